@@ -1,3 +1,4 @@
 //! fechner: a path tracer that stops sampling where the eye stops seeing.
-pub mod scene;
 pub mod bsdf;
+pub mod exr_read;
+pub mod scene;

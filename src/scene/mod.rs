@@ -6,6 +6,9 @@
 use glam::{Affine3A, Mat3, Vec2, Vec3, Vec4};
 use std::sync::Arc;
 
+pub mod load;
+pub mod texture;
+
 /// Index into [`Scene::meshes`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct MeshId(pub u32);
@@ -147,7 +150,7 @@ pub struct ScalarInput {
     pub texture: Option<(TextureLookup, u8)>,
 }
 
-/// A texture and how its coordinates are made: uv' = scale·R(rotation)·uv + offset.
+/// A texture and how its coordinates are made: uv' = R(rotation)·(scale·uv) + offset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureLookup {
     /// Which texture.
@@ -163,21 +166,32 @@ pub struct TextureLookup {
 impl ColorInput {
     /// The same colour everywhere.
     pub const fn constant(factor: Vec3) -> Self {
-        Self { factor, texture: None }
+        Self {
+            factor,
+            texture: None,
+        }
     }
 }
 
 impl ScalarInput {
     /// The same value everywhere.
     pub const fn constant(factor: f32) -> Self {
-        Self { factor, texture: None }
+        Self {
+            factor,
+            texture: None,
+        }
     }
 }
 
 impl TextureLookup {
     /// The texture with the mesh's own coordinates.
     pub const fn plain(texture: TextureId) -> Self {
-        Self { texture, offset: Vec2::ZERO, rotation: 0.0, scale: Vec2::ONE }
+        Self {
+            texture,
+            offset: Vec2::ZERO,
+            rotation: 0.0,
+            scale: Vec2::ONE,
+        }
     }
 }
 
@@ -271,7 +285,7 @@ pub enum Surface {
 }
 
 /// How texel values are encoded.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Encoding {
     /// Colour under the sRGB transfer function.
     Srgb,
