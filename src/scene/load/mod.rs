@@ -21,6 +21,7 @@ mod default_view;
 pub mod environment;
 mod error;
 mod files;
+mod gltf;
 pub mod metals;
 mod mtl;
 mod obj;
@@ -64,6 +65,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
     match extension.as_deref() {
         Some("toml") => toml::load(path, options),
         Some("obj") => obj::load(path, options),
+        Some("gltf" | "glb") => gltf::load(path, options),
         _ => {
             // A wrong path is the likelier slip: say that first.
             let metadata =

@@ -175,17 +175,23 @@ impl Libraries {
 fn clean(text: &str) -> String {
     let mut cleaned = String::with_capacity(text.len() + 1);
     let mut joined = 0;
+    let mut is_numeric = false;
     for line in text.lines() {
+        let is_start = joined == 0;
+        let line = if is_start { line.trim_start() } else { line };
+        // A name may hold '#', numbers may not.
+        is_numeric = if is_start {
+            line.starts_with(['v', 'f'])
+        } else {
+            is_numeric
+        };
+        let line = if is_numeric {
+            line.split('#').next().unwrap_or(line)
+        } else {
+            line
+        };
         let continued = line.trim_end().strip_suffix('\\');
         let part = continued.unwrap_or(line);
-        let is_start = joined == 0;
-        let part = if is_start { part.trim_start() } else { part };
-        // A name may hold '#', numbers may not.
-        let part = if part.starts_with(['v', 'f']) {
-            part.split('#').next().unwrap_or(part)
-        } else {
-            part
-        };
         match part.split_once('\t') {
             Some(_) => cleaned.extend(part.chars().map(|c| if c == '\t' { ' ' } else { c })),
             None => cleaned.push_str(if is_start && part.trim() == "usemtl" {

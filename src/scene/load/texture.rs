@@ -24,10 +24,6 @@ pub(super) enum Picture {
     /// A file.
     File(PathBuf),
     /// Bytes inside another file; the name is for messages and tells them apart.
-    #[expect(
-        dead_code,
-        reason = "for pictures inside glTF files, which are not read yet"
-    )]
     Memory { name: String, bytes: Arc<Vec<u8>> },
 }
 

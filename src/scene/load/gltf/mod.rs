@@ -1,0 +1,395 @@
+//! glTF 2.0 and GLB through the `gltf` crate's document, with buffers, accessors and images read by ourselves (see
+//! [`buffers`]): its readers panic on damaged files.
+//!
+//! Rest poses only: animations, skins and morph targets are noted and left out.
+
+mod buffers;
+mod material;
+
+use self::buffers::Buffers;
+use self::material::Materials;
+use super::builder::{Builder, IfDark, NamedCamera};
+use super::error::LoadError;
+use super::{LoadOptions, files};
+use crate::scene::{Camera, Instance, Light, MaterialId, Mesh, MeshId, Scene};
+use ::gltf::mesh::{Mode, Semantic};
+use glam::{Affine3A, Mat4, Vec2, Vec3, Vec4};
+use std::collections::HashMap;
+use std::path::Path;
+
+/// Deepest chain of nodes; the recursion would otherwise end at the stack's size.
+const DEEPEST_NODE: usize = 256;
+/// Most placed meshes: a node below many parents is placed once for each.
+const MOST_INSTANCES: usize = 4_000_000;
+
+/// Extensions that are done, or change nothing that a rest pose shows.
+const KNOWN: &[&str] = &[
+    "KHR_lights_punctual",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+];
+
+/// Reads a glTF or GLB file.
+pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
+    let bytes = files::read(path)?;
+    let container = buffers::split(path, &bytes)?;
+    let mut builder = Builder::new(path);
+    let document = parse(path, container.json, &mut builder)?;
+    let buffers = Buffers::read(path, &document, container.binary)?;
+
+    let Some(scene) = document
+        .default_scene()
+        .or_else(|| document.scenes().next())
+    else {
+        return Err(LoadError::invalid(
+            path,
+            "nothing to render: the file has no scene",
+        ));
+    };
+    let mut reader = Reader {
+        path,
+        buffers: &buffers,
+        materials: Materials::new(path, &document, &buffers),
+        meshes: HashMap::new(),
+        ancestors: Vec::new(),
+        builder: &mut builder,
+    };
+    for node in scene.nodes() {
+        reader.node(&node, Mat4::IDENTITY)?;
+    }
+    if document.animations().next().is_some() {
+        builder.note("Animations are not played: the rest pose is shown.");
+    }
+    builder.finish(path, IfDark::Studio, options)
+}
+
+/// The document, checked by the crate, after our own look at its extensions.
+fn parse(path: &Path, json: &[u8], builder: &mut Builder) -> Result<::gltf::Document, LoadError> {
+    let mut root: ::gltf::json::Root = serde_json::from_slice(json).map_err(|error| {
+        let place = super::Place {
+            file: path.to_owned(),
+            line: Some(error.line()).filter(|&line| line > 0),
+        };
+        LoadError::invalid_at(place, format_args!("not valid glTF: {error}"))
+    })?;
+    if let Some(refused) = root
+        .extensions_required
+        .iter()
+        .find(|name| !KNOWN.contains(&name.as_str()))
+    {
+        let advice = match refused.as_str() {
+            "KHR_draco_mesh_compression" | "EXT_meshopt_compression" => {
+                "; export it without mesh compression"
+            }
+            "KHR_texture_basisu" | "EXT_texture_webp" => "; export its textures as PNG or JPEG",
+            _ => "",
+        };
+        return Err(LoadError::unsupported(
+            path,
+            format_args!("needs the extension {refused}, which is not read{advice}"),
+        ));
+    }
+    for name in root
+        .extensions_used
+        .iter()
+        .filter(|name| !KNOWN.contains(&name.as_str()))
+    {
+        let instead = match name.as_str() {
+            "KHR_materials_clearcoat" => "the layer below is rendered without its coat",
+            "KHR_materials_sheen" => "the cloth is rendered without its sheen",
+            "KHR_materials_specular" => "the dielectric's usual reflection is rendered",
+            "KHR_materials_variants" => "the default variant is rendered",
+            _ => "it is left out",
+        };
+        builder.note(format!("{name} is not supported: {instead}."));
+    }
+    // The crate refuses some that we do ourselves.
+    root.extensions_required.clear();
+    let version = root.asset.version.clone();
+    if !version.starts_with("2.") {
+        return Err(LoadError::unsupported(
+            path,
+            format_args!("glTF version {version}; version 2 is read"),
+        ));
+    }
+    ::gltf::Document::from_json(root)
+        .map_err(|error| LoadError::invalid(path, format_args!("not valid glTF: {error}")))
+}
+
+struct Reader<'a> {
+    path: &'a Path,
+    buffers: &'a Buffers,
+    materials: Materials<'a>,
+    /// Meshes and materials by (mesh, primitive); `None` for primitives that are not rendered.
+    meshes: HashMap<usize, Vec<(MeshId, MaterialId)>>,
+    /// Nodes above the current one.
+    ancestors: Vec<usize>,
+    builder: &'a mut Builder,
+}
+
+impl Reader<'_> {
+    fn node(&mut self, node: &::gltf::Node, parent: Mat4) -> Result<(), LoadError> {
+        if self.ancestors.contains(&node.index()) {
+            return Err(LoadError::invalid(
+                self.path,
+                format_args!("node {} is its own ancestor", node.index()),
+            ));
+        }
+        if self.ancestors.len() >= DEEPEST_NODE {
+            return Err(LoadError::invalid(
+                self.path,
+                format_args!("nodes nested deeper than {DEEPEST_NODE}"),
+            ));
+        }
+        let matrix = parent * Mat4::from_cols_array_2d(&node.transform().matrix());
+        let to_world = Affine3A::from_mat4(matrix);
+        let name = node
+            .name()
+            .map_or_else(|| format!("node {}", node.index()), str::to_owned);
+        if let Some(mesh) = node.mesh() {
+            if node.skin().is_some() {
+                self.builder.note(format!(
+                    "\"{name}\": its skin is not applied, the mesh is shown as modelled."
+                ));
+            }
+            self.place(&mesh, &name, to_world)?;
+        }
+        if let Some(camera) = node.camera() {
+            self.camera(&camera, &name, &to_world);
+        }
+        if let Some(light) = node.light() {
+            self.light(&light, &to_world);
+        }
+        self.ancestors.push(node.index());
+        for child in node.children() {
+            self.node(&child, matrix)?;
+        }
+        self.ancestors.pop();
+        Ok(())
+    }
+
+    fn place(
+        &mut self,
+        mesh: &::gltf::Mesh,
+        name: &str,
+        to_world: Affine3A,
+    ) -> Result<(), LoadError> {
+        if !self.meshes.contains_key(&mesh.index()) {
+            let mut parts = Vec::new();
+            for primitive in mesh.primitives() {
+                if let Some(converted) = self.primitive(mesh, &primitive)? {
+                    let material = self.materials.get(self.builder, &primitive.material())?;
+                    parts.push((self.builder.add_mesh(converted), material));
+                }
+            }
+            self.meshes.insert(mesh.index(), parts);
+        }
+        let parts = &self.meshes[&mesh.index()];
+        if self.builder.instances.len() + parts.len() > MOST_INSTANCES {
+            return Err(LoadError::too_large(
+                self.path,
+                format_args!("more than {MOST_INSTANCES} placed meshes"),
+            ));
+        }
+        self.builder
+            .instances
+            .extend(parts.iter().map(|&(mesh, material)| Instance {
+                name: name.to_owned(),
+                mesh,
+                material,
+                to_world,
+            }));
+        Ok(())
+    }
+
+    fn primitive(
+        &mut self,
+        mesh: &::gltf::Mesh,
+        from: &::gltf::Primitive,
+    ) -> Result<Option<Mesh>, LoadError> {
+        let name = mesh
+            .name()
+            .map_or_else(|| format!("mesh {}", mesh.index()), str::to_owned);
+        if matches!(
+            from.mode(),
+            Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip
+        ) {
+            self.builder
+                .note(format!("\"{name}\": points and lines are not rendered."));
+            return Ok(None);
+        }
+        let Some(positions) = from.get(&Semantic::Positions) else {
+            self.builder
+                .note(format!("\"{name}\" has no positions and is left out."));
+            return Ok(None);
+        };
+        let positions: Vec<Vec3> = self
+            .buffers
+            .floats(&positions)?
+            .into_iter()
+            .map(Vec3::from_array)
+            .collect();
+        let vectors = |semantic| {
+            from.get(&semantic)
+                .map(|accessor| self.buffers.floats::<3>(&accessor))
+                .transpose()
+        };
+        let normals = vectors(Semantic::Normals)?
+            .unwrap_or_default()
+            .into_iter()
+            .map(Vec3::from_array)
+            .collect();
+        let uvs = from
+            .get(&Semantic::TexCoords(0))
+            .map(|accessor| self.buffers.floats(&accessor))
+            .transpose()?;
+        let tangents = from
+            .get(&Semantic::Tangents)
+            .map(|accessor| self.buffers.floats(&accessor))
+            .transpose()?;
+        if from.get(&Semantic::Colors(0)).is_some() {
+            self.builder
+                .note(format!("\"{name}\": vertex colours are not used."));
+        }
+        if from.morph_targets().next().is_some() {
+            self.builder
+                .note(format!("\"{name}\": morph targets are not applied."));
+        }
+        let indices = match from.indices() {
+            Some(accessor) => self.buffers.indices(&accessor)?,
+            None => (0..positions.len() as u32).collect(),
+        };
+        if let Some(index) = indices
+            .iter()
+            .find(|&&index| index as usize >= positions.len())
+        {
+            let problem = format!(
+                "\"{name}\" has {} vertices, but index {index} is used",
+                positions.len()
+            );
+            return Err(LoadError::invalid(self.path, problem));
+        }
+        Ok(Some(Mesh {
+            name,
+            positions,
+            normals,
+            uvs: uvs
+                .unwrap_or_default()
+                .into_iter()
+                .map(Vec2::from_array)
+                .collect(),
+            tangents: tangents
+                .unwrap_or_default()
+                .into_iter()
+                .map(Vec4::from_array)
+                .collect(),
+            triangles: triangles(&indices, from.mode()),
+        }))
+    }
+
+    fn camera(&mut self, camera: &::gltf::Camera, node: &str, to_world: &Affine3A) {
+        let name = camera.name().unwrap_or(node).to_owned();
+        let ::gltf::camera::Projection::Perspective(perspective) = camera.projection() else {
+            self.builder.note(format!(
+                "Camera \"{name}\" is orthographic and is left out."
+            ));
+            return;
+        };
+        let position = Vec3::from(to_world.translation);
+        let forward = to_world.transform_vector3(Vec3::NEG_Z).try_normalize();
+        let up = to_world.transform_vector3(Vec3::Y).try_normalize();
+        let fov = perspective.yfov().to_degrees();
+        let (Some(forward), Some(up)) = (forward, up) else {
+            return;
+        };
+        if !position.is_finite()
+            || !(0.001..=179.0).contains(&fov)
+            || forward.cross(up).length() < 1e-5
+        {
+            self.builder.note(format!(
+                "Camera \"{name}\" is left out: its transform or angle is not usable."
+            ));
+            return;
+        }
+        let camera = Camera {
+            position,
+            forward,
+            up,
+            vertical_fov_deg: fov,
+            aperture_radius: 0.0,
+            focus_distance: 1.0,
+        };
+        self.builder.cameras.push(NamedCamera { name, camera });
+    }
+
+    fn light(&mut self, light: &::gltf::khr_lights_punctual::Light, to_world: &Affine3A) {
+        use ::gltf::khr_lights_punctual::Kind;
+        let strength = Vec3::from_array(light.color()) * light.intensity();
+        let position = Vec3::from(to_world.translation);
+        let Some(direction) = to_world.transform_vector3(Vec3::NEG_Z).try_normalize() else {
+            return;
+        };
+        if !strength.is_finite() || !position.is_finite() {
+            self.builder.note("A light that is not finite is left out.");
+            return;
+        }
+        let strength = strength.max(Vec3::ZERO);
+        self.builder.lights.push(match light.kind() {
+            Kind::Directional => Light::Directional {
+                direction,
+                irradiance: strength,
+            },
+            Kind::Point => Light::Point {
+                position,
+                intensity: strength,
+            },
+            Kind::Spot {
+                inner_cone_angle,
+                outer_cone_angle,
+            } => {
+                let quarter = std::f32::consts::FRAC_PI_2;
+                let outer = if outer_cone_angle > 0.0 {
+                    outer_cone_angle.min(quarter)
+                } else {
+                    quarter / 2.0
+                };
+                let inner = if inner_cone_angle >= 0.0 {
+                    inner_cone_angle.min(outer)
+                } else {
+                    0.0
+                };
+                Light::Spot {
+                    position,
+                    direction,
+                    intensity: strength,
+                    inner_angle: inner,
+                    outer_angle: outer,
+                }
+            }
+        });
+    }
+}
+
+/// The triangles of lists, strips and fans; an incomplete last one is dropped.
+fn triangles(indices: &[u32], mode: Mode) -> Vec<[u32; 3]> {
+    match mode {
+        Mode::TriangleStrip => {
+            let flip = |(place, three): (usize, &[u32])| match place % 2 {
+                0 => [three[0], three[1], three[2]],
+                _ => [three[1], three[0], three[2]],
+            };
+            indices.windows(3).enumerate().map(flip).collect()
+        }
+        Mode::TriangleFan => indices
+            .windows(2)
+            .skip(1)
+            .map(|pair| [indices[0], pair[0], pair[1]])
+            .collect(),
+        _ => indices.as_chunks::<3>().0.to_vec(),
+    }
+}
