@@ -35,7 +35,10 @@ pub(super) fn read_into(
     path: &Path,
     with_materials: bool,
 ) -> Result<Vec<(MeshId, MaterialId)>, LoadError> {
-    let text = clean(&files::decode_loosely(path, files::read(path)?)?);
+    let Cleaned {
+        text,
+        has_vertex_colors,
+    } = clean(&files::decode_loosely(path, files::read(path)?)?);
     let libraries = RefCell::new(Libraries::default());
     let mut reader = CountingReader {
         rest: text.as_bytes(),
@@ -103,10 +106,7 @@ pub(super) fn read_into(
             "{name}: {sparse_faces} points and lines are not rendered."
         ));
     }
-    if models
-        .iter()
-        .any(|model| !model.mesh.vertex_color.is_empty())
-    {
+    if has_vertex_colors {
         builder.note(format!("{name}: vertex colours are not used."));
     }
     if placed.is_empty() {
@@ -170,9 +170,16 @@ impl Libraries {
     }
 }
 
+/// An OBJ file's text as `tobj` can read it.
+struct Cleaned {
+    text: String,
+    has_vertex_colors: bool,
+}
+
 /// The text with continued lines joined (blank lines keep the count), comments behind numbers cut off, and empty
 /// `usemtl` statements left out: all three stop `tobj`.
-fn clean(text: &str) -> String {
+fn clean(text: &str) -> Cleaned {
+    let mut has_vertex_colors = false;
     let mut cleaned = String::with_capacity(text.len() + 1);
     let mut joined = 0;
     let mut is_numeric = false;
@@ -192,6 +199,13 @@ fn clean(text: &str) -> String {
         };
         let continued = line.trim_end().strip_suffix('\\');
         let part = continued.unwrap_or(line);
+        // Colours behind positions: tobj refuses files that give them to some vertices only, and we do not use them.
+        let mut part = part;
+        if is_start && part.starts_with("v ") && part.split_whitespace().count() > 6 {
+            has_vertex_colors = true;
+            let fourth = part.split_whitespace().nth(4).unwrap_or_default();
+            part = &part[..fourth.as_ptr() as usize - part.as_ptr() as usize];
+        }
         match part.split_once('\t') {
             Some(_) => cleaned.extend(part.chars().map(|c| if c == '\t' { ' ' } else { c })),
             None => cleaned.push_str(if is_start && part.trim() == "usemtl" {
@@ -208,7 +222,10 @@ fn clean(text: &str) -> String {
             joined = 0;
         }
     }
-    cleaned
+    Cleaned {
+        text: cleaned,
+        has_vertex_colors,
+    }
 }
 
 /// Hands out text and counts the lines, because `tobj`'s errors have none.
@@ -438,7 +455,7 @@ mod tests {
 
     #[test]
     fn cleaning_keeps_line_numbers() {
-        let text = clean("v 1 2 \\\n 3 # here\nusemtl \n\tf 1\t2 3\ng a#b\n");
+        let text = clean("v 1 2 \\\n 3 # here\nusemtl \n\tf 1\t2 3\ng a#b\n").text;
         assert_eq!(
             text.lines().collect::<Vec<_>>(),
             ["v 1 2   3 ", "", "", "f 1 2 3", "g a#b"]
