@@ -1,0 +1,493 @@
+//! Reads EXR files that anybody may have made or damaged.
+//!
+//! The header is read first and its claims are checked against the file's length and a limit on memory; only then are
+//! pixels read. The `exr` crate alone believes the header and asks for as much memory as it says, which ends the program.
+
+use crate::output::Attribute;
+use ::exr::meta::attribute::{AttributeValue, Text};
+use ::exr::meta::header::Header;
+use ::exr::meta::{BlockDescription, MetaData};
+use ::exr::prelude::{FlatSamples, ReadChannels, ReadLayers, Vec2, read};
+use std::fs::File;
+use std::io::BufReader;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+
+/// Most memory that the pixels of a file may take as 32-bit floats: 1 GiB, a 4K frame with 30 channels.
+pub const MEMORY_LIMIT_BYTES: u64 = 1 << 30;
+
+/// An EXR file in memory.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExrImage {
+    /// Width of the data window in pixels.
+    pub width: u32,
+    /// Height of the data window in pixels.
+    pub height: u32,
+    /// Place of the data window's top left pixel, x to the right and y down.
+    pub data_window_origin: (i32, i32),
+    /// Channels by name, row-major from the top left, whole numbers and halves as floats. A channel of a named part has
+    /// the part's name before its own: `beauty.R`; a file of one part keeps its names.
+    pub channels: Vec<(String, Vec<f32>)>,
+    /// How the file stores each of `channels`.
+    pub types: Vec<SampleType>,
+    /// Attributes of the first part, sorted by name. Other types than text and numbers are given as text.
+    pub attributes: Vec<(String, Attribute)>,
+    /// Parts that were left out because their size differs from the first one's.
+    pub parts_left_out: Vec<String>,
+}
+
+/// How a file stores a channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SampleType {
+    /// 16-bit float.
+    Half,
+    /// 32-bit float.
+    Float,
+    /// 32-bit unsigned integer.
+    Uint,
+}
+
+impl std::fmt::Display for SampleType {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(match self {
+            Self::Half => "half",
+            Self::Float => "float",
+            Self::Uint => "uint",
+        })
+    }
+}
+
+impl ExrImage {
+    /// The values of a channel, if it is there.
+    pub fn channel(&self, name: &str) -> Option<&[f32]> {
+        self.channels
+            .iter()
+            .find(|(n, _)| n == name)
+            .map(|(_, values)| values.as_slice())
+    }
+
+    /// An attribute of the first part, if it is there.
+    pub fn attribute(&self, name: &str) -> Option<&Attribute> {
+        self.attributes
+            .iter()
+            .find(|(n, _)| n == name)
+            .map(|(_, value)| value)
+    }
+}
+
+/// Why an EXR file could not be read.
+#[derive(Debug, thiserror::Error)]
+pub enum ExrReadError {
+    /// The operating system refused.
+    #[error("cannot read {}: {source}", .path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file is damaged or no EXR file.
+    #[error("cannot read {}: damaged or no EXR file ({problem})", .path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// The file may be sound, but has something that is not read here.
+    #[error("cannot read {}: {feature}", .path.display())]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+        /// What it has, and what would be right.
+        feature: String,
+    },
+    /// The pixels would take more than [`MEMORY_LIMIT_BYTES`].
+    #[error(
+        "cannot read {}: {width}×{height} pixels of {channels} channels need {} MiB, more than the {} MiB allowed",
+        .path.display(), .bytes >> 20, MEMORY_LIMIT_BYTES >> 20
+    )]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Width that the header claims.
+        width: u64,
+        /// Height that the header claims.
+        height: u64,
+        /// Channels of all parts.
+        channels: usize,
+        /// Memory that would be needed.
+        bytes: u64,
+    },
+}
+
+/// Reads every channel of a file's parts.
+pub fn read_exr(path: &Path) -> Result<ExrImage, ExrReadError> {
+    let headers = read_headers(path)?;
+    // A second opening of the file: the reader below wants to start at its beginning.
+    let image = guarded(path, || {
+        read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .all_channels()
+            .all_layers()
+            .all_attributes()
+            .from_buffered(open(path)?)
+    })?;
+    let first = &headers[0];
+    let mut result = ExrImage {
+        width: first.layer_size.0 as u32,
+        height: first.layer_size.1 as u32,
+        data_window_origin: (
+            first.own_attributes.layer_position.0,
+            first.own_attributes.layer_position.1,
+        ),
+        channels: Vec::new(),
+        types: Vec::new(),
+        attributes: attributes(first),
+        parts_left_out: Vec::new(),
+    };
+    let several = image.layer_data.len() > 1;
+    for layer in image.layer_data {
+        let part = layer
+            .attributes
+            .layer_name
+            .as_ref()
+            .map(Text::to_string)
+            .unwrap_or_default();
+        if layer.size != first.layer_size {
+            result.parts_left_out.push(part);
+            continue;
+        }
+        for channel in layer.channel_data.list {
+            let name = channel.name.to_string();
+            let name = if several && !part.is_empty() {
+                format!("{part}.{name}")
+            } else {
+                name
+            };
+            let (values, kind) = match channel.sample_data {
+                FlatSamples::F32(values) => (values, SampleType::Float),
+                FlatSamples::F16(values) => (
+                    values.iter().map(|v| v.to_f32()).collect(),
+                    SampleType::Half,
+                ),
+                FlatSamples::U32(values) => {
+                    (values.iter().map(|&v| v as f32).collect(), SampleType::Uint)
+                }
+            };
+            result.channels.push((name, values));
+            result.types.push(kind);
+        }
+    }
+    Ok(result)
+}
+
+/// Reads the headers of all parts and refuses what could not be read within [`MEMORY_LIMIT_BYTES`].
+fn read_headers(path: &Path) -> Result<Vec<Header>, ExrReadError> {
+    let io = |source| ExrReadError::Io {
+        path: path.to_owned(),
+        source,
+    };
+    let damaged = |problem: String| ExrReadError::Damaged {
+        path: path.to_owned(),
+        problem,
+    };
+    let unsupported = |feature: &str| ExrReadError::Unsupported {
+        path: path.to_owned(),
+        feature: feature.to_owned(),
+    };
+
+    let found = path.metadata().map_err(io)?;
+    if found.is_dir() {
+        return Err(io(std::io::Error::new(
+            std::io::ErrorKind::IsADirectory,
+            "it is a folder, not an EXR file",
+        )));
+    }
+    if found.len() == 0 {
+        return Err(damaged("it is empty".to_owned()));
+    }
+    let headers = guarded(path, || MetaData::read_from_buffered(open(path)?, false))?.headers;
+    let Some(first) = headers.first() else {
+        return Err(damaged("it has no part".to_owned()));
+    };
+
+    let mut bytes: u64 = 0;
+    let mut chunks: u64 = 0;
+    for header in &headers {
+        if header.deep {
+            return Err(unsupported(
+                "deep pixels are not read; flatten the picture first",
+            ));
+        }
+        if header
+            .channels
+            .list
+            .iter()
+            .any(|channel| channel.sampling != Vec2(1, 1))
+        {
+            return Err(unsupported(
+                "subsampled channels are not read; write the picture as RGB",
+            ));
+        }
+        let Vec2(width, height) = header.layer_size;
+        if width == 0 || height == 0 {
+            return Err(damaged("it has no pixels".to_owned()));
+        }
+        let pixels = (width as u64).saturating_mul(height as u64);
+        let channels = header.channels.list.len() as u64;
+        bytes = bytes.saturating_add(pixels.saturating_mul(channels * 4));
+        // A single block is unpacked at once, and tiles may be larger than the picture.
+        if let BlockDescription::Tiles(tiles) = header.blocks {
+            let tile_pixels = (tiles.tile_size.0 as u64).saturating_mul(tiles.tile_size.1 as u64);
+            if tile_pixels.saturating_mul(channels * 4) > MEMORY_LIMIT_BYTES / 4 {
+                return Err(damaged(format!(
+                    "tiles of {}×{} pixels",
+                    tiles.tile_size.0, tiles.tile_size.1
+                )));
+            }
+        }
+        chunks = chunks.saturating_add(header.chunk_count as u64);
+    }
+    if bytes > MEMORY_LIMIT_BYTES {
+        return Err(ExrReadError::TooLarge {
+            path: path.to_owned(),
+            width: first.layer_size.0 as u64,
+            height: first.layer_size.1 as u64,
+            channels: headers
+                .iter()
+                .map(|header| header.channels.list.len())
+                .sum(),
+            bytes,
+        });
+    }
+    // Each chunk takes 8 bytes in the table of offsets, and a place and a length of 4 bytes each where it stands.
+    if chunks.saturating_mul(16) > found.len() {
+        return Err(damaged(format!(
+            "it is too short for the {chunks} blocks that its header tells of"
+        )));
+    }
+    Ok(headers.into_vec())
+}
+
+fn open(path: &Path) -> std::io::Result<BufReader<File>> {
+    Ok(BufReader::new(File::open(path)?))
+}
+
+/// Runs the library, and turns its errors, and panics on damaged data, into ours.
+fn guarded<T>(
+    path: &Path,
+    run: impl FnOnce() -> ::exr::error::Result<T>,
+) -> Result<T, ExrReadError> {
+    use ::exr::error::Error;
+    let path = path.to_owned();
+    match catch_unwind(AssertUnwindSafe(run)) {
+        Ok(Ok(value)) => Ok(value),
+        Ok(Err(Error::Io(source))) => Err(ExrReadError::Io { path, source }),
+        Ok(Err(Error::NotSupported(what))) => Err(ExrReadError::Unsupported {
+            path,
+            feature: format!("{what} is not read; convert the file to ZIP first"),
+        }),
+        Ok(Err(Error::Invalid(problem))) => Err(ExrReadError::Damaged {
+            path,
+            problem: problem.into_owned(),
+        }),
+        Ok(Err(Error::Aborted)) => Err(ExrReadError::Damaged {
+            path,
+            problem: "reading ended early".to_owned(),
+        }),
+        Err(_) => Err(ExrReadError::Damaged {
+            path,
+            problem: "its blocks contradict its header".to_owned(),
+        }),
+    }
+}
+
+/// What the header says besides the pixels' layout, sorted by name.
+fn attributes(header: &Header) -> Vec<(String, Attribute)> {
+    let own = &header.own_attributes;
+    let mut list: Vec<(String, Attribute)> = own
+        .other
+        .iter()
+        .chain(&header.shared_attributes.other)
+        .map(|(name, value)| (name.to_string(), attribute(value)))
+        .collect();
+    let mut text = |name: &str, value: &Option<Text>| {
+        if let Some(value) = value {
+            list.push((name.to_owned(), Attribute::Text(value.to_string())));
+        }
+    };
+    text("name", &own.layer_name);
+    text("owner", &own.owner);
+    text("comments", &own.comments);
+    text("capDate", &own.capture_date);
+    text("software", &own.software_name);
+    if let Some(nits) = own.white_luminance {
+        list.push(("whiteLuminance".to_owned(), Attribute::Float(nits)));
+    }
+    if let Some(c) = header.shared_attributes.chromaticities {
+        let [r, g, b, w] = [c.red, c.green, c.blue, c.white].map(|Vec2(x, y)| format!("{x} {y}"));
+        let text = format!("red {r}, green {g}, blue {b}, white {w}");
+        list.push(("chromaticities".to_owned(), Attribute::Text(text)));
+    }
+    list.sort_by(|a, b| a.0.cmp(&b.0));
+    list
+}
+
+fn attribute(value: &AttributeValue) -> Attribute {
+    match value {
+        AttributeValue::Text(text) => Attribute::Text(text.to_string()),
+        AttributeValue::F32(number) => Attribute::Float(*number),
+        AttributeValue::F64(number) => Attribute::Text(number.to_string()),
+        AttributeValue::I32(number) => Attribute::Integer(*number),
+        AttributeValue::Bytes { type_hint, bytes } => {
+            Attribute::Text(format!("{} bytes of {type_hint}", bytes.len()))
+        }
+        other => Attribute::Text(format!("{other:?}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::output::{Picture, write_exr};
+    use std::time::{Duration, Instant};
+
+    /// Peak memory of this process in KiB, where the system tells.
+    fn peak_memory_kib() -> Option<u64> {
+        let status = std::fs::read_to_string("/proc/self/status").ok()?;
+        let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+        line.split_whitespace().nth(1)?.parse().ok()
+    }
+
+    #[test]
+    fn damaged_files_end_in_an_error_or_a_picture_soon_and_in_little_memory() {
+        let folder =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets/faults/exr-damaged");
+        let Ok(files) = std::fs::read_dir(&folder) else {
+            println!("skipped: {} is not there", folder.display());
+            return;
+        };
+        let mut readable = 0;
+        let mut refused = 0;
+        for file in files {
+            let path = file.unwrap().path();
+            let start = Instant::now();
+            match read_exr(&path) {
+                Ok(image) => {
+                    readable += 1;
+                    assert!(
+                        image
+                            .channels
+                            .iter()
+                            .all(|(_, v)| v.len() == (image.width * image.height) as usize)
+                    );
+                }
+                Err(error) => {
+                    refused += 1;
+                    let message = error.to_string();
+                    assert!(
+                        message.starts_with("cannot read ") && !message.contains('\n'),
+                        "{message}"
+                    );
+                    println!("{message}");
+                }
+            }
+            assert!(
+                start.elapsed() < Duration::from_secs(5),
+                "{} took {:?}",
+                path.display(),
+                start.elapsed()
+            );
+        }
+        println!(
+            "{readable} readable, {refused} refused, peak {:?} KiB",
+            peak_memory_kib()
+        );
+        assert!(refused > 50, "{refused} refused");
+        if let Some(kib) = peak_memory_kib() {
+            assert!(kib < 1 << 20, "peak memory {kib} KiB");
+        }
+    }
+
+    /// A small sound file, to be damaged.
+    fn sound_file(folder: &Path) -> Vec<u8> {
+        let path = folder.join("sound.exr");
+        let mut picture = Picture::new(16, 16);
+        let values: Vec<f32> = (0..256).map(|i| (i * i % 17) as f32).collect();
+        picture.push_f32("R", &values[..]);
+        picture.push_f16("G", &values[..]);
+        write_exr(&path, &picture).unwrap();
+        std::fs::read(path).unwrap()
+    }
+
+    #[test]
+    fn every_cut_of_a_file_is_an_error() {
+        let folder = tempfile::tempdir().unwrap();
+        let bytes = sound_file(folder.path());
+        let path = folder.path().join("cut.exr");
+        for length in 0..bytes.len() {
+            std::fs::write(&path, &bytes[..length]).unwrap();
+            assert!(
+                read_exr(&path).is_err(),
+                "cut to {length} of {} bytes",
+                bytes.len()
+            );
+        }
+    }
+
+    #[test]
+    fn any_changed_byte_is_survived() {
+        let folder = tempfile::tempdir().unwrap();
+        let bytes = sound_file(folder.path());
+        let path = folder.path().join("changed.exr");
+        for at in 0..bytes.len() {
+            for value in [0x00, 0x7f, 0xff] {
+                let mut changed = bytes.clone();
+                changed[at] = value;
+                std::fs::write(&path, changed).unwrap();
+                if let Ok(image) = read_exr(&path) {
+                    assert!(
+                        u64::from(image.width) * u64::from(image.height) * 8 <= MEMORY_LIMIT_BYTES
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_picture_too_large_for_memory_is_refused_by_its_size() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut bytes = sound_file(folder.path());
+        let name = b"dataWindow\0box2i\0";
+        let at = bytes
+            .windows(name.len())
+            .position(|window| window == name)
+            .unwrap()
+            + name.len()
+            + 4;
+        bytes[at + 8..at + 12].copy_from_slice(&99_999i32.to_le_bytes());
+        bytes[at + 12..at + 16].copy_from_slice(&99_999i32.to_le_bytes());
+        let path = folder.path().join("large.exr");
+        std::fs::write(&path, bytes).unwrap();
+        let message = read_exr(&path).unwrap_err().to_string();
+        assert!(
+            message.contains("100000×100000 pixels of 2 channels need 76293 MiB"),
+            "{message}"
+        );
+    }
+
+    #[test]
+    fn what_is_no_exr_file_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let message = |path: &Path| read_exr(path).unwrap_err().to_string();
+        assert!(message(folder.path()).contains("it is a folder"));
+        assert!(message(&folder.path().join("none.exr")).contains("none.exr"));
+        let path = folder.path().join("text.exr");
+        std::fs::write(&path, "").unwrap();
+        assert!(message(&path).contains("it is empty"));
+        std::fs::write(&path, "not a picture").unwrap();
+        assert!(message(&path).contains("damaged or no EXR file"));
+    }
+}
