@@ -21,6 +21,8 @@ pub struct Judgement {
     pub tone: Box<dyn FittedTone>,
     /// Thresholds from the guide.
     pub thresholds: ThresholdMap,
+    /// Variance of the picture's luminance in (scene cd/m²)², with what stratification makes of it.
+    pub variance_of_mean: Plane,
     /// Variance of the picture as displayed, by pooled statistics and the low-discrepancy factor.
     pub display_variance: Plane,
     /// Visibility that the variance predicts.
@@ -51,6 +53,9 @@ pub fn judge(film: &Film, settings: &LoopSettings) -> Result<Judgement, JudgeErr
     )?;
 
     let nits_squared = settings.nits_per_unit * settings.nits_per_unit;
+    let variance_of_mean = Plane::from_fn(film.width() as usize, film.height() as usize, |x, y| {
+        (f64::from(statistics.variance_of_mean.get(x, y)) * nits_squared) as f32
+    });
     let (width, height) = (film.width() as usize, film.height() as usize);
     let scene_variance = |per_sample: &Plane| {
         Plane::from_fn(width, height, |x, y| {
@@ -75,7 +80,7 @@ pub fn judge(film: &Film, settings: &LoopSettings) -> Result<Judgement, JudgeErr
         seen::display_half_difference(tone.as_ref(), display, &estimate.luminance_cd_m2, &estimate.half_difference);
     let predicted = thresholds.predicted_visibility(&display_variance);
     let measured = thresholds.measured_visibility(&displayed_difference);
-    Ok(Judgement { estimate, tone, thresholds, display_variance, predicted, measured, variance_per_sample })
+    Ok(Judgement { estimate, tone, thresholds, variance_of_mean, display_variance, predicted, measured, variance_per_sample })
 }
 
 /// Luminance of the denoised picture: what adaptation, masking and the operator are made from, so that noise neither

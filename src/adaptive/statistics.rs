@@ -25,6 +25,9 @@ pub struct SampleStatistics {
     /// Ratio of the halves' squared difference to what independent samples would show, pooled: below 1 where
     /// stratification pays.
     pub low_discrepancy_factor: Plane,
+    /// Variance of the picture's luminance, scene units squared: the pixel's own scatter, times the same factor with the
+    /// pixel itself counted in. For reports, not for decisions.
+    pub variance_of_mean: Plane,
 }
 
 impl SampleStatistics {
@@ -47,6 +50,7 @@ impl SampleStatistics {
             pooled: plane(&|i| pooled[i].variance),
             for_half: [plane(&|i| decided_by(b, i)), plane(&|i| decided_by(a, i))],
             low_discrepancy_factor: plane(&|i| pooled[i].factor),
+            variance_of_mean: plane(&|i| evidence[i].variance_of_mean * pooled[i].factor_with_own),
         }
     }
 }
@@ -72,6 +76,8 @@ struct PixelEvidence {
     squared_difference: f64,
     /// Its expectation for independent samples, as share of the sample variance.
     difference_scale: f64,
+    /// (s_A²/n_A + s_B²/n_B) / 4.
+    variance_of_mean: f64,
 }
 
 impl PixelEvidence {
@@ -83,6 +89,7 @@ impl PixelEvidence {
             degrees_of_freedom: (count(a) - 1.0) + (count(b) - 1.0),
             squared_difference: 0.25 * difference * difference,
             difference_scale: 0.25 * (1.0 / count(a) + 1.0 / count(b)),
+            variance_of_mean: 0.25 * (a.sample_variance(0) / count(a) + b.sample_variance(0) / count(b)),
         }
     }
 
@@ -95,6 +102,7 @@ impl PixelEvidence {
 struct Pooled {
     variance: f64,
     factor: f64,
+    factor_with_own: f64,
 }
 
 /// Pools the neighbours of one pixel. Each neighbour weighs the same whatever its count, so that a region's variance is
@@ -127,8 +135,12 @@ fn pool(
     // A pixel like none of its neighbours has only itself to go by.
     let own = &evidence[y * width + x];
     let variance = if weights > 0.0 { variances / weights } else { own.variance() };
-    let factor = if expected > 0.0 { (squared / expected).clamp(FACTOR_RANGE.0, FACTOR_RANGE.1) } else { 1.0 };
-    Pooled { variance, factor }
+    let ratio = |squared: f64, expected: f64| if expected > 0.0 { squared / expected } else { 1.0 };
+    Pooled {
+        variance,
+        factor: ratio(squared, expected).clamp(FACTOR_RANGE.0, FACTOR_RANGE.1),
+        factor_with_own: ratio(squared + own.squared_difference, expected + own.variance_of_mean),
+    }
 }
 
 /// How alike two first surfaces are, in [0.02, 1]: never 0, so that a lone pixel still learns something.

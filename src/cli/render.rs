@@ -10,9 +10,9 @@ use fechner::integrator::{DEFAULT_MAX_DEPTH, PathTracer, TraceSettings};
 use fechner::output;
 use fechner::sampler::PixelFilter;
 use fechner::scene::{Scene, load};
-use fechner_perception::display::Display;
+use fechner_perception::display::{Display, Viewing};
 use fechner_perception::tone;
-use fechner_perception::viewing::{Observer, Viewing};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -156,11 +156,10 @@ fn parse_positive(text: &str) -> Result<f64, String> {
 
 /// Renders and writes.
 pub(super) fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
-    let format = output::Format::of_path(&arguments.output)?;
+    let format = output::check_target(&arguments.output)?;
     if let Some(json) = &arguments.json {
         output::check_writable(json)?;
     }
-    output::check_writable(&arguments.output)?;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(arguments.threads.unwrap_or(0) as usize)
         .thread_name(|i| format!("render-{i}"))
@@ -211,14 +210,14 @@ fn write(
     report: &Report,
 ) -> anyhow::Result<()> {
     match format {
-        output::Format::Png => output::picture::write_display_png(&arguments.output, rendered)?,
+        output::Format::Png => output::rendered::write_display_png(&arguments.output, rendered)?,
         output::Format::Exr => {
-            output::picture::write_layers_exr(&arguments.output, rendered, settings.nits_per_unit, &report.attributes())?;
+            output::rendered::write_layers_exr(&arguments.output, rendered, settings.nits_per_unit, &report.attributes())?;
         }
     }
     if let Some(path) = &arguments.json {
         let text = serde_json::to_string_pretty(report).context("the report could not be put into words")?;
-        output::write_text(path, &text)?;
+        output::write_beside(path, |file| file.write_all(text.as_bytes()))?;
     }
     Ok(())
 }
@@ -227,11 +226,11 @@ fn write(
 fn loop_settings(arguments: &RenderArguments, scene: &Scene) -> anyhow::Result<LoopSettings> {
     let view = &scene.viewing;
     let display = find_display(arguments.display.as_deref().or(view.display.as_deref()).unwrap_or("desktop"))?;
-    let default_observer = Observer::for_display(&display);
-    let observer = Observer {
-        csf_area_deg2: arguments.csf_area.unwrap_or(default_observer.csf_area_deg2),
-        ..default_observer
-    };
+    let mut viewing = Viewing::of(display);
+    if let Some(area) = arguments.csf_area {
+        viewing.observer.csf_area_deg2 = area;
+    }
+    viewing.check().context("--display and --csf-area")?;
     let operator_name = arguments.operator.as_deref().or(view.operator.as_deref()).unwrap_or("constant");
     let operator = tone::operator(operator_name, arguments.exposure.or(view.exposure_stops)).with_context(|| {
         format!("there is no tone operator \"{operator_name}\"; known: {}", tone::operator_names().join(", "))
@@ -256,7 +255,7 @@ fn loop_settings(arguments: &RenderArguments, scene: &Scene) -> anyhow::Result<L
             max_samples: arguments.max_spp.unwrap_or(DEFAULT_MAX_SAMPLES),
             plans: arguments.plans,
         },
-        viewing: Viewing { display, observer },
+        viewing,
         nits_per_unit: arguments.nits_per_unit.unwrap_or(scene.nits_per_unit),
         operator,
     })

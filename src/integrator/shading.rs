@@ -63,7 +63,7 @@ impl PathTracer {
             return point.shading_normal;
         };
         let scene = self.world.scene();
-        let texel = scene.textures[lookup.texture.0 as usize].sample_rgba(lookup.coordinates(point.uv));
+        let texel = scene.textures[lookup.texture.0 as usize].sample_rgba(lookup.transform(point.uv));
         let mut mapped = texel.truncate() * 2.0 - 1.0;
         mapped.x *= strength;
         mapped.y *= strength;
