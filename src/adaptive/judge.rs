@@ -7,7 +7,7 @@ use crate::sampler::Half;
 use fechner_perception::csf::CastleCsf;
 use fechner_perception::guide::{GuideInputs, denoise};
 use fechner_perception::photometry::luminance;
-use fechner_perception::plane::Plane;
+use fechner_perception::Plane;
 use fechner_perception::seen;
 use fechner_perception::threshold::{ThresholdInputs, ThresholdMap, threshold_map};
 use fechner_perception::tone::{FittedTone, SceneGuide};
@@ -49,7 +49,7 @@ pub fn judge(film: &Film, settings: &LoopSettings) -> Result<Judgement, JudgeErr
     let thresholds = threshold_map(
         &ThresholdInputs { display_luminance_cd_m2: &displayed_guide, guide_variance: None },
         &settings.viewing,
-        &CastleCsf::new(settings.viewing.observer.csf_area_deg2),
+        &CastleCsf::new(settings.viewing.observer.csf_area_deg2)?,
     )?;
 
     let nits_squared = settings.nits_per_unit * settings.nits_per_unit;

@@ -29,7 +29,6 @@ pub struct Limits {
 }
 
 /// Everything the loop needs to know besides the scene.
-#[derive(Debug)]
 pub struct LoopSettings {
     /// How samples are spread.
     pub sampling: Sampling,

@@ -7,7 +7,7 @@
 
 use crate::film::{Film, HalfPixel, PixelGuide};
 use crate::sampler::Half;
-use fechner_perception::plane::Plane;
+use fechner_perception::Plane;
 use rayon::prelude::*;
 
 /// Pixels to each side that are pooled: 7×7.

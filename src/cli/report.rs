@@ -5,7 +5,7 @@ use fechner::adaptive::settings::{LoopSettings, Sampling};
 use fechner::adaptive::{Rendered, StopReason, visible_share};
 use fechner::integrator::PathTracer;
 use fechner::output::Attribute;
-use fechner_perception::plane::Plane;
+use fechner_perception::Plane;
 use fechner_perception::psychometric::detection_probability;
 use serde::Serialize;
 use std::path::Path;

@@ -2,7 +2,7 @@
 
 use super::{Film, HalfPixel, opponent};
 use crate::sampler::Half;
-use fechner_perception::plane::Plane;
+use fechner_perception::Plane;
 
 /// The picture and its statistics, row-major, in cd/m².
 #[derive(Clone, Debug)]

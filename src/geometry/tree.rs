@@ -82,14 +82,12 @@ pub trait PrimitiveTree: Sized {
 }
 
 /// Eight-wide compressed tree: for triangles, in coordinates of hundreds of units (hazard 2).
-#[derive(Debug)]
 pub struct WideTree {
     tree: CwBvh,
     order: Vec<u32>,
 }
 
 /// Binary tree: for few large things such as instances, in any coordinates.
-#[derive(Debug)]
 pub struct BinaryTree {
     tree: Bvh2,
     order: Vec<u32>,

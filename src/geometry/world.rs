@@ -26,7 +26,6 @@ pub struct Hit {
 }
 
 /// A scene with its trees.
-#[derive(Debug)]
 pub struct World {
     scene: Arc<Scene>,
     /// Triangles of meshes that are placed once.
@@ -36,7 +35,9 @@ pub struct World {
     /// Over `items`, when there is more than the fixed tree.
     top: Option<BinaryTree>,
     items: Vec<Item>,
-    bounds: Bounds,
+    center: Vec3,
+    /// Of the sphere around everything.
+    radius: f32,
     has_alpha: bool,
 }
 
@@ -96,7 +97,13 @@ impl World {
             (Some(tree), ordered)
         };
         let has_alpha = scene.materials.iter().any(|m| m.alpha != Alpha::Opaque);
-        Self { scene, fixed, shared, top, items, bounds, has_alpha }
+        let (center, radius) = if bounds.is_finite() {
+            let center = (bounds.min + bounds.max) * 0.5;
+            (center.into(), (bounds.max - center).length().max(f32::MIN_POSITIVE))
+        } else {
+            (Vec3::ZERO, 1.0)
+        };
+        Self { scene, fixed, shared, top, items, center, radius, has_alpha }
     }
 
     /// The scene that this was built from.
@@ -106,17 +113,18 @@ impl World {
 
     /// Centre of the bounding box and radius of the sphere around it; a unit sphere for an empty scene.
     pub fn bounding_sphere(&self) -> (Vec3, f32) {
-        if self.bounds.is_finite() {
-            let center = (self.bounds.min + self.bounds.max) * 0.5;
-            (center.into(), ((self.bounds.max - center).length()).max(f32::MIN_POSITIVE))
-        } else {
-            (Vec3::ZERO, 1.0)
-        }
+        (self.center, self.radius)
     }
 
     /// Triangles that were left out because they have no area.
     pub fn degenerate_triangles(&self) -> usize {
         self.fixed.degenerate + self.shared.iter().map(|t| t.degenerate).sum::<usize>()
+    }
+
+    /// How far from a point new rays must start to clear the rounding of the trees' coordinates and of the point's own:
+    /// a few units in the last place of both.
+    pub fn offset_at(&self, position: Vec3) -> f32 {
+        4e-7 * (position.abs().max_element() + self.radius)
     }
 
     /// The material of an object.
@@ -217,8 +225,6 @@ impl World {
 
     /// The surface at a hit.
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
-        let (_, world_radius) = self.bounding_sphere();
-        let offset_at = |p: Vec3| 4e-7 * (p.abs().max_element() + world_radius);
         let Some(instance) = self.scene.instances.get(hit.object as usize) else {
             let s = &self.scene.spheres[hit.object as usize - self.scene.instances.len()];
             let normal = (Vec3::from(ray.origin + ray.direction * hit.distance) - s.center).normalize_or(Vec3::Y);
@@ -235,7 +241,7 @@ impl World {
                 ),
                 object: hit.object,
                 triangle: 0,
-                offset: offset_at(position),
+                offset: self.offset_at(position),
             };
         };
         let mesh = &self.scene.meshes[instance.mesh.0 as usize];
@@ -280,7 +286,7 @@ impl World {
             uv: interpolate_uv(mesh, hit.triangle, b1, b2),
             object: hit.object,
             triangle: hit.triangle,
-            offset: offset_at(position),
+            offset: self.offset_at(position),
         }
     }
 }

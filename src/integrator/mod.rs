@@ -81,7 +81,6 @@ impl SamplePlan {
 }
 
 /// A scene made ready for tracing.
-#[derive(Debug)]
 pub struct PathTracer {
     world: World,
     lights: Lights,

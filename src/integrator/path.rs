@@ -6,8 +6,9 @@
 use super::PathTracer;
 use super::shading::Shading;
 use crate::geometry::{Hit, Ray, SurfacePoint};
+use crate::light::LightSample;
 use crate::sampler::{Purpose, Sample};
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
 /// What the first surface looks like: guides for the perception model and for denoisers.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -136,13 +137,24 @@ impl PathTracer {
             return;
         }
         let weight = if light.is_delta { 1.0 } else { power_heuristic(light.pdf, scattered.pdf) };
-        let origin = point.spawn(wi);
-        // Measured from the offset origin, and short of the light's own surface.
-        let distance = (light.distance - (Vec3::from(origin) - point.position).dot(wi)) * (1.0 - 1e-5);
         path.rays += 1;
-        if !self.world.occluded(&Ray { origin, direction: wi.into() }, distance) {
+        if !self.is_hidden(point, &light) {
             path.radiance += path.throughput * scattered.value * light.radiance * (weight / light.pdf);
         }
+    }
+}
+
+impl PathTracer {
+    /// Whether something stands between a point and a light. Both ends are lifted off their surfaces.
+    fn is_hidden(&self, point: &SurfacePoint, light: &LightSample) -> bool {
+        let origin = point.spawn(light.direction);
+        let Some(place) = light.place else {
+            return self.world.occluded(&Ray { origin, direction: light.direction.into() }, f32::INFINITY);
+        };
+        let end = place.position + place.normal * self.world.offset_at(place.position);
+        let way = Vec3A::from(end) - origin;
+        let distance = way.length();
+        distance > 0.0 && self.world.occluded(&Ray { origin, direction: way / distance }, distance)
     }
 }
 

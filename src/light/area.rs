@@ -1,6 +1,6 @@
 //! Surfaces that emit: triangles, sampled uniformly by area, and spheres, sampled uniformly in the cone that they fill.
 
-use super::LightSample;
+use super::{LightPlace, LightSample};
 use crate::scene::{Instance, Material, Scene, Sphere};
 use glam::{Vec2, Vec3};
 use std::f32::consts::{PI, TAU};
@@ -63,7 +63,7 @@ impl TriangleEmitter {
         let uv = self.uv(scene, instance, b1, b2);
         Some(LightSample {
             direction,
-            distance,
+            place: Some(LightPlace { position, normal: self.normal * facing.signum() }),
             radiance: material.emission.evaluate(&scene.textures, uv),
             pdf: self.pdf(direction, distance, self.normal),
             is_delta: false,
@@ -135,9 +135,10 @@ impl SphereEmitter {
         let along = axis_length * (1.0 - one_minus_cos);
         let miss = axis_length * sin;
         let distance = along - (self.radius * self.radius - miss * miss).max(0.0).sqrt();
+        let position = from + direction * distance;
         Some(LightSample {
             direction,
-            distance,
+            place: Some(LightPlace { position, normal: (position - self.center).normalize_or(-direction) }),
             radiance: self.radiance,
             pdf: 1.0 / (TAU * one_minus_cos_max),
             is_delta: false,

@@ -72,7 +72,7 @@ impl EnvironmentSampler {
         let pdf = probability * density / (TAU * (cos_top - cos_bottom));
         (pdf > 0.0 && pdf.is_finite()).then(|| LightSample {
             direction,
-            distance: f32::INFINITY,
+            place: None,
             radiance: self.radiance(direction),
             pdf,
             is_delta: false,

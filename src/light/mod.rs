@@ -21,14 +21,23 @@ use glam::Vec3;
 pub struct LightSample {
     /// Unit direction.
     pub direction: Vec3,
-    /// Distance to the light; infinite for environment and directional lights.
-    pub distance: f32,
+    /// Where the light is reached; `None` for environment and directional lights, which are infinitely far.
+    pub place: Option<LightPlace>,
     /// Radiance that arrives if nothing is between; for lights without area, irradiance perpendicular to `direction`.
     pub radiance: Vec3,
     /// Probability per steradian; for lights without area, the probability of the choice.
     pub pdf: f32,
     /// Whether a BSDF could never find this light by chance.
     pub is_delta: bool,
+}
+
+/// A point on a light.
+#[derive(Clone, Copy, Debug)]
+pub struct LightPlace {
+    /// World position.
+    pub position: Vec3,
+    /// Unit normal on the side that shines on the shaded point; zero for lights without a surface.
+    pub normal: Vec3,
 }
 
 #[derive(Clone, Debug)]

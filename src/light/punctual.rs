@@ -1,6 +1,6 @@
 //! Lights without area: point, spot and directional.
 
-use super::LightSample;
+use super::{LightPlace, LightSample};
 use crate::scene::Light;
 use glam::Vec3;
 use std::f32::consts::{PI, TAU};
@@ -22,7 +22,7 @@ pub(super) fn sample(light: &Light, from: Vec3) -> Option<LightSample> {
         let distance = to_light.length();
         (distance > 0.0).then(|| LightSample {
             direction: to_light / distance,
-            distance,
+            place: Some(LightPlace { position, normal: Vec3::ZERO }),
             radiance: intensity / (distance * distance),
             pdf: 1.0,
             is_delta: true,
@@ -37,7 +37,7 @@ pub(super) fn sample(light: &Light, from: Vec3) -> Option<LightSample> {
         }
         Light::Directional { direction, irradiance } => Some(LightSample {
             direction: -direction,
-            distance: f32::INFINITY,
+            place: None,
             radiance: irradiance,
             pdf: 1.0,
             is_delta: true,

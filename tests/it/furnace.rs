@@ -20,11 +20,11 @@ fn sphere_in_furnace(surface: Surface) -> PathTracer {
     PathTracer::new(Arc::new(scene), trace_settings(16, 16, 0))
 }
 
-/// Within 0.5 %, and within the test's own noise: 16 blocks of 4096 samples.
+/// Within 0.5 %, and within the test's own noise: 16 blocks of 16384 samples.
 fn assert_returns(surface: &Surface, expected: Vec3) {
     let tracer = sphere_in_furnace(surface.clone());
     for ray in rays() {
-        let (mean, error) = radiance_along(&tracer, ray, 16, 4096);
+        let (mean, error) = radiance_along(&tracer, ray, 16, 16384);
         let tolerance = Vec3::splat(0.005) * expected + 3.3 * error;
         assert!(
             (mean - expected).abs().cmple(tolerance).all(),
