@@ -7,7 +7,7 @@
 //! Sources: R. Cook & K. Torrance (1982) for the model, B. Walter et al. (2007), eq. 20; the GGX distribution and the
 //! compensation of multiple bounces as their own files say. Not for painted or anodised metal: those are coated diffuse.
 
-use super::energy::{self, AlbedoCurve};
+use super::energy::{self, AlbedoCurve, LARGEST_SINGLE_SHARE};
 use super::ggx::Ggx;
 use super::mirror::reflect_about_normal;
 use super::warp::GrazingHemisphere;
@@ -120,6 +120,6 @@ impl Facets {
     /// Probability that a sample is one bounce off a facet. Close to its share of the energy; never below 0.25, since a
     /// dark tint makes the other lobe count for less than it does for a lossless metal.
     fn single_share(&self, cos_o: f32) -> f32 {
-        (1.0 - self.missing.at(cos_o)).clamp(0.25, 1.0)
+        (1.0 - self.missing.at(cos_o)).clamp(0.25, LARGEST_SINGLE_SHARE)
     }
 }

@@ -8,7 +8,7 @@
 //! and shadowing of both kinds of light by the height-correlated G2 of Pharr, Jakob & Humphreys (2023), section 9.7;
 //! Kulla & Conty (2017) for the compensation. Not for sheets without an inside: see the thin dielectric.
 
-use super::energy::{DielectricCompensation, DielectricTables};
+use super::energy::{self, DielectricCompensation, DielectricTables, LARGEST_SINGLE_SHARE};
 use super::ggx::Ggx;
 use super::mirror::reflect_about_normal;
 use super::warp::GrazingHemisphere;
@@ -97,7 +97,9 @@ impl<'a> Dielectric<'a> {
         let compensation = facets
             .tables
             .map(|tables| tables.compensation(facets.roughness, outside));
-        let single_share = compensation.map_or(1.0, |c| (1.0 - c.near.at(up.z)).clamp(0.05, 1.0));
+        let single_share = compensation.map_or(1.0, |c| {
+            (1.0 - c.near.at(up.z)).clamp(0.05, LARGEST_SINGLE_SHARE)
+        });
         let compensation_reflects = compensation.map_or(0.0, |c| {
             let reflected = 1.0 - c.transmitted_share;
             reflected / (reflected + c.transmitted_share * self.transmittance.max_element())
@@ -216,7 +218,7 @@ impl Near<'_> {
             * 0.25
             * self.ggx.visible_density_over_cosine(wo, h);
         let multiple = self.compensation.map_or(0.0, |c| {
-            (1.0 - c.transmitted_share) * super::energy::missing_lobe(&c.near, wo.z, wi.z)
+            (1.0 - c.transmitted_share) * energy::missing_lobe(&c.near, wo.z, wi.z)
         });
         let multiple_pdf = self.compensation_reflects * self.grazing.pdf(wi.z);
         BsdfEvaluation {

@@ -13,7 +13,8 @@
 use super::fresnel;
 use super::ggx::Ggx;
 use glam::Vec3;
-use std::f32::consts::{FRAC_1_PI, PI};
+use std::f32::consts::{FRAC_1_PI, TAU};
+use std::fmt;
 use std::sync::LazyLock;
 
 /// Rows of a table, equally spaced in roughness over [0, 1].
@@ -23,8 +24,12 @@ const COSINE_NODES: usize = 40;
 /// Nodes of the averages, a multiple of the rows' spacing apart so that every row is one.
 const AVERAGE_NODES: usize = 4 * (ROUGHNESS_NODES - 1) + 1;
 
+/// Most of the samples that may go to single scattering. The rest keeps the compensation reachable where the energy
+/// that it gives back is too small for single precision to tell 1 − E from 0.
+pub(crate) const LARGEST_SINGLE_SHARE: f32 = 0.9999;
+
 /// A directional albedo, or one less it, as a function of cosine and roughness.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub(crate) struct AlbedoTable {
     rows: [[f32; COSINE_NODES]; ROUGHNESS_NODES],
     /// 2∫ of the curve at each of more closely spaced roughnesses times μ dμ, over roughness⁴ = α². The average falls like α² towards smooth surfaces, where linear
@@ -33,7 +38,7 @@ pub(crate) struct AlbedoTable {
 }
 
 /// An [`AlbedoTable`] at one roughness.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(crate) struct AlbedoCurve<'a> {
     lower: &'a [f32; COSINE_NODES],
     upper: &'a [f32; COSINE_NODES],
@@ -42,14 +47,35 @@ pub(crate) struct AlbedoCurve<'a> {
     average: f32,
 }
 
-/// Quadrature points over half a turn of azimuth.
-const AZIMUTHS: usize = 12;
-/// Quadrature points along the height of the spherical cap of visible normals.
-const HEIGHTS: usize = 32;
+/// Quadrature points over the cap of visible normals.
+const POINTS: usize = 400;
 
-/// Sines and cosines of the azimuths of quadrature.
-static HALF_CIRCLE: LazyLock<[(f32, f32); AZIMUTHS]> = LazyLock::new(|| {
-    std::array::from_fn(|azimuth| (PI * (azimuth as f32 + 0.5) / AZIMUTHS as f32).sin_cos())
+/// A point of quadrature.
+struct Point {
+    /// Height on the cap as a uniform number.
+    u: f32,
+    /// Sine and cosine of the azimuth.
+    azimuth: (f32, f32),
+    weight: f32,
+}
+
+/// A Fibonacci lattice over azimuth and s, where u = s²(3 − 2s) smooths the square roots at both ends of the cap.
+///
+/// No two points share a height or an azimuth: total internal reflection has an edge in the integrand, on which a grid
+/// of as many points would be wrong by 1 %. The weights sum to 1, so that a constant comes out exact.
+static QUADRATURE: LazyLock<[Point; POINTS]> = LazyLock::new(|| {
+    const GOLDEN: f32 = 0.618_034;
+    let height = |index: usize| (index as f32 + 0.5) / POINTS as f32;
+    let weight = |s: f32| s * (1.0 - s);
+    let total: f32 = (0..POINTS).map(|index| weight(height(index))).sum();
+    std::array::from_fn(|index| {
+        let s = height(index);
+        Point {
+            u: s * s * (3.0 - 2.0 * s),
+            azimuth: (TAU * (index as f32 * GOLDEN).fract()).sin_cos(),
+            weight: weight(s) / total,
+        }
+    })
 });
 
 /// Where the columns lie: t = (√(μ(1 + α)/(μ + α)) + μ)/2.
@@ -215,7 +241,7 @@ impl SchlickCurve {
 
 /// What a rough dielectric boundary of one index keeps after one facet, for both sides, and how what it loses is split
 /// between reflection and transmission. Make one per index of refraction and share it.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct DielectricTables {
     eta: f32,
     /// 1 − E of reflection and transmission together, by energy, for light that arrives from outside.
@@ -236,6 +262,24 @@ pub(crate) struct DielectricCompensation<'a> {
     pub(crate) far: AlbedoCurve<'a>,
     /// Share of the missing energy that is transmitted; the rest is reflected.
     pub(crate) transmitted_share: f32,
+}
+
+// Tables are not for reading: the parameters that they were made for are.
+impl fmt::Debug for DielectricTables {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("DielectricTables")
+            .field("eta", &self.eta)
+            .finish_non_exhaustive()
+    }
+}
+
+impl fmt::Debug for AlbedoCurve<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("AlbedoCurve")
+            .field("alpha", &self.alpha)
+            .field("average", &self.average)
+            .finish_non_exhaustive()
+    }
 }
 
 impl DielectricTables {
@@ -324,26 +368,13 @@ fn transmitted(ggx: &Ggx, wo: Vec3, m: Vec3, eta: f32, cos_transmitted: f32) -> 
 }
 
 /// Mean of `f(wo, m)` over the facet normals m visible from `wo` at cosine `mu`.
-///
-/// Midpoint rule over half the azimuth (the other half mirrors it) and over u = s²(3 − 2s), which smooths the square
-/// roots at both ends of the spherical cap. Divided by the sum of its own weights, so that a constant comes out exact.
 fn average_over_visible_normals(ggx: &Ggx, mu: f32, f: impl Fn(Vec3, Vec3) -> f32) -> f32 {
     let wo = Vec3::new((1.0 - mu * mu).max(0.0).sqrt(), 0.0, mu);
     let cap = ggx.visible_cap(wo);
-    let mut sum = 0.0;
-    let mut weights = 0.0;
-    for height in 0..HEIGHTS {
-        let s = (height as f32 + 0.5) / HEIGHTS as f32;
-        let u = s * s * (3.0 - 2.0 * s);
-        let weight = s * (1.0 - s);
-        let ring: f32 = HALF_CIRCLE
-            .iter()
-            .map(|&sin_cos| f(wo, cap.normal(sin_cos, u)))
-            .sum();
-        sum += weight * ring;
-        weights += weight;
-    }
-    sum / (weights * AZIMUTHS as f32)
+    QUADRATURE
+        .iter()
+        .map(|point| point.weight * f(wo, cap.normal(point.azimuth, point.u)))
+        .sum()
 }
 
 /// 2∫curve(μ)μ dμ, by three-point Gauss–Legendre quadrature on every interval of the table.

@@ -24,6 +24,8 @@ mod ggx;
 mod lambert;
 mod metal_roughness;
 mod mirror;
+#[cfg(test)]
+mod tests;
 mod thin_dielectric;
 mod warp;
 
