@@ -169,7 +169,7 @@ pub(super) fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
 }
 
 fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyhow::Result<()> {
-    let options = load::LoadOptions { camera: arguments.camera.clone(), frame_time: arguments.at };
+    let options = load::LoadOptions { camera: arguments.camera.clone(), frame_time: arguments.at, ..load::LoadOptions::default() };
     let scene = load::load(&arguments.scene, &options)?;
     for note in &scene.notes {
         eprintln!("note: {note}");
