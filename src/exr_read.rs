@@ -1,269 +1,493 @@
-//! The only way in which this program opens an OpenEXR file: first the header, against a limit, then the pixels.
+//! Reads EXR files that anybody may have made or damaged.
 //!
-//! A 2 kB file can promise a picture of 60 GB, and a failed allocation of that size ends the process; so nothing is
-//! decoded before the promised size is known to fit.
+//! The header is read first and its claims are checked against the file's length and a limit on memory; only then are
+//! pixels read. The `exr` crate alone believes the header and asks for as much memory as it says, which ends the program.
 
-use exr::meta::MetaData;
-use exr::meta::header::{Header, ImageAttributes, LayerAttributes};
-use exr::prelude::{FlatSamples, ReadChannels, ReadLayers};
+use crate::output::Attribute;
+use ::exr::meta::attribute::{AttributeValue, Text};
+use ::exr::meta::header::Header;
+use ::exr::meta::{BlockDescription, MetaData};
+use ::exr::prelude::{FlatSamples, ReadChannels, ReadLayers, Vec2, read};
 use std::io::Cursor;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
 
-/// Why an OpenEXR file was not read.
-#[derive(Debug, thiserror::Error)]
-pub enum ExrError {
-    /// The file is damaged or cut off.
-    #[error("not a readable OpenEXR file: {0}")]
-    Damaged(String),
-    /// The file may be right, but uses something that is not read.
-    #[error("{0}")]
-    Unsupported(String),
-    /// The picture is larger than the limit.
-    #[error("{0}")]
-    TooLarge(String),
-}
+/// Most memory that the pixels of a file may take as 32-bit floats: 1 GiB, a 4K frame with 30 channels.
+pub const MEMORY_LIMIT_BYTES: u64 = 1 << 30;
 
-/// How large a picture may be.
-#[derive(Clone, Copy, Debug)]
-pub struct Limits {
-    /// Most pixels along a side.
-    pub longest_side: usize,
-    /// Most bytes of all decoded samples together, at 4 bytes a sample.
-    pub most_bytes: usize,
-}
-
-impl Default for Limits {
-    fn default() -> Self {
-        Self {
-            longest_side: 32_768,
-            most_bytes: 1 << 30,
-        }
-    }
-}
-
-/// A whole OpenEXR file.
-#[derive(Clone, Debug)]
-pub struct ExrFile {
-    /// Attributes of the file: display window, own attributes in `other`.
-    pub attributes: ImageAttributes,
-    /// Layers ("parts") in the file's order.
-    pub layers: Vec<ExrLayer>,
-}
-
-/// One layer of an OpenEXR file.
-#[derive(Clone, Debug)]
-pub struct ExrLayer {
-    /// Pixels in a row.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-    /// Attributes of the layer: name, white luminance, own attributes in `other`.
-    pub attributes: LayerAttributes,
-    /// Channels, sorted by name as the format demands.
-    pub channels: Vec<ExrChannel>,
-}
-
-/// One channel of a layer.
-#[derive(Clone, Debug)]
-pub struct ExrChannel {
-    /// Name, for example `R` or `depth.Z`.
-    pub name: String,
-    /// Samples, row by row, top row first.
-    pub samples: Samples,
-}
-
-/// Samples of a channel. Half floats are widened.
+/// An EXR file in memory.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Samples {
-    /// Floating point values.
-    Float(Vec<f32>),
-    /// Whole numbers: sample counts, object ids.
-    Uint(Vec<u32>),
+pub struct ExrImage {
+    /// Width of the data window in pixels.
+    pub width: u32,
+    /// Height of the data window in pixels.
+    pub height: u32,
+    /// Place of the data window's top left pixel, x to the right and y down.
+    pub data_window_origin: (i32, i32),
+    /// Channels by name, row-major from the top left, whole numbers and halves as floats. A channel of a named part has
+    /// the part's name before its own: `beauty.R`; a file of one part keeps its names.
+    pub channels: Vec<(String, Vec<f32>)>,
+    /// How the file stores each of `channels`.
+    pub types: Vec<SampleType>,
+    /// Attributes of the first part, sorted by name. Other types than text and numbers are given as text.
+    pub attributes: Vec<(String, Attribute)>,
+    /// Parts that were left out because their size differs from the first one's.
+    pub parts_left_out: Vec<String>,
 }
 
-/// A picture's colour and coverage.
-#[derive(Clone, Debug)]
-pub struct RgbaPicture {
-    /// Pixels in a row.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-    /// Linear red, green, blue and alpha, row by row from the top.
-    pub texels: Vec<[f32; 4]>,
+/// How a file stores a channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SampleType {
+    /// 16-bit float.
+    Half,
+    /// 32-bit float.
+    Float,
+    /// 32-bit unsigned integer.
+    Uint,
 }
 
-impl ExrLayer {
-    /// A channel by its name.
-    pub fn channel(&self, name: &str) -> Option<&ExrChannel> {
-        self.channels.iter().find(|channel| channel.name == name)
+impl std::fmt::Display for SampleType {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(match self {
+            Self::Half => "half",
+            Self::Float => "float",
+            Self::Uint => "uint",
+        })
     }
 }
 
-impl Samples {
-    /// How many there are.
-    pub fn len(&self) -> usize {
-        match self {
-            Self::Float(values) => values.len(),
-            Self::Uint(values) => values.len(),
-        }
+impl ExrImage {
+    /// The values of a channel, if it is there.
+    pub fn channel(&self, name: &str) -> Option<&[f32]> {
+        self.channels
+            .iter()
+            .find(|(n, _)| n == name)
+            .map(|(_, values)| values.as_slice())
     }
 
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// The sample as a float.
-    pub fn get(&self, index: usize) -> Option<f32> {
-        match self {
-            Self::Float(values) => values.get(index).copied(),
-            Self::Uint(values) => values.get(index).map(|&value| value as f32),
-        }
+    /// An attribute of the first part, if it is there.
+    pub fn attribute(&self, name: &str) -> Option<&Attribute> {
+        self.attributes
+            .iter()
+            .find(|(n, _)| n == name)
+            .map(|(_, value)| value)
     }
 }
 
-/// Whether these are the first bytes of an OpenEXR file.
+/// Why an EXR file could not be read.
+#[derive(Debug, thiserror::Error)]
+pub enum ExrReadError {
+    /// The operating system refused.
+    #[error("cannot read {}: {source}", .path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file is damaged or no EXR file.
+    #[error("cannot read {}: damaged or no EXR file ({problem})", .path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// The file may be sound, but has something that is not read here.
+    #[error("cannot read {}: {feature}", .path.display())]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+        /// What it has, and what would be right.
+        feature: String,
+    },
+    /// The pixels would take more than [`MEMORY_LIMIT_BYTES`].
+    #[error(
+        "cannot read {}: {width}×{height} pixels of {channels} channels need {} MiB, more than the {} MiB allowed",
+        .path.display(), .bytes >> 20, MEMORY_LIMIT_BYTES >> 20
+    )]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Width that the header claims.
+        width: u64,
+        /// Height that the header claims.
+        height: u64,
+        /// Channels of all parts.
+        channels: usize,
+        /// Memory that would be needed.
+        bytes: u64,
+    },
+}
+
+/// Reads every channel of a file's parts.
+pub fn read_exr(path: &Path) -> Result<ExrImage, ExrReadError> {
+    let io = |source| ExrReadError::Io { path: path.to_owned(), source };
+    if path.metadata().map_err(io)?.is_dir() {
+        return Err(io(std::io::Error::new(
+            std::io::ErrorKind::IsADirectory,
+            "it is a folder, not an EXR file",
+        )));
+    }
+    decode_exr(path, &std::fs::read(path).map_err(io)?)
+}
+
+/// Whether these are the first bytes of an EXR file.
 pub fn is_exr(bytes: &[u8]) -> bool {
     bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01])
 }
 
-/// The headers alone, one a layer; no pixel is decoded.
-pub fn read_headers(bytes: &[u8]) -> Result<Vec<Header>, ExrError> {
-    let headers = MetaData::read_from_buffered(Cursor::new(bytes), false)
-        .map_err(|error| damaged(&error))?
-        .headers;
-    Ok(headers.into_vec())
-}
-
-/// The whole file, if it fits the limits.
-pub fn read(bytes: &[u8], limits: &Limits) -> Result<ExrFile, ExrError> {
-    check(&read_headers(bytes)?, limits)?;
-    let image = exr::prelude::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .all_channels()
-        .all_layers()
-        .all_attributes()
-        .from_buffered(Cursor::new(bytes))
-        .map_err(|error| damaged(&error))?;
-    let layers = image.layer_data.into_iter().map(|layer| ExrLayer {
-        width: layer.size.width(),
-        height: layer.size.height(),
-        attributes: layer.attributes,
-        channels: layer
-            .channel_data
-            .list
-            .into_iter()
-            .map(|channel| ExrChannel {
-                name: channel.name.to_string(),
-                samples: match channel.sample_data {
-                    FlatSamples::F16(values) => {
-                        Samples::Float(values.into_iter().map(|value| value.to_f32()).collect())
-                    }
-                    FlatSamples::F32(values) => Samples::Float(values),
-                    FlatSamples::U32(values) => Samples::Uint(values),
-                },
-            })
-            .collect(),
-    });
-    Ok(ExrFile {
-        attributes: image.attributes,
-        layers: layers.collect(),
-    })
-}
-
-/// The first layer that has `R G B` (and perhaps `A`) or a grey `Y`.
-pub fn read_rgba(bytes: &[u8], limits: &Limits) -> Result<RgbaPicture, ExrError> {
-    let file = read(bytes, limits)?;
-    let colour = |layer: &ExrLayer, [r, g, b]: [&str; 3]| {
-        let channels = [layer.channel(r)?, layer.channel(g)?, layer.channel(b)?];
-        let alpha = layer.channel("A");
-        let pixel = |index| {
-            let [r, g, b] = channels.map(|channel| channel.samples.get(index).unwrap_or(0.0));
-            [
-                r,
-                g,
-                b,
-                alpha
-                    .and_then(|alpha| alpha.samples.get(index))
-                    .unwrap_or(1.0),
-            ]
-        };
-        let texels = (0..layer.width * layer.height).map(pixel).collect();
-        Some(RgbaPicture {
-            width: layer.width,
-            height: layer.height,
-            texels,
-        })
+/// Reads every channel of the parts of a file that is in memory; `path` is for messages.
+pub fn decode_exr(path: &Path, file: &[u8]) -> Result<ExrImage, ExrReadError> {
+    let headers = read_headers(path, file)?;
+    let image = guarded(path, || {
+        read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .all_channels()
+            .all_layers()
+            .all_attributes()
+            .from_buffered(Cursor::new(file))
+    })?;
+    let first = &headers[0];
+    let mut result = ExrImage {
+        width: first.layer_size.0 as u32,
+        height: first.layer_size.1 as u32,
+        data_window_origin: (
+            first.own_attributes.layer_position.0,
+            first.own_attributes.layer_position.1,
+        ),
+        channels: Vec::new(),
+        types: Vec::new(),
+        attributes: attributes(first),
+        parts_left_out: Vec::new(),
     };
-    let find = |names| file.layers.iter().find_map(|layer| colour(layer, names));
-    find(["R", "G", "B"])
-        .or_else(|| find(["Y", "Y", "Y"]))
-        .ok_or_else(|| {
-            let names = file
-                .layers
-                .iter()
-                .flat_map(|layer| &layer.channels)
-                .map(|channel| channel.name.as_str());
-            let names: Vec<&str> = names.take(12).collect();
-            ExrError::Unsupported(format!(
-                "needs the channels R, G, B or Y; the file has {}",
-                names.join(", ")
-            ))
-        })
+    let several = image.layer_data.len() > 1;
+    for layer in image.layer_data {
+        let part = layer
+            .attributes
+            .layer_name
+            .as_ref()
+            .map(Text::to_string)
+            .unwrap_or_default();
+        if layer.size != first.layer_size {
+            result.parts_left_out.push(part);
+            continue;
+        }
+        for channel in layer.channel_data.list {
+            let name = channel.name.to_string();
+            let name = if several && !part.is_empty() {
+                format!("{part}.{name}")
+            } else {
+                name
+            };
+            let (values, kind) = match channel.sample_data {
+                FlatSamples::F32(values) => (values, SampleType::Float),
+                FlatSamples::F16(values) => (
+                    values.iter().map(|v| v.to_f32()).collect(),
+                    SampleType::Half,
+                ),
+                FlatSamples::U32(values) => {
+                    (values.iter().map(|&v| v as f32).collect(), SampleType::Uint)
+                }
+            };
+            result.channels.push((name, values));
+            result.types.push(kind);
+        }
+    }
+    Ok(result)
 }
 
-fn check(headers: &[Header], limits: &Limits) -> Result<(), ExrError> {
-    let mut bytes: u128 = 0;
-    for header in headers {
-        let (width, height) = (header.layer_size.width(), header.layer_size.height());
-        if width == 0 || height == 0 {
-            return Err(ExrError::Damaged(format!(
-                "a layer of {width} x {height} pixels"
-            )));
-        }
-        if width > limits.longest_side || height > limits.longest_side {
-            let limit = limits.longest_side;
-            return Err(ExrError::TooLarge(format!(
-                "{width} x {height} pixels; at most {limit} a side are read"
-            )));
-        }
+/// Reads the headers of all parts and refuses what could not be read within [`MEMORY_LIMIT_BYTES`].
+fn read_headers(path: &Path, file: &[u8]) -> Result<Vec<Header>, ExrReadError> {
+    let damaged = |problem: String| ExrReadError::Damaged {
+        path: path.to_owned(),
+        problem,
+    };
+    let unsupported = |feature: &str| ExrReadError::Unsupported {
+        path: path.to_owned(),
+        feature: feature.to_owned(),
+    };
+
+    if file.is_empty() {
+        return Err(damaged("it is empty".to_owned()));
+    }
+    let headers = guarded(path, || MetaData::read_from_buffered(Cursor::new(file), false))?.headers;
+    let Some(first) = headers.first() else {
+        return Err(damaged("it has no part".to_owned()));
+    };
+
+    let mut bytes: u64 = 0;
+    let mut chunks: u64 = 0;
+    for header in &headers {
         if header.deep {
-            return Err(ExrError::Unsupported(
-                "deep data is not read, only flat pictures".to_owned(),
+            return Err(unsupported(
+                "deep pixels are not read; flatten the picture first",
             ));
         }
         if header
             .channels
             .list
             .iter()
-            .any(|channel| channel.sampling.x() != 1 || channel.sampling.y() != 1)
+            .any(|channel| channel.sampling != Vec2(1, 1))
         {
-            return Err(ExrError::Unsupported(
-                "channels of lower resolution (luminance-chroma) are not read".to_owned(),
+            return Err(unsupported(
+                "subsampled channels are not read; write the picture as RGB",
             ));
         }
-        bytes += width as u128 * height as u128 * header.channels.list.len() as u128 * 4;
+        let Vec2(width, height) = header.layer_size;
+        if width == 0 || height == 0 {
+            return Err(damaged("it has no pixels".to_owned()));
+        }
+        let pixels = (width as u64).saturating_mul(height as u64);
+        let channels = header.channels.list.len() as u64;
+        bytes = bytes.saturating_add(pixels.saturating_mul(channels * 4));
+        // A single block is unpacked at once, and tiles may be larger than the picture.
+        if let BlockDescription::Tiles(tiles) = header.blocks {
+            let tile_pixels = (tiles.tile_size.0 as u64).saturating_mul(tiles.tile_size.1 as u64);
+            if tile_pixels.saturating_mul(channels * 4) > MEMORY_LIMIT_BYTES / 4 {
+                return Err(damaged(format!(
+                    "tiles of {}×{} pixels",
+                    tiles.tile_size.0, tiles.tile_size.1
+                )));
+            }
+        }
+        chunks = chunks.saturating_add(header.chunk_count as u64);
     }
-    if bytes > limits.most_bytes as u128 {
-        let (promised, limit) = (bytes >> 20, limits.most_bytes >> 20);
-        return Err(ExrError::TooLarge(format!(
-            "the header promises {promised} MiB of pixels; at most {limit} are read"
+    if bytes > MEMORY_LIMIT_BYTES {
+        return Err(ExrReadError::TooLarge {
+            path: path.to_owned(),
+            width: first.layer_size.0 as u64,
+            height: first.layer_size.1 as u64,
+            channels: headers
+                .iter()
+                .map(|header| header.channels.list.len())
+                .sum(),
+            bytes,
+        });
+    }
+    // Each chunk takes 8 bytes in the table of offsets, and a place and a length of 4 bytes each where it stands.
+    if chunks.saturating_mul(16) > file.len() as u64 {
+        return Err(damaged(format!(
+            "it is too short for the {chunks} blocks that its header tells of"
         )));
     }
-    Ok(())
+    Ok(headers.into_vec())
 }
 
-fn damaged(error: &exr::error::Error) -> ExrError {
-    match error {
-        exr::error::Error::NotSupported(what) => {
-            ExrError::Unsupported(format!("OpenEXR feature not read: {what}"))
+/// Runs the library, and turns its errors, and panics on damaged data, into ours.
+fn guarded<T>(
+    path: &Path,
+    run: impl FnOnce() -> ::exr::error::Result<T>,
+) -> Result<T, ExrReadError> {
+    use ::exr::error::Error;
+    let path = path.to_owned();
+    match catch_unwind(AssertUnwindSafe(run)) {
+        Ok(Ok(value)) => Ok(value),
+        Ok(Err(Error::Io(source))) => Err(ExrReadError::Io { path, source }),
+        Ok(Err(Error::NotSupported(what))) => Err(ExrReadError::Unsupported {
+            path,
+            feature: format!("{what} is not read; convert the file to ZIP first"),
+        }),
+        Ok(Err(Error::Invalid(problem))) => Err(ExrReadError::Damaged {
+            path,
+            problem: problem.into_owned(),
+        }),
+        Ok(Err(Error::Aborted)) => Err(ExrReadError::Damaged {
+            path,
+            problem: "reading ended early".to_owned(),
+        }),
+        Err(_) => Err(ExrReadError::Damaged {
+            path,
+            problem: "its blocks contradict its header".to_owned(),
+        }),
+    }
+}
+
+/// What the header says besides the pixels' layout, sorted by name.
+fn attributes(header: &Header) -> Vec<(String, Attribute)> {
+    let own = &header.own_attributes;
+    let mut list: Vec<(String, Attribute)> = own
+        .other
+        .iter()
+        .chain(&header.shared_attributes.other)
+        .map(|(name, value)| (name.to_string(), attribute(value)))
+        .collect();
+    let mut text = |name: &str, value: &Option<Text>| {
+        if let Some(value) = value {
+            list.push((name.to_owned(), Attribute::Text(value.to_string())));
         }
-        other => ExrError::Damaged(
-            other
-                .to_string()
-                .split_whitespace()
-                .collect::<Vec<_>>()
-                .join(" "),
-        ),
+    };
+    text("name", &own.layer_name);
+    text("owner", &own.owner);
+    text("comments", &own.comments);
+    text("capDate", &own.capture_date);
+    text("software", &own.software_name);
+    if let Some(nits) = own.white_luminance {
+        list.push(("whiteLuminance".to_owned(), Attribute::Float(nits)));
+    }
+    if let Some(c) = header.shared_attributes.chromaticities {
+        let [r, g, b, w] = [c.red, c.green, c.blue, c.white].map(|Vec2(x, y)| format!("{x} {y}"));
+        let text = format!("red {r}, green {g}, blue {b}, white {w}");
+        list.push(("chromaticities".to_owned(), Attribute::Text(text)));
+    }
+    list.sort_by(|a, b| a.0.cmp(&b.0));
+    list
+}
+
+fn attribute(value: &AttributeValue) -> Attribute {
+    match value {
+        AttributeValue::Text(text) => Attribute::Text(text.to_string()),
+        AttributeValue::F32(number) => Attribute::Float(*number),
+        AttributeValue::F64(number) => Attribute::Text(number.to_string()),
+        AttributeValue::I32(number) => Attribute::Integer(*number),
+        AttributeValue::Bytes { type_hint, bytes } => {
+            Attribute::Text(format!("{} bytes of {type_hint}", bytes.len()))
+        }
+        other => Attribute::Text(format!("{other:?}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::output::{Picture, write_exr};
+    use std::time::{Duration, Instant};
+
+    /// Peak memory of this process in KiB, where the system tells.
+    fn peak_memory_kib() -> Option<u64> {
+        let status = std::fs::read_to_string("/proc/self/status").ok()?;
+        let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+        line.split_whitespace().nth(1)?.parse().ok()
+    }
+
+    #[test]
+    fn damaged_files_end_in_an_error_or_a_picture_soon_and_in_little_memory() {
+        let folder =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets/faults/exr-damaged");
+        let Ok(files) = std::fs::read_dir(&folder) else {
+            println!("skipped: {} is not there", folder.display());
+            return;
+        };
+        let mut readable = 0;
+        let mut refused = 0;
+        for file in files {
+            let path = file.unwrap().path();
+            let start = Instant::now();
+            match read_exr(&path) {
+                Ok(image) => {
+                    readable += 1;
+                    assert!(
+                        image
+                            .channels
+                            .iter()
+                            .all(|(_, v)| v.len() == (image.width * image.height) as usize)
+                    );
+                }
+                Err(error) => {
+                    refused += 1;
+                    let message = error.to_string();
+                    assert!(
+                        message.starts_with("cannot read ") && !message.contains('\n'),
+                        "{message}"
+                    );
+                    println!("{message}");
+                }
+            }
+            assert!(
+                start.elapsed() < Duration::from_secs(5),
+                "{} took {:?}",
+                path.display(),
+                start.elapsed()
+            );
+        }
+        println!(
+            "{readable} readable, {refused} refused, peak {:?} KiB",
+            peak_memory_kib()
+        );
+        assert!(refused > 50, "{refused} refused");
+        if let Some(kib) = peak_memory_kib() {
+            assert!(kib < 1 << 20, "peak memory {kib} KiB");
+        }
+    }
+
+    /// A small sound file, to be damaged.
+    fn sound_file(folder: &Path) -> Vec<u8> {
+        let path = folder.join("sound.exr");
+        let mut picture = Picture::new(16, 16);
+        let values: Vec<f32> = (0..256).map(|i| (i * i % 17) as f32).collect();
+        picture.push_f32("R", &values[..]);
+        picture.push_f16("G", &values[..]);
+        write_exr(&path, &picture).unwrap();
+        std::fs::read(path).unwrap()
+    }
+
+    #[test]
+    fn every_cut_of_a_file_is_an_error() {
+        let folder = tempfile::tempdir().unwrap();
+        let bytes = sound_file(folder.path());
+        let path = folder.path().join("cut.exr");
+        for length in 0..bytes.len() {
+            std::fs::write(&path, &bytes[..length]).unwrap();
+            assert!(
+                read_exr(&path).is_err(),
+                "cut to {length} of {} bytes",
+                bytes.len()
+            );
+        }
+    }
+
+    #[test]
+    fn any_changed_byte_is_survived() {
+        let folder = tempfile::tempdir().unwrap();
+        let bytes = sound_file(folder.path());
+        let path = folder.path().join("changed.exr");
+        for at in 0..bytes.len() {
+            for value in [0x00, 0x7f, 0xff] {
+                let mut changed = bytes.clone();
+                changed[at] = value;
+                std::fs::write(&path, changed).unwrap();
+                if let Ok(image) = read_exr(&path) {
+                    assert!(
+                        u64::from(image.width) * u64::from(image.height) * 8 <= MEMORY_LIMIT_BYTES
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_picture_too_large_for_memory_is_refused_by_its_size() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut bytes = sound_file(folder.path());
+        let name = b"dataWindow\0box2i\0";
+        let at = bytes
+            .windows(name.len())
+            .position(|window| window == name)
+            .unwrap()
+            + name.len()
+            + 4;
+        bytes[at + 8..at + 12].copy_from_slice(&99_999i32.to_le_bytes());
+        bytes[at + 12..at + 16].copy_from_slice(&99_999i32.to_le_bytes());
+        let path = folder.path().join("large.exr");
+        std::fs::write(&path, bytes).unwrap();
+        let message = read_exr(&path).unwrap_err().to_string();
+        assert!(
+            message.contains("100000×100000 pixels of 2 channels need 76293 MiB"),
+            "{message}"
+        );
+    }
+
+    #[test]
+    fn what_is_no_exr_file_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let message = |path: &Path| read_exr(path).unwrap_err().to_string();
+        assert!(message(folder.path()).contains("it is a folder"));
+        assert!(message(&folder.path().join("none.exr")).contains("none.exr"));
+        let path = folder.path().join("text.exr");
+        std::fs::write(&path, "").unwrap();
+        assert!(message(&path).contains("it is empty"));
+        std::fs::write(&path, "not a picture").unwrap();
+        assert!(message(&path).contains("damaged or no EXR file"));
     }
 }

@@ -3,6 +3,8 @@
 //! Plain data, filled by `load` (one file a format) and read by everybody else. Lengths are in scene units, radiance is
 //! linear Rec.709 RGB in scene units: RGB (1, 1, 1) has a luminance of [`Scene::nits_per_unit`] cd/m².
 
+mod material;
+
 use glam::{Affine3A, Mat3, Vec2, Vec3, Vec4};
 use std::sync::Arc;
 

@@ -246,24 +246,27 @@ pub(super) fn decode_bytes(
 }
 
 fn decode_exr(bytes: &[u8], name: &Path) -> Result<Decoded, LoadError> {
-    let limits = exr_read::Limits {
-        longest_side: LONGEST_SIDE as usize,
-        most_bytes: MOST_BYTES as usize,
-    };
-    let picture = exr_read::read_rgba(bytes, &limits).map_err(|error| match error {
-        exr_read::ExrError::TooLarge(_) => LoadError::too_large(name, error),
+    let picture = exr_read::decode_exr(name, bytes).map_err(|error| match error {
+        exr_read::ExrReadError::TooLarge { .. } => LoadError::too_large(name, error),
         _ => LoadError::invalid(name, error),
     })?;
-    let texels = picture
-        .texels
-        .iter()
-        .map(|texel| texel.map(finite_or_zero))
+    let (width, height) = (u64::from(picture.width), u64::from(picture.height));
+    check_size(name, width, height, 16)?;
+    // A picture of one channel is grey; parts prefix their names.
+    let find = |wanted: &str| {
+        let suffix = format!(".{wanted}");
+        picture.channel(wanted).or_else(|| {
+            picture.channels.iter().find(|(n, _)| n.ends_with(&suffix)).map(|(_, values)| values.as_slice())
+        })
+    };
+    let (Some(red), alpha) = (find("R").or_else(|| find("Y")), find("A")) else {
+        return Err(LoadError::unsupported(name, "the picture has neither a channel R nor a channel Y"));
+    };
+    let (green, blue) = (find("G").unwrap_or(red), find("B").unwrap_or(red));
+    let texels = (0..red.len())
+        .map(|i| [red[i], green[i], blue[i], alpha.map_or(1.0, |a| a[i])].map(finite_or_zero))
         .collect();
-    Ok(Decoded {
-        width: picture.width as u32,
-        height: picture.height as u32,
-        texels: Texels::Floats(Arc::new(texels)),
-    })
+    Ok(Decoded { width: picture.width, height: picture.height, texels: Texels::Floats(Arc::new(texels)) })
 }
 
 fn check_size(name: &Path, width: u64, height: u64, bytes_per_texel: u64) -> Result<(), LoadError> {

@@ -1,0 +1,314 @@
+//! `fechner info FILE`: what a picture file holds.
+
+use anyhow::{Context, bail};
+use fechner::exr_read::{ExrImage, read_exr};
+use image::ImageDecoder;
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Prints what is in a picture file: size, channels with their range, attributes, colour tags.
+pub(crate) fn run(path: &Path) -> anyhow::Result<()> {
+    print!("{}", describe(path)?);
+    Ok(())
+}
+
+/// The text that [`run`] prints.
+fn describe(path: &Path) -> anyhow::Result<String> {
+    let ending = path
+        .extension()
+        .and_then(|e| e.to_str())
+        .map(str::to_ascii_lowercase);
+    match ending.as_deref() {
+        Some("exr") => Ok(describe_exr(&read_exr(path)?)),
+        Some("png") => describe_png(path),
+        Some("hdr") => describe_hdr(path),
+        _ => bail!(
+            "cannot tell what {} is: .exr, .png and .hdr files are known",
+            path.display()
+        ),
+    }
+}
+
+/// The range of the finite values among `values`.
+struct Range {
+    min: f32,
+    mean: f64,
+    max: f32,
+    nonfinite: usize,
+}
+
+impl Range {
+    fn of(values: impl Iterator<Item = f32>) -> Self {
+        let mut range = Self {
+            min: f32::INFINITY,
+            mean: 0.0,
+            max: f32::NEG_INFINITY,
+            nonfinite: 0,
+        };
+        let mut count = 0_u64;
+        for value in values {
+            if value.is_finite() {
+                range.min = range.min.min(value);
+                range.max = range.max.max(value);
+                range.mean += f64::from(value);
+                count += 1;
+            } else {
+                range.nonfinite += 1;
+            }
+        }
+        range.mean /= count as f64;
+        range
+    }
+
+    fn row(&self, text: &mut String, name: &str, kind: &str, width: usize) {
+        let Self {
+            min,
+            mean,
+            max,
+            nonfinite,
+        } = self;
+        let _ = write!(
+            text,
+            "  {name:width$}  {kind:5}  {:>12}  {:>12}  {:>12}",
+            short(*min),
+            short(*mean as f32),
+            short(*max)
+        );
+        if *nonfinite > 0 {
+            let _ = write!(text, "  and {nonfinite} not finite");
+        }
+        text.push('\n');
+    }
+}
+
+/// Six significant digits without a tail of zeros.
+fn short(value: f32) -> String {
+    let size = value.abs();
+    if size == 0.0 {
+        "0".to_owned()
+    } else if !(1e-4..1e7).contains(&size) {
+        format!("{value:.4e}")
+    } else {
+        let digits = (5 - size.log10().floor() as i32).max(0) as usize;
+        let text = format!("{value:.digits$}");
+        if text.contains('.') {
+            text.trim_end_matches('0').trim_end_matches('.').to_owned()
+        } else {
+            text
+        }
+    }
+}
+
+fn heading(text: &mut String, first: &str, width: usize) {
+    let _ = writeln!(
+        text,
+        "  {first:width$}  type   {:>12}  {:>12}  {:>12}",
+        "min", "mean", "max"
+    );
+}
+
+fn describe_exr(image: &ExrImage) -> String {
+    let mut text = format!("OpenEXR, {}×{} pixels", image.width, image.height);
+    if image.data_window_origin != (0, 0) {
+        let _ = write!(
+            text,
+            " from ({}, {})",
+            image.data_window_origin.0, image.data_window_origin.1
+        );
+    }
+    text.push_str("\n\n");
+    let width = image
+        .channels
+        .iter()
+        .map(|(name, _)| name.len())
+        .max()
+        .unwrap_or(0)
+        .max(7);
+    heading(&mut text, "channel", width);
+    for ((name, values), kind) in image.channels.iter().zip(&image.types) {
+        Range::of(values.iter().copied()).row(&mut text, name, &kind.to_string(), width);
+    }
+    for part in &image.parts_left_out {
+        let _ = writeln!(text, "  part \"{part}\" has another size and is not shown");
+    }
+    if !image.attributes.is_empty() {
+        text.push('\n');
+        let width = image
+            .attributes
+            .iter()
+            .map(|(name, _)| name.len())
+            .max()
+            .unwrap_or(0);
+        for (name, value) in &image.attributes {
+            let _ = writeln!(text, "  {name:width$}  {value}");
+        }
+    }
+    text
+}
+
+fn describe_png(path: &Path) -> anyhow::Result<String> {
+    let problem = || format!("cannot read {}: damaged or no PNG file", path.display());
+    let file =
+        std::fs::File::open(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let mut decoder = png::Decoder::new(std::io::BufReader::new(file));
+    decoder.set_limits(png::Limits { bytes: 1 << 28 });
+    let mut reader = decoder.read_info().with_context(problem)?;
+    let info = reader.info();
+    let mut tags = Vec::new();
+    if let Some(intent) = info.srgb {
+        tags.push(format!("sRGB ({intent:?})"));
+    }
+    if let Some(cicp) = info.coding_independent_code_points {
+        tags.push(format!(
+            "CICP primaries {}, transfer {}",
+            cicp.color_primaries, cicp.transfer_function
+        ));
+    }
+    if let Some(profile) = &info.icc_profile {
+        tags.push(format!("ICC profile of {} bytes", profile.len()));
+    }
+    if let Some(gamma) = info.gama_chunk {
+        tags.push(format!("gamma {}", gamma.into_value()));
+    }
+    if tags.is_empty() {
+        tags.push("none".to_owned());
+    }
+    let bits = info.bit_depth as u8;
+    let mut text = format!(
+        "PNG, {}×{} pixels, {:?}, {bits} bits a channel\n",
+        info.width, info.height, info.color_type
+    );
+    let _ = writeln!(text, "colour tags: {}", tags.join(", "));
+
+    let size = reader.output_buffer_size().with_context(problem)?;
+    let mut pixels = vec![0; size];
+    let frame = reader.next_frame(&mut pixels).with_context(problem)?;
+    pixels.truncate(frame.buffer_size());
+    if bits == 8 {
+        let names: &[&str] = match frame.color_type {
+            png::ColorType::Grayscale => &["grey"],
+            png::ColorType::GrayscaleAlpha => &["grey", "alpha"],
+            png::ColorType::Rgb => &["red", "green", "blue"],
+            png::ColorType::Rgba => &["red", "green", "blue", "alpha"],
+            png::ColorType::Indexed => &["index"],
+        };
+        text.push('\n');
+        heading(&mut text, "channel", 7);
+        for (c, name) in names.iter().enumerate() {
+            let values = pixels
+                .iter()
+                .skip(c)
+                .step_by(names.len())
+                .map(|&byte| f32::from(byte));
+            Range::of(values).row(&mut text, name, "8-bit", 7);
+        }
+    }
+    Ok(text)
+}
+
+fn describe_hdr(path: &Path) -> anyhow::Result<String> {
+    let problem = || {
+        format!(
+            "cannot read {}: damaged or no Radiance file",
+            path.display()
+        )
+    };
+    let file =
+        std::fs::File::open(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let mut decoder =
+        image::codecs::hdr::HdrDecoder::new(std::io::BufReader::new(file)).with_context(problem)?;
+    let mut limits = image::Limits::default();
+    limits.max_alloc = Some(1 << 30);
+    decoder.set_limits(limits).with_context(problem)?;
+    let meta = decoder.metadata();
+    let (width, height) = decoder.dimensions();
+    if decoder.total_bytes() > 1 << 30 {
+        bail!(
+            "cannot read {}: {width}×{height} pixels need more than 1 GiB",
+            path.display()
+        );
+    }
+    let pixels = image::DynamicImage::from_decoder(decoder)
+        .with_context(problem)?
+        .into_rgb32f();
+    let mut text = format!("Radiance HDR, {width}×{height} pixels, shared exponent\n");
+    if let Some(exposure) = meta.exposure {
+        let _ = writeln!(text, "exposure {exposure}");
+    }
+    text.push('\n');
+    heading(&mut text, "channel", 7);
+    for (c, name) in ["R", "G", "B"].iter().enumerate() {
+        Range::of(pixels.pixels().map(|pixel| pixel.0[c])).row(&mut text, name, "rgbe", 7);
+    }
+    Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fechner::output::{Attribute, Picture, write_exr, write_png};
+
+    #[test]
+    fn an_exr_file_is_described() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.EXR");
+        let mut picture = Picture::new(2, 1);
+        picture.push_f32("R", vec![0.25, 1.0]);
+        picture.push_u32("samples.Y", vec![8, 1024]);
+        picture.push_attribute("seed", Attribute::Integer(7));
+        write_exr(&path, &picture).unwrap();
+        let text = describe(&path).unwrap();
+        assert!(text.starts_with("OpenEXR, 2×1 pixels\n"), "{text}");
+        let row = |name: &str| {
+            let line = text
+                .lines()
+                .find(|line| line.trim_start().starts_with(name))
+                .unwrap_or_default();
+            line.split_whitespace()
+                .map(str::to_owned)
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(row("R "), ["R", "float", "0.25", "0.625", "1"]);
+        assert_eq!(row("samples.Y"), ["samples.Y", "uint", "8", "516", "1024"]);
+        assert_eq!(row("seed"), ["seed", "7"]);
+    }
+
+    #[test]
+    fn a_png_file_is_described_with_its_colour_tags() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        write_png(&path, 2, 2, &[[1.0, 0.0, 0.0]; 4]).unwrap();
+        let text = describe(&path).unwrap();
+        assert!(
+            text.contains("2×2 pixels, Rgb, 8 bits") && text.contains("sRGB"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn what_cannot_be_described_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let message =
+            |name: &str| format!("{:#}", describe(&folder.path().join(name)).unwrap_err());
+        assert!(message("a.txt").contains(".exr, .png and .hdr files are known"));
+        for name in ["a.png", "a.hdr", "a.exr"] {
+            assert!(message(name).contains(name), "{}", message(name));
+            std::fs::write(folder.path().join(name), "rubbish").unwrap();
+            assert!(message(name).contains("damaged or no"), "{}", message(name));
+        }
+    }
+
+    #[test]
+    fn numbers_are_short() {
+        for (value, text) in [
+            (0.0, "0"),
+            (1.0, "1"),
+            (1024.0, "1024"),
+            (0.1, "0.1"),
+            (1e9, "1.0000e9"),
+            (1234.5678, "1234.57"),
+        ] {
+            assert_eq!(short(value), text);
+        }
+    }
+}

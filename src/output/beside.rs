@@ -1,0 +1,206 @@
+//! Files that are complete or not there: written beside the target under another name, flushed to the disk, renamed.
+
+use super::OutputError;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
+
+/// Writes `path` by letting `write` fill a new file in the same folder, which then takes the target's place at once.
+///
+/// If `write` fails, the new file is removed and the target stays as it was. A symbolic link is followed: the file that it
+/// points to is replaced, not the link.
+pub fn write_beside(
+    path: &Path,
+    write: impl FnOnce(&mut File) -> std::io::Result<()>,
+) -> Result<(), OutputError> {
+    let (mut file, target) = create_beside(path)?;
+    let io = |source| OutputError::Io {
+        path: path.to_owned(),
+        source,
+    };
+    write(file.as_file_mut()).map_err(io)?;
+    // Without this a crash of the machine after the rename could leave the new name with no content.
+    file.as_file().sync_all().map_err(io)?;
+    file.persist(target).map_err(|error| io(error.error))?;
+    Ok(())
+}
+
+/// Makes the new file, which is removed when dropped, and says what it should be renamed to.
+pub(super) fn create_beside(path: &Path) -> Result<(NamedTempFile, PathBuf), OutputError> {
+    let io = |source| OutputError::Io {
+        path: path.to_owned(),
+        source,
+    };
+    let not_a_file = |found| OutputError::NotAFile {
+        path: path.to_owned(),
+        found,
+    };
+    let target = match path.metadata() {
+        Ok(found) if found.is_dir() => return Err(not_a_file("a folder")),
+        // Renaming over a device such as /dev/null would replace the device.
+        Ok(found) if !found.is_file() => return Err(not_a_file("not an ordinary file")),
+        Ok(_) => path.canonicalize().map_err(io)?,
+        Err(_) => path.to_owned(),
+    };
+    let Some(name) = target.file_name() else {
+        return Err(not_a_file("a folder"));
+    };
+    let folder = match target.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    match folder.metadata() {
+        Ok(found) if found.is_dir() => {}
+        Ok(_) => {
+            return Err(io(std::io::Error::new(
+                std::io::ErrorKind::NotADirectory,
+                format!("{} is a file, not a folder", folder.display()),
+            )));
+        }
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            return Err(OutputError::MissingFolder {
+                path: path.to_owned(),
+                folder: folder.to_owned(),
+            });
+        }
+        Err(error) => return Err(io(error)),
+    }
+    let mut prefix = std::ffi::OsString::from(".");
+    prefix.push(name);
+    prefix.push(".");
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(&prefix).suffix(".part");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // As any new file: all may read and write, less the user's umask. The default of temporary files is owner only.
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    builder
+        .tempfile_in(folder)
+        .map(|file| (file, target.clone()))
+        .map_err(|error| {
+            // The error's own text names the temporary file, which the user never asked for.
+            io(std::io::Error::new(
+                error.kind(),
+                format!(
+                    "cannot make a file in {}: {}",
+                    folder.display(),
+                    plain(&error)
+                ),
+            ))
+        })
+}
+
+/// The system's words without the path that `tempfile` adds.
+fn plain(error: &std::io::Error) -> String {
+    error.raw_os_error().map_or_else(
+        || error.kind().to_string(),
+        |code| std::io::Error::from_raw_os_error(code).to_string(),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<_> = std::fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_failed_write_leaves_the_old_file_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        std::fs::write(&path, "old").unwrap();
+        let result = write_beside(&path, |file| {
+            file.write_all(b"half a pic")?;
+            Err(std::io::Error::other("the disk is full"))
+        });
+        assert!(
+            result
+                .unwrap_err()
+                .to_string()
+                .ends_with("a.png: the disk is full")
+        );
+        assert_eq!(std::fs::read(&path).unwrap(), b"old");
+        assert_eq!(names(folder.path()), ["a.png"]);
+    }
+
+    #[test]
+    fn a_panic_while_writing_leaves_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        let result = std::panic::catch_unwind(|| {
+            let _ = write_beside(&path, |file| {
+                file.write_all(b"half a pic")?;
+                panic!("stopped on purpose by a test");
+            });
+        });
+        assert!(result.is_err());
+        assert!(names(folder.path()).is_empty());
+    }
+
+    #[test]
+    fn a_new_file_replaces_the_old_one_and_only_its_content() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        for content in ["one", "two"] {
+            write_beside(&path, |file| file.write_all(content.as_bytes())).unwrap();
+            assert_eq!(std::fs::read_to_string(&path).unwrap(), content);
+            assert_eq!(names(folder.path()), ["a.png"]);
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn permissions_are_those_of_an_ordinary_file_and_links_are_followed() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let (plain, ours, link) = (
+            folder.path().join("p"),
+            folder.path().join("o"),
+            folder.path().join("l"),
+        );
+        std::fs::write(&plain, "").unwrap();
+        write_beside(&ours, |_| Ok(())).unwrap();
+        let mode = |path: &Path| path.metadata().unwrap().permissions().mode() & 0o777;
+        assert_eq!(mode(&ours), mode(&plain));
+
+        std::os::unix::fs::symlink(&ours, &link).unwrap();
+        write_beside(&link, |file| file.write_all(b"x")).unwrap();
+        assert!(link.symlink_metadata().unwrap().is_symlink());
+        assert_eq!(std::fs::read(&ours).unwrap(), b"x");
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("file");
+        std::fs::write(&file, "").unwrap();
+        let message = |path: &Path| write_beside(path, |_| Ok(())).unwrap_err().to_string();
+        assert!(
+            message(folder.path()).contains("it is a folder"),
+            "{}",
+            message(folder.path())
+        );
+        assert!(
+            message(&folder.path().join("no/such.png")).contains("does not exist; create it first")
+        );
+        assert!(
+            message(&file.join("a.png")).contains("cannot write"),
+            "{}",
+            message(&file.join("a.png"))
+        );
+        assert!(message(Path::new("/")).contains("it is a folder"));
+        #[cfg(unix)]
+        assert!(message(Path::new("/dev/null")).contains("not an ordinary file"));
+        assert_eq!(names(folder.path()), ["file"]);
+    }
+}

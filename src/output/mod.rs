@@ -1,0 +1,254 @@
+//! Picture files: what is in them, and how they are written.
+//!
+//! [`write_exr`] writes linear data of any number of channels, [`write_png`] a picture for a display. Both write beside the
+//! target and rename, so that a target is either the old file, the new file or absent, never a part of one; and both give
+//! equal bytes for equal pixels, so that files can be compared by their hash.
+//!
+//! Call [`check_target`] before a long render: it finds out whether the file can be written at all.
+
+mod beside;
+mod exr_file;
+mod exr_header;
+mod png_file;
+pub mod rendered;
+
+pub use beside::write_beside;
+pub use exr_file::write_exr;
+pub use png_file::{encode_srgb8, write_png};
+
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+
+/// Luminance of RGB (1, 1, 1) in cd/m². [`write_exr`] copies this attribute to the standard `whiteLuminance` too.
+pub const NITS_PER_UNIT: &str = "nits_per_unit";
+/// Set by [`write_exr`], and only when it had to change values: how many were not finite or too large for half floats.
+pub const REPLACED_VALUES: &str = "replaced_values";
+
+/// A picture of named channels, row-major from the top left.
+#[derive(Clone, Debug, Default)]
+pub struct Picture<'a> {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Channels, in any order; the file holds them sorted by name, as the format asks.
+    pub channels: Vec<Channel<'a>>,
+    /// What a reader should know: observer, seed, [`NITS_PER_UNIT`].
+    pub attributes: Vec<(String, Attribute)>,
+}
+
+/// Values of one channel.
+#[derive(Clone, Debug)]
+pub struct Channel<'a> {
+    /// Name as other tools know it: `R`, `albedo.R`, `normal.X`, `depth.Z`, `samples.Y`.
+    pub name: String,
+    /// One value a pixel.
+    pub values: ChannelValues<'a>,
+}
+
+/// Values of a channel and how the file stores them.
+#[derive(Clone, Debug)]
+pub enum ChannelValues<'a> {
+    /// Stored as 32-bit floats. Infinities become the largest finite value, NaN becomes 0.
+    F32(Cow<'a, [f32]>),
+    /// Stored as half floats, clamped to ±65504. NaN becomes 0.
+    F16(Cow<'a, [f32]>),
+    /// Stored as 32-bit unsigned integers.
+    U32(Cow<'a, [u32]>),
+}
+
+impl ChannelValues<'_> {
+    /// How many values there are.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::F32(values) | Self::F16(values) => values.len(),
+            Self::U32(values) => values.len(),
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+impl<'a> Picture<'a> {
+    /// A picture without channels.
+    pub fn new(width: u32, height: u32) -> Self {
+        Self {
+            width,
+            height,
+            ..Self::default()
+        }
+    }
+
+    /// Adds a channel of 32-bit floats.
+    pub fn push_f32(&mut self, name: &str, values: impl Into<Cow<'a, [f32]>>) {
+        self.channels.push(Channel {
+            name: name.to_owned(),
+            values: ChannelValues::F32(values.into()),
+        });
+    }
+
+    /// Adds a channel of half floats.
+    pub fn push_f16(&mut self, name: &str, values: impl Into<Cow<'a, [f32]>>) {
+        self.channels.push(Channel {
+            name: name.to_owned(),
+            values: ChannelValues::F16(values.into()),
+        });
+    }
+
+    /// Adds a channel of 32-bit unsigned integers.
+    pub fn push_u32(&mut self, name: &str, values: impl Into<Cow<'a, [u32]>>) {
+        self.channels.push(Channel {
+            name: name.to_owned(),
+            values: ChannelValues::U32(values.into()),
+        });
+    }
+
+    /// Adds an attribute.
+    pub fn push_attribute(&mut self, name: &str, value: Attribute) {
+        self.attributes.push((name.to_owned(), value));
+    }
+}
+
+/// A named fact about a picture.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Attribute {
+    /// Text; other characters than those of Latin-1 become `?`, since the format knows only bytes.
+    Text(String),
+    /// A number.
+    Float(f32),
+    /// A whole number.
+    Integer(i32),
+}
+
+impl std::fmt::Display for Attribute {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Text(text) => f.write_str(text),
+            Self::Float(number) => number.fmt(f),
+            Self::Integer(number) => number.fmt(f),
+        }
+    }
+}
+
+/// Why a picture could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum OutputError {
+    /// The folder to write into is not there.
+    #[error("cannot write {}: the folder {} does not exist; create it first", .path.display(), .folder.display())]
+    MissingFolder {
+        /// The file asked for.
+        path: PathBuf,
+        /// The folder that is missing.
+        folder: PathBuf,
+    },
+    /// The target is a folder, a device or a pipe.
+    #[error("cannot write {}: it is {found}; name a file ending in .png or .exr", .path.display())]
+    NotAFile {
+        /// The target asked for.
+        path: PathBuf,
+        /// What it is.
+        found: &'static str,
+    },
+    /// The name's ending says nothing about the format.
+    #[error("cannot write {}: {}; end the name in .png or .exr", .path.display(), extension_problem(.path))]
+    UnknownExtension {
+        /// The file asked for.
+        path: PathBuf,
+    },
+    /// The operating system refused.
+    #[error("cannot write {}: {source}", .path.display())]
+    Io {
+        /// The file asked for.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The picture itself makes no sense; a mistake of the caller.
+    #[error("cannot write {}: {problem}", .path.display())]
+    BadPicture {
+        /// The file asked for.
+        path: PathBuf,
+        /// What is wrong with the picture.
+        problem: String,
+    },
+}
+
+fn extension_problem(path: &Path) -> String {
+    match path.extension() {
+        Some(extension) => format!(
+            "\".{}\" is no picture format that can be written",
+            extension.to_string_lossy()
+        ),
+        None => "its name has no ending that tells the format".to_owned(),
+    }
+}
+
+/// Formats that can be written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// 8-bit sRGB for a display.
+    Png,
+    /// Linear data, many channels.
+    Exr,
+}
+
+impl Format {
+    /// The format that a file's name asks for, by its ending, upper or lower case.
+    pub fn of(path: &Path) -> Result<Self, OutputError> {
+        match path
+            .extension()
+            .and_then(|e| e.to_str())
+            .map(str::to_ascii_lowercase)
+            .as_deref()
+        {
+            Some("png") => Ok(Self::Png),
+            Some("exr") => Ok(Self::Exr),
+            _ => Err(OutputError::UnknownExtension {
+                path: path.to_owned(),
+            }),
+        }
+    }
+}
+
+/// Tells whether `path` can be written, before the work is done: known ending, existing folder that lets files be made,
+/// and nothing but a file in its place. Leaves nothing behind.
+pub fn check_target(path: &Path) -> Result<Format, OutputError> {
+    let format = Format::of(path)?;
+    beside::create_beside(path)?;
+    Ok(format)
+}
+
+/// Tells whether any file can be written at `path`, whatever its ending. Leaves nothing behind.
+pub fn check_writable(path: &Path) -> Result<(), OutputError> {
+    beside::create_beside(path).map(|_| ())
+}
+
+/// Checks that a picture of this size exists and that its arrays fit it.
+fn check_size(
+    path: &Path,
+    width: u32,
+    height: u32,
+    arrays: &[(&str, usize)],
+) -> Result<(), OutputError> {
+    let bad = |problem: String| OutputError::BadPicture {
+        path: path.to_owned(),
+        problem,
+    };
+    if width == 0 || height == 0 {
+        return Err(bad(format!(
+            "a picture of {width}×{height} pixels has no pixels"
+        )));
+    }
+    let pixels = width as usize * height as usize;
+    for &(name, len) in arrays {
+        if len != pixels {
+            return Err(bad(format!(
+                "{name} has {len} values for {width}×{height} = {pixels} pixels"
+            )));
+        }
+    }
+    Ok(())
+}

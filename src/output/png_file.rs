@@ -1,0 +1,191 @@
+//! 8-bit sRGB pictures, tagged as such.
+
+use super::{OutputError, beside::write_beside, check_size};
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+/// Writes linear display RGB, where 1 is the display's white, as an 8-bit PNG tagged sRGB.
+///
+/// Values are clamped to [0, 1] and NaN becomes black. Rounding is dithered by up to one step, the same in all three
+/// channels so that greys stay grey, by a hash of the pixel's place so that equal pixels give equal files.
+pub fn write_png(
+    path: &Path,
+    width: u32,
+    height: u32,
+    rgb_linear_display: &[[f32; 3]],
+) -> Result<(), OutputError> {
+    check_size(
+        path,
+        width,
+        height,
+        &[("the picture", rgb_linear_display.len())],
+    )?;
+    let bytes = encode_srgb8(width, rgb_linear_display);
+    write_beside(path, |file| {
+        let mut buffered = BufWriter::new(file);
+        let mut encoder = png::Encoder::new(&mut buffered, width, height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
+        // For readers that know only these; the values are those that the format's standard names beside sRGB.
+        encoder.set_source_gamma(png::ScaledFloat::from_scaled(45_455));
+        encoder.set_source_chromaticities(png::SourceChromaticities::new(
+            (0.3127, 0.3290),
+            (0.64, 0.33),
+            (0.30, 0.60),
+            (0.15, 0.06),
+        ));
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&bytes)?;
+        writer.finish()?;
+        buffered.flush()
+    })
+}
+
+/// The bytes of [`write_png`]: sRGB-encoded, dithered, RGB after RGB, row after row.
+pub fn encode_srgb8(width: u32, rgb_linear_display: &[[f32; 3]]) -> Vec<u8> {
+    let width = width.max(1) as usize;
+    let mut bytes = Vec::with_capacity(rgb_linear_display.len() * 3);
+    for (i, rgb) in rgb_linear_display.iter().enumerate() {
+        let offset = dither((i % width) as u32, (i / width) as u32);
+        for &value in rgb {
+            // A value that is a whole step stays that step whatever the offset in [0, 1).
+            bytes.push((srgb_from_linear(value) * 255.0 + offset) as u8);
+        }
+    }
+    bytes
+}
+
+/// The sRGB transfer function (IEC 61966-2-1) of a value clamped to [0, 1]; NaN stays, and becomes 0 as an integer.
+fn srgb_from_linear(value: f32) -> f32 {
+    let value = value.clamp(0.0, 1.0);
+    if value >= 1.0 {
+        1.0 // the formula gives a little less, which dither would show as specks in a white area
+    } else if value > 0.003_130_8 {
+        1.055 * value.powf(1.0 / 2.4) - 0.055
+    } else {
+        12.92 * value
+    }
+}
+
+/// A number in [0, 1) that looks random from pixel to pixel and is always the same at the same pixel.
+fn dither(x: u32, y: u32) -> f32 {
+    let mut h = x.wrapping_mul(0x9e37_79b1) ^ y.wrapping_mul(0x85eb_ca77).rotate_left(13);
+    h = (h ^ (h >> 16)).wrapping_mul(0x21f0_aaad);
+    h = (h ^ (h >> 15)).wrapping_mul(0x735a_2d97);
+    h ^= h >> 15;
+    (h >> 8) as f32 / (1u32 << 24) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chunk_names(bytes: &[u8]) -> Vec<String> {
+        let mut names = Vec::new();
+        let mut at = 8;
+        while at + 8 <= bytes.len() {
+            let length = u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+            names.push(String::from_utf8_lossy(&bytes[at + 4..at + 8]).into_owned());
+            at += length + 12;
+        }
+        names
+    }
+
+    #[test]
+    fn the_file_is_tagged_srgb_and_reads_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        let pixels = [[0.0, 0.5, 1.0], [1.0, 0.0, 0.214_041_14]];
+        write_png(&path, 2, 1, &pixels).unwrap();
+        let names = chunk_names(&std::fs::read(&path).unwrap());
+        for name in ["sRGB", "gAMA", "cHRM"] {
+            assert!(
+                names.iter().any(|n| n == name),
+                "{name} is missing from {names:?}"
+            );
+        }
+        let image = image::open(&path).unwrap().into_rgb8();
+        assert_eq!(image.dimensions(), (2, 1));
+        let [r, g, b] = image.get_pixel(0, 0).0;
+        assert_eq!((r, b), (0, 255));
+        assert!(
+            (187..=188).contains(&g),
+            "linear 0.5 is 187.5 in sRGB, read {g}"
+        );
+        assert!((127..=128).contains(&image.get_pixel(1, 0).0[2]));
+    }
+
+    #[test]
+    fn extremes_are_clamped_and_one_pixel_is_enough() {
+        assert_eq!(
+            encode_srgb8(1, &[[f32::NAN, -1.0, f32::NEG_INFINITY]]),
+            [0, 0, 0]
+        );
+        assert_eq!(
+            encode_srgb8(1, &[[f32::INFINITY, 7.0, 1.0]]),
+            [255, 255, 255]
+        );
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        write_png(&path, 1, 1, &[[1.0; 3]]).unwrap();
+        assert_eq!(
+            image::open(&path).unwrap().into_rgb8().into_raw(),
+            [255, 255, 255]
+        );
+    }
+
+    #[test]
+    fn dither_keeps_the_mean_and_greys_grey() {
+        let (width, height) = (128, 128);
+        for step in [10.25_f32, 100.5, 200.8] {
+            let code = step / 255.0;
+            let linear = if code <= 0.040_45 {
+                code / 12.92
+            } else {
+                ((code + 0.055) / 1.055).powf(2.4)
+            };
+            let bytes = encode_srgb8(width, &vec![[linear; 3]; (width * height) as usize]);
+            assert!(bytes.chunks(3).all(|p| p[0] == p[1] && p[1] == p[2]));
+            let mean = bytes.iter().map(|&b| f64::from(b)).sum::<f64>() / bytes.len() as f64;
+            // 16384 draws of a step with a spread of at most 0.5: 4 sigma is 0.016.
+            assert!(
+                (mean - f64::from(step)).abs() < 0.016,
+                "step {step} came out as {mean}"
+            );
+        }
+    }
+
+    #[test]
+    fn equal_pixels_give_equal_bytes() {
+        let folder = tempfile::tempdir().unwrap();
+        let pixels: Vec<[f32; 3]> = (0..35)
+            .map(|i| [i as f32 / 35.0, 0.3, 0.01 * i as f32])
+            .collect();
+        let write = |name: &str| {
+            let path = folder.path().join(name);
+            write_png(&path, 7, 5, &pixels).unwrap();
+            std::fs::read(path).unwrap()
+        };
+        assert_eq!(write("a.png"), write("b.png"));
+    }
+
+    #[test]
+    fn a_picture_of_the_wrong_size_is_refused_and_not_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        assert!(
+            write_png(&path, 2, 2, &[[0.0; 3]])
+                .unwrap_err()
+                .to_string()
+                .contains("2×2 = 4 pixels")
+        );
+        assert!(
+            write_png(&path, 0, 2, &[])
+                .unwrap_err()
+                .to_string()
+                .contains("no pixels")
+        );
+        assert!(!path.exists());
+    }
+}
