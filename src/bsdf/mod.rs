@@ -18,12 +18,14 @@
 
 mod conductor;
 mod dielectric;
+mod diffuse_transmission;
 mod energy;
 mod fresnel;
 mod ggx;
 mod lambert;
 mod metal_roughness;
 mod mirror;
+mod oren_nayar;
 #[cfg(test)]
 mod tests;
 mod thin_dielectric;
@@ -33,10 +35,12 @@ use glam::Vec3;
 
 pub use conductor::Conductor;
 pub use dielectric::Dielectric;
+pub use diffuse_transmission::DiffuseTransmission;
 pub use energy::DielectricTables;
 pub use lambert::Lambert;
 pub use metal_roughness::MetalRoughness;
 pub use mirror::Mirror;
+pub use oren_nayar::OrenNayar;
 pub use thin_dielectric::ThinDielectric;
 
 /// Slope width α below which a microfacet surface counts as perfectly smooth. Its lobe would be 0.06° wide: less than a
@@ -147,6 +151,10 @@ pub enum Bsdf<'a> {
     ThinDielectric(ThinDielectric),
     /// The material of glTF 2.0.
     MetalRoughness(MetalRoughness),
+    /// Rough diffuse reflection.
+    OrenNayar(OrenNayar),
+    /// Thin diffuse sheet.
+    DiffuseTransmission(DiffuseTransmission),
 }
 
 impl<'a> Bsdf<'a> {
@@ -203,6 +211,16 @@ impl<'a> Bsdf<'a> {
         ))
     }
 
+    /// Rough diffuse reflection with walls of albedo `reflectance` and `roughness`, both in [0, 1].
+    pub fn oren_nayar(reflectance: Vec3, roughness: f32) -> Self {
+        Self::OrenNayar(OrenNayar::new(reflectance, roughness))
+    }
+
+    /// Thin diffuse sheet; `reflectance` + `transmittance` at most 1.
+    pub fn diffuse_transmission(reflectance: Vec3, transmittance: Vec3) -> Self {
+        Self::DiffuseTransmission(DiffuseTransmission::new(reflectance, transmittance))
+    }
+
     /// Value and pdf for a pair of unit directions. Delta lobes count as 0 in both.
     pub fn evaluate(&self, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
         match self {
@@ -211,6 +229,8 @@ impl<'a> Bsdf<'a> {
             Self::Conductor(model) => model.evaluate(wo, wi),
             Self::Dielectric(model) => model.evaluate(wo, wi),
             Self::MetalRoughness(model) => model.evaluate(wo, wi),
+            Self::OrenNayar(model) => model.evaluate(wo, wi),
+            Self::DiffuseTransmission(model) => model.evaluate(wo, wi),
         }
     }
 
@@ -223,13 +243,15 @@ impl<'a> Bsdf<'a> {
             Self::Dielectric(model) => model.sample(wo, u),
             Self::ThinDielectric(model) => model.sample(wo, u),
             Self::MetalRoughness(model) => model.sample(wo, u),
+            Self::OrenNayar(model) => model.sample(wo, u),
+            Self::DiffuseTransmission(model) => model.sample(wo, u),
         }
     }
 
     /// Whether [`Self::evaluate`] can be other than 0; if not, light sampling is of no use.
     pub fn has_smooth_lobe(&self) -> bool {
         match self {
-            Self::Lambert(_) => true,
+            Self::Lambert(_) | Self::OrenNayar(_) | Self::DiffuseTransmission(_) => true,
             Self::Mirror(_) | Self::ThinDielectric(_) => false,
             Self::Conductor(model) => model.has_smooth_lobe(),
             Self::Dielectric(model) => model.has_smooth_lobe(),
@@ -246,6 +268,8 @@ impl<'a> Bsdf<'a> {
             Self::Dielectric(model) => model.albedo(wo),
             Self::ThinDielectric(model) => model.albedo(wo),
             Self::MetalRoughness(model) => model.albedo(wo),
+            Self::OrenNayar(model) => model.albedo(wo),
+            Self::DiffuseTransmission(model) => model.albedo(),
         }
     }
 }

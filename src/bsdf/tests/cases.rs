@@ -148,6 +148,32 @@ pub(super) fn smooth_cases() -> Vec<Case> {
             width,
         ));
     }
+    for roughness in [0.0f32, 0.5, 1.0] {
+        cases.push(Case::new(
+            format!("white oren-nayar {roughness}"),
+            Bsdf::oren_nayar(Vec3::ONE, roughness),
+            Lossless,
+            1.0,
+        ));
+        cases.push(Case::new(
+            format!("oren-nayar {roughness}"),
+            Bsdf::oren_nayar(GRAY_BLUE, roughness),
+            AtMost,
+            1.0,
+        ));
+    }
+    cases.push(Case::new(
+        "white sheet",
+        Bsdf::diffuse_transmission(Vec3::splat(0.7), Vec3::splat(0.3)),
+        Lossless,
+        1.0,
+    ));
+    cases.push(Case::new(
+        "sheet",
+        Bsdf::diffuse_transmission(0.5 * GRAY_BLUE, Vec3::new(0.6, 0.1, 0.0)),
+        AtMost,
+        1.0,
+    ));
     for transmission in [0.0, 0.6] {
         cases.push(Case::new(
             format!("white smooth metal-roughness {transmission}"),

@@ -77,6 +77,9 @@ fn extreme_models() -> Vec<Bsdf<'static>> {
             models.push(Bsdf::conductor(Vec3::splat(eta), Vec3::splat(k), roughness));
         }
         for color in [Vec3::ZERO, Vec3::ONE, Vec3::Y] {
+            models.push(Bsdf::oren_nayar(color, roughness));
+            models.push(Bsdf::diffuse_transmission(color, Vec3::ZERO));
+            models.push(Bsdf::diffuse_transmission(Vec3::ZERO, color));
             for metallic in [0.0, 0.5, 1.0] {
                 for ior in [0.0, 1.0, 1.5] {
                     for transmission in [0.0, 0.5, 1.0] {
