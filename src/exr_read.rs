@@ -8,8 +8,7 @@ use ::exr::meta::attribute::{AttributeValue, Text};
 use ::exr::meta::header::Header;
 use ::exr::meta::{BlockDescription, MetaData};
 use ::exr::prelude::{FlatSamples, ReadChannels, ReadLayers, Vec2, read};
-use std::fs::File;
-use std::io::BufReader;
+use std::io::Cursor;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
@@ -123,8 +122,24 @@ pub enum ExrReadError {
 
 /// Reads every channel of a file's parts.
 pub fn read_exr(path: &Path) -> Result<ExrImage, ExrReadError> {
-    let headers = read_headers(path)?;
-    // A second opening of the file: the reader below wants to start at its beginning.
+    let io = |source| ExrReadError::Io { path: path.to_owned(), source };
+    if path.metadata().map_err(io)?.is_dir() {
+        return Err(io(std::io::Error::new(
+            std::io::ErrorKind::IsADirectory,
+            "it is a folder, not an EXR file",
+        )));
+    }
+    decode_exr(path, &std::fs::read(path).map_err(io)?)
+}
+
+/// Whether these are the first bytes of an EXR file.
+pub fn is_exr(bytes: &[u8]) -> bool {
+    bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01])
+}
+
+/// Reads every channel of the parts of a file that is in memory; `path` is for messages.
+pub fn decode_exr(path: &Path, file: &[u8]) -> Result<ExrImage, ExrReadError> {
+    let headers = read_headers(path, file)?;
     let image = guarded(path, || {
         read()
             .no_deep_data()
@@ -132,7 +147,7 @@ pub fn read_exr(path: &Path) -> Result<ExrImage, ExrReadError> {
             .all_channels()
             .all_layers()
             .all_attributes()
-            .from_buffered(open(path)?)
+            .from_buffered(Cursor::new(file))
     })?;
     let first = &headers[0];
     let mut result = ExrImage {
@@ -184,11 +199,7 @@ pub fn read_exr(path: &Path) -> Result<ExrImage, ExrReadError> {
 }
 
 /// Reads the headers of all parts and refuses what could not be read within [`MEMORY_LIMIT_BYTES`].
-fn read_headers(path: &Path) -> Result<Vec<Header>, ExrReadError> {
-    let io = |source| ExrReadError::Io {
-        path: path.to_owned(),
-        source,
-    };
+fn read_headers(path: &Path, file: &[u8]) -> Result<Vec<Header>, ExrReadError> {
     let damaged = |problem: String| ExrReadError::Damaged {
         path: path.to_owned(),
         problem,
@@ -198,17 +209,10 @@ fn read_headers(path: &Path) -> Result<Vec<Header>, ExrReadError> {
         feature: feature.to_owned(),
     };
 
-    let found = path.metadata().map_err(io)?;
-    if found.is_dir() {
-        return Err(io(std::io::Error::new(
-            std::io::ErrorKind::IsADirectory,
-            "it is a folder, not an EXR file",
-        )));
-    }
-    if found.len() == 0 {
+    if file.is_empty() {
         return Err(damaged("it is empty".to_owned()));
     }
-    let headers = guarded(path, || MetaData::read_from_buffered(open(path)?, false))?.headers;
+    let headers = guarded(path, || MetaData::read_from_buffered(Cursor::new(file), false))?.headers;
     let Some(first) = headers.first() else {
         return Err(damaged("it has no part".to_owned()));
     };
@@ -263,16 +267,12 @@ fn read_headers(path: &Path) -> Result<Vec<Header>, ExrReadError> {
         });
     }
     // Each chunk takes 8 bytes in the table of offsets, and a place and a length of 4 bytes each where it stands.
-    if chunks.saturating_mul(16) > found.len() {
+    if chunks.saturating_mul(16) > file.len() as u64 {
         return Err(damaged(format!(
             "it is too short for the {chunks} blocks that its header tells of"
         )));
     }
     Ok(headers.into_vec())
-}
-
-fn open(path: &Path) -> std::io::Result<BufReader<File>> {
-    Ok(BufReader::new(File::open(path)?))
 }
 
 /// Runs the library, and turns its errors, and panics on damaged data, into ours.

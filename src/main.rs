@@ -1,36 +1,15 @@
-//! The command line of fechner.
+//! The command line of fechner: one file a subcommand under `cli/`.
 
 mod cli;
 
-use clap::{Parser, Subcommand};
-use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// A path tracer that stops sampling where the eye stops seeing
-#[derive(Parser)]
-#[command(version)]
-struct Arguments {
-    #[command(subcommand)]
-    command: Command,
-}
-
-#[derive(Subcommand)]
-enum Command {
-    /// Say what a picture file holds
-    Info {
-        /// An .exr, .png or .hdr file
-        file: PathBuf,
-    },
-}
-
 fn main() -> ExitCode {
-    let result = match Arguments::parse().command {
-        Command::Info { file } => cli::info::run(&file),
-    };
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
+    match cli::run() {
+        Ok(code) => code,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            // One line, whatever the chain of causes.
+            eprintln!("fechner: {}", format!("{error:#}").replace('\n', " "));
             ExitCode::from(2)
         }
     }

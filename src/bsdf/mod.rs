@@ -1,1 +1,265 @@
 //! How surfaces scatter light, one file a model.
+//!
+//! # Conventions
+//!
+//! Directions are unit vectors in the local shading frame: z is the shading normal, `wo` points towards where the path
+//! came from (the camera), `wi` towards where it goes on (the light), and both point **away** from the surface.
+//!
+//! Values are for **radiance** carried from `wi` to `wo`. Where light is refracted, radiance divided by the squared
+//! index of refraction is what stays constant along a ray, so a transmission lobe carries the factor
+//! (η of `wo`'s side / η of `wi`'s side)²: a camera path that enters glass is multiplied by 1/η², one that leaves it by
+//! η², and one through a whole slab by 1. Reciprocity of transmission then reads
+//! f(A→B)/η_B² = f(B→A)/η_A² with light going from A to B (Veach 1997, eq. 5.14).
+//!
+//! Opaque reflectors are two-sided: with `wo` below the surface they scatter as if the normal were turned over.
+//! Dielectrics are real boundaries, and the sign of `wo.z` says on which side the path is.
+//!
+//! Roughness r is perceptual, in [0, 1]; the microfacet slope width is α = r² (Burley 2012, section 5.4).
+
+mod conductor;
+mod dielectric;
+mod energy;
+mod fresnel;
+mod ggx;
+mod lambert;
+mod metal_roughness;
+mod mirror;
+#[cfg(test)]
+mod tests;
+mod thin_dielectric;
+mod warp;
+
+use glam::Vec3;
+
+pub use conductor::Conductor;
+pub use dielectric::Dielectric;
+pub use energy::DielectricTables;
+pub use lambert::Lambert;
+pub use metal_roughness::MetalRoughness;
+pub use mirror::Mirror;
+pub use thin_dielectric::ThinDielectric;
+
+/// Slope width α below which a microfacet surface counts as perfectly smooth. Its lobe would be 0.06° wide: less than a
+/// pixel of any display at any distance, and the half-way vector in single precision starts to blur it.
+pub const SMALLEST_ALPHA: f32 = 1e-3;
+
+/// What [`Bsdf::evaluate`] tells of one pair of directions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BsdfEvaluation {
+    /// f(wo, wi)·|cos θi| per linear RGB channel, in 1/sr; 0 for what only a delta lobe would scatter.
+    pub value: Vec3,
+    /// Probability per steradian that [`Bsdf::sample`] chooses `wi` by one of its smooth lobes.
+    pub pdf: f32,
+}
+
+impl BsdfEvaluation {
+    /// Nothing is scattered and nothing is ever sampled.
+    pub const BLACK: Self = Self {
+        value: Vec3::ZERO,
+        pdf: 0.0,
+    };
+
+    /// The sample of a smooth lobe that chose `wi`, or `None` where it carries nothing.
+    ///
+    /// The weight is value / pdf of the *whole* mixture of lobes, so that a sample and an evaluation always agree.
+    fn into_sample(self, wi: Vec3) -> Option<BsdfSample> {
+        let lobe = if wi.z > 0.0 {
+            Lobe::Smooth
+        } else {
+            Lobe::SmoothTransmission
+        };
+        // A pdf above zero but so small that the weight overflows comes only from rounding.
+        let weight = self.value / self.pdf;
+        (self.pdf > 0.0 && weight.is_finite()).then_some(BsdfSample {
+            wi,
+            weight,
+            pdf: self.pdf,
+            lobe,
+        })
+    }
+
+    /// The same seen from the other side of the surface: for models that turn both directions over.
+    fn sample_turned(self, wi: Vec3, wo: Vec3) -> Option<BsdfSample> {
+        self.into_sample(wi).map(|sample| sample.turned_like(wo))
+    }
+}
+
+/// A direction chosen by [`Bsdf::sample`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BsdfSample {
+    /// Unit direction in which the path goes on.
+    pub wi: Vec3,
+    /// f·|cos θi| / pdf: what the path's throughput is multiplied with.
+    pub weight: Vec3,
+    /// Probability per steradian; for a delta lobe its discrete probability.
+    pub pdf: f32,
+    /// Which kind of lobe was chosen.
+    pub lobe: Lobe,
+}
+
+impl BsdfSample {
+    /// Turns the direction over if `wo` lies below the surface (the model having worked above it).
+    fn turned_like(mut self, wo: Vec3) -> Self {
+        if wo.z < 0.0 {
+            self.wi.z = -self.wi.z;
+        }
+        self
+    }
+}
+
+/// The kind of lobe that a sample came from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Lobe {
+    /// Reflection with a finite pdf.
+    Smooth,
+    /// Transmission with a finite pdf.
+    SmoothTransmission,
+    /// Reflection into exactly one direction.
+    Delta,
+    /// Transmission into exactly one direction.
+    DeltaTransmission,
+}
+
+impl Lobe {
+    /// Whether only one direction is possible, so that light sampling can never find it.
+    pub const fn is_delta(self) -> bool {
+        matches!(self, Self::Delta | Self::DeltaTransmission)
+    }
+
+    /// Whether the path changes sides.
+    pub const fn is_transmission(self) -> bool {
+        matches!(self, Self::SmoothTransmission | Self::DeltaTransmission)
+    }
+}
+
+/// A scattering model with its parameters resolved at one point of a surface.
+#[derive(Clone, Copy, Debug)]
+pub enum Bsdf<'a> {
+    /// Ideal diffuse reflection.
+    Lambert(Lambert),
+    /// Ideal specular reflection.
+    Mirror(Mirror),
+    /// Metal, smooth or rough.
+    Conductor(Conductor),
+    /// Boundary of a clear volume, smooth or rough.
+    Dielectric(Dielectric<'a>),
+    /// Thin clear sheet.
+    ThinDielectric(ThinDielectric),
+    /// The material of glTF 2.0.
+    MetalRoughness(MetalRoughness),
+}
+
+impl<'a> Bsdf<'a> {
+    /// Ideal diffuse reflection with albedo `reflectance` in [0, 1].
+    pub fn lambert(reflectance: Vec3) -> Self {
+        Self::Lambert(Lambert::new(reflectance))
+    }
+
+    /// Ideal specular reflection with `reflectance` in [0, 1].
+    pub fn mirror(reflectance: Vec3) -> Self {
+        Self::Mirror(Mirror::new(reflectance))
+    }
+
+    /// Metal of complex index η + ik per RGB channel, seen in air.
+    pub fn conductor(eta: Vec3, k: Vec3, roughness: f32) -> Self {
+        Self::Conductor(Conductor::new(eta, k, roughness))
+    }
+
+    /// Boundary of a clear volume whose index is `eta_inside_over_outside`; `transmittance` tints each crossing. Without
+    /// `tables` a rough boundary loses the light that bounces between its facets.
+    pub fn dielectric(
+        eta_inside_over_outside: f32,
+        roughness: f32,
+        transmittance: Vec3,
+        tables: Option<&'a DielectricTables>,
+    ) -> Self {
+        Self::Dielectric(Dielectric::new(
+            eta_inside_over_outside,
+            roughness,
+            transmittance,
+            tables,
+        ))
+    }
+
+    /// Thin sheet of a clear material; `transmittance` tints what goes through.
+    pub fn thin_dielectric(ior: f32, transmittance: Vec3) -> Self {
+        Self::ThinDielectric(ThinDielectric::new(ior, transmittance))
+    }
+
+    /// The metal-roughness material of glTF 2.0 with its extensions for the index of refraction and for transmission.
+    pub fn metal_roughness(
+        base_color: Vec3,
+        metallic: f32,
+        roughness: f32,
+        ior: f32,
+        transmission: f32,
+    ) -> Self {
+        Self::MetalRoughness(MetalRoughness::new(
+            base_color,
+            metallic,
+            roughness,
+            ior,
+            transmission,
+        ))
+    }
+
+    /// Value and pdf for a pair of unit directions. Delta lobes count as 0 in both.
+    pub fn evaluate(&self, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
+        match self {
+            Self::Lambert(model) => model.evaluate(wo, wi),
+            Self::Mirror(_) | Self::ThinDielectric(_) => BsdfEvaluation::BLACK,
+            Self::Conductor(model) => model.evaluate(wo, wi),
+            Self::Dielectric(model) => model.evaluate(wo, wi),
+            Self::MetalRoughness(model) => model.evaluate(wo, wi),
+        }
+    }
+
+    /// Chooses where the path goes on, from three independent numbers in [0, 1); `None` where it ends.
+    pub fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
+        match self {
+            Self::Lambert(model) => model.sample(wo, u),
+            Self::Mirror(model) => model.sample(wo),
+            Self::Conductor(model) => model.sample(wo, u),
+            Self::Dielectric(model) => model.sample(wo, u),
+            Self::ThinDielectric(model) => model.sample(wo, u),
+            Self::MetalRoughness(model) => model.sample(wo, u),
+        }
+    }
+
+    /// Whether [`Self::evaluate`] can be other than 0; if not, light sampling is of no use.
+    pub fn has_smooth_lobe(&self) -> bool {
+        match self {
+            Self::Lambert(_) => true,
+            Self::Mirror(_) | Self::ThinDielectric(_) => false,
+            Self::Conductor(model) => model.has_smooth_lobe(),
+            Self::Dielectric(model) => model.has_smooth_lobe(),
+            Self::MetalRoughness(model) => model.has_smooth_lobe(),
+        }
+    }
+
+    /// Approximate share of light that is scattered, reflected and transmitted together, for AOVs and guides.
+    pub fn albedo(&self, wo: Vec3) -> Vec3 {
+        match self {
+            Self::Lambert(model) => model.albedo(),
+            Self::Mirror(model) => model.albedo(),
+            Self::Conductor(model) => model.albedo(wo),
+            Self::Dielectric(model) => model.albedo(wo),
+            Self::ThinDielectric(model) => model.albedo(wo),
+            Self::MetalRoughness(model) => model.albedo(wo),
+        }
+    }
+}
+
+/// Turns both directions over if `wo` lies below the surface, so that an opaque model only sees its front.
+fn to_front(wo: Vec3, wi: Vec3) -> (Vec3, Vec3) {
+    if wo.z < 0.0 {
+        (turn(wo), turn(wi))
+    } else {
+        (wo, wi)
+    }
+}
+
+/// The direction mirrored in the surface's plane.
+fn turn(w: Vec3) -> Vec3 {
+    Vec3::new(w.x, w.y, -w.z)
+}

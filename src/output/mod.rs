@@ -10,6 +10,7 @@ mod beside;
 mod exr_file;
 mod exr_header;
 mod png_file;
+pub mod rendered;
 
 pub use beside::write_beside;
 pub use exr_file::write_exr;
@@ -218,6 +219,11 @@ pub fn check_target(path: &Path) -> Result<Format, OutputError> {
     let format = Format::of(path)?;
     beside::create_beside(path)?;
     Ok(format)
+}
+
+/// Tells whether any file can be written at `path`, whatever its ending. Leaves nothing behind.
+pub fn check_writable(path: &Path) -> Result<(), OutputError> {
+    beside::create_beside(path).map(|_| ())
 }
 
 /// Checks that a picture of this size exists and that its arrays fit it.

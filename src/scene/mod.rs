@@ -3,8 +3,13 @@
 //! Plain data, filled by `load` (one file a format) and read by everybody else. Lengths are in scene units, radiance is
 //! linear Rec.709 RGB in scene units: RGB (1, 1, 1) has a luminance of [`Scene::nits_per_unit`] cd/m².
 
+mod material;
+
 use glam::{Affine3A, Mat3, Vec2, Vec3, Vec4};
 use std::sync::Arc;
+
+pub mod load;
+pub mod texture;
 
 /// Index into [`Scene::meshes`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -147,7 +152,7 @@ pub struct ScalarInput {
     pub texture: Option<(TextureLookup, u8)>,
 }
 
-/// A texture and how its coordinates are made: uv' = scale·R(rotation)·uv + offset.
+/// A texture and how its coordinates are made: uv' = R(rotation)·(scale·uv) + offset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureLookup {
     /// Which texture.
@@ -282,7 +287,7 @@ pub enum Surface {
 }
 
 /// How texel values are encoded.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Encoding {
     /// Colour under the sRGB transfer function.
     Srgb,

@@ -1,0 +1,203 @@
+//! Octave bands in cycles per degree, whose energies add up to the whole.
+
+/// A set of octave bands: raised cosines over log frequency with Σ_b B_b(f)² = 1 at every frequency.
+///
+/// Centres are fixed in cycles per degree (0.5, 1, 2, …), since masking belongs to the eye and not to the pixel grid.
+/// The lowest band takes everything below its centre and the highest everything above.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct OctaveBands {
+    centers_cpd: Vec<f64>,
+}
+
+const LOWEST_CPD: f64 = 0.5;
+/// Above twice this centre contrast sensitivity is below a tenth of its peak at any luminance.
+const HIGHEST_CPD: f64 = 16.0;
+
+impl OctaveBands {
+    /// The bands that a grid of `pixels_per_degree` can show.
+    pub(crate) fn for_grid(pixels_per_degree: f64) -> Self {
+        let nyquist_cpd = pixels_per_degree / 2.0;
+        let mut centers_cpd = vec![LOWEST_CPD];
+        let mut next = 2.0 * LOWEST_CPD;
+        while next <= HIGHEST_CPD && next <= 0.75 * nyquist_cpd {
+            centers_cpd.push(next);
+            next *= 2.0;
+        }
+        Self { centers_cpd }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.centers_cpd.len()
+    }
+
+    pub(crate) fn center_cpd(&self, band: usize) -> f64 {
+        self.centers_cpd[band]
+    }
+
+    /// Amplitude gain of `band` for errors, 0 to 1: with open ends, so that the squares of all bands add to 1.
+    pub(crate) fn gain(&self, band: usize, freq_cpd: f64) -> f64 {
+        if freq_cpd <= 0.0 {
+            return if band == 0 { 1.0 } else { 0.0 };
+        }
+        let octaves = (freq_cpd / self.centers_cpd[band]).log2();
+        if (band == 0 && octaves <= 0.0) || (band + 1 == self.len() && octaves >= 0.0) {
+            return 1.0;
+        }
+        raised_cosine(octaves)
+    }
+
+    /// Amplitude gain of `band` for the guide: closed at the bottom, so that a slow gradient is no mask.
+    pub(crate) fn mask_gain(&self, band: usize, freq_cpd: f64) -> f64 {
+        if freq_cpd <= 0.0 {
+            return 0.0;
+        }
+        let octaves = (freq_cpd / self.centers_cpd[band]).log2();
+        if band + 1 == self.len() && octaves >= 0.0 {
+            1.0
+        } else {
+            raised_cosine(octaves)
+        }
+    }
+
+    /// A frequency above which the band passes nothing.
+    pub(crate) fn limit_cpd(&self, band: usize) -> f64 {
+        if band + 1 == self.len() {
+            f64::INFINITY
+        } else {
+            2.0 * self.centers_cpd[band]
+        }
+    }
+}
+
+fn raised_cosine(octaves: f64) -> f64 {
+    if octaves.abs() >= 1.0 {
+        0.0
+    } else {
+        (octaves * std::f64::consts::FRAC_PI_2).cos()
+    }
+}
+
+/// A function of frequency, tabulated at equal steps from 0 to the corner of the Nyquist square.
+#[derive(Clone, Debug)]
+pub(crate) struct RadialTable {
+    values: Vec<f32>,
+    steps_per_cpd: f32,
+}
+
+const RADIAL_STEPS: usize = 2048;
+
+impl RadialTable {
+    pub(crate) fn new(pixels_per_degree: f64, value_at: impl Fn(f64) -> f64) -> Self {
+        let highest_cpd = pixels_per_degree * std::f64::consts::FRAC_1_SQRT_2;
+        let step = highest_cpd / (RADIAL_STEPS - 2) as f64;
+        let values = (0..RADIAL_STEPS)
+            .map(|index| value_at(index as f64 * step) as f32)
+            .collect();
+        Self {
+            values,
+            steps_per_cpd: step.recip() as f32,
+        }
+    }
+
+    pub(crate) fn at(&self, freq_cpd: f32) -> f32 {
+        let position = freq_cpd * self.steps_per_cpd;
+        let index = (position as usize).min(self.values.len() - 2);
+        let fraction = (position - index as f32).min(1.0);
+        self.values[index] + fraction * (self.values[index + 1] - self.values[index])
+    }
+
+    /// The product of two tables of one grid.
+    pub(crate) fn times(&self, other: &Self) -> Self {
+        let values = self
+            .values
+            .iter()
+            .zip(&other.values)
+            .map(|(a, b)| a * b)
+            .collect();
+        Self {
+            values,
+            steps_per_cpd: self.steps_per_cpd,
+        }
+    }
+}
+
+/// Calls `visit(freq_cpd, weight)` at the midpoints of rings that tile the Nyquist square; the weights add to 1.
+///
+/// The mean of H² over the square is the share of white pixel noise's variance that a filter H passes.
+pub(crate) fn for_each_ring(pixels_per_degree: f64, rings: usize, mut visit: impl FnMut(f64, f64)) {
+    let nyquist_cpd = pixels_per_degree / 2.0;
+    let highest_cpd = nyquist_cpd * std::f64::consts::SQRT_2;
+    // Rings as wide as they are far out: bands are octaves, and the lowest deserve as many rings as the highest.
+    let lowest_cpd = highest_cpd * 1e-4;
+    let ratio = (highest_cpd / lowest_cpd).powf((rings as f64).recip());
+    let mut inner = 0.0;
+    for ring in 1..=rings {
+        let outer = if ring == rings {
+            highest_cpd
+        } else {
+            lowest_cpd * ratio.powi(ring as i32)
+        };
+        let weight = (square_disc_area(outer, nyquist_cpd) - square_disc_area(inner, nyquist_cpd))
+            / (4.0 * nyquist_cpd * nyquist_cpd);
+        visit((0.5 * (inner * inner + outer * outer)).sqrt(), weight);
+        inner = outer;
+    }
+}
+
+/// Area of the part of a disc of radius `radius` that lies in the square |x|, |y| ≤ `half_side`.
+fn square_disc_area(radius: f64, half_side: f64) -> f64 {
+    let disc = std::f64::consts::PI * radius * radius;
+    if radius <= half_side {
+        return disc;
+    }
+    let half_angle = (half_side / radius).min(1.0).acos();
+    let segment = radius * radius * (half_angle - half_angle.sin() * half_angle.cos());
+    disc - 4.0 * segment
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn energies_of_the_bands_add_to_one() {
+        for ppd in [2.0, 30.0, 60.0, 110.0] {
+            let bands = OctaveBands::for_grid(ppd);
+            for step in 0..500 {
+                let freq = f64::from(step) * ppd / 700.0;
+                let sum: f64 = (0..bands.len())
+                    .map(|band| bands.gain(band, freq).powi(2))
+                    .sum();
+                assert!((sum - 1.0).abs() < 1e-12, "{ppd} ppd, {freq} cpd: {sum}");
+            }
+        }
+    }
+
+    #[test]
+    fn bands_reach_as_far_as_the_grid() {
+        assert_eq!(
+            OctaveBands::for_grid(60.0).centers_cpd,
+            [0.5, 1.0, 2.0, 4.0, 8.0, 16.0]
+        );
+        assert_eq!(
+            OctaveBands::for_grid(30.0).centers_cpd,
+            [0.5, 1.0, 2.0, 4.0, 8.0]
+        );
+        assert_eq!(OctaveBands::for_grid(1.0).centers_cpd, [0.5]);
+    }
+
+    #[test]
+    fn rings_tile_the_square() {
+        let (mut sum, mut mean_square) = (0.0, 0.0);
+        for_each_ring(40.0, 400, |freq, weight| {
+            sum += weight;
+            mean_square += weight * freq * freq;
+        });
+        assert!((sum - 1.0).abs() < 1e-12);
+        // The mean of x² + y² over a square of half side 20 is 2/3 · 400.
+        assert!(
+            (mean_square / (2.0 / 3.0 * 400.0) - 1.0).abs() < 1e-3,
+            "{mean_square}"
+        );
+    }
+}

@@ -1,0 +1,126 @@
+//! castleCSF.
+
+use super::ContrastSensitivity;
+use crate::error::{Error, check_range};
+
+/// castleCSF: achromatic, sustained channel, foveal and static.
+///
+/// Ashraf, Mantiuk, Chapiro and Wuerger, "castleCSF — a contrast sensitivity function of color, area, spatiotemporal
+/// frequency, luminance and eccentricity", Journal of Vision 24(4), 2024. Constants from the authors' published code
+/// (gfxdisp/castleCSF, f4b0b72). The transient channel is left out: its peak frequency crosses zero at
+/// 0.0113 cd/m², where it would answer to static patterns.
+///
+/// Declared domain: 0.001 to 10 000 cd/m², up to 64 cpd; luminances outside are moved to its edge.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CastleCsf {
+    area_deg2: f64,
+}
+
+impl CastleCsf {
+    /// For gratings that cover `area_deg2` square degrees.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] unless the area lies between 0.001 and 10 000 deg².
+    pub fn new(area_deg2: f64) -> Result<Self, Error> {
+        check_range(
+            "csf_area_deg2",
+            area_deg2,
+            1e-3,
+            1e4,
+            "between 0.001 and 10000 deg²",
+        )?;
+        Ok(Self { area_deg2 })
+    }
+
+    /// The grating's area, deg².
+    #[must_use]
+    pub fn area_deg2(&self) -> f64 {
+        self.area_deg2
+    }
+}
+
+impl Default for CastleCsf {
+    /// 1 deg²: a foveal patch.
+    fn default() -> Self {
+        Self { area_deg2: 1.0 }
+    }
+}
+
+const MIN_LUMINANCE_CD_M2: f64 = 1e-3;
+const MAX_LUMINANCE_CD_M2: f64 = 1e4;
+
+impl ContrastSensitivity for CastleCsf {
+    fn name(&self) -> &'static str {
+        "castle"
+    }
+
+    fn sensitivity(&self, freq_cpd: f64, luminance_cd_m2: f64) -> f64 {
+        if freq_cpd <= 0.0 {
+            return 0.0;
+        }
+        let luminance = luminance_cd_m2.clamp(MIN_LUMINANCE_CD_M2, MAX_LUMINANCE_CD_M2);
+        let peak = peak_sensitivity(luminance);
+        let peak_freq_cpd = 1.781_19 * (1.0 + 91.571_8 / luminance).powf(-0.256_682);
+        let octaves_off = (freq_cpd / peak_freq_cpd).log10();
+        let mut log_parabola =
+            10.0_f64.powf(-octaves_off * octaves_off / 2.0_f64.powf(0.000_213_047));
+        if freq_cpd < peak_freq_cpd {
+            log_parabola = log_parabola.max(1.0 - 0.100_207);
+        }
+        // Spatial summation (Rovamo et al. 1993): area counts up to a critical area that shrinks with frequency.
+        let critical_area_deg2 = 157.103 / (1.0 + (freq_cpd / 0.702_338).powi(2));
+        let summation =
+            (critical_area_deg2 / (1.0 + critical_area_deg2 / self.area_deg2)).sqrt() * freq_cpd;
+        peak * log_parabola * summation
+    }
+}
+
+fn peak_sensitivity(luminance_cd_m2: f64) -> f64 {
+    let rise = 56.4947 * (1.0 + 7.547_26 / luminance_cd_m2).powf(-0.144_532);
+    // (1 + p₄/L)^−p₅ with p₄ ≈ 6e-7 and p₅ ≈ 1e10: a plain power would lose p₄/L beside 1.
+    let fall = -9.668_62e9 * (5.583_41e-7 / luminance_cd_m2).ln_1p();
+    rise * -fall.exp_m1()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn golden_values() {
+        let csf = CastleCsf::default();
+        for (luminance, freq, expected) in [
+            (0.1, 0.5, 13.588_307_52),
+            (0.1, 8.0, 1.802_453_948),
+            (1.0, 2.0, 39.632_571_77),
+            (1.0, 16.0, 2.389_335_938),
+            (10.0, 0.5, 23.321_231_17),
+            (10.0, 8.0, 45.590_911_47),
+            (100.0, 0.5, 25.031_127_75),
+            (100.0, 2.0, 104.992_111_8),
+            (100.0, 8.0, 98.562_824_32),
+            (100.0, 16.0, 38.199_733_79),
+            (1000.0, 16.0, 51.154_743_99),
+        ] {
+            let found = csf.sensitivity(freq, luminance);
+            assert!(
+                (found / expected - 1.0_f64).abs() < 1e-6,
+                "S({freq}, {luminance}) = {found}, not {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn no_input_gives_nan() {
+        let csf = CastleCsf::default();
+        for freq in [0.0, 1e-300, 0.5, 64.0, 1e6] {
+            for luminance in [0.0, 1e-300, 1e-4, 100.0, 1e8] {
+                let found = csf.sensitivity(freq, luminance);
+                assert!(
+                    found.is_finite() && found >= 0.0,
+                    "S({freq}, {luminance}) = {found}"
+                );
+            }
+        }
+    }
+}

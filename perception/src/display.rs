@@ -1,0 +1,437 @@
+//! The display, and who looks at it from where.
+
+use serde::{Deserialize, Serialize};
+
+pub use crate::eotf::Eotf;
+use crate::error::{Error, check_range};
+
+/// A display at its viewing distance.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Display {
+    /// What a report calls it.
+    pub name: String,
+    /// Pixels a degree of visual angle, at the centre: 2 d tan(0.5°) / pixel pitch.
+    pub pixels_per_degree: f64,
+    /// Luminance of full white, cd/m².
+    pub white_cd_m2: f64,
+    /// Luminance of full black in a dark room, cd/m².
+    pub black_cd_m2: f64,
+    /// Room light reflected by the screen, cd/m², added to everything it shows.
+    pub ambient_cd_m2: f64,
+    /// Transfer function.
+    pub eotf: Eotf,
+    /// Viewing distance in metres, where known: some contrast sensitivity functions depend on it.
+    pub distance_m: Option<f64>,
+    /// Contrast sensitivity area this display asks for, deg²; `None` leaves the observer's.
+    pub csf_area_deg2: Option<f64>,
+    /// Frames a second, for moving pictures.
+    pub frames_per_second: f64,
+    /// Share of a frame's time that a pixel is lit: 1 for sample-and-hold, towards 0 for a strobed display.
+    pub persistence: f64,
+}
+
+struct Preset {
+    name: &'static str,
+    pixels_per_degree: f64,
+    white_cd_m2: f64,
+    black_cd_m2: f64,
+    eotf: Eotf,
+    csf_area_deg2: Option<f64>,
+}
+
+const fn preset(
+    name: &'static str,
+    pixels_per_degree: f64,
+    white_cd_m2: f64,
+    black_cd_m2: f64,
+) -> Preset {
+    Preset {
+        name,
+        pixels_per_degree,
+        white_cd_m2,
+        black_cd_m2,
+        eotf: Eotf::Srgb,
+        csf_area_deg2: None,
+    }
+}
+
+const PRESETS: [Preset; 8] = [
+    preset("desktop", 60.0, 200.0, 0.2),
+    preset("fullhd", 38.0, 200.0, 0.2),
+    preset("laptop", 80.0, 300.0, 0.3),
+    Preset {
+        eotf: Eotf::Bt1886,
+        ..preset("uhd-tv", 110.0, 300.0, 0.05)
+    },
+    preset("phone", 90.0, 500.0, 0.05),
+    Preset {
+        eotf: Eotf::Bt1886,
+        ..preset("cinema", 50.0, 48.0, 0.02)
+    },
+    Preset {
+        eotf: Eotf::Pq,
+        ..preset("hdr-1000", 60.0, 1000.0, 0.005)
+    },
+    Preset {
+        csf_area_deg2: Some(7.0),
+        ..preset("strict", 30.0, 400.0, 0.1)
+    },
+];
+
+const PRESET_NAMES: [&str; 8] = {
+    let mut names = [""; 8];
+    let mut index = 0;
+    while index < PRESETS.len() {
+        names[index] = PRESETS[index].name;
+        index += 1;
+    }
+    names
+};
+
+impl Default for Display {
+    /// The preset `desktop`: 60 pixels a degree, white 200 cd/m², black 0.2 cd/m².
+    fn default() -> Self {
+        Self::from_preset(&PRESETS[0])
+    }
+}
+
+impl Display {
+    /// A display everybody has a name for; see [`Display::preset_names`].
+    ///
+    /// ```
+    /// use fechner_perception::Display;
+    /// assert_eq!(Display::preset("desktop").unwrap().pixels_per_degree, 60.0);
+    /// assert!(Display::preset("television of 1936").is_none());
+    /// ```
+    #[must_use]
+    pub fn preset(name: &str) -> Option<Self> {
+        PRESETS
+            .iter()
+            .find(|preset| preset.name == name)
+            .map(Self::from_preset)
+    }
+
+    /// The names that [`Display::preset`] knows.
+    #[must_use]
+    pub fn preset_names() -> &'static [&'static str] {
+        &PRESET_NAMES
+    }
+
+    fn from_preset(preset: &Preset) -> Self {
+        Self {
+            name: preset.name.to_owned(),
+            pixels_per_degree: preset.pixels_per_degree,
+            white_cd_m2: preset.white_cd_m2,
+            black_cd_m2: preset.black_cd_m2,
+            ambient_cd_m2: 0.0,
+            eotf: preset.eotf,
+            distance_m: None,
+            csf_area_deg2: preset.csf_area_deg2,
+            frames_per_second: 60.0,
+            persistence: 1.0,
+        }
+    }
+
+    /// Reads a display file: a TOML table whose keys are the fields of [`Display`], all optional.
+    ///
+    /// `preset` names the display that fills what is left out (`desktop` if absent). Instead of `pixels_per_degree`
+    /// a file may give `width_px`, `width_m` and `distance_m`.
+    ///
+    /// ```
+    /// use fechner_perception::Display;
+    /// let mine = Display::from_toml("name = 'mine'\nwidth_px = 1920\nwidth_m = 0.531\ndistance_m = 0.6").unwrap();
+    /// assert!((mine.pixels_per_degree - 37.9).abs() < 0.1);
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Parse`] for what is no TOML or has unknown keys, [`Error::UnknownName`] for an unknown preset and
+    /// [`Error::OutOfRange`] for values that no display has.
+    pub fn from_toml(text: &str) -> Result<Self, Error> {
+        let file: DisplayFile = toml::from_str(text).map_err(|error| Error::Parse {
+            what: "display file",
+            reason: error.to_string(),
+        })?;
+        let base = file.preset.as_deref().unwrap_or("desktop");
+        let mut display = Self::preset(base).ok_or_else(|| Error::UnknownName {
+            kind: "display preset",
+            name: base.to_owned(),
+            known: PRESET_NAMES.join(", "),
+        })?;
+        if file.preset.is_none() {
+            "file".clone_into(&mut display.name);
+        }
+        let set = |field: &mut f64, value: Option<f64>| {
+            if let Some(value) = value {
+                *field = value;
+            }
+        };
+        set(&mut display.pixels_per_degree, file.pixels_per_degree);
+        set(&mut display.white_cd_m2, file.white_cd_m2);
+        set(&mut display.black_cd_m2, file.black_cd_m2);
+        set(&mut display.ambient_cd_m2, file.ambient_cd_m2);
+        set(&mut display.frames_per_second, file.frames_per_second);
+        set(&mut display.persistence, file.persistence);
+        display.name = file.name.unwrap_or(display.name);
+        display.eotf = file.eotf.unwrap_or(display.eotf);
+        display.distance_m = file.distance_m.or(display.distance_m);
+        display.csf_area_deg2 = file.csf_area_deg2.or(display.csf_area_deg2);
+        match (
+            file.pixels_per_degree,
+            file.width_px,
+            file.width_m,
+            display.distance_m,
+        ) {
+            (Some(_), None, None, _) | (None, None, None, _) => {}
+            (None, Some(width_px), Some(width_m), Some(distance_m)) => {
+                display.pixels_per_degree = pixels_per_degree(width_px, width_m, distance_m)?;
+            }
+            _ => {
+                return Err(Error::Parse {
+                    what: "display file",
+                    reason: "give either `pixels_per_degree`, or all of `width_px`, `width_m` and `distance_m`"
+                        .to_owned(),
+                });
+            }
+        }
+        display.check()?;
+        Ok(display)
+    }
+
+    /// Luminance, cd/m², that this display shows for linear light `relative` (clamped to 0..1; NaN counts as 0):
+    /// black + ambient + (white − black) · relative.
+    #[must_use]
+    pub fn luminance_cd_m2(&self, relative: f64) -> f64 {
+        let light = if relative.is_nan() {
+            0.0
+        } else {
+            relative.clamp(0.0, 1.0)
+        };
+        self.black_cd_m2 + self.ambient_cd_m2 + (self.white_cd_m2 - self.black_cd_m2) * light
+    }
+
+    /// Rejects a display that cannot be.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`], naming the field.
+    pub fn check(&self) -> Result<(), Error> {
+        const PPD: &str = "between 1 and 1000 pixels per degree";
+        const LIGHT: &str = "between 0 and 1e8 cd/m²";
+        check_range(
+            "pixels_per_degree",
+            self.pixels_per_degree,
+            1.0,
+            1000.0,
+            PPD,
+        )?;
+        check_range(
+            "white_cd_m2",
+            self.white_cd_m2,
+            1e-3,
+            1e8,
+            "between 0.001 and 1e8 cd/m²",
+        )?;
+        check_range(
+            "black_cd_m2",
+            self.black_cd_m2,
+            0.0,
+            self.white_cd_m2,
+            "between 0 and white_cd_m2",
+        )?;
+        check_range("ambient_cd_m2", self.ambient_cd_m2, 0.0, 1e8, LIGHT)?;
+        check_range(
+            "frames_per_second",
+            self.frames_per_second,
+            1.0,
+            1e4,
+            "between 1 and 10000",
+        )?;
+        check_range("persistence", self.persistence, 0.0, 1.0, "between 0 and 1")?;
+        if let Some(distance_m) = self.distance_m {
+            check_range(
+                "distance_m",
+                distance_m,
+                0.01,
+                1000.0,
+                "between 0.01 and 1000 m",
+            )?;
+        }
+        if let Some(area) = self.csf_area_deg2 {
+            check_range(
+                "csf_area_deg2",
+                area,
+                1e-3,
+                1e4,
+                "between 0.001 and 10000 deg²",
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// Pixels a degree at the centre of a flat display: 2 d tan(0.5°) / pitch.
+///
+/// # Errors
+/// [`Error::OutOfRange`] for sizes and distances that are not positive and finite.
+pub fn pixels_per_degree(width_px: f64, width_m: f64, distance_m: f64) -> Result<f64, Error> {
+    const POSITIVE: &str = "positive and finite";
+    check_range(
+        "width_px",
+        width_px,
+        1.0,
+        1e6,
+        "between 1 and 1000000 pixels",
+    )?;
+    check_range("width_m", width_m, f64::MIN_POSITIVE, f64::MAX, POSITIVE)?;
+    check_range(
+        "distance_m",
+        distance_m,
+        f64::MIN_POSITIVE,
+        f64::MAX,
+        POSITIVE,
+    )?;
+    Ok(2.0 * distance_m * 0.5_f64.to_radians().tan() * width_px / width_m)
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DisplayFile {
+    name: Option<String>,
+    preset: Option<String>,
+    pixels_per_degree: Option<f64>,
+    width_px: Option<f64>,
+    width_m: Option<f64>,
+    white_cd_m2: Option<f64>,
+    black_cd_m2: Option<f64>,
+    ambient_cd_m2: Option<f64>,
+    eotf: Option<Eotf>,
+    distance_m: Option<f64>,
+    csf_area_deg2: Option<f64>,
+    frames_per_second: Option<f64>,
+    persistence: Option<f64>,
+}
+
+/// The eye.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Observer {
+    /// Multiplies contrast sensitivity: 1 is the median observer of the model's data, 1.75 a keen one.
+    pub sensitivity: f64,
+    /// Area of the grating whose threshold is meant, deg². 1 is a foveal patch.
+    pub csf_area_deg2: f64,
+}
+
+impl Observer {
+    /// A keen observer: 1.75 times the median sensitivity.
+    #[must_use]
+    pub fn keen() -> Self {
+        Self {
+            sensitivity: 1.75,
+            ..Self::default()
+        }
+    }
+}
+
+impl Default for Observer {
+    /// The median observer, 1 deg².
+    fn default() -> Self {
+        Self {
+            sensitivity: 1.0,
+            csf_area_deg2: 1.0,
+        }
+    }
+}
+
+/// Who looks at what.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Viewing {
+    /// The display at its distance.
+    pub display: Display,
+    /// The eye in front of it.
+    pub observer: Observer,
+}
+
+impl Viewing {
+    /// A display with the observer it asks for (the preset `strict` asks for 7 deg²).
+    #[must_use]
+    pub fn of(display: Display) -> Self {
+        let mut observer = Observer::default();
+        observer.csf_area_deg2 = display.csf_area_deg2.unwrap_or(observer.csf_area_deg2);
+        Self { display, observer }
+    }
+
+    /// Rejects a viewing that cannot be.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`], naming the field.
+    pub fn check(&self) -> Result<(), Error> {
+        self.display.check()?;
+        check_range(
+            "observer.sensitivity",
+            self.observer.sensitivity,
+            1e-3,
+            1e3,
+            "between 0.001 and 1000",
+        )?;
+        check_range(
+            "observer.csf_area_deg2",
+            self.observer.csf_area_deg2,
+            1e-3,
+            1e4,
+            "between 0.001 and 10000 deg²",
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_preset_is_a_possible_display() {
+        for name in Display::preset_names() {
+            let display = Display::preset(name).unwrap();
+            assert_eq!(&display.name, name);
+            display.check().unwrap();
+        }
+    }
+
+    #[test]
+    fn geometry_of_known_screens() {
+        // 24 in 1920×1080 at 0.6 m, 27 in 3840×2160 at 0.6 m.
+        assert!((pixels_per_degree(1920.0, 0.531_36, 0.6).unwrap() - 37.843).abs() < 0.01);
+        assert!((pixels_per_degree(3840.0, 0.597_7, 0.6).unwrap() - 67.277).abs() < 0.02);
+        assert!(pixels_per_degree(1920.0, 0.0, 0.6).is_err());
+    }
+
+    #[test]
+    fn luminance_spans_black_to_white() {
+        let display = Display {
+            ambient_cd_m2: 1.0,
+            ..Display::default()
+        };
+        assert_eq!(display.luminance_cd_m2(-1.0), 1.2);
+        assert_eq!(display.luminance_cd_m2(f64::NAN), 1.2);
+        assert!((display.luminance_cd_m2(7.0) - 201.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn bad_files_say_why() {
+        assert!(matches!(
+            Display::from_toml("white_cd_m2 = -5"),
+            Err(Error::OutOfRange { .. })
+        ));
+        assert!(matches!(
+            Display::from_toml("colour = 'red'"),
+            Err(Error::Parse { .. })
+        ));
+        assert!(matches!(
+            Display::from_toml("preset = 'wall'"),
+            Err(Error::UnknownName { .. })
+        ));
+        assert!(matches!(
+            Display::from_toml("width_px = 1920"),
+            Err(Error::Parse { .. })
+        ));
+        let phone = Display::from_toml("preset = 'phone'\nwhite_cd_m2 = 700").unwrap();
+        assert_eq!((phone.white_cd_m2, phone.pixels_per_degree), (700.0, 90.0));
+    }
+}

@@ -1,0 +1,254 @@
+//! Windows that slide over a picture: Gaussian blur and erosion, reflected at the borders.
+//!
+//! Both cost the same whatever the window's size, and neither subtracts: a running sum that takes a firefly of 1e20
+//! back out would leave its rounding error all along the row.
+
+use rayon::prelude::*;
+
+use crate::plane::Plane;
+
+/// Index of the pixel that stands at `index` when a row of `len` pixels is mirrored at its ends without end
+/// (… 1 0 | 0 1 2 … n−1 | n−1 n−2 …).
+pub(crate) fn reflect(index: isize, len: usize) -> usize {
+    if index >= 0 && (index as usize) < len {
+        return index as usize;
+    }
+    let period = 2 * len as isize;
+    let inside = index.rem_euclid(period) as usize;
+    if inside < len {
+        inside
+    } else {
+        2 * len - 1 - inside
+    }
+}
+
+/// `plane` convolved with a Gaussian of standard deviation `sigma_px`.
+///
+/// Three box filters with fractional ends, whose variance is exactly σ² (Gwosdek, Grewenig, Bruhn and Weickert,
+/// "Theoretical foundations of Gaussian convolution by extended box filtering", 2011). Positive stays positive and the
+/// mean is kept.
+pub(crate) fn gaussian_blur(plane: &Plane, sigma_px: f64) -> Plane {
+    if sigma_px.is_nan() || sigma_px < 1e-3 {
+        return plane.clone();
+    }
+    along_both_axes(plane, |len| {
+        // Beyond twice the row the mirrored picture is uniform anyway; the cap bounds the cost.
+        let kernel = BoxKernel::third_of_variance(sigma_px.min(2.0 * len as f64));
+        move |row: &mut [f32], scratch: &mut Scratch| {
+            for _ in 0..3 {
+                kernel.apply(row, scratch);
+            }
+        }
+    })
+}
+
+/// The smallest value of `plane` within a square of half-width `radius_px` around each pixel.
+pub(crate) fn erode(plane: &Plane, radius_px: usize) -> Plane {
+    if radius_px == 0 {
+        return plane.clone();
+    }
+    along_both_axes(plane, |len| {
+        let radius = radius_px.min(len);
+        move |row: &mut [f32], scratch: &mut Scratch| {
+            scratch.extend(row, radius);
+            scratch.fold_blocks(2 * radius + 1, f32::min);
+            for (start, value) in row.iter_mut().enumerate() {
+                *value = scratch.suffix[start].min(scratch.prefix[start + 2 * radius]);
+            }
+        }
+    })
+}
+
+/// Buffers one thread reuses from row to row.
+#[derive(Default)]
+struct Scratch {
+    extended: Vec<f32>,
+    prefix: Vec<f32>,
+    suffix: Vec<f32>,
+}
+
+impl Scratch {
+    /// Copies `row` with `pad` reflected pixels on each side.
+    fn extend(&mut self, row: &[f32], pad: usize) {
+        let len = row.len();
+        self.extended.clear();
+        self.extended
+            .extend((0..pad).map(|index| row[reflect(index as isize - pad as isize, len)]));
+        self.extended.extend_from_slice(row);
+        self.extended
+            .extend((0..pad).map(|index| row[reflect((len + index) as isize, len)]));
+    }
+
+    /// Van Herk's trick: with the row cut into blocks as long as the window, every window is the end of one block
+    /// joined to the start of the next.
+    fn fold_blocks(&mut self, block: usize, join: impl Fn(f32, f32) -> f32) {
+        let extended = &self.extended;
+        self.prefix.clone_from(extended);
+        self.suffix.clone_from(extended);
+        for (prefix, suffix) in self
+            .prefix
+            .chunks_mut(block)
+            .zip(self.suffix.chunks_mut(block))
+        {
+            for index in 1..prefix.len() {
+                prefix[index] = join(prefix[index - 1], prefix[index]);
+            }
+            for index in (0..suffix.len() - 1).rev() {
+                suffix[index] = join(suffix[index], suffix[index + 1]);
+            }
+        }
+    }
+}
+
+/// A box of 2r + 1 ones with a fraction at each end.
+#[derive(Clone, Copy, Debug)]
+struct BoxKernel {
+    radius: usize,
+    end_weight: f32,
+    scale: f32,
+}
+
+impl BoxKernel {
+    /// The box that, applied three times, has standard deviation `sigma_px`.
+    fn third_of_variance(sigma_px: f64) -> Self {
+        let variance = sigma_px * sigma_px / 3.0;
+        let radius = (((12.0 * variance + 1.0).sqrt() - 1.0) / 2.0).floor();
+        let length = 2.0 * radius + 1.0;
+        let end = length * (variance - radius * (radius + 1.0) / 3.0)
+            / (2.0 * ((radius + 1.0).powi(2) - variance));
+        Self {
+            radius: radius as usize,
+            end_weight: end as f32,
+            scale: (length + 2.0 * end).recip() as f32,
+        }
+    }
+
+    fn apply(self, row: &mut [f32], scratch: &mut Scratch) {
+        let window = 2 * self.radius + 1;
+        scratch.extend(row, self.radius + 1);
+        scratch.fold_blocks(window, |a, b| a + b);
+        for (start, value) in row.iter_mut().enumerate() {
+            // The window covers start + 1 ..= start + window; at a block's start the prefix alone is the whole sum.
+            let whole = if (start + 1) % window == 0 {
+                scratch.prefix[start + window]
+            } else {
+                scratch.suffix[start + 1] + scratch.prefix[start + window]
+            };
+            let ends = scratch.extended[start] + scratch.extended[start + window + 1];
+            *value = (whole + self.end_weight * ends) * self.scale;
+        }
+    }
+}
+
+/// Runs a row operation along x, then along y. `operation_for` gets the length of the rows it will see.
+fn along_both_axes<Op>(plane: &Plane, operation_for: impl Fn(usize) -> Op) -> Plane
+where
+    Op: Fn(&mut [f32], &mut Scratch) + Sync,
+{
+    if plane.values().is_empty() {
+        return plane.clone();
+    }
+    let mut rows = plane.clone();
+    run_rows(&mut rows, &operation_for(plane.width()));
+    let mut columns = transposed(&rows);
+    run_rows(&mut columns, &operation_for(plane.height()));
+    transposed(&columns)
+}
+
+fn run_rows(plane: &mut Plane, operation: &(impl Fn(&mut [f32], &mut Scratch) + Sync)) {
+    let width = plane.width();
+    plane
+        .values_mut()
+        .par_chunks_mut(width)
+        .with_min_len((8192 / width).max(1))
+        .for_each_init(Scratch::default, |scratch, row| operation(row, scratch));
+}
+
+/// Rows become columns.
+pub(crate) fn transposed(plane: &Plane) -> Plane {
+    let (width, height) = (plane.width(), plane.height());
+    let mut result = Plane::filled(height, width, 0.0);
+    let source = plane.values();
+    // Strips of 16 columns: each line fetched from the source serves 16 rows of the result.
+    result
+        .values_mut()
+        .par_chunks_mut((16 * height).max(1))
+        .enumerate()
+        .for_each(|(strip, rows)| {
+            let first_column = strip * 16;
+            for y in 0..height {
+                for (column, row) in rows.chunks_exact_mut(height).enumerate() {
+                    row[y] = source[y * width + first_column + column];
+                }
+            }
+        });
+    result
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reflection_mirrors_without_end() {
+        let indices: Vec<usize> = (-4..7).map(|index| reflect(index, 3)).collect();
+        assert_eq!(indices, [2, 2, 1, 0, 0, 1, 2, 2, 1, 0, 0]);
+        assert_eq!(reflect(-1000, 1), 0);
+    }
+
+    #[test]
+    fn blur_has_the_variance_it_is_asked_for() {
+        for sigma in [0.3, 1.0, 2.7, 9.5] {
+            let mut spike = Plane::filled(129, 129, 0.0);
+            spike.values_mut()[64 * 129 + 64] = 1.0;
+            let blurred = gaussian_blur(&spike, sigma);
+            let mut variance = 0.0;
+            for y in 0..129 {
+                for x in 0..129 {
+                    variance += f64::from(blurred.get(x, y)) * (x as f64 - 64.0).powi(2);
+                }
+            }
+            assert!(
+                (variance / (sigma * sigma) - 1.0).abs() < 1e-4,
+                "σ {sigma}: variance {variance}"
+            );
+            assert!((blurred.mean() * 129.0 * 129.0 - 1.0).abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn blur_keeps_the_mean_of_any_picture_of_any_size() {
+        for (width, height) in [(1, 1), (1, 7), (5, 3), (64, 33)] {
+            let plane = Plane::from_fn(width, height, |x, y| ((x * 7 + y * 13) % 11) as f32);
+            let blurred = gaussian_blur(&plane, 12.0);
+            assert!((blurred.mean() - plane.mean()).abs() < 1e-4 * (1.0 + plane.mean()));
+        }
+    }
+
+    #[test]
+    fn a_firefly_leaves_nothing_far_away() {
+        let mut plane = Plane::filled(200, 3, 1e-3);
+        plane.values_mut()[200 + 20] = 1e20;
+        let blurred = gaussian_blur(&plane, 3.0);
+        assert!((blurred.get(150, 1) / 1e-3 - 1.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn erosion_is_the_minimum_of_the_square() {
+        let plane = Plane::from_fn(37, 23, |x, y| ((x * 31 + y * 17) % 101) as f32);
+        for radius in [1, 3, 30] {
+            let eroded = erode(&plane, radius);
+            for y in 0..23_usize {
+                for x in 0..37_usize {
+                    let mut least = f32::INFINITY;
+                    for v in y.saturating_sub(radius)..(y + radius + 1).min(23) {
+                        for u in x.saturating_sub(radius)..(x + radius + 1).min(37) {
+                            least = least.min(plane.get(u, v));
+                        }
+                    }
+                    assert_eq!(eroded.get(x, y), least, "({x}, {y}) radius {radius}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! Masking: how much a band's own contrast raises its threshold.
+
+use crate::bands::{OctaveBands, RadialTable};
+use crate::fft::{PictureTransform, Spectrum};
+use crate::filter::{erode, gaussian_blur};
+use crate::plane::Plane;
+use crate::sensitivity::BandTables;
+
+/// The threshold elevation is never taken to exceed this, whatever the contrast.
+pub const ELEVATION_CAP: f64 = 3.0;
+
+/// Threshold elevation T_e = (1 + |m|^2.8)^(1/4) by a mask of contrast `mask` in threshold units.
+///
+/// Daly, "The visible differences predictor", 1993, with slope s = 0.7; with s = Q = 0.7 his constants k₁ and k₂ cancel.
+/// Not capped.
+#[must_use]
+pub fn threshold_elevation(mask: f64) -> f64 {
+    (1.0 + mask.abs().powf(2.8)).powf(0.25)
+}
+
+/// [`threshold_elevation`], capped, against the mask's squared contrast.
+pub(crate) struct ElevationTable {
+    entries: Vec<f32>,
+    entries_per_square: f32,
+}
+
+const ENTRIES: usize = 1024;
+
+impl ElevationTable {
+    pub(crate) fn new() -> Self {
+        // Contrast at which the elevation reaches its cap.
+        let last = (ELEVATION_CAP.powi(4) - 1.0).powf(2.0 / 2.8);
+        let entries = (0..=ENTRIES)
+            .map(|entry| {
+                threshold_elevation((last * entry as f64 / ENTRIES as f64).sqrt())
+                    .min(ELEVATION_CAP) as f32
+            })
+            .collect();
+        Self {
+            entries,
+            entries_per_square: (ENTRIES as f64 / last) as f32,
+        }
+    }
+
+    fn at(&self, mask_squared: f32) -> f32 {
+        let position = (mask_squared * self.entries_per_square).min(ENTRIES as f32 - 1e-3);
+        let index = position as usize;
+        self.entries[index]
+            + (position - index as f32) * (self.entries[index + 1] - self.entries[index])
+    }
+}
+
+/// What the masks of all bands are made from.
+pub(crate) struct MaskSource<'a> {
+    pub(crate) transform: &'a PictureTransform,
+    /// Spectrum of the guide over its adaptation luminance.
+    pub(crate) contrast: &'a Spectrum,
+    /// Variance of the guide's noise over the adaptation luminance squared, if any is known.
+    pub(crate) noise: Option<&'a Plane>,
+    /// Coordinates of the adaptation luminance in the tables.
+    pub(crate) coordinates: &'a Plane,
+    pub(crate) pixels_per_degree: f64,
+}
+
+/// Threshold elevation, 1 to 3, of one band at every pixel.
+///
+/// The band's local contrast amplitude is √2 times its RMS over a Gaussian of a third of a wavelength (the band's
+/// signal itself crosses zero twice a wavelength), less the energy that the guide's own noise has there. It is then
+/// eroded over one wavelength to each side: an edge, whose contrast lives within a wavelength, masks nothing beside
+/// it; texture, which goes on, does.
+pub(crate) fn band_elevation(
+    source: &MaskSource<'_>,
+    bands: &OctaveBands,
+    band: usize,
+    tables: &BandTables,
+    elevation: &ElevationTable,
+) -> Plane {
+    let ppd = source.pixels_per_degree;
+    let gain = RadialTable::new(ppd, |freq| bands.mask_gain(band, freq));
+    let mut energy = source
+        .transform
+        .filtered(source.contrast, ppd, bands.limit_cpd(band), |freq| {
+            gain.at(freq)
+        })
+        .map(|a| a * a);
+    let share = tables.mask_noise_share as f32;
+    if let Some(noise) = source.noise {
+        energy.for_each_row_mut(|y, row| {
+            for (value, noise) in row.iter_mut().zip(noise.row(y)) {
+                *value -= share * noise;
+            }
+        });
+    }
+    let wavelength_px = ppd / bands.center_cpd(band);
+    let mut mask = gaussian_blur(&energy, 0.35 * wavelength_px);
+    mask.for_each_row_mut(|y, row| {
+        for (value, coordinate) in row.iter_mut().zip(source.coordinates.row(y)) {
+            *value = 2.0 * value.max(0.0) * tables.center_sensitivity_squared.at(*coordinate);
+        }
+    });
+    let mut elevated = erode(&mask, wavelength_px.round() as usize);
+    elevated.for_each_row_mut(|_, row| {
+        row.iter_mut()
+            .for_each(|value| *value = elevation.at(*value))
+    });
+    elevated
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn golden_elevations() {
+        for (mask, expected) in [
+            (0.0, 1.0),
+            (0.5, 1.034_111_411),
+            (1.0, 1.189_207_115),
+            (2.0, 1.679_918_943),
+            (5.0, 3.093_647_699),
+            (10.0, 5.013_856_978),
+            (50.0, 15.462_542_36),
+        ] {
+            assert!(
+                (threshold_elevation(mask) / expected - 1.0).abs() < 1e-8,
+                "{mask}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_table_follows_the_formula_up_to_the_cap() {
+        let table = ElevationTable::new();
+        for step in 0..300 {
+            let mask = f64::from(step) * 0.05;
+            let expected = threshold_elevation(mask).min(ELEVATION_CAP);
+            let found = f64::from(table.at((mask * mask) as f32));
+            assert!(
+                (found / expected - 1.0).abs() < 2e-3,
+                "{mask}: {found} for {expected}"
+            );
+        }
+    }
+}

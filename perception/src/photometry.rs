@@ -1,0 +1,28 @@
+//! From linear RGB to luminance.
+
+/// Rec. 709 luminance weights for linear red, green and blue with a D65 white (ITU-R BT.709-6, section 3.2).
+pub const REC709_WEIGHTS: [f32; 3] = [0.2126, 0.7152, 0.0722];
+
+/// Photopic luminance of linear Rec. 709 RGB, in the unit of `rgb` (cd/m² in, cd/m² out).
+///
+/// ```
+/// assert_eq!(fechner_perception::photometry::luminance([100.0, 100.0, 100.0]), 100.0);
+/// ```
+#[must_use]
+pub fn luminance(rgb: [f32; 3]) -> f32 {
+    // Summed so that the weights of white add to exactly 1 in f32.
+    rgb[0] * REC709_WEIGHTS[0] + rgb[1] * REC709_WEIGHTS[1] + rgb[2] * REC709_WEIGHTS[2]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_are_rec709() {
+        let close = |a: f32, b: f32| (a - b).abs() < 1e-5;
+        assert!(close(luminance([1.0, 0.0, 0.0]), 0.2126));
+        assert!(close(luminance([0.6, 0.35, 0.25]), 0.39593));
+        assert!(close(luminance([0.3, 0.5, 0.9]), 0.48636));
+    }
+}

@@ -1,0 +1,242 @@
+//! A single-channel picture.
+
+use rayon::prelude::*;
+
+use crate::error::Error;
+
+/// A row-major image of `f32`, row 0 at the top.
+///
+/// What its values mean (cd/m², (cd/m²)², threshold units) is said by whoever hands it out; the plane itself only
+/// knows its shape. Both sides may be 0, though every model rejects a plane without pixels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plane {
+    width: usize,
+    height: usize,
+    values: Vec<f32>,
+}
+
+impl Plane {
+    /// A plane whose every pixel is `value`.
+    ///
+    /// ```
+    /// use fechner_perception::Plane;
+    /// assert_eq!(Plane::filled(3, 2, 50.0).values(), [50.0; 6]);
+    /// ```
+    #[must_use]
+    pub fn filled(width: usize, height: usize, value: f32) -> Self {
+        Self {
+            width,
+            height,
+            values: vec![value; width * height],
+        }
+    }
+
+    /// Takes row-major values.
+    ///
+    /// # Errors
+    /// [`Error::ValueCount`] unless there are exactly `width * height` of them.
+    pub fn from_values(width: usize, height: usize, values: Vec<f32>) -> Result<Self, Error> {
+        if width.checked_mul(height) == Some(values.len()) {
+            Ok(Self {
+                width,
+                height,
+                values,
+            })
+        } else {
+            Err(Error::ValueCount {
+                width,
+                height,
+                found: values.len(),
+            })
+        }
+    }
+
+    /// Asks `value_at(x, y)` for every pixel, rows in parallel.
+    #[must_use]
+    pub fn from_fn(
+        width: usize,
+        height: usize,
+        value_at: impl Fn(usize, usize) -> f32 + Sync,
+    ) -> Self {
+        let mut plane = Self::filled(width, height, 0.0);
+        plane.for_each_row_mut(|y, row| {
+            for (x, value) in row.iter_mut().enumerate() {
+                *value = value_at(x, y);
+            }
+        });
+        plane
+    }
+
+    /// Columns.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Rows.
+    #[must_use]
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// All values, row by row.
+    #[must_use]
+    pub fn values(&self) -> &[f32] {
+        &self.values
+    }
+
+    /// All values, row by row, to be written.
+    pub fn values_mut(&mut self) -> &mut [f32] {
+        &mut self.values
+    }
+
+    /// The value at column `x`, row `y`.
+    ///
+    /// # Panics
+    /// Outside the plane, as indexing a slice does.
+    #[must_use]
+    pub fn get(&self, x: usize, y: usize) -> f32 {
+        assert!(x < self.width, "column {x} of a plane {} wide", self.width);
+        self.values[y * self.width + x]
+    }
+
+    /// The values given up, row by row.
+    #[must_use]
+    pub fn into_values(self) -> Vec<f32> {
+        self.values
+    }
+
+    /// A plane of the same shape with `change` applied to every value.
+    #[must_use]
+    pub fn map(&self, change: impl Fn(f32) -> f32 + Sync) -> Self {
+        let mut mapped = self.clone();
+        mapped.for_each_row_mut(|_, row| row.iter_mut().for_each(|value| *value = change(*value)));
+        mapped
+    }
+
+    /// Arithmetic mean, summed in `f64`; 0 for a plane without pixels.
+    #[must_use]
+    pub fn mean(&self) -> f64 {
+        if self.values.is_empty() {
+            return 0.0;
+        }
+        self.values
+            .iter()
+            .map(|&value| f64::from(value))
+            .sum::<f64>()
+            / self.values.len() as f64
+    }
+
+    /// Runs `work(y, row)` over all rows in parallel; each row is one thread's own, so the order cannot matter.
+    pub(crate) fn for_each_row_mut(&mut self, work: impl Fn(usize, &mut [f32]) + Sync) {
+        if self.width == 0 {
+            return;
+        }
+        // A few rows at a time: one row of a small picture is less work than handing it over.
+        let rows_at_once = (16_384 / self.width).max(1);
+        let width = self.width;
+        self.values
+            .par_chunks_mut(width * rows_at_once)
+            .enumerate()
+            .for_each(|(chunk, rows)| {
+                for (offset, row) in rows.chunks_exact_mut(width).enumerate() {
+                    work(chunk * rows_at_once + offset, row);
+                }
+            });
+    }
+
+    pub(crate) fn row(&self, y: usize) -> &[f32] {
+        &self.values[y * self.width..(y + 1) * self.width]
+    }
+
+    pub(crate) fn same_size(&self, other: &Self) -> bool {
+        self.width == other.width && self.height == other.height
+    }
+
+    /// Rejects a plane of another size than `width` × `height`.
+    pub(crate) fn check_size(
+        &self,
+        what: &'static str,
+        width: usize,
+        height: usize,
+    ) -> Result<(), Error> {
+        if self.width == width && self.height == height {
+            Ok(())
+        } else {
+            Err(Error::SizeMismatch {
+                what,
+                width,
+                height,
+                found_width: self.width,
+                found_height: self.height,
+            })
+        }
+    }
+
+    /// Rejects an empty plane and any value that is not finite or is negative.
+    pub(crate) fn check_non_negative(&self, what: &'static str) -> Result<(), Error> {
+        if self.values.is_empty() {
+            return Err(Error::Empty { what });
+        }
+        match self
+            .values
+            .iter()
+            .position(|value| !(value.is_finite() && *value >= 0.0))
+        {
+            None => Ok(()),
+            Some(index) => {
+                let (x, y) = (index % self.width, index / self.width);
+                Err(Error::BadPixel {
+                    what,
+                    value: self.values[index],
+                    x,
+                    y,
+                })
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_keep_their_places() {
+        let plane = Plane::from_fn(3, 2, |x, y| (10 * y + x) as f32);
+        assert_eq!(plane.values(), [0.0, 1.0, 2.0, 10.0, 11.0, 12.0]);
+        assert_eq!(plane.get(2, 1), 12.0);
+    }
+
+    #[test]
+    fn a_wrong_count_is_an_error() {
+        assert_eq!(
+            Plane::from_values(3, 2, vec![0.0; 5]),
+            Err(Error::ValueCount {
+                width: 3,
+                height: 2,
+                found: 5
+            })
+        );
+        assert!(Plane::from_values(usize::MAX, 3, vec![]).is_err());
+    }
+
+    #[test]
+    fn bad_pixels_are_named() {
+        let plane = Plane::from_fn(4, 4, |x, y| if (x, y) == (2, 3) { f32::NAN } else { 1.0 });
+        assert!(matches!(
+            plane.check_non_negative("guide"),
+            Err(Error::BadPixel { x: 2, y: 3, .. })
+        ));
+        assert!(
+            Plane::filled(4, 4, -1.0)
+                .check_non_negative("guide")
+                .is_err()
+        );
+        assert!(
+            Plane::filled(0, 4, 1.0)
+                .check_non_negative("guide")
+                .is_err()
+        );
+    }
+}

@@ -1,0 +1,214 @@
+//! Error as it will be seen: through a fitted tone operator, on a display.
+//!
+//! A pixel's error is pushed through the operator by itself; how a local operator would spread it to other pixels is
+//! ignored.
+
+use crate::display::Display;
+use crate::plane::Plane;
+use crate::tone::FittedTone;
+
+/// What the display shows, cd/m², for scene luminance in cd/m².
+#[must_use]
+pub fn display_luminance(
+    fitted: &dyn FittedTone,
+    display: &Display,
+    scene_luminance: &Plane,
+) -> Plane {
+    let shown = Shown { fitted, display };
+    scene_luminance.map(|scene| shown.cd_m2(scene))
+}
+
+/// Variance of the displayed luminance, (cd/m²)², for scene luminance of mean `mean` (cd/m²) and variance `variance`
+/// ((cd/m²)², of the mean).
+///
+/// Three-point quadrature of the operator, not its derivative: just above a clip the derivative is 0, and the noise is
+/// not. Where M ≥ √3 σ the points are those of Gauss and Hermite (M and M ± √3 σ); nearer to black, where light cannot
+/// go below 0, the lower point stays at 0 and the upper one moves out to M + 3σ²/M, which keeps mean and variance. An
+/// operator that is linear over the points gives exactly its slope² · σ².
+///
+/// Pixels whose mean or variance is not finite get infinity; so does every pixel when the planes differ in size.
+#[must_use]
+pub fn display_variance(
+    fitted: &dyn FittedTone,
+    display: &Display,
+    mean: &Plane,
+    variance: &Plane,
+) -> Plane {
+    let (width, height) = (mean.width(), mean.height());
+    if !mean.same_size(variance) {
+        return Plane::filled(width, height, f32::INFINITY);
+    }
+    let shown = Shown { fitted, display };
+    let mut result = Plane::filled(width, height, 0.0);
+    result.for_each_row_mut(|y, row| {
+        for (value, (mean, variance)) in row.iter_mut().zip(mean.row(y).iter().zip(variance.row(y)))
+        {
+            *value = if mean.is_finite() && variance.is_finite() {
+                shown.variance(f64::from(mean.max(0.0)), f64::from(variance.max(0.0)))
+            } else {
+                f32::INFINITY
+            };
+        }
+    });
+    result
+}
+
+/// Half the difference that the two halves make on the display, cd/m²: (tone(M + D) − tone(M − D)) / 2 for the mean M and
+/// the half difference D = (A − B) / 2, both scene cd/m².
+///
+/// Pixels that are not finite give 0 (they are counted and left out upstream); planes of different sizes give infinity.
+#[must_use]
+pub fn display_half_difference(
+    fitted: &dyn FittedTone,
+    display: &Display,
+    mean: &Plane,
+    half_difference: &Plane,
+) -> Plane {
+    let (width, height) = (mean.width(), mean.height());
+    if !mean.same_size(half_difference) {
+        return Plane::filled(width, height, f32::INFINITY);
+    }
+    let shown = Shown { fitted, display };
+    let mut result = Plane::filled(width, height, 0.0);
+    result.for_each_row_mut(|y, row| {
+        for (value, (&mean, &difference)) in row
+            .iter_mut()
+            .zip(mean.row(y).iter().zip(half_difference.row(y)))
+        {
+            if mean.is_finite() && difference.is_finite() {
+                *value = 0.5 * (shown.cd_m2(mean + difference) - shown.cd_m2(mean - difference));
+            }
+        }
+    });
+    result
+}
+
+/// A display behind an operator.
+struct Shown<'a> {
+    fitted: &'a dyn FittedTone,
+    display: &'a Display,
+}
+
+impl Shown<'_> {
+    fn cd_m2(&self, scene_cd_m2: f32) -> f32 {
+        self.display.luminance_cd_m2(f64::from(
+            self.fitted.relative_luminance(scene_cd_m2.max(0.0)),
+        )) as f32
+    }
+
+    fn variance(&self, mean: f64, variance: f64) -> f32 {
+        if variance <= 0.0 {
+            return 0.0;
+        }
+        // Distances of the outer points from the mean. At M = √3 σ both forms agree.
+        let gauss = (3.0 * variance).sqrt();
+        let (below, above) = if mean >= gauss {
+            (gauss, gauss)
+        } else {
+            (mean, (3.0 * variance / mean).min(1e30))
+        };
+        if below <= 0.0 || !above.is_finite() {
+            // No light on average, yet noise: only a broken input has that. Take the noise as it stands.
+            let swing = f64::from(self.cd_m2(gauss as f32) - self.cd_m2(0.0));
+            return (swing * swing / 3.0) as f32;
+        }
+        let weight_below = variance / (below * (below + above));
+        let weight_above = variance / (above * (below + above));
+        let center = f64::from(self.cd_m2(mean as f32));
+        let low = f64::from(self.cd_m2((mean - below) as f32)) - center;
+        let high = f64::from(self.cd_m2((mean + above) as f32)) - center;
+        let offset = weight_below * low + weight_above * high;
+        (weight_below * low * low + weight_above * high * high - offset * offset).max(0.0) as f32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tone::{SceneGuide, operator};
+
+    fn absolute(display: &Display) -> Box<dyn FittedTone> {
+        let guide = Plane::filled(1, 1, 1.0);
+        operator("absolute", None).unwrap().fit(
+            &SceneGuide {
+                luminance_cd_m2: &guide,
+            },
+            display,
+        )
+    }
+
+    fn one(value: f32) -> Plane {
+        Plane::filled(1, 1, value)
+    }
+
+    #[test]
+    fn a_linear_operator_keeps_the_variance() {
+        let display = Display::default();
+        let guide = Plane::filled(1, 1, 10.0);
+        let ward94 = operator("ward94", None).unwrap();
+        let fitted = ward94.fit(
+            &SceneGuide {
+                luminance_cd_m2: &guide,
+            },
+            &display,
+        );
+        let slope = fitted.relative_luminance(1.0) * 199.8;
+        // The last two have σ near and above the mean.
+        for (mean, variance) in [(10.0, 4.0), (10.0, 30.0), (2.0, 4.0), (0.5, 1.0)] {
+            let found = display_variance(&*fitted, &display, &one(mean), &one(variance)).get(0, 0);
+            let expected = slope * slope * variance;
+            assert!(
+                (found / expected - 1.0).abs() < 1e-4,
+                "{mean} {variance}: {found}"
+            );
+        }
+    }
+
+    #[test]
+    fn noise_above_a_clip_is_not_lost() {
+        let display = Display::default();
+        let fitted = absolute(&display);
+        // Mean 10 above white, σ 20: the derivative at the mean is 0, the noise dips far below white.
+        let found = display_variance(&*fitted, &display, &one(210.0), &one(400.0)).get(0, 0);
+        assert!(found > 50.0, "{found}");
+        let far_above = display_variance(&*fitted, &display, &one(2000.0), &one(400.0)).get(0, 0);
+        assert_eq!(far_above, 0.0);
+    }
+
+    #[test]
+    fn half_difference_clips_like_the_picture() {
+        let display = Display::default();
+        let fitted = absolute(&display);
+        let found = display_half_difference(&*fitted, &display, &one(100.0), &one(3.0)).get(0, 0);
+        assert!((found - 3.0).abs() < 1e-3);
+        let clipped =
+            display_half_difference(&*fitted, &display, &one(200.0), &one(10.0)).get(0, 0);
+        assert!((clipped - 5.0).abs() < 1e-3, "{clipped}");
+    }
+
+    #[test]
+    fn broken_input_is_infinitely_visible_or_left_out() {
+        let display = Display::default();
+        let fitted = absolute(&display);
+        assert!(
+            display_variance(&*fitted, &display, &one(f32::NAN), &one(1.0))
+                .get(0, 0)
+                .is_infinite()
+        );
+        assert!(
+            display_variance(&*fitted, &display, &one(1.0), &Plane::filled(2, 1, 1.0))
+                .get(0, 0)
+                .is_infinite()
+        );
+        assert!(
+            display_variance(&*fitted, &display, &one(0.0), &one(1.0))
+                .get(0, 0)
+                .is_finite()
+        );
+        assert!(
+            display_variance(&*fitted, &display, &one(1e-30), &one(1e30))
+                .get(0, 0)
+                .is_finite()
+        );
+    }
+}

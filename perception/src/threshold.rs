@@ -1,0 +1,431 @@
+//! The threshold map: how much error each pixel of a picture may have before it is seen.
+
+use crate::bands::OctaveBands;
+use crate::csf::ContrastSensitivity;
+use crate::display::Viewing;
+use crate::error::Error;
+use crate::fft::PictureTransform;
+use crate::filter::gaussian_blur;
+use crate::masking::{ElevationTable, MaskSource, band_elevation};
+use crate::plane::Plane;
+use crate::sensitivity::{
+    AdaptationLevel, LEAST_ADAPTATION_CD_M2, SensitivityTables, adaptation_levels,
+    luminance_coordinate,
+};
+
+/// Standard deviation of the windows over which the eye adapts and error is pooled, degrees: as wide as a disc of 1°.
+pub const POOLING_SIGMA_DEG: f64 = 0.25;
+
+/// The picture that thresholds are found for.
+#[derive(Clone, Copy, Debug)]
+pub struct ThresholdInputs<'a> {
+    /// Luminance of the denoised guide as the display shows it, cd/m².
+    pub display_luminance_cd_m2: &'a Plane,
+    /// Variance of the noise left in that guide, (cd/m²)², taken as white: its energy is taken out of the masks, so that noise
+    /// does not hide noise. For a denoised guide, whose noise is no longer white, the variance *before* denoising
+    /// bounds the noise in every band. `None` takes the guide as clean.
+    pub guide_variance: Option<&'a Plane>,
+}
+
+/// What the eye in front of one display can see at each pixel of one picture.
+///
+/// Made by [`threshold_map`]. Errors are asked about in display cd/m².
+#[derive(Clone, Debug)]
+pub struct ThresholdMap {
+    pub(crate) viewing: Viewing,
+    pub(crate) bands: OctaveBands,
+    pub(crate) tables: SensitivityTables,
+    pub(crate) levels: Vec<AdaptationLevel>,
+    pub(crate) adaptation_cd_m2: Plane,
+    /// Threshold elevation of each band.
+    pub(crate) elevations: Vec<Plane>,
+    pub(crate) noise_gain: Plane,
+}
+
+/// Finds adaptation, masking and thresholds of a picture.
+///
+/// Adaptation is the arithmetic mean over a Gaussian of σ 0.25° (the variance of a disc of 1°), after single pixels
+/// brighter than all their neighbours have been brought down to them: a firefly must not raise its own threshold.
+/// Masking is each octave band's own, see [`crate::masking`].
+///
+/// # Errors
+/// [`Error::Empty`] and [`Error::BadPixel`] for pictures that are none, [`Error::SizeMismatch`] for a variance of
+/// another size, [`Error::OutOfRange`] for an impossible viewing.
+///
+/// ```
+/// use fechner_perception::{CastleCsf, Plane, ThresholdInputs, Viewing, threshold_map};
+/// let grey = Plane::filled(64, 64, 100.0);
+/// let inputs = ThresholdInputs { display_luminance_cd_m2: &grey, guide_variance: None };
+/// let map = threshold_map(&inputs, &Viewing::default(), &CastleCsf::default())?;
+/// // At 60 pixels a degree white noise of 1.73 % is at threshold.
+/// let allowed = map.allowed_standard_error_cd_m2(1.0).get(32, 32);
+/// assert!((allowed - 1.73).abs() < 0.02);
+/// # Ok::<(), fechner_perception::Error>(())
+/// ```
+pub fn threshold_map(
+    inputs: &ThresholdInputs<'_>,
+    viewing: &Viewing,
+    csf: &dyn ContrastSensitivity,
+) -> Result<ThresholdMap, Error> {
+    viewing.check()?;
+    let guide = inputs.display_luminance_cd_m2;
+    guide.check_non_negative("display luminance")?;
+    if let Some(variance) = inputs.guide_variance {
+        variance.check_size("guide variance", guide.width(), guide.height())?;
+        variance.check_non_negative("guide variance")?;
+    }
+    let ppd = viewing.display.pixels_per_degree;
+    let bands = OctaveBands::for_grid(ppd);
+    let tables = SensitivityTables::new(&bands, viewing, csf);
+
+    let mut adaptation_cd_m2 = gaussian_blur(
+        &without_single_bright_pixels(guide),
+        POOLING_SIGMA_DEG * ppd,
+    );
+    adaptation_cd_m2.for_each_row_mut(|_, row| {
+        row.iter_mut()
+            .for_each(|value| *value = value.max(LEAST_ADAPTATION_CD_M2));
+    });
+    let coordinates = adaptation_cd_m2.map(luminance_coordinate);
+
+    let transform = picture_transform(guide.width(), guide.height(), ppd);
+    let contrast = transform.forward(&ratio(guide, &adaptation_cd_m2, |value, adaptation| {
+        value / adaptation - 1.0
+    }));
+    let noise = inputs.guide_variance.map(|variance| {
+        ratio(variance, &adaptation_cd_m2, |value, adaptation| {
+            value / adaptation / adaptation
+        })
+    });
+    let source = MaskSource {
+        transform: &transform,
+        contrast: &contrast,
+        noise: noise.as_ref(),
+        coordinates: &coordinates,
+        pixels_per_degree: ppd,
+    };
+    let elevation = ElevationTable::new();
+    let elevations: Vec<Plane> = tables
+        .bands
+        .iter()
+        .enumerate()
+        .map(|(band, band_tables)| band_elevation(&source, &bands, band, band_tables, &elevation))
+        .collect();
+
+    let noise_gain = noise_gain(&tables, &adaptation_cd_m2, &coordinates, Some(&elevations));
+    let (least, greatest) = range(&adaptation_cd_m2);
+    let levels = adaptation_levels(viewing, csf, least, greatest);
+    Ok(ThresholdMap {
+        viewing: viewing.clone(),
+        bands,
+        tables,
+        levels,
+        adaptation_cd_m2,
+        elevations,
+        noise_gain,
+    })
+}
+
+impl ThresholdMap {
+    /// Adaptation luminance, cd/m², at least 1e-4.
+    #[must_use]
+    pub fn adaptation_cd_m2(&self) -> &Plane {
+        &self.adaptation_cd_m2
+    }
+
+    /// N(x) in 1/(cd/m²)²: white pixel noise of locally constant variance σ² has visibility v with v² = 2 N σ².
+    ///
+    /// N = Σ_b mean(S² `B_b`²) / (`m_b` `L_a`)², the mean taken over the frequencies of the pixel grid.
+    #[must_use]
+    pub fn noise_gain(&self) -> &Plane {
+        &self.noise_gain
+    }
+
+    /// Standard error of a pixel's mean, cd/m², that leaves white noise at `visibility`: v / √(2N).
+    #[must_use]
+    pub fn allowed_standard_error_cd_m2(&self, visibility: f64) -> Plane {
+        self.noise_gain
+            .map(|gain| (visibility / (2.0 * f64::from(gain)).sqrt()) as f32)
+    }
+
+    /// How many times masking raises the allowed standard error of white noise at each pixel, 1 to 3.
+    #[must_use]
+    pub fn masking_elevation(&self) -> Plane {
+        let coordinates = self.adaptation_cd_m2.map(luminance_coordinate);
+        let unmasked = noise_gain(&self.tables, &self.adaptation_cd_m2, &coordinates, None);
+        ratio(&unmasked, &self.noise_gain, |unmasked, masked| {
+            (unmasked / masked).sqrt()
+        })
+    }
+
+    /// The viewing that the thresholds hold for.
+    #[must_use]
+    pub fn viewing(&self) -> &Viewing {
+        &self.viewing
+    }
+
+    /// Columns, pixels.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.adaptation_cd_m2.width()
+    }
+
+    /// Rows, pixels.
+    #[must_use]
+    pub fn height(&self) -> usize {
+        self.adaptation_cd_m2.height()
+    }
+}
+
+/// The transform for pictures of this size at this resolution: one degree of mirror on each side, since contrast
+/// sensitivity reaches no further.
+pub(crate) fn picture_transform(
+    width: usize,
+    height: usize,
+    pixels_per_degree: f64,
+) -> PictureTransform {
+    PictureTransform::new(width, height, pixels_per_degree.ceil() as usize)
+}
+
+/// `change(a, b)` at every pixel of two planes of one size.
+pub(crate) fn ratio(a: &Plane, b: &Plane, change: impl Fn(f32, f32) -> f32 + Sync) -> Plane {
+    let mut result = a.clone();
+    result.for_each_row_mut(|y, row| {
+        for (value, other) in row.iter_mut().zip(b.row(y)) {
+            *value = change(*value, *other);
+        }
+    });
+    result
+}
+
+fn noise_gain(
+    tables: &SensitivityTables,
+    adaptation_cd_m2: &Plane,
+    coordinates: &Plane,
+    elevations: Option<&[Plane]>,
+) -> Plane {
+    let mut gain = adaptation_cd_m2.clone();
+    gain.for_each_row_mut(|y, row| {
+        for (x, (value, &coordinate)) in row.iter_mut().zip(coordinates.row(y)).enumerate() {
+            let energy: f32 = tables
+                .bands
+                .iter()
+                .enumerate()
+                .map(|(band, tables)| {
+                    let elevation = elevations.map_or(1.0, |elevations| elevations[band].row(y)[x]);
+                    tables.noise_energy.at(coordinate) / (elevation * elevation)
+                })
+                .sum();
+            // Divided twice: the square of 1e-4 cd/m² and of 1e20 must both stay within f32.
+            *value = energy / *value / *value;
+        }
+    });
+    gain
+}
+
+fn range(plane: &Plane) -> (f32, f32) {
+    plane
+        .values()
+        .iter()
+        .fold((f32::INFINITY, 0.0), |(least, greatest), &value| {
+            (least.min(value), greatest.max(value))
+        })
+}
+
+/// Every pixel lowered to the brightest of its eight neighbours where it exceeds them all.
+fn without_single_bright_pixels(plane: &Plane) -> Plane {
+    let (width, height) = (plane.width(), plane.height());
+    if width * height == 1 {
+        return plane.clone();
+    }
+    let mut result = plane.clone();
+    result.for_each_row_mut(|y, row| {
+        let rows = [
+            plane.row(y.saturating_sub(1)),
+            plane.row(y),
+            plane.row((y + 1).min(height - 1)),
+        ];
+        for (x, value) in row.iter_mut().enumerate() {
+            let columns = x.saturating_sub(1)..(x + 2).min(width);
+            let mut brightest = 0.0_f32;
+            for (index, line) in rows.iter().enumerate() {
+                // At the top and bottom the row stands in for its missing neighbour, without the pixel itself.
+                let is_own =
+                    index == 1 || (index == 0 && y == 0) || (index == 2 && y + 1 == height);
+                for column in columns.clone() {
+                    if !(is_own && column == x) {
+                        brightest = brightest.max(line[column]);
+                    }
+                }
+            }
+            *value = value.min(brightest);
+        }
+    });
+    result
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::csf::CastleCsf;
+    use crate::display::Display;
+
+    fn viewing(pixels_per_degree: f64) -> Viewing {
+        Viewing {
+            display: Display {
+                pixels_per_degree,
+                ..Display::default()
+            },
+            ..Viewing::default()
+        }
+    }
+
+    fn map_of(picture: &Plane, viewing: &Viewing) -> ThresholdMap {
+        let inputs = ThresholdInputs {
+            display_luminance_cd_m2: picture,
+            guide_variance: None,
+        };
+        threshold_map(&inputs, viewing, &CastleCsf::default()).unwrap()
+    }
+
+    /// Standard error at v = 1 is σ/L = 1 / (S_peak G √2) with the specification's S_peak and G of white noise.
+    #[test]
+    fn uniform_pictures_have_the_tabulated_thresholds() {
+        for (luminance, ppd, expected) in [
+            (1.0, 30.0, 1.0 / (40.160_55 * 0.295_844)),
+            (1.0, 60.0, 1.0 / (40.160_55 * 0.149_091)),
+            (10.0, 20.0, 1.0 / (86.063_1 * 0.616_258)),
+            (10.0, 60.0, 1.0 / (86.063_1 * 0.227_654)),
+            (100.0, 20.0, 1.0 / (134.296_3 * 0.748_92)),
+            (100.0, 30.0, 1.0 / (134.296_3 * 0.567_412)),
+            (100.0, 60.0, 1.0 / (134.296_3 * 0.304_307)),
+        ] {
+            let map = map_of(&Plane::filled(32, 24, luminance), &viewing(ppd));
+            let allowed =
+                f64::from(map.allowed_standard_error_cd_m2(1.0).get(16, 12)) / f64::from(luminance);
+            let expected = expected / std::f64::consts::SQRT_2;
+            assert!(
+                (allowed / expected - 1.0).abs() < 2e-3,
+                "{luminance} cd/m², {ppd} ppd: {allowed}, not {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn an_edge_masks_nothing_beside_it() {
+        for ppd in [38.0, 60.0] {
+            let step = Plane::from_fn(256, 64, |x, _| if x < 128 { 50.0 } else { 100.0 });
+            let elevation = map_of(&step, &viewing(ppd)).masking_elevation();
+            let beside = (0.25 * ppd) as usize;
+            for x in [128 - beside, 127 + beside] {
+                let found = elevation.get(x, 32);
+                assert!(found < 1.25, "{ppd} ppd, x {x}: {found}");
+            }
+        }
+    }
+
+    #[test]
+    fn texture_masks_and_its_own_noise_does_not() {
+        let wave = |amplitude: f32| {
+            Plane::from_fn(192, 192, move |x, y| {
+                let phase = std::f32::consts::TAU * 4.0 / 60.0;
+                100.0 * (1.0 + amplitude * ((x as f32 * phase).cos() * (y as f32 * phase).cos()))
+            })
+        };
+        let textured = map_of(&wave(0.3), &viewing(60.0))
+            .masking_elevation()
+            .get(96, 96);
+        assert!(textured > 1.15, "{textured}");
+        // White noise of 10 % of the mean, known as such, and unknown.
+        let mut state = 1_u64;
+        let noisy = Plane::from_values(
+            192,
+            192,
+            (0..192 * 192)
+                .map(|_| 100.0 + 10.0 * normal(&mut state))
+                .collect(),
+        );
+        let noisy = noisy.unwrap();
+        let variance = Plane::filled(192, 192, 100.0);
+        let known = ThresholdInputs {
+            display_luminance_cd_m2: &noisy,
+            guide_variance: Some(&variance),
+        };
+        let known = threshold_map(&known, &viewing(60.0), &CastleCsf::default())
+            .unwrap()
+            .masking_elevation();
+        let unknown = map_of(&noisy, &viewing(60.0)).masking_elevation();
+        assert!(
+            known.mean() < 1.01 && unknown.mean() > 1.2,
+            "known {} unknown {}",
+            known.mean(),
+            unknown.mean()
+        );
+    }
+
+    #[test]
+    fn a_firefly_does_not_raise_its_threshold() {
+        let mut picture = Plane::filled(64, 64, 20.0);
+        picture.values_mut()[32 * 64 + 32] = 200.0;
+        let adapted = map_of(&picture, &viewing(60.0))
+            .adaptation_cd_m2()
+            .get(32, 32);
+        assert!((adapted - 20.0).abs() < 1e-3, "{adapted}");
+    }
+
+    #[test]
+    fn any_size_and_luminance_gives_finite_thresholds() {
+        for (width, height) in [(1, 1), (2, 1), (1, 9), (3, 3), (17, 5)] {
+            for luminance in [0.0, 1e-30, 1e-4, 1.0, 1e8] {
+                let map = map_of(&Plane::filled(width, height, luminance), &viewing(30.0));
+                let allowed = map.allowed_standard_error_cd_m2(1.0);
+                assert!(
+                    allowed
+                        .values()
+                        .iter()
+                        .all(|value| value.is_finite() && *value > 0.0),
+                    "{luminance}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn bad_inputs_are_errors() {
+        let csf = CastleCsf::default();
+        let bad = Plane::filled(4, 4, f32::NAN);
+        let good = Plane::filled(4, 4, 1.0);
+        let small = Plane::filled(2, 2, 1.0);
+        let ask = |display_luminance_cd_m2, guide_variance, viewing: &Viewing| {
+            threshold_map(
+                &ThresholdInputs {
+                    display_luminance_cd_m2,
+                    guide_variance,
+                },
+                viewing,
+                &csf,
+            )
+            .err()
+        };
+        assert!(matches!(
+            ask(&bad, None, &Viewing::default()),
+            Some(Error::BadPixel { .. })
+        ));
+        assert!(matches!(
+            ask(&good, Some(&small), &Viewing::default()),
+            Some(Error::SizeMismatch { .. })
+        ));
+        assert!(matches!(
+            ask(&good, None, &viewing(0.0)),
+            Some(Error::OutOfRange { .. })
+        ));
+        assert!(matches!(
+            ask(&good, None, &viewing(f64::NAN)),
+            Some(Error::OutOfRange { .. })
+        ));
+    }
+
+    fn normal(state: &mut u64) -> f32 {
+        crate::test_noise::normal(state)
+    }
+}

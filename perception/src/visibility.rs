@@ -1,0 +1,386 @@
+//! Visibility: an error in threshold units.
+//!
+//! v(x) = √2 · sqrt(g ⊗ E\[V²\])(x), where V is the display error over the adaptation luminance, through the contrast
+//! sensitivity function and divided by each band's masking, and g is a Gaussian of σ 0.25°. Bands add by energy. A
+//! grating at its threshold has v = 1: the √2 turns its RMS into its amplitude.
+
+use crate::bands::RadialTable;
+use crate::filter::gaussian_blur;
+use crate::plane::Plane;
+use crate::sensitivity::luminance_coordinate;
+use crate::threshold::{POOLING_SIGMA_DEG, ThresholdMap, picture_transform, ratio};
+
+/// An error of this many times the adaptation luminance is hopelessly visible; more would only cost the rest of the
+/// transform its precision.
+const LARGEST_RELATIVE_ERROR: f32 = 1e3;
+/// Its square.
+const LARGEST_RELATIVE_VARIANCE: f32 = LARGEST_RELATIVE_ERROR * LARGEST_RELATIVE_ERROR;
+
+/// What a measured error looks like.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeasuredError {
+    /// v(x) in threshold units: pooled, times √2.
+    pub visibility: Plane,
+    /// The unpooled amplitude sqrt(Σ_b `V_b`²) at each pixel in threshold units: what a lone bright pixel shows,
+    /// which pooling would hide.
+    pub amplitude: Plane,
+}
+
+impl ThresholdMap {
+    /// Visibility that independent pixel errors of this variance ((cd/m²)² on the display, of the pixel's mean) will
+    /// have, on average over noise.
+    ///
+    /// v² = 2 g ⊗ Σ_b (mean(S² `B_b`²) / `m_b`²) · (`h_b`² ⊗ σ²/`L_a`²): each band smears the noise's energy by the width of its
+    /// own impulse response before masking acts.
+    ///
+    /// Pixels whose variance is negative or not finite get infinity and count as 0 for the others; a plane of another
+    /// size gets infinity everywhere.
+    #[must_use]
+    pub fn predicted_visibility(&self, variance_of_mean: &Plane) -> Plane {
+        if !self.fits(variance_of_mean) {
+            return self.infinite();
+        }
+        let relative = ratio(
+            variance_of_mean,
+            &self.adaptation_cd_m2,
+            |variance, adaptation| {
+                if variance.is_finite() && variance >= 0.0 {
+                    (variance / adaptation / adaptation).min(LARGEST_RELATIVE_VARIANCE)
+                } else {
+                    0.0
+                }
+            },
+        );
+        let coordinates = self.adaptation_cd_m2.map(luminance_coordinate);
+        let mut energy = Plane::filled(self.width(), self.height(), 0.0);
+        for (tables, elevation) in self.tables.bands.iter().zip(&self.elevations) {
+            let spread = gaussian_blur(
+                &relative,
+                tables.spread_deg * self.viewing.display.pixels_per_degree,
+            );
+            energy.for_each_row_mut(|y, row| {
+                let inputs = spread
+                    .row(y)
+                    .iter()
+                    .zip(elevation.row(y))
+                    .zip(coordinates.row(y));
+                for (value, ((spread, elevation), coordinate)) in row.iter_mut().zip(inputs) {
+                    *value +=
+                        spread * tables.noise_energy.at(*coordinate) / (elevation * elevation);
+                }
+            });
+        }
+        let visibility = self.pooled(&energy).map(|energy| (2.0 * energy).sqrt());
+        ratio(&visibility, variance_of_mean, |visibility, variance| {
+            if variance.is_finite() && variance >= 0.0 {
+                visibility
+            } else {
+                f32::INFINITY
+            }
+        })
+    }
+
+    /// Visibility of the error that two halves of a picture show: `half_difference` is D = (A − B)/2 in display cd/m²,
+    /// a realisation of the error of (A + B)/2, with whatever correlation between pixels it has.
+    ///
+    /// D/`L_a` is filtered by the contrast sensitivity function of half-decade adaptation levels, interpolated linearly in
+    /// luminance, band by band; each band is divided by its masking; energies are added and pooled.
+    ///
+    /// Pixels that are not finite count as 0; a plane of another size gets infinity everywhere.
+    #[must_use]
+    pub fn measured_visibility(&self, half_difference: &Plane) -> Plane {
+        if !self.fits(half_difference) {
+            return self.infinite();
+        }
+        self.visibility_of_energy(&self.error_energy(half_difference))
+    }
+
+    /// [`ThresholdMap::measured_visibility`], and the unpooled amplitude beside it.
+    #[must_use]
+    pub fn measured_error(&self, half_difference: &Plane) -> MeasuredError {
+        if !self.fits(half_difference) {
+            return MeasuredError {
+                visibility: self.infinite(),
+                amplitude: self.infinite(),
+            };
+        }
+        let energy = self.error_energy(half_difference);
+        MeasuredError {
+            visibility: self.visibility_of_energy(&energy),
+            amplitude: energy.map(f32::sqrt),
+        }
+    }
+
+    /// `plane` convolved with the pooling window g, a Gaussian of σ 0.25° (any unit, unchanged).
+    #[must_use]
+    pub fn pooled(&self, plane: &Plane) -> Plane {
+        gaussian_blur(
+            plane,
+            POOLING_SIGMA_DEG * self.viewing.display.pixels_per_degree,
+        )
+    }
+
+    fn visibility_of_energy(&self, energy: &Plane) -> Plane {
+        self.pooled(energy).map(|energy| (2.0 * energy).sqrt())
+    }
+
+    /// Σ_b (`V_b` / `m_b`)² at every pixel.
+    fn error_energy(&self, half_difference: &Plane) -> Plane {
+        let ppd = self.viewing.display.pixels_per_degree;
+        let relative = ratio(
+            half_difference,
+            &self.adaptation_cd_m2,
+            |difference, adaptation| {
+                if difference.is_finite() {
+                    (difference / adaptation).clamp(-LARGEST_RELATIVE_ERROR, LARGEST_RELATIVE_ERROR)
+                } else {
+                    0.0
+                }
+            },
+        );
+        let transform = picture_transform(self.width(), self.height(), ppd);
+        let spectrum = transform.forward(&relative);
+        let positions = self
+            .adaptation_cd_m2
+            .map(|adaptation| self.level_position(adaptation));
+        let mut energy = Plane::filled(self.width(), self.height(), 0.0);
+        for (band, elevation) in self.elevations.iter().enumerate() {
+            let window = RadialTable::new(ppd, |freq| self.bands.gain(band, freq));
+            let mut response = Plane::filled(self.width(), self.height(), 0.0);
+            for (index, level) in self.levels.iter().enumerate() {
+                let gain = window.times(&level.sensitivity);
+                let filtered =
+                    transform.filtered(&spectrum, ppd, self.bands.limit_cpd(band), |freq| {
+                        gain.at(freq)
+                    });
+                response.for_each_row_mut(|y, row| {
+                    for (value, (filtered, position)) in row
+                        .iter_mut()
+                        .zip(filtered.row(y).iter().zip(positions.row(y)))
+                    {
+                        *value += filtered * (1.0 - (position - index as f32).abs()).max(0.0);
+                    }
+                });
+            }
+            energy.for_each_row_mut(|y, row| {
+                for (value, (response, elevation)) in row
+                    .iter_mut()
+                    .zip(response.row(y).iter().zip(elevation.row(y)))
+                {
+                    let visible = response / elevation;
+                    *value += visible * visible;
+                }
+            });
+        }
+        energy
+    }
+
+    /// Where an adaptation luminance stands between the levels: 1.25 is a quarter of the way, in luminance, from the second level
+    /// to the third.
+    fn level_position(&self, adaptation_cd_m2: f32) -> f32 {
+        let above = self
+            .levels
+            .partition_point(|level| level.luminance_cd_m2 <= adaptation_cd_m2);
+        match (above.checked_sub(1), self.levels.get(above)) {
+            (Some(below), Some(upper)) => {
+                let lower = self.levels[below].luminance_cd_m2;
+                below as f32 + (adaptation_cd_m2 - lower) / (upper.luminance_cd_m2 - lower)
+            }
+            (Some(last), None) => last as f32,
+            (None, _) => 0.0,
+        }
+    }
+
+    fn fits(&self, plane: &Plane) -> bool {
+        self.adaptation_cd_m2.same_size(plane)
+    }
+
+    fn infinite(&self) -> Plane {
+        Plane::filled(self.width(), self.height(), f32::INFINITY)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::csf::CastleCsf;
+    use crate::display::{Display, Viewing};
+    use crate::test_noise::normal;
+    use crate::threshold::{ThresholdInputs, threshold_map};
+
+    fn map_of(picture: &Plane, pixels_per_degree: f64) -> ThresholdMap {
+        let viewing = Viewing {
+            display: Display {
+                pixels_per_degree,
+                ..Display::default()
+            },
+            ..Viewing::default()
+        };
+        let inputs = ThresholdInputs {
+            display_luminance_cd_m2: picture,
+            guide_variance: None,
+        };
+        threshold_map(&inputs, &viewing, &CastleCsf::default()).unwrap()
+    }
+
+    fn noise(width: usize, height: usize, sigma: impl Fn(usize, usize) -> f32, seed: u64) -> Plane {
+        let mut state = seed;
+        let mut plane = Plane::filled(width, height, 0.0);
+        for y in 0..height {
+            for x in 0..width {
+                plane.values_mut()[y * width + x] = sigma(x, y) * normal(&mut state);
+            }
+        }
+        plane
+    }
+
+    /// Amplitudes S(ρ, L)/L of a unit grating; v of a grating is its amplitude in threshold units.
+    #[test]
+    fn gratings_have_their_contrast_over_threshold() {
+        for (freq, luminance, expected) in [
+            (1.0, 100.0, 0.514_672_59),
+            (4.0, 100.0, 1.342_777_4),
+            (8.0, 100.0, 0.985_628_24),
+            (4.0, 10.0, 8.037_241_3),
+            (4.0, 1.0, 27.840_307),
+        ] {
+            let map = map_of(&Plane::filled(256, 256, luminance), 32.0);
+            // Phase such that the mirrored picture goes on as the same grating.
+            let grating = Plane::from_fn(256, 256, |x, _| {
+                (std::f64::consts::TAU * freq * (x as f64 + 0.5) / 32.0).cos() as f32
+            });
+            let found = f64::from(map.measured_visibility(&grating).get(128, 128));
+            assert!(
+                (found / expected - 1.0).abs() < 2e-3,
+                "{freq} cpd, {luminance} cd/m²: {found}, not {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_lone_pixel_reaches_the_tabulated_peak() {
+        let map = map_of(&Plane::filled(256, 256, 100.0), 30.0);
+        let mut pixel = Plane::filled(256, 256, 0.0);
+        pixel.values_mut()[128 * 256 + 128] = 1.0;
+        let found = map.measured_error(&pixel).amplitude.get(128, 128);
+        // mean(S)/100 = 0.695 for all bands in phase; by energy the same peak is lower by the bands' overlap.
+        assert!((0.35..0.75).contains(&found), "{found}");
+    }
+
+    #[test]
+    fn white_noise_is_as_visible_as_predicted() {
+        for (luminance, ppd) in [
+            (1.0, 20.0),
+            (10.0, 60.0),
+            (30.0, 38.0),
+            (57.0, 60.0),
+            (100.0, 30.0),
+            (190.0, 110.0),
+        ] {
+            let map = map_of(&Plane::filled(256, 256, luminance), ppd);
+            let sigma = 0.02 * luminance;
+            let predicted = map.predicted_visibility(&Plane::filled(256, 256, sigma * sigma));
+            let squares: f64 = (0..4)
+                .map(|seed| {
+                    map.measured_visibility(&noise(256, 256, |_, _| sigma, seed))
+                        .map(|v| v * v)
+                        .mean()
+                })
+                .sum::<f64>()
+                / 4.0;
+            let found = squares.sqrt() / predicted.map(|v| v * v).mean().sqrt();
+            assert!(
+                (found - 1.0).abs() < 0.05,
+                "{luminance} cd/m², {ppd} ppd: measured/predicted {found}"
+            );
+            // And what the gain says of it.
+            let from_gain = (2.0 * map.noise_gain().get(9, 9)).sqrt() * sigma;
+            assert!((predicted.get(9, 9) / from_gain - 1.0).abs() < 1e-3);
+        }
+    }
+
+    /// Patchy noise on a textured picture: prediction and measurement agree place by place.
+    #[test]
+    fn patchy_noise_under_masking_is_as_visible_as_predicted() {
+        let picture = Plane::from_fn(256, 256, |x, y| {
+            let wave = ((x as f32 * 0.4).cos() * (y as f32 * 0.45).cos())
+                * if x > 128 { 0.6 } else { 0.0 };
+            (60.0 + 0.4 * y as f32) * (1.0 + wave)
+        });
+        let map = map_of(&picture, 60.0);
+        let sigma = |x: usize, y: usize| {
+            if (x / 64 + y / 64).is_multiple_of(2) {
+                6.0
+            } else {
+                1.0
+            }
+        };
+        let predicted =
+            map.predicted_visibility(&Plane::from_fn(256, 256, |x, y| sigma(x, y) * sigma(x, y)));
+        let mut measured = Plane::filled(256, 256, 0.0);
+        for seed in 0..16 {
+            let one = map.measured_visibility(&noise(256, 256, sigma, 100 + seed));
+            measured = ratio(&measured, &one, |sum, v| sum + v * v / 16.0);
+        }
+        for (x, y) in [
+            (32, 32),
+            (96, 32),
+            (160, 32),
+            (224, 32),
+            (32, 96),
+            (96, 96),
+            (224, 160),
+            (160, 160),
+            (128, 128),
+        ] {
+            let found = measured.get(x, y).sqrt() / predicted.get(x, y);
+            assert!(
+                (found - 1.0).abs() < 0.15,
+                "({x}, {y}): measured/predicted {found}"
+            );
+        }
+    }
+
+    #[test]
+    fn broken_input_never_gives_nan() {
+        let map = map_of(&Plane::filled(16, 16, 50.0), 30.0);
+        let mut broken = Plane::filled(16, 16, 1.0);
+        broken.values_mut()[17] = f32::NAN;
+        broken.values_mut()[40] = f32::INFINITY;
+        broken.values_mut()[41] = f32::MAX;
+        for visibility in [
+            map.predicted_visibility(&broken),
+            map.measured_visibility(&broken),
+        ] {
+            assert!(visibility.values().iter().all(|v| !v.is_nan()));
+        }
+        assert!(map.predicted_visibility(&broken).get(1, 1).is_infinite());
+        assert!(map.predicted_visibility(&broken).get(8, 8).is_finite());
+        assert!(
+            map.measured_visibility(&Plane::filled(3, 3, 1.0))
+                .get(0, 0)
+                .is_infinite()
+        );
+    }
+
+    #[test]
+    fn threads_do_not_change_a_bit() {
+        let picture = Plane::from_fn(97, 61, |x, y| 10.0 + ((x * y) % 17) as f32);
+        let error = noise(97, 61, |_, _| 1.0, 5);
+        let run = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .unwrap();
+            pool.install(|| {
+                let map = map_of(&picture, 40.0);
+                (
+                    map.noise_gain().clone(),
+                    map.measured_visibility(&error),
+                    map.predicted_visibility(&picture),
+                )
+            })
+        };
+        assert_eq!(run(1), run(3));
+    }
+}

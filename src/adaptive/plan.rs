@@ -1,0 +1,233 @@
+//! Which pixels get how many more samples. Decisions only: nothing here traces.
+//!
+//! Counts double, because trickles would be decided by luck. Where the need of a pixel lies between two doublings, the
+//! two are mixed over 2×2 quads so that the mean of 1/n, which is what the eye's pooling sees, is right: rounding up
+//! alone would cost 1.44 times the samples.
+
+use super::judge::Judgement;
+use crate::film::Film;
+use crate::integrator::{BlockWork, PILOT_SAMPLES, SamplePlan, samples_through};
+use crate::sampler::Half;
+
+/// Doublings that one plan gives a pixel at most: its variance is looked at again in between.
+const MOST_DOUBLINGS_AT_ONCE: u32 = 2;
+
+/// The first samples of every pixel: 8 + 8, or as many as `max_samples` allows.
+pub fn pilot_plan(pixels: u32, max_samples: u32) -> SamplePlan {
+    let mut plan = SamplePlan::default();
+    for pixel in 0..pixels {
+        for half in Half::BOTH {
+            let share = (max_samples + 1 - half.index() as u32) / 2;
+            let samples = PILOT_SAMPLES.min(share);
+            if samples > 0 {
+                plan.blocks.push(BlockWork { samples, ..BlockWork::whole(pixel, half, 0) });
+            }
+        }
+    }
+    plan
+}
+
+/// Doubles every pixel, up to `mean_samples` a pixel in all. Empty when they are there.
+pub fn uniform_plan(film: &Film, mean_samples: u32) -> SamplePlan {
+    let mut plan = SamplePlan::default();
+    for pixel in 0..film.width() * film.height() {
+        for half in Half::BOTH {
+            let level = film.half(half)[pixel as usize].levels;
+            let wanted = u64::from((mean_samples + 1 - half.index() as u32) / 2);
+            // What earlier levels hold by construction, finite or not.
+            let held = samples_through(level - 1);
+            if wanted > held {
+                let block = BlockWork::whole(pixel, half, level);
+                let samples = u64::from(block.samples).min(wanted - held) as u32;
+                plan.blocks.push(BlockWork { samples, ..block });
+            }
+        }
+    }
+    plan
+}
+
+/// Doublings for pixels whose error could still be seen at `visibility`.
+///
+/// Minimising samples under a bound on the pooled visibility makes counts go as the standard deviation of a pixel times a
+/// multiplier that varies as slowly as the pooling does (Neyman 1934); here the multiplier is the pooled standard
+/// deviation, which never spends more than a pixelwise rule and meets the same bound.
+pub fn adaptive_plan(film: &Film, judgement: &Judgement, visibility: f64, max_samples: u32) -> SamplePlan {
+    let gain = judgement.thresholds.noise_gain();
+    let pooled = Half::BOTH.map(|half| judgement.thresholds.pooled(&judgement.variance_per_sample[half.index()]));
+    let need = |half: Half, pixel: usize| {
+        let own = f64::from(judgement.variance_per_sample[half.index()].values()[pixel]);
+        let around = f64::from(pooled[half.index()].values()[pixel]);
+        let samples = f64::from(film.half(half)[pixel].samples.max(1));
+        confidence_margin(samples) * f64::from(gain.values()[pixel]) * (own * around).sqrt() / (visibility * visibility)
+    };
+    let wanted = |pixel: usize| {
+        let doublings = Half::BOTH.map(|half| {
+            let held = samples_through(film.half(half)[pixel].levels - 1);
+            doublings_for(need(half, pixel) / held as f64, dither(film.width(), pixel))
+        });
+        // A half may not fall behind the other by more than one doubling.
+        let level = |h: Half| u32::from(film.half(h)[pixel].levels) + doublings[h.index()];
+        Half::BOTH.map(|h| level(h).max(level(h.other()).saturating_sub(1)) - u32::from(film.half(h)[pixel].levels))
+    };
+    blocks(film, max_samples, wanted)
+}
+
+/// One doubling for every pixel in whose surroundings the predicted visibility is above the target: what is left to do
+/// when each pixel by itself has what it needs.
+pub fn remainder_plan(film: &Film, judgement: &Judgement, visibility: f64, max_samples: u32) -> SamplePlan {
+    blocks(film, max_samples, |pixel| {
+        [u32::from(f64::from(judgement.predicted.values()[pixel]) > visibility); 2]
+    })
+}
+
+fn blocks(film: &Film, max_samples: u32, doublings: impl Fn(usize) -> [u32; 2]) -> SamplePlan {
+    let mut plan = SamplePlan::default();
+    for pixel in 0..(film.width() * film.height()) as usize {
+        let doublings = doublings(pixel);
+        for half in Half::BOTH {
+            let level = film.half(half)[pixel].levels;
+            for extra in 0..doublings[half.index()] as u8 {
+                if samples_through(level + extra) > u64::from(max_samples / 2) {
+                    break;
+                }
+                plan.blocks.push(BlockWork::whole(pixel as u32, half, level + extra));
+            }
+        }
+    }
+    plan
+}
+
+/// How much more than the estimated need is asked for, against estimates that are low by chance. Pooling leaves few per
+/// cent of scatter on well-behaved noise; what is left is for tails, and fades as samples come in.
+fn confidence_margin(samples: f64) -> f64 {
+    1.05 + 1.0 / samples.sqrt()
+}
+
+/// Doublings for a pixel that needs `ratio` times what it has: whole ones, and one more for a share of pixels such that
+/// the mean of 1/n is 1/need.
+fn doublings_for(ratio: f64, dither: f64) -> u32 {
+    if !(ratio > 1.0) {
+        return 0;
+    }
+    let whole = ratio.log2().floor().min(f64::from(MOST_DOUBLINGS_AT_ONCE)) as u32;
+    if whole == MOST_DOUBLINGS_AT_ONCE {
+        return whole;
+    }
+    let rest = ratio / f64::from(1 << whole);
+    // share/(2n) + (1 − share)/n = 1/(rest·n)
+    let share = 2.0 * (1.0 - 1.0 / rest);
+    whole + u32::from(share > dither)
+}
+
+/// Thresholds of the four pixels of a quad.
+fn dither(width: u32, pixel: usize) -> f64 {
+    [[0.125, 0.625], [0.875, 0.375]][quad_row(width, pixel)][quad_column(width, pixel)]
+}
+
+fn quad_row(width: u32, pixel: usize) -> usize {
+    (pixel / width as usize) % 2
+}
+
+fn quad_column(width: u32, pixel: usize) -> usize {
+    (pixel % width as usize) % 2
+}
+
+/// Cuts a long plan into four that each hold one pixel of every quad, so that a limit of time can end between them and
+/// still leave an even picture.
+pub fn slices(plan: SamplePlan, width: u32, pixels: u32) -> Vec<SamplePlan> {
+    const LONG_PLAN_SAMPLES_PER_PIXEL: u64 = 4;
+    if plan.samples() < LONG_PLAN_SAMPLES_PER_PIXEL * u64::from(pixels) {
+        return vec![plan];
+    }
+    let mut slices = vec![SamplePlan::default(); 4];
+    for block in plan.blocks {
+        let pixel = block.pixel as usize;
+        slices[quad_row(width, pixel) * 2 + quad_column(width, pixel)].blocks.push(block);
+    }
+    slices.retain(|s| !s.blocks.is_empty());
+    slices
+}
+
+/// Cuts a plan to a budget: the blocks of pixels that have least of what they need first.
+pub fn cut_to_budget(plan: SamplePlan, judgement: &Judgement, samples: u64) -> SamplePlan {
+    if plan.samples() <= samples {
+        return plan;
+    }
+    let mut blocks = plan.blocks;
+    let urgency = |b: &BlockWork| judgement.predicted.values()[b.pixel as usize];
+    blocks.sort_by(|a, b| urgency(b).total_cmp(&urgency(a)).then(a.pixel.cmp(&b.pixel)).then(a.level.cmp(&b.level)));
+    let mut left = samples;
+    blocks.retain(|b| {
+        let fits = u64::from(b.samples) <= left;
+        if fits {
+            left -= u64::from(b.samples);
+        }
+        fits
+    });
+    // A block of a later level must not come without the one before it.
+    blocks.sort_by_key(|b| (b.pixel, b.half, b.level));
+    let mut kept: Vec<BlockWork> = Vec::with_capacity(blocks.len());
+    for block in blocks {
+        let follows = kept.last().is_some_and(|k| {
+            k.pixel == block.pixel && k.half == block.half && k.level + 1 == block.level
+        });
+        let is_first = plan_first_level(&kept, &block);
+        if follows || is_first {
+            kept.push(block);
+        }
+    }
+    SamplePlan { blocks: kept }
+}
+
+/// Whether no earlier block of the same pixel and half stands before this one.
+fn plan_first_level(kept: &[BlockWork], block: &BlockWork) -> bool {
+    kept.last().is_none_or(|k| (k.pixel, k.half) != (block.pixel, block.half))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Over a quad, the mean of 1/n is that of the need to within the four steps of the dither.
+    #[test]
+    fn mixing_two_counts_meets_the_need() {
+        for ratio in [1.05, 1.2, 1.5, 1.9, 2.2, 3.3, 4.0] {
+            let inverse: f64 = [0.125, 0.375, 0.625, 0.875]
+                .map(|d| 1.0 / f64::from(1u32 << doublings_for(ratio, d)))
+                .iter()
+                .sum::<f64>()
+                / 4.0;
+            assert!((inverse * ratio - 1.0).abs() < 0.15, "ratio {ratio}: {}", inverse * ratio);
+        }
+        assert_eq!(doublings_for(1.0, 0.0), 0);
+        assert_eq!(doublings_for(f64::NAN, 0.0), 0);
+        assert_eq!(doublings_for(1e9, 0.9), MOST_DOUBLINGS_AT_ONCE);
+    }
+
+    #[test]
+    fn a_uniform_plan_takes_exactly_what_is_asked() {
+        for spp in [1u32, 2, 7, 16, 17, 100, 256] {
+            let mut film = Film::new(3, 2);
+            let mut taken = 0;
+            let mut plan = pilot_plan(6, spp);
+            while !plan.blocks.is_empty() {
+                taken += plan.samples();
+                for block in &plan.blocks {
+                    film.merge_block(*block, &crate::film::BlockSum::default());
+                }
+                plan = if film.half(Half::B)[0].levels == 0 { SamplePlan::default() } else { uniform_plan(&film, spp) };
+            }
+            assert_eq!(taken, u64::from(spp) * 6, "{spp} spp");
+        }
+    }
+
+    #[test]
+    fn slices_hold_the_whole_plan() {
+        let plan = pilot_plan(16, 16);
+        let parts = slices(plan.clone(), 4, 16);
+        assert_eq!(parts.len(), 4);
+        let mut blocks: Vec<_> = parts.into_iter().flat_map(|p| p.blocks).collect();
+        blocks.sort_by_key(|b| (b.pixel, b.half));
+        assert_eq!(blocks, plan.blocks);
+    }
+}

@@ -1,0 +1,198 @@
+//! Every model with parameters worth testing, and the directions it is seen from.
+
+use super::sphere::Peak;
+use crate::bsdf::{Bsdf, DielectricTables};
+use glam::Vec3;
+use std::sync::LazyLock;
+
+/// What a model must give back of the light that falls on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Budget {
+    /// All of it.
+    Lossless,
+    /// No more than all.
+    AtMost,
+}
+
+/// A model under test.
+#[derive(Clone)]
+pub(super) struct Case {
+    pub(super) name: String,
+    pub(super) bsdf: Bsdf<'static>,
+    pub(super) budget: Budget,
+    /// Index below the surface over that above; 1 unless the surface bounds a volume.
+    pub(super) eta: f32,
+    /// Width of the narrowest lobe in radians.
+    pub(super) width: f64,
+}
+
+impl Case {
+    fn new(name: impl Into<String>, bsdf: Bsdf<'static>, budget: Budget, width: f64) -> Self {
+        Self {
+            name: name.into(),
+            bsdf,
+            budget,
+            eta: 1.0,
+            width,
+        }
+    }
+
+    /// (Index on the side of `wi` / index on the side of `wo`)²: turns radiance back into energy.
+    pub(super) fn energy_per_radiance(&self, wo: Vec3, wi: Vec3) -> f64 {
+        let index = |w: Vec3| f64::from(if w.z > 0.0 { 1.0 } else { self.eta });
+        (index(wi) / index(wo)).powi(2)
+    }
+
+    /// Where the model may be narrow when seen from `wo`.
+    pub(super) fn peaks(&self, wo: Vec3) -> Vec<Peak> {
+        let eta = if wo.z > 0.0 { self.eta } else { 1.0 / self.eta };
+        let (x, y) = (-wo.x / eta, -wo.y / eta);
+        let z = (1.0 - x * x - y * y).max(0.0).sqrt().copysign(-wo.z);
+        [Vec3::new(-wo.x, -wo.y, wo.z), Vec3::new(x, y, z)]
+            .into_iter()
+            .map(|direction| Peak {
+                direction: direction.normalize(),
+                width: 0.5 * self.width,
+            })
+            .collect()
+    }
+}
+
+/// Directions to look from, on both sides; none in a plane of symmetry of the bins.
+pub(super) fn views() -> Vec<Vec3> {
+    [1.0f32, 0.9, 0.7, 0.4, 0.15, 0.03, -0.95, -0.7, -0.3, -0.08]
+        .into_iter()
+        .map(|z| {
+            let (sin, cos) = 0.7f32.sin_cos();
+            let radius = (1.0 - z * z).sqrt();
+            Vec3::new(radius * cos, radius * sin, z)
+        })
+        .collect()
+}
+
+pub(super) static GLASS: LazyLock<DielectricTables> = LazyLock::new(|| DielectricTables::new(1.5));
+pub(super) static WATER: LazyLock<DielectricTables> = LazyLock::new(|| DielectricTables::new(1.33));
+pub(super) static DIAMOND: LazyLock<DielectricTables> =
+    LazyLock::new(|| DielectricTables::new(2.4));
+
+const GRAY_BLUE: Vec3 = Vec3::new(0.2, 0.5, 0.8);
+const GOLD_ETA: Vec3 = Vec3::new(0.143, 0.375, 1.442);
+const GOLD_K: Vec3 = Vec3::new(3.983, 2.386, 1.603);
+
+/// Models with at least one smooth lobe.
+pub(super) fn smooth_cases() -> Vec<Case> {
+    use Budget::{AtMost, Lossless};
+    let mut cases = vec![
+        Case::new("lambert white", Bsdf::lambert(Vec3::ONE), Lossless, 1.0),
+        Case::new("lambert", Bsdf::lambert(GRAY_BLUE), AtMost, 1.0),
+    ];
+    for roughness in [0.1f32, 0.4, 1.0] {
+        let width = f64::from(roughness * roughness);
+        cases.push(Case::new(
+            format!("lossless conductor {roughness}"),
+            Bsdf::conductor(Vec3::ZERO, Vec3::splat(3.0), roughness),
+            Lossless,
+            width,
+        ));
+        cases.push(Case::new(
+            format!("gold {roughness}"),
+            Bsdf::conductor(GOLD_ETA, GOLD_K, roughness),
+            AtMost,
+            width,
+        ));
+        for (name, eta, tables) in [
+            ("glass", 1.5f32, &GLASS),
+            ("water from below", 1.0 / 1.33, &WATER_REVERSED),
+            ("diamond", 2.4, &DIAMOND),
+        ] {
+            cases.push(Case {
+                eta,
+                ..Case::new(
+                    format!("{name} {roughness}"),
+                    Bsdf::dielectric(eta, roughness, Vec3::ONE, Some(tables)),
+                    Lossless,
+                    0.3 * width,
+                )
+            });
+        }
+        cases.push(Case {
+            eta: 1.33,
+            ..Case::new(
+                format!("tinted water {roughness}"),
+                Bsdf::dielectric(1.33, roughness, GRAY_BLUE, Some(&WATER)),
+                AtMost,
+                0.3 * width,
+            )
+        });
+        cases.push(Case {
+            eta: 1.5,
+            ..Case::new(
+                format!("glass without tables {roughness}"),
+                Bsdf::dielectric(1.5, roughness, Vec3::ONE, None),
+                AtMost,
+                0.3 * width,
+            )
+        });
+        for (metallic, transmission) in [(0.0, 0.0), (1.0, 0.0), (0.4, 0.5), (0.0, 1.0)] {
+            cases.push(Case::new(
+                format!("white metal-roughness {metallic} {roughness} {transmission}"),
+                Bsdf::metal_roughness(Vec3::ONE, metallic, roughness, 1.5, transmission),
+                Lossless,
+                width,
+            ));
+        }
+        cases.push(Case::new(
+            format!("metal-roughness {roughness}"),
+            Bsdf::metal_roughness(GRAY_BLUE, 0.3, roughness, 1.8, 0.4),
+            AtMost,
+            width,
+        ));
+    }
+    for transmission in [0.0, 0.6] {
+        cases.push(Case::new(
+            format!("white smooth metal-roughness {transmission}"),
+            Bsdf::metal_roughness(Vec3::ONE, 0.0, 0.0, 1.5, transmission),
+            Lossless,
+            1.0,
+        ));
+    }
+    cases
+}
+
+static WATER_REVERSED: LazyLock<DielectricTables> =
+    LazyLock::new(|| DielectricTables::new(1.0 / 1.33));
+
+/// Models that consist of delta lobes.
+pub(super) fn delta_cases() -> Vec<Case> {
+    use Budget::{AtMost, Lossless};
+    let glass = |name: &str, eta, tint, budget| Case {
+        eta,
+        ..Case::new(name, Bsdf::dielectric(eta, 0.0, tint, None), budget, 1.0)
+    };
+    vec![
+        Case::new("mirror", Bsdf::mirror(GRAY_BLUE), AtMost, 1.0),
+        Case::new("white mirror", Bsdf::mirror(Vec3::ONE), Lossless, 1.0),
+        Case::new(
+            "smooth gold",
+            Bsdf::conductor(GOLD_ETA, GOLD_K, 0.0),
+            AtMost,
+            1.0,
+        ),
+        glass("smooth glass", 1.5, Vec3::ONE, Lossless),
+        glass("smooth bubble", 0.7, Vec3::ONE, Lossless),
+        glass("smooth tinted glass", 1.5, GRAY_BLUE, AtMost),
+        Case::new("pane", Bsdf::thin_dielectric(1.5, Vec3::ONE), Lossless, 1.0),
+        Case::new(
+            "tinted pane",
+            Bsdf::thin_dielectric(1.5, GRAY_BLUE),
+            AtMost,
+            1.0,
+        ),
+        Case::new(
+            "smooth metal",
+            Bsdf::metal_roughness(Vec3::ONE, 1.0, 0.0, 1.5, 0.0),
+            Lossless,
+            1.0,
+        ),
+    ]
+}

@@ -1,0 +1,70 @@
+//! What the module promises about sides and about radiance across boundaries.
+
+use super::cases::{delta_cases, smooth_cases};
+use crate::bsdf::{Bsdf, BsdfSample, Lobe, turn};
+use glam::Vec3;
+
+fn refracted(bsdf: &Bsdf<'_>, wo: Vec3) -> BsdfSample {
+    let sample = bsdf.sample(wo, [0.5, 0.5, 0.999]).expect("transmission");
+    assert_eq!(sample.lobe, Lobe::DeltaTransmission);
+    sample
+}
+
+#[test]
+fn a_slab_of_glass_changes_neither_direction_nor_radiance() {
+    let glass = Bsdf::dielectric(1.5, 0.0, Vec3::ONE, None);
+    let wo = Vec3::new(0.6, 0.0, 0.8);
+    let entering = refracted(&glass, wo);
+    // Snell, and 1/η² on the way in.
+    assert!((entering.wi.x + 0.4).abs() < 1e-6, "{entering:?}");
+    assert!(
+        (entering.weight.x * 1.5 * 1.5 - 1.0).abs() < 1e-5,
+        "{entering:?}"
+    );
+    let leaving = refracted(&glass, turn(-entering.wi).with_z(entering.wi.z));
+    assert!(
+        (leaving.weight.x / (1.5 * 1.5) - 1.0).abs() < 1e-5,
+        "{leaving:?}"
+    );
+}
+
+#[test]
+fn opaque_models_look_the_same_from_both_sides() {
+    let wo = Vec3::new(0.36, 0.48, 0.8);
+    let wi = Vec3::new(-0.6, 0.64, 0.48);
+    for case in smooth_cases() {
+        if case.eta != 1.0 {
+            continue;
+        }
+        let front = case.bsdf.evaluate(wo, wi);
+        let back = case.bsdf.evaluate(turn(wo), turn(wi));
+        assert_eq!(front, back, "{}", case.name);
+        assert!(front.value.max_element() > 0.0, "{}", case.name);
+    }
+}
+
+#[test]
+fn only_models_of_delta_lobes_say_so() {
+    for case in delta_cases() {
+        assert!(!case.bsdf.has_smooth_lobe(), "{}", case.name);
+    }
+    for case in smooth_cases() {
+        assert!(case.bsdf.has_smooth_lobe(), "{}", case.name);
+    }
+}
+
+/// The pane's reflectance at normal incidence: 2R/(1 + R) with R = 4 %.
+#[test]
+fn reflectance_matches_known_values() {
+    let straight = |bsdf: Bsdf<'_>| {
+        let sample = bsdf.sample(Vec3::Z, [0.5, 0.5, 0.0]).expect("reflection");
+        sample.weight * sample.pdf
+    };
+    let pane = straight(Bsdf::thin_dielectric(1.5, Vec3::ONE));
+    assert!((pane.x - 0.08 / 1.04).abs() < 1e-6, "{pane}");
+    let glass = straight(Bsdf::dielectric(1.5, 0.0, Vec3::ONE, None));
+    assert!((glass.x - 0.04).abs() < 1e-6, "{glass}");
+    // ((n − 1)² + k²)/((n + 1)² + k²) for n = 0.2, k = 3.
+    let metal = straight(Bsdf::conductor(Vec3::splat(0.2), Vec3::splat(3.0), 0.0));
+    assert!((metal.x - 9.64 / 10.44).abs() < 1e-6, "{metal}");
+}

@@ -1,0 +1,105 @@
+//! White furnaces: what a model gives back of uniform light from everywhere.
+
+use super::cases::{Budget, Case, delta_cases, smooth_cases, views};
+use super::sphere::{Bins, integrate};
+use super::statistics::{Mean, Random, normal_p, sidak};
+use glam::Vec3;
+
+/// Share of the light that a lossless model may be off by.
+const TOLERANCE: f64 = 0.005;
+const SAMPLES: usize = 60_000;
+/// Error of quadrature along the edges that refraction makes.
+const QUADRATURE_ERROR: f64 = 1e-3;
+
+/// Energy that comes back by sampling, in the brightest channel.
+fn by_sampling(case: &Case, wo: Vec3, seed: u64) -> Mean {
+    let mut random = Random::new(seed);
+    let mut mean = Mean::default();
+    for _ in 0..SAMPLES {
+        mean.add(case.bsdf.sample(wo, random.triple()).map_or(0.0, |sample| {
+            f64::from(sample.weight.z) * case.energy_per_radiance(wo, sample.wi)
+        }));
+    }
+    mean
+}
+
+/// The same by quadrature of the smooth lobes, plus the exact share of the delta lobes.
+fn by_quadrature(case: &Case, wo: Vec3) -> f64 {
+    // Fewer bins miss slivers of refracted light that fall between the first points of quadrature.
+    let bins = Bins {
+        heights: 64,
+        azimuths: 64,
+    };
+    let peaks = case.peaks(wo);
+    let value = |wi| {
+        let energy = case.energy_per_radiance(wo, wi);
+        [f64::from(case.bsdf.evaluate(wo, wi).value.z) * energy, 0.0]
+    };
+    let smooth: f64 = (0..bins.count())
+        .map(|index| integrate(bins.cell(index), &peaks, &value)[0])
+        .sum();
+    smooth + delta_energy(case, wo)
+}
+
+/// Energy of the delta lobes: each is found by trying the third random number.
+fn delta_energy(case: &Case, wo: Vec3) -> f64 {
+    let mut energies = [0.0; 2];
+    for step in 0..1000 {
+        let u = [0.3, 0.4, (step as f32 + 0.5) / 1000.0];
+        if let Some(sample) = case.bsdf.sample(wo, u).filter(|s| s.lobe.is_delta()) {
+            energies[usize::from(sample.lobe.is_transmission())] =
+                f64::from(sample.weight.z * sample.pdf) * case.energy_per_radiance(wo, sample.wi);
+        }
+    }
+    energies.iter().sum()
+}
+
+fn all_cases() -> Vec<Case> {
+    smooth_cases().into_iter().chain(delta_cases()).collect()
+}
+
+#[test]
+fn lossless_models_give_back_everything_by_quadrature() {
+    let mut worst = (0.0, String::new());
+    for case in all_cases() {
+        for wo in views() {
+            let energy = by_quadrature(&case, wo);
+            let what = format!("{} cos {}: {energy:.5}", case.name, wo.z);
+            assert!(energy < 1.0 + TOLERANCE, "{what}");
+            if case.budget == Budget::Lossless && (energy - 1.0).abs() > worst.0 {
+                worst = ((energy - 1.0f64).abs(), what);
+            }
+        }
+    }
+    println!("worst furnace error: {worst:?}");
+    assert!(worst.0 < TOLERANCE, "{worst:?}");
+}
+
+/// Significance 1e-3 over all models and views.
+#[test]
+fn sampling_and_quadrature_agree_on_the_energy() {
+    let cases = all_cases();
+    let views = views();
+    let significance = sidak(1e-3, cases.len() * views.len());
+    let mut failures = Vec::new();
+    for (number, case) in cases.iter().enumerate() {
+        for (view, &wo) in views.iter().enumerate() {
+            let sampled = by_sampling(case, wo, (number * 100 + view) as u64 + 7);
+            let error = sampled.standard_error();
+            let quadrature = by_quadrature(case, wo);
+            let difference = (sampled.mean() - quadrature).abs();
+            let difference = (difference - QUADRATURE_ERROR).max(0.0);
+            let p = normal_p(difference / error.max(1e-9));
+            // Beyond this the test could not tell 1 from 1.02.
+            if p < significance || error > 5e-3 {
+                failures.push(format!(
+                    "{} cos {}: sampled {:.5} ± {error:.5}, quadrature {quadrature:.5}, p {p:.1e}",
+                    case.name,
+                    wo.z,
+                    sampled.mean(),
+                ));
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}

@@ -1,0 +1,76 @@
+//! Directions from uniform numbers.
+//!
+//! Source: Malley's method, as in Pharr, Jakob & Humphreys, *Physically Based Rendering* (2023), section A.5.3.
+
+use glam::Vec3;
+use std::f32::consts::{FRAC_1_PI, TAU};
+
+/// A direction of the upper hemisphere with pdf cos θ / π, from `u` in [0, 1)².
+pub(crate) fn cosine_hemisphere(u: [f32; 2]) -> Vec3 {
+    let (sin, cos) = (TAU * u[0]).sin_cos();
+    let radius = u[1].sqrt();
+    // u below 1 keeps z above 0, so that no sample lies in the surface.
+    Vec3::new(
+        radius * cos,
+        radius * sin,
+        (1.0 - u[1]).max(f32::MIN_POSITIVE).sqrt(),
+    )
+}
+
+/// Pdf per steradian of [`cosine_hemisphere`]; 0 below the surface.
+pub(crate) fn cosine_hemisphere_pdf(cos_theta: f32) -> f32 {
+    cos_theta.max(0.0) * FRAC_1_PI
+}
+
+/// Directions of the upper hemisphere that crowd towards the horizon, with pdf cos θ / (π ln(1 + 1/c²)(cos²θ + c²)).
+///
+/// The light that single scattering loses has this shape: it leaves within about α of the horizon when the surface is
+/// nearly smooth, where cosine-distributed directions would carry weights of up to 1/α².
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct GrazingHemisphere {
+    /// c².
+    spread2: f32,
+    /// ln(1 + 1/c²).
+    log: f32,
+}
+
+impl GrazingHemisphere {
+    /// For a microfacet surface of slope width `alpha` in (0, 1].
+    pub(crate) fn new(alpha: f32) -> Self {
+        // c = α for smooth surfaces; at α = 1 large, and the distribution all but cosine.
+        let spread2 = alpha * alpha / (1.02 - alpha);
+        Self {
+            spread2,
+            log: (1.0 / spread2).ln_1p(),
+        }
+    }
+
+    /// A direction from `u` in [0, 1)².
+    pub(crate) fn sample(&self, u: [f32; 2]) -> Vec3 {
+        let cos2 = (self.spread2 * (self.log * u[1]).exp_m1()).clamp(f32::MIN_POSITIVE, 1.0);
+        let (sin, cos) = (TAU * u[0]).sin_cos();
+        let radius = (1.0 - cos2).sqrt();
+        Vec3::new(radius * cos, radius * sin, cos2.sqrt())
+    }
+
+    /// Pdf per steradian; 0 below the surface.
+    pub(crate) fn pdf(&self, cos_theta: f32) -> f32 {
+        if cos_theta > 0.0 {
+            cos_theta * FRAC_1_PI / (self.log * (cos_theta * cos_theta + self.spread2))
+        } else {
+            0.0
+        }
+    }
+}
+
+/// Takes a choice with probability `probability` by `u` and stretches what is left of `u` over [0, 1) again.
+pub(crate) fn choose(u: f32, probability: f32) -> (bool, f32) {
+    const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
+    if u < probability {
+        (true, (u / probability).min(BELOW_ONE))
+    } else {
+        // With a probability of 1 and u < 1 this branch is never reached; max() only guards against rounding.
+        let rest = (1.0 - probability).max(f32::MIN_POSITIVE);
+        (false, ((u - probability) / rest).min(BELOW_ONE))
+    }
+}

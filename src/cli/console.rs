@@ -1,0 +1,80 @@
+//! What a person sees while a picture is made: a progress bar on a terminal, plain lines elsewhere.
+
+use fechner::adaptive::{Monitor, Progress};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+
+pub(super) struct Console {
+    bar: Option<ProgressBar>,
+    started: Instant,
+    time_limit: Option<Duration>,
+}
+
+impl Console {
+    pub(super) fn new(time_limit: Option<Duration>) -> Self {
+        let bar = std::io::stderr().is_terminal().then(|| {
+            let bar = ProgressBar::new(0);
+            let style = ProgressStyle::with_template("{bar:24} {msg}  {elapsed}")
+                .unwrap_or_else(|_| ProgressStyle::default_bar());
+            bar.set_style(style);
+            bar.enable_steady_tick(Duration::from_millis(200));
+            bar
+        });
+        Self { bar, started: Instant::now(), time_limit }
+    }
+
+    /// Removes the bar.
+    pub(super) fn finish(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+
+    /// Time left in words, from the rate so far.
+    fn time_left(&self, progress: &Progress, pixels: f64) -> String {
+        let elapsed = self.started.elapsed().as_secs_f64();
+        let rate = progress.mean_samples * pixels / elapsed.max(1e-3);
+        let by_samples = progress.remaining_samples / rate;
+        let by_limit = self.time_limit.map_or(f64::INFINITY, |limit| (limit.as_secs_f64() - elapsed).max(0.0));
+        let seconds = by_samples.min(by_limit);
+        if seconds.is_finite() { format!("about {} left", duration_in_words(seconds)) } else { String::new() }
+    }
+}
+
+impl Monitor for Console {
+    fn looked(&self, progress: &Progress) {
+        let message = format!(
+            "pass {}  {:.1} spp  {:.1} % still visible  {}",
+            progress.pass,
+            progress.mean_samples,
+            100.0 * progress.visible_share,
+            self.time_left(progress, progress.pixels),
+        );
+        match &self.bar {
+            Some(bar) => {
+                let done = (progress.mean_samples * progress.pixels) as u64;
+                bar.set_length(done + progress.remaining_samples.min(1e15).max(progress.next_samples as f64) as u64);
+                bar.set_position(done);
+                bar.set_message(message);
+            }
+            None => eprintln!("{message}"),
+        }
+    }
+
+    fn samples_done(&self, samples: u64) {
+        if let Some(bar) = &self.bar {
+            bar.inc(samples);
+        }
+    }
+}
+
+/// "0.8 s", "42 s", "3 min 20 s", "2 h 5 min".
+pub(super) fn duration_in_words(seconds: f64) -> String {
+    match seconds {
+        s if s < 10.0 => format!("{s:.1} s"),
+        s if s < 100.0 => format!("{s:.0} s"),
+        s if s < 6000.0 => format!("{:.0} min {:.0} s", (s / 60.0).floor(), s % 60.0),
+        s => format!("{:.0} h {:.0} min", (s / 3600.0).floor(), (s % 3600.0) / 60.0),
+    }
+}

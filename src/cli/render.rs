@@ -1,0 +1,298 @@
+//! `fechner render`: a scene file in, a picture out.
+
+use super::console::Console;
+use super::report::{Report, summary};
+use anyhow::{Context, bail};
+use clap::{Args, ValueEnum};
+use fechner::adaptive::settings::{DEFAULT_MAX_SAMPLES, Limits, LoopSettings, Sampling};
+use fechner::adaptive::{self, Rendered};
+use fechner::integrator::{DEFAULT_MAX_DEPTH, PathTracer, TraceSettings};
+use fechner::output;
+use fechner::sampler::PixelFilter;
+use fechner::scene::{Scene, load};
+use fechner_perception::display::{Display, Viewing};
+use fechner_perception::tone;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Arguments of `render`.
+#[derive(Debug, Args)]
+pub(super) struct RenderArguments {
+    /// Scene: .toml, .gltf, .glb or .obj.
+    scene: PathBuf,
+    /// Picture to write: .png as the display shows it, .exr with all layers.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Picture size.
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<Size>,
+    /// Camera of the scene file, by name.
+    #[arg(long, value_name = "NAME")]
+    camera: Option<String>,
+    /// Time in the scene's keyframes, in seconds.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
+    at: f64,
+
+    /// Stop when the remaining noise is at most this visible: 1 is at threshold.
+    #[arg(long, value_name = "V", value_parser = parse_positive, help_heading = "Until")]
+    visibility: Option<f64>,
+    /// The same, by name.
+    #[arg(long, value_enum, conflicts_with = "visibility", help_heading = "Until")]
+    quality: Option<Quality>,
+    /// Stop after this many seconds of rendering.
+    #[arg(long, value_name = "SECONDS", value_parser = parse_positive, help_heading = "Until")]
+    time: Option<f64>,
+    /// Stop at this mean number of samples a pixel.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Until")]
+    spp: Option<u32>,
+    /// Most samples of one pixel.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(16..), help_heading = "Until")]
+    max_spp: Option<u32>,
+    /// Stop after this many plans: repeats a render that ended by --time.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Until")]
+    plans: Option<u32>,
+
+    /// How samples are spread.
+    #[arg(long, value_enum, default_value = "adaptive", help_heading = "Sampling")]
+    sampling: SamplingChoice,
+    /// Most scattering events of a path.
+    #[arg(long, value_name = "N", help_heading = "Sampling")]
+    max_depth: Option<u32>,
+    /// Pixel filter.
+    #[arg(long, value_enum, default_value = "gaussian", help_heading = "Sampling")]
+    filter: FilterChoice,
+    /// Seed of all random numbers.
+    #[arg(long, default_value_t = 0, help_heading = "Sampling")]
+    seed: u64,
+
+    /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file.
+    #[arg(long, value_name = "NAME|FILE", help_heading = "Seeing")]
+    display: Option<String>,
+    /// Area in deg² over which the eye sums contrast.
+    #[arg(long, value_name = "DEG2", value_parser = parse_positive, help_heading = "Seeing")]
+    csf_area: Option<f64>,
+    /// Luminance in cd/m² of RGB (1, 1, 1), in place of the scene's.
+    #[arg(long, value_name = "CD_M2", value_parser = parse_positive, help_heading = "Seeing")]
+    nits_per_unit: Option<f64>,
+
+    /// Tone operator.
+    #[arg(long, value_name = "NAME", help_heading = "Picture")]
+    operator: Option<String>,
+    /// Exposure correction in stops.
+    #[arg(long, value_name = "STOPS", allow_negative_numbers = true, help_heading = "Picture")]
+    exposure: Option<f64>,
+
+    /// Threads; the picture does not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..1024), help_heading = "Running")]
+    threads: Option<u32>,
+    /// Write figures of the render here.
+    #[arg(long, value_name = "FILE", help_heading = "Running")]
+    json: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Size {
+    width: u32,
+    height: u32,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Quality {
+    /// Visibility 4.
+    Draft,
+    /// Visibility 2.
+    Preview,
+    /// Visibility 1.
+    Good,
+    /// Visibility 0.5.
+    Final,
+    /// Visibility 0.25.
+    Critical,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum SamplingChoice {
+    /// Where the remaining error can be seen.
+    Adaptive,
+    /// The same everywhere.
+    Uniform,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum FilterChoice {
+    /// One pixel wide.
+    Box,
+    /// Gaussian of σ 0.45 pixels.
+    Gaussian,
+}
+
+impl Quality {
+    fn visibility(self) -> f64 {
+        match self {
+            Quality::Draft => 4.0,
+            Quality::Preview => 2.0,
+            Quality::Good => 1.0,
+            Quality::Final => 0.5,
+            Quality::Critical => 0.25,
+        }
+    }
+}
+
+fn parse_size(text: &str) -> Result<Size, String> {
+    let wrong = || format!("\"{text}\" is not a size; expected WIDTHxHEIGHT in pixels, such as 640x360");
+    let (width, height) = text.split_once(['x', 'X', '×']).ok_or_else(wrong)?;
+    let (width, height) = (width.parse().map_err(|_| wrong())?, height.parse().map_err(|_| wrong())?);
+    if width == 0 || height == 0 { Err(wrong()) } else { Ok(Size { width, height }) }
+}
+
+fn parse_positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err(format!("\"{text}\" is not a number above 0")),
+    }
+}
+
+/// Renders and writes.
+pub(super) fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
+    let format = output::check_target(&arguments.output)?;
+    if let Some(json) = &arguments.json {
+        output::check_writable(json)?;
+    }
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(arguments.threads.unwrap_or(0) as usize)
+        .thread_name(|i| format!("render-{i}"))
+        .build()
+        .context("the threads could not be started")?;
+    pool.install(|| render_and_write(arguments, format))
+}
+
+fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyhow::Result<()> {
+    let options = load::LoadOptions { camera: arguments.camera.clone(), frame_time: arguments.at, ..load::LoadOptions::default() };
+    let scene = load::load(&arguments.scene, &options)?;
+    for note in &scene.notes {
+        eprintln!("note: {note}");
+    }
+    let size = arguments.size.unwrap_or(Size { width: scene.film.width, height: scene.film.height });
+    check_memory(size)?;
+    let settings = loop_settings(arguments, &scene)?;
+    let trace = TraceSettings {
+        width: size.width,
+        height: size.height,
+        seed: arguments.seed,
+        max_depth: arguments.max_depth.unwrap_or(DEFAULT_MAX_DEPTH),
+        filter: match arguments.filter {
+            FilterChoice::Box => PixelFilter::Box,
+            FilterChoice::Gaussian => PixelFilter::Gaussian,
+        },
+    };
+    let scene = Arc::new(scene);
+    let tracer = PathTracer::new(Arc::clone(&scene), trace);
+    let degenerate = tracer.world().degenerate_triangles();
+    if degenerate > 0 {
+        eprintln!("note: {degenerate} triangles without area were left out");
+    }
+    let console = Console::new(settings.limits.time);
+    let rendered = adaptive::render(&tracer, &settings, &console)?;
+    console.finish();
+    let report = Report::new(&arguments.scene, &tracer, &settings, &rendered);
+    write(arguments, format, &rendered, &settings, &report)?;
+    eprintln!("{}", summary(&report, &settings, &rendered));
+    Ok(())
+}
+
+fn write(
+    arguments: &RenderArguments,
+    format: output::Format,
+    rendered: &Rendered,
+    settings: &LoopSettings,
+    report: &Report,
+) -> anyhow::Result<()> {
+    match format {
+        output::Format::Png => output::rendered::write_display_png(&arguments.output, rendered)?,
+        output::Format::Exr => {
+            output::rendered::write_layers_exr(&arguments.output, rendered, settings.nits_per_unit, &report.attributes())?;
+        }
+    }
+    if let Some(path) = &arguments.json {
+        let text = serde_json::to_string_pretty(report).context("the report could not be put into words")?;
+        output::write_beside(path, |file| file.write_all(text.as_bytes()))?;
+    }
+    Ok(())
+}
+
+/// Command line before scene before default.
+fn loop_settings(arguments: &RenderArguments, scene: &Scene) -> anyhow::Result<LoopSettings> {
+    let view = &scene.viewing;
+    let display = find_display(arguments.display.as_deref().or(view.display.as_deref()).unwrap_or("desktop"))?;
+    let mut viewing = Viewing::of(display);
+    if let Some(area) = arguments.csf_area {
+        viewing.observer.csf_area_deg2 = area;
+    }
+    viewing.check().context("--display and --csf-area")?;
+    let operator_name = arguments.operator.as_deref().or(view.operator.as_deref()).unwrap_or("constant");
+    let operator = tone::operator(operator_name, arguments.exposure.or(view.exposure_stops)).with_context(|| {
+        format!("there is no tone operator \"{operator_name}\"; known: {}", tone::operator_names().join(", "))
+    })?;
+    let sampling = match arguments.sampling {
+        SamplingChoice::Adaptive => Sampling::Adaptive,
+        SamplingChoice::Uniform => Sampling::Uniform,
+    };
+    let asked = arguments.visibility.or(arguments.quality.map(Quality::visibility));
+    let visibility = match (asked, sampling) {
+        (Some(visibility), _) => visibility,
+        // A uniform render of so many samples or seconds is what was asked for, not an early end.
+        (None, Sampling::Uniform) if arguments.spp.is_some() || arguments.time.is_some() => 0.0,
+        (None, _) => view.visibility.unwrap_or(1.0),
+    };
+    Ok(LoopSettings {
+        sampling,
+        limits: Limits {
+            visibility,
+            time: arguments.time.map(Duration::from_secs_f64),
+            mean_samples: arguments.spp,
+            max_samples: arguments.max_spp.unwrap_or(DEFAULT_MAX_SAMPLES),
+            plans: arguments.plans,
+        },
+        viewing,
+        nits_per_unit: arguments.nits_per_unit.unwrap_or(scene.nits_per_unit),
+        operator,
+    })
+}
+
+fn find_display(name: &str) -> anyhow::Result<Display> {
+    if let Some(display) = Display::preset(name) {
+        return Ok(display);
+    }
+    if !name.ends_with(".toml") {
+        bail!("there is no display \"{name}\"; known: {}, or a .toml file", Display::preset_names().join(", "));
+    }
+    let text = std::fs::read_to_string(Path::new(name)).with_context(|| format!("display file {name}"))?;
+    Display::from_toml(&text).with_context(|| format!("display file {name}"))
+}
+
+/// Refuses a size whose film and maps would not fit into memory.
+fn check_memory(size: Size) -> anyhow::Result<()> {
+    /// Film 128, picture, guide and threshold maps measured at about 500 more at their peak.
+    const BYTES_PER_PIXEL: u64 = 700;
+    let needed = u64::from(size.width) * u64::from(size.height) * BYTES_PER_PIXEL;
+    let available = available_memory_bytes().unwrap_or(8 << 30);
+    if needed > available || u64::from(size.width) * u64::from(size.height) > u64::from(u32::MAX) / 2 {
+        bail!(
+            "a picture of {}x{} needs about {:.1} GiB of memory, and {:.1} GiB are free: choose a smaller --size",
+            size.width,
+            size.height,
+            needed as f64 / f64::from(1 << 30),
+            available as f64 / f64::from(1 << 30)
+        );
+    }
+    Ok(())
+}
+
+/// Free memory as Linux states it; `None` elsewhere.
+fn available_memory_bytes() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text.lines().find_map(|l| l.strip_prefix("MemAvailable:"))?;
+    line.trim().trim_end_matches("kB").trim().parse::<u64>().ok().map(|kib| kib * 1024)
+}

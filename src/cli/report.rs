@@ -1,0 +1,228 @@
+//! The figures of a render, for machines (`--json`, EXR attributes) and in plain words.
+
+use super::console::duration_in_words;
+use fechner::adaptive::settings::{LoopSettings, Sampling};
+use fechner::adaptive::{Rendered, StopReason, visible_share};
+use fechner::integrator::PathTracer;
+use fechner::output::Attribute;
+use fechner_perception::Plane;
+use fechner_perception::psychometric::detection_probability;
+use serde::Serialize;
+use std::path::Path;
+
+/// Where the picture is seen.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct ObserverReport {
+    display: String,
+    pixels_per_degree: f64,
+    white_cd_m2: f64,
+    black_cd_m2: f64,
+    ambient_cd_m2: f64,
+    distance_m: Option<f64>,
+    sensitivity: f64,
+    csf_area_deg2: f64,
+}
+
+/// Everything that `--json` holds.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct Report {
+    fechner_version: &'static str,
+    scene: String,
+    width: u32,
+    height: u32,
+    seed: u64,
+    sampling: &'static str,
+    model: &'static str,
+    csf: &'static str,
+    operator: String,
+    nits_per_unit: f64,
+    observer: ObserverReport,
+    samples_total: u64,
+    spp_mean: f64,
+    spp_max: u32,
+    rays_total: u64,
+    seconds_total: f64,
+    seconds_perception: f64,
+    visibility_target: Option<f64>,
+    visibility_p99: f64,
+    visibility_p999: f64,
+    visibility_max: f64,
+    /// Share of pixels whose predicted visibility is above the target (above 1 where there is none).
+    fraction_visible: f64,
+    /// Of a 1° patch at the 99th percentile.
+    detection_probability_p99: f64,
+    /// Expected number of 1° patches in which noise is noticed.
+    patches_noticed: f64,
+    /// Energy of the halves' difference through the eye's filter over the predicted energy; 1 when the prediction holds.
+    measured_over_predicted: f64,
+    nonfinite_samples: u64,
+    peak_memory_bytes: Option<u64>,
+    plans: u32,
+    stop_reason: &'static str,
+}
+
+impl Report {
+    pub(super) fn new(scene: &Path, tracer: &PathTracer, settings: &LoopSettings, rendered: &Rendered) -> Self {
+        let film = &rendered.film;
+        let pixels = u64::from(film.width()) * u64::from(film.height());
+        let judgement = &rendered.judgement;
+        let display = &settings.viewing.display;
+        let target = (settings.limits.visibility > 0.0).then_some(settings.limits.visibility);
+        let sorted = sorted_values(&judgement.predicted);
+        let p99 = quantile(&sorted, 0.99);
+        let energy = |p: &Plane| p.values().iter().map(|&v| f64::from(v) * f64::from(v)).sum::<f64>();
+        let samples_total = film.total_samples();
+        Self {
+            fechner_version: env!("CARGO_PKG_VERSION"),
+            scene: scene.display().to_string(),
+            width: film.width(),
+            height: film.height(),
+            seed: tracer.settings().seed,
+            sampling: match settings.sampling {
+                Sampling::Adaptive => "adaptive",
+                Sampling::Uniform => "uniform",
+            },
+            model: "csf-bands",
+            csf: "castle",
+            operator: judgement.tone.describe(),
+            nits_per_unit: settings.nits_per_unit,
+            observer: ObserverReport {
+                display: display.name.clone(),
+                pixels_per_degree: display.pixels_per_degree,
+                white_cd_m2: display.white_cd_m2,
+                black_cd_m2: display.black_cd_m2,
+                ambient_cd_m2: display.ambient_cd_m2,
+                distance_m: display.distance_m,
+                sensitivity: settings.viewing.observer.sensitivity,
+                csf_area_deg2: settings.viewing.observer.csf_area_deg2,
+            },
+            samples_total,
+            spp_mean: samples_total as f64 / pixels as f64,
+            spp_max: (0..pixels as usize).map(|i| film.samples(i)).max().unwrap_or(0),
+            rays_total: film.rays,
+            seconds_total: rendered.seconds_total,
+            seconds_perception: rendered.seconds_perception,
+            visibility_target: target,
+            visibility_p99: p99,
+            visibility_p999: quantile(&sorted, 0.999),
+            visibility_max: quantile(&sorted, 1.0),
+            fraction_visible: visible_share(judgement, target.unwrap_or(1.0)),
+            detection_probability_p99: detection_probability(p99),
+            patches_noticed: patches_noticed(&judgement.predicted, display.pixels_per_degree),
+            measured_over_predicted: energy(&judgement.measured) / energy(&judgement.predicted),
+            nonfinite_samples: film.nonfinite_samples,
+            peak_memory_bytes: peak_memory_bytes(),
+            plans: rendered.plans,
+            stop_reason: match rendered.stop_reason {
+                StopReason::Visibility => "visibility",
+                StopReason::Time => "time",
+                StopReason::Samples => "spp",
+                StopReason::MaxSamples => "max-spp",
+                StopReason::Plans => "plans",
+            },
+        }
+    }
+
+    /// What an EXR file should say of itself.
+    pub(super) fn attributes(&self) -> Vec<(String, Attribute)> {
+        let text = |s: &str| Attribute::Text(s.to_owned());
+        let number = |x: f64| Attribute::Float(x as f32);
+        let mut attributes = vec![
+            ("fechner.scene", text(&self.scene)),
+            ("fechner.seed", text(&self.seed.to_string())),
+            ("fechner.sampling", text(self.sampling)),
+            ("fechner.model", text(self.model)),
+            ("fechner.csf", text(self.csf)),
+            ("fechner.operator", text(&self.operator)),
+            ("fechner.seen", text("display")),
+            ("fechner.latitude_stops", Attribute::Float(0.0)),
+            ("fechner.observer.display", text(&self.observer.display)),
+            ("fechner.observer.pixels_per_degree", number(self.observer.pixels_per_degree)),
+            ("fechner.observer.white_cd_m2", number(self.observer.white_cd_m2)),
+            ("fechner.observer.black_cd_m2", number(self.observer.black_cd_m2)),
+            ("fechner.observer.ambient_cd_m2", number(self.observer.ambient_cd_m2)),
+            ("fechner.observer.sensitivity", number(self.observer.sensitivity)),
+            ("fechner.observer.csf_area_deg2", number(self.observer.csf_area_deg2)),
+            ("fechner.plans", Attribute::Integer(self.plans.try_into().unwrap_or(i32::MAX))),
+            ("fechner.stop_reason", text(self.stop_reason)),
+        ];
+        if let Some(target) = self.visibility_target {
+            attributes.push(("fechner.visibility_target", number(target)));
+        }
+        attributes.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+    }
+}
+
+/// The end of a render in plain words.
+pub(super) fn summary(report: &Report, settings: &LoopSettings, rendered: &Rendered) -> String {
+    let display = &settings.viewing.display;
+    let distance = display.distance_m.map_or_else(String::new, |d| format!(" at {d:.2} m"));
+    let p = |v: f64| format!("{:.1} %", 100.0 * detection_probability(v));
+    let why = match rendered.stop_reason {
+        StopReason::Visibility => "Stopped because the target is reached",
+        StopReason::Time => "Stopped because the time was up",
+        StopReason::Samples => "Stopped because the samples were spent",
+        StopReason::MaxSamples => "Stopped although some pixels are above the target: they have the most samples allowed",
+        StopReason::Plans => "Stopped after the plans asked for",
+    };
+    let target = report.visibility_target.map_or_else(
+        || format!("{:.2} % of the picture is above visibility 1", 100.0 * report.fraction_visible),
+        |t| format!("{:.2} % of the picture is above the target visibility {t}", 100.0 * report.fraction_visible),
+    );
+    let mut lines = vec![
+        format!(
+            "{} samples ({:.1} a pixel on average, {} at most) in {}, of which {:.1} % in the perception model.",
+            report.samples_total,
+            report.spp_mean,
+            report.spp_max,
+            duration_in_words(report.seconds_total),
+            100.0 * report.seconds_perception / report.seconds_total
+        ),
+        format!("{why}; {target}."),
+        format!(
+            "On the display \"{}\" ({} pixels a degree{distance}, white {} cd/m²): predicted chance that remaining noise \
+             is detected in a 1° patch is {} at the 99th percentile (visibility {:.2}); about {:.1} of {:.0} patches.",
+            display.name,
+            display.pixels_per_degree,
+            display.white_cd_m2,
+            p(report.visibility_p99),
+            report.visibility_p99,
+            report.patches_noticed,
+            patch_count(&rendered.judgement.predicted, display.pixels_per_degree),
+        ),
+        "Model-predicted, calibrated on gratings, not on renderings; light paths never sampled are not covered.".to_owned(),
+    ];
+    if report.nonfinite_samples > 0 {
+        lines.push(format!("{} samples were not finite and are left out.", report.nonfinite_samples));
+    }
+    lines.join("\n")
+}
+
+fn sorted_values(plane: &Plane) -> Vec<f32> {
+    let mut values = plane.values().to_vec();
+    values.sort_by(f32::total_cmp);
+    values
+}
+
+fn quantile(sorted: &[f32], share: f64) -> f64 {
+    let last = sorted.len().saturating_sub(1);
+    sorted.get((share * last as f64).round() as usize).map_or(0.0, |&v| f64::from(v))
+}
+
+/// 1° × 1° patches in the picture.
+fn patch_count(visibility: &Plane, pixels_per_degree: f64) -> f64 {
+    visibility.values().len() as f64 / (pixels_per_degree * pixels_per_degree)
+}
+
+fn patches_noticed(visibility: &Plane, pixels_per_degree: f64) -> f64 {
+    let mean = visibility.values().iter().map(|&v| detection_probability(f64::from(v))).sum::<f64>()
+        / visibility.values().len() as f64;
+    mean * patch_count(visibility, pixels_per_degree)
+}
+
+/// Peak resident memory as Linux states it; `None` elsewhere.
+fn peak_memory_bytes() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = text.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+    line.trim().trim_end_matches("kB").trim().parse::<u64>().ok().map(|kib| kib * 1024)
+}

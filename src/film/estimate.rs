@@ -1,0 +1,49 @@
+//! What the film says so far, in cd/m².
+
+use super::{Film, HalfPixel, opponent};
+use crate::sampler::Half;
+use fechner_perception::Plane;
+
+/// The picture and its statistics, row-major, in cd/m².
+#[derive(Clone, Debug)]
+pub struct Estimate {
+    /// (A + B) / 2: linear RGB whose luminance is in cd/m².
+    pub rgb_cd_m2: Vec<[f32; 3]>,
+    /// Luminance of the picture.
+    pub luminance_cd_m2: Plane,
+    /// Variance of the picture's luminance from the samples' own scatter, (s_A²/n_A + s_B²/n_B) / 4, in (cd/m²)². Above
+    /// the true variance where samples are stratified.
+    pub variance_of_mean: Plane,
+    /// (A − B) / 2 in luminance: a realisation of the picture's error.
+    pub half_difference: Plane,
+}
+
+impl Film {
+    /// The picture so far. `nits_per_unit`: luminance in cd/m² of RGB (1, 1, 1).
+    pub fn estimate(&self, nits_per_unit: f64) -> Estimate {
+        let (width, height) = (self.width() as usize, self.height() as usize);
+        let (a, b) = (self.half(Half::A), self.half(Half::B));
+        let plane = |value: &(dyn Fn(&HalfPixel, &HalfPixel) -> f64 + Sync)| {
+            Plane::from_fn(width, height, |x, y| value(&a[y * width + x], &b[y * width + x]) as f32)
+        };
+        let nits = nits_per_unit;
+        let y = |half: &HalfPixel| opponent(half.mean)[0];
+        // A render of one sample has an empty half: the other is then the picture.
+        let average = |of_a: f64, of_b: f64, a: &HalfPixel, b: &HalfPixel| match (a.samples, b.samples) {
+            (_, 0) => of_a,
+            (0, _) => of_b,
+            _ => 0.5 * (of_a + of_b),
+        };
+        let variance_of_half = |half: &HalfPixel| half.sample_variance(0) / f64::from(half.samples.max(1));
+        Estimate {
+            rgb_cd_m2: a
+                .iter()
+                .zip(b)
+                .map(|(a, b)| std::array::from_fn(|c| (nits * average(a.mean[c], b.mean[c], a, b)) as f32))
+                .collect(),
+            luminance_cd_m2: plane(&|a, b| nits * average(y(a), y(b), a, b)),
+            variance_of_mean: plane(&|a, b| 0.25 * nits * nits * (variance_of_half(a) + variance_of_half(b))),
+            half_difference: plane(&|a, b| 0.5 * nits * (y(a) - y(b))),
+        }
+    }
+}

@@ -1,0 +1,213 @@
+//! What has been sampled so far: two independent half buffers with their statistics, and what the first surfaces are.
+//!
+//! The picture is the plain average of the halves' means: weighting by counts would let the data that chose the counts
+//! bias the picture. 128 bytes a pixel.
+
+mod estimate;
+
+pub use estimate::Estimate;
+
+use crate::integrator::{BlockWork, PathSample};
+use crate::sampler::Half;
+use fechner_perception::photometry::luminance;
+use glam::Vec3;
+
+/// Statistics of one pixel in one half.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct HalfPixel {
+    /// Mean linear RGB radiance in scene units.
+    pub mean: [f64; 3],
+    /// Sum of squared deviations of luminance and two opponent channels from their means, scene units squared.
+    pub m2: [f32; 3],
+    /// Finite samples in the mean.
+    pub samples: u32,
+    /// Doublings taken, counting the pilot as 1; 0 is an empty pixel.
+    pub levels: u8,
+}
+
+/// Scene-linear luminance and two opponent channels (red–green, yellow–violet) of an RGB value.
+pub fn opponent(rgb: [f64; 3]) -> [f64; 3] {
+    let [r, g, b] = rgb;
+    let y = f64::from(luminance([1.0, 0.0, 0.0])) * r
+        + f64::from(luminance([0.0, 1.0, 0.0])) * g
+        + f64::from(luminance([0.0, 0.0, 1.0])) * b;
+    [y, 0.5 * (r - g), 0.25 * (r + g) - 0.5 * b]
+}
+
+/// Sum of one block of samples.
+#[derive(Clone, Copy, Debug)]
+pub struct BlockSum {
+    samples: u32,
+    nonfinite: u32,
+    rays: u64,
+    rgb: [f64; 3],
+    squares: [f64; 3],
+    albedo: Vec3,
+    normal: Vec3,
+    depth: f32,
+    first_object_id: Option<u32>,
+}
+
+impl Default for BlockSum {
+    fn default() -> Self {
+        Self {
+            samples: 0,
+            nonfinite: 0,
+            rays: 0,
+            rgb: [0.0; 3],
+            squares: [0.0; 3],
+            albedo: Vec3::ZERO,
+            normal: Vec3::ZERO,
+            depth: 0.0,
+            first_object_id: None,
+        }
+    }
+}
+
+impl BlockSum {
+    /// Adds a sample; one that is not finite is counted and left out.
+    pub fn add(&mut self, sample: &PathSample) {
+        self.rays += u64::from(sample.rays);
+        self.first_object_id.get_or_insert(sample.first_hit.object_id);
+        if !sample.radiance.is_finite() {
+            self.nonfinite += 1;
+            return;
+        }
+        self.samples += 1;
+        let rgb = sample.radiance.as_dvec3().to_array();
+        for (sum, value) in self.rgb.iter_mut().zip(rgb) {
+            *sum += value;
+        }
+        // The sum of squares in f64 keeps 9 digits of a variance at a coefficient of variation of 1e-3.
+        for (sum, value) in self.squares.iter_mut().zip(opponent(rgb)) {
+            *sum += value * value;
+        }
+        self.albedo += sample.first_hit.albedo;
+        self.normal += sample.first_hit.normal;
+        self.depth += sample.first_hit.depth;
+    }
+}
+
+impl HalfPixel {
+    /// Adds a block (Chan, Golub and LeVeque 1983).
+    fn merge(&mut self, block: &BlockSum) {
+        self.levels += 1;
+        if block.samples == 0 {
+            return;
+        }
+        let (old, new) = (f64::from(self.samples), f64::from(block.samples));
+        let block_mean = block.rgb.map(|sum| sum / new);
+        let block_opponent = opponent(block_mean);
+        let difference: [f64; 3] = {
+            let own = opponent(self.mean);
+            std::array::from_fn(|c| block_opponent[c] - own[c])
+        };
+        for c in 0..3 {
+            let block_m2 = (block.squares[c] - new * block_opponent[c] * block_opponent[c]).max(0.0);
+            let between = difference[c] * difference[c] * old * new / (old + new);
+            self.m2[c] = (f64::from(self.m2[c]) + block_m2 + between) as f32;
+            self.mean[c] += (block_mean[c] - self.mean[c]) * new / (old + new);
+        }
+        self.samples += block.samples;
+    }
+
+    /// Unbiased variance of one sample in an opponent channel; 0 below two samples.
+    pub fn sample_variance(&self, channel: usize) -> f64 {
+        if self.samples < 2 { 0.0 } else { f64::from(self.m2[channel]) / f64::from(self.samples - 1) }
+    }
+}
+
+/// Mean of what the first surfaces of a pixel are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PixelGuide {
+    /// Mean albedo.
+    pub albedo: [f32; 3],
+    /// Mean shading normal, not unit length at edges.
+    pub normal: [f32; 3],
+    /// Mean distance.
+    pub depth: f32,
+    /// Object number + 1 of the first sample.
+    pub object_id: u32,
+}
+
+/// The film.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Film {
+    width: u32,
+    height: u32,
+    halves: [Vec<HalfPixel>; 2],
+    guides: Vec<PixelGuide>,
+    /// Samples that were not finite.
+    pub nonfinite_samples: u64,
+    /// Rays traced.
+    pub rays: u64,
+}
+
+impl Film {
+    /// An empty film.
+    pub fn new(width: u32, height: u32) -> Self {
+        let pixels = width as usize * height as usize;
+        let nothing = PixelGuide { albedo: [0.0; 3], normal: [0.0; 3], depth: 0.0, object_id: 0 };
+        Self {
+            width,
+            height,
+            halves: [vec![HalfPixel::default(); pixels], vec![HalfPixel::default(); pixels]],
+            guides: vec![nothing; pixels],
+            nonfinite_samples: 0,
+            rays: 0,
+        }
+    }
+
+    /// Width in pixels.
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Height in pixels.
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// One half, row-major.
+    pub fn half(&self, half: Half) -> &[HalfPixel] {
+        &self.halves[half.index()]
+    }
+
+    /// First surfaces, row-major.
+    pub fn guides(&self) -> &[PixelGuide] {
+        &self.guides
+    }
+
+    /// Adds a block of samples to a pixel.
+    pub fn merge_block(&mut self, work: BlockWork, block: &BlockSum) {
+        let pixel = work.pixel as usize;
+        let before = self.halves[0][pixel].samples + self.halves[1][pixel].samples;
+        self.halves[work.half.index()][pixel].merge(block);
+        self.nonfinite_samples += u64::from(block.nonfinite);
+        self.rays += block.rays;
+        let guide = &mut self.guides[pixel];
+        if let (0, Some(id)) = (before, block.first_object_id) {
+            guide.object_id = id;
+        }
+        if block.samples > 0 {
+            let share = block.samples as f32 / (before + block.samples) as f32;
+            let scale = 1.0 / block.samples as f32;
+            let blend = |old: &mut [f32; 3], sum: Vec3| {
+                *old = Vec3::from_array(*old).lerp(sum * scale, share).to_array();
+            };
+            blend(&mut guide.albedo, block.albedo);
+            blend(&mut guide.normal, block.normal);
+            guide.depth += (block.depth * scale - guide.depth) * share;
+        }
+    }
+
+    /// Samples of a pixel in both halves.
+    pub fn samples(&self, pixel: usize) -> u32 {
+        self.halves[0][pixel].samples + self.halves[1][pixel].samples
+    }
+
+    /// Samples of all pixels.
+    pub fn total_samples(&self) -> u64 {
+        self.halves.iter().flatten().map(|p| u64::from(p.samples)).sum()
+    }
+}

@@ -1,0 +1,26 @@
+//! Rays, triangles, spheres and the two-level tree that finds what a ray hits.
+//!
+//! [`World`] is what the rest of the program sees: `closest` and `occluded`, and [`World::surface`] for what is there.
+//! The trees are obvhs's, behind [`tree::PrimitiveTree`]; the triangle test is ours, because a leak at a shared edge is a
+//! firefly that an adaptive sampler would chase for ever.
+
+pub mod sphere;
+pub mod surface;
+pub mod tree;
+pub mod triangle;
+mod mesh_tree;
+mod world;
+
+pub use surface::SurfacePoint;
+pub use world::{Hit, World};
+
+use glam::Vec3A;
+
+/// A half-line. `direction` has unit length, so distances along it are scene units.
+#[derive(Clone, Copy, Debug)]
+pub struct Ray {
+    /// Where it starts.
+    pub origin: Vec3A,
+    /// Unit direction.
+    pub direction: Vec3A,
+}

@@ -1,0 +1,372 @@
+//! Everything that rays can hit, in two levels.
+//!
+//! Meshes that are placed once are put into world space and share one tree; meshes that are placed several times have a
+//! tree each, in their own space, and are entered through their instance's transform. Spheres stay analytic.
+
+use super::mesh_tree::{MeshHit, MeshTree, TriangleRef};
+use super::tree::{BinaryTree, Bounds, PrimitiveTree};
+use super::{Ray, SurfacePoint, sphere};
+use crate::scene::{Alpha, Instance, MaterialId, Scene, ScalarInput};
+use glam::{Affine3A, Mat3A, Vec2, Vec3, Vec3A};
+use std::sync::Arc;
+
+/// What a ray hits.
+#[derive(Clone, Copy, Debug)]
+pub struct Hit {
+    /// Distance along the ray.
+    pub distance: f32,
+    /// Index of the object: instances first, then spheres.
+    pub object: u32,
+    /// Triangle of the mesh, 0 for a sphere.
+    pub triangle: u32,
+    /// Barycentric weight of the second vertex.
+    pub b1: f32,
+    /// Barycentric weight of the third vertex.
+    pub b2: f32,
+}
+
+/// A scene with its trees.
+pub struct World {
+    scene: Arc<Scene>,
+    /// Triangles of meshes that are placed once.
+    fixed: MeshTree,
+    /// Trees of meshes that are placed several times.
+    shared: Vec<MeshTree>,
+    /// Over `items`, when there is more than the fixed tree.
+    top: Option<BinaryTree>,
+    items: Vec<Item>,
+    center: Vec3,
+    /// Of the sphere around everything.
+    radius: f32,
+    has_alpha: bool,
+}
+
+/// What a leaf of the top tree holds.
+#[derive(Debug)]
+enum Item {
+    Fixed,
+    Placed { instance: u32, shared: usize, to_mesh: Affine3A },
+    Sphere { object: u32, center: Vec3A, radius: f32 },
+}
+
+impl World {
+    /// Builds the trees. Deterministic for any number of threads.
+    pub fn new(scene: Arc<Scene>) -> Self {
+        let mut uses = vec![0u32; scene.meshes.len()];
+        for instance in &scene.instances {
+            uses[instance.mesh.0 as usize] += 1;
+        }
+        let fixed = MeshTree::build(&fixed_triangles(&scene, &uses));
+        let mut items = Vec::new();
+        let mut item_bounds = Vec::new();
+        if fixed.bounds().is_finite() {
+            items.push(Item::Fixed);
+            item_bounds.push(fixed.bounds());
+        }
+        let mut shared = Vec::new();
+        let mut tree_of_mesh = vec![None; scene.meshes.len()];
+        for (number, instance) in scene.instances.iter().enumerate() {
+            let mesh = instance.mesh.0 as usize;
+            if uses[mesh] < 2 {
+                continue;
+            }
+            let tree = *tree_of_mesh[mesh].get_or_insert_with(|| {
+                shared.push(MeshTree::build(&own_triangles(&scene, mesh)));
+                shared.len() - 1
+            });
+            if !shared[tree].bounds().is_finite() {
+                continue;
+            }
+            items.push(Item::Placed { instance: number as u32, shared: tree, to_mesh: instance.to_world.inverse() });
+            item_bounds.push(placed_bounds(&scene, instance));
+        }
+        for (number, s) in scene.spheres.iter().enumerate() {
+            let (center, radius) = (Vec3A::from(s.center), s.radius);
+            let object = (scene.instances.len() + number) as u32;
+            items.push(Item::Sphere { object, center, radius });
+            item_bounds.push(Bounds { min: center - radius, max: center + radius });
+        }
+        let bounds = item_bounds.iter().fold(Bounds::EMPTY, |all, b| all.union(*b));
+        let only_fixed = matches!(items[..], [Item::Fixed]);
+        let (top, items) = if only_fixed {
+            (None, items)
+        } else {
+            let tree = BinaryTree::build(&item_bounds);
+            let mut slots: Vec<Option<Item>> = items.into_iter().map(Some).collect();
+            let ordered = tree.order().iter().filter_map(|&i| slots[i as usize].take()).collect();
+            (Some(tree), ordered)
+        };
+        let has_alpha = scene.materials.iter().any(|m| m.alpha != Alpha::Opaque);
+        let (center, radius) = if bounds.is_finite() {
+            let center = (bounds.min + bounds.max) * 0.5;
+            (center.into(), (bounds.max - center).length().max(f32::MIN_POSITIVE))
+        } else {
+            (Vec3::ZERO, 1.0)
+        };
+        Self { scene, fixed, shared, top, items, center, radius, has_alpha }
+    }
+
+    /// The scene that this was built from.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// Centre of the bounding box and radius of the sphere around it; a unit sphere for an empty scene.
+    pub fn bounding_sphere(&self) -> (Vec3, f32) {
+        (self.center, self.radius)
+    }
+
+    /// Triangles that were left out because they have no area.
+    pub fn degenerate_triangles(&self) -> usize {
+        self.fixed.degenerate + self.shared.iter().map(|t| t.degenerate).sum::<usize>()
+    }
+
+    /// How far from a point new rays must start to clear the rounding of the trees' coordinates and of the point's own:
+    /// a few units in the last place of both.
+    pub fn offset_at(&self, position: Vec3) -> f32 {
+        4e-7 * (position.abs().max_element() + self.radius)
+    }
+
+    /// The material of an object.
+    pub fn material_of(&self, object: u32) -> MaterialId {
+        let instances = self.scene.instances.len();
+        match self.scene.instances.get(object as usize) {
+            Some(instance) => instance.material,
+            None => self.scene.spheres[object as usize - instances].material,
+        }
+    }
+
+    /// The closest surface along the ray.
+    pub fn closest(&self, ray: &Ray) -> Option<Hit> {
+        if self.top.is_none() {
+            return self.closest_fixed(ray, f32::INFINITY);
+        }
+        let mut best = None;
+        self.top.as_ref()?.closest(ray.origin, ray.direction, f32::INFINITY, |i, t_max| {
+            let hit = match &self.items[i] {
+                Item::Fixed => self.closest_fixed(ray, t_max),
+                Item::Placed { instance, shared, to_mesh } => {
+                    let local = LocalRay::new(ray, to_mesh);
+                    self.shared[*shared]
+                        .closest(local.origin, local.direction, t_max * local.length, |h| {
+                            self.is_there(*instance, h, ray)
+                        })
+                        .map(|h| world_hit(*instance, h, h.t / local.length))
+                }
+                Item::Sphere { object, center, radius } => sphere::intersect(ray, *center, *radius, t_max)
+                    .map(|distance| Hit { distance, object: *object, triangle: 0, b1: 0.0, b2: 0.0 }),
+            };
+            match hit {
+                Some(hit) if hit.distance < t_max => {
+                    best = Some(hit);
+                    hit.distance
+                }
+                _ => f32::INFINITY,
+            }
+        });
+        best
+    }
+
+    /// Whether anything is nearer than `distance` along the ray.
+    pub fn occluded(&self, ray: &Ray, distance: f32) -> bool {
+        let fixed = |t_max: f32| {
+            self.fixed.any(ray.origin, ray.direction, t_max, |h| self.is_there(h.triangle.instance, h, ray))
+        };
+        let Some(top) = &self.top else {
+            return fixed(distance);
+        };
+        top.any(ray.origin, ray.direction, distance, |i, t_max| {
+            let blocked = match &self.items[i] {
+                Item::Fixed => fixed(t_max),
+                Item::Placed { instance, shared, to_mesh } => {
+                    let local = LocalRay::new(ray, to_mesh);
+                    self.shared[*shared].any(local.origin, local.direction, t_max * local.length, |h| {
+                        self.is_there(*instance, h, ray)
+                    })
+                }
+                Item::Sphere { center, radius, .. } => sphere::intersect(ray, *center, *radius, t_max).is_some(),
+            };
+            if blocked { 0.0 } else { f32::INFINITY }
+        })
+    }
+
+    fn closest_fixed(&self, ray: &Ray, t_max: f32) -> Option<Hit> {
+        self.fixed
+            .closest(ray.origin, ray.direction, t_max, |h| self.is_there(h.triangle.instance, h, ray))
+            .map(|h| world_hit(h.triangle.instance, h, h.t))
+    }
+
+    /// Whether alpha leaves this point of the surface in place.
+    fn is_there(&self, instance: u32, hit: &MeshHit, ray: &Ray) -> bool {
+        if !self.has_alpha {
+            return true;
+        }
+        let instance = &self.scene.instances[instance as usize];
+        let coverage = |value: &ScalarInput| {
+            let mesh = &self.scene.meshes[instance.mesh.0 as usize];
+            let uv = interpolate_uv(mesh, hit.triangle.triangle, hit.b1, hit.b2);
+            value.evaluate(&self.scene.textures, uv)
+        };
+        match &self.scene.materials[instance.material.0 as usize].alpha {
+            Alpha::Opaque => true,
+            Alpha::Mask { value, cutoff } => coverage(value) >= *cutoff,
+            // A random number that is a pure function of the ray and the triangle: the same ray always agrees with itself.
+            Alpha::Blend { value } => coverage(value) > ray_hash(ray, hit.triangle.triangle),
+        }
+    }
+
+    /// World-space corners of a triangle of an instance.
+    pub fn triangle_corners(&self, object: u32, triangle: u32) -> [Vec3; 3] {
+        let instance = &self.scene.instances[object as usize];
+        let mesh = &self.scene.meshes[instance.mesh.0 as usize];
+        mesh.triangles[triangle as usize]
+            .map(|i| instance.to_world.transform_point3(mesh.positions[i as usize]))
+    }
+
+    /// The surface at a hit.
+    pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
+        let Some(instance) = self.scene.instances.get(hit.object as usize) else {
+            let s = &self.scene.spheres[hit.object as usize - self.scene.instances.len()];
+            let normal = (Vec3::from(ray.origin + ray.direction * hit.distance) - s.center).normalize_or(Vec3::Y);
+            let position = s.center + s.radius * normal;
+            return SurfacePoint {
+                position,
+                geometric_normal: normal,
+                shading_normal: normal,
+                tangent: Vec3::Y.cross(normal).normalize_or(Vec3::X),
+                handedness: 1.0,
+                uv: Vec2::new(
+                    0.5 + normal.x.atan2(-normal.z) / std::f32::consts::TAU,
+                    normal.y.clamp(-1.0, 1.0).acos() / std::f32::consts::PI,
+                ),
+                object: hit.object,
+                triangle: 0,
+                offset: self.offset_at(position),
+            };
+        };
+        let mesh = &self.scene.meshes[instance.mesh.0 as usize];
+        let corners = self.triangle_corners(hit.object, hit.triangle);
+        let (b1, b2) = (hit.b1, hit.b2);
+        let position = corners[0] * (1.0 - b1 - b2) + corners[1] * b1 + corners[2] * b2;
+        let mirrored = instance.to_world.matrix3.determinant() < 0.0;
+        let flip = if mirrored { -1.0 } else { 1.0 };
+        let geometric_normal =
+            flip * (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or(Vec3::Y);
+        let indices = mesh.triangles[hit.triangle as usize].map(|i| i as usize);
+        let blend = |values: &[Vec3]| {
+            values[indices[0]] * (1.0 - b1 - b2) + values[indices[1]] * b1 + values[indices[2]] * b2
+        };
+        let shading_normal = if mesh.normals.is_empty() {
+            geometric_normal
+        } else {
+            let normal_matrix = Mat3A::from_cols(
+                instance.to_world.matrix3.y_axis.cross(instance.to_world.matrix3.z_axis),
+                instance.to_world.matrix3.z_axis.cross(instance.to_world.matrix3.x_axis),
+                instance.to_world.matrix3.x_axis.cross(instance.to_world.matrix3.y_axis),
+            );
+            let n = (flip * (normal_matrix * Vec3A::from(blend(&mesh.normals)))).normalize_or(geometric_normal.into());
+            // A file may wind its triangles against its normals; the geometric side is what counts.
+            let n = Vec3::from(n);
+            if n.dot(geometric_normal) < 0.0 { -n } else { n }
+        };
+        let (tangent, handedness) = if mesh.tangents.is_empty() {
+            tangent_from_uv(mesh, hit.triangle, &corners)
+        } else {
+            let t = |k: usize| mesh.tangents[indices[k]];
+            let blended = t(0).truncate() * (1.0 - b1 - b2) + t(1).truncate() * b1 + t(2).truncate() * b2;
+            let world = Vec3::from(instance.to_world.matrix3 * Vec3A::from(blended));
+            (world.normalize_or(Vec3::X), if t(0).w < 0.0 { -flip } else { flip })
+        };
+        SurfacePoint {
+            position,
+            geometric_normal,
+            shading_normal,
+            tangent,
+            handedness,
+            uv: interpolate_uv(mesh, hit.triangle, b1, b2),
+            object: hit.object,
+            triangle: hit.triangle,
+            offset: self.offset_at(position),
+        }
+    }
+}
+
+/// A ray in an instance's mesh space, its direction made unit again: distances there are `length` times longer.
+struct LocalRay {
+    origin: Vec3A,
+    direction: Vec3A,
+    length: f32,
+}
+
+impl LocalRay {
+    fn new(ray: &Ray, to_mesh: &Affine3A) -> Self {
+        let direction = to_mesh.transform_vector3a(ray.direction);
+        let length = direction.length();
+        Self { origin: to_mesh.transform_point3a(ray.origin), direction: direction / length, length }
+    }
+}
+
+fn world_hit(instance: u32, hit: MeshHit, distance: f32) -> Hit {
+    Hit { distance, object: instance, triangle: hit.triangle.triangle, b1: hit.b1, b2: hit.b2 }
+}
+
+fn own_triangles(scene: &Scene, mesh: usize) -> Vec<([Vec3A; 3], TriangleRef)> {
+    let mesh = &scene.meshes[mesh];
+    mesh.triangles
+        .iter()
+        .enumerate()
+        .map(|(triangle, indices)| {
+            let corners = indices.map(|i| Vec3A::from(mesh.positions[i as usize]));
+            (corners, TriangleRef { instance: 0, triangle: triangle as u32 })
+        })
+        .collect()
+}
+
+fn fixed_triangles(scene: &Scene, uses: &[u32]) -> Vec<([Vec3A; 3], TriangleRef)> {
+    let mut triangles = Vec::new();
+    for (number, instance) in scene.instances.iter().enumerate() {
+        if uses[instance.mesh.0 as usize] != 1 {
+            continue;
+        }
+        for (corners, reference) in own_triangles(scene, instance.mesh.0 as usize) {
+            let world = corners.map(|p| instance.to_world.transform_point3a(p));
+            triangles.push((world, TriangleRef { instance: number as u32, ..reference }));
+        }
+    }
+    triangles
+}
+
+fn placed_bounds(scene: &Scene, instance: &Instance) -> Bounds {
+    let mesh = &scene.meshes[instance.mesh.0 as usize];
+    Bounds::of_points(mesh.positions.iter().map(|&p| instance.to_world.transform_point3a(p.into())))
+}
+
+fn interpolate_uv(mesh: &crate::scene::Mesh, triangle: u32, b1: f32, b2: f32) -> Vec2 {
+    if mesh.uvs.is_empty() {
+        return Vec2::ZERO;
+    }
+    let [i, j, k] = mesh.triangles[triangle as usize].map(|i| mesh.uvs[i as usize]);
+    i * (1.0 - b1 - b2) + j * b1 + k * b2
+}
+
+/// Direction of growing u on a triangle and the handedness of (u, v), from its texture coordinates.
+fn tangent_from_uv(mesh: &crate::scene::Mesh, triangle: u32, corners: &[Vec3; 3]) -> (Vec3, f32) {
+    let along_edge = (corners[1] - corners[0]).normalize_or(Vec3::X);
+    if mesh.uvs.is_empty() {
+        return (along_edge, 1.0);
+    }
+    let [a, b, c] = mesh.triangles[triangle as usize].map(|i| mesh.uvs[i as usize]);
+    let (d1, d2) = (b - a, c - a);
+    let area = d1.perp_dot(d2);
+    let tangent = ((corners[1] - corners[0]) * d2.y - (corners[2] - corners[0]) * d1.y) * area.signum();
+    // v runs down the picture, so a texture that is not mirrored has a negative uv area.
+    (tangent.try_normalize().unwrap_or(along_edge), if area > 0.0 { -1.0 } else { 1.0 })
+}
+
+fn ray_hash(ray: &Ray, triangle: u32) -> f32 {
+    let mut h = u64::from(triangle);
+    for value in ray.origin.to_array().into_iter().chain(ray.direction.to_array()) {
+        h = crate::sampler::hash_words(h, u64::from(value.to_bits()));
+    }
+    (h >> 40) as f32 * (1.0 / 16_777_216.0)
+}

@@ -1,0 +1,200 @@
+//! The life of one sample: from the lens to the end of its path.
+//!
+//! Unbiased path tracing with next-event estimation, multiple importance sampling by the power heuristic (Veach 1997)
+//! and Russian roulette.
+
+use super::PathTracer;
+use super::shading::Shading;
+use crate::geometry::{Hit, Ray, SurfacePoint};
+use crate::light::LightSample;
+use crate::sampler::{Purpose, Sample};
+use glam::{Vec3, Vec3A};
+
+/// What the first surface looks like: guides for the perception model and for denoisers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FirstHit {
+    /// Directional albedo in [0, 1]; 1 where the surface emits.
+    pub albedo: Vec3,
+    /// Shading normal in world space; zero where nothing is hit.
+    pub normal: Vec3,
+    /// Distance from the camera in scene units; 0 where nothing is hit.
+    pub depth: f32,
+    /// Object number + 1; 0 where nothing is hit.
+    pub object_id: u32,
+}
+
+impl FirstHit {
+    const NOTHING: Self = Self { albedo: Vec3::ONE, normal: Vec3::ZERO, depth: 0.0, object_id: 0 };
+}
+
+/// What a sample found.
+#[derive(Clone, Copy, Debug)]
+pub struct PathSample {
+    /// Radiance in scene units.
+    pub radiance: Vec3,
+    /// The first surface.
+    pub first_hit: FirstHit,
+    /// Rays traced: camera, bounce and shadow.
+    pub rays: u32,
+}
+
+/// Where a path is.
+struct PathState {
+    ray: Ray,
+    /// Where the ray left a surface.
+    from: Vec3,
+    throughput: Vec3,
+    radiance: Vec3,
+    /// Solid-angle density with which the ray's direction was scattered; `None` if light sampling could not have found
+    /// the same direction (camera rays and delta lobes).
+    scatter_pdf: Option<f32>,
+    rays: u32,
+}
+
+impl PathTracer {
+    /// Follows one path.
+    pub fn trace_path(&self, camera_ray: Ray, sample: Sample) -> PathSample {
+        let mut first_hit = FirstHit::NOTHING;
+        let mut path = PathState {
+            ray: camera_ray,
+            from: camera_ray.origin.into(),
+            throughput: Vec3::ONE,
+            radiance: Vec3::ZERO,
+            scatter_pdf: None,
+            rays: 0,
+        };
+        for bounce in 0.. {
+            path.rays += 1;
+            let Some(hit) = self.world.closest(&path.ray) else {
+                self.add_environment(&mut path);
+                break;
+            };
+            let point = self.world.surface(&path.ray, &hit);
+            let wo = -Vec3::from(path.ray.direction);
+            let emitted = self.add_emission(&mut path, &hit, &point);
+            let shading = self.shading(&point, wo);
+            if bounce == 0 {
+                let albedo = shading.bsdf.albedo(shading.frame.to_local(wo)).clamp(Vec3::ZERO, Vec3::ONE);
+                first_hit = FirstHit {
+                    albedo: if emitted { Vec3::ONE } else { albedo },
+                    normal: shading.frame.normal(),
+                    depth: hit.distance,
+                    object_id: hit.object + 1,
+                };
+            }
+            if bounce >= self.settings.max_depth {
+                break;
+            }
+            if shading.bsdf.has_smooth_lobe() {
+                self.add_direct_light(&mut path, &point, &shading, wo, sample.draw(Purpose::Light { bounce }));
+            }
+            let [u, v, lobe, survival] = sample.draw(Purpose::Scatter { bounce });
+            if !scatter(&mut path, &point, &shading, wo, [u, v, lobe]) || !survives(&mut path, bounce, survival) {
+                break;
+            }
+        }
+        PathSample { radiance: path.radiance, first_hit, rays: path.rays }
+    }
+
+    /// Radiance of the environment along a ray that hit nothing.
+    fn add_environment(&self, path: &mut PathState) {
+        let direction = path.ray.direction.into();
+        let radiance = self.lights.environment_radiance(direction);
+        if radiance == Vec3::ZERO {
+            return;
+        }
+        let weight = path.scatter_pdf.map_or(1.0, |pdf| power_heuristic(pdf, self.lights.pdf_of_environment(direction)));
+        path.radiance += path.throughput * radiance * weight;
+    }
+
+    /// Radiance emitted by the surface that was hit; whether there was any.
+    fn add_emission(&self, path: &mut PathState, hit: &Hit, point: &SurfacePoint) -> bool {
+        let scene = self.world.scene();
+        let material = &scene.materials[self.world.material_of(hit.object).0 as usize];
+        let from_front = Vec3::from(path.ray.direction).dot(point.geometric_normal) < 0.0;
+        if material.emission.factor == Vec3::ZERO || !(from_front || material.emits_both_sides) {
+            return false;
+        }
+        let radiance = material.emission.evaluate(&scene.textures, point.uv);
+        let weight = path.scatter_pdf.map_or(1.0, |pdf| {
+            power_heuristic(pdf, self.lights.pdf_of_hit(path.from, &path.ray, hit, point))
+        });
+        path.radiance += path.throughput * radiance * weight;
+        radiance != Vec3::ZERO
+    }
+
+    /// Next-event estimation: light that arrives straight from a sampled light.
+    fn add_direct_light(&self, path: &mut PathState, point: &SurfacePoint, shading: &Shading, wo: Vec3, u: [f32; 4]) {
+        let Some(light) = self.lights.sample(self.world.scene(), point, [u[0], u[1], u[2]]) else {
+            return;
+        };
+        let wi = light.direction;
+        if !shading.sides_agree(wo, wi) {
+            return;
+        }
+        let scattered = shading.bsdf.evaluate(shading.frame.to_local(wo), shading.frame.to_local(wi));
+        if scattered.value == Vec3::ZERO {
+            return;
+        }
+        let weight = if light.is_delta { 1.0 } else { power_heuristic(light.pdf, scattered.pdf) };
+        path.rays += 1;
+        if !self.is_hidden(point, &light) {
+            path.radiance += path.throughput * scattered.value * light.radiance * (weight / light.pdf);
+        }
+    }
+}
+
+impl PathTracer {
+    /// Whether something stands between a point and a light. Both ends are lifted off their surfaces.
+    fn is_hidden(&self, point: &SurfacePoint, light: &LightSample) -> bool {
+        let origin = point.spawn(light.direction);
+        let Some(place) = light.place else {
+            return self.world.occluded(&Ray { origin, direction: light.direction.into() }, f32::INFINITY);
+        };
+        let end = place.position + place.normal * self.world.offset_at(place.position);
+        let way = Vec3A::from(end) - origin;
+        let distance = way.length();
+        distance > 0.0 && self.world.occluded(&Ray { origin, direction: way / distance }, distance)
+    }
+}
+
+/// Chooses the next direction; false where the path ends.
+fn scatter(path: &mut PathState, point: &SurfacePoint, shading: &Shading, wo: Vec3, u: [f32; 3]) -> bool {
+    let Some(scattered) = shading.bsdf.sample(shading.frame.to_local(wo), u) else {
+        return false;
+    };
+    let wi = shading.frame.to_world(scattered.wi).normalize();
+    if !shading.sides_agree(wo, wi) {
+        return false;
+    }
+    path.throughput *= scattered.weight;
+    path.scatter_pdf = (!scattered.lobe.is_delta()).then_some(scattered.pdf);
+    path.from = point.position;
+    path.ray = Ray { origin: point.spawn(wi), direction: wi.into() };
+    path.throughput.max_element() > 0.0 && path.throughput.is_finite()
+}
+
+/// Russian roulette by throughput from the fourth bounce on.
+fn survives(path: &mut PathState, bounce: u32, u: f32) -> bool {
+    const FIRST_BOUNCE: u32 = 3;
+    const ALWAYS_MORTAL_FROM: u32 = 8;
+    if bounce < FIRST_BOUNCE {
+        return true;
+    }
+    let most = if bounce < ALWAYS_MORTAL_FROM { 1.0 } else { 0.98 };
+    let survival = path.throughput.max_element().min(most);
+    if u >= survival {
+        return false;
+    }
+    path.throughput /= survival;
+    true
+}
+
+/// Weight of a technique with density `own` against one with density `other` (Veach 1997, β = 2).
+fn power_heuristic(own: f32, other: f32) -> f32 {
+    if own.is_infinite() {
+        return 1.0;
+    }
+    let ratio = other / own;
+    if ratio.is_nan() { 0.0 } else { 1.0 / (1.0 + ratio * ratio) }
+}

@@ -1,0 +1,56 @@
+//! The files a render leaves: what the display shows, or every layer of it.
+
+use super::{Attribute, NITS_PER_UNIT, OutputError, Picture, write_exr, write_png};
+use crate::adaptive::Rendered;
+use crate::film::{Film, PixelGuide};
+use crate::sampler::Half;
+use std::path::Path;
+
+/// Writes the picture through its tone operator as sRGB.
+pub fn write_display_png(path: &Path, rendered: &Rendered) -> Result<(), OutputError> {
+    let judgement = &rendered.judgement;
+    let shown: Vec<[f32; 3]> =
+        judgement.estimate.rgb_cd_m2.iter().map(|&rgb| judgement.tone.map_rgb(rgb)).collect();
+    write_png(path, rendered.film.width(), rendered.film.height(), &shown)
+}
+
+/// Writes the picture in scene units with its layers: albedo, normal, depth, object id, sample count, variance of the
+/// picture's luminance (scene cd/m², squared), threshold (standard error in display cd/m² that is at visibility 1) and
+/// predicted visibility.
+pub fn write_layers_exr(
+    path: &Path,
+    rendered: &Rendered,
+    nits_per_unit: f64,
+    attributes: &[(String, Attribute)],
+) -> Result<(), OutputError> {
+    let (film, judgement) = (&rendered.film, &rendered.judgement);
+    let mut picture = Picture::new(film.width(), film.height());
+    let to_units = (1.0 / nits_per_unit) as f32;
+    for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
+        let values: Vec<f32> = judgement.estimate.rgb_cd_m2.iter().map(|rgb| rgb[c] * to_units).collect();
+        picture.push_f32(name, values);
+    }
+    let guide = |value: &dyn Fn(&PixelGuide) -> f32| film.guides().iter().map(value).collect::<Vec<f32>>();
+    for (c, name) in ["albedo.R", "albedo.G", "albedo.B"].into_iter().enumerate() {
+        picture.push_f16(name, guide(&|g| g.albedo[c]));
+    }
+    for (c, name) in ["normal.X", "normal.Y", "normal.Z"].into_iter().enumerate() {
+        picture.push_f16(name, guide(&|g| g.normal[c]));
+    }
+    picture.push_f32("depth.Z", guide(&|g| g.depth));
+    picture.push_u32("id.Y", film.guides().iter().map(|g| g.object_id).collect::<Vec<u32>>());
+    picture.push_u32("samples.Y", sample_counts(film));
+    picture.push_f32("variance.Y", judgement.variance_of_mean.values());
+    let threshold = judgement.thresholds.allowed_standard_error_cd_m2(1.0);
+    picture.push_f32("threshold.Y", threshold.values());
+    picture.push_f32("visibility.Y", judgement.predicted.values());
+    picture.push_attribute(NITS_PER_UNIT, Attribute::Float(nits_per_unit as f32));
+    for (name, value) in attributes {
+        picture.push_attribute(name, value.clone());
+    }
+    write_exr(path, &picture)
+}
+
+fn sample_counts(film: &Film) -> Vec<u32> {
+    film.half(Half::A).iter().zip(film.half(Half::B)).map(|(a, b)| a.samples + b.samples).collect()
+}

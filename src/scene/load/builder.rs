@@ -1,0 +1,216 @@
+//! The scene while it is being read: what all formats add to, and the last look that keeps their promises.
+
+use super::error::{LoadError, nearest, suggestion};
+use super::texture::Requests;
+use super::{LoadOptions, default_view, environment, validate};
+use crate::scene::{
+    Camera, Environment, FilmDefaults, Instance, Light, Material, MaterialId, Mesh, MeshId, Scene,
+    Sphere, ViewingDefaults,
+};
+use std::path::Path;
+
+/// A camera that a file holds.
+#[derive(Clone, Debug)]
+pub(super) struct NamedCamera {
+    pub(super) name: String,
+    pub(super) camera: Camera,
+}
+
+/// What to do with a scene that brings no light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum IfDark {
+    /// Our own format has lights: their absence is a slip.
+    Fail,
+    /// The format has none, or files come without: a studio sky stands in, also when the only emitters are weaker than
+    /// `WEAK_EMITTER_CD_M2`.
+    Studio,
+}
+
+/// Emitters of interchange files below this many cd/m² are decoration (an "emissive" left at 1), not the scene's light.
+const WEAK_EMITTER_CD_M2: f32 = 10.0;
+
+/// The scene while it is being read.
+#[derive(Debug)]
+pub(super) struct Builder {
+    pub(super) name: String,
+    pub(super) nits_per_unit: f64,
+    pub(super) cameras: Vec<NamedCamera>,
+    pub(super) film: FilmDefaults,
+    pub(super) viewing: ViewingDefaults,
+    pub(super) meshes: Vec<Mesh>,
+    pub(super) instances: Vec<Instance>,
+    pub(super) spheres: Vec<Sphere>,
+    pub(super) materials: Vec<Material>,
+    pub(super) textures: Requests,
+    pub(super) lights: Vec<Light>,
+    pub(super) environment: Option<Environment>,
+    pub(super) notes: Vec<String>,
+}
+
+impl Builder {
+    /// An empty scene named after its file.
+    pub(super) fn new(path: &Path) -> Self {
+        Self {
+            name: path
+                .file_stem()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned(),
+            nits_per_unit: 1.0,
+            cameras: Vec::new(),
+            film: FilmDefaults {
+                width: 512,
+                height: 512,
+            },
+            viewing: ViewingDefaults::default(),
+            meshes: Vec::new(),
+            instances: Vec::new(),
+            spheres: Vec::new(),
+            materials: Vec::new(),
+            textures: Requests::default(),
+            lights: Vec::new(),
+            environment: None,
+            notes: Vec::new(),
+        }
+    }
+
+    pub(super) fn add_mesh(&mut self, mesh: Mesh) -> MeshId {
+        self.meshes.push(mesh);
+        MeshId(self.meshes.len() as u32 - 1)
+    }
+
+    pub(super) fn add_material(&mut self, material: Material) -> MaterialId {
+        self.materials.push(material);
+        MaterialId(self.materials.len() as u32 - 1)
+    }
+
+    /// Adds a sentence, once.
+    pub(super) fn note(&mut self, note: impl Into<String>) {
+        let note = note.into();
+        if !self.notes.contains(&note) {
+            self.notes.push(note);
+        }
+    }
+
+    /// Chooses the camera, decodes the textures, checks everything, and adds what is missing.
+    pub(super) fn finish(
+        mut self,
+        path: &Path,
+        if_dark: IfDark,
+        options: &LoadOptions,
+    ) -> Result<Scene, LoadError> {
+        validate::repair(&mut self, path)?;
+        let camera = self.choose_camera(options)?;
+        let textures = std::mem::take(&mut self.textures).decode(&mut self.notes)?;
+        let mut scene = Scene {
+            name: self.name,
+            nits_per_unit: self.nits_per_unit,
+            camera,
+            film: self.film,
+            viewing: self.viewing,
+            meshes: self.meshes,
+            instances: self.instances,
+            spheres: self.spheres,
+            materials: self.materials,
+            textures,
+            lights: self.lights,
+            environment: self.environment,
+            notes: self.notes,
+        };
+        validate::check(&scene, path)?;
+        let weakest = match if_dark {
+            IfDark::Fail => 0.0,
+            IfDark::Studio => WEAK_EMITTER_CD_M2 / scene.nits_per_unit as f32,
+        };
+        if !options.environment_follows && !is_lit(&scene, weakest) {
+            match if_dark {
+                IfDark::Fail => {
+                    return Err(LoadError::invalid(
+                        path,
+                        "scene has no light: add an [environment], [[lights]] or an object whose material has an emission",
+                    ));
+                }
+                IfDark::Studio => {
+                    scene.environment = Some(environment::studio(
+                        scene.nits_per_unit,
+                        scene.camera.forward,
+                    ));
+                    scene.notes.push("No light in the file: a soft studio of about 1000 cd/m² surrounds the scene.".to_owned());
+                }
+            }
+        }
+        Ok(scene)
+    }
+
+    fn choose_camera(&mut self, options: &LoadOptions) -> Result<Camera, LoadError> {
+        let names = || self.cameras.iter().map(|camera| camera.name.as_str());
+        let Some(wanted) = &options.camera else {
+            if let Some(first) = self.cameras.first() {
+                let camera = first.camera.clone();
+                if self.cameras.len() > 1 {
+                    let note = format!(
+                        "{} cameras; the first one, \"{}\", is used.",
+                        self.cameras.len(),
+                        first.name
+                    );
+                    self.notes.push(note);
+                }
+                return Ok(camera);
+            }
+            self.notes.push(
+                "No camera in the file: a three-quarter view of the whole scene is used."
+                    .to_owned(),
+            );
+            let aspect = self.film.width as f32 / self.film.height as f32;
+            return Ok(default_view::framed(
+                default_view::bounds(&self.meshes, &self.instances, &self.spheres),
+                aspect,
+            ));
+        };
+        if let Some(camera) = self.cameras.iter().find(|camera| camera.name == *wanted) {
+            return Ok(camera.camera.clone());
+        }
+        let problem = match names().count() {
+            0 => format!("no camera \"{wanted}\": the scene has no named camera"),
+            _ => format!("no camera \"{wanted}\"{}", {
+                // A slip gets its correction, anything else the list.
+                match nearest(wanted, names()) {
+                    Some(_) => suggestion(wanted, names()),
+                    None => format!("; the scene has {}", names().collect::<Vec<_>>().join(", ")),
+                }
+            }),
+        };
+        Err(LoadError::Option { problem })
+    }
+}
+
+/// Whether anything gives light: more radiance than `weakest` for surfaces.
+fn is_lit(scene: &Scene, weakest: f32) -> bool {
+    let emits = |id: MaterialId| {
+        let emission = scene.materials[id.0 as usize].emission;
+        let brightest = emission.texture.map_or(1.0, |lookup| {
+            scene.textures[lookup.texture.0 as usize].brightest()
+        });
+        emission.factor.max_element() * brightest > weakest
+    };
+    let shines = |light: &Light| match light {
+        Light::Point { intensity, .. } | Light::Spot { intensity, .. } => {
+            intensity.max_element() > 0.0
+        }
+        Light::Directional { irradiance, .. } => irradiance.max_element() > 0.0,
+    };
+    let surrounded = scene.environment.as_ref().is_some_and(|environment| {
+        environment.scale > 0.0
+            && environment
+                .texels
+                .iter()
+                .any(|texel| texel.max_element() > 0.0)
+    });
+    surrounded
+        || scene.lights.iter().any(shines)
+        || scene
+            .instances
+            .iter()
+            .any(|instance| emits(instance.material))
+        || scene.spheres.iter().any(|sphere| emits(sphere.material))
+}

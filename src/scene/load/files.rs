@@ -1,0 +1,91 @@
+//! Reading whole files, with a limit and with errors that say what the path is when it is no file.
+
+use super::error::LoadError;
+use std::io::Read;
+use std::path::Path;
+
+/// No file larger than this is read: a picture, mesh or buffer above it is more likely a slip than a scene.
+const LARGEST_FILE_BYTES: u64 = 4 << 30;
+
+/// The whole file.
+pub(crate) fn read(path: &Path) -> Result<Vec<u8>, LoadError> {
+    // Opened only after the look at its kind: opening a pipe would wait for a writer for ever.
+    let metadata = std::fs::metadata(path).map_err(|error| LoadError::unreadable(path, &error))?;
+    if metadata.is_dir() {
+        return Err(LoadError::Unreadable {
+            file: path.to_owned(),
+            problem: "is a directory, not a file".to_owned(),
+        });
+    }
+    if !metadata.is_file() {
+        return Err(LoadError::Unreadable {
+            file: path.to_owned(),
+            problem: "is not a regular file".to_owned(),
+        });
+    }
+    if metadata.len() > LARGEST_FILE_BYTES {
+        let problem = format!(
+            "{} MiB, at most {} MiB are read",
+            metadata.len() >> 20,
+            LARGEST_FILE_BYTES >> 20
+        );
+        return Err(LoadError::too_large(path, problem));
+    }
+    let file = std::fs::File::open(path).map_err(|error| LoadError::unreadable(path, &error))?;
+    let mut bytes = Vec::with_capacity(metadata.len() as usize);
+    // The limit holds again here, for files that grow while they are read.
+    file.take(LARGEST_FILE_BYTES)
+        .read_to_end(&mut bytes)
+        .map_err(|error| LoadError::unreadable(path, &error))?;
+    if bytes.is_empty() {
+        return Err(LoadError::invalid(path, "the file is empty"));
+    }
+    Ok(bytes)
+}
+
+/// The whole file as text: UTF-8, or UTF-16 with a byte order mark (some Windows exporters write it).
+pub(crate) fn read_text(path: &Path) -> Result<String, LoadError> {
+    decode_text(path, read(path)?)
+}
+
+/// Text from bytes, with a placeholder for each byte that is not UTF-8: old exporters write names and comments in other
+/// encodings, and only those are lost.
+pub(crate) fn decode_loosely(path: &Path, bytes: Vec<u8>) -> Result<String, LoadError> {
+    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+        return decode_text(path, bytes);
+    }
+    let text = bytes.strip_prefix(&[0xef, 0xbb, 0xbf]).unwrap_or(&bytes);
+    Ok(String::from_utf8_lossy(text).into_owned())
+}
+
+/// Text from bytes.
+pub(crate) fn decode_text(path: &Path, bytes: Vec<u8>) -> Result<String, LoadError> {
+    let utf16 = |unit: fn([u8; 2]) -> u16| {
+        if !bytes.len().is_multiple_of(2) {
+            return Err(LoadError::invalid(
+                path,
+                "UTF-16 text with half a character at its end",
+            ));
+        }
+        let units = bytes[2..]
+            .chunks_exact(2)
+            .map(|pair| unit([pair[0], pair[1]]));
+        char::decode_utf16(units)
+            .collect::<Result<String, _>>()
+            .map_err(|_| LoadError::invalid(path, "not valid UTF-16 text"))
+    };
+    match bytes.get(..3) {
+        Some([0xff, 0xfe, _]) => utf16(u16::from_le_bytes),
+        Some([0xfe, 0xff, _]) => utf16(u16::from_be_bytes),
+        Some([0xef, 0xbb, 0xbf]) => utf8(path, bytes[3..].to_vec()),
+        _ => utf8(path, bytes),
+    }
+}
+
+fn utf8(path: &Path, bytes: Vec<u8>) -> Result<String, LoadError> {
+    String::from_utf8(bytes).map_err(|error| {
+        let valid = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = valid.iter().filter(|&&byte| byte == b'\n').count() + 1;
+        LoadError::invalid_at(super::Place::line(path, line), "not UTF-8 text")
+    })
+}

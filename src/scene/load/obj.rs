@@ -1,0 +1,452 @@
+//! Wavefront OBJ through `tobj`, which is strict about indices and loose about the rest: we clean the text before it and
+//! check what comes out of it.
+//!
+//! OBJ has neither camera nor lights nor units: see the table in [`super`]. Smoothing groups and vertex colours are not
+//! used; faces without normals are flat.
+
+use super::builder::{Builder, IfDark};
+use super::error::{LoadError, Place, nearest};
+use super::{LoadOptions, files, mtl, polygon};
+use crate::scene::{Instance, MaterialId, Mesh, MeshId, Scene};
+use glam::{Affine3A, Vec2, Vec3};
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::io::{BufRead, Read};
+use std::path::Path;
+
+/// Reads an OBJ file as a whole scene.
+pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
+    let mut builder = Builder::new(path);
+    for (mesh, material) in read_into(&mut builder, path, true)? {
+        let name = builder.meshes[mesh.0 as usize].name.clone();
+        builder.instances.push(Instance {
+            name,
+            mesh,
+            material,
+            to_world: Affine3A::IDENTITY,
+        });
+    }
+    builder.finish(path, IfDark::Studio, options)
+}
+
+/// Adds a file's meshes, each with its material. Without `with_materials` its MTL files are not opened.
+pub(super) fn read_into(
+    builder: &mut Builder,
+    path: &Path,
+    with_materials: bool,
+) -> Result<Vec<(MeshId, MaterialId)>, LoadError> {
+    let text = clean(&files::decode_loosely(path, files::read(path)?)?);
+    let libraries = RefCell::new(Libraries::default());
+    let mut reader = CountingReader {
+        rest: text.as_bytes(),
+        lines: 0,
+    };
+    let options = tobj::LoadOptions {
+        single_index: true,
+        triangulate: false,
+        ..tobj::LoadOptions::default()
+    };
+    let parsed = tobj::load_obj_buf(&mut reader, &options, |named| {
+        let mut libraries = libraries.borrow_mut();
+        let first = libraries.materials.len();
+        if with_materials {
+            libraries.open(path, &named.to_string_lossy());
+        }
+        libraries.index(first)
+    });
+    let line = reader.lines;
+    let (models, _) = parsed.map_err(|error| explain(error, &text, path, line))?;
+    let libraries = libraries.into_inner();
+    if let Some(error) = libraries.error {
+        return Err(error);
+    }
+    for note in libraries.notes {
+        builder.note(note);
+    }
+    if with_materials {
+        report_unknown_materials(builder, path, &text, &libraries.materials);
+    }
+
+    // Materials are converted when a face uses them: libraries are often shared by many files.
+    let mut converted: HashMap<Option<usize>, MaterialId> = HashMap::new();
+    let mut placed = Vec::new();
+    let mut sparse_faces = 0;
+    for model in &models {
+        let (mesh, skipped) = convert_mesh(model, path)?;
+        sparse_faces += skipped;
+        if mesh.triangles.is_empty() {
+            continue;
+        }
+        let wanted = model
+            .mesh
+            .material_id
+            .filter(|&id| id < libraries.materials.len());
+        let material = match converted.get(&wanted) {
+            Some(id) => *id,
+            None => {
+                let id = match wanted {
+                    Some(index) => {
+                        let material = libraries.materials[index].convert(builder);
+                        builder.add_material(material)
+                    }
+                    None => mtl::default_material(builder),
+                };
+                converted.insert(wanted, id);
+                id
+            }
+        };
+        placed.push((builder.add_mesh(mesh), material));
+    }
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    if sparse_faces > 0 {
+        builder.note(format!(
+            "{name}: {sparse_faces} points and lines are not rendered."
+        ));
+    }
+    if models
+        .iter()
+        .any(|model| !model.mesh.vertex_color.is_empty())
+    {
+        builder.note(format!("{name}: vertex colours are not used."));
+    }
+    if placed.is_empty() {
+        return Err(LoadError::invalid(
+            path,
+            "nothing to render: no face with three corners",
+        ));
+    }
+    Ok(placed)
+}
+
+/// The MTL files that an OBJ file names.
+#[derive(Default)]
+struct Libraries {
+    materials: Vec<mtl::Written>,
+    notes: Vec<String>,
+    error: Option<LoadError>,
+}
+
+impl Libraries {
+    /// `mtllib` names one file that may hold spaces, or several files apart by spaces.
+    fn open(&mut self, obj: &Path, named: &str) {
+        let folder = obj.parent().unwrap_or(Path::new(""));
+        let whole = named
+            .trim()
+            .trim_matches('"')
+            .replace("\\ ", " ")
+            .replace('\\', "/");
+        let single = mtl::find_file(folder, &whole);
+        let found: Vec<_> = if single.is_file() {
+            vec![single]
+        } else {
+            whole
+                .split_whitespace()
+                .map(|word| mtl::find_file(folder, word))
+                .filter(|file| file.is_file())
+                .collect()
+        };
+        if found.is_empty() {
+            self.notes.push(format!(
+                "Material file \"{whole}\" not found: a plain grey stands in."
+            ));
+        }
+        for file in found {
+            match mtl::read(&file, &mut self.notes) {
+                Ok(materials) => self.materials.extend(materials),
+                Err(error) => self.error = Some(error),
+            }
+        }
+    }
+
+    /// What `tobj` wants to know of the materials from number `first` on: their names. It counts on from what it has.
+    fn index(&self, first: usize) -> tobj::MTLLoadResult {
+        let new = &self.materials[first..];
+        let places = new
+            .iter()
+            .enumerate()
+            .map(|(place, material)| (material.name.clone(), place))
+            .collect();
+        Ok((vec![tobj::Material::default(); new.len()], places))
+    }
+}
+
+/// The text with continued lines joined (blank lines keep the count), comments behind numbers cut off, and empty
+/// `usemtl` statements left out: all three stop `tobj`.
+fn clean(text: &str) -> String {
+    let mut cleaned = String::with_capacity(text.len() + 1);
+    let mut joined = 0;
+    for line in text.lines() {
+        let continued = line.trim_end().strip_suffix('\\');
+        let part = continued.unwrap_or(line);
+        let is_start = joined == 0;
+        let part = if is_start { part.trim_start() } else { part };
+        // A name may hold '#', numbers may not.
+        let part = if part.starts_with(['v', 'f']) {
+            part.split('#').next().unwrap_or(part)
+        } else {
+            part
+        };
+        match part.split_once('\t') {
+            Some(_) => cleaned.extend(part.chars().map(|c| if c == '\t' { ' ' } else { c })),
+            None => cleaned.push_str(if is_start && part.trim() == "usemtl" {
+                ""
+            } else {
+                part
+            }),
+        }
+        if continued.is_some() {
+            cleaned.push(' ');
+            joined += 1;
+        } else {
+            cleaned.extend(std::iter::repeat_n('\n', joined + 1));
+            joined = 0;
+        }
+    }
+    cleaned
+}
+
+/// Hands out text and counts the lines, because `tobj`'s errors have none.
+struct CountingReader<'a> {
+    rest: &'a [u8],
+    lines: usize,
+}
+
+impl Read for CountingReader<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        let count = self.rest.len().min(buffer.len());
+        buffer[..count].copy_from_slice(&self.rest[..count]);
+        self.consume(count);
+        Ok(count)
+    }
+}
+
+impl BufRead for CountingReader<'_> {
+    fn fill_buf(&mut self) -> std::io::Result<&[u8]> {
+        Ok(self.rest)
+    }
+
+    fn consume(&mut self, count: usize) {
+        self.lines += self.rest[..count]
+            .iter()
+            .filter(|&&byte| byte == b'\n')
+            .count();
+        self.rest = &self.rest[count..];
+    }
+}
+
+/// Our error for one of `tobj`'s; `line` is the last line that it has read.
+fn explain(error: tobj::LoadError, text: &str, path: &Path, line: usize) -> LoadError {
+    use tobj::LoadError as Cause;
+    let (line, problem) = match error {
+        Cause::FaceVertexOutOfBounds
+        | Cause::FaceTexCoordOutOfBounds
+        | Cause::FaceNormalOutOfBounds => {
+            // These are only noticed when the object ends: find the face.
+            match find_bad_index(text) {
+                Some((line, problem)) => (line, problem),
+                None => (line, error.to_string()),
+            }
+        }
+        Cause::PositionParseError => (line, "expected \"v x y z\" with three numbers".to_owned()),
+        Cause::NormalParseError => (line, "expected \"vn x y z\" with three numbers".to_owned()),
+        Cause::TexcoordParseError => (line, "expected \"vt u v\" with two numbers".to_owned()),
+        Cause::FaceParseError => match find_bad_index(text) {
+            Some((line, problem)) => (line, problem),
+            None => (
+                line,
+                "expected a face as \"f v/vt/vn ...\", indices counted from 1".to_owned(),
+            ),
+        },
+        Cause::InvalidPolygon => (
+            line,
+            "expected a face with at least three corners".to_owned(),
+        ),
+        other => (line, other.to_string()),
+    };
+    LoadError::invalid_at(Place::line(path, line.max(1)), problem)
+}
+
+/// The first face whose index names nothing, and how.
+fn find_bad_index(text: &str) -> Option<(usize, String)> {
+    let kind_of = |line: &str| match line.split_whitespace().next() {
+        Some("v") => Some(0),
+        Some("vt") => Some(1),
+        Some("vn") => Some(2),
+        _ => None,
+    };
+    let mut totals = [0_i64; 3];
+    text.lines()
+        .filter_map(kind_of)
+        .for_each(|kind| totals[kind] += 1);
+    let mut so_far = [0_i64; 3];
+    for (number, line) in text.lines().enumerate() {
+        if let Some(kind) = kind_of(line) {
+            so_far[kind] += 1;
+        }
+        let Some(corners) = line.strip_prefix("f ") else {
+            continue;
+        };
+        for corner in corners.split_whitespace() {
+            for (kind, index) in corner
+                .split('/')
+                .enumerate()
+                .take(3)
+                .filter(|(_, index)| !index.is_empty())
+            {
+                let what = ["vertices", "texture coordinates", "normals"][kind];
+                let Ok(value) = index.parse::<i64>() else {
+                    return Some((
+                        number + 1,
+                        format!("\"{corner}\" is not a corner like v/vt/vn"),
+                    ));
+                };
+                if value == 0 || value > totals[kind] || value < -so_far[kind] {
+                    return Some((
+                        number + 1,
+                        format!(
+                            "face index {value}, but the file has {} {what}",
+                            totals[kind]
+                        ),
+                    ));
+                }
+            }
+        }
+    }
+    None
+}
+
+/// Notes `usemtl` names that no library has, with the nearest that one has.
+fn report_unknown_materials(
+    builder: &mut Builder,
+    path: &Path,
+    text: &str,
+    known: &[mtl::Written],
+) {
+    if known.is_empty() {
+        return;
+    }
+    let names = || known.iter().map(|material| material.name.as_str());
+    for (number, line) in text.lines().enumerate() {
+        let Some(name) = line.strip_prefix("usemtl ").map(str::trim) else {
+            continue;
+        };
+        if !names().any(|known| known == name) {
+            let place = Place::line(path, number + 1);
+            let guess = nearest(name, names())
+                .map(|guess| format!(" (nearest: \"{guess}\")"))
+                .unwrap_or_default();
+            builder.note(format!(
+                "{place}: unknown material \"{name}\"{guess}: a plain grey stands in."
+            ));
+        }
+    }
+}
+
+/// Our mesh, and how many points and lines were skipped.
+fn convert_mesh(model: &tobj::Model, path: &Path) -> Result<(Mesh, usize), LoadError> {
+    let from = &model.mesh;
+    let positions: Vec<Vec3> = from
+        .positions
+        .as_chunks::<3>()
+        .0
+        .iter()
+        .copied()
+        .map(Vec3::from_array)
+        .collect();
+    if let Some(bad) = positions.iter().find(|position| !position.is_finite()) {
+        return Err(LoadError::invalid(
+            path,
+            format_args!("a vertex of \"{}\" is not finite: {bad}", model.name),
+        ));
+    }
+    // Where only some faces have normals or coordinates, tobj's arrays are too short to belong to the positions.
+    let of_all = |values: &[f32], width: usize| values.len() == positions.len() * width;
+    let normals = if of_all(&from.normals, 3) {
+        from.normals
+            .as_chunks::<3>()
+            .0
+            .iter()
+            .copied()
+            .map(Vec3::from_array)
+            .collect()
+    } else {
+        Vec::new()
+    };
+    let uvs = if of_all(&from.texcoords, 2) {
+        from.texcoords
+            .as_chunks::<2>()
+            .0
+            .iter()
+            .map(|&[u, v]| Vec2::new(u, 1.0 - v))
+            .collect()
+    } else {
+        Vec::new()
+    };
+    let mut triangles = Vec::new();
+    let mut skipped = 0;
+    if from.face_arities.is_empty() {
+        triangles.extend_from_slice(from.indices.as_chunks::<3>().0);
+    } else {
+        let mut rest = from.indices.as_slice();
+        for &arity in &from.face_arities {
+            let Some((face, behind)) = rest.split_at_checked(arity as usize) else {
+                break;
+            };
+            rest = behind;
+            if face.len() < 3 {
+                skipped += 1;
+            } else if face.iter().all(|&index| (index as usize) < positions.len()) {
+                polygon::triangulate(&positions, face, &mut triangles);
+            }
+        }
+    }
+    triangles.retain(|triangle| {
+        triangle
+            .iter()
+            .all(|&index| (index as usize) < positions.len())
+    });
+    let name = if model.name.is_empty() || model.name == "unnamed_object" {
+        path.file_stem()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned()
+    } else {
+        model.name.clone()
+    };
+    Ok((
+        Mesh {
+            name,
+            positions,
+            normals,
+            uvs,
+            tangents: Vec::new(),
+            triangles,
+        },
+        skipped,
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cleaning_keeps_line_numbers() {
+        let text = clean("v 1 2 \\\n 3 # here\nusemtl \n\tf 1\t2 3\ng a#b\n");
+        assert_eq!(
+            text.lines().collect::<Vec<_>>(),
+            ["v 1 2   3 ", "", "", "f 1 2 3", "g a#b"]
+        );
+    }
+
+    #[test]
+    fn a_bad_index_is_found_with_its_line() {
+        let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 7\n";
+        assert_eq!(
+            find_bad_index(text),
+            Some((5, "face index 7, but the file has 3 vertices".to_owned()))
+        );
+        assert_eq!(find_bad_index("v 0 0 0\nf -1 -1 -2\n").unwrap().0, 2);
+        assert_eq!(find_bad_index("v 0 0 0\nf 1 1 0\n").unwrap().0, 2);
+    }
+}

@@ -1,0 +1,340 @@
+//! `[materials.*]`.
+
+use super::Context;
+use super::fields::{Fields, Value};
+use super::light::unit_luminance;
+use crate::scene::load::LoadError;
+use crate::scene::load::error::suggestion;
+use crate::scene::load::metals::METALS;
+use crate::scene::{
+    Alpha, ColorInput, Encoding, Material, MaterialId, ScalarInput, Surface, TextureLookup,
+};
+use glam::{Vec2, Vec3};
+use std::collections::HashMap;
+
+/// Keys that every material may have.
+const COMMON: [&str; 9] = [
+    "type",
+    "emission",
+    "emission_cd_m2",
+    "power_lm",
+    "emission_color",
+    "emits_both_sides",
+    "normal_map",
+    "alpha",
+    "alpha_cutoff",
+];
+
+/// The materials by name.
+#[derive(Default)]
+pub(super) struct Materials<'a> {
+    by_name: HashMap<&'a str, Entry>,
+    names: Vec<&'a str>,
+}
+
+/// A material, and the luminous power that each object of it gives, if that is how its emission was told.
+#[derive(Clone, Copy)]
+pub(super) struct Entry {
+    pub(super) id: MaterialId,
+    pub(super) power: Option<Power>,
+}
+
+/// Luminous power of a whole object; its radiance follows from the object's area.
+#[derive(Clone, Copy)]
+pub(super) struct Power {
+    pub(super) lumen: f64,
+    /// Colour of luminance 1.
+    pub(super) tint: Vec3,
+}
+
+impl<'a> Materials<'a> {
+    /// The material of this name.
+    pub(super) fn find(&self, name: &Value) -> Result<Entry, LoadError> {
+        let written = name.string()?;
+        self.by_name.get(written).copied().ok_or_else(|| {
+            name.error(format_args!(
+                "unknown material \"{written}\"{}",
+                suggestion(written, self.names.iter().copied())
+            ))
+        })
+    }
+
+    /// Reads one material.
+    pub(super) fn read(
+        &mut self,
+        context: &mut Context<'a>,
+        name: &'a str,
+        value: &Value<'a>,
+    ) -> Result<(), LoadError> {
+        let kinds: [(&'static str, Reader<'a>, &[&str]); 6] = [
+            ("diffuse", diffuse, &["reflectance"]),
+            ("mirror", mirror, &["reflectance"]),
+            ("conductor", conductor, &["metal", "eta", "k", "roughness"]),
+            (
+                "dielectric",
+                dielectric,
+                &["ior", "roughness", "transmittance"],
+            ),
+            (
+                "thin-dielectric",
+                thin_dielectric,
+                &["ior", "transmittance"],
+            ),
+            (
+                "metal-roughness",
+                metal_roughness,
+                &["base_color", "metallic", "roughness", "ior", "transmission"],
+            ),
+        ];
+        let kind = value.entries()?.require("type")?;
+        let choices: Vec<(&'static str, usize)> = kinds
+            .iter()
+            .enumerate()
+            .map(|(place, kind)| (kind.0, place))
+            .collect();
+        let (_, read_surface, own) = kinds[kind.choice(&choices)?];
+        let known: Vec<&str> = COMMON.iter().chain(own).copied().collect();
+        let fields = value.fields(&known)?;
+
+        let surface = read_surface(context, &fields)?;
+        let (emission, power) = read_emission(context, &fields)?;
+        let material = Material {
+            name: name.to_owned(),
+            surface,
+            emission,
+            emits_both_sides: fields.get_or("emits_both_sides", false, Value::boolean)?,
+            normal_map: fields.get_some("normal_map", |value| normal_map(context, value))?,
+            alpha: alpha(context, &fields)?,
+        };
+        let id = context.builder.add_material(material);
+        self.by_name.insert(name, Entry { id, power });
+        self.names.push(name);
+        Ok(())
+    }
+}
+
+/// Reads the keys of one kind of material.
+type Reader<'a> = fn(&mut Context<'a>, &Fields<'a>) -> Result<Surface, LoadError>;
+
+fn diffuse<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
+    Ok(Surface::Diffuse {
+        reflectance: share(context, &fields.require("reflectance")?)?,
+    })
+}
+
+fn mirror<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
+    Ok(Surface::Mirror {
+        reflectance: share_or_white(context, fields, "reflectance")?,
+    })
+}
+
+fn conductor<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
+    let (eta, k) = match (fields.get("metal"), fields.get("eta"), fields.get("k")) {
+        (Some(metal), None, None) => {
+            let metal = metal.choice(METALS)?;
+            (metal.eta, metal.k)
+        }
+        (None, Some(eta), Some(k)) => {
+            let real = eta.color()?;
+            if real.min_element() <= 0.0 {
+                return Err(eta.error("the index of refraction must be above 0"));
+            }
+            (real, k.color()?)
+        }
+        _ => return Err(fields.error("needs either \"metal\", or both \"eta\" and \"k\"")),
+    };
+    Ok(Surface::Conductor {
+        eta,
+        k,
+        roughness: scalar(context, fields, "roughness", 0.0)?,
+    })
+}
+
+fn dielectric<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
+    Ok(Surface::Dielectric {
+        ior: fields.get_or("ior", 1.5, Value::positive)? as f32,
+        roughness: scalar(context, fields, "roughness", 0.0)?,
+        transmittance: share_or_white(context, fields, "transmittance")?,
+    })
+}
+
+fn thin_dielectric<'a>(
+    context: &mut Context<'a>,
+    fields: &Fields<'a>,
+) -> Result<Surface, LoadError> {
+    Ok(Surface::ThinDielectric {
+        ior: fields.get_or("ior", 1.5, Value::positive)? as f32,
+        transmittance: share_or_white(context, fields, "transmittance")?,
+    })
+}
+
+fn metal_roughness<'a>(
+    context: &mut Context<'a>,
+    fields: &Fields<'a>,
+) -> Result<Surface, LoadError> {
+    Ok(Surface::MetalRoughness {
+        base_color: share_or_white(context, fields, "base_color")?,
+        metallic: scalar(context, fields, "metallic", 0.0)?,
+        roughness: scalar(context, fields, "roughness", 0.5)?,
+        ior: fields.get_or("ior", 1.5, Value::positive)? as f32,
+        transmission: scalar(context, fields, "transmission", 0.0)?,
+    })
+}
+
+/// `emission` in scene units, or a luminance, or a luminous power of the object.
+fn read_emission<'a>(
+    context: &mut Context<'a>,
+    fields: &Fields<'a>,
+) -> Result<(ColorInput, Option<Power>), LoadError> {
+    let black = ColorInput::constant(Vec3::ZERO);
+    let kinds = ["emission", "emission_cd_m2", "power_lm"];
+    let tint = fields.get_or("emission_color", Vec3::ONE, |value| {
+        unit_luminance(value, value.color()?)
+    })?;
+    if kinds.iter().all(|kind| fields.get(kind).is_none()) {
+        return match fields.get("emission_color") {
+            Some(value) => Err(value.error("needs emission_cd_m2 or power_lm beside it")),
+            None => Ok((black, None)),
+        };
+    }
+    match fields.exactly_one(&kinds)? {
+        ("emission", value) => match fields.get("emission_color") {
+            Some(tint) => Err(tint
+                .error("belongs to emission_cd_m2 or power_lm; \"emission\" has its own colour")),
+            None => Ok((color(context, &value)?, None)),
+        },
+        ("emission_cd_m2", value) => {
+            let radiance = value.non_negative()? / context.builder.nits_per_unit;
+            Ok((ColorInput::constant(tint * radiance as f32), None))
+        }
+        (_, value) => Ok((
+            black,
+            Some(Power {
+                lumen: value.non_negative()?,
+                tint,
+            }),
+        )),
+    }
+}
+
+fn alpha<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Alpha, LoadError> {
+    let cutoff = fields.get_some("alpha_cutoff", |value| value.within(0.0, 1.0))?;
+    match (fields.get("alpha"), cutoff) {
+        (None, None) => Ok(Alpha::Opaque),
+        (None, Some(_)) => Err(fields.error("\"alpha_cutoff\" needs \"alpha\"")),
+        (Some(_), cutoff) => {
+            let value = scalar(context, fields, "alpha", 1.0)?;
+            Ok(cutoff.map_or(Alpha::Blend { value }, |cutoff| Alpha::Mask {
+                value,
+                cutoff: cutoff as f32,
+            }))
+        }
+    }
+}
+
+/// A number, a colour, or a texture table.
+fn color<'a>(context: &mut Context<'a>, value: &Value<'a>) -> Result<ColorInput, LoadError> {
+    if !value.is_table() {
+        return Ok(ColorInput::constant(value.color()?));
+    }
+    let fields = value.fields(&["texture", "factor", "scale", "offset", "rotation_deg"])?;
+    Ok(ColorInput {
+        factor: fields.get_or("factor", Vec3::ONE, Value::color)?,
+        texture: Some(lookup(context, &fields, Encoding::Srgb)?),
+    })
+}
+
+/// A colour of which no channel exceeds 1: more would reflect more light than comes in.
+fn share<'a>(context: &mut Context<'a>, value: &Value<'a>) -> Result<ColorInput, LoadError> {
+    let color = color(context, value)?;
+    if color.factor.max_element() > 1.0 {
+        return Err(value.error(format_args!(
+            "must not exceed 1 in any channel: {}",
+            color.factor
+        )));
+    }
+    Ok(color)
+}
+
+fn share_or_white<'a>(
+    context: &mut Context<'a>,
+    fields: &Fields<'a>,
+    key: &str,
+) -> Result<ColorInput, LoadError> {
+    fields.get_or(key, ColorInput::constant(Vec3::ONE), |value| {
+        share(context, value)
+    })
+}
+
+/// A number in [0, 1], or a channel of a texture.
+fn scalar<'a>(
+    context: &mut Context<'a>,
+    fields: &Fields<'a>,
+    key: &str,
+    default: f32,
+) -> Result<ScalarInput, LoadError> {
+    let Some(value) = fields.get(key) else {
+        return Ok(ScalarInput::constant(default));
+    };
+    if !value.is_table() {
+        return Ok(ScalarInput::constant(value.within(0.0, 1.0)? as f32));
+    }
+    let fields = value.fields(&[
+        "texture",
+        "channel",
+        "factor",
+        "scale",
+        "offset",
+        "rotation_deg",
+    ])?;
+    let channel = fields.get_or("channel", 0, |value| {
+        value.choice(&[("r", 0), ("g", 1), ("b", 2), ("a", 3)])
+    })?;
+    Ok(ScalarInput {
+        factor: fields.get_or("factor", 1.0, |value| value.within(0.0, 1.0))? as f32,
+        texture: Some((lookup(context, &fields, Encoding::Linear)?, channel)),
+    })
+}
+
+fn normal_map<'a>(
+    context: &mut Context<'a>,
+    value: &Value<'a>,
+) -> Result<(TextureLookup, f32), LoadError> {
+    let fields = value.fields(&["texture", "strength", "scale", "offset", "rotation_deg"])?;
+    let strength = fields.get_or("strength", 1.0, Value::number)? as f32;
+    Ok((lookup(context, &fields, Encoding::Linear)?, strength))
+}
+
+/// The texture that a table names. Its own `encoding` wins over what its use suggests.
+fn lookup<'a>(
+    context: &mut Context<'a>,
+    fields: &Fields<'a>,
+    usual: Encoding,
+) -> Result<TextureLookup, LoadError> {
+    let name = fields.require("texture")?;
+    let written = name.string()?;
+    let Some(entry) = context.textures.get(written) else {
+        let known = context.texture_names.iter().copied();
+        return Err(name.error(format_args!(
+            "unknown texture \"{written}\"{}",
+            suggestion(written, known)
+        )));
+    };
+    let mut request = entry.request.clone();
+    request.encoding = entry.encoding.unwrap_or(usual);
+    let number_or_two = |value: &Value| {
+        if value.is_array() {
+            value.vec2()
+        } else {
+            value.number().map(|number| Vec2::splat(number as f32))
+        }
+    };
+    Ok(TextureLookup {
+        texture: context.builder.textures.add(request),
+        offset: fields.get_or("offset", Vec2::ZERO, Value::vec2)?,
+        rotation: fields
+            .get_or("rotation_deg", 0.0, Value::number)?
+            .to_radians() as f32,
+        scale: fields.get_or("scale", Vec2::ONE, number_or_two)?,
+    })
+}

@@ -1,0 +1,240 @@
+//! Our own scene format; scenes/README.md describes it by an example that has everything.
+
+mod fields;
+mod light;
+mod material;
+mod motion;
+mod object;
+
+use self::fields::{Fields, Source, Value};
+use super::builder::{Builder, IfDark, NamedCamera};
+use super::error::LoadError;
+use super::texture::{IfMissing, Picture, Request};
+use super::{LoadOptions, environment, files};
+use crate::scene::{Camera, Encoding, FilmDefaults, Scene, ViewingDefaults, Wrap};
+use ::toml::de::DeTable;
+use std::collections::HashMap;
+use std::path::Path;
+
+/// Most pixels along a side of the film.
+const LONGEST_FILM_SIDE: u32 = 65_536;
+
+/// What the parts of a file share while they are read.
+struct Context<'a> {
+    /// The folder that paths are relative to.
+    folder: &'a Path,
+    /// `[textures.*]` by name.
+    textures: HashMap<&'a str, TextureEntry>,
+    /// Names of all textures, in the file's order, for suggestions.
+    texture_names: Vec<&'a str>,
+    frame_time: f64,
+    builder: Builder,
+}
+
+/// A texture of the file; whether it is decoded as colour may depend on who uses it.
+struct TextureEntry {
+    request: Request,
+    encoding: Option<Encoding>,
+}
+
+/// Reads a scene file.
+pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
+    let text = files::read_text(path)?;
+    let source = Source {
+        file: path,
+        text: &text,
+    };
+    let document = DeTable::parse(&text).map_err(|error| source.syntax_error(&error))?;
+    let root = Fields::root(
+        &source,
+        document.get_ref(),
+        &[
+            "name",
+            "nits_per_unit",
+            "film",
+            "view",
+            "camera",
+            "environment",
+            "textures",
+            "materials",
+            "objects",
+            "lights",
+        ],
+    )?;
+
+    let mut builder = Builder::new(path);
+    if let Some(name) = root.get_some("name", |value| value.string())? {
+        builder.name = name.to_owned();
+    }
+    builder.nits_per_unit = root.get_or("nits_per_unit", 1.0, Value::positive)?;
+    if let Some(film) = root.get("film") {
+        builder.film = read_film(&film)?;
+    }
+    if let Some(view) = root.get("view") {
+        builder.viewing = read_view(&view)?;
+    }
+    if let Some(camera) = root.get("camera") {
+        let camera = read_camera(&camera, options.frame_time)?;
+        builder.cameras.push(NamedCamera {
+            name: "camera".to_owned(),
+            camera,
+        });
+    }
+
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut context = Context {
+        folder,
+        textures: HashMap::new(),
+        texture_names: Vec::new(),
+        frame_time: options.frame_time,
+        builder,
+    };
+    if let Some(surroundings) = root.get("environment") {
+        context.builder.environment = Some(read_environment(&surroundings, folder)?);
+    }
+    if let Some(textures) = root.get("textures") {
+        for (name, value) in textures.entries()?.all() {
+            context.textures.insert(name, read_texture(&value, folder)?);
+            context.texture_names.push(name);
+        }
+    }
+    let mut materials = material::Materials::default();
+    if let Some(entries) = root.get("materials") {
+        for (name, value) in entries.entries()?.all() {
+            materials.read(&mut context, name, &value)?;
+        }
+    }
+    let mut objects = object::Objects::new(&materials);
+    if let Some(list) = root.get("objects") {
+        for value in list.array()? {
+            objects.read(&mut context, &value)?;
+        }
+    }
+    if let Some(list) = root.get("lights") {
+        for value in list.array()? {
+            context
+                .builder
+                .lights
+                .push(light::read(&value, context.builder.nits_per_unit)?);
+        }
+    }
+    context.builder.finish(path, IfDark::Fail, options)
+}
+
+fn read_film(value: &Value) -> Result<FilmDefaults, LoadError> {
+    let size = value.fields(&["size"])?.require("size")?;
+    match size.array()?.as_slice() {
+        [width, height] => Ok(FilmDefaults {
+            width: width.count(LONGEST_FILM_SIDE)?,
+            height: height.count(LONGEST_FILM_SIDE)?,
+        }),
+        other => Err(size.error(format_args!(
+            "expected [width, height], found {} values",
+            other.len()
+        ))),
+    }
+}
+
+fn read_view(value: &Value) -> Result<ViewingDefaults, LoadError> {
+    let fields = value.fields(&["display", "visibility", "operator", "exposure_stops"])?;
+    let text = |key| fields.get_some(key, |value| value.string().map(str::to_owned));
+    Ok(ViewingDefaults {
+        display: text("display")?,
+        visibility: fields.get_some("visibility", Value::positive)?,
+        operator: text("operator")?,
+        exposure_stops: fields.get_some("exposure_stops", Value::number)?,
+    })
+}
+
+fn read_camera(value: &Value, frame_time: f64) -> Result<Camera, LoadError> {
+    let fields = value.fields(&[
+        "position",
+        "look_at",
+        "up",
+        "vertical_fov_deg",
+        "aperture_radius",
+        "focus_distance",
+        "keyframes",
+    ])?;
+    let keyframes = fields.get_some("keyframes", |value| motion::camera_keyframes(value))?;
+    let (position, look_at) = match keyframes {
+        Some(keyframes) => {
+            if let Some(value) = fields.get("position").or_else(|| fields.get("look_at")) {
+                return Err(value.error("excludes camera.keyframes, whose entries have their own"));
+            }
+            keyframes.at(frame_time)
+        }
+        None => (
+            fields.require("position")?.vec3()?,
+            fields.require("look_at")?.vec3()?,
+        ),
+    };
+    let Some(forward) = (look_at - position).try_normalize() else {
+        return Err(fields.error("position and look_at are the same point"));
+    };
+    let up = fields.get_or("up", glam::Vec3::Y, Value::direction)?;
+    if forward.cross(up).length() < 1e-5 {
+        return Err(fields.error(format_args!(
+            "looks along its own up vector {up}; set another \"up\""
+        )));
+    }
+    let vertical_fov_deg = fields.get_or("vertical_fov_deg", 40.0, Value::number)?;
+    if !(0.001..=179.0).contains(&vertical_fov_deg) {
+        return Err(fields
+            .require("vertical_fov_deg")?
+            .within(0.001, 179.0)
+            .err()
+            .unwrap_or_else(|| fields.error("")));
+    }
+    Ok(Camera {
+        position,
+        forward,
+        up,
+        vertical_fov_deg: vertical_fov_deg as f32,
+        aperture_radius: fields.get_or("aperture_radius", 0.0, Value::non_negative)? as f32,
+        focus_distance: match fields.get("focus_distance") {
+            Some(distance) => distance.positive()? as f32,
+            None => position.distance(look_at),
+        },
+    })
+}
+
+fn read_environment(value: &Value, folder: &Path) -> Result<crate::scene::Environment, LoadError> {
+    let fields = value.fields(&["image", "radiance", "scale", "rotation_deg"])?;
+    let scale = fields.get_or("scale", 1.0, Value::non_negative)? as f32;
+    let rotation_deg = fields.get_or("rotation_deg", 0.0, Value::number)? as f32;
+    match fields.exactly_one(&["image", "radiance"])? {
+        ("image", image) => {
+            environment::from_file(&folder.join(image.string()?), scale, rotation_deg)
+                .map_err(|error| error.referenced_from(image.place()))
+        }
+        (_, radiance) => {
+            let mut environment = environment::constant(radiance.color()?);
+            environment.scale = scale;
+            Ok(environment)
+        }
+    }
+}
+
+fn read_texture(value: &Value, folder: &Path) -> Result<TextureEntry, LoadError> {
+    let fields = value.fields(&["file", "encoding", "wrap", "nearest"])?;
+    let file = fields.require("file")?;
+    let encodings = [("srgb", Encoding::Srgb), ("linear", Encoding::Linear)];
+    let wraps = [
+        ("repeat", Wrap::Repeat),
+        ("mirror", Wrap::Mirror),
+        ("clamp", Wrap::Clamp),
+    ];
+    let wrap = fields.get_or("wrap", Wrap::Repeat, |value| value.choice(&wraps))?;
+    Ok(TextureEntry {
+        request: Request {
+            picture: Picture::File(folder.join(file.string()?)),
+            encoding: Encoding::Srgb,
+            wrap_u: wrap,
+            wrap_v: wrap,
+            nearest: fields.get_or("nearest", false, Value::boolean)?,
+            if_missing: IfMissing::Fail(file.place()),
+        },
+        encoding: fields.get_some("encoding", |value| value.choice(&encodings))?,
+    })
+}

@@ -1,0 +1,166 @@
+//! Transforms and keyframes. Positions and scales move linearly between keyframes, rotations by slerp; before the first
+//! and after the last keyframe everything rests.
+
+use super::fields::{Fields, Value};
+use crate::scene::load::LoadError;
+use glam::{Affine3A, Quat, Vec3};
+
+/// Values at increasing times.
+pub(super) struct Keyframes<T> {
+    frames: Vec<(f64, T)>,
+}
+
+/// The two keyframes around a time, and how far between them it is.
+struct Between<'a, T> {
+    before: &'a T,
+    after: &'a T,
+    share: f32,
+}
+
+impl<T> Keyframes<T> {
+    fn read(
+        list: &Value,
+        known: &[&str],
+        read: impl Fn(&Fields) -> Result<T, LoadError>,
+    ) -> Result<Self, LoadError> {
+        let mut frames: Vec<(f64, T)> = Vec::new();
+        for value in list.array()? {
+            let fields = value.fields(known)?;
+            let time = fields.require("time")?;
+            let seconds = time.number()?;
+            if frames.last().is_some_and(|(last, _)| *last >= seconds) {
+                return Err(time.error("times must increase from keyframe to keyframe"));
+            }
+            frames.push((seconds, read(&fields)?));
+        }
+        if frames.is_empty() {
+            return Err(list.error("needs at least one keyframe"));
+        }
+        Ok(Self { frames })
+    }
+
+    fn around(&self, time: f64) -> Between<'_, T> {
+        let after = self.frames.partition_point(|(seconds, _)| *seconds <= time);
+        let clamp = |index: usize| &self.frames[index.min(self.frames.len() - 1)];
+        let (before_time, before) = clamp(after.saturating_sub(1));
+        let (after_time, after) = clamp(after);
+        let span = after_time - before_time;
+        let share = if span > 0.0 {
+            ((time - before_time) / span).clamp(0.0, 1.0) as f32
+        } else {
+            0.0
+        };
+        Between {
+            before,
+            after,
+            share,
+        }
+    }
+}
+
+/// The camera's `keyframes`: position and point looked at.
+pub(super) fn camera_keyframes(list: &Value) -> Result<Keyframes<(Vec3, Vec3)>, LoadError> {
+    Keyframes::read(list, &["time", "position", "look_at"], |fields| {
+        Ok((
+            fields.require("position")?.vec3()?,
+            fields.require("look_at")?.vec3()?,
+        ))
+    })
+}
+
+impl Keyframes<(Vec3, Vec3)> {
+    /// Position and point looked at.
+    pub(super) fn at(&self, time: f64) -> (Vec3, Vec3) {
+        let Between {
+            before,
+            after,
+            share,
+        } = self.around(time);
+        (before.0.lerp(after.0, share), before.1.lerp(after.1, share))
+    }
+}
+
+/// Scale, then rotation, then translation.
+#[derive(Clone, Copy)]
+pub(super) struct Pose {
+    scale: Vec3,
+    rotation: Quat,
+    translation: Vec3,
+}
+
+/// An object's `keyframes`.
+pub(super) fn object_keyframes(list: &Value) -> Result<Keyframes<Pose>, LoadError> {
+    Keyframes::read(
+        list,
+        &["time", "translate", "rotate_deg", "axis", "scale"],
+        |fields| {
+            Ok(Pose {
+                scale: fields.get_or("scale", Vec3::ONE, scale)?,
+                rotation: rotation(fields)?.unwrap_or(Quat::IDENTITY),
+                translation: fields.get_or("translate", Vec3::ZERO, Value::vec3)?,
+            })
+        },
+    )
+}
+
+impl Keyframes<Pose> {
+    /// The transform at a time.
+    pub(super) fn at(&self, time: f64) -> Affine3A {
+        let Between {
+            before,
+            after,
+            share,
+        } = self.around(time);
+        Affine3A::from_scale_rotation_translation(
+            before.scale.lerp(after.scale, share),
+            before.rotation.slerp(after.rotation, share),
+            before.translation.lerp(after.translation, share),
+        )
+    }
+}
+
+/// An object's `transform`: a list of steps, applied in this order.
+pub(super) fn transform(list: &Value) -> Result<Affine3A, LoadError> {
+    let mut total = Affine3A::IDENTITY;
+    for step in list.array()? {
+        let fields = step.fields(&["scale", "rotate_deg", "axis", "translate"])?;
+        let (kind, value) = fields.exactly_one(&["scale", "rotate_deg", "translate"])?;
+        if kind != "rotate_deg"
+            && let Some(axis) = fields.get("axis")
+        {
+            return Err(axis.error("belongs to rotate_deg only"));
+        }
+        let step = match kind {
+            "scale" => Affine3A::from_scale(scale(&value)?),
+            "translate" => Affine3A::from_translation(value.vec3()?),
+            _ => Affine3A::from_quat(rotation(&fields)?.unwrap_or(Quat::IDENTITY)),
+        };
+        total = step * total;
+    }
+    Ok(total)
+}
+
+/// One number for all axes or three, none of them 0.
+fn scale(value: &Value) -> Result<Vec3, LoadError> {
+    let scale = if value.is_array() {
+        value.vec3()?
+    } else {
+        Vec3::splat(value.number()? as f32)
+    };
+    if scale.min_element() == 0.0 || scale.max_element() == 0.0 || scale.y == 0.0 {
+        return Err(value.error("a scale of 0 flattens the object"));
+    }
+    Ok(scale)
+}
+
+/// `rotate_deg` about `axis`.
+fn rotation(fields: &Fields) -> Result<Option<Quat>, LoadError> {
+    match (fields.get("rotate_deg"), fields.get("axis")) {
+        (None, None) => Ok(None),
+        (Some(angle), Some(axis)) => {
+            let radians = (angle.number()? % 360.0).to_radians() as f32;
+            Ok(Some(Quat::from_axis_angle(axis.direction()?, radians)))
+        }
+        _ => Err(fields.error("rotate_deg and axis belong together")),
+    }
+}

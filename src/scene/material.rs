@@ -1,0 +1,37 @@
+//! What a renderer asks of materials besides their values at a point.
+
+use super::{Material, Texels, Texture};
+use glam::{Vec2, Vec3};
+
+impl Material {
+    /// Mean emitted radiance over the texture's square, in scene units; `None` where nothing is emitted.
+    pub fn mean_emission(&self, textures: &[Texture]) -> Option<Vec3> {
+        if self.emission.factor.max_element() <= 0.0 {
+            return None;
+        }
+        let mean = match &self.emission.texture {
+            None => self.emission.factor,
+            Some(lookup) => self.emission.factor * mean_color(&textures[lookup.texture.0 as usize]),
+        };
+        (mean.max_element() > 0.0).then_some(mean)
+    }
+}
+
+/// Mean linear colour of a texture.
+fn mean_color(texture: &Texture) -> Vec3 {
+    let (width, height) = (texture.width as usize, texture.height as usize);
+    if let Texels::Floats(texels) = &texture.texels {
+        let sum: glam::DVec3 = texels.iter().map(|t| Vec3::new(t[0], t[1], t[2]).as_dvec3()).sum();
+        return (sum / texels.len().max(1) as f64).as_vec3();
+    }
+    // At most 256 × 256 places: a mean for choosing lights, not for shading.
+    let (columns, rows) = (width.min(256), height.min(256));
+    let mut sum = glam::DVec3::ZERO;
+    for y in 0..rows {
+        for x in 0..columns {
+            let uv = Vec2::new((x as f32 + 0.5) / columns as f32, (y as f32 + 0.5) / rows as f32);
+            sum += texture.sample_rgba(uv).truncate().as_dvec3();
+        }
+    }
+    (sum / (columns * rows) as f64).as_vec3()
+}

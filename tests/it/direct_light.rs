@@ -1,0 +1,111 @@
+//! Direct light on a diffuse plane against closed forms, within 0.3 %.
+
+use crate::support::{add_material, add_rectangle, add_sphere, constant_environment, diffuse, empty_scene, radiance_along, trace_settings};
+use fechner::geometry::Ray;
+use fechner::integrator::{PathTracer, TraceSettings};
+use fechner::scene::{Light, Scene};
+use glam::{Vec3, vec3a};
+use std::f32::consts::{FRAC_1_PI, PI};
+use std::sync::Arc;
+
+const ALBEDO: f32 = 0.6;
+
+/// A floor at y = 0, facing up, of albedo 0.6.
+fn floor() -> Scene {
+    let mut scene = empty_scene();
+    let material = add_material(&mut scene, diffuse(ALBEDO), Vec3::ZERO);
+    add_rectangle(&mut scene, Vec3::new(-50.0, 0.0, -50.0), Vec3::Z * 100.0, Vec3::X * 100.0, material);
+    scene
+}
+
+/// Reflected radiance at (x, 0, 0) must be albedo·irradiance/π.
+fn assert_irradiance(scene: Scene, x: f32, expected_irradiance: f32, what: &str) {
+    // One scattering event: direct light only.
+    let settings = TraceSettings { max_depth: 1, ..trace_settings(16, 16, 0) };
+    let tracer = PathTracer::new(Arc::new(scene), settings);
+    let ray = Ray { origin: vec3a(x - 0.1, 0.2, 0.0), direction: vec3a(0.1, -0.2, 0.0).normalize() };
+    let (mean, error) = radiance_along(&tracer, ray, 16, 16384);
+    let expected = ALBEDO * FRAC_1_PI * expected_irradiance;
+    assert!(
+        (mean.x - expected).abs() < 0.003 * expected && error.x < 0.001 * expected,
+        "{what}: {} ± {}, expected {expected}, ratio {}",
+        mean.x,
+        error.x,
+        mean.x / expected
+    );
+}
+
+/// Irradiance at the origin, normal +y, from a polygon of radiance 1 above the horizon (Lambert 1760).
+fn polygon_irradiance(corners: &[Vec3]) -> f32 {
+    let mut sum = 0.0f64;
+    for (i, a) in corners.iter().enumerate() {
+        let (a, b) = (a.as_dvec3().normalize(), corners[(i + 1) % corners.len()].as_dvec3().normalize());
+        sum += a.dot(b).acos() * a.cross(b).normalize().y;
+    }
+    (0.5 * sum.abs()) as f32
+}
+
+#[test]
+fn a_rectangle_gives_its_form_factor() {
+    for x in [0.0, 0.7, 3.0] {
+        let mut scene = floor();
+        let lamp = add_material(&mut scene, diffuse(0.0), Vec3::splat(5.0));
+        scene.materials[lamp.0 as usize].emits_both_sides = false;
+        let (corner, u, v) = (Vec3::new(-0.5, 1.2, -0.4), Vec3::new(1.0, 0.3, 0.0), Vec3::new(0.0, 0.0, 0.8));
+        add_rectangle(&mut scene, corner, u, v, lamp);
+        let corners = [corner, corner + u, corner + u + v, corner + v].map(|c| c - Vec3::X * x);
+        assert_irradiance(scene, x, 5.0 * polygon_irradiance(&corners), &format!("rectangle seen from x = {x}"));
+    }
+}
+
+#[test]
+fn a_sphere_gives_its_closed_form() {
+    for (x, radius) in [(0.0f32, 0.5), (1.5, 0.5), (0.5, 0.05)] {
+        let mut scene = floor();
+        let lamp = add_material(&mut scene, diffuse(0.0), Vec3::splat(3.0));
+        let center = Vec3::new(0.0, 1.0, 0.0);
+        add_sphere(&mut scene, center, radius, lamp);
+        let distance_squared = x * x + 1.0;
+        let cosine = 1.0 / distance_squared.sqrt();
+        let irradiance = 3.0 * PI * radius * radius / distance_squared * cosine;
+        assert_irradiance(scene, x, irradiance, &format!("sphere of radius {radius} seen from x = {x}"));
+    }
+}
+
+#[test]
+fn lights_without_area_follow_their_laws() {
+    let mut point = floor();
+    point.lights.push(Light::Point { position: Vec3::new(0.0, 2.0, 0.0), intensity: Vec3::splat(8.0) });
+    assert_irradiance(point.clone(), 1.5, 8.0 / 6.25 * 0.8, "point");
+    let mut spot = floor();
+    spot.lights.push(Light::Spot {
+        position: Vec3::new(0.0, 2.0, 0.0),
+        direction: Vec3::NEG_Y,
+        intensity: Vec3::splat(8.0),
+        inner_angle: 1.0,
+        outer_angle: 1.2,
+    });
+    assert_irradiance(spot, 1.5, 8.0 / 6.25 * 0.8, "inside the cone of a spot");
+    let mut sun = floor();
+    sun.lights.push(Light::Directional {
+        direction: Vec3::new(0.6, -0.8, 0.0),
+        irradiance: Vec3::splat(2.0),
+    });
+    assert_irradiance(sun, 0.0, 1.6, "directional");
+}
+
+#[test]
+fn a_constant_sky_gives_pi() {
+    let mut scene = floor();
+    scene.environment = constant_environment(1.0);
+    assert_irradiance(scene, 0.0, PI, "sky");
+}
+
+/// Two kinds of light at once: the choice between them must not change either.
+#[test]
+fn lights_add_up() {
+    let mut scene = floor();
+    scene.environment = constant_environment(0.1);
+    scene.lights.push(Light::Point { position: Vec3::new(0.0, 2.0, 0.0), intensity: Vec3::splat(8.0) });
+    assert_irradiance(scene, 0.0, 0.1 * PI + 2.0, "sky and point");
+}

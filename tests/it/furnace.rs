@@ -1,0 +1,117 @@
+//! White furnaces: what a lossless surface returns in a constant environment is the environment.
+
+use crate::support::{add_material, add_sphere, constant_environment, diffuse, empty_scene, radiance_along, trace_settings};
+use fechner::geometry::Ray;
+use fechner::integrator::PathTracer;
+use fechner::scene::{ColorInput, ScalarInput, Scene, Surface};
+use glam::{Vec3, Vec3A, vec3a};
+use std::sync::Arc;
+
+/// Rays that meet a unit sphere at the origin from face on to grazing.
+fn rays() -> impl Iterator<Item = Ray> {
+    [0.0f32, 0.5, 0.8, 0.95].into_iter().map(|x| Ray { origin: vec3a(x, 0.0, 5.0), direction: Vec3A::NEG_Z })
+}
+
+fn sphere_in_furnace(surface: Surface) -> PathTracer {
+    let mut scene = empty_scene();
+    scene.environment = constant_environment(1.0);
+    let material = add_material(&mut scene, surface, Vec3::ZERO);
+    add_sphere(&mut scene, Vec3::ZERO, 1.0, material);
+    PathTracer::new(Arc::new(scene), trace_settings(16, 16, 0))
+}
+
+/// Within 0.5 %, and within the test's own noise: 16 blocks of 16384 samples.
+fn assert_returns(surface: &Surface, expected: Vec3) {
+    let tracer = sphere_in_furnace(surface.clone());
+    for ray in rays() {
+        let (mean, error) = radiance_along(&tracer, ray, 16, 16384);
+        let tolerance = Vec3::splat(0.005) * expected + 3.3 * error;
+        assert!(
+            (mean - expected).abs().cmple(tolerance).all(),
+            "{surface:?} at x = {}: {mean} ± {error}, expected {expected}",
+            ray.origin.x
+        );
+        assert!(error.max_element() < 0.002, "{surface:?}: too noisy to test, ± {error}");
+    }
+}
+
+#[test]
+fn diffuse_returns_its_albedo() {
+    for albedo in [0.18, 0.5, 1.0] {
+        assert_returns(&diffuse(albedo), Vec3::splat(albedo));
+    }
+}
+
+#[test]
+fn mirrors_return_their_reflectance() {
+    let reflectance = Vec3::new(0.9, 0.5, 0.1);
+    assert_returns(&Surface::Mirror { reflectance: ColorInput::constant(reflectance) }, reflectance);
+}
+
+/// A conductor with a vast extinction reflects everything: any loss is the microfacet model's.
+#[test]
+fn lossless_conductors_return_everything() {
+    for roughness in [0.0, 0.2, 0.5, 0.8, 1.0] {
+        let surface = Surface::Conductor {
+            eta: Vec3::ONE,
+            k: Vec3::splat(1e4),
+            roughness: ScalarInput::constant(roughness),
+        };
+        assert_returns(&surface, Vec3::ONE);
+    }
+}
+
+#[test]
+fn clear_dielectrics_return_everything() {
+    for ior in [1.33, 1.5, 2.4] {
+        for roughness in [0.0, 0.3, 0.6, 1.0] {
+            let surface = Surface::Dielectric {
+                ior,
+                roughness: ScalarInput::constant(roughness),
+                transmittance: ColorInput::constant(Vec3::ONE),
+            };
+            assert_returns(&surface, Vec3::ONE);
+        }
+    }
+    assert_returns(
+        &Surface::ThinDielectric { ior: 1.5, transmittance: ColorInput::constant(Vec3::ONE) },
+        Vec3::ONE,
+    );
+}
+
+#[test]
+fn white_metal_roughness_returns_everything() {
+    for metallic in [0.0, 0.5, 1.0] {
+        for roughness in [0.1, 0.5, 1.0] {
+            let surface = Surface::MetalRoughness {
+                base_color: ColorInput::constant(Vec3::ONE),
+                metallic: ScalarInput::constant(metallic),
+                roughness: ScalarInput::constant(roughness),
+                ior: 1.5,
+                transmission: ScalarInput::constant(0.0),
+            };
+            assert_returns(&surface, Vec3::ONE);
+        }
+    }
+}
+
+/// Inside a closed sphere that emits E and reflects ρ, radiance is E/(1 − ρ) everywhere and in all directions.
+#[test]
+fn infinite_bounces_add_up() {
+    for (albedo, samples) in [(0.5f32, 4096), (0.8, 4096), (0.95, 16384)] {
+        let mut scene: Scene = empty_scene();
+        let material = add_material(&mut scene, diffuse(albedo), Vec3::splat(0.3));
+        add_sphere(&mut scene, Vec3::ZERO, 2.0, material);
+        let tracer = PathTracer::new(Arc::new(scene), trace_settings(16, 16, 0));
+        let ray = Ray { origin: vec3a(0.3, -0.2, 0.1), direction: vec3a(0.48, 0.6, 0.64) };
+        let (mean, error) = radiance_along(&tracer, ray, 16, samples);
+        let expected = 0.3 / (1.0 - albedo);
+        assert!(
+            (mean.x - expected).abs() < 0.003 * expected + 3.3 * error.x,
+            "albedo {albedo}: {} ± {}, expected {expected}",
+            mean.x,
+            error.x
+        );
+        assert!(error.x < 0.005 * expected, "albedo {albedo}: too noisy to test, ± {}", error.x);
+    }
+}

@@ -1,0 +1,130 @@
+//! Scenes made in code, and rendering them.
+
+use fechner::adaptive::settings::{DEFAULT_MAX_SAMPLES, Limits, LoopSettings, Sampling};
+use fechner::integrator::{PathTracer, TraceSettings};
+use fechner::sampler::{BlockKey, Half, PixelFilter, Purpose};
+use fechner::scene::{
+    Alpha, Camera, ColorInput, Environment, FilmDefaults, Instance, Material, MaterialId, Mesh, MeshId, Scene, Sphere,
+    Surface, ViewingDefaults,
+};
+use fechner_perception::display::{Display, Viewing};
+use fechner_perception::tone;
+use glam::{Affine3A, Mat3, Vec2, Vec3};
+use std::sync::Arc;
+
+/// A scene of nothing, seen from z = 5.
+pub(crate) fn empty_scene() -> Scene {
+    Scene {
+        name: "test".to_owned(),
+        nits_per_unit: 100.0,
+        camera: Camera {
+            position: Vec3::new(0.0, 0.0, 5.0),
+            forward: Vec3::NEG_Z,
+            up: Vec3::Y,
+            vertical_fov_deg: 20.0,
+            aperture_radius: 0.0,
+            focus_distance: 5.0,
+        },
+        film: FilmDefaults { width: 16, height: 16 },
+        viewing: ViewingDefaults::default(),
+        meshes: Vec::new(),
+        instances: Vec::new(),
+        spheres: Vec::new(),
+        materials: Vec::new(),
+        textures: Vec::new(),
+        lights: Vec::new(),
+        environment: None,
+        notes: Vec::new(),
+    }
+}
+
+/// Light of the same radiance from everywhere.
+pub(crate) fn constant_environment(radiance: f32) -> Option<Environment> {
+    Some(Environment {
+        width: 1,
+        height: 1,
+        texels: Arc::new(vec![Vec3::splat(radiance)]),
+        scale: 1.0,
+        from_world: Mat3::IDENTITY,
+    })
+}
+
+/// Adds a material that scatters like this.
+pub(crate) fn add_material(scene: &mut Scene, surface: Surface, emission: Vec3) -> MaterialId {
+    scene.materials.push(Material {
+        name: format!("material {}", scene.materials.len()),
+        surface,
+        emission: ColorInput::constant(emission),
+        emits_both_sides: true,
+        normal_map: None,
+        alpha: Alpha::Opaque,
+    });
+    MaterialId(scene.materials.len() as u32 - 1)
+}
+
+pub(crate) fn diffuse(albedo: f32) -> Surface {
+    Surface::Diffuse { reflectance: ColorInput::constant(Vec3::splat(albedo)) }
+}
+
+pub(crate) fn add_sphere(scene: &mut Scene, center: Vec3, radius: f32, material: MaterialId) {
+    scene.spheres.push(Sphere { name: "sphere".to_owned(), center, radius, material });
+}
+
+/// Adds a parallelogram with the normal `edge_u` × `edge_v`.
+pub(crate) fn add_rectangle(scene: &mut Scene, corner: Vec3, edge_u: Vec3, edge_v: Vec3, material: MaterialId) {
+    scene.meshes.push(Mesh {
+        name: "rectangle".to_owned(),
+        positions: vec![corner, corner + edge_u, corner + edge_u + edge_v, corner + edge_v],
+        uvs: vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..Mesh::default()
+    });
+    scene.instances.push(Instance {
+        name: "rectangle".to_owned(),
+        mesh: MeshId(scene.meshes.len() as u32 - 1),
+        material,
+        to_world: Affine3A::IDENTITY,
+    });
+}
+
+pub(crate) fn trace_settings(width: u32, height: u32, seed: u64) -> TraceSettings {
+    TraceSettings { width, height, seed, max_depth: 1_000, filter: PixelFilter::Box }
+}
+
+/// Mean and standard error of the radiance along one ray, from `blocks` independent blocks of `samples`.
+pub(crate) fn radiance_along(
+    tracer: &PathTracer,
+    ray: fechner::geometry::Ray,
+    blocks: u32,
+    samples: u32,
+) -> (Vec3, Vec3) {
+    let means: Vec<Vec3> = (0..blocks)
+        .map(|block| {
+            let key = BlockKey { seed: 1, pixel: block, half: Half::A, level: 0 };
+            let sum: Vec3 = key.samples(samples).map(|s| tracer.trace_path(ray, s).radiance).sum();
+            sum / samples as f32
+        })
+        .collect();
+    let mean = means.iter().sum::<Vec3>() / blocks as f32;
+    let variance = means.iter().map(|m| (m - mean) * (m - mean)).sum::<Vec3>() / (blocks - 1) as f32;
+    (mean, (variance / blocks as f32).powf(0.5))
+}
+
+/// Settings for the display `desktop` and constant scaling.
+pub(crate) fn loop_settings(nits_per_unit: f64, sampling: Sampling, visibility: f64, spp: Option<u32>) -> LoopSettings {
+    LoopSettings {
+        sampling,
+        limits: Limits { visibility, time: None, mean_samples: spp, max_samples: DEFAULT_MAX_SAMPLES, plans: None },
+        viewing: Viewing::of(Display::preset("desktop").expect("a preset")),
+        nits_per_unit,
+        operator: tone::operator("constant", None).expect("an operator"),
+    }
+}
+
+/// Keeps the purposes in the API honest: a sample's camera numbers are what the tracer uses for the pixel.
+#[test]
+fn camera_numbers_fill_the_pixel() {
+    let key = BlockKey { seed: 0, pixel: 0, half: Half::A, level: 3 };
+    let mean: f32 = key.samples(64).map(|s| s.draw(Purpose::Camera)[0]).sum::<f32>() / 64.0;
+    assert!((mean - 0.5).abs() < 0.02, "{mean}");
+}
