@@ -15,6 +15,7 @@ size = [512, 384]
 [view]
 display = "desktop"
 visibility = 2.0
+exposure_stops = -1.4
 
 [camera]
 position = [0.0, 1.75, 6.6]
@@ -34,7 +35,7 @@ file = "textures/terrazzo.png"
 
 [materials.floor]
 type = "metal-roughness"
-base_color = { texture = "terrazzo", scale = [4, 4] }
+base_color = { texture = "terrazzo", scale = [6, 7] }
 metallic = 0.0
 roughness = 0.22
 
@@ -77,18 +78,18 @@ material = "wall"
 
 /// Colours of the lamps: linear, all of luminance 1.
 const COLORS: [(&str, [f32; 3]); 5] = [
-    ("amber", [1.90, 0.80, 0.32]),
-    ("rose", [2.60, 0.58, 0.45]),
-    ("mint", [0.45, 1.20, 0.65]),
-    ("sky", [0.45, 1.00, 2.62]),
-    ("cream", [1.30, 0.95, 0.61]),
+    ("amber", [2.30, 0.71, 0.02]),
+    ("rose", [3.90, 0.18, 0.60]),
+    ("mint", [0.10, 1.32, 0.45]),
+    ("sky", [0.05, 0.75, 6.20]),
+    ("cream", [1.35, 0.93, 0.65]),
 ];
 
 /// The whole scene file.
 pub(crate) fn scene() -> String {
     let mut text = HEAD.to_owned();
     for (name, color) in COLORS {
-        let [r, g, b] = color.map(|c| c * 260.0);
+        let [r, g, b] = color.map(|c| c * 26.0);
         let _ = write!(
             text,
             "\n[materials.{name}]\ntype = \"diffuse\"\nreflectance = [0, 0, 0]\nemission = [{r:.1}, {g:.1}, {b:.1}]\n"
@@ -132,7 +133,7 @@ pub(crate) fn scene() -> String {
             let jitter = 0.3 * (random(string, lamp, 3) - 0.5);
             let _ = write!(
                 text,
-                "\n[[objects]]\nsphere = {{ center = [{x:.3}, {y:.3}, {:.3}], radius = 0.035 }}\nmaterial = \"{name}\"\n",
+                "\n[[objects]]\nsphere = {{ center = [{x:.3}, {y:.3}, {:.3}], radius = 0.045 }}\nmaterial = \"{name}\"\n",
                 z + jitter
             );
         }

@@ -85,11 +85,11 @@ fn studio(azimuth: f32, elevation: f32) -> [f32; 3] {
     let mut color = [0.045, 0.046, 0.05];
     // Each box fades towards one end, as soft boxes do, which draws gradients on gloss.
     let left =
-        window(azimuth, elevation, (-0.31, -0.18), (5.0, 70.0), 2.0) * step(-10.0, 80.0, elevation);
+        window(azimuth, elevation, (-0.33, -0.22), (8.0, 62.0), 2.0) * step(-10.0, 80.0, elevation);
     let right = window(azimuth, elevation, (0.20, 0.25), (-2.0, 75.0), 1.5);
     let top = step(66.0, 74.0, elevation);
-    color = sum(color, [17.0, 16.6, 16.0], left);
-    color = sum(color, [10.0, 10.6, 11.5], right);
+    color = sum(color, [70.0, 68.0, 66.0], left);
+    color = sum(color, [34.0, 36.0, 39.0], right);
     sum(color, [3.0, 3.0, 3.0], top)
 }
 

@@ -25,7 +25,7 @@ pub(super) fn table() -> Vec<Part> {
     let face = Part::surface("table-face", "table", (1, 1), [2.0, 0.06], |u, v| {
         [-0.9 + 1.8 * u, -thick + (thick - radius) * v, front]
     });
-    let wall = Part::surface("wall", "tiles", (1, 1), [3.0, 2.0], |u, v| {
+    let wall = Part::surface("wall", "tiles", (1, 1), [5.4, 3.6], |u, v| {
         [-1.5 + 3.0 * u, -0.6 + 2.0 * v, back]
     });
     vec![top, edge, face, wall]
