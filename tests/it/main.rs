@@ -4,10 +4,12 @@
 //! - `furnace`: energy: closed and open white furnaces with known answers
 //! - `direct_light`: irradiance from a rectangle, a sphere, a point and an environment against closed forms
 //! - `adaptive_render`: adaptive and uniform renders against a reference: bias, calibration, determinism
+//! - `bad_input`: bad scene files, and our own ones
 //! - `load_assets`: scenes that others made, sound and damaged
 //! - `command_line`: the program as a user runs it
 
 mod adaptive_render;
+mod bad_input;
 mod command_line;
 mod direct_light;
 mod furnace;

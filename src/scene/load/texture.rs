@@ -256,17 +256,28 @@ fn decode_exr(bytes: &[u8], name: &Path) -> Result<Decoded, LoadError> {
     let find = |wanted: &str| {
         let suffix = format!(".{wanted}");
         picture.channel(wanted).or_else(|| {
-            picture.channels.iter().find(|(n, _)| n.ends_with(&suffix)).map(|(_, values)| values.as_slice())
+            picture
+                .channels
+                .iter()
+                .find(|(n, _)| n.ends_with(&suffix))
+                .map(|(_, values)| values.as_slice())
         })
     };
     let (Some(red), alpha) = (find("R").or_else(|| find("Y")), find("A")) else {
-        return Err(LoadError::unsupported(name, "the picture has neither a channel R nor a channel Y"));
+        return Err(LoadError::unsupported(
+            name,
+            "the picture has neither a channel R nor a channel Y",
+        ));
     };
     let (green, blue) = (find("G").unwrap_or(red), find("B").unwrap_or(red));
     let texels = (0..red.len())
         .map(|i| [red[i], green[i], blue[i], alpha.map_or(1.0, |a| a[i])].map(finite_or_zero))
         .collect();
-    Ok(Decoded { width: picture.width, height: picture.height, texels: Texels::Floats(Arc::new(texels)) })
+    Ok(Decoded {
+        width: picture.width,
+        height: picture.height,
+        texels: Texels::Floats(Arc::new(texels)),
+    })
 }
 
 fn check_size(name: &Path, width: u64, height: u64, bytes_per_texel: u64) -> Result<(), LoadError> {
