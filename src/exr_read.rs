@@ -59,18 +59,12 @@ impl std::fmt::Display for SampleType {
 impl ExrImage {
     /// The values of a channel, if it is there.
     pub fn channel(&self, name: &str) -> Option<&[f32]> {
-        self.channels
-            .iter()
-            .find(|(n, _)| n == name)
-            .map(|(_, values)| values.as_slice())
+        self.channels.iter().find(|(n, _)| n == name).map(|(_, values)| values.as_slice())
     }
 
     /// An attribute of the first part, if it is there.
     pub fn attribute(&self, name: &str) -> Option<&Attribute> {
-        self.attributes
-            .iter()
-            .find(|(n, _)| n == name)
-            .map(|(_, value)| value)
+        self.attributes.iter().find(|(n, _)| n == name).map(|(_, value)| value)
     }
 }
 
@@ -124,10 +118,7 @@ pub enum ExrReadError {
 pub fn read_exr(path: &Path) -> Result<ExrImage, ExrReadError> {
     let io = |source| ExrReadError::Io { path: path.to_owned(), source };
     if path.metadata().map_err(io)?.is_dir() {
-        return Err(io(std::io::Error::new(
-            std::io::ErrorKind::IsADirectory,
-            "it is a folder, not an EXR file",
-        )));
+        return Err(io(std::io::Error::new(std::io::ErrorKind::IsADirectory, "it is a folder, not an EXR file")));
     }
     decode_exr(path, &std::fs::read(path).map_err(io)?)
 }
@@ -153,10 +144,7 @@ pub fn decode_exr(path: &Path, file: &[u8]) -> Result<ExrImage, ExrReadError> {
     let mut result = ExrImage {
         width: first.layer_size.0 as u32,
         height: first.layer_size.1 as u32,
-        data_window_origin: (
-            first.own_attributes.layer_position.0,
-            first.own_attributes.layer_position.1,
-        ),
+        data_window_origin: (first.own_attributes.layer_position.0, first.own_attributes.layer_position.1),
         channels: Vec::new(),
         types: Vec::new(),
         attributes: attributes(first),
@@ -164,32 +152,18 @@ pub fn decode_exr(path: &Path, file: &[u8]) -> Result<ExrImage, ExrReadError> {
     };
     let several = image.layer_data.len() > 1;
     for layer in image.layer_data {
-        let part = layer
-            .attributes
-            .layer_name
-            .as_ref()
-            .map(Text::to_string)
-            .unwrap_or_default();
+        let part = layer.attributes.layer_name.as_ref().map(Text::to_string).unwrap_or_default();
         if layer.size != first.layer_size {
             result.parts_left_out.push(part);
             continue;
         }
         for channel in layer.channel_data.list {
             let name = channel.name.to_string();
-            let name = if several && !part.is_empty() {
-                format!("{part}.{name}")
-            } else {
-                name
-            };
+            let name = if several && !part.is_empty() { format!("{part}.{name}") } else { name };
             let (values, kind) = match channel.sample_data {
                 FlatSamples::F32(values) => (values, SampleType::Float),
-                FlatSamples::F16(values) => (
-                    values.iter().map(|v| v.to_f32()).collect(),
-                    SampleType::Half,
-                ),
-                FlatSamples::U32(values) => {
-                    (values.iter().map(|&v| v as f32).collect(), SampleType::Uint)
-                }
+                FlatSamples::F16(values) => (values.iter().map(|v| v.to_f32()).collect(), SampleType::Half),
+                FlatSamples::U32(values) => (values.iter().map(|&v| v as f32).collect(), SampleType::Uint),
             };
             result.channels.push((name, values));
             result.types.push(kind);
@@ -200,14 +174,8 @@ pub fn decode_exr(path: &Path, file: &[u8]) -> Result<ExrImage, ExrReadError> {
 
 /// Reads the headers of all parts and refuses what could not be read within [`MEMORY_LIMIT_BYTES`].
 fn read_headers(path: &Path, file: &[u8]) -> Result<Vec<Header>, ExrReadError> {
-    let damaged = |problem: String| ExrReadError::Damaged {
-        path: path.to_owned(),
-        problem,
-    };
-    let unsupported = |feature: &str| ExrReadError::Unsupported {
-        path: path.to_owned(),
-        feature: feature.to_owned(),
-    };
+    let damaged = |problem: String| ExrReadError::Damaged { path: path.to_owned(), problem };
+    let unsupported = |feature: &str| ExrReadError::Unsupported { path: path.to_owned(), feature: feature.to_owned() };
 
     if file.is_empty() {
         return Err(damaged("it is empty".to_owned()));
@@ -221,19 +189,10 @@ fn read_headers(path: &Path, file: &[u8]) -> Result<Vec<Header>, ExrReadError> {
     let mut chunks: u64 = 0;
     for header in &headers {
         if header.deep {
-            return Err(unsupported(
-                "deep pixels are not read; flatten the picture first",
-            ));
+            return Err(unsupported("deep pixels are not read; flatten the picture first"));
         }
-        if header
-            .channels
-            .list
-            .iter()
-            .any(|channel| channel.sampling != Vec2(1, 1))
-        {
-            return Err(unsupported(
-                "subsampled channels are not read; write the picture as RGB",
-            ));
+        if header.channels.list.iter().any(|channel| channel.sampling != Vec2(1, 1)) {
+            return Err(unsupported("subsampled channels are not read; write the picture as RGB"));
         }
         let Vec2(width, height) = header.layer_size;
         if width == 0 || height == 0 {
@@ -246,10 +205,7 @@ fn read_headers(path: &Path, file: &[u8]) -> Result<Vec<Header>, ExrReadError> {
         if let BlockDescription::Tiles(tiles) = header.blocks {
             let tile_pixels = (tiles.tile_size.0 as u64).saturating_mul(tiles.tile_size.1 as u64);
             if tile_pixels.saturating_mul(channels * 4) > MEMORY_LIMIT_BYTES / 4 {
-                return Err(damaged(format!(
-                    "tiles of {}×{} pixels",
-                    tiles.tile_size.0, tiles.tile_size.1
-                )));
+                return Err(damaged(format!("tiles of {}×{} pixels", tiles.tile_size.0, tiles.tile_size.1)));
             }
         }
         chunks = chunks.saturating_add(header.chunk_count as u64);
@@ -259,27 +215,19 @@ fn read_headers(path: &Path, file: &[u8]) -> Result<Vec<Header>, ExrReadError> {
             path: path.to_owned(),
             width: first.layer_size.0 as u64,
             height: first.layer_size.1 as u64,
-            channels: headers
-                .iter()
-                .map(|header| header.channels.list.len())
-                .sum(),
+            channels: headers.iter().map(|header| header.channels.list.len()).sum(),
             bytes,
         });
     }
     // Each chunk takes 8 bytes in the table of offsets, and a place and a length of 4 bytes each where it stands.
     if chunks.saturating_mul(16) > file.len() as u64 {
-        return Err(damaged(format!(
-            "it is too short for the {chunks} blocks that its header tells of"
-        )));
+        return Err(damaged(format!("it is too short for the {chunks} blocks that its header tells of")));
     }
     Ok(headers.into_vec())
 }
 
 /// Runs the library, and turns its errors, and panics on damaged data, into ours.
-fn guarded<T>(
-    path: &Path,
-    run: impl FnOnce() -> ::exr::error::Result<T>,
-) -> Result<T, ExrReadError> {
+fn guarded<T>(path: &Path, run: impl FnOnce() -> ::exr::error::Result<T>) -> Result<T, ExrReadError> {
     use ::exr::error::Error;
     let path = path.to_owned();
     match catch_unwind(AssertUnwindSafe(run)) {
@@ -289,18 +237,9 @@ fn guarded<T>(
             path,
             feature: format!("{what} is not read; convert the file to ZIP first"),
         }),
-        Ok(Err(Error::Invalid(problem))) => Err(ExrReadError::Damaged {
-            path,
-            problem: problem.into_owned(),
-        }),
-        Ok(Err(Error::Aborted)) => Err(ExrReadError::Damaged {
-            path,
-            problem: "reading ended early".to_owned(),
-        }),
-        Err(_) => Err(ExrReadError::Damaged {
-            path,
-            problem: "its blocks contradict its header".to_owned(),
-        }),
+        Ok(Err(Error::Invalid(problem))) => Err(ExrReadError::Damaged { path, problem: problem.into_owned() }),
+        Ok(Err(Error::Aborted)) => Err(ExrReadError::Damaged { path, problem: "reading ended early".to_owned() }),
+        Err(_) => Err(ExrReadError::Damaged { path, problem: "its blocks contradict its header".to_owned() }),
     }
 }
 
@@ -341,9 +280,7 @@ fn attribute(value: &AttributeValue) -> Attribute {
         AttributeValue::F32(number) => Attribute::Float(*number),
         AttributeValue::F64(number) => Attribute::Text(number.to_string()),
         AttributeValue::I32(number) => Attribute::Integer(*number),
-        AttributeValue::Bytes { type_hint, bytes } => {
-            Attribute::Text(format!("{} bytes of {type_hint}", bytes.len()))
-        }
+        AttributeValue::Bytes { type_hint, bytes } => Attribute::Text(format!("{} bytes of {type_hint}", bytes.len())),
         other => Attribute::Text(format!("{other:?}")),
     }
 }
@@ -363,8 +300,7 @@ mod tests {
 
     #[test]
     fn damaged_files_end_in_an_error_or_a_picture_soon_and_in_little_memory() {
-        let folder =
-            Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets/faults/exr-damaged");
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets/faults/exr-damaged");
         let Ok(files) = std::fs::read_dir(&folder) else {
             println!("skipped: {} is not there", folder.display());
             return;
@@ -377,34 +313,18 @@ mod tests {
             match read_exr(&path) {
                 Ok(image) => {
                     readable += 1;
-                    assert!(
-                        image
-                            .channels
-                            .iter()
-                            .all(|(_, v)| v.len() == (image.width * image.height) as usize)
-                    );
+                    assert!(image.channels.iter().all(|(_, v)| v.len() == (image.width * image.height) as usize));
                 }
                 Err(error) => {
                     refused += 1;
                     let message = error.to_string();
-                    assert!(
-                        message.starts_with("cannot read ") && !message.contains('\n'),
-                        "{message}"
-                    );
+                    assert!(message.starts_with("cannot read ") && !message.contains('\n'), "{message}");
                     println!("{message}");
                 }
             }
-            assert!(
-                start.elapsed() < Duration::from_secs(5),
-                "{} took {:?}",
-                path.display(),
-                start.elapsed()
-            );
+            assert!(start.elapsed() < Duration::from_secs(5), "{} took {:?}", path.display(), start.elapsed());
         }
-        println!(
-            "{readable} readable, {refused} refused, peak {:?} KiB",
-            peak_memory_kib()
-        );
+        println!("{readable} readable, {refused} refused, peak {:?} KiB", peak_memory_kib());
         assert!(refused > 50, "{refused} refused");
         if let Some(kib) = peak_memory_kib() {
             assert!(kib < 1 << 20, "peak memory {kib} KiB");
@@ -429,11 +349,7 @@ mod tests {
         let path = folder.path().join("cut.exr");
         for length in 0..bytes.len() {
             std::fs::write(&path, &bytes[..length]).unwrap();
-            assert!(
-                read_exr(&path).is_err(),
-                "cut to {length} of {} bytes",
-                bytes.len()
-            );
+            assert!(read_exr(&path).is_err(), "cut to {length} of {} bytes", bytes.len());
         }
     }
 
@@ -448,9 +364,7 @@ mod tests {
                 changed[at] = value;
                 std::fs::write(&path, changed).unwrap();
                 if let Ok(image) = read_exr(&path) {
-                    assert!(
-                        u64::from(image.width) * u64::from(image.height) * 8 <= MEMORY_LIMIT_BYTES
-                    );
+                    assert!(u64::from(image.width) * u64::from(image.height) * 8 <= MEMORY_LIMIT_BYTES);
                 }
             }
         }
@@ -461,21 +375,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut bytes = sound_file(folder.path());
         let name = b"dataWindow\0box2i\0";
-        let at = bytes
-            .windows(name.len())
-            .position(|window| window == name)
-            .unwrap()
-            + name.len()
-            + 4;
+        let at = bytes.windows(name.len()).position(|window| window == name).unwrap() + name.len() + 4;
         bytes[at + 8..at + 12].copy_from_slice(&99_999i32.to_le_bytes());
         bytes[at + 12..at + 16].copy_from_slice(&99_999i32.to_le_bytes());
         let path = folder.path().join("large.exr");
         std::fs::write(&path, bytes).unwrap();
         let message = read_exr(&path).unwrap_err().to_string();
-        assert!(
-            message.contains("100000×100000 pixels of 2 channels need 76293 MiB"),
-            "{message}"
-        );
+        assert!(message.contains("100000×100000 pixels of 2 channels need 76293 MiB"), "{message}");
     }
 
     #[test]

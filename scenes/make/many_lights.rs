@@ -96,14 +96,8 @@ pub(crate) fn scene() -> String {
         );
     }
     // Columns of plaster with steel balls on them.
-    for (i, (x, z, height)) in [
-        (-2.3, -1.2, 1.5),
-        (-0.8, -1.9, 1.1),
-        (0.8, -1.9, 1.1),
-        (2.3, -1.2, 1.5),
-    ]
-    .iter()
-    .enumerate()
+    for (i, (x, z, height)) in
+        [(-2.3, -1.2, 1.5), (-0.8, -1.9, 1.1), (0.8, -1.9, 1.1), (2.3, -1.2, 1.5)].iter().enumerate()
     {
         let _ = write!(
             text,
@@ -128,8 +122,7 @@ pub(crate) fn scene() -> String {
             let x = -3.9 + 7.8 * t;
             let sag = 0.9 + 0.25 * random(string, 0, 1);
             let y = 3.3 - sag * 4.0 * t * (1.0 - t) + 0.05 * (TAU * 3.0 * t).sin();
-            let (name, _) =
-                COLORS[(random(string, lamp, 2) * COLORS.len() as f32) as usize % COLORS.len()];
+            let (name, _) = COLORS[(random(string, lamp, 2) * COLORS.len() as f32) as usize % COLORS.len()];
             let jitter = 0.3 * (random(string, lamp, 3) - 0.5);
             let _ = write!(
                 text,

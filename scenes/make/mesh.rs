@@ -19,11 +19,7 @@ fn sub(a: Vec3, b: Vec3) -> Vec3 {
 }
 
 pub(crate) fn cross(a: Vec3, b: Vec3) -> Vec3 {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 fn length(a: Vec3) -> f64 {
@@ -77,12 +73,7 @@ impl Part {
                 let mut face = vec![a, a + 1, a + columns + 2, a + columns + 1];
                 // At a pole two corners of a face are one point.
                 face.dedup_by(|b, a| length(sub(part.positions[*a], part.positions[*b])) < 1e-7);
-                if face.len() > 2
-                    && length(sub(
-                        part.positions[face[0]],
-                        part.positions[face[face.len() - 1]],
-                    )) < 1e-7
-                {
+                if face.len() > 2 && length(sub(part.positions[face[0]], part.positions[face[face.len() - 1]])) < 1e-7 {
                     face.pop();
                 }
                 if face.len() > 2 {
@@ -107,11 +98,7 @@ fn normal(point: &impl Fn(f64, f64) -> Vec3, u: f64, v: f64) -> Vec3 {
 fn short(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" {
-        "0".to_owned()
-    } else {
-        text.to_owned()
-    }
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
 /// Writes parts as `folder/name.obj`, which uses `folder/materials.mtl`. Texture coordinates are written for those materials
@@ -128,35 +115,20 @@ pub(crate) fn write_obj(
         let textured = textured(&part.material);
         let _ = writeln!(text, "o {}\nusemtl {}", part.name, part.material);
         for p in &part.positions {
-            let _ = writeln!(
-                text,
-                "v {} {} {}",
-                short(p[0], 5),
-                short(p[1], 5),
-                short(p[2], 5)
-            );
+            let _ = writeln!(text, "v {} {} {}", short(p[0], 5), short(p[1], 5), short(p[2], 5));
         }
         for t in part.uvs.iter().filter(|_| textured) {
             let _ = writeln!(text, "vt {} {}", short(t[0], 4), short(t[1], 4));
         }
         for n in &part.normals {
-            let _ = writeln!(
-                text,
-                "vn {} {} {}",
-                short(n[0], 3),
-                short(n[1], 3),
-                short(n[2], 3)
-            );
+            let _ = writeln!(text, "vn {} {} {}", short(n[0], 3), short(n[1], 3), short(n[2], 3));
         }
         for face in &part.faces {
             text.push('f');
             for corner in face {
                 let i = base + corner;
-                let _ = if textured {
-                    write!(text, " {i}/{}/{i}", uv_base + corner)
-                } else {
-                    write!(text, " {i}//{i}")
-                };
+                let _ =
+                    if textured { write!(text, " {i}/{}/{i}", uv_base + corner) } else { write!(text, " {i}//{i}") };
             }
             text.push('\n');
         }

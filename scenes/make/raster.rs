@@ -27,9 +27,7 @@ impl<T> Raster<T> {
     /// Evaluates `value(u, v)` at the middle of each of `size`² pixels; v runs down.
     pub(crate) fn new(size: u32, value: impl Fn(f32, f32) -> T) -> Self {
         let middle = |i: u32| (i as f32 + 0.5) / size as f32;
-        let values = (0..size * size)
-            .map(|i| value(middle(i % size), middle(i / size)))
-            .collect();
+        let values = (0..size * size).map(|i| value(middle(i % size), middle(i / size))).collect();
         Self { size, values }
     }
 }
@@ -48,11 +46,7 @@ fn write_png(path: &Path, size: u32, bytes: &[u8], color: ExtendedColorType) -> 
 impl Raster<Color> {
     /// Writes an 8-bit RGB picture.
     pub(crate) fn write(&self, path: &Path) -> anyhow::Result<()> {
-        let bytes: Vec<u8> = self
-            .values
-            .iter()
-            .flat_map(|color| color.map(byte))
-            .collect();
+        let bytes: Vec<u8> = self.values.iter().flat_map(|color| color.map(byte)).collect();
         write_png(path, self.size, &bytes, ExtendedColorType::Rgb8)
     }
 }

@@ -28,13 +28,7 @@ fn sum(a: [f32; 3], b: [f32; 3], weight: f32) -> [f32; 3] {
 }
 
 /// 1 inside a box of azimuths (turns) and elevations (degrees), with edges `soft` degrees wide.
-fn window(
-    azimuth: f32,
-    elevation: f32,
-    (left, right): (f32, f32),
-    (low, high): (f32, f32),
-    soft: f32,
-) -> f32 {
+fn window(azimuth: f32, elevation: f32, (left, right): (f32, f32), (low, high): (f32, f32), soft: f32) -> f32 {
     let rise = |edge: f32, x: f32| step(edge - soft, edge + soft, x);
     rise(low, elevation)
         * (1.0 - rise(high, elevation))
@@ -56,14 +50,10 @@ fn evening(azimuth: f32, elevation: f32) -> [f32; 3] {
     }
     let mut color = sum([0.85, 0.78, 0.72], [-0.62, -0.42, -0.10], up.powf(0.55));
     let x = azimuth + 0.5;
-    let cloud = fractal(x * 8.0, elevation / 14.0, (8, 997), 5, 3)
-        + 0.35 * fractal(x * 3.0, elevation / 25.0, (3, 997), 2, 4);
+    let cloud =
+        fractal(x * 8.0, elevation / 14.0, (8, 997), 5, 3) + 0.35 * fractal(x * 3.0, elevation / 25.0, (3, 997), 2, 4);
     let cover = step(0.02, 0.5, cloud) * step(0.0, 14.0, elevation);
-    color = sum(
-        color.map(|c| c * (1.0 - 0.6 * cover)),
-        [1.15, 1.08, 1.02],
-        0.75 * cover,
-    );
+    color = sum(color.map(|c| c * (1.0 - 0.6 * cover)), [1.15, 1.08, 1.02], 0.75 * cover);
     color = sum(color, [1.9, 1.25, 0.65], (-away / 14.0).exp());
     sum(color, [560.0, 430.0, 260.0], (-(away / 3.2).powi(2)).exp())
 }
@@ -84,8 +74,7 @@ fn room(azimuth: f32, elevation: f32) -> [f32; 3] {
 fn studio(azimuth: f32, elevation: f32) -> [f32; 3] {
     let mut color = [0.045, 0.046, 0.05];
     // Each box fades towards one end, as soft boxes do, which draws gradients on gloss.
-    let left =
-        window(azimuth, elevation, (-0.33, -0.22), (8.0, 62.0), 2.0) * step(-10.0, 80.0, elevation);
+    let left = window(azimuth, elevation, (-0.33, -0.22), (8.0, 62.0), 2.0) * step(-10.0, 80.0, elevation);
     let right = window(azimuth, elevation, (0.20, 0.25), (-2.0, 75.0), 1.5);
     let top = step(66.0, 74.0, elevation);
     color = sum(color, [70.0, 68.0, 66.0], left);

@@ -4,10 +4,10 @@ use super::settings::LoopSettings;
 use super::statistics::SampleStatistics;
 use crate::film::{Estimate, Film};
 use crate::sampler::Half;
+use fechner_perception::Plane;
 use fechner_perception::csf::CastleCsf;
 use fechner_perception::guide::{GuideInputs, denoise};
 use fechner_perception::photometry::luminance;
-use fechner_perception::Plane;
 use fechner_perception::seen;
 use fechner_perception::threshold::{ThresholdInputs, ThresholdMap, threshold_map};
 use fechner_perception::tone::{FittedTone, SceneGuide};
@@ -65,8 +65,7 @@ pub fn judge(film: &Film, settings: &LoopSettings) -> Result<Judgement, JudgeErr
             (f64::from(per_sample.values()[i]) * nits_squared * share * factor) as f32
         })
     };
-    let display_variance =
-        seen::display_variance(tone.as_ref(), display, &guide, &scene_variance(&statistics.pooled));
+    let display_variance = seen::display_variance(tone.as_ref(), display, &guide, &scene_variance(&statistics.pooled));
     let variance_per_sample = Half::BOTH.map(|half| {
         let scene = scene_variance(&statistics.for_half[half.index()]);
         let displayed = seen::display_variance(tone.as_ref(), display, &guide, &scene);
@@ -80,7 +79,16 @@ pub fn judge(film: &Film, settings: &LoopSettings) -> Result<Judgement, JudgeErr
         seen::display_half_difference(tone.as_ref(), display, &estimate.luminance_cd_m2, &estimate.half_difference);
     let predicted = thresholds.predicted_visibility(&display_variance);
     let measured = thresholds.measured_visibility(&displayed_difference);
-    Ok(Judgement { estimate, tone, thresholds, variance_of_mean, display_variance, predicted, measured, variance_per_sample })
+    Ok(Judgement {
+        estimate,
+        tone,
+        thresholds,
+        variance_of_mean,
+        display_variance,
+        predicted,
+        measured,
+        variance_per_sample,
+    })
 }
 
 /// Luminance of the denoised picture: what adaptation, masking and the operator are made from, so that noise neither

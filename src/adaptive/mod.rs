@@ -2,7 +2,7 @@
 //!
 //! [`render`] is the heart of the program. It walks a fixed ladder of visibilities and leaves each rung only when the
 //! picture has reached it, so that a preview is a prefix of the final picture. What to do next is decided in [`plan`]
-//! and by [`next_step`]; what the eye sees is asked of the perception crate in [`judge`]; variance is in [`statistics`].
+//! and by `next_step`; what the eye sees is asked of the perception crate in [`mod@judge`]; variance is in [`statistics`].
 
 pub mod judge;
 pub mod plan;

@@ -75,9 +75,7 @@ pub fn adaptive_plan(film: &Film, judgement: &Judgement, visibility: f64, max_sa
 /// One doubling for every pixel in whose surroundings the predicted visibility is above the target: what is left to do
 /// when each pixel by itself has what it needs.
 pub fn remainder_plan(film: &Film, judgement: &Judgement, visibility: f64, max_samples: u32) -> SamplePlan {
-    blocks(film, max_samples, |pixel| {
-        [u32::from(f64::from(judgement.predicted.values()[pixel]) > visibility); 2]
-    })
+    blocks(film, max_samples, |pixel| [u32::from(f64::from(judgement.predicted.values()[pixel]) > visibility); 2])
 }
 
 fn blocks(film: &Film, max_samples: u32, doublings: impl Fn(usize) -> [u32; 2]) -> SamplePlan {
@@ -106,7 +104,7 @@ fn confidence_margin(samples: f64) -> f64 {
 /// Doublings for a pixel that needs `ratio` times what it has: whole ones, and one more for a share of pixels such that
 /// the mean of 1/n is 1/need.
 fn doublings_for(ratio: f64, dither: f64) -> u32 {
-    if !(ratio > 1.0) {
+    if ratio.is_nan() || ratio <= 1.0 {
         return 0;
     }
     let whole = ratio.log2().floor().min(f64::from(MOST_DOUBLINGS_AT_ONCE)) as u32;
@@ -168,9 +166,8 @@ pub fn cut_to_budget(plan: SamplePlan, judgement: &Judgement, samples: u64) -> S
     blocks.sort_by_key(|b| (b.pixel, b.half, b.level));
     let mut kept: Vec<BlockWork> = Vec::with_capacity(blocks.len());
     for block in blocks {
-        let follows = kept.last().is_some_and(|k| {
-            k.pixel == block.pixel && k.half == block.half && k.level + 1 == block.level
-        });
+        let follows =
+            kept.last().is_some_and(|k| k.pixel == block.pixel && k.half == block.half && k.level + 1 == block.level);
         let is_first = plan_first_level(&kept, &block);
         if follows || is_first {
             kept.push(block);

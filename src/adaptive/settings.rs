@@ -1,7 +1,7 @@
 //! What a render is asked to do.
 
-use fechner_perception::tone::ToneOperator;
 use fechner_perception::display::Viewing;
+use fechner_perception::tone::ToneOperator;
 use std::time::Duration;
 
 /// How samples are spread.

@@ -36,15 +36,13 @@ impl SampleStatistics {
         let (width, height) = (film.width() as usize, film.height() as usize);
         let (a, b) = (film.half(Half::A), film.half(Half::B));
         let guides = film.guides();
-        let evidence: Vec<PixelEvidence> =
-            a.iter().zip(b).map(|(a, b)| PixelEvidence::new(a, b)).collect();
+        let evidence: Vec<PixelEvidence> = a.iter().zip(b).map(|(a, b)| PixelEvidence::new(a, b)).collect();
         let pooled: Vec<Pooled> = (0..width * height)
             .into_par_iter()
             .map(|i| pool(&evidence, guides, (i % width, i / width), (width, height)))
             .collect();
-        let plane = |value: &(dyn Fn(usize) -> f64 + Sync)| {
-            Plane::from_fn(width, height, |x, y| value(y * width + x) as f32)
-        };
+        let plane =
+            |value: &(dyn Fn(usize) -> f64 + Sync)| Plane::from_fn(width, height, |x, y| value(y * width + x) as f32);
         let decided_by = |other: &[HalfPixel], i: usize| pooled[i].variance.max(cautious_variance(&other[i]));
         Self {
             pooled: plane(&|i| pooled[i].variance),
@@ -145,9 +143,7 @@ fn pool(
 
 /// How alike two first surfaces are, in [0.02, 1]: never 0, so that a lone pixel still learns something.
 fn likeness(a: &PixelGuide, b: &PixelGuide) -> f32 {
-    let distance2 = |p: &[f32; 3], q: &[f32; 3]| {
-        p.iter().zip(q).map(|(p, q)| (p - q) * (p - q)).sum::<f32>()
-    };
+    let distance2 = |p: &[f32; 3], q: &[f32; 3]| p.iter().zip(q).map(|(p, q)| (p - q) * (p - q)).sum::<f32>();
     let normal = distance2(&a.normal, &b.normal);
     let albedo = distance2(&a.albedo, &b.albedo);
     let depth = (a.depth - b.depth).abs() / (a.depth.max(b.depth) + f32::MIN_POSITIVE);
@@ -177,12 +173,7 @@ mod tests {
                         let u = (crate::sampler::hash_words(counter, 99) >> 40) as f32 / 16_777_216.0;
                         sum.add(&PathSample {
                             radiance: Vec3::splat(value(pixel, u)),
-                            first_hit: FirstHit {
-                                albedo: Vec3::ONE,
-                                normal: Vec3::Z,
-                                depth: 1.0,
-                                object_id: 1,
-                            },
+                            first_hit: FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1 },
                             rays: 1,
                         });
                     }

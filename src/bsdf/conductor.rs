@@ -43,10 +43,7 @@ impl Conductor {
                 ggx: Ggx::isotropic(alpha),
                 missing,
                 grazing: GrazingHemisphere::new(alpha),
-                tint: energy::multiple_bounce_tint(
-                    fresnel::conductor_average(eta, k),
-                    1.0 - missing.average(),
-                ),
+                tint: energy::multiple_bounce_tint(fresnel::conductor_average(eta, k), 1.0 - missing.average()),
             }
         });
         Self { eta, k, facets }

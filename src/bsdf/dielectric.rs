@@ -64,8 +64,7 @@ impl<'a> Dielectric<'a> {
     ) -> Self {
         let roughness = roughness.clamp(0.0, 1.0);
         let alpha = roughness * roughness;
-        let rough =
-            alpha >= SMALLEST_ALPHA && (eta_inside_over_outside - 1.0).abs() >= SMALLEST_INDEX_STEP;
+        let rough = alpha >= SMALLEST_ALPHA && (eta_inside_over_outside - 1.0).abs() >= SMALLEST_INDEX_STEP;
         Self {
             eta_inside_over_outside,
             transmittance,
@@ -84,22 +83,14 @@ impl<'a> Dielectric<'a> {
 
     /// Index on the far side over the index on `wo`'s side.
     fn eta_from(&self, wo: Vec3) -> f32 {
-        if wo.z > 0.0 {
-            self.eta_inside_over_outside
-        } else {
-            1.0 / self.eta_inside_over_outside
-        }
+        if wo.z > 0.0 { self.eta_inside_over_outside } else { 1.0 / self.eta_inside_over_outside }
     }
 
     fn near(&self, facets: &Facets<'a>, wo: Vec3) -> Near<'a> {
         let outside = wo.z > 0.0;
         let up = if outside { wo } else { turn(wo) };
-        let compensation = facets
-            .tables
-            .map(|tables| tables.compensation(facets.roughness, outside));
-        let single_share = compensation.map_or(1.0, |c| {
-            (1.0 - c.near.at(up.z)).clamp(0.05, LARGEST_SINGLE_SHARE)
-        });
+        let compensation = facets.tables.map(|tables| tables.compensation(facets.roughness, outside));
+        let single_share = compensation.map_or(1.0, |c| (1.0 - c.near.at(up.z)).clamp(0.05, LARGEST_SINGLE_SHARE));
         let compensation_reflects = compensation.map_or(0.0, |c| {
             let reflected = 1.0 - c.transmitted_share;
             reflected / (reflected + c.transmitted_share * self.transmittance.max_element())
@@ -155,12 +146,7 @@ impl<'a> Dielectric<'a> {
             });
         }
         let pdf = 1.0 - probability;
-        let wi = Vec3::new(
-            -wo.x / eta,
-            -wo.y / eta,
-            -boundary.cos_transmitted.copysign(wo.z),
-        )
-        .normalize();
+        let wi = Vec3::new(-wo.x / eta, -wo.y / eta, -boundary.cos_transmitted.copysign(wo.z)).normalize();
         (pdf > 0.0 && wi.z != 0.0).then(|| BsdfSample {
             wi,
             weight: transmitted / (pdf * eta * eta),
@@ -181,11 +167,7 @@ impl Near<'_> {
         let (single, rest) = warp::choose(u[2], self.single_share);
         if !single {
             let wi = self.grazing.sample([u[0], u[1]]);
-            return Some(if rest < self.compensation_reflects {
-                wi
-            } else {
-                turn(wi)
-            });
+            return Some(if rest < self.compensation_reflects { wi } else { turn(wi) });
         }
         let m = self.ggx.sample_visible(self.wo, [u[0], u[1]]);
         let cos = self.wo.dot(m).max(0.0);
@@ -214,12 +196,10 @@ impl Near<'_> {
         let h = (wo + wi).normalize_or(Vec3::Z);
         let reflectance = fresnel::dielectric(wo.dot(h), self.eta).reflectance;
         let single = reflectance * self.ggx.density(h) * self.ggx.visibility(wo, wi) * wi.z;
-        let single_pdf = reflection_probability(reflectance, self.tint)
-            * 0.25
-            * self.ggx.visible_density_over_cosine(wo, h);
-        let multiple = self.compensation.map_or(0.0, |c| {
-            (1.0 - c.transmitted_share) * energy::missing_lobe(&c.near, wo.z, wi.z)
-        });
+        let single_pdf =
+            reflection_probability(reflectance, self.tint) * 0.25 * self.ggx.visible_density_over_cosine(wo, h);
+        let multiple =
+            self.compensation.map_or(0.0, |c| (1.0 - c.transmitted_share) * energy::missing_lobe(&c.near, wo.z, wi.z));
         let multiple_pdf = self.compensation_reflects * self.grazing.pdf(wi.z);
         BsdfEvaluation {
             value: Vec3::splat(single + multiple),
@@ -256,14 +236,9 @@ impl Near<'_> {
         // Facet steradians per steradian of wi.
         let jacobian = self.eta * self.eta * -cos_i / (root * root);
         let up = turn(wi);
-        let value = (1.0 - reflectance)
-            * self.ggx.density(h)
-            * self.ggx.visibility(wo, up)
-            * 4.0
-            * up.z
-            * cos_o
-            * jacobian
-            / (self.eta * self.eta);
+        let value =
+            (1.0 - reflectance) * self.ggx.density(h) * self.ggx.visibility(wo, up) * 4.0 * up.z * cos_o * jacobian
+                / (self.eta * self.eta);
         let pdf = (1.0 - reflection_probability(reflectance, self.tint))
             * self.ggx.visible_density_over_cosine(wo, h)
             * cos_o
@@ -277,9 +252,5 @@ fn reflection_probability(reflectance: f32, tint: Vec3) -> f32 {
     let transmitted = (1.0 - reflectance) * tint.max_element();
     let total = reflectance + transmitted;
     // With nothing to follow (an index of 1 and a black tint) either answer is right.
-    if total > 0.0 {
-        reflectance / total
-    } else {
-        1.0
-    }
+    if total > 0.0 { reflectance / total } else { 1.0 }
 }

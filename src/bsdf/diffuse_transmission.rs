@@ -24,15 +24,7 @@ impl DiffuseTransmission {
     /// Albedo of either side per channel in [0, 1], their sum at most 1.
     pub fn new(reflectance: Vec3, transmittance: Vec3) -> Self {
         let total = reflectance.max_element() + transmittance.max_element();
-        Self {
-            reflectance,
-            transmittance,
-            reflects: if total > 0.0 {
-                reflectance.max_element() / total
-            } else {
-                1.0
-            },
-        }
+        Self { reflectance, transmittance, reflects: if total > 0.0 { reflectance.max_element() / total } else { 1.0 } }
     }
 
     pub(super) fn evaluate(&self, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
@@ -40,16 +32,10 @@ impl DiffuseTransmission {
         if wo.z <= 0.0 {
             return BsdfEvaluation::BLACK;
         }
-        let (albedo, share) = if wi.z > 0.0 {
-            (self.reflectance, self.reflects)
-        } else {
-            (self.transmittance, 1.0 - self.reflects)
-        };
+        let (albedo, share) =
+            if wi.z > 0.0 { (self.reflectance, self.reflects) } else { (self.transmittance, 1.0 - self.reflects) };
         let cos = wi.z.abs();
-        BsdfEvaluation {
-            value: albedo * (FRAC_1_PI * cos),
-            pdf: share * warp::cosine_hemisphere_pdf(cos),
-        }
+        BsdfEvaluation { value: albedo * (FRAC_1_PI * cos), pdf: share * warp::cosine_hemisphere_pdf(cos) }
     }
 
     pub(super) fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {

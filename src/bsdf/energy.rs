@@ -116,14 +116,9 @@ impl AlbedoTable {
         let rows = std::array::from_fn(|row| {
             let roughness = node_roughness(row, ROUGHNESS_NODES);
             let alpha = roughness * roughness;
-            std::array::from_fn(|column| {
-                albedo(cosine_of_column(node(column, COSINE_NODES), alpha), alpha)
-            })
+            std::array::from_fn(|column| albedo(cosine_of_column(node(column, COSINE_NODES), alpha), alpha))
         });
-        let mut table = Self {
-            rows,
-            averages_over_alpha2: [0.0; AVERAGE_NODES],
-        };
+        let mut table = Self { rows, averages_over_alpha2: [0.0; AVERAGE_NODES] };
         table.averages_over_alpha2 = std::array::from_fn(|index| {
             let roughness = node_roughness(index, AVERAGE_NODES);
             cosine_average(&table.curve(roughness)) / roughness.powi(4)
@@ -143,11 +138,7 @@ impl AlbedoTable {
             alpha,
             average: alpha
                 * alpha
-                * lerp(
-                    self.averages_over_alpha2[average],
-                    self.averages_over_alpha2[average + 1],
-                    average_fraction,
-                ),
+                * lerp(self.averages_over_alpha2[average], self.averages_over_alpha2[average + 1], average_fraction),
         }
     }
 }
@@ -223,9 +214,7 @@ pub(crate) struct SchlickCurve {
 impl SchlickCurve {
     /// S at `roughness` in [0, 1].
     pub(crate) fn new(roughness: f32) -> Self {
-        Self {
-            above_smooth: GGX.schlick.curve(roughness),
-        }
+        Self { above_smooth: GGX.schlick.curve(roughness) }
     }
 
     /// S at an incident cosine in (0, 1].
@@ -267,9 +256,7 @@ pub(crate) struct DielectricCompensation<'a> {
 // Tables are not for reading: the parameters that they were made for are.
 impl fmt::Debug for DielectricTables {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("DielectricTables")
-            .field("eta", &self.eta)
-            .finish_non_exhaustive()
+        f.debug_struct("DielectricTables").field("eta", &self.eta).finish_non_exhaustive()
     }
 }
 
@@ -299,12 +286,7 @@ impl DielectricTables {
             })
         };
         let (outside, inside) = rayon::join(|| side(eta), || side(1.0 / eta));
-        Self {
-            eta,
-            outside,
-            inside,
-            throughput: 1.0 - dielectric_average(eta),
-        }
+        Self { eta, outside, inside, throughput: 1.0 - dielectric_average(eta) }
     }
 
     /// The relative index that the tables were made for.
@@ -320,17 +302,12 @@ impl DielectricTables {
     pub(crate) fn compensation(&self, roughness: f32, outside: bool) -> DielectricCompensation<'_> {
         let outer = self.outside.curve(roughness);
         let inner = self.inside.curve(roughness);
-        let (near, far, index) = if outside {
-            (outer, inner, 1.0)
-        } else {
-            (inner, outer, self.eta)
-        };
+        let (near, far, index) = if outside { (outer, inner, 1.0) } else { (inner, outer, self.eta) };
         let transmittance = self.throughput / (index * index);
         DielectricCompensation {
             near,
             far,
-            transmitted_share: transmittance
-                * (far.missing_average() / near.missing_average()).min(1.0),
+            transmitted_share: transmittance * (far.missing_average() / near.missing_average()).min(1.0),
         }
     }
 }
@@ -350,40 +327,25 @@ fn dielectric_average(eta: f32) -> f32 {
 /// Share of light that leaves after being reflected by facet `m`.
 fn reflected(ggx: &Ggx, wo: Vec3, m: Vec3) -> f32 {
     let wi = 2.0 * wo.dot(m) * m - wo;
-    if wi.z > 0.0 {
-        ggx.unshadowed(wo, wi)
-    } else {
-        0.0
-    }
+    if wi.z > 0.0 { ggx.unshadowed(wo, wi) } else { 0.0 }
 }
 
 /// Share of light that leaves on the other side after being refracted by facet `m`.
 fn transmitted(ggx: &Ggx, wo: Vec3, m: Vec3, eta: f32, cos_transmitted: f32) -> f32 {
     let wi = m * (wo.dot(m) / eta - cos_transmitted) - wo / eta;
-    if wi.z < 0.0 {
-        ggx.unshadowed(wo, super::turn(wi))
-    } else {
-        0.0
-    }
+    if wi.z < 0.0 { ggx.unshadowed(wo, super::turn(wi)) } else { 0.0 }
 }
 
 /// Mean of `f(wo, m)` over the facet normals m visible from `wo` at cosine `mu`.
 fn average_over_visible_normals(ggx: &Ggx, mu: f32, f: impl Fn(Vec3, Vec3) -> f32) -> f32 {
     let wo = Vec3::new((1.0 - mu * mu).max(0.0).sqrt(), 0.0, mu);
     let cap = ggx.visible_cap(wo);
-    QUADRATURE
-        .iter()
-        .map(|point| point.weight * f(wo, cap.normal(point.azimuth, point.u)))
-        .sum()
+    QUADRATURE.iter().map(|point| point.weight * f(wo, cap.normal(point.azimuth, point.u))).sum()
 }
 
 /// 2∫curve(μ)μ dμ, by three-point Gauss–Legendre quadrature on every interval of the table.
 fn cosine_average(curve: &AlbedoCurve<'_>) -> f32 {
-    const NODES: [(f32, f32); 3] = [
-        (0.112_701_67, 0.277_777_8),
-        (0.5, 0.444_444_45),
-        (0.887_298_35, 0.277_777_8),
-    ];
+    const NODES: [(f32, f32); 3] = [(0.112_701_67, 0.277_777_8), (0.5, 0.444_444_45), (0.887_298_35, 0.277_777_8)];
     let mut sum = 0.0;
     let mut low = 0.0;
     for column in 1..COSINE_NODES {

@@ -21,19 +21,12 @@ pub(crate) fn dielectric(cos_incident: f32, eta: f32) -> DielectricBoundary {
     let cos_incident = cos_incident.clamp(0.0, 1.0);
     let sin2_transmitted = (1.0 - cos_incident * cos_incident) / (eta * eta);
     if sin2_transmitted >= 1.0 {
-        return DielectricBoundary {
-            reflectance: 1.0,
-            cos_transmitted: 0.0,
-        };
+        return DielectricBoundary { reflectance: 1.0, cos_transmitted: 0.0 };
     }
     let cos_transmitted = (1.0 - sin2_transmitted).sqrt();
-    let perpendicular =
-        (cos_incident - eta * cos_transmitted) / (cos_incident + eta * cos_transmitted);
+    let perpendicular = (cos_incident - eta * cos_transmitted) / (cos_incident + eta * cos_transmitted);
     let parallel = (eta * cos_incident - cos_transmitted) / (eta * cos_incident + cos_transmitted);
-    DielectricBoundary {
-        reflectance: 0.5 * (perpendicular * perpendicular + parallel * parallel),
-        cos_transmitted,
-    }
+    DielectricBoundary { reflectance: 0.5 * (perpendicular * perpendicular + parallel * parallel), cos_transmitted }
 }
 
 /// Exact reflectance per channel of a conductor with complex index `eta` + i `k` relative to the incident side, for an
@@ -68,9 +61,7 @@ pub(crate) fn conductor_average(eta: Vec3, k: Vec3) -> Vec3 {
         (0.669_990_54, 0.326_072_57),
         (0.930_568_16, 0.173_927_43),
     ];
-    NODES.iter().fold(Vec3::ZERO, |sum, &(mu2, weight)| {
-        sum + weight * conductor(mu2.sqrt(), eta, k)
-    })
+    NODES.iter().fold(Vec3::ZERO, |sum, &(mu2, weight)| sum + weight * conductor(mu2.sqrt(), eta, k))
 }
 
 /// Reflectance at normal incidence of a dielectric of relative index `ior`.

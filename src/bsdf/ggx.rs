@@ -20,10 +20,7 @@ pub(crate) struct Ggx {
 impl Ggx {
     /// The same width along every azimuth.
     pub(crate) fn isotropic(alpha: f32) -> Self {
-        Self {
-            alpha_x: alpha,
-            alpha_y: alpha,
-        }
+        Self { alpha_x: alpha, alpha_y: alpha }
     }
 
     /// D(m): area of facets with normal `m` per unit of macro-surface and steradian.
@@ -69,10 +66,7 @@ impl Ggx {
 
     /// The normals visible from `wo`, as a cap of the sphere.
     pub(crate) fn visible_cap(&self, wo: Vec3) -> VisibleCap {
-        VisibleCap {
-            ggx: *self,
-            stretched: Vec3::new(self.alpha_x * wo.x, self.alpha_y * wo.y, wo.z).normalize(),
-        }
+        VisibleCap { ggx: *self, stretched: Vec3::new(self.alpha_x * wo.x, self.alpha_y * wo.y, wo.z).normalize() }
     }
 }
 
@@ -90,11 +84,6 @@ impl VisibleCap {
         let z = (1.0 - u) * (1.0 + self.stretched.z) - self.stretched.z;
         let sin_theta = (1.0 - z * z).max(0.0).sqrt();
         let half = Vec3::new(sin_theta * cos_phi, sin_theta * sin_phi, z) + self.stretched;
-        Vec3::new(
-            self.ggx.alpha_x * half.x,
-            self.ggx.alpha_y * half.y,
-            half.z.max(0.0),
-        )
-        .normalize_or(Vec3::Z)
+        Vec3::new(self.ggx.alpha_x * half.x, self.ggx.alpha_y * half.y, half.z.max(0.0)).normalize_or(Vec3::Z)
     }
 }

@@ -26,10 +26,7 @@ impl Lambert {
         if !(wo.z > 0.0 && wi.z > 0.0) {
             return BsdfEvaluation::BLACK;
         }
-        BsdfEvaluation {
-            value: self.reflectance * (FRAC_1_PI * wi.z),
-            pdf: warp::cosine_hemisphere_pdf(wi.z),
-        }
+        BsdfEvaluation { value: self.reflectance * (FRAC_1_PI * wi.z), pdf: warp::cosine_hemisphere_pdf(wi.z) }
     }
 
     pub(super) fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
@@ -37,10 +34,8 @@ impl Lambert {
             return None;
         }
         let wi = warp::cosine_hemisphere([u[0], u[1]]);
-        let evaluation = BsdfEvaluation {
-            value: self.reflectance * (FRAC_1_PI * wi.z),
-            pdf: warp::cosine_hemisphere_pdf(wi.z),
-        };
+        let evaluation =
+            BsdfEvaluation { value: self.reflectance * (FRAC_1_PI * wi.z), pdf: warp::cosine_hemisphere_pdf(wi.z) };
         evaluation.sample_turned(wi, wo)
     }
 

@@ -116,25 +116,16 @@ impl Shares {
 
 impl MetalRoughness {
     /// The parameters as in the file's head.
-    pub fn new(
-        base_color: Vec3,
-        metallic: f32,
-        roughness: f32,
-        ior: f32,
-        transmission: f32,
-    ) -> Self {
+    pub fn new(base_color: Vec3, metallic: f32, roughness: f32, ior: f32, transmission: f32) -> Self {
         let metallic = metallic.clamp(0.0, 1.0);
         let transmission = transmission.clamp(0.0, 1.0);
         let roughness = roughness.clamp(0.0, 1.0);
         let alpha = roughness * roughness;
         let coat_f0 = normal_reflectance(ior);
-        let facets = (alpha >= SMALLEST_ALPHA)
-            .then(|| Facets::new(roughness, base_color, metallic, coat_f0));
+        let facets = (alpha >= SMALLEST_ALPHA).then(|| Facets::new(roughness, base_color, metallic, coat_f0));
         let coat_average = match &facets {
             None => coat_f0 + (1.0 - coat_f0) * SCHLICK_AVERAGE,
-            Some(facets) => {
-                facets.coat_albedo(coat_f0, facets.missing.average(), facets.schlick.average())
-            }
+            Some(facets) => facets.coat_albedo(coat_f0, facets.missing.average(), facets.schlick.average()),
         };
         let base = base_color * (1.0 - metallic);
         Self {
@@ -207,13 +198,7 @@ impl MetalRoughness {
         }
     }
 
-    fn evaluate_front(
-        &self,
-        near: &Albedos,
-        shares: &Shares,
-        wo: Vec3,
-        wi: Vec3,
-    ) -> BsdfEvaluation {
+    fn evaluate_front(&self, near: &Albedos, shares: &Shares, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
         if wi.z > 0.0 {
             self.evaluate_reflection(near, shares, wo, wi)
         } else if wi.z < 0.0 {
@@ -223,13 +208,7 @@ impl MetalRoughness {
         }
     }
 
-    fn evaluate_reflection(
-        &self,
-        near: &Albedos,
-        shares: &Shares,
-        wo: Vec3,
-        wi: Vec3,
-    ) -> BsdfEvaluation {
+    fn evaluate_reflection(&self, near: &Albedos, shares: &Shares, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
         let far = self.albedos(wi.z);
         let base = (1.0 - near.coat) * (1.0 - far.coat) * wi.z * FRAC_1_PI / self.base_average;
         let mut value = self.diffuse * base;
@@ -237,8 +216,7 @@ impl MetalRoughness {
         if let Some(facets) = &self.facets {
             let facet = facets.reflect(wo, wi);
             let fresnel = self.f0 + (Vec3::ONE - self.f0) * facet.schlick;
-            value += fresnel * facet.value
-                + facets.tint * energy::missing_lobe(&facets.missing, wo.z, wi.z);
+            value += fresnel * facet.value + facets.tint * energy::missing_lobe(&facets.missing, wo.z, wi.z);
             pdf += shares.specular * facet.pdf + shares.multiple * facets.grazing.pdf(wi.z);
         }
         BsdfEvaluation { value, pdf }
@@ -255,8 +233,7 @@ impl MetalRoughness {
         let multiple = (1.0 - facets.coat_tint) * energy::missing_lobe(&facets.missing, wo.z, wi.z);
         BsdfEvaluation {
             value: self.transmitted * (passed * facet.value + multiple),
-            pdf: shares.through_single * facet.pdf
-                + shares.through_multiple * facets.grazing.pdf(wi.z),
+            pdf: shares.through_single * facet.pdf + shares.through_multiple * facets.grazing.pdf(wi.z),
         }
     }
 
@@ -272,9 +249,7 @@ impl MetalRoughness {
         let up = match (choice, &self.facets) {
             (Choice::Diffuse, _) => warp::cosine_hemisphere([u[0], u[1]]),
             (_, None) => return Some(self.sample_smooth(&near, &shares, wo, through)),
-            (Choice::Multiple | Choice::ThroughMultiple, Some(facets)) => {
-                facets.grazing.sample([u[0], u[1]])
-            }
+            (Choice::Multiple | Choice::ThroughMultiple, Some(facets)) => facets.grazing.sample([u[0], u[1]]),
             (Choice::Specular | Choice::ThroughSingle, Some(facets)) => {
                 let m = facets.ggx.sample_visible(front, [u[0], u[1]]);
                 2.0 * front.dot(m) * m - front
@@ -284,18 +259,11 @@ impl MetalRoughness {
             return None;
         }
         let wi = if through { turn(up) } else { up };
-        self.evaluate_front(&near, &shares, front, wi)
-            .sample_turned(wi, wo)
+        self.evaluate_front(&near, &shares, front, wi).sample_turned(wi, wo)
     }
 
     /// The delta lobes of a perfectly smooth coat.
-    fn sample_smooth(
-        &self,
-        near: &Albedos,
-        shares: &Shares,
-        wo: Vec3,
-        through: bool,
-    ) -> BsdfSample {
+    fn sample_smooth(&self, near: &Albedos, shares: &Shares, wo: Vec3, through: bool) -> BsdfSample {
         if through {
             BsdfSample {
                 wi: -wo,

@@ -58,28 +58,16 @@ pub struct BsdfEvaluation {
 
 impl BsdfEvaluation {
     /// Nothing is scattered and nothing is ever sampled.
-    pub const BLACK: Self = Self {
-        value: Vec3::ZERO,
-        pdf: 0.0,
-    };
+    pub const BLACK: Self = Self { value: Vec3::ZERO, pdf: 0.0 };
 
     /// The sample of a smooth lobe that chose `wi`, or `None` where it carries nothing.
     ///
     /// The weight is value / pdf of the *whole* mixture of lobes, so that a sample and an evaluation always agree.
     fn into_sample(self, wi: Vec3) -> Option<BsdfSample> {
-        let lobe = if wi.z > 0.0 {
-            Lobe::Smooth
-        } else {
-            Lobe::SmoothTransmission
-        };
+        let lobe = if wi.z > 0.0 { Lobe::Smooth } else { Lobe::SmoothTransmission };
         // A pdf above zero but so small that the weight overflows comes only from rounding.
         let weight = self.value / self.pdf;
-        (self.pdf > 0.0 && weight.is_finite()).then_some(BsdfSample {
-            wi,
-            weight,
-            pdf: self.pdf,
-            lobe,
-        })
+        (self.pdf > 0.0 && weight.is_finite()).then_some(BsdfSample { wi, weight, pdf: self.pdf, lobe })
     }
 
     /// The same seen from the other side of the surface: for models that turn both directions over.
@@ -181,12 +169,7 @@ impl<'a> Bsdf<'a> {
         transmittance: Vec3,
         tables: Option<&'a DielectricTables>,
     ) -> Self {
-        Self::Dielectric(Dielectric::new(
-            eta_inside_over_outside,
-            roughness,
-            transmittance,
-            tables,
-        ))
+        Self::Dielectric(Dielectric::new(eta_inside_over_outside, roughness, transmittance, tables))
     }
 
     /// Thin sheet of a clear material; `transmittance` tints what goes through.
@@ -195,20 +178,8 @@ impl<'a> Bsdf<'a> {
     }
 
     /// The metal-roughness material of glTF 2.0 with its extensions for the index of refraction and for transmission.
-    pub fn metal_roughness(
-        base_color: Vec3,
-        metallic: f32,
-        roughness: f32,
-        ior: f32,
-        transmission: f32,
-    ) -> Self {
-        Self::MetalRoughness(MetalRoughness::new(
-            base_color,
-            metallic,
-            roughness,
-            ior,
-            transmission,
-        ))
+    pub fn metal_roughness(base_color: Vec3, metallic: f32, roughness: f32, ior: f32, transmission: f32) -> Self {
+        Self::MetalRoughness(MetalRoughness::new(base_color, metallic, roughness, ior, transmission))
     }
 
     /// Rough diffuse reflection with walls of albedo `reflectance` and `roughness`, both in [0, 1].
@@ -276,11 +247,7 @@ impl<'a> Bsdf<'a> {
 
 /// Turns both directions over if `wo` lies below the surface, so that an opaque model only sees its front.
 fn to_front(wo: Vec3, wi: Vec3) -> (Vec3, Vec3) {
-    if wo.z < 0.0 {
-        (turn(wo), turn(wi))
-    } else {
-        (wo, wi)
-    }
+    if wo.z < 0.0 { (turn(wo), turn(wi)) } else { (wo, wi) }
 }
 
 /// The direction mirrored in the surface's plane.

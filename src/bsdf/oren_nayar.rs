@@ -31,15 +31,8 @@ impl OrenNayar {
         let roughness = roughness.clamp(0.0, 1.0);
         let facing = 1.0 / (1.0 + (0.5 - 2.0 / (3.0 * PI)) * roughness);
         let average = facing * (1.0 + (2.0 / 3.0 - 28.0 / (15.0 * PI)) * roughness);
-        let multiple =
-            reflectance * reflectance * average / (Vec3::ONE - reflectance * (1.0 - average));
-        Self {
-            reflectance,
-            roughness,
-            facing,
-            average,
-            multiple,
-        }
+        let multiple = reflectance * reflectance * average / (Vec3::ONE - reflectance * (1.0 - average));
+        Self { reflectance, roughness, facing, average, multiple }
     }
 
     /// Albedo of single scattering at an incident cosine, for white walls.
@@ -61,19 +54,12 @@ impl OrenNayar {
         let missing = |cos| (1.0 - self.single_albedo(cos)).max(0.0);
         let between = missing(wo.z) * missing(wi.z) / missing_average;
         let f = self.reflectance * single.max(0.0) + self.multiple * between;
-        BsdfEvaluation {
-            value: f * (FRAC_1_PI * wi.z),
-            pdf: warp::cosine_hemisphere_pdf(wi.z),
-        }
+        BsdfEvaluation { value: f * (FRAC_1_PI * wi.z), pdf: warp::cosine_hemisphere_pdf(wi.z) }
     }
 
     pub(super) fn evaluate(&self, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
         let (wo, wi) = to_front(wo, wi);
-        if wo.z > 0.0 && wi.z > 0.0 {
-            self.evaluate_front(wo, wi)
-        } else {
-            BsdfEvaluation::BLACK
-        }
+        if wo.z > 0.0 && wi.z > 0.0 { self.evaluate_front(wo, wi) } else { BsdfEvaluation::BLACK }
     }
 
     pub(super) fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {

@@ -45,12 +45,7 @@ impl ThinDielectric {
             })
         } else {
             let pdf = 1.0 - probability;
-            (pdf > 0.0).then(|| BsdfSample {
-                wi: -wo,
-                weight: transmitted / pdf,
-                pdf,
-                lobe: Lobe::DeltaTransmission,
-            })
+            (pdf > 0.0).then(|| BsdfSample { wi: -wo, weight: transmitted / pdf, pdf, lobe: Lobe::DeltaTransmission })
         }
     }
 

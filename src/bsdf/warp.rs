@@ -10,11 +10,7 @@ pub(crate) fn cosine_hemisphere(u: [f32; 2]) -> Vec3 {
     let (sin, cos) = (TAU * u[0]).sin_cos();
     let radius = u[1].sqrt();
     // u below 1 keeps z above 0, so that no sample lies in the surface.
-    Vec3::new(
-        radius * cos,
-        radius * sin,
-        (1.0 - u[1]).max(f32::MIN_POSITIVE).sqrt(),
-    )
+    Vec3::new(radius * cos, radius * sin, (1.0 - u[1]).max(f32::MIN_POSITIVE).sqrt())
 }
 
 /// Pdf per steradian of [`cosine_hemisphere`]; 0 below the surface.
@@ -39,10 +35,7 @@ impl GrazingHemisphere {
     pub(crate) fn new(alpha: f32) -> Self {
         // c = α for smooth surfaces; at α = 1 large, and the distribution all but cosine.
         let spread2 = alpha * alpha / (1.02 - alpha);
-        Self {
-            spread2,
-            log: (1.0 / spread2).ln_1p(),
-        }
+        Self { spread2, log: (1.0 / spread2).ln_1p() }
     }
 
     /// A direction from `u` in [0, 1)².
@@ -55,11 +48,7 @@ impl GrazingHemisphere {
 
     /// Pdf per steradian; 0 below the surface.
     pub(crate) fn pdf(&self, cos_theta: f32) -> f32 {
-        if cos_theta > 0.0 {
-            cos_theta * FRAC_1_PI / (self.log * (cos_theta * cos_theta + self.spread2))
-        } else {
-            0.0
-        }
+        if cos_theta > 0.0 { cos_theta * FRAC_1_PI / (self.log * (cos_theta * cos_theta + self.spread2)) } else { 0.0 }
     }
 }
 

@@ -14,18 +14,12 @@ pub(crate) fn run(path: &Path) -> anyhow::Result<()> {
 
 /// The text that [`run`] prints.
 fn describe(path: &Path) -> anyhow::Result<String> {
-    let ending = path
-        .extension()
-        .and_then(|e| e.to_str())
-        .map(str::to_ascii_lowercase);
+    let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
     match ending.as_deref() {
         Some("exr") => Ok(describe_exr(&read_exr(path)?)),
         Some("png") => describe_png(path),
         Some("hdr") => describe_hdr(path),
-        _ => bail!(
-            "cannot tell what {} is: .exr, .png and .hdr files are known",
-            path.display()
-        ),
+        _ => bail!("cannot tell what {} is: .exr, .png and .hdr files are known", path.display()),
     }
 }
 
@@ -39,12 +33,7 @@ struct Range {
 
 impl Range {
     fn of(values: impl Iterator<Item = f32>) -> Self {
-        let mut range = Self {
-            min: f32::INFINITY,
-            mean: 0.0,
-            max: f32::NEG_INFINITY,
-            nonfinite: 0,
-        };
+        let mut range = Self { min: f32::INFINITY, mean: 0.0, max: f32::NEG_INFINITY, nonfinite: 0 };
         let mut count = 0_u64;
         for value in values {
             if value.is_finite() {
@@ -61,12 +50,7 @@ impl Range {
     }
 
     fn row(&self, text: &mut String, name: &str, kind: &str, width: usize) {
-        let Self {
-            min,
-            mean,
-            max,
-            nonfinite,
-        } = self;
+        let Self { min, mean, max, nonfinite } = self;
         let _ = write!(
             text,
             "  {name:width$}  {kind:5}  {:>12}  {:>12}  {:>12}",
@@ -91,39 +75,21 @@ fn short(value: f32) -> String {
     } else {
         let digits = (5 - size.log10().floor() as i32).max(0) as usize;
         let text = format!("{value:.digits$}");
-        if text.contains('.') {
-            text.trim_end_matches('0').trim_end_matches('.').to_owned()
-        } else {
-            text
-        }
+        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
     }
 }
 
 fn heading(text: &mut String, first: &str, width: usize) {
-    let _ = writeln!(
-        text,
-        "  {first:width$}  type   {:>12}  {:>12}  {:>12}",
-        "min", "mean", "max"
-    );
+    let _ = writeln!(text, "  {first:width$}  type   {:>12}  {:>12}  {:>12}", "min", "mean", "max");
 }
 
 fn describe_exr(image: &ExrImage) -> String {
     let mut text = format!("OpenEXR, {}×{} pixels", image.width, image.height);
     if image.data_window_origin != (0, 0) {
-        let _ = write!(
-            text,
-            " from ({}, {})",
-            image.data_window_origin.0, image.data_window_origin.1
-        );
+        let _ = write!(text, " from ({}, {})", image.data_window_origin.0, image.data_window_origin.1);
     }
     text.push_str("\n\n");
-    let width = image
-        .channels
-        .iter()
-        .map(|(name, _)| name.len())
-        .max()
-        .unwrap_or(0)
-        .max(7);
+    let width = image.channels.iter().map(|(name, _)| name.len()).max().unwrap_or(0).max(7);
     heading(&mut text, "channel", width);
     for ((name, values), kind) in image.channels.iter().zip(&image.types) {
         Range::of(values.iter().copied()).row(&mut text, name, &kind.to_string(), width);
@@ -133,12 +99,7 @@ fn describe_exr(image: &ExrImage) -> String {
     }
     if !image.attributes.is_empty() {
         text.push('\n');
-        let width = image
-            .attributes
-            .iter()
-            .map(|(name, _)| name.len())
-            .max()
-            .unwrap_or(0);
+        let width = image.attributes.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
         for (name, value) in &image.attributes {
             let _ = writeln!(text, "  {name:width$}  {value}");
         }
@@ -148,8 +109,7 @@ fn describe_exr(image: &ExrImage) -> String {
 
 fn describe_png(path: &Path) -> anyhow::Result<String> {
     let problem = || format!("cannot read {}: damaged or no PNG file", path.display());
-    let file =
-        std::fs::File::open(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let file = std::fs::File::open(path).with_context(|| format!("cannot read {}", path.display()))?;
     let mut decoder = png::Decoder::new(std::io::BufReader::new(file));
     decoder.set_limits(png::Limits { bytes: 1 << 28 });
     let mut reader = decoder.read_info().with_context(problem)?;
@@ -159,10 +119,7 @@ fn describe_png(path: &Path) -> anyhow::Result<String> {
         tags.push(format!("sRGB ({intent:?})"));
     }
     if let Some(cicp) = info.coding_independent_code_points {
-        tags.push(format!(
-            "CICP primaries {}, transfer {}",
-            cicp.color_primaries, cicp.transfer_function
-        ));
+        tags.push(format!("CICP primaries {}, transfer {}", cicp.color_primaries, cicp.transfer_function));
     }
     if let Some(profile) = &info.icc_profile {
         tags.push(format!("ICC profile of {} bytes", profile.len()));
@@ -174,10 +131,8 @@ fn describe_png(path: &Path) -> anyhow::Result<String> {
         tags.push("none".to_owned());
     }
     let bits = info.bit_depth as u8;
-    let mut text = format!(
-        "PNG, {}×{} pixels, {:?}, {bits} bits a channel\n",
-        info.width, info.height, info.color_type
-    );
+    let mut text =
+        format!("PNG, {}×{} pixels, {:?}, {bits} bits a channel\n", info.width, info.height, info.color_type);
     let _ = writeln!(text, "colour tags: {}", tags.join(", "));
 
     let size = reader.output_buffer_size().with_context(problem)?;
@@ -195,11 +150,7 @@ fn describe_png(path: &Path) -> anyhow::Result<String> {
         text.push('\n');
         heading(&mut text, "channel", 7);
         for (c, name) in names.iter().enumerate() {
-            let values = pixels
-                .iter()
-                .skip(c)
-                .step_by(names.len())
-                .map(|&byte| f32::from(byte));
+            let values = pixels.iter().skip(c).step_by(names.len()).map(|&byte| f32::from(byte));
             Range::of(values).row(&mut text, name, "8-bit", 7);
         }
     }
@@ -207,30 +158,18 @@ fn describe_png(path: &Path) -> anyhow::Result<String> {
 }
 
 fn describe_hdr(path: &Path) -> anyhow::Result<String> {
-    let problem = || {
-        format!(
-            "cannot read {}: damaged or no Radiance file",
-            path.display()
-        )
-    };
-    let file =
-        std::fs::File::open(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let mut decoder =
-        image::codecs::hdr::HdrDecoder::new(std::io::BufReader::new(file)).with_context(problem)?;
+    let problem = || format!("cannot read {}: damaged or no Radiance file", path.display());
+    let file = std::fs::File::open(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let mut decoder = image::codecs::hdr::HdrDecoder::new(std::io::BufReader::new(file)).with_context(problem)?;
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(1 << 30);
     decoder.set_limits(limits).with_context(problem)?;
     let meta = decoder.metadata();
     let (width, height) = decoder.dimensions();
     if decoder.total_bytes() > 1 << 30 {
-        bail!(
-            "cannot read {}: {width}×{height} pixels need more than 1 GiB",
-            path.display()
-        );
+        bail!("cannot read {}: {width}×{height} pixels need more than 1 GiB", path.display());
     }
-    let pixels = image::DynamicImage::from_decoder(decoder)
-        .with_context(problem)?
-        .into_rgb32f();
+    let pixels = image::DynamicImage::from_decoder(decoder).with_context(problem)?.into_rgb32f();
     let mut text = format!("Radiance HDR, {width}×{height} pixels, shared exponent\n");
     if let Some(exposure) = meta.exposure {
         let _ = writeln!(text, "exposure {exposure}");
@@ -260,13 +199,8 @@ mod tests {
         let text = describe(&path).unwrap();
         assert!(text.starts_with("OpenEXR, 2×1 pixels\n"), "{text}");
         let row = |name: &str| {
-            let line = text
-                .lines()
-                .find(|line| line.trim_start().starts_with(name))
-                .unwrap_or_default();
-            line.split_whitespace()
-                .map(str::to_owned)
-                .collect::<Vec<_>>()
+            let line = text.lines().find(|line| line.trim_start().starts_with(name)).unwrap_or_default();
+            line.split_whitespace().map(str::to_owned).collect::<Vec<_>>()
         };
         assert_eq!(row("R "), ["R", "float", "0.25", "0.625", "1"]);
         assert_eq!(row("samples.Y"), ["samples.Y", "uint", "8", "516", "1024"]);
@@ -279,17 +213,13 @@ mod tests {
         let path = folder.path().join("a.png");
         write_png(&path, 2, 2, &[[1.0, 0.0, 0.0]; 4]).unwrap();
         let text = describe(&path).unwrap();
-        assert!(
-            text.contains("2×2 pixels, Rgb, 8 bits") && text.contains("sRGB"),
-            "{text}"
-        );
+        assert!(text.contains("2×2 pixels, Rgb, 8 bits") && text.contains("sRGB"), "{text}");
     }
 
     #[test]
     fn what_cannot_be_described_is_named() {
         let folder = tempfile::tempdir().unwrap();
-        let message =
-            |name: &str| format!("{:#}", describe(&folder.path().join(name)).unwrap_err());
+        let message = |name: &str| format!("{:#}", describe(&folder.path().join(name)).unwrap_err());
         assert!(message("a.txt").contains(".exr, .png and .hdr files are known"));
         for name in ["a.png", "a.hdr", "a.exr"] {
             assert!(message(name).contains(name), "{}", message(name));
@@ -300,14 +230,9 @@ mod tests {
 
     #[test]
     fn numbers_are_short() {
-        for (value, text) in [
-            (0.0, "0"),
-            (1.0, "1"),
-            (1024.0, "1024"),
-            (0.1, "0.1"),
-            (1e9, "1.0000e9"),
-            (1234.5678, "1234.57"),
-        ] {
+        for (value, text) in
+            [(0.0, "0"), (1.0, "1"), (1024.0, "1024"), (0.1, "0.1"), (1e9, "1.0000e9"), (1234.5678, "1234.57")]
+        {
             assert_eq!(short(value), text);
         }
     }

@@ -169,7 +169,11 @@ pub(super) fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
 }
 
 fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyhow::Result<()> {
-    let options = load::LoadOptions { camera: arguments.camera.clone(), frame_time: arguments.at, ..load::LoadOptions::default() };
+    let options = load::LoadOptions {
+        camera: arguments.camera.clone(),
+        frame_time: arguments.at,
+        ..load::LoadOptions::default()
+    };
     let scene = load::load(&arguments.scene, &options)?;
     for note in &scene.notes {
         eprintln!("note: {note}");
@@ -212,7 +216,12 @@ fn write(
     match format {
         output::Format::Png => output::rendered::write_display_png(&arguments.output, rendered)?,
         output::Format::Exr => {
-            output::rendered::write_layers_exr(&arguments.output, rendered, settings.nits_per_unit, &report.attributes())?;
+            output::rendered::write_layers_exr(
+                &arguments.output,
+                rendered,
+                settings.nits_per_unit,
+                &report.attributes(),
+            )?;
         }
     }
     if let Some(path) = &arguments.json {

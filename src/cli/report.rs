@@ -162,7 +162,9 @@ pub(super) fn summary(report: &Report, settings: &LoopSettings, rendered: &Rende
         StopReason::Visibility => "Stopped because the target is reached",
         StopReason::Time => "Stopped because the time was up",
         StopReason::Samples => "Stopped because the samples were spent",
-        StopReason::MaxSamples => "Stopped although some pixels are above the target: they have the most samples allowed",
+        StopReason::MaxSamples => {
+            "Stopped although some pixels are above the target: they have the most samples allowed"
+        }
         StopReason::Plans => "Stopped after the plans asked for",
     };
     let target = report.visibility_target.map_or_else(
@@ -190,7 +192,8 @@ pub(super) fn summary(report: &Report, settings: &LoopSettings, rendered: &Rende
             report.patches_noticed,
             patch_count(&rendered.judgement.predicted, display.pixels_per_degree),
         ),
-        "Model-predicted, calibrated on gratings, not on renderings; light paths never sampled are not covered.".to_owned(),
+        "Model-predicted, calibrated on gratings, not on renderings; light paths never sampled are not covered."
+            .to_owned(),
     ];
     if report.nonfinite_samples > 0 {
         lines.push(format!("{} samples were not finite and are left out.", report.nonfinite_samples));

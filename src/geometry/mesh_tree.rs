@@ -43,9 +43,8 @@ pub(super) struct MeshTree {
 impl MeshTree {
     /// Builds over triangles in any coordinates.
     pub(super) fn build(triangles: &[([Vec3A; 3], TriangleRef)]) -> Self {
-        let usable = |t: &[Vec3A; 3]| {
-            t.iter().all(|p| p.is_finite()) && (t[1] - t[0]).cross(t[2] - t[0]).length_squared() > 0.0
-        };
+        let usable =
+            |t: &[Vec3A; 3]| t.iter().all(|p| p.is_finite()) && (t[1] - t[0]).cross(t[2] - t[0]).length_squared() > 0.0;
         let bounds = Bounds::of_points(triangles.iter().filter(|(t, _)| usable(t)).flat_map(|(t, _)| *t));
         let (center, scale) = if bounds.is_finite() {
             let extent = (bounds.max - bounds.min).max_element();
@@ -88,8 +87,7 @@ impl MeshTree {
             let Some(hit) = sheared.intersect(&self.vertices[i], t_max) else {
                 return f32::INFINITY;
             };
-            let candidate =
-                MeshHit { t: hit.t * to_given, triangle: self.references[i], b1: hit.b1, b2: hit.b2 };
+            let candidate = MeshHit { t: hit.t * to_given, triangle: self.references[i], b1: hit.b1, b2: hit.b2 };
             if !accept(&candidate) {
                 return f32::INFINITY;
             }
@@ -101,13 +99,7 @@ impl MeshTree {
 
     /// Whether anything that `accept` lets stand is nearer than `t_max`.
     #[inline]
-    pub(super) fn any(
-        &self,
-        origin: Vec3A,
-        direction: Vec3A,
-        t_max: f32,
-        accept: impl Fn(&MeshHit) -> bool,
-    ) -> bool {
+    pub(super) fn any(&self, origin: Vec3A, direction: Vec3A, t_max: f32, accept: impl Fn(&MeshHit) -> bool) -> bool {
         let origin = (origin - self.center) * self.scale;
         let sheared = ShearedRay::new(origin, direction);
         let to_given = 1.0 / self.scale;
@@ -115,8 +107,7 @@ impl MeshTree {
             let Some(hit) = sheared.intersect(&self.vertices[i], t_max) else {
                 return f32::INFINITY;
             };
-            let candidate =
-                MeshHit { t: hit.t * to_given, triangle: self.references[i], b1: hit.b1, b2: hit.b2 };
+            let candidate = MeshHit { t: hit.t * to_given, triangle: self.references[i], b1: hit.b1, b2: hit.b2 };
             if accept(&candidate) { hit.t } else { f32::INFINITY }
         })
     }
@@ -162,11 +153,8 @@ mod tests {
     }
 
     fn tree_of(triangles: &[[Vec3A; 3]]) -> MeshTree {
-        let numbered: Vec<_> = triangles
-            .iter()
-            .enumerate()
-            .map(|(i, t)| (*t, TriangleRef { instance: 0, triangle: i as u32 }))
-            .collect();
+        let numbered: Vec<_> =
+            triangles.iter().enumerate().map(|(i, t)| (*t, TriangleRef { instance: 0, triangle: i as u32 })).collect();
         MeshTree::build(&numbered)
     }
 
@@ -235,7 +223,9 @@ mod tests {
         let flat = |i: usize| triangles[i].map(|p| p.to_array());
         let mut hits = 0;
         for i in 0..3000u32 {
-            let unit = |k: u32| (crate::sampler::hash_words(u64::from(i), u64::from(k)) >> 40) as f32 / 16_777_216.0 * 2.0 - 1.0;
+            let unit = |k: u32| {
+                (crate::sampler::hash_words(u64::from(i), u64::from(k)) >> 40) as f32 / 16_777_216.0 * 2.0 - 1.0
+            };
             let origin = vec3a(unit(0), unit(1), unit(2)) * 2.0;
             let direction = vec3a(unit(3), unit(4), unit(5)).normalize();
             let sheared = ShearedRay::new(origin, direction);

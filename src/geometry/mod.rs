@@ -4,11 +4,11 @@
 //! The trees are obvhs's, behind [`tree::PrimitiveTree`]; the triangle test is ours, because a leak at a shared edge is a
 //! firefly that an adaptive sampler would chase for ever.
 
+mod mesh_tree;
 pub mod sphere;
 pub mod surface;
 pub mod tree;
 pub mod triangle;
-mod mesh_tree;
 mod world;
 
 pub use surface::SurfacePoint;

@@ -11,7 +11,8 @@ pub fn intersect(ray: &Ray, center: Vec3A, radius: f32, t_max: f32) -> Option<f3
     // Squared distance of the centre from the ray, taken from the perpendicular itself: no cancellation.
     let perpendicular = to_center - along * ray.direction;
     let discriminant = radius * radius - perpendicular.length_squared();
-    if !(discriminant >= 0.0) {
+    // Also refuses NaN.
+    if discriminant.is_nan() || discriminant < 0.0 {
         return None;
     }
     let root = discriminant.sqrt();

@@ -3,7 +3,7 @@
 //! Four hazards of obvhs 0.4, each kept out here and each with a regression test (`tests` below and in `world`):
 //! 1. its triangle test leaks at edges: we bring our own, and pad the boxes by a relative 2e-7;
 //! 2. its wide tree drops hits nearer than a ray parameter of 1e-4: callers scale coordinates up
-//!    (see [`super::mesh_tree`]), and the top level uses the binary tree, which has no such limit;
+//!    (see `mesh_tree`), and the top level uses the binary tree, which has no such limit;
 //! 3. boxes that are not finite panic the builder: they are given to no builder, and never hit;
 //! 4. many coinciding centroids make the search quadratic: then the fastest preset is used.
 

@@ -6,7 +6,7 @@
 use super::mesh_tree::{MeshHit, MeshTree, TriangleRef};
 use super::tree::{BinaryTree, Bounds, PrimitiveTree};
 use super::{Ray, SurfacePoint, sphere};
-use crate::scene::{Alpha, Instance, MaterialId, Scene, ScalarInput};
+use crate::scene::{Alpha, Instance, MaterialId, ScalarInput, Scene};
 use glam::{Affine3A, Mat3A, Vec2, Vec3, Vec3A};
 use std::sync::Arc;
 
@@ -180,9 +180,8 @@ impl World {
                 Item::Fixed => fixed(t_max),
                 Item::Placed { instance, shared, to_mesh } => {
                     let local = LocalRay::new(ray, to_mesh);
-                    self.shared[*shared].any(local.origin, local.direction, t_max * local.length, |h| {
-                        self.is_there(*instance, h, ray)
-                    })
+                    self.shared[*shared]
+                        .any(local.origin, local.direction, t_max * local.length, |h| self.is_there(*instance, h, ray))
                 }
                 Item::Sphere { center, radius, .. } => sphere::intersect(ray, *center, *radius, t_max).is_some(),
             };
@@ -219,8 +218,7 @@ impl World {
     pub fn triangle_corners(&self, object: u32, triangle: u32) -> [Vec3; 3] {
         let instance = &self.scene.instances[object as usize];
         let mesh = &self.scene.meshes[instance.mesh.0 as usize];
-        mesh.triangles[triangle as usize]
-            .map(|i| instance.to_world.transform_point3(mesh.positions[i as usize]))
+        mesh.triangles[triangle as usize].map(|i| instance.to_world.transform_point3(mesh.positions[i as usize]))
     }
 
     /// The surface at a hit.
@@ -250,12 +248,10 @@ impl World {
         let position = corners[0] * (1.0 - b1 - b2) + corners[1] * b1 + corners[2] * b2;
         let mirrored = instance.to_world.matrix3.determinant() < 0.0;
         let flip = if mirrored { -1.0 } else { 1.0 };
-        let geometric_normal =
-            flip * (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or(Vec3::Y);
+        let geometric_normal = flip * (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or(Vec3::Y);
         let indices = mesh.triangles[hit.triangle as usize].map(|i| i as usize);
-        let blend = |values: &[Vec3]| {
-            values[indices[0]] * (1.0 - b1 - b2) + values[indices[1]] * b1 + values[indices[2]] * b2
-        };
+        let blend =
+            |values: &[Vec3]| values[indices[0]] * (1.0 - b1 - b2) + values[indices[1]] * b1 + values[indices[2]] * b2;
         let shading_normal = if mesh.normals.is_empty() {
             geometric_normal
         } else {

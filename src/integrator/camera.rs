@@ -56,11 +56,8 @@ fn concentric_disc([u, v]: [f32; 2]) -> Vec2 {
     if x == 0.0 && y == 0.0 {
         return Vec2::ZERO;
     }
-    let (radius, angle) = if x.abs() > y.abs() {
-        (x, FRAC_PI_4 * (y / x))
-    } else {
-        (y, 2.0 * FRAC_PI_4 - FRAC_PI_4 * (x / y))
-    };
+    let (radius, angle) =
+        if x.abs() > y.abs() { (x, FRAC_PI_4 * (y / x)) } else { (y, 2.0 * FRAC_PI_4 - FRAC_PI_4 * (x / y)) };
     radius * Vec2::from_angle(angle)
 }
 

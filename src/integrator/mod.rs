@@ -152,8 +152,7 @@ impl PathTracer {
 
     /// Sums one block of one pixel.
     fn trace_block(&self, block: BlockWork) -> BlockSum {
-        let key =
-            BlockKey { seed: self.settings.seed, pixel: block.pixel, half: block.half, level: block.level };
+        let key = BlockKey { seed: self.settings.seed, pixel: block.pixel, half: block.half, level: block.level };
         let pixel = Vec2::new(
             (block.pixel % self.settings.width) as f32 + 0.5,
             (block.pixel / self.settings.width) as f32 + 0.5,

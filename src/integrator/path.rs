@@ -103,7 +103,8 @@ impl PathTracer {
         if radiance == Vec3::ZERO {
             return;
         }
-        let weight = path.scatter_pdf.map_or(1.0, |pdf| power_heuristic(pdf, self.lights.pdf_of_environment(direction)));
+        let weight =
+            path.scatter_pdf.map_or(1.0, |pdf| power_heuristic(pdf, self.lights.pdf_of_environment(direction)));
         path.radiance += path.throughput * radiance * weight;
     }
 
@@ -116,9 +117,9 @@ impl PathTracer {
             return false;
         }
         let radiance = material.emission.evaluate(&scene.textures, point.uv);
-        let weight = path.scatter_pdf.map_or(1.0, |pdf| {
-            power_heuristic(pdf, self.lights.pdf_of_hit(path.from, &path.ray, hit, point))
-        });
+        let weight = path
+            .scatter_pdf
+            .map_or(1.0, |pdf| power_heuristic(pdf, self.lights.pdf_of_hit(path.from, &path.ray, hit, point)));
         path.radiance += path.throughput * radiance * weight;
         radiance != Vec3::ZERO
     }

@@ -45,15 +45,13 @@ impl PathTracer {
                 self.dielectric_tables[material_id.0 as usize].as_ref(),
             ),
             Surface::ThinDielectric { ior, transmittance } => Bsdf::thin_dielectric(*ior, color(transmittance)),
-            Surface::MetalRoughness { base_color, metallic, roughness, ior, transmission } => {
-                Bsdf::metal_roughness(
-                    color(base_color),
-                    scalar(metallic),
-                    scalar(roughness),
-                    *ior,
-                    scalar(transmission),
-                )
-            }
+            Surface::MetalRoughness { base_color, metallic, roughness, ior, transmission } => Bsdf::metal_roughness(
+                color(base_color),
+                scalar(metallic),
+                scalar(roughness),
+                *ior,
+                scalar(transmission),
+            ),
         };
         Shading { bsdf, frame, geometric_normal: point.geometric_normal }
     }

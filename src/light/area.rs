@@ -55,7 +55,7 @@ impl TriangleEmitter {
         let distance = to_light.length();
         let direction = to_light / distance;
         let facing = -direction.dot(self.normal);
-        if !(distance > 0.0) || self.area == 0.0 || (facing <= 0.0 && !self.both_sides) {
+        if distance == 0.0 || self.area == 0.0 || (facing <= 0.0 && !self.both_sides) {
             return None;
         }
         let instance = &scene.instances[self.object as usize];

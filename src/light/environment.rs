@@ -97,8 +97,5 @@ fn row_cosines(row: usize, height: f32) -> (f32, f32) {
 
 /// Picture coordinates of a direction: v = 0 is +y, u = 0.5 is −z, u grows towards +x.
 fn to_uv(direction: Vec3) -> Vec2 {
-    Vec2::new(
-        0.5 + direction.x.atan2(-direction.z) / TAU,
-        direction.y.clamp(-1.0, 1.0).acos() / PI,
-    )
+    Vec2::new(0.5 + direction.x.atan2(-direction.z) / TAU, direction.y.clamp(-1.0, 1.0).acos() / PI)
 }

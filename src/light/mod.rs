@@ -134,9 +134,7 @@ impl Lights {
         let chosen = choice.probability(index) * (1.0 - self.environment_share);
         chosen
             * match &self.emitters[index] {
-                Emitter::Triangle(emitter) => {
-                    emitter.pdf(ray.direction.into(), hit.distance, there.geometric_normal)
-                }
+                Emitter::Triangle(emitter) => emitter.pdf(ray.direction.into(), hit.distance, there.geometric_normal),
                 Emitter::Sphere(emitter) => emitter.pdf(from),
                 Emitter::Punctual(_) => 0.0,
             }

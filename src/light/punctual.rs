@@ -35,13 +35,9 @@ pub(super) fn sample(light: &Light, from: Vec3) -> Option<LightSample> {
             let falloff = cone_falloff(-sample.direction.dot(direction), inner_angle.cos(), outer_angle.cos());
             (falloff > 0.0).then(|| LightSample { radiance: sample.radiance * falloff, ..sample })
         }
-        Light::Directional { direction, irradiance } => Some(LightSample {
-            direction: -direction,
-            place: None,
-            radiance: irradiance,
-            pdf: 1.0,
-            is_delta: true,
-        }),
+        Light::Directional { direction, irradiance } => {
+            Some(LightSample { direction: -direction, place: None, radiance: irradiance, pdf: 1.0, is_delta: true })
+        }
     }
 }
 

@@ -9,15 +9,9 @@ use tempfile::NamedTempFile;
 ///
 /// If `write` fails, the new file is removed and the target stays as it was. A symbolic link is followed: the file that it
 /// points to is replaced, not the link.
-pub fn write_beside(
-    path: &Path,
-    write: impl FnOnce(&mut File) -> std::io::Result<()>,
-) -> Result<(), OutputError> {
+pub fn write_beside(path: &Path, write: impl FnOnce(&mut File) -> std::io::Result<()>) -> Result<(), OutputError> {
     let (mut file, target) = create_beside(path)?;
-    let io = |source| OutputError::Io {
-        path: path.to_owned(),
-        source,
-    };
+    let io = |source| OutputError::Io { path: path.to_owned(), source };
     write(file.as_file_mut()).map_err(io)?;
     // Without this a crash of the machine after the rename could leave the new name with no content.
     file.as_file().sync_all().map_err(io)?;
@@ -27,14 +21,8 @@ pub fn write_beside(
 
 /// Makes the new file, which is removed when dropped, and says what it should be renamed to.
 pub(super) fn create_beside(path: &Path) -> Result<(NamedTempFile, PathBuf), OutputError> {
-    let io = |source| OutputError::Io {
-        path: path.to_owned(),
-        source,
-    };
-    let not_a_file = |found| OutputError::NotAFile {
-        path: path.to_owned(),
-        found,
-    };
+    let io = |source| OutputError::Io { path: path.to_owned(), source };
+    let not_a_file = |found| OutputError::NotAFile { path: path.to_owned(), found };
     let target = match path.metadata() {
         Ok(found) if found.is_dir() => return Err(not_a_file("a folder")),
         // Renaming over a device such as /dev/null would replace the device.
@@ -58,10 +46,7 @@ pub(super) fn create_beside(path: &Path) -> Result<(NamedTempFile, PathBuf), Out
             )));
         }
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-            return Err(OutputError::MissingFolder {
-                path: path.to_owned(),
-                folder: folder.to_owned(),
-            });
+            return Err(OutputError::MissingFolder { path: path.to_owned(), folder: folder.to_owned() });
         }
         Err(error) => return Err(io(error)),
     }
@@ -76,28 +61,17 @@ pub(super) fn create_beside(path: &Path) -> Result<(NamedTempFile, PathBuf), Out
         // As any new file: all may read and write, less the user's umask. The default of temporary files is owner only.
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    builder
-        .tempfile_in(folder)
-        .map(|file| (file, target.clone()))
-        .map_err(|error| {
-            // The error's own text names the temporary file, which the user never asked for.
-            io(std::io::Error::new(
-                error.kind(),
-                format!(
-                    "cannot make a file in {}: {}",
-                    folder.display(),
-                    plain(&error)
-                ),
-            ))
-        })
+    builder.tempfile_in(folder).map(|file| (file, target.clone())).map_err(|error| {
+        // The error's own text names the temporary file, which the user never asked for.
+        io(std::io::Error::new(error.kind(), format!("cannot make a file in {}: {}", folder.display(), plain(&error))))
+    })
 }
 
 /// The system's words without the path that `tempfile` adds.
 fn plain(error: &std::io::Error) -> String {
-    error.raw_os_error().map_or_else(
-        || error.kind().to_string(),
-        |code| std::io::Error::from_raw_os_error(code).to_string(),
-    )
+    error
+        .raw_os_error()
+        .map_or_else(|| error.kind().to_string(), |code| std::io::Error::from_raw_os_error(code).to_string())
 }
 
 #[cfg(test)]
@@ -123,12 +97,7 @@ mod tests {
             file.write_all(b"half a pic")?;
             Err(std::io::Error::other("the disk is full"))
         });
-        assert!(
-            result
-                .unwrap_err()
-                .to_string()
-                .ends_with("a.png: the disk is full")
-        );
+        assert!(result.unwrap_err().to_string().ends_with("a.png: the disk is full"));
         assert_eq!(std::fs::read(&path).unwrap(), b"old");
         assert_eq!(names(folder.path()), ["a.png"]);
     }
@@ -163,11 +132,7 @@ mod tests {
     fn permissions_are_those_of_an_ordinary_file_and_links_are_followed() {
         use std::os::unix::fs::PermissionsExt;
         let folder = tempfile::tempdir().unwrap();
-        let (plain, ours, link) = (
-            folder.path().join("p"),
-            folder.path().join("o"),
-            folder.path().join("l"),
-        );
+        let (plain, ours, link) = (folder.path().join("p"), folder.path().join("o"), folder.path().join("l"));
         std::fs::write(&plain, "").unwrap();
         write_beside(&ours, |_| Ok(())).unwrap();
         let mode = |path: &Path| path.metadata().unwrap().permissions().mode() & 0o777;
@@ -185,19 +150,9 @@ mod tests {
         let file = folder.path().join("file");
         std::fs::write(&file, "").unwrap();
         let message = |path: &Path| write_beside(path, |_| Ok(())).unwrap_err().to_string();
-        assert!(
-            message(folder.path()).contains("it is a folder"),
-            "{}",
-            message(folder.path())
-        );
-        assert!(
-            message(&folder.path().join("no/such.png")).contains("does not exist; create it first")
-        );
-        assert!(
-            message(&file.join("a.png")).contains("cannot write"),
-            "{}",
-            message(&file.join("a.png"))
-        );
+        assert!(message(folder.path()).contains("it is a folder"), "{}", message(folder.path()));
+        assert!(message(&folder.path().join("no/such.png")).contains("does not exist; create it first"));
+        assert!(message(&file.join("a.png")).contains("cannot write"), "{}", message(&file.join("a.png")));
         assert!(message(Path::new("/")).contains("it is a folder"));
         #[cfg(unix)]
         assert!(message(Path::new("/dev/null")).contains("not an ordinary file"));

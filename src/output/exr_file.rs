@@ -2,13 +2,11 @@
 
 use super::beside::write_beside;
 use super::exr_header::sort_attributes;
-use super::{
-    Attribute, ChannelValues, NITS_PER_UNIT, OutputError, Picture, REPLACED_VALUES, check_size,
-};
+use super::{Attribute, ChannelValues, NITS_PER_UNIT, OutputError, Picture, REPLACED_VALUES, check_size};
 use ::exr::meta::attribute::{AttributeValue, Chromaticities};
 use ::exr::prelude::{
-    AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image, ImageAttributes,
-    IntegerBounds, Layer, LayerAttributes, LineOrder, Text, Vec2, WritableImage, f16,
+    AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds, Layer,
+    LayerAttributes, LineOrder, Text, Vec2, WritableImage, f16,
 };
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -34,29 +32,19 @@ pub fn write_exr(path: &Path, picture: &Picture<'_>) -> Result<(), OutputError> 
         .collect();
 
     let size = Vec2(picture.width as usize, picture.height as usize);
-    let mut layer_attributes = LayerAttributes {
-        software_name: Some("fechner".into()),
-        ..LayerAttributes::default()
-    };
+    let mut layer_attributes = LayerAttributes { software_name: Some("fechner".into()), ..LayerAttributes::default() };
     for (name, value) in &picture.attributes {
         if let (NITS_PER_UNIT, &Attribute::Float(nits)) = (name.as_str(), value) {
             layer_attributes.white_luminance = Some(nits);
         }
-        layer_attributes
-            .other
-            .insert(text(name), attribute_value(value));
+        layer_attributes.other.insert(text(name), attribute_value(value));
     }
     if replaced > 0 {
         let count = i32::try_from(replaced).unwrap_or(i32::MAX);
-        layer_attributes
-            .other
-            .insert(text(REPLACED_VALUES), AttributeValue::I32(count));
+        layer_attributes.other.insert(text(REPLACED_VALUES), AttributeValue::I32(count));
     }
-    let encoding = Encoding {
-        compression: Compression::ZIP16,
-        blocks: Blocks::ScanLines,
-        line_order: LineOrder::Increasing,
-    };
+    let encoding =
+        Encoding { compression: Compression::ZIP16, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
     let mut image_attributes = ImageAttributes::new(IntegerBounds::from_dimensions(size));
     image_attributes.chromaticities = Some(Chromaticities {
         red: Vec2(0.64, 0.33),
@@ -89,15 +77,8 @@ fn io_error(error: ::exr::error::Error) -> std::io::Error {
 
 /// Finds what the format cannot hold, before anything is written.
 fn check(path: &Path, picture: &Picture<'_>) -> Result<(), OutputError> {
-    let bad = |problem: String| OutputError::BadPicture {
-        path: path.to_owned(),
-        problem,
-    };
-    let lengths: Vec<(&str, usize)> = picture
-        .channels
-        .iter()
-        .map(|c| (c.name.as_str(), c.values.len()))
-        .collect();
+    let bad = |problem: String| OutputError::BadPicture { path: path.to_owned(), problem };
+    let lengths: Vec<(&str, usize)> = picture.channels.iter().map(|c| (c.name.as_str(), c.values.len())).collect();
     check_size(path, picture.width, picture.height, &lengths)?;
     if picture.channels.is_empty() {
         return Err(bad("the picture has no channels".to_owned()));
@@ -109,9 +90,7 @@ fn check(path: &Path, picture: &Picture<'_>) -> Result<(), OutputError> {
     }
     for name in names {
         if name.is_empty() || !name.bytes().all(|b| b.is_ascii_graphic()) || name.len() > 255 {
-            return Err(bad(format!(
-                "\"{name}\" cannot be a channel's name: 1 to 255 letters, digits and signs"
-            )));
+            return Err(bad(format!("\"{name}\" cannot be a channel's name: 1 to 255 letters, digits and signs")));
         }
     }
     Ok(())
@@ -130,25 +109,17 @@ fn flat_samples(values: &ChannelValues<'_>, replaced: &mut usize) -> FlatSamples
         }
     };
     match values {
-        ChannelValues::F32(values) => {
-            FlatSamples::F32(values.iter().map(|&v| finite(v, f32::MAX)).collect())
+        ChannelValues::F32(values) => FlatSamples::F32(values.iter().map(|&v| finite(v, f32::MAX)).collect()),
+        ChannelValues::F16(values) => {
+            FlatSamples::F16(values.iter().map(|&v| f16::from_f32(finite(v, F16_MAX))).collect())
         }
-        ChannelValues::F16(values) => FlatSamples::F16(
-            values
-                .iter()
-                .map(|&v| f16::from_f32(finite(v, F16_MAX)))
-                .collect(),
-        ),
         ChannelValues::U32(values) => FlatSamples::U32(values.to_vec()),
     }
 }
 
 /// Text as the format's bytes: characters that do not fit become `?`.
 fn text(text: &str) -> Text {
-    let fitting: String = text
-        .chars()
-        .map(|c| if u32::from(c) < 256 { c } else { '?' })
-        .collect();
+    let fitting: String = text.chars().map(|c| if u32::from(c) < 256 { c } else { '?' }).collect();
     Text::new_or_none(&fitting).expect("every character fits a byte")
 }
 
@@ -187,27 +158,17 @@ mod tests {
         write_exr(&path, &sample_picture(&RED)).unwrap();
         let image = read_exr(&path).unwrap();
         assert_eq!((image.width, image.height), (3, 2));
-        let names: Vec<&str> = image
-            .channels
-            .iter()
-            .map(|(name, _)| name.as_str())
-            .collect();
+        let names: Vec<&str> = image.channels.iter().map(|(name, _)| name.as_str()).collect();
         assert_eq!(names, ["B", "G", "R", "normal.X", "samples.Y"]);
         assert_eq!(image.channel("R").unwrap(), RED);
-        assert_eq!(
-            image.channel("G").unwrap(),
-            [0.0, 0.25, 0.5, 1.0, 2.0, 65504.0]
-        );
+        assert_eq!(image.channel("G").unwrap(), [0.0, 0.25, 0.5, 1.0, 2.0, 65504.0]);
         assert_eq!(image.channel("samples.Y").unwrap()[5], 16_777_216.0);
         assert_eq!(image.types[1], SampleType::Half);
         assert_eq!(image.types[4], SampleType::Uint);
         for (name, value) in sample_picture(&RED).attributes {
             assert_eq!(image.attribute(&name), Some(&value), "{name}");
         }
-        assert_eq!(
-            image.attribute("whiteLuminance"),
-            Some(&Attribute::Float(123.5))
-        );
+        assert_eq!(image.attribute("whiteLuminance"), Some(&Attribute::Float(123.5)));
         assert_eq!(image.attribute(REPLACED_VALUES), None);
         assert!(image.attribute("chromaticities").is_some());
     }
@@ -236,14 +197,8 @@ mod tests {
         write_exr(&path, &picture).unwrap();
         let image = read_exr(&path).unwrap();
         assert_eq!(image.channel("R").unwrap(), [0.0, f32::MAX, f32::MIN, 1.0]);
-        assert_eq!(
-            image.channel("G").unwrap(),
-            [65504.0, -65504.0, 0.0, 65504.0]
-        );
-        assert_eq!(
-            image.attribute(REPLACED_VALUES),
-            Some(&Attribute::Integer(7))
-        );
+        assert_eq!(image.channel("G").unwrap(), [65504.0, -65504.0, 0.0, 65504.0]);
+        assert_eq!(image.attribute(REPLACED_VALUES), Some(&Attribute::Integer(7)));
     }
 
     #[test]

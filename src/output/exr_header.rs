@@ -29,10 +29,7 @@ pub(super) fn sort_attributes(file: &mut (impl Read + Write + Seek)) -> io::Resu
         attributes.push((name, bytes));
     }
     attributes.sort();
-    let sorted: Vec<u8> = attributes
-        .into_iter()
-        .flat_map(|(_, bytes)| bytes)
-        .collect();
+    let sorted: Vec<u8> = attributes.into_iter().flat_map(|(_, bytes)| bytes).collect();
     file.seek(SeekFrom::Start(PREAMBLE))?;
     file.write_all(&sorted)
 }
@@ -41,9 +38,5 @@ pub(super) fn sort_attributes(file: &mut (impl Read + Write + Seek)) -> io::Resu
 fn read_name(reader: &mut impl io::BufRead) -> io::Result<Vec<u8>> {
     let mut name = Vec::new();
     reader.read_until(0, &mut name)?;
-    if name.last() == Some(&0) {
-        Ok(name)
-    } else {
-        Err(io::ErrorKind::UnexpectedEof.into())
-    }
+    if name.last() == Some(&0) { Ok(name) } else { Err(io::ErrorKind::UnexpectedEof.into()) }
 }

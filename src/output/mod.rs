@@ -75,35 +75,22 @@ impl ChannelValues<'_> {
 impl<'a> Picture<'a> {
     /// A picture without channels.
     pub fn new(width: u32, height: u32) -> Self {
-        Self {
-            width,
-            height,
-            ..Self::default()
-        }
+        Self { width, height, ..Self::default() }
     }
 
     /// Adds a channel of 32-bit floats.
     pub fn push_f32(&mut self, name: &str, values: impl Into<Cow<'a, [f32]>>) {
-        self.channels.push(Channel {
-            name: name.to_owned(),
-            values: ChannelValues::F32(values.into()),
-        });
+        self.channels.push(Channel { name: name.to_owned(), values: ChannelValues::F32(values.into()) });
     }
 
     /// Adds a channel of half floats.
     pub fn push_f16(&mut self, name: &str, values: impl Into<Cow<'a, [f32]>>) {
-        self.channels.push(Channel {
-            name: name.to_owned(),
-            values: ChannelValues::F16(values.into()),
-        });
+        self.channels.push(Channel { name: name.to_owned(), values: ChannelValues::F16(values.into()) });
     }
 
     /// Adds a channel of 32-bit unsigned integers.
     pub fn push_u32(&mut self, name: &str, values: impl Into<Cow<'a, [u32]>>) {
-        self.channels.push(Channel {
-            name: name.to_owned(),
-            values: ChannelValues::U32(values.into()),
-        });
+        self.channels.push(Channel { name: name.to_owned(), values: ChannelValues::U32(values.into()) });
     }
 
     /// Adds an attribute.
@@ -178,10 +165,7 @@ pub enum OutputError {
 
 fn extension_problem(path: &Path) -> String {
     match path.extension() {
-        Some(extension) => format!(
-            "\".{}\" is no picture format that can be written",
-            extension.to_string_lossy()
-        ),
+        Some(extension) => format!("\".{}\" is no picture format that can be written", extension.to_string_lossy()),
         None => "its name has no ending that tells the format".to_owned(),
     }
 }
@@ -198,17 +182,10 @@ pub enum Format {
 impl Format {
     /// The format that a file's name asks for, by its ending, upper or lower case.
     pub fn of(path: &Path) -> Result<Self, OutputError> {
-        match path
-            .extension()
-            .and_then(|e| e.to_str())
-            .map(str::to_ascii_lowercase)
-            .as_deref()
-        {
+        match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
             Some("png") => Ok(Self::Png),
             Some("exr") => Ok(Self::Exr),
-            _ => Err(OutputError::UnknownExtension {
-                path: path.to_owned(),
-            }),
+            _ => Err(OutputError::UnknownExtension { path: path.to_owned() }),
         }
     }
 }
@@ -227,27 +204,15 @@ pub fn check_writable(path: &Path) -> Result<(), OutputError> {
 }
 
 /// Checks that a picture of this size exists and that its arrays fit it.
-fn check_size(
-    path: &Path,
-    width: u32,
-    height: u32,
-    arrays: &[(&str, usize)],
-) -> Result<(), OutputError> {
-    let bad = |problem: String| OutputError::BadPicture {
-        path: path.to_owned(),
-        problem,
-    };
+fn check_size(path: &Path, width: u32, height: u32, arrays: &[(&str, usize)]) -> Result<(), OutputError> {
+    let bad = |problem: String| OutputError::BadPicture { path: path.to_owned(), problem };
     if width == 0 || height == 0 {
-        return Err(bad(format!(
-            "a picture of {width}×{height} pixels has no pixels"
-        )));
+        return Err(bad(format!("a picture of {width}×{height} pixels has no pixels")));
     }
     let pixels = width as usize * height as usize;
     for &(name, len) in arrays {
         if len != pixels {
-            return Err(bad(format!(
-                "{name} has {len} values for {width}×{height} = {pixels} pixels"
-            )));
+            return Err(bad(format!("{name} has {len} values for {width}×{height} = {pixels} pixels")));
         }
     }
     Ok(())

@@ -8,18 +8,8 @@ use std::path::Path;
 ///
 /// Values are clamped to [0, 1] and NaN becomes black. Rounding is dithered by up to one step, the same in all three
 /// channels so that greys stay grey, by a hash of the pixel's place so that equal pixels give equal files.
-pub fn write_png(
-    path: &Path,
-    width: u32,
-    height: u32,
-    rgb_linear_display: &[[f32; 3]],
-) -> Result<(), OutputError> {
-    check_size(
-        path,
-        width,
-        height,
-        &[("the picture", rgb_linear_display.len())],
-    )?;
+pub fn write_png(path: &Path, width: u32, height: u32, rgb_linear_display: &[[f32; 3]]) -> Result<(), OutputError> {
+    check_size(path, width, height, &[("the picture", rgb_linear_display.len())])?;
     let bytes = encode_srgb8(width, rgb_linear_display);
     write_beside(path, |file| {
         let mut buffered = BufWriter::new(file);
@@ -100,39 +90,24 @@ mod tests {
         write_png(&path, 2, 1, &pixels).unwrap();
         let names = chunk_names(&std::fs::read(&path).unwrap());
         for name in ["sRGB", "gAMA", "cHRM"] {
-            assert!(
-                names.iter().any(|n| n == name),
-                "{name} is missing from {names:?}"
-            );
+            assert!(names.iter().any(|n| n == name), "{name} is missing from {names:?}");
         }
         let image = image::open(&path).unwrap().into_rgb8();
         assert_eq!(image.dimensions(), (2, 1));
         let [r, g, b] = image.get_pixel(0, 0).0;
         assert_eq!((r, b), (0, 255));
-        assert!(
-            (187..=188).contains(&g),
-            "linear 0.5 is 187.5 in sRGB, read {g}"
-        );
+        assert!((187..=188).contains(&g), "linear 0.5 is 187.5 in sRGB, read {g}");
         assert!((127..=128).contains(&image.get_pixel(1, 0).0[2]));
     }
 
     #[test]
     fn extremes_are_clamped_and_one_pixel_is_enough() {
-        assert_eq!(
-            encode_srgb8(1, &[[f32::NAN, -1.0, f32::NEG_INFINITY]]),
-            [0, 0, 0]
-        );
-        assert_eq!(
-            encode_srgb8(1, &[[f32::INFINITY, 7.0, 1.0]]),
-            [255, 255, 255]
-        );
+        assert_eq!(encode_srgb8(1, &[[f32::NAN, -1.0, f32::NEG_INFINITY]]), [0, 0, 0]);
+        assert_eq!(encode_srgb8(1, &[[f32::INFINITY, 7.0, 1.0]]), [255, 255, 255]);
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
         write_png(&path, 1, 1, &[[1.0; 3]]).unwrap();
-        assert_eq!(
-            image::open(&path).unwrap().into_rgb8().into_raw(),
-            [255, 255, 255]
-        );
+        assert_eq!(image::open(&path).unwrap().into_rgb8().into_raw(), [255, 255, 255]);
     }
 
     #[test]
@@ -140,28 +115,19 @@ mod tests {
         let (width, height) = (128, 128);
         for step in [10.25_f32, 100.5, 200.8] {
             let code = step / 255.0;
-            let linear = if code <= 0.040_45 {
-                code / 12.92
-            } else {
-                ((code + 0.055) / 1.055).powf(2.4)
-            };
+            let linear = if code <= 0.040_45 { code / 12.92 } else { ((code + 0.055) / 1.055).powf(2.4) };
             let bytes = encode_srgb8(width, &vec![[linear; 3]; (width * height) as usize]);
             assert!(bytes.chunks(3).all(|p| p[0] == p[1] && p[1] == p[2]));
             let mean = bytes.iter().map(|&b| f64::from(b)).sum::<f64>() / bytes.len() as f64;
             // 16384 draws of a step with a spread of at most 0.5: 4 sigma is 0.016.
-            assert!(
-                (mean - f64::from(step)).abs() < 0.016,
-                "step {step} came out as {mean}"
-            );
+            assert!((mean - f64::from(step)).abs() < 0.016, "step {step} came out as {mean}");
         }
     }
 
     #[test]
     fn equal_pixels_give_equal_bytes() {
         let folder = tempfile::tempdir().unwrap();
-        let pixels: Vec<[f32; 3]> = (0..35)
-            .map(|i| [i as f32 / 35.0, 0.3, 0.01 * i as f32])
-            .collect();
+        let pixels: Vec<[f32; 3]> = (0..35).map(|i| [i as f32 / 35.0, 0.3, 0.01 * i as f32]).collect();
         let write = |name: &str| {
             let path = folder.path().join(name);
             write_png(&path, 7, 5, &pixels).unwrap();
@@ -174,18 +140,8 @@ mod tests {
     fn a_picture_of_the_wrong_size_is_refused_and_not_written() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
-        assert!(
-            write_png(&path, 2, 2, &[[0.0; 3]])
-                .unwrap_err()
-                .to_string()
-                .contains("2×2 = 4 pixels")
-        );
-        assert!(
-            write_png(&path, 0, 2, &[])
-                .unwrap_err()
-                .to_string()
-                .contains("no pixels")
-        );
+        assert!(write_png(&path, 2, 2, &[[0.0; 3]]).unwrap_err().to_string().contains("2×2 = 4 pixels"));
+        assert!(write_png(&path, 0, 2, &[]).unwrap_err().to_string().contains("no pixels"));
         assert!(!path.exists());
     }
 }

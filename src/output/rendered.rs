@@ -9,8 +9,7 @@ use std::path::Path;
 /// Writes the picture through its tone operator as sRGB.
 pub fn write_display_png(path: &Path, rendered: &Rendered) -> Result<(), OutputError> {
     let judgement = &rendered.judgement;
-    let shown: Vec<[f32; 3]> =
-        judgement.estimate.rgb_cd_m2.iter().map(|&rgb| judgement.tone.map_rgb(rgb)).collect();
+    let shown: Vec<[f32; 3]> = judgement.estimate.rgb_cd_m2.iter().map(|&rgb| judgement.tone.map_rgb(rgb)).collect();
     write_png(path, rendered.film.width(), rendered.film.height(), &shown)
 }
 

@@ -40,8 +40,7 @@ mod tests {
         let n = 256;
         let mut sum = 0.0f64;
         for i in 0..n * n {
-            let p = PixelFilter::Gaussian
-                .sample(((i % n) as f32 + 0.5) / n as f32, ((i / n) as f32 + 0.5) / n as f32);
+            let p = PixelFilter::Gaussian.sample(((i % n) as f32 + 0.5) / n as f32, ((i / n) as f32 + 0.5) / n as f32);
             assert!(p.length() <= GAUSSIAN_RADIUS_PX * 1.0001, "{p}");
             sum += f64::from(p.length_squared());
         }

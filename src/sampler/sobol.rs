@@ -113,9 +113,8 @@ mod tests {
     /// The unscrambled sequence begins with the published points (Joe and Kuo 2008, in binary order, not Gray code).
     #[test]
     fn directions_give_the_published_points() {
-        let point = |i: u32| {
-            [to_unit(i), to_unit(reversed_point(&DIMENSION_1, i)), to_unit(reversed_point(&DIMENSION_2, i))]
-        };
+        let point =
+            |i: u32| [to_unit(i), to_unit(reversed_point(&DIMENSION_1, i)), to_unit(reversed_point(&DIMENSION_2, i))];
         assert_eq!(point(0), [0.0, 0.0, 0.0]);
         assert_eq!(point(1), [0.5, 0.5, 0.5]);
         assert_eq!(point(2), [0.25, 0.75, 0.75]);

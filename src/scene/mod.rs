@@ -168,32 +168,21 @@ pub struct TextureLookup {
 impl ColorInput {
     /// The same colour everywhere.
     pub const fn constant(factor: Vec3) -> Self {
-        Self {
-            factor,
-            texture: None,
-        }
+        Self { factor, texture: None }
     }
 }
 
 impl ScalarInput {
     /// The same value everywhere.
     pub const fn constant(factor: f32) -> Self {
-        Self {
-            factor,
-            texture: None,
-        }
+        Self { factor, texture: None }
     }
 }
 
 impl TextureLookup {
     /// The texture with the mesh's own coordinates.
     pub const fn plain(texture: TextureId) -> Self {
-        Self {
-            texture,
-            offset: Vec2::ZERO,
-            rotation: 0.0,
-            scale: Vec2::ONE,
-        }
+        Self { texture, offset: Vec2::ZERO, rotation: 0.0, scale: Vec2::ONE }
     }
 }
 

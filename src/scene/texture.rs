@@ -6,11 +6,7 @@ use std::sync::LazyLock;
 
 /// Linear value of a colour value in [0, 1] under the sRGB curve (IEC 61966-2-1).
 pub fn srgb_to_linear(value: f32) -> f32 {
-    if value <= 0.04045 {
-        value / 12.92
-    } else {
-        ((value + 0.055) / 1.055).powf(2.4)
-    }
+    if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
 }
 
 /// The curve at all 256 byte values: `powf` for 12 values of every bilinear lookup would dominate it.
@@ -25,11 +21,7 @@ impl Wrap {
             Self::Clamp => position.clamp(0, size - 1),
             Self::Mirror => {
                 let folded = position.rem_euclid(2 * size);
-                if folded < size {
-                    folded
-                } else {
-                    2 * size - 1 - folded
-                }
+                if folded < size { folded } else { 2 * size - 1 - folded }
             }
         }
     }
@@ -44,10 +36,7 @@ impl TextureLookup {
         // KHR_texture_transform: offset · rotation · scale, its rotation being clockwise in our v-down coordinates.
         let (sin, cos) = self.rotation.sin_cos();
         let scaled = self.scale * uv;
-        Vec2::new(
-            cos * scaled.x + sin * scaled.y,
-            cos * scaled.y - sin * scaled.x,
-        ) + self.offset
+        Vec2::new(cos * scaled.x + sin * scaled.y, cos * scaled.y - sin * scaled.x) + self.offset
     }
 }
 
@@ -62,29 +51,16 @@ impl Texture {
         let x = (uv.x * self.width as f32).clamp(-limit, limit);
         let y = (uv.y * self.height as f32).clamp(-limit, limit);
         if self.nearest {
-            return self.texel(
-                self.wrap_u.apply(x.floor() as i64, width),
-                self.wrap_v.apply(y.floor() as i64, height),
-            );
+            return self.texel(self.wrap_u.apply(x.floor() as i64, width), self.wrap_v.apply(y.floor() as i64, height));
         }
         let (x, y) = (x - 0.5, y - 0.5);
         let (left, top) = (x.floor(), y.floor());
         let (fraction_x, fraction_y) = (x - left, y - top);
         let (left, top) = (left as i64, top as i64);
-        let columns = [
-            self.wrap_u.apply(left, width),
-            self.wrap_u.apply(left + 1, width),
-        ];
-        let rows = [
-            self.wrap_v.apply(top, height),
-            self.wrap_v.apply(top + 1, height),
-        ];
-        let upper = self
-            .texel(columns[0], rows[0])
-            .lerp(self.texel(columns[1], rows[0]), fraction_x);
-        let lower = self
-            .texel(columns[0], rows[1])
-            .lerp(self.texel(columns[1], rows[1]), fraction_x);
+        let columns = [self.wrap_u.apply(left, width), self.wrap_u.apply(left + 1, width)];
+        let rows = [self.wrap_v.apply(top, height), self.wrap_v.apply(top + 1, height)];
+        let upper = self.texel(columns[0], rows[0]).lerp(self.texel(columns[1], rows[0]), fraction_x);
+        let lower = self.texel(columns[0], rows[1]).lerp(self.texel(columns[1], rows[1]), fraction_x);
         upper.lerp(lower, fraction_y)
     }
 
@@ -92,22 +68,11 @@ impl Texture {
     pub fn brightest(&self) -> f32 {
         match &self.texels {
             Texels::Bytes(texels, encoding) => {
-                let byte = texels
-                    .iter()
-                    .map(|&[r, g, b, _]| r.max(g).max(b))
-                    .max()
-                    .unwrap_or(0);
+                let byte = texels.iter().map(|&[r, g, b, _]| r.max(g).max(b)).max().unwrap_or(0);
                 let value = f32::from(byte) / 255.0;
-                if *encoding == Encoding::Srgb {
-                    srgb_to_linear(value)
-                } else {
-                    value
-                }
+                if *encoding == Encoding::Srgb { srgb_to_linear(value) } else { value }
             }
-            Texels::Floats(texels) => texels
-                .iter()
-                .map(|&[r, g, b, _]| r.max(g).max(b))
-                .fold(0.0, f32::max),
+            Texels::Floats(texels) => texels.iter().map(|&[r, g, b, _]| r.max(g).max(b)).fold(0.0, f32::max),
         }
     }
 
@@ -122,12 +87,7 @@ impl Texture {
             Texels::Bytes(texels, Encoding::Srgb) => {
                 let [r, g, b, a] = texels[index];
                 let table = &*SRGB_TO_LINEAR;
-                Vec4::new(
-                    table[r as usize],
-                    table[g as usize],
-                    table[b as usize],
-                    f32::from(a) * (1.0 / 255.0),
-                )
+                Vec4::new(table[r as usize], table[g as usize], table[b as usize], f32::from(a) * (1.0 / 255.0))
             }
             Texels::Floats(texels) => Vec4::from_array(texels[index]),
         }
@@ -140,10 +100,7 @@ impl ColorInput {
         match &self.texture {
             None => self.factor,
             Some(lookup) => {
-                self.factor
-                    * textures[lookup.texture.0 as usize]
-                        .sample_rgba(lookup.transform(uv))
-                        .truncate()
+                self.factor * textures[lookup.texture.0 as usize].sample_rgba(lookup.transform(uv)).truncate()
             }
         }
     }
@@ -173,10 +130,7 @@ mod tests {
             name: "test".to_owned(),
             width: 2,
             height: 1,
-            texels: Texels::Bytes(
-                Arc::new(vec![[0, 0, 0, 255], [255, 255, 255, 255]]),
-                Encoding::Linear,
-            ),
+            texels: Texels::Bytes(Arc::new(vec![[0, 0, 0, 255], [255, 255, 255, 255]]), Encoding::Linear),
             wrap_u: wrap,
             wrap_v: wrap,
             nearest: false,
@@ -186,17 +140,8 @@ mod tests {
     #[test]
     fn texel_centres_are_exact_and_between_is_linear() {
         let texture = two_by_one(Wrap::Clamp);
-        for (u, expected) in [
-            (0.25, 0.0),
-            (0.75, 1.0),
-            (0.5, 0.5),
-            (-3.0, 0.0),
-            (7.0, 1.0),
-        ] {
-            assert!(
-                (texture.sample_rgba(Vec2::new(u, 0.5)).x - expected).abs() < 1e-6,
-                "u = {u}"
-            );
+        for (u, expected) in [(0.25, 0.0), (0.75, 1.0), (0.5, 0.5), (-3.0, 0.0), (7.0, 1.0)] {
+            assert!((texture.sample_rgba(Vec2::new(u, 0.5)).x - expected).abs() < 1e-6, "u = {u}");
         }
     }
 
@@ -209,10 +154,7 @@ mod tests {
             (Wrap::Mirror, 1.25, 1.0),
             (Wrap::Mirror, -0.25, 0.0),
         ] {
-            assert!(
-                (two_by_one(wrap).sample_rgba(Vec2::new(u, 0.5)).x - expected).abs() < 1e-6,
-                "{wrap:?} {u}"
-            );
+            assert!((two_by_one(wrap).sample_rgba(Vec2::new(u, 0.5)).x - expected).abs() < 1e-6, "{wrap:?} {u}");
         }
     }
 
@@ -220,20 +162,8 @@ mod tests {
     fn any_coordinates_are_safe() {
         for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
             for nearest in [false, true] {
-                let texture = Texture {
-                    nearest,
-                    ..two_by_one(wrap)
-                };
-                for value in [
-                    f32::NAN,
-                    f32::INFINITY,
-                    f32::NEG_INFINITY,
-                    f32::MAX,
-                    f32::MIN,
-                    1e30,
-                    -1e12,
-                    1e-45,
-                ] {
+                let texture = Texture { nearest, ..two_by_one(wrap) };
+                for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, f32::MIN, 1e30, -1e12, 1e-45] {
                     assert!(texture.sample_rgba(Vec2::new(value, value)).is_finite());
                 }
             }
@@ -243,15 +173,8 @@ mod tests {
     #[test]
     fn texture_coordinates_turn_as_in_gltf() {
         // The extension's matrices for a quarter turn: (u, v) goes to (v, −u).
-        let lookup = TextureLookup {
-            rotation: std::f32::consts::FRAC_PI_2,
-            ..TextureLookup::plain(TextureId(0))
-        };
-        assert!(
-            lookup
-                .transform(Vec2::new(0.25, 0.75))
-                .abs_diff_eq(Vec2::new(0.75, -0.25), 1e-6)
-        );
+        let lookup = TextureLookup { rotation: std::f32::consts::FRAC_PI_2, ..TextureLookup::plain(TextureId(0)) };
+        assert!(lookup.transform(Vec2::new(0.25, 0.75)).abs_diff_eq(Vec2::new(0.75, -0.25), 1e-6));
     }
 
     #[test]
@@ -259,12 +182,6 @@ mod tests {
         let mut texture = two_by_one(Wrap::Clamp);
         texture.texels = Texels::Bytes(Arc::new(vec![[188, 0, 255, 128]; 2]), Encoding::Srgb);
         let texel = texture.sample_rgba(Vec2::splat(0.5));
-        assert!(
-            (texel - Vec4::new(0.502_886, 0.0, 1.0, 128.0 / 255.0))
-                .abs()
-                .max_element()
-                < 1e-5,
-            "{texel}"
-        );
+        assert!((texel - Vec4::new(0.502_886, 0.0, 1.0, 128.0 / 255.0)).abs().max_element() < 1e-5, "{texel}");
     }
 }

@@ -66,8 +66,7 @@ fn uniform_and_adaptive_renders_agree_with_a_reference() {
         );
         assert!(difference.abs() < 0.005 * reference.mean(), "{name}: mean off by {difference}");
         assert!(difference.abs() < 3.5 * error, "{name}: {} standard errors", difference / error);
-        let squared: f64 =
-            judged.luminance.iter().zip(&reference.luminance).map(|(a, b)| (a - b) * (a - b)).sum();
+        let squared: f64 = judged.luminance.iter().zip(&reference.luminance).map(|(a, b)| (a - b) * (a - b)).sum();
         let predicted: f64 = judged.variance.iter().chain(&reference.variance).sum();
         println!("{name}: calibration {:.3}", squared / predicted);
         assert!((squared / predicted - 1.0).abs() < 0.1, "{name}: calibration {}", squared / predicted);

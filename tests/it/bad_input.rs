@@ -13,27 +13,11 @@ fn every_bad_file_says_what_is_wrong_with_it() {
     for entry in std::fs::read_dir(folder("tests/bad")).unwrap() {
         let path = entry.unwrap().path();
         let text = std::fs::read_to_string(&path).unwrap();
-        let (_, expected) = text
-            .split_once("# expect: ")
-            .expect("a bad file says what is expected");
-        let expected = expected
-            .split(['\n', '}'])
-            .next()
-            .unwrap()
-            .trim_end_matches('"');
-        let expected = if path.extension().unwrap() == "gltf" {
-            expected
-        } else {
-            expected.trim()
-        };
-        let message = load(&path, &LoadOptions::default())
-            .expect_err(&path.display().to_string())
-            .to_string();
-        assert!(
-            message.contains(expected) && !message.contains('\n'),
-            "{}\n  {message}\n  {expected}",
-            path.display()
-        );
+        let (_, expected) = text.split_once("# expect: ").expect("a bad file says what is expected");
+        let expected = expected.split(['\n', '}']).next().unwrap().trim_end_matches('"');
+        let expected = if path.extension().unwrap() == "gltf" { expected } else { expected.trim() };
+        let message = load(&path, &LoadOptions::default()).expect_err(&path.display().to_string()).to_string();
+        assert!(message.contains(expected) && !message.contains('\n'), "{}\n  {message}\n  {expected}", path.display());
         files += 1;
     }
     assert!(files >= 15, "{files}");
@@ -41,11 +25,7 @@ fn every_bad_file_says_what_is_wrong_with_it() {
 
 #[test]
 fn what_is_no_scene_is_named() {
-    let message = |name: &str| {
-        load(&folder(name), &LoadOptions::default())
-            .unwrap_err()
-            .to_string()
-    };
+    let message = |name: &str| load(&folder(name), &LoadOptions::default()).unwrap_err().to_string();
     assert!(message("tests/none.toml").ends_with("no such file"));
     assert!(message("tests").contains("is a directory"));
     assert!(message("Cargo.lock").contains(".toml, .obj, .gltf and .glb are read"));
@@ -55,9 +35,7 @@ fn what_is_no_scene_is_named() {
 fn our_own_scenes_load_and_survive_every_cut() {
     for entry in std::fs::read_dir(folder("scenes")).unwrap() {
         let path = entry.unwrap().path();
-        if path.extension().is_none_or(|extension| extension != "toml")
-            || path.ends_with("Cargo.toml")
-        {
+        if path.extension().is_none_or(|extension| extension != "toml") || path.ends_with("Cargo.toml") {
             continue;
         }
         if let Err(error) = load(&path, &LoadOptions::default()) {

@@ -43,9 +43,27 @@ fn a_render_leaves_a_picture_and_its_figures() {
     let json: serde_json::Value =
         serde_json::from_slice(&std::fs::read(folder.path().join("out.json")).expect("written")).expect("JSON");
     for key in [
-        "scene", "width", "height", "seed", "sampling", "model", "csf", "operator", "observer", "samples_total",
-        "spp_mean", "spp_max", "seconds_total", "seconds_perception", "visibility_target", "visibility_p99",
-        "fraction_visible", "detection_probability_p99", "nonfinite_samples", "peak_memory_bytes", "plans",
+        "scene",
+        "width",
+        "height",
+        "seed",
+        "sampling",
+        "model",
+        "csf",
+        "operator",
+        "observer",
+        "samples_total",
+        "spp_mean",
+        "spp_max",
+        "seconds_total",
+        "seconds_perception",
+        "visibility_target",
+        "visibility_p99",
+        "fraction_visible",
+        "detection_probability_p99",
+        "nonfinite_samples",
+        "peak_memory_bytes",
+        "plans",
         "stop_reason",
     ] {
         assert!(!json[key].is_null(), "{key} is missing");
@@ -53,8 +71,19 @@ fn a_render_leaves_a_picture_and_its_figures() {
     let picture = image::open(folder.path().join("out.png")).expect("a PNG");
     assert_eq!((picture.width(), picture.height()), (24, 16));
     let exr = fechner::exr_read::read_exr(&folder.path().join("out.exr")).expect("an EXR");
-    for channel in ["R", "G", "B", "albedo.R", "normal.X", "depth.Z", "id.Y", "samples.Y", "threshold.Y",
-        "visibility.Y", "variance.Y"] {
+    for channel in [
+        "R",
+        "G",
+        "B",
+        "albedo.R",
+        "normal.X",
+        "depth.Z",
+        "id.Y",
+        "samples.Y",
+        "threshold.Y",
+        "visibility.Y",
+        "variance.Y",
+    ] {
         assert!(exr.channel(channel).is_some(), "{channel} is missing");
     }
     let mut left: Vec<_> = std::fs::read_dir(folder.path())

@@ -1,6 +1,8 @@
 //! Direct light on a diffuse plane against closed forms, within 0.3 %.
 
-use crate::support::{add_material, add_rectangle, add_sphere, constant_environment, diffuse, empty_scene, radiance_along, trace_settings};
+use crate::support::{
+    add_material, add_rectangle, add_sphere, constant_environment, diffuse, empty_scene, radiance_along, trace_settings,
+};
 use fechner::geometry::Ray;
 use fechner::integrator::{PathTracer, TraceSettings};
 use fechner::scene::{Light, Scene};
@@ -87,10 +89,7 @@ fn lights_without_area_follow_their_laws() {
     });
     assert_irradiance(spot, 1.5, 8.0 / 6.25 * 0.8, "inside the cone of a spot");
     let mut sun = floor();
-    sun.lights.push(Light::Directional {
-        direction: Vec3::new(0.6, -0.8, 0.0),
-        irradiance: Vec3::splat(2.0),
-    });
+    sun.lights.push(Light::Directional { direction: Vec3::new(0.6, -0.8, 0.0), irradiance: Vec3::splat(2.0) });
     assert_irradiance(sun, 0.0, 1.6, "directional");
 }
 

@@ -6,10 +6,8 @@ use std::time::{Duration, Instant};
 
 /// The folder of other people's scenes: FECHNER_ASSETS, else beside the project.
 fn assets() -> Option<PathBuf> {
-    let folder = std::env::var_os("FECHNER_ASSETS").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets"),
-        PathBuf::from,
-    );
+    let folder = std::env::var_os("FECHNER_ASSETS")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets"), PathBuf::from);
     if folder.is_dir() {
         return Some(folder);
     }
@@ -18,26 +16,15 @@ fn assets() -> Option<PathBuf> {
 }
 
 fn files_below(folder: &Path, found: &mut Vec<PathBuf>) {
-    let mut entries: Vec<PathBuf> = std::fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-        .collect();
+    let mut entries: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     entries.sort();
     for path in entries {
-        if path.is_dir() {
-            files_below(&path, found)
-        } else {
-            found.push(path)
-        }
+        if path.is_dir() { files_below(&path, found) } else { found.push(path) }
     }
 }
 
 fn has_extension(path: &Path, extensions: &[&str]) -> bool {
-    path.extension().is_some_and(|extension| {
-        extensions
-            .iter()
-            .any(|known| extension.eq_ignore_ascii_case(known))
-    })
+    path.extension().is_some_and(|extension| extensions.iter().any(|known| extension.eq_ignore_ascii_case(known)))
 }
 
 #[test]
@@ -45,23 +32,15 @@ fn every_sound_scene_loads() {
     let Some(folder) = assets() else { return };
     let mut files = Vec::new();
     files_below(&folder, &mut files);
-    files.retain(|path| {
-        has_extension(path, &["gltf", "glb", "obj"]) && !path.starts_with(folder.join("faults"))
-    });
+    files.retain(|path| has_extension(path, &["gltf", "glb", "obj"]) && !path.starts_with(folder.join("faults")));
     let mut failures = Vec::new();
     for path in &files {
         let start = Instant::now();
         match load(path, &LoadOptions::default()) {
             Ok(scene) => {
                 let triangles: usize = scene.meshes.iter().map(|mesh| mesh.triangles.len()).sum();
-                if start.elapsed() > Duration::from_millis(200)
-                    || !path.starts_with(folder.join("scenes-mitsuba"))
-                {
-                    println!(
-                        "{} ms, {triangles} triangles: {}",
-                        start.elapsed().as_millis(),
-                        path.display()
-                    );
+                if start.elapsed() > Duration::from_millis(200) || !path.starts_with(folder.join("scenes-mitsuba")) {
+                    println!("{} ms, {triangles} triangles: {}", start.elapsed().as_millis(), path.display());
                     scene.notes.iter().for_each(|note| println!("    {note}"));
                 }
             }
@@ -69,9 +48,7 @@ fn every_sound_scene_loads() {
         }
     }
     println!("{} files, {} failures", files.len(), failures.len());
-    failures
-        .iter()
-        .for_each(|failure| println!("    {failure}"));
+    failures.iter().for_each(|failure| println!("    {failure}"));
     // Points and lines alone are sound files without anything to render.
     failures.retain(|failure| !failure.contains("nothing to render"));
     // "3.1+e2" is no number in any reader's book but its author's.
@@ -94,11 +71,6 @@ fn damaged_scenes_end_in_one_line_soon() {
                 assert!(!message.contains('\n'), "{message}");
             }
         }
-        assert!(
-            start.elapsed() < Duration::from_secs(5),
-            "{} took {:?}",
-            path.display(),
-            start.elapsed()
-        );
+        assert!(start.elapsed() < Duration::from_secs(5), "{} took {:?}", path.display(), start.elapsed());
     }
 }

@@ -8,26 +8,16 @@ use std::f64::consts::TAU;
 pub(super) fn table() -> Vec<Part> {
     let (front, back, radius, thick) = (0.45, -0.45, 0.012, 0.05);
     let top = Part::surface("table-top", "table", (1, 1), [2.0, 1.0], |u, v| {
-        [
-            -0.9 + 1.8 * u,
-            0.0,
-            front - radius + (back - front + radius) * v,
-        ]
+        [-0.9 + 1.8 * u, 0.0, front - radius + (back - front + radius) * v]
     });
     let edge = Part::surface("table-edge", "table", (1, 10), [2.0, 0.06], |u, v| {
         let angle = (1.0 - v) * TAU / 4.0;
-        [
-            -0.9 + 1.8 * u,
-            radius * (angle.cos() - 1.0),
-            front - radius + radius * angle.sin(),
-        ]
+        [-0.9 + 1.8 * u, radius * (angle.cos() - 1.0), front - radius + radius * angle.sin()]
     });
     let face = Part::surface("table-face", "table", (1, 1), [2.0, 0.06], |u, v| {
         [-0.9 + 1.8 * u, -thick + (thick - radius) * v, front]
     });
-    let wall = Part::surface("wall", "tiles", (1, 1), [5.4, 3.6], |u, v| {
-        [-1.5 + 3.0 * u, -0.6 + 2.0 * v, back]
-    });
+    let wall = Part::surface("wall", "tiles", (1, 1), [5.4, 3.6], |u, v| [-1.5 + 3.0 * u, -0.6 + 2.0 * v, back]);
     vec![top, edge, face, wall]
 }
 
@@ -43,28 +33,18 @@ pub(super) fn cloth() -> Part {
             ([0.0, s], [1.0, 0.0])
         } else if s < turn {
             let angle = s / radius;
-            (
-                [radius * (angle.cos() - 1.0), radius * angle.sin()],
-                [angle.cos(), angle.sin()],
-            )
+            ([radius * (angle.cos() - 1.0), radius * angle.sin()], [angle.cos(), angle.sin()])
         } else {
             ([turn - radius - s, radius], [0.0, 1.0])
         };
         let hanging = ((s - 0.01) / hang).clamp(0.0, 1.0);
-        let ripple = |x: f64, y: f64, seed| {
-            f64::from(gradient(x as f32 + 40.0, y as f32 + 40.0, (997, 997), seed))
-        };
+        let ripple = |x: f64, y: f64, seed| f64::from(gradient(x as f32 + 40.0, y as f32 + 40.0, (997, 997), seed));
         // Folds grow as it hangs, and a few soft waves lie on the table; it never dips below the table.
-        let fold =
-            0.020 * hanging * (1.0 + (u * 4.3 * TAU + 1.2 * ripple(x * 4.0, s * 3.0, 3)).sin());
+        let fold = 0.020 * hanging * (1.0 + (u * 4.3 * TAU + 1.2 * ripple(x * 4.0, s * 3.0, 3)).sin());
         let wave = 0.0045 * (1.0 + ripple(x * 9.0 + s * 5.0, s * 11.0 - x * 3.0, 4));
         let lift = 0.0015 + fold + wave;
         let narrow = 1.0 - 0.10 * hanging * hanging;
         let skew = 0.10 * s;
-        [
-            x * narrow + skew,
-            y + out[0] * lift,
-            edge - 0.008 + z + out[1] * lift,
-        ]
+        [x * narrow + skew, y + out[0] * lift, edge - 0.008 + z + out[1] * lift]
     })
 }

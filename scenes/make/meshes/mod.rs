@@ -57,10 +57,7 @@ pub(crate) fn write_all(folder: &Path) -> anyhow::Result<()> {
 /// Whether a material of [`MATERIALS`] uses a picture.
 fn is_textured(material: &str) -> bool {
     let name = format!("newmtl {material}\n");
-    let entry = MATERIALS
-        .split_once(&name)
-        .expect("every part uses one of our materials")
-        .1;
+    let entry = MATERIALS.split_once(&name).expect("every part uses one of our materials").1;
     let entry = entry.split_once("newmtl").map_or(entry, |(entry, _)| entry);
     entry.contains("map_") || entry.contains("norm ")
 }

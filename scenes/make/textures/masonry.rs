@@ -21,11 +21,7 @@ fn bond(u: f32, v: f32, columns: i32, rows: i32, aspect: f32) -> Place {
     let x = u * columns as f32 + if row.rem_euclid(2) == 1 { 0.5 } else { 0.0 };
     let local = (x - x.floor() - 0.5, y - y.floor() - 0.5);
     let edge = ((0.5 - local.0.abs()) * aspect).min(0.5 - local.1.abs());
-    Place {
-        id: ((x.floor() as i32).rem_euclid(columns), row.rem_euclid(rows)),
-        local,
-        edge,
-    }
+    Place { id: ((x.floor() as i32).rem_euclid(columns), row.rem_euclid(rows)), local, edge }
 }
 
 /// A tile's share of the place (0 is grout) and how its face leans and bulges.
@@ -47,10 +43,7 @@ fn tile_color(u: f32, v: f32) -> Color {
     let thin = 1.0 - step(0.05, 0.17, place.edge);
     let cloud = 1.0 + 0.10 * fractal(u * 12.0, v * 12.0, (12, 12), 3, 8);
     let glaze = mix_colors(scale_color(glaze, cloud), [0.45, 0.60, 0.55], 0.55 * thin);
-    let grout = scale_color(
-        [0.72, 0.69, 0.63],
-        1.0 + 0.10 * fractal(u * 64.0, v * 64.0, (64, 64), 2, 4),
-    );
+    let grout = scale_color([0.72, 0.69, 0.63], 1.0 + 0.10 * fractal(u * 64.0, v * 64.0, (64, 64), 2, 4));
     mix_colors(grout, glaze, share)
 }
 
@@ -68,36 +61,20 @@ fn brick_color(u: f32, v: f32) -> Color {
     let (place, share, _) = brick(u, v);
     let pick = |k| random(place.id.0, place.id.1, k);
     let clay = mix_colors([0.62, 0.30, 0.21], [0.47, 0.21, 0.17], pick(31));
-    let clay = if pick(32) < 0.14 {
-        mix_colors(clay, [0.30, 0.19, 0.19], 0.7)
-    } else {
-        clay
-    };
-    let clay = if pick(33) < 0.12 {
-        mix_colors(clay, [0.76, 0.50, 0.34], 0.6)
-    } else {
-        clay
-    };
+    let clay = if pick(32) < 0.14 { mix_colors(clay, [0.30, 0.19, 0.19], 0.7) } else { clay };
+    let clay = if pick(33) < 0.12 { mix_colors(clay, [0.76, 0.50, 0.34], 0.6) } else { clay };
     let grain = 1.0 + 0.22 * fractal(u * 32.0, v * 32.0, (32, 32), 4, 34);
     let bloom = step(0.15, 0.6, fractal(u * 5.0, v * 5.0, (5, 5), 4, 35));
     let clay = mix_colors(scale_color(clay, grain), [0.74, 0.66, 0.60], 0.28 * bloom);
-    let mortar = scale_color(
-        [0.70, 0.66, 0.60],
-        1.0 + 0.16 * fractal(u * 64.0, v * 64.0, (64, 64), 3, 36),
-    );
+    let mortar = scale_color([0.70, 0.66, 0.60], 1.0 + 0.16 * fractal(u * 64.0, v * 64.0, (64, 64), 3, 36));
     mix_colors(mortar, clay, share)
 }
 
 /// Writes colour, normals and roughness of the tiles, and colour and normals of the bricks.
 pub(super) fn write(folder: &Path) -> anyhow::Result<()> {
     Raster::new(512, tile_color).write(&folder.join("tiles.png"))?;
-    Raster::new(512, |u, v| tile(u, v).2)
-        .normals(0.012)
-        .write(&folder.join("tiles-normal.png"))?;
-    Raster::new(256, |u, v| mix(0.85, 0.16, tile(u, v).1))
-        .write(&folder.join("tiles-roughness.png"))?;
+    Raster::new(512, |u, v| tile(u, v).2).normals(0.012).write(&folder.join("tiles-normal.png"))?;
+    Raster::new(256, |u, v| mix(0.85, 0.16, tile(u, v).1)).write(&folder.join("tiles-roughness.png"))?;
     Raster::new(512, brick_color).write(&folder.join("bricks.png"))?;
-    Raster::new(256, |u, v| brick(u, v).2)
-        .normals(0.010)
-        .write(&folder.join("bricks-normal.png"))
+    Raster::new(256, |u, v| brick(u, v).2).normals(0.010).write(&folder.join("bricks-normal.png"))
 }

@@ -10,28 +10,14 @@ fn marble(u: f32, v: f32) -> Color {
     // A vein runs where a smooth field changes sign; its width follows another field.
     let vein = |x: f32, y: f32, period: i32, width: f32, seed: u32| {
         let distance = gradient(x, y, (period, period), seed).abs();
-        let width = width
-            * (0.35
-                + 0.65
-                    * (0.5 + 0.5 * gradient(x * 0.5 + 0.3, y * 0.5, (period, period), seed + 1)));
+        let width = width * (0.35 + 0.65 * (0.5 + 0.5 * gradient(x * 0.5 + 0.3, y * 0.5, (period, period), seed + 1)));
         (-(distance / width).powi(2)).exp()
     };
     let cloud = 0.5 + 0.5 * fractal(u * 3.0 + warp(3), v * 3.0, (3, 3), 5, 9);
-    let body = mix_colors(
-        [0.93, 0.92, 0.90],
-        [0.76, 0.77, 0.79],
-        step(0.25, 0.9, cloud),
-    );
+    let body = mix_colors([0.93, 0.92, 0.90], [0.76, 0.77, 0.79], step(0.25, 0.9, cloud));
     // Veins fade in and out, else they close to rings.
-    let fade = |seed| {
-        step(
-            -0.15,
-            0.45,
-            fractal(u * 3.0 + warp(5), v * 3.0, (3, 3), 3, seed),
-        )
-    };
-    let veins = (0.8 * fade(40) * vein(x, y, 3, 0.05, 20))
-        .max(0.6 * fade(41) * vein(x * 2.0, y * 2.0, 6, 0.05, 30));
+    let fade = |seed| step(-0.15, 0.45, fractal(u * 3.0 + warp(5), v * 3.0, (3, 3), 3, seed));
+    let veins = (0.8 * fade(40) * vein(x, y, 3, 0.05, 20)).max(0.6 * fade(41) * vein(x * 2.0, y * 2.0, 6, 0.05, 30));
     mix_colors(body, [0.36, 0.38, 0.42], veins)
 }
 

@@ -36,23 +36,14 @@ fn sample(u: f32, v: f32) -> Sample {
     let ring = step(0.15, 0.85, phase) * (1.0 - step(0.90, 1.0, phase));
     let fibre = fractal(u * 8.0, across * 42.0, (8, PLANKS * 42), 3, seed + 20);
     let plank = step(0.012, 0.024, 0.5 - y.abs());
-    Sample {
-        ring,
-        fibre,
-        plank,
-        tone: random(index, 2, 5),
-    }
+    Sample { ring, fibre, plank, tone: random(index, 2, 5) }
 }
 
 /// Writes `wood.png` and `wood-roughness.png`.
 pub(super) fn write(folder: &Path) -> anyhow::Result<()> {
     Raster::new(512, |u, v| {
         let s = sample(u, v);
-        let color = mix_colors(
-            LIGHT,
-            DARK,
-            (0.75 * s.ring + 0.45 * s.fibre).clamp(0.0, 1.0),
-        );
+        let color = mix_colors(LIGHT, DARK, (0.75 * s.ring + 0.45 * s.fibre).clamp(0.0, 1.0));
         let color = scale_color(color, mix(0.86, 1.08, s.tone) * mix(0.25, 1.0, s.plank));
         [color[0], color[1] * mix(0.97, 1.02, s.tone), color[2]]
     })

@@ -28,13 +28,7 @@ pub(super) struct Case {
 
 impl Case {
     fn new(name: impl Into<String>, bsdf: Bsdf<'static>, budget: Budget, width: f64) -> Self {
-        Self {
-            name: name.into(),
-            bsdf,
-            budget,
-            eta: 1.0,
-            width,
-        }
+        Self { name: name.into(), bsdf, budget, eta: 1.0, width }
     }
 
     /// (Index on the side of `wi` / index on the side of `wo`)²: turns radiance back into energy.
@@ -50,10 +44,7 @@ impl Case {
         let z = (1.0 - x * x - y * y).max(0.0).sqrt().copysign(-wo.z);
         [Vec3::new(-wo.x, -wo.y, wo.z), Vec3::new(x, y, z)]
             .into_iter()
-            .map(|direction| Peak {
-                direction: direction.normalize(),
-                width: 0.5 * self.width,
-            })
+            .map(|direction| Peak { direction: direction.normalize(), width: 0.5 * self.width })
             .collect()
     }
 }
@@ -72,8 +63,7 @@ pub(super) fn views() -> Vec<Vec3> {
 
 pub(super) static GLASS: LazyLock<DielectricTables> = LazyLock::new(|| DielectricTables::new(1.5));
 pub(super) static WATER: LazyLock<DielectricTables> = LazyLock::new(|| DielectricTables::new(1.33));
-pub(super) static DIAMOND: LazyLock<DielectricTables> =
-    LazyLock::new(|| DielectricTables::new(2.4));
+pub(super) static DIAMOND: LazyLock<DielectricTables> = LazyLock::new(|| DielectricTables::new(2.4));
 
 const GRAY_BLUE: Vec3 = Vec3::new(0.2, 0.5, 0.8);
 const GOLD_ETA: Vec3 = Vec3::new(0.143, 0.375, 1.442);
@@ -94,17 +84,10 @@ pub(super) fn smooth_cases() -> Vec<Case> {
             Lossless,
             width,
         ));
-        cases.push(Case::new(
-            format!("gold {roughness}"),
-            Bsdf::conductor(GOLD_ETA, GOLD_K, roughness),
-            AtMost,
-            width,
-        ));
-        for (name, eta, tables) in [
-            ("glass", 1.5f32, &GLASS),
-            ("water from below", 1.0 / 1.33, &WATER_REVERSED),
-            ("diamond", 2.4, &DIAMOND),
-        ] {
+        cases.push(Case::new(format!("gold {roughness}"), Bsdf::conductor(GOLD_ETA, GOLD_K, roughness), AtMost, width));
+        for (name, eta, tables) in
+            [("glass", 1.5f32, &GLASS), ("water from below", 1.0 / 1.33, &WATER_REVERSED), ("diamond", 2.4, &DIAMOND)]
+        {
             cases.push(Case {
                 eta,
                 ..Case::new(
@@ -155,25 +138,10 @@ pub(super) fn smooth_cases() -> Vec<Case> {
             Lossless,
             1.0,
         ));
-        cases.push(Case::new(
-            format!("oren-nayar {roughness}"),
-            Bsdf::oren_nayar(GRAY_BLUE, roughness),
-            AtMost,
-            1.0,
-        ));
+        cases.push(Case::new(format!("oren-nayar {roughness}"), Bsdf::oren_nayar(GRAY_BLUE, roughness), AtMost, 1.0));
     }
-    cases.push(Case::new(
-        "white sheet",
-        Bsdf::diffuse_transmission(Vec3::splat(0.7), Vec3::splat(0.3)),
-        Lossless,
-        1.0,
-    ));
-    cases.push(Case::new(
-        "sheet",
-        Bsdf::diffuse_transmission(0.5 * GRAY_BLUE, Vec3::new(0.6, 0.1, 0.0)),
-        AtMost,
-        1.0,
-    ));
+    cases.push(Case::new("white sheet", Bsdf::diffuse_transmission(Vec3::splat(0.7), Vec3::splat(0.3)), Lossless, 1.0));
+    cases.push(Case::new("sheet", Bsdf::diffuse_transmission(0.5 * GRAY_BLUE, Vec3::new(0.6, 0.1, 0.0)), AtMost, 1.0));
     for transmission in [0.0, 0.6] {
         cases.push(Case::new(
             format!("white smooth metal-roughness {transmission}"),
@@ -185,8 +153,7 @@ pub(super) fn smooth_cases() -> Vec<Case> {
     cases
 }
 
-static WATER_REVERSED: LazyLock<DielectricTables> =
-    LazyLock::new(|| DielectricTables::new(1.0 / 1.33));
+static WATER_REVERSED: LazyLock<DielectricTables> = LazyLock::new(|| DielectricTables::new(1.0 / 1.33));
 
 /// Models that consist of delta lobes.
 pub(super) fn delta_cases() -> Vec<Case> {
@@ -198,27 +165,12 @@ pub(super) fn delta_cases() -> Vec<Case> {
     vec![
         Case::new("mirror", Bsdf::mirror(GRAY_BLUE), AtMost, 1.0),
         Case::new("white mirror", Bsdf::mirror(Vec3::ONE), Lossless, 1.0),
-        Case::new(
-            "smooth gold",
-            Bsdf::conductor(GOLD_ETA, GOLD_K, 0.0),
-            AtMost,
-            1.0,
-        ),
+        Case::new("smooth gold", Bsdf::conductor(GOLD_ETA, GOLD_K, 0.0), AtMost, 1.0),
         glass("smooth glass", 1.5, Vec3::ONE, Lossless),
         glass("smooth bubble", 0.7, Vec3::ONE, Lossless),
         glass("smooth tinted glass", 1.5, GRAY_BLUE, AtMost),
         Case::new("pane", Bsdf::thin_dielectric(1.5, Vec3::ONE), Lossless, 1.0),
-        Case::new(
-            "tinted pane",
-            Bsdf::thin_dielectric(1.5, GRAY_BLUE),
-            AtMost,
-            1.0,
-        ),
-        Case::new(
-            "smooth metal",
-            Bsdf::metal_roughness(Vec3::ONE, 1.0, 0.0, 1.5, 0.0),
-            Lossless,
-            1.0,
-        ),
+        Case::new("tinted pane", Bsdf::thin_dielectric(1.5, GRAY_BLUE), AtMost, 1.0),
+        Case::new("smooth metal", Bsdf::metal_roughness(Vec3::ONE, 1.0, 0.0, 1.5, 0.0), Lossless, 1.0),
     ]
 }

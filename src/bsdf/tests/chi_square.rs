@@ -8,10 +8,7 @@ use glam::Vec3;
 const SAMPLES: usize = 60_000;
 /// Share of the pdf that quadrature may miss along the edges that refraction makes.
 const QUADRATURE_ERROR: f64 = 1e-3;
-const BINS: Bins = Bins {
-    heights: 24,
-    azimuths: 24,
-};
+const BINS: Bins = Bins { heights: 24, azimuths: 24 };
 /// Bins after those of the sphere: delta reflection, delta transmission, nothing.
 const EXTRA: usize = 3;
 
@@ -44,10 +41,7 @@ fn histogram(case: &Case, wo: Vec3, seed: u64) -> Histogram {
     }
     let used: f64 = probability.iter().sum();
     probability[BINS.count() + 2] = (1.0 - used).max(0.0);
-    Histogram {
-        observed,
-        expected: probability.iter().map(|p| p * SAMPLES as f64).collect(),
-    }
+    Histogram { observed, expected: probability.iter().map(|p| p * SAMPLES as f64).collect() }
 }
 
 impl Histogram {
@@ -104,9 +98,7 @@ fn samples_follow_their_pdf() {
             if p < significance || normal_p(z) < significance {
                 let name = &case.name;
                 let cos = wo.z;
-                failures.push(format!(
-                    "{name}, cos {cos}: chi-square p {p:.2e}, discarded z {z:.1}"
-                ));
+                failures.push(format!("{name}, cos {cos}: chi-square p {p:.2e}, discarded z {z:.1}"));
             }
         }
     }

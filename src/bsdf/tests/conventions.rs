@@ -17,15 +17,9 @@ fn a_slab_of_glass_changes_neither_direction_nor_radiance() {
     let entering = refracted(&glass, wo);
     // Snell, and 1/η² on the way in.
     assert!((entering.wi.x + 0.4).abs() < 1e-6, "{entering:?}");
-    assert!(
-        (entering.weight.x * 1.5 * 1.5 - 1.0).abs() < 1e-5,
-        "{entering:?}"
-    );
+    assert!((entering.weight.x * 1.5 * 1.5 - 1.0).abs() < 1e-5, "{entering:?}");
     let leaving = refracted(&glass, turn(-entering.wi).with_z(entering.wi.z));
-    assert!(
-        (leaving.weight.x / (1.5 * 1.5) - 1.0).abs() < 1e-5,
-        "{leaving:?}"
-    );
+    assert!((leaving.weight.x / (1.5 * 1.5) - 1.0).abs() < 1e-5, "{leaving:?}");
 }
 
 #[test]

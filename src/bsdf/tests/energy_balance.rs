@@ -16,9 +16,11 @@ fn by_sampling(case: &Case, wo: Vec3, seed: u64) -> Mean {
     let mut random = Random::new(seed);
     let mut mean = Mean::default();
     for _ in 0..SAMPLES {
-        mean.add(case.bsdf.sample(wo, random.triple()).map_or(0.0, |sample| {
-            f64::from(sample.weight.z) * case.energy_per_radiance(wo, sample.wi)
-        }));
+        mean.add(
+            case.bsdf
+                .sample(wo, random.triple())
+                .map_or(0.0, |sample| f64::from(sample.weight.z) * case.energy_per_radiance(wo, sample.wi)),
+        );
     }
     mean
 }
@@ -26,18 +28,13 @@ fn by_sampling(case: &Case, wo: Vec3, seed: u64) -> Mean {
 /// The same by quadrature of the smooth lobes, plus the exact share of the delta lobes.
 fn by_quadrature(case: &Case, wo: Vec3) -> f64 {
     // Fewer bins miss slivers of refracted light that fall between the first points of quadrature.
-    let bins = Bins {
-        heights: 64,
-        azimuths: 64,
-    };
+    let bins = Bins { heights: 64, azimuths: 64 };
     let peaks = case.peaks(wo);
     let value = |wi| {
         let energy = case.energy_per_radiance(wo, wi);
         [f64::from(case.bsdf.evaluate(wo, wi).value.z) * energy, 0.0]
     };
-    let smooth: f64 = (0..bins.count())
-        .map(|index| integrate(bins.cell(index), &peaks, &value)[0])
-        .sum();
+    let smooth: f64 = (0..bins.count()).map(|index| integrate(bins.cell(index), &peaks, &value)[0]).sum();
     smooth + delta_energy(case, wo)
 }
 

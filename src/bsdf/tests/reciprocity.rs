@@ -33,11 +33,7 @@ fn light_may_be_turned_round() {
             let scale = forth.max(back).max_element();
             let difference = (forth - back).abs().max_element();
             // Single precision, magnified by narrow lobes at grazing angles.
-            assert!(
-                difference <= 5e-3 * scale + 1e-6,
-                "{}: {wo} {wi}: {forth} {back}",
-                case.name
-            );
+            assert!(difference <= 5e-3 * scale + 1e-6, "{}: {wo} {wi}: {forth} {back}", case.name);
             compared += usize::from(scale > 0.0);
         }
         assert!(compared > 500, "{}: only {compared} pairs", case.name);

@@ -23,12 +23,7 @@ fn check_sample(case: &str, bsdf: &Bsdf<'_>, wo: Vec3, u: [f32; 3]) {
         assert!(bsdf.has_smooth_lobe(), "{}", context());
         let evaluation = bsdf.evaluate(wo, sample.wi);
         assert_eq!(evaluation.pdf, sample.pdf, "{}", context());
-        assert_eq!(
-            evaluation.value / evaluation.pdf,
-            sample.weight,
-            "{}",
-            context()
-        );
+        assert_eq!(evaluation.value / evaluation.pdf, sample.weight, "{}", context());
     }
 }
 
@@ -41,10 +36,7 @@ fn check_evaluation(case: &str, bsdf: &Bsdf<'_>, wo: Vec3, wi: Vec3) {
     assert!(fine, "{case}: wo {wo} wi {wi}: {evaluation:?}");
     // Less than this is rounding: 1 − E of a hardly rough surface, or a cosine next to 0.
     if evaluation.value.max_element() > 1e-9 {
-        assert!(
-            evaluation.pdf > 0.0,
-            "{case}: wo {wo} wi {wi} is never sampled"
-        );
+        assert!(evaluation.pdf > 0.0, "{case}: wo {wo} wi {wi} is never sampled");
     }
 }
 
@@ -83,13 +75,7 @@ fn extreme_models() -> Vec<Bsdf<'static>> {
             for metallic in [0.0, 0.5, 1.0] {
                 for ior in [0.0, 1.0, 1.5] {
                     for transmission in [0.0, 0.5, 1.0] {
-                        models.push(Bsdf::metal_roughness(
-                            color,
-                            metallic,
-                            roughness,
-                            ior,
-                            transmission,
-                        ));
+                        models.push(Bsdf::metal_roughness(color, metallic, roughness, ior, transmission));
                     }
                 }
             }
@@ -117,10 +103,7 @@ fn nothing_breaks_at_the_extremes() {
             }
             let albedo = bsdf.albedo(wo);
             assert!(albedo.is_finite(), "{name}: wo {wo}: albedo {albedo}");
-            assert!(
-                albedo.min_element() >= 0.0 && albedo.max_element() <= 1.01,
-                "{name}: wo {wo}: albedo {albedo}"
-            );
+            assert!(albedo.min_element() >= 0.0 && albedo.max_element() <= 1.01, "{name}: wo {wo}: albedo {albedo}");
         }
     }
 }

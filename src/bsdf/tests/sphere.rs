@@ -36,10 +36,7 @@ impl Bins {
         let (row, column) = (index / self.azimuths, index % self.azimuths);
         let theta = |row: usize| PI * row as f64 / self.heights as f64;
         let phi = |column: usize| TAU * column as f64 / self.azimuths as f64;
-        Cell {
-            theta: [theta(row), theta(row + 1)],
-            phi: [phi(column), phi(column + 1)],
-        }
+        Cell { theta: [theta(row), theta(row + 1)], phi: [phi(column), phi(column + 1)] }
     }
 
     pub(super) fn index(&self, w: Vec3) -> usize {
@@ -48,11 +45,7 @@ impl Bins {
         let row = (theta / PI * self.heights as f64) as usize;
         // A direction above the plane must not be rounded into a bin below it.
         let half = self.heights / 2;
-        let row = if w.z >= 0.0 {
-            row.min(half - 1)
-        } else {
-            row.clamp(half, self.heights - 1)
-        };
+        let row = if w.z >= 0.0 { row.min(half - 1) } else { row.clamp(half, self.heights - 1) };
         let phi = w64.y.atan2(w64.x).rem_euclid(TAU);
         let column = (phi / TAU * self.azimuths as f64) as usize;
         row * self.azimuths + column.min(self.azimuths - 1)
@@ -64,13 +57,7 @@ pub(super) fn integrate(cell: Cell, peaks: &[Peak], f: &impl Fn(Vec3) -> Values)
     refine(cell, peaks, f, gauss(cell, f), 0)
 }
 
-fn refine(
-    cell: Cell,
-    peaks: &[Peak],
-    f: &impl Fn(Vec3) -> Values,
-    whole: Values,
-    depth: u32,
-) -> Values {
+fn refine(cell: Cell, peaks: &[Peak], f: &impl Fn(Vec3) -> Values, whole: Values, depth: u32) -> Values {
     const TOLERANCE: f64 = 3e-7;
     const DEEPEST: u32 = 11;
     let quarters = cell.quarters();
@@ -98,8 +85,7 @@ impl Cell {
         let upper = [theta, self.theta[1]];
         let left = [self.phi[0], phi];
         let right = [phi, self.phi[1]];
-        [(lower, left), (lower, right), (upper, left), (upper, right)]
-            .map(|(theta, phi)| Self { theta, phi })
+        [(lower, left), (lower, right), (upper, left), (upper, right)].map(|(theta, phi)| Self { theta, phi })
     }
 
     /// Whether a peak lies within two widths of the cell and is narrower than the cell.
@@ -126,11 +112,8 @@ impl Cell {
 }
 
 fn gauss(cell: Cell, f: &impl Fn(Vec3) -> Values) -> Values {
-    const NODES: [(f64, f64); 3] = [
-        (0.112_701_665_379_258_31, 5.0 / 18.0),
-        (0.5, 8.0 / 18.0),
-        (0.887_298_334_620_741_7, 5.0 / 18.0),
-    ];
+    const NODES: [(f64, f64); 3] =
+        [(0.112_701_665_379_258_31, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
     let area = (cell.theta[1] - cell.theta[0]) * (cell.phi[1] - cell.phi[0]);
     let mut sum = [0.0; 2];
     for (a, weight_a) in NODES {
@@ -146,13 +129,8 @@ fn gauss(cell: Cell, f: &impl Fn(Vec3) -> Values) -> Values {
 
 #[test]
 fn bins_cover_the_sphere() {
-    let bins = Bins {
-        heights: 8,
-        azimuths: 6,
-    };
-    let area: f64 = (0..bins.count())
-        .map(|index| integrate(bins.cell(index), &[], &|_| [1.0, 0.0])[0])
-        .sum();
+    let bins = Bins { heights: 8, azimuths: 6 };
+    let area: f64 = (0..bins.count()).map(|index| integrate(bins.cell(index), &[], &|_| [1.0, 0.0])[0]).sum();
     assert!((area - 2.0 * TAU).abs() < 1e-9, "{area}");
     for index in 0..bins.count() {
         let middle = bins.cell(index).direction(0.4, 0.6);

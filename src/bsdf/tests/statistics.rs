@@ -111,12 +111,9 @@ pub(super) fn sidak(overall: f64, tests: usize) -> f64 {
 #[test]
 fn distributions_match_tables() {
     // Abramowitz & Stegun (1964), tables 26.7 and 26.1.
-    for (statistic, degrees, p) in [
-        (3.841_46, 1.0, 0.05),
-        (18.307_0, 10.0, 0.05),
-        (149.449, 100.0, 0.001),
-        (67.327_6, 100.0, 0.995),
-    ] {
+    for (statistic, degrees, p) in
+        [(3.841_46, 1.0, 0.05), (18.307_0, 10.0, 0.05), (149.449, 100.0, 0.001), (67.327_6, 100.0, 0.995)]
+    {
         let got = chi_square_p(statistic, degrees);
         assert!((got / p - 1.0).abs() < 1e-4, "{statistic} {degrees}: {got}");
     }

@@ -4,8 +4,8 @@ use super::error::{LoadError, nearest, suggestion};
 use super::texture::Requests;
 use super::{LoadOptions, default_view, environment, validate};
 use crate::scene::{
-    Camera, Environment, FilmDefaults, Instance, Light, Material, MaterialId, Mesh, MeshId, Scene,
-    Sphere, ViewingDefaults,
+    Camera, Environment, FilmDefaults, Instance, Light, Material, MaterialId, Mesh, MeshId, Scene, Sphere,
+    ViewingDefaults,
 };
 use std::path::Path;
 
@@ -51,17 +51,10 @@ impl Builder {
     /// An empty scene named after its file.
     pub(super) fn new(path: &Path) -> Self {
         Self {
-            name: path
-                .file_stem()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned(),
+            name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
             nits_per_unit: 1.0,
             cameras: Vec::new(),
-            film: FilmDefaults {
-                width: 512,
-                height: 512,
-            },
+            film: FilmDefaults { width: 512, height: 512 },
             viewing: ViewingDefaults::default(),
             meshes: Vec::new(),
             instances: Vec::new(),
@@ -93,12 +86,7 @@ impl Builder {
     }
 
     /// Chooses the camera, decodes the textures, checks everything, and adds what is missing.
-    pub(super) fn finish(
-        mut self,
-        path: &Path,
-        if_dark: IfDark,
-        options: &LoadOptions,
-    ) -> Result<Scene, LoadError> {
+    pub(super) fn finish(mut self, path: &Path, if_dark: IfDark, options: &LoadOptions) -> Result<Scene, LoadError> {
         validate::repair(&mut self, path)?;
         let camera = self.choose_camera(options)?;
         let textures = std::mem::take(&mut self.textures).decode(&mut self.notes)?;
@@ -131,11 +119,10 @@ impl Builder {
                     ));
                 }
                 IfDark::Studio => {
-                    scene.environment = Some(environment::studio(
-                        scene.nits_per_unit,
-                        scene.camera.forward,
-                    ));
-                    scene.notes.push("No light in the file: a soft studio of about 1000 cd/m² surrounds the scene.".to_owned());
+                    scene.environment = Some(environment::studio(scene.nits_per_unit, scene.camera.forward));
+                    scene.notes.push(
+                        "No light in the file: a soft studio of about 1000 cd/m² surrounds the scene.".to_owned(),
+                    );
                 }
             }
         }
@@ -148,19 +135,12 @@ impl Builder {
             if let Some(first) = self.cameras.first() {
                 let camera = first.camera.clone();
                 if self.cameras.len() > 1 {
-                    let note = format!(
-                        "{} cameras; the first one, \"{}\", is used.",
-                        self.cameras.len(),
-                        first.name
-                    );
+                    let note = format!("{} cameras; the first one, \"{}\", is used.", self.cameras.len(), first.name);
                     self.notes.push(note);
                 }
                 return Ok(camera);
             }
-            self.notes.push(
-                "No camera in the file: a three-quarter view of the whole scene is used."
-                    .to_owned(),
-            );
+            self.notes.push("No camera in the file: a three-quarter view of the whole scene is used.".to_owned());
             let aspect = self.film.width as f32 / self.film.height as f32;
             return Ok(default_view::framed(
                 default_view::bounds(&self.meshes, &self.instances, &self.spheres),
@@ -188,29 +168,18 @@ impl Builder {
 fn is_lit(scene: &Scene, weakest: f32) -> bool {
     let emits = |id: MaterialId| {
         let emission = scene.materials[id.0 as usize].emission;
-        let brightest = emission.texture.map_or(1.0, |lookup| {
-            scene.textures[lookup.texture.0 as usize].brightest()
-        });
+        let brightest = emission.texture.map_or(1.0, |lookup| scene.textures[lookup.texture.0 as usize].brightest());
         emission.factor.max_element() * brightest > weakest
     };
     let shines = |light: &Light| match light {
-        Light::Point { intensity, .. } | Light::Spot { intensity, .. } => {
-            intensity.max_element() > 0.0
-        }
+        Light::Point { intensity, .. } | Light::Spot { intensity, .. } => intensity.max_element() > 0.0,
         Light::Directional { irradiance, .. } => irradiance.max_element() > 0.0,
     };
     let surrounded = scene.environment.as_ref().is_some_and(|environment| {
-        environment.scale > 0.0
-            && environment
-                .texels
-                .iter()
-                .any(|texel| texel.max_element() > 0.0)
+        environment.scale > 0.0 && environment.texels.iter().any(|texel| texel.max_element() > 0.0)
     });
     surrounded
         || scene.lights.iter().any(shines)
-        || scene
-            .instances
-            .iter()
-            .any(|instance| emits(instance.material))
+        || scene.instances.iter().any(|instance| emits(instance.material))
         || scene.spheres.iter().any(|sphere| emits(sphere.material))
 }

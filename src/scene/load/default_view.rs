@@ -26,9 +26,7 @@ pub fn bounds(meshes: &[Mesh], instances: &[Instance], spheres: &[Sphere]) -> Bo
     for instance in instances {
         let mesh = &meshes[instance.mesh.0 as usize];
         for &index in mesh.triangles.iter().flatten() {
-            let point = instance
-                .to_world
-                .transform_point3a(mesh.positions[index as usize].into());
+            let point = instance.to_world.transform_point3a(mesh.positions[index as usize].into());
             min = min.min(point);
             max = max.max(point);
         }
@@ -37,21 +35,14 @@ pub fn bounds(meshes: &[Mesh], instances: &[Instance], spheres: &[Sphere]) -> Bo
         min = min.min(Vec3A::from(sphere.center - sphere.radius));
         max = max.max(Vec3A::from(sphere.center + sphere.radius));
     }
-    Bounds {
-        min: min.into(),
-        max: max.into(),
-    }
+    Bounds { min: min.into(), max: max.into() }
 }
 
 /// A camera with all of the bounds in a picture of this aspect (width / height).
 pub fn framed(bounds: Bounds, aspect: f32) -> Camera {
     let (sin_azimuth, cos_azimuth) = AZIMUTH_DEG.to_radians().sin_cos();
     let (sin_elevation, cos_elevation) = ELEVATION_DEG.to_radians().sin_cos();
-    let forward = -Vec3::new(
-        cos_elevation * sin_azimuth,
-        sin_elevation,
-        cos_elevation * cos_azimuth,
-    );
+    let forward = -Vec3::new(cos_elevation * sin_azimuth, sin_elevation, cos_elevation * cos_azimuth);
     let right = forward.cross(Vec3::Y).normalize();
     let up = right.cross(forward);
 
@@ -65,16 +56,11 @@ pub fn framed(bounds: Bounds, aspect: f32) -> Camera {
         let sign = |bit: u32| if corner >> bit & 1 == 0 { -1.0 } else { 1.0 };
         let offset = half * Vec3::new(sign(0), sign(1), sign(2));
         // A corner this far sideways must be at least this far in front of the camera.
-        let needed =
-            (offset.dot(right).abs() / tan_horizontal).max(offset.dot(up).abs() / tan_vertical);
+        let needed = (offset.dot(right).abs() / tan_horizontal).max(offset.dot(up).abs() / tan_vertical);
         distance = distance.max(needed - offset.dot(forward));
     }
     // A single point has no size: any distance frames it.
-    let distance = if distance > 0.0 && distance.is_finite() {
-        distance
-    } else {
-        1.0
-    };
+    let distance = if distance > 0.0 && distance.is_finite() { distance } else { 1.0 };
     Camera {
         position: center - distance * forward,
         forward,
@@ -91,15 +77,8 @@ mod tests {
 
     #[test]
     fn every_corner_is_in_the_picture_and_one_is_near_its_edge() {
-        for (size, aspect) in [
-            (Vec3::ONE, 1.0),
-            (Vec3::new(10.0, 0.1, 3.0), 1.5),
-            (Vec3::new(0.2, 40.0, 0.3), 0.6),
-        ] {
-            let bounds = Bounds {
-                min: Vec3::splat(5.0),
-                max: Vec3::splat(5.0) + size,
-            };
+        for (size, aspect) in [(Vec3::ONE, 1.0), (Vec3::new(10.0, 0.1, 3.0), 1.5), (Vec3::new(0.2, 40.0, 0.3), 0.6)] {
+            let bounds = Bounds { min: Vec3::splat(5.0), max: Vec3::splat(5.0) + size };
             let camera = framed(bounds, aspect);
             let right = camera.forward.cross(camera.up).normalize();
             let up = right.cross(camera.forward);
@@ -107,13 +86,11 @@ mod tests {
             let mut widest: f32 = 0.0;
             for corner in 0..8 {
                 let pick = |bit: u32| if corner >> bit & 1 == 0 { 0.0 } else { 1.0 };
-                let point =
-                    bounds.min + size * Vec3::new(pick(0), pick(1), pick(2)) - camera.position;
+                let point = bounds.min + size * Vec3::new(pick(0), pick(1), pick(2)) - camera.position;
                 let depth = point.dot(camera.forward);
                 assert!(depth > 0.0);
-                widest = widest
-                    .max(point.dot(right).abs() / depth / tan / aspect)
-                    .max(point.dot(up).abs() / depth / tan);
+                widest =
+                    widest.max(point.dot(right).abs() / depth / tan / aspect).max(point.dot(up).abs() / depth / tan);
             }
             assert!((0.9..0.96).contains(&widest), "{widest}");
         }

@@ -13,13 +13,7 @@ const STUDIO_SIZE: [u32; 2] = [256, 128];
 
 /// The same radiance from everywhere, in scene units.
 pub fn constant(radiance: Vec3) -> Environment {
-    Environment {
-        width: 1,
-        height: 1,
-        texels: Arc::new(vec![radiance]),
-        scale: 1.0,
-        from_world: Mat3::IDENTITY,
-    }
+    Environment { width: 1, height: 1, texels: Arc::new(vec![radiance]), scale: 1.0, from_world: Mat3::IDENTITY }
 }
 
 /// A lat-long picture (.hdr, .exr, .png, ...), times `scale`, turned by `rotation_deg` about +y (counter-clockwise seen
@@ -32,16 +26,10 @@ pub fn from_file(path: &Path, scale: f32, rotation_deg: f32) -> Result<Environme
                 Encoding::Srgb => crate::scene::texture::srgb_to_linear(f32::from(value) / 255.0),
                 Encoding::Linear => f32::from(value) / 255.0,
             };
-            bytes
-                .iter()
-                .map(|&[r, g, b, _]| Vec3::new(decode(r), decode(g), decode(b)))
-                .collect()
+            bytes.iter().map(|&[r, g, b, _]| Vec3::new(decode(r), decode(g), decode(b))).collect()
         }
         // Light is never negative; wide-gamut pictures hold negative Rec.709 values for colours outside it.
-        Texels::Floats(floats) => floats
-            .iter()
-            .map(|&[r, g, b, _]| Vec3::new(r, g, b).max(Vec3::ZERO))
-            .collect(),
+        Texels::Floats(floats) => floats.iter().map(|&[r, g, b, _]| Vec3::new(r, g, b).max(Vec3::ZERO)).collect(),
     };
     Ok(Environment {
         width: picture.width,
@@ -75,8 +63,7 @@ pub fn studio(nits_per_unit: f64, forward: Vec3) -> Environment {
             let (sin_phi, cos_phi) = (TAU * ((column as f32 + 0.5) / width as f32 - 0.5)).sin_cos();
             let direction = Vec3::new(sin_theta * sin_phi, cos_theta, -sin_theta * cos_phi);
             let height_share = 0.5 + 0.5 * direction.y;
-            let ambient =
-                Vec3::new(0.95, 0.97, 1.0) * (180.0 + 720.0 * height_share * height_share);
+            let ambient = Vec3::new(0.95, 0.97, 1.0) * (180.0 + 720.0 * height_share * height_share);
             let nits = ambient
                 + Vec3::new(1.0, 0.96, 0.9) * 6000.0 * soft_box(direction, key, 0.42)
                 + Vec3::new(0.9, 0.95, 1.0) * 2200.0 * soft_box(direction, rim, 0.28);

@@ -67,18 +67,12 @@ pub struct Place {
 impl Place {
     /// A file as a whole.
     pub fn file(file: &Path) -> Self {
-        Self {
-            file: file.to_owned(),
-            line: None,
-        }
+        Self { file: file.to_owned(), line: None }
     }
 
     /// A line of a file, counted from 1.
     pub fn line(file: &Path, line: usize) -> Self {
-        Self {
-            file: file.to_owned(),
-            line: Some(line),
-        }
+        Self { file: file.to_owned(), line: Some(line) }
     }
 }
 
@@ -94,34 +88,22 @@ impl fmt::Display for Place {
 impl LoadError {
     /// The file as a whole is wrong.
     pub fn invalid(file: &Path, problem: impl fmt::Display) -> Self {
-        Self::Invalid {
-            place: Place::file(file),
-            problem: one_line(problem),
-        }
+        Self::Invalid { place: Place::file(file), problem: one_line(problem) }
     }
 
     /// A line of the file is wrong.
     pub fn invalid_at(place: Place, problem: impl fmt::Display) -> Self {
-        Self::Invalid {
-            place,
-            problem: one_line(problem),
-        }
+        Self::Invalid { place, problem: one_line(problem) }
     }
 
     /// The file is of a kind that is not read.
     pub fn unsupported(file: &Path, problem: impl fmt::Display) -> Self {
-        Self::Unsupported {
-            place: Place::file(file),
-            problem: one_line(problem),
-        }
+        Self::Unsupported { place: Place::file(file), problem: one_line(problem) }
     }
 
     /// The file asks for too much memory.
     pub fn too_large(file: &Path, problem: impl fmt::Display) -> Self {
-        Self::TooLarge {
-            file: file.to_owned(),
-            problem: one_line(problem),
-        }
+        Self::TooLarge { file: file.to_owned(), problem: one_line(problem) }
     }
 
     /// The file could not be read.
@@ -131,18 +113,12 @@ impl LoadError {
             std::io::ErrorKind::PermissionDenied => "no permission to read it".to_owned(),
             _ => one_line(error),
         };
-        Self::Unreadable {
-            file: file.to_owned(),
-            problem,
-        }
+        Self::Unreadable { file: file.to_owned(), problem }
     }
 
     /// The same error, with the place that named the file.
     pub fn referenced_from(self, place: Place) -> Self {
-        Self::Referenced {
-            place,
-            source: Box::new(self),
-        }
+        Self::Referenced { place, source: Box::new(self) }
     }
 
     /// Whether the file is not there at all (other than damaged).
@@ -155,10 +131,8 @@ impl LoadError {
 pub(crate) fn one_line(text: impl fmt::Display) -> String {
     const LONGEST: usize = 400;
     let text = text.to_string();
-    let words: Vec<&str> = text
-        .split(|c: char| c.is_control() || c.is_whitespace())
-        .filter(|w| !w.is_empty())
-        .collect();
+    let words: Vec<&str> =
+        text.split(|c: char| c.is_control() || c.is_whitespace()).filter(|w| !w.is_empty()).collect();
     let mut line = words.join(" ");
     if line.chars().count() > LONGEST {
         line = line.chars().take(LONGEST).chain("...".chars()).collect();
@@ -167,34 +141,22 @@ pub(crate) fn one_line(text: impl fmt::Display) -> String {
 }
 
 /// The candidate nearest to what was written, if near enough to be a slip.
-pub(crate) fn nearest<'a>(
-    written: &str,
-    candidates: impl IntoIterator<Item = &'a str>,
-) -> Option<&'a str> {
+pub(crate) fn nearest<'a>(written: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     candidates
         .into_iter()
         .map(|candidate| (edit_distance(written, candidate), candidate))
-        .filter(|&(distance, candidate)| {
-            distance <= 1 + written.chars().count().max(candidate.chars().count()) / 3
-        })
+        .filter(|&(distance, candidate)| distance <= 1 + written.chars().count().max(candidate.chars().count()) / 3)
         .min_by_key(|&(distance, _)| distance)
         .map(|(_, candidate)| candidate)
 }
 
 /// `"; did you mean "x"?"`, or else the list of what is known, or nothing when nothing is known.
-pub(crate) fn suggestion<'a>(
-    written: &str,
-    candidates: impl IntoIterator<Item = &'a str> + Clone,
-) -> String {
+pub(crate) fn suggestion<'a>(written: &str, candidates: impl IntoIterator<Item = &'a str> + Clone) -> String {
     if let Some(candidate) = nearest(written, candidates.clone()) {
         return format!("; did you mean \"{candidate}\"?");
     }
     let known: Vec<&str> = candidates.into_iter().take(24).collect();
-    if known.is_empty() {
-        String::new()
-    } else {
-        format!("; known: {}", known.join(", "))
-    }
+    if known.is_empty() { String::new() } else { format!("; known: {}", known.join(", ")) }
 }
 
 /// Levenshtein's distance with adjacent swaps counted once (the commonest slip of the fingers).

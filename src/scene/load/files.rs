@@ -12,31 +12,19 @@ pub(crate) fn read(path: &Path) -> Result<Vec<u8>, LoadError> {
     // Opened only after the look at its kind: opening a pipe would wait for a writer for ever.
     let metadata = std::fs::metadata(path).map_err(|error| LoadError::unreadable(path, &error))?;
     if metadata.is_dir() {
-        return Err(LoadError::Unreadable {
-            file: path.to_owned(),
-            problem: "is a directory, not a file".to_owned(),
-        });
+        return Err(LoadError::Unreadable { file: path.to_owned(), problem: "is a directory, not a file".to_owned() });
     }
     if !metadata.is_file() {
-        return Err(LoadError::Unreadable {
-            file: path.to_owned(),
-            problem: "is not a regular file".to_owned(),
-        });
+        return Err(LoadError::Unreadable { file: path.to_owned(), problem: "is not a regular file".to_owned() });
     }
     if metadata.len() > LARGEST_FILE_BYTES {
-        let problem = format!(
-            "{} MiB, at most {} MiB are read",
-            metadata.len() >> 20,
-            LARGEST_FILE_BYTES >> 20
-        );
+        let problem = format!("{} MiB, at most {} MiB are read", metadata.len() >> 20, LARGEST_FILE_BYTES >> 20);
         return Err(LoadError::too_large(path, problem));
     }
     let file = std::fs::File::open(path).map_err(|error| LoadError::unreadable(path, &error))?;
     let mut bytes = Vec::with_capacity(metadata.len() as usize);
     // The limit holds again here, for files that grow while they are read.
-    file.take(LARGEST_FILE_BYTES)
-        .read_to_end(&mut bytes)
-        .map_err(|error| LoadError::unreadable(path, &error))?;
+    file.take(LARGEST_FILE_BYTES).read_to_end(&mut bytes).map_err(|error| LoadError::unreadable(path, &error))?;
     if bytes.is_empty() {
         return Err(LoadError::invalid(path, "the file is empty"));
     }
@@ -62,14 +50,9 @@ pub(crate) fn decode_loosely(path: &Path, bytes: Vec<u8>) -> Result<String, Load
 pub(crate) fn decode_text(path: &Path, bytes: Vec<u8>) -> Result<String, LoadError> {
     let utf16 = |unit: fn([u8; 2]) -> u16| {
         if !bytes.len().is_multiple_of(2) {
-            return Err(LoadError::invalid(
-                path,
-                "UTF-16 text with half a character at its end",
-            ));
+            return Err(LoadError::invalid(path, "UTF-16 text with half a character at its end"));
         }
-        let units = bytes[2..]
-            .chunks_exact(2)
-            .map(|pair| unit([pair[0], pair[1]]));
+        let units = bytes[2..].chunks_exact(2).map(|pair| unit([pair[0], pair[1]]));
         char::decode_utf16(units)
             .collect::<Result<String, _>>()
             .map_err(|_| LoadError::invalid(path, "not valid UTF-16 text"))

@@ -17,30 +17,15 @@ pub struct Metal {
 }
 
 const fn metal(eta: [f32; 3], k: [f32; 3]) -> Metal {
-    Metal {
-        eta: Vec3::from_array(eta),
-        k: Vec3::from_array(k),
-    }
+    Metal { eta: Vec3::from_array(eta), k: Vec3::from_array(k) }
 }
 
 /// Every metal by name.
 pub const METALS: &[(&str, Metal)] = &[
     ("gold", metal([0.188, 0.544, 1.332], [3.403, 2.231, 1.869])),
-    (
-        "silver",
-        metal([0.057, 0.054, 0.047], [4.254, 3.429, 2.803]),
-    ),
-    (
-        "copper",
-        metal([0.275, 1.116, 1.247], [3.373, 2.596, 2.456]),
-    ),
-    (
-        "aluminium",
-        metal([1.136, 0.728, 0.528], [6.663, 5.663, 4.943]),
-    ),
+    ("silver", metal([0.057, 0.054, 0.047], [4.254, 3.429, 2.803])),
+    ("copper", metal([0.275, 1.116, 1.247], [3.373, 2.596, 2.456])),
+    ("aluminium", metal([1.136, 0.728, 0.528], [6.663, 5.663, 4.943])),
     ("iron", metal([2.892, 2.895, 2.646], [3.065, 2.918, 2.805])),
-    (
-        "chromium",
-        metal([3.145, 3.034, 2.456], [3.312, 3.330, 3.210]),
-    ),
+    ("chromium", metal([3.145, 3.034, 2.456], [3.312, 3.330, 3.210])),
 ];

@@ -55,35 +55,22 @@ const FORMATS: &str = ".toml, .obj, .gltf and .glb are read";
 /// Reads a scene; the format is told by the file's name.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
     if !options.frame_time.is_finite() {
-        return Err(LoadError::Option {
-            problem: format!("frame time must be finite, not {}", options.frame_time),
-        });
+        return Err(LoadError::Option { problem: format!("frame time must be finite, not {}", options.frame_time) });
     }
-    let extension = path
-        .extension()
-        .map(|extension| extension.to_string_lossy().to_lowercase());
+    let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
     match extension.as_deref() {
         Some("toml") => toml::load(path, options),
         Some("obj") => obj::load(path, options),
         Some("gltf" | "glb") => gltf::load(path, options),
         _ => {
             // A wrong path is the likelier slip: say that first.
-            let metadata =
-                std::fs::metadata(path).map_err(|error| LoadError::unreadable(path, &error))?;
+            let metadata = std::fs::metadata(path).map_err(|error| LoadError::unreadable(path, &error))?;
             if metadata.is_dir() {
                 let problem = "is a directory, not a scene file".to_owned();
-                return Err(LoadError::Unreadable {
-                    file: path.to_owned(),
-                    problem,
-                });
+                return Err(LoadError::Unreadable { file: path.to_owned(), problem });
             }
-            let kind = extension.map_or("without extension".to_owned(), |extension| {
-                format!(".{extension}")
-            });
-            Err(LoadError::unsupported(
-                path,
-                format_args!("not a scene format that is read ({kind}): {FORMATS}"),
-            ))
+            let kind = extension.map_or("without extension".to_owned(), |extension| format!(".{extension}"));
+            Err(LoadError::unsupported(path, format_args!("not a scene format that is read ({kind}): {FORMATS}")))
         }
     }
 }

@@ -7,9 +7,7 @@ use super::builder::Builder;
 use super::error::LoadError;
 use super::files;
 use super::texture::{IfMissing, Picture, Request};
-use crate::scene::{
-    Alpha, ColorInput, Encoding, Material, MaterialId, ScalarInput, Surface, TextureLookup, Wrap,
-};
+use crate::scene::{Alpha, ColorInput, Encoding, Material, MaterialId, ScalarInput, Surface, TextureLookup, Wrap};
 use glam::{Vec2, Vec3};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -52,19 +50,13 @@ pub(super) fn read(path: &Path, notes: &mut Vec<String>) -> Result<Vec<Written>,
         }
         let key = key.to_ascii_lowercase();
         if key == "newmtl" {
-            materials.push(Written {
-                name: rest.to_owned(),
-                folder: folder.to_owned(),
-                ..Written::default()
-            });
+            materials.push(Written { name: rest.to_owned(), folder: folder.to_owned(), ..Written::default() });
             continue;
         }
         let Some(material) = materials.last_mut() else {
             continue;
         };
-        if key.starts_with("map_")
-            || ["norm", "bump", "disp", "refl", "decal"].contains(&key.as_str())
-        {
+        if key.starts_with("map_") || ["norm", "bump", "disp", "refl", "decal"].contains(&key.as_str()) {
             let map = parse_map(rest);
             if !map.file.is_empty() {
                 material.maps.insert(key, map);
@@ -72,21 +64,13 @@ pub(super) fn read(path: &Path, notes: &mut Vec<String>) -> Result<Vec<Written>,
             continue;
         }
         // Comments may follow the numbers; "Kd spectral file.rfl" and "Kd xyz ..." have none we could use.
-        let words = rest
-            .split_whitespace()
-            .take_while(|word| !word.starts_with('#'));
+        let words = rest.split_whitespace().take_while(|word| !word.starts_with('#'));
         let numbers: Result<Vec<f32>, _> = words.map(str::parse).collect();
         match numbers {
-            Ok(numbers)
-                if !numbers.is_empty() && numbers.iter().all(|number| number.is_finite()) =>
-            {
+            Ok(numbers) if !numbers.is_empty() && numbers.iter().all(|number| number.is_finite()) => {
                 material.numbers.insert(key, numbers);
             }
-            _ => notes.push(format!(
-                "{}:{}: \"{key}\" skipped: expected numbers.",
-                path.display(),
-                number + 1
-            )),
+            _ => notes.push(format!("{}:{}: \"{key}\" skipped: expected numbers.", path.display(), number + 1)),
         }
     }
     Ok(materials)
@@ -94,18 +78,10 @@ pub(super) fn read(path: &Path, notes: &mut Vec<String>) -> Result<Vec<Written>,
 
 /// Options, then a file name that may hold spaces; some writers put options behind it.
 fn parse_map(text: &str) -> Map {
-    let mut map = Map {
-        file: String::new(),
-        offset: Vec2::ZERO,
-        scale: Vec2::ONE,
-        bump: 1.0,
-        clamp: false,
-        channel: None,
-    };
-    let words: Vec<(usize, &str)> = text
-        .split_whitespace()
-        .map(|word| (word.as_ptr() as usize - text.as_ptr() as usize, word))
-        .collect();
+    let mut map =
+        Map { file: String::new(), offset: Vec2::ZERO, scale: Vec2::ONE, bump: 1.0, clamp: false, channel: None };
+    let words: Vec<(usize, &str)> =
+        text.split_whitespace().map(|word| (word.as_ptr() as usize - text.as_ptr() as usize, word)).collect();
     let mut name: Option<(usize, usize)> = None;
     let mut next = 0;
     while let Some(&(start, word)) = words.get(next) {
@@ -113,18 +89,14 @@ fn parse_map(text: &str) -> Map {
         let most = match word {
             "-o" | "-s" | "-t" => 3,
             "-mm" => 2,
-            "-bm" | "-boost" | "-texres" | "-clamp" | "-blendu" | "-blendv" | "-cc"
-            | "-imfchan" | "-type" => 1,
+            "-bm" | "-boost" | "-texres" | "-clamp" | "-blendu" | "-blendv" | "-cc" | "-imfchan" | "-type" => 1,
             _ => {
                 // From the first word of the name to its last one, with the spaces between as they are.
                 name = Some((name.map_or(start, |(first, _)| first), start + word.len()));
                 continue;
             }
         };
-        let is_word = matches!(
-            word,
-            "-clamp" | "-blendu" | "-blendv" | "-cc" | "-imfchan" | "-type" | "-texres"
-        );
+        let is_word = matches!(word, "-clamp" | "-blendu" | "-blendv" | "-cc" | "-imfchan" | "-type" | "-texres");
         let mut arguments: Vec<&str> = Vec::new();
         while arguments.len() < most
             && let Some(&(_, argument)) = words.get(next)
@@ -145,12 +117,7 @@ fn parse_map(text: &str) -> Map {
             "-s" => map.scale = Vec2::new(number(0, 1.0), number(1, 1.0)),
             "-bm" => map.bump = number(0, 1.0),
             "-clamp" => map.clamp = arguments.first() == Some(&"on"),
-            "-imfchan" => {
-                map.channel = arguments
-                    .first()
-                    .and_then(|channel| "rgbm".find(*channel))
-                    .map(|c| c as u8)
-            }
+            "-imfchan" => map.channel = arguments.first().and_then(|channel| "rgbm".find(*channel)).map(|c| c as u8),
             _ => {}
         }
     }
@@ -162,9 +129,7 @@ fn parse_map(text: &str) -> Map {
 
 /// The material of faces that name none, or one that no file defines.
 pub(super) fn default_material(builder: &mut Builder) -> MaterialId {
-    let surface = Surface::Diffuse {
-        reflectance: ColorInput::constant(Vec3::splat(0.7)),
-    };
+    let surface = Surface::Diffuse { reflectance: ColorInput::constant(Vec3::splat(0.7)) };
     builder.add_material(plain("default", surface))
 }
 
@@ -187,11 +152,7 @@ impl Written {
     /// A colour; one number stands for all three.
     fn color(&self, key: &str) -> Option<Vec3> {
         let numbers = self.numbers.get(key)?;
-        let color = if numbers.len() >= 3 {
-            Vec3::from_slice(numbers)
-        } else {
-            Vec3::splat(numbers[0])
-        };
+        let color = if numbers.len() >= 3 { Vec3::from_slice(numbers) } else { Vec3::splat(numbers[0]) };
         Some(color.max(Vec3::ZERO))
     }
 
@@ -199,13 +160,7 @@ impl Written {
         keys.iter().find_map(|key| self.maps.get(*key))
     }
 
-    fn lookup(
-        &self,
-        builder: &mut Builder,
-        map: &Map,
-        encoding: Encoding,
-        if_missing: [u8; 4],
-    ) -> TextureLookup {
+    fn lookup(&self, builder: &mut Builder, map: &Map, encoding: Encoding, if_missing: [u8; 4]) -> TextureLookup {
         let wrap = if map.clamp { Wrap::Clamp } else { Wrap::Repeat };
         let texture = builder.textures.add(Request {
             picture: Picture::File(find_file(&self.folder, &map.file)),
@@ -230,9 +185,7 @@ impl Written {
             None => ColorInput::constant(factor.unwrap_or(default)),
             // Several exporters write a black factor beside a map, and mean the map.
             Some(map) => ColorInput {
-                factor: factor
-                    .filter(|factor| factor.max_element() > 0.0)
-                    .unwrap_or(Vec3::ONE),
+                factor: factor.filter(|factor| factor.max_element() > 0.0).unwrap_or(Vec3::ONE),
                 texture: Some(self.lookup(builder, map, Encoding::Srgb, [180, 180, 180, 255])),
             },
         }
@@ -246,10 +199,7 @@ impl Written {
                 let channel = map.channel.unwrap_or(0).min(2);
                 let lookup = self.lookup(builder, map, Encoding::Linear, [255; 4]);
                 let factor = factor.filter(|&factor| factor > 0.0).unwrap_or(1.0);
-                ScalarInput {
-                    factor,
-                    texture: Some((lookup, channel)),
-                }
+                ScalarInput { factor, texture: Some((lookup, channel)) }
             }
         }
     }
@@ -258,22 +208,12 @@ impl Written {
     pub(super) fn convert(&self, builder: &mut Builder) -> Material {
         let surface = self.surface(builder);
         let mut material = plain(&self.name, surface);
-        if self
-            .color("ke")
-            .is_some_and(|emission| emission.max_element() > 0.0)
-            || self.maps.contains_key("map_ke")
-        {
+        if self.color("ke").is_some_and(|emission| emission.max_element() > 0.0) || self.maps.contains_key("map_ke") {
             material.emission = self.color_input(builder, "ke", Vec3::ZERO);
         }
         if let Some(map) = self.map(&["norm"]) {
-            material.normal_map = Some((
-                self.lookup(builder, map, Encoding::Linear, [128, 128, 255, 255]),
-                map.bump,
-            ));
-        } else if self
-            .map(&["bump", "map_bump", "disp", "map_disp"])
-            .is_some()
-        {
+            material.normal_map = Some((self.lookup(builder, map, Encoding::Linear, [128, 128, 255, 255]), map.bump));
+        } else if self.map(&["bump", "map_bump", "disp", "map_disp"]).is_some() {
             builder.note(format!(
                 "Material \"{}\": bump and displacement heights are not rendered (\"norm\" is).",
                 self.name
@@ -290,34 +230,22 @@ impl Written {
         let Some(map) = self.map(&["map_d"]) else {
             // Fully transparent materials are a common slip about the meaning of Tr.
             return if opacity > 0.0 && opacity < 1.0 {
-                Alpha::Blend {
-                    value: ScalarInput::constant(opacity),
-                }
+                Alpha::Blend { value: ScalarInput::constant(opacity) }
             } else {
                 Alpha::Opaque
             };
         };
         // The colour's own file named again means its alpha channel; any other file is a grey picture.
-        let same_file = self
-            .map(&["map_kd"])
-            .is_some_and(|color| color.file == map.file);
+        let same_file = self.map(&["map_kd"]).is_some_and(|color| color.file == map.file);
         let channel = map.channel.unwrap_or(if same_file { 3 } else { 0 });
         let lookup = self.lookup(builder, map, Encoding::Linear, [255; 4]);
         let factor = if opacity > 0.0 { opacity } else { 1.0 };
-        Alpha::Blend {
-            value: ScalarInput {
-                factor,
-                texture: Some((lookup, channel)),
-            },
-        }
+        Alpha::Blend { value: ScalarInput { factor, texture: Some((lookup, channel)) } }
     }
 
     /// `d`, or 1 − `Tr`.
     fn opacity(&self) -> f32 {
-        self.number("d")
-            .or(self.number("tr").map(|transparency| 1.0 - transparency))
-            .unwrap_or(1.0)
-            .clamp(0.0, 1.0)
+        self.number("d").or(self.number("tr").map(|transparency| 1.0 - transparency)).unwrap_or(1.0).clamp(0.0, 1.0)
     }
 
     fn surface(&self, builder: &mut Builder) -> Surface {
@@ -325,25 +253,16 @@ impl Written {
         let diffuse = self.color("kd").unwrap_or(Vec3::splat(0.7)).min(Vec3::ONE);
         let specular = self.color("ks").unwrap_or(Vec3::ZERO).min(Vec3::ONE);
         let is_black = diffuse.max_element() == 0.0 && !self.maps.contains_key("map_kd");
-        let is_pbr = ["pr", "pm"]
-            .iter()
-            .any(|key| self.numbers.contains_key(*key))
-            || ["map_pr", "map_pm"]
-                .iter()
-                .any(|key| self.maps.contains_key(*key));
-        let roughness = self.number("ns").map_or(0.5, |exponent| {
-            (2.0 / (exponent.max(0.0) + 2.0)).sqrt().sqrt()
-        });
+        let is_pbr = ["pr", "pm"].iter().any(|key| self.numbers.contains_key(*key))
+            || ["map_pr", "map_pm"].iter().any(|key| self.maps.contains_key(*key));
+        let roughness = self.number("ns").map_or(0.5, |exponent| (2.0 / (exponent.max(0.0) + 2.0)).sqrt().sqrt());
 
         // 4, 6, 7, 9 are "glass" in the format's list; 5 is a mirror that exporters also use for glass.
         let lets_light_through = self.opacity() < 1.0 || self.numbers.contains_key("tf");
         if matches!(illumination, 4 | 6 | 7 | 9) || illumination == 5 && lets_light_through {
             let ior = self.number("ni").filter(|&ior| ior > 1.0).unwrap_or(1.5);
-            let transmittance = self
-                .color("tf")
-                .filter(|tint| tint.max_element() > 0.0)
-                .unwrap_or(Vec3::ONE)
-                .min(Vec3::ONE);
+            let transmittance =
+                self.color("tf").filter(|tint| tint.max_element() > 0.0).unwrap_or(Vec3::ONE).min(Vec3::ONE);
             return Surface::Dielectric {
                 ior,
                 roughness: ScalarInput::constant(self.number("pr").unwrap_or(0.0).clamp(0.0, 1.0)),
@@ -362,9 +281,7 @@ impl Written {
             };
         }
         if matches!(illumination, 3 | 5 | 8) && is_black && specular.max_element() > 0.0 {
-            return Surface::Mirror {
-                reflectance: ColorInput::constant(specular),
-            };
+            return Surface::Mirror { reflectance: ColorInput::constant(specular) };
         }
         if is_black && specular.max_element() > 0.1 && illumination >= 2 {
             return Surface::MetalRoughness {
@@ -409,15 +326,9 @@ mod tests {
     fn texture_options_stand_before_and_after_names_with_spaces() {
         let map = parse_map("-bm 0.5 -o .1 .2 -s 2 3 1 -clamp on my  wood.png");
         assert_eq!(map.file, "my  wood.png");
-        assert_eq!(
-            (map.offset, map.scale, map.bump, map.clamp),
-            (Vec2::new(0.1, 0.2), Vec2::new(2.0, 3.0), 0.5, true)
-        );
+        assert_eq!((map.offset, map.scale, map.bump, map.clamp), (Vec2::new(0.1, 0.2), Vec2::new(2.0, 3.0), 0.5, true));
         let map = parse_map("-imfchan g dir\\bump 2.jpg -bm 1.5");
-        assert_eq!(
-            (map.file.as_str(), map.bump, map.channel),
-            ("dir/bump 2.jpg", 1.5, Some(1))
-        );
+        assert_eq!((map.file.as_str(), map.bump, map.channel), ("dir/bump 2.jpg", 1.5, Some(1)));
         // A name that starts with a digit after an option that takes up to three numbers.
         assert_eq!(parse_map("-o 0.1 diffuse.jpg").file, "diffuse.jpg");
         assert_eq!(parse_map("").file, "");

@@ -19,12 +19,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
     let mut builder = Builder::new(path);
     for (mesh, material) in read_into(&mut builder, path, true)? {
         let name = builder.meshes[mesh.0 as usize].name.clone();
-        builder.instances.push(Instance {
-            name,
-            mesh,
-            material,
-            to_world: Affine3A::IDENTITY,
-        });
+        builder.instances.push(Instance { name, mesh, material, to_world: Affine3A::IDENTITY });
     }
     builder.finish(path, IfDark::Studio, options)
 }
@@ -35,20 +30,10 @@ pub(super) fn read_into(
     path: &Path,
     with_materials: bool,
 ) -> Result<Vec<(MeshId, MaterialId)>, LoadError> {
-    let Cleaned {
-        text,
-        has_vertex_colors,
-    } = clean(&files::decode_loosely(path, files::read(path)?)?);
+    let Cleaned { text, has_vertex_colors } = clean(&files::decode_loosely(path, files::read(path)?)?);
     let libraries = RefCell::new(Libraries::default());
-    let mut reader = CountingReader {
-        rest: text.as_bytes(),
-        lines: 0,
-    };
-    let options = tobj::LoadOptions {
-        single_index: true,
-        triangulate: false,
-        ..tobj::LoadOptions::default()
-    };
+    let mut reader = CountingReader { rest: text.as_bytes(), lines: 0 };
+    let options = tobj::LoadOptions { single_index: true, triangulate: false, ..tobj::LoadOptions::default() };
     let parsed = tobj::load_obj_buf(&mut reader, &options, |named| {
         let mut libraries = libraries.borrow_mut();
         let first = libraries.materials.len();
@@ -80,10 +65,7 @@ pub(super) fn read_into(
         if mesh.triangles.is_empty() {
             continue;
         }
-        let wanted = model
-            .mesh
-            .material_id
-            .filter(|&id| id < libraries.materials.len());
+        let wanted = model.mesh.material_id.filter(|&id| id < libraries.materials.len());
         let material = match converted.get(&wanted) {
             Some(id) => *id,
             None => {
@@ -102,18 +84,13 @@ pub(super) fn read_into(
     }
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     if sparse_faces > 0 {
-        builder.note(format!(
-            "{name}: {sparse_faces} points and lines are not rendered."
-        ));
+        builder.note(format!("{name}: {sparse_faces} points and lines are not rendered."));
     }
     if has_vertex_colors {
         builder.note(format!("{name}: vertex colours are not used."));
     }
     if placed.is_empty() {
-        return Err(LoadError::invalid(
-            path,
-            "nothing to render: no face with three corners",
-        ));
+        return Err(LoadError::invalid(path, "nothing to render: no face with three corners"));
     }
     Ok(placed)
 }
@@ -130,25 +107,15 @@ impl Libraries {
     /// `mtllib` names one file that may hold spaces, or several files apart by spaces.
     fn open(&mut self, obj: &Path, named: &str) {
         let folder = obj.parent().unwrap_or(Path::new(""));
-        let whole = named
-            .trim()
-            .trim_matches('"')
-            .replace("\\ ", " ")
-            .replace('\\', "/");
+        let whole = named.trim().trim_matches('"').replace("\\ ", " ").replace('\\', "/");
         let single = mtl::find_file(folder, &whole);
         let found: Vec<_> = if single.is_file() {
             vec![single]
         } else {
-            whole
-                .split_whitespace()
-                .map(|word| mtl::find_file(folder, word))
-                .filter(|file| file.is_file())
-                .collect()
+            whole.split_whitespace().map(|word| mtl::find_file(folder, word)).filter(|file| file.is_file()).collect()
         };
         if found.is_empty() {
-            self.notes.push(format!(
-                "Material file \"{whole}\" not found: a plain grey stands in."
-            ));
+            self.notes.push(format!("Material file \"{whole}\" not found: a plain grey stands in."));
         }
         for file in found {
             match mtl::read(&file, &mut self.notes) {
@@ -161,11 +128,7 @@ impl Libraries {
     /// What `tobj` wants to know of the materials from number `first` on: their names. It counts on from what it has.
     fn index(&self, first: usize) -> tobj::MTLLoadResult {
         let new = &self.materials[first..];
-        let places = new
-            .iter()
-            .enumerate()
-            .map(|(place, material)| (material.name.clone(), place))
-            .collect();
+        let places = new.iter().enumerate().map(|(place, material)| (material.name.clone(), place)).collect();
         Ok((vec![tobj::Material::default(); new.len()], places))
     }
 }
@@ -187,16 +150,8 @@ fn clean(text: &str) -> Cleaned {
         let is_start = joined == 0;
         let line = if is_start { line.trim_start() } else { line };
         // A name may hold '#', numbers may not.
-        is_numeric = if is_start {
-            line.starts_with(['v', 'f'])
-        } else {
-            is_numeric
-        };
-        let line = if is_numeric {
-            line.split('#').next().unwrap_or(line)
-        } else {
-            line
-        };
+        is_numeric = if is_start { line.starts_with(['v', 'f']) } else { is_numeric };
+        let line = if is_numeric { line.split('#').next().unwrap_or(line) } else { line };
         let continued = line.trim_end().strip_suffix('\\');
         let part = continued.unwrap_or(line);
         // Colours behind positions: tobj refuses files that give them to some vertices only, and we do not use them.
@@ -208,11 +163,7 @@ fn clean(text: &str) -> Cleaned {
         }
         match part.split_once('\t') {
             Some(_) => cleaned.extend(part.chars().map(|c| if c == '\t' { ' ' } else { c })),
-            None => cleaned.push_str(if is_start && part.trim() == "usemtl" {
-                ""
-            } else {
-                part
-            }),
+            None => cleaned.push_str(if is_start && part.trim() == "usemtl" { "" } else { part }),
         }
         if continued.is_some() {
             cleaned.push(' ');
@@ -222,10 +173,7 @@ fn clean(text: &str) -> Cleaned {
             joined = 0;
         }
     }
-    Cleaned {
-        text: cleaned,
-        has_vertex_colors,
-    }
+    Cleaned { text: cleaned, has_vertex_colors }
 }
 
 /// Hands out text and counts the lines, because `tobj`'s errors have none.
@@ -249,10 +197,7 @@ impl BufRead for CountingReader<'_> {
     }
 
     fn consume(&mut self, count: usize) {
-        self.lines += self.rest[..count]
-            .iter()
-            .filter(|&&byte| byte == b'\n')
-            .count();
+        self.lines += self.rest[..count].iter().filter(|&&byte| byte == b'\n').count();
         self.rest = &self.rest[count..];
     }
 }
@@ -261,9 +206,7 @@ impl BufRead for CountingReader<'_> {
 fn explain(error: tobj::LoadError, text: &str, path: &Path, line: usize) -> LoadError {
     use tobj::LoadError as Cause;
     let (line, problem) = match error {
-        Cause::FaceVertexOutOfBounds
-        | Cause::FaceTexCoordOutOfBounds
-        | Cause::FaceNormalOutOfBounds => {
+        Cause::FaceVertexOutOfBounds | Cause::FaceTexCoordOutOfBounds | Cause::FaceNormalOutOfBounds => {
             // These are only noticed when the object ends: find the face.
             match find_bad_index(text) {
                 Some((line, problem)) => (line, problem),
@@ -275,15 +218,9 @@ fn explain(error: tobj::LoadError, text: &str, path: &Path, line: usize) -> Load
         Cause::TexcoordParseError => (line, "expected \"vt u v\" with two numbers".to_owned()),
         Cause::FaceParseError => match find_bad_index(text) {
             Some((line, problem)) => (line, problem),
-            None => (
-                line,
-                "expected a face as \"f v/vt/vn ...\", indices counted from 1".to_owned(),
-            ),
+            None => (line, "expected a face as \"f v/vt/vn ...\", indices counted from 1".to_owned()),
         },
-        Cause::InvalidPolygon => (
-            line,
-            "expected a face with at least three corners".to_owned(),
-        ),
+        Cause::InvalidPolygon => (line, "expected a face with at least three corners".to_owned()),
         other => (line, other.to_string()),
     };
     LoadError::invalid_at(Place::line(path, line.max(1)), problem)
@@ -298,9 +235,7 @@ fn find_bad_index(text: &str) -> Option<(usize, String)> {
         _ => None,
     };
     let mut totals = [0_i64; 3];
-    text.lines()
-        .filter_map(kind_of)
-        .for_each(|kind| totals[kind] += 1);
+    text.lines().filter_map(kind_of).for_each(|kind| totals[kind] += 1);
     let mut so_far = [0_i64; 3];
     for (number, line) in text.lines().enumerate() {
         if let Some(kind) = kind_of(line) {
@@ -310,27 +245,13 @@ fn find_bad_index(text: &str) -> Option<(usize, String)> {
             continue;
         };
         for corner in corners.split_whitespace() {
-            for (kind, index) in corner
-                .split('/')
-                .enumerate()
-                .take(3)
-                .filter(|(_, index)| !index.is_empty())
-            {
+            for (kind, index) in corner.split('/').enumerate().take(3).filter(|(_, index)| !index.is_empty()) {
                 let what = ["vertices", "texture coordinates", "normals"][kind];
                 let Ok(value) = index.parse::<i64>() else {
-                    return Some((
-                        number + 1,
-                        format!("\"{corner}\" is not a corner like v/vt/vn"),
-                    ));
+                    return Some((number + 1, format!("\"{corner}\" is not a corner like v/vt/vn")));
                 };
                 if value == 0 || value > totals[kind] || value < -so_far[kind] {
-                    return Some((
-                        number + 1,
-                        format!(
-                            "face index {value}, but the file has {} {what}",
-                            totals[kind]
-                        ),
-                    ));
+                    return Some((number + 1, format!("face index {value}, but the file has {} {what}", totals[kind])));
                 }
             }
         }
@@ -339,12 +260,7 @@ fn find_bad_index(text: &str) -> Option<(usize, String)> {
 }
 
 /// Notes `usemtl` names that no library has, with the nearest that one has.
-fn report_unknown_materials(
-    builder: &mut Builder,
-    path: &Path,
-    text: &str,
-    known: &[mtl::Written],
-) {
+fn report_unknown_materials(builder: &mut Builder, path: &Path, text: &str, known: &[mtl::Written]) {
     if known.is_empty() {
         return;
     }
@@ -355,12 +271,8 @@ fn report_unknown_materials(
         };
         if !names().any(|known| known == name) {
             let place = Place::line(path, number + 1);
-            let guess = nearest(name, names())
-                .map(|guess| format!(" (nearest: \"{guess}\")"))
-                .unwrap_or_default();
-            builder.note(format!(
-                "{place}: unknown material \"{name}\"{guess}: a plain grey stands in."
-            ));
+            let guess = nearest(name, names()).map(|guess| format!(" (nearest: \"{guess}\")")).unwrap_or_default();
+            builder.note(format!("{place}: unknown material \"{name}\"{guess}: a plain grey stands in."));
         }
     }
 }
@@ -368,40 +280,19 @@ fn report_unknown_materials(
 /// Our mesh, and how many points and lines were skipped.
 fn convert_mesh(model: &tobj::Model, path: &Path) -> Result<(Mesh, usize), LoadError> {
     let from = &model.mesh;
-    let positions: Vec<Vec3> = from
-        .positions
-        .as_chunks::<3>()
-        .0
-        .iter()
-        .copied()
-        .map(Vec3::from_array)
-        .collect();
+    let positions: Vec<Vec3> = from.positions.as_chunks::<3>().0.iter().copied().map(Vec3::from_array).collect();
     if let Some(bad) = positions.iter().find(|position| !position.is_finite()) {
-        return Err(LoadError::invalid(
-            path,
-            format_args!("a vertex of \"{}\" is not finite: {bad}", model.name),
-        ));
+        return Err(LoadError::invalid(path, format_args!("a vertex of \"{}\" is not finite: {bad}", model.name)));
     }
     // Where only some faces have normals or coordinates, tobj's arrays are too short to belong to the positions.
     let of_all = |values: &[f32], width: usize| values.len() == positions.len() * width;
     let normals = if of_all(&from.normals, 3) {
-        from.normals
-            .as_chunks::<3>()
-            .0
-            .iter()
-            .copied()
-            .map(Vec3::from_array)
-            .collect()
+        from.normals.as_chunks::<3>().0.iter().copied().map(Vec3::from_array).collect()
     } else {
         Vec::new()
     };
     let uvs = if of_all(&from.texcoords, 2) {
-        from.texcoords
-            .as_chunks::<2>()
-            .0
-            .iter()
-            .map(|&[u, v]| Vec2::new(u, 1.0 - v))
-            .collect()
+        from.texcoords.as_chunks::<2>().0.iter().map(|&[u, v]| Vec2::new(u, 1.0 - v)).collect()
     } else {
         Vec::new()
     };
@@ -423,30 +314,13 @@ fn convert_mesh(model: &tobj::Model, path: &Path) -> Result<(Mesh, usize), LoadE
             }
         }
     }
-    triangles.retain(|triangle| {
-        triangle
-            .iter()
-            .all(|&index| (index as usize) < positions.len())
-    });
+    triangles.retain(|triangle| triangle.iter().all(|&index| (index as usize) < positions.len()));
     let name = if model.name.is_empty() || model.name == "unnamed_object" {
-        path.file_stem()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned()
+        path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
     } else {
         model.name.clone()
     };
-    Ok((
-        Mesh {
-            name,
-            positions,
-            normals,
-            uvs,
-            tangents: Vec::new(),
-            triangles,
-        },
-        skipped,
-    ))
+    Ok((Mesh { name, positions, normals, uvs, tangents: Vec::new(), triangles }, skipped))
 }
 
 #[cfg(test)]
@@ -456,19 +330,13 @@ mod tests {
     #[test]
     fn cleaning_keeps_line_numbers() {
         let text = clean("v 1 2 \\\n 3 # here\nusemtl \n\tf 1\t2 3\ng a#b\n").text;
-        assert_eq!(
-            text.lines().collect::<Vec<_>>(),
-            ["v 1 2   3 ", "", "", "f 1 2 3", "g a#b"]
-        );
+        assert_eq!(text.lines().collect::<Vec<_>>(), ["v 1 2   3 ", "", "", "f 1 2 3", "g a#b"]);
     }
 
     #[test]
     fn a_bad_index_is_found_with_its_line() {
         let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 7\n";
-        assert_eq!(
-            find_bad_index(text),
-            Some((5, "face index 7, but the file has 3 vertices".to_owned()))
-        );
+        assert_eq!(find_bad_index(text), Some((5, "face index 7, but the file has 3 vertices".to_owned())));
         assert_eq!(find_bad_index("v 0 0 0\nf -1 -1 -2\n").unwrap().0, 2);
         assert_eq!(find_bad_index("v 0 0 0\nf 1 1 0\n").unwrap().0, 2);
     }

@@ -14,19 +14,9 @@ const SPHERE_SEGMENTS: u32 = 192;
 pub fn rectangle(corner: Vec3, edge_u: Vec3, edge_v: Vec3) -> Mesh {
     Mesh {
         name: "rectangle".to_owned(),
-        positions: vec![
-            corner,
-            corner + edge_u,
-            corner + edge_u + edge_v,
-            corner + edge_v,
-        ],
+        positions: vec![corner, corner + edge_u, corner + edge_u + edge_v, corner + edge_v],
         // v runs down the image: its top row lies along the far edge.
-        uvs: vec![
-            Vec2::new(0.0, 1.0),
-            Vec2::new(1.0, 1.0),
-            Vec2::new(1.0, 0.0),
-            Vec2::new(0.0, 0.0),
-        ],
+        uvs: vec![Vec2::new(0.0, 1.0), Vec2::new(1.0, 1.0), Vec2::new(1.0, 0.0), Vec2::new(0.0, 0.0)],
         triangles: vec![[0, 1, 2], [0, 2, 3]],
         ..Mesh::default()
     }
@@ -44,19 +34,12 @@ pub fn cuboid(min: Vec3, max: Vec3) -> Mesh {
         rectangle(min + y + z, x, -z), // +y
         rectangle(min, x, z),          // −y
     ];
-    let mut mesh = Mesh {
-        name: "box".to_owned(),
-        ..Mesh::default()
-    };
+    let mut mesh = Mesh { name: "box".to_owned(), ..Mesh::default() };
     for face in faces {
         let base = mesh.positions.len() as u32;
         mesh.positions.extend(face.positions);
         mesh.uvs.extend(face.uvs);
-        mesh.triangles.extend(
-            face.triangles
-                .iter()
-                .map(|triangle| triangle.map(|index| index + base)),
-        );
+        mesh.triangles.extend(face.triangles.iter().map(|triangle| triangle.map(|index| index + base)));
     }
     mesh
 }
@@ -65,34 +48,21 @@ pub fn cuboid(min: Vec3, max: Vec3) -> Mesh {
 pub fn disk(center: Vec3, normal: Vec3, radius: f32) -> Mesh {
     let (tangent, bitangent) = normal.any_orthonormal_pair();
     // any_orthonormal_pair's handedness is not promised; the front must be where the normal points.
-    let bitangent = if tangent.cross(bitangent).dot(normal) < 0.0 {
-        -bitangent
-    } else {
-        bitangent
-    };
-    let mut mesh = Mesh {
-        name: "disk".to_owned(),
-        positions: vec![center],
-        uvs: vec![Vec2::splat(0.5)],
-        ..Mesh::default()
-    };
+    let bitangent = if tangent.cross(bitangent).dot(normal) < 0.0 { -bitangent } else { bitangent };
+    let mut mesh =
+        Mesh { name: "disk".to_owned(), positions: vec![center], uvs: vec![Vec2::splat(0.5)], ..Mesh::default() };
     for segment in 0..DISK_SEGMENTS {
         let (sin, cos) = (TAU * segment as f32 / DISK_SEGMENTS as f32).sin_cos();
-        mesh.positions
-            .push(center + radius * (cos * tangent + sin * bitangent));
+        mesh.positions.push(center + radius * (cos * tangent + sin * bitangent));
         mesh.uvs.push(Vec2::new(0.5 + 0.5 * cos, 0.5 - 0.5 * sin));
-        mesh.triangles
-            .push([0, 1 + segment, 1 + (segment + 1) % DISK_SEGMENTS]);
+        mesh.triangles.push([0, 1 + segment, 1 + (segment + 1) % DISK_SEGMENTS]);
     }
     mesh
 }
 
 /// A sphere as a mesh, for transforms that do not leave it a sphere.
 pub fn sphere(center: Vec3, radius: f32) -> Mesh {
-    let mut mesh = Mesh {
-        name: "sphere".to_owned(),
-        ..Mesh::default()
-    };
+    let mut mesh = Mesh { name: "sphere".to_owned(), ..Mesh::default() };
     for ring in 0..=SPHERE_RINGS {
         let v = ring as f32 / SPHERE_RINGS as f32;
         let (sin_theta, cos_theta) = (PI * v).sin_cos();
@@ -123,36 +93,22 @@ pub fn sphere(center: Vec3, radius: f32) -> Mesh {
 
 /// Area of a mesh after a transform.
 pub fn area(mesh: &Mesh, to_world: &Affine3A) -> f64 {
-    let corner = |index: u32| {
-        to_world
-            .transform_point3(mesh.positions[index as usize])
-            .as_dvec3()
-    };
-    let double: f64 = mesh
-        .triangles
-        .iter()
-        .map(|&[a, b, c]| {
-            (corner(b) - corner(a))
-                .cross(corner(c) - corner(a))
-                .length()
-        })
-        .sum();
+    let corner = |index: u32| to_world.transform_point3(mesh.positions[index as usize]).as_dvec3();
+    let double: f64 =
+        mesh.triangles.iter().map(|&[a, b, c]| (corner(b) - corner(a)).cross(corner(c) - corner(a)).length()).sum();
     0.5 * double
 }
 
 /// The factor by which a transform scales every length, if it scales all alike (then spheres stay spheres).
 pub fn similarity_scale(transform: &Affine3A) -> Option<f32> {
-    let [x, y, z] =
-        [transform.x_axis, transform.y_axis, transform.z_axis].map(|axis| axis.as_dvec3());
+    let [x, y, z] = [transform.x_axis, transform.y_axis, transform.z_axis].map(|axis| axis.as_dvec3());
     let scale = x.length();
     let tolerance = 1e-5 * scale * scale;
     let alike = |a: f64| (a - scale * scale).abs() <= tolerance;
     let similar = scale > 0.0
         && alike(y.length_squared())
         && alike(z.length_squared())
-        && [x.dot(y), y.dot(z), z.dot(x)]
-            .iter()
-            .all(|dot| dot.abs() <= tolerance);
+        && [x.dot(y), y.dot(z), z.dot(x)].iter().all(|dot| dot.abs() <= tolerance);
     similar.then_some(scale as f32)
 }
 
@@ -162,10 +118,7 @@ mod tests {
 
     fn enclosed_volume(mesh: &Mesh) -> f32 {
         let corner = |index: u32| mesh.positions[index as usize];
-        mesh.triangles
-            .iter()
-            .map(|&[a, b, c]| corner(a).dot(corner(b).cross(corner(c))) / 6.0)
-            .sum()
+        mesh.triangles.iter().map(|&[a, b, c]| corner(a).dot(corner(b).cross(corner(c))) / 6.0).sum()
     }
 
     #[test]
@@ -178,12 +131,7 @@ mod tests {
 
     #[test]
     fn flat_shapes_face_along_their_normal() {
-        for normal in [
-            Vec3::Y,
-            Vec3::NEG_Y,
-            Vec3::X,
-            Vec3::new(1.0, -2.0, 0.5).normalize(),
-        ] {
+        for normal in [Vec3::Y, Vec3::NEG_Y, Vec3::X, Vec3::new(1.0, -2.0, 0.5).normalize()] {
             let mesh = disk(Vec3::ONE, normal, 0.5);
             assert!((area(&mesh, &Affine3A::IDENTITY) / (PI as f64 * 0.25) - 1.0).abs() < 1e-3);
             let [a, b, c] = mesh.triangles[5].map(|index| mesh.positions[index as usize]);
@@ -199,10 +147,7 @@ mod tests {
             Vec3::ONE,
         );
         assert!((similarity_scale(&turned).unwrap() - 2.0).abs() < 1e-5);
-        assert_eq!(
-            similarity_scale(&Affine3A::from_scale(Vec3::new(1.0, 1.1, 1.0))),
-            None
-        );
+        assert_eq!(similarity_scale(&Affine3A::from_scale(Vec3::new(1.0, 1.1, 1.0))), None);
         assert_eq!(similarity_scale(&Affine3A::from_scale(Vec3::ZERO)), None);
     }
 }

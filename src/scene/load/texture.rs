@@ -59,8 +59,7 @@ impl Requests {
         let same = |other: &Request| {
             other.picture == request.picture
                 && other.encoding == request.encoding
-                && (other.wrap_u, other.wrap_v, other.nearest)
-                    == (request.wrap_u, request.wrap_v, request.nearest)
+                && (other.wrap_u, other.wrap_v, other.nearest) == (request.wrap_u, request.wrap_v, request.nearest)
         };
         let place = self.requests.iter().position(same).unwrap_or_else(|| {
             self.requests.push(request);
@@ -74,19 +73,14 @@ impl Requests {
         let mut place_of = HashMap::new();
         let mut distinct = Vec::new();
         for request in &self.requests {
-            place_of
-                .entry((&request.picture, request.encoding))
-                .or_insert_with(|| {
-                    distinct.push((&request.picture, request.encoding));
-                    distinct.len() - 1
-                });
+            place_of.entry((&request.picture, request.encoding)).or_insert_with(|| {
+                distinct.push((&request.picture, request.encoding));
+                distinct.len() - 1
+            });
         }
-        let decoded: Vec<Result<Decoded, LoadError>> = distinct
-            .par_iter()
-            .map(|(picture, encoding)| decode(picture, *encoding))
-            .collect();
-        let mut decoded: Vec<Option<Result<Decoded, LoadError>>> =
-            decoded.into_iter().map(Some).collect();
+        let decoded: Vec<Result<Decoded, LoadError>> =
+            distinct.par_iter().map(|(picture, encoding)| decode(picture, *encoding)).collect();
+        let mut decoded: Vec<Option<Result<Decoded, LoadError>>> = decoded.into_iter().map(Some).collect();
 
         let mut textures = Vec::with_capacity(self.requests.len());
         for request in &self.requests {
@@ -95,9 +89,7 @@ impl Requests {
                 Some(Ok(picture)) => picture.clone(),
                 _ => match (slot.take(), &request.if_missing) {
                     (Some(Err(error)), IfMissing::Replace(texel)) if error.is_unreadable() => {
-                        notes.push(format!(
-                            "Texture not found, a plain one stands in: {error}."
-                        ));
+                        notes.push(format!("Texture not found, a plain one stands in: {error}."));
                         let plain = Decoded::plain(*texel, request.encoding);
                         *slot = Some(Ok(plain.clone()));
                         plain
@@ -128,11 +120,7 @@ impl Requests {
 impl Picture {
     fn name(&self) -> String {
         match self {
-            Self::File(path) => path
-                .file_name()
-                .unwrap_or(path.as_os_str())
-                .to_string_lossy()
-                .into_owned(),
+            Self::File(path) => path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned(),
             Self::Memory { name, .. } => name.clone(),
         }
     }
@@ -148,11 +136,7 @@ pub(super) struct Decoded {
 
 impl Decoded {
     fn plain(texel: [u8; 4], encoding: Encoding) -> Self {
-        Self {
-            width: 1,
-            height: 1,
-            texels: Texels::Bytes(Arc::new(vec![texel]), encoding),
-        }
+        Self { width: 1, height: 1, texels: Texels::Bytes(Arc::new(vec![texel]), encoding) }
     }
 }
 
@@ -165,35 +149,18 @@ fn decode(picture: &Picture, encoding: Encoding) -> Result<Decoded, LoadError> {
 }
 
 /// Decodes a picture that is in memory. Its kind is told from its first bytes, else from its name.
-pub(super) fn decode_bytes(
-    bytes: &[u8],
-    name: &Path,
-    encoding: Encoding,
-) -> Result<Decoded, LoadError> {
+pub(super) fn decode_bytes(bytes: &[u8], name: &Path, encoding: Encoding) -> Result<Decoded, LoadError> {
     if exr_read::is_exr(bytes) {
         return decode_exr(bytes, name);
     }
     let wrong = |error: image::ImageError| match error {
-        image::ImageError::Limits(_) => {
-            LoadError::too_large(name, format_args!("the picture is too large: {error}"))
-        }
+        image::ImageError::Limits(_) => LoadError::too_large(name, format_args!("the picture is too large: {error}")),
         _ => LoadError::invalid(name, format_args!("not a readable picture: {error}")),
     };
-    let format = image::guess_format(bytes)
-        .ok()
-        .or_else(|| ImageFormat::from_path(name).ok());
-    let known = [
-        ImageFormat::Png,
-        ImageFormat::Jpeg,
-        ImageFormat::Hdr,
-        ImageFormat::Tga,
-        ImageFormat::Tiff,
-    ];
+    let format = image::guess_format(bytes).ok().or_else(|| ImageFormat::from_path(name).ok());
+    let known = [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Hdr, ImageFormat::Tga, ImageFormat::Tiff];
     let Some(format) = format.filter(|format| known.contains(format)) else {
-        return Err(LoadError::unsupported(
-            name,
-            "not a picture that is read: png, jpg, hdr, tga, tiff, exr are",
-        ));
+        return Err(LoadError::unsupported(name, "not a picture that is read: png, jpg, hdr, tga, tiff, exr are"));
     };
 
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
@@ -208,12 +175,7 @@ pub(super) fn decode_bytes(
     let eight_bit = matches!(color, image::ColorType::L8 | image::ColorType::La8)
         || matches!(color, image::ColorType::Rgb8 | image::ColorType::Rgba8);
     // Not every decoder looks at the limits: these hold before any of them allocates.
-    check_size(
-        name,
-        u64::from(width),
-        u64::from(height),
-        if eight_bit { 4 } else { 16 },
-    )?;
+    check_size(name, u64::from(width), u64::from(height), if eight_bit { 4 } else { 16 })?;
 
     let image = DynamicImage::from_decoder(decoder).map_err(wrong)?;
     let texels = if eight_bit {
@@ -222,27 +184,16 @@ pub(super) fn decode_bytes(
     } else {
         // 16-bit integers under the sRGB curve are unfolded here, floats are linear already.
         let unfold = encoding == Encoding::Srgb
-            && !matches!(
-                image,
-                DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_)
-            );
+            && !matches!(image, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_));
         let mut texels = image.into_rgba32f().into_raw().as_chunks::<4>().0.to_vec();
         for [r, g, b, _] in &mut texels {
             for value in [r, g, b] {
-                *value = if unfold {
-                    texture::srgb_to_linear(*value)
-                } else {
-                    finite_or_zero(*value)
-                };
+                *value = if unfold { texture::srgb_to_linear(*value) } else { finite_or_zero(*value) };
             }
         }
         Texels::Floats(Arc::new(texels))
     };
-    Ok(Decoded {
-        width,
-        height,
-        texels,
-    })
+    Ok(Decoded { width, height, texels })
 }
 
 fn decode_exr(bytes: &[u8], name: &Path) -> Result<Decoded, LoadError> {
@@ -256,36 +207,21 @@ fn decode_exr(bytes: &[u8], name: &Path) -> Result<Decoded, LoadError> {
     let find = |wanted: &str| {
         let suffix = format!(".{wanted}");
         picture.channel(wanted).or_else(|| {
-            picture
-                .channels
-                .iter()
-                .find(|(n, _)| n.ends_with(&suffix))
-                .map(|(_, values)| values.as_slice())
+            picture.channels.iter().find(|(n, _)| n.ends_with(&suffix)).map(|(_, values)| values.as_slice())
         })
     };
     let (Some(red), alpha) = (find("R").or_else(|| find("Y")), find("A")) else {
-        return Err(LoadError::unsupported(
-            name,
-            "the picture has neither a channel R nor a channel Y",
-        ));
+        return Err(LoadError::unsupported(name, "the picture has neither a channel R nor a channel Y"));
     };
     let (green, blue) = (find("G").unwrap_or(red), find("B").unwrap_or(red));
-    let texels = (0..red.len())
-        .map(|i| [red[i], green[i], blue[i], alpha.map_or(1.0, |a| a[i])].map(finite_or_zero))
-        .collect();
-    Ok(Decoded {
-        width: picture.width,
-        height: picture.height,
-        texels: Texels::Floats(Arc::new(texels)),
-    })
+    let texels =
+        (0..red.len()).map(|i| [red[i], green[i], blue[i], alpha.map_or(1.0, |a| a[i])].map(finite_or_zero)).collect();
+    Ok(Decoded { width: picture.width, height: picture.height, texels: Texels::Floats(Arc::new(texels)) })
 }
 
 fn check_size(name: &Path, width: u64, height: u64, bytes_per_texel: u64) -> Result<(), LoadError> {
     if width == 0 || height == 0 {
-        return Err(LoadError::invalid(
-            name,
-            format_args!("the picture is empty ({width} x {height} pixels)"),
-        ));
+        return Err(LoadError::invalid(name, format_args!("the picture is empty ({width} x {height} pixels)")));
     }
     let side = u64::from(LONGEST_SIDE);
     if width > side || height > side || width * height * bytes_per_texel > MOST_BYTES {

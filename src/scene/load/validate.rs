@@ -13,28 +13,13 @@ use std::path::Path;
 pub(super) fn repair(builder: &mut Builder, path: &Path) -> Result<(), LoadError> {
     for index in 0..builder.meshes.len() {
         let mesh = &mut builder.meshes[index];
-        if let Some(vertex) = mesh
-            .positions
-            .iter()
-            .position(|position| !position.is_finite())
-        {
-            let problem = format!(
-                "vertex {vertex} of \"{}\" is not finite: {}",
-                mesh.name, mesh.positions[vertex]
-            );
+        if let Some(vertex) = mesh.positions.iter().position(|position| !position.is_finite()) {
+            let problem = format!("vertex {vertex} of \"{}\" is not finite: {}", mesh.name, mesh.positions[vertex]);
             return Err(LoadError::invalid(path, problem));
         }
         let vertices = mesh.positions.len();
-        if let Some(triangle) = mesh
-            .triangles
-            .iter()
-            .flatten()
-            .find(|&&vertex| vertex as usize >= vertices)
-        {
-            let problem = format!(
-                "\"{}\" has {vertices} vertices, but a triangle uses number {triangle}",
-                mesh.name
-            );
+        if let Some(triangle) = mesh.triangles.iter().flatten().find(|&&vertex| vertex as usize >= vertices) {
+            let problem = format!("\"{}\" has {vertices} vertices, but a triangle uses number {triangle}", mesh.name);
             return Err(LoadError::invalid(path, problem));
         }
         let degenerate = drop_degenerate(mesh);
@@ -42,30 +27,23 @@ pub(super) fn repair(builder: &mut Builder, path: &Path) -> Result<(), LoadError
         let name = mesh.name.clone();
         if degenerate > 0 {
             let rest = mesh.triangles.len();
-            builder.note(format!(
-                "\"{name}\": {degenerate} triangles without area left out, {rest} remain."
-            ));
+            builder.note(format!("\"{name}\": {degenerate} triangles without area left out, {rest} remain."));
         }
         if changed_normals {
-            builder.note(format!("\"{name}\": some normals had no length or were not finite; the faces' own are used."));
+            builder
+                .note(format!("\"{name}\": some normals had no length or were not finite; the faces' own are used."));
         }
     }
     let mut notes = Vec::new();
     let meshes = &builder.meshes;
     builder.instances.retain(|instance| {
         if meshes[instance.mesh.0 as usize].triangles.is_empty() {
-            notes.push(format!(
-                "\"{}\" has no triangles and is left out.",
-                instance.name
-            ));
+            notes.push(format!("\"{}\" has no triangles and is left out.", instance.name));
             return false;
         }
         let invertible = is_invertible(&instance.to_world);
         if !invertible {
-            notes.push(format!(
-                "\"{}\" is left out: its transform flattens it or is not finite.",
-                instance.name
-            ));
+            notes.push(format!("\"{}\" is left out: its transform flattens it or is not finite.", instance.name));
         }
         invertible
     });
@@ -73,15 +51,8 @@ pub(super) fn repair(builder: &mut Builder, path: &Path) -> Result<(), LoadError
         builder.note(note);
     }
     if builder.instances.is_empty() && builder.spheres.is_empty() {
-        let why = builder
-            .notes
-            .first()
-            .map(|note| format!(" ({})", note.trim_end_matches('.')))
-            .unwrap_or_default();
-        return Err(LoadError::invalid(
-            path,
-            format_args!("nothing to render: no triangle and no sphere{why}"),
-        ));
+        let why = builder.notes.first().map(|note| format!(" ({})", note.trim_end_matches('.'))).unwrap_or_default();
+        return Err(LoadError::invalid(path, format_args!("nothing to render: no triangle and no sphere{why}")));
     }
     check_extent(builder, path)
 }
@@ -95,20 +66,13 @@ fn check_extent(builder: &Builder, path: &Path) -> Result<(), LoadError> {
     if largest <= LARGEST {
         return Ok(());
     }
-    Err(LoadError::invalid(
-        path,
-        format_args!("coordinates reach {largest:e}; at most {LARGEST:e} can be rendered"),
-    ))
+    Err(LoadError::invalid(path, format_args!("coordinates reach {largest:e}; at most {LARGEST:e} can be rendered")))
 }
 
 /// Removes triangles whose corners coincide or lie on a line; returns how many.
 fn drop_degenerate(mesh: &mut Mesh) -> usize {
     let before = mesh.triangles.len();
-    let Mesh {
-        positions,
-        triangles,
-        ..
-    } = mesh;
+    let Mesh { positions, triangles, .. } = mesh;
     triangles.retain(|&[a, b, c]| {
         let [a, b, c] = [a, b, c].map(|index| positions[index as usize].as_dvec3());
         // f64, or small triangles far from the origin would vanish by rounding.
@@ -131,8 +95,7 @@ fn repair_attributes(mesh: &mut Mesh) -> bool {
             *uv = Vec2::ZERO;
         }
     }
-    let good_tangent =
-        |tangent: &glam::Vec4| tangent.is_finite() && tangent.truncate().length_squared() > 1e-12;
+    let good_tangent = |tangent: &glam::Vec4| tangent.is_finite() && tangent.truncate().length_squared() > 1e-12;
     if mesh.tangents.len() != vertices || !mesh.tangents.iter().all(good_tangent) {
         mesh.tangents.clear();
     }
@@ -150,9 +113,7 @@ fn repair_attributes(mesh: &mut Mesh) -> bool {
     for triangle in &mesh.triangles {
         let [a, b, c] = triangle.map(|index| mesh.positions[index as usize].as_dvec3());
         let normal = (b - a).cross(c - a).normalize_or_zero().as_vec3();
-        triangle
-            .iter()
-            .for_each(|&index| of_faces[index as usize] += normal);
+        triangle.iter().for_each(|&index| of_faces[index as usize] += normal);
     }
     let used: std::collections::HashSet<u32> = mesh.triangles.iter().flatten().copied().collect();
     let mut reported = false;
@@ -169,32 +130,19 @@ fn is_invertible(transform: &Affine3A) -> bool {
         return false;
     }
     let inverse = transform.inverse();
-    transform.matrix3.determinant() != 0.0
-        && inverse.is_finite()
-        && inverse.matrix3.determinant() != 0.0
+    transform.matrix3.determinant() != 0.0 && inverse.is_finite() && inverse.matrix3.determinant() != 0.0
 }
 
 /// Proves what `repair` and the loaders promised; a failure here is a loader's mistake and is still no panic.
 pub(super) fn check(scene: &Scene, path: &Path) -> Result<(), LoadError> {
-    let broken = |what: &str| {
-        Err(LoadError::invalid(
-            path,
-            format_args!("{what} is out of range"),
-        ))
-    };
+    let broken = |what: &str| Err(LoadError::invalid(path, format_args!("{what} is out of range")));
     let in_range = |index: u32, len: usize| (index as usize) < len;
     for instance in &scene.instances {
-        if !in_range(instance.mesh.0, scene.meshes.len())
-            || !in_range(instance.material.0, scene.materials.len())
-        {
+        if !in_range(instance.mesh.0, scene.meshes.len()) || !in_range(instance.material.0, scene.materials.len()) {
             return broken("a mesh or material");
         }
     }
-    if scene
-        .spheres
-        .iter()
-        .any(|sphere| !in_range(sphere.material.0, scene.materials.len()))
-    {
+    if scene.spheres.iter().any(|sphere| !in_range(sphere.material.0, scene.materials.len())) {
         return broken("a sphere's material");
     }
     for material in &scene.materials {
@@ -204,9 +152,7 @@ pub(super) fn check(scene: &Scene, path: &Path) -> Result<(), LoadError> {
             .chain([material.normal_map.map(|(lookup, _)| lookup.texture.0)])
             .chain([match material.alpha {
                 Alpha::Opaque => None,
-                Alpha::Mask { value, .. } | Alpha::Blend { value } => {
-                    value.texture.map(|(lookup, _)| lookup.texture.0)
-                }
+                Alpha::Mask { value, .. } | Alpha::Blend { value } => value.texture.map(|(lookup, _)| lookup.texture.0),
             }])
             .flatten()
             .any(|texture| !in_range(texture, scene.textures.len()))
@@ -219,32 +165,16 @@ pub(super) fn check(scene: &Scene, path: &Path) -> Result<(), LoadError> {
 
 fn textures_of(surface: &Surface) -> Vec<Option<u32>> {
     let color = |input: &crate::scene::ColorInput| input.texture.map(|lookup| lookup.texture.0);
-    let scalar =
-        |input: &crate::scene::ScalarInput| input.texture.map(|(lookup, _)| lookup.texture.0);
+    let scalar = |input: &crate::scene::ScalarInput| input.texture.map(|(lookup, _)| lookup.texture.0);
     match surface {
         Surface::Diffuse { reflectance } | Surface::Mirror { reflectance } => {
             vec![color(reflectance)]
         }
         Surface::Conductor { roughness, .. } => vec![scalar(roughness)],
-        Surface::Dielectric {
-            roughness,
-            transmittance,
-            ..
-        } => vec![scalar(roughness), color(transmittance)],
+        Surface::Dielectric { roughness, transmittance, .. } => vec![scalar(roughness), color(transmittance)],
         Surface::ThinDielectric { transmittance, .. } => vec![color(transmittance)],
-        Surface::MetalRoughness {
-            base_color,
-            metallic,
-            roughness,
-            transmission,
-            ..
-        } => {
-            vec![
-                color(base_color),
-                scalar(metallic),
-                scalar(roughness),
-                scalar(transmission),
-            ]
+        Surface::MetalRoughness { base_color, metallic, roughness, transmission, .. } => {
+            vec![color(base_color), scalar(metallic), scalar(roughness), scalar(transmission)]
         }
     }
 }

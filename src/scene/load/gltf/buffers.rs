@@ -19,38 +19,19 @@ pub(super) struct Container<'a> {
 /// Splits a GLB file; anything else is taken for JSON.
 pub(super) fn split<'a>(path: &Path, bytes: &'a [u8]) -> Result<Container<'a>, LoadError> {
     if !bytes.starts_with(b"glTF") {
-        return Ok(Container {
-            json: bytes,
-            binary: None,
-        });
+        return Ok(Container { json: bytes, binary: None });
     }
-    let word = |at: usize| {
-        bytes
-            .get(at..at + 4)
-            .map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
-    };
+    let word = |at: usize| bytes.get(at..at + 4).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]));
     let cut = || LoadError::invalid(path, "the GLB file is cut off");
     let version = word(4).ok_or_else(cut)?;
     if version != 2 {
-        return Err(LoadError::unsupported(
-            path,
-            format_args!("GLB version {version}; version 2 is read"),
-        ));
+        return Err(LoadError::unsupported(path, format_args!("GLB version {version}; version 2 is read")));
     }
-    let mut container = Container {
-        json: &[],
-        binary: None,
-    };
+    let mut container = Container { json: &[], binary: None };
     let mut at = 12;
     while at < bytes.len() {
-        let (length, kind) = (
-            word(at).ok_or_else(cut)? as usize,
-            word(at + 4).ok_or_else(cut)?,
-        );
-        let chunk = bytes
-            .get(at + 8..)
-            .and_then(|rest| rest.get(..length))
-            .ok_or_else(cut)?;
+        let (length, kind) = (word(at).ok_or_else(cut)? as usize, word(at + 4).ok_or_else(cut)?);
+        let chunk = bytes.get(at + 8..).and_then(|rest| rest.get(..length)).ok_or_else(cut)?;
         match kind {
             0x4E4F_534A if container.json.is_empty() => container.json = chunk,
             0x004E_4942 if container.binary.is_none() => container.binary = Some(chunk),
@@ -75,18 +56,12 @@ pub(super) enum Uri {
 pub(super) fn resolve(path: &Path, uri: &str) -> Result<Uri, LoadError> {
     if let Some(data) = uri.strip_prefix("data:") {
         let encoded = data.split_once(";base64,").map(|(_, encoded)| encoded);
-        let encoded =
-            encoded.ok_or_else(|| LoadError::invalid(path, "a data: URI that is not base64"))?;
+        let encoded = encoded.ok_or_else(|| LoadError::invalid(path, "a data: URI that is not base64"))?;
         let bytes = base64::engine::general_purpose::STANDARD.decode(encoded.trim());
-        return bytes
-            .map(Uri::Data)
-            .map_err(|error| LoadError::invalid(path, format_args!("a data: URI: {error}")));
+        return bytes.map(Uri::Data).map_err(|error| LoadError::invalid(path, format_args!("a data: URI: {error}")));
     }
     if uri.contains("://") {
-        return Err(LoadError::unsupported(
-            path,
-            format_args!("\"{uri}\": only local files are read"),
-        ));
+        return Err(LoadError::unsupported(path, format_args!("\"{uri}\": only local files are read")));
     }
     let mut decoded = Vec::new();
     let mut rest = uri.as_bytes();
@@ -114,11 +89,7 @@ pub(super) struct Buffers {
 }
 
 impl Buffers {
-    pub(super) fn read(
-        path: &Path,
-        document: &gltf::Document,
-        binary: Option<&[u8]>,
-    ) -> Result<Self, LoadError> {
+    pub(super) fn read(path: &Path, document: &gltf::Document, binary: Option<&[u8]>) -> Result<Self, LoadError> {
         let mut all = Vec::new();
         for (index, buffer) in document.as_json().buffers.iter().enumerate() {
             let bytes = match &buffer.uri {
@@ -126,52 +97,34 @@ impl Buffers {
                 None => Vec::new(),
                 Some(uri) => match resolve(path, uri)? {
                     Uri::Data(bytes) => bytes,
-                    Uri::File(file) => files::read(&file)
-                        .map_err(|error| error.referenced_from(super::super::Place::file(path)))?,
+                    Uri::File(file) => {
+                        files::read(&file).map_err(|error| error.referenced_from(super::super::Place::file(path)))?
+                    }
                 },
             };
             let promised = buffer.byte_length.0;
             if (bytes.len() as u64) < promised {
-                let problem = format!(
-                    "buffer {index} has {} bytes, {promised} are promised",
-                    bytes.len()
-                );
+                let problem = format!("buffer {index} has {} bytes, {promised} are promised", bytes.len());
                 return Err(LoadError::invalid(path, problem));
             }
             all.push(bytes);
         }
-        Ok(Self {
-            path: path.to_owned(),
-            bytes: all,
-        })
+        Ok(Self { path: path.to_owned(), bytes: all })
     }
 
     /// The bytes of a buffer view.
     pub(super) fn view(&self, view: &gltf::buffer::View) -> Result<&[u8], LoadError> {
-        let buffer = self
-            .bytes
-            .get(view.buffer().index())
-            .map(Vec::as_slice)
-            .unwrap_or_default();
-        buffer
-            .get(view.offset()..)
-            .and_then(|rest| rest.get(..view.length()))
-            .ok_or_else(|| {
-                let (offset, length) = (view.offset(), view.length());
-                let problem = format!(
-                    "buffer view {} needs bytes {offset} + {length} of a buffer of {}",
-                    view.index(),
-                    buffer.len()
-                );
-                LoadError::invalid(&self.path, problem)
-            })
+        let buffer = self.bytes.get(view.buffer().index()).map(Vec::as_slice).unwrap_or_default();
+        buffer.get(view.offset()..).and_then(|rest| rest.get(..view.length())).ok_or_else(|| {
+            let (offset, length) = (view.offset(), view.length());
+            let problem =
+                format!("buffer view {} needs bytes {offset} + {length} of a buffer of {}", view.index(), buffer.len());
+            LoadError::invalid(&self.path, problem)
+        })
     }
 
     /// The accessor's elements as floats, `N` a piece; integers are scaled if the file says "normalized".
-    pub(super) fn floats<const N: usize>(
-        &self,
-        accessor: &gltf::Accessor,
-    ) -> Result<Vec<[f32; N]>, LoadError> {
+    pub(super) fn floats<const N: usize>(&self, accessor: &gltf::Accessor) -> Result<Vec<[f32; N]>, LoadError> {
         let kind = accessor.data_type();
         let scaled = accessor.normalized();
         let decode = |bytes: &[u8]| match (kind, scaled) {
@@ -183,12 +136,8 @@ impl Buffers {
             (DataType::U16, false) => f32::from(u16::from_le_bytes([bytes[0], bytes[1]])),
             (DataType::U16, true) => f32::from(u16::from_le_bytes([bytes[0], bytes[1]])) / 65535.0,
             (DataType::I16, false) => f32::from(i16::from_le_bytes([bytes[0], bytes[1]])),
-            (DataType::I16, true) => {
-                (f32::from(i16::from_le_bytes([bytes[0], bytes[1]])) / 32767.0).max(-1.0)
-            }
-            (DataType::U32, _) => {
-                u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]) as f32
-            }
+            (DataType::I16, true) => (f32::from(i16::from_le_bytes([bytes[0], bytes[1]])) / 32767.0).max(-1.0),
+            (DataType::U32, _) => u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]) as f32,
         };
         self.elements(accessor, decode)
     }
@@ -204,18 +153,11 @@ impl Buffers {
             DataType::U16 => u32::from(u16::from_le_bytes([bytes[0], bytes[1]])),
             _ => u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]),
         };
-        Ok(self
-            .elements::<1, u32>(accessor, decode)?
-            .into_iter()
-            .map(|[index]| index)
-            .collect())
+        Ok(self.elements::<1, u32>(accessor, decode)?.into_iter().map(|[index]| index).collect())
     }
 
     fn wrong(&self, accessor: &gltf::Accessor, problem: impl std::fmt::Display) -> LoadError {
-        LoadError::invalid(
-            &self.path,
-            format_args!("accessor {}: {problem}", accessor.index()),
-        )
+        LoadError::invalid(&self.path, format_args!("accessor {}: {problem}", accessor.index()))
     }
 
     fn elements<const N: usize, T: Copy + Default>(
@@ -228,15 +170,10 @@ impl Buffers {
         }
         let count = accessor.count();
         if count > MOST_ELEMENTS {
-            return Err(self.wrong(
-                accessor,
-                format_args!("{count} elements, at most {MOST_ELEMENTS} are read"),
-            ));
+            return Err(self.wrong(accessor, format_args!("{count} elements, at most {MOST_ELEMENTS} are read")));
         }
         let width = accessor.data_type().size();
-        let element = |bytes: &[u8]| {
-            std::array::from_fn(|place| decode(&bytes[place * width..(place + 1) * width]))
-        };
+        let element = |bytes: &[u8]| std::array::from_fn(|place| decode(&bytes[place * width..(place + 1) * width]));
         let size = width * N;
         let mut elements: Vec<[T; N]> = match accessor.view() {
             None => vec![[T::default(); N]; count],
@@ -244,59 +181,31 @@ impl Buffers {
                 let bytes = self.view(&view)?;
                 let stride = view.stride().unwrap_or(size).max(size);
                 let start = accessor.offset();
-                let end = count.checked_sub(1).map_or(Some(start), |last| {
-                    last.checked_mul(stride)?
-                        .checked_add(start)?
-                        .checked_add(size)
-                });
+                let end = count
+                    .checked_sub(1)
+                    .map_or(Some(start), |last| last.checked_mul(stride)?.checked_add(start)?.checked_add(size));
                 if end.is_none_or(|end| end > bytes.len()) {
-                    let problem = format!(
-                        "{count} elements do not fit its buffer view of {} bytes",
-                        bytes.len()
-                    );
+                    let problem = format!("{count} elements do not fit its buffer view of {} bytes", bytes.len());
                     return Err(self.wrong(accessor, problem));
                 }
-                (0..count)
-                    .map(|index| element(&bytes[start + index * stride..]))
-                    .collect()
+                (0..count).map(|index| element(&bytes[start + index * stride..])).collect()
             }
         };
         if let Some(sparse) = accessor.sparse() {
             let width_of_index = sparse.indices().index_type().size();
             let from = sparse.indices();
-            let indices = self
-                .view(&from.view())?
-                .get(from.offset()..)
-                .unwrap_or_default();
-            let values = self
-                .view(&sparse.values().view())?
-                .get(sparse.values().offset()..)
-                .unwrap_or_default();
+            let indices = self.view(&from.view())?.get(from.offset()..).unwrap_or_default();
+            let values = self.view(&sparse.values().view())?.get(sparse.values().offset()..).unwrap_or_default();
             let count = sparse.count();
-            let fits = |bytes: &[u8], size: usize| {
-                count
-                    .checked_mul(size)
-                    .is_some_and(|needed| needed <= bytes.len())
-            };
+            let fits = |bytes: &[u8], size: usize| count.checked_mul(size).is_some_and(|needed| needed <= bytes.len());
             if !fits(indices, width_of_index) || !fits(values, size) {
                 return Err(self.wrong(accessor, "its sparse part does not fit its buffer views"));
             }
-            for (place, value) in indices
-                .chunks_exact(width_of_index)
-                .zip(values.chunks_exact(size))
-                .take(count)
-            {
-                let place = place
-                    .iter()
-                    .rev()
-                    .fold(0, |index, &byte| index << 8 | usize::from(byte));
+            for (place, value) in indices.chunks_exact(width_of_index).zip(values.chunks_exact(size)).take(count) {
+                let place = place.iter().rev().fold(0, |index, &byte| index << 8 | usize::from(byte));
                 let slot = elements.get_mut(place);
-                *slot.ok_or_else(|| {
-                    self.wrong(
-                        accessor,
-                        format_args!("sparse index {place} is out of range"),
-                    )
-                })? = element(value);
+                *slot.ok_or_else(|| self.wrong(accessor, format_args!("sparse index {place} is out of range")))? =
+                    element(value);
             }
         }
         Ok(elements)

@@ -4,9 +4,7 @@ use super::super::builder::Builder;
 use super::super::error::LoadError;
 use super::super::texture::{IfMissing, Picture, Request};
 use super::buffers::{Buffers, Uri, resolve};
-use crate::scene::{
-    Alpha, ColorInput, Encoding, Material, MaterialId, ScalarInput, Surface, TextureLookup, Wrap,
-};
+use crate::scene::{Alpha, ColorInput, Encoding, Material, MaterialId, ScalarInput, Surface, TextureLookup, Wrap};
 use glam::{Vec2, Vec3};
 use gltf::texture::{MagFilter, WrappingMode};
 use std::collections::HashMap;
@@ -24,21 +22,11 @@ pub(super) struct Materials<'a> {
 
 impl<'a> Materials<'a> {
     pub(super) fn new(path: &'a Path, document: &'a gltf::Document, buffers: &'a Buffers) -> Self {
-        Self {
-            path,
-            document,
-            buffers,
-            converted: HashMap::new(),
-            embedded: HashMap::new(),
-        }
+        Self { path, document, buffers, converted: HashMap::new(), embedded: HashMap::new() }
     }
 
     /// Our material for glTF's.
-    pub(super) fn get(
-        &mut self,
-        builder: &mut Builder,
-        material: &gltf::Material,
-    ) -> Result<MaterialId, LoadError> {
+    pub(super) fn get(&mut self, builder: &mut Builder, material: &gltf::Material) -> Result<MaterialId, LoadError> {
         if let Some(id) = self.converted.get(&material.index()) {
             return Ok(*id);
         }
@@ -48,59 +36,32 @@ impl<'a> Materials<'a> {
         Ok(id)
     }
 
-    fn convert(
-        &mut self,
-        builder: &mut Builder,
-        from: &gltf::Material,
-    ) -> Result<Material, LoadError> {
-        let name = from.name().map_or_else(
-            || format!("material {}", from.index().unwrap_or(0)),
-            str::to_owned,
-        );
+    fn convert(&mut self, builder: &mut Builder, from: &gltf::Material) -> Result<Material, LoadError> {
+        let name = from.name().map_or_else(|| format!("material {}", from.index().unwrap_or(0)), str::to_owned);
         let pbr = from.pbr_metallic_roughness();
         let [red, green, blue, opacity] = pbr.base_color_factor();
         let base_texture = pbr.base_color_texture();
         let base_lookup = self.optional(builder, base_texture.as_ref(), Encoding::Srgb)?;
-        let rough_lookup = self.optional(
-            builder,
-            pbr.metallic_roughness_texture().as_ref(),
-            Encoding::Linear,
-        )?;
+        let rough_lookup = self.optional(builder, pbr.metallic_roughness_texture().as_ref(), Encoding::Linear)?;
         let share = |value: f32| {
-            if value.is_finite() {
-                value.clamp(0.0, 1.0)
-            } else {
-                0.0
-            }
+            if value.is_finite() { value.clamp(0.0, 1.0) } else { 0.0 }
         };
-        let base_color = ColorInput {
-            factor: Vec3::new(share(red), share(green), share(blue)),
-            texture: base_lookup,
-        };
+        let base_color = ColorInput { factor: Vec3::new(share(red), share(green), share(blue)), texture: base_lookup };
         let transmission = match from.transmission() {
             None => ScalarInput::constant(0.0),
             Some(transmission) => ScalarInput {
                 factor: share(transmission.transmission_factor()),
                 texture: self
-                    .optional(
-                        builder,
-                        transmission.transmission_texture().as_ref(),
-                        Encoding::Linear,
-                    )?
+                    .optional(builder, transmission.transmission_texture().as_ref(), Encoding::Linear)?
                     .map(|lookup| (lookup, 0)),
             },
         };
-        if from
-            .volume()
-            .is_some_and(|volume| volume.thickness_factor() > 0.0)
-        {
+        if from.volume().is_some_and(|volume| volume.thickness_factor() > 0.0) {
             builder.note("KHR_materials_volume: transmission is treated as a thin sheet, without absorption.");
         }
         let surface = if from.unlit() {
             builder.note("KHR_materials_unlit: rendered as a diffuse surface.");
-            Surface::Diffuse {
-                reflectance: base_color,
-            }
+            Surface::Diffuse { reflectance: base_color }
         } else {
             Surface::MetalRoughness {
                 base_color,
@@ -112,10 +73,7 @@ impl<'a> Materials<'a> {
                     factor: share(pbr.roughness_factor()),
                     texture: rough_lookup.map(|lookup| (lookup, 1)),
                 },
-                ior: from
-                    .ior()
-                    .filter(|ior| ior.is_finite() && *ior >= 1.0)
-                    .unwrap_or(1.5),
+                ior: from.ior().filter(|ior| ior.is_finite() && *ior >= 1.0).unwrap_or(1.5),
                 transmission,
             }
         };
@@ -123,22 +81,11 @@ impl<'a> Materials<'a> {
         // The file's unit is cd/m², and so is ours: nits_per_unit stays 1.
         let strength = from.emissive_strength().unwrap_or(1.0);
         let factor = Vec3::from_array(from.emissive_factor()) * strength;
-        let factor = if factor.is_finite() {
-            factor.max(Vec3::ZERO)
-        } else {
-            Vec3::ZERO
-        };
+        let factor = if factor.is_finite() { factor.max(Vec3::ZERO) } else { Vec3::ZERO };
         let emission = if factor == Vec3::ZERO {
             ColorInput::constant(Vec3::ZERO)
         } else {
-            ColorInput {
-                factor,
-                texture: self.optional(
-                    builder,
-                    from.emissive_texture().as_ref(),
-                    Encoding::Srgb,
-                )?,
-            }
+            ColorInput { factor, texture: self.optional(builder, from.emissive_texture().as_ref(), Encoding::Srgb)? }
         };
         let normal_map = match from.normal_texture() {
             None => None,
@@ -146,45 +93,23 @@ impl<'a> Materials<'a> {
                 if normal.tex_coord() != 0 {
                     builder.note("Texture coordinate sets beyond the first are not used.");
                 }
-                let transform = normal
-                    .extension_value("KHR_texture_transform")
-                    .map(read_transform);
-                let lookup = self.lookup(
-                    builder,
-                    &normal.texture(),
-                    Encoding::Linear,
-                    transform,
-                    [128, 128, 255, 255],
-                )?;
-                let strength = if normal.scale().is_finite() {
-                    normal.scale()
-                } else {
-                    1.0
-                };
+                let transform = normal.extension_value("KHR_texture_transform").map(read_transform);
+                let lookup =
+                    self.lookup(builder, &normal.texture(), Encoding::Linear, transform, [128, 128, 255, 255])?;
+                let strength = if normal.scale().is_finite() { normal.scale() } else { 1.0 };
                 lookup.map(|lookup| (lookup, strength))
             }
         };
 
-        let coverage = ScalarInput {
-            factor: share(opacity),
-            texture: base_lookup.map(|lookup| (lookup, 3)),
-        };
+        let coverage = ScalarInput { factor: share(opacity), texture: base_lookup.map(|lookup| (lookup, 3)) };
         let alpha = match from.alpha_mode() {
             gltf::material::AlphaMode::Opaque => Alpha::Opaque,
-            gltf::material::AlphaMode::Mask => Alpha::Mask {
-                value: coverage,
-                cutoff: share(from.alpha_cutoff().unwrap_or(0.5)),
-            },
+            gltf::material::AlphaMode::Mask => {
+                Alpha::Mask { value: coverage, cutoff: share(from.alpha_cutoff().unwrap_or(0.5)) }
+            }
             gltf::material::AlphaMode::Blend => Alpha::Blend { value: coverage },
         };
-        Ok(Material {
-            name,
-            surface,
-            emission,
-            emits_both_sides: from.double_sided(),
-            normal_map,
-            alpha,
-        })
+        Ok(Material { name, surface, emission, emits_both_sides: from.double_sided(), normal_map, alpha })
     }
 
     fn optional(
@@ -195,10 +120,7 @@ impl<'a> Materials<'a> {
     ) -> Result<Option<TextureLookup>, LoadError> {
         let Some(info) = info else { return Ok(None) };
         let transform = info.texture_transform();
-        let set = transform
-            .as_ref()
-            .and_then(gltf::texture::TextureTransform::tex_coord)
-            .unwrap_or(info.tex_coord());
+        let set = transform.as_ref().and_then(gltf::texture::TextureTransform::tex_coord).unwrap_or(info.tex_coord());
         if set != 0 {
             builder.note("Texture coordinate sets beyond the first are not used.");
         }
@@ -207,13 +129,7 @@ impl<'a> Materials<'a> {
             rotation: transform.rotation(),
             scale: Vec2::from_array(transform.scale()),
         });
-        self.lookup(
-            builder,
-            &info.texture(),
-            encoding,
-            transform,
-            [180, 180, 180, 255],
-        )
+        self.lookup(builder, &info.texture(), encoding, transform, [180, 180, 180, 255])
     }
 
     fn lookup(
@@ -224,13 +140,9 @@ impl<'a> Materials<'a> {
         transform: Option<Transform>,
         if_missing: [u8; 4],
     ) -> Result<Option<TextureLookup>, LoadError> {
-        let index = self.document.as_json().textures[texture.index()]
-            .source
-            .value();
+        let index = self.document.as_json().textures[texture.index()].source.value();
         let Some(picture) = self.picture(index)? else {
-            builder.note(format!(
-                "Image {index} has neither a file nor a buffer view and is left out."
-            ));
+            builder.note(format!("Image {index} has neither a file nor a buffer view and is left out."));
             return Ok(None);
         };
         let sampler = texture.sampler();
@@ -249,17 +161,10 @@ impl<'a> Materials<'a> {
         });
         let plain = TextureLookup::plain(texture);
         Ok(Some(match transform {
-            Some(Transform {
-                offset,
-                rotation,
-                scale,
-            }) if offset.is_finite() && rotation.is_finite() && scale.is_finite() => {
-                TextureLookup {
-                    offset,
-                    rotation,
-                    scale,
-                    ..plain
-                }
+            Some(Transform { offset, rotation, scale })
+                if offset.is_finite() && rotation.is_finite() && scale.is_finite() =>
+            {
+                TextureLookup { offset, rotation, scale, ..plain }
             }
             _ => plain,
         }))
@@ -270,16 +175,10 @@ impl<'a> Materials<'a> {
         let Some(image) = self.document.as_json().images.get(index) else {
             return Ok(None);
         };
-        let name = image
-            .name
-            .clone()
-            .unwrap_or_else(|| format!("image {index}"));
+        let name = image.name.clone().unwrap_or_else(|| format!("image {index}"));
         let name = format!("{}: {name}", self.path.display());
         if let Some(bytes) = self.embedded.get(&index) {
-            return Ok(Some(Picture::Memory {
-                name,
-                bytes: bytes.clone(),
-            }));
+            return Ok(Some(Picture::Memory { name, bytes: bytes.clone() }));
         }
         let bytes = match (&image.uri, image.buffer_view) {
             (Some(uri), _) => match resolve(self.path, uri)? {
@@ -292,11 +191,7 @@ impl<'a> Materials<'a> {
             },
             (None, None) => return Ok(None),
         };
-        let bytes = self
-            .embedded
-            .entry(index)
-            .or_insert(Arc::new(bytes))
-            .clone();
+        let bytes = self.embedded.entry(index).or_insert(Arc::new(bytes)).clone();
         Ok(Some(Picture::Memory { name, bytes }))
     }
 }
@@ -312,17 +207,11 @@ struct Transform {
 /// The extension where the crate leaves it as JSON (normal maps).
 fn read_transform(value: &serde_json::Value) -> Transform {
     let number = |value: Option<&serde_json::Value>, default: f32| {
-        value
-            .and_then(serde_json::Value::as_f64)
-            .map_or(default, |number| number as f32)
+        value.and_then(serde_json::Value::as_f64).map_or(default, |number| number as f32)
     };
     let pair = |key: &str, default: f32| {
         let part = |place: usize| number(value.get(key).and_then(|pair| pair.get(place)), default);
         Vec2::new(part(0), part(1))
     };
-    Transform {
-        offset: pair("offset", 0.0),
-        rotation: number(value.get("rotation"), 0.0),
-        scale: pair("scale", 1.0),
-    }
+    Transform { offset: pair("offset", 0.0), rotation: number(value.get("rotation"), 0.0), scale: pair("scale", 1.0) }
 }

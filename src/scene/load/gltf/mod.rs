@@ -42,14 +42,8 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
     let document = parse(path, container.json, &mut builder)?;
     let buffers = Buffers::read(path, &document, container.binary)?;
 
-    let Some(scene) = document
-        .default_scene()
-        .or_else(|| document.scenes().next())
-    else {
-        return Err(LoadError::invalid(
-            path,
-            "nothing to render: the file has no scene",
-        ));
+    let Some(scene) = document.default_scene().or_else(|| document.scenes().next()) else {
+        return Err(LoadError::invalid(path, "nothing to render: the file has no scene"));
     };
     let mut reader = Reader {
         path,
@@ -71,21 +65,12 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
 /// The document, checked by the crate, after our own look at its extensions.
 fn parse(path: &Path, json: &[u8], builder: &mut Builder) -> Result<::gltf::Document, LoadError> {
     let mut root: ::gltf::json::Root = serde_json::from_slice(json).map_err(|error| {
-        let place = super::Place {
-            file: path.to_owned(),
-            line: Some(error.line()).filter(|&line| line > 0),
-        };
+        let place = super::Place { file: path.to_owned(), line: Some(error.line()).filter(|&line| line > 0) };
         LoadError::invalid_at(place, format_args!("not valid glTF: {error}"))
     })?;
-    if let Some(refused) = root
-        .extensions_required
-        .iter()
-        .find(|name| !KNOWN.contains(&name.as_str()))
-    {
+    if let Some(refused) = root.extensions_required.iter().find(|name| !KNOWN.contains(&name.as_str())) {
         let advice = match refused.as_str() {
-            "KHR_draco_mesh_compression" | "EXT_meshopt_compression" => {
-                "; export it without mesh compression"
-            }
+            "KHR_draco_mesh_compression" | "EXT_meshopt_compression" => "; export it without mesh compression",
             "KHR_texture_basisu" | "EXT_texture_webp" => "; export its textures as PNG or JPEG",
             _ => "",
         };
@@ -94,11 +79,7 @@ fn parse(path: &Path, json: &[u8], builder: &mut Builder) -> Result<::gltf::Docu
             format_args!("needs the extension {refused}, which is not read{advice}"),
         ));
     }
-    for name in root
-        .extensions_used
-        .iter()
-        .filter(|name| !KNOWN.contains(&name.as_str()))
-    {
+    for name in root.extensions_used.iter().filter(|name| !KNOWN.contains(&name.as_str())) {
         let instead = match name.as_str() {
             "KHR_materials_clearcoat" => "the layer below is rendered without its coat",
             "KHR_materials_sheen" => "the cloth is rendered without its sheen",
@@ -112,13 +93,9 @@ fn parse(path: &Path, json: &[u8], builder: &mut Builder) -> Result<::gltf::Docu
     root.extensions_required.clear();
     let version = root.asset.version.clone();
     if !version.starts_with("2.") {
-        return Err(LoadError::unsupported(
-            path,
-            format_args!("glTF version {version}; version 2 is read"),
-        ));
+        return Err(LoadError::unsupported(path, format_args!("glTF version {version}; version 2 is read")));
     }
-    ::gltf::Document::from_json(root)
-        .map_err(|error| LoadError::invalid(path, format_args!("not valid glTF: {error}")))
+    ::gltf::Document::from_json(root).map_err(|error| LoadError::invalid(path, format_args!("not valid glTF: {error}")))
 }
 
 struct Reader<'a> {
@@ -135,27 +112,17 @@ struct Reader<'a> {
 impl Reader<'_> {
     fn node(&mut self, node: &::gltf::Node, parent: Mat4) -> Result<(), LoadError> {
         if self.ancestors.contains(&node.index()) {
-            return Err(LoadError::invalid(
-                self.path,
-                format_args!("node {} is its own ancestor", node.index()),
-            ));
+            return Err(LoadError::invalid(self.path, format_args!("node {} is its own ancestor", node.index())));
         }
         if self.ancestors.len() >= DEEPEST_NODE {
-            return Err(LoadError::invalid(
-                self.path,
-                format_args!("nodes nested deeper than {DEEPEST_NODE}"),
-            ));
+            return Err(LoadError::invalid(self.path, format_args!("nodes nested deeper than {DEEPEST_NODE}")));
         }
         let matrix = parent * Mat4::from_cols_array_2d(&node.transform().matrix());
         let to_world = Affine3A::from_mat4(matrix);
-        let name = node
-            .name()
-            .map_or_else(|| format!("node {}", node.index()), str::to_owned);
+        let name = node.name().map_or_else(|| format!("node {}", node.index()), str::to_owned);
         if let Some(mesh) = node.mesh() {
             if node.skin().is_some() {
-                self.builder.note(format!(
-                    "\"{name}\": its skin is not applied, the mesh is shown as modelled."
-                ));
+                self.builder.note(format!("\"{name}\": its skin is not applied, the mesh is shown as modelled."));
             }
             self.place(&mesh, &name, to_world)?;
         }
@@ -173,12 +140,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn place(
-        &mut self,
-        mesh: &::gltf::Mesh,
-        name: &str,
-        to_world: Affine3A,
-    ) -> Result<(), LoadError> {
+    fn place(&mut self, mesh: &::gltf::Mesh, name: &str, to_world: Affine3A) -> Result<(), LoadError> {
         if !self.meshes.contains_key(&mesh.index()) {
             let mut parts = Vec::new();
             for primitive in mesh.primitives() {
@@ -191,103 +153,52 @@ impl Reader<'_> {
         }
         let parts = &self.meshes[&mesh.index()];
         if self.builder.instances.len() + parts.len() > MOST_INSTANCES {
-            return Err(LoadError::too_large(
-                self.path,
-                format_args!("more than {MOST_INSTANCES} placed meshes"),
-            ));
+            return Err(LoadError::too_large(self.path, format_args!("more than {MOST_INSTANCES} placed meshes")));
         }
-        self.builder
-            .instances
-            .extend(parts.iter().map(|&(mesh, material)| Instance {
-                name: name.to_owned(),
-                mesh,
-                material,
-                to_world,
-            }));
+        self.builder.instances.extend(parts.iter().map(|&(mesh, material)| Instance {
+            name: name.to_owned(),
+            mesh,
+            material,
+            to_world,
+        }));
         Ok(())
     }
 
-    fn primitive(
-        &mut self,
-        mesh: &::gltf::Mesh,
-        from: &::gltf::Primitive,
-    ) -> Result<Option<Mesh>, LoadError> {
-        let name = mesh
-            .name()
-            .map_or_else(|| format!("mesh {}", mesh.index()), str::to_owned);
-        if matches!(
-            from.mode(),
-            Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip
-        ) {
-            self.builder
-                .note(format!("\"{name}\": points and lines are not rendered."));
+    fn primitive(&mut self, mesh: &::gltf::Mesh, from: &::gltf::Primitive) -> Result<Option<Mesh>, LoadError> {
+        let name = mesh.name().map_or_else(|| format!("mesh {}", mesh.index()), str::to_owned);
+        if matches!(from.mode(), Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
+            self.builder.note(format!("\"{name}\": points and lines are not rendered."));
             return Ok(None);
         }
         let Some(positions) = from.get(&Semantic::Positions) else {
-            self.builder
-                .note(format!("\"{name}\" has no positions and is left out."));
+            self.builder.note(format!("\"{name}\" has no positions and is left out."));
             return Ok(None);
         };
-        let positions: Vec<Vec3> = self
-            .buffers
-            .floats(&positions)?
-            .into_iter()
-            .map(Vec3::from_array)
-            .collect();
-        let vectors = |semantic| {
-            from.get(&semantic)
-                .map(|accessor| self.buffers.floats::<3>(&accessor))
-                .transpose()
-        };
-        let normals = vectors(Semantic::Normals)?
-            .unwrap_or_default()
-            .into_iter()
-            .map(Vec3::from_array)
-            .collect();
-        let uvs = from
-            .get(&Semantic::TexCoords(0))
-            .map(|accessor| self.buffers.floats(&accessor))
-            .transpose()?;
-        let tangents = from
-            .get(&Semantic::Tangents)
-            .map(|accessor| self.buffers.floats(&accessor))
-            .transpose()?;
+        let positions: Vec<Vec3> = self.buffers.floats(&positions)?.into_iter().map(Vec3::from_array).collect();
+        let vectors = |semantic| from.get(&semantic).map(|accessor| self.buffers.floats::<3>(&accessor)).transpose();
+        let normals = vectors(Semantic::Normals)?.unwrap_or_default().into_iter().map(Vec3::from_array).collect();
+        let uvs = from.get(&Semantic::TexCoords(0)).map(|accessor| self.buffers.floats(&accessor)).transpose()?;
+        let tangents = from.get(&Semantic::Tangents).map(|accessor| self.buffers.floats(&accessor)).transpose()?;
         if from.get(&Semantic::Colors(0)).is_some() {
-            self.builder
-                .note(format!("\"{name}\": vertex colours are not used."));
+            self.builder.note(format!("\"{name}\": vertex colours are not used."));
         }
         if from.morph_targets().next().is_some() {
-            self.builder
-                .note(format!("\"{name}\": morph targets are not applied."));
+            self.builder.note(format!("\"{name}\": morph targets are not applied."));
         }
         let indices = match from.indices() {
             Some(accessor) => self.buffers.indices(&accessor)?,
             None => (0..positions.len() as u32).collect(),
         };
-        if let Some(index) = indices
-            .iter()
-            .find(|&&index| index as usize >= positions.len())
-        {
-            let problem = format!(
-                "\"{name}\" has {} vertices, but index {index} is used",
-                positions.len()
-            );
+        if let Some(index) = indices.iter().find(|&&index| index as usize >= positions.len()) {
+            let problem = format!("\"{name}\" has {} vertices, but index {index} is used", positions.len());
             return Err(LoadError::invalid(self.path, problem));
         }
         Ok(Some(Mesh {
             name,
             positions,
             normals,
-            uvs: uvs
-                .unwrap_or_default()
-                .into_iter()
-                .map(Vec2::from_array)
-                .collect(),
-            tangents: tangents
-                .unwrap_or_default()
-                .into_iter()
-                .map(Vec4::from_array)
-                .collect(),
+            uvs: uvs.unwrap_or_default().into_iter().map(Vec2::from_array).collect(),
+            tangents: tangents.unwrap_or_default().into_iter().map(Vec4::from_array).collect(),
             triangles: triangles(&indices, from.mode()),
         }))
     }
@@ -295,9 +206,7 @@ impl Reader<'_> {
     fn camera(&mut self, camera: &::gltf::Camera, node: &str, to_world: &Affine3A) {
         let name = camera.name().unwrap_or(node).to_owned();
         let ::gltf::camera::Projection::Perspective(perspective) = camera.projection() else {
-            self.builder.note(format!(
-                "Camera \"{name}\" is orthographic and is left out."
-            ));
+            self.builder.note(format!("Camera \"{name}\" is orthographic and is left out."));
             return;
         };
         let position = Vec3::from(to_world.translation);
@@ -307,23 +216,11 @@ impl Reader<'_> {
         let (Some(forward), Some(up)) = (forward, up) else {
             return;
         };
-        if !position.is_finite()
-            || !(0.001..=179.0).contains(&fov)
-            || forward.cross(up).length() < 1e-5
-        {
-            self.builder.note(format!(
-                "Camera \"{name}\" is left out: its transform or angle is not usable."
-            ));
+        if !position.is_finite() || !(0.001..=179.0).contains(&fov) || forward.cross(up).length() < 1e-5 {
+            self.builder.note(format!("Camera \"{name}\" is left out: its transform or angle is not usable."));
             return;
         }
-        let camera = Camera {
-            position,
-            forward,
-            up,
-            vertical_fov_deg: fov,
-            aperture_radius: 0.0,
-            focus_distance: 1.0,
-        };
+        let camera = Camera { position, forward, up, vertical_fov_deg: fov, aperture_radius: 0.0, focus_distance: 1.0 };
         self.builder.cameras.push(NamedCamera { name, camera });
     }
 
@@ -340,36 +237,13 @@ impl Reader<'_> {
         }
         let strength = strength.max(Vec3::ZERO);
         self.builder.lights.push(match light.kind() {
-            Kind::Directional => Light::Directional {
-                direction,
-                irradiance: strength,
-            },
-            Kind::Point => Light::Point {
-                position,
-                intensity: strength,
-            },
-            Kind::Spot {
-                inner_cone_angle,
-                outer_cone_angle,
-            } => {
+            Kind::Directional => Light::Directional { direction, irradiance: strength },
+            Kind::Point => Light::Point { position, intensity: strength },
+            Kind::Spot { inner_cone_angle, outer_cone_angle } => {
                 let quarter = std::f32::consts::FRAC_PI_2;
-                let outer = if outer_cone_angle > 0.0 {
-                    outer_cone_angle.min(quarter)
-                } else {
-                    quarter / 2.0
-                };
-                let inner = if inner_cone_angle >= 0.0 {
-                    inner_cone_angle.min(outer)
-                } else {
-                    0.0
-                };
-                Light::Spot {
-                    position,
-                    direction,
-                    intensity: strength,
-                    inner_angle: inner,
-                    outer_angle: outer,
-                }
+                let outer = if outer_cone_angle > 0.0 { outer_cone_angle.min(quarter) } else { quarter / 2.0 };
+                let inner = if inner_cone_angle >= 0.0 { inner_cone_angle.min(outer) } else { 0.0 };
+                Light::Spot { position, direction, intensity: strength, inner_angle: inner, outer_angle: outer }
             }
         });
     }
@@ -385,11 +259,7 @@ fn triangles(indices: &[u32], mode: Mode) -> Vec<[u32; 3]> {
             };
             indices.windows(3).enumerate().map(flip).collect()
         }
-        Mode::TriangleFan => indices
-            .windows(2)
-            .skip(1)
-            .map(|pair| [indices[0], pair[0], pair[1]])
-            .collect(),
+        Mode::TriangleFan => indices.windows(2).skip(1).map(|pair| [indices[0], pair[0], pair[1]]).collect(),
         _ => indices.as_chunks::<3>().0.to_vec(),
     }
 }

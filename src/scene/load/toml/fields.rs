@@ -18,21 +18,14 @@ pub(super) struct Source<'a> {
 impl Source<'_> {
     /// The line of a byte, counted from 1.
     pub(super) fn line_of(&self, byte: usize) -> usize {
-        self.text.as_bytes()[..byte.min(self.text.len())]
-            .iter()
-            .filter(|&&b| b == b'\n')
-            .count()
-            + 1
+        self.text.as_bytes()[..byte.min(self.text.len())].iter().filter(|&&b| b == b'\n').count() + 1
     }
 
     /// Turns the parser's error into ours.
     pub(super) fn syntax_error(&self, error: &toml::de::Error) -> LoadError {
         let line = error.span().map(|span| self.line_of(span.start));
         LoadError::Invalid {
-            place: Place {
-                file: self.file.to_owned(),
-                line,
-            },
+            place: Place { file: self.file.to_owned(), line },
             problem: one_line(format_args!("not valid TOML: {}", error.message())),
         }
     }
@@ -68,10 +61,7 @@ impl<'a> Value<'a> {
     }
 
     fn wrong_type(&self, expected: &str) -> LoadError {
-        self.error(format_args!(
-            "expected {expected}, found {}",
-            describe(self.value)
-        ))
+        self.error(format_args!("expected {expected}, found {}", describe(self.value)))
     }
 
     pub(super) fn is_table(&self) -> bool {
@@ -86,9 +76,9 @@ impl<'a> Value<'a> {
     pub(super) fn number(&self) -> Result<f64, LoadError> {
         let number = match self.value {
             // Neither TOML's 0x, 0o, 0b integers nor its underscores mean anything else than their value.
-            DeValue::Integer(integer) => i64::from_str_radix(integer.as_str(), integer.radix())
-                .ok()
-                .map(|value| value as f64),
+            DeValue::Integer(integer) => {
+                i64::from_str_radix(integer.as_str(), integer.radix()).ok().map(|value| value as f64)
+            }
             DeValue::Float(float) => float.as_str().parse().ok(),
             _ => return Err(self.wrong_type("a number")),
         };
@@ -102,11 +92,7 @@ impl<'a> Value<'a> {
     /// A number above 0.
     pub(super) fn positive(&self) -> Result<f64, LoadError> {
         let number = self.number()?;
-        if (number as f32) > 0.0 {
-            Ok(number)
-        } else {
-            Err(self.error(format_args!("must be above 0, not {number}")))
-        }
+        if (number as f32) > 0.0 { Ok(number) } else { Err(self.error(format_args!("must be above 0, not {number}"))) }
     }
 
     /// A number of 0 or more.
@@ -132,46 +118,30 @@ impl<'a> Value<'a> {
         if number.fract() == 0.0 && (1.0..=f64::from(most)).contains(&number) {
             Ok(number as u32)
         } else {
-            Err(self.error(format_args!(
-                "must be a whole number from 1 to {most}, not {number}"
-            )))
+            Err(self.error(format_args!("must be a whole number from 1 to {most}, not {number}")))
         }
     }
 
     pub(super) fn string(&self) -> Result<&'a str, LoadError> {
-        self.value
-            .as_str()
-            .ok_or_else(|| self.wrong_type("a string"))
+        self.value.as_str().ok_or_else(|| self.wrong_type("a string"))
     }
 
     pub(super) fn boolean(&self) -> Result<bool, LoadError> {
-        self.value
-            .as_bool()
-            .ok_or_else(|| self.wrong_type("true or false"))
+        self.value.as_bool().ok_or_else(|| self.wrong_type("true or false"))
     }
 
     /// One of some words.
     pub(super) fn choice<T: Copy>(&self, words: &[(&'static str, T)]) -> Result<T, LoadError> {
         let written = self.string()?;
-        words
-            .iter()
-            .find(|(word, _)| *word == written)
-            .map(|&(_, choice)| choice)
-            .ok_or_else(|| {
-                let known = words.iter().map(|&(word, _)| word).collect::<Vec<_>>();
-                self.error(format_args!(
-                    "unknown value \"{written}\"{}",
-                    suggestion(written, known)
-                ))
-            })
+        words.iter().find(|(word, _)| *word == written).map(|&(_, choice)| choice).ok_or_else(|| {
+            let known = words.iter().map(|&(word, _)| word).collect::<Vec<_>>();
+            self.error(format_args!("unknown value \"{written}\"{}", suggestion(written, known)))
+        })
     }
 
     /// The elements of a list.
     pub(super) fn array(&self) -> Result<Vec<Value<'a>>, LoadError> {
-        let array = self
-            .value
-            .as_array()
-            .ok_or_else(|| self.wrong_type("a list"))?;
+        let array = self.value.as_array().ok_or_else(|| self.wrong_type("a list"))?;
         let element = |(index, value): (usize, &'a Spanned<DeValue<'a>>)| Value {
             source: self.source,
             path: format!("{}[{index}]", self.path),
@@ -188,10 +158,7 @@ impl<'a> Value<'a> {
             return Err(self.wrong_type(expected));
         };
         if elements.len() != N {
-            return Err(self.error(format_args!(
-                "expected {expected}, found {} values",
-                elements.len()
-            )));
+            return Err(self.error(format_args!("expected {expected}, found {} values", elements.len())));
         }
         let mut numbers = [0.0; N];
         for (number, element) in numbers.iter_mut().zip(&elements) {
@@ -202,28 +169,23 @@ impl<'a> Value<'a> {
 
     /// Three numbers.
     pub(super) fn vec3(&self) -> Result<Vec3, LoadError> {
-        self.numbers::<3>("three numbers [x, y, z]")
-            .map(Vec3::from_array)
+        self.numbers::<3>("three numbers [x, y, z]").map(Vec3::from_array)
     }
 
     /// Three numbers that are not all 0, scaled to unit length.
     pub(super) fn direction(&self) -> Result<Vec3, LoadError> {
-        self.vec3()?
-            .try_normalize()
-            .ok_or_else(|| self.error("a direction must not have zero length"))
+        self.vec3()?.try_normalize().ok_or_else(|| self.error("a direction must not have zero length"))
     }
 
     /// Two numbers.
     pub(super) fn vec2(&self) -> Result<Vec2, LoadError> {
-        self.numbers::<2>("two numbers [u, v]")
-            .map(Vec2::from_array)
+        self.numbers::<2>("two numbers [u, v]").map(Vec2::from_array)
     }
 
     /// One number for all three channels, or three; none below 0.
     pub(super) fn color(&self) -> Result<Vec3, LoadError> {
         let color = if self.is_array() {
-            self.numbers::<3>("a colour [r, g, b]")
-                .map(Vec3::from_array)?
+            self.numbers::<3>("a colour [r, g, b]").map(Vec3::from_array)?
         } else if matches!(self.value, DeValue::Integer(_) | DeValue::Float(_)) {
             Vec3::splat(self.number()? as f32)
         } else {
@@ -244,32 +206,15 @@ impl<'a> Value<'a> {
 
     /// The keys of a table, whatever they are: names that the author chose.
     pub(super) fn entries(&self) -> Result<Fields<'a>, LoadError> {
-        let table = self
-            .value
-            .as_table()
-            .ok_or_else(|| self.wrong_type("a table"))?;
-        Ok(Fields {
-            source: self.source,
-            path: self.path.clone(),
-            line: self.line,
-            table,
-        })
+        let table = self.value.as_table().ok_or_else(|| self.wrong_type("a table"))?;
+        Ok(Fields { source: self.source, path: self.path.clone(), line: self.line, table })
     }
 }
 
 impl<'a> Fields<'a> {
     /// The file's topmost table.
-    pub(super) fn root(
-        source: &'a Source<'a>,
-        table: &'a DeTable<'a>,
-        known: &[&str],
-    ) -> Result<Self, LoadError> {
-        let fields = Self {
-            source,
-            path: String::new(),
-            line: 1,
-            table,
-        };
+    pub(super) fn root(source: &'a Source<'a>, table: &'a DeTable<'a>, known: &[&str]) -> Result<Self, LoadError> {
+        let fields = Self { source, path: String::new(), line: 1, table };
         fields.check_known(known)?;
         Ok(fields)
     }
@@ -277,25 +222,15 @@ impl<'a> Fields<'a> {
     /// Refuses keys that are not in the list.
     pub(super) fn check_known(&self, known: &[&str]) -> Result<(), LoadError> {
         // The first wrong key in the file's order, not in the alphabet's.
-        let unknown = self
-            .table
-            .keys()
-            .filter(|key| !known.contains(&key.get_ref().as_ref()));
+        let unknown = self.table.keys().filter(|key| !known.contains(&key.get_ref().as_ref()));
         let Some(key) = unknown.min_by_key(|key| key.span().start) else {
             return Ok(());
         };
         let written = key.get_ref().as_ref();
-        let within = if self.path.is_empty() {
-            String::new()
-        } else {
-            format!(" in {}", self.path)
-        };
+        let within = if self.path.is_empty() { String::new() } else { format!(" in {}", self.path) };
         Err(LoadError::invalid_at(
             Place::line(self.source.file, self.source.line_of(key.span().start)),
-            format_args!(
-                "unknown key \"{written}\"{within}{}",
-                suggestion(written, known.iter().copied())
-            ),
+            format_args!("unknown key \"{written}\"{within}{}", suggestion(written, known.iter().copied())),
         ))
     }
 
@@ -305,26 +240,13 @@ impl<'a> Fields<'a> {
 
     /// An error about the table as a whole.
     pub(super) fn error(&self, problem: impl std::fmt::Display) -> LoadError {
-        let path = if self.path.is_empty() {
-            String::new()
-        } else {
-            format!("{}: ", self.path)
-        };
+        let path = if self.path.is_empty() { String::new() } else { format!("{}: ", self.path) };
         LoadError::invalid_at(self.place(), format_args!("{path}{problem}"))
     }
 
     fn value(&self, key: &str, value: &'a Spanned<DeValue<'a>>) -> Value<'a> {
-        let path = if self.path.is_empty() {
-            key.to_owned()
-        } else {
-            format!("{}.{key}", self.path)
-        };
-        Value {
-            source: self.source,
-            path,
-            line: self.source.line_of(value.span().start),
-            value: value.get_ref(),
-        }
+        let path = if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) };
+        Value { source: self.source, path, line: self.source.line_of(value.span().start), value: value.get_ref() }
     }
 
     pub(super) fn get(&self, key: &str) -> Option<Value<'a>> {
@@ -332,8 +254,7 @@ impl<'a> Fields<'a> {
     }
 
     pub(super) fn require(&self, key: &str) -> Result<Value<'a>, LoadError> {
-        self.get(key)
-            .ok_or_else(|| self.error(format_args!("\"{key}\" is missing")))
+        self.get(key).ok_or_else(|| self.error(format_args!("\"{key}\" is missing")))
     }
 
     /// The value, read by `read`, or the default when it is not there.
@@ -359,39 +280,25 @@ impl<'a> Fields<'a> {
     pub(super) fn all(&self) -> Vec<(&'a str, Value<'a>)> {
         let mut entries: Vec<_> = self.table.iter().collect();
         entries.sort_by_key(|(key, _)| key.span().start);
-        entries
-            .into_iter()
-            .map(|(key, value)| (key.get_ref().as_ref(), self.value(key.get_ref(), value)))
-            .collect()
+        entries.into_iter().map(|(key, value)| (key.get_ref().as_ref(), self.value(key.get_ref(), value))).collect()
     }
 
     /// The only one of some keys that is there; none or several are errors.
-    pub(super) fn exactly_one(
-        &self,
-        keys: &[&'static str],
-    ) -> Result<(&'static str, Value<'a>), LoadError> {
-        let mut present = keys
-            .iter()
-            .filter_map(|&key| self.get(key).map(|value| (key, value)));
-        let first = present
-            .next()
-            .ok_or_else(|| self.error(format_args!("one of {} is missing", keys.join(", "))))?;
+    pub(super) fn exactly_one(&self, keys: &[&'static str]) -> Result<(&'static str, Value<'a>), LoadError> {
+        let mut present = keys.iter().filter_map(|&key| self.get(key).map(|value| (key, value)));
+        let first = present.next().ok_or_else(|| self.error(format_args!("one of {} is missing", keys.join(", "))))?;
         match present.next() {
             None => Ok(first),
-            Some((second, value)) => Err(value.error(format_args!(
-                "\"{}\" and \"{second}\" exclude each other",
-                first.0
-            ))),
+            Some((second, value)) => {
+                Err(value.error(format_args!("\"{}\" and \"{second}\" exclude each other", first.0)))
+            }
         }
     }
 }
 
 fn describe(value: &DeValue<'_>) -> String {
     match value {
-        DeValue::String(text) => format!(
-            "the string \"{}\"",
-            text.chars().take(40).collect::<String>()
-        ),
+        DeValue::String(text) => format!("the string \"{}\"", text.chars().take(40).collect::<String>()),
         DeValue::Integer(integer) => format!("the number {}", integer.as_str()),
         DeValue::Float(float) => format!("the number {}", float.as_str()),
         DeValue::Boolean(value) => format!("{value}"),

@@ -9,26 +9,12 @@ use std::f64::consts::TAU;
 /// Reads one light; `nits_per_unit` turns candela and lux into scene units.
 pub(super) fn read(value: &Value, nits_per_unit: f64) -> Result<Light, LoadError> {
     let any = value.entries()?;
-    let kinds = [
-        ("point", "point"),
-        ("spot", "spot"),
-        ("directional", "directional"),
-    ];
+    let kinds = [("point", "point"), ("spot", "spot"), ("directional", "directional")];
     match any.require("type")?.choice(&kinds)? {
         "point" => {
-            let fields = value.fields(&[
-                "type",
-                "name",
-                "position",
-                "intensity_cd",
-                "power_lm",
-                "color",
-            ])?;
+            let fields = value.fields(&["type", "name", "position", "intensity_cd", "power_lm", "color"])?;
             let position = fields.require("position")?.vec3()?;
-            Ok(Light::Point {
-                position,
-                intensity: intensity(&fields, 2.0 * TAU, nits_per_unit)?,
-            })
+            Ok(Light::Point { position, intensity: intensity(&fields, 2.0 * TAU, nits_per_unit)? })
         }
         "spot" => {
             let known = [
@@ -49,13 +35,10 @@ pub(super) fn read(value: &Value, nits_per_unit: f64) -> Result<Light, LoadError
             let direction = if kind == "direction" {
                 aim.direction()?
             } else {
-                (aim.vec3()? - position)
-                    .try_normalize()
-                    .ok_or_else(|| aim.error("is the light's own position"))?
+                (aim.vec3()? - position).try_normalize().ok_or_else(|| aim.error("is the light's own position"))?
             };
             let outer = fields.get_or("outer_deg", 30.0, |value| value.within(0.01, 90.0))?;
-            let inner =
-                fields.get_or("inner_deg", 0.8 * outer, |value| value.within(0.0, outer))?;
+            let inner = fields.get_or("inner_deg", 0.8 * outer, |value| value.within(0.0, outer))?;
             let (inner, outer) = (inner.to_radians(), outer.to_radians());
             // Exact for a fall-off that is symmetric in the cosine between the two angles.
             let solid_angle = TAU * (1.0 - 0.5 * (inner.cos() + outer.cos()));
@@ -92,19 +75,11 @@ fn amount(value: &Value, fields: &Fields) -> Result<Vec3, LoadError> {
         return Ok(amount);
     };
     let tint = color.color()?;
-    if value.is_array() {
-        Ok(amount * tint)
-    } else {
-        Ok(amount * unit_luminance(&color, tint)?)
-    }
+    if value.is_array() { Ok(amount * tint) } else { Ok(amount * unit_luminance(&color, tint)?) }
 }
 
 /// The tint at luminance 1, so that a number of candela or lumen stays that number.
 pub(super) fn unit_luminance(value: &Value, tint: Vec3) -> Result<Vec3, LoadError> {
     let luminance = luminance(tint);
-    if luminance > 0.0 {
-        Ok(tint / luminance)
-    } else {
-        Err(value.error("a colour of light must not be black"))
-    }
+    if luminance > 0.0 { Ok(tint / luminance) } else { Err(value.error("a colour of light must not be black")) }
 }

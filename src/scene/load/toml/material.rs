@@ -6,9 +6,7 @@ use super::light::unit_luminance;
 use crate::scene::load::LoadError;
 use crate::scene::load::error::suggestion;
 use crate::scene::load::metals::METALS;
-use crate::scene::{
-    Alpha, ColorInput, Encoding, Material, MaterialId, ScalarInput, Surface, TextureLookup,
-};
+use crate::scene::{Alpha, ColorInput, Encoding, Material, MaterialId, ScalarInput, Surface, TextureLookup};
 use glam::{Vec2, Vec3};
 use std::collections::HashMap;
 
@@ -70,28 +68,13 @@ impl<'a> Materials<'a> {
             ("diffuse", diffuse, &["reflectance"]),
             ("mirror", mirror, &["reflectance"]),
             ("conductor", conductor, &["metal", "eta", "k", "roughness"]),
-            (
-                "dielectric",
-                dielectric,
-                &["ior", "roughness", "transmittance"],
-            ),
-            (
-                "thin-dielectric",
-                thin_dielectric,
-                &["ior", "transmittance"],
-            ),
-            (
-                "metal-roughness",
-                metal_roughness,
-                &["base_color", "metallic", "roughness", "ior", "transmission"],
-            ),
+            ("dielectric", dielectric, &["ior", "roughness", "transmittance"]),
+            ("thin-dielectric", thin_dielectric, &["ior", "transmittance"]),
+            ("metal-roughness", metal_roughness, &["base_color", "metallic", "roughness", "ior", "transmission"]),
         ];
         let kind = value.entries()?.require("type")?;
-        let choices: Vec<(&'static str, usize)> = kinds
-            .iter()
-            .enumerate()
-            .map(|(place, kind)| (kind.0, place))
-            .collect();
+        let choices: Vec<(&'static str, usize)> =
+            kinds.iter().enumerate().map(|(place, kind)| (kind.0, place)).collect();
         let (_, read_surface, own) = kinds[kind.choice(&choices)?];
         let known: Vec<&str> = COMMON.iter().chain(own).copied().collect();
         let fields = value.fields(&known)?;
@@ -117,15 +100,11 @@ impl<'a> Materials<'a> {
 type Reader<'a> = fn(&mut Context<'a>, &Fields<'a>) -> Result<Surface, LoadError>;
 
 fn diffuse<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
-    Ok(Surface::Diffuse {
-        reflectance: share(context, &fields.require("reflectance")?)?,
-    })
+    Ok(Surface::Diffuse { reflectance: share(context, &fields.require("reflectance")?)? })
 }
 
 fn mirror<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
-    Ok(Surface::Mirror {
-        reflectance: share_or_white(context, fields, "reflectance")?,
-    })
+    Ok(Surface::Mirror { reflectance: share_or_white(context, fields, "reflectance")? })
 }
 
 fn conductor<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
@@ -143,11 +122,7 @@ fn conductor<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surfa
         }
         _ => return Err(fields.error("needs either \"metal\", or both \"eta\" and \"k\"")),
     };
-    Ok(Surface::Conductor {
-        eta,
-        k,
-        roughness: scalar(context, fields, "roughness", 0.0)?,
-    })
+    Ok(Surface::Conductor { eta, k, roughness: scalar(context, fields, "roughness", 0.0)? })
 }
 
 fn dielectric<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
@@ -158,20 +133,14 @@ fn dielectric<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surf
     })
 }
 
-fn thin_dielectric<'a>(
-    context: &mut Context<'a>,
-    fields: &Fields<'a>,
-) -> Result<Surface, LoadError> {
+fn thin_dielectric<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
     Ok(Surface::ThinDielectric {
         ior: fields.get_or("ior", 1.5, Value::positive)? as f32,
         transmittance: share_or_white(context, fields, "transmittance")?,
     })
 }
 
-fn metal_roughness<'a>(
-    context: &mut Context<'a>,
-    fields: &Fields<'a>,
-) -> Result<Surface, LoadError> {
+fn metal_roughness<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
     Ok(Surface::MetalRoughness {
         base_color: share_or_white(context, fields, "base_color")?,
         metallic: scalar(context, fields, "metallic", 0.0)?,
@@ -182,15 +151,10 @@ fn metal_roughness<'a>(
 }
 
 /// `emission` in scene units, or a luminance, or a luminous power of the object.
-fn read_emission<'a>(
-    context: &mut Context<'a>,
-    fields: &Fields<'a>,
-) -> Result<(ColorInput, Option<Power>), LoadError> {
+fn read_emission<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<(ColorInput, Option<Power>), LoadError> {
     let black = ColorInput::constant(Vec3::ZERO);
     let kinds = ["emission", "emission_cd_m2", "power_lm"];
-    let tint = fields.get_or("emission_color", Vec3::ONE, |value| {
-        unit_luminance(value, value.color()?)
-    })?;
+    let tint = fields.get_or("emission_color", Vec3::ONE, |value| unit_luminance(value, value.color()?))?;
     if kinds.iter().all(|kind| fields.get(kind).is_none()) {
         return match fields.get("emission_color") {
             Some(value) => Err(value.error("needs emission_cd_m2 or power_lm beside it")),
@@ -199,21 +163,14 @@ fn read_emission<'a>(
     }
     match fields.exactly_one(&kinds)? {
         ("emission", value) => match fields.get("emission_color") {
-            Some(tint) => Err(tint
-                .error("belongs to emission_cd_m2 or power_lm; \"emission\" has its own colour")),
+            Some(tint) => Err(tint.error("belongs to emission_cd_m2 or power_lm; \"emission\" has its own colour")),
             None => Ok((color(context, &value)?, None)),
         },
         ("emission_cd_m2", value) => {
             let radiance = value.non_negative()? / context.builder.nits_per_unit;
             Ok((ColorInput::constant(tint * radiance as f32), None))
         }
-        (_, value) => Ok((
-            black,
-            Some(Power {
-                lumen: value.non_negative()?,
-                tint,
-            }),
-        )),
+        (_, value) => Ok((black, Some(Power { lumen: value.non_negative()?, tint }))),
     }
 }
 
@@ -224,10 +181,7 @@ fn alpha<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Alpha, Lo
         (None, Some(_)) => Err(fields.error("\"alpha_cutoff\" needs \"alpha\"")),
         (Some(_), cutoff) => {
             let value = scalar(context, fields, "alpha", 1.0)?;
-            Ok(cutoff.map_or(Alpha::Blend { value }, |cutoff| Alpha::Mask {
-                value,
-                cutoff: cutoff as f32,
-            }))
+            Ok(cutoff.map_or(Alpha::Blend { value }, |cutoff| Alpha::Mask { value, cutoff: cutoff as f32 }))
         }
     }
 }
@@ -248,22 +202,13 @@ fn color<'a>(context: &mut Context<'a>, value: &Value<'a>) -> Result<ColorInput,
 fn share<'a>(context: &mut Context<'a>, value: &Value<'a>) -> Result<ColorInput, LoadError> {
     let color = color(context, value)?;
     if color.factor.max_element() > 1.0 {
-        return Err(value.error(format_args!(
-            "must not exceed 1 in any channel: {}",
-            color.factor
-        )));
+        return Err(value.error(format_args!("must not exceed 1 in any channel: {}", color.factor)));
     }
     Ok(color)
 }
 
-fn share_or_white<'a>(
-    context: &mut Context<'a>,
-    fields: &Fields<'a>,
-    key: &str,
-) -> Result<ColorInput, LoadError> {
-    fields.get_or(key, ColorInput::constant(Vec3::ONE), |value| {
-        share(context, value)
-    })
+fn share_or_white<'a>(context: &mut Context<'a>, fields: &Fields<'a>, key: &str) -> Result<ColorInput, LoadError> {
+    fields.get_or(key, ColorInput::constant(Vec3::ONE), |value| share(context, value))
 }
 
 /// A number in [0, 1], or a channel of a texture.
@@ -279,62 +224,37 @@ fn scalar<'a>(
     if !value.is_table() {
         return Ok(ScalarInput::constant(value.within(0.0, 1.0)? as f32));
     }
-    let fields = value.fields(&[
-        "texture",
-        "channel",
-        "factor",
-        "scale",
-        "offset",
-        "rotation_deg",
-    ])?;
-    let channel = fields.get_or("channel", 0, |value| {
-        value.choice(&[("r", 0), ("g", 1), ("b", 2), ("a", 3)])
-    })?;
+    let fields = value.fields(&["texture", "channel", "factor", "scale", "offset", "rotation_deg"])?;
+    let channel = fields.get_or("channel", 0, |value| value.choice(&[("r", 0), ("g", 1), ("b", 2), ("a", 3)]))?;
     Ok(ScalarInput {
         factor: fields.get_or("factor", 1.0, |value| value.within(0.0, 1.0))? as f32,
         texture: Some((lookup(context, &fields, Encoding::Linear)?, channel)),
     })
 }
 
-fn normal_map<'a>(
-    context: &mut Context<'a>,
-    value: &Value<'a>,
-) -> Result<(TextureLookup, f32), LoadError> {
+fn normal_map<'a>(context: &mut Context<'a>, value: &Value<'a>) -> Result<(TextureLookup, f32), LoadError> {
     let fields = value.fields(&["texture", "strength", "scale", "offset", "rotation_deg"])?;
     let strength = fields.get_or("strength", 1.0, Value::number)? as f32;
     Ok((lookup(context, &fields, Encoding::Linear)?, strength))
 }
 
 /// The texture that a table names. Its own `encoding` wins over what its use suggests.
-fn lookup<'a>(
-    context: &mut Context<'a>,
-    fields: &Fields<'a>,
-    usual: Encoding,
-) -> Result<TextureLookup, LoadError> {
+fn lookup<'a>(context: &mut Context<'a>, fields: &Fields<'a>, usual: Encoding) -> Result<TextureLookup, LoadError> {
     let name = fields.require("texture")?;
     let written = name.string()?;
     let Some(entry) = context.textures.get(written) else {
         let known = context.texture_names.iter().copied();
-        return Err(name.error(format_args!(
-            "unknown texture \"{written}\"{}",
-            suggestion(written, known)
-        )));
+        return Err(name.error(format_args!("unknown texture \"{written}\"{}", suggestion(written, known))));
     };
     let mut request = entry.request.clone();
     request.encoding = entry.encoding.unwrap_or(usual);
     let number_or_two = |value: &Value| {
-        if value.is_array() {
-            value.vec2()
-        } else {
-            value.number().map(|number| Vec2::splat(number as f32))
-        }
+        if value.is_array() { value.vec2() } else { value.number().map(|number| Vec2::splat(number as f32)) }
     };
     Ok(TextureLookup {
         texture: context.builder.textures.add(request),
         offset: fields.get_or("offset", Vec2::ZERO, Value::vec2)?,
-        rotation: fields
-            .get_or("rotation_deg", 0.0, Value::number)?
-            .to_radians() as f32,
+        rotation: fields.get_or("rotation_deg", 0.0, Value::number)?.to_radians() as f32,
         scale: fields.get_or("scale", Vec2::ONE, number_or_two)?,
     })
 }

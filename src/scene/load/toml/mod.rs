@@ -40,10 +40,7 @@ struct TextureEntry {
 /// Reads a scene file.
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
     let text = files::read_text(path)?;
-    let source = Source {
-        file: path,
-        text: &text,
-    };
+    let source = Source { file: path, text: &text };
     let document = DeTable::parse(&text).map_err(|error| source.syntax_error(&error))?;
     let root = Fields::root(
         &source,
@@ -75,10 +72,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
     }
     if let Some(camera) = root.get("camera") {
         let camera = read_camera(&camera, options.frame_time)?;
-        builder.cameras.push(NamedCamera {
-            name: "camera".to_owned(),
-            camera,
-        });
+        builder.cameras.push(NamedCamera { name: "camera".to_owned(), camera });
     }
 
     let folder = path.parent().unwrap_or(Path::new(""));
@@ -112,10 +106,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
     }
     if let Some(list) = root.get("lights") {
         for value in list.array()? {
-            context
-                .builder
-                .lights
-                .push(light::read(&value, context.builder.nits_per_unit)?);
+            context.builder.lights.push(light::read(&value, context.builder.nits_per_unit)?);
         }
     }
     context.builder.finish(path, IfDark::Fail, options)
@@ -124,14 +115,10 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
 fn read_film(value: &Value) -> Result<FilmDefaults, LoadError> {
     let size = value.fields(&["size"])?.require("size")?;
     match size.array()?.as_slice() {
-        [width, height] => Ok(FilmDefaults {
-            width: width.count(LONGEST_FILM_SIDE)?,
-            height: height.count(LONGEST_FILM_SIDE)?,
-        }),
-        other => Err(size.error(format_args!(
-            "expected [width, height], found {} values",
-            other.len()
-        ))),
+        [width, height] => {
+            Ok(FilmDefaults { width: width.count(LONGEST_FILM_SIDE)?, height: height.count(LONGEST_FILM_SIDE)? })
+        }
+        other => Err(size.error(format_args!("expected [width, height], found {} values", other.len()))),
     }
 }
 
@@ -164,27 +151,18 @@ fn read_camera(value: &Value, frame_time: f64) -> Result<Camera, LoadError> {
             }
             keyframes.at(frame_time)
         }
-        None => (
-            fields.require("position")?.vec3()?,
-            fields.require("look_at")?.vec3()?,
-        ),
+        None => (fields.require("position")?.vec3()?, fields.require("look_at")?.vec3()?),
     };
     let Some(forward) = (look_at - position).try_normalize() else {
         return Err(fields.error("position and look_at are the same point"));
     };
     let up = fields.get_or("up", glam::Vec3::Y, Value::direction)?;
     if forward.cross(up).length() < 1e-5 {
-        return Err(fields.error(format_args!(
-            "looks along its own up vector {up}; set another \"up\""
-        )));
+        return Err(fields.error(format_args!("looks along its own up vector {up}; set another \"up\"")));
     }
     let vertical_fov_deg = fields.get_or("vertical_fov_deg", 40.0, Value::number)?;
     if !(0.001..=179.0).contains(&vertical_fov_deg) {
-        return Err(fields
-            .require("vertical_fov_deg")?
-            .within(0.001, 179.0)
-            .err()
-            .unwrap_or_else(|| fields.error("")));
+        return Err(fields.require("vertical_fov_deg")?.within(0.001, 179.0).err().unwrap_or_else(|| fields.error("")));
     }
     Ok(Camera {
         position,
@@ -204,10 +182,8 @@ fn read_environment(value: &Value, folder: &Path) -> Result<crate::scene::Enviro
     let scale = fields.get_or("scale", 1.0, Value::non_negative)? as f32;
     let rotation_deg = fields.get_or("rotation_deg", 0.0, Value::number)? as f32;
     match fields.exactly_one(&["image", "radiance"])? {
-        ("image", image) => {
-            environment::from_file(&folder.join(image.string()?), scale, rotation_deg)
-                .map_err(|error| error.referenced_from(image.place()))
-        }
+        ("image", image) => environment::from_file(&folder.join(image.string()?), scale, rotation_deg)
+            .map_err(|error| error.referenced_from(image.place())),
         (_, radiance) => {
             let mut environment = environment::constant(radiance.color()?);
             environment.scale = scale;
@@ -220,11 +196,7 @@ fn read_texture(value: &Value, folder: &Path) -> Result<TextureEntry, LoadError>
     let fields = value.fields(&["file", "encoding", "wrap", "nearest"])?;
     let file = fields.require("file")?;
     let encodings = [("srgb", Encoding::Srgb), ("linear", Encoding::Linear)];
-    let wraps = [
-        ("repeat", Wrap::Repeat),
-        ("mirror", Wrap::Mirror),
-        ("clamp", Wrap::Clamp),
-    ];
+    let wraps = [("repeat", Wrap::Repeat), ("mirror", Wrap::Mirror), ("clamp", Wrap::Clamp)];
     let wrap = fields.get_or("wrap", Wrap::Repeat, |value| value.choice(&wraps))?;
     Ok(TextureEntry {
         request: Request {

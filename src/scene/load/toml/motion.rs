@@ -18,11 +18,7 @@ struct Between<'a, T> {
 }
 
 impl<T> Keyframes<T> {
-    fn read(
-        list: &Value,
-        known: &[&str],
-        read: impl Fn(&Fields) -> Result<T, LoadError>,
-    ) -> Result<Self, LoadError> {
+    fn read(list: &Value, known: &[&str], read: impl Fn(&Fields) -> Result<T, LoadError>) -> Result<Self, LoadError> {
         let mut frames: Vec<(f64, T)> = Vec::new();
         for value in list.array()? {
             let fields = value.fields(known)?;
@@ -45,37 +41,22 @@ impl<T> Keyframes<T> {
         let (before_time, before) = clamp(after.saturating_sub(1));
         let (after_time, after) = clamp(after);
         let span = after_time - before_time;
-        let share = if span > 0.0 {
-            ((time - before_time) / span).clamp(0.0, 1.0) as f32
-        } else {
-            0.0
-        };
-        Between {
-            before,
-            after,
-            share,
-        }
+        let share = if span > 0.0 { ((time - before_time) / span).clamp(0.0, 1.0) as f32 } else { 0.0 };
+        Between { before, after, share }
     }
 }
 
 /// The camera's `keyframes`: position and point looked at.
 pub(super) fn camera_keyframes(list: &Value) -> Result<Keyframes<(Vec3, Vec3)>, LoadError> {
     Keyframes::read(list, &["time", "position", "look_at"], |fields| {
-        Ok((
-            fields.require("position")?.vec3()?,
-            fields.require("look_at")?.vec3()?,
-        ))
+        Ok((fields.require("position")?.vec3()?, fields.require("look_at")?.vec3()?))
     })
 }
 
 impl Keyframes<(Vec3, Vec3)> {
     /// Position and point looked at.
     pub(super) fn at(&self, time: f64) -> (Vec3, Vec3) {
-        let Between {
-            before,
-            after,
-            share,
-        } = self.around(time);
+        let Between { before, after, share } = self.around(time);
         (before.0.lerp(after.0, share), before.1.lerp(after.1, share))
     }
 }
@@ -90,27 +71,19 @@ pub(super) struct Pose {
 
 /// An object's `keyframes`.
 pub(super) fn object_keyframes(list: &Value) -> Result<Keyframes<Pose>, LoadError> {
-    Keyframes::read(
-        list,
-        &["time", "translate", "rotate_deg", "axis", "scale"],
-        |fields| {
-            Ok(Pose {
-                scale: fields.get_or("scale", Vec3::ONE, scale)?,
-                rotation: rotation(fields)?.unwrap_or(Quat::IDENTITY),
-                translation: fields.get_or("translate", Vec3::ZERO, Value::vec3)?,
-            })
-        },
-    )
+    Keyframes::read(list, &["time", "translate", "rotate_deg", "axis", "scale"], |fields| {
+        Ok(Pose {
+            scale: fields.get_or("scale", Vec3::ONE, scale)?,
+            rotation: rotation(fields)?.unwrap_or(Quat::IDENTITY),
+            translation: fields.get_or("translate", Vec3::ZERO, Value::vec3)?,
+        })
+    })
 }
 
 impl Keyframes<Pose> {
     /// The transform at a time.
     pub(super) fn at(&self, time: f64) -> Affine3A {
-        let Between {
-            before,
-            after,
-            share,
-        } = self.around(time);
+        let Between { before, after, share } = self.around(time);
         Affine3A::from_scale_rotation_translation(
             before.scale.lerp(after.scale, share),
             before.rotation.slerp(after.rotation, share),
@@ -142,11 +115,7 @@ pub(super) fn transform(list: &Value) -> Result<Affine3A, LoadError> {
 
 /// One number for all axes or three, none of them 0.
 fn scale(value: &Value) -> Result<Vec3, LoadError> {
-    let scale = if value.is_array() {
-        value.vec3()?
-    } else {
-        Vec3::splat(value.number()? as f32)
-    };
+    let scale = if value.is_array() { value.vec3()? } else { Vec3::splat(value.number()? as f32) };
     if scale.min_element() == 0.0 || scale.max_element() == 0.0 || scale.y == 0.0 {
         return Err(value.error("a scale of 0 flattens the object"));
     }

@@ -28,19 +28,11 @@ struct Placement {
 
 impl<'m, 'a> Objects<'m, 'a> {
     pub(super) fn new(materials: &'m Materials<'a>) -> Self {
-        Self {
-            materials,
-            files: HashMap::new(),
-            read: 0,
-        }
+        Self { materials, files: HashMap::new(), read: 0 }
     }
 
     /// Reads one object.
-    pub(super) fn read(
-        &mut self,
-        context: &mut Context<'a>,
-        value: &Value<'a>,
-    ) -> Result<(), LoadError> {
+    pub(super) fn read(&mut self, context: &mut Context<'a>, value: &Value<'a>) -> Result<(), LoadError> {
         let kinds = ["mesh", "rectangle", "box", "sphere", "disk"];
         let fields = value.fields(&[
             "name",
@@ -85,16 +77,9 @@ impl<'m, 'a> Objects<'m, 'a> {
         place_mesh(context, mesh, &fields, placement)
     }
 
-    fn place_file(
-        &mut self,
-        context: &mut Context<'a>,
-        file: &Value,
-        placement: Placement,
-    ) -> Result<(), LoadError> {
+    fn place_file(&mut self, context: &mut Context<'a>, file: &Value, placement: Placement) -> Result<(), LoadError> {
         let path = context.folder.join(file.string()?);
-        let is_obj = path
-            .extension()
-            .is_some_and(|extension| extension.eq_ignore_ascii_case("obj"));
+        let is_obj = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"));
         if !is_obj {
             return Err(file.error("only .obj meshes can be placed in a .toml scene"));
         }
@@ -111,22 +96,16 @@ impl<'m, 'a> Objects<'m, 'a> {
         let material = match placement.material {
             None => None,
             Some(entry) => {
-                let area = parts.iter().map(|(mesh, _)| {
-                    shapes::area(
-                        &context.builder.meshes[mesh.0 as usize],
-                        &placement.to_world,
-                    )
-                });
+                let area = parts
+                    .iter()
+                    .map(|(mesh, _)| shapes::area(&context.builder.meshes[mesh.0 as usize], &placement.to_world));
                 let area = area.sum();
                 Some(with_power(context, entry, area, &placement.name, file)?)
             }
         };
         for (part, (mesh, own)) in parts.iter().enumerate() {
-            let name = if parts.len() == 1 {
-                placement.name.clone()
-            } else {
-                format!("{} ({})", placement.name, part + 1)
-            };
+            let name =
+                if parts.len() == 1 { placement.name.clone() } else { format!("{} ({})", placement.name, part + 1) };
             context.builder.instances.push(Instance {
                 name,
                 mesh: *mesh,
@@ -138,46 +117,21 @@ impl<'m, 'a> Objects<'m, 'a> {
     }
 }
 
-fn place_mesh(
-    context: &mut Context,
-    mesh: Mesh,
-    fields: &Fields,
-    placement: Placement,
-) -> Result<(), LoadError> {
-    let entry = placement
-        .material
-        .ok_or_else(|| fields.error("\"material\" is missing"))?;
+fn place_mesh(context: &mut Context, mesh: Mesh, fields: &Fields, placement: Placement) -> Result<(), LoadError> {
+    let entry = placement.material.ok_or_else(|| fields.error("\"material\" is missing"))?;
     let area = shapes::area(&mesh, &placement.to_world);
-    let material = with_power(
-        context,
-        entry,
-        area,
-        &placement.name,
-        &fields.require("material")?,
-    )?;
+    let material = with_power(context, entry, area, &placement.name, &fields.require("material")?)?;
     let mesh = context.builder.add_mesh(mesh);
-    context.builder.instances.push(Instance {
-        name: placement.name,
-        mesh,
-        material,
-        to_world: placement.to_world,
-    });
+    context.builder.instances.push(Instance { name: placement.name, mesh, material, to_world: placement.to_world });
     Ok(())
 }
 
 /// A sphere stays analytic as long as the transform leaves it a sphere.
-fn place_sphere(
-    context: &mut Context,
-    shape: &Value,
-    fields: &Fields,
-    placement: Placement,
-) -> Result<(), LoadError> {
+fn place_sphere(context: &mut Context, shape: &Value, fields: &Fields, placement: Placement) -> Result<(), LoadError> {
     let own = shape.fields(&["center", "radius"])?;
     let center = own.require("center")?.vec3()?;
     let radius = own.require("radius")?.positive()? as f32;
-    let entry = placement
-        .material
-        .ok_or_else(|| fields.error("\"material\" is missing"))?;
+    let entry = placement.material.ok_or_else(|| fields.error("\"material\" is missing"))?;
     let Some(scale) = shapes::similarity_scale(&placement.to_world) else {
         let mut mesh = shapes::sphere(center, radius);
         mesh.name.clone_from(&placement.name);
@@ -189,19 +143,8 @@ fn place_sphere(
         return Err(shape.error("its transform leaves no finite sphere"));
     }
     let area = 4.0 * PI * f64::from(radius) * f64::from(radius);
-    let material = with_power(
-        context,
-        entry,
-        area,
-        &placement.name,
-        &fields.require("material")?,
-    )?;
-    context.builder.spheres.push(Sphere {
-        name: placement.name,
-        center,
-        radius,
-        material,
-    });
+    let material = with_power(context, entry, area, &placement.name, &fields.require("material")?)?;
+    context.builder.spheres.push(Sphere { name: placement.name, center, radius, material });
     Ok(())
 }
 
@@ -230,11 +173,8 @@ fn with_power(
 
 fn rectangle(shape: &Value) -> Result<Mesh, LoadError> {
     let fields = shape.fields(&["corner", "edge_u", "edge_v"])?;
-    let [corner, u, v] = [
-        fields.require("corner")?.vec3()?,
-        fields.require("edge_u")?.vec3()?,
-        fields.require("edge_v")?.vec3()?,
-    ];
+    let [corner, u, v] =
+        [fields.require("corner")?.vec3()?, fields.require("edge_u")?.vec3()?, fields.require("edge_v")?.vec3()?];
     if u.as_dvec3().cross(v.as_dvec3()).length_squared() == 0.0 {
         return Err(shape.error("edge_u and edge_v must span an area"));
     }
@@ -243,14 +183,9 @@ fn rectangle(shape: &Value) -> Result<Mesh, LoadError> {
 
 fn cuboid(shape: &Value) -> Result<Mesh, LoadError> {
     let fields = shape.fields(&["min", "max"])?;
-    let [min, max]: [Vec3; 2] = [
-        fields.require("min")?.vec3()?,
-        fields.require("max")?.vec3()?,
-    ];
+    let [min, max]: [Vec3; 2] = [fields.require("min")?.vec3()?, fields.require("max")?.vec3()?];
     if !max.cmpgt(min).all() {
-        return Err(shape.error(format_args!(
-            "each coordinate of max {max} must be above that of min {min}"
-        )));
+        return Err(shape.error(format_args!("each coordinate of max {max} must be above that of min {min}")));
     }
     Ok(shapes::cuboid(min, max))
 }
@@ -258,9 +193,5 @@ fn cuboid(shape: &Value) -> Result<Mesh, LoadError> {
 fn disk(shape: &Value) -> Result<Mesh, LoadError> {
     let fields = shape.fields(&["center", "normal", "radius"])?;
     let radius = fields.require("radius")?.positive()? as f32;
-    Ok(shapes::disk(
-        fields.require("center")?.vec3()?,
-        fields.require("normal")?.direction()?,
-        radius,
-    ))
+    Ok(shapes::disk(fields.require("center")?.vec3()?, fields.require("normal")?.direction()?, radius))
 }
