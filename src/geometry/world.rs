@@ -39,6 +39,30 @@ pub struct World {
     /// Of the sphere around everything.
     radius: f32,
     has_alpha: bool,
+    /// By instance.
+    placements: Vec<Placement>,
+}
+
+/// What shading needs of an instance besides its transform.
+#[derive(Clone, Copy, Debug)]
+struct Placement {
+    /// Cofactors of the transform: turns normals, and turns them over where the transform mirrors.
+    normal_matrix: Mat3A,
+    /// −1 where the transform mirrors.
+    flip: f32,
+    /// Whether the material has a normal map.
+    needs_tangent: bool,
+}
+
+impl Placement {
+    fn new(scene: &Scene, instance: &Instance) -> Self {
+        let m = instance.to_world.matrix3;
+        let flip = if m.determinant() < 0.0 { -1.0 } else { 1.0 };
+        let cofactors =
+            Mat3A::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
+        let needs_tangent = scene.materials[instance.material.0 as usize].normal_map.is_some();
+        Self { normal_matrix: cofactors * flip, flip, needs_tangent }
+    }
 }
 
 /// What a leaf of the top tree holds.
@@ -103,7 +127,8 @@ impl World {
         } else {
             (Vec3::ZERO, 1.0)
         };
-        Self { scene, fixed, shared, top, items, center, radius, has_alpha }
+        let placements = scene.instances.iter().map(|i| Placement::new(&scene, i)).collect();
+        Self { scene, fixed, shared, top, items, center, radius, has_alpha, placements }
     }
 
     /// The scene that this was built from.
@@ -246,32 +271,27 @@ impl World {
         let corners = self.triangle_corners(hit.object, hit.triangle);
         let (b1, b2) = (hit.b1, hit.b2);
         let position = corners[0] * (1.0 - b1 - b2) + corners[1] * b1 + corners[2] * b2;
-        let mirrored = instance.to_world.matrix3.determinant() < 0.0;
-        let flip = if mirrored { -1.0 } else { 1.0 };
+        let Placement { normal_matrix, flip, needs_tangent } = self.placements[hit.object as usize];
         let geometric_normal = flip * (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or(Vec3::Y);
         let indices = mesh.triangles[hit.triangle as usize].map(|i| i as usize);
-        let blend =
-            |values: &[Vec3]| values[indices[0]] * (1.0 - b1 - b2) + values[indices[1]] * b1 + values[indices[2]] * b2;
         let shading_normal = if mesh.normals.is_empty() {
             geometric_normal
         } else {
-            let normal_matrix = Mat3A::from_cols(
-                instance.to_world.matrix3.y_axis.cross(instance.to_world.matrix3.z_axis),
-                instance.to_world.matrix3.z_axis.cross(instance.to_world.matrix3.x_axis),
-                instance.to_world.matrix3.x_axis.cross(instance.to_world.matrix3.y_axis),
-            );
-            let n = (flip * (normal_matrix * Vec3A::from(blend(&mesh.normals)))).normalize_or(geometric_normal.into());
+            let [n0, n1, n2] = indices.map(|i| mesh.normals[i]);
+            let blended = Vec3A::from(n0 * (1.0 - b1 - b2) + n1 * b1 + n2 * b2);
+            let n = Vec3::from(normal_matrix * blended).normalize_or(geometric_normal);
             // A file may wind its triangles against its normals; the geometric side is what counts.
-            let n = Vec3::from(n);
             if n.dot(geometric_normal) < 0.0 { -n } else { n }
         };
-        let (tangent, handedness) = if mesh.tangents.is_empty() {
+        let (tangent, handedness) = if !needs_tangent {
+            (corners[1] - corners[0], 1.0)
+        } else if mesh.tangents.is_empty() {
             tangent_from_uv(mesh, hit.triangle, &corners)
         } else {
-            let t = |k: usize| mesh.tangents[indices[k]];
-            let blended = t(0).truncate() * (1.0 - b1 - b2) + t(1).truncate() * b1 + t(2).truncate() * b2;
+            let [t0, t1, t2] = indices.map(|i| mesh.tangents[i]);
+            let blended = t0.truncate() * (1.0 - b1 - b2) + t1.truncate() * b1 + t2.truncate() * b2;
             let world = Vec3::from(instance.to_world.matrix3 * Vec3A::from(blended));
-            (world.normalize_or(Vec3::X), if t(0).w < 0.0 { -flip } else { flip })
+            (world.normalize_or(Vec3::X), if t0.w < 0.0 { -flip } else { flip })
         };
         SurfacePoint {
             position,

@@ -103,7 +103,7 @@ fn bad_arguments_are_refused_in_one_line() {
     let cornell = cornell.to_str().expect("text");
     let at = folder.path();
     assert_refused(&["render", "missing.toml", "-o", "a.png"], at, &["missing.toml"]);
-    assert_refused(&["render", ".", "-o", "a.png"], at, &["folder"]);
+    assert_refused(&["render", ".", "-o", "a.png"], at, &["is a directory"]);
     assert_refused(&["render", cornell, "-o", "a.gif"], at, &["a.gif", ".exr"]);
     assert_refused(&["render", cornell, "-o", "no/such/a.png"], at, &["no/such"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--size", "0x10"], at, &["0x10", "WIDTHxHEIGHT"]);
