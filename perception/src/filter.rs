@@ -22,6 +22,10 @@ pub(crate) fn reflect(index: isize, len: usize) -> usize {
     }
 }
 
+/// Columns worked on at once: enough to fill vector registers, few enough that a strip stays in the cache.
+const LANES: usize = 16;
+type Lanes = [f32; LANES];
+
 /// `plane` convolved with a Gaussian of standard deviation `sigma_px`.
 ///
 /// Three box filters with fractional ends, whose variance is exactly σ² (Gwosdek, Grewenig, Bruhn and Weickert,
@@ -34,9 +38,9 @@ pub(crate) fn gaussian_blur(plane: &Plane, sigma_px: f64) -> Plane {
     along_both_axes(plane, |len| {
         // Beyond twice the row the mirrored picture is uniform anyway; the cap bounds the cost.
         let kernel = BoxKernel::third_of_variance(sigma_px.min(2.0 * len as f64));
-        move |row: &mut [f32], scratch: &mut Scratch| {
+        move |strip: &mut Strip| {
             for _ in 0..3 {
-                kernel.apply(row, scratch);
+                kernel.apply(strip);
             }
         }
     })
@@ -49,52 +53,80 @@ pub(crate) fn erode(plane: &Plane, radius_px: usize) -> Plane {
     }
     along_both_axes(plane, |len| {
         let radius = radius_px.min(len);
-        move |row: &mut [f32], scratch: &mut Scratch| {
-            scratch.extend(row, radius);
-            scratch.fold_blocks(2 * radius + 1, f32::min);
-            for (start, value) in row.iter_mut().enumerate() {
-                *value = scratch.suffix[start].min(scratch.prefix[start + 2 * radius]);
+        move |strip: &mut Strip| {
+            strip.extend(radius);
+            strip.fold_blocks(2 * radius + 1, f32::min);
+            let windows = strip.suffix.iter().zip(&strip.prefix[2 * radius..]);
+            for (value, (suffix, prefix)) in strip.values.iter_mut().zip(windows) {
+                for lane in 0..LANES {
+                    value[lane] = suffix[lane].min(prefix[lane]);
+                }
             }
         }
     })
 }
 
-/// Buffers one thread reuses from row to row.
-#[derive(Default)]
-struct Scratch {
-    extended: Vec<f32>,
-    prefix: Vec<f32>,
-    suffix: Vec<f32>,
+/// The largest value of `plane` within a square of half-width `radius_px` around each pixel.
+pub(crate) fn dilate(plane: &Plane, radius_px: usize) -> Plane {
+    erode(&plane.map(|value| -value), radius_px).map(|value| -value)
 }
 
-impl Scratch {
-    /// Copies `row` with `pad` reflected pixels on each side.
-    fn extend(&mut self, row: &[f32], pad: usize) {
-        let len = row.len();
-        self.extended.clear();
-        self.extended
-            .extend((0..pad).map(|index| row[reflect(index as isize - pad as isize, len)]));
-        self.extended.extend_from_slice(row);
-        self.extended
-            .extend((0..pad).map(|index| row[reflect((len + index) as isize, len)]));
+/// A few columns of a picture side by side, and the buffers one thread reuses from strip to strip.
+#[derive(Default)]
+struct Strip {
+    values: Vec<Lanes>,
+    extended: Vec<Lanes>,
+    prefix: Vec<Lanes>,
+    suffix: Vec<Lanes>,
+}
+
+impl Strip {
+    /// Takes up to [`LANES`] columns of `plane` from `first` on; lanes left over repeat the last one.
+    fn load(&mut self, plane: &Plane, first: usize) {
+        let count = (plane.width() - first).min(LANES);
+        self.values.clear();
+        self.values.extend((0..plane.height()).map(|y| {
+            let source = &plane.row(y)[first..first + count];
+            let mut lanes = [source[count - 1]; LANES];
+            lanes[..count].copy_from_slice(source);
+            lanes
+        }));
     }
 
-    /// Van Herk's trick: with the row cut into blocks as long as the window, every window is the end of one block
+    /// Copies the values with `pad` reflected ones on each side.
+    fn extend(&mut self, pad: usize) {
+        let (values, len) = (&self.values, self.values.len());
+        self.extended.clear();
+        self.extended
+            .extend((0..pad).map(|index| values[reflect(index as isize - pad as isize, len)]));
+        self.extended.extend_from_slice(values);
+        self.extended
+            .extend((0..pad).map(|index| values[reflect((len + index) as isize, len)]));
+    }
+
+    /// Van Herk's trick: with the column cut into blocks as long as the window, every window is the end of one block
     /// joined to the start of the next.
     fn fold_blocks(&mut self, block: usize, join: impl Fn(f32, f32) -> f32) {
-        let extended = &self.extended;
-        self.prefix.clone_from(extended);
-        self.suffix.clone_from(extended);
+        self.prefix.clone_from(&self.extended);
+        self.suffix.clone_from(&self.extended);
         for (prefix, suffix) in self
             .prefix
             .chunks_mut(block)
             .zip(self.suffix.chunks_mut(block))
         {
-            for index in 1..prefix.len() {
-                prefix[index] = join(prefix[index - 1], prefix[index]);
+            let mut running = prefix[0];
+            for lanes in prefix.iter_mut().skip(1) {
+                for lane in 0..LANES {
+                    running[lane] = join(running[lane], lanes[lane]);
+                }
+                *lanes = running;
             }
-            for index in (0..suffix.len() - 1).rev() {
-                suffix[index] = join(suffix[index], suffix[index + 1]);
+            let mut running = suffix[suffix.len() - 1];
+            for lanes in suffix.iter_mut().rev().skip(1) {
+                for lane in 0..LANES {
+                    running[lane] = join(running[lane], lanes[lane]);
+                }
+                *lanes = running;
             }
         }
     }
@@ -123,62 +155,53 @@ impl BoxKernel {
         }
     }
 
-    fn apply(self, row: &mut [f32], scratch: &mut Scratch) {
+    fn apply(self, strip: &mut Strip) {
         let window = 2 * self.radius + 1;
-        scratch.extend(row, self.radius + 1);
-        scratch.fold_blocks(window, |a, b| a + b);
-        for (start, value) in row.iter_mut().enumerate() {
+        strip.extend(self.radius + 1);
+        strip.fold_blocks(window, |a, b| a + b);
+        for (start, value) in strip.values.iter_mut().enumerate() {
             // The window covers start + 1 ..= start + window; at a block's start the prefix alone is the whole sum.
-            let whole = if (start + 1) % window == 0 {
-                scratch.prefix[start + window]
+            let prefix = &strip.prefix[start + window];
+            let suffix = if (start + 1).is_multiple_of(window) {
+                &[0.0; LANES]
             } else {
-                scratch.suffix[start + 1] + scratch.prefix[start + window]
+                &strip.suffix[start + 1]
             };
-            let ends = scratch.extended[start] + scratch.extended[start + window + 1];
-            *value = (whole + self.end_weight * ends) * self.scale;
+            let (first, last) = (&strip.extended[start], &strip.extended[start + window + 1]);
+            for lane in 0..LANES {
+                let ends = first[lane] + last[lane];
+                value[lane] = (suffix[lane] + prefix[lane] + self.end_weight * ends) * self.scale;
+            }
         }
     }
 }
 
-/// Runs a row operation along x, then along y. `operation_for` gets the length of the rows it will see.
+/// Runs an operation along y, then along x. `operation_for` gets the length of the columns it will see.
 fn along_both_axes<Op>(plane: &Plane, operation_for: impl Fn(usize) -> Op) -> Plane
 where
-    Op: Fn(&mut [f32], &mut Scratch) + Sync,
+    Op: Fn(&mut Strip) + Sync,
 {
     if plane.values().is_empty() {
         return plane.clone();
     }
-    let mut rows = plane.clone();
-    run_rows(&mut rows, &operation_for(plane.width()));
-    let mut columns = transposed(&rows);
-    run_rows(&mut columns, &operation_for(plane.height()));
-    transposed(&columns)
+    let turned = run_columns(plane, &operation_for(plane.height()));
+    run_columns(&turned, &operation_for(plane.width()))
 }
 
-fn run_rows(plane: &mut Plane, operation: &(impl Fn(&mut [f32], &mut Scratch) + Sync)) {
-    let width = plane.width();
-    plane
-        .values_mut()
-        .par_chunks_mut(width)
-        .with_min_len((8192 / width).max(1))
-        .for_each_init(Scratch::default, |scratch, row| operation(row, scratch));
-}
-
-/// Rows become columns.
-pub(crate) fn transposed(plane: &Plane) -> Plane {
-    let (width, height) = (plane.width(), plane.height());
-    let mut result = Plane::filled(height, width, 0.0);
-    let source = plane.values();
-    // Strips of 16 columns: each line fetched from the source serves 16 rows of the result.
+/// Runs an operation along every column; the result is transposed, so that a second run works on the rows.
+fn run_columns(plane: &Plane, operation: &(impl Fn(&mut Strip) + Sync)) -> Plane {
+    let height = plane.height();
+    let mut result = Plane::filled(height, plane.width(), 0.0);
     result
         .values_mut()
-        .par_chunks_mut((16 * height).max(1))
+        .par_chunks_mut(LANES * height)
         .enumerate()
-        .for_each(|(strip, rows)| {
-            let first_column = strip * 16;
-            for y in 0..height {
-                for (column, row) in rows.chunks_exact_mut(height).enumerate() {
-                    row[y] = source[y * width + first_column + column];
+        .for_each_init(Strip::default, |strip, (index, rows)| {
+            strip.load(plane, index * LANES);
+            operation(strip);
+            for (lane, row) in rows.chunks_exact_mut(height).enumerate() {
+                for (value, lanes) in row.iter_mut().zip(&strip.values) {
+                    *value = lanes[lane];
                 }
             }
         });

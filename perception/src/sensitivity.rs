@@ -196,12 +196,7 @@ pub(crate) fn adaptation_levels(
             let luminance = 10.0_f64.powf(f64::from(level) / 2.0);
             let gain = viewing.observer.sensitivity;
             let sensitivity = RadialTable::new(viewing.display.pixels_per_degree, |freq| {
-                // The average over a picture is no pattern: no model has a threshold for 0 cpd.
-                if freq > 0.0 {
-                    gain * csf.sensitivity(freq, luminance)
-                } else {
-                    0.0
-                }
+                gain * csf.sensitivity(freq, luminance)
             });
             AdaptationLevel {
                 luminance_cd_m2: luminance as f32,
