@@ -51,7 +51,8 @@ impl Difference {
 /// use fechner_perception::difference::difference;
 /// let reference = Plane::filled(64, 64, 100.0);
 /// let mut test = reference.clone();
-/// test.values_mut()[64 * 32 + 32] = 140.0;
+/// test.values_mut()[64 * 32 + 32] = 200.0; // twice as bright
+/// test.values_mut()[64 * 32 + 33] = 200.0;
 /// let seen = difference(&reference, &test, &Viewing::default(), &CastleCsf::default())?;
 /// assert!(seen.is_visible());
 /// # Ok::<(), fechner_perception::Error>(())

@@ -21,9 +21,7 @@ pub(crate) struct PictureTransform {
     padded_width: usize,
     padded_height: usize,
     rows_forward: Arc<dyn RealToComplex<f32>>,
-    rows_back: Arc<dyn ComplexToReal<f32>>,
     columns_forward: Arc<dyn Fft<f32>>,
-    columns_back: Arc<dyn Fft<f32>>,
 }
 
 /// A picture's spectrum: one line for each horizontal frequency, the vertical frequencies along it.
@@ -77,9 +75,7 @@ impl PictureTransform {
             padded_width,
             padded_height,
             rows_forward: planners.real.plan_fft_forward(padded_width),
-            rows_back: planners.real.plan_fft_inverse(padded_width),
             columns_forward: planners.complex.plan_fft_forward(padded_height),
-            columns_back: planners.complex.plan_fft_inverse(padded_height),
         }
     }
 
@@ -118,30 +114,11 @@ impl PictureTransform {
         Spectrum { bins }
     }
 
-    /// The picture whose spectrum is `spectrum` with every bin multiplied by `gain(freq_cpd)`.
+    /// The picture whose spectrum is `spectrum` with every bin multiplied by `gain(freq_cpd)`, at every `factor`-th pixel
+    /// only, from pixel −`factor` on until past the picture's end: sample j stands at pixel (j − 1) · `factor`.
     ///
     /// `limit_cpd` is a frequency above which `gain` is zero (infinite if there is none): columns beyond it are not
-    /// transformed.
-    pub(crate) fn filtered(
-        &self,
-        spectrum: &Spectrum,
-        pixels_per_degree: f64,
-        limit_cpd: f64,
-        gain: impl Fn(f32) -> f32 + Sync,
-    ) -> Plane {
-        let back = BackTransform {
-            columns: self.columns_back.clone(),
-            rows: self.rows_back.clone(),
-            factor: 1,
-            first: self.pad,
-            width: self.width,
-            height: self.height,
-        };
-        self.run_back(&back, spectrum, pixels_per_degree, limit_cpd, gain)
-    }
-
-    /// [`PictureTransform::filtered`] at every `factor`-th pixel only, from pixel −`factor` on until past the picture's end:
-    /// sample j stands at pixel (j − 1) · `factor`. `factor` must be one of 1, 2, 4, 8, 16, and leave room for `limit_cpd`.
+    /// transformed. `factor` must be one of 1, 2, 4, 8, 16, and leave room for `limit_cpd`.
     pub(crate) fn filtered_reduced(
         &self,
         spectrum: &Spectrum,
@@ -250,6 +227,20 @@ pub(crate) fn reduced_size(len: usize, factor: usize) -> usize {
     (len - 1) / factor + 3
 }
 
+/// The pixel at which reduced sample `index` stands, or the nearest one of a picture `len` pixels long.
+pub(crate) fn reduced_pixel(index: usize, factor: usize, len: usize) -> usize {
+    (index * factor).saturating_sub(factor).min(len - 1)
+}
+
+/// The largest reduction that still samples frequencies up to `limit_cpd`.
+pub(crate) fn reduction(pixels_per_degree: f64, limit_cpd: f64) -> usize {
+    let mut factor = 1;
+    while factor < MOST_REDUCTION && pixels_per_degree / (4 * factor) as f64 >= limit_cpd {
+        factor *= 2;
+    }
+    factor
+}
+
 /// A plane of `width` × `height` pixels, interpolated linearly from one at every `factor`-th pixel (see
 /// [`PictureTransform::filtered_reduced`]).
 pub(crate) fn enlarged(reduced: &Plane, factor: usize, width: usize, height: usize) -> Plane {
@@ -295,6 +286,18 @@ fn transpose(source: &[Complex32], target: &mut [Complex32], width: usize, heigh
 mod tests {
     use super::*;
 
+    /// At every pixel.
+    fn filtered(
+        transform: &PictureTransform,
+        spectrum: &Spectrum,
+        pixels_per_degree: f64,
+        limit_cpd: f64,
+        gain: impl Fn(f32) -> f32 + Sync,
+    ) -> Plane {
+        let whole = transform.filtered_reduced(spectrum, pixels_per_degree, limit_cpd, 1, gain);
+        enlarged(&whole, 1, transform.width, transform.height)
+    }
+
     #[test]
     fn smooth_sizes() {
         assert_eq!(
@@ -308,7 +311,13 @@ mod tests {
         for (width, height) in [(1, 1), (1, 5), (7, 3), (48, 31)] {
             let plane = Plane::from_fn(width, height, |x, y| ((x * 7 + y * 13) % 11) as f32);
             let transform = PictureTransform::new(width, height, 9);
-            let back = transform.filtered(&transform.forward(&plane), 30.0, f64::INFINITY, |_| 1.0);
+            let back = filtered(
+                &transform,
+                &transform.forward(&plane),
+                30.0,
+                f64::INFINITY,
+                |_| 1.0,
+            );
             for (found, expected) in back.values().iter().zip(plane.values()) {
                 assert!(
                     (found - expected).abs() < 1e-4,
@@ -327,10 +336,10 @@ mod tests {
         });
         let transform = PictureTransform::new(16, 64, 32);
         let spectrum = transform.forward(&plane);
-        let kept = transform.filtered(&spectrum, 32.0, f64::INFINITY, |freq| {
+        let kept = filtered(&transform, &spectrum, 32.0, f64::INFINITY, |freq| {
             f32::from((freq - 1.5).abs() < 0.01)
         });
-        let lost = transform.filtered(&spectrum, 32.0, 1.6, |freq| {
+        let lost = filtered(&transform, &spectrum, 32.0, 1.6, |freq| {
             f32::from((freq - 1.5).abs() > 0.01)
         });
         for ((kept, lost), expected) in kept.values().iter().zip(lost.values()).zip(plane.values())
@@ -348,7 +357,7 @@ mod tests {
         let spectrum = transform.forward(&plane);
         // A smooth low-pass that ends at 2 cpd; 60 pixels a degree.
         let gain = |freq: f32| (1.0 - freq / 2.0).max(0.0).powi(2);
-        let whole = transform.filtered(&spectrum, 60.0, 2.0, gain);
+        let whole = filtered(&transform, &spectrum, 60.0, 2.0, gain);
         for factor in [2, 4, 8] {
             let reduced = transform.filtered_reduced(&spectrum, 60.0, 2.0, factor, gain);
             let back = enlarged(&reduced, factor, 75, 42);

@@ -55,13 +55,13 @@ pub(crate) fn erode(plane: &Plane, radius_px: usize) -> Plane {
         let radius = radius_px.min(len);
         move |strip: &mut Strip| {
             strip.extend(radius);
-            strip.fold_blocks(2 * radius + 1, f32::min);
-            let windows = strip.suffix.iter().zip(&strip.prefix[2 * radius..]);
-            for (value, (suffix, prefix)) in strip.values.iter_mut().zip(windows) {
-                for lane in 0..LANES {
-                    value[lane] = suffix[lane].min(prefix[lane]);
-                }
-            }
+            strip.slide(
+                0,
+                2 * radius + 1,
+                f32::INFINITY,
+                f32::min,
+                |window, _, _| window,
+            );
         }
     })
 }
@@ -76,7 +76,6 @@ pub(crate) fn dilate(plane: &Plane, radius_px: usize) -> Plane {
 struct Strip {
     values: Vec<Lanes>,
     extended: Vec<Lanes>,
-    prefix: Vec<Lanes>,
     suffix: Vec<Lanes>,
 }
 
@@ -104,29 +103,50 @@ impl Strip {
             .extend((0..pad).map(|index| values[reflect((len + index) as isize, len)]));
     }
 
+    /// Sets every value to `finish(join over the window, element before it, element after it)`, the window of `window`
+    /// elements starting `offset` elements after the value's place in the extended column.
+    ///
     /// Van Herk's trick: with the column cut into blocks as long as the window, every window is the end of one block
-    /// joined to the start of the next.
-    fn fold_blocks(&mut self, block: usize, join: impl Fn(f32, f32) -> f32) {
-        self.prefix.clone_from(&self.extended);
-        self.suffix.clone_from(&self.extended);
-        for (prefix, suffix) in self
-            .prefix
-            .chunks_mut(block)
-            .zip(self.suffix.chunks_mut(block))
-        {
-            let mut running = prefix[0];
-            for lanes in prefix.iter_mut().skip(1) {
+    /// joined to the start of the next. `neutral` is what `join` leaves unchanged.
+    fn slide(
+        &mut self,
+        offset: usize,
+        window: usize,
+        neutral: f32,
+        join: impl Fn(f32, f32) -> f32,
+        finish: impl Fn(f32, f32, f32) -> f32,
+    ) {
+        let extended = &self.extended;
+        self.suffix.resize(window, [neutral; LANES]);
+        for (block, values) in self.values.chunks_mut(window).enumerate() {
+            let start = offset + block * window;
+            let mut running = [neutral; LANES];
+            for (suffix, lanes) in self
+                .suffix
+                .iter_mut()
+                .zip(&extended[start..start + window])
+                .rev()
+            {
                 for lane in 0..LANES {
                     running[lane] = join(running[lane], lanes[lane]);
                 }
-                *lanes = running;
+                *suffix = running;
             }
-            let mut running = suffix[suffix.len() - 1];
-            for lanes in suffix.iter_mut().rev().skip(1) {
-                for lane in 0..LANES {
-                    running[lane] = join(running[lane], lanes[lane]);
+            let mut prefix = [neutral; LANES];
+            for (index, (value, suffix)) in values.iter_mut().zip(&self.suffix).enumerate() {
+                if index > 0 {
+                    let next = &extended[start + window + index - 1];
+                    for lane in 0..LANES {
+                        prefix[lane] = join(prefix[lane], next[lane]);
+                    }
                 }
-                *lanes = running;
+                // Without offset nothing stands before the first window, nor need anything stand after the last.
+                let before = &extended[(start + index).saturating_sub(1)];
+                let after = &extended[(start + index + window).min(extended.len() - 1)];
+                for lane in 0..LANES {
+                    value[lane] =
+                        finish(join(suffix[lane], prefix[lane]), before[lane], after[lane]);
+                }
             }
         }
     }
@@ -156,23 +176,19 @@ impl BoxKernel {
     }
 
     fn apply(self, strip: &mut Strip) {
-        let window = 2 * self.radius + 1;
         strip.extend(self.radius + 1);
-        strip.fold_blocks(window, |a, b| a + b);
-        for (start, value) in strip.values.iter_mut().enumerate() {
-            // The window covers start + 1 ..= start + window; at a block's start the prefix alone is the whole sum.
-            let prefix = &strip.prefix[start + window];
-            let suffix = if (start + 1).is_multiple_of(window) {
-                &[0.0; LANES]
-            } else {
-                &strip.suffix[start + 1]
-            };
-            let (first, last) = (&strip.extended[start], &strip.extended[start + window + 1]);
-            for lane in 0..LANES {
-                let ends = first[lane] + last[lane];
-                value[lane] = (suffix[lane] + prefix[lane] + self.end_weight * ends) * self.scale;
-            }
-        }
+        let Self {
+            radius,
+            end_weight,
+            scale,
+        } = self;
+        strip.slide(
+            1,
+            2 * radius + 1,
+            0.0,
+            |a, b| a + b,
+            |sum, before, after| (sum + end_weight * (before + after)) * scale,
+        );
     }
 }
 
@@ -199,9 +215,12 @@ fn run_columns(plane: &Plane, operation: &(impl Fn(&mut Strip) + Sync)) -> Plane
         .for_each_init(Strip::default, |strip, (index, rows)| {
             strip.load(plane, index * LANES);
             operation(strip);
-            for (lane, row) in rows.chunks_exact_mut(height).enumerate() {
-                for (value, lanes) in row.iter_mut().zip(&strip.values) {
-                    *value = lanes[lane];
+            // Sixteen values at a time: what is read sixteen times stays at hand.
+            for (block, values) in strip.values.chunks(LANES).enumerate() {
+                for (lane, row) in rows.chunks_exact_mut(height).enumerate() {
+                    for (value, lanes) in row[block * LANES..].iter_mut().zip(values) {
+                        *value = lanes[lane];
+                    }
                 }
             }
         });

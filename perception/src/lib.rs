@@ -32,6 +32,7 @@
 //! # Ok::<(), fechner_perception::Error>(())
 //! ```
 
+pub mod adaptation;
 pub mod allocation;
 mod bands;
 pub mod csf;

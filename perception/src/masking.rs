@@ -1,7 +1,7 @@
 //! Masking: how much a band's own contrast raises its threshold.
 
 use crate::bands::{OctaveBands, RadialTable};
-use crate::fft::{MOST_REDUCTION, PictureTransform, Spectrum, enlarged};
+use crate::fft::{PictureTransform, Spectrum, enlarged, reduced_pixel as pixel, reduction};
 use crate::filter::{erode, gaussian_blur};
 use crate::plane::Plane;
 use crate::sensitivity::BandTables;
@@ -79,7 +79,8 @@ pub(crate) fn band_elevation(
     let (width, height) = (source.coordinates.width(), source.coordinates.height());
     let gain = RadialTable::new(ppd, |freq| bands.mask_gain(band, freq));
     let limit_cpd = bands.limit_cpd(band);
-    let factor = reduction(ppd, limit_cpd);
+    // A quarter more densely than the band needs: its energy is blurred next.
+    let factor = reduction(ppd, 1.25 * limit_cpd);
     let wavelength_px = ppd / bands.center_cpd(band) / factor as f64;
     let mut energy = source
         .transform
@@ -109,20 +110,6 @@ pub(crate) fn band_elevation(
             .for_each(|value| *value = elevation.at(*value))
     });
     enlarged(&elevated, factor, width, height)
-}
-
-/// The largest reduction that still samples a band of at most `limit_cpd` a quarter more densely than it needs.
-fn reduction(pixels_per_degree: f64, limit_cpd: f64) -> usize {
-    let mut factor = 1;
-    while factor < MOST_REDUCTION && pixels_per_degree / (4 * factor) as f64 >= 1.25 * limit_cpd {
-        factor *= 2;
-    }
-    factor
-}
-
-/// The pixel at which reduced sample `index` stands, or the nearest one of the picture.
-fn pixel(index: usize, factor: usize, len: usize) -> usize {
-    (index * factor).saturating_sub(factor).min(len - 1)
 }
 
 /// Mean of the `factor` × `factor` pixels around a reduced sample.

@@ -6,6 +6,7 @@
 mod barten99;
 mod castle;
 mod castle_chromatic;
+mod castle_temporal;
 mod daly93;
 mod daly98;
 mod mannos_sakrison;
@@ -14,6 +15,7 @@ mod moving;
 pub use barten99::Barten99;
 pub use castle::CastleCsf;
 pub use castle_chromatic::{CastleChromatic, ChromaticChannel};
+pub use castle_temporal::CastleTemporal;
 pub use daly93::Daly93;
 pub use daly98::{DRIFT_DEG_S, Daly98, FASTEST_PURSUIT_DEG_S, PURSUIT_GAIN};
 pub use mannos_sakrison::MannosSakrison;
