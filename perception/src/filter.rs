@@ -22,6 +22,10 @@ pub(crate) fn reflect(index: isize, len: usize) -> usize {
     }
 }
 
+/// Columns worked on at once: enough to fill vector registers, few enough that a strip stays in the cache.
+const LANES: usize = 16;
+type Lanes = [f32; LANES];
+
 /// `plane` convolved with a Gaussian of standard deviation `sigma_px`.
 ///
 /// Three box filters with fractional ends, whose variance is exactly σ² (Gwosdek, Grewenig, Bruhn and Weickert,
@@ -34,9 +38,9 @@ pub(crate) fn gaussian_blur(plane: &Plane, sigma_px: f64) -> Plane {
     along_both_axes(plane, |len| {
         // Beyond twice the row the mirrored picture is uniform anyway; the cap bounds the cost.
         let kernel = BoxKernel::third_of_variance(sigma_px.min(2.0 * len as f64));
-        move |row: &mut [f32], scratch: &mut Scratch| {
+        move |strip: &mut Strip| {
             for _ in 0..3 {
-                kernel.apply(row, scratch);
+                kernel.apply(strip);
             }
         }
     })
@@ -49,52 +53,100 @@ pub(crate) fn erode(plane: &Plane, radius_px: usize) -> Plane {
     }
     along_both_axes(plane, |len| {
         let radius = radius_px.min(len);
-        move |row: &mut [f32], scratch: &mut Scratch| {
-            scratch.extend(row, radius);
-            scratch.fold_blocks(2 * radius + 1, f32::min);
-            for (start, value) in row.iter_mut().enumerate() {
-                *value = scratch.suffix[start].min(scratch.prefix[start + 2 * radius]);
-            }
+        move |strip: &mut Strip| {
+            strip.extend(radius);
+            strip.slide(
+                0,
+                2 * radius + 1,
+                f32::INFINITY,
+                f32::min,
+                |window, _, _| window,
+            );
         }
     })
 }
 
-/// Buffers one thread reuses from row to row.
-#[derive(Default)]
-struct Scratch {
-    extended: Vec<f32>,
-    prefix: Vec<f32>,
-    suffix: Vec<f32>,
+/// The largest value of `plane` within a square of half-width `radius_px` around each pixel.
+pub(crate) fn dilate(plane: &Plane, radius_px: usize) -> Plane {
+    erode(&plane.map(|value| -value), radius_px).map(|value| -value)
 }
 
-impl Scratch {
-    /// Copies `row` with `pad` reflected pixels on each side.
-    fn extend(&mut self, row: &[f32], pad: usize) {
-        let len = row.len();
-        self.extended.clear();
-        self.extended
-            .extend((0..pad).map(|index| row[reflect(index as isize - pad as isize, len)]));
-        self.extended.extend_from_slice(row);
-        self.extended
-            .extend((0..pad).map(|index| row[reflect((len + index) as isize, len)]));
+/// A few columns of a picture side by side, and the buffers one thread reuses from strip to strip.
+#[derive(Default)]
+struct Strip {
+    values: Vec<Lanes>,
+    extended: Vec<Lanes>,
+    suffix: Vec<Lanes>,
+}
+
+impl Strip {
+    /// Takes up to [`LANES`] columns of `plane` from `first` on; lanes left over repeat the last one.
+    fn load(&mut self, plane: &Plane, first: usize) {
+        let count = (plane.width() - first).min(LANES);
+        self.values.clear();
+        self.values.extend((0..plane.height()).map(|y| {
+            let source = &plane.row(y)[first..first + count];
+            let mut lanes = [source[count - 1]; LANES];
+            lanes[..count].copy_from_slice(source);
+            lanes
+        }));
     }
 
-    /// Van Herk's trick: with the row cut into blocks as long as the window, every window is the end of one block
-    /// joined to the start of the next.
-    fn fold_blocks(&mut self, block: usize, join: impl Fn(f32, f32) -> f32) {
+    /// Copies the values with `pad` reflected ones on each side.
+    fn extend(&mut self, pad: usize) {
+        let (values, len) = (&self.values, self.values.len());
+        self.extended.clear();
+        self.extended
+            .extend((0..pad).map(|index| values[reflect(index as isize - pad as isize, len)]));
+        self.extended.extend_from_slice(values);
+        self.extended
+            .extend((0..pad).map(|index| values[reflect((len + index) as isize, len)]));
+    }
+
+    /// Sets every value to `finish(join over the window, element before it, element after it)`, the window of `window`
+    /// elements starting `offset` elements after the value's place in the extended column.
+    ///
+    /// Van Herk's trick: with the column cut into blocks as long as the window, every window is the end of one block
+    /// joined to the start of the next. `neutral` is what `join` leaves unchanged.
+    fn slide(
+        &mut self,
+        offset: usize,
+        window: usize,
+        neutral: f32,
+        join: impl Fn(f32, f32) -> f32,
+        finish: impl Fn(f32, f32, f32) -> f32,
+    ) {
         let extended = &self.extended;
-        self.prefix.clone_from(extended);
-        self.suffix.clone_from(extended);
-        for (prefix, suffix) in self
-            .prefix
-            .chunks_mut(block)
-            .zip(self.suffix.chunks_mut(block))
-        {
-            for index in 1..prefix.len() {
-                prefix[index] = join(prefix[index - 1], prefix[index]);
+        self.suffix.resize(window, [neutral; LANES]);
+        for (block, values) in self.values.chunks_mut(window).enumerate() {
+            let start = offset + block * window;
+            let mut running = [neutral; LANES];
+            for (suffix, lanes) in self
+                .suffix
+                .iter_mut()
+                .zip(&extended[start..start + window])
+                .rev()
+            {
+                for lane in 0..LANES {
+                    running[lane] = join(running[lane], lanes[lane]);
+                }
+                *suffix = running;
             }
-            for index in (0..suffix.len() - 1).rev() {
-                suffix[index] = join(suffix[index], suffix[index + 1]);
+            let mut prefix = [neutral; LANES];
+            for (index, (value, suffix)) in values.iter_mut().zip(&self.suffix).enumerate() {
+                if index > 0 {
+                    let next = &extended[start + window + index - 1];
+                    for lane in 0..LANES {
+                        prefix[lane] = join(prefix[lane], next[lane]);
+                    }
+                }
+                // Without offset nothing stands before the first window, nor need anything stand after the last.
+                let before = &extended[(start + index).saturating_sub(1)];
+                let after = &extended[(start + index + window).min(extended.len() - 1)];
+                for lane in 0..LANES {
+                    value[lane] =
+                        finish(join(suffix[lane], prefix[lane]), before[lane], after[lane]);
+                }
             }
         }
     }
@@ -123,62 +175,52 @@ impl BoxKernel {
         }
     }
 
-    fn apply(self, row: &mut [f32], scratch: &mut Scratch) {
-        let window = 2 * self.radius + 1;
-        scratch.extend(row, self.radius + 1);
-        scratch.fold_blocks(window, |a, b| a + b);
-        for (start, value) in row.iter_mut().enumerate() {
-            // The window covers start + 1 ..= start + window; at a block's start the prefix alone is the whole sum.
-            let whole = if (start + 1) % window == 0 {
-                scratch.prefix[start + window]
-            } else {
-                scratch.suffix[start + 1] + scratch.prefix[start + window]
-            };
-            let ends = scratch.extended[start] + scratch.extended[start + window + 1];
-            *value = (whole + self.end_weight * ends) * self.scale;
-        }
+    fn apply(self, strip: &mut Strip) {
+        strip.extend(self.radius + 1);
+        let Self {
+            radius,
+            end_weight,
+            scale,
+        } = self;
+        strip.slide(
+            1,
+            2 * radius + 1,
+            0.0,
+            |a, b| a + b,
+            |sum, before, after| (sum + end_weight * (before + after)) * scale,
+        );
     }
 }
 
-/// Runs a row operation along x, then along y. `operation_for` gets the length of the rows it will see.
+/// Runs an operation along y, then along x. `operation_for` gets the length of the columns it will see.
 fn along_both_axes<Op>(plane: &Plane, operation_for: impl Fn(usize) -> Op) -> Plane
 where
-    Op: Fn(&mut [f32], &mut Scratch) + Sync,
+    Op: Fn(&mut Strip) + Sync,
 {
     if plane.values().is_empty() {
         return plane.clone();
     }
-    let mut rows = plane.clone();
-    run_rows(&mut rows, &operation_for(plane.width()));
-    let mut columns = transposed(&rows);
-    run_rows(&mut columns, &operation_for(plane.height()));
-    transposed(&columns)
+    let turned = run_columns(plane, &operation_for(plane.height()));
+    run_columns(&turned, &operation_for(plane.width()))
 }
 
-fn run_rows(plane: &mut Plane, operation: &(impl Fn(&mut [f32], &mut Scratch) + Sync)) {
-    let width = plane.width();
-    plane
-        .values_mut()
-        .par_chunks_mut(width)
-        .with_min_len((8192 / width).max(1))
-        .for_each_init(Scratch::default, |scratch, row| operation(row, scratch));
-}
-
-/// Rows become columns.
-pub(crate) fn transposed(plane: &Plane) -> Plane {
-    let (width, height) = (plane.width(), plane.height());
-    let mut result = Plane::filled(height, width, 0.0);
-    let source = plane.values();
-    // Strips of 16 columns: each line fetched from the source serves 16 rows of the result.
+/// Runs an operation along every column; the result is transposed, so that a second run works on the rows.
+fn run_columns(plane: &Plane, operation: &(impl Fn(&mut Strip) + Sync)) -> Plane {
+    let height = plane.height();
+    let mut result = Plane::filled(height, plane.width(), 0.0);
     result
         .values_mut()
-        .par_chunks_mut((16 * height).max(1))
+        .par_chunks_mut(LANES * height)
         .enumerate()
-        .for_each(|(strip, rows)| {
-            let first_column = strip * 16;
-            for y in 0..height {
-                for (column, row) in rows.chunks_exact_mut(height).enumerate() {
-                    row[y] = source[y * width + first_column + column];
+        .for_each_init(Strip::default, |strip, (index, rows)| {
+            strip.load(plane, index * LANES);
+            operation(strip);
+            // Sixteen values at a time: what is read sixteen times stays at hand.
+            for (block, values) in strip.values.chunks(LANES).enumerate() {
+                for (lane, row) in rows.chunks_exact_mut(height).enumerate() {
+                    for (value, lanes) in row[block * LANES..].iter_mut().zip(values) {
+                        *value = lanes[lane];
+                    }
                 }
             }
         });

@@ -32,8 +32,11 @@
 //! # Ok::<(), fechner_perception::Error>(())
 //! ```
 
+pub mod adaptation;
+pub mod allocation;
 mod bands;
 pub mod csf;
+pub mod difference;
 pub mod display;
 pub mod eotf;
 mod error;
@@ -41,15 +44,20 @@ mod fft;
 mod filter;
 pub mod guide;
 pub mod masking;
+pub mod model;
+pub mod motion;
+pub mod opponent;
 pub mod photometry;
 mod plane;
 pub mod psychometric;
+pub mod saliency;
 pub mod seen;
 mod sensitivity;
 #[cfg(test)]
 mod test_noise;
 pub mod threshold;
 pub mod tone;
+pub mod tvi;
 pub mod visibility;
 
 pub use csf::{CastleCsf, ContrastSensitivity};

@@ -1,7 +1,7 @@
 //! Masking: how much a band's own contrast raises its threshold.
 
 use crate::bands::{OctaveBands, RadialTable};
-use crate::fft::{PictureTransform, Spectrum};
+use crate::fft::{PictureTransform, Spectrum, enlarged, reduced_pixel as pixel, reduction};
 use crate::filter::{erode, gaussian_blur};
 use crate::plane::Plane;
 use crate::sensitivity::BandTables;
@@ -76,26 +76,32 @@ pub(crate) fn band_elevation(
     elevation: &ElevationTable,
 ) -> Plane {
     let ppd = source.pixels_per_degree;
+    let (width, height) = (source.coordinates.width(), source.coordinates.height());
     let gain = RadialTable::new(ppd, |freq| bands.mask_gain(band, freq));
+    let limit_cpd = bands.limit_cpd(band);
+    // A quarter more densely than the band needs: its energy is blurred next.
+    let factor = reduction(ppd, 1.25 * limit_cpd);
+    let wavelength_px = ppd / bands.center_cpd(band) / factor as f64;
     let mut energy = source
         .transform
-        .filtered(source.contrast, ppd, bands.limit_cpd(band), |freq| {
+        .filtered_reduced(source.contrast, ppd, limit_cpd, factor, |freq| {
             gain.at(freq)
         })
-        .map(|a| a * a);
-    let share = tables.mask_noise_share as f32;
+        .map(|amplitude| amplitude * amplitude);
     if let Some(noise) = source.noise {
+        let share = tables.mask_noise_share as f32;
         energy.for_each_row_mut(|y, row| {
-            for (value, noise) in row.iter_mut().zip(noise.row(y)) {
-                *value -= share * noise;
+            for (x, value) in row.iter_mut().enumerate() {
+                *value -= share * block_mean(noise, x, y, factor);
             }
         });
     }
-    let wavelength_px = ppd / bands.center_cpd(band);
     let mut mask = gaussian_blur(&energy, 0.35 * wavelength_px);
     mask.for_each_row_mut(|y, row| {
-        for (value, coordinate) in row.iter_mut().zip(source.coordinates.row(y)) {
-            *value = 2.0 * value.max(0.0) * tables.center_sensitivity_squared.at(*coordinate);
+        let coordinates = source.coordinates.row(pixel(y, factor, height));
+        for (x, value) in row.iter_mut().enumerate() {
+            let coordinate = coordinates[pixel(x, factor, width)];
+            *value = 2.0 * value.max(0.0) * tables.center_sensitivity_squared.at(coordinate);
         }
     });
     let mut elevated = erode(&mask, wavelength_px.round() as usize);
@@ -103,7 +109,26 @@ pub(crate) fn band_elevation(
         row.iter_mut()
             .for_each(|value| *value = elevation.at(*value))
     });
-    elevated
+    enlarged(&elevated, factor, width, height)
+}
+
+/// Mean of the `factor` × `factor` pixels around a reduced sample.
+fn block_mean(plane: &Plane, x: usize, y: usize, factor: usize) -> f32 {
+    if factor == 1 {
+        return plane.get(pixel(x, 1, plane.width()), pixel(y, 1, plane.height()));
+    }
+    let range = |index: usize, len: usize| {
+        let center = pixel(index, factor, len);
+        center.saturating_sub(factor / 2)..(center + factor / 2).min(len).max(1)
+    };
+    let (mut sum, mut count) = (0.0, 0.0);
+    for v in range(y, plane.height()) {
+        for value in &plane.row(v)[range(x, plane.width())] {
+            sum += value;
+            count += 1.0;
+        }
+    }
+    if count > 0.0 { sum / count } else { 0.0 }
 }
 
 #[cfg(test)]

@@ -14,9 +14,29 @@ pub fn luminance(rgb: [f32; 3]) -> f32 {
     rgb[0] * REC709_WEIGHTS[0] + rgb[1] * REC709_WEIGHTS[1] + rgb[2] * REC709_WEIGHTS[2]
 }
 
+/// Scotopic luminance (what the rods see) of linear Rec. 709 RGB, in the unit of `rgb`, scaled so that white has the
+/// same photopic and scotopic luminance.
+///
+/// Weights of Ward Larson, Rushmeier and Piatko's 1997 operator as Radiance publishes it, made for its own primaries
+/// and used here as an approximation for Rec. 709. Multiply by 2.26 for scotopic cd/m² of an equal-energy white.
+#[must_use]
+pub fn scotopic_luminance(rgb: [f32; 3]) -> f32 {
+    rgb[0] * 0.062 + rgb[1] * 0.608 + rgb[2] * 0.330
+}
+
+/// Luminance in cd/m² of a white whose radiance is 1 W/(sr m²) over the visible band (equal-energy white, 380 to 780 nm;
+/// Radiance's convention), per unit of RGB.
+pub const WHITE_EFFICACY_LM_W: f64 = 179.0;
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rods_are_blind_to_red() {
+        assert!((scotopic_luminance([1.0; 3]) - 1.0).abs() < 1e-6);
+        assert!(scotopic_luminance([1.0, 0.0, 0.0]) < 0.3 * luminance([1.0, 0.0, 0.0]));
+    }
 
     #[test]
     fn weights_are_rec709() {

@@ -136,7 +136,7 @@ impl SensitivityTables {
                     .iter()
                     .map(|ring| ring.weight * bands.mask_gain(band, ring.freq_cpd).powi(2))
                     .sum(),
-                spread_deg: spread_deg(ppd, |freq| {
+                spread_deg: spread_deg(bands.limit_cpd(band).min(ppd / 2.0), |freq| {
                     bands.gain(band, freq) * csf.sensitivity(freq, grey_cd_m2)
                 }),
             })
@@ -150,17 +150,19 @@ struct Ring {
     weight: f64,
 }
 
-/// Standard deviation along one axis of |h|², for the isotropic filter of transfer function `transfer`: by Parseval,
-/// ∫ x² h² = ∫ |∂H/∂f|² / 4π², of which each axis has half.
-fn spread_deg(pixels_per_degree: f64, transfer: impl Fn(f64) -> f64) -> f64 {
-    let step = pixels_per_degree / 2.0 / 4000.0;
+/// Standard deviation along one axis of |h|², for the isotropic filter of transfer function `transfer` that passes nothing
+/// above `limit_cpd`: by Parseval, ∫ x² h² = ∫ |∂H/∂f|² / 4π², of which each axis has half.
+fn spread_deg(limit_cpd: f64, transfer: impl Fn(f64) -> f64) -> f64 {
+    const STEPS: u32 = 256;
+    let step = limit_cpd / f64::from(STEPS);
     let (mut energy, mut slope_energy) = (0.0, 0.0);
-    for index in 0..4000 {
-        let freq = (f64::from(index) + 0.5) * step;
-        let value = transfer(freq);
-        let slope = (transfer(freq + 0.5 * step) - transfer(freq - 0.5 * step)) / step;
-        energy += value * value * freq;
-        slope_energy += slope * slope * freq;
+    let mut last = transfer(0.0);
+    for index in 1..=STEPS {
+        let next = transfer(f64::from(index) * step);
+        let freq = (f64::from(index) - 0.5) * step;
+        energy += (0.5 * (last + next)).powi(2) * freq;
+        slope_energy += ((next - last) / step).powi(2) * freq;
+        last = next;
     }
     if energy <= 0.0 {
         return 0.0;
@@ -196,12 +198,7 @@ pub(crate) fn adaptation_levels(
             let luminance = 10.0_f64.powf(f64::from(level) / 2.0);
             let gain = viewing.observer.sensitivity;
             let sensitivity = RadialTable::new(viewing.display.pixels_per_degree, |freq| {
-                // The average over a picture is no pattern: no model has a threshold for 0 cpd.
-                if freq > 0.0 {
-                    gain * csf.sensitivity(freq, luminance)
-                } else {
-                    0.0
-                }
+                gain * csf.sensitivity(freq, luminance)
             });
             AdaptationLevel {
                 luminance_cd_m2: luminance as f32,

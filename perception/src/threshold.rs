@@ -1,7 +1,7 @@
 //! The threshold map: how much error each pixel of a picture may have before it is seen.
 
 use crate::bands::OctaveBands;
-use crate::csf::ContrastSensitivity;
+use crate::csf::{ContrastSensitivity, DRIFT_DEG_S, Daly98};
 use crate::display::Viewing;
 use crate::error::Error;
 use crate::fft::PictureTransform;
@@ -74,25 +74,81 @@ pub fn threshold_map(
         variance.check_size("guide variance", guide.width(), guide.height())?;
         variance.check_non_negative("guide variance")?;
     }
+    let adaptation_cd_m2 = local_adaptation(guide, viewing.display.pixels_per_degree);
+    Ok(assemble(
+        guide,
+        inputs.guide_variance,
+        adaptation_cd_m2,
+        viewing,
+        csf,
+    ))
+}
+
+/// Finds thresholds of one chromatic channel of a picture, to be asked about errors in that channel.
+///
+/// `channel_cd_m2` is the channel's signal in the denoised guide and `display_luminance_cd_m2` the guide's luminance (both
+/// from [`crate::opponent::opponent`] of the displayed colours): adaptation comes from luminance, masking from the
+/// channel's own contrast. `csf` is the channel's, e.g. [`crate::csf::CastleChromatic`].
+///
+/// # Errors
+/// As [`threshold_map`]; the channel's signal may be negative.
+pub fn chromatic_threshold_map(
+    channel_cd_m2: &Plane,
+    display_luminance_cd_m2: &Plane,
+    viewing: &Viewing,
+    csf: &dyn ContrastSensitivity,
+) -> Result<ThresholdMap, Error> {
+    viewing.check()?;
+    display_luminance_cd_m2.check_non_negative("display luminance")?;
+    channel_cd_m2.check_size(
+        "chromatic signal",
+        display_luminance_cd_m2.width(),
+        display_luminance_cd_m2.height(),
+    )?;
+    channel_cd_m2
+        .map(f32::abs)
+        .check_non_negative("chromatic signal")?;
+    let adaptation_cd_m2 =
+        local_adaptation(display_luminance_cd_m2, viewing.display.pixels_per_degree);
+    Ok(assemble(
+        channel_cd_m2,
+        None,
+        adaptation_cd_m2,
+        viewing,
+        csf,
+    ))
+}
+
+/// Adaptation luminance: see [`threshold_map`].
+pub(crate) fn local_adaptation(luminance_cd_m2: &Plane, pixels_per_degree: f64) -> Plane {
+    gaussian_blur(
+        &without_single_bright_pixels(luminance_cd_m2),
+        POOLING_SIGMA_DEG * pixels_per_degree,
+    )
+    .map(|value| value.max(LEAST_ADAPTATION_CD_M2))
+}
+
+/// Masks and noise gain of a signal, cd/m², under an adaptation luminance.
+fn assemble(
+    signal_cd_m2: &Plane,
+    noise_variance: Option<&Plane>,
+    adaptation_cd_m2: Plane,
+    viewing: &Viewing,
+    csf: &dyn ContrastSensitivity,
+) -> ThresholdMap {
     let ppd = viewing.display.pixels_per_degree;
     let bands = OctaveBands::for_grid(ppd);
     let tables = SensitivityTables::new(&bands, viewing, csf);
-
-    let mut adaptation_cd_m2 = gaussian_blur(
-        &without_single_bright_pixels(guide),
-        POOLING_SIGMA_DEG * ppd,
-    );
-    adaptation_cd_m2.for_each_row_mut(|_, row| {
-        row.iter_mut()
-            .for_each(|value| *value = value.max(LEAST_ADAPTATION_CD_M2));
-    });
     let coordinates = adaptation_cd_m2.map(luminance_coordinate);
 
-    let transform = picture_transform(guide.width(), guide.height(), ppd);
-    let contrast = transform.forward(&ratio(guide, &adaptation_cd_m2, |value, adaptation| {
-        value / adaptation - 1.0
-    }));
-    let noise = inputs.guide_variance.map(|variance| {
+    let transform = picture_transform(signal_cd_m2.width(), signal_cd_m2.height(), ppd);
+    // Less its mean, which no band passes: the transform's precision is for the detail.
+    let contrast = ratio(signal_cd_m2, &adaptation_cd_m2, |value, adaptation| {
+        value / adaptation
+    });
+    let mean = contrast.mean() as f32;
+    let contrast = transform.forward(&contrast.map(|value| value - mean));
+    let noise = noise_variance.map(|variance| {
         ratio(variance, &adaptation_cd_m2, |value, adaptation| {
             value / adaptation / adaptation
         })
@@ -115,7 +171,7 @@ pub fn threshold_map(
     let noise_gain = noise_gain(&tables, &adaptation_cd_m2, &coordinates, Some(&elevations));
     let (least, greatest) = range(&adaptation_cd_m2);
     let levels = adaptation_levels(viewing, csf, least, greatest);
-    Ok(ThresholdMap {
+    ThresholdMap {
         viewing: viewing.clone(),
         bands,
         tables,
@@ -123,7 +179,7 @@ pub fn threshold_map(
         adaptation_cd_m2,
         elevations,
         noise_gain,
-    })
+    }
 }
 
 impl ThresholdMap {
@@ -158,6 +214,33 @@ impl ThresholdMap {
         })
     }
 
+    /// The same thresholds for error that moves over the retina at `retinal_velocity_deg_s` (see [`crate::motion`]).
+    ///
+    /// Each band's threshold is raised, or at low frequencies lowered, by the ratio of Daly's 1998 spatiovelocity
+    /// sensitivity at rest to that in motion at the band's centre, kept within 0.1 and 20.
+    ///
+    /// # Errors
+    /// [`Error::SizeMismatch`] and [`Error::BadPixel`] for velocities that do not fit.
+    pub fn with_motion(&self, retinal_velocity_deg_s: &Plane) -> Result<Self, Error> {
+        retinal_velocity_deg_s.check_size("velocity", self.width(), self.height())?;
+        retinal_velocity_deg_s.check_non_negative("velocity")?;
+        let mut moved = self.clone();
+        for (band, elevation) in moved.elevations.iter_mut().enumerate() {
+            let table = MotionTable::new(self.bands.center_cpd(band));
+            *elevation = ratio(elevation, retinal_velocity_deg_s, |elevation, velocity| {
+                elevation * table.at(velocity)
+            });
+        }
+        let coordinates = self.adaptation_cd_m2.map(luminance_coordinate);
+        moved.noise_gain = noise_gain(
+            &self.tables,
+            &self.adaptation_cd_m2,
+            &coordinates,
+            Some(&moved.elevations),
+        );
+        Ok(moved)
+    }
+
     /// The viewing that the thresholds hold for.
     #[must_use]
     pub fn viewing(&self) -> &Viewing {
@@ -174,6 +257,40 @@ impl ThresholdMap {
     #[must_use]
     pub fn height(&self) -> usize {
         self.adaptation_cd_m2.height()
+    }
+}
+
+/// Threshold elevation by motion of one frequency, against log retinal velocity.
+struct MotionTable {
+    entries: Vec<f32>,
+}
+
+impl MotionTable {
+    /// Steps a factor of 2 in velocity.
+    const STEPS_AN_OCTAVE: f32 = 8.0;
+
+    fn new(freq_cpd: f64) -> Self {
+        let rest = Daly98::default().ln_sensitivity(freq_cpd);
+        let entries = (0..=96)
+            .map(|index| {
+                let retinal_velocity_deg_s =
+                    DRIFT_DEG_S * (f64::from(index) / f64::from(Self::STEPS_AN_OCTAVE)).exp2();
+                let moving = Daly98 {
+                    retinal_velocity_deg_s,
+                }
+                .ln_sensitivity(freq_cpd);
+                (rest - moving).exp().clamp(0.1, 20.0) as f32
+            })
+            .collect();
+        Self { entries }
+    }
+
+    fn at(&self, velocity_deg_s: f32) -> f32 {
+        let position =
+            (velocity_deg_s / DRIFT_DEG_S as f32).max(1.0).log2() * Self::STEPS_AN_OCTAVE;
+        let index = (position as usize).min(self.entries.len() - 2);
+        let fraction = (position - index as f32).min(1.0);
+        self.entries[index] + fraction * (self.entries[index + 1] - self.entries[index])
     }
 }
 
@@ -388,6 +505,52 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn error_that_moves_fast_may_be_larger() {
+        let map = map_of(&Plane::filled(32, 32, 50.0), &viewing(60.0));
+        let at = |velocity| {
+            let moved = map.with_motion(&Plane::filled(32, 32, velocity)).unwrap();
+            moved.allowed_standard_error_cd_m2(1.0).get(16, 16)
+        };
+        let still = map.allowed_standard_error_cd_m2(1.0).get(16, 16);
+        assert!((at(0.0) / still - 1.0).abs() < 1e-5 && (at(0.15) / still - 1.0).abs() < 1e-5);
+        assert!(at(10.0) > 2.0 * still, "{} {still}", at(10.0));
+        assert!(at(1e9).is_finite());
+        assert!(map.with_motion(&Plane::filled(3, 3, 0.0)).is_err());
+    }
+
+    #[test]
+    fn isoluminant_noise_is_not_missed() {
+        use crate::csf::{CastleChromatic, ChromaticChannel};
+        use crate::opponent::opponent;
+        let mut state = 9;
+        let noise: Vec<_> = (0..128 * 128)
+            .map(|_| {
+                // Red up and green down by the same luminance.
+                let red = 40.0 * normal(&mut state);
+                opponent([red, -red * 0.2126 / 0.7152, 0.0])
+            })
+            .collect();
+        let plane = |value: fn(&crate::opponent::Opponent) -> f32| {
+            Plane::from_values(128, 128, noise.iter().map(value).collect()).unwrap()
+        };
+        let grey = Plane::filled(128, 128, 100.0);
+        let csf = CastleChromatic::new(ChromaticChannel::RedGreen, 1.0).unwrap();
+        let red_green =
+            chromatic_threshold_map(&Plane::filled(128, 128, 0.0), &grey, &viewing(60.0), &csf)
+                .unwrap();
+        let luminance_v = map_of(&grey, &viewing(60.0))
+            .measured_visibility(&plane(|c| c.achromatic))
+            .get(64, 64);
+        let chromatic_v = red_green
+            .measured_visibility(&plane(|c| c.red_green))
+            .get(64, 64);
+        assert!(
+            luminance_v < 1e-3 && chromatic_v > 1.0,
+            "luminance {luminance_v}, red–green {chromatic_v}"
+        );
     }
 
     #[test]

@@ -5,6 +5,7 @@
 //! grating at its threshold has v = 1: the √2 turns its RMS into its amplitude.
 
 use crate::bands::RadialTable;
+use crate::fft::{enlarged, reduced_pixel, reduced_size, reduction};
 use crate::filter::gaussian_blur;
 use crate::plane::Plane;
 use crate::sensitivity::luminance_coordinate;
@@ -54,10 +55,14 @@ impl ThresholdMap {
         let coordinates = self.adaptation_cd_m2.map(luminance_coordinate);
         let mut energy = Plane::filled(self.width(), self.height(), 0.0);
         for (tables, elevation) in self.tables.bands.iter().zip(&self.elevations) {
-            let spread = gaussian_blur(
-                &relative,
-                tables.spread_deg * self.viewing.display.pixels_per_degree,
-            );
+            // A spread of a fifth of the pooling window widens it by 2 %: nothing to pay a blur for.
+            let blurred = (tables.spread_deg > 0.2 * POOLING_SIGMA_DEG).then(|| {
+                gaussian_blur(
+                    &relative,
+                    tables.spread_deg * self.viewing.display.pixels_per_degree,
+                )
+            });
+            let spread = blurred.as_ref().unwrap_or(&relative);
             energy.for_each_row_mut(|y, row| {
                 let inputs = spread
                     .row(y)
@@ -144,32 +149,42 @@ impl ThresholdMap {
             .adaptation_cd_m2
             .map(|adaptation| self.level_position(adaptation));
         let mut energy = Plane::filled(self.width(), self.height(), 0.0);
+        let (width, height) = (self.width(), self.height());
         for (band, elevation) in self.elevations.iter().enumerate() {
             let window = RadialTable::new(ppd, |freq| self.bands.gain(band, freq));
-            let mut response = Plane::filled(self.width(), self.height(), 0.0);
+            let limit_cpd = self.bands.limit_cpd(band);
+            // The energy reaches twice as far in frequency as the amplitude.
+            let factor = reduction(ppd, 2.0 * limit_cpd);
+            let mut response = Plane::filled(
+                reduced_size(width, factor),
+                reduced_size(height, factor),
+                0.0,
+            );
             for (index, level) in self.levels.iter().enumerate() {
                 let gain = window.times(&level.sensitivity);
                 let filtered =
-                    transform.filtered(&spectrum, ppd, self.bands.limit_cpd(band), |freq| {
-                        gain.at(freq)
-                    });
+                    transform
+                        .filtered_reduced(&spectrum, ppd, limit_cpd, factor, |freq| gain.at(freq));
                 response.for_each_row_mut(|y, row| {
-                    for (value, (filtered, position)) in row
-                        .iter_mut()
-                        .zip(filtered.row(y).iter().zip(positions.row(y)))
-                    {
+                    let positions = positions.row(reduced_pixel(y, factor, height));
+                    for (x, (value, filtered)) in row.iter_mut().zip(filtered.row(y)).enumerate() {
+                        let position = positions[reduced_pixel(x, factor, width)];
                         *value += filtered * (1.0 - (position - index as f32).abs()).max(0.0);
                     }
                 });
             }
-            energy.for_each_row_mut(|y, row| {
-                for (value, (response, elevation)) in row
-                    .iter_mut()
-                    .zip(response.row(y).iter().zip(elevation.row(y)))
-                {
-                    let visible = response / elevation;
-                    *value += visible * visible;
+            response.for_each_row_mut(|y, row| {
+                let elevations = elevation.row(reduced_pixel(y, factor, height));
+                for (x, value) in row.iter_mut().enumerate() {
+                    let visible = *value / elevations[reduced_pixel(x, factor, width)];
+                    *value = visible * visible;
                 }
+            });
+            let whole = enlarged(&response, factor, width, height);
+            energy.for_each_row_mut(|y, row| {
+                row.iter_mut()
+                    .zip(whole.row(y))
+                    .for_each(|(value, more)| *value += more);
             });
         }
         energy

@@ -3,9 +3,26 @@
 //! S = 1 / (contrast amplitude at threshold), contrast = amplitude / mean luminance. The threshold *amplitude* of a
 //! grating of ρ cycles per degree on L cd/m² is therefore L / S(ρ, L) cd/m².
 
+mod barten99;
 mod castle;
+mod castle_chromatic;
+mod castle_temporal;
+mod daly93;
+mod daly98;
+mod mannos_sakrison;
+mod moving;
 
+pub use barten99::Barten99;
 pub use castle::CastleCsf;
+pub use castle_chromatic::{CastleChromatic, ChromaticChannel};
+pub use castle_temporal::CastleTemporal;
+pub use daly93::Daly93;
+pub use daly98::{DRIFT_DEG_S, Daly98, FASTEST_PURSUIT_DEG_S, PURSUIT_GAIN};
+pub use mannos_sakrison::MannosSakrison;
+pub use moving::Moving;
+
+use crate::display::Viewing;
+use crate::error::Error;
 
 /// A contrast sensitivity function for static, achromatic gratings seen foveally.
 pub trait ContrastSensitivity: Send + Sync {
@@ -17,4 +34,80 @@ pub trait ContrastSensitivity: Send + Sync {
     /// Finite and not negative for every finite frequency ≥ 0 and luminance ≥ 0; a luminance outside the model's
     /// domain is moved to its edge.
     fn sensitivity(&self, freq_cpd: f64, luminance_cd_m2: f64) -> f64;
+}
+
+const NAMES: [&str; 5] = ["castle", "barten99", "daly93", "daly98", "mannos-sakrison"];
+
+/// The names that [`by_name`] knows.
+#[must_use]
+pub fn names() -> &'static [&'static str] {
+    &NAMES
+}
+
+/// The function of that name, for the observer's area and the display's distance where it depends on them.
+///
+/// # Errors
+/// [`Error::UnknownName`], or [`Error::OutOfRange`] for an impossible viewing.
+///
+/// ```
+/// use fechner_perception::{Viewing, csf};
+/// let csf = csf::by_name("barten99", &Viewing::default())?;
+/// assert!((csf.sensitivity(8.0, 100.0) - 235.0).abs() < 0.1);
+/// # Ok::<(), fechner_perception::Error>(())
+/// ```
+pub fn by_name(name: &str, viewing: &Viewing) -> Result<Box<dyn ContrastSensitivity>, Error> {
+    viewing.check()?;
+    let area_deg2 = viewing.observer.csf_area_deg2;
+    Ok(match name {
+        "castle" => Box::new(CastleCsf::new(area_deg2)?),
+        "barten99" => Box::new(Barten99 {
+            field_deg: area_deg2.sqrt(),
+        }),
+        "daly93" => Box::new(Daly93 {
+            area_deg2,
+            distance_m: viewing
+                .display
+                .distance_m
+                .unwrap_or(Daly93::default().distance_m),
+            ..Daly93::default()
+        }),
+        "daly98" => Box::new(Daly98::default()),
+        "mannos-sakrison" => Box::new(MannosSakrison::default()),
+        _ => {
+            return Err(Error::UnknownName {
+                kind: "contrast sensitivity function",
+                name: name.to_owned(),
+                known: NAMES.join(", "),
+            });
+        }
+    })
+}
+
+/// Greatest sensitivity over 0.05 to 60 cpd at one luminance.
+#[must_use]
+pub fn peak_sensitivity(csf: &dyn ContrastSensitivity, luminance_cd_m2: f64) -> f64 {
+    // Every function here has one hump over log frequency: a coarse scan, then thirds.
+    let at = |log_freq: f64| csf.sensitivity(log_freq.exp(), luminance_cd_m2);
+    let (first, last) = (0.05_f64.ln(), 60.0_f64.ln());
+    let step = (last - first) / 64.0;
+    let best =
+        (0..=64)
+            .map(|index| first + f64::from(index) * step)
+            .fold(first, |best, log_freq| {
+                if at(log_freq) > at(best) {
+                    log_freq
+                } else {
+                    best
+                }
+            });
+    let (mut low, mut high) = (best - step, best + step);
+    for _ in 0..60 {
+        let (left, right) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+        if at(left) < at(right) {
+            low = left;
+        } else {
+            high = right;
+        }
+    }
+    at(0.5 * (low + high)).max(at(best))
 }

@@ -1,0 +1,109 @@
+//! What the eye is adapted to.
+
+use crate::error::{Error, check_range};
+use crate::plane::Plane;
+use crate::sensitivity::LEAST_ADAPTATION_CD_M2;
+use crate::threshold::local_adaptation;
+
+/// How luminances are averaged.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Mean {
+    /// What reaches the retina; what threshold curves were measured with. A firefly moves it.
+    #[default]
+    Arithmetic,
+    /// exp(mean(ln L)): robust, usual for the key of a whole picture.
+    Geometric,
+}
+
+/// The luminance, cd/m², that an eye looking all over the picture adapts to, at least 1e-4. 1e-4 for a picture without pixels;
+/// values that are not finite are left out.
+#[must_use]
+pub fn world_adaptation_cd_m2(luminance_cd_m2: &Plane, mean: Mean) -> f64 {
+    let floor = f64::from(LEAST_ADAPTATION_CD_M2);
+    let (mut sum, mut count) = (0.0, 0.0);
+    for &value in luminance_cd_m2
+        .values()
+        .iter()
+        .filter(|value| value.is_finite())
+    {
+        let value = f64::from(value.max(LEAST_ADAPTATION_CD_M2));
+        sum += match mean {
+            Mean::Arithmetic => value,
+            Mean::Geometric => value.ln(),
+        };
+        count += 1.0;
+    }
+    if count == 0.0 {
+        return floor;
+    }
+    match mean {
+        Mean::Arithmetic => (sum / count).max(floor),
+        Mean::Geometric => (sum / count).exp().max(floor),
+    }
+}
+
+/// The luminance, cd/m², that the eye looking at each pixel adapts to: the mean over a Gaussian of σ 0.25° (as wide as a
+/// disc of 1°), at least 1e-4. Arithmetic means first bring single pixels brighter than all their neighbours down to them.
+///
+/// # Errors
+/// [`Error::Empty`] and [`Error::BadPixel`] for no picture, [`Error::OutOfRange`] unless `pixels_per_degree` is 1 to 1000.
+pub fn local_adaptation_cd_m2(
+    luminance_cd_m2: &Plane,
+    pixels_per_degree: f64,
+    mean: Mean,
+) -> Result<Plane, Error> {
+    luminance_cd_m2.check_non_negative("luminance")?;
+    check_range(
+        "pixels_per_degree",
+        pixels_per_degree,
+        1.0,
+        1000.0,
+        "between 1 and 1000 pixels per degree",
+    )?;
+    Ok(match mean {
+        Mean::Arithmetic => local_adaptation(luminance_cd_m2, pixels_per_degree),
+        Mean::Geometric => {
+            // The logarithm of the floor is the origin: the blur wants no negative numbers.
+            let logs = luminance_cd_m2
+                .map(|value| (value.max(LEAST_ADAPTATION_CD_M2) / LEAST_ADAPTATION_CD_M2).ln());
+            let sigma_px = crate::threshold::POOLING_SIGMA_DEG * pixels_per_degree;
+            crate::filter::gaussian_blur(&logs, sigma_px)
+                .map(|log| log.exp() * LEAST_ADAPTATION_CD_M2)
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_dark_half_bright() {
+        let picture = Plane::from_fn(40, 40, |x, _| if x < 20 { 1.0 } else { 100.0 });
+        assert!((world_adaptation_cd_m2(&picture, Mean::Arithmetic) - 50.5).abs() < 1e-6);
+        assert!((world_adaptation_cd_m2(&picture, Mean::Geometric) - 10.0).abs() < 1e-6);
+        // At the edge the window sees as much of one half as of the other.
+        let at = |mean| {
+            let adapted = local_adaptation_cd_m2(&picture, 20.0, mean).unwrap();
+            (adapted.get(19, 20), adapted.get(20, 20))
+        };
+        let (left, right) = at(Mean::Arithmetic);
+        assert!((0.5 * (left + right) - 50.5).abs() < 0.1);
+        let (left, right) = at(Mean::Geometric);
+        assert!(((left * right).sqrt() - 10.0).abs() < 0.1);
+    }
+
+    #[test]
+    fn black_and_empty_pictures_adapt_to_the_floor() {
+        for picture in [
+            Plane::filled(0, 0, 1.0),
+            Plane::filled(3, 3, 0.0),
+            Plane::filled(2, 2, f32::NAN),
+        ] {
+            for mean in [Mean::Arithmetic, Mean::Geometric] {
+                assert!((world_adaptation_cd_m2(&picture, mean) - 1e-4).abs() < 1e-9);
+            }
+        }
+        assert!(local_adaptation_cd_m2(&Plane::filled(2, 2, 1.0), 0.0, Mean::Geometric).is_err());
+    }
+}

@@ -1,0 +1,116 @@
+//! castleCSF's two chromatic mechanisms.
+
+use super::ContrastSensitivity;
+use crate::error::{Error, check_range};
+
+/// Which opponent channel of castleCSF.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ChromaticChannel {
+    /// L − M.
+    RedGreen,
+    /// S − (L + M).
+    YellowViolet,
+}
+
+/// castleCSF for isoluminant gratings: sensitivity to opponent contrast, the opponent signal's amplitude over L + M.
+///
+/// Ashraf et al. 2024 (see [`super::CastleCsf`]), sustained channel, foveal and static. Low-pass but for the area term.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CastleChromatic {
+    channel: ChromaticChannel,
+    area_deg2: f64,
+}
+
+struct Parameters {
+    /// `S_max` = p₁ (1 + p₂/L)^−p₃.
+    peak: [f64; 3],
+    peak_cpd: f64,
+    log2_bandwidth: f64,
+    area_0: f64,
+    freq_0: f64,
+}
+
+const RED_GREEN: Parameters = Parameters {
+    peak: [681.434, 38.0038, 0.480_386],
+    peak_cpd: 0.017_836_4,
+    log2_bandwidth: 2.421_04,
+    area_0: 2816.44,
+    freq_0: 0.071_105_8,
+};
+const YELLOW_VIOLET: Parameters = Parameters {
+    peak: [166.683, 62.8974, 0.411_93],
+    peak_cpd: 0.004_257_53,
+    log2_bandwidth: 2.681_97,
+    area_0: 2.827_89e7,
+    freq_0: 0.000_635_093,
+};
+
+impl CastleChromatic {
+    /// One channel, for gratings that cover `area_deg2` square degrees.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] unless the area lies between 0.001 and 10 000 deg².
+    pub fn new(channel: ChromaticChannel, area_deg2: f64) -> Result<Self, Error> {
+        check_range(
+            "csf_area_deg2",
+            area_deg2,
+            1e-3,
+            1e4,
+            "between 0.001 and 10000 deg²",
+        )?;
+        Ok(Self { channel, area_deg2 })
+    }
+}
+
+impl ContrastSensitivity for CastleChromatic {
+    fn name(&self) -> &'static str {
+        match self.channel {
+            ChromaticChannel::RedGreen => "castle-rg",
+            ChromaticChannel::YellowViolet => "castle-yv",
+        }
+    }
+
+    fn sensitivity(&self, freq_cpd: f64, luminance_cd_m2: f64) -> f64 {
+        if freq_cpd <= 0.0 {
+            return 0.0;
+        }
+        let parameters = match self.channel {
+            ChromaticChannel::RedGreen => &RED_GREEN,
+            ChromaticChannel::YellowViolet => &YELLOW_VIOLET,
+        };
+        let luminance = luminance_cd_m2.clamp(1e-3, 1e4);
+        let peak =
+            parameters.peak[0] * (1.0 + parameters.peak[1] / luminance).powf(-parameters.peak[2]);
+        let decades_above = (freq_cpd / parameters.peak_cpd).log10().max(0.0);
+        let log_parabola =
+            10.0_f64.powf(-decades_above * decades_above / parameters.log2_bandwidth.exp2());
+        let critical_area_deg2 = parameters.area_0 / (1.0 + (freq_cpd / parameters.freq_0).powi(2));
+        peak * log_parabola
+            * (critical_area_deg2 / (1.0 + critical_area_deg2 / self.area_deg2)).sqrt()
+            * freq_cpd
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::csf::CastleCsf;
+
+    #[test]
+    fn colour_is_seen_at_low_frequencies_only() {
+        for channel in [ChromaticChannel::RedGreen, ChromaticChannel::YellowViolet] {
+            let csf = CastleChromatic::new(channel, 1.0).unwrap();
+            let at = |freq: f64| csf.sensitivity(freq, 100.0);
+            let achromatic = CastleCsf::default();
+            let slope = |at: &dyn Fn(f64) -> f64| at(0.5) / at(8.0);
+            let luminance_slope = slope(&|freq| achromatic.sensitivity(freq, 100.0));
+            assert!(
+                slope(&at) > 3.0 * luminance_slope,
+                "{channel:?}: {} {luminance_slope}",
+                slope(&at)
+            );
+            assert!(at(0.0) == 0.0 && at(1e9).is_finite());
+            assert!(csf.sensitivity(1.0, 1.0) < at(1.0));
+        }
+    }
+}

@@ -1,0 +1,87 @@
+//! castleCSF for gratings that flicker or drift.
+
+use super::ContrastSensitivity;
+use super::castle::CastleCsf;
+
+/// castleCSF's achromatic mechanism at a temporal frequency: its sustained channel, which fades with it, and its
+/// transient channel, which peaks at w₀ = 2.41 log₁₀ L + 4.70 Hz; they add.
+///
+/// Ashraf et al. 2024 (see [`CastleCsf`]), fovea. Where the published w₀ crosses zero (0.0113 cd/m²) a static pattern
+/// would excite the transient channel by 59 % of the sustained one, and below it the formula has no real value: here w₀
+/// is at least 1 Hz, and at 0 Hz there is the sustained channel alone, so that the static case equals [`CastleCsf`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct CastleTemporal {
+    /// The static function.
+    pub sustained: CastleCsf,
+    /// Temporal frequency, Hz: spatial frequency times retinal velocity for a drifting grating.
+    pub temporal_hz: f64,
+}
+
+impl ContrastSensitivity for CastleTemporal {
+    fn name(&self) -> &'static str {
+        "castle-temporal"
+    }
+
+    fn sensitivity(&self, freq_cpd: f64, luminance_cd_m2: f64) -> f64 {
+        let flicker_hz = if self.temporal_hz.is_nan() {
+            0.0
+        } else {
+            self.temporal_hz.abs()
+        };
+        let sustained = (-flicker_hz.powf(1.3314) / 10.5795).exp()
+            * self.sustained.sensitivity(freq_cpd, luminance_cd_m2);
+        if flicker_hz <= 0.0 || freq_cpd <= 0.0 {
+            return sustained;
+        }
+        let luminance = luminance_cd_m2.clamp(1e-3, 1e4);
+        let peak_hz = (2.414_82 * luminance.log10() + 4.7036).max(1.0);
+        let detuning = flicker_hz.powf(0.1898) - peak_hz.powf(0.1898);
+        let response = (-detuning * detuning / 0.084_483_6).exp();
+        sustained + response * transient(freq_cpd, luminance, self.sustained.area_deg2())
+    }
+}
+
+/// Spatial sensitivity of the transient channel: low-pass, growing slowly with luminance.
+fn transient(freq_cpd: f64, luminance_cd_m2: f64, area_deg2: f64) -> f64 {
+    let peak = 2748.09 * luminance_cd_m2.powf(0.193_434);
+    let decades_above = (freq_cpd / 0.000_316_696).log10().max(0.0);
+    let log_parabola = 10.0_f64.powf(-decades_above * decades_above / 2.6761_f64.exp2());
+    let critical_area_deg2 = 3.816_11 / (1.0 + (freq_cpd / 3.013_89).powi(2));
+    peak * log_parabola
+        * (critical_area_deg2 / (1.0 + critical_area_deg2 / area_deg2)).sqrt()
+        * freq_cpd
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(temporal_hz: f64, freq_cpd: f64, luminance_cd_m2: f64) -> f64 {
+        CastleTemporal {
+            sustained: CastleCsf::default(),
+            temporal_hz,
+        }
+        .sensitivity(freq_cpd, luminance_cd_m2)
+    }
+
+    #[test]
+    fn rest_is_the_static_function() {
+        for luminance in [0.001, 0.0113, 0.01, 100.0] {
+            let still = CastleCsf::default().sensitivity(2.0, luminance);
+            assert!((at(0.0, 2.0, luminance) / still - 1.0).abs() < 1e-12);
+            // And nothing jumps where the published formula does.
+            assert!(
+                (at(1e-3, 2.0, luminance) / still - 1.0).abs() < 0.05,
+                "{luminance}"
+            );
+        }
+    }
+
+    #[test]
+    fn flicker_helps_coarse_patterns_and_hides_fine_ones() {
+        assert!(at(8.0, 0.5, 100.0) > at(0.0, 0.5, 100.0));
+        assert!(at(8.0, 8.0, 100.0) < 0.5 * at(0.0, 8.0, 100.0));
+        assert!(at(60.0, 1.0, 100.0) < at(8.0, 1.0, 100.0));
+        assert!(at(f64::NAN, 1.0, 100.0).is_finite() && at(1e300, 1.0, 100.0).is_finite());
+    }
+}

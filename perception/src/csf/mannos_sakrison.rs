@@ -1,0 +1,32 @@
+//! The first contrast sensitivity function of image coding.
+
+use super::ContrastSensitivity;
+
+/// Mannos and Sakrison, "The effects of a visual fidelity criterion on the encoding of images", IEEE Trans. IT 20, 1974:
+/// 2.6 (0.0192 + 0.114 f) exp(−(0.114 f)^1.1), times a gain.
+///
+/// It knows no luminance and no absolute scale; here its peak (0.981 at 7.894 cpd) is scaled by `gain`. For teaching and
+/// comparison.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MannosSakrison {
+    /// Multiplies the normalised function.
+    pub gain: f64,
+}
+
+impl Default for MannosSakrison {
+    /// A gain of 250, about the best that eyes do.
+    fn default() -> Self {
+        Self { gain: 250.0 }
+    }
+}
+
+impl ContrastSensitivity for MannosSakrison {
+    fn name(&self) -> &'static str {
+        "mannos-sakrison"
+    }
+
+    fn sensitivity(&self, freq_cpd: f64, _luminance_cd_m2: f64) -> f64 {
+        let scaled = 0.114 * freq_cpd.max(0.0);
+        self.gain * 2.6 * (0.0192 + scaled) * (-scaled.powf(1.1)).exp()
+    }
+}

@@ -1,0 +1,183 @@
+//! A visible-differences predictor: can one picture be told from another?
+
+use crate::csf::ContrastSensitivity;
+use crate::display::Viewing;
+use crate::error::Error;
+use crate::plane::Plane;
+use crate::psychometric::detection_probability;
+use crate::threshold::{ThresholdInputs, ratio, threshold_map};
+
+/// What an observer sees of the difference of two pictures.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Difference {
+    /// Visibility v of the difference at each pixel, in threshold units.
+    pub visibility: Plane,
+    /// Greatest v over the picture: the one figure. Above 1 the pictures are told apart somewhere.
+    pub worst_visibility: f64,
+    /// Share of the pixels with v above 1.
+    pub visible_fraction: f64,
+}
+
+impl Difference {
+    /// Probability of seeing the difference in the 1° patch around each pixel: 1 − exp(−v^3.5).
+    #[must_use]
+    pub fn detection(&self) -> Plane {
+        self.visibility
+            .map(|v| detection_probability(f64::from(v)) as f32)
+    }
+
+    /// Whether the difference reaches threshold anywhere.
+    #[must_use]
+    pub fn is_visible(&self) -> bool {
+        self.worst_visibility > 1.0
+    }
+}
+
+/// Predicts what can be seen of the difference between two pictures' displayed luminances (cd/m²).
+///
+/// After Daly, "The visible differences predictor", 1993: amplitude nonlinearity by local adaptation, the contrast
+/// sensitivity function (`csf`, any of [`crate::csf`]), masking by band. Changed: isotropic octave bands instead of the
+/// cortex transform, bands added by energy and pooled over 1° instead of probability summation (so that its figure is the
+/// visibility that the rest of this crate uses), and sensitivity below 0.5 cpd held at its value there, so that a picture
+/// that is brighter as a whole counts. Masking is mutual, the lesser of what the two pictures mask: detail that only one
+/// of them has does not hide its own absence from the other.
+///
+/// # Errors
+/// [`Error::SizeMismatch`], [`Error::Empty`], [`Error::BadPixel`] for pictures that cannot be compared,
+/// [`Error::OutOfRange`] for an impossible viewing.
+///
+/// ```
+/// use fechner_perception::{CastleCsf, Plane, Viewing};
+/// use fechner_perception::difference::difference;
+/// let reference = Plane::filled(64, 64, 100.0);
+/// let mut test = reference.clone();
+/// test.values_mut()[64 * 32 + 32] = 200.0; // twice as bright
+/// test.values_mut()[64 * 32 + 33] = 200.0;
+/// let seen = difference(&reference, &test, &Viewing::default(), &CastleCsf::default())?;
+/// assert!(seen.is_visible());
+/// # Ok::<(), fechner_perception::Error>(())
+/// ```
+pub fn difference(
+    reference_cd_m2: &Plane,
+    test_cd_m2: &Plane,
+    viewing: &Viewing,
+    csf: &dyn ContrastSensitivity,
+) -> Result<Difference, Error> {
+    test_cd_m2.check_size(
+        "test picture",
+        reference_cd_m2.width(),
+        reference_cd_m2.height(),
+    )?;
+    let csf = HeldAtLowFrequencies { base: csf };
+    let map_of = |picture| {
+        threshold_map(
+            &ThresholdInputs {
+                display_luminance_cd_m2: picture,
+                guide_variance: None,
+            },
+            viewing,
+            &csf,
+        )
+    };
+    let mut map = map_of(reference_cd_m2)?;
+    let test_map = map_of(test_cd_m2)?;
+    for (elevation, test_elevation) in map.elevations.iter_mut().zip(&test_map.elevations) {
+        *elevation = ratio(elevation, test_elevation, f32::min);
+    }
+    let visibility =
+        map.measured_visibility(&ratio(test_cd_m2, reference_cd_m2, |test, reference| {
+            test - reference
+        }));
+    let worst = visibility.values().iter().copied().fold(0.0, f32::max);
+    let visible = visibility.values().iter().filter(|v| **v > 1.0).count();
+    Ok(Difference {
+        worst_visibility: f64::from(worst),
+        visible_fraction: visible as f64 / visibility.values().len() as f64,
+        visibility,
+    })
+}
+
+/// Sensitivity below 0.5 cpd as at 0.5 cpd, 0 included.
+struct HeldAtLowFrequencies<'a> {
+    base: &'a dyn ContrastSensitivity,
+}
+
+impl ContrastSensitivity for HeldAtLowFrequencies<'_> {
+    fn name(&self) -> &'static str {
+        self.base.name()
+    }
+
+    fn sensitivity(&self, freq_cpd: f64, luminance_cd_m2: f64) -> f64 {
+        self.base.sensitivity(freq_cpd.max(0.5), luminance_cd_m2)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::csf::CastleCsf;
+    use crate::test_noise::normal;
+
+    fn compare(reference: &Plane, test: &Plane) -> Difference {
+        difference(reference, test, &Viewing::default(), &CastleCsf::default()).unwrap()
+    }
+
+    fn noisy(reference: &Plane, relative: f32) -> Plane {
+        let mut state = 3;
+        let mut test = reference.clone();
+        test.values_mut()
+            .iter_mut()
+            .for_each(|value| *value *= 1.0 + relative * normal(&mut state).clamp(-3.0, 3.0));
+        test
+    }
+
+    #[test]
+    fn equal_pictures_are_equal() {
+        let picture = Plane::from_fn(50, 40, |x, y| (x * y) as f32);
+        let found = compare(&picture, &picture);
+        assert_eq!((found.worst_visibility, found.visible_fraction), (0.0, 0.0));
+        assert!(!found.is_visible());
+    }
+
+    #[test]
+    fn more_noise_is_more_visible() {
+        let grey = Plane::filled(96, 96, 100.0);
+        let levels = [0.001, 0.005, 0.02, 0.08]
+            .map(|noise| compare(&grey, &noisy(&grey, noise)).worst_visibility);
+        assert!(
+            levels.windows(2).all(|pair| pair[0] < pair[1]),
+            "{levels:?}"
+        );
+        assert!(levels[0] < 1.0 && levels[3] > 1.0);
+    }
+
+    #[test]
+    fn a_picture_brighter_as_a_whole_is_seen() {
+        let grey = Plane::filled(64, 64, 100.0);
+        assert!(compare(&grey, &grey.map(|value| value * 1.1)).is_visible());
+        assert!(!compare(&grey, &grey.map(|value| value * 1.002)).is_visible());
+    }
+
+    #[test]
+    fn lost_texture_is_not_hidden_by_itself() {
+        let texture = Plane::from_fn(128, 128, |x, y| {
+            100.0 * (1.0 + 0.3 * (x as f32 * 0.42).cos() * (y as f32 * 0.42).cos())
+        });
+        let flat = Plane::filled(128, 128, 100.0);
+        let lost = compare(&texture, &flat).worst_visibility;
+        assert!((lost / compare(&flat, &texture).worst_visibility - 1.0).abs() < 0.05);
+        assert!(lost > 5.0, "{lost}");
+        // While noise on the texture is hidden by it, where the same noise on grey is not.
+        let on_texture = compare(&texture, &noisy(&texture, 0.03))
+            .visibility
+            .get(64, 64);
+        let on_grey = compare(&flat, &noisy(&flat, 0.03)).visibility.get(64, 64);
+        assert!(on_texture < 0.95 * on_grey, "{on_texture} {on_grey}");
+    }
+
+    #[test]
+    fn pictures_of_two_sizes_are_an_error() {
+        let (a, b) = (Plane::filled(4, 4, 1.0), Plane::filled(4, 5, 1.0));
+        assert!(difference(&a, &b, &Viewing::default(), &CastleCsf::default()).is_err());
+    }
+}

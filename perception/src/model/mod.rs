@@ -1,0 +1,270 @@
+//! Threshold models: rules for how much noise a pixel may have, from the first idea to the default.
+//!
+//! All answer the same question, in the same unit: the standard error of a pixel's mean, in cd/m² on the display, at
+//! which its noise is just at threshold. They differ in what they take into account.
+
+mod bolin_meyer;
+mod csf_bands;
+mod pyramid;
+mod ramasubramanian;
+mod tvi;
+mod yee;
+
+pub use bolin_meyer::BolinMeyer;
+pub use csf_bands::CsfBands;
+pub use ramasubramanian::Ramasubramanian;
+pub use tvi::Tvi;
+pub use yee::Yee;
+
+use crate::csf::ContrastSensitivity;
+use crate::display::Viewing;
+use crate::error::Error;
+use crate::plane::Plane;
+
+/// What a model may look at. All planes have one size.
+#[derive(Clone, Copy)]
+pub struct ModelInputs<'a> {
+    /// Luminance of the denoised guide as the display shows it, cd/m².
+    pub display_luminance_cd_m2: &'a Plane,
+    /// Variance of the noise left in the guide, (cd/m²)²; `None` takes it as clean.
+    pub guide_variance: Option<&'a Plane>,
+    /// Speed over the picture, deg/s, of what each pixel shows (see [`crate::motion::image_velocity_deg_s`]); `None` for a
+    /// still. Only for error that travels with the object.
+    pub image_velocity_deg_s: Option<&'a Plane>,
+    /// How much each pixel attracts the gaze, 0..1 (see [`crate::saliency`]); `None` is 1: everything is followed.
+    pub attention: Option<&'a Plane>,
+    /// Who looks from where.
+    pub viewing: &'a Viewing,
+    /// Contrast sensitivity.
+    pub csf: &'a dyn ContrastSensitivity,
+}
+
+impl ModelInputs<'_> {
+    fn check(&self) -> Result<(), Error> {
+        self.viewing.check()?;
+        let guide = self.display_luminance_cd_m2;
+        guide.check_non_negative("display luminance")?;
+        for (what, plane) in [
+            ("guide variance", self.guide_variance),
+            ("image velocity", self.image_velocity_deg_s),
+            ("attention", self.attention),
+        ] {
+            if let Some(plane) = plane {
+                plane.check_size(what, guide.width(), guide.height())?;
+                plane.check_non_negative(what)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Velocity over the retina, deg/s, at each pixel: the eye's drift alone for a still.
+    fn retinal_velocity_deg_s(&self) -> Option<Plane> {
+        let velocity = self.image_velocity_deg_s?;
+        Some(Plane::from_fn(
+            velocity.width(),
+            velocity.height(),
+            |x, y| {
+                let attention = self
+                    .attention
+                    .map_or(1.0, |attention| f64::from(attention.get(x, y)));
+                crate::motion::retinal_velocity_deg_s(f64::from(velocity.get(x, y)), attention)
+                    as f32
+            },
+        ))
+    }
+}
+
+/// A rule for how much noise may remain.
+pub trait ThresholdModel: Send + Sync {
+    /// What the command line calls it.
+    fn name(&self) -> &'static str;
+
+    /// Standard error of the pixel's mean, cd/m² on the display, at which noise is at threshold. Finite and positive.
+    ///
+    /// # Errors
+    /// [`Error`] for planes of different sizes, values that are not finite or negative, and impossible viewings.
+    fn allowed_standard_error_cd_m2(&self, inputs: &ModelInputs<'_>) -> Result<Plane, Error>;
+}
+
+/// Two-sided 95 % of a normal distribution: models that stop on a confidence interval ask z σ ≤ T.
+const Z_95: f64 = 1.96;
+
+const NAMES: [&str; 5] = ["csf-bands", "ramasubramanian", "yee", "bolin-meyer", "tvi"];
+
+/// The names that [`by_name`] knows; the first is the default.
+#[must_use]
+pub fn names() -> &'static [&'static str] {
+    &NAMES
+}
+
+/// The model of that name, with its defaults.
+///
+/// ```
+/// use fechner_perception::model;
+/// assert_eq!(model::by_name("yee").unwrap().name(), "yee");
+/// assert!(model::by_name("guess").is_none());
+/// ```
+#[must_use]
+pub fn by_name(name: &str) -> Option<Box<dyn ThresholdModel>> {
+    Some(match name {
+        "csf-bands" => Box::new(CsfBands),
+        "ramasubramanian" => Box::new(Ramasubramanian::default()),
+        "yee" => Box::new(Yee::default()),
+        "bolin-meyer" => Box::new(BolinMeyer),
+        "tvi" => Box::new(Tvi::default()),
+        _ => return None,
+    })
+}
+
+/// A function of adaptation luminance, asked once on a fine grid instead of once a pixel.
+struct PerLuminance {
+    entries: Vec<f32>,
+}
+
+impl PerLuminance {
+    const LOWEST_DECADE: f32 = -4.0;
+    const DECADES: f32 = 12.0;
+    const ENTRIES_A_DECADE: f32 = 16.0;
+
+    /// `value_at(luminance in cd/m²)` must be positive.
+    fn new(value_at: impl Fn(f64) -> f64) -> Self {
+        let last = (Self::DECADES * Self::ENTRIES_A_DECADE) as usize;
+        let entries = (0..=last)
+            .map(|index| {
+                let decade = Self::LOWEST_DECADE + index as f32 / Self::ENTRIES_A_DECADE;
+                value_at(10.0_f64.powf(f64::from(decade))).max(1e-30).ln() as f32
+            })
+            .collect();
+        Self { entries }
+    }
+
+    fn at(&self, luminance_cd_m2: f32) -> f32 {
+        let position =
+            (luminance_cd_m2.max(1e-4).log10() - Self::LOWEST_DECADE) * Self::ENTRIES_A_DECADE;
+        let index = (position.max(0.0) as usize).min(self.entries.len() - 2);
+        let fraction = (position - index as f32).clamp(0.0, 1.0);
+        (self.entries[index] + fraction * (self.entries[index + 1] - self.entries[index])).exp()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::csf::CastleCsf;
+
+    fn picture() -> Plane {
+        Plane::from_fn(160, 96, |x, y| {
+            let texture = if x > 80 {
+                0.5 * (x as f32 * 0.42).cos() * (y as f32 * 0.42).cos()
+            } else {
+                0.0
+            };
+            50.0 * (1.0 + texture)
+        })
+    }
+
+    fn ask(name: &str, guide: &Plane, velocity: Option<&Plane>) -> Plane {
+        let viewing = Viewing::default();
+        let inputs = ModelInputs {
+            display_luminance_cd_m2: guide,
+            guide_variance: None,
+            image_velocity_deg_s: velocity,
+            attention: None,
+            viewing: &viewing,
+            csf: &CastleCsf::default(),
+        };
+        by_name(name)
+            .unwrap()
+            .allowed_standard_error_cd_m2(&inputs)
+            .unwrap()
+    }
+
+    #[test]
+    fn every_model_answers_every_picture() {
+        let mut spike = Plane::filled(20, 10, 0.0);
+        spike.values_mut()[30] = 1e8;
+        for name in names() {
+            for guide in [
+                Plane::filled(1, 1, 0.0),
+                Plane::filled(3, 2, 1e8),
+                spike.clone(),
+                picture(),
+            ] {
+                let fast = Plane::filled(guide.width(), guide.height(), 1e6);
+                for velocity in [None, Some(&fast)] {
+                    let allowed = ask(name, &guide, velocity);
+                    assert!(
+                        allowed
+                            .values()
+                            .iter()
+                            .all(|value| value.is_finite() && *value > 0.0),
+                        "{name} on {}×{}",
+                        guide.width(),
+                        guide.height()
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn texture_and_motion_raise_thresholds_in_the_models_that_know_them() {
+        let guide = picture();
+        let moving = Plane::filled(160, 96, 20.0);
+        for (name, knows_texture, knows_motion) in [
+            ("csf-bands", true, true),
+            ("ramasubramanian", true, false),
+            ("yee", true, true),
+            ("bolin-meyer", true, false),
+            ("tvi", false, false),
+        ] {
+            let textured = ask(name, &guide, None).get(120, 48);
+            let flat = ask(name, &Plane::filled(160, 96, 50.0), None).get(120, 48);
+            assert_eq!(
+                textured > 1.05 * flat,
+                knows_texture,
+                "{name}: flat {flat}, textured {textured}"
+            );
+            let moved = ask(name, &guide, Some(&moving)).get(120, 48);
+            assert_eq!(
+                moved > 1.2 * textured,
+                knows_motion,
+                "{name}: still {textured}, moving {moved}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_uniform_picture_has_the_published_thresholds() {
+        let grey = Plane::filled(64, 64, 50.0);
+        let at = |name| ask(name, &grey, None).get(32, 32) * Z_95 as f32;
+        assert!(
+            (at("ramasubramanian") - 0.409_201).abs() < 1e-3,
+            "{}",
+            at("ramasubramanian")
+        );
+        assert!((at("tvi") - 3.087_946).abs() < 1e-2, "{}", at("tvi"));
+    }
+
+    #[test]
+    fn bad_inputs_are_errors() {
+        let (guide, small) = (Plane::filled(4, 4, 1.0), Plane::filled(2, 2, 1.0));
+        let viewing = Viewing::default();
+        for name in names() {
+            let inputs = ModelInputs {
+                display_luminance_cd_m2: &guide,
+                guide_variance: None,
+                image_velocity_deg_s: Some(&small),
+                attention: None,
+                viewing: &viewing,
+                csf: &CastleCsf::default(),
+            };
+            assert!(
+                by_name(name)
+                    .unwrap()
+                    .allowed_standard_error_cd_m2(&inputs)
+                    .is_err()
+            );
+        }
+    }
+}

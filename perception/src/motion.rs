@@ -1,0 +1,153 @@
+//! Motion: what moves over the picture, and what of it moves over the retina.
+
+use crate::csf::{DRIFT_DEG_S, FASTEST_PURSUIT_DEG_S, PURSUIT_GAIN};
+use crate::error::Error;
+use crate::plane::Plane;
+
+/// How the error of a moving picture moves; each class is seen differently.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ErrorMotion {
+    /// New noise in every frame: motion hides nothing of it.
+    #[default]
+    Fresh,
+    /// Error that travels with the object (from reprojected or cached samples): seen through the retinal velocity.
+    Travelling,
+    /// The same noise pattern in every frame, locked to the screen: as the eye follows the object, the pattern crosses the
+    /// retina at the eye's own velocity; where the eye rests it is static noise.
+    Locked,
+}
+
+/// Velocity of the eye, deg/s, when it looks at something that crosses the picture at `image_velocity_deg_s`:
+/// min(0.82 s v + 0.15, 80) (Daly 1998), with attention s in 0..1 (Yee et al. 2001): what stands out is followed.
+#[must_use]
+pub fn eye_velocity_deg_s(image_velocity_deg_s: f64, attention: f64) -> f64 {
+    let followed =
+        PURSUIT_GAIN * attention.clamp(0.0, 1.0) * image_velocity_deg_s.abs() + DRIFT_DEG_S;
+    followed.min(FASTEST_PURSUIT_DEG_S)
+}
+
+/// Speed over the retina, deg/s, at least the eye's drift of 0.15 deg/s: |v − v_eye|.
+///
+/// The floor is needed: at 0.833 deg/s the formula crosses zero and sensitivity would vanish.
+#[must_use]
+pub fn retinal_velocity_deg_s(image_velocity_deg_s: f64, attention: f64) -> f64 {
+    let image = image_velocity_deg_s.abs().min(1e9);
+    // `max` turns NaN into the drift.
+    (image - eye_velocity_deg_s(image, attention))
+        .abs()
+        .max(DRIFT_DEG_S)
+}
+
+impl ErrorMotion {
+    /// Velocity, deg/s, at which this error crosses the retina where the picture moves at `image_velocity_deg_s`.
+    /// `None` for fresh noise, which motion does not change.
+    #[must_use]
+    pub fn retinal_velocity_deg_s(self, image_velocity_deg_s: f64, attention: f64) -> Option<f64> {
+        match self {
+            Self::Fresh => None,
+            Self::Travelling => Some(retinal_velocity_deg_s(image_velocity_deg_s, attention)),
+            Self::Locked => {
+                Some(eye_velocity_deg_s(image_velocity_deg_s, attention).max(DRIFT_DEG_S))
+            }
+        }
+    }
+}
+
+/// Speed over the picture, deg/s, of motion in pixels a frame: |(x, y)| · frames a second / pixels a degree.
+///
+/// Each pixel takes the slowest speed of its 3×3 neighbourhood: at a silhouette the slower side's error is the one that
+/// could be seen. Motion that is not finite counts as none.
+///
+/// # Errors
+/// [`Error::SizeMismatch`] for planes of two sizes.
+pub fn image_velocity_deg_s(
+    motion_x_px: &Plane,
+    motion_y_px: &Plane,
+    frames_per_second: f64,
+    pixels_per_degree: f64,
+) -> Result<Plane, Error> {
+    motion_y_px.check_size("vertical motion", motion_x_px.width(), motion_x_px.height())?;
+    let scale = (frames_per_second / pixels_per_degree) as f32;
+    let speed = crate::threshold::ratio(motion_x_px, motion_y_px, |x, y| {
+        let speed = x.hypot(y) * scale;
+        if speed.is_finite() { speed } else { 0.0 }
+    });
+    Ok(crate::filter::erode(&speed, 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pixels_a_frame_become_degrees_a_second() {
+        for (pixels, fps, ppd, expected) in [
+            (1.0, 30.0, 30.0, 1.0),
+            (12.0, 30.0, 30.0, 12.0),
+            (5.0, 60.0, 40.0, 7.5),
+            (0.25, 24.0, 21.57, 0.278_164),
+        ] {
+            let x = Plane::filled(3, 3, pixels);
+            let speed = image_velocity_deg_s(&x, &Plane::filled(3, 3, 0.0), fps, ppd).unwrap();
+            assert!((speed.get(1, 1) - expected).abs() < 1e-5);
+        }
+        assert!(
+            image_velocity_deg_s(
+                &Plane::filled(3, 3, 0.0),
+                &Plane::filled(2, 3, 0.0),
+                30.0,
+                30.0
+            )
+            .is_err()
+        );
+    }
+
+    #[test]
+    fn attention_decides_what_is_followed() {
+        for (velocity, attention, expected) in [
+            (1.0, 0.0, 0.85),
+            (1.0, 0.5, 0.44),
+            (1.0, 1.0, 0.15),
+            (10.0, 0.25, 7.80),
+            (10.0, 1.0, 1.65),
+            (50.0, 0.5, 29.35),
+            (120.0, 1.0, 40.0),
+        ] {
+            let found = retinal_velocity_deg_s(velocity, attention);
+            assert!(
+                (found - expected).abs() < 1e-9,
+                "{velocity} {attention}: {found}"
+            );
+        }
+        assert!(retinal_velocity_deg_s(f64::NAN, f64::NAN).is_finite());
+    }
+
+    #[test]
+    fn the_three_kinds_of_error_move_differently() {
+        assert_eq!(ErrorMotion::Fresh.retinal_velocity_deg_s(10.0, 1.0), None);
+        assert!(
+            (ErrorMotion::Travelling
+                .retinal_velocity_deg_s(10.0, 1.0)
+                .unwrap()
+                - 1.65)
+                .abs()
+                < 1e-9
+        );
+        assert!(
+            (ErrorMotion::Locked
+                .retinal_velocity_deg_s(10.0, 1.0)
+                .unwrap()
+                - 8.35)
+                .abs()
+                < 1e-9
+        );
+        assert!(
+            (ErrorMotion::Locked
+                .retinal_velocity_deg_s(0.0, 1.0)
+                .unwrap()
+                - 0.15)
+                .abs()
+                < 1e-9
+        );
+    }
+}

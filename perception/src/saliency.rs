@@ -1,0 +1,364 @@
+//! Saliency: what of a picture attracts the gaze.
+//!
+//! Itti, Koch and Niebur, "A model of saliency-based visual attention for rapid scene analysis", IEEE PAMI 20(11), 1998:
+//! centre–surround differences of intensity, opponent colour and orientation over a pyramid; and of motion, as Yee,
+//! Pattanaik and Greenberg added in 2001.
+
+use crate::error::Error;
+use crate::filter::reflect;
+use crate::plane::Plane;
+
+/// The picture that somebody looks at. All planes have one size.
+#[derive(Clone, Copy, Debug)]
+pub struct SaliencyInputs<'a> {
+    /// Red, green and blue of the tone-mapped guide, 0..1: linear HDR would let one lamp own the map.
+    pub rgb: [&'a Plane; 3],
+    /// Speed over the picture, any unit; `None` for a still.
+    pub velocity: Option<&'a Plane>,
+}
+
+/// Saliency of each pixel, 0..1. A picture in which nothing stands out is 1 everywhere: all of it may be looked at.
+///
+/// # Errors
+/// [`Error::Empty`], [`Error::BadPixel`], [`Error::SizeMismatch`].
+pub fn saliency(inputs: &SaliencyInputs<'_>) -> Result<Plane, Error> {
+    let [red, green, blue] = inputs.rgb;
+    let (width, height) = (red.width(), red.height());
+    for (what, plane) in [
+        ("red", Some(red)),
+        ("green", Some(green)),
+        ("blue", Some(blue)),
+        ("velocity", inputs.velocity),
+    ] {
+        if let Some(plane) = plane {
+            plane.check_size(what, width, height)?;
+            plane.check_non_negative(what)?;
+        }
+    }
+    let intensity = Plane::from_fn(width, height, |x, y| {
+        (red.get(x, y) + green.get(x, y) + blue.get(x, y)) / 3.0
+    });
+    let pyramid = Pyramid::of(&intensity);
+    let opponents = opponent_colours(inputs.rgb, &intensity);
+    let mut conspicuities = vec![
+        conspicuity([&pyramid].into_iter()),
+        conspicuity(opponents.iter().map(Pyramid::of).collect::<Vec<_>>().iter()),
+        conspicuity(
+            (0..4)
+                .map(|turn| pyramid.oriented(turn))
+                .collect::<Vec<_>>()
+                .iter(),
+        ),
+    ];
+    if let Some(velocity) = inputs.velocity {
+        conspicuities.push(conspicuity([Pyramid::of(velocity)].iter()));
+    }
+    let mut sum = Plane::filled(conspicuities[0].width(), conspicuities[0].height(), 0.0);
+    for map in &conspicuities {
+        add(&mut sum, &promoted(map));
+    }
+    let largest = sum.values().iter().copied().fold(0.0, f32::max);
+    if largest <= 1e-6 {
+        return Ok(Plane::filled(width, height, 1.0));
+    }
+    let small = sum.map(|value| value / largest);
+    Ok(resized(&small, width, height))
+}
+
+/// Gaze at one point instead of a saliency map: 1 at (`x_px`, `y_px`), falling as a Gaussian of `sigma_px`.
+#[must_use]
+pub fn gaze(width: usize, height: usize, x_px: f32, y_px: f32, sigma_px: f32) -> Plane {
+    let scale = -0.5 / (sigma_px * sigma_px).max(1e-6);
+    Plane::from_fn(width, height, |x, y| {
+        let (dx, dy) = (x as f32 + 0.5 - x_px, y as f32 + 0.5 - y_px);
+        let value = ((dx * dx + dy * dy) * scale).exp();
+        if value.is_finite() { value } else { 0.0 }
+    })
+}
+
+/// Centre scales and the surrounds' distance from them, as published.
+const CENTERS: [usize; 3] = [2, 3, 4];
+const DELTAS: [usize; 2] = [3, 4];
+/// Scale at which maps are added.
+const COMMON: usize = 4;
+
+/// Half-sized copies of a plane; small pictures have fewer than the published nine.
+struct Pyramid {
+    levels: Vec<Plane>,
+}
+
+impl Pyramid {
+    fn of(plane: &Plane) -> Self {
+        let mut levels = vec![plane.clone()];
+        while levels.len() < 9 {
+            let last = &levels[levels.len() - 1];
+            if last.width().min(last.height()) < 2 {
+                break;
+            }
+            levels.push(halved(last));
+        }
+        Self { levels }
+    }
+
+    fn level(&self, index: usize) -> &Plane {
+        &self.levels[index.min(self.levels.len() - 1)]
+    }
+
+    /// Magnitude of the response to a Gabor patch at `turn` · 45° on every level.
+    fn oriented(&self, turn: u8) -> Self {
+        Self {
+            levels: self.levels.iter().map(|level| gabor(level, turn)).collect(),
+        }
+    }
+}
+
+/// Red–green and blue–yellow, hue only where there is light enough to see it.
+fn opponent_colours(rgb: [&Plane; 3], intensity: &Plane) -> [Plane; 2] {
+    let brightest = intensity.values().iter().copied().fold(0.0, f32::max);
+    let channel = |opponent: fn(f32, f32, f32) -> f32| {
+        Plane::from_fn(intensity.width(), intensity.height(), |x, y| {
+            let light = intensity.get(x, y);
+            if light <= brightest / 10.0 || light <= 0.0 {
+                return 0.0;
+            }
+            let [r, g, b] = rgb.map(|plane| plane.get(x, y) / light);
+            opponent(r, g, b)
+        })
+    };
+    [
+        channel(|r, g, b| (r - (g + b) / 2.0).max(0.0) - (g - (r + b) / 2.0).max(0.0)),
+        channel(|r, g, b| {
+            (b - (r + g) / 2.0).max(0.0) - ((r + g) / 2.0 - (r - g).abs() / 2.0 - b).max(0.0)
+        }),
+    ]
+}
+
+/// The across-scale sum of promoted centre–surround maps.
+fn conspicuity<'a>(pyramids: impl Iterator<Item = &'a Pyramid>) -> Plane {
+    let mut sum: Option<Plane> = None;
+    for pyramid in pyramids {
+        let common = pyramid.level(COMMON);
+        let (width, height) = (common.width(), common.height());
+        for center in CENTERS {
+            for delta in DELTAS {
+                let center_map = pyramid.level(center);
+                let surround = resized(
+                    pyramid.level(center + delta),
+                    center_map.width(),
+                    center_map.height(),
+                );
+                let mut difference = center_map.clone();
+                difference.for_each_row_mut(|y, row| {
+                    row.iter_mut()
+                        .zip(surround.row(y))
+                        .for_each(|(value, other)| *value = (*value - other).abs());
+                });
+                let map = promoted(&resized(&difference, width, height));
+                match &mut sum {
+                    Some(sum) => add(sum, &map),
+                    None => sum = Some(map),
+                }
+            }
+        }
+    }
+    sum.unwrap_or_else(|| Plane::filled(1, 1, 0.0))
+}
+
+/// Itti's N: scaled to 0..1, times (1 − m)² with m the mean of the local maxima but the global one: many equal peaks
+/// say nothing.
+fn promoted(map: &Plane) -> Plane {
+    let largest = map.values().iter().copied().fold(0.0, f32::max);
+    if largest <= 1e-6 {
+        return map.map(|_| 0.0);
+    }
+    let scaled = map.map(|value| value / largest);
+    let factor = promotion(&scaled);
+    scaled.map(|value| value * factor)
+}
+
+/// (M − m)² of a map scaled to M = 1.
+fn promotion(scaled: &Plane) -> f32 {
+    let (width, height) = (scaled.width(), scaled.height());
+    let mut maxima = Vec::new();
+    for y in 0..height {
+        for x in 0..width {
+            let value = scaled.get(x, y);
+            let mut is_peak = value > 0.0;
+            for v in y.saturating_sub(1)..(y + 2).min(height) {
+                for u in x.saturating_sub(1)..(x + 2).min(width) {
+                    // Of a plateau only its first pixel counts.
+                    let other = scaled.get(u, v);
+                    let earlier = (v, u) < (y, x);
+                    is_peak &= (u, v) == (x, y) || other < value || (other == value && !earlier);
+                }
+            }
+            if is_peak {
+                maxima.push(value);
+            }
+        }
+    }
+    maxima.sort_unstable_by(f32::total_cmp);
+    maxima.pop();
+    if maxima.is_empty() {
+        return 1.0;
+    }
+    let mean = maxima.iter().sum::<f32>() / maxima.len() as f32;
+    (1.0 - mean).powi(2)
+}
+
+fn add(sum: &mut Plane, other: &Plane) {
+    for (value, other) in sum.values_mut().iter_mut().zip(other.values()) {
+        *value += other;
+    }
+}
+
+/// Blurred by the binomial kernel (1, 4, 6, 4, 1)/16 and every second pixel taken.
+fn halved(plane: &Plane) -> Plane {
+    const KERNEL: [f32; 5] = [0.0625, 0.25, 0.375, 0.25, 0.0625];
+    let (width, height) = (plane.width(), plane.height());
+    let tap =
+        |center: usize, index: usize, len: usize| reflect((2 * center + index) as isize - 2, len);
+    let across = Plane::from_fn(width.div_ceil(2), height, |x, y| {
+        (0..5)
+            .map(|index| KERNEL[index] * plane.get(tap(x, index, width), y))
+            .sum()
+    });
+    Plane::from_fn(across.width(), height.div_ceil(2), |x, y| {
+        (0..5)
+            .map(|index| KERNEL[index] * across.get(x, tap(y, index, height)))
+            .sum()
+    })
+}
+
+/// Bilinear interpolation to another size.
+fn resized(plane: &Plane, width: usize, height: usize) -> Plane {
+    let place = |index: usize, to: usize, from: usize| {
+        let position =
+            ((index as f32 + 0.5) * from as f32 / to as f32 - 0.5).clamp(0.0, (from - 1) as f32);
+        let below = position as usize;
+        (below, (below + 1).min(from - 1), position - below as f32)
+    };
+    Plane::from_fn(width, height, |x, y| {
+        let (x0, x1, fx) = place(x, width, plane.width());
+        let (y0, y1, fy) = place(y, height, plane.height());
+        let top = plane.get(x0, y0) * (1.0 - fx) + plane.get(x1, y0) * fx;
+        let bottom = plane.get(x0, y1) * (1.0 - fx) + plane.get(x1, y1) * fx;
+        top * (1.0 - fy) + bottom * fy
+    })
+}
+
+/// Magnitude of the response to an even and an odd Gabor patch of wavelength 4 pixels and σ 2, at `turn` · 45°.
+fn gabor(plane: &Plane, turn: u8) -> Plane {
+    const RADIUS: isize = 4;
+    let (sine, cosine) = (f32::from(turn) * std::f32::consts::FRAC_PI_4).sin_cos();
+    let mut taps = Vec::new();
+    let (mut even_sum, mut weight_sum) = (0.0, 0.0);
+    for dy in -RADIUS..=RADIUS {
+        for dx in -RADIUS..=RADIUS {
+            let window = (-((dx * dx + dy * dy) as f32) / 8.0).exp();
+            let phase = std::f32::consts::FRAC_PI_2 * (dx as f32 * cosine + dy as f32 * sine);
+            even_sum += window * phase.cos();
+            weight_sum += window;
+            taps.push((dx, dy, window, phase));
+        }
+    }
+    // The even patch must not answer to plain light.
+    let offset = even_sum / weight_sum;
+    Plane::from_fn(plane.width(), plane.height(), |x, y| {
+        let (mut even, mut odd) = (0.0, 0.0);
+        for &(dx, dy, window, phase) in &taps {
+            let value = plane.get(
+                reflect(x as isize + dx, plane.width()),
+                reflect(y as isize + dy, plane.height()),
+            ) * window;
+            even += value * (phase.cos() - offset);
+            odd += value * phase.sin();
+        }
+        (even * even + odd * odd).sqrt() / weight_sum
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn promotion_follows_the_published_rule() {
+        // Peaks of a map scaled to 10: others {4, 2} → 49, {5} → 25, {10} → 0, none → 100.
+        let peaks = |values: &[f32]| {
+            let mut map = Plane::filled(40, 3, 0.0);
+            for (index, value) in values.iter().enumerate() {
+                map.values_mut()[40 + 4 + 8 * index] = value / 10.0;
+            }
+            promotion(&map) * 100.0
+        };
+        for (values, expected) in [
+            (vec![10.0, 4.0, 2.0], 49.0),
+            (vec![10.0, 5.0], 25.0),
+            (vec![10.0, 10.0], 0.0),
+            (vec![10.0], 100.0),
+            (vec![10.0, 9.0, 1.0], 25.0),
+        ] {
+            assert!((peaks(&values) - expected).abs() < 1e-3, "{values:?}");
+        }
+    }
+
+    #[test]
+    fn the_odd_one_stands_out() {
+        let spot = Plane::from_fn(256, 256, |x, y| {
+            if x.abs_diff(180) < 12 && y.abs_diff(70) < 12 {
+                0.9
+            } else {
+                0.2
+            }
+        });
+        let map = saliency(&SaliencyInputs {
+            rgb: [&spot; 3],
+            velocity: None,
+        })
+        .unwrap();
+        assert!(
+            map.get(180, 70) > 0.5 && map.get(40, 200) < 0.2,
+            "{} {}",
+            map.get(180, 70),
+            map.get(40, 200)
+        );
+        assert!(map.values().iter().all(|value| (0.0..=1.0).contains(value)));
+        // Motion alone, in a picture without anything to see.
+        let grey = Plane::filled(256, 256, 0.3);
+        let velocity = Plane::from_fn(256, 256, |x, y| if x < 60 && y < 60 { 8.0 } else { 0.0 });
+        let map = saliency(&SaliencyInputs {
+            rgb: [&grey; 3],
+            velocity: Some(&velocity),
+        })
+        .unwrap();
+        assert!(map.get(40, 40) > 2.0 * map.get(200, 200));
+    }
+
+    #[test]
+    fn a_plain_picture_is_all_worth_a_look() {
+        for (width, height) in [(1, 1), (3, 200), (300, 280)] {
+            let grey = Plane::filled(width, height, 0.5);
+            let map = saliency(&SaliencyInputs {
+                rgb: [&grey; 3],
+                velocity: None,
+            })
+            .unwrap();
+            assert_eq!(map, Plane::filled(width, height, 1.0));
+        }
+        let bad = Plane::filled(3, 3, f32::NAN);
+        assert!(
+            saliency(&SaliencyInputs {
+                rgb: [&bad; 3],
+                velocity: None
+            })
+            .is_err()
+        );
+    }
+
+    #[test]
+    fn gaze_is_where_it_is_put() {
+        let map = gaze(100, 50, 30.0, 20.0, 10.0);
+        assert!(map.get(29, 19) > 0.99 && map.get(99, 49) < 1e-6);
+    }
+}
