@@ -29,7 +29,9 @@ pub struct Judgement {
     pub predicted: Plane,
     /// Visibility of the halves' difference: the same, measured.
     pub measured: Plane,
-    /// Displayed variance of the mean times samples, per half: what one sample of that half is worth.
+    /// Displayed variance of one sample as the neighbours tell it: the variance of the mean is this over the count.
+    pub pooled_variance_per_sample: Plane,
+    /// The same as each half decides by it.
     pub variance_per_sample: [Plane; 2],
 }
 
@@ -46,11 +48,6 @@ pub fn judge(film: &Film, settings: &LoopSettings) -> Result<Judgement, JudgeErr
     let tone = settings.operator.fit(&SceneGuide { luminance_cd_m2: &guide }, &settings.viewing.display);
     let display = &settings.viewing.display;
     let displayed_guide = seen::display_luminance(tone.as_ref(), display, &guide);
-    let thresholds = threshold_map(
-        &ThresholdInputs { display_luminance_cd_m2: &displayed_guide, guide_variance: None },
-        &settings.viewing,
-        &CastleCsf::new(settings.viewing.observer.csf_area_deg2)?,
-    )?;
 
     let nits_squared = settings.nits_per_unit * settings.nits_per_unit;
     let variance_of_mean = Plane::from_fn(film.width() as usize, film.height() as usize, |x, y| {
@@ -65,16 +62,24 @@ pub fn judge(film: &Film, settings: &LoopSettings) -> Result<Judgement, JudgeErr
             (f64::from(per_sample.values()[i]) * nits_squared * share * factor) as f32
         })
     };
-    let display_variance = seen::display_variance(tone.as_ref(), display, &guide, &scene_variance(&statistics.pooled));
-    let variance_per_sample = Half::BOTH.map(|half| {
-        let scene = scene_variance(&statistics.for_half[half.index()]);
-        let displayed = seen::display_variance(tone.as_ref(), display, &guide, &scene);
+    let displayed =
+        |per_sample: &Plane| seen::display_variance(tone.as_ref(), display, &guide, &scene_variance(per_sample));
+    let display_variance = displayed(&statistics.pooled);
+    // The noise before denoising bounds what is left of it in the guide, so masking fades in as samples come.
+    let thresholds = threshold_map(
+        &ThresholdInputs { display_luminance_cd_m2: &displayed_guide, guide_variance: Some(&display_variance) },
+        &settings.viewing,
+        &CastleCsf::new(settings.viewing.observer.csf_area_deg2)?,
+    )?;
+    let per_sample = |variance: &Plane| {
         Plane::from_fn(width, height, |x, y| {
             let i = y * width + x;
             let share = 0.25 * (inverse_count(film, Half::A, i) + inverse_count(film, Half::B, i));
-            (f64::from(displayed.values()[i]) / share) as f32
+            (f64::from(variance.values()[i]) / share) as f32
         })
-    });
+    };
+    let pooled_variance_per_sample = per_sample(&display_variance);
+    let variance_per_sample = Half::BOTH.map(|half| per_sample(&displayed(&statistics.for_half[half.index()])));
     let displayed_difference =
         seen::display_half_difference(tone.as_ref(), display, &estimate.luminance_cd_m2, &estimate.half_difference);
     let predicted = thresholds.predicted_visibility(&display_variance);
@@ -87,6 +92,7 @@ pub fn judge(film: &Film, settings: &LoopSettings) -> Result<Judgement, JudgeErr
         display_variance,
         predicted,
         measured,
+        pooled_variance_per_sample,
         variance_per_sample,
     })
 }

@@ -123,7 +123,7 @@ pub fn render(tracer: &PathTracer, settings: &LoopSettings, monitor: &dyn Monito
         let judgement = judge(&film, settings)?;
         let step = match out_of_limit {
             Some(reason) => Step::Stop(reason),
-            None => next_step(&film, &judgement, settings, &mut rungs),
+            None => next_step(&film, &judgement, settings, &mut rungs)?,
         };
         seconds_perception += look.elapsed().as_secs_f64();
         pass += 1;
@@ -150,38 +150,59 @@ fn limit_reached(settings: &LoopSettings, elapsed: Duration, plans: u32) -> Opti
 }
 
 /// Decides what comes next, leaving rungs of the ladder that are reached.
-fn next_step(film: &Film, judgement: &Judgement, settings: &LoopSettings, rungs: &mut VecDeque<f64>) -> Step {
+fn next_step(
+    film: &Film,
+    judgement: &Judgement,
+    settings: &LoopSettings,
+    rungs: &mut VecDeque<f64>,
+) -> Result<Step, JudgeError> {
     let pixels = u64::from(film.width()) * u64::from(film.height());
     let budget = settings.limits.mean_samples.map(|mean| u64::from(mean) * pixels);
     let left = budget.map_or(u64::MAX, |b| b.saturating_sub(film.total_samples()));
     if left == 0 {
-        return Step::Stop(StopReason::Samples);
+        return Ok(Step::Stop(StopReason::Samples));
     }
-    let max_samples = settings.limits.max_samples;
     while let Some(&rung) = rungs.front() {
         let reached = visible_share(judgement, rung) <= TOLERATED_SHARE;
-        let plan = match settings.sampling {
-            _ if reached => SamplePlan::default(),
-            Sampling::Uniform => {
-                let most = settings.limits.mean_samples.unwrap_or(max_samples).min(max_samples);
-                let doubled = 2 * (film.total_samples() / pixels).max(8) as u32;
-                uniform_plan(film, doubled.min(most))
+        if !reached {
+            let plan = plan_towards(rung, film, judgement, settings)?;
+            if plan.blocks.is_empty() && rungs.len() == 1 {
+                return Ok(Step::Stop(StopReason::MaxSamples));
             }
-            Sampling::Adaptive => {
-                let plan = adaptive_plan(film, judgement, rung, max_samples);
-                if plan.blocks.is_empty() { remainder_plan(film, judgement, rung, max_samples) } else { plan }
+            let plan = if plan.samples() > left { cut_to_budget(plan, judgement, left) } else { plan };
+            if !plan.blocks.is_empty() {
+                return Ok(Step::Trace(plan));
             }
-        };
-        if !plan.blocks.is_empty() {
-            let plan = cut_to_budget(plan, judgement, left);
-            return if plan.blocks.is_empty() { Step::Stop(StopReason::Samples) } else { Step::Trace(plan) };
-        }
-        if !reached && rungs.len() == 1 {
-            return Step::Stop(StopReason::MaxSamples);
         }
         rungs.pop_front();
     }
-    Step::Stop(StopReason::Visibility)
+    Ok(Step::Stop(if visible_share(judgement, settings.limits.visibility) <= TOLERATED_SHARE {
+        StopReason::Visibility
+    } else {
+        StopReason::Samples
+    }))
+}
+
+/// More samples for a rung that is not reached; none where no pixel may have more.
+fn plan_towards(
+    rung: f64,
+    film: &Film,
+    judgement: &Judgement,
+    settings: &LoopSettings,
+) -> Result<SamplePlan, JudgeError> {
+    let max_samples = settings.limits.max_samples;
+    Ok(match settings.sampling {
+        Sampling::Uniform => {
+            let most = settings.limits.mean_samples.unwrap_or(max_samples).min(max_samples);
+            let pixels = u64::from(film.width()) * u64::from(film.height());
+            let doubled = 2 * (film.total_samples() / pixels).max(8) as u32;
+            uniform_plan(film, doubled.min(most))
+        }
+        Sampling::Adaptive => {
+            let plan = adaptive_plan(film, judgement, rung, max_samples)?;
+            if plan.blocks.is_empty() { remainder_plan(film, judgement, rung, max_samples) } else { plan }
+        }
+    })
 }
 
 /// Share of pixels whose predicted visibility is above `visibility`.

@@ -8,6 +8,8 @@ use super::judge::Judgement;
 use crate::film::Film;
 use crate::integrator::{BlockWork, PILOT_SAMPLES, SamplePlan, samples_through};
 use crate::sampler::Half;
+use fechner_perception::Plane;
+use fechner_perception::allocation::{AllocationProblem, allocate};
 
 /// Doublings that one plan gives a pixel at most: its variance is looked at again in between.
 const MOST_DOUBLINGS_AT_ONCE: u32 = 2;
@@ -48,17 +50,34 @@ pub fn uniform_plan(film: &Film, mean_samples: u32) -> SamplePlan {
 
 /// Doublings for pixels whose error could still be seen at `visibility`.
 ///
-/// Minimising samples under a bound on the pooled visibility makes counts go as the standard deviation of a pixel times a
-/// multiplier that varies as slowly as the pooling does (Neyman 1934); here the multiplier is the pooled standard
-/// deviation, which never spends more than a pixelwise rule and meets the same bound.
-pub fn adaptive_plan(film: &Film, judgement: &Judgement, visibility: f64, max_samples: u32) -> SamplePlan {
-    let gain = judgement.thresholds.noise_gain();
-    let pooled = Half::BOTH.map(|half| judgement.thresholds.pooled(&judgement.variance_per_sample[half.index()]));
+/// The perception crate's convex allocation says how many samples each pixel should have if its variance were that of
+/// its neighbours; each half then scales its share by what the other half knows of the pixel itself (counts go as the
+/// standard deviation, Neyman 1934).
+///
+/// # Errors
+/// Only if the allocation refuses the judgement's maps, which would be a defect of ours.
+pub fn adaptive_plan(
+    film: &Film,
+    judgement: &Judgement,
+    visibility: f64,
+    max_samples: u32,
+) -> Result<SamplePlan, fechner_perception::Error> {
+    let (width, height) = (film.width() as usize, film.height() as usize);
+    let allocation = allocate(&AllocationProblem {
+        variance_per_sample: &judgement.pooled_variance_per_sample,
+        thresholds: &judgement.thresholds,
+        cost: &Plane::filled(width, height, 1.0),
+        tolerance: None,
+        visibility,
+        min_samples: f64::from(2 * PILOT_SAMPLES),
+        max_samples: f64::from(max_samples).max(f64::from(2 * PILOT_SAMPLES)),
+    })?;
     let need = |half: Half, pixel: usize| {
+        let pooled = f64::from(judgement.pooled_variance_per_sample.values()[pixel]);
         let own = f64::from(judgement.variance_per_sample[half.index()].values()[pixel]);
-        let around = f64::from(pooled[half.index()].values()[pixel]);
-        let samples = f64::from(film.half(half)[pixel].samples.max(1));
-        confidence_margin(samples) * f64::from(gain.values()[pixel]) * (own * around).sqrt() / (visibility * visibility)
+        let share = 0.5 * f64::from(allocation.samples.values()[pixel]);
+        let harder = if pooled > 0.0 { (own / pooled).max(1.0).sqrt() } else { 1.0 };
+        share * harder * confidence_margin(f64::from(film.half(half)[pixel].samples.max(1)))
     };
     let wanted = |pixel: usize| {
         let doublings = Half::BOTH.map(|half| {
@@ -69,7 +88,7 @@ pub fn adaptive_plan(film: &Film, judgement: &Judgement, visibility: f64, max_sa
         let level = |h: Half| u32::from(film.half(h)[pixel].levels) + doublings[h.index()];
         Half::BOTH.map(|h| level(h).max(level(h.other()).saturating_sub(1)) - u32::from(film.half(h)[pixel].levels))
     };
-    blocks(film, max_samples, wanted)
+    Ok(blocks(film, max_samples, wanted))
 }
 
 /// One doubling for every pixel in whose surroundings the predicted visibility is above the target: what is left to do
@@ -148,9 +167,6 @@ pub fn slices(plan: SamplePlan, width: u32, pixels: u32) -> Vec<SamplePlan> {
 
 /// Cuts a plan to a budget: the blocks of pixels that have least of what they need first.
 pub fn cut_to_budget(plan: SamplePlan, judgement: &Judgement, samples: u64) -> SamplePlan {
-    if plan.samples() <= samples {
-        return plan;
-    }
     let mut blocks = plan.blocks;
     let urgency = |b: &BlockWork| judgement.predicted.values()[b.pixel as usize];
     blocks.sort_by(|a, b| urgency(b).total_cmp(&urgency(a)).then(a.pixel.cmp(&b.pixel)).then(a.level.cmp(&b.level)));
