@@ -321,20 +321,31 @@ fn noise_gain(
     coordinates: &Plane,
     elevations: Option<&[Plane]>,
 ) -> Plane {
-    let mut gain = adaptation_cd_m2.clone();
+    let mut gain = Plane::filled(adaptation_cd_m2.width(), adaptation_cd_m2.height(), 0.0);
     gain.for_each_row_mut(|y, row| {
-        for (x, (value, &coordinate)) in row.iter_mut().zip(coordinates.row(y)).enumerate() {
-            let energy: f32 = tables
-                .bands
+        let coordinates = coordinates.row(y);
+        // Band by band: each row of elevations is read in one go.
+        for (band, tables) in tables.bands.iter().enumerate() {
+            let energies = coordinates
                 .iter()
-                .enumerate()
-                .map(|(band, tables)| {
-                    let elevation = elevations.map_or(1.0, |elevations| elevations[band].row(y)[x]);
-                    tables.noise_energy.at(coordinate) / (elevation * elevation)
-                })
-                .sum();
-            // Divided twice: the square of 1e-4 cd/m² and of 1e20 must both stay within f32.
-            *value = energy / *value / *value;
+                .map(|&coordinate| tables.noise_energy.at(coordinate));
+            match elevations {
+                Some(elevations) => {
+                    for (value, (energy, elevation)) in
+                        row.iter_mut().zip(energies.zip(elevations[band].row(y)))
+                    {
+                        *value += energy / (elevation * elevation);
+                    }
+                }
+                None => row
+                    .iter_mut()
+                    .zip(energies)
+                    .for_each(|(value, energy)| *value += energy),
+            }
+        }
+        // Divided twice: the square of 1e-4 cd/m² and of 1e20 must both stay within f32.
+        for (value, adaptation) in row.iter_mut().zip(adaptation_cd_m2.row(y)) {
+            *value = *value / adaptation / adaptation;
         }
     });
     gain
