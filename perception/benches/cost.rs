@@ -27,31 +27,21 @@ fn fourier_transform(width: usize, height: usize) -> impl FnMut() {
     move || {
         let kept = width / 2 + 1;
         let mut by_row = vec![Complex32::default(); kept * height];
-        by_row
-            .par_chunks_mut(kept)
-            .zip(picture.par_chunks(width))
-            .for_each_init(
-                || (rows.make_input_vec(), rows.make_scratch_vec()),
-                |(input, scratch), (bins, row)| {
-                    input.copy_from_slice(row);
-                    rows.process_with_scratch(input, bins, scratch)
-                        .expect("lengths of the plan");
-                },
-            );
+        by_row.par_chunks_mut(kept).zip(picture.par_chunks(width)).for_each_init(
+            || (rows.make_input_vec(), rows.make_scratch_vec()),
+            |(input, scratch), (bins, row)| {
+                input.copy_from_slice(row);
+                rows.process_with_scratch(input, bins, scratch).expect("lengths of the plan");
+            },
+        );
         let mut by_column = vec![Complex32::default(); kept * height];
-        by_column
-            .par_chunks_mut(8 * height)
-            .enumerate()
-            .for_each(|(strip, lines)| {
-                for y in 0..height {
-                    for (line, value) in lines
-                        .chunks_exact_mut(height)
-                        .zip(&by_row[y * kept + 8 * strip..])
-                    {
-                        line[y] = *value;
-                    }
+        by_column.par_chunks_mut(8 * height).enumerate().for_each(|(strip, lines)| {
+            for y in 0..height {
+                for (line, value) in lines.chunks_exact_mut(height).zip(&by_row[y * kept + 8 * strip..]) {
+                    line[y] = *value;
                 }
-            });
+            }
+        });
         by_column.par_chunks_mut(height).for_each_init(
             || vec![Complex32::default(); columns.get_inplace_scratch_len()],
             |scratch, line| columns.process_with_scratch(line, scratch),
@@ -63,19 +53,13 @@ fn fourier_transform(width: usize, height: usize) -> impl FnMut() {
 fn main() {
     for (width, height) in [(512, 512), (1920, 1080)] {
         let picture = Plane::from_fn(width, height, |x, y| {
-            60.0 + 40.0 * ((x as f32 * 0.11).sin() * (y as f32 * 0.07).cos())
-                + ((x * 31 + y * 17) % 13) as f32
+            60.0 + 40.0 * ((x as f32 * 0.11).sin() * (y as f32 * 0.07).cos()) + ((x * 31 + y * 17) % 13) as f32
         });
-        let variance = Plane::from_fn(width, height, |x, y| {
-            100.0 + ((x / 64 + y / 64) % 7) as f32 * 300.0
-        });
+        let variance = Plane::from_fn(width, height, |x, y| 100.0 + ((x / 64 + y / 64) % 7) as f32 * 300.0);
         let cost = Plane::filled(width, height, 1.0);
         let viewing = Viewing::default();
         let csf = CastleCsf::default();
-        let inputs = ThresholdInputs {
-            display_luminance_cd_m2: &picture,
-            guide_variance: None,
-        };
+        let inputs = ThresholdInputs { display_luminance_cd_m2: &picture, guide_variance: None };
         let map = threshold_map(&inputs, &viewing, &csf).expect("a good picture");
         let unit = fastest(7, fourier_transform(width, height));
         let report = |what: &str, seconds: f64| {
@@ -86,18 +70,9 @@ fn main() {
                 1e3 * unit
             );
         };
-        report(
-            "threshold map",
-            fastest(5, || drop(threshold_map(&inputs, &viewing, &csf))),
-        );
-        report(
-            "predicted visibility",
-            fastest(5, || drop(map.predicted_visibility(&variance))),
-        );
-        report(
-            "measured visibility",
-            fastest(3, || drop(map.measured_visibility(&variance))),
-        );
+        report("threshold map", fastest(5, || drop(threshold_map(&inputs, &viewing, &csf))));
+        report("predicted visibility", fastest(5, || drop(map.predicted_visibility(&variance))));
+        report("measured visibility", fastest(3, || drop(map.measured_visibility(&variance))));
         let problem = AllocationProblem {
             variance_per_sample: &variance,
             thresholds: &map,

@@ -11,22 +11,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let sensitivity = |column: u32, row: u32| {
         let retinal_velocity_deg_s = 0.15 * (80.0_f64 / 0.15).powf(1.0 - f64::from(row) / 511.0);
         let freq_cpd = 0.1 * 600.0_f64.powf(f64::from(column) / 511.0);
-        Daly98 {
-            retinal_velocity_deg_s,
-        }
-        .ln_sensitivity(freq_cpd)
-            / std::f64::consts::LN_10
+        Daly98 { retinal_velocity_deg_s }.ln_sensitivity(freq_cpd) / std::f64::consts::LN_10
     };
     image::GrayImage::from_fn(512, 512, |column, row| {
         let log = sensitivity(column, row);
         let is_contour = log > -1.0
             && (log.floor() != sensitivity(column + 1, row).floor()
                 || log.floor() != sensitivity(column, row + 1).floor());
-        image::Luma([if is_contour {
-            255
-        } else {
-            ((log + 1.0) / 3.5 * 230.0).clamp(0.0, 230.0) as u8
-        }])
+        image::Luma([if is_contour { 255 } else { ((log + 1.0) / 3.5 * 230.0).clamp(0.0, 230.0) as u8 }])
     })
     .save(&path)?;
     println!("{}", path.display());

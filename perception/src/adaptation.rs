@@ -21,11 +21,7 @@ pub enum Mean {
 pub fn world_adaptation_cd_m2(luminance_cd_m2: &Plane, mean: Mean) -> f64 {
     let floor = f64::from(LEAST_ADAPTATION_CD_M2);
     let (mut sum, mut count) = (0.0, 0.0);
-    for &value in luminance_cd_m2
-        .values()
-        .iter()
-        .filter(|value| value.is_finite())
-    {
+    for &value in luminance_cd_m2.values().iter().filter(|value| value.is_finite()) {
         let value = f64::from(value.max(LEAST_ADAPTATION_CD_M2));
         sum += match mean {
             Mean::Arithmetic => value,
@@ -47,28 +43,16 @@ pub fn world_adaptation_cd_m2(luminance_cd_m2: &Plane, mean: Mean) -> f64 {
 ///
 /// # Errors
 /// [`Error::Empty`] and [`Error::BadPixel`] for no picture, [`Error::OutOfRange`] unless `pixels_per_degree` is 1 to 1000.
-pub fn local_adaptation_cd_m2(
-    luminance_cd_m2: &Plane,
-    pixels_per_degree: f64,
-    mean: Mean,
-) -> Result<Plane, Error> {
+pub fn local_adaptation_cd_m2(luminance_cd_m2: &Plane, pixels_per_degree: f64, mean: Mean) -> Result<Plane, Error> {
     luminance_cd_m2.check_non_negative("luminance")?;
-    check_range(
-        "pixels_per_degree",
-        pixels_per_degree,
-        1.0,
-        1000.0,
-        "between 1 and 1000 pixels per degree",
-    )?;
+    check_range("pixels_per_degree", pixels_per_degree, 1.0, 1000.0, "between 1 and 1000 pixels per degree")?;
     Ok(match mean {
         Mean::Arithmetic => local_adaptation(luminance_cd_m2, pixels_per_degree),
         Mean::Geometric => {
             // The logarithm of the floor is the origin: the blur wants no negative numbers.
-            let logs = luminance_cd_m2
-                .map(|value| (value.max(LEAST_ADAPTATION_CD_M2) / LEAST_ADAPTATION_CD_M2).ln());
+            let logs = luminance_cd_m2.map(|value| (value.max(LEAST_ADAPTATION_CD_M2) / LEAST_ADAPTATION_CD_M2).ln());
             let sigma_px = crate::threshold::POOLING_SIGMA_DEG * pixels_per_degree;
-            crate::filter::gaussian_blur(&logs, sigma_px)
-                .map(|log| log.exp() * LEAST_ADAPTATION_CD_M2)
+            crate::filter::gaussian_blur(&logs, sigma_px).map(|log| log.exp() * LEAST_ADAPTATION_CD_M2)
         }
     })
 }
@@ -95,11 +79,7 @@ mod tests {
 
     #[test]
     fn black_and_empty_pictures_adapt_to_the_floor() {
-        for picture in [
-            Plane::filled(0, 0, 1.0),
-            Plane::filled(3, 3, 0.0),
-            Plane::filled(2, 2, f32::NAN),
-        ] {
+        for picture in [Plane::filled(0, 0, 1.0), Plane::filled(3, 3, 0.0), Plane::filled(2, 2, f32::NAN)] {
             for mean in [Mean::Arithmetic, Mean::Geometric] {
                 assert!((world_adaptation_cd_m2(&picture, mean) - 1e-4).abs() < 1e-9);
             }

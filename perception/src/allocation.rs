@@ -103,13 +103,7 @@ pub fn allocate(problem: &AllocationProblem<'_>) -> Result<Allocation, Error> {
 /// # Errors
 /// As [`allocate`], and [`Error::OutOfRange`] for a budget that is not positive.
 pub fn allocate_budget(problem: &AllocationProblem<'_>, budget: f64) -> Result<Allocation, Error> {
-    check_range(
-        "budget",
-        budget,
-        f64::MIN_POSITIVE,
-        f64::MAX,
-        "positive and finite",
-    )?;
+    check_range("budget", budget, f64::MIN_POSITIVE, f64::MAX, "positive and finite")?;
     let solver = Solver::new(problem)?;
     let mut visibility = problem.visibility;
     let mut multipliers = solver.first_multipliers(visibility);
@@ -122,10 +116,7 @@ pub fn allocate_budget(problem: &AllocationProblem<'_>, budget: f64) -> Result<A
         if excess <= 1.0 {
             affordable = visibility.ln();
             let enough = excess > 0.99;
-            if best
-                .as_ref()
-                .is_none_or(|best| best.visibility > visibility)
-            {
+            if best.as_ref().is_none_or(|best| best.visibility > visibility) {
                 best = Some(found);
             }
             if enough {
@@ -149,16 +140,13 @@ pub fn allocate_budget(problem: &AllocationProblem<'_>, budget: f64) -> Result<A
             aimed.clamp(too_dear + margin, affordable - margin)
         } else {
             // Limits make the cost respond less than the law says: go at least a quarter further.
-            visibility.ln()
-                + (aimed - visibility.ln()).signum() * (aimed - visibility.ln()).abs().max(0.25)
+            visibility.ln() + (aimed - visibility.ln()).signum() * (aimed - visibility.ln()).abs().max(0.25)
         };
         if !(-30.0..=30.0).contains(&next) {
             break;
         }
         let factor = (visibility.ln() - next).exp().powi(4) as f32;
-        multipliers
-            .iter_mut()
-            .for_each(|multiplier| *multiplier *= factor);
+        multipliers.iter_mut().for_each(|multiplier| *multiplier *= factor);
         visibility = next.exp();
     }
     match best {
@@ -198,43 +186,13 @@ impl<'a> Solver<'a> {
                 plane.check_non_negative(what)?;
             }
         }
-        const LIMITS: &str =
-            "at least 1e-6, and min_samples at most max_samples, which is at most 1e12";
-        check_range(
-            "visibility",
-            problem.visibility,
-            1e-9,
-            1e9,
-            "between 1e-9 and 1e9",
-        )?;
-        check_range(
-            "min_samples",
-            problem.min_samples,
-            1e-6,
-            problem.max_samples,
-            LIMITS,
-        )?;
-        check_range(
-            "max_samples",
-            problem.max_samples,
-            problem.min_samples,
-            1e12,
-            LIMITS,
-        )?;
-        for (what, plane) in [
-            ("cost", Some(problem.cost)),
-            ("tolerance", problem.tolerance),
-        ] {
-            if let Some(least) =
-                plane.and_then(|plane| plane.values().iter().copied().reduce(f32::min))
-            {
-                check_range(
-                    what,
-                    f64::from(least),
-                    1e-12,
-                    f64::MAX,
-                    "at least 1e-12 at every pixel",
-                )?;
+        const LIMITS: &str = "at least 1e-6, and min_samples at most max_samples, which is at most 1e12";
+        check_range("visibility", problem.visibility, 1e-9, 1e9, "between 1e-9 and 1e9")?;
+        check_range("min_samples", problem.min_samples, 1e-6, problem.max_samples, LIMITS)?;
+        check_range("max_samples", problem.max_samples, problem.min_samples, 1e12, LIMITS)?;
+        for (what, plane) in [("cost", Some(problem.cost)), ("tolerance", problem.tolerance)] {
+            if let Some(least) = plane.and_then(|plane| plane.values().iter().copied().reduce(f32::min)) {
+                check_range(what, f64::from(least), 1e-12, f64::MAX, "at least 1e-12 at every pixel")?;
             }
         }
         // Bounded so that squares stay within f32; beyond it no count would do.
@@ -244,22 +202,13 @@ impl<'a> Solver<'a> {
             .zip(problem.variance_per_sample.values())
             .map(|(gain, variance)| (2.0 * gain * variance).min(1e18))
             .collect();
-        let root = weight
-            .iter()
-            .zip(problem.cost.values())
-            .map(|(weight, cost)| (weight / cost).sqrt())
-            .collect();
+        let root = weight.iter().zip(problem.cost.values()).map(|(weight, cost)| (weight / cost).sqrt()).collect();
         let sigma_px = POOLING_SIGMA_DEG * problem.thresholds.viewing().display.pixels_per_degree;
         let block = ((sigma_px / 4.0) as usize).clamp(1, 8);
         let most = problem.max_samples as f32;
         let at_most: Vec<f32> = weight.iter().map(|weight| weight / most).collect();
         let floor = gaussian_blur(&Plane::from_values(width, height, at_most)?, sigma_px);
-        let total_cost: f64 = problem
-            .cost
-            .values()
-            .iter()
-            .map(|&cost| f64::from(cost))
-            .sum();
+        let total_cost: f64 = problem.cost.values().iter().map(|&cost| f64::from(cost)).sum();
         Ok(Self {
             problem,
             weight,
@@ -288,16 +237,12 @@ impl<'a> Solver<'a> {
         let mut bounds = self.floor.clone();
         let tolerance = self.problem.tolerance.map(Plane::values);
         for (index, bound) in bounds.values_mut().iter_mut().enumerate() {
-            let wanted = tolerance.map_or(target, |tolerance| {
-                target * tolerance[index] * tolerance[index]
-            });
+            let wanted = tolerance.map_or(target, |tolerance| target * tolerance[index] * tolerance[index]);
             // Rounding alone must not call a constraint unreachable.
             if *bound > wanted * 1.000_01 {
                 unreachable += 1;
             }
-            *bound = wanted
-                .max(*bound * UNREACHABLE_SLACK)
-                .max(f32::MIN_POSITIVE);
+            *bound = wanted.max(*bound * UNREACHABLE_SLACK).max(f32::MIN_POSITIVE);
         }
         (bounds, unreachable)
     }
@@ -321,11 +266,7 @@ impl<'a> Solver<'a> {
         let mut iterations = 0;
         let mut best_bound = f64::NEG_INFINITY;
         let mut best_multipliers = multipliers.to_vec();
-        let most_iterations = if multipliers.len() <= SMALL_GRID {
-            10 * MOST_ITERATIONS
-        } else {
-            MOST_ITERATIONS
-        };
+        let most_iterations = if multipliers.len() <= SMALL_GRID { 10 * MOST_ITERATIONS } else { MOST_ITERATIONS };
         for iteration in 1..=most_iterations {
             iterations = iteration;
             let price = self.blur_blocks(multipliers, sigma_blocks);
@@ -336,19 +277,13 @@ impl<'a> Solver<'a> {
                     best_bound = dual.value;
                     best_multipliers.copy_from_slice(multipliers);
                 }
-                let worst = noise
-                    .iter()
-                    .zip(&coarse_bounds)
-                    .map(|(noise, bound)| noise / bound)
-                    .fold(0.0, f32::max);
+                let worst = noise.iter().zip(&coarse_bounds).map(|(noise, bound)| noise / bound).fold(0.0, f32::max);
                 let feasible_cost = dual.cost * f64::from(worst.max(1.0));
                 if feasible_cost <= best_bound.max(self.cheapest) * (1.0 + SMALL_GAP) {
                     break;
                 }
             }
-            for (multiplier, (noise, bound)) in
-                multipliers.iter_mut().zip(noise.iter().zip(&coarse_bounds))
-            {
+            for (multiplier, (noise, bound)) in multipliers.iter_mut().zip(noise.iter().zip(&coarse_bounds)) {
                 // λ ← λ · (v²/bound)³. Counts go as √μ and v² as 1/√μ, so the square would be Newton's step for a
                 // uniform picture and the fourth power the edge of stability; details, which pooling weakens, want
                 // more than the square.
@@ -368,10 +303,7 @@ impl<'a> Solver<'a> {
     fn certified(&self, multipliers: &[f32], bounds: &Plane, iterations: usize) -> Allocation {
         let lambda = self.spread_over_blocks(multipliers);
         let price = gaussian_blur(&lambda, self.sigma_px);
-        let (least, most) = (
-            self.problem.min_samples as f32,
-            self.problem.max_samples as f32,
-        );
+        let (least, most) = (self.problem.min_samples as f32, self.problem.max_samples as f32);
         let mut samples = Plane::from_fn(self.width(), self.height(), |x, y| {
             let index = y * self.width() + x;
             (self.root[index] * price.values()[index].sqrt()).clamp(least, most)
@@ -380,8 +312,7 @@ impl<'a> Solver<'a> {
         for (index, &count) in samples.values().iter().enumerate() {
             let cost = f64::from(self.problem.cost.values()[index]);
             lower_bound += cost * f64::from(count)
-                + f64::from(self.weight[index]) * f64::from(price.values()[index])
-                    / f64::from(count)
+                + f64::from(self.weight[index]) * f64::from(price.values()[index]) / f64::from(count)
                 - f64::from(lambda.values()[index]) * f64::from(bounds.values()[index]);
         }
         self.repair(&mut samples, bounds);
@@ -394,15 +325,7 @@ impl<'a> Solver<'a> {
         // The fewest samples everywhere are a bound too.
         let lower_bound = lower_bound.max(self.cheapest);
         let gap = (cost / lower_bound - 1.0).max(0.0);
-        Allocation {
-            samples,
-            cost,
-            lower_bound,
-            gap,
-            visibility: 0.0,
-            unreachable_pixels: 0,
-            iterations,
-        }
+        Allocation { samples, cost, lower_bound, gap, visibility: 0.0, unreachable_pixels: 0, iterations }
     }
 
     /// Raises counts around violated constraints until none is left.
@@ -430,19 +353,12 @@ impl<'a> Solver<'a> {
 
     /// v² over its bound at every pixel.
     fn excess(&self, samples: &Plane, bounds: &Plane) -> Plane {
-        let noise: Vec<f32> = self
-            .weight
-            .iter()
-            .zip(samples.values())
-            .map(|(weight, count)| weight / count)
-            .collect();
+        let noise: Vec<f32> = self.weight.iter().zip(samples.values()).map(|(weight, count)| weight / count).collect();
         let noise = Plane::from_values(self.width(), self.height(), noise)
             .unwrap_or_else(|_| Plane::filled(self.width(), self.height(), f32::INFINITY));
         let mut excess = gaussian_blur(&noise, self.sigma_px);
         excess.for_each_row_mut(|y, row| {
-            row.iter_mut()
-                .zip(bounds.row(y))
-                .for_each(|(value, bound)| *value /= bound);
+            row.iter_mut().zip(bounds.row(y)).for_each(|(value, bound)| *value /= bound);
         });
         excess
     }
@@ -450,10 +366,7 @@ impl<'a> Solver<'a> {
     /// Mean of w/n over each block, with the counts that `price` asks for.
     fn block_noise(&self, price: &[f32]) -> Vec<f32> {
         let root_price: Vec<f32> = price.iter().map(|price| price.sqrt()).collect();
-        let (least, most) = (
-            self.problem.min_samples as f32,
-            self.problem.max_samples as f32,
-        );
+        let (least, most) = (self.problem.min_samples as f32, self.problem.max_samples as f32);
         self.reduce_blocks(|index, block| {
             self.weight[index] / (self.root[index] * root_price[block]).clamp(least, most)
         })
@@ -461,10 +374,7 @@ impl<'a> Solver<'a> {
 
     fn coarse_dual(&self, price: &[f32], multipliers: &[f32], bounds: &[f32]) -> CoarseDual {
         let root_price: Vec<f32> = price.iter().map(|price| price.sqrt()).collect();
-        let (least, most) = (
-            self.problem.min_samples as f32,
-            self.problem.max_samples as f32,
-        );
+        let (least, most) = (self.problem.min_samples as f32, self.problem.max_samples as f32);
         let cost_of = |index: usize, block: usize| {
             let count = (self.root[index] * root_price[block]).clamp(least, most);
             self.problem.cost.values()[index] * count
@@ -472,51 +382,38 @@ impl<'a> Solver<'a> {
         let costs = self.reduce_blocks(cost_of);
         let lagrangians = self.reduce_blocks(|index, block| {
             let count = (self.root[index] * root_price[block]).clamp(least, most);
-            cost_of(index, block) + self.weight[index] * price[block] / count
-                - multipliers[block] * bounds[block]
+            cost_of(index, block) + self.weight[index] * price[block] / count - multipliers[block] * bounds[block]
         });
         let sum = |means: &[f32]| {
-            means
-                .iter()
-                .enumerate()
-                .map(|(block, mean)| f64::from(*mean) * self.pixels_in(block) as f64)
-                .sum()
+            means.iter().enumerate().map(|(block, mean)| f64::from(*mean) * self.pixels_in(block) as f64).sum()
         };
-        CoarseDual {
-            value: sum(&lagrangians),
-            cost: sum(&costs),
-        }
+        CoarseDual { value: sum(&lagrangians), cost: sum(&costs) }
     }
 
     fn pixels_in(&self, block: usize) -> usize {
         let (bx, by) = (block % self.blocks_x, block / self.blocks_x);
-        (self.width() - bx * self.block).min(self.block)
-            * (self.height() - by * self.block).min(self.block)
+        (self.width() - bx * self.block).min(self.block) * (self.height() - by * self.block).min(self.block)
     }
 
     /// Mean of `value_at(pixel index, block index)` over each block.
     fn reduce_blocks(&self, value_at: impl Fn(usize, usize) -> f32 + Sync) -> Vec<f32> {
         let (width, height) = (self.width(), self.height());
         let mut means = vec![0.0; self.blocks_x * self.blocks_y];
-        means
-            .par_chunks_mut(self.blocks_x)
-            .with_min_len((4096 / width).max(1))
-            .enumerate()
-            .for_each(|(by, row)| {
-                for (bx, mean) in row.iter_mut().enumerate() {
-                    let block = by * self.blocks_x + bx;
-                    let columns = bx * self.block..((bx + 1) * self.block).min(width);
-                    let rows = by * self.block..((by + 1) * self.block).min(height);
-                    let count = columns.len() * rows.len();
-                    let mut sum = 0.0;
-                    for y in rows {
-                        for x in columns.clone() {
-                            sum += value_at(y * width + x, block);
-                        }
+        means.par_chunks_mut(self.blocks_x).with_min_len((4096 / width).max(1)).enumerate().for_each(|(by, row)| {
+            for (bx, mean) in row.iter_mut().enumerate() {
+                let block = by * self.blocks_x + bx;
+                let columns = bx * self.block..((bx + 1) * self.block).min(width);
+                let rows = by * self.block..((by + 1) * self.block).min(height);
+                let count = columns.len() * rows.len();
+                let mut sum = 0.0;
+                for y in rows {
+                    for x in columns.clone() {
+                        sum += value_at(y * width + x, block);
                     }
-                    *mean = sum / count as f32;
                 }
-            });
+                *mean = sum / count as f32;
+            }
+        });
         means
     }
 
@@ -532,9 +429,7 @@ impl<'a> Solver<'a> {
     }
 
     fn spread_over_blocks(&self, values: &[f32]) -> Plane {
-        Plane::from_fn(self.width(), self.height(), |x, y| {
-            values[(y / self.block) * self.blocks_x + x / self.block]
-        })
+        Plane::from_fn(self.width(), self.height(), |x, y| values[(y / self.block) * self.blocks_x + x / self.block])
     }
 }
 

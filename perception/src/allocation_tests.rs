@@ -14,8 +14,7 @@ impl Case {
     /// A picture with bright and dark regions, patchy variances over four decades, heavy-tailed from pixel to pixel.
     fn patchy(width: usize, height: usize, pixels_per_degree: f64, seed: u64) -> Self {
         let picture = Plane::from_fn(width, height, |x, y| {
-            40.0 + 35.0 * (x as f32 * 0.05).sin() * (y as f32 * 0.04).cos()
-                + if x > width / 2 { 60.0 } else { 0.0 }
+            40.0 + 35.0 * (x as f32 * 0.05).sin() * (y as f32 * 0.04).cos() + if x > width / 2 { 60.0 } else { 0.0 }
         });
         let mut state = seed;
         let patches: Vec<f32> = (0..64).map(|_| (2.0 * normal(&mut state)).exp()).collect();
@@ -26,26 +25,12 @@ impl Case {
                 let index = y * width + x;
                 let patch = patches[(x * 8 / width) + 8 * (y * 8 / height)];
                 variance.values_mut()[index] = 300.0 * patch * normal(&mut state).exp();
-                cost.values_mut()[index] =
-                    1.0 + uniform(&mut state) as f32 + (x * 3 / width) as f32;
+                cost.values_mut()[index] = 1.0 + uniform(&mut state) as f32 + (x * 3 / width) as f32;
             }
         }
-        let viewing = Viewing {
-            display: Display {
-                pixels_per_degree,
-                ..Display::default()
-            },
-            ..Viewing::default()
-        };
-        let inputs = ThresholdInputs {
-            display_luminance_cd_m2: &picture,
-            guide_variance: None,
-        };
-        Self {
-            thresholds: threshold_map(&inputs, &viewing, &CastleCsf::default()).unwrap(),
-            variance,
-            cost,
-        }
+        let viewing = Viewing { display: Display { pixels_per_degree, ..Display::default() }, ..Viewing::default() };
+        let inputs = ThresholdInputs { display_luminance_cd_m2: &picture, guide_variance: None };
+        Self { thresholds: threshold_map(&inputs, &viewing, &CastleCsf::default()).unwrap(), variance, cost }
     }
 
     fn problem(&self) -> AllocationProblem<'_> {
@@ -66,13 +51,7 @@ impl Case {
         let energy = Plane::from_fn(samples.width(), samples.height(), |x, y| {
             2.0 * gain.get(x, y) * self.variance.get(x, y) / samples.get(x, y)
         });
-        self.thresholds
-            .pooled(&energy)
-            .values()
-            .iter()
-            .copied()
-            .fold(0.0, f32::max)
-            .sqrt()
+        self.thresholds.pooled(&energy).values().iter().copied().fold(0.0, f32::max).sqrt()
     }
 }
 
@@ -80,10 +59,7 @@ impl Case {
 fn an_even_picture_needs_its_closed_form() {
     let viewing = Viewing::default();
     let grey = Plane::filled(40, 30, 80.0);
-    let inputs = ThresholdInputs {
-        display_luminance_cd_m2: &grey,
-        guide_variance: None,
-    };
+    let inputs = ThresholdInputs { display_luminance_cd_m2: &grey, guide_variance: None };
     let thresholds = threshold_map(&inputs, &viewing, &CastleCsf::default()).unwrap();
     let variance = Plane::filled(40, 30, 900.0);
     let cost = Plane::filled(40, 30, 3.0);
@@ -97,11 +73,7 @@ fn an_even_picture_needs_its_closed_form() {
         max_samples: 1e9,
     })
     .unwrap();
-    let expected = 900.0
-        / thresholds
-            .allowed_standard_error_cd_m2(0.5)
-            .get(3, 3)
-            .powi(2);
+    let expected = 900.0 / thresholds.allowed_standard_error_cd_m2(0.5).get(3, 3).powi(2);
     assert!((found.samples.get(20, 15) / expected - 1.0).abs() < 3e-3);
     assert!((found.cost / (3.0 * 1200.0 * f64::from(expected)) - 1.0).abs() < 3e-3);
     assert!(found.gap < 5e-3, "{}", found.gap);
@@ -109,34 +81,19 @@ fn an_even_picture_needs_its_closed_form() {
 
 #[test]
 fn the_gap_closes_and_every_constraint_holds() {
-    for (width, height, ppd, seed) in [(512, 512, 60.0, 1), (256, 200, 38.0, 2), (97, 61, 20.0, 3)]
-    {
+    for (width, height, ppd, seed) in [(512, 512, 60.0, 1), (256, 200, 38.0, 2), (97, 61, 20.0, 3)] {
         let case = Case::patchy(width, height, ppd, seed);
         let found = allocate(&case.problem()).unwrap();
         let worst = case.worst_visibility(&found.samples);
         assert!(worst <= 1.000_1, "{width}×{height}: v {worst}");
-        assert!(
-            found.gap <= 0.01,
-            "{width}×{height}: gap {} after {} updates",
-            found.gap,
-            found.iterations
-        );
+        assert!(found.gap <= 0.01, "{width}×{height}: gap {} after {} updates", found.gap, found.iterations);
         assert!((found.iterations <= 100 || width < 128) && found.unreachable_pixels == 0);
-        assert!(
-            found
-                .samples
-                .values()
-                .iter()
-                .all(|count| (16.0..=1e6).contains(count))
-        );
+        assert!(found.samples.values().iter().all(|count| (16.0..=1e6).contains(count)));
     }
 }
 
 /// An independent solver: projected coordinate descent on the primal with a log barrier, on a problem small enough.
-#[allow(
-    clippy::needless_range_loop,
-    reason = "matrices read best by row and column"
-)]
+#[allow(clippy::needless_range_loop, reason = "matrices read best by row and column")]
 #[test]
 fn an_interior_point_method_finds_the_same_cost() {
     let case = Case::patchy(12, 8, 20.0, 4);
@@ -151,22 +108,13 @@ fn an_interior_point_method_finds_the_same_cost() {
         unit.values_mut()[column] = 1.0;
         for (row, value) in case.thresholds.pooled(&unit).values().iter().enumerate() {
             let gain = f64::from(case.thresholds.noise_gain().values()[column]);
-            rows[row][column] =
-                f64::from(*value) * 2.0 * gain * f64::from(case.variance.values()[column]);
+            rows[row][column] = f64::from(*value) * 2.0 * gain * f64::from(case.variance.values()[column]);
         }
     }
-    let cost: Vec<f64> = case
-        .cost
-        .values()
-        .iter()
-        .map(|&cost| f64::from(cost))
-        .collect();
+    let cost: Vec<f64> = case.cost.values().iter().map(|&cost| f64::from(cost)).collect();
     // Over x = 1/n, minimise t Σ c/x − Σ log(1 − A x) − Σ log(1 − x) − Σ log x by damped Newton with growing t.
     let mut x: Vec<f64> = vec![0.0; count];
-    let most = rows
-        .iter()
-        .map(|row| row.iter().sum::<f64>())
-        .fold(0.0, f64::max);
+    let most = rows.iter().map(|row| row.iter().sum::<f64>()).fold(0.0, f64::max);
     x.fill((0.5 / most).min(0.5));
     let mut t = 1e-6;
     while t < 1e4 {
@@ -176,22 +124,11 @@ fn an_interior_point_method_finds_the_same_cost() {
         t *= 4.0;
     }
     let exact: f64 = cost.iter().zip(&x).map(|(cost, x)| cost / x).sum();
-    assert!(
-        (found.cost / exact - 1.0).abs() < 0.01,
-        "{} against {exact}",
-        found.cost
-    );
-    assert!(
-        found.lower_bound <= exact * 1.000_1,
-        "bound {} above the optimum {exact}",
-        found.lower_bound
-    );
+    assert!((found.cost / exact - 1.0).abs() < 0.01, "{} against {exact}", found.cost);
+    assert!(found.lower_bound <= exact * 1.000_1, "bound {} above the optimum {exact}", found.lower_bound);
 }
 
-#[allow(
-    clippy::needless_range_loop,
-    reason = "matrices read best by row and column"
-)]
+#[allow(clippy::needless_range_loop, reason = "matrices read best by row and column")]
 fn newton_step(rows: &[Vec<f64>], cost: &[f64], t: f64, x: &mut [f64]) {
     let count = x.len();
     let value = |x: &[f64]| -> f64 {
@@ -264,11 +201,7 @@ fn a_budget_is_spent_and_buys_the_lowest_visibility() {
     for share in [0.4, 1.0, 3.0] {
         let budget = free.cost * share;
         let found = allocate_budget(&case.problem(), budget).unwrap();
-        assert!(
-            found.cost <= budget && found.cost > 0.98 * budget,
-            "{share}: {} of {budget}",
-            found.cost
-        );
+        assert!(found.cost <= budget && found.cost > 0.98 * budget, "{share}: {} of {budget}", found.cost);
         assert!(f64::from(case.worst_visibility(&found.samples)) <= found.visibility * 1.000_1);
     }
     let tiny = allocate_budget(&case.problem(), 1.0).unwrap();
@@ -283,13 +216,7 @@ fn what_cannot_be_reached_is_counted() {
     problem.max_samples = 64.0;
     let found = allocate(&problem).unwrap();
     assert!(found.unreachable_pixels > 1000);
-    assert!(
-        found
-            .samples
-            .values()
-            .iter()
-            .all(|count| count.is_finite() && *count <= 64.0)
-    );
+    assert!(found.samples.values().iter().all(|count| count.is_finite() && *count <= 64.0));
 }
 
 #[test]
@@ -297,11 +224,7 @@ fn tolerance_moves_samples_to_where_it_matters() {
     let case = Case::patchy(128, 96, 60.0, 7);
     let tolerance = Plane::from_fn(128, 96, |x, _| if x < 64 { 0.5 } else { 4.0 });
     let plain = allocate(&case.problem()).unwrap();
-    let moved = allocate(&AllocationProblem {
-        tolerance: Some(&tolerance),
-        ..case.problem()
-    })
-    .unwrap();
+    let moved = allocate(&AllocationProblem { tolerance: Some(&tolerance), ..case.problem() }).unwrap();
     assert!(moved.samples.get(10, 50) > 2.0 * plain.samples.get(10, 50));
     assert!(moved.samples.get(120, 50) < plain.samples.get(120, 50));
 }
@@ -314,26 +237,10 @@ fn noise_free_pictures_and_bad_inputs() {
     assert!(found.samples.values().iter().all(|&count| count == 16.0) && found.gap < 1e-6);
     let problem = case.problem();
     let ask = |problem: AllocationProblem<'_>| allocate(&problem).is_err();
-    assert!(ask(AllocationProblem {
-        visibility: 0.0,
-        ..problem
-    }));
-    assert!(ask(AllocationProblem {
-        min_samples: 5.0,
-        max_samples: 4.0,
-        ..problem
-    }));
-    assert!(ask(AllocationProblem {
-        cost: &Plane::filled(20, 20, 0.0),
-        ..problem
-    }));
-    assert!(ask(AllocationProblem {
-        cost: &Plane::filled(2, 20, 1.0),
-        ..problem
-    }));
-    assert!(ask(AllocationProblem {
-        variance_per_sample: &Plane::filled(20, 20, f32::NAN),
-        ..problem
-    }));
+    assert!(ask(AllocationProblem { visibility: 0.0, ..problem }));
+    assert!(ask(AllocationProblem { min_samples: 5.0, max_samples: 4.0, ..problem }));
+    assert!(ask(AllocationProblem { cost: &Plane::filled(20, 20, 0.0), ..problem }));
+    assert!(ask(AllocationProblem { cost: &Plane::filled(2, 20, 1.0), ..problem }));
+    assert!(ask(AllocationProblem { variance_per_sample: &Plane::filled(20, 20, f32::NAN), ..problem }));
     assert!(allocate_budget(&problem, f64::NAN).is_err());
 }

@@ -52,29 +52,17 @@ impl OctaveBands {
             return 0.0;
         }
         let octaves = (freq_cpd / self.centers_cpd[band]).log2();
-        if band + 1 == self.len() && octaves >= 0.0 {
-            1.0
-        } else {
-            raised_cosine(octaves)
-        }
+        if band + 1 == self.len() && octaves >= 0.0 { 1.0 } else { raised_cosine(octaves) }
     }
 
     /// A frequency above which the band passes nothing.
     pub(crate) fn limit_cpd(&self, band: usize) -> f64 {
-        if band + 1 == self.len() {
-            f64::INFINITY
-        } else {
-            2.0 * self.centers_cpd[band]
-        }
+        if band + 1 == self.len() { f64::INFINITY } else { 2.0 * self.centers_cpd[band] }
     }
 }
 
 fn raised_cosine(octaves: f64) -> f64 {
-    if octaves.abs() >= 1.0 {
-        0.0
-    } else {
-        (octaves * std::f64::consts::FRAC_PI_2).cos()
-    }
+    if octaves.abs() >= 1.0 { 0.0 } else { (octaves * std::f64::consts::FRAC_PI_2).cos() }
 }
 
 /// A function of frequency, tabulated at equal steps from 0 to the corner of the Nyquist square.
@@ -90,13 +78,8 @@ impl RadialTable {
     pub(crate) fn new(pixels_per_degree: f64, value_at: impl Fn(f64) -> f64) -> Self {
         let highest_cpd = pixels_per_degree * std::f64::consts::FRAC_1_SQRT_2;
         let step = highest_cpd / (RADIAL_STEPS - 2) as f64;
-        let values = (0..RADIAL_STEPS)
-            .map(|index| value_at(index as f64 * step) as f32)
-            .collect();
-        Self {
-            values,
-            steps_per_cpd: step.recip() as f32,
-        }
+        let values = (0..RADIAL_STEPS).map(|index| value_at(index as f64 * step) as f32).collect();
+        Self { values, steps_per_cpd: step.recip() as f32 }
     }
 
     pub(crate) fn at(&self, freq_cpd: f32) -> f32 {
@@ -108,16 +91,8 @@ impl RadialTable {
 
     /// The product of two tables of one grid.
     pub(crate) fn times(&self, other: &Self) -> Self {
-        let values = self
-            .values
-            .iter()
-            .zip(&other.values)
-            .map(|(a, b)| a * b)
-            .collect();
-        Self {
-            values,
-            steps_per_cpd: self.steps_per_cpd,
-        }
+        let values = self.values.iter().zip(&other.values).map(|(a, b)| a * b).collect();
+        Self { values, steps_per_cpd: self.steps_per_cpd }
     }
 }
 
@@ -132,11 +107,7 @@ pub(crate) fn for_each_ring(pixels_per_degree: f64, rings: usize, mut visit: imp
     let ratio = (highest_cpd / lowest_cpd).powf((rings as f64).recip());
     let mut inner = 0.0;
     for ring in 1..=rings {
-        let outer = if ring == rings {
-            highest_cpd
-        } else {
-            lowest_cpd * ratio.powi(ring as i32)
-        };
+        let outer = if ring == rings { highest_cpd } else { lowest_cpd * ratio.powi(ring as i32) };
         let weight = (square_disc_area(outer, nyquist_cpd) - square_disc_area(inner, nyquist_cpd))
             / (4.0 * nyquist_cpd * nyquist_cpd);
         visit((0.5 * (inner * inner + outer * outer)).sqrt(), weight);
@@ -165,9 +136,7 @@ mod tests {
             let bands = OctaveBands::for_grid(ppd);
             for step in 0..500 {
                 let freq = f64::from(step) * ppd / 700.0;
-                let sum: f64 = (0..bands.len())
-                    .map(|band| bands.gain(band, freq).powi(2))
-                    .sum();
+                let sum: f64 = (0..bands.len()).map(|band| bands.gain(band, freq).powi(2)).sum();
                 assert!((sum - 1.0).abs() < 1e-12, "{ppd} ppd, {freq} cpd: {sum}");
             }
         }
@@ -175,14 +144,8 @@ mod tests {
 
     #[test]
     fn bands_reach_as_far_as_the_grid() {
-        assert_eq!(
-            OctaveBands::for_grid(60.0).centers_cpd,
-            [0.5, 1.0, 2.0, 4.0, 8.0, 16.0]
-        );
-        assert_eq!(
-            OctaveBands::for_grid(30.0).centers_cpd,
-            [0.5, 1.0, 2.0, 4.0, 8.0]
-        );
+        assert_eq!(OctaveBands::for_grid(60.0).centers_cpd, [0.5, 1.0, 2.0, 4.0, 8.0, 16.0]);
+        assert_eq!(OctaveBands::for_grid(30.0).centers_cpd, [0.5, 1.0, 2.0, 4.0, 8.0]);
         assert_eq!(OctaveBands::for_grid(1.0).centers_cpd, [0.5]);
     }
 
@@ -195,9 +158,6 @@ mod tests {
         });
         assert!((sum - 1.0).abs() < 1e-12);
         // The mean of x² + y² over a square of half side 20 is 2/3 · 400.
-        assert!(
-            (mean_square / (2.0 / 3.0 * 400.0) - 1.0).abs() < 1e-3,
-            "{mean_square}"
-        );
+        assert!((mean_square / (2.0 / 3.0 * 400.0) - 1.0).abs() < 1e-3, "{mean_square}");
     }
 }

@@ -22,8 +22,7 @@ impl Difference {
     /// Probability of seeing the difference in the 1° patch around each pixel: 1 − exp(−v^3.5).
     #[must_use]
     pub fn detection(&self) -> Plane {
-        self.visibility
-            .map(|v| detection_probability(f64::from(v)) as f32)
+        self.visibility.map(|v| detection_probability(f64::from(v)) as f32)
     }
 
     /// Whether the difference reaches threshold anywhere.
@@ -63,31 +62,17 @@ pub fn difference(
     viewing: &Viewing,
     csf: &dyn ContrastSensitivity,
 ) -> Result<Difference, Error> {
-    test_cd_m2.check_size(
-        "test picture",
-        reference_cd_m2.width(),
-        reference_cd_m2.height(),
-    )?;
+    test_cd_m2.check_size("test picture", reference_cd_m2.width(), reference_cd_m2.height())?;
     let csf = HeldAtLowFrequencies { base: csf };
     let map_of = |picture| {
-        threshold_map(
-            &ThresholdInputs {
-                display_luminance_cd_m2: picture,
-                guide_variance: None,
-            },
-            viewing,
-            &csf,
-        )
+        threshold_map(&ThresholdInputs { display_luminance_cd_m2: picture, guide_variance: None }, viewing, &csf)
     };
     let mut map = map_of(reference_cd_m2)?;
     let test_map = map_of(test_cd_m2)?;
     for (elevation, test_elevation) in map.elevations.iter_mut().zip(&test_map.elevations) {
         *elevation = ratio(elevation, test_elevation, f32::min);
     }
-    let visibility =
-        map.measured_visibility(&ratio(test_cd_m2, reference_cd_m2, |test, reference| {
-            test - reference
-        }));
+    let visibility = map.measured_visibility(&ratio(test_cd_m2, reference_cd_m2, |test, reference| test - reference));
     let worst = visibility.values().iter().copied().fold(0.0, f32::max);
     let visible = visibility.values().iter().filter(|v| **v > 1.0).count();
     Ok(Difference {
@@ -125,9 +110,7 @@ mod tests {
     fn noisy(reference: &Plane, relative: f32) -> Plane {
         let mut state = 3;
         let mut test = reference.clone();
-        test.values_mut()
-            .iter_mut()
-            .for_each(|value| *value *= 1.0 + relative * normal(&mut state).clamp(-3.0, 3.0));
+        test.values_mut().iter_mut().for_each(|value| *value *= 1.0 + relative * normal(&mut state).clamp(-3.0, 3.0));
         test
     }
 
@@ -142,12 +125,8 @@ mod tests {
     #[test]
     fn more_noise_is_more_visible() {
         let grey = Plane::filled(96, 96, 100.0);
-        let levels = [0.001, 0.005, 0.02, 0.08]
-            .map(|noise| compare(&grey, &noisy(&grey, noise)).worst_visibility);
-        assert!(
-            levels.windows(2).all(|pair| pair[0] < pair[1]),
-            "{levels:?}"
-        );
+        let levels = [0.001, 0.005, 0.02, 0.08].map(|noise| compare(&grey, &noisy(&grey, noise)).worst_visibility);
+        assert!(levels.windows(2).all(|pair| pair[0] < pair[1]), "{levels:?}");
         assert!(levels[0] < 1.0 && levels[3] > 1.0);
     }
 
@@ -160,17 +139,14 @@ mod tests {
 
     #[test]
     fn lost_texture_is_not_hidden_by_itself() {
-        let texture = Plane::from_fn(128, 128, |x, y| {
-            100.0 * (1.0 + 0.3 * (x as f32 * 0.42).cos() * (y as f32 * 0.42).cos())
-        });
+        let texture =
+            Plane::from_fn(128, 128, |x, y| 100.0 * (1.0 + 0.3 * (x as f32 * 0.42).cos() * (y as f32 * 0.42).cos()));
         let flat = Plane::filled(128, 128, 100.0);
         let lost = compare(&texture, &flat).worst_visibility;
         assert!((lost / compare(&flat, &texture).worst_visibility - 1.0).abs() < 0.05);
         assert!(lost > 5.0, "{lost}");
         // While noise on the texture is hidden by it, where the same noise on grey is not.
-        let on_texture = compare(&texture, &noisy(&texture, 0.03))
-            .visibility
-            .get(64, 64);
+        let on_texture = compare(&texture, &noisy(&texture, 0.03)).visibility.get(64, 64);
         let on_grey = compare(&flat, &noisy(&flat, 0.03)).visibility.get(64, 64);
         assert!(on_texture < 0.95 * on_grey, "{on_texture} {on_grey}");
     }

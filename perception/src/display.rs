@@ -39,43 +39,19 @@ struct Preset {
     csf_area_deg2: Option<f64>,
 }
 
-const fn preset(
-    name: &'static str,
-    pixels_per_degree: f64,
-    white_cd_m2: f64,
-    black_cd_m2: f64,
-) -> Preset {
-    Preset {
-        name,
-        pixels_per_degree,
-        white_cd_m2,
-        black_cd_m2,
-        eotf: Eotf::Srgb,
-        csf_area_deg2: None,
-    }
+const fn preset(name: &'static str, pixels_per_degree: f64, white_cd_m2: f64, black_cd_m2: f64) -> Preset {
+    Preset { name, pixels_per_degree, white_cd_m2, black_cd_m2, eotf: Eotf::Srgb, csf_area_deg2: None }
 }
 
 const PRESETS: [Preset; 8] = [
     preset("desktop", 60.0, 200.0, 0.2),
     preset("fullhd", 38.0, 200.0, 0.2),
     preset("laptop", 80.0, 300.0, 0.3),
-    Preset {
-        eotf: Eotf::Bt1886,
-        ..preset("uhd-tv", 110.0, 300.0, 0.05)
-    },
+    Preset { eotf: Eotf::Bt1886, ..preset("uhd-tv", 110.0, 300.0, 0.05) },
     preset("phone", 90.0, 500.0, 0.05),
-    Preset {
-        eotf: Eotf::Bt1886,
-        ..preset("cinema", 50.0, 48.0, 0.02)
-    },
-    Preset {
-        eotf: Eotf::Pq,
-        ..preset("hdr-1000", 60.0, 1000.0, 0.005)
-    },
-    Preset {
-        csf_area_deg2: Some(7.0),
-        ..preset("strict", 30.0, 400.0, 0.1)
-    },
+    Preset { eotf: Eotf::Bt1886, ..preset("cinema", 50.0, 48.0, 0.02) },
+    Preset { eotf: Eotf::Pq, ..preset("hdr-1000", 60.0, 1000.0, 0.005) },
+    Preset { csf_area_deg2: Some(7.0), ..preset("strict", 30.0, 400.0, 0.1) },
 ];
 
 const PRESET_NAMES: [&str; 8] = {
@@ -105,10 +81,7 @@ impl Display {
     /// ```
     #[must_use]
     pub fn preset(name: &str) -> Option<Self> {
-        PRESETS
-            .iter()
-            .find(|preset| preset.name == name)
-            .map(Self::from_preset)
+        PRESETS.iter().find(|preset| preset.name == name).map(Self::from_preset)
     }
 
     /// The names that [`Display::preset`] knows.
@@ -147,10 +120,8 @@ impl Display {
     /// [`Error::Parse`] for what is no TOML or has unknown keys, [`Error::UnknownName`] for an unknown preset and
     /// [`Error::OutOfRange`] for values that no display has.
     pub fn from_toml(text: &str) -> Result<Self, Error> {
-        let file: DisplayFile = toml::from_str(text).map_err(|error| Error::Parse {
-            what: "display file",
-            reason: error.to_string(),
-        })?;
+        let file: DisplayFile =
+            toml::from_str(text).map_err(|error| Error::Parse { what: "display file", reason: error.to_string() })?;
         let base = file.preset.as_deref().unwrap_or("desktop");
         let mut display = Self::preset(base).ok_or_else(|| Error::UnknownName {
             kind: "display preset",
@@ -175,12 +146,7 @@ impl Display {
         display.eotf = file.eotf.unwrap_or(display.eotf);
         display.distance_m = file.distance_m.or(display.distance_m);
         display.csf_area_deg2 = file.csf_area_deg2.or(display.csf_area_deg2);
-        match (
-            file.pixels_per_degree,
-            file.width_px,
-            file.width_m,
-            display.distance_m,
-        ) {
+        match (file.pixels_per_degree, file.width_px, file.width_m, display.distance_m) {
             (Some(_), None, None, _) | (None, None, None, _) => {}
             (None, Some(width_px), Some(width_m), Some(distance_m)) => {
                 display.pixels_per_degree = pixels_per_degree(width_px, width_m, distance_m)?;
@@ -201,11 +167,7 @@ impl Display {
     /// black + ambient + (white − black) · relative.
     #[must_use]
     pub fn luminance_cd_m2(&self, relative: f64) -> f64 {
-        let light = if relative.is_nan() {
-            0.0
-        } else {
-            relative.clamp(0.0, 1.0)
-        };
+        let light = if relative.is_nan() { 0.0 } else { relative.clamp(0.0, 1.0) };
         self.black_cd_m2 + self.ambient_cd_m2 + (self.white_cd_m2 - self.black_cd_m2) * light
     }
 
@@ -216,53 +178,17 @@ impl Display {
     pub fn check(&self) -> Result<(), Error> {
         const PPD: &str = "between 1 and 1000 pixels per degree";
         const LIGHT: &str = "between 0 and 1e8 cd/m²";
-        check_range(
-            "pixels_per_degree",
-            self.pixels_per_degree,
-            1.0,
-            1000.0,
-            PPD,
-        )?;
-        check_range(
-            "white_cd_m2",
-            self.white_cd_m2,
-            1e-3,
-            1e8,
-            "between 0.001 and 1e8 cd/m²",
-        )?;
-        check_range(
-            "black_cd_m2",
-            self.black_cd_m2,
-            0.0,
-            self.white_cd_m2,
-            "between 0 and white_cd_m2",
-        )?;
+        check_range("pixels_per_degree", self.pixels_per_degree, 1.0, 1000.0, PPD)?;
+        check_range("white_cd_m2", self.white_cd_m2, 1e-3, 1e8, "between 0.001 and 1e8 cd/m²")?;
+        check_range("black_cd_m2", self.black_cd_m2, 0.0, self.white_cd_m2, "between 0 and white_cd_m2")?;
         check_range("ambient_cd_m2", self.ambient_cd_m2, 0.0, 1e8, LIGHT)?;
-        check_range(
-            "frames_per_second",
-            self.frames_per_second,
-            1.0,
-            1e4,
-            "between 1 and 10000",
-        )?;
+        check_range("frames_per_second", self.frames_per_second, 1.0, 1e4, "between 1 and 10000")?;
         check_range("persistence", self.persistence, 0.0, 1.0, "between 0 and 1")?;
         if let Some(distance_m) = self.distance_m {
-            check_range(
-                "distance_m",
-                distance_m,
-                0.01,
-                1000.0,
-                "between 0.01 and 1000 m",
-            )?;
+            check_range("distance_m", distance_m, 0.01, 1000.0, "between 0.01 and 1000 m")?;
         }
         if let Some(area) = self.csf_area_deg2 {
-            check_range(
-                "csf_area_deg2",
-                area,
-                1e-3,
-                1e4,
-                "between 0.001 and 10000 deg²",
-            )?;
+            check_range("csf_area_deg2", area, 1e-3, 1e4, "between 0.001 and 10000 deg²")?;
         }
         Ok(())
     }
@@ -274,21 +200,9 @@ impl Display {
 /// [`Error::OutOfRange`] for sizes and distances that are not positive and finite.
 pub fn pixels_per_degree(width_px: f64, width_m: f64, distance_m: f64) -> Result<f64, Error> {
     const POSITIVE: &str = "positive and finite";
-    check_range(
-        "width_px",
-        width_px,
-        1.0,
-        1e6,
-        "between 1 and 1000000 pixels",
-    )?;
+    check_range("width_px", width_px, 1.0, 1e6, "between 1 and 1000000 pixels")?;
     check_range("width_m", width_m, f64::MIN_POSITIVE, f64::MAX, POSITIVE)?;
-    check_range(
-        "distance_m",
-        distance_m,
-        f64::MIN_POSITIVE,
-        f64::MAX,
-        POSITIVE,
-    )?;
+    check_range("distance_m", distance_m, f64::MIN_POSITIVE, f64::MAX, POSITIVE)?;
     Ok(2.0 * distance_m * 0.5_f64.to_radians().tan() * width_px / width_m)
 }
 
@@ -323,20 +237,14 @@ impl Observer {
     /// A keen observer: 1.75 times the median sensitivity.
     #[must_use]
     pub fn keen() -> Self {
-        Self {
-            sensitivity: 1.75,
-            ..Self::default()
-        }
+        Self { sensitivity: 1.75, ..Self::default() }
     }
 }
 
 impl Default for Observer {
     /// The median observer, 1 deg².
     fn default() -> Self {
-        Self {
-            sensitivity: 1.0,
-            csf_area_deg2: 1.0,
-        }
+        Self { sensitivity: 1.0, csf_area_deg2: 1.0 }
     }
 }
 
@@ -364,20 +272,8 @@ impl Viewing {
     /// [`Error::OutOfRange`], naming the field.
     pub fn check(&self) -> Result<(), Error> {
         self.display.check()?;
-        check_range(
-            "observer.sensitivity",
-            self.observer.sensitivity,
-            1e-3,
-            1e3,
-            "between 0.001 and 1000",
-        )?;
-        check_range(
-            "observer.csf_area_deg2",
-            self.observer.csf_area_deg2,
-            1e-3,
-            1e4,
-            "between 0.001 and 10000 deg²",
-        )
+        check_range("observer.sensitivity", self.observer.sensitivity, 1e-3, 1e3, "between 0.001 and 1000")?;
+        check_range("observer.csf_area_deg2", self.observer.csf_area_deg2, 1e-3, 1e4, "between 0.001 and 10000 deg²")
     }
 }
 
@@ -404,10 +300,7 @@ mod tests {
 
     #[test]
     fn luminance_spans_black_to_white() {
-        let display = Display {
-            ambient_cd_m2: 1.0,
-            ..Display::default()
-        };
+        let display = Display { ambient_cd_m2: 1.0, ..Display::default() };
         assert_eq!(display.luminance_cd_m2(-1.0), 1.2);
         assert_eq!(display.luminance_cd_m2(f64::NAN), 1.2);
         assert!((display.luminance_cd_m2(7.0) - 201.0).abs() < 1e-9);
@@ -415,22 +308,10 @@ mod tests {
 
     #[test]
     fn bad_files_say_why() {
-        assert!(matches!(
-            Display::from_toml("white_cd_m2 = -5"),
-            Err(Error::OutOfRange { .. })
-        ));
-        assert!(matches!(
-            Display::from_toml("colour = 'red'"),
-            Err(Error::Parse { .. })
-        ));
-        assert!(matches!(
-            Display::from_toml("preset = 'wall'"),
-            Err(Error::UnknownName { .. })
-        ));
-        assert!(matches!(
-            Display::from_toml("width_px = 1920"),
-            Err(Error::Parse { .. })
-        ));
+        assert!(matches!(Display::from_toml("white_cd_m2 = -5"), Err(Error::OutOfRange { .. })));
+        assert!(matches!(Display::from_toml("colour = 'red'"), Err(Error::Parse { .. })));
+        assert!(matches!(Display::from_toml("preset = 'wall'"), Err(Error::UnknownName { .. })));
+        assert!(matches!(Display::from_toml("width_px = 1920"), Err(Error::Parse { .. })));
         let phone = Display::from_toml("preset = 'phone'\nwhite_cd_m2 = 700").unwrap();
         assert_eq!((phone.white_cd_m2, phone.pixels_per_degree), (700.0, 90.0));
     }

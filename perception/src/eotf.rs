@@ -31,20 +31,14 @@ impl Eotf {
     /// Only [`Eotf::Pq`] needs `white_cd_m2`: its codes mean absolute luminances. NaN gives 0.
     #[must_use]
     pub fn encode(self, relative: f64, white_cd_m2: f64) -> f64 {
-        let light = if relative.is_nan() {
-            0.0
-        } else {
-            relative.clamp(0.0, 1.0)
-        };
+        let light = if relative.is_nan() { 0.0 } else { relative.clamp(0.0, 1.0) };
         let code = match self {
             Self::Linear => light,
             Self::Srgb if light <= 0.003_130_8 => 12.92 * light,
             Self::Srgb => 1.055 * light.powf(1.0 / 2.4) - 0.055,
             Self::Bt1886 => light.powf(1.0 / 2.4),
             Self::Pq => {
-                let power = (light * white_cd_m2 / PQ_PEAK_CD_M2)
-                    .clamp(0.0, 1.0)
-                    .powf(PQ_M1);
+                let power = (light * white_cd_m2 / PQ_PEAK_CD_M2).clamp(0.0, 1.0).powf(PQ_M1);
                 ((PQ_C1 + PQ_C2 * power) / (1.0 + PQ_C3 * power)).powf(PQ_M2)
             }
         };
@@ -54,11 +48,7 @@ impl Eotf {
     /// Linear light (1 = display white) of a code value (clamped to 0..1): the inverse of [`Eotf::encode`].
     #[must_use]
     pub fn decode(self, code: f64, white_cd_m2: f64) -> f64 {
-        let code = if code.is_nan() {
-            0.0
-        } else {
-            code.clamp(0.0, 1.0)
-        };
+        let code = if code.is_nan() { 0.0 } else { code.clamp(0.0, 1.0) };
         match self {
             Self::Linear => code,
             Self::Srgb if code <= 0.040_45 => code / 12.92,

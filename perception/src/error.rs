@@ -88,13 +88,5 @@ pub(crate) fn check_range(
     high: f64,
     expected: &'static str,
 ) -> Result<(), Error> {
-    if value >= low && value <= high {
-        Ok(())
-    } else {
-        Err(Error::OutOfRange {
-            what,
-            value,
-            expected,
-        })
-    }
+    if value >= low && value <= high { Ok(()) } else { Err(Error::OutOfRange { what, value, expected }) }
 }

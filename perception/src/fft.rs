@@ -34,12 +34,8 @@ struct Planners {
     complex: FftPlanner<f32>,
 }
 
-static PLANNERS: LazyLock<Mutex<Planners>> = LazyLock::new(|| {
-    Mutex::new(Planners {
-        real: RealFftPlanner::new(),
-        complex: FftPlanner::new(),
-    })
-});
+static PLANNERS: LazyLock<Mutex<Planners>> =
+    LazyLock::new(|| Mutex::new(Planners { real: RealFftPlanner::new(), complex: FftPlanner::new() }));
 
 /// The smallest number ≥ `least` without prime factors other than 2, 3 and 5.
 pub(crate) fn smooth_size(least: usize) -> usize {
@@ -61,13 +57,10 @@ impl PictureTransform {
     pub(crate) fn new(width: usize, height: usize, pad: usize) -> Self {
         // Multiples of the largest reduction, so that reduced transforms sample the same pixels.
         let pad = pad.max(1).next_multiple_of(MOST_REDUCTION);
-        let padded =
-            |len: usize| MOST_REDUCTION * smooth_size((len + 2 * pad).div_ceil(MOST_REDUCTION));
+        let padded = |len: usize| MOST_REDUCTION * smooth_size((len + 2 * pad).div_ceil(MOST_REDUCTION));
         let (padded_width, padded_height) = (padded(width), padded(height));
         // A poisoned lock only means that another thread died while planning; the plans made so far are whole.
-        let mut planners = PLANNERS
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut planners = PLANNERS.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         Self {
             width,
             height,
@@ -90,12 +83,7 @@ impl PictureTransform {
         let zero = Complex32::default();
         let mut by_row = vec![zero; columns * self.padded_height];
         by_row.par_chunks_mut(columns).enumerate().for_each_init(
-            || {
-                (
-                    self.rows_forward.make_input_vec(),
-                    self.rows_forward.make_scratch_vec(),
-                )
-            },
+            || (self.rows_forward.make_input_vec(), self.rows_forward.make_scratch_vec()),
             |(row, scratch), (y, bins)| {
                 let source = plane.row(reflect(y as isize - self.pad as isize, self.height));
                 for (x, value) in row.iter_mut().enumerate() {
@@ -127,13 +115,9 @@ impl PictureTransform {
         factor: usize,
         gain: impl Fn(f32) -> f32 + Sync,
     ) -> Plane {
-        let mut planners = PLANNERS
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut planners = PLANNERS.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let back = BackTransform {
-            columns: planners
-                .complex
-                .plan_fft_inverse(self.padded_height / factor),
+            columns: planners.complex.plan_fft_inverse(self.padded_height / factor),
             rows: planners.real.plan_fft_inverse(self.padded_width / factor),
             factor,
             first: self.pad / factor - 1,
@@ -161,51 +145,39 @@ impl PictureTransform {
         let step_y = (pixels_per_degree / all_rows as f64) as f32;
         let scale = 1.0 / (self.padded_width as f32 * all_rows as f32);
         let mut bins = vec![zero; columns * rows];
-        bins.par_chunks_mut(rows)
-            .zip(spectrum.bins.par_chunks(all_rows))
-            .enumerate()
-            .for_each_init(
-                || vec![zero; back.columns.get_inplace_scratch_len()],
-                |scratch, (kx, (filtered, source))| {
-                    let freq_x = kx as f32 * step_x;
-                    if f64::from(freq_x) > limit_cpd {
-                        return;
-                    }
-                    for (ky, bin) in filtered.iter_mut().enumerate() {
-                        // Negative frequencies stand at the end.
-                        let source_ky = if 2 * ky <= rows {
-                            ky
-                        } else {
-                            all_rows - (rows - ky)
-                        };
-                        let freq_y = ky.min(rows - ky) as f32 * step_y;
-                        *bin = source[source_ky]
-                            * (gain((freq_x * freq_x + freq_y * freq_y).sqrt()) * scale);
-                    }
-                    back.columns.process_with_scratch(filtered, scratch);
-                },
-            );
+        bins.par_chunks_mut(rows).zip(spectrum.bins.par_chunks(all_rows)).enumerate().for_each_init(
+            || vec![zero; back.columns.get_inplace_scratch_len()],
+            |scratch, (kx, (filtered, source))| {
+                let freq_x = kx as f32 * step_x;
+                if f64::from(freq_x) > limit_cpd {
+                    return;
+                }
+                for (ky, bin) in filtered.iter_mut().enumerate() {
+                    // Negative frequencies stand at the end.
+                    let source_ky = if 2 * ky <= rows { ky } else { all_rows - (rows - ky) };
+                    let freq_y = ky.min(rows - ky) as f32 * step_y;
+                    *bin = source[source_ky] * (gain((freq_x * freq_x + freq_y * freq_y).sqrt()) * scale);
+                }
+                back.columns.process_with_scratch(filtered, scratch);
+            },
+        );
         let mut by_row = vec![zero; columns * rows];
         transpose(&bins, &mut by_row, rows, columns);
         // Only the rows that are asked for come back.
         let kept = back.first * columns..(back.first + back.height) * columns;
         let mut picture = Plane::filled(back.width, back.height, 0.0);
-        picture
-            .values_mut()
-            .par_chunks_mut(back.width)
-            .zip(by_row[kept].par_chunks_mut(columns))
-            .for_each_init(
-                || (back.rows.make_output_vec(), back.rows.make_scratch_vec()),
-                |(row, scratch), (values, bins)| {
-                    // The transform of a real row has real ends; rounding leaves a trace that the plan would refuse.
-                    bins[0].im = 0.0;
-                    if row_length.is_multiple_of(2) {
-                        bins[columns - 1].im = 0.0;
-                    }
-                    let _ = back.rows.process_with_scratch(bins, row, scratch);
-                    values.copy_from_slice(&row[back.first..back.first + back.width]);
-                },
-            );
+        picture.values_mut().par_chunks_mut(back.width).zip(by_row[kept].par_chunks_mut(columns)).for_each_init(
+            || (back.rows.make_output_vec(), back.rows.make_scratch_vec()),
+            |(row, scratch), (values, bins)| {
+                // The transform of a real row has real ends; rounding leaves a trace that the plan would refuse.
+                bins[0].im = 0.0;
+                if row_length.is_multiple_of(2) {
+                    bins[columns - 1].im = 0.0;
+                }
+                let _ = back.rows.process_with_scratch(bins, row, scratch);
+                values.copy_from_slice(&row[back.first..back.first + back.width]);
+            },
+        );
         picture
     }
 }
@@ -269,17 +241,14 @@ pub(crate) fn enlarged(reduced: &Plane, factor: usize, width: usize, height: usi
 /// `source` has rows of `width` bins; `target` gets them as columns.
 fn transpose(source: &[Complex32], target: &mut [Complex32], width: usize, height: usize) {
     const STRIP: usize = 8;
-    target
-        .par_chunks_mut(STRIP * height)
-        .enumerate()
-        .for_each(|(strip, rows)| {
-            for y in 0..height {
-                let line = &source[y * width + strip * STRIP..];
-                for (row, value) in rows.chunks_exact_mut(height).zip(line) {
-                    row[y] = *value;
-                }
+    target.par_chunks_mut(STRIP * height).enumerate().for_each(|(strip, rows)| {
+        for y in 0..height {
+            let line = &source[y * width + strip * STRIP..];
+            for (row, value) in rows.chunks_exact_mut(height).zip(line) {
+                row[y] = *value;
             }
-        });
+        }
+    });
 }
 
 #[cfg(test)]
@@ -300,10 +269,7 @@ mod tests {
 
     #[test]
     fn smooth_sizes() {
-        assert_eq!(
-            [1, 7, 11, 632, 1021].map(smooth_size),
-            [1, 8, 12, 640, 1024]
-        );
+        assert_eq!([1, 7, 11, 632, 1021].map(smooth_size), [1, 8, 12, 640, 1024]);
     }
 
     #[test]
@@ -311,18 +277,9 @@ mod tests {
         for (width, height) in [(1, 1), (1, 5), (7, 3), (48, 31)] {
             let plane = Plane::from_fn(width, height, |x, y| ((x * 7 + y * 13) % 11) as f32);
             let transform = PictureTransform::new(width, height, 9);
-            let back = filtered(
-                &transform,
-                &transform.forward(&plane),
-                30.0,
-                f64::INFINITY,
-                |_| 1.0,
-            );
+            let back = filtered(&transform, &transform.forward(&plane), 30.0, f64::INFINITY, |_| 1.0);
             for (found, expected) in back.values().iter().zip(plane.values()) {
-                assert!(
-                    (found - expected).abs() < 1e-4,
-                    "{width}×{height}: {found} for {expected}"
-                );
+                assert!((found - expected).abs() < 1e-4, "{width}×{height}: {found} for {expected}");
             }
         }
     }
@@ -331,28 +288,19 @@ mod tests {
     fn frequencies_are_cycles_per_degree() {
         // 3 cycles in 64 pixels at 32 pixels a degree: 1.5 cpd along y; with 16 pixels of mirror on each side, a third of
         // the padded 96 rows is still whole half waves.
-        let plane = Plane::from_fn(16, 64, |_, y| {
-            (std::f32::consts::TAU * 3.0 * (y as f32 + 0.5) / 64.0).cos()
-        });
+        let plane = Plane::from_fn(16, 64, |_, y| (std::f32::consts::TAU * 3.0 * (y as f32 + 0.5) / 64.0).cos());
         let transform = PictureTransform::new(16, 64, 32);
         let spectrum = transform.forward(&plane);
-        let kept = filtered(&transform, &spectrum, 32.0, f64::INFINITY, |freq| {
-            f32::from((freq - 1.5).abs() < 0.01)
-        });
-        let lost = filtered(&transform, &spectrum, 32.0, 1.6, |freq| {
-            f32::from((freq - 1.5).abs() > 0.01)
-        });
-        for ((kept, lost), expected) in kept.values().iter().zip(lost.values()).zip(plane.values())
-        {
+        let kept = filtered(&transform, &spectrum, 32.0, f64::INFINITY, |freq| f32::from((freq - 1.5).abs() < 0.01));
+        let lost = filtered(&transform, &spectrum, 32.0, 1.6, |freq| f32::from((freq - 1.5).abs() > 0.01));
+        for ((kept, lost), expected) in kept.values().iter().zip(lost.values()).zip(plane.values()) {
             assert!((kept - expected).abs() < 1e-5 && lost.abs() < 1e-5);
         }
     }
 
     #[test]
     fn a_reduced_transform_samples_the_whole_one() {
-        let plane = Plane::from_fn(75, 42, |x, y| {
-            (x as f32 * 0.13).sin() + (y as f32 * 0.1 + x as f32 * 0.02).cos()
-        });
+        let plane = Plane::from_fn(75, 42, |x, y| (x as f32 * 0.13).sin() + (y as f32 * 0.1 + x as f32 * 0.02).cos());
         let transform = PictureTransform::new(75, 42, 30);
         let spectrum = transform.forward(&plane);
         // A smooth low-pass that ends at 2 cpd; 60 pixels a degree.
@@ -364,11 +312,7 @@ mod tests {
             for y in 0..42 {
                 for x in 0..75 {
                     let error = (back.get(x, y) - whole.get(x, y)).abs();
-                    let limit = if x % factor == 0 && y % factor == 0 {
-                        1e-5
-                    } else {
-                        0.05
-                    };
+                    let limit = if x % factor == 0 && y % factor == 0 { 1e-5 } else { 0.05 };
                     assert!(error < limit, "factor {factor} at ({x}, {y}): {error}");
                 }
             }

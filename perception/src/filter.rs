@@ -15,11 +15,7 @@ pub(crate) fn reflect(index: isize, len: usize) -> usize {
     }
     let period = 2 * len as isize;
     let inside = index.rem_euclid(period) as usize;
-    if inside < len {
-        inside
-    } else {
-        2 * len - 1 - inside
-    }
+    if inside < len { inside } else { 2 * len - 1 - inside }
 }
 
 /// Columns worked on at once: enough to fill vector registers, few enough that a strip stays in the cache.
@@ -55,13 +51,7 @@ pub(crate) fn erode(plane: &Plane, radius_px: usize) -> Plane {
         let radius = radius_px.min(len);
         move |strip: &mut Strip| {
             strip.extend(radius);
-            strip.slide(
-                0,
-                2 * radius + 1,
-                f32::INFINITY,
-                f32::min,
-                |window, _, _| window,
-            );
+            strip.slide(0, 2 * radius + 1, f32::INFINITY, f32::min, |window, _, _| window);
         }
     })
 }
@@ -96,11 +86,9 @@ impl Strip {
     fn extend(&mut self, pad: usize) {
         let (values, len) = (&self.values, self.values.len());
         self.extended.clear();
-        self.extended
-            .extend((0..pad).map(|index| values[reflect(index as isize - pad as isize, len)]));
+        self.extended.extend((0..pad).map(|index| values[reflect(index as isize - pad as isize, len)]));
         self.extended.extend_from_slice(values);
-        self.extended
-            .extend((0..pad).map(|index| values[reflect((len + index) as isize, len)]));
+        self.extended.extend((0..pad).map(|index| values[reflect((len + index) as isize, len)]));
     }
 
     /// Sets every value to `finish(join over the window, element before it, element after it)`, the window of `window`
@@ -121,12 +109,7 @@ impl Strip {
         for (block, values) in self.values.chunks_mut(window).enumerate() {
             let start = offset + block * window;
             let mut running = [neutral; LANES];
-            for (suffix, lanes) in self
-                .suffix
-                .iter_mut()
-                .zip(&extended[start..start + window])
-                .rev()
-            {
+            for (suffix, lanes) in self.suffix.iter_mut().zip(&extended[start..start + window]).rev() {
                 for lane in 0..LANES {
                     running[lane] = join(running[lane], lanes[lane]);
                 }
@@ -144,8 +127,7 @@ impl Strip {
                 let before = &extended[(start + index).saturating_sub(1)];
                 let after = &extended[(start + index + window).min(extended.len() - 1)];
                 for lane in 0..LANES {
-                    value[lane] =
-                        finish(join(suffix[lane], prefix[lane]), before[lane], after[lane]);
+                    value[lane] = finish(join(suffix[lane], prefix[lane]), before[lane], after[lane]);
                 }
             }
         }
@@ -166,22 +148,13 @@ impl BoxKernel {
         let variance = sigma_px * sigma_px / 3.0;
         let radius = (((12.0 * variance + 1.0).sqrt() - 1.0) / 2.0).floor();
         let length = 2.0 * radius + 1.0;
-        let end = length * (variance - radius * (radius + 1.0) / 3.0)
-            / (2.0 * ((radius + 1.0).powi(2) - variance));
-        Self {
-            radius: radius as usize,
-            end_weight: end as f32,
-            scale: (length + 2.0 * end).recip() as f32,
-        }
+        let end = length * (variance - radius * (radius + 1.0) / 3.0) / (2.0 * ((radius + 1.0).powi(2) - variance));
+        Self { radius: radius as usize, end_weight: end as f32, scale: (length + 2.0 * end).recip() as f32 }
     }
 
     fn apply(self, strip: &mut Strip) {
         strip.extend(self.radius + 1);
-        let Self {
-            radius,
-            end_weight,
-            scale,
-        } = self;
+        let Self { radius, end_weight, scale } = self;
         strip.slide(
             1,
             2 * radius + 1,
@@ -208,11 +181,9 @@ where
 fn run_columns(plane: &Plane, operation: &(impl Fn(&mut Strip) + Sync)) -> Plane {
     let height = plane.height();
     let mut result = Plane::filled(height, plane.width(), 0.0);
-    result
-        .values_mut()
-        .par_chunks_mut(LANES * height)
-        .enumerate()
-        .for_each_init(Strip::default, |strip, (index, rows)| {
+    result.values_mut().par_chunks_mut(LANES * height).enumerate().for_each_init(
+        Strip::default,
+        |strip, (index, rows)| {
             strip.load(plane, index * LANES);
             operation(strip);
             // Sixteen values at a time: what is read sixteen times stays at hand.
@@ -223,7 +194,8 @@ fn run_columns(plane: &Plane, operation: &(impl Fn(&mut Strip) + Sync)) -> Plane
                     }
                 }
             }
-        });
+        },
+    );
     result
 }
 
@@ -250,10 +222,7 @@ mod tests {
                     variance += f64::from(blurred.get(x, y)) * (x as f64 - 64.0).powi(2);
                 }
             }
-            assert!(
-                (variance / (sigma * sigma) - 1.0).abs() < 1e-4,
-                "σ {sigma}: variance {variance}"
-            );
+            assert!((variance / (sigma * sigma) - 1.0).abs() < 1e-4, "σ {sigma}: variance {variance}");
             assert!((blurred.mean() * 129.0 * 129.0 - 1.0).abs() < 1e-5);
         }
     }

@@ -82,22 +82,13 @@ struct Light {
 
 /// What a pixel is divided by to leave its illumination.
 fn divisor(albedo: [f32; 3]) -> [f32; 3] {
-    let usable =
-        albedo.iter().all(|channel| channel.is_finite()) && luminance(albedo) > LEAST_ALBEDO;
-    if usable {
-        albedo.map(|channel| channel.max(LEAST_ALBEDO))
-    } else {
-        [1.0; 3]
-    }
+    let usable = albedo.iter().all(|channel| channel.is_finite()) && luminance(albedo) > LEAST_ALBEDO;
+    if usable { albedo.map(|channel| channel.max(LEAST_ALBEDO)) } else { [1.0; 3] }
 }
 
 fn illumination(inputs: &GuideInputs<'_>) -> Vec<Light> {
     let finite = |value: f32| {
-        if value.is_finite() {
-            value.clamp(0.0, 1e18)
-        } else {
-            0.0
-        }
+        if value.is_finite() { value.clamp(0.0, 1e18) } else { 0.0 }
     };
     (0..inputs.rgb.len())
         .into_par_iter()
@@ -107,11 +98,7 @@ fn illumination(inputs: &GuideInputs<'_>) -> Vec<Light> {
             let scale = luminance(albedo);
             // Capped so that its square stays within f32.
             let variance = (finite(inputs.variance.values()[index]) / (scale * scale)).min(1e18);
-            Light {
-                rgb,
-                luminance: luminance(rgb),
-                variance,
-            }
+            Light { rgb, luminance: luminance(rgb), variance }
         })
         .collect()
 }
@@ -167,10 +154,8 @@ fn depth_slopes(inputs: &GuideInputs<'_>) -> Vec<f32> {
                     if step.is_nan() { f32::INFINITY } else { step }
                 })
             };
-            let across =
-                step((x > 0).then(|| index - 1)).min(step((x + 1 < width).then(|| index + 1)));
-            let along = step((y > 0).then(|| index - width))
-                .min(step((y + 1 < height).then(|| index + width)));
+            let across = step((x > 0).then(|| index - 1)).min(step((x + 1 < width).then(|| index + 1)));
+            let along = step((y > 0).then(|| index - width)).min(step((y + 1 < height).then(|| index + width)));
             let slope = across.max(along);
             if slope.is_finite() { slope } else { 0.0 }
         })
@@ -184,85 +169,60 @@ fn falling(x: f32) -> f32 {
     fourth * fourth
 }
 
-fn filter_pass(
-    light: &[Light],
-    inputs: &GuideInputs<'_>,
-    slopes: &[f32],
-    hole: usize,
-) -> Vec<Light> {
+fn filter_pass(light: &[Light], inputs: &GuideInputs<'_>, slopes: &[f32], hole: usize) -> Vec<Light> {
     const TENT: [f32; 3] = [0.25, 0.5, 0.25];
     let (width, height) = (inputs.width, inputs.height);
     let mut filtered = vec![Light::default(); light.len()];
-    filtered
-        .par_chunks_mut(width)
-        .with_min_len((4096 / width).max(1))
-        .enumerate()
-        .for_each(|(y, row)| {
-            for (x, result) in row.iter_mut().enumerate() {
-                let index = y * width + x;
-                let center = light[index];
-                let depth = inputs.depth[index];
-                let normal = inputs.normal[index];
-                let luminance_scale = 1.0
-                    / (LUMINANCE_SIGMAS * smoothed_variance(light, width, height, x, y).sqrt()
-                        + 1e-3 * center.luminance
-                        + 1e-12);
-                let relative_floor = if depth.is_finite() {
-                    1e-3 * depth.abs()
-                } else {
-                    0.0
+    filtered.par_chunks_mut(width).with_min_len((4096 / width).max(1)).enumerate().for_each(|(y, row)| {
+        for (x, result) in row.iter_mut().enumerate() {
+            let index = y * width + x;
+            let center = light[index];
+            let depth = inputs.depth[index];
+            let normal = inputs.normal[index];
+            let luminance_scale = 1.0
+                / (LUMINANCE_SIGMAS * smoothed_variance(light, width, height, x, y).sqrt()
+                    + 1e-3 * center.luminance
+                    + 1e-12);
+            let relative_floor = if depth.is_finite() { 1e-3 * depth.abs() } else { 0.0 };
+            let depth_scale = 1.0 / (DEPTH_SLOPES * slopes[index] * hole as f32 + relative_floor + 1e-12);
+            let (mut rgb, mut variance, mut weight_sum) = ([0.0_f32; 3], 0.0_f32, 0.0_f32);
+            for (dy, tent_y) in TENT.into_iter().enumerate() {
+                let Some(v) = (y + dy * hole).checked_sub(hole).filter(|v| *v < height) else {
+                    continue;
                 };
-                let depth_scale =
-                    1.0 / (DEPTH_SLOPES * slopes[index] * hole as f32 + relative_floor + 1e-12);
-                let (mut rgb, mut variance, mut weight_sum) = ([0.0_f32; 3], 0.0_f32, 0.0_f32);
-                for (dy, tent_y) in TENT.into_iter().enumerate() {
-                    let Some(v) = (y + dy * hole).checked_sub(hole).filter(|v| *v < height) else {
+                for (dx, tent_x) in TENT.into_iter().enumerate() {
+                    let Some(u) = (x + dx * hole).checked_sub(hole).filter(|u| *u < width) else {
                         continue;
                     };
-                    for (dx, tent_x) in TENT.into_iter().enumerate() {
-                        let Some(u) = (x + dx * hole).checked_sub(hole).filter(|u| *u < width)
-                        else {
-                            continue;
+                    let other_index = v * width + u;
+                    let other = light[other_index];
+                    let weight = if other_index == index {
+                        tent_x * tent_y
+                    } else {
+                        let other_depth = inputs.depth[other_index];
+                        let depth_apart = match (depth.is_finite(), other_depth.is_finite()) {
+                            (true, true) => (depth - other_depth).abs() * depth_scale,
+                            (false, false) => 0.0,
+                            _ => continue,
                         };
-                        let other_index = v * width + u;
-                        let other = light[other_index];
-                        let weight = if other_index == index {
-                            tent_x * tent_y
-                        } else {
-                            let other_depth = inputs.depth[other_index];
-                            let depth_apart = match (depth.is_finite(), other_depth.is_finite()) {
-                                (true, true) => (depth - other_depth).abs() * depth_scale,
-                                (false, false) => 0.0,
-                                _ => continue,
-                            };
-                            let normal_apart = NORMAL_SHARPNESS
-                                * (1.0 - dot(normal, inputs.normal[other_index])).max(0.0);
-                            let apart = (center.luminance - other.luminance).abs()
-                                * luminance_scale
-                                + depth_apart
-                                + if normal == [0.0; 3] {
-                                    0.0
-                                } else {
-                                    normal_apart
-                                };
-                            tent_x * tent_y * falling(apart)
-                        };
-                        for (sum, channel) in rgb.iter_mut().zip(other.rgb) {
-                            *sum += weight * channel;
-                        }
-                        variance += weight * weight * other.variance;
-                        weight_sum += weight;
+                        let normal_apart = NORMAL_SHARPNESS * (1.0 - dot(normal, inputs.normal[other_index])).max(0.0);
+                        let apart = (center.luminance - other.luminance).abs() * luminance_scale
+                            + depth_apart
+                            + if normal == [0.0; 3] { 0.0 } else { normal_apart };
+                        tent_x * tent_y * falling(apart)
+                    };
+                    for (sum, channel) in rgb.iter_mut().zip(other.rgb) {
+                        *sum += weight * channel;
                     }
+                    variance += weight * weight * other.variance;
+                    weight_sum += weight;
                 }
-                // The pixel's own weight is never 0.
-                let rgb = rgb.map(|channel| channel / weight_sum);
-                *result = Light {
-                    rgb,
-                    luminance: luminance(rgb),
-                    variance: variance / (weight_sum * weight_sum),
-                };
             }
-        });
+            // The pixel's own weight is never 0.
+            let rgb = rgb.map(|channel| channel / weight_sum);
+            *result = Light { rgb, luminance: luminance(rgb), variance: variance / (weight_sum * weight_sum) };
+        }
+    });
     filtered
 }
 
@@ -305,21 +265,10 @@ mod tests {
     fn picture(seed: u64) -> Picture {
         let mut state = seed;
         let pixels = || (0..HEIGHT).flat_map(|y| (0..WIDTH).map(move |x| (x, y)));
-        let albedo: Vec<[f32; 3]> = pixels()
-            .map(|(x, _)| {
-                if x % 8 < 4 {
-                    [0.8, 0.2, 0.3]
-                } else {
-                    [0.3, 0.7, 0.4]
-                }
-            })
-            .collect();
+        let albedo: Vec<[f32; 3]> =
+            pixels().map(|(x, _)| if x % 8 < 4 { [0.8, 0.2, 0.3] } else { [0.3, 0.7, 0.4] }).collect();
         let normal_of = |y: usize| {
-            if y < 32 {
-                [0.0, 0.0, 1.0]
-            } else {
-                [0.0, 1.0, 0.0]
-            }
+            if y < 32 { [0.0, 0.0, 1.0] } else { [0.0, 1.0, 0.0] }
         };
         let light = |x: usize, y: usize| {
             if y < 32 {
@@ -330,10 +279,8 @@ mod tests {
                 10.0
             }
         };
-        let truth: Vec<[f32; 3]> = pixels()
-            .zip(&albedo)
-            .map(|((x, y), albedo)| albedo.map(|channel| channel * light(x, y)))
-            .collect();
+        let truth: Vec<[f32; 3]> =
+            pixels().zip(&albedo).map(|((x, y), albedo)| albedo.map(|channel| channel * light(x, y))).collect();
         let noisy: Vec<[f32; 3]> = truth
             .iter()
             .map(|rgb| {
@@ -341,29 +288,15 @@ mod tests {
                 rgb.map(|channel| channel * factor.max(0.0))
             })
             .collect();
-        let variance = Plane::from_values(
-            WIDTH,
-            HEIGHT,
-            truth
-                .iter()
-                .map(|rgb| (0.3 * luminance(*rgb)).powi(2))
-                .collect(),
-        );
+        let variance =
+            Plane::from_values(WIDTH, HEIGHT, truth.iter().map(|rgb| (0.3 * luminance(*rgb)).powi(2)).collect());
         Picture {
             truth,
             noisy,
             variance: variance.unwrap(),
             albedo,
             normal: pixels().map(|(_, y)| normal_of(y)).collect(),
-            depth: pixels()
-                .map(|(_, y)| {
-                    if y < 32 {
-                        5.0
-                    } else {
-                        5.0 - 0.05 * (y - 32) as f32
-                    }
-                })
-                .collect(),
+            depth: pixels().map(|(_, y)| if y < 32 { 5.0 } else { 5.0 - 0.05 * (y - 32) as f32 }).collect(),
         }
     }
 

@@ -31,22 +31,15 @@ impl ElevationTable {
         // Contrast at which the elevation reaches its cap.
         let last = (ELEVATION_CAP.powi(4) - 1.0).powf(2.0 / 2.8);
         let entries = (0..=ENTRIES)
-            .map(|entry| {
-                threshold_elevation((last * entry as f64 / ENTRIES as f64).sqrt())
-                    .min(ELEVATION_CAP) as f32
-            })
+            .map(|entry| threshold_elevation((last * entry as f64 / ENTRIES as f64).sqrt()).min(ELEVATION_CAP) as f32)
             .collect();
-        Self {
-            entries,
-            entries_per_square: (ENTRIES as f64 / last) as f32,
-        }
+        Self { entries, entries_per_square: (ENTRIES as f64 / last) as f32 }
     }
 
     fn at(&self, mask_squared: f32) -> f32 {
         let position = (mask_squared * self.entries_per_square).min(ENTRIES as f32 - 1e-3);
         let index = position as usize;
-        self.entries[index]
-            + (position - index as f32) * (self.entries[index + 1] - self.entries[index])
+        self.entries[index] + (position - index as f32) * (self.entries[index + 1] - self.entries[index])
     }
 }
 
@@ -84,9 +77,7 @@ pub(crate) fn band_elevation(
     let wavelength_px = ppd / bands.center_cpd(band) / factor as f64;
     let mut energy = source
         .transform
-        .filtered_reduced(source.contrast, ppd, limit_cpd, factor, |freq| {
-            gain.at(freq)
-        })
+        .filtered_reduced(source.contrast, ppd, limit_cpd, factor, |freq| gain.at(freq))
         .map(|amplitude| amplitude * amplitude);
     if let Some(noise) = source.noise {
         let share = tables.mask_noise_share as f32;
@@ -105,10 +96,7 @@ pub(crate) fn band_elevation(
         }
     });
     let mut elevated = erode(&mask, wavelength_px.round() as usize);
-    elevated.for_each_row_mut(|_, row| {
-        row.iter_mut()
-            .for_each(|value| *value = elevation.at(*value))
-    });
+    elevated.for_each_row_mut(|_, row| row.iter_mut().for_each(|value| *value = elevation.at(*value)));
     enlarged(&elevated, factor, width, height)
 }
 
@@ -146,10 +134,7 @@ mod tests {
             (10.0, 5.013_856_978),
             (50.0, 15.462_542_36),
         ] {
-            assert!(
-                (threshold_elevation(mask) / expected - 1.0).abs() < 1e-8,
-                "{mask}"
-            );
+            assert!((threshold_elevation(mask) / expected - 1.0).abs() < 1e-8, "{mask}");
         }
     }
 
@@ -160,10 +145,7 @@ mod tests {
             let mask = f64::from(step) * 0.05;
             let expected = threshold_elevation(mask).min(ELEVATION_CAP);
             let found = f64::from(table.at((mask * mask) as f32));
-            assert!(
-                (found / expected - 1.0).abs() < 2e-3,
-                "{mask}: {found} for {expected}"
-            );
+            assert!((found / expected - 1.0).abs() < 2e-3, "{mask}: {found} for {expected}");
         }
     }
 }

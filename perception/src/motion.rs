@@ -21,8 +21,7 @@ pub enum ErrorMotion {
 /// min(0.82 s v + 0.15, 80) (Daly 1998), with attention s in 0..1 (Yee et al. 2001): what stands out is followed.
 #[must_use]
 pub fn eye_velocity_deg_s(image_velocity_deg_s: f64, attention: f64) -> f64 {
-    let followed =
-        PURSUIT_GAIN * attention.clamp(0.0, 1.0) * image_velocity_deg_s.abs() + DRIFT_DEG_S;
+    let followed = PURSUIT_GAIN * attention.clamp(0.0, 1.0) * image_velocity_deg_s.abs() + DRIFT_DEG_S;
     followed.min(FASTEST_PURSUIT_DEG_S)
 }
 
@@ -33,9 +32,7 @@ pub fn eye_velocity_deg_s(image_velocity_deg_s: f64, attention: f64) -> f64 {
 pub fn retinal_velocity_deg_s(image_velocity_deg_s: f64, attention: f64) -> f64 {
     let image = image_velocity_deg_s.abs().min(1e9);
     // `max` turns NaN into the drift.
-    (image - eye_velocity_deg_s(image, attention))
-        .abs()
-        .max(DRIFT_DEG_S)
+    (image - eye_velocity_deg_s(image, attention)).abs().max(DRIFT_DEG_S)
 }
 
 impl ErrorMotion {
@@ -46,9 +43,7 @@ impl ErrorMotion {
         match self {
             Self::Fresh => None,
             Self::Travelling => Some(retinal_velocity_deg_s(image_velocity_deg_s, attention)),
-            Self::Locked => {
-                Some(eye_velocity_deg_s(image_velocity_deg_s, attention).max(DRIFT_DEG_S))
-            }
+            Self::Locked => Some(eye_velocity_deg_s(image_velocity_deg_s, attention).max(DRIFT_DEG_S)),
         }
     }
 }
@@ -81,25 +76,14 @@ mod tests {
 
     #[test]
     fn pixels_a_frame_become_degrees_a_second() {
-        for (pixels, fps, ppd, expected) in [
-            (1.0, 30.0, 30.0, 1.0),
-            (12.0, 30.0, 30.0, 12.0),
-            (5.0, 60.0, 40.0, 7.5),
-            (0.25, 24.0, 21.57, 0.278_164),
-        ] {
+        for (pixels, fps, ppd, expected) in
+            [(1.0, 30.0, 30.0, 1.0), (12.0, 30.0, 30.0, 12.0), (5.0, 60.0, 40.0, 7.5), (0.25, 24.0, 21.57, 0.278_164)]
+        {
             let x = Plane::filled(3, 3, pixels);
             let speed = image_velocity_deg_s(&x, &Plane::filled(3, 3, 0.0), fps, ppd).unwrap();
             assert!((speed.get(1, 1) - expected).abs() < 1e-5);
         }
-        assert!(
-            image_velocity_deg_s(
-                &Plane::filled(3, 3, 0.0),
-                &Plane::filled(2, 3, 0.0),
-                30.0,
-                30.0
-            )
-            .is_err()
-        );
+        assert!(image_velocity_deg_s(&Plane::filled(3, 3, 0.0), &Plane::filled(2, 3, 0.0), 30.0, 30.0).is_err());
     }
 
     #[test]
@@ -114,10 +98,7 @@ mod tests {
             (120.0, 1.0, 40.0),
         ] {
             let found = retinal_velocity_deg_s(velocity, attention);
-            assert!(
-                (found - expected).abs() < 1e-9,
-                "{velocity} {attention}: {found}"
-            );
+            assert!((found - expected).abs() < 1e-9, "{velocity} {attention}: {found}");
         }
         assert!(retinal_velocity_deg_s(f64::NAN, f64::NAN).is_finite());
     }
@@ -125,29 +106,8 @@ mod tests {
     #[test]
     fn the_three_kinds_of_error_move_differently() {
         assert_eq!(ErrorMotion::Fresh.retinal_velocity_deg_s(10.0, 1.0), None);
-        assert!(
-            (ErrorMotion::Travelling
-                .retinal_velocity_deg_s(10.0, 1.0)
-                .unwrap()
-                - 1.65)
-                .abs()
-                < 1e-9
-        );
-        assert!(
-            (ErrorMotion::Locked
-                .retinal_velocity_deg_s(10.0, 1.0)
-                .unwrap()
-                - 8.35)
-                .abs()
-                < 1e-9
-        );
-        assert!(
-            (ErrorMotion::Locked
-                .retinal_velocity_deg_s(0.0, 1.0)
-                .unwrap()
-                - 0.15)
-                .abs()
-                < 1e-9
-        );
+        assert!((ErrorMotion::Travelling.retinal_velocity_deg_s(10.0, 1.0).unwrap() - 1.65).abs() < 1e-9);
+        assert!((ErrorMotion::Locked.retinal_velocity_deg_s(10.0, 1.0).unwrap() - 8.35).abs() < 1e-9);
+        assert!((ErrorMotion::Locked.retinal_velocity_deg_s(0.0, 1.0).unwrap() - 0.15).abs() < 1e-9);
     }
 }

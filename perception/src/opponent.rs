@@ -37,9 +37,8 @@ const fn cone_matrix() -> [[f32; 3]; 3] {
     while row < 3 {
         let mut column = 0;
         while column < 3 {
-            cones[row][column] = LMS[row][0] * XYZ[0][column]
-                + LMS[row][1] * XYZ[1][column]
-                + LMS[row][2] * XYZ[2][column];
+            cones[row][column] =
+                LMS[row][0] * XYZ[0][column] + LMS[row][1] * XYZ[1][column] + LMS[row][2] * XYZ[2][column];
             if row < 2 {
                 white += cones[row][column];
             }
@@ -69,13 +68,7 @@ const fn cone_matrix() -> [[f32; 3]; 3] {
 /// ```
 #[must_use]
 pub fn opponent(rgb_cd_m2: [f32; 3]) -> Opponent {
-    let cone = |row: usize| -> f32 {
-        CONES[row]
-            .iter()
-            .zip(rgb_cd_m2)
-            .map(|(weight, value)| weight * value)
-            .sum()
-    };
+    let cone = |row: usize| -> f32 { CONES[row].iter().zip(rgb_cd_m2).map(|(weight, value)| weight * value).sum() };
     let white = |row: usize| -> f32 { CONES[row].iter().sum() };
     let (long, medium, short) = (cone(0), cone(1), cone(2));
     Opponent {
@@ -94,10 +87,7 @@ mod tests {
         let sums: Vec<f32> = CONES.iter().map(|row| row.iter().sum()).collect();
         // L/M of D65 is 2.311 and (L+M)/S 50.98 in castleCSF; the 1931 observer's white differs a little.
         assert!((sums[0] / sums[1] - 2.311).abs() < 0.03, "{sums:?}");
-        assert!(
-            ((sums[0] + sums[1]) / sums[2] - 50.98).abs() < 1.0,
-            "{sums:?}"
-        );
+        assert!(((sums[0] + sums[1]) / sums[2] - 50.98).abs() < 1.0, "{sums:?}");
         assert!((sums[0] + sums[1] - 1.0).abs() < 1e-6);
     }
 

@@ -24,11 +24,7 @@ impl Plane {
     /// ```
     #[must_use]
     pub fn filled(width: usize, height: usize, value: f32) -> Self {
-        Self {
-            width,
-            height,
-            values: vec![value; width * height],
-        }
+        Self { width, height, values: vec![value; width * height] }
     }
 
     /// Takes row-major values.
@@ -37,27 +33,15 @@ impl Plane {
     /// [`Error::ValueCount`] unless there are exactly `width * height` of them.
     pub fn from_values(width: usize, height: usize, values: Vec<f32>) -> Result<Self, Error> {
         if width.checked_mul(height) == Some(values.len()) {
-            Ok(Self {
-                width,
-                height,
-                values,
-            })
+            Ok(Self { width, height, values })
         } else {
-            Err(Error::ValueCount {
-                width,
-                height,
-                found: values.len(),
-            })
+            Err(Error::ValueCount { width, height, found: values.len() })
         }
     }
 
     /// Asks `value_at(x, y)` for every pixel, rows in parallel.
     #[must_use]
-    pub fn from_fn(
-        width: usize,
-        height: usize,
-        value_at: impl Fn(usize, usize) -> f32 + Sync,
-    ) -> Self {
+    pub fn from_fn(width: usize, height: usize, value_at: impl Fn(usize, usize) -> f32 + Sync) -> Self {
         let mut plane = Self::filled(width, height, 0.0);
         plane.for_each_row_mut(|y, row| {
             for (x, value) in row.iter_mut().enumerate() {
@@ -120,11 +104,7 @@ impl Plane {
         if self.values.is_empty() {
             return 0.0;
         }
-        self.values
-            .iter()
-            .map(|&value| f64::from(value))
-            .sum::<f64>()
-            / self.values.len() as f64
+        self.values.iter().map(|&value| f64::from(value)).sum::<f64>() / self.values.len() as f64
     }
 
     /// Runs `work(y, row)` over all rows in parallel; each row is one thread's own, so the order cannot matter.
@@ -135,14 +115,11 @@ impl Plane {
         // A few rows at a time: one row of a small picture is less work than handing it over.
         let rows_at_once = (16_384 / self.width).max(1);
         let width = self.width;
-        self.values
-            .par_chunks_mut(width * rows_at_once)
-            .enumerate()
-            .for_each(|(chunk, rows)| {
-                for (offset, row) in rows.chunks_exact_mut(width).enumerate() {
-                    work(chunk * rows_at_once + offset, row);
-                }
-            });
+        self.values.par_chunks_mut(width * rows_at_once).enumerate().for_each(|(chunk, rows)| {
+            for (offset, row) in rows.chunks_exact_mut(width).enumerate() {
+                work(chunk * rows_at_once + offset, row);
+            }
+        });
     }
 
     pub(crate) fn row(&self, y: usize) -> &[f32] {
@@ -154,22 +131,11 @@ impl Plane {
     }
 
     /// Rejects a plane of another size than `width` × `height`.
-    pub(crate) fn check_size(
-        &self,
-        what: &'static str,
-        width: usize,
-        height: usize,
-    ) -> Result<(), Error> {
+    pub(crate) fn check_size(&self, what: &'static str, width: usize, height: usize) -> Result<(), Error> {
         if self.width == width && self.height == height {
             Ok(())
         } else {
-            Err(Error::SizeMismatch {
-                what,
-                width,
-                height,
-                found_width: self.width,
-                found_height: self.height,
-            })
+            Err(Error::SizeMismatch { what, width, height, found_width: self.width, found_height: self.height })
         }
     }
 
@@ -178,20 +144,11 @@ impl Plane {
         if self.values.is_empty() {
             return Err(Error::Empty { what });
         }
-        match self
-            .values
-            .iter()
-            .position(|value| !(value.is_finite() && *value >= 0.0))
-        {
+        match self.values.iter().position(|value| !(value.is_finite() && *value >= 0.0)) {
             None => Ok(()),
             Some(index) => {
                 let (x, y) = (index % self.width, index / self.width);
-                Err(Error::BadPixel {
-                    what,
-                    value: self.values[index],
-                    x,
-                    y,
-                })
+                Err(Error::BadPixel { what, value: self.values[index], x, y })
             }
         }
     }
@@ -210,33 +167,15 @@ mod tests {
 
     #[test]
     fn a_wrong_count_is_an_error() {
-        assert_eq!(
-            Plane::from_values(3, 2, vec![0.0; 5]),
-            Err(Error::ValueCount {
-                width: 3,
-                height: 2,
-                found: 5
-            })
-        );
+        assert_eq!(Plane::from_values(3, 2, vec![0.0; 5]), Err(Error::ValueCount { width: 3, height: 2, found: 5 }));
         assert!(Plane::from_values(usize::MAX, 3, vec![]).is_err());
     }
 
     #[test]
     fn bad_pixels_are_named() {
         let plane = Plane::from_fn(4, 4, |x, y| if (x, y) == (2, 3) { f32::NAN } else { 1.0 });
-        assert!(matches!(
-            plane.check_non_negative("guide"),
-            Err(Error::BadPixel { x: 2, y: 3, .. })
-        ));
-        assert!(
-            Plane::filled(4, 4, -1.0)
-                .check_non_negative("guide")
-                .is_err()
-        );
-        assert!(
-            Plane::filled(0, 4, 1.0)
-                .check_non_negative("guide")
-                .is_err()
-        );
+        assert!(matches!(plane.check_non_negative("guide"), Err(Error::BadPixel { x: 2, y: 3, .. })));
+        assert!(Plane::filled(4, 4, -1.0).check_non_negative("guide").is_err());
+        assert!(Plane::filled(0, 4, 1.0).check_non_negative("guide").is_err());
     }
 }

@@ -28,11 +28,7 @@ pub fn visibility_at_probability(probability: f64) -> f64 {
 /// 1 − exp(−Σ|v|^3.5).
 #[must_use]
 pub fn probability_of_any(visibilities: impl IntoIterator<Item = f64>) -> f64 {
-    -(-visibilities
-        .into_iter()
-        .map(|v| v.abs().powf(SLOPE))
-        .sum::<f64>())
-    .exp_m1()
+    -(-visibilities.into_iter().map(|v| v.abs().powf(SLOPE)).sum::<f64>()).exp_m1()
 }
 
 #[cfg(test)]
@@ -48,14 +44,8 @@ mod tests {
             (1.5, 0.983_973_536_3),
             (2.0, 0.999_987_795_5),
         ] {
-            assert!(
-                (detection_probability(v) / expected - 1.0).abs() < 1e-9,
-                "v = {v}"
-            );
-            assert!(
-                (visibility_at_probability(expected) / v - 1.0).abs() < 1e-6,
-                "v = {v}"
-            );
+            assert!((detection_probability(v) / expected - 1.0).abs() < 1e-9, "v = {v}");
+            assert!((visibility_at_probability(expected) / v - 1.0).abs() < 1e-6, "v = {v}");
         }
         assert!((detection_probability(0.900_578) - 0.5).abs() < 1e-6);
         assert_eq!(detection_probability(-1.5), detection_probability(1.5));
@@ -64,10 +54,7 @@ mod tests {
     #[test]
     fn probability_summation_is_minkowski_pooling() {
         let parts = [0.4, 0.9, 0.2];
-        let product: f64 = parts
-            .iter()
-            .map(|&v| 1.0 - detection_probability(v))
-            .product();
+        let product: f64 = parts.iter().map(|&v| 1.0 - detection_probability(v)).product();
         assert!((probability_of_any(parts) - (1.0 - product)).abs() < 1e-12);
     }
 }

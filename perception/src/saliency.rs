@@ -24,31 +24,21 @@ pub struct SaliencyInputs<'a> {
 pub fn saliency(inputs: &SaliencyInputs<'_>) -> Result<Plane, Error> {
     let [red, green, blue] = inputs.rgb;
     let (width, height) = (red.width(), red.height());
-    for (what, plane) in [
-        ("red", Some(red)),
-        ("green", Some(green)),
-        ("blue", Some(blue)),
-        ("velocity", inputs.velocity),
-    ] {
+    for (what, plane) in
+        [("red", Some(red)), ("green", Some(green)), ("blue", Some(blue)), ("velocity", inputs.velocity)]
+    {
         if let Some(plane) = plane {
             plane.check_size(what, width, height)?;
             plane.check_non_negative(what)?;
         }
     }
-    let intensity = Plane::from_fn(width, height, |x, y| {
-        (red.get(x, y) + green.get(x, y) + blue.get(x, y)) / 3.0
-    });
+    let intensity = Plane::from_fn(width, height, |x, y| (red.get(x, y) + green.get(x, y) + blue.get(x, y)) / 3.0);
     let pyramid = Pyramid::of(&intensity);
     let opponents = opponent_colours(inputs.rgb, &intensity);
     let mut conspicuities = vec![
         conspicuity([&pyramid].into_iter()),
         conspicuity(opponents.iter().map(Pyramid::of).collect::<Vec<_>>().iter()),
-        conspicuity(
-            (0..4)
-                .map(|turn| pyramid.oriented(turn))
-                .collect::<Vec<_>>()
-                .iter(),
-        ),
+        conspicuity((0..4).map(|turn| pyramid.oriented(turn)).collect::<Vec<_>>().iter()),
     ];
     if let Some(velocity) = inputs.velocity {
         conspicuities.push(conspicuity([Pyramid::of(velocity)].iter()));
@@ -106,9 +96,7 @@ impl Pyramid {
 
     /// Magnitude of the response to a Gabor patch at `turn` · 45° on every level.
     fn oriented(&self, turn: u8) -> Self {
-        Self {
-            levels: self.levels.iter().map(|level| gabor(level, turn)).collect(),
-        }
+        Self { levels: self.levels.iter().map(|level| gabor(level, turn)).collect() }
     }
 }
 
@@ -127,9 +115,7 @@ fn opponent_colours(rgb: [&Plane; 3], intensity: &Plane) -> [Plane; 2] {
     };
     [
         channel(|r, g, b| (r - (g + b) / 2.0).max(0.0) - (g - (r + b) / 2.0).max(0.0)),
-        channel(|r, g, b| {
-            (b - (r + g) / 2.0).max(0.0) - ((r + g) / 2.0 - (r - g).abs() / 2.0 - b).max(0.0)
-        }),
+        channel(|r, g, b| (b - (r + g) / 2.0).max(0.0) - ((r + g) / 2.0 - (r - g).abs() / 2.0 - b).max(0.0)),
     ]
 }
 
@@ -142,16 +128,10 @@ fn conspicuity<'a>(pyramids: impl Iterator<Item = &'a Pyramid>) -> Plane {
         for center in CENTERS {
             for delta in DELTAS {
                 let center_map = pyramid.level(center);
-                let surround = resized(
-                    pyramid.level(center + delta),
-                    center_map.width(),
-                    center_map.height(),
-                );
+                let surround = resized(pyramid.level(center + delta), center_map.width(), center_map.height());
                 let mut difference = center_map.clone();
                 difference.for_each_row_mut(|y, row| {
-                    row.iter_mut()
-                        .zip(surround.row(y))
-                        .for_each(|(value, other)| *value = (*value - other).abs());
+                    row.iter_mut().zip(surround.row(y)).for_each(|(value, other)| *value = (*value - other).abs());
                 });
                 let map = promoted(&resized(&difference, width, height));
                 match &mut sum {
@@ -216,25 +196,19 @@ fn add(sum: &mut Plane, other: &Plane) {
 fn halved(plane: &Plane) -> Plane {
     const KERNEL: [f32; 5] = [0.0625, 0.25, 0.375, 0.25, 0.0625];
     let (width, height) = (plane.width(), plane.height());
-    let tap =
-        |center: usize, index: usize, len: usize| reflect((2 * center + index) as isize - 2, len);
+    let tap = |center: usize, index: usize, len: usize| reflect((2 * center + index) as isize - 2, len);
     let across = Plane::from_fn(width.div_ceil(2), height, |x, y| {
-        (0..5)
-            .map(|index| KERNEL[index] * plane.get(tap(x, index, width), y))
-            .sum()
+        (0..5).map(|index| KERNEL[index] * plane.get(tap(x, index, width), y)).sum()
     });
     Plane::from_fn(across.width(), height.div_ceil(2), |x, y| {
-        (0..5)
-            .map(|index| KERNEL[index] * across.get(x, tap(y, index, height)))
-            .sum()
+        (0..5).map(|index| KERNEL[index] * across.get(x, tap(y, index, height))).sum()
     })
 }
 
 /// Bilinear interpolation to another size.
 fn resized(plane: &Plane, width: usize, height: usize) -> Plane {
     let place = |index: usize, to: usize, from: usize| {
-        let position =
-            ((index as f32 + 0.5) * from as f32 / to as f32 - 0.5).clamp(0.0, (from - 1) as f32);
+        let position = ((index as f32 + 0.5) * from as f32 / to as f32 - 0.5).clamp(0.0, (from - 1) as f32);
         let below = position as usize;
         (below, (below + 1).min(from - 1), position - below as f32)
     };
@@ -267,10 +241,8 @@ fn gabor(plane: &Plane, turn: u8) -> Plane {
     Plane::from_fn(plane.width(), plane.height(), |x, y| {
         let (mut even, mut odd) = (0.0, 0.0);
         for &(dx, dy, window, phase) in &taps {
-            let value = plane.get(
-                reflect(x as isize + dx, plane.width()),
-                reflect(y as isize + dy, plane.height()),
-            ) * window;
+            let value =
+                plane.get(reflect(x as isize + dx, plane.width()), reflect(y as isize + dy, plane.height())) * window;
             even += value * (phase.cos() - offset);
             odd += value * phase.sin();
         }
@@ -305,33 +277,14 @@ mod tests {
 
     #[test]
     fn the_odd_one_stands_out() {
-        let spot = Plane::from_fn(256, 256, |x, y| {
-            if x.abs_diff(180) < 12 && y.abs_diff(70) < 12 {
-                0.9
-            } else {
-                0.2
-            }
-        });
-        let map = saliency(&SaliencyInputs {
-            rgb: [&spot; 3],
-            velocity: None,
-        })
-        .unwrap();
-        assert!(
-            map.get(180, 70) > 0.5 && map.get(40, 200) < 0.2,
-            "{} {}",
-            map.get(180, 70),
-            map.get(40, 200)
-        );
+        let spot = Plane::from_fn(256, 256, |x, y| if x.abs_diff(180) < 12 && y.abs_diff(70) < 12 { 0.9 } else { 0.2 });
+        let map = saliency(&SaliencyInputs { rgb: [&spot; 3], velocity: None }).unwrap();
+        assert!(map.get(180, 70) > 0.5 && map.get(40, 200) < 0.2, "{} {}", map.get(180, 70), map.get(40, 200));
         assert!(map.values().iter().all(|value| (0.0..=1.0).contains(value)));
         // Motion alone, in a picture without anything to see.
         let grey = Plane::filled(256, 256, 0.3);
         let velocity = Plane::from_fn(256, 256, |x, y| if x < 60 && y < 60 { 8.0 } else { 0.0 });
-        let map = saliency(&SaliencyInputs {
-            rgb: [&grey; 3],
-            velocity: Some(&velocity),
-        })
-        .unwrap();
+        let map = saliency(&SaliencyInputs { rgb: [&grey; 3], velocity: Some(&velocity) }).unwrap();
         assert!(map.get(40, 40) > 2.0 * map.get(200, 200));
     }
 
@@ -339,21 +292,11 @@ mod tests {
     fn a_plain_picture_is_all_worth_a_look() {
         for (width, height) in [(1, 1), (3, 200), (300, 280)] {
             let grey = Plane::filled(width, height, 0.5);
-            let map = saliency(&SaliencyInputs {
-                rgb: [&grey; 3],
-                velocity: None,
-            })
-            .unwrap();
+            let map = saliency(&SaliencyInputs { rgb: [&grey; 3], velocity: None }).unwrap();
             assert_eq!(map, Plane::filled(width, height, 1.0));
         }
         let bad = Plane::filled(3, 3, f32::NAN);
-        assert!(
-            saliency(&SaliencyInputs {
-                rgb: [&bad; 3],
-                velocity: None
-            })
-            .is_err()
-        );
+        assert!(saliency(&SaliencyInputs { rgb: [&bad; 3], velocity: None }).is_err());
     }
 
     #[test]

@@ -9,11 +9,7 @@ use crate::tone::FittedTone;
 
 /// What the display shows, cd/m², for scene luminance in cd/m².
 #[must_use]
-pub fn display_luminance(
-    fitted: &dyn FittedTone,
-    display: &Display,
-    scene_luminance: &Plane,
-) -> Plane {
+pub fn display_luminance(fitted: &dyn FittedTone, display: &Display, scene_luminance: &Plane) -> Plane {
     let shown = Shown { fitted, display };
     scene_luminance.map(|scene| shown.cd_m2(scene))
 }
@@ -28,12 +24,7 @@ pub fn display_luminance(
 ///
 /// Pixels whose mean or variance is not finite get infinity; so does every pixel when the planes differ in size.
 #[must_use]
-pub fn display_variance(
-    fitted: &dyn FittedTone,
-    display: &Display,
-    mean: &Plane,
-    variance: &Plane,
-) -> Plane {
+pub fn display_variance(fitted: &dyn FittedTone, display: &Display, mean: &Plane, variance: &Plane) -> Plane {
     let (width, height) = (mean.width(), mean.height());
     if !mean.same_size(variance) {
         return Plane::filled(width, height, f32::INFINITY);
@@ -41,8 +32,7 @@ pub fn display_variance(
     let shown = Shown { fitted, display };
     let mut result = Plane::filled(width, height, 0.0);
     result.for_each_row_mut(|y, row| {
-        for (value, (mean, variance)) in row.iter_mut().zip(mean.row(y).iter().zip(variance.row(y)))
-        {
+        for (value, (mean, variance)) in row.iter_mut().zip(mean.row(y).iter().zip(variance.row(y))) {
             *value = if mean.is_finite() && variance.is_finite() {
                 shown.variance(f64::from(mean.max(0.0)), f64::from(variance.max(0.0)))
             } else {
@@ -71,10 +61,7 @@ pub fn display_half_difference(
     let shown = Shown { fitted, display };
     let mut result = Plane::filled(width, height, 0.0);
     result.for_each_row_mut(|y, row| {
-        for (value, (&mean, &difference)) in row
-            .iter_mut()
-            .zip(mean.row(y).iter().zip(half_difference.row(y)))
-        {
+        for (value, (&mean, &difference)) in row.iter_mut().zip(mean.row(y).iter().zip(half_difference.row(y))) {
             if mean.is_finite() && difference.is_finite() {
                 *value = 0.5 * (shown.cd_m2(mean + difference) - shown.cd_m2(mean - difference));
             }
@@ -91,9 +78,7 @@ struct Shown<'a> {
 
 impl Shown<'_> {
     fn cd_m2(&self, scene_cd_m2: f32) -> f32 {
-        self.display.luminance_cd_m2(f64::from(
-            self.fitted.relative_luminance(scene_cd_m2.max(0.0)),
-        )) as f32
+        self.display.luminance_cd_m2(f64::from(self.fitted.relative_luminance(scene_cd_m2.max(0.0)))) as f32
     }
 
     fn variance(&self, mean: f64, variance: f64) -> f32 {
@@ -102,11 +87,7 @@ impl Shown<'_> {
         }
         // Distances of the outer points from the mean. At M = √3 σ both forms agree.
         let gauss = (3.0 * variance).sqrt();
-        let (below, above) = if mean >= gauss {
-            (gauss, gauss)
-        } else {
-            (mean, (3.0 * variance / mean).min(1e30))
-        };
+        let (below, above) = if mean >= gauss { (gauss, gauss) } else { (mean, (3.0 * variance / mean).min(1e30)) };
         if below <= 0.0 || !above.is_finite() {
             // No light on average, yet noise: only a broken input has that. Take the noise as it stands.
             let swing = f64::from(self.cd_m2(gauss as f32) - self.cd_m2(0.0));
@@ -129,12 +110,7 @@ mod tests {
 
     fn absolute(display: &Display) -> Box<dyn FittedTone> {
         let guide = Plane::filled(1, 1, 1.0);
-        operator("absolute", None).unwrap().fit(
-            &SceneGuide {
-                luminance_cd_m2: &guide,
-            },
-            display,
-        )
+        operator("absolute", None).unwrap().fit(&SceneGuide { luminance_cd_m2: &guide }, display)
     }
 
     fn one(value: f32) -> Plane {
@@ -146,21 +122,13 @@ mod tests {
         let display = Display::default();
         let guide = Plane::filled(1, 1, 10.0);
         let ward94 = operator("ward94", None).unwrap();
-        let fitted = ward94.fit(
-            &SceneGuide {
-                luminance_cd_m2: &guide,
-            },
-            &display,
-        );
+        let fitted = ward94.fit(&SceneGuide { luminance_cd_m2: &guide }, &display);
         let slope = fitted.relative_luminance(1.0) * 199.8;
         // The last two have σ near and above the mean.
         for (mean, variance) in [(10.0, 4.0), (10.0, 30.0), (2.0, 4.0), (0.5, 1.0)] {
             let found = display_variance(&*fitted, &display, &one(mean), &one(variance)).get(0, 0);
             let expected = slope * slope * variance;
-            assert!(
-                (found / expected - 1.0).abs() < 1e-4,
-                "{mean} {variance}: {found}"
-            );
+            assert!((found / expected - 1.0).abs() < 1e-4, "{mean} {variance}: {found}");
         }
     }
 
@@ -181,8 +149,7 @@ mod tests {
         let fitted = absolute(&display);
         let found = display_half_difference(&*fitted, &display, &one(100.0), &one(3.0)).get(0, 0);
         assert!((found - 3.0).abs() < 1e-3);
-        let clipped =
-            display_half_difference(&*fitted, &display, &one(200.0), &one(10.0)).get(0, 0);
+        let clipped = display_half_difference(&*fitted, &display, &one(200.0), &one(10.0)).get(0, 0);
         assert!((clipped - 5.0).abs() < 1e-3, "{clipped}");
     }
 
@@ -190,25 +157,9 @@ mod tests {
     fn broken_input_is_infinitely_visible_or_left_out() {
         let display = Display::default();
         let fitted = absolute(&display);
-        assert!(
-            display_variance(&*fitted, &display, &one(f32::NAN), &one(1.0))
-                .get(0, 0)
-                .is_infinite()
-        );
-        assert!(
-            display_variance(&*fitted, &display, &one(1.0), &Plane::filled(2, 1, 1.0))
-                .get(0, 0)
-                .is_infinite()
-        );
-        assert!(
-            display_variance(&*fitted, &display, &one(0.0), &one(1.0))
-                .get(0, 0)
-                .is_finite()
-        );
-        assert!(
-            display_variance(&*fitted, &display, &one(1e-30), &one(1e30))
-                .get(0, 0)
-                .is_finite()
-        );
+        assert!(display_variance(&*fitted, &display, &one(f32::NAN), &one(1.0)).get(0, 0).is_infinite());
+        assert!(display_variance(&*fitted, &display, &one(1.0), &Plane::filled(2, 1, 1.0)).get(0, 0).is_infinite());
+        assert!(display_variance(&*fitted, &display, &one(0.0), &one(1.0)).get(0, 0).is_finite());
+        assert!(display_variance(&*fitted, &display, &one(1e-30), &one(1e30)).get(0, 0).is_finite());
     }
 }

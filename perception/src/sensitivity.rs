@@ -46,16 +46,12 @@ impl LuminanceTable {
 
 /// Where a luminance stands in every [`LuminanceTable`].
 pub(crate) fn luminance_coordinate(luminance_cd_m2: f32) -> f32 {
-    ((luminance_cd_m2.max(LEAST_ADAPTATION_CD_M2).log10() - LOWEST_DECADE as f32)
-        * ENTRIES_A_DECADE as f32)
-        .max(0.0)
+    ((luminance_cd_m2.max(LEAST_ADAPTATION_CD_M2).log10() - LOWEST_DECADE as f32) * ENTRIES_A_DECADE as f32).max(0.0)
 }
 
 fn sample_luminances() -> impl Iterator<Item = f64> {
     let samples = (HIGHEST_DECADE - LOWEST_DECADE) * SAMPLES_A_DECADE as i32;
-    (0..=samples).map(|index| {
-        10.0_f64.powf(f64::from(LOWEST_DECADE) + f64::from(index) / SAMPLES_A_DECADE as f64)
-    })
+    (0..=samples).map(|index| 10.0_f64.powf(f64::from(LOWEST_DECADE) + f64::from(index) / SAMPLES_A_DECADE as f64))
 }
 
 /// What one band does to errors and masks.
@@ -79,44 +75,25 @@ pub(crate) struct SensitivityTables {
 }
 
 impl SensitivityTables {
-    pub(crate) fn new(
-        bands: &OctaveBands,
-        viewing: &Viewing,
-        csf: &dyn ContrastSensitivity,
-    ) -> Self {
+    pub(crate) fn new(bands: &OctaveBands, viewing: &Viewing, csf: &dyn ContrastSensitivity) -> Self {
         let ppd = viewing.display.pixels_per_degree;
         let gain = viewing.observer.sensitivity;
         let count = bands.len();
         let mut rings = Vec::with_capacity(RINGS);
-        for_each_ring(ppd, RINGS, |freq_cpd, weight| {
-            rings.push(Ring { freq_cpd, weight })
-        });
+        for_each_ring(ppd, RINGS, |freq_cpd, weight| rings.push(Ring { freq_cpd, weight }));
         let shares: Vec<Vec<f64>> = (0..count)
-            .map(|band| {
-                rings
-                    .iter()
-                    .map(|ring| ring.weight * bands.gain(band, ring.freq_cpd).powi(2))
-                    .collect()
-            })
+            .map(|band| rings.iter().map(|ring| ring.weight * bands.gain(band, ring.freq_cpd).powi(2)).collect())
             .collect();
         // noise[sample][band], center[sample][band]
         let mut noise = Vec::new();
         let mut center = Vec::new();
         for luminance in sample_luminances() {
-            let squares: Vec<f64> = rings
-                .iter()
-                .map(|ring| (gain * csf.sensitivity(ring.freq_cpd, luminance)).powi(2))
-                .collect();
+            let squares: Vec<f64> =
+                rings.iter().map(|ring| (gain * csf.sensitivity(ring.freq_cpd, luminance)).powi(2)).collect();
             noise.push(
                 shares
                     .iter()
-                    .map(|shares| {
-                        shares
-                            .iter()
-                            .zip(&squares)
-                            .map(|(share, square)| share * square)
-                            .sum::<f64>()
-                    })
+                    .map(|shares| shares.iter().zip(&squares).map(|(share, square)| share * square).sum::<f64>())
                     .collect::<Vec<_>>(),
             );
             center.push(
@@ -129,9 +106,7 @@ impl SensitivityTables {
         let tables = (0..count)
             .map(|band| BandTables {
                 noise_energy: LuminanceTable::from_samples(|sample| noise[sample][band]),
-                center_sensitivity_squared: LuminanceTable::from_samples(|sample| {
-                    center[sample][band]
-                }),
+                center_sensitivity_squared: LuminanceTable::from_samples(|sample| center[sample][band]),
                 mask_noise_share: rings
                     .iter()
                     .map(|ring| ring.weight * bands.mask_gain(band, ring.freq_cpd).powi(2))
@@ -187,23 +162,17 @@ pub(crate) fn adaptation_levels(
     least_cd_m2: f32,
     greatest_cd_m2: f32,
 ) -> Vec<AdaptationLevel> {
-    let half_decade =
-        |luminance: f32| 2.0 * f64::from(luminance.max(LEAST_ADAPTATION_CD_M2)).log10();
+    let half_decade = |luminance: f32| 2.0 * f64::from(luminance.max(LEAST_ADAPTATION_CD_M2)).log10();
     // A luminance within a millionth of a level is that level: no second transform for rounding.
     let first = (half_decade(least_cd_m2) + 1e-6).floor() as i32;
-    let last =
-        ((half_decade(greatest_cd_m2) - 1e-6).ceil() as i32).clamp(first, 2 * HIGHEST_DECADE + 20);
+    let last = ((half_decade(greatest_cd_m2) - 1e-6).ceil() as i32).clamp(first, 2 * HIGHEST_DECADE + 20);
     (first..=last)
         .map(|level| {
             let luminance = 10.0_f64.powf(f64::from(level) / 2.0);
             let gain = viewing.observer.sensitivity;
-            let sensitivity = RadialTable::new(viewing.display.pixels_per_degree, |freq| {
-                gain * csf.sensitivity(freq, luminance)
-            });
-            AdaptationLevel {
-                luminance_cd_m2: luminance as f32,
-                sensitivity,
-            }
+            let sensitivity =
+                RadialTable::new(viewing.display.pixels_per_degree, |freq| gain * csf.sensitivity(freq, luminance));
+            AdaptationLevel { luminance_cd_m2: luminance as f32, sensitivity }
         })
         .collect()
 }

@@ -9,8 +9,7 @@ use crate::filter::gaussian_blur;
 use crate::masking::{ElevationTable, MaskSource, band_elevation};
 use crate::plane::Plane;
 use crate::sensitivity::{
-    AdaptationLevel, LEAST_ADAPTATION_CD_M2, SensitivityTables, adaptation_levels,
-    luminance_coordinate,
+    AdaptationLevel, LEAST_ADAPTATION_CD_M2, SensitivityTables, adaptation_levels, luminance_coordinate,
 };
 
 /// Standard deviation of the windows over which the eye adapts and error is pooled, degrees: as wide as a disc of 1°.
@@ -75,13 +74,7 @@ pub fn threshold_map(
         variance.check_non_negative("guide variance")?;
     }
     let adaptation_cd_m2 = local_adaptation(guide, viewing.display.pixels_per_degree);
-    Ok(assemble(
-        guide,
-        inputs.guide_variance,
-        adaptation_cd_m2,
-        viewing,
-        csf,
-    ))
+    Ok(assemble(guide, inputs.guide_variance, adaptation_cd_m2, viewing, csf))
 }
 
 /// Finds thresholds of one chromatic channel of a picture, to be asked about errors in that channel.
@@ -100,32 +93,16 @@ pub fn chromatic_threshold_map(
 ) -> Result<ThresholdMap, Error> {
     viewing.check()?;
     display_luminance_cd_m2.check_non_negative("display luminance")?;
-    channel_cd_m2.check_size(
-        "chromatic signal",
-        display_luminance_cd_m2.width(),
-        display_luminance_cd_m2.height(),
-    )?;
-    channel_cd_m2
-        .map(f32::abs)
-        .check_non_negative("chromatic signal")?;
-    let adaptation_cd_m2 =
-        local_adaptation(display_luminance_cd_m2, viewing.display.pixels_per_degree);
-    Ok(assemble(
-        channel_cd_m2,
-        None,
-        adaptation_cd_m2,
-        viewing,
-        csf,
-    ))
+    channel_cd_m2.check_size("chromatic signal", display_luminance_cd_m2.width(), display_luminance_cd_m2.height())?;
+    channel_cd_m2.map(f32::abs).check_non_negative("chromatic signal")?;
+    let adaptation_cd_m2 = local_adaptation(display_luminance_cd_m2, viewing.display.pixels_per_degree);
+    Ok(assemble(channel_cd_m2, None, adaptation_cd_m2, viewing, csf))
 }
 
 /// Adaptation luminance: see [`threshold_map`].
 pub(crate) fn local_adaptation(luminance_cd_m2: &Plane, pixels_per_degree: f64) -> Plane {
-    gaussian_blur(
-        &without_single_bright_pixels(luminance_cd_m2),
-        POOLING_SIGMA_DEG * pixels_per_degree,
-    )
-    .map(|value| value.max(LEAST_ADAPTATION_CD_M2))
+    gaussian_blur(&without_single_bright_pixels(luminance_cd_m2), POOLING_SIGMA_DEG * pixels_per_degree)
+        .map(|value| value.max(LEAST_ADAPTATION_CD_M2))
 }
 
 /// Masks and noise gain of a signal, cd/m², under an adaptation luminance.
@@ -143,16 +120,11 @@ fn assemble(
 
     let transform = picture_transform(signal_cd_m2.width(), signal_cd_m2.height(), ppd);
     // Less its mean, which no band passes: the transform's precision is for the detail.
-    let contrast = ratio(signal_cd_m2, &adaptation_cd_m2, |value, adaptation| {
-        value / adaptation
-    });
+    let contrast = ratio(signal_cd_m2, &adaptation_cd_m2, |value, adaptation| value / adaptation);
     let mean = contrast.mean() as f32;
     let contrast = transform.forward(&contrast.map(|value| value - mean));
-    let noise = noise_variance.map(|variance| {
-        ratio(variance, &adaptation_cd_m2, |value, adaptation| {
-            value / adaptation / adaptation
-        })
-    });
+    let noise = noise_variance
+        .map(|variance| ratio(variance, &adaptation_cd_m2, |value, adaptation| value / adaptation / adaptation));
     let source = MaskSource {
         transform: &transform,
         contrast: &contrast,
@@ -171,15 +143,7 @@ fn assemble(
     let noise_gain = noise_gain(&tables, &adaptation_cd_m2, &coordinates, Some(&elevations));
     let (least, greatest) = range(&adaptation_cd_m2);
     let levels = adaptation_levels(viewing, csf, least, greatest);
-    ThresholdMap {
-        viewing: viewing.clone(),
-        bands,
-        tables,
-        levels,
-        adaptation_cd_m2,
-        elevations,
-        noise_gain,
-    }
+    ThresholdMap { viewing: viewing.clone(), bands, tables, levels, adaptation_cd_m2, elevations, noise_gain }
 }
 
 impl ThresholdMap {
@@ -200,8 +164,7 @@ impl ThresholdMap {
     /// Standard error of a pixel's mean, cd/m², that leaves white noise at `visibility`: v / √(2N).
     #[must_use]
     pub fn allowed_standard_error_cd_m2(&self, visibility: f64) -> Plane {
-        self.noise_gain
-            .map(|gain| (visibility / (2.0 * f64::from(gain)).sqrt()) as f32)
+        self.noise_gain.map(|gain| (visibility / (2.0 * f64::from(gain)).sqrt()) as f32)
     }
 
     /// How many times masking raises the allowed standard error of white noise at each pixel, 1 to 3.
@@ -209,9 +172,7 @@ impl ThresholdMap {
     pub fn masking_elevation(&self) -> Plane {
         let coordinates = self.adaptation_cd_m2.map(luminance_coordinate);
         let unmasked = noise_gain(&self.tables, &self.adaptation_cd_m2, &coordinates, None);
-        ratio(&unmasked, &self.noise_gain, |unmasked, masked| {
-            (unmasked / masked).sqrt()
-        })
+        ratio(&unmasked, &self.noise_gain, |unmasked, masked| (unmasked / masked).sqrt())
     }
 
     /// The same thresholds for error that moves over the retina at `retinal_velocity_deg_s` (see [`crate::motion`]).
@@ -227,17 +188,10 @@ impl ThresholdMap {
         let mut moved = self.clone();
         for (band, elevation) in moved.elevations.iter_mut().enumerate() {
             let table = MotionTable::new(self.bands.center_cpd(band));
-            *elevation = ratio(elevation, retinal_velocity_deg_s, |elevation, velocity| {
-                elevation * table.at(velocity)
-            });
+            *elevation = ratio(elevation, retinal_velocity_deg_s, |elevation, velocity| elevation * table.at(velocity));
         }
         let coordinates = self.adaptation_cd_m2.map(luminance_coordinate);
-        moved.noise_gain = noise_gain(
-            &self.tables,
-            &self.adaptation_cd_m2,
-            &coordinates,
-            Some(&moved.elevations),
-        );
+        moved.noise_gain = noise_gain(&self.tables, &self.adaptation_cd_m2, &coordinates, Some(&moved.elevations));
         Ok(moved)
     }
 
@@ -273,12 +227,8 @@ impl MotionTable {
         let rest = Daly98::default().ln_sensitivity(freq_cpd);
         let entries = (0..=96)
             .map(|index| {
-                let retinal_velocity_deg_s =
-                    DRIFT_DEG_S * (f64::from(index) / f64::from(Self::STEPS_AN_OCTAVE)).exp2();
-                let moving = Daly98 {
-                    retinal_velocity_deg_s,
-                }
-                .ln_sensitivity(freq_cpd);
+                let retinal_velocity_deg_s = DRIFT_DEG_S * (f64::from(index) / f64::from(Self::STEPS_AN_OCTAVE)).exp2();
+                let moving = Daly98 { retinal_velocity_deg_s }.ln_sensitivity(freq_cpd);
                 (rest - moving).exp().clamp(0.1, 20.0) as f32
             })
             .collect();
@@ -286,8 +236,7 @@ impl MotionTable {
     }
 
     fn at(&self, velocity_deg_s: f32) -> f32 {
-        let position =
-            (velocity_deg_s / DRIFT_DEG_S as f32).max(1.0).log2() * Self::STEPS_AN_OCTAVE;
+        let position = (velocity_deg_s / DRIFT_DEG_S as f32).max(1.0).log2() * Self::STEPS_AN_OCTAVE;
         let index = (position as usize).min(self.entries.len() - 2);
         let fraction = (position - index as f32).min(1.0);
         self.entries[index] + fraction * (self.entries[index + 1] - self.entries[index])
@@ -296,11 +245,7 @@ impl MotionTable {
 
 /// The transform for pictures of this size at this resolution: one degree of mirror on each side, since contrast
 /// sensitivity reaches no further.
-pub(crate) fn picture_transform(
-    width: usize,
-    height: usize,
-    pixels_per_degree: f64,
-) -> PictureTransform {
+pub(crate) fn picture_transform(width: usize, height: usize, pixels_per_degree: f64) -> PictureTransform {
     PictureTransform::new(width, height, pixels_per_degree.ceil() as usize)
 }
 
@@ -326,21 +271,14 @@ fn noise_gain(
         let coordinates = coordinates.row(y);
         // Band by band: each row of elevations is read in one go.
         for (band, tables) in tables.bands.iter().enumerate() {
-            let energies = coordinates
-                .iter()
-                .map(|&coordinate| tables.noise_energy.at(coordinate));
+            let energies = coordinates.iter().map(|&coordinate| tables.noise_energy.at(coordinate));
             match elevations {
                 Some(elevations) => {
-                    for (value, (energy, elevation)) in
-                        row.iter_mut().zip(energies.zip(elevations[band].row(y)))
-                    {
+                    for (value, (energy, elevation)) in row.iter_mut().zip(energies.zip(elevations[band].row(y))) {
                         *value += energy / (elevation * elevation);
                     }
                 }
-                None => row
-                    .iter_mut()
-                    .zip(energies)
-                    .for_each(|(value, energy)| *value += energy),
+                None => row.iter_mut().zip(energies).for_each(|(value, energy)| *value += energy),
             }
         }
         // Divided twice: the square of 1e-4 cd/m² and of 1e20 must both stay within f32.
@@ -355,9 +293,7 @@ fn range(plane: &Plane) -> (f32, f32) {
     plane
         .values()
         .iter()
-        .fold((f32::INFINITY, 0.0), |(least, greatest), &value| {
-            (least.min(value), greatest.max(value))
-        })
+        .fold((f32::INFINITY, 0.0), |(least, greatest), &value| (least.min(value), greatest.max(value)))
 }
 
 /// Every pixel lowered to the brightest of its eight neighbours where it exceeds them all.
@@ -368,18 +304,13 @@ fn without_single_bright_pixels(plane: &Plane) -> Plane {
     }
     let mut result = plane.clone();
     result.for_each_row_mut(|y, row| {
-        let rows = [
-            plane.row(y.saturating_sub(1)),
-            plane.row(y),
-            plane.row((y + 1).min(height - 1)),
-        ];
+        let rows = [plane.row(y.saturating_sub(1)), plane.row(y), plane.row((y + 1).min(height - 1))];
         for (x, value) in row.iter_mut().enumerate() {
             let columns = x.saturating_sub(1)..(x + 2).min(width);
             let mut brightest = 0.0_f32;
             for (index, line) in rows.iter().enumerate() {
                 // At the top and bottom the row stands in for its missing neighbour, without the pixel itself.
-                let is_own =
-                    index == 1 || (index == 0 && y == 0) || (index == 2 && y + 1 == height);
+                let is_own = index == 1 || (index == 0 && y == 0) || (index == 2 && y + 1 == height);
                 for column in columns.clone() {
                     if !(is_own && column == x) {
                         brightest = brightest.max(line[column]);
@@ -399,20 +330,11 @@ mod tests {
     use crate::display::Display;
 
     fn viewing(pixels_per_degree: f64) -> Viewing {
-        Viewing {
-            display: Display {
-                pixels_per_degree,
-                ..Display::default()
-            },
-            ..Viewing::default()
-        }
+        Viewing { display: Display { pixels_per_degree, ..Display::default() }, ..Viewing::default() }
     }
 
     fn map_of(picture: &Plane, viewing: &Viewing) -> ThresholdMap {
-        let inputs = ThresholdInputs {
-            display_luminance_cd_m2: picture,
-            guide_variance: None,
-        };
+        let inputs = ThresholdInputs { display_luminance_cd_m2: picture, guide_variance: None };
         threshold_map(&inputs, viewing, &CastleCsf::default()).unwrap()
     }
 
@@ -429,13 +351,9 @@ mod tests {
             (100.0, 60.0, 1.0 / (134.296_3 * 0.304_307)),
         ] {
             let map = map_of(&Plane::filled(32, 24, luminance), &viewing(ppd));
-            let allowed =
-                f64::from(map.allowed_standard_error_cd_m2(1.0).get(16, 12)) / f64::from(luminance);
+            let allowed = f64::from(map.allowed_standard_error_cd_m2(1.0).get(16, 12)) / f64::from(luminance);
             let expected = expected / std::f64::consts::SQRT_2;
-            assert!(
-                (allowed / expected - 1.0).abs() < 2e-3,
-                "{luminance} cd/m², {ppd} ppd: {allowed}, not {expected}"
-            );
+            assert!((allowed / expected - 1.0).abs() < 2e-3, "{luminance} cd/m², {ppd} ppd: {allowed}, not {expected}");
         }
     }
 
@@ -460,44 +378,24 @@ mod tests {
                 100.0 * (1.0 + amplitude * ((x as f32 * phase).cos() * (y as f32 * phase).cos()))
             })
         };
-        let textured = map_of(&wave(0.3), &viewing(60.0))
-            .masking_elevation()
-            .get(96, 96);
+        let textured = map_of(&wave(0.3), &viewing(60.0)).masking_elevation().get(96, 96);
         assert!(textured > 1.15, "{textured}");
         // White noise of 10 % of the mean, known as such, and unknown.
         let mut state = 1_u64;
-        let noisy = Plane::from_values(
-            192,
-            192,
-            (0..192 * 192)
-                .map(|_| 100.0 + 10.0 * normal(&mut state))
-                .collect(),
-        );
+        let noisy = Plane::from_values(192, 192, (0..192 * 192).map(|_| 100.0 + 10.0 * normal(&mut state)).collect());
         let noisy = noisy.unwrap();
         let variance = Plane::filled(192, 192, 100.0);
-        let known = ThresholdInputs {
-            display_luminance_cd_m2: &noisy,
-            guide_variance: Some(&variance),
-        };
-        let known = threshold_map(&known, &viewing(60.0), &CastleCsf::default())
-            .unwrap()
-            .masking_elevation();
+        let known = ThresholdInputs { display_luminance_cd_m2: &noisy, guide_variance: Some(&variance) };
+        let known = threshold_map(&known, &viewing(60.0), &CastleCsf::default()).unwrap().masking_elevation();
         let unknown = map_of(&noisy, &viewing(60.0)).masking_elevation();
-        assert!(
-            known.mean() < 1.01 && unknown.mean() > 1.2,
-            "known {} unknown {}",
-            known.mean(),
-            unknown.mean()
-        );
+        assert!(known.mean() < 1.01 && unknown.mean() > 1.2, "known {} unknown {}", known.mean(), unknown.mean());
     }
 
     #[test]
     fn a_firefly_does_not_raise_its_threshold() {
         let mut picture = Plane::filled(64, 64, 20.0);
         picture.values_mut()[32 * 64 + 32] = 200.0;
-        let adapted = map_of(&picture, &viewing(60.0))
-            .adaptation_cd_m2()
-            .get(32, 32);
+        let adapted = map_of(&picture, &viewing(60.0)).adaptation_cd_m2().get(32, 32);
         assert!((adapted - 20.0).abs() < 1e-3, "{adapted}");
     }
 
@@ -507,13 +405,7 @@ mod tests {
             for luminance in [0.0, 1e-30, 1e-4, 1.0, 1e8] {
                 let map = map_of(&Plane::filled(width, height, luminance), &viewing(30.0));
                 let allowed = map.allowed_standard_error_cd_m2(1.0);
-                assert!(
-                    allowed
-                        .values()
-                        .iter()
-                        .all(|value| value.is_finite() && *value > 0.0),
-                    "{luminance}"
-                );
+                assert!(allowed.values().iter().all(|value| value.is_finite() && *value > 0.0), "{luminance}");
             }
         }
     }
@@ -549,19 +441,10 @@ mod tests {
         };
         let grey = Plane::filled(128, 128, 100.0);
         let csf = CastleChromatic::new(ChromaticChannel::RedGreen, 1.0).unwrap();
-        let red_green =
-            chromatic_threshold_map(&Plane::filled(128, 128, 0.0), &grey, &viewing(60.0), &csf)
-                .unwrap();
-        let luminance_v = map_of(&grey, &viewing(60.0))
-            .measured_visibility(&plane(|c| c.achromatic))
-            .get(64, 64);
-        let chromatic_v = red_green
-            .measured_visibility(&plane(|c| c.red_green))
-            .get(64, 64);
-        assert!(
-            luminance_v < 1e-3 && chromatic_v > 1.0,
-            "luminance {luminance_v}, red–green {chromatic_v}"
-        );
+        let red_green = chromatic_threshold_map(&Plane::filled(128, 128, 0.0), &grey, &viewing(60.0), &csf).unwrap();
+        let luminance_v = map_of(&grey, &viewing(60.0)).measured_visibility(&plane(|c| c.achromatic)).get(64, 64);
+        let chromatic_v = red_green.measured_visibility(&plane(|c| c.red_green)).get(64, 64);
+        assert!(luminance_v < 1e-3 && chromatic_v > 1.0, "luminance {luminance_v}, red–green {chromatic_v}");
     }
 
     #[test]
@@ -571,32 +454,12 @@ mod tests {
         let good = Plane::filled(4, 4, 1.0);
         let small = Plane::filled(2, 2, 1.0);
         let ask = |display_luminance_cd_m2, guide_variance, viewing: &Viewing| {
-            threshold_map(
-                &ThresholdInputs {
-                    display_luminance_cd_m2,
-                    guide_variance,
-                },
-                viewing,
-                &csf,
-            )
-            .err()
+            threshold_map(&ThresholdInputs { display_luminance_cd_m2, guide_variance }, viewing, &csf).err()
         };
-        assert!(matches!(
-            ask(&bad, None, &Viewing::default()),
-            Some(Error::BadPixel { .. })
-        ));
-        assert!(matches!(
-            ask(&good, Some(&small), &Viewing::default()),
-            Some(Error::SizeMismatch { .. })
-        ));
-        assert!(matches!(
-            ask(&good, None, &viewing(0.0)),
-            Some(Error::OutOfRange { .. })
-        ));
-        assert!(matches!(
-            ask(&good, None, &viewing(f64::NAN)),
-            Some(Error::OutOfRange { .. })
-        ));
+        assert!(matches!(ask(&bad, None, &Viewing::default()), Some(Error::BadPixel { .. })));
+        assert!(matches!(ask(&good, Some(&small), &Viewing::default()), Some(Error::SizeMismatch { .. })));
+        assert!(matches!(ask(&good, None, &viewing(0.0)), Some(Error::OutOfRange { .. })));
+        assert!(matches!(ask(&good, None, &viewing(f64::NAN)), Some(Error::OutOfRange { .. })));
     }
 
     fn normal(state: &mut u64) -> f32 {

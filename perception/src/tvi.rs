@@ -62,11 +62,7 @@ pub fn scotopic(adaptation_cd_m2: f64) -> f64 {
 #[must_use]
 pub fn combined(adaptation_cd_m2: f64) -> f64 {
     // The curves cross at 0.9585 cd/m².
-    if log10(adaptation_cd_m2) < -0.0184 {
-        scotopic(adaptation_cd_m2)
-    } else {
-        photopic(adaptation_cd_m2)
-    }
+    if log10(adaptation_cd_m2) < -0.0184 { scotopic(adaptation_cd_m2) } else { photopic(adaptation_cd_m2) }
 }
 
 /// [`combined`], never falling as luminance rises: the greatest value at or below `adaptation_cd_m2`. For root finding.
@@ -90,11 +86,7 @@ pub fn combined_monotone(adaptation_cd_m2: f64) -> f64 {
 
 /// NaN and everything below the floor of vision count as 1e-6 cd/m².
 fn log10(luminance_cd_m2: f64) -> f64 {
-    if luminance_cd_m2.is_nan() {
-        -6.0
-    } else {
-        luminance_cd_m2.clamp(1e-6, 1e300).log10()
-    }
+    if luminance_cd_m2.is_nan() { -6.0 } else { luminance_cd_m2.clamp(1e-6, 1e300).log10() }
 }
 
 fn exp10(log: f64) -> f64 {
@@ -130,10 +122,7 @@ mod tests {
         for step in -600..500 {
             let luminance = 10.0_f64.powf(f64::from(step) / 100.0);
             let lower = photopic(luminance).min(scotopic(luminance));
-            assert!(
-                (combined(luminance) / lower - 1.0).abs() < 1e-5,
-                "{luminance}"
-            );
+            assert!((combined(luminance) / lower - 1.0).abs() < 1e-5, "{luminance}");
         }
     }
 
@@ -143,10 +132,7 @@ mod tests {
         for step in -6000..5000 {
             let luminance = 10.0_f64.powf(f64::from(step) / 1000.0);
             let value = combined_monotone(luminance);
-            assert!(
-                value >= last && value / combined(luminance) < 1.028,
-                "{luminance}"
-            );
+            assert!(value >= last && value / combined(luminance) < 1.028, "{luminance}");
             last = value;
         }
     }
@@ -163,10 +149,7 @@ mod tests {
             let at = |base| base_threshold_cd_m2(luminance, base);
             assert!((at(ThresholdBase::TviRaw) / raw - 1.0_f64).abs() < 1e-5);
             assert!((at(ThresholdBase::TviShifted) / shifted - 1.0_f64).abs() < 1e-5);
-            assert!(
-                (at(ThresholdBase::CsfPeak(&castle)) / peak - 1.0_f64).abs() < 1e-4,
-                "{luminance}"
-            );
+            assert!((at(ThresholdBase::CsfPeak(&castle)) / peak - 1.0_f64).abs() < 1e-4, "{luminance}");
         }
     }
 }

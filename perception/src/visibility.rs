@@ -41,47 +41,30 @@ impl ThresholdMap {
         if !self.fits(variance_of_mean) {
             return self.infinite();
         }
-        let relative = ratio(
-            variance_of_mean,
-            &self.adaptation_cd_m2,
-            |variance, adaptation| {
-                if variance.is_finite() && variance >= 0.0 {
-                    (variance / adaptation / adaptation).min(LARGEST_RELATIVE_VARIANCE)
-                } else {
-                    0.0
-                }
-            },
-        );
+        let relative = ratio(variance_of_mean, &self.adaptation_cd_m2, |variance, adaptation| {
+            if variance.is_finite() && variance >= 0.0 {
+                (variance / adaptation / adaptation).min(LARGEST_RELATIVE_VARIANCE)
+            } else {
+                0.0
+            }
+        });
         let coordinates = self.adaptation_cd_m2.map(luminance_coordinate);
         let mut energy = Plane::filled(self.width(), self.height(), 0.0);
         for (tables, elevation) in self.tables.bands.iter().zip(&self.elevations) {
             // A spread of a fifth of the pooling window widens it by 2 %: nothing to pay a blur for.
-            let blurred = (tables.spread_deg > 0.2 * POOLING_SIGMA_DEG).then(|| {
-                gaussian_blur(
-                    &relative,
-                    tables.spread_deg * self.viewing.display.pixels_per_degree,
-                )
-            });
+            let blurred = (tables.spread_deg > 0.2 * POOLING_SIGMA_DEG)
+                .then(|| gaussian_blur(&relative, tables.spread_deg * self.viewing.display.pixels_per_degree));
             let spread = blurred.as_ref().unwrap_or(&relative);
             energy.for_each_row_mut(|y, row| {
-                let inputs = spread
-                    .row(y)
-                    .iter()
-                    .zip(elevation.row(y))
-                    .zip(coordinates.row(y));
+                let inputs = spread.row(y).iter().zip(elevation.row(y)).zip(coordinates.row(y));
                 for (value, ((spread, elevation), coordinate)) in row.iter_mut().zip(inputs) {
-                    *value +=
-                        spread * tables.noise_energy.at(*coordinate) / (elevation * elevation);
+                    *value += spread * tables.noise_energy.at(*coordinate) / (elevation * elevation);
                 }
             });
         }
         let visibility = self.pooled(&energy).map(|energy| (2.0 * energy).sqrt());
         ratio(&visibility, variance_of_mean, |visibility, variance| {
-            if variance.is_finite() && variance >= 0.0 {
-                visibility
-            } else {
-                f32::INFINITY
-            }
+            if variance.is_finite() && variance >= 0.0 { visibility } else { f32::INFINITY }
         })
     }
 
@@ -104,25 +87,16 @@ impl ThresholdMap {
     #[must_use]
     pub fn measured_error(&self, half_difference: &Plane) -> MeasuredError {
         if !self.fits(half_difference) {
-            return MeasuredError {
-                visibility: self.infinite(),
-                amplitude: self.infinite(),
-            };
+            return MeasuredError { visibility: self.infinite(), amplitude: self.infinite() };
         }
         let energy = self.error_energy(half_difference);
-        MeasuredError {
-            visibility: self.visibility_of_energy(&energy),
-            amplitude: energy.map(f32::sqrt),
-        }
+        MeasuredError { visibility: self.visibility_of_energy(&energy), amplitude: energy.map(f32::sqrt) }
     }
 
     /// `plane` convolved with the pooling window g, a Gaussian of σ 0.25° (any unit, unchanged).
     #[must_use]
     pub fn pooled(&self, plane: &Plane) -> Plane {
-        gaussian_blur(
-            plane,
-            POOLING_SIGMA_DEG * self.viewing.display.pixels_per_degree,
-        )
+        gaussian_blur(plane, POOLING_SIGMA_DEG * self.viewing.display.pixels_per_degree)
     }
 
     fn visibility_of_energy(&self, energy: &Plane) -> Plane {
@@ -132,22 +106,16 @@ impl ThresholdMap {
     /// Σ_b (`V_b` / `m_b`)² at every pixel.
     fn error_energy(&self, half_difference: &Plane) -> Plane {
         let ppd = self.viewing.display.pixels_per_degree;
-        let relative = ratio(
-            half_difference,
-            &self.adaptation_cd_m2,
-            |difference, adaptation| {
-                if difference.is_finite() {
-                    (difference / adaptation).clamp(-LARGEST_RELATIVE_ERROR, LARGEST_RELATIVE_ERROR)
-                } else {
-                    0.0
-                }
-            },
-        );
+        let relative = ratio(half_difference, &self.adaptation_cd_m2, |difference, adaptation| {
+            if difference.is_finite() {
+                (difference / adaptation).clamp(-LARGEST_RELATIVE_ERROR, LARGEST_RELATIVE_ERROR)
+            } else {
+                0.0
+            }
+        });
         let transform = picture_transform(self.width(), self.height(), ppd);
         let spectrum = transform.forward(&relative);
-        let positions = self
-            .adaptation_cd_m2
-            .map(|adaptation| self.level_position(adaptation));
+        let positions = self.adaptation_cd_m2.map(|adaptation| self.level_position(adaptation));
         let mut energy = Plane::filled(self.width(), self.height(), 0.0);
         let (width, height) = (self.width(), self.height());
         for (band, elevation) in self.elevations.iter().enumerate() {
@@ -155,16 +123,10 @@ impl ThresholdMap {
             let limit_cpd = self.bands.limit_cpd(band);
             // The energy reaches twice as far in frequency as the amplitude.
             let factor = reduction(ppd, 2.0 * limit_cpd);
-            let mut response = Plane::filled(
-                reduced_size(width, factor),
-                reduced_size(height, factor),
-                0.0,
-            );
+            let mut response = Plane::filled(reduced_size(width, factor), reduced_size(height, factor), 0.0);
             for (index, level) in self.levels.iter().enumerate() {
                 let gain = window.times(&level.sensitivity);
-                let filtered =
-                    transform
-                        .filtered_reduced(&spectrum, ppd, limit_cpd, factor, |freq| gain.at(freq));
+                let filtered = transform.filtered_reduced(&spectrum, ppd, limit_cpd, factor, |freq| gain.at(freq));
                 response.for_each_row_mut(|y, row| {
                     let positions = positions.row(reduced_pixel(y, factor, height));
                     for (x, (value, filtered)) in row.iter_mut().zip(filtered.row(y)).enumerate() {
@@ -182,9 +144,7 @@ impl ThresholdMap {
             });
             let whole = enlarged(&response, factor, width, height);
             energy.for_each_row_mut(|y, row| {
-                row.iter_mut()
-                    .zip(whole.row(y))
-                    .for_each(|(value, more)| *value += more);
+                row.iter_mut().zip(whole.row(y)).for_each(|(value, more)| *value += more);
             });
         }
         energy
@@ -193,9 +153,7 @@ impl ThresholdMap {
     /// Where an adaptation luminance stands between the levels: 1.25 is a quarter of the way, in luminance, from the second level
     /// to the third.
     fn level_position(&self, adaptation_cd_m2: f32) -> f32 {
-        let above = self
-            .levels
-            .partition_point(|level| level.luminance_cd_m2 <= adaptation_cd_m2);
+        let above = self.levels.partition_point(|level| level.luminance_cd_m2 <= adaptation_cd_m2);
         match (above.checked_sub(1), self.levels.get(above)) {
             (Some(below), Some(upper)) => {
                 let lower = self.levels[below].luminance_cd_m2;
@@ -224,17 +182,8 @@ mod tests {
     use crate::threshold::{ThresholdInputs, threshold_map};
 
     fn map_of(picture: &Plane, pixels_per_degree: f64) -> ThresholdMap {
-        let viewing = Viewing {
-            display: Display {
-                pixels_per_degree,
-                ..Display::default()
-            },
-            ..Viewing::default()
-        };
-        let inputs = ThresholdInputs {
-            display_luminance_cd_m2: picture,
-            guide_variance: None,
-        };
+        let viewing = Viewing { display: Display { pixels_per_degree, ..Display::default() }, ..Viewing::default() };
+        let inputs = ThresholdInputs { display_luminance_cd_m2: picture, guide_variance: None };
         threshold_map(&inputs, &viewing, &CastleCsf::default()).unwrap()
     }
 
@@ -261,14 +210,10 @@ mod tests {
         ] {
             let map = map_of(&Plane::filled(256, 256, luminance), 32.0);
             // Phase such that the mirrored picture goes on as the same grating.
-            let grating = Plane::from_fn(256, 256, |x, _| {
-                (std::f64::consts::TAU * freq * (x as f64 + 0.5) / 32.0).cos() as f32
-            });
+            let grating =
+                Plane::from_fn(256, 256, |x, _| (std::f64::consts::TAU * freq * (x as f64 + 0.5) / 32.0).cos() as f32);
             let found = f64::from(map.measured_visibility(&grating).get(128, 128));
-            assert!(
-                (found / expected - 1.0).abs() < 2e-3,
-                "{freq} cpd, {luminance} cd/m²: {found}, not {expected}"
-            );
+            assert!((found / expected - 1.0).abs() < 2e-3, "{freq} cpd, {luminance} cd/m²: {found}, not {expected}");
         }
     }
 
@@ -284,30 +229,16 @@ mod tests {
 
     #[test]
     fn white_noise_is_as_visible_as_predicted() {
-        for (luminance, ppd) in [
-            (1.0, 20.0),
-            (10.0, 60.0),
-            (30.0, 38.0),
-            (57.0, 60.0),
-            (100.0, 30.0),
-            (190.0, 110.0),
-        ] {
+        for (luminance, ppd) in [(1.0, 20.0), (10.0, 60.0), (30.0, 38.0), (57.0, 60.0), (100.0, 30.0), (190.0, 110.0)] {
             let map = map_of(&Plane::filled(256, 256, luminance), ppd);
             let sigma = 0.02 * luminance;
             let predicted = map.predicted_visibility(&Plane::filled(256, 256, sigma * sigma));
             let squares: f64 = (0..4)
-                .map(|seed| {
-                    map.measured_visibility(&noise(256, 256, |_, _| sigma, seed))
-                        .map(|v| v * v)
-                        .mean()
-                })
+                .map(|seed| map.measured_visibility(&noise(256, 256, |_, _| sigma, seed)).map(|v| v * v).mean())
                 .sum::<f64>()
                 / 4.0;
             let found = squares.sqrt() / predicted.map(|v| v * v).mean().sqrt();
-            assert!(
-                (found - 1.0).abs() < 0.05,
-                "{luminance} cd/m², {ppd} ppd: measured/predicted {found}"
-            );
+            assert!((found - 1.0).abs() < 0.05, "{luminance} cd/m², {ppd} ppd: measured/predicted {found}");
             // And what the gain says of it.
             let from_gain = (2.0 * map.noise_gain().get(9, 9)).sqrt() * sigma;
             assert!((predicted.get(9, 9) / from_gain - 1.0).abs() < 1e-3);
@@ -318,41 +249,23 @@ mod tests {
     #[test]
     fn patchy_noise_under_masking_is_as_visible_as_predicted() {
         let picture = Plane::from_fn(256, 256, |x, y| {
-            let wave = ((x as f32 * 0.4).cos() * (y as f32 * 0.45).cos())
-                * if x > 128 { 0.6 } else { 0.0 };
+            let wave = ((x as f32 * 0.4).cos() * (y as f32 * 0.45).cos()) * if x > 128 { 0.6 } else { 0.0 };
             (60.0 + 0.4 * y as f32) * (1.0 + wave)
         });
         let map = map_of(&picture, 60.0);
         let sigma = |x: usize, y: usize| {
-            if (x / 64 + y / 64).is_multiple_of(2) {
-                6.0
-            } else {
-                1.0
-            }
+            if (x / 64 + y / 64).is_multiple_of(2) { 6.0 } else { 1.0 }
         };
-        let predicted =
-            map.predicted_visibility(&Plane::from_fn(256, 256, |x, y| sigma(x, y) * sigma(x, y)));
+        let predicted = map.predicted_visibility(&Plane::from_fn(256, 256, |x, y| sigma(x, y) * sigma(x, y)));
         let mut measured = Plane::filled(256, 256, 0.0);
         for seed in 0..16 {
             let one = map.measured_visibility(&noise(256, 256, sigma, 100 + seed));
             measured = ratio(&measured, &one, |sum, v| sum + v * v / 16.0);
         }
-        for (x, y) in [
-            (32, 32),
-            (96, 32),
-            (160, 32),
-            (224, 32),
-            (32, 96),
-            (96, 96),
-            (224, 160),
-            (160, 160),
-            (128, 128),
-        ] {
+        for (x, y) in [(32, 32), (96, 32), (160, 32), (224, 32), (32, 96), (96, 96), (224, 160), (160, 160), (128, 128)]
+        {
             let found = measured.get(x, y).sqrt() / predicted.get(x, y);
-            assert!(
-                (found - 1.0).abs() < 0.15,
-                "({x}, {y}): measured/predicted {found}"
-            );
+            assert!((found - 1.0).abs() < 0.15, "({x}, {y}): measured/predicted {found}");
         }
     }
 
@@ -363,19 +276,12 @@ mod tests {
         broken.values_mut()[17] = f32::NAN;
         broken.values_mut()[40] = f32::INFINITY;
         broken.values_mut()[41] = f32::MAX;
-        for visibility in [
-            map.predicted_visibility(&broken),
-            map.measured_visibility(&broken),
-        ] {
+        for visibility in [map.predicted_visibility(&broken), map.measured_visibility(&broken)] {
             assert!(visibility.values().iter().all(|v| !v.is_nan()));
         }
         assert!(map.predicted_visibility(&broken).get(1, 1).is_infinite());
         assert!(map.predicted_visibility(&broken).get(8, 8).is_finite());
-        assert!(
-            map.measured_visibility(&Plane::filled(3, 3, 1.0))
-                .get(0, 0)
-                .is_infinite()
-        );
+        assert!(map.measured_visibility(&Plane::filled(3, 3, 1.0)).get(0, 0).is_infinite());
     }
 
     #[test]
@@ -383,17 +289,10 @@ mod tests {
         let picture = Plane::from_fn(97, 61, |x, y| 10.0 + ((x * y) % 17) as f32);
         let error = noise(97, 61, |_, _| 1.0, 5);
         let run = |threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .build()
-                .unwrap();
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| {
                 let map = map_of(&picture, 40.0);
-                (
-                    map.noise_gain().clone(),
-                    map.measured_visibility(&error),
-                    map.predicted_visibility(&picture),
-                )
+                (map.noise_gain().clone(), map.measured_visibility(&error), map.predicted_visibility(&picture))
             })
         };
         assert_eq!(run(1), run(3));

@@ -1,8 +1,6 @@
 //! The specification's table of reference values, computed by an independent program from the published formulas.
 
-use fechner_perception::csf::{
-    Barten99, CastleCsf, ContrastSensitivity, Daly93, Daly98, MannosSakrison,
-};
+use fechner_perception::csf::{Barten99, CastleCsf, ContrastSensitivity, Daly93, Daly98, MannosSakrison};
 use fechner_perception::{masking, motion, psychometric, tvi};
 
 const TABLE: &str = include_str!("golden.json");
@@ -19,10 +17,7 @@ fn check(name: &str, tolerance: f64, value: impl Fn(&[f64]) -> f64) {
     for row in rows(name) {
         let (expected, inputs) = row.split_last().expect("a row");
         let found = value(inputs);
-        assert!(
-            (found / expected - 1.0).abs() < tolerance,
-            "{name} {inputs:?}: {found}, not {expected}"
-        );
+        assert!((found / expected - 1.0).abs() < tolerance, "{name} {inputs:?}: {found}, not {expected}");
     }
 }
 
@@ -36,39 +31,19 @@ fn threshold_versus_intensity() {
 
 #[test]
 fn contrast_sensitivity() {
-    check("csf_daly98", 1e-6, |row| {
-        Daly98 {
-            retinal_velocity_deg_s: row[0],
-        }
-        .sensitivity(row[1], 100.0)
-    });
-    check("csf_daly93_i2_1_d0.5_theta0", 1e-6, |row| {
-        Daly93::default().sensitivity(row[1], row[0])
-    });
-    check("csf_barten99_X0_1", 1e-6, |row| {
-        Barten99::default().sensitivity(row[1], row[0])
-    });
-    check("csf_mannos", 1e-6, |row| {
-        MannosSakrison { gain: 1.0 }.sensitivity(row[0], 100.0)
-    });
-    check("csf_castle_ach_sustained_area1", 1e-6, |row| {
-        CastleCsf::default().sensitivity(row[1], row[0])
-    });
+    check("csf_daly98", 1e-6, |row| Daly98 { retinal_velocity_deg_s: row[0] }.sensitivity(row[1], 100.0));
+    check("csf_daly93_i2_1_d0.5_theta0", 1e-6, |row| Daly93::default().sensitivity(row[1], row[0]));
+    check("csf_barten99_X0_1", 1e-6, |row| Barten99::default().sensitivity(row[1], row[0]));
+    check("csf_mannos", 1e-6, |row| MannosSakrison { gain: 1.0 }.sensitivity(row[0], 100.0));
+    check("csf_castle_ach_sustained_area1", 1e-6, |row| CastleCsf::default().sensitivity(row[1], row[0]));
 }
 
 #[test]
 fn masking_detection_and_pursuit() {
-    check("mask_daly_s0.7", 1e-6, |row| {
-        masking::threshold_elevation(row[0])
-    });
-    check("psychometric_1mexp_beta3.5", 1e-6, |row| {
-        psychometric::detection_probability(row[0])
-    });
+    check("mask_daly_s0.7", 1e-6, |row| masking::threshold_elevation(row[0]));
+    check("psychometric_1mexp_beta3.5", 1e-6, |row| psychometric::detection_probability(row[0]));
     for row in rows("eye_tracking_vI_vR_mag") {
         let expected = row[1].max(0.15);
-        assert!(
-            (motion::retinal_velocity_deg_s(row[0], 1.0) - expected).abs() < 1e-6,
-            "{row:?}"
-        );
+        assert!((motion::retinal_velocity_deg_s(row[0], 1.0) - expected).abs() < 1e-6, "{row:?}");
     }
 }

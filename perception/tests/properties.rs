@@ -16,25 +16,13 @@ fn pictures() -> impl Strategy<Value = Plane> {
 }
 
 fn map_of(picture: &Plane, pixels_per_degree: f64) -> ThresholdMap {
-    let viewing = Viewing {
-        display: Display {
-            pixels_per_degree,
-            ..Display::default()
-        },
-        ..Viewing::default()
-    };
-    let inputs = ThresholdInputs {
-        display_luminance_cd_m2: picture,
-        guide_variance: None,
-    };
+    let viewing = Viewing { display: Display { pixels_per_degree, ..Display::default() }, ..Viewing::default() };
+    let inputs = ThresholdInputs { display_luminance_cd_m2: picture, guide_variance: None };
     threshold_map(&inputs, &viewing, &CastleCsf::default()).expect("a good picture")
 }
 
 fn never_nan(plane: &Plane) -> bool {
-    plane
-        .values()
-        .iter()
-        .all(|value| !value.is_nan() && *value >= 0.0)
+    plane.values().iter().all(|value| !value.is_nan() && *value >= 0.0)
 }
 
 proptest! {

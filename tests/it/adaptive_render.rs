@@ -70,15 +70,29 @@ fn uniform_and_adaptive_renders_agree_with_a_reference() {
         let predicted: f64 = judged.variance.iter().chain(&reference.variance).sum();
         println!("{name}: calibration {:.3}", squared / predicted);
         {
-            let d: f64 = rendered.judgement.estimate.half_difference.values().iter().map(|&v| f64::from(v) * f64::from(v)).sum();
+            let d: f64 =
+                rendered.judgement.estimate.half_difference.values().iter().map(|&v| f64::from(v) * f64::from(v)).sum();
             let own: f64 = rendered.judgement.estimate.variance_of_mean.values().iter().map(|&v| f64::from(v)).sum();
             let s1: f64 = judged.variance.iter().sum();
             let s2: f64 = judged.variance.iter().map(|v| v * v).sum();
-            println!("DEBUG D2 {d:.4} own {own:.4} reported {s1:.4} err2 {squared:.4} refvar {:.4} dof {:.1}", reference.variance.iter().sum::<f64>(), s1 * s1 / s2);
+            println!(
+                "DEBUG D2 {d:.4} own {own:.4} reported {s1:.4} err2 {squared:.4} refvar {:.4} dof {:.1}",
+                reference.variance.iter().sum::<f64>(),
+                s1 * s1 / s2
+            );
             let mut worst: Vec<usize> = (0..judged.variance.len()).collect();
             worst.sort_by(|&a, &b| judged.variance[b].total_cmp(&judged.variance[a]));
             for &i in &worst[..12] {
-                println!("DEBUG ({},{}) var {:.4} own {:.4} D2 {:.4} err2 {:.4} n {}", i % 128, i / 128, judged.variance[i], rendered.judgement.estimate.variance_of_mean.values()[i], rendered.judgement.estimate.half_difference.values()[i].powi(2), (judged.luminance[i] - reference.luminance[i]).powi(2), rendered.film.samples(i));
+                println!(
+                    "DEBUG ({},{}) var {:.4} own {:.4} D2 {:.4} err2 {:.4} n {}",
+                    i % 128,
+                    i / 128,
+                    judged.variance[i],
+                    rendered.judgement.estimate.variance_of_mean.values()[i],
+                    rendered.judgement.estimate.half_difference.values()[i].powi(2),
+                    (judged.luminance[i] - reference.luminance[i]).powi(2),
+                    rendered.film.samples(i)
+                );
             }
         }
         assert!((squared / predicted - 1.0).abs() < 0.1, "{name}: calibration {}", squared / predicted);

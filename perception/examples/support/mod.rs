@@ -6,9 +6,7 @@ use image::{Rgb, RgbImage};
 
 /// Where the example's picture goes: the first argument, or `name` in the system's folder for temporary files.
 pub(crate) fn target(name: &str) -> PathBuf {
-    std::env::args()
-        .nth(1)
-        .map_or_else(|| std::env::temp_dir().join(name), PathBuf::from)
+    std::env::args().nth(1).map_or_else(|| std::env::temp_dir().join(name), PathBuf::from)
 }
 
 /// A plot of curves over decades of both axes, a line at every decade.
@@ -23,11 +21,7 @@ pub(crate) struct LogPlot {
 #[allow(dead_code, reason = "each example uses what it needs")]
 impl LogPlot {
     pub(crate) fn new(x: std::ops::Range<f64>, y: std::ops::Range<f64>) -> Self {
-        let mut plot = Self {
-            image: RgbImage::from_pixel(800, 600, Rgb([255; 3])),
-            x,
-            y,
-        };
+        let mut plot = Self { image: RgbImage::from_pixel(800, 600, Rgb([255; 3])), x, y };
         for decade in plot.x.start.ceil() as i32..=plot.x.end as i32 {
             let column = plot.column(f64::from(decade));
             (0..600).for_each(|row| plot.dot(column, f64::from(row), [215; 3]));

@@ -22,13 +22,7 @@ impl CastleCsf {
     /// # Errors
     /// [`Error::OutOfRange`] unless the area lies between 0.001 and 10 000 deg².
     pub fn new(area_deg2: f64) -> Result<Self, Error> {
-        check_range(
-            "csf_area_deg2",
-            area_deg2,
-            1e-3,
-            1e4,
-            "between 0.001 and 10000 deg²",
-        )?;
+        check_range("csf_area_deg2", area_deg2, 1e-3, 1e4, "between 0.001 and 10000 deg²")?;
         Ok(Self { area_deg2 })
     }
 
@@ -62,15 +56,13 @@ impl ContrastSensitivity for CastleCsf {
         let peak = peak_sensitivity(luminance);
         let peak_freq_cpd = 1.781_19 * (1.0 + 91.571_8 / luminance).powf(-0.256_682);
         let octaves_off = (freq_cpd / peak_freq_cpd).log10();
-        let mut log_parabola =
-            10.0_f64.powf(-octaves_off * octaves_off / 2.0_f64.powf(0.000_213_047));
+        let mut log_parabola = 10.0_f64.powf(-octaves_off * octaves_off / 2.0_f64.powf(0.000_213_047));
         if freq_cpd < peak_freq_cpd {
             log_parabola = log_parabola.max(1.0 - 0.100_207);
         }
         // Spatial summation (Rovamo et al. 1993): area counts up to a critical area that shrinks with frequency.
         let critical_area_deg2 = 157.103 / (1.0 + (freq_cpd / 0.702_338).powi(2));
-        let summation =
-            (critical_area_deg2 / (1.0 + critical_area_deg2 / self.area_deg2)).sqrt() * freq_cpd;
+        let summation = (critical_area_deg2 / (1.0 + critical_area_deg2 / self.area_deg2)).sqrt() * freq_cpd;
         peak * log_parabola * summation
     }
 }
@@ -103,10 +95,7 @@ mod tests {
             (1000.0, 16.0, 51.154_743_99),
         ] {
             let found = csf.sensitivity(freq, luminance);
-            assert!(
-                (found / expected - 1.0_f64).abs() < 1e-6,
-                "S({freq}, {luminance}) = {found}, not {expected}"
-            );
+            assert!((found / expected - 1.0_f64).abs() < 1e-6, "S({freq}, {luminance}) = {found}, not {expected}");
         }
     }
 
@@ -116,10 +105,7 @@ mod tests {
         for freq in [0.0, 1e-300, 0.5, 64.0, 1e6] {
             for luminance in [0.0, 1e-300, 1e-4, 100.0, 1e8] {
                 let found = csf.sensitivity(freq, luminance);
-                assert!(
-                    found.is_finite() && found >= 0.0,
-                    "S({freq}, {luminance}) = {found}"
-                );
+                assert!(found.is_finite() && found >= 0.0, "S({freq}, {luminance}) = {found}");
             }
         }
     }

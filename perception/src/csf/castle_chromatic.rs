@@ -51,13 +51,7 @@ impl CastleChromatic {
     /// # Errors
     /// [`Error::OutOfRange`] unless the area lies between 0.001 and 10 000 deg².
     pub fn new(channel: ChromaticChannel, area_deg2: f64) -> Result<Self, Error> {
-        check_range(
-            "csf_area_deg2",
-            area_deg2,
-            1e-3,
-            1e4,
-            "between 0.001 and 10000 deg²",
-        )?;
+        check_range("csf_area_deg2", area_deg2, 1e-3, 1e4, "between 0.001 and 10000 deg²")?;
         Ok(Self { channel, area_deg2 })
     }
 }
@@ -79,15 +73,11 @@ impl ContrastSensitivity for CastleChromatic {
             ChromaticChannel::YellowViolet => &YELLOW_VIOLET,
         };
         let luminance = luminance_cd_m2.clamp(1e-3, 1e4);
-        let peak =
-            parameters.peak[0] * (1.0 + parameters.peak[1] / luminance).powf(-parameters.peak[2]);
+        let peak = parameters.peak[0] * (1.0 + parameters.peak[1] / luminance).powf(-parameters.peak[2]);
         let decades_above = (freq_cpd / parameters.peak_cpd).log10().max(0.0);
-        let log_parabola =
-            10.0_f64.powf(-decades_above * decades_above / parameters.log2_bandwidth.exp2());
+        let log_parabola = 10.0_f64.powf(-decades_above * decades_above / parameters.log2_bandwidth.exp2());
         let critical_area_deg2 = parameters.area_0 / (1.0 + (freq_cpd / parameters.freq_0).powi(2));
-        peak * log_parabola
-            * (critical_area_deg2 / (1.0 + critical_area_deg2 / self.area_deg2)).sqrt()
-            * freq_cpd
+        peak * log_parabola * (critical_area_deg2 / (1.0 + critical_area_deg2 / self.area_deg2)).sqrt() * freq_cpd
     }
 }
 
@@ -104,11 +94,7 @@ mod tests {
             let achromatic = CastleCsf::default();
             let slope = |at: &dyn Fn(f64) -> f64| at(0.5) / at(8.0);
             let luminance_slope = slope(&|freq| achromatic.sensitivity(freq, 100.0));
-            assert!(
-                slope(&at) > 3.0 * luminance_slope,
-                "{channel:?}: {} {luminance_slope}",
-                slope(&at)
-            );
+            assert!(slope(&at) > 3.0 * luminance_slope, "{channel:?}: {} {luminance_slope}", slope(&at));
             assert!(at(0.0) == 0.0 && at(1e9).is_finite());
             assert!(csf.sensitivity(1.0, 1.0) < at(1.0));
         }

@@ -23,13 +23,9 @@ impl ContrastSensitivity for CastleTemporal {
     }
 
     fn sensitivity(&self, freq_cpd: f64, luminance_cd_m2: f64) -> f64 {
-        let flicker_hz = if self.temporal_hz.is_nan() {
-            0.0
-        } else {
-            self.temporal_hz.abs()
-        };
-        let sustained = (-flicker_hz.powf(1.3314) / 10.5795).exp()
-            * self.sustained.sensitivity(freq_cpd, luminance_cd_m2);
+        let flicker_hz = if self.temporal_hz.is_nan() { 0.0 } else { self.temporal_hz.abs() };
+        let sustained =
+            (-flicker_hz.powf(1.3314) / 10.5795).exp() * self.sustained.sensitivity(freq_cpd, luminance_cd_m2);
         if flicker_hz <= 0.0 || freq_cpd <= 0.0 {
             return sustained;
         }
@@ -47,9 +43,7 @@ fn transient(freq_cpd: f64, luminance_cd_m2: f64, area_deg2: f64) -> f64 {
     let decades_above = (freq_cpd / 0.000_316_696).log10().max(0.0);
     let log_parabola = 10.0_f64.powf(-decades_above * decades_above / 2.6761_f64.exp2());
     let critical_area_deg2 = 3.816_11 / (1.0 + (freq_cpd / 3.013_89).powi(2));
-    peak * log_parabola
-        * (critical_area_deg2 / (1.0 + critical_area_deg2 / area_deg2)).sqrt()
-        * freq_cpd
+    peak * log_parabola * (critical_area_deg2 / (1.0 + critical_area_deg2 / area_deg2)).sqrt() * freq_cpd
 }
 
 #[cfg(test)]
@@ -57,11 +51,7 @@ mod tests {
     use super::*;
 
     fn at(temporal_hz: f64, freq_cpd: f64, luminance_cd_m2: f64) -> f64 {
-        CastleTemporal {
-            sustained: CastleCsf::default(),
-            temporal_hz,
-        }
-        .sensitivity(freq_cpd, luminance_cd_m2)
+        CastleTemporal { sustained: CastleCsf::default(), temporal_hz }.sensitivity(freq_cpd, luminance_cd_m2)
     }
 
     #[test]
@@ -70,10 +60,7 @@ mod tests {
             let still = CastleCsf::default().sensitivity(2.0, luminance);
             assert!((at(0.0, 2.0, luminance) / still - 1.0).abs() < 1e-12);
             // And nothing jumps where the published formula does.
-            assert!(
-                (at(1e-3, 2.0, luminance) / still - 1.0).abs() < 0.05,
-                "{luminance}"
-            );
+            assert!((at(1e-3, 2.0, luminance) / still - 1.0).abs() < 0.05, "{luminance}");
         }
     }
 

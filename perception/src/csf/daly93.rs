@@ -19,11 +19,7 @@ pub struct Daly93 {
 impl Default for Daly93 {
     /// 1 deg² at half a metre, along an axis.
     fn default() -> Self {
-        Self {
-            area_deg2: 1.0,
-            distance_m: 0.5,
-            orientation_rad: 0.0,
-        }
+        Self { area_deg2: 1.0, distance_m: 0.5, orientation_rad: 0.0 }
     }
 }
 
@@ -41,8 +37,7 @@ impl ContrastSensitivity for Daly93 {
         let luminance = luminance_cd_m2.clamp(1e-4, 1e6);
         let area = self.area_deg2.clamp(1e-6, 1e9);
         let near = 0.856 * self.distance_m.clamp(1e-3, 1e6).powf(0.14);
-        let oblique =
-            0.5 * (1.0 - OBLIQUE) * (4.0 * self.orientation_rad).cos() + 0.5 * (1.0 + OBLIQUE);
+        let oblique = 0.5 * (1.0 - OBLIQUE) * (4.0 * self.orientation_rad).cos() + 0.5 * (1.0 + OBLIQUE);
         let stretched = freq_cpd / (near * oblique);
         PEAK * base(freq_cpd, luminance, area).min(base(stretched, luminance, area))
     }
@@ -65,10 +60,7 @@ mod tests {
     #[test]
     fn oblique_gratings_are_harder_to_see() {
         let along = Daly93::default();
-        let oblique = Daly93 {
-            orientation_rad: std::f64::consts::FRAC_PI_4,
-            ..along
-        };
+        let oblique = Daly93 { orientation_rad: std::f64::consts::FRAC_PI_4, ..along };
         assert!((along.sensitivity(8.0, 100.0) - 121.9).abs() < 0.1);
         assert!((oblique.sensitivity(8.0, 100.0) - 89.9).abs() < 0.1);
     }

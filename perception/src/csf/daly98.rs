@@ -46,18 +46,12 @@ impl Daly98 {
 impl Default for Daly98 {
     /// A picture at rest, under the eye's own drift.
     fn default() -> Self {
-        Self {
-            retinal_velocity_deg_s: DRIFT_DEG_S,
-        }
+        Self { retinal_velocity_deg_s: DRIFT_DEG_S }
     }
 }
 
 fn floored(velocity_deg_s: f64) -> f64 {
-    if velocity_deg_s.is_nan() {
-        DRIFT_DEG_S
-    } else {
-        velocity_deg_s.abs().clamp(DRIFT_DEG_S, 1e6)
-    }
+    if velocity_deg_s.is_nan() { DRIFT_DEG_S } else { velocity_deg_s.abs().clamp(DRIFT_DEG_S, 1e6) }
 }
 
 fn highest_cpd(velocity_deg_s: f64) -> f64 {
@@ -70,11 +64,7 @@ impl ContrastSensitivity for Daly98 {
     }
 
     fn sensitivity(&self, freq_cpd: f64, _luminance_cd_m2: f64) -> f64 {
-        if freq_cpd > 0.0 {
-            self.ln_sensitivity(freq_cpd).exp()
-        } else {
-            0.0
-        }
+        if freq_cpd > 0.0 { self.ln_sensitivity(freq_cpd).exp() } else { 0.0 }
     }
 }
 
@@ -90,9 +80,7 @@ mod tests {
             (10.0, 0.573_857_964_5, 141.141_431_1),
             (80.0, 0.079_009_429_89, 91.170_918_84),
         ] {
-            let csf = Daly98 {
-                retinal_velocity_deg_s: velocity,
-            };
+            let csf = Daly98 { retinal_velocity_deg_s: velocity };
             assert!((csf.peak_cpd() / freq - 1.0_f64).abs() < 1e-8);
             assert!((csf.sensitivity(freq, 100.0) / sensitivity - 1.0_f64).abs() < 1e-8);
         }
@@ -101,9 +89,7 @@ mod tests {
     #[test]
     fn no_velocity_breaks_it() {
         for velocity in [0.0, -3.0, f64::NAN, f64::INFINITY, 1e300] {
-            let csf = Daly98 {
-                retinal_velocity_deg_s: velocity,
-            };
+            let csf = Daly98 { retinal_velocity_deg_s: velocity };
             assert!(csf.sensitivity(4.0, 100.0).is_finite());
             assert!(csf.ln_sensitivity(60.0).is_finite());
         }

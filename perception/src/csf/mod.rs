@@ -60,15 +60,10 @@ pub fn by_name(name: &str, viewing: &Viewing) -> Result<Box<dyn ContrastSensitiv
     let area_deg2 = viewing.observer.csf_area_deg2;
     Ok(match name {
         "castle" => Box::new(CastleCsf::new(area_deg2)?),
-        "barten99" => Box::new(Barten99 {
-            field_deg: area_deg2.sqrt(),
-        }),
+        "barten99" => Box::new(Barten99 { field_deg: area_deg2.sqrt() }),
         "daly93" => Box::new(Daly93 {
             area_deg2,
-            distance_m: viewing
-                .display
-                .distance_m
-                .unwrap_or(Daly93::default().distance_m),
+            distance_m: viewing.display.distance_m.unwrap_or(Daly93::default().distance_m),
             ..Daly93::default()
         }),
         "daly98" => Box::new(Daly98::default()),
@@ -90,16 +85,9 @@ pub fn peak_sensitivity(csf: &dyn ContrastSensitivity, luminance_cd_m2: f64) -> 
     let at = |log_freq: f64| csf.sensitivity(log_freq.exp(), luminance_cd_m2);
     let (first, last) = (0.05_f64.ln(), 60.0_f64.ln());
     let step = (last - first) / 64.0;
-    let best =
-        (0..=64)
-            .map(|index| first + f64::from(index) * step)
-            .fold(first, |best, log_freq| {
-                if at(log_freq) > at(best) {
-                    log_freq
-                } else {
-                    best
-                }
-            });
+    let best = (0..=64)
+        .map(|index| first + f64::from(index) * step)
+        .fold(first, |best, log_freq| if at(log_freq) > at(best) { log_freq } else { best });
     let (mut low, mut high) = (best - step, best + step);
     for _ in 0..60 {
         let (left, right) = (low + (high - low) / 3.0, high - (high - low) / 3.0);

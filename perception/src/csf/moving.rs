@@ -19,12 +19,8 @@ impl ContrastSensitivity for Moving<'_> {
     }
 
     fn sensitivity(&self, freq_cpd: f64, luminance_cd_m2: f64) -> f64 {
-        let moving = Daly98 {
-            retinal_velocity_deg_s: self.retinal_velocity_deg_s,
-        };
-        let ratio = (moving.ln_sensitivity(freq_cpd) - Daly98::default().ln_sensitivity(freq_cpd))
-            .exp()
-            .min(10.0);
+        let moving = Daly98 { retinal_velocity_deg_s: self.retinal_velocity_deg_s };
+        let ratio = (moving.ln_sensitivity(freq_cpd) - Daly98::default().ln_sensitivity(freq_cpd)).exp().min(10.0);
         self.base.sensitivity(freq_cpd, luminance_cd_m2) * ratio
     }
 }
@@ -37,17 +33,9 @@ mod tests {
     #[test]
     fn rest_is_the_static_function() {
         let base = CastleCsf::default();
-        let at = |velocity, freq| {
-            Moving {
-                base: &base,
-                retinal_velocity_deg_s: velocity,
-            }
-            .sensitivity(freq, 50.0)
-        };
+        let at = |velocity, freq| Moving { base: &base, retinal_velocity_deg_s: velocity }.sensitivity(freq, 50.0);
         assert!((at(0.0, 8.0) / base.sensitivity(8.0, 50.0) - 1.0).abs() < 1e-12);
         assert!(at(10.0, 8.0) < 1e-4 * at(0.0, 8.0));
-        assert!(
-            (at(3.0, 0.5) / base.sensitivity(0.5, 50.0) - 83.131_443 / 15.769_727).abs() < 1e-4
-        );
+        assert!((at(3.0, 0.5) / base.sensitivity(0.5, 50.0) - 83.131_443 / 15.769_727).abs() < 1e-4);
     }
 }

@@ -35,26 +35,18 @@ impl ThresholdModel for BolinMeyer {
         for level in 1..=LEVELS {
             let side = (1_usize << level) as f64;
             // A box of side s has the variance of a Gaussian of σ = √((s² − 1) / 12).
-            let coarser = gaussian_blur(
-                inputs.display_luminance_cd_m2,
-                ((side * side - 1.0) / 12.0).sqrt(),
-            );
+            let coarser = gaussian_blur(inputs.display_luminance_cd_m2, ((side * side - 1.0) / 12.0).sqrt());
             let detail = ratio(&finer, &coarser, |finer, coarser| (finer - coarser).powi(2));
             // √2 times the RMS over the block: the amplitude of a grating.
-            let contrast = ratio(
-                &gaussian_blur(&detail, 0.5 * side),
-                &adaptation,
-                |energy, adaptation| (2.0 * energy.max(0.0)).sqrt() / adaptation,
-            );
-            // A Haar detail of side s passes 1/(2s) to 1/s cycles a pixel; its middle is 0.75/s.
-            let sensitivity = PerLuminance::new(|luminance| {
-                gain * inputs.csf.sensitivity(0.75 * ppd / side, luminance)
+            let contrast = ratio(&gaussian_blur(&detail, 0.5 * side), &adaptation, |energy, adaptation| {
+                (2.0 * energy.max(0.0)).sqrt() / adaptation
             });
+            // A Haar detail of side s passes 1/(2s) to 1/s cycles a pixel; its middle is 0.75/s.
+            let sensitivity =
+                PerLuminance::new(|luminance| gain * inputs.csf.sensitivity(0.75 * ppd / side, luminance));
             let share = 3.0 * 0.25_f32.powi(level as i32);
             noise_gain.for_each_row_mut(|y, row| {
-                for (value, (contrast, adaptation)) in row
-                    .iter_mut()
-                    .zip(contrast.row(y).iter().zip(adaptation.row(y)))
+                for (value, (contrast, adaptation)) in row.iter_mut().zip(contrast.row(y).iter().zip(adaptation.row(y)))
                 {
                     let sensitivity = sensitivity.at(*adaptation);
                     let elevation = threshold_elevation(f64::from(contrast * sensitivity)) as f32;

@@ -60,17 +60,10 @@ impl ModelInputs<'_> {
     /// Velocity over the retina, deg/s, at each pixel: the eye's drift alone for a still.
     fn retinal_velocity_deg_s(&self) -> Option<Plane> {
         let velocity = self.image_velocity_deg_s?;
-        Some(Plane::from_fn(
-            velocity.width(),
-            velocity.height(),
-            |x, y| {
-                let attention = self
-                    .attention
-                    .map_or(1.0, |attention| f64::from(attention.get(x, y)));
-                crate::motion::retinal_velocity_deg_s(f64::from(velocity.get(x, y)), attention)
-                    as f32
-            },
-        ))
+        Some(Plane::from_fn(velocity.width(), velocity.height(), |x, y| {
+            let attention = self.attention.map_or(1.0, |attention| f64::from(attention.get(x, y)));
+            crate::motion::retinal_velocity_deg_s(f64::from(velocity.get(x, y)), attention) as f32
+        }))
     }
 }
 
@@ -139,8 +132,7 @@ impl PerLuminance {
     }
 
     fn at(&self, luminance_cd_m2: f32) -> f32 {
-        let position =
-            (luminance_cd_m2.max(1e-4).log10() - Self::LOWEST_DECADE) * Self::ENTRIES_A_DECADE;
+        let position = (luminance_cd_m2.max(1e-4).log10() - Self::LOWEST_DECADE) * Self::ENTRIES_A_DECADE;
         let index = (position.max(0.0) as usize).min(self.entries.len() - 2);
         let fraction = (position - index as f32).clamp(0.0, 1.0);
         (self.entries[index] + fraction * (self.entries[index + 1] - self.entries[index])).exp()
@@ -154,11 +146,7 @@ mod tests {
 
     fn picture() -> Plane {
         Plane::from_fn(160, 96, |x, y| {
-            let texture = if x > 80 {
-                0.5 * (x as f32 * 0.42).cos() * (y as f32 * 0.42).cos()
-            } else {
-                0.0
-            };
+            let texture = if x > 80 { 0.5 * (x as f32 * 0.42).cos() * (y as f32 * 0.42).cos() } else { 0.0 };
             50.0 * (1.0 + texture)
         })
     }
@@ -173,10 +161,7 @@ mod tests {
             viewing: &viewing,
             csf: &CastleCsf::default(),
         };
-        by_name(name)
-            .unwrap()
-            .allowed_standard_error_cd_m2(&inputs)
-            .unwrap()
+        by_name(name).unwrap().allowed_standard_error_cd_m2(&inputs).unwrap()
     }
 
     #[test]
@@ -184,20 +169,12 @@ mod tests {
         let mut spike = Plane::filled(20, 10, 0.0);
         spike.values_mut()[30] = 1e8;
         for name in names() {
-            for guide in [
-                Plane::filled(1, 1, 0.0),
-                Plane::filled(3, 2, 1e8),
-                spike.clone(),
-                picture(),
-            ] {
+            for guide in [Plane::filled(1, 1, 0.0), Plane::filled(3, 2, 1e8), spike.clone(), picture()] {
                 let fast = Plane::filled(guide.width(), guide.height(), 1e6);
                 for velocity in [None, Some(&fast)] {
                     let allowed = ask(name, &guide, velocity);
                     assert!(
-                        allowed
-                            .values()
-                            .iter()
-                            .all(|value| value.is_finite() && *value > 0.0),
+                        allowed.values().iter().all(|value| value.is_finite() && *value > 0.0),
                         "{name} on {}×{}",
                         guide.width(),
                         guide.height()
@@ -220,17 +197,9 @@ mod tests {
         ] {
             let textured = ask(name, &guide, None).get(120, 48);
             let flat = ask(name, &Plane::filled(160, 96, 50.0), None).get(120, 48);
-            assert_eq!(
-                textured > 1.05 * flat,
-                knows_texture,
-                "{name}: flat {flat}, textured {textured}"
-            );
+            assert_eq!(textured > 1.05 * flat, knows_texture, "{name}: flat {flat}, textured {textured}");
             let moved = ask(name, &guide, Some(&moving)).get(120, 48);
-            assert_eq!(
-                moved > 1.2 * textured,
-                knows_motion,
-                "{name}: still {textured}, moving {moved}"
-            );
+            assert_eq!(moved > 1.2 * textured, knows_motion, "{name}: still {textured}, moving {moved}");
         }
     }
 
@@ -238,11 +207,7 @@ mod tests {
     fn a_uniform_picture_has_the_published_thresholds() {
         let grey = Plane::filled(64, 64, 50.0);
         let at = |name| ask(name, &grey, None).get(32, 32) * Z_95 as f32;
-        assert!(
-            (at("ramasubramanian") - 0.409_201).abs() < 1e-3,
-            "{}",
-            at("ramasubramanian")
-        );
+        assert!((at("ramasubramanian") - 0.409_201).abs() < 1e-3, "{}", at("ramasubramanian"));
         assert!((at("tvi") - 3.087_946).abs() < 1e-2, "{}", at("tvi"));
     }
 
@@ -259,12 +224,7 @@ mod tests {
                 viewing: &viewing,
                 csf: &CastleCsf::default(),
             };
-            assert!(
-                by_name(name)
-                    .unwrap()
-                    .allowed_standard_error_cd_m2(&inputs)
-                    .is_err()
-            );
+            assert!(by_name(name).unwrap().allowed_standard_error_cd_m2(&inputs).is_err());
         }
     }
 }

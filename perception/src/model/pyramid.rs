@@ -22,10 +22,7 @@ pub(crate) fn band_contrasts(picture: &Plane) -> Vec<Plane> {
         .map(|levels| {
             let mut contrast = levels[0].clone();
             contrast.for_each_row_mut(|y, row| {
-                for (value, (next, base)) in row
-                    .iter_mut()
-                    .zip(levels[1].row(y).iter().zip(levels[2].row(y)))
-                {
+                for (value, (next, base)) in row.iter_mut().zip(levels[1].row(y).iter().zip(levels[2].row(y))) {
                     *value = (*value - next).abs() / base.max(LEAST_LUMINANCE_CD_M2);
                 }
             });
@@ -47,29 +44,19 @@ pub(crate) fn band_frequency_cpd(band: usize, pixels_per_degree: f64) -> f64 {
 fn smoothed(plane: &Plane, hole: usize) -> Plane {
     const KERNEL: [f32; 5] = [0.05, 0.25, 0.4, 0.25, 0.05];
     let (width, height) = (plane.width(), plane.height());
-    let tap = |index: usize, tap: usize, len: usize| {
-        reflect(index as isize + (tap as isize - 2) * hole as isize, len)
-    };
+    let tap = |index: usize, tap: usize, len: usize| reflect(index as isize + (tap as isize - 2) * hole as isize, len);
     let mut across = plane.clone();
     across.for_each_row_mut(|y, row| {
         let source = plane.row(y);
         for (x, value) in row.iter_mut().enumerate() {
-            *value = KERNEL
-                .iter()
-                .enumerate()
-                .map(|(index, weight)| weight * source[tap(x, index, width)])
-                .sum();
+            *value = KERNEL.iter().enumerate().map(|(index, weight)| weight * source[tap(x, index, width)]).sum();
         }
     });
     let mut both = across.clone();
     both.for_each_row_mut(|y, row| {
         let rows = [0, 1, 2, 3, 4].map(|index| across.row(tap(y, index, height)));
         for (x, value) in row.iter_mut().enumerate() {
-            *value = KERNEL
-                .iter()
-                .zip(rows)
-                .map(|(weight, row)| weight * row[x])
-                .sum();
+            *value = KERNEL.iter().zip(rows).map(|(weight, row)| weight * row[x]).sum();
         }
     });
     both
@@ -84,13 +71,10 @@ mod tests {
     fn bands_peak_where_they_say() {
         for band in 1..4 {
             let freq = band_frequency_cpd(band, 1.0) as f32;
-            let wave = Plane::from_fn(256, 64, |x, _| {
-                10.0 * (1.0 + 0.5 * (std::f32::consts::TAU * freq * x as f32).cos())
-            });
+            let wave =
+                Plane::from_fn(256, 64, |x, _| 10.0 * (1.0 + 0.5 * (std::f32::consts::TAU * freq * x as f32).cos()));
             let strength: Vec<f64> = band_contrasts(&wave).iter().map(Plane::mean).collect();
-            let best = (0..BANDS)
-                .max_by(|a, b| strength[*a].total_cmp(&strength[*b]))
-                .unwrap();
+            let best = (0..BANDS).max_by(|a, b| strength[*a].total_cmp(&strength[*b])).unwrap();
             assert_eq!(best, band, "{strength:?}");
         }
     }

@@ -36,13 +36,8 @@ impl ThresholdModel for Ramasubramanian {
         inputs.check()?;
         let ppd = inputs.viewing.display.pixels_per_degree;
         let gain = inputs.viewing.observer.sensitivity;
-        let base = if self.raw_tvi {
-            ThresholdBase::TviRaw
-        } else {
-            ThresholdBase::CsfPeak(inputs.csf)
-        };
-        let thresholds =
-            PerLuminance::new(|luminance| base_threshold_cd_m2(luminance, base) / (Z_95 * gain));
+        let base = if self.raw_tvi { ThresholdBase::TviRaw } else { ThresholdBase::CsfPeak(inputs.csf) };
+        let thresholds = PerLuminance::new(|luminance| base_threshold_cd_m2(luminance, base) / (Z_95 * gain));
         let peak = peak_sensitivity(inputs.csf, 100.0);
         let elevations: Vec<f32> = (0..BANDS)
             .map(|band| {
@@ -52,11 +47,7 @@ impl ThresholdModel for Ramasubramanian {
             .collect();
         let sensitivities: Vec<PerLuminance> = (0..BANDS)
             .map(|band| {
-                PerLuminance::new(|luminance| {
-                    gain * inputs
-                        .csf
-                        .sensitivity(band_frequency_cpd(band, ppd), luminance)
-                })
+                PerLuminance::new(|luminance| gain * inputs.csf.sensitivity(band_frequency_cpd(band, ppd), luminance))
             })
             .collect();
         let contrasts = band_contrasts(inputs.display_luminance_cd_m2);

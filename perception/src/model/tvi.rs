@@ -24,16 +24,10 @@ impl ThresholdModel for Tvi {
 
     fn allowed_standard_error_cd_m2(&self, inputs: &ModelInputs<'_>) -> Result<Plane, Error> {
         inputs.check()?;
-        let base = if self.shifted {
-            ThresholdBase::TviShifted
-        } else {
-            ThresholdBase::TviRaw
-        };
+        let base = if self.shifted { ThresholdBase::TviShifted } else { ThresholdBase::TviRaw };
         let gain = inputs.viewing.observer.sensitivity;
-        let table =
-            PerLuminance::new(|luminance| base_threshold_cd_m2(luminance, base) / (Z_95 * gain));
+        let table = PerLuminance::new(|luminance| base_threshold_cd_m2(luminance, base) / (Z_95 * gain));
         let ppd = inputs.viewing.display.pixels_per_degree;
-        Ok(local_adaptation(inputs.display_luminance_cd_m2, ppd)
-            .map(|adaptation| table.at(adaptation)))
+        Ok(local_adaptation(inputs.display_luminance_cd_m2, ppd).map(|adaptation| table.at(adaptation)))
     }
 }

@@ -25,10 +25,7 @@ pub struct Yee {
 
 impl Default for Yee {
     fn default() -> Self {
-        Self {
-            raw_tvi: false,
-            most_elevation: 20.0,
-        }
+        Self { raw_tvi: false, most_elevation: 20.0 }
     }
 }
 
@@ -36,16 +33,12 @@ impl Yee {
     /// `f_i`, the elevation of a frequency by motion, capped.
     #[must_use]
     pub fn elevation(&self, freq_cpd: f64, retinal_velocity_deg_s: f64) -> f64 {
-        let csf = Daly98 {
-            retinal_velocity_deg_s,
-        };
+        let csf = Daly98 { retinal_velocity_deg_s };
         let peak_cpd = csf.peak_cpd();
         if freq_cpd <= peak_cpd {
             return 1.0;
         }
-        (csf.ln_sensitivity(peak_cpd) - csf.ln_sensitivity(freq_cpd))
-            .min(self.most_elevation.max(1.0).ln())
-            .exp()
+        (csf.ln_sensitivity(peak_cpd) - csf.ln_sensitivity(freq_cpd)).min(self.most_elevation.max(1.0).ln()).exp()
     }
 }
 
@@ -58,42 +51,25 @@ impl ThresholdModel for Yee {
         inputs.check()?;
         let ppd = inputs.viewing.display.pixels_per_degree;
         let gain = inputs.viewing.observer.sensitivity;
-        let base = if self.raw_tvi {
-            ThresholdBase::TviRaw
-        } else {
-            ThresholdBase::CsfPeak(inputs.csf)
-        };
-        let thresholds =
-            PerLuminance::new(|luminance| base_threshold_cd_m2(luminance, base) / (Z_95 * gain));
+        let base = if self.raw_tvi { ThresholdBase::TviRaw } else { ThresholdBase::CsfPeak(inputs.csf) };
+        let thresholds = PerLuminance::new(|luminance| base_threshold_cd_m2(luminance, base) / (Z_95 * gain));
         // A velocity is a positive number over many decades, like a luminance: 0.1 deg/s and up.
         let elevations: Vec<PerLuminance> = (0..BANDS)
-            .map(|band| {
-                PerLuminance::new(|velocity| {
-                    self.elevation(band_frequency_cpd(band, ppd), velocity)
-                })
-            })
+            .map(|band| PerLuminance::new(|velocity| self.elevation(band_frequency_cpd(band, ppd), velocity)))
             .collect();
         let velocity = inputs.retinal_velocity_deg_s();
         let contrasts = band_contrasts(inputs.display_luminance_cd_m2);
         let mut allowed = local_adaptation(inputs.display_luminance_cd_m2, ppd);
         allowed.for_each_row_mut(|y, row| {
             for (x, value) in row.iter_mut().enumerate() {
-                let retinal = velocity
-                    .as_ref()
-                    .map_or(crate::csf::DRIFT_DEG_S as f32, |velocity| {
-                        velocity.row(y)[x]
-                    });
+                let retinal = velocity.as_ref().map_or(crate::csf::DRIFT_DEG_S as f32, |velocity| velocity.row(y)[x]);
                 let (mut elevation, mut total) = (0.0, 0.0);
                 for (contrast, table) in contrasts.iter().zip(&elevations) {
                     let contrast = contrast.row(y)[x];
                     elevation += contrast * table.at(retinal);
                     total += contrast;
                 }
-                let elevation = if total > 0.0 {
-                    (elevation / total).max(1.0)
-                } else {
-                    1.0
-                };
+                let elevation = if total > 0.0 { (elevation / total).max(1.0) } else { 1.0 };
                 *value = thresholds.at(*value) * elevation;
             }
         });
@@ -107,22 +83,12 @@ mod tests {
 
     #[test]
     fn golden_elevations() {
-        let uncapped = Yee {
-            most_elevation: 1e12,
-            ..Yee::default()
-        };
-        for (velocity, freq, expected) in [
-            (0.15, 8.0, 1.353),
-            (0.15, 16.0, 9.252),
-            (1.0, 8.0, 4.188),
-            (1.0, 16.0, 238.7),
-            (10.0, 2.0, 11.86),
-        ] {
+        let uncapped = Yee { most_elevation: 1e12, ..Yee::default() };
+        for (velocity, freq, expected) in
+            [(0.15, 8.0, 1.353), (0.15, 16.0, 9.252), (1.0, 8.0, 4.188), (1.0, 16.0, 238.7), (10.0, 2.0, 11.86)]
+        {
             let found = uncapped.elevation(freq, velocity);
-            assert!(
-                (found / expected - 1.0_f64).abs() < 1e-3,
-                "{velocity} {freq}: {found}"
-            );
+            assert!((found / expected - 1.0_f64).abs() < 1e-3, "{velocity} {freq}: {found}");
         }
         assert_eq!(uncapped.elevation(1.0, 0.15), 1.0);
         assert!((Yee::default().elevation(8.0, 10.0) - 20.0).abs() < 1e-9);

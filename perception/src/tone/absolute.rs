@@ -21,11 +21,7 @@ impl ToneOperator for Absolute {
     fn fit(&self, _guide: &SceneGuide<'_>, display: &Display) -> Box<dyn FittedTone> {
         let black_cd_m2 = display.luminance_cd_m2(0.0);
         let span_cd_m2 = (display.luminance_cd_m2(1.0) - black_cd_m2).max(f64::MIN_POSITIVE);
-        Box::new(Fitted {
-            exposure: self.exposure,
-            black_cd_m2,
-            span_cd_m2,
-        })
+        Box::new(Fitted { exposure: self.exposure, black_cd_m2, span_cd_m2 })
     }
 }
 
@@ -44,9 +40,6 @@ impl FittedTone for Fitted {
     }
 
     fn describe(&self) -> String {
-        format!(
-            "absolute: {} cd/m² shown for each cd/m² of the scene",
-            self.exposure
-        )
+        format!("absolute: {} cd/m² shown for each cd/m² of the scene", self.exposure)
     }
 }

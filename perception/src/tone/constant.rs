@@ -29,14 +29,9 @@ impl ToneOperator for Constant {
 
     fn fit(&self, guide: &SceneGuide<'_>, _display: &Display) -> Box<dyn FittedTone> {
         let statistics = SceneStatistics::of(guide.luminance_cd_m2);
-        let key_scale = statistics
-            .log_average(TRIM, 1.0 - TRIM)
-            .map_or(1.0, |average| KEY / average);
+        let key_scale = statistics.log_average(TRIM, 1.0 - TRIM).map_or(1.0, |average| KEY / average);
         let clip_scale = statistics.quantile(UNCLIPPED).map_or(1.0, f64::recip);
-        Box::new(Scale {
-            operator: self.name(),
-            relative_per_cd_m2: self.exposure * key_scale.min(clip_scale),
-        })
+        Box::new(Scale { operator: self.name(), relative_per_cd_m2: self.exposure * key_scale.min(clip_scale) })
     }
 }
 
@@ -46,12 +41,7 @@ mod tests {
     use crate::plane::Plane;
 
     fn relative_of_ten(guide: &Plane) -> f32 {
-        let fitted = Constant { exposure: 1.0 }.fit(
-            &SceneGuide {
-                luminance_cd_m2: guide,
-            },
-            &Display::default(),
-        );
+        let fitted = Constant { exposure: 1.0 }.fit(&SceneGuide { luminance_cd_m2: guide }, &Display::default());
         fitted.relative_luminance(10.0)
     }
 
@@ -72,12 +62,7 @@ mod tests {
     fn a_night_scene_keeps_its_windows() {
         let mut night = Plane::filled(100, 100, 0.01);
         night.values_mut()[..1000].fill(100.0);
-        let fitted = Constant { exposure: 1.0 }.fit(
-            &SceneGuide {
-                luminance_cd_m2: &night,
-            },
-            &Display::default(),
-        );
+        let fitted = Constant { exposure: 1.0 }.fit(&SceneGuide { luminance_cd_m2: &night }, &Display::default());
         assert!((fitted.relative_luminance(100.0) - 1.0).abs() < 1e-6);
     }
 }

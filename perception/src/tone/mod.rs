@@ -52,13 +52,7 @@ pub trait FittedTone: Send + Sync + Debug {
     /// equal luminance until it does, which keeps hue and luminance where clipping each channel would not. Black stays
     /// black.
     fn map_rgb(&self, rgb_cd_m2: [f32; 3]) -> [f32; 3] {
-        let rgb = rgb_cd_m2.map(|channel| {
-            if channel.is_finite() {
-                channel.max(0.0)
-            } else {
-                0.0
-            }
-        });
+        let rgb = rgb_cd_m2.map(|channel| if channel.is_finite() { channel.max(0.0) } else { 0.0 });
         let scene = luminance(rgb);
         if scene <= 0.0 {
             return [0.0; 3];
@@ -89,9 +83,7 @@ const OPERATOR_NAMES: [&str; 4] = ["constant", "absolute", "ward94", "tumblin-ru
 /// ```
 #[must_use]
 pub fn operator(name: &str, exposure_stops: Option<f64>) -> Option<Box<dyn ToneOperator>> {
-    let stops = exposure_stops
-        .filter(|stops| stops.is_finite())
-        .unwrap_or(0.0);
+    let stops = exposure_stops.filter(|stops| stops.is_finite()).unwrap_or(0.0);
     let exposure = stops.clamp(-100.0, 100.0).exp2();
     Some(match name {
         "constant" => Box::new(Constant { exposure }),
@@ -122,11 +114,7 @@ impl FittedTone for Scale {
     }
 
     fn describe(&self) -> String {
-        format!(
-            "{}: white at {:.4} cd/m² of the scene",
-            self.operator,
-            self.relative_per_cd_m2.recip()
-        )
+        format!("{}: white at {:.4} cd/m² of the scene", self.operator, self.relative_per_cd_m2.recip())
     }
 }
 
@@ -157,33 +145,17 @@ mod tests {
             for guide in guides() {
                 let operator = operator(name, Some(0.5)).unwrap();
                 assert_eq!(&operator.name(), name);
-                let fitted = operator.fit(
-                    &SceneGuide {
-                        luminance_cd_m2: &guide,
-                    },
-                    &Display::default(),
-                );
+                let fitted = operator.fit(&SceneGuide { luminance_cd_m2: &guide }, &Display::default());
                 let mut last = 0.0;
                 for scene in [0.0, 1e-40, 1e-4, 0.1, 1.0, 10.0, 1e3, 1e8, 1e30, f32::MAX] {
                     let relative = fitted.relative_luminance(scene);
-                    assert!(
-                        relative >= last && relative.is_finite(),
-                        "{name} at {scene}: {relative} after {last}"
-                    );
+                    assert!(relative >= last && relative.is_finite(), "{name} at {scene}: {relative} after {last}");
                     last = relative;
                 }
                 assert!(fitted.relative_luminance(f32::NAN).is_finite());
-                for rgb in [
-                    [0.0; 3],
-                    [1e30, 0.0, 0.0],
-                    [f32::NAN, 1.0, f32::INFINITY],
-                    [3.0, 100.0, 0.2],
-                ] {
+                for rgb in [[0.0; 3], [1e30, 0.0, 0.0], [f32::NAN, 1.0, f32::INFINITY], [3.0, 100.0, 0.2]] {
                     let shown = fitted.map_rgb(rgb);
-                    assert!(
-                        shown.iter().all(|channel| (0.0..=1.0).contains(channel)),
-                        "{name} {rgb:?} {shown:?}"
-                    );
+                    assert!(shown.iter().all(|channel| (0.0..=1.0).contains(channel)), "{name} {rgb:?} {shown:?}");
                 }
                 assert_eq!(fitted.map_rgb([0.0; 3]), [0.0; 3]);
             }
@@ -192,10 +164,7 @@ mod tests {
 
     #[test]
     fn colours_too_bright_for_the_display_keep_their_luminance() {
-        let fitted = Scale {
-            operator: "test",
-            relative_per_cd_m2: 0.01,
-        };
+        let fitted = Scale { operator: "test", relative_per_cd_m2: 0.01 };
         let shown = fitted.map_rgb([200.0, 20.0, 20.0]);
         let wanted = luminance([2.0, 0.2, 0.2]);
         assert!((luminance(shown) - wanted).abs() < 1e-4, "{shown:?}");

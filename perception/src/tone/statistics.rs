@@ -27,9 +27,7 @@ impl SceneStatistics {
     /// The value below which the share `fraction` of the pixels lies; `None` for a black picture.
     pub(crate) fn quantile(&self, fraction: f64) -> Option<f64> {
         let last = self.sorted_cd_m2.len().checked_sub(1)?;
-        Some(f64::from(
-            self.sorted_cd_m2[(fraction.clamp(0.0, 1.0) * last as f64).round() as usize],
-        ))
+        Some(f64::from(self.sorted_cd_m2[(fraction.clamp(0.0, 1.0) * last as f64).round() as usize]))
     }
 
     /// Geometric mean of the pixels between two quantiles; `None` for a black picture.
@@ -37,14 +35,8 @@ impl SceneStatistics {
         let count = self.sorted_cd_m2.len();
         let first = (from * count as f64).floor() as usize;
         let end = ((to * count as f64).ceil() as usize).clamp(first, count);
-        let kept = self
-            .sorted_cd_m2
-            .get(first..end)
-            .filter(|kept| !kept.is_empty())?;
-        Some(
-            (kept.iter().map(|&value| f64::from(value).ln()).sum::<f64>() / kept.len() as f64)
-                .exp(),
-        )
+        let kept = self.sorted_cd_m2.get(first..end).filter(|kept| !kept.is_empty())?;
+        Some((kept.iter().map(|&value| f64::from(value).ln()).sum::<f64>() / kept.len() as f64).exp())
     }
 }
 
@@ -61,10 +53,6 @@ mod tests {
         let statistics = SceneStatistics::of(&plane);
         assert!((statistics.log_average(0.03, 0.97).unwrap() - 3.0).abs() < 1e-9);
         assert_eq!(statistics.quantile(0.5), Some(3.0));
-        assert!(
-            SceneStatistics::of(&Plane::filled(4, 4, 0.0))
-                .quantile(0.5)
-                .is_none()
-        );
+        assert!(SceneStatistics::of(&Plane::filled(4, 4, 0.0)).quantile(0.5).is_none());
     }
 }

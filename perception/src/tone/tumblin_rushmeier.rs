@@ -30,9 +30,8 @@ impl ToneOperator for TumblinRushmeier {
         let white_cd_m2 = display.luminance_cd_m2(1.0);
         // A display without any black has no contrast to take the root of; 10 000:1 is as good as eyes need.
         let display_adaptation = (white_cd_m2 * black_cd_m2.max(white_cd_m2 * 1e-4)).sqrt();
-        let scene_adaptation = SceneStatistics::of(guide.luminance_cd_m2)
-            .log_average(0.0, 1.0)
-            .unwrap_or(display_adaptation);
+        let scene_adaptation =
+            SceneStatistics::of(guide.luminance_cd_m2).log_average(0.0, 1.0).unwrap_or(display_adaptation);
         Box::new(Fitted {
             law: BrightnessMatch::between(scene_adaptation, display_adaptation),
             scene_adaptation_cd_m2: scene_adaptation,
@@ -84,8 +83,7 @@ struct Fitted {
 
 impl FittedTone for Fitted {
     fn relative_luminance(&self, scene_cd_m2: f32) -> f32 {
-        let shown =
-            self.exposure * self.law.display_cd_m2(f64::from(scene_cd_m2)) - self.black_cd_m2;
+        let shown = self.exposure * self.law.display_cd_m2(f64::from(scene_cd_m2)) - self.black_cd_m2;
         (shown / self.span_cd_m2).clamp(0.0, f64::from(f32::MAX)) as f32
     }
 
@@ -116,21 +114,11 @@ mod tests {
             (1000.0, 5000.0, 372.818_145_6),
         ] {
             let found = BrightnessMatch::between(adaptation, 25.0).display_cd_m2(scene);
-            assert!(
-                (found / expected - 1.0_f64).abs() < 1e-6,
-                "{adaptation} {scene}: {found}"
-            );
+            assert!((found / expected - 1.0_f64).abs() < 1e-6, "{adaptation} {scene}: {found}");
         }
-        for (adaptation, expected) in [
-            (0.01, 0.345_932_392_7),
-            (1000.0, 1.308_379_648),
-            (10_000.0, 1.500_869_1),
-        ] {
+        for (adaptation, expected) in [(0.01, 0.345_932_392_7), (1000.0, 1.308_379_648), (10_000.0, 1.500_869_1)] {
             let found = BrightnessMatch::between(adaptation, 25.0).exponent;
-            assert!(
-                (found / expected - 1.0_f64).abs() < 1e-6,
-                "{adaptation}: {found}"
-            );
+            assert!((found / expected - 1.0_f64).abs() < 1e-6, "{adaptation}: {found}");
         }
     }
 

@@ -22,9 +22,8 @@ impl ToneOperator for Ward94 {
 
     fn fit(&self, guide: &SceneGuide<'_>, display: &Display) -> Box<dyn FittedTone> {
         let display_adaptation = display.white_cd_m2 / 2.0;
-        let scene_adaptation = SceneStatistics::of(guide.luminance_cd_m2)
-            .log_average(0.0, 1.0)
-            .unwrap_or(display_adaptation);
+        let scene_adaptation =
+            SceneStatistics::of(guide.luminance_cd_m2).log_average(0.0, 1.0).unwrap_or(display_adaptation);
         let factor = scale_factor(scene_adaptation, display_adaptation);
         Box::new(Scale {
             operator: self.name(),
@@ -35,8 +34,7 @@ impl ToneOperator for Ward94 {
 
 /// Display cd/m² for each cd/m² of the scene.
 fn scale_factor(scene_adaptation_cd_m2: f64, display_adaptation_cd_m2: f64) -> f64 {
-    ((1.219 + display_adaptation_cd_m2.powf(0.4)) / (1.219 + scene_adaptation_cd_m2.powf(0.4)))
-        .powf(2.5)
+    ((1.219 + display_adaptation_cd_m2.powf(0.4)) / (1.219 + scene_adaptation_cd_m2.powf(0.4))).powf(2.5)
 }
 
 #[cfg(test)]
@@ -55,26 +53,15 @@ mod tests {
             (100.0, 0.567_197_577_4),
             (1000.0, 0.073_293_226_57),
         ] {
-            assert!(
-                (scale_factor(scene, 50.0) / expected - 1.0).abs() < 1e-6,
-                "{scene}"
-            );
+            assert!((scale_factor(scene, 50.0) / expected - 1.0).abs() < 1e-6, "{scene}");
         }
     }
 
     #[test]
     fn the_fit_uses_half_the_white() {
-        let display = Display {
-            white_cd_m2: 100.0,
-            ..Display::default()
-        };
+        let display = Display { white_cd_m2: 100.0, ..Display::default() };
         let guide = Plane::filled(4, 4, 10.0);
-        let fitted = Ward94 { exposure: 1.0 }.fit(
-            &SceneGuide {
-                luminance_cd_m2: &guide,
-            },
-            &display,
-        );
+        let fitted = Ward94 { exposure: 1.0 }.fit(&SceneGuide { luminance_cd_m2: &guide }, &display);
         assert!((fitted.relative_luminance(10.0) - 0.328_084_7).abs() < 1e-5);
     }
 }
