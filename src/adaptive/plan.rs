@@ -11,8 +11,9 @@ use crate::sampler::Half;
 use fechner_perception::Plane;
 use fechner_perception::allocation::{AllocationProblem, allocate};
 
-/// Doublings that one plan gives a pixel at most: its variance is looked at again in between.
-const MOST_DOUBLINGS_AT_ONCE: u32 = 2;
+/// Doublings that one plan gives a pixel at most: its variance, and what stratification makes of it, are looked at again
+/// in between. With 2, the Cornell box ended at visibility 1.74 where 2 was asked for.
+const MOST_DOUBLINGS_AT_ONCE: u32 = 1;
 
 /// The first samples of every pixel: 8 + 8, or as many as `max_samples` allows.
 pub fn pilot_plan(pixels: u32, max_samples: u32) -> SamplePlan {
@@ -117,7 +118,7 @@ fn blocks(film: &Film, max_samples: u32, doublings: impl Fn(usize) -> [u32; 2]) 
 /// How much more than the estimated need is asked for, against estimates that are low by chance. Pooling leaves few per
 /// cent of scatter on well-behaved noise; what is left is for tails, and fades as samples come in.
 fn confidence_margin(samples: f64) -> f64 {
-    1.05 + 1.0 / samples.sqrt()
+    1.0 + 0.6 / samples.sqrt()
 }
 
 /// Doublings for a pixel that needs `ratio` times what it has: whole ones, and one more for a share of pixels such that
@@ -204,7 +205,7 @@ mod tests {
     /// Over a quad, the mean of 1/n is that of the need to within the four steps of the dither.
     #[test]
     fn mixing_two_counts_meets_the_need() {
-        for ratio in [1.05, 1.2, 1.5, 1.9, 2.2, 3.3, 4.0] {
+        for ratio in [1.05, 1.2, 1.5, 1.9, 2.0] {
             let inverse: f64 = [0.125, 0.375, 0.625, 0.875]
                 .map(|d| 1.0 / f64::from(1u32 << doublings_for(ratio, d)))
                 .iter()
