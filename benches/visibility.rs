@@ -39,8 +39,10 @@ struct Arm {
     spp: Option<u32>,
 }
 
-const REFERENCE: Arm = Arm { name: "reference", seed: 900, sampling: Sampling::Uniform, visibility: 0.0, spp: Some(2048) };
-const UNIFORM: Arm = Arm { name: "uniform-1024", seed: 1, sampling: Sampling::Uniform, visibility: 0.0, spp: Some(1024) };
+const REFERENCE: Arm =
+    Arm { name: "reference", seed: 900, sampling: Sampling::Uniform, visibility: 0.0, spp: Some(2048) };
+const UNIFORM: Arm =
+    Arm { name: "uniform-1024", seed: 1, sampling: Sampling::Uniform, visibility: 0.0, spp: Some(1024) };
 /// The target is below 1 because 99 % of the picture must be: one picture's local RMS scatters about its expectation.
 const ADAPTIVE: Arm = Arm { name: "adaptive-0.85", seed: 2, sampling: Sampling::Adaptive, visibility: 0.85, spp: None };
 
@@ -179,5 +181,10 @@ fn from_bytes(bytes: &[u8]) -> Result<Run> {
             .collect();
         Plane::from_values(SIZE as usize, SIZE as usize, values)
     };
-    Ok(Run { halves: [half(0)?, half(1)?], samples: figure(0), seconds_total: figure(1), seconds_perception: figure(2) })
+    Ok(Run {
+        halves: [half(0)?, half(1)?],
+        samples: figure(0),
+        seconds_total: figure(1),
+        seconds_perception: figure(2),
+    })
 }

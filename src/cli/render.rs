@@ -36,13 +36,13 @@ pub(super) struct RenderArguments {
     at: f64,
 
     /// Stop when the remaining noise is at most this visible: 1 is at threshold.
-    #[arg(long, value_name = "V", value_parser = parse_positive, help_heading = "Until")]
+    #[arg(long, value_name = "V", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Until")]
     visibility: Option<f64>,
     /// The same, by name.
     #[arg(long, value_enum, conflicts_with = "visibility", help_heading = "Until")]
     quality: Option<Quality>,
     /// Stop after this many seconds of rendering.
-    #[arg(long, value_name = "SECONDS", value_parser = parse_positive, help_heading = "Until")]
+    #[arg(long, value_name = "SECONDS", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Until")]
     time: Option<f64>,
     /// Stop at this mean number of samples a pixel.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Until")]
@@ -71,10 +71,10 @@ pub(super) struct RenderArguments {
     #[arg(long, value_name = "NAME|FILE", help_heading = "Seeing")]
     display: Option<String>,
     /// Area in deg² over which the eye sums contrast.
-    #[arg(long, value_name = "DEG2", value_parser = parse_positive, help_heading = "Seeing")]
+    #[arg(long, value_name = "DEG2", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Seeing")]
     csf_area: Option<f64>,
     /// Luminance in cd/m² of RGB (1, 1, 1), in place of the scene's.
-    #[arg(long, value_name = "CD_M2", value_parser = parse_positive, help_heading = "Seeing")]
+    #[arg(long, value_name = "CD_M2", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Seeing")]
     nits_per_unit: Option<f64>,
 
     /// Tone operator.

@@ -48,6 +48,10 @@ struct PathState {
     /// Solid-angle density with which the ray's direction was scattered; `None` if light sampling could not have found
     /// the same direction (camera rays and delta lobes).
     scatter_pdf: Option<f32>,
+    /// What radiance gains on the way back out of the media it has entered: n² of the medium over that at the camera.
+    /// Roulette looks at throughput times this, else it would kill most of what is inside glass (throughput 1/n²) and
+    /// multiply the rest.
+    radiance_gain_on_exit: f32,
     rays: u32,
 }
 
@@ -61,6 +65,7 @@ impl PathTracer {
             throughput: Vec3::ONE,
             radiance: Vec3::ZERO,
             scatter_pdf: None,
+            radiance_gain_on_exit: 1.0,
             rays: 0,
         };
         for bounce in 0.. {
@@ -169,6 +174,11 @@ fn scatter(path: &mut PathState, point: &SurfacePoint, shading: &Shading, wo: Ve
         return false;
     }
     path.throughput *= scattered.weight;
+    if scattered.lobe.is_transmission() {
+        let n_squared = shading.relative_ior * shading.relative_ior;
+        let entering = wo.dot(shading.frame.normal()) > 0.0;
+        path.radiance_gain_on_exit *= if entering { n_squared } else { 1.0 / n_squared };
+    }
     path.scatter_pdf = (!scattered.lobe.is_delta()).then_some(scattered.pdf);
     path.from = point.position;
     path.ray = Ray { origin: point.spawn(wi), direction: wi.into() };
@@ -183,7 +193,7 @@ fn survives(path: &mut PathState, bounce: u32, u: f32) -> bool {
         return true;
     }
     let most = if bounce < ALWAYS_MORTAL_FROM { 1.0 } else { 0.98 };
-    let survival = path.throughput.max_element().min(most);
+    let survival = (path.throughput.max_element() * path.radiance_gain_on_exit).min(most);
     if u >= survival {
         return false;
     }

@@ -12,6 +12,8 @@ pub(super) struct Shading<'a> {
     pub(super) bsdf: Bsdf<'a>,
     pub(super) frame: Frame,
     pub(super) geometric_normal: Vec3,
+    /// Index of refraction behind the surface over that in front of it; 1 where light is not refracted.
+    pub(super) relative_ior: f32,
 }
 
 impl Shading<'_> {
@@ -53,7 +55,11 @@ impl PathTracer {
                 scalar(transmission),
             ),
         };
-        Shading { bsdf, frame, geometric_normal: point.geometric_normal }
+        let relative_ior = match material.surface {
+            Surface::Dielectric { ior, .. } => ior,
+            _ => 1.0,
+        };
+        Shading { bsdf, frame, geometric_normal: point.geometric_normal, relative_ior }
     }
 
     fn shading_normal(&self, material: &Material, point: &SurfacePoint) -> Vec3 {

@@ -22,8 +22,13 @@ fn sphere_in_furnace(surface: Surface) -> PathTracer {
     PathTracer::new(Arc::new(scene), trace_settings(16, 16, 0))
 }
 
-/// Within 0.5 %, and within the test's own noise of at most 0.3 %: 16 blocks of 8192 samples.
+/// Within 0.5 %, and 3.3 of the test's own standard errors (significance 1e-3), which must themselves be small: from 16
+/// blocks of 8192 samples.
 fn assert_returns(surface: &Surface, expected: Vec3) {
+    assert_returns_within(surface, expected, 0.0025);
+}
+
+fn assert_returns_within(surface: &Surface, expected: Vec3, most_error: f32) {
     let tracer = sphere_in_furnace(surface.clone());
     for ray in rays() {
         let (mean, error) = radiance_along(&tracer, ray, 16, 8192);
@@ -33,7 +38,7 @@ fn assert_returns(surface: &Surface, expected: Vec3) {
             "{surface:?} at x = {}: {mean} ± {error}, expected {expected}",
             ray.origin.x
         );
-        assert!(error.max_element() < 0.003, "{surface:?}: too noisy to test, ± {error}");
+        assert!(error.max_element() < most_error, "{surface:?}: too noisy to test, ± {error}");
     }
 }
 
@@ -69,7 +74,8 @@ fn clear_dielectrics_return_everything() {
                 roughness: ScalarInput::constant(roughness),
                 transmittance: ColorInput::constant(Vec3::ONE),
             };
-            assert_returns(&surface, Vec3::ONE);
+            // Paths inside a rough ball are long and their weights differ: noisier than the others.
+            assert_returns_within(&surface, Vec3::ONE, 0.015);
         }
     }
     assert_returns(&Surface::ThinDielectric { ior: 1.5, transmittance: ColorInput::constant(Vec3::ONE) }, Vec3::ONE);
