@@ -114,7 +114,9 @@ pub fn render(tracer: &PathTracer, settings: &LoopSettings, monitor: &dyn Monito
         while let Some(plan) = pending.pop_front() {
             tracer.trace(&plan, &mut film, &|samples| monitor.samples_done(samples));
             plans += 1;
-            out_of_limit = limit_reached(settings, started.elapsed(), plans);
+            let next = pending.front().map_or(0, SamplePlan::samples);
+            let expected = started.elapsed().mul_f64(next as f64 / film.total_samples().max(1) as f64);
+            out_of_limit = limit_reached(settings, started.elapsed() + expected / 2, plans);
             if out_of_limit.is_some() {
                 break;
             }
@@ -129,7 +131,7 @@ pub fn render(tracer: &PathTracer, settings: &LoopSettings, monitor: &dyn Monito
         pass += 1;
         monitor.looked(&progress(pass, &film, &judgement, settings, &rungs, &step));
         match step {
-            Step::Trace(plan) => pending.extend(slices(plan, width, width * height)),
+            Step::Trace(plan) => pending.extend(slices(plan, width, film.total_samples())),
             Step::Stop(stop_reason) => {
                 let seconds_total = started.elapsed().as_secs_f64();
                 return Ok(Rendered { film, judgement, stop_reason, plans, seconds_total, seconds_perception });
@@ -138,7 +140,8 @@ pub fn render(tracer: &PathTracer, settings: &LoopSettings, monitor: &dyn Monito
     }
 }
 
-/// Limits that do not depend on the picture.
+/// Limits that do not depend on the picture. `elapsed` is the time at the middle of the plan that would come next: a
+/// render ends at the boundary between plans that is nearest to its limit.
 fn limit_reached(settings: &LoopSettings, elapsed: Duration, plans: u32) -> Option<StopReason> {
     if settings.limits.time.is_some_and(|limit| elapsed >= limit) {
         Some(StopReason::Time)

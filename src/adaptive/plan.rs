@@ -139,28 +139,27 @@ fn doublings_for(ratio: f64, dither: f64) -> u32 {
 
 /// Thresholds of the four pixels of a quad.
 fn dither(width: u32, pixel: usize) -> f64 {
-    [[0.125, 0.625], [0.875, 0.375]][quad_row(width, pixel)][quad_column(width, pixel)]
+    let (x, y) = (pixel % width as usize, pixel / width as usize);
+    [[0.125, 0.625], [0.875, 0.375]][y % 2][x % 2]
 }
 
-fn quad_row(width: u32, pixel: usize) -> usize {
-    (pixel / width as usize) % 2
-}
-
-fn quad_column(width: u32, pixel: usize) -> usize {
-    (pixel % width as usize) % 2
-}
-
-/// Cuts a long plan into four that each hold one pixel of every quad, so that a limit of time can end between them and
-/// still leave an even picture.
-pub fn slices(plan: SamplePlan, width: u32, pixels: u32) -> Vec<SamplePlan> {
-    const LONG_PLAN_SAMPLES_PER_PIXEL: u64 = 4;
-    if plan.samples() < LONG_PLAN_SAMPLES_PER_PIXEL * u64::from(pixels) {
-        return vec![plan];
-    }
-    let mut slices = vec![SamplePlan::default(); 4];
+/// Cuts a plan into up to 16 that each hold one pixel of every 4×4 block (or of every quad, for 4), so that a limit of
+/// time can end between them and still leave an even picture. A slice is at most about an eighth of what was traced
+/// before: how much depends on counts alone, never on a clock.
+pub fn slices(plan: SamplePlan, width: u32, traced_samples: u64) -> Vec<SamplePlan> {
+    /// Order in which the pixels of a 4×4 block are visited: neighbours far apart in time (Bayer 1973).
+    const BAYER: [[usize; 4]; 4] = [[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]];
+    let eighths = plan.samples() / (traced_samples / 8).max(1);
+    let count = match eighths {
+        0..=1 => return vec![plan],
+        2..=4 => 4,
+        _ => 16,
+    };
+    let mut slices = vec![SamplePlan::default(); count];
     for block in plan.blocks {
-        let pixel = block.pixel as usize;
-        slices[quad_row(width, pixel) * 2 + quad_column(width, pixel)].blocks.push(block);
+        let (x, y) = (block.pixel % width, block.pixel / width);
+        let place = BAYER[y as usize % 4][x as usize % 4];
+        slices[place * count / 16].blocks.push(block);
     }
     slices.retain(|s| !s.blocks.is_empty());
     slices
@@ -236,12 +235,15 @@ mod tests {
     }
 
     #[test]
-    fn slices_hold_the_whole_plan() {
-        let plan = pilot_plan(16, 16);
-        let parts = slices(plan.clone(), 4, 16);
-        assert_eq!(parts.len(), 4);
-        let mut blocks: Vec<_> = parts.into_iter().flat_map(|p| p.blocks).collect();
-        blocks.sort_by_key(|b| (b.pixel, b.half));
-        assert_eq!(blocks, plan.blocks);
+    fn slices_hold_the_whole_plan_and_spread_evenly() {
+        let plan = pilot_plan(64, 16);
+        for (traced, count) in [(u64::MAX, 1), (plan.samples() * 2, 4), (0, 16)] {
+            let parts = slices(plan.clone(), 8, traced);
+            assert_eq!(parts.len(), count);
+            assert!(parts.iter().all(|p| p.samples() * count as u64 == plan.samples()));
+            let mut blocks: Vec<_> = parts.into_iter().flat_map(|p| p.blocks).collect();
+            blocks.sort_by_key(|b| (b.pixel, b.half));
+            assert_eq!(blocks, plan.blocks);
+        }
     }
 }

@@ -211,3 +211,53 @@ impl Film {
         self.halves.iter().flatten().map(|p| u64::from(p.samples)).sum()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrator::FirstHit;
+
+    fn sample(radiance: f32) -> PathSample {
+        let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 2.0, object_id: 1 };
+        PathSample { radiance: Vec3::splat(radiance), first_hit, rays: 1 }
+    }
+
+    fn sum_of(values: &[f32]) -> BlockSum {
+        let mut sum = BlockSum::default();
+        values.iter().for_each(|&v| sum.add(&sample(v)));
+        sum
+    }
+
+    #[test]
+    fn values_that_are_not_finite_are_counted_and_kept_out() {
+        let mut film = Film::new(1, 1);
+        let work = BlockWork { pixel: 0, half: Half::A, level: 0, samples: 4 };
+        film.merge_block(work, &sum_of(&[1.0, f32::NAN, f32::INFINITY, 3.0]));
+        let pixel = film.half(Half::A)[0];
+        assert_eq!((film.nonfinite_samples, pixel.samples, pixel.mean[0]), (2, 2, 2.0));
+        assert!((pixel.sample_variance(0) - 2.0).abs() < 1e-6);
+        film.merge_block(BlockWork { half: Half::B, ..work }, &sum_of(&[f32::NAN; 4]));
+        assert_eq!(film.estimate(1.0).rgb_cd_m2[0], [2.0; 3], "an empty half leaves the picture to the other");
+    }
+
+    /// Merging blocks gives what one block of all samples gives; an empty block changes nothing.
+    #[test]
+    fn merging_is_adding() {
+        let values: Vec<f32> = (0..64).map(|i| ((i * 37) % 64) as f32).collect();
+        let work = |level| BlockWork { pixel: 0, half: Half::A, level, samples: 32 };
+        let (mut whole, mut parts) = (Film::new(1, 1), Film::new(1, 1));
+        whole.merge_block(work(0), &sum_of(&values));
+        parts.merge_block(work(0), &sum_of(&values[..17]));
+        parts.merge_block(work(1), &BlockSum::default());
+        parts.merge_block(work(2), &sum_of(&values[17..]));
+        let (whole, parts) = (whole.half(Half::A)[0], parts.half(Half::A)[0]);
+        assert_eq!(whole.samples, parts.samples);
+        assert!((whole.mean[1] - parts.mean[1]).abs() < 1e-12);
+        assert!((whole.sample_variance(0) / parts.sample_variance(0) - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_pixel_takes_at_most_128_bytes() {
+        assert!(2 * size_of::<HalfPixel>() + size_of::<PixelGuide>() <= 128);
+    }
+}

@@ -52,3 +52,83 @@ fn our_own_scenes_load_and_survive_every_cut() {
         }
     }
 }
+
+/// Writes every 61st cut of a good file, and every byte of its first 400 overwritten, in place of it, and loads the scene:
+/// a scene or one line, never a panic.
+fn survive_damage(scene: &Path, damaged: &Path, good: &[u8]) {
+    let load_scene = || {
+        if let Err(error) = load(scene, &LoadOptions::default()) {
+            assert!(!error.to_string().contains('\n'), "{error}");
+        }
+    };
+    for length in (0..good.len()).step_by(good.len() / 61 + 1) {
+        std::fs::write(damaged, &good[..length]).unwrap();
+        load_scene();
+    }
+    let mut bytes = good.to_vec();
+    for i in (0..good.len().min(400)).step_by(3) {
+        for wrong in [0x00, 0x7f, 0xff] {
+            bytes[i] = wrong;
+            std::fs::write(damaged, &bytes).unwrap();
+            load_scene();
+        }
+        bytes[i] = good[i];
+    }
+}
+
+#[test]
+fn damaged_meshes_and_textures_never_panic() {
+    let place = tempfile::tempdir().unwrap();
+    let obj = std::fs::read(folder("scenes/meshes/table.obj")).unwrap();
+    let mesh = place.path().join("mesh.obj");
+    survive_damage(&mesh, &mesh, &obj);
+
+    let quad = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
+    std::fs::write(place.path().join("quad.obj"), quad).unwrap();
+    let mut picture = image::RgbImage::new(9, 7);
+    picture.pixels_mut().enumerate().for_each(|(i, p)| p.0 = [(i * 7) as u8, (i * 3) as u8, 200]);
+    for ending in ["png", "jpg", "tga", "hdr"] {
+        let texture = place.path().join(format!("texture.{ending}"));
+        match ending {
+            "hdr" => image::DynamicImage::ImageRgb8(picture.clone()).into_rgb32f().save(&texture).unwrap(),
+            _ => picture.save(&texture).unwrap(),
+        }
+        let scene = place.path().join(format!("{ending}.toml"));
+        let text = format!(
+            "[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n[environment]\nradiance = [1, 1, 1]\n\
+             [textures.t]\nfile = \"texture.{ending}\"\n[materials.m]\ntype = \"diffuse\"\n\
+             reflectance = {{ texture = \"t\" }}\n[[objects]]\nmesh = \"quad.obj\"\nmaterial = \"m\"\n"
+        );
+        std::fs::write(&scene, text).unwrap();
+        let loaded = load(&scene, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!((loaded.textures[0].width, loaded.textures[0].height), (9, 7), "{ending}");
+        survive_damage(&scene, &texture, &std::fs::read(&texture).unwrap());
+    }
+}
+
+/// A triangle with its buffer in a data URI: the smallest whole glTF.
+const TRIANGLE_GLTF: &str = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}],
+"bufferViews":[{"buffer":0,"byteLength":36}],
+"buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]}"#;
+
+#[test]
+fn damaged_gltf_never_panics() {
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("triangle.gltf");
+    std::fs::write(&path, TRIANGLE_GLTF).unwrap();
+    let scene = load(&path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(scene.meshes[0].triangles.len(), 1);
+    survive_damage(&path, &path, TRIANGLE_GLTF.as_bytes());
+    // Every number replaced by ones that are too large, negative and not whole.
+    for (start, _) in TRIANGLE_GLTF.match_indices(|c: char| c.is_ascii_digit()) {
+        for wrong in ["4294967295", "-1", "1e30", "0.5", "99"] {
+            let text = format!("{}{wrong}{}", &TRIANGLE_GLTF[..start], &TRIANGLE_GLTF[start + 1..]);
+            std::fs::write(&path, text).unwrap();
+            if let Err(error) = load(&path, &LoadOptions::default()) {
+                assert!(!error.to_string().contains('\n'), "{error}");
+            }
+        }
+    }
+}
