@@ -1,9 +1,13 @@
 //! The command line.
 
+mod compare;
 mod console;
 mod info;
+mod picture;
 mod render;
 mod report;
+mod seeing;
+mod threshold;
 
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
@@ -21,6 +25,10 @@ struct CommandLine {
 enum Command {
     /// Render a scene until nothing more can be seen, or until a limit.
     Render(Box<render::RenderArguments>),
+    /// Say whether one picture can be told from another by eye: exit status 0 same, 1 visible, 2 error.
+    Compare(compare::CompareArguments),
+    /// Map how much noise may stay in a picture of any renderer before it is seen.
+    Threshold(threshold::ThresholdArguments),
     /// Say what is in a picture file.
     Info {
         /// EXR, PNG or HDR file.
@@ -28,10 +36,12 @@ enum Command {
     },
 }
 
-/// Runs what the arguments ask for. Exit status 0: done; 2: bad input or a failed write.
+/// Runs what the arguments ask for. Exit status 0: done; 1: `compare` sees a difference; 2: bad input or a failed write.
 pub(crate) fn run() -> anyhow::Result<ExitCode> {
     match CommandLine::parse().command {
         Command::Render(arguments) => render::run(&arguments)?,
+        Command::Compare(arguments) => return compare::run(&arguments),
+        Command::Threshold(arguments) => threshold::run(&arguments)?,
         Command::Info { file } => info::run(&file)?,
     }
     Ok(ExitCode::SUCCESS)

@@ -2,6 +2,7 @@
 
 use super::console::Console;
 use super::report::{Report, summary};
+use super::seeing::{self, parse_positive};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use fechner::adaptive::settings::{DEFAULT_MAX_SAMPLES, Limits, LoopSettings, Sampling};
@@ -10,10 +11,9 @@ use fechner::integrator::{DEFAULT_MAX_DEPTH, PathTracer, TraceSettings};
 use fechner::output;
 use fechner::sampler::PixelFilter;
 use fechner::scene::{Scene, load};
-use fechner_perception::display::{Display, Viewing};
 use fechner_perception::tone;
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -147,13 +147,6 @@ fn parse_size(text: &str) -> Result<Size, String> {
     if width == 0 || height == 0 { Err(wrong()) } else { Ok(Size { width, height }) }
 }
 
-fn parse_positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
-        _ => Err(format!("\"{text}\" is not a number above 0")),
-    }
-}
-
 /// Renders and writes.
 pub(super) fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     let format = output::check_target(&arguments.output)?;
@@ -234,12 +227,8 @@ fn write(
 /// Command line before scene before default.
 fn loop_settings(arguments: &RenderArguments, scene: &Scene) -> anyhow::Result<LoopSettings> {
     let view = &scene.viewing;
-    let display = find_display(arguments.display.as_deref().or(view.display.as_deref()).unwrap_or("desktop"))?;
-    let mut viewing = Viewing::of(display);
-    if let Some(area) = arguments.csf_area {
-        viewing.observer.csf_area_deg2 = area;
-    }
-    viewing.check().context("--display and --csf-area")?;
+    let display_name = arguments.display.as_deref().or(view.display.as_deref()).unwrap_or("desktop");
+    let viewing = seeing::viewing(display_name, arguments.csf_area)?;
     let operator_name = arguments.operator.as_deref().or(view.operator.as_deref()).unwrap_or("constant");
     let operator = tone::operator(operator_name, arguments.exposure.or(view.exposure_stops)).with_context(|| {
         format!("there is no tone operator \"{operator_name}\"; known: {}", tone::operator_names().join(", "))
@@ -268,17 +257,6 @@ fn loop_settings(arguments: &RenderArguments, scene: &Scene) -> anyhow::Result<L
         nits_per_unit: arguments.nits_per_unit.unwrap_or(scene.nits_per_unit),
         operator,
     })
-}
-
-fn find_display(name: &str) -> anyhow::Result<Display> {
-    if let Some(display) = Display::preset(name) {
-        return Ok(display);
-    }
-    if !name.ends_with(".toml") {
-        bail!("there is no display \"{name}\"; known: {}, or a .toml file", Display::preset_names().join(", "));
-    }
-    let text = std::fs::read_to_string(Path::new(name)).with_context(|| format!("display file {name}"))?;
-    Display::from_toml(&text).with_context(|| format!("display file {name}"))
 }
 
 /// Refuses a size whose film and maps would not fit into memory.

@@ -114,3 +114,47 @@ fn bad_arguments_are_refused_in_one_line() {
     assert_refused(&["info", "missing.exr"], at, &["missing.exr"]);
     assert_eq!(std::fs::read_dir(at).expect("readable").count(), 0, "something was written");
 }
+
+/// Two renders of different seeds at few samples differ visibly, a picture does not differ from itself, and the noise of
+/// the pair is above threshold; a file without a unit is refused.
+#[test]
+fn pictures_are_compared_and_thresholds_mapped() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let scene = scene("cornell-box.toml");
+    for seed in ["1", "2"] {
+        let name = format!("{seed}.exr");
+        let run = fechner()
+            .arg("render")
+            .arg(&scene)
+            .args(["--size", "64x48", "--sampling", "uniform", "--spp", "16", "--seed", seed, "-o", &name])
+            .current_dir(at)
+            .output()
+            .expect("runs");
+        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    }
+    let run = |arguments: &[&str]| fechner().args(arguments).current_dir(at).output().expect("runs");
+    let same = run(&["compare", "1.exr", "1.exr"]);
+    assert_eq!(same.status.code(), Some(0), "{}", String::from_utf8_lossy(&same.stderr));
+    let differ = run(&["compare", "1.exr", "2.exr", "--map", "map.png", "--json", "figures.json"]);
+    assert_eq!(differ.status.code(), Some(1), "{}", String::from_utf8_lossy(&differ.stderr));
+    let map = image::open(at.join("map.png")).expect("a map");
+    assert_eq!((map.width(), map.height()), (64, 48));
+    let figures: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(at.join("figures.json")).expect("written")).expect("JSON");
+    assert!(figures["worst_visibility"].as_f64().expect("a number") > 1.0);
+    let threshold = run(&["threshold", "1.exr", "--halves", "1.exr", "2.exr", "-o", "threshold.exr"]);
+    assert_eq!(threshold.status.code(), Some(0), "{}", String::from_utf8_lossy(&threshold.stderr));
+    let maps = fechner::exr_read::read_exr(&at.join("threshold.exr")).expect("maps");
+    assert!(maps.channel("threshold.Y").expect("thresholds").iter().all(|&t| t > 0.0 && t.is_finite()));
+    assert!(maps.channel("visibility.Y").expect("visibility").iter().any(|&v| v > 1.0));
+
+    let mut unitless = fechner::output::Picture::new(2, 2);
+    for name in ["R", "G", "B"] {
+        unitless.push_f32(name, vec![0.5; 4]);
+    }
+    fechner::output::write_exr(&at.join("unitless.exr"), &unitless).expect("written");
+    assert_refused(&["compare", "unitless.exr", "unitless.exr"], at, &["unitless.exr", "--nits-per-unit"]);
+    assert_refused(&["compare", "1.exr", "unitless.exr", "--nits-per-unit", "100"], at, &["64x48", "2x2"]);
+    assert_refused(&["threshold", "1.exr", "-o", "a.exr", "--model", "guess"], at, &["guess", "csf-bands"]);
+}

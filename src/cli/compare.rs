@@ -1,0 +1,125 @@
+//! `fechner compare`: can one picture be told from another by eye?
+
+use super::picture::InputPicture;
+use super::seeing::SeeingArguments;
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use fechner::output;
+use fechner_perception::csf;
+use fechner_perception::difference::{Difference, difference};
+use fechner_perception::psychometric::detection_probability;
+use fechner_perception::tone;
+use serde::Serialize;
+use std::io::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Arguments of `compare`.
+#[derive(Debug, Args)]
+pub(super) struct CompareArguments {
+    /// The picture that is right.
+    reference: PathBuf,
+    /// The picture to be told from it.
+    test: PathBuf,
+    #[command(flatten)]
+    seeing: SeeingArguments,
+    /// Tone operator that shows scene-linear pictures; it is fitted to the reference.
+    #[arg(long, value_name = "NAME", default_value = "constant")]
+    operator: String,
+    /// Write where the difference is seen: grey below threshold, yellow to red above.
+    #[arg(long, value_name = "FILE.png")]
+    map: Option<PathBuf>,
+    /// Write the figures here.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+#[derive(Serialize)]
+struct Figures {
+    reference: String,
+    test: String,
+    display: String,
+    pixels_per_degree: f64,
+    csf: &'static str,
+    worst_visibility: f64,
+    visible_fraction: f64,
+    detection_probability_worst: f64,
+    is_visible: bool,
+}
+
+/// Exit status 0: the same to the eye; 1: told apart.
+pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
+    for target in arguments.map.iter().chain(&arguments.json) {
+        output::check_writable(target)?;
+    }
+    let viewing = arguments.seeing.viewing()?;
+    let csf = csf::by_name(&arguments.seeing.csf, &viewing)?;
+    let nits_per_unit = arguments.seeing.nits_per_unit;
+    let reference = InputPicture::read(&arguments.reference, nits_per_unit)?;
+    let test = InputPicture::read(&arguments.test, nits_per_unit)?;
+    if reference.size() != test.size() {
+        let ((a, b), (c, d)) = (reference.size(), test.size());
+        bail!(
+            "{} has {a}x{b} pixels and {} has {c}x{d}: only pictures of one size can be compared",
+            arguments.reference.display(),
+            arguments.test.display()
+        );
+    }
+    let operator = tone::operator(&arguments.operator, None).with_context(|| {
+        let known = tone::operator_names().join(", ");
+        format!("there is no tone operator \"{}\"; known: {known}", arguments.operator)
+    })?;
+    let fitted =
+        reference.fit(operator.as_ref(), &viewing.display).or_else(|| test.fit(operator.as_ref(), &viewing.display));
+    let seen = difference(
+        &reference.displayed(fitted.as_deref(), &viewing),
+        &test.displayed(fitted.as_deref(), &viewing),
+        &viewing,
+        csf.as_ref(),
+    )?;
+    let figures = Figures {
+        reference: arguments.reference.display().to_string(),
+        test: arguments.test.display().to_string(),
+        display: viewing.display.name.clone(),
+        pixels_per_degree: viewing.display.pixels_per_degree,
+        csf: csf.name(),
+        worst_visibility: seen.worst_visibility,
+        visible_fraction: seen.visible_fraction,
+        detection_probability_worst: detection_probability(seen.worst_visibility),
+        is_visible: seen.is_visible(),
+    };
+    if let Some(path) = &arguments.map {
+        write_map(path, &seen)?;
+    }
+    if let Some(path) = &arguments.json {
+        let text = serde_json::to_string_pretty(&figures).context("the figures could not be put into words")?;
+        output::write_beside(path, |file| file.write_all(text.as_bytes()))?;
+    }
+    println!(
+        "{}: worst visibility {:.2} (seen in a 1° patch with {:.1} %), {:.2} % of the picture above threshold, on \
+         \"{}\" at {} pixels a degree",
+        if figures.is_visible { "visible" } else { "the same to the eye" },
+        figures.worst_visibility,
+        100.0 * figures.detection_probability_worst,
+        100.0 * figures.visible_fraction,
+        figures.display,
+        figures.pixels_per_degree
+    );
+    Ok(ExitCode::from(u8::from(figures.is_visible)))
+}
+
+/// Grey up to threshold, then yellow at v = 1 to red at v = 4 and above.
+fn write_map(path: &std::path::Path, seen: &Difference) -> Result<()> {
+    let color = |v: f32| {
+        if v <= 1.0 {
+            [0.25 * v; 3]
+        } else {
+            let heat = (v.log2() / 2.0).min(1.0);
+            [1.0, 0.8 * (1.0 - heat), 0.05]
+        }
+    };
+    let map = &seen.visibility;
+    let pixels: Vec<[f32; 3]> = map.values().iter().map(|&v| color(v)).collect();
+    output::write_png(path, map.width() as u32, map.height() as u32, &pixels)?;
+    Ok(())
+}

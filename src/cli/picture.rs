@@ -1,0 +1,126 @@
+//! Pictures of any renderer as the input of `compare` and `threshold`.
+
+use anyhow::{Context, Result, bail};
+use fechner::exr_read::{ExrImage, read_exr};
+use fechner::output::{Attribute, NITS_PER_UNIT};
+use fechner_perception::display::{Display, Viewing};
+use fechner_perception::photometry::luminance;
+use fechner_perception::tone::{FittedTone, SceneGuide, ToneOperator};
+use fechner_perception::{Plane, seen};
+use std::path::Path;
+
+/// A picture from a file.
+pub(super) struct InputPicture {
+    width: usize,
+    height: usize,
+    rgb: Vec<[f32; 3]>,
+    content: Content,
+}
+
+/// What the values mean.
+#[derive(Clone, Copy, PartialEq)]
+enum Content {
+    /// Linear radiance; RGB (1, 1, 1) has this luminance in cd/m².
+    Scene { nits_per_unit: f64 },
+    /// Code values of a display, 0 to 1.
+    Display,
+}
+
+impl InputPicture {
+    /// Reads an EXR, HDR, PNG or JPEG file. `nits_per_unit` is needed for scene-linear files that do not say it.
+    pub(super) fn read(path: &Path, nits_per_unit: Option<f64>) -> Result<Self> {
+        let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
+        match ending.as_deref() {
+            Some("exr") => Self::from_exr(path, &read_exr(path)?, nits_per_unit),
+            Some("hdr") => {
+                let nits_per_unit = nits_per_unit.with_context(|| no_unit(path))?;
+                Self::from_image(path, Content::Scene { nits_per_unit })
+            }
+            Some("png" | "jpg" | "jpeg") => Self::from_image(path, Content::Display),
+            _ => bail!("{}: not a picture that can be judged: .exr, .hdr, .png and .jpg are read", path.display()),
+        }
+    }
+
+    fn from_exr(path: &Path, exr: &ExrImage, nits_per_unit: Option<f64>) -> Result<Self> {
+        let in_file = || {
+            [NITS_PER_UNIT, "whiteLuminance"].into_iter().find_map(|name| match exr.attribute(name) {
+                Some(Attribute::Float(nits)) if *nits > 0.0 => Some(f64::from(*nits)),
+                _ => None,
+            })
+        };
+        let nits_per_unit = nits_per_unit.or_else(in_file).with_context(|| no_unit(path))?;
+        let [r, g, b] = ["R", "G", "B"].map(|c| find_channel(exr, &[c], c));
+        let (Some(r), Some(g), Some(b)) = (r, g, b) else {
+            bail!("{}: there are no channels R, G and B; `fechner info` lists what there is", path.display());
+        };
+        let rgb = (0..r.len()).map(|i| [r[i], g[i], b[i]]).collect();
+        let content = Content::Scene { nits_per_unit };
+        Ok(Self { width: exr.width as usize, height: exr.height as usize, rgb, content })
+    }
+
+    fn from_image(path: &Path, content: Content) -> Result<Self> {
+        let mut reader = image::ImageReader::open(path)
+            .and_then(image::ImageReader::with_guessed_format)
+            .with_context(|| format!("{}", path.display()))?;
+        let mut limits = image::Limits::default();
+        limits.max_image_width = Some(1 << 15);
+        limits.max_image_height = Some(1 << 15);
+        limits.max_alloc = Some(1 << 30);
+        reader.limits(limits);
+        let picture = reader.decode().with_context(|| format!("{}: not a readable picture", path.display()))?;
+        let picture = picture.into_rgb32f();
+        let (width, height) = (picture.width() as usize, picture.height() as usize);
+        Ok(Self { width, height, rgb: picture.pixels().map(|p| p.0).collect(), content })
+    }
+
+    /// Width and height in pixels.
+    pub(super) fn size(&self) -> (usize, usize) {
+        (self.width, self.height)
+    }
+
+    /// The operator fitted to this picture; `None` for one that is ready for the display.
+    pub(super) fn fit(&self, operator: &dyn ToneOperator, display: &Display) -> Option<Box<dyn FittedTone>> {
+        let luminance_cd_m2 = self.scene_luminance()?;
+        Some(operator.fit(&SceneGuide { luminance_cd_m2: &luminance_cd_m2 }, display))
+    }
+
+    /// Luminance in cd/m² of the scene; `None` for a picture that is ready for the display.
+    pub(super) fn scene_luminance(&self) -> Option<Plane> {
+        let Content::Scene { nits_per_unit } = self.content else { return None };
+        Some(Plane::from_fn(self.width, self.height, |x, y| {
+            let value = luminance(self.rgb[y * self.width + x]) * nits_per_unit as f32;
+            if value.is_finite() { value.max(0.0) } else { 0.0 }
+        }))
+    }
+
+    /// Luminance in cd/m² that the display sends to the eye.
+    pub(super) fn displayed(&self, tone: Option<&dyn FittedTone>, viewing: &Viewing) -> Plane {
+        let display = &viewing.display;
+        match (self.scene_luminance(), tone) {
+            (Some(scene), Some(tone)) => seen::display_luminance(tone, display, &scene),
+            _ => Plane::from_fn(self.width, self.height, |x, y| {
+                let code = self.rgb[y * self.width + x];
+                let linear = code.map(|c| display.eotf.decode(f64::from(c), display.white_cd_m2) as f32);
+                display.luminance_cd_m2(f64::from(luminance(linear))) as f32
+            }),
+        }
+    }
+}
+
+fn no_unit(path: &Path) -> String {
+    format!(
+        "{}: the file does not say how bright RGB (1, 1, 1) is, and nothing can be seen in a picture without a unit: give \
+         --nits-per-unit in cd/m²",
+        path.display()
+    )
+}
+
+/// A channel by one of its names, or by its last part: renderers prefix layers and passes (`RenderLayer.Combined.R`).
+pub(super) fn find_channel<'a>(exr: &'a ExrImage, names: &[&str], last_part: &str) -> Option<&'a [f32]> {
+    let ends = |name: &str| name.rsplit('.').next().is_some_and(|part| part.eq_ignore_ascii_case(last_part));
+    names.iter().find_map(|name| exr.channel(name)).or_else(|| {
+        let candidates: Vec<_> = exr.channels.iter().filter(|(name, _)| ends(name)).collect();
+        let combined = candidates.iter().find(|(name, _)| name.to_ascii_lowercase().contains("combined"));
+        combined.or(candidates.first()).map(|(_, values)| values.as_slice())
+    })
+}

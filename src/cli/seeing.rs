@@ -1,0 +1,59 @@
+//! Arguments that say who looks at what.
+
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use fechner_perception::display::{Display, Viewing};
+use std::path::Path;
+
+/// Display, observer and units, for commands that judge pictures.
+#[derive(Debug, Args)]
+pub(super) struct SeeingArguments {
+    /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file.
+    #[arg(long, value_name = "NAME|FILE", default_value = "desktop")]
+    display: String,
+    /// Contrast sensitivity function.
+    #[arg(long, value_name = "NAME", default_value = "castle")]
+    pub(super) csf: String,
+    /// Area in deg² over which the eye sums contrast.
+    #[arg(long, value_name = "DEG2", value_parser = parse_positive, allow_negative_numbers = true)]
+    csf_area: Option<f64>,
+    /// Luminance in cd/m² of RGB (1, 1, 1), for files that do not say it.
+    #[arg(long, value_name = "CD_M2", value_parser = parse_positive, allow_negative_numbers = true)]
+    pub(super) nits_per_unit: Option<f64>,
+}
+
+impl SeeingArguments {
+    /// The viewing that they mean.
+    pub(super) fn viewing(&self) -> Result<Viewing> {
+        viewing(&self.display, self.csf_area)
+    }
+}
+
+/// The viewing for a display's name or file and, where given, a contrast sensitivity area in deg².
+pub(super) fn viewing(display: &str, csf_area_deg2: Option<f64>) -> Result<Viewing> {
+    let mut viewing = Viewing::of(find_display(display)?);
+    if let Some(area) = csf_area_deg2 {
+        viewing.observer.csf_area_deg2 = area;
+    }
+    viewing.check().context("--display and --csf-area")?;
+    Ok(viewing)
+}
+
+fn find_display(name: &str) -> Result<Display> {
+    if let Some(display) = Display::preset(name) {
+        return Ok(display);
+    }
+    if !name.ends_with(".toml") {
+        bail!("there is no display \"{name}\"; known: {}, or a .toml file", Display::preset_names().join(", "));
+    }
+    let text = std::fs::read_to_string(Path::new(name)).with_context(|| format!("display file {name}"))?;
+    Display::from_toml(&text).with_context(|| format!("display file {name}"))
+}
+
+/// A number above 0.
+pub(super) fn parse_positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err(format!("\"{text}\" is not a number above 0")),
+    }
+}

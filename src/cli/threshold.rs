@@ -1,0 +1,151 @@
+//! `fechner threshold`: how much noise may stay in a picture, and how visible the noise is that it has.
+
+use super::picture::{InputPicture, find_channel};
+use super::seeing::SeeingArguments;
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use fechner::exr_read::read_exr;
+use fechner::output::{self, Attribute, Format, Picture};
+use fechner_perception::model::{self, ModelInputs};
+use fechner_perception::motion::image_velocity_deg_s;
+use fechner_perception::{Plane, ThresholdInputs, csf, seen, threshold_map, tone};
+use std::path::{Path, PathBuf};
+
+/// Arguments of `threshold`.
+#[derive(Debug, Args)]
+pub(super) struct ThresholdArguments {
+    /// Picture of any renderer, best without noise.
+    input: PathBuf,
+    /// EXR file to write: threshold.Y (standard error in display cd/m² at visibility 1), adaptation.Y and, with
+    /// --halves, visibility.Y.
+    #[arg(short, long, value_name = "FILE.exr")]
+    output: PathBuf,
+    /// Two renders with independent samples: half of their difference is the noise that is judged.
+    #[arg(long, num_args = 2, value_names = ["A", "B"])]
+    halves: Option<Vec<PathBuf>>,
+    /// Motion in pixels a frame, for error that travels with what is shown.
+    #[arg(long, value_name = "FILE.exr")]
+    velocity: Option<PathBuf>,
+    /// Threshold model.
+    #[arg(long, value_name = "NAME", default_value = "csf-bands")]
+    model: String,
+    /// Tone operator that shows scene-linear pictures.
+    #[arg(long, value_name = "NAME", default_value = "constant")]
+    operator: String,
+    #[command(flatten)]
+    seeing: SeeingArguments,
+}
+
+/// Writes the maps.
+pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
+    if output::check_target(&arguments.output)? != Format::Exr {
+        bail!("{}: threshold maps are data; end the name in .exr", arguments.output.display());
+    }
+    let viewing = arguments.seeing.viewing()?;
+    let csf = csf::by_name(&arguments.seeing.csf, &viewing)?;
+    let model = model::by_name(&arguments.model).with_context(|| {
+        format!("there is no threshold model \"{}\"; known: {}", arguments.model, model::names().join(", "))
+    })?;
+    let operator = tone::operator(&arguments.operator, None).with_context(|| {
+        let known = tone::operator_names().join(", ");
+        format!("there is no tone operator \"{}\"; known: {known}", arguments.operator)
+    })?;
+    let nits_per_unit = arguments.seeing.nits_per_unit;
+    let guide = InputPicture::read(&arguments.input, nits_per_unit)?;
+    let fitted = guide.fit(operator.as_ref(), &viewing.display);
+    let shown = guide.displayed(fitted.as_deref(), &viewing);
+    let velocity = match &arguments.velocity {
+        Some(path) => {
+            let display = &viewing.display;
+            let [x, y] = read_velocity(path, guide.size())?;
+            Some(image_velocity_deg_s(&x, &y, display.frames_per_second, display.pixels_per_degree)?)
+        }
+        None => None,
+    };
+    let threshold = model.allowed_standard_error_cd_m2(&ModelInputs {
+        display_luminance_cd_m2: &shown,
+        guide_variance: None,
+        image_velocity_deg_s: velocity.as_ref(),
+        attention: None,
+        viewing: &viewing,
+        csf: csf.as_ref(),
+    })?;
+    let map = threshold_map(
+        &ThresholdInputs { display_luminance_cd_m2: &shown, guide_variance: None },
+        &viewing,
+        csf.as_ref(),
+    )?;
+    let mut picture = Picture::new(shown.width() as u32, shown.height() as u32);
+    picture.push_f32("threshold.Y", threshold.values());
+    picture.push_f32("adaptation.Y", map.adaptation_cd_m2().values());
+    let visibility = match arguments.halves.as_deref() {
+        Some([a, b]) => {
+            let [a, b] = [a, b].map(|path| InputPicture::read(path, nits_per_unit));
+            let (a, b) = (a?, b?);
+            if a.size() != guide.size() || b.size() != guide.size() {
+                bail!("the halves do not have the size of {}", arguments.input.display());
+            }
+            Some(map.measured_visibility(&half_difference(&a, &b, fitted.as_deref(), &viewing)))
+        }
+        _ => None,
+    };
+    if let Some(visibility) = &visibility {
+        picture.push_f32("visibility.Y", visibility.values());
+    }
+    let text = |s: &str| Attribute::Text(s.to_owned());
+    picture.push_attribute("fechner.model", text(model.name()));
+    picture.push_attribute("fechner.csf", text(csf.name()));
+    picture.push_attribute("fechner.observer.display", text(&viewing.display.name));
+    let ppd = viewing.display.pixels_per_degree as f32;
+    picture.push_attribute("fechner.observer.pixels_per_degree", Attribute::Float(ppd));
+    output::write_exr(&arguments.output, &picture)?;
+    println!("median threshold {:.3} cd/m² of standard error at visibility 1", median(&threshold));
+    if let Some(visibility) = &visibility {
+        println!("median visibility of the noise {:.2}", median(visibility));
+    }
+    Ok(())
+}
+
+/// (A − B)/2 as the display shows it.
+fn half_difference(
+    a: &InputPicture,
+    b: &InputPicture,
+    fitted: Option<&dyn tone::FittedTone>,
+    viewing: &fechner_perception::Viewing,
+) -> Plane {
+    let combine = |a: &Plane, b: &Plane, with: fn(f32, f32) -> f32| {
+        Plane::from_fn(a.width(), a.height(), |x, y| with(a.get(x, y), b.get(x, y)))
+    };
+    match (a.scene_luminance(), b.scene_luminance(), fitted) {
+        (Some(a), Some(b), Some(fitted)) => {
+            let mean = combine(&a, &b, |a, b| 0.5 * (a + b));
+            let difference = combine(&a, &b, |a, b| 0.5 * (a - b));
+            seen::display_half_difference(fitted, &viewing.display, &mean, &difference)
+        }
+        _ => combine(&a.displayed(fitted, viewing), &b.displayed(fitted, viewing), |a, b| 0.5 * (a - b)),
+    }
+}
+
+/// Motion in pixels under the names that renderers give it.
+fn read_velocity(path: &Path, (width, height): (usize, usize)) -> Result<[Plane; 2]> {
+    let exr = read_exr(path)?;
+    if (exr.width as usize, exr.height as usize) != (width, height) {
+        bail!("{} has {}x{} pixels, the picture {width}x{height}", path.display(), exr.width, exr.height);
+    }
+    let x = find_channel(&exr, &["velocity.X", "Vector.X", "forward.u", "motion.X", "motion.x"], "u");
+    let y = find_channel(&exr, &["velocity.Y", "Vector.Y", "forward.v", "motion.Y", "motion.y"], "v");
+    let (Some(x), Some(y)) = (x, y) else {
+        bail!("{}: no motion channels; velocity.X/Y, Vector.X/Y, forward.u/v and motion.X/Y are known", path.display());
+    };
+    let plane = |values: &[f32]| {
+        let finite = values.iter().map(|&v| if v.is_finite() { v } else { 0.0 }).collect();
+        Plane::from_values(width, height, finite)
+    };
+    Ok([plane(x)?, plane(y)?])
+}
+
+fn median(plane: &Plane) -> f32 {
+    let mut values = plane.values().to_vec();
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f32::total_cmp).1
+}
