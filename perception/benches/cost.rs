@@ -19,6 +19,29 @@ fn fastest(runs: usize, mut work: impl FnMut()) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
+/// A figure of this process in bytes, from Linux's /proc: `VmRSS` now, or `VmHWM`, the most so far.
+fn memory(figure: &str) -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix(figure)?.strip_prefix(':'))?;
+    Some(1024.0 * line.trim().strip_suffix("kB")?.trim().parse::<f64>().ok()?)
+}
+
+/// Prints how much memory a threshold map takes at its worst, beyond the picture itself. The first thing the program does, so
+/// that nothing given back earlier hides it.
+fn report_memory() {
+    let (width, height) = (1920, 1080);
+    let picture = Plane::from_fn(width, height, |x, y| 50.0 + ((x * 31 + y * 17) % 13) as f32);
+    let inputs = ThresholdInputs { display_luminance_cd_m2: &picture, guide_variance: None };
+    let before = memory("VmRSS");
+    std::hint::black_box(threshold_map(&inputs, &Viewing::default(), &CastleCsf::default()).is_ok());
+    match (before, memory("VmHWM")) {
+        (Some(before), Some(most)) => {
+            println!("{width}×{height}  threshold map: {:.0} bytes a pixel", (most - before) / (width * height) as f64);
+        }
+        _ => println!("memory: only Linux tells"),
+    }
+}
+
 /// A plain real 2-D transform: rows, a transposition, columns; on all threads.
 fn fourier_transform(width: usize, height: usize) -> impl FnMut() {
     let rows = realfft::RealFftPlanner::<f32>::new().plan_fft_forward(width);
@@ -51,6 +74,7 @@ fn fourier_transform(width: usize, height: usize) -> impl FnMut() {
 }
 
 fn main() {
+    report_memory();
     for (width, height) in [(512, 512), (1920, 1080)] {
         let picture = Plane::from_fn(width, height, |x, y| {
             60.0 + 40.0 * ((x as f32 * 0.11).sin() * (y as f32 * 0.07).cos()) + ((x * 31 + y * 17) % 13) as f32

@@ -1,9 +1,10 @@
 //! What the eye is adapted to.
 
 use crate::error::{Error, check_range};
+use crate::filter::gaussian_blur;
 use crate::plane::Plane;
 use crate::sensitivity::LEAST_ADAPTATION_CD_M2;
-use crate::threshold::local_adaptation;
+use crate::threshold::POOLING_SIGMA_DEG;
 
 /// How luminances are averaged.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -51,10 +52,43 @@ pub fn local_adaptation_cd_m2(luminance_cd_m2: &Plane, pixels_per_degree: f64, m
         Mean::Geometric => {
             // The logarithm of the floor is the origin: the blur wants no negative numbers.
             let logs = luminance_cd_m2.map(|value| (value.max(LEAST_ADAPTATION_CD_M2) / LEAST_ADAPTATION_CD_M2).ln());
-            let sigma_px = crate::threshold::POOLING_SIGMA_DEG * pixels_per_degree;
-            crate::filter::gaussian_blur(&logs, sigma_px).map(|log| log.exp() * LEAST_ADAPTATION_CD_M2)
+            let sigma_px = POOLING_SIGMA_DEG * pixels_per_degree;
+            gaussian_blur(&logs, sigma_px).map(|log| log.exp() * LEAST_ADAPTATION_CD_M2)
         }
     })
+}
+
+/// Adaptation luminance: see [`crate::threshold_map`].
+pub(crate) fn local_adaptation(luminance_cd_m2: &Plane, pixels_per_degree: f64) -> Plane {
+    let steady = without_single_bright_pixels(luminance_cd_m2);
+    let mut adaptation = gaussian_blur(&steady, POOLING_SIGMA_DEG * pixels_per_degree);
+    adaptation.for_each_row_mut(|_, row| row.iter_mut().for_each(|value| *value = value.max(LEAST_ADAPTATION_CD_M2)));
+    adaptation
+}
+
+/// Every pixel lowered to the brightest of its eight neighbours where it exceeds them all.
+fn without_single_bright_pixels(plane: &Plane) -> Plane {
+    let (width, height) = (plane.width(), plane.height());
+    if width * height == 1 {
+        return plane.clone();
+    }
+    let mut result = Plane::filled(width, height, 0.0);
+    result.for_each_row_mut(|y, row| {
+        // The brightest neighbour of each pixel; 0 is below them all.
+        let raise = |row: &mut [f32], values: &[f32]| {
+            row.iter_mut().zip(values).for_each(|(brightest, value)| *brightest = brightest.max(*value));
+        };
+        for v in y.saturating_sub(1)..(y + 2).min(height) {
+            let line = plane.row(v);
+            raise(&mut row[1..], &line[..width - 1]);
+            raise(&mut row[..width - 1], &line[1..]);
+            if v != y {
+                raise(row, line);
+            }
+        }
+        row.iter_mut().zip(plane.row(y)).for_each(|(brightest, own)| *brightest = brightest.min(*own));
+    });
+    result
 }
 
 #[cfg(test)]

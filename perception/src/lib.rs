@@ -35,6 +35,7 @@
 pub mod adaptation;
 pub mod allocation;
 mod bands;
+pub mod colour;
 pub mod csf;
 pub mod difference;
 pub mod display;
@@ -50,6 +51,8 @@ pub mod opponent;
 pub mod photometry;
 mod plane;
 pub mod psychometric;
+mod reduced;
+mod rows;
 pub mod saliency;
 pub mod seen;
 mod sensitivity;

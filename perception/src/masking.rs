@@ -1,9 +1,10 @@
 //! Masking: how much a band's own contrast raises its threshold.
 
 use crate::bands::{OctaveBands, RadialTable};
-use crate::fft::{PictureTransform, Spectrum, enlarged, reduced_pixel as pixel, reduction};
+use crate::fft::{PictureTransform, Spectrum, reduced_pixel as pixel, reduced_size, reduction};
 use crate::filter::{erode, gaussian_blur};
 use crate::plane::Plane;
+use crate::reduced::ReducedPlane;
 use crate::sensitivity::BandTables;
 
 /// The threshold elevation is never taken to exceed this, whatever the contrast.
@@ -55,7 +56,7 @@ pub(crate) struct MaskSource<'a> {
     pub(crate) pixels_per_degree: f64,
 }
 
-/// Threshold elevation, 1 to 3, of one band at every pixel.
+/// Threshold elevation, 1 to 3, of one band, on a grid as fine as the band needs.
 ///
 /// The band's local contrast amplitude is √2 times its RMS over a Gaussian of a third of a wavelength (the band's
 /// signal itself crosses zero twice a wavelength), less the energy that the guide's own noise has there. It is then
@@ -67,18 +68,26 @@ pub(crate) fn band_elevation(
     band: usize,
     tables: &BandTables,
     elevation: &ElevationTable,
-) -> Plane {
+) -> ReducedPlane {
     let ppd = source.pixels_per_degree;
     let (width, height) = (source.coordinates.width(), source.coordinates.height());
     let gain = RadialTable::new(ppd, |freq| bands.mask_gain(band, freq));
     let limit_cpd = bands.limit_cpd(band);
     // A quarter more densely than the band needs: its energy is blurred next.
-    let factor = reduction(ppd, 1.25 * limit_cpd);
-    let wavelength_px = ppd / bands.center_cpd(band) / factor as f64;
-    let mut energy = source
-        .transform
-        .filtered_reduced(source.contrast, ppd, limit_cpd, factor, |freq| gain.at(freq))
-        .map(|amplitude| amplitude * amplitude);
+    let amplitude_factor = reduction(ppd, 1.25 * limit_cpd);
+    let amplitude =
+        source.transform.filtered_reduced(source.contrast, ppd, limit_cpd, amplitude_factor, |freq| gain.at(freq));
+    let wavelength_px = ppd / bands.center_cpd(band);
+    let mut blur_variance_px = (0.35 * wavelength_px).powi(2);
+    let (mut energy, factor) = if amplitude_factor == 1 {
+        // The variance of the window that halves.
+        blur_variance_px -= 0.5;
+        (halved_energy(&amplitude, width, height), 2)
+    } else {
+        let mut energy = amplitude;
+        energy.for_each_row_mut(|_, row| row.iter_mut().for_each(|value| *value *= *value));
+        (energy, amplitude_factor)
+    };
     if let Some(noise) = source.noise {
         let share = tables.mask_noise_share as f32;
         energy.for_each_row_mut(|y, row| {
@@ -87,7 +96,8 @@ pub(crate) fn band_elevation(
             }
         });
     }
-    let mut mask = gaussian_blur(&energy, 0.35 * wavelength_px);
+    let mut mask = gaussian_blur(&energy, blur_variance_px.max(0.0).sqrt() / factor as f64);
+    drop(energy);
     mask.for_each_row_mut(|y, row| {
         let coordinates = source.coordinates.row(pixel(y, factor, height));
         for (x, value) in row.iter_mut().enumerate() {
@@ -95,9 +105,28 @@ pub(crate) fn band_elevation(
             *value = 2.0 * value.max(0.0) * tables.center_sensitivity_squared.at(coordinate);
         }
     });
-    let mut elevated = erode(&mask, wavelength_px.round() as usize);
+    let mut elevated = erode(&mask, (wavelength_px / factor as f64).round() as usize);
     elevated.for_each_row_mut(|_, row| row.iter_mut().for_each(|value| *value = elevation.at(*value)));
-    enlarged(&elevated, factor, width, height)
+    ReducedPlane::new(elevated, factor, width, height)
+}
+
+/// The energy of an amplitude at every pixel (with a frame of one pixel, as [`PictureTransform::filtered_reduced`] gives it), at
+/// every other pixel: squares through a binomial window, since sampling them bare would alias.
+fn halved_energy(amplitude: &Plane, width: usize, height: usize) -> Plane {
+    const BINOMIAL: [f32; 3] = [0.25, 0.5, 0.25];
+    let mut energy = Plane::filled(reduced_size(width, 2), reduced_size(height, 2), 0.0);
+    energy.for_each_row_mut(|y, row| {
+        let mut squares = vec![0.0_f32; amplitude.width()];
+        for (offset, weight) in BINOMIAL.into_iter().enumerate() {
+            let source = amplitude.row((2 * y + offset).saturating_sub(2).min(amplitude.height() - 1));
+            squares.iter_mut().zip(source).for_each(|(sum, value)| *sum += weight * value * value);
+        }
+        for (x, value) in row.iter_mut().enumerate() {
+            let at = |offset: usize| squares[(2 * x + offset).saturating_sub(2).min(squares.len() - 1)];
+            *value = BINOMIAL[0] * at(0) + BINOMIAL[1] * at(1) + BINOMIAL[2] * at(2);
+        }
+    });
+    energy
 }
 
 /// Mean of the `factor` × `factor` pixels around a reduced sample.

@@ -1,6 +1,6 @@
 //! Motion: what moves over the picture, and what of it moves over the retina.
 
-use crate::csf::{DRIFT_DEG_S, FASTEST_PURSUIT_DEG_S, PURSUIT_GAIN};
+use crate::csf::{DRIFT_DEG_S, Daly98, FASTEST_PURSUIT_DEG_S, PURSUIT_GAIN};
 use crate::error::Error;
 use crate::plane::Plane;
 
@@ -68,6 +68,35 @@ pub fn image_velocity_deg_s(
         if speed.is_finite() { speed } else { 0.0 }
     });
     Ok(crate::filter::erode(&speed, 1))
+}
+
+/// Threshold elevation by motion of one frequency, against log retinal velocity.
+pub(crate) struct MotionTable {
+    entries: Vec<f32>,
+}
+
+impl MotionTable {
+    /// Steps a factor of 2 in velocity.
+    const STEPS_AN_OCTAVE: f32 = 8.0;
+
+    pub(crate) fn new(freq_cpd: f64) -> Self {
+        let rest = Daly98::default().ln_sensitivity(freq_cpd);
+        let entries = (0..=96)
+            .map(|index| {
+                let retinal_velocity_deg_s = DRIFT_DEG_S * (f64::from(index) / f64::from(Self::STEPS_AN_OCTAVE)).exp2();
+                let moving = Daly98 { retinal_velocity_deg_s }.ln_sensitivity(freq_cpd);
+                (rest - moving).exp().clamp(0.1, 20.0) as f32
+            })
+            .collect();
+        Self { entries }
+    }
+
+    pub(crate) fn at(&self, velocity_deg_s: f32) -> f32 {
+        let position = (velocity_deg_s / DRIFT_DEG_S as f32).max(1.0).log2() * Self::STEPS_AN_OCTAVE;
+        let index = (position as usize).min(self.entries.len() - 2);
+        let fraction = (position - index as f32).min(1.0);
+        self.entries[index] + fraction * (self.entries[index + 1] - self.entries[index])
+    }
 }
 
 #[cfg(test)]

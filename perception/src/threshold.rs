@@ -1,16 +1,16 @@
 //! The threshold map: how much error each pixel of a picture may have before it is seen.
 
+use crate::adaptation::local_adaptation;
 use crate::bands::OctaveBands;
-use crate::csf::{ContrastSensitivity, DRIFT_DEG_S, Daly98};
+use crate::csf::ContrastSensitivity;
 use crate::display::Viewing;
 use crate::error::Error;
 use crate::fft::PictureTransform;
-use crate::filter::gaussian_blur;
 use crate::masking::{ElevationTable, MaskSource, band_elevation};
+use crate::motion::MotionTable;
 use crate::plane::Plane;
-use crate::sensitivity::{
-    AdaptationLevel, LEAST_ADAPTATION_CD_M2, SensitivityTables, adaptation_levels, luminance_coordinate,
-};
+use crate::reduced::ReducedPlane;
+use crate::sensitivity::{AdaptationLevel, SensitivityTables, adaptation_levels, luminance_coordinate};
 
 /// Standard deviation of the windows over which the eye adapts and error is pooled, degrees: as wide as a disc of 1°.
 pub const POOLING_SIGMA_DEG: f64 = 0.25;
@@ -37,7 +37,7 @@ pub struct ThresholdMap {
     pub(crate) levels: Vec<AdaptationLevel>,
     pub(crate) adaptation_cd_m2: Plane,
     /// Threshold elevation of each band.
-    pub(crate) elevations: Vec<Plane>,
+    pub(crate) elevations: Vec<ReducedPlane>,
     pub(crate) noise_gain: Plane,
 }
 
@@ -99,12 +99,6 @@ pub fn chromatic_threshold_map(
     Ok(assemble(channel_cd_m2, None, adaptation_cd_m2, viewing, csf))
 }
 
-/// Adaptation luminance: see [`threshold_map`].
-pub(crate) fn local_adaptation(luminance_cd_m2: &Plane, pixels_per_degree: f64) -> Plane {
-    gaussian_blur(&without_single_bright_pixels(luminance_cd_m2), POOLING_SIGMA_DEG * pixels_per_degree)
-        .map(|value| value.max(LEAST_ADAPTATION_CD_M2))
-}
-
 /// Masks and noise gain of a signal, cd/m², under an adaptation luminance.
 fn assemble(
     signal_cd_m2: &Plane,
@@ -120,20 +114,22 @@ fn assemble(
 
     let transform = picture_transform(signal_cd_m2.width(), signal_cd_m2.height(), ppd);
     // Less its mean, which no band passes: the transform's precision is for the detail.
-    let contrast = ratio(signal_cd_m2, &adaptation_cd_m2, |value, adaptation| value / adaptation);
+    let mut contrast = ratio(signal_cd_m2, &adaptation_cd_m2, |value, adaptation| value / adaptation);
     let mean = contrast.mean() as f32;
-    let contrast = transform.forward(&contrast.map(|value| value - mean));
+    contrast.for_each_row_mut(|_, row| row.iter_mut().for_each(|value| *value -= mean));
+    let spectrum = transform.forward(&contrast);
+    drop(contrast);
     let noise = noise_variance
         .map(|variance| ratio(variance, &adaptation_cd_m2, |value, adaptation| value / adaptation / adaptation));
     let source = MaskSource {
         transform: &transform,
-        contrast: &contrast,
+        contrast: &spectrum,
         noise: noise.as_ref(),
         coordinates: &coordinates,
         pixels_per_degree: ppd,
     };
     let elevation = ElevationTable::new();
-    let elevations: Vec<Plane> = tables
+    let elevations: Vec<ReducedPlane> = tables
         .bands
         .iter()
         .enumerate()
@@ -188,7 +184,8 @@ impl ThresholdMap {
         let mut moved = self.clone();
         for (band, elevation) in moved.elevations.iter_mut().enumerate() {
             let table = MotionTable::new(self.bands.center_cpd(band));
-            *elevation = ratio(elevation, retinal_velocity_deg_s, |elevation, velocity| elevation * table.at(velocity));
+            *elevation =
+                elevation.change_by(retinal_velocity_deg_s, |elevation, velocity| elevation * table.at(velocity));
         }
         let coordinates = self.adaptation_cd_m2.map(luminance_coordinate);
         moved.noise_gain = noise_gain(&self.tables, &self.adaptation_cd_m2, &coordinates, Some(&moved.elevations));
@@ -214,35 +211,6 @@ impl ThresholdMap {
     }
 }
 
-/// Threshold elevation by motion of one frequency, against log retinal velocity.
-struct MotionTable {
-    entries: Vec<f32>,
-}
-
-impl MotionTable {
-    /// Steps a factor of 2 in velocity.
-    const STEPS_AN_OCTAVE: f32 = 8.0;
-
-    fn new(freq_cpd: f64) -> Self {
-        let rest = Daly98::default().ln_sensitivity(freq_cpd);
-        let entries = (0..=96)
-            .map(|index| {
-                let retinal_velocity_deg_s = DRIFT_DEG_S * (f64::from(index) / f64::from(Self::STEPS_AN_OCTAVE)).exp2();
-                let moving = Daly98 { retinal_velocity_deg_s }.ln_sensitivity(freq_cpd);
-                (rest - moving).exp().clamp(0.1, 20.0) as f32
-            })
-            .collect();
-        Self { entries }
-    }
-
-    fn at(&self, velocity_deg_s: f32) -> f32 {
-        let position = (velocity_deg_s / DRIFT_DEG_S as f32).max(1.0).log2() * Self::STEPS_AN_OCTAVE;
-        let index = (position as usize).min(self.entries.len() - 2);
-        let fraction = (position - index as f32).min(1.0);
-        self.entries[index] + fraction * (self.entries[index + 1] - self.entries[index])
-    }
-}
-
 /// The transform for pictures of this size at this resolution: one degree of mirror on each side, since contrast
 /// sensitivity reaches no further.
 pub(crate) fn picture_transform(width: usize, height: usize, pixels_per_degree: f64) -> PictureTransform {
@@ -264,17 +232,19 @@ fn noise_gain(
     tables: &SensitivityTables,
     adaptation_cd_m2: &Plane,
     coordinates: &Plane,
-    elevations: Option<&[Plane]>,
+    elevations: Option<&[ReducedPlane]>,
 ) -> Plane {
     let mut gain = Plane::filled(adaptation_cd_m2.width(), adaptation_cd_m2.height(), 0.0);
     gain.for_each_row_mut(|y, row| {
         let coordinates = coordinates.row(y);
+        let (mut buffer, mut elevation) = (Vec::new(), vec![0.0; row.len()]);
         // Band by band: each row of elevations is read in one go.
         for (band, tables) in tables.bands.iter().enumerate() {
             let energies = coordinates.iter().map(|&coordinate| tables.noise_energy.at(coordinate));
             match elevations {
                 Some(elevations) => {
-                    for (value, (energy, elevation)) in row.iter_mut().zip(energies.zip(elevations[band].row(y))) {
+                    elevations[band].row_into(y, &mut buffer, &mut elevation);
+                    for (value, (energy, elevation)) in row.iter_mut().zip(energies.zip(&elevation)) {
                         *value += energy / (elevation * elevation);
                     }
                 }
@@ -294,33 +264,6 @@ fn range(plane: &Plane) -> (f32, f32) {
         .values()
         .iter()
         .fold((f32::INFINITY, 0.0), |(least, greatest), &value| (least.min(value), greatest.max(value)))
-}
-
-/// Every pixel lowered to the brightest of its eight neighbours where it exceeds them all.
-fn without_single_bright_pixels(plane: &Plane) -> Plane {
-    let (width, height) = (plane.width(), plane.height());
-    if width * height == 1 {
-        return plane.clone();
-    }
-    let mut result = plane.clone();
-    result.for_each_row_mut(|y, row| {
-        let rows = [plane.row(y.saturating_sub(1)), plane.row(y), plane.row((y + 1).min(height - 1))];
-        for (x, value) in row.iter_mut().enumerate() {
-            let columns = x.saturating_sub(1)..(x + 2).min(width);
-            let mut brightest = 0.0_f32;
-            for (index, line) in rows.iter().enumerate() {
-                // At the top and bottom the row stands in for its missing neighbour, without the pixel itself.
-                let is_own = index == 1 || (index == 0 && y == 0) || (index == 2 && y + 1 == height);
-                for column in columns.clone() {
-                    if !(is_own && column == x) {
-                        brightest = brightest.max(line[column]);
-                    }
-                }
-            }
-            *value = value.min(brightest);
-        }
-    });
-    result
 }
 
 #[cfg(test)]

@@ -56,7 +56,9 @@ impl ThresholdMap {
                 .then(|| gaussian_blur(&relative, tables.spread_deg * self.viewing.display.pixels_per_degree));
             let spread = blurred.as_ref().unwrap_or(&relative);
             energy.for_each_row_mut(|y, row| {
-                let inputs = spread.row(y).iter().zip(elevation.row(y)).zip(coordinates.row(y));
+                let mut elevations = vec![0.0; row.len()];
+                elevation.row_into(y, &mut Vec::new(), &mut elevations);
+                let inputs = spread.row(y).iter().zip(&elevations).zip(coordinates.row(y));
                 for (value, ((spread, elevation), coordinate)) in row.iter_mut().zip(inputs) {
                     *value += spread * tables.noise_energy.at(*coordinate) / (elevation * elevation);
                 }
@@ -136,7 +138,8 @@ impl ThresholdMap {
                 });
             }
             response.for_each_row_mut(|y, row| {
-                let elevations = elevation.row(reduced_pixel(y, factor, height));
+                let mut elevations = vec![0.0; width];
+                elevation.row_into(reduced_pixel(y, factor, height), &mut Vec::new(), &mut elevations);
                 for (x, value) in row.iter_mut().enumerate() {
                     let visible = *value / elevations[reduced_pixel(x, factor, width)];
                     *value = visible * visible;

@@ -1,11 +1,12 @@
 //! Bolin and Meyer.
 
 use super::{ModelInputs, PerLuminance, ThresholdModel};
+use crate::adaptation::local_adaptation;
 use crate::error::Error;
 use crate::filter::gaussian_blur;
 use crate::masking::threshold_elevation;
 use crate::plane::Plane;
-use crate::threshold::{local_adaptation, ratio};
+use crate::threshold::ratio;
 
 /// After "A perceptually based adaptive sampling algorithm", SIGGRAPH 1998: the picture in Haar bands, each with its own
 /// contrast sensitivity and masked by its own contrast; samples go where the error of a band could be seen.

@@ -2,11 +2,11 @@
 
 use super::pyramid::{BANDS, band_contrasts, band_frequency_cpd};
 use super::{ModelInputs, PerLuminance, ThresholdModel, Z_95};
+use crate::adaptation::local_adaptation;
 use crate::csf::peak_sensitivity;
 use crate::error::Error;
 use crate::masking::threshold_elevation;
 use crate::plane::Plane;
-use crate::threshold::local_adaptation;
 use crate::tvi::{ThresholdBase, base_threshold_cd_m2};
 
 /// "A perceptually based physical error metric for realistic image synthesis", SIGGRAPH 1999: T = TVI(`L_a`) · F, where

@@ -1,9 +1,9 @@
 //! Threshold versus intensity alone.
 
 use super::{ModelInputs, PerLuminance, ThresholdModel, Z_95};
+use crate::adaptation::local_adaptation;
 use crate::error::Error;
 use crate::plane::Plane;
-use crate::threshold::local_adaptation;
 use crate::tvi::{ThresholdBase, base_threshold_cd_m2};
 
 /// The first idea: a pixel may err by what a large spot must differ from its background to be seen.

@@ -2,10 +2,10 @@
 
 use super::pyramid::{BANDS, band_contrasts, band_frequency_cpd};
 use super::{ModelInputs, PerLuminance, ThresholdModel, Z_95};
+use crate::adaptation::local_adaptation;
 use crate::csf::Daly98;
 use crate::error::Error;
 use crate::plane::Plane;
-use crate::threshold::local_adaptation;
 use crate::tvi::{ThresholdBase, base_threshold_cd_m2};
 
 /// "Spatiotemporal sensitivity and visual attention for efficient rendering of dynamic environments", ACM TOG 20(1),

@@ -1,0 +1,390 @@
+//! The dual updates, and the certificate at full resolution.
+
+use rayon::prelude::*;
+
+use super::{Allocation, AllocationProblem};
+use crate::error::{Error, check_range};
+use crate::filter::{dilate, gaussian_blur};
+use crate::plane::Plane;
+use crate::threshold::POOLING_SIGMA_DEG;
+
+/// Updates after which the multipliers are taken as they are; on a small grid, where they cost nothing, ten times more.
+const MOST_ITERATIONS: usize = 100;
+/// Multipliers of a small grid.
+const SMALL_GRID: usize = 4096;
+/// Gap on a small reduced grid at which to stop.
+const SMALL_GAP: f64 = 3e-3;
+/// The same on any other, where updates are dear.
+const ENOUGH_GAP: f64 = 5e-3;
+/// How often the gap is looked at.
+const CHECK_EVERY: usize = 5;
+/// Slack given to constraints that cannot be met.
+const UNREACHABLE_SLACK: f32 = 1.01;
+
+/// One problem, prepared.
+pub(super) struct Solver<'a> {
+    problem: &'a AllocationProblem<'a>,
+    /// w = 2 N σ² per pixel: what v² would be for one sample.
+    weight: Vec<f32>,
+    /// √(w / c): counts are this times √μ.
+    root: Vec<f32>,
+    sigma_px: f64,
+    /// Side of the blocks that share a multiplier.
+    block: usize,
+    blocks_x: usize,
+    blocks_y: usize,
+    /// What the pixels of each block come to.
+    blocks: Vec<BlockStatistics>,
+    /// v² reached with `max_samples` everywhere, over v*² = 1.
+    floor: Plane,
+    /// Σ cᵢ times `min_samples`.
+    pub(super) cheapest: f64,
+}
+
+impl<'a> Solver<'a> {
+    pub(super) fn new(problem: &'a AllocationProblem<'a>) -> Result<Self, Error> {
+        let gain = problem.thresholds.noise_gain();
+        let (width, height) = (gain.width(), gain.height());
+        for (what, plane) in [
+            ("variance per sample", Some(problem.variance_per_sample)),
+            ("cost", Some(problem.cost)),
+            ("tolerance", problem.tolerance),
+        ] {
+            if let Some(plane) = plane {
+                plane.check_size(what, width, height)?;
+                plane.check_non_negative(what)?;
+            }
+        }
+        const LIMITS: &str = "at least 1e-6, and min_samples at most max_samples, which is at most 1e12";
+        check_range("visibility", problem.visibility, 1e-9, 1e9, "between 1e-9 and 1e9")?;
+        check_range("min_samples", problem.min_samples, 1e-6, problem.max_samples, LIMITS)?;
+        check_range("max_samples", problem.max_samples, problem.min_samples, 1e12, LIMITS)?;
+        for (what, plane) in [("cost", Some(problem.cost)), ("tolerance", problem.tolerance)] {
+            if let Some(least) = plane.and_then(|plane| plane.values().iter().copied().reduce(f32::min)) {
+                check_range(what, f64::from(least), 1e-12, f64::MAX, "at least 1e-12 at every pixel")?;
+            }
+        }
+        // Bounded so that squares stay within f32; beyond it no count would do.
+        let weight: Vec<f32> = gain
+            .values()
+            .par_iter()
+            .zip(problem.variance_per_sample.values())
+            .map(|(gain, variance)| (2.0 * gain * variance).min(1e18))
+            .collect();
+        let root = weight.par_iter().zip(problem.cost.values()).map(|(weight, cost)| (weight / cost).sqrt()).collect();
+        let sigma_px = POOLING_SIGMA_DEG * problem.thresholds.viewing().display.pixels_per_degree;
+        let block = ((sigma_px / 4.0) as usize).clamp(1, 8);
+        let most = problem.max_samples as f32;
+        let at_most: Vec<f32> = weight.par_iter().map(|weight| weight / most).collect();
+        let floor = gaussian_blur(&Plane::from_values(width, height, at_most)?, sigma_px);
+        let total_cost: f64 = problem.cost.values().iter().map(|&cost| f64::from(cost)).sum();
+        let mut solver = Self {
+            problem,
+            weight,
+            root,
+            sigma_px,
+            block,
+            blocks_x: width.div_ceil(block),
+            blocks_y: height.div_ceil(block),
+            floor,
+            cheapest: total_cost * problem.min_samples,
+            blocks: Vec::new(),
+        };
+        solver.blocks = solver.block_statistics();
+        Ok(solver)
+    }
+
+    fn width(&self) -> usize {
+        self.floor.width()
+    }
+
+    fn height(&self) -> usize {
+        self.floor.height()
+    }
+
+    /// Largest v² allowed at each pixel, and how many had to be relaxed.
+    fn bounds(&self, visibility: f64) -> (Plane, usize) {
+        let target = (visibility * visibility) as f32;
+        let mut unreachable = 0;
+        let mut bounds = self.floor.clone();
+        let tolerance = self.problem.tolerance.map(Plane::values);
+        for (index, bound) in bounds.values_mut().iter_mut().enumerate() {
+            let wanted = tolerance.map_or(target, |tolerance| target * tolerance[index] * tolerance[index]);
+            // Rounding alone must not call a constraint unreachable.
+            if *bound > wanted * 1.000_01 {
+                unreachable += 1;
+            }
+            *bound = wanted.max(*bound * UNREACHABLE_SLACK).max(f32::MIN_POSITIVE);
+        }
+        (bounds, unreachable)
+    }
+
+    /// Multipliers that would be right if every pixel were alone: n = w / v*², so μ = c w / v*⁴.
+    pub(super) fn first_multipliers(&self, visibility: f64) -> Vec<f32> {
+        let scale = (visibility.powi(4)).recip() as f32;
+        let alone: Vec<f32> = self
+            .weight
+            .par_iter()
+            .zip(self.problem.cost.values())
+            .map(|(weight, cost)| (weight * cost * scale).clamp(1e-30, 1e30))
+            .collect();
+        self.block_means(&alone)
+    }
+
+    pub(super) fn solve(&self, visibility: f64, multipliers: &mut [f32]) -> Allocation {
+        let (bounds, unreachable_pixels) = self.bounds(visibility);
+        let coarse_bounds = self.block_means(bounds.values());
+        let sigma_blocks = self.sigma_px / self.block as f64;
+        let mut iterations = 0;
+        let mut best_bound = f64::NEG_INFINITY;
+        let mut best_multipliers = multipliers.to_vec();
+        let (most_iterations, enough_gap) = if multipliers.len() <= SMALL_GRID {
+            (10 * MOST_ITERATIONS, SMALL_GAP)
+        } else {
+            (MOST_ITERATIONS, ENOUGH_GAP)
+        };
+        for iteration in 1..=most_iterations {
+            iterations = iteration;
+            let price = self.blur_blocks(multipliers, sigma_blocks);
+            let noise = self.blur_blocks(&self.block_noise(&price), sigma_blocks);
+            if iteration % CHECK_EVERY == 0 {
+                let dual = self.coarse_dual(&price, multipliers, &coarse_bounds);
+                if dual.value > best_bound {
+                    best_bound = dual.value;
+                    best_multipliers.copy_from_slice(multipliers);
+                }
+                let worst = noise.iter().zip(&coarse_bounds).map(|(noise, bound)| noise / bound).fold(0.0, f32::max);
+                let feasible_cost = dual.cost * f64::from(worst.max(1.0));
+                if feasible_cost <= best_bound.max(self.cheapest) * (1.0 + enough_gap) {
+                    break;
+                }
+            }
+            for (multiplier, (noise, bound)) in multipliers.iter_mut().zip(noise.iter().zip(&coarse_bounds)) {
+                // λ ← λ · (v²/bound)³. Counts go as √μ and v² as 1/√μ, so the square would be Newton's step for a
+                // uniform picture and the fourth power the edge of stability; details, which pooling weakens, want
+                // more than the square.
+                let excess = noise / bound;
+                let step = (excess * excess * excess).clamp(1e-3, 1e3);
+                *multiplier = (*multiplier * step).clamp(1e-30, 1e30);
+            }
+        }
+        multipliers.copy_from_slice(&best_multipliers);
+        let mut allocation = self.certified(multipliers, &bounds, iterations);
+        allocation.visibility = visibility;
+        allocation.unreachable_pixels = unreachable_pixels;
+        allocation
+    }
+
+    /// Counts at full resolution that meet every constraint, and the lower bound that the multipliers prove there.
+    fn certified(&self, multipliers: &[f32], bounds: &Plane, iterations: usize) -> Allocation {
+        let lambda = self.spread_over_blocks(multipliers);
+        let price = gaussian_blur(&lambda, self.sigma_px);
+        let (least, most) = (self.problem.min_samples as f32, self.problem.max_samples as f32);
+        let mut samples = Plane::from_fn(self.width(), self.height(), |x, y| {
+            let index = y * self.width() + x;
+            (self.root[index] * price.values()[index].sqrt()).clamp(least, most)
+        });
+        let mut lower_bound = 0.0;
+        for (index, &count) in samples.values().iter().enumerate() {
+            let cost = f64::from(self.problem.cost.values()[index]);
+            lower_bound += cost * f64::from(count)
+                + f64::from(self.weight[index]) * f64::from(price.values()[index]) / f64::from(count)
+                - f64::from(lambda.values()[index]) * f64::from(bounds.values()[index]);
+        }
+        self.repair(&mut samples, bounds);
+        let cost = samples
+            .values()
+            .iter()
+            .zip(self.problem.cost.values())
+            .map(|(count, cost)| f64::from(*count) * f64::from(*cost))
+            .sum::<f64>();
+        // The fewest samples everywhere are a bound too.
+        let lower_bound = lower_bound.max(self.cheapest);
+        let gap = (cost / lower_bound - 1.0).max(0.0);
+        Allocation { samples, cost, lower_bound, gap, visibility: 0.0, unreachable_pixels: 0, iterations }
+    }
+
+    /// Raises counts around violated constraints until none is left.
+    fn repair(&self, samples: &mut Plane, bounds: &Plane) {
+        let most = self.problem.max_samples as f32;
+        let least = self.problem.min_samples as f32;
+        let reach = (2.0 * self.sigma_px).ceil() as usize;
+        for _ in 0..12 {
+            let excess = self.excess(samples, bounds);
+            let worst = excess.values().iter().copied().fold(0.0, f32::max);
+            if worst <= 1.0 {
+                return;
+            }
+            // The last per cent is cheaper paid by all than looked for.
+            let factor = if worst < 1.001 {
+                Plane::filled(self.width(), self.height(), worst * 1.000_01)
+            } else {
+                dilate(&excess.map(|excess| excess.max(1.0)), reach)
+            };
+            for (count, factor) in samples.values_mut().iter_mut().zip(factor.values()) {
+                *count = (*count * factor).clamp(least, most);
+            }
+        }
+    }
+
+    /// v² over its bound at every pixel.
+    fn excess(&self, samples: &Plane, bounds: &Plane) -> Plane {
+        let noise: Vec<f32> =
+            self.weight.par_iter().zip(samples.values()).map(|(weight, count)| weight / count).collect();
+        let noise = Plane::from_values(self.width(), self.height(), noise)
+            .unwrap_or_else(|_| Plane::filled(self.width(), self.height(), f32::INFINITY));
+        let mut excess = gaussian_blur(&noise, self.sigma_px);
+        excess.for_each_row_mut(|y, row| {
+            row.iter_mut().zip(bounds.row(y)).for_each(|(value, bound)| *value /= bound);
+        });
+        excess
+    }
+
+    /// Mean of w/n over each block, with the counts that `price` asks for.
+    fn block_noise(&self, price: &[f32]) -> Vec<f32> {
+        self.over_blocks(|block| {
+            let root_price = price[block].sqrt();
+            let statistics = &self.blocks[block];
+            match self.limit_of(block, root_price) {
+                Limits::None => statistics.root_weight_cost / root_price,
+                Limits::All(count) => statistics.weight / count,
+                Limits::Some => self.block_mean(block, |index| self.weight[index] / self.count(index, root_price)),
+            }
+        })
+    }
+
+    fn coarse_dual(&self, price: &[f32], multipliers: &[f32], bounds: &[f32]) -> CoarseDual {
+        // Cost and noise of each block, in the order of the blocks: the sum is the same on any number of threads.
+        let noise = self.block_noise(price);
+        let costs = self.over_blocks(|block| {
+            let root_price = price[block].sqrt();
+            let statistics = &self.blocks[block];
+            match self.limit_of(block, root_price) {
+                Limits::None => statistics.root_weight_cost * root_price,
+                Limits::All(count) => statistics.cost * count,
+                Limits::Some => {
+                    self.block_mean(block, |index| self.problem.cost.values()[index] * self.count(index, root_price))
+                }
+            }
+        });
+        let mut dual = CoarseDual { value: 0.0, cost: 0.0 };
+        for (block, (cost, noise)) in costs.iter().zip(&noise).enumerate() {
+            let pixels = self.pixels_in(block) as f64;
+            let lagrangian = f64::from(*cost) + f64::from(price[block]) * f64::from(*noise)
+                - f64::from(multipliers[block]) * f64::from(bounds[block]);
+            dual.value += pixels * lagrangian;
+            dual.cost += pixels * f64::from(*cost);
+        }
+        dual
+    }
+
+    /// Samples of a pixel where the square root of its price is `root_price`.
+    fn count(&self, index: usize, root_price: f32) -> f32 {
+        (self.root[index] * root_price).clamp(self.problem.min_samples as f32, self.problem.max_samples as f32)
+    }
+
+    /// Which pixels of a block a limit holds at `root_price`.
+    fn limit_of(&self, block: usize, root_price: f32) -> Limits {
+        let (least, most) = (self.problem.min_samples as f32, self.problem.max_samples as f32);
+        let statistics = &self.blocks[block];
+        let (fewest, greatest) = (statistics.least_root * root_price, statistics.greatest_root * root_price);
+        if fewest >= least && greatest <= most {
+            Limits::None
+        } else if greatest <= least {
+            Limits::All(least)
+        } else if fewest >= most {
+            Limits::All(most)
+        } else {
+            Limits::Some
+        }
+    }
+
+    fn pixels_in(&self, block: usize) -> usize {
+        let (bx, by) = (block % self.blocks_x, block / self.blocks_x);
+        (self.width() - bx * self.block).min(self.block) * (self.height() - by * self.block).min(self.block)
+    }
+
+    /// `value_of(block index)` for every block.
+    fn over_blocks<T: Send>(&self, value_of: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+        let least = (4096 / (self.block * self.block)).max(1);
+        (0..self.blocks_x * self.blocks_y).into_par_iter().with_min_len(least).map(value_of).collect()
+    }
+
+    /// Calls `visit(pixel index)` for every pixel of a block.
+    fn for_each_in(&self, block: usize, mut visit: impl FnMut(usize)) {
+        let (bx, by) = (block % self.blocks_x, block / self.blocks_x);
+        let columns = bx * self.block..((bx + 1) * self.block).min(self.width());
+        for y in by * self.block..((by + 1) * self.block).min(self.height()) {
+            for x in columns.clone() {
+                visit(y * self.width() + x);
+            }
+        }
+    }
+
+    /// Mean of `value_at(pixel index)` over a block.
+    fn block_mean(&self, block: usize, value_at: impl Fn(usize) -> f32) -> f32 {
+        let mut sum = 0.0;
+        self.for_each_in(block, |index| sum += value_at(index));
+        sum / self.pixels_in(block) as f32
+    }
+
+    fn block_statistics(&self) -> Vec<BlockStatistics> {
+        self.over_blocks(|block| {
+            let mut statistics = BlockStatistics {
+                weight: self.block_mean(block, |index| self.weight[index]),
+                cost: self.block_mean(block, |index| self.problem.cost.values()[index]),
+                // √(w/c) · c
+                root_weight_cost: self.block_mean(block, |index| self.root[index] * self.problem.cost.values()[index]),
+                least_root: f32::INFINITY,
+                greatest_root: 0.0,
+            };
+            self.for_each_in(block, |index| {
+                statistics.least_root = statistics.least_root.min(self.root[index]);
+                statistics.greatest_root = statistics.greatest_root.max(self.root[index]);
+            });
+            statistics
+        })
+    }
+
+    fn block_means(&self, values: &[f32]) -> Vec<f32> {
+        self.over_blocks(|block| self.block_mean(block, |index| values[index]))
+    }
+
+    fn blur_blocks(&self, values: &[f32], sigma_blocks: f64) -> Vec<f32> {
+        match Plane::from_values(self.blocks_x, self.blocks_y, values.to_vec()) {
+            Ok(plane) => gaussian_blur(&plane, sigma_blocks).into_values(),
+            Err(_) => values.to_vec(),
+        }
+    }
+
+    fn spread_over_blocks(&self, values: &[f32]) -> Plane {
+        Plane::from_fn(self.width(), self.height(), |x, y| values[(y / self.block) * self.blocks_x + x / self.block])
+    }
+}
+
+/// What the pixels of one block come to: as long as no count meets a limit, noise and cost need no more than this.
+struct BlockStatistics {
+    /// Mean of w.
+    weight: f32,
+    /// Mean of c.
+    cost: f32,
+    /// Mean of √(w c).
+    root_weight_cost: f32,
+    /// Least and greatest √(w / c).
+    least_root: f32,
+    greatest_root: f32,
+}
+
+/// Which of a block's counts stand at a limit.
+enum Limits {
+    None,
+    /// All, at this count.
+    All(f32),
+    Some,
+}
+
+/// Value of the dual function on the reduced grid, and what its counts cost.
+struct CoarseDual {
+    value: f64,
+    cost: f64,
+}

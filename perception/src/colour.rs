@@ -1,0 +1,137 @@
+//! Visibility of colour errors: over the achromatic, red–green and yellow–violet channels the largest counts.
+
+use crate::csf::{CastleChromatic, CastleCsf, ChromaticChannel};
+use crate::display::Viewing;
+use crate::error::Error;
+use crate::opponent::{Opponent, opponent};
+use crate::plane::Plane;
+use crate::threshold::{ThresholdInputs, ThresholdMap, chromatic_threshold_map, threshold_map};
+
+/// Thresholds of one picture in each of the eye's three channels.
+#[derive(Clone, Debug)]
+pub struct ColourThresholds {
+    /// Luminance.
+    pub achromatic: ThresholdMap,
+    /// L − M.
+    pub red_green: ThresholdMap,
+    /// S − (L + M).
+    pub yellow_violet: ThresholdMap,
+}
+
+/// Finds the thresholds of a displayed picture (linear Rec. 709 RGB in cd/m², row-major, denoised) for errors of any colour, with
+/// castleCSF for the observer's area.
+///
+/// # Errors
+/// [`Error::ValueCount`] unless there are `width * height` pixels; else as [`threshold_map`].
+///
+/// ```
+/// use fechner_perception::Viewing;
+/// use fechner_perception::colour::colour_thresholds;
+/// let grey = vec![[80.0; 3]; 64 * 64];
+/// let thresholds = colour_thresholds(&grey, 64, 64, &Viewing::default())?;
+/// let error = vec![[0.5; 3]; 64 * 64];
+/// assert!(thresholds.measured_visibility(&error)?.get(32, 32).is_finite());
+/// # Ok::<(), fechner_perception::Error>(())
+/// ```
+pub fn colour_thresholds(
+    display_rgb_cd_m2: &[[f32; 3]],
+    width: usize,
+    height: usize,
+    viewing: &Viewing,
+) -> Result<ColourThresholds, Error> {
+    viewing.check()?;
+    let picture = Channels::new(display_rgb_cd_m2, width, height)?;
+    let area_deg2 = viewing.observer.csf_area_deg2;
+    let luminance = picture.achromatic.map(|value| if value < 0.0 { 0.0 } else { value });
+    let chromatic = |signal: &Plane, channel: ChromaticChannel| {
+        chromatic_threshold_map(signal, &luminance, viewing, &CastleChromatic::new(channel, area_deg2)?)
+    };
+    Ok(ColourThresholds {
+        achromatic: threshold_map(
+            &ThresholdInputs { display_luminance_cd_m2: &luminance, guide_variance: None },
+            viewing,
+            &CastleCsf::new(area_deg2)?,
+        )?,
+        red_green: chromatic(&picture.red_green, ChromaticChannel::RedGreen)?,
+        yellow_violet: chromatic(&picture.yellow_violet, ChromaticChannel::YellowViolet)?,
+    })
+}
+
+impl ColourThresholds {
+    /// Visibility at each pixel of the error that two halves of a picture show, half their difference in linear Rec. 709 RGB
+    /// on the display, cd/m²: the greatest over the three channels (see [`ThresholdMap::measured_visibility`]).
+    ///
+    /// # Errors
+    /// [`Error::ValueCount`] for an error of another size.
+    pub fn measured_visibility(&self, half_difference_rgb: &[[f32; 3]]) -> Result<Plane, Error> {
+        let error = Channels::new(half_difference_rgb, self.achromatic.width(), self.achromatic.height())?;
+        let mut greatest = self.achromatic.measured_visibility(&error.achromatic);
+        for other in [
+            self.red_green.measured_visibility(&error.red_green),
+            self.yellow_violet.measured_visibility(&error.yellow_violet),
+        ] {
+            greatest.values_mut().iter_mut().zip(other.values()).for_each(|(v, other)| *v = v.max(*other));
+        }
+        Ok(greatest)
+    }
+}
+
+/// A picture's opponent signals, cd/m².
+struct Channels {
+    achromatic: Plane,
+    red_green: Plane,
+    yellow_violet: Plane,
+}
+
+impl Channels {
+    fn new(rgb_cd_m2: &[[f32; 3]], width: usize, height: usize) -> Result<Self, Error> {
+        if width.checked_mul(height) != Some(rgb_cd_m2.len()) {
+            return Err(Error::ValueCount { width, height, found: rgb_cd_m2.len() });
+        }
+        let plane = |signal: fn(Opponent) -> f32| {
+            Plane::from_fn(width, height, |x, y| signal(opponent(rgb_cd_m2[y * width + x])))
+        };
+        Ok(Self {
+            achromatic: plane(|colour| colour.achromatic),
+            red_green: plane(|colour| colour.red_green),
+            yellow_violet: plane(|colour| colour.yellow_violet),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_noise::normal;
+
+    const SIDE: usize = 128;
+
+    fn noise(of: impl Fn(f32) -> [f32; 3]) -> Vec<[f32; 3]> {
+        let mut state = 11;
+        (0..SIDE * SIDE).map(|_| of(normal(&mut state))).collect()
+    }
+
+    #[test]
+    fn noise_of_constant_luminance_is_seen() {
+        let grey = vec![[100.0; 3]; SIDE * SIDE];
+        let thresholds = colour_thresholds(&grey, SIDE, SIDE, &Viewing::default()).unwrap();
+        // Red up and green down by the same luminance.
+        let error = noise(|value| [40.0 * value, -40.0 * value * 0.2126 / 0.7152, 0.0]);
+        let luminance = Plane::from_fn(SIDE, SIDE, |x, y| opponent(error[y * SIDE + x]).achromatic);
+        let missed = thresholds.achromatic.measured_visibility(&luminance).get(64, 64);
+        let seen = thresholds.measured_visibility(&error).unwrap().get(64, 64);
+        assert!(missed < 1e-3 && seen > 1.0, "luminance {missed}, all channels {seen}");
+    }
+
+    #[test]
+    fn grey_noise_is_as_visible_as_its_luminance() {
+        let grey = vec![[100.0; 3]; SIDE * SIDE];
+        let thresholds = colour_thresholds(&grey, SIDE, SIDE, &Viewing::default()).unwrap();
+        let error = noise(|value| [3.0 * value; 3]);
+        let luminance = Plane::from_fn(SIDE, SIDE, |x, y| opponent(error[y * SIDE + x]).achromatic);
+        let alone = thresholds.achromatic.measured_visibility(&luminance).get(64, 64);
+        let all = thresholds.measured_visibility(&error).unwrap().get(64, 64);
+        assert!((all / alone - 1.0).abs() < 1e-5, "{all} {alone}");
+        assert!(thresholds.measured_visibility(&error[1..]).is_err());
+    }
+}
