@@ -12,6 +12,7 @@ use super::builder::{Builder, IfDark, NamedCamera};
 use super::error::LoadError;
 use super::{LoadOptions, files};
 use crate::scene::{Camera, Instance, Light, MaterialId, Mesh, MeshId, Scene};
+use ::gltf::json::validation::Checked;
 use ::gltf::mesh::{Mode, Semantic};
 use glam::{Affine3A, Mat4, Vec2, Vec3, Vec4};
 use std::collections::HashMap;
@@ -95,7 +96,27 @@ fn parse(path: &Path, json: &[u8], builder: &mut Builder) -> Result<::gltf::Docu
     if !version.starts_with("2.") {
         return Err(LoadError::unsupported(path, format_args!("glTF version {version}; version 2 is read")));
     }
+    check_positions(path, &root)?;
     ::gltf::Document::from_json(root).map_err(|error| LoadError::invalid(path, format_args!("not valid glTF: {error}")))
+}
+
+/// Refuses primitives whose positions are in an accessor that is not there: the crate's own validation looks at the
+/// accessor's range before it looks whether it exists, and panics (gltf-json 1.4.1, found by damaging a file).
+fn check_positions(path: &Path, root: &::gltf::json::Root) -> Result<(), LoadError> {
+    let positions = Checked::Valid(Semantic::Positions);
+    for (mesh_number, mesh) in root.meshes.iter().enumerate() {
+        for primitive in &mesh.primitives {
+            let accessor = primitive.attributes.get(&positions).map(::gltf::json::Index::value);
+            if let Some(accessor) = accessor.filter(|&a| a >= root.accessors.len()) {
+                let count = root.accessors.len();
+                return Err(LoadError::invalid(
+                    path,
+                    format_args!("mesh {mesh_number} has its positions in accessor {accessor}, but there are {count}"),
+                ));
+            }
+        }
+    }
+    Ok(())
 }
 
 struct Reader<'a> {
