@@ -106,7 +106,7 @@ impl<'a> Judge<'a> {
     }
 
     /// Mean samples a pixel of the convex optimum at visibility 1 with the variance that the reference's halves show, pooled
-    /// over a Gaussian of 0.25°: what no rule with these thresholds can do better than.
+    /// over a Gaussian of 0.25°. A rule that uses variance finer than that could do better, by as much as it varies there.
     fn oracle(&self) -> Result<f64> {
         let halves = &self.reference.halves;
         let half_difference = combine(&halves[0], &halves[1], |a, b| 0.5 * (a - b));
