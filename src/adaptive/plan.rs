@@ -12,7 +12,7 @@ use fechner_perception::Plane;
 use fechner_perception::allocation::{AllocationProblem, allocate};
 
 /// Doublings that one plan gives a pixel at most: its variance, and what stratification makes of it, are looked at again
-/// in between. With 2, the Cornell box ended at visibility 1.74 where 2 was asked for.
+/// in between, since stratification pays more the more samples there are.
 const MOST_DOUBLINGS_AT_ONCE: u32 = 1;
 
 /// The first samples of every pixel: 8 + 8, or as many as `max_samples` allows.

@@ -53,7 +53,8 @@ impl Bounds {
     }
 }
 
-struct Boxed(Aabb);
+/// A padded box.
+pub struct Boxed(Aabb);
 
 impl Boundable for Boxed {
     fn aabb(&self) -> Aabb {
@@ -81,17 +82,56 @@ pub trait PrimitiveTree: Sized {
     fn any(&self, origin: Vec3A, direction: Vec3A, t_max: f32, test: impl FnMut(usize, f32) -> f32) -> bool;
 }
 
-/// Eight-wide compressed tree: for triangles, in coordinates of hundreds of units (hazard 2).
-pub struct WideTree {
-    tree: CwBvh,
+/// A tree of obvhs with the order of its primitives.
+pub struct ObvhsTree<B> {
+    tree: B,
     order: Vec<u32>,
 }
 
+/// Eight-wide compressed tree: for triangles, in coordinates of hundreds of units (hazard 2).
+pub type WideTree = ObvhsTree<CwBvh>;
+
 /// Binary tree: for few large things such as instances, in any coordinates.
-pub struct BinaryTree {
-    tree: Bvh2,
-    order: Vec<u32>,
+pub type BinaryTree = ObvhsTree<Bvh2>;
+
+/// What obvhs's two trees have in common, under one name.
+pub trait Backend: Sized {
+    /// Builds over boxes.
+    fn build(boxes: &[Boxed], params: BvhBuildParams) -> Self;
+    /// Indices of the boxes in tree order.
+    fn indices(&self) -> &[u32];
+    /// Closest hit.
+    fn traverse(&self, ray: TreeRay, hit: &mut RayHit, test: impl FnMut(&TreeRay, usize) -> f32) -> bool;
+    /// Whether nothing is hit.
+    fn misses(&self, ray: TreeRay, test: impl FnMut(&TreeRay, usize) -> f32) -> bool;
 }
+
+macro_rules! backend {
+    ($tree:ty, $build:path) => {
+        impl Backend for $tree {
+            fn build(boxes: &[Boxed], params: BvhBuildParams) -> Self {
+                $build(boxes, params, &mut Duration::default())
+            }
+
+            fn indices(&self) -> &[u32] {
+                &self.primitive_indices
+            }
+
+            #[inline]
+            fn traverse(&self, ray: TreeRay, hit: &mut RayHit, test: impl FnMut(&TreeRay, usize) -> f32) -> bool {
+                self.ray_traverse(ray, hit, test)
+            }
+
+            #[inline]
+            fn misses(&self, ray: TreeRay, test: impl FnMut(&TreeRay, usize) -> f32) -> bool {
+                self.ray_traverse_miss(ray, test)
+            }
+        }
+    };
+}
+
+backend!(CwBvh, build_cwbvh);
+backend!(Bvh2, build_bvh2);
 
 /// Boxes that may be built with, and their primitive numbers.
 struct Input {
@@ -129,11 +169,11 @@ fn original_numbers(tree_indices: &[u32], numbers: &[u32]) -> Vec<u32> {
     tree_indices.iter().map(|&i| numbers[i as usize]).collect()
 }
 
-impl PrimitiveTree for WideTree {
+impl<B: Backend> PrimitiveTree for ObvhsTree<B> {
     fn build(bounds: &[Bounds]) -> Self {
         let input = prepare(bounds);
-        let tree = build_cwbvh(&input.boxes, input.params, &mut Duration::default());
-        let order = original_numbers(&tree.primitive_indices, &input.numbers);
+        let tree = B::build(&input.boxes, input.params);
+        let order = original_numbers(tree.indices(), &input.numbers);
         Self { tree, order }
     }
 
@@ -151,49 +191,13 @@ impl PrimitiveTree for WideTree {
     ) -> Option<(usize, f32)> {
         let mut hit = RayHit::none();
         let ray = TreeRay::new(origin, direction, 0.0, t_max);
-        self.tree
-            .ray_traverse(ray, &mut hit, |ray, id| test(id, ray.tmax))
-            .then_some((hit.primitive_id as usize, hit.t))
+        self.tree.traverse(ray, &mut hit, |ray, id| test(id, ray.tmax)).then_some((hit.primitive_id as usize, hit.t))
     }
 
     #[inline]
     fn any(&self, origin: Vec3A, direction: Vec3A, t_max: f32, mut test: impl FnMut(usize, f32) -> f32) -> bool {
         let ray = TreeRay::new(origin, direction, 0.0, t_max);
-        !self.tree.ray_traverse_miss(ray, |ray, id| test(id, ray.tmax))
-    }
-}
-
-impl PrimitiveTree for BinaryTree {
-    fn build(bounds: &[Bounds]) -> Self {
-        let input = prepare(bounds);
-        let tree = build_bvh2(&input.boxes, input.params, &mut Duration::default());
-        let order = original_numbers(&tree.primitive_indices, &input.numbers);
-        Self { tree, order }
-    }
-
-    fn order(&self) -> &[u32] {
-        &self.order
-    }
-
-    #[inline]
-    fn closest(
-        &self,
-        origin: Vec3A,
-        direction: Vec3A,
-        t_max: f32,
-        mut test: impl FnMut(usize, f32) -> f32,
-    ) -> Option<(usize, f32)> {
-        let mut hit = RayHit::none();
-        let ray = TreeRay::new(origin, direction, 0.0, t_max);
-        self.tree
-            .ray_traverse(ray, &mut hit, |ray, id| test(id, ray.tmax))
-            .then_some((hit.primitive_id as usize, hit.t))
-    }
-
-    #[inline]
-    fn any(&self, origin: Vec3A, direction: Vec3A, t_max: f32, mut test: impl FnMut(usize, f32) -> f32) -> bool {
-        let ray = TreeRay::new(origin, direction, 0.0, t_max);
-        !self.tree.ray_traverse_miss(ray, |ray, id| test(id, ray.tmax))
+        !self.tree.misses(ray, |ray, id| test(id, ray.tmax))
     }
 }
 
