@@ -21,8 +21,8 @@ pub(super) struct Collapsed {
     pub(super) order: Vec<u32>,
     /// `None` where there is nothing.
     pub(super) root: Option<Child>,
-    /// Nodes on the longest way from the root to a leaf.
-    pub(super) depth: usize,
+    /// Most children that wait while a walk is at the bottom: those beside the way from the root, added up.
+    pub(super) waiting: usize,
 }
 
 /// Builds over boxes; those that are not finite are left out.
@@ -65,7 +65,7 @@ impl<'a> Collapser<'a> {
                 blocks: Vec::new(),
                 order: Vec::with_capacity(built.numbers.len()),
                 root: None,
-                depth: 0,
+                waiting: 0,
             },
         }
     }
@@ -109,22 +109,23 @@ impl<'a> Collapser<'a> {
         }
         self.out.nodes.push(Node::EMPTY);
         self.out.root = Some(Child::node(0));
-        let mut open = vec![(0u32, 0usize, 1usize)];
+        let mut open = vec![(0u32, 0usize, 0usize)];
         let mut members = Vec::with_capacity(LANES);
-        while let Some((index, place, depth)) = open.pop() {
-            self.out.depth = self.out.depth.max(depth);
+        while let Some((index, place, waiting)) = open.pop() {
             members.clear();
             let node = &self.binary.nodes[index as usize];
             let split = self.choices[index as usize].left[0];
             self.gather(node.first_index, split, &mut members);
             self.gather(node.first_index + 1, LANES as u8 - split, &mut members);
+            let waiting = waiting + members.len() - 1;
+            self.out.waiting = self.out.waiting.max(waiting);
             for (slot, &member) in members.iter().enumerate() {
                 let child = if self.becomes_leaf(member) {
                     self.emit_block(member)
                 } else {
                     let place = self.out.nodes.len();
                     self.out.nodes.push(Node::EMPTY);
-                    open.push((member, place, depth + 1));
+                    open.push((member, place, waiting));
                     Child::node(place)
                 };
                 let aabb = self.binary.nodes[member as usize].aabb();

@@ -155,7 +155,7 @@ pub(super) struct WideHit {
 }
 
 /// Entries of the stack that are kept off the heap.
-const STACK: usize = 128;
+const STACK: usize = 96;
 
 /// See the module.
 pub(super) struct WideTree {
@@ -173,12 +173,19 @@ impl WideTree {
     /// Builds over triangles; those whose entry in `bounds` is not finite are left out.
     pub(super) fn build(triangles: &[[Vec3A; 3]], bounds: &[Bounds], references: &[TriangleRef]) -> Self {
         let cut = collapse::build(bounds);
+        eprintln!(
+            "waiting {} nodes {} blocks {} fill {}",
+            cut.waiting,
+            cut.nodes.len(),
+            cut.blocks.len(),
+            triangles.len() as f32 / cut.blocks.len() as f32
+        );
         let mut tree = Self {
             nodes: cut.nodes,
             blocks: vec![Block::EMPTY; cut.blocks.len()],
             references: vec![TriangleRef::NONE; cut.blocks.len() * LANES],
             root: cut.root,
-            stack_need: cut.depth * (LANES - 1) + 1,
+            stack_need: cut.waiting,
             path: Path::best(),
         };
         for (index, range) in cut.blocks.iter().enumerate() {
@@ -501,9 +508,9 @@ mod tests {
         let tree = build(&triangles);
         let mut seen = vec![0; triangles.len()];
         let everywhere = Bounds { min: Vec3A::NEG_INFINITY, max: Vec3A::INFINITY };
-        let mut open = vec![(tree.root.expect("not empty"), everywhere, 1)];
-        while let Some((child, bounds, depth)) = open.pop() {
-            assert!(depth * (LANES - 1) <= tree.stack_need + LANES, "depth {depth}");
+        let mut open = vec![(tree.root.expect("not empty"), everywhere, 0)];
+        while let Some((child, bounds, waiting)) = open.pop() {
+            assert!(waiting <= tree.stack_need, "{waiting} children wait");
             let index = (child.0 & !Child::LEAF) as usize;
             if child.0 & Child::LEAF != 0 {
                 for lane in 0..LANES {
@@ -518,12 +525,14 @@ mod tests {
                 continue;
             }
             let node = &tree.nodes[index];
-            for slot in (0..LANES).filter(|&slot| node.planes[0][slot] <= node.planes[1][slot]) {
+            let slots = (0..LANES).filter(|&slot| node.planes[0][slot] <= node.planes[1][slot]);
+            let waiting = waiting + slots.clone().count() - 1;
+            for slot in slots {
                 let plane = |row: usize| node.planes[row][slot];
                 let min = vec3a(plane(0), plane(2), plane(4));
                 let max = vec3a(plane(1), plane(3), plane(5));
                 assert!(min.cmpge(bounds.min).all() && max.cmple(bounds.max).all());
-                open.push((node.children[slot], Bounds { min, max }, depth + 1));
+                open.push((node.children[slot], Bounds { min, max }, waiting));
             }
         }
         assert!(seen.iter().all(|&times| times == 1));
