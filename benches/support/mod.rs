@@ -1,12 +1,19 @@
-//! What the speed benches share: a generated cave of any number of triangles, and a clock that other programs' work does
-//! not advance.
+//! What the speed benches share: scenes, and clocks that other programs' work does not advance.
 
+#![allow(dead_code, reason = "each bench uses a part")]
+
+pub(crate) mod peer;
+
+use anyhow::Result;
+use fechner::scene::load::{LoadOptions, load, shapes};
 use fechner::scene::{
-    Alpha, Camera, ColorInput, FilmDefaults, Instance, Material, MaterialId, Mesh, MeshId, Scene, Surface,
-    ViewingDefaults,
+    Alpha, Camera, ColorInput, Encoding, FilmDefaults, Instance, Material, MaterialId, Mesh, MeshId, Scene, Surface,
+    Texels, Texture, TextureId, TextureLookup, ViewingDefaults, Wrap,
 };
 use glam::{Affine3A, Vec2, Vec3};
 use rustix::time::{ClockId, clock_gettime};
+use std::path::Path;
+use std::sync::Arc;
 
 /// CPU time of the thread that asks: what other programs on the machine do does not count (their use of the caches does).
 pub(crate) struct ThreadClock(f64);
@@ -28,6 +35,26 @@ impl ThreadClock {
     }
 }
 
+/// CPU time of all threads of this program.
+pub(crate) struct ProcessClock(f64);
+
+impl ProcessClock {
+    /// Starts now.
+    pub(crate) fn start() -> Self {
+        Self(Self::now())
+    }
+
+    /// Seconds since the start.
+    pub(crate) fn seconds(&self) -> f64 {
+        Self::now() - self.0
+    }
+
+    fn now() -> f64 {
+        let time = clock_gettime(ClockId::ProcessCPUTime);
+        time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
+    }
+}
+
 /// How finely the cave is cut.
 #[derive(Clone, Copy)]
 pub(crate) struct CaveSize {
@@ -40,6 +67,8 @@ pub(crate) struct CaveSize {
 impl CaveSize {
     /// 70,000 triangles.
     pub(crate) const SMALL: Self = Self { grid: 75, segments: 22 };
+    /// 100,000 triangles.
+    pub(crate) const MEDIUM: Self = Self { grid: 90, segments: 26 };
     /// 1 million triangles.
     pub(crate) const LARGE: Self = Self { grid: 300, segments: 81 };
 }
@@ -182,4 +211,44 @@ pub(crate) fn grey_scene(meshes: Vec<Mesh>) -> Scene {
         environment: None,
         notes: Vec::new(),
     }
+}
+
+/// The Cornell box of `scenes/`, everything in it diffuse.
+pub(crate) fn cornell_box() -> Result<Scene> {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml");
+    Ok(load(&file, &LoadOptions::default())?)
+}
+
+/// The cave of 100,000 triangles under a texture of 1024×1024 texels, lit by a lamp below its roof.
+pub(crate) fn textured_cave() -> Scene {
+    let lamp = shapes::rectangle(Vec3::new(-0.3, 0.85, -0.3), Vec3::X * 0.6, Vec3::Z * 0.6);
+    let mut scene = grey_scene(vec![cave_mesh(CaveSize::MEDIUM), lamp]);
+    let texels = (0..1024 * 1024u32)
+        .map(|i| {
+            let (x, y) = (i % 1024, i / 1024);
+            let wave = |k: f32, phase: f32| (0.5 + 0.5 * (k * x as f32 + 0.7 * k * y as f32 + phase).sin()) * 120.0;
+            let check = if (x / 16 + y / 16) % 2 == 0 { 90.0 } else { 40.0 };
+            [(wave(0.02, 0.0) + check) as u8, (wave(0.03, 1.0) + check) as u8, (wave(0.05, 2.0) + check) as u8, 255]
+        })
+        .collect();
+    scene.textures.push(Texture {
+        name: "rock".to_owned(),
+        width: 1024,
+        height: 1024,
+        texels: Texels::Bytes(Arc::new(texels), Encoding::Srgb),
+        wrap_u: Wrap::Repeat,
+        wrap_v: Wrap::Repeat,
+        nearest: false,
+    });
+    let lookup = TextureLookup::plain(TextureId(0));
+    scene.materials[0].surface =
+        Surface::Diffuse { reflectance: ColorInput { factor: Vec3::ONE, texture: Some(lookup) } };
+    scene.materials.push(Material {
+        name: "lamp".to_owned(),
+        surface: Surface::Diffuse { reflectance: ColorInput::constant(Vec3::ZERO) },
+        emission: ColorInput::constant(Vec3::splat(10.0)),
+        ..scene.materials[0].clone()
+    });
+    scene.instances[1].material = MaterialId(1);
+    scene
 }

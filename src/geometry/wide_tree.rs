@@ -173,13 +173,6 @@ impl WideTree {
     /// Builds over triangles; those whose entry in `bounds` is not finite are left out.
     pub(super) fn build(triangles: &[[Vec3A; 3]], bounds: &[Bounds], references: &[TriangleRef]) -> Self {
         let cut = collapse::build(bounds);
-        eprintln!(
-            "waiting {} nodes {} blocks {} fill {}",
-            cut.waiting,
-            cut.nodes.len(),
-            cut.blocks.len(),
-            triangles.len() as f32 / cut.blocks.len() as f32
-        );
         let mut tree = Self {
             nodes: cut.nodes,
             blocks: vec![Block::EMPTY; cut.blocks.len()],
