@@ -6,6 +6,7 @@
 //! - `adaptive_render`: adaptive and uniform renders against a reference: bias, calibration, determinism
 //! - `bad_input`: bad scene files, and our own ones
 //! - `load_assets`: scenes that others made, sound and damaged
+//! - `no_allocation`: the heap is left alone while paths are traced
 //! - `command_line`: the program as a user runs it
 
 mod adaptive_render;
@@ -14,4 +15,5 @@ mod command_line;
 mod direct_light;
 mod furnace;
 mod load_assets;
+mod no_allocation;
 mod support;
