@@ -2,7 +2,7 @@
 
 use super::settings::LoopSettings;
 use super::statistics::{ChannelStatistics, SampleStatistics};
-use crate::film::{Estimate, Film};
+use crate::film::{CHANNELS, Estimate, Film};
 use crate::sampler::Half;
 use fechner_perception::Plane;
 use fechner_perception::csf::CastleCsf;
@@ -48,12 +48,11 @@ pub struct JudgeError(#[from] fechner_perception::Error);
 /// Only if the perception model refuses the film's maps.
 pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Judgement, JudgeError> {
     let estimate = film.estimate(settings.nits_per_unit);
-    let statistics = SampleStatistics::of(film);
     let guide = guide_luminance(film, &estimate);
     let tone = settings.operator.fit(&SceneGuide { luminance_cd_m2: &guide }, &settings.viewing.display);
-    let shown = Shown { film, guide: &guide, tone: tone.as_ref(), settings, inflation };
+    let statistics = SampleStatistics::of(film, &display_scale(film, &guide, tone.as_ref(), settings, inflation));
     let displayed_guide = seen::display_luminance(tone.as_ref(), &settings.viewing.display, &guide);
-    let luminance_variance = shown.variance(0, statistics.luminance(), &statistics.luminance().pooled);
+    let luminance_variance = variance_of_mean(film, statistics.luminance(), &statistics.luminance().pooled);
     // The noise before denoising bounds what is left of it in the guide, so masking fades in as samples come.
     let csf = CastleCsf::new(settings.viewing.observer.csf_area_deg2)?;
     let thresholds = threshold_map(
@@ -76,7 +75,7 @@ pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Jud
     // A model of luminance alone judges luminance alone.
     let gains = if settings.model.is_none() { Some(thresholds.chromatic_gains()?) } else { None };
     let most_visible = |of: &dyn for<'a> Fn(&'a ChannelStatistics) -> &'a Plane| {
-        let channel = |c: usize| shown.variance(c, &statistics.channels[c], of(&statistics.channels[c]));
+        let channel = |c: usize| variance_of_mean(film, &statistics.channels[c], of(&statistics.channels[c]));
         match &gains {
             None => channel(0),
             Some(gains) => thresholds.luminance_equivalent_variance(gains, [&channel(0), &channel(1), &channel(2)]),
@@ -90,13 +89,16 @@ pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Jud
     };
     let variance_per_sample =
         Half::BOTH.map(|half| per_sample(&most_visible(&|channel| &channel.for_half[half.index()])));
-    let nits_squared = (settings.nits_per_unit * settings.nits_per_unit) as f32;
+    let own_variance = &estimate.variance_of_mean;
+    let reported_variance = Plane::from_fn(own_variance.width(), own_variance.height(), |x, y| {
+        own_variance.get(x, y) * statistics.luminance().factor_with_own.get(x, y)
+    });
     let mut judgement = Judgement {
         estimate,
         tone,
         thresholds,
         pixel_thresholds,
-        variance_of_mean: statistics.luminance().variance_of_mean.map(|v| v * nits_squared),
+        variance_of_mean: reported_variance,
         predicted: Plane::filled(0, 0, 0.0),
         pooled_variance_per_sample: per_sample(&display_variance),
         variance_per_sample,
@@ -136,32 +138,41 @@ impl Judgement {
     }
 }
 
-/// Scene variance through the display.
-struct Shown<'a> {
-    film: &'a Film,
-    guide: &'a Plane,
-    tone: &'a dyn FittedTone,
-    settings: &'a LoopSettings,
+/// Displayed variance over scene variance of each pixel, by channel, at the size that its variance has now: what the display
+/// makes of a pixel's own noise, before any pooling. From scene units; inflation included.
+pub fn display_scale(
+    film: &Film,
+    guide: &Plane,
+    tone: &dyn FittedTone,
+    settings: &LoopSettings,
     inflation: f64,
+) -> [Plane; CHANNELS] {
+    let (a, b) = (film.half(Half::A), film.half(Half::B));
+    let nits_squared = settings.nits_per_unit * settings.nits_per_unit * inflation;
+    let display = &settings.viewing.display;
+    std::array::from_fn(|c| {
+        let own = |i: usize| 0.5 * (a[i].sample_variance(c) + b[i].sample_variance(c)) * variance_share(film, i);
+        let scene =
+            Plane::from_fn(guide.width(), guide.height(), |x, y| (own(y * guide.width() + x) * nits_squared) as f32);
+        let displayed = if c == 0 {
+            seen::display_variance(tone, display, guide, &scene)
+        } else {
+            seen::display_chromatic_variance(tone, display, guide, &scene)
+        };
+        Plane::from_fn(guide.width(), guide.height(), |x, y| {
+            let (scene, displayed) = (f64::from(scene.get(x, y)), f64::from(displayed.get(x, y)));
+            if scene > 0.0 && displayed.is_finite() { (displayed / scene * nits_squared) as f32 } else { 0.0 }
+        })
+    })
 }
 
-impl Shown<'_> {
-    /// Displayed variance of the picture's mean in a channel, for the variance of one sample in scene units squared.
-    fn variance(&self, channel: usize, statistics: &ChannelStatistics, per_sample: &Plane) -> Plane {
-        let scale = self.settings.nits_per_unit * self.settings.nits_per_unit * self.inflation;
-        let width = per_sample.width();
-        let of_mean = Plane::from_fn(width, per_sample.height(), |x, y| {
-            let factor = f64::from(statistics.low_discrepancy_factor.get(x, y));
-            let share = variance_share(self.film, y * width + x);
-            (f64::from(per_sample.get(x, y)) * scale * share * factor) as f32
-        });
-        let display = &self.settings.viewing.display;
-        if channel == 0 {
-            seen::display_variance(self.tone, display, self.guide, &of_mean)
-        } else {
-            seen::display_chromatic_variance(self.tone, display, self.guide, &of_mean)
-        }
-    }
+/// Variance of the picture's mean in a channel for the variance of one sample.
+fn variance_of_mean(film: &Film, statistics: &ChannelStatistics, per_sample: &Plane) -> Plane {
+    Plane::from_fn(per_sample.width(), per_sample.height(), |x, y| {
+        let factor = f64::from(statistics.low_discrepancy_factor.get(x, y));
+        let share = variance_share(film, y * per_sample.width() + x);
+        (f64::from(per_sample.get(x, y)) * share * factor) as f32
+    })
 }
 
 /// Luminance of the denoised picture: what adaptation, masking and the operator are made from, so that noise neither

@@ -13,9 +13,10 @@ use rayon::prelude::*;
 /// Pixels to each side that are pooled: 7×7.
 const POOL_RADIUS: i64 = 3;
 /// Range of the low-discrepancy factor: stratified samples do better than their scatter says, hardly ever worse.
-const FACTOR_RANGE: (f64, f64) = (0.1, 1.2);
+const FACTOR_RANGE: (f64, f64) = (0.02, 1.2);
 
-/// Variance of one sample in one opponent channel, per pixel, in scene units squared, and what stratification makes of it.
+/// Variance of one sample in one opponent channel, per pixel, in the unit of the scale that was given, and what
+/// stratification makes of it.
 #[derive(Clone, Debug)]
 pub struct ChannelStatistics {
     /// Pooled over the neighbours of like surface, the pixel itself left out.
@@ -25,9 +26,8 @@ pub struct ChannelStatistics {
     /// Ratio of the halves' squared difference to what independent samples would show, pooled: below 1 where
     /// stratification pays.
     pub low_discrepancy_factor: Plane,
-    /// Variance of the picture in this channel: the pixel's own scatter, times the same factor with the pixel itself
-    /// counted in. For reports, not for decisions.
-    pub variance_of_mean: Plane,
+    /// The same factor with the pixel itself counted in. For reports, not for decisions.
+    pub factor_with_own: Plane,
 }
 
 /// Statistics of luminance and the two chromatic channels.
@@ -38,13 +38,15 @@ pub struct SampleStatistics {
 }
 
 impl SampleStatistics {
-    /// Pools a film.
-    pub fn of(film: &Film) -> Self {
+    /// Pools a film. `scale` turns each pixel's scene variance, by channel, into what counts: displayed variance, since a
+    /// lamp's border scatters far above what the display can show, and its dark neighbours must not inherit that.
+    pub fn of(film: &Film, scale: &[Plane; CHANNELS]) -> Self {
         let (width, height) = (film.width() as usize, film.height() as usize);
         let (a, b) = (film.half(Half::A), film.half(Half::B));
         let guides = film.guides();
-        let evidence: Vec<[PixelEvidence; CHANNELS]> =
-            a.iter().zip(b).map(|(a, b)| PixelEvidence::of_pixel(a, b)).collect();
+        let evidence: Vec<[PixelEvidence; CHANNELS]> = (0..a.len())
+            .map(|i| PixelEvidence::of_pixel(&a[i], &b[i], scale.each_ref().map(|s| s.values()[i])))
+            .collect();
         let pooled: Vec<[Pooled; CHANNELS]> = (0..width * height)
             .into_par_iter()
             .map(|i| pool(&evidence, guides, (i % width, i / width), (width, height)))
@@ -53,12 +55,15 @@ impl SampleStatistics {
             let plane = |value: &(dyn Fn(usize) -> f64 + Sync)| {
                 Plane::from_fn(width, height, |x, y| value(y * width + x) as f32)
             };
-            let decided_by = |other: &[HalfPixel], i: usize| pooled[i][c].variance.max(cautious_variance(&other[i], c));
+            let decided_by = |other: &[HalfPixel], i: usize| {
+                let own = cautious_variance(&other[i], c) * f64::from(scale[c].values()[i]);
+                pooled[i][c].variance.max(own)
+            };
             ChannelStatistics {
                 pooled: plane(&|i| pooled[i][c].variance),
                 for_half: [plane(&|i| decided_by(b, i)), plane(&|i| decided_by(a, i))],
                 low_discrepancy_factor: plane(&|i| pooled[i][c].factor),
-                variance_of_mean: plane(&|i| evidence[i][c].variance_of_mean * pooled[i][c].factor_with_own),
+                factor_with_own: plane(&|i| pooled[i][c].factor_with_own),
             }
         };
         Self { channels: std::array::from_fn(channel) }
@@ -68,6 +73,11 @@ impl SampleStatistics {
     pub fn luminance(&self) -> &ChannelStatistics {
         &self.channels[0]
     }
+}
+
+/// The scale that leaves variances in scene units.
+pub fn scene_units(film: &Film) -> [Plane; CHANNELS] {
+    std::array::from_fn(|_| Plane::filled(film.width() as usize, film.height() as usize, 1.0))
 }
 
 /// A pixel's own variance, lowered by two of its standard errors under normal samples: the maximum with the pooled
@@ -88,25 +98,24 @@ struct PixelEvidence {
     variance: f64,
     /// Squared half difference.
     squared_difference: f64,
-    /// Its expectation for independent samples, as share of the sample variance.
-    difference_scale: f64,
-    /// (s_A²/n_A + s_B²/n_B) / 4.
-    variance_of_mean: f64,
+    /// Its expectation for independent samples.
+    expected_difference: f64,
 }
 
 impl PixelEvidence {
-    fn of_pixel(a: &HalfPixel, b: &HalfPixel) -> [Self; CHANNELS] {
+    fn of_pixel(a: &HalfPixel, b: &HalfPixel, scale: [f32; CHANNELS]) -> [Self; CHANNELS] {
         let means = [opponent(a.mean), opponent(b.mean)];
         let count = |h: &HalfPixel| f64::from(h.samples.max(1));
         let degrees_of_freedom = (count(a) - 1.0) + (count(b) - 1.0);
         std::array::from_fn(|c| {
             let difference = means[0][c] - means[1][c];
             let m2 = f64::from(a.m2[c]) + f64::from(b.m2[c]);
+            let scale = f64::from(scale[c]);
+            let variance = if degrees_of_freedom > 0.0 { scale * m2 / degrees_of_freedom } else { 0.0 };
             Self {
-                variance: if degrees_of_freedom > 0.0 { m2 / degrees_of_freedom } else { 0.0 },
-                squared_difference: 0.25 * difference * difference,
-                difference_scale: 0.25 * (1.0 / count(a) + 1.0 / count(b)),
-                variance_of_mean: 0.25 * (a.sample_variance(c) / count(a) + b.sample_variance(c) / count(b)),
+                variance,
+                squared_difference: 0.25 * scale * difference * difference,
+                expected_difference: 0.25 * variance * (1.0 / count(a) + 1.0 / count(b)),
             }
         })
     }
@@ -125,6 +134,17 @@ struct PoolSums {
     variances: f64,
     squared: f64,
     expected: f64,
+    /// The largest expectation of a single neighbour, weighted.
+    most_expected: f64,
+}
+
+impl PoolSums {
+    /// Squared differences over their expectation, drawn towards 1 by one observation as heavy as the heaviest: where a
+    /// single pixel outweighs the others, its half difference may be small by luck.
+    fn factor(&self) -> f64 {
+        let expected = self.expected + self.most_expected;
+        if expected > 0.0 { (self.squared + self.most_expected) / expected } else { 1.0 }
+    }
 }
 
 /// Pools the neighbours of one pixel. Each neighbour weighs the same whatever its count, so that a region's variance is
@@ -151,19 +171,23 @@ fn pool(
             for (sums, neighbour) in sums.iter_mut().zip(&evidence[i]) {
                 sums.variances += weight * neighbour.variance;
                 sums.squared += weight * neighbour.squared_difference;
-                sums.expected += weight * neighbour.variance * neighbour.difference_scale;
+                let expected = weight * neighbour.expected_difference;
+                sums.expected += expected;
+                sums.most_expected = sums.most_expected.max(expected);
             }
         }
     }
     let own = &evidence[y * width + x];
-    let ratio = |squared: f64, expected: f64| if expected > 0.0 { squared / expected } else { 1.0 };
     std::array::from_fn(|c| {
         let (sums, own) = (&sums[c], &own[c]);
         Pooled {
             // A pixel like none of its neighbours has only itself to go by.
             variance: if weights > 0.0 { sums.variances / weights } else { own.variance },
-            factor: ratio(sums.squared, sums.expected).clamp(FACTOR_RANGE.0, FACTOR_RANGE.1),
-            factor_with_own: ratio(sums.squared + own.squared_difference, sums.expected + own.variance_of_mean),
+            factor: sums.factor().clamp(FACTOR_RANGE.0, FACTOR_RANGE.1),
+            factor_with_own: match sums.expected + own.expected_difference {
+                0.0 => 1.0,
+                expected => (sums.squared + own.squared_difference) / expected,
+            },
         }
     })
 }
@@ -180,7 +204,7 @@ pub struct Outliers {
 /// Finds pixels whose halves differ by more than five standard errors of what their neighbours show.
 pub fn find_outliers(film: &Film) -> Outliers {
     const STANDARD_ERRORS: f64 = 5.0;
-    let statistics = SampleStatistics::of(film);
+    let statistics = SampleStatistics::of(film, &scene_units(film));
     let (a, b) = (film.half(Half::A), film.half(Half::B));
     let (mut pixels, mut excess, mut energy) = (0, 0.0, 0.0);
     for (i, (a, b)) in a.iter().zip(b).enumerate() {
@@ -244,7 +268,7 @@ mod tests {
     #[test]
     fn flat_noise_is_estimated_right() {
         let film = film_of(32, 32, 2, |_, u| u);
-        let statistics = SampleStatistics::of(&film);
+        let statistics = SampleStatistics::of(&film, &scene_units(&film));
         let mean = |p: &Plane| p.values().iter().sum::<f32>() / p.values().len() as f32;
         assert!(
             (mean(&statistics.luminance().pooled) * 12.0 - 1.0).abs() < 0.02,
@@ -263,7 +287,7 @@ mod tests {
     fn an_isolated_hard_pixel_is_caught() {
         let hard = 16 * 33 + 16;
         let film = film_of(33, 33, 2, |pixel, u| if pixel == hard { u * 10.0 } else { u });
-        let statistics = SampleStatistics::of(&film);
+        let statistics = SampleStatistics::of(&film, &scene_units(&film));
         let at = |p: &Plane| f64::from(p.values()[hard as usize]);
         assert!(at(&statistics.luminance().pooled) < 0.2, "the pool leaves the pixel itself out");
         assert!(at(&statistics.luminance().for_half[0]) > 2.0 && at(&statistics.luminance().for_half[1]) > 2.0);
@@ -283,9 +307,13 @@ mod tests {
         let mut sum = BlockSum::default();
         sum.add(&wild);
         changed.merge_block(BlockWork { samples: 1, ..BlockWork::whole(pixel, Half::A, 1) }, &sum);
-        let before = SampleStatistics::of(&base).luminance().for_half[0].values()[pixel as usize];
-        let after = SampleStatistics::of(&changed).luminance().for_half[0].values()[pixel as usize];
+        let before = SampleStatistics::of(&base, &scene_units(&base)).luminance().for_half[0].values()[pixel as usize];
+        let after =
+            SampleStatistics::of(&changed, &scene_units(&changed)).luminance().for_half[0].values()[pixel as usize];
         assert_eq!(before, after);
-        assert!(SampleStatistics::of(&changed).luminance().for_half[1].values()[pixel as usize] > before * 100.0);
+        assert!(
+            SampleStatistics::of(&changed, &scene_units(&changed)).luminance().for_half[1].values()[pixel as usize]
+                > before * 100.0
+        );
     }
 }
