@@ -70,7 +70,7 @@ pub fn difference(
     let mut map = map_of(reference_cd_m2)?;
     let test_map = map_of(test_cd_m2)?;
     for (elevation, test_elevation) in map.elevations.iter_mut().zip(&test_map.elevations) {
-        elevation.combine(test_elevation, f32::min);
+        elevation.combine(test_elevation, |reference, test, _, _| reference.min(test));
     }
     let visibility = map.measured_visibility(&ratio(test_cd_m2, reference_cd_m2, |test, reference| test - reference));
     let worst = visibility.values().iter().copied().fold(0.0, f32::max);

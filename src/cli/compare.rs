@@ -97,7 +97,7 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
     }
     println!(
         "{}: worst visibility {:.2} (seen in a 1° patch with {:.1} %), {:.2} % of the picture above threshold, on \
-         \"{}\" at {} pixels a degree",
+         \"{}\" at {} pixels a degree (model-predicted; calibrated on gratings, not on renderings)",
         if figures.is_visible { "visible" } else { "the same to the eye" },
         figures.worst_visibility,
         100.0 * figures.detection_probability_worst,

@@ -1,5 +1,6 @@
 //! The command line.
 
+mod channels;
 mod compare;
 mod console;
 mod info;
