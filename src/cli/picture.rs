@@ -97,6 +97,22 @@ impl InputPicture {
         }))
     }
 
+    /// Linear RGB in cd/m² that the display sends to the eye.
+    pub(super) fn displayed_rgb(&self, tone: Option<&dyn FittedTone>, viewing: &Viewing) -> Vec<[f32; 3]> {
+        let display = &viewing.display;
+        let cd_m2 = |relative: f32| display.luminance_cd_m2(f64::from(relative)) as f32;
+        match (self.content, tone) {
+            (Content::Scene { nits_per_unit }, Some(tone)) => {
+                let light = |value: f32| if value.is_finite() { value.max(0.0) * nits_per_unit as f32 } else { 0.0 };
+                self.rgb.iter().map(|rgb| tone.map_rgb(rgb.map(light)).map(cd_m2)).collect()
+            }
+            _ => {
+                let linear = |code: f32| display.eotf.decode(f64::from(code), display.white_cd_m2) as f32;
+                self.rgb.iter().map(|rgb| rgb.map(|code| cd_m2(linear(code)))).collect()
+            }
+        }
+    }
+
     /// Luminance in cd/m² that the display sends to the eye.
     pub(super) fn displayed(&self, tone: Option<&dyn FittedTone>, viewing: &Viewing) -> Plane {
         let display = &viewing.display;

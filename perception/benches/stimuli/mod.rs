@@ -45,7 +45,7 @@ pub(crate) fn all(folder: &Path) -> Result<Vec<Stimulus>, Box<dyn std::error::Er
     add("edge".into(), windowed(|_, y| if row(y) < 0 { -1.0 } else { 1.0 }));
     add("line 0.5′".into(), windowed(|_, y| f64::from(u8::from(row(y) == 0))));
     add("dipole, 3 pixels".into(), windowed(|_, y| f64::from(i8::from(row(y) == -2) - i8::from(row(y) == 0))));
-    for flip in [1.0, -1.0] {
+    for flip in [1.0_f64, -1.0] {
         add(
             format!("5 collinear Gabors 8 cpd, {}", if flip > 0.0 { "in phase" } else { "alternating" }),
             stimulus(|x, y| {
