@@ -1,6 +1,7 @@
 //! The command line.
 
 mod bench;
+mod channels;
 mod compare;
 mod console;
 mod info;
