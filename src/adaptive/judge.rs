@@ -45,7 +45,7 @@ pub fn judge(film: &Film, settings: &LoopSettings) -> Result<Judgement, JudgeErr
     let estimate = film.estimate(settings.nits_per_unit);
     let statistics = SampleStatistics::of(film);
     let guide = guide_luminance(film, &estimate);
-    let tone = settings.operator.fit(&SceneGuide { luminance_cd_m2: &guide }, &settings.viewing.display);
+    let tone = settings.operator.fit(&SceneGuide::of(&guide), &settings.viewing, None);
     let display = &settings.viewing.display;
     let displayed_guide = seen::display_luminance(tone.as_ref(), display, &guide);
 

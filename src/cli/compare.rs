@@ -69,8 +69,7 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
         let known = tone::operator_names().join(", ");
         format!("there is no tone operator \"{}\"; known: {known}", arguments.operator)
     })?;
-    let fitted =
-        reference.fit(operator.as_ref(), &viewing.display).or_else(|| test.fit(operator.as_ref(), &viewing.display));
+    let fitted = reference.fit(operator.as_ref(), &viewing).or_else(|| test.fit(operator.as_ref(), &viewing));
     let seen = difference(
         &reference.displayed(fitted.as_deref(), &viewing),
         &test.displayed(fitted.as_deref(), &viewing),

@@ -3,7 +3,7 @@
 use anyhow::{Context, Result, bail};
 use fechner::exr_read::{ExrImage, read_exr};
 use fechner::output::{Attribute, NITS_PER_UNIT};
-use fechner_perception::display::{Display, Viewing};
+use fechner_perception::display::Viewing;
 use fechner_perception::photometry::luminance;
 use fechner_perception::tone::{FittedTone, SceneGuide, ToneOperator};
 use fechner_perception::{Plane, seen};
@@ -79,9 +79,9 @@ impl InputPicture {
     }
 
     /// The operator fitted to this picture; `None` for one that is ready for the display.
-    pub(super) fn fit(&self, operator: &dyn ToneOperator, display: &Display) -> Option<Box<dyn FittedTone>> {
+    pub(super) fn fit(&self, operator: &dyn ToneOperator, viewing: &Viewing) -> Option<Box<dyn FittedTone>> {
         let luminance_cd_m2 = self.scene_luminance()?;
-        Some(operator.fit(&SceneGuide { luminance_cd_m2: &luminance_cd_m2 }, display))
+        Some(operator.fit(&SceneGuide::of(&luminance_cd_m2), viewing, None))
     }
 
     /// Luminance in cd/m² of the scene; `None` for a picture that is ready for the display.
