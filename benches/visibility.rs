@@ -85,9 +85,7 @@ impl<'a> Judge<'a> {
     fn new(reference: &'a Run) -> Result<Self> {
         let viewing = Viewing::of(Display::preset("desktop").context("a preset")?);
         let luminance = mean(reference);
-        let tone = operator("constant", None)
-            .context("an operator")?
-            .fit(&SceneGuide { luminance_cd_m2: &luminance }, &viewing.display);
+        let tone = operator("constant", None).context("an operator")?.fit(&SceneGuide::of(&luminance), &viewing, None);
         let shown = seen::display_luminance(tone.as_ref(), &viewing.display, &luminance);
         let inputs = ThresholdInputs { display_luminance_cd_m2: &shown, guide_variance: None };
         let thresholds = threshold_map(&inputs, &viewing, &CastleCsf::default())?;

@@ -52,8 +52,9 @@ pub(crate) fn veil_cd_m2(luminance_cd_m2: &Plane, adaptation_cd_m2: &Plane, view
     let Glare::Cie { age_years } = viewing.observer.glare else { return None };
     let density = viewing.display.pixel_density();
     let (width, height) = (luminance_cd_m2.width(), luminance_cd_m2.height());
-    let cell = [(density.horizontal, width), (density.vertical, height)]
-        .map(|(pixels_per_degree, len)| ((pixels_per_degree / CELLS_A_DEGREE) as usize).max(len.div_ceil(MOST_CELLS)).max(1));
+    let cell = [(density.horizontal, width), (density.vertical, height)].map(|(pixels_per_degree, len)| {
+        ((pixels_per_degree / CELLS_A_DEGREE) as usize).max(len.div_ceil(MOST_CELLS)).max(1)
+    });
     let cells = (width.div_ceil(cell[0]), height.div_ceil(cell[1]));
     // Real part: light; imaginary part: area. One complex transform convolves both.
     let sides = [smooth_size(2 * cells.0), smooth_size(2 * cells.1)];
@@ -103,7 +104,8 @@ fn veil_of_cell(offset: [usize; 2], cell_deg: [f64; 2], density: PixelDensity, a
     let mut sum = 0.0;
     for point in 0..POINTS * POINTS {
         let within = [point % POINTS, point / POINTS].map(|at| (at as f64 + 0.5) / POINTS as f64 - 0.5);
-        let angle_deg = ((offset[0] as f64 + within[0]) * cell_deg[0]).hypot((offset[1] as f64 + within[1]) * cell_deg[1]);
+        let angle_deg =
+            ((offset[0] as f64 + within[0]) * cell_deg[0]).hypot((offset[1] as f64 + within[1]) * cell_deg[1]);
         sum += veil_per_lux(angle_deg, age_years) * angle_deg.to_radians().cos().max(0.0);
     }
     sum / (POINTS * POINTS) as f64 * solid_angle
@@ -168,8 +170,10 @@ impl Grid {
     /// Rows become columns.
     fn turn(&mut self) {
         let [width, height] = self.sides;
-        self.values =
-            (0..width).flat_map(|x| (0..height).map(move |y| (x, y))).map(|(x, y)| self.values[y * width + x]).collect();
+        self.values = (0..width)
+            .flat_map(|x| (0..height).map(move |y| (x, y)))
+            .map(|(x, y)| self.values[y * width + x])
+            .collect();
         self.sides = [height, width];
     }
 }
@@ -182,8 +186,7 @@ mod tests {
     use crate::threshold::{ThresholdInputs, threshold_map};
 
     fn viewing(glare: Glare) -> Viewing {
-        let mut viewing =
-            Viewing::of(Display { pixels_per_degree: 30.0, white_cd_m2: 4000.0, ..Display::default() });
+        let mut viewing = Viewing::of(Display { pixels_per_degree: 30.0, white_cd_m2: 4000.0, ..Display::default() });
         viewing.observer.glare = glare;
         viewing
     }

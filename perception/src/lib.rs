@@ -18,7 +18,7 @@
 //! let scene = Plane::from_fn(64, 48, |x, _| 10.0 + x as f32);
 //! let viewing = Viewing::of(Display::preset("laptop").unwrap());
 //! let operator = tone::operator("ward94", None).unwrap();
-//! let fitted = operator.fit(&tone::SceneGuide { luminance_cd_m2: &scene }, &viewing.display);
+//! let fitted = operator.fit(&tone::SceneGuide::of(&scene), &viewing, None);
 //! let shown = seen::display_luminance(&*fitted, &viewing.display, &scene);
 //!
 //! let inputs = ThresholdInputs { display_luminance_cd_m2: &shown, guide_variance: None };
@@ -52,6 +52,7 @@ mod noise_gain;
 pub mod opponent;
 pub mod photometry;
 mod plane;
+pub mod primaries;
 pub mod psychometric;
 mod reduced;
 mod rows;

@@ -138,7 +138,8 @@ fn masked(
     let transform = PictureTransform::new(width, height, density);
     let mut workspace = Workspace::default();
     let contrast = transform.forward(&mut workspace, |y, row| {
-        for (value, (signal, adaptation)) in row.iter_mut().zip(signal_cd_m2.row(y).iter().zip(adaptation_cd_m2.row(y))) {
+        for (value, (signal, adaptation)) in row.iter_mut().zip(signal_cd_m2.row(y).iter().zip(adaptation_cd_m2.row(y)))
+        {
             *value = signal / adaptation - mean;
         }
     });

@@ -47,7 +47,7 @@ pub struct JudgeError(#[from] fechner_perception::Error);
 pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Judgement, JudgeError> {
     let estimate = film.estimate(settings.nits_per_unit);
     let guide = guide_luminance(film, &estimate);
-    let tone = settings.operator.fit(&SceneGuide { luminance_cd_m2: &guide }, &settings.viewing.display);
+    let tone = settings.operator.fit(&SceneGuide::of(&guide), &settings.viewing, None);
     let statistics = SampleStatistics::of(film, &display_scale(film, &guide, tone.as_ref(), settings, inflation));
     let displayed_guide = seen::display_luminance(tone.as_ref(), &settings.viewing.display, &guide);
     let luminance_variance = variance_of_mean(film, statistics.luminance(), &statistics.luminance().pooled);

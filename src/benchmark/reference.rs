@@ -102,7 +102,7 @@ impl Reference {
     fn display_factors(subject: &Subject, film: &Film) -> Result<[Plane; CHANNELS]> {
         let settings = subject.loop_settings()?;
         let luminance = film.estimate(settings.nits_per_unit).luminance_cd_m2.map(|v| v.max(0.0));
-        let tone = settings.operator.fit(&SceneGuide { luminance_cd_m2: &luminance }, &settings.viewing.display);
+        let tone = settings.operator.fit(&SceneGuide::of(&luminance), &settings.viewing, None);
         let scale = display_scale(film, &luminance, tone.as_ref(), &settings, 1.0);
         Ok(SampleStatistics::of(film, &scale).channels.map(|channel| channel.low_discrepancy_factor))
     }
@@ -125,7 +125,7 @@ impl Reference {
     pub(crate) fn fit(&self, subject: &Subject) -> Result<Box<dyn FittedTone>> {
         let settings = subject.loop_settings()?;
         let luminance = self.luminance();
-        Ok(settings.operator.fit(&SceneGuide { luminance_cd_m2: &luminance }, &subject.viewing.display))
+        Ok(settings.operator.fit(&SceneGuide::of(&luminance), &subject.viewing, None))
     }
 
     fn to_bytes(&self) -> Vec<u8> {

@@ -70,8 +70,7 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
         let known = tone::operator_names().join(", ");
         format!("there is no tone operator \"{}\"; known: {known}", arguments.operator)
     })?;
-    let fitted =
-        reference.fit(operator.as_ref(), &viewing.display).or_else(|| test.fit(operator.as_ref(), &viewing.display));
+    let fitted = reference.fit(operator.as_ref(), &viewing).or_else(|| test.fit(operator.as_ref(), &viewing));
     let (width, height) = reference.size();
     let seen = colour_difference(
         &reference.displayed_rgb(fitted.as_deref(), &viewing),

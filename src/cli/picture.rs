@@ -4,7 +4,7 @@ use super::channels::{self, Colour};
 use anyhow::{Context, Result, bail};
 use fechner::exr_read::{ExrImage, read_exr};
 use fechner::output::{Attribute, NITS_PER_UNIT};
-use fechner_perception::display::{Display, Viewing};
+use fechner_perception::display::Viewing;
 use fechner_perception::photometry::luminance;
 use fechner_perception::tone::{FittedTone, SceneGuide, ToneOperator};
 use fechner_perception::{Plane, seen};
@@ -53,10 +53,9 @@ impl InputPicture {
         let rgb = match channels::colour(exr) {
             Some(Colour::Rgb([r, g, b])) => (0..r.len()).map(|i| [r[i], g[i], b[i]]).collect(),
             Some(Colour::Grey(y)) => y.iter().map(|&value| [value; 3]).collect(),
-            None => bail!(
-                "{}: there are no channels R, G and B, nor Y; `fechner info` lists what there is",
-                path.display()
-            ),
+            None => {
+                bail!("{}: there are no channels R, G and B, nor Y; `fechner info` lists what there is", path.display())
+            }
         };
         let content = Content::Scene { nits_per_unit };
         Ok(Self { width: exr.width as usize, height: exr.height as usize, rgb, content })
@@ -83,9 +82,9 @@ impl InputPicture {
     }
 
     /// The operator fitted to this picture; `None` for one that is ready for the display.
-    pub(super) fn fit(&self, operator: &dyn ToneOperator, display: &Display) -> Option<Box<dyn FittedTone>> {
+    pub(super) fn fit(&self, operator: &dyn ToneOperator, viewing: &Viewing) -> Option<Box<dyn FittedTone>> {
         let luminance_cd_m2 = self.scene_luminance()?;
-        Some(operator.fit(&SceneGuide { luminance_cd_m2: &luminance_cd_m2 }, display))
+        Some(operator.fit(&SceneGuide::of(&luminance_cd_m2), viewing, None))
     }
 
     /// Luminance in cd/m² of the scene; `None` for a picture that is ready for the display.

@@ -61,7 +61,7 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     })?;
     let nits_per_unit = arguments.seeing.nits_per_unit;
     let guide = InputPicture::read(&arguments.input, nits_per_unit)?;
-    let fitted = guide.fit(operator.as_ref(), &viewing.display);
+    let fitted = guide.fit(operator.as_ref(), &viewing);
     let shown = guide.displayed(fitted.as_deref(), &viewing);
     let velocity = match &arguments.velocity {
         Some(path) => {
