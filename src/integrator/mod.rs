@@ -1,23 +1,25 @@
 //! The path tracer: [`PathTracer::trace`] turns a [`SamplePlan`] into film.
 //!
-//! `path` holds the life of one sample, `camera` where it starts, `shading` what a surface point scatters like.
+//! `path` holds the life of one sample, `camera` where it starts, `shading` what a surface point scatters like,
+//! `tables` what materials compute beforehand.
 
 mod camera;
 mod path;
 mod shading;
+mod tables;
 
 pub use camera::CameraRays;
 pub use path::{FirstHit, PathSample};
 
-use crate::bsdf::DielectricTables;
 use crate::film::{BlockSum, Film};
 use crate::geometry::World;
 use crate::light::Lights;
 use crate::sampler::{BlockKey, Half, PixelFilter, Purpose};
-use crate::scene::{Scene, Surface};
+use crate::scene::Scene;
 use glam::Vec2;
 use rayon::prelude::*;
 use std::sync::Arc;
+use tables::SurfaceTables;
 
 /// What does not change during a render.
 #[derive(Clone, Copy, Debug)]
@@ -32,6 +34,9 @@ pub struct TraceSettings {
     pub max_depth: u32,
     /// Reconstruction filter.
     pub filter: PixelFilter,
+    /// Largest channel of a sample, scene units: brighter samples are scaled down to it, which darkens the picture where
+    /// light is rare. `None` leaves the estimate unbiased.
+    pub clamp: Option<f32>,
 }
 
 /// Scattering events that a path may have when nobody asks for fewer: with Russian roulette's survival of at most 0.98
@@ -47,24 +52,29 @@ pub struct BlockWork {
     pub half: Half,
     /// Which doubling.
     pub level: u8,
-    /// How many of the block's samples: all of them, or the first few where a budget ends within the block.
+    /// Index in the doubling of the first sample.
+    pub first: u32,
+    /// How many samples: all of the doubling's, or a part where a budget ends or a rule looks within it.
     pub samples: u32,
 }
 
 impl BlockWork {
     /// The whole block: the pilot has [`PILOT_SAMPLES`], and each level doubles the total.
     pub fn whole(pixel: u32, half: Half, level: u8) -> Self {
-        Self { pixel, half, level, samples: PILOT_SAMPLES << u32::from(level.saturating_sub(1)) }
+        Self { pixel, half, level, first: 0, samples: PILOT_SAMPLES << u32::from(level.saturating_sub(1)) }
+    }
+
+    /// What is left of the doubling that a half is in after `taken` samples.
+    pub fn rest(pixel: u32, half: Half, taken: u32) -> Self {
+        let level = if taken < PILOT_SAMPLES { 0 } else { 1 + (taken / PILOT_SAMPLES).ilog2() as u8 };
+        let whole = Self::whole(pixel, half, level);
+        let first = if level == 0 { taken } else { taken - whole.samples };
+        Self { first, samples: whole.samples - first, ..whole }
     }
 }
 
 /// Samples of the pilot in each half.
 pub const PILOT_SAMPLES: u32 = 8;
-
-/// Samples that a half has after a level.
-pub fn samples_through(level: u8) -> u64 {
-    u64::from(PILOT_SAMPLES) << level
-}
 
 /// What to trace next. Plain data: deciding it and doing it are two things.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -86,27 +96,18 @@ pub struct PathTracer {
     lights: Lights,
     camera: CameraRays,
     settings: TraceSettings,
-    /// By material; only rough dielectrics have one.
-    dielectric_tables: Vec<Option<DielectricTables>>,
+    /// By material.
+    surface_tables: Vec<SurfaceTables>,
 }
 
 impl PathTracer {
     /// Builds trees and light tables.
     pub fn new(scene: Arc<Scene>, settings: TraceSettings) -> Self {
         let camera = CameraRays::new(&scene.camera, settings.width, settings.height);
-        let dielectric_tables = scene
-            .materials
-            .iter()
-            .map(|m| match m.surface {
-                Surface::Dielectric { ior, roughness, .. } if roughness.factor > 0.0 => {
-                    Some(DielectricTables::new(ior))
-                }
-                _ => None,
-            })
-            .collect();
+        let surface_tables = tables::of_materials(&scene.materials);
         let world = World::new(scene);
         let lights = Lights::new(&world);
-        Self { world, lights, camera, settings, dielectric_tables }
+        Self { world, lights, camera, settings, surface_tables }
     }
 
     /// The settings it was made with.
@@ -119,9 +120,20 @@ impl PathTracer {
         &self.world
     }
 
-    /// Takes the samples of a plan into the film, in parallel, with the same result for any number of threads: each
-    /// block is summed by one thread, and blocks are merged in the plan's order.
+    /// Takes the samples of a plan into the film, in parallel, with the same result for any number of threads.
     pub fn trace(&self, plan: &SamplePlan, film: &mut Film, progress: &(dyn Fn(u64) + Sync)) {
+        self.trace_into(plan, self.settings.seed, &mut |work, sum| film.merge_block(work, sum), progress);
+    }
+
+    /// Hands the sums of a plan's blocks, sampled by `seed`, to `merge`: each block is summed by one thread, and blocks
+    /// come in the plan's order.
+    pub fn trace_into(
+        &self,
+        plan: &SamplePlan,
+        seed: u64,
+        merge: &mut dyn FnMut(BlockWork, &BlockSum),
+        progress: &(dyn Fn(u64) + Sync),
+    ) {
         // Batches bound the memory of unmerged blocks; chunks of near equal work keep both ends of a batch busy.
         const BLOCKS_PER_BATCH: usize = 1 << 16;
         const SAMPLES_PER_CHUNK: u64 = 2_048;
@@ -139,29 +151,33 @@ impl PathTracer {
                 .par_iter()
                 .with_max_len(1)
                 .map(|chunk| {
-                    let sums = chunk.iter().map(|&block| self.trace_block(block)).collect();
+                    let sums = chunk.iter().map(|&block| self.trace_block(block, seed)).collect();
                     progress(chunk.iter().map(|b| u64::from(b.samples)).sum());
                     sums
                 })
                 .collect();
             for (block, sum) in batch.iter().zip(sums.iter().flatten()) {
-                film.merge_block(*block, sum);
+                merge(*block, sum);
             }
         }
     }
 
     /// Sums one block of one pixel.
-    fn trace_block(&self, block: BlockWork) -> BlockSum {
-        let key = BlockKey { seed: self.settings.seed, pixel: block.pixel, half: block.half, level: block.level };
+    fn trace_block(&self, block: BlockWork, seed: u64) -> BlockSum {
+        let key = BlockKey { seed, pixel: block.pixel, half: block.half, level: block.level };
         let pixel = Vec2::new(
             (block.pixel % self.settings.width) as f32 + 0.5,
             (block.pixel / self.settings.width) as f32 + 0.5,
         );
         let mut sum = BlockSum::default();
-        for sample in key.samples(block.samples) {
+        for sample in key.samples(block.first + block.samples).skip(block.first as usize) {
             let [x, y, lens_u, lens_v] = sample.draw(Purpose::Camera);
             let ray = self.camera.ray(pixel + self.settings.filter.sample(x, y), [lens_u, lens_v]);
-            sum.add(&self.trace_path(ray, sample));
+            let mut path = self.trace_path(ray, sample);
+            if let Some(clamp) = self.settings.clamp {
+                path.radiance *= (clamp / path.radiance.max_element().max(clamp)).min(1.0);
+            }
+            sum.add(&path);
         }
         sum
     }

@@ -4,6 +4,7 @@
 //! - `furnace`: energy: closed and open white furnaces with known answers
 //! - `direct_light`: irradiance from a rectangle, a sphere, a point and an environment against closed forms
 //! - `adaptive_render`: adaptive and uniform renders against a reference: bias, calibration, determinism
+//! - `bench`: the benchmark from end to end, small
 //! - `bad_input`: bad scene files, and our own ones
 //! - `load_assets`: scenes that others made, sound and damaged
 //! - `no_allocation`: the heap is left alone while paths are traced
@@ -11,6 +12,7 @@
 
 mod adaptive_render;
 mod bad_input;
+mod bench;
 mod command_line;
 mod direct_light;
 mod furnace;

@@ -1,6 +1,6 @@
 //! Scenes made in code, and rendering them.
 
-use fechner::adaptive::settings::{DEFAULT_MAX_SAMPLES, Limits, LoopSettings, Sampling};
+use fechner::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, Sampling};
 use fechner::integrator::{PathTracer, TraceSettings};
 use fechner::sampler::{BlockKey, Half, PixelFilter, Purpose};
 use fechner::scene::{
@@ -88,7 +88,7 @@ pub(crate) fn add_rectangle(scene: &mut Scene, corner: Vec3, edge_u: Vec3, edge_
 }
 
 pub(crate) fn trace_settings(width: u32, height: u32, seed: u64) -> TraceSettings {
-    TraceSettings { width, height, seed, max_depth: 1_000, filter: PixelFilter::Box }
+    TraceSettings { width, height, seed, max_depth: 1_000, filter: PixelFilter::Box, clamp: None }
 }
 
 /// Mean and standard error of the radiance along one ray, from `blocks` independent blocks of `samples`.
@@ -114,6 +114,8 @@ pub(crate) fn radiance_along(
 pub(crate) fn loop_settings(nits_per_unit: f64, sampling: Sampling, visibility: f64, spp: Option<u32>) -> LoopSettings {
     LoopSettings {
         sampling,
+        allocation: AllocationRule::default(),
+        model: None,
         limits: Limits { visibility, time: None, mean_samples: spp, max_samples: DEFAULT_MAX_SAMPLES, plans: None },
         viewing: Viewing::of(Display::preset("desktop").expect("a preset")),
         nits_per_unit,
