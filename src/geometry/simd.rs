@@ -240,8 +240,12 @@ mod avx2 {
     }
 }
 
+/// Whole arrays at each step, so that the compiler can use what vectors the target has.
 mod portable {
     use super::*;
+    use std::array::from_fn;
+
+    type Row = [f32; LANES];
 
     fn min(a: f32, b: f32) -> f32 {
         if a < b { a } else { b }
@@ -251,45 +255,64 @@ mod portable {
         if a > b { a } else { b }
     }
 
+    /// One bit for each lane.
+    fn mask(lanes: [bool; LANES]) -> u32 {
+        let bits: [u32; LANES] = from_fn(|lane| u32::from(lanes[lane]) << lane);
+        bits.iter().fold(0, |all, bit| all | bit)
+    }
+
     #[inline]
     pub(super) fn meet(node: &Node, ray: &BoxRay, t_max: f32) -> Met {
-        let near =
-            |axis: usize, lane: usize| (node.planes[ray.near[axis]][lane] - ray.origin[axis]) * ray.inverse[axis];
-        let far = |axis: usize, lane: usize| {
-            (node.planes[ray.near[axis] ^ 1][lane] - ray.origin[axis]) * ray.inverse_far[axis]
+        let near = |axis: usize| -> Row {
+            let plane = &node.planes[ray.near[axis]];
+            from_fn(|lane| (plane[lane] - ray.origin[axis]) * ray.inverse[axis])
         };
-        let enter: [f32; LANES] =
-            std::array::from_fn(|lane| max(max(near(0, lane), near(1, lane)), max(near(2, lane), 0.0)));
-        let leave: [f32; LANES] =
-            std::array::from_fn(|lane| min(min(far(0, lane), far(1, lane)), min(far(2, lane), t_max)));
-        let met = (0..LANES).fold(0, |met, lane| met | u32::from(enter[lane] <= leave[lane]) << lane);
-        Met { slots: met, distances: Lanes(enter) }
+        let far = |axis: usize| -> Row {
+            let plane = &node.planes[ray.near[axis] ^ 1];
+            from_fn(|lane| (plane[lane] - ray.origin[axis]) * ray.inverse_far[axis])
+        };
+        let (x, y, z) = (near(0), near(1), near(2));
+        let enter: Row = from_fn(|lane| max(max(x[lane], y[lane]), max(z[lane], 0.0)));
+        let (x, y, z) = (far(0), far(1), far(2));
+        let leave: Row = from_fn(|lane| min(min(x[lane], y[lane]), min(z[lane], t_max)));
+        Met { slots: mask(from_fn(|lane| enter[lane] <= leave[lane])), distances: Lanes(enter) }
     }
 
     #[inline]
     pub(super) fn hits(block: &Block, ray: &ShearedRay, t_max: f32) -> Candidates {
         let [xs, ys, zs] = ray.axes.map(|axis| &block.corners[axis]);
         let origin = ray.axes.map(|axis| ray.origin[axis]);
-        let none = Lanes([0.0; LANES]);
-        let mut found = Candidates { lanes: 0, doubtful: 0, t: none, b1: none, b2: none };
-        for lane in 0..LANES {
-            let sheared = |vertex: usize| {
-                let z = zs[vertex][lane] - origin[2];
-                [(xs[vertex][lane] - origin[0]) - ray.shear_x * z, (ys[vertex][lane] - origin[1]) - ray.shear_y * z, z]
-            };
-            let (a, b, c) = (sheared(0), sheared(1), sheared(2));
-            let cross = |p: &[f32; 3], q: &[f32; 3]| p[0] * q[1] - p[1] * q[0];
-            let (u, v, w) = (cross(&c, &b), cross(&a, &c), cross(&b, &a));
-            if !(min(min(u, v), w) >= 0.0 || max(max(u, v), w) <= 0.0) {
-                continue;
-            }
-            let inverse = 1.0 / (u + v + w);
-            let t = ray.scale_z * (u * a[2] + v * b[2] + w * c[2]) * inverse;
-            let doubtful = u == 0.0 || v == 0.0 || w == 0.0;
-            found.doubtful |= u32::from(doubtful) << lane;
-            found.lanes |= u32::from(doubtful || (t > 0.0 && t <= t_max)) << lane;
-            (found.t.0[lane], found.b1.0[lane], found.b2.0[lane]) = (t, v * inverse, w * inverse);
+        let sheared = |vertex: usize| -> [Row; 3] {
+            let z: Row = from_fn(|lane| zs[vertex][lane] - origin[2]);
+            [
+                from_fn(|lane| (xs[vertex][lane] - origin[0]) - ray.shear_x * z[lane]),
+                from_fn(|lane| (ys[vertex][lane] - origin[1]) - ray.shear_y * z[lane]),
+                z,
+            ]
+        };
+        let (a, b, c) = (sheared(0), sheared(1), sheared(2));
+        let cross =
+            |p: &[Row; 3], q: &[Row; 3]| -> Row { from_fn(|lane| p[0][lane] * q[1][lane] - p[1][lane] * q[0][lane]) };
+        let (u, v, w) = (cross(&c, &b), cross(&a, &c), cross(&b, &a));
+        let least: Row = from_fn(|lane| min(min(u[lane], v[lane]), w[lane]));
+        let most: Row = from_fn(|lane| max(max(u[lane], v[lane]), w[lane]));
+        let inside = mask(from_fn(|lane| (least[lane] >= 0.0) | (most[lane] <= 0.0)));
+        if inside == 0 {
+            let none = Lanes([0.0; LANES]);
+            return Candidates { lanes: 0, doubtful: 0, t: none, b1: none, b2: none };
         }
-        found
+        let doubtful = inside & mask(from_fn(|lane| (u[lane] == 0.0) | (v[lane] == 0.0) | (w[lane] == 0.0)));
+        let inverse: Row = from_fn(|lane| 1.0 / (u[lane] + v[lane] + w[lane]));
+        let t: Row = from_fn(|lane| {
+            ray.scale_z * (u[lane] * a[2][lane] + v[lane] * b[2][lane] + w[lane] * c[2][lane]) * inverse[lane]
+        });
+        let between = mask(from_fn(|lane| (t[lane] > 0.0) & (t[lane] <= t_max)));
+        Candidates {
+            lanes: inside & between | doubtful,
+            doubtful,
+            t: Lanes(t),
+            b1: Lanes(from_fn(|lane| v[lane] * inverse[lane])),
+            b2: Lanes(from_fn(|lane| w[lane] * inverse[lane])),
+        }
     }
 }
