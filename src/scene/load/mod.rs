@@ -25,8 +25,10 @@ mod gltf;
 pub mod metals;
 mod mtl;
 mod obj;
+mod ply;
 mod polygon;
 pub mod shapes;
+mod spectrum;
 #[path = "texture.rs"]
 mod texture;
 mod toml;

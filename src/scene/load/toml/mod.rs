@@ -9,7 +9,7 @@ mod object;
 use self::fields::{Fields, Source, Value};
 use super::builder::{Builder, IfDark, NamedCamera};
 use super::error::LoadError;
-use super::texture::{IfMissing, Picture, Request};
+use super::texture::{Adjust, IfMissing, Picture, Request};
 use super::{LoadOptions, environment, files};
 use crate::scene::{Camera, Encoding, FilmDefaults, Scene, ViewingDefaults, Wrap};
 use ::toml::de::DeTable;
@@ -206,6 +206,7 @@ fn read_texture(value: &Value, folder: &Path) -> Result<TextureEntry, LoadError>
             wrap_v: wrap,
             nearest: fields.get_or("nearest", false, Value::boolean)?,
             if_missing: IfMissing::Fail(file.place()),
+            adjust: Adjust::NONE,
         },
         encoding: fields.get_some("encoding", |value| value.choice(&encodings))?,
     })
