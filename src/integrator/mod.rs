@@ -1,23 +1,25 @@
 //! The path tracer: [`PathTracer::trace`] turns a [`SamplePlan`] into film.
 //!
-//! `path` holds the life of one sample, `camera` where it starts, `shading` what a surface point scatters like.
+//! `path` holds the life of one sample, `camera` where it starts, `shading` what a surface point scatters like,
+//! `tables` what materials compute beforehand.
 
 mod camera;
 mod path;
 mod shading;
+mod tables;
 
 pub use camera::CameraRays;
 pub use path::{FirstHit, PathSample};
 
-use crate::bsdf::DielectricTables;
 use crate::film::{BlockSum, Film};
 use crate::geometry::World;
 use crate::light::Lights;
 use crate::sampler::{BlockKey, Half, PixelFilter, Purpose};
-use crate::scene::{Scene, Surface};
+use crate::scene::Scene;
 use glam::Vec2;
 use rayon::prelude::*;
 use std::sync::Arc;
+use tables::SurfaceTables;
 
 /// What does not change during a render.
 #[derive(Clone, Copy, Debug)]
@@ -86,27 +88,18 @@ pub struct PathTracer {
     lights: Lights,
     camera: CameraRays,
     settings: TraceSettings,
-    /// By material; only rough dielectrics have one.
-    dielectric_tables: Vec<Option<DielectricTables>>,
+    /// By material.
+    surface_tables: Vec<SurfaceTables>,
 }
 
 impl PathTracer {
     /// Builds trees and light tables.
     pub fn new(scene: Arc<Scene>, settings: TraceSettings) -> Self {
         let camera = CameraRays::new(&scene.camera, settings.width, settings.height);
-        let dielectric_tables = scene
-            .materials
-            .iter()
-            .map(|m| match m.surface {
-                Surface::Dielectric { ior, roughness, .. } if roughness.factor > 0.0 => {
-                    Some(DielectricTables::new(ior))
-                }
-                _ => None,
-            })
-            .collect();
+        let surface_tables = tables::of_materials(&scene.materials);
         let world = World::new(scene);
         let lights = Lights::new(&world);
-        Self { world, lights, camera, settings, dielectric_tables }
+        Self { world, lights, camera, settings, surface_tables }
     }
 
     /// The settings it was made with.

@@ -4,7 +4,7 @@
 //! and Russian roulette.
 
 use super::PathTracer;
-use super::shading::Shading;
+use super::shading::{Components, Shading};
 use crate::geometry::{Hit, Ray, SurfacePoint};
 use crate::light::LightSample;
 use crate::sampler::{Purpose, Sample};
@@ -77,7 +77,8 @@ impl PathTracer {
             let point = self.world.surface(&path.ray, &hit);
             let wo = -Vec3::from(path.ray.direction);
             let emitted = self.add_emission(&mut path, &hit, &point);
-            let shading = self.shading(&point, wo);
+            let components = Components::new();
+            let shading = self.shading(&point, wo, &components);
             if bounce == 0 {
                 let albedo = shading.bsdf.albedo(shading.frame.to_local(wo)).clamp(Vec3::ZERO, Vec3::ONE);
                 first_hit = FirstHit {
@@ -174,10 +175,8 @@ fn scatter(path: &mut PathState, point: &SurfacePoint, shading: &Shading, wo: Ve
         return false;
     }
     path.throughput *= scattered.weight;
-    if scattered.lobe.is_transmission() {
-        let n_squared = shading.relative_ior * shading.relative_ior;
-        let entering = wo.dot(shading.frame.normal()) > 0.0;
-        path.radiance_gain_on_exit *= if entering { n_squared } else { 1.0 / n_squared };
+    if let Some(index) = scattered.crossed_index {
+        path.radiance_gain_on_exit *= index * index;
     }
     path.scatter_pdf = (!scattered.lobe.is_delta()).then_some(scattered.pdf);
     path.from = point.position;

@@ -5,8 +5,14 @@ use super::sphere::{Bins, integrate};
 use super::statistics::{Mean, Random, normal_p, sidak};
 use glam::Vec3;
 
-/// Share of the light that a lossless model may be off by.
-const TOLERANCE: f64 = 0.005;
+/// Share of the light that a model may be off by; none may give back more than comes in by more than that.
+const fn tolerance(budget: Budget) -> f64 {
+    match budget {
+        Budget::Lossless | Budget::AtMost => 0.005,
+        Budget::NearlyLossless => 0.01,
+    }
+}
+
 const SAMPLES: usize = 60_000;
 /// Error of quadrature along the edges that refraction makes.
 const QUADRATURE_ERROR: f64 = 1e-3;
@@ -57,19 +63,23 @@ fn all_cases() -> Vec<Case> {
 
 #[test]
 fn lossless_models_give_back_everything_by_quadrature() {
-    let mut worst = (0.0, String::new());
+    let mut failures = Vec::new();
     for case in all_cases() {
+        let mut worst = (0.0, String::new());
         for wo in views() {
             let energy = by_quadrature(&case, wo);
             let what = format!("{} cos {}: {energy:.5}", case.name, wo.z);
-            assert!(energy < 1.0 + TOLERANCE, "{what}");
-            if case.budget == Budget::Lossless && (energy - 1.0).abs() > worst.0 {
-                worst = ((energy - 1.0f64).abs(), what);
+            let error = if case.budget == Budget::AtMost { energy - 1.0 } else { (energy - 1.0).abs() };
+            if error > worst.0 {
+                worst = (error, what);
             }
         }
+        println!("worst furnace error: {worst:?}");
+        if worst.0 > tolerance(case.budget) {
+            failures.push(worst.1);
+        }
     }
-    println!("worst furnace error: {worst:?}");
-    assert!(worst.0 < TOLERANCE, "{worst:?}");
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
 /// Significance 1e-3 over all models and views.

@@ -5,6 +5,7 @@ mod light;
 mod material;
 mod motion;
 mod object;
+mod surface;
 
 use self::fields::{Fields, Source, Value};
 use super::builder::{Builder, IfDark, NamedCamera};
