@@ -4,6 +4,7 @@ use super::PathTracer;
 use crate::bsdf::Bsdf;
 use crate::geometry::SurfacePoint;
 use crate::geometry::surface::Frame;
+use crate::light::LightReceiver;
 use crate::scene::{Material, Surface};
 use glam::Vec3;
 
@@ -14,9 +15,18 @@ pub(super) struct Shading<'a> {
     pub(super) geometric_normal: Vec3,
     /// Index of refraction behind the surface over that in front of it; 1 where light is not refracted.
     pub(super) relative_ior: f32,
+    /// Whether light can come from the other side.
+    pub(super) transmits: bool,
 }
 
 impl Shading<'_> {
+    /// What the choice of a light may know of this point: surfaces that transmit receive from both sides.
+    pub(super) fn receiver(&self, point: &SurfacePoint, wo: Vec3) -> LightReceiver {
+        let side = if wo.dot(self.geometric_normal) >= 0.0 { 1.0 } else { -1.0 };
+        let normal = if self.transmits { Vec3::ZERO } else { side * self.geometric_normal };
+        LightReceiver { position: point.position, normal }
+    }
+
     /// Whether two world directions are on the same side of the surface by both normals, or on opposite sides by both.
     /// Where shading and geometric normal disagree, light would leak through: such pairs scatter nothing.
     pub(super) fn sides_agree(&self, a: Vec3, b: Vec3) -> bool {
@@ -59,7 +69,12 @@ impl PathTracer {
             Surface::Dielectric { ior, .. } => ior,
             _ => 1.0,
         };
-        Shading { bsdf, frame, geometric_normal: point.geometric_normal, relative_ior }
+        let transmits = match material.surface {
+            Surface::Diffuse { .. } | Surface::Mirror { .. } | Surface::Conductor { .. } => false,
+            Surface::MetalRoughness { transmission, .. } => transmission.factor > 0.0,
+            _ => true,
+        };
+        Shading { bsdf, frame, geometric_normal: point.geometric_normal, relative_ior, transmits }
     }
 
     fn shading_normal(&self, material: &Material, point: &SurfacePoint) -> Vec3 {

@@ -1,6 +1,6 @@
 //! What a renderer asks of materials besides their values at a point.
 
-use super::{Material, Texels, Texture};
+use super::{Alpha, Material, Texels, Texture};
 use glam::{Vec2, Vec3};
 
 impl Material {
@@ -14,6 +14,17 @@ impl Material {
             Some(lookup) => self.emission.factor * mean_color(&textures[lookup.texture.0 as usize]),
         };
         (mean.max_element() > 0.0).then_some(mean)
+    }
+}
+
+impl Alpha {
+    /// Probability that the surface is there, at texture coordinates.
+    pub fn coverage(&self, textures: &[Texture], uv: Vec2) -> f32 {
+        match self {
+            Self::Opaque => 1.0,
+            Self::Mask { value, cutoff } => f32::from(u8::from(value.evaluate(textures, uv) >= *cutoff)),
+            Self::Blend { value } => value.evaluate(textures, uv).clamp(0.0, 1.0),
+        }
     }
 }
 

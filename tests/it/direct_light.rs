@@ -5,7 +5,7 @@ use crate::support::{
 };
 use fechner::geometry::Ray;
 use fechner::integrator::{PathTracer, TraceSettings};
-use fechner::scene::{Light, Scene};
+use fechner::scene::{Light, Scene, SpotFalloff};
 use glam::{Vec3, vec3a};
 use std::f32::consts::{FRAC_1_PI, PI};
 use std::sync::Arc;
@@ -25,7 +25,7 @@ fn assert_irradiance(scene: Scene, x: f32, expected_irradiance: f32, what: &str)
     // One scattering event: direct light only.
     let settings = TraceSettings { max_depth: 1, ..trace_settings(16, 16, 0) };
     let tracer = PathTracer::new(Arc::new(scene), settings);
-    let ray = Ray { origin: vec3a(x - 0.1, 0.2, 0.0), direction: vec3a(0.1, -0.2, 0.0).normalize() };
+    let ray = Ray::new(vec3a(x - 0.1, 0.2, 0.0), vec3a(0.1, -0.2, 0.0).normalize());
     let (mean, error) = radiance_along(&tracer, ray, 16, 16384);
     let expected = ALBEDO * FRAC_1_PI * expected_irradiance;
     assert!(
@@ -86,10 +86,15 @@ fn lights_without_area_follow_their_laws() {
         intensity: Vec3::splat(8.0),
         inner_angle: 1.0,
         outer_angle: 1.2,
+        falloff: SpotFalloff::Smoothstep,
     });
     assert_irradiance(spot, 1.5, 8.0 / 6.25 * 0.8, "inside the cone of a spot");
     let mut sun = floor();
-    sun.lights.push(Light::Directional { direction: Vec3::new(0.6, -0.8, 0.0), irradiance: Vec3::splat(2.0) });
+    sun.lights.push(Light::Directional {
+        direction: Vec3::new(0.6, -0.8, 0.0),
+        irradiance: Vec3::splat(2.0),
+        angular_radius: 0.0,
+    });
     assert_irradiance(sun, 0.0, 1.6, "directional");
 }
 

@@ -27,6 +27,7 @@ mod mtl;
 mod obj;
 mod polygon;
 pub mod shapes;
+pub mod sky;
 #[path = "texture.rs"]
 mod texture;
 mod toml;
