@@ -10,7 +10,7 @@ pub mod settings;
 pub mod statistics;
 
 use crate::film::Film;
-use crate::integrator::{PathTracer, SamplePlan};
+use crate::integrator::{Crop, PathTracer, SamplePlan};
 use judge::{JudgeError, Judgement, judge};
 use plan::{adaptive_plan, cut_to_budget, pilot_plan, remainder_plan, slices, uniform_plan};
 use settings::{LoopSettings, Sampling, ladder};
@@ -101,7 +101,7 @@ enum Step {
 /// Only if the perception model refuses the picture, which would be a defect of ours.
 pub fn render(tracer: &PathTracer, settings: &LoopSettings, monitor: &dyn Monitor) -> Result<Rendered, JudgeError> {
     let started = Instant::now();
-    let (width, height) = (tracer.settings().width, tracer.settings().height);
+    let Crop { width, height, .. } = tracer.settings().film_area();
     let mut film = Film::new(width, height);
     let mut rungs = VecDeque::from(ladder(settings.limits.visibility));
     let mut seconds_perception = 0.0;

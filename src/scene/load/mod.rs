@@ -29,6 +29,7 @@ mod ply;
 mod polygon;
 pub mod shapes;
 mod spectrum;
+pub mod sky;
 #[path = "texture.rs"]
 mod texture;
 mod toml;
