@@ -14,7 +14,7 @@ use fechner::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, L
 use fechner::adaptive::{Quiet, render};
 use fechner::film::opponent;
 use fechner::integrator::{DEFAULT_MAX_DEPTH, PathTracer, TraceSettings};
-use fechner::sampler::{Half, PixelFilter};
+use fechner::sampler::{Half, PixelFilter, Sequence};
 use fechner::scene::load::{LoadOptions, load};
 use fechner_perception::allocation::{AllocationProblem, allocate};
 use fechner_perception::tone::{FittedTone, SceneGuide, operator};
@@ -171,6 +171,8 @@ fn cached(root: &Path, arm: &Arm) -> Result<Run> {
         max_depth: DEFAULT_MAX_DEPTH,
         clamp: None,
         filter: PixelFilter::Gaussian,
+        sequence: Sequence::PerPixel,
+        crop: None,
     };
     let rendered = render(&PathTracer::new(Arc::new(scene), trace), &settings, &Quiet)?;
     let halves = Half::BOTH.map(|half| {

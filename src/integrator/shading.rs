@@ -5,6 +5,7 @@ use super::tables::{SurfaceTables, slope_width};
 use crate::bsdf::{Bsdf, CoatedDiffuse, Conductor, Dielectric, Microfacets};
 use crate::geometry::SurfacePoint;
 use crate::geometry::surface::Frame;
+use crate::light::LightReceiver;
 use crate::scene::{ColorInput, Material, Roughness, ScalarInput, Surface, Texture};
 use glam::{Vec2, Vec3};
 use std::cell::{Cell, OnceCell};
@@ -14,6 +15,8 @@ pub(super) struct Shading<'a> {
     pub(super) bsdf: Bsdf<'a>,
     pub(super) frame: Frame,
     pub(super) geometric_normal: Vec3,
+    /// Whether light can come from the other side.
+    pub(super) transmits: bool,
 }
 
 /// Components of a mix, two for each of its nodes: a place to stay for what the mix refers to, on the stack of the path.
@@ -113,6 +116,13 @@ impl Reader<'_> {
 }
 
 impl Shading<'_> {
+    /// What the choice of a light may know of this point: surfaces that transmit receive from both sides.
+    pub(super) fn receiver(&self, point: &SurfacePoint, wo: Vec3) -> LightReceiver {
+        let side = if wo.dot(self.geometric_normal) >= 0.0 { 1.0 } else { -1.0 };
+        let normal = if self.transmits { Vec3::ZERO } else { side * self.geometric_normal };
+        LightReceiver { position: point.position, normal }
+    }
+
     /// Whether two world directions are on the same side of the surface by both normals, or on opposite sides by both.
     /// Where shading and geometric normal disagree, light would leak through: such pairs scatter nothing.
     pub(super) fn sides_agree(&self, a: Vec3, b: Vec3) -> bool {
@@ -130,10 +140,16 @@ impl PathTracer {
         let material = &scene.materials[material_id];
         let normal = seen_side(self.shading_normal(material, point), point.geometric_normal, wo);
         let reader = Reader { textures: &scene.textures, uv: point.uv };
+        let transmits = match &material.surface {
+            Surface::Diffuse { .. } | Surface::Mirror { .. } | Surface::Conductor { .. } => false,
+            Surface::MetalRoughness(model) => model.transmission.factor > 0.0,
+            _ => true,
+        };
         Shading {
             bsdf: reader.bsdf(&material.surface, &self.surface_tables[material_id], components),
             frame: Frame::new(normal, point.tangent),
             geometric_normal: point.geometric_normal,
+            transmits,
         }
     }
 
