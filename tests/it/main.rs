@@ -8,6 +8,7 @@
 //! - `camera_and_time`: blur of lens and shutter, moving lamps, crops
 //! - `bad_input`: bad scene files, and our own ones
 //! - `load_assets`: scenes that others made, sound and damaged
+//! - `no_allocation`: the heap is left alone while paths are traced
 //! - `command_line`: the program as a user runs it
 
 mod adaptive_render;
@@ -18,4 +19,5 @@ mod command_line;
 mod direct_light;
 mod furnace;
 mod load_assets;
+mod no_allocation;
 mod support;
