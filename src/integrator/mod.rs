@@ -1,9 +1,11 @@
 //! The path tracer: [`PathTracer::trace`] turns a [`SamplePlan`] into film.
 //!
 //! `path` holds the life of one sample, `camera` where it starts, `shading` what a surface point scatters like,
-//! `tables` what materials compute beforehand.
+//! `tables` what materials compute beforehand,
+//! `media` what a ray travels in.
 
 mod camera;
+mod media;
 mod path;
 mod shading;
 mod tables;
@@ -127,6 +129,8 @@ pub struct PathTracer {
     /// Whether anything moves while the shutter is open.
     moves: bool,
     settings: TraceSettings,
+    /// Whether any volume absorbs, so that paths must know what they are in.
+    absorbs: bool,
     /// By material.
     surface_tables: Vec<SurfaceTables>,
 }
@@ -135,11 +139,14 @@ impl PathTracer {
     /// Builds trees and light tables.
     pub fn new(scene: Arc<Scene>, settings: TraceSettings) -> Self {
         let camera = CameraRays::new(&scene.camera, settings.width, settings.height);
+        let absorbs = scene.materials.iter().any(|material| {
+            material.surface.interior_absorption().is_some_and(|absorption| absorption.max_element() > 0.0)
+        });
         let surface_tables = tables::of_materials(&scene.materials);
         let moves = scene.moves();
         let world = World::new(scene);
         let lights = Lights::new(&world);
-        Self { world, lights, camera, moves, settings, surface_tables }
+        Self { world, lights, camera, moves, settings, absorbs, surface_tables }
     }
 
     /// The settings it was made with.
