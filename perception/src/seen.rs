@@ -57,12 +57,11 @@ pub fn display_chromatic_variance(fitted: &dyn FittedTone, display: &Display, me
         return Plane::filled(width, height, f32::INFINITY);
     }
     let shown = Shown { fitted, display };
-    let black = shown.cd_m2(0.0);
     let mut result = Plane::filled(width, height, 0.0);
     result.for_each_row_mut(|y, row| {
-        for (value, (mean, variance)) in row.iter_mut().zip(mean.row(y).iter().zip(variance.row(y))) {
-            let luminance = mean.max(1e-6);
-            let slope = (shown.cd_m2(luminance) - black) / luminance;
+        for (x, (value, (mean, variance))) in row.iter_mut().zip(mean.row(y).iter().zip(variance.row(y))).enumerate() {
+            let (pixel, luminance) = (Pixel { x, y }, mean.max(1e-6));
+            let slope = (shown.cd_m2(pixel, luminance) - shown.cd_m2(pixel, 0.0)) / luminance;
             let displayed = slope * slope * variance.max(0.0);
             *value = if mean.is_finite() && displayed.is_finite() { displayed } else { f32::INFINITY };
         }

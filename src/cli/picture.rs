@@ -49,13 +49,14 @@ impl InputPicture {
             })
         };
         let nits_per_unit = nits_per_unit.or_else(in_file).with_context(|| no_unit(path))?;
-        let [r, g, b] = ["R", "G", "B"].map(|c| find_channel(exr, &[c], c));
-        let (Some(r), Some(g), Some(b)) = (r, g, b) else {
-            bail!("{}: there are no channels R, G and B; `fechner info` lists what there is", path.display());
+        let Some(picture) = exr.scene_picture(|exr, name| find_channel(exr, &[name], name)) else {
+            bail!("{}: there are no channels R, G and B, nor Y; `fechner info` lists what there is", path.display());
         };
-        let rgb = (0..r.len()).map(|i| [r[i], g[i], b[i]]).collect();
+        for note in &picture.notes {
+            eprintln!("note: {}: {note}", path.display());
+        }
         let content = Content::Scene { nits_per_unit };
-        Ok(Self { width: exr.width as usize, height: exr.height as usize, rgb, content })
+        Ok(Self { width: picture.width as usize, height: picture.height as usize, rgb: picture.rgb, content })
     }
 
     fn from_image(path: &Path, content: Content) -> Result<Self> {
@@ -91,6 +92,13 @@ impl InputPicture {
             let value = luminance(self.rgb[y * self.width + x]) * nits_per_unit as f32;
             if value.is_finite() { value.max(0.0) } else { 0.0 }
         }))
+    }
+
+    /// Linear RGB in cd/m² of the scene; `None` for a picture that is ready for the display.
+    pub(super) fn scene_rgb_cd_m2(&self) -> Option<Vec<[f32; 3]>> {
+        let Content::Scene { nits_per_unit } = self.content else { return None };
+        let cd_m2 = |value: f32| (f64::from(value) * nits_per_unit).clamp(-1e30, 1e30) as f32;
+        Some(self.rgb.iter().map(|pixel| pixel.map(cd_m2)).collect())
     }
 
     /// Luminance in cd/m² that the display sends to the eye.

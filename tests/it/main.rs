@@ -7,6 +7,7 @@
 //! - `bad_input`: bad scene files, and our own ones
 //! - `load_assets`: scenes that others made, sound and damaged
 //! - `command_line`: the program as a user runs it
+//! - `tonemap`: HDR pictures for displays, one by one and over time
 
 mod adaptive_render;
 mod bad_input;
@@ -15,3 +16,4 @@ mod direct_light;
 mod furnace;
 mod load_assets;
 mod support;
+mod tonemap;

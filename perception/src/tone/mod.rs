@@ -14,7 +14,6 @@ use std::fmt::Debug;
 
 use crate::display::Viewing;
 use crate::photometry::luminance;
-use crate::plane::Plane;
 
 mod absolute;
 pub mod acuity;
