@@ -287,7 +287,9 @@ fn write(
     report: &Report,
 ) -> anyhow::Result<()> {
     match format {
-        output::Format::Png => output::rendered::write_display_png(&arguments.output, rendered)?,
+        output::Format::Png => {
+            output::rendered::write_display_png(&arguments.output, rendered, &settings.viewing.display)?;
+        }
         output::Format::Exr => {
             output::rendered::write_layers_exr(
                 &arguments.output,

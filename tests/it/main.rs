@@ -10,6 +10,7 @@
 //! - `load_assets`: scenes that others made, sound and damaged
 //! - `no_allocation`: the heap is left alone while paths are traced
 //! - `command_line`: the program as a user runs it
+//! - `tonemap`: HDR pictures for displays, one by one and over time
 
 mod adaptive_render;
 mod bad_input;
@@ -21,3 +22,4 @@ mod furnace;
 mod load_assets;
 mod no_allocation;
 mod support;
+mod tonemap;
