@@ -13,7 +13,7 @@ use anyhow::{Context, Result, bail};
 use fechner::film::Film;
 use fechner::integrator::{BlockWork, PathTracer, SamplePlan, TraceSettings};
 use fechner::sampler::{Half, PixelFilter};
-use fechner::scene::{ColorInput, Material, MaterialId, ScalarInput, Scene, Surface};
+use fechner::scene::{ColorInput, Material, MaterialId, Roughness, Scene, Surface};
 use fechner_perception::photometry::luminance;
 use glam::Vec3;
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -33,13 +33,15 @@ fn main() -> Result<()> {
     println!("| --- | --- | --- | --- | --- |");
     let glass = Surface::Dielectric {
         ior: 1.5,
-        roughness: ScalarInput::constant(0.0),
+        roughness: Roughness::SMOOTH,
         transmittance: ColorInput::constant(Vec3::ONE),
+        absorption: Vec3::ZERO,
     };
     let copper = Surface::Conductor {
         eta: Vec3::new(0.200, 0.924, 1.102),
         k: Vec3::new(3.912, 2.452, 2.142),
-        roughness: ScalarInput::constant(0.0),
+        tint: ColorInput::constant(Vec3::ONE),
+        roughness: Roughness::SMOOTH,
     };
     compare("Cornell box, diffuse", "diffuse", cornell_box()?)?;
     compare("Cornell box, copper ball", "copper", with_ball(cornell_box()?, copper))?;
@@ -129,7 +131,8 @@ fn ours_like(pictures: &mut Pictures, pixels: &[[f32; 3]]) {
 
 /// One picture of ours: its luminances.
 fn render(scene: &Arc<Scene>, seed: u64) -> Vec<f64> {
-    let settings = TraceSettings { width: SIZE, height: SIZE, seed, max_depth: MAX_DEPTH, filter: PixelFilter::Box };
+    let settings =
+        TraceSettings { width: SIZE, height: SIZE, seed, max_depth: MAX_DEPTH, filter: PixelFilter::Box, clamp: None };
     let levels = (0..SIZE * SIZE)
         .flat_map(|pixel| Half::BOTH.into_iter().flat_map(move |half| (0..LEVELS).map(move |l| (pixel, half, l))));
     let plan = SamplePlan { blocks: levels.map(|(pixel, half, level)| BlockWork::whole(pixel, half, level)).collect() };

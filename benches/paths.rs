@@ -60,7 +60,14 @@ fn bench_scene(name: &str, scene: fechner::scene::Scene) -> Result<()> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/cache/paths").join(name);
     write_scene(&scene, &folder)?;
     let mut mitsuba = Mitsuba::start(&folder, SIZE)?;
-    let settings = TraceSettings { width: SIZE, height: SIZE, seed: 1, max_depth: MAX_DEPTH, filter: PixelFilter::Box };
+    let settings = TraceSettings {
+        width: SIZE,
+        height: SIZE,
+        seed: 1,
+        max_depth: MAX_DEPTH,
+        filter: PixelFilter::Box,
+        clamp: None,
+    };
     let tracer = PathTracer::new(Arc::new(scene), settings);
     let plan = SamplePlan {
         blocks: (0..SIZE * SIZE).flat_map(|pixel| Half::BOTH.map(|half| BlockWork::whole(pixel, half, 0))).collect(),

@@ -55,10 +55,18 @@ pub(crate) fn write_scene(scene: &Scene, folder: &Path) -> Result<()> {
 fn material(scene: &Scene, material: &Material, folder: &Path) -> Result<Value> {
     let surface = match &material.surface {
         Surface::Diffuse { reflectance } => json!({ "diffuse": color(scene, reflectance, folder)? }),
-        Surface::Conductor { eta, k, roughness } if roughness.factor == 0.0 => {
+        Surface::Conductor { eta, k, roughness, tint }
+            if roughness.is_smooth() && *tint == ColorInput::constant(Vec3::ONE) =>
+        {
             json!({ "eta": eta.to_array(), "k": k.to_array() })
         }
-        Surface::Dielectric { ior, roughness, .. } if roughness.factor == 0.0 => json!({ "ior": ior }),
+        Surface::Dielectric { ior, roughness, transmittance, absorption }
+            if roughness.is_smooth()
+                && *transmittance == ColorInput::constant(Vec3::ONE)
+                && *absorption == Vec3::ZERO =>
+        {
+            json!({ "ior": ior })
+        }
         _ => bail!("material `{}` is none that is compared", material.name),
     };
     Ok(json!({ "surface": surface, "emission": material.emission.factor.to_array() }))
