@@ -60,8 +60,7 @@ pub fn display_chromatic_variance(fitted: &dyn FittedTone, display: &Display, me
     let mut result = Plane::filled(width, height, 0.0);
     result.for_each_row_mut(|y, row| {
         for (x, (value, (mean, variance))) in row.iter_mut().zip(mean.row(y).iter().zip(variance.row(y))).enumerate() {
-            let pixel = Pixel { x, y };
-            let luminance = mean.max(1e-6);
+            let (pixel, luminance) = (Pixel { x, y }, mean.max(1e-6));
             let slope = (shown.cd_m2(pixel, luminance) - shown.cd_m2(pixel, 0.0)) / luminance;
             let displayed = slope * slope * variance.max(0.0);
             *value = if mean.is_finite() && displayed.is_finite() { displayed } else { f32::INFINITY };

@@ -11,6 +11,7 @@ use fechner_perception::model::ModelInputs;
 use fechner_perception::photometry::luminance;
 use fechner_perception::seen;
 use fechner_perception::threshold::{ThresholdInputs, ThresholdMap, threshold_map};
+use fechner_perception::tone::acuity::BehindAcuity;
 use fechner_perception::tone::{FittedTone, SceneGuide};
 use fechner_perception::visibility::MeasuredError;
 
@@ -52,7 +53,8 @@ pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Jud
     let displayed_guide = seen::display_luminance(tone.as_ref(), &settings.viewing.display, &guide);
     let luminance_variance = variance_of_mean(film, statistics.luminance(), &statistics.luminance().pooled);
     // The noise before denoising bounds what is left of it in the guide, so masking fades in as samples come.
-    let csf = CastleCsf::new(settings.viewing.observer.csf_area_deg2)?;
+    // Noise goes through the loss of acuity that the operator shows, as the picture does.
+    let csf = BehindAcuity { csf: CastleCsf::new(settings.viewing.observer.csf_area_deg2)?, acuity: tone.acuity() };
     let thresholds = threshold_map(
         &ThresholdInputs { display_luminance_cd_m2: &displayed_guide, guide_variance: Some(&luminance_variance) },
         &settings.viewing,

@@ -12,7 +12,7 @@ pub mod settings;
 pub mod statistics;
 
 use crate::film::Film;
-use crate::integrator::{PathTracer, SamplePlan};
+use crate::integrator::{Crop, PathTracer, SamplePlan};
 use audit::{Audit, audit};
 use fechner_perception::Plane;
 use judge::{JudgeError, Judgement, judge};
@@ -133,7 +133,7 @@ struct Loop<'a> {
 /// Only if the perception model refuses the picture, which would be a defect of ours.
 pub fn render(tracer: &PathTracer, settings: &LoopSettings, monitor: &dyn Monitor) -> Result<Rendered, JudgeError> {
     let started = Instant::now();
-    let (width, height) = (tracer.settings().width, tracer.settings().height);
+    let Crop { width, height, .. } = tracer.settings().film_area();
     let mut state = Loop {
         tracer,
         settings,

@@ -23,7 +23,7 @@ pub use record::{Record, Results};
 
 use crate::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, Sampling};
 use crate::integrator::{DEFAULT_MAX_DEPTH, PathTracer, TraceSettings};
-use crate::sampler::PixelFilter;
+use crate::sampler::{PixelFilter, Sequence};
 use crate::scene::Scene;
 use crate::scene::load::{LoadOptions, load};
 use anyhow::{Context, Result};
@@ -93,6 +93,8 @@ impl Subject {
             max_depth: DEFAULT_MAX_DEPTH,
             filter: PixelFilter::Gaussian,
             clamp: None,
+            sequence: Sequence::PerPixel,
+            crop: None,
         };
         PathTracer::new(Arc::clone(&self.scene), settings)
     }

@@ -28,15 +28,18 @@ mod dielectric_tables;
 mod diffuse_transmission;
 mod energy;
 mod fresnel;
+mod he_torrance;
 mod lambert;
 mod metal_roughness;
 mod microfacets;
 mod mirror;
 mod mix;
 mod oren_nayar;
+mod phong;
 #[cfg(test)]
 mod tests;
 mod thin_dielectric;
+mod ward;
 mod warp;
 
 use glam::Vec3;
@@ -49,13 +52,16 @@ pub use conductor::Conductor;
 pub use dielectric::Dielectric;
 pub use dielectric_tables::DielectricTables;
 pub use diffuse_transmission::DiffuseTransmission;
+pub use he_torrance::HeTorrance;
 pub use lambert::Lambert;
 pub use metal_roughness::MetalRoughness;
 pub use microfacets::Microfacets;
 pub use mirror::Mirror;
 pub use mix::Mix;
 pub use oren_nayar::OrenNayar;
+pub use phong::Phong;
 pub use thin_dielectric::ThinDielectric;
+pub use ward::Ward;
 
 /// Slope width α below which a microfacet surface counts as perfectly smooth. Its lobe would be 0.06° wide: less than a
 /// pixel of any display at any distance, and the half-way vector in single precision starts to blur it.
@@ -175,6 +181,12 @@ pub enum Bsdf<'a> {
     CoatedDiffuse(CoatedDiffuse<'a>),
     /// Clear coat over a metal.
     CoatedConductor(CoatedConductor<'a>),
+    /// Diffuse base and a lobe around the mirror direction.
+    Phong(Phong),
+    /// Diffuse base and a Gaussian lobe of half-way vectors.
+    Ward(Ward),
+    /// Relief of the size of a wavelength.
+    HeTorrance(HeTorrance),
     /// Weighted sum of two models.
     Mix(Mix<'a>),
 }
@@ -259,6 +271,9 @@ impl<'a> Bsdf<'a> {
             Self::DiffuseTransmission(model) => model.evaluate(wo, wi),
             Self::CoatedDiffuse(model) => model.evaluate(wo, wi),
             Self::CoatedConductor(model) => model.evaluate(wo, wi),
+            Self::Phong(model) => model.evaluate(wo, wi),
+            Self::Ward(model) => model.evaluate(wo, wi),
+            Self::HeTorrance(model) => model.evaluate(wo, wi),
             Self::Mix(model) => model.evaluate(wo, wi),
         }
     }
@@ -276,6 +291,9 @@ impl<'a> Bsdf<'a> {
             Self::DiffuseTransmission(model) => model.sample(wo, u),
             Self::CoatedDiffuse(model) => model.sample(wo, u),
             Self::CoatedConductor(model) => model.sample(wo, u),
+            Self::Phong(model) => model.sample(wo, u),
+            Self::Ward(model) => model.sample(wo, u),
+            Self::HeTorrance(model) => model.sample(wo, u),
             Self::Mix(model) => model.sample(wo, u),
         }
     }
@@ -283,13 +301,16 @@ impl<'a> Bsdf<'a> {
     /// Whether [`Self::evaluate`] can be other than 0; if not, light sampling is of no use.
     pub fn has_smooth_lobe(&self) -> bool {
         match self {
-            Self::Lambert(_) | Self::OrenNayar(_) | Self::DiffuseTransmission(_) => true,
+            Self::Lambert(_) | Self::OrenNayar(_) | Self::DiffuseTransmission(_) | Self::Phong(_) | Self::Ward(_) => {
+                true
+            }
             Self::Mirror(_) | Self::ThinDielectric(_) => false,
             Self::Conductor(model) => model.has_smooth_lobe(),
             Self::Dielectric(model) => model.has_smooth_lobe(),
             Self::MetalRoughness(model) => model.has_smooth_lobe(),
             Self::CoatedDiffuse(model) => model.has_smooth_lobe(),
             Self::CoatedConductor(model) => model.has_smooth_lobe(),
+            Self::HeTorrance(model) => model.has_smooth_lobe(),
             Self::Mix(model) => model.has_smooth_lobe(),
         }
     }
@@ -307,6 +328,9 @@ impl<'a> Bsdf<'a> {
             Self::DiffuseTransmission(model) => model.albedo(),
             Self::CoatedDiffuse(model) => model.albedo(wo),
             Self::CoatedConductor(model) => model.albedo(wo),
+            Self::Phong(model) => model.albedo(),
+            Self::Ward(model) => model.albedo(),
+            Self::HeTorrance(model) => model.albedo(wo),
             Self::Mix(model) => model.albedo(wo),
         }
     }

@@ -93,6 +93,7 @@ fn split(name: &str) -> (&str, &str) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use fechner::exr_read::Window;
 
     /// Channel i holds the value i.
     fn exr(names: &[&str]) -> ExrImage {
@@ -100,6 +101,9 @@ mod tests {
             width: 1,
             height: 1,
             data_window_origin: (0, 0),
+            display_window: Window { origin: (0, 0), width: 1, height: 1 },
+            chromaticities: None,
+            lines_left_out: 0,
             channels: names.iter().enumerate().map(|(i, name)| ((*name).to_owned(), vec![i as f32])).collect(),
             types: Vec::new(),
             attributes: Vec::new(),

@@ -50,15 +50,14 @@ impl InputPicture {
             })
         };
         let nits_per_unit = nits_per_unit.or_else(in_file).with_context(|| no_unit(path))?;
-        let rgb = match channels::colour(exr) {
-            Some(Colour::Rgb([r, g, b])) => (0..r.len()).map(|i| [r[i], g[i], b[i]]).collect(),
-            Some(Colour::Grey(y)) => y.iter().map(|&value| [value; 3]).collect(),
-            None => {
-                bail!("{}: there are no channels R, G and B, nor Y; `fechner info` lists what there is", path.display())
-            }
+        let Some(picture) = exr.scene_picture(picture_channel) else {
+            bail!("{}: there are no channels R, G and B, nor Y; `fechner info` lists what there is", path.display());
         };
+        for note in &picture.notes {
+            eprintln!("note: {}: {note}", path.display());
+        }
         let content = Content::Scene { nits_per_unit };
-        Ok(Self { width: exr.width as usize, height: exr.height as usize, rgb, content })
+        Ok(Self { width: picture.width as usize, height: picture.height as usize, rgb: picture.rgb, content })
     }
 
     fn from_image(path: &Path, content: Content) -> Result<Self> {
@@ -112,6 +111,13 @@ impl InputPicture {
         }
     }
 
+    /// Linear RGB in cd/m² of the scene; `None` for a picture that is ready for the display.
+    pub(super) fn scene_rgb_cd_m2(&self) -> Option<Vec<[f32; 3]>> {
+        let Content::Scene { nits_per_unit } = self.content else { return None };
+        let cd_m2 = |value: f32| (f64::from(value) * nits_per_unit).clamp(-1e30, 1e30) as f32;
+        Some(self.rgb.iter().map(|pixel| pixel.map(cd_m2)).collect())
+    }
+
     /// Luminance in cd/m² that the display sends to the eye.
     pub(super) fn displayed(&self, tone: Option<&dyn FittedTone>, viewing: &Viewing) -> Plane {
         let display = &viewing.display;
@@ -123,6 +129,17 @@ impl InputPicture {
                 display.luminance_cd_m2(f64::from(luminance(linear))) as f32
             }),
         }
+    }
+}
+
+/// A channel of the file's picture by its last name, all three from one layer.
+fn picture_channel<'a>(exr: &'a ExrImage, name: &str) -> Option<&'a [f32]> {
+    let Some(Colour::Rgb([r, g, b])) = channels::colour(exr) else { return None };
+    match name {
+        "R" => Some(r),
+        "G" => Some(g),
+        "B" => Some(b),
+        _ => None,
     }
 }
 

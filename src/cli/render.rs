@@ -7,9 +7,9 @@ use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use fechner::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, RivalRule, Sampling};
 use fechner::adaptive::{self, Rendered};
-use fechner::integrator::{DEFAULT_MAX_DEPTH, PathTracer, TraceSettings};
+use fechner::integrator::{Crop, DEFAULT_MAX_DEPTH, PathTracer, TraceSettings};
 use fechner::output;
-use fechner::sampler::PixelFilter;
+use fechner::sampler::{PixelFilter, Sequence};
 use fechner::scene::{Scene, load};
 use fechner_perception::model::{self, ThresholdModel};
 use fechner_perception::tone;
@@ -29,6 +29,9 @@ pub(super) struct RenderArguments {
     /// Picture size.
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<Size>,
+    /// Trace only this part of the picture, with the samples it has in the whole.
+    #[arg(long, value_name = "X,Y,W,H", value_parser = parse_crop)]
+    crop: Option<Crop>,
     /// Camera of the scene file, by name.
     #[arg(long, value_name = "NAME")]
     camera: Option<String>,
@@ -73,6 +76,9 @@ pub(super) struct RenderArguments {
     /// Pixel filter.
     #[arg(long, value_enum, default_value = "gaussian", help_heading = "Sampling")]
     filter: FilterChoice,
+    /// How the samples of neighbouring pixels relate.
+    #[arg(long, value_enum, default_value = "per-pixel", help_heading = "Sampling")]
+    sequence: SequenceChoice,
     /// Seed of all random numbers.
     #[arg(long, default_value_t = 0, help_heading = "Sampling")]
     seed: u64,
@@ -154,6 +160,38 @@ enum FilterChoice {
     Box,
     /// Gaussian of σ 0.45 pixels.
     Gaussian,
+    /// Window 3 pixels wide: a little sharper.
+    BlackmanHarris,
+    /// Cubic with negative lobes: sharpest, with --sampling uniform only.
+    Mitchell,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum SequenceChoice {
+    /// Neighbouring pixels are independent.
+    PerPixel,
+    /// Samples are spread over neighbouring pixels as well, in Z-order.
+    ZOrder,
+}
+
+/// X,Y,W,H in pixels of the full picture.
+fn parse_crop(text: &str) -> Result<Crop, String> {
+    let wrong = || format!("\"{text}\" is not a crop; expected X,Y,WIDTH,HEIGHT in pixels, such as 100,50,64,64");
+    let numbers: Vec<u32> = text.split(',').map(|n| n.trim().parse().map_err(|_| wrong())).collect::<Result<_, _>>()?;
+    match numbers[..] {
+        [x, y, width, height] if width > 0 && height > 0 => Ok(Crop { x, y, width, height }),
+        _ => Err(wrong()),
+    }
+}
+
+/// A crop must lie within the picture.
+fn check_crop(crop: Crop, size: Size) -> anyhow::Result<Crop> {
+    let inside = |start: u32, extent: u32, whole: u32| u64::from(start) + u64::from(extent) <= u64::from(whole);
+    if inside(crop.x, crop.width, size.width) && inside(crop.y, crop.height, size.height) {
+        return Ok(crop);
+    }
+    let Crop { x, y, width, height } = crop;
+    bail!("--crop {x},{y},{width},{height} reaches beyond the picture of {}x{} pixels", size.width, size.height)
 }
 
 impl Quality {
@@ -211,8 +249,21 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
         filter: match arguments.filter {
             FilterChoice::Box => PixelFilter::Box,
             FilterChoice::Gaussian => PixelFilter::Gaussian,
+            FilterChoice::BlackmanHarris => PixelFilter::BlackmanHarris,
+            FilterChoice::Mitchell => PixelFilter::Mitchell,
         },
+        sequence: match arguments.sequence {
+            SequenceChoice::PerPixel => Sequence::PerPixel,
+            SequenceChoice::ZOrder => Sequence::ZOrder,
+        },
+        crop: arguments.crop.map(|crop| check_crop(crop, size)).transpose()?,
     };
+    if trace.filter.is_signed() && settings.sampling == Sampling::Adaptive {
+        bail!(
+            "--filter mitchell has negative lobes, whose scatter is not the picture's noise: adaptive sampling cannot \
+             judge it; use --sampling uniform, or the filter blackman-harris"
+        );
+    }
     let scene = Arc::new(scene);
     let tracer = PathTracer::new(Arc::clone(&scene), trace);
     let degenerate = tracer.world().degenerate_triangles();
@@ -236,7 +287,9 @@ fn write(
     report: &Report,
 ) -> anyhow::Result<()> {
     match format {
-        output::Format::Png => output::rendered::write_display_png(&arguments.output, rendered)?,
+        output::Format::Png => {
+            output::rendered::write_display_png(&arguments.output, rendered, &settings.viewing.display)?;
+        }
         output::Format::Exr => {
             output::rendered::write_layers_exr(
                 &arguments.output,

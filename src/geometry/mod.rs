@@ -26,4 +26,13 @@ pub struct Ray {
     pub origin: Vec3A,
     /// Unit direction.
     pub direction: Vec3A,
+    /// When, as share of the open shutter, in [0, 1].
+    pub time: f32,
+}
+
+impl Ray {
+    /// A ray when the shutter opens.
+    pub fn new(origin: Vec3A, direction: Vec3A) -> Self {
+        Self { origin, direction, time: 0.0 }
+    }
 }

@@ -1,11 +1,13 @@
 //! From a material and a surface point to a BSDF in a frame.
 
 use super::PathTracer;
+use super::media::{Media, Medium};
 use super::tables::{SurfaceTables, slope_width};
-use crate::bsdf::{Bsdf, CoatedDiffuse, Conductor, Dielectric, Microfacets};
+use crate::bsdf::{Bsdf, CoatedDiffuse, Conductor, Dielectric, HeTorrance, Microfacets, Phong, Ward};
 use crate::geometry::SurfacePoint;
 use crate::geometry::surface::Frame;
-use crate::scene::{ColorInput, Material, Roughness, ScalarInput, Surface, Texture};
+use crate::light::LightReceiver;
+use crate::scene::{ColorInput, Material, MaterialId, Roughness, ScalarInput, Surface, Texture};
 use glam::{Vec2, Vec3};
 use std::cell::{Cell, OnceCell};
 
@@ -14,6 +16,10 @@ pub(super) struct Shading<'a> {
     pub(super) bsdf: Bsdf<'a>,
     pub(super) frame: Frame,
     pub(super) geometric_normal: Vec3,
+    /// Whether light can come from the other side.
+    pub(super) transmits: bool,
+    /// The volume behind the surface, if any volume of the scene absorbs.
+    pub(super) medium: Option<Medium>,
 }
 
 /// Components of a mix, two for each of its nodes: a place to stay for what the mix refers to, on the stack of the path.
@@ -50,6 +56,13 @@ impl Reader<'_> {
         input.evaluate(self.textures, self.uv)
     }
 
+    /// Two albedos, scaled down where their sum exceeds 1.
+    fn shares(&self, first: &ColorInput, second: &ColorInput) -> [Vec3; 2] {
+        let (first, second) = (self.color(first), self.color(second));
+        let scale = 1.0 / (first + second).max_element().max(1.0);
+        [first * scale, second * scale]
+    }
+
     fn facets(&self, roughness: &Roughness) -> Microfacets {
         let u = slope_width(roughness.scale, self.scalar(&roughness.u));
         let v = roughness.v.as_ref().map_or(u, |v| slope_width(roughness.scale, self.scalar(v)));
@@ -63,9 +76,8 @@ impl Reader<'_> {
                 Bsdf::oren_nayar(self.color(reflectance), self.scalar(roughness))
             }
             (Surface::DiffuseTransmission { reflectance, transmittance }, _) => {
-                let (reflected, transmitted) = (self.color(reflectance), self.color(transmittance));
-                let scale = 1.0 / (reflected + transmitted).max_element().max(1.0);
-                Bsdf::diffuse_transmission(reflected * scale, transmitted * scale)
+                let [reflected, transmitted] = self.shares(reflectance, transmittance);
+                Bsdf::diffuse_transmission(reflected, transmitted)
             }
             (Surface::Mirror { reflectance }, _) => Bsdf::mirror(self.color(reflectance)),
             (Surface::Conductor { eta, k, tint, roughness }, tables) => {
@@ -92,6 +104,17 @@ impl Reader<'_> {
             (Surface::CoatedConductor { eta, k, roughness, coat_roughness, .. }, SurfaceTables::Layers(tables)) => {
                 Bsdf::coated_conductor(*eta, *k, self.facets(roughness), self.facets(coat_roughness), tables)
             }
+            (Surface::Phong { diffuse, specular, exponent }, _) => {
+                let [diffuse, specular] = self.shares(diffuse, specular);
+                Bsdf::Phong(Phong::new(diffuse, specular, self.scalar(exponent)))
+            }
+            (Surface::Ward { diffuse, specular, roughness }, _) => {
+                let [diffuse, specular] = self.shares(diffuse, specular);
+                Bsdf::Ward(Ward::new(diffuse, specular, self.facets(roughness).alphas()))
+            }
+            (Surface::HeTorrance { eta, k, height_nm, correlation_nm, diffuse }, _) => {
+                Bsdf::HeTorrance(HeTorrance::new(*eta, *k, *height_nm, *correlation_nm, self.color(diffuse)))
+            }
             (Surface::MetalRoughness(model), _) => Bsdf::metal_roughness(
                 self.color(&model.base_color),
                 self.scalar(&model.metallic),
@@ -113,6 +136,24 @@ impl Reader<'_> {
 }
 
 impl Shading<'_> {
+    /// What the choice of a light may know of this point: surfaces that transmit receive from both sides.
+    pub(super) fn receiver(&self, point: &SurfacePoint, wo: Vec3) -> LightReceiver {
+        let side = if wo.dot(self.geometric_normal) >= 0.0 { 1.0 } else { -1.0 };
+        let normal = if self.transmits { Vec3::ZERO } else { side * self.geometric_normal };
+        LightReceiver { position: point.position, normal }
+    }
+
+    /// The volumes around a ray that came along `wo` through `media` and goes on along `wi`.
+    pub(super) fn media_after(&self, mut media: Media, wo: Vec3, wi: Vec3) -> Media {
+        let (from_front, to_front) = (wo.dot(self.geometric_normal) > 0.0, wi.dot(self.geometric_normal) > 0.0);
+        if let Some(medium) = self.medium
+            && from_front != to_front
+        {
+            media.cross(medium, from_front);
+        }
+        media
+    }
+
     /// Whether two world directions are on the same side of the surface by both normals, or on opposite sides by both.
     /// Where shading and geometric normal disagree, light would leak through: such pairs scatter nothing.
     pub(super) fn sides_agree(&self, a: Vec3, b: Vec3) -> bool {
@@ -130,10 +171,17 @@ impl PathTracer {
         let material = &scene.materials[material_id];
         let normal = seen_side(self.shading_normal(material, point), point.geometric_normal, wo);
         let reader = Reader { textures: &scene.textures, uv: point.uv };
+        let transmits = match &material.surface {
+            Surface::Diffuse { .. } | Surface::Mirror { .. } | Surface::Conductor { .. } => false,
+            Surface::MetalRoughness(model) => model.transmission.factor > 0.0,
+            _ => true,
+        };
         Shading {
             bsdf: reader.bsdf(&material.surface, &self.surface_tables[material_id], components),
             frame: Frame::new(normal, point.tangent),
             geometric_normal: point.geometric_normal,
+            transmits,
+            medium: if self.absorbs { Medium::behind(MaterialId(material_id as u32), &material.surface) } else { None },
         }
     }
 

@@ -1,17 +1,20 @@
 //! The files a render leaves: what the display shows, or every layer of it.
 
-use super::{Attribute, NITS_PER_UNIT, OutputError, Picture, write_exr, write_png};
+use super::{Attribute, NITS_PER_UNIT, OutputError, Picture, write_exr, write_png_for};
 use crate::adaptive::Rendered;
 use crate::adaptive::statistics::picture_variance;
 use crate::film::{Film, PixelGuide};
 use crate::sampler::Half;
+use fechner_perception::display::Display;
+use fechner_perception::tone::map_picture;
 use std::path::Path;
 
-/// Writes the picture through its tone operator as sRGB.
-pub fn write_display_png(path: &Path, rendered: &Rendered) -> Result<(), OutputError> {
+/// Writes the picture through its tone operator, coded for the display.
+pub fn write_display_png(path: &Path, rendered: &Rendered, display: &Display) -> Result<(), OutputError> {
     let judgement = &rendered.judgement;
-    let shown: Vec<[f32; 3]> = judgement.estimate.rgb_cd_m2.iter().map(|&rgb| judgement.tone.map_rgb(rgb)).collect();
-    write_png(path, rendered.film.width(), rendered.film.height(), &shown)
+    let (width, height) = (rendered.film.width(), rendered.film.height());
+    let shown = map_picture(judgement.tone.as_ref(), width as usize, &judgement.estimate.rgb_cd_m2);
+    write_png_for(path, width, height, &shown, display)
 }
 
 /// Writes the picture in scene units with its layers: albedo, normal, depth, object id, sample count, variance of the

@@ -70,6 +70,17 @@ impl Material {
     }
 }
 
+impl Alpha {
+    /// Probability that the surface is there, at texture coordinates.
+    pub fn coverage(&self, textures: &[Texture], uv: Vec2) -> f32 {
+        match self {
+            Self::Opaque => 1.0,
+            Self::Mask { value, cutoff } => f32::from(u8::from(value.evaluate(textures, uv) >= *cutoff)),
+            Self::Blend { value } => value.evaluate(textures, uv).clamp(0.0, 1.0),
+        }
+    }
+}
+
 /// Mean linear colour of a texture.
 fn mean_color(texture: &Texture) -> Vec3 {
     let (width, height) = (texture.width as usize, texture.height as usize);

@@ -3,17 +3,25 @@
 //! Plain data, filled by `load` (one file a format) and read by everybody else. Lengths are in scene units, radiance is
 //! linear Rec.709 RGB in scene units: RGB (1, 1, 1) has a luminance of [`Scene::nits_per_unit`] cd/m².
 
+mod camera;
+mod environment;
+mod light;
 mod material;
+mod motion;
 mod surface;
-
-use glam::{Affine3A, Mat3, Vec2, Vec3, Vec4};
-use std::sync::Arc;
 
 pub mod load;
 pub mod texture;
 
+pub use camera::{Camera, Projection, ScreenWindow};
+pub use environment::{Environment, Parametrisation};
+pub use light::{Light, SpotFalloff};
 pub use material::{Alpha, Material};
+pub use motion::{Motion, MotionKey, Pose};
 pub use surface::{Distribution, MetalRoughness, Roughness, RoughnessScale, Surface};
+
+use glam::{Affine3A, Vec2, Vec3, Vec4};
+use std::sync::Arc;
 
 /// Index into [`Scene::meshes`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -48,12 +56,21 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Decoded textures.
     pub textures: Vec<Texture>,
-    /// Point, spot and directional lights. Area lights are surfaces whose material emits.
+    /// Point, spot and directional lights, and the sun's disc. Area lights are surfaces whose material emits.
     pub lights: Vec<Light>,
     /// What rays see that hit nothing; `None` is black.
     pub environment: Option<Environment>,
     /// What the loader assumed or left out, one sentence each, shown to the user once.
     pub notes: Vec<String>,
+}
+
+impl Scene {
+    /// Whether anything moves while the shutter is open.
+    pub fn moves(&self) -> bool {
+        self.camera.motion.is_some()
+            || self.instances.iter().any(|instance| instance.motion.is_some())
+            || self.spheres.iter().any(|sphere| sphere.motion.is_some())
+    }
 }
 
 /// Picture size in pixels.
@@ -76,23 +93,6 @@ pub struct ViewingDefaults {
     pub operator: Option<String>,
     /// Exposure correction in stops for the operator `constant`.
     pub exposure_stops: Option<f64>,
-}
-
-/// A thin-lens camera that looks along `forward` with `up` towards the top of the picture.
-#[derive(Clone, Debug)]
-pub struct Camera {
-    /// Centre of the lens, world space.
-    pub position: Vec3,
-    /// Unit viewing direction.
-    pub forward: Vec3,
-    /// Up vector, need not be perpendicular to `forward`, not parallel to it.
-    pub up: Vec3,
-    /// Full vertical field of view in degrees, in (0, 180).
-    pub vertical_fov_deg: f32,
-    /// Radius of the lens in scene units; 0 is a pinhole.
-    pub aperture_radius: f32,
-    /// Distance of the plane in focus along `forward`, scene units, above 0.
-    pub focus_distance: f32,
 }
 
 /// A triangle mesh in object space. Every index is in range and every position finite: loaders guarantee it.
@@ -121,8 +121,10 @@ pub struct Instance {
     pub mesh: MeshId,
     /// Which material.
     pub material: MaterialId,
-    /// Object space to world space; invertible.
+    /// Object space to world space when the shutter opens; invertible.
     pub to_world: Affine3A,
+    /// Object space to world space while the shutter is open; `None` where it rests.
+    pub motion: Option<Motion>,
 }
 
 /// An analytic sphere in world space.
@@ -136,6 +138,8 @@ pub struct Sphere {
     pub radius: f32,
     /// Which material.
     pub material: MaterialId,
+    /// Moves centre and radius while the shutter is open (similarities only); `None` where it rests.
+    pub motion: Option<Motion>,
 }
 
 /// A colour that is constant or read from a texture and multiplied by a factor.
@@ -236,51 +240,4 @@ pub enum Texels {
     Bytes(Arc<Vec<[u8; 4]>>, Encoding),
     /// Linear floats.
     Floats(Arc<Vec<[f32; 4]>>),
-}
-
-/// A light without area.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Light {
-    /// Shines equally in all directions.
-    Point {
-        /// World position.
-        position: Vec3,
-        /// Radiant intensity in scene units × area: luminous intensity in cd is `nits_per_unit` × its luminance.
-        intensity: Vec3,
-    },
-    /// Shines in a cone.
-    Spot {
-        /// World position.
-        position: Vec3,
-        /// Unit axis of the cone, away from the light.
-        direction: Vec3,
-        /// Intensity on the axis.
-        intensity: Vec3,
-        /// Half angle in radians inside which it shines fully.
-        inner_angle: f32,
-        /// Half angle in radians outside which it is dark.
-        outer_angle: f32,
-    },
-    /// Shines from infinitely far away.
-    Directional {
-        /// Unit direction in which the light travels.
-        direction: Vec3,
-        /// Irradiance on a surface that faces it: illuminance in lx is `nits_per_unit` × its luminance.
-        irradiance: Vec3,
-    },
-}
-
-/// Radiance from infinitely far away.
-#[derive(Clone, Debug)]
-pub struct Environment {
-    /// Lat-long picture of linear RGB radiance; a constant one is 1×1. Row 0 is +y (up), the middle column is −z.
-    pub width: u32,
-    /// Rows of the picture.
-    pub height: u32,
-    /// Texels, row-major.
-    pub texels: Arc<Vec<Vec3>>,
-    /// Multiplies the texels.
-    pub scale: f32,
-    /// World directions to the picture's directions (a rotation).
-    pub from_world: Mat3,
 }

@@ -150,6 +150,37 @@ pub enum Surface {
     },
     /// The metal-roughness model of glTF 2.0.
     MetalRoughness(MetalRoughness),
+    /// The modified Phong model. Where the albedos' sum exceeds 1, both are scaled down.
+    Phong {
+        /// Albedo of the base in [0, 1].
+        diffuse: ColorInput,
+        /// Albedo of the lobe in [0, 1].
+        specular: ColorInput,
+        /// Exponent of the lobe, at least 0.
+        exponent: ScalarInput,
+    },
+    /// Ward's anisotropic model. Where the albedos' sum exceeds 1, both are scaled down.
+    Ward {
+        /// Albedo of the base in [0, 1].
+        diffuse: ColorInput,
+        /// Albedo of the lobe in [0, 1].
+        specular: ColorInput,
+        /// Slope widths; the distribution is Gaussian whatever it says here.
+        roughness: Roughness,
+    },
+    /// The wave-optical model of He, Torrance, Sillion and Greenberg.
+    HeTorrance {
+        /// Real part of the index of refraction.
+        eta: Vec3,
+        /// Imaginary part; 0 for dielectrics.
+        k: Vec3,
+        /// Root mean square height of the relief in nanometres, at least 0.
+        height_nm: f32,
+        /// Autocorrelation length of the relief in nanometres, above 0.
+        correlation_nm: f32,
+        /// Albedo in [0, 1] of what leaves after scattering beneath the surface.
+        diffuse: ColorInput,
+    },
     /// The sum of two, weighted. Normal map, emission and alpha are the whole material's.
     Mix {
         /// Seen where `amount` is 0.
@@ -213,6 +244,15 @@ impl Surface {
         Self::Conductor { eta, k, tint: ColorInput::constant(Vec3::ONE), roughness }
     }
 
+    /// What the volume behind the surface absorbs per scene unit; `None` where it bounds none.
+    pub fn interior_absorption(&self) -> Option<Vec3> {
+        match self {
+            Self::Dielectric { absorption, .. } => Some(*absorption),
+            Self::Mix { first, second, .. } => first.interior_absorption().or_else(|| second.interior_absorption()),
+            _ => None,
+        }
+    }
+
     /// Models that are summed up: 1 unless it is a mix.
     pub fn components(&self) -> usize {
         match self {
@@ -226,6 +266,7 @@ impl Surface {
         match self {
             Self::Conductor { roughness, .. }
             | Self::Dielectric { roughness, .. }
+            | Self::Ward { roughness, .. }
             | Self::CoatedDiffuse { roughness, .. } => roughness.v.is_some(),
             Self::CoatedConductor { roughness, coat_roughness, .. } => {
                 roughness.v.is_some() || coat_roughness.v.is_some()
@@ -236,6 +277,8 @@ impl Surface {
             | Self::DiffuseTransmission { .. }
             | Self::Mirror { .. }
             | Self::ThinDielectric { .. }
+            | Self::Phong { .. }
+            | Self::HeTorrance { .. }
             | Self::MetalRoughness(_) => false,
         }
     }
@@ -251,6 +294,8 @@ impl Surface {
             Self::Conductor { tint, .. } => vec![tint],
             Self::Dielectric { transmittance, .. } | Self::ThinDielectric { transmittance, .. } => vec![transmittance],
             Self::CoatedConductor { .. } => Vec::new(),
+            Self::Phong { diffuse, specular, .. } | Self::Ward { diffuse, specular, .. } => vec![diffuse, specular],
+            Self::HeTorrance { diffuse, .. } => vec![diffuse],
             Self::MetalRoughness(model) => vec![&model.base_color],
             Self::Mix { first, second, .. } => first.colors().into_iter().chain(second.colors()).collect(),
         }
@@ -263,9 +308,12 @@ impl Surface {
             | Self::DiffuseTransmission { .. }
             | Self::Mirror { .. }
             | Self::ThinDielectric { .. } => Vec::new(),
+            Self::HeTorrance { .. } => Vec::new(),
             Self::OrenNayar { roughness, .. } => vec![roughness],
+            Self::Phong { exponent, .. } => vec![exponent],
             Self::Conductor { roughness, .. }
             | Self::Dielectric { roughness, .. }
+            | Self::Ward { roughness, .. }
             | Self::CoatedDiffuse { roughness, .. } => roughness.scalars().collect(),
             Self::CoatedConductor { roughness, coat_roughness, .. } => {
                 roughness.scalars().chain(coat_roughness.scalars()).collect()

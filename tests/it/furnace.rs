@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 /// Rays that meet a unit sphere at the origin from face on to grazing.
 fn rays() -> impl Iterator<Item = Ray> {
-    [0.0f32, 0.5, 0.8, 0.95].into_iter().map(|x| Ray { origin: vec3a(x, 0.0, 5.0), direction: Vec3A::NEG_Z })
+    [0.0f32, 0.5, 0.8, 0.95].into_iter().map(|x| Ray::new(vec3a(x, 0.0, 5.0), Vec3A::NEG_Z))
 }
 
 fn sphere_in_furnace(surface: Surface) -> PathTracer {
@@ -103,7 +103,7 @@ fn infinite_bounces_add_up() {
         let material = add_material(&mut scene, diffuse(albedo), Vec3::splat(0.3));
         add_sphere(&mut scene, Vec3::ZERO, 2.0, material);
         let tracer = PathTracer::new(Arc::new(scene), trace_settings(16, 16, 0));
-        let ray = Ray { origin: vec3a(0.3, -0.2, 0.1), direction: vec3a(0.48, 0.6, 0.64) };
+        let ray = Ray::new(vec3a(0.3, -0.2, 0.1), vec3a(0.48, 0.6, 0.64));
         let (mean, error) = radiance_along(&tracer, ray, 16, samples);
         let expected = 0.3 / (1.0 - albedo);
         assert!(

@@ -1,9 +1,8 @@
 //! A path takes no memory from the heap: allocation would be a lock between threads and a tenth of a short path's time.
 
-use crate::support::trace_settings;
+use crate::support::{block_key, trace_settings};
 use fechner::geometry::Ray;
 use fechner::integrator::PathTracer;
-use fechner::sampler::{BlockKey, Half};
 use fechner::scene::load::{LoadOptions, load};
 use glam::{Vec3A, vec3a};
 use std::path::Path;
@@ -23,8 +22,8 @@ fn paths_allocate_nothing() {
         let trace = |pixel: u32| {
             let angle = pixel as f32;
             let direction = Vec3A::new(angle.sin(), -0.3 + 0.2 * (3.0 * angle).cos(), -angle.cos().abs()).normalize();
-            let sample = BlockKey { seed: 5, pixel, half: Half::A, level: 0 }.sample(0);
-            tracer.trace_path(Ray { origin: eye, direction }, sample).rays
+            let sample = block_key(pixel).sample(0);
+            tracer.trace_path(Ray { origin: eye, direction, time: 0.0 }, sample).rays
         };
         // What is made once at first use, such as the sRGB table, may allocate.
         trace(0);

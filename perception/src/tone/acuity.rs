@@ -68,6 +68,25 @@ impl AcuityFilter {
     }
 }
 
+/// A contrast sensitivity function behind a loss of acuity: how scene noise is seen that the operator blurs. Thresholds
+/// built with it hold for the noise as it is rendered.
+pub struct BehindAcuity<C> {
+    /// The eye in front of the display.
+    pub csf: C,
+    /// What the operator takes away, if it does.
+    pub acuity: Option<AcuityFilter>,
+}
+
+impl<C: ContrastSensitivity> ContrastSensitivity for BehindAcuity<C> {
+    fn name(&self) -> &'static str {
+        self.csf.name()
+    }
+
+    fn sensitivity(&self, freq_cpd: f64, luminance_cd_m2: f64) -> f64 {
+        self.acuity.map_or(1.0, |acuity| acuity.transfer(freq_cpd)) * self.csf.sensitivity(freq_cpd, luminance_cd_m2)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

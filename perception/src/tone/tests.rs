@@ -1,5 +1,6 @@
 use super::*;
 use crate::display::Display;
+use crate::plane::Plane;
 use crate::tvi;
 
 fn guides() -> Vec<Plane> {

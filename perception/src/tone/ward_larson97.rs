@@ -167,7 +167,8 @@ mod tests {
         let faded = fit(Effects { colour: true, ..Effects::default() });
         let red = [0.2, 0.05, 0.01];
         let spread = |rgb: [f32; 3]| (rgb[0] - rgb[2]) / rgb[0].max(1e-6);
-        assert!(spread(faded.map_rgb(red)) < 0.1 * spread(plain.map_rgb(red)));
+        let (faded, plain_red) = (faded.map_rgb(red), plain.map_rgb(red));
+        assert!(spread(faded) < 0.1 * spread(plain_red), "{faded:?} {plain_red:?}");
         assert!(plain.acuity().is_none());
         let night = picture().map(|value| 1e-3 * value);
         let operator = WardLarson97 { exposure: 1.0, ceiling: Ceiling::Human, effects: all };

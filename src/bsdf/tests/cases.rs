@@ -2,7 +2,8 @@
 
 use super::sphere::Peak;
 use crate::bsdf::{
-    AnisotropicTable, Bsdf, CoatTables, Conductor, DielectricTables, LayerTables, Microfacets, WidthRange,
+    AnisotropicTable, Bsdf, CoatTables, Conductor, DielectricTables, HeTorrance, LayerTables, Microfacets, Phong, Ward,
+    WidthRange,
 };
 use crate::scene::Distribution;
 use glam::Vec3;
@@ -179,6 +180,42 @@ fn layered_cases(cases: &mut Vec<Case>) {
     cases.push(Case::new("mix with a mirror", Bsdf::mix(&REFLECTOR, &NESTED, 0.6), Lossless, 0.09));
 }
 
+/// Models without microfacets.
+fn empirical_cases(cases: &mut Vec<Case>) {
+    use Budget::AtMost;
+    let half = Vec3::splat(0.5);
+    for (exponent, width) in [(0.0f32, 1.0), (10.0, 0.3), (1000.0, 0.03)] {
+        let phong = |diffuse, specular| Bsdf::Phong(Phong::new(diffuse, specular, exponent));
+        cases.push(Case::new(format!("phong {exponent}"), phong(half, half), AtMost, width));
+        cases.push(Case::new(format!("phong lobe {exponent}"), phong(Vec3::ZERO, Vec3::ONE), AtMost, width));
+    }
+    for alphas in [[0.1f32, 0.1], [0.3, 0.1], [1.0, 1.0]] {
+        let ward = |diffuse, specular| Bsdf::Ward(Ward::new(diffuse, specular, alphas));
+        let width = f64::from(alphas[1]);
+        cases.push(Case::new(format!("ward {alphas:?}"), ward(half, half), AtMost, width));
+        cases.push(Case::new(format!("ward lobe {alphas:?}"), ward(Vec3::ZERO, Vec3::ONE), AtMost, width));
+    }
+    // Rms height and autocorrelation length in nanometres.
+    // Few, for each value costs a sum of up to a hundred terms.
+    for (height, correlation) in [(50.0f32, 1500.0f32), (800.0, 4000.0)] {
+        let relief = |eta, k, diffuse| Bsdf::HeTorrance(HeTorrance::new(eta, k, height, correlation, diffuse));
+        let width = 0.1;
+        let name = format!("{height} nm, {correlation} nm");
+        cases.push(Case::new(
+            format!("lossless relief {name}"),
+            relief(Vec3::ZERO, Vec3::splat(3.0), Vec3::ZERO),
+            AtMost,
+            width,
+        ));
+        cases.push(Case::new(
+            format!("ceramic relief {name}"),
+            relief(Vec3::splat(1.5), Vec3::ZERO, Vec3::ONE),
+            AtMost,
+            width,
+        ));
+    }
+}
+
 /// Models with at least one smooth lobe.
 pub(super) fn smooth_cases() -> Vec<Case> {
     static CASES: LazyLock<Vec<Case>> = LazyLock::new(all_smooth_cases);
@@ -267,6 +304,7 @@ fn all_smooth_cases() -> Vec<Case> {
     }
     facet_cases(&mut cases);
     layered_cases(&mut cases);
+    empirical_cases(&mut cases);
     cases
 }
 
@@ -292,6 +330,12 @@ pub(super) fn delta_cases() -> Vec<Case> {
         Case::new(
             "coated mirror",
             Bsdf::coated_conductor(Vec3::ONE, Vec3::splat(1e5), 0.0, 0.0, &LAYERS),
+            Lossless,
+            1.0,
+        ),
+        Case::new(
+            "flat relief",
+            Bsdf::HeTorrance(HeTorrance::new(Vec3::ZERO, Vec3::splat(3.0), 0.0, 1000.0, Vec3::ZERO)),
             Lossless,
             1.0,
         ),

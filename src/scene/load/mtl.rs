@@ -6,7 +6,7 @@
 use super::builder::Builder;
 use super::error::LoadError;
 use super::files;
-use super::texture::{IfMissing, Picture, Request};
+use super::texture::{Adjust, IfMissing, Picture, Request};
 use crate::scene::{
     Alpha, ColorInput, Encoding, Material, MaterialId, MetalRoughness, Roughness, ScalarInput, Surface, TextureLookup,
     Wrap,
@@ -161,6 +161,7 @@ impl Written {
             wrap_v: wrap,
             nearest: false,
             if_missing: IfMissing::Replace(if_missing),
+            adjust: Adjust::NONE,
         });
         // MTL's offset and scale are meant for v up; the mesh's coordinates were turned to v down.
         TextureLookup {

@@ -2,7 +2,7 @@
 
 use super::super::builder::Builder;
 use super::super::error::LoadError;
-use super::super::texture::{IfMissing, Picture, Request};
+use super::super::texture::{Adjust, IfMissing, Picture, Request};
 use super::buffers::{Buffers, Uri, resolve};
 use crate::scene::{
     Alpha, ColorInput, Encoding, Material, MaterialId, MetalRoughness, ScalarInput, Surface, TextureLookup, Wrap,
@@ -160,6 +160,7 @@ impl<'a> Materials<'a> {
             wrap_v: wrap(sampler.wrap_t()),
             nearest: sampler.mag_filter() == Some(MagFilter::Nearest),
             if_missing: IfMissing::Replace(if_missing),
+            adjust: Adjust::NONE,
         });
         let plain = TextureLookup::plain(texture);
         Ok(Some(match transform {

@@ -5,7 +5,7 @@ use super::super::metals::METALS;
 use super::Context;
 use super::fields::{Fields, Value};
 use super::material::{Materials, scalar, share, share_or_white};
-use crate::scene::{Distribution, MetalRoughness, Roughness, Surface};
+use crate::scene::{ColorInput, Distribution, MetalRoughness, Roughness, ScalarInput, Surface};
 use glam::Vec3;
 
 /// Reads the keys of one kind of surface.
@@ -15,7 +15,7 @@ pub(super) type Reader<'a> = fn(&Materials<'a>, &mut Context<'a>, &Fields<'a>) -
 pub(super) type Kind<'a> = (&'static str, Reader<'a>, &'static [&'static str]);
 
 /// Every kind.
-pub(super) const fn kinds<'a>() -> [Kind<'a>; 11] {
+pub(super) const fn kinds<'a>() -> [Kind<'a>; 14] {
     [
         ("diffuse", diffuse, &["reflectance"]),
         ("oren-nayar", oren_nayar, &["reflectance", "roughness"]),
@@ -59,6 +59,9 @@ pub(super) const fn kinds<'a>() -> [Kind<'a>; 11] {
             ],
         ),
         ("metal-roughness", metal_roughness, &["base_color", "metallic", "roughness", "ior", "transmission"]),
+        ("phong", phong, &["diffuse", "specular", "exponent"]),
+        ("ward", ward, &["diffuse", "specular", "roughness", "roughness_v"]),
+        ("he-torrance", he_torrance, &["metal", "eta", "k", "height_nm", "correlation_nm", "diffuse"]),
         ("mix", mix, &["materials", "amount"]),
     ]
 }
@@ -221,6 +224,42 @@ fn metal_roughness<'a>(
         ior: fields.get_or("ior", 1.5, Value::positive)? as f32,
         transmission: scalar(context, fields, "transmission", 0.0)?,
     }))
+}
+
+/// Two albedos of which neither defaults to white; their sum must not exceed 1.
+fn base_and_lobe<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<[ColorInput; 2], LoadError> {
+    let black = ColorInput::constant(Vec3::ZERO);
+    let diffuse = fields.get_or("diffuse", black, |value| share(context, value))?;
+    let value = fields.require("specular")?;
+    let specular = share(context, &value)?;
+    let sum = diffuse.factor + specular.factor;
+    if diffuse.texture.is_none() && specular.texture.is_none() && sum.max_element() > 1.0 {
+        return Err(value.error(format_args!("with \"diffuse\" must not exceed 1 in any channel: {sum}")));
+    }
+    Ok([diffuse, specular])
+}
+
+fn phong<'a>(_: &Materials<'a>, context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
+    let [diffuse, specular] = base_and_lobe(context, fields)?;
+    let exponent = fields.get_or("exponent", 50.0, |value| value.within(0.0, 1e6))? as f32;
+    Ok(Surface::Phong { diffuse, specular, exponent: ScalarInput::constant(exponent) })
+}
+
+fn ward<'a>(_: &Materials<'a>, context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
+    let [diffuse, specular] = base_and_lobe(context, fields)?;
+    Ok(Surface::Ward { diffuse, specular, roughness: roughness(context, fields, ROUGHNESS)? })
+}
+
+fn he_torrance<'a>(_: &Materials<'a>, context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
+    let (eta, k) = metal(fields)?;
+    let black = ColorInput::constant(Vec3::ZERO);
+    Ok(Surface::HeTorrance {
+        eta,
+        k,
+        height_nm: fields.get_or("height_nm", 200.0, Value::non_negative)? as f32,
+        correlation_nm: fields.get_or("correlation_nm", 3000.0, Value::positive)? as f32,
+        diffuse: fields.get_or("diffuse", black, |value| share(context, value))?,
+    })
 }
 
 fn mix<'a>(materials: &Materials<'a>, context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
