@@ -10,7 +10,7 @@
 //! to the adaptive render's figure only, so the ratio errs against it.
 
 use anyhow::{Context, Result};
-use fechner::adaptive::settings::{DEFAULT_MAX_SAMPLES, Limits, LoopSettings, Sampling};
+use fechner::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, Sampling};
 use fechner::adaptive::{Quiet, render};
 use fechner::film::opponent;
 use fechner::integrator::{DEFAULT_MAX_DEPTH, PathTracer, TraceSettings};
@@ -153,6 +153,8 @@ fn cached(root: &Path, arm: &Arm) -> Result<Run> {
     let nits_per_unit = scene.nits_per_unit;
     let settings = LoopSettings {
         sampling: arm.sampling,
+        allocation: AllocationRule::Convex,
+        model: None,
         limits: Limits {
             visibility: arm.visibility,
             time: None,
@@ -169,9 +171,11 @@ fn cached(root: &Path, arm: &Arm) -> Result<Run> {
         height: SIZE,
         seed: arm.seed,
         max_depth: DEFAULT_MAX_DEPTH,
+        clamp: None,
         filter: PixelFilter::Gaussian,
         sequence: Sequence::PerPixel,
         crop: None,
+        transparent: false,
     };
     let rendered = render(&PathTracer::new(Arc::new(scene), trace), &settings, &Quiet)?;
     let halves = Half::BOTH.map(|half| {

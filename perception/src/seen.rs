@@ -43,6 +43,31 @@ pub fn display_variance(fitted: &dyn FittedTone, display: &Display, mean: &Plane
     result
 }
 
+/// Variance of a chromatic signal as displayed, (cd/m²)², for one of variance `variance` ((cd/m²)², of the mean) on scene
+/// luminance `mean` (cd/m²): operators keep the ratios of a colour's channels, so its signals scale as its luminance does.
+/// What a display's clip of single channels hides is not taken off.
+///
+/// Pixels that are not finite get infinity; so does every pixel when the planes differ in size.
+#[must_use]
+pub fn display_chromatic_variance(fitted: &dyn FittedTone, display: &Display, mean: &Plane, variance: &Plane) -> Plane {
+    let (width, height) = (mean.width(), mean.height());
+    if !mean.same_size(variance) {
+        return Plane::filled(width, height, f32::INFINITY);
+    }
+    let shown = Shown { fitted, display };
+    let black = shown.cd_m2(0.0);
+    let mut result = Plane::filled(width, height, 0.0);
+    result.for_each_row_mut(|y, row| {
+        for (value, (mean, variance)) in row.iter_mut().zip(mean.row(y).iter().zip(variance.row(y))) {
+            let luminance = mean.max(1e-6);
+            let slope = (shown.cd_m2(luminance) - black) / luminance;
+            let displayed = slope * slope * variance.max(0.0);
+            *value = if mean.is_finite() && displayed.is_finite() { displayed } else { f32::INFINITY };
+        }
+    });
+    result
+}
+
 /// Half the difference that the two halves make on the display, cd/m²: (tone(M + D) − tone(M − D)) / 2 for the mean M and
 /// the half difference D = (A − B) / 2, both scene cd/m².
 ///

@@ -228,7 +228,8 @@ pub(crate) fn ratio(a: &Plane, b: &Plane, change: impl Fn(f32, f32) -> f32 + Syn
     result
 }
 
-fn noise_gain(
+/// N(x) under an adaptation luminance, with each band's masking or without any.
+pub(crate) fn noise_gain(
     tables: &SensitivityTables,
     adaptation_cd_m2: &Plane,
     coordinates: &Plane,

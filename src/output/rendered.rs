@@ -1,25 +1,51 @@
 //! The files a render leaves: what the display shows, or every layer of it.
 
-use super::{Attribute, NITS_PER_UNIT, OutputError, Picture, write_exr, write_png};
+use super::{Attribute, NITS_PER_UNIT, OutputError, Picture, write_exr, write_png, write_png_with_alpha};
 use crate::adaptive::Rendered;
 use crate::film::{Film, PixelGuide};
 use crate::sampler::Half;
 use std::path::Path;
 
-/// Writes the picture through its tone operator as sRGB.
-pub fn write_display_png(path: &Path, rendered: &Rendered) -> Result<(), OutputError> {
-    let judgement = &rendered.judgement;
-    let shown: Vec<[f32; 3]> = judgement.estimate.rgb_cd_m2.iter().map(|&rgb| judgement.tone.map_rgb(rgb)).collect();
-    write_png(path, rendered.film.width(), rendered.film.height(), &shown)
+/// What is where no surface covers the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Background {
+    /// What surrounds the scene: the files have no alpha.
+    Shown,
+    /// Nothing: the files have alpha.
+    Transparent,
 }
 
-/// Writes the picture in scene units with its layers: albedo, normal, depth, object id, sample count, variance of the
+/// Writes the picture through its tone operator as sRGB. A transparent background gives straight alpha, the colours being
+/// those of what covers the pixel.
+pub fn write_display_png(path: &Path, rendered: &Rendered, background: Background) -> Result<(), OutputError> {
+    let judgement = &rendered.judgement;
+    let (width, height) = (rendered.film.width(), rendered.film.height());
+    let picture = judgement.estimate.rgb_cd_m2.iter();
+    match background {
+        Background::Shown => {
+            let shown: Vec<[f32; 3]> = picture.map(|&rgb| judgement.tone.map_rgb(rgb)).collect();
+            write_png(path, width, height, &shown)
+        }
+        Background::Transparent => {
+            let coverage = rendered.film.coverage();
+            let covered = |(&rgb, &alpha): (&[f32; 3], &f32)| {
+                let scale = if alpha > 0.0 { 1.0 / alpha } else { 0.0 };
+                judgement.tone.map_rgb(rgb.map(|value| value * scale))
+            };
+            let shown: Vec<[f32; 3]> = picture.zip(&coverage).map(covered).collect();
+            write_png_with_alpha(path, width, height, &shown, &coverage)
+        }
+    }
+}
+
+/// Writes the picture in scene units with its layers: alpha (premultiplied) where the background is transparent, albedo, normal, depth, object id, sample count, variance of the
 /// picture's luminance (scene cd/m², squared), threshold (standard error in display cd/m² that is at visibility 1) and
 /// predicted visibility.
 pub fn write_layers_exr(
     path: &Path,
     rendered: &Rendered,
     nits_per_unit: f64,
+    background: Background,
     attributes: &[(String, Attribute)],
 ) -> Result<(), OutputError> {
     let (film, judgement) = (&rendered.film, &rendered.judgement);
@@ -28,6 +54,9 @@ pub fn write_layers_exr(
     for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
         let values: Vec<f32> = judgement.estimate.rgb_cd_m2.iter().map(|rgb| rgb[c] * to_units).collect();
         picture.push_f32(name, values);
+    }
+    if background == Background::Transparent {
+        picture.push_f32("A", film.coverage());
     }
     let guide = |value: &dyn Fn(&PixelGuide) -> f32| film.guides().iter().map(value).collect::<Vec<f32>>();
     for (c, name) in ["albedo.R", "albedo.G", "albedo.B"].into_iter().enumerate() {
@@ -40,7 +69,7 @@ pub fn write_layers_exr(
     picture.push_u32("id.Y", film.guides().iter().map(|g| g.object_id).collect::<Vec<u32>>());
     picture.push_u32("samples.Y", sample_counts(film));
     picture.push_f32("variance.Y", judgement.variance_of_mean.values());
-    let threshold = judgement.thresholds.allowed_standard_error_cd_m2(1.0);
+    let threshold = judgement.allowed_standard_error_cd_m2();
     picture.push_f32("threshold.Y", threshold.values());
     picture.push_f32("visibility.Y", judgement.predicted.values());
     picture.push_attribute(NITS_PER_UNIT, Attribute::Float(nits_per_unit as f32));
