@@ -92,9 +92,10 @@ impl Subject {
             seed,
             max_depth: DEFAULT_MAX_DEPTH,
             filter: PixelFilter::Gaussian,
-            clamp: None,
             sequence: Sequence::PerPixel,
             crop: None,
+            transparent: false,
+            clamp: None,
         };
         PathTracer::new(Arc::clone(&self.scene), settings)
     }

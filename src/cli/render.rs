@@ -9,6 +9,7 @@ use fechner::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, L
 use fechner::adaptive::{self, Rendered};
 use fechner::integrator::{Crop, DEFAULT_MAX_DEPTH, PathTracer, TraceSettings};
 use fechner::output;
+use fechner::output::rendered::Background;
 use fechner::sampler::{PixelFilter, Sequence};
 use fechner::scene::{Scene, load};
 use fechner_perception::model::{self, ThresholdModel};
@@ -96,6 +97,9 @@ pub(super) struct RenderArguments {
     #[arg(long, value_name = "CD_M2", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Seeing")]
     nits_per_unit: Option<f64>,
 
+    /// Leave out what surrounds the scene and write alpha: straight in PNG, premultiplied in EXR.
+    #[arg(long, help_heading = "Picture")]
+    transparent: bool,
     /// Tone operator.
     #[arg(long, value_name = "NAME", help_heading = "Picture")]
     operator: Option<String>,
@@ -257,8 +261,9 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
             SequenceChoice::ZOrder => Sequence::ZOrder,
         },
         crop: arguments.crop.map(|crop| check_crop(crop, size)).transpose()?,
+        transparent: arguments.transparent,
     };
-    if trace.filter.is_signed() && settings.sampling == Sampling::Adaptive {
+    if trace.filter.is_signed() && settings.sampling != Sampling::Uniform {
         bail!(
             "--filter mitchell has negative lobes, whose scatter is not the picture's noise: adaptive sampling cannot \
              judge it; use --sampling uniform, or the filter blackman-harris"
@@ -286,15 +291,18 @@ fn write(
     settings: &LoopSettings,
     report: &Report,
 ) -> anyhow::Result<()> {
+    let background = if arguments.transparent { Background::Transparent } else { Background::Shown };
     match format {
         output::Format::Png => {
-            output::rendered::write_display_png(&arguments.output, rendered, &settings.viewing.display)?;
+            let display = &settings.viewing.display;
+            output::rendered::write_display_png(&arguments.output, rendered, display, background)?;
         }
         output::Format::Exr => {
             output::rendered::write_layers_exr(
                 &arguments.output,
                 rendered,
                 settings.nits_per_unit,
+                background,
                 &report.attributes(),
             )?;
         }

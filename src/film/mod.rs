@@ -23,6 +23,8 @@ pub struct HalfPixel {
     pub samples: u32,
     /// Samples asked for, finite or not: where the pixel's sequence goes on.
     pub taken: u32,
+    /// Samples in the mean whose camera ray met nothing.
+    pub missed: u32,
 }
 
 /// Channels that statistics are kept of: luminance, red–green, yellow–violet.
@@ -37,6 +39,7 @@ pub fn opponent(rgb: [f64; 3]) -> [f64; CHANNELS] {
 #[derive(Clone, Copy, Debug)]
 pub struct BlockSum {
     samples: u32,
+    missed: u32,
     nonfinite: u32,
     rays: u64,
     rgb: [f64; 3],
@@ -51,6 +54,7 @@ impl Default for BlockSum {
     fn default() -> Self {
         Self {
             samples: 0,
+            missed: 0,
             nonfinite: 0,
             rays: 0,
             rgb: [0.0; 3],
@@ -73,6 +77,7 @@ impl BlockSum {
             return;
         }
         self.samples += 1;
+        self.missed += u32::from(sample.first_hit.object_id == 0);
         let rgb = sample.radiance.as_dvec3().to_array();
         for (sum, value) in self.rgb.iter_mut().zip(rgb) {
             *sum += value;
@@ -110,6 +115,12 @@ impl HalfPixel {
             *mean += (block - *mean) * new / (old + new);
         }
         self.samples += block.samples;
+        self.missed += block.missed;
+    }
+
+    /// Share of the samples whose camera ray met something; 1 for an empty pixel.
+    pub fn coverage(&self) -> f32 {
+        1.0 - self.missed as f32 / self.samples.max(1) as f32
     }
 
     /// Unbiased variance of one sample in an opponent channel; 0 below two samples.
@@ -200,6 +211,17 @@ impl Film {
             blend(&mut guide.normal, block.normal);
             guide.depth += (block.depth * scale - guide.depth) * share;
         }
+    }
+
+    /// Share of each pixel that something covers, weighed as the picture is: the mean of the halves.
+    pub fn coverage(&self) -> Vec<f32> {
+        let [a, b] = &self.halves;
+        let mean = |(a, b): (&HalfPixel, &HalfPixel)| match (a.samples, b.samples) {
+            (_, 0) => a.coverage(),
+            (0, _) => b.coverage(),
+            _ => 0.5 * (a.coverage() + b.coverage()),
+        };
+        a.iter().zip(b).map(mean).collect()
     }
 
     /// Samples of a pixel in both halves.

@@ -3,12 +3,17 @@
 //! Meshes that are placed once are put into world space and share one tree; meshes that are placed several times have a
 //! tree each, in their own space, and are entered through their instance's transform. Spheres stay analytic.
 
+mod at_hit;
+#[cfg(test)]
+mod tests;
+
 use super::mesh_tree::{MeshHit, MeshTree};
 use super::tree::{BinaryTree, Bounds, PrimitiveTree};
 use super::wide_tree::TriangleRef;
-use super::{Ray, SurfacePoint, sphere};
+use super::{Ray, sphere};
 use crate::scene::{Alpha, Instance, MaterialId, Motion, ScalarInput, Scene};
-use glam::{Affine3A, Mat3A, Vec2, Vec3, Vec3A};
+use at_hit::{Placement, interpolate_uv};
+use glam::{Affine3A, Vec3, Vec3A};
 use std::sync::Arc;
 
 /// What a ray hits.
@@ -48,27 +53,6 @@ pub struct World {
     has_alpha: bool,
     /// By instance.
     placements: Vec<Placement>,
-}
-
-/// What shading needs of an instance besides its transform.
-#[derive(Clone, Copy, Debug)]
-struct Placement {
-    /// Cofactors of the transform: turns normals, and turns them over where the transform mirrors.
-    normal_matrix: Mat3A,
-    /// −1 where the transform mirrors.
-    flip: f32,
-    /// Whether the material has a normal map.
-    needs_tangent: bool,
-}
-
-impl Placement {
-    fn new(scene: &Scene, instance: &Instance, to_world: &Affine3A) -> Self {
-        let m = to_world.matrix3;
-        let flip = if m.determinant() < 0.0 { -1.0 } else { 1.0 };
-        let cofactors = Mat3A::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
-        let needs_tangent = scene.materials[instance.material.0 as usize].needs_tangent();
-        Self { normal_matrix: cofactors * flip, flip, needs_tangent }
-    }
 }
 
 /// What a leaf of the top tree holds.
@@ -299,91 +283,6 @@ impl World {
             Alpha::Blend { value } => coverage(value) > ray_hash(ray, hit.triangle.triangle),
         }
     }
-
-    /// Object space to world space of an instance at a share of the open shutter.
-    pub fn transform_at(&self, object: u32, time: f32) -> Affine3A {
-        let instance = &self.scene.instances[object as usize];
-        instance.motion.as_ref().map_or(instance.to_world, |motion| motion.at(time))
-    }
-
-    /// Centre and radius of a sphere at a share of the open shutter.
-    pub fn sphere_at(&self, object: u32, time: f32) -> (Vec3A, f32) {
-        let sphere = &self.scene.spheres[object as usize - self.scene.instances.len()];
-        let center = Vec3A::from(sphere.center);
-        let Some(motion) = &sphere.motion else { return (center, sphere.radius) };
-        let moved = motion.at(time);
-        (moved.transform_point3a(center), sphere.radius * moved.matrix3.x_axis.length())
-    }
-
-    /// World-space corners of a triangle of an instance at a share of the open shutter.
-    pub fn triangle_corners(&self, object: u32, triangle: u32, time: f32) -> [Vec3; 3] {
-        let to_world = self.transform_at(object, time);
-        let mesh = &self.scene.meshes[self.scene.instances[object as usize].mesh.0 as usize];
-        mesh.triangles[triangle as usize].map(|i| to_world.transform_point3(mesh.positions[i as usize]))
-    }
-
-    /// The surface at a hit.
-    pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
-        let Some(instance) = self.scene.instances.get(hit.object as usize) else {
-            let (center, radius) = self.sphere_at(hit.object, ray.time);
-            let normal = Vec3::from((ray.origin + ray.direction * hit.distance) - center).normalize_or(Vec3::Y);
-            let position = Vec3::from(center) + radius * normal;
-            return SurfacePoint {
-                position,
-                geometric_normal: normal,
-                shading_normal: normal,
-                tangent: Vec3::Y.cross(normal).normalize_or(Vec3::X),
-                handedness: 1.0,
-                uv: Vec2::new(
-                    0.5 + normal.x.atan2(-normal.z) / std::f32::consts::TAU,
-                    normal.y.clamp(-1.0, 1.0).acos() / std::f32::consts::PI,
-                ),
-                object: hit.object,
-                triangle: 0,
-                offset: self.offset_at(position),
-            };
-        };
-        let mesh = &self.scene.meshes[instance.mesh.0 as usize];
-        let corners = self.triangle_corners(hit.object, hit.triangle, ray.time);
-        let (b1, b2) = (hit.b1, hit.b2);
-        let position = corners[0] * (1.0 - b1 - b2) + corners[1] * b1 + corners[2] * b2;
-        let Placement { normal_matrix, flip, needs_tangent } = match instance.motion {
-            Some(_) => Placement::new(&self.scene, instance, &self.transform_at(hit.object, ray.time)),
-            None => self.placements[hit.object as usize],
-        };
-        let geometric_normal = flip * (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or(Vec3::Y);
-        let indices = mesh.triangles[hit.triangle as usize].map(|i| i as usize);
-        let shading_normal = if mesh.normals.is_empty() {
-            geometric_normal
-        } else {
-            let [n0, n1, n2] = indices.map(|i| mesh.normals[i]);
-            let blended = Vec3A::from(n0 * (1.0 - b1 - b2) + n1 * b1 + n2 * b2);
-            let n = Vec3::from(normal_matrix * blended).normalize_or(geometric_normal);
-            // A file may wind its triangles against its normals; the geometric side is what counts.
-            if n.dot(geometric_normal) < 0.0 { -n } else { n }
-        };
-        let (tangent, handedness) = if !needs_tangent {
-            (corners[1] - corners[0], 1.0)
-        } else if mesh.tangents.is_empty() {
-            tangent_from_uv(mesh, hit.triangle, &corners)
-        } else {
-            let [t0, t1, t2] = indices.map(|i| mesh.tangents[i]);
-            let blended = t0.truncate() * (1.0 - b1 - b2) + t1.truncate() * b1 + t2.truncate() * b2;
-            let world = Vec3::from(self.transform_at(hit.object, ray.time).matrix3 * Vec3A::from(blended));
-            (world.normalize_or(Vec3::X), if t0.w < 0.0 { -flip } else { flip })
-        };
-        SurfacePoint {
-            position,
-            geometric_normal,
-            shading_normal,
-            tangent,
-            handedness,
-            uv: interpolate_uv(mesh, hit.triangle, b1, b2),
-            object: hit.object,
-            triangle: hit.triangle,
-            offset: self.offset_at(position),
-        }
-    }
 }
 
 /// A ray in an instance's mesh space, its direction made unit again: distances there are `length` times longer.
@@ -448,137 +347,10 @@ fn swept_bounds(motion: &Motion, own: Bounds) -> Bounds {
     bounds
 }
 
-fn interpolate_uv(mesh: &crate::scene::Mesh, triangle: u32, b1: f32, b2: f32) -> Vec2 {
-    if mesh.uvs.is_empty() {
-        return Vec2::ZERO;
-    }
-    let [i, j, k] = mesh.triangles[triangle as usize].map(|i| mesh.uvs[i as usize]);
-    i * (1.0 - b1 - b2) + j * b1 + k * b2
-}
-
-/// Direction of growing u on a triangle and the handedness of (u, v), from its texture coordinates.
-fn tangent_from_uv(mesh: &crate::scene::Mesh, triangle: u32, corners: &[Vec3; 3]) -> (Vec3, f32) {
-    let along_edge = (corners[1] - corners[0]).normalize_or(Vec3::X);
-    if mesh.uvs.is_empty() {
-        return (along_edge, 1.0);
-    }
-    let [a, b, c] = mesh.triangles[triangle as usize].map(|i| mesh.uvs[i as usize]);
-    let (d1, d2) = (b - a, c - a);
-    let area = d1.perp_dot(d2);
-    let tangent = ((corners[1] - corners[0]) * d2.y - (corners[2] - corners[0]) * d1.y) * area.signum();
-    // v runs down the picture, so a texture that is not mirrored has a negative uv area.
-    (tangent.try_normalize().unwrap_or(along_edge), if area > 0.0 { -1.0 } else { 1.0 })
-}
-
 fn ray_hash(ray: &Ray, triangle: u32) -> f32 {
     let mut h = u64::from(triangle);
     for value in ray.origin.to_array().into_iter().chain(ray.direction.to_array()) {
         h = crate::sampler::hash_words(h, u64::from(value.to_bits()));
     }
     (h >> 40) as f32 * (1.0 / 16_777_216.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::{Camera, ColorInput, FilmDefaults, Material, Mesh, MeshId, Sphere, Surface, ViewingDefaults};
-    use glam::{Quat, vec3a};
-
-    /// A tetrahedron placed by each of the transforms, and a sphere.
-    fn scene(transforms: &[Affine3A]) -> Scene {
-        let mesh = Mesh {
-            name: "tetrahedron".to_owned(),
-            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z],
-            triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
-            ..Mesh::default()
-        };
-        let material = Material {
-            name: "grey".to_owned(),
-            surface: Surface::Diffuse { reflectance: ColorInput::constant(Vec3::splat(0.5)) },
-            emission: ColorInput::constant(Vec3::ZERO),
-            emits_both_sides: false,
-            normal_map: None,
-            alpha: Alpha::Opaque,
-        };
-        let instance = |to_world: &Affine3A| Instance {
-            name: String::new(),
-            mesh: MeshId(0),
-            material: MaterialId(0),
-            to_world: *to_world,
-            motion: None,
-        };
-        Scene {
-            name: String::new(),
-            nits_per_unit: 1.0,
-            camera: Camera::pinhole(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 40.0),
-            film: FilmDefaults { width: 1, height: 1 },
-            viewing: ViewingDefaults::default(),
-            meshes: vec![mesh],
-            instances: transforms.iter().map(instance).collect(),
-            spheres: vec![Sphere {
-                name: String::new(),
-                center: Vec3::splat(-3.0),
-                radius: 1.0,
-                material: MaterialId(0),
-                motion: None,
-            }],
-            materials: vec![material],
-            textures: Vec::new(),
-            lights: Vec::new(),
-            environment: None,
-            notes: Vec::new(),
-        }
-    }
-
-    /// The same instances with a mesh of its own each: all of them end in the tree of fixed triangles.
-    fn flattened(scene: &Scene) -> Scene {
-        let mut flat = scene.clone();
-        flat.meshes = vec![scene.meshes[0].clone(); scene.instances.len()];
-        flat.instances.iter_mut().enumerate().for_each(|(i, instance)| instance.mesh = MeshId(i as u32));
-        flat
-    }
-
-    /// Rotated, scaled by a thousandth, stretched and mirrored instances are hit where the flattened ones are.
-    #[test]
-    fn two_levels_equal_one() {
-        let transforms = [
-            Affine3A::from_translation(Vec3::X * 2.0),
-            Affine3A::from_scale_rotation_translation(Vec3::splat(1e-3), Quat::from_rotation_y(1.0), Vec3::Y),
-            Affine3A::from_scale_rotation_translation(Vec3::new(3.0, 0.2, 1.0), Quat::from_rotation_x(2.0), Vec3::ZERO),
-            Affine3A::from_scale(Vec3::new(-1.0, 1.0, 1.0)),
-        ];
-        let placed = scene(&transforms);
-        let (two, one) = (World::new(Arc::new(placed.clone())), World::new(Arc::new(flattened(&placed))));
-        assert_eq!((two.shared.len(), one.shared.len()), (1, 0));
-        let mut hits = [0; 5];
-        for i in 0..4000u64 {
-            let unit = |k: u64| (crate::sampler::hash_words(i, k) >> 40) as f32 / 16_777_216.0 * 2.0 - 1.0;
-            let origin = vec3a(unit(0), unit(1), unit(2)) * 6.0;
-            let target = [Vec3A::ZERO, vec3a(2.2, 0.2, 0.2), Vec3A::Y, Vec3A::splat(-3.0)][i as usize % 4];
-            let spread = if i % 4 == 2 { 1e-3 } else { 1.0 };
-            let direction = (target + vec3a(unit(3), unit(4), unit(5)) * spread - origin).normalize();
-            let ray = Ray::new(origin, direction);
-            let (a, b) = (two.closest(&ray), one.closest(&ray));
-            assert_eq!(a.is_some(), b.is_some(), "ray {i}");
-            if let (Some(a), Some(b)) = (a, b) {
-                assert_eq!((a.object, a.triangle), (b.object, b.triangle), "ray {i}");
-                assert!((a.distance - b.distance).abs() < 1e-5 * b.distance, "ray {i}");
-                hits[a.object as usize] += 1;
-                let (p, q) = (two.surface(&ray, &a), one.surface(&ray, &b));
-                assert!(p.position.distance(q.position) < 1e-4);
-                assert!(p.geometric_normal.dot(q.geometric_normal) > 0.999);
-                assert!(two.occluded(&ray, a.distance * 1.001) && !two.occluded(&ray, a.distance * 0.999));
-            }
-        }
-        assert!(hits.iter().all(|&h| h > 20), "hits by object: {hits:?}");
-    }
-
-    /// The mirrored instance's normals still point outwards.
-    #[test]
-    fn mirrored_instances_keep_their_outside() {
-        let world = World::new(Arc::new(scene(&[Affine3A::from_scale(Vec3::new(-1.0, 1.0, 1.0))])));
-        let ray = Ray::new(vec3a(-2.0, 2.0, 2.0), vec3a(1.0, -1.0, -1.0).normalize());
-        let hit = world.closest(&ray).expect("the slanted face");
-        assert!(world.surface(&ray, &hit).geometric_normal.dot(Vec3::from(ray.direction)) < 0.0);
-    }
 }

@@ -36,13 +36,16 @@ pub struct TraceSettings {
     pub max_depth: u32,
     /// Reconstruction filter.
     pub filter: PixelFilter,
-    /// Largest channel of a sample, scene units: brighter samples are scaled down to it, which darkens the picture where
-    /// light is rare. `None` leaves the estimate unbiased.
-    pub clamp: Option<f32>,
     /// How the samples of neighbouring pixels relate.
     pub sequence: Sequence,
     /// The part of the picture that is traced; `None` is all of it. Its samples are those of the whole picture.
     pub crop: Option<Crop>,
+    /// Whether camera rays that meet nothing see nothing, so that the picture can be laid over another. Light from afar
+    /// still falls on surfaces, and is seen in and through them.
+    pub transparent: bool,
+    /// Largest channel of a sample, scene units: brighter samples are scaled down to it, which darkens the picture where
+    /// light is rare. `None` leaves the estimate unbiased.
+    pub clamp: Option<f32>,
 }
 
 /// A rectangle of the picture in pixels, inside it.
@@ -227,7 +230,8 @@ impl PathTracer {
             if let Some(clamp) = self.settings.clamp {
                 path.radiance *= (clamp / path.radiance.max_element().max(clamp)).min(1.0);
             }
-            sum.add(&PathSample { radiance: path.radiance * filtered.weight, ..path });
+            path.radiance *= filtered.weight;
+            sum.add(&path);
         }
         sum
     }

@@ -75,7 +75,9 @@ impl PathTracer {
         for bounce in 0.. {
             path.rays += 1;
             let Some(hit) = self.world.closest(&path.ray) else {
-                self.add_environment(&mut path);
+                if bounce > 0 || !self.settings.transparent {
+                    self.add_environment(&mut path);
+                }
                 break;
             };
             let point = self.world.surface(&path.ray, &hit);

@@ -73,11 +73,31 @@ fn encode_pq16(rgb_linear_display: &[[f32; 3]], display: &Display) -> Vec<u8> {
 /// channels so that greys stay grey, by a hash of the pixel's place so that equal pixels give equal files.
 pub fn write_png(path: &Path, width: u32, height: u32, rgb_linear_display: &[[f32; 3]]) -> Result<(), OutputError> {
     check_size(path, width, height, &[("the picture", rgb_linear_display.len())])?;
-    let bytes = encode_srgb8(width, rgb_linear_display);
+    write_bytes(path, width, height, png::ColorType::Rgb, &encode_srgb8(width, rgb_linear_display))
+}
+
+/// The same with an alpha in [0, 1] a pixel, by which the colours are not multiplied.
+pub fn write_png_with_alpha(
+    path: &Path,
+    width: u32,
+    height: u32,
+    rgb_linear_display: &[[f32; 3]],
+    alpha: &[f32],
+) -> Result<(), OutputError> {
+    check_size(path, width, height, &[("the picture", rgb_linear_display.len()), ("alpha", alpha.len())])?;
+    let colors = encode_srgb8(width, rgb_linear_display);
+    let alphas = alpha.iter().map(|a| (a.clamp(0.0, 1.0) * 255.0 + 0.5) as u8);
+    let bytes: Vec<u8> =
+        colors.as_chunks::<3>().0.iter().zip(alphas).flat_map(|(&[r, g, b], a)| [r, g, b, a]).collect();
+    write_bytes(path, width, height, png::ColorType::Rgba, &bytes)
+}
+
+/// Writes 8-bit samples, tagged as sRGB.
+fn write_bytes(path: &Path, width: u32, height: u32, color: png::ColorType, bytes: &[u8]) -> Result<(), OutputError> {
     write_beside(path, |file| {
         let mut buffered = BufWriter::new(file);
         let mut encoder = png::Encoder::new(&mut buffered, width, height);
-        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_color(color);
         encoder.set_depth(png::BitDepth::Eight);
         encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
         // For readers that know only these; the values are those that the format's standard names beside sRGB.
@@ -89,7 +109,7 @@ pub fn write_png(path: &Path, width: u32, height: u32, rgb_linear_display: &[[f3
             (0.15, 0.06),
         ));
         let mut writer = encoder.write_header()?;
-        writer.write_image_data(&bytes)?;
+        writer.write_image_data(bytes)?;
         writer.finish()?;
         buffered.flush()
     })

@@ -1,6 +1,6 @@
 //! The files a render leaves: what the display shows, or every layer of it.
 
-use super::{Attribute, NITS_PER_UNIT, OutputError, Picture, write_exr, write_png_for};
+use super::{Attribute, NITS_PER_UNIT, OutputError, Picture, write_exr, write_png_for, write_png_with_alpha};
 use crate::adaptive::Rendered;
 use crate::adaptive::statistics::picture_variance;
 use crate::film::{Film, PixelGuide};
@@ -9,21 +9,50 @@ use fechner_perception::display::Display;
 use fechner_perception::tone::map_picture;
 use std::path::Path;
 
-/// Writes the picture through its tone operator, coded for the display.
-pub fn write_display_png(path: &Path, rendered: &Rendered, display: &Display) -> Result<(), OutputError> {
-    let judgement = &rendered.judgement;
-    let (width, height) = (rendered.film.width(), rendered.film.height());
-    let shown = map_picture(judgement.tone.as_ref(), width as usize, &judgement.estimate.rgb_cd_m2);
-    write_png_for(path, width, height, &shown, display)
+/// What is where no surface covers the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Background {
+    /// What surrounds the scene: the files have no alpha.
+    Shown,
+    /// Nothing: the files have alpha.
+    Transparent,
 }
 
-/// Writes the picture in scene units with its layers: albedo, normal, depth, object id, sample count, variance of the
-/// picture's luminance (scene cd/m², squared), threshold (standard error in display cd/m² that is at visibility 1) and
+/// Writes the picture through its tone operator, coded for the display. A transparent background gives sRGB with straight
+/// alpha, the colours being those of what covers the pixel.
+pub fn write_display_png(
+    path: &Path,
+    rendered: &Rendered,
+    display: &Display,
+    background: Background,
+) -> Result<(), OutputError> {
+    let judgement = &rendered.judgement;
+    let (width, height) = (rendered.film.width(), rendered.film.height());
+    let picture = &judgement.estimate.rgb_cd_m2;
+    let tone = judgement.tone.as_ref();
+    match background {
+        Background::Shown => write_png_for(path, width, height, &map_picture(tone, width as usize, picture), display),
+        Background::Transparent => {
+            let coverage = rendered.film.coverage();
+            let covered = |(rgb, &alpha): (&[f32; 3], &f32)| {
+                let scale = if alpha > 0.0 { 1.0 / alpha } else { 0.0 };
+                rgb.map(|value| value * scale)
+            };
+            let covered: Vec<[f32; 3]> = picture.iter().zip(&coverage).map(covered).collect();
+            let shown = map_picture(tone, width as usize, &covered);
+            write_png_with_alpha(path, width, height, &shown, &coverage)
+        }
+    }
+}
+
+/// Writes the picture in scene units with its layers: alpha (premultiplied) where the background is transparent, albedo,
+/// normal, depth, object id, sample count, variance of the picture's luminance (scene cd/m², squared), threshold (standard error in display cd/m² that is at visibility 1) and
 /// predicted visibility.
 pub fn write_layers_exr(
     path: &Path,
     rendered: &Rendered,
     nits_per_unit: f64,
+    background: Background,
     attributes: &[(String, Attribute)],
 ) -> Result<(), OutputError> {
     let (film, judgement) = (&rendered.film, &rendered.judgement);
@@ -32,6 +61,9 @@ pub fn write_layers_exr(
     for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
         let values: Vec<f32> = judgement.estimate.rgb_cd_m2.iter().map(|rgb| rgb[c] * to_units).collect();
         picture.push_f32(name, values);
+    }
+    if background == Background::Transparent {
+        picture.push_f32("A", film.coverage());
     }
     let guide = |value: &dyn Fn(&PixelGuide) -> f32| film.guides().iter().map(value).collect::<Vec<f32>>();
     for (c, name) in ["albedo.R", "albedo.G", "albedo.B"].into_iter().enumerate() {

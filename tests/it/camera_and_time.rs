@@ -1,10 +1,13 @@
 //! What lens and shutter do to a picture, measured as second moments of spots of light; crops; motion under lamps.
 
-use crate::support::{add_material, add_rectangle, add_sphere, diffuse, empty_scene, radiance_along, trace_settings};
+use crate::support::{
+    add_material, add_rectangle, add_sphere, constant_environment, diffuse, empty_scene, radiance_along, trace_settings,
+};
 use fechner::film::Film;
 use fechner::geometry::Ray;
 use fechner::integrator::{BlockWork, Crop, PathTracer, SamplePlan, TraceSettings};
 use fechner::sampler::{Half, Sequence};
+use fechner::scene::load::{LoadOptions, load};
 use fechner::scene::{Motion, Scene};
 use glam::{Affine3A, Quat, Vec3, vec3a};
 use std::f32::consts::{FRAC_1_PI, PI};
@@ -165,4 +168,68 @@ fn a_crop_is_a_part_of_the_whole() {
         }
         assert!(part.half(Half::A).iter().any(|pixel| pixel.mean[0] > 0.1), "the crop shows something");
     }
+}
+
+/// With a transparent background, pixels beside the lamp see nothing of the sky and are not covered, while the sky still
+/// lights what stands in it.
+#[test]
+fn a_transparent_background_leaves_the_light() {
+    let mut scene = empty_scene();
+    let grey = add_material(&mut scene, diffuse(0.5), Vec3::ZERO);
+    add_sphere(&mut scene, Vec3::ZERO, 0.5, grey);
+    scene.environment = constant_environment(1.0);
+    let film = film_of(&scene, TraceSettings { transparent: true, ..trace_settings(SIZE, SIZE, 5) }, 3);
+    let (coverage, picture) = (film.coverage(), film.estimate(1.0).rgb_cd_m2);
+    let (corner, middle) = (0, (SIZE * SIZE / 2 + SIZE / 2) as usize);
+    assert_eq!((coverage[corner], picture[corner]), (0.0, [0.0; 3]));
+    assert!(coverage[middle] == 1.0 && (picture[middle][0] - 0.5).abs() < 0.02, "{:?}", picture[middle]);
+    // The sphere's disc in pixels: its silhouette is at sin θ = 0.1.
+    let radius = pixels(5.0 * 0.1f64.asin().tan(), 5.0);
+    let area: f64 = coverage.iter().map(|&c| f64::from(c)).sum();
+    assert!((area / (std::f64::consts::PI * radius * radius) - 1.0).abs() < 0.005, "{area}");
+}
+
+/// Keyframes of a file move things while the shutter is open, from the frame's time on: at shares of the shutter they are
+/// where the keyframes say, also where a keyframe lies within it.
+#[test]
+fn keyframes_move_things_while_the_shutter_is_open() {
+    let text = r#"
+        [camera]
+        shutter_s = 0.5
+        keyframes = [ { time = 0, position = [0, 0, 5], look_at = [0, 0, 0] }, { time = 4, position = [4, 0, 5], look_at = [4, 0, 0] } ]
+        [environment]
+        sky = { sun_elevation_deg = 30 }
+        [materials.white]
+        type = "diffuse"
+        reflectance = [0.7, 0.7, 0.7]
+        [[objects]]
+        box = { min = [0, 0, 0], max = [1, 1, 1] }
+        material = "white"
+        transform = [ { translate = [0, 1, 0] } ]
+        keyframes = [ { time = 1, translate = [0, 0, 0] }, { time = 1.25, translate = [1, 0, 0] }, { time = 2, rotate_deg = 90, axis = [0, 0, 1], translate = [1, 0, 0] } ]
+        [[objects]]
+        sphere = { center = [0, 0, 0], radius = 1 }
+        material = "white"
+        keyframes = [ { time = 1, scale = 1 }, { time = 1.5, scale = 2 } ]
+    "#;
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("moving.toml");
+    std::fs::write(&file, text).expect("written");
+    let options = LoadOptions { frame_time: 1.0, ..LoadOptions::default() };
+    let scene = load(&file, &options).expect("a sound scene");
+    assert!(scene.moves() && scene.lights.len() == 1);
+    let camera = scene.camera.motion.as_ref().expect("it moves");
+    assert!(scene.camera.position.abs_diff_eq(Vec3::new(1.0, 0.0, 5.0), 1e-5));
+    assert!(camera.at(1.0).transform_point3(scene.camera.position).abs_diff_eq(Vec3::new(1.5, 0.0, 5.0), 1e-5));
+    let cube = scene.instances[0].motion.as_ref().expect("it moves");
+    let origin = |time: f32| cube.at(time).transform_point3(Vec3::ZERO);
+    assert!(origin(0.25).abs_diff_eq(Vec3::new(0.5, 1.0, 0.0), 1e-5), "{}", origin(0.25));
+    assert!(origin(0.5).abs_diff_eq(Vec3::new(1.0, 1.0, 0.0), 1e-5), "{}", origin(0.5));
+    // A quarter second of three quarters: 30° about z.
+    let (sin, cos) = 30f32.to_radians().sin_cos();
+    assert!(origin(1.0).abs_diff_eq(Vec3::new(1.0 - sin, cos, 0.0), 1e-5), "{}", origin(1.0));
+    let sphere = scene.spheres[0].motion.as_ref().expect("it moves");
+    assert!((sphere.at(0.5).matrix3.x_axis.length() - 1.5).abs() < 1e-5);
+    let still = load(&file, &LoadOptions { frame_time: 9.0, ..LoadOptions::default() }).expect("a sound scene");
+    assert!(!still.moves(), "after the last keyframe everything rests");
 }

@@ -160,3 +160,42 @@ fn pictures_are_compared_and_thresholds_mapped() {
     assert_refused(&["compare", "1.exr", "unitless.exr", "--nits-per-unit", "100"], at, &["64x48", "2x2"]);
     assert_refused(&["threshold", "1.exr", "-o", "a.exr", "--model", "guess"], at, &["guess", "csf-bands"]);
 }
+
+/// Options that contradict each other or the picture are told apart before anything is traced.
+#[test]
+fn impossible_pictures_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = scene("cornell-box.toml");
+    let scene = scene.to_str().expect("a plain path");
+    let with = |extra: &[&'static str]| {
+        let mut arguments = vec!["render", scene, "-o", "out.png", "--size", "32x32"];
+        arguments.extend(extra);
+        arguments.iter().map(|a| (*a).to_owned()).collect::<Vec<_>>()
+    };
+    let cases: [(&[&'static str], &[&str]); 3] = [
+        (&["--filter", "mitchell"], &["negative lobes", "--sampling uniform", "blackman-harris"]),
+        (&["--crop", "20,0,20,10"], &["--crop 20,0,20,10 reaches beyond the picture of 32x32 pixels"]),
+        (&["--crop", "1,2,3"], &["expected X,Y,WIDTH,HEIGHT"]),
+    ];
+    for (extra, fragments) in cases {
+        let arguments = with(extra);
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        assert_refused(&arguments, folder.path(), fragments);
+    }
+    let run = fechner()
+        .args(with(&[
+            "--filter",
+            "mitchell",
+            "--sampling",
+            "uniform",
+            "--spp",
+            "4",
+            "--crop",
+            "4,4,8,8",
+            "--transparent",
+        ]))
+        .current_dir(folder.path())
+        .output()
+        .expect("runs");
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+}

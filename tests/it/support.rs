@@ -83,6 +83,7 @@ pub(crate) fn trace_settings(width: u32, height: u32, seed: u64) -> TraceSetting
         filter: PixelFilter::Box,
         sequence: Sequence::PerPixel,
         crop: None,
+        transparent: false,
         clamp: None,
     }
 }

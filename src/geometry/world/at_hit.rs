@@ -1,0 +1,136 @@
+//! What is at a hit: from a place on a triangle or sphere at a time to a [`SurfacePoint`].
+
+use super::{Hit, World};
+use crate::geometry::{Ray, SurfacePoint};
+use crate::scene::{Instance, Mesh, Scene};
+use glam::{Affine3A, Mat3A, Vec2, Vec3, Vec3A};
+
+/// What shading needs of an instance besides its transform.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Placement {
+    /// Cofactors of the transform: turns normals, and turns them over where the transform mirrors.
+    normal_matrix: Mat3A,
+    /// −1 where the transform mirrors.
+    flip: f32,
+    /// Whether the material has a normal map.
+    needs_tangent: bool,
+}
+
+impl Placement {
+    pub(super) fn new(scene: &Scene, instance: &Instance, to_world: &Affine3A) -> Self {
+        let m = to_world.matrix3;
+        let flip = if m.determinant() < 0.0 { -1.0 } else { 1.0 };
+        let cofactors = Mat3A::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
+        let needs_tangent = scene.materials[instance.material.0 as usize].normal_map.is_some();
+        Self { normal_matrix: cofactors * flip, flip, needs_tangent }
+    }
+}
+
+impl World {
+    /// Object space to world space of an instance at a share of the open shutter.
+    pub fn transform_at(&self, object: u32, time: f32) -> Affine3A {
+        let instance = &self.scene.instances[object as usize];
+        instance.motion.as_ref().map_or(instance.to_world, |motion| motion.at(time))
+    }
+
+    /// Centre and radius of a sphere at a share of the open shutter.
+    pub fn sphere_at(&self, object: u32, time: f32) -> (Vec3A, f32) {
+        let sphere = &self.scene.spheres[object as usize - self.scene.instances.len()];
+        let center = Vec3A::from(sphere.center);
+        let Some(motion) = &sphere.motion else { return (center, sphere.radius) };
+        let moved = motion.at(time);
+        (moved.transform_point3a(center), sphere.radius * moved.matrix3.x_axis.length())
+    }
+
+    /// World-space corners of a triangle of an instance at a share of the open shutter.
+    pub fn triangle_corners(&self, object: u32, triangle: u32, time: f32) -> [Vec3; 3] {
+        let to_world = self.transform_at(object, time);
+        let mesh = &self.scene.meshes[self.scene.instances[object as usize].mesh.0 as usize];
+        mesh.triangles[triangle as usize].map(|i| to_world.transform_point3(mesh.positions[i as usize]))
+    }
+
+    /// The surface at a hit.
+    pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
+        let Some(instance) = self.scene.instances.get(hit.object as usize) else {
+            let (center, radius) = self.sphere_at(hit.object, ray.time);
+            let normal = Vec3::from((ray.origin + ray.direction * hit.distance) - center).normalize_or(Vec3::Y);
+            let position = Vec3::from(center) + radius * normal;
+            return SurfacePoint {
+                position,
+                geometric_normal: normal,
+                shading_normal: normal,
+                tangent: Vec3::Y.cross(normal).normalize_or(Vec3::X),
+                handedness: 1.0,
+                uv: Vec2::new(
+                    0.5 + normal.x.atan2(-normal.z) / std::f32::consts::TAU,
+                    normal.y.clamp(-1.0, 1.0).acos() / std::f32::consts::PI,
+                ),
+                object: hit.object,
+                triangle: 0,
+                offset: self.offset_at(position),
+            };
+        };
+        let mesh = &self.scene.meshes[instance.mesh.0 as usize];
+        let corners = self.triangle_corners(hit.object, hit.triangle, ray.time);
+        let (b1, b2) = (hit.b1, hit.b2);
+        let position = corners[0] * (1.0 - b1 - b2) + corners[1] * b1 + corners[2] * b2;
+        let Placement { normal_matrix, flip, needs_tangent } = match instance.motion {
+            Some(_) => Placement::new(&self.scene, instance, &self.transform_at(hit.object, ray.time)),
+            None => self.placements[hit.object as usize],
+        };
+        let geometric_normal = flip * (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or(Vec3::Y);
+        let indices = mesh.triangles[hit.triangle as usize].map(|i| i as usize);
+        let shading_normal = if mesh.normals.is_empty() {
+            geometric_normal
+        } else {
+            let [n0, n1, n2] = indices.map(|i| mesh.normals[i]);
+            let blended = Vec3A::from(n0 * (1.0 - b1 - b2) + n1 * b1 + n2 * b2);
+            let n = Vec3::from(normal_matrix * blended).normalize_or(geometric_normal);
+            // A file may wind its triangles against its normals; the geometric side is what counts.
+            if n.dot(geometric_normal) < 0.0 { -n } else { n }
+        };
+        let (tangent, handedness) = if !needs_tangent {
+            (corners[1] - corners[0], 1.0)
+        } else if mesh.tangents.is_empty() {
+            tangent_from_uv(mesh, hit.triangle, &corners)
+        } else {
+            let [t0, t1, t2] = indices.map(|i| mesh.tangents[i]);
+            let blended = t0.truncate() * (1.0 - b1 - b2) + t1.truncate() * b1 + t2.truncate() * b2;
+            let world = Vec3::from(self.transform_at(hit.object, ray.time).matrix3 * Vec3A::from(blended));
+            (world.normalize_or(Vec3::X), if t0.w < 0.0 { -flip } else { flip })
+        };
+        SurfacePoint {
+            position,
+            geometric_normal,
+            shading_normal,
+            tangent,
+            handedness,
+            uv: interpolate_uv(mesh, hit.triangle, b1, b2),
+            object: hit.object,
+            triangle: hit.triangle,
+            offset: self.offset_at(position),
+        }
+    }
+}
+
+pub(super) fn interpolate_uv(mesh: &Mesh, triangle: u32, b1: f32, b2: f32) -> Vec2 {
+    if mesh.uvs.is_empty() {
+        return Vec2::ZERO;
+    }
+    let [i, j, k] = mesh.triangles[triangle as usize].map(|i| mesh.uvs[i as usize]);
+    i * (1.0 - b1 - b2) + j * b1 + k * b2
+}
+
+/// Direction of growing u on a triangle and the handedness of (u, v), from its texture coordinates.
+fn tangent_from_uv(mesh: &Mesh, triangle: u32, corners: &[Vec3; 3]) -> (Vec3, f32) {
+    let along_edge = (corners[1] - corners[0]).normalize_or(Vec3::X);
+    if mesh.uvs.is_empty() {
+        return (along_edge, 1.0);
+    }
+    let [a, b, c] = mesh.triangles[triangle as usize].map(|i| mesh.uvs[i as usize]);
+    let (d1, d2) = (b - a, c - a);
+    let area = d1.perp_dot(d2);
+    let tangent = ((corners[1] - corners[0]) * d2.y - (corners[2] - corners[0]) * d1.y) * area.signum();
+    // v runs down the picture, so a texture that is not mirrored has a negative uv area.
+    (tangent.try_normalize().unwrap_or(along_edge), if area > 0.0 { -1.0 } else { 1.0 })
+}
