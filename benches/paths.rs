@@ -13,7 +13,7 @@ mod support;
 use anyhow::Result;
 use fechner::film::Film;
 use fechner::integrator::{BlockWork, PathTracer, SamplePlan, TraceSettings};
-use fechner::sampler::{Half, PixelFilter};
+use fechner::sampler::{Half, PixelFilter, Sequence};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -66,6 +66,8 @@ fn bench_scene(name: &str, scene: fechner::scene::Scene) -> Result<()> {
         seed: 1,
         max_depth: MAX_DEPTH,
         filter: PixelFilter::Box,
+        sequence: Sequence::PerPixel,
+        crop: None,
         clamp: None,
     };
     let tracer = PathTracer::new(Arc::new(scene), settings);

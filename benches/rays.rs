@@ -9,8 +9,7 @@ mod support;
 
 use anyhow::{Context, Result, bail};
 use fechner::geometry::{Ray, World};
-use fechner::integrator::CameraRays;
-use fechner::sampler::{BlockKey, Half, Purpose};
+use fechner::integrator::{CameraRays, CameraSample};
 use glam::{Vec2, Vec3, Vec3A};
 use std::hint::black_box;
 use std::io::{BufRead, BufReader, Write};
@@ -153,25 +152,22 @@ fn ray_sets(world: &World) -> Vec<RaySet> {
     let camera = CameraRays::new(&world.scene().camera, SIDE, SIDE);
     let (mut primary, mut bounce, mut shadow) = (Vec::new(), Vec::new(), Vec::new());
     for pixel in 0..SIDE * SIDE {
-        let sample = BlockKey { seed: 1, pixel, half: Half::A, level: 0 }.sample(0);
         let place = Vec2::new((pixel % SIDE) as f32 + 0.5, (pixel / SIDE) as f32 + 0.5);
-        let ray = camera.ray(place, [0.5, 0.5]);
+        let ray = camera.ray(&CameraSample { position_px: place, lens: [0.5, 0.5], time: 0.0 });
         primary.push((ray, f32::INFINITY));
         let Some(hit) = world.closest(&ray) else { continue };
         let point = world.surface(&ray, &hit);
-        let [u, v, ..] = sample.draw(Purpose::Scatter { bounce: 0 });
-        let direction = cosine_direction(facing(point.geometric_normal, &ray), u, v);
-        let bounced = Ray { origin: point.spawn(direction), direction: direction.into() };
+        let direction = cosine_direction(facing(point.geometric_normal, &ray), uniform(pixel, 0), uniform(pixel, 1));
+        let bounced = Ray::new(point.spawn(direction), direction.into());
         bounce.push((bounced, f32::INFINITY));
         let Some(hit) = world.closest(&bounced) else { continue };
         let point = world.surface(&bounced, &hit);
-        let [x, z, ..] = sample.draw(Purpose::Light { bounce: 0 });
-        let light = Vec3::new(0.6 * (x - 0.5), 0.85, 0.6 * (z - 0.5));
+        let light = Vec3::new(0.6 * (uniform(pixel, 2) - 0.5), 0.85, 0.6 * (uniform(pixel, 3) - 0.5));
         let normal = facing(point.geometric_normal, &bounced);
         if (light - point.position).dot(normal) > 0.0 {
             let origin = point.spawn(normal);
             let way = Vec3A::from(light) - origin;
-            shadow.push((Ray { origin, direction: way.normalize() }, way.length()));
+            shadow.push((Ray::new(origin, way.normalize()), way.length()));
         }
     }
     vec![
@@ -179,6 +175,14 @@ fn ray_sets(world: &World) -> Vec<RaySet> {
         RaySet { name: "bounce", rays: bounce, any: false },
         RaySet { name: "shadow", rays: shadow, any: true },
     ]
+}
+
+/// A number in [0, 1) that looks random (the finaliser of SplitMix64: Steele, Lea and Flood 2014).
+fn uniform(pixel: u32, dimension: u64) -> f32 {
+    let mut x = (u64::from(pixel) << 8 | dimension).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    (x >> 40) as f32 / 16_777_216.0
 }
 
 fn facing(normal: Vec3, ray: &Ray) -> Vec3 {

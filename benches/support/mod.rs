@@ -180,19 +180,13 @@ pub(crate) fn grey_scene(meshes: Vec<Mesh>) -> Scene {
             mesh: MeshId(mesh),
             material: MaterialId(0),
             to_world: Affine3A::IDENTITY,
+            motion: None,
         })
         .collect();
     Scene {
         name: "cave".to_owned(),
         nits_per_unit: 1.0,
-        camera: Camera {
-            position: Vec3::new(-0.9, 0.6, 0.9),
-            forward: Vec3::new(0.9, -0.25, -0.9).normalize(),
-            up: Vec3::Y,
-            vertical_fov_deg: 60.0,
-            aperture_radius: 0.0,
-            focus_distance: 1.0,
-        },
+        camera: Camera::pinhole(Vec3::new(-0.9, 0.6, 0.9), Vec3::new(0.9, -0.25, -0.9).normalize(), Vec3::Y, 60.0),
         film: FilmDefaults { width: 512, height: 512 },
         viewing: ViewingDefaults::default(),
         meshes,

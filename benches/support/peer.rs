@@ -4,7 +4,7 @@
 //! what both renderers mean the same thing by. Anything else is refused.
 
 use anyhow::{Context, Result, bail};
-use fechner::scene::{ColorInput, Encoding, Material, Scene, Surface, Texels};
+use fechner::scene::{ColorInput, Encoding, Material, Projection, Scene, Surface, Texels};
 use glam::Vec3;
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Write};
@@ -40,11 +40,12 @@ pub(crate) fn write_scene(scene: &Scene, folder: &Path) -> Result<()> {
         shapes.push(json!({ "center": center, "radius": sphere.radius, "material": material }));
     }
     let camera = &scene.camera;
+    let Projection::Perspective { vertical_fov_deg } = camera.projection else { bail!("only perspective is compared") };
     let description = json!({
         "origin": camera.position.to_array(),
         "target": (camera.position + camera.forward).to_array(),
         "up": camera.up.to_array(),
-        "vertical_fov_deg": camera.vertical_fov_deg,
+        "vertical_fov_deg": vertical_fov_deg,
         "max_depth": MAX_DEPTH + 1,
         "shapes": shapes,
     });
