@@ -263,7 +263,9 @@ fn write(
             }
             let white = viewing.display.white_cd_m2 as f32;
             picture.push_attribute(output::NITS_PER_UNIT, Attribute::Float(white));
-            picture.push_attribute("fechner.operator", Attribute::Text(fitted.describe()));
+            // Readers take text for UTF-8, the writer has Latin-1: only what both have in common is safe.
+            let operator = fitted.describe().replace('²', "2").replace('×', "x");
+            picture.push_attribute("fechner.operator", Attribute::Text(operator));
             picture.push_attribute("fechner.observer.display", Attribute::Text(viewing.display.name.clone()));
             if let Some(state) = state {
                 let text = serde_json::to_string(state).context("the eye's state could not be put into words")?;

@@ -181,13 +181,11 @@ mod tests {
     }
 
     #[test]
-    fn an_odd_height_is_read_as_far_as_it_can_be() {
+    fn luminance_alone_is_a_grey_picture() {
         let Some(path) = asset("LuminanceChroma/Garden.exr") else { return };
         let garden = picture(&path);
         assert_eq!((garden.width, garden.height), (874, 493));
-        assert!(garden.notes.iter().any(|note| note.contains("last 13 lines")), "{:?}", garden.notes);
-        let green = garden.rgb.iter().filter(|[r, g, b]| g > r && g > b).count();
-        assert!(green * 3 > garden.rgb.len(), "{green} green pixels in a garden");
+        assert!(garden.rgb.iter().all(|[r, g, b]| r == g && g == b));
     }
 
     #[test]
