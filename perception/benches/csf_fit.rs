@@ -8,8 +8,8 @@ mod support;
 
 use fechner_perception::Error;
 use fechner_perception::csf::{
-    Barten89, Barten99, CastleChromatic, CastleCsf, ChromaticChannel, ContrastSensitivity, Daly93, Daly98, HdrVdp2, Laird06,
-    MannosSakrison, StelaCsf,
+    Barten89, Barten99, CastleChromatic, CastleCsf, ChromaticChannel, ContrastSensitivity, Daly93, Daly98, HdrVdp2,
+    Laird06, MannosSakrison, StelaCsf,
 };
 use support::{Row, Table};
 
@@ -40,9 +40,11 @@ fn main() {
         &achromatic,
         |m| Ok(MannosSakrison::default().sensitivity(m.freq_cpd, m.luminance_cd_m2)),
     );
-    report("stela", &achromatic, |m| {
-        Ok(StelaCsf { area_deg2: m.area_deg2 }.sensitivity(m.freq_cpd, m.luminance_cd_m2))
-    });
+    report(
+        "stela",
+        &achromatic,
+        |m| Ok(StelaCsf { area_deg2: m.area_deg2 }.sensitivity(m.freq_cpd, m.luminance_cd_m2)),
+    );
     report("barten89", &achromatic, |m| Ok(Barten89.sensitivity(m.freq_cpd, m.luminance_cd_m2)));
     report("hdrvdp2", &achromatic, |m| Ok(HdrVdp2::default().sensitivity(m.freq_cpd, m.luminance_cd_m2)));
     report("laird06", &achromatic, |m| Ok(Laird06::default().sensitivity(m.freq_cpd, m.luminance_cd_m2)));

@@ -61,7 +61,9 @@ fn elevation(picture: &Plane, guide_variance: Option<&Plane>) -> Result<Plane, f
 
 fn medians(map: &Plane) -> [f64; 3] {
     [0, 1, 2].map(|wanted| {
-        let inside = |x: usize| part(x) == wanted && part(x.saturating_sub(30)) == wanted && part((x + 30).min(WIDTH - 1)) == wanted;
+        let inside = |x: usize| {
+            part(x) == wanted && part(x.saturating_sub(30)) == wanted && part((x + 30).min(WIDTH - 1)) == wanted
+        };
         let mut values: Vec<f32> =
             (0..HEIGHT).flat_map(|y| (0..WIDTH).filter(|x| inside(*x)).map(move |x| map.get(x, y))).collect();
         let middle = values.len() / 2;

@@ -43,12 +43,26 @@ fn run(folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
         let scale = 10.0_f64.powf(-log_sensitivity) as f32 * BACKGROUND_CD_M2;
         let seen = map.measured_visibility(&contrast.map(|value| value * scale));
         let v = f64::from(seen.values().iter().copied().fold(0.0, f32::max));
-        println!("{:2} {name:34} threshold {:5.1} dB: v {v:5.2}, {:+5.1} dB", index + 1, -20.0 * log_sensitivity, 20.0 * v.log10());
+        println!(
+            "{:2} {name:34} threshold {:5.1} dB: v {v:5.2}, {:+5.1} dB",
+            index + 1,
+            -20.0 * log_sensitivity,
+            20.0 * v.log10()
+        );
         decibels.push(20.0 * v.log10());
     }
     let rms = |errors: &[f64], bias: f64| support::rms(errors, bias);
-    println!("{} stimuli: RMS {:.1} dB, {:.1} dB without the median", decibels.len(), rms(&decibels, 0.0), rms(&decibels, support::median(&decibels)));
-    println!("noise alone {:+.1} dB; RMS {:.1} dB if its threshold fixes the scale", decibels[NOISE], rms(&decibels, decibels[NOISE]));
+    println!(
+        "{} stimuli: RMS {:.1} dB, {:.1} dB without the median",
+        decibels.len(),
+        rms(&decibels, 0.0),
+        rms(&decibels, support::median(&decibels))
+    );
+    println!(
+        "noise alone {:+.1} dB; RMS {:.1} dB if its threshold fixes the scale",
+        decibels[NOISE],
+        rms(&decibels, decibels[NOISE])
+    );
     println!("the first 14 (Gabor patches): RMS {:.1} dB", rms(&decibels[..14], 0.0));
     Ok(())
 }

@@ -80,8 +80,7 @@ impl PictureTransform {
     pub(crate) fn new(width: usize, height: usize, density: PixelDensity) -> Self {
         // Multiples of the largest reduction, so that reduced transforms sample the same pixels.
         let pad = |pixels_per_degree: f64| (pixels_per_degree.ceil() as usize).max(1).next_multiple_of(MOST_REDUCTION);
-        let padded =
-            |len: usize, pad: usize| MOST_REDUCTION * smooth_size((len + 2 * pad).div_ceil(MOST_REDUCTION));
+        let padded = |len: usize, pad: usize| MOST_REDUCTION * smooth_size((len + 2 * pad).div_ceil(MOST_REDUCTION));
         let (pad_x, pad_y) = (pad(density.horizontal), pad(density.vertical));
         let (padded_width, padded_height) = (padded(width, pad_x), padded(height, pad_y));
         // A poisoned lock only means that another thread died while planning; the plans made so far are whole.

@@ -81,7 +81,9 @@ pub(crate) fn band_elevation(
     // A quarter more densely than the band needs: its energy is blurred next.
     let amplitude_factor = reduction(density, 1.25 * limit_cpd);
     let amplitude =
-        source.transform.filtered_reduced(workspace, source.contrast, limit_cpd, amplitude_factor, |freq| gain.at(freq));
+        source
+            .transform
+            .filtered_reduced(workspace, source.contrast, limit_cpd, amplitude_factor, |freq| gain.at(freq));
     let factor = 2 * amplitude_factor;
     let size = (reduced_size(source.width, factor), reduced_size(source.height, factor));
     let mut energy = halved(&amplitude, size, |value| value * value);

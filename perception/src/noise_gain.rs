@@ -10,11 +10,7 @@ use crate::sensitivity::{SensitivityTables, luminance_coordinate};
 ///
 /// The sum changes as slowly as the elevations and the adaptation do: it is made on the finest grid of elevations and
 /// interpolated; only the division by `L_a`² is every pixel's own.
-pub(crate) fn noise_gain(
-    tables: &SensitivityTables,
-    adaptation_cd_m2: &Plane,
-    elevations: &[ReducedPlane],
-) -> Plane {
+pub(crate) fn noise_gain(tables: &SensitivityTables, adaptation_cd_m2: &Plane, elevations: &[ReducedPlane]) -> Plane {
     let (width, height) = (adaptation_cd_m2.width(), adaptation_cd_m2.height());
     let factor = elevations.iter().map(ReducedPlane::factor).min().unwrap_or(2);
     let coordinates = reduced_coordinates(adaptation_cd_m2, factor);

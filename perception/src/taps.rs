@@ -122,7 +122,8 @@ mod tests {
         for (radius_x, radius_y) in [(0, 0), (1, 3), (8, 2)] {
             assert_eq!(eroded(&plane, radius_x, radius_y), filter::erode_xy(&plane, radius_x, radius_y));
         }
-        let (taps, boxes) = (smoothed(&plane, 2.0, 2.5), filter::gaussian_blur_xy(&plane, 2.0_f64.sqrt(), 2.5_f64.sqrt()));
+        let (taps, boxes) =
+            (smoothed(&plane, 2.0, 2.5), filter::gaussian_blur_xy(&plane, 2.0_f64.sqrt(), 2.5_f64.sqrt()));
         for (a, b) in taps.values().iter().zip(boxes.values()) {
             assert!((a - b).abs() < 1.5, "{a} {b}");
         }

@@ -52,8 +52,8 @@ impl ThresholdMap {
         let mut energy = Plane::filled(self.width(), self.height(), 0.0);
         for (tables, elevation) in self.tables.bands.iter().zip(&self.elevations) {
             // A spread of a fifth of the pooling window widens it by 2 %: nothing to pay a blur for.
-            let blurred = (tables.spread_deg > 0.2 * POOLING_SIGMA_DEG)
-                .then(|| self.blurred(&relative, tables.spread_deg));
+            let blurred =
+                (tables.spread_deg > 0.2 * POOLING_SIGMA_DEG).then(|| self.blurred(&relative, tables.spread_deg));
             let spread = blurred.as_ref().unwrap_or(&relative);
             energy.for_each_row_mut(|y, row| {
                 let mut elevations = vec![0.0; row.len()];

@@ -1,7 +1,8 @@
 //! The specification's table of reference values, computed by an independent program from the published formulas.
 
 use fechner_perception::csf::{
-    Barten89, Barten99, CastleCsf, ContrastSensitivity, Daly93, Daly98, HdrVdp2, Laird06, MannosSakrison, StelaCsf, peak_sensitivity,
+    Barten89, Barten99, CastleCsf, ContrastSensitivity, Daly93, Daly98, HdrVdp2, Laird06, MannosSakrison, StelaCsf,
+    peak_sensitivity,
 };
 use fechner_perception::{masking, motion, psychometric, tvi};
 
@@ -49,11 +50,17 @@ fn contrast_sensitivity() {
 fn peaks() {
     for row in rows("csf_daly98_peak") {
         let csf = Daly98 { retinal_velocity_deg_s: row[0] };
-        assert!((csf.peak_cpd() / row[1] - 1.0).abs() < 1e-6 && (peak_sensitivity(&csf, 100.0) / row[2] - 1.0).abs() < 1e-6);
+        assert!(
+            (csf.peak_cpd() / row[1] - 1.0).abs() < 1e-6 && (peak_sensitivity(&csf, 100.0) / row[2] - 1.0).abs() < 1e-6
+        );
     }
     // Section 3.3, 3.5 and 3.7: (luminance, peak) of Daly 1993, Barten 1999, castle and stela, to the digits printed there.
     let peaks: [(&dyn ContrastSensitivity, &[(f64, f64)], f64); 4] = [
-        (&Daly93::default(), &[(0.1, 27.667_19), (1.0, 64.532_33), (10.0, 117.1547), (30.0, 145.0632), (1000.0, 195.1269)], 1e-5),
+        (
+            &Daly93::default(),
+            &[(0.1, 27.667_19), (1.0, 64.532_33), (10.0, 117.1547), (30.0, 145.0632), (1000.0, 195.1269)],
+            1e-5,
+        ),
         (&Barten99::default(), &[(0.1, 21.396_68), (1.0, 61.605_36), (10.0, 147.7587), (100.0, 238.1931)], 1e-6),
         (&CastleCsf::default(), &[(0.01, 6.570_88), (1.0, 40.160_55), (100.0, 134.2963), (1000.0, 151.8814)], 1e-6),
         (&StelaCsf::default(), &[(1.0, 34.968), (10.0, 68.035), (100.0, 102.457), (1000.0, 117.005)], 2e-5),

@@ -13,8 +13,8 @@ pub(super) enum Colour<'a> {
 
 /// Layers that hold colour, but not the picture's.
 const NOT_THE_PICTURE: [&str; 14] = [
-    "albedo", "normal", "depth", "position", "variance", "velocity", "vector", "motion", "forward", "backward", "crypto", "shadow",
-    "mask", "diffuse",
+    "albedo", "normal", "depth", "position", "variance", "velocity", "vector", "motion", "forward", "backward",
+    "crypto", "shadow", "mask", "diffuse",
 ];
 /// What renderers call the finished picture; R, G and B without a layer come first.
 const THE_PICTURE: [&str; 5] = ["combined", "beauty", "rgba", "color", "image"];
@@ -23,15 +23,19 @@ const THE_PICTURE: [&str; 5] = ["combined", "beauty", "rgba", "color", "image"];
 /// (`RenderLayer.Combined.R`), else of the first layer that is no auxiliary; else `Y`. All three come from one layer.
 pub(super) fn colour(exr: &ExrImage) -> Option<Colour<'_>> {
     let layers = layers_with(exr, &["R", "G", "B"]);
-    let is_named = |layer: &str, names: &[&str]| names.iter().any(|name| layer.to_ascii_lowercase().contains(name));
+    let called = |name: &str| layers.iter().copied().find(|layer| layer.to_ascii_lowercase().contains(name));
+    let is_auxiliary = |layer: &str| NOT_THE_PICTURE.iter().any(|name| layer.to_ascii_lowercase().contains(*name));
     let best = layers
         .iter()
+        .copied()
         .find(|layer| layer.is_empty())
-        .or_else(|| THE_PICTURE.iter().find_map(|name| layers.iter().find(|layer| is_named(layer, &[name]))))
-        .or_else(|| layers.iter().find(|layer| !is_named(layer, &NOT_THE_PICTURE)));
+        .or_else(|| THE_PICTURE.iter().find_map(|name| called(*name)))
+        .or_else(|| layers.iter().copied().find(|layer| !is_auxiliary(layer)));
     match best {
         Some(layer) => {
-            let [Some(r), Some(g), Some(b)] = ["R", "G", "B"].map(|part| part_of(exr, layer, part)) else { return None };
+            let [Some(r), Some(g), Some(b)] = ["R", "G", "B"].map(|part| part_of(exr, layer, part)) else {
+                return None;
+            };
             Some(Colour::Rgb([r, g, b]))
         }
         None => exr.channel("Y").map(Colour::Grey),
@@ -116,8 +120,15 @@ mod tests {
     fn the_picture_is_found_and_its_channels_are_of_one_layer() {
         assert_eq!(rgb_of(&["A", "B", "G", "R"]), Some([3.0, 2.0, 1.0]));
         assert_eq!(rgb_of(&["albedo.R", "B", "G", "R", "left.B", "left.G", "left.R"]), Some([3.0, 2.0, 1.0]));
-        let blender = ["RenderLayer.AO.B", "RenderLayer.AO.G", "RenderLayer.AO.R", "RenderLayer.Combined.A",
-            "RenderLayer.Combined.B", "RenderLayer.Combined.G", "RenderLayer.Combined.R"];
+        let blender = [
+            "RenderLayer.AO.B",
+            "RenderLayer.AO.G",
+            "RenderLayer.AO.R",
+            "RenderLayer.Combined.A",
+            "RenderLayer.Combined.B",
+            "RenderLayer.Combined.G",
+            "RenderLayer.Combined.R",
+        ];
         assert_eq!(rgb_of(&blender), Some([6.0, 5.0, 4.0]));
         assert_eq!(rgb_of(&["albedo.B", "albedo.G", "albedo.R", "main.b", "main.g", "main.r"]), Some([5.0, 4.0, 3.0]));
         assert_eq!(rgb_of(&["albedo.B", "albedo.G", "albedo.R"]), None);
@@ -130,9 +141,15 @@ mod tests {
         let motion_of = |names: &[&str]| motion(&exr(names)).map(|(layer, [x, y])| (layer.to_owned(), x[0], y[0]));
         let found = |layer: &str, x: f32, y: f32| Some((layer.to_owned(), x, y));
         assert_eq!(motion_of(&["R", "velocity.X", "velocity.Y"]), found("velocity", 1.0, 2.0));
-        assert_eq!(motion_of(&["ViewLayer.Vector.W", "ViewLayer.Vector.X", "ViewLayer.Vector.Y"]), found("ViewLayer.Vector", 1.0, 2.0));
+        assert_eq!(
+            motion_of(&["ViewLayer.Vector.W", "ViewLayer.Vector.X", "ViewLayer.Vector.Y"]),
+            found("ViewLayer.Vector", 1.0, 2.0)
+        );
         assert_eq!(motion_of(&["forward.u", "forward.v"]), found("forward", 0.0, 1.0));
-        assert_eq!(motion_of(&["disparityL.x", "disparityL.y", "forward.left.u", "forward.left.v"]), found("forward.left", 2.0, 3.0));
+        assert_eq!(
+            motion_of(&["disparityL.x", "disparityL.y", "forward.left.u", "forward.left.v"]),
+            found("forward.left", 2.0, 3.0)
+        );
         assert_eq!(motion_of(&["motion.x", "motion.y", "motion.z"]), found("motion", 0.0, 1.0));
         assert_eq!(motion_of(&["motionvector.B", "motionvector.G", "motionvector.R"]), found("motionvector", 2.0, 1.0));
         // One half of a vector, or the wrong way in time, is none.

@@ -53,10 +53,9 @@ impl InputPicture {
         let rgb = match channels::colour(exr) {
             Some(Colour::Rgb([r, g, b])) => (0..r.len()).map(|i| [r[i], g[i], b[i]]).collect(),
             Some(Colour::Grey(y)) => y.iter().map(|&value| [value; 3]).collect(),
-            None => bail!(
-                "{}: there are no channels R, G and B, nor Y; `fechner info` lists what there is",
-                path.display()
-            ),
+            None => {
+                bail!("{}: there are no channels R, G and B, nor Y; `fechner info` lists what there is", path.display())
+            }
         };
         let content = Content::Scene { nits_per_unit };
         Ok(Self { width: exr.width as usize, height: exr.height as usize, rgb, content })

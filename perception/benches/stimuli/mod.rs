@@ -50,9 +50,8 @@ pub(crate) fn all(folder: &Path) -> Result<Vec<Stimulus>, Box<dyn std::error::Er
             format!("5 collinear Gabors 8 cpd, {}", if flip > 0.0 { "in phase" } else { "alternating" }),
             stimulus(|x, y| {
                 let wave = (std::f64::consts::TAU * 8.0 * y).cos();
-                let window: f64 = (-2..=2)
-                    .map(|k: i32| flip.powi(k) * gauss(x - 0.35 * f64::from(k), y, 0.07, 0.07))
-                    .sum();
+                let window: f64 =
+                    (-2..=2).map(|k: i32| flip.powi(k) * gauss(x - 0.35 * f64::from(k), y, 0.07, 0.07)).sum();
                 wave * window
             }),
         );

@@ -51,7 +51,9 @@ fn parameters(luminance_cd_m2: f64) -> [f64; 4] {
     let above = LUMINANCES_CD_M2[1..5].partition_point(|entry| *entry <= luminance) + 1;
     let (low, high) = (LUMINANCES_CD_M2[above - 1].log10(), LUMINANCES_CD_M2[above].log10());
     let fraction = (luminance.log10() - low) / (high - low);
-    let at = |index: usize| PARAMETERS[above - 1][index] + fraction * (PARAMETERS[above][index] - PARAMETERS[above - 1][index]);
+    let at = |index: usize| {
+        PARAMETERS[above - 1][index] + fraction * (PARAMETERS[above][index] - PARAMETERS[above - 1][index])
+    };
     [at(0), at(1), at(2), at(3)]
 }
 

@@ -53,10 +53,15 @@ impl ThresholdModel for Yee {
             .map(|band| PerLuminance::new(|velocity| self.elevation(band_frequency_cpd(band, ppd), velocity)))
             .collect();
         let velocity = inputs.retinal_velocity_deg_s();
-        Ok(contrast_weighted(inputs, self.raw_tvi, |elevation| elevation.max(1.0), |x, y, _, band, _| {
-            let retinal = velocity.as_ref().map_or(DRIFT_DEG_S as f32, |velocity| velocity.row(y)[x]);
-            elevations[band].at(retinal)
-        }))
+        Ok(contrast_weighted(
+            inputs,
+            self.raw_tvi,
+            |elevation| elevation.max(1.0),
+            |x, y, _, band, _| {
+                let retinal = velocity.as_ref().map_or(DRIFT_DEG_S as f32, |velocity| velocity.row(y)[x]);
+                elevations[band].at(retinal)
+            },
+        ))
     }
 }
 
