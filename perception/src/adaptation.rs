@@ -42,7 +42,8 @@ pub fn world_adaptation_cd_m2(luminance_cd_m2: &Plane, mean: Mean) -> f64 {
 }
 
 /// The luminance, cd/m², that the eye looking at each pixel adapts to: the mean over a Gaussian of σ 0.25° (as wide as a
-/// disc of 1°), at least 1e-4. Arithmetic means first bring single pixels brighter than all their neighbours down to them.
+/// disc of 1°), at least 1e-4. Arithmetic means first bring down pixels that outshine all their neighbours, or all but one:
+/// fireflies, alone or in pairs.
 ///
 /// # Errors
 /// [`Error::Empty`] and [`Error::BadPixel`] for no picture, [`Error::OutOfRange`] for an impossible display.
@@ -81,7 +82,7 @@ pub(crate) fn adapted(luminance_cd_m2: &Plane, viewing: &Viewing) -> Plane {
 
 /// Adaptation luminance: see [`crate::threshold_map`].
 fn local_adaptation(luminance_cd_m2: &Plane, display: &Display) -> Plane {
-    let mut adaptation = blurred(&without_single_bright_pixels(luminance_cd_m2), display);
+    let mut adaptation = blurred(&without_fireflies(luminance_cd_m2), display);
     adaptation.for_each_row_mut(|_, row| row.iter_mut().for_each(|value| *value = value.max(LEAST_ADAPTATION_CD_M2)));
     adaptation
 }
@@ -91,27 +92,36 @@ fn blurred(plane: &Plane, display: &Display) -> Plane {
     gaussian_blur_xy(plane, POOLING_SIGMA_DEG * density.horizontal, POOLING_SIGMA_DEG * density.vertical)
 }
 
-/// Every pixel lowered to the brightest of its eight neighbours where it exceeds them all.
-fn without_single_bright_pixels(plane: &Plane) -> Plane {
+/// Every pixel lowered to the second brightest of its eight neighbours where it exceeds that: fireflies, alone and in pairs.
+/// In a picture one pixel wide, whose ends have a single neighbour, to the brightest.
+fn without_fireflies(plane: &Plane) -> Plane {
     let (width, height) = (plane.width(), plane.height());
     if width * height == 1 {
         return plane.clone();
     }
+    let is_line = width == 1 || height == 1;
     let mut result = Plane::filled(width, height, 0.0);
     result.for_each_row_mut(|y, row| {
-        // The brightest neighbour of each pixel; 0 is below them all.
-        let raise = |row: &mut [f32], values: &[f32]| {
-            row.iter_mut().zip(values).for_each(|(brightest, value)| *brightest = brightest.max(*value));
+        // The two brightest neighbours of each pixel; 0 is below them all.
+        let (brightest, mut second) = (row, vec![0.0_f32; width]);
+        let mut raise = |range: std::ops::Range<usize>, values: &[f32]| {
+            let ranks = brightest[range.clone()].iter_mut().zip(&mut second[range]);
+            for ((brightest, second), value) in ranks.zip(values) {
+                *second = second.max(brightest.min(*value));
+                *brightest = brightest.max(*value);
+            }
         };
         for v in y.saturating_sub(1)..(y + 2).min(height) {
             let line = plane.row(v);
-            raise(&mut row[1..], &line[..width - 1]);
-            raise(&mut row[..width - 1], &line[1..]);
+            raise(1..width, &line[..width - 1]);
+            raise(0..width - 1, &line[1..]);
             if v != y {
-                raise(row, line);
+                raise(0..width, line);
             }
         }
-        row.iter_mut().zip(plane.row(y)).for_each(|(brightest, own)| *brightest = brightest.min(*own));
+        for ((limit, second), own) in brightest.iter_mut().zip(&second).zip(plane.row(y)) {
+            *limit = own.min(if is_line { *limit } else { *second });
+        }
     });
     result
 }

@@ -45,8 +45,9 @@ pub struct ThresholdMap {
 
 /// Finds adaptation, masking and thresholds of a picture.
 ///
-/// Adaptation is the arithmetic mean over a Gaussian of σ 0.25° (the variance of a disc of 1°), after single pixels
-/// brighter than all their neighbours have been brought down to them: a firefly must not raise its own threshold.
+/// Adaptation is the arithmetic mean over a Gaussian of σ 0.25° (the variance of a disc of 1°), after pixels that
+/// outshine all their neighbours, or all but one, have been brought down to the second brightest: a firefly must not raise its
+/// own threshold.
 /// Masking is each octave band's own, see [`crate::masking`].
 ///
 /// # Errors

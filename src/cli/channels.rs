@@ -23,12 +23,14 @@ const THE_PICTURE: [&str; 5] = ["combined", "beauty", "rgba", "color", "image"];
 /// (`RenderLayer.Combined.R`), else of the first layer that is no auxiliary; else `Y`. All three come from one layer.
 pub(super) fn colour(exr: &ExrImage) -> Option<Colour<'_>> {
     let layers = layers_with(exr, &["R", "G", "B"]);
-    let is_named = |layer: &str, names: &[&str]| names.iter().any(|name| layer.to_ascii_lowercase().contains(name));
+    let called = |name: &str| layers.iter().copied().find(|layer| layer.to_ascii_lowercase().contains(name));
+    let is_auxiliary = |layer: &str| NOT_THE_PICTURE.iter().any(|name| layer.to_ascii_lowercase().contains(*name));
     let best = layers
         .iter()
+        .copied()
         .find(|layer| layer.is_empty())
-        .or_else(|| THE_PICTURE.iter().find_map(|name| layers.iter().find(|layer| is_named(layer, &[name]))))
-        .or_else(|| layers.iter().find(|layer| !is_named(layer, &NOT_THE_PICTURE)));
+        .or_else(|| THE_PICTURE.iter().find_map(|name| called(*name)))
+        .or_else(|| layers.iter().copied().find(|layer| !is_auxiliary(layer)));
     match best {
         Some(layer) => {
             let [Some(r), Some(g), Some(b)] = ["R", "G", "B"].map(|part| part_of(exr, layer, part)) else {
