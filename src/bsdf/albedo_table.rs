@@ -135,11 +135,6 @@ impl AlbedoCurve<'_> {
             self.fraction,
         )
     }
-
-    /// 2∫ of the curve times μ dμ.
-    pub(crate) fn average(&self) -> f32 {
-        self.average
-    }
 }
 
 /// An [`AlbedoTable`] for facets that may be wider along one axis than along the other.
@@ -192,6 +187,68 @@ impl DirectionalCurve<'_> {
 impl fmt::Debug for DirectionalCurve<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("DirectionalCurve").field("isotropic", &self.isotropic).finish_non_exhaustive()
+    }
+}
+
+/// Two tables side by side: what is looked up together is found together, for one computation of the place.
+pub(crate) struct PairTable {
+    rows: Vec<[[f32; 2]; COSINE_NODES]>,
+    averages_over_alpha2: Vec<[f32; 2]>,
+}
+
+/// A [`PairTable`] at one roughness.
+#[derive(Clone, Copy)]
+pub(crate) struct PairCurve<'a> {
+    lower: &'a [[f32; 2]; COSINE_NODES],
+    upper: &'a [[f32; 2]; COSINE_NODES],
+    fraction: f32,
+    alpha: f32,
+    averages: [f32; 2],
+}
+
+impl PairTable {
+    pub(crate) fn new(first: &AlbedoTable, second: &AlbedoTable) -> Self {
+        let rows = (0..ROUGHNESS_NODES)
+            .map(|row| std::array::from_fn(|column| [first.rows[row][column], second.rows[row][column]]))
+            .collect();
+        let averages_over_alpha2 = (0..AVERAGE_NODES)
+            .map(|node| [first.averages_over_alpha2[node], second.averages_over_alpha2[node]])
+            .collect();
+        Self { rows, averages_over_alpha2 }
+    }
+
+    /// The tables at `roughness` in [0, 1].
+    pub(crate) fn curve(&self, roughness: f32) -> PairCurve<'_> {
+        let (row, fraction) = position(roughness, ROUGHNESS_NODES);
+        let (node, node_fraction) = position(roughness, AVERAGE_NODES);
+        let alpha = roughness * roughness;
+        let ([a, b], [c, d]) = (self.averages_over_alpha2[node], self.averages_over_alpha2[node + 1]);
+        let averages = [lerp(a, c, node_fraction), lerp(b, d, node_fraction)].map(|ratio| alpha * alpha * ratio);
+        PairCurve { lower: &self.rows[row], upper: &self.rows[row + 1], fraction, alpha, averages }
+    }
+}
+
+impl PairCurve<'_> {
+    /// Both values at an incident cosine in (0, 1].
+    pub(crate) fn at(&self, mu: f32) -> [f32; 2] {
+        let t = column_of_cosine(mu.max(f32::MIN_POSITIVE), self.alpha);
+        let (column, fraction) = position(t, COSINE_NODES);
+        let (lower, upper) =
+            ([self.lower[column], self.lower[column + 1]], [self.upper[column], self.upper[column + 1]]);
+        [0, 1].map(|k| {
+            lerp(lerp(lower[0][k], lower[1][k], fraction), lerp(upper[0][k], upper[1][k], fraction), self.fraction)
+        })
+    }
+
+    /// Twice the integrals of the curves times μ dμ.
+    pub(crate) fn averages(&self) -> [f32; 2] {
+        self.averages
+    }
+}
+
+impl fmt::Debug for PairCurve<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("PairCurve").field("alpha", &self.alpha).finish_non_exhaustive()
     }
 }
 

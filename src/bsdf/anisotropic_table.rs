@@ -8,6 +8,7 @@ use super::microfacets::Microfacets;
 use crate::scene::Distribution;
 use glam::Vec3;
 use std::f32::consts::FRAC_PI_2;
+use std::fmt;
 
 /// Columns: cosines, spaced as those of the isotropic table.
 const COSINES: usize = 32;
@@ -151,6 +152,12 @@ impl Cell {
         let along = |row: &[f32; COSINES]| row[left] + (row[left + 1] - row[left]) * (column - left as f32);
         let (below, above) = (along(&self.rows[low]), along(&self.rows[low + 1]));
         below + (above - below) * (row - low as f32)
+    }
+}
+
+impl fmt::Debug for AnisotropicCurve<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("AnisotropicCurve").field("weights", &self.weights).finish_non_exhaustive()
     }
 }
 

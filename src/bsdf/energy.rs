@@ -10,7 +10,10 @@
 //! compensation, its tint and the split for dielectrics; C. Kelemen & L. Szirmay-Kalos (2001) for the form; S. Hill, *A
 //! multi-faceted exploration* (2018) for the tint's squared F_avg. The tables are computed here, by quadrature over visible normals.
 
-use super::albedo_table::{AlbedoCurve, AlbedoTable, DirectionalCurve, average_over_visible_normals, direction_at};
+use super::albedo_table::{
+    AlbedoTable, DirectionalCurve, PairCurve, PairTable, average_over_visible_normals, direction_at,
+};
+use super::anisotropic_table::{AnisotropicCurve, AnisotropicTable, WidthRange};
 use super::fresnel;
 use super::microfacets::Microfacets;
 use crate::scene::Distribution;
@@ -37,7 +40,7 @@ pub(crate) struct ReflectionTables {
     /// 1 − E, of facets that reflect everything.
     pub(crate) missing: AlbedoTable,
     /// Albedo of facets that reflect Schlick's (1 − wo·h)⁵, less (1 − μ)⁵: what is left is smooth even where the columns
-    /// are wide apart. See [`SchlickCurve`].
+    /// are wide apart. See [`SchlickCurves`].
     pub(crate) schlick: AlbedoTable,
 }
 
@@ -70,27 +73,50 @@ impl ReflectionTables {
 static GGX: LazyLock<ReflectionTables> = LazyLock::new(|| ReflectionTables::new(Distribution::Ggx));
 static BECKMANN: LazyLock<ReflectionTables> = LazyLock::new(|| ReflectionTables::new(Distribution::Beckmann));
 
-/// Albedo of facets that reflect Schlick's (1 − wo·h)⁵ at one roughness: the part S of a GGX lobe's albedo
-/// F0·E + (1 − F0)·S.
+/// What a GGX lobe with Schlick's reflectance keeps and loses at one roughness: its albedo is F0·(1 − missing) +
+/// (F90 − F0)·S, S being the albedo of facets that reflect Schlick's (1 − wo·h)⁵.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct SchlickCurve {
-    above_smooth: AlbedoCurve<'static>,
+pub(crate) struct SchlickCurves {
+    /// Missing energy, and S less (1 − μ)⁵.
+    pair: PairCurve<'static>,
+    /// Missing energy of facets that are wider along one axis.
+    anisotropic: Option<AnisotropicCurve<'static>>,
 }
 
-impl SchlickCurve {
-    /// S at `roughness` in [0, 1].
-    pub(crate) fn new(roughness: f32) -> Self {
-        Self { above_smooth: ReflectionTables::of(Distribution::Ggx).schlick.curve(roughness) }
+/// Values of [`SchlickCurves`] at a direction, or their averages.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SchlickAlbedo {
+    pub(crate) missing: f32,
+    pub(crate) schlick: f32,
+}
+
+static GGX_PAIR: LazyLock<PairTable> = LazyLock::new(|| PairTable::new(&GGX.missing, &GGX.schlick));
+static GGX_ANISOTROPIC: LazyLock<AnisotropicTable> =
+    LazyLock::new(|| AnisotropicTable::missing([WidthRange::Textured; 2], Distribution::Ggx));
+
+impl SchlickCurves {
+    /// The curves for GGX facets. S is that of the mean width where widths differ.
+    pub(crate) fn new(facets: &Microfacets) -> Self {
+        let anisotropic = (!facets.is_isotropic()).then(|| GGX_ANISOTROPIC.curve(facets.alphas()));
+        Self { pair: GGX_PAIR.curve(facets.mean_alpha().sqrt()), anisotropic }
     }
 
-    /// S at an incident cosine in (0, 1].
-    pub(crate) fn at(&self, mu: f32) -> f32 {
-        (self.above_smooth.at(mu) + fresnel::schlick_weight(mu)).max(0.0)
+    /// Both at a direction of the upper half.
+    pub(crate) fn at(&self, w: Vec3) -> SchlickAlbedo {
+        let [missing, above_smooth] = self.pair.at(w.z);
+        SchlickAlbedo {
+            missing: self.anisotropic.as_ref().map_or(missing, |curve| curve.at(w)),
+            schlick: (above_smooth + fresnel::schlick_weight(w.z)).max(0.0),
+        }
     }
 
-    /// 2∫S(μ)μ dμ.
-    pub(crate) fn average(&self) -> f32 {
-        self.above_smooth.average() + fresnel::SCHLICK_AVERAGE
+    /// Cosine-weighted averages of both.
+    pub(crate) fn averages(&self) -> SchlickAlbedo {
+        let [missing, above_smooth] = self.pair.averages();
+        SchlickAlbedo {
+            missing: self.anisotropic.as_ref().map_or(missing, AnisotropicCurve::average),
+            schlick: above_smooth + fresnel::SCHLICK_AVERAGE,
+        }
     }
 }
 

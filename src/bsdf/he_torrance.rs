@@ -8,7 +8,9 @@
 //! In it: the specular term (a delta lobe of weight F·S·e^−g), the directional-diffuse term with its series, effective
 //! roughness and Smith's shadowing, at one wavelength a channel (610, 550, 465 nm), and the uniform-diffuse term. Left out:
 //! polarisation. Of own making: the uniform-diffuse term is coupled by (1 − F(μo))(1 − F(μi)), which the paper leaves a
-//! constant without a bound on energy, and the series beyond g = 40, expanded around its largest term.
+//! constant without a bound on energy, and the series beyond g = 40, expanded around its largest term. The
+//! Kirchhoff approximation beneath it all overshoots: a lossless relief of 50 nm over 1500 nm gives back 1.034 of the light
+//! at a cosine of 0.15.
 //!
 //! Source: X. He, K. Torrance, F. Sillion & D. Greenberg, *A comprehensive physical model for light reflection* (SIGGRAPH
 //! 1991), eqs. 5, 23 to 25, 57 to 79; its factor G is (v·v/v_z)² once the products of polarisation vectors are multiplied

@@ -11,24 +11,59 @@
 //! the base sees (1 − E(μo))(1 − E(μi))/(π(1 − E_avg)) with E the coat's albedo, where the specification's own sample code
 //! uses 1 − F(h) and is not lossless. Not for metals by measured index, nor for glass with an inside.
 
-use super::albedo_table::AlbedoCurve;
-use super::energy::{self, ReflectionTables, SchlickCurve};
+use super::energy::{self, SchlickAlbedo, SchlickCurves};
 use super::fresnel::{SCHLICK_AVERAGE, normal_reflectance, schlick_weight};
 use super::microfacets::Microfacets;
 use super::mirror::reflect_about_normal;
 use super::warp::GrazingHemisphere;
-use super::{BsdfEvaluation, BsdfSample, Lobe, SMALLEST_ALPHA, to_front, turn, warp};
+use super::{BsdfEvaluation, BsdfSample, Lobe, to_front, turn, warp};
 use crate::scene::Distribution;
 use glam::Vec3;
 use std::f32::consts::FRAC_1_PI;
 
+/// Parameters of the model, resolved at a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MetalRoughnessParameters {
+    /// Reflectance of the metal at normal incidence and albedo of the base, per channel in [0, 1].
+    pub base_color: Vec3,
+    /// Share of the metal in [0, 1].
+    pub metallic: f32,
+    /// Perceptual roughness in [0, 1].
+    pub roughness: f32,
+    /// Stretch of the facets along the tangent, in [0, 1]: α there is lerp(α, 1, anisotropy²).
+    pub anisotropy: f32,
+    /// Index of refraction of the dielectric, at least 1, or 0 for one that reflects everything.
+    pub ior: f32,
+    /// Strength of the dielectric's reflection in [0, 1].
+    pub specular: f32,
+    /// Tint of the dielectric's reflection at normal incidence, at least 0.
+    pub specular_color: Vec3,
+    /// Share in [0, 1] of what passes the dielectric that goes straight through.
+    pub transmission: f32,
+}
+
+impl Default for MetalRoughnessParameters {
+    fn default() -> Self {
+        Self {
+            base_color: Vec3::ONE,
+            metallic: 0.0,
+            roughness: 0.5,
+            anisotropy: 0.0,
+            ior: 1.5,
+            specular: 1.0,
+            specular_color: Vec3::ONE,
+            transmission: 0.0,
+        }
+    }
+}
+
 /// The metal-roughness material of glTF 2.0.
 #[derive(Clone, Copy, Debug)]
 pub struct MetalRoughness {
-    /// Reflectance at normal incidence of metal and coat together.
-    f0: Vec3,
-    /// Reflectance at normal incidence of the dielectric's coat alone.
-    coat_f0: f32,
+    /// Reflectance of metal and coat together, face on and at grazing angles.
+    both: Schlick,
+    /// The dielectric's coat alone, in the channel in which it reflects most.
+    coat: CoatSchlick,
     /// Albedo of the base, with the metal's share and the transmitted share taken out.
     diffuse: Vec3,
     /// The same for what goes through.
@@ -39,16 +74,47 @@ pub struct MetalRoughness {
     facets: Option<Facets>,
 }
 
+/// Schlick's reflectance: from `f0` face on to `f90` at grazing angles.
+#[derive(Clone, Copy, Debug)]
+struct Schlick {
+    f0: Vec3,
+    f90: f32,
+}
+
+/// The same for one channel.
+#[derive(Clone, Copy, Debug)]
+struct CoatSchlick {
+    f0: f32,
+    f90: f32,
+}
+
+impl Schlick {
+    fn at(&self, weight: f32) -> Vec3 {
+        self.f0 + (Vec3::splat(self.f90) - self.f0) * weight
+    }
+
+    fn average(&self) -> Vec3 {
+        self.at(SCHLICK_AVERAGE)
+    }
+}
+
+impl CoatSchlick {
+    fn at(&self, weight: f32) -> f32 {
+        self.f0 + (self.f90 - self.f0) * weight
+    }
+}
+
 #[derive(Clone, Copy, Debug)]
 struct Facets {
-    ggx: Microfacets,
+    microfacets: Microfacets,
     grazing: GrazingHemisphere,
-    missing: AlbedoCurve<'static>,
-    schlick: SchlickCurve,
+    curves: SchlickCurves,
     /// Tint of light that bounced twice or more, metal and coat together.
     tint: Vec3,
     /// The same of the coat alone.
     coat_tint: f32,
+    /// 1/(π × average of what one bounce loses).
+    missing_norm: f32,
 }
 
 /// Directional albedos at one direction.
@@ -56,6 +122,8 @@ struct Facets {
 struct Albedos {
     /// One bounce, metal and coat together.
     specular: Vec3,
+    /// What one bounce loses off facets that reflect everything.
+    missing: f32,
     /// Two or more bounces, metal and coat together.
     multiple: Vec3,
     /// Coat alone, all bounces.
@@ -117,22 +185,28 @@ impl Shares {
 }
 
 impl MetalRoughness {
-    /// The parameters as in the file's head.
-    pub fn new(base_color: Vec3, metallic: f32, roughness: f32, ior: f32, transmission: f32) -> Self {
-        let metallic = metallic.clamp(0.0, 1.0);
-        let transmission = transmission.clamp(0.0, 1.0);
-        let roughness = roughness.clamp(0.0, 1.0);
-        let alpha = roughness * roughness;
-        let coat_f0 = normal_reflectance(ior);
-        let facets = (alpha >= SMALLEST_ALPHA).then(|| Facets::new(roughness, base_color, metallic, coat_f0));
+    /// The model of such parameters.
+    pub fn new(parameters: &MetalRoughnessParameters) -> Self {
+        let MetalRoughnessParameters { base_color, ior, .. } = *parameters;
+        let metallic = parameters.metallic.clamp(0.0, 1.0);
+        let transmission = parameters.transmission.clamp(0.0, 1.0);
+        let specular = parameters.specular.clamp(0.0, 1.0);
+        let f0 = (normal_reflectance(ior) * parameters.specular_color).min(Vec3::ONE) * specular;
+        let dielectric = Schlick { f0, f90: specular };
+        let metal = Schlick { f0: base_color, f90: 1.0 };
+        let coat = CoatSchlick { f0: f0.max_element(), f90: specular };
+        let facets = Facets::new(parameters, metallic, &dielectric, &metal);
         let coat_average = match &facets {
-            None => coat_f0 + (1.0 - coat_f0) * SCHLICK_AVERAGE,
-            Some(facets) => facets.coat_albedo(coat_f0, facets.missing.average(), facets.schlick.average()),
+            None => coat.at(SCHLICK_AVERAGE),
+            Some(facets) => facets.coat_albedo(&coat, &facets.curves.averages()),
         };
         let base = base_color * (1.0 - metallic);
         Self {
-            f0: Vec3::splat(coat_f0).lerp(base_color, metallic),
-            coat_f0,
+            both: Schlick {
+                f0: dielectric.f0.lerp(metal.f0, metallic),
+                f90: dielectric.f90 + (metal.f90 - dielectric.f90) * metallic,
+            },
+            coat,
             diffuse: base * (1.0 - transmission),
             transmitted: base * transmission,
             base_average: (1.0 - coat_average).max(1e-7),
@@ -144,13 +218,14 @@ impl MetalRoughness {
         self.facets.is_some() || self.diffuse != Vec3::ZERO
     }
 
-    fn albedos(&self, cos: f32) -> Albedos {
+    fn albedos(&self, w: Vec3) -> Albedos {
         match &self.facets {
             None => {
-                let weight = schlick_weight(cos);
-                let coat = self.coat_f0 + (1.0 - self.coat_f0) * weight;
+                let weight = schlick_weight(w.z);
+                let coat = self.coat.at(weight);
                 Albedos {
-                    specular: self.f0 + (Vec3::ONE - self.f0) * weight,
+                    specular: self.both.at(weight),
+                    missing: 0.0,
                     multiple: Vec3::ZERO,
                     coat,
                     through_single: 1.0 - coat,
@@ -158,13 +233,15 @@ impl MetalRoughness {
                 }
             }
             Some(facets) => {
-                let missing = facets.missing.at(cos);
-                let schlick = facets.schlick.at(cos);
+                let albedo = facets.curves.at(w);
+                let SchlickAlbedo { missing, schlick } = albedo;
+                let kept = 1.0 - missing;
                 Albedos {
-                    specular: self.f0 * (1.0 - missing) + (Vec3::ONE - self.f0) * schlick,
+                    specular: self.both.f0 * kept + (Vec3::splat(self.both.f90) - self.both.f0) * schlick,
+                    missing,
                     multiple: facets.tint * missing,
-                    coat: facets.coat_albedo(self.coat_f0, missing, schlick),
-                    through_single: ((1.0 - self.coat_f0) * (1.0 - missing - schlick)).max(0.0),
+                    coat: facets.coat_albedo(&self.coat, &albedo),
+                    through_single: (kept - self.coat.f0 * kept - (self.coat.f90 - self.coat.f0) * schlick).max(0.0),
                     through_multiple: missing * (1.0 - facets.coat_tint),
                 }
             }
@@ -193,7 +270,7 @@ impl MetalRoughness {
         if wo.z <= 0.0 {
             return BsdfEvaluation::BLACK;
         }
-        let near = self.albedos(wo.z);
+        let near = self.albedos(wo);
         match self.shares(&near) {
             Some(shares) => self.evaluate_front(&near, &shares, wo, wi),
             None => BsdfEvaluation::BLACK,
@@ -204,21 +281,21 @@ impl MetalRoughness {
         if wi.z > 0.0 {
             self.evaluate_reflection(near, shares, wo, wi)
         } else if wi.z < 0.0 {
-            self.evaluate_transmission(shares, wo, turn(wi))
+            self.evaluate_transmission(near, shares, wo, turn(wi))
         } else {
             BsdfEvaluation::BLACK
         }
     }
 
     fn evaluate_reflection(&self, near: &Albedos, shares: &Shares, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
-        let far = self.albedos(wi.z);
+        let far = self.albedos(wi);
         let base = (1.0 - near.coat) * (1.0 - far.coat) * wi.z * FRAC_1_PI / self.base_average;
         let mut value = self.diffuse * base;
         let mut pdf = shares.diffuse * warp::cosine_hemisphere_pdf(wi.z);
         if let Some(facets) = &self.facets {
-            let facet = facets.reflect(wo, wi);
-            let fresnel = self.f0 + (Vec3::ONE - self.f0) * facet.schlick;
-            value += fresnel * facet.value + facets.tint * facets.missing_lobe(wo.z, wi.z);
+            let facet = facets.microfacets.reflect(wo, wi);
+            let multiple = near.missing * far.missing * wi.z * facets.missing_norm;
+            value += self.both.at(schlick_weight(facet.cos_half)) * facet.value + facets.tint * multiple;
             pdf += shares.specular * facet.pdf + shares.multiple * facets.grazing.pdf(wi.z);
         }
         BsdfEvaluation { value, pdf }
@@ -226,13 +303,14 @@ impl MetalRoughness {
 
     /// Light that goes through, with `wi` already mirrored to the upper side: the facets' reflection lobe, upside down,
     /// with what they do not reflect.
-    fn evaluate_transmission(&self, shares: &Shares, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
+    fn evaluate_transmission(&self, near: &Albedos, shares: &Shares, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
         let Some(facets) = &self.facets else {
             return BsdfEvaluation::BLACK;
         };
-        let facet = facets.reflect(wo, wi);
-        let passed = (1.0 - self.coat_f0) * (1.0 - facet.schlick);
-        let multiple = (1.0 - facets.coat_tint) * facets.missing_lobe(wo.z, wi.z);
+        let facet = facets.microfacets.reflect(wo, wi);
+        let passed = 1.0 - self.coat.at(schlick_weight(facet.cos_half));
+        let missing = facets.curves.at(wi).missing;
+        let multiple = (1.0 - facets.coat_tint) * near.missing * missing * wi.z * facets.missing_norm;
         BsdfEvaluation {
             value: self.transmitted * (passed * facet.value + multiple),
             pdf: shares.through_single * facet.pdf + shares.through_multiple * facets.grazing.pdf(wi.z),
@@ -244,7 +322,7 @@ impl MetalRoughness {
         if front.z <= 0.0 {
             return None;
         }
-        let near = self.albedos(front.z);
+        let near = self.albedos(front);
         let shares = self.shares(&near)?;
         let choice = shares.choose(u[2]);
         let through = matches!(choice, Choice::ThroughSingle | Choice::ThroughMultiple);
@@ -253,13 +331,9 @@ impl MetalRoughness {
             (_, None) => return Some(self.sample_smooth(&near, &shares, wo, through)),
             (Choice::Multiple | Choice::ThroughMultiple, Some(facets)) => facets.grazing.sample([u[0], u[1]]),
             (Choice::Specular | Choice::ThroughSingle, Some(facets)) => {
-                let m = facets.ggx.sample_visible(front, [u[0], u[1]]);
-                2.0 * front.dot(m) * m - front
+                facets.microfacets.sample_reflection(front, [u[0], u[1]])?
             }
         };
-        if up.z <= 0.0 {
-            return None;
-        }
         let wi = if through { turn(up) } else { up };
         self.evaluate_front(&near, &shares, front, wi).sample_turned(wi, wo)
     }
@@ -286,53 +360,40 @@ impl MetalRoughness {
     }
 
     pub(super) fn albedo(&self, wo: Vec3) -> Vec3 {
-        let near = self.albedos(wo.z.abs());
+        let (up, _) = to_front(wo, wo);
+        let near = self.albedos(up);
         near.specular + near.multiple + (self.diffuse + self.transmitted) * (1.0 - near.coat)
     }
 }
 
-/// One bounce off a facet that reflects everything.
-struct FacetReflection {
-    /// D·G2/(4 cos θo), the cosine of wi included.
-    value: f32,
-    /// Pdf of choosing wi by a visible normal.
-    pdf: f32,
-    /// Schlick's weight at the facet.
-    schlick: f32,
-}
-
 impl Facets {
-    fn new(roughness: f32, base_color: Vec3, metallic: f32, coat_f0: f32) -> Self {
+    /// `None` where the surface is smooth.
+    fn new(
+        parameters: &MetalRoughnessParameters,
+        metallic: f32,
+        dielectric: &Schlick,
+        metal: &Schlick,
+    ) -> Option<Self> {
+        let roughness = parameters.roughness.clamp(0.0, 1.0);
         let alpha = roughness * roughness;
-        let missing = ReflectionTables::of(Distribution::Ggx).missing.curve(roughness);
-        let average = |f0: Vec3| f0 + (Vec3::ONE - f0) * SCHLICK_AVERAGE;
-        let tint = |f0: Vec3| energy::multiple_bounce_tint(average(f0), 1.0 - missing.average());
-        let coat_tint = tint(Vec3::splat(coat_f0));
-        Self {
-            ggx: Microfacets::isotropic(alpha, Distribution::Ggx),
-            grazing: GrazingHemisphere::new(alpha),
-            missing,
-            schlick: SchlickCurve::new(roughness),
-            tint: coat_tint.lerp(tint(base_color), metallic),
-            coat_tint: coat_tint.x,
-        }
+        let stretch = parameters.anisotropy.clamp(0.0, 1.0).powi(2);
+        let microfacets = Microfacets::new(alpha + (1.0 - alpha) * stretch, alpha, Distribution::Ggx).rough()?;
+        let curves = SchlickCurves::new(&microfacets);
+        let missing = curves.averages().missing;
+        let tint = |schlick: &Schlick| energy::multiple_bounce_tint(schlick.average(), 1.0 - missing);
+        let coat_tint = tint(dielectric);
+        Some(Self {
+            microfacets,
+            grazing: GrazingHemisphere::new(microfacets.mean_alpha()),
+            curves,
+            tint: coat_tint.lerp(tint(metal), metallic),
+            coat_tint: coat_tint.max_element(),
+            missing_norm: FRAC_1_PI / missing.max(1e-9),
+        })
     }
 
     /// Albedo of the coat, all bounces, from the tabulated albedos at one direction or from their averages.
-    fn coat_albedo(&self, coat_f0: f32, missing: f32, schlick: f32) -> f32 {
-        coat_f0 * (1.0 - missing) + (1.0 - coat_f0) * schlick + self.coat_tint * missing
-    }
-
-    fn missing_lobe(&self, cos_o: f32, cos_i: f32) -> f32 {
-        self.missing.at(cos_o) * self.missing.at(cos_i) * cos_i * FRAC_1_PI / self.missing.average().max(1e-9)
-    }
-
-    fn reflect(&self, wo: Vec3, wi: Vec3) -> FacetReflection {
-        let h = (wo + wi).normalize_or(Vec3::Z);
-        FacetReflection {
-            value: self.ggx.density(h) * self.ggx.visibility(wo, wi) * wi.z,
-            pdf: 0.25 * self.ggx.visible_density_over_cosine(wo, h),
-            schlick: schlick_weight(wo.dot(h)),
-        }
+    fn coat_albedo(&self, coat: &CoatSchlick, albedo: &SchlickAlbedo) -> f32 {
+        coat.f0 * (1.0 - albedo.missing) + (coat.f90 - coat.f0) * albedo.schlick + self.coat_tint * albedo.missing
     }
 }

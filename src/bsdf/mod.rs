@@ -39,6 +39,7 @@ mod phong;
 #[cfg(test)]
 mod tests;
 mod thin_dielectric;
+mod varnish;
 mod ward;
 mod warp;
 
@@ -54,13 +55,14 @@ pub use dielectric_tables::DielectricTables;
 pub use diffuse_transmission::DiffuseTransmission;
 pub use he_torrance::HeTorrance;
 pub use lambert::Lambert;
-pub use metal_roughness::MetalRoughness;
+pub use metal_roughness::{MetalRoughness, MetalRoughnessParameters};
 pub use microfacets::Microfacets;
 pub use mirror::Mirror;
 pub use mix::Mix;
 pub use oren_nayar::OrenNayar;
 pub use phong::Phong;
 pub use thin_dielectric::ThinDielectric;
+pub use varnish::Varnish;
 pub use ward::Ward;
 
 /// Slope width α below which a microfacet surface counts as perfectly smooth. Its lobe would be 0.06° wide: less than a
@@ -173,6 +175,8 @@ pub enum Bsdf<'a> {
     ThinDielectric(ThinDielectric),
     /// The material of glTF 2.0.
     MetalRoughness(MetalRoughness),
+    /// Clear coat and sheen over the material of glTF 2.0.
+    Varnish(Varnish),
     /// Rough diffuse reflection.
     OrenNayar(OrenNayar),
     /// Thin diffuse sheet.
@@ -246,7 +250,14 @@ impl<'a> Bsdf<'a> {
 
     /// The metal-roughness material of glTF 2.0 with its extensions for the index of refraction and for transmission.
     pub fn metal_roughness(base_color: Vec3, metallic: f32, roughness: f32, ior: f32, transmission: f32) -> Self {
-        Self::MetalRoughness(MetalRoughness::new(base_color, metallic, roughness, ior, transmission))
+        Self::MetalRoughness(MetalRoughness::new(&MetalRoughnessParameters {
+            base_color,
+            metallic,
+            roughness,
+            ior,
+            transmission,
+            ..MetalRoughnessParameters::default()
+        }))
     }
 
     /// Rough diffuse reflection with walls of albedo `reflectance` and `roughness`, both in [0, 1].
@@ -267,6 +278,7 @@ impl<'a> Bsdf<'a> {
             Self::Conductor(model) => model.evaluate(wo, wi),
             Self::Dielectric(model) => model.evaluate(wo, wi),
             Self::MetalRoughness(model) => model.evaluate(wo, wi),
+            Self::Varnish(model) => model.evaluate(wo, wi),
             Self::OrenNayar(model) => model.evaluate(wo, wi),
             Self::DiffuseTransmission(model) => model.evaluate(wo, wi),
             Self::CoatedDiffuse(model) => model.evaluate(wo, wi),
@@ -287,6 +299,7 @@ impl<'a> Bsdf<'a> {
             Self::Dielectric(model) => model.sample(wo, u),
             Self::ThinDielectric(model) => model.sample(wo, u),
             Self::MetalRoughness(model) => model.sample(wo, u),
+            Self::Varnish(model) => model.sample(wo, u),
             Self::OrenNayar(model) => model.sample(wo, u),
             Self::DiffuseTransmission(model) => model.sample(wo, u),
             Self::CoatedDiffuse(model) => model.sample(wo, u),
@@ -308,6 +321,7 @@ impl<'a> Bsdf<'a> {
             Self::Conductor(model) => model.has_smooth_lobe(),
             Self::Dielectric(model) => model.has_smooth_lobe(),
             Self::MetalRoughness(model) => model.has_smooth_lobe(),
+            Self::Varnish(model) => model.has_smooth_lobe(),
             Self::CoatedDiffuse(model) => model.has_smooth_lobe(),
             Self::CoatedConductor(model) => model.has_smooth_lobe(),
             Self::HeTorrance(model) => model.has_smooth_lobe(),
@@ -324,6 +338,7 @@ impl<'a> Bsdf<'a> {
             Self::Dielectric(model) => model.albedo(wo),
             Self::ThinDielectric(model) => model.albedo(wo),
             Self::MetalRoughness(model) => model.albedo(wo),
+            Self::Varnish(model) => model.albedo(wo),
             Self::OrenNayar(model) => model.albedo(wo),
             Self::DiffuseTransmission(model) => model.albedo(),
             Self::CoatedDiffuse(model) => model.albedo(wo),

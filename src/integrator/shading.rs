@@ -3,11 +3,14 @@
 use super::PathTracer;
 use super::media::{Media, Medium};
 use super::tables::{SurfaceTables, slope_width};
-use crate::bsdf::{Bsdf, CoatedDiffuse, Conductor, Dielectric, HeTorrance, Microfacets, Phong, Ward};
+use crate::bsdf::{
+    self, Bsdf, CoatedDiffuse, Conductor, Dielectric, HeTorrance, MetalRoughnessParameters, Microfacets, Phong,
+    Varnish, Ward,
+};
 use crate::geometry::SurfacePoint;
 use crate::geometry::surface::Frame;
 use crate::light::LightReceiver;
-use crate::scene::{ColorInput, Material, MaterialId, Roughness, ScalarInput, Surface, Texture};
+use crate::scene::{ColorInput, Material, MaterialId, MetalRoughness, Roughness, ScalarInput, Surface, Texture};
 use glam::{Vec2, Vec3};
 use std::cell::{Cell, OnceCell};
 
@@ -69,6 +72,41 @@ impl Reader<'_> {
         Microfacets::new(u, v, roughness.distribution)
     }
 
+    /// glTF's model; with a volume, what it transmits is a dielectric's boundary, mixed in by its share.
+    fn metal_roughness<'a>(
+        &self,
+        model: &MetalRoughness,
+        tables: &'a SurfaceTables,
+        components: &'a Components<'a>,
+    ) -> Bsdf<'a> {
+        let transmission = self.scalar(&model.transmission).clamp(0.0, 1.0);
+        let parameters = MetalRoughnessParameters {
+            base_color: self.color(&model.base_color),
+            metallic: self.scalar(&model.metallic),
+            roughness: self.scalar(&model.roughness),
+            anisotropy: self.scalar(&model.anisotropy),
+            ior: model.ior,
+            specular: self.scalar(&model.specular),
+            specular_color: self.color(&model.specular_color),
+            transmission: if model.volume.is_some() { 0.0 } else { transmission },
+        };
+        let base = bsdf::MetalRoughness::new(&parameters);
+        let (clearcoat, sheen) = (self.scalar(&model.clearcoat), self.color(&model.sheen_color));
+        let surface = if clearcoat > 0.0 || sheen != Vec3::ZERO {
+            let clearcoat_roughness = self.scalar(&model.clearcoat_roughness);
+            let sheen_roughness = self.scalar(&model.sheen_roughness);
+            Bsdf::Varnish(Varnish::new(base, clearcoat, clearcoat_roughness, sheen, sheen_roughness))
+        } else {
+            Bsdf::MetalRoughness(base)
+        };
+        let SurfaceTables::Dielectric(tables) = tables else {
+            return surface;
+        };
+        let boundary = Bsdf::dielectric(model.ior, parameters.roughness, parameters.base_color, Some(tables));
+        let amount = transmission * (1.0 - parameters.metallic.clamp(0.0, 1.0));
+        Bsdf::mix(components.keep(surface), components.keep(boundary), amount)
+    }
+
     fn bsdf<'a>(&self, surface: &Surface, tables: &'a SurfaceTables, components: &'a Components<'a>) -> Bsdf<'a> {
         match (surface, tables) {
             (Surface::Diffuse { reflectance }, _) => Bsdf::lambert(self.color(reflectance)),
@@ -115,13 +153,7 @@ impl Reader<'_> {
             (Surface::HeTorrance { eta, k, height_nm, correlation_nm, diffuse }, _) => {
                 Bsdf::HeTorrance(HeTorrance::new(*eta, *k, *height_nm, *correlation_nm, self.color(diffuse)))
             }
-            (Surface::MetalRoughness(model), _) => Bsdf::metal_roughness(
-                self.color(&model.base_color),
-                self.scalar(&model.metallic),
-                self.scalar(&model.roughness),
-                model.ior,
-                self.scalar(&model.transmission),
-            ),
+            (Surface::MetalRoughness(model), tables) => self.metal_roughness(model, tables, components),
             (Surface::Mix { first, second, amount }, SurfaceTables::Mix(tables)) => {
                 let first = components.keep(self.bsdf(first, &tables[0], components));
                 let second = components.keep(self.bsdf(second, &tables[1], components));

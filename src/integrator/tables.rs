@@ -46,6 +46,9 @@ impl Maker {
             Surface::Dielectric { ior, roughness, .. } if !roughness.is_smooth() => {
                 SurfaceTables::Dielectric(self.dielectric(*ior, roughness))
             }
+            Surface::MetalRoughness(model) if model.volume.is_some() => {
+                SurfaceTables::Dielectric(self.dielectric(model.ior, &Roughness::isotropic(model.roughness)))
+            }
             Surface::CoatedDiffuse { ior, roughness, .. } => SurfaceTables::Coat(self.coat(*ior, roughness)),
             Surface::CoatedConductor { coat_ior, roughness, coat_roughness, .. } => {
                 let distributions = [coat_roughness.distribution, roughness.distribution];

@@ -69,6 +69,7 @@ impl From<ScalarInput> for Roughness {
 }
 
 /// How a surface scatters light.
+#[expect(clippy::large_enum_variant, reason = "one a material, read in place: a box would only cost a look-up")]
 #[derive(Clone, Debug)]
 pub enum Surface {
     /// Lambert.
@@ -203,8 +204,25 @@ pub struct MetalRoughness {
     pub roughness: ScalarInput,
     /// Index of refraction of the dielectric part; 1.5 unless told.
     pub ior: f32,
-    /// Share of the dielectric part's light that goes through (thin), not into diffuse reflection.
+    /// Share of the dielectric part's light that goes through, not into diffuse reflection: straight through a thin sheet, or
+    /// refracted into a volume if there is one.
     pub transmission: ScalarInput,
+    /// Absorption per scene unit of the volume behind the surface; `None` for a thin sheet.
+    pub volume: Option<Vec3>,
+    /// Strength of the dielectric's reflection in [0, 1].
+    pub specular: ScalarInput,
+    /// Tint of the dielectric's reflection face on.
+    pub specular_color: ColorInput,
+    /// In [0, 1]: facets are stretched along the tangent.
+    pub anisotropy: ScalarInput,
+    /// Coverage of a clear coat of index 1.5, in [0, 1].
+    pub clearcoat: ScalarInput,
+    /// Its perceptual roughness in [0, 1].
+    pub clearcoat_roughness: ScalarInput,
+    /// Albedo of fibres that stand on the surface, in [0, 1].
+    pub sheen_color: ColorInput,
+    /// Their perceptual roughness in [0, 1].
+    pub sheen_roughness: ScalarInput,
 }
 
 impl Default for MetalRoughness {
@@ -216,6 +234,14 @@ impl Default for MetalRoughness {
             roughness: ScalarInput::constant(0.5),
             ior: 1.5,
             transmission: ScalarInput::constant(0.0),
+            volume: None,
+            specular: ScalarInput::constant(1.0),
+            specular_color: ColorInput::constant(Vec3::ONE),
+            anisotropy: ScalarInput::constant(0.0),
+            clearcoat: ScalarInput::constant(0.0),
+            clearcoat_roughness: ScalarInput::constant(0.0),
+            sheen_color: ColorInput::constant(Vec3::ZERO),
+            sheen_roughness: ScalarInput::constant(0.0),
         }
     }
 }
@@ -248,6 +274,7 @@ impl Surface {
     pub fn interior_absorption(&self) -> Option<Vec3> {
         match self {
             Self::Dielectric { absorption, .. } => Some(*absorption),
+            Self::MetalRoughness(model) => model.volume,
             Self::Mix { first, second, .. } => first.interior_absorption().or_else(|| second.interior_absorption()),
             _ => None,
         }
@@ -257,6 +284,7 @@ impl Surface {
     pub fn components(&self) -> usize {
         match self {
             Self::Mix { first, second, .. } => first.components() + second.components(),
+            Self::MetalRoughness(model) if model.volume.is_some() => 2,
             _ => 1,
         }
     }
@@ -278,8 +306,8 @@ impl Surface {
             | Self::Mirror { .. }
             | Self::ThinDielectric { .. }
             | Self::Phong { .. }
-            | Self::HeTorrance { .. }
-            | Self::MetalRoughness(_) => false,
+            | Self::HeTorrance { .. } => false,
+            Self::MetalRoughness(model) => model.anisotropy.factor > 0.0,
         }
     }
 
@@ -296,7 +324,7 @@ impl Surface {
             Self::CoatedConductor { .. } => Vec::new(),
             Self::Phong { diffuse, specular, .. } | Self::Ward { diffuse, specular, .. } => vec![diffuse, specular],
             Self::HeTorrance { diffuse, .. } => vec![diffuse],
-            Self::MetalRoughness(model) => vec![&model.base_color],
+            Self::MetalRoughness(model) => vec![&model.base_color, &model.specular_color, &model.sheen_color],
             Self::Mix { first, second, .. } => first.colors().into_iter().chain(second.colors()).collect(),
         }
     }
@@ -318,7 +346,16 @@ impl Surface {
             Self::CoatedConductor { roughness, coat_roughness, .. } => {
                 roughness.scalars().chain(coat_roughness.scalars()).collect()
             }
-            Self::MetalRoughness(model) => vec![&model.metallic, &model.roughness, &model.transmission],
+            Self::MetalRoughness(model) => vec![
+                &model.metallic,
+                &model.roughness,
+                &model.transmission,
+                &model.specular,
+                &model.anisotropy,
+                &model.clearcoat,
+                &model.clearcoat_roughness,
+                &model.sheen_roughness,
+            ],
             Self::Mix { first, second, amount } => {
                 first.scalars().into_iter().chain(second.scalars()).chain([amount]).collect()
             }

@@ -2,8 +2,8 @@
 
 use super::sphere::Peak;
 use crate::bsdf::{
-    AnisotropicTable, Bsdf, CoatTables, Conductor, DielectricTables, HeTorrance, LayerTables, Microfacets, Phong, Ward,
-    WidthRange,
+    AnisotropicTable, Bsdf, CoatTables, Conductor, DielectricTables, HeTorrance, LayerTables, MetalRoughness,
+    MetalRoughnessParameters, Microfacets, Phong, Varnish, Ward, WidthRange,
 };
 use crate::scene::Distribution;
 use glam::Vec3;
@@ -18,6 +18,8 @@ pub(super) enum Budget {
     NearlyLossless,
     /// No more than all.
     AtMost,
+    /// No more than all, but for the 4 % by which the Kirchhoff approximation of the source overshoots at grazing angles.
+    Kirchhoff,
 }
 
 /// A model under test.
@@ -180,6 +182,29 @@ fn layered_cases(cases: &mut Vec<Case>) {
     cases.push(Case::new("mix with a mirror", Bsdf::mix(&REFLECTOR, &NESTED, 0.6), Lossless, 0.09));
 }
 
+/// The material of glTF with its extensions.
+fn gltf_cases(cases: &mut Vec<Case>) {
+    let extended = MetalRoughness::new(&MetalRoughnessParameters {
+        base_color: GRAY_BLUE,
+        roughness: 0.4,
+        anisotropy: 0.6,
+        specular: 0.6,
+        specular_color: Vec3::new(1.0, 0.5, 0.2),
+        transmission: 0.3,
+        ..MetalRoughnessParameters::default()
+    });
+    cases.push(Case::new("extended metal-roughness", Bsdf::MetalRoughness(extended), Budget::AtMost, 0.16));
+    let white = MetalRoughness::new(&MetalRoughnessParameters::default());
+    for (clearcoat, roughness, sheen, sheen_roughness) in
+        [(1.0f32, 0.0f32, 0.0f32, 0.5f32), (1.0, 0.3, 0.0, 0.5), (0.0, 0.0, 1.0, 0.3), (0.6, 0.2, 0.5, 0.8)]
+    {
+        let bsdf = Bsdf::Varnish(Varnish::new(white, clearcoat, roughness, Vec3::splat(sheen), sheen_roughness));
+        let width = if clearcoat > 0.0 && roughness > 0.0 { roughness * roughness } else { 0.25 };
+        let name = format!("varnish {clearcoat} {roughness}, sheen {sheen} {sheen_roughness}");
+        cases.push(Case::new(name, bsdf, Budget::AtMost, f64::from(width)));
+    }
+}
+
 /// Models without microfacets.
 fn empirical_cases(cases: &mut Vec<Case>) {
     use Budget::AtMost;
@@ -204,7 +229,7 @@ fn empirical_cases(cases: &mut Vec<Case>) {
         cases.push(Case::new(
             format!("lossless relief {name}"),
             relief(Vec3::ZERO, Vec3::splat(3.0), Vec3::ZERO),
-            AtMost,
+            Budget::Kirchhoff,
             width,
         ));
         cases.push(Case::new(
@@ -304,6 +329,7 @@ fn all_smooth_cases() -> Vec<Case> {
     }
     facet_cases(&mut cases);
     layered_cases(&mut cases);
+    gltf_cases(&mut cases);
     empirical_cases(&mut cases);
     cases
 }

@@ -58,9 +58,6 @@ impl<'a> Materials<'a> {
                     .map(|lookup| (lookup, 0)),
             },
         };
-        if from.volume().is_some_and(|volume| volume.thickness_factor() > 0.0) {
-            builder.note("KHR_materials_volume: transmission is treated as a thin sheet, without absorption.");
-        }
         let surface = if from.unlit() {
             builder.note("KHR_materials_unlit: rendered as a diffuse surface.");
             Surface::Diffuse { reflectance: base_color }
@@ -77,6 +74,16 @@ impl<'a> Materials<'a> {
                 },
                 ior: from.ior().filter(|ior| ior.is_finite() && *ior >= 1.0).unwrap_or(1.5),
                 transmission,
+                volume: from.volume().filter(|volume| volume.thickness_factor() > 0.0).map(|volume| {
+                    let distance = volume.attenuation_distance();
+                    let left = Vec3::from_array(volume.attenuation_color()).clamp(Vec3::splat(1e-4), Vec3::ONE);
+                    if distance.is_finite() && distance > 0.0 {
+                        Surface::absorption_of(left, distance)
+                    } else {
+                        Vec3::ZERO
+                    }
+                }),
+                ..self.extensions(builder, from)?
             })
         };
 
@@ -112,6 +119,79 @@ impl<'a> Materials<'a> {
             gltf::material::AlphaMode::Blend => Alpha::Blend { value: coverage },
         };
         Ok(Material { name, surface, emission, emits_both_sides: from.double_sided(), normal_map, alpha })
+    }
+
+    /// What extensions say about the surface beyond the core's parameters.
+    fn extensions(&mut self, builder: &mut Builder, from: &gltf::Material) -> Result<MetalRoughness, LoadError> {
+        let mut model = MetalRoughness::default();
+        if let Some(json) = from.extension_value("KHR_materials_clearcoat") {
+            model.clearcoat = self.json_scalar(builder, json, ["clearcoatFactor", "clearcoatTexture"], 0)?;
+            let keys = ["clearcoatRoughnessFactor", "clearcoatRoughnessTexture"];
+            model.clearcoat_roughness = self.json_scalar(builder, json, keys, 1)?;
+            if json.get("clearcoatNormalTexture").is_some() {
+                builder.note("KHR_materials_clearcoat: the coat takes the base's normal map, not its own.");
+            }
+        }
+        if let Some(json) = from.extension_value("KHR_materials_sheen") {
+            let factor = json_color(json, "sheenColorFactor", 0.0).min(Vec3::ONE);
+            let texture = self.json_lookup(builder, json, "sheenColorTexture", Encoding::Srgb)?;
+            model.sheen_color = ColorInput { factor, texture };
+            let keys = ["sheenRoughnessFactor", "sheenRoughnessTexture"];
+            model.sheen_roughness = self.json_scalar(builder, json, keys, 3)?;
+        }
+        if let Some(json) = from.extension_value("KHR_materials_anisotropy") {
+            model.anisotropy = self.json_scalar(builder, json, ["anisotropyStrength", "anisotropyTexture"], 2)?;
+            if json.get("anisotropyRotation").is_some_and(|rotation| rotation.as_f64() != Some(0.0)) {
+                builder.note("KHR_materials_anisotropy: the stretch follows the tangent, its rotation is not used.");
+            }
+        }
+        if let Some(specular) = from.specular() {
+            let factor = specular.specular_factor();
+            model.specular = ScalarInput {
+                factor: if factor.is_finite() { factor.clamp(0.0, 1.0) } else { 1.0 },
+                texture: self
+                    .optional(builder, specular.specular_texture().as_ref(), Encoding::Linear)?
+                    .map(|lookup| (lookup, 3)),
+            };
+            let color = Vec3::from_array(specular.specular_color_factor());
+            model.specular_color = ColorInput {
+                factor: if color.is_finite() { color.max(Vec3::ZERO) } else { Vec3::ONE },
+                texture: self.optional(builder, specular.specular_color_texture().as_ref(), Encoding::Srgb)?,
+            };
+        }
+        Ok(model)
+    }
+
+    /// A factor in [0, 1], 0 unless told, and a channel of a texture, of an extension that the crate leaves as JSON.
+    fn json_scalar(
+        &mut self,
+        builder: &mut Builder,
+        json: &serde_json::Value,
+        [factor, texture]: [&str; 2],
+        channel: u8,
+    ) -> Result<ScalarInput, LoadError> {
+        let number = json.get(factor).and_then(serde_json::Value::as_f64).unwrap_or(0.0) as f32;
+        let lookup = self.json_lookup(builder, json, texture, Encoding::Linear)?;
+        Ok(ScalarInput { factor: number.clamp(0.0, 1.0), texture: lookup.map(|lookup| (lookup, channel)) })
+    }
+
+    fn json_lookup(
+        &mut self,
+        builder: &mut Builder,
+        json: &serde_json::Value,
+        key: &str,
+        encoding: Encoding,
+    ) -> Result<Option<TextureLookup>, LoadError> {
+        let Some(info) = json.get(key) else { return Ok(None) };
+        let index = info.get("index").and_then(serde_json::Value::as_u64);
+        let Some(texture) = index.and_then(|index| self.document.textures().nth(index as usize)) else {
+            return Err(LoadError::invalid(self.path, format_args!("{key}: there is no texture of this index")));
+        };
+        if info.get("texCoord").is_some_and(|set| set.as_u64() != Some(0)) {
+            builder.note("Texture coordinate sets beyond the first are not used.");
+        }
+        let transform = info.pointer("/extensions/KHR_texture_transform").map(read_transform);
+        self.lookup(builder, &texture, encoding, transform, [255; 4])
     }
 
     fn optional(
@@ -197,6 +277,15 @@ impl<'a> Materials<'a> {
         let bytes = self.embedded.entry(index).or_insert(Arc::new(bytes)).clone();
         Ok(Some(Picture::Memory { name, bytes }))
     }
+}
+
+/// A colour of an extension that the crate leaves as JSON; none below 0.
+fn json_color(json: &serde_json::Value, key: &str, default: f32) -> Vec3 {
+    let channel = |place: usize| {
+        let number = json.get(key).and_then(|color| color.get(place)).and_then(serde_json::Value::as_f64);
+        number.map_or(default, |number| number as f32).max(0.0)
+    };
+    Vec3::new(channel(0), channel(1), channel(2))
 }
 
 /// KHR_texture_transform.

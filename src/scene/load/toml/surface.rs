@@ -58,7 +58,27 @@ pub(super) const fn kinds<'a>() -> [Kind<'a>; 14] {
                 "coat_distribution",
             ],
         ),
-        ("metal-roughness", metal_roughness, &["base_color", "metallic", "roughness", "ior", "transmission"]),
+        (
+            "metal-roughness",
+            metal_roughness,
+            &[
+                "base_color",
+                "metallic",
+                "roughness",
+                "ior",
+                "transmission",
+                "specular",
+                "specular_color",
+                "anisotropy",
+                "clearcoat",
+                "clearcoat_roughness",
+                "sheen_color",
+                "sheen_roughness",
+                "absorption",
+                "attenuation_color",
+                "attenuation_distance",
+            ],
+        ),
         ("phong", phong, &["diffuse", "specular", "exponent"]),
         ("ward", ward, &["diffuse", "specular", "roughness", "roughness_v"]),
         ("he-torrance", he_torrance, &["metal", "eta", "k", "height_nm", "correlation_nm", "diffuse"]),
@@ -223,6 +243,18 @@ fn metal_roughness<'a>(
         roughness: scalar(context, fields, "roughness", 0.5)?,
         ior: fields.get_or("ior", 1.5, Value::positive)? as f32,
         transmission: scalar(context, fields, "transmission", 0.0)?,
+        volume: if fields.get("absorption").or(fields.get("attenuation_color")).is_some() {
+            Some(absorption(fields)?)
+        } else {
+            None
+        },
+        specular: scalar(context, fields, "specular", 1.0)?,
+        specular_color: share_or_white(context, fields, "specular_color")?,
+        anisotropy: scalar(context, fields, "anisotropy", 0.0)?,
+        clearcoat: scalar(context, fields, "clearcoat", 0.0)?,
+        clearcoat_roughness: scalar(context, fields, "clearcoat_roughness", 0.0)?,
+        sheen_color: fields.get_or("sheen_color", ColorInput::constant(Vec3::ZERO), |value| share(context, value))?,
+        sheen_roughness: scalar(context, fields, "sheen_roughness", 0.0)?,
     }))
 }
 

@@ -1,0 +1,218 @@
+//! The upper layers of glTF's materials: a clear coat, and a sheen of fibres, over the metal-roughness model.
+//!
+//! Parameters: `clearcoat`, coverage in [0, 1] of a coat of index 1.5, and its perceptual roughness in [0, 1];
+//! `sheen_color` per linear RGB channel in [0, 1], and `sheen_roughness` in [0, 1], perceptual.
+//!
+//! A layer that reflects E(ω) lets (1 − E(ωo))(1 − E(ωi))/(1 − E(normal)) through to what lies beneath: reciprocal, and never
+//! more than came in, since a layer passes most face on. It is right face on and loses light towards grazing angles, where
+//! what the layer turns back inside is not followed.
+//!
+//! Sources: Khronos Group, KHR_materials_clearcoat and KHR_materials_sheen; A. Estevez & C. Kulla, *Production friendly
+//! microfacet sheen BRDF* (2017), eq. 2, for the fibres' distribution; D. Neubelt & M. Pettineo (2013) for their visibility
+//! 1/(4(cos θo + cos θi − cos θo cos θi)), with which fibres of roughness below 0.5 reflect more than comes in at grazing
+//! angles, and are scaled down by as much.
+
+use super::albedo_table::{AlbedoTable, direction_at};
+use super::coat::{Coat, CoatTables};
+use super::metal_roughness::MetalRoughness;
+use super::mirror::reflect_about_normal;
+use super::{BsdfEvaluation, BsdfSample, fresnel, to_front, turn, warp};
+use crate::scene::Distribution;
+use glam::Vec3;
+use std::f32::consts::TAU;
+use std::sync::LazyLock;
+
+static COAT: LazyLock<CoatTables> = LazyLock::new(|| CoatTables::new(1.5, Distribution::Ggx));
+
+/// Clear coat and sheen over a metal-roughness base.
+#[derive(Clone, Copy, Debug)]
+pub struct Varnish {
+    base: MetalRoughness,
+    coat: Coat<'static>,
+    clearcoat: f32,
+    /// What the coat passes face on.
+    coat_passes: f32,
+    sheen: Option<Sheen>,
+}
+
+/// Fibres of one roughness.
+#[derive(Clone, Copy, Debug)]
+struct Sheen {
+    color: Vec3,
+    roughness: f32,
+    inverse_alpha: f32,
+    /// 1, or less where fibres would reflect more than comes in.
+    scale: f32,
+    passes: f32,
+}
+
+/// Exponents beyond 1/this would crowd at grazing angles only.
+const SMALLEST_ALPHA: f32 = 0.01;
+
+fn inverse_alpha(alpha: f32) -> f32 {
+    1.0 / alpha.max(SMALLEST_ALPHA)
+}
+
+/// Charlie's distribution and Neubelt's visibility, cosine of `wi` included.
+fn fibres(wo: Vec3, wi: Vec3, inverse_alpha: f32) -> f32 {
+    let half = (wo + wi).normalize_or(Vec3::Z);
+    let sin2 = (1.0 - half.z * half.z).max(0.0);
+    let density = (2.0 + inverse_alpha) * sin2.powf(0.5 * inverse_alpha) / TAU;
+    density * wi.z / (4.0 * (wo.z + wi.z - wo.z * wi.z))
+}
+
+/// Albedo of white fibres, by the midpoint rule over cosine and azimuth.
+static SHEEN: LazyLock<AlbedoTable> = LazyLock::new(|| {
+    AlbedoTable::new(|mu, alpha| {
+        const STEPS: usize = 32;
+        let wo = direction_at(mu);
+        let inverse_alpha = inverse_alpha(alpha);
+        let mut sum = 0.0;
+        for row in 0..STEPS {
+            // Squared, because fibres shine where light grazes.
+            let root = (row as f32 + 0.5) / STEPS as f32;
+            let cos = root * root;
+            let sin = (1.0 - cos * cos).sqrt();
+            for column in 0..STEPS {
+                let (y, x) = (0.5 * TAU * (column as f32 + 0.5) / STEPS as f32).sin_cos();
+                sum += 2.0 * root * fibres(wo, Vec3::new(sin * x, sin * y, cos), inverse_alpha);
+            }
+        }
+        sum * TAU / (STEPS * STEPS) as f32
+    })
+});
+
+impl Sheen {
+    fn new(color: Vec3, roughness: f32) -> Self {
+        let roughness = roughness.clamp(0.0, 1.0);
+        let curve = SHEEN.curve(roughness);
+        // Least where light grazes most, which is where fibres reflect most; a hair more for quadrature.
+        let most = curve.at(f32::MIN_POSITIVE).max(1.0) * 1.02;
+        let scale = 1.0 / most.max(1.0);
+        let passes = 1.0 - color.max_element() * scale * curve.at(1.0);
+        Self { color, roughness, inverse_alpha: inverse_alpha(roughness * roughness), scale, passes }
+    }
+
+    fn albedo(&self, w: Vec3) -> f32 {
+        (self.scale * SHEEN.curve(self.roughness).at(w.z)).clamp(0.0, 1.0)
+    }
+
+    fn passed(&self, w: Vec3) -> f32 {
+        1.0 - self.color.max_element() * self.albedo(w)
+    }
+}
+
+impl Varnish {
+    /// Layers as in the file's head over a base.
+    pub fn new(
+        base: MetalRoughness,
+        clearcoat: f32,
+        clearcoat_roughness: f32,
+        sheen_color: Vec3,
+        sheen_roughness: f32,
+    ) -> Self {
+        let coat = COAT.coat(super::Microfacets::from(clearcoat_roughness.clamp(0.0, 1.0)).rough().as_ref());
+        let clearcoat = clearcoat.clamp(0.0, 1.0);
+        let color = sheen_color.clamp(Vec3::ZERO, Vec3::ONE);
+        Self {
+            base,
+            coat,
+            clearcoat,
+            coat_passes: 1.0 - clearcoat * coat.reflectance(Vec3::Z),
+            sheen: (color != Vec3::ZERO).then(|| Sheen::new(color, sheen_roughness)),
+        }
+    }
+
+    pub(super) fn has_smooth_lobe(&self) -> bool {
+        self.base.has_smooth_lobe() || self.sheen.is_some() || self.clearcoat > 0.0 && self.coat.facets.is_some()
+    }
+
+    fn coat_passed(&self, w: Vec3) -> f32 {
+        1.0 - self.clearcoat * self.coat.reflectance(w)
+    }
+
+    /// What the coat and the sheen leave of what passes both ways; directions of the upper half.
+    fn passed_to_base(&self, wo: Vec3, wi: Vec3) -> f32 {
+        let coat = self.coat_passed(wo) * self.coat_passed(wi) / self.coat_passes;
+        let sheen = self.sheen.as_ref().map_or(1.0, |sheen| sheen.passed(wo) * sheen.passed(wi) / sheen.passes);
+        coat * sheen
+    }
+
+    /// Probabilities of coat and sheen; the rest is the base's.
+    fn shares(&self, wo: Vec3) -> [f32; 2] {
+        let passed = self.coat_passed(wo);
+        let sheen = self.sheen.as_ref().map_or(0.0, |sheen| passed * sheen.color.max_element() * sheen.albedo(wo));
+        let left = passed - sheen;
+        let base = (left * self.base.albedo(wo).max_element()).max(0.05 * left);
+        let total = 1.0 - passed + sheen + base;
+        [(1.0 - passed) / total, sheen / total]
+    }
+
+    pub(super) fn evaluate(&self, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
+        let (wo, wi) = to_front(wo, wi);
+        if wo.z > 0.0 && wi.z != 0.0 { self.evaluate_front(self.shares(wo), wo, wi) } else { BsdfEvaluation::BLACK }
+    }
+
+    fn evaluate_front(&self, [coat_share, sheen_share]: [f32; 2], wo: Vec3, wi: Vec3) -> BsdfEvaluation {
+        let up = if wi.z < 0.0 { turn(wi) } else { wi };
+        let base = self.base.evaluate(wo, wi);
+        let mut value = base.value * self.passed_to_base(wo, up);
+        let mut pdf = base.pdf * (1.0 - coat_share - sheen_share).max(0.0);
+        if wi.z > 0.0 {
+            if let Some(sheen) = &self.sheen {
+                let coat = self.coat_passed(wo) * self.coat_passed(wi) / self.coat_passes;
+                value += sheen.color * (sheen.scale * coat * fibres(wo, wi, sheen.inverse_alpha));
+                pdf += sheen_share * warp::cosine_hemisphere_pdf(wi.z);
+            }
+            if let Some(facets) = &self.coat.facets {
+                let facet = facets.reflect(wo, wi);
+                let reflectance = fresnel::dielectric(facet.cos_half, self.coat.eta).reflectance;
+                value += Vec3::splat(self.clearcoat * reflectance * facet.value);
+                pdf += coat_share * facet.pdf;
+            }
+        }
+        BsdfEvaluation { value, pdf }
+    }
+
+    pub(super) fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
+        if wo.z == 0.0 {
+            return None;
+        }
+        let front = if wo.z < 0.0 { turn(wo) } else { wo };
+        let shares = self.shares(front);
+        let [coat_share, sheen_share] = shares;
+        let point = [u[0], u[1]];
+        let wi = if u[2] < coat_share {
+            match &self.coat.facets {
+                Some(facets) => facets.sample_reflection(front, point)?,
+                None => {
+                    let weight = Vec3::splat(self.clearcoat * self.coat.reflectance(front) / coat_share);
+                    return Some(BsdfSample::reflected_delta(reflect_about_normal(wo), weight, coat_share));
+                }
+            }
+        } else if u[2] < coat_share + sheen_share {
+            warp::cosine_hemisphere(point)
+        } else {
+            let base_share = (1.0 - coat_share - sheen_share).max(1e-6);
+            let (_, rest) = warp::choose(u[2], coat_share + sheen_share);
+            let sample = self.base.sample(front, [u[0], u[1], rest])?;
+            if sample.lobe.is_delta() {
+                let up = Vec3::new(sample.wi.x, sample.wi.y, sample.wi.z.abs());
+                let weight = sample.weight * (self.passed_to_base(front, up) / base_share);
+                return Some(BsdfSample { weight, pdf: base_share * sample.pdf, ..sample }.turned_like(wo));
+            }
+            sample.wi
+        };
+        self.evaluate_front(shares, front, wi).sample_turned(wi, wo)
+    }
+
+    pub(super) fn albedo(&self, wo: Vec3) -> Vec3 {
+        let (up, _) = to_front(wo, wo);
+        let passed = self.coat_passed(up);
+        let (sheen, left) = match &self.sheen {
+            None => (Vec3::ZERO, 1.0),
+            Some(sheen) => (sheen.color * sheen.albedo(up), sheen.passed(up)),
+        };
+        Vec3::splat(1.0 - passed) + passed * (sheen + left * self.base.albedo(up))
+    }
+}
