@@ -293,7 +293,10 @@ fn write(
 ) -> anyhow::Result<()> {
     let background = if arguments.transparent { Background::Transparent } else { Background::Shown };
     match format {
-        output::Format::Png => output::rendered::write_display_png(&arguments.output, rendered, background)?,
+        output::Format::Png => {
+            let display = &settings.viewing.display;
+            output::rendered::write_display_png(&arguments.output, rendered, display, background)?;
+        }
         output::Format::Exr => {
             output::rendered::write_layers_exr(
                 &arguments.output,

@@ -7,8 +7,9 @@ mod at_hit;
 #[cfg(test)]
 mod tests;
 
-use super::mesh_tree::{MeshHit, MeshTree, TriangleRef};
+use super::mesh_tree::{MeshHit, MeshTree};
 use super::tree::{BinaryTree, Bounds, PrimitiveTree};
+use super::wide_tree::TriangleRef;
 use super::{Ray, sphere};
 use crate::scene::{Alpha, Instance, MaterialId, Motion, ScalarInput, Scene};
 use at_hit::{Placement, interpolate_uv};
@@ -161,6 +162,11 @@ impl World {
     /// Triangles that were left out because they have no area.
     pub fn degenerate_triangles(&self) -> usize {
         self.fixed.degenerate + self.shared.iter().map(|t| t.degenerate).sum::<usize>()
+    }
+
+    /// Memory of the trees over triangles in bytes, their copies of the vertices included.
+    pub fn tree_bytes(&self) -> usize {
+        self.fixed.bytes() + self.shared.iter().map(MeshTree::bytes).sum::<usize>()
     }
 
     /// How far from a point new rays must start to clear the rounding of the trees' coordinates and of the point's own:

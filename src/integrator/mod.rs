@@ -1,23 +1,27 @@
 //! The path tracer: [`PathTracer::trace`] turns a [`SamplePlan`] into film.
 //!
-//! `path` holds the life of one sample, `camera` where it starts, `shading` what a surface point scatters like.
+//! `path` holds the life of one sample, `camera` where it starts, `shading` what a surface point scatters like,
+//! `tables` what materials compute beforehand,
+//! `media` what a ray travels in.
 
 mod camera;
+mod media;
 mod path;
 mod shading;
+mod tables;
 
 pub use camera::{CameraRays, CameraSample};
 pub use path::{FirstHit, PathSample};
 
-use crate::bsdf::DielectricTables;
 use crate::film::{BlockSum, Film};
 use crate::geometry::World;
 use crate::light::Lights;
 use crate::sampler::{BlockKey, Half, Pixel, PixelFilter, Purpose, Sequence};
-use crate::scene::{Scene, Surface};
+use crate::scene::Scene;
 use glam::Vec2;
 use rayon::prelude::*;
 use std::sync::Arc;
+use tables::SurfaceTables;
 
 /// What does not change during a render.
 #[derive(Clone, Copy, Debug)]
@@ -32,6 +36,9 @@ pub struct TraceSettings {
     pub max_depth: u32,
     /// Reconstruction filter.
     pub filter: PixelFilter,
+    /// Largest channel of a sample, scene units: brighter samples are scaled down to it, which darkens the picture where
+    /// light is rare. `None` leaves the estimate unbiased.
+    pub clamp: Option<f32>,
     /// How the samples of neighbouring pixels relate.
     pub sequence: Sequence,
     /// The part of the picture that is traced; `None` is all of it. Its samples are those of the whole picture.
@@ -39,9 +46,6 @@ pub struct TraceSettings {
     /// Whether camera rays that meet nothing see nothing, so that the picture can be laid over another. Light from afar
     /// still falls on surfaces, and is seen in and through them.
     pub transparent: bool,
-    /// Largest channel of a sample, scene units: brighter samples are scaled down to it, which darkens the picture where
-    /// light is rare. `None` leaves the estimate unbiased.
-    pub clamp: Option<f32>,
 }
 
 /// A rectangle of the picture in pixels, inside it.
@@ -58,6 +62,21 @@ pub struct Crop {
 }
 
 impl TraceSettings {
+    /// The whole picture as it is traced by default.
+    pub fn new(width: u32, height: u32, seed: u64) -> Self {
+        Self {
+            width,
+            height,
+            seed,
+            max_depth: DEFAULT_MAX_DEPTH,
+            filter: PixelFilter::Gaussian,
+            clamp: None,
+            sequence: Sequence::PerPixel,
+            crop: None,
+            transparent: false,
+        }
+    }
+
     /// The part of the picture that is traced, and that the film holds.
     pub fn film_area(&self) -> Crop {
         self.crop.unwrap_or(Crop { x: 0, y: 0, width: self.width, height: self.height })
@@ -128,28 +147,24 @@ pub struct PathTracer {
     /// Whether anything moves while the shutter is open.
     moves: bool,
     settings: TraceSettings,
-    /// By material; only rough dielectrics have one.
-    dielectric_tables: Vec<Option<DielectricTables>>,
+    /// Whether any volume absorbs, so that paths must know what they are in.
+    absorbs: bool,
+    /// By material.
+    surface_tables: Vec<SurfaceTables>,
 }
 
 impl PathTracer {
     /// Builds trees and light tables.
     pub fn new(scene: Arc<Scene>, settings: TraceSettings) -> Self {
         let camera = CameraRays::new(&scene.camera, settings.width, settings.height);
-        let dielectric_tables = scene
-            .materials
-            .iter()
-            .map(|m| match m.surface {
-                Surface::Dielectric { ior, roughness, .. } if roughness.factor > 0.0 => {
-                    Some(DielectricTables::new(ior))
-                }
-                _ => None,
-            })
-            .collect();
+        let absorbs = scene.materials.iter().any(|material| {
+            material.surface.interior_absorption().is_some_and(|absorption| absorption.max_element() > 0.0)
+        });
+        let surface_tables = tables::of_materials(&scene.materials);
         let moves = scene.moves();
         let world = World::new(scene);
         let lights = Lights::new(&world);
-        Self { world, lights, camera, moves, settings, dielectric_tables }
+        Self { world, lights, camera, moves, settings, absorbs, surface_tables }
     }
 
     /// The settings it was made with.

@@ -4,7 +4,8 @@
 //! and Russian roulette.
 
 use super::PathTracer;
-use super::shading::Shading;
+use super::media::Media;
+use super::shading::{Components, Shading};
 use crate::geometry::{Hit, Ray, SurfacePoint};
 use crate::light::{LightReceiver, LightSample};
 use crate::sampler::{Purpose, Sample};
@@ -52,6 +53,8 @@ struct PathState {
     /// Roulette looks at throughput times this, else it would kill most of what is inside glass (throughput 1/n²) and
     /// multiply the rest.
     radiance_gain_on_exit: f32,
+    /// The volumes that the ray is in; empty in scenes where none absorbs.
+    media: Media,
     rays: u32,
 }
 
@@ -66,6 +69,7 @@ impl PathTracer {
             radiance: Vec3::ZERO,
             scatter_pdf: None,
             radiance_gain_on_exit: 1.0,
+            media: Media::default(),
             rays: 0,
         };
         for bounce in 0.. {
@@ -78,8 +82,15 @@ impl PathTracer {
             };
             let point = self.world.surface(&path.ray, &hit);
             let wo = -Vec3::from(path.ray.direction);
+            let components = Components::new();
+            let shading = self.shading(&point, wo, &components);
+            path.throughput *= match shading.medium {
+                Some(medium) if wo.dot(point.geometric_normal) < 0.0 => {
+                    path.media.transmittance_to_back_of(medium, hit.distance)
+                }
+                _ => path.media.transmittance(hit.distance),
+            };
             let emitted = self.add_emission(&mut path, &hit, &point);
-            let shading = self.shading(&point, wo);
             if bounce == 0 {
                 let albedo = shading.bsdf.albedo(shading.frame.to_local(wo)).clamp(Vec3::ZERO, Vec3::ONE);
                 first_hit = FirstHit {
@@ -111,7 +122,7 @@ impl PathTracer {
             return;
         }
         let weight = path.scatter_pdf.map_or(1.0, |pdf| power_heuristic(pdf, self.lights.pdf_from_afar(direction)));
-        path.radiance += path.throughput * radiance * weight;
+        path.radiance += path.throughput * path.media.transmittance(f32::INFINITY) * radiance * weight;
     }
 
     /// Radiance emitted by the surface that was hit; whether there was any.
@@ -147,7 +158,8 @@ impl PathTracer {
         let weight = if light.is_delta { 1.0 } else { power_heuristic(light.pdf, scattered.pdf) };
         path.rays += 1;
         if !self.is_hidden(point, &light, path.ray.time) {
-            path.radiance += path.throughput * scattered.value * light.radiance * (weight / light.pdf);
+            let left = shading.media_after(path.media, wo, wi).transmittance(distance_to(point, &light));
+            path.radiance += path.throughput * left * scattered.value * light.radiance * (weight / light.pdf);
         }
     }
 }
@@ -166,6 +178,11 @@ impl PathTracer {
     }
 }
 
+/// How far away a sampled light is, in scene units; infinite for environments and directional lights.
+fn distance_to(point: &SurfacePoint, light: &LightSample) -> f32 {
+    light.place.map_or(f32::INFINITY, |place| place.position.distance(point.position))
+}
+
 /// Chooses the next direction; false where the path ends.
 fn scatter(path: &mut PathState, point: &SurfacePoint, shading: &Shading, wo: Vec3, u: [f32; 3]) -> bool {
     let Some(scattered) = shading.bsdf.sample(shading.frame.to_local(wo), u) else {
@@ -176,10 +193,9 @@ fn scatter(path: &mut PathState, point: &SurfacePoint, shading: &Shading, wo: Ve
         return false;
     }
     path.throughput *= scattered.weight;
-    if scattered.lobe.is_transmission() {
-        let n_squared = shading.relative_ior * shading.relative_ior;
-        let entering = wo.dot(shading.frame.normal()) > 0.0;
-        path.radiance_gain_on_exit *= if entering { n_squared } else { 1.0 / n_squared };
+    if let Some(index) = scattered.crossed_index {
+        path.radiance_gain_on_exit *= index * index;
+        path.media = shading.media_after(path.media, wo, wi);
     }
     path.scatter_pdf = (!scattered.lobe.is_delta()).then_some(scattered.pdf);
     path.from = shading.receiver(point, wo);

@@ -14,7 +14,7 @@ pub mod rendered;
 
 pub use beside::write_beside;
 pub use exr_file::write_exr;
-pub use png_file::{encode_srgb8, write_png, write_png_with_alpha};
+pub use png_file::{encode_srgb8, write_png, write_png_for, write_png_with_alpha, write_pq_png};
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};

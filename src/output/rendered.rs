@@ -1,9 +1,12 @@
 //! The files a render leaves: what the display shows, or every layer of it.
 
-use super::{Attribute, NITS_PER_UNIT, OutputError, Picture, write_exr, write_png, write_png_with_alpha};
+use super::{Attribute, NITS_PER_UNIT, OutputError, Picture, write_exr, write_png_for, write_png_with_alpha};
 use crate::adaptive::Rendered;
+use crate::adaptive::statistics::picture_variance;
 use crate::film::{Film, PixelGuide};
 use crate::sampler::Half;
+use fechner_perception::display::Display;
+use fechner_perception::tone::map_picture;
 use std::path::Path;
 
 /// What is where no surface covers the picture.
@@ -15,32 +18,36 @@ pub enum Background {
     Transparent,
 }
 
-/// Writes the picture through its tone operator as sRGB. A transparent background gives straight alpha, the colours being
-/// those of what covers the pixel.
-pub fn write_display_png(path: &Path, rendered: &Rendered, background: Background) -> Result<(), OutputError> {
+/// Writes the picture through its tone operator, coded for the display. A transparent background gives straight alpha in
+/// sRGB, the colours being those of what covers the pixel.
+pub fn write_display_png(
+    path: &Path,
+    rendered: &Rendered,
+    display: &Display,
+    background: Background,
+) -> Result<(), OutputError> {
     let judgement = &rendered.judgement;
     let (width, height) = (rendered.film.width(), rendered.film.height());
-    let picture = judgement.estimate.rgb_cd_m2.iter();
+    let picture = &judgement.estimate.rgb_cd_m2;
     match background {
         Background::Shown => {
-            let shown: Vec<[f32; 3]> = picture.map(|&rgb| judgement.tone.map_rgb(rgb)).collect();
-            write_png(path, width, height, &shown)
+            let shown = map_picture(judgement.tone.as_ref(), width as usize, picture);
+            write_png_for(path, width, height, &shown, display)
         }
         Background::Transparent => {
             let coverage = rendered.film.coverage();
-            let covered = |(&rgb, &alpha): (&[f32; 3], &f32)| {
-                let scale = if alpha > 0.0 { 1.0 / alpha } else { 0.0 };
-                judgement.tone.map_rgb(rgb.map(|value| value * scale))
-            };
-            let shown: Vec<[f32; 3]> = picture.zip(&coverage).map(covered).collect();
+            let scale = |alpha: f32| if alpha > 0.0 { 1.0 / alpha } else { 0.0 };
+            let covering: Vec<[f32; 3]> =
+                picture.iter().zip(&coverage).map(|(rgb, &alpha)| rgb.map(|value| value * scale(alpha))).collect();
+            let shown = map_picture(judgement.tone.as_ref(), width as usize, &covering);
             write_png_with_alpha(path, width, height, &shown, &coverage)
         }
     }
 }
 
-/// Writes the picture in scene units with its layers: alpha (premultiplied) where the background is transparent, albedo, normal, depth, object id, sample count, variance of the
-/// picture's luminance (scene cd/m², squared), threshold (standard error in display cd/m² that is at visibility 1) and
-/// predicted visibility.
+/// Writes the picture in scene units with its layers: alpha (premultiplied) where the background is transparent, albedo,
+/// normal, depth, object id, sample count, variance of the picture's luminance (scene cd/m², squared), threshold (standard
+/// error in display cd/m² that is at visibility 1) and predicted visibility.
 pub fn write_layers_exr(
     path: &Path,
     rendered: &Rendered,
@@ -68,7 +75,8 @@ pub fn write_layers_exr(
     picture.push_f32("depth.Z", guide(&|g| g.depth));
     picture.push_u32("id.Y", film.guides().iter().map(|g| g.object_id).collect::<Vec<u32>>());
     picture.push_u32("samples.Y", sample_counts(film));
-    picture.push_f32("variance.Y", judgement.variance_of_mean.values());
+    let variance = picture_variance(film, nits_per_unit);
+    picture.push_f32("variance.Y", variance.values());
     let threshold = judgement.allowed_standard_error_cd_m2();
     picture.push_f32("threshold.Y", threshold.values());
     picture.push_f32("visibility.Y", judgement.predicted.values());

@@ -8,6 +8,7 @@ mod environment;
 mod light;
 mod material;
 mod motion;
+mod surface;
 
 pub mod load;
 pub mod texture;
@@ -15,7 +16,9 @@ pub mod texture;
 pub use camera::{Camera, Projection, ScreenWindow};
 pub use environment::{Environment, Parametrisation};
 pub use light::{Light, SpotFalloff};
+pub use material::{Alpha, Material};
 pub use motion::{Motion, MotionKey, Pose};
+pub use surface::{Distribution, MetalRoughness, Roughness, RoughnessScale, Surface};
 
 use glam::{Affine3A, Vec2, Vec3, Vec4};
 use std::sync::Arc;
@@ -189,95 +192,6 @@ impl TextureLookup {
     pub const fn plain(texture: TextureId) -> Self {
         Self { texture, offset: Vec2::ZERO, rotation: 0.0, scale: Vec2::ONE }
     }
-}
-
-/// How a surface looks.
-#[derive(Clone, Debug)]
-pub struct Material {
-    /// Name for messages.
-    pub name: String,
-    /// How it scatters.
-    pub surface: Surface,
-    /// Emitted radiance in scene units; black for most.
-    pub emission: ColorInput,
-    /// Whether it emits from its back side too.
-    pub emits_both_sides: bool,
-    /// Tangent-space normal map and the strength of its x and y.
-    pub normal_map: Option<(TextureLookup, f32)>,
-    /// Coverage; what it cuts away is not there at all.
-    pub alpha: Alpha,
-}
-
-/// Coverage of a surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Alpha {
-    /// Everything is there.
-    Opaque,
-    /// Points whose value is below the cutoff are not there.
-    Mask {
-        /// Coverage.
-        value: ScalarInput,
-        /// Threshold in [0, 1].
-        cutoff: f32,
-    },
-    /// Points are there with this probability.
-    Blend {
-        /// Coverage in [0, 1].
-        value: ScalarInput,
-    },
-}
-
-/// How a surface scatters light. Roughness is perceptual: the microfacet width α is its square; 0 is smooth.
-#[derive(Clone, Debug)]
-pub enum Surface {
-    /// Lambert.
-    Diffuse {
-        /// Albedo in [0, 1].
-        reflectance: ColorInput,
-    },
-    /// A perfect mirror.
-    Mirror {
-        /// Reflectance in [0, 1].
-        reflectance: ColorInput,
-    },
-    /// A metal with complex index of refraction η + ik per RGB channel.
-    Conductor {
-        /// Real part.
-        eta: Vec3,
-        /// Imaginary part.
-        k: Vec3,
-        /// Perceptual roughness in [0, 1].
-        roughness: ScalarInput,
-    },
-    /// Glass, water: the boundary of a clear volume.
-    Dielectric {
-        /// Index of refraction inside relative to outside, above 0.
-        ior: f32,
-        /// Perceptual roughness in [0, 1].
-        roughness: ScalarInput,
-        /// Tint of the transmitted light at each crossing; white for clear glass.
-        transmittance: ColorInput,
-    },
-    /// A thin clear sheet: light goes straight through or is reflected.
-    ThinDielectric {
-        /// Index of refraction of the sheet.
-        ior: f32,
-        /// Tint of the transmitted light.
-        transmittance: ColorInput,
-    },
-    /// The metal-roughness model of glTF 2.0.
-    MetalRoughness {
-        /// Base colour.
-        base_color: ColorInput,
-        /// 0 dielectric, 1 metal.
-        metallic: ScalarInput,
-        /// Perceptual roughness in [0, 1].
-        roughness: ScalarInput,
-        /// Index of refraction of the dielectric part, 1.5 unless told.
-        ior: f32,
-        /// Share of the dielectric part's light that goes through (thin), not into diffuse reflection.
-        transmission: ScalarInput,
-    },
 }
 
 /// How texel values are encoded.

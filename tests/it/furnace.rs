@@ -5,7 +5,7 @@ use crate::support::{
 };
 use fechner::geometry::Ray;
 use fechner::integrator::PathTracer;
-use fechner::scene::{ColorInput, ScalarInput, Scene, Surface};
+use fechner::scene::{ColorInput, MetalRoughness, Roughness, ScalarInput, Scene, Surface};
 use glam::{Vec3, Vec3A, vec3a};
 use std::sync::Arc;
 
@@ -59,8 +59,7 @@ fn mirrors_return_their_reflectance() {
 #[test]
 fn lossless_conductors_return_everything() {
     for roughness in [0.0, 0.2, 0.5, 0.8, 1.0] {
-        let surface =
-            Surface::Conductor { eta: Vec3::ONE, k: Vec3::splat(1e4), roughness: ScalarInput::constant(roughness) };
+        let surface = Surface::conductor(Vec3::ONE, Vec3::splat(1e4), Roughness::constant(roughness));
         assert_returns(&surface, Vec3::ONE);
     }
 }
@@ -71,8 +70,9 @@ fn clear_dielectrics_return_everything() {
         for roughness in [0.0, 0.3, 0.6, 1.0] {
             let surface = Surface::Dielectric {
                 ior,
-                roughness: ScalarInput::constant(roughness),
+                roughness: Roughness::constant(roughness),
                 transmittance: ColorInput::constant(Vec3::ONE),
+                absorption: Vec3::ZERO,
             };
             // Paths inside a rough ball are long and their weights differ: noisier than the others.
             assert_returns_within(&surface, Vec3::ONE, 0.01);
@@ -85,13 +85,11 @@ fn clear_dielectrics_return_everything() {
 fn white_metal_roughness_returns_everything() {
     for metallic in [0.0, 0.5, 1.0] {
         for roughness in [0.1, 0.5, 1.0] {
-            let surface = Surface::MetalRoughness {
-                base_color: ColorInput::constant(Vec3::ONE),
+            let surface = Surface::MetalRoughness(MetalRoughness {
                 metallic: ScalarInput::constant(metallic),
                 roughness: ScalarInput::constant(roughness),
-                ior: 1.5,
-                transmission: ScalarInput::constant(0.0),
-            };
+                ..MetalRoughness::default()
+            });
             assert_returns(&surface, Vec3::ONE);
         }
     }

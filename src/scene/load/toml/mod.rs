@@ -6,13 +6,14 @@ mod light;
 mod material;
 mod motion;
 mod object;
+mod surface;
 mod surroundings;
 
 use self::fields::{Fields, Source, Value};
 use self::motion::Shutter;
 use super::builder::{Builder, IfDark, NamedCamera};
 use super::error::LoadError;
-use super::texture::{IfMissing, Picture, Request};
+use super::texture::{Adjust, IfMissing, Picture, Request};
 use super::{LoadOptions, files};
 use crate::scene::{Encoding, FilmDefaults, Scene, ViewingDefaults, Wrap};
 use ::toml::de::DeTable;
@@ -148,6 +149,7 @@ fn read_texture(value: &Value, folder: &Path) -> Result<TextureEntry, LoadError>
             wrap_v: wrap,
             nearest: fields.get_or("nearest", false, Value::boolean)?,
             if_missing: IfMissing::Fail(file.place()),
+            adjust: Adjust::NONE,
         },
         encoding: fields.get_some("encoding", |value| value.choice(&encodings))?,
     })
