@@ -12,7 +12,7 @@ mod support;
 use anyhow::{Context, Result, bail};
 use fechner::film::Film;
 use fechner::integrator::{BlockWork, PathTracer, SamplePlan, TraceSettings};
-use fechner::sampler::{Half, PixelFilter, Sequence};
+use fechner::sampler::{Half, PixelFilter};
 use fechner::scene::{ColorInput, Material, MaterialId, Roughness, Scene, Surface};
 use fechner_perception::photometry::luminance;
 use glam::Vec3;
@@ -131,16 +131,8 @@ fn ours_like(pictures: &mut Pictures, pixels: &[[f32; 3]]) {
 
 /// One picture of ours: its luminances.
 fn render(scene: &Arc<Scene>, seed: u64) -> Vec<f64> {
-    let settings = TraceSettings {
-        width: SIZE,
-        height: SIZE,
-        seed,
-        max_depth: MAX_DEPTH,
-        filter: PixelFilter::Box,
-        sequence: Sequence::PerPixel,
-        crop: None,
-        clamp: None,
-    };
+    let settings =
+        TraceSettings { max_depth: MAX_DEPTH, filter: PixelFilter::Box, ..TraceSettings::new(SIZE, SIZE, seed) };
     let levels = (0..SIZE * SIZE)
         .flat_map(|pixel| Half::BOTH.into_iter().flat_map(move |half| (0..LEVELS).map(move |l| (pixel, half, l))));
     let plan = SamplePlan { blocks: levels.map(|(pixel, half, level)| BlockWork::whole(pixel, half, level)).collect() };

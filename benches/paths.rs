@@ -13,7 +13,7 @@ mod support;
 use anyhow::Result;
 use fechner::film::Film;
 use fechner::integrator::{BlockWork, PathTracer, SamplePlan, TraceSettings};
-use fechner::sampler::{Half, PixelFilter, Sequence};
+use fechner::sampler::{Half, PixelFilter};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -60,16 +60,8 @@ fn bench_scene(name: &str, scene: fechner::scene::Scene) -> Result<()> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("benches/cache/paths").join(name);
     write_scene(&scene, &folder)?;
     let mut mitsuba = Mitsuba::start(&folder, SIZE)?;
-    let settings = TraceSettings {
-        width: SIZE,
-        height: SIZE,
-        seed: 1,
-        max_depth: MAX_DEPTH,
-        filter: PixelFilter::Box,
-        sequence: Sequence::PerPixel,
-        crop: None,
-        clamp: None,
-    };
+    let settings =
+        TraceSettings { max_depth: MAX_DEPTH, filter: PixelFilter::Box, ..TraceSettings::new(SIZE, SIZE, 1) };
     let tracer = PathTracer::new(Arc::new(scene), settings);
     let plan = SamplePlan {
         blocks: (0..SIZE * SIZE).flat_map(|pixel| Half::BOTH.map(|half| BlockWork::whole(pixel, half, 0))).collect(),

@@ -8,8 +8,8 @@
 use anyhow::{Context, Result};
 use fechner::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, Sampling};
 use fechner::adaptive::{Quiet, Rendered, render};
-use fechner::integrator::{DEFAULT_MAX_DEPTH, PathTracer, TraceSettings};
-use fechner::sampler::{PixelFilter, Sequence};
+use fechner::integrator::{PathTracer, TraceSettings};
+use fechner::sampler::Sequence;
 use fechner::scene::Scene;
 use fechner::scene::load::{LoadOptions, load};
 use fechner_perception::tone::operator;
@@ -83,16 +83,6 @@ fn rendered(scene: &Arc<Scene>, sequence: Sequence, seed: u64, effort: Effort) -
         nits_per_unit: scene.nits_per_unit,
         operator: operator("constant", None).context("an operator")?,
     };
-    let trace = TraceSettings {
-        width: SIZE,
-        height: SIZE,
-        seed,
-        max_depth: DEFAULT_MAX_DEPTH,
-        filter: PixelFilter::Gaussian,
-        sequence,
-        crop: None,
-        transparent: false,
-        clamp: None,
-    };
+    let trace = TraceSettings { sequence, ..TraceSettings::new(SIZE, SIZE, seed) };
     Ok(render(&PathTracer::new(Arc::clone(scene), trace), &settings, &Quiet)?)
 }

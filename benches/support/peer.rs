@@ -40,7 +40,9 @@ pub(crate) fn write_scene(scene: &Scene, folder: &Path) -> Result<()> {
         shapes.push(json!({ "center": center, "radius": sphere.radius, "material": material }));
     }
     let camera = &scene.camera;
-    let Projection::Perspective { vertical_fov_deg } = camera.projection else { bail!("only perspective is compared") };
+    let Projection::Perspective { vertical_fov_deg } = camera.projection else {
+        bail!("the peer's script knows perspective cameras only");
+    };
     let description = json!({
         "origin": camera.position.to_array(),
         "target": (camera.position + camera.forward).to_array(),

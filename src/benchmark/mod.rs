@@ -22,8 +22,7 @@ pub use arm::Arm;
 pub use record::{Record, Results};
 
 use crate::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, Sampling};
-use crate::integrator::{DEFAULT_MAX_DEPTH, PathTracer, TraceSettings};
-use crate::sampler::{PixelFilter, Sequence};
+use crate::integrator::{PathTracer, TraceSettings};
 use crate::scene::Scene;
 use crate::scene::load::{LoadOptions, load};
 use anyhow::{Context, Result};
@@ -86,17 +85,7 @@ impl Subject {
     }
 
     pub(crate) fn tracer(&self, seed: u64) -> PathTracer {
-        let settings = TraceSettings {
-            width: self.size.0,
-            height: self.size.1,
-            seed,
-            max_depth: DEFAULT_MAX_DEPTH,
-            filter: PixelFilter::Gaussian,
-            sequence: Sequence::PerPixel,
-            crop: None,
-            transparent: false,
-            clamp: None,
-        };
+        let settings = TraceSettings::new(self.size.0, self.size.1, seed);
         PathTracer::new(Arc::clone(&self.scene), settings)
     }
 

@@ -36,6 +36,9 @@ pub struct TraceSettings {
     pub max_depth: u32,
     /// Reconstruction filter.
     pub filter: PixelFilter,
+    /// Largest channel of a sample, scene units: brighter samples are scaled down to it, which darkens the picture where
+    /// light is rare. `None` leaves the estimate unbiased.
+    pub clamp: Option<f32>,
     /// How the samples of neighbouring pixels relate.
     pub sequence: Sequence,
     /// The part of the picture that is traced; `None` is all of it. Its samples are those of the whole picture.
@@ -43,9 +46,6 @@ pub struct TraceSettings {
     /// Whether camera rays that meet nothing see nothing, so that the picture can be laid over another. Light from afar
     /// still falls on surfaces, and is seen in and through them.
     pub transparent: bool,
-    /// Largest channel of a sample, scene units: brighter samples are scaled down to it, which darkens the picture where
-    /// light is rare. `None` leaves the estimate unbiased.
-    pub clamp: Option<f32>,
 }
 
 /// A rectangle of the picture in pixels, inside it.
@@ -62,6 +62,21 @@ pub struct Crop {
 }
 
 impl TraceSettings {
+    /// The whole picture as it is traced by default.
+    pub fn new(width: u32, height: u32, seed: u64) -> Self {
+        Self {
+            width,
+            height,
+            seed,
+            max_depth: DEFAULT_MAX_DEPTH,
+            filter: PixelFilter::Gaussian,
+            clamp: None,
+            sequence: Sequence::PerPixel,
+            crop: None,
+            transparent: false,
+        }
+    }
+
     /// The part of the picture that is traced, and that the film holds.
     pub fn film_area(&self) -> Crop {
         self.crop.unwrap_or(Crop { x: 0, y: 0, width: self.width, height: self.height })

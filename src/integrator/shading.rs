@@ -204,9 +204,12 @@ impl PathTracer {
         let normal = seen_side(self.shading_normal(material, point), point.geometric_normal, wo);
         let reader = Reader { textures: &scene.textures, uv: point.uv };
         let transmits = match &material.surface {
-            Surface::Diffuse { .. } | Surface::Mirror { .. } | Surface::Conductor { .. } => false,
             Surface::MetalRoughness(model) => model.transmission.factor > 0.0,
-            _ => true,
+            Surface::DiffuseTransmission { .. }
+            | Surface::Dielectric { .. }
+            | Surface::ThinDielectric { .. }
+            | Surface::Mix { .. } => true,
+            _ => false,
         };
         Shading {
             bsdf: reader.bsdf(&material.surface, &self.surface_tables[material_id], components),

@@ -18,8 +18,8 @@ pub enum Background {
     Transparent,
 }
 
-/// Writes the picture through its tone operator, coded for the display. A transparent background gives sRGB with straight
-/// alpha, the colours being those of what covers the pixel.
+/// Writes the picture through its tone operator, coded for the display. A transparent background gives straight alpha in
+/// sRGB, the colours being those of what covers the pixel.
 pub fn write_display_png(
     path: &Path,
     rendered: &Rendered,
@@ -29,25 +29,25 @@ pub fn write_display_png(
     let judgement = &rendered.judgement;
     let (width, height) = (rendered.film.width(), rendered.film.height());
     let picture = &judgement.estimate.rgb_cd_m2;
-    let tone = judgement.tone.as_ref();
     match background {
-        Background::Shown => write_png_for(path, width, height, &map_picture(tone, width as usize, picture), display),
+        Background::Shown => {
+            let shown = map_picture(judgement.tone.as_ref(), width as usize, picture);
+            write_png_for(path, width, height, &shown, display)
+        }
         Background::Transparent => {
             let coverage = rendered.film.coverage();
-            let covered = |(rgb, &alpha): (&[f32; 3], &f32)| {
-                let scale = if alpha > 0.0 { 1.0 / alpha } else { 0.0 };
-                rgb.map(|value| value * scale)
-            };
-            let covered: Vec<[f32; 3]> = picture.iter().zip(&coverage).map(covered).collect();
-            let shown = map_picture(tone, width as usize, &covered);
+            let scale = |alpha: f32| if alpha > 0.0 { 1.0 / alpha } else { 0.0 };
+            let covering: Vec<[f32; 3]> =
+                picture.iter().zip(&coverage).map(|(rgb, &alpha)| rgb.map(|value| value * scale(alpha))).collect();
+            let shown = map_picture(judgement.tone.as_ref(), width as usize, &covering);
             write_png_with_alpha(path, width, height, &shown, &coverage)
         }
     }
 }
 
 /// Writes the picture in scene units with its layers: alpha (premultiplied) where the background is transparent, albedo,
-/// normal, depth, object id, sample count, variance of the picture's luminance (scene cd/m², squared), threshold (standard error in display cd/m² that is at visibility 1) and
-/// predicted visibility.
+/// normal, depth, object id, sample count, variance of the picture's luminance (scene cd/m², squared), threshold (standard
+/// error in display cd/m² that is at visibility 1) and predicted visibility.
 pub fn write_layers_exr(
     path: &Path,
     rendered: &Rendered,

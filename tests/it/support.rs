@@ -75,17 +75,7 @@ pub(crate) fn add_rectangle(scene: &mut Scene, corner: Vec3, edge_u: Vec3, edge_
 }
 
 pub(crate) fn trace_settings(width: u32, height: u32, seed: u64) -> TraceSettings {
-    TraceSettings {
-        width,
-        height,
-        seed,
-        max_depth: 1_000,
-        filter: PixelFilter::Box,
-        sequence: Sequence::PerPixel,
-        crop: None,
-        transparent: false,
-        clamp: None,
-    }
+    TraceSettings { filter: PixelFilter::Box, ..TraceSettings::new(width, height, seed) }
 }
 
 /// A block of samples by number, of at most 2^18.

@@ -12,7 +12,7 @@ pub(super) struct Placement {
     normal_matrix: Mat3A,
     /// −1 where the transform mirrors.
     flip: f32,
-    /// Whether the material has a normal map.
+    /// Whether the material asks for a tangent.
     needs_tangent: bool,
 }
 
@@ -21,7 +21,7 @@ impl Placement {
         let m = to_world.matrix3;
         let flip = if m.determinant() < 0.0 { -1.0 } else { 1.0 };
         let cofactors = Mat3A::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
-        let needs_tangent = scene.materials[instance.material.0 as usize].normal_map.is_some();
+        let needs_tangent = scene.materials[instance.material.0 as usize].needs_tangent();
         Self { normal_matrix: cofactors * flip, flip, needs_tangent }
     }
 }
