@@ -7,6 +7,7 @@ mod picture;
 mod render;
 mod report;
 mod seeing;
+mod staging;
 mod threshold;
 
 use clap::{Parser, Subcommand};

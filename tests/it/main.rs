@@ -5,8 +5,11 @@
 //! - `direct_light`: irradiance from a rectangle, a disk, a sphere, a point and environments against closed forms; radiosity
 //! - `adaptive_render`: adaptive and uniform renders against a reference: bias, calibration, determinism
 //! - `camera_and_time`: blur of lens and shutter, moving lamps, crops
+//! - `formats`: the same scene from several formats
 //! - `bad_input`: bad scene files, and our own ones
 //! - `load_assets`: scenes that others made, sound and damaged
+//! - `mutations`: thousands of damaged files a format, in a child process (ignored)
+//! - `references`: scenes of others beside reference pictures (ignored)
 //! - `command_line`: the program as a user runs it
 
 mod adaptive_render;
@@ -14,6 +17,9 @@ mod bad_input;
 mod camera_and_time;
 mod command_line;
 mod direct_light;
+mod formats;
 mod furnace;
 mod load_assets;
+mod mutations;
+mod references;
 mod support;
