@@ -10,7 +10,7 @@
 //! to the adaptive render's figure only, so the ratio errs against it.
 
 use anyhow::{Context, Result};
-use fechner::adaptive::settings::{DEFAULT_MAX_SAMPLES, Limits, LoopSettings, Sampling};
+use fechner::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, Sampling};
 use fechner::adaptive::{Quiet, render};
 use fechner::film::opponent;
 use fechner::integrator::{DEFAULT_MAX_DEPTH, PathTracer, TraceSettings};
@@ -85,9 +85,7 @@ impl<'a> Judge<'a> {
     fn new(reference: &'a Run) -> Result<Self> {
         let viewing = Viewing::of(Display::preset("desktop").context("a preset")?);
         let luminance = mean(reference);
-        let tone = operator("constant", None)
-            .context("an operator")?
-            .fit(&SceneGuide { luminance_cd_m2: &luminance }, &viewing.display);
+        let tone = operator("constant", None).context("an operator")?.fit(&SceneGuide::of(&luminance), &viewing, None);
         let shown = seen::display_luminance(tone.as_ref(), &viewing.display, &luminance);
         let inputs = ThresholdInputs { display_luminance_cd_m2: &shown, guide_variance: None };
         let thresholds = threshold_map(&inputs, &viewing, &CastleCsf::default())?;
@@ -153,6 +151,8 @@ fn cached(root: &Path, arm: &Arm) -> Result<Run> {
     let nits_per_unit = scene.nits_per_unit;
     let settings = LoopSettings {
         sampling: arm.sampling,
+        allocation: AllocationRule::Convex,
+        model: None,
         limits: Limits {
             visibility: arm.visibility,
             time: None,
@@ -169,6 +169,7 @@ fn cached(root: &Path, arm: &Arm) -> Result<Run> {
         height: SIZE,
         seed: arm.seed,
         max_depth: DEFAULT_MAX_DEPTH,
+        clamp: None,
         filter: PixelFilter::Gaussian,
         sequence: Sequence::PerPixel,
         crop: None,

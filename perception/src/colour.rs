@@ -3,8 +3,10 @@
 use crate::csf::{CastleChromatic, CastleCsf, ChromaticChannel};
 use crate::display::Viewing;
 use crate::error::Error;
+use crate::noise_gain::noise_gain;
 use crate::opponent::{Opponent, opponent};
 use crate::plane::Plane;
+use crate::sensitivity::SensitivityTables;
 use crate::threshold::{ThresholdInputs, ThresholdMap, chromatic_threshold_map, threshold_map};
 
 /// Thresholds of one picture in each of the eye's three channels.
@@ -76,15 +78,62 @@ impl ColourThresholds {
     }
 }
 
+impl ThresholdMap {
+    /// N(x) in 1/(cd/m²)² of a chromatic channel: white pixel noise of variance σ² in that opponent signal has visibility
+    /// v with v² = 2 N σ². Under the adaptation of this map, without masking (an upper bound that needs no transform).
+    ///
+    /// # Errors
+    /// As [`CastleChromatic::new`].
+    pub fn chromatic_noise_gain(&self, channel: ChromaticChannel) -> Result<Plane, Error> {
+        let csf = CastleChromatic::new(channel, self.viewing.observer.csf_area_deg2)?;
+        let tables = SensitivityTables::new(&self.bands, &self.viewing, &csf);
+        Ok(noise_gain(&tables, &self.adaptation_cd_m2, &[]))
+    }
+
+    /// Gains of both chromatic channels.
+    ///
+    /// # Errors
+    /// As [`CastleChromatic::new`].
+    pub fn chromatic_gains(&self) -> Result<ChromaticGains, Error> {
+        Ok(ChromaticGains {
+            red_green: self.chromatic_noise_gain(ChromaticChannel::RedGreen)?,
+            yellow_violet: self.chromatic_noise_gain(ChromaticChannel::YellowViolet)?,
+        })
+    }
+
+    /// The luminance variance that would be as visible as the most visible of three channels' noise: max over channels of
+    /// `N_c` `σ_c²`, over N. Planes in (cd/m²)² on the display, in the order of [`Opponent`].
+    #[must_use]
+    pub fn luminance_equivalent_variance(&self, gains: &ChromaticGains, variances: [&Plane; 3]) -> Plane {
+        let [achromatic, red_green, yellow_violet] = variances;
+        Plane::from_fn(self.width(), self.height(), |x, y| {
+            let chromatic = (gains.red_green.get(x, y) * red_green.get(x, y))
+                .max(gains.yellow_violet.get(x, y) * yellow_violet.get(x, y));
+            let gain = self.noise_gain.get(x, y);
+            let equivalent = if gain > 0.0 { chromatic / gain } else { 0.0 };
+            achromatic.get(x, y).max(equivalent)
+        })
+    }
+}
+
+/// N(x) of the chromatic channels, 1/(cd/m²)²: see [`ThresholdMap::chromatic_noise_gain`].
+#[derive(Clone, Debug)]
+pub struct ChromaticGains {
+    /// Of L − M.
+    pub red_green: Plane,
+    /// Of S − (L + M).
+    pub yellow_violet: Plane,
+}
+
 /// A picture's opponent signals, cd/m².
-struct Channels {
-    achromatic: Plane,
-    red_green: Plane,
-    yellow_violet: Plane,
+pub(crate) struct Channels {
+    pub(crate) achromatic: Plane,
+    pub(crate) red_green: Plane,
+    pub(crate) yellow_violet: Plane,
 }
 
 impl Channels {
-    fn new(rgb_cd_m2: &[[f32; 3]], width: usize, height: usize) -> Result<Self, Error> {
+    pub(crate) fn new(rgb_cd_m2: &[[f32; 3]], width: usize, height: usize) -> Result<Self, Error> {
         if width.checked_mul(height) != Some(rgb_cd_m2.len()) {
             return Err(Error::ValueCount { width, height, found: rgb_cd_m2.len() });
         }

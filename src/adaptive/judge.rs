@@ -1,16 +1,18 @@
-//! The film as it will be seen: thresholds, remaining visibility, and the samples each pixel needs for more.
+//! The film as it will be seen: thresholds, remaining visibility, and how each pixel's samples scatter on the display.
 
 use super::settings::LoopSettings;
-use super::statistics::SampleStatistics;
-use crate::film::{Estimate, Film};
+use super::statistics::{ChannelStatistics, SampleStatistics};
+use crate::film::{CHANNELS, Estimate, Film};
 use crate::sampler::Half;
 use fechner_perception::Plane;
 use fechner_perception::csf::CastleCsf;
 use fechner_perception::guide::{GuideInputs, denoise};
+use fechner_perception::model::ModelInputs;
 use fechner_perception::photometry::luminance;
 use fechner_perception::seen;
 use fechner_perception::threshold::{ThresholdInputs, ThresholdMap, threshold_map};
 use fechner_perception::tone::{FittedTone, SceneGuide};
+use fechner_perception::visibility::MeasuredError;
 
 /// What the perception model says of a film. Everything is in display cd/m² unless it says otherwise.
 #[derive(Debug)]
@@ -19,17 +21,15 @@ pub struct Judgement {
     pub estimate: Estimate,
     /// The tone operator as fitted to the guide.
     pub tone: Box<dyn FittedTone>,
-    /// Thresholds from the guide.
+    /// Thresholds from the guide, by contrast sensitivity in bands.
     pub thresholds: ThresholdMap,
-    /// Variance of the picture's luminance in (scene cd/m²)², with what stratification makes of it.
-    pub variance_of_mean: Plane,
-    /// Variance of the picture as displayed, by pooled statistics and the low-discrepancy factor.
-    pub display_variance: Plane,
+    /// Standard error that a pixel may have at visibility 1 by the model that drives the loop, where that is another one:
+    /// a rule of its own for each pixel.
+    pub pixel_thresholds: Option<Plane>,
     /// Visibility that the variance predicts.
     pub predicted: Plane,
-    /// Visibility of the halves' difference: the same, measured.
-    pub measured: Plane,
-    /// Displayed variance of one sample as the neighbours tell it: the variance of the mean is this over the count.
+    /// Displayed variance of one sample as the neighbours tell it, as the luminance variance that shows as much as the
+    /// most visible of the eye's three channels: the variance of the mean is this over the count.
     pub pooled_variance_per_sample: Plane,
     /// The same as each half decides by it.
     pub variance_per_sample: [Plane; 2],
@@ -40,60 +40,131 @@ pub struct Judgement {
 #[error("the threshold map could not be made: {0}")]
 pub struct JudgeError(#[from] fechner_perception::Error);
 
-/// Looks at the film through display and eye.
-pub fn judge(film: &Film, settings: &LoopSettings) -> Result<Judgement, JudgeError> {
+/// Looks at the film through display and eye. `inflation` multiplies every variance (1, unless an audit found it low).
+///
+/// # Errors
+/// Only if the perception model refuses the film's maps.
+pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Judgement, JudgeError> {
     let estimate = film.estimate(settings.nits_per_unit);
-    let statistics = SampleStatistics::of(film);
     let guide = guide_luminance(film, &estimate);
-    let tone = settings.operator.fit(&SceneGuide { luminance_cd_m2: &guide }, &settings.viewing.display);
-    let display = &settings.viewing.display;
-    let displayed_guide = seen::display_luminance(tone.as_ref(), display, &guide);
-
-    let nits_squared = settings.nits_per_unit * settings.nits_per_unit;
-    let variance_of_mean = Plane::from_fn(film.width() as usize, film.height() as usize, |x, y| {
-        (f64::from(statistics.variance_of_mean.get(x, y)) * nits_squared) as f32
-    });
-    let (width, height) = (film.width() as usize, film.height() as usize);
-    let scene_variance = |per_sample: &Plane| {
-        Plane::from_fn(width, height, |x, y| {
-            let i = y * width + x;
-            let share = 0.25 * (inverse_count(film, Half::A, i) + inverse_count(film, Half::B, i));
-            let factor = f64::from(statistics.low_discrepancy_factor.values()[i]);
-            (f64::from(per_sample.values()[i]) * nits_squared * share * factor) as f32
-        })
-    };
-    let displayed =
-        |per_sample: &Plane| seen::display_variance(tone.as_ref(), display, &guide, &scene_variance(per_sample));
-    let display_variance = displayed(&statistics.pooled);
+    let tone = settings.operator.fit(&SceneGuide::of(&guide), &settings.viewing, None);
+    let statistics = SampleStatistics::of(film, &display_scale(film, &guide, tone.as_ref(), settings, inflation));
+    let displayed_guide = seen::display_luminance(tone.as_ref(), &settings.viewing.display, &guide);
+    let luminance_variance = variance_of_mean(film, statistics.luminance(), &statistics.luminance().pooled);
     // The noise before denoising bounds what is left of it in the guide, so masking fades in as samples come.
+    let csf = CastleCsf::new(settings.viewing.observer.csf_area_deg2)?;
     let thresholds = threshold_map(
-        &ThresholdInputs { display_luminance_cd_m2: &displayed_guide, guide_variance: Some(&display_variance) },
+        &ThresholdInputs { display_luminance_cd_m2: &displayed_guide, guide_variance: Some(&luminance_variance) },
         &settings.viewing,
-        &CastleCsf::new(settings.viewing.observer.csf_area_deg2)?,
+        &csf,
     )?;
+    let pixel_thresholds = match &settings.model {
+        None => None,
+        Some(model) => Some(model.allowed_standard_error_cd_m2(&ModelInputs {
+            display_luminance_cd_m2: &displayed_guide,
+            guide_variance: Some(&luminance_variance),
+            image_velocity_deg_s: None,
+            attention: None,
+            viewing: &settings.viewing,
+            csf: &csf,
+        })?),
+    };
+
+    // A model of luminance alone judges luminance alone.
+    let gains = if settings.model.is_none() { Some(thresholds.chromatic_gains()?) } else { None };
+    let most_visible = |of: &dyn for<'a> Fn(&'a ChannelStatistics) -> &'a Plane| {
+        let channel = |c: usize| variance_of_mean(film, &statistics.channels[c], of(&statistics.channels[c]));
+        match &gains {
+            None => channel(0),
+            Some(gains) => thresholds.luminance_equivalent_variance(gains, [&channel(0), &channel(1), &channel(2)]),
+        }
+    };
+    let display_variance = most_visible(&|channel| &channel.pooled);
     let per_sample = |variance: &Plane| {
-        Plane::from_fn(width, height, |x, y| {
-            let i = y * width + x;
-            let share = 0.25 * (inverse_count(film, Half::A, i) + inverse_count(film, Half::B, i));
-            (f64::from(variance.values()[i]) / share) as f32
+        Plane::from_fn(variance.width(), variance.height(), |x, y| {
+            (f64::from(variance.get(x, y)) / variance_share(film, y * variance.width() + x)) as f32
         })
     };
-    let pooled_variance_per_sample = per_sample(&display_variance);
-    let variance_per_sample = Half::BOTH.map(|half| per_sample(&displayed(&statistics.for_half[half.index()])));
-    let displayed_difference =
-        seen::display_half_difference(tone.as_ref(), display, &estimate.luminance_cd_m2, &estimate.half_difference);
-    let predicted = thresholds.predicted_visibility(&display_variance);
-    let measured = thresholds.measured_visibility(&displayed_difference);
-    Ok(Judgement {
+    let variance_per_sample =
+        Half::BOTH.map(|half| per_sample(&most_visible(&|channel| &channel.for_half[half.index()])));
+    let mut judgement = Judgement {
         estimate,
         tone,
         thresholds,
-        variance_of_mean,
-        display_variance,
-        predicted,
-        measured,
-        pooled_variance_per_sample,
+        pixel_thresholds,
+        predicted: Plane::filled(0, 0, 0.0),
+        pooled_variance_per_sample: per_sample(&display_variance),
         variance_per_sample,
+    };
+    judgement.predicted = judgement.visibility_of(&display_variance);
+    Ok(judgement)
+}
+
+impl Judgement {
+    /// Visibility of a picture whose displayed luminance has this variance, (cd/m²)².
+    pub fn visibility_of(&self, display_variance: &Plane) -> Plane {
+        match &self.pixel_thresholds {
+            None => self.thresholds.predicted_visibility(display_variance),
+            Some(allowed) => Plane::from_fn(allowed.width(), allowed.height(), |x, y| {
+                display_variance.get(x, y).sqrt() / allowed.get(x, y)
+            }),
+        }
+    }
+
+    /// Standard error of a pixel, cd/m² on the display, that is at visibility 1 by the model that drives the loop.
+    pub fn allowed_standard_error_cd_m2(&self) -> Plane {
+        match &self.pixel_thresholds {
+            None => self.thresholds.allowed_standard_error_cd_m2(1.0),
+            Some(allowed) => allowed.clone(),
+        }
+    }
+
+    /// What can be seen of the halves' luminance difference: the same as predicted, measured.
+    pub fn measured_error(&self, settings: &LoopSettings) -> MeasuredError {
+        let displayed = seen::display_half_difference(
+            self.tone.as_ref(),
+            &settings.viewing.display,
+            &self.estimate.luminance_cd_m2,
+            &self.estimate.half_difference,
+        );
+        self.thresholds.measured_error(&displayed)
+    }
+}
+
+/// Displayed variance over scene variance of each pixel, by channel, at the size that its variance has now: what the display
+/// makes of a pixel's own noise, before any pooling. From scene units; inflation included.
+pub fn display_scale(
+    film: &Film,
+    guide: &Plane,
+    tone: &dyn FittedTone,
+    settings: &LoopSettings,
+    inflation: f64,
+) -> [Plane; CHANNELS] {
+    let (a, b) = (film.half(Half::A), film.half(Half::B));
+    let nits_squared = settings.nits_per_unit * settings.nits_per_unit * inflation;
+    let display = &settings.viewing.display;
+    std::array::from_fn(|c| {
+        let own = |i: usize| 0.5 * (a[i].sample_variance(c) + b[i].sample_variance(c)) * variance_share(film, i);
+        let scene =
+            Plane::from_fn(guide.width(), guide.height(), |x, y| (own(y * guide.width() + x) * nits_squared) as f32);
+        let displayed = if c == 0 {
+            seen::display_variance(tone, display, guide, &scene)
+        } else {
+            seen::display_chromatic_variance(tone, display, guide, &scene)
+        };
+        Plane::from_fn(guide.width(), guide.height(), |x, y| {
+            let (scene, displayed) = (f64::from(scene.get(x, y)), f64::from(displayed.get(x, y)));
+            if scene > 0.0 && displayed.is_finite() { (displayed / scene * nits_squared) as f32 } else { 0.0 }
+        })
+    })
+}
+
+/// Variance of the picture's mean in a channel for the variance of one sample.
+fn variance_of_mean(film: &Film, statistics: &ChannelStatistics, per_sample: &Plane) -> Plane {
+    Plane::from_fn(per_sample.width(), per_sample.height(), |x, y| {
+        let factor = f64::from(statistics.low_discrepancy_factor.get(x, y));
+        let share = variance_share(film, y * per_sample.width() + x);
+        (f64::from(per_sample.get(x, y)) * share * factor) as f32
     })
 }
 
@@ -116,6 +187,83 @@ fn guide_luminance(film: &Film, estimate: &Estimate) -> Plane {
     Plane::from_fn(width, height, |x, y| luminance(denoised[y * width + x]).max(0.0))
 }
 
-fn inverse_count(film: &Film, half: Half, pixel: usize) -> f64 {
-    1.0 / f64::from(film.half(half)[pixel].samples.max(1))
+/// Variance of a pixel's mean over that of one sample, (1/n_A + 1/n_B) / 4.
+pub fn variance_share(film: &Film, pixel: usize) -> f64 {
+    let inverse = |half: Half| 1.0 / f64::from(film.half(half)[pixel].samples.max(1));
+    0.25 * (inverse(Half::A) + inverse(Half::B))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::adaptive::plan::pilot_plan;
+    use crate::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, Sampling};
+    use crate::film::BlockSum;
+    use crate::integrator::{FirstHit, PathSample};
+    use crate::sampler::hash_words;
+    use fechner_perception::display::{Display, Viewing};
+    use fechner_perception::tone::operator;
+    use glam::Vec3;
+
+    fn settings() -> LoopSettings {
+        LoopSettings {
+            sampling: Sampling::Adaptive,
+            allocation: AllocationRule::Convex,
+            model: None,
+            limits: Limits {
+                visibility: 1.0,
+                time: None,
+                mean_samples: None,
+                max_samples: DEFAULT_MAX_SAMPLES,
+                plans: None,
+            },
+            viewing: Viewing::of(Display::preset("desktop").expect("a preset")),
+            nits_per_unit: 100.0,
+            operator: operator("absolute", None).expect("an operator"),
+        }
+    }
+
+    /// A pilot of `color(pixel, random in −1..1)`.
+    fn film_of(color: impl Fn(u32, f32) -> Vec3) -> Film {
+        let mut film = Film::new(64, 64);
+        for block in pilot_plan(64 * 64, 16).blocks {
+            let mut sum = BlockSum::default();
+            for index in 0..block.samples {
+                let key = u64::from(block.pixel) << 8 | u64::from(index);
+                let random = (hash_words(key, block.half.index() as u64) >> 40) as f32 / 8_388_608.0 - 1.0;
+                let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1 };
+                sum.add(&PathSample { radiance: color(block.pixel, random), first_hit, rays: 1 });
+            }
+            film.merge_block(block, &sum);
+        }
+        film
+    }
+
+    /// Noise that leaves luminance alone is seen by its colour: no stop at the pilot.
+    #[test]
+    fn isoluminant_noise_is_seen() {
+        let red_for_green = Vec3::new(1.0, -0.2126 / 0.7152, 0.0);
+        let film = film_of(|_, random| Vec3::splat(0.8) + 0.7 * random * red_for_green);
+        let judgement = judge(&film, &settings(), 1.0).expect("judges");
+        let luminance_variance = judgement.estimate.variance_of_mean.get(32, 32);
+        assert!(luminance_variance < 1e-4, "luminance varies by {luminance_variance}");
+        assert!(judgement.predicted.get(32, 32) > 1.0, "v = {}", judgement.predicted.get(32, 32));
+        let of_luminance = LoopSettings { model: fechner_perception::model::by_name("tvi"), ..settings() };
+        let blind = judge(&film, &of_luminance, 1.0).expect("judges");
+        assert!(blind.predicted.get(32, 32) < 0.01, "a model of luminance sees {}", blind.predicted.get(32, 32));
+    }
+
+    /// What the display clips is not pooled into dark neighbours: a lamp that scatters by a thousand times white.
+    #[test]
+    fn a_clipped_lamp_does_not_trouble_its_neighbours() {
+        let dim = |random: f32| Vec3::splat(0.5 + 0.05 * random);
+        let film = film_of(|_, random| dim(random));
+        let is_lamp = |pixel: u32| (28..36).contains(&(pixel % 64)) && (28..36).contains(&(pixel / 64));
+        let lit =
+            film_of(|pixel, random| if is_lamp(pixel) { Vec3::splat(2000.0 + 900.0 * random) } else { dim(random) });
+        let beside =
+            |film: &Film| judge(film, &settings(), 1.0).expect("judges").pooled_variance_per_sample.get(37, 32);
+        let (before, after) = (beside(&film), beside(&lit));
+        assert!(after < 4.0 * before, "variance beside the lamp went from {before} to {after}");
+    }
 }

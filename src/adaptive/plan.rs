@@ -5,8 +5,9 @@
 //! alone would cost 1.44 times the samples.
 
 use super::judge::Judgement;
+use super::settings::AllocationRule;
 use crate::film::Film;
-use crate::integrator::{BlockWork, PILOT_SAMPLES, SamplePlan, samples_through};
+use crate::integrator::{BlockWork, PILOT_SAMPLES, SamplePlan};
 use crate::sampler::Half;
 use fechner_perception::Plane;
 use fechner_perception::allocation::{AllocationProblem, allocate};
@@ -35,80 +36,98 @@ pub fn uniform_plan(film: &Film, mean_samples: u32) -> SamplePlan {
     let mut plan = SamplePlan::default();
     for pixel in 0..film.width() * film.height() {
         for half in Half::BOTH {
-            let level = film.half(half)[pixel as usize].levels;
-            let wanted = u64::from((mean_samples + 1 - half.index() as u32) / 2);
-            // What earlier levels hold by construction, finite or not.
-            let held = samples_through(level - 1);
-            if wanted > held {
-                let block = BlockWork::whole(pixel, half, level);
-                let samples = u64::from(block.samples).min(wanted - held) as u32;
-                plan.blocks.push(BlockWork { samples, ..block });
+            let taken = film.half(half)[pixel as usize].taken;
+            let wanted = (mean_samples + 1 - half.index() as u32) / 2;
+            if wanted > taken {
+                let block = BlockWork::rest(pixel, half, taken);
+                plan.blocks.push(BlockWork { samples: block.samples.min(wanted - taken), ..block });
             }
         }
     }
     plan
 }
 
-/// Doublings for pixels whose error could still be seen at `visibility`.
-///
-/// The perception crate's convex allocation says how many samples each pixel should have if its variance were that of
-/// its neighbours; each half then scales its share by what the other half knows of the pixel itself (counts go as the
-/// standard deviation, Neyman 1934).
+/// How many samples each pixel should have in all for a visibility, if its variance were that of its neighbours.
 ///
 /// # Errors
 /// Only if the allocation refuses the judgement's maps, which would be a defect of ours.
-pub fn adaptive_plan(
-    film: &Film,
+pub fn wanted_samples(
     judgement: &Judgement,
+    rule: AllocationRule,
     visibility: f64,
     max_samples: u32,
-) -> Result<SamplePlan, fechner_perception::Error> {
-    let (width, height) = (film.width() as usize, film.height() as usize);
-    let allocation = allocate(&AllocationProblem {
-        variance_per_sample: &judgement.pooled_variance_per_sample,
-        thresholds: &judgement.thresholds,
-        cost: &Plane::filled(width, height, 1.0),
-        tolerance: None,
-        visibility,
-        min_samples: f64::from(2 * PILOT_SAMPLES),
-        max_samples: f64::from(max_samples).max(f64::from(2 * PILOT_SAMPLES)),
-    })?;
-    let need = |half: Half, pixel: usize| {
-        let pooled = f64::from(judgement.pooled_variance_per_sample.values()[pixel]);
-        let own = f64::from(judgement.variance_per_sample[half.index()].values()[pixel]);
-        let share = 0.5 * f64::from(allocation.samples.values()[pixel]);
-        let harder = if pooled > 0.0 { (own / pooled).max(1.0).sqrt() } else { 1.0 };
-        share * harder * confidence_margin(f64::from(film.half(half)[pixel].samples.max(1)))
-    };
-    let wanted = |pixel: usize| {
-        let doublings = Half::BOTH.map(|half| {
-            let held = samples_through(film.half(half)[pixel].levels - 1);
-            doublings_for(need(half, pixel) / held as f64, dither(film.width(), pixel))
-        });
-        // A half may not fall behind the other by more than one doubling.
-        let level = |h: Half| u32::from(film.half(h)[pixel].levels) + doublings[h.index()];
-        Half::BOTH.map(|h| level(h).max(level(h.other()).saturating_sub(1)) - u32::from(film.half(h)[pixel].levels))
-    };
-    Ok(blocks(film, max_samples, wanted))
+) -> Result<Plane, fechner_perception::Error> {
+    let least = f64::from(2 * PILOT_SAMPLES);
+    let most = f64::from(max_samples).max(least);
+    let variance = &judgement.pooled_variance_per_sample;
+    if rule == AllocationRule::Convex && judgement.pixel_thresholds.is_none() {
+        let allocation = allocate(&AllocationProblem {
+            variance_per_sample: variance,
+            thresholds: &judgement.thresholds,
+            cost: &Plane::filled(variance.width(), variance.height(), 1.0),
+            tolerance: None,
+            visibility,
+            min_samples: least,
+            max_samples: most,
+        })?;
+        return Ok(allocation.samples);
+    }
+    let allowed = judgement.allowed_standard_error_cd_m2();
+    Ok(Plane::from_fn(variance.width(), variance.height(), |x, y| {
+        let standard_error = f64::from(allowed.get(x, y)) * visibility;
+        (f64::from(variance.get(x, y)) / (standard_error * standard_error)).clamp(least, most) as f32
+    }))
 }
 
-/// One doubling for every pixel in whose surroundings the predicted visibility is above the target: what is left to do
-/// when each pixel by itself has what it needs.
-pub fn remainder_plan(film: &Film, judgement: &Judgement, visibility: f64, max_samples: u32) -> SamplePlan {
-    blocks(film, max_samples, |pixel| [u32::from(f64::from(judgement.predicted.values()[pixel]) > visibility); 2])
+/// Doublings for pixels that have fewer samples than `wanted`.
+///
+/// Each half scales its share by what the other half knows of the pixel itself (counts go as the standard deviation,
+/// Neyman 1934).
+pub fn adaptive_plan(film: &Film, judgement: &Judgement, wanted: &Plane, max_samples: u32) -> SamplePlan {
+    doubling_plan(film, max_samples, |pixel| {
+        let pooled = judgement.pooled_variance_per_sample.values()[pixel];
+        let own = judgement.variance_per_sample.each_ref().map(|plane| plane.values()[pixel]);
+        doublings_of_halves(film, pixel, wanted.values()[pixel], pooled, own)
+    })
 }
 
-fn blocks(film: &Film, max_samples: u32, doublings: impl Fn(usize) -> [u32; 2]) -> SamplePlan {
+/// Doublings of both halves of a pixel that should have `wanted` samples if its variance were `pooled`; `own` is the larger of
+/// that and what each half may know of the pixel itself.
+fn doublings_of_halves(film: &Film, pixel: usize, wanted: f32, pooled: f32, own: [f32; 2]) -> [u32; 2] {
+    let doublings = Half::BOTH.map(|half| {
+        let taken = film.half(half)[pixel].taken.max(1);
+        let harder = if pooled > 0.0 { f64::from(own[half.index()] / pooled).max(1.0).sqrt() } else { 1.0 };
+        let need = 0.5 * f64::from(wanted) * harder * confidence_margin(f64::from(taken));
+        doublings_for(need / f64::from(taken), dither(film.width(), pixel))
+    });
+    // A half that falls far behind makes the other's samples worthless, yet one that follows closely is decided by its own
+    // data after all, through the other's count: on the lognormal field of the tests a lag of one doubling costs 0.50 % of
+    // the energy, two 0.24 %, none that is bounded 0.14 % (each ± 0.12).
+    let after = |half: Half| u64::from(film.half(half)[pixel].taken) << doublings[half.index()];
+    Half::BOTH.map(|half| {
+        let is_far_behind = 8 * after(half) <= after(half.other());
+        doublings[half.index()] + u32::from(is_far_behind)
+    })
+}
+
+/// One doubling for every pixel of a mask.
+pub fn doubling_of(film: &Film, max_samples: u32, mask: impl Fn(usize) -> bool) -> SamplePlan {
+    doubling_plan(film, max_samples, |pixel| [u32::from(mask(pixel)); 2])
+}
+
+fn doubling_plan(film: &Film, max_samples: u32, doublings: impl Fn(usize) -> [u32; 2]) -> SamplePlan {
     let mut plan = SamplePlan::default();
     for pixel in 0..(film.width() * film.height()) as usize {
         let doublings = doublings(pixel);
         for half in Half::BOTH {
-            let level = film.half(half)[pixel].levels;
-            for extra in 0..doublings[half.index()] as u8 {
-                if samples_through(level + extra) > u64::from(max_samples / 2) {
+            let mut taken = film.half(half)[pixel].taken;
+            for _ in 0..doublings[half.index()] {
+                let block = BlockWork::rest(pixel as u32, half, taken);
+                taken += block.samples;
+                if taken > max_samples / 2 {
                     break;
                 }
-                plan.blocks.push(BlockWork::whole(pixel as u32, half, level + extra));
+                plan.blocks.push(block);
             }
         }
     }
@@ -118,7 +137,7 @@ fn blocks(film: &Film, max_samples: u32, doublings: impl Fn(usize) -> [u32; 2]) 
 /// How much more than the estimated need is asked for, against estimates that are low by chance. Pooling leaves few per
 /// cent of scatter on well-behaved noise; what is left is for tails, and fades as samples come in.
 fn confidence_margin(samples: f64) -> f64 {
-    1.0 + 0.6 / samples.sqrt()
+    1.0 + 0.25 / samples.sqrt()
 }
 
 /// Doublings for a pixel that needs `ratio` times what it has: whole ones, and one more for a share of pixels such that
@@ -165,10 +184,10 @@ pub fn slices(plan: SamplePlan, width: u32, traced_samples: u64) -> Vec<SamplePl
     slices
 }
 
-/// Cuts a plan to a budget: the blocks of pixels that have least of what they need first.
-pub fn cut_to_budget(plan: SamplePlan, judgement: &Judgement, samples: u64) -> SamplePlan {
+/// Cuts a plan to a budget: the blocks of pixels with the largest `urgency` first.
+pub fn cut_to_budget(plan: SamplePlan, urgency: &Plane, samples: u64) -> SamplePlan {
     let mut blocks = plan.blocks;
-    let urgency = |b: &BlockWork| judgement.predicted.values()[b.pixel as usize];
+    let urgency = |b: &BlockWork| urgency.values()[b.pixel as usize];
     blocks.sort_by(|a, b| urgency(b).total_cmp(&urgency(a)).then(a.pixel.cmp(&b.pixel)).then(a.level.cmp(&b.level)));
     let mut left = samples;
     blocks.retain(|b| {
@@ -200,6 +219,11 @@ fn plan_first_level(kept: &[BlockWork], block: &BlockWork) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::adaptive::statistics::{SampleStatistics, scene_units};
+    use crate::film::BlockSum;
+    use crate::integrator::{FirstHit, PathSample};
+    use crate::sampler::hash_words;
+    use glam::Vec3;
 
     /// Over a quad, the mean of 1/n is that of the need to within the four steps of the dither.
     #[test]
@@ -217,6 +241,33 @@ mod tests {
         assert_eq!(doublings_for(1e9, 0.9), MOST_DOUBLINGS_AT_ONCE);
     }
 
+    fn constant_block(samples: u32) -> BlockSum {
+        let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1 };
+        let mut sum = BlockSum::default();
+        (0..samples).for_each(|_| sum.add(&PathSample { radiance: Vec3::ONE, first_hit, rays: 1 }));
+        sum
+    }
+
+    /// Pieces of any size take up a half's sequence without a gap or an overlap.
+    #[test]
+    fn the_rest_of_a_doubling_follows_on() {
+        for step in [1u32, 3, 8, 13] {
+            let mut taken = 0;
+            let mut seen = std::collections::BTreeSet::new();
+            while taken < 128 {
+                let rest = BlockWork::rest(0, Half::A, taken);
+                let samples = rest.samples.min(step);
+                assert!((rest.first..rest.first + samples).all(|index| seen.insert((rest.level, index))));
+                taken += samples;
+            }
+            let complete = (0..128).all(|i: u32| {
+                let level = if i < 8 { 0 } else { 1 + (i / 8).ilog2() as u8 };
+                seen.contains(&(level, if level == 0 { i } else { i - (8 << (level - 1)) }))
+            });
+            assert!(complete, "pieces of {step}");
+        }
+    }
+
     #[test]
     fn a_uniform_plan_takes_exactly_what_is_asked() {
         for spp in [1u32, 2, 7, 16, 17, 100, 256] {
@@ -226,12 +277,82 @@ mod tests {
             while !plan.blocks.is_empty() {
                 taken += plan.samples();
                 for block in &plan.blocks {
-                    film.merge_block(*block, &crate::film::BlockSum::default());
+                    film.merge_block(*block, &constant_block(block.samples));
                 }
-                plan = if film.half(Half::B)[0].levels == 0 { SamplePlan::default() } else { uniform_plan(&film, spp) };
+                plan = uniform_plan(&film, spp);
             }
             assert_eq!(taken, u64::from(spp) * 6, "{spp} spp");
         }
+    }
+
+    /// The count rule on flat fields of 96×96 pixels whose standard error should become 1/32 of the samples' deviation: mean
+    /// count over the right one (1024), pixels that stop below half of it, and energy lost. Gaussian noise, a lognormal of
+    /// coefficient of variation 4, and fireflies that hold 10 % of the energy in one sample of 1000.
+    #[test]
+    fn counts_can_be_trusted_on_heavy_tails() {
+        type Draw = fn(f64, f64) -> f64;
+        let gaussian: Draw = |u, v| 4.0 + (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos();
+        let lognormal: Draw = |u, v| {
+            let sigma = 17f64.ln().sqrt();
+            (sigma * (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos() - 0.5 * sigma * sigma).exp()
+        };
+        let fireflies: Draw = |u, v| 0.9 * (0.5 + v) + if u < 1e-3 { 100.0 } else { 0.0 };
+        let fields: [(&str, Draw, f64, f64, f64); 3] = [
+            ("gaussian", gaussian, 4.0, 1.0, 0.0),
+            ("lognormal", lognormal, 1.0, 16.0, 0.01),
+            ("fireflies", fireflies, 1.0, 10.0 + 0.81 / 12.0 - 0.01, 0.03),
+        ];
+        for (name, draw, mean, variance, most_below) in fields {
+            let film = stopped_film(96, draw, variance / 1024.0);
+            let counts: Vec<f64> = (0..96 * 96).map(|i| f64::from(film.samples(i))).collect();
+            let ratio = counts.iter().sum::<f64>() / 1024.0 / counts.len() as f64;
+            let below = counts.iter().filter(|&&n| n < 512.0).count() as f64 / counts.len() as f64;
+            let picture = film.estimate(1.0).luminance_cd_m2;
+            let bias = picture.mean() / mean - 1.0;
+            let standard_error = (variance / counts.iter().sum::<f64>()).sqrt() / mean;
+            println!(
+                "{name}: n/n_req {ratio:.2}, below half {:.2} %, bias {:+.2} ± {:.2} %",
+                100.0 * below,
+                100.0 * bias,
+                100.0 * standard_error
+            );
+            assert!((0.95..1.8).contains(&ratio), "{name}: {ratio}");
+            assert!(below <= most_below, "{name}: {below}");
+            assert!(bias.abs() < 0.003 + 3.3 * standard_error, "{name}: bias {bias}");
+        }
+    }
+
+    /// Samples a field until the count rule asks for no more.
+    fn stopped_film(size: u32, draw: fn(f64, f64) -> f64, variance_of_mean: f64) -> Film {
+        let mut film = Film::new(size, size);
+        let mut plan = pilot_plan(size * size, 16);
+        while !plan.blocks.is_empty() {
+            for block in &plan.blocks {
+                film.merge_block(*block, &drawn_block(*block, draw));
+            }
+            let statistics = SampleStatistics::of(&film, &scene_units(&film));
+            let luminance = statistics.luminance();
+            plan = doubling_plan(&film, 1 << 16, |i| {
+                let factor = luminance.low_discrepancy_factor.values()[i];
+                let pooled = luminance.pooled.values()[i] * factor;
+                let own = luminance.for_half.each_ref().map(|plane| plane.values()[i] * factor);
+                doublings_of_halves(&film, i, pooled / variance_of_mean as f32, pooled, own)
+            });
+        }
+        film
+    }
+
+    fn drawn_block(block: BlockWork, draw: fn(f64, f64) -> f64) -> BlockSum {
+        let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1 };
+        let mut sum = BlockSum::default();
+        let key = hash_words(u64::from(block.pixel) << 8 | u64::from(block.level), block.half.index() as u64);
+        for index in block.first..block.first + block.samples {
+            let random =
+                |d: u64| ((hash_words(key, u64::from(index) * 2 + d) >> 11) as f64 + 0.5) / (1u64 << 53) as f64;
+            let radiance = Vec3::splat(draw(random(0), random(1)) as f32);
+            sum.add(&PathSample { radiance, first_hit, rays: 1 });
+        }
+        sum
     }
 
     #[test]

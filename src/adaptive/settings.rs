@@ -1,16 +1,46 @@
 //! What a render is asked to do.
 
 use fechner_perception::display::Viewing;
+use fechner_perception::model::ThresholdModel;
 use fechner_perception::tone::ToneOperator;
 use std::time::Duration;
 
 /// How samples are spread.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Sampling {
     /// Where the remaining error can be seen.
     Adaptive,
     /// The same everywhere.
     Uniform,
+    /// By another renderer's rule, for comparison.
+    Rival(RivalRule),
+}
+
+/// Stop rules and budgets of today's renderers (see [`super::rivals`]).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RivalRule {
+    /// Difference of two estimates over the square root of brightness, dilated, as Cycles does it.
+    Relative {
+        /// Its noise threshold; 0.01 is its default.
+        threshold: f64,
+    },
+    /// Standard error of the pixel over its mean.
+    Variance {
+        /// The ratio at which a pixel stops.
+        threshold: f64,
+    },
+    /// A budget spread by relative variance of 4×4 pixels, as Tungsten does it; it has no stop of its own.
+    Budget,
+}
+
+/// How the adaptive mode finds a pixel's count.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum AllocationRule {
+    /// The cheapest counts that keep the pooled visibility everywhere: a convex problem.
+    #[default]
+    Convex,
+    /// Each pixel by its own threshold, as if its surroundings were like it. For comparison.
+    Local,
 }
 
 /// When to stop; the first that is reached does.
@@ -32,6 +62,10 @@ pub struct Limits {
 pub struct LoopSettings {
     /// How samples are spread.
     pub sampling: Sampling,
+    /// How the adaptive mode finds a pixel's count.
+    pub allocation: AllocationRule,
+    /// Threshold model that drives the loop; `None` is contrast sensitivity in bands, pooled over the eye's window.
+    pub model: Option<Box<dyn ThresholdModel>>,
     /// When to stop.
     pub limits: Limits,
     /// Display and observer.

@@ -5,7 +5,7 @@
 //! the pixel's own variance as the *other* half saw it. Measured on synthetic fields, this leaves +0.26 ± 0.1 % of bias
 //! on a lognormal of coefficient of variation 4, where a pixel's own variance costs −13.6 %.
 
-use crate::film::{Film, HalfPixel, PixelGuide};
+use crate::film::{CHANNELS, Film, HalfPixel, PixelGuide, opponent};
 use crate::sampler::Half;
 use fechner_perception::Plane;
 use rayon::prelude::*;
@@ -13,11 +13,12 @@ use rayon::prelude::*;
 /// Pixels to each side that are pooled: 7×7.
 const POOL_RADIUS: i64 = 3;
 /// Range of the low-discrepancy factor: stratified samples do better than their scatter says, hardly ever worse.
-const FACTOR_RANGE: (f64, f64) = (0.1, 1.2);
+const FACTOR_RANGE: (f64, f64) = (0.02, 1.2);
 
-/// Luminance variance of one sample, per pixel, in scene units squared, and what stratification makes of it.
+/// Variance of one sample in one opponent channel, per pixel, in the unit of the scale that was given, and what
+/// stratification makes of it.
 #[derive(Clone, Debug)]
-pub struct SampleStatistics {
+pub struct ChannelStatistics {
     /// Pooled over the neighbours of like surface, the pixel itself left out.
     pub pooled: Plane,
     /// What half A decides by: pooled, or the pixel's own variance seen by B where that is larger.
@@ -25,74 +26,106 @@ pub struct SampleStatistics {
     /// Ratio of the halves' squared difference to what independent samples would show, pooled: below 1 where
     /// stratification pays.
     pub low_discrepancy_factor: Plane,
-    /// Variance of the picture's luminance, scene units squared: the pixel's own scatter, times the same factor with the
-    /// pixel itself counted in. For reports, not for decisions.
-    pub variance_of_mean: Plane,
+    /// The same factor with the pixel itself counted in. For reports, not for decisions.
+    pub factor_with_own: Plane,
+}
+
+/// Statistics of luminance and the two chromatic channels.
+#[derive(Clone, Debug)]
+pub struct SampleStatistics {
+    /// By channel, in the order of [`crate::film::opponent`].
+    pub channels: [ChannelStatistics; CHANNELS],
 }
 
 impl SampleStatistics {
-    /// Pools a film.
-    pub fn of(film: &Film) -> Self {
+    /// Pools a film. `scale` turns each pixel's scene variance, by channel, into what counts: displayed variance, since a
+    /// lamp's border scatters far above what the display can show, and its dark neighbours must not inherit that.
+    pub fn of(film: &Film, scale: &[Plane; CHANNELS]) -> Self {
         let (width, height) = (film.width() as usize, film.height() as usize);
         let (a, b) = (film.half(Half::A), film.half(Half::B));
         let guides = film.guides();
-        let evidence: Vec<PixelEvidence> = a.iter().zip(b).map(|(a, b)| PixelEvidence::new(a, b)).collect();
-        let pooled: Vec<Pooled> = (0..width * height)
+        let evidence: Vec<[PixelEvidence; CHANNELS]> = (0..a.len())
+            .map(|i| PixelEvidence::of_pixel(&a[i], &b[i], scale.each_ref().map(|s| s.values()[i])))
+            .collect();
+        let pooled: Vec<[Pooled; CHANNELS]> = (0..width * height)
             .into_par_iter()
             .map(|i| pool(&evidence, guides, (i % width, i / width), (width, height)))
             .collect();
-        let plane =
-            |value: &(dyn Fn(usize) -> f64 + Sync)| Plane::from_fn(width, height, |x, y| value(y * width + x) as f32);
-        let decided_by = |other: &[HalfPixel], i: usize| pooled[i].variance.max(cautious_variance(&other[i]));
-        Self {
-            pooled: plane(&|i| pooled[i].variance),
-            for_half: [plane(&|i| decided_by(b, i)), plane(&|i| decided_by(a, i))],
-            low_discrepancy_factor: plane(&|i| pooled[i].factor),
-            variance_of_mean: plane(&|i| evidence[i].variance_of_mean * pooled[i].factor_with_own),
-        }
+        let channel = |c: usize| {
+            let plane = |value: &(dyn Fn(usize) -> f64 + Sync)| {
+                Plane::from_fn(width, height, |x, y| value(y * width + x) as f32)
+            };
+            let decided_by = |other: &[HalfPixel], i: usize| {
+                let own = cautious_variance(&other[i], c) * f64::from(scale[c].values()[i]);
+                pooled[i][c].variance.max(own)
+            };
+            ChannelStatistics {
+                pooled: plane(&|i| pooled[i][c].variance),
+                for_half: [plane(&|i| decided_by(b, i)), plane(&|i| decided_by(a, i))],
+                low_discrepancy_factor: plane(&|i| pooled[i][c].factor),
+                factor_with_own: plane(&|i| pooled[i][c].factor_with_own),
+            }
+        };
+        Self { channels: std::array::from_fn(channel) }
     }
+
+    /// Statistics of luminance.
+    pub fn luminance(&self) -> &ChannelStatistics {
+        &self.channels[0]
+    }
+}
+
+/// Variance of the picture's luminance in (scene cd/m²)²: each pixel's own scatter, and what stratification makes of it around
+/// the pixel. For reports, not for decisions.
+pub fn picture_variance(film: &Film, nits_per_unit: f64) -> Plane {
+    let own = film.estimate(nits_per_unit).variance_of_mean;
+    let factor = SampleStatistics::of(film, &scene_units(film)).channels[0].factor_with_own.clone();
+    Plane::from_fn(own.width(), own.height(), |x, y| own.get(x, y) * factor.get(x, y))
+}
+
+/// The scale that leaves variances in scene units.
+pub fn scene_units(film: &Film) -> [Plane; CHANNELS] {
+    std::array::from_fn(|_| Plane::filled(film.width() as usize, film.height() as usize, 1.0))
 }
 
 /// A pixel's own variance, lowered by two of its standard errors under normal samples: the maximum with the pooled
 /// value would otherwise pick the lucky scatter of every pixel and spend about 1.3 times too much, while the isolated
 /// hard pixels that this term is for stand out by far more.
-fn cautious_variance(pixel: &HalfPixel) -> f64 {
+fn cautious_variance(pixel: &HalfPixel, channel: usize) -> f64 {
     if pixel.samples < 2 {
         return 0.0;
     }
     let standard_error = (2.0 / f64::from(pixel.samples - 1)).sqrt();
-    pixel.sample_variance(0) / (1.0 + 2.0 * standard_error)
+    pixel.sample_variance(channel) / (1.0 + 2.0 * standard_error)
 }
 
-/// What one pixel has to say about variance.
+/// What one pixel has to say about variance in one channel.
 #[derive(Clone, Copy)]
 struct PixelEvidence {
-    /// Sum of squared deviations of both halves about their own means.
-    m2: f64,
-    degrees_of_freedom: f64,
-    /// Squared half difference of luminance.
+    /// Sample variance from the squared deviations of both halves about their own means.
+    variance: f64,
+    /// Squared half difference.
     squared_difference: f64,
-    /// Its expectation for independent samples, as share of the sample variance.
-    difference_scale: f64,
-    /// (s_A²/n_A + s_B²/n_B) / 4.
-    variance_of_mean: f64,
+    /// Its expectation for independent samples.
+    expected_difference: f64,
 }
 
 impl PixelEvidence {
-    fn new(a: &HalfPixel, b: &HalfPixel) -> Self {
-        let difference = crate::film::opponent(a.mean)[0] - crate::film::opponent(b.mean)[0];
+    fn of_pixel(a: &HalfPixel, b: &HalfPixel, scale: [f32; CHANNELS]) -> [Self; CHANNELS] {
+        let means = [opponent(a.mean), opponent(b.mean)];
         let count = |h: &HalfPixel| f64::from(h.samples.max(1));
-        Self {
-            m2: f64::from(a.m2[0]) + f64::from(b.m2[0]),
-            degrees_of_freedom: (count(a) - 1.0) + (count(b) - 1.0),
-            squared_difference: 0.25 * difference * difference,
-            difference_scale: 0.25 * (1.0 / count(a) + 1.0 / count(b)),
-            variance_of_mean: 0.25 * (a.sample_variance(0) / count(a) + b.sample_variance(0) / count(b)),
-        }
-    }
-
-    fn variance(&self) -> f64 {
-        if self.degrees_of_freedom > 0.0 { self.m2 / self.degrees_of_freedom } else { 0.0 }
+        let degrees_of_freedom = (count(a) - 1.0) + (count(b) - 1.0);
+        std::array::from_fn(|c| {
+            let difference = means[0][c] - means[1][c];
+            let m2 = f64::from(a.m2[c]) + f64::from(b.m2[c]);
+            let scale = f64::from(scale[c]);
+            let variance = if degrees_of_freedom > 0.0 { scale * m2 / degrees_of_freedom } else { 0.0 };
+            Self {
+                variance,
+                squared_difference: 0.25 * scale * difference * difference,
+                expected_difference: 0.25 * variance * (1.0 / count(a) + 1.0 / count(b)),
+            }
+        })
     }
 }
 
@@ -103,17 +136,36 @@ struct Pooled {
     factor_with_own: f64,
 }
 
+/// Weighted sums over the neighbours of a pixel in one channel.
+#[derive(Clone, Copy, Default)]
+struct PoolSums {
+    variances: f64,
+    squared: f64,
+    expected: f64,
+    /// The largest expectation of a single neighbour, weighted.
+    most_expected: f64,
+}
+
+impl PoolSums {
+    /// Squared differences over their expectation, drawn towards 1 by one observation as heavy as the heaviest: where a
+    /// single pixel outweighs the others, its half difference may be small by luck.
+    fn factor(&self) -> f64 {
+        let expected = self.expected + self.most_expected;
+        if expected > 0.0 { (self.squared + self.most_expected) / expected } else { 1.0 }
+    }
+}
+
 /// Pools the neighbours of one pixel. Each neighbour weighs the same whatever its count, so that a region's variance is
 /// not that of its hardest pixels.
 fn pool(
-    evidence: &[PixelEvidence],
+    evidence: &[[PixelEvidence; CHANNELS]],
     guides: &[PixelGuide],
     (x, y): (usize, usize),
     (width, height): (usize, usize),
-) -> Pooled {
+) -> [Pooled; CHANNELS] {
     let center = &guides[y * width + x];
-    let (mut weights, mut variances) = (0.0f64, 0.0f64);
-    let (mut squared, mut expected) = (0.0f64, 0.0f64);
+    let mut weights = 0.0f64;
+    let mut sums = [PoolSums::default(); CHANNELS];
     let rows = (y as i64 - POOL_RADIUS).max(0)..=(y as i64 + POOL_RADIUS).min(height as i64 - 1);
     for ny in rows {
         let columns = (x as i64 - POOL_RADIUS).max(0)..=(x as i64 + POOL_RADIUS).min(width as i64 - 1);
@@ -123,22 +175,58 @@ fn pool(
                 continue;
             }
             let weight = f64::from(likeness(center, &guides[i]));
-            let neighbour = &evidence[i];
             weights += weight;
-            variances += weight * neighbour.variance();
-            squared += weight * neighbour.squared_difference;
-            expected += weight * neighbour.variance() * neighbour.difference_scale;
+            for (sums, neighbour) in sums.iter_mut().zip(&evidence[i]) {
+                sums.variances += weight * neighbour.variance;
+                sums.squared += weight * neighbour.squared_difference;
+                let expected = weight * neighbour.expected_difference;
+                sums.expected += expected;
+                sums.most_expected = sums.most_expected.max(expected);
+            }
         }
     }
-    // A pixel like none of its neighbours has only itself to go by.
     let own = &evidence[y * width + x];
-    let variance = if weights > 0.0 { variances / weights } else { own.variance() };
-    let ratio = |squared: f64, expected: f64| if expected > 0.0 { squared / expected } else { 1.0 };
-    Pooled {
-        variance,
-        factor: ratio(squared, expected).clamp(FACTOR_RANGE.0, FACTOR_RANGE.1),
-        factor_with_own: ratio(squared + own.squared_difference, expected + own.variance_of_mean),
+    std::array::from_fn(|c| {
+        let (sums, own) = (&sums[c], &own[c]);
+        Pooled {
+            // A pixel like none of its neighbours has only itself to go by.
+            variance: if weights > 0.0 { sums.variances / weights } else { own.variance },
+            factor: sums.factor().clamp(FACTOR_RANGE.0, FACTOR_RANGE.1),
+            factor_with_own: match sums.expected + own.expected_difference {
+                0.0 => 1.0,
+                expected => (sums.squared + own.squared_difference) / expected,
+            },
+        }
+    })
+}
+
+/// Pixels that stand out of their surroundings by light that few samples find.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outliers {
+    /// How many.
+    pub pixels: usize,
+    /// Half difference of their halves, over the energy of the picture.
+    pub energy_share: f64,
+}
+
+/// Finds pixels whose halves differ by more than five standard errors of what their neighbours show.
+pub fn find_outliers(film: &Film) -> Outliers {
+    const STANDARD_ERRORS: f64 = 5.0;
+    let statistics = SampleStatistics::of(film, &scene_units(film));
+    let (a, b) = (film.half(Half::A), film.half(Half::B));
+    let (mut pixels, mut excess, mut energy) = (0, 0.0, 0.0);
+    for (i, (a, b)) in a.iter().zip(b).enumerate() {
+        let means = [opponent(a.mean)[0], opponent(b.mean)[0]];
+        energy += 0.5 * (means[0] + means[1]);
+        let half_difference = 0.5 * (means[0] - means[1]).abs();
+        let inverse = |h: &HalfPixel| 1.0 / f64::from(h.samples.max(1));
+        let of_neighbours = f64::from(statistics.luminance().pooled.values()[i]) * 0.25 * (inverse(a) + inverse(b));
+        if half_difference > STANDARD_ERRORS * of_neighbours.sqrt() && half_difference > 0.0 {
+            pixels += 1;
+            excess += half_difference;
+        }
     }
+    Outliers { pixels, energy_share: if energy > 0.0 { excess / energy } else { 0.0 } }
 }
 
 /// How alike two first surfaces are, in [0.02, 1]: never 0, so that a lone pixel still learns something.
@@ -188,13 +276,17 @@ mod tests {
     #[test]
     fn flat_noise_is_estimated_right() {
         let film = film_of(32, 32, 2, |_, u| u);
-        let statistics = SampleStatistics::of(&film);
+        let statistics = SampleStatistics::of(&film, &scene_units(&film));
         let mean = |p: &Plane| p.values().iter().sum::<f32>() / p.values().len() as f32;
-        assert!((mean(&statistics.pooled) * 12.0 - 1.0).abs() < 0.02, "{}", mean(&statistics.pooled) * 12.0);
-        let factor = mean(&statistics.low_discrepancy_factor);
+        assert!(
+            (mean(&statistics.luminance().pooled) * 12.0 - 1.0).abs() < 0.02,
+            "{}",
+            mean(&statistics.luminance().pooled) * 12.0
+        );
+        let factor = mean(&statistics.luminance().low_discrepancy_factor);
         // The clamp at 1.2 cuts the upper half of a ±20 % scatter.
         assert!((factor - 1.0).abs() < 0.1, "{factor}");
-        let excess = mean(&statistics.for_half[0]) / mean(&statistics.pooled);
+        let excess = mean(&statistics.luminance().for_half[0]) / mean(&statistics.luminance().pooled);
         assert!(excess < 1.05, "maximum of pooled and own spends {excess}");
     }
 
@@ -203,10 +295,10 @@ mod tests {
     fn an_isolated_hard_pixel_is_caught() {
         let hard = 16 * 33 + 16;
         let film = film_of(33, 33, 2, |pixel, u| if pixel == hard { u * 10.0 } else { u });
-        let statistics = SampleStatistics::of(&film);
+        let statistics = SampleStatistics::of(&film, &scene_units(&film));
         let at = |p: &Plane| f64::from(p.values()[hard as usize]);
-        assert!(at(&statistics.pooled) < 0.2, "the pool leaves the pixel itself out");
-        assert!(at(&statistics.for_half[0]) > 2.0 && at(&statistics.for_half[1]) > 2.0);
+        assert!(at(&statistics.luminance().pooled) < 0.2, "the pool leaves the pixel itself out");
+        assert!(at(&statistics.luminance().for_half[0]) > 2.0 && at(&statistics.luminance().for_half[1]) > 2.0);
     }
 
     /// A pixel's decision for half A must not change with A's own samples of that pixel.
@@ -222,10 +314,14 @@ mod tests {
         };
         let mut sum = BlockSum::default();
         sum.add(&wild);
-        changed.merge_block(BlockWork { pixel, half: Half::A, level: 1, samples: 1 }, &sum);
-        let before = SampleStatistics::of(&base).for_half[0].values()[pixel as usize];
-        let after = SampleStatistics::of(&changed).for_half[0].values()[pixel as usize];
+        changed.merge_block(BlockWork { samples: 1, ..BlockWork::whole(pixel, Half::A, 1) }, &sum);
+        let before = SampleStatistics::of(&base, &scene_units(&base)).luminance().for_half[0].values()[pixel as usize];
+        let after =
+            SampleStatistics::of(&changed, &scene_units(&changed)).luminance().for_half[0].values()[pixel as usize];
         assert_eq!(before, after);
-        assert!(SampleStatistics::of(&changed).for_half[1].values()[pixel as usize] > before * 100.0);
+        assert!(
+            SampleStatistics::of(&changed, &scene_units(&changed)).luminance().for_half[1].values()[pixel as usize]
+                > before * 100.0
+        );
     }
 }

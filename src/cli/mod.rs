@@ -1,5 +1,7 @@
 //! The command line.
 
+mod bench;
+mod channels;
 mod compare;
 mod console;
 mod info;
@@ -26,6 +28,8 @@ struct CommandLine {
 enum Command {
     /// Render a scene until nothing more can be seen, or until a limit.
     Render(Box<render::RenderArguments>),
+    /// Measure what adaptive sampling saves against uniform sampling and other renderers' rules.
+    Bench(bench::BenchArguments),
     /// Say whether one picture can be told from another by eye: exit status 0 same, 1 visible, 2 error.
     Compare(compare::CompareArguments),
     /// Map how much noise may stay in a picture of any renderer before it is seen.
@@ -41,6 +45,7 @@ enum Command {
 pub(crate) fn run() -> anyhow::Result<ExitCode> {
     match CommandLine::parse().command {
         Command::Render(arguments) => render::run(&arguments)?,
+        Command::Bench(arguments) => bench::run(&arguments)?,
         Command::Compare(arguments) => return compare::run(&arguments),
         Command::Threshold(arguments) => threshold::run(&arguments)?,
         Command::Info { file } => info::run(&file)?,

@@ -5,12 +5,13 @@ use super::report::{Report, summary};
 use super::seeing::{self, parse_positive};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
-use fechner::adaptive::settings::{DEFAULT_MAX_SAMPLES, Limits, LoopSettings, Sampling};
+use fechner::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, RivalRule, Sampling};
 use fechner::adaptive::{self, Rendered};
 use fechner::integrator::{Crop, DEFAULT_MAX_DEPTH, PathTracer, TraceSettings};
 use fechner::output;
 use fechner::sampler::{PixelFilter, Sequence};
 use fechner::scene::{Scene, load};
+use fechner_perception::model::{self, ThresholdModel};
 use fechner_perception::tone;
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -62,6 +63,15 @@ pub(super) struct RenderArguments {
     /// How samples are spread.
     #[arg(long, value_enum, default_value = "adaptive", help_heading = "Sampling")]
     sampling: SamplingChoice,
+    /// Threshold at which --sampling relative and variance stop.
+    #[arg(long, value_name = "X", value_parser = parse_positive, allow_negative_numbers = true, default_value_t = 0.01, help_heading = "Sampling")]
+    noise_threshold: f64,
+    /// How --sampling adaptive finds counts.
+    #[arg(long, value_enum, default_value = "convex", help_heading = "Sampling")]
+    allocation: AllocationChoice,
+    /// Scale samples whose largest channel is above X scene units down to it. Darkens the picture where light is rare.
+    #[arg(long, value_name = "X", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Sampling")]
+    clamp: Option<f64>,
     /// Most scattering events of a path.
     #[arg(long, value_name = "N", help_heading = "Sampling")]
     max_depth: Option<u32>,
@@ -78,6 +88,9 @@ pub(super) struct RenderArguments {
     /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file.
     #[arg(long, value_name = "NAME|FILE", help_heading = "Seeing")]
     display: Option<String>,
+    /// Threshold model that drives the sampling: csf-bands, tvi, ramasubramanian, yee, bolin-meyer.
+    #[arg(long, value_name = "NAME", default_value = "csf-bands", help_heading = "Seeing")]
+    model: String,
     /// Area in deg² over which the eye sums contrast.
     #[arg(long, value_name = "DEG2", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Seeing")]
     csf_area: Option<f64>,
@@ -126,6 +139,21 @@ enum SamplingChoice {
     Adaptive,
     /// The same everywhere.
     Uniform,
+    /// Another renderer's rule, for comparison: difference of two estimates over the square root of brightness (Cycles).
+    Relative,
+    /// For comparison: relative standard error of each pixel.
+    Variance,
+    /// For comparison: a budget (--spp) spread by relative variance of 4×4 pixels (Tungsten).
+    Budget,
+}
+
+/// How the adaptive mode finds counts.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum AllocationChoice {
+    /// The cheapest counts for the visibility pooled over the eye's window.
+    Convex,
+    /// Each pixel by its own threshold.
+    Local,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -220,6 +248,7 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
         height: size.height,
         seed: arguments.seed,
         max_depth: arguments.max_depth.unwrap_or(DEFAULT_MAX_DEPTH),
+        clamp: arguments.clamp.map(|clamp| clamp as f32),
         filter: match arguments.filter {
             FilterChoice::Box => PixelFilter::Box,
             FilterChoice::Gaussian => PixelFilter::Gaussian,
@@ -287,9 +316,16 @@ fn loop_settings(arguments: &RenderArguments, scene: &Scene) -> anyhow::Result<L
     let operator = tone::operator(operator_name, arguments.exposure.or(view.exposure_stops)).with_context(|| {
         format!("there is no tone operator \"{operator_name}\"; known: {}", tone::operator_names().join(", "))
     })?;
+    let threshold = arguments.noise_threshold;
     let sampling = match arguments.sampling {
         SamplingChoice::Adaptive => Sampling::Adaptive,
         SamplingChoice::Uniform => Sampling::Uniform,
+        SamplingChoice::Relative => Sampling::Rival(RivalRule::Relative { threshold }),
+        SamplingChoice::Variance => Sampling::Rival(RivalRule::Variance { threshold }),
+        SamplingChoice::Budget if arguments.spp.is_none() && arguments.time.is_none() => {
+            bail!("--sampling budget has no stop of its own: add --spp or --time")
+        }
+        SamplingChoice::Budget => Sampling::Rival(RivalRule::Budget),
     };
     let asked = arguments.visibility.or(arguments.quality.map(Quality::visibility));
     let visibility = match (asked, sampling) {
@@ -300,6 +336,11 @@ fn loop_settings(arguments: &RenderArguments, scene: &Scene) -> anyhow::Result<L
     };
     Ok(LoopSettings {
         sampling,
+        allocation: match arguments.allocation {
+            AllocationChoice::Convex => AllocationRule::Convex,
+            AllocationChoice::Local => AllocationRule::Local,
+        },
+        model: threshold_model(&arguments.model)?,
         limits: Limits {
             visibility,
             time: arguments.time.map(Duration::from_secs_f64),
@@ -311,6 +352,13 @@ fn loop_settings(arguments: &RenderArguments, scene: &Scene) -> anyhow::Result<L
         nits_per_unit: arguments.nits_per_unit.unwrap_or(scene.nits_per_unit),
         operator,
     })
+}
+
+/// `None` for the default, which the loop itself pools over the eye's window.
+fn threshold_model(name: &str) -> anyhow::Result<Option<Box<dyn ThresholdModel>>> {
+    let found = model::by_name(name)
+        .with_context(|| format!("there is no threshold model \"{name}\"; known: {}", model::names().join(", ")))?;
+    Ok(Some(found).filter(|_| name != model::names()[0]))
 }
 
 /// Refuses a size whose film and maps would not fit into memory.

@@ -1,7 +1,8 @@
 //! The figures of a render, for machines (`--json`, EXR attributes) and in plain words.
 
 use super::console::duration_in_words;
-use fechner::adaptive::settings::{LoopSettings, Sampling};
+use fechner::adaptive::settings::{LoopSettings, RivalRule, Sampling};
+use fechner::adaptive::statistics::find_outliers;
 use fechner::adaptive::{Rendered, StopReason, visible_share};
 use fechner::integrator::PathTracer;
 use fechner::output::Attribute;
@@ -55,6 +56,17 @@ pub(super) struct Report {
     patches_noticed: f64,
     /// Energy of the halves' difference through the eye's filter over the predicted energy; 1 when the prediction holds.
     measured_over_predicted: f64,
+    /// Visible energy of fresh samples against the kept ones in audited tiles, over the predicted; none for small pictures.
+    audit_ratio: Option<f64>,
+    audit_standard_error: Option<f64>,
+    audit_tiles: usize,
+    /// What audits multiplied the variance by.
+    variance_inflation: f64,
+    /// Pixels whose halves differ by more than five standard errors of what their neighbours show: light that few samples
+    /// find (fireflies).
+    outlier_pixels: usize,
+    /// Share of the picture's energy by which they stand out.
+    outlier_energy_share: f64,
     nonfinite_samples: u64,
     peak_memory_bytes: Option<u64>,
     plans: u32,
@@ -72,6 +84,7 @@ impl Report {
         let p99 = quantile(&sorted, 0.99);
         let energy = |p: &Plane| p.values().iter().map(|&v| f64::from(v) * f64::from(v)).sum::<f64>();
         let samples_total = film.total_samples();
+        let outliers = find_outliers(film);
         Self {
             fechner_version: env!("CARGO_PKG_VERSION"),
             scene: scene.display().to_string(),
@@ -81,8 +94,11 @@ impl Report {
             sampling: match settings.sampling {
                 Sampling::Adaptive => "adaptive",
                 Sampling::Uniform => "uniform",
+                Sampling::Rival(RivalRule::Relative { .. }) => "relative",
+                Sampling::Rival(RivalRule::Variance { .. }) => "variance",
+                Sampling::Rival(RivalRule::Budget) => "budget",
             },
-            model: "csf-bands",
+            model: settings.model.as_ref().map_or("csf-bands", |model| model.name()),
             csf: "castle",
             operator: judgement.tone.describe(),
             nits_per_unit: settings.nits_per_unit,
@@ -109,7 +125,14 @@ impl Report {
             fraction_visible: visible_share(judgement, target.unwrap_or(1.0)),
             detection_probability_p99: detection_probability(p99),
             patches_noticed: patches_noticed(&judgement.predicted, display.pixels_per_degree),
-            measured_over_predicted: energy(&judgement.measured) / energy(&judgement.predicted),
+            measured_over_predicted: energy(&judgement.measured_error(settings).visibility)
+                / energy(&judgement.predicted),
+            audit_ratio: rendered.audit.map(|audit| audit.ratio),
+            audit_standard_error: rendered.audit.map(|audit| audit.standard_error),
+            audit_tiles: rendered.audit.map_or(0, |audit| audit.tiles),
+            variance_inflation: rendered.inflation,
+            outlier_pixels: outliers.pixels,
+            outlier_energy_share: outliers.energy_share,
             nonfinite_samples: film.nonfinite_samples,
             peak_memory_bytes: peak_memory_bytes(),
             plans: rendered.plans,
@@ -119,6 +142,7 @@ impl Report {
                 StopReason::Samples => "spp",
                 StopReason::MaxSamples => "max-spp",
                 StopReason::Plans => "plans",
+                StopReason::Rule => "rule",
             },
         }
     }
@@ -166,6 +190,7 @@ pub(super) fn summary(report: &Report, settings: &LoopSettings, rendered: &Rende
             "Stopped although some pixels are above the target: they have the most samples allowed"
         }
         StopReason::Plans => "Stopped after the plans asked for",
+        StopReason::Rule => "Stopped because the rule asked for is satisfied",
     };
     let target = report.visibility_target.map_or_else(
         || format!("{:.2} % of the picture is above visibility 1", 100.0 * report.fraction_visible),
@@ -195,6 +220,19 @@ pub(super) fn summary(report: &Report, settings: &LoopSettings, rendered: &Rende
         "Model-predicted, calibrated on gratings, not on renderings; light paths never sampled are not covered."
             .to_owned(),
     ];
+    if let Some(audit) = rendered.audit {
+        lines.push(format!(
+            "Audit: fresh samples in {} tiles differ from the picture by {:.2} ± {:.2} times the predicted visible energy.",
+            audit.tiles, audit.ratio, audit.standard_error
+        ));
+    }
+    if report.outlier_pixels > 0 {
+        lines.push(format!(
+            "{} pixels hold light that few samples find (fireflies): {:.2} % of the picture's energy. They are kept.",
+            report.outlier_pixels,
+            100.0 * report.outlier_energy_share
+        ));
+    }
     if report.nonfinite_samples > 0 {
         lines.push(format!("{} samples were not finite and are left out.", report.nonfinite_samples));
     }

@@ -9,7 +9,7 @@ pub use estimate::Estimate;
 
 use crate::integrator::{BlockWork, PathSample};
 use crate::sampler::Half;
-use fechner_perception::photometry::luminance;
+use fechner_perception::opponent::OPPONENT_OF_RGB;
 use glam::Vec3;
 
 /// Statistics of one pixel in one half.
@@ -18,20 +18,19 @@ pub struct HalfPixel {
     /// Mean linear RGB radiance in scene units.
     pub mean: [f64; 3],
     /// Sum of squared deviations of luminance and two opponent channels from their means, scene units squared.
-    pub m2: [f32; 3],
+    pub m2: [f32; CHANNELS],
     /// Finite samples in the mean.
     pub samples: u32,
-    /// Doublings taken, counting the pilot as 1; 0 is an empty pixel.
-    pub levels: u8,
+    /// Samples asked for, finite or not: where the pixel's sequence goes on.
+    pub taken: u32,
 }
 
+/// Channels that statistics are kept of: luminance, red–green, yellow–violet.
+pub const CHANNELS: usize = 3;
+
 /// Scene-linear luminance and two opponent channels (red–green, yellow–violet) of an RGB value.
-pub fn opponent(rgb: [f64; 3]) -> [f64; 3] {
-    let [r, g, b] = rgb;
-    let y = f64::from(luminance([1.0, 0.0, 0.0])) * r
-        + f64::from(luminance([0.0, 1.0, 0.0])) * g
-        + f64::from(luminance([0.0, 0.0, 1.0])) * b;
-    [y, 0.5 * (r - g), 0.25 * (r + g) - 0.5 * b]
+pub fn opponent(rgb: [f64; 3]) -> [f64; CHANNELS] {
+    OPPONENT_OF_RGB.map(|row| row[0] * rgb[0] + row[1] * rgb[1] + row[2] * rgb[2])
 }
 
 /// Sum of one block of samples.
@@ -41,7 +40,7 @@ pub struct BlockSum {
     nonfinite: u32,
     rays: u64,
     rgb: [f64; 3],
-    squares: [f64; 3],
+    squares: [f64; CHANNELS],
     albedo: Vec3,
     normal: Vec3,
     depth: f32,
@@ -55,7 +54,7 @@ impl Default for BlockSum {
             nonfinite: 0,
             rays: 0,
             rgb: [0.0; 3],
-            squares: [0.0; 3],
+            squares: [0.0; CHANNELS],
             albedo: Vec3::ZERO,
             normal: Vec3::ZERO,
             depth: 0.0,
@@ -90,23 +89,25 @@ impl BlockSum {
 
 impl HalfPixel {
     /// Adds a block (Chan, Golub and LeVeque 1983).
-    fn merge(&mut self, block: &BlockSum) {
-        self.levels += 1;
+    pub(crate) fn merge(&mut self, block: &BlockSum) {
+        self.taken += block.samples + block.nonfinite;
         if block.samples == 0 {
             return;
         }
         let (old, new) = (f64::from(self.samples), f64::from(block.samples));
         let block_mean = block.rgb.map(|sum| sum / new);
         let block_opponent = opponent(block_mean);
-        let difference: [f64; 3] = {
+        let difference: [f64; CHANNELS] = {
             let own = opponent(self.mean);
             std::array::from_fn(|c| block_opponent[c] - own[c])
         };
-        for c in 0..3 {
+        for c in 0..CHANNELS {
             let block_m2 = (block.squares[c] - new * block_opponent[c] * block_opponent[c]).max(0.0);
             let between = difference[c] * difference[c] * old * new / (old + new);
             self.m2[c] = (f64::from(self.m2[c]) + block_m2 + between) as f32;
-            self.mean[c] += (block_mean[c] - self.mean[c]) * new / (old + new);
+        }
+        for (mean, block) in self.mean.iter_mut().zip(block_mean) {
+            *mean += (block - *mean) * new / (old + new);
         }
         self.samples += block.samples;
     }
@@ -231,7 +232,7 @@ mod tests {
     #[test]
     fn values_that_are_not_finite_are_counted_and_kept_out() {
         let mut film = Film::new(1, 1);
-        let work = BlockWork { pixel: 0, half: Half::A, level: 0, samples: 4 };
+        let work = BlockWork { samples: 4, ..BlockWork::whole(0, Half::A, 0) };
         film.merge_block(work, &sum_of(&[1.0, f32::NAN, f32::INFINITY, 3.0]));
         let pixel = film.half(Half::A)[0];
         assert_eq!((film.nonfinite_samples, pixel.samples, pixel.mean[0]), (2, 2, 2.0));
@@ -244,7 +245,7 @@ mod tests {
     #[test]
     fn merging_is_adding() {
         let values: Vec<f32> = (0..64).map(|i| ((i * 37) % 64) as f32).collect();
-        let work = |level| BlockWork { pixel: 0, half: Half::A, level, samples: 32 };
+        let work = |level| BlockWork::whole(0, Half::A, level);
         let (mut whole, mut parts) = (Film::new(1, 1), Film::new(1, 1));
         whole.merge_block(work(0), &sum_of(&values));
         parts.merge_block(work(0), &sum_of(&values[..17]));

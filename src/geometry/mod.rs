@@ -4,11 +4,14 @@
 //! The trees are obvhs's, behind [`tree::PrimitiveTree`]; the triangle test is ours, because a leak at a shared edge is a
 //! firefly that an adaptive sampler would chase for ever.
 
+mod collapse;
 mod mesh_tree;
+mod simd;
 pub mod sphere;
 pub mod surface;
 pub mod tree;
 pub mod triangle;
+mod wide_tree;
 mod world;
 
 pub use surface::SurfacePoint;

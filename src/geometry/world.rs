@@ -3,8 +3,9 @@
 //! Meshes that are placed once are put into world space and share one tree; meshes that are placed several times have a
 //! tree each, in their own space, and are entered through their instance's transform. Spheres stay analytic.
 
-use super::mesh_tree::{MeshHit, MeshTree, TriangleRef};
+use super::mesh_tree::{MeshHit, MeshTree};
 use super::tree::{BinaryTree, Bounds, PrimitiveTree};
+use super::wide_tree::TriangleRef;
 use super::{Ray, SurfacePoint, sphere};
 use crate::scene::{Alpha, Instance, MaterialId, Motion, ScalarInput, Scene};
 use glam::{Affine3A, Mat3A, Vec2, Vec3, Vec3A};
@@ -177,6 +178,11 @@ impl World {
     /// Triangles that were left out because they have no area.
     pub fn degenerate_triangles(&self) -> usize {
         self.fixed.degenerate + self.shared.iter().map(|t| t.degenerate).sum::<usize>()
+    }
+
+    /// Memory of the trees over triangles in bytes, their copies of the vertices included.
+    pub fn tree_bytes(&self) -> usize {
+        self.fixed.bytes() + self.shared.iter().map(MeshTree::bytes).sum::<usize>()
     }
 
     /// How far from a point new rays must start to clear the rounding of the trees' coordinates and of the point's own:

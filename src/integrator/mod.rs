@@ -34,6 +34,9 @@ pub struct TraceSettings {
     pub max_depth: u32,
     /// Reconstruction filter.
     pub filter: PixelFilter,
+    /// Largest channel of a sample, scene units: brighter samples are scaled down to it, which darkens the picture where
+    /// light is rare. `None` leaves the estimate unbiased.
+    pub clamp: Option<f32>,
     /// How the samples of neighbouring pixels relate.
     pub sequence: Sequence,
     /// The part of the picture that is traced; `None` is all of it. Its samples are those of the whole picture.
@@ -73,14 +76,24 @@ pub struct BlockWork {
     pub half: Half,
     /// Which doubling.
     pub level: u8,
-    /// How many of the block's samples: all of them, or the first few where a budget ends within the block.
+    /// Index in the doubling of the first sample.
+    pub first: u32,
+    /// How many samples: all of the doubling's, or a part where a budget ends or a rule looks within it.
     pub samples: u32,
 }
 
 impl BlockWork {
     /// The whole block: the pilot has [`PILOT_SAMPLES`], and each level doubles the total.
     pub fn whole(pixel: u32, half: Half, level: u8) -> Self {
-        Self { pixel, half, level, samples: 1 << log2_block(level) }
+        Self { pixel, half, level, first: 0, samples: 1 << log2_block(level) }
+    }
+
+    /// What is left of the doubling that a half is in after `taken` samples.
+    pub fn rest(pixel: u32, half: Half, taken: u32) -> Self {
+        let level = if taken < PILOT_SAMPLES { 0 } else { 1 + (taken / PILOT_SAMPLES).ilog2() as u8 };
+        let whole = Self::whole(pixel, half, level);
+        let first = if level == 0 { taken } else { taken - whole.samples };
+        Self { first, samples: whole.samples - first, ..whole }
     }
 }
 
@@ -90,11 +103,6 @@ pub const PILOT_SAMPLES: u32 = 8;
 /// log₂ of the samples of a level's whole block.
 fn log2_block(level: u8) -> u8 {
     PILOT_SAMPLES.ilog2() as u8 + level.saturating_sub(1)
-}
-
-/// Samples that a half has after a level.
-pub fn samples_through(level: u8) -> u64 {
-    u64::from(PILOT_SAMPLES) << level
 }
 
 /// What to trace next. Plain data: deciding it and doing it are two things.
@@ -144,9 +152,20 @@ impl PathTracer {
         &self.world
     }
 
-    /// Takes the samples of a plan into the film, in parallel, with the same result for any number of threads: each
-    /// block is summed by one thread, and blocks are merged in the plan's order.
+    /// Takes the samples of a plan into the film, in parallel, with the same result for any number of threads.
     pub fn trace(&self, plan: &SamplePlan, film: &mut Film, progress: &(dyn Fn(u64) + Sync)) {
+        self.trace_into(plan, self.settings.seed, &mut |work, sum| film.merge_block(work, sum), progress);
+    }
+
+    /// Hands the sums of a plan's blocks, sampled by `seed`, to `merge`: each block is summed by one thread, and blocks
+    /// come in the plan's order.
+    pub fn trace_into(
+        &self,
+        plan: &SamplePlan,
+        seed: u64,
+        merge: &mut dyn FnMut(BlockWork, &BlockSum),
+        progress: &(dyn Fn(u64) + Sync),
+    ) {
         // Batches bound the memory of unmerged blocks; chunks of near equal work keep both ends of a batch busy.
         const BLOCKS_PER_BATCH: usize = 1 << 16;
         const SAMPLES_PER_CHUNK: u64 = 2_048;
@@ -164,23 +183,23 @@ impl PathTracer {
                 .par_iter()
                 .with_max_len(1)
                 .map(|chunk| {
-                    let sums = chunk.iter().map(|&block| self.trace_block(block)).collect();
+                    let sums = chunk.iter().map(|&block| self.trace_block(block, seed)).collect();
                     progress(chunk.iter().map(|b| u64::from(b.samples)).sum());
                     sums
                 })
                 .collect();
             for (block, sum) in batch.iter().zip(sums.iter().flatten()) {
-                film.merge_block(*block, sum);
+                merge(*block, sum);
             }
         }
     }
 
     /// Sums one block of one pixel.
-    fn trace_block(&self, block: BlockWork) -> BlockSum {
+    fn trace_block(&self, block: BlockWork, seed: u64) -> BlockSum {
         let area = self.settings.film_area();
         let pixel = Pixel { x: area.x + block.pixel % area.width, y: area.y + block.pixel / area.width };
         let key = BlockKey {
-            seed: self.settings.seed,
+            seed,
             pixel,
             half: block.half,
             level: block.level,
@@ -189,7 +208,7 @@ impl PathTracer {
         };
         let center = Vec2::new(pixel.x as f32, pixel.y as f32) + 0.5;
         let mut sum = BlockSum::default();
-        for sample in key.samples(block.samples) {
+        for sample in key.samples(block.first + block.samples).skip(block.first as usize) {
             let [x, y, lens_u, lens_v] = sample.draw(Purpose::Camera);
             let filtered = self.settings.filter.sample(x, y);
             let ray = self.camera.ray(&CameraSample {
@@ -197,7 +216,10 @@ impl PathTracer {
                 lens: [lens_u, lens_v],
                 time: if self.moves { sample.draw(Purpose::Time)[0] } else { 0.0 },
             });
-            let path = self.trace_path(ray, sample);
+            let mut path = self.trace_path(ray, sample);
+            if let Some(clamp) = self.settings.clamp {
+                path.radiance *= (clamp / path.radiance.max_element().max(clamp)).min(1.0);
+            }
             sum.add(&PathSample { radiance: path.radiance * filtered.weight, ..path });
         }
         sum

@@ -2,6 +2,7 @@
 
 use super::{Attribute, NITS_PER_UNIT, OutputError, Picture, write_exr, write_png};
 use crate::adaptive::Rendered;
+use crate::adaptive::statistics::picture_variance;
 use crate::film::{Film, PixelGuide};
 use crate::sampler::Half;
 use std::path::Path;
@@ -39,8 +40,9 @@ pub fn write_layers_exr(
     picture.push_f32("depth.Z", guide(&|g| g.depth));
     picture.push_u32("id.Y", film.guides().iter().map(|g| g.object_id).collect::<Vec<u32>>());
     picture.push_u32("samples.Y", sample_counts(film));
-    picture.push_f32("variance.Y", judgement.variance_of_mean.values());
-    let threshold = judgement.thresholds.allowed_standard_error_cd_m2(1.0);
+    let variance = picture_variance(film, nits_per_unit);
+    picture.push_f32("variance.Y", variance.values());
+    let threshold = judgement.allowed_standard_error_cd_m2();
     picture.push_f32("threshold.Y", threshold.values());
     picture.push_f32("visibility.Y", judgement.predicted.values());
     picture.push_attribute(NITS_PER_UNIT, Attribute::Float(nits_per_unit as f32));

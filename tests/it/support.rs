@@ -1,6 +1,6 @@
 //! Scenes made in code, and rendering them.
 
-use fechner::adaptive::settings::{DEFAULT_MAX_SAMPLES, Limits, LoopSettings, Sampling};
+use fechner::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, Sampling};
 use fechner::integrator::{PathTracer, TraceSettings};
 use fechner::sampler::{BlockKey, Half, Pixel, PixelFilter, Purpose, Sequence};
 use fechner::scene::{
@@ -83,6 +83,7 @@ pub(crate) fn trace_settings(width: u32, height: u32, seed: u64) -> TraceSetting
         filter: PixelFilter::Box,
         sequence: Sequence::PerPixel,
         crop: None,
+        clamp: None,
     }
 }
 
@@ -115,6 +116,8 @@ pub(crate) fn radiance_along(
 pub(crate) fn loop_settings(nits_per_unit: f64, sampling: Sampling, visibility: f64, spp: Option<u32>) -> LoopSettings {
     LoopSettings {
         sampling,
+        allocation: AllocationRule::default(),
+        model: None,
         limits: Limits { visibility, time: None, mean_samples: spp, max_samples: DEFAULT_MAX_SAMPLES, plans: None },
         viewing: Viewing::of(Display::preset("desktop").expect("a preset")),
         nits_per_unit,

@@ -33,8 +33,8 @@ mod pbrt;
 mod ply;
 mod polygon;
 pub mod shapes;
-mod spectrum;
 pub mod sky;
+mod spectrum;
 #[path = "texture.rs"]
 mod texture;
 mod toml;

@@ -8,7 +8,8 @@ use super::error::LoadError;
 use super::files;
 use super::texture::{Adjust, IfMissing, Picture, Request};
 use crate::scene::{
-    Alpha, ColorInput, Encoding, Material, MaterialId, MetalRoughness, Roughness, ScalarInput, Surface, TextureLookup, Wrap,
+    Alpha, ColorInput, Encoding, Material, MaterialId, MetalRoughness, Roughness, ScalarInput, Surface, TextureLookup,
+    Wrap,
 };
 use glam::{Vec2, Vec3};
 use std::collections::HashMap;

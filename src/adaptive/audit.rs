@@ -1,0 +1,159 @@
+//! Whether the stopped picture is as noisy as the loop thinks.
+//!
+//! On a stratified 2 % of tiles, as many fresh samples as the tile has are taken and thrown away. What can be seen of the
+//! difference between fresh and kept, over what the variance predicts, is the audit's ratio: 1 if the variance is right,
+//! above 1 where light was found that the stopping samples had missed.
+
+use super::judge::{Judgement, variance_share};
+use super::settings::LoopSettings;
+use crate::film::{Film, HalfPixel, opponent};
+use crate::integrator::{BlockWork, PathTracer, SamplePlan};
+use crate::sampler::{Half, hash_words};
+use fechner_perception::{Plane, seen};
+
+/// Side of a tile, pixels. The noise of independent pixels, most of whose visible energy lies above 2 cycles a degree, is
+/// judged as well in small tiles, and there are more of them.
+const TILE: usize = 16;
+/// Tiles of which one is audited.
+const STRATUM: usize = 50;
+/// Keeps audits' random numbers apart from the picture's.
+const AUDIT_STREAM: u64 = 0x0041_5544_4954;
+
+/// What an audit found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Audit {
+    /// Tiles that were sampled again.
+    pub tiles: usize,
+    /// Samples that it took.
+    pub samples: u64,
+    /// Visible energy of fresh less kept, over what was predicted.
+    pub ratio: f64,
+    /// Standard error of the ratio, from the scatter between tiles; infinite where nothing was predicted.
+    pub standard_error: f64,
+}
+
+impl Audit {
+    /// Whether the variance is too low, at one-sided 95 %, by more than a tenth.
+    pub fn disagrees(&self) -> bool {
+        self.ratio - 1.645 * self.standard_error > 1.1
+    }
+}
+
+/// Audits a film. `None` for pictures of fewer than 75 tiles, of which 2 % are a single one.
+pub fn audit(
+    tracer: &PathTracer,
+    film: &Film,
+    judgement: &Judgement,
+    settings: &LoopSettings,
+    round: u32,
+) -> Option<Audit> {
+    let tiles = choose_tiles(film, round);
+    if tiles.len() < 2 {
+        return None;
+    }
+    let width = film.width() as usize;
+    let pixels: Vec<usize> = tiles.iter().flat_map(|tile| tile.pixels(width)).collect();
+    let plan = repetition(film, &pixels);
+    let seed = hash_words(tracer.settings().seed, AUDIT_STREAM + u64::from(round));
+    let mut fresh = vec![[HalfPixel::default(); 2]; pixels.len()];
+    // Blocks come in the order of `pixels`.
+    let mut place = 0;
+    tracer.trace_into(
+        &plan,
+        seed,
+        &mut |work, sum| {
+            while pixels[place] != work.pixel as usize {
+                place += 1;
+            }
+            fresh[place][work.half.index()].merge(sum);
+        },
+        &|_| {},
+    );
+
+    let nits = settings.nits_per_unit;
+    let mut difference = Plane::filled(width, film.height() as usize, 0.0);
+    let mut variance = Plane::filled(width, film.height() as usize, 0.0);
+    for (&pixel, halves) in pixels.iter().zip(&fresh) {
+        let kept: f64 = Half::BOTH.iter().map(|&h| 0.5 * opponent(film.half(h)[pixel].mean)[0]).sum();
+        let again: f64 = halves.iter().map(|half| 0.5 * opponent(half.mean)[0]).sum();
+        // Fresh less kept has twice the variance of one of them.
+        difference.values_mut()[pixel] = (nits * (again - kept) / std::f64::consts::SQRT_2) as f32;
+        let per_sample = f64::from(judgement.pooled_variance_per_sample.values()[pixel]);
+        variance.values_mut()[pixel] = (per_sample * variance_share(film, pixel)) as f32;
+    }
+    let displayed = seen::display_half_difference(
+        judgement.tone.as_ref(),
+        &settings.viewing.display,
+        &judgement.estimate.luminance_cd_m2,
+        &difference,
+    );
+    let found = judgement.thresholds.measured_visibility(&displayed);
+    let predicted = judgement.thresholds.predicted_visibility(&variance);
+    let energies = tiles.iter().map(|tile| (tile.energy(&found), tile.energy(&predicted))).collect::<Vec<_>>();
+    let (ratio, standard_error) = ratio_of_sums(&energies);
+    Some(Audit { tiles: tiles.len(), samples: plan.samples(), ratio, standard_error })
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Tile {
+    left: usize,
+    top: usize,
+}
+
+impl Tile {
+    fn pixels(self, width: usize) -> impl Iterator<Item = usize> {
+        (self.top..self.top + TILE).flat_map(move |y| (self.left..self.left + TILE).map(move |x| y * width + x))
+    }
+
+    /// Σ v² of the tile and, since the eye's window spreads it, of half a tile around.
+    fn energy(self, visibility: &Plane) -> f64 {
+        let rows = self.top.saturating_sub(TILE / 2)..(self.top + 3 * TILE / 2).min(visibility.height());
+        let columns = self.left.saturating_sub(TILE / 2)..(self.left + 3 * TILE / 2).min(visibility.width());
+        let squared = |x: usize, y: usize| f64::from(visibility.get(x, y)).powi(2);
+        rows.flat_map(|y| columns.clone().map(move |x| (x, y))).map(|(x, y)| squared(x, y)).sum()
+    }
+}
+
+/// One tile of every stratum of 50 in reading order, chosen by chance.
+fn choose_tiles(film: &Film, round: u32) -> Vec<Tile> {
+    let columns = film.width() as usize / TILE;
+    let tiles = columns * (film.height() as usize / TILE);
+    let strata = (tiles + STRATUM / 2) / STRATUM;
+    let chosen = |stratum: usize| {
+        let (start, end) = (stratum * tiles / strata, (stratum + 1) * tiles / strata);
+        let index = start + hash_words(u64::from(round), stratum as u64) as usize % (end - start);
+        Tile { left: index % columns * TILE, top: index / columns * TILE }
+    };
+    (0..strata).map(chosen).collect()
+}
+
+/// The same samples again.
+fn repetition(film: &Film, pixels: &[usize]) -> SamplePlan {
+    let mut plan = SamplePlan::default();
+    for &pixel in pixels {
+        for half in Half::BOTH {
+            let mut taken = 0;
+            while taken < film.half(half)[pixel].taken {
+                let rest = BlockWork::rest(pixel as u32, half, taken);
+                let samples = rest.samples.min(film.half(half)[pixel].taken - taken);
+                plan.blocks.push(BlockWork { samples, ..rest });
+                taken += samples;
+            }
+        }
+    }
+    plan
+}
+
+/// Σ found / Σ predicted and its standard error (the usual ratio estimator's).
+fn ratio_of_sums(energies: &[(f64, f64)]) -> (f64, f64) {
+    let found: f64 = energies.iter().map(|e| e.0).sum();
+    let predicted: f64 = energies.iter().map(|e| e.1).sum();
+    let n = energies.len() as f64;
+    if predicted <= 0.0 {
+        return (1.0, f64::INFINITY);
+    }
+    let ratio = found / predicted;
+    let scatter: f64 = energies.iter().map(|(found, predicted)| (found - ratio * predicted).powi(2)).sum();
+    let standard_error = if n > 1.0 { (scatter * n / (n - 1.0)).sqrt() / predicted } else { f64::INFINITY };
+    (ratio, standard_error)
+}

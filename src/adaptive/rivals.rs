@@ -1,0 +1,242 @@
+//! The rules of today's renderers, on the same tracer and sampler, for comparison.
+//!
+//! They look at every [`STEP`] samples, as Cycles does, and know neither display nor eye: `exposure` is all that they are
+//! told. Not for use: each has a knob without a unit, and stops dark regions and fireflies early.
+
+use super::settings::RivalRule;
+use crate::film::{Film, HalfPixel, opponent};
+use crate::integrator::{BlockWork, SamplePlan};
+use crate::sampler::{Half, hash_words};
+
+/// Samples between two looks, both halves together.
+const STEP: u32 = 16;
+/// Cycles multiplies its threshold by this.
+const RELATIVE_SCALE: f64 = 5.0;
+/// Side of the square of pixels whose samples Tungsten pools.
+const RECORD_SIDE: usize = 4;
+/// Tungsten's least squared mean to divide by.
+const LEAST_SQUARED_MEAN: f64 = 1e-3;
+
+/// The next samples by a rule; empty when the rule would stop. `exposure` turns scene units into shares of display white;
+/// `mean_samples` ends a budget.
+pub fn rival_plan(
+    rule: RivalRule,
+    film: &Film,
+    exposure: f64,
+    mean_samples: Option<u32>,
+    max_samples: u32,
+) -> SamplePlan {
+    match rule {
+        RivalRule::Relative { threshold } => step_where(film, max_samples, &relative_active(film, threshold, exposure)),
+        RivalRule::Variance { threshold } => step_where(film, max_samples, &variance_active(film, threshold, exposure)),
+        RivalRule::Budget => budget_pass(film, exposure, mean_samples.unwrap_or(u32::MAX), max_samples),
+    }
+}
+
+/// Takes `samples` of a pixel, half of them in each half, through as many doublings as they reach.
+fn push_samples(plan: &mut SamplePlan, film: &Film, pixel: usize, samples: u32) {
+    for half in Half::BOTH {
+        let mut left = (samples + 1 - half.index() as u32) / 2;
+        let mut taken = film.half(half)[pixel].taken;
+        while left > 0 {
+            let rest = BlockWork::rest(pixel as u32, half, taken);
+            let block = BlockWork { samples: rest.samples.min(left), ..rest };
+            plan.blocks.push(block);
+            taken += block.samples;
+            left -= block.samples;
+        }
+    }
+}
+
+fn step_where(film: &Film, max_samples: u32, active: &[bool]) -> SamplePlan {
+    let mut plan = SamplePlan::default();
+    for (pixel, _) in active.iter().enumerate().filter(|(_, active)| **active) {
+        if film.samples(pixel) + STEP <= max_samples {
+            push_samples(&mut plan, film, pixel, STEP);
+        }
+    }
+    plan
+}
+
+/// Cycles' test: |I − A| summed over RGB, over S where the RGB sum S is at least 1 and over √S below, with its least count
+/// of max(4, ⌈16 / threshold^0.3⌉) samples and its 3×3 dilation.
+fn relative_active(film: &Film, threshold: f64, exposure: f64) -> Vec<bool> {
+    let least = (16.0 / threshold.powf(0.3)).ceil().max(4.0);
+    let (a, b) = (film.half(Half::A), film.half(Half::B));
+    let fails = |i: usize| {
+        let error: f64 = a[i].mean.iter().zip(b[i].mean).map(|(a, b)| 0.5 * (a - b).abs() * exposure).sum();
+        let sum: f64 = a[i].mean.iter().zip(b[i].mean).map(|(a, b)| 0.5 * (a + b) * exposure).sum();
+        let norm = if sum < 1.0 { sum.max(0.0).sqrt() } else { sum };
+        f64::from(film.samples(i)) < least || error > threshold * RELATIVE_SCALE * (1e-4 + norm)
+    };
+    dilated(&(0..a.len()).map(fails).collect::<Vec<_>>(), film.width() as usize)
+}
+
+fn dilated(mask: &[bool], width: usize) -> Vec<bool> {
+    let height = mask.len() / width;
+    let any_near = |i: usize| {
+        let (x, y) = (i % width, i / width);
+        (y.saturating_sub(1)..(y + 2).min(height))
+            .any(|v| (x.saturating_sub(1)..(x + 2).min(width)).any(|u| mask[v * width + u]))
+    };
+    (0..mask.len()).map(any_near).collect()
+}
+
+/// Relative standard error of the pixel by its own samples.
+fn variance_active(film: &Film, threshold: f64, exposure: f64) -> Vec<bool> {
+    let (a, b) = (film.half(Half::A), film.half(Half::B));
+    let variance_of_mean = |half: &HalfPixel| half.sample_variance(0) / f64::from(half.samples.max(1));
+    (0..a.len())
+        .map(|i| {
+            let standard_error = (0.25 * (variance_of_mean(&a[i]) + variance_of_mean(&b[i]))).sqrt();
+            let mean = 0.5 * (opponent(a[i].mean)[0] + opponent(b[i].mean)[0]);
+            standard_error > threshold * mean.max(1e-3 / exposure)
+        })
+        .collect()
+}
+
+/// One pass of Tungsten's: as many samples as 16 a pixel, one everywhere and the others in proportion to each record's
+/// error, which is clamped at its 95th percentile and dilated; fractions are rounded by chance.
+fn budget_pass(film: &Film, exposure: f64, mean_samples: u32, max_samples: u32) -> SamplePlan {
+    let pixels = film.width() as usize * film.height() as usize;
+    let left = (u64::from(mean_samples) * pixels as u64).saturating_sub(film.total_samples());
+    let pass = left.min(u64::from(STEP) * pixels as u64);
+    let mut plan = SamplePlan::default();
+    if pass < pixels as u64 {
+        return plan;
+    }
+    let errors = record_errors(film, exposure);
+    let total: f64 = errors.iter().sum();
+    let spread = (pass - pixels as u64) as f64;
+    for (pixel, error) in errors.iter().enumerate() {
+        let share = if total > 0.0 { error / total } else { 1.0 / pixels as f64 };
+        let random = (hash_words(film.total_samples(), pixel as u64) >> 11) as f64 / (1u64 << 53) as f64;
+        let samples = 1 + (spread * share + random) as u32;
+        push_samples(&mut plan, film, pixel, samples.min(max_samples.saturating_sub(film.samples(pixel))));
+    }
+    plan
+}
+
+/// Error of each pixel's record.
+fn record_errors(film: &Film, exposure: f64) -> Vec<f64> {
+    let (width, height) = (film.width() as usize, film.height() as usize);
+    let (columns, rows) = (width.div_ceil(RECORD_SIDE), height.div_ceil(RECORD_SIDE));
+    let records: Vec<f64> = (0..columns * rows)
+        .map(|r| {
+            let (left, top) = (r % columns * RECORD_SIDE, r / columns * RECORD_SIDE);
+            let pixels = (top..(top + RECORD_SIDE).min(height))
+                .flat_map(|y| (left..(left + RECORD_SIDE).min(width)).map(move |x| y * width + x));
+            record_error(film, pixels, exposure)
+        })
+        .collect();
+    let mut sorted = records.clone();
+    sorted.sort_by(f64::total_cmp);
+    let clamp = sorted[(0.95 * (sorted.len() - 1) as f64) as usize];
+    let dilated = |r: usize| {
+        let (x, y) = (r % columns, r / columns);
+        (y.saturating_sub(1)..(y + 2).min(rows))
+            .flat_map(|v| (x.saturating_sub(1)..(x + 2).min(columns)).map(move |u| v * columns + u))
+            .map(|near| records[near].min(clamp))
+            .fold(0.0, f64::max)
+    };
+    let spread: Vec<f64> = (0..records.len()).map(dilated).collect();
+    (0..width * height).map(|i| spread[i / width / RECORD_SIDE * columns + i % width / RECORD_SIDE]).collect()
+}
+
+/// Variance of all samples in a record over their number and squared mean.
+fn record_error(film: &Film, pixels: impl Iterator<Item = usize>, exposure: f64) -> f64 {
+    let (mut count, mut sum, mut squares) = (0.0, 0.0, 0.0);
+    for pixel in pixels {
+        for half in Half::BOTH {
+            let of_half = &film.half(half)[pixel];
+            let (n, mean) = (f64::from(of_half.samples), opponent(of_half.mean)[0] * exposure);
+            count += n;
+            sum += n * mean;
+            squares += f64::from(of_half.m2[0]) * exposure * exposure + n * mean * mean;
+        }
+    }
+    if count < 2.0 {
+        return 0.0;
+    }
+    let mean = sum / count;
+    let variance = ((squares - count * mean * mean) / (count - 1.0)).max(0.0);
+    variance / (count * (mean * mean).max(LEAST_SQUARED_MEAN))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::adaptive::plan::pilot_plan;
+    use crate::film::BlockSum;
+    use crate::integrator::{FirstHit, PathSample};
+    use glam::Vec3;
+
+    /// A film whose left half is noise of standard deviation `noise` about 0.5, and whose right half is flat.
+    fn film(noise: f32) -> Film {
+        let mut film = Film::new(32, 16);
+        for block in pilot_plan(32 * 16, 16).blocks {
+            extend(&mut film, block, noise);
+        }
+        film
+    }
+
+    fn extend(film: &mut Film, block: BlockWork, noise: f32) {
+        let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1 };
+        let mut sum = BlockSum::default();
+        for index in block.first..block.first + block.samples {
+            let key = u64::from(block.pixel) << 32 | u64::from(block.level) << 24 | u64::from(index);
+            let u = (hash_words(key, block.half.index() as u64) >> 40) as f32 / 16_777_216.0 - 0.5;
+            let value = if block.pixel % 32 < 16 { 0.5 + noise * u * 12f32.sqrt() } else { 0.5 };
+            sum.add(&PathSample { radiance: Vec3::splat(value), first_hit, rays: 1 });
+        }
+        film.merge_block(block, &sum);
+    }
+
+    /// Each rule spends on the noisy half alone (but for the least counts), and stops.
+    #[test]
+    fn rules_spend_where_the_noise_is_and_stop() {
+        for rule in [RivalRule::Relative { threshold: 0.01 }, RivalRule::Variance { threshold: 0.02 }] {
+            let mut film = film(0.3);
+            loop {
+                let plan = rival_plan(rule, &film, 1.0, None, 1 << 16);
+                if plan.blocks.is_empty() {
+                    break;
+                }
+                for block in plan.blocks {
+                    extend(&mut film, block, 0.3);
+                }
+            }
+            let mean = |columns: std::ops::Range<usize>| {
+                let count = columns.len() as f64 * 16.0;
+                (0..16)
+                    .flat_map(|y| columns.clone().map(move |x| y * 32 + x))
+                    .map(|i| f64::from(film.samples(i)))
+                    .sum::<f64>()
+                    / count
+            };
+            let (noisy, flat) = (mean(0..15), mean(18..32));
+            assert!(noisy > 2.0 * flat, "{rule:?}: {noisy} and {flat} samples");
+            if let RivalRule::Variance { threshold } = rule {
+                let right = (0.3 / 0.5 / threshold).powi(2);
+                assert!((noisy / right - 1.0).abs() < 0.1, "{noisy} samples, not {right}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_budget_is_spent_and_no_more() {
+        let mut film = film(0.3);
+        for _ in 0..100 {
+            let plan = rival_plan(RivalRule::Budget, &film, 1.0, Some(128), 1 << 16);
+            if plan.blocks.is_empty() {
+                break;
+            }
+            for block in plan.blocks {
+                extend(&mut film, block, 0.3);
+            }
+        }
+        let mean = film.total_samples() as f64 / 512.0;
+        assert!((126.0..=129.0).contains(&mean), "{mean} samples a pixel");
+        assert!(film.samples(5 * 32 + 5) > 3 * film.samples(5 * 32 + 28));
+    }
+}

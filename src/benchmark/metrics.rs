@@ -1,0 +1,69 @@
+//! Metrics that no arm optimises: FLIP, ColorVideoVDP, relative mean squared error.
+
+use super::Subject;
+use super::truth::Truth;
+use anyhow::{Context, Result};
+use colorvideovdp::{Color, Cvvdp, DisplayModel, Execution, Geometry, Image, Options, Photometry};
+use fechner_perception::Eotf;
+use flip_rs::{RgbImage, Weighting, ldr_flip};
+
+/// How far a picture is from the reference by other people's measures.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Metrics {
+    /// Mean of LDR-FLIP.
+    pub(crate) flip_mean: f64,
+    /// Its 99th percentile.
+    pub(crate) flip_p99: f64,
+    /// ColorVideoVDP's just-objectionable differences, at most 10.
+    pub(crate) jod: f64,
+    /// Mean of squared error over squared reference, on displayed light.
+    pub(crate) relmse: f64,
+}
+
+/// Measures a displayed picture (linear RGB, 0..1).
+pub(crate) fn measure(subject: &Subject, truth: &Truth, picture: &[[f32; 3]]) -> Result<Metrics> {
+    let (width, height) = (subject.size.0 as usize, subject.size.1 as usize);
+    let display = &subject.viewing.display;
+    let encoded = |picture: &[[f32; 3]]| {
+        let code = |&light: &f32| Eotf::Srgb.encode(f64::from(light), display.white_cd_m2) as f32;
+        picture.iter().flatten().map(code).collect::<Vec<f32>>()
+    };
+    let flip = ldr_flip(
+        &RgbImage::new(width, height, encoded(&truth.picture))?,
+        &RgbImage::new(width, height, encoded(picture))?,
+        display.pixels_per_degree as f32,
+    )?;
+    let image = |picture: &[[f32; 3]]| {
+        let light = truth.display_cd_m2(picture).into_iter().flatten().collect();
+        Image::new(width, height, 3, light)
+    };
+    let contrast = display.white_cd_m2 / display.black_cd_m2.max(display.white_cd_m2 * 1e-6);
+    let model = DisplayModel::new(
+        "fechner",
+        Photometry::new(display.white_cd_m2, contrast, 0.0, 0.0, 1.0)?,
+        Geometry::from_ppd([width, height], display.pixels_per_degree)?,
+        "BT.709-linear",
+    )?;
+    let metric = Cvvdp::new(model, Options::default().with_execution(Execution::SingleThread))?;
+    let prediction = metric
+        .predict_image(&image(picture)?, &image(&truth.picture)?, Color::Linear)
+        .context("ColorVideoVDP refuses the pictures")?;
+    Ok(Metrics {
+        flip_mean: f64::from(flip.statistics().mean),
+        flip_p99: f64::from(flip.percentile(0.99, Weighting::Unweighted)?),
+        jod: f64::from(prediction.jod),
+        relmse: relative_mean_squared_error(&truth.picture, picture),
+    })
+}
+
+/// Mean of (test − reference)² / (reference² + 0.01²).
+fn relative_mean_squared_error(reference: &[[f32; 3]], test: &[[f32; 3]]) -> f64 {
+    let terms = reference.iter().flatten().zip(test.iter().flatten());
+    let sum: f64 = terms
+        .map(|(&reference, &test)| {
+            let (reference, test) = (f64::from(reference), f64::from(test));
+            (test - reference).powi(2) / (reference * reference + 1e-4)
+        })
+        .sum();
+    sum / (3 * reference.len()) as f64
+}

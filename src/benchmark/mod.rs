@@ -1,0 +1,193 @@
+//! What adaptive sampling saves: arms on the same tracer, judged against a reference and an oracle.
+//!
+//! [`run`] renders every arm of every scene with several seeds and writes `results.json`, `results.csv` and
+//! `report.html`. Truth is √2 × the local RMS (Gaussian of σ 0.25°) of the error through the eye's filters, in all three
+//! opponent channels, the reference's own noise taken out; it is never a pointwise difference and never what an arm itself
+//! predicts. Finished renders are kept in the output folder, so that a run that was broken off goes on.
+//!
+//! Not for timing the tracer: see `benches/`.
+
+mod arm;
+mod metrics;
+mod oracle;
+mod pictures;
+mod record;
+mod reference;
+mod report;
+mod runner;
+mod summary;
+mod truth;
+
+pub use arm::Arm;
+pub use record::{Record, Results};
+
+use crate::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, Sampling};
+use crate::integrator::{DEFAULT_MAX_DEPTH, PathTracer, TraceSettings};
+use crate::sampler::{PixelFilter, Sequence};
+use crate::scene::Scene;
+use crate::scene::load::{LoadOptions, load};
+use anyhow::{Context, Result};
+use fechner_perception::display::{Display, Viewing};
+use fechner_perception::tone;
+use oracle::{displayed_variance, least_samples, uniform_samples};
+use reference::Reference;
+use runner::ArmRunner;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use truth::Truth;
+
+/// What to run.
+#[derive(Clone, Debug)]
+pub struct BenchSettings {
+    /// Scene files.
+    pub scenes: Vec<PathBuf>,
+    /// Width and height in pixels.
+    pub size: (u32, u32),
+    /// Visibility v\* that every arm has to reach.
+    pub visibility: f64,
+    /// Arms, the uniform one first.
+    pub arms: Vec<Arm>,
+    /// Renders of each arm.
+    pub seeds: u32,
+    /// Samples of the reference, as a multiple of what uniform sampling needs for v\* on 99 %.
+    pub reference_factor: f64,
+    /// Display preset.
+    pub display: String,
+    /// Folder of results; made if need be.
+    pub output: PathBuf,
+}
+
+/// Shares of the picture that have to be below v\*.
+pub const COVERAGES: [f64; 3] = [0.95, 0.99, 0.999];
+
+/// One scene, ready to be rendered by any arm.
+pub(crate) struct Subject {
+    /// File name without its ending.
+    pub(crate) name: String,
+    pub(crate) scene: Arc<Scene>,
+    pub(crate) size: (u32, u32),
+    pub(crate) viewing: Viewing,
+    pub(crate) visibility: f64,
+}
+
+impl Subject {
+    fn load(path: &Path, settings: &BenchSettings) -> Result<Self> {
+        let scene = load(path, &LoadOptions::default())?;
+        let display = Display::preset(&settings.display)
+            .with_context(|| format!("there is no display \"{}\"", settings.display))?;
+        let name = path.file_stem().map_or_else(|| scene.name.clone(), |stem| stem.to_string_lossy().into_owned());
+        Ok(Self {
+            name,
+            scene: Arc::new(scene),
+            size: settings.size,
+            viewing: Viewing::of(display),
+            visibility: settings.visibility,
+        })
+    }
+
+    pub(crate) fn tracer(&self, seed: u64) -> PathTracer {
+        let settings = TraceSettings {
+            width: self.size.0,
+            height: self.size.1,
+            seed,
+            max_depth: DEFAULT_MAX_DEPTH,
+            filter: PixelFilter::Gaussian,
+            clamp: None,
+            sequence: Sequence::PerPixel,
+            crop: None,
+        };
+        PathTracer::new(Arc::clone(&self.scene), settings)
+    }
+
+    /// Settings of the default loop, to be changed by an arm.
+    pub(crate) fn loop_settings(&self) -> Result<LoopSettings> {
+        Ok(LoopSettings {
+            sampling: Sampling::Adaptive,
+            allocation: AllocationRule::Convex,
+            model: None,
+            limits: Limits {
+                visibility: self.visibility,
+                time: None,
+                mean_samples: None,
+                max_samples: DEFAULT_MAX_SAMPLES,
+                plans: None,
+            },
+            viewing: self.viewing.clone(),
+            nits_per_unit: self.scene.nits_per_unit,
+            operator: tone::operator("constant", None).context("an operator")?,
+        })
+    }
+
+    pub(crate) fn pixels(&self) -> f64 {
+        f64::from(self.size.0) * f64::from(self.size.1)
+    }
+}
+
+/// What converged variances say that a scene needs, before anything is tried: what no rule can beat.
+#[derive(Clone, Debug)]
+pub struct Bound {
+    /// Scene.
+    pub scene: String,
+    /// Share of the picture that has to be at v\*.
+    pub coverage: f64,
+    /// Samples a pixel of uniform sampling.
+    pub uniform: f64,
+    /// Mean samples a pixel of the cheapest counts.
+    pub optimum: f64,
+}
+
+/// Bounds of every scene and coverage; renders nothing but the references.
+///
+/// # Errors
+/// As [`run`].
+pub fn bounds(settings: &BenchSettings, say: &dyn Fn(&str)) -> Result<Vec<Bound>> {
+    make_folders(settings)?;
+    let mut bounds = Vec::new();
+    for path in &settings.scenes {
+        let subject = Subject::load(path, settings)?;
+        let reference = Reference::cached(&subject, settings, say)?;
+        let truth = Truth::new(&subject, &reference)?;
+        let variance = displayed_variance(&subject, &reference, &truth)?;
+        for coverage in COVERAGES {
+            bounds.push(Bound {
+                scene: subject.name.clone(),
+                coverage,
+                uniform: uniform_samples(&subject, &truth, &variance, coverage),
+                optimum: least_samples(&subject, &truth, &variance, coverage)?,
+            });
+        }
+    }
+    Ok(bounds)
+}
+
+fn make_folders(settings: &BenchSettings) -> Result<()> {
+    for folder in ["runs", "references"] {
+        let folder = settings.output.join(folder);
+        std::fs::create_dir_all(&folder).with_context(|| format!("{}", folder.display()))?;
+    }
+    Ok(())
+}
+
+/// Runs every arm of every scene and writes the results.
+///
+/// # Errors
+/// Scenes that do not load, and folders that cannot be written.
+pub fn run(settings: &BenchSettings, say: &dyn Fn(&str)) -> Result<Results> {
+    make_folders(settings)?;
+    let mut results = Results::new(settings);
+    for path in &settings.scenes {
+        let subject = Subject::load(path, settings)?;
+        let reference = Reference::cached(&subject, settings, say)?;
+        let truth = Truth::new(&subject, &reference)?;
+        let mut runner = ArmRunner::new(&subject, &reference, &truth, settings);
+        for &arm in &settings.arms {
+            let runs = runner.runs(arm, say)?;
+            results.add(&subject, &reference, arm, &runs);
+            results.pictures.push(runner.pictures(arm));
+        }
+        say(&results.scene_lines(&subject.name));
+        results.summarise();
+        results.write(&settings.output)?;
+    }
+    Ok(results)
+}

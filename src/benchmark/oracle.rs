@@ -1,0 +1,93 @@
+//! The counts that one would take who knew every pixel's variance and threshold: the convex optimum.
+
+use super::Subject;
+use super::reference::Reference;
+use super::runner::quantile;
+use super::truth::Truth;
+use crate::adaptive::settings::DEFAULT_MAX_SAMPLES;
+use crate::film::{CHANNELS, Film};
+use crate::integrator::{BlockWork, PILOT_SAMPLES, SamplePlan};
+use crate::sampler::{Half, hash_words};
+use anyhow::Result;
+use fechner_perception::allocation::{AllocationProblem, allocate};
+use fechner_perception::{Plane, seen};
+
+/// Variance of one sample of each pixel on the display, as luminance that is as visible as the most visible channel.
+pub(crate) fn displayed_variance(subject: &Subject, reference: &Reference, truth: &Truth) -> Result<Plane> {
+    let display = &subject.viewing.display;
+    let mean = reference.luminance();
+    // An operator bends: the variance is pushed through it at the size it has when uniform sampling is done.
+    let spp = reference.uniform_spp as f32;
+    let of_mean: [Plane; CHANNELS] = std::array::from_fn(|c| {
+        let factor = &reference.low_discrepancy_factor[c];
+        let variance = &reference.sample_variance[c];
+        Plane::from_fn(variance.width(), variance.height(), |x, y| variance.get(x, y) * factor.get(x, y) / spp)
+    });
+    let tone = truth.tone.as_ref();
+    let shown = [
+        seen::display_variance(tone, display, &mean, &of_mean[0]),
+        seen::display_chromatic_variance(tone, display, &mean, &of_mean[1]),
+        seen::display_chromatic_variance(tone, display, &mean, &of_mean[2]),
+    ];
+    let thresholds = &truth.thresholds.achromatic;
+    let gains = thresholds.chromatic_gains()?;
+    let [achromatic, red_green, yellow_violet] = &shown;
+    let equivalent = thresholds.luminance_equivalent_variance(&gains, [achromatic, red_green, yellow_violet]);
+    Ok(equivalent.map(|variance| variance * spp))
+}
+
+/// Samples a pixel that uniform sampling needs for v\* on this share of the picture.
+pub(crate) fn uniform_samples(subject: &Subject, truth: &Truth, variance: &Plane, coverage: f64) -> f64 {
+    let hardest = quantile(&truth.thresholds.achromatic.predicted_visibility(variance), coverage);
+    (hardest / subject.visibility).powi(2)
+}
+
+/// The least mean samples a pixel that any rule could take for v\* on this share of the picture: the pixels that uniform
+/// sampling would leave above it are left above it.
+pub(crate) fn least_samples(subject: &Subject, truth: &Truth, variance: &Plane, coverage: f64) -> Result<f64> {
+    let seen = truth.thresholds.achromatic.predicted_visibility(variance);
+    let hardest = quantile(&seen, coverage) as f32;
+    // Far above, not infinite: the solver's multipliers stay finite.
+    let tolerance = seen.map(|v| if v > hardest { 30.0 } else { 1.0 });
+    let counts = optimal_counts(truth, variance, subject.visibility, Some(&tolerance))?;
+    Ok(counts.mean())
+}
+
+/// The cheapest counts for a visibility everywhere.
+pub(crate) fn optimal_samples(truth: &Truth, variance: &Plane, visibility: f64) -> Result<Plane> {
+    optimal_counts(truth, variance, visibility, None)
+}
+
+fn optimal_counts(truth: &Truth, variance: &Plane, visibility: f64, tolerance: Option<&Plane>) -> Result<Plane> {
+    let allocation = allocate(&AllocationProblem {
+        variance_per_sample: variance,
+        thresholds: &truth.thresholds.achromatic,
+        cost: &Plane::filled(variance.width(), variance.height(), 1.0),
+        tolerance,
+        visibility,
+        min_samples: f64::from(2 * PILOT_SAMPLES),
+        max_samples: f64::from(DEFAULT_MAX_SAMPLES),
+    })?;
+    Ok(allocation.samples)
+}
+
+/// Traces real-valued counts: where one lies between two doublings, they are mixed by chance so that the mean of 1/n is right.
+pub(crate) fn trace_counts(subject: &Subject, counts: &Plane, seed: u64) -> Film {
+    let tracer = subject.tracer(seed);
+    let mut film = Film::new(subject.size.0, subject.size.1);
+    let mut plan = SamplePlan::default();
+    for (pixel, &count) in counts.values().iter().enumerate() {
+        for half in Half::BOTH {
+            let random = hash_words(hash_words(seed, pixel as u64), half.index() as u64) >> 11;
+            let pilots = (0.5 * f64::from(count) / f64::from(PILOT_SAMPLES)).max(1.0);
+            let doublings = pilots.log2().floor();
+            let share = 2.0 * (1.0 - doublings.exp2() / pilots);
+            let is_next = (random as f64 / (1u64 << 53) as f64) < share;
+            for level in 0..=doublings as u8 + u8::from(is_next) {
+                plan.blocks.push(BlockWork::whole(pixel as u32, half, level));
+            }
+        }
+    }
+    tracer.trace(&plan, &mut film, &|_| {});
+    film
+}

@@ -1,0 +1,191 @@
+//! The reference of a scene: a long uniform render with its halves and converged variances, kept by content.
+
+use super::runner::quantile;
+use super::{BenchSettings, Subject};
+use crate::adaptive::judge::{display_scale, judge};
+use crate::adaptive::plan::{pilot_plan, uniform_plan};
+use crate::adaptive::statistics::SampleStatistics;
+use crate::film::{CHANNELS, Film};
+use crate::integrator::PathTracer;
+use crate::sampler::Half;
+use anyhow::{Context, Result};
+use fechner_perception::Plane;
+use fechner_perception::tone::{FittedTone, SceneGuide};
+use std::path::Path;
+
+/// Seed of references, far from those of arms.
+const REFERENCE_SEED: u64 = 0x5245_4645;
+/// Most samples a pixel that a reference takes.
+const MOST_SAMPLES: f64 = 16_384.0;
+
+/// A long uniform render.
+pub(crate) struct Reference {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    /// Samples a pixel.
+    pub(crate) spp: u32,
+    /// Linear RGB in cd/m² of each half.
+    pub(crate) halves: [Vec<[f32; 3]>; 2],
+    /// Variance of one sample by channel, (cd/m²)².
+    pub(crate) sample_variance: [Plane; CHANNELS],
+    /// What stratification makes of it at about the samples that uniform sampling needs, by channel.
+    pub(crate) low_discrepancy_factor: [Plane; CHANNELS],
+    /// Samples a pixel that uniform sampling was found to need for v\* on 99 % of the picture, by its own prediction.
+    pub(crate) uniform_spp: f64,
+}
+
+impl Reference {
+    /// Renders the reference, or reads it back.
+    pub(crate) fn cached(subject: &Subject, settings: &BenchSettings, say: &dyn Fn(&str)) -> Result<Self> {
+        let key = subject.key(settings.reference_factor);
+        let file = settings.output.join("references").join(format!("{}-{key:016x}.f32", subject.name));
+        if let Ok(bytes) = std::fs::read(&file) {
+            return Self::from_bytes(&bytes, subject)
+                .with_context(|| format!("{} is no reference of this version: delete it", file.display()));
+        }
+        let started = std::time::Instant::now();
+        let reference = Self::render(subject, settings.reference_factor)?;
+        say(&format!(
+            "{}: reference of {} spp in {:.0} s; uniform sampling needs about {:.0} spp",
+            subject.name,
+            reference.spp,
+            started.elapsed().as_secs_f64(),
+            reference.uniform_spp
+        ));
+        let bytes = reference.to_bytes();
+        crate::output::write_beside(&file, |file| std::io::Write::write_all(file, &bytes))?;
+        Ok(reference)
+    }
+
+    fn render(subject: &Subject, factor: f64) -> Result<Self> {
+        let tracer = subject.tracer(REFERENCE_SEED);
+        let settings = subject.loop_settings()?;
+        let mut film = Film::new(subject.size.0, subject.size.1);
+        let mut spp = 16;
+        // Stratification pays more the more samples there are: its factor is taken where uniform sampling would end.
+        let uniform_spp = loop {
+            trace_up_to(&tracer, &mut film, spp);
+            let reached = quantile(&judge(&film, &settings, 1.0)?.predicted, 0.99) / subject.visibility;
+            let needed = f64::from(spp) * reached * reached;
+            if needed <= f64::from(spp) || f64::from(spp) >= MOST_SAMPLES {
+                break needed;
+            }
+            spp *= 2;
+        };
+        let factors = Self::display_factors(subject, &film)?;
+        let wanted = (factor * uniform_spp).clamp(512.0, MOST_SAMPLES).log2().ceil().exp2() as u32;
+        while spp < wanted {
+            spp *= 2;
+            trace_up_to(&tracer, &mut film, spp);
+        }
+        let nits = subject.scene.nits_per_unit;
+        let rgb = |half: Half| film.half(half).iter().map(|p| p.mean.map(|v| (v * nits) as f32)).collect();
+        let own_variance = |c: usize| {
+            let [a, b] = Half::BOTH.map(|half| film.half(half));
+            Plane::from_fn(film.width() as usize, film.height() as usize, |x, y| {
+                let i = y * film.width() as usize + x;
+                (0.5 * (a[i].sample_variance(c) + b[i].sample_variance(c)) * nits * nits) as f32
+            })
+        };
+        Ok(Self {
+            width: film.width() as usize,
+            height: film.height() as usize,
+            spp,
+            halves: Half::BOTH.map(rgb),
+            sample_variance: std::array::from_fn(own_variance),
+            low_discrepancy_factor: factors,
+            uniform_spp,
+        })
+    }
+
+    /// What stratification makes of each pixel's displayed variance, by channel.
+    fn display_factors(subject: &Subject, film: &Film) -> Result<[Plane; CHANNELS]> {
+        let settings = subject.loop_settings()?;
+        let luminance = film.estimate(settings.nits_per_unit).luminance_cd_m2.map(|v| v.max(0.0));
+        let tone = settings.operator.fit(&SceneGuide::of(&luminance), &settings.viewing, None);
+        let scale = display_scale(film, &luminance, tone.as_ref(), &settings, 1.0);
+        Ok(SampleStatistics::of(film, &scale).channels.map(|channel| channel.low_discrepancy_factor))
+    }
+
+    /// Mean of the halves, cd/m².
+    pub(crate) fn rgb_cd_m2(&self) -> Vec<[f32; 3]> {
+        let [a, b] = &self.halves;
+        a.iter().zip(b).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] + b[c]))).collect()
+    }
+
+    /// Scene luminance, cd/m².
+    pub(crate) fn luminance(&self) -> Plane {
+        let rgb = self.rgb_cd_m2();
+        Plane::from_fn(self.width, self.height, |x, y| {
+            fechner_perception::photometry::luminance(rgb[y * self.width + x]).max(0.0)
+        })
+    }
+
+    /// The operator of the arms, fitted to the reference.
+    pub(crate) fn fit(&self, subject: &Subject) -> Result<Box<dyn FittedTone>> {
+        let settings = subject.loop_settings()?;
+        let luminance = self.luminance();
+        Ok(settings.operator.fit(&SceneGuide::of(&luminance), &subject.viewing, None))
+    }
+
+    fn to_bytes(&self) -> Vec<u8> {
+        let header = [self.spp as f32, self.uniform_spp as f32];
+        let planes = self.sample_variance.iter().chain(&self.low_discrepancy_factor);
+        let values = header
+            .into_iter()
+            .chain(self.halves.iter().flatten().flatten().copied())
+            .chain(planes.flat_map(|plane| plane.values().iter().copied()));
+        values.flat_map(f32::to_le_bytes).collect()
+    }
+
+    fn from_bytes(bytes: &[u8], subject: &Subject) -> Result<Self> {
+        let (width, height) = (subject.size.0 as usize, subject.size.1 as usize);
+        let pixels = width * height;
+        let expected = 4 * (2 + pixels * (6 + 2 * CHANNELS));
+        anyhow::ensure!(bytes.len() == expected, "it has {} bytes, not {expected}", bytes.len());
+        let values: Vec<f32> = bytes.chunks_exact(4).map(|c| f32::from_le_bytes([c[0], c[1], c[2], c[3]])).collect();
+        let (header, rest) = values.split_at(2);
+        let (halves, planes) = rest.split_at(6 * pixels);
+        let half = |h: usize| halves[3 * pixels * h..3 * pixels * (h + 1)].chunks_exact(3).map(|c| [c[0], c[1], c[2]]);
+        let plane = |index: usize| Plane::from_fn(width, height, |x, y| planes[index * pixels + y * width + x]);
+        Ok(Self {
+            width,
+            height,
+            spp: header[0] as u32,
+            uniform_spp: f64::from(header[1]),
+            halves: [half(0).collect(), half(1).collect()],
+            sample_variance: std::array::from_fn(plane),
+            low_discrepancy_factor: std::array::from_fn(|c| plane(CHANNELS + c)),
+        })
+    }
+}
+
+/// Doubles every pixel of a film, or begins it, so that each has `spp` samples.
+fn trace_up_to(tracer: &PathTracer, film: &mut Film, spp: u32) {
+    let plan =
+        if film.total_samples() == 0 { pilot_plan(film.width() * film.height(), spp) } else { uniform_plan(film, spp) };
+    tracer.trace(&plan, film, &|_| {});
+}
+
+impl Subject {
+    /// Hash of the scene's content and of everything else that a reference depends on.
+    pub(crate) fn key(&self, factor: f64) -> u64 {
+        let text = format!("{:?}|{:?}|{}|{factor}|{:?}", self.scene, self.size, self.visibility, self.viewing);
+        // FNV-1a (Fowler, Noll and Vo): a name for a cache, not a seal.
+        text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+    }
+}
+
+/// Writes a plane beside its record.
+pub(crate) fn write_plane(path: &Path, plane: &Plane) -> Result<()> {
+    let bytes: Vec<u8> = plane.values().iter().flat_map(|v| v.to_le_bytes()).collect();
+    crate::output::write_beside(path, |file| std::io::Write::write_all(file, &bytes))?;
+    Ok(())
+}
+
+/// Reads what [`write_plane`] wrote; `None` unless it has this size.
+pub(crate) fn read_plane(path: &Path, width: usize, height: usize) -> Option<Plane> {
+    let bytes = std::fs::read(path).ok()?;
+    let values = bytes.chunks_exact(4).map(|c| f32::from_le_bytes([c[0], c[1], c[2], c[3]])).collect();
+    Plane::from_values(width, height, values).ok()
+}

@@ -1,0 +1,96 @@
+//! What can truly be seen of a render's error.
+
+use super::Subject;
+use super::reference::Reference;
+use crate::film::CHANNELS;
+use anyhow::Result;
+use fechner_perception::colour::{ColourThresholds, colour_thresholds};
+use fechner_perception::opponent::opponent;
+use fechner_perception::tone::FittedTone;
+use fechner_perception::{Display, Plane, ThresholdMap};
+
+/// Sees differences to a reference.
+pub(crate) struct Truth {
+    pub(crate) tone: Box<dyn FittedTone>,
+    pub(crate) thresholds: ColourThresholds,
+    display: Display,
+    width: usize,
+    height: usize,
+    /// The reference as displayed, by channel.
+    shown: [Plane; CHANNELS],
+    /// v² of the reference's own noise, by channel.
+    own_energy: [Plane; CHANNELS],
+    /// The reference as displayed: linear RGB, 0..1.
+    pub(crate) picture: Vec<[f32; 3]>,
+}
+
+impl Truth {
+    pub(crate) fn new(subject: &Subject, reference: &Reference) -> Result<Self> {
+        let tone = reference.fit(subject)?;
+        let display = subject.viewing.display.clone();
+        let (width, height) = (reference.width, reference.height);
+        let picture: Vec<[f32; 3]> = reference.rgb_cd_m2().into_iter().map(|rgb| tone.map_rgb(rgb)).collect();
+        let displayed = displayed_rgb(&display, &picture);
+        let thresholds = colour_thresholds(&displayed, width, height, &subject.viewing)?;
+        let halves = reference.halves.each_ref().map(|half| {
+            let mapped: Vec<[f32; 3]> = half.iter().map(|&rgb| tone.map_rgb(rgb)).collect();
+            signals(&displayed_rgb(&display, &mapped), width, height)
+        });
+        let own_energy = std::array::from_fn(|c| {
+            let half_difference = combine(&halves[0][c], &halves[1][c], |a, b| 0.5 * (a - b));
+            squared_visibility(channel(&thresholds, c), &half_difference)
+        });
+        let shown = signals(&displayed, width, height);
+        Ok(Self { tone, thresholds, display, width, height, shown, own_energy, picture })
+    }
+
+    /// A picture as the display shows it: linear RGB, 0..1. `rgb_cd_m2` is of the scene.
+    pub(crate) fn displayed(&self, rgb_cd_m2: &[[f32; 3]]) -> Vec<[f32; 3]> {
+        rgb_cd_m2.iter().map(|&rgb| self.tone.map_rgb(rgb)).collect()
+    }
+
+    /// Linear RGB in cd/m² of the display for its light of 0..1.
+    pub(crate) fn display_cd_m2(&self, picture: &[[f32; 3]]) -> Vec<[f32; 3]> {
+        displayed_rgb(&self.display, picture)
+    }
+
+    /// v² of a displayed picture's error, without the reference's part in the difference: the channel that shows most.
+    pub(crate) fn squared_visibility(&self, picture: &[[f32; 3]]) -> Plane {
+        let shown = signals(&displayed_rgb(&self.display, picture), self.width, self.height);
+        let mut most = Plane::filled(self.width, self.height, 0.0);
+        let known = self.shown.iter().zip(&self.own_energy).enumerate();
+        for (shown, (c, (reference, own_energy))) in shown.iter().zip(known) {
+            let difference = combine(shown, reference, |a, b| a - b);
+            let energy = squared_visibility(channel(&self.thresholds, c), &difference);
+            let of_render = combine(&energy, own_energy, |energy, own| (energy - own).max(0.0));
+            most = combine(&most, &of_render, f32::max);
+        }
+        most
+    }
+}
+
+fn channel(thresholds: &ColourThresholds, channel: usize) -> &ThresholdMap {
+    [&thresholds.achromatic, &thresholds.red_green, &thresholds.yellow_violet][channel]
+}
+
+fn squared_visibility(thresholds: &ThresholdMap, error: &Plane) -> Plane {
+    thresholds.measured_visibility(error).map(|v| v * v)
+}
+
+fn displayed_rgb(display: &Display, picture: &[[f32; 3]]) -> Vec<[f32; 3]> {
+    picture.iter().map(|rgb| rgb.map(|light| display.luminance_cd_m2(f64::from(light)) as f32)).collect()
+}
+
+fn signals(rgb_cd_m2: &[[f32; 3]], width: usize, height: usize) -> [Plane; CHANNELS] {
+    let signal = |of: fn([f32; 3]) -> f32| Plane::from_fn(width, height, |x, y| of(rgb_cd_m2[y * width + x]));
+    [
+        signal(|rgb| opponent(rgb).achromatic),
+        signal(|rgb| opponent(rgb).red_green),
+        signal(|rgb| opponent(rgb).yellow_violet),
+    ]
+}
+
+/// A plane of two others' values.
+pub(crate) fn combine(a: &Plane, b: &Plane, with: impl Fn(f32, f32) -> f32 + Sync) -> Plane {
+    Plane::from_fn(a.width(), a.height(), |x, y| with(a.get(x, y), b.get(x, y)))
+}
