@@ -2,8 +2,8 @@
 
 use anyhow::{Context, bail};
 use clap::Args;
-use fechner::scene::load::sky::{self, Sky};
 use fechner::scene::load::environment;
+use fechner::scene::load::sky::{self, Sky};
 use fechner::scene::{Camera, Environment, Projection, Scene};
 use glam::Vec3;
 use std::path::PathBuf;
@@ -73,7 +73,11 @@ fn parse_look_at(text: &str) -> Result<LookAt, String> {
     let look = match numbers(text).as_deref() {
         Some(values @ [_, _, _, _, _, _]) => look(values, None),
         Some(values @ [_, _, _, _, _, _, fov]) if (0.001..=179.0).contains(fov) => look(values, Some(*fov)),
-        _ => return Err(format!("\"{text}\": expected X,Y,Z,X,Y,Z and perhaps a field of view in [0.001, 179] degrees")),
+        _ => {
+            return Err(format!(
+                "\"{text}\": expected X,Y,Z,X,Y,Z and perhaps a field of view in [0.001, 179] degrees"
+            ));
+        }
     };
     if look.from == look.to { Err("both points are the same".to_owned()) } else { Ok(look) }
 }
@@ -113,10 +117,8 @@ impl Staging {
             if !look.from.is_finite() {
                 bail!("--look-at: the points must be finite");
             }
-            scene.camera = Camera {
-                focus_distance: look.from.distance(look.to),
-                ..Camera::pinhole(look.from, forward, up, fov)
-            };
+            scene.camera =
+                Camera { focus_distance: look.from.distance(look.to), ..Camera::pinhole(look.from, forward, up, fov) };
             scene.notes.retain(|note| !note.starts_with("No camera in the file"));
         }
         Ok(())

@@ -49,7 +49,14 @@ fn the_cornell_box_is_the_same_in_three_formats() {
         for (place, (a, b)) in ours.iter().zip(&theirs).enumerate() {
             let z = (a[0] - b[0]) / (a[1] + b[1]).sqrt();
             worst = if z.abs() > worst.abs() { z } else { worst };
-            assert!(z.abs() < 5.0, "{file}: region {}, channel {}: {} and {}, z = {z:.1}", place / 3, place % 3, a[0], b[0]);
+            assert!(
+                z.abs() < 5.0,
+                "{file}: region {}, channel {}: {} and {}, z = {z:.1}",
+                place / 3,
+                place % 3,
+                a[0],
+                b[0]
+            );
         }
         println!("{file}: largest z {worst:.2}");
     }

@@ -32,7 +32,9 @@ fn every_sound_scene_loads() {
     let Some(folder) = assets() else { return };
     let mut files = Vec::new();
     files_below(&folder, &mut files);
-    files.retain(|path| has_extension(path, &["gltf", "glb", "obj", "pbrt", "xml"]) && !path.starts_with(folder.join("faults")));
+    files.retain(|path| {
+        has_extension(path, &["gltf", "glb", "obj", "pbrt", "xml"]) && !path.starts_with(folder.join("faults"))
+    });
     let mut failures = Vec::new();
     for path in &files {
         let start = Instant::now();

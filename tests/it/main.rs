@@ -24,6 +24,6 @@ mod formats;
 mod furnace;
 mod load_assets;
 mod mutations;
-mod references;
 mod no_allocation;
+mod references;
 mod support;

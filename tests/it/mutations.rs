@@ -10,10 +10,11 @@ const MUTATIONS: u64 = 10_000;
 /// The good files: one or two of each format.
 fn good_files() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut files: Vec<PathBuf> = ["other-formats/cornell-box.pbrt", "other-formats/cornell-box.xml", "cornell-box.toml"]
-        .iter()
-        .map(|name| root.join("scenes").join(name))
-        .collect();
+    let mut files: Vec<PathBuf> =
+        ["other-formats/cornell-box.pbrt", "other-formats/cornell-box.xml", "cornell-box.toml"]
+            .iter()
+            .map(|name| root.join("scenes").join(name))
+            .collect();
     if let Some(assets) = crate::load_assets::assets() {
         let more = [
             "scenes-pbrt/staircase2/models/Mesh010.ply",

@@ -25,8 +25,8 @@ pub mod environment;
 mod error;
 mod files;
 mod gltf;
-mod mitsuba;
 pub mod metals;
+mod mitsuba;
 mod mtl;
 mod obj;
 mod pbrt;
@@ -105,11 +105,16 @@ fn check_made_vertices(path: &Path, vertices: usize) -> Result<(), LoadError> {
     if vertices <= MOST_VERTICES {
         return Ok(());
     }
-    Err(LoadError::too_large(path, format_args!("its spheres, disks and the like need more than {MOST_VERTICES} vertices")))
+    Err(LoadError::too_large(
+        path,
+        format_args!("its spheres, disks and the like need more than {MOST_VERTICES} vertices"),
+    ))
 }
 
 fn stem_ends_with(path: &Path, extension: &str) -> bool {
-    Path::new(path.file_stem().unwrap_or_default()).extension().is_some_and(|inner| inner.eq_ignore_ascii_case(extension))
+    Path::new(path.file_stem().unwrap_or_default())
+        .extension()
+        .is_some_and(|inner| inner.eq_ignore_ascii_case(extension))
 }
 
 /// A mesh alone, in grey.

@@ -24,19 +24,13 @@ pub(super) struct Posed {
 pub(super) type Pose = HashMap<usize, Posed>;
 
 /// The pose of the first animation at a time in seconds.
-pub(super) fn pose(
-    path: &Path,
-    document: &gltf::Document,
-    buffers: &Buffers,
-    seconds: f64,
-) -> Result<Pose, LoadError> {
+pub(super) fn pose(path: &Path, document: &gltf::Document, buffers: &Buffers, seconds: f64) -> Result<Pose, LoadError> {
     let mut pose = Pose::new();
     let Some(animation) = document.animations().next() else { return Ok(pose) };
     for channel in animation.channels() {
         let sampler = channel.sampler();
-        let wrong = |problem: &str| {
-            LoadError::invalid(path, format_args!("animation {}: {problem}", animation.index()))
-        };
+        let wrong =
+            |problem: &str| LoadError::invalid(path, format_args!("animation {}: {problem}", animation.index()));
         let times: Vec<f32> = buffers.floats::<1>(&sampler.input())?.into_iter().map(|[time]| time).collect();
         if times.is_empty() || times.windows(2).any(|pair| !(pair[0] <= pair[1])) || !times[0].is_finite() {
             return Err(wrong("its times are missing or do not increase"));

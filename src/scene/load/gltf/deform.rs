@@ -39,7 +39,8 @@ pub(super) fn skin(
     let mut blended = vec![Mat4::ZERO; mesh.positions.len()];
     let mut total = vec![0.0_f32; mesh.positions.len()];
     for set in 0.. {
-        let (Some(indices), Some(weights)) = (primitive.get(&Semantic::Joints(set)), primitive.get(&Semantic::Weights(set)))
+        let (Some(indices), Some(weights)) =
+            (primitive.get(&Semantic::Joints(set)), primitive.get(&Semantic::Weights(set)))
         else {
             break;
         };

@@ -234,12 +234,7 @@ impl<'a> Reader<'a> {
         self.place_parts(&parts, name, if joints.is_some() { Affine3A::IDENTITY } else { to_world })
     }
 
-    fn place_parts(
-        &mut self,
-        parts: &[(MeshId, MaterialId)],
-        name: &str,
-        to_world: Affine3A,
-    ) -> Result<(), LoadError> {
+    fn place_parts(&mut self, parts: &[(MeshId, MaterialId)], name: &str, to_world: Affine3A) -> Result<(), LoadError> {
         if self.builder.instances.len() + parts.len() > MOST_INSTANCES {
             return Err(LoadError::too_large(self.path, format_args!("more than {MOST_INSTANCES} placed meshes")));
         }

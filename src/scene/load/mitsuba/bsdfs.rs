@@ -237,7 +237,9 @@ impl Reader {
                 // Variants of a metal ("Cu_palik") stand for the metal.
                 let metal = named::metal(symbol.split('_').next().unwrap_or(symbol)).ok_or_else(|| {
                     let known = named::metal_symbols().join(", ");
-                    bsdf.unsupported(format_args!("the metal \"{symbol}\" is not known; {known} are, and eta and k are read"))
+                    bsdf.unsupported(format_args!(
+                        "the metal \"{symbol}\" is not known; {known} are, and eta and k are read"
+                    ))
                 })?;
                 (metal.eta, metal.k)
             }
@@ -356,7 +358,11 @@ fn index(bsdf: &Element, name: &str, default: &str) -> Result<f32, LoadError> {
         ("string", None) => return Err(child.error(format_args!("\"{text}\" is not a known substance"))),
         _ => {
             let numbers = child.numbers(text)?;
-            if numbers.len() == 3 { luminance(Vec3::from_slice(&numbers)) } else { numbers.first().copied().unwrap_or(0.0) }
+            if numbers.len() == 3 {
+                luminance(Vec3::from_slice(&numbers))
+            } else {
+                numbers.first().copied().unwrap_or(0.0)
+            }
         }
     };
     if index > 0.0 { Ok(index) } else { Err(child.error("an index of refraction must be above 0")) }

@@ -90,8 +90,9 @@ impl TreeBuilder<'_, '_> {
                     }
                     let name = converted.require("filename")?;
                     let file = self.file.parent().unwrap_or(Path::new("")).join(name);
-                    let root = read(&file, self.defaults, self.includes + 1)
-                        .map_err(|error| if self.includes == 0 { error.referenced_from(converted.place()) } else { error })?;
+                    let root = read(&file, self.defaults, self.includes + 1).map_err(|error| {
+                        if self.includes == 0 { error.referenced_from(converted.place()) } else { error }
+                    })?;
                     element.children.extend(root.children.iter().cloned());
                 }
                 _ => element.children.push(converted),
@@ -115,7 +116,8 @@ impl TreeBuilder<'_, '_> {
                 }
             };
             let value = self.defaults.get(name).ok_or_else(|| {
-                let problem = format!("\"${name}\" has no value: a <default name=\"{name}\" value=\"...\"/> before it gives one");
+                let problem =
+                    format!("\"${name}\" has no value: a <default name=\"{name}\" value=\"...\"/> before it gives one");
                 LoadError::invalid_at(place.clone(), problem)
             })?;
             result.push_str(value);

@@ -58,7 +58,9 @@ impl Reader {
                 self.surround(Environment::constant(radiance));
             }
             "envmap" => {
-                let Some(name) = emitter.string("filename")? else { return Err(emitter.error("an envmap needs a filename")) };
+                let Some(name) = emitter.string("filename")? else {
+                    return Err(emitter.error("an envmap needs a filename"));
+                };
                 let file = self.file(emitter, name);
                 let mut environment = environment::read(&file, Parametrisation::LatLong)
                     .map_err(|error| error.referenced_from(emitter.place()))?;
@@ -95,9 +97,12 @@ impl Reader {
     /// What a surface with an area emitter gives.
     pub(super) fn area_radiance(&mut self, emitter: &Element) -> Result<ColorInput, LoadError> {
         if emitter.kind() != "area" {
-            return Err(emitter.unsupported(format_args!("emitter \"{}\" on a shape is not rendered; area is", emitter.kind())));
+            return Err(
+                emitter.unsupported(format_args!("emitter \"{}\" on a shape is not rendered; area is", emitter.kind()))
+            );
         }
-        let radiance = self.color_input(emitter, "radiance", Meaning::Light)?.unwrap_or(ColorInput::constant(Vec3::ONE));
+        let radiance =
+            self.color_input(emitter, "radiance", Meaning::Light)?.unwrap_or(ColorInput::constant(Vec3::ONE));
         emitter.ignore(&["samplingweight"]);
         self.note_unused("emitter \"area\"", emitter);
         Ok(radiance)

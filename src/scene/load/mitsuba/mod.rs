@@ -184,7 +184,8 @@ impl Reader {
         match (&mut material.surface, absorbed) {
             (Surface::Dielectric { absorption, .. }, Some(absorbed)) => {
                 *absorption = (absorbed * scale).max(Vec3::ZERO);
-                self.builder.note(format!("{}: a medium's absorption is rendered, its scattering is not.", medium.place()));
+                self.builder
+                    .note(format!("{}: a medium's absorption is rendered, its scattering is not.", medium.place()));
             }
             (Surface::Dielectric { .. }, None) => {
                 self.builder.note(format!("{}: neither sigma_a nor sigma_t: nothing is absorbed.", medium.place()));

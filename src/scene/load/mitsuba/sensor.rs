@@ -42,7 +42,8 @@ impl Reader {
                 )));
             }
         };
-        let shift = Vec2::new(sensor.float_or("principalpointoffsetx", 0.0)?, sensor.float_or("principalpointoffsety", 0.0)?);
+        let shift =
+            Vec2::new(sensor.float_or("principalpointoffsetx", 0.0)?, sensor.float_or("principalpointoffsety", 0.0)?);
         let screen_window = (shift != Vec2::ZERO).then(|| {
             let window = ScreenWindow::centered(aspect);
             let moved = Vec2::new(-shift.x * 2.0 * aspect, shift.y * 2.0);
@@ -106,8 +107,20 @@ fn vertical_fov(sensor: &Element, aspect: f32) -> Result<f32, LoadError> {
     let vertical = match axis {
         "y" => tangent,
         "x" => tangent / aspect,
-        "smaller" => if aspect > 1.0 { tangent } else { tangent / aspect },
-        "larger" => if aspect > 1.0 { tangent / aspect } else { tangent },
+        "smaller" => {
+            if aspect > 1.0 {
+                tangent
+            } else {
+                tangent / aspect
+            }
+        }
+        "larger" => {
+            if aspect > 1.0 {
+                tangent / aspect
+            } else {
+                tangent
+            }
+        }
         "diagonal" => tangent / aspect.hypot(1.0),
         other => return Err(sensor.error(format_args!("unknown fov axis \"{other}\""))),
     };

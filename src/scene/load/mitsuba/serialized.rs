@@ -29,7 +29,10 @@ pub(super) fn read(path: &Path, number: usize) -> Result<Mesh, LoadError> {
     }
     let version = half(2).ok_or_else(cut)?;
     if version != 3 && version != 4 {
-        return Err(LoadError::unsupported(path, format_args!("version {version} of serialized meshes; 3 and 4 are read")));
+        return Err(LoadError::unsupported(
+            path,
+            format_args!("version {version} of serialized meshes; 3 and 4 are read"),
+        ));
     }
     let count = bytes.len().checked_sub(4).and_then(|at| bytes.get(at..)).ok_or_else(cut)?;
     let count = u32::from_le_bytes([count[0], count[1], count[2], count[3]]) as usize;
@@ -46,7 +49,8 @@ pub(super) fn read(path: &Path, number: usize) -> Result<Mesh, LoadError> {
         .take(MOST_UNPACKED_BYTES)
         .read_to_end(&mut unpacked)
         .map_err(|error| LoadError::invalid(path, format_args!("mesh {number} is not valid zlib: {error}")))?;
-    parse(&unpacked, version).ok_or_else(|| LoadError::invalid(path, format_args!("mesh {number} is cut off or damaged")))
+    parse(&unpacked, version)
+        .ok_or_else(|| LoadError::invalid(path, format_args!("mesh {number} is cut off or damaged")))
 }
 
 /// `None` where the bytes do not suffice or an index is out of range.
@@ -62,9 +66,11 @@ fn parse(bytes: &[u8], version: u16) -> Option<Mesh> {
     }
     let (vertices, triangles) = (cursor.count()?, cursor.count()?);
     let double = flags & DOUBLE_PRECISION != 0;
-    mesh.positions = cursor.floats(vertices, 3, double)?.as_chunks::<3>().0.iter().map(|&p| Vec3::from_array(p)).collect();
+    mesh.positions =
+        cursor.floats(vertices, 3, double)?.as_chunks::<3>().0.iter().map(|&p| Vec3::from_array(p)).collect();
     if flags & HAS_NORMALS != 0 {
-        mesh.normals = cursor.floats(vertices, 3, double)?.as_chunks::<3>().0.iter().map(|&n| Vec3::from_array(n)).collect();
+        mesh.normals =
+            cursor.floats(vertices, 3, double)?.as_chunks::<3>().0.iter().map(|&n| Vec3::from_array(n)).collect();
     }
     if flags & HAS_TEXTURE_COORDINATES != 0 {
         let coordinates = cursor.floats(vertices, 2, double)?;

@@ -94,7 +94,8 @@ impl Reader {
             "cylinder" => {
                 let from = shape.vector("p0")?.unwrap_or(Vec3::ZERO);
                 let to = shape.vector("p1")?.unwrap_or(Vec3::Z);
-                cylinder(from, to, positive(shape, "radius")?).ok_or_else(|| shape.error("p0 and p1 are the same point"))?
+                cylinder(from, to, positive(shape, "radius")?)
+                    .ok_or_else(|| shape.error("p0 and p1 are the same point"))?
             }
             other => {
                 let known = "obj, ply, serialized, rectangle, cube, sphere, disk, cylinder, shapegroup, instance are";

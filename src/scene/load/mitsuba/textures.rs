@@ -146,8 +146,11 @@ impl Reader {
         let one = |name: &str| if texture.child(name).is_some() { wrap(name) } else { Ok(both) };
         let raw = texture.boolean_or("raw", false)? || texture.float("gamma")?.is_some_and(|gamma| gamma == 1.0);
         let filter = texture.string("filtertype")?.map(canonical);
-        let encoding =
-            if raw || meaning == Meaning::Coefficient && texture.child("gamma").is_some() { Encoding::Linear } else { Encoding::Srgb };
+        let encoding = if raw || meaning == Meaning::Coefficient && texture.child("gamma").is_some() {
+            Encoding::Linear
+        } else {
+            Encoding::Srgb
+        };
         let mut lookup = mapping(texture)?;
         lookup.texture = self.builder.textures.add(Request {
             picture: Picture::File(file),
@@ -207,7 +210,8 @@ fn rgb(child: &Element, value: &str) -> Result<Vec3, LoadError> {
 fn blackbody(child: &Element) -> Result<Vec3, LoadError> {
     let text = child.attribute("temperature").unwrap_or("").trim().trim_end_matches(['K', 'k']);
     let kelvin = child.numbers(text)?.first().copied().map(f64::from).unwrap_or(0.0);
-    let spectrum = Spectrum::blackbody(kelvin).ok_or_else(|| child.error("expected a temperature in kelvin above 0"))?;
+    let spectrum =
+        Spectrum::blackbody(kelvin).ok_or_else(|| child.error("expected a temperature in kelvin above 0"))?;
     let scale = if child.attribute("scale").is_some() { child.number_attribute("scale")? } else { 1.0 };
     // Radiance at the peak: 4.0957e-15 W m⁻² sr⁻¹ nm⁻¹ K⁻⁵ · T⁵.
     let color = spectrum.emission() * (4.0957e-15 * kelvin.powi(5)) as f32 * scale;

@@ -41,7 +41,10 @@ impl Reader<'_> {
         let aspect = aspect.unwrap_or(full.width as f32 / full.height as f32);
         let window = match parameters.numbers(&["float"], "screenwindow")? {
             // The shorter side spans [−1, 1].
-            None => ScreenWindow { min: -Vec2::new(aspect.max(1.0), (1.0 / aspect).max(1.0)), max: Vec2::new(aspect.max(1.0), (1.0 / aspect).max(1.0)) },
+            None => ScreenWindow {
+                min: -Vec2::new(aspect.max(1.0), (1.0 / aspect).max(1.0)),
+                max: Vec2::new(aspect.max(1.0), (1.0 / aspect).max(1.0)),
+            },
             Some(&[left, right, bottom, top]) if left < right && bottom < top => {
                 ScreenWindow { min: Vec2::new(left as f32, bottom as f32), max: Vec2::new(right as f32, top as f32) }
             }
@@ -51,7 +54,8 @@ impl Reader<'_> {
         let projection = match kind.as_str() {
             "perspective" | "realistic" => {
                 if kind == "realistic" {
-                    self.builder.note("The lens system of a \"realistic\" camera is not traced: a pinhole of 45 degrees.");
+                    self.builder
+                        .note("The lens system of a \"realistic\" camera is not traced: a pinhole of 45 degrees.");
                 }
                 let fov = parameters.float_or("fov", if kind == "realistic" { 45.0 } else { 90.0 })?;
                 if !(0.001..=179.0).contains(&fov) {
@@ -61,8 +65,9 @@ impl Reader<'_> {
             }
             "orthographic" => Projection::Orthographic { height: 2.0 },
             other => {
-                return Err(parameters
-                    .unsupported(format_args!("cameras of type \"{other}\" are not rendered; perspective and orthographic are")));
+                return Err(parameters.unsupported(format_args!(
+                    "cameras of type \"{other}\" are not rendered; perspective and orthographic are"
+                )));
             }
         };
         let camera = Camera {

@@ -90,7 +90,11 @@ impl Reader<'_> {
     }
 
     /// A number that may be a texture.
-    pub(super) fn scalar_input(&mut self, parameters: &Parameters, name: &str) -> Result<Option<ScalarInput>, LoadError> {
+    pub(super) fn scalar_input(
+        &mut self,
+        parameters: &Parameters,
+        name: &str,
+    ) -> Result<Option<ScalarInput>, LoadError> {
         match parameters.word(&["texture"], name)? {
             Some(texture) => {
                 let texture = texture.to_owned();

@@ -168,10 +168,8 @@ impl Reader<'_> {
                 }
             }
             other @ ("hair" | "measured") => {
-                return Err(parameters.unsupported(format_args!(
-                    "material \"{other}\" is not rendered; {} are",
-                    KNOWN.join(", ")
-                )));
+                return Err(parameters
+                    .unsupported(format_args!("material \"{other}\" is not rendered; {} are", KNOWN.join(", "))));
             }
             other => {
                 return Err(parameters.error(format_args!("unknown material \"{other}\"{}", suggestion(other, KNOWN))));
@@ -205,7 +203,9 @@ impl Reader<'_> {
             // Nested mixes double at each level: stop before they are many.
             let most = Surface::MOST_COMPONENTS;
             if surface.as_ref().is_some_and(|surface| surface.components() > most) {
-                return Err(parameters.unsupported(format_args!("mixes of more than {most} materials are not rendered")));
+                return Err(
+                    parameters.unsupported(format_args!("mixes of more than {most} materials are not rendered"))
+                );
             }
             parts.push(surface.ok_or_else(|| parameters.unsupported("a mix with \"interface\" is not rendered"))?);
         }

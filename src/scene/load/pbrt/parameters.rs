@@ -32,8 +32,20 @@ pub(super) struct Parameters {
 }
 
 const KINDS: [&str; 14] = [
-    "integer", "float", "point2", "vector2", "point3", "point", "vector3", "vector", "normal3", "normal", "spectrum", "rgb",
-    "blackbody", "bool",
+    "integer",
+    "float",
+    "point2",
+    "vector2",
+    "point3",
+    "point",
+    "vector3",
+    "vector",
+    "normal3",
+    "normal",
+    "spectrum",
+    "rgb",
+    "blackbody",
+    "bool",
 ];
 
 impl Parameters {
@@ -49,7 +61,10 @@ impl Parameters {
             };
             if !KINDS.contains(&kind) && !["string", "texture"].contains(&kind) {
                 let known = KINDS.iter().copied().chain(["string", "texture"]);
-                return wrong(format!("unknown parameter type \"{kind}\"{}", suggestion(kind, known.collect::<Vec<_>>())));
+                return wrong(format!(
+                    "unknown parameter type \"{kind}\"{}",
+                    suggestion(kind, known.collect::<Vec<_>>())
+                ));
             }
             let values = read_values(lexer, line)?;
             let fits = match (kind, &values) {
@@ -241,7 +256,10 @@ fn read_values(lexer: &mut Lexer, line: usize) -> Result<Values, LoadError> {
             Token::Word(word) => match word.parse::<f64>() {
                 Ok(number) => numbers.push(number),
                 Err(_) => {
-                    return Err(LoadError::invalid_at(lexer.place(line), format_args!("expected a value, found {word}")));
+                    return Err(LoadError::invalid_at(
+                        lexer.place(line),
+                        format_args!("expected a value, found {word}"),
+                    ));
                 }
             },
             Token::Open | Token::Close => {
@@ -253,7 +271,9 @@ fn read_values(lexer: &mut Lexer, line: usize) -> Result<Values, LoadError> {
     if first == Token::Open {
         loop {
             match lexer.next()? {
-                None => return Err(LoadError::invalid_at(lexer.place(first_line), "a list without its closing bracket")),
+                None => {
+                    return Err(LoadError::invalid_at(lexer.place(first_line), "a list without its closing bracket"));
+                }
                 Some((Token::Close, _)) => break,
                 Some((token, line)) => add(token, line, lexer)?,
             }

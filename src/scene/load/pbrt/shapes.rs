@@ -62,7 +62,13 @@ impl Reader<'_> {
                         self.note_unread("sphere", parameters);
                         let motion = motion.map(|motion| motion.since_open());
                         let center = Vec3::from(placed.translation);
-                        self.builder.spheres.push(Sphere { name: "sphere".to_owned(), center, radius, material, motion });
+                        self.builder.spheres.push(Sphere {
+                            name: "sphere".to_owned(),
+                            center,
+                            radius,
+                            material,
+                            motion,
+                        });
                         return Ok(());
                     }
                     _ => Shape::Mesh(whole_sphere(radius)),
@@ -149,7 +155,11 @@ impl Reader<'_> {
 
 fn radius(parameters: &Parameters) -> Result<f32, LoadError> {
     let radius = parameters.float_or("radius", 1.0)?;
-    if radius > 0.0 { Ok(radius) } else { Err(parameters.error(format_args!("\"radius\" must be above 0, not {radius}"))) }
+    if radius > 0.0 {
+        Ok(radius)
+    } else {
+        Err(parameters.error(format_args!("\"radius\" must be above 0, not {radius}")))
+    }
 }
 
 fn full_turn(parameters: &Parameters) -> Result<f32, LoadError> {

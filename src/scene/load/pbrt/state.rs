@@ -82,7 +82,6 @@ pub(super) fn look_at(eye: DVec3, target: DVec3, up: DVec3) -> Option<DMat4> {
     let ahead = (target - eye).try_normalize()?;
     let right = up.try_normalize()?.cross(ahead).try_normalize()?;
     let up = ahead.cross(right);
-    let camera_to_world =
-        DMat4::from_cols(right.extend(0.0), up.extend(0.0), ahead.extend(0.0), eye.extend(1.0));
+    let camera_to_world = DMat4::from_cols(right.extend(0.0), up.extend(0.0), ahead.extend(0.0), eye.extend(1.0));
     Some(camera_to_world.inverse())
 }

@@ -26,7 +26,12 @@ impl Definition {
 
 impl Reader<'_> {
     /// A colour texture by name.
-    pub(super) fn color_texture(&mut self, user: &Parameters, name: &str, depth: usize) -> Result<ColorInput, LoadError> {
+    pub(super) fn color_texture(
+        &mut self,
+        user: &Parameters,
+        name: &str,
+        depth: usize,
+    ) -> Result<ColorInput, LoadError> {
         let definition = self.find_texture(user, "spectrum", name, depth)?;
         let parameters = &definition.parameters;
         match definition.kind.as_str() {
@@ -195,7 +200,11 @@ impl Reader<'_> {
             Some("linear") => (Encoding::Linear, 1.0),
             Some(other) => match other.strip_prefix("gamma ").and_then(|gamma| gamma.trim().parse::<f32>().ok()) {
                 Some(gamma) if gamma > 0.0 && gamma.is_finite() => (Encoding::Linear, gamma),
-                _ => return Err(parameters.error(format_args!("encoding \"{other}\": expected sRGB, linear or gamma G"))),
+                _ => {
+                    return Err(
+                        parameters.error(format_args!("encoding \"{other}\": expected sRGB, linear or gamma G"))
+                    );
+                }
             },
         };
         let wrap = match parameters.string("wrap")? {
