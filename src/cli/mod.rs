@@ -9,6 +9,7 @@ mod picture;
 mod render;
 mod report;
 mod seeing;
+mod staging;
 mod threshold;
 mod tonemap;
 

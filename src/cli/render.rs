@@ -22,7 +22,7 @@ use std::time::Duration;
 /// Arguments of `render`.
 #[derive(Debug, Args)]
 pub(super) struct RenderArguments {
-    /// Scene: .toml, .gltf, .glb or .obj.
+    /// Scene: .toml, .gltf, .glb, .obj, .ply, .pbrt or .xml (Mitsuba).
     scene: PathBuf,
     /// Picture to write: .png as the display shows it, .exr with all layers.
     #[arg(short, long, value_name = "FILE")]
@@ -36,6 +36,8 @@ pub(super) struct RenderArguments {
     /// Camera of the scene file, by name.
     #[arg(long, value_name = "NAME")]
     camera: Option<String>,
+    #[command(flatten)]
+    staging: super::staging::Staging,
     /// Time in the scene's keyframes, in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
     at: f64,
@@ -235,9 +237,10 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     let options = load::LoadOptions {
         camera: arguments.camera.clone(),
         frame_time: arguments.at,
-        ..load::LoadOptions::default()
+        environment_follows: arguments.staging.has_environment(),
     };
-    let scene = load::load(&arguments.scene, &options)?;
+    let mut scene = load::load(&arguments.scene, &options)?;
+    arguments.staging.apply(&mut scene, arguments.nits_per_unit)?;
     for note in &scene.notes {
         eprintln!("note: {note}");
     }

@@ -52,6 +52,10 @@ impl SphericalTriangle {
         let q = (-a).cross(edge_1);
         let determinant = edge_1.dot(p);
         let s1 = ((-a).dot(p) / determinant).clamp(0.0, 1.0);
+        // 0/0 where the direction runs within the plane (staircase2's lamps): clamp panics on a bound that is NaN.
+        if s1.is_nan() {
+            return None;
+        }
         let s2 = (direction.dot(q) / determinant).clamp(0.0, 1.0 - s1);
         (s1.is_finite() && s2.is_finite()).then_some([s1 as f32, s2 as f32])
     }

@@ -28,7 +28,7 @@ fn what_is_no_scene_is_named() {
     let message = |name: &str| load(&folder(name), &LoadOptions::default()).unwrap_err().to_string();
     assert!(message("tests/none.toml").ends_with("no such file"));
     assert!(message("tests").contains("is a directory"));
-    assert!(message("Cargo.lock").contains(".toml, .obj, .gltf and .glb are read"));
+    assert!(message("Cargo.lock").contains(".toml, .obj, .ply, .gltf, .glb, .pbrt and .xml (Mitsuba) are read"));
 }
 
 #[test]
@@ -112,6 +112,35 @@ const TRIANGLE_GLTF: &str = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"
 "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}],
 "bufferViews":[{"buffer":0,"byteLength":36}],
 "buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]}"#;
+
+#[test]
+fn damaged_scenes_of_other_renderers_never_panic() {
+    let place = tempfile::tempdir().unwrap();
+    for ending in ["pbrt", "xml"] {
+        let good = std::fs::read(folder(&format!("scenes/other-formats/cornell-box.{ending}"))).unwrap();
+        let path = place.path().join(format!("scene.{ending}"));
+        survive_damage(&path, &path, &good);
+    }
+}
+
+#[test]
+fn a_side_file_adds_what_the_scene_lacks() {
+    let place = tempfile::tempdir().unwrap();
+    let scene = place.path().join("quad.obj");
+    std::fs::write(&scene, "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n").unwrap();
+    let alone = load(&scene, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    assert!(alone.environment.is_some() && alone.nits_per_unit == 1.0);
+    let side = place.path().join("quad.fechner.toml");
+    let text = "nits_per_unit = 50\n[camera]\nposition = [0, 0, 4]\nlook_at = [0, 0, 0]\n\
+                [[lights]]\ntype = \"point\"\nposition = [0, 0, 2]\nintensity_cd = 100\n";
+    std::fs::write(&side, text).unwrap();
+    let staged = load(&scene, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!((staged.lights.len(), staged.nits_per_unit), (1, 50.0));
+    assert!(staged.environment.is_none() && staged.camera.position.z == 4.0);
+    std::fs::write(&side, "[camra]\n").unwrap();
+    let message = load(&scene, &LoadOptions::default()).unwrap_err().to_string();
+    assert!(message.contains("quad.fechner.toml:1: unknown key \"camra\"; did you mean \"camera\"?"), "{message}");
+}
 
 #[test]
 fn damaged_gltf_never_panics() {

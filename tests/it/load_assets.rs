@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// The folder of other people's scenes: FECHNER_ASSETS, else beside the project.
-fn assets() -> Option<PathBuf> {
+pub(crate) fn assets() -> Option<PathBuf> {
     let folder = std::env::var_os("FECHNER_ASSETS")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets"), PathBuf::from);
     if folder.is_dir() {
@@ -32,7 +32,9 @@ fn every_sound_scene_loads() {
     let Some(folder) = assets() else { return };
     let mut files = Vec::new();
     files_below(&folder, &mut files);
-    files.retain(|path| has_extension(path, &["gltf", "glb", "obj"]) && !path.starts_with(folder.join("faults")));
+    files.retain(|path| {
+        has_extension(path, &["gltf", "glb", "obj", "pbrt", "xml"]) && !path.starts_with(folder.join("faults"))
+    });
     let mut failures = Vec::new();
     for path in &files {
         let start = Instant::now();

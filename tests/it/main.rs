@@ -6,8 +6,11 @@
 //! - `adaptive_render`: adaptive and uniform renders against a reference: bias, calibration, determinism
 //! - `bench`: the benchmark from end to end, small
 //! - `camera_and_time`: blur of lens and shutter, moving lamps, crops
+//! - `formats`: the same scene from several formats
 //! - `bad_input`: bad scene files, and our own ones
 //! - `load_assets`: scenes that others made, sound and damaged
+//! - `mutations`: thousands of damaged files a format, in a child process (ignored)
+//! - `references`: scenes of others beside reference pictures (ignored)
 //! - `no_allocation`: the heap is left alone while paths are traced
 //! - `command_line`: the program as a user runs it
 //! - `tonemap`: HDR pictures for displays, one by one and over time
@@ -18,8 +21,11 @@ mod bench;
 mod camera_and_time;
 mod command_line;
 mod direct_light;
+mod formats;
 mod furnace;
 mod load_assets;
+mod mutations;
 mod no_allocation;
+mod references;
 mod support;
 mod tonemap;

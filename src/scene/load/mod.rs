@@ -6,6 +6,9 @@
 //! | --- | --- | --- |
 //! | our TOML | nothing; a scene without any light is an error | without `[camera]`: a three-quarter view of everything |
 //! | OBJ + MTL | camera, lights, units of `Ke` and of length | framed view, studio sky, `Ke` 1 is 1 unit of radiance |
+//! | PLY | everything but the mesh | the same, in grey |
+//! | pbrt-v4 | units of radiance, unless its lights are photometric | RGB 1 is 100 cd/m² |
+//! | Mitsuba XML | units of radiance | RGB 1 is 100 cd/m² |
 //! | glTF 2.0, GLB | environment light; often camera and lights | the same; units are cd/m², cd, lx as specified |
 //!
 //! What was assumed or left out is said in [`Scene::notes`].
@@ -23,8 +26,10 @@ mod error;
 mod files;
 mod gltf;
 pub mod metals;
+mod mitsuba;
 mod mtl;
 mod obj;
+mod pbrt;
 mod ply;
 mod polygon;
 pub mod shapes;
@@ -38,7 +43,7 @@ mod validate;
 pub use default_view::{Bounds, bounds, framed};
 pub use error::{LoadError, Place};
 
-use crate::scene::Scene;
+use crate::scene::{Instance, Scene};
 use std::path::Path;
 
 /// What the caller chooses about loading.
@@ -53,18 +58,34 @@ pub struct LoadOptions {
 }
 
 /// The formats that are read, for messages.
-const FORMATS: &str = ".toml, .obj, .gltf and .glb are read";
+const FORMATS: &str = ".toml, .obj, .ply, .gltf, .glb, .pbrt and .xml (Mitsuba) are read";
 
-/// Reads a scene; the format is told by the file's name.
+/// Reads a scene; the format is told by the file's name. A file `NAME.fechner.toml` beside `NAME.gltf` (or any other
+/// foreign scene) adds display, units, lights, camera and keyframes to it.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
     if !options.frame_time.is_finite() {
         return Err(LoadError::Option { problem: format!("frame time must be finite, not {}", options.frame_time) });
     }
+    let side = toml::side::of(path).filter(|side| side != path && path.extension().is_some_and(|e| e != "toml"));
+    let Some(side) = side else { return load_alone(path, options) };
+    let environment_follows = options.environment_follows || toml::side::brings_light(&side)?;
+    let mut scene = load_alone(path, &LoadOptions { environment_follows, ..options.clone() })?;
+    toml::side::apply(&side, options, &mut scene)?;
+    Ok(scene)
+}
+
+fn load_alone(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
     let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
     match extension.as_deref() {
         Some("toml") => toml::load(path, options),
         Some("obj") => obj::load(path, options),
         Some("gltf" | "glb") => gltf::load(path, options),
+        Some("pbrt") => pbrt::load(path, options),
+        Some("xml") => mitsuba::load(path, options),
+        // geometry.pbrt.gz and scene.xml.gz
+        Some("gz") if stem_ends_with(path, "pbrt") => pbrt::load(path, options),
+        Some("gz") if stem_ends_with(path, "xml") => mitsuba::load(path, options),
+        Some("ply") => load_ply(path, options),
         _ => {
             // A wrong path is the likelier slip: say that first.
             let metadata = std::fs::metadata(path).map_err(|error| LoadError::unreadable(path, &error))?;
@@ -76,6 +97,36 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
             Err(LoadError::unsupported(path, format_args!("not a scene format that is read ({kind}): {FORMATS}")))
         }
     }
+}
+
+/// Refuses files that make many meshes out of few words: thirty bytes can ask for a sphere of ten thousand vertices.
+fn check_made_vertices(path: &Path, vertices: usize) -> Result<(), LoadError> {
+    const MOST_VERTICES: usize = 40_000_000;
+    if vertices <= MOST_VERTICES {
+        return Ok(());
+    }
+    Err(LoadError::too_large(
+        path,
+        format_args!("its spheres, disks and the like need more than {MOST_VERTICES} vertices"),
+    ))
+}
+
+fn stem_ends_with(path: &Path, extension: &str) -> bool {
+    Path::new(path.file_stem().unwrap_or_default())
+        .extension()
+        .is_some_and(|inner| inner.eq_ignore_ascii_case(extension))
+}
+
+/// A mesh alone, in grey.
+fn load_ply(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
+    let mut builder = builder::Builder::new(path);
+    let loaded = ply::read(path)?;
+    loaded.notes.into_iter().for_each(|note| builder.note(note));
+    let material = mtl::default_material(&mut builder);
+    let name = loaded.mesh.name.clone();
+    let mesh = builder.add_mesh(loaded.mesh);
+    builder.instances.push(Instance { name, mesh, material, to_world: glam::Affine3A::IDENTITY, motion: None });
+    builder.finish(path, builder::IfDark::Studio, options)
 }
 
 /// Luminance of linear Rec.709 RGB relative to RGB (1, 1, 1).

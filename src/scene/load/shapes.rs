@@ -91,6 +91,22 @@ pub fn sphere(center: Vec3, radius: f32) -> Mesh {
     mesh
 }
 
+/// Winds every triangle so that its front is on the side of its corners' normals, where there are any.
+pub fn face_along_normals(mesh: &mut Mesh) {
+    let Mesh { positions, normals, triangles, .. } = mesh;
+    let vertices = positions.len();
+    if normals.len() != vertices {
+        return;
+    }
+    for triangle in triangles.iter_mut().filter(|triangle| triangle.iter().all(|&i| (i as usize) < vertices)) {
+        let [a, b, c] = triangle.map(|index| positions[index as usize]);
+        let shading: Vec3 = triangle.iter().map(|&index| normals[index as usize]).sum();
+        if (b - a).cross(c - a).dot(shading) < 0.0 {
+            triangle.swap(1, 2);
+        }
+    }
+}
+
 /// Area of a mesh after a transform.
 pub fn area(mesh: &Mesh, to_world: &Affine3A) -> f64 {
     let corner = |index: u32| to_world.transform_point3(mesh.positions[index as usize]).as_dvec3();

@@ -200,6 +200,13 @@ impl Decoded {
     }
 }
 
+/// Whether a file is a picture with an alpha channel, by its header.
+pub(super) fn has_alpha(path: &Path) -> bool {
+    let decoder =
+        ImageReader::open(path).ok().and_then(|reader| reader.with_guessed_format().ok()?.into_decoder().ok());
+    decoder.is_some_and(|decoder| decoder.color_type().has_alpha())
+}
+
 /// Decodes one picture.
 fn decode(picture: &Picture, encoding: Encoding) -> Result<Decoded, LoadError> {
     match picture {

@@ -1,9 +1,12 @@
 //! glTF 2.0 and GLB through the `gltf` crate's document, with buffers, accessors and images read by ourselves (see
 //! [`buffers`]): its readers panic on damaged files.
 //!
-//! Rest poses only: animations, skins and morph targets are noted and left out.
+//! The first animation is played up to the time that the caller asks for; skins and morph targets bend the meshes of that
+//! moment.
 
+mod animation;
 mod buffers;
+mod deform;
 mod material;
 
 use self::buffers::Buffers;
@@ -56,13 +59,25 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
         materials: Materials::new(path, &document, &buffers),
         meshes: HashMap::new(),
         ancestors: Vec::new(),
+        pose: animation::pose(path, &document, &buffers, options.frame_time)?,
+        placed: Vec::new(),
+        world: HashMap::new(),
         builder: &mut builder,
     };
     for node in scene.nodes() {
-        reader.node(&node, Mat4::IDENTITY)?;
+        reader.walk(node, Mat4::IDENTITY)?;
     }
-    if document.animations().next().is_some() {
-        builder.note("Animations are not played: the rest pose is shown.");
+    // Skins need the places of all nodes first.
+    for (node, matrix) in std::mem::take(&mut reader.placed) {
+        reader.node(&node, matrix)?;
+    }
+    if let Some(first) = document.animations().next() {
+        let count = document.animations().count();
+        let name = first.name().map_or_else(String::new, |name| format!(" \"{name}\""));
+        builder.note(format!(
+            "Animation{name} (1 of {count}) at {} s; meshes that deform do not blur.",
+            options.frame_time
+        ));
     }
     builder.finish(path, IfDark::Studio, options)
 }
@@ -128,25 +143,49 @@ struct Reader<'a> {
     meshes: HashMap<usize, Vec<(MeshId, MaterialId)>>,
     /// Nodes above the current one.
     ancestors: Vec<usize>,
+    pose: animation::Pose,
+    /// Every node with its transform, in the order of the file.
+    placed: Vec<(::gltf::Node<'a>, Mat4)>,
+    /// The same by index: where joints are.
+    world: HashMap<usize, Mat4>,
     builder: &'a mut Builder,
 }
 
-impl Reader<'_> {
-    fn node(&mut self, node: &::gltf::Node, parent: Mat4) -> Result<(), LoadError> {
+impl<'a> Reader<'a> {
+    /// Notes where a node and all below it are.
+    fn walk(&mut self, node: ::gltf::Node<'a>, parent: Mat4) -> Result<(), LoadError> {
         if self.ancestors.contains(&node.index()) {
             return Err(LoadError::invalid(self.path, format_args!("node {} is its own ancestor", node.index())));
         }
         if self.ancestors.len() >= DEEPEST_NODE {
             return Err(LoadError::invalid(self.path, format_args!("nodes nested deeper than {DEEPEST_NODE}")));
         }
-        let matrix = parent * Mat4::from_cols_array_2d(&node.transform().matrix());
+        if self.placed.len() >= MOST_INSTANCES {
+            return Err(LoadError::too_large(self.path, format_args!("more than {MOST_INSTANCES} placed nodes")));
+        }
+        let matrix = parent * animation::local(&node, &self.pose);
+        self.world.insert(node.index(), matrix);
+        self.ancestors.push(node.index());
+        self.placed.push((node.clone(), matrix));
+        for child in node.children() {
+            self.walk(child, matrix)?;
+        }
+        self.ancestors.pop();
+        Ok(())
+    }
+
+    fn node(&mut self, node: &::gltf::Node<'a>, matrix: Mat4) -> Result<(), LoadError> {
         let to_world = Affine3A::from_mat4(matrix);
         let name = node.name().map_or_else(|| format!("node {}", node.index()), str::to_owned);
         if let Some(mesh) = node.mesh() {
-            if node.skin().is_some() {
-                self.builder.note(format!("\"{name}\": its skin is not applied, the mesh is shown as modelled."));
+            let animated = self.pose.get(&node.index()).and_then(|posed| posed.weights.clone());
+            let weights = animated.or(node.weights().map(<[f32]>::to_vec)).or(mesh.weights().map(<[f32]>::to_vec));
+            let weights = weights.unwrap_or_default();
+            if node.skin().is_some() || weights.iter().any(|weight| *weight != 0.0) {
+                self.place_deformed(node, &mesh, &name, &weights, to_world)?;
+            } else {
+                self.place(&mesh, &name, to_world)?;
             }
-            self.place(&mesh, &name, to_world)?;
         }
         if let Some(camera) = node.camera() {
             self.camera(&camera, &name, &to_world);
@@ -154,11 +193,6 @@ impl Reader<'_> {
         if let Some(light) = node.light() {
             self.light(&light, &to_world);
         }
-        self.ancestors.push(node.index());
-        for child in node.children() {
-            self.node(&child, matrix)?;
-        }
-        self.ancestors.pop();
         Ok(())
     }
 
@@ -173,7 +207,35 @@ impl Reader<'_> {
             }
             self.meshes.insert(mesh.index(), parts);
         }
-        let parts = &self.meshes[&mesh.index()];
+        let parts = self.meshes[&mesh.index()].clone();
+        self.place_parts(&parts, name, to_world)
+    }
+
+    /// A mesh with a shape of its own: morphed, skinned or both.
+    fn place_deformed(
+        &mut self,
+        node: &::gltf::Node,
+        mesh: &::gltf::Mesh,
+        name: &str,
+        weights: &[f32],
+        to_world: Affine3A,
+    ) -> Result<(), LoadError> {
+        let joints = node.skin().map(|skin| deform::joints(self.buffers, &skin, &self.world)).transpose()?;
+        let mut parts = Vec::new();
+        for primitive in mesh.primitives() {
+            let Some(mut converted) = self.primitive(mesh, &primitive)? else { continue };
+            deform::morph(self.buffers, &primitive, weights, &mut converted)?;
+            if let Some(joints) = &joints {
+                deform::skin(self.buffers, &primitive, joints, &mut converted)?;
+            }
+            let material = self.materials.get(self.builder, &primitive.material())?;
+            parts.push((self.builder.add_mesh(converted), material));
+        }
+        // A skin's vertices are in world space already: the node's own transform does not count.
+        self.place_parts(&parts, name, if joints.is_some() { Affine3A::IDENTITY } else { to_world })
+    }
+
+    fn place_parts(&mut self, parts: &[(MeshId, MaterialId)], name: &str, to_world: Affine3A) -> Result<(), LoadError> {
         if self.builder.instances.len() + parts.len() > MOST_INSTANCES {
             return Err(LoadError::too_large(self.path, format_args!("more than {MOST_INSTANCES} placed meshes")));
         }
@@ -204,9 +266,6 @@ impl Reader<'_> {
         let tangents = from.get(&Semantic::Tangents).map(|accessor| self.buffers.floats(&accessor)).transpose()?;
         if from.get(&Semantic::Colors(0)).is_some() {
             self.builder.note(format!("\"{name}\": vertex colours are not used."));
-        }
-        if from.morph_targets().next().is_some() {
-            self.builder.note(format!("\"{name}\": morph targets are not applied."));
         }
         let indices = match from.indices() {
             Some(accessor) => self.buffers.indices(&accessor)?,

@@ -110,11 +110,6 @@ impl Spectrum {
     pub(super) fn reflectance(&self) -> Vec3 {
         clip(xyz_to_rgb(self.xyz(|row| between(row, |i| D65[i]))))
     }
-
-    /// The mean over the eye's sensitivity, for what cannot have a colour (an index of refraction).
-    pub(super) fn mean(&self) -> f32 {
-        self.xyz(|_| 1.0).y as f32
-    }
 }
 
 /// Wavelengths of the tables' rows.
@@ -152,7 +147,6 @@ mod tests {
         assert!(flat.reflectance().abs_diff_eq(Vec3::splat(0.5), 5e-4), "{}", flat.reflectance());
         // Equal energy has x = y = 1/3; in Rec.709 with Y = 1 that is (1.2048, 0.9483, 0.9089).
         assert!((2.0 * flat.emission()).abs_diff_eq(Vec3::new(1.2048, 0.9483, 0.9089), 1e-3));
-        assert!((flat.mean() - 0.5).abs() < 1e-4);
     }
 
     /// Values of an independent integration over the 1 nm tables of the `colour` package 0.4.7.

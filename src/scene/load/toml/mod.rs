@@ -6,6 +6,7 @@ mod light;
 mod material;
 mod motion;
 mod object;
+pub(super) mod side;
 mod surface;
 mod surroundings;
 

@@ -1,0 +1,126 @@
+//! Camera and surroundings from the command line, for scenes that lack them or have the wrong ones.
+
+use anyhow::{Context, bail};
+use clap::Args;
+use fechner::scene::load::environment;
+use fechner::scene::load::sky::{self, Sky};
+use fechner::scene::{Camera, Environment, Projection, Scene};
+use glam::Vec3;
+use std::path::PathBuf;
+
+/// What is put in the place of the scene's own.
+#[derive(Debug, Args)]
+pub(super) struct Staging {
+    /// Surroundings instead of the scene's: a lat-long picture (.hdr, .exr, .png), sky:ELEVATION[,AZIMUTH[,TURBIDITY]] in
+    /// degrees, or constant:CD_M2.
+    #[arg(long, value_name = "FILE|sky:...", value_parser = parse_surroundings)]
+    environment: Option<Surroundings>,
+    /// Look from one point to another: X,Y,Z,X,Y,Z, and the vertical field of view in degrees if wanted.
+    #[arg(long, value_name = "FROM,TO[,FOV]", value_parser = parse_look_at, allow_hyphen_values = true, conflicts_with = "camera")]
+    look_at: Option<LookAt>,
+}
+
+#[derive(Clone, Debug)]
+enum Surroundings {
+    Picture(PathBuf),
+    Sky(Sky),
+    Constant(f32),
+}
+
+#[derive(Clone, Copy, Debug)]
+struct LookAt {
+    from: Vec3,
+    to: Vec3,
+    vertical_fov_deg: Option<f32>,
+}
+
+fn numbers(text: &str) -> Option<Vec<f32>> {
+    text.split(',').map(|word| word.trim().parse().ok().filter(|number: &f32| number.is_finite())).collect()
+}
+
+fn parse_surroundings(text: &str) -> Result<Surroundings, String> {
+    if let Some(nits) = text.strip_prefix("constant:") {
+        return match numbers(nits).as_deref() {
+            Some(&[nits]) if nits >= 0.0 => Ok(Surroundings::Constant(nits)),
+            _ => Err(format!("\"{text}\": expected constant: and a luminance in cd/m², such as constant:500")),
+        };
+    }
+    let Some(sky) = text.strip_prefix("sky:") else { return Ok(Surroundings::Picture(PathBuf::from(text))) };
+    let default = Sky::default();
+    let values = numbers(sky).filter(|values| (1..=3).contains(&values.len()));
+    let values = values.ok_or_else(|| {
+        format!("\"{text}\": expected sky:ELEVATION[,AZIMUTH[,TURBIDITY]], such as sky:30 or sky:30,120,4")
+    })?;
+    let at = |place: usize, default: f32| values.get(place).copied().unwrap_or(default);
+    let sky = Sky {
+        sun_elevation_deg: at(0, default.sun_elevation_deg),
+        sun_azimuth_deg: at(1, default.sun_azimuth_deg),
+        turbidity: at(2, default.turbidity),
+        ..default
+    };
+    if !(0.0..=90.0).contains(&sky.sun_elevation_deg) || !(2.0..=10.0).contains(&sky.turbidity) {
+        return Err(format!("\"{text}\": the elevation must lie in [0, 90] degrees, the turbidity in [2, 10]"));
+    }
+    Ok(Surroundings::Sky(sky))
+}
+
+fn parse_look_at(text: &str) -> Result<LookAt, String> {
+    let look = |values: &[f32], vertical_fov_deg| LookAt {
+        from: Vec3::from_slice(&values[..3]),
+        to: Vec3::from_slice(&values[3..6]),
+        vertical_fov_deg,
+    };
+    let look = match numbers(text).as_deref() {
+        Some(values @ [_, _, _, _, _, _]) => look(values, None),
+        Some(values @ [_, _, _, _, _, _, fov]) if (0.001..=179.0).contains(fov) => look(values, Some(*fov)),
+        _ => {
+            return Err(format!(
+                "\"{text}\": expected X,Y,Z,X,Y,Z and perhaps a field of view in [0.001, 179] degrees"
+            ));
+        }
+    };
+    if look.from == look.to { Err("both points are the same".to_owned()) } else { Ok(look) }
+}
+
+impl Staging {
+    /// Whether the scene's own lack of light does not matter.
+    pub(super) fn has_environment(&self) -> bool {
+        self.environment.is_some()
+    }
+
+    /// Puts everything into the scene. `nits_per_unit` is the command line's, if it names one.
+    pub(super) fn apply(&self, scene: &mut Scene, nits_per_unit: Option<f64>) -> anyhow::Result<()> {
+        let nits_per_unit = nits_per_unit.unwrap_or(scene.nits_per_unit);
+        match &self.environment {
+            None => {}
+            Some(Surroundings::Picture(file)) => {
+                scene.environment = Some(environment::from_file(file, 1.0, 0.0).context("--environment")?);
+            }
+            Some(Surroundings::Constant(nits)) => {
+                let radiance = (f64::from(*nits) / nits_per_unit) as f32;
+                scene.environment = Some(Environment::constant(Vec3::splat(radiance)));
+            }
+            Some(Surroundings::Sky(sky)) => {
+                let light = sky::light(sky, nits_per_unit);
+                scene.environment = Some(light.environment);
+                scene.lights.extend(light.sun);
+            }
+        }
+        if let Some(look) = self.look_at {
+            let forward = (look.to - look.from).try_normalize().context("--look-at: the points are too close")?;
+            let own_fov = match scene.camera.projection {
+                Projection::Perspective { vertical_fov_deg } => vertical_fov_deg,
+                Projection::Orthographic { .. } => 40.0,
+            };
+            let up = if forward.cross(Vec3::Y).length() < 1e-3 { Vec3::NEG_Z } else { Vec3::Y };
+            let fov = look.vertical_fov_deg.unwrap_or(own_fov);
+            if !look.from.is_finite() {
+                bail!("--look-at: the points must be finite");
+            }
+            scene.camera =
+                Camera { focus_distance: look.from.distance(look.to), ..Camera::pinhole(look.from, forward, up, fov) };
+            scene.notes.retain(|note| !note.starts_with("No camera in the file"));
+        }
+        Ok(())
+    }
+}

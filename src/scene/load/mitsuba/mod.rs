@@ -1,0 +1,204 @@
+//! Mitsuba scene files (XML, dialects 0.4 to 3), as far as scenes/README.md lists.
+//!
+//! RGB as it stands, tables of spectra through the CIE observer. One-sided BSDFs scatter on both sides here. Integrators,
+//! samplers and reconstruction filters are fechner's.
+
+mod bsdfs;
+mod element;
+mod emitters;
+mod sensor;
+mod serialized;
+mod shapes;
+mod textures;
+mod transform;
+
+use super::LoadOptions;
+use super::builder::{Builder, IfDark};
+use super::error::{LoadError, suggestion};
+use crate::scene::{Material, MaterialId, MeshId, Scene, Surface};
+use element::Element;
+use glam::{Affine3A, Vec3};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+
+/// Luminance of RGB (1, 1, 1): the format has no unit.
+const ASSUMED_NITS_PER_UNIT: f64 = 100.0;
+
+/// Reads a Mitsuba file.
+pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
+    let root = element::read(path, &mut HashMap::new(), 0)?;
+    if root.tag != "scene" {
+        return Err(root.error("expected a <scene>"));
+    }
+    let mut reader = Reader {
+        builder: Builder::new(path),
+        named: HashMap::new(),
+        materials: HashMap::new(),
+        mesh_files: HashMap::new(),
+        groups: HashMap::new(),
+        current_group: None,
+        made_vertices: 0,
+    };
+    reader.name_all(&root);
+    for child in &root.children {
+        match child.tag.as_str() {
+            "shape" => reader.shape(child)?,
+            "emitter" | "luminaire" => reader.emitter(child)?,
+            "sensor" | "camera" => reader.sensor(child)?,
+            "integrator" | "sampler" => {
+                reader.builder.note("Integrator, sampler and filter are fechner's own, not the file's.");
+            }
+            // Defined here, used by reference.
+            "bsdf" | "texture" | "ref" | "alias" | "medium" | "spectrum" | "rgb" | "path" => {}
+            other => {
+                let known = ["shape", "emitter", "sensor", "bsdf", "texture", "integrator", "include", "default"];
+                return Err(child.error(format_args!("unknown element{}", suggestion(other, known))));
+            }
+        }
+    }
+    reader.builder.nits_per_unit = ASSUMED_NITS_PER_UNIT;
+    reader.builder.note(format!(
+        "Radiance has no unit in this file: 1 is taken as {ASSUMED_NITS_PER_UNIT} cd/m² (--nits-per-unit changes it)."
+    ));
+    reader.builder.finish(path, IfDark::StudioWithoutLight, options)
+}
+
+struct Reader {
+    builder: Builder,
+    named: HashMap<String, Rc<Element>>,
+    /// By addresses of BSDF and emitter; 0 for none.
+    materials: HashMap<(usize, usize), Option<MaterialId>>,
+    mesh_files: HashMap<shapes::MeshKey, Vec<MeshId>>,
+    /// Parts of groups, by address.
+    groups: HashMap<usize, Vec<(MeshId, MaterialId, Affine3A)>>,
+    current_group: Option<Vec<(MeshId, MaterialId, Affine3A)>>,
+    /// Of meshes that stand for disks and their like.
+    made_vertices: usize,
+}
+
+impl Reader {
+    /// Finds everything that has an id, wherever it stands.
+    fn name_all(&mut self, element: &Rc<Element>) {
+        for child in &element.children {
+            if child.tag != "ref"
+                && let Some(id) = child.attribute("id")
+            {
+                self.named.entry(id.to_owned()).or_insert_with(|| Rc::clone(child));
+            }
+            if child.tag == "alias"
+                && let (Some(id), Some(target)) = (child.attribute("as"), child.attribute("id"))
+                && let Some(target) = self.named.get(target).cloned()
+            {
+                self.named.insert(id.to_owned(), target);
+            }
+            self.name_all(child);
+        }
+    }
+
+    /// What a `<ref>` means.
+    fn resolve(&self, reference: &Element) -> Result<Rc<Element>, LoadError> {
+        let id = reference.attribute("id").unwrap_or("");
+        self.named.get(id).cloned().ok_or_else(|| {
+            let mut known: Vec<&str> = self.named.keys().map(String::as_str).collect();
+            known.sort_unstable();
+            reference.error(format_args!("nothing has the id \"{id}\"{}", suggestion(id, known)))
+        })
+    }
+
+    /// A file that an element names, beside the file that it stands in.
+    fn file(&self, element: &Element, name: &str) -> PathBuf {
+        element.file.parent().unwrap_or(Path::new("")).join(name.replace('\\', "/"))
+    }
+
+    /// The material of a shape; `None` where the surface is not there.
+    fn material_of(&mut self, shape: &Element) -> Result<Option<MaterialId>, LoadError> {
+        let mut bsdf = shape.tagged("bsdf").next().cloned();
+        let mut emitter = shape.tagged("emitter").chain(shape.tagged("luminaire")).next().cloned();
+        let mut media: Vec<Rc<Element>> = shape.tagged("medium").cloned().collect();
+        for reference in shape.tagged("ref").cloned().collect::<Vec<_>>() {
+            let found = self.resolve(&reference)?;
+            match found.tag.as_str() {
+                "bsdf" => bsdf = Some(found),
+                "emitter" | "luminaire" => emitter = Some(found),
+                "medium" if reference.attribute("name") == Some("interior") => media.push(found),
+                "medium" => self.builder.note(format!("{}: the medium outside is not rendered.", reference.place())),
+                other => return Err(reference.error(format_args!("a shape cannot use a <{other}>"))),
+            }
+        }
+        if shape.tagged("subsurface").next().is_some() {
+            self.builder.note(format!("{}: light below the surface is not rendered.", shape.place()));
+        }
+        let address = |element: &Option<Rc<Element>>| element.as_ref().map_or(0, |rc| Rc::as_ptr(rc) as usize);
+        let key = (address(&bsdf), address(&emitter));
+        if media.is_empty()
+            && let Some(id) = self.materials.get(&key)
+        {
+            return Ok(*id);
+        }
+        let converted = match &bsdf {
+            Some(bsdf) => self.bsdf(bsdf, 0)?.into_material(bsdf.name()),
+            None => {
+                let reflectance = crate::scene::ColorInput::constant(Vec3::splat(0.5));
+                Some(Material::plain("default", Surface::Diffuse { reflectance }))
+            }
+        };
+        let mut material = match (converted, &emitter) {
+            (Some(material), _) => material,
+            (None, Some(_)) => {
+                let reflectance = crate::scene::ColorInput::constant(Vec3::ZERO);
+                Material::plain("null", Surface::Diffuse { reflectance })
+            }
+            (None, None) if media.is_empty() => {
+                self.builder.note("Shapes with the BSDF \"null\" are not there.");
+                self.materials.insert(key, None);
+                return Ok(None);
+            }
+            (None, None) => {
+                return Err(shape.unsupported("a volume without a surface is not rendered; absorption behind glass is"));
+            }
+        };
+        if let Some(emitter) = &emitter {
+            material.emission = self.area_radiance(emitter)?;
+        }
+        for medium in &media {
+            self.fill(&mut material, medium)?;
+        }
+        let id = self.builder.add_material(material);
+        if media.is_empty() {
+            self.materials.insert(key, Some(id));
+        }
+        Ok(Some(id))
+    }
+
+    /// Puts the absorption of a medium behind a surface.
+    fn fill(&mut self, material: &mut Material, medium: &Element) -> Result<(), LoadError> {
+        use textures::Meaning::Coefficient;
+        if medium.kind() != "homogeneous" {
+            return Err(medium.unsupported("only homogeneous media behind glass are rendered, by their absorption"));
+        }
+        let scale = medium.float_or("scale", 1.0)?;
+        let total = self.color(medium, "sigmat", Coefficient)?;
+        let albedo = self.color(medium, "albedo", Coefficient)?.unwrap_or(Vec3::splat(0.75));
+        let absorbed = self.color(medium, "sigmaa", Coefficient)?.or(total.map(|total| total * (1.0 - albedo)));
+        match (&mut material.surface, absorbed) {
+            (Surface::Dielectric { absorption, .. }, Some(absorbed)) => {
+                *absorption = (absorbed * scale).max(Vec3::ZERO);
+                self.builder
+                    .note(format!("{}: a medium's absorption is rendered, its scattering is not.", medium.place()));
+            }
+            (Surface::Dielectric { .. }, None) => {
+                self.builder.note(format!("{}: neither sigma_a nor sigma_t: nothing is absorbed.", medium.place()));
+            }
+            _ => self.builder.note(format!("{}: media are only rendered behind dielectric surfaces.", medium.place())),
+        }
+        Ok(())
+    }
+
+    fn note_unused(&mut self, what: &str, element: &Element) {
+        let unused = element.unused();
+        if !unused.is_empty() {
+            self.builder.note(format!("{}: {what}: not used: {}.", element.place(), unused.join(", ")));
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! `<sensor>` and its `<film>`.
+
+use super::super::builder::NamedCamera;
+use super::super::error::LoadError;
+use super::Reader;
+use super::element::{Element, canonical};
+use super::transform;
+use crate::scene::{Camera, FilmDefaults, Projection, ScreenWindow};
+use glam::{Vec2, Vec3};
+
+/// Widest and highest picture that a file may ask for.
+const LONGEST_SIDE: f32 = 32_768.0;
+
+impl Reader {
+    /// Adds a camera; the first one's film is the picture's size.
+    pub(super) fn sensor(&mut self, sensor: &Element) -> Result<(), LoadError> {
+        let is_first = self.builder.cameras.is_empty();
+        let film = self.film(sensor)?;
+        if is_first {
+            self.builder.film = film;
+        }
+        let aspect = film.width as f32 / film.height as f32;
+        let to_world = transform::of(sensor, "toworld")?;
+        let kind = sensor.kind();
+        let axis = |vector| to_world.transform_vector3(vector).try_normalize();
+        let (Some(left), Some(up), Some(forward)) = (axis(Vec3::X), axis(Vec3::Y), axis(Vec3::Z)) else {
+            return Err(sensor.error("its transform cannot be undone"));
+        };
+        if forward.cross(up).length() < 1e-5 {
+            return Err(sensor.error("its transform cannot be undone"));
+        }
+        let projection = match kind.as_str() {
+            "perspective" | "thinlens" => Projection::Perspective { vertical_fov_deg: vertical_fov(sensor, aspect)? },
+            "orthographic" | "telecentric" => {
+                // The picture's width spans [−1, 1] of the camera's own x.
+                let width = 2.0 * to_world.matrix3.x_axis.length();
+                Projection::Orthographic { height: width / aspect }
+            }
+            other => {
+                return Err(sensor.unsupported(format_args!(
+                    "sensor \"{other}\" is not rendered; perspective, thinlens, orthographic are"
+                )));
+            }
+        };
+        let shift =
+            Vec2::new(sensor.float_or("principalpointoffsetx", 0.0)?, sensor.float_or("principalpointoffsety", 0.0)?);
+        let screen_window = (shift != Vec2::ZERO).then(|| {
+            let window = ScreenWindow::centered(aspect);
+            let moved = Vec2::new(-shift.x * 2.0 * aspect, shift.y * 2.0);
+            ScreenWindow { min: window.min + moved, max: window.max + moved }
+        });
+        let has_lens = matches!(kind.as_str(), "thinlens" | "telecentric");
+        let aperture_radius = if has_lens { sensor.float_or("apertureradius", 0.0)?.max(0.0) } else { 0.0 };
+        let focus_distance = sensor.float_or("focusdistance", 1.0)?.max(1e-6);
+        sensor.ignore(&["nearclip", "farclip", "shutteropen", "shutterclose"]);
+        sensor.tagged("sampler").count();
+        self.note_unused(&format!("sensor \"{kind}\""), sensor);
+        let camera = Camera {
+            projection,
+            screen_window,
+            // Mitsuba's x points to the left of the picture.
+            mirrored: forward.cross(up).dot(left) > 0.0,
+            aperture_radius,
+            focus_distance,
+            ..Camera::pinhole(to_world.translation.into(), forward, up, 40.0)
+        };
+        self.builder.cameras.push(NamedCamera { name: sensor.name(), camera });
+        Ok(())
+    }
+
+    fn film(&mut self, sensor: &Element) -> Result<FilmDefaults, LoadError> {
+        let Some(film) = sensor.tagged("film").next().cloned() else {
+            return Ok(FilmDefaults { width: 768, height: 576 });
+        };
+        let side = |name: &str, default: f32| {
+            let side = film.float_or(name, default)?;
+            if (1.0..=LONGEST_SIDE).contains(&side) && side.fract() == 0.0 {
+                Ok(side as u32)
+            } else {
+                Err(film.error(format_args!("\"{name}\" must be a whole number from 1 to {LONGEST_SIDE}, not {side}")))
+            }
+        };
+        let size = FilmDefaults { width: side("width", 768.0)?, height: side("height", 576.0)? };
+        if ["cropwidth", "cropheight", "cropoffsetx", "cropoffsety"].iter().any(|name| film.child(name).is_some()) {
+            self.builder.note(format!("{}: the film's crop is not used: the whole picture is rendered.", film.place()));
+        }
+        Ok(size)
+    }
+}
+
+/// `fov` belongs to the x axis unless `fov_axis` says otherwise; without it a focal length on 35 mm film counts.
+fn vertical_fov(sensor: &Element, aspect: f32) -> Result<f32, LoadError> {
+    let axis = sensor.string("fovaxis")?.map(canonical);
+    let half_tangent = |degrees: f32| (0.5 * degrees).to_radians().tan();
+    let (tangent, axis) = match sensor.float("fov")? {
+        Some(fov) if (0.001..=179.0).contains(&fov) => (half_tangent(fov), axis.as_deref().unwrap_or("x")),
+        Some(fov) => return Err(sensor.error(format_args!("\"fov\" must lie in [0.001, 179] degrees, not {fov}"))),
+        None => {
+            let text = sensor.string("focallength")?.unwrap_or("50mm");
+            let millimetres: Option<f32> = text.trim().trim_end_matches("mm").trim().parse().ok();
+            let millimetres = millimetres.filter(|length| *length > 0.0 && length.is_finite());
+            let length = millimetres.ok_or_else(|| sensor.error(format_args!("\"{text}\" is not a focal length")))?;
+            // Half the diagonal of 36 mm × 24 mm.
+            (0.5 * 36.0_f32.hypot(24.0) / length, "diagonal")
+        }
+    };
+    let vertical = match axis {
+        "y" => tangent,
+        "x" => tangent / aspect,
+        "smaller" => {
+            if aspect > 1.0 {
+                tangent
+            } else {
+                tangent / aspect
+            }
+        }
+        "larger" => {
+            if aspect > 1.0 {
+                tangent / aspect
+            } else {
+                tangent
+            }
+        }
+        "diagonal" => tangent / aspect.hypot(1.0),
+        other => return Err(sensor.error(format_args!("unknown fov axis \"{other}\""))),
+    };
+    Ok((2.0 * vertical.atan().to_degrees()).clamp(0.001, 179.0))
+}

@@ -1,0 +1,275 @@
+//! `<shape>`.
+
+use super::super::error::LoadError;
+use super::super::{obj, ply, shapes};
+use super::Reader;
+use super::element::Element;
+use super::serialized;
+use super::transform;
+use crate::scene::{Instance, MaterialId, Mesh, MeshId, Sphere};
+use glam::{Affine3A, Mat3, Vec2, Vec3};
+use std::f32::consts::TAU;
+use std::rc::Rc;
+
+/// A mesh file as it is used: path, number of the mesh in it, normals of faces, turned over.
+pub(super) type MeshKey = (std::path::PathBuf, usize, bool, bool);
+
+impl Reader {
+    /// Adds a shape.
+    pub(super) fn shape(&mut self, shape: &Rc<Element>) -> Result<(), LoadError> {
+        let kind = shape.kind();
+        if matches!(kind.as_str(), "shapegroup" | "instance") {
+            return self.group(shape, &kind);
+        }
+        let to_world = transform::of(shape, "toworld")?;
+        let flip = shape.boolean_or("flipnormals", false)?;
+        if kind == "sphere" {
+            return self.sphere(shape, &to_world, flip);
+        }
+        let meshes = self.meshes(shape, &kind, flip)?;
+        let material = self.material_of(shape)?;
+        self.note_unused(&format!("shape \"{kind}\""), shape);
+        let Some(material) = material else { return Ok(()) };
+        for mesh in meshes {
+            self.place(mesh, material, to_world);
+        }
+        Ok(())
+    }
+
+    fn place(&mut self, mesh: MeshId, material: MaterialId, to_world: Affine3A) {
+        let name = self.builder.meshes[mesh.0 as usize].name.clone();
+        match &mut self.current_group {
+            Some(parts) => parts.push((mesh, material, to_world)),
+            None => self.builder.instances.push(Instance { name, mesh, material, to_world, motion: None }),
+        }
+    }
+
+    /// `shapegroup` defines, `instance` places.
+    fn group(&mut self, shape: &Rc<Element>, kind: &str) -> Result<(), LoadError> {
+        if kind == "shapegroup" {
+            self.collect_group(shape)?;
+            return Ok(());
+        }
+        let to_world = transform::of(shape, "toworld")?;
+        let named: Vec<Rc<Element>> = shape.tagged("ref").cloned().collect();
+        for reference in named {
+            let group = self.resolve(&reference)?;
+            let key = Rc::as_ptr(&group) as usize;
+            if !self.groups.contains_key(&key) {
+                self.collect_group(&group)?;
+            }
+            let parts = self.groups.get(&key).cloned().unwrap_or_default();
+            for (mesh, material, inner) in parts {
+                self.place(mesh, material, to_world * inner);
+            }
+        }
+        Ok(())
+    }
+
+    fn collect_group(&mut self, group: &Rc<Element>) -> Result<(), LoadError> {
+        let key = Rc::as_ptr(group) as usize;
+        if self.current_group.is_some() {
+            return Err(group.unsupported("a group inside a group is not rendered"));
+        }
+        if self.groups.contains_key(&key) {
+            return Ok(());
+        }
+        self.current_group = Some(Vec::new());
+        let inner: Vec<Rc<Element>> = group.tagged("shape").cloned().collect();
+        for shape in &inner {
+            self.shape(shape)?;
+        }
+        let parts = self.current_group.take().unwrap_or_default();
+        self.groups.insert(key, parts);
+        Ok(())
+    }
+
+    fn meshes(&mut self, shape: &Element, kind: &str, flip: bool) -> Result<Vec<MeshId>, LoadError> {
+        let mut mesh = match kind {
+            "obj" | "ply" | "serialized" => return self.mesh_file(shape, kind, flip),
+            // v runs up from the first corner, as our rectangle's does.
+            "rectangle" => shapes::rectangle(Vec3::new(-1.0, -1.0, 0.0), Vec3::X * 2.0, Vec3::Y * 2.0),
+            "cube" => shapes::cuboid(Vec3::NEG_ONE, Vec3::ONE),
+            "disk" => shapes::disk(Vec3::ZERO, Vec3::Z, 1.0),
+            "cylinder" => {
+                let from = shape.vector("p0")?.unwrap_or(Vec3::ZERO);
+                let to = shape.vector("p1")?.unwrap_or(Vec3::Z);
+                cylinder(from, to, positive(shape, "radius")?)
+                    .ok_or_else(|| shape.error("p0 and p1 are the same point"))?
+            }
+            other => {
+                let known = "obj, ply, serialized, rectangle, cube, sphere, disk, cylinder, shapegroup, instance are";
+                return Err(shape.unsupported(format_args!("shapes of type \"{other}\" are not rendered; {known}")));
+            }
+        };
+        if flip {
+            turn_over(&mut mesh);
+        }
+        self.count(shape, &mesh)?;
+        Ok(vec![self.builder.add_mesh(mesh)])
+    }
+
+    fn count(&mut self, shape: &Element, mesh: &Mesh) -> Result<(), LoadError> {
+        self.made_vertices += mesh.positions.len();
+        super::super::check_made_vertices(&shape.file, self.made_vertices)
+    }
+
+    /// Each file is read once for each way of using it.
+    fn mesh_file(&mut self, shape: &Element, kind: &str, flip: bool) -> Result<Vec<MeshId>, LoadError> {
+        let Some(name) = shape.string("filename")? else { return Err(shape.error("a mesh needs a filename")) };
+        let faces = shape.boolean_or("facenormals", false)?;
+        let number = shape.float_or("shapeindex", 0.0)?.max(0.0) as usize;
+        shape.ignore(&["fliptexcoords", "maxsmoothangle", "srgb", "collapse"]);
+        let key: MeshKey = (self.file(shape, name), number, faces, flip);
+        if let Some(ids) = self.mesh_files.get(&key) {
+            return Ok(ids.clone());
+        }
+        let referenced = |error: LoadError| error.referenced_from(shape.place());
+        let ids: Vec<MeshId> = match kind {
+            "obj" => {
+                let parts = obj::read_into(&mut self.builder, &key.0, false).map_err(referenced)?;
+                parts.into_iter().map(|(mesh, _)| mesh).collect()
+            }
+            "ply" => {
+                let loaded = ply::read(&key.0).map_err(referenced)?;
+                for note in loaded.notes {
+                    self.builder.note(note);
+                }
+                vec![self.builder.add_mesh(loaded.mesh)]
+            }
+            _ => {
+                let mesh = serialized::read(&key.0, number).map_err(referenced)?;
+                vec![self.builder.add_mesh(mesh)]
+            }
+        };
+        for id in &ids {
+            let mesh = &mut self.builder.meshes[id.0 as usize];
+            if faces {
+                mesh.normals.clear();
+            } else if mesh.normals.is_empty() {
+                smooth(mesh);
+            }
+            shapes::face_along_normals(mesh);
+            if flip {
+                turn_over(mesh);
+            }
+        }
+        self.mesh_files.insert(key, ids.clone());
+        Ok(ids)
+    }
+
+    fn sphere(&mut self, shape: &Element, to_world: &Affine3A, flip: bool) -> Result<(), LoadError> {
+        let center = shape.vector("center")?.unwrap_or(Vec3::ZERO);
+        let radius = positive(shape, "radius")?;
+        let material = self.material_of(shape)?;
+        self.note_unused("shape \"sphere\"", shape);
+        let Some(material) = material else { return Ok(()) };
+        let placed = to_world.transform_point3(center);
+        let scaled = shapes::similarity_scale(to_world).map(|scale| radius * scale);
+        match scaled.filter(|radius| *radius > 0.0 && radius.is_finite() && placed.is_finite()) {
+            Some(radius) if !flip && self.current_group.is_none() => {
+                self.builder.spheres.push(Sphere {
+                    name: "sphere".to_owned(),
+                    center: placed,
+                    radius,
+                    material,
+                    motion: None,
+                });
+            }
+            _ => {
+                let mut mesh = shapes::sphere(center, radius);
+                if flip {
+                    turn_over(&mut mesh);
+                }
+                self.count(shape, &mesh)?;
+                let mesh = self.builder.add_mesh(mesh);
+                self.place(mesh, material, *to_world);
+            }
+        }
+        Ok(())
+    }
+}
+
+fn positive(shape: &Element, name: &str) -> Result<f32, LoadError> {
+    let value = shape.float_or(name, 1.0)?;
+    if value > 0.0 { Ok(value) } else { Err(shape.error(format_args!("\"{name}\" must be above 0, not {value}"))) }
+}
+
+/// Without caps, seen from outside.
+fn cylinder(from: Vec3, to: Vec3, radius: f32) -> Option<Mesh> {
+    const SEGMENTS: u32 = 128;
+    let axis = (to - from).try_normalize()?;
+    let (x, y) = axis.any_orthonormal_pair();
+    let frame = Mat3::from_cols(x, y, axis);
+    let frame = if frame.determinant() < 0.0 { Mat3::from_cols(y, x, axis) } else { frame };
+    let mut mesh = Mesh { name: "cylinder".to_owned(), ..Mesh::default() };
+    for segment in 0..=SEGMENTS {
+        let u = segment as f32 / SEGMENTS as f32;
+        let (sin, cos) = (TAU * u).sin_cos();
+        let normal = frame * Vec3::new(cos, sin, 0.0);
+        for (end, v) in [(from, 1.0), (to, 0.0)] {
+            mesh.positions.push(end + radius * normal);
+            mesh.normals.push(normal);
+            mesh.uvs.push(Vec2::new(u, v));
+        }
+    }
+    for segment in 0..SEGMENTS {
+        let low = 2 * segment;
+        mesh.triangles.push([low, low + 2, low + 1]);
+        mesh.triangles.push([low + 1, low + 2, low + 3]);
+    }
+    Some(mesh)
+}
+
+fn turn_over(mesh: &mut Mesh) {
+    mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+    mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
+}
+
+/// Normals of vertices: the faces' around them, weighted by their angle (Thürmer and Wüthrich 1998).
+fn smooth(mesh: &mut Mesh) {
+    let mut normals = vec![Vec3::ZERO; mesh.positions.len()];
+    for triangle in &mesh.triangles {
+        let corners = triangle.map(|index| mesh.positions[index as usize].as_dvec3());
+        let face = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
+        for corner in 0..3 {
+            let [here, next, last] = [corner, (corner + 1) % 3, (corner + 2) % 3].map(|i| corners[i]);
+            let (a, b) = ((next - here).normalize_or_zero(), (last - here).normalize_or_zero());
+            let angle = a.dot(b).clamp(-1.0, 1.0).acos();
+            normals[triangle[corner] as usize] += (face * angle).as_vec3();
+        }
+    }
+    mesh.normals = normals.into_iter().map(|normal| normal.normalize_or(Vec3::Y)).collect();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cylinder_faces_outwards() {
+        let mesh = cylinder(Vec3::ZERO, Vec3::new(0.0, 2.0, 0.0), 0.5).unwrap();
+        for triangle in &mesh.triangles {
+            let [a, b, c] = triangle.map(|index| mesh.positions[index as usize]);
+            let middle = (a + b + c) / 3.0;
+            assert!((b - a).cross(c - a).dot(Vec3::new(middle.x, 0.0, middle.z)) > 0.0);
+        }
+        let area = shapes::area(&mesh, &Affine3A::IDENTITY);
+        assert!((area / (std::f64::consts::TAU * 0.5 * 2.0) - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn smooth_normals_of_a_box_point_along_its_diagonals() {
+        let mut mesh = Mesh {
+            positions: (0..8).map(|i| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32)).collect(),
+            ..Mesh::default()
+        };
+        for [a, b, c, d] in [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]] {
+            mesh.triangles.extend([[a, b, c], [a, c, d]]);
+        }
+        smooth(&mut mesh);
+        for (position, normal) in mesh.positions.iter().zip(&mesh.normals) {
+            assert!(normal.dot((position - 0.5).normalize()) > 0.9999, "{normal} at {position}");
+        }
+    }
+}

@@ -1,0 +1,219 @@
+//! Colours, spectra and `<texture>`.
+
+use super::super::error::LoadError;
+use super::super::spectrum::Spectrum;
+use super::super::texture::{Adjust, IfMissing, Picture, Request};
+use super::super::{files, luminance};
+use super::Reader;
+use super::element::{Element, canonical};
+use super::transform;
+use crate::scene::texture::srgb_to_linear;
+use crate::scene::{ColorInput, Encoding, ScalarInput, TextureId, TextureLookup, Wrap};
+use glam::{Vec2, Vec3};
+use std::rc::Rc;
+
+/// What a colour stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Meaning {
+    Reflectance,
+    Coefficient,
+    Light,
+}
+
+impl Reader {
+    /// A colour without texture.
+    pub(super) fn color(&mut self, owner: &Element, name: &str, meaning: Meaning) -> Result<Option<Vec3>, LoadError> {
+        let Some(input) = self.color_input(owner, name, meaning)? else { return Ok(None) };
+        if input.texture.is_some() {
+            self.builder.note(format!("{}: \"{name}\": a texture is not rendered here: its factor.", owner.place()));
+        }
+        Ok(Some(input.factor))
+    }
+
+    /// A colour that may be a texture.
+    pub(super) fn color_input(
+        &mut self,
+        owner: &Element,
+        name: &str,
+        meaning: Meaning,
+    ) -> Result<Option<ColorInput>, LoadError> {
+        let Some(child) = owner.child(name).cloned() else { return Ok(None) };
+        let child = if child.tag == "ref" { self.resolve(&child)? } else { child };
+        let value = || child.attribute("value").unwrap_or("");
+        let color = match child.tag.as_str() {
+            "texture" => return self.texture(&child, meaning, 0).map(Some),
+            "float" | "integer" => Vec3::splat(child.numbers(value())?.first().copied().unwrap_or(0.0)),
+            "rgb" => rgb(&child, value())?,
+            "srgb" => {
+                let encoded = rgb(&child, value())?;
+                if value().starts_with('#') { encoded } else { encoded.map(srgb_to_linear) }
+            }
+            "spectrum" => self.spectrum(&child, value(), meaning)?,
+            "blackbody" => blackbody(&child)?,
+            other => return Err(child.error(format_args!("\"{other}\" is no colour"))),
+        };
+        if color.min_element() < 0.0 {
+            return Err(child.error("a colour must not be negative"));
+        }
+        let color = if meaning == Meaning::Reflectance && color.max_element() > 1.0 {
+            self.builder.note(format!("{}: \"{name}\" above 1 is taken as 1.", child.place()));
+            color.min(Vec3::ONE)
+        } else {
+            color
+        };
+        Ok(Some(ColorInput::constant(color)))
+    }
+
+    fn spectrum(&mut self, child: &Element, value: &str, meaning: Meaning) -> Result<Vec3, LoadError> {
+        let spectrum = if let Some(name) = child.attribute("filename") {
+            let text = files::read_text(&self.file(child, name)).map_err(|e| e.referenced_from(child.place()))?;
+            Spectrum::from_text(&text)
+        } else if value.contains(':') {
+            let numbers = value.split([',', ':', ' ', '\n', '\t', '\r']).filter(|word| !word.is_empty());
+            let numbers: Result<Vec<f64>, _> = numbers.map(str::parse).collect();
+            numbers.ok().and_then(|numbers| Spectrum::from_list(&numbers))
+        } else {
+            return rgb(child, value);
+        };
+        let spectrum = spectrum.ok_or_else(|| child.error("expected a number or pairs \"nanometres:value\""))?;
+        Ok(if meaning == Meaning::Light { spectrum.emission() } else { spectrum.reflectance() })
+    }
+
+    /// A number that may be a texture.
+    pub(super) fn scalar_input(&mut self, owner: &Element, name: &str) -> Result<Option<ScalarInput>, LoadError> {
+        let Some(child) = owner.child(name).cloned() else { return Ok(None) };
+        if matches!(child.tag.as_str(), "float" | "integer") {
+            return Ok(owner.float(name)?.map(ScalarInput::constant));
+        }
+        let Some(color) = self.color_input(owner, name, Meaning::Coefficient)? else { return Ok(None) };
+        Ok(Some(ScalarInput { factor: luminance(color.factor), texture: color.texture.map(|lookup| (lookup, 0)) }))
+    }
+
+    /// The opacity of a mask: a picture with an alpha channel means that channel.
+    pub(super) fn opacity(&mut self, owner: &Element) -> Result<Option<ScalarInput>, LoadError> {
+        let Some(mut scalar) = self.scalar_input(owner, "opacity")? else { return Ok(None) };
+        if let Some(child) = owner.child("opacity").cloned() {
+            let child = if child.tag == "ref" { self.resolve(&child)? } else { child };
+            if let Some(name) = child.string("filename")?
+                && super::super::texture::has_alpha(&self.file(&child, name))
+                && let Some((_, channel)) = &mut scalar.texture
+            {
+                *channel = 3;
+            }
+        }
+        Ok(Some(scalar))
+    }
+
+    /// A texture plugin.
+    fn texture(&mut self, texture: &Rc<Element>, meaning: Meaning, depth: usize) -> Result<ColorInput, LoadError> {
+        if depth > 16 {
+            return Err(texture.error("textures are nested too deeply"));
+        }
+        let input = match texture.kind().as_str() {
+            "bitmap" => self.bitmap(texture, meaning)?,
+            "checkerboard" => self.checkerboard(texture)?,
+            "scale" => {
+                let inner = texture.tagged("texture").next().cloned();
+                let factor = match texture.child("scale").is_some() {
+                    true => self.color(texture, "scale", Meaning::Coefficient)?.unwrap_or(Vec3::ONE),
+                    false => Vec3::ONE,
+                };
+                let inner = inner.ok_or_else(|| texture.error("a scale needs a texture inside"))?;
+                let inner = self.texture(&inner, meaning, depth + 1)?;
+                ColorInput { factor: inner.factor * factor, ..inner }
+            }
+            other => {
+                let note = format!("{}: texture \"{other}\" is not rendered: grey 0.5.", texture.place());
+                self.builder.note(note);
+                ColorInput::constant(Vec3::splat(0.5))
+            }
+        };
+        texture.ignore(&["maxanisotropy", "cache", "format"]);
+        self.note_unused("texture", texture);
+        Ok(input)
+    }
+
+    fn bitmap(&mut self, texture: &Element, meaning: Meaning) -> Result<ColorInput, LoadError> {
+        let Some(name) = texture.string("filename")? else { return Err(texture.error("a bitmap needs a filename")) };
+        let file = self.file(texture, name);
+        let wrap = |name: &str| match texture.string(name)?.map(canonical).as_deref() {
+            None | Some("repeat") => Ok(Wrap::Repeat),
+            Some("mirror") => Ok(Wrap::Mirror),
+            Some("clamp" | "zero" | "one") => Ok(Wrap::Clamp),
+            Some(other) => Err(texture.error(format_args!("unknown wrap mode \"{other}\""))),
+        };
+        let both = wrap("wrapmode")?;
+        let one = |name: &str| if texture.child(name).is_some() { wrap(name) } else { Ok(both) };
+        let raw = texture.boolean_or("raw", false)? || texture.float("gamma")?.is_some_and(|gamma| gamma == 1.0);
+        let filter = texture.string("filtertype")?.map(canonical);
+        let encoding = if raw || meaning == Meaning::Coefficient && texture.child("gamma").is_some() {
+            Encoding::Linear
+        } else {
+            Encoding::Srgb
+        };
+        let mut lookup = mapping(texture)?;
+        lookup.texture = self.builder.textures.add(Request {
+            picture: Picture::File(file),
+            encoding,
+            wrap_u: one("wrapmodeu")?,
+            wrap_v: one("wrapmodev")?,
+            nearest: filter.as_deref() == Some("nearest"),
+            if_missing: IfMissing::Fail(texture.place()),
+            adjust: Adjust::NONE,
+        });
+        Ok(ColorInput { factor: Vec3::ONE, texture: Some(lookup) })
+    }
+
+    fn checkerboard(&mut self, texture: &Element) -> Result<ColorInput, LoadError> {
+        let first = self.color(texture, "color0", Meaning::Reflectance)?.unwrap_or(Vec3::splat(0.4));
+        let second = self.color(texture, "color1", Meaning::Reflectance)?.unwrap_or(Vec3::splat(0.2));
+        let [a, b] = [first, second].map(|color| color.extend(1.0).to_array());
+        let request = Request { nearest: true, ..Request::texels("checkerboard", [2, 2], &[b, a, a, b]) };
+        let mut lookup = mapping(texture)?;
+        lookup.texture = self.builder.textures.add(request);
+        Ok(ColorInput { factor: Vec3::ONE, texture: Some(lookup) })
+    }
+}
+
+/// `uscale` and its like or `to_uv`, for a v that runs up where ours runs down.
+fn mapping(texture: &Element) -> Result<TextureLookup, LoadError> {
+    let all = texture.float_or("uvscale", 1.0)?;
+    let mut scale = Vec2::new(texture.float_or("uscale", all)?, texture.float_or("vscale", all)?);
+    let mut offset = Vec2::new(texture.float_or("uoffset", 0.0)?, texture.float_or("voffset", 0.0)?);
+    let to_uv = transform::of(texture, "touv")?;
+    scale *= Vec2::new(to_uv.matrix3.x_axis.x, to_uv.matrix3.y_axis.y);
+    offset += Vec2::new(to_uv.translation.x, to_uv.translation.y);
+    Ok(TextureLookup {
+        texture: TextureId(0),
+        offset: Vec2::new(offset.x, 1.0 - scale.y - offset.y),
+        rotation: 0.0,
+        scale,
+    })
+}
+
+/// Three numbers, one for all, or #rrggbb under the sRGB curve.
+fn rgb(child: &Element, value: &str) -> Result<Vec3, LoadError> {
+    if let Some(hex) = value.trim().strip_prefix('#') {
+        let number = u32::from_str_radix(hex, 16).ok().filter(|_| hex.len() == 6);
+        let number = number.ok_or_else(|| child.error(format_args!("\"{value}\" is not #rrggbb")))?;
+        let channel = |shift: u32| srgb_to_linear((number >> shift & 0xff) as f32 / 255.0);
+        return Ok(Vec3::new(channel(16), channel(8), channel(0)));
+    }
+    match child.numbers(value)?.as_slice() {
+        &[all] => Ok(Vec3::splat(all)),
+        &[r, g, b] => Ok(Vec3::new(r, g, b)),
+        other => Err(child.error(format_args!("expected one or three numbers, found {}", other.len()))),
+    }
+}
+
+/// Planck's law in W m⁻² sr⁻¹ nm⁻¹, as Mitsuba's spectra are, times `scale`.
+fn blackbody(child: &Element) -> Result<Vec3, LoadError> {
+    let text = child.attribute("temperature").unwrap_or("").trim().trim_end_matches(['K', 'k']);
+    let kelvin = child.numbers(text)?.first().copied().map(f64::from).unwrap_or(0.0);
+    let spectrum =
+        Spectrum::blackbody(kelvin).ok_or_else(|| child.error("expected a temperature in kelvin above 0"))?;
+    let scale = if child.attribute("scale").is_some() { child.number_attribute("scale")? } else { 1.0 };
+    // Radiance at the peak: 4.0957e-15 W m⁻² sr⁻¹ nm⁻¹ K⁻⁵ · T⁵.
+    let color = spectrum.emission() * (4.0957e-15 * kelvin.powi(5)) as f32 * scale;
+    if color.is_finite() { Ok(color) } else { Err(child.error("the temperature is too high")) }
+}

@@ -1,0 +1,179 @@
+//! `Camera` and `Film`: projection, lens, picture size, crop, and what the sensor multiplies.
+
+use super::super::builder::NamedCamera;
+use super::super::error::LoadError;
+use super::Reader;
+use super::state::Transforms;
+use crate::scene::{Camera, FilmDefaults, Motion, Projection, ScreenWindow};
+use glam::{Affine3A, Vec2, Vec3};
+
+/// Widest and highest picture that a file may ask for.
+const LONGEST_SIDE: i64 = 32_768;
+
+/// A rectangle of the film in shares of it, from the upper left corner.
+struct Crop {
+    min: Vec2,
+    max: Vec2,
+}
+
+impl Reader<'_> {
+    /// Puts the camera together once `WorldBegin` is reached.
+    pub(super) fn place_camera(&mut self) -> Result<(), LoadError> {
+        let (full, crop) = self.film_size()?;
+        let Some((kind, parameters, world_to_camera)) = self.camera.take() else {
+            return Ok(());
+        };
+        let opens = parameters.float_or("shutteropen", 0.0)?;
+        let closes = parameters.float_or("shutterclose", 1.0)?;
+        self.shutter = [opens, closes.max(opens)];
+        self.exposure = self.sensor(closes - opens)?;
+        let to_world = world_to_camera.inverse();
+        let placed = self.here(&to_world);
+        let axis = |vector| placed.transform_vector3(vector).try_normalize();
+        let (Some(forward), Some(up), Some(right)) = (axis(Vec3::Z), axis(Vec3::Y), axis(Vec3::X)) else {
+            return Err(parameters.error("the camera's transform cannot be undone"));
+        };
+        let position = Vec3::from(placed.translation);
+        if !position.is_finite() || forward.cross(up).length() < 1e-5 {
+            return Err(parameters.error("the camera's transform cannot be undone"));
+        }
+        let aspect = parameters.float("frameaspectratio")?.filter(|&aspect| aspect > 0.0);
+        let aspect = aspect.unwrap_or(full.width as f32 / full.height as f32);
+        let window = match parameters.numbers(&["float"], "screenwindow")? {
+            // The shorter side spans [−1, 1].
+            None => ScreenWindow {
+                min: -Vec2::new(aspect.max(1.0), (1.0 / aspect).max(1.0)),
+                max: Vec2::new(aspect.max(1.0), (1.0 / aspect).max(1.0)),
+            },
+            Some(&[left, right, bottom, top]) if left < right && bottom < top => {
+                ScreenWindow { min: Vec2::new(left as f32, bottom as f32), max: Vec2::new(right as f32, top as f32) }
+            }
+            Some(_) => return Err(parameters.error("\"screenwindow\": expected [ left right bottom top ]")),
+        };
+        let is_usual = window.min == -window.max && aspect >= 1.0 && window.max == Vec2::new(aspect, 1.0);
+        let projection = match kind.as_str() {
+            "perspective" | "realistic" => {
+                if kind == "realistic" {
+                    self.builder
+                        .note("The lens system of a \"realistic\" camera is not traced: a pinhole of 45 degrees.");
+                }
+                let fov = parameters.float_or("fov", if kind == "realistic" { 45.0 } else { 90.0 })?;
+                if !(0.001..=179.0).contains(&fov) {
+                    return Err(parameters.error(format_args!("\"fov\" must lie in [0.001, 179] degrees, not {fov}")));
+                }
+                Projection::Perspective { vertical_fov_deg: fov }
+            }
+            "orthographic" => Projection::Orthographic { height: 2.0 },
+            other => {
+                return Err(parameters.unsupported(format_args!(
+                    "cameras of type \"{other}\" are not rendered; perspective and orthographic are"
+                )));
+            }
+        };
+        let camera = Camera {
+            projection,
+            screen_window: (!is_usual || crop.is_some()).then(|| cropped(window, crop)),
+            mirrored: forward.cross(up).dot(right) < 0.0,
+            aperture_radius: parameters.float_or("lensradius", 0.0)?.max(0.0),
+            focus_distance: parameters.float_or("focaldistance", 1e6)?.max(1e-6),
+            motion: self.motion(&to_world).map(|m| m.since_open()),
+            ..Camera::pinhole(position, forward, up, 40.0)
+        };
+        self.note_unread("camera", &parameters);
+        self.builder.cameras.push(NamedCamera { name: kind, camera });
+        Ok(())
+    }
+
+    /// Where a transform is when the shutter opens.
+    pub(super) fn here(&self, transforms: &Transforms) -> Affine3A {
+        transforms.at(self.share_of(self.shutter[0]))
+    }
+
+    /// The motion while the shutter is open; `None` where nothing moves.
+    pub(super) fn motion(&self, transforms: &Transforms) -> Option<Motion> {
+        if !transforms.moves() || self.shutter[1] <= self.shutter[0] {
+            return None;
+        }
+        let at = |time| transforms.at(self.share_of(time));
+        let (open, close) = (at(self.shutter[0]), at(self.shutter[1]));
+        let invertible = |transform: &Affine3A| transform.is_finite() && transform.matrix3.determinant() != 0.0;
+        (invertible(&open) && invertible(&close)).then(|| Motion::between(open, close)).filter(|motion| !motion.rests())
+    }
+
+    /// How far a time lies between those of `TransformTimes`.
+    fn share_of(&self, time: f32) -> f32 {
+        let [start, end] = self.times;
+        let time = time + self.options.frame_time as f32;
+        if end > start { ((time - start) / (end - start)).clamp(0.0, 1.0) } else { 0.0 }
+    }
+
+    /// The film's size, and the part of it that is rendered.
+    fn film_size(&mut self) -> Result<(FilmDefaults, Option<Crop>), LoadError> {
+        let Some((_, film)) = &self.film else {
+            let default = FilmDefaults { width: 1280, height: 720 };
+            self.builder.film = default;
+            return Ok((default, None));
+        };
+        let side = |name: &str, default: i64| match film.integer(name)?.unwrap_or(default) {
+            side @ 1..=LONGEST_SIDE => Ok(side as u32),
+            other => Err(film.error(format_args!("\"{name}\" must lie in [1, {LONGEST_SIDE}], not {other}"))),
+        };
+        let full = FilmDefaults { width: side("xresolution", 1280)?, height: side("yresolution", 720)? };
+        let size = Vec2::new(full.width as f32, full.height as f32);
+        let shares = match (film.numbers(&["float"], "cropwindow")?, film.numbers(&["integer"], "pixelbounds")?) {
+            (Some(&[x0, x1, y0, y1]), None) => Some([x0, x1, y0, y1].map(|share| share as f32)),
+            (None, Some(&[x0, x1, y0, y1])) => {
+                let [x0, x1, y0, y1] = [x0, x1, y0, y1].map(|pixel| pixel as f32);
+                Some([x0 / size.x, x1 / size.x, y0 / size.y, y1 / size.y])
+            }
+            (None, None) => None,
+            _ => return Err(film.error("expected four numbers in either \"cropwindow\" or \"pixelbounds\"")),
+        };
+        let Some([x0, x1, y0, y1]) = shares.map(|shares| shares.map(|share| share.clamp(0.0, 1.0))) else {
+            self.builder.film = full;
+            return Ok((full, None));
+        };
+        let (first, last) = ((Vec2::new(x0, y0) * size).ceil(), (Vec2::new(x1, y1) * size).ceil());
+        let pixels = last - first;
+        if pixels.min_element() < 1.0 {
+            return Err(film.error("the crop leaves no pixel"));
+        }
+        self.builder.film = FilmDefaults { width: pixels.x as u32, height: pixels.y as u32 };
+        Ok((full, Some(Crop { min: first / size, max: last / size })))
+    }
+
+    /// What the sensor multiplies radiance by: exposure time × ISO / 100.
+    fn sensor(&mut self, seconds: f32) -> Result<f32, LoadError> {
+        let Some((kind, film)) = self.film.take() else { return Ok(1.0) };
+        if kind != "rgb" {
+            self.builder.note(format!("Film \"{kind}\" is rendered as \"rgb\"."));
+        }
+        if film.string("sensor")?.is_some_and(|sensor| sensor != "cie1931")
+            || film.float("whitebalance")?.is_some_and(|kelvin| kelvin > 0.0)
+        {
+            self.builder.note("The sensor's own colour response and white balance are not rendered, its exposure is.");
+        }
+        let ratio = seconds * film.float_or("iso", 100.0)? / 100.0;
+        for (type_, name) in [
+            ("string", "filename"),
+            ("float", "diagonal"),
+            ("bool", "savefp16"),
+            ("float", "maxcomponentvalue"),
+            ("string", "coordinatesystem"),
+        ] {
+            film.find(&[type_], name);
+        }
+        self.note_unread("film", &film);
+        Ok(if ratio > 0.0 && ratio.is_finite() { ratio } else { 1.0 })
+    }
+}
+
+fn cropped(window: ScreenWindow, crop: Option<Crop>) -> ScreenWindow {
+    let Some(Crop { min, max }) = crop else { return window };
+    let size = window.max - window.min;
+    // The film's rows run down, the window's y runs up.
+    ScreenWindow {
+        min: Vec2::new(window.min.x + min.x * size.x, window.max.y - max.y * size.y),
+        max: Vec2::new(window.min.x + max.x * size.x, window.max.y - min.y * size.y),
+    }
+}

@@ -1,0 +1,193 @@
+//! `LightSource`, and the radiance of `AreaLightSource`.
+//!
+//! A light's RGB is radiance as it stands, any other spectrum gives luminance 1 (see [`super::inputs`]); `power` is lumen
+//! and `illuminance` lux, spread as pbrt-v4 does (its `lights.cpp`).
+
+use super::super::error::LoadError;
+use super::super::texture::{Adjust, IfMissing, Picture, Request};
+use super::super::{environment, luminance};
+use super::Reader;
+use super::inputs::Meaning;
+use super::parameters::Parameters;
+use crate::scene::{ColorInput, Encoding, Environment, Light, Parametrisation, SpotFalloff, TextureLookup, Wrap};
+use glam::{Affine3A, Mat3, Vec3};
+use std::f32::consts::{PI, TAU};
+use std::sync::Arc;
+
+/// What an area light gives.
+pub(super) struct Emission {
+    pub(super) radiance: ColorInput,
+    pub(super) both_sides: bool,
+    /// Luminous power of each shape, for which `radiance` is scaled once its area is known.
+    pub(super) lumen: Option<f32>,
+}
+
+impl Reader<'_> {
+    /// `LightSource`.
+    pub(super) fn light(&mut self, kind: &str, parameters: &Parameters) -> Result<(), LoadError> {
+        let to_world = self.here(&self.state.transforms);
+        if self.state.transforms.moves() {
+            self.builder.note("Lights do not move: they stay where they are when the shutter opens.");
+        }
+        match kind {
+            "point" => {
+                let intensity = self.light_color(parameters, "I", 2.0 * TAU)?;
+                let from = parameters.point("from")?.unwrap_or(Vec3::ZERO);
+                self.builder.lights.push(Light::Point { position: to_world.transform_point3(from), intensity });
+            }
+            "spot" => self.spot(parameters, &to_world)?,
+            "distant" => {
+                let (from, to) = (parameters.point("from")?, parameters.point("to")?);
+                let travels = to.unwrap_or(Vec3::Z) - from.unwrap_or(Vec3::ZERO);
+                let direction = to_world.transform_vector3(travels).try_normalize();
+                let direction = direction.ok_or_else(|| parameters.error("\"from\" and \"to\" are the same point"))?;
+                let illuminance = self.positive(parameters, "illuminance")?;
+                let irradiance = self.light_color(parameters, "L", 1.0)? * illuminance.unwrap_or(1.0);
+                self.builder.lights.push(Light::Directional { direction, irradiance, angular_radius: 0.0 });
+            }
+            "infinite" => {
+                let environment = self.infinite(parameters, &to_world)?;
+                self.add_environment(environment);
+            }
+            "goniometric" => {
+                self.builder.note(format!(
+                    "{}: a goniometric light's pattern is not rendered: it shines alike in all directions.",
+                    parameters.place()
+                ));
+                parameters.string("filename")?;
+                let intensity = self.light_color(parameters, "I", 2.0 * TAU)?;
+                let position = Vec3::from(to_world.translation);
+                self.builder.lights.push(Light::Point { position, intensity });
+            }
+            "projection" => return Err(parameters.unsupported("lights of type \"projection\" are not rendered")),
+            other => return Err(parameters.error(format_args!("unknown light \"{other}\""))),
+        }
+        self.note_unread(&format!("light \"{kind}\""), parameters);
+        Ok(())
+    }
+
+    fn positive(&mut self, parameters: &Parameters, name: &str) -> Result<Option<f32>, LoadError> {
+        let value = parameters.float(name)?.filter(|&value| value > 0.0);
+        self.is_photometric |= value.is_some();
+        Ok(value)
+    }
+
+    /// The light's colour times its scale, the sensor's and, where `power` is given, that over `full` steradian.
+    fn light_color(&mut self, parameters: &Parameters, name: &str, full: f32) -> Result<Vec3, LoadError> {
+        let color = self.color(parameters, name, Meaning::Light)?.unwrap_or(Vec3::ONE);
+        let scale = parameters.float_or("scale", 1.0)?.max(0.0);
+        let power = self.positive(parameters, "power")?.map_or(1.0, |lumen| lumen / full);
+        Ok(color * scale * power * self.exposure)
+    }
+
+    fn spot(&mut self, parameters: &Parameters, to_world: &Affine3A) -> Result<(), LoadError> {
+        let from = parameters.point("from")?.unwrap_or(Vec3::ZERO);
+        let to = parameters.point("to")?.unwrap_or(Vec3::Z);
+        let direction = to_world.transform_vector3(to - from).try_normalize();
+        let direction = direction.ok_or_else(|| parameters.error("\"from\" and \"to\" are the same point"))?;
+        let outer = parameters.float_or("coneangle", 30.0)?;
+        let delta = parameters.float_or("conedeltaangle", 5.0)?;
+        if !(0.0..=90.0).contains(&outer) || delta < 0.0 {
+            return Err(parameters.error("\"coneangle\" must lie in [0, 90], \"conedeltaangle\" must not be negative"));
+        }
+        let (outer_angle, inner_angle) = (outer.to_radians(), (outer - delta).max(0.0).to_radians());
+        let (inner_cos, outer_cos) = (inner_angle.cos(), outer_angle.cos());
+        let full = TAU * ((1.0 - inner_cos) + (inner_cos - outer_cos) / 2.0);
+        let intensity = self.light_color(parameters, "I", full)?;
+        self.builder.lights.push(Light::Spot {
+            position: to_world.transform_point3(from),
+            direction,
+            intensity,
+            inner_angle,
+            outer_angle,
+            falloff: SpotFalloff::Smoothstep,
+        });
+        Ok(())
+    }
+
+    fn infinite(&mut self, parameters: &Parameters, to_world: &Affine3A) -> Result<Environment, LoadError> {
+        if parameters.find(&["point3", "point"], "portal").is_some() {
+            self.builder.note("An infinite light's portal is not used; its picture is rendered all around.");
+        }
+        let scale = parameters.float_or("scale", 1.0)?.max(0.0) * self.exposure;
+        let illuminance = self.positive(parameters, "illuminance")?;
+        let Some(file) = parameters.string("filename")? else {
+            let color = self.color(parameters, "L", Meaning::Light)?.unwrap_or(Vec3::ONE);
+            // pbrt takes a uniform hemisphere of luminance 1 for π lux.
+            return Ok(Environment::constant(color * scale * illuminance.map_or(1.0, |lux| lux / PI)));
+        };
+        let file = self.file(file);
+        let mut environment = environment::read(&file, Parametrisation::EqualArea)
+            .map_err(|error| error.referenced_from(parameters.place()))?;
+        environment.from_world = rotation(to_world).transpose();
+        environment.scale = scale;
+        if let Some(lux) = illuminance {
+            let up = environment.from_world.transpose() * Vec3::Z;
+            let present = luminance(environment.irradiance(up)) / scale.max(f32::MIN_POSITIVE);
+            if present > 0.0 {
+                environment.scale *= lux / present;
+            }
+        }
+        Ok(environment)
+    }
+
+    /// One environment is rendered: constant ones are added to it, a second picture is left out.
+    fn add_environment(&mut self, new: Environment) {
+        let Some(present) = self.builder.environment.take() else {
+            self.builder.environment = Some(new);
+            return;
+        };
+        let is_constant = |environment: &Environment| environment.texels.len() == 1;
+        let (picture, constant) = if is_constant(&new) { (present, new) } else { (new, present) };
+        if !is_constant(&constant) {
+            self.builder.note("Several infinite lights with pictures: only the first one is rendered.");
+            self.builder.environment = Some(constant);
+            return;
+        }
+        let added = constant.texels[0] * constant.scale;
+        let texels = picture.texels.iter().map(|&texel| texel * picture.scale + added).collect();
+        self.builder.environment = Some(Environment { texels: Arc::new(texels), scale: 1.0, ..picture });
+    }
+
+    /// What the current area light gives.
+    pub(super) fn emission(&mut self, parameters: &Parameters) -> Result<Emission, LoadError> {
+        let lumen = self.positive(parameters, "power")?;
+        let scale = parameters.float_or("scale", 1.0)?.max(0.0) * self.exposure;
+        let radiance = match parameters.string("filename")? {
+            None => {
+                let color = self.color(parameters, "L", Meaning::Light)?.unwrap_or(Vec3::ONE);
+                ColorInput::constant(color * scale)
+            }
+            Some(file) => {
+                let request = Request {
+                    picture: Picture::File(self.file(file)),
+                    encoding: Encoding::Srgb,
+                    wrap_u: Wrap::Clamp,
+                    wrap_v: Wrap::Clamp,
+                    nearest: false,
+                    if_missing: IfMissing::Fail(parameters.place()),
+                    adjust: Adjust::NONE,
+                };
+                if lumen.is_some() {
+                    let note = format!("{}: \"power\" of a picture is spread as if it were white.", parameters.place());
+                    self.builder.note(note);
+                }
+                let texture = self.builder.textures.add(request);
+                ColorInput { factor: Vec3::splat(scale), texture: Some(TextureLookup::plain(texture)) }
+            }
+        };
+        let both_sides = parameters.boolean_or("twosided", false)?;
+        self.note_unread("area light", parameters);
+        Ok(Emission { radiance, both_sides, lumen })
+    }
+}
+
+/// The rotation (or reflection) of a transform, without its scale.
+pub(super) fn rotation(transform: &Affine3A) -> Mat3 {
+    let [x, y, z] = [transform.matrix3.x_axis, transform.matrix3.y_axis, transform.matrix3.z_axis].map(Vec3::from);
+    let x = x.normalize_or(Vec3::X);
+    let across = y - y.dot(x) * x;
+    let y = across.try_normalize().unwrap_or_else(|| x.any_orthonormal_vector());
+    let upright = x.cross(y);
+    Mat3::from_cols(x, y, if upright.dot(z) < 0.0 { -upright } else { upright })
+}

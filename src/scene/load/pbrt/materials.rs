@@ -1,0 +1,255 @@
+//! `Material` and its named kin, and the media behind their surfaces.
+
+use super::super::error::{LoadError, suggestion};
+use super::super::spectrum::named;
+use super::super::texture::{Adjust, IfMissing, Picture, Request};
+use super::Reader;
+use super::inputs::Meaning;
+use super::parameters::Parameters;
+use crate::scene::{
+    ColorInput, Distribution, Encoding, Material, Roughness, RoughnessScale, ScalarInput, Surface, TextureLookup, Wrap,
+};
+use glam::Vec3;
+use std::rc::Rc;
+
+/// Deepest nesting of mixes.
+const DEEPEST: usize = 16;
+
+/// The materials that are read, for messages.
+const KNOWN: [&str; 9] = [
+    "diffuse",
+    "coateddiffuse",
+    "coatedconductor",
+    "conductor",
+    "dielectric",
+    "thindielectric",
+    "diffusetransmission",
+    "mix",
+    "interface",
+];
+
+/// A material as it was written; it is converted when a shape uses it.
+#[derive(Debug)]
+pub(super) struct Definition {
+    pub(super) name: String,
+    pub(super) kind: String,
+    pub(super) parameters: Parameters,
+}
+
+/// A medium as far as surfaces can show it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Medium {
+    /// Absorption coefficient per scene unit.
+    pub(super) absorption: Vec3,
+}
+
+impl Reader<'_> {
+    /// `MakeNamedMedium`: absorption is kept, scattering and its like are named.
+    pub(super) fn medium(&mut self, name: &str, parameters: &Parameters) -> Result<(), LoadError> {
+        let kind = parameters.string("type")?.unwrap_or("homogeneous");
+        if kind != "homogeneous" {
+            return Err(parameters.unsupported(format_args!(
+                "medium \"{name}\": volumes of type \"{kind}\" are not rendered; homogeneous absorption behind glass is"
+            )));
+        }
+        let scale = parameters.float_or("scale", 1.0)?;
+        let absorption = self.color(parameters, "sigma_a", Meaning::Coefficient)?;
+        let scattering = self.color(parameters, "sigma_s", Meaning::Coefficient)?;
+        if parameters.string("preset")?.is_some() {
+            self.builder.note(format!("Medium \"{name}\": presets are not known; it absorbs nothing."));
+        } else if scattering.is_none_or(|s| s.max_element() > 0.0) {
+            self.builder.note(format!("Medium \"{name}\": its absorption is rendered, its scattering is not."));
+        }
+        // pbrt's defaults are the coefficients of milk-like stuff, in mm⁻¹.
+        let absorption = absorption.unwrap_or(Vec3::new(0.0011, 0.0024, 0.014)) * scale;
+        self.media.insert(name.to_owned(), Medium { absorption: absorption.max(Vec3::ZERO) });
+        parameters.find(&["float"], "g");
+        parameters.find(&["rgb", "spectrum", "blackbody"], "Le");
+        self.note_unread(&format!("medium \"{name}\""), parameters);
+        Ok(())
+    }
+
+    /// The material of a name.
+    pub(super) fn named_material(&self, user: &Parameters, name: &str) -> Result<Rc<Definition>, LoadError> {
+        self.named_materials.get(name).cloned().ok_or_else(|| {
+            let mut known: Vec<&str> = self.named_materials.keys().map(String::as_str).collect();
+            known.sort_unstable();
+            user.error(format_args!("there is no material \"{name}\"{}", suggestion(name, known)))
+        })
+    }
+
+    /// Our material; `None` for one that is not there ("interface").
+    pub(super) fn convert_material(&mut self, definition: &Definition) -> Result<Option<Material>, LoadError> {
+        let parameters = &definition.parameters;
+        let Some(surface) = self.surface(definition, 0)? else { return Ok(None) };
+        if surface.components() > Surface::MOST_COMPONENTS {
+            let most = Surface::MOST_COMPONENTS;
+            return Err(parameters.unsupported(format_args!("mixes of more than {most} materials are not rendered")));
+        }
+        let mut material = Material::plain(definition.name.clone(), surface);
+        if let Some(file) = parameters.string("normalmap")? {
+            let request = Request {
+                picture: Picture::File(self.file(file)),
+                encoding: Encoding::Linear,
+                wrap_u: Wrap::Repeat,
+                wrap_v: Wrap::Repeat,
+                nearest: false,
+                if_missing: IfMissing::Fail(parameters.place()),
+                adjust: Adjust::NONE,
+            };
+            material.normal_map = Some((TextureLookup::plain(self.builder.textures.add(request)), 1.0));
+        }
+        if parameters.find(&["float", "texture"], "displacement").is_some() {
+            self.builder.note(format!("{}: displacement is not rendered: the surface is smooth.", parameters.place()));
+        }
+        self.note_unread(&format!("material \"{}\"", definition.name), parameters);
+        Ok(Some(material))
+    }
+
+    fn surface(&mut self, definition: &Definition, depth: usize) -> Result<Option<Surface>, LoadError> {
+        let parameters = &definition.parameters;
+        let surface = match definition.kind.as_str() {
+            "diffuse" => Surface::Diffuse { reflectance: self.reflectance(parameters, 0.5)? },
+            "coateddiffuse" => {
+                self.note_coat(parameters);
+                Surface::CoatedDiffuse {
+                    reflectance: self.reflectance(parameters, 0.5)?,
+                    ior: self.ior(parameters, "eta", 1.5)?.max(1.0),
+                    roughness: self.roughness(parameters, "")?,
+                    saturates: true,
+                }
+            }
+            "coatedconductor" => {
+                self.note_coat(parameters);
+                let (eta, k) = self.metal(parameters, "conductor.")?;
+                Surface::CoatedConductor {
+                    eta,
+                    k,
+                    roughness: self.roughness(parameters, "conductor.")?,
+                    coat_ior: self.ior(parameters, "interface.eta", 1.5)?.max(1.0),
+                    coat_roughness: self.roughness(parameters, "interface.")?,
+                }
+            }
+            "conductor" => {
+                let (eta, k) = self.metal(parameters, "")?;
+                Surface::conductor(eta, k, self.roughness(parameters, "")?)
+            }
+            "dielectric" => Surface::Dielectric {
+                ior: self.ior(parameters, "eta", 1.5)?,
+                roughness: self.roughness(parameters, "")?,
+                transmittance: ColorInput::constant(Vec3::ONE),
+                absorption: Vec3::ZERO,
+            },
+            "thindielectric" => Surface::ThinDielectric {
+                ior: self.ior(parameters, "eta", 1.5)?,
+                transmittance: ColorInput::constant(Vec3::ONE),
+            },
+            "diffusetransmission" => {
+                let scale = parameters.float_or("scale", 1.0)?.clamp(0.0, 1.0);
+                let scaled = |color: ColorInput| ColorInput { factor: color.factor * scale, ..color };
+                let transmittance = self.color_input(parameters, "transmittance", Meaning::Reflectance)?;
+                Surface::DiffuseTransmission {
+                    reflectance: scaled(self.reflectance(parameters, 0.25)?),
+                    transmittance: scaled(transmittance.unwrap_or(ColorInput::constant(Vec3::splat(0.25)))),
+                }
+            }
+            "mix" => return self.mix(parameters, depth),
+            "interface" | "none" | "" => return Ok(None),
+            "subsurface" => {
+                self.builder.note(format!(
+                    "{}: light below the surface is not rendered: \"subsurface\" is a coated diffuse surface.",
+                    parameters.place()
+                ));
+                Surface::CoatedDiffuse {
+                    reflectance: self.reflectance(parameters, 0.5)?,
+                    ior: self.ior(parameters, "eta", 1.33)?.max(1.0),
+                    roughness: self.roughness(parameters, "")?,
+                    saturates: true,
+                }
+            }
+            other @ ("hair" | "measured") => {
+                return Err(parameters
+                    .unsupported(format_args!("material \"{other}\" is not rendered; {} are", KNOWN.join(", "))));
+            }
+            other => {
+                return Err(parameters.error(format_args!("unknown material \"{other}\"{}", suggestion(other, KNOWN))));
+            }
+        };
+        Ok(Some(surface))
+    }
+
+    fn note_coat(&mut self, parameters: &Parameters) {
+        let thick = parameters.find(&["rgb", "spectrum", "texture"], "albedo").is_some();
+        for (kind, name) in [("float", "thickness"), ("float", "g"), ("integer", "maxdepth"), ("integer", "nsamples")] {
+            parameters.find(&[kind, "texture"], name);
+        }
+        if thick {
+            self.builder.note(format!("{}: the medium inside the coat is not rendered.", parameters.place()));
+        }
+    }
+
+    fn mix(&mut self, parameters: &Parameters, depth: usize) -> Result<Option<Surface>, LoadError> {
+        if depth > DEEPEST {
+            return Err(parameters.error("mixes are nested too deeply, or a mix uses itself"));
+        }
+        let [first, second] = parameters.strings("materials")? else {
+            return Err(parameters.error("a mix needs \"string materials\" with two names"));
+        };
+        let amount = self.scalar_input(parameters, "amount")?.unwrap_or(ScalarInput::constant(0.5));
+        let mut parts = Vec::new();
+        for name in [first, second] {
+            let definition = self.named_material(parameters, name)?;
+            let surface = self.surface(&definition, depth + 1)?;
+            // Nested mixes double at each level: stop before they are many.
+            let most = Surface::MOST_COMPONENTS;
+            if surface.as_ref().is_some_and(|surface| surface.components() > most) {
+                return Err(
+                    parameters.unsupported(format_args!("mixes of more than {most} materials are not rendered"))
+                );
+            }
+            parts.push(surface.ok_or_else(|| parameters.unsupported("a mix with \"interface\" is not rendered"))?);
+        }
+        let (Some(second), Some(first)) = (parts.pop(), parts.pop()) else { return Ok(None) };
+        Ok(Some(Surface::Mix { first: Box::new(first), second: Box::new(second), amount }))
+    }
+
+    fn reflectance(&mut self, parameters: &Parameters, default: f32) -> Result<ColorInput, LoadError> {
+        let color = self.color_input(parameters, "reflectance", Meaning::Reflectance)?;
+        Ok(color.unwrap_or(ColorInput::constant(Vec3::splat(default))))
+    }
+
+    /// η and k, or those that reflect a colour at normal incidence as pbrt makes them: η = 1, k = 2√r / √(1 − r).
+    fn metal(&mut self, parameters: &Parameters, prefix: &str) -> Result<(Vec3, Vec3), LoadError> {
+        for name in [format!("{prefix}reflectance"), "reflectance".to_owned()] {
+            if let Some(color) = self.color_input(parameters, &name, Meaning::Reflectance)? {
+                if color.texture.is_some() {
+                    let note = format!("{}: a metal's textured reflectance is its factor.", parameters.place());
+                    self.builder.note(note);
+                }
+                let r = color.factor.clamp(Vec3::ZERO, Vec3::splat(0.9999));
+                return Ok((Vec3::ONE, 2.0 * (r / (Vec3::ONE - r)).powf(0.5)));
+            }
+        }
+        let copper = named::metal("Cu").map_or((Vec3::ONE, Vec3::ONE), |metal| (metal.eta, metal.k));
+        let eta = self.color(parameters, &format!("{prefix}eta"), Meaning::Coefficient)?.unwrap_or(copper.0);
+        let k = self.color(parameters, &format!("{prefix}k"), Meaning::Coefficient)?.unwrap_or(copper.1);
+        if eta.min_element() <= 0.0 {
+            return Err(parameters.error(format_args!("a metal's eta must be above 0 in every channel: {eta}")));
+        }
+        Ok((eta, k))
+    }
+
+    fn roughness(&mut self, parameters: &Parameters, prefix: &str) -> Result<Roughness, LoadError> {
+        let both = self.scalar_input(parameters, &format!("{prefix}roughness"))?.unwrap_or(ScalarInput::constant(0.0));
+        let u = self.scalar_input(parameters, &format!("{prefix}uroughness"))?.unwrap_or(both);
+        let v = self.scalar_input(parameters, &format!("{prefix}vroughness"))?.unwrap_or(both);
+        let remap = parameters.boolean_or("remaproughness", true)?;
+        let clamped = |input: ScalarInput| ScalarInput { factor: input.factor.clamp(0.0, 1.0), ..input };
+        Ok(Roughness {
+            u: clamped(u),
+            v: (u != v).then_some(clamped(v)),
+            scale: if remap { RoughnessScale::SquareRoot } else { RoughnessScale::Alpha },
+            distribution: Distribution::Ggx,
+        })
+    }
+}

@@ -1,0 +1,229 @@
+//! pbrt-v4 scene files, by a reader of our own: the subset that scenes/README.md lists.
+//!
+//! pbrt's camera looks along +z with x to the right, so scenes written for it are left-handed or carry a mirroring camera
+//! transform; both end in [`Camera::mirrored`](crate::scene::Camera::mirrored). Radiance is multiplied by the sensor's
+//! exposure, so that pixels have pbrt's own values, and `nits_per_unit` divided by it. Integrators, samplers and filters
+//! are fechner's.
+
+mod camera;
+mod directives;
+mod inputs;
+mod lexer;
+mod lights;
+mod materials;
+mod parameters;
+mod shapes;
+mod state;
+mod textures;
+
+use super::LoadOptions;
+use super::builder::{Builder, IfDark};
+use super::error::{LoadError, suggestion};
+use crate::scene::{Alpha, Material, MaterialId, MeshId, ScalarInput, Scene, Surface};
+use parameters::Parameters;
+use state::{State, Transforms};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+
+/// Most placed shapes.
+const MOST_INSTANCES: usize = 4_000_000;
+/// Luminance of RGB (1, 1, 1) where no light of the file is photometric.
+const ASSUMED_NITS_PER_UNIT: f64 = 100.0;
+
+/// Reads a pbrt file.
+pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
+    let mut reader = Reader {
+        main: path.to_owned(),
+        file: path.to_owned(),
+        options,
+        builder: Builder::new(path),
+        state: State::new(),
+        stack: Vec::new(),
+        coordinate_systems: HashMap::new(),
+        textures: HashMap::new(),
+        named_materials: HashMap::new(),
+        media: HashMap::new(),
+        objects: HashMap::new(),
+        current_object: None,
+        converted: HashMap::new(),
+        keep_alive: Vec::new(),
+        ply_files: HashMap::new(),
+        camera: None,
+        film: None,
+        times: [0.0, 1.0],
+        shutter: [0.0, 0.0],
+        exposure: 1.0,
+        in_world: false,
+        is_photometric: false,
+        includes: 0,
+        made_vertices: 0,
+    };
+    reader.read_file(path)?;
+    reader.finish(path)
+}
+
+/// A shape of an object that may be placed many times.
+struct Part {
+    name: String,
+    mesh: MeshId,
+    material: MaterialId,
+    transforms: Transforms,
+}
+
+/// What makes a material of its own out of a definition.
+type MaterialKey = (usize, usize, Option<String>, Option<String>);
+
+struct Reader<'a> {
+    /// The file that was asked for, and the one that is being read.
+    main: PathBuf,
+    file: PathBuf,
+    options: &'a LoadOptions,
+    builder: Builder,
+    state: State,
+    /// Saved states, and what opened them.
+    stack: Vec<(State, &'static str)>,
+    coordinate_systems: HashMap<String, Transforms>,
+    textures: HashMap<(&'static str, String), Rc<textures::Definition>>,
+    named_materials: HashMap<String, Rc<materials::Definition>>,
+    media: HashMap<String, materials::Medium>,
+    objects: HashMap<String, Vec<Part>>,
+    current_object: Option<String>,
+    /// By addresses of material and area light, alpha, and medium.
+    converted: HashMap<MaterialKey, Option<MaterialId>>,
+    /// Whatever has an address in `converted`.
+    keep_alive: Vec<(Rc<materials::Definition>, Option<Rc<Parameters>>)>,
+    ply_files: HashMap<(PathBuf, bool), MeshId>,
+    camera: Option<(String, Parameters, Transforms)>,
+    film: Option<(String, Parameters)>,
+    /// `TransformTimes`.
+    times: [f32; 2],
+    /// When the shutter opens and closes.
+    shutter: [f32; 2],
+    /// The sensor's factor.
+    exposure: f32,
+    in_world: bool,
+    is_photometric: bool,
+    includes: usize,
+    /// Of meshes that stand for spheres and their like.
+    made_vertices: usize,
+}
+
+impl Reader<'_> {
+    /// A file that this one names: beside it, or beside the first one.
+    fn file(&self, name: &str) -> PathBuf {
+        let beside = |file: &Path| file.parent().unwrap_or(Path::new("")).join(name);
+        let here = beside(&self.file);
+        if here.is_file() { here } else { beside(&self.main) }
+    }
+
+    /// The material of the next shape, with its light, alpha and medium; `None` where the surface is not there.
+    fn current_material(&mut self, shape: &Parameters, area: f64) -> Result<Option<MaterialId>, LoadError> {
+        let definition = self.state.material.clone().unwrap_or_else(|| {
+            Rc::new(materials::Definition {
+                name: "default".to_owned(),
+                kind: "diffuse".to_owned(),
+                parameters: Parameters::none(shape.place()),
+            })
+        });
+        let mut light = self.state.area_light.clone();
+        if light.is_some() && self.current_object.is_some() {
+            self.builder.note("Area lights inside objects do not shine, as in pbrt.");
+            light = None;
+        }
+        let alpha = shape.word(&["texture"], "alpha")?.map(str::to_owned);
+        let alpha_number = shape.float("alpha")?;
+        let medium = self.state.inside_medium.clone();
+        // Luminous power is shared out over each shape's own area: such materials are never the same.
+        let has_power = light.as_ref().is_some_and(|light| light.float("power").is_ok_and(|power| power.is_some()));
+        let address = |pointer: *const ()| pointer as usize;
+        let key = (
+            address(Rc::as_ptr(&definition).cast()),
+            light.as_ref().map_or(0, |light| address(Rc::as_ptr(light).cast())),
+            alpha.clone().or(alpha_number.map(|number| format!("= {number}"))),
+            medium.clone(),
+        );
+        if !has_power && let Some(id) = self.converted.get(&key) {
+            return Ok(*id);
+        }
+        let id = match self.convert_material(&definition)? {
+            None if light.is_none() => {
+                if medium.is_some() {
+                    return Err(
+                        shape.unsupported("a volume without a surface is not rendered; absorption behind glass is")
+                    );
+                }
+                self.builder.note("Shapes of material \"interface\" are not there.");
+                None
+            }
+            converted => {
+                let black = crate::scene::ColorInput::constant(glam::Vec3::ZERO);
+                let mut material = converted.unwrap_or_else(|| {
+                    Material::plain(definition.name.clone(), Surface::Diffuse { reflectance: black })
+                });
+                if let Some(light) = &light {
+                    let emission = self.emission(light)?;
+                    material.emission = emission.radiance;
+                    material.emits_both_sides = emission.both_sides;
+                    if let Some(lumen) = emission.lumen {
+                        let sides = if emission.both_sides { 2.0 } else { 1.0 };
+                        let radiance = f64::from(lumen) / (std::f64::consts::PI * area.max(f64::MIN_POSITIVE) * sides);
+                        material.emission.factor *= radiance.min(1e30) as f32;
+                    }
+                }
+                if let Some(texture) = alpha {
+                    material.alpha = Alpha::Blend { value: self.scalar_texture(shape, &texture, 0)? };
+                } else if let Some(number) = alpha_number.filter(|&number| number < 1.0) {
+                    material.alpha = Alpha::Blend { value: ScalarInput::constant(number.max(0.0)) };
+                }
+                if let Some(name) = medium {
+                    self.fill(&mut material, &name, shape)?;
+                }
+                Some(self.builder.add_material(material))
+            }
+        };
+        self.keep_alive.push((definition, light));
+        self.converted.insert(key, id);
+        Ok(id)
+    }
+
+    /// Puts the absorption of a medium behind a surface.
+    fn fill(&mut self, material: &mut Material, name: &str, shape: &Parameters) -> Result<(), LoadError> {
+        let Some(medium) = self.media.get(name) else {
+            let mut known: Vec<&str> = self.media.keys().map(String::as_str).collect();
+            known.sort_unstable();
+            return Err(shape.error(format_args!("there is no medium \"{name}\"{}", suggestion(name, known))));
+        };
+        match &mut material.surface {
+            Surface::Dielectric { absorption, .. } => *absorption = medium.absorption,
+            _ => self.builder.note(format!("Medium \"{name}\" is only rendered behind dielectric surfaces.")),
+        }
+        Ok(())
+    }
+
+    fn note_unread(&mut self, what: &str, parameters: &Parameters) {
+        let unread = parameters.unread();
+        if !unread.is_empty() {
+            self.builder.note(format!("{}: {what}: not used: {}.", parameters.place(), unread.join(", ")));
+        }
+    }
+
+    fn finish(mut self, path: &Path) -> Result<Scene, LoadError> {
+        if let Some((_, opened)) = self.stack.last() {
+            return Err(LoadError::invalid(path, format_args!("{opened} is never closed")));
+        }
+        if !self.in_world {
+            return Err(LoadError::invalid(path, "the file has no WorldBegin"));
+        }
+        let nits = if self.is_photometric {
+            1.0
+        } else {
+            self.builder.note(format!(
+                "Radiance has no unit in this file: 1 is taken as {ASSUMED_NITS_PER_UNIT} cd/m² (--nits-per-unit changes it)."
+            ));
+            ASSUMED_NITS_PER_UNIT
+        };
+        self.builder.nits_per_unit = nits / f64::from(self.exposure);
+        self.builder.finish(path, IfDark::StudioWithoutLight, self.options)
+    }
+}

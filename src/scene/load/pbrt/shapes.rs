@@ -1,0 +1,360 @@
+//! `Shape`: meshes, PLY files, spheres, disks, cylinders, bilinear patches.
+//!
+//! The front of a surface, from which one-sided lights shine and glass is told from air, is where pbrt has it: on the side of
+//! the shading normals where there are any, else by the winding, and turned over by `ReverseOrientation`.
+
+use super::super::error::LoadError;
+use super::super::{ply, shapes};
+use super::Reader;
+use super::parameters::Parameters;
+use crate::scene::{Instance, Mesh, MeshId, Sphere};
+use glam::{Affine3A, Vec2, Vec3};
+use std::f32::consts::{PI, TAU};
+
+/// Steps around a full turn and along the other parameter of a curved surface.
+const AROUND: u32 = 128;
+const ALONG: u32 = 64;
+
+/// A shape in its own coordinates.
+enum Shape {
+    Mesh(Mesh),
+    File(MeshId),
+    Sphere(f32),
+}
+
+impl Reader<'_> {
+    /// Adds a shape to the scene, or to the object that is being defined.
+    pub(super) fn shape(&mut self, kind: &str, parameters: &Parameters) -> Result<(), LoadError> {
+        let reverse = self.state.reverse_orientation;
+        let to_world = self.state.transforms;
+        let shape = match kind {
+            "trianglemesh" => Shape::Mesh(triangle_mesh(parameters, "indices")?),
+            "loopsubdiv" => {
+                let note = format!("{}: \"loopsubdiv\" is rendered as its control mesh.", parameters.place());
+                self.builder.note(note);
+                parameters.integer("levels")?;
+                parameters.string("scheme")?;
+                Shape::Mesh(triangle_mesh(parameters, "indices")?)
+            }
+            "bilinearmesh" => Shape::Mesh(bilinear_mesh(parameters)?),
+            "plymesh" => self.ply_mesh(parameters)?,
+            "sphere" => self.sphere(parameters)?,
+            "disk" => Shape::Mesh(disk(parameters)?),
+            "cylinder" => Shape::Mesh(cylinder(parameters)?),
+            "curve" => return Err(parameters.unsupported("shapes of type \"curve\" (hair, fur) are not rendered")),
+            other => {
+                let known = "trianglemesh, plymesh, sphere, disk, cylinder, bilinearmesh, loopsubdiv are read";
+                return Err(parameters.error(format_args!("unknown shape \"{other}\"; {known}")));
+            }
+        };
+        let placed = self.here(&to_world);
+        let motion = self.motion(&to_world);
+        let area = |mesh: &Mesh| shapes::area(mesh, &placed);
+        let shape = match shape {
+            // A sphere stays analytic while its transform leaves it one and nothing asks for pbrt's own coordinates.
+            Shape::Sphere(radius) => {
+                let scale = shapes::similarity_scale(&placed);
+                let scale = scale.filter(|_| !reverse && self.current_object.is_none() && !self.uses_textures());
+                match scale.map(|scale| radius * scale).filter(|radius| *radius > 0.0 && radius.is_finite()) {
+                    Some(radius) if placed.translation.is_finite() => {
+                        let area = 4.0 * f64::from(PI) * f64::from(radius) * f64::from(radius);
+                        let Some(material) = self.current_material(parameters, area)? else { return Ok(()) };
+                        self.note_unread("sphere", parameters);
+                        let motion = motion.map(|motion| motion.since_open());
+                        let center = Vec3::from(placed.translation);
+                        self.builder.spheres.push(Sphere {
+                            name: "sphere".to_owned(),
+                            center,
+                            radius,
+                            material,
+                            motion,
+                        });
+                        return Ok(());
+                    }
+                    _ => Shape::Mesh(whole_sphere(radius)),
+                }
+            }
+            other => other,
+        };
+        let (mesh, area) = match shape {
+            Shape::File(id) => (id, area(&self.builder.meshes[id.0 as usize])),
+            Shape::Mesh(mut mesh) => {
+                kind.clone_into(&mut mesh.name);
+                orient(&mut mesh, reverse);
+                let area = area(&mesh);
+                if kind != "trianglemesh" {
+                    self.made_vertices += mesh.positions.len();
+                    super::super::check_made_vertices(&self.main, self.made_vertices)?;
+                }
+                (self.builder.add_mesh(mesh), area)
+            }
+            Shape::Sphere(_) => return Ok(()),
+        };
+        let Some(material) = self.current_material(parameters, area)? else { return Ok(()) };
+        self.note_unread(&format!("shape \"{kind}\""), parameters);
+        let name = self.builder.meshes[mesh.0 as usize].name.clone();
+        match &self.current_object {
+            Some(object) => {
+                let parts = self.objects.entry(object.clone()).or_default();
+                parts.push(super::Part { name, mesh, material, transforms: to_world });
+            }
+            None => self.builder.instances.push(Instance { name, mesh, material, to_world: placed, motion }),
+        }
+        Ok(())
+    }
+
+    /// Whether the current material reads texture coordinates.
+    fn uses_textures(&self) -> bool {
+        let of = |parameters: &Parameters| parameters.has_textures();
+        self.state.material.as_ref().is_some_and(|definition| of(&definition.parameters) || definition.kind == "mix")
+            || self.state.area_light.as_ref().is_some_and(|light| of(light))
+    }
+
+    /// Each file is read once for each orientation.
+    fn ply_mesh(&mut self, parameters: &Parameters) -> Result<Shape, LoadError> {
+        let Some(file) = parameters.string("filename")? else {
+            return Err(parameters.error("a plymesh needs a \"string filename\""));
+        };
+        let key = (self.file(file), self.state.reverse_orientation);
+        for (kind, name) in [("float", "edgelength"), ("texture", "displacement")] {
+            if parameters.find(&[kind], name).is_some() {
+                self.builder.note(format!("{}: displacement is not rendered.", parameters.place()));
+            }
+        }
+        if let Some(id) = self.ply_files.get(&key) {
+            return Ok(Shape::File(*id));
+        }
+        let mut loaded = ply::read(&key.0).map_err(|error| error.referenced_from(parameters.place()))?;
+        orient(&mut loaded.mesh, key.1);
+        for note in loaded.notes {
+            self.builder.note(note);
+        }
+        let id = self.builder.add_mesh(loaded.mesh);
+        self.ply_files.insert(key, id);
+        Ok(Shape::File(id))
+    }
+
+    fn sphere(&mut self, parameters: &Parameters) -> Result<Shape, LoadError> {
+        let radius = radius(parameters)?;
+        let low = parameters.float_or("zmin", -radius)?;
+        let high = parameters.float_or("zmax", radius)?;
+        let turn = full_turn(parameters)?;
+        if low <= -radius && high >= radius && turn >= TAU {
+            return Ok(Shape::Sphere(radius));
+        }
+        let angle = |z: f32| (z / radius).clamp(-1.0, 1.0).acos();
+        let (first, last) = (angle(low.min(high)), angle(low.max(high)));
+        Ok(Shape::Mesh(grid(|u, v| {
+            let (sin_phi, cos_phi) = (turn * u).sin_cos();
+            let (sin_theta, cos_theta) = (first + (last - first) * v).sin_cos();
+            let normal = Vec3::new(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta);
+            (radius * normal, normal)
+        })))
+    }
+}
+
+fn radius(parameters: &Parameters) -> Result<f32, LoadError> {
+    let radius = parameters.float_or("radius", 1.0)?;
+    if radius > 0.0 {
+        Ok(radius)
+    } else {
+        Err(parameters.error(format_args!("\"radius\" must be above 0, not {radius}")))
+    }
+}
+
+fn full_turn(parameters: &Parameters) -> Result<f32, LoadError> {
+    Ok(parameters.float_or("phimax", 360.0)?.clamp(0.0, 360.0).to_radians())
+}
+
+/// A surface over (u, v) in [0, 1]² from its points and normals; v runs up in pbrt's coordinates.
+fn grid(surface: impl Fn(f32, f32) -> (Vec3, Vec3)) -> Mesh {
+    let mut mesh = Mesh::default();
+    for row in 0..=ALONG {
+        for column in 0..=AROUND {
+            let (u, v) = (column as f32 / AROUND as f32, row as f32 / ALONG as f32);
+            let (position, normal) = surface(u, v);
+            mesh.positions.push(position);
+            mesh.normals.push(normal);
+            mesh.uvs.push(Vec2::new(u, 1.0 - v));
+        }
+    }
+    for row in 0..ALONG {
+        for column in 0..AROUND {
+            let low = row * (AROUND + 1) + column;
+            let high = low + AROUND + 1;
+            mesh.triangles.push([low, low + 1, high]);
+            mesh.triangles.push([low + 1, high + 1, high]);
+        }
+    }
+    mesh
+}
+
+fn whole_sphere(radius: f32) -> Mesh {
+    grid(|u, v| {
+        let (sin_phi, cos_phi) = (TAU * u).sin_cos();
+        let (sin_theta, cos_theta) = (PI * (1.0 - v)).sin_cos();
+        let normal = Vec3::new(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta);
+        (radius * normal, normal)
+    })
+}
+
+/// A disk faces +z; the whole one is our own shape.
+fn disk(parameters: &Parameters) -> Result<Mesh, LoadError> {
+    let radius = radius(parameters)?;
+    let height = parameters.float_or("height", 0.0)?;
+    let inner = parameters.float_or("innerradius", 0.0)?.clamp(0.0, radius);
+    let turn = full_turn(parameters)?;
+    if inner == 0.0 && turn >= TAU {
+        return Ok(shapes::disk(Vec3::Z * height, Vec3::Z, radius));
+    }
+    Ok(grid(|u, v| {
+        let (sin, cos) = (turn * u).sin_cos();
+        let r = radius + (inner - radius) * v;
+        (Vec3::new(r * cos, r * sin, height), Vec3::Z)
+    }))
+}
+
+fn cylinder(parameters: &Parameters) -> Result<Mesh, LoadError> {
+    let radius = radius(parameters)?;
+    let (low, high) = (parameters.float_or("zmin", -1.0)?, parameters.float_or("zmax", 1.0)?);
+    let turn = full_turn(parameters)?;
+    Ok(grid(|u, v| {
+        let (sin, cos) = (turn * u).sin_cos();
+        (Vec3::new(radius * cos, radius * sin, low + (high - low) * v), Vec3::new(cos, sin, 0.0))
+    }))
+}
+
+/// Positions, normals and coordinates that all meshes have.
+fn vertices(parameters: &Parameters) -> Result<Mesh, LoadError> {
+    let Some(positions) = parameters.vec3s(&["point3", "point"], "P")? else {
+        return Err(parameters.error("the mesh has no \"point3 P\""));
+    };
+    let normals = parameters.vec3s(&["normal3", "normal"], "N")?.unwrap_or_default();
+    let mut uvs = parameters.vec2s("uv")?.unwrap_or_default();
+    uvs.iter_mut().for_each(|uv| uv.y = 1.0 - uv.y);
+    for (name, count) in [("N", normals.len()), ("uv", uvs.len())] {
+        if count != 0 && count != positions.len() {
+            let problem = format!("\"{name}\" has {count} entries for {} positions", positions.len());
+            return Err(parameters.error(problem));
+        }
+    }
+    parameters.find(&["vector3", "vector"], "S");
+    parameters.find(&["integer"], "faceIndices");
+    Ok(Mesh { positions, normals, uvs, ..Mesh::default() })
+}
+
+fn indices<const N: usize>(parameters: &Parameters, name: &str, vertices: usize) -> Result<Vec<[u32; N]>, LoadError> {
+    let Some(numbers) = parameters.numbers(&["integer"], name)? else {
+        // The list may be left out where there is just one face.
+        return if vertices == N {
+            Ok(vec![std::array::from_fn(|corner| corner as u32)])
+        } else {
+            Err(parameters.error(format_args!("the mesh has no \"integer {name}\"")))
+        };
+    };
+    let (faces, rest) = numbers.as_chunks::<N>();
+    if !rest.is_empty() {
+        return Err(parameters.error(format_args!("\"{name}\": {} numbers are not faces of {N}", numbers.len())));
+    }
+    if let Some(bad) = numbers.iter().find(|&&index| index.fract() != 0.0 || index < 0.0 || index >= vertices as f64) {
+        return Err(parameters.error(format_args!("\"{name}\" holds {bad}, but there are {vertices} positions")));
+    }
+    Ok(faces.iter().map(|face| face.map(|index| index as u32)).collect())
+}
+
+fn triangle_mesh(parameters: &Parameters, name: &str) -> Result<Mesh, LoadError> {
+    let mut mesh = vertices(parameters)?;
+    mesh.triangles = indices(parameters, name, mesh.positions.len())?;
+    Ok(mesh)
+}
+
+/// Patches as grids of 8 × 8: exact where they are flat.
+fn bilinear_mesh(parameters: &Parameters) -> Result<Mesh, LoadError> {
+    const STEPS: u32 = 8;
+    const MOST_PATCHES: usize = 1 << 17;
+    let from = vertices(parameters)?;
+    let patches: Vec<[u32; 4]> = indices(parameters, "indices", from.positions.len())?;
+    if patches.len() > MOST_PATCHES {
+        return Err(parameters.error(format_args!("more than {MOST_PATCHES} bilinear patches")));
+    }
+    let mut mesh = Mesh::default();
+    for patch in &patches {
+        let patch = patch.map(|corner| corner as usize);
+        let base = mesh.positions.len() as u32;
+        for row in 0..=STEPS {
+            for column in 0..=STEPS {
+                let (u, v) = (column as f32 / STEPS as f32, row as f32 / STEPS as f32);
+                // The corners' order is (0,0), (1,0), (0,1), (1,1).
+                let blend = |values: &[Vec3]| {
+                    let [a, b, c, d] = patch.map(|corner| values[corner]);
+                    a.lerp(b, u).lerp(c.lerp(d, u), v)
+                };
+                mesh.positions.push(blend(&from.positions));
+                if !from.normals.is_empty() {
+                    mesh.normals.push(blend(&from.normals));
+                }
+                mesh.uvs.push(if from.uvs.is_empty() {
+                    Vec2::new(u, 1.0 - v)
+                } else {
+                    let [a, b, c, d] = patch.map(|corner| from.uvs[corner]);
+                    a.lerp(b, u).lerp(c.lerp(d, u), v)
+                });
+            }
+        }
+        for row in 0..STEPS {
+            for column in 0..STEPS {
+                let low = base + row * (STEPS + 1) + column;
+                let high = low + STEPS + 1;
+                mesh.triangles.push([low, low + 1, high]);
+                mesh.triangles.push([low + 1, high + 1, high]);
+            }
+        }
+    }
+    Ok(mesh)
+}
+
+/// Winds every triangle so that its front is pbrt's.
+pub(super) fn orient(mesh: &mut Mesh, reverse: bool) {
+    shapes::face_along_normals(mesh);
+    if reverse {
+        mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+        mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
+    }
+}
+
+/// An instance of each part of an object.
+pub(super) fn place_part(reader: &Reader, part: &super::Part, transforms: &super::state::Transforms) -> Instance {
+    let total = transforms.then(&part.transforms);
+    let to_world: Affine3A = reader.here(&total);
+    Instance {
+        name: part.name.clone(),
+        mesh: part.mesh,
+        material: part.material,
+        to_world,
+        motion: reader.motion(&total),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outward_share(mesh: &Mesh) -> f32 {
+        let outward = mesh.triangles.iter().filter(|triangle| {
+            let [a, b, c] = triangle.map(|index| mesh.positions[index as usize]);
+            (b - a).cross(c - a).dot(a + b + c) >= 0.0
+        });
+        outward.count() as f32 / mesh.triangles.len() as f32
+    }
+
+    #[test]
+    fn spheres_face_outwards_and_reversed_ones_inwards() {
+        let mut mesh = whole_sphere(2.0);
+        orient(&mut mesh, false);
+        assert_eq!(outward_share(&mesh), 1.0);
+        let area = shapes::area(&mesh, &Affine3A::IDENTITY);
+        assert!((area / (16.0 * f64::from(PI)) - 1.0).abs() < 2e-3, "{area}");
+        orient(&mut mesh, true);
+        assert!(outward_share(&mesh) < 0.02);
+    }
+}

@@ -1,0 +1,272 @@
+//! `Texture`: image maps, constants, products, checkerboards. What else pbrt can compute is named and averaged.
+
+use super::super::error::{LoadError, suggestion};
+use super::super::texture::{Adjust, IfMissing, Picture, Request};
+use super::Reader;
+use super::inputs::Meaning;
+use super::parameters::Parameters;
+use crate::scene::{ColorInput, Encoding, ScalarInput, TextureLookup, Wrap};
+use glam::{Vec2, Vec3};
+use std::rc::Rc;
+
+/// Deepest chain of textures that use textures.
+const DEEPEST: usize = 32;
+
+/// A texture as it was written.
+pub(super) struct Definition {
+    kind: String,
+    parameters: Parameters,
+}
+
+impl Definition {
+    pub(super) fn new(kind: &str, parameters: Parameters) -> Self {
+        Self { kind: kind.to_owned(), parameters }
+    }
+}
+
+impl Reader<'_> {
+    /// A colour texture by name.
+    pub(super) fn color_texture(
+        &mut self,
+        user: &Parameters,
+        name: &str,
+        depth: usize,
+    ) -> Result<ColorInput, LoadError> {
+        let definition = self.find_texture(user, "spectrum", name, depth)?;
+        let parameters = &definition.parameters;
+        match definition.kind.as_str() {
+            "constant" => {
+                let value = self.color(parameters, "value", Meaning::Reflectance)?.unwrap_or(Vec3::ONE);
+                Ok(ColorInput::constant(value))
+            }
+            "imagemap" => {
+                let (lookup, scale) = self.image(parameters, Encoding::Srgb)?;
+                Ok(ColorInput { factor: Vec3::splat(scale), texture: Some(lookup) })
+            }
+            "scale" => {
+                let base = self.color_operand(parameters, "tex", Vec3::ONE, depth)?;
+                let factor = match self.scalar_operand(parameters, "scale", 1.0, depth)? {
+                    ScalarInput { factor, texture: None } => factor,
+                    ScalarInput { factor, .. } => {
+                        self.average(parameters, name, "its scale's texture");
+                        factor
+                    }
+                };
+                Ok(ColorInput { factor: base.factor * factor, texture: base.texture })
+            }
+            "mix" => {
+                let amount = self.scalar_operand(parameters, "amount", 0.5, depth)?;
+                let first = self.color_operand(parameters, "tex1", Vec3::ZERO, depth)?;
+                let second = self.color_operand(parameters, "tex2", Vec3::ONE, depth)?;
+                Ok(match (first.texture, second.texture, amount.texture) {
+                    (None, None, None) => ColorInput::constant(first.factor.lerp(second.factor, amount.factor)),
+                    _ => {
+                        self.average(parameters, name, "the mix of textures: the heavier one");
+                        if amount.factor < 0.5 { first } else { second }
+                    }
+                })
+            }
+            "checkerboard" => {
+                let colors = [
+                    self.color_operand(parameters, "tex1", Vec3::ONE, depth)?,
+                    self.color_operand(parameters, "tex2", Vec3::ZERO, depth)?,
+                ];
+                if colors.iter().any(|color| color.texture.is_some()) {
+                    self.average(parameters, name, "textures inside a checkerboard: their factors");
+                }
+                let lookup = self.checkerboard(parameters, colors.map(|color| color.factor))?;
+                Ok(ColorInput { factor: Vec3::ONE, texture: Some(lookup) })
+            }
+            other => {
+                self.average(parameters, name, &format!("a texture of type \"{other}\": grey 0.5"));
+                Ok(ColorInput::constant(Vec3::splat(0.5)))
+            }
+        }
+    }
+
+    /// A scalar texture by name.
+    pub(super) fn scalar_texture(
+        &mut self,
+        user: &Parameters,
+        name: &str,
+        depth: usize,
+    ) -> Result<ScalarInput, LoadError> {
+        let definition = self.find_texture(user, "float", name, depth)?;
+        let parameters = &definition.parameters;
+        match definition.kind.as_str() {
+            "constant" => Ok(ScalarInput::constant(parameters.float_or("value", 1.0)?)),
+            "imagemap" => {
+                let (lookup, factor) = self.image(parameters, Encoding::Srgb)?;
+                Ok(ScalarInput { factor, texture: Some((lookup, 0)) })
+            }
+            "scale" => {
+                let base = self.scalar_operand(parameters, "tex", 1.0, depth)?;
+                let scale = self.scalar_operand(parameters, "scale", 1.0, depth)?;
+                if base.texture.is_some() && scale.texture.is_some() {
+                    self.average(parameters, name, "its scale's texture");
+                }
+                Ok(ScalarInput { factor: base.factor * scale.factor, texture: base.texture.or(scale.texture) })
+            }
+            "mix" => {
+                let amount = self.scalar_operand(parameters, "amount", 0.5, depth)?.factor;
+                let first = self.scalar_operand(parameters, "tex1", 0.0, depth)?;
+                let second = self.scalar_operand(parameters, "tex2", 1.0, depth)?;
+                if first.texture.is_none() && second.texture.is_none() {
+                    return Ok(ScalarInput::constant(first.factor + (second.factor - first.factor) * amount));
+                }
+                self.average(parameters, name, "the mix of textures: the heavier one");
+                Ok(if amount < 0.5 { first } else { second })
+            }
+            "checkerboard" => {
+                let values = [
+                    self.scalar_operand(parameters, "tex1", 1.0, depth)?.factor,
+                    self.scalar_operand(parameters, "tex2", 0.0, depth)?.factor,
+                ];
+                let lookup = self.checkerboard(parameters, values.map(Vec3::splat))?;
+                Ok(ScalarInput { factor: 1.0, texture: Some((lookup, 0)) })
+            }
+            other => {
+                self.average(parameters, name, &format!("a texture of type \"{other}\": 0.5"));
+                Ok(ScalarInput::constant(0.5))
+            }
+        }
+    }
+
+    fn average(&mut self, parameters: &Parameters, name: &str, what: &str) {
+        self.builder.note(format!("{}: texture \"{name}\": not rendered as such: {what}.", parameters.place()));
+    }
+
+    fn find_texture(
+        &self,
+        user: &Parameters,
+        class: &'static str,
+        name: &str,
+        depth: usize,
+    ) -> Result<Rc<Definition>, LoadError> {
+        if depth > DEEPEST {
+            return Err(user.error(format_args!("texture \"{name}\" uses itself, or {DEEPEST} others in a chain")));
+        }
+        if let Some(definition) = self.textures.get(&(class, name.to_owned())) {
+            return Ok(Rc::clone(definition));
+        }
+        let mut known: Vec<&str> =
+            self.textures.keys().filter(|(of, _)| *of == class).map(|(_, name)| name.as_str()).collect();
+        known.sort_unstable();
+        Err(user.error(format_args!("there is no {class} texture \"{name}\"{}", suggestion(name, known))))
+    }
+
+    /// A colour, or another texture.
+    fn color_operand(
+        &mut self,
+        parameters: &Parameters,
+        name: &str,
+        default: Vec3,
+        depth: usize,
+    ) -> Result<ColorInput, LoadError> {
+        if let Some(texture) = parameters.word(&["texture"], name)? {
+            let texture = texture.to_owned();
+            return self.color_texture(parameters, &texture, depth + 1);
+        }
+        let color = self.color(parameters, name, Meaning::Reflectance)?;
+        let color = color.or(parameters.float(name)?.map(Vec3::splat)).unwrap_or(default);
+        Ok(ColorInput::constant(color))
+    }
+
+    fn scalar_operand(
+        &mut self,
+        parameters: &Parameters,
+        name: &str,
+        default: f32,
+        depth: usize,
+    ) -> Result<ScalarInput, LoadError> {
+        match parameters.word(&["texture"], name)? {
+            Some(texture) => {
+                let texture = texture.to_owned();
+                self.scalar_texture(parameters, &texture, depth + 1)
+            }
+            None => Ok(ScalarInput::constant(parameters.float_or(name, default)?)),
+        }
+    }
+
+    /// An image file and its scale.
+    fn image(&mut self, parameters: &Parameters, usual: Encoding) -> Result<(TextureLookup, f32), LoadError> {
+        let Some(file) = parameters.string("filename")? else {
+            return Err(parameters.error("an imagemap needs a \"string filename\""));
+        };
+        let file = self.file(file);
+        let (encoding, exponent) = match parameters.string("encoding")? {
+            None => (usual, 1.0),
+            Some("sRGB") => (Encoding::Srgb, 1.0),
+            Some("linear") => (Encoding::Linear, 1.0),
+            Some(other) => match other.strip_prefix("gamma ").and_then(|gamma| gamma.trim().parse::<f32>().ok()) {
+                Some(gamma) if gamma > 0.0 && gamma.is_finite() => (Encoding::Linear, gamma),
+                _ => {
+                    return Err(
+                        parameters.error(format_args!("encoding \"{other}\": expected sRGB, linear or gamma G"))
+                    );
+                }
+            },
+        };
+        let wrap = match parameters.string("wrap")? {
+            None | Some("repeat") => Wrap::Repeat,
+            Some("clamp") => Wrap::Clamp,
+            Some(other) => {
+                let note = format!("{}: wrap \"{other}\" is rendered as \"clamp\".", parameters.place());
+                self.builder.note(note);
+                Wrap::Clamp
+            }
+        };
+        let nearest = match parameters.string("filter")? {
+            Some("point") => true,
+            Some("trilinear" | "ewa" | "EWA" | "bilinear") | None => false,
+            Some(other) => return Err(parameters.error(format_args!("filter \"{other}\" is not known"))),
+        };
+        let scale = parameters.float_or("scale", 1.0)?;
+        let mut lookup = self.mapping(parameters)?;
+        lookup.texture = self.builder.textures.add(Request {
+            picture: Picture::File(file),
+            encoding,
+            wrap_u: wrap,
+            wrap_v: wrap,
+            nearest,
+            if_missing: IfMissing::Fail(parameters.place()),
+            adjust: Adjust { invert: parameters.boolean_or("invert", false)?, exponent_bits: exponent.to_bits() },
+        });
+        Ok((lookup, scale))
+    }
+
+    /// `uscale` and its like, for pbrt's v that runs up where ours runs down.
+    fn mapping(&mut self, parameters: &Parameters) -> Result<TextureLookup, LoadError> {
+        if let Some(other) = parameters.string("mapping")?.filter(|mapping| *mapping != "uv") {
+            let note = format!("{}: mapping \"{other}\": the mesh's own coordinates are used.", parameters.place());
+            self.builder.note(note);
+        }
+        let scale = Vec2::new(parameters.float_or("uscale", 1.0)?, parameters.float_or("vscale", 1.0)?);
+        let delta = Vec2::new(parameters.float_or("udelta", 0.0)?, parameters.float_or("vdelta", 0.0)?);
+        Ok(TextureLookup {
+            texture: crate::scene::TextureId(0),
+            offset: Vec2::new(delta.x, 1.0 - scale.y - delta.y),
+            rotation: 0.0,
+            scale,
+        })
+    }
+
+    /// Two colours that alternate over unit squares: four texels, repeated.
+    fn checkerboard(&mut self, parameters: &Parameters, [even, odd]: [Vec3; 2]) -> Result<TextureLookup, LoadError> {
+        if parameters.integer("dimension")?.is_some_and(|dimension| dimension != 2) {
+            return Err(parameters.unsupported("a checkerboard in three dimensions is not rendered"));
+        }
+        let lookup = self.mapping(parameters)?;
+        let [even, odd] = [even, odd].map(|color| color.extend(1.0).to_array());
+        let texture = self.builder.textures.add(Request {
+            wrap_u: Wrap::Repeat,
+            wrap_v: Wrap::Repeat,
+            nearest: true,
+            // pbrt's t runs up: the upper row holds t in [1, 2).
+            ..Request::texels("checkerboard", [2, 2], &[odd, even, even, odd])
+        });
+        // Two squares a picture; our v of the picture is 1 − t/2.
+        let (scale, offset) = (0.5 * lookup.scale, 0.5 * lookup.offset);
+        Ok(TextureLookup { texture, scale, offset: Vec2::new(offset.x, offset.y + 0.5), ..lookup })
+    }
+}

@@ -1,0 +1,80 @@
+//! The side file: `scene.fechner.toml` beside a scene of another format adds what that format lacks.
+//!
+//! It may hold `nits_per_unit`, `[film]`, `[view]`, `[camera]` (with keyframes), `[environment]` and `[[lights]]`, all as in
+//! our own format. Camera and environment take the place of the scene's, lights are added to them.
+
+use super::fields::{Fields, Source, Value};
+use super::motion::Shutter;
+use super::{camera, light, read_film, read_view, surroundings};
+use crate::scene::load::error::LoadError;
+use crate::scene::load::{LoadOptions, files};
+use crate::scene::{Scene, ViewingDefaults};
+use ::toml::de::DeTable;
+use std::path::{Path, PathBuf};
+
+const KNOWN: [&str; 6] = ["nits_per_unit", "film", "view", "camera", "environment", "lights"];
+
+/// The side file of a scene, if there is one.
+pub(in crate::scene::load) fn of(scene: &Path) -> Option<PathBuf> {
+    let beside = scene.with_extension("fechner.toml");
+    beside.is_file().then_some(beside)
+}
+
+/// Whether the side file has lights or surroundings of its own.
+pub(in crate::scene::load) fn brings_light(path: &Path) -> Result<bool, LoadError> {
+    with_root(path, |root| Ok(root.get("environment").is_some() || root.get("lights").is_some()))
+}
+
+/// Adds everything to the scene. The scene's own camera stays where the caller has asked for one by name.
+pub(in crate::scene::load) fn apply(path: &Path, options: &LoadOptions, scene: &mut Scene) -> Result<(), LoadError> {
+    with_root(path, |root| {
+        let nits_per_unit = root.get_or("nits_per_unit", scene.nits_per_unit, Value::positive)?;
+        if let Some(film) = root.get("film") {
+            scene.film = read_film(&film)?;
+        }
+        if let Some(view) = root.get("view") {
+            let ViewingDefaults { display, visibility, operator, exposure_stops } = read_view(&view)?;
+            let old = std::mem::take(&mut scene.viewing);
+            scene.viewing = ViewingDefaults {
+                display: display.or(old.display),
+                visibility: visibility.or(old.visibility),
+                operator: operator.or(old.operator),
+                exposure_stops: exposure_stops.or(old.exposure_stops),
+            };
+        }
+        if let Some(value) = root.get("camera")
+            && options.camera.is_none()
+        {
+            let stays_open = value.entries()?.get_or("shutter_s", 0.0, Value::non_negative)?;
+            scene.camera = camera::read(&value, Shutter { opens: options.frame_time, stays_open })?;
+        }
+        if let Some(value) = root.get("environment") {
+            let folder = path.parent().unwrap_or(Path::new(""));
+            let surroundings = surroundings::read(&value, folder, nits_per_unit)?;
+            scene.environment = Some(surroundings.environment);
+            scene.lights.extend(surroundings.sun);
+        }
+        if let Some(list) = root.get("lights") {
+            for value in list.array()? {
+                scene.lights.push(light::read(&value, nits_per_unit)?);
+            }
+        }
+        // What was assumed is no longer true.
+        if root.get("nits_per_unit").is_some() {
+            scene.notes.retain(|note| !note.starts_with("Radiance has no unit"));
+        }
+        if root.get("camera").is_some() {
+            scene.notes.retain(|note| !note.starts_with("No camera in the file"));
+        }
+        scene.nits_per_unit = nits_per_unit;
+        Ok(())
+    })
+}
+
+fn with_root<T>(path: &Path, read: impl FnOnce(&Fields) -> Result<T, LoadError>) -> Result<T, LoadError> {
+    let text = files::read_text(path)?;
+    let source = Source { file: path, text: &text };
+    let document = DeTable::parse(&text).map_err(|error| source.syntax_error(&error))?;
+    let root = Fields::root(&source, document.get_ref(), &KNOWN)?;
+    read(&root)
+}

@@ -1,0 +1,108 @@
+//! Scenes of others beside the pictures that another renderer made of them: the table in scenes/README.md.
+
+use crate::load_assets::assets;
+use crate::support::{loop_settings, trace_settings};
+use fechner::adaptive::settings::Sampling;
+use fechner::adaptive::{Quiet, render};
+use fechner::integrator::PathTracer;
+use fechner::scene::load::{LoadOptions, load};
+use glam::{DVec3, Vec3};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Regions along each side of the picture.
+const REGIONS: u32 = 4;
+
+struct Case {
+    scene: &'static str,
+    /// Pixels of the reference along a side of one of ours.
+    divisor: u32,
+    samples: u32,
+}
+
+const CASES: &[Case] = &[
+    Case { scene: "scenes-pbrt/cornell-box/scene-v4.pbrt", divisor: 8, samples: 512 },
+    Case { scene: "scenes-pbrt/veach-mis/scene-v4.pbrt", divisor: 5, samples: 256 },
+    Case { scene: "scenes-pbrt/veach-ajar/scene-v4.pbrt", divisor: 8, samples: 512 },
+    Case { scene: "scenes-pbrt/staircase2/scene-v4.pbrt", divisor: 8, samples: 256 },
+    Case { scene: "scenes-pbrt/coffee/scene-v4.pbrt", divisor: 8, samples: 256 },
+    Case { scene: "scenes-pbrt/water-caustic/scene-v4.pbrt", divisor: 8, samples: 256 },
+    Case { scene: "scenes-mitsuba/living-room/scene.xml", divisor: 8, samples: 256 },
+];
+
+/// Mean RGB of the blocks of `divisor`² pixels.
+fn reduced(picture: &fechner::exr_read::ExrImage, divisor: u32) -> Vec<Vec3> {
+    let channel = |name| picture.channel(name).expect("the reference has R, G and B");
+    let channels = ["R", "G", "B"].map(channel);
+    let (width, height) = (picture.width / divisor, picture.height / divisor);
+    let mut pixels = Vec::new();
+    for y in 0..height {
+        for x in 0..width {
+            let mut sum = DVec3::ZERO;
+            let mut count = 0.0;
+            for i in 0..divisor * divisor {
+                let (px, py) = (x * divisor + i % divisor, y * divisor + i / divisor);
+                let at = (py * picture.width + px) as usize;
+                let rgb = DVec3::from_array(channels.map(|c| f64::from(c[at])));
+                // One pixel of water-caustic is infinite.
+                if rgb.is_finite() {
+                    sum += rgb;
+                    count += 1.0;
+                }
+            }
+            pixels.push((sum / count).as_vec3());
+        }
+    }
+    pixels
+}
+
+fn luminance(rgb: Vec3) -> f64 {
+    f64::from(rgb.dot(Vec3::new(0.2126, 0.7152, 0.0722)))
+}
+
+/// `cargo test --release -p fechner --test it references -- --ignored --nocapture [scene's name in FECHNER_SCENE]`
+#[test]
+#[ignore = "minutes of rendering; its table stands in scenes/README.md"]
+fn pictures_have_their_references_brightness() {
+    let Some(folder) = assets() else { return };
+    let only = std::env::var("FECHNER_SCENE").unwrap_or_default();
+    println!("scene | triangles | load s | mean ratio | standard error | median region | lowest and highest region");
+    for case in CASES.iter().filter(|case| case.scene.contains(&only)) {
+        let path = folder.join(case.scene);
+        let start = Instant::now();
+        let mut scene = load(&path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        let seconds = start.elapsed().as_secs_f64();
+        let reference = fechner::exr_read::read_exr(&path.with_file_name("TungstenRender.exr")).unwrap();
+        let (width, height) = (reference.width / case.divisor, reference.height / case.divisor);
+        let triangles: usize = scene.instances.iter().map(|i| scene.meshes[i.mesh.0 as usize].triangles.len()).sum();
+        // Values of the file, not cd/m².
+        scene.nits_per_unit = 1.0;
+        let settings = loop_settings(1.0, Sampling::Uniform, 0.0, Some(case.samples));
+        let tracer = PathTracer::new(Arc::new(scene), trace_settings(width, height, 1));
+        let rendered = render(&tracer, &settings, &Quiet).expect("the perception model takes the picture");
+        let estimate = &rendered.judgement.estimate;
+        let theirs = reduced(&reference, case.divisor);
+        let mut of_regions = vec![[0.0; 2]; (REGIONS * REGIONS) as usize];
+        let mut variance = 0.0;
+        for (i, (ours, theirs)) in estimate.rgb_cd_m2.iter().zip(&theirs).enumerate() {
+            let (x, y) = (i as u32 % width, i as u32 / width);
+            let region = &mut of_regions[(y * REGIONS / height * REGIONS + x * REGIONS / width) as usize];
+            region[0] += luminance(Vec3::from_array(*ours));
+            region[1] += luminance(*theirs);
+            variance += f64::from(estimate.variance_of_mean.values()[i]);
+        }
+        let total = of_regions.iter().fold([0.0; 2], |sum, region| [sum[0] + region[0], sum[1] + region[1]]);
+        let mut ratios: Vec<f64> = of_regions.iter().filter(|r| r[1] > 0.0).map(|r| r[0] / r[1]).collect();
+        println!("    by region: {}", ratios.iter().map(|r| format!("{r:.3}")).collect::<Vec<_>>().join(" "));
+        ratios.sort_by(f64::total_cmp);
+        println!(
+            "{} | {triangles} | {seconds:.2} | {:.4} | {:.4} | {:.3} | {:.3} .. {:.3}",
+            case.scene,
+            total[0] / total[1],
+            variance.sqrt() / total[1],
+            ratios[ratios.len() / 2],
+            ratios[0],
+            ratios[ratios.len() - 1],
+        );
+    }
+}
