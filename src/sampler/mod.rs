@@ -12,8 +12,10 @@ mod sobol;
 
 pub use filter::PixelFilter;
 
+use serde::{Deserialize, Serialize};
+
 /// Which of the two independent estimates of a pixel a sample belongs to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Half {
     /// The first estimate.
     A,

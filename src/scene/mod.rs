@@ -8,6 +8,7 @@ mod material;
 use glam::{Affine3A, Mat3, Vec2, Vec3, Vec4};
 use std::sync::Arc;
 
+pub mod hash;
 pub mod load;
 pub mod texture;
 

@@ -7,11 +7,15 @@
 //! - `bad_input`: bad scene files, and our own ones
 //! - `load_assets`: scenes that others made, sound and damaged
 //! - `command_line`: the program as a user runs it
+//! - `checkpoint`: renders stopped, continued and merged against renders in one go
+//! - `kill`: the program, killed and resumed
 
 mod adaptive_render;
 mod bad_input;
+mod checkpoint;
 mod command_line;
 mod direct_light;
 mod furnace;
+mod kill;
 mod load_assets;
 mod support;
