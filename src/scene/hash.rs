@@ -7,7 +7,6 @@ use bytemuck::NoUninit;
 use serde::{Deserialize, Serialize};
 use std::io::{BufWriter, Write};
 use std::mem::take;
-use std::sync::Arc;
 
 /// BLAKE3 of everything in a scene that samples depend on.
 #[derive(Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -48,12 +47,12 @@ pub fn content_hash(scene: &Scene) -> ContentHash {
     for texture in &mut rest.textures {
         texture.name.clear();
         match &mut texture.texels {
-            Texels::Bytes(texels, _) => hash_array(&mut hasher, &std::mem::replace(texels, Arc::default())),
-            Texels::Floats(texels) => hash_array(&mut hasher, &std::mem::replace(texels, Arc::default())),
+            Texels::Bytes(texels, _) => hash_array(&mut hasher, &take(texels)),
+            Texels::Floats(texels) => hash_array(&mut hasher, &take(texels)),
         }
     }
     if let Some(environment) = &mut rest.environment {
-        hash_array(&mut hasher, &std::mem::replace(&mut environment.texels, Arc::default()));
+        hash_array(&mut hasher, &take(&mut environment.texels));
     }
     let mut text = BufWriter::with_capacity(1 << 16, &mut hasher);
     write!(text, "{rest:?}").and_then(|()| text.flush()).expect("a hasher takes all bytes");
@@ -71,6 +70,7 @@ mod tests {
     use super::*;
     use crate::scene::load::{LoadOptions, load};
     use std::path::Path;
+    use std::sync::Arc;
 
     fn scene(file: &str) -> Scene {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file);
@@ -107,7 +107,7 @@ mod tests {
                 Texels::Floats(texels) => Arc::make_mut(texels)[0][0] += 1e-6,
             },
             |s| s.meshes.swap(0, 1),
-            |s| drop(s.meshes[0].uvs.pop()),
+            |s| s.meshes[0].uvs.clear(),
             |s| s.lights.push(crate::scene::Light::Point { position: glam::Vec3::ZERO, intensity: glam::Vec3::ONE }),
             |s| s.environment.iter_mut().for_each(|e| e.scale *= 1.0 + f32::EPSILON),
         ];
