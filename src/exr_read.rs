@@ -8,9 +8,15 @@ use ::exr::meta::attribute::{AttributeValue, Text};
 use ::exr::meta::header::Header;
 use ::exr::meta::{BlockDescription, MetaData};
 use ::exr::prelude::{FlatSamples, ReadChannels, ReadLayers, Vec2, read};
+use fechner_perception::primaries::Primaries;
 use std::io::Cursor;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
+
+mod colour;
+mod subsampled;
+
+pub use colour::ScenePicture;
 
 /// Most memory that the pixels of a file may take as 32-bit floats: 1 GiB, a 4K frame with 30 channels.
 pub const MEMORY_LIMIT_BYTES: u64 = 1 << 30;
@@ -33,6 +39,24 @@ pub struct ExrImage {
     pub attributes: Vec<(String, Attribute)>,
     /// Parts that were left out because their size differs from the first one's.
     pub parts_left_out: Vec<String>,
+    /// Lines at the bottom that could not be read: an odd rest of lines in a block of subsampled channels.
+    pub lines_left_out: u32,
+    /// What is to be shown; may be smaller or larger than the data.
+    pub display_window: Window,
+    /// Primaries and white of R, G and B, where the file says them. Channels are as in the file: see
+    /// [`ExrImage::scene_picture`].
+    pub chromaticities: Option<Primaries>,
+}
+
+/// A rectangle of pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window {
+    /// Its top left pixel, x to the right and y down.
+    pub origin: (i32, i32),
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
 }
 
 /// How a file stores a channel.
@@ -130,6 +154,9 @@ pub fn is_exr(bytes: &[u8]) -> bool {
 
 /// Reads every channel of the parts of a file that is in memory; `path` is for messages.
 pub fn decode_exr(path: &Path, file: &[u8]) -> Result<ExrImage, ExrReadError> {
+    if let Some(image) = subsampled::read(path, file)? {
+        return Ok(image);
+    }
     let headers = read_headers(path, file)?;
     let image = guarded(path, || {
         read()
@@ -141,15 +168,7 @@ pub fn decode_exr(path: &Path, file: &[u8]) -> Result<ExrImage, ExrReadError> {
             .from_buffered(Cursor::new(file))
     })?;
     let first = &headers[0];
-    let mut result = ExrImage {
-        width: first.layer_size.0 as u32,
-        height: first.layer_size.1 as u32,
-        data_window_origin: (first.own_attributes.layer_position.0, first.own_attributes.layer_position.1),
-        channels: Vec::new(),
-        types: Vec::new(),
-        attributes: attributes(first),
-        parts_left_out: Vec::new(),
-    };
+    let mut result = image_without_channels(first);
     let several = image.layer_data.len() > 1;
     for layer in image.layer_data {
         let part = layer.attributes.layer_name.as_ref().map(Text::to_string).unwrap_or_default();
@@ -170,6 +189,40 @@ pub fn decode_exr(path: &Path, file: &[u8]) -> Result<ExrImage, ExrReadError> {
         }
     }
     Ok(result)
+}
+
+fn image_without_channels(first: &Header) -> ExrImage {
+    let window = first.shared_attributes.display_window;
+    // A display window that no memory could hold is no reason to refuse the data.
+    let data = first.layer_size.0.saturating_mul(first.layer_size.1);
+    let sound = window.size.0 > 0
+        && window.size.1 > 0
+        && window.size.0.saturating_mul(window.size.1) <= (64 * data).max(1 << 24);
+    let origin = (first.own_attributes.layer_position.0, first.own_attributes.layer_position.1);
+    let (width, height) = (first.layer_size.0 as u32, first.layer_size.1 as u32);
+    let point = |Vec2(x, y): Vec2<f32>| [f64::from(x), f64::from(y)];
+    ExrImage {
+        width,
+        height,
+        data_window_origin: origin,
+        channels: Vec::new(),
+        types: Vec::new(),
+        attributes: attributes(first),
+        parts_left_out: Vec::new(),
+        lines_left_out: 0,
+        display_window: if sound {
+            let origin = (window.position.0, window.position.1);
+            Window { origin, width: window.size.0 as u32, height: window.size.1 as u32 }
+        } else {
+            Window { origin, width, height }
+        },
+        chromaticities: first.shared_attributes.chromaticities.map(|c| Primaries {
+            red: point(c.red),
+            green: point(c.green),
+            blue: point(c.blue),
+            white: point(c.white),
+        }),
+    }
 }
 
 /// Reads the headers of all parts and refuses what could not be read within [`MEMORY_LIMIT_BYTES`].
@@ -286,114 +339,4 @@ fn attribute(value: &AttributeValue) -> Attribute {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::output::{Picture, write_exr};
-    use std::time::{Duration, Instant};
-
-    /// Peak memory of this process in KiB, where the system tells.
-    fn peak_memory_kib() -> Option<u64> {
-        let status = std::fs::read_to_string("/proc/self/status").ok()?;
-        let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
-        line.split_whitespace().nth(1)?.parse().ok()
-    }
-
-    #[test]
-    fn damaged_files_end_in_an_error_or_a_picture_soon_and_in_little_memory() {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets/faults/exr-damaged");
-        let Ok(files) = std::fs::read_dir(&folder) else {
-            println!("skipped: {} is not there", folder.display());
-            return;
-        };
-        let mut readable = 0;
-        let mut refused = 0;
-        for file in files {
-            let path = file.unwrap().path();
-            let start = Instant::now();
-            match read_exr(&path) {
-                Ok(image) => {
-                    readable += 1;
-                    assert!(image.channels.iter().all(|(_, v)| v.len() == (image.width * image.height) as usize));
-                }
-                Err(error) => {
-                    refused += 1;
-                    let message = error.to_string();
-                    assert!(message.starts_with("cannot read ") && !message.contains('\n'), "{message}");
-                    println!("{message}");
-                }
-            }
-            assert!(start.elapsed() < Duration::from_secs(5), "{} took {:?}", path.display(), start.elapsed());
-        }
-        println!("{readable} readable, {refused} refused, peak {:?} KiB", peak_memory_kib());
-        assert!(refused > 50, "{refused} refused");
-        if let Some(kib) = peak_memory_kib() {
-            assert!(kib < 1 << 20, "peak memory {kib} KiB");
-        }
-    }
-
-    /// A small sound file, to be damaged.
-    fn sound_file(folder: &Path) -> Vec<u8> {
-        let path = folder.join("sound.exr");
-        let mut picture = Picture::new(16, 16);
-        let values: Vec<f32> = (0..256).map(|i| (i * i % 17) as f32).collect();
-        picture.push_f32("R", &values[..]);
-        picture.push_f16("G", &values[..]);
-        write_exr(&path, &picture).unwrap();
-        std::fs::read(path).unwrap()
-    }
-
-    #[test]
-    fn every_cut_of_a_file_is_an_error() {
-        let folder = tempfile::tempdir().unwrap();
-        let bytes = sound_file(folder.path());
-        let path = folder.path().join("cut.exr");
-        for length in 0..bytes.len() {
-            std::fs::write(&path, &bytes[..length]).unwrap();
-            assert!(read_exr(&path).is_err(), "cut to {length} of {} bytes", bytes.len());
-        }
-    }
-
-    #[test]
-    fn any_changed_byte_is_survived() {
-        let folder = tempfile::tempdir().unwrap();
-        let bytes = sound_file(folder.path());
-        let path = folder.path().join("changed.exr");
-        for at in 0..bytes.len() {
-            for value in [0x00, 0x7f, 0xff] {
-                let mut changed = bytes.clone();
-                changed[at] = value;
-                std::fs::write(&path, changed).unwrap();
-                if let Ok(image) = read_exr(&path) {
-                    assert!(u64::from(image.width) * u64::from(image.height) * 8 <= MEMORY_LIMIT_BYTES);
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn a_picture_too_large_for_memory_is_refused_by_its_size() {
-        let folder = tempfile::tempdir().unwrap();
-        let mut bytes = sound_file(folder.path());
-        let name = b"dataWindow\0box2i\0";
-        let at = bytes.windows(name.len()).position(|window| window == name).unwrap() + name.len() + 4;
-        bytes[at + 8..at + 12].copy_from_slice(&99_999i32.to_le_bytes());
-        bytes[at + 12..at + 16].copy_from_slice(&99_999i32.to_le_bytes());
-        let path = folder.path().join("large.exr");
-        std::fs::write(&path, bytes).unwrap();
-        let message = read_exr(&path).unwrap_err().to_string();
-        assert!(message.contains("100000×100000 pixels of 2 channels need 76293 MiB"), "{message}");
-    }
-
-    #[test]
-    fn what_is_no_exr_file_is_named() {
-        let folder = tempfile::tempdir().unwrap();
-        let message = |path: &Path| read_exr(path).unwrap_err().to_string();
-        assert!(message(folder.path()).contains("it is a folder"));
-        assert!(message(&folder.path().join("none.exr")).contains("none.exr"));
-        let path = folder.path().join("text.exr");
-        std::fs::write(&path, "").unwrap();
-        assert!(message(&path).contains("it is empty"));
-        std::fs::write(&path, "not a picture").unwrap();
-        assert!(message(&path).contains("damaged or no EXR file"));
-    }
-}
+mod tests;

@@ -95,6 +95,8 @@ fn main() {
             );
         };
         report("threshold map", fastest(5, || drop(threshold_map(&inputs, &viewing, &csf))));
+        let noisy = ThresholdInputs { guide_variance: Some(&variance), ..inputs };
+        report("threshold map of a guide", fastest(5, || drop(threshold_map(&noisy, &viewing, &csf))));
         report("predicted visibility", fastest(5, || drop(map.predicted_visibility(&variance))));
         report("measured visibility", fastest(3, || drop(map.measured_visibility(&variance))));
         let problem = AllocationProblem {
@@ -107,6 +109,14 @@ fn main() {
             max_samples: 1e6,
         };
         report("allocation", fastest(3, || drop(allocate(&problem))));
+        if let Ok(found) = allocate(&problem) {
+            // Multipliers are solved for on blocks of pixels, the gap is taken at every pixel: it bounds what both leave.
+            println!(
+                "{width}×{height}  allocation costs at most {:.2} % more than the optimum, after {} updates",
+                100.0 * found.gap,
+                found.iterations
+            );
+        }
         let rgb: Vec<[f32; 3]> = picture.values().iter().map(|&value| [value; 3]).collect();
         let albedo = vec![[0.5; 3]; rgb.len()];
         let normal = vec![[0.0, 0.0, 1.0]; rgb.len()];

@@ -4,10 +4,14 @@
 //! the environment variable `CASTLE_CSF_DATA`, and prints RMS errors in dB: as they are, and with each model's median
 //! error taken out. Static foveal gratings of at least 1 cd/m² and at most 20 cpd.
 
+mod support;
+
 use fechner_perception::Error;
 use fechner_perception::csf::{
-    Barten99, CastleChromatic, CastleCsf, ChromaticChannel, ContrastSensitivity, Daly93, Daly98, MannosSakrison,
+    Barten89, Barten99, CastleChromatic, CastleCsf, ChromaticChannel, ContrastSensitivity, Daly93, Daly98, HdrVdp2,
+    Laird06, MannosSakrison, StelaCsf,
 };
+use support::{Row, Table};
 
 struct Measurement {
     luminance_cd_m2: f64,
@@ -19,17 +23,9 @@ struct Measurement {
 }
 
 fn main() {
-    let Ok(path) = std::env::var("CASTLE_CSF_DATA") else {
-        println!("set CASTLE_CSF_DATA to data_aggregated_merged.csv of gfxdisp/castleCSF to print fits");
-        return;
-    };
-    let all = match std::fs::read_to_string(&path) {
-        Ok(text) => measurements(&text),
-        Err(error) => {
-            println!("{path}: {error}");
-            return;
-        }
-    };
+    let what = "data_aggregated_merged.csv of gfxdisp/castleCSF to print fits";
+    let Some(table) = Table::from_environment("CASTLE_CSF_DATA", what) else { return };
+    let all: Vec<Measurement> = table.rows().filter_map(|row| measurement(&row)).collect();
     let achromatic: Vec<&Measurement> = all.iter().filter(|m| is_achromatic(m)).collect();
     println!("{} achromatic measurements: RMS dB, and without bias", achromatic.len());
     report("castle", &achromatic, |m| Ok(CastleCsf::new(m.area_deg2)?.sensitivity(m.freq_cpd, m.luminance_cd_m2)));
@@ -44,36 +40,36 @@ fn main() {
         &achromatic,
         |m| Ok(MannosSakrison::default().sensitivity(m.freq_cpd, m.luminance_cd_m2)),
     );
+    report(
+        "stela",
+        &achromatic,
+        |m| Ok(StelaCsf { area_deg2: m.area_deg2 }.sensitivity(m.freq_cpd, m.luminance_cd_m2)),
+    );
+    report("barten89", &achromatic, |m| Ok(Barten89.sensitivity(m.freq_cpd, m.luminance_cd_m2)));
+    report("hdrvdp2", &achromatic, |m| Ok(HdrVdp2::default().sensitivity(m.freq_cpd, m.luminance_cd_m2)));
+    report("laird06", &achromatic, |m| Ok(Laird06::default().sensitivity(m.freq_cpd, m.luminance_cd_m2)));
     report("daly98", &achromatic, |m| Ok(Daly98::default().sensitivity(m.freq_cpd, m.luminance_cd_m2)));
     let coloured: Vec<&Measurement> = all.iter().filter(|m| !is_achromatic(m)).collect();
     println!("{} measurements in other colour directions", coloured.len());
     report("castle, three channels", &coloured, castle_in_colour);
 }
 
-fn measurements(text: &str) -> Vec<Measurement> {
-    let mut lines = text.lines();
-    let names: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
-    lines
-        .filter_map(|line| {
-            let fields: Vec<&str> = line.split(',').collect();
-            let field = |name: &str| names.iter().position(|n| *n == name).and_then(|index| fields.get(index).copied());
-            let number = |name: &str| field(name)?.parse::<f64>().ok().filter(|value| value.is_finite());
-            let is_wanted = field("stimulus")? == "grating"
-                && number("t_frequency")? == 0.0
-                && number("eccentricity")? == 0.0
-                && number("luminance")? >= 1.0
-                && number("s_frequency")? <= 20.0;
-            is_wanted.then_some(())?;
-            Some(Measurement {
-                luminance_cd_m2: number("luminance")?,
-                freq_cpd: number("s_frequency")?,
-                area_deg2: number("area")?,
-                sensitivity: number("sensitivity")?,
-                background_lms: [number("L")?, number("M")?, number("S")?],
-                direction_lms: [number("L_delta")?, number("M_delta")?, number("S_delta")?],
-            })
-        })
-        .collect()
+/// A static foveal grating of at least 1 cd/m² and at most 20 cpd.
+fn measurement(row: &Row<'_>) -> Option<Measurement> {
+    let is_wanted = row.text("stimulus")? == "grating"
+        && row.number("t_frequency")? == 0.0
+        && row.number("eccentricity")? == 0.0
+        && row.number("luminance")? >= 1.0
+        && row.number("s_frequency")? <= 20.0;
+    is_wanted.then_some(())?;
+    Some(Measurement {
+        luminance_cd_m2: row.number("luminance")?,
+        freq_cpd: row.number("s_frequency")?,
+        area_deg2: row.number("area")?,
+        sensitivity: row.number("sensitivity")?,
+        background_lms: [row.number("L")?, row.number("M")?, row.number("S")?],
+        direction_lms: [row.number("L_delta")?, row.number("M_delta")?, row.number("S_delta")?],
+    })
 }
 
 fn is_achromatic(m: &Measurement) -> bool {
@@ -104,13 +100,6 @@ fn castle_in_colour(m: &Measurement) -> Result<f64, Error> {
 }
 
 fn report(name: &str, data: &[&Measurement], model: impl Fn(&Measurement) -> Result<f64, Error>) {
-    let mut errors: Vec<f64> =
-        data.iter().filter_map(|m| Some(20.0 * (model(m).ok()? / m.sensitivity).log10())).collect();
-    if errors.is_empty() {
-        return;
-    }
-    errors.sort_unstable_by(f64::total_cmp);
-    let median = errors[errors.len() / 2];
-    let rms = |offset: f64| (errors.iter().map(|e| (e - offset).powi(2)).sum::<f64>() / errors.len() as f64).sqrt();
-    println!("  {name:24} {:5.1} {:5.1}", rms(0.0), rms(median));
+    let errors: Vec<f64> = data.iter().filter_map(|m| Some(20.0 * (model(m).ok()? / m.sensitivity).log10())).collect();
+    println!("  {name:24} {:5.1} {:5.1}", support::rms(&errors, 0.0), support::rms(&errors, support::median(&errors)));
 }

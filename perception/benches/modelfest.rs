@@ -1,89 +1,88 @@
-//! How visible this crate calls what people could only just see: the Gabor patches of ModelFest.
+//! How visible this crate calls what people could only just see: the 43 stimuli of ModelFest.
 //!
-//! Reads the mean thresholds of Watson, "Visual detection of spatial contrast patterns: evaluation of five simple models",
-//! 2000, from `data_aggregated_merged.csv` of gfxdisp/castleCSF, whose path is the environment variable
-//! `CASTLE_CSF_DATA`. Each patch is made again (256×256 pixels, 120 pixels a degree, 30 cd/m²) at people's threshold
-//! contrast; a perfect model would call every one v = 1. Prints v in dB, and the RMS with and without the median.
+//! Made again from their published definitions (Carney et al., "Development of an image/threshold database for designing and
+//! testing human vision models", 1999; Watson and Ahumada, "A standard model for foveal detection of spatial contrast", 2005):
+//! 256×256 pixels, 120 pixels a degree, 30 cd/m², at the mean threshold contrast of 16 observers. Thresholds, the noise sample and
+//! the natural scene are data: the environment variable `MODELFEST_DATA` names the folder that has `modelfest_data.csv`,
+//! `modelfest_noise.tif` and `modelfest_natural_scene.tif`, as the Python package stimupy installs it
+//! (`pip install stimupy`, then `site-packages/stimupy/papers`).
+//!
+//! A perfect model would call every stimulus v = 1.04: thresholds are for 84 % correct of two, v = 1 is 82 %. Stimuli faded in and
+//! out over half a second, which is not modelled here.
 
-use fechner_perception::{CastleCsf, Display, Observer, Plane, ThresholdInputs, Viewing, threshold_map};
+mod stimuli;
+mod support;
 
-const SIDE: usize = 256;
-const PIXELS_PER_DEGREE: f64 = 120.0;
-const BACKGROUND_CD_M2: f32 = 30.0;
+use fechner_perception::{CastleCsf, Display, Plane, ThresholdInputs, Viewing, threshold_map};
+use std::path::Path;
+use stimuli::{BACKGROUND_CD_M2, PIXELS_PER_DEGREE, SIDE, Stimulus};
 
-/// A vertical grating in cosine phase under a Gaussian.
-struct Gabor {
-    freq_cpd: f64,
-    sigma_deg: f64,
-    threshold_contrast: f64,
-}
-
-impl Gabor {
-    fn picture_cd_m2(&self) -> Plane {
-        let degrees = |pixel: usize| (pixel as f64 + 0.5 - SIDE as f64 / 2.0) / PIXELS_PER_DEGREE;
-        Plane::from_fn(SIDE, SIDE, |x, y| {
-            let (x, y) = (degrees(x), degrees(y));
-            let window = (-(x * x + y * y) / (2.0 * self.sigma_deg * self.sigma_deg)).exp();
-            let wave = (std::f64::consts::TAU * self.freq_cpd * x).cos();
-            (self.threshold_contrast * window * wave) as f32 * BACKGROUND_CD_M2
-        })
-    }
-}
+/// Place of the noise among the stimuli: the one that is nearest to what a renderer leaves.
+const NOISE: usize = 34;
 
 fn main() {
-    let Ok(path) = std::env::var("CASTLE_CSF_DATA") else {
-        println!("set CASTLE_CSF_DATA to data_aggregated_merged.csv of gfxdisp/castleCSF to print ModelFest's patches");
+    let Ok(folder) = std::env::var("MODELFEST_DATA") else {
+        println!("set MODELFEST_DATA to stimupy's folder `papers` (pip install stimupy) to print ModelFest's stimuli");
         return;
     };
-    let patches = match std::fs::read_to_string(&path) {
-        Ok(text) => gabors(&text),
-        Err(error) => {
-            println!("{path}: {error}");
-            return;
-        }
-    };
-    let display = Display { pixels_per_degree: PIXELS_PER_DEGREE, ..Display::default() };
-    let viewing = Viewing { display, observer: Observer::default() };
-    let grey = Plane::filled(SIDE, SIDE, BACKGROUND_CD_M2);
-    let inputs = ThresholdInputs { display_luminance_cd_m2: &grey, guide_variance: None };
-    let map = match threshold_map(&inputs, &viewing, &CastleCsf::default()) {
-        Ok(map) => map,
-        Err(error) => {
-            println!("{error}");
-            return;
-        }
-    };
-    let mut decibels: Vec<f64> = Vec::new();
-    for patch in &patches {
-        let seen = map.measured_visibility(&patch.picture_cd_m2());
-        let v = f64::from(seen.values().iter().copied().fold(0.0, f32::max));
-        decibels.push(20.0 * v.log10());
-        println!("{:5.2} cpd, σ {:.3}°: v {v:5.2}, {:+.1} dB", patch.freq_cpd, patch.sigma_deg, 20.0 * v.log10());
+    if let Err(error) = run(Path::new(&folder)) {
+        println!("{folder}: {error}");
     }
-    let mut sorted = decibels.clone();
-    sorted.sort_by(f64::total_cmp);
-    let Some(median) = sorted.get(sorted.len() / 2) else {
-        println!("no ModelFest patches in {path}");
-        return;
-    };
-    let rms = |bias: f64| (decibels.iter().map(|d| (d - bias).powi(2)).sum::<f64>() / decibels.len() as f64).sqrt();
-    println!("{} patches: RMS {:.1} dB, {:.1} dB without the median", decibels.len(), rms(0.0), rms(*median));
 }
 
-fn gabors(text: &str) -> Vec<Gabor> {
-    let mut lines = text.lines();
-    let names: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
-    lines
-        .filter_map(|line| {
-            let fields: Vec<&str> = line.split(',').collect();
-            let field = |name: &str| names.iter().position(|n| *n == name).and_then(|index| fields.get(index).copied());
-            let number = |name: &str| field(name)?.parse::<f64>().ok().filter(|value| value.is_finite());
-            (field("dataset")? == "modelfest" && field("stimulus")? == "gabor").then_some(())?;
-            Some(Gabor {
-                freq_cpd: number("s_frequency")?,
-                sigma_deg: number("ge_sigma")?,
-                threshold_contrast: 10.0_f64.powf(number("log_cone_contrast")?),
-            })
-        })
-        .collect()
+fn run(folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
+    let thresholds = mean_log_sensitivities(&std::fs::read_to_string(folder.join("modelfest_data.csv"))?)?;
+    let stimuli = stimuli::all(folder)?;
+    let display = Display { pixels_per_degree: PIXELS_PER_DEGREE, ..Display::default() };
+    let grey = Plane::filled(SIDE, SIDE, BACKGROUND_CD_M2);
+    let inputs = ThresholdInputs { display_luminance_cd_m2: &grey, guide_variance: None };
+    let map = threshold_map(&inputs, &Viewing::of(display), &CastleCsf::default())?;
+    let mut decibels = Vec::new();
+    for (index, (stimulus, log_sensitivity)) in stimuli.iter().zip(&thresholds).enumerate() {
+        let Stimulus { name, contrast } = stimulus;
+        let scale = 10.0_f64.powf(-log_sensitivity) as f32 * BACKGROUND_CD_M2;
+        let seen = map.measured_visibility(&contrast.map(|value| value * scale));
+        let v = f64::from(seen.values().iter().copied().fold(0.0, f32::max));
+        println!(
+            "{:2} {name:34} threshold {:5.1} dB: v {v:5.2}, {:+5.1} dB",
+            index + 1,
+            -20.0 * log_sensitivity,
+            20.0 * v.log10()
+        );
+        decibels.push(20.0 * v.log10());
+    }
+    let rms = |errors: &[f64], bias: f64| support::rms(errors, bias);
+    println!(
+        "{} stimuli: RMS {:.1} dB, {:.1} dB without the median",
+        decibels.len(),
+        rms(&decibels, 0.0),
+        rms(&decibels, support::median(&decibels))
+    );
+    println!(
+        "noise alone {:+.1} dB; RMS {:.1} dB if its threshold fixes the scale",
+        decibels[NOISE],
+        rms(&decibels, decibels[NOISE])
+    );
+    println!("the first 14 (Gabor patches): RMS {:.1} dB", rms(&decibels[..14], 0.0));
+    Ok(())
+}
+
+/// Mean over observers and their four runs, log10 of 1/contrast, of each stimulus.
+fn mean_log_sensitivities(text: &str) -> Result<Vec<f64>, Box<dyn std::error::Error>> {
+    const RUNS: usize = 4;
+    const STIMULI: usize = 43;
+    let mut sums = vec![0.0; STIMULI];
+    let mut observers = 0.0;
+    for (line, row) in text.lines().enumerate() {
+        let values: Result<Vec<f64>, _> = row.split(',').skip(1).map(str::parse).collect();
+        let values = values.map_err(|error| format!("modelfest_data.csv, line {}: {error}", line + 1))?;
+        if values.len() != RUNS * STIMULI {
+            return Err(format!("modelfest_data.csv, line {}: {} values, not 172", line + 1, values.len()).into());
+        }
+        for (sum, runs) in sums.iter_mut().zip(values.chunks(RUNS)) {
+            *sum += runs.iter().sum::<f64>() / RUNS as f64;
+        }
+        observers += 1.0;
+    }
+    Ok(sums.into_iter().map(|sum| sum / observers).collect())
 }

@@ -1,7 +1,9 @@
 //! What the eye is adapted to.
 
-use crate::error::{Error, check_range};
-use crate::filter::gaussian_blur;
+use crate::display::{Display, Viewing};
+use crate::error::Error;
+use crate::filter::gaussian_blur_xy;
+use crate::glare;
 use crate::plane::Plane;
 use crate::sensitivity::LEAST_ADAPTATION_CD_M2;
 use crate::threshold::POOLING_SIGMA_DEG;
@@ -43,27 +45,50 @@ pub fn world_adaptation_cd_m2(luminance_cd_m2: &Plane, mean: Mean) -> f64 {
 /// disc of 1°), at least 1e-4. Arithmetic means first bring single pixels brighter than all their neighbours down to them.
 ///
 /// # Errors
-/// [`Error::Empty`] and [`Error::BadPixel`] for no picture, [`Error::OutOfRange`] unless `pixels_per_degree` is 1 to 1000.
-pub fn local_adaptation_cd_m2(luminance_cd_m2: &Plane, pixels_per_degree: f64, mean: Mean) -> Result<Plane, Error> {
+/// [`Error::Empty`] and [`Error::BadPixel`] for no picture, [`Error::OutOfRange`] for an impossible display.
+///
+/// ```
+/// use fechner_perception::{Display, Plane};
+/// use fechner_perception::adaptation::{Mean, local_adaptation_cd_m2};
+/// let halves = Plane::from_fn(120, 8, |x, _| if x < 60 { 1.0 } else { 100.0 });
+/// let adapted = local_adaptation_cd_m2(&halves, &Display::default(), Mean::Arithmetic)?;
+/// assert!(adapted.get(5, 4) < 1.01 && adapted.get(115, 4) > 99.0);
+/// # Ok::<(), fechner_perception::Error>(())
+/// ```
+pub fn local_adaptation_cd_m2(luminance_cd_m2: &Plane, display: &Display, mean: Mean) -> Result<Plane, Error> {
     luminance_cd_m2.check_non_negative("luminance")?;
-    check_range("pixels_per_degree", pixels_per_degree, 1.0, 1000.0, "between 1 and 1000 pixels per degree")?;
+    display.check()?;
     Ok(match mean {
-        Mean::Arithmetic => local_adaptation(luminance_cd_m2, pixels_per_degree),
+        Mean::Arithmetic => local_adaptation(luminance_cd_m2, display),
         Mean::Geometric => {
             // The logarithm of the floor is the origin: the blur wants no negative numbers.
             let logs = luminance_cd_m2.map(|value| (value.max(LEAST_ADAPTATION_CD_M2) / LEAST_ADAPTATION_CD_M2).ln());
-            let sigma_px = POOLING_SIGMA_DEG * pixels_per_degree;
-            gaussian_blur(&logs, sigma_px).map(|log| log.exp() * LEAST_ADAPTATION_CD_M2)
+            blurred(&logs, display).map(|log| log.exp() * LEAST_ADAPTATION_CD_M2)
         }
     })
 }
 
+/// What thresholds are taken at: [`local_adaptation`], and the observer's glare.
+pub(crate) fn adapted(luminance_cd_m2: &Plane, viewing: &Viewing) -> Plane {
+    let mut adaptation = local_adaptation(luminance_cd_m2, &viewing.display);
+    if let Some(veil) = glare::veil_cd_m2(luminance_cd_m2, &adaptation, viewing) {
+        adaptation.for_each_row_mut(|y, row| {
+            veil.add_to_row(y, row);
+        });
+    }
+    adaptation
+}
+
 /// Adaptation luminance: see [`crate::threshold_map`].
-pub(crate) fn local_adaptation(luminance_cd_m2: &Plane, pixels_per_degree: f64) -> Plane {
-    let steady = without_single_bright_pixels(luminance_cd_m2);
-    let mut adaptation = gaussian_blur(&steady, POOLING_SIGMA_DEG * pixels_per_degree);
+fn local_adaptation(luminance_cd_m2: &Plane, display: &Display) -> Plane {
+    let mut adaptation = blurred(&without_single_bright_pixels(luminance_cd_m2), display);
     adaptation.for_each_row_mut(|_, row| row.iter_mut().for_each(|value| *value = value.max(LEAST_ADAPTATION_CD_M2)));
     adaptation
+}
+
+fn blurred(plane: &Plane, display: &Display) -> Plane {
+    let density = display.pixel_density();
+    gaussian_blur_xy(plane, POOLING_SIGMA_DEG * density.horizontal, POOLING_SIGMA_DEG * density.vertical)
 }
 
 /// Every pixel lowered to the brightest of its eight neighbours where it exceeds them all.
@@ -95,6 +120,10 @@ fn without_single_bright_pixels(plane: &Plane) -> Plane {
 mod tests {
     use super::*;
 
+    fn display(pixels_per_degree: f64) -> Display {
+        Display { pixels_per_degree, ..Display::default() }
+    }
+
     #[test]
     fn half_dark_half_bright() {
         let picture = Plane::from_fn(40, 40, |x, _| if x < 20 { 1.0 } else { 100.0 });
@@ -102,7 +131,7 @@ mod tests {
         assert!((world_adaptation_cd_m2(&picture, Mean::Geometric) - 10.0).abs() < 1e-6);
         // At the edge the window sees as much of one half as of the other.
         let at = |mean| {
-            let adapted = local_adaptation_cd_m2(&picture, 20.0, mean).unwrap();
+            let adapted = local_adaptation_cd_m2(&picture, &display(20.0), mean).unwrap();
             (adapted.get(19, 20), adapted.get(20, 20))
         };
         let (left, right) = at(Mean::Arithmetic);
@@ -118,6 +147,6 @@ mod tests {
                 assert!((world_adaptation_cd_m2(&picture, mean) - 1e-4).abs() < 1e-9);
             }
         }
-        assert!(local_adaptation_cd_m2(&Plane::filled(2, 2, 1.0), 0.0, Mean::Geometric).is_err());
+        assert!(local_adaptation_cd_m2(&Plane::filled(2, 2, 1.0), &display(0.0), Mean::Geometric).is_err());
     }
 }

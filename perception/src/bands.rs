@@ -1,5 +1,7 @@
 //! Octave bands in cycles per degree, whose energies add up to the whole.
 
+use crate::display::PixelDensity;
+
 /// A set of octave bands: raised cosines over log frequency with Σ_b B_b(f)² = 1 at every frequency.
 ///
 /// Centres are fixed in cycles per degree (0.5, 1, 2, …), since masking belongs to the eye and not to the pixel grid.
@@ -14,9 +16,9 @@ const LOWEST_CPD: f64 = 0.5;
 const HIGHEST_CPD: f64 = 16.0;
 
 impl OctaveBands {
-    /// The bands that a grid of `pixels_per_degree` can show.
-    pub(crate) fn for_grid(pixels_per_degree: f64) -> Self {
-        let nyquist_cpd = pixels_per_degree / 2.0;
+    /// The bands that a grid can show along its finer axis.
+    pub(crate) fn for_grid(density: PixelDensity) -> Self {
+        let nyquist_cpd = density.finest() / 2.0;
         let mut centers_cpd = vec![LOWEST_CPD];
         let mut next = 2.0 * LOWEST_CPD;
         while next <= HIGHEST_CPD && next <= 0.75 * nyquist_cpd {
@@ -65,7 +67,7 @@ fn raised_cosine(octaves: f64) -> f64 {
     if octaves.abs() >= 1.0 { 0.0 } else { (octaves * std::f64::consts::FRAC_PI_2).cos() }
 }
 
-/// A function of frequency, tabulated at equal steps from 0 to the corner of the Nyquist square.
+/// A function of frequency, tabulated at equal steps from 0 to the corner of the Nyquist rectangle.
 #[derive(Clone, Debug)]
 pub(crate) struct RadialTable {
     values: Vec<f32>,
@@ -75,8 +77,8 @@ pub(crate) struct RadialTable {
 const RADIAL_STEPS: usize = 2048;
 
 impl RadialTable {
-    pub(crate) fn new(pixels_per_degree: f64, value_at: impl Fn(f64) -> f64) -> Self {
-        let highest_cpd = pixels_per_degree * std::f64::consts::FRAC_1_SQRT_2;
+    pub(crate) fn new(density: PixelDensity, value_at: impl Fn(f64) -> f64) -> Self {
+        let highest_cpd = 0.5 * density.horizontal.hypot(density.vertical);
         let step = highest_cpd / (RADIAL_STEPS - 2) as f64;
         let values = (0..RADIAL_STEPS).map(|index| value_at(index as f64 * step) as f32).collect();
         Self { values, steps_per_cpd: step.recip() as f32 }
@@ -96,34 +98,34 @@ impl RadialTable {
     }
 }
 
-/// Calls `visit(freq_cpd, weight)` at the midpoints of rings that tile the Nyquist square; the weights add to 1.
+/// Calls `visit(freq_cpd, weight)` at the midpoints of rings that tile the Nyquist rectangle; the weights add to 1.
 ///
-/// The mean of H² over the square is the share of white pixel noise's variance that a filter H passes.
-pub(crate) fn for_each_ring(pixels_per_degree: f64, rings: usize, mut visit: impl FnMut(f64, f64)) {
-    let nyquist_cpd = pixels_per_degree / 2.0;
-    let highest_cpd = nyquist_cpd * std::f64::consts::SQRT_2;
+/// The mean of H² over the rectangle is the share of white pixel noise's variance that a filter H passes.
+pub(crate) fn for_each_ring(density: PixelDensity, rings: usize, mut visit: impl FnMut(f64, f64)) {
+    let (nyquist_x, nyquist_y) = (density.horizontal / 2.0, density.vertical / 2.0);
+    let highest_cpd = nyquist_x.hypot(nyquist_y);
     // Rings as wide as they are far out: bands are octaves, and the lowest deserve as many rings as the highest.
     let lowest_cpd = highest_cpd * 1e-4;
     let ratio = (highest_cpd / lowest_cpd).powf((rings as f64).recip());
+    let area = |radius: f64| rectangle_disc_area(radius, nyquist_x, nyquist_y);
     let mut inner = 0.0;
     for ring in 1..=rings {
         let outer = if ring == rings { highest_cpd } else { lowest_cpd * ratio.powi(ring as i32) };
-        let weight = (square_disc_area(outer, nyquist_cpd) - square_disc_area(inner, nyquist_cpd))
-            / (4.0 * nyquist_cpd * nyquist_cpd);
+        let weight = (area(outer) - area(inner)) / (4.0 * nyquist_x * nyquist_y);
         visit((0.5 * (inner * inner + outer * outer)).sqrt(), weight);
         inner = outer;
     }
 }
 
-/// Area of the part of a disc of radius `radius` that lies in the square |x|, |y| ≤ `half_side`.
-fn square_disc_area(radius: f64, half_side: f64) -> f64 {
-    let disc = std::f64::consts::PI * radius * radius;
-    if radius <= half_side {
-        return disc;
-    }
-    let half_angle = (half_side / radius).min(1.0).acos();
-    let segment = radius * radius * (half_angle - half_angle.sin() * half_angle.cos());
-    disc - 4.0 * segment
+/// Area of the part of a disc of radius `radius`, at most half the diagonal, that lies in the rectangle
+/// |x| ≤ `half_width`, |y| ≤ `half_height`.
+fn rectangle_disc_area(radius: f64, half_width: f64, half_height: f64) -> f64 {
+    // What juts out over one side; up to half the diagonal the four pieces do not overlap.
+    let segment = |half_side: f64| {
+        let half_angle = (half_side / radius).min(1.0).acos();
+        radius * radius * (half_angle - half_angle.sin() * half_angle.cos())
+    };
+    std::f64::consts::PI * radius * radius - 2.0 * (segment(half_width) + segment(half_height))
 }
 
 #[cfg(test)]
@@ -133,7 +135,7 @@ mod tests {
     #[test]
     fn energies_of_the_bands_add_to_one() {
         for ppd in [2.0, 30.0, 60.0, 110.0] {
-            let bands = OctaveBands::for_grid(ppd);
+            let bands = OctaveBands::for_grid(PixelDensity::square(ppd));
             for step in 0..500 {
                 let freq = f64::from(step) * ppd / 700.0;
                 let sum: f64 = (0..bands.len()).map(|band| bands.gain(band, freq).powi(2)).sum();
@@ -144,20 +146,23 @@ mod tests {
 
     #[test]
     fn bands_reach_as_far_as_the_grid() {
-        assert_eq!(OctaveBands::for_grid(60.0).centers_cpd, [0.5, 1.0, 2.0, 4.0, 8.0, 16.0]);
-        assert_eq!(OctaveBands::for_grid(30.0).centers_cpd, [0.5, 1.0, 2.0, 4.0, 8.0]);
-        assert_eq!(OctaveBands::for_grid(1.0).centers_cpd, [0.5]);
+        assert_eq!(OctaveBands::for_grid(PixelDensity::square(60.0)).centers_cpd, [0.5, 1.0, 2.0, 4.0, 8.0, 16.0]);
+        assert_eq!(OctaveBands::for_grid(PixelDensity::square(30.0)).centers_cpd, [0.5, 1.0, 2.0, 4.0, 8.0]);
+        assert_eq!(OctaveBands::for_grid(PixelDensity::square(1.0)).centers_cpd, [0.5]);
     }
 
     #[test]
-    fn rings_tile_the_square() {
-        let (mut sum, mut mean_square) = (0.0, 0.0);
-        for_each_ring(40.0, 400, |freq, weight| {
-            sum += weight;
-            mean_square += weight * freq * freq;
-        });
-        assert!((sum - 1.0).abs() < 1e-12);
-        // The mean of x² + y² over a square of half side 20 is 2/3 · 400.
-        assert!((mean_square / (2.0 / 3.0 * 400.0) - 1.0).abs() < 1e-3, "{mean_square}");
+    fn rings_tile_the_rectangle() {
+        for (horizontal, vertical) in [(40.0, 40.0), (40.0, 90.0), (100.0, 20.0)] {
+            let (mut sum, mut mean_square) = (0.0, 0.0);
+            for_each_ring(PixelDensity { horizontal, vertical }, 400, |freq, weight| {
+                sum += weight;
+                mean_square += weight * freq * freq;
+            });
+            assert!((sum - 1.0).abs() < 1e-12);
+            // The mean of x² + y² over a rectangle of half sides a and b is (a² + b²)/3.
+            let expected = (horizontal * horizontal + vertical * vertical) / 12.0;
+            assert!((mean_square / expected - 1.0).abs() < 1e-3, "{horizontal}×{vertical}: {mean_square}");
+        }
     }
 }

@@ -3,10 +3,11 @@
 use crate::csf::{CastleChromatic, CastleCsf, ChromaticChannel};
 use crate::display::Viewing;
 use crate::error::Error;
+use crate::noise_gain::noise_gain;
 use crate::opponent::{Opponent, opponent};
 use crate::plane::Plane;
-use crate::sensitivity::{SensitivityTables, luminance_coordinate};
-use crate::threshold::{ThresholdInputs, ThresholdMap, chromatic_threshold_map, noise_gain, threshold_map};
+use crate::sensitivity::SensitivityTables;
+use crate::threshold::{ThresholdInputs, ThresholdMap, chromatic_threshold_map, threshold_map};
 
 /// Thresholds of one picture in each of the eye's three channels.
 #[derive(Clone, Debug)]
@@ -86,8 +87,7 @@ impl ThresholdMap {
     pub fn chromatic_noise_gain(&self, channel: ChromaticChannel) -> Result<Plane, Error> {
         let csf = CastleChromatic::new(channel, self.viewing.observer.csf_area_deg2)?;
         let tables = SensitivityTables::new(&self.bands, &self.viewing, &csf);
-        let coordinates = self.adaptation_cd_m2.map(luminance_coordinate);
-        Ok(noise_gain(&tables, &self.adaptation_cd_m2, &coordinates, None))
+        Ok(noise_gain(&tables, &self.adaptation_cd_m2, &[]))
     }
 
     /// Gains of both chromatic channels.
@@ -126,14 +126,14 @@ pub struct ChromaticGains {
 }
 
 /// A picture's opponent signals, cd/m².
-struct Channels {
-    achromatic: Plane,
-    red_green: Plane,
-    yellow_violet: Plane,
+pub(crate) struct Channels {
+    pub(crate) achromatic: Plane,
+    pub(crate) red_green: Plane,
+    pub(crate) yellow_violet: Plane,
 }
 
 impl Channels {
-    fn new(rgb_cd_m2: &[[f32; 3]], width: usize, height: usize) -> Result<Self, Error> {
+    pub(crate) fn new(rgb_cd_m2: &[[f32; 3]], width: usize, height: usize) -> Result<Self, Error> {
         if width.checked_mul(height) != Some(rgb_cd_m2.len()) {
             return Err(Error::ValueCount { width, height, found: rgb_cd_m2.len() });
         }

@@ -1,11 +1,12 @@
 //! A visible-differences predictor: can one picture be told from another?
 
-use crate::csf::ContrastSensitivity;
+use crate::colour::Channels;
+use crate::csf::{CastleChromatic, ChromaticChannel, ContrastSensitivity};
 use crate::display::Viewing;
 use crate::error::Error;
 use crate::plane::Plane;
 use crate::psychometric::detection_probability;
-use crate::threshold::{ThresholdInputs, ratio, threshold_map};
+use crate::threshold::{ThresholdInputs, ThresholdMap, chromatic_threshold_map, ratio, threshold_map};
 
 /// What an observer sees of the difference of two pictures.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,6 +20,16 @@ pub struct Difference {
 }
 
 impl Difference {
+    fn of(visibility: Plane) -> Self {
+        let worst = visibility.values().iter().copied().fold(0.0, f32::max);
+        let visible = visibility.values().iter().filter(|v| **v > 1.0).count();
+        Self {
+            worst_visibility: f64::from(worst),
+            visible_fraction: visible as f64 / visibility.values().len() as f64,
+            visibility,
+        }
+    }
+
     /// Probability of seeing the difference in the 1° patch around each pixel: 1 − exp(−v^3.5).
     #[must_use]
     pub fn detection(&self) -> Plane {
@@ -67,19 +78,57 @@ pub fn difference(
     let map_of = |picture| {
         threshold_map(&ThresholdInputs { display_luminance_cd_m2: picture, guide_variance: None }, viewing, &csf)
     };
-    let mut map = map_of(reference_cd_m2)?;
-    let test_map = map_of(test_cd_m2)?;
-    for (elevation, test_elevation) in map.elevations.iter_mut().zip(&test_map.elevations) {
-        elevation.combine(test_elevation, f32::min);
+    let seen = mutual_visibility(map_of(reference_cd_m2)?, &map_of(test_cd_m2)?, reference_cd_m2, test_cd_m2);
+    Ok(Difference::of(seen))
+}
+
+/// [`difference`] for pictures in colour (linear Rec. 709 RGB on the display, cd/m², row-major): at each pixel the most visible of the
+/// achromatic channel, through `csf`, and castleCSF's red–green and yellow–violet.
+///
+/// # Errors
+/// [`Error::ValueCount`] unless both pictures have `width * height` pixels; else as [`difference`].
+///
+/// ```
+/// use fechner_perception::{CastleCsf, Viewing};
+/// use fechner_perception::difference::colour_difference;
+/// let grey = vec![[100.0; 3]; 64 * 64];
+/// // Redder, with less green and the same luminance.
+/// let tinted = vec![[120.0, 100.0 - 20.0 * 0.2126 / 0.7152, 100.0]; 64 * 64];
+/// let seen = colour_difference(&grey, &tinted, 64, 64, &Viewing::default(), &CastleCsf::default())?;
+/// assert!(seen.is_visible());
+/// # Ok::<(), fechner_perception::Error>(())
+/// ```
+pub fn colour_difference(
+    reference_rgb_cd_m2: &[[f32; 3]],
+    test_rgb_cd_m2: &[[f32; 3]],
+    width: usize,
+    height: usize,
+    viewing: &Viewing,
+    csf: &dyn ContrastSensitivity,
+) -> Result<Difference, Error> {
+    let [reference, test] = [reference_rgb_cd_m2, test_rgb_cd_m2].map(|rgb| Channels::new(rgb, width, height));
+    let (reference, test) = (reference?, test?);
+    let mut greatest = difference(&reference.achromatic, &test.achromatic, viewing, csf)?.visibility;
+    for (channel, own, other) in [
+        (ChromaticChannel::RedGreen, &reference.red_green, &test.red_green),
+        (ChromaticChannel::YellowViolet, &reference.yellow_violet, &test.yellow_violet),
+    ] {
+        let csf = CastleChromatic::new(channel, viewing.observer.csf_area_deg2)?;
+        let csf = HeldAtLowFrequencies { base: &csf };
+        let map = chromatic_threshold_map(own, &reference.achromatic, viewing, &csf)?;
+        let test_map = chromatic_threshold_map(other, &test.achromatic, viewing, &csf)?;
+        let seen = mutual_visibility(map, &test_map, own, other);
+        greatest.values_mut().iter_mut().zip(seen.values()).for_each(|(v, other)| *v = v.max(*other));
     }
-    let visibility = map.measured_visibility(&ratio(test_cd_m2, reference_cd_m2, |test, reference| test - reference));
-    let worst = visibility.values().iter().copied().fold(0.0, f32::max);
-    let visible = visibility.values().iter().filter(|v| **v > 1.0).count();
-    Ok(Difference {
-        worst_visibility: f64::from(worst),
-        visible_fraction: visible as f64 / visibility.values().len() as f64,
-        visibility,
-    })
+    Ok(Difference::of(greatest))
+}
+
+/// Visibility of the difference between two signals, masked by what both of them mask.
+fn mutual_visibility(mut map: ThresholdMap, test_map: &ThresholdMap, reference: &Plane, test: &Plane) -> Plane {
+    for (elevation, test_elevation) in map.elevations.iter_mut().zip(&test_map.elevations) {
+        elevation.combine(test_elevation, |reference, test, _, _| reference.min(test));
+    }
+    map.measured_visibility(&ratio(test, reference, |test, reference| test - reference))
 }
 
 /// Sensitivity below 0.5 cpd as at 0.5 cpd, 0 included.
@@ -149,6 +198,21 @@ mod tests {
         let on_texture = compare(&texture, &noisy(&texture, 0.03)).visibility.get(64, 64);
         let on_grey = compare(&flat, &noisy(&flat, 0.03)).visibility.get(64, 64);
         assert!(on_texture < 0.95 * on_grey, "{on_texture} {on_grey}");
+    }
+
+    #[test]
+    fn a_tint_of_equal_luminance_is_seen_and_grey_differs_as_without_colour() {
+        let grey = vec![[100.0; 3]; 64 * 64];
+        let of = |test: &[[f32; 3]]| {
+            colour_difference(&grey, test, 64, 64, &Viewing::default(), &CastleCsf::default()).unwrap()
+        };
+        let tinted = [115.0, 100.0 - 15.0 * 0.2126 / 0.7152, 100.0];
+        assert!(of(&vec![tinted; 64 * 64]).is_visible());
+        assert!(!of(&vec![[100.1, 100.0 - 0.1 * 0.2126 / 0.7152, 100.0]; 64 * 64]).is_visible());
+        let brighter = of(&vec![[104.0; 3]; 64 * 64]).worst_visibility;
+        let alone = compare(&Plane::filled(64, 64, 100.0), &Plane::filled(64, 64, 104.0)).worst_visibility;
+        assert!((brighter / alone - 1.0).abs() < 1e-3, "{brighter} {alone}");
+        assert!(colour_difference(&grey, &grey[1..], 64, 64, &Viewing::default(), &CastleCsf::default()).is_err());
     }
 
     #[test]

@@ -10,8 +10,12 @@ use crate::error::{Error, check_range};
 pub struct Display {
     /// What a report calls it.
     pub name: String,
-    /// Pixels a degree of visual angle, at the centre: 2 d tan(0.5°) / pixel pitch.
+    /// Pixels a degree of visual angle along a row, at the centre: 2 d tan(0.5°) / pixel pitch.
     pub pixels_per_degree: f64,
+    /// Width of a pixel over its height (as in an EXR's `pixelAspectRatio`): 1 for square pixels. `pixels_per_degree` is
+    /// counted along the rows; along the columns there are this many times as many.
+    #[serde(default = "square")]
+    pub pixel_aspect_ratio: f64,
     /// Luminance of full white, cd/m².
     pub white_cd_m2: f64,
     /// Luminance of full black in a dark room, cd/m².
@@ -28,6 +32,45 @@ pub struct Display {
     pub frames_per_second: f64,
     /// Share of a frame's time that a pixel is lit: 1 for sample-and-hold, towards 0 for a strobed display.
     pub persistence: f64,
+}
+
+fn square() -> f64 {
+    1.0
+}
+
+/// Pixels a degree of visual angle along both axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PixelDensity {
+    /// Along a row.
+    pub horizontal: f64,
+    /// Along a column.
+    pub vertical: f64,
+}
+
+impl PixelDensity {
+    /// Of square pixels.
+    #[must_use]
+    pub fn square(pixels_per_degree: f64) -> Self {
+        Self { horizontal: pixels_per_degree, vertical: pixels_per_degree }
+    }
+
+    /// Along the finer axis.
+    #[must_use]
+    pub fn finest(self) -> f64 {
+        self.horizontal.max(self.vertical)
+    }
+
+    /// Along the coarser axis.
+    #[must_use]
+    pub fn coarsest(self) -> f64 {
+        self.horizontal.min(self.vertical)
+    }
+
+    /// The geometric mean: that of square pixels of the same area.
+    #[must_use]
+    pub fn mean(self) -> f64 {
+        (self.horizontal * self.vertical).sqrt()
+    }
 }
 
 struct Preset {
@@ -94,6 +137,7 @@ impl Display {
         Self {
             name: preset.name.to_owned(),
             pixels_per_degree: preset.pixels_per_degree,
+            pixel_aspect_ratio: square(),
             white_cd_m2: preset.white_cd_m2,
             black_cd_m2: preset.black_cd_m2,
             ambient_cd_m2: 0.0,
@@ -137,6 +181,7 @@ impl Display {
             }
         };
         set(&mut display.pixels_per_degree, file.pixels_per_degree);
+        set(&mut display.pixel_aspect_ratio, file.pixel_aspect_ratio);
         set(&mut display.white_cd_m2, file.white_cd_m2);
         set(&mut display.black_cd_m2, file.black_cd_m2);
         set(&mut display.ambient_cd_m2, file.ambient_cd_m2);
@@ -163,6 +208,19 @@ impl Display {
         Ok(display)
     }
 
+    /// Pixels a degree along both axes.
+    ///
+    /// ```
+    /// use fechner_perception::Display;
+    /// let anamorphic = Display { pixel_aspect_ratio: 2.0, ..Display::default() };
+    /// assert_eq!(anamorphic.pixel_density().vertical, 120.0);
+    /// ```
+    #[must_use]
+    pub fn pixel_density(&self) -> PixelDensity {
+        let horizontal = self.pixels_per_degree;
+        PixelDensity { horizontal, vertical: horizontal * self.pixel_aspect_ratio }
+    }
+
     /// Luminance, cd/m², that this display shows for linear light `relative` (clamped to 0..1; NaN counts as 0):
     /// black + ambient + (white − black) · relative.
     #[must_use]
@@ -179,6 +237,7 @@ impl Display {
         const PPD: &str = "between 1 and 1000 pixels per degree";
         const LIGHT: &str = "between 0 and 1e8 cd/m²";
         check_range("pixels_per_degree", self.pixels_per_degree, 1.0, 1000.0, PPD)?;
+        check_range("pixel_aspect_ratio", self.pixel_aspect_ratio, 0.1, 10.0, "between 0.1 and 10")?;
         check_range("white_cd_m2", self.white_cd_m2, 1e-3, 1e8, "between 0.001 and 1e8 cd/m²")?;
         check_range("black_cd_m2", self.black_cd_m2, 0.0, self.white_cd_m2, "between 0 and white_cd_m2")?;
         check_range("ambient_cd_m2", self.ambient_cd_m2, 0.0, 1e8, LIGHT)?;
@@ -212,6 +271,7 @@ struct DisplayFile {
     name: Option<String>,
     preset: Option<String>,
     pixels_per_degree: Option<f64>,
+    pixel_aspect_ratio: Option<f64>,
     width_px: Option<f64>,
     width_m: Option<f64>,
     white_cd_m2: Option<f64>,
@@ -231,6 +291,23 @@ pub struct Observer {
     pub sensitivity: f64,
     /// Area of the grating whose threshold is meant, deg². 1 is a foveal patch.
     pub csf_area_deg2: f64,
+    /// Light scattered in the eye; [`Glare::None`] unless asked for.
+    #[serde(default)]
+    pub glare: Glare,
+}
+
+/// What the eye's own media do to bright light (see [`crate::glare`]).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Glare {
+    /// Nothing: thresholds beside lamps come out lower than they are, never higher.
+    #[default]
+    None,
+    /// A veil by the CIE's general disability glare equation for an eye of this age.
+    Cie {
+        /// Years.
+        age_years: f64,
+    },
 }
 
 impl Observer {
@@ -244,7 +321,7 @@ impl Observer {
 impl Default for Observer {
     /// The median observer, 1 deg².
     fn default() -> Self {
-        Self { sensitivity: 1.0, csf_area_deg2: 1.0 }
+        Self { sensitivity: 1.0, csf_area_deg2: 1.0, glare: Glare::None }
     }
 }
 
@@ -272,6 +349,9 @@ impl Viewing {
     /// [`Error::OutOfRange`], naming the field.
     pub fn check(&self) -> Result<(), Error> {
         self.display.check()?;
+        if let Glare::Cie { age_years } = self.observer.glare {
+            check_range("observer.glare.age_years", age_years, 1.0, 120.0, "between 1 and 120 years")?;
+        }
         check_range("observer.sensitivity", self.observer.sensitivity, 1e-3, 1e3, "between 0.001 and 1000")?;
         check_range("observer.csf_area_deg2", self.observer.csf_area_deg2, 1e-3, 1e4, "between 0.001 and 10000 deg²")
     }

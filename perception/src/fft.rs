@@ -7,6 +7,7 @@ use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use rustfft::num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 
+use crate::display::PixelDensity;
 use crate::filter::reflect;
 use crate::plane::Plane;
 
@@ -17,9 +18,11 @@ pub(crate) const MOST_REDUCTION: usize = 16;
 pub(crate) struct PictureTransform {
     width: usize,
     height: usize,
-    pad: usize,
+    pad_x: usize,
+    pad_y: usize,
     padded_width: usize,
     padded_height: usize,
+    density: PixelDensity,
     rows_forward: Arc<dyn RealToComplex<f32>>,
     columns_forward: Arc<dyn Fft<f32>>,
 }
@@ -29,6 +32,14 @@ pub(crate) struct Spectrum {
     bins: Vec<Complex32>,
 }
 
+/// Buffers that transforms of one picture hand on to each other: to have the memory made anew for every band would cost a
+/// tenth of a threshold map.
+#[derive(Default)]
+pub(crate) struct Workspace {
+    by_column: Vec<Complex32>,
+    by_row: Vec<Complex32>,
+}
+
 struct Planners {
     real: RealFftPlanner<f32>,
     complex: FftPlanner<f32>,
@@ -36,6 +47,17 @@ struct Planners {
 
 static PLANNERS: LazyLock<Mutex<Planners>> =
     LazyLock::new(|| Mutex::new(Planners { real: RealFftPlanner::new(), complex: FftPlanner::new() }));
+
+/// Complex transforms of one length, there and back (not scaled).
+pub(crate) struct ComplexPlans {
+    pub(crate) forward: Arc<dyn Fft<f32>>,
+    pub(crate) back: Arc<dyn Fft<f32>>,
+}
+
+pub(crate) fn complex_plans(len: usize) -> ComplexPlans {
+    let planner = &mut PLANNERS.lock().unwrap_or_else(std::sync::PoisonError::into_inner).complex;
+    ComplexPlans { forward: planner.plan_fft_forward(len), back: planner.plan_fft_inverse(len) }
+}
 
 /// The smallest number ≥ `least` without prime factors other than 2, 3 and 5.
 pub(crate) fn smooth_size(least: usize) -> usize {
@@ -53,20 +75,24 @@ pub(crate) fn smooth_size(least: usize) -> usize {
 }
 
 impl PictureTransform {
-    /// For pictures of `width` × `height`, mirrored by at least `pad` pixels on every side.
-    pub(crate) fn new(width: usize, height: usize, pad: usize) -> Self {
+    /// For pictures of `width` × `height` pixels, mirrored by at least one degree on every side, since contrast sensitivity
+    /// reaches no further.
+    pub(crate) fn new(width: usize, height: usize, density: PixelDensity) -> Self {
         // Multiples of the largest reduction, so that reduced transforms sample the same pixels.
-        let pad = pad.max(1).next_multiple_of(MOST_REDUCTION);
-        let padded = |len: usize| MOST_REDUCTION * smooth_size((len + 2 * pad).div_ceil(MOST_REDUCTION));
-        let (padded_width, padded_height) = (padded(width), padded(height));
+        let pad = |pixels_per_degree: f64| (pixels_per_degree.ceil() as usize).max(1).next_multiple_of(MOST_REDUCTION);
+        let padded = |len: usize, pad: usize| MOST_REDUCTION * smooth_size((len + 2 * pad).div_ceil(MOST_REDUCTION));
+        let (pad_x, pad_y) = (pad(density.horizontal), pad(density.vertical));
+        let (padded_width, padded_height) = (padded(width, pad_x), padded(height, pad_y));
         // A poisoned lock only means that another thread died while planning; the plans made so far are whole.
         let mut planners = PLANNERS.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         Self {
             width,
             height,
-            pad,
+            pad_x,
+            pad_y,
             padded_width,
             padded_height,
+            density,
             rows_forward: planners.real.plan_fft_forward(padded_width),
             columns_forward: planners.complex.plan_fft_forward(padded_height),
         }
@@ -77,24 +103,25 @@ impl PictureTransform {
         self.padded_width / 2 + 1
     }
 
-    /// The spectrum of `plane`, which must have this transform's size.
-    pub(crate) fn forward(&self, plane: &Plane) -> Spectrum {
+    /// The spectrum of the picture whose row y `fill_row(y, row)` writes.
+    pub(crate) fn forward(&self, workspace: &mut Workspace, fill_row: impl Fn(usize, &mut [f32]) + Sync) -> Spectrum {
         let columns = self.columns();
         let zero = Complex32::default();
-        let mut by_row = vec![zero; columns * self.padded_height];
+        let by_row = sized(&mut workspace.by_row, columns * self.padded_height);
         by_row.par_chunks_mut(columns).enumerate().for_each_init(
             || (self.rows_forward.make_input_vec(), self.rows_forward.make_scratch_vec()),
             |(row, scratch), (y, bins)| {
-                let source = plane.row(reflect(y as isize - self.pad as isize, self.height));
-                for (x, value) in row.iter_mut().enumerate() {
-                    *value = source[reflect(x as isize - self.pad as isize, self.width)];
+                let inside = self.pad_x..self.pad_x + self.width;
+                fill_row(reflect(y as isize - self.pad_y as isize, self.height), &mut row[inside.clone()]);
+                for x in (0..inside.start).chain(inside.end..self.padded_width) {
+                    row[x] = row[self.pad_x + reflect(x as isize - self.pad_x as isize, self.width)];
                 }
                 // Lengths come from the same plan, the only thing this call can complain of.
                 let _ = self.rows_forward.process_with_scratch(row, bins, scratch);
             },
         );
         let mut bins = vec![zero; columns * self.padded_height];
-        transpose(&by_row, &mut bins, columns, self.padded_height);
+        transpose(by_row, &mut bins, columns, self.padded_height);
         bins.par_chunks_mut(self.padded_height).for_each_init(
             || vec![zero; self.columns_forward.get_inplace_scratch_len()],
             |scratch, column| self.columns_forward.process_with_scratch(column, scratch),
@@ -109,8 +136,8 @@ impl PictureTransform {
     /// transformed. `factor` must be one of 1, 2, 4, 8, 16, and leave room for `limit_cpd`.
     pub(crate) fn filtered_reduced(
         &self,
+        workspace: &mut Workspace,
         spectrum: &Spectrum,
-        pixels_per_degree: f64,
         limit_cpd: f64,
         factor: usize,
         gain: impl Fn(f32) -> f32 + Sync,
@@ -120,51 +147,67 @@ impl PictureTransform {
             columns: planners.complex.plan_fft_inverse(self.padded_height / factor),
             rows: planners.real.plan_fft_inverse(self.padded_width / factor),
             factor,
-            first: self.pad / factor - 1,
+            first_x: self.pad_x / factor - 1,
+            first_y: self.pad_y / factor - 1,
             width: reduced_size(self.width, factor),
             height: reduced_size(self.height, factor),
         };
         drop(planners);
-        self.run_back(&back, spectrum, pixels_per_degree, limit_cpd, gain)
+        self.filtered_columns(&back, &mut workspace.by_column, spectrum, limit_cpd, gain);
+        let columns = back.columns_kept(self.padded_width);
+        let rows = self.padded_height / factor;
+        let by_row = sized(&mut workspace.by_row, columns * rows);
+        transpose(&workspace.by_column[..columns * rows], by_row, rows, columns);
+        self.rows_back(&back, by_row)
     }
 
-    fn run_back(
+    /// The spectrum through the gain and back along its columns.
+    fn filtered_columns(
         &self,
         back: &BackTransform,
+        buffer: &mut Vec<Complex32>,
         spectrum: &Spectrum,
-        pixels_per_degree: f64,
         limit_cpd: f64,
         gain: impl Fn(f32) -> f32 + Sync,
-    ) -> Plane {
+    ) {
         let all_rows = self.padded_height;
         let rows = all_rows / back.factor;
-        let row_length = self.padded_width / back.factor;
-        let columns = row_length / 2 + 1;
         let zero = Complex32::default();
-        let step_x = (pixels_per_degree / self.padded_width as f64) as f32;
-        let step_y = (pixels_per_degree / all_rows as f64) as f32;
+        let step_x = (self.density.horizontal / self.padded_width as f64) as f32;
+        let step_y = (self.density.vertical / all_rows as f64) as f32;
         let scale = 1.0 / (self.padded_width as f32 * all_rows as f32);
-        let mut bins = vec![zero; columns * rows];
+        let bins = sized(buffer, back.columns_kept(self.padded_width) * rows);
         bins.par_chunks_mut(rows).zip(spectrum.bins.par_chunks(all_rows)).enumerate().for_each_init(
-            || vec![zero; back.columns.get_inplace_scratch_len()],
-            |scratch, (kx, (filtered, source))| {
+            || (vec![zero; back.columns.get_inplace_scratch_len()], vec![0.0_f32; rows / 2 + 1]),
+            |(scratch, gains), (kx, (filtered, source))| {
                 let freq_x = kx as f32 * step_x;
                 if f64::from(freq_x) > limit_cpd {
+                    filtered.fill(zero);
                     return;
                 }
-                for (ky, bin) in filtered.iter_mut().enumerate() {
-                    // Negative frequencies stand at the end.
-                    let source_ky = if 2 * ky <= rows { ky } else { all_rows - (rows - ky) };
-                    let freq_y = ky.min(rows - ky) as f32 * step_y;
-                    *bin = source[source_ky] * (gain((freq_x * freq_x + freq_y * freq_y).sqrt()) * scale);
+                for (ky, value) in gains.iter_mut().enumerate() {
+                    let freq_y = ky as f32 * step_y;
+                    *value = gain((freq_x * freq_x + freq_y * freq_y).sqrt()) * scale;
+                }
+                // Negative frequencies stand at the end, the lowest last.
+                let (positive, negative) = filtered.split_at_mut(rows / 2 + 1);
+                for ((bin, source), gain) in positive.iter_mut().zip(source).zip(&*gains) {
+                    *bin = source * gain;
+                }
+                let from_end = source.iter().rev().zip(&gains[1..]);
+                for (bin, (source, gain)) in negative.iter_mut().rev().zip(from_end) {
+                    *bin = source * gain;
                 }
                 back.columns.process_with_scratch(filtered, scratch);
             },
         );
-        let mut by_row = vec![zero; columns * rows];
-        transpose(&bins, &mut by_row, rows, columns);
-        // Only the rows that are asked for come back.
-        let kept = back.first * columns..(back.first + back.height) * columns;
+    }
+
+    /// Back along the rows that are asked for.
+    fn rows_back(&self, back: &BackTransform, by_row: &mut [Complex32]) -> Plane {
+        let row_length = self.padded_width / back.factor;
+        let columns = back.columns_kept(self.padded_width);
+        let kept = back.first_y * columns..(back.first_y + back.height) * columns;
         let mut picture = Plane::filled(back.width, back.height, 0.0);
         picture.values_mut().par_chunks_mut(back.width).zip(by_row[kept].par_chunks_mut(columns)).for_each_init(
             || (back.rows.make_output_vec(), back.rows.make_scratch_vec()),
@@ -175,11 +218,19 @@ impl PictureTransform {
                     bins[columns - 1].im = 0.0;
                 }
                 let _ = back.rows.process_with_scratch(bins, row, scratch);
-                values.copy_from_slice(&row[back.first..back.first + back.width]);
+                values.copy_from_slice(&row[back.first_x..back.first_x + back.width]);
             },
         );
         picture
     }
+}
+
+/// The first `len` bins of a buffer that grows to them.
+fn sized(buffer: &mut Vec<Complex32>, len: usize) -> &mut [Complex32] {
+    if buffer.len() < len {
+        buffer.resize(len, Complex32::default());
+    }
+    &mut buffer[..len]
 }
 
 /// Plans and frame of a way back from the spectrum.
@@ -188,10 +239,18 @@ struct BackTransform {
     rows: Arc<dyn ComplexToReal<f32>>,
     /// Every how many-th pixel comes back.
     factor: usize,
-    /// The first row and column kept, in samples.
-    first: usize,
+    /// The first column and row kept, in samples.
+    first_x: usize,
+    first_y: usize,
     width: usize,
     height: usize,
+}
+
+impl BackTransform {
+    /// Horizontal frequencies of the reduced picture.
+    fn columns_kept(&self, padded_width: usize) -> usize {
+        padded_width / self.factor / 2 + 1
+    }
 }
 
 /// Samples of a row of `len` pixels at every `factor`-th pixel, one before the first and one past the last included.
@@ -204,10 +263,10 @@ pub(crate) fn reduced_pixel(index: usize, factor: usize, len: usize) -> usize {
     (index * factor).saturating_sub(factor).min(len - 1)
 }
 
-/// The largest reduction that still samples frequencies up to `limit_cpd`.
-pub(crate) fn reduction(pixels_per_degree: f64, limit_cpd: f64) -> usize {
+/// The largest reduction that still samples frequencies up to `limit_cpd` along both axes.
+pub(crate) fn reduction(density: PixelDensity, limit_cpd: f64) -> usize {
     let mut factor = 1;
-    while factor < MOST_REDUCTION && pixels_per_degree / (4 * factor) as f64 >= limit_cpd {
+    while factor < MOST_REDUCTION && density.coarsest() / (4 * factor) as f64 >= limit_cpd {
         factor *= 2;
     }
     factor
@@ -259,12 +318,19 @@ mod tests {
     fn filtered(
         transform: &PictureTransform,
         spectrum: &Spectrum,
-        pixels_per_degree: f64,
         limit_cpd: f64,
         gain: impl Fn(f32) -> f32 + Sync,
     ) -> Plane {
-        let whole = transform.filtered_reduced(spectrum, pixels_per_degree, limit_cpd, 1, gain);
+        let whole = transform.filtered_reduced(&mut Workspace::default(), spectrum, limit_cpd, 1, gain);
         enlarged(&whole, 1, transform.width, transform.height)
+    }
+
+    fn spectrum_of(transform: &PictureTransform, plane: &Plane) -> Spectrum {
+        transform.forward(&mut Workspace::default(), |y, row| row.copy_from_slice(plane.row(y)))
+    }
+
+    fn transform_at(width: usize, height: usize, pixels_per_degree: f64) -> PictureTransform {
+        PictureTransform::new(width, height, PixelDensity::square(pixels_per_degree))
     }
 
     #[test]
@@ -276,8 +342,8 @@ mod tests {
     fn a_gain_of_one_gives_the_picture_back() {
         for (width, height) in [(1, 1), (1, 5), (7, 3), (48, 31)] {
             let plane = Plane::from_fn(width, height, |x, y| ((x * 7 + y * 13) % 11) as f32);
-            let transform = PictureTransform::new(width, height, 9);
-            let back = filtered(&transform, &transform.forward(&plane), 30.0, f64::INFINITY, |_| 1.0);
+            let transform = transform_at(width, height, 30.0);
+            let back = filtered(&transform, &spectrum_of(&transform, &plane), f64::INFINITY, |_| 1.0);
             for (found, expected) in back.values().iter().zip(plane.values()) {
                 assert!((found - expected).abs() < 1e-4, "{width}×{height}: {found} for {expected}");
             }
@@ -289,10 +355,10 @@ mod tests {
         // 3 cycles in 64 pixels at 32 pixels a degree: 1.5 cpd along y; with 16 pixels of mirror on each side, a third of
         // the padded 96 rows is still whole half waves.
         let plane = Plane::from_fn(16, 64, |_, y| (std::f32::consts::TAU * 3.0 * (y as f32 + 0.5) / 64.0).cos());
-        let transform = PictureTransform::new(16, 64, 32);
-        let spectrum = transform.forward(&plane);
-        let kept = filtered(&transform, &spectrum, 32.0, f64::INFINITY, |freq| f32::from((freq - 1.5).abs() < 0.01));
-        let lost = filtered(&transform, &spectrum, 32.0, 1.6, |freq| f32::from((freq - 1.5).abs() > 0.01));
+        let transform = transform_at(16, 64, 32.0);
+        let spectrum = spectrum_of(&transform, &plane);
+        let kept = filtered(&transform, &spectrum, f64::INFINITY, |freq| f32::from((freq - 1.5).abs() < 0.01));
+        let lost = filtered(&transform, &spectrum, 1.6, |freq| f32::from((freq - 1.5).abs() > 0.01));
         for ((kept, lost), expected) in kept.values().iter().zip(lost.values()).zip(plane.values()) {
             assert!((kept - expected).abs() < 1e-5 && lost.abs() < 1e-5);
         }
@@ -301,13 +367,13 @@ mod tests {
     #[test]
     fn a_reduced_transform_samples_the_whole_one() {
         let plane = Plane::from_fn(75, 42, |x, y| (x as f32 * 0.13).sin() + (y as f32 * 0.1 + x as f32 * 0.02).cos());
-        let transform = PictureTransform::new(75, 42, 30);
-        let spectrum = transform.forward(&plane);
+        let transform = transform_at(75, 42, 60.0);
+        let spectrum = spectrum_of(&transform, &plane);
         // A smooth low-pass that ends at 2 cpd; 60 pixels a degree.
         let gain = |freq: f32| (1.0 - freq / 2.0).max(0.0).powi(2);
-        let whole = filtered(&transform, &spectrum, 60.0, 2.0, gain);
+        let whole = filtered(&transform, &spectrum, 2.0, gain);
         for factor in [2, 4, 8] {
-            let reduced = transform.filtered_reduced(&spectrum, 60.0, 2.0, factor, gain);
+            let reduced = transform.filtered_reduced(&mut Workspace::default(), &spectrum, 2.0, factor, gain);
             let back = enlarged(&reduced, factor, 75, 42);
             for y in 0..42 {
                 for x in 0..75 {

@@ -28,41 +28,51 @@ type Lanes = [f32; LANES];
 /// "Theoretical foundations of Gaussian convolution by extended box filtering", 2011). Positive stays positive and the
 /// mean is kept. A wide window slides over a reduced row, see [`Tent`].
 pub(crate) fn gaussian_blur(plane: &Plane, sigma_px: f64) -> Plane {
-    if sigma_px.is_nan() || sigma_px < 1e-3 {
-        return plane.clone();
-    }
-    along_both_axes(plane, |len| {
+    gaussian_blur_xy(plane, sigma_px, sigma_px)
+}
+
+/// [`gaussian_blur`] with a standard deviation of its own along each axis.
+pub(crate) fn gaussian_blur_xy(plane: &Plane, sigma_x_px: f64, sigma_y_px: f64) -> Plane {
+    let blurred = |sigma_px: f64, len: usize| {
+        // NaN blurs nothing.
+        let is_wide = sigma_px >= 1e-3;
         // Beyond twice the row the mirrored picture is uniform anyway; the cap bounds the cost.
         let sigma_px = sigma_px.min(2.0 * len as f64);
         let tent = Tent::for_sigma(sigma_px, len);
         let kernel = BoxKernel::third_of_variance(tent.sigma_left(sigma_px));
         move |strip: &mut Strip| {
-            tent.reduce(strip);
-            for _ in 0..3 {
-                kernel.apply(strip);
+            if is_wide {
+                tent.reduce(strip);
+                for _ in 0..3 {
+                    kernel.apply(strip);
+                }
+                tent.enlarge(strip);
             }
-            tent.enlarge(strip);
         }
-    })
+    };
+    along_both_axes(plane, |len| blurred(sigma_y_px, len), |len| blurred(sigma_x_px, len))
 }
 
 /// The smallest value of `plane` within a square of half-width `radius_px` around each pixel.
 pub(crate) fn erode(plane: &Plane, radius_px: usize) -> Plane {
-    if radius_px == 0 {
-        return plane.clone();
-    }
-    along_both_axes(plane, |len| {
+    erode_xy(plane, radius_px, radius_px)
+}
+
+/// The smallest value of `plane` within a rectangle of these half-widths around each pixel.
+pub(crate) fn erode_xy(plane: &Plane, radius_x_px: usize, radius_y_px: usize) -> Plane {
+    let eroded = |radius_px: usize, len: usize| {
         let radius = radius_px.min(len);
         move |strip: &mut Strip| {
             strip.extend(radius);
             strip.slide(0, 2 * radius + 1, f32::INFINITY, f32::min, |window, _, _| window);
         }
-    })
+    };
+    along_both_axes(plane, |len| eroded(radius_y_px, len), |len| eroded(radius_x_px, len))
 }
 
-/// The largest value of `plane` within a square of half-width `radius_px` around each pixel.
-pub(crate) fn dilate(plane: &Plane, radius_px: usize) -> Plane {
-    erode(&plane.map(|value| -value), radius_px).map(|value| -value)
+/// The largest value of `plane` within a rectangle of these half-widths around each pixel.
+pub(crate) fn dilate_xy(plane: &Plane, radius_x_px: usize, radius_y_px: usize) -> Plane {
+    erode_xy(&plane.map(|value| -value), radius_x_px, radius_y_px).map(|value| -value)
 }
 
 /// A few columns of a picture side by side, and the buffers one thread reuses from strip to strip.
@@ -252,16 +262,21 @@ impl BoxKernel {
     }
 }
 
-/// Runs an operation along y, then along x. `operation_for` gets the length of the columns it will see.
-fn along_both_axes<Op>(plane: &Plane, operation_for: impl Fn(usize) -> Op) -> Plane
+/// Runs an operation along y, then one along x. Each `for` gets the length of the columns or rows it will see.
+fn along_both_axes<Down, Across>(
+    plane: &Plane,
+    down_for: impl Fn(usize) -> Down,
+    across_for: impl Fn(usize) -> Across,
+) -> Plane
 where
-    Op: Fn(&mut Strip) + Sync,
+    Down: Fn(&mut Strip) + Sync,
+    Across: Fn(&mut Strip) + Sync,
 {
     if plane.values().is_empty() {
         return plane.clone();
     }
-    let turned = run_columns(plane, &operation_for(plane.height()));
-    run_columns(&turned, &operation_for(plane.width()))
+    let turned = run_columns(plane, &down_for(plane.height()));
+    run_columns(&turned, &across_for(plane.width()))
 }
 
 /// Runs an operation along every column; the result is transposed, so that a second run works on the rows.

@@ -18,7 +18,7 @@
 //! let scene = Plane::from_fn(64, 48, |x, _| 10.0 + x as f32);
 //! let viewing = Viewing::of(Display::preset("laptop").unwrap());
 //! let operator = tone::operator("ward94", None).unwrap();
-//! let fitted = operator.fit(&tone::SceneGuide { luminance_cd_m2: &scene }, &viewing.display);
+//! let fitted = operator.fit(&tone::SceneGuide::of(&scene), &viewing, None);
 //! let shown = seen::display_luminance(&*fitted, &viewing.display, &scene);
 //!
 //! let inputs = ThresholdInputs { display_luminance_cd_m2: &shown, guide_variance: None };
@@ -43,19 +43,23 @@ pub mod eotf;
 mod error;
 mod fft;
 mod filter;
+pub mod glare;
 pub mod guide;
 pub mod masking;
 pub mod model;
 pub mod motion;
+mod noise_gain;
 pub mod opponent;
 pub mod photometry;
 mod plane;
+pub mod primaries;
 pub mod psychometric;
 mod reduced;
 mod rows;
 pub mod saliency;
 pub mod seen;
 mod sensitivity;
+mod taps;
 #[cfg(test)]
 mod test_noise;
 pub mod threshold;

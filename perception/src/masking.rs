@@ -1,11 +1,12 @@
 //! Masking: how much a band's own contrast raises its threshold.
 
 use crate::bands::{OctaveBands, RadialTable};
-use crate::fft::{PictureTransform, Spectrum, reduced_pixel as pixel, reduced_size, reduction};
-use crate::filter::{erode, gaussian_blur};
+use crate::display::PixelDensity;
+use crate::fft::{MOST_REDUCTION, PictureTransform, Spectrum, Workspace, reduced_size, reduction};
 use crate::plane::Plane;
 use crate::reduced::ReducedPlane;
 use crate::sensitivity::BandTables;
+use crate::taps::{eroded, smoothed};
 
 /// The threshold elevation is never taken to exceed this, whatever the contrast.
 pub const ELEVATION_CAP: f64 = 3.0;
@@ -49,11 +50,15 @@ pub(crate) struct MaskSource<'a> {
     pub(crate) transform: &'a PictureTransform,
     /// Spectrum of the guide over its adaptation luminance.
     pub(crate) contrast: &'a Spectrum,
-    /// Variance of the guide's noise over the adaptation luminance squared, if any is known.
-    pub(crate) noise: Option<&'a Plane>,
-    /// Coordinates of the adaptation luminance in the tables.
+    /// Variance of the guide's noise over the adaptation luminance squared, if any is known: at every second pixel, every
+    /// fourth and so on, framed like any [`ReducedPlane`].
+    pub(crate) noise: Vec<Plane>,
+    /// Coordinates of the adaptation luminance in the tables, at every second pixel.
     pub(crate) coordinates: &'a Plane,
-    pub(crate) pixels_per_degree: f64,
+    pub(crate) density: PixelDensity,
+    /// Of the picture, pixels.
+    pub(crate) width: usize,
+    pub(crate) height: usize,
 }
 
 /// Threshold elevation, 1 to 3, of one band, on a grid as fine as the band needs.
@@ -64,88 +69,92 @@ pub(crate) struct MaskSource<'a> {
 /// it; texture, which goes on, does.
 pub(crate) fn band_elevation(
     source: &MaskSource<'_>,
+    workspace: &mut Workspace,
     bands: &OctaveBands,
     band: usize,
     tables: &BandTables,
     elevation: &ElevationTable,
 ) -> ReducedPlane {
-    let ppd = source.pixels_per_degree;
-    let (width, height) = (source.coordinates.width(), source.coordinates.height());
-    let gain = RadialTable::new(ppd, |freq| bands.mask_gain(band, freq));
+    let density = source.density;
+    let gain = RadialTable::new(density, |freq| bands.mask_gain(band, freq));
     let limit_cpd = bands.limit_cpd(band);
     // A quarter more densely than the band needs: its energy is blurred next.
-    let amplitude_factor = reduction(ppd, 1.25 * limit_cpd);
+    let amplitude_factor = reduction(density, 1.25 * limit_cpd);
     let amplitude =
-        source.transform.filtered_reduced(source.contrast, ppd, limit_cpd, amplitude_factor, |freq| gain.at(freq));
-    let wavelength_px = ppd / bands.center_cpd(band);
-    let mut blur_variance_px = (0.35 * wavelength_px).powi(2);
-    let (mut energy, factor) = if amplitude_factor == 1 {
-        // The variance of the window that halves.
-        blur_variance_px -= 0.5;
-        (halved_energy(&amplitude, width, height), 2)
-    } else {
-        let mut energy = amplitude;
-        energy.for_each_row_mut(|_, row| row.iter_mut().for_each(|value| *value *= *value));
-        (energy, amplitude_factor)
-    };
-    if let Some(noise) = source.noise {
+        source
+            .transform
+            .filtered_reduced(workspace, source.contrast, limit_cpd, amplitude_factor, |freq| gain.at(freq));
+    let factor = 2 * amplitude_factor;
+    let size = (reduced_size(source.width, factor), reduced_size(source.height, factor));
+    let mut energy = halved(&amplitude, size, |value| value * value);
+    drop(amplitude);
+    if let Some(noise) = source.noise.get(amplitude_factor.ilog2() as usize) {
         let share = tables.mask_noise_share as f32;
         energy.for_each_row_mut(|y, row| {
-            for (x, value) in row.iter_mut().enumerate() {
-                *value -= share * block_mean(noise, x, y, factor);
-            }
+            row.iter_mut().zip(noise.row(y)).for_each(|(value, noise)| *value -= share * noise);
         });
     }
-    let mut mask = gaussian_blur(&energy, blur_variance_px.max(0.0).sqrt() / factor as f64);
+    // In samples, less the variance of the window that halved.
+    let wavelength = |pixels_per_degree: f64| pixels_per_degree / bands.center_cpd(band) / factor as f64;
+    let variance = |wavelength: f64| ((0.35 * wavelength).powi(2) - HALVING_VARIANCE / 4.0).max(0.0);
+    let (wavelength_x, wavelength_y) = (wavelength(density.horizontal), wavelength(density.vertical));
+    let mut mask = smoothed(&energy, variance(wavelength_x), variance(wavelength_y));
     drop(energy);
+    let half = factor / 2;
+    let coordinate_at = |index: usize, len: usize| (index * half + 1).saturating_sub(half).min(len - 1);
     mask.for_each_row_mut(|y, row| {
-        let coordinates = source.coordinates.row(pixel(y, factor, height));
+        let coordinates = source.coordinates.row(coordinate_at(y, source.coordinates.height()));
         for (x, value) in row.iter_mut().enumerate() {
-            let coordinate = coordinates[pixel(x, factor, width)];
+            let coordinate = coordinates[coordinate_at(x, coordinates.len())];
             *value = 2.0 * value.max(0.0) * tables.center_sensitivity_squared.at(coordinate);
         }
     });
-    let mut elevated = erode(&mask, (wavelength_px / factor as f64).round() as usize);
+    let mut elevated = eroded(&mask, wavelength_x.round() as usize, wavelength_y.round() as usize);
     elevated.for_each_row_mut(|_, row| row.iter_mut().for_each(|value| *value = elevation.at(*value)));
-    ReducedPlane::new(elevated, factor, width, height)
+    ReducedPlane::new(elevated, factor, source.width, source.height)
 }
 
-/// The energy of an amplitude at every pixel (with a frame of one pixel, as [`PictureTransform::filtered_reduced`] gives it), at
-/// every other pixel: squares through a binomial window, since sampling them bare would alias.
-fn halved_energy(amplitude: &Plane, width: usize, height: usize) -> Plane {
+/// `plane` at every second pixel, every fourth and so on, up to what [`MaskSource`] can be asked for.
+pub(crate) fn halvings(plane: &Plane) -> Vec<Plane> {
+    let (width, height) = (plane.width(), plane.height());
+    let mut framed = Plane::filled(width + 2, height + 2, 0.0);
+    framed.for_each_row_mut(|y, row| {
+        let source = plane.row(y.saturating_sub(1).min(height - 1));
+        row[1..=width].copy_from_slice(source);
+        row[0] = source[0];
+        row[width + 1] = source[width - 1];
+    });
+    let mut planes: Vec<Plane> = Vec::new();
+    let mut factor = 2;
+    while factor <= 2 * MOST_REDUCTION {
+        let size = (reduced_size(width, factor), reduced_size(height, factor));
+        planes.push(halved(planes.last().unwrap_or(&framed), size, |value| value));
+        factor *= 2;
+    }
+    planes
+}
+
+/// Variance of the window of [`halved`], in samples of its input.
+const HALVING_VARIANCE: f64 = 0.5;
+
+/// `change` of every sample of a framed plane, at every other one, to a plane of `size`: through a binomial window, since
+/// sampled bare it would alias.
+fn halved(plane: &Plane, size: (usize, usize), change: impl Fn(f32) -> f32 + Sync) -> Plane {
     const BINOMIAL: [f32; 3] = [0.25, 0.5, 0.25];
-    let mut energy = Plane::filled(reduced_size(width, 2), reduced_size(height, 2), 0.0);
-    energy.for_each_row_mut(|y, row| {
-        let mut squares = vec![0.0_f32; amplitude.width()];
+    let mut result = Plane::filled(size.0, size.1, 0.0);
+    result.for_each_row_mut(|y, row| {
+        let mut sums = vec![0.0_f32; plane.width()];
         for (offset, weight) in BINOMIAL.into_iter().enumerate() {
-            let source = amplitude.row((2 * y + offset).saturating_sub(2).min(amplitude.height() - 1));
-            squares.iter_mut().zip(source).for_each(|(sum, value)| *sum += weight * value * value);
+            let source = plane.row((2 * y + offset).saturating_sub(2).min(plane.height() - 1));
+            sums.iter_mut().zip(source).for_each(|(sum, value)| *sum += weight * change(*value));
         }
+        let last = sums.len() - 1;
         for (x, value) in row.iter_mut().enumerate() {
-            let at = |offset: usize| squares[(2 * x + offset).saturating_sub(2).min(squares.len() - 1)];
+            let at = |offset: usize| sums[(2 * x + offset).saturating_sub(2).min(last)];
             *value = BINOMIAL[0] * at(0) + BINOMIAL[1] * at(1) + BINOMIAL[2] * at(2);
         }
     });
-    energy
-}
-
-/// Mean of the `factor` × `factor` pixels around a reduced sample.
-fn block_mean(plane: &Plane, x: usize, y: usize, factor: usize) -> f32 {
-    if factor == 1 {
-        return plane.get(pixel(x, 1, plane.width()), pixel(y, 1, plane.height()));
-    }
-    let range = |index: usize, len: usize| {
-        let center = pixel(index, factor, len);
-        center.saturating_sub(factor / 2)..(center + factor / 2).min(len).max(1)
-    };
-    let (mut sum, mut count) = (0.0, 0.0);
-    for v in range(y, plane.height()) {
-        for value in &plane.row(v)[range(x, plane.width())] {
-            sum += value;
-            count += 1.0;
-        }
-    }
-    if count > 0.0 { sum / count } else { 0.0 }
+    result
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Motion: what moves over the picture, and what of it moves over the retina.
 
 use crate::csf::{DRIFT_DEG_S, Daly98, FASTEST_PURSUIT_DEG_S, PURSUIT_GAIN};
+use crate::display::Display;
 use crate::error::Error;
 use crate::plane::Plane;
 
@@ -48,23 +49,29 @@ impl ErrorMotion {
     }
 }
 
-/// Speed over the picture, deg/s, of motion in pixels a frame: |(x, y)| · frames a second / pixels a degree.
+/// Speed over the picture, deg/s, of motion in pixels a frame, on a display of these frames a second and pixels a degree.
 ///
 /// Each pixel takes the slowest speed of its 3×3 neighbourhood: at a silhouette the slower side's error is the one that
 /// could be seen. Motion that is not finite counts as none.
 ///
 /// # Errors
-/// [`Error::SizeMismatch`] for planes of two sizes.
-pub fn image_velocity_deg_s(
-    motion_x_px: &Plane,
-    motion_y_px: &Plane,
-    frames_per_second: f64,
-    pixels_per_degree: f64,
-) -> Result<Plane, Error> {
+/// [`Error::SizeMismatch`] for planes of two sizes, [`Error::OutOfRange`] for an impossible display.
+///
+/// ```
+/// use fechner_perception::{Display, Plane, motion::image_velocity_deg_s};
+/// let (right, down) = (Plane::filled(8, 8, 12.0), Plane::filled(8, 8, 0.0));
+/// // 12 pixels in a sixtieth of a second at 60 pixels a degree.
+/// assert_eq!(image_velocity_deg_s(&right, &down, &Display::default())?.get(4, 4), 12.0);
+/// # Ok::<(), fechner_perception::Error>(())
+/// ```
+pub fn image_velocity_deg_s(motion_x_px: &Plane, motion_y_px: &Plane, display: &Display) -> Result<Plane, Error> {
+    display.check()?;
     motion_y_px.check_size("vertical motion", motion_x_px.width(), motion_x_px.height())?;
-    let scale = (frames_per_second / pixels_per_degree) as f32;
+    let density = display.pixel_density();
+    let scale = |pixels_per_degree: f64| (display.frames_per_second / pixels_per_degree) as f32;
+    let (scale_x, scale_y) = (scale(density.horizontal), scale(density.vertical));
     let speed = crate::threshold::ratio(motion_x_px, motion_y_px, |x, y| {
-        let speed = x.hypot(y) * scale;
+        let speed = (x * scale_x).hypot(y * scale_y);
         if speed.is_finite() { speed } else { 0.0 }
     });
     Ok(crate::filter::erode(&speed, 1))
@@ -108,11 +115,17 @@ mod tests {
         for (pixels, fps, ppd, expected) in
             [(1.0, 30.0, 30.0, 1.0), (12.0, 30.0, 30.0, 12.0), (5.0, 60.0, 40.0, 7.5), (0.25, 24.0, 21.57, 0.278_164)]
         {
-            let x = Plane::filled(3, 3, pixels);
-            let speed = image_velocity_deg_s(&x, &Plane::filled(3, 3, 0.0), fps, ppd).unwrap();
+            let display = Display { pixels_per_degree: ppd, frames_per_second: fps, ..Display::default() };
+            let (motion, none) = (Plane::filled(3, 3, pixels), Plane::filled(3, 3, 0.0));
+            let speed = image_velocity_deg_s(&motion, &none, &display).unwrap();
             assert!((speed.get(1, 1) - expected).abs() < 1e-5);
+            // Pixels twice as wide as high: there are twice as many to a degree downwards.
+            let anamorphic = Display { pixel_aspect_ratio: 2.0, ..display };
+            let down = image_velocity_deg_s(&none, &motion, &anamorphic).unwrap();
+            assert!((2.0 * down.get(1, 1) - expected).abs() < 1e-5);
         }
-        assert!(image_velocity_deg_s(&Plane::filled(3, 3, 0.0), &Plane::filled(2, 3, 0.0), 30.0, 30.0).is_err());
+        let (wide, narrow) = (Plane::filled(3, 3, 0.0), Plane::filled(2, 3, 0.0));
+        assert!(image_velocity_deg_s(&wide, &narrow, &Display::default()).is_err());
     }
 
     #[test]

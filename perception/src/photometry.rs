@@ -9,6 +9,7 @@ pub const REC709_WEIGHTS: [f32; 3] = [0.2126, 0.7152, 0.0722];
 /// assert_eq!(fechner_perception::photometry::luminance([100.0, 100.0, 100.0]), 100.0);
 /// ```
 #[must_use]
+#[inline]
 pub fn luminance(rgb: [f32; 3]) -> f32 {
     // Summed so that the weights of white add to exactly 1 in f32.
     rgb[0] * REC709_WEIGHTS[0] + rgb[1] * REC709_WEIGHTS[1] + rgb[2] * REC709_WEIGHTS[2]

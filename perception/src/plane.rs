@@ -104,7 +104,22 @@ impl Plane {
         if self.values.is_empty() {
             return 0.0;
         }
-        self.values.iter().map(|&value| f64::from(value)).sum::<f64>() / self.values.len() as f64
+        // Chunk by chunk, then the chunks in their order: the same sum on any number of threads.
+        let chunks: Vec<f64> =
+            self.values.par_chunks(1 << 14).map(|chunk| chunk.iter().map(|&value| f64::from(value)).sum()).collect();
+        chunks.iter().sum::<f64>() / self.values.len() as f64
+    }
+
+    /// Least and greatest value; (∞, 0) for a plane without pixels. Values must not be negative.
+    pub(crate) fn range(&self) -> (f32, f32) {
+        let join = |a: (f32, f32), b: (f32, f32)| (a.0.min(b.0), a.1.max(b.1));
+        self.values
+            .par_chunks(1 << 14)
+            .map(|chunk| {
+                let least = chunk.iter().copied().fold(f32::INFINITY, f32::min);
+                (least, chunk.iter().copied().fold(0.0, f32::max))
+            })
+            .reduce(|| (f32::INFINITY, 0.0), join)
     }
 
     /// Runs `work(y, row)` over all rows in parallel; each row is one thread's own, so the order cannot matter.
@@ -144,7 +159,13 @@ impl Plane {
         if self.values.is_empty() {
             return Err(Error::Empty { what });
         }
-        match self.values.iter().position(|value| !(value.is_finite() && *value >= 0.0)) {
+        let is_bad = |value: &f32| !(value.is_finite() && *value >= 0.0);
+        // Whole chunks without an early exit run on vector registers.
+        let has_bad = |chunk: &[f32]| chunk.iter().fold(false, |bad, value| bad | is_bad(value));
+        if !self.values.par_chunks(1 << 14).any(has_bad) {
+            return Ok(());
+        }
+        match self.values.iter().position(is_bad) {
             None => Ok(()),
             Some(index) => {
                 let (x, y) = (index % self.width, index / self.width);

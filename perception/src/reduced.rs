@@ -1,6 +1,6 @@
 //! A smooth map kept at a fraction of the picture's resolution.
 
-use crate::fft::enlarged;
+use crate::fft::{enlarged, reduced_pixel};
 use crate::plane::Plane;
 
 /// Values at every `factor`-th pixel, one before the picture and at least one past it included, and straight lines between
@@ -39,11 +39,39 @@ impl ReducedPlane {
         }
     }
 
-    /// `change(own, other)` of every sample of two maps of one picture and factor.
-    pub(crate) fn combine(&mut self, other: &Self, change: impl Fn(f32, f32) -> f32 + Sync) {
-        self.samples.for_each_row_mut(|y, row| {
-            for (value, other) in row.iter_mut().zip(other.samples.row(y)) {
-                *value = change(*value, *other);
+    /// Every how many-th pixel has a sample.
+    pub(crate) fn factor(&self) -> usize {
+        self.factor
+    }
+
+    /// Writes row `j` of the same map with a sample at every `factor`-th pixel, its frame of one included; `factor` divides
+    /// this map's own. `buffer` is any vector, to be used again.
+    pub(crate) fn finer_row_into(&self, factor: usize, j: usize, buffer: &mut Vec<f32>, row: &mut [f32]) {
+        let ratio = self.factor / factor;
+        // Fine sample j stands (j − 1) / ratio of a step past coarse sample 1.
+        let last = self.samples.height() - 1;
+        let (upper, fraction) = ((j + ratio - 1) / ratio, ((j + ratio - 1) % ratio) as f32 / ratio as f32);
+        let (above, below) = (self.samples.row(upper.min(last)), self.samples.row((upper + 1).min(last)));
+        buffer.clear();
+        buffer.extend(above.iter().zip(below).map(|(above, below)| above + (below - above) * fraction));
+        let step = (ratio as f32).recip();
+        row[0] = buffer[1] + (buffer[0] - buffer[1]) * step;
+        let last = buffer.len() - 1;
+        for (block, values) in row[1..].chunks_mut(ratio).enumerate() {
+            let (from, to) = (buffer[(block + 1).min(last)], buffer[(block + 2).min(last)]);
+            for (offset, value) in values.iter_mut().enumerate() {
+                *value = from + (to - from) * (offset as f32 * step);
+            }
+        }
+    }
+
+    /// `change(own, other, x, y)` of every sample of two maps of one picture and factor, (x, y) the pixel it stands at.
+    pub(crate) fn combine(&mut self, other: &Self, change: impl Fn(f32, f32, usize, usize) -> f32 + Sync) {
+        let (factor, width, height) = (self.factor, self.width, self.height);
+        self.samples.for_each_row_mut(|j, row| {
+            let y = reduced_pixel(j, factor, height);
+            for (i, (value, other)) in row.iter_mut().zip(other.samples.row(j)).enumerate() {
+                *value = change(*value, *other, reduced_pixel(i, factor, width), y);
             }
         });
     }
@@ -78,6 +106,20 @@ mod tests {
                 reduced.row_into(y, &mut buffer, &mut row);
                 for (found, expected) in row.iter().zip(whole.row(y)) {
                     assert!((found - expected).abs() < 1e-3, "factor {factor}, row {y}: {found}, not {expected}");
+                }
+            }
+            if factor > 1 {
+                let finer = factor / 2;
+                let (wide, high) = (reduced_size(21, finer), reduced_size(13, finer));
+                let mut row = vec![0.0; wide];
+                for j in 1..high - 1 {
+                    reduced.finer_row_into(finer, j, &mut buffer, &mut row);
+                    for (i, found) in row.iter().enumerate().take(wide - 1).skip(1) {
+                        let (x, y) = ((i - 1) * finer, (j - 1) * finer);
+                        if x < 21 && y < 13 {
+                            assert!((found - whole.get(x, y)).abs() < 1e-3, "factor {factor} at ({x}, {y})");
+                        }
+                    }
                 }
             }
             assert_eq!(reduced.change_by(&whole, |own, other| own - other).enlarged().mean(), 0.0);

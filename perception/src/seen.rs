@@ -1,17 +1,19 @@
 //! Error as it will be seen: through a fitted tone operator, on a display.
 //!
-//! A pixel's error is pushed through the operator by itself; how a local operator would spread it to other pixels is
-//! ignored.
+//! A pixel's error is pushed through the operator by itself, with what the eye is adapted to at that pixel; how a local
+//! operator would spread it to other pixels is ignored.
 
 use crate::display::Display;
 use crate::plane::Plane;
-use crate::tone::FittedTone;
+use crate::tone::{FittedTone, Pixel};
 
 /// What the display shows, cd/m², for scene luminance in cd/m².
 #[must_use]
 pub fn display_luminance(fitted: &dyn FittedTone, display: &Display, scene_luminance: &Plane) -> Plane {
     let shown = Shown { fitted, display };
-    scene_luminance.map(|scene| shown.cd_m2(scene))
+    Plane::from_fn(scene_luminance.width(), scene_luminance.height(), |x, y| {
+        shown.cd_m2(Pixel { x, y }, scene_luminance.get(x, y))
+    })
 }
 
 /// Variance of the displayed luminance, (cd/m²)², for scene luminance of mean `mean` (cd/m²) and variance `variance`
@@ -32,9 +34,9 @@ pub fn display_variance(fitted: &dyn FittedTone, display: &Display, mean: &Plane
     let shown = Shown { fitted, display };
     let mut result = Plane::filled(width, height, 0.0);
     result.for_each_row_mut(|y, row| {
-        for (value, (mean, variance)) in row.iter_mut().zip(mean.row(y).iter().zip(variance.row(y))) {
+        for (x, (value, (mean, variance))) in row.iter_mut().zip(mean.row(y).iter().zip(variance.row(y))).enumerate() {
             *value = if mean.is_finite() && variance.is_finite() {
-                shown.variance(f64::from(mean.max(0.0)), f64::from(variance.max(0.0)))
+                shown.variance(Pixel { x, y }, f64::from(mean.max(0.0)), f64::from(variance.max(0.0)))
             } else {
                 f32::INFINITY
             };
@@ -55,12 +57,11 @@ pub fn display_chromatic_variance(fitted: &dyn FittedTone, display: &Display, me
         return Plane::filled(width, height, f32::INFINITY);
     }
     let shown = Shown { fitted, display };
-    let black = shown.cd_m2(0.0);
     let mut result = Plane::filled(width, height, 0.0);
     result.for_each_row_mut(|y, row| {
-        for (value, (mean, variance)) in row.iter_mut().zip(mean.row(y).iter().zip(variance.row(y))) {
-            let luminance = mean.max(1e-6);
-            let slope = (shown.cd_m2(luminance) - black) / luminance;
+        for (x, (value, (mean, variance))) in row.iter_mut().zip(mean.row(y).iter().zip(variance.row(y))).enumerate() {
+            let (pixel, luminance) = (Pixel { x, y }, mean.max(1e-6));
+            let slope = (shown.cd_m2(pixel, luminance) - shown.cd_m2(pixel, 0.0)) / luminance;
             let displayed = slope * slope * variance.max(0.0);
             *value = if mean.is_finite() && displayed.is_finite() { displayed } else { f32::INFINITY };
         }
@@ -86,9 +87,11 @@ pub fn display_half_difference(
     let shown = Shown { fitted, display };
     let mut result = Plane::filled(width, height, 0.0);
     result.for_each_row_mut(|y, row| {
-        for (value, (&mean, &difference)) in row.iter_mut().zip(mean.row(y).iter().zip(half_difference.row(y))) {
+        let pixels = row.iter_mut().zip(mean.row(y).iter().zip(half_difference.row(y)));
+        for (x, (value, (&mean, &difference))) in pixels.enumerate() {
             if mean.is_finite() && difference.is_finite() {
-                *value = 0.5 * (shown.cd_m2(mean + difference) - shown.cd_m2(mean - difference));
+                let pixel = Pixel { x, y };
+                *value = 0.5 * (shown.cd_m2(pixel, mean + difference) - shown.cd_m2(pixel, mean - difference));
             }
         }
     });
@@ -102,11 +105,12 @@ struct Shown<'a> {
 }
 
 impl Shown<'_> {
-    fn cd_m2(&self, scene_cd_m2: f32) -> f32 {
-        self.display.luminance_cd_m2(f64::from(self.fitted.relative_luminance(scene_cd_m2.max(0.0)))) as f32
+    fn cd_m2(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
+        let relative = self.fitted.relative_luminance_at(pixel, scene_cd_m2.max(0.0));
+        self.display.luminance_cd_m2(f64::from(relative)) as f32
     }
 
-    fn variance(&self, mean: f64, variance: f64) -> f32 {
+    fn variance(&self, pixel: Pixel, mean: f64, variance: f64) -> f32 {
         if variance <= 0.0 {
             return 0.0;
         }
@@ -115,14 +119,14 @@ impl Shown<'_> {
         let (below, above) = if mean >= gauss { (gauss, gauss) } else { (mean, (3.0 * variance / mean).min(1e30)) };
         if below <= 0.0 || !above.is_finite() {
             // No light on average, yet noise: only a broken input has that. Take the noise as it stands.
-            let swing = f64::from(self.cd_m2(gauss as f32) - self.cd_m2(0.0));
+            let swing = f64::from(self.cd_m2(pixel, gauss as f32) - self.cd_m2(pixel, 0.0));
             return (swing * swing / 3.0) as f32;
         }
         let weight_below = variance / (below * (below + above));
         let weight_above = variance / (above * (below + above));
-        let center = f64::from(self.cd_m2(mean as f32));
-        let low = f64::from(self.cd_m2((mean - below) as f32)) - center;
-        let high = f64::from(self.cd_m2((mean + above) as f32)) - center;
+        let center = f64::from(self.cd_m2(pixel, mean as f32));
+        let low = f64::from(self.cd_m2(pixel, (mean - below) as f32)) - center;
+        let high = f64::from(self.cd_m2(pixel, (mean + above) as f32)) - center;
         let offset = weight_below * low + weight_above * high;
         (weight_below * low * low + weight_above * high * high - offset * offset).max(0.0) as f32
     }
@@ -131,11 +135,13 @@ impl Shown<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::display::Viewing;
     use crate::tone::{SceneGuide, operator};
 
     fn absolute(display: &Display) -> Box<dyn FittedTone> {
         let guide = Plane::filled(1, 1, 1.0);
-        operator("absolute", None).unwrap().fit(&SceneGuide { luminance_cd_m2: &guide }, display)
+        let viewing = Viewing::of(display.clone());
+        operator("absolute", None).unwrap().fit(&SceneGuide::of(&guide), &viewing, None)
     }
 
     fn one(value: f32) -> Plane {
@@ -147,7 +153,7 @@ mod tests {
         let display = Display::default();
         let guide = Plane::filled(1, 1, 10.0);
         let ward94 = operator("ward94", None).unwrap();
-        let fitted = ward94.fit(&SceneGuide { luminance_cd_m2: &guide }, &display);
+        let fitted = ward94.fit(&SceneGuide::of(&guide), &Viewing::of(display.clone()), None);
         let slope = fitted.relative_luminance(1.0) * 199.8;
         // The last two have σ near and above the mean.
         for (mean, variance) in [(10.0, 4.0), (10.0, 30.0), (2.0, 4.0), (0.5, 1.0)] {

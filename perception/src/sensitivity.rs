@@ -72,7 +72,7 @@ fn sample_luminances() -> impl Iterator<Item = f64> {
 /// What one band does to errors and masks.
 #[derive(Clone, Debug)]
 pub(crate) struct BandTables {
-    /// Mean of S² B² over the Nyquist square: the energy, in squared threshold units, that white pixel noise of unit
+    /// Mean of S² B² over the Nyquist rectangle: the energy, in squared threshold units, that white pixel noise of unit
     /// relative variance has in the band, against adaptation luminance.
     pub(crate) noise_energy: LuminanceTable,
     /// S² at the band's centre, against adaptation luminance.
@@ -91,11 +91,11 @@ pub(crate) struct SensitivityTables {
 
 impl SensitivityTables {
     pub(crate) fn new(bands: &OctaveBands, viewing: &Viewing, csf: &dyn ContrastSensitivity) -> Self {
-        let ppd = viewing.display.pixels_per_degree;
+        let density = viewing.display.pixel_density();
         let gain = viewing.observer.sensitivity;
         let count = bands.len();
         let mut rings = Vec::with_capacity(RINGS);
-        for_each_ring(ppd, RINGS, |freq_cpd, weight| rings.push(Ring { freq_cpd, weight }));
+        for_each_ring(density, RINGS, |freq_cpd, weight| rings.push(Ring { freq_cpd, weight }));
         let shares: Vec<Vec<f64>> = (0..count)
             .map(|band| rings.iter().map(|ring| ring.weight * bands.gain(band, ring.freq_cpd).powi(2)).collect())
             .collect();
@@ -126,7 +126,7 @@ impl SensitivityTables {
                     .iter()
                     .map(|ring| ring.weight * bands.mask_gain(band, ring.freq_cpd).powi(2))
                     .sum(),
-                spread_deg: spread_deg(bands.limit_cpd(band).min(ppd / 2.0), |freq| {
+                spread_deg: spread_deg(bands.limit_cpd(band).min(density.mean() / 2.0), |freq| {
                     bands.gain(band, freq) * csf.sensitivity(freq, grey_cd_m2)
                 }),
             })
@@ -186,7 +186,7 @@ pub(crate) fn adaptation_levels(
             let luminance = 10.0_f64.powf(f64::from(level) / 2.0);
             let gain = viewing.observer.sensitivity;
             let sensitivity =
-                RadialTable::new(viewing.display.pixels_per_degree, |freq| gain * csf.sensitivity(freq, luminance));
+                RadialTable::new(viewing.display.pixel_density(), |freq| gain * csf.sensitivity(freq, luminance));
             AdaptationLevel { luminance_cd_m2: luminance as f32, sensitivity }
         })
         .collect()

@@ -1,16 +1,18 @@
 //! The threshold map: how much error each pixel of a picture may have before it is seen.
 
-use crate::adaptation::local_adaptation;
+use crate::adaptation::adapted;
 use crate::bands::OctaveBands;
 use crate::csf::ContrastSensitivity;
-use crate::display::Viewing;
+use crate::display::{Glare, Viewing};
 use crate::error::Error;
-use crate::fft::PictureTransform;
-use crate::masking::{ElevationTable, MaskSource, band_elevation};
+use crate::fft::{PictureTransform, Workspace};
+use crate::glare::keep_thresholds;
+use crate::masking::{ElevationTable, MaskSource, band_elevation, halvings};
 use crate::motion::MotionTable;
+use crate::noise_gain::{noise_gain, reduced_coordinates};
 use crate::plane::Plane;
 use crate::reduced::ReducedPlane;
-use crate::sensitivity::{AdaptationLevel, SensitivityTables, adaptation_levels, luminance_coordinate};
+use crate::sensitivity::{AdaptationLevel, SensitivityTables, adaptation_levels};
 
 /// Standard deviation of the windows over which the eye adapts and error is pooled, degrees: as wide as a disc of 1°.
 pub const POOLING_SIGMA_DEG: f64 = 0.25;
@@ -73,8 +75,7 @@ pub fn threshold_map(
         variance.check_size("guide variance", guide.width(), guide.height())?;
         variance.check_non_negative("guide variance")?;
     }
-    let adaptation_cd_m2 = local_adaptation(guide, viewing.display.pixels_per_degree);
-    Ok(assemble(guide, inputs.guide_variance, adaptation_cd_m2, viewing, csf))
+    Ok(assemble(guide, guide, 1.0, inputs.guide_variance, viewing, csf))
 }
 
 /// Finds thresholds of one chromatic channel of a picture, to be asked about errors in that channel.
@@ -95,49 +96,73 @@ pub fn chromatic_threshold_map(
     display_luminance_cd_m2.check_non_negative("display luminance")?;
     channel_cd_m2.check_size("chromatic signal", display_luminance_cd_m2.width(), display_luminance_cd_m2.height())?;
     channel_cd_m2.map(f32::abs).check_non_negative("chromatic signal")?;
-    let adaptation_cd_m2 = local_adaptation(display_luminance_cd_m2, viewing.display.pixels_per_degree);
-    Ok(assemble(channel_cd_m2, None, adaptation_cd_m2, viewing, csf))
+    Ok(assemble(channel_cd_m2, display_luminance_cd_m2, 0.0, None, viewing, csf))
 }
 
-/// Masks and noise gain of a signal, cd/m², under an adaptation luminance.
+/// Adaptation to a luminance, cd/m², and the masks and noise gain of a signal under it, with the observer's glare.
 fn assemble(
     signal_cd_m2: &Plane,
+    luminance_cd_m2: &Plane,
+    mean: f32,
+    noise_variance: Option<&Plane>,
+    viewing: &Viewing,
+    csf: &dyn ContrastSensitivity,
+) -> ThresholdMap {
+    let under = |viewing: &Viewing| {
+        let adaptation_cd_m2 = adapted(luminance_cd_m2, viewing);
+        masked(signal_cd_m2, mean, noise_variance, adaptation_cd_m2, viewing, csf)
+    };
+    let mut map = under(viewing);
+    if viewing.observer.glare != Glare::None {
+        let mut clear = viewing.clone();
+        clear.observer.glare = Glare::None;
+        keep_thresholds(&mut map, &under(&clear));
+    }
+    map
+}
+
+/// Masks and noise gain of a signal, cd/m², under an adaptation luminance. `mean` is about the mean of signal over adaptation:
+/// no band passes it, and without it the transform's precision is for the detail.
+fn masked(
+    signal_cd_m2: &Plane,
+    mean: f32,
     noise_variance: Option<&Plane>,
     adaptation_cd_m2: Plane,
     viewing: &Viewing,
     csf: &dyn ContrastSensitivity,
 ) -> ThresholdMap {
-    let ppd = viewing.display.pixels_per_degree;
-    let bands = OctaveBands::for_grid(ppd);
+    let density = viewing.display.pixel_density();
+    let bands = OctaveBands::for_grid(density);
     let tables = SensitivityTables::new(&bands, viewing, csf);
-    let coordinates = adaptation_cd_m2.map(luminance_coordinate);
-
-    let transform = picture_transform(signal_cd_m2.width(), signal_cd_m2.height(), ppd);
-    // Less its mean, which no band passes: the transform's precision is for the detail.
-    let mut contrast = ratio(signal_cd_m2, &adaptation_cd_m2, |value, adaptation| value / adaptation);
-    let mean = contrast.mean() as f32;
-    contrast.for_each_row_mut(|_, row| row.iter_mut().for_each(|value| *value -= mean));
-    let spectrum = transform.forward(&contrast);
-    drop(contrast);
-    let noise = noise_variance
-        .map(|variance| ratio(variance, &adaptation_cd_m2, |value, adaptation| value / adaptation / adaptation));
+    let (width, height) = (signal_cd_m2.width(), signal_cd_m2.height());
+    let transform = PictureTransform::new(width, height, density);
+    let mut workspace = Workspace::default();
+    let contrast = transform.forward(&mut workspace, |y, row| {
+        for (value, (signal, adaptation)) in row.iter_mut().zip(signal_cd_m2.row(y).iter().zip(adaptation_cd_m2.row(y)))
+        {
+            *value = signal / adaptation - mean;
+        }
+    });
     let source = MaskSource {
         transform: &transform,
-        contrast: &spectrum,
-        noise: noise.as_ref(),
-        coordinates: &coordinates,
-        pixels_per_degree: ppd,
+        contrast: &contrast,
+        noise: noise_variance.map_or_else(Vec::new, |variance| {
+            halvings(&ratio(variance, &adaptation_cd_m2, |value, adaptation| value / adaptation / adaptation))
+        }),
+        coordinates: &reduced_coordinates(&adaptation_cd_m2, 2),
+        density,
+        width,
+        height,
     };
     let elevation = ElevationTable::new();
     let elevations: Vec<ReducedPlane> = tables
         .bands
         .iter()
         .enumerate()
-        .map(|(band, band_tables)| band_elevation(&source, &bands, band, band_tables, &elevation))
+        .map(|(band, band_tables)| band_elevation(&source, &mut workspace, &bands, band, band_tables, &elevation))
         .collect();
-
-    let noise_gain = noise_gain(&tables, &adaptation_cd_m2, &coordinates, Some(&elevations));
-    let (least, greatest) = range(&adaptation_cd_m2);
+    let noise_gain = noise_gain(&tables, &adaptation_cd_m2, &elevations);
+    let (least, greatest) = adaptation_cd_m2.range();
     let levels = adaptation_levels(viewing, csf, least, greatest);
     ThresholdMap { viewing: viewing.clone(), bands, tables, levels, adaptation_cd_m2, elevations, noise_gain }
 }
@@ -166,8 +191,7 @@ impl ThresholdMap {
     /// How many times masking raises the allowed standard error of white noise at each pixel, 1 to 3.
     #[must_use]
     pub fn masking_elevation(&self) -> Plane {
-        let coordinates = self.adaptation_cd_m2.map(luminance_coordinate);
-        let unmasked = noise_gain(&self.tables, &self.adaptation_cd_m2, &coordinates, None);
+        let unmasked = noise_gain(&self.tables, &self.adaptation_cd_m2, &[]);
         ratio(&unmasked, &self.noise_gain, |unmasked, masked| (unmasked / masked).sqrt())
     }
 
@@ -187,8 +211,7 @@ impl ThresholdMap {
             *elevation =
                 elevation.change_by(retinal_velocity_deg_s, |elevation, velocity| elevation * table.at(velocity));
         }
-        let coordinates = self.adaptation_cd_m2.map(luminance_coordinate);
-        moved.noise_gain = noise_gain(&self.tables, &self.adaptation_cd_m2, &coordinates, Some(&moved.elevations));
+        moved.noise_gain = noise_gain(&self.tables, &self.adaptation_cd_m2, &moved.elevations);
         Ok(moved)
     }
 
@@ -211,12 +234,6 @@ impl ThresholdMap {
     }
 }
 
-/// The transform for pictures of this size at this resolution: one degree of mirror on each side, since contrast
-/// sensitivity reaches no further.
-pub(crate) fn picture_transform(width: usize, height: usize, pixels_per_degree: f64) -> PictureTransform {
-    PictureTransform::new(width, height, pixels_per_degree.ceil() as usize)
-}
-
 /// `change(a, b)` at every pixel of two planes of one size.
 pub(crate) fn ratio(a: &Plane, b: &Plane, change: impl Fn(f32, f32) -> f32 + Sync) -> Plane {
     let mut result = a.clone();
@@ -228,185 +245,5 @@ pub(crate) fn ratio(a: &Plane, b: &Plane, change: impl Fn(f32, f32) -> f32 + Syn
     result
 }
 
-/// N(x) under an adaptation luminance, with each band's masking or without any.
-pub(crate) fn noise_gain(
-    tables: &SensitivityTables,
-    adaptation_cd_m2: &Plane,
-    coordinates: &Plane,
-    elevations: Option<&[ReducedPlane]>,
-) -> Plane {
-    let mut gain = Plane::filled(adaptation_cd_m2.width(), adaptation_cd_m2.height(), 0.0);
-    gain.for_each_row_mut(|y, row| {
-        let coordinates = coordinates.row(y);
-        let (mut buffer, mut elevation) = (Vec::new(), vec![0.0; row.len()]);
-        // Band by band: each row of elevations is read in one go.
-        for (band, tables) in tables.bands.iter().enumerate() {
-            let energies = coordinates.iter().map(|&coordinate| tables.noise_energy.at(coordinate));
-            match elevations {
-                Some(elevations) => {
-                    elevations[band].row_into(y, &mut buffer, &mut elevation);
-                    for (value, (energy, elevation)) in row.iter_mut().zip(energies.zip(&elevation)) {
-                        *value += energy / (elevation * elevation);
-                    }
-                }
-                None => row.iter_mut().zip(energies).for_each(|(value, energy)| *value += energy),
-            }
-        }
-        // Divided twice: the square of 1e-4 cd/m² and of 1e20 must both stay within f32.
-        for (value, adaptation) in row.iter_mut().zip(adaptation_cd_m2.row(y)) {
-            *value = *value / adaptation / adaptation;
-        }
-    });
-    gain
-}
-
-fn range(plane: &Plane) -> (f32, f32) {
-    plane
-        .values()
-        .iter()
-        .fold((f32::INFINITY, 0.0), |(least, greatest), &value| (least.min(value), greatest.max(value)))
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::csf::CastleCsf;
-    use crate::display::Display;
-
-    fn viewing(pixels_per_degree: f64) -> Viewing {
-        Viewing { display: Display { pixels_per_degree, ..Display::default() }, ..Viewing::default() }
-    }
-
-    fn map_of(picture: &Plane, viewing: &Viewing) -> ThresholdMap {
-        let inputs = ThresholdInputs { display_luminance_cd_m2: picture, guide_variance: None };
-        threshold_map(&inputs, viewing, &CastleCsf::default()).unwrap()
-    }
-
-    /// Standard error at v = 1 is σ/L = 1 / (S_peak G √2) with the specification's S_peak and G of white noise.
-    #[test]
-    fn uniform_pictures_have_the_tabulated_thresholds() {
-        for (luminance, ppd, expected) in [
-            (1.0, 30.0, 1.0 / (40.160_55 * 0.295_844)),
-            (1.0, 60.0, 1.0 / (40.160_55 * 0.149_091)),
-            (10.0, 20.0, 1.0 / (86.063_1 * 0.616_258)),
-            (10.0, 60.0, 1.0 / (86.063_1 * 0.227_654)),
-            (100.0, 20.0, 1.0 / (134.296_3 * 0.748_92)),
-            (100.0, 30.0, 1.0 / (134.296_3 * 0.567_412)),
-            (100.0, 60.0, 1.0 / (134.296_3 * 0.304_307)),
-        ] {
-            let map = map_of(&Plane::filled(32, 24, luminance), &viewing(ppd));
-            let allowed = f64::from(map.allowed_standard_error_cd_m2(1.0).get(16, 12)) / f64::from(luminance);
-            let expected = expected / std::f64::consts::SQRT_2;
-            assert!((allowed / expected - 1.0).abs() < 2e-3, "{luminance} cd/m², {ppd} ppd: {allowed}, not {expected}");
-        }
-    }
-
-    #[test]
-    fn an_edge_masks_nothing_beside_it() {
-        for ppd in [38.0, 60.0] {
-            let step = Plane::from_fn(256, 64, |x, _| if x < 128 { 50.0 } else { 100.0 });
-            let elevation = map_of(&step, &viewing(ppd)).masking_elevation();
-            let beside = (0.25 * ppd) as usize;
-            for x in [128 - beside, 127 + beside] {
-                let found = elevation.get(x, 32);
-                assert!(found < 1.25, "{ppd} ppd, x {x}: {found}");
-            }
-        }
-    }
-
-    #[test]
-    fn texture_masks_and_its_own_noise_does_not() {
-        let wave = |amplitude: f32| {
-            Plane::from_fn(192, 192, move |x, y| {
-                let phase = std::f32::consts::TAU * 4.0 / 60.0;
-                100.0 * (1.0 + amplitude * ((x as f32 * phase).cos() * (y as f32 * phase).cos()))
-            })
-        };
-        let textured = map_of(&wave(0.3), &viewing(60.0)).masking_elevation().get(96, 96);
-        assert!(textured > 1.15, "{textured}");
-        // White noise of 10 % of the mean, known as such, and unknown.
-        let mut state = 1_u64;
-        let noisy = Plane::from_values(192, 192, (0..192 * 192).map(|_| 100.0 + 10.0 * normal(&mut state)).collect());
-        let noisy = noisy.unwrap();
-        let variance = Plane::filled(192, 192, 100.0);
-        let known = ThresholdInputs { display_luminance_cd_m2: &noisy, guide_variance: Some(&variance) };
-        let known = threshold_map(&known, &viewing(60.0), &CastleCsf::default()).unwrap().masking_elevation();
-        let unknown = map_of(&noisy, &viewing(60.0)).masking_elevation();
-        assert!(known.mean() < 1.01 && unknown.mean() > 1.2, "known {} unknown {}", known.mean(), unknown.mean());
-    }
-
-    #[test]
-    fn a_firefly_does_not_raise_its_threshold() {
-        let mut picture = Plane::filled(64, 64, 20.0);
-        picture.values_mut()[32 * 64 + 32] = 200.0;
-        let adapted = map_of(&picture, &viewing(60.0)).adaptation_cd_m2().get(32, 32);
-        assert!((adapted - 20.0).abs() < 1e-3, "{adapted}");
-    }
-
-    #[test]
-    fn any_size_and_luminance_gives_finite_thresholds() {
-        for (width, height) in [(1, 1), (2, 1), (1, 9), (3, 3), (17, 5)] {
-            for luminance in [0.0, 1e-30, 1e-4, 1.0, 1e8] {
-                let map = map_of(&Plane::filled(width, height, luminance), &viewing(30.0));
-                let allowed = map.allowed_standard_error_cd_m2(1.0);
-                assert!(allowed.values().iter().all(|value| value.is_finite() && *value > 0.0), "{luminance}");
-            }
-        }
-    }
-
-    #[test]
-    fn error_that_moves_fast_may_be_larger() {
-        let map = map_of(&Plane::filled(32, 32, 50.0), &viewing(60.0));
-        let at = |velocity| {
-            let moved = map.with_motion(&Plane::filled(32, 32, velocity)).unwrap();
-            moved.allowed_standard_error_cd_m2(1.0).get(16, 16)
-        };
-        let still = map.allowed_standard_error_cd_m2(1.0).get(16, 16);
-        assert!((at(0.0) / still - 1.0).abs() < 1e-5 && (at(0.15) / still - 1.0).abs() < 1e-5);
-        assert!(at(10.0) > 2.0 * still, "{} {still}", at(10.0));
-        assert!(at(1e9).is_finite());
-        assert!(map.with_motion(&Plane::filled(3, 3, 0.0)).is_err());
-    }
-
-    #[test]
-    fn isoluminant_noise_is_not_missed() {
-        use crate::csf::{CastleChromatic, ChromaticChannel};
-        use crate::opponent::opponent;
-        let mut state = 9;
-        let noise: Vec<_> = (0..128 * 128)
-            .map(|_| {
-                // Red up and green down by the same luminance.
-                let red = 40.0 * normal(&mut state);
-                opponent([red, -red * 0.2126 / 0.7152, 0.0])
-            })
-            .collect();
-        let plane = |value: fn(&crate::opponent::Opponent) -> f32| {
-            Plane::from_values(128, 128, noise.iter().map(value).collect()).unwrap()
-        };
-        let grey = Plane::filled(128, 128, 100.0);
-        let csf = CastleChromatic::new(ChromaticChannel::RedGreen, 1.0).unwrap();
-        let red_green = chromatic_threshold_map(&Plane::filled(128, 128, 0.0), &grey, &viewing(60.0), &csf).unwrap();
-        let luminance_v = map_of(&grey, &viewing(60.0)).measured_visibility(&plane(|c| c.achromatic)).get(64, 64);
-        let chromatic_v = red_green.measured_visibility(&plane(|c| c.red_green)).get(64, 64);
-        assert!(luminance_v < 1e-3 && chromatic_v > 1.0, "luminance {luminance_v}, red–green {chromatic_v}");
-    }
-
-    #[test]
-    fn bad_inputs_are_errors() {
-        let csf = CastleCsf::default();
-        let bad = Plane::filled(4, 4, f32::NAN);
-        let good = Plane::filled(4, 4, 1.0);
-        let small = Plane::filled(2, 2, 1.0);
-        let ask = |display_luminance_cd_m2, guide_variance, viewing: &Viewing| {
-            threshold_map(&ThresholdInputs { display_luminance_cd_m2, guide_variance }, viewing, &csf).err()
-        };
-        assert!(matches!(ask(&bad, None, &Viewing::default()), Some(Error::BadPixel { .. })));
-        assert!(matches!(ask(&good, Some(&small), &Viewing::default()), Some(Error::SizeMismatch { .. })));
-        assert!(matches!(ask(&good, None, &viewing(0.0)), Some(Error::OutOfRange { .. })));
-        assert!(matches!(ask(&good, None, &viewing(f64::NAN)), Some(Error::OutOfRange { .. })));
-    }
-
-    fn normal(state: &mut u64) -> f32 {
-        crate::test_noise::normal(state)
-    }
-}
+mod tests;

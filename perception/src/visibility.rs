@@ -5,11 +5,11 @@
 //! grating at its threshold has v = 1: the √2 turns its RMS into its amplitude.
 
 use crate::bands::RadialTable;
-use crate::fft::{enlarged, reduced_pixel, reduced_size, reduction};
-use crate::filter::gaussian_blur;
+use crate::fft::{PictureTransform, Workspace, enlarged, reduced_pixel, reduced_size, reduction};
+use crate::filter::gaussian_blur_xy;
 use crate::plane::Plane;
 use crate::sensitivity::luminance_coordinate;
-use crate::threshold::{POOLING_SIGMA_DEG, ThresholdMap, picture_transform, ratio};
+use crate::threshold::{POOLING_SIGMA_DEG, ThresholdMap, ratio};
 
 /// An error of this many times the adaptation luminance is hopelessly visible; more would only cost the rest of the
 /// transform its precision.
@@ -52,8 +52,8 @@ impl ThresholdMap {
         let mut energy = Plane::filled(self.width(), self.height(), 0.0);
         for (tables, elevation) in self.tables.bands.iter().zip(&self.elevations) {
             // A spread of a fifth of the pooling window widens it by 2 %: nothing to pay a blur for.
-            let blurred = (tables.spread_deg > 0.2 * POOLING_SIGMA_DEG)
-                .then(|| gaussian_blur(&relative, tables.spread_deg * self.viewing.display.pixels_per_degree));
+            let blurred =
+                (tables.spread_deg > 0.2 * POOLING_SIGMA_DEG).then(|| self.blurred(&relative, tables.spread_deg));
             let spread = blurred.as_ref().unwrap_or(&relative);
             energy.for_each_row_mut(|y, row| {
                 let mut elevations = vec![0.0; row.len()];
@@ -98,7 +98,12 @@ impl ThresholdMap {
     /// `plane` convolved with the pooling window g, a Gaussian of σ 0.25° (any unit, unchanged).
     #[must_use]
     pub fn pooled(&self, plane: &Plane) -> Plane {
-        gaussian_blur(plane, POOLING_SIGMA_DEG * self.viewing.display.pixels_per_degree)
+        self.blurred(plane, POOLING_SIGMA_DEG)
+    }
+
+    fn blurred(&self, plane: &Plane, sigma_deg: f64) -> Plane {
+        let density = self.viewing.display.pixel_density();
+        gaussian_blur_xy(plane, sigma_deg * density.horizontal, sigma_deg * density.vertical)
     }
 
     fn visibility_of_energy(&self, energy: &Plane) -> Plane {
@@ -107,7 +112,7 @@ impl ThresholdMap {
 
     /// Σ_b (`V_b` / `m_b`)² at every pixel.
     fn error_energy(&self, half_difference: &Plane) -> Plane {
-        let ppd = self.viewing.display.pixels_per_degree;
+        let density = self.viewing.display.pixel_density();
         let relative = ratio(half_difference, &self.adaptation_cd_m2, |difference, adaptation| {
             if difference.is_finite() {
                 (difference / adaptation).clamp(-LARGEST_RELATIVE_ERROR, LARGEST_RELATIVE_ERROR)
@@ -115,20 +120,22 @@ impl ThresholdMap {
                 0.0
             }
         });
-        let transform = picture_transform(self.width(), self.height(), ppd);
-        let spectrum = transform.forward(&relative);
+        let transform = PictureTransform::new(self.width(), self.height(), density);
+        let mut workspace = Workspace::default();
+        let spectrum = transform.forward(&mut workspace, |y, row| row.copy_from_slice(relative.row(y)));
         let positions = self.adaptation_cd_m2.map(|adaptation| self.level_position(adaptation));
         let mut energy = Plane::filled(self.width(), self.height(), 0.0);
         let (width, height) = (self.width(), self.height());
         for (band, elevation) in self.elevations.iter().enumerate() {
-            let window = RadialTable::new(ppd, |freq| self.bands.gain(band, freq));
+            let window = RadialTable::new(density, |freq| self.bands.gain(band, freq));
             let limit_cpd = self.bands.limit_cpd(band);
             // The energy reaches twice as far in frequency as the amplitude.
-            let factor = reduction(ppd, 2.0 * limit_cpd);
+            let factor = reduction(density, 2.0 * limit_cpd);
             let mut response = Plane::filled(reduced_size(width, factor), reduced_size(height, factor), 0.0);
             for (index, level) in self.levels.iter().enumerate() {
                 let gain = window.times(&level.sensitivity);
-                let filtered = transform.filtered_reduced(&spectrum, ppd, limit_cpd, factor, |freq| gain.at(freq));
+                let filtered =
+                    transform.filtered_reduced(&mut workspace, &spectrum, limit_cpd, factor, |freq| gain.at(freq));
                 response.for_each_row_mut(|y, row| {
                     let positions = positions.row(reduced_pixel(y, factor, height));
                     for (x, (value, filtered)) in row.iter_mut().zip(filtered.row(y)).enumerate() {

@@ -87,10 +87,10 @@ proptest! {
     }
 
     #[test]
-    fn every_model_and_every_csf_answers(picture in pictures(), which in 0_usize..25) {
+    fn every_model_and_every_csf_answers(picture in pictures(), which in 0_usize..45) {
         let viewing = Viewing::default();
-        let csf = csf::by_name(csf::names()[which % 5], &viewing).expect("a known name");
-        let model = model::by_name(model::names()[which / 5]).expect("a known name");
+        let csf = csf::by_name(csf::names()[which % csf::names().len()], &viewing).expect("a known name");
+        let model = model::by_name(model::names()[which / csf::names().len()]).expect("a known name");
         let inputs = model::ModelInputs {
             display_luminance_cd_m2: &picture,
             guide_variance: Some(&picture),

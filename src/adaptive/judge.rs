@@ -11,6 +11,7 @@ use fechner_perception::model::ModelInputs;
 use fechner_perception::photometry::luminance;
 use fechner_perception::seen;
 use fechner_perception::threshold::{ThresholdInputs, ThresholdMap, threshold_map};
+use fechner_perception::tone::acuity::BehindAcuity;
 use fechner_perception::tone::{FittedTone, SceneGuide};
 use fechner_perception::visibility::MeasuredError;
 
@@ -26,8 +27,6 @@ pub struct Judgement {
     /// Standard error that a pixel may have at visibility 1 by the model that drives the loop, where that is another one:
     /// a rule of its own for each pixel.
     pub pixel_thresholds: Option<Plane>,
-    /// Variance of the picture's luminance in (scene cd/m²)², with what stratification makes of it.
-    pub variance_of_mean: Plane,
     /// Visibility that the variance predicts.
     pub predicted: Plane,
     /// Displayed variance of one sample as the neighbours tell it, as the luminance variance that shows as much as the
@@ -49,12 +48,13 @@ pub struct JudgeError(#[from] fechner_perception::Error);
 pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Judgement, JudgeError> {
     let estimate = film.estimate(settings.nits_per_unit);
     let guide = guide_luminance(film, &estimate);
-    let tone = settings.operator.fit(&SceneGuide { luminance_cd_m2: &guide }, &settings.viewing.display);
+    let tone = settings.operator.fit(&SceneGuide::of(&guide), &settings.viewing, None);
     let statistics = SampleStatistics::of(film, &display_scale(film, &guide, tone.as_ref(), settings, inflation));
     let displayed_guide = seen::display_luminance(tone.as_ref(), &settings.viewing.display, &guide);
     let luminance_variance = variance_of_mean(film, statistics.luminance(), &statistics.luminance().pooled);
     // The noise before denoising bounds what is left of it in the guide, so masking fades in as samples come.
-    let csf = CastleCsf::new(settings.viewing.observer.csf_area_deg2)?;
+    // Noise goes through the loss of acuity that the operator shows, as the picture does.
+    let csf = BehindAcuity { csf: CastleCsf::new(settings.viewing.observer.csf_area_deg2)?, acuity: tone.acuity() };
     let thresholds = threshold_map(
         &ThresholdInputs { display_luminance_cd_m2: &displayed_guide, guide_variance: Some(&luminance_variance) },
         &settings.viewing,
@@ -89,16 +89,11 @@ pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Jud
     };
     let variance_per_sample =
         Half::BOTH.map(|half| per_sample(&most_visible(&|channel| &channel.for_half[half.index()])));
-    let own_variance = &estimate.variance_of_mean;
-    let reported_variance = Plane::from_fn(own_variance.width(), own_variance.height(), |x, y| {
-        own_variance.get(x, y) * statistics.luminance().factor_with_own.get(x, y)
-    });
     let mut judgement = Judgement {
         estimate,
         tone,
         thresholds,
         pixel_thresholds,
-        variance_of_mean: reported_variance,
         predicted: Plane::filled(0, 0, 0.0),
         pooled_variance_per_sample: per_sample(&display_variance),
         variance_per_sample,
@@ -198,4 +193,79 @@ fn guide_luminance(film: &Film, estimate: &Estimate) -> Plane {
 pub fn variance_share(film: &Film, pixel: usize) -> f64 {
     let inverse = |half: Half| 1.0 / f64::from(film.half(half)[pixel].samples.max(1));
     0.25 * (inverse(Half::A) + inverse(Half::B))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::adaptive::plan::pilot_plan;
+    use crate::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, Sampling};
+    use crate::film::BlockSum;
+    use crate::integrator::{FirstHit, PathSample};
+    use crate::sampler::hash_words;
+    use fechner_perception::display::{Display, Viewing};
+    use fechner_perception::tone::operator;
+    use glam::Vec3;
+
+    fn settings() -> LoopSettings {
+        LoopSettings {
+            sampling: Sampling::Adaptive,
+            allocation: AllocationRule::Convex,
+            model: None,
+            limits: Limits {
+                visibility: 1.0,
+                time: None,
+                mean_samples: None,
+                max_samples: DEFAULT_MAX_SAMPLES,
+                plans: None,
+            },
+            viewing: Viewing::of(Display::preset("desktop").expect("a preset")),
+            nits_per_unit: 100.0,
+            operator: operator("absolute", None).expect("an operator"),
+        }
+    }
+
+    /// A pilot of `color(pixel, random in −1..1)`.
+    fn film_of(color: impl Fn(u32, f32) -> Vec3) -> Film {
+        let mut film = Film::new(64, 64);
+        for block in pilot_plan(64 * 64, 16).blocks {
+            let mut sum = BlockSum::default();
+            for index in 0..block.samples {
+                let key = u64::from(block.pixel) << 8 | u64::from(index);
+                let random = (hash_words(key, block.half.index() as u64) >> 40) as f32 / 8_388_608.0 - 1.0;
+                let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1 };
+                sum.add(&PathSample { radiance: color(block.pixel, random), first_hit, rays: 1 });
+            }
+            film.merge_block(block, &sum);
+        }
+        film
+    }
+
+    /// Noise that leaves luminance alone is seen by its colour: no stop at the pilot.
+    #[test]
+    fn isoluminant_noise_is_seen() {
+        let red_for_green = Vec3::new(1.0, -0.2126 / 0.7152, 0.0);
+        let film = film_of(|_, random| Vec3::splat(0.8) + 0.7 * random * red_for_green);
+        let judgement = judge(&film, &settings(), 1.0).expect("judges");
+        let luminance_variance = judgement.estimate.variance_of_mean.get(32, 32);
+        assert!(luminance_variance < 1e-4, "luminance varies by {luminance_variance}");
+        assert!(judgement.predicted.get(32, 32) > 1.0, "v = {}", judgement.predicted.get(32, 32));
+        let of_luminance = LoopSettings { model: fechner_perception::model::by_name("tvi"), ..settings() };
+        let blind = judge(&film, &of_luminance, 1.0).expect("judges");
+        assert!(blind.predicted.get(32, 32) < 0.01, "a model of luminance sees {}", blind.predicted.get(32, 32));
+    }
+
+    /// What the display clips is not pooled into dark neighbours: a lamp that scatters by a thousand times white.
+    #[test]
+    fn a_clipped_lamp_does_not_trouble_its_neighbours() {
+        let dim = |random: f32| Vec3::splat(0.5 + 0.05 * random);
+        let film = film_of(|_, random| dim(random));
+        let is_lamp = |pixel: u32| (28..36).contains(&(pixel % 64)) && (28..36).contains(&(pixel / 64));
+        let lit =
+            film_of(|pixel, random| if is_lamp(pixel) { Vec3::splat(2000.0 + 900.0 * random) } else { dim(random) });
+        let beside =
+            |film: &Film| judge(film, &settings(), 1.0).expect("judges").pooled_variance_per_sample.get(37, 32);
+        let (before, after) = (beside(&film), beside(&lit));
+        assert!(after < 4.0 * before, "variance beside the lamp went from {before} to {after}");
+    }
 }

@@ -16,7 +16,7 @@ pub mod statistics;
 pub use monitor::{Directive, Monitor, Progress, Quiet};
 
 use crate::film::Film;
-use crate::integrator::{PathTracer, SamplePlan, TraceSettings};
+use crate::integrator::{Crop, PathTracer, SamplePlan};
 use audit::{Audit, audit};
 use fechner_perception::Plane;
 use judge::{JudgeError, Judgement, judge};
@@ -120,7 +120,7 @@ struct Loop<'a> {
 /// # Errors
 /// Only if the perception model refuses the picture, which would be a defect of ours.
 pub fn render(tracer: &PathTracer, settings: &LoopSettings, monitor: &dyn Monitor) -> Result<Rendered, JudgeError> {
-    let TraceSettings { width, height, .. } = *tracer.settings();
+    let Crop { width, height, .. } = tracer.settings().film_area();
     resume(tracer, settings, RenderState::new(width, height, &settings.limits), monitor)
 }
 
@@ -152,8 +152,8 @@ pub fn resume(
         monitor.looked(&progress(&render, &judgement, &step));
         match step {
             Step::Trace(plan) => {
-                let (width, traced) = (tracer.settings().width, render.state.film.total_samples());
-                render.state.pending.extend(slices(plan, width, traced));
+                let film = &render.state.film;
+                render.state.pending.extend(slices(plan, film.width(), film.total_samples()));
                 last_look = Some(judgement);
             }
             Step::Stop(reason) => return render.finish(judgement, reason, monitor),

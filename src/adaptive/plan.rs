@@ -84,26 +84,30 @@ pub fn wanted_samples(
 /// Each half scales its share by what the other half knows of the pixel itself (counts go as the standard deviation,
 /// Neyman 1934).
 pub fn adaptive_plan(film: &Film, judgement: &Judgement, wanted: &Plane, max_samples: u32) -> SamplePlan {
-    let need = |half: Half, pixel: usize| {
-        let pooled = f64::from(judgement.pooled_variance_per_sample.values()[pixel]);
-        let own = f64::from(judgement.variance_per_sample[half.index()].values()[pixel]);
-        let share = 0.5 * f64::from(wanted.values()[pixel]);
-        let harder = if pooled > 0.0 { (own / pooled).max(1.0).sqrt() } else { 1.0 };
-        share * harder * confidence_margin(f64::from(film.half(half)[pixel].samples.max(1)))
-    };
-    let doublings = |pixel: usize| {
-        let doublings = Half::BOTH.map(|half| {
-            let taken = film.half(half)[pixel].taken.max(1);
-            doublings_for(need(half, pixel) / f64::from(taken), dither(film.width(), pixel))
-        });
-        // A half may not fall behind the other by more than one doubling.
-        let after = |half: Half| u64::from(film.half(half)[pixel].taken) << doublings[half.index()];
-        Half::BOTH.map(|half| {
-            let is_far_behind = 4 * after(half) <= after(half.other());
-            doublings[half.index()] + u32::from(is_far_behind)
-        })
-    };
-    doubling_plan(film, max_samples, doublings)
+    doubling_plan(film, max_samples, |pixel| {
+        let pooled = judgement.pooled_variance_per_sample.values()[pixel];
+        let own = judgement.variance_per_sample.each_ref().map(|plane| plane.values()[pixel]);
+        doublings_of_halves(film, pixel, wanted.values()[pixel], pooled, own)
+    })
+}
+
+/// Doublings of both halves of a pixel that should have `wanted` samples if its variance were `pooled`; `own` is the larger of
+/// that and what each half may know of the pixel itself.
+fn doublings_of_halves(film: &Film, pixel: usize, wanted: f32, pooled: f32, own: [f32; 2]) -> [u32; 2] {
+    let doublings = Half::BOTH.map(|half| {
+        let taken = film.half(half)[pixel].taken.max(1);
+        let harder = if pooled > 0.0 { f64::from(own[half.index()] / pooled).max(1.0).sqrt() } else { 1.0 };
+        let need = 0.5 * f64::from(wanted) * harder * confidence_margin(f64::from(taken));
+        doublings_for(need / f64::from(taken), dither(film.width(), pixel))
+    });
+    // A half that falls far behind makes the other's samples worthless, yet one that follows closely is decided by its own
+    // data after all, through the other's count: on the lognormal field of the tests a lag of one doubling costs 0.50 % of
+    // the energy, two 0.24 %, none that is bounded 0.14 % (each ± 0.12).
+    let after = |half: Half| u64::from(film.half(half)[pixel].taken) << doublings[half.index()];
+    Half::BOTH.map(|half| {
+        let is_far_behind = 8 * after(half) <= after(half.other());
+        doublings[half.index()] + u32::from(is_far_behind)
+    })
 }
 
 /// One doubling for every pixel of a mask.
@@ -215,8 +219,10 @@ fn plan_first_level(kept: &[BlockWork], block: &BlockWork) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::adaptive::statistics::{SampleStatistics, scene_units};
     use crate::film::BlockSum;
     use crate::integrator::{FirstHit, PathSample};
+    use crate::sampler::hash_words;
     use glam::Vec3;
 
     /// Over a quad, the mean of 1/n is that of the need to within the four steps of the dither.
@@ -277,6 +283,76 @@ mod tests {
             }
             assert_eq!(taken, u64::from(spp) * 6, "{spp} spp");
         }
+    }
+
+    /// The count rule on flat fields of 96×96 pixels whose standard error should become 1/32 of the samples' deviation: mean
+    /// count over the right one (1024), pixels that stop below half of it, and energy lost. Gaussian noise, a lognormal of
+    /// coefficient of variation 4, and fireflies that hold 10 % of the energy in one sample of 1000.
+    #[test]
+    fn counts_can_be_trusted_on_heavy_tails() {
+        type Draw = fn(f64, f64) -> f64;
+        let gaussian: Draw = |u, v| 4.0 + (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos();
+        let lognormal: Draw = |u, v| {
+            let sigma = 17f64.ln().sqrt();
+            (sigma * (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos() - 0.5 * sigma * sigma).exp()
+        };
+        let fireflies: Draw = |u, v| 0.9 * (0.5 + v) + if u < 1e-3 { 100.0 } else { 0.0 };
+        let fields: [(&str, Draw, f64, f64, f64); 3] = [
+            ("gaussian", gaussian, 4.0, 1.0, 0.0),
+            ("lognormal", lognormal, 1.0, 16.0, 0.01),
+            ("fireflies", fireflies, 1.0, 10.0 + 0.81 / 12.0 - 0.01, 0.03),
+        ];
+        for (name, draw, mean, variance, most_below) in fields {
+            let film = stopped_film(96, draw, variance / 1024.0);
+            let counts: Vec<f64> = (0..96 * 96).map(|i| f64::from(film.samples(i))).collect();
+            let ratio = counts.iter().sum::<f64>() / 1024.0 / counts.len() as f64;
+            let below = counts.iter().filter(|&&n| n < 512.0).count() as f64 / counts.len() as f64;
+            let picture = film.estimate(1.0).luminance_cd_m2;
+            let bias = picture.mean() / mean - 1.0;
+            let standard_error = (variance / counts.iter().sum::<f64>()).sqrt() / mean;
+            println!(
+                "{name}: n/n_req {ratio:.2}, below half {:.2} %, bias {:+.2} ± {:.2} %",
+                100.0 * below,
+                100.0 * bias,
+                100.0 * standard_error
+            );
+            assert!((0.95..1.8).contains(&ratio), "{name}: {ratio}");
+            assert!(below <= most_below, "{name}: {below}");
+            assert!(bias.abs() < 0.003 + 3.3 * standard_error, "{name}: bias {bias}");
+        }
+    }
+
+    /// Samples a field until the count rule asks for no more.
+    fn stopped_film(size: u32, draw: fn(f64, f64) -> f64, variance_of_mean: f64) -> Film {
+        let mut film = Film::new(size, size);
+        let mut plan = pilot_plan(size * size, 16);
+        while !plan.blocks.is_empty() {
+            for block in &plan.blocks {
+                film.merge_block(*block, &drawn_block(*block, draw));
+            }
+            let statistics = SampleStatistics::of(&film, &scene_units(&film));
+            let luminance = statistics.luminance();
+            plan = doubling_plan(&film, 1 << 16, |i| {
+                let factor = luminance.low_discrepancy_factor.values()[i];
+                let pooled = luminance.pooled.values()[i] * factor;
+                let own = luminance.for_half.each_ref().map(|plane| plane.values()[i] * factor);
+                doublings_of_halves(&film, i, pooled / variance_of_mean as f32, pooled, own)
+            });
+        }
+        film
+    }
+
+    fn drawn_block(block: BlockWork, draw: fn(f64, f64) -> f64) -> BlockSum {
+        let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1 };
+        let mut sum = BlockSum::default();
+        let key = hash_words(u64::from(block.pixel) << 8 | u64::from(block.level), block.half.index() as u64);
+        for index in block.first..block.first + block.samples {
+            let random =
+                |d: u64| ((hash_words(key, u64::from(index) * 2 + d) >> 11) as f64 + 0.5) / (1u64 << 53) as f64;
+            let radiance = Vec3::splat(draw(random(0), random(1)) as f32);
+            sum.add(&PathSample { radiance, first_hit, rays: 1 });
+        }
+        sum
     }
 
     #[test]

@@ -75,6 +75,14 @@ impl SampleStatistics {
     }
 }
 
+/// Variance of the picture's luminance in (scene cd/m²)²: each pixel's own scatter, and what stratification makes of it around
+/// the pixel. For reports, not for decisions.
+pub fn picture_variance(film: &Film, nits_per_unit: f64) -> Plane {
+    let own = film.estimate(nits_per_unit).variance_of_mean;
+    let factor = SampleStatistics::of(film, &scene_units(film)).channels[0].factor_with_own.clone();
+    Plane::from_fn(own.width(), own.height(), |x, y| own.get(x, y) * factor.get(x, y))
+}
+
 /// The scale that leaves variances in scene units.
 pub fn scene_units(film: &Film) -> [Plane; CHANNELS] {
     std::array::from_fn(|_| Plane::filled(film.width() as usize, film.height() as usize, 1.0))

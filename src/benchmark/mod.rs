@@ -14,6 +14,7 @@ mod pictures;
 mod record;
 mod reference;
 mod report;
+mod runner;
 mod summary;
 mod truth;
 
@@ -22,14 +23,15 @@ pub use record::{Record, Results};
 
 use crate::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, Sampling};
 use crate::integrator::{DEFAULT_MAX_DEPTH, PathTracer, TraceSettings};
-use crate::sampler::PixelFilter;
+use crate::sampler::{PixelFilter, Sequence};
 use crate::scene::Scene;
 use crate::scene::load::{LoadOptions, load};
 use anyhow::{Context, Result};
-use arm::ArmRunner;
 use fechner_perception::display::{Display, Viewing};
 use fechner_perception::tone;
+use oracle::{displayed_variance, least_samples, uniform_samples};
 use reference::Reference;
+use runner::ArmRunner;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use truth::Truth;
@@ -91,6 +93,8 @@ impl Subject {
             max_depth: DEFAULT_MAX_DEPTH,
             filter: PixelFilter::Gaussian,
             clamp: None,
+            sequence: Sequence::PerPixel,
+            crop: None,
         };
         PathTracer::new(Arc::clone(&self.scene), settings)
     }
@@ -119,15 +123,57 @@ impl Subject {
     }
 }
 
+/// What converged variances say that a scene needs, before anything is tried: what no rule can beat.
+#[derive(Clone, Debug)]
+pub struct Bound {
+    /// Scene.
+    pub scene: String,
+    /// Share of the picture that has to be at v\*.
+    pub coverage: f64,
+    /// Samples a pixel of uniform sampling.
+    pub uniform: f64,
+    /// Mean samples a pixel of the cheapest counts.
+    pub optimum: f64,
+}
+
+/// Bounds of every scene and coverage; renders nothing but the references.
+///
+/// # Errors
+/// As [`run`].
+pub fn bounds(settings: &BenchSettings, say: &dyn Fn(&str)) -> Result<Vec<Bound>> {
+    make_folders(settings)?;
+    let mut bounds = Vec::new();
+    for path in &settings.scenes {
+        let subject = Subject::load(path, settings)?;
+        let reference = Reference::cached(&subject, settings, say)?;
+        let truth = Truth::new(&subject, &reference)?;
+        let variance = displayed_variance(&subject, &reference, &truth)?;
+        for coverage in COVERAGES {
+            bounds.push(Bound {
+                scene: subject.name.clone(),
+                coverage,
+                uniform: uniform_samples(&subject, &truth, &variance, coverage),
+                optimum: least_samples(&subject, &truth, &variance, coverage)?,
+            });
+        }
+    }
+    Ok(bounds)
+}
+
+fn make_folders(settings: &BenchSettings) -> Result<()> {
+    for folder in ["runs", "references"] {
+        let folder = settings.output.join(folder);
+        std::fs::create_dir_all(&folder).with_context(|| format!("{}", folder.display()))?;
+    }
+    Ok(())
+}
+
 /// Runs every arm of every scene and writes the results.
 ///
 /// # Errors
 /// Scenes that do not load, and folders that cannot be written.
 pub fn run(settings: &BenchSettings, say: &dyn Fn(&str)) -> Result<Results> {
-    for folder in ["runs", "references"] {
-        let folder = settings.output.join(folder);
-        std::fs::create_dir_all(&folder).with_context(|| format!("{}", folder.display()))?;
-    }
+    make_folders(settings)?;
     let mut results = Results::new(settings);
     for path in &settings.scenes {
         let subject = Subject::load(path, settings)?;

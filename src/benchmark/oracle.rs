@@ -2,6 +2,7 @@
 
 use super::Subject;
 use super::reference::Reference;
+use super::runner::quantile;
 use super::truth::Truth;
 use crate::adaptive::settings::DEFAULT_MAX_SAMPLES;
 use crate::film::{CHANNELS, Film};
@@ -37,20 +38,33 @@ pub(crate) fn displayed_variance(subject: &Subject, reference: &Reference, truth
 
 /// Samples a pixel that uniform sampling needs for v\* on this share of the picture.
 pub(crate) fn uniform_samples(subject: &Subject, truth: &Truth, variance: &Plane, coverage: f64) -> f64 {
-    let mut visibility = truth.thresholds.achromatic.predicted_visibility(variance).values().to_vec();
-    let rank = (coverage * (visibility.len() - 1) as f64) as usize;
-    let (_, &mut hardest, _) = visibility.select_nth_unstable_by(rank, f32::total_cmp);
-    (f64::from(hardest) / subject.visibility).powi(2)
+    let hardest = quantile(&truth.thresholds.achromatic.predicted_visibility(variance), coverage);
+    (hardest / subject.visibility).powi(2)
 }
 
-/// The cheapest counts for v\* everywhere.
-pub(crate) fn optimal_samples(subject: &Subject, truth: &Truth, variance: &Plane) -> Result<Plane> {
+/// The least mean samples a pixel that any rule could take for v\* on this share of the picture: the pixels that uniform
+/// sampling would leave above it are left above it.
+pub(crate) fn least_samples(subject: &Subject, truth: &Truth, variance: &Plane, coverage: f64) -> Result<f64> {
+    let seen = truth.thresholds.achromatic.predicted_visibility(variance);
+    let hardest = quantile(&seen, coverage) as f32;
+    // Far above, not infinite: the solver's multipliers stay finite.
+    let tolerance = seen.map(|v| if v > hardest { 30.0 } else { 1.0 });
+    let counts = optimal_counts(truth, variance, subject.visibility, Some(&tolerance))?;
+    Ok(counts.mean())
+}
+
+/// The cheapest counts for a visibility everywhere.
+pub(crate) fn optimal_samples(truth: &Truth, variance: &Plane, visibility: f64) -> Result<Plane> {
+    optimal_counts(truth, variance, visibility, None)
+}
+
+fn optimal_counts(truth: &Truth, variance: &Plane, visibility: f64, tolerance: Option<&Plane>) -> Result<Plane> {
     let allocation = allocate(&AllocationProblem {
         variance_per_sample: variance,
         thresholds: &truth.thresholds.achromatic,
         cost: &Plane::filled(variance.width(), variance.height(), 1.0),
-        tolerance: None,
-        visibility: subject.visibility,
+        tolerance,
+        visibility,
         min_samples: f64::from(2 * PILOT_SAMPLES),
         max_samples: f64::from(DEFAULT_MAX_SAMPLES),
     })?;

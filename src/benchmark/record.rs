@@ -1,8 +1,9 @@
 //! What the benchmark found: one record a scene, arm, seed and coverage, and the summary over scenes.
 
-use super::arm::{Arm, Run, quantile};
+use super::arm::Arm;
 use super::reference::Reference;
 use super::report::html;
+use super::runner::{Run, quantile};
 use super::summary::{GeometricMean, geometric_mean};
 use super::{BenchSettings, COVERAGES, Subject};
 use anyhow::Result;

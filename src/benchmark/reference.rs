@@ -1,12 +1,12 @@
 //! The reference of a scene: a long uniform render with its halves and converged variances, kept by content.
 
+use super::runner::quantile;
 use super::{BenchSettings, Subject};
-use crate::adaptive::judge::display_scale;
-use crate::adaptive::plan::uniform_plan;
-use crate::adaptive::settings::{Limits, Sampling};
+use crate::adaptive::judge::{display_scale, judge};
+use crate::adaptive::plan::{pilot_plan, uniform_plan};
 use crate::adaptive::statistics::SampleStatistics;
-use crate::adaptive::{Quiet, render};
 use crate::film::{CHANNELS, Film};
+use crate::integrator::PathTracer;
 use crate::sampler::Half;
 use anyhow::{Context, Result};
 use fechner_perception::Plane;
@@ -59,28 +59,24 @@ impl Reference {
 
     fn render(subject: &Subject, factor: f64) -> Result<Self> {
         let tracer = subject.tracer(REFERENCE_SEED);
-        let mut settings = subject.loop_settings()?;
-        settings.sampling = Sampling::Uniform;
-        settings.limits = Limits { mean_samples: Some(256), visibility: 0.0, ..settings.limits };
-        let first = render(&tracer, &settings, &Quiet)?;
-        let mut visibilities = first.judgement.predicted.values().to_vec();
-        let rank = (0.99 * (visibilities.len() - 1) as f64) as usize;
-        let (_, &mut hardest, _) = visibilities.select_nth_unstable_by(rank, f32::total_cmp);
-        let uniform_spp = (256.0 * (f64::from(hardest) / subject.visibility).powi(2)).max(16.0);
+        let settings = subject.loop_settings()?;
+        let mut film = Film::new(subject.size.0, subject.size.1);
+        let mut spp = 16;
+        // Stratification pays more the more samples there are: its factor is taken where uniform sampling would end.
+        let uniform_spp = loop {
+            trace_up_to(&tracer, &mut film, spp);
+            let reached = quantile(&judge(&film, &settings, 1.0)?.predicted, 0.99) / subject.visibility;
+            let needed = f64::from(spp) * reached * reached;
+            if needed <= f64::from(spp) || f64::from(spp) >= MOST_SAMPLES {
+                break needed;
+            }
+            spp *= 2;
+        };
+        let factors = Self::display_factors(subject, &film)?;
         let wanted = (factor * uniform_spp).clamp(512.0, MOST_SAMPLES).log2().ceil().exp2() as u32;
-
-        let mut film = first.film;
-        let mut factors = Self::display_factors(subject, &film)?;
-        loop {
-            let mean = (film.total_samples() as f64 / subject.pixels()).round() as u32;
-            if f64::from(mean) <= uniform_spp {
-                factors = Self::display_factors(subject, &film)?;
-            }
-            let plan = uniform_plan(&film, wanted.min(mean.max(8) * 2));
-            if plan.blocks.is_empty() {
-                break;
-            }
-            tracer.trace(&plan, &mut film, &|_| {});
+        while spp < wanted {
+            spp *= 2;
+            trace_up_to(&tracer, &mut film, spp);
         }
         let nits = subject.scene.nits_per_unit;
         let rgb = |half: Half| film.half(half).iter().map(|p| p.mean.map(|v| (v * nits) as f32)).collect();
@@ -94,7 +90,7 @@ impl Reference {
         Ok(Self {
             width: film.width() as usize,
             height: film.height() as usize,
-            spp: wanted,
+            spp,
             halves: Half::BOTH.map(rgb),
             sample_variance: std::array::from_fn(own_variance),
             low_discrepancy_factor: factors,
@@ -106,7 +102,7 @@ impl Reference {
     fn display_factors(subject: &Subject, film: &Film) -> Result<[Plane; CHANNELS]> {
         let settings = subject.loop_settings()?;
         let luminance = film.estimate(settings.nits_per_unit).luminance_cd_m2.map(|v| v.max(0.0));
-        let tone = settings.operator.fit(&SceneGuide { luminance_cd_m2: &luminance }, &settings.viewing.display);
+        let tone = settings.operator.fit(&SceneGuide::of(&luminance), &settings.viewing, None);
         let scale = display_scale(film, &luminance, tone.as_ref(), &settings, 1.0);
         Ok(SampleStatistics::of(film, &scale).channels.map(|channel| channel.low_discrepancy_factor))
     }
@@ -129,7 +125,7 @@ impl Reference {
     pub(crate) fn fit(&self, subject: &Subject) -> Result<Box<dyn FittedTone>> {
         let settings = subject.loop_settings()?;
         let luminance = self.luminance();
-        Ok(settings.operator.fit(&SceneGuide { luminance_cd_m2: &luminance }, &subject.viewing.display))
+        Ok(settings.operator.fit(&SceneGuide::of(&luminance), &subject.viewing, None))
     }
 
     fn to_bytes(&self) -> Vec<u8> {
@@ -162,6 +158,13 @@ impl Reference {
             low_discrepancy_factor: std::array::from_fn(|c| plane(CHANNELS + c)),
         })
     }
+}
+
+/// Doubles every pixel of a film, or begins it, so that each has `spp` samples.
+fn trace_up_to(tracer: &PathTracer, film: &mut Film, spp: u32) {
+    let plan =
+        if film.total_samples() == 0 { pilot_plan(film.width() * film.height(), spp) } else { uniform_plan(film, spp) };
+    tracer.trace(&plan, film, &|_| {});
 }
 
 impl Subject {

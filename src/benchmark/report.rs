@@ -84,7 +84,7 @@ fn bars(results: &Results, scene: &str) -> String {
     for (row, record) in records.iter().enumerate() {
         let (y, length) = (24 * row, WIDTH * record.samples / most);
         let colour = match record.arm {
-            "default" => "#c2410c",
+            "default" | "as-asked" => "#c2410c",
             "oracle" => "#0f766e",
             _ => "#94a3b8",
         };

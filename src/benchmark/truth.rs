@@ -58,11 +58,12 @@ impl Truth {
     pub(crate) fn squared_visibility(&self, picture: &[[f32; 3]]) -> Plane {
         let shown = signals(&displayed_rgb(&self.display, picture), self.width, self.height);
         let mut most = Plane::filled(self.width, self.height, 0.0);
-        for c in 0..CHANNELS {
-            let difference = combine(&shown[c], &self.shown[c], |a, b| a - b);
+        let known = self.shown.iter().zip(&self.own_energy).enumerate();
+        for (shown, (c, (reference, own_energy))) in shown.iter().zip(known) {
+            let difference = combine(shown, reference, |a, b| a - b);
             let energy = squared_visibility(channel(&self.thresholds, c), &difference);
-            let own = combine(&energy, &self.own_energy[c], |energy, reference| (energy - reference).max(0.0));
-            most = combine(&most, &own, f32::max);
+            let of_render = combine(&energy, own_energy, |energy, own| (energy - own).max(0.0));
+            most = combine(&most, &of_render, f32::max);
         }
         most
     }

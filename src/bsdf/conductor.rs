@@ -1,56 +1,69 @@
 //! Metal: a boundary that reflects or absorbs, smooth or rough.
 //!
 //! Parameters: `eta` and `k`, real and imaginary part of the index of refraction per linear RGB channel, relative to air
-//! (η of 0 with any k reflects everything); `roughness` in [0, 1], perceptual. α = roughness² below 1e-3 is a perfect
-//! mirror with the metal's Fresnel reflectance.
+//! (η of 0 with any k reflects everything); `tint` in [0, 1], white for real metals; microfacets of GGX or Beckmann, of
+//! which slope widths below 1e-3 are a perfect mirror with the metal's Fresnel reflectance.
 //!
 //! Sources: R. Cook & K. Torrance (1982) for the model, B. Walter et al. (2007), eq. 20; the GGX distribution and the
 //! compensation of multiple bounces as their own files say. Not for painted or anodised metal: those are coated diffuse.
 
-use super::energy::{self, AlbedoCurve, LARGEST_SINGLE_SHARE};
-use super::ggx::Ggx;
+use super::albedo_table::DirectionalCurve;
+use super::anisotropic_table::AnisotropicTable;
+use super::energy::{self, LARGEST_SINGLE_SHARE, ReflectionTables};
+use super::microfacets::Microfacets;
 use super::mirror::reflect_about_normal;
 use super::warp::GrazingHemisphere;
-use super::{BsdfEvaluation, BsdfSample, Lobe, SMALLEST_ALPHA, fresnel, to_front, turn};
+use super::{BsdfEvaluation, BsdfSample, fresnel, to_front, turn};
 use glam::Vec3;
 
 /// Metal, smooth or rough.
 #[derive(Clone, Copy, Debug)]
-pub struct Conductor {
+pub struct Conductor<'a> {
     eta: Vec3,
     k: Vec3,
-    facets: Option<Facets>,
-}
-
-/// The rough part: one bounce off GGX facets and a diffuse-like lobe for two or more.
-#[derive(Clone, Copy, Debug)]
-struct Facets {
-    ggx: Ggx,
-    missing: AlbedoCurve<'static>,
-    grazing: GrazingHemisphere,
-    /// Tint of light that bounced twice or more.
     tint: Vec3,
+    facets: Option<Facets<'a>>,
 }
 
-impl Conductor {
-    /// Index of refraction η + ik per channel, at least 0, and perceptual roughness in [0, 1].
-    pub fn new(eta: Vec3, k: Vec3, roughness: f32) -> Self {
-        let roughness = roughness.clamp(0.0, 1.0);
-        let alpha = roughness * roughness;
-        let facets = (alpha >= SMALLEST_ALPHA).then(|| {
-            let missing = energy::GGX.missing.curve(roughness);
+/// The rough part: one bounce off facets and a diffuse-like lobe for two or more.
+#[derive(Clone, Copy, Debug)]
+struct Facets<'a> {
+    microfacets: Microfacets,
+    missing: DirectionalCurve<'a>,
+    grazing: GrazingHemisphere,
+    /// Reflectance of light that bounced twice or more.
+    multiple: Vec3,
+}
+
+impl<'a> Conductor<'a> {
+    /// Index of refraction η + ik per channel, at least 0, a tint in [0, 1] that multiplies what is reflected, and the
+    /// surface's facets with, if they are anisotropic, their table of missing energy.
+    pub fn new(
+        eta: Vec3,
+        k: Vec3,
+        tint: Vec3,
+        microfacets: Microfacets,
+        anisotropic: Option<&'a AnisotropicTable>,
+    ) -> Self {
+        let facets = microfacets.rough().map(|microfacets| {
+            let missing = ReflectionTables::of(microfacets.distribution()).missing.along(&microfacets, anisotropic);
             Facets {
-                ggx: Ggx::isotropic(alpha),
+                microfacets,
                 missing,
-                grazing: GrazingHemisphere::new(alpha),
-                tint: energy::multiple_bounce_tint(fresnel::conductor_average(eta, k), 1.0 - missing.average()),
+                grazing: GrazingHemisphere::new(microfacets.mean_alpha()),
+                multiple: tint
+                    * energy::multiple_bounce_tint(fresnel::conductor_average(eta, k), 1.0 - missing.average()),
             }
         });
-        Self { eta, k, facets }
+        Self { eta, k, tint, facets }
     }
 
     pub(super) fn has_smooth_lobe(&self) -> bool {
         self.facets.is_some()
+    }
+
+    fn reflectance(&self, cos: f32) -> Vec3 {
+        self.tint * fresnel::conductor(cos, self.eta, self.k)
     }
 
     pub(super) fn evaluate(&self, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
@@ -61,17 +74,13 @@ impl Conductor {
         }
     }
 
-    fn evaluate_front(&self, facets: &Facets, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
-        let h = (wo + wi).normalize_or(Vec3::Z);
-        let density = facets.ggx.density(h);
-        let reflectance = fresnel::conductor(wo.dot(h), self.eta, self.k);
-        let single = density * facets.ggx.visibility(wo, wi) * wi.z;
-        let multiple = energy::missing_lobe(&facets.missing, wo.z, wi.z);
-        let share = facets.single_share(wo.z);
-        let visible = 0.25 * facets.ggx.visible_density_over_cosine(wo, h);
+    fn evaluate_front(&self, facets: &Facets<'_>, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
+        let single = facets.microfacets.reflect(wo, wi);
+        let multiple = energy::missing_lobe(&facets.missing, wo, wi);
+        let share = facets.single_share(wo);
         BsdfEvaluation {
-            value: reflectance * single + facets.tint * multiple,
-            pdf: share * visible + (1.0 - share) * facets.grazing.pdf(wi.z),
+            value: self.reflectance(single.cos_half) * single.value + facets.multiple * multiple,
+            pdf: share * single.pdf + (1.0 - share) * facets.grazing.pdf(wi.z),
         }
     }
 
@@ -81,42 +90,33 @@ impl Conductor {
         }
         let front = if wo.z < 0.0 { turn(wo) } else { wo };
         let Some(facets) = &self.facets else {
-            return Some(BsdfSample {
-                wi: reflect_about_normal(wo),
-                weight: fresnel::conductor(front.z, self.eta, self.k),
-                pdf: 1.0,
-                lobe: Lobe::Delta,
-            });
+            return Some(BsdfSample::reflected_delta(reflect_about_normal(wo), self.reflectance(front.z), 1.0));
         };
-        let wi = if u[2] < facets.single_share(front.z) {
-            let m = facets.ggx.sample_visible(front, [u[0], u[1]]);
-            2.0 * front.dot(m) * m - front
+        let wi = if u[2] < facets.single_share(front) {
+            facets.microfacets.sample_reflection(front, [u[0], u[1]])?
         } else {
             facets.grazing.sample([u[0], u[1]])
         };
-        if wi.z <= 0.0 {
-            return None;
-        }
         self.evaluate_front(facets, front, wi).sample_turned(wi, wo)
     }
 
     pub(super) fn albedo(&self, wo: Vec3) -> Vec3 {
-        let cos = wo.z.abs();
-        let reflectance = fresnel::conductor(cos, self.eta, self.k);
+        let (up, _) = to_front(wo, wo);
+        let reflectance = self.reflectance(up.z);
         match &self.facets {
             None => reflectance,
             Some(facets) => {
-                let missing = facets.missing.at(cos);
-                reflectance * (1.0 - missing) + facets.tint * missing
+                let missing = facets.missing.at(up);
+                reflectance * (1.0 - missing) + facets.multiple * missing
             }
         }
     }
 }
 
-impl Facets {
+impl Facets<'_> {
     /// Probability that a sample is one bounce off a facet. Close to its share of the energy; never below 0.25, since a
     /// dark tint makes the other lobe count for less than it does for a lossless metal.
-    fn single_share(&self, cos_o: f32) -> f32 {
-        (1.0 - self.missing.at(cos_o)).clamp(0.25, LARGEST_SINGLE_SHARE)
+    fn single_share(&self, wo: Vec3) -> f32 {
+        (1.0 - self.missing.at(wo)).clamp(0.25, LARGEST_SINGLE_SHARE)
     }
 }

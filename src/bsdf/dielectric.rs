@@ -1,18 +1,20 @@
 //! The boundary of a clear volume (glass, water), smooth or rough: light is reflected or refracted.
 //!
-//! Parameters: index of refraction inside over outside, above 0 (`wo.z > 0` is outside); `roughness` in [0, 1],
-//! perceptual; `transmittance`, a tint per linear RGB channel in [0, 1] on every crossing; tables for the light that
-//! bounces between facets, without which a rough boundary loses it. α = roughness² below 1e-3 is perfectly smooth.
+//! Parameters: index of refraction inside over outside, above 0 (`wo.z > 0` is outside); microfacets of GGX or
+//! Beckmann, of which slope widths below 1e-3 are perfectly smooth; `transmittance`, a tint per linear RGB channel in
+//! [0, 1] on every crossing; tables for the light that bounces between facets, without which a rough boundary loses it.
+//! What the inside absorbs is the integrator's to count.
 //!
 //! Sources: B. Walter et al., *Microfacet models for refraction through rough surfaces* (2007), eqs. 16 to 21; masking
 //! and shadowing of both kinds of light by the height-correlated G2 of Pharr, Jakob & Humphreys (2023), section 9.7;
 //! Kulla & Conty (2017) for the compensation. Not for sheets without an inside: see the thin dielectric.
 
-use super::energy::{self, DielectricCompensation, DielectricTables, LARGEST_SINGLE_SHARE};
-use super::ggx::Ggx;
+use super::dielectric_tables::{DielectricCompensation, DielectricTables};
+use super::energy::{self, LARGEST_SINGLE_SHARE};
+use super::microfacets::Microfacets;
 use super::mirror::reflect_about_normal;
 use super::warp::GrazingHemisphere;
-use super::{BsdfEvaluation, BsdfSample, Lobe, SMALLEST_ALPHA, fresnel, turn, warp};
+use super::{BsdfEvaluation, BsdfSample, Lobe, fresnel, turn, warp};
 use glam::Vec3;
 use std::f32::consts::FRAC_1_PI;
 
@@ -31,9 +33,8 @@ pub struct Dielectric<'a> {
 /// What makes a boundary rough.
 #[derive(Clone, Copy, Debug)]
 struct Facets<'a> {
-    ggx: Ggx,
+    microfacets: Microfacets,
     grazing: GrazingHemisphere,
-    roughness: f32,
     tables: Option<&'a DielectricTables>,
 }
 
@@ -44,7 +45,7 @@ struct Near<'a> {
     /// Index on the far side over the index on the path's side.
     eta: f32,
     tint: Vec3,
-    ggx: Ggx,
+    microfacets: Microfacets,
     grazing: GrazingHemisphere,
     compensation: Option<DielectricCompensation<'a>>,
     /// Probability that a sample is one event at a facet.
@@ -54,24 +55,21 @@ struct Near<'a> {
 }
 
 impl<'a> Dielectric<'a> {
-    /// Index inside over outside, perceptual roughness in [0, 1], tint of each crossing in [0, 1], and the tables of the
-    /// same index.
+    /// Index inside over outside, the surface's facets, tint of each crossing in [0, 1], and the tables of the same index
+    /// and distribution.
     pub fn new(
         eta_inside_over_outside: f32,
-        roughness: f32,
+        microfacets: Microfacets,
         transmittance: Vec3,
         tables: Option<&'a DielectricTables>,
     ) -> Self {
-        let roughness = roughness.clamp(0.0, 1.0);
-        let alpha = roughness * roughness;
-        let rough = alpha >= SMALLEST_ALPHA && (eta_inside_over_outside - 1.0).abs() >= SMALLEST_INDEX_STEP;
+        let bends = (eta_inside_over_outside - 1.0).abs() >= SMALLEST_INDEX_STEP;
         Self {
             eta_inside_over_outside,
             transmittance,
-            facets: rough.then(|| Facets {
-                ggx: Ggx::isotropic(alpha),
-                grazing: GrazingHemisphere::new(alpha),
-                roughness,
+            facets: microfacets.rough().filter(|_| bends).map(|microfacets| Facets {
+                microfacets,
+                grazing: GrazingHemisphere::new(microfacets.mean_alpha()),
                 tables,
             }),
         }
@@ -89,8 +87,8 @@ impl<'a> Dielectric<'a> {
     fn near(&self, facets: &Facets<'a>, wo: Vec3) -> Near<'a> {
         let outside = wo.z > 0.0;
         let up = if outside { wo } else { turn(wo) };
-        let compensation = facets.tables.map(|tables| tables.compensation(facets.roughness, outside));
-        let single_share = compensation.map_or(1.0, |c| (1.0 - c.near.at(up.z)).clamp(0.05, LARGEST_SINGLE_SHARE));
+        let compensation = facets.tables.map(|tables| tables.compensation(&facets.microfacets, outside));
+        let single_share = compensation.map_or(1.0, |c| (1.0 - c.near.at(up)).clamp(0.05, LARGEST_SINGLE_SHARE));
         let compensation_reflects = compensation.map_or(0.0, |c| {
             let reflected = 1.0 - c.transmitted_share;
             reflected / (reflected + c.transmitted_share * self.transmittance.max_element())
@@ -99,7 +97,7 @@ impl<'a> Dielectric<'a> {
             wo: up,
             eta: self.eta_from(wo),
             tint: self.transmittance,
-            ggx: facets.ggx,
+            microfacets: facets.microfacets,
             grazing: facets.grazing,
             compensation,
             single_share,
@@ -126,8 +124,9 @@ impl<'a> Dielectric<'a> {
             Some(facets) => {
                 let near = self.near(facets, wo);
                 let wi = near.choose(u)?;
-                let sample = near.evaluate(wi).into_sample(wi)?;
-                Some(sample.turned_like(wo))
+                let sample = near.evaluate(wi).into_sample(wi)?.turned_like(wo);
+                let crossed_index = sample.lobe.is_transmission().then_some(near.eta);
+                Some(BsdfSample { crossed_index, ..sample })
             }
         }
     }
@@ -138,12 +137,8 @@ impl<'a> Dielectric<'a> {
         let transmitted = (1.0 - boundary.reflectance) * self.transmittance;
         let probability = reflection_probability(boundary.reflectance, self.transmittance);
         if u < probability {
-            return Some(BsdfSample {
-                wi: reflect_about_normal(wo),
-                weight: Vec3::splat(boundary.reflectance / probability),
-                pdf: probability,
-                lobe: Lobe::Delta,
-            });
+            let weight = Vec3::splat(boundary.reflectance / probability);
+            return Some(BsdfSample::reflected_delta(reflect_about_normal(wo), weight, probability));
         }
         let pdf = 1.0 - probability;
         let wi = Vec3::new(-wo.x / eta, -wo.y / eta, -boundary.cos_transmitted.copysign(wo.z)).normalize();
@@ -152,6 +147,7 @@ impl<'a> Dielectric<'a> {
             weight: transmitted / (pdf * eta * eta),
             pdf,
             lobe: Lobe::DeltaTransmission,
+            crossed_index: Some(eta),
         })
     }
 
@@ -169,7 +165,7 @@ impl Near<'_> {
             let wi = self.grazing.sample([u[0], u[1]]);
             return Some(if rest < self.compensation_reflects { wi } else { turn(wi) });
         }
-        let m = self.ggx.sample_visible(self.wo, [u[0], u[1]]);
+        let m = self.microfacets.sample_visible(self.wo, [u[0], u[1]]);
         let cos = self.wo.dot(m).max(0.0);
         let boundary = fresnel::dielectric(cos, self.eta);
         if rest < reflection_probability(boundary.reflectance, self.tint) {
@@ -193,13 +189,12 @@ impl Near<'_> {
 
     fn evaluate_reflection(&self, wi: Vec3) -> BsdfEvaluation {
         let wo = self.wo;
-        let h = (wo + wi).normalize_or(Vec3::Z);
-        let reflectance = fresnel::dielectric(wo.dot(h), self.eta).reflectance;
-        let single = reflectance * self.ggx.density(h) * self.ggx.visibility(wo, wi) * wi.z;
-        let single_pdf =
-            reflection_probability(reflectance, self.tint) * 0.25 * self.ggx.visible_density_over_cosine(wo, h);
+        let facet = self.microfacets.reflect(wo, wi);
+        let reflectance = fresnel::dielectric(facet.cos_half, self.eta).reflectance;
+        let single = reflectance * facet.value;
+        let single_pdf = reflection_probability(reflectance, self.tint) * facet.pdf;
         let multiple =
-            self.compensation.map_or(0.0, |c| (1.0 - c.transmitted_share) * energy::missing_lobe(&c.near, wo.z, wi.z));
+            self.compensation.map_or(0.0, |c| (1.0 - c.transmitted_share) * energy::missing_lobe(&c.near, wo, wi));
         let multiple_pdf = self.compensation_reflects * self.grazing.pdf(wi.z);
         BsdfEvaluation {
             value: Vec3::splat(single + multiple),
@@ -211,7 +206,7 @@ impl Near<'_> {
         let (single, single_pdf) = self.single_transmission(wi);
         // Energy that arrives on the far side, times 1/η² to become radiance.
         let multiple = self.compensation.map_or(0.0, |c| {
-            let lobe = c.near.at(self.wo.z) * c.far.at(-wi.z) / c.far.missing_average();
+            let lobe = c.near.at(self.wo) * c.far.at(turn(wi)) / c.far.missing_average();
             c.transmitted_share * lobe * -wi.z * FRAC_1_PI / (self.eta * self.eta)
         });
         let multiple_pdf = (1.0 - self.compensation_reflects) * self.grazing.pdf(-wi.z);
@@ -236,11 +231,16 @@ impl Near<'_> {
         // Facet steradians per steradian of wi.
         let jacobian = self.eta * self.eta * -cos_i / (root * root);
         let up = turn(wi);
-        let value =
-            (1.0 - reflectance) * self.ggx.density(h) * self.ggx.visibility(wo, up) * 4.0 * up.z * cos_o * jacobian
-                / (self.eta * self.eta);
+        let value = (1.0 - reflectance)
+            * self.microfacets.density(h)
+            * self.microfacets.visibility(wo, up)
+            * 4.0
+            * up.z
+            * cos_o
+            * jacobian
+            / (self.eta * self.eta);
         let pdf = (1.0 - reflection_probability(reflectance, self.tint))
-            * self.ggx.visible_density_over_cosine(wo, h)
+            * self.microfacets.visible_density_over_cosine(wo, h)
             * cos_o
             * jacobian;
         (value, pdf)

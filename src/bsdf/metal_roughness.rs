@@ -11,12 +11,14 @@
 //! the base sees (1 − E(μo))(1 − E(μi))/(π(1 − E_avg)) with E the coat's albedo, where the specification's own sample code
 //! uses 1 − F(h) and is not lossless. Not for metals by measured index, nor for glass with an inside.
 
-use super::energy::{self, AlbedoCurve, SchlickCurve};
+use super::albedo_table::AlbedoCurve;
+use super::energy::{self, ReflectionTables, SchlickCurve};
 use super::fresnel::{SCHLICK_AVERAGE, normal_reflectance, schlick_weight};
-use super::ggx::Ggx;
+use super::microfacets::Microfacets;
 use super::mirror::reflect_about_normal;
 use super::warp::GrazingHemisphere;
 use super::{BsdfEvaluation, BsdfSample, Lobe, SMALLEST_ALPHA, to_front, turn, warp};
+use crate::scene::Distribution;
 use glam::Vec3;
 use std::f32::consts::FRAC_1_PI;
 
@@ -39,7 +41,7 @@ pub struct MetalRoughness {
 
 #[derive(Clone, Copy, Debug)]
 struct Facets {
-    ggx: Ggx,
+    ggx: Microfacets,
     grazing: GrazingHemisphere,
     missing: AlbedoCurve<'static>,
     schlick: SchlickCurve,
@@ -216,7 +218,7 @@ impl MetalRoughness {
         if let Some(facets) = &self.facets {
             let facet = facets.reflect(wo, wi);
             let fresnel = self.f0 + (Vec3::ONE - self.f0) * facet.schlick;
-            value += fresnel * facet.value + facets.tint * energy::missing_lobe(&facets.missing, wo.z, wi.z);
+            value += fresnel * facet.value + facets.tint * facets.missing_lobe(wo.z, wi.z);
             pdf += shares.specular * facet.pdf + shares.multiple * facets.grazing.pdf(wi.z);
         }
         BsdfEvaluation { value, pdf }
@@ -230,7 +232,7 @@ impl MetalRoughness {
         };
         let facet = facets.reflect(wo, wi);
         let passed = (1.0 - self.coat_f0) * (1.0 - facet.schlick);
-        let multiple = (1.0 - facets.coat_tint) * energy::missing_lobe(&facets.missing, wo.z, wi.z);
+        let multiple = (1.0 - facets.coat_tint) * facets.missing_lobe(wo.z, wi.z);
         BsdfEvaluation {
             value: self.transmitted * (passed * facet.value + multiple),
             pdf: shares.through_single * facet.pdf + shares.through_multiple * facets.grazing.pdf(wi.z),
@@ -270,6 +272,7 @@ impl MetalRoughness {
                 weight: self.transmitted * (near.through_single / shares.through_single),
                 pdf: shares.through_single,
                 lobe: Lobe::DeltaTransmission,
+                crossed_index: None,
             }
         } else {
             BsdfSample {
@@ -277,6 +280,7 @@ impl MetalRoughness {
                 weight: near.specular / shares.specular,
                 pdf: shares.specular,
                 lobe: Lobe::Delta,
+                crossed_index: None,
             }
         }
     }
@@ -300,12 +304,12 @@ struct FacetReflection {
 impl Facets {
     fn new(roughness: f32, base_color: Vec3, metallic: f32, coat_f0: f32) -> Self {
         let alpha = roughness * roughness;
-        let missing = energy::GGX.missing.curve(roughness);
+        let missing = ReflectionTables::of(Distribution::Ggx).missing.curve(roughness);
         let average = |f0: Vec3| f0 + (Vec3::ONE - f0) * SCHLICK_AVERAGE;
         let tint = |f0: Vec3| energy::multiple_bounce_tint(average(f0), 1.0 - missing.average());
         let coat_tint = tint(Vec3::splat(coat_f0));
         Self {
-            ggx: Ggx::isotropic(alpha),
+            ggx: Microfacets::isotropic(alpha, Distribution::Ggx),
             grazing: GrazingHemisphere::new(alpha),
             missing,
             schlick: SchlickCurve::new(roughness),
@@ -317,6 +321,10 @@ impl Facets {
     /// Albedo of the coat, all bounces, from the tabulated albedos at one direction or from their averages.
     fn coat_albedo(&self, coat_f0: f32, missing: f32, schlick: f32) -> f32 {
         coat_f0 * (1.0 - missing) + (1.0 - coat_f0) * schlick + self.coat_tint * missing
+    }
+
+    fn missing_lobe(&self, cos_o: f32, cos_i: f32) -> f32 {
+        self.missing.at(cos_o) * self.missing.at(cos_i) * cos_i * FRAC_1_PI / self.missing.average().max(1e-9)
     }
 
     fn reflect(&self, wo: Vec3, wi: Vec3) -> FacetReflection {

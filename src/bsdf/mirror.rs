@@ -26,6 +26,7 @@ impl Mirror {
             weight: self.reflectance,
             pdf: 1.0,
             lobe: Lobe::Delta,
+            crossed_index: None,
         })
     }
 

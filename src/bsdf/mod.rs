@@ -16,32 +16,52 @@
 //!
 //! Roughness r is perceptual, in [0, 1]; the microfacet slope width is α = r² (Burley 2012, section 5.4).
 
+mod albedo_table;
+mod anisotropic_table;
+mod beckmann;
+mod coat;
+mod coated_conductor;
+mod coated_diffuse;
 mod conductor;
 mod dielectric;
+mod dielectric_tables;
 mod diffuse_transmission;
 mod energy;
 mod fresnel;
-mod ggx;
+mod he_torrance;
 mod lambert;
 mod metal_roughness;
+mod microfacets;
 mod mirror;
+mod mix;
 mod oren_nayar;
+mod phong;
 #[cfg(test)]
 mod tests;
 mod thin_dielectric;
+mod ward;
 mod warp;
 
 use glam::Vec3;
 
+pub use anisotropic_table::{AnisotropicTable, WidthRange};
+pub use coat::CoatTables;
+pub use coated_conductor::{CoatedConductor, LayerTables};
+pub use coated_diffuse::CoatedDiffuse;
 pub use conductor::Conductor;
 pub use dielectric::Dielectric;
+pub use dielectric_tables::DielectricTables;
 pub use diffuse_transmission::DiffuseTransmission;
-pub use energy::DielectricTables;
+pub use he_torrance::HeTorrance;
 pub use lambert::Lambert;
 pub use metal_roughness::MetalRoughness;
+pub use microfacets::Microfacets;
 pub use mirror::Mirror;
+pub use mix::Mix;
 pub use oren_nayar::OrenNayar;
+pub use phong::Phong;
 pub use thin_dielectric::ThinDielectric;
+pub use ward::Ward;
 
 /// Slope width α below which a microfacet surface counts as perfectly smooth. Its lobe would be 0.06° wide: less than a
 /// pixel of any display at any distance, and the half-way vector in single precision starts to blur it.
@@ -67,7 +87,13 @@ impl BsdfEvaluation {
         let lobe = if wi.z > 0.0 { Lobe::Smooth } else { Lobe::SmoothTransmission };
         // A pdf above zero but so small that the weight overflows comes only from rounding.
         let weight = self.value / self.pdf;
-        (self.pdf > 0.0 && weight.is_finite()).then_some(BsdfSample { wi, weight, pdf: self.pdf, lobe })
+        (self.pdf > 0.0 && weight.is_finite()).then_some(BsdfSample {
+            wi,
+            weight,
+            pdf: self.pdf,
+            lobe,
+            crossed_index: None,
+        })
     }
 
     /// The same seen from the other side of the surface: for models that turn both directions over.
@@ -87,9 +113,17 @@ pub struct BsdfSample {
     pub pdf: f32,
     /// Which kind of lobe was chosen.
     pub lobe: Lobe,
+    /// Where the path entered or left a volume: the index of refraction that it comes into over the one it leaves. `None`
+    /// for reflection, and for transmission through sheets without an inside.
+    pub crossed_index: Option<f32>,
 }
 
 impl BsdfSample {
+    /// Reflection into exactly one direction, chosen with a probability of `pdf`.
+    fn reflected_delta(wi: Vec3, weight: Vec3, pdf: f32) -> Self {
+        Self { wi, weight, pdf, lobe: Lobe::Delta, crossed_index: None }
+    }
+
     /// Turns the direction over if `wo` lies below the surface (the model having worked above it).
     fn turned_like(mut self, wo: Vec3) -> Self {
         if wo.z < 0.0 {
@@ -132,8 +166,8 @@ pub enum Bsdf<'a> {
     /// Ideal specular reflection.
     Mirror(Mirror),
     /// Metal, smooth or rough.
-    Conductor(Conductor),
-    /// Boundary of a clear volume, smooth or rough.
+    Conductor(Conductor<'a>),
+    /// Boundary of a volume, smooth or rough.
     Dielectric(Dielectric<'a>),
     /// Thin clear sheet.
     ThinDielectric(ThinDielectric),
@@ -143,6 +177,18 @@ pub enum Bsdf<'a> {
     OrenNayar(OrenNayar),
     /// Thin diffuse sheet.
     DiffuseTransmission(DiffuseTransmission),
+    /// Clear coat over a diffuse base.
+    CoatedDiffuse(CoatedDiffuse<'a>),
+    /// Clear coat over a metal.
+    CoatedConductor(CoatedConductor<'a>),
+    /// Diffuse base and a lobe around the mirror direction.
+    Phong(Phong),
+    /// Diffuse base and a Gaussian lobe of half-way vectors.
+    Ward(Ward),
+    /// Relief of the size of a wavelength.
+    HeTorrance(HeTorrance),
+    /// Weighted sum of two models.
+    Mix(Mix<'a>),
 }
 
 impl<'a> Bsdf<'a> {
@@ -156,20 +202,41 @@ impl<'a> Bsdf<'a> {
         Self::Mirror(Mirror::new(reflectance))
     }
 
-    /// Metal of complex index η + ik per RGB channel, seen in air.
-    pub fn conductor(eta: Vec3, k: Vec3, roughness: f32) -> Self {
-        Self::Conductor(Conductor::new(eta, k, roughness))
+    /// Metal of complex index η + ik per RGB channel, seen in air; a number stands for perceptual roughness of GGX.
+    pub fn conductor(eta: Vec3, k: Vec3, facets: impl Into<Microfacets>) -> Self {
+        Self::Conductor(Conductor::new(eta, k, Vec3::ONE, facets.into(), None))
     }
 
-    /// Boundary of a clear volume whose index is `eta_inside_over_outside`; `transmittance` tints each crossing. Without
-    /// `tables` a rough boundary loses the light that bounces between its facets.
+    /// Boundary of a volume whose index is `eta_inside_over_outside`; `transmittance` tints each crossing. Without `tables`
+    /// a rough boundary loses the light that bounces between its facets.
     pub fn dielectric(
         eta_inside_over_outside: f32,
-        roughness: f32,
+        facets: impl Into<Microfacets>,
         transmittance: Vec3,
         tables: Option<&'a DielectricTables>,
     ) -> Self {
-        Self::Dielectric(Dielectric::new(eta_inside_over_outside, roughness, transmittance, tables))
+        Self::Dielectric(Dielectric::new(eta_inside_over_outside, facets.into(), transmittance, tables))
+    }
+
+    /// Clear coat, of the tables' index, over a diffuse base of albedo `reflectance`.
+    pub fn coated_diffuse(reflectance: Vec3, facets: impl Into<Microfacets>, tables: &'a CoatTables) -> Self {
+        Self::CoatedDiffuse(CoatedDiffuse::new(reflectance, facets.into(), true, tables))
+    }
+
+    /// Clear coat, of the tables' index, over a metal.
+    pub fn coated_conductor(
+        eta: Vec3,
+        k: Vec3,
+        facets: impl Into<Microfacets>,
+        coat_facets: impl Into<Microfacets>,
+        tables: &'a LayerTables,
+    ) -> Self {
+        Self::CoatedConductor(CoatedConductor::new(eta, k, facets.into(), coat_facets.into(), tables))
+    }
+
+    /// Weighted sum of two models, `amount` in [0, 1] being the second's share.
+    pub fn mix(first: &'a Bsdf<'a>, second: &'a Bsdf<'a>, amount: f32) -> Self {
+        Self::Mix(Mix::new(first, second, amount))
     }
 
     /// Thin sheet of a clear material; `transmittance` tints what goes through.
@@ -202,6 +269,12 @@ impl<'a> Bsdf<'a> {
             Self::MetalRoughness(model) => model.evaluate(wo, wi),
             Self::OrenNayar(model) => model.evaluate(wo, wi),
             Self::DiffuseTransmission(model) => model.evaluate(wo, wi),
+            Self::CoatedDiffuse(model) => model.evaluate(wo, wi),
+            Self::CoatedConductor(model) => model.evaluate(wo, wi),
+            Self::Phong(model) => model.evaluate(wo, wi),
+            Self::Ward(model) => model.evaluate(wo, wi),
+            Self::HeTorrance(model) => model.evaluate(wo, wi),
+            Self::Mix(model) => model.evaluate(wo, wi),
         }
     }
 
@@ -216,17 +289,29 @@ impl<'a> Bsdf<'a> {
             Self::MetalRoughness(model) => model.sample(wo, u),
             Self::OrenNayar(model) => model.sample(wo, u),
             Self::DiffuseTransmission(model) => model.sample(wo, u),
+            Self::CoatedDiffuse(model) => model.sample(wo, u),
+            Self::CoatedConductor(model) => model.sample(wo, u),
+            Self::Phong(model) => model.sample(wo, u),
+            Self::Ward(model) => model.sample(wo, u),
+            Self::HeTorrance(model) => model.sample(wo, u),
+            Self::Mix(model) => model.sample(wo, u),
         }
     }
 
     /// Whether [`Self::evaluate`] can be other than 0; if not, light sampling is of no use.
     pub fn has_smooth_lobe(&self) -> bool {
         match self {
-            Self::Lambert(_) | Self::OrenNayar(_) | Self::DiffuseTransmission(_) => true,
+            Self::Lambert(_) | Self::OrenNayar(_) | Self::DiffuseTransmission(_) | Self::Phong(_) | Self::Ward(_) => {
+                true
+            }
             Self::Mirror(_) | Self::ThinDielectric(_) => false,
             Self::Conductor(model) => model.has_smooth_lobe(),
             Self::Dielectric(model) => model.has_smooth_lobe(),
             Self::MetalRoughness(model) => model.has_smooth_lobe(),
+            Self::CoatedDiffuse(model) => model.has_smooth_lobe(),
+            Self::CoatedConductor(model) => model.has_smooth_lobe(),
+            Self::HeTorrance(model) => model.has_smooth_lobe(),
+            Self::Mix(model) => model.has_smooth_lobe(),
         }
     }
 
@@ -241,6 +326,12 @@ impl<'a> Bsdf<'a> {
             Self::MetalRoughness(model) => model.albedo(wo),
             Self::OrenNayar(model) => model.albedo(wo),
             Self::DiffuseTransmission(model) => model.albedo(),
+            Self::CoatedDiffuse(model) => model.albedo(wo),
+            Self::CoatedConductor(model) => model.albedo(wo),
+            Self::Phong(model) => model.albedo(),
+            Self::Ward(model) => model.albedo(),
+            Self::HeTorrance(model) => model.albedo(wo),
+            Self::Mix(model) => model.albedo(wo),
         }
     }
 }

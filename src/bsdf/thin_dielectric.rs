@@ -42,10 +42,17 @@ impl ThinDielectric {
                 weight: Vec3::splat(reflectance / probability),
                 pdf: probability,
                 lobe: Lobe::Delta,
+                crossed_index: None,
             })
         } else {
             let pdf = 1.0 - probability;
-            (pdf > 0.0).then(|| BsdfSample { wi: -wo, weight: transmitted / pdf, pdf, lobe: Lobe::DeltaTransmission })
+            (pdf > 0.0).then(|| BsdfSample {
+                wi: -wo,
+                weight: transmitted / pdf,
+                pdf,
+                lobe: Lobe::DeltaTransmission,
+                crossed_index: None,
+            })
         }
     }
 

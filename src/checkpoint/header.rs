@@ -1,7 +1,7 @@
 //! What was rendered and for whom: small, at the start of the film's file.
 
 use crate::adaptive::settings::{AllocationRule, Limits, LoopSettings, Sampling};
-use crate::integrator::TraceSettings;
+use crate::integrator::{Crop, TraceSettings};
 use crate::scene::Scene;
 use crate::scene::hash::{ContentHash, content_hash};
 use fechner_perception::display::Viewing;
@@ -32,9 +32,9 @@ pub struct Origin {
     pub scene_name: String,
     /// The scene's content.
     pub scene: ContentHash,
-    /// Width of the picture in pixels.
+    /// Width of the film in pixels.
     pub width: u32,
-    /// Height of the picture in pixels.
+    /// Height of the film in pixels.
     pub height: u32,
     /// How it was traced, in words.
     pub tracing: String,
@@ -80,12 +80,13 @@ pub struct UnknownName {
 impl Origin {
     /// Of a render.
     pub fn of(scene: &Scene, settings: &TraceSettings) -> Self {
+        let Crop { width, height, .. } = settings.film_area();
         Self {
             program: concat!("fechner ", env!("CARGO_PKG_VERSION")).to_owned(),
             scene_name: scene.name.clone(),
             scene: content_hash(scene),
-            width: settings.width,
-            height: settings.height,
+            width,
+            height,
             tracing: in_words(settings),
         }
     }
@@ -113,12 +114,11 @@ impl Origin {
     }
 }
 
-/// Every setting that changes a sample, also those to come, less what is said elsewhere.
+/// Every setting that changes a sample, also those to come, less the seed.
 fn in_words(settings: &TraceSettings) -> String {
     let text = format!("{settings:?}");
     let fields = text.trim_start_matches("TraceSettings { ").trim_end_matches(" }").split(", ");
-    let is_elsewhere = |field: &&str| ["width: ", "height: ", "seed: "].iter().any(|name| field.starts_with(name));
-    fields.filter(|field| !is_elsewhere(field)).collect::<Vec<_>>().join(", ")
+    fields.filter(|field| !field.starts_with("seed: ")).collect::<Vec<_>>().join(", ")
 }
 
 impl Seeds {

@@ -3,7 +3,7 @@
 use super::seeing::parse_positive;
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
-use fechner::benchmark::{Arm, BenchSettings, run as run_bench};
+use fechner::benchmark::{Arm, BenchSettings, bounds, run as run_bench};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `bench`.
@@ -29,6 +29,12 @@ pub(super) struct BenchArguments {
     /// Display preset.
     #[arg(long, value_name = "NAME", default_value = "desktop")]
     display: String,
+    /// Samples of the reference, as a multiple of what uniform sampling needs (at least 512, at most 16384 a pixel).
+    #[arg(long, value_name = "X", value_parser = parse_positive, default_value_t = 16.0)]
+    reference_factor: f64,
+    /// Only say what uniform sampling and the optimum need by converged variances: what no rule can beat.
+    #[arg(long)]
+    bound: bool,
     /// Arms, separated by commas, in place of the suite's.
     #[arg(long, value_name = "ARM,…", value_delimiter = ',')]
     arms: Vec<String>,
@@ -36,7 +42,7 @@ pub(super) struct BenchArguments {
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Suite {
-    /// 128×128, visibility 4, six arms, three seeds.
+    /// 128×128, visibility 4, seven arms, three seeds.
     Quick,
     /// 256×256, visibility 1, every arm, five seeds: a night.
     Full,
@@ -56,11 +62,21 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
         visibility: arguments.visibility.unwrap_or(visibility),
         arms: if arguments.arms.is_empty() { arms } else { named_arms(&arguments.arms)? },
         seeds: arguments.seeds.unwrap_or(seeds),
-        reference_factor: 16.0,
+        reference_factor: arguments.reference_factor,
         display: arguments.display.clone(),
         output: arguments.output.clone(),
     };
-    let results = run_bench(&settings, &|line| eprintln!("{line}"))?;
+    let say = |line: &str| eprintln!("{line}");
+    if arguments.bound {
+        println!("| scene | coverage | uniform, spp | optimum, spp | ratio |");
+        println!("| --- | --- | --- | --- | --- |");
+        for b in bounds(&settings, &say)? {
+            let (share, ratio) = (100.0 * b.coverage, b.uniform / b.optimum);
+            println!("| {} | {share} % | {:.0} | {:.0} | {ratio:.2} |", b.scene, b.uniform, b.optimum);
+        }
+        return Ok(());
+    }
+    let results = run_bench(&settings, &say)?;
     println!("| arm | coverage | samples, uniform / arm | worst scene | oracle / arm |");
     println!("| --- | --- | --- | --- | --- |");
     for s in &results.summary {
@@ -80,7 +96,7 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
     Ok(())
 }
 
-/// Arms by name, the uniform one first and the default one before what is compared with it.
+/// Arms by name, and those that others are compared with.
 fn named_arms(names: &[String]) -> Result<Vec<Arm>> {
     for name in names {
         if !Arm::ALL.iter().any(|arm| arm.name() == name) {
@@ -88,7 +104,9 @@ fn named_arms(names: &[String]) -> Result<Vec<Arm>> {
             bail!("there is no arm \"{name}\"; known: {}", known.join(", "));
         }
     }
-    Ok(Arm::ALL.into_iter().filter(|arm| *arm == Arm::Uniform || names.iter().any(|name| name == arm.name())).collect())
+    let is_named = |arm: Arm| names.iter().any(|name| name == arm.name());
+    let needed = |arm: Arm| arm == Arm::Uniform || (arm == Arm::AsAsked && is_named(Arm::UniformEqualTime));
+    Ok(Arm::ALL.into_iter().filter(|&arm| needed(arm) || is_named(arm)).collect())
 }
 
 fn scenes_of(folder: &Path) -> Result<Vec<PathBuf>> {

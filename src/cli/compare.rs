@@ -6,7 +6,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::output;
 use fechner_perception::csf;
-use fechner_perception::difference::{Difference, difference};
+use fechner_perception::difference::{Difference, colour_difference};
 use fechner_perception::psychometric::detection_probability;
 use fechner_perception::tone;
 use serde::Serialize;
@@ -42,6 +42,7 @@ struct Figures {
     pixels_per_degree: f64,
     csf: &'static str,
     worst_visibility: f64,
+    mean_visibility: f64,
     visible_fraction: f64,
     detection_probability_worst: f64,
     is_visible: bool,
@@ -69,11 +70,13 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
         let known = tone::operator_names().join(", ");
         format!("there is no tone operator \"{}\"; known: {known}", arguments.operator)
     })?;
-    let fitted =
-        reference.fit(operator.as_ref(), &viewing.display).or_else(|| test.fit(operator.as_ref(), &viewing.display));
-    let seen = difference(
-        &reference.displayed(fitted.as_deref(), &viewing),
-        &test.displayed(fitted.as_deref(), &viewing),
+    let fitted = reference.fit(operator.as_ref(), &viewing).or_else(|| test.fit(operator.as_ref(), &viewing));
+    let (width, height) = reference.size();
+    let seen = colour_difference(
+        &reference.displayed_rgb(fitted.as_deref(), &viewing),
+        &test.displayed_rgb(fitted.as_deref(), &viewing),
+        width,
+        height,
         &viewing,
         csf.as_ref(),
     )?;
@@ -84,6 +87,7 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
         pixels_per_degree: viewing.display.pixels_per_degree,
         csf: csf.name(),
         worst_visibility: seen.worst_visibility,
+        mean_visibility: seen.visibility.mean(),
         visible_fraction: seen.visible_fraction,
         detection_probability_worst: detection_probability(seen.worst_visibility),
         is_visible: seen.is_visible(),
@@ -97,7 +101,7 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
     }
     println!(
         "{}: worst visibility {:.2} (seen in a 1° patch with {:.1} %), {:.2} % of the picture above threshold, on \
-         \"{}\" at {} pixels a degree",
+         \"{}\" at {} pixels a degree (model-predicted; calibrated on gratings, not on renderings)",
         if figures.is_visible { "visible" } else { "the same to the eye" },
         figures.worst_visibility,
         100.0 * figures.detection_probability_worst,

@@ -1,6 +1,7 @@
 //! The command line.
 
 mod bench;
+mod channels;
 mod compare;
 mod console;
 mod info;
@@ -11,6 +12,7 @@ mod render;
 mod report;
 mod seeing;
 mod threshold;
+mod tonemap;
 
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
@@ -32,6 +34,8 @@ enum Command {
     Bench(bench::BenchArguments),
     /// Say whether one picture can be told from another by eye: exit status 0 same, 1 visible, 2 error.
     Compare(compare::CompareArguments),
+    /// Show HDR pictures as a display and an eye would have them: tone operators, eyes that adapt over time.
+    Tonemap(tonemap::TonemapArguments),
     /// Map how much noise may stay in a picture of any renderer before it is seen.
     Threshold(threshold::ThresholdArguments),
     /// Add up renders of different seeds that were kept by --checkpoint, or make a picture of a single one.
@@ -49,6 +53,7 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
         Command::Render(arguments) => render::run(&arguments)?,
         Command::Bench(arguments) => bench::run(&arguments)?,
         Command::Compare(arguments) => return compare::run(&arguments),
+        Command::Tonemap(arguments) => tonemap::run(&arguments)?,
         Command::Threshold(arguments) => threshold::run(&arguments)?,
         Command::Merge(arguments) => merge::run(&arguments)?,
         Command::Info { file } => info::run(&file)?,

@@ -1,9 +1,10 @@
 //! Pictures of any renderer as the input of `compare` and `threshold`.
 
+use super::channels::{self, Colour};
 use anyhow::{Context, Result, bail};
 use fechner::exr_read::{ExrImage, read_exr};
 use fechner::output::{Attribute, NITS_PER_UNIT};
-use fechner_perception::display::{Display, Viewing};
+use fechner_perception::display::Viewing;
 use fechner_perception::photometry::luminance;
 use fechner_perception::tone::{FittedTone, SceneGuide, ToneOperator};
 use fechner_perception::{Plane, seen};
@@ -49,13 +50,14 @@ impl InputPicture {
             })
         };
         let nits_per_unit = nits_per_unit.or_else(in_file).with_context(|| no_unit(path))?;
-        let [r, g, b] = ["R", "G", "B"].map(|c| find_channel(exr, &[c], c));
-        let (Some(r), Some(g), Some(b)) = (r, g, b) else {
-            bail!("{}: there are no channels R, G and B; `fechner info` lists what there is", path.display());
+        let Some(picture) = exr.scene_picture(picture_channel) else {
+            bail!("{}: there are no channels R, G and B, nor Y; `fechner info` lists what there is", path.display());
         };
-        let rgb = (0..r.len()).map(|i| [r[i], g[i], b[i]]).collect();
+        for note in &picture.notes {
+            eprintln!("note: {}: {note}", path.display());
+        }
         let content = Content::Scene { nits_per_unit };
-        Ok(Self { width: exr.width as usize, height: exr.height as usize, rgb, content })
+        Ok(Self { width: picture.width as usize, height: picture.height as usize, rgb: picture.rgb, content })
     }
 
     fn from_image(path: &Path, content: Content) -> Result<Self> {
@@ -79,9 +81,9 @@ impl InputPicture {
     }
 
     /// The operator fitted to this picture; `None` for one that is ready for the display.
-    pub(super) fn fit(&self, operator: &dyn ToneOperator, display: &Display) -> Option<Box<dyn FittedTone>> {
+    pub(super) fn fit(&self, operator: &dyn ToneOperator, viewing: &Viewing) -> Option<Box<dyn FittedTone>> {
         let luminance_cd_m2 = self.scene_luminance()?;
-        Some(operator.fit(&SceneGuide { luminance_cd_m2: &luminance_cd_m2 }, display))
+        Some(operator.fit(&SceneGuide::of(&luminance_cd_m2), viewing, None))
     }
 
     /// Luminance in cd/m² of the scene; `None` for a picture that is ready for the display.
@@ -91,6 +93,29 @@ impl InputPicture {
             let value = luminance(self.rgb[y * self.width + x]) * nits_per_unit as f32;
             if value.is_finite() { value.max(0.0) } else { 0.0 }
         }))
+    }
+
+    /// Linear RGB in cd/m² that the display sends to the eye.
+    pub(super) fn displayed_rgb(&self, tone: Option<&dyn FittedTone>, viewing: &Viewing) -> Vec<[f32; 3]> {
+        let display = &viewing.display;
+        let cd_m2 = |relative: f32| display.luminance_cd_m2(f64::from(relative)) as f32;
+        match (self.content, tone) {
+            (Content::Scene { nits_per_unit }, Some(tone)) => {
+                let light = |value: f32| if value.is_finite() { value.max(0.0) * nits_per_unit as f32 } else { 0.0 };
+                self.rgb.iter().map(|rgb| tone.map_rgb(rgb.map(light)).map(cd_m2)).collect()
+            }
+            _ => {
+                let linear = |code: f32| display.eotf.decode(f64::from(code), display.white_cd_m2) as f32;
+                self.rgb.iter().map(|rgb| rgb.map(|code| cd_m2(linear(code)))).collect()
+            }
+        }
+    }
+
+    /// Linear RGB in cd/m² of the scene; `None` for a picture that is ready for the display.
+    pub(super) fn scene_rgb_cd_m2(&self) -> Option<Vec<[f32; 3]>> {
+        let Content::Scene { nits_per_unit } = self.content else { return None };
+        let cd_m2 = |value: f32| (f64::from(value) * nits_per_unit).clamp(-1e30, 1e30) as f32;
+        Some(self.rgb.iter().map(|pixel| pixel.map(cd_m2)).collect())
     }
 
     /// Luminance in cd/m² that the display sends to the eye.
@@ -107,20 +132,21 @@ impl InputPicture {
     }
 }
 
+/// A channel of the file's picture by its last name, all three from one layer.
+fn picture_channel<'a>(exr: &'a ExrImage, name: &str) -> Option<&'a [f32]> {
+    let Some(Colour::Rgb([r, g, b])) = channels::colour(exr) else { return None };
+    match name {
+        "R" => Some(r),
+        "G" => Some(g),
+        "B" => Some(b),
+        _ => None,
+    }
+}
+
 fn no_unit(path: &Path) -> String {
     format!(
         "{}: the file does not say how bright RGB (1, 1, 1) is, and nothing can be seen in a picture without a unit: give \
          --nits-per-unit in cd/m²",
         path.display()
     )
-}
-
-/// A channel by one of its names, or by its last part: renderers prefix layers and passes (`RenderLayer.Combined.R`).
-pub(super) fn find_channel<'a>(exr: &'a ExrImage, names: &[&str], last_part: &str) -> Option<&'a [f32]> {
-    let ends = |name: &str| name.rsplit('.').next().is_some_and(|part| part.eq_ignore_ascii_case(last_part));
-    names.iter().find_map(|name| exr.channel(name)).or_else(|| {
-        let candidates: Vec<_> = exr.channels.iter().filter(|(name, _)| ends(name)).collect();
-        let combined = candidates.iter().find(|(name, _)| name.to_ascii_lowercase().contains("combined"));
-        combined.or(candidates.first()).map(|(_, values)| values.as_slice())
-    })
 }

@@ -10,9 +10,9 @@ use fechner::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, L
 use fechner::adaptive::state::RenderState;
 use fechner::adaptive::{self, Rendered};
 use fechner::checkpoint::{Header, Origin, Seeds, SettingsRecord};
-use fechner::integrator::{DEFAULT_MAX_DEPTH, PathTracer, TraceSettings};
+use fechner::integrator::{Crop, DEFAULT_MAX_DEPTH, PathTracer, TraceSettings};
 use fechner::output;
-use fechner::sampler::PixelFilter;
+use fechner::sampler::{PixelFilter, Sequence};
 use fechner::scene::{Scene, load};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -30,6 +30,9 @@ pub(super) struct RenderArguments {
     /// Picture size.
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<Size>,
+    /// Trace only this part of the picture, with the samples it has in the whole.
+    #[arg(long, value_name = "X,Y,W,H", value_parser = parse_crop)]
+    crop: Option<Crop>,
     /// Camera of the scene file, by name.
     #[arg(long, value_name = "NAME")]
     camera: Option<String>,
@@ -74,6 +77,9 @@ pub(super) struct RenderArguments {
     /// Pixel filter.
     #[arg(long, value_enum, default_value = "gaussian", help_heading = "Sampling")]
     filter: FilterChoice,
+    /// How the samples of neighbouring pixels relate.
+    #[arg(long, value_enum, default_value = "per-pixel", help_heading = "Sampling")]
+    sequence: SequenceChoice,
     /// Seed of all random numbers.
     #[arg(long, default_value_t = 0, help_heading = "Sampling")]
     seed: u64,
@@ -157,6 +163,38 @@ enum FilterChoice {
     Box,
     /// Gaussian of σ 0.45 pixels.
     Gaussian,
+    /// Window 3 pixels wide: a little sharper.
+    BlackmanHarris,
+    /// Cubic with negative lobes: sharpest, with --sampling uniform only.
+    Mitchell,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum SequenceChoice {
+    /// Neighbouring pixels are independent.
+    PerPixel,
+    /// Samples are spread over neighbouring pixels as well, in Z-order.
+    ZOrder,
+}
+
+/// X,Y,W,H in pixels of the full picture.
+fn parse_crop(text: &str) -> Result<Crop, String> {
+    let wrong = || format!("\"{text}\" is not a crop; expected X,Y,WIDTH,HEIGHT in pixels, such as 100,50,64,64");
+    let numbers: Vec<u32> = text.split(',').map(|n| n.trim().parse().map_err(|_| wrong())).collect::<Result<_, _>>()?;
+    match numbers[..] {
+        [x, y, width, height] if width > 0 && height > 0 => Ok(Crop { x, y, width, height }),
+        _ => Err(wrong()),
+    }
+}
+
+/// A crop must lie within the picture.
+fn check_crop(crop: Crop, size: Size) -> anyhow::Result<Crop> {
+    let inside = |start: u32, extent: u32, whole: u32| u64::from(start) + u64::from(extent) <= u64::from(whole);
+    if inside(crop.x, crop.width, size.width) && inside(crop.y, crop.height, size.height) {
+        return Ok(crop);
+    }
+    let Crop { x, y, width, height } = crop;
+    bail!("--crop {x},{y},{width},{height} reaches beyond the picture of {}x{} pixels", size.width, size.height)
 }
 
 impl Quality {
@@ -205,10 +243,17 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     }
     let size = arguments.size.unwrap_or(Size { width: scene.film.width, height: scene.film.height });
     check_memory(size)?;
-    let trace = trace_settings(arguments, size);
+    let trace = trace_settings(arguments, size)?;
     let record = settings_record(arguments, &scene)?;
     let settings = record.loop_settings(limits(arguments, &scene, record.sampling))?;
-    let fresh = RenderState::new(size.width, size.height, &settings.limits);
+    if trace.filter.is_signed() && settings.sampling == Sampling::Adaptive {
+        bail!(
+            "--filter mitchell has negative lobes, whose scatter is not the picture's noise: adaptive sampling cannot \
+             judge it; use --sampling uniform, or the filter blackman-harris"
+        );
+    }
+    let Crop { width, height, .. } = trace.film_area();
+    let fresh = RenderState::new(width, height, &settings.limits);
     let (state, seeds, keeper) = if arguments.checkpoint.is_wanted() {
         let origin = Origin::of(&scene, &trace);
         let seeds = Seeds::one(arguments.seed);
@@ -243,7 +288,7 @@ pub(super) fn write_picture(
     report: &Report,
 ) -> anyhow::Result<()> {
     match format {
-        output::Format::Png => output::rendered::write_display_png(path, rendered)?,
+        output::Format::Png => output::rendered::write_display_png(path, rendered, &settings.viewing.display)?,
         output::Format::Exr => {
             output::rendered::write_layers_exr(path, rendered, settings.nits_per_unit, &report.attributes())?;
         }
@@ -259,8 +304,8 @@ pub(super) fn write_json(path: Option<&Path>, report: &Report) -> anyhow::Result
     Ok(())
 }
 
-fn trace_settings(arguments: &RenderArguments, size: Size) -> TraceSettings {
-    TraceSettings {
+fn trace_settings(arguments: &RenderArguments, size: Size) -> anyhow::Result<TraceSettings> {
+    Ok(TraceSettings {
         width: size.width,
         height: size.height,
         seed: arguments.seed,
@@ -269,8 +314,15 @@ fn trace_settings(arguments: &RenderArguments, size: Size) -> TraceSettings {
         filter: match arguments.filter {
             FilterChoice::Box => PixelFilter::Box,
             FilterChoice::Gaussian => PixelFilter::Gaussian,
+            FilterChoice::BlackmanHarris => PixelFilter::BlackmanHarris,
+            FilterChoice::Mitchell => PixelFilter::Mitchell,
         },
-    }
+        sequence: match arguments.sequence {
+            SequenceChoice::PerPixel => Sequence::PerPixel,
+            SequenceChoice::ZOrder => Sequence::ZOrder,
+        },
+        crop: arguments.crop.map(|crop| check_crop(crop, size)).transpose()?,
+    })
 }
 
 /// When to stop.

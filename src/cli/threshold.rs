@@ -1,11 +1,13 @@
 //! `fechner threshold`: how much noise may stay in a picture, and how visible the noise is that it has.
 
-use super::picture::{InputPicture, find_channel};
+use super::channels;
+use super::picture::InputPicture;
 use super::seeing::SeeingArguments;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::exr_read::read_exr;
 use fechner::output::{self, Attribute, Format, Picture};
+use fechner_perception::display::Glare;
 use fechner_perception::model::{self, ModelInputs};
 use fechner_perception::motion::image_velocity_deg_s;
 use fechner_perception::{Plane, ThresholdInputs, csf, seen, threshold_map, tone};
@@ -26,6 +28,9 @@ pub(super) struct ThresholdArguments {
     /// Motion in pixels a frame, for error that travels with what is shown.
     #[arg(long, value_name = "FILE.exr")]
     velocity: Option<PathBuf>,
+    /// Add the veil that bright things cast inside the eye (CIE), for an observer of this age (25 if none is given).
+    #[arg(long, value_name = "AGE", num_args = 0..=1, default_missing_value = "25")]
+    glare: Option<f64>,
     /// Threshold model.
     #[arg(long, value_name = "NAME", default_value = "csf-bands")]
     model: String,
@@ -41,7 +46,11 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     if output::check_target(&arguments.output)? != Format::Exr {
         bail!("{}: threshold maps are data; end the name in .exr", arguments.output.display());
     }
-    let viewing = arguments.seeing.viewing()?;
+    let mut viewing = arguments.seeing.viewing()?;
+    if let Some(age_years) = arguments.glare {
+        viewing.observer.glare = Glare::Cie { age_years };
+        viewing.check().context("--glare")?;
+    }
     let csf = csf::by_name(&arguments.seeing.csf, &viewing)?;
     let model = model::by_name(&arguments.model).with_context(|| {
         format!("there is no threshold model \"{}\"; known: {}", arguments.model, model::names().join(", "))
@@ -52,13 +61,12 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     })?;
     let nits_per_unit = arguments.seeing.nits_per_unit;
     let guide = InputPicture::read(&arguments.input, nits_per_unit)?;
-    let fitted = guide.fit(operator.as_ref(), &viewing.display);
+    let fitted = guide.fit(operator.as_ref(), &viewing);
     let shown = guide.displayed(fitted.as_deref(), &viewing);
     let velocity = match &arguments.velocity {
         Some(path) => {
-            let display = &viewing.display;
             let [x, y] = read_velocity(path, guide.size())?;
-            Some(image_velocity_deg_s(&x, &y, display.frames_per_second, display.pixels_per_degree)?)
+            Some(image_velocity_deg_s(&x, &y, &viewing.display)?)
         }
         None => None,
     };
@@ -99,7 +107,10 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     let ppd = viewing.display.pixels_per_degree as f32;
     picture.push_attribute("fechner.observer.pixels_per_degree", Attribute::Float(ppd));
     output::write_exr(&arguments.output, &picture)?;
-    println!("median threshold {:.3} cd/m² of standard error at visibility 1", median(&threshold));
+    println!(
+        "median threshold {:.3} cd/m² of standard error at visibility 1 (model-predicted; calibrated on gratings, not on renderings)",
+        median(&threshold)
+    );
     if let Some(visibility) = &visibility {
         println!("median visibility of the noise {:.2}", median(visibility));
     }
@@ -132,11 +143,14 @@ fn read_velocity(path: &Path, (width, height): (usize, usize)) -> Result<[Plane;
     if (exr.width as usize, exr.height as usize) != (width, height) {
         bail!("{} has {}x{} pixels, the picture {width}x{height}", path.display(), exr.width, exr.height);
     }
-    let x = find_channel(&exr, &["velocity.X", "Vector.X", "forward.u", "motion.X", "motion.x"], "u");
-    let y = find_channel(&exr, &["velocity.Y", "Vector.Y", "forward.v", "motion.Y", "motion.y"], "v");
-    let (Some(x), Some(y)) = (x, y) else {
-        bail!("{}: no motion channels; velocity.X/Y, Vector.X/Y, forward.u/v and motion.X/Y are known", path.display());
+    let Some((layer, [x, y])) = channels::motion(&exr) else {
+        bail!(
+            "{}: no motion channels; velocity.X/Y, Vector.X/Y, motion.X/Y and forward.u/v are known, with or without a layer \
+             before them",
+            path.display()
+        );
     };
+    println!("motion from the channels of {layer}");
     let plane = |values: &[f32]| {
         let finite = values.iter().map(|&v| if v.is_finite() { v } else { 0.0 }).collect();
         Plane::from_values(width, height, finite)

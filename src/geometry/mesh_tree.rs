@@ -1,21 +1,12 @@
-//! A tree over triangles, in coordinates of its own that suit the tree.
+//! The wide tree of a mesh, in coordinates of its own.
 //!
-//! The wide tree drops what is nearer than a ray parameter of 1e-4 (hazard 2 in [`super::tree`]), so coordinates are
-//! centred and scaled by a power of two until the largest extent is between 512 and 1024: the limit is then 2e-7 of the
-//! mesh's size. A power of two changes no bit of a mantissa, so shared vertices stay shared and distances scale exactly.
+//! They are centred, so that box tests keep their precision far from the origin, and scaled by a power of two until the
+//! largest extent is between 512 and 1024, so that no product of the triangle test leaves the range of f32. A power of two
+//! changes no bit of a mantissa: shared vertices stay shared and distances scale exactly.
 
-use super::tree::{Bounds, PrimitiveTree, WideTree};
-use super::triangle::ShearedRay;
+use super::tree::Bounds;
+use super::wide_tree::{TriangleRef, WideHit, WideTree};
 use glam::Vec3A;
-
-/// Which triangle of which instance.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct TriangleRef {
-    /// Index of the instance in the scene; unused (0) where a tree is shared by several.
-    pub(super) instance: u32,
-    /// Index of the triangle in its mesh.
-    pub(super) triangle: u32,
-}
 
 /// Where a triangle is hit.
 #[derive(Clone, Copy, Debug)]
@@ -31,10 +22,6 @@ pub(super) struct MeshTree {
     tree: WideTree,
     center: Vec3A,
     scale: f32,
-    /// In tree order, in tree coordinates.
-    vertices: Vec<[[f32; 3]; 3]>,
-    /// In tree order.
-    references: Vec<TriangleRef>,
     bounds: Bounds,
     /// Triangles left out because they have no area or a coordinate that is not finite.
     pub(super) degenerate: usize,
@@ -58,16 +45,20 @@ impl MeshTree {
             .zip(&local)
             .map(|((original, _), t)| if usable(original) { Bounds::of_points(*t) } else { Bounds::EMPTY })
             .collect();
-        let tree = WideTree::build(&boxes);
-        let vertices = tree.order().iter().map(|&i| local[i as usize].map(|p| p.to_array())).collect();
-        let references = tree.order().iter().map(|&i| triangles[i as usize].1).collect();
-        let degenerate = triangles.len() - tree.order().len();
-        Self { tree, center, scale, vertices, references, bounds, degenerate }
+        let references: Vec<TriangleRef> = triangles.iter().map(|(_, reference)| *reference).collect();
+        let tree = WideTree::build(&local, &boxes, &references);
+        let degenerate = boxes.iter().filter(|b| !b.is_finite()).count();
+        Self { tree, center, scale, bounds, degenerate }
     }
 
     /// Bounds in the coordinates the tree was given; not finite when it is empty.
     pub(super) fn bounds(&self) -> Bounds {
         self.bounds
+    }
+
+    /// Memory in bytes.
+    pub(super) fn bytes(&self) -> usize {
+        self.tree.bytes()
     }
 
     /// The closest hit nearer than `t_max` that `accept` lets stand. `direction` has unit length.
@@ -80,43 +71,30 @@ impl MeshTree {
         accept: impl Fn(&MeshHit) -> bool,
     ) -> Option<MeshHit> {
         let origin = (origin - self.center) * self.scale;
-        let sheared = ShearedRay::new(origin, direction);
-        let to_given = 1.0 / self.scale;
-        let mut best = None;
-        self.tree.closest(origin, direction, t_max * self.scale, |i, t_max| {
-            let Some(hit) = sheared.intersect(&self.vertices[i], t_max) else {
-                return f32::INFINITY;
-            };
-            let candidate = MeshHit { t: hit.t * to_given, triangle: self.references[i], b1: hit.b1, b2: hit.b2 };
-            if !accept(&candidate) {
-                return f32::INFINITY;
-            }
-            best = Some(candidate);
-            hit.t
-        });
-        best
+        let given = |hit: &WideHit| self.given(hit);
+        self.tree.closest(origin, direction, t_max * self.scale, |h| accept(&given(h))).as_ref().map(given)
     }
 
     /// Whether anything that `accept` lets stand is nearer than `t_max`.
     #[inline]
     pub(super) fn any(&self, origin: Vec3A, direction: Vec3A, t_max: f32, accept: impl Fn(&MeshHit) -> bool) -> bool {
         let origin = (origin - self.center) * self.scale;
-        let sheared = ShearedRay::new(origin, direction);
-        let to_given = 1.0 / self.scale;
-        self.tree.any(origin, direction, t_max * self.scale, |i, t_max| {
-            let Some(hit) = sheared.intersect(&self.vertices[i], t_max) else {
-                return f32::INFINITY;
-            };
-            let candidate = MeshHit { t: hit.t * to_given, triangle: self.references[i], b1: hit.b1, b2: hit.b2 };
-            if accept(&candidate) { hit.t } else { f32::INFINITY }
-        })
+        self.tree.any(origin, direction, t_max * self.scale, |h| accept(&self.given(h)))
+    }
+
+    /// A hit in the coordinates that the tree was given.
+    #[inline]
+    fn given(&self, found: &WideHit) -> MeshHit {
+        let hit = &found.hit;
+        MeshHit { t: hit.t / self.scale, triangle: found.reference, b1: hit.b1, b2: hit.b2 }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::tree::BinaryTree;
+    use crate::geometry::tree::{BinaryTree, PrimitiveTree};
+    use crate::geometry::triangle::ShearedRay;
     use glam::{Vec3, vec3a};
 
     /// A closed sphere of 20·4^`subdivisions` triangles.

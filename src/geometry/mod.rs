@@ -4,11 +4,14 @@
 //! The trees are obvhs's, behind [`tree::PrimitiveTree`]; the triangle test is ours, because a leak at a shared edge is a
 //! firefly that an adaptive sampler would chase for ever.
 
+mod collapse;
 mod mesh_tree;
+mod simd;
 pub mod sphere;
 pub mod surface;
 pub mod tree;
 pub mod triangle;
+mod wide_tree;
 mod world;
 
 pub use surface::SurfacePoint;
@@ -23,4 +26,13 @@ pub struct Ray {
     pub origin: Vec3A,
     /// Unit direction.
     pub direction: Vec3A,
+    /// When, as share of the open shutter, in [0, 1].
+    pub time: f32,
+}
+
+impl Ray {
+    /// A ray when the shutter opens.
+    pub fn new(origin: Vec3A, direction: Vec3A) -> Self {
+        Self { origin, direction, time: 0.0 }
+    }
 }

@@ -33,18 +33,18 @@ mod tests {
 
     #[test]
     fn near_and_inside() {
-        let ray = Ray { origin: vec3a(0.0, 0.0, 5.0), direction: vec3a(0.0, 0.0, -1.0) };
+        let ray = Ray::new(vec3a(0.0, 0.0, 5.0), vec3a(0.0, 0.0, -1.0));
         assert_eq!(intersect(&ray, Vec3A::ZERO, 1.0, f32::INFINITY), Some(4.0));
         assert_eq!(intersect(&ray, Vec3A::ZERO, 1.0, 3.9), None);
-        let inside = Ray { origin: Vec3A::ZERO, direction: vec3a(1.0, 0.0, 0.0) };
+        let inside = Ray::new(Vec3A::ZERO, vec3a(1.0, 0.0, 0.0));
         assert_eq!(intersect(&inside, Vec3A::ZERO, 2.0, f32::INFINITY), Some(2.0));
-        let behind = Ray { origin: vec3a(0.0, 0.0, 5.0), direction: vec3a(0.0, 0.0, 1.0) };
+        let behind = Ray::new(vec3a(0.0, 0.0, 5.0), vec3a(0.0, 0.0, 1.0));
         assert_eq!(intersect(&behind, Vec3A::ZERO, 1.0, f32::INFINITY), None);
     }
 
     #[test]
     fn a_small_sphere_far_away_is_hit_at_its_distance() {
-        let ray = Ray { origin: vec3a(0.0, 0.0, 1e4), direction: vec3a(0.0, 0.0, -1.0) };
+        let ray = Ray::new(vec3a(0.0, 0.0, 1e4), vec3a(0.0, 0.0, -1.0));
         let t = intersect(&ray, Vec3A::ZERO, 0.01, f32::INFINITY).expect("on the axis");
         assert!((t - (1e4 - 0.01)).abs() <= 2e-3, "{t}");
     }

@@ -11,7 +11,7 @@ pub struct SurfacePoint {
     pub geometric_normal: Vec3,
     /// Unit normal for shading, on the same side.
     pub shading_normal: Vec3,
-    /// Along growing u where the material has a normal map, else anywhere in the surface; neither of unit length nor
+    /// Along growing u where the material asks for it (`needs_tangent`), else anywhere in the surface; neither of unit length nor
     /// perpendicular to the shading normal.
     pub tangent: Vec3,
     /// +1 or −1: the bitangent is this times shading_normal × tangent.

@@ -1,21 +1,20 @@
-//! The acceleration structure behind one small trait: obvhs's trees, fenced.
+//! obvhs behind one small trait, fenced: the builder of every tree, and the walk of the binary ones.
 //!
-//! Four hazards of obvhs 0.4, each kept out here and each with a regression test (`tests` below and in `world`):
-//! 1. its triangle test leaks at edges: we bring our own, and pad the boxes by a relative 2e-7;
-//! 2. its wide tree drops hits nearer than a ray parameter of 1e-4: callers scale coordinates up
-//!    (see `mesh_tree`), and the top level uses the binary tree, which has no such limit;
+//! Triangles are walked in an eight-wide tree of our own (`wide_tree`), cut from what [`build_binary`] makes.
+//!
+//! Four hazards of obvhs 0.4, each kept out and each with a regression test (here, in `mesh_tree` and in `world`):
+//! 1. its triangle test leaks at edges: we bring our own, and pad the boxes by 2e-7 of their largest coordinate;
+//! 2. its wide tree drops hits nearer than a ray parameter of 1e-4: it is not used;
 //! 3. boxes that are not finite panic the builder: they are given to no builder, and never hit;
 //! 4. many coinciding centroids make the search quadratic: then the fastest preset is used.
 
 use glam::Vec3A;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::builder::build_bvh2;
-use obvhs::cwbvh::CwBvh;
-use obvhs::cwbvh::builder::build_cwbvh;
+use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
+use obvhs::ploc::PlocBuilder;
 use obvhs::ray::{Ray as TreeRay, RayHit};
 use obvhs::{Boundable, BvhBuildParams};
-use std::time::Duration;
 
 /// Axis-aligned box of a primitive.
 #[derive(Clone, Copy, Debug)]
@@ -45,10 +44,10 @@ impl Bounds {
         self.min.is_finite() && self.max.is_finite()
     }
 
-    /// Grown by a relative 2e-7 a coordinate, which closes the trees' rounding (measured: 3 leaks in 153,600 rays at
-    /// edges without, 0 with).
+    /// Grown by 2e-7 of the largest coordinate, which closes the rounding of box and triangle tests (obvhs's own walk:
+    /// 3 leaks in 153,600 rays at edges without, 0 with). Of all axes, since the triangle test shears one into another.
     fn padded(self) -> Self {
-        let pad = self.min.abs().max(self.max.abs()) * 2e-7 + Vec3A::splat(f32::MIN_POSITIVE);
+        let pad = Vec3A::splat(self.min.abs().max(self.max.abs()).max_element() * 2e-7 + f32::MIN_POSITIVE);
         Self { min: self.min - pad, max: self.max + pad }
     }
 }
@@ -82,56 +81,14 @@ pub trait PrimitiveTree: Sized {
     fn any(&self, origin: Vec3A, direction: Vec3A, t_max: f32, test: impl FnMut(usize, f32) -> f32) -> bool;
 }
 
-/// A tree of obvhs with the order of its primitives.
-pub struct ObvhsTree<B> {
-    tree: B,
+/// Up to so many primitives are tested one after the other: a walk costs more than it saves.
+const FEW: usize = 4;
+
+/// obvhs's binary tree, walked by obvhs: for few large things such as instances, in any coordinates.
+pub struct BinaryTree {
+    tree: Bvh2,
     order: Vec<u32>,
 }
-
-/// Eight-wide compressed tree: for triangles, in coordinates of hundreds of units (hazard 2).
-pub type WideTree = ObvhsTree<CwBvh>;
-
-/// Binary tree: for few large things such as instances, in any coordinates.
-pub type BinaryTree = ObvhsTree<Bvh2>;
-
-/// What obvhs's two trees have in common, under one name.
-pub trait Backend: Sized {
-    /// Builds over boxes.
-    fn build(boxes: &[Boxed], params: BvhBuildParams) -> Self;
-    /// Indices of the boxes in tree order.
-    fn indices(&self) -> &[u32];
-    /// Closest hit.
-    fn traverse(&self, ray: TreeRay, hit: &mut RayHit, test: impl FnMut(&TreeRay, usize) -> f32) -> bool;
-    /// Whether nothing is hit.
-    fn misses(&self, ray: TreeRay, test: impl FnMut(&TreeRay, usize) -> f32) -> bool;
-}
-
-macro_rules! backend {
-    ($tree:ty, $build:path) => {
-        impl Backend for $tree {
-            fn build(boxes: &[Boxed], params: BvhBuildParams) -> Self {
-                $build(boxes, params, &mut Duration::default())
-            }
-
-            fn indices(&self) -> &[u32] {
-                &self.primitive_indices
-            }
-
-            #[inline]
-            fn traverse(&self, ray: TreeRay, hit: &mut RayHit, test: impl FnMut(&TreeRay, usize) -> f32) -> bool {
-                self.ray_traverse(ray, hit, test)
-            }
-
-            #[inline]
-            fn misses(&self, ray: TreeRay, test: impl FnMut(&TreeRay, usize) -> f32) -> bool {
-                self.ray_traverse_miss(ray, test)
-            }
-        }
-    };
-}
-
-backend!(CwBvh, build_cwbvh);
-backend!(Bvh2, build_bvh2);
 
 /// Boxes that may be built with, and their primitive numbers.
 struct Input {
@@ -158,6 +115,28 @@ fn prepare(bounds: &[Bounds]) -> Input {
     Input { boxes, numbers, params }
 }
 
+/// What obvhs built.
+pub(super) struct BuiltTree {
+    pub(super) tree: Bvh2,
+    /// By obvhs's primitive index: the number of the box it was given as.
+    pub(super) numbers: Vec<u32>,
+}
+
+/// Builds obvhs's binary tree with one primitive a leaf; boxes that are not finite are left out.
+pub(super) fn build_binary(bounds: &[Bounds]) -> BuiltTree {
+    let Input { boxes, numbers, params } = prepare(bounds);
+    let all = (0..boxes.len() as u32).collect();
+    let mut tree = PlocBuilder::with_capacity(boxes.len()).build(
+        params.ploc_search_distance,
+        &boxes,
+        all,
+        params.sort_precision,
+        params.search_depth_threshold,
+    );
+    ReinsertionOptimizer::default().run(&mut tree, params.reinsertion_batch_ratio, None);
+    BuiltTree { tree, numbers }
+}
+
 /// The size of the largest set of boxes with the very same centroid.
 fn most_coinciding_centroids(boxes: &[Boxed]) -> usize {
     let mut keys: Vec<[u32; 3]> = boxes.iter().map(|b| b.0.center().to_array().map(f32::to_bits)).collect();
@@ -165,15 +144,10 @@ fn most_coinciding_centroids(boxes: &[Boxed]) -> usize {
     keys.chunk_by(|a, b| a == b).map(<[_]>::len).max().unwrap_or(0)
 }
 
-fn original_numbers(tree_indices: &[u32], numbers: &[u32]) -> Vec<u32> {
-    tree_indices.iter().map(|&i| numbers[i as usize]).collect()
-}
-
-impl<B: Backend> PrimitiveTree for ObvhsTree<B> {
+impl PrimitiveTree for BinaryTree {
     fn build(bounds: &[Bounds]) -> Self {
-        let input = prepare(bounds);
-        let tree = B::build(&input.boxes, input.params);
-        let order = original_numbers(tree.indices(), &input.numbers);
+        let BuiltTree { tree, numbers } = build_binary(bounds);
+        let order = tree.primitive_indices.iter().map(|&i| numbers[i as usize]).collect();
         Self { tree, order }
     }
 
@@ -189,15 +163,30 @@ impl<B: Backend> PrimitiveTree for ObvhsTree<B> {
         t_max: f32,
         mut test: impl FnMut(usize, f32) -> f32,
     ) -> Option<(usize, f32)> {
+        if self.order.len() <= FEW {
+            let mut best = None;
+            for i in 0..self.order.len() {
+                let t = test(i, best.map_or(t_max, |(_, t)| t));
+                if t < best.map_or(t_max, |(_, t)| t) {
+                    best = Some((i, t));
+                }
+            }
+            return best;
+        }
         let mut hit = RayHit::none();
         let ray = TreeRay::new(origin, direction, 0.0, t_max);
-        self.tree.traverse(ray, &mut hit, |ray, id| test(id, ray.tmax)).then_some((hit.primitive_id as usize, hit.t))
+        self.tree
+            .ray_traverse(ray, &mut hit, |ray, id| test(id, ray.tmax))
+            .then_some((hit.primitive_id as usize, hit.t))
     }
 
     #[inline]
     fn any(&self, origin: Vec3A, direction: Vec3A, t_max: f32, mut test: impl FnMut(usize, f32) -> f32) -> bool {
+        if self.order.len() <= FEW {
+            return (0..self.order.len()).any(|i| test(i, t_max) < t_max);
+        }
         let ray = TreeRay::new(origin, direction, 0.0, t_max);
-        !self.tree.misses(ray, |ray, id| test(id, ray.tmax))
+        !self.tree.ray_traverse_miss(ray, |ray, id| test(id, ray.tmax))
     }
 }
 
@@ -209,8 +198,8 @@ mod tests {
         Bounds { min: Vec3A::splat(at), max: Vec3A::splat(at + 1.0) }
     }
 
-    fn build_and_count<T: PrimitiveTree>(bounds: &[Bounds]) -> usize {
-        let tree = T::build(bounds);
+    fn build_and_count(bounds: &[Bounds]) -> usize {
+        let tree = BinaryTree::build(bounds);
         let mut found = 0;
         tree.any(Vec3A::splat(-10.0), Vec3A::ONE.normalize(), f32::INFINITY, |_, _| {
             found += 1;
@@ -224,17 +213,14 @@ mod tests {
         let bad = Bounds { min: Vec3A::splat(f32::NAN), max: Vec3A::ONE };
         let infinite = Bounds { min: Vec3A::ZERO, max: Vec3A::splat(f32::INFINITY) };
         let bounds = [bad, unit_box(0.0), infinite, unit_box(3.0), Bounds::EMPTY];
-        assert_eq!(WideTree::build(&bounds).order().len(), 2);
-        assert_eq!(build_and_count::<WideTree>(&bounds), 2);
-        assert_eq!(build_and_count::<BinaryTree>(&bounds), 2);
+        assert_eq!(BinaryTree::build(&bounds).order().len(), 2);
+        assert_eq!(build_and_count(&bounds), 2);
     }
 
     #[test]
     fn nothing_and_one_thing_build() {
-        assert_eq!(build_and_count::<WideTree>(&[]), 0);
-        assert_eq!(build_and_count::<BinaryTree>(&[]), 0);
-        assert_eq!(build_and_count::<WideTree>(&[unit_box(0.0)]), 1);
-        assert_eq!(build_and_count::<BinaryTree>(&[unit_box(0.0)]), 1);
+        assert_eq!(build_and_count(&[]), 0);
+        assert_eq!(build_and_count(&[unit_box(0.0)]), 1);
     }
 
     /// 20,000 identical boxes took 11 s with the medium preset, 0.85 s with the fastest: chosen by count, not by a clock.

@@ -8,13 +8,12 @@ use glam::Vec3A;
 /// A ray sheared so that it runs along +z; made once a ray and tree.
 #[derive(Clone, Copy, Debug)]
 pub struct ShearedRay {
-    origin: [f32; 3],
-    axis_x: usize,
-    axis_y: usize,
-    axis_z: usize,
-    shear_x: f32,
-    shear_y: f32,
-    scale_z: f32,
+    pub(super) origin: [f32; 3],
+    /// Which axes of space become x, y and z: z is the one along which the ray is longest.
+    pub(super) axes: [usize; 3],
+    pub(super) shear_x: f32,
+    pub(super) shear_y: f32,
+    pub(super) scale_z: f32,
 }
 
 /// Where a triangle is hit.
@@ -47,23 +46,22 @@ impl ShearedRay {
         }
         Self {
             origin: origin.to_array(),
-            axis_x,
-            axis_y,
-            axis_z,
+            axes: [axis_x, axis_y, axis_z],
             shear_x: d[axis_x] / d[axis_z],
             shear_y: d[axis_y] / d[axis_z],
             scale_z: 1.0 / d[axis_z],
         }
     }
 
-    /// The hit with 0 < t < `t_max`, from either side.
+    /// The hit with 0 < t ≤ `t_max`, from either side.
     #[inline]
     pub fn intersect(&self, triangle: &[[f32; 3]; 3], t_max: f32) -> Option<TriangleHit> {
+        let [axis_x, axis_y, axis_z] = self.axes;
         let sheared = |vertex: &[f32; 3]| {
-            let z = vertex[self.axis_z] - self.origin[self.axis_z];
+            let z = vertex[axis_z] - self.origin[axis_z];
             (
-                (vertex[self.axis_x] - self.origin[self.axis_x]) - self.shear_x * z,
-                (vertex[self.axis_y] - self.origin[self.axis_y]) - self.shear_y * z,
+                (vertex[axis_x] - self.origin[axis_x]) - self.shear_x * z,
+                (vertex[axis_y] - self.origin[axis_y]) - self.shear_y * z,
                 z,
             )
         };
@@ -92,7 +90,7 @@ impl ShearedRay {
         let inverse = 1.0 / determinant;
         let t = self.scale_z * (u * az + v * bz + w * cz) * inverse;
         // The negation also refuses NaN.
-        if !(t > 0.0 && t < t_max) {
+        if !(t > 0.0 && t <= t_max) {
             return None;
         }
         Some(TriangleHit { t, b1: v * inverse, b2: w * inverse })

@@ -3,10 +3,11 @@
 //! Meshes that are placed once are put into world space and share one tree; meshes that are placed several times have a
 //! tree each, in their own space, and are entered through their instance's transform. Spheres stay analytic.
 
-use super::mesh_tree::{MeshHit, MeshTree, TriangleRef};
+use super::mesh_tree::{MeshHit, MeshTree};
 use super::tree::{BinaryTree, Bounds, PrimitiveTree};
+use super::wide_tree::TriangleRef;
 use super::{Ray, SurfacePoint, sphere};
-use crate::scene::{Alpha, Instance, MaterialId, ScalarInput, Scene};
+use crate::scene::{Alpha, Instance, MaterialId, Motion, ScalarInput, Scene};
 use glam::{Affine3A, Mat3A, Vec2, Vec3, Vec3A};
 use std::sync::Arc;
 
@@ -23,6 +24,12 @@ pub struct Hit {
     pub b1: f32,
     /// Barycentric weight of the third vertex.
     pub b2: f32,
+}
+
+impl Hit {
+    fn on_sphere(object: u32, distance: f32) -> Self {
+        Self { distance, object, triangle: 0, b1: 0.0, b2: 0.0 }
+    }
 }
 
 /// A scene with its trees.
@@ -55,11 +62,11 @@ struct Placement {
 }
 
 impl Placement {
-    fn new(scene: &Scene, instance: &Instance) -> Self {
-        let m = instance.to_world.matrix3;
+    fn new(scene: &Scene, instance: &Instance, to_world: &Affine3A) -> Self {
+        let m = to_world.matrix3;
         let flip = if m.determinant() < 0.0 { -1.0 } else { 1.0 };
         let cofactors = Mat3A::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
-        let needs_tangent = scene.materials[instance.material.0 as usize].normal_map.is_some();
+        let needs_tangent = scene.materials[instance.material.0 as usize].needs_tangent();
         Self { normal_matrix: cofactors * flip, flip, needs_tangent }
     }
 }
@@ -68,8 +75,24 @@ impl Placement {
 #[derive(Debug)]
 enum Item {
     Fixed,
-    Placed { instance: u32, shared: usize, to_mesh: Affine3A },
-    Sphere { object: u32, center: Vec3A, radius: f32 },
+    Placed {
+        instance: u32,
+        shared: usize,
+        to_mesh: Affine3A,
+    },
+    /// An instance that moves while the shutter is open.
+    Moving {
+        instance: u32,
+        shared: usize,
+    },
+    Sphere {
+        object: u32,
+        center: Vec3A,
+        radius: f32,
+    },
+    MovingSphere {
+        object: u32,
+    },
 }
 
 impl World {
@@ -77,7 +100,8 @@ impl World {
     pub fn new(scene: Arc<Scene>) -> Self {
         let mut uses = vec![0u32; scene.meshes.len()];
         for instance in &scene.instances {
-            uses[instance.mesh.0 as usize] += 1;
+            // What moves cannot be put into world space.
+            uses[instance.mesh.0 as usize] += if instance.motion.is_some() { 2 } else { 1 };
         }
         let fixed = MeshTree::build(&fixed_triangles(&scene, &uses));
         let mut items = Vec::new();
@@ -100,14 +124,25 @@ impl World {
             if !shared[tree].bounds().is_finite() {
                 continue;
             }
-            items.push(Item::Placed { instance: number as u32, shared: tree, to_mesh: instance.to_world.inverse() });
-            item_bounds.push(placed_bounds(&scene, instance));
+            let number = number as u32;
+            items.push(match instance.motion {
+                Some(_) => Item::Moving { instance: number, shared: tree },
+                None => Item::Placed { instance: number, shared: tree, to_mesh: instance.to_world.inverse() },
+            });
+            item_bounds.push(match &instance.motion {
+                Some(motion) => swept_bounds(motion, shared[tree].bounds()),
+                None => placed_bounds(&scene, instance),
+            });
         }
         for (number, s) in scene.spheres.iter().enumerate() {
             let (center, radius) = (Vec3A::from(s.center), s.radius);
             let object = (scene.instances.len() + number) as u32;
-            items.push(Item::Sphere { object, center, radius });
-            item_bounds.push(Bounds { min: center - radius, max: center + radius });
+            let bounds = Bounds { min: center - radius, max: center + radius };
+            items.push(match s.motion {
+                Some(_) => Item::MovingSphere { object },
+                None => Item::Sphere { object, center, radius },
+            });
+            item_bounds.push(s.motion.as_ref().map_or(bounds, |motion| swept_bounds(motion, bounds)));
         }
         let bounds = item_bounds.iter().fold(Bounds::EMPTY, |all, b| all.union(*b));
         let only_fixed = matches!(items[..], [Item::Fixed]);
@@ -126,7 +161,7 @@ impl World {
         } else {
             (Vec3::ZERO, 1.0)
         };
-        let placements = scene.instances.iter().map(|i| Placement::new(&scene, i)).collect();
+        let placements = scene.instances.iter().map(|i| Placement::new(&scene, i, &i.to_world)).collect();
         Self { scene, fixed, shared, top, items, center, radius, has_alpha, placements }
     }
 
@@ -143,6 +178,11 @@ impl World {
     /// Triangles that were left out because they have no area.
     pub fn degenerate_triangles(&self) -> usize {
         self.fixed.degenerate + self.shared.iter().map(|t| t.degenerate).sum::<usize>()
+    }
+
+    /// Memory of the trees over triangles in bytes, their copies of the vertices included.
+    pub fn tree_bytes(&self) -> usize {
+        self.fixed.bytes() + self.shared.iter().map(MeshTree::bytes).sum::<usize>()
     }
 
     /// How far from a point new rays must start to clear the rounding of the trees' coordinates and of the point's own:
@@ -177,8 +217,21 @@ impl World {
                         })
                         .map(|h| world_hit(*instance, h, h.t / local.length))
                 }
-                Item::Sphere { object, center, radius } => sphere::intersect(ray, *center, *radius, t_max)
-                    .map(|distance| Hit { distance, object: *object, triangle: 0, b1: 0.0, b2: 0.0 }),
+                Item::Moving { instance, shared } => {
+                    let local = LocalRay::new(ray, &self.transform_at(*instance, ray.time).inverse());
+                    self.shared[*shared]
+                        .closest(local.origin, local.direction, t_max * local.length, |h| {
+                            self.is_there(*instance, h, ray)
+                        })
+                        .map(|h| world_hit(*instance, h, h.t / local.length))
+                }
+                Item::Sphere { object, center, radius } => {
+                    sphere::intersect(ray, *center, *radius, t_max).map(|distance| Hit::on_sphere(*object, distance))
+                }
+                Item::MovingSphere { object } => {
+                    let (center, radius) = self.sphere_at(*object, ray.time);
+                    sphere::intersect(ray, center, radius, t_max).map(|distance| Hit::on_sphere(*object, distance))
+                }
             };
             match hit {
                 Some(hit) if hit.distance < t_max => {
@@ -207,7 +260,16 @@ impl World {
                     self.shared[*shared]
                         .any(local.origin, local.direction, t_max * local.length, |h| self.is_there(*instance, h, ray))
                 }
+                Item::Moving { instance, shared } => {
+                    let local = LocalRay::new(ray, &self.transform_at(*instance, ray.time).inverse());
+                    self.shared[*shared]
+                        .any(local.origin, local.direction, t_max * local.length, |h| self.is_there(*instance, h, ray))
+                }
                 Item::Sphere { center, radius, .. } => sphere::intersect(ray, *center, *radius, t_max).is_some(),
+                Item::MovingSphere { object } => {
+                    let (center, radius) = self.sphere_at(*object, ray.time);
+                    sphere::intersect(ray, center, radius, t_max).is_some()
+                }
             };
             if blocked { 0.0 } else { f32::INFINITY }
         })
@@ -238,19 +300,34 @@ impl World {
         }
     }
 
-    /// World-space corners of a triangle of an instance.
-    pub fn triangle_corners(&self, object: u32, triangle: u32) -> [Vec3; 3] {
+    /// Object space to world space of an instance at a share of the open shutter.
+    pub fn transform_at(&self, object: u32, time: f32) -> Affine3A {
         let instance = &self.scene.instances[object as usize];
-        let mesh = &self.scene.meshes[instance.mesh.0 as usize];
-        mesh.triangles[triangle as usize].map(|i| instance.to_world.transform_point3(mesh.positions[i as usize]))
+        instance.motion.as_ref().map_or(instance.to_world, |motion| motion.at(time))
+    }
+
+    /// Centre and radius of a sphere at a share of the open shutter.
+    pub fn sphere_at(&self, object: u32, time: f32) -> (Vec3A, f32) {
+        let sphere = &self.scene.spheres[object as usize - self.scene.instances.len()];
+        let center = Vec3A::from(sphere.center);
+        let Some(motion) = &sphere.motion else { return (center, sphere.radius) };
+        let moved = motion.at(time);
+        (moved.transform_point3a(center), sphere.radius * moved.matrix3.x_axis.length())
+    }
+
+    /// World-space corners of a triangle of an instance at a share of the open shutter.
+    pub fn triangle_corners(&self, object: u32, triangle: u32, time: f32) -> [Vec3; 3] {
+        let to_world = self.transform_at(object, time);
+        let mesh = &self.scene.meshes[self.scene.instances[object as usize].mesh.0 as usize];
+        mesh.triangles[triangle as usize].map(|i| to_world.transform_point3(mesh.positions[i as usize]))
     }
 
     /// The surface at a hit.
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
         let Some(instance) = self.scene.instances.get(hit.object as usize) else {
-            let s = &self.scene.spheres[hit.object as usize - self.scene.instances.len()];
-            let normal = (Vec3::from(ray.origin + ray.direction * hit.distance) - s.center).normalize_or(Vec3::Y);
-            let position = s.center + s.radius * normal;
+            let (center, radius) = self.sphere_at(hit.object, ray.time);
+            let normal = Vec3::from((ray.origin + ray.direction * hit.distance) - center).normalize_or(Vec3::Y);
+            let position = Vec3::from(center) + radius * normal;
             return SurfacePoint {
                 position,
                 geometric_normal: normal,
@@ -267,10 +344,13 @@ impl World {
             };
         };
         let mesh = &self.scene.meshes[instance.mesh.0 as usize];
-        let corners = self.triangle_corners(hit.object, hit.triangle);
+        let corners = self.triangle_corners(hit.object, hit.triangle, ray.time);
         let (b1, b2) = (hit.b1, hit.b2);
         let position = corners[0] * (1.0 - b1 - b2) + corners[1] * b1 + corners[2] * b2;
-        let Placement { normal_matrix, flip, needs_tangent } = self.placements[hit.object as usize];
+        let Placement { normal_matrix, flip, needs_tangent } = match instance.motion {
+            Some(_) => Placement::new(&self.scene, instance, &self.transform_at(hit.object, ray.time)),
+            None => self.placements[hit.object as usize],
+        };
         let geometric_normal = flip * (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or(Vec3::Y);
         let indices = mesh.triangles[hit.triangle as usize].map(|i| i as usize);
         let shading_normal = if mesh.normals.is_empty() {
@@ -289,7 +369,7 @@ impl World {
         } else {
             let [t0, t1, t2] = indices.map(|i| mesh.tangents[i]);
             let blended = t0.truncate() * (1.0 - b1 - b2) + t1.truncate() * b1 + t2.truncate() * b2;
-            let world = Vec3::from(instance.to_world.matrix3 * Vec3A::from(blended));
+            let world = Vec3::from(self.transform_at(hit.object, ray.time).matrix3 * Vec3A::from(blended));
             (world.normalize_or(Vec3::X), if t0.w < 0.0 { -flip } else { flip })
         };
         SurfacePoint {
@@ -356,6 +436,18 @@ fn placed_bounds(scene: &Scene, instance: &Instance) -> Bounds {
     Bounds::of_points(mesh.positions.iter().map(|&p| instance.to_world.transform_point3a(p.into())))
 }
 
+/// Where things with these bounds in their own space can be while the shutter is open.
+fn swept_bounds(motion: &Motion, own: Bounds) -> Bounds {
+    let pick = |corner: u32, bit: u32| if corner >> bit & 1 == 0 { own.min } else { own.max };
+    let corners: [Vec3A; 8] =
+        std::array::from_fn(|i| Vec3A::new(pick(i as u32, 0).x, pick(i as u32, 1).y, pick(i as u32, 2).z));
+    let mut bounds = Bounds::EMPTY;
+    motion.sweep(&corners, |center, radius| {
+        bounds = bounds.union(Bounds { min: center - radius, max: center + radius });
+    });
+    bounds
+}
+
 fn interpolate_uv(mesh: &crate::scene::Mesh, triangle: u32, b1: f32, b2: f32) -> Vec2 {
     if mesh.uvs.is_empty() {
         return Vec2::ZERO;
@@ -413,18 +505,12 @@ mod tests {
             mesh: MeshId(0),
             material: MaterialId(0),
             to_world: *to_world,
+            motion: None,
         };
         Scene {
             name: String::new(),
             nits_per_unit: 1.0,
-            camera: Camera {
-                position: Vec3::ZERO,
-                forward: Vec3::NEG_Z,
-                up: Vec3::Y,
-                vertical_fov_deg: 40.0,
-                aperture_radius: 0.0,
-                focus_distance: 1.0,
-            },
+            camera: Camera::pinhole(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 40.0),
             film: FilmDefaults { width: 1, height: 1 },
             viewing: ViewingDefaults::default(),
             meshes: vec![mesh],
@@ -434,6 +520,7 @@ mod tests {
                 center: Vec3::splat(-3.0),
                 radius: 1.0,
                 material: MaterialId(0),
+                motion: None,
             }],
             materials: vec![material],
             textures: Vec::new(),
@@ -470,7 +557,7 @@ mod tests {
             let target = [Vec3A::ZERO, vec3a(2.2, 0.2, 0.2), Vec3A::Y, Vec3A::splat(-3.0)][i as usize % 4];
             let spread = if i % 4 == 2 { 1e-3 } else { 1.0 };
             let direction = (target + vec3a(unit(3), unit(4), unit(5)) * spread - origin).normalize();
-            let ray = Ray { origin, direction };
+            let ray = Ray::new(origin, direction);
             let (a, b) = (two.closest(&ray), one.closest(&ray));
             assert_eq!(a.is_some(), b.is_some(), "ray {i}");
             if let (Some(a), Some(b)) = (a, b) {
@@ -490,7 +577,7 @@ mod tests {
     #[test]
     fn mirrored_instances_keep_their_outside() {
         let world = World::new(Arc::new(scene(&[Affine3A::from_scale(Vec3::new(-1.0, 1.0, 1.0))])));
-        let ray = Ray { origin: vec3a(-2.0, 2.0, 2.0), direction: vec3a(1.0, -1.0, -1.0).normalize() };
+        let ray = Ray::new(vec3a(-2.0, 2.0, 2.0), vec3a(1.0, -1.0, -1.0).normalize());
         let hit = world.closest(&ray).expect("the slanted face");
         assert!(world.surface(&ray, &hit).geometric_normal.dot(Vec3::from(ray.direction)) < 0.0);
     }

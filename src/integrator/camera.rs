@@ -1,7 +1,7 @@
-//! Rays of a thin-lens camera.
+//! Rays of the camera: perspective or orthographic, through a thin lens, from where it is while the shutter is open.
 
 use crate::geometry::Ray;
-use crate::scene::Camera;
+use crate::scene::{Camera, Motion, Projection, ScreenWindow};
 use glam::{Vec2, Vec3, Vec3A};
 use std::f32::consts::FRAC_PI_4;
 
@@ -10,43 +10,79 @@ use std::f32::consts::FRAC_PI_4;
 pub struct CameraRays {
     position: Vec3,
     forward: Vec3,
-    /// World vector of one pixel to the right, on the plane at distance 1.
+    /// World vector of one pixel to the right: on the plane at distance 1, or in the scene where rays are parallel.
     pixel_right: Vec3,
-    /// World vector of one pixel down, on the plane at distance 1.
+    /// World vector of one pixel down, likewise.
     pixel_down: Vec3,
+    /// Place in the picture, in pixels, through which the axis goes.
     center: Vec2,
     lens_right: Vec3,
     lens_up: Vec3,
     focus_distance: f32,
+    parallel: bool,
+    motion: Option<Motion>,
+}
+
+/// What a camera ray depends on.
+#[derive(Clone, Copy, Debug)]
+pub struct CameraSample {
+    /// Position in the picture in pixels; (0, 0) is the top left corner.
+    pub position_px: Vec2,
+    /// Two numbers in [0, 1) for the point on the lens.
+    pub lens: [f32; 2],
+    /// Share of the open shutter, in [0, 1).
+    pub time: f32,
 }
 
 impl CameraRays {
-    /// For a picture of `width` × `height` square pixels.
+    /// For a picture of `width` × `height` pixels.
     pub fn new(camera: &Camera, width: u32, height: u32) -> Self {
         let forward = camera.forward.normalize_or(Vec3::NEG_Z);
         let right = forward.cross(camera.up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector());
         let up = right.cross(forward);
-        let pixel = 2.0 * (camera.vertical_fov_deg.to_radians() * 0.5).tan() / height as f32;
+        let right = if camera.mirrored { -right } else { right };
+        let (half_height, parallel) = match camera.projection {
+            Projection::Perspective { vertical_fov_deg } => ((vertical_fov_deg.to_radians() * 0.5).tan(), false),
+            Projection::Orthographic { height } => (0.5 * height, true),
+        };
+        let size_px = Vec2::new(width as f32, height as f32);
+        let window = camera.screen_window.unwrap_or(ScreenWindow::centered(size_px.x / size_px.y));
+        let pixel = (window.max - window.min) / size_px;
         Self {
             position: camera.position,
             forward,
-            pixel_right: right * pixel,
-            pixel_down: -up * pixel,
-            center: Vec2::new(width as f32, height as f32) * 0.5,
+            pixel_right: right * (pixel.x * half_height),
+            pixel_down: -up * (pixel.y * half_height),
+            center: Vec2::new(-window.min.x, window.max.y) / pixel,
             lens_right: right * camera.aperture_radius,
             lens_up: up * camera.aperture_radius,
             focus_distance: camera.focus_distance,
+            parallel,
+            motion: camera.motion.clone(),
         }
     }
 
-    /// The ray through a position of the picture in pixels (0, 0 is the top left corner) and a point of the lens.
-    pub fn ray(&self, position_px: Vec2, lens: [f32; 2]) -> Ray {
-        let offset = position_px - self.center;
-        let through = self.forward + offset.x * self.pixel_right + offset.y * self.pixel_down;
-        let disc = concentric_disc(lens);
+    /// The ray of a sample.
+    pub fn ray(&self, sample: &CameraSample) -> Ray {
+        let offset = sample.position_px - self.center;
+        let sideways = offset.x * self.pixel_right + offset.y * self.pixel_down;
+        let disc = concentric_disc(sample.lens);
         let on_lens = self.lens_right * disc.x + self.lens_up * disc.y;
-        let direction = (through * self.focus_distance - on_lens).normalize();
-        Ray { origin: Vec3A::from(self.position + on_lens), direction: direction.into() }
+        let (origin, way) = if self.parallel {
+            (self.position + sideways + on_lens, self.forward * self.focus_distance - on_lens)
+        } else {
+            (self.position + on_lens, (self.forward + sideways) * self.focus_distance - on_lens)
+        };
+        let (origin, direction) = (Vec3A::from(origin), Vec3A::from(way).normalize());
+        let Some(motion) = &self.motion else {
+            return Ray { origin, direction, time: sample.time };
+        };
+        let moved = motion.at(sample.time);
+        Ray {
+            origin: moved.transform_point3a(origin),
+            direction: moved.transform_vector3a(direction).normalize(),
+            time: sample.time,
+        }
     }
 }
 
@@ -64,38 +100,75 @@ fn concentric_disc([u, v]: [f32; 2]) -> Vec2 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::Affine3A;
 
     fn camera(aperture_radius: f32) -> Camera {
         Camera {
-            position: Vec3::new(1.0, 2.0, 3.0),
-            forward: Vec3::NEG_Z,
-            up: Vec3::Y,
-            vertical_fov_deg: 90.0,
             aperture_radius,
             focus_distance: 4.0,
+            ..Camera::pinhole(Vec3::new(1.0, 2.0, 3.0), Vec3::NEG_Z, Vec3::Y, 90.0)
         }
+    }
+
+    fn ray(rays: &CameraRays, x: f32, y: f32, lens: [f32; 2], time: f32) -> (Vec3, Vec3) {
+        let ray = rays.ray(&CameraSample { position_px: Vec2::new(x, y), lens, time });
+        (ray.origin.into(), ray.direction.into())
     }
 
     #[test]
     fn corners_and_centre() {
         let rays = CameraRays::new(&camera(0.0), 200, 100);
-        let at = |x, y| Vec3::from(rays.ray(Vec2::new(x, y), [0.3, 0.8]).direction);
+        let at = |x, y| ray(&rays, x, y, [0.3, 0.8], 0.0).1;
         assert!(at(100.0, 50.0).distance(Vec3::NEG_Z) < 1e-6);
         // 90° vertically: the top middle looks up at 45°.
         assert!(at(100.0, 0.0).distance(Vec3::new(0.0, 1.0, -1.0).normalize()) < 1e-6);
         assert!(at(200.0, 50.0).distance(Vec3::new(2.0, 0.0, -1.0).normalize()) < 1e-6);
+        let mirrored = CameraRays::new(&Camera { mirrored: true, ..camera(0.0) }, 200, 100);
+        let left = ray(&mirrored, 200.0, 50.0, [0.5; 2], 0.0).1;
+        assert!(left.distance(Vec3::new(-2.0, 0.0, -1.0).normalize()) < 1e-6);
+    }
+
+    #[test]
+    fn parallel_rays_start_across_the_height() {
+        let projection = Projection::Orthographic { height: 6.0 };
+        let rays = CameraRays::new(&Camera { projection, ..camera(0.0) }, 200, 100);
+        for (x, y, expected) in [(100.0, 50.0, Vec3::ZERO), (200.0, 0.0, Vec3::new(6.0, 3.0, 0.0))] {
+            let (origin, direction) = ray(&rays, x, y, [0.5; 2], 0.0);
+            assert!(origin.distance(Vec3::new(1.0, 2.0, 3.0) + expected) < 1e-5 && direction == Vec3::NEG_Z);
+        }
+    }
+
+    /// A window's edges are where they say, in half heights, y up.
+    #[test]
+    fn a_screen_window_is_what_the_film_covers() {
+        let screen_window = Some(ScreenWindow { min: Vec2::new(-0.5, 0.25), max: Vec2::new(1.5, 1.25) });
+        let rays = CameraRays::new(&Camera { screen_window, ..camera(0.0) }, 200, 100);
+        for (x, y, expected) in [(0.0, 0.0, Vec2::new(-0.5, 1.25)), (200.0, 100.0, Vec2::new(1.5, 0.25))] {
+            let direction = ray(&rays, x, y, [0.5; 2], 0.0).1;
+            assert!(direction.distance(expected.extend(-1.0).normalize()) < 1e-6, "{x} {y}: {direction}");
+        }
     }
 
     #[test]
     fn every_lens_point_sees_the_same_point_in_focus() {
-        let rays = CameraRays::new(&camera(0.5), 100, 100);
-        let in_focus = |lens| {
-            let ray = rays.ray(Vec2::new(20.0, 70.0), lens);
-            Vec3::from(ray.origin + ray.direction * ((ray.origin.z + 1.0) / -ray.direction.z))
-        };
-        let center = in_focus([0.5, 0.5]);
-        for lens in [[0.0, 0.0], [0.99, 0.1], [0.2, 0.7]] {
-            assert!(in_focus(lens).distance(center) < 1e-5, "{lens:?}");
+        let parallel = Camera { projection: Projection::Orthographic { height: 2.0 }, ..camera(0.5) };
+        for rays in [CameraRays::new(&camera(0.5), 100, 100), CameraRays::new(&parallel, 100, 100)] {
+            let in_focus = |lens| {
+                let (origin, direction) = ray(&rays, 20.0, 70.0, lens, 0.0);
+                origin + direction * ((origin.z + 1.0) / -direction.z)
+            };
+            let center = in_focus([0.5, 0.5]);
+            for lens in [[0.0, 0.0], [0.99, 0.1], [0.2, 0.7]] {
+                assert!(in_focus(lens).distance(center) < 1e-5, "{lens:?}");
+            }
         }
+    }
+
+    #[test]
+    fn a_moving_camera_is_where_its_motion_says() {
+        let motion = Motion::between(Affine3A::IDENTITY, Affine3A::from_translation(Vec3::X * 2.0));
+        let rays = CameraRays::new(&Camera { motion: Some(motion), ..camera(0.0) }, 100, 100);
+        let (origin, direction) = ray(&rays, 50.0, 50.0, [0.5; 2], 0.25);
+        assert!(origin.distance(Vec3::new(1.5, 2.0, 3.0)) < 1e-6 && direction.distance(Vec3::NEG_Z) < 1e-6);
     }
 }

@@ -1,24 +1,28 @@
 //! The path tracer: [`PathTracer::trace`] turns a [`SamplePlan`] into film.
 //!
-//! `path` holds the life of one sample, `camera` where it starts, `shading` what a surface point scatters like.
+//! `path` holds the life of one sample, `camera` where it starts, `shading` what a surface point scatters like,
+//! `tables` what materials compute beforehand,
+//! `media` what a ray travels in.
 
 mod camera;
+mod media;
 mod path;
 mod shading;
+mod tables;
 
-pub use camera::CameraRays;
+pub use camera::{CameraRays, CameraSample};
 pub use path::{FirstHit, PathSample};
 
-use crate::bsdf::DielectricTables;
 use crate::film::{BlockSum, Film};
 use crate::geometry::World;
 use crate::light::Lights;
-use crate::sampler::{BlockKey, Half, PixelFilter, Purpose};
-use crate::scene::{Scene, Surface};
+use crate::sampler::{BlockKey, Half, Pixel, PixelFilter, Purpose, Sequence};
+use crate::scene::Scene;
 use glam::Vec2;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
+use tables::SurfaceTables;
 
 /// What does not change during a render.
 #[derive(Clone, Copy, Debug)]
@@ -36,6 +40,30 @@ pub struct TraceSettings {
     /// Largest channel of a sample, scene units: brighter samples are scaled down to it, which darkens the picture where
     /// light is rare. `None` leaves the estimate unbiased.
     pub clamp: Option<f32>,
+    /// How the samples of neighbouring pixels relate.
+    pub sequence: Sequence,
+    /// The part of the picture that is traced; `None` is all of it. Its samples are those of the whole picture.
+    pub crop: Option<Crop>,
+}
+
+/// A rectangle of the picture in pixels, inside it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Crop {
+    /// Leftmost column.
+    pub x: u32,
+    /// Topmost row.
+    pub y: u32,
+    /// Columns, at least 1.
+    pub width: u32,
+    /// Rows, at least 1.
+    pub height: u32,
+}
+
+impl TraceSettings {
+    /// The part of the picture that is traced, and that the film holds.
+    pub fn film_area(&self) -> Crop {
+        self.crop.unwrap_or(Crop { x: 0, y: 0, width: self.width, height: self.height })
+    }
 }
 
 /// Scattering events that a path may have when nobody asks for fewer: with Russian roulette's survival of at most 0.98
@@ -45,7 +73,7 @@ pub const DEFAULT_MAX_DEPTH: u32 = 1_000;
 /// One block of samples to be taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BlockWork {
-    /// Row-major index of the pixel.
+    /// Row-major index of the pixel on the film.
     pub pixel: u32,
     /// For which half.
     pub half: Half,
@@ -60,7 +88,7 @@ pub struct BlockWork {
 impl BlockWork {
     /// The whole block: the pilot has [`PILOT_SAMPLES`], and each level doubles the total.
     pub fn whole(pixel: u32, half: Half, level: u8) -> Self {
-        Self { pixel, half, level, first: 0, samples: PILOT_SAMPLES << u32::from(level.saturating_sub(1)) }
+        Self { pixel, half, level, first: 0, samples: 1 << log2_block(level) }
     }
 
     /// What is left of the doubling that a half is in after `taken` samples.
@@ -74,6 +102,11 @@ impl BlockWork {
 
 /// Samples of the pilot in each half.
 pub const PILOT_SAMPLES: u32 = 8;
+
+/// log₂ of the samples of a level's whole block.
+fn log2_block(level: u8) -> u8 {
+    PILOT_SAMPLES.ilog2() as u8 + level.saturating_sub(1)
+}
 
 /// What to trace next. Plain data: deciding it and doing it are two things.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -94,28 +127,27 @@ pub struct PathTracer {
     world: World,
     lights: Lights,
     camera: CameraRays,
+    /// Whether anything moves while the shutter is open.
+    moves: bool,
     settings: TraceSettings,
-    /// By material; only rough dielectrics have one.
-    dielectric_tables: Vec<Option<DielectricTables>>,
+    /// Whether any volume absorbs, so that paths must know what they are in.
+    absorbs: bool,
+    /// By material.
+    surface_tables: Vec<SurfaceTables>,
 }
 
 impl PathTracer {
     /// Builds trees and light tables.
     pub fn new(scene: Arc<Scene>, settings: TraceSettings) -> Self {
         let camera = CameraRays::new(&scene.camera, settings.width, settings.height);
-        let dielectric_tables = scene
-            .materials
-            .iter()
-            .map(|m| match m.surface {
-                Surface::Dielectric { ior, roughness, .. } if roughness.factor > 0.0 => {
-                    Some(DielectricTables::new(ior))
-                }
-                _ => None,
-            })
-            .collect();
+        let absorbs = scene.materials.iter().any(|material| {
+            material.surface.interior_absorption().is_some_and(|absorption| absorption.max_element() > 0.0)
+        });
+        let surface_tables = tables::of_materials(&scene.materials);
+        let moves = scene.moves();
         let world = World::new(scene);
         let lights = Lights::new(&world);
-        Self { world, lights, camera, settings, dielectric_tables }
+        Self { world, lights, camera, moves, settings, absorbs, surface_tables }
     }
 
     /// The settings it was made with.
@@ -201,20 +233,31 @@ impl PathTracer {
 
     /// Sums one block of one pixel.
     fn trace_block(&self, block: BlockWork, seed: u64) -> BlockSum {
-        let key = BlockKey { seed, pixel: block.pixel, half: block.half, level: block.level };
-        let pixel = Vec2::new(
-            (block.pixel % self.settings.width) as f32 + 0.5,
-            (block.pixel / self.settings.width) as f32 + 0.5,
-        );
+        let area = self.settings.film_area();
+        let pixel = Pixel { x: area.x + block.pixel % area.width, y: area.y + block.pixel / area.width };
+        let key = BlockKey {
+            seed,
+            pixel,
+            half: block.half,
+            level: block.level,
+            log2_samples: log2_block(block.level),
+            sequence: self.settings.sequence,
+        };
+        let center = Vec2::new(pixel.x as f32, pixel.y as f32) + 0.5;
         let mut sum = BlockSum::default();
         for sample in key.samples(block.first + block.samples).skip(block.first as usize) {
             let [x, y, lens_u, lens_v] = sample.draw(Purpose::Camera);
-            let ray = self.camera.ray(pixel + self.settings.filter.sample(x, y), [lens_u, lens_v]);
+            let filtered = self.settings.filter.sample(x, y);
+            let ray = self.camera.ray(&CameraSample {
+                position_px: center + filtered.offset,
+                lens: [lens_u, lens_v],
+                time: if self.moves { sample.draw(Purpose::Time)[0] } else { 0.0 },
+            });
             let mut path = self.trace_path(ray, sample);
             if let Some(clamp) = self.settings.clamp {
                 path.radiance *= (clamp / path.radiance.max_element().max(clamp)).min(1.0);
             }
-            sum.add(&path);
+            sum.add(&PathSample { radiance: path.radiance * filtered.weight, ..path });
         }
         sum
     }

@@ -4,9 +4,10 @@
 //! and Russian roulette.
 
 use super::PathTracer;
-use super::shading::Shading;
+use super::media::Media;
+use super::shading::{Components, Shading};
 use crate::geometry::{Hit, Ray, SurfacePoint};
-use crate::light::LightSample;
+use crate::light::{LightReceiver, LightSample};
 use crate::sampler::{Purpose, Sample};
 use glam::{Vec3, Vec3A};
 
@@ -42,7 +43,7 @@ pub struct PathSample {
 struct PathState {
     ray: Ray,
     /// Where the ray left a surface.
-    from: Vec3,
+    from: LightReceiver,
     throughput: Vec3,
     radiance: Vec3,
     /// Solid-angle density with which the ray's direction was scattered; `None` if light sampling could not have found
@@ -52,6 +53,8 @@ struct PathState {
     /// Roulette looks at throughput times this, else it would kill most of what is inside glass (throughput 1/n²) and
     /// multiply the rest.
     radiance_gain_on_exit: f32,
+    /// The volumes that the ray is in; empty in scenes where none absorbs.
+    media: Media,
     rays: u32,
 }
 
@@ -61,11 +64,12 @@ impl PathTracer {
         let mut first_hit = FirstHit::NOTHING;
         let mut path = PathState {
             ray: camera_ray,
-            from: camera_ray.origin.into(),
+            from: LightReceiver { position: camera_ray.origin.into(), normal: Vec3::ZERO },
             throughput: Vec3::ONE,
             radiance: Vec3::ZERO,
             scatter_pdf: None,
             radiance_gain_on_exit: 1.0,
+            media: Media::default(),
             rays: 0,
         };
         for bounce in 0.. {
@@ -76,8 +80,15 @@ impl PathTracer {
             };
             let point = self.world.surface(&path.ray, &hit);
             let wo = -Vec3::from(path.ray.direction);
+            let components = Components::new();
+            let shading = self.shading(&point, wo, &components);
+            path.throughput *= match shading.medium {
+                Some(medium) if wo.dot(point.geometric_normal) < 0.0 => {
+                    path.media.transmittance_to_back_of(medium, hit.distance)
+                }
+                _ => path.media.transmittance(hit.distance),
+            };
             let emitted = self.add_emission(&mut path, &hit, &point);
-            let shading = self.shading(&point, wo);
             if bounce == 0 {
                 let albedo = shading.bsdf.albedo(shading.frame.to_local(wo)).clamp(Vec3::ZERO, Vec3::ONE);
                 first_hit = FirstHit {
@@ -104,13 +115,12 @@ impl PathTracer {
     /// Radiance of the environment along a ray that hit nothing.
     fn add_environment(&self, path: &mut PathState) {
         let direction = path.ray.direction.into();
-        let radiance = self.lights.environment_radiance(direction);
+        let radiance = self.lights.radiance_from_afar(direction);
         if radiance == Vec3::ZERO {
             return;
         }
-        let weight =
-            path.scatter_pdf.map_or(1.0, |pdf| power_heuristic(pdf, self.lights.pdf_of_environment(direction)));
-        path.radiance += path.throughput * radiance * weight;
+        let weight = path.scatter_pdf.map_or(1.0, |pdf| power_heuristic(pdf, self.lights.pdf_from_afar(direction)));
+        path.radiance += path.throughput * path.media.transmittance(f32::INFINITY) * radiance * weight;
     }
 
     /// Radiance emitted by the surface that was hit; whether there was any.
@@ -124,14 +134,15 @@ impl PathTracer {
         let radiance = material.emission.evaluate(&scene.textures, point.uv);
         let weight = path
             .scatter_pdf
-            .map_or(1.0, |pdf| power_heuristic(pdf, self.lights.pdf_of_hit(path.from, &path.ray, hit, point)));
+            .map_or(1.0, |pdf| power_heuristic(pdf, self.lights.pdf_of_hit(&self.world, &path.from, &path.ray, hit)));
         path.radiance += path.throughput * radiance * weight;
         radiance != Vec3::ZERO
     }
 
     /// Next-event estimation: light that arrives straight from a sampled light.
     fn add_direct_light(&self, path: &mut PathState, point: &SurfacePoint, shading: &Shading, wo: Vec3, u: [f32; 4]) {
-        let Some(light) = self.lights.sample(self.world.scene(), point, [u[0], u[1], u[2]]) else {
+        let receiver = shading.receiver(point, wo);
+        let Some(light) = self.lights.sample(&self.world, &receiver, path.ray.time, [u[0], u[1], u[2]]) else {
             return;
         };
         let wi = light.direction;
@@ -144,24 +155,30 @@ impl PathTracer {
         }
         let weight = if light.is_delta { 1.0 } else { power_heuristic(light.pdf, scattered.pdf) };
         path.rays += 1;
-        if !self.is_hidden(point, &light) {
-            path.radiance += path.throughput * scattered.value * light.radiance * (weight / light.pdf);
+        if !self.is_hidden(point, &light, path.ray.time) {
+            let left = shading.media_after(path.media, wo, wi).transmittance(distance_to(point, &light));
+            path.radiance += path.throughput * left * scattered.value * light.radiance * (weight / light.pdf);
         }
     }
 }
 
 impl PathTracer {
     /// Whether something stands between a point and a light. Both ends are lifted off their surfaces.
-    fn is_hidden(&self, point: &SurfacePoint, light: &LightSample) -> bool {
+    fn is_hidden(&self, point: &SurfacePoint, light: &LightSample, time: f32) -> bool {
         let origin = point.spawn(light.direction);
         let Some(place) = light.place else {
-            return self.world.occluded(&Ray { origin, direction: light.direction.into() }, f32::INFINITY);
+            return self.world.occluded(&Ray { origin, direction: light.direction.into(), time }, f32::INFINITY);
         };
         let end = place.position + place.normal * self.world.offset_at(place.position);
         let way = Vec3A::from(end) - origin;
         let distance = way.length();
-        distance > 0.0 && self.world.occluded(&Ray { origin, direction: way / distance }, distance)
+        distance > 0.0 && self.world.occluded(&Ray { origin, direction: way / distance, time }, distance)
     }
+}
+
+/// How far away a sampled light is, in scene units; infinite for environments and directional lights.
+fn distance_to(point: &SurfacePoint, light: &LightSample) -> f32 {
+    light.place.map_or(f32::INFINITY, |place| place.position.distance(point.position))
 }
 
 /// Chooses the next direction; false where the path ends.
@@ -174,14 +191,13 @@ fn scatter(path: &mut PathState, point: &SurfacePoint, shading: &Shading, wo: Ve
         return false;
     }
     path.throughput *= scattered.weight;
-    if scattered.lobe.is_transmission() {
-        let n_squared = shading.relative_ior * shading.relative_ior;
-        let entering = wo.dot(shading.frame.normal()) > 0.0;
-        path.radiance_gain_on_exit *= if entering { n_squared } else { 1.0 / n_squared };
+    if let Some(index) = scattered.crossed_index {
+        path.radiance_gain_on_exit *= index * index;
+        path.media = shading.media_after(path.media, wo, wi);
     }
     path.scatter_pdf = (!scattered.lobe.is_delta()).then_some(scattered.pdf);
-    path.from = point.position;
-    path.ray = Ray { origin: point.spawn(wi), direction: wi.into() };
+    path.from = shading.receiver(point, wo);
+    path.ray = Ray { origin: point.spawn(wi), direction: wi.into(), time: path.ray.time };
     path.throughput.max_element() > 0.0 && path.throughput.is_finite()
 }
 

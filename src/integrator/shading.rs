@@ -1,22 +1,159 @@
 //! From a material and a surface point to a BSDF in a frame.
 
 use super::PathTracer;
-use crate::bsdf::Bsdf;
+use super::media::{Media, Medium};
+use super::tables::{SurfaceTables, slope_width};
+use crate::bsdf::{Bsdf, CoatedDiffuse, Conductor, Dielectric, HeTorrance, Microfacets, Phong, Ward};
 use crate::geometry::SurfacePoint;
 use crate::geometry::surface::Frame;
-use crate::scene::{Material, Surface};
-use glam::Vec3;
+use crate::light::LightReceiver;
+use crate::scene::{ColorInput, Material, MaterialId, Roughness, ScalarInput, Surface, Texture};
+use glam::{Vec2, Vec3};
+use std::cell::{Cell, OnceCell};
 
 /// A BSDF and the frame in which it works.
 pub(super) struct Shading<'a> {
     pub(super) bsdf: Bsdf<'a>,
     pub(super) frame: Frame,
     pub(super) geometric_normal: Vec3,
-    /// Index of refraction behind the surface over that in front of it; 1 where light is not refracted.
-    pub(super) relative_ior: f32,
+    /// Whether light can come from the other side.
+    pub(super) transmits: bool,
+    /// The volume behind the surface, if any volume of the scene absorbs.
+    pub(super) medium: Option<Medium>,
+}
+
+/// Components of a mix, two for each of its nodes: a place to stay for what the mix refers to, on the stack of the path.
+pub(super) struct Components<'a> {
+    cells: [OnceCell<Bsdf<'a>>; 2 * (Surface::MOST_COMPONENTS - 1)],
+    used: Cell<usize>,
+}
+
+impl<'a> Components<'a> {
+    pub(super) fn new() -> Self {
+        Self { cells: [const { OnceCell::new() }; 2 * (Surface::MOST_COMPONENTS - 1)], used: Cell::new(0) }
+    }
+
+    /// Keeps a component. Of more than fit, which loaders refuse, the last stands for the rest.
+    fn keep(&'a self, bsdf: Bsdf<'a>) -> &'a Bsdf<'a> {
+        let place = self.used.get().min(self.cells.len() - 1);
+        self.used.set(place + 1);
+        self.cells[place].get_or_init(|| bsdf)
+    }
+}
+
+/// Where the inputs of a material are read.
+struct Reader<'a> {
+    textures: &'a [Texture],
+    uv: Vec2,
+}
+
+impl Reader<'_> {
+    fn color(&self, input: &ColorInput) -> Vec3 {
+        input.evaluate(self.textures, self.uv)
+    }
+
+    fn scalar(&self, input: &ScalarInput) -> f32 {
+        input.evaluate(self.textures, self.uv)
+    }
+
+    /// Two albedos, scaled down where their sum exceeds 1.
+    fn shares(&self, first: &ColorInput, second: &ColorInput) -> [Vec3; 2] {
+        let (first, second) = (self.color(first), self.color(second));
+        let scale = 1.0 / (first + second).max_element().max(1.0);
+        [first * scale, second * scale]
+    }
+
+    fn facets(&self, roughness: &Roughness) -> Microfacets {
+        let u = slope_width(roughness.scale, self.scalar(&roughness.u));
+        let v = roughness.v.as_ref().map_or(u, |v| slope_width(roughness.scale, self.scalar(v)));
+        Microfacets::new(u, v, roughness.distribution)
+    }
+
+    fn bsdf<'a>(&self, surface: &Surface, tables: &'a SurfaceTables, components: &'a Components<'a>) -> Bsdf<'a> {
+        match (surface, tables) {
+            (Surface::Diffuse { reflectance }, _) => Bsdf::lambert(self.color(reflectance)),
+            (Surface::OrenNayar { reflectance, roughness }, _) => {
+                Bsdf::oren_nayar(self.color(reflectance), self.scalar(roughness))
+            }
+            (Surface::DiffuseTransmission { reflectance, transmittance }, _) => {
+                let [reflected, transmitted] = self.shares(reflectance, transmittance);
+                Bsdf::diffuse_transmission(reflected, transmitted)
+            }
+            (Surface::Mirror { reflectance }, _) => Bsdf::mirror(self.color(reflectance)),
+            (Surface::Conductor { eta, k, tint, roughness }, tables) => {
+                let table = match tables {
+                    SurfaceTables::Conductor(table) => Some(&**table),
+                    _ => None,
+                };
+                Bsdf::Conductor(Conductor::new(*eta, *k, self.color(tint), self.facets(roughness), table))
+            }
+            (Surface::Dielectric { ior, roughness, transmittance, .. }, tables) => {
+                let tables = match tables {
+                    SurfaceTables::Dielectric(tables) => Some(&**tables),
+                    _ => None,
+                };
+                Bsdf::Dielectric(Dielectric::new(*ior, self.facets(roughness), self.color(transmittance), tables))
+            }
+            (Surface::ThinDielectric { ior, transmittance }, _) => {
+                Bsdf::thin_dielectric(*ior, self.color(transmittance))
+            }
+            (Surface::CoatedDiffuse { reflectance, roughness, saturates, .. }, SurfaceTables::Coat(tables)) => {
+                let facets = self.facets(roughness);
+                Bsdf::CoatedDiffuse(CoatedDiffuse::new(self.color(reflectance), facets, *saturates, tables))
+            }
+            (Surface::CoatedConductor { eta, k, roughness, coat_roughness, .. }, SurfaceTables::Layers(tables)) => {
+                Bsdf::coated_conductor(*eta, *k, self.facets(roughness), self.facets(coat_roughness), tables)
+            }
+            (Surface::Phong { diffuse, specular, exponent }, _) => {
+                let [diffuse, specular] = self.shares(diffuse, specular);
+                Bsdf::Phong(Phong::new(diffuse, specular, self.scalar(exponent)))
+            }
+            (Surface::Ward { diffuse, specular, roughness }, _) => {
+                let [diffuse, specular] = self.shares(diffuse, specular);
+                Bsdf::Ward(Ward::new(diffuse, specular, self.facets(roughness).alphas()))
+            }
+            (Surface::HeTorrance { eta, k, height_nm, correlation_nm, diffuse }, _) => {
+                Bsdf::HeTorrance(HeTorrance::new(*eta, *k, *height_nm, *correlation_nm, self.color(diffuse)))
+            }
+            (Surface::MetalRoughness(model), _) => Bsdf::metal_roughness(
+                self.color(&model.base_color),
+                self.scalar(&model.metallic),
+                self.scalar(&model.roughness),
+                model.ior,
+                self.scalar(&model.transmission),
+            ),
+            (Surface::Mix { first, second, amount }, SurfaceTables::Mix(tables)) => {
+                let first = components.keep(self.bsdf(first, &tables[0], components));
+                let second = components.keep(self.bsdf(second, &tables[1], components));
+                Bsdf::mix(first, second, self.scalar(amount))
+            }
+            // Tables are made for every surface that needs them: nothing else remains.
+            (Surface::CoatedDiffuse { .. } | Surface::CoatedConductor { .. } | Surface::Mix { .. }, _) => {
+                Bsdf::lambert(Vec3::ZERO)
+            }
+        }
+    }
 }
 
 impl Shading<'_> {
+    /// What the choice of a light may know of this point: surfaces that transmit receive from both sides.
+    pub(super) fn receiver(&self, point: &SurfacePoint, wo: Vec3) -> LightReceiver {
+        let side = if wo.dot(self.geometric_normal) >= 0.0 { 1.0 } else { -1.0 };
+        let normal = if self.transmits { Vec3::ZERO } else { side * self.geometric_normal };
+        LightReceiver { position: point.position, normal }
+    }
+
+    /// The volumes around a ray that came along `wo` through `media` and goes on along `wi`.
+    pub(super) fn media_after(&self, mut media: Media, wo: Vec3, wi: Vec3) -> Media {
+        let (from_front, to_front) = (wo.dot(self.geometric_normal) > 0.0, wi.dot(self.geometric_normal) > 0.0);
+        if let Some(medium) = self.medium
+            && from_front != to_front
+        {
+            media.cross(medium, from_front);
+        }
+        media
+    }
+
     /// Whether two world directions are on the same side of the surface by both normals, or on opposite sides by both.
     /// Where shading and geometric normal disagree, light would leak through: such pairs scatter nothing.
     pub(super) fn sides_agree(&self, a: Vec3, b: Vec3) -> bool {
@@ -28,38 +165,24 @@ impl Shading<'_> {
 
 impl PathTracer {
     /// The BSDF at a point seen from the direction `wo` (world, unit, away from the surface).
-    pub(super) fn shading(&self, point: &SurfacePoint, wo: Vec3) -> Shading<'_> {
+    pub(super) fn shading<'a>(&'a self, point: &SurfacePoint, wo: Vec3, components: &'a Components<'a>) -> Shading<'a> {
         let scene = self.world.scene();
-        let material_id = self.world.material_of(point.object);
-        let material = &scene.materials[material_id.0 as usize];
+        let material_id = self.world.material_of(point.object).0 as usize;
+        let material = &scene.materials[material_id];
         let normal = seen_side(self.shading_normal(material, point), point.geometric_normal, wo);
-        let frame = Frame::new(normal, point.tangent);
-        let color = |input: &crate::scene::ColorInput| input.evaluate(&scene.textures, point.uv);
-        let scalar = |input: &crate::scene::ScalarInput| input.evaluate(&scene.textures, point.uv);
-        let bsdf = match &material.surface {
-            Surface::Diffuse { reflectance } => Bsdf::lambert(color(reflectance)),
-            Surface::Mirror { reflectance } => Bsdf::mirror(color(reflectance)),
-            Surface::Conductor { eta, k, roughness } => Bsdf::conductor(*eta, *k, scalar(roughness)),
-            Surface::Dielectric { ior, roughness, transmittance } => Bsdf::dielectric(
-                *ior,
-                scalar(roughness),
-                color(transmittance),
-                self.dielectric_tables[material_id.0 as usize].as_ref(),
-            ),
-            Surface::ThinDielectric { ior, transmittance } => Bsdf::thin_dielectric(*ior, color(transmittance)),
-            Surface::MetalRoughness { base_color, metallic, roughness, ior, transmission } => Bsdf::metal_roughness(
-                color(base_color),
-                scalar(metallic),
-                scalar(roughness),
-                *ior,
-                scalar(transmission),
-            ),
+        let reader = Reader { textures: &scene.textures, uv: point.uv };
+        let transmits = match &material.surface {
+            Surface::Diffuse { .. } | Surface::Mirror { .. } | Surface::Conductor { .. } => false,
+            Surface::MetalRoughness(model) => model.transmission.factor > 0.0,
+            _ => true,
         };
-        let relative_ior = match material.surface {
-            Surface::Dielectric { ior, .. } => ior,
-            _ => 1.0,
-        };
-        Shading { bsdf, frame, geometric_normal: point.geometric_normal, relative_ior }
+        Shading {
+            bsdf: reader.bsdf(&material.surface, &self.surface_tables[material_id], components),
+            frame: Frame::new(normal, point.tangent),
+            geometric_normal: point.geometric_normal,
+            transmits,
+            medium: if self.absorbs { Medium::behind(MaterialId(material_id as u32), &material.surface) } else { None },
+        }
     }
 
     fn shading_normal(&self, material: &Material, point: &SurfacePoint) -> Vec3 {

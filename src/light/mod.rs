@@ -1,20 +1,33 @@
 //! Where light comes from, one file a kind, and how one is chosen.
 //!
-//! A light is chosen by its power (the environment, if there is one, gets half of the choices), then a direction towards
-//! it by its own rule. All pdfs are per steradian at the shaded point and include the choice, so they can be weighed
-//! against those of BSDFs. Not for scenes of hundreds of emitters: choosing by power alone ignores distance.
+//! First a group is chosen with fixed probabilities (the environment, lights from afar, emitters that have a place), then
+//! one of the group: by irradiance from afar, by a tree over what each can give to this point among the placed. Then a
+//! direction by the light's own rule. All pdfs are per steradian at the receiver and include the choices, so they can be
+//! weighed against those of BSDFs.
 
-mod area;
+mod collect;
+mod distant;
 mod distribution;
 mod environment;
+mod flat;
 mod punctual;
+mod solid_angle;
+mod sphere;
+#[cfg(test)]
+mod tests;
+mod tree;
 
-use crate::geometry::{Hit, Ray, SurfacePoint, World};
-use crate::scene::{Light, Scene};
-use area::{SphereEmitter, TriangleEmitter};
-use distribution::Distribution1d;
+pub use tree::LightReceiver;
+
+use crate::geometry::{Hit, Ray, World};
+use crate::scene::Light;
+use collect::Collected;
+use distant::DistantLights;
 use environment::EnvironmentSampler;
+use flat::FlatEmitter;
 use glam::Vec3;
+use sphere::SphereEmitter;
+use tree::LightTree;
 
 /// A direction towards a light, seen from a point.
 #[derive(Clone, Copy, Debug)]
@@ -42,111 +55,123 @@ pub struct LightPlace {
 
 #[derive(Clone, Debug)]
 enum Emitter {
-    Triangle(TriangleEmitter),
+    Flat(FlatEmitter),
     Sphere(SphereEmitter),
-    Punctual(Light),
+    Point(Light),
+    /// A triangle of an instance that moves while the shutter is open.
+    MovingTriangle {
+        object: u32,
+        triangle: u32,
+    },
+    /// A sphere that moves.
+    MovingSphere {
+        object: u32,
+        radiance: Vec3,
+    },
 }
 
 /// All lights of a world, ready to be sampled.
 #[derive(Debug)]
 pub struct Lights {
     emitters: Vec<Emitter>,
-    /// Over `emitters`, by power.
-    choice: Option<Distribution1d>,
+    /// Per object: the emitter of each triangle, for objects that emit.
+    emitter_of: Vec<Option<Vec<u32>>>,
+    tree: Option<LightTree>,
+    distant: Option<DistantLights>,
     environment: Option<EnvironmentSampler>,
-    /// Probability of choosing the environment.
-    environment_share: f32,
-    /// Per object: index of the emitter of its first triangle.
-    first_emitter: Vec<Option<u32>>,
+    shares: Shares,
+}
+
+/// Probabilities of the groups.
+#[derive(Clone, Copy, Debug)]
+struct Shares {
+    environment: f32,
+    distant: f32,
+    placed: f32,
 }
 
 impl Lights {
     /// Collects every emitter of the world.
     pub fn new(world: &World) -> Self {
         let scene = world.scene();
-        let (mut emitters, mut powers) = (Vec::new(), Vec::new());
-        let mut first_emitter = vec![None; scene.instances.len() + scene.spheres.len()];
-        for (object, instance) in scene.instances.iter().enumerate() {
-            let material = &scene.materials[instance.material.0 as usize];
-            let Some(radiance) = material.mean_emission(&scene.textures) else { continue };
-            first_emitter[object] = Some(emitters.len() as u32);
-            for triangle in 0..scene.meshes[instance.mesh.0 as usize].triangles.len() {
-                let corners = world.triangle_corners(object as u32, triangle as u32);
-                let emitter = TriangleEmitter::new(object as u32, triangle as u32, corners, instance, material);
-                powers.push(f64::from(emitter.area() * radiance.max_element()) * f64::from(emitter.sides()));
-                emitters.push(Emitter::Triangle(emitter));
+        let Collected { emitters, bounds, emitter_of } = collect::placed(world);
+        let tree = LightTree::new(&bounds);
+        let distant = DistantLights::new(&scene.lights);
+        let environment = scene.environment.as_ref().and_then(EnvironmentSampler::new);
+        let sampled = environment.as_ref().is_some_and(EnvironmentSampler::is_sampled);
+        let weights = [sampled, distant.is_some(), tree.is_some()].map(|there| if there { 1.0f32 } else { 0.0 });
+        let total = weights.iter().sum::<f32>().max(1.0);
+        let [environment_share, distant_share, placed] = weights.map(|weight| weight / total);
+        let shares = Shares { environment: environment_share, distant: distant_share, placed };
+        Self { emitters, emitter_of, tree, distant, environment, shares }
+    }
+
+    /// A direction from a receiver towards a light, for three numbers in [0, 1): two for the place, one for the choice.
+    pub fn sample(&self, world: &World, receiver: &LightReceiver, time: f32, u: [f32; 3]) -> Option<LightSample> {
+        let [u0, u1, select] = u;
+        let Shares { environment, distant, placed } = self.shares;
+        let (sample, chosen) = if select < environment {
+            (self.environment.as_ref()?.sample([u0, u1])?, environment)
+        } else if select < environment + distant {
+            let within = (select - environment) / distant;
+            (self.distant.as_ref()?.sample([u0, u1, within]), distant)
+        } else {
+            let within = ((select - environment - distant) / placed).clamp(0.0, 1.0 - f32::EPSILON / 2.0);
+            let (index, chosen) = self.tree.as_ref()?.sample(receiver, within)?;
+            (self.sample_emitter(world, index, receiver.position, time, [u0, u1])?, placed * chosen)
+        };
+        Some(LightSample { pdf: sample.pdf * chosen, ..sample }).filter(|s| s.pdf > 0.0 && s.pdf.is_finite())
+    }
+
+    fn sample_emitter(&self, world: &World, index: usize, from: Vec3, time: f32, u: [f32; 2]) -> Option<LightSample> {
+        match &self.emitters[index] {
+            Emitter::Flat(emitter) => emitter.sample(world.scene(), from, u),
+            Emitter::Sphere(emitter) => emitter.sample(from, u),
+            Emitter::Point(light) => punctual::sample(light, from),
+            Emitter::MovingTriangle { object, triangle } => {
+                collect::triangle_at(world, *object, *triangle, time).sample(world.scene(), from, u)
+            }
+            Emitter::MovingSphere { object, radiance } => {
+                collect::sphere_at(world, *object, *radiance, time).sample(from, u)
             }
         }
-        for (number, sphere) in scene.spheres.iter().enumerate() {
-            let material = &scene.materials[sphere.material.0 as usize];
-            let Some(radiance) = material.mean_emission(&scene.textures) else { continue };
-            let object = scene.instances.len() + number;
-            first_emitter[object] = Some(emitters.len() as u32);
-            let emitter = SphereEmitter::new(sphere, radiance);
-            powers.push(f64::from(emitter.area() * radiance.max_element()));
-            emitters.push(Emitter::Sphere(emitter));
-        }
-        let (_, world_radius) = world.bounding_sphere();
-        for light in &scene.lights {
-            powers.push(f64::from(punctual::power(light, world_radius) / std::f32::consts::PI));
-            emitters.push(Emitter::Punctual(light.clone()));
-        }
-        let choice = Distribution1d::new(&powers);
-        let environment = scene.environment.as_ref().and_then(EnvironmentSampler::new);
-        let environment_share = match (&environment, &choice) {
-            (None, _) => 0.0,
-            (Some(_), None) => 1.0,
-            (Some(_), Some(_)) => 0.5,
-        };
-        Self { emitters, choice, environment, environment_share, first_emitter }
     }
 
-    /// Whether there is nothing to sample.
-    pub fn is_empty(&self) -> bool {
-        self.choice.is_none() && self.environment.is_none()
-    }
-
-    /// A direction from `point` towards a light, for three numbers in [0, 1): two for the place, one for the choice.
-    pub fn sample(&self, scene: &Scene, point: &SurfacePoint, u: [f32; 3]) -> Option<LightSample> {
-        let [u0, u1, select] = u;
-        if select < self.environment_share {
-            let sample = self.environment.as_ref()?.sample([u0, u1])?;
-            return Some(LightSample { pdf: sample.pdf * self.environment_share, ..sample });
-        }
-        let select = (select - self.environment_share) / (1.0 - self.environment_share);
-        let (index, chosen) = self.choice.as_ref()?.sample_discrete(select);
-        let chosen = chosen * (1.0 - self.environment_share);
-        let sample = match &self.emitters[index] {
-            Emitter::Triangle(emitter) => emitter.sample(scene, point.position, [u0, u1])?,
-            Emitter::Sphere(emitter) => emitter.sample(point.position, [u0, u1])?,
-            Emitter::Punctual(light) => punctual::sample(light, point.position)?,
-        };
-        Some(LightSample { pdf: sample.pdf * chosen, ..sample })
-    }
-
-    /// Probability per steradian that [`Lights::sample`] from `from` would have chosen the direction of a ray that hit
-    /// the emitting surface point `there`.
-    pub fn pdf_of_hit(&self, from: Vec3, ray: &Ray, hit: &Hit, there: &SurfacePoint) -> f32 {
-        let (Some(first), Some(choice)) = (self.first_emitter[hit.object as usize], &self.choice) else {
+    /// Probability per steradian that [`Lights::sample`] for this receiver would have chosen the direction of a ray from
+    /// it that hit an emitting surface.
+    pub fn pdf_of_hit(&self, world: &World, receiver: &LightReceiver, ray: &Ray, hit: &Hit) -> f32 {
+        let (Some(of_triangle), Some(tree)) = (&self.emitter_of[hit.object as usize], &self.tree) else {
             return 0.0;
         };
-        let index = (first + hit.triangle) as usize;
-        let chosen = choice.probability(index) * (1.0 - self.environment_share);
+        let index = of_triangle[hit.triangle as usize] as usize;
+        let chosen = tree.probability(receiver, index) * self.shares.placed;
+        if chosen == 0.0 {
+            return 0.0;
+        }
+        let (from, direction) = (receiver.position, Vec3::from(ray.direction));
         chosen
             * match &self.emitters[index] {
-                Emitter::Triangle(emitter) => emitter.pdf(ray.direction.into(), hit.distance, there.geometric_normal),
+                Emitter::Flat(emitter) => emitter.pdf(from, direction, hit.distance),
                 Emitter::Sphere(emitter) => emitter.pdf(from),
-                Emitter::Punctual(_) => 0.0,
+                Emitter::MovingTriangle { object, triangle } => {
+                    collect::triangle_at(world, *object, *triangle, ray.time).pdf(from, direction, hit.distance)
+                }
+                Emitter::MovingSphere { object, radiance } => {
+                    collect::sphere_at(world, *object, *radiance, ray.time).pdf(from)
+                }
+                Emitter::Point(_) => 0.0,
             }
     }
 
-    /// Radiance of the environment in a direction.
-    pub fn environment_radiance(&self, direction: Vec3) -> Vec3 {
+    /// Radiance that a ray which meets no surface sees: the environment and the discs of lights from afar.
+    pub fn radiance_from_afar(&self, direction: Vec3) -> Vec3 {
         self.environment.as_ref().map_or(Vec3::ZERO, |e| e.radiance(direction))
+            + self.distant.as_ref().map_or(Vec3::ZERO, |d| d.radiance(direction))
     }
 
-    /// Probability per steradian that [`Lights::sample`] chooses this direction towards the environment.
-    pub fn pdf_of_environment(&self, direction: Vec3) -> f32 {
-        self.environment.as_ref().map_or(0.0, |e| e.pdf(direction) * self.environment_share)
+    /// Probability per steradian that [`Lights::sample`] chooses this direction by a light that is infinitely far.
+    pub fn pdf_from_afar(&self, direction: Vec3) -> f32 {
+        let environment = self.environment.as_ref().map_or(0.0, |e| e.pdf(direction) * self.shares.environment);
+        environment + self.distant.as_ref().map_or(0.0, |d| d.pdf(direction) * self.shares.distant)
     }
 }

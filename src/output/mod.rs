@@ -14,7 +14,7 @@ pub mod rendered;
 
 pub use beside::{remove_leftovers, write_beside};
 pub use exr_file::write_exr;
-pub use png_file::{encode_srgb8, write_png};
+pub use png_file::{encode_srgb8, write_png, write_png_for, write_pq_png};
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};

@@ -1,8 +1,71 @@
-//! 8-bit sRGB pictures, tagged as such.
+//! Pictures for displays: 8-bit sRGB, or 16-bit PQ for HDR displays, tagged as such.
 
 use super::{OutputError, beside::write_beside, check_size};
+use fechner_perception::display::{Display, Eotf};
+use fechner_perception::primaries::{Matrix, Primaries, apply};
+use rayon::prelude::*;
 use std::io::{BufWriter, Write};
 use std::path::Path;
+
+/// Writes linear display RGB, where 0 is the display's black and 1 its white, as the display wants it: [`write_pq_png`] for
+/// one of SMPTE ST 2084, [`write_png`] for all others, which colour management brings to them.
+pub fn write_png_for(
+    path: &Path,
+    width: u32,
+    height: u32,
+    rgb_linear_display: &[[f32; 3]],
+    display: &Display,
+) -> Result<(), OutputError> {
+    match display.eotf {
+        Eotf::Pq => write_pq_png(path, width, height, rgb_linear_display, display),
+        Eotf::Srgb | Eotf::Bt1886 | Eotf::Linear => write_png(path, width, height, rgb_linear_display),
+    }
+}
+
+/// Code points of ITU-T H.273: primaries of BT.2020, transfer of SMPTE ST 2084 (PQ), RGB, full range.
+const CICP_BT2020_PQ: [u8; 4] = [9, 16, 0, 1];
+
+/// Writes what the display emits as a 16-bit PNG in PQ code values and Rec.2020 primaries, with the cICP chunk (PNG, third
+/// edition) that says so.
+///
+/// Values are absolute: `rgb_linear_display` of 0 is the display's black, 1 its white, both in cd/m². NaN becomes black.
+pub fn write_pq_png(
+    path: &Path,
+    width: u32,
+    height: u32,
+    rgb_linear_display: &[[f32; 3]],
+    display: &Display,
+) -> Result<(), OutputError> {
+    check_size(path, width, height, &[("the picture", rgb_linear_display.len())])?;
+    let bytes = encode_pq16(rgb_linear_display, display);
+    write_beside(path, |file| {
+        let mut buffered = BufWriter::new(file);
+        let mut encoder = png::Encoder::new(&mut buffered, width, height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Sixteen);
+        let mut writer = encoder.write_header()?;
+        writer.write_chunk(png::chunk::ChunkType(*b"cICP"), &CICP_BT2020_PQ)?;
+        writer.write_image_data(&bytes)?;
+        writer.finish()?;
+        buffered.flush()
+    })
+}
+
+/// The bytes of [`write_pq_png`]: big-endian, RGB after RGB.
+fn encode_pq16(rgb_linear_display: &[[f32; 3]], display: &Display) -> Vec<u8> {
+    const PEAK_CD_M2: f64 = 10_000.0;
+    const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let wide = Primaries::REC709.to(&Primaries::REC2020).unwrap_or(IDENTITY);
+    let mut bytes = vec![0; rgb_linear_display.len() * 6];
+    bytes.par_chunks_mut(6).zip(rgb_linear_display).with_min_len(4096).for_each(|(bytes, rgb)| {
+        let shown = apply(&wide, rgb.map(|c| if c.is_nan() { 0.0 } else { f64::from(c) }));
+        for (bytes, relative) in bytes.chunks_exact_mut(2).zip(shown) {
+            let code = Eotf::Pq.encode(display.luminance_cd_m2(relative) / PEAK_CD_M2, PEAK_CD_M2);
+            bytes.copy_from_slice(&((code * 65_535.0).round() as u16).to_be_bytes());
+        }
+    });
+    bytes
+}
 
 /// Writes linear display RGB, where 1 is the display's white, as an 8-bit PNG tagged sRGB.
 ///
@@ -98,6 +161,29 @@ mod tests {
         assert_eq!((r, b), (0, 255));
         assert!((187..=188).contains(&g), "linear 0.5 is 187.5 in sRGB, read {g}");
         assert!((127..=128).contains(&image.get_pixel(1, 0).0[2]));
+    }
+
+    #[test]
+    fn an_hdr_picture_says_what_its_codes_mean() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        let display = Display::preset("hdr-1000").unwrap();
+        write_png_for(&path, 3, 1, &[[1.0; 3], [0.0, f32::NAN, 0.0], [0.1, 0.0, 0.0]], &display).unwrap();
+        let names = chunk_names(&std::fs::read(&path).unwrap());
+        let place = |name: &str| names.iter().position(|n| n == name);
+        assert!(place("cICP") > place("IHDR") && place("cICP") < place("IDAT"), "{names:?}");
+        let file = std::io::BufReader::new(std::fs::File::open(&path).unwrap());
+        let mut reader = png::Decoder::new(file).read_info().unwrap();
+        let tag = reader.info().coding_independent_code_points.unwrap();
+        assert_eq!((tag.color_primaries, tag.transfer_function, tag.is_video_full_range_image), (9, 16, true));
+        let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut bytes).unwrap();
+        let code = |index: usize| f64::from(u16::from_be_bytes([bytes[2 * index], bytes[2 * index + 1]])) / 65_535.0;
+        // ST 2084: 1000 cd/m² is code 0.7518; the black of the display is 0.005 cd/m².
+        assert!((code(0) - 0.751_827).abs() < 1e-4, "{}", code(0));
+        assert!((Eotf::Pq.decode(code(3), 1.0) - 0.005).abs() < 1e-4, "{}", code(3));
+        // Red of Rec.709 is orange in Rec.2020's primaries.
+        assert!(code(6) > code(7) && code(7) > code(8) && code(8) > code(5));
     }
 
     #[test]

@@ -1,16 +1,20 @@
 //! The files a render leaves: what the display shows, or every layer of it.
 
-use super::{Attribute, NITS_PER_UNIT, OutputError, Picture, write_exr, write_png};
+use super::{Attribute, NITS_PER_UNIT, OutputError, Picture, write_exr, write_png_for};
 use crate::adaptive::Rendered;
+use crate::adaptive::statistics::picture_variance;
 use crate::film::{Film, PixelGuide};
 use crate::sampler::Half;
+use fechner_perception::display::Display;
+use fechner_perception::tone::map_picture;
 use std::path::Path;
 
-/// Writes the picture through its tone operator as sRGB.
-pub fn write_display_png(path: &Path, rendered: &Rendered) -> Result<(), OutputError> {
+/// Writes the picture through its tone operator, coded for the display.
+pub fn write_display_png(path: &Path, rendered: &Rendered, display: &Display) -> Result<(), OutputError> {
     let judgement = &rendered.judgement;
-    let shown: Vec<[f32; 3]> = judgement.estimate.rgb_cd_m2.iter().map(|&rgb| judgement.tone.map_rgb(rgb)).collect();
-    write_png(path, rendered.film.width(), rendered.film.height(), &shown)
+    let (width, height) = (rendered.film.width(), rendered.film.height());
+    let shown = map_picture(judgement.tone.as_ref(), width as usize, &judgement.estimate.rgb_cd_m2);
+    write_png_for(path, width, height, &shown, display)
 }
 
 /// Writes the picture in scene units with its layers: albedo, normal, depth, object id, sample count, variance of the
@@ -39,7 +43,8 @@ pub fn write_layers_exr(
     picture.push_f32("depth.Z", guide(&|g| g.depth));
     picture.push_u32("id.Y", film.guides().iter().map(|g| g.object_id).collect::<Vec<u32>>());
     picture.push_u32("samples.Y", sample_counts(film));
-    picture.push_f32("variance.Y", judgement.variance_of_mean.values());
+    let variance = picture_variance(film, nits_per_unit);
+    picture.push_f32("variance.Y", variance.values());
     let threshold = judgement.allowed_standard_error_cd_m2();
     picture.push_f32("threshold.Y", threshold.values());
     picture.push_f32("visibility.Y", judgement.predicted.values());

@@ -1,9 +1,62 @@
-//! What a renderer asks of materials besides their values at a point.
+//! Materials: how a surface scatters, emits and covers, and what a renderer asks of them besides values at a point.
 
-use super::{Material, Texels, Texture};
+use super::{ColorInput, ScalarInput, Surface, Texels, Texture, TextureLookup};
 use glam::{Vec2, Vec3};
 
+/// How a surface looks.
+#[derive(Clone, Debug)]
+pub struct Material {
+    /// Name for messages.
+    pub name: String,
+    /// How it scatters.
+    pub surface: Surface,
+    /// Emitted radiance in scene units; black for most.
+    pub emission: ColorInput,
+    /// Whether it emits from its back side too.
+    pub emits_both_sides: bool,
+    /// Tangent-space normal map and the strength of its x and y.
+    pub normal_map: Option<(TextureLookup, f32)>,
+    /// Coverage; what it cuts away is not there at all.
+    pub alpha: Alpha,
+}
+
+/// Coverage of a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Alpha {
+    /// Everything is there.
+    Opaque,
+    /// Points whose value is below the cutoff are not there.
+    Mask {
+        /// Coverage.
+        value: ScalarInput,
+        /// Threshold in [0, 1].
+        cutoff: f32,
+    },
+    /// Points are there with this probability.
+    Blend {
+        /// Coverage in [0, 1].
+        value: ScalarInput,
+    },
+}
+
 impl Material {
+    /// A surface that neither emits nor is cut out.
+    pub fn plain(name: impl Into<String>, surface: Surface) -> Self {
+        Self {
+            name: name.into(),
+            surface,
+            emission: ColorInput::constant(Vec3::ZERO),
+            emits_both_sides: false,
+            normal_map: None,
+            alpha: Alpha::Opaque,
+        }
+    }
+
+    /// Whether shading needs to know along which way texture coordinates grow.
+    pub fn needs_tangent(&self) -> bool {
+        self.normal_map.is_some() || self.surface.is_anisotropic()
+    }
+
     /// Mean emitted radiance over the texture's square, in scene units; `None` where nothing is emitted.
     pub fn mean_emission(&self, textures: &[Texture]) -> Option<Vec3> {
         if self.emission.factor.max_element() <= 0.0 {
@@ -14,6 +67,17 @@ impl Material {
             Some(lookup) => self.emission.factor * mean_color(&textures[lookup.texture.0 as usize]),
         };
         (mean.max_element() > 0.0).then_some(mean)
+    }
+}
+
+impl Alpha {
+    /// Probability that the surface is there, at texture coordinates.
+    pub fn coverage(&self, textures: &[Texture], uv: Vec2) -> f32 {
+        match self {
+            Self::Opaque => 1.0,
+            Self::Mask { value, cutoff } => f32::from(u8::from(value.evaluate(textures, uv) >= *cutoff)),
+            Self::Blend { value } => value.evaluate(textures, uv).clamp(0.0, 1.0),
+        }
     }
 }
 

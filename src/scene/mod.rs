@@ -3,14 +3,26 @@
 //! Plain data, filled by `load` (one file a format) and read by everybody else. Lengths are in scene units, radiance is
 //! linear Rec.709 RGB in scene units: RGB (1, 1, 1) has a luminance of [`Scene::nits_per_unit`] cd/m².
 
+mod camera;
+mod environment;
+mod light;
 mod material;
-
-use glam::{Affine3A, Mat3, Vec2, Vec3, Vec4};
-use std::sync::Arc;
+mod motion;
+mod surface;
 
 pub mod hash;
 pub mod load;
 pub mod texture;
+
+pub use camera::{Camera, Projection, ScreenWindow};
+pub use environment::{Environment, Parametrisation};
+pub use light::{Light, SpotFalloff};
+pub use material::{Alpha, Material};
+pub use motion::{Motion, MotionKey, Pose};
+pub use surface::{Distribution, MetalRoughness, Roughness, RoughnessScale, Surface};
+
+use glam::{Affine3A, Vec2, Vec3, Vec4};
+use std::sync::Arc;
 
 /// Index into [`Scene::meshes`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -45,12 +57,21 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Decoded textures.
     pub textures: Vec<Texture>,
-    /// Point, spot and directional lights. Area lights are surfaces whose material emits.
+    /// Point, spot and directional lights, and the sun's disc. Area lights are surfaces whose material emits.
     pub lights: Vec<Light>,
     /// What rays see that hit nothing; `None` is black.
     pub environment: Option<Environment>,
     /// What the loader assumed or left out, one sentence each, shown to the user once.
     pub notes: Vec<String>,
+}
+
+impl Scene {
+    /// Whether anything moves while the shutter is open.
+    pub fn moves(&self) -> bool {
+        self.camera.motion.is_some()
+            || self.instances.iter().any(|instance| instance.motion.is_some())
+            || self.spheres.iter().any(|sphere| sphere.motion.is_some())
+    }
 }
 
 /// Picture size in pixels.
@@ -73,23 +94,6 @@ pub struct ViewingDefaults {
     pub operator: Option<String>,
     /// Exposure correction in stops for the operator `constant`.
     pub exposure_stops: Option<f64>,
-}
-
-/// A thin-lens camera that looks along `forward` with `up` towards the top of the picture.
-#[derive(Clone, Debug)]
-pub struct Camera {
-    /// Centre of the lens, world space.
-    pub position: Vec3,
-    /// Unit viewing direction.
-    pub forward: Vec3,
-    /// Up vector, need not be perpendicular to `forward`, not parallel to it.
-    pub up: Vec3,
-    /// Full vertical field of view in degrees, in (0, 180).
-    pub vertical_fov_deg: f32,
-    /// Radius of the lens in scene units; 0 is a pinhole.
-    pub aperture_radius: f32,
-    /// Distance of the plane in focus along `forward`, scene units, above 0.
-    pub focus_distance: f32,
 }
 
 /// A triangle mesh in object space. Every index is in range and every position finite: loaders guarantee it.
@@ -118,8 +122,10 @@ pub struct Instance {
     pub mesh: MeshId,
     /// Which material.
     pub material: MaterialId,
-    /// Object space to world space; invertible.
+    /// Object space to world space when the shutter opens; invertible.
     pub to_world: Affine3A,
+    /// Object space to world space while the shutter is open; `None` where it rests.
+    pub motion: Option<Motion>,
 }
 
 /// An analytic sphere in world space.
@@ -133,6 +139,8 @@ pub struct Sphere {
     pub radius: f32,
     /// Which material.
     pub material: MaterialId,
+    /// Moves centre and radius while the shutter is open (similarities only); `None` where it rests.
+    pub motion: Option<Motion>,
 }
 
 /// A colour that is constant or read from a texture and multiplied by a factor.
@@ -187,95 +195,6 @@ impl TextureLookup {
     }
 }
 
-/// How a surface looks.
-#[derive(Clone, Debug)]
-pub struct Material {
-    /// Name for messages.
-    pub name: String,
-    /// How it scatters.
-    pub surface: Surface,
-    /// Emitted radiance in scene units; black for most.
-    pub emission: ColorInput,
-    /// Whether it emits from its back side too.
-    pub emits_both_sides: bool,
-    /// Tangent-space normal map and the strength of its x and y.
-    pub normal_map: Option<(TextureLookup, f32)>,
-    /// Coverage; what it cuts away is not there at all.
-    pub alpha: Alpha,
-}
-
-/// Coverage of a surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Alpha {
-    /// Everything is there.
-    Opaque,
-    /// Points whose value is below the cutoff are not there.
-    Mask {
-        /// Coverage.
-        value: ScalarInput,
-        /// Threshold in [0, 1].
-        cutoff: f32,
-    },
-    /// Points are there with this probability.
-    Blend {
-        /// Coverage in [0, 1].
-        value: ScalarInput,
-    },
-}
-
-/// How a surface scatters light. Roughness is perceptual: the microfacet width α is its square; 0 is smooth.
-#[derive(Clone, Debug)]
-pub enum Surface {
-    /// Lambert.
-    Diffuse {
-        /// Albedo in [0, 1].
-        reflectance: ColorInput,
-    },
-    /// A perfect mirror.
-    Mirror {
-        /// Reflectance in [0, 1].
-        reflectance: ColorInput,
-    },
-    /// A metal with complex index of refraction η + ik per RGB channel.
-    Conductor {
-        /// Real part.
-        eta: Vec3,
-        /// Imaginary part.
-        k: Vec3,
-        /// Perceptual roughness in [0, 1].
-        roughness: ScalarInput,
-    },
-    /// Glass, water: the boundary of a clear volume.
-    Dielectric {
-        /// Index of refraction inside relative to outside, above 0.
-        ior: f32,
-        /// Perceptual roughness in [0, 1].
-        roughness: ScalarInput,
-        /// Tint of the transmitted light at each crossing; white for clear glass.
-        transmittance: ColorInput,
-    },
-    /// A thin clear sheet: light goes straight through or is reflected.
-    ThinDielectric {
-        /// Index of refraction of the sheet.
-        ior: f32,
-        /// Tint of the transmitted light.
-        transmittance: ColorInput,
-    },
-    /// The metal-roughness model of glTF 2.0.
-    MetalRoughness {
-        /// Base colour.
-        base_color: ColorInput,
-        /// 0 dielectric, 1 metal.
-        metallic: ScalarInput,
-        /// Perceptual roughness in [0, 1].
-        roughness: ScalarInput,
-        /// Index of refraction of the dielectric part, 1.5 unless told.
-        ior: f32,
-        /// Share of the dielectric part's light that goes through (thin), not into diffuse reflection.
-        transmission: ScalarInput,
-    },
-}
-
 /// How texel values are encoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Encoding {
@@ -322,51 +241,4 @@ pub enum Texels {
     Bytes(Arc<Vec<[u8; 4]>>, Encoding),
     /// Linear floats.
     Floats(Arc<Vec<[f32; 4]>>),
-}
-
-/// A light without area.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Light {
-    /// Shines equally in all directions.
-    Point {
-        /// World position.
-        position: Vec3,
-        /// Radiant intensity in scene units × area: luminous intensity in cd is `nits_per_unit` × its luminance.
-        intensity: Vec3,
-    },
-    /// Shines in a cone.
-    Spot {
-        /// World position.
-        position: Vec3,
-        /// Unit axis of the cone, away from the light.
-        direction: Vec3,
-        /// Intensity on the axis.
-        intensity: Vec3,
-        /// Half angle in radians inside which it shines fully.
-        inner_angle: f32,
-        /// Half angle in radians outside which it is dark.
-        outer_angle: f32,
-    },
-    /// Shines from infinitely far away.
-    Directional {
-        /// Unit direction in which the light travels.
-        direction: Vec3,
-        /// Irradiance on a surface that faces it: illuminance in lx is `nits_per_unit` × its luminance.
-        irradiance: Vec3,
-    },
-}
-
-/// Radiance from infinitely far away.
-#[derive(Clone, Debug)]
-pub struct Environment {
-    /// Lat-long picture of linear RGB radiance; a constant one is 1×1. Row 0 is +y (up), the middle column is −z.
-    pub width: u32,
-    /// Rows of the picture.
-    pub height: u32,
-    /// Texels, row-major.
-    pub texels: Arc<Vec<Vec3>>,
-    /// Multiplies the texels.
-    pub scale: f32,
-    /// World directions to the picture's directions (a rotation).
-    pub from_world: Mat3,
 }

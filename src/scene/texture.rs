@@ -16,6 +16,10 @@ static SRGB_TO_LINEAR: LazyLock<[f32; 256]> =
 impl Wrap {
     /// The texel index in [0, size) for any whole position; `size` is at least 1.
     fn apply(self, position: i64, size: i64) -> i64 {
+        // Most are within, and a 64-bit division costs more than all else in a look-up.
+        if (0..size).contains(&position) {
+            return position;
+        }
         match self {
             Self::Repeat => position.rem_euclid(size),
             Self::Clamp => position.clamp(0, size - 1),

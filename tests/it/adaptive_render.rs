@@ -1,13 +1,18 @@
 //! Adaptive and uniform renders of the Cornell box against a reference: energy, calibration, determinism.
 
 use crate::support::{loop_settings, trace_settings};
+use fechner::adaptive::audit::audit;
 use fechner::adaptive::settings::Sampling;
+use fechner::adaptive::statistics::picture_variance;
 use fechner::adaptive::{Quiet, Rendered, render};
 use fechner::integrator::PathTracer;
 use fechner::scene::Scene;
 use fechner::scene::load::{LoadOptions, load};
 use std::path::Path;
 use std::sync::Arc;
+
+/// What the scene file says.
+const NITS_PER_UNIT: f64 = 120.0;
 
 fn cornell_box() -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml");
@@ -32,7 +37,7 @@ impl Judged {
         let to_f64 = |values: &[f32]| values.iter().map(|&v| f64::from(v)).collect();
         Self {
             luminance: to_f64(rendered.judgement.estimate.luminance_cd_m2.values()),
-            variance: to_f64(rendered.judgement.variance_of_mean.values()),
+            variance: to_f64(picture_variance(&rendered.film, NITS_PER_UNIT).values()),
         }
     }
 
@@ -165,4 +170,25 @@ fn limits_end_a_render() {
     let capped = render(&tracer, &settings, &Quiet).expect("renders");
     assert_eq!(capped.stop_reason, fechner::adaptive::StopReason::MaxSamples);
     assert!((0..24 * 24).all(|i| capped.film.samples(i) <= 64));
+}
+
+/// Fresh samples agree with an honest variance, and disagree with one that is four times too low.
+#[test]
+fn an_audit_finds_variance_that_is_too_low() {
+    let scene = cornell_box();
+    let settings = loop_settings(scene.nits_per_unit, Sampling::Uniform, 0.0, Some(32));
+    let tracer = PathTracer::new(Arc::new(scene), trace_settings(256, 192, 9));
+    let mut rendered = render(&tracer, &settings, &Quiet).expect("renders");
+    let audited = |rendered: &Rendered| {
+        audit(&tracer, &rendered.film, &rendered.judgement, &settings, 0).expect("large enough to audit")
+    };
+    let honest = audited(&rendered);
+    println!("honest {honest:?}");
+    assert!(!honest.disagrees(), "{honest:?}");
+    assert!((honest.ratio - 1.0).abs() < 0.4, "{honest:?}");
+    let variance = &mut rendered.judgement.pooled_variance_per_sample;
+    *variance = variance.map(|v| 0.25 * v);
+    let low = audited(&rendered);
+    assert!(low.disagrees(), "{low:?}");
+    assert!((low.ratio / honest.ratio - 4.0).abs() < 0.01, "{low:?}");
 }

@@ -109,6 +109,8 @@ fn bad_arguments_are_refused_in_one_line() {
     assert_refused(&["render", cornell, "-o", "a.png", "--size", "0x10"], at, &["0x10", "WIDTHxHEIGHT"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--size", "400000x400000"], at, &["memory", "--size"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--visibility", "-1"], at, &["above 0"]);
+    assert_refused(&["render", cornell, "-o", "a.png", "--sampling", "budget"], at, &["--spp"]);
+    assert_refused(&["render", cornell, "-o", "a.png", "--model", "guess"], at, &["guess", "csf-bands"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--display", "cinemax"], at, &["cinemax", "cinema"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--operator", "magic"], at, &["magic", "constant"]);
     assert_refused(&["info", "missing.exr"], at, &["missing.exr"]);

@@ -5,13 +5,13 @@ use crate::support::{
 };
 use fechner::geometry::Ray;
 use fechner::integrator::PathTracer;
-use fechner::scene::{ColorInput, ScalarInput, Scene, Surface};
+use fechner::scene::{ColorInput, MetalRoughness, Roughness, ScalarInput, Scene, Surface};
 use glam::{Vec3, Vec3A, vec3a};
 use std::sync::Arc;
 
 /// Rays that meet a unit sphere at the origin from face on to grazing.
 fn rays() -> impl Iterator<Item = Ray> {
-    [0.0f32, 0.5, 0.8, 0.95].into_iter().map(|x| Ray { origin: vec3a(x, 0.0, 5.0), direction: Vec3A::NEG_Z })
+    [0.0f32, 0.5, 0.8, 0.95].into_iter().map(|x| Ray::new(vec3a(x, 0.0, 5.0), Vec3A::NEG_Z))
 }
 
 fn sphere_in_furnace(surface: Surface) -> PathTracer {
@@ -59,8 +59,7 @@ fn mirrors_return_their_reflectance() {
 #[test]
 fn lossless_conductors_return_everything() {
     for roughness in [0.0, 0.2, 0.5, 0.8, 1.0] {
-        let surface =
-            Surface::Conductor { eta: Vec3::ONE, k: Vec3::splat(1e4), roughness: ScalarInput::constant(roughness) };
+        let surface = Surface::conductor(Vec3::ONE, Vec3::splat(1e4), Roughness::constant(roughness));
         assert_returns(&surface, Vec3::ONE);
     }
 }
@@ -71,8 +70,9 @@ fn clear_dielectrics_return_everything() {
         for roughness in [0.0, 0.3, 0.6, 1.0] {
             let surface = Surface::Dielectric {
                 ior,
-                roughness: ScalarInput::constant(roughness),
+                roughness: Roughness::constant(roughness),
                 transmittance: ColorInput::constant(Vec3::ONE),
+                absorption: Vec3::ZERO,
             };
             // Paths inside a rough ball are long and their weights differ: noisier than the others.
             assert_returns_within(&surface, Vec3::ONE, 0.01);
@@ -85,13 +85,11 @@ fn clear_dielectrics_return_everything() {
 fn white_metal_roughness_returns_everything() {
     for metallic in [0.0, 0.5, 1.0] {
         for roughness in [0.1, 0.5, 1.0] {
-            let surface = Surface::MetalRoughness {
-                base_color: ColorInput::constant(Vec3::ONE),
+            let surface = Surface::MetalRoughness(MetalRoughness {
                 metallic: ScalarInput::constant(metallic),
                 roughness: ScalarInput::constant(roughness),
-                ior: 1.5,
-                transmission: ScalarInput::constant(0.0),
-            };
+                ..MetalRoughness::default()
+            });
             assert_returns(&surface, Vec3::ONE);
         }
     }
@@ -105,7 +103,7 @@ fn infinite_bounces_add_up() {
         let material = add_material(&mut scene, diffuse(albedo), Vec3::splat(0.3));
         add_sphere(&mut scene, Vec3::ZERO, 2.0, material);
         let tracer = PathTracer::new(Arc::new(scene), trace_settings(16, 16, 0));
-        let ray = Ray { origin: vec3a(0.3, -0.2, 0.1), direction: vec3a(0.48, 0.6, 0.64) };
+        let ray = Ray::new(vec3a(0.3, -0.2, 0.1), vec3a(0.48, 0.6, 0.64));
         let (mean, error) = radiance_along(&tracer, ray, 16, samples);
         let expected = 0.3 / (1.0 - albedo);
         assert!(

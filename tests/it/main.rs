@@ -2,20 +2,28 @@
 //!
 //! - `support`: scenes made in code, and rendering them
 //! - `furnace`: energy: closed and open white furnaces with known answers
-//! - `direct_light`: irradiance from a rectangle, a sphere, a point and an environment against closed forms
+//! - `direct_light`: irradiance from a rectangle, a disk, a sphere, a point and environments against closed forms; radiosity
 //! - `adaptive_render`: adaptive and uniform renders against a reference: bias, calibration, determinism
+//! - `bench`: the benchmark from end to end, small
+//! - `camera_and_time`: blur of lens and shutter, moving lamps, crops
 //! - `bad_input`: bad scene files, and our own ones
 //! - `load_assets`: scenes that others made, sound and damaged
+//! - `no_allocation`: the heap is left alone while paths are traced
 //! - `command_line`: the program as a user runs it
 //! - `checkpoint`: renders stopped, continued and merged against renders in one go
 //! - `kill`: the program, killed and resumed
+//! - `tonemap`: HDR pictures for displays, one by one and over time
 
 mod adaptive_render;
 mod bad_input;
+mod bench;
+mod camera_and_time;
 mod checkpoint;
 mod command_line;
 mod direct_light;
 mod furnace;
 mod kill;
 mod load_assets;
+mod no_allocation;
 mod support;
+mod tonemap;

@@ -2,29 +2,21 @@
 
 use fechner::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, Sampling};
 use fechner::integrator::{PathTracer, TraceSettings};
-use fechner::sampler::{BlockKey, Half, PixelFilter, Purpose};
+use fechner::sampler::{BlockKey, Half, Pixel, PixelFilter, Purpose, Sequence};
 use fechner::scene::{
     Alpha, Camera, ColorInput, Environment, FilmDefaults, Instance, Material, MaterialId, Mesh, MeshId, Scene, Sphere,
     Surface, ViewingDefaults,
 };
 use fechner_perception::display::{Display, Viewing};
 use fechner_perception::tone;
-use glam::{Affine3A, Mat3, Vec2, Vec3};
-use std::sync::Arc;
+use glam::{Affine3A, Vec2, Vec3};
 
 /// A scene of nothing, seen from z = 5.
 pub(crate) fn empty_scene() -> Scene {
     Scene {
         name: "test".to_owned(),
         nits_per_unit: 100.0,
-        camera: Camera {
-            position: Vec3::new(0.0, 0.0, 5.0),
-            forward: Vec3::NEG_Z,
-            up: Vec3::Y,
-            vertical_fov_deg: 20.0,
-            aperture_radius: 0.0,
-            focus_distance: 5.0,
-        },
+        camera: Camera { focus_distance: 5.0, ..Camera::pinhole(Vec3::new(0.0, 0.0, 5.0), Vec3::NEG_Z, Vec3::Y, 20.0) },
         film: FilmDefaults { width: 16, height: 16 },
         viewing: ViewingDefaults::default(),
         meshes: Vec::new(),
@@ -40,13 +32,7 @@ pub(crate) fn empty_scene() -> Scene {
 
 /// Light of the same radiance from everywhere.
 pub(crate) fn constant_environment(radiance: f32) -> Option<Environment> {
-    Some(Environment {
-        width: 1,
-        height: 1,
-        texels: Arc::new(vec![Vec3::splat(radiance)]),
-        scale: 1.0,
-        from_world: Mat3::IDENTITY,
-    })
+    Some(Environment::constant(Vec3::splat(radiance)))
 }
 
 /// Adds a material that scatters like this.
@@ -67,7 +53,7 @@ pub(crate) fn diffuse(albedo: f32) -> Surface {
 }
 
 pub(crate) fn add_sphere(scene: &mut Scene, center: Vec3, radius: f32, material: MaterialId) {
-    scene.spheres.push(Sphere { name: "sphere".to_owned(), center, radius, material });
+    scene.spheres.push(Sphere { name: "sphere".to_owned(), center, radius, material, motion: None });
 }
 
 /// Adds a parallelogram with the normal `edge_u` × `edge_v`.
@@ -84,11 +70,27 @@ pub(crate) fn add_rectangle(scene: &mut Scene, corner: Vec3, edge_u: Vec3, edge_
         mesh: MeshId(scene.meshes.len() as u32 - 1),
         material,
         to_world: Affine3A::IDENTITY,
+        motion: None,
     });
 }
 
 pub(crate) fn trace_settings(width: u32, height: u32, seed: u64) -> TraceSettings {
-    TraceSettings { width, height, seed, max_depth: 1_000, filter: PixelFilter::Box, clamp: None }
+    TraceSettings {
+        width,
+        height,
+        seed,
+        max_depth: 1_000,
+        filter: PixelFilter::Box,
+        sequence: Sequence::PerPixel,
+        crop: None,
+        clamp: None,
+    }
+}
+
+/// A block of samples by number, of at most 2^18.
+pub(crate) fn block_key(number: u32) -> BlockKey {
+    let pixel = Pixel { x: number, y: 0 };
+    BlockKey { seed: 1, pixel, half: Half::A, level: 0, log2_samples: 18, sequence: Sequence::PerPixel }
 }
 
 /// Mean and standard error of the radiance along one ray, from `blocks` independent blocks of `samples`.
@@ -100,7 +102,7 @@ pub(crate) fn radiance_along(
 ) -> (Vec3, Vec3) {
     let means: Vec<Vec3> = (0..blocks)
         .map(|block| {
-            let key = BlockKey { seed: 1, pixel: block, half: Half::A, level: 0 };
+            let key = block_key(block);
             let sum: Vec3 = key.samples(samples).map(|s| tracer.trace_path(ray, s).radiance).sum();
             sum / samples as f32
         })
@@ -126,7 +128,7 @@ pub(crate) fn loop_settings(nits_per_unit: f64, sampling: Sampling, visibility: 
 /// Keeps the purposes in the API honest: a sample's camera numbers are what the tracer uses for the pixel.
 #[test]
 fn camera_numbers_fill_the_pixel() {
-    let key = BlockKey { seed: 0, pixel: 0, half: Half::A, level: 3 };
+    let key = block_key(3);
     let mean: f32 = key.samples(64).map(|s| s.draw(Purpose::Camera)[0]).sum::<f32>() / 64.0;
     assert!((mean - 0.5).abs() < 0.02, "{mean}");
 }

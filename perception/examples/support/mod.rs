@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use image::{Rgb, RgbImage};
 
 /// Where the example's picture goes: the first argument, or `name` in the system's folder for temporary files.
+#[allow(dead_code, reason = "each example uses what it needs")]
 pub(crate) fn target(name: &str) -> PathBuf {
     std::env::args().nth(1).map_or_else(|| std::env::temp_dir().join(name), PathBuf::from)
 }

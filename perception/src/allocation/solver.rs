@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::{Allocation, AllocationProblem};
 use crate::error::{Error, check_range};
-use crate::filter::{dilate, gaussian_blur};
+use crate::filter::{dilate_xy, gaussian_blur_xy};
 use crate::plane::Plane;
 use crate::threshold::POOLING_SIGMA_DEG;
 
@@ -28,7 +28,8 @@ pub(super) struct Solver<'a> {
     weight: Vec<f32>,
     /// √(w / c): counts are this times √μ.
     root: Vec<f32>,
-    sigma_px: f64,
+    /// Standard deviation of the pooling window along x and y.
+    sigma_px: [f64; 2],
     /// Side of the blocks that share a multiplier.
     block: usize,
     blocks_x: usize,
@@ -72,11 +73,12 @@ impl<'a> Solver<'a> {
             .map(|(gain, variance)| (2.0 * gain * variance).min(1e18))
             .collect();
         let root = weight.par_iter().zip(problem.cost.values()).map(|(weight, cost)| (weight / cost).sqrt()).collect();
-        let sigma_px = POOLING_SIGMA_DEG * problem.thresholds.viewing().display.pixels_per_degree;
-        let block = ((sigma_px / 4.0) as usize).clamp(1, 8);
+        let density = problem.thresholds.viewing().display.pixel_density();
+        let sigma_px = [density.horizontal, density.vertical].map(|density| POOLING_SIGMA_DEG * density);
+        let block = ((POOLING_SIGMA_DEG * density.coarsest() / 4.0) as usize).clamp(1, 8);
         let most = problem.max_samples as f32;
         let at_most: Vec<f32> = weight.par_iter().map(|weight| weight / most).collect();
-        let floor = gaussian_blur(&Plane::from_values(width, height, at_most)?, sigma_px);
+        let floor = gaussian_blur_xy(&Plane::from_values(width, height, at_most)?, sigma_px[0], sigma_px[1]);
         let total_cost: f64 = problem.cost.values().iter().map(|&cost| f64::from(cost)).sum();
         let mut solver = Self {
             problem,
@@ -134,7 +136,7 @@ impl<'a> Solver<'a> {
     pub(super) fn solve(&self, visibility: f64, multipliers: &mut [f32]) -> Allocation {
         let (bounds, unreachable_pixels) = self.bounds(visibility);
         let coarse_bounds = self.block_means(bounds.values());
-        let sigma_blocks = self.sigma_px / self.block as f64;
+        let sigma_blocks = self.sigma_px.map(|sigma| sigma / self.block as f64);
         let mut iterations = 0;
         let mut best_bound = f64::NEG_INFINITY;
         let mut best_multipliers = multipliers.to_vec();
@@ -178,7 +180,7 @@ impl<'a> Solver<'a> {
     /// Counts at full resolution that meet every constraint, and the lower bound that the multipliers prove there.
     fn certified(&self, multipliers: &[f32], bounds: &Plane, iterations: usize) -> Allocation {
         let lambda = self.spread_over_blocks(multipliers);
-        let price = gaussian_blur(&lambda, self.sigma_px);
+        let price = gaussian_blur_xy(&lambda, self.sigma_px[0], self.sigma_px[1]);
         let (least, most) = (self.problem.min_samples as f32, self.problem.max_samples as f32);
         let mut samples = Plane::from_fn(self.width(), self.height(), |x, y| {
             let index = y * self.width() + x;
@@ -208,7 +210,7 @@ impl<'a> Solver<'a> {
     fn repair(&self, samples: &mut Plane, bounds: &Plane) {
         let most = self.problem.max_samples as f32;
         let least = self.problem.min_samples as f32;
-        let reach = (2.0 * self.sigma_px).ceil() as usize;
+        let reach = self.sigma_px.map(|sigma| (2.0 * sigma).ceil() as usize);
         for _ in 0..12 {
             let excess = self.excess(samples, bounds);
             let worst = excess.values().iter().copied().fold(0.0, f32::max);
@@ -219,7 +221,7 @@ impl<'a> Solver<'a> {
             let factor = if worst < 1.001 {
                 Plane::filled(self.width(), self.height(), worst * 1.000_01)
             } else {
-                dilate(&excess.map(|excess| excess.max(1.0)), reach)
+                dilate_xy(&excess.map(|excess| excess.max(1.0)), reach[0], reach[1])
             };
             for (count, factor) in samples.values_mut().iter_mut().zip(factor.values()) {
                 *count = (*count * factor).clamp(least, most);
@@ -233,7 +235,7 @@ impl<'a> Solver<'a> {
             self.weight.par_iter().zip(samples.values()).map(|(weight, count)| weight / count).collect();
         let noise = Plane::from_values(self.width(), self.height(), noise)
             .unwrap_or_else(|_| Plane::filled(self.width(), self.height(), f32::INFINITY));
-        let mut excess = gaussian_blur(&noise, self.sigma_px);
+        let mut excess = gaussian_blur_xy(&noise, self.sigma_px[0], self.sigma_px[1]);
         excess.for_each_row_mut(|y, row| {
             row.iter_mut().zip(bounds.row(y)).for_each(|(value, bound)| *value /= bound);
         });
@@ -350,9 +352,9 @@ impl<'a> Solver<'a> {
         self.over_blocks(|block| self.block_mean(block, |index| values[index]))
     }
 
-    fn blur_blocks(&self, values: &[f32], sigma_blocks: f64) -> Vec<f32> {
+    fn blur_blocks(&self, values: &[f32], sigma_blocks: [f64; 2]) -> Vec<f32> {
         match Plane::from_values(self.blocks_x, self.blocks_y, values.to_vec()) {
-            Ok(plane) => gaussian_blur(&plane, sigma_blocks).into_values(),
+            Ok(plane) => gaussian_blur_xy(&plane, sigma_blocks[0], sigma_blocks[1]).into_values(),
             Err(_) => values.to_vec(),
         }
     }

@@ -92,106 +92,67 @@ fn the_gap_closes_and_every_constraint_holds() {
     }
 }
 
-/// An independent solver: projected coordinate descent on the primal with a log barrier, on a problem small enough.
-#[allow(clippy::needless_range_loop, reason = "matrices read best by row and column")]
+/// A conic interior-point solver finds the optimum of problems small enough for it.
 #[test]
-fn an_interior_point_method_finds_the_same_cost() {
-    let case = Case::patchy(12, 8, 20.0, 4);
-    let mut problem = case.problem();
-    problem.min_samples = 1.0;
-    let found = allocate(&problem).unwrap();
-    let count = 12 * 8;
-    // The pooling window as a matrix, asked for column by column.
-    let mut rows = vec![vec![0.0_f64; count]; count];
-    for column in 0..count {
-        let mut unit = Plane::filled(12, 8, 0.0);
-        unit.values_mut()[column] = 1.0;
-        for (row, value) in case.thresholds.pooled(&unit).values().iter().enumerate() {
-            let gain = f64::from(case.thresholds.noise_gain().values()[column]);
-            rows[row][column] = f64::from(*value) * 2.0 * gain * f64::from(case.variance.values()[column]);
-        }
+fn a_conic_solver_finds_the_same_cost() {
+    for (seed, min_samples, most) in [(4, 1.0, 1e6), (11, 16.0, 1e6), (12, 4.0, 400.0)] {
+        let case = Case::patchy(12, 8, 20.0, seed);
+        let problem = AllocationProblem { min_samples, max_samples: most, ..case.problem() };
+        let found = allocate(&problem).unwrap();
+        assert_eq!(found.unreachable_pixels, 0);
+        let exact = conic_optimum(&case, min_samples, most);
+        assert!((found.cost / exact - 1.0).abs() < 0.01, "{} against {exact}", found.cost);
+        assert!(found.lower_bound <= exact * 1.000_1, "bound {} above the optimum {exact}", found.lower_bound);
     }
-    let cost: Vec<f64> = case.cost.values().iter().map(|&cost| f64::from(cost)).collect();
-    // Over x = 1/n, minimise t Σ c/x − Σ log(1 − A x) − Σ log(1 − x) − Σ log x by damped Newton with growing t.
-    let mut x: Vec<f64> = vec![0.0; count];
-    let most = rows.iter().map(|row| row.iter().sum::<f64>()).fold(0.0, f64::max);
-    x.fill((0.5 / most).min(0.5));
-    let mut t = 1e-6;
-    while t < 1e4 {
-        for _ in 0..30 {
-            newton_step(&rows, &cost, t, &mut x);
-        }
-        t *= 4.0;
-    }
-    let exact: f64 = cost.iter().zip(&x).map(|(cost, x)| cost / x).sum();
-    assert!((found.cost / exact - 1.0).abs() < 0.01, "{} against {exact}", found.cost);
-    assert!(found.lower_bound <= exact * 1.000_1, "bound {} above the optimum {exact}", found.lower_bound);
 }
 
-#[allow(clippy::needless_range_loop, reason = "matrices read best by row and column")]
-fn newton_step(rows: &[Vec<f64>], cost: &[f64], t: f64, x: &mut [f64]) {
-    let count = x.len();
-    let value = |x: &[f64]| -> f64 {
-        let mut sum = 0.0;
-        for (cost, &x) in cost.iter().zip(x) {
-            if x <= 0.0 || x >= 1.0 {
-                return f64::INFINITY;
-            }
-            sum += t * cost / x - (1.0 - x).ln() - x.ln();
-        }
-        for row in rows {
-            let slack = 1.0 - row.iter().zip(x).map(|(a, x)| a * x).sum::<f64>();
-            if slack <= 0.0 {
-                return f64::INFINITY;
-            }
-            sum -= slack.ln();
-        }
-        sum
+/// Over x = 1/n and t ≥ 1/x: minimise c·t subject to A x ≤ 1, 1/most ≤ x ≤ 1/least and t x ≥ 1, which is the second-order
+/// cone |(2, t − x)| ≤ t + x.
+fn conic_optimum(case: &Case, least: f64, most: f64) -> f64 {
+    use clarabel::algebra::CscMatrix;
+    use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
+    let (width, height) = (case.cost.width(), case.cost.height());
+    let count = width * height;
+    // Variables: x, scaled by `least` so that they are about 1, then t.
+    let (mut rows, mut columns, mut values, mut bounds) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let mut entry = |row: usize, column: usize, value: f64| {
+        rows.push(row);
+        columns.push(column);
+        values.push(value);
     };
-    let mut gradient = vec![0.0; count];
-    let mut hessian = vec![vec![0.0; count]; count];
-    for index in 0..count {
-        let (cost, x) = (cost[index], x[index]);
-        gradient[index] = -t * cost / (x * x) + 1.0 / (1.0 - x) - 1.0 / x;
-        hessian[index][index] = 2.0 * t * cost / x.powi(3) + (1.0 - x).powi(-2) + x.powi(-2);
-    }
-    for row in rows {
-        let slack = 1.0 - row.iter().zip(x.iter()).map(|(a, x)| a * x).sum::<f64>();
-        for i in 0..count {
-            gradient[i] += row[i] / slack;
-            for j in 0..count {
-                hessian[i][j] += row[i] * row[j] / (slack * slack);
+    for column in 0..count {
+        let mut unit = Plane::filled(width, height, 0.0);
+        unit.values_mut()[column] = 1.0;
+        let weight =
+            2.0 * f64::from(case.thresholds.noise_gain().values()[column]) * f64::from(case.variance.values()[column])
+                / least;
+        for (row, value) in case.thresholds.pooled(&unit).values().iter().enumerate() {
+            if *value > 0.0 {
+                entry(row, column, f64::from(*value) * weight);
             }
         }
+        entry(count + column, column, 1.0);
+        entry(2 * count + column, column, -1.0);
+        let cone = 3 * count + 3 * column;
+        entry(cone, column, -1.0);
+        entry(cone, count + column, -1.0);
+        entry(cone + 1, column, 1.0);
+        entry(cone + 1, count + column, -1.0);
     }
-    // Gaussian elimination; the matrix is positive definite.
-    let mut step: Vec<f64> = gradient.iter().map(|g| -g).collect();
-    for pivot in 0..count {
-        for row in pivot + 1..count {
-            let factor = hessian[row][pivot] / hessian[pivot][pivot];
-            for column in pivot..count {
-                hessian[row][column] -= factor * hessian[pivot][column];
-            }
-            step[row] -= factor * step[pivot];
-        }
-    }
-    for row in (0..count).rev() {
-        for column in row + 1..count {
-            step[row] -= hessian[row][column] * step[column];
-        }
-        step[row] /= hessian[row][row];
-    }
-    let slope: f64 = gradient.iter().zip(&step).map(|(g, s)| g * s).sum();
-    let before = value(x);
-    let mut length = 1.0;
-    while length > 1e-12 {
-        let next: Vec<f64> = x.iter().zip(&step).map(|(x, s)| x + length * s).collect();
-        if value(&next) <= before + 0.25 * length * slope {
-            x.copy_from_slice(&next);
-            return;
-        }
-        length *= 0.5;
-    }
+    bounds.extend(vec![1.0; 2 * count]);
+    bounds.extend(vec![-least / most; count]);
+    (0..count).for_each(|_| bounds.extend([0.0, 0.0, 2.0]));
+    let constraints = CscMatrix::new_from_triplets(6 * count, 2 * count, rows, columns, values);
+    let mut cost = vec![0.0; count];
+    cost.extend(case.cost.values().iter().map(|cost| f64::from(*cost)));
+    let mut cones = vec![SupportedConeT::NonnegativeConeT(3 * count)];
+    cones.extend((0..count).map(|_| SupportedConeT::SecondOrderConeT(3)));
+    let settings = DefaultSettings { verbose: false, ..DefaultSettings::default() };
+    let none = CscMatrix::zeros((2 * count, 2 * count));
+    let mut solver = DefaultSolver::new(&none, &cost, &constraints, &bounds, &cones, settings).unwrap();
+    solver.solve();
+    assert_eq!(solver.solution.status, SolverStatus::Solved);
+    solver.solution.obj_val * least
 }
 
 #[test]

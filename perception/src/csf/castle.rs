@@ -49,29 +49,54 @@ impl ContrastSensitivity for CastleCsf {
     }
 
     fn sensitivity(&self, freq_cpd: f64, luminance_cd_m2: f64) -> f64 {
+        SUSTAINED.sensitivity(freq_cpd, luminance_cd_m2, self.area_deg2)
+    }
+}
+
+const SUSTAINED: Sustained = Sustained {
+    peak: [56.4947, 7.547_26, 0.144_532, 5.583_41e-7, 9.668_62e9],
+    peak_freq: [1.781_19, 91.571_8, 0.256_682],
+    log2_bandwidth: 0.000_213_047,
+    truncation: 0.100_207,
+    area_0_deg2: 157.103,
+    freq_0_cpd: 0.702_338,
+};
+
+/// Constants of the sustained achromatic channel that stelaCSF and castleCSF share the form of.
+pub(super) struct Sustained {
+    /// p₁ to p₅ of `S_max`(L) = p₁ (1 + p₂/L)^−p₃ (1 − (1 + p₄/L)^−p₅).
+    pub(super) peak: [f64; 5],
+    /// q₁ to q₃ of `f_max`(L) = q₁ (1 + q₂/L)^−q₃.
+    pub(super) peak_freq: [f64; 3],
+    pub(super) log2_bandwidth: f64,
+    /// How far sensitivity falls at most below the peak's frequency, before area counts.
+    pub(super) truncation: f64,
+    pub(super) area_0_deg2: f64,
+    pub(super) freq_0_cpd: f64,
+}
+
+impl Sustained {
+    pub(super) fn sensitivity(&self, freq_cpd: f64, luminance_cd_m2: f64, area_deg2: f64) -> f64 {
         if freq_cpd <= 0.0 {
             return 0.0;
         }
         let luminance = luminance_cd_m2.clamp(MIN_LUMINANCE_CD_M2, MAX_LUMINANCE_CD_M2);
-        let peak = peak_sensitivity(luminance);
-        let peak_freq_cpd = 1.781_19 * (1.0 + 91.571_8 / luminance).powf(-0.256_682);
-        let octaves_off = (freq_cpd / peak_freq_cpd).log10();
-        let mut log_parabola = 10.0_f64.powf(-octaves_off * octaves_off / 2.0_f64.powf(0.000_213_047));
+        let [p1, p2, p3, p4, p5] = self.peak;
+        let rise = p1 * (1.0 + p2 / luminance).powf(-p3);
+        // (1 + p₄/L)^−p₅ with p₄ ≈ 6e-7 and p₅ ≈ 1e10: a plain power would lose p₄/L beside 1.
+        let fall = -p5 * (p4 / luminance).ln_1p();
+        let [q1, q2, q3] = self.peak_freq;
+        let peak_freq_cpd = q1 * (1.0 + q2 / luminance).powf(-q3);
+        let decades_off = (freq_cpd / peak_freq_cpd).log10();
+        let mut log_parabola = 10.0_f64.powf(-decades_off * decades_off / self.log2_bandwidth.exp2());
         if freq_cpd < peak_freq_cpd {
-            log_parabola = log_parabola.max(1.0 - 0.100_207);
+            log_parabola = log_parabola.max(1.0 - self.truncation);
         }
         // Spatial summation (Rovamo et al. 1993): area counts up to a critical area that shrinks with frequency.
-        let critical_area_deg2 = 157.103 / (1.0 + (freq_cpd / 0.702_338).powi(2));
-        let summation = (critical_area_deg2 / (1.0 + critical_area_deg2 / self.area_deg2)).sqrt() * freq_cpd;
-        peak * log_parabola * summation
+        let critical_area_deg2 = self.area_0_deg2 / (1.0 + (freq_cpd / self.freq_0_cpd).powi(2));
+        let summation = (critical_area_deg2 / (1.0 + critical_area_deg2 / area_deg2)).sqrt() * freq_cpd;
+        rise * -fall.exp_m1() * log_parabola * summation
     }
-}
-
-fn peak_sensitivity(luminance_cd_m2: f64) -> f64 {
-    let rise = 56.4947 * (1.0 + 7.547_26 / luminance_cd_m2).powf(-0.144_532);
-    // (1 + p₄/L)^−p₅ with p₄ ≈ 6e-7 and p₅ ≈ 1e10: a plain power would lose p₄/L beside 1.
-    let fall = -9.668_62e9 * (5.583_41e-7 / luminance_cd_m2).ln_1p();
-    rise * -fall.exp_m1()
 }
 
 #[cfg(test)]

@@ -21,25 +21,39 @@ pub const FASTEST_PURSUIT_DEG_S: f64 = 80.0;
 /// Gain of smooth pursuit (Daly 1998).
 pub const PURSUIT_GAIN: f64 = 0.82;
 
-const C0: f64 = 1.14;
-const C1: f64 = 0.67;
-const C2: f64 = 1.7;
+/// Kelly's surface with constants: S = k · `gain` · c₂ v (2π ρ c₁)² exp(−4π c₁ ρ / `ρ_max`).
+pub(super) struct Spatiovelocity {
+    pub(super) c1: f64,
+    pub(super) c2: f64,
+    pub(super) gain: f64,
+}
+
+const SURFACE: Spatiovelocity = Spatiovelocity { c1: 0.67, c2: 1.7, gain: 1.14 };
+
+impl Spatiovelocity {
+    pub(super) fn ln_sensitivity(&self, freq_cpd: f64, velocity_deg_s: f64) -> f64 {
+        let scaled = self.c2 * velocity_deg_s;
+        let k = 6.1 + 7.3 * (scaled / 3.0).log10().abs().powi(3);
+        let radians = std::f64::consts::TAU * freq_cpd.max(1e-12) * self.c1;
+        (k * self.gain * scaled).ln() + 2.0 * radians.ln() - 2.0 * radians / self.highest_cpd(velocity_deg_s)
+    }
+
+    fn highest_cpd(&self, velocity_deg_s: f64) -> f64 {
+        45.9 / (self.c2 * velocity_deg_s + 2.0)
+    }
+}
 
 impl Daly98 {
     /// Natural logarithm of the sensitivity, finite where the sensitivity itself underflows (1e-120 and less).
     #[must_use]
     pub fn ln_sensitivity(&self, freq_cpd: f64) -> f64 {
-        let velocity = floored(self.retinal_velocity_deg_s);
-        let scaled = C2 * velocity;
-        let k = 6.1 + 7.3 * (scaled / 3.0).log10().abs().powi(3);
-        let radians = std::f64::consts::TAU * freq_cpd.max(1e-12) * C1;
-        (k * C0 * scaled).ln() + 2.0 * radians.ln() - 2.0 * radians / highest_cpd(velocity)
+        SURFACE.ln_sensitivity(freq_cpd, floored(self.retinal_velocity_deg_s))
     }
 
     /// Frequency of the greatest sensitivity, cpd: ρ_max / (2π c₁).
     #[must_use]
     pub fn peak_cpd(&self) -> f64 {
-        highest_cpd(floored(self.retinal_velocity_deg_s)) / (std::f64::consts::TAU * C1)
+        SURFACE.highest_cpd(floored(self.retinal_velocity_deg_s)) / (std::f64::consts::TAU * SURFACE.c1)
     }
 }
 
@@ -50,12 +64,9 @@ impl Default for Daly98 {
     }
 }
 
-fn floored(velocity_deg_s: f64) -> f64 {
+/// At least the eye's drift, and never NaN.
+pub(super) fn floored(velocity_deg_s: f64) -> f64 {
     if velocity_deg_s.is_nan() { DRIFT_DEG_S } else { velocity_deg_s.abs().clamp(DRIFT_DEG_S, 1e6) }
-}
-
-fn highest_cpd(velocity_deg_s: f64) -> f64 {
-    45.9 / (C2 * velocity_deg_s + 2.0)
 }
 
 impl ContrastSensitivity for Daly98 {

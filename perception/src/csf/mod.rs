@@ -3,23 +3,31 @@
 //! S = 1 / (contrast amplitude at threshold), contrast = amplitude / mean luminance. The threshold *amplitude* of a
 //! grating of ρ cycles per degree on L cd/m² is therefore L / S(ρ, L) cd/m².
 
+mod barten89;
 mod barten99;
 mod castle;
 mod castle_chromatic;
 mod castle_temporal;
 mod daly93;
 mod daly98;
+mod hdrvdp2;
+mod laird06;
 mod mannos_sakrison;
 mod moving;
+mod stela;
 
+pub use barten89::Barten89;
 pub use barten99::Barten99;
 pub use castle::CastleCsf;
 pub use castle_chromatic::{CastleChromatic, ChromaticChannel};
 pub use castle_temporal::CastleTemporal;
 pub use daly93::Daly93;
 pub use daly98::{DRIFT_DEG_S, Daly98, FASTEST_PURSUIT_DEG_S, PURSUIT_GAIN};
+pub use hdrvdp2::HdrVdp2;
+pub use laird06::Laird06;
 pub use mannos_sakrison::MannosSakrison;
 pub use moving::Moving;
+pub use stela::StelaCsf;
 
 use crate::display::Viewing;
 use crate::error::Error;
@@ -36,7 +44,8 @@ pub trait ContrastSensitivity: Send + Sync {
     fn sensitivity(&self, freq_cpd: f64, luminance_cd_m2: f64) -> f64;
 }
 
-const NAMES: [&str; 5] = ["castle", "barten99", "daly93", "daly98", "mannos-sakrison"];
+const NAMES: [&str; 9] =
+    ["castle", "stela", "barten99", "barten89", "daly93", "daly98", "laird06", "hdrvdp2", "mannos-sakrison"];
 
 /// The names that [`by_name`] knows.
 #[must_use]
@@ -66,7 +75,11 @@ pub fn by_name(name: &str, viewing: &Viewing) -> Result<Box<dyn ContrastSensitiv
             distance_m: viewing.display.distance_m.unwrap_or(Daly93::default().distance_m),
             ..Daly93::default()
         }),
+        "stela" => Box::new(StelaCsf { area_deg2 }),
+        "barten89" => Box::new(Barten89),
         "daly98" => Box::new(Daly98::default()),
+        "laird06" => Box::new(Laird06::default()),
+        "hdrvdp2" => Box::new(HdrVdp2::default()),
         "mannos-sakrison" => Box::new(MannosSakrison::default()),
         _ => {
             return Err(Error::UnknownName {
@@ -79,6 +92,11 @@ pub fn by_name(name: &str, viewing: &Viewing) -> Result<Box<dyn ContrastSensitiv
 }
 
 /// Greatest sensitivity over 0.05 to 60 cpd at one luminance.
+///
+/// ```
+/// use fechner_perception::csf::{CastleCsf, peak_sensitivity};
+/// assert!((peak_sensitivity(&CastleCsf::default(), 100.0) - 134.3).abs() < 0.1);
+/// ```
 #[must_use]
 pub fn peak_sensitivity(csf: &dyn ContrastSensitivity, luminance_cd_m2: f64) -> f64 {
     // Every function here has one hump over log frequency: a coarse scan, then thirds.

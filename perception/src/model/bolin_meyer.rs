@@ -1,7 +1,7 @@
 //! Bolin and Meyer.
 
 use super::{ModelInputs, PerLuminance, ThresholdModel};
-use crate::adaptation::local_adaptation;
+use crate::adaptation::adapted;
 use crate::error::Error;
 use crate::filter::gaussian_blur;
 use crate::masking::threshold_elevation;
@@ -28,9 +28,9 @@ impl ThresholdModel for BolinMeyer {
 
     fn allowed_standard_error_cd_m2(&self, inputs: &ModelInputs<'_>) -> Result<Plane, Error> {
         inputs.check()?;
-        let ppd = inputs.viewing.display.pixels_per_degree;
+        let ppd = inputs.viewing.display.pixel_density().mean();
         let gain = inputs.viewing.observer.sensitivity;
-        let adaptation = local_adaptation(inputs.display_luminance_cd_m2, ppd);
+        let adaptation = adapted(inputs.display_luminance_cd_m2, inputs.viewing);
         let mut noise_gain = Plane::filled(adaptation.width(), adaptation.height(), 0.0);
         let mut finer = inputs.display_luminance_cd_m2.clone();
         for level in 1..=LEVELS {

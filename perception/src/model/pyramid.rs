@@ -1,7 +1,10 @@
-//! Burt and Adelson's pyramid, undecimated.
+//! Burt and Adelson's pyramid, undecimated, and what the models built on it share.
 
+use super::{ModelInputs, PerLuminance, Z_95};
+use crate::adaptation::adapted;
 use crate::filter::reflect;
 use crate::plane::Plane;
+use crate::tvi::{ThresholdBase, base_threshold_cd_m2};
 
 /// Contrast bands of the published models.
 pub(crate) const BANDS: usize = 6;
@@ -39,6 +42,35 @@ pub(crate) fn band_frequency_cpd(band: usize, pixels_per_degree: f64) -> f64 {
             1 => 0.1485,
             _ => 0.278 * 0.5_f64.powi(band as i32),
         }
+}
+
+/// Threshold map of the models that weigh each band's elevation by its share of the local contrast: the base threshold at each
+/// pixel's adaptation luminance times `factor(Σ C_i f_i / Σ C_i)`, where `elevation_at(x, y, adaptation, band, C_i)` is f_i. A picture
+/// without contrast has no weights: nothing is elevated.
+pub(crate) fn contrast_weighted(
+    inputs: &ModelInputs<'_>,
+    raw_tvi: bool,
+    factor: impl Fn(f32) -> f32 + Sync,
+    elevation_at: impl Fn(usize, usize, f32, usize, f32) -> f32 + Sync,
+) -> Plane {
+    let gain = inputs.viewing.observer.sensitivity;
+    let base = if raw_tvi { ThresholdBase::TviRaw } else { ThresholdBase::CsfPeak(inputs.csf) };
+    let thresholds = PerLuminance::new(|luminance| base_threshold_cd_m2(luminance, base) / (Z_95 * gain));
+    let contrasts = band_contrasts(inputs.display_luminance_cd_m2);
+    let mut allowed = adapted(inputs.display_luminance_cd_m2, inputs.viewing);
+    allowed.for_each_row_mut(|y, row| {
+        for (x, value) in row.iter_mut().enumerate() {
+            let adaptation = *value;
+            let (mut elevation, mut total) = (0.0, 0.0);
+            for (band, contrast) in contrasts.iter().enumerate() {
+                let contrast = contrast.row(y)[x];
+                elevation += contrast * elevation_at(x, y, adaptation, band, contrast);
+                total += contrast;
+            }
+            *value = thresholds.at(adaptation) * if total > 0.0 { factor(elevation / total) } else { 1.0 };
+        }
+    });
+    allowed
 }
 
 fn smoothed(plane: &Plane, hole: usize) -> Plane {

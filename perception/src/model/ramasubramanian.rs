@@ -1,13 +1,11 @@
 //! Ramasubramanian, Pattanaik and Greenberg.
 
-use super::pyramid::{BANDS, band_contrasts, band_frequency_cpd};
-use super::{ModelInputs, PerLuminance, ThresholdModel, Z_95};
-use crate::adaptation::local_adaptation;
+use super::pyramid::{BANDS, band_frequency_cpd, contrast_weighted};
+use super::{ModelInputs, PerLuminance, ThresholdModel};
 use crate::csf::peak_sensitivity;
 use crate::error::Error;
 use crate::masking::threshold_elevation;
 use crate::plane::Plane;
-use crate::tvi::{ThresholdBase, base_threshold_cd_m2};
 
 /// "A perceptually based physical error metric for realistic image synthesis", SIGGRAPH 1999: T = TVI(`L_a`) · F, where
 /// F = Σ (`C_i`/ΣC) · (`S_max`/S(`ρ_i`)) · mask(`C_i` S(`ρ_i`)) raises the threshold where the picture's contrast lies off the peak of
@@ -34,10 +32,8 @@ impl ThresholdModel for Ramasubramanian {
 
     fn allowed_standard_error_cd_m2(&self, inputs: &ModelInputs<'_>) -> Result<Plane, Error> {
         inputs.check()?;
-        let ppd = inputs.viewing.display.pixels_per_degree;
+        let ppd = inputs.viewing.display.pixel_density().mean();
         let gain = inputs.viewing.observer.sensitivity;
-        let base = if self.raw_tvi { ThresholdBase::TviRaw } else { ThresholdBase::CsfPeak(inputs.csf) };
-        let thresholds = PerLuminance::new(|luminance| base_threshold_cd_m2(luminance, base) / (Z_95 * gain));
         let peak = peak_sensitivity(inputs.csf, 100.0);
         let elevations: Vec<f32> = (0..BANDS)
             .map(|band| {
@@ -50,23 +46,10 @@ impl ThresholdModel for Ramasubramanian {
                 PerLuminance::new(|luminance| gain * inputs.csf.sensitivity(band_frequency_cpd(band, ppd), luminance))
             })
             .collect();
-        let contrasts = band_contrasts(inputs.display_luminance_cd_m2);
-        let mut allowed = local_adaptation(inputs.display_luminance_cd_m2, ppd);
-        allowed.for_each_row_mut(|y, row| {
-            for (x, value) in row.iter_mut().enumerate() {
-                let adaptation = *value;
-                let (mut factor, mut total) = (0.0, 0.0);
-                for band in 0..BANDS {
-                    let contrast = contrasts[band].row(y)[x];
-                    let mask = f64::from(contrast * sensitivities[band].at(adaptation));
-                    factor += contrast * elevations[band] * threshold_elevation(mask) as f32;
-                    total += contrast;
-                }
-                // A picture without contrast has no weights: nothing is elevated.
-                let factor = if total > 0.0 { factor / total } else { 1.0 };
-                *value = thresholds.at(adaptation) * factor.clamp(*FACTOR.start(), *FACTOR.end());
-            }
-        });
-        Ok(allowed)
+        let factor = |elevation: f32| elevation.clamp(*FACTOR.start(), *FACTOR.end());
+        Ok(contrast_weighted(inputs, self.raw_tvi, factor, |_, _, adaptation, band, contrast| {
+            let mask = f64::from(contrast * sensitivities[band].at(adaptation));
+            elevations[band] * threshold_elevation(mask) as f32
+        }))
     }
 }

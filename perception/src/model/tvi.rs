@@ -1,7 +1,7 @@
 //! Threshold versus intensity alone.
 
 use super::{ModelInputs, PerLuminance, ThresholdModel, Z_95};
-use crate::adaptation::local_adaptation;
+use crate::adaptation::adapted;
 use crate::error::Error;
 use crate::plane::Plane;
 use crate::tvi::{ThresholdBase, base_threshold_cd_m2};
@@ -27,7 +27,6 @@ impl ThresholdModel for Tvi {
         let base = if self.shifted { ThresholdBase::TviShifted } else { ThresholdBase::TviRaw };
         let gain = inputs.viewing.observer.sensitivity;
         let table = PerLuminance::new(|luminance| base_threshold_cd_m2(luminance, base) / (Z_95 * gain));
-        let ppd = inputs.viewing.display.pixels_per_degree;
-        Ok(local_adaptation(inputs.display_luminance_cd_m2, ppd).map(|adaptation| table.at(adaptation)))
+        Ok(adapted(inputs.display_luminance_cd_m2, inputs.viewing).map(|adaptation| table.at(adaptation)))
     }
 }

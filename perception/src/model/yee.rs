@@ -1,12 +1,10 @@
 //! Yee, Pattanaik and Greenberg.
 
-use super::pyramid::{BANDS, band_contrasts, band_frequency_cpd};
-use super::{ModelInputs, PerLuminance, ThresholdModel, Z_95};
-use crate::adaptation::local_adaptation;
-use crate::csf::Daly98;
+use super::pyramid::{BANDS, band_frequency_cpd, contrast_weighted};
+use super::{ModelInputs, PerLuminance, ThresholdModel};
+use crate::csf::{DRIFT_DEG_S, Daly98};
 use crate::error::Error;
 use crate::plane::Plane;
-use crate::tvi::{ThresholdBase, base_threshold_cd_m2};
 
 /// "Spatiotemporal sensitivity and visual attention for efficient rendering of dynamic environments", ACM TOG 20(1),
 /// 2001: the Aleph map, ℵ = TVI(`L_a`) · Σ `R_i` `f_i` with `R_i` the share of band i in the local contrast and
@@ -49,31 +47,21 @@ impl ThresholdModel for Yee {
 
     fn allowed_standard_error_cd_m2(&self, inputs: &ModelInputs<'_>) -> Result<Plane, Error> {
         inputs.check()?;
-        let ppd = inputs.viewing.display.pixels_per_degree;
-        let gain = inputs.viewing.observer.sensitivity;
-        let base = if self.raw_tvi { ThresholdBase::TviRaw } else { ThresholdBase::CsfPeak(inputs.csf) };
-        let thresholds = PerLuminance::new(|luminance| base_threshold_cd_m2(luminance, base) / (Z_95 * gain));
+        let ppd = inputs.viewing.display.pixel_density().mean();
         // A velocity is a positive number over many decades, like a luminance: 0.1 deg/s and up.
         let elevations: Vec<PerLuminance> = (0..BANDS)
             .map(|band| PerLuminance::new(|velocity| self.elevation(band_frequency_cpd(band, ppd), velocity)))
             .collect();
         let velocity = inputs.retinal_velocity_deg_s();
-        let contrasts = band_contrasts(inputs.display_luminance_cd_m2);
-        let mut allowed = local_adaptation(inputs.display_luminance_cd_m2, ppd);
-        allowed.for_each_row_mut(|y, row| {
-            for (x, value) in row.iter_mut().enumerate() {
-                let retinal = velocity.as_ref().map_or(crate::csf::DRIFT_DEG_S as f32, |velocity| velocity.row(y)[x]);
-                let (mut elevation, mut total) = (0.0, 0.0);
-                for (contrast, table) in contrasts.iter().zip(&elevations) {
-                    let contrast = contrast.row(y)[x];
-                    elevation += contrast * table.at(retinal);
-                    total += contrast;
-                }
-                let elevation = if total > 0.0 { (elevation / total).max(1.0) } else { 1.0 };
-                *value = thresholds.at(*value) * elevation;
-            }
-        });
-        Ok(allowed)
+        Ok(contrast_weighted(
+            inputs,
+            self.raw_tvi,
+            |elevation| elevation.max(1.0),
+            |x, y, _, band, _| {
+                let retinal = velocity.as_ref().map_or(DRIFT_DEG_S as f32, |velocity| velocity.row(y)[x]);
+                elevations[band].at(retinal)
+            },
+        ))
     }
 }
 

@@ -1,15 +1,22 @@
 //! Shows the scene's own luminances.
 
-use super::{FittedTone, SceneGuide, ToneOperator};
-use crate::display::Display;
+use serde::{Deserialize, Serialize};
+
+use super::guide::{Pixel, SceneGuide};
+use super::saved::{Fit, SavedTone};
+use super::screen::Screen;
+use super::time::AdaptationState;
+use super::{FittedTone, ToneOperator};
+use crate::display::Viewing;
 
 /// Every scene luminance is shown as itself as far as the display reaches; what it cannot help showing (black and
 /// ambient light) is subtracted first.
 ///
-/// For pictures that are display-referred already, and for judging what a scene would look like through a window.
+/// For pictures that are display-referred already, for judging what a scene would look like through a window, and, with
+/// an exposure in stops, as a fixed exposure that looks at no picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Absolute {
-    /// Multiplies the result.
+    /// Multiplies the result: 2^stops.
     pub exposure: f64,
 }
 
@@ -18,28 +25,27 @@ impl ToneOperator for Absolute {
         "absolute"
     }
 
-    fn fit(&self, _guide: &SceneGuide<'_>, display: &Display) -> Box<dyn FittedTone> {
-        let black_cd_m2 = display.luminance_cd_m2(0.0);
-        let span_cd_m2 = (display.luminance_cd_m2(1.0) - black_cd_m2).max(f64::MIN_POSITIVE);
-        Box::new(Fitted { exposure: self.exposure, black_cd_m2, span_cd_m2 })
+    fn fit(&self, _guide: &SceneGuide<'_>, viewing: &Viewing, _state: Option<&AdaptationState>) -> Box<dyn FittedTone> {
+        Box::new(FittedAbsolute { exposure: self.exposure, screen: Screen::of(&viewing.display) })
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Fitted {
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct FittedAbsolute {
     exposure: f64,
-    black_cd_m2: f64,
-    span_cd_m2: f64,
+    screen: Screen,
 }
 
-impl FittedTone for Fitted {
-    fn relative_luminance(&self, scene_cd_m2: f32) -> f32 {
-        // `max` turns NaN into 0.
-        let shown = self.exposure * f64::from(scene_cd_m2.max(0.0)) - self.black_cd_m2;
-        (shown / self.span_cd_m2).clamp(0.0, f64::from(f32::MAX)) as f32
+impl FittedTone for FittedAbsolute {
+    fn relative_luminance_at(&self, _pixel: Pixel, scene_cd_m2: f32) -> f32 {
+        self.screen.relative(self.exposure * f64::from(scene_cd_m2.max(0.0)))
     }
 
     fn describe(&self) -> String {
         format!("absolute: {} cd/m² shown for each cd/m² of the scene", self.exposure)
+    }
+
+    fn save(&self) -> SavedTone {
+        SavedTone(Fit::Absolute(self.clone()))
     }
 }

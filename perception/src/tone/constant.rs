@@ -1,48 +1,84 @@
-//! One exposure for the whole picture, found automatically.
+//! One exposure for the whole picture.
 
+use super::scale::Scale;
 use super::statistics::SceneStatistics;
-use super::{FittedTone, Scale, SceneGuide, ToneOperator};
-use crate::display::Display;
+use super::time::AdaptationState;
+use super::{FittedTone, SceneGuide, ToneOperator};
+use crate::display::Viewing;
+use crate::plane::Plane;
+
+/// How long a camera would expose.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Exposure {
+    /// The geometric mean of the middle 94 % of the pixels becomes middle grey (0.18), unless that would clip more than
+    /// one pixel in twenty, when the 95 % point becomes white. Neither fireflies nor a small lamp in view move it, and a
+    /// night scene is not lifted until its windows burn out.
+    #[default]
+    Automatic,
+    /// The darkest tenth ends at middle grey: detail in the shadows, whatever becomes of the rest.
+    Long,
+    /// One pixel in a thousand is white: detail in the lights, whatever becomes of the rest.
+    Short,
+}
 
 /// Multiplies by one number, as a camera's exposure does.
-///
-/// The geometric mean of the middle 94 % of the pixels becomes middle grey (0.18), unless that would clip more than
-/// one pixel in twenty, when the 95 % point becomes white. Neither fireflies nor a small lamp in view move it, and a
-/// night scene is not lifted until its windows burn out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Constant {
     /// Multiplies the result: 2^stops.
     pub exposure: f64,
+    /// What the exposure aims at.
+    pub time: Exposure,
 }
 
 /// Linear light of middle grey.
-const KEY: f64 = 0.18;
+pub(super) const KEY: f64 = 0.18;
 /// Share of the pixels left out at each end before averaging.
 const TRIM: f64 = 0.03;
 /// Share of the pixels that must not clip.
 const UNCLIPPED: f64 = 0.95;
+const DARK: f64 = 0.1;
+const LIGHT: f64 = 0.999;
+
+/// Display light for one cd/m² of the scene; 1 for a black picture.
+pub(super) fn exposure_of(luminance_cd_m2: &Plane, time: Exposure) -> f64 {
+    let statistics = SceneStatistics::of(luminance_cd_m2);
+    let found = match time {
+        Exposure::Automatic => {
+            let key = statistics.log_average(TRIM, 1.0 - TRIM).map(|average| KEY / average);
+            let clip = statistics.quantile(UNCLIPPED).map(f64::recip);
+            key.zip(clip).map(|(key, clip)| key.min(clip))
+        }
+        Exposure::Long => statistics.quantile(DARK).map(|dark| KEY / dark),
+        Exposure::Short => statistics.quantile(LIGHT).map(f64::recip),
+    };
+    found.unwrap_or(1.0)
+}
 
 impl ToneOperator for Constant {
     fn name(&self) -> &'static str {
-        "constant"
+        match self.time {
+            Exposure::Automatic => "constant",
+            Exposure::Long => "constant-long",
+            Exposure::Short => "constant-short",
+        }
     }
 
-    fn fit(&self, guide: &SceneGuide<'_>, _display: &Display) -> Box<dyn FittedTone> {
-        let statistics = SceneStatistics::of(guide.luminance_cd_m2);
-        let key_scale = statistics.log_average(TRIM, 1.0 - TRIM).map_or(1.0, |average| KEY / average);
-        let clip_scale = statistics.quantile(UNCLIPPED).map_or(1.0, f64::recip);
-        Box::new(Scale { operator: self.name(), relative_per_cd_m2: self.exposure * key_scale.min(clip_scale) })
+    fn fit(&self, guide: &SceneGuide<'_>, _viewing: &Viewing, _state: Option<&AdaptationState>) -> Box<dyn FittedTone> {
+        let relative_per_cd_m2 = self.exposure * exposure_of(guide.luminance_cd_m2, self.time);
+        Box::new(Scale { operator: self.name().to_owned(), relative_per_cd_m2 })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plane::Plane;
+
+    fn fitted(guide: &Plane, time: Exposure) -> Box<dyn FittedTone> {
+        Constant { exposure: 1.0, time }.fit(&SceneGuide::of(guide), &Viewing::default(), None)
+    }
 
     fn relative_of_ten(guide: &Plane) -> f32 {
-        let fitted = Constant { exposure: 1.0 }.fit(&SceneGuide { luminance_cd_m2: guide }, &Display::default());
-        fitted.relative_luminance(10.0)
+        fitted(guide, Exposure::Automatic).relative_luminance(10.0)
     }
 
     #[test]
@@ -62,7 +98,16 @@ mod tests {
     fn a_night_scene_keeps_its_windows() {
         let mut night = Plane::filled(100, 100, 0.01);
         night.values_mut()[..1000].fill(100.0);
-        let fitted = Constant { exposure: 1.0 }.fit(&SceneGuide { luminance_cd_m2: &night }, &Display::default());
-        assert!((fitted.relative_luminance(100.0) - 1.0).abs() < 1e-6);
+        assert!((fitted(&night, Exposure::Automatic).relative_luminance(100.0) - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn long_shows_the_shadows_and_short_the_lights() {
+        let steps = Plane::from_fn(1000, 1, |x, _| 1.0 + x as f32);
+        assert!((fitted(&steps, Exposure::Long).relative_luminance(101.0) - 0.18).abs() < 1e-3);
+        assert!((fitted(&steps, Exposure::Short).relative_luminance(999.0) - 1.0).abs() < 1e-6);
+        let stop = Constant { exposure: 2.0, time: Exposure::Short };
+        let brighter = stop.fit(&SceneGuide::of(&steps), &Viewing::default(), None);
+        assert!((brighter.relative_luminance(999.0) - 2.0).abs() < 1e-6);
     }
 }

@@ -1,37 +1,85 @@
 //! What operators want to know of a picture as a whole.
 
+use rayon::prelude::*;
+
 use crate::plane::Plane;
 
 /// Below this, cd/m², a pixel says nothing about how a picture should be exposed (the floor of human vision).
 const FLOOR_CD_M2: f32 = 1e-4;
+/// Pixels summed by one thread at a time. Sums are added in the picture's order, whatever the number of threads.
+const CHUNK: usize = 1 << 14;
+
+/// Whether a pixel says something about exposure: blacks (an empty background is no reason to expose longer) and values
+/// that are not finite do not.
+fn counts(value: f32) -> bool {
+    value.is_finite() && value > FLOOR_CD_M2
+}
+
+/// Geometric mean, cd/m², of the pixels above the floor of vision; `None` for a black picture.
+pub(super) fn log_average(luminance_cd_m2: &Plane) -> Option<f64> {
+    let sums: Vec<LogSum> = luminance_cd_m2
+        .values()
+        .par_chunks(CHUNK)
+        .map(|values| values.iter().fold(LogSum::default(), |sum, &value| sum.with(value, 1.0)))
+        .collect();
+    LogSum::mean(&sums)
+}
+
+/// The same with a weight for each pixel, `weight_at(x, y)`.
+pub(super) fn weighted_log_average(plane: &Plane, weight_at: impl Fn(usize, usize) -> f64 + Sync) -> Option<f64> {
+    let sums: Vec<LogSum> = (0..plane.height())
+        .into_par_iter()
+        .map(|y| {
+            let row = plane.row(y).iter().enumerate();
+            row.fold(LogSum::default(), |sum, (x, &value)| sum.with(value, weight_at(x, y)))
+        })
+        .collect();
+    LogSum::mean(&sums)
+}
+
+#[derive(Clone, Copy, Default)]
+struct LogSum {
+    log: f64,
+    weight: f64,
+}
+
+impl LogSum {
+    fn with(self, value: f32, weight: f64) -> Self {
+        if counts(value) {
+            Self { log: self.log + weight * f64::from(value.ln()), weight: self.weight + weight }
+        } else {
+            self
+        }
+    }
+
+    fn mean(sums: &[Self]) -> Option<f64> {
+        let (log, weight) = sums.iter().fold((0.0, 0.0), |(log, weight), sum| (log + sum.log, weight + sum.weight));
+        (weight > 0.0).then(|| (log / weight).exp())
+    }
+}
 
 /// Scene luminances above the floor of vision, in rising order.
 #[derive(Clone, Debug)]
-pub(crate) struct SceneStatistics {
+pub(super) struct SceneStatistics {
     sorted_cd_m2: Vec<f32>,
 }
 
 impl SceneStatistics {
-    /// Leaves out blacks (an empty background is no reason to expose longer) and values that are not finite.
-    pub(crate) fn of(luminance_cd_m2: &Plane) -> Self {
-        let mut sorted_cd_m2: Vec<f32> = luminance_cd_m2
-            .values()
-            .iter()
-            .copied()
-            .filter(|value| value.is_finite() && *value > FLOOR_CD_M2)
-            .collect();
-        sorted_cd_m2.sort_unstable_by(f32::total_cmp);
+    pub(super) fn of(luminance_cd_m2: &Plane) -> Self {
+        let mut sorted_cd_m2: Vec<f32> =
+            luminance_cd_m2.values().iter().copied().filter(|&value| counts(value)).collect();
+        sorted_cd_m2.par_sort_unstable_by(f32::total_cmp);
         Self { sorted_cd_m2 }
     }
 
     /// The value below which the share `fraction` of the pixels lies; `None` for a black picture.
-    pub(crate) fn quantile(&self, fraction: f64) -> Option<f64> {
+    pub(super) fn quantile(&self, fraction: f64) -> Option<f64> {
         let last = self.sorted_cd_m2.len().checked_sub(1)?;
         Some(f64::from(self.sorted_cd_m2[(fraction.clamp(0.0, 1.0) * last as f64).round() as usize]))
     }
 
     /// Geometric mean of the pixels between two quantiles; `None` for a black picture.
-    pub(crate) fn log_average(&self, from: f64, to: f64) -> Option<f64> {
+    pub(super) fn log_average(&self, from: f64, to: f64) -> Option<f64> {
         let count = self.sorted_cd_m2.len();
         let first = (from * count as f64).floor() as usize;
         let end = ((to * count as f64).ceil() as usize).clamp(first, count);
@@ -54,5 +102,14 @@ mod tests {
         assert!((statistics.log_average(0.03, 0.97).unwrap() - 3.0).abs() < 1e-9);
         assert_eq!(statistics.quantile(0.5), Some(3.0));
         assert!(SceneStatistics::of(&Plane::filled(4, 4, 0.0)).quantile(0.5).is_none());
+        assert!(log_average(&Plane::filled(4, 4, 0.0)).is_none());
+    }
+
+    #[test]
+    fn weights_choose_what_is_averaged() {
+        let plane = Plane::from_fn(20, 4, |x, _| if x < 10 { 1.0 } else { 100.0 });
+        assert!((log_average(&plane).unwrap() - 10.0).abs() < 1e-6);
+        let right = weighted_log_average(&plane, |x, _| f64::from(u8::from(x >= 10)));
+        assert!((right.unwrap() - 100.0).abs() < 1e-4);
     }
 }

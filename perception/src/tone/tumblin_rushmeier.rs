@@ -1,18 +1,27 @@
 //! Tumblin and Rushmeier's brightness-preserving operator.
 
-use super::statistics::SceneStatistics;
-use super::{FittedTone, SceneGuide, ToneOperator};
-use crate::display::Display;
+use serde::{Deserialize, Serialize};
+
+use super::field::{AdaptationScope, LocalAdaptation};
+use super::guide::{Pixel, SceneGuide};
+use super::saved::{Fit, SavedTone};
+use super::screen::Screen;
+use super::time::{AdaptationState, Goal};
+use super::{FittedTone, ToneOperator};
+use crate::display::Viewing;
 
 /// Makes brightness on the display equal to brightness in the scene, by Stevens and Stevens' power laws.
 ///
 /// Tumblin and Rushmeier, "Tone reproduction for realistic images", IEEE CG&A 13(6), 1993. Adaptation of the scene is
-/// the geometric mean of its pixels, not a pixel's own (a local exponent reverses contrast at edges); that of the
-/// display is white / √(white / black). The display's black is subtracted, since the display adds it again.
+/// the geometric mean of its pixels (a pixel's own would reverse contrast at edges, as [`AdaptationScope::Local`] does in
+/// part); that of the display is white / √(white / black). The display's black is subtracted, since the display adds it
+/// again.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TumblinRushmeier {
     /// Multiplies the result: 2^stops.
     pub exposure: f64,
+    /// What the eye is adapted to.
+    pub scope: AdaptationScope,
 }
 
 /// One lambert in cd/m².
@@ -25,25 +34,31 @@ impl ToneOperator for TumblinRushmeier {
         "tumblin-rushmeier"
     }
 
-    fn fit(&self, guide: &SceneGuide<'_>, display: &Display) -> Box<dyn FittedTone> {
-        let black_cd_m2 = display.luminance_cd_m2(0.0);
-        let white_cd_m2 = display.luminance_cd_m2(1.0);
+    fn sees_adaptation(&self) -> bool {
+        true
+    }
+
+    fn fit(&self, guide: &SceneGuide<'_>, viewing: &Viewing, state: Option<&AdaptationState>) -> Box<dyn FittedTone> {
+        let ppd = viewing.display.pixels_per_degree;
+        let screen = Screen::of(&viewing.display);
         // A display without any black has no contrast to take the root of; 10 000:1 is as good as eyes need.
-        let display_adaptation = (white_cd_m2 * black_cd_m2.max(white_cd_m2 * 1e-4)).sqrt();
-        let scene_adaptation =
-            SceneStatistics::of(guide.luminance_cd_m2).log_average(0.0, 1.0).unwrap_or(display_adaptation);
-        Box::new(Fitted {
-            law: BrightnessMatch::between(scene_adaptation, display_adaptation),
-            scene_adaptation_cd_m2: scene_adaptation,
-            black_cd_m2,
-            span_cd_m2: (white_cd_m2 - black_cd_m2).max(f64::MIN_POSITIVE),
+        let white_cd_m2 = screen.white_cd_m2();
+        let display_adaptation = (white_cd_m2 * screen.black_cd_m2.max(white_cd_m2 * 1e-4)).sqrt();
+        let scene_adaptation_cd_m2 =
+            state.map_or_else(|| Goal::of(guide, ppd).cones_cd_m2, |state| state.cones.neural_cd_m2);
+        Box::new(FittedTumblinRushmeier {
+            law: BrightnessMatch::between(scene_adaptation_cd_m2, display_adaptation),
+            scene_adaptation_cd_m2,
+            display_adaptation_cd_m2: display_adaptation,
+            local: LocalAdaptation::of(guide, self.scope, &viewing.display),
+            screen,
             exposure: self.exposure,
         })
     }
 }
 
 /// `L_d` = gain · `L_w`^exponent, both in lamberts.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct BrightnessMatch {
     exponent: f64,
     gain: f64,
@@ -72,19 +87,23 @@ impl BrightnessMatch {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Fitted {
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct FittedTumblinRushmeier {
     law: BrightnessMatch,
     scene_adaptation_cd_m2: f64,
-    black_cd_m2: f64,
-    span_cd_m2: f64,
+    display_adaptation_cd_m2: f64,
+    local: LocalAdaptation,
+    screen: Screen,
     exposure: f64,
 }
 
-impl FittedTone for Fitted {
-    fn relative_luminance(&self, scene_cd_m2: f32) -> f32 {
-        let shown = self.exposure * self.law.display_cd_m2(f64::from(scene_cd_m2)) - self.black_cd_m2;
-        (shown / self.span_cd_m2).clamp(0.0, f64::from(f32::MAX)) as f32
+impl FittedTone for FittedTumblinRushmeier {
+    fn relative_luminance_at(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
+        let law = self
+            .local
+            .at(pixel)
+            .map_or(self.law, |local| BrightnessMatch::between(local.cones_cd_m2, self.display_adaptation_cd_m2));
+        self.screen.relative(self.exposure * law.display_cd_m2(f64::from(scene_cd_m2)))
     }
 
     fn describe(&self) -> String {
@@ -92,6 +111,10 @@ impl FittedTone for Fitted {
             "tumblin-rushmeier: exponent {:.4} for a scene adaptation of {:.4} cd/m²",
             self.law.exponent, self.scene_adaptation_cd_m2
         )
+    }
+
+    fn save(&self) -> SavedTone {
+        SavedTone(Fit::TumblinRushmeier(self.clone()))
     }
 }
 

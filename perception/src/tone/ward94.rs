@@ -1,8 +1,14 @@
 //! Ward's contrast-based scale factor.
 
-use super::statistics::SceneStatistics;
-use super::{FittedTone, Scale, SceneGuide, ToneOperator};
-use crate::display::Display;
+use serde::{Deserialize, Serialize};
+
+use super::field::{AdaptationScope, LocalAdaptation};
+use super::guide::{Pixel, SceneGuide};
+use super::saved::{Fit, SavedTone};
+use super::screen::finite;
+use super::time::{AdaptationState, Goal};
+use super::{FittedTone, ToneOperator};
+use crate::display::Viewing;
 
 /// Scales so that what is just visible in the scene is just visible on the display.
 ///
@@ -13,6 +19,8 @@ use crate::display::Display;
 pub struct Ward94 {
     /// Multiplies the result: 2^stops.
     pub exposure: f64,
+    /// What the eye is adapted to.
+    pub scope: AdaptationScope,
 }
 
 impl ToneOperator for Ward94 {
@@ -20,26 +28,61 @@ impl ToneOperator for Ward94 {
         "ward94"
     }
 
-    fn fit(&self, guide: &SceneGuide<'_>, display: &Display) -> Box<dyn FittedTone> {
-        let display_adaptation = display.white_cd_m2 / 2.0;
-        let scene_adaptation =
-            SceneStatistics::of(guide.luminance_cd_m2).log_average(0.0, 1.0).unwrap_or(display_adaptation);
-        let factor = scale_factor(scene_adaptation, display_adaptation);
-        Box::new(Scale {
-            operator: self.name(),
-            relative_per_cd_m2: self.exposure * factor / display.white_cd_m2.max(f64::MIN_POSITIVE),
+    fn sees_adaptation(&self) -> bool {
+        true
+    }
+
+    fn fit(&self, guide: &SceneGuide<'_>, viewing: &Viewing, state: Option<&AdaptationState>) -> Box<dyn FittedTone> {
+        let ppd = viewing.display.pixels_per_degree;
+        let adaptation_cd_m2 = state.map_or_else(|| Goal::of(guide, ppd).cones_cd_m2, |state| state.cones.neural_cd_m2);
+        Box::new(FittedWard94 {
+            exposure: self.exposure,
+            white_cd_m2: viewing.display.white_cd_m2.max(f64::MIN_POSITIVE),
+            adaptation_cd_m2,
+            local: LocalAdaptation::of(guide, self.scope, &viewing.display),
         })
     }
 }
 
 /// Display cd/m² for each cd/m² of the scene.
-fn scale_factor(scene_adaptation_cd_m2: f64, display_adaptation_cd_m2: f64) -> f64 {
+pub(super) fn scale_factor(scene_adaptation_cd_m2: f64, display_adaptation_cd_m2: f64) -> f64 {
     ((1.219 + display_adaptation_cd_m2.powf(0.4)) / (1.219 + scene_adaptation_cd_m2.powf(0.4))).powf(2.5)
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct FittedWard94 {
+    exposure: f64,
+    white_cd_m2: f64,
+    adaptation_cd_m2: f64,
+    local: LocalAdaptation,
+}
+
+impl FittedWard94 {
+    fn relative_per_cd_m2(&self, adaptation_cd_m2: f64) -> f64 {
+        self.exposure * scale_factor(adaptation_cd_m2, self.white_cd_m2 / 2.0) / self.white_cd_m2
+    }
+}
+
+impl FittedTone for FittedWard94 {
+    fn relative_luminance_at(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
+        let adaptation = self.local.at(pixel).map_or(self.adaptation_cd_m2, |local| local.cones_cd_m2);
+        finite(f64::from(scene_cd_m2.max(0.0)) * self.relative_per_cd_m2(adaptation))
+    }
+
+    fn describe(&self) -> String {
+        let white = self.relative_per_cd_m2(self.adaptation_cd_m2).recip();
+        format!("ward94: white at {white:.4} cd/m² of the scene")
+    }
+
+    fn save(&self) -> SavedTone {
+        SavedTone(Fit::Ward94(self.clone()))
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::display::Display;
     use crate::plane::Plane;
 
     #[test]
@@ -52,6 +95,7 @@ mod tests {
             (50.0, 1.0),
             (100.0, 0.567_197_577_4),
             (1000.0, 0.073_293_226_57),
+            (1e4, 0.008_180_311),
         ] {
             assert!((scale_factor(scene, 50.0) / expected - 1.0).abs() < 1e-6, "{scene}");
         }
@@ -59,9 +103,22 @@ mod tests {
 
     #[test]
     fn the_fit_uses_half_the_white() {
-        let display = Display { white_cd_m2: 100.0, ..Display::default() };
+        let viewing = Viewing::of(Display { white_cd_m2: 100.0, ..Display::default() });
         let guide = Plane::filled(4, 4, 10.0);
-        let fitted = Ward94 { exposure: 1.0 }.fit(&SceneGuide { luminance_cd_m2: &guide }, &display);
+        let ward94 = Ward94 { exposure: 1.0, scope: AdaptationScope::World };
+        let fitted = ward94.fit(&SceneGuide::of(&guide), &viewing, None);
         assert!((fitted.relative_luminance(10.0) - 0.328_084_7).abs() < 1e-5);
+    }
+
+    #[test]
+    fn local_adaptation_lifts_the_shadow_and_not_the_light() {
+        let viewing = Viewing::of(Display { pixels_per_degree: 20.0, ..Display::default() });
+        let guide = Plane::from_fn(120, 20, |x, _| if x < 60 { 1.0 } else { 1000.0 });
+        let at = |scope, x, scene| {
+            let fitted = Ward94 { exposure: 1.0, scope }.fit(&SceneGuide::of(&guide), &viewing, None);
+            fitted.relative_luminance_at(Pixel { x, y: 10 }, scene)
+        };
+        assert!(at(AdaptationScope::Local, 5, 1.0) > 2.0 * at(AdaptationScope::World, 5, 1.0));
+        assert!(at(AdaptationScope::Local, 110, 1000.0) < 0.5 * at(AdaptationScope::World, 110, 1000.0));
     }
 }

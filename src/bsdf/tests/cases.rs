@@ -1,15 +1,21 @@
 //! Every model with parameters worth testing, and the directions it is seen from.
 
 use super::sphere::Peak;
-use crate::bsdf::{Bsdf, DielectricTables};
+use crate::bsdf::{
+    AnisotropicTable, Bsdf, CoatTables, Conductor, DielectricTables, HeTorrance, LayerTables, Microfacets, Phong, Ward,
+    WidthRange,
+};
+use crate::scene::Distribution;
 use glam::Vec3;
 use std::sync::LazyLock;
 
 /// What a model must give back of the light that falls on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Budget {
-    /// All of it.
+    /// All of it, within 0.5 %.
     Lossless,
+    /// All of it, within 1 %: dielectrics and interpolated widths of anisotropic facets.
+    NearlyLossless,
     /// No more than all.
     AtMost,
 }
@@ -61,16 +67,162 @@ pub(super) fn views() -> Vec<Vec3> {
         .collect()
 }
 
-pub(super) static GLASS: LazyLock<DielectricTables> = LazyLock::new(|| DielectricTables::new(1.5));
-pub(super) static WATER: LazyLock<DielectricTables> = LazyLock::new(|| DielectricTables::new(1.33));
-pub(super) static DIAMOND: LazyLock<DielectricTables> = LazyLock::new(|| DielectricTables::new(2.4));
+pub(super) static GLASS: LazyLock<DielectricTables> = LazyLock::new(|| DielectricTables::new(1.5, Distribution::Ggx));
+pub(super) static WATER: LazyLock<DielectricTables> = LazyLock::new(|| DielectricTables::new(1.33, Distribution::Ggx));
+pub(super) static DIAMOND: LazyLock<DielectricTables> = LazyLock::new(|| DielectricTables::new(2.4, Distribution::Ggx));
 
 const GRAY_BLUE: Vec3 = Vec3::new(0.2, 0.5, 0.8);
 const GOLD_ETA: Vec3 = Vec3::new(0.143, 0.375, 1.442);
 const GOLD_K: Vec3 = Vec3::new(3.983, 2.386, 1.603);
 
+pub(super) static BECKMANN_GLASS: LazyLock<DielectricTables> =
+    LazyLock::new(|| DielectricTables::new(1.5, Distribution::Beckmann));
+pub(super) static COAT: LazyLock<CoatTables> = LazyLock::new(|| CoatTables::new(1.5, Distribution::Ggx));
+/// Layers of any roughness, as with textures.
+pub(super) static LAYERS: LazyLock<LayerTables> =
+    LazyLock::new(|| LayerTables::new(1.5, [Distribution::Ggx; 2], [WidthRange::Textured; 2]));
+
+/// Facets twice as wide along one axis as the mean, half as wide along the other.
+fn brushed(distribution: Distribution, roughness: f32) -> Microfacets {
+    let alpha = roughness * roughness;
+    Microfacets::new((2.0 * alpha).min(1.0), 0.5 * alpha, distribution)
+}
+
+/// Both distributions, isotropic and not.
+fn facet_cases(cases: &mut Vec<Case>) {
+    use Budget::{Lossless, NearlyLossless};
+    use Distribution::{Beckmann, Ggx};
+    let lossless = |facets| Bsdf::conductor(Vec3::ZERO, Vec3::splat(3.0), facets);
+    // A material's tables live as long as the material; a test's as long as the test.
+    let brushed_metal = |facets: Microfacets, distribution, ranges| {
+        let table: &'static AnisotropicTable = Box::leak(Box::new(AnisotropicTable::missing(ranges, distribution)));
+        Bsdf::Conductor(Conductor::new(Vec3::ZERO, Vec3::splat(3.0), Vec3::ONE, facets, Some(table)))
+    };
+    let textured: &'static AnisotropicTable =
+        Box::leak(Box::new(AnisotropicTable::missing([WidthRange::Textured; 2], Ggx)));
+    for roughness in [0.2f32, 0.6, 1.0] {
+        let alpha = roughness * roughness;
+        let width = f64::from(alpha);
+        let widths = [(2.0 * alpha).min(1.0), 0.5 * alpha].map(WidthRange::Constant);
+        let mut metal = |name: &str, bsdf, width| {
+            cases.push(Case::new(format!("{name} metal {roughness}"), bsdf, Lossless, width));
+        };
+        metal("Beckmann", lossless(Microfacets::isotropic(alpha, Beckmann)), width);
+        for distribution in [Ggx, Beckmann] {
+            let facets = brushed(distribution, roughness);
+            metal(&format!("brushed {distribution:?}"), brushed_metal(facets, distribution, widths), 0.5 * width);
+        }
+        let textured = Conductor::new(Vec3::ZERO, Vec3::splat(3.0), Vec3::ONE, brushed(Ggx, roughness), Some(textured));
+        cases.push(Case::new(
+            format!("textured brushed metal {roughness}"),
+            Bsdf::Conductor(textured),
+            NearlyLossless,
+            0.5 * width,
+        ));
+        let mut glass = |name: &str, facets: Microfacets, tables, width| {
+            cases.push(Case {
+                eta: 1.5,
+                ..Case::new(
+                    format!("{name} glass {roughness}"),
+                    Bsdf::dielectric(1.5, facets, Vec3::ONE, Some(tables)),
+                    NearlyLossless,
+                    0.3 * width,
+                )
+            });
+        };
+        glass("Beckmann", Microfacets::isotropic(alpha, Beckmann), &*BECKMANN_GLASS, width);
+        let brushed_glass = DielectricTables::new(1.5, Ggx).with_anisotropy(widths);
+        glass("brushed", brushed(Ggx, roughness), Box::leak(Box::new(brushed_glass)), 0.5 * width);
+    }
+}
+
+/// Coats over other models, and mixes.
+fn layered_cases(cases: &mut Vec<Case>) {
+    use Budget::{AtMost, Lossless};
+    let lossless = (Vec3::splat(1.0), Vec3::splat(1e5));
+    for roughness in [0.0f32, 0.3, 1.0] {
+        let width = if roughness > 0.0 { f64::from(roughness * roughness) } else { 1.0 };
+        cases.push(Case::new(
+            format!("white plastic {roughness}"),
+            Bsdf::coated_diffuse(Vec3::ONE, roughness, &COAT),
+            Lossless,
+            width,
+        ));
+        cases.push(Case::new(
+            format!("plastic {roughness}"),
+            Bsdf::coated_diffuse(GRAY_BLUE, roughness, &COAT),
+            AtMost,
+            width,
+        ));
+    }
+    for (coat, metal) in [(0.0f32, 0.3f32), (0.3, 0.0), (0.2, 0.5), (1.0, 1.0), (0.0, 1.0)] {
+        // The coat's facets widen a smooth metal's to 0.17 of their own.
+        let width =
+            f64::from(0.17 * coat * coat + metal * metal).min(if coat > 0.0 { f64::from(coat * coat) } else { 1.0 });
+        cases.push(Case::new(
+            format!("coated lossless metal {coat} {metal}"),
+            Bsdf::coated_conductor(lossless.0, lossless.1, metal, coat, &LAYERS),
+            Lossless,
+            width,
+        ));
+        cases.push(Case::new(
+            format!("coated gold {coat} {metal}"),
+            Bsdf::coated_conductor(GOLD_ETA, GOLD_K, metal, coat, &LAYERS),
+            AtMost,
+            width,
+        ));
+    }
+    static WHITE: LazyLock<Bsdf<'static>> = LazyLock::new(|| Bsdf::lambert(Vec3::ONE));
+    static SILVER: LazyLock<Bsdf<'static>> = LazyLock::new(|| Bsdf::conductor(Vec3::ZERO, Vec3::splat(3.0), 0.3));
+    static REFLECTOR: LazyLock<Bsdf<'static>> = LazyLock::new(|| Bsdf::mirror(Vec3::ONE));
+    static NESTED: LazyLock<Bsdf<'static>> = LazyLock::new(|| Bsdf::mix(&WHITE, &SILVER, 0.5));
+    cases.push(Case::new("mix of smooth lobes", Bsdf::mix(&WHITE, &SILVER, 0.3), Lossless, 0.09));
+    cases.push(Case::new("mix with a mirror", Bsdf::mix(&REFLECTOR, &NESTED, 0.6), Lossless, 0.09));
+}
+
+/// Models without microfacets.
+fn empirical_cases(cases: &mut Vec<Case>) {
+    use Budget::AtMost;
+    let half = Vec3::splat(0.5);
+    for (exponent, width) in [(0.0f32, 1.0), (10.0, 0.3), (1000.0, 0.03)] {
+        let phong = |diffuse, specular| Bsdf::Phong(Phong::new(diffuse, specular, exponent));
+        cases.push(Case::new(format!("phong {exponent}"), phong(half, half), AtMost, width));
+        cases.push(Case::new(format!("phong lobe {exponent}"), phong(Vec3::ZERO, Vec3::ONE), AtMost, width));
+    }
+    for alphas in [[0.1f32, 0.1], [0.3, 0.1], [1.0, 1.0]] {
+        let ward = |diffuse, specular| Bsdf::Ward(Ward::new(diffuse, specular, alphas));
+        let width = f64::from(alphas[1]);
+        cases.push(Case::new(format!("ward {alphas:?}"), ward(half, half), AtMost, width));
+        cases.push(Case::new(format!("ward lobe {alphas:?}"), ward(Vec3::ZERO, Vec3::ONE), AtMost, width));
+    }
+    // Rms height and autocorrelation length in nanometres.
+    // Few, for each value costs a sum of up to a hundred terms.
+    for (height, correlation) in [(50.0f32, 1500.0f32), (800.0, 4000.0)] {
+        let relief = |eta, k, diffuse| Bsdf::HeTorrance(HeTorrance::new(eta, k, height, correlation, diffuse));
+        let width = 0.1;
+        let name = format!("{height} nm, {correlation} nm");
+        cases.push(Case::new(
+            format!("lossless relief {name}"),
+            relief(Vec3::ZERO, Vec3::splat(3.0), Vec3::ZERO),
+            AtMost,
+            width,
+        ));
+        cases.push(Case::new(
+            format!("ceramic relief {name}"),
+            relief(Vec3::splat(1.5), Vec3::ZERO, Vec3::ONE),
+            AtMost,
+            width,
+        ));
+    }
+}
+
 /// Models with at least one smooth lobe.
 pub(super) fn smooth_cases() -> Vec<Case> {
+    static CASES: LazyLock<Vec<Case>> = LazyLock::new(all_smooth_cases);
+    CASES.clone()
+}
+
+fn all_smooth_cases() -> Vec<Case> {
     use Budget::{AtMost, Lossless};
     let mut cases = vec![
         Case::new("lambert white", Bsdf::lambert(Vec3::ONE), Lossless, 1.0),
@@ -150,10 +302,14 @@ pub(super) fn smooth_cases() -> Vec<Case> {
             1.0,
         ));
     }
+    facet_cases(&mut cases);
+    layered_cases(&mut cases);
+    empirical_cases(&mut cases);
     cases
 }
 
-static WATER_REVERSED: LazyLock<DielectricTables> = LazyLock::new(|| DielectricTables::new(1.0 / 1.33));
+static WATER_REVERSED: LazyLock<DielectricTables> =
+    LazyLock::new(|| DielectricTables::new(1.0 / 1.33, Distribution::Ggx));
 
 /// Models that consist of delta lobes.
 pub(super) fn delta_cases() -> Vec<Case> {
@@ -171,6 +327,18 @@ pub(super) fn delta_cases() -> Vec<Case> {
         glass("smooth tinted glass", 1.5, GRAY_BLUE, AtMost),
         Case::new("pane", Bsdf::thin_dielectric(1.5, Vec3::ONE), Lossless, 1.0),
         Case::new("tinted pane", Bsdf::thin_dielectric(1.5, GRAY_BLUE), AtMost, 1.0),
+        Case::new(
+            "coated mirror",
+            Bsdf::coated_conductor(Vec3::ONE, Vec3::splat(1e5), 0.0, 0.0, &LAYERS),
+            Lossless,
+            1.0,
+        ),
+        Case::new(
+            "flat relief",
+            Bsdf::HeTorrance(HeTorrance::new(Vec3::ZERO, Vec3::splat(3.0), 0.0, 1000.0, Vec3::ZERO)),
+            Lossless,
+            1.0,
+        ),
         Case::new("smooth metal", Bsdf::metal_roughness(Vec3::ONE, 1.0, 0.0, 1.5, 0.0), Lossless, 1.0),
     ]
 }

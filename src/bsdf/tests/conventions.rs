@@ -25,7 +25,8 @@ fn a_slab_of_glass_changes_neither_direction_nor_radiance() {
 #[test]
 fn opaque_models_look_the_same_from_both_sides() {
     let wo = Vec3::new(0.36, 0.48, 0.8);
-    let wi = Vec3::new(-0.6, 0.64, 0.48);
+    // Near the mirror direction, where lobes without tails are above 0 too.
+    let wi = Vec3::new(-0.48, -0.36, 0.8);
     for case in smooth_cases() {
         if case.eta != 1.0 {
             continue;

@@ -5,8 +5,14 @@ use super::sphere::{Bins, integrate};
 use super::statistics::{Mean, Random, normal_p, sidak};
 use glam::Vec3;
 
-/// Share of the light that a lossless model may be off by.
-const TOLERANCE: f64 = 0.005;
+/// Share of the light that a model may be off by; none may give back more than comes in by more than that.
+const fn tolerance(budget: Budget) -> f64 {
+    match budget {
+        Budget::Lossless | Budget::AtMost => 0.005,
+        Budget::NearlyLossless => 0.01,
+    }
+}
+
 const SAMPLES: usize = 60_000;
 /// Error of quadrature along the edges that refraction makes.
 const QUADRATURE_ERROR: f64 = 1e-3;
@@ -55,48 +61,40 @@ fn all_cases() -> Vec<Case> {
     smooth_cases().into_iter().chain(delta_cases()).collect()
 }
 
+/// Significance 1e-3 over all models and views for the agreement of sampling and quadrature.
 #[test]
-fn lossless_models_give_back_everything_by_quadrature() {
-    let mut worst = (0.0, String::new());
-    for case in all_cases() {
-        for wo in views() {
-            let energy = by_quadrature(&case, wo);
-            let what = format!("{} cos {}: {energy:.5}", case.name, wo.z);
-            assert!(energy < 1.0 + TOLERANCE, "{what}");
-            if case.budget == Budget::Lossless && (energy - 1.0).abs() > worst.0 {
-                worst = ((energy - 1.0f64).abs(), what);
-            }
-        }
-    }
-    println!("worst furnace error: {worst:?}");
-    assert!(worst.0 < TOLERANCE, "{worst:?}");
-}
-
-/// Significance 1e-3 over all models and views.
-#[test]
-fn sampling_and_quadrature_agree_on_the_energy() {
+fn energy_is_what_the_model_promises_by_quadrature_and_by_sampling() {
     let cases = all_cases();
-    let views = views();
+    let views: Vec<Vec3> = views().into_iter().step_by(2).collect();
     let significance = sidak(1e-3, cases.len() * views.len());
     let mut failures = Vec::new();
     for (number, case) in cases.iter().enumerate() {
+        let mut worst = (f64::MIN, 0.0);
         for (view, &wo) in views.iter().enumerate() {
-            let sampled = by_sampling(case, wo, (number * 100 + view) as u64 + 7);
-            let error = sampled.standard_error();
-            let quadrature = by_quadrature(case, wo);
-            let difference = (sampled.mean() - quadrature).abs();
-            let difference = (difference - QUADRATURE_ERROR).max(0.0);
-            let p = normal_p(difference / error.max(1e-9));
-            // Beyond this the test could not tell 1 from 1.02.
-            if p < significance || error > 5e-3 {
-                failures.push(format!(
-                    "{} cos {}: sampled {:.5} ± {error:.5}, quadrature {quadrature:.5}, p {p:.1e}",
-                    case.name,
-                    wo.z,
-                    sampled.mean(),
-                ));
+            let energy = by_quadrature(case, wo);
+            let error = if case.budget == Budget::AtMost { energy - 1.0 } else { (energy - 1.0).abs() };
+            if error > worst.0 {
+                worst = (error, wo.z);
             }
+            failures.extend(disagreement(case, wo, energy, significance, (number * 100 + view) as u64 + 7));
+        }
+        println!("{}: worst furnace error {:.5} at cos {}", case.name, worst.0, worst.1);
+        if worst.0 > tolerance(case.budget) {
+            failures.push(format!("{}: furnace error {:.5} at cos {}", case.name, worst.0, worst.1));
         }
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
+/// What is wrong between energy by sampling and `energy` by quadrature, if anything is.
+fn disagreement(case: &Case, wo: Vec3, energy: f64, significance: f64, seed: u64) -> Option<String> {
+    let sampled = by_sampling(case, wo, seed);
+    let error = sampled.standard_error();
+    let difference = ((sampled.mean() - energy).abs() - QUADRATURE_ERROR).max(0.0);
+    let p = normal_p(difference / error.max(1e-9));
+    // Beyond an error of 5e-3 the test could not tell 1 from 1.02.
+    (p < significance || error > 5e-3).then(|| {
+        let (name, cos, mean) = (&case.name, wo.z, sampled.mean());
+        format!("{name} cos {cos}: sampled {mean:.5} ± {error:.5}, quadrature {energy:.5}, p {p:.1e}")
+    })
 }

@@ -24,6 +24,8 @@ pub(super) enum IfDark {
     /// The format has none, or files come without: a studio sky stands in, also when the only emitters are weaker than
     /// `WEAK_EMITTER_CD_M2`.
     Studio,
+    /// The same, but the file's own lights are believed however weak they are.
+    StudioWithoutLight,
 }
 
 /// Emitters of interchange files below this many cd/m² are decoration (an "emissive" left at 1), not the scene's light.
@@ -107,7 +109,7 @@ impl Builder {
         };
         validate::check(&scene, path)?;
         let weakest = match if_dark {
-            IfDark::Fail => 0.0,
+            IfDark::Fail | IfDark::StudioWithoutLight => 0.0,
             IfDark::Studio => WEAK_EMITTER_CD_M2 / scene.nits_per_unit as f32,
         };
         if !options.environment_follows && !is_lit(&scene, weakest) {
@@ -118,7 +120,7 @@ impl Builder {
                         "scene has no light: add an [environment], [[lights]] or an object whose material has an emission",
                     ));
                 }
-                IfDark::Studio => {
+                IfDark::Studio | IfDark::StudioWithoutLight => {
                     scene.environment = Some(environment::studio(scene.nits_per_unit, scene.camera.forward));
                     scene.notes.push(
                         "No light in the file: a soft studio of about 1000 cd/m² surrounds the scene.".to_owned(),

@@ -62,12 +62,8 @@ pub fn framed(bounds: Bounds, aspect: f32) -> Camera {
     // A single point has no size: any distance frames it.
     let distance = if distance > 0.0 && distance.is_finite() { distance } else { 1.0 };
     Camera {
-        position: center - distance * forward,
-        forward,
-        up: Vec3::Y,
-        vertical_fov_deg: VERTICAL_FOV_DEG,
-        aperture_radius: 0.0,
         focus_distance: distance,
+        ..Camera::pinhole(center - distance * forward, forward, Vec3::Y, VERTICAL_FOV_DEG)
     }
 }
 
@@ -82,7 +78,7 @@ mod tests {
             let camera = framed(bounds, aspect);
             let right = camera.forward.cross(camera.up).normalize();
             let up = right.cross(camera.forward);
-            let tan = (0.5 * camera.vertical_fov_deg).to_radians().tan();
+            let tan = (0.5 * VERTICAL_FOV_DEG).to_radians().tan();
             let mut widest: f32 = 0.0;
             for corner in 0..8 {
                 let pick = |bit: u32| if corner >> bit & 1 == 0 { 0.0 } else { 1.0 };

@@ -1,25 +1,32 @@
-//! What surrounds a scene: lat-long pictures, one colour, or the soft studio sky of scenes that bring no light.
+//! What surrounds a scene: pictures, one colour, or the soft studio sky of scenes that bring no light.
 
 use super::error::LoadError;
 use super::texture;
-use crate::scene::{Encoding, Environment, Texels};
+use crate::scene::{Encoding, Environment, Parametrisation, Texels};
 use glam::{Mat3, Vec3};
-use std::f32::consts::{PI, TAU};
 use std::path::Path;
 use std::sync::Arc;
 
 /// Columns and rows of the studio sky: its softest edge spans 15 texels.
 const STUDIO_SIZE: [u32; 2] = [256, 128];
 
-/// The same radiance from everywhere, in scene units.
-pub fn constant(radiance: Vec3) -> Environment {
-    Environment { width: 1, height: 1, texels: Arc::new(vec![radiance]), scale: 1.0, from_world: Mat3::IDENTITY }
-}
-
 /// A lat-long picture (.hdr, .exr, .png, ...), times `scale`, turned by `rotation_deg` about +y (counter-clockwise seen
 /// from above).
 pub fn from_file(path: &Path, scale: f32, rotation_deg: f32) -> Result<Environment, LoadError> {
+    let environment = read(path, Parametrisation::LatLong)?;
+    Ok(Environment { scale, from_world: Mat3::from_rotation_y(-rotation_deg.to_radians()), ..environment })
+}
+
+/// A picture in a parametrisation, of scale 1 and not turned. An equal-area picture must be square.
+pub fn read(path: &Path, parametrisation: Parametrisation) -> Result<Environment, LoadError> {
     let picture = texture::decode_bytes(&super::files::read(path)?, path, Encoding::Srgb)?;
+    if parametrisation == Parametrisation::EqualArea && picture.width != picture.height {
+        let problem = format_args!(
+            "an equal-area environment is square, and the picture has {} x {} pixels",
+            picture.width, picture.height
+        );
+        return Err(LoadError::invalid(path, problem));
+    }
     let texels: Vec<Vec3> = match &picture.texels {
         Texels::Bytes(bytes, encoding) => {
             let decode = |value: u8| match encoding {
@@ -32,11 +39,11 @@ pub fn from_file(path: &Path, scale: f32, rotation_deg: f32) -> Result<Environme
         Texels::Floats(floats) => floats.iter().map(|&[r, g, b, _]| Vec3::new(r, g, b).max(Vec3::ZERO)).collect(),
     };
     Ok(Environment {
+        parametrisation,
         width: picture.width,
         height: picture.height,
         texels: Arc::new(texels),
-        scale,
-        from_world: Mat3::from_rotation_y(-rotation_deg.to_radians()),
+        ..Environment::constant(Vec3::ZERO)
     })
 }
 
@@ -55,26 +62,12 @@ pub fn studio(nits_per_unit: f64, forward: Vec3) -> Environment {
         let inside = (0.5 - outside).clamp(0.0, 1.0);
         inside * inside * (3.0 - 2.0 * inside)
     };
-    let mut texels = Vec::with_capacity((width * height) as usize);
-    for row in 0..height {
-        let (sin_theta, cos_theta) = (PI * (row as f32 + 0.5) / height as f32).sin_cos();
-        for column in 0..width {
-            // The middle column is −z, and columns to its right turn towards +x.
-            let (sin_phi, cos_phi) = (TAU * ((column as f32 + 0.5) / width as f32 - 0.5)).sin_cos();
-            let direction = Vec3::new(sin_theta * sin_phi, cos_theta, -sin_theta * cos_phi);
-            let height_share = 0.5 + 0.5 * direction.y;
-            let ambient = Vec3::new(0.95, 0.97, 1.0) * (180.0 + 720.0 * height_share * height_share);
-            let nits = ambient
-                + Vec3::new(1.0, 0.96, 0.9) * 6000.0 * soft_box(direction, key, 0.42)
-                + Vec3::new(0.9, 0.95, 1.0) * 2200.0 * soft_box(direction, rim, 0.28);
-            texels.push(nits);
-        }
-    }
-    Environment {
-        width,
-        height,
-        texels: Arc::new(texels),
-        scale: (1.0 / nits_per_unit) as f32,
-        from_world: Mat3::IDENTITY,
-    }
+    let nits = Environment::from_directions(width, height, |direction| {
+        let height_share = 0.5 + 0.5 * direction.y;
+        let ambient = Vec3::new(0.95, 0.97, 1.0) * (180.0 + 720.0 * height_share * height_share);
+        ambient
+            + Vec3::new(1.0, 0.96, 0.9) * 6000.0 * soft_box(direction, key, 0.42)
+            + Vec3::new(0.9, 0.95, 1.0) * 2200.0 * soft_box(direction, rim, 0.28)
+    });
+    Environment { scale: (1.0 / nits_per_unit) as f32, ..nits }
 }

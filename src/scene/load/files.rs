@@ -7,6 +7,9 @@ use std::path::Path;
 /// No file larger than this is read: a picture, mesh or buffer above it is more likely a slip than a scene.
 const LARGEST_FILE_BYTES: u64 = 4 << 30;
 
+/// Most bytes that a packed file may unpack to: a few kB can stand for gigabytes of nothing.
+const MOST_UNPACKED_BYTES: u64 = 2 << 30;
+
 /// The whole file.
 pub(crate) fn read(path: &Path) -> Result<Vec<u8>, LoadError> {
     // Opened only after the look at its kind: opening a pipe would wait for a writer for ever.
@@ -29,6 +32,25 @@ pub(crate) fn read(path: &Path) -> Result<Vec<u8>, LoadError> {
         return Err(LoadError::invalid(path, "the file is empty"));
     }
     Ok(bytes)
+}
+
+/// The whole file, unpacked if it is a gzip file.
+pub(crate) fn read_unpacked(path: &Path) -> Result<Vec<u8>, LoadError> {
+    let bytes = read(path)?;
+    if !bytes.starts_with(&[0x1f, 0x8b]) {
+        return Ok(bytes);
+    }
+    let mut unpacked = Vec::new();
+    // One more byte than allowed tells a file that ends there from one that goes on.
+    let mut limited = flate2::read::MultiGzDecoder::new(bytes.as_slice()).take(MOST_UNPACKED_BYTES + 1);
+    limited
+        .read_to_end(&mut unpacked)
+        .map_err(|error| LoadError::invalid(path, format_args!("not valid gzip: {error}")))?;
+    if unpacked.len() as u64 > MOST_UNPACKED_BYTES {
+        let problem = format!("unpacks to more than {} MiB", MOST_UNPACKED_BYTES >> 20);
+        return Err(LoadError::too_large(path, problem));
+    }
+    Ok(unpacked)
 }
 
 /// The whole file as text: UTF-8, or UTF-16 with a byte order mark (some Windows exporters write it).

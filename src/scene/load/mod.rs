@@ -25,8 +25,11 @@ mod gltf;
 pub mod metals;
 mod mtl;
 mod obj;
+mod ply;
 mod polygon;
 pub mod shapes;
+pub mod sky;
+mod spectrum;
 #[path = "texture.rs"]
 mod texture;
 mod toml;

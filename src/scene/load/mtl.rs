@@ -6,8 +6,11 @@
 use super::builder::Builder;
 use super::error::LoadError;
 use super::files;
-use super::texture::{IfMissing, Picture, Request};
-use crate::scene::{Alpha, ColorInput, Encoding, Material, MaterialId, ScalarInput, Surface, TextureLookup, Wrap};
+use super::texture::{Adjust, IfMissing, Picture, Request};
+use crate::scene::{
+    Alpha, ColorInput, Encoding, Material, MaterialId, MetalRoughness, Roughness, ScalarInput, Surface, TextureLookup,
+    Wrap,
+};
 use glam::{Vec2, Vec3};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -130,18 +133,7 @@ fn parse_map(text: &str) -> Map {
 /// The material of faces that name none, or one that no file defines.
 pub(super) fn default_material(builder: &mut Builder) -> MaterialId {
     let surface = Surface::Diffuse { reflectance: ColorInput::constant(Vec3::splat(0.7)) };
-    builder.add_material(plain("default", surface))
-}
-
-fn plain(name: &str, surface: Surface) -> Material {
-    Material {
-        name: name.to_owned(),
-        surface,
-        emission: ColorInput::constant(Vec3::ZERO),
-        emits_both_sides: false,
-        normal_map: None,
-        alpha: Alpha::Opaque,
-    }
+    builder.add_material(Material::plain("default", surface))
 }
 
 impl Written {
@@ -169,6 +161,7 @@ impl Written {
             wrap_v: wrap,
             nearest: false,
             if_missing: IfMissing::Replace(if_missing),
+            adjust: Adjust::NONE,
         });
         // MTL's offset and scale are meant for v up; the mesh's coordinates were turned to v down.
         TextureLookup {
@@ -207,7 +200,7 @@ impl Written {
     /// Our material for it.
     pub(super) fn convert(&self, builder: &mut Builder) -> Material {
         let surface = self.surface(builder);
-        let mut material = plain(&self.name, surface);
+        let mut material = Material::plain(&self.name, surface);
         if self.color("ke").is_some_and(|emission| emission.max_element() > 0.0) || self.maps.contains_key("map_ke") {
             material.emission = self.color_input(builder, "ke", Vec3::ZERO);
         }
@@ -265,32 +258,32 @@ impl Written {
                 self.color("tf").filter(|tint| tint.max_element() > 0.0).unwrap_or(Vec3::ONE).min(Vec3::ONE);
             return Surface::Dielectric {
                 ior,
-                roughness: ScalarInput::constant(self.number("pr").unwrap_or(0.0).clamp(0.0, 1.0)),
+                roughness: Roughness::constant(self.number("pr").unwrap_or(0.0).clamp(0.0, 1.0)),
                 transmittance: ColorInput::constant(transmittance),
+                absorption: Vec3::ZERO,
             };
         }
         if is_pbr {
             let mut base_color = self.color_input(builder, "kd", Vec3::splat(0.7));
             base_color.factor = base_color.factor.min(Vec3::ONE);
-            return Surface::MetalRoughness {
+            return Surface::MetalRoughness(MetalRoughness {
                 base_color,
                 metallic: self.scalar_input(builder, "pm", 0.0),
                 roughness: self.scalar_input(builder, "pr", 0.5),
                 ior: self.number("ni").filter(|&ior| ior > 1.0).unwrap_or(1.5),
-                transmission: ScalarInput::constant(0.0),
-            };
+                ..MetalRoughness::default()
+            });
         }
         if matches!(illumination, 3 | 5 | 8) && is_black && specular.max_element() > 0.0 {
             return Surface::Mirror { reflectance: ColorInput::constant(specular) };
         }
         if is_black && specular.max_element() > 0.1 && illumination >= 2 {
-            return Surface::MetalRoughness {
+            return Surface::MetalRoughness(MetalRoughness {
                 base_color: ColorInput::constant(specular),
                 metallic: ScalarInput::constant(1.0),
                 roughness: ScalarInput::constant(roughness),
-                ior: 1.5,
-                transmission: ScalarInput::constant(0.0),
-            };
+                ..MetalRoughness::default()
+            });
         }
         let mut reflectance = self.color_input(builder, "kd", Vec3::splat(0.7));
         reflectance.factor = reflectance.factor.min(Vec3::ONE);
@@ -298,13 +291,11 @@ impl Written {
             return Surface::Diffuse { reflectance };
         }
         // A Phong highlight over a diffuse colour: plastic with the microfacet width of that exponent.
-        Surface::MetalRoughness {
+        Surface::MetalRoughness(MetalRoughness {
             base_color: reflectance,
-            metallic: ScalarInput::constant(0.0),
             roughness: ScalarInput::constant(roughness),
-            ior: 1.5,
-            transmission: ScalarInput::constant(0.0),
-        }
+            ..MetalRoughness::default()
+        })
     }
 }
 

@@ -19,7 +19,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
     let mut builder = Builder::new(path);
     for (mesh, material) in read_into(&mut builder, path, true)? {
         let name = builder.meshes[mesh.0 as usize].name.clone();
-        builder.instances.push(Instance { name, mesh, material, to_world: Affine3A::IDENTITY });
+        builder.instances.push(Instance { name, mesh, material, to_world: Affine3A::IDENTITY, motion: None });
     }
     builder.finish(path, IfDark::Studio, options)
 }

@@ -25,6 +25,46 @@ pub(super) enum Picture {
     File(PathBuf),
     /// Bytes inside another file; the name is for messages and tells them apart.
     Memory { name: String, bytes: Arc<Vec<u8>> },
+    /// Linear texels made by a loader, as the bits of their floats.
+    Texels { name: String, size: [u32; 2], bits: Arc<Vec<[u32; 4]>> },
+}
+
+/// What is done to a picture's linear values before anything else sees them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) struct Adjust {
+    /// 1 minus the value.
+    pub(super) invert: bool,
+    /// Exponent of the (inverted) value, as the bits of an f32.
+    pub(super) exponent_bits: u32,
+}
+
+impl Adjust {
+    /// Values as they are.
+    pub(super) const NONE: Self = Self { invert: false, exponent_bits: 1.0_f32.to_bits() };
+
+    fn apply(self, picture: Decoded) -> Decoded {
+        if self == Self::NONE {
+            return picture;
+        }
+        let exponent = f32::from_bits(self.exponent_bits);
+        let change = |value: f32| {
+            let value = if self.invert { 1.0 - value } else { value };
+            if exponent == 1.0 { value } else { value.max(0.0).powf(exponent) }
+        };
+        let linear = |[r, g, b, a]: [f32; 4]| [change(r), change(g), change(b), a];
+        let texels = match &picture.texels {
+            Texels::Floats(floats) => floats.iter().map(|&texel| linear(texel)).collect(),
+            Texels::Bytes(bytes, encoding) => {
+                let decode = |byte: u8| match encoding {
+                    Encoding::Srgb => texture::srgb_to_linear(f32::from(byte) / 255.0),
+                    Encoding::Linear => f32::from(byte) / 255.0,
+                };
+                let texel = |&[r, g, b, a]: &[u8; 4]| linear([decode(r), decode(g), decode(b), f32::from(a) / 255.0]);
+                bytes.iter().map(texel).collect()
+            }
+        };
+        Decoded { texels: Texels::Floats(Arc::new(texels)), ..picture }
+    }
 }
 
 /// What to do when the file is not there at all. (A damaged one is always an error.)
@@ -45,6 +85,23 @@ pub(super) struct Request {
     pub(super) wrap_v: Wrap,
     pub(super) nearest: bool,
     pub(super) if_missing: IfMissing,
+    pub(super) adjust: Adjust,
+}
+
+impl Request {
+    /// A picture that a loader made: `size` texels of linear RGBA, row 0 at the top.
+    pub(super) fn texels(name: &str, size: [u32; 2], texels: &[[f32; 4]]) -> Self {
+        let bits = Arc::new(texels.iter().map(|texel| texel.map(f32::to_bits)).collect());
+        Self {
+            picture: Picture::Texels { name: name.to_owned(), size, bits },
+            encoding: Encoding::Linear,
+            wrap_u: Wrap::Repeat,
+            wrap_v: Wrap::Repeat,
+            nearest: false,
+            if_missing: IfMissing::Replace([128; 4]),
+            adjust: Adjust::NONE,
+        }
+    }
 }
 
 /// The textures asked for so far.
@@ -59,6 +116,7 @@ impl Requests {
         let same = |other: &Request| {
             other.picture == request.picture
                 && other.encoding == request.encoding
+                && other.adjust == request.adjust
                 && (other.wrap_u, other.wrap_v, other.nearest) == (request.wrap_u, request.wrap_v, request.nearest)
         };
         let place = self.requests.iter().position(same).unwrap_or_else(|| {
@@ -73,18 +131,20 @@ impl Requests {
         let mut place_of = HashMap::new();
         let mut distinct = Vec::new();
         for request in &self.requests {
-            place_of.entry((&request.picture, request.encoding)).or_insert_with(|| {
-                distinct.push((&request.picture, request.encoding));
+            place_of.entry((&request.picture, request.encoding, request.adjust)).or_insert_with(|| {
+                distinct.push((&request.picture, request.encoding, request.adjust));
                 distinct.len() - 1
             });
         }
-        let decoded: Vec<Result<Decoded, LoadError>> =
-            distinct.par_iter().map(|(picture, encoding)| decode(picture, *encoding)).collect();
+        let decoded: Vec<Result<Decoded, LoadError>> = distinct
+            .par_iter()
+            .map(|(picture, encoding, adjust)| Ok(adjust.apply(decode(picture, *encoding)?)))
+            .collect();
         let mut decoded: Vec<Option<Result<Decoded, LoadError>>> = decoded.into_iter().map(Some).collect();
 
         let mut textures = Vec::with_capacity(self.requests.len());
         for request in &self.requests {
-            let slot = &mut decoded[place_of[&(&request.picture, request.encoding)]];
+            let slot = &mut decoded[place_of[&(&request.picture, request.encoding, request.adjust)]];
             let picture = match slot {
                 Some(Ok(picture)) => picture.clone(),
                 _ => match (slot.take(), &request.if_missing) {
@@ -121,7 +181,7 @@ impl Picture {
     fn name(&self) -> String {
         match self {
             Self::File(path) => path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned(),
-            Self::Memory { name, .. } => name.clone(),
+            Self::Memory { name, .. } | Self::Texels { name, .. } => name.clone(),
         }
     }
 }
@@ -145,6 +205,10 @@ fn decode(picture: &Picture, encoding: Encoding) -> Result<Decoded, LoadError> {
     match picture {
         Picture::File(path) => decode_bytes(&super::files::read(path)?, path, encoding),
         Picture::Memory { name, bytes } => decode_bytes(bytes, Path::new(name), encoding),
+        Picture::Texels { size: [width, height], bits, .. } => {
+            let texels = bits.iter().map(|texel| texel.map(f32::from_bits)).collect();
+            Ok(Decoded { width: *width, height: *height, texels: Texels::Floats(Arc::new(texels)) })
+        }
     }
 }
 

@@ -146,6 +146,13 @@ pub(super) fn check(scene: &Scene, path: &Path) -> Result<(), LoadError> {
         return broken("a sphere's material");
     }
     for material in &scene.materials {
+        let components = material.surface.components();
+        if components > Surface::MOST_COMPONENTS {
+            let most = Surface::MOST_COMPONENTS;
+            let problem =
+                format!("material \"{}\" mixes {components} models; at most {most} are possible", material.name);
+            return Err(LoadError::invalid(path, problem));
+        }
         if textures_of(&material.surface)
             .into_iter()
             .chain([material.emission.texture.map(|lookup| lookup.texture.0)])
@@ -164,17 +171,7 @@ pub(super) fn check(scene: &Scene, path: &Path) -> Result<(), LoadError> {
 }
 
 fn textures_of(surface: &Surface) -> Vec<Option<u32>> {
-    let color = |input: &crate::scene::ColorInput| input.texture.map(|lookup| lookup.texture.0);
-    let scalar = |input: &crate::scene::ScalarInput| input.texture.map(|(lookup, _)| lookup.texture.0);
-    match surface {
-        Surface::Diffuse { reflectance } | Surface::Mirror { reflectance } => {
-            vec![color(reflectance)]
-        }
-        Surface::Conductor { roughness, .. } => vec![scalar(roughness)],
-        Surface::Dielectric { roughness, transmittance, .. } => vec![scalar(roughness), color(transmittance)],
-        Surface::ThinDielectric { transmittance, .. } => vec![color(transmittance)],
-        Surface::MetalRoughness { base_color, metallic, roughness, transmission, .. } => {
-            vec![color(base_color), scalar(metallic), scalar(roughness), scalar(transmission)]
-        }
-    }
+    let colors = surface.colors().into_iter().map(|input| input.texture.map(|lookup| lookup.texture.0));
+    let scalars = surface.scalars().into_iter().map(|input| input.texture.map(|(lookup, _)| lookup.texture.0));
+    colors.chain(scalars).collect()
 }

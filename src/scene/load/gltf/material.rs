@@ -2,9 +2,11 @@
 
 use super::super::builder::Builder;
 use super::super::error::LoadError;
-use super::super::texture::{IfMissing, Picture, Request};
+use super::super::texture::{Adjust, IfMissing, Picture, Request};
 use super::buffers::{Buffers, Uri, resolve};
-use crate::scene::{Alpha, ColorInput, Encoding, Material, MaterialId, ScalarInput, Surface, TextureLookup, Wrap};
+use crate::scene::{
+    Alpha, ColorInput, Encoding, Material, MaterialId, MetalRoughness, ScalarInput, Surface, TextureLookup, Wrap,
+};
 use glam::{Vec2, Vec3};
 use gltf::texture::{MagFilter, WrappingMode};
 use std::collections::HashMap;
@@ -63,7 +65,7 @@ impl<'a> Materials<'a> {
             builder.note("KHR_materials_unlit: rendered as a diffuse surface.");
             Surface::Diffuse { reflectance: base_color }
         } else {
-            Surface::MetalRoughness {
+            Surface::MetalRoughness(MetalRoughness {
                 base_color,
                 metallic: ScalarInput {
                     factor: share(pbr.metallic_factor()),
@@ -75,7 +77,7 @@ impl<'a> Materials<'a> {
                 },
                 ior: from.ior().filter(|ior| ior.is_finite() && *ior >= 1.0).unwrap_or(1.5),
                 transmission,
-            }
+            })
         };
 
         // The file's unit is cd/m², and so is ours: nits_per_unit stays 1.
@@ -158,6 +160,7 @@ impl<'a> Materials<'a> {
             wrap_v: wrap(sampler.wrap_t()),
             nearest: sampler.mag_filter() == Some(MagFilter::Nearest),
             if_missing: IfMissing::Replace(if_missing),
+            adjust: Adjust::NONE,
         });
         let plain = TextureLookup::plain(texture);
         Ok(Some(match transform {

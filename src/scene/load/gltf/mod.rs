@@ -11,7 +11,7 @@ use self::material::Materials;
 use super::builder::{Builder, IfDark, NamedCamera};
 use super::error::LoadError;
 use super::{LoadOptions, files};
-use crate::scene::{Camera, Instance, Light, MaterialId, Mesh, MeshId, Scene};
+use crate::scene::{Camera, Instance, Light, MaterialId, Mesh, MeshId, Projection, Scene, SpotFalloff};
 use ::gltf::json::validation::Checked;
 use ::gltf::mesh::{Mode, Semantic};
 use glam::{Affine3A, Mat4, Vec2, Vec3, Vec4};
@@ -181,6 +181,7 @@ impl Reader<'_> {
             mesh,
             material,
             to_world,
+            motion: None,
         }));
         Ok(())
     }
@@ -226,22 +227,27 @@ impl Reader<'_> {
 
     fn camera(&mut self, camera: &::gltf::Camera, node: &str, to_world: &Affine3A) {
         let name = camera.name().unwrap_or(node).to_owned();
-        let ::gltf::camera::Projection::Perspective(perspective) = camera.projection() else {
-            self.builder.note(format!("Camera \"{name}\" is orthographic and is left out."));
-            return;
-        };
         let position = Vec3::from(to_world.translation);
         let forward = to_world.transform_vector3(Vec3::NEG_Z).try_normalize();
         let up = to_world.transform_vector3(Vec3::Y).try_normalize();
-        let fov = perspective.yfov().to_degrees();
+        let (projection, usable) = match camera.projection() {
+            ::gltf::camera::Projection::Perspective(perspective) => {
+                let vertical_fov_deg = perspective.yfov().to_degrees();
+                (Projection::Perspective { vertical_fov_deg }, (0.001..=179.0).contains(&vertical_fov_deg))
+            }
+            ::gltf::camera::Projection::Orthographic(parallel) => {
+                let height = 2.0 * parallel.ymag();
+                (Projection::Orthographic { height }, height > 0.0 && height.is_finite())
+            }
+        };
         let (Some(forward), Some(up)) = (forward, up) else {
             return;
         };
-        if !position.is_finite() || !(0.001..=179.0).contains(&fov) || forward.cross(up).length() < 1e-5 {
-            self.builder.note(format!("Camera \"{name}\" is left out: its transform or angle is not usable."));
+        if !position.is_finite() || !usable || forward.cross(up).length() < 1e-5 {
+            self.builder.note(format!("Camera \"{name}\" is left out: its transform, angle or height is not usable."));
             return;
         }
-        let camera = Camera { position, forward, up, vertical_fov_deg: fov, aperture_radius: 0.0, focus_distance: 1.0 };
+        let camera = Camera { projection, ..Camera::pinhole(position, forward, up, 40.0) };
         self.builder.cameras.push(NamedCamera { name, camera });
     }
 
@@ -258,13 +264,20 @@ impl Reader<'_> {
         }
         let strength = strength.max(Vec3::ZERO);
         self.builder.lights.push(match light.kind() {
-            Kind::Directional => Light::Directional { direction, irradiance: strength },
+            Kind::Directional => Light::Directional { direction, irradiance: strength, angular_radius: 0.0 },
             Kind::Point => Light::Point { position, intensity: strength },
             Kind::Spot { inner_cone_angle, outer_cone_angle } => {
                 let quarter = std::f32::consts::FRAC_PI_2;
                 let outer = if outer_cone_angle > 0.0 { outer_cone_angle.min(quarter) } else { quarter / 2.0 };
                 let inner = if inner_cone_angle >= 0.0 { inner_cone_angle.min(outer) } else { 0.0 };
-                Light::Spot { position, direction, intensity: strength, inner_angle: inner, outer_angle: outer }
+                Light::Spot {
+                    position,
+                    direction,
+                    intensity: strength,
+                    inner_angle: inner,
+                    outer_angle: outer,
+                    falloff: SpotFalloff::Squared,
+                }
             }
         });
     }

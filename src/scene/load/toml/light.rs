@@ -1,8 +1,8 @@
 //! `[[lights]]`: point, spot and directional, in photometric units.
 
 use super::fields::{Fields, Value};
-use crate::scene::Light;
 use crate::scene::load::{LoadError, luminance};
+use crate::scene::{Light, SpotFalloff};
 use glam::Vec3;
 use std::f64::consts::TAU;
 
@@ -40,22 +40,24 @@ pub(super) fn read(value: &Value, nits_per_unit: f64) -> Result<Light, LoadError
             let outer = fields.get_or("outer_deg", 30.0, |value| value.within(0.01, 90.0))?;
             let inner = fields.get_or("inner_deg", 0.8 * outer, |value| value.within(0.0, outer))?;
             let (inner, outer) = (inner.to_radians(), outer.to_radians());
-            // Exact for a fall-off that is symmetric in the cosine between the two angles.
-            let solid_angle = TAU * (1.0 - 0.5 * (inner.cos() + outer.cos()));
+            let falloff = SpotFalloff::Smoothstep;
+            let solid_angle = f64::from(falloff.solid_angle(inner as f32, outer as f32));
             Ok(Light::Spot {
                 position,
                 direction,
                 intensity: intensity(&fields, solid_angle, nits_per_unit)?,
                 inner_angle: inner as f32,
                 outer_angle: outer as f32,
+                falloff,
             })
         }
         _ => {
-            let fields = value.fields(&["type", "name", "direction", "illuminance_lx", "color"])?;
+            let fields = value.fields(&["type", "name", "direction", "illuminance_lx", "color", "diameter_deg"])?;
             let lux = amount(&fields.require("illuminance_lx")?, &fields)?;
             Ok(Light::Directional {
                 direction: fields.require("direction")?.direction()?,
                 irradiance: lux / nits_per_unit as f32,
+                angular_radius: 0.5 * fields.get_or("diameter_deg", 0.0, |v| v.within(0.0, 170.0))?.to_radians() as f32,
             })
         }
     }

@@ -1,12 +1,11 @@
 //! `[materials.*]`.
 
-use super::Context;
 use super::fields::{Fields, Value};
 use super::light::unit_luminance;
+use super::{Context, surface};
 use crate::scene::load::LoadError;
 use crate::scene::load::error::suggestion;
-use crate::scene::load::metals::METALS;
-use crate::scene::{Alpha, ColorInput, Encoding, Material, MaterialId, ScalarInput, Surface, TextureLookup};
+use crate::scene::{Alpha, ColorInput, Encoding, Material, MaterialId, ScalarInput, TextureLookup};
 use glam::{Vec2, Vec3};
 use std::collections::HashMap;
 
@@ -57,6 +56,15 @@ impl<'a> Materials<'a> {
         })
     }
 
+    /// The material of this name, where a later material refers to it.
+    pub(super) fn find_above(&self, name: &Value) -> Result<Entry, LoadError> {
+        let written = name.string()?;
+        self.by_name.get(written).copied().ok_or_else(|| {
+            let known = suggestion(written, self.names.iter().copied());
+            name.error(format_args!("no material \"{written}\" above this one{known}"))
+        })
+    }
+
     /// Reads one material.
     pub(super) fn read(
         &mut self,
@@ -64,14 +72,7 @@ impl<'a> Materials<'a> {
         name: &'a str,
         value: &Value<'a>,
     ) -> Result<(), LoadError> {
-        let kinds: [(&'static str, Reader<'a>, &[&str]); 6] = [
-            ("diffuse", diffuse, &["reflectance"]),
-            ("mirror", mirror, &["reflectance"]),
-            ("conductor", conductor, &["metal", "eta", "k", "roughness"]),
-            ("dielectric", dielectric, &["ior", "roughness", "transmittance"]),
-            ("thin-dielectric", thin_dielectric, &["ior", "transmittance"]),
-            ("metal-roughness", metal_roughness, &["base_color", "metallic", "roughness", "ior", "transmission"]),
-        ];
+        let kinds = surface::kinds();
         let kind = value.entries()?.require("type")?;
         let choices: Vec<(&'static str, usize)> =
             kinds.iter().enumerate().map(|(place, kind)| (kind.0, place)).collect();
@@ -79,7 +80,7 @@ impl<'a> Materials<'a> {
         let known: Vec<&str> = COMMON.iter().chain(own).copied().collect();
         let fields = value.fields(&known)?;
 
-        let surface = read_surface(context, &fields)?;
+        let surface = read_surface(self, context, &fields)?;
         let (emission, power) = read_emission(context, &fields)?;
         let material = Material {
             name: name.to_owned(),
@@ -94,60 +95,6 @@ impl<'a> Materials<'a> {
         self.names.push(name);
         Ok(())
     }
-}
-
-/// Reads the keys of one kind of material.
-type Reader<'a> = fn(&mut Context<'a>, &Fields<'a>) -> Result<Surface, LoadError>;
-
-fn diffuse<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
-    Ok(Surface::Diffuse { reflectance: share(context, &fields.require("reflectance")?)? })
-}
-
-fn mirror<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
-    Ok(Surface::Mirror { reflectance: share_or_white(context, fields, "reflectance")? })
-}
-
-fn conductor<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
-    let (eta, k) = match (fields.get("metal"), fields.get("eta"), fields.get("k")) {
-        (Some(metal), None, None) => {
-            let metal = metal.choice(METALS)?;
-            (metal.eta, metal.k)
-        }
-        (None, Some(eta), Some(k)) => {
-            let real = eta.color()?;
-            if real.min_element() <= 0.0 {
-                return Err(eta.error("the index of refraction must be above 0"));
-            }
-            (real, k.color()?)
-        }
-        _ => return Err(fields.error("needs either \"metal\", or both \"eta\" and \"k\"")),
-    };
-    Ok(Surface::Conductor { eta, k, roughness: scalar(context, fields, "roughness", 0.0)? })
-}
-
-fn dielectric<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
-    Ok(Surface::Dielectric {
-        ior: fields.get_or("ior", 1.5, Value::positive)? as f32,
-        roughness: scalar(context, fields, "roughness", 0.0)?,
-        transmittance: share_or_white(context, fields, "transmittance")?,
-    })
-}
-
-fn thin_dielectric<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
-    Ok(Surface::ThinDielectric {
-        ior: fields.get_or("ior", 1.5, Value::positive)? as f32,
-        transmittance: share_or_white(context, fields, "transmittance")?,
-    })
-}
-
-fn metal_roughness<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
-    Ok(Surface::MetalRoughness {
-        base_color: share_or_white(context, fields, "base_color")?,
-        metallic: scalar(context, fields, "metallic", 0.0)?,
-        roughness: scalar(context, fields, "roughness", 0.5)?,
-        ior: fields.get_or("ior", 1.5, Value::positive)? as f32,
-        transmission: scalar(context, fields, "transmission", 0.0)?,
-    })
 }
 
 /// `emission` in scene units, or a luminance, or a luminous power of the object.
@@ -199,7 +146,7 @@ fn color<'a>(context: &mut Context<'a>, value: &Value<'a>) -> Result<ColorInput,
 }
 
 /// A colour of which no channel exceeds 1: more would reflect more light than comes in.
-fn share<'a>(context: &mut Context<'a>, value: &Value<'a>) -> Result<ColorInput, LoadError> {
+pub(super) fn share<'a>(context: &mut Context<'a>, value: &Value<'a>) -> Result<ColorInput, LoadError> {
     let color = color(context, value)?;
     if color.factor.max_element() > 1.0 {
         return Err(value.error(format_args!("must not exceed 1 in any channel: {}", color.factor)));
@@ -207,12 +154,16 @@ fn share<'a>(context: &mut Context<'a>, value: &Value<'a>) -> Result<ColorInput,
     Ok(color)
 }
 
-fn share_or_white<'a>(context: &mut Context<'a>, fields: &Fields<'a>, key: &str) -> Result<ColorInput, LoadError> {
+pub(super) fn share_or_white<'a>(
+    context: &mut Context<'a>,
+    fields: &Fields<'a>,
+    key: &str,
+) -> Result<ColorInput, LoadError> {
     fields.get_or(key, ColorInput::constant(Vec3::ONE), |value| share(context, value))
 }
 
 /// A number in [0, 1], or a channel of a texture.
-fn scalar<'a>(
+pub(super) fn scalar<'a>(
     context: &mut Context<'a>,
     fields: &Fields<'a>,
     key: &str,

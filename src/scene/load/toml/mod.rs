@@ -1,17 +1,21 @@
 //! Our own scene format; scenes/README.md describes it by an example that has everything.
 
+mod camera;
 mod fields;
 mod light;
 mod material;
 mod motion;
 mod object;
+mod surface;
+mod surroundings;
 
 use self::fields::{Fields, Source, Value};
+use self::motion::Shutter;
 use super::builder::{Builder, IfDark, NamedCamera};
 use super::error::LoadError;
-use super::texture::{IfMissing, Picture, Request};
-use super::{LoadOptions, environment, files};
-use crate::scene::{Camera, Encoding, FilmDefaults, Scene, ViewingDefaults, Wrap};
+use super::texture::{Adjust, IfMissing, Picture, Request};
+use super::{LoadOptions, files};
+use crate::scene::{Encoding, FilmDefaults, Scene, ViewingDefaults, Wrap};
 use ::toml::de::DeTable;
 use std::collections::HashMap;
 use std::path::Path;
@@ -27,7 +31,7 @@ struct Context<'a> {
     textures: HashMap<&'a str, TextureEntry>,
     /// Names of all textures, in the file's order, for suggestions.
     texture_names: Vec<&'a str>,
-    frame_time: f64,
+    shutter: Shutter,
     builder: Builder,
 }
 
@@ -70,21 +74,19 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
     if let Some(view) = root.get("view") {
         builder.viewing = read_view(&view)?;
     }
+    let mut shutter = Shutter { opens: options.frame_time, stays_open: 0.0 };
     if let Some(camera) = root.get("camera") {
-        let camera = read_camera(&camera, options.frame_time)?;
+        shutter.stays_open = camera.entries()?.get_or("shutter_s", 0.0, Value::non_negative)?;
+        let camera = camera::read(&camera, shutter)?;
         builder.cameras.push(NamedCamera { name: "camera".to_owned(), camera });
     }
 
     let folder = path.parent().unwrap_or(Path::new(""));
-    let mut context = Context {
-        folder,
-        textures: HashMap::new(),
-        texture_names: Vec::new(),
-        frame_time: options.frame_time,
-        builder,
-    };
+    let mut context = Context { folder, textures: HashMap::new(), texture_names: Vec::new(), shutter, builder };
     if let Some(surroundings) = root.get("environment") {
-        context.builder.environment = Some(read_environment(&surroundings, folder)?);
+        let surroundings = surroundings::read(&surroundings, folder, context.builder.nits_per_unit)?;
+        context.builder.environment = Some(surroundings.environment);
+        context.builder.lights.extend(surroundings.sun);
     }
     if let Some(textures) = root.get("textures") {
         for (name, value) in textures.entries()?.all() {
@@ -133,65 +135,6 @@ fn read_view(value: &Value) -> Result<ViewingDefaults, LoadError> {
     })
 }
 
-fn read_camera(value: &Value, frame_time: f64) -> Result<Camera, LoadError> {
-    let fields = value.fields(&[
-        "position",
-        "look_at",
-        "up",
-        "vertical_fov_deg",
-        "aperture_radius",
-        "focus_distance",
-        "keyframes",
-    ])?;
-    let keyframes = fields.get_some("keyframes", |value| motion::camera_keyframes(value))?;
-    let (position, look_at) = match keyframes {
-        Some(keyframes) => {
-            if let Some(value) = fields.get("position").or_else(|| fields.get("look_at")) {
-                return Err(value.error("excludes camera.keyframes, whose entries have their own"));
-            }
-            keyframes.at(frame_time)
-        }
-        None => (fields.require("position")?.vec3()?, fields.require("look_at")?.vec3()?),
-    };
-    let Some(forward) = (look_at - position).try_normalize() else {
-        return Err(fields.error("position and look_at are the same point"));
-    };
-    let up = fields.get_or("up", glam::Vec3::Y, Value::direction)?;
-    if forward.cross(up).length() < 1e-5 {
-        return Err(fields.error(format_args!("looks along its own up vector {up}; set another \"up\"")));
-    }
-    let vertical_fov_deg = fields.get_or("vertical_fov_deg", 40.0, Value::number)?;
-    if !(0.001..=179.0).contains(&vertical_fov_deg) {
-        return Err(fields.require("vertical_fov_deg")?.within(0.001, 179.0).err().unwrap_or_else(|| fields.error("")));
-    }
-    Ok(Camera {
-        position,
-        forward,
-        up,
-        vertical_fov_deg: vertical_fov_deg as f32,
-        aperture_radius: fields.get_or("aperture_radius", 0.0, Value::non_negative)? as f32,
-        focus_distance: match fields.get("focus_distance") {
-            Some(distance) => distance.positive()? as f32,
-            None => position.distance(look_at),
-        },
-    })
-}
-
-fn read_environment(value: &Value, folder: &Path) -> Result<crate::scene::Environment, LoadError> {
-    let fields = value.fields(&["image", "radiance", "scale", "rotation_deg"])?;
-    let scale = fields.get_or("scale", 1.0, Value::non_negative)? as f32;
-    let rotation_deg = fields.get_or("rotation_deg", 0.0, Value::number)? as f32;
-    match fields.exactly_one(&["image", "radiance"])? {
-        ("image", image) => environment::from_file(&folder.join(image.string()?), scale, rotation_deg)
-            .map_err(|error| error.referenced_from(image.place())),
-        (_, radiance) => {
-            let mut environment = environment::constant(radiance.color()?);
-            environment.scale = scale;
-            Ok(environment)
-        }
-    }
-}
-
 fn read_texture(value: &Value, folder: &Path) -> Result<TextureEntry, LoadError> {
     let fields = value.fields(&["file", "encoding", "wrap", "nearest"])?;
     let file = fields.require("file")?;
@@ -206,6 +149,7 @@ fn read_texture(value: &Value, folder: &Path) -> Result<TextureEntry, LoadError>
             wrap_v: wrap,
             nearest: fields.get_or("nearest", false, Value::boolean)?,
             if_missing: IfMissing::Fail(file.place()),
+            adjust: Adjust::NONE,
         },
         encoding: fields.get_some("encoding", |value| value.choice(&encodings))?,
     })

@@ -3,7 +3,16 @@
 
 use super::fields::{Fields, Value};
 use crate::scene::load::LoadError;
-use glam::{Affine3A, Quat, Vec3};
+use crate::scene::{Camera, Motion, MotionKey, Pose};
+use glam::{Affine3A, Mat3A, Quat, Vec3, Vec3A};
+
+/// When the shutter is open, in seconds of the keyframes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shutter {
+    pub(super) opens: f64,
+    /// 0 for a picture of one moment.
+    pub(super) stays_open: f64,
+}
 
 /// Values at increasing times.
 pub(super) struct Keyframes<T> {
@@ -35,6 +44,19 @@ impl<T> Keyframes<T> {
         Ok(Self { frames })
     }
 
+    /// Times at which the shutter opens and closes, those of keyframes between, and `between` more before each next one.
+    fn times(&self, shutter: Shutter, between: u32) -> Vec<f64> {
+        let closes = shutter.opens + shutter.stays_open;
+        let inner = self.frames.iter().map(|(time, _)| *time).filter(|t| *t > shutter.opens && *t < closes);
+        let ends: Vec<f64> = [shutter.opens].into_iter().chain(inner).chain([closes]).collect();
+        let mut times = vec![shutter.opens];
+        for pair in ends.windows(2) {
+            let step = |i: u32| pair[0] + (pair[1] - pair[0]) * f64::from(i) / f64::from(between + 1);
+            times.extend((1..=between).map(step).chain([pair[1]]));
+        }
+        times
+    }
+
     fn around(&self, time: f64) -> Between<'_, T> {
         let after = self.frames.partition_point(|(seconds, _)| *seconds <= time);
         let clamp = |index: usize| &self.frames[index.min(self.frames.len() - 1)];
@@ -59,36 +81,61 @@ impl Keyframes<(Vec3, Vec3)> {
         let Between { before, after, share } = self.around(time);
         (before.0.lerp(after.0, share), before.1.lerp(after.1, share))
     }
+
+    /// What moves `camera` from where it is when the shutter opens; `None` where it rests. Positions are exact; turns
+    /// are slerped between 16 views of each interval, since the point looked at moves on a line.
+    pub(super) fn motion(&self, camera: &Camera, shutter: Shutter) -> Option<Motion> {
+        if shutter.stays_open == 0.0 {
+            return None;
+        }
+        let pose = |time: f64| {
+            let (position, look_at) = self.at(time);
+            let forward = (look_at - position).normalize_or(camera.forward);
+            let right = forward.cross(camera.up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector());
+            let axes = Mat3A::from_cols(right.into(), right.cross(forward).into(), (-forward).into());
+            let rotation = Quat::from_mat3a(&axes).normalize();
+            Pose { translation: Vec3A::from(position), rotation, stretch: Mat3A::IDENTITY }
+        };
+        moving(self.times(shutter, 15), shutter, pose, Affine3A::IDENTITY).map(|motion| motion.since_open())
+    }
 }
 
-/// Scale, then rotation, then translation.
-#[derive(Clone, Copy)]
-pub(super) struct Pose {
-    scale: Vec3,
-    rotation: Quat,
-    translation: Vec3,
+/// A motion through poses; `None` where it rests.
+fn moving(times: Vec<f64>, shutter: Shutter, pose: impl Fn(f64) -> Pose, before: Affine3A) -> Option<Motion> {
+    let key = |time: f64| MotionKey { time: ((time - shutter.opens) / shutter.stays_open) as f32, pose: pose(time) };
+    let mut keys: Vec<MotionKey> = times.into_iter().map(key).collect();
+    keys.dedup_by_key(|key| key.time);
+    Motion::new(before, keys).filter(|motion| !motion.rests())
 }
 
 /// An object's `keyframes`.
 pub(super) fn object_keyframes(list: &Value) -> Result<Keyframes<Pose>, LoadError> {
     Keyframes::read(list, &["time", "translate", "rotate_deg", "axis", "scale"], |fields| {
-        Ok(Pose {
-            scale: fields.get_or("scale", Vec3::ONE, scale)?,
-            rotation: rotation(fields)?.unwrap_or(Quat::IDENTITY),
-            translation: fields.get_or("translate", Vec3::ZERO, Value::vec3)?,
-        })
+        Ok(Pose::from_parts(
+            fields.get_or("scale", Vec3::ONE, scale)?,
+            rotation(fields)?.unwrap_or(Quat::IDENTITY),
+            fields.get_or("translate", Vec3::ZERO, Value::vec3)?,
+        ))
     })
 }
 
 impl Keyframes<Pose> {
+    fn pose(&self, time: f64) -> Pose {
+        let Between { before, after, share } = self.around(time);
+        before.interpolate(*after, share)
+    }
+
     /// The transform at a time.
     pub(super) fn at(&self, time: f64) -> Affine3A {
-        let Between { before, after, share } = self.around(time);
-        Affine3A::from_scale_rotation_translation(
-            before.scale.lerp(after.scale, share),
-            before.rotation.slerp(after.rotation, share),
-            before.translation.lerp(after.translation, share),
-        )
+        self.pose(time).to_affine()
+    }
+
+    /// The motion of something placed by `before` while the shutter is open; `None` where it rests.
+    pub(super) fn motion(&self, before: Affine3A, shutter: Shutter) -> Option<Motion> {
+        if shutter.stays_open == 0.0 {
+            return None;
+        }
+        moving(self.times(shutter, 0), shutter, |time| self.pose(time), before)
     }
 }
 

@@ -5,7 +5,7 @@ use super::fields::{Fields, Value};
 use super::material::{Entry, Materials};
 use super::motion;
 use crate::scene::load::{LoadError, obj, shapes};
-use crate::scene::{ColorInput, Instance, MaterialId, Mesh, MeshId, Sphere};
+use crate::scene::{ColorInput, Instance, MaterialId, Mesh, MeshId, Motion, Sphere};
 use glam::{Affine3A, Vec3};
 use std::collections::HashMap;
 use std::f64::consts::PI;
@@ -24,6 +24,7 @@ struct Placement {
     name: String,
     material: Option<Entry>,
     to_world: Affine3A,
+    motion: Option<Motion>,
 }
 
 impl<'m, 'a> Objects<'m, 'a> {
@@ -49,8 +50,10 @@ impl<'m, 'a> Objects<'m, 'a> {
         self.read += 1;
 
         let mut to_world = fields.get_or("transform", Affine3A::IDENTITY, motion::transform)?;
+        let mut moves = None;
         if let Some(keyframes) = fields.get_some("keyframes", motion::object_keyframes)? {
-            to_world = keyframes.at(context.frame_time) * to_world;
+            moves = keyframes.motion(to_world, context.shutter);
+            to_world = keyframes.at(context.shutter.opens) * to_world;
         }
         let placement = Placement {
             name: fields
@@ -58,6 +61,7 @@ impl<'m, 'a> Objects<'m, 'a> {
                 .unwrap_or(format!("{kind} {}", self.read)),
             material: fields.get_some("material", |name| self.materials.find(name))?,
             to_world,
+            motion: moves,
         };
         if kind == "mesh" {
             return self.place_file(context, &shape, placement);
@@ -111,6 +115,7 @@ impl<'m, 'a> Objects<'m, 'a> {
                 mesh: *mesh,
                 material: material.unwrap_or(*own),
                 to_world: placement.to_world,
+                motion: placement.motion.clone(),
             });
         }
         Ok(())
@@ -122,7 +127,8 @@ fn place_mesh(context: &mut Context, mesh: Mesh, fields: &Fields, placement: Pla
     let area = shapes::area(&mesh, &placement.to_world);
     let material = with_power(context, entry, area, &placement.name, &fields.require("material")?)?;
     let mesh = context.builder.add_mesh(mesh);
-    context.builder.instances.push(Instance { name: placement.name, mesh, material, to_world: placement.to_world });
+    let Placement { name, to_world, motion, .. } = placement;
+    context.builder.instances.push(Instance { name, mesh, material, to_world, motion });
     Ok(())
 }
 
@@ -132,7 +138,12 @@ fn place_sphere(context: &mut Context, shape: &Value, fields: &Fields, placement
     let center = own.require("center")?.vec3()?;
     let radius = own.require("radius")?.positive()? as f32;
     let entry = placement.material.ok_or_else(|| fields.error("\"material\" is missing"))?;
-    let Some(scale) = shapes::similarity_scale(&placement.to_world) else {
+    // Between two similarities everything is one, too.
+    let stays_round = placement
+        .motion
+        .as_ref()
+        .is_none_or(|motion| motion.keys().iter().all(|key| shapes::similarity_scale(&motion.at(key.time)).is_some()));
+    let Some(scale) = shapes::similarity_scale(&placement.to_world).filter(|_| stays_round) else {
         let mut mesh = shapes::sphere(center, radius);
         mesh.name.clone_from(&placement.name);
         return place_mesh(context, mesh, fields, placement);
@@ -144,7 +155,8 @@ fn place_sphere(context: &mut Context, shape: &Value, fields: &Fields, placement
     }
     let area = 4.0 * PI * f64::from(radius) * f64::from(radius);
     let material = with_power(context, entry, area, &placement.name, &fields.require("material")?)?;
-    context.builder.spheres.push(Sphere { name: placement.name, center, radius, material });
+    let motion = placement.motion.map(|motion| motion.since_open());
+    context.builder.spheres.push(Sphere { name: placement.name, center, radius, material, motion });
     Ok(())
 }
 

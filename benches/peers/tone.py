@@ -1,0 +1,106 @@
+#!/usr/bin/env python3
+"""Tone operators beside pfstools' (Debian package `pfstools`).
+
+    cargo build --release
+    python3 -m venv /tmp/venv && /tmp/venv/bin/pip install numpy OpenEXR
+    /tmp/venv/bin/python benches/peers/tone.py
+
+Speed: wall time of `fechner tonemap` (reading EXR and writing PNG included) over that of the pfstmo program alone, which
+reads and writes a stream in memory. Runs alternate and the best of several counts, since the machine is shared.
+Agreement: displayed linear light of a ramp of greys through both, for the operators that are meant to be the same.
+"""
+
+import os
+import subprocess
+import tempfile
+import time
+
+import numpy as np
+import OpenEXR
+
+ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
+FECHNER = os.environ.get("FECHNER", os.path.join(ROOT, "target", "release", "fechner"))
+RUNS = 5
+# Ours, and pfstools' command nearest to it.
+PAIRS = [
+    ("pattanaik00", ["pfstmo_pattanaik00"]),
+    ("reinhard02", ["pfstmo_reinhard02"]),
+    ("reinhard02 --adaptation local", ["pfstmo_reinhard02", "--scales"]),
+    ("ward-larson97", ["pfstmo_mantiuk08", "--display-function", "l=200:b=0.2:g=2.2"]),
+    ("durand-dorsey00", ["pfstmo_drago03"]),
+]
+
+
+def write_exr(path, rgb):
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    OpenEXR.File(header, {"RGB": np.ascontiguousarray(rgb, np.float32)}).write(path)
+
+
+def read_exr(path):
+    channels = OpenEXR.File(path).channels()
+    if "RGB" in channels:
+        return channels["RGB"].pixels
+    return np.stack([channels[name].pixels for name in "RGB"], -1)
+
+
+def picture(width, height):
+    """Five decades of luminance with texture and colour."""
+    x, y = np.meshgrid(np.linspace(0, 1, width), np.linspace(0, 1, height))
+    light = 10 ** (5 * x - 1) * (1 + 0.3 * np.sin(60 * x) * np.sin(45 * y))
+    return light[..., None] * np.stack([1 + 0.3 * y, np.ones_like(y), 1.3 - 0.6 * y], -1)
+
+
+def seconds(command, **streams):
+    start = time.perf_counter()
+    subprocess.run(command, check=True, stderr=subprocess.DEVNULL, **streams)
+    return time.perf_counter() - start
+
+
+def tonemap(source, target, *arguments):
+    return [FECHNER, "tonemap", source, "-o", target, "--nits-per-unit", "1", *arguments]
+
+
+def speed(folder):
+    source, stream = os.path.join(folder, "large.exr"), os.path.join(folder, "large.pfs")
+    write_exr(source, picture(1920, 1080))
+    with open(stream, "wb") as file:
+        subprocess.run(["pfsinexr", source], check=True, stdout=file)
+    print("1920x1080                        fechner s   pfstmo s   fechner / pfstmo   pfstmo command")
+    for ours, theirs in PAIRS:
+        best = [float("inf")] * 2
+        name = ours.split()
+        for _ in range(RUNS):
+            command = tonemap(source, os.path.join(folder, "a.png"), "--operator", *name)
+            best[0] = min(best[0], seconds(command, stdout=subprocess.DEVNULL))
+            with open(stream, "rb") as file:
+                best[1] = min(best[1], seconds(theirs, stdin=file, stdout=subprocess.DEVNULL))
+        print(f"{ours:32} {best[0]:9.2f} {best[1]:10.2f} {best[0] / best[1]:18.2f}   {' '.join(theirs)}")
+
+
+def through_pfs(source, folder, command):
+    target = os.path.join(folder, "theirs.exr")
+    line = f"pfsinexr {source} | {' '.join(command)} | pfsoutexr --float32 {target}"
+    subprocess.run(line, shell=True, check=True, stderr=subprocess.DEVNULL)
+    return read_exr(target)[0, :, 1]
+
+
+def agreement(folder):
+    display = os.path.join(folder, "peer.toml")
+    with open(display, "w") as file:
+        file.write("white_cd_m2 = 125\nblack_cd_m2 = 0\n")
+    source, target = os.path.join(folder, "ramp.exr"), os.path.join(folder, "ours.exr")
+    print("\npattanaik00 on greys from A/100 to 5 A: largest difference of display light (white is 1)")
+    for adaptation in [1e-4, 0.01, 1, 25, 100, 1000, 1e4]:
+        ramp = adaptation * np.logspace(-2, np.log10(5), 512)
+        write_exr(source, np.repeat(np.tile(ramp, (16, 1))[..., None], 3, -1))
+        extra = ["--operator", "pattanaik00", "--display", display, "--adapted-to", str(adaptation)]
+        subprocess.run(tonemap(source, target, *extra), check=True, stdout=subprocess.DEVNULL)
+        ours = read_exr(target)[8, :, 1]
+        theirs = through_pfs(source, folder, ["pfstmo_pattanaik00", "--cone", str(adaptation), "--rod", str(adaptation)])
+        print(f"  A = {adaptation:8} cd/m2: {np.abs(ours - theirs).max():.6f}")
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as folder:
+        agreement(folder)
+        speed(folder)

@@ -1,0 +1,201 @@
+use super::*;
+use crate::csf::CastleCsf;
+use crate::display::Display;
+
+fn viewing(pixels_per_degree: f64) -> Viewing {
+    Viewing { display: Display { pixels_per_degree, ..Display::default() }, ..Viewing::default() }
+}
+
+fn map_of(picture: &Plane, viewing: &Viewing) -> ThresholdMap {
+    let inputs = ThresholdInputs { display_luminance_cd_m2: picture, guide_variance: None };
+    threshold_map(&inputs, viewing, &CastleCsf::default()).unwrap()
+}
+
+/// Standard error at v = 1 is σ/L = 1 / (S_peak G √2) with the specification's S_peak and G of white noise.
+#[test]
+fn uniform_pictures_have_the_tabulated_thresholds() {
+    for (luminance, ppd, expected) in [
+        (1.0, 30.0, 1.0 / (40.160_55 * 0.295_844)),
+        (1.0, 60.0, 1.0 / (40.160_55 * 0.149_091)),
+        (10.0, 20.0, 1.0 / (86.063_1 * 0.616_258)),
+        (10.0, 60.0, 1.0 / (86.063_1 * 0.227_654)),
+        (100.0, 20.0, 1.0 / (134.296_3 * 0.748_92)),
+        (100.0, 30.0, 1.0 / (134.296_3 * 0.567_412)),
+        (100.0, 60.0, 1.0 / (134.296_3 * 0.304_307)),
+    ] {
+        let map = map_of(&Plane::filled(32, 24, luminance), &viewing(ppd));
+        let allowed = f64::from(map.allowed_standard_error_cd_m2(1.0).get(16, 12)) / f64::from(luminance);
+        let expected = expected / std::f64::consts::SQRT_2;
+        assert!((allowed / expected - 1.0).abs() < 2e-3, "{luminance} cd/m², {ppd} ppd: {allowed}, not {expected}");
+    }
+}
+
+#[test]
+fn an_edge_masks_nothing_beside_it() {
+    for ppd in [38.0, 60.0] {
+        let step = Plane::from_fn(256, 64, |x, _| if x < 128 { 50.0 } else { 100.0 });
+        let elevation = map_of(&step, &viewing(ppd)).masking_elevation();
+        let beside = (0.25 * ppd) as usize;
+        for x in [128 - beside, 127 + beside] {
+            let found = elevation.get(x, 32);
+            assert!(found < 1.25, "{ppd} ppd, x {x}: {found}");
+        }
+    }
+}
+
+#[test]
+fn texture_masks_and_its_own_noise_does_not() {
+    let wave = |amplitude: f32| {
+        Plane::from_fn(192, 192, move |x, y| {
+            let phase = std::f32::consts::TAU * 4.0 / 60.0;
+            100.0 * (1.0 + amplitude * ((x as f32 * phase).cos() * (y as f32 * phase).cos()))
+        })
+    };
+    let textured = map_of(&wave(0.3), &viewing(60.0)).masking_elevation().get(96, 96);
+    assert!(textured > 1.15, "{textured}");
+    // White noise of 10 % of the mean, known as such, and unknown.
+    let mut state = 1_u64;
+    let noisy = Plane::from_values(192, 192, (0..192 * 192).map(|_| 100.0 + 10.0 * normal(&mut state)).collect());
+    let noisy = noisy.unwrap();
+    let variance = Plane::filled(192, 192, 100.0);
+    let known = ThresholdInputs { display_luminance_cd_m2: &noisy, guide_variance: Some(&variance) };
+    let known = threshold_map(&known, &viewing(60.0), &CastleCsf::default()).unwrap().masking_elevation();
+    let unknown = map_of(&noisy, &viewing(60.0)).masking_elevation();
+    assert!(known.mean() < 1.01 && unknown.mean() > 1.2, "known {} unknown {}", known.mean(), unknown.mean());
+}
+
+#[test]
+fn a_firefly_does_not_raise_its_threshold() {
+    let mut picture = Plane::filled(64, 64, 20.0);
+    picture.values_mut()[32 * 64 + 32] = 200.0;
+    let adapted = map_of(&picture, &viewing(60.0)).adaptation_cd_m2().get(32, 32);
+    assert!((adapted - 20.0).abs() < 1e-3, "{adapted}");
+}
+
+/// Some of a path tracer's outliers, alone and in pairs, on a textured picture: adaptation hardly moves.
+#[test]
+fn scattered_fireflies_do_not_move_adaptation() {
+    let clean = Plane::from_fn(160, 120, |x, y| 20.0 + 5.0 * ((x * 7 + y * 13) % 11) as f32);
+    let mut dirty = clean.clone();
+    let mut state = 3;
+    let mut fireflies = 0;
+    for y in 2..118 {
+        for x in 2..158 {
+            if crate::test_noise::uniform(&mut state) < 2e-3 {
+                dirty.values_mut()[y * 160 + x] = 1e5;
+                fireflies += 1;
+            }
+        }
+    }
+    assert!(fireflies > 20);
+    let (clean, dirty) = (map_of(&clean, &viewing(60.0)), map_of(&dirty, &viewing(60.0)));
+    let change = ratio(dirty.adaptation_cd_m2(), clean.adaptation_cd_m2(), |dirty, clean| dirty / clean);
+    let (least, greatest) = change.range();
+    assert!(least > 0.999 && greatest < 1.02, "{least} {greatest}");
+}
+
+/// A picture on pixels twice as wide as high shows what square pixels of the finer pitch show.
+#[test]
+fn pixels_need_not_be_square() {
+    let square = viewing(60.0);
+    let mut wide = viewing(30.0);
+    wide.display.pixel_aspect_ratio = 2.0;
+    // Texture to the right; gratings of one frequency along x and along y, 2 cpd, fine enough for both grids.
+    let texture = |x: f32, y: f32| {
+        let phase = std::f32::consts::TAU * 2.0;
+        let amplitude = if x > 3.0 { 0.3 } else { 0.0 };
+        80.0 * (1.0 + amplitude * (phase * x).cos() * (phase * y).cos())
+    };
+    let fine = Plane::from_fn(360, 240, |x, y| texture((x as f32 + 0.5) / 60.0, (y as f32 + 0.5) / 60.0));
+    let coarse = Plane::from_fn(180, 240, |x, y| texture((x as f32 + 0.5) / 30.0, (y as f32 + 0.5) / 60.0));
+    let (on_square, on_wide) = (map_of(&fine, &square), map_of(&coarse, &wide));
+    for (x, y) in [(40, 60), (80, 120), (130, 100), (160, 200)] {
+        let (a, b) = (on_square.adaptation_cd_m2().get(2 * x, y), on_wide.adaptation_cd_m2().get(x, y));
+        assert!((b / a - 1.0).abs() < 0.01, "adaptation at ({x}, {y}): {a}, {b}");
+        let (a, b) = (on_square.elevations[2].enlarged().get(2 * x, y), on_wide.elevations[2].enlarged().get(x, y));
+        assert!((b / a - 1.0).abs() < 0.03, "elevation of the 2 cpd band at ({x}, {y}): {a}, {b}");
+    }
+    // The same grating as an error, along x and then along y, is as visible on both; pooled, it has its contrast over threshold.
+    for along_y in [false, true] {
+        let wave = |x: f32, y: f32| (std::f32::consts::TAU * 4.0 * if along_y { y } else { x }).cos();
+        let of = |width: usize, step: f32, map: &ThresholdMap| {
+            let error = Plane::from_fn(width, 240, |x, y| wave((x as f32 + 0.5) * step, (y as f32 + 0.5) / 60.0));
+            map.measured_visibility(&error).get(width / 4, 120)
+        };
+        let (a, b) = (of(360, 1.0 / 60.0, &on_square), of(180, 1.0 / 30.0, &on_wide));
+        assert!((b / a - 1.0).abs() < 0.01, "grating along {}: {a}, {b}", if along_y { "y" } else { "x" });
+    }
+    // White noise of the same σ has half as many pixels to average over: more of its energy lies where the eye sees.
+    let grey = |width| Plane::filled(width, 240, 80.0);
+    let gain = |picture: &Plane, viewing: &Viewing| f64::from(map_of(picture, viewing).noise_gain().get(20, 100));
+    let (fine, coarse, middle) = (gain(&grey(360), &square), gain(&grey(180), &wide), gain(&grey(180), &viewing(30.0)));
+    assert!(fine < coarse && coarse < middle, "{fine} {coarse} {middle}");
+    assert!((coarse / (fine * middle).sqrt() - 1.0).abs() < 0.15, "{coarse}");
+}
+
+#[test]
+fn any_size_and_luminance_gives_finite_thresholds() {
+    for (width, height) in [(1, 1), (2, 1), (1, 9), (3, 3), (17, 5)] {
+        for luminance in [0.0, 1e-30, 1e-4, 1.0, 1e8] {
+            let map = map_of(&Plane::filled(width, height, luminance), &viewing(30.0));
+            let allowed = map.allowed_standard_error_cd_m2(1.0);
+            assert!(allowed.values().iter().all(|value| value.is_finite() && *value > 0.0), "{luminance}");
+        }
+    }
+}
+
+#[test]
+fn error_that_moves_fast_may_be_larger() {
+    let map = map_of(&Plane::filled(32, 32, 50.0), &viewing(60.0));
+    let at = |velocity| {
+        let moved = map.with_motion(&Plane::filled(32, 32, velocity)).unwrap();
+        moved.allowed_standard_error_cd_m2(1.0).get(16, 16)
+    };
+    let still = map.allowed_standard_error_cd_m2(1.0).get(16, 16);
+    assert!((at(0.0) / still - 1.0).abs() < 1e-5 && (at(0.15) / still - 1.0).abs() < 1e-5);
+    assert!(at(10.0) > 2.0 * still, "{} {still}", at(10.0));
+    assert!(at(1e9).is_finite());
+    assert!(map.with_motion(&Plane::filled(3, 3, 0.0)).is_err());
+}
+
+#[test]
+fn isoluminant_noise_is_not_missed() {
+    use crate::csf::{CastleChromatic, ChromaticChannel};
+    use crate::opponent::opponent;
+    let mut state = 9;
+    let noise: Vec<_> = (0..128 * 128)
+        .map(|_| {
+            // Red up and green down by the same luminance.
+            let red = 40.0 * normal(&mut state);
+            opponent([red, -red * 0.2126 / 0.7152, 0.0])
+        })
+        .collect();
+    let plane = |value: fn(&crate::opponent::Opponent) -> f32| {
+        Plane::from_values(128, 128, noise.iter().map(value).collect()).unwrap()
+    };
+    let grey = Plane::filled(128, 128, 100.0);
+    let csf = CastleChromatic::new(ChromaticChannel::RedGreen, 1.0).unwrap();
+    let red_green = chromatic_threshold_map(&Plane::filled(128, 128, 0.0), &grey, &viewing(60.0), &csf).unwrap();
+    let luminance_v = map_of(&grey, &viewing(60.0)).measured_visibility(&plane(|c| c.achromatic)).get(64, 64);
+    let chromatic_v = red_green.measured_visibility(&plane(|c| c.red_green)).get(64, 64);
+    assert!(luminance_v < 1e-3 && chromatic_v > 1.0, "luminance {luminance_v}, red–green {chromatic_v}");
+}
+
+#[test]
+fn bad_inputs_are_errors() {
+    let csf = CastleCsf::default();
+    let bad = Plane::filled(4, 4, f32::NAN);
+    let good = Plane::filled(4, 4, 1.0);
+    let small = Plane::filled(2, 2, 1.0);
+    let ask = |display_luminance_cd_m2, guide_variance, viewing: &Viewing| {
+        threshold_map(&ThresholdInputs { display_luminance_cd_m2, guide_variance }, viewing, &csf).err()
+    };
+    assert!(matches!(ask(&bad, None, &Viewing::default()), Some(Error::BadPixel { .. })));
+    assert!(matches!(ask(&good, Some(&small), &Viewing::default()), Some(Error::SizeMismatch { .. })));
+    assert!(matches!(ask(&good, None, &viewing(0.0)), Some(Error::OutOfRange { .. })));
+    assert!(matches!(ask(&good, None, &viewing(f64::NAN)), Some(Error::OutOfRange { .. })));
+}
+
+fn normal(state: &mut u64) -> f32 {
+    crate::test_noise::normal(state)
+}

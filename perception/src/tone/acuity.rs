@@ -1,0 +1,119 @@
+//! Fine detail that an eye in dim light does not resolve, taken out of the picture for one in front of a bright display.
+
+use serde::{Deserialize, Serialize};
+
+use crate::csf::{CastleCsf, ContrastSensitivity};
+use crate::display::Viewing;
+use crate::filter::gaussian_blur;
+use crate::plane::Plane;
+use crate::tvi::acuity_cpd;
+
+/// A Gaussian over the picture.
+///
+/// At the highest frequency r that the scene's eye resolves ([`acuity_cpd`], Shlaer's data) it lets through just the
+/// contrast that the display's eye detects there, 1/S(r) of castleCSF: what the one cannot see, the other cannot either.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AcuityFilter {
+    /// Standard deviation, degrees.
+    pub sigma_deg: f64,
+    /// Of the display.
+    pub pixels_per_degree: f64,
+}
+
+impl AcuityFilter {
+    /// The filter for an eye adapted to `adaptation_cd_m2`; `None` where it resolves all that the display shows.
+    #[must_use]
+    pub fn for_adaptation(adaptation_cd_m2: f64, viewing: &Viewing) -> Option<Self> {
+        let pixels_per_degree = viewing.display.pixels_per_degree;
+        let limit_cpd = acuity_cpd(adaptation_cd_m2);
+        if limit_cpd >= pixels_per_degree / 2.0 || limit_cpd <= 0.0 {
+            return None;
+        }
+        let display_adaptation_cd_m2 = viewing.display.white_cd_m2 / 2.0;
+        let threshold = CastleCsf::default().sensitivity(limit_cpd, display_adaptation_cd_m2).recip();
+        if threshold >= 1.0 {
+            return None;
+        }
+        let sigma_deg = (-threshold.ln() / 2.0).sqrt() / (std::f64::consts::PI * limit_cpd);
+        Some(Self { sigma_deg, pixels_per_degree })
+    }
+
+    /// Share of a grating's amplitude that is left at `freq_cpd` cycles a degree. White noise of a renderer passes the same
+    /// filter: multiply a band's noise gain by it.
+    #[must_use]
+    pub fn transfer(&self, freq_cpd: f64) -> f64 {
+        let phase = std::f64::consts::TAU * self.sigma_deg * freq_cpd;
+        (-0.5 * phase * phase).exp()
+    }
+
+    /// One channel through the filter.
+    #[must_use]
+    pub fn blur_plane(&self, plane: &Plane) -> Plane {
+        gaussian_blur(plane, self.sigma_deg * self.pixels_per_degree)
+    }
+
+    /// A picture `width` pixels wide through the filter; pixels that are not finite count as black.
+    #[must_use]
+    pub fn blur(&self, width: usize, rgb: &[[f32; 3]]) -> Vec<[f32; 3]> {
+        let width = width.max(1);
+        let height = rgb.len() / width;
+        let [r, g, b] = [0, 1, 2].map(|channel| {
+            self.blur_plane(&Plane::from_fn(width, height, |x, y| {
+                let value = rgb[y * width + x][channel];
+                if value.is_finite() { value } else { 0.0 }
+            }))
+        });
+        let channels = r.values().iter().zip(g.values()).zip(b.values());
+        channels.map(|((&r, &g), &b)| [r, g, b]).collect()
+    }
+}
+
+/// A contrast sensitivity function behind a loss of acuity: how scene noise is seen that the operator blurs. Thresholds
+/// built with it hold for the noise as it is rendered.
+pub struct BehindAcuity<C> {
+    /// The eye in front of the display.
+    pub csf: C,
+    /// What the operator takes away, if it does.
+    pub acuity: Option<AcuityFilter>,
+}
+
+impl<C: ContrastSensitivity> ContrastSensitivity for BehindAcuity<C> {
+    fn name(&self) -> &'static str {
+        self.csf.name()
+    }
+
+    fn sensitivity(&self, freq_cpd: f64, luminance_cd_m2: f64) -> f64 {
+        self.acuity.map_or(1.0, |acuity| acuity.transfer(freq_cpd)) * self.csf.sensitivity(freq_cpd, luminance_cd_m2)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::display::Display;
+
+    #[test]
+    fn what_the_scene_hides_is_at_threshold_on_the_display() {
+        let viewing = Viewing::default();
+        for adaptation in [0.001, 0.01, 0.1] {
+            let filter = AcuityFilter::for_adaptation(adaptation, &viewing).unwrap();
+            let limit = acuity_cpd(adaptation);
+            let shown = filter.transfer(limit) * CastleCsf::default().sensitivity(limit, 100.0);
+            assert!((shown - 1.0).abs() < 1e-9, "{adaptation}: {shown}");
+        }
+        assert!(AcuityFilter::for_adaptation(100.0, &viewing).is_none());
+        let coarse = Viewing::of(Display { pixels_per_degree: 5.0, ..Display::default() });
+        assert!(AcuityFilter::for_adaptation(0.1, &coarse).is_none());
+    }
+
+    #[test]
+    fn the_blur_has_the_transfer_it_says() {
+        let filter = AcuityFilter { sigma_deg: 0.05, pixels_per_degree: 64.0 };
+        let grating = Plane::from_fn(256, 8, |x, _| 1.0 + (std::f32::consts::TAU * x as f32 / 32.0).cos());
+        let blurred = filter.blur_plane(&grating);
+        let amplitude =
+            f64::from(blurred.values()[4 * 256 + 64..4 * 256 + 192].iter().copied().fold(0.0, f32::max)) - 1.0;
+        // 32 pixels a period are 2 cycles a degree.
+        assert!((amplitude / filter.transfer(2.0) - 1.0).abs() < 0.02, "{amplitude} {}", filter.transfer(2.0));
+    }
+}

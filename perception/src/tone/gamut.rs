@@ -1,0 +1,54 @@
+//! Colours that a display can show.
+
+use crate::photometry::luminance;
+
+/// Linear display RGB in 0..1 of the same luminance and hue: luminance above 1 becomes white, and what does not fit is
+/// mixed with the grey of equal luminance. Channels must be finite; negative ones count as 0.
+pub(super) fn fit_into_display(rgb: [f32; 3]) -> [f32; 3] {
+    let rgb = rgb.map(|channel| channel.max(0.0));
+    let shown = luminance(rgb);
+    if shown <= 0.0 {
+        return [0.0; 3];
+    }
+    let target = shown.min(1.0);
+    desaturate(rgb.map(|channel| channel / shown * target), target)
+}
+
+/// Scene RGB with luminance `scene` brought to display luminance `target` (clamped to 0..1), hue kept.
+pub(super) fn with_luminance(rgb: [f32; 3], scene: f32, target: f32) -> [f32; 3] {
+    if scene <= 0.0 {
+        return [target.clamp(0.0, 1.0); 3];
+    }
+    let target = target.clamp(0.0, 1.0);
+    desaturate(rgb.map(|channel| channel / scene * target), target)
+}
+
+/// Mixes `rgb` with the grey of its own luminance `grey` (0..1) until no channel exceeds 1.
+fn desaturate(rgb: [f32; 3], grey: f32) -> [f32; 3] {
+    let largest = rgb.into_iter().fold(0.0, f32::max);
+    if largest <= 1.0 {
+        return rgb;
+    }
+    let keep = ((1.0 - grey) / (largest - grey)).clamp(0.0, 1.0);
+    rgb.map(|channel| (grey + keep * (channel - grey)).clamp(0.0, 1.0))
+}
+
+/// `rgb` without what no light is: negative and not finite channels become 0.
+pub(super) fn light(rgb: [f32; 3]) -> [f32; 3] {
+    rgb.map(|channel| if channel.is_finite() { channel.max(0.0) } else { 0.0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_too_bright_keeps_luminance_and_hue() {
+        let shown = fit_into_display([2.0, 0.2, 0.2]);
+        assert!((luminance(shown) - luminance([2.0, 0.2, 0.2])).abs() < 1e-5, "{shown:?}");
+        assert!((shown[0] - 1.0).abs() < 1e-5 && shown[1] < shown[0] && shown[1] == shown[2]);
+        assert_eq!(fit_into_display([5.0, 4.0, 6.0]), [1.0; 3]);
+        assert_eq!(fit_into_display([0.0, -1.0, 0.0]), [0.0; 3]);
+        assert_eq!(with_luminance([0.0; 3], 0.0, 0.5), [0.5; 3]);
+    }
+}

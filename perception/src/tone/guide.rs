@@ -1,0 +1,54 @@
+//! What an operator is fitted to.
+
+use crate::plane::Plane;
+
+/// A pixel of a picture: column and row from the top left.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pixel {
+    /// Column.
+    pub x: usize,
+    /// Row.
+    pub y: usize,
+}
+
+impl Pixel {
+    /// A place outside every picture: what is asked there is answered with the state of the whole view.
+    pub const NOWHERE: Self = Self { x: usize::MAX, y: usize::MAX };
+}
+
+/// What an operator may look at when it is fitted.
+#[derive(Clone, Copy, Debug)]
+pub struct SceneGuide<'a> {
+    /// Scene luminance of the denoised guide, cd/m².
+    pub luminance_cd_m2: &'a Plane,
+    /// The same as the rods see it ([`scotopic_luminance`](crate::photometry::scotopic_luminance)); the photopic luminance stands in where it is not given or
+    /// has another size.
+    pub scotopic_cd_m2: Option<&'a Plane>,
+    /// Where the eye looks. Adaptation then comes from there and not from the picture as a whole.
+    pub gaze: Option<Pixel>,
+}
+
+impl<'a> SceneGuide<'a> {
+    /// A grey picture that is looked at all over.
+    #[must_use]
+    pub fn of(luminance_cd_m2: &'a Plane) -> Self {
+        Self { luminance_cd_m2, scotopic_cd_m2: None, gaze: None }
+    }
+
+    /// The same with what the rods see.
+    #[must_use]
+    pub fn with_scotopic(self, scotopic_cd_m2: &'a Plane) -> Self {
+        Self { scotopic_cd_m2: Some(scotopic_cd_m2), ..self }
+    }
+
+    /// The same with the eye on one pixel.
+    #[must_use]
+    pub fn with_gaze(self, gaze: Option<Pixel>) -> Self {
+        Self { gaze, ..self }
+    }
+
+    /// What the rods see, as far as it is known.
+    pub(super) fn rods(&self) -> &'a Plane {
+        self.scotopic_cd_m2.filter(|plane| plane.same_size(self.luminance_cd_m2)).unwrap_or(self.luminance_cd_m2)
+    }
+}

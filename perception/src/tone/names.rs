@@ -1,0 +1,101 @@
+//! Operators by name.
+
+use super::field::AdaptationScope;
+use super::{
+    Absolute, Agx, Ceiling, Constant, DurandDorsey00, Exposure, Ferwerda96, Linear, Pattanaik00, PbrNeutral,
+    Reinhard02, Scheel00, Srgb, ToneOperator, TumblinRushmeier, Ward94, WardLarson97,
+};
+
+/// What an eye loses besides brightness, for the operators that can show it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Effects {
+    /// Bright places veil their surroundings (`ward-larson97`).
+    pub glare: bool,
+    /// Fine detail is lost in dim light (`ward-larson97`, `ferwerda96`).
+    pub acuity: bool,
+    /// Colour is lost in dim light (`ward-larson97`; `ferwerda96`, `durand-dorsey00` and `pattanaik00` always lose it).
+    pub colour: bool,
+}
+
+/// What may be chosen besides the operator.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ToneSettings {
+    /// Multiplies light by 2^stops: before the curve of `agx`, `pbr-neutral` and `reinhard02`, after the others.
+    pub exposure_stops: f64,
+    /// What the eye is adapted to, for the operators that know both.
+    pub scope: AdaptationScope,
+    /// `None`: what the operator's authors had, which is acuity and colour for `ferwerda96` and nothing for
+    /// `ward-larson97`.
+    pub effects: Option<Effects>,
+}
+
+const OPERATOR_NAMES: [&str; 16] = [
+    "constant",
+    "constant-long",
+    "constant-short",
+    "absolute",
+    "tumblin-rushmeier",
+    "ward94",
+    "ferwerda96",
+    "ward-larson97",
+    "pattanaik00",
+    "durand-dorsey00",
+    "scheel00",
+    "reinhard02",
+    "linear",
+    "srgb",
+    "pbr-neutral",
+    "agx",
+];
+
+/// The operator of that name. `exposure_stops` multiplies what it shows by 2^stops; `None` is 0.
+///
+/// ```
+/// use fechner_perception::tone;
+/// assert!(tone::operator("ward94", None).is_some());
+/// assert_eq!(tone::operator("ptyg", None).unwrap().name(), "pattanaik00");
+/// assert!(tone::operator("darkroom", None).is_none());
+/// ```
+#[must_use]
+pub fn operator(name: &str, exposure_stops: Option<f64>) -> Option<Box<dyn ToneOperator>> {
+    operator_with(name, &ToneSettings { exposure_stops: exposure_stops.unwrap_or(0.0), ..ToneSettings::default() })
+}
+
+/// The operator of that name or of its authors' initials (`tr`, `fpsg`, `wrp`, `ptyg`).
+#[must_use]
+pub fn operator_with(name: &str, settings: &ToneSettings) -> Option<Box<dyn ToneOperator>> {
+    let stops = if settings.exposure_stops.is_finite() { settings.exposure_stops } else { 0.0 };
+    let exposure = stops.clamp(-100.0, 100.0).exp2();
+    let scope = settings.scope;
+    Some(match name {
+        "constant" => Box::new(Constant { exposure, time: Exposure::Automatic }),
+        "constant-long" => Box::new(Constant { exposure, time: Exposure::Long }),
+        "constant-short" => Box::new(Constant { exposure, time: Exposure::Short }),
+        "absolute" => Box::new(Absolute { exposure }),
+        "tumblin-rushmeier" | "tr" => Box::new(TumblinRushmeier { exposure, scope }),
+        "ward94" => Box::new(Ward94 { exposure, scope }),
+        "ferwerda96" | "fpsg" => {
+            let acuity = settings.effects.is_none_or(|effects| effects.acuity);
+            Box::new(Ferwerda96 { exposure, scope, acuity })
+        }
+        "ward-larson97" | "wrp" => {
+            let effects = settings.effects.unwrap_or_default();
+            Box::new(WardLarson97 { exposure, ceiling: Ceiling::Human, effects })
+        }
+        "pattanaik00" | "ptyg" => Box::new(Pattanaik00 { exposure, scope }),
+        "durand-dorsey00" => Box::new(DurandDorsey00 { exposure, scope }),
+        "scheel00" => Box::new(Scheel00 { exposure }),
+        "reinhard02" => Box::new(Reinhard02 { exposure, scope }),
+        "linear" => Box::new(Linear { exposure }),
+        "srgb" => Box::new(Srgb { exposure }),
+        "pbr-neutral" => Box::new(PbrNeutral { exposure }),
+        "agx" => Box::new(Agx { exposure }),
+        _ => return None,
+    })
+}
+
+/// The names that [`operator`] knows, initials aside.
+#[must_use]
+pub fn operator_names() -> &'static [&'static str] {
+    &OPERATOR_NAMES
+}

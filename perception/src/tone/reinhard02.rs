@@ -1,0 +1,133 @@
+//! Reinhard, Stark, Shirley and Ferwerda's photographic operator.
+
+use serde::{Deserialize, Serialize};
+
+use super::constant::KEY;
+use super::field::{AdaptationScope, FrozenPlane};
+use super::guide::{Pixel, SceneGuide};
+use super::saved::{Fit, SavedTone};
+use super::screen::finite;
+use super::statistics::log_average;
+use super::time::AdaptationState;
+use super::{FittedTone, ToneOperator};
+use crate::display::Viewing;
+use crate::filter::gaussian_blur;
+use crate::plane::Plane;
+
+/// The picture's geometric mean becomes middle grey, and L (1 + L / `L_white`²) / (1 + L) brings the brightest pixel to white.
+///
+/// "Photographic tone reproduction for digital images", SIGGRAPH 2002: key 0.18, equation 4. With
+/// [`AdaptationScope::Local`] equation 9, dodging and burning: each pixel is divided by the mean of the largest surround of
+/// even luminance (eight scales in steps of 1.6, φ = 8, ε = 0.05). It knows no unit: only ratios count.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reinhard02 {
+    /// Multiplies the scene: 2^stops.
+    pub exposure: f64,
+    /// One curve for all, or one for each surround.
+    pub scope: AdaptationScope,
+}
+
+impl ToneOperator for Reinhard02 {
+    fn name(&self) -> &'static str {
+        "reinhard02"
+    }
+
+    fn fit(&self, guide: &SceneGuide<'_>, _viewing: &Viewing, _state: Option<&AdaptationState>) -> Box<dyn FittedTone> {
+        let plane = guide.luminance_cd_m2;
+        let scale = self.exposure * log_average(plane).map_or(1.0, |average| KEY / average);
+        let greatest = plane.values().iter().copied().filter(|value| value.is_finite()).fold(0.0, f32::max);
+        let surround = match self.scope {
+            AdaptationScope::World => None,
+            AdaptationScope::Local => Some(FrozenPlane::of(surround(plane, scale))),
+        };
+        // A picture whose brightest pixel is not bright keeps the plain curve: `white` below 1 would lift it.
+        Box::new(FittedReinhard02 { scale, white: (scale * f64::from(greatest)).max(1.0), surround })
+    }
+}
+
+/// The mean of the largest surround that is even, in units of the scaled picture.
+fn surround(luminance_cd_m2: &Plane, scale: f64) -> Plane {
+    const SCALES: i32 = 8;
+    const PHI: f32 = 8.0;
+    const EPSILON: f32 = 0.05;
+    let scaled = luminance_cd_m2.map(|value| finite(scale * f64::from(if value.is_finite() { value } else { 0.0 })));
+    // A profile of exp(−r² / (0.35 s)²) has σ = 0.35 s / √2.
+    let at = |step: i32| gaussian_blur(&scaled, 0.35 * 1.6_f64.powi(step) / 2.0_f64.sqrt());
+    let mut center = at(0);
+    let mut chosen = center.clone();
+    let mut open = Plane::filled(center.width(), center.height(), 1.0);
+    for step in 0..SCALES {
+        let wider = at(step + 1);
+        let size = 1.6_f32.powi(step);
+        let pixels = chosen.values_mut().iter_mut().zip(open.values_mut());
+        for ((chosen, open), (&center, &wider)) in pixels.zip(center.values().iter().zip(wider.values())) {
+            let response = (center - wider) / (2.0_f32.powf(PHI) * KEY as f32 / (size * size) + center);
+            if *open > 0.0 {
+                *chosen = center;
+                if response.abs() >= EPSILON {
+                    *open = 0.0;
+                }
+            }
+        }
+        center = wider;
+    }
+    chosen
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct FittedReinhard02 {
+    scale: f64,
+    white: f64,
+    surround: Option<FrozenPlane>,
+}
+
+impl FittedTone for FittedReinhard02 {
+    fn relative_luminance_at(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
+        let light = self.scale * f64::from(scene_cd_m2.clamp(0.0, f32::MAX).max(0.0));
+        finite(match self.surround.as_ref().and_then(|surround| surround.at(pixel)) {
+            Some(surround) => light / (1.0 + surround),
+            None => light * (1.0 + light / (self.white * self.white)) / (1.0 + light),
+        })
+    }
+
+    fn describe(&self) -> String {
+        let white = self.white / self.scale;
+        format!("reinhard02: middle grey at {:.4}, white at {white:.4} cd/m² of the scene", KEY / self.scale)
+    }
+
+    fn save(&self) -> SavedTone {
+        SavedTone(Fit::Reinhard02(self.clone()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fit(guide: &Plane, scope: AdaptationScope) -> Box<dyn FittedTone> {
+        Reinhard02 { exposure: 1.0, scope }.fit(&SceneGuide::of(guide), &Viewing::default(), None)
+    }
+
+    #[test]
+    fn the_mean_is_grey_and_the_brightest_is_white() {
+        let guide = Plane::from_fn(101, 1, |x, _| 10.0_f32.powf((x as f32 - 50.0) / 25.0));
+        let fit = fit(&guide, AdaptationScope::World);
+        assert!((fit.relative_luminance(1.0) - 0.18 / 1.18).abs() < 1e-3);
+        assert!((fit.relative_luminance(100.0) - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn dodging_keeps_detail_that_the_plain_curve_flattens() {
+        let guide = Plane::from_fn(128, 128, |x, y| {
+            let base = if x < 64 { 1.0 } else { 300.0 };
+            base * if (x / 4 + y / 4) % 2 == 0 { 1.0 } else { 1.3 }
+        });
+        let contrast = |scope| {
+            let fit = fit(&guide, scope);
+            let at = |y| fit.relative_luminance_at(Pixel { x: 97, y }, guide.get(97, y));
+            (at(65) / at(61)).max(at(61) / at(65))
+        };
+        let (local, world) = (contrast(AdaptationScope::Local), contrast(AdaptationScope::World));
+        assert!(local > 1.02 * world, "{local} {world}");
+    }
+}

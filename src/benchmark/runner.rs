@@ -1,0 +1,239 @@
+//! Rendering an arm, judging it, and keeping what was found.
+
+use super::arm::Arm;
+use super::metrics::{Metrics, measure};
+use super::oracle::{displayed_variance, optimal_samples, trace_counts, uniform_samples};
+use super::pictures::{read_pictures, write_pictures};
+use super::record::ScenePictures;
+use super::reference::{Reference, read_plane, write_plane};
+use super::truth::Truth;
+use super::{BenchSettings, Subject};
+use crate::adaptive::statistics::picture_variance;
+use crate::adaptive::{Quiet, Rendered, render};
+use crate::film::Film;
+use anyhow::{Context, Result};
+use fechner_perception::Plane;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Arms whose pictures stand in the report.
+const PICTURED: [Arm; 4] = [Arm::Uniform, Arm::Relative, Arm::AsAsked, Arm::Oracle];
+
+/// One render, judged.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct Run {
+    pub(crate) seed: u64,
+    /// Setting of the arm's knob, for arms that have one.
+    pub(crate) knob: Option<f64>,
+    pub(crate) samples: u64,
+    pub(crate) seconds: f64,
+    /// Time in perception, planning and audits.
+    pub(crate) seconds_perception: f64,
+    /// Mean luminance over the reference's, less 1, and its standard error.
+    pub(crate) energy_bias: f64,
+    pub(crate) energy_bias_standard_error: f64,
+    pub(crate) flip_mean: f64,
+    pub(crate) flip_p99: f64,
+    pub(crate) jod: f64,
+    pub(crate) relmse: f64,
+    pub(crate) audit_ratio: Option<f64>,
+    /// v² of its error, written beside the record.
+    #[serde(skip)]
+    pub(crate) squared_visibility: Option<Plane>,
+}
+
+/// A film and what making it took.
+struct Made {
+    film: Film,
+    seconds: f64,
+    seconds_perception: f64,
+    audit_ratio: Option<f64>,
+}
+
+impl From<Rendered> for Made {
+    fn from(rendered: Rendered) -> Self {
+        Self {
+            film: rendered.film,
+            seconds: rendered.seconds_total,
+            seconds_perception: rendered.seconds_perception,
+            audit_ratio: rendered.audit.map(|audit| audit.ratio),
+        }
+    }
+}
+
+/// Renders arms of one scene.
+pub(crate) struct ArmRunner<'a> {
+    subject: &'a Subject,
+    reference: &'a Reference,
+    truth: &'a Truth,
+    settings: &'a BenchSettings,
+    variance: Option<Plane>,
+    /// Runs of the loop as asked, for the arm of equal time.
+    runs_as_asked: Vec<Run>,
+}
+
+impl<'a> ArmRunner<'a> {
+    pub(crate) fn new(
+        subject: &'a Subject,
+        reference: &'a Reference,
+        truth: &'a Truth,
+        settings: &'a BenchSettings,
+    ) -> Self {
+        Self { subject, reference, truth, settings, variance: None, runs_as_asked: Vec::new() }
+    }
+
+    /// The arm's runs, those that are there read back.
+    pub(crate) fn runs(&mut self, arm: Arm, say: &dyn Fn(&str)) -> Result<Vec<Run>> {
+        let mut runs: Vec<Run> = Vec::new();
+        let mut knob = None;
+        for seed in 0..u64::from(self.settings.seeds) {
+            let file = self.file(arm, seed);
+            let run = match self.read(&file) {
+                Some(run) => run,
+                None => {
+                    let run = if seed == 0 { self.first_run(arm)? } else { self.run(arm, seed, knob)? };
+                    self.write(&file, &run)?;
+                    run
+                }
+            };
+            knob = run.knob.or(knob);
+            runs.push(run);
+        }
+        if arm == Arm::AsAsked {
+            self.runs_as_asked.clone_from(&runs);
+        }
+        say(&format!("{}: {} done", self.subject.name, arm.name()));
+        Ok(runs)
+    }
+
+    /// The run of the first seed. An arm with a knob is rendered up to four times, until 99 % of the picture is at v\* within
+    /// 12 %: knobs are like errors, and what is left scales with them.
+    fn first_run(&mut self, arm: Arm) -> Result<Run> {
+        let uniform_spp = match arm {
+            Arm::Uniform => uniform_samples(self.subject, self.truth, &self.variance()?.clone(), 0.99),
+            _ => self.reference.uniform_spp,
+        };
+        let Some(mut knob) = arm.first_knob(self.subject, uniform_spp) else { return self.run(arm, 0, None) };
+        let mut run = self.run(arm, 0, Some(knob))?;
+        for _ in 0..3 {
+            let energy = run.squared_visibility.as_ref().context("a fresh run")?;
+            let step = (quantile(energy, 0.99).sqrt() / self.subject.visibility).clamp(0.1, 10.0);
+            if (0.89..1.12).contains(&step) {
+                break;
+            }
+            knob /= step;
+            run = self.run(arm, 0, Some(knob))?;
+        }
+        Ok(run)
+    }
+
+    fn run(&mut self, arm: Arm, seed: u64, knob: Option<f64>) -> Result<Run> {
+        let made = self.make(arm, seed, knob)?;
+        let nits = self.subject.scene.nits_per_unit;
+        let estimate = made.film.estimate(nits);
+        let picture = self.truth.displayed(&estimate.rgb_cd_m2);
+        let metrics: Metrics = measure(self.subject, self.truth, &picture)?;
+        let sum = |plane: &Plane| plane.values().iter().map(|&v| f64::from(v)).sum::<f64>();
+        let truth = sum(&self.reference.luminance());
+        // The reference's own error, from its halves' scatter, belongs to the interval.
+        let [a, b] = self.reference.halves.each_ref();
+        let own: f64 = a.iter().zip(b).map(|(a, b)| half_difference(*a, *b).powi(2)).sum();
+        let variance = sum(&picture_variance(&made.film, nits)) + own;
+        let squared_visibility = self.truth.squared_visibility(&picture);
+        if seed == 0 && PICTURED.contains(&arm) {
+            write_pictures(&self.file(arm, seed), self.subject, &made.film, &picture, &squared_visibility)?;
+        }
+        Ok(Run {
+            seed,
+            knob,
+            samples: made.film.total_samples(),
+            seconds: made.seconds,
+            seconds_perception: made.seconds_perception,
+            energy_bias: sum(&estimate.luminance_cd_m2) / truth - 1.0,
+            energy_bias_standard_error: variance.sqrt() / truth,
+            flip_mean: metrics.flip_mean,
+            flip_p99: metrics.flip_p99,
+            jod: metrics.jod,
+            relmse: metrics.relmse,
+            audit_ratio: made.audit_ratio,
+            squared_visibility: Some(squared_visibility),
+        })
+    }
+
+    fn make(&mut self, arm: Arm, seed: u64, knob: Option<f64>) -> Result<Made> {
+        let knob = match arm {
+            Arm::Oracle => return self.make_oracle(seed, knob.unwrap_or(self.subject.visibility)),
+            Arm::UniformEqualTime => self.equal_time_spp(seed)?.sqrt().recip(),
+            _ => knob.unwrap_or(self.subject.visibility),
+        };
+        let settings = arm.settings(self.subject, knob, self.reference.uniform_spp)?;
+        Ok(render(&self.subject.tracer(seed + 1), &settings, &Quiet)?.into())
+    }
+
+    fn make_oracle(&mut self, seed: u64, visibility: f64) -> Result<Made> {
+        let variance = self.variance()?.clone();
+        let counts = optimal_samples(self.truth, &variance, visibility)?;
+        let started = Instant::now();
+        let film = trace_counts(self.subject, &counts, seed + 1);
+        Ok(Made { film, seconds: started.elapsed().as_secs_f64(), seconds_perception: 0.0, audit_ratio: None })
+    }
+
+    /// Samples a pixel that uniform sampling takes in the time of the loop's run as asked with this seed.
+    fn equal_time_spp(&self, seed: u64) -> Result<f64> {
+        let run = self.runs_as_asked.get(seed as usize).context("the arm as-asked comes before uniform-equal-time")?;
+        // By the share of time outside of the tracer, which the machine's other work changes less than seconds.
+        let tracing = 1.0 - run.seconds_perception / run.seconds;
+        Ok((run.samples as f64 / self.subject.pixels() / tracing).max(16.0))
+    }
+
+    /// What the report shows of the arm.
+    pub(crate) fn pictures(&self, arm: Arm) -> ScenePictures {
+        let pictures = read_pictures(&self.file(arm, 0));
+        ScenePictures { scene: self.subject.name.clone(), arm: arm.name(), pictures }
+    }
+
+    fn variance(&mut self) -> Result<&Plane> {
+        if self.variance.is_none() {
+            self.variance = Some(displayed_variance(self.subject, self.reference, self.truth)?);
+        }
+        self.variance.as_ref().context("just made")
+    }
+
+    fn file(&self, arm: Arm, seed: u64) -> PathBuf {
+        let key = self.subject.key(self.settings.reference_factor);
+        let version = env!("CARGO_PKG_VERSION");
+        let name = format!("{}-{key:016x}-{version}-{}-{seed}.json", self.subject.name, arm.name());
+        self.settings.output.join("runs").join(name)
+    }
+
+    fn read(&self, file: &Path) -> Option<Run> {
+        let mut run: Run = serde_json::from_slice(&std::fs::read(file).ok()?).ok()?;
+        let plane = read_plane(&file.with_extension("f32"), self.reference.width, self.reference.height)?;
+        run.squared_visibility = Some(plane);
+        Some(run)
+    }
+
+    fn write(&self, file: &Path, run: &Run) -> Result<()> {
+        if let Some(plane) = &run.squared_visibility {
+            write_plane(&file.with_extension("f32"), plane)?;
+        }
+        let text = serde_json::to_string_pretty(run)?;
+        crate::output::write_beside(file, |file| std::io::Write::write_all(file, text.as_bytes()))?;
+        Ok(())
+    }
+}
+
+/// Half the difference of two colours' luminance.
+fn half_difference(a: [f32; 3], b: [f32; 3]) -> f64 {
+    use fechner_perception::photometry::luminance;
+    0.5 * f64::from(luminance(a) - luminance(b))
+}
+
+/// The value that this share of a plane's pixels stays below.
+pub(crate) fn quantile(plane: &Plane, share: f64) -> f64 {
+    let mut values = plane.values().to_vec();
+    let rank = (share * (values.len() - 1) as f64).round() as usize;
+    let (_, &mut value, _) = values.select_nth_unstable_by(rank, f32::total_cmp);
+    f64::from(value)
+}

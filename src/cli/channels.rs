@@ -1,0 +1,160 @@
+//! Which channels of another program's EXR file hold its colour and its motion.
+
+use fechner::exr_read::ExrImage;
+
+/// Colour as it was found.
+#[derive(Debug, PartialEq)]
+pub(super) enum Colour<'a> {
+    /// Red, green and blue.
+    Rgb([&'a [f32]; 3]),
+    /// Luminance alone: a grey picture.
+    Grey(&'a [f32]),
+}
+
+/// Layers that hold colour, but not the picture's.
+const NOT_THE_PICTURE: [&str; 14] = [
+    "albedo", "normal", "depth", "position", "variance", "velocity", "vector", "motion", "forward", "backward",
+    "crypto", "shadow", "mask", "diffuse",
+];
+/// What renderers call the finished picture; R, G and B without a layer come first.
+const THE_PICTURE: [&str; 5] = ["combined", "beauty", "rgba", "color", "image"];
+
+/// The picture: `R`, `G`, `B` if the file has them, else of a layer called like a finished picture
+/// (`RenderLayer.Combined.R`), else of the first layer that is no auxiliary; else `Y`. All three come from one layer.
+pub(super) fn colour(exr: &ExrImage) -> Option<Colour<'_>> {
+    let layers = layers_with(exr, &["R", "G", "B"]);
+    let is_named = |layer: &str, names: &[&str]| names.iter().any(|name| layer.to_ascii_lowercase().contains(name));
+    let best = layers
+        .iter()
+        .find(|layer| layer.is_empty())
+        .or_else(|| THE_PICTURE.iter().find_map(|name| layers.iter().find(|layer| is_named(layer, &[name]))))
+        .or_else(|| layers.iter().find(|layer| !is_named(layer, &NOT_THE_PICTURE)));
+    match best {
+        Some(layer) => {
+            let [Some(r), Some(g), Some(b)] = ["R", "G", "B"].map(|part| part_of(exr, layer, part)) else {
+                return None;
+            };
+            Some(Colour::Rgb([r, g, b]))
+        }
+        None => exr.channel("Y").map(Colour::Grey),
+    }
+}
+
+/// Names of layers that hold motion from this frame to the next, the surest first.
+const MOTION_LAYERS: [&str; 7] = ["velocity", "vector", "motion", "motionvector", "motionvectors", "forward", "mv"];
+/// What the two parts of a vector are called.
+const VECTOR_PARTS: [[&str; 2]; 3] = [["X", "Y"], ["U", "V"], ["R", "G"]];
+
+/// Motion in pixels: the layer's name, and its channels along x and y.
+///
+/// A layer counts if one part of its name, between dots, is one that renderers use (`velocity.X`, `ViewLayer.Vector.X`,
+/// `forward.left.u`, `motion.x`); case does not matter.
+pub(super) fn motion(exr: &ExrImage) -> Option<(&str, [&[f32]; 2])> {
+    for name in MOTION_LAYERS {
+        for [across, down] in VECTOR_PARTS {
+            let found = layers_with(exr, &[across, down])
+                .into_iter()
+                .find(|layer| layer.split('.').any(|part| part.eq_ignore_ascii_case(name)));
+            if let Some(layer) = found {
+                return Some((layer, [part_of(exr, layer, across)?, part_of(exr, layer, down)?]));
+            }
+        }
+    }
+    None
+}
+
+/// Layers (what stands before the last dot, perhaps nothing) that have all of `parts`, in the file's order.
+fn layers_with<'a>(exr: &'a ExrImage, parts: &[&str]) -> Vec<&'a str> {
+    let mut layers: Vec<&str> = Vec::new();
+    for (name, _) in &exr.channels {
+        let (layer, part) = split(name);
+        if part.eq_ignore_ascii_case(parts[0])
+            && !layers.contains(&layer)
+            && parts.iter().all(|part| part_of(exr, layer, part).is_some())
+        {
+            layers.push(layer);
+        }
+    }
+    layers
+}
+
+fn part_of<'a>(exr: &'a ExrImage, layer: &str, part: &str) -> Option<&'a [f32]> {
+    let is_it = |name: &str| {
+        let (own_layer, own_part) = split(name);
+        own_layer == layer && own_part.eq_ignore_ascii_case(part)
+    };
+    exr.channels.iter().find(|(name, _)| is_it(name)).map(|(_, values)| values.as_slice())
+}
+
+fn split(name: &str) -> (&str, &str) {
+    name.rsplit_once('.').unwrap_or(("", name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fechner::exr_read::Window;
+
+    /// Channel i holds the value i.
+    fn exr(names: &[&str]) -> ExrImage {
+        ExrImage {
+            width: 1,
+            height: 1,
+            data_window_origin: (0, 0),
+            display_window: Window { origin: (0, 0), width: 1, height: 1 },
+            chromaticities: None,
+            lines_left_out: 0,
+            channels: names.iter().enumerate().map(|(i, name)| ((*name).to_owned(), vec![i as f32])).collect(),
+            types: Vec::new(),
+            attributes: Vec::new(),
+            parts_left_out: Vec::new(),
+        }
+    }
+
+    fn rgb_of(names: &[&str]) -> Option<[f32; 3]> {
+        match colour(&exr(names))? {
+            Colour::Rgb(planes) => Some(planes.map(|plane| plane[0])),
+            Colour::Grey(_) => None,
+        }
+    }
+
+    #[test]
+    fn the_picture_is_found_and_its_channels_are_of_one_layer() {
+        assert_eq!(rgb_of(&["A", "B", "G", "R"]), Some([3.0, 2.0, 1.0]));
+        assert_eq!(rgb_of(&["albedo.R", "B", "G", "R", "left.B", "left.G", "left.R"]), Some([3.0, 2.0, 1.0]));
+        let blender = [
+            "RenderLayer.AO.B",
+            "RenderLayer.AO.G",
+            "RenderLayer.AO.R",
+            "RenderLayer.Combined.A",
+            "RenderLayer.Combined.B",
+            "RenderLayer.Combined.G",
+            "RenderLayer.Combined.R",
+        ];
+        assert_eq!(rgb_of(&blender), Some([6.0, 5.0, 4.0]));
+        assert_eq!(rgb_of(&["albedo.B", "albedo.G", "albedo.R", "main.b", "main.g", "main.r"]), Some([5.0, 4.0, 3.0]));
+        assert_eq!(rgb_of(&["albedo.B", "albedo.G", "albedo.R"]), None);
+        assert_eq!(colour(&exr(&["Y"])), Some(Colour::Grey(&[0.0])));
+        assert_eq!(colour(&exr(&["Z"])), None);
+    }
+
+    #[test]
+    fn motion_goes_by_many_names() {
+        let motion_of = |names: &[&str]| motion(&exr(names)).map(|(layer, [x, y])| (layer.to_owned(), x[0], y[0]));
+        let found = |layer: &str, x: f32, y: f32| Some((layer.to_owned(), x, y));
+        assert_eq!(motion_of(&["R", "velocity.X", "velocity.Y"]), found("velocity", 1.0, 2.0));
+        assert_eq!(
+            motion_of(&["ViewLayer.Vector.W", "ViewLayer.Vector.X", "ViewLayer.Vector.Y"]),
+            found("ViewLayer.Vector", 1.0, 2.0)
+        );
+        assert_eq!(motion_of(&["forward.u", "forward.v"]), found("forward", 0.0, 1.0));
+        assert_eq!(
+            motion_of(&["disparityL.x", "disparityL.y", "forward.left.u", "forward.left.v"]),
+            found("forward.left", 2.0, 3.0)
+        );
+        assert_eq!(motion_of(&["motion.x", "motion.y", "motion.z"]), found("motion", 0.0, 1.0));
+        assert_eq!(motion_of(&["motionvector.B", "motionvector.G", "motionvector.R"]), found("motionvector", 2.0, 1.0));
+        // One half of a vector, or the wrong way in time, is none.
+        assert_eq!(motion_of(&["velocity.X", "backward.u", "backward.v", "normal.X", "normal.Y"]), None);
+    }
+}

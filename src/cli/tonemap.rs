@@ -1,0 +1,276 @@
+//! `fechner tonemap`: HDR pictures as a display shows them to an eye, one by one or as a sequence in time.
+
+mod sheet;
+
+use super::picture::InputPicture;
+use super::seeing::{self, parse_positive};
+use anyhow::{Context, Result, bail};
+use clap::{Args, ValueEnum};
+use fechner::output::{self, Attribute, Format, Picture};
+use fechner_perception::photometry::{luminance, scotopic_luminance};
+use fechner_perception::tone::{
+    self, AdaptationScope, AdaptationState, Effects, FittedTone, Goal, Pixel, SceneGuide, ToneOperator, ToneSettings,
+    map_picture,
+};
+use fechner_perception::{Plane, Viewing};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `tonemap`.
+#[derive(Debug, Args)]
+pub(super) struct TonemapArguments {
+    /// Pictures (.exr, .hdr); several are a sequence in time.
+    #[arg(required = true, num_args = 1..)]
+    input: Vec<PathBuf>,
+    /// .png as the display wants it (16-bit PQ for an HDR display), .exr in units of the display's white. The name of a
+    /// sequence has # for each digit of the frame's number: night.####.png.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Tone operator, or "all" for a sheet with all of them.
+    #[arg(long, value_name = "NAME|all")]
+    operator: String,
+    /// Exposure correction in stops.
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
+    exposure: f64,
+    /// Luminance in cd/m² of RGB (1, 1, 1), for files that do not say it.
+    #[arg(long, value_name = "CD_M2", value_parser = parse_positive, allow_negative_numbers = true)]
+    nits_per_unit: Option<f64>,
+    /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file.
+    #[arg(long, value_name = "NAME|FILE", default_value = "desktop")]
+    display: String,
+    /// What the eye is adapted to: the view as a whole, or each place of it.
+    #[arg(long, value_enum, default_value = "world")]
+    adaptation: Scope,
+    /// What else the eye loses, in place of what the operator's authors chose.
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
+    effects: Option<Vec<Effect>>,
+
+    /// Frames a second of a sequence.
+    #[arg(long, value_name = "N", default_value_t = 24.0, value_parser = parse_positive, help_heading = "Over time")]
+    fps: f64,
+    /// What the eye is adapted to before the first frame; without it, to the first frame.
+    #[arg(long, value_name = "CD_M2", value_parser = parse_positive, help_heading = "Over time")]
+    adapted_to: Option<f64>,
+    /// The eye's state, continued from this file if it is there and left in it.
+    #[arg(long, value_name = "FILE.json", conflicts_with = "adapted_to", help_heading = "Over time")]
+    state: Option<PathBuf>,
+    /// The pixel that the eye looks at; without it, all of the view counts.
+    #[arg(long, value_name = "X,Y", value_parser = parse_pixel, help_heading = "Over time")]
+    gaze: Option<Gaze>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+enum Scope {
+    World,
+    Local,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+enum Effect {
+    /// Bright places veil their surroundings.
+    Glare,
+    /// Fine detail is lost in dim light.
+    Acuity,
+    /// Colour is lost in dim light.
+    Colour,
+    /// Nothing is lost.
+    None,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Gaze(Pixel);
+
+fn parse_pixel(text: &str) -> Result<Gaze, String> {
+    let parsed =
+        text.split_once(',').and_then(|(x, y)| Some(Pixel { x: x.trim().parse().ok()?, y: y.trim().parse().ok()? }));
+    parsed.map(Gaze).ok_or_else(|| format!("\"{text}\" is not a pixel; expected X,Y such as 320,180"))
+}
+
+/// A picture in scene cd/m² with what operators look at.
+pub(super) struct SceneFrame {
+    width: usize,
+    rgb_cd_m2: Vec<[f32; 3]>,
+    photopic: Plane,
+    scotopic: Plane,
+    gaze: Option<Pixel>,
+}
+
+impl SceneFrame {
+    fn read(path: &Path, arguments: &TonemapArguments) -> Result<Self> {
+        let picture = InputPicture::read(path, arguments.nits_per_unit)?;
+        let (width, height) = picture.size();
+        let Some(rgb_cd_m2) = picture.scene_rgb_cd_m2() else {
+            bail!("{}: ready for a display already; .exr and .hdr files hold scenes", path.display());
+        };
+        if let Some(Gaze(Pixel { x, y })) = arguments.gaze.filter(|gaze| gaze.0.x >= width || gaze.0.y >= height) {
+            bail!("--gaze {x},{y} is outside {}, which has {width}x{height} pixels", path.display());
+        }
+        let plane =
+            |of: fn([f32; 3]) -> f32| Plane::from_fn(width, height, |x, y| of(rgb_cd_m2[y * width + x]).max(0.0));
+        let (photopic, scotopic) = (plane(luminance), plane(scotopic_luminance));
+        Ok(Self { width, rgb_cd_m2, photopic, scotopic, gaze: arguments.gaze.map(|gaze| gaze.0) })
+    }
+
+    fn guide(&self) -> SceneGuide<'_> {
+        SceneGuide::of(&self.photopic).with_scotopic(&self.scotopic).with_gaze(self.gaze)
+    }
+
+    fn height(&self) -> usize {
+        self.photopic.height()
+    }
+
+    fn shown(&self, fitted: &dyn FittedTone) -> Vec<[f32; 3]> {
+        map_picture(fitted, self.width, &self.rgb_cd_m2)
+    }
+}
+
+/// Reads, maps and writes.
+pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
+    let targets = targets(arguments)?;
+    let format = output::check_target(&targets[0])?;
+    let viewing = seeing::viewing(&arguments.display, None)?;
+    let settings = settings(arguments);
+    if arguments.operator == "all" {
+        return run_all(arguments, format, &targets, &viewing, &settings);
+    }
+    let operator = tone::operator_with(&arguments.operator, &settings).with_context(|| {
+        let known = tone::operator_names().join(", ");
+        format!("there is no tone operator \"{}\"; known: {known}, all", arguments.operator)
+    })?;
+    let timed = arguments.input.len() > 1 || arguments.adapted_to.is_some() || arguments.state.is_some();
+    if timed && arguments.adaptation == Scope::Local {
+        bail!("--adaptation local has no course in time: leave it out for a sequence");
+    }
+    let mut eye = if timed { Some(Eye::new(arguments, operator.as_ref())?) } else { None };
+    for (input, target) in arguments.input.iter().zip(&targets) {
+        let frame = SceneFrame::read(input, arguments)?;
+        let state = eye.as_mut().map(|eye| eye.look_at(Goal::of(&frame.guide(), viewing.display.pixels_per_degree)));
+        let fitted = operator.fit(&frame.guide(), &viewing, state.as_ref());
+        write(target, format, &frame, fitted.as_ref(), &viewing, state.as_ref())?;
+        println!("{}: {}", target.display(), fitted.describe());
+    }
+    if let (Some(path), Some(state)) = (&arguments.state, eye.and_then(|eye| eye.state)) {
+        let text = serde_json::to_string_pretty(&state).context("the eye's state could not be put into words")?;
+        output::write_beside(path, |file| file.write_all(text.as_bytes()))?;
+    }
+    Ok(())
+}
+
+fn run_all(
+    arguments: &TonemapArguments,
+    format: Format,
+    targets: &[PathBuf],
+    viewing: &Viewing,
+    settings: &ToneSettings,
+) -> Result<()> {
+    if arguments.input.len() > 1 || arguments.adapted_to.is_some() || arguments.state.is_some() {
+        bail!("a sheet of all operators shows one picture at rest: give one file and no --adapted-to or --state");
+    }
+    if format != Format::Png {
+        bail!("{}: a sheet of all operators is a picture; end the name in .png", targets[0].display());
+    }
+    let frame = SceneFrame::read(&arguments.input[0], arguments)?;
+    let sheet = sheet::of_all_operators(&frame, viewing, settings);
+    output::write_png_for(&targets[0], sheet.width as u32, sheet.height as u32, &sheet.rgb, &viewing.display)?;
+    Ok(())
+}
+
+fn settings(arguments: &TonemapArguments) -> ToneSettings {
+    ToneSettings {
+        exposure_stops: arguments.exposure,
+        scope: match arguments.adaptation {
+            Scope::World => AdaptationScope::World,
+            Scope::Local => AdaptationScope::Local,
+        },
+        effects: arguments.effects.as_ref().map(|list| Effects {
+            glare: list.contains(&Effect::Glare),
+            acuity: list.contains(&Effect::Acuity),
+            colour: list.contains(&Effect::Colour),
+        }),
+    }
+}
+
+/// The eye of a sequence.
+struct Eye {
+    state: Option<AdaptationState>,
+    is_between_frames: bool,
+    seconds_per_frame: f64,
+    kinetics: tone::Kinetics,
+}
+
+impl Eye {
+    fn new(arguments: &TonemapArguments, operator: &dyn ToneOperator) -> Result<Self> {
+        if !operator.sees_adaptation() {
+            bail!("{} does not know an eye that adapts over time", operator.name());
+        }
+        let kinetics = operator.kinetics();
+        let mut state = arguments.adapted_to.map(|cd_m2| AdaptationState::adapted_to(Goal::both(cd_m2), &kinetics));
+        let mut is_between_frames = false;
+        if let Some(path) = arguments.state.as_ref().filter(|path| path.exists()) {
+            let text = std::fs::read_to_string(path).with_context(|| format!("{}", path.display()))?;
+            let read = serde_json::from_str(&text);
+            state = Some(read.with_context(|| format!("{}: not an eye's state as tonemap leaves it", path.display()))?);
+            is_between_frames = true;
+        }
+        Ok(Self { state, is_between_frames, seconds_per_frame: arguments.fps.recip(), kinetics })
+    }
+
+    /// The state in which the next frame is seen. The first one is seen as it appears; between frames the light changes
+    /// evenly.
+    fn look_at(&mut self, goal: Goal) -> AdaptationState {
+        let state = match self.state {
+            None => AdaptationState::adapted_to(goal, &self.kinetics),
+            Some(state) if self.is_between_frames => state.after(goal, self.seconds_per_frame, &self.kinetics),
+            Some(state) => state.looking_at(goal),
+        };
+        self.is_between_frames = true;
+        self.state = Some(state);
+        state
+    }
+}
+
+/// One file name for each input.
+fn targets(arguments: &TonemapArguments) -> Result<Vec<PathBuf>> {
+    let name = arguments.output.to_string_lossy();
+    let digits = name.chars().filter(|c| *c == '#').count();
+    if arguments.input.len() == 1 && digits == 0 {
+        return Ok(vec![arguments.output.clone()]);
+    }
+    let hashes = "#".repeat(digits);
+    if digits == 0 || !name.contains(&hashes) {
+        bail!("{name}: the name of a sequence needs # for each digit of the frame's number, such as night.####.png");
+    }
+    let number = |frame: usize| PathBuf::from(name.replace(&hashes, &format!("{frame:0digits$}")));
+    Ok((1..=arguments.input.len()).map(number).collect())
+}
+
+fn write(
+    target: &Path,
+    format: Format,
+    frame: &SceneFrame,
+    fitted: &dyn FittedTone,
+    viewing: &Viewing,
+    state: Option<&AdaptationState>,
+) -> Result<()> {
+    let shown = frame.shown(fitted);
+    let (width, height) = (frame.width as u32, frame.height() as u32);
+    match format {
+        Format::Png => output::write_png_for(target, width, height, &shown, &viewing.display)?,
+        Format::Exr => {
+            let mut picture = Picture::new(width, height);
+            for (channel, name) in ["R", "G", "B"].into_iter().enumerate() {
+                picture.push_f32(name, shown.iter().map(|pixel| pixel[channel]).collect::<Vec<_>>());
+            }
+            let white = viewing.display.white_cd_m2 as f32;
+            picture.push_attribute(output::NITS_PER_UNIT, Attribute::Float(white));
+            picture.push_attribute("fechner.operator", Attribute::Text(fitted.describe()));
+            picture.push_attribute("fechner.observer.display", Attribute::Text(viewing.display.name.clone()));
+            if let Some(state) = state {
+                let text = serde_json::to_string(state).context("the eye's state could not be put into words")?;
+                picture.push_attribute("fechner.adaptation", Attribute::Text(text));
+            }
+            output::write_exr(target, &picture)?;
+        }
+    }
+    Ok(())
+}

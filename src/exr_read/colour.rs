@@ -1,0 +1,223 @@
+//! The colours that an EXR file means: its own primaries, luminance and chroma, the window that is to be shown.
+
+use super::{ExrImage, Window};
+use fechner_perception::primaries::{Matrix, Primaries, apply};
+
+/// The picture that a file is meant to show.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ScenePicture {
+    /// Width of the display window in pixels.
+    pub width: u32,
+    /// Height of the display window in pixels.
+    pub height: u32,
+    /// Linear Rec.709 RGB in the file's unit, finite, row-major; may be negative for colours outside Rec.709. Black where
+    /// the file has no pixels.
+    pub rgb: Vec<[f32; 3]>,
+    /// What was done to it, a line each, for whoever should know.
+    pub notes: Vec<String>,
+}
+
+/// Channels of a picture, one value a pixel each.
+struct Channels<'a> {
+    red: &'a [f32],
+    green: &'a [f32],
+    blue: &'a [f32],
+}
+
+impl ExrImage {
+    /// The picture in linear Rec.709 RGB over the display window; `None` where there is neither R, G and B nor luminance.
+    ///
+    /// `find` finds a channel by its last name (renderers prefix layers). Chromaticities are honoured: colours stay what they
+    /// are, white included. Not finite values become 0 (NaN, −∞) or the largest finite value of the picture (∞).
+    pub fn scene_picture<'a>(&'a self, find: impl Fn(&'a Self, &str) -> Option<&'a [f32]>) -> Option<ScenePicture> {
+        let mut notes = Vec::new();
+        let primaries = self.chromaticities.unwrap_or(Primaries::REC709);
+        let channel = |name: &str| find(self, name);
+        let mut rgb: Vec<[f32; 3]> = match (channel("R"), channel("G"), channel("B")) {
+            (Some(red), Some(green), Some(blue)) => {
+                let channels = Channels { red, green, blue };
+                (0..red.len()).map(|i| [channels.red[i], channels.green[i], channels.blue[i]]).collect()
+            }
+            _ => {
+                let luminance = self.channel("Y")?;
+                match (self.channel("RY"), self.channel("BY")) {
+                    (Some(red), Some(blue)) => {
+                        notes.push("luminance and chroma made RGB again".to_owned());
+                        from_chroma(luminance, red, blue, &primaries)
+                    }
+                    _ => luminance.iter().map(|&y| [y; 3]).collect(),
+                }
+            }
+        };
+        let replaced = replace_what_is_not_finite(&mut rgb);
+        if replaced > 0 {
+            notes.push(format!("{replaced} values that are not finite were replaced"));
+        }
+        if let Some(matrix) = self.to_rec709() {
+            rgb.iter_mut().for_each(|pixel| *pixel = apply(&matrix, pixel.map(f64::from)).map(|c| c as f32));
+            notes.push("colours brought from the file's chromaticities to Rec.709".to_owned());
+            replace_what_is_not_finite(&mut rgb);
+        }
+        if self.lines_left_out > 0 {
+            notes.push(format!("the last {} lines could not be read", self.lines_left_out));
+        }
+        let Window { width, height, .. } = self.display_window;
+        if self.data_window() != self.display_window {
+            let (w, h, (x, y)) = (self.width, self.height, self.data_window_origin);
+            notes.push(format!("data of {w}x{h} pixels at ({x}, {y}) put into a window of {width}x{height}"));
+            rgb = self.in_display_window(&rgb);
+        }
+        Some(ScenePicture { width, height, rgb, notes })
+    }
+
+    fn data_window(&self) -> Window {
+        // Lines that could not be read leave a black border, which is said.
+        Window { origin: self.data_window_origin, width: self.width, height: self.height }
+    }
+
+    /// The matrix to Rec.709, where the file's primaries are others.
+    fn to_rec709(&self) -> Option<Matrix> {
+        let file = self.chromaticities?;
+        let points = |p: &Primaries| [p.red, p.green, p.blue, p.white];
+        let (own, ours) = (points(&file), points(&Primaries::REC709));
+        if own.iter().flatten().zip(ours.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-3) {
+            return None;
+        }
+        file.to(&Primaries::REC709)
+    }
+
+    fn in_display_window(&self, rgb: &[[f32; 3]]) -> Vec<[f32; 3]> {
+        let Window { origin, width, height } = self.display_window;
+        let offset = |pixel: u32, window: i32, data: i32, size: u32| {
+            usize::try_from(i64::from(pixel) + i64::from(window) - i64::from(data))
+                .ok()
+                .filter(|at| *at < size as usize)
+        };
+        let mut shown = Vec::with_capacity(width as usize * height as usize);
+        for y in 0..height {
+            let row = offset(y, origin.1, self.data_window_origin.1, self.height);
+            for x in 0..width {
+                let column = offset(x, origin.0, self.data_window_origin.0, self.width);
+                shown.push(match (row, column) {
+                    (Some(row), Some(column)) => rgb[row * self.width as usize + column],
+                    _ => [0.0; 3],
+                });
+            }
+        }
+        shown
+    }
+}
+
+/// RY = (R − Y) / Y and BY = (B − Y) / Y, with Y the luminance by the file's own primaries.
+fn from_chroma(luminance: &[f32], red: &[f32], blue: &[f32], primaries: &Primaries) -> Vec<[f32; 3]> {
+    let weights = primaries.to_xyz().map_or([0.2126, 0.7152, 0.0722], |matrix| matrix[1]);
+    let [wr, wg, wb] = weights.map(|weight| weight as f32);
+    let pixels = luminance.iter().zip(red.iter().zip(blue));
+    pixels
+        .map(|(&y, (&ry, &by))| {
+            let (r, b) = ((ry + 1.0) * y, (by + 1.0) * y);
+            [r, (y - r * wr - b * wb) / wg, b]
+        })
+        .collect()
+}
+
+/// How many values were replaced.
+fn replace_what_is_not_finite(rgb: &mut [[f32; 3]]) -> usize {
+    let values = || rgb.iter().flatten();
+    let count = values().filter(|value| !value.is_finite()).count();
+    if count > 0 {
+        let largest = values().copied().filter(|value| value.is_finite()).fold(0.0, f32::max);
+        for value in rgb.iter_mut().flatten().filter(|value| !value.is_finite()) {
+            *value = if *value == f32::INFINITY { largest } else { 0.0 };
+        }
+    }
+    count
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{decode_exr, read_exr};
+    use super::*;
+    use std::path::{Path, PathBuf};
+
+    fn asset(name: &str) -> Option<PathBuf> {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets/hdr/openexr-images").join(name);
+        if !path.exists() {
+            println!("skipped: {} is not there", path.display());
+            return None;
+        }
+        Some(path)
+    }
+
+    fn picture(path: &Path) -> ScenePicture {
+        read_exr(path).unwrap().scene_picture(|image, name| image.channel(name)).unwrap()
+    }
+
+    /// Root mean square of the relative difference of pixels, over those that are not dark.
+    fn difference(a: &ScenePicture, b: &ScenePicture) -> f64 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (a, b) in a.rgb.iter().zip(&b.rgb) {
+            let scale = f64::from(a[0] + a[1] + a[2]) / 3.0;
+            if scale > 0.02 {
+                sum += a.iter().zip(b).map(|(a, b)| (f64::from(a - b) / scale).powi(2)).sum::<f64>() / 3.0;
+                count += 1.0;
+            }
+        }
+        (sum / count).sqrt()
+    }
+
+    /// One photograph as Rec.709, XYZ, and both as luminance and chroma.
+    #[test]
+    fn one_picture_in_four_forms_is_one_picture() {
+        let Some(path) = asset("Chromaticities/Rec709.exr") else { return };
+        let reference = picture(&path);
+        for (name, tolerance) in [("XYZ", 0.01), ("Rec709_YC", 0.06), ("XYZ_YC", 0.06)] {
+            let other = picture(&path.with_file_name(format!("{name}.exr")));
+            assert_eq!((other.width, other.height), (610, 406), "{name}");
+            let found = difference(&reference, &other);
+            println!("{name}: {found:.4} of the luminance, {:?}", other.notes);
+            assert!(found < tolerance, "{name}: {found}");
+        }
+    }
+
+    #[test]
+    fn an_odd_height_is_read_as_far_as_it_can_be() {
+        let Some(path) = asset("LuminanceChroma/Garden.exr") else { return };
+        let garden = picture(&path);
+        assert_eq!((garden.width, garden.height), (874, 493));
+        assert!(garden.notes.iter().any(|note| note.contains("last 13 lines")), "{:?}", garden.notes);
+        let green = garden.rgb.iter().filter(|[r, g, b]| g > r && g > b).count();
+        assert!(green * 3 > garden.rgb.len(), "{green} green pixels in a garden");
+    }
+
+    #[test]
+    fn what_is_not_finite_is_replaced_and_said() {
+        let Some(path) = asset("TestImages/BrightRingsNanInf.exr") else { return };
+        let rings = picture(&path);
+        assert!(rings.rgb.iter().flatten().all(|value| value.is_finite()));
+        assert!(rings.notes.iter().any(|note| note.contains("not finite")), "{:?}", rings.notes);
+    }
+
+    /// A file of ours with its windows and chromaticities changed by hand.
+    #[test]
+    fn the_data_is_put_into_the_display_window() {
+        use crate::output::{Picture, write_exr};
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let mut file = Picture::new(4, 2);
+        for name in ["R", "G", "B"] {
+            file.push_f32(name, (0..8).map(|i| i as f32).collect::<Vec<_>>());
+        }
+        write_exr(&path, &file).unwrap();
+        let mut bytes = std::fs::read(&path).unwrap();
+        let name = b"displayWindow\0box2i\0";
+        let at = bytes.windows(name.len()).position(|window| window == name).unwrap() + name.len() + 4;
+        for (index, value) in [-1_i32, 1, 2, 2].into_iter().enumerate() {
+            bytes[at + 4 * index..at + 4 * index + 4].copy_from_slice(&value.to_le_bytes());
+        }
+        let shown = decode_exr(&path, &bytes).unwrap().scene_picture(|image, name| image.channel(name)).unwrap();
+        assert_eq!((shown.width, shown.height), (4, 2));
+        let reds: Vec<f32> = shown.rgb.iter().map(|pixel| pixel[0]).collect();
+        assert_eq!(reds, [0.0, 4.0, 5.0, 6.0, 0.0, 0.0, 0.0, 0.0]);
+    }
+}

@@ -1,0 +1,295 @@
+//! Box and triangle tests of eight lanes at once, for AVX2 and for any machine, and the choice between the two.
+//!
+//! Both have the same operations in the same order and no fused multiply-add, so their results are equal to the bit;
+//! minimum and maximum are x86's: the second operand where one is NaN. The only `unsafe` of the crate is here: calling
+//! a function that was compiled for AVX2, after asking the machine whether it has it.
+
+#![allow(unsafe_code, reason = "calls into functions compiled for AVX2: 2 times the rays a second (benches/README.md)")]
+
+use super::triangle::ShearedRay;
+use super::wide_tree::{Block, BoxRay, Candidates, LANES, Lanes, Met, Node, WideHit, WideTree};
+
+/// Which kernels a tree is walked with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Path(Instructions);
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Instructions {
+    Portable,
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+}
+
+impl Path {
+    /// For any machine.
+    pub(super) const PORTABLE: Self = Self(Instructions::Portable);
+
+    /// The fastest that this machine has.
+    pub(super) fn best() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") {
+            return Self(Instructions::Avx2);
+        }
+        Self::PORTABLE
+    }
+}
+
+/// Asks for the cache lines of a value that is about to be read.
+#[inline(always)]
+pub(super) fn prefetch<T>(value: &T) {
+    #[cfg(target_arch = "x86_64")]
+    for offset in (0..size_of::<T>()).step_by(64) {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        let line = std::ptr::from_ref(value).cast::<i8>().wrapping_add(offset);
+        // SAFETY: a prefetch reads nothing that the program sees and faults at no address.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(line) };
+    }
+}
+
+/// [`WideTree::walk_closest`] with the kernels of `path`.
+#[inline]
+pub(super) fn closest(
+    path: Path,
+    tree: &WideTree,
+    boxes: &BoxRay,
+    sheared: &ShearedRay,
+    t_max: f32,
+    accept: impl Fn(&WideHit) -> bool,
+) -> Option<WideHit> {
+    match path.0 {
+        // SAFETY: `Avx2` is made by `Path::best` alone, and only where the machine has AVX2.
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Avx2 => unsafe { avx2::closest(tree, boxes, sheared, t_max, accept) },
+        Instructions::Portable => tree.walk_closest(
+            sheared,
+            t_max,
+            |node, t_max| portable::meet(node, boxes, t_max),
+            |block, t_max| portable::hits(block, sheared, t_max),
+            accept,
+        ),
+    }
+}
+
+/// [`WideTree::walk_any`] with the kernels of `path`.
+#[inline]
+pub(super) fn any(
+    path: Path,
+    tree: &WideTree,
+    boxes: &BoxRay,
+    sheared: &ShearedRay,
+    t_max: f32,
+    accept: impl Fn(&WideHit) -> bool,
+) -> bool {
+    match path.0 {
+        // SAFETY: `Avx2` is made by `Path::best` alone, and only where the machine has AVX2.
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Avx2 => unsafe { avx2::any(tree, boxes, sheared, t_max, accept) },
+        Instructions::Portable => tree.walk_any(
+            sheared,
+            t_max,
+            |node, t_max| portable::meet(node, boxes, t_max),
+            |block, t_max| portable::hits(block, sheared, t_max),
+            accept,
+        ),
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+mod avx2 {
+    use super::*;
+    use bytemuck::cast;
+    use std::arch::x86_64::*;
+
+    #[target_feature(enable = "avx2")]
+    pub(super) fn closest(
+        tree: &WideTree,
+        boxes: &BoxRay,
+        sheared: &ShearedRay,
+        t_max: f32,
+        accept: impl Fn(&WideHit) -> bool,
+    ) -> Option<WideHit> {
+        let (boxes, edges) = (WideBoxRay::new(boxes), WideShear::new(sheared));
+        tree.walk_closest(
+            sheared,
+            t_max,
+            |node, t_max| meet(node, &boxes, t_max),
+            |block, t_max| hits(block, &edges, t_max),
+            accept,
+        )
+    }
+
+    #[target_feature(enable = "avx2")]
+    pub(super) fn any(
+        tree: &WideTree,
+        boxes: &BoxRay,
+        sheared: &ShearedRay,
+        t_max: f32,
+        accept: impl Fn(&WideHit) -> bool,
+    ) -> bool {
+        let (boxes, edges) = (WideBoxRay::new(boxes), WideShear::new(sheared));
+        tree.walk_any(
+            sheared,
+            t_max,
+            |node, t_max| meet(node, &boxes, t_max),
+            |block, t_max| hits(block, &edges, t_max),
+            accept,
+        )
+    }
+
+    struct WideBoxRay {
+        origin: [__m256; 3],
+        inverse: [__m256; 3],
+        inverse_far: [__m256; 3],
+        near: [usize; 3],
+    }
+
+    impl WideBoxRay {
+        #[inline]
+        #[target_feature(enable = "avx2")]
+        fn new(ray: &BoxRay) -> Self {
+            let splat = |v: [f32; 3]| [_mm256_set1_ps(v[0]), _mm256_set1_ps(v[1]), _mm256_set1_ps(v[2])];
+            Self {
+                origin: splat(ray.origin),
+                inverse: splat(ray.inverse),
+                inverse_far: splat(ray.inverse_far),
+                near: ray.near,
+            }
+        }
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn meet(node: &Node, ray: &WideBoxRay, t_max: f32) -> Met {
+        let near = |axis: usize| {
+            let plane: __m256 = cast(node.planes[ray.near[axis]]);
+            _mm256_mul_ps(_mm256_sub_ps(plane, ray.origin[axis]), ray.inverse[axis])
+        };
+        let far = |axis: usize| {
+            let plane: __m256 = cast(node.planes[ray.near[axis] ^ 1]);
+            _mm256_mul_ps(_mm256_sub_ps(plane, ray.origin[axis]), ray.inverse_far[axis])
+        };
+        let enter = _mm256_max_ps(_mm256_max_ps(near(0), near(1)), _mm256_max_ps(near(2), _mm256_setzero_ps()));
+        let leave = _mm256_min_ps(_mm256_min_ps(far(0), far(1)), _mm256_min_ps(far(2), _mm256_set1_ps(t_max)));
+        let met = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(enter, leave));
+        Met { slots: met as u32, distances: Lanes(cast(enter)) }
+    }
+
+    struct WideShear {
+        origin: [__m256; 3],
+        shear: [__m256; 2],
+        scale_z: __m256,
+        axes: [usize; 3],
+    }
+
+    impl WideShear {
+        #[inline]
+        #[target_feature(enable = "avx2")]
+        fn new(ray: &ShearedRay) -> Self {
+            Self {
+                origin: [
+                    _mm256_set1_ps(ray.origin[ray.axes[0]]),
+                    _mm256_set1_ps(ray.origin[ray.axes[1]]),
+                    _mm256_set1_ps(ray.origin[ray.axes[2]]),
+                ],
+                shear: [_mm256_set1_ps(ray.shear_x), _mm256_set1_ps(ray.shear_y)],
+                scale_z: _mm256_set1_ps(ray.scale_z),
+                axes: ray.axes,
+            }
+        }
+    }
+
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn hits(block: &Block, ray: &WideShear, t_max: f32) -> Candidates {
+        let [xs, ys, zs] = [&block.corners[ray.axes[0]], &block.corners[ray.axes[1]], &block.corners[ray.axes[2]]];
+        let sheared = |vertex: usize| {
+            let z = _mm256_sub_ps(cast(zs[vertex]), ray.origin[2]);
+            let x = _mm256_sub_ps(cast(xs[vertex]), ray.origin[0]);
+            let y = _mm256_sub_ps(cast(ys[vertex]), ray.origin[1]);
+            [_mm256_sub_ps(x, _mm256_mul_ps(ray.shear[0], z)), _mm256_sub_ps(y, _mm256_mul_ps(ray.shear[1], z)), z]
+        };
+        let (a, b, c) = (sheared(0), sheared(1), sheared(2));
+        let cross =
+            |p: &[__m256; 3], q: &[__m256; 3]| _mm256_sub_ps(_mm256_mul_ps(p[0], q[1]), _mm256_mul_ps(p[1], q[0]));
+        let (u, v, w) = (cross(&c, &b), cross(&a, &c), cross(&b, &a));
+        let zero = _mm256_setzero_ps();
+        let least = _mm256_min_ps(_mm256_min_ps(u, v), w);
+        let most = _mm256_max_ps(_mm256_max_ps(u, v), w);
+        let inside = _mm256_or_ps(_mm256_cmp_ps::<_CMP_GE_OQ>(least, zero), _mm256_cmp_ps::<_CMP_LE_OQ>(most, zero));
+        let inside_lanes = _mm256_movemask_ps(inside) as u32;
+        if inside_lanes == 0 {
+            let none = Lanes([0.0; LANES]);
+            return Candidates { lanes: 0, doubtful: 0, t: none, b1: none, b2: none };
+        }
+        let equal = |x: __m256| _mm256_cmp_ps::<_CMP_EQ_OQ>(x, zero);
+        let doubtful =
+            inside_lanes & _mm256_movemask_ps(_mm256_or_ps(equal(u), _mm256_or_ps(equal(v), equal(w)))) as u32;
+        let inverse = _mm256_div_ps(_mm256_set1_ps(1.0), _mm256_add_ps(_mm256_add_ps(u, v), w));
+        let sum = _mm256_add_ps(_mm256_add_ps(_mm256_mul_ps(u, a[2]), _mm256_mul_ps(v, b[2])), _mm256_mul_ps(w, c[2]));
+        let t = _mm256_mul_ps(_mm256_mul_ps(ray.scale_z, sum), inverse);
+        let ahead = _mm256_cmp_ps::<_CMP_GT_OQ>(t, zero);
+        let before = _mm256_cmp_ps::<_CMP_LE_OQ>(t, _mm256_set1_ps(t_max));
+        let lanes = inside_lanes & _mm256_movemask_ps(_mm256_and_ps(ahead, before)) as u32 | doubtful;
+        Candidates {
+            lanes,
+            doubtful,
+            t: Lanes(cast(t)),
+            b1: Lanes(cast(_mm256_mul_ps(v, inverse))),
+            b2: Lanes(cast(_mm256_mul_ps(w, inverse))),
+        }
+    }
+}
+
+mod portable {
+    use super::*;
+
+    fn min(a: f32, b: f32) -> f32 {
+        if a < b { a } else { b }
+    }
+
+    fn max(a: f32, b: f32) -> f32 {
+        if a > b { a } else { b }
+    }
+
+    #[inline]
+    pub(super) fn meet(node: &Node, ray: &BoxRay, t_max: f32) -> Met {
+        let near =
+            |axis: usize, lane: usize| (node.planes[ray.near[axis]][lane] - ray.origin[axis]) * ray.inverse[axis];
+        let far = |axis: usize, lane: usize| {
+            (node.planes[ray.near[axis] ^ 1][lane] - ray.origin[axis]) * ray.inverse_far[axis]
+        };
+        let enter: [f32; LANES] =
+            std::array::from_fn(|lane| max(max(near(0, lane), near(1, lane)), max(near(2, lane), 0.0)));
+        let leave: [f32; LANES] =
+            std::array::from_fn(|lane| min(min(far(0, lane), far(1, lane)), min(far(2, lane), t_max)));
+        let met = (0..LANES).fold(0, |met, lane| met | u32::from(enter[lane] <= leave[lane]) << lane);
+        Met { slots: met, distances: Lanes(enter) }
+    }
+
+    #[inline]
+    pub(super) fn hits(block: &Block, ray: &ShearedRay, t_max: f32) -> Candidates {
+        let [xs, ys, zs] = ray.axes.map(|axis| &block.corners[axis]);
+        let origin = ray.axes.map(|axis| ray.origin[axis]);
+        let none = Lanes([0.0; LANES]);
+        let mut found = Candidates { lanes: 0, doubtful: 0, t: none, b1: none, b2: none };
+        for lane in 0..LANES {
+            let sheared = |vertex: usize| {
+                let z = zs[vertex][lane] - origin[2];
+                [(xs[vertex][lane] - origin[0]) - ray.shear_x * z, (ys[vertex][lane] - origin[1]) - ray.shear_y * z, z]
+            };
+            let (a, b, c) = (sheared(0), sheared(1), sheared(2));
+            let cross = |p: &[f32; 3], q: &[f32; 3]| p[0] * q[1] - p[1] * q[0];
+            let (u, v, w) = (cross(&c, &b), cross(&a, &c), cross(&b, &a));
+            if !(min(min(u, v), w) >= 0.0 || max(max(u, v), w) <= 0.0) {
+                continue;
+            }
+            let inverse = 1.0 / (u + v + w);
+            let t = ray.scale_z * (u * a[2] + v * b[2] + w * c[2]) * inverse;
+            let doubtful = u == 0.0 || v == 0.0 || w == 0.0;
+            found.doubtful |= u32::from(doubtful) << lane;
+            found.lanes |= u32::from(doubtful || (t > 0.0 && t <= t_max)) << lane;
+            (found.t.0[lane], found.b1.0[lane], found.b2.0[lane]) = (t, v * inverse, w * inverse);
+        }
+        found
+    }
+}

@@ -1,0 +1,533 @@
+//! An eight-wide tree over triangles: what obvhs builds, cut and walked by us.
+//!
+//! A node holds the boxes of eight children, each plane of the eight side by side, so that one ray is tested against all
+//! of them at once; a leaf is one block of up to [`LANES`] triangles in the same arrangement. The nearest child is entered
+//! first. Two walks with the same arithmetic in the same order, one for AVX2 and one for any machine, give equal bytes
+//! (`simd`); of hits at the same distance the smaller [`TriangleRef`] stands, so that the order of the walk does not show.
+//!
+//! Not for primitives other than triangles, nor for a handful of them: the binary tree ([`super::tree`]) serves those.
+
+use super::collapse;
+use super::simd::{self, Path};
+use super::tree::Bounds;
+use super::triangle::{ShearedRay, TriangleHit};
+use glam::Vec3A;
+
+/// Children of a node, and triangles of a block.
+pub(super) const LANES: usize = 8;
+
+/// Which triangle of which instance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct TriangleRef {
+    /// Index of the instance in the scene; unused (0) where a tree is shared by several.
+    pub(super) instance: u32,
+    /// Index of the triangle in its mesh.
+    pub(super) triangle: u32,
+}
+
+impl TriangleRef {
+    /// Of the lanes of a block that hold no triangle.
+    const NONE: Self = Self { instance: u32::MAX, triangle: u32::MAX };
+}
+
+/// A child of a node: another node, or a block of triangles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Child(u32);
+
+impl Child {
+    const LEAF: u32 = 1 << 31;
+
+    pub(super) fn node(index: usize) -> Self {
+        Self(index as u32)
+    }
+
+    pub(super) fn block(index: usize) -> Self {
+        Self(index as u32 | Self::LEAF)
+    }
+}
+
+/// The boxes of eight children; 256 bytes, four cache lines.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Node {
+    /// Low x, high x, low y, high y, low z, high z. Children that are not there have boxes that nothing meets.
+    pub(super) planes: [[f32; LANES]; 6],
+    pub(super) children: [Child; LANES],
+}
+
+impl Node {
+    pub(super) const EMPTY: Self = Self {
+        planes: [
+            [f32::INFINITY; LANES],
+            [f32::NEG_INFINITY; LANES],
+            [f32::INFINITY; LANES],
+            [f32::NEG_INFINITY; LANES],
+            [f32::INFINITY; LANES],
+            [f32::NEG_INFINITY; LANES],
+        ],
+        children: [Child(0); LANES],
+    };
+
+    pub(super) fn set(&mut self, slot: usize, min: Vec3A, max: Vec3A, child: Child) {
+        for axis in 0..3 {
+            self.planes[2 * axis][slot] = min[axis];
+            self.planes[2 * axis + 1][slot] = max[axis];
+        }
+        self.children[slot] = child;
+    }
+}
+
+/// Up to eight triangles.
+#[derive(Clone, Debug)]
+#[repr(C, align(32))]
+pub(super) struct Block {
+    /// By axis, then vertex, then lane. Lanes without a triangle are NaN, which no test accepts.
+    pub(super) corners: [[[f32; LANES]; 3]; 3],
+}
+
+impl Block {
+    const EMPTY: Self = Self { corners: [[[f32::NAN; LANES]; 3]; 3] };
+
+    fn triangle(&self, lane: usize) -> [[f32; 3]; 3] {
+        std::array::from_fn(|vertex| std::array::from_fn(|axis| self.corners[axis][vertex][lane]))
+    }
+}
+
+/// A ray made ready for box tests.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BoxRay {
+    pub(super) origin: [f32; 3],
+    /// Inverse direction.
+    pub(super) inverse: [f32; 3],
+    /// The same a little longer, so that rounding never closes a box that the exact ray meets: two distances have three
+    /// roundings each, 6 · 2⁻²⁴ = 3.6e-7 (Ize, "Robust BVH Ray Traversal", JCGT 2013).
+    pub(super) inverse_far: [f32; 3],
+    /// Rows of [`Node::planes`] that the ray meets first, by axis.
+    pub(super) near: [usize; 3],
+}
+
+impl BoxRay {
+    fn new(origin: Vec3A, direction: Vec3A) -> Self {
+        let inverse = direction.to_array().map(|d| {
+            // Finite, so that no product with it is NaN.
+            const LEAST: f32 = 1e-18;
+            1.0 / if d.abs() < LEAST { LEAST.copysign(d) } else { d }
+        });
+        let near = std::array::from_fn(|axis| 2 * axis + usize::from(inverse[axis] < 0.0));
+        Self { origin: origin.to_array(), inverse, inverse_far: inverse.map(|i| i * 1.000_000_4), near }
+    }
+}
+
+/// A number a lane, where vector stores do not straddle cache lines.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C, align(32))]
+pub(super) struct Lanes(pub(super) [f32; LANES]);
+
+impl Lanes {
+    #[inline(always)]
+    fn get(&self, lane: u32) -> f32 {
+        self.0[lane as usize & (LANES - 1)]
+    }
+}
+
+/// The children of a node that a ray meets: one bit each, and at what distances.
+pub(super) struct Met {
+    pub(super) slots: u32,
+    pub(super) distances: Lanes,
+}
+
+/// The triangles of a block that a ray hits.
+pub(super) struct Candidates {
+    /// One bit each: hit at 0 < t ≤ `t_max`.
+    pub(super) lanes: u32,
+    /// One bit each: on an edge to within f32, so that [`ShearedRay::intersect`] must decide.
+    pub(super) doubtful: u32,
+    pub(super) t: Lanes,
+    pub(super) b1: Lanes,
+    pub(super) b2: Lanes,
+}
+
+/// A triangle hit by a ray.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct WideHit {
+    pub(super) reference: TriangleRef,
+    pub(super) hit: TriangleHit,
+}
+
+/// Entries of the stack that are kept off the heap.
+const STACK: usize = 96;
+
+/// See the module.
+pub(super) struct WideTree {
+    nodes: Vec<Node>,
+    blocks: Vec<Block>,
+    /// By block and lane.
+    references: Vec<TriangleRef>,
+    root: Option<Child>,
+    /// Most entries that a walk can have on its stack.
+    stack_need: usize,
+    path: Path,
+}
+
+impl WideTree {
+    /// Builds over triangles; those whose entry in `bounds` is not finite are left out.
+    pub(super) fn build(triangles: &[[Vec3A; 3]], bounds: &[Bounds], references: &[TriangleRef]) -> Self {
+        let cut = collapse::build(bounds);
+        let mut tree = Self {
+            nodes: cut.nodes,
+            blocks: vec![Block::EMPTY; cut.blocks.len()],
+            references: vec![TriangleRef::NONE; cut.blocks.len() * LANES],
+            root: cut.root,
+            stack_need: cut.waiting,
+            path: Path::best(),
+        };
+        for (index, range) in cut.blocks.iter().enumerate() {
+            for (lane, &number) in cut.order[range.clone()].iter().enumerate() {
+                let corners = triangles[number as usize];
+                for (vertex, corner) in corners.iter().enumerate() {
+                    for axis in 0..3 {
+                        tree.blocks[index].corners[axis][vertex][lane] = corner[axis];
+                    }
+                }
+                tree.references[index * LANES + lane] = references[number as usize];
+            }
+        }
+        tree
+    }
+
+    /// Memory in bytes.
+    pub(super) fn bytes(&self) -> usize {
+        std::mem::size_of_val(&self.nodes[..])
+            + std::mem::size_of_val(&self.blocks[..])
+            + std::mem::size_of_val(&self.references[..])
+    }
+
+    /// The closest hit nearer than `t_max` that `accept` lets stand.
+    #[inline]
+    pub(super) fn closest(
+        &self,
+        origin: Vec3A,
+        direction: Vec3A,
+        t_max: f32,
+        accept: impl Fn(&WideHit) -> bool,
+    ) -> Option<WideHit> {
+        let (boxes, sheared) = (BoxRay::new(origin, direction), ShearedRay::new(origin, direction));
+        simd::closest(self.path, self, &boxes, &sheared, t_max, accept)
+    }
+
+    /// Whether anything that `accept` lets stand is nearer than `t_max`.
+    #[inline]
+    pub(super) fn any(&self, origin: Vec3A, direction: Vec3A, t_max: f32, accept: impl Fn(&WideHit) -> bool) -> bool {
+        let (boxes, sheared) = (BoxRay::new(origin, direction), ShearedRay::new(origin, direction));
+        simd::any(self.path, self, &boxes, &sheared, t_max, accept)
+    }
+
+    /// The walk of [`Self::closest`], over any pair of kernels: `meet` gives the children of a node, `hits` the triangles
+    /// of a block that the ray meets before a distance.
+    #[inline(always)]
+    pub(super) fn walk_closest(
+        &self,
+        sheared: &ShearedRay,
+        t_max: f32,
+        meet: impl Fn(&Node, f32) -> Met,
+        hits: impl Fn(&Block, f32) -> Candidates,
+        accept: impl Fn(&WideHit) -> bool,
+    ) -> Option<WideHit> {
+        let mut current = self.root?;
+        let mut best: Option<WideHit> = None;
+        let mut t_max = t_max;
+        let mut short = [0u64; STACK];
+        let mut long = Vec::new();
+        let stack = self.stack(&mut short, &mut long);
+        let mut top = 0;
+        loop {
+            if current.0 & Child::LEAF == 0 {
+                let node = &self.nodes[current.0 as usize];
+                let Met { slots: mut met, distances } = meet(node, t_max);
+                if met != 0 {
+                    // Distances are not negative, so their bits sort as they do.
+                    let key = |slot: u32| {
+                        let child = node.children[slot as usize & (LANES - 1)];
+                        self.prefetch(child);
+                        u64::from(distances.get(slot).to_bits()) << 32 | u64::from(child.0)
+                    };
+                    let mut nearest = key(met.trailing_zeros());
+                    met &= met - 1;
+                    let base = top;
+                    while met != 0 {
+                        let next = key(met.trailing_zeros());
+                        met &= met - 1;
+                        let far = nearest.max(next);
+                        nearest = nearest.min(next);
+                        // Insertion: the farthest lies deepest.
+                        let mut place = top;
+                        while place > base && stack[place - 1] < far {
+                            stack[place] = stack[place - 1];
+                            place -= 1;
+                        }
+                        stack[place] = far;
+                        top += 1;
+                    }
+                    current = Child(nearest as u32);
+                    continue;
+                }
+            } else {
+                let index = (current.0 & !Child::LEAF) as usize;
+                let block = &self.blocks[index];
+                let found = hits(block, t_max);
+                let mut lanes = found.lanes;
+                while lanes != 0 {
+                    let lane = lanes.trailing_zeros();
+                    lanes &= lanes - 1;
+                    let Some(hit) = self.hit_of_lane(block, &found, lane, sheared, t_max) else { continue };
+                    let found = WideHit { reference: self.references[index * LANES + lane as usize], hit };
+                    let stands = match &best {
+                        Some(best) => hit.t < best.hit.t || found.reference < best.reference,
+                        None => hit.t < t_max,
+                    };
+                    if stands && hit.t <= t_max && accept(&found) {
+                        t_max = hit.t;
+                        best = Some(found);
+                    }
+                }
+            }
+            loop {
+                if top == 0 {
+                    return best;
+                }
+                top -= 1;
+                let key = stack[top];
+                if f32::from_bits((key >> 32) as u32) <= t_max {
+                    current = Child(key as u32);
+                    break;
+                }
+            }
+        }
+    }
+
+    /// The walk of [`Self::any`]: as above, but the first hit ends it and children are entered as they come.
+    #[inline(always)]
+    pub(super) fn walk_any(
+        &self,
+        sheared: &ShearedRay,
+        t_max: f32,
+        meet: impl Fn(&Node, f32) -> Met,
+        hits: impl Fn(&Block, f32) -> Candidates,
+        accept: impl Fn(&WideHit) -> bool,
+    ) -> bool {
+        let Some(mut current) = self.root else { return false };
+        let mut short = [0u64; STACK];
+        let mut long = Vec::new();
+        let stack = self.stack(&mut short, &mut long);
+        let mut top = 0;
+        loop {
+            if current.0 & Child::LEAF == 0 {
+                let node = &self.nodes[current.0 as usize];
+                let Met { slots: mut met, .. } = meet(node, t_max);
+                if met != 0 {
+                    let child = |slot: u32| {
+                        let child = node.children[slot as usize & (LANES - 1)];
+                        self.prefetch(child);
+                        child
+                    };
+                    current = child(met.trailing_zeros());
+                    met &= met - 1;
+                    while met != 0 {
+                        stack[top] = u64::from(child(met.trailing_zeros()).0);
+                        met &= met - 1;
+                        top += 1;
+                    }
+                    continue;
+                }
+            } else {
+                let index = (current.0 & !Child::LEAF) as usize;
+                let block = &self.blocks[index];
+                let found = hits(block, t_max);
+                let mut lanes = found.lanes;
+                while lanes != 0 {
+                    let lane = lanes.trailing_zeros();
+                    lanes &= lanes - 1;
+                    if let Some(hit) = self.hit_of_lane(block, &found, lane, sheared, t_max)
+                        && hit.t < t_max
+                        && accept(&WideHit { reference: self.references[index * LANES + lane as usize], hit })
+                    {
+                        return true;
+                    }
+                }
+            }
+            if top == 0 {
+                return false;
+            }
+            top -= 1;
+            current = Child(stack[top] as u32);
+        }
+    }
+
+    #[inline(always)]
+    fn hit_of_lane(
+        &self,
+        block: &Block,
+        found: &Candidates,
+        lane: u32,
+        sheared: &ShearedRay,
+        t_max: f32,
+    ) -> Option<TriangleHit> {
+        if found.doubtful >> lane & 1 == 1 {
+            return sheared.intersect(&block.triangle(lane as usize), t_max);
+        }
+        Some(TriangleHit { t: found.t.get(lane), b1: found.b1.get(lane), b2: found.b2.get(lane) })
+    }
+
+    /// Asks for the cache lines of a child that is about to be entered.
+    #[inline(always)]
+    fn prefetch(&self, child: Child) {
+        let index = (child.0 & !Child::LEAF) as usize;
+        if child.0 & Child::LEAF == 0 {
+            simd::prefetch(&self.nodes[index]);
+        } else {
+            simd::prefetch(&self.blocks[index]);
+        }
+    }
+
+    /// A stack that is long enough for this tree: `short`, or else `long`, on the heap.
+    #[inline(always)]
+    fn stack<'a>(&self, short: &'a mut [u64; STACK], long: &'a mut Vec<u64>) -> &'a mut [u64] {
+        if self.stack_need <= STACK {
+            short
+        } else {
+            long.resize(self.stack_need, 0);
+            long
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::vec3a;
+
+    fn unit(ray: u64, k: u64) -> f32 {
+        (crate::sampler::hash_words(ray, k) >> 40) as f32 / 16_777_216.0 * 2.0 - 1.0
+    }
+
+    fn build(triangles: &[[Vec3A; 3]]) -> WideTree {
+        let bounds: Vec<_> = triangles.iter().map(|t| Bounds::of_points(*t)).collect();
+        let references: Vec<_> =
+            (0..triangles.len() as u32).map(|triangle| TriangleRef { instance: 0, triangle }).collect();
+        WideTree::build(triangles, &bounds, &references)
+    }
+
+    /// Small triangles all over the place, each given twice.
+    fn clutter() -> Vec<[Vec3A; 3]> {
+        let once = (0..700).map(|i| {
+            let place = vec3a(unit(i, 0), unit(i, 1), unit(i, 2));
+            [0, 1, 2].map(|corner| place + 0.2 * vec3a(unit(i, 3 + corner), unit(i, 6 + corner), unit(i, 9 + corner)))
+        });
+        once.clone().chain(once).collect()
+    }
+
+    /// Rays from anywhere to anywhere, some along an axis.
+    fn rays() -> impl Iterator<Item = (Vec3A, Vec3A)> {
+        (0..6000u64).map(|i| {
+            let origin = 2.0 * vec3a(unit(i, 20), unit(i, 21), unit(i, 22));
+            let direction = match i % 8 {
+                0 => Vec3A::X,
+                1 => Vec3A::NEG_Z,
+                2 => vec3a(0.6, -0.8, 0.0),
+                _ => (vec3a(unit(i, 23), unit(i, 24), unit(i, 25)) - origin).normalize(),
+            };
+            (origin, direction)
+        })
+    }
+
+    fn same(a: Option<WideHit>, b: Option<WideHit>) -> bool {
+        let bits = |h: WideHit| (h.reference, [h.hit.t, h.hit.b1, h.hit.b2].map(f32::to_bits));
+        a.map(bits) == b.map(bits)
+    }
+
+    /// Every set of instructions gives the same bytes as testing all triangles one by one does, of two equal hits the one
+    /// with the smaller number.
+    #[test]
+    fn all_paths_equal_brute_force_to_the_bit() {
+        let triangles = clutter();
+        let mut tree = build(&triangles);
+        let mut hits = 0;
+        for (i, (origin, direction)) in rays().enumerate() {
+            let sheared = ShearedRay::new(origin, direction);
+            let mut brute: Option<WideHit> = None;
+            for (number, corners) in triangles.iter().enumerate() {
+                let t_max = brute.map_or(f32::INFINITY, |b| b.hit.t);
+                let reference = TriangleRef { instance: 0, triangle: number as u32 };
+                match sheared.intersect(&corners.map(|c| c.to_array()), t_max) {
+                    Some(hit) if hit.t < t_max => brute = Some(WideHit { reference, hit }),
+                    _ => {}
+                }
+            }
+            hits += u32::from(brute.is_some());
+            for path in [Path::best(), Path::PORTABLE] {
+                tree.path = path;
+                let closest = tree.closest(origin, direction, f32::INFINITY, |_| true);
+                assert!(same(closest, brute), "ray {i}, {path:?}: {closest:?}, not {brute:?}");
+                assert_eq!(tree.any(origin, direction, f32::INFINITY, |_| true), brute.is_some(), "ray {i}, {path:?}");
+                if let Some(brute) = brute {
+                    let t = brute.hit.t;
+                    assert!(!tree.any(origin, direction, t, |_| true), "ray {i}: a hit at the end is not before it");
+                    assert!(tree.closest(origin, direction, t, |_| true).is_none(), "ray {i}");
+                    let rest = tree.closest(origin, direction, f32::INFINITY, |h| h.reference != brute.reference);
+                    let twin = rest.expect("each triangle is there twice").reference.triangle;
+                    assert_eq!(twin, brute.reference.triangle + 700, "ray {i}: the twin of what is not accepted");
+                }
+            }
+        }
+        assert!(hits > 2000, "{hits} rays hit: the test tests too little");
+    }
+
+    /// A tree so deep that its stack lies on the heap is walked like any other.
+    #[test]
+    fn a_long_stack_gives_the_same_hits() {
+        let mut tree = build(&clutter());
+        assert!(tree.stack_need <= STACK, "{}", tree.stack_need);
+        let before: Vec<_> = rays().map(|(o, d)| tree.closest(o, d, f32::INFINITY, |_| true)).collect();
+        tree.stack_need = STACK + 1;
+        for ((origin, direction), before) in rays().zip(before) {
+            assert!(same(tree.closest(origin, direction, f32::INFINITY, |_| true), before));
+        }
+    }
+
+    /// Each triangle is in one block once, no box leaves out what lies under it, and no walk needs more than the stack.
+    #[test]
+    fn nodes_hold_what_is_below_them() {
+        let triangles = clutter();
+        let tree = build(&triangles);
+        let mut seen = vec![0; triangles.len()];
+        let everywhere = Bounds { min: Vec3A::NEG_INFINITY, max: Vec3A::INFINITY };
+        let mut open = vec![(tree.root.expect("not empty"), everywhere, 0)];
+        while let Some((child, bounds, waiting)) = open.pop() {
+            assert!(waiting <= tree.stack_need, "{waiting} children wait");
+            let index = (child.0 & !Child::LEAF) as usize;
+            if child.0 & Child::LEAF != 0 {
+                for lane in 0..LANES {
+                    let reference = tree.references[index * LANES + lane];
+                    if reference != TriangleRef::NONE {
+                        seen[reference.triangle as usize] += 1;
+                        for corner in tree.blocks[index].triangle(lane).map(Vec3A::from) {
+                            assert!(corner.cmpge(bounds.min).all() && corner.cmple(bounds.max).all());
+                        }
+                    }
+                }
+                continue;
+            }
+            let node = &tree.nodes[index];
+            let slots = (0..LANES).filter(|&slot| node.planes[0][slot] <= node.planes[1][slot]);
+            let waiting = waiting + slots.clone().count() - 1;
+            for slot in slots {
+                let plane = |row: usize| node.planes[row][slot];
+                let min = vec3a(plane(0), plane(2), plane(4));
+                let max = vec3a(plane(1), plane(3), plane(5));
+                assert!(min.cmpge(bounds.min).all() && max.cmple(bounds.max).all());
+                open.push((node.children[slot], Bounds { min, max }, waiting));
+            }
+        }
+        assert!(seen.iter().all(|&times| times == 1));
+    }
+}

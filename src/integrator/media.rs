@@ -1,0 +1,122 @@
+//! What a ray travels in: the volumes that a path has entered and not yet left, and what they absorb (Beer–Lambert).
+//!
+//! A boundary pushes its inside when the path enters it from the front and takes it away again when the path leaves. A volume
+//! is known by its material, so that its boundary may be made of several objects; the innermost one absorbs. Thin sheets
+//! have no inside. A path that meets a boundary from behind without having entered it began in there, or came in through a
+//! face that belongs to another volume: the way to that boundary is inside it.
+//!
+//! Source: A. Beer (1852); nesting as in C. Schmidt & B. Budge, *Simple nested dielectrics in ray traced images* (2002),
+//! without priorities, since our boundaries carry the index of both sides.
+
+use crate::scene::{MaterialId, Surface};
+use glam::Vec3;
+
+/// Volumes inside one another that are told apart; beyond it the innermost ones are forgotten.
+const DEEPEST: usize = 8;
+
+/// The inside of a boundary.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Medium {
+    material: MaterialId,
+    /// Per scene unit and channel.
+    absorption: Vec3,
+}
+
+impl Medium {
+    /// What lies behind a surface of such a material, if it bounds a volume.
+    pub(super) fn behind(material: MaterialId, surface: &Surface) -> Option<Self> {
+        surface.interior_absorption().map(|absorption| Self { material, absorption })
+    }
+
+    /// Share of light that is left after a distance, which may be infinite.
+    fn transmittance(&self, distance: f32) -> Vec3 {
+        // 0 · ∞ is no number: what does not absorb lets everything through.
+        let left = |absorption: f32| if absorption > 0.0 { (-absorption * distance).exp() } else { 1.0 };
+        Vec3::new(left(self.absorption.x), left(self.absorption.y), left(self.absorption.z))
+    }
+}
+
+/// The volumes that a path is in, outermost first.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Media {
+    entered: [Option<Medium>; DEEPEST],
+    count: usize,
+}
+
+impl Media {
+    /// Crosses a boundary: into `medium` from its front, else out of it.
+    pub(super) fn cross(&mut self, medium: Medium, enters: bool) {
+        if enters {
+            if self.count < DEEPEST {
+                self.entered[self.count] = Some(medium);
+                self.count += 1;
+            }
+            return;
+        }
+        let is_it = |entered: &Option<Medium>| entered.is_some_and(|entered| entered.material == medium.material);
+        if let Some(place) = self.entered[..self.count].iter().rposition(is_it) {
+            self.entered.copy_within(place + 1..self.count, place);
+            self.count -= 1;
+        }
+    }
+
+    fn innermost(&self) -> Option<Medium> {
+        self.count.checked_sub(1).and_then(|last| self.entered[last])
+    }
+
+    /// Share of light that is left along a free way of such a length.
+    pub(super) fn transmittance(&self, distance: f32) -> Vec3 {
+        self.innermost().map_or(Vec3::ONE, |medium| medium.transmittance(distance))
+    }
+
+    /// The same along a way that ends at the back of the boundary of `medium`.
+    pub(super) fn transmittance_to_back_of(&self, medium: Medium, distance: f32) -> Vec3 {
+        let entered = self.entered[..self.count].iter().flatten().any(|entered| entered.material == medium.material);
+        if entered { self.transmittance(distance) } else { medium.transmittance(distance) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn medium(material: u32, absorption: f32) -> Medium {
+        Medium { material: MaterialId(material), absorption: Vec3::splat(absorption) }
+    }
+
+    #[test]
+    fn the_innermost_volume_absorbs() {
+        let (glass, wine) = (medium(0, 1.0), medium(1, 3.0));
+        let mut media = Media::default();
+        assert_eq!(media.transmittance(f32::INFINITY), Vec3::ONE);
+        media.cross(glass, true);
+        media.cross(wine, true);
+        assert_eq!(media.transmittance(1.0), Vec3::splat((-3.0f32).exp()));
+        // Out of the outer one first, as where two volumes overlap.
+        media.cross(glass, false);
+        assert_eq!(media.transmittance(1.0), Vec3::splat((-3.0f32).exp()));
+        media.cross(wine, false);
+        assert_eq!(media.transmittance(1.0), Vec3::ONE);
+    }
+
+    #[test]
+    fn a_path_that_began_inside_knows_it_at_the_back_of_the_boundary() {
+        let water = medium(4, 2.0);
+        let mut media = Media::default();
+        assert_eq!(media.transmittance_to_back_of(water, 0.5), Vec3::splat((-1.0f32).exp()));
+        media.cross(water, false);
+        assert_eq!(media.transmittance(0.5), Vec3::ONE);
+    }
+
+    #[test]
+    fn more_volumes_than_are_told_apart_do_no_harm() {
+        let mut media = Media::default();
+        for number in 0..20 {
+            media.cross(medium(number, 1.0), true);
+        }
+        for number in 0..20 {
+            media.cross(medium(number, 1.0), false);
+        }
+        assert_eq!(media.count, 0);
+    }
+}

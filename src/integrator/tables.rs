@@ -1,0 +1,109 @@
+//! Tables that materials need, computed once before tracing and shared where parameters are equal.
+
+use crate::bsdf::{AnisotropicTable, CoatTables, DielectricTables, LayerTables, WidthRange};
+use crate::scene::{Distribution, Material, Roughness, RoughnessScale, ScalarInput, Surface};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// The tables of one surface.
+pub(super) enum SurfaceTables {
+    /// It needs none.
+    None,
+    /// Of a metal of anisotropic roughness.
+    Conductor(Box<AnisotropicTable>),
+    /// Of a rough dielectric.
+    Dielectric(Arc<DielectricTables>),
+    /// Of a coat over a diffuse base.
+    Coat(Arc<CoatTables>),
+    /// Of a coat over a metal.
+    Layers(Arc<LayerTables>),
+    /// Of both components.
+    Mix(Box<[SurfaceTables; 2]>),
+}
+
+/// Makes tables; equal ones only once.
+#[derive(Default)]
+struct Maker {
+    dielectrics: HashMap<(u32, Distribution), Arc<DielectricTables>>,
+    coats: HashMap<(u32, Distribution), Arc<CoatTables>>,
+}
+
+/// The tables of each material.
+pub(super) fn of_materials(materials: &[Material]) -> Vec<SurfaceTables> {
+    let mut maker = Maker::default();
+    materials.iter().map(|material| maker.tables_of(&material.surface)).collect()
+}
+
+impl Maker {
+    fn tables_of(&mut self, surface: &Surface) -> SurfaceTables {
+        match surface {
+            Surface::Conductor { roughness, .. } => match widths(roughness) {
+                Some(ranges) => {
+                    SurfaceTables::Conductor(Box::new(AnisotropicTable::missing(ranges, roughness.distribution)))
+                }
+                None => SurfaceTables::None,
+            },
+            Surface::Dielectric { ior, roughness, .. } if !roughness.is_smooth() => {
+                SurfaceTables::Dielectric(self.dielectric(*ior, roughness))
+            }
+            Surface::CoatedDiffuse { ior, roughness, .. } => SurfaceTables::Coat(self.coat(*ior, roughness)),
+            Surface::CoatedConductor { coat_ior, roughness, coat_roughness, .. } => {
+                let distributions = [coat_roughness.distribution, roughness.distribution];
+                let ranges = [mean_width(coat_roughness), mean_width(roughness)];
+                SurfaceTables::Layers(Arc::new(LayerTables::new(*coat_ior, distributions, ranges)))
+            }
+            Surface::Mix { first, second, .. } => {
+                SurfaceTables::Mix(Box::new([self.tables_of(first), self.tables_of(second)]))
+            }
+            _ => SurfaceTables::None,
+        }
+    }
+
+    fn dielectric(&mut self, ior: f32, roughness: &Roughness) -> Arc<DielectricTables> {
+        let key = (ior.to_bits(), roughness.distribution);
+        let make = || Arc::new(DielectricTables::new(ior, roughness.distribution));
+        let shared = self.dielectrics.entry(key).or_insert_with(make);
+        match widths(roughness) {
+            Some(ranges) => Arc::new(DielectricTables::clone(shared).with_anisotropy(ranges)),
+            None => shared.clone(),
+        }
+    }
+
+    fn coat(&mut self, ior: f32, roughness: &Roughness) -> Arc<CoatTables> {
+        let key = (ior.to_bits(), roughness.distribution);
+        let make = || Arc::new(CoatTables::new(ior, roughness.distribution));
+        let shared = self.coats.entry(key).or_insert_with(make);
+        match widths(roughness) {
+            Some(ranges) => Arc::new(CoatTables::clone(shared).with_anisotropy(ranges)),
+            None => shared.clone(),
+        }
+    }
+}
+
+/// The slope widths that an anisotropic roughness may take along each axis.
+fn widths(roughness: &Roughness) -> Option<[WidthRange; 2]> {
+    let range = |input: &ScalarInput| match input.texture {
+        None => WidthRange::Constant(slope_width(roughness.scale, input.factor)),
+        Some(_) => WidthRange::Textured,
+    };
+    roughness.v.as_ref().map(|v| [range(&roughness.u), range(v)])
+}
+
+/// The geometric mean of both slope widths that a roughness may take.
+fn mean_width(roughness: &Roughness) -> WidthRange {
+    let constant = |input: &ScalarInput| input.texture.is_none().then(|| slope_width(roughness.scale, input.factor));
+    match (constant(&roughness.u), constant(roughness.v.as_ref().unwrap_or(&roughness.u))) {
+        (Some(u), Some(v)) => WidthRange::Constant((u * v).sqrt()),
+        _ => WidthRange::Textured,
+    }
+}
+
+/// The slope width α in [0, 1] for a number on a scale.
+pub(super) fn slope_width(scale: RoughnessScale, value: f32) -> f32 {
+    let value = value.clamp(0.0, 1.0);
+    match scale {
+        RoughnessScale::Perceptual => value * value,
+        RoughnessScale::Alpha => value,
+        RoughnessScale::SquareRoot => value.sqrt(),
+    }
+}

@@ -1,0 +1,369 @@
+//! A tree over emitters that chooses one by what it can give to a point, so that hundreds do not raise noise.
+//!
+//! Conty Estévez and Kulla, "Importance Sampling of Many Lights with Adaptive Tree Splitting", 2018: a node knows box,
+//! intensity and a cone of normals; the tree is built by their surface area orientation heuristic and walked with
+//! probabilities in proportion to what each child can give at most. Not for lights without a place.
+
+use glam::Vec3;
+use std::f32::consts::{FRAC_PI_2, PI};
+
+/// What a group of emitters can give.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct LightBounds {
+    pub(super) min: Vec3,
+    pub(super) max: Vec3,
+    /// Sum of the intensities that the emitters have along their own normals: radiance × area, or intensity.
+    pub(super) intensity: f32,
+    /// Unit axis of the cone of normals.
+    pub(super) axis: Vec3,
+    /// Half angle of the cone of normals, in [0, π].
+    pub(super) normal_angle: f32,
+    /// Angle from its normal into which an emitter shines, in [0, π/2].
+    pub(super) emission_angle: f32,
+}
+
+/// A place that asks for light.
+#[derive(Clone, Copy, Debug)]
+pub struct LightReceiver {
+    /// World position.
+    pub position: Vec3,
+    /// Unit normal on the side from which light can be scattered; zero where it can from both.
+    pub normal: Vec3,
+}
+
+impl LightBounds {
+    fn center(&self) -> Vec3 {
+        0.5 * (self.min + self.max)
+    }
+
+    fn union(&self, other: &Self) -> Self {
+        if self.intensity == 0.0 {
+            return *other;
+        }
+        if other.intensity == 0.0 {
+            return *self;
+        }
+        let (axis, normal_angle) = cone_union((self.axis, self.normal_angle), (other.axis, other.normal_angle));
+        Self {
+            min: self.min.min(other.min),
+            max: self.max.max(other.max),
+            intensity: self.intensity + other.intensity,
+            axis,
+            normal_angle,
+            emission_angle: self.emission_angle.max(other.emission_angle),
+        }
+    }
+}
+
+/// [`LightBounds`] as the walk needs them: no angle is computed on the way.
+#[derive(Clone, Copy, Debug)]
+struct Giver {
+    center: Vec3,
+    /// Squared, of the ball around the box.
+    radius_squared: f32,
+    intensity: f32,
+    axis: Vec3,
+    cos_normal: f32,
+    sin_normal: f32,
+    cos_emission: f32,
+}
+
+impl Giver {
+    fn new(bounds: &LightBounds) -> Self {
+        let (sin_normal, cos_normal) = bounds.normal_angle.sin_cos();
+        Self {
+            center: bounds.center(),
+            radius_squared: 0.25 * (bounds.max - bounds.min).length_squared(),
+            intensity: bounds.intensity,
+            axis: bounds.axis,
+            cos_normal: if bounds.normal_angle >= PI { -1.0 } else { cos_normal },
+            sin_normal: sin_normal.max(0.0),
+            cos_emission: bounds.emission_angle.cos(),
+        }
+    }
+
+    /// Irradiance that the group gives to a receiver, roughly; 0 only where it can give none.
+    fn importance(&self, receiver: &LightReceiver) -> f32 {
+        let to_center = self.center - receiver.position;
+        let center_distance_squared = to_center.length_squared();
+        // Inside or near the box the distance to its centre says nothing.
+        let distance_squared = center_distance_squared.max(self.radius_squared).max(f32::MIN_POSITIVE);
+        if center_distance_squared <= self.radius_squared {
+            return self.intensity / distance_squared;
+        }
+        let way = to_center / center_distance_squared.sqrt();
+        let sin_squared = self.radius_squared / center_distance_squared;
+        let ball = Angle { cos: (1.0 - sin_squared).max(0.0).sqrt(), sin: sin_squared.sqrt() };
+        // Rounding must not make anything 0 that is not.
+        const SLACK: f32 = 1e-4;
+        let normals = Angle { cos: self.cos_normal, sin: self.sin_normal };
+        let leaving = Angle::of_cos(-self.axis.dot(way)).less(normals).less(ball).cos + SLACK;
+        if leaving < self.cos_emission {
+            return 0.0;
+        }
+        let arriving = if receiver.normal == Vec3::ZERO {
+            1.0
+        } else {
+            (Angle::of_cos(receiver.normal.dot(way)).less(ball).cos + SLACK).max(0.0)
+        };
+        self.intensity * leaving.max(1e-3) * arriving / distance_squared
+    }
+}
+
+/// An angle in [0, π].
+#[derive(Clone, Copy, Debug)]
+struct Angle {
+    cos: f32,
+    sin: f32,
+}
+
+impl Angle {
+    fn of_cos(cos: f32) -> Self {
+        Self { cos, sin: (1.0 - cos * cos).max(0.0).sqrt() }
+    }
+
+    /// The angle less another, at least 0.
+    fn less(self, other: Self) -> Self {
+        if self.cos >= other.cos {
+            return Self { cos: 1.0, sin: 0.0 };
+        }
+        Self { cos: self.cos * other.cos + self.sin * other.sin, sin: self.sin * other.cos - self.cos * other.sin }
+    }
+}
+
+/// Angle between unit vectors.
+fn angle(a: Vec3, b: Vec3) -> f32 {
+    a.dot(b).clamp(-1.0, 1.0).acos()
+}
+
+/// The smallest cone around two cones of (axis, half angle).
+fn cone_union(a: (Vec3, f32), b: (Vec3, f32)) -> (Vec3, f32) {
+    let (wide, narrow) = if a.1 >= b.1 { (a, b) } else { (b, a) };
+    let between = angle(wide.0, narrow.0);
+    if (between + narrow.1).min(PI) <= wide.1 {
+        return wide;
+    }
+    let half_angle = 0.5 * (wide.1 + between + narrow.1);
+    let turn_axis = wide.0.cross(narrow.0);
+    if half_angle >= PI || turn_axis.length_squared() < 1e-12 {
+        return (wide.0, PI);
+    }
+    let rotation = glam::Quat::from_axis_angle(turn_axis.normalize(), half_angle - wide.1);
+    ((rotation * wide.0).normalize(), half_angle)
+}
+
+/// Measure of the directions into which a cone of emitters shines (Conty Estévez and Kulla 2018, eq. 1).
+fn orientation_measure(normal_angle: f32, emission_angle: f32) -> f32 {
+    let reach = (normal_angle + emission_angle).min(PI);
+    let (sin, cos) = normal_angle.sin_cos();
+    2.0 * PI * (1.0 - cos)
+        + FRAC_PI_2 * (2.0 * reach * sin - (normal_angle - 2.0 * reach).cos() - 2.0 * normal_angle * sin + cos)
+}
+
+/// A node as built, with two children or an emitter.
+enum Binary {
+    Leaf { emitter: u32 },
+    Inner { children: Box<[(LightBounds, Binary); 2]> },
+}
+
+/// A node as walked.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    giver: Giver,
+    /// Index of the first child in the list of nodes, or of the emitter of a leaf.
+    first: u32,
+    /// Children, which follow each other; 0 for a leaf.
+    children: u32,
+    /// Index of the node's parent; its own for the root.
+    parent: u32,
+}
+
+/// The tree.
+#[derive(Debug)]
+pub(super) struct LightTree {
+    nodes: Vec<Node>,
+    /// By emitter: its leaf.
+    leaf_of: Vec<Option<u32>>,
+}
+
+/// Most children of a node. A choice among many small groups is better than a row of choices between two large ones:
+/// relative variance of one sample under the 576 lamps of `tests` is 0.58 with 2, 0.17 with 8, 0.07 with 16, 0.05 with 32.
+const WIDTH: usize = 16;
+
+/// Levels below which nodes are halved by count, so that no set of lights is deeper than 64.
+const HALVE_BELOW: u32 = 32;
+
+impl LightTree {
+    /// Over emitters 0, 1, …; those without intensity are left out. `None` where none is left.
+    pub(super) fn new(bounds: &[LightBounds]) -> Option<Self> {
+        let usable =
+            |b: &LightBounds| b.intensity > 0.0 && b.intensity.is_finite() && b.min.is_finite() && b.max.is_finite();
+        let mut emitters: Vec<u32> = (0..bounds.len() as u32).filter(|&i| usable(&bounds[i as usize])).collect();
+        if emitters.is_empty() {
+            return None;
+        }
+        let (root_bounds, root) = build(bounds, &mut emitters, 0);
+        let mut tree = Self { nodes: Vec::with_capacity(2 * emitters.len()), leaf_of: vec![None; bounds.len()] };
+        tree.nodes.push(Node { giver: Giver::new(&root_bounds), first: 0, children: 0, parent: 0 });
+        tree.place(0, root);
+        Some(tree)
+    }
+
+    /// Puts what is below a node into the list, in nodes of up to [`WIDTH`] children.
+    fn place(&mut self, place: u32, node: Binary) {
+        let children = match node {
+            Binary::Leaf { emitter } => {
+                self.nodes[place as usize].first = emitter;
+                self.leaf_of[emitter as usize] = Some(place);
+                return;
+            }
+            Binary::Inner { children } => children,
+        };
+        let mut group = Vec::from(*children);
+        while group.len() < WIDTH {
+            // Opens the child that is worst described by its bounds: intense and wide.
+            let badness = |(bounds, node): &(LightBounds, Binary)| match node {
+                Binary::Leaf { .. } => 0.0,
+                Binary::Inner { .. } => bounds.intensity * (bounds.max - bounds.min).length_squared().max(1e-30),
+            };
+            let worst = (0..group.len()).fold(0, |a, b| if badness(&group[b]) > badness(&group[a]) { b } else { a });
+            if badness(&group[worst]) == 0.0 {
+                break;
+            }
+            if let (_, Binary::Inner { children }) = group.remove(worst) {
+                group.extend(*children);
+            }
+        }
+        let first = self.nodes.len() as u32;
+        self.nodes[place as usize].first = first;
+        self.nodes[place as usize].children = group.len() as u32;
+        self.nodes.extend(group.iter().map(|(bounds, _)| Node {
+            giver: Giver::new(bounds),
+            first: 0,
+            children: 0,
+            parent: place,
+        }));
+        for (offset, (_, child)) in group.into_iter().enumerate() {
+            self.place(first + offset as u32, child);
+        }
+    }
+
+    /// What each child of a node can give, the rest of the array being 0, and their sum.
+    fn importances(&self, receiver: &LightReceiver, node: &Node) -> ([f32; WIDTH], f32) {
+        let mut importances = [0.0; WIDTH];
+        let children = &self.nodes[node.first as usize..(node.first + node.children) as usize];
+        for (importance, child) in importances.iter_mut().zip(children) {
+            *importance = child.giver.importance(receiver);
+        }
+        let total = importances.iter().sum();
+        (importances, total)
+    }
+
+    /// An emitter and the probability of its choice; `None` where no emitter can give anything.
+    pub(super) fn sample(&self, receiver: &LightReceiver, mut u: f32) -> Option<(usize, f32)> {
+        let (mut node, mut probability) = (&self.nodes[0], 1.0);
+        if node.children == 0 && node.giver.importance(receiver) == 0.0 {
+            return None;
+        }
+        while node.children > 0 {
+            let (importances, total) = self.importances(receiver, node);
+            if !(total > 0.0 && total.is_finite()) {
+                return None;
+            }
+            let target = u * total;
+            let (mut before, mut chosen) = (0.0, None);
+            for (index, &importance) in importances.iter().enumerate() {
+                if importance > 0.0 {
+                    // The last child that can give anything takes what rounding leaves over.
+                    let is_it = target < before + importance;
+                    chosen = Some((index, before, importance));
+                    if is_it {
+                        break;
+                    }
+                    before += importance;
+                }
+            }
+            let (index, before, importance) = chosen?;
+            u = ((target - before) / importance).clamp(0.0, 1.0 - f32::EPSILON / 2.0);
+            probability *= importance / total;
+            node = &self.nodes[node.first as usize + index];
+        }
+        Some((node.first as usize, probability))
+    }
+
+    /// Probability that [`LightTree::sample`] chooses an emitter.
+    pub(super) fn probability(&self, receiver: &LightReceiver, emitter: usize) -> f32 {
+        let Some(mut place) = self.leaf_of[emitter] else { return 0.0 };
+        if place == 0 {
+            return if self.nodes[0].giver.importance(receiver) > 0.0 { 1.0 } else { 0.0 };
+        }
+        let mut probability = 1.0;
+        while place != 0 {
+            let parent = &self.nodes[self.nodes[place as usize].parent as usize];
+            let (importances, total) = self.importances(receiver, parent);
+            if !(total > 0.0 && total.is_finite()) {
+                return 0.0;
+            }
+            probability *= importances[(place - parent.first) as usize] / total;
+            place = self.nodes[place as usize].parent;
+        }
+        probability
+    }
+}
+
+fn build(bounds: &[LightBounds], emitters: &mut [u32], depth: u32) -> (LightBounds, Binary) {
+    if let [emitter] = *emitters {
+        return (bounds[emitter as usize], Binary::Leaf { emitter });
+    }
+    let middle = if depth < HALVE_BELOW { split(bounds, emitters) } else { emitters.len() / 2 };
+    let (first, second) = emitters.split_at_mut(middle);
+    let children = [build(bounds, first, depth + 1), build(bounds, second, depth + 1)];
+    (children[0].0.union(&children[1].0), Binary::Inner { children: Box::new(children) })
+}
+
+/// Orders emitters so that the first part and the rest make the cheapest pair of nodes; the size of the first part.
+fn split(bounds: &[LightBounds], emitters: &mut [u32]) -> usize {
+    const BUCKETS: usize = 12;
+    let center = |emitter: u32| bounds[emitter as usize].center();
+    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    for &emitter in emitters.iter() {
+        (low, high) = (low.min(center(emitter)), high.max(center(emitter)));
+    }
+    let extent = high - low;
+    let bucket_of = |emitter: u32, axis: usize| {
+        let share = (center(emitter)[axis] - low[axis]) / extent[axis];
+        ((share * BUCKETS as f32) as usize).min(BUCKETS - 1)
+    };
+    let cost = |b: &LightBounds, axis: usize| {
+        let size = b.max - b.min;
+        let surface = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
+        // Long thin boxes are cut across: the regularisation of the paper's eq. 3. A line or a point has no surface, so
+        // its length stands in.
+        let long = extent.max_element() / extent[axis];
+        b.intensity * orientation_measure(b.normal_angle, b.emission_angle) * (surface + size.length_squared()) * long
+    };
+    let mut best: Option<(f32, usize, usize)> = None;
+    for axis in 0..3 {
+        if extent[axis] <= 0.0 {
+            continue;
+        }
+        let mut buckets: [Option<LightBounds>; BUCKETS] = [None; BUCKETS];
+        for &emitter in emitters.iter() {
+            let own = bounds[emitter as usize];
+            let bucket = &mut buckets[bucket_of(emitter, axis)];
+            *bucket = Some(bucket.map_or(own, |b| b.union(&own)));
+        }
+        let gather = |range: &[Option<LightBounds>]| range.iter().flatten().copied().reduce(|a, b| a.union(&b));
+        for cut in 1..BUCKETS {
+            let (Some(first), Some(second)) = (gather(&buckets[..cut]), gather(&buckets[cut..])) else { continue };
+            let total = cost(&first, axis) + cost(&second, axis);
+            if best.is_none_or(|(least, ..)| total < least) {
+                best = Some((total, axis, cut));
+            }
+        }
+    }
+    let Some((_, axis, cut)) = best else { return emitters.len() / 2 };
+    // Stable, so that equal keys keep their order on every machine.
+    emitters.sort_by_key(|&emitter| bucket_of(emitter, axis) >= cut);
+    emitters.partition_point(|&emitter| bucket_of(emitter, axis) < cut).clamp(1, emitters.len() - 1)
+}

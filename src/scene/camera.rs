@@ -1,0 +1,76 @@
+//! The camera: where it is, how it projects, its lens and its motion.
+
+use super::Motion;
+use glam::{Vec2, Vec3};
+
+/// A camera that looks along `forward` with `up` towards the top of the picture.
+#[derive(Clone, Debug)]
+pub struct Camera {
+    /// Centre of the lens, world space.
+    pub position: Vec3,
+    /// Unit viewing direction.
+    pub forward: Vec3,
+    /// Up vector, need not be perpendicular to `forward`, not parallel to it.
+    pub up: Vec3,
+    /// How directions or positions become places in the picture.
+    pub projection: Projection,
+    /// The part of the image plane that the film covers; `None`: the middle, pixels square.
+    pub screen_window: Option<ScreenWindow>,
+    /// Whether left and right are exchanged, as by a camera transform that mirrors (pbrt's `Scale -1 1 1`).
+    pub mirrored: bool,
+    /// Radius of the lens in scene units; 0 is a pinhole.
+    pub aperture_radius: f32,
+    /// Distance of the plane in focus along `forward`, scene units, above 0.
+    pub focus_distance: f32,
+    /// Moves the whole camera (rotation and translation) while the shutter is open; `None` where it rests.
+    pub motion: Option<Motion>,
+}
+
+/// Parallel or central projection.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Projection {
+    /// Central.
+    Perspective {
+        /// Full vertical field of view in degrees, in (0, 180).
+        vertical_fov_deg: f32,
+    },
+    /// Parallel.
+    Orthographic {
+        /// Full height of what is seen, scene units, above 0.
+        height: f32,
+    },
+}
+
+/// A rectangle on the image plane, y up. The unit is half the picture's height: without a window the film of aspect a
+/// covers [−a, a] × [−1, 1]. A film of another aspect than its window's has pixels that are not square (as in pbrt).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScreenWindow {
+    /// Left and bottom edges.
+    pub min: Vec2,
+    /// Right and top edges, above `min` in both.
+    pub max: Vec2,
+}
+
+impl Camera {
+    /// A pinhole at rest, focused (should it get a lens) at distance 1.
+    pub fn pinhole(position: Vec3, forward: Vec3, up: Vec3, vertical_fov_deg: f32) -> Self {
+        Self {
+            position,
+            forward,
+            up,
+            projection: Projection::Perspective { vertical_fov_deg },
+            screen_window: None,
+            mirrored: false,
+            aperture_radius: 0.0,
+            focus_distance: 1.0,
+            motion: None,
+        }
+    }
+}
+
+impl ScreenWindow {
+    /// What a film of this aspect (width / height) covers when no window is given.
+    pub fn centered(aspect: f32) -> Self {
+        Self { min: Vec2::new(-aspect, -1.0), max: Vec2::new(aspect, 1.0) }
+    }
+}

@@ -1,0 +1,251 @@
+//! Stanford PLY meshes: ASCII and binary of both byte orders, plain or under gzip.
+//!
+//! Vertices (`x y z`, `nx ny nz`, `u v` or `s t` and their longer names) and faces (`vertex_indices`) are read, everything
+//! else is skipped and named. Written by ourselves: a million triangles load in little more than reading their bytes
+//! takes (benches/README.md), and every count is checked against the bytes that are there before memory is taken for it.
+
+mod body;
+mod header;
+
+use super::error::{LoadError, Place};
+use super::{files, polygon};
+use crate::scene::Mesh;
+use body::Values;
+use glam::{Vec2, Vec3};
+use header::{Element, Property};
+use std::path::Path;
+
+/// A mesh, and what of the file was not used.
+pub(super) struct Loaded {
+    pub(super) mesh: Mesh,
+    pub(super) notes: Vec<String>,
+}
+
+/// Reads a file. Its v is taken to run up the image, as pbrt and Mitsuba have it; ours runs down.
+pub(super) fn read(path: &Path) -> Result<Loaded, LoadError> {
+    let bytes = files::read_unpacked(path)?;
+    let header = header::parse(path, &bytes)?;
+    let mut values = Values::new(path, &bytes[header.body..], &header);
+    let mut mesh =
+        Mesh { name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(), ..Mesh::default() };
+    let mut notes = Vec::new();
+    let mut unused: Vec<&str> = Vec::new();
+    let mut polygons = Polygons::default();
+    for element in &header.elements {
+        values.check_count(element)?;
+        match element.name.as_str() {
+            "vertex" => unused.extend(read_vertices(&mut values, element, &mut mesh)?),
+            "face" => unused.extend(read_faces(&mut values, element, &mut polygons)?),
+            other => {
+                unused.push(other);
+                values.skip(element)?;
+            }
+        }
+    }
+    let Mesh { positions, triangles, .. } = &mut mesh;
+    let vertices = positions.len();
+    if let Some(index) = polygons.indices.iter().find(|&&index| index as usize >= vertices) {
+        return Err(LoadError::invalid(path, format_args!("a face uses vertex {index}, but there are {vertices}")));
+    }
+    polygons.triangulate(positions, triangles);
+    if triangles.is_empty() {
+        return Err(LoadError::invalid(path, "nothing to render: no face with three corners"));
+    }
+    if !unused.is_empty() {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        notes.push(format!("{name}: not used: {}.", unused.join(", ")));
+    }
+    Ok(Loaded { mesh, notes })
+}
+
+/// Faces as they stand in the file.
+#[derive(Default)]
+struct Polygons {
+    /// Corners of each face.
+    sizes: Vec<u32>,
+    indices: Vec<u32>,
+    /// Whether every face so far is a triangle.
+    others: bool,
+}
+
+impl Polygons {
+    fn triangulate(&self, positions: &[Vec3], triangles: &mut Vec<[u32; 3]>) {
+        if !self.others {
+            triangles.extend_from_slice(self.indices.as_chunks::<3>().0);
+            return;
+        }
+        let mut rest = self.indices.as_slice();
+        for &size in &self.sizes {
+            let Some((face, behind)) = rest.split_at_checked(size as usize) else { return };
+            rest = behind;
+            if size >= 3 {
+                polygon::triangulate(positions, face, triangles);
+            }
+        }
+    }
+}
+
+/// Where a vertex property goes.
+fn slot(name: &str) -> Option<usize> {
+    Some(match name {
+        "x" => 0,
+        "y" => 1,
+        "z" => 2,
+        "nx" => 3,
+        "ny" => 4,
+        "nz" => 5,
+        "u" | "s" | "texture_u" | "texture_s" => 6,
+        "v" | "t" | "texture_v" | "texture_t" => 7,
+        _ => return None,
+    })
+}
+
+/// Fills positions, normals and coordinates; returns the names of what is not used.
+fn read_vertices<'h>(values: &mut Values, element: &'h Element, mesh: &mut Mesh) -> Result<Vec<&'h str>, LoadError> {
+    let mut unused = Vec::new();
+    let mut slots = Vec::new();
+    for property in &element.properties {
+        let found = if property.list.is_none() { slot(&property.name) } else { None };
+        if found.is_none() {
+            unused.push(property.name.as_str());
+        }
+        slots.push(found);
+    }
+    let has = |places: std::ops::Range<usize>| places.clone().all(|place| slots.contains(&Some(place)));
+    if !has(0..3) {
+        return Err(values.error("its vertices have no x, y and z"));
+    }
+    let (has_normals, has_uvs) = (has(3..6), has(6..8));
+    mesh.positions.reserve_exact(element.count);
+    if has_normals {
+        mesh.normals.reserve_exact(element.count);
+    }
+    if has_uvs {
+        mesh.uvs.reserve_exact(element.count);
+    }
+    values.rows(element, &slots, |v: &[f32; 8]| {
+        mesh.positions.push(Vec3::new(v[0], v[1], v[2]));
+        if has_normals {
+            mesh.normals.push(Vec3::new(v[3], v[4], v[5]));
+        }
+        if has_uvs {
+            mesh.uvs.push(Vec2::new(v[6], 1.0 - v[7]));
+        }
+    })?;
+    Ok(unused)
+}
+
+fn read_faces<'h>(
+    values: &mut Values,
+    element: &'h Element,
+    polygons: &mut Polygons,
+) -> Result<Vec<&'h str>, LoadError> {
+    let is_corners = |property: &Property| {
+        property.list.is_some() && ["vertex_indices", "vertex_index"].contains(&property.name.as_str())
+    };
+    if !element.properties.iter().any(is_corners) {
+        return Err(values.error("its faces have no list \"vertex_indices\""));
+    }
+    let unused = element.properties.iter().filter(|property| !is_corners(property)).map(|p| p.name.as_str()).collect();
+    polygons.sizes.reserve_exact(element.count);
+    polygons.indices.reserve_exact(element.count.saturating_mul(3).min(values.bytes_left()));
+    for _ in 0..element.count {
+        for property in &element.properties {
+            let Some(count_kind) = property.list else {
+                values.number(property.kind)?;
+                continue;
+            };
+            if !is_corners(property) {
+                values.skip_list(count_kind, property.kind)?;
+                continue;
+            }
+            let size = values.list(count_kind, property.kind, &mut polygons.indices)?;
+            polygons.others |= size != 3;
+            polygons.sizes.push(size);
+        }
+    }
+    Ok(unused)
+}
+
+/// The place of an error in a PLY file: its header has lines, its body has none.
+fn at_line(path: &Path, line: usize) -> Place {
+    Place::line(path, line)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEADER: &str = "ply\nformat FORMAT 1.0\ncomment made by hand\nelement vertex 4\nproperty float x\n\
+        property float y\nproperty float z\nproperty float u\nproperty float v\nproperty uchar red\n\
+        element face 2\nproperty list uchar int vertex_indices\nend_header\n";
+
+    fn load(bytes: &[u8]) -> Result<Loaded, LoadError> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mesh.ply");
+        std::fs::write(&path, bytes).unwrap();
+        read(&path)
+    }
+
+    fn ascii() -> Vec<u8> {
+        let body = "0 0 0 0 0 9\n1 0 0 1 0 9\n1 1 0 1 1 9\n0 1 0 0 1 9\n3 0 1 2\n3 0 2 3\n";
+        (HEADER.replace("FORMAT", "ascii") + body).into_bytes()
+    }
+
+    fn binary(big: bool) -> Vec<u8> {
+        let mut bytes =
+            HEADER.replace("FORMAT", if big { "binary_big_endian" } else { "binary_little_endian" }).into_bytes();
+        let mut put = |value: [u8; 4]| {
+            bytes.extend(if big { value.into_iter().rev().collect::<Vec<_>>() } else { value.to_vec() });
+        };
+        for [x, y] in [[0.0_f32, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]] {
+            [x, y, 0.0, x, y].iter().for_each(|v| put(v.to_le_bytes()));
+            put([9, 9, 9, 9]);
+        }
+        // The colour is one byte: take three of the four out again.
+        let start = bytes.len() - 4 * 24;
+        let vertices: Vec<u8> = bytes[start..].chunks(24).flat_map(|row| row[..21].to_vec()).collect();
+        bytes.truncate(start);
+        bytes.extend(vertices);
+        for face in [[0_i32, 1, 2], [0, 2, 3]] {
+            bytes.push(3);
+            for index in face {
+                bytes.extend(if big { index.to_be_bytes() } else { index.to_le_bytes() });
+            }
+        }
+        bytes
+    }
+
+    #[test]
+    fn all_encodings_give_the_same_mesh() {
+        let text = load(&ascii()).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(text.mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
+        assert_eq!(text.mesh.uvs[2], Vec2::new(1.0, 0.0));
+        assert_eq!(text.notes, ["mesh.ply: not used: red."]);
+        let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        std::io::Write::write_all(&mut packed, &ascii()).unwrap();
+        for bytes in [binary(false), binary(true), packed.finish().unwrap()] {
+            let other = load(&bytes).unwrap_or_else(|e| panic!("{e}")).mesh;
+            assert_eq!((&other.positions, &other.triangles), (&text.mesh.positions, &text.mesh.triangles));
+            assert_eq!(other.uvs, text.mesh.uvs);
+        }
+    }
+
+    #[test]
+    fn every_cut_and_large_counts_end_in_one_line() {
+        for bytes in [ascii(), binary(false)] {
+            for length in 0..bytes.len() - 3 {
+                if let Err(error) = load(&bytes[..length]) {
+                    assert!(!error.to_string().contains('\n'), "{error}");
+                }
+            }
+        }
+        let text = String::from_utf8(ascii()).unwrap();
+        for (from, to) in [("vertex 4", "vertex 4000000000"), ("face 2", "face 9999999999"), ("3 0 2 3", "900 0 2 3")] {
+            let error = load(text.replace(from, to).as_bytes()).err().expect(to).to_string();
+            assert!(error.contains("mesh.ply"), "{error}");
+        }
+        let error = load(text.replace("3 0 2 3", "3 0 2 7").as_bytes()).err().unwrap().to_string();
+        assert!(error.ends_with("a face uses vertex 7, but there are 4"), "{error}");
+    }
+}

@@ -1,0 +1,327 @@
+//! How surfaces scatter light, as scene files tell it: one variant a model of `crate::bsdf`.
+
+use super::{ColorInput, ScalarInput};
+use glam::Vec3;
+
+/// Shape of the distribution of microfacet slopes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Distribution {
+    /// Trowbridge and Reitz: long tails, fits most real surfaces.
+    #[default]
+    Ggx,
+    /// Gaussian slopes: short tails.
+    Beckmann,
+}
+
+/// How the numbers of a [`Roughness`] become the microfacet slope width α.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum RoughnessScale {
+    /// α is the square of the number (Burley 2012).
+    #[default]
+    Perceptual,
+    /// α is the number itself.
+    Alpha,
+    /// α is the square root of the number.
+    SquareRoot,
+}
+
+/// Roughness of a microfacet surface; 0 is smooth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Roughness {
+    /// Along the tangent, in [0, 1].
+    pub u: ScalarInput,
+    /// Along the bitangent; `None` where it equals `u`.
+    pub v: Option<ScalarInput>,
+    /// What the numbers mean.
+    pub scale: RoughnessScale,
+    /// Shape of the distribution.
+    pub distribution: Distribution,
+}
+
+impl Roughness {
+    /// GGX, the same in all directions, perceptual.
+    pub const fn isotropic(roughness: ScalarInput) -> Self {
+        Self { u: roughness, v: None, scale: RoughnessScale::Perceptual, distribution: Distribution::Ggx }
+    }
+
+    /// Perfectly smooth.
+    pub const SMOOTH: Self = Self::isotropic(ScalarInput::constant(0.0));
+
+    /// The same GGX roughness everywhere, perceptual, in [0, 1].
+    pub const fn constant(roughness: f32) -> Self {
+        Self::isotropic(ScalarInput::constant(roughness))
+    }
+
+    fn scalars(&self) -> impl Iterator<Item = &ScalarInput> {
+        [Some(&self.u), self.v.as_ref()].into_iter().flatten()
+    }
+
+    /// Whether the surface is smooth wherever it is looked at.
+    pub fn is_smooth(&self) -> bool {
+        self.u.factor == 0.0 && self.v.is_none_or(|v| v.factor == 0.0)
+    }
+}
+
+impl From<ScalarInput> for Roughness {
+    fn from(roughness: ScalarInput) -> Self {
+        Self::isotropic(roughness)
+    }
+}
+
+/// How a surface scatters light.
+#[derive(Clone, Debug)]
+pub enum Surface {
+    /// Lambert.
+    Diffuse {
+        /// Albedo in [0, 1].
+        reflectance: ColorInput,
+    },
+    /// Rough diffuse: clay, unglazed ceramics, the moon.
+    OrenNayar {
+        /// Albedo of the grooves' walls in [0, 1].
+        reflectance: ColorInput,
+        /// In [0, 1]; 0 is Lambert.
+        roughness: ScalarInput,
+    },
+    /// A thin diffuse sheet: paper, leaves.
+    DiffuseTransmission {
+        /// Albedo of the lit side in [0, 1].
+        reflectance: ColorInput,
+        /// Albedo of the other side in [0, 1]; where the sum exceeds 1, both are scaled down.
+        transmittance: ColorInput,
+    },
+    /// A perfect mirror.
+    Mirror {
+        /// Reflectance in [0, 1].
+        reflectance: ColorInput,
+    },
+    /// A metal with complex index of refraction η + ik per RGB channel.
+    Conductor {
+        /// Real part.
+        eta: Vec3,
+        /// Imaginary part.
+        k: Vec3,
+        /// Multiplies what is reflected, in [0, 1]; white for real metals.
+        tint: ColorInput,
+        /// Roughness.
+        roughness: Roughness,
+    },
+    /// Glass, water: the boundary of a volume.
+    Dielectric {
+        /// Index of refraction inside relative to outside, above 0.
+        ior: f32,
+        /// Roughness.
+        roughness: Roughness,
+        /// Tint of the transmitted light at each crossing; white for clear glass.
+        transmittance: ColorInput,
+        /// Absorption coefficient of the inside per scene unit and channel, at least 0; 0 is clear.
+        absorption: Vec3,
+    },
+    /// A thin clear sheet: light goes straight through or is reflected.
+    ThinDielectric {
+        /// Index of refraction of the sheet.
+        ior: f32,
+        /// Tint of the transmitted light.
+        transmittance: ColorInput,
+    },
+    /// Plastic, varnish, glaze: a clear coat over a diffuse base, the light between the two counted.
+    CoatedDiffuse {
+        /// Albedo of the base in [0, 1].
+        reflectance: ColorInput,
+        /// Index of refraction of the coat, at least 1.
+        ior: f32,
+        /// Roughness of the coat.
+        roughness: Roughness,
+        /// Whether repeated reflection inside the coat saturates the base's colour, as it does in reality.
+        saturates: bool,
+    },
+    /// Lacquered metal: a clear coat over a conductor.
+    CoatedConductor {
+        /// Real part of the metal's index, relative to air.
+        eta: Vec3,
+        /// Imaginary part.
+        k: Vec3,
+        /// Roughness of the metal.
+        roughness: Roughness,
+        /// Index of refraction of the coat, at least 1.
+        coat_ior: f32,
+        /// Roughness of the coat.
+        coat_roughness: Roughness,
+    },
+    /// The metal-roughness model of glTF 2.0.
+    MetalRoughness(MetalRoughness),
+    /// The modified Phong model. Where the albedos' sum exceeds 1, both are scaled down.
+    Phong {
+        /// Albedo of the base in [0, 1].
+        diffuse: ColorInput,
+        /// Albedo of the lobe in [0, 1].
+        specular: ColorInput,
+        /// Exponent of the lobe, at least 0.
+        exponent: ScalarInput,
+    },
+    /// Ward's anisotropic model. Where the albedos' sum exceeds 1, both are scaled down.
+    Ward {
+        /// Albedo of the base in [0, 1].
+        diffuse: ColorInput,
+        /// Albedo of the lobe in [0, 1].
+        specular: ColorInput,
+        /// Slope widths; the distribution is Gaussian whatever it says here.
+        roughness: Roughness,
+    },
+    /// The wave-optical model of He, Torrance, Sillion and Greenberg.
+    HeTorrance {
+        /// Real part of the index of refraction.
+        eta: Vec3,
+        /// Imaginary part; 0 for dielectrics.
+        k: Vec3,
+        /// Root mean square height of the relief in nanometres, at least 0.
+        height_nm: f32,
+        /// Autocorrelation length of the relief in nanometres, above 0.
+        correlation_nm: f32,
+        /// Albedo in [0, 1] of what leaves after scattering beneath the surface.
+        diffuse: ColorInput,
+    },
+    /// The sum of two, weighted. Normal map, emission and alpha are the whole material's.
+    Mix {
+        /// Seen where `amount` is 0.
+        first: Box<Surface>,
+        /// Seen where `amount` is 1.
+        second: Box<Surface>,
+        /// Share of the second in [0, 1].
+        amount: ScalarInput,
+    },
+}
+
+/// Parameters of glTF's metal-roughness model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MetalRoughness {
+    /// Base colour in [0, 1].
+    pub base_color: ColorInput,
+    /// 0 dielectric, 1 metal.
+    pub metallic: ScalarInput,
+    /// Perceptual roughness in [0, 1].
+    pub roughness: ScalarInput,
+    /// Index of refraction of the dielectric part; 1.5 unless told.
+    pub ior: f32,
+    /// Share of the dielectric part's light that goes through (thin), not into diffuse reflection.
+    pub transmission: ScalarInput,
+}
+
+impl Default for MetalRoughness {
+    /// White, dielectric, of roughness 0.5 and index 1.5.
+    fn default() -> Self {
+        Self {
+            base_color: ColorInput::constant(Vec3::ONE),
+            metallic: ScalarInput::constant(0.0),
+            roughness: ScalarInput::constant(0.5),
+            ior: 1.5,
+            transmission: ScalarInput::constant(0.0),
+        }
+    }
+}
+
+impl Surface {
+    /// Most components that nested mixes of one material may have together.
+    pub const MOST_COMPONENTS: usize = 8;
+
+    /// A clear, smooth dielectric boundary.
+    pub const fn clear_dielectric(ior: f32) -> Self {
+        Self::Dielectric {
+            ior,
+            roughness: Roughness::SMOOTH,
+            transmittance: ColorInput::constant(Vec3::ONE),
+            absorption: Vec3::ZERO,
+        }
+    }
+
+    /// Absorption per scene unit of an inside that leaves the colour `left`, above 0, of white light after `distance`.
+    pub fn absorption_of(left: Vec3, distance: f32) -> Vec3 {
+        Vec3::new(left.x.ln(), left.y.ln(), left.z.ln()) / -distance
+    }
+
+    /// A metal without tint.
+    pub const fn conductor(eta: Vec3, k: Vec3, roughness: Roughness) -> Self {
+        Self::Conductor { eta, k, tint: ColorInput::constant(Vec3::ONE), roughness }
+    }
+
+    /// What the volume behind the surface absorbs per scene unit; `None` where it bounds none.
+    pub fn interior_absorption(&self) -> Option<Vec3> {
+        match self {
+            Self::Dielectric { absorption, .. } => Some(*absorption),
+            Self::Mix { first, second, .. } => first.interior_absorption().or_else(|| second.interior_absorption()),
+            _ => None,
+        }
+    }
+
+    /// Models that are summed up: 1 unless it is a mix.
+    pub fn components(&self) -> usize {
+        match self {
+            Self::Mix { first, second, .. } => first.components() + second.components(),
+            _ => 1,
+        }
+    }
+
+    /// Whether it looks different when turned about its normal.
+    pub fn is_anisotropic(&self) -> bool {
+        match self {
+            Self::Conductor { roughness, .. }
+            | Self::Dielectric { roughness, .. }
+            | Self::Ward { roughness, .. }
+            | Self::CoatedDiffuse { roughness, .. } => roughness.v.is_some(),
+            Self::CoatedConductor { roughness, coat_roughness, .. } => {
+                roughness.v.is_some() || coat_roughness.v.is_some()
+            }
+            Self::Mix { first, second, .. } => first.is_anisotropic() || second.is_anisotropic(),
+            Self::Diffuse { .. }
+            | Self::OrenNayar { .. }
+            | Self::DiffuseTransmission { .. }
+            | Self::Mirror { .. }
+            | Self::ThinDielectric { .. }
+            | Self::Phong { .. }
+            | Self::HeTorrance { .. }
+            | Self::MetalRoughness(_) => false,
+        }
+    }
+
+    /// Every colour that the model reads.
+    pub fn colors(&self) -> Vec<&ColorInput> {
+        match self {
+            Self::Diffuse { reflectance }
+            | Self::OrenNayar { reflectance, .. }
+            | Self::Mirror { reflectance }
+            | Self::CoatedDiffuse { reflectance, .. } => vec![reflectance],
+            Self::DiffuseTransmission { reflectance, transmittance } => vec![reflectance, transmittance],
+            Self::Conductor { tint, .. } => vec![tint],
+            Self::Dielectric { transmittance, .. } | Self::ThinDielectric { transmittance, .. } => vec![transmittance],
+            Self::CoatedConductor { .. } => Vec::new(),
+            Self::Phong { diffuse, specular, .. } | Self::Ward { diffuse, specular, .. } => vec![diffuse, specular],
+            Self::HeTorrance { diffuse, .. } => vec![diffuse],
+            Self::MetalRoughness(model) => vec![&model.base_color],
+            Self::Mix { first, second, .. } => first.colors().into_iter().chain(second.colors()).collect(),
+        }
+    }
+
+    /// Every scalar that the model reads.
+    pub fn scalars(&self) -> Vec<&ScalarInput> {
+        match self {
+            Self::Diffuse { .. }
+            | Self::DiffuseTransmission { .. }
+            | Self::Mirror { .. }
+            | Self::ThinDielectric { .. } => Vec::new(),
+            Self::HeTorrance { .. } => Vec::new(),
+            Self::OrenNayar { roughness, .. } => vec![roughness],
+            Self::Phong { exponent, .. } => vec![exponent],
+            Self::Conductor { roughness, .. }
+            | Self::Dielectric { roughness, .. }
+            | Self::Ward { roughness, .. }
+            | Self::CoatedDiffuse { roughness, .. } => roughness.scalars().collect(),
+            Self::CoatedConductor { roughness, coat_roughness, .. } => {
+                roughness.scalars().chain(coat_roughness.scalars()).collect()
+            }
+            Self::MetalRoughness(model) => vec![&model.metallic, &model.roughness, &model.transmission],
+            Self::Mix { first, second, amount } => {
+                first.scalars().into_iter().chain(second.scalars()).chain([amount]).collect()
+            }
+        }
+    }
+}

@@ -1,0 +1,168 @@
+//! What lens and shutter do to a picture, measured as second moments of spots of light; crops; motion under lamps.
+
+use crate::support::{add_material, add_rectangle, add_sphere, diffuse, empty_scene, radiance_along, trace_settings};
+use fechner::film::Film;
+use fechner::geometry::Ray;
+use fechner::integrator::{BlockWork, Crop, PathTracer, SamplePlan, TraceSettings};
+use fechner::sampler::{Half, Sequence};
+use fechner::scene::{Motion, Scene};
+use glam::{Affine3A, Quat, Vec3, vec3a};
+use std::f32::consts::{FRAC_1_PI, PI};
+use std::sync::Arc;
+
+const SIZE: u32 = 64;
+
+/// All blocks up to a level of every pixel.
+fn film_of(scene: &Scene, settings: TraceSettings, levels: u8) -> Film {
+    let tracer = PathTracer::new(Arc::new(scene.clone()), settings);
+    let area = settings.film_area();
+    let blocks = (0..area.width * area.height)
+        .flat_map(|pixel| Half::BOTH.map(|half| (0..levels).map(move |level| BlockWork::whole(pixel, half, level))))
+        .flatten()
+        .collect();
+    let mut film = Film::new(area.width, area.height);
+    tracer.trace(&SamplePlan { blocks }, &mut film, &|_| {});
+    film
+}
+
+/// Mean and variance of the light's place along x and y, in pixels, without what the pixels' own width adds.
+struct Spot {
+    variance: [f64; 2],
+}
+
+fn spot_of(scene: &Scene) -> Spot {
+    let film = film_of(scene, trace_settings(SIZE, SIZE, 3), 5);
+    let estimate = film.estimate(1.0);
+    let (mut weight, mut sum, mut squares) = (0.0, [0.0; 2], [0.0; 2]);
+    for (i, rgb) in estimate.rgb_cd_m2.iter().enumerate() {
+        let value = f64::from(rgb[0]);
+        weight += value;
+        for (axis, place) in [i as u32 % SIZE, i as u32 / SIZE].into_iter().enumerate() {
+            sum[axis] += value * f64::from(place);
+            squares[axis] += value * f64::from(place) * f64::from(place);
+        }
+    }
+    let variance = std::array::from_fn(|axis| {
+        let mean = sum[axis] / weight;
+        squares[axis] / weight - mean * mean - 1.0 / 12.0
+    });
+    Spot { variance }
+}
+
+/// Pixels that a length at a distance from the camera of `empty_scene` (20°, at z = 5) takes.
+fn pixels(length: f64, distance: f64) -> f64 {
+    length / (2.0 * 10f64.to_radians().tan() * distance / f64::from(SIZE))
+}
+
+fn small_lamp(radius: f32, z: f32) -> Scene {
+    let mut scene = empty_scene();
+    let lamp = add_material(&mut scene, diffuse(0.0), Vec3::ONE);
+    add_sphere(&mut scene, Vec3::new(0.0, 0.0, z), radius, lamp);
+    scene
+}
+
+/// A lamp twice as far as the plane in focus is blurred into a disc of radius a·(1 − f/d) on that plane: variance r²/4
+/// along each axis, besides that of the lamp's own disc.
+#[test]
+fn a_lens_blurs_by_the_thin_lens_law() {
+    let (radius, distance, focus, aperture) = (0.08, 8.0, 4.0, 0.2);
+    let mut scene = small_lamp(radius as f32, 5.0 - distance as f32);
+    scene.camera.aperture_radius = aperture as f32;
+    scene.camera.focus_distance = focus as f32;
+    let Spot { variance } = spot_of(&scene);
+    let blur = pixels(aperture * (1.0 - focus / distance), focus);
+    let own = pixels(radius, distance);
+    for measured in variance {
+        let measured_blur = (4.0 * measured - own * own).sqrt();
+        assert!((measured_blur / blur - 1.0).abs() < 0.01, "blur of {measured_blur} px, expected {blur}");
+    }
+}
+
+/// Whatever moves evenly by a length leaves a streak of that length: variance L²/12 along it, besides its own.
+#[test]
+fn a_shutter_leaves_streaks_of_their_length() {
+    let motion = Motion::between(Affine3A::from_translation(Vec3::X * -0.4), Affine3A::from_translation(Vec3::X * 0.4));
+    let radius = 0.06;
+    let mut sphere = small_lamp(radius as f32, 0.0);
+    sphere.spheres[0].motion = Some(motion.clone());
+    let mut camera = small_lamp(radius as f32, 0.0);
+    camera.camera.motion = Some(motion.clone());
+    let mut mesh = empty_scene();
+    let lamp = add_material(&mut mesh, diffuse(0.0), Vec3::ONE);
+    add_rectangle(&mut mesh, Vec3::new(-0.05, -0.05, 0.0), Vec3::X * 0.1, Vec3::Y * 0.1, lamp);
+    mesh.instances[0].motion = Some(motion);
+    for (name, scene, own) in [
+        ("sphere", sphere, radius * radius / 4.0),
+        ("camera", camera, radius * radius / 4.0),
+        ("mesh", mesh, 0.01 / 12.0),
+    ] {
+        let Spot { variance: [along, across] } = spot_of(&scene);
+        let own = own * pixels(1.0, 5.0).powi(2);
+        let length = (12.0 * (along - own)).sqrt();
+        let expected = pixels(0.8, 5.0);
+        assert!((length / expected - 1.0).abs() < 0.01, "{name}: a streak of {length} px, expected {expected}");
+        assert!((across / own - 1.0).abs() < 0.05, "{name}: {across} across, expected {own}");
+    }
+}
+
+/// A floor under a lamp that moves and turns: at any time the light is that of the lamp where it is then.
+#[test]
+fn a_moving_lamp_lights_from_where_it_is() {
+    let (albedo, radius, radiance) = (0.6f32, 0.3f32, 4.0f32);
+    let motion = Motion::between(
+        Affine3A::from_translation(Vec3::new(-1.0, 1.0, 0.0)),
+        Affine3A::from_rotation_translation(Quat::from_rotation_x(2.0), Vec3::new(1.0, 2.0, 0.0)),
+    );
+    for as_mesh in [false, true] {
+        let mut scene = empty_scene();
+        let floor = add_material(&mut scene, diffuse(albedo), Vec3::ZERO);
+        add_rectangle(&mut scene, Vec3::new(-50.0, 0.0, -50.0), Vec3::Z * 100.0, Vec3::X * 100.0, floor);
+        let lamp = add_material(&mut scene, diffuse(0.0), Vec3::splat(radiance));
+        if as_mesh {
+            let ball = fechner::scene::load::shapes::sphere(Vec3::ZERO, radius);
+            scene.meshes.push(ball);
+            let mut instance = scene.instances[0].clone();
+            instance.mesh = fechner::scene::MeshId(1);
+            instance.material = lamp;
+            instance.motion = Some(motion.clone());
+            scene.instances.push(instance);
+        } else {
+            add_sphere(&mut scene, Vec3::ZERO, radius, lamp);
+            scene.spheres[0].motion = Some(motion.clone());
+        }
+        let settings = TraceSettings { max_depth: 1, ..trace_settings(16, 16, 0) };
+        let tracer = PathTracer::new(Arc::new(scene), settings);
+        for time in [0.0f32, 0.3, 0.9] {
+            let ray = Ray { time, ..Ray::new(vec3a(0.1, 0.2, 0.0), vec3a(-0.1, -0.2, 0.0).normalize()) };
+            let (mean, error) = radiance_along(&tracer, ray, 16, if as_mesh { 1024 } else { 4096 });
+            let center = Vec3::from(motion.at(time).translation);
+            let distance_squared = center.length_squared();
+            let irradiance = radiance * PI * radius * radius / distance_squared * (center.y / distance_squared.sqrt());
+            let expected = albedo * FRAC_1_PI * irradiance;
+            // The mesh is a polyhedron inside the sphere: 0.1 % less of it.
+            let tolerance = 3.3 * error.x + if as_mesh { 2e-3 } else { 1e-4 } * expected;
+            assert!((mean.x - expected).abs() < tolerance, "mesh {as_mesh}, time {time}: {mean} ± {error}, {expected}");
+            assert!(error.x < 0.01 * expected, "too noisy to test: {error}");
+        }
+    }
+}
+
+/// A crop's pixels are those of the whole picture, bit for bit, in every sequence.
+#[test]
+fn a_crop_is_a_part_of_the_whole() {
+    let mut scene = small_lamp(0.5, 0.0);
+    scene.camera.aperture_radius = 0.1;
+    let crop = Crop { x: 20, y: 11, width: 17, height: 23 };
+    for sequence in [Sequence::PerPixel, Sequence::ZOrder, Sequence::Independent] {
+        let settings = TraceSettings { sequence, ..trace_settings(SIZE, SIZE, 5) };
+        let whole = film_of(&scene, settings, 2);
+        let part = film_of(&scene, TraceSettings { crop: Some(crop), ..settings }, 2);
+        for half in Half::BOTH {
+            for (i, pixel) in part.half(half).iter().enumerate() {
+                let (x, y) = (crop.x + i as u32 % crop.width, crop.y + i as u32 / crop.width);
+                assert_eq!(pixel, &whole.half(half)[(y * SIZE + x) as usize], "{sequence:?} ({x}, {y})");
+            }
+        }
+        assert!(part.half(Half::A).iter().any(|pixel| pixel.mean[0] > 0.1), "the crop shows something");
+    }
+}

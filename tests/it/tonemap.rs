@@ -1,0 +1,108 @@
+//! `fechner tonemap`: sheets, sequences in time, HDR displays, and what it refuses.
+
+use assert_cmd::Command;
+use fechner::exr_read::read_exr;
+use fechner::output::{Attribute, NITS_PER_UNIT, Picture, write_exr};
+use std::path::Path;
+
+fn tonemap(folder: &Path, arguments: &[&str]) -> std::process::Output {
+    let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+    command.arg("tonemap").args(arguments).current_dir(folder).output().expect("runs")
+}
+
+fn run(folder: &Path, arguments: &[&str]) -> String {
+    let output = tonemap(folder, arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// A grey picture of 64×36 pixels, cd/m², with a step.
+fn write_step(folder: &Path, name: &str, dark: f32, bright: f32) {
+    let mut picture = Picture::new(64, 36);
+    for channel in ["R", "G", "B"] {
+        picture.push_f32(channel, (0..64 * 36).map(|i| if i % 64 < 32 { dark } else { bright }).collect::<Vec<_>>());
+    }
+    picture.push_attribute(NITS_PER_UNIT, Attribute::Float(1.0));
+    write_exr(&folder.join(name), &picture).expect("written");
+}
+
+fn mean_green(path: &Path) -> f32 {
+    let image = read_exr(path).expect("an EXR file");
+    let green = image.channel("G").expect("green");
+    green.iter().sum::<f32>() / green.len() as f32
+}
+
+#[test]
+fn all_operators_make_one_sheet() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write_step(folder.path(), "a.exr", 1.0, 1000.0);
+    run(folder.path(), &["a.exr", "-o", "all.png", "--operator", "all", "--adaptation", "local"]);
+    let sheet = image::open(folder.path().join("all.png")).expect("a picture");
+    assert!(sheet.width() > 4 * 64 && sheet.height() > 4 * 36);
+}
+
+#[test]
+fn a_sequence_is_blinded_and_recovers_and_can_be_continued() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for frame in 1..=4 {
+        write_step(folder.path(), &format!("in{frame}.exr"), 500.0, 2000.0);
+    }
+    let inputs = ["in1.exr", "in2.exr", "in3.exr", "in4.exr"];
+    let common = ["--operator", "ptyg", "--fps", "5"];
+    let whole = [&inputs[..], &common[..], &["-o", "whole.##.exr", "--adapted-to", "0.1"][..]].concat();
+    run(folder.path(), &whole);
+    let course: Vec<f32> =
+        (1..=4).map(|frame| mean_green(&folder.path().join(format!("whole.{frame:02}.exr")))).collect();
+    assert!(course[0] > 0.99 && course.windows(2).all(|pair| pair[1] < pair[0] + 1e-6), "{course:?}");
+    assert!(course[3] < 0.8, "{course:?}");
+
+    // The same in two parts by way of a file.
+    let start = r#"{"cones":{"neural_cd_m2":0.1,"pigment":1.0},"rods":{"neural_cd_m2":0.1,"pigment":0.3},
+        "goal":{"cones_cd_m2":0.1,"rods_cd_m2":0.1}}"#;
+    let part = |inputs: &[&str], name: &str, state: &str| {
+        let output = [inputs, &common[..], &["-o", name, "--state", state][..]].concat();
+        run(folder.path(), &output);
+    };
+    for state in ["once.json", "twice.json"] {
+        std::fs::write(folder.path().join(state), start).expect("written");
+    }
+    part(&inputs, "once.#.exr", "once.json");
+    part(&inputs[..2], "twice.#.exr", "twice.json");
+    part(&inputs[2..], "rest.#.exr", "twice.json");
+    let last = |name: &str| mean_green(&folder.path().join(name));
+    assert_eq!(last("once.4.exr").to_bits(), last("rest.2.exr").to_bits());
+}
+
+#[test]
+fn an_hdr_display_gets_sixteen_bits() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write_step(folder.path(), "a.exr", 1.0, 1000.0);
+    run(folder.path(), &["a.exr", "-o", "a.png", "--operator", "absolute", "--display", "hdr-1000"]);
+    let image = image::open(folder.path().join("a.png")).expect("a picture");
+    assert!(matches!(image, image::DynamicImage::ImageRgb16(_)));
+    // 1000 cd/m² is code 0.7518 of 65535.
+    let code = image.to_rgb16().get_pixel(60, 10).0[1];
+    assert!((49_200..=49_320).contains(&code), "{code}");
+}
+
+#[test]
+fn what_makes_no_sense_is_refused_in_one_line() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write_step(folder.path(), "a.exr", 1.0, 1000.0);
+    let refused = |arguments: &[&str], fragment: &str| {
+        let output = tonemap(folder.path(), arguments);
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+        assert!(message.contains(fragment) && !message.contains("panicked"), "{arguments:?}: {message}");
+    };
+    refused(&["a.exr", "-o", "b.png", "--operator", "darkroom"], "known: constant");
+    refused(&["a.exr", "a.exr", "-o", "b.png", "--operator", "ptyg"], "# for each digit");
+    refused(&["a.exr", "a.exr", "-o", "b.#.png", "--operator", "agx"], "does not know an eye that adapts");
+    refused(&["a.exr", "-o", "b.png", "--operator", "ptyg", "--gaze", "64,3"], "outside");
+    refused(&["a.exr", "-o", "b.exr", "--operator", "all"], "end the name in .png");
+    refused(
+        &["a.exr", "-o", "b.png", "--operator", "tr", "--adaptation", "local", "--adapted-to", "3"],
+        "no course in time",
+    );
+    assert!(!folder.path().join("b.png").exists());
+}
