@@ -15,6 +15,7 @@
 pub mod adaptive;
 pub mod benchmark;
 pub mod bsdf;
+pub mod checkpoint;
 pub mod exr_read;
 pub mod film;
 pub mod geometry;

@@ -10,6 +10,7 @@ use crate::film::{Film, HalfPixel, opponent};
 use crate::integrator::{BlockWork, PathTracer, SamplePlan};
 use crate::sampler::{Half, hash_words};
 use fechner_perception::{Plane, seen};
+use serde::{Deserialize, Serialize};
 
 /// Side of a tile, pixels. The noise of independent pixels, most of whose visible energy lies above 2 cycles a degree, is
 /// judged as well in small tiles, and there are more of them.
@@ -20,7 +21,7 @@ const STRATUM: usize = 50;
 const AUDIT_STREAM: u64 = 0x0041_5544_4954;
 
 /// What an audit found.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Audit {
     /// Tiles that were sampled again.
     pub tiles: usize,

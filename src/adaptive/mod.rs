@@ -6,21 +6,26 @@
 
 pub mod audit;
 pub mod judge;
+mod monitor;
 pub mod plan;
 pub mod rivals;
 pub mod settings;
+pub mod state;
 pub mod statistics;
+
+pub use monitor::{Directive, Monitor, Progress, Quiet};
 
 use crate::film::Film;
 use crate::integrator::{Crop, PathTracer, SamplePlan};
 use audit::{Audit, audit};
 use fechner_perception::Plane;
 use judge::{JudgeError, Judgement, judge};
-use plan::{adaptive_plan, cut_to_budget, doubling_of, pilot_plan, slices, uniform_plan, wanted_samples};
+use plan::{adaptive_plan, cut_to_budget, doubling_of, slices, uniform_plan, wanted_samples};
 use rivals::rival_plan;
 use settings::{LoopSettings, Sampling, ladder};
+use state::{Exposure, RenderState};
 use std::collections::VecDeque;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Share of pixels that may remain above the target when the loop stops.
 pub const TOLERATED_SHARE: f64 = 0.001;
@@ -50,42 +55,10 @@ pub enum StopReason {
     Plans,
     /// Another renderer's rule was satisfied.
     Rule,
-}
-
-/// How far a render is, told after each look.
-#[derive(Clone, Copy, Debug)]
-pub struct Progress {
-    /// Looks taken, from 1.
-    pub pass: u32,
-    /// Visibility that is being worked towards.
-    pub rung: f64,
-    /// Pixels of the picture.
-    pub pixels: f64,
-    /// Mean samples a pixel so far.
-    pub mean_samples: f64,
-    /// Share of pixels whose predicted visibility is above the final target.
-    pub visible_share: f64,
-    /// Samples of the plan that comes next.
-    pub next_samples: u64,
-    /// Rough count of samples that the target will take from here, if the noise behaves as it did.
-    pub remaining_samples: f64,
-}
-
-/// Is told how a render goes. Called from the render's own thread, except `samples_done`.
-pub trait Monitor: Sync {
-    /// After each look at the picture.
-    fn looked(&self, progress: &Progress);
-    /// While a plan is traced, from any thread.
-    fn samples_done(&self, samples: u64);
-}
-
-/// Tells nobody.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Quiet;
-
-impl Monitor for Quiet {
-    fn looked(&self, _: &Progress) {}
-    fn samples_done(&self, _: u64) {}
+    /// The monitor asked for it.
+    Interrupted,
+    /// It is the sum of several, and what was asked for is not reached.
+    Merged,
 }
 
 /// A finished render.
@@ -103,10 +76,26 @@ pub struct Rendered {
     pub audit: Option<Audit>,
     /// What audits multiplied the variance by.
     pub inflation: f64,
-    /// Time from the first sample to the end.
+    /// Time from the first sample to the end, less what a resumed render lay idle.
     pub seconds_total: f64,
     /// Of which in the perception model, planning and audits.
     pub seconds_perception: f64,
+}
+
+impl Rendered {
+    /// A state's end and the last look at it.
+    pub fn new(state: RenderState, judgement: Judgement, stop_reason: StopReason) -> Self {
+        Self {
+            film: state.film,
+            judgement,
+            stop_reason,
+            plans: state.plans,
+            audit: state.audit,
+            inflation: state.inflation,
+            seconds_total: state.seconds_total,
+            seconds_perception: state.seconds_perception,
+        }
+    }
 }
 
 /// What to do after a look.
@@ -116,15 +105,14 @@ enum Step {
     Stop(StopReason),
 }
 
-/// A render under way: all that decides what comes next.
+/// A render under way.
 struct Loop<'a> {
     tracer: &'a PathTracer,
     settings: &'a LoopSettings,
-    film: Film,
     rungs: VecDeque<f64>,
-    inflation: f64,
-    audit: Option<Audit>,
-    audits: u32,
+    state: RenderState,
+    resumed_at: Instant,
+    seconds_before: f64,
 }
 
 /// Renders until a limit is reached.
@@ -132,99 +120,128 @@ struct Loop<'a> {
 /// # Errors
 /// Only if the perception model refuses the picture, which would be a defect of ours.
 pub fn render(tracer: &PathTracer, settings: &LoopSettings, monitor: &dyn Monitor) -> Result<Rendered, JudgeError> {
-    let started = Instant::now();
     let Crop { width, height, .. } = tracer.settings().film_area();
-    let mut state = Loop {
-        tracer,
-        settings,
-        film: Film::new(width, height),
-        rungs: VecDeque::from(ladder(settings.limits.visibility)),
-        inflation: 1.0,
-        audit: None,
-        audits: 0,
-    };
-    let mut seconds_perception = 0.0;
-    let (mut plans, mut pass) = (0, 0);
-    let most = settings.limits.max_samples.min(settings.limits.mean_samples.unwrap_or(u32::MAX));
-    let mut pending = VecDeque::from([pilot_plan(width * height, most)]);
+    resume(tracer, settings, RenderState::new(width, height, &settings.limits), monitor)
+}
+
+/// Goes on with a render of the same scene, size and seed until a limit is reached. Limits count from the first start.
+///
+/// # Errors
+/// Only if the perception model refuses the picture, which would be a defect of ours.
+pub fn resume(
+    tracer: &PathTracer,
+    settings: &LoopSettings,
+    state: RenderState,
+    monitor: &dyn Monitor,
+) -> Result<Rendered, JudgeError> {
+    let mut render = Loop::new(tracer, settings, state);
     let mut last_look: Option<Judgement> = None;
-    let mut judged_samples = 0;
     loop {
-        let mut out_of_limit = None;
-        while let Some(plan) = pending.pop_front() {
-            tracer.trace(&plan, &mut state.film, &|samples| monitor.samples_done(samples));
-            plans += 1;
-            let next = pending.front().map_or(0, SamplePlan::samples);
-            let expected = started.elapsed().mul_f64(next as f64 / state.film.total_samples().max(1) as f64);
-            out_of_limit = limit_reached(settings, started.elapsed() + expected / 2, plans);
-            if out_of_limit.is_some() {
-                break;
-            }
-        }
+        let ended = render.trace_pending(monitor);
         let look = Instant::now();
-        // Rules that do not see need no look at each of their many small steps.
-        let is_blind = matches!(settings.sampling, Sampling::Rival(_)) && out_of_limit.is_none();
-        let judgement = match last_look.take() {
-            Some(earlier) if is_blind && state.film.total_samples() < 2 * judged_samples => earlier,
-            _ => {
-                judged_samples = state.film.total_samples();
-                judge(&state.film, settings, state.inflation)?
-            }
+        let mut judgement = match last_look.take() {
+            Some(earlier) if ended.is_none() && render.exposure_holds() => earlier,
+            _ => judge(&render.state.film, settings, render.state.inflation)?,
         };
-        let step = match out_of_limit {
+        let step = match ended {
             Some(reason) => Step::Stop(reason),
-            None => state.next_step(&judgement)?,
+            None => render.next_step(&mut judgement)?,
         };
-        seconds_perception += look.elapsed().as_secs_f64();
-        pass += 1;
-        monitor.looked(&progress(pass, &state, &judgement, &step));
+        render.state.seconds_perception += look.elapsed().as_secs_f64();
+        render.state.passes += 1;
+        monitor.looked(&progress(&render, &judgement, &step));
         match step {
             Step::Trace(plan) => {
-                pending.extend(slices(plan, width, state.film.total_samples()));
+                let film = &render.state.film;
+                render.state.pending.extend(slices(plan, film.width(), film.total_samples()));
                 last_look = Some(judgement);
             }
-            Step::Stop(stop_reason) => {
-                let fresh = judged_samples == state.film.total_samples();
-                return Ok(Rendered {
-                    judgement: if fresh { judgement } else { judge(&state.film, settings, state.inflation)? },
-                    film: state.film,
-                    stop_reason,
-                    plans,
-                    audit: state.audit,
-                    inflation: state.inflation,
-                    seconds_total: started.elapsed().as_secs_f64(),
-                    seconds_perception,
-                });
-            }
+            Step::Stop(reason) => return render.finish(judgement, reason, monitor),
         }
     }
 }
 
-/// Limits that do not depend on the picture. `elapsed` is the time at the middle of the plan that would come next: a
-/// render ends at the boundary between plans that is nearest to its limit.
-fn limit_reached(settings: &LoopSettings, elapsed: Duration, plans: u32) -> Option<StopReason> {
-    if settings.limits.time.is_some_and(|limit| elapsed >= limit) {
-        Some(StopReason::Time)
-    } else if settings.limits.plans.is_some_and(|limit| plans >= limit) {
-        Some(StopReason::Plans)
-    } else {
-        None
+impl<'a> Loop<'a> {
+    fn new(tracer: &'a PathTracer, settings: &'a LoopSettings, state: RenderState) -> Self {
+        let is_left = |&rung: &f64| state.finished_rung.is_none_or(|finished| rung < finished);
+        let rungs = ladder(settings.limits.visibility).into_iter().filter(is_left).collect();
+        let seconds_before = state.seconds_total;
+        Self { tracer, settings, rungs, state, resumed_at: Instant::now(), seconds_before }
     }
-}
 
-impl Loop<'_> {
-    /// Decides what comes next, leaving rungs of the ladder that are reached.
-    fn next_step(&mut self, judgement: &Judgement) -> Result<Step, JudgeError> {
+    /// Traces what is planned, and says why the render ends if it does. A plan that was begun is finished first, unless
+    /// the monitor stops it.
+    fn trace_pending(&mut self, monitor: &dyn Monitor) -> Option<StopReason> {
+        loop {
+            if self.state.traced_blocks == 0
+                && let Some(reason) = self.limit_reached()
+            {
+                return Some(reason);
+            }
+            let blocks = &self.state.pending.front()?.blocks;
+            while let rest @ [_, ..] = &blocks[self.state.traced_blocks..] {
+                let progress = |samples| monitor.samples_done(samples);
+                self.state.traced_blocks += self.tracer.trace_batch(rest, &mut self.state.film, &progress);
+                self.state.seconds_total = self.seconds_before + self.resumed_at.elapsed().as_secs_f64();
+                if monitor.between_batches(&self.state) == Directive::Stop {
+                    return Some(StopReason::Interrupted);
+                }
+            }
+            self.state.pending.pop_front();
+            self.state.traced_blocks = 0;
+            self.state.plans += 1;
+        }
+    }
+
+    /// Limits that do not depend on the picture: a render ends at the boundary between plans that is nearest to its limit
+    /// of time. The pilot is always traced.
+    fn limit_reached(&self) -> Option<StopReason> {
+        let RenderState { film, pending, plans, .. } = &self.state;
+        if *plans == 0 {
+            return None;
+        }
+        let traced = film.total_samples().max(1);
+        let elapsed = self.seconds_before + self.resumed_at.elapsed().as_secs_f64();
+        let next = pending.front().map_or(0, SamplePlan::samples);
+        let middle_of_next = elapsed * (1.0 + 0.5 * next as f64 / traced as f64);
         let limits = &self.settings.limits;
-        let pixels = u64::from(self.film.width()) * u64::from(self.film.height());
+        if limits.time.is_some_and(|limit| middle_of_next >= limit.as_secs_f64()) {
+            Some(StopReason::Time)
+        } else if limits.plans.is_some_and(|limit| *plans >= limit) {
+            Some(StopReason::Plans)
+        } else {
+            None
+        }
+    }
+
+    /// Tells the last state, and looks once more where the rule did not need to.
+    fn finish(
+        mut self,
+        judgement: Judgement,
+        reason: StopReason,
+        monitor: &dyn Monitor,
+    ) -> Result<Rendered, JudgeError> {
+        let judgement = match self.settings.sampling {
+            Sampling::Rival(_) => judge(&self.state.film, self.settings, self.state.inflation)?,
+            Sampling::Adaptive | Sampling::Uniform => judgement,
+        };
+        self.state.seconds_total = self.seconds_before + self.resumed_at.elapsed().as_secs_f64();
+        monitor.ended(&self.state);
+        Ok(Rendered::new(self.state, judgement, reason))
+    }
+
+    /// Decides what comes next, leaving rungs of the ladder that are reached. An audit may make `judgement` stricter.
+    fn next_step(&mut self, judgement: &mut Judgement) -> Result<Step, JudgeError> {
+        let limits = &self.settings.limits;
+        let pixels = u64::from(self.state.film.width()) * u64::from(self.state.film.height());
         let budget = limits.mean_samples.map(|mean| u64::from(mean) * pixels);
-        let left = budget.map_or(u64::MAX, |b| b.saturating_sub(self.film.total_samples()));
+        let left = budget.map_or(u64::MAX, |b| b.saturating_sub(self.state.film.total_samples()));
         if left == 0 {
             return Ok(Step::Stop(StopReason::Samples));
         }
         if let Sampling::Rival(rule) = self.settings.sampling {
-            let exposure = scene_unit_over_white(judgement, self.settings);
-            let plan = rival_plan(rule, &self.film, exposure, limits.mean_samples, limits.max_samples);
+            let exposure = self.exposure(judgement);
+            let plan = rival_plan(rule, &self.state.film, exposure, limits.mean_samples, limits.max_samples);
             return Ok(if plan.blocks.is_empty() { Step::Stop(StopReason::Rule) } else { Step::Trace(plan) });
         }
         while let Some(&rung) = self.rungs.front() {
@@ -235,6 +252,9 @@ impl Loop<'_> {
                 }
             }
             self.rungs.pop_front();
+            if is_reached(judgement, rung) {
+                self.state.finished_rung = Some(rung);
+            }
         }
         Ok(Step::Stop(if is_reached(judgement, limits.visibility) {
             StopReason::Visibility
@@ -246,29 +266,29 @@ impl Loop<'_> {
     }
 
     /// More samples for a rung; `None` when it is reached or no pixel may have more.
-    fn plan_towards(&mut self, rung: f64, judgement: &Judgement) -> Result<Option<SamplePlan>, JudgeError> {
+    fn plan_towards(&mut self, rung: f64, judgement: &mut Judgement) -> Result<Option<SamplePlan>, JudgeError> {
         let max_samples = self.settings.limits.max_samples;
         let doubled = {
             let most = self.settings.limits.mean_samples.unwrap_or(max_samples).min(max_samples);
-            let pixels = u64::from(self.film.width()) * u64::from(self.film.height());
-            (2 * (self.film.total_samples() / pixels).max(8) as u32).min(most)
+            let pixels = u64::from(self.state.film.width()) * u64::from(self.state.film.height());
+            (2 * (self.state.film.total_samples() / pixels).max(8) as u32).min(most)
         };
         let some = |plan: SamplePlan| if plan.blocks.is_empty() { None } else { Some(plan) };
         if self.settings.sampling == Sampling::Uniform {
-            return Ok(if is_reached(judgement, rung) { None } else { some(uniform_plan(&self.film, doubled)) });
+            return Ok(if is_reached(judgement, rung) { None } else { some(uniform_plan(&self.state.film, doubled)) });
         }
         if !is_reached(judgement, rung) {
             let wanted = wanted_samples(judgement, self.settings.allocation, rung, max_samples)?;
-            if predicted_saving(&self.film, judgement, &wanted, rung) < LEAST_SAVING {
-                return Ok(some(uniform_plan(&self.film, doubled)));
+            if predicted_saving(&self.state.film, judgement, &wanted, rung) < LEAST_SAVING {
+                return Ok(some(uniform_plan(&self.state.film, doubled)));
             }
-            let plan = adaptive_plan(&self.film, judgement, &wanted, max_samples);
+            let plan = adaptive_plan(&self.state.film, judgement, &wanted, max_samples);
             if !plan.blocks.is_empty() {
                 return Ok(Some(plan));
             }
             // Each pixel by itself has what it needs, yet its surroundings show.
             let predicted = judgement.predicted.values();
-            return Ok(some(doubling_of(&self.film, max_samples, |i| f64::from(predicted[i]) > rung)));
+            return Ok(some(doubling_of(&self.state.film, max_samples, |i| f64::from(predicted[i]) > rung)));
         }
         if let Some(plan) = some(self.peaks(rung, judgement)) {
             return Ok(Some(plan));
@@ -280,23 +300,39 @@ impl Loop<'_> {
     fn peaks(&self, rung: f64, judgement: &Judgement) -> SamplePlan {
         let amplitude = judgement.measured_error(self.settings).amplitude;
         let limit = TOLERATED_PEAK * rung;
-        doubling_of(&self.film, self.settings.limits.max_samples, |i| f64::from(amplitude.values()[i]) > limit)
+        doubling_of(&self.state.film, self.settings.limits.max_samples, |i| f64::from(amplitude.values()[i]) > limit)
     }
 
     /// Audits a rung that is reached. Where the variance proves too low it is raised from here on, and the plan for it is
     /// returned.
-    fn audited(&mut self, rung: f64, judgement: &Judgement) -> Result<Option<SamplePlan>, JudgeError> {
+    fn audited(&mut self, rung: f64, judgement: &mut Judgement) -> Result<Option<SamplePlan>, JudgeError> {
         let may_audit = rung <= HIGHEST_AUDITED_RUNG && judgement.pixel_thresholds.is_none();
-        if !may_audit || self.inflation >= MOST_INFLATION {
+        if !may_audit || self.state.inflation >= MOST_INFLATION {
             return Ok(None);
         }
-        let found = audit(self.tracer, &self.film, judgement, self.settings, self.audits);
-        self.audits += 1;
-        self.audit = found.or(self.audit);
+        let found = audit(self.tracer, &self.state.film, judgement, self.settings, self.state.audits);
+        self.state.audits += 1;
+        self.state.audit = found.or(self.state.audit);
         let Some(found) = found.filter(Audit::disagrees) else { return Ok(None) };
-        self.inflation = (self.inflation * found.ratio).min(MOST_INFLATION);
-        let stricter = judge(&self.film, self.settings, self.inflation)?;
-        self.plan_towards(rung, &stricter)
+        self.state.inflation = (self.state.inflation * found.ratio).min(MOST_INFLATION);
+        *judgement = judge(&self.state.film, self.settings, self.state.inflation)?;
+        self.plan_towards(rung, judgement)
+    }
+
+    /// The exposure that rules without sight are told: measured anew at each doubling of the samples.
+    fn exposure(&mut self, judgement: &Judgement) -> f64 {
+        if !self.exposure_holds() {
+            let samples = self.state.film.total_samples();
+            let scene_unit_over_white = scene_unit_over_white(judgement, self.settings);
+            self.state.exposure = Some(Exposure { samples, scene_unit_over_white });
+        }
+        self.state.exposure.map_or(1.0, |exposure| exposure.scene_unit_over_white)
+    }
+
+    /// Whether a rule that does not see needs no look now, as after most of its many small steps.
+    fn exposure_holds(&self) -> bool {
+        let samples = self.state.film.total_samples();
+        self.state.exposure.is_some_and(|exposure| samples < 2 * exposure.samples)
     }
 }
 
@@ -307,7 +343,7 @@ fn scene_unit_over_white(judgement: &Judgement, settings: &LoopSettings) -> f64 
 }
 
 /// Whether a rung's stop is met: the tolerated share of pixels is below it, and no patch is far above.
-fn is_reached(judgement: &Judgement, rung: f64) -> bool {
+pub fn is_reached(judgement: &Judgement, rung: f64) -> bool {
     let worst = judgement.predicted.values().iter().fold(0.0, |a: f32, &v| a.max(v));
     visible_share(judgement, rung) <= TOLERATED_SHARE && f64::from(worst) <= TOLERATED_PATCH * rung
 }
@@ -329,8 +365,8 @@ pub fn visible_share(judgement: &Judgement, visibility: f64) -> f64 {
     values.iter().filter(|&&v| f64::from(v) > visibility).count() as f64 / values.len() as f64
 }
 
-fn progress(pass: u32, state: &Loop<'_>, judgement: &Judgement, step: &Step) -> Progress {
-    let Loop { film, settings, rungs, .. } = state;
+fn progress(render: &Loop<'_>, judgement: &Judgement, step: &Step) -> Progress {
+    let Loop { state: RenderState { film, passes, .. }, settings, rungs, .. } = render;
     let pixels = f64::from(film.width()) * f64::from(film.height());
     let target = settings.limits.visibility;
     let by_budget = settings
@@ -345,7 +381,8 @@ fn progress(pass: u32, state: &Loop<'_>, judgement: &Judgement, step: &Step) -> 
         .sum();
     let remaining = by_budget.min(by_visibility);
     Progress {
-        pass,
+        pass: *passes,
+        seconds: render.seconds_before + render.resumed_at.elapsed().as_secs_f64(),
         rung: rungs.front().copied().unwrap_or(target),
         pixels,
         mean_samples: film.total_samples() as f64 / pixels,

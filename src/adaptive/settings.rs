@@ -3,10 +3,11 @@
 use fechner_perception::display::Viewing;
 use fechner_perception::model::ThresholdModel;
 use fechner_perception::tone::ToneOperator;
+use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
 /// How samples are spread.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Sampling {
     /// Where the remaining error can be seen.
     Adaptive,
@@ -17,7 +18,7 @@ pub enum Sampling {
 }
 
 /// Stop rules and budgets of today's renderers (see [`super::rivals`]).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum RivalRule {
     /// Difference of two estimates over the square root of brightness, dilated, as Cycles does it.
     Relative {
@@ -34,7 +35,7 @@ pub enum RivalRule {
 }
 
 /// How the adaptive mode finds a pixel's count.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum AllocationRule {
     /// The cheapest counts that keep the pooled visibility everywhere: a convex problem.
     #[default]

@@ -3,11 +3,10 @@
 use fechner::adaptive::{Monitor, Progress};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 pub(super) struct Console {
     bar: Option<ProgressBar>,
-    started: Instant,
     time_limit: Option<Duration>,
 }
 
@@ -21,7 +20,7 @@ impl Console {
             bar.enable_steady_tick(Duration::from_millis(200));
             bar
         });
-        Self { bar, started: Instant::now(), time_limit }
+        Self { bar, time_limit }
     }
 
     /// Removes the bar.
@@ -33,7 +32,7 @@ impl Console {
 
     /// Time left in words, from the rate so far.
     fn time_left(&self, progress: &Progress, pixels: f64) -> String {
-        let elapsed = self.started.elapsed().as_secs_f64();
+        let elapsed = progress.seconds;
         let rate = progress.mean_samples * pixels / elapsed.max(1e-3);
         let by_samples = progress.remaining_samples / rate;
         let by_limit = self.time_limit.map_or(f64::INFINITY, |limit| (limit.as_secs_f64() - elapsed).max(0.0));

@@ -1,9 +1,13 @@
-//! `fechner info FILE`: what a picture file holds.
+//! `fechner info FILE`: what a picture or a film holds.
+
+mod film;
 
 use anyhow::{Context, bail};
+use fechner::checkpoint::{is_checkpoint, read_checkpoint};
 use fechner::exr_read::{ExrImage, read_exr};
 use image::ImageDecoder;
 use std::fmt::Write as _;
+use std::io::Read as _;
 use std::path::Path;
 
 /// Prints what is in a picture file: size, channels with their range, attributes, colour tags.
@@ -14,13 +18,26 @@ pub(crate) fn run(path: &Path) -> anyhow::Result<()> {
 
 /// The text that [`run`] prints.
 fn describe(path: &Path) -> anyhow::Result<String> {
+    if is_film(path)? {
+        return Ok(film::describe(&read_checkpoint(path)?));
+    }
     let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
     match ending.as_deref() {
         Some("exr") => Ok(describe_exr(&read_exr(path)?)),
         Some("png") => describe_png(path),
         Some("hdr") => describe_hdr(path),
-        _ => bail!("cannot tell what {} is: .exr, .png and .hdr files are known", path.display()),
+        _ => bail!("cannot tell what {} is: .exr, .png and .hdr files and films are known", path.display()),
     }
+}
+
+/// A film's file may have any name.
+fn is_film(path: &Path) -> anyhow::Result<bool> {
+    let cannot_read = || format!("cannot read {}", path.display());
+    let mut start = Vec::new();
+    if path.metadata().with_context(cannot_read)?.is_file() {
+        std::fs::File::open(path).and_then(|file| file.take(16).read_to_end(&mut start)).with_context(cannot_read)?;
+    }
+    Ok(is_checkpoint(&start))
 }
 
 /// The range of the finite values among `values`.
@@ -220,7 +237,8 @@ mod tests {
     fn what_cannot_be_described_is_named() {
         let folder = tempfile::tempdir().unwrap();
         let message = |name: &str| format!("{:#}", describe(&folder.path().join(name)).unwrap_err());
-        assert!(message("a.txt").contains(".exr, .png and .hdr files are known"));
+        std::fs::write(folder.path().join("a.txt"), "words").unwrap();
+        assert!(message("a.txt").contains(".exr, .png and .hdr files and films are known"));
         for name in ["a.png", "a.hdr", "a.exr"] {
             assert!(message(name).contains(name), "{}", message(name));
             std::fs::write(folder.path().join(name), "rubbish").unwrap();

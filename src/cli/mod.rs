@@ -5,6 +5,8 @@ mod channels;
 mod compare;
 mod console;
 mod info;
+mod keeper;
+mod merge;
 mod picture;
 mod render;
 mod report;
@@ -37,9 +39,11 @@ enum Command {
     Tonemap(tonemap::TonemapArguments),
     /// Map how much noise may stay in a picture of any renderer before it is seen.
     Threshold(threshold::ThresholdArguments),
-    /// Say what is in a picture file.
+    /// Add up renders of different seeds that were kept by --checkpoint, or make a picture of a single one.
+    Merge(merge::MergeArguments),
+    /// Say what is in a picture's or film's file.
     Info {
-        /// EXR, PNG or HDR file.
+        /// EXR, PNG or HDR file, or a film kept by render --checkpoint.
         file: PathBuf,
     },
 }
@@ -52,6 +56,7 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
         Command::Compare(arguments) => return compare::run(&arguments),
         Command::Tonemap(arguments) => tonemap::run(&arguments)?,
         Command::Threshold(arguments) => threshold::run(&arguments)?,
+        Command::Merge(arguments) => merge::run(&arguments)?,
         Command::Info { file } => info::run(&file)?,
     }
     Ok(ExitCode::SUCCESS)

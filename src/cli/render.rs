@@ -1,21 +1,22 @@
 //! `fechner render`: a scene file in, a picture out.
 
 use super::console::Console;
+use super::keeper::{CheckpointArguments, Keeper, Watch};
 use super::report::{Report, summary};
 use super::seeing::{self, parse_positive};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use fechner::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, RivalRule, Sampling};
+use fechner::adaptive::state::RenderState;
 use fechner::adaptive::{self, Rendered};
+use fechner::checkpoint::{Header, Origin, Seeds, SettingsRecord};
 use fechner::integrator::{Crop, DEFAULT_MAX_DEPTH, PathTracer, TraceSettings};
 use fechner::output;
 use fechner::output::rendered::Background;
 use fechner::sampler::{PixelFilter, Sequence};
 use fechner::scene::{Scene, load};
-use fechner_perception::model::{self, ThresholdModel};
-use fechner_perception::tone;
 use std::io::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -115,6 +116,8 @@ pub(super) struct RenderArguments {
     /// Write figures of the render here.
     #[arg(long, value_name = "FILE", help_heading = "Running")]
     json: Option<PathBuf>,
+    #[command(flatten)]
+    checkpoint: CheckpointArguments,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -225,6 +228,7 @@ pub(super) fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     if let Some(json) = &arguments.json {
         output::check_writable(json)?;
     }
+    arguments.checkpoint.check()?;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(arguments.threads.unwrap_or(0) as usize)
         .thread_name(|i| format!("render-{i}"))
@@ -246,8 +250,74 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     }
     let size = arguments.size.unwrap_or(Size { width: scene.film.width, height: scene.film.height });
     check_memory(size)?;
-    let settings = loop_settings(arguments, &scene)?;
-    let trace = TraceSettings {
+    let trace = trace_settings(arguments, size)?;
+    let record = settings_record(arguments, &scene)?;
+    let settings = record.loop_settings(limits(arguments, &scene, record.sampling))?;
+    if trace.filter.is_signed() && settings.sampling != Sampling::Uniform {
+        bail!(
+            "--filter mitchell has negative lobes, whose scatter is not the picture's noise: adaptive sampling cannot \
+             judge it; use --sampling uniform, or the filter blackman-harris"
+        );
+    }
+    let Crop { width, height, .. } = trace.film_area();
+    let fresh = RenderState::new(width, height, &settings.limits);
+    let (state, seeds, keeper) = if arguments.checkpoint.is_wanted() {
+        let origin = Origin::of(&scene, &trace);
+        let seeds = Seeds::one(arguments.seed);
+        let header = Header { origin, seeds, settings: record, visibility: settings.limits.visibility };
+        let start = arguments.checkpoint.start(header, fresh, &settings.limits)?;
+        (start.state, start.header.seeds.all.clone(), Some(Keeper::new(&arguments.checkpoint, start.header)))
+    } else {
+        (fresh, vec![arguments.seed], None)
+    };
+    let scene = Arc::new(scene);
+    let tracer = PathTracer::new(Arc::clone(&scene), trace);
+    let degenerate = tracer.world().degenerate_triangles();
+    if degenerate > 0 {
+        eprintln!("note: {degenerate} triangles without area were left out");
+    }
+    let watch = Watch::new(Console::new(settings.limits.time), keeper)?;
+    let rendered = adaptive::resume(&tracer, &settings, state, &watch)?;
+    watch.finish();
+    let report = Report::new(&arguments.scene.display().to_string(), &seeds, &settings, &rendered);
+    let background = if arguments.transparent { Background::Transparent } else { Background::Shown };
+    write_picture(&arguments.output, format, background, &rendered, &settings, &report)?;
+    write_json(arguments.json.as_deref(), &report)?;
+    eprintln!("{}", summary(&report, &settings, &rendered));
+    watch.report()
+}
+
+/// Writes the picture in the format that its name asks for.
+pub(super) fn write_picture(
+    path: &Path,
+    format: output::Format,
+    background: Background,
+    rendered: &Rendered,
+    settings: &LoopSettings,
+    report: &Report,
+) -> anyhow::Result<()> {
+    match format {
+        output::Format::Png => {
+            output::rendered::write_display_png(path, rendered, &settings.viewing.display, background)?;
+        }
+        output::Format::Exr => {
+            let attributes = report.attributes();
+            output::rendered::write_layers_exr(path, rendered, settings.nits_per_unit, background, &attributes)?;
+        }
+    }
+    Ok(())
+}
+
+/// Writes the figures where they are asked for.
+pub(super) fn write_json(path: Option<&Path>, report: &Report) -> anyhow::Result<()> {
+    let Some(path) = path else { return Ok(()) };
+    let text = serde_json::to_string_pretty(report).context("the report could not be put into words")?;
+    output::write_beside(path, |file| file.write_all(text.as_bytes()))?;
+    Ok(())
+}
+
+fn trace_settings(arguments: &RenderArguments, size: Size) -> anyhow::Result<TraceSettings> {
+    Ok(TraceSettings {
         width: size.width,
         height: size.height,
         seed: arguments.seed,
@@ -265,67 +335,33 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
         },
         crop: arguments.crop.map(|crop| check_crop(crop, size)).transpose()?,
         transparent: arguments.transparent,
+    })
+}
+
+/// When to stop.
+fn limits(arguments: &RenderArguments, scene: &Scene, sampling: Sampling) -> Limits {
+    let asked = arguments.visibility.or(arguments.quality.map(Quality::visibility));
+    let visibility = match (asked, sampling) {
+        (Some(visibility), _) => visibility,
+        // A uniform render of so many samples or seconds is what was asked for, not an early end.
+        (None, Sampling::Uniform) if arguments.spp.is_some() || arguments.time.is_some() => 0.0,
+        (None, _) => scene.viewing.visibility.unwrap_or(1.0),
     };
-    if trace.filter.is_signed() && settings.sampling != Sampling::Uniform {
-        bail!(
-            "--filter mitchell has negative lobes, whose scatter is not the picture's noise: adaptive sampling cannot \
-             judge it; use --sampling uniform, or the filter blackman-harris"
-        );
+    Limits {
+        visibility,
+        time: arguments.time.map(Duration::from_secs_f64),
+        mean_samples: arguments.spp,
+        max_samples: arguments.max_spp.unwrap_or(DEFAULT_MAX_SAMPLES),
+        plans: arguments.plans,
     }
-    let scene = Arc::new(scene);
-    let tracer = PathTracer::new(Arc::clone(&scene), trace);
-    let degenerate = tracer.world().degenerate_triangles();
-    if degenerate > 0 {
-        eprintln!("note: {degenerate} triangles without area were left out");
-    }
-    let console = Console::new(settings.limits.time);
-    let rendered = adaptive::render(&tracer, &settings, &console)?;
-    console.finish();
-    let report = Report::new(&arguments.scene, &tracer, &settings, &rendered);
-    write(arguments, format, &rendered, &settings, &report)?;
-    eprintln!("{}", summary(&report, &settings, &rendered));
-    Ok(())
 }
 
-fn write(
-    arguments: &RenderArguments,
-    format: output::Format,
-    rendered: &Rendered,
-    settings: &LoopSettings,
-    report: &Report,
-) -> anyhow::Result<()> {
-    let background = if arguments.transparent { Background::Transparent } else { Background::Shown };
-    match format {
-        output::Format::Png => {
-            let display = &settings.viewing.display;
-            output::rendered::write_display_png(&arguments.output, rendered, display, background)?;
-        }
-        output::Format::Exr => {
-            output::rendered::write_layers_exr(
-                &arguments.output,
-                rendered,
-                settings.nits_per_unit,
-                background,
-                &report.attributes(),
-            )?;
-        }
-    }
-    if let Some(path) = &arguments.json {
-        let text = serde_json::to_string_pretty(report).context("the report could not be put into words")?;
-        output::write_beside(path, |file| file.write_all(text.as_bytes()))?;
-    }
-    Ok(())
-}
-
-/// Command line before scene before default.
-fn loop_settings(arguments: &RenderArguments, scene: &Scene) -> anyhow::Result<LoopSettings> {
+/// How to sample and for whom: command line before scene before default.
+fn settings_record(arguments: &RenderArguments, scene: &Scene) -> anyhow::Result<SettingsRecord> {
     let view = &scene.viewing;
     let display_name = arguments.display.as_deref().or(view.display.as_deref()).unwrap_or("desktop");
     let viewing = seeing::viewing(display_name, arguments.csf_area)?;
-    let operator_name = arguments.operator.as_deref().or(view.operator.as_deref()).unwrap_or("constant");
-    let operator = tone::operator(operator_name, arguments.exposure.or(view.exposure_stops)).with_context(|| {
-        format!("there is no tone operator \"{operator_name}\"; known: {}", tone::operator_names().join(", "))
-    })?;
+    let operator = arguments.operator.as_deref().or(view.operator.as_deref()).unwrap_or("constant");
     let threshold = arguments.noise_threshold;
     let sampling = match arguments.sampling {
         SamplingChoice::Adaptive => Sampling::Adaptive,
@@ -337,38 +373,18 @@ fn loop_settings(arguments: &RenderArguments, scene: &Scene) -> anyhow::Result<L
         }
         SamplingChoice::Budget => Sampling::Rival(RivalRule::Budget),
     };
-    let asked = arguments.visibility.or(arguments.quality.map(Quality::visibility));
-    let visibility = match (asked, sampling) {
-        (Some(visibility), _) => visibility,
-        // A uniform render of so many samples or seconds is what was asked for, not an early end.
-        (None, Sampling::Uniform) if arguments.spp.is_some() || arguments.time.is_some() => 0.0,
-        (None, _) => view.visibility.unwrap_or(1.0),
-    };
-    Ok(LoopSettings {
+    Ok(SettingsRecord {
         sampling,
         allocation: match arguments.allocation {
             AllocationChoice::Convex => AllocationRule::Convex,
             AllocationChoice::Local => AllocationRule::Local,
         },
-        model: threshold_model(&arguments.model)?,
-        limits: Limits {
-            visibility,
-            time: arguments.time.map(Duration::from_secs_f64),
-            mean_samples: arguments.spp,
-            max_samples: arguments.max_spp.unwrap_or(DEFAULT_MAX_SAMPLES),
-            plans: arguments.plans,
-        },
+        model: arguments.model.clone(),
         viewing,
         nits_per_unit: arguments.nits_per_unit.unwrap_or(scene.nits_per_unit),
-        operator,
+        operator: operator.to_owned(),
+        exposure_stops: arguments.exposure.or(view.exposure_stops),
     })
-}
-
-/// `None` for the default, which the loop itself pools over the eye's window.
-fn threshold_model(name: &str) -> anyhow::Result<Option<Box<dyn ThresholdModel>>> {
-    let found = model::by_name(name)
-        .with_context(|| format!("there is no threshold model \"{name}\"; known: {}", model::names().join(", ")))?;
-    Ok(Some(found).filter(|_| name != model::names()[0]))
 }
 
 /// Refuses a size whose film and maps would not fit into memory.

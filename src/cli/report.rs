@@ -4,12 +4,10 @@ use super::console::duration_in_words;
 use fechner::adaptive::settings::{LoopSettings, RivalRule, Sampling};
 use fechner::adaptive::statistics::find_outliers;
 use fechner::adaptive::{Rendered, StopReason, visible_share};
-use fechner::integrator::PathTracer;
 use fechner::output::Attribute;
 use fechner_perception::Plane;
 use fechner_perception::psychometric::detection_probability;
 use serde::Serialize;
-use std::path::Path;
 
 /// Where the picture is seen.
 #[derive(Clone, Debug, Serialize)]
@@ -31,7 +29,9 @@ pub(super) struct Report {
     scene: String,
     width: u32,
     height: u32,
+    /// The first of `seeds`.
     seed: u64,
+    seeds: Vec<u64>,
     sampling: &'static str,
     model: &'static str,
     csf: &'static str,
@@ -74,7 +74,8 @@ pub(super) struct Report {
 }
 
 impl Report {
-    pub(super) fn new(scene: &Path, tracer: &PathTracer, settings: &LoopSettings, rendered: &Rendered) -> Self {
+    /// `seeds`: all whose samples are in the film, at least one.
+    pub(super) fn new(scene: &str, seeds: &[u64], settings: &LoopSettings, rendered: &Rendered) -> Self {
         let film = &rendered.film;
         let pixels = u64::from(film.width()) * u64::from(film.height());
         let judgement = &rendered.judgement;
@@ -87,10 +88,11 @@ impl Report {
         let outliers = find_outliers(film);
         Self {
             fechner_version: env!("CARGO_PKG_VERSION"),
-            scene: scene.display().to_string(),
+            scene: scene.to_owned(),
             width: film.width(),
             height: film.height(),
-            seed: tracer.settings().seed,
+            seed: seeds[0],
+            seeds: seeds.to_vec(),
             sampling: match settings.sampling {
                 Sampling::Adaptive => "adaptive",
                 Sampling::Uniform => "uniform",
@@ -143,6 +145,8 @@ impl Report {
                 StopReason::MaxSamples => "max-spp",
                 StopReason::Plans => "plans",
                 StopReason::Rule => "rule",
+                StopReason::Interrupted => "interrupted",
+                StopReason::Merged => "merged",
             },
         }
     }
@@ -153,7 +157,7 @@ impl Report {
         let number = |x: f64| Attribute::Float(x as f32);
         let mut attributes = vec![
             ("fechner.scene", text(&self.scene)),
-            ("fechner.seed", text(&self.seed.to_string())),
+            ("fechner.seed", text(&self.seeds.iter().map(u64::to_string).collect::<Vec<_>>().join(", "))),
             ("fechner.sampling", text(self.sampling)),
             ("fechner.model", text(self.model)),
             ("fechner.csf", text(self.csf)),
@@ -191,6 +195,8 @@ pub(super) fn summary(report: &Report, settings: &LoopSettings, rendered: &Rende
         }
         StopReason::Plans => "Stopped after the plans asked for",
         StopReason::Rule => "Stopped because the rule asked for is satisfied",
+        StopReason::Interrupted => "Stopped by a signal",
+        StopReason::Merged => "Merged",
     };
     let target = report.visibility_target.map_or_else(
         || format!("{:.2} % of the picture is above visibility 1", 100.0 * report.fraction_visible),

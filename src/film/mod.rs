@@ -4,6 +4,7 @@
 //! bias the picture. 128 bytes a pixel.
 
 mod estimate;
+mod merge;
 
 pub use estimate::Estimate;
 
@@ -11,9 +12,10 @@ use crate::integrator::{BlockWork, PathSample};
 use crate::sampler::Half;
 use fechner_perception::opponent::OPPONENT_OF_RGB;
 use glam::Vec3;
+use serde::{Deserialize, Serialize};
 
 /// Statistics of one pixel in one half.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct HalfPixel {
     /// Mean linear RGB radiance in scene units.
     pub mean: [f64; 3],
@@ -130,7 +132,7 @@ impl HalfPixel {
 }
 
 /// Mean of what the first surfaces of a pixel are.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PixelGuide {
     /// Mean albedo.
     pub albedo: [f32; 3],
@@ -143,7 +145,7 @@ pub struct PixelGuide {
 }
 
 /// The film.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Film {
     width: u32,
     height: u32,

@@ -20,6 +20,7 @@ use crate::sampler::{BlockKey, Half, Pixel, PixelFilter, Purpose, Sequence};
 use crate::scene::Scene;
 use glam::Vec2;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use tables::SurfaceTables;
 
@@ -88,7 +89,7 @@ impl TraceSettings {
 pub const DEFAULT_MAX_DEPTH: u32 = 1_000;
 
 /// One block of samples to be taken.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BlockWork {
     /// Row-major index of the pixel on the film.
     pub pixel: u32,
@@ -126,7 +127,7 @@ fn log2_block(level: u8) -> u8 {
 }
 
 /// What to trace next. Plain data: deciding it and doing it are two things.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SamplePlan {
     /// Blocks by pixel, half and level.
     pub blocks: Vec<BlockWork>,
@@ -182,6 +183,13 @@ impl PathTracer {
         self.trace_into(plan, self.settings.seed, &mut |work, sum| film.merge_block(work, sum), progress);
     }
 
+    /// Takes the samples of the first blocks into the film, as many as make one batch, and says how many blocks that was:
+    /// at least one, unless there is none. Batches leave the caller a moment to look around; the film does not depend on
+    /// where they end.
+    pub fn trace_batch(&self, blocks: &[BlockWork], film: &mut Film, progress: &(dyn Fn(u64) + Sync)) -> usize {
+        self.batch_into(blocks, self.settings.seed, &mut |work, sum| film.merge_block(work, sum), progress)
+    }
+
     /// Hands the sums of a plan's blocks, sampled by `seed`, to `merge`: each block is summed by one thread, and blocks
     /// come in the plan's order.
     pub fn trace_into(
@@ -191,32 +199,54 @@ impl PathTracer {
         merge: &mut dyn FnMut(BlockWork, &BlockSum),
         progress: &(dyn Fn(u64) + Sync),
     ) {
-        // Batches bound the memory of unmerged blocks; chunks of near equal work keep both ends of a batch busy.
+        let mut blocks = plan.blocks.as_slice();
+        while !blocks.is_empty() {
+            blocks = &blocks[self.batch_into(blocks, seed, merge, progress)..];
+        }
+    }
+
+    /// Traces the first batch of `blocks`. Its bounds keep the memory of unmerged blocks and the time without a pause
+    /// small (about a second), and yet leave every thread so many chunks that few idle at its end.
+    fn batch_into(
+        &self,
+        blocks: &[BlockWork],
+        seed: u64,
+        merge: &mut dyn FnMut(BlockWork, &BlockSum),
+        progress: &(dyn Fn(u64) + Sync),
+    ) -> usize {
         const BLOCKS_PER_BATCH: usize = 1 << 16;
+        const CHUNKS_PER_THREAD: usize = 64;
+        const SAMPLES_PER_THREAD: u64 = 1 << 19;
         const SAMPLES_PER_CHUNK: u64 = 2_048;
-        for batch in plan.blocks.chunks(BLOCKS_PER_BATCH) {
-            let mut chunks = Vec::new();
-            let (mut start, mut samples) = (0, 0);
-            for (i, block) in batch.iter().enumerate() {
-                samples += u64::from(block.samples);
-                if samples >= SAMPLES_PER_CHUNK || i + 1 == batch.len() {
-                    chunks.push(&batch[start..=i]);
-                    (start, samples) = (i + 1, 0);
-                }
+        let threads = rayon::current_num_threads();
+        let mut chunks = Vec::new();
+        let (mut start, mut in_chunk, mut in_batch) = (0, 0, 0);
+        for (i, block) in blocks.iter().enumerate() {
+            in_chunk += u64::from(block.samples);
+            in_batch += u64::from(block.samples);
+            let is_full = i + 1 == blocks.len().min(BLOCKS_PER_BATCH)
+                || (in_batch >= SAMPLES_PER_THREAD * threads as u64 && chunks.len() + 1 >= CHUNKS_PER_THREAD * threads);
+            if in_chunk >= SAMPLES_PER_CHUNK || is_full {
+                chunks.push(&blocks[start..=i]);
+                (start, in_chunk) = (i + 1, 0);
             }
-            let sums: Vec<Vec<BlockSum>> = chunks
-                .par_iter()
-                .with_max_len(1)
-                .map(|chunk| {
-                    let sums = chunk.iter().map(|&block| self.trace_block(block, seed)).collect();
-                    progress(chunk.iter().map(|b| u64::from(b.samples)).sum());
-                    sums
-                })
-                .collect();
-            for (block, sum) in batch.iter().zip(sums.iter().flatten()) {
-                merge(*block, sum);
+            if is_full {
+                break;
             }
         }
+        let sums: Vec<Vec<BlockSum>> = chunks
+            .par_iter()
+            .with_max_len(1)
+            .map(|chunk| {
+                let sums = chunk.iter().map(|&block| self.trace_block(block, seed)).collect();
+                progress(chunk.iter().map(|b| u64::from(b.samples)).sum());
+                sums
+            })
+            .collect();
+        for (block, sum) in blocks.iter().zip(sums.iter().flatten()) {
+            merge(*block, sum);
+        }
+        start
     }
 
     /// Sums one block of one pixel.

@@ -1,6 +1,7 @@
 //! Files that are complete or not there: written beside the target under another name, flushed to the disk, renamed.
 
 use super::OutputError;
+use std::ffi::{OsStr, OsString};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
@@ -50,11 +51,9 @@ pub(super) fn create_beside(path: &Path) -> Result<(NamedTempFile, PathBuf), Out
         }
         Err(error) => return Err(io(error)),
     }
-    let mut prefix = std::ffi::OsString::from(".");
-    prefix.push(name);
-    prefix.push(".");
+    let prefix = part_prefix(name);
     let mut builder = tempfile::Builder::new();
-    builder.prefix(&prefix).suffix(".part");
+    builder.prefix(&prefix).suffix(PART_SUFFIX);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
@@ -65,6 +64,30 @@ pub(super) fn create_beside(path: &Path) -> Result<(NamedTempFile, PathBuf), Out
         // The error's own text names the temporary file, which the user never asked for.
         io(std::io::Error::new(error.kind(), format!("cannot make a file in {}: {}", folder.display(), plain(&error))))
     })
+}
+
+/// How the names of new files end until they are renamed.
+const PART_SUFFIX: &str = ".part";
+
+fn part_prefix(name: &OsStr) -> OsString {
+    [OsStr::new("."), name, OsStr::new(".")].into_iter().collect()
+}
+
+/// Removes new files beside `path` that a killed program could not complete. Call it only where no other program can be
+/// writing `path`.
+pub fn remove_leftovers(path: &Path) -> Result<(), OutputError> {
+    let io = |source| OutputError::Io { path: path.to_owned(), source };
+    let target = path.canonicalize().map_err(io)?;
+    let (Some(folder), Some(name)) = (target.parent(), target.file_name()) else { return Ok(()) };
+    let prefix = part_prefix(name);
+    for entry in folder.read_dir().map_err(io)? {
+        let found = entry.map_err(io)?.file_name();
+        let bytes = found.as_encoded_bytes();
+        if bytes.starts_with(prefix.as_encoded_bytes()) && bytes.ends_with(PART_SUFFIX.as_bytes()) {
+            std::fs::remove_file(folder.join(&found)).map_err(io)?;
+        }
+    }
+    Ok(())
 }
 
 /// The system's words without the path that `tempfile` adds.
@@ -100,6 +123,16 @@ mod tests {
         assert!(result.unwrap_err().to_string().ends_with("a.png: the disk is full"));
         assert_eq!(std::fs::read(&path).unwrap(), b"old");
         assert_eq!(names(folder.path()), ["a.png"]);
+    }
+
+    #[test]
+    fn leftovers_of_this_file_are_removed_and_of_no_other() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a.film", ".a.film.x1Y2z3.part", ".b.film.x1Y2z3.part", ".a.film.part.png"] {
+            std::fs::write(folder.path().join(name), "").unwrap();
+        }
+        remove_leftovers(&folder.path().join("a.film")).unwrap();
+        assert_eq!(names(folder.path()), [".a.film.part.png", ".b.film.x1Y2z3.part", "a.film"]);
     }
 
     #[test]

@@ -12,7 +12,7 @@ mod exr_header;
 mod png_file;
 pub mod rendered;
 
-pub use beside::write_beside;
+pub use beside::{remove_leftovers, write_beside};
 pub use exr_file::write_exr;
 pub use png_file::{encode_srgb8, write_png, write_png_for, write_png_with_alpha, write_pq_png};
 
@@ -132,7 +132,7 @@ pub enum OutputError {
         folder: PathBuf,
     },
     /// The target is a folder, a device or a pipe.
-    #[error("cannot write {}: it is {found}; name a file ending in .png or .exr", .path.display())]
+    #[error("cannot write {}: it is {found}; name an ordinary file", .path.display())]
     NotAFile {
         /// The target asked for.
         path: PathBuf,

@@ -27,8 +27,10 @@ pub enum Sequence {
     Independent,
 }
 
+use serde::{Deserialize, Serialize};
+
 /// Which of the two independent estimates of a pixel a sample belongs to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Half {
     /// The first estimate.
     A,

@@ -10,6 +10,7 @@ mod material;
 mod motion;
 mod surface;
 
+pub mod hash;
 pub mod load;
 pub mod texture;
 

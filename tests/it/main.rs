@@ -13,16 +13,20 @@
 //! - `references`: scenes of others beside reference pictures (ignored)
 //! - `no_allocation`: the heap is left alone while paths are traced
 //! - `command_line`: the program as a user runs it
+//! - `checkpoint`: renders stopped, continued and merged against renders in one go
+//! - `kill`: the program, killed and resumed
 //! - `tonemap`: HDR pictures for displays, one by one and over time
 
 mod adaptive_render;
 mod bad_input;
 mod bench;
 mod camera_and_time;
+mod checkpoint;
 mod command_line;
 mod direct_light;
 mod formats;
 mod furnace;
+mod kill;
 mod load_assets;
 mod mutations;
 mod no_allocation;

@@ -1,0 +1,56 @@
+//! How a render tells what it does, and is told to stop.
+
+use super::state::RenderState;
+
+/// How far a render is, told after each look.
+#[derive(Clone, Copy, Debug)]
+pub struct Progress {
+    /// Looks taken, from 1.
+    pub pass: u32,
+    /// Time from the first sample, less what a resumed render lay idle.
+    pub seconds: f64,
+    /// Visibility that is being worked towards.
+    pub rung: f64,
+    /// Pixels of the picture.
+    pub pixels: f64,
+    /// Mean samples a pixel so far.
+    pub mean_samples: f64,
+    /// Share of pixels whose predicted visibility is above the final target.
+    pub visible_share: f64,
+    /// Samples of the plan that comes next.
+    pub next_samples: u64,
+    /// Rough count of samples that the target will take from here, if the noise behaves as it did.
+    pub remaining_samples: f64,
+}
+
+/// Whether a render goes on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Directive {
+    /// As planned.
+    GoOn,
+    /// At once, with the picture so far.
+    Stop,
+}
+
+/// Is told how a render goes. Called from the render's own thread, except `samples_done`.
+pub trait Monitor: Sync {
+    /// After each look at the picture.
+    fn looked(&self, progress: &Progress);
+    /// While a plan is traced, from any thread.
+    fn samples_done(&self, samples: u64);
+    /// About once a second, between batches of samples; a render that is resumed from this state makes the same picture.
+    fn between_batches(&self, _state: &RenderState) -> Directive {
+        Directive::GoOn
+    }
+    /// At the end, with what a render to another limit would go on from.
+    fn ended(&self, _state: &RenderState) {}
+}
+
+/// Tells nobody.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Quiet;
+
+impl Monitor for Quiet {
+    fn looked(&self, _: &Progress) {}
+    fn samples_done(&self, _: u64) {}
+}

@@ -1,0 +1,79 @@
+//! All of a render that decides what comes next: what a checkpoint holds, and what a resumed render goes on from.
+
+use super::audit::Audit;
+use super::plan::uniform_plan;
+use super::settings::Limits;
+use crate::film::Film;
+use crate::integrator::{BlockWork, PILOT_SAMPLES, SamplePlan};
+use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
+
+/// A render between two batches of samples.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RenderState {
+    /// All samples.
+    pub film: Film,
+    /// What is decided and not yet traced.
+    pub pending: VecDeque<SamplePlan>,
+    /// Blocks of the first of these plans that are in the film.
+    pub traced_blocks: usize,
+    /// The lowest visibility of the ladder that was reached.
+    pub finished_rung: Option<f64>,
+    /// What audits multiplied the variance by, at least 1.
+    pub inflation: f64,
+    /// The last audit.
+    pub audit: Option<Audit>,
+    /// Audits so far.
+    pub audits: u32,
+    /// What a rule without sight was told.
+    pub exposure: Option<Exposure>,
+    /// Plans traced.
+    pub plans: u32,
+    /// Looks taken.
+    pub passes: u32,
+    /// Time from the first sample, less the time between an end and its resumption.
+    pub seconds_total: f64,
+    /// Of which in the perception model, planning and audits.
+    pub seconds_perception: f64,
+}
+
+/// Exposure of the display as measured at a number of samples.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Exposure {
+    /// Samples of all pixels at the time.
+    pub samples: u64,
+    /// Share of display white that one scene unit makes near black.
+    pub scene_unit_over_white: f64,
+}
+
+impl RenderState {
+    /// The start of a render: nothing traced, the pilot planned.
+    pub fn new(width: u32, height: u32, limits: &Limits) -> Self {
+        Self::of_film(Film::new(width, height), limits.max_samples.min(limits.mean_samples.unwrap_or(u32::MAX)))
+    }
+
+    /// A film about which nothing has been decided: empty, merged from others, or made for other eyes. Planned is what it
+    /// lacks of a pilot of 8 + 8 samples a pixel, or of `most_samples` in all.
+    pub fn of_film(film: Film, most_samples: u32) -> Self {
+        let pilot = uniform_plan(&film, most_samples.min(2 * PILOT_SAMPLES));
+        Self {
+            film,
+            pending: if pilot.blocks.is_empty() { VecDeque::new() } else { VecDeque::from([pilot]) },
+            traced_blocks: 0,
+            finished_rung: None,
+            inflation: 1.0,
+            audit: None,
+            audits: 0,
+            exposure: None,
+            plans: 0,
+            passes: 0,
+            seconds_total: 0.0,
+            seconds_perception: 0.0,
+        }
+    }
+
+    /// Blocks that are planned and not yet traced, in order.
+    pub fn untraced_blocks(&self) -> impl Iterator<Item = &BlockWork> {
+        self.pending.iter().flat_map(|plan| &plan.blocks).skip(self.traced_blocks)
+    }
+}

@@ -1,0 +1,193 @@
+//! What was rendered and for whom: small, at the start of the film's file.
+
+use crate::adaptive::settings::{AllocationRule, Limits, LoopSettings, Sampling};
+use crate::integrator::{Crop, TraceSettings};
+use crate::scene::Scene;
+use crate::scene::hash::{ContentHash, content_hash};
+use fechner_perception::display::Viewing;
+use fechner_perception::model::{self, ThresholdModel};
+use fechner_perception::tone;
+use serde::{Deserialize, Serialize};
+
+/// The start of a film's file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Header {
+    /// What the samples are samples of.
+    pub origin: Origin,
+    /// Whose random numbers they used.
+    pub seeds: Seeds,
+    /// For whose eyes they were spread.
+    pub settings: SettingsRecord,
+    /// Visibility that was aimed at.
+    pub visibility: f64,
+}
+
+/// Everything that a sample is a function of, besides its place in the picture and the seed: only films of equal origin
+/// may be added or continued.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Origin {
+    /// Program and version.
+    pub program: String,
+    /// The scene's name, for messages.
+    pub scene_name: String,
+    /// The scene's content.
+    pub scene: ContentHash,
+    /// Width of the film in pixels.
+    pub width: u32,
+    /// Height of the film in pixels.
+    pub height: u32,
+    /// How it was traced, in words.
+    pub tracing: String,
+}
+
+/// Seeds of a film's samples.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Seeds {
+    /// All of them, ascending.
+    pub all: Vec<u64>,
+    /// The one by which the render goes on; none in a merged film, which goes on by a new one.
+    pub current: Option<u64>,
+}
+
+/// How samples were spread and for whom, in words that can be written down: what [`LoopSettings`] are made from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SettingsRecord {
+    /// How samples are spread.
+    pub sampling: Sampling,
+    /// How counts are found.
+    pub allocation: AllocationRule,
+    /// Threshold model, by name.
+    pub model: String,
+    /// Display and observer.
+    pub viewing: Viewing,
+    /// Luminance in cd/m² of RGB (1, 1, 1).
+    pub nits_per_unit: f64,
+    /// Tone operator, by name.
+    pub operator: String,
+    /// Exposure correction, where the operator was given one.
+    pub exposure_stops: Option<f64>,
+}
+
+/// A name that this version does not know.
+#[derive(Debug, thiserror::Error)]
+#[error("there is no {kind} \"{name}\"; known: {known}")]
+pub struct UnknownName {
+    kind: &'static str,
+    name: String,
+    known: String,
+}
+
+impl Origin {
+    /// Of a render.
+    pub fn of(scene: &Scene, settings: &TraceSettings) -> Self {
+        let Crop { width, height, .. } = settings.film_area();
+        Self {
+            program: concat!("fechner ", env!("CARGO_PKG_VERSION")).to_owned(),
+            scene_name: scene.name.clone(),
+            scene: content_hash(scene),
+            width,
+            height,
+            tracing: in_words(settings),
+        }
+    }
+
+    /// What keeps a film from standing beside one of `own` origin; `None` if nothing does.
+    pub fn difference(&self, own: &Origin) -> Option<String> {
+        if self.program != own.program {
+            return Some(format!("it was written by {}, and this is {}", self.program, own.program));
+        }
+        if self.scene != own.scene {
+            return Some(format!(
+                "it holds another scene (\"{}\", content {}) than \"{}\", content {}: the scene file, a mesh or a texture \
+                 has changed, or --camera or --at is another",
+                self.scene_name, self.scene, own.scene_name, own.scene
+            ));
+        }
+        if (self.width, self.height) != (own.width, own.height) {
+            return Some(format!(
+                "it holds a picture of {}x{} pixels, not of {}x{}",
+                self.width, self.height, own.width, own.height
+            ));
+        }
+        (self.tracing != own.tracing)
+            .then(|| format!("its samples were traced by {}, not by {}", self.tracing, own.tracing))
+    }
+}
+
+/// Every setting that changes a sample, also those to come, less the seed.
+fn in_words(settings: &TraceSettings) -> String {
+    let text = format!("{settings:?}");
+    let fields = text.trim_start_matches("TraceSettings { ").trim_end_matches(" }").split(", ");
+    fields.filter(|field| !field.starts_with("seed: ")).collect::<Vec<_>>().join(", ")
+}
+
+impl Seeds {
+    /// A film of one render.
+    pub fn one(seed: u64) -> Self {
+        Self { all: vec![seed], current: Some(seed) }
+    }
+
+    /// The seeds of this film when it goes on by `seed`.
+    ///
+    /// # Errors
+    /// Says which seed would be right.
+    pub fn continued_by(&self, seed: u64) -> Result<Self, String> {
+        match self.current {
+            Some(current) if current == seed => Ok(self.clone()),
+            Some(current) => Err(format!("it goes on with --seed {current}, not {seed}")),
+            None if self.all.contains(&seed) => Err(format!(
+                "it is merged and has the samples of --seed {seed} already: go on with one that is not among {}",
+                self.in_words()
+            )),
+            None => {
+                let mut all = self.all.clone();
+                all.push(seed);
+                all.sort_unstable();
+                Ok(Self { all, current: Some(seed) })
+            }
+        }
+    }
+
+    /// All seeds, for people.
+    pub fn in_words(&self) -> String {
+        self.all.iter().map(u64::to_string).collect::<Vec<_>>().join(", ")
+    }
+}
+
+impl SettingsRecord {
+    /// Settings for the loop.
+    ///
+    /// # Errors
+    /// For names that nobody answers to.
+    pub fn loop_settings(&self, limits: Limits) -> Result<LoopSettings, UnknownName> {
+        let operator = tone::operator(&self.operator, self.exposure_stops).ok_or_else(|| UnknownName {
+            kind: "tone operator",
+            name: self.operator.clone(),
+            known: tone::operator_names().join(", "),
+        })?;
+        Ok(LoopSettings {
+            sampling: self.sampling,
+            allocation: self.allocation,
+            model: self.threshold_model()?,
+            limits,
+            viewing: self.viewing.clone(),
+            nits_per_unit: self.nits_per_unit,
+            operator,
+        })
+    }
+
+    /// `None` for the default, which the loop itself pools over the eye's window.
+    fn threshold_model(&self) -> Result<Option<Box<dyn ThresholdModel>>, UnknownName> {
+        let found = model::by_name(&self.model).ok_or_else(|| UnknownName {
+            kind: "threshold model",
+            name: self.model.clone(),
+            known: model::names().join(", "),
+        })?;
+        Ok(Some(found).filter(|_| self.model != model::names()[0]))
+    }
+
+    /// Whether pictures made by both are seen alike, however their samples were spread.
+    pub fn is_seen_like(&self, other: &Self) -> bool {
+        *self == Self { sampling: self.sampling, allocation: self.allocation, ..other.clone() }
+    }
+}

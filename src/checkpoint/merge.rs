@@ -1,0 +1,109 @@
+//! Adding up renders of different seeds.
+
+use super::file::read_header;
+use super::{Checkpoint, CheckpointError, Header, Seeds, read_checkpoint};
+use crate::adaptive::settings::DEFAULT_MAX_SAMPLES;
+use crate::adaptive::state::RenderState;
+use std::path::{Path, PathBuf};
+
+/// Why films could not be merged.
+#[derive(Debug, thiserror::Error)]
+pub enum MergeError {
+    /// One of them could not be used.
+    #[error(transparent)]
+    File(#[from] CheckpointError),
+    /// Two of them hold the same samples.
+    #[error(
+        "{} and {} both hold samples of seed {seed}, which would count twice: render one of them with another --seed",
+        .first.display(), .second.display()
+    )]
+    SameSeed {
+        /// One file.
+        first: PathBuf,
+        /// The other.
+        second: PathBuf,
+        /// What they share.
+        seed: u64,
+    },
+}
+
+/// Adds the films of several files: half A to half A and B to B, in the order of their seeds, so that the order of
+/// `paths` does not matter. What was decided for the single films (plans, rungs, audits) is left behind; the largest
+/// inflation stays.
+///
+/// Films are read one after the other: two are in memory at a time.
+///
+/// # Errors
+/// [`MergeError`] for a file that cannot be read, films of other scenes, sizes, versions or viewings than the first, and
+/// films that share a seed.
+pub fn merge_files(paths: &[PathBuf]) -> Result<Checkpoint, MergeError> {
+    let mut files = Vec::with_capacity(paths.len());
+    for path in paths {
+        files.push((read_header(path)?, path.as_path()));
+    }
+    files.sort_by(|a, b| a.0.seeds.all.cmp(&b.0.seeds.all));
+    check_seeds(&files)?;
+    let (first, rest) = files.split_first().expect("at least one film");
+    let mut sum = read_same(first)?;
+    for file in rest {
+        let different = |problem: String| CheckpointError::Different { path: file.1.to_owned(), problem };
+        if let Some(problem) = file.0.origin.difference(&first.0.origin) {
+            return Err(different(format!("{problem}, as in {}", first.1.display())).into());
+        }
+        if !file.0.settings.is_seen_like(&first.0.settings) {
+            return Err(different(format!(
+                "it was rendered for another display, observer, operator, model or unit than {}",
+                first.1.display()
+            ))
+            .into());
+        }
+        let next = read_same(file)?;
+        sum.state.film.add(&next.state.film).map_err(|problem| different(problem.to_owned()))?;
+        sum.state.inflation = sum.state.inflation.max(next.state.inflation);
+        sum.state.plans = sum.state.plans.saturating_add(next.state.plans);
+        sum.state.seconds_total += next.state.seconds_total;
+        sum.state.seconds_perception += next.state.seconds_perception;
+        sum.header.visibility = sum.header.visibility.min(next.header.visibility);
+        sum.header.seeds.all.extend(next.header.seeds.all);
+    }
+    if !rest.is_empty() {
+        sum.header.seeds.all.sort_unstable();
+        sum.header.seeds.current = None;
+        sum.state = undecided(sum.state);
+    }
+    Ok(sum)
+}
+
+/// The film of a state and what it took, without what was decided about it.
+fn undecided(state: RenderState) -> RenderState {
+    let RenderState { film, inflation, plans, seconds_total, seconds_perception, .. } = state;
+    RenderState {
+        inflation,
+        plans,
+        seconds_total,
+        seconds_perception,
+        ..RenderState::of_film(film, DEFAULT_MAX_SAMPLES)
+    }
+}
+
+/// Reads all of a file whose header was read before.
+fn read_same((header, path): &(Header, &Path)) -> Result<Checkpoint, CheckpointError> {
+    let checkpoint = read_checkpoint(path)?;
+    if checkpoint.header == *header {
+        Ok(checkpoint)
+    } else {
+        Err(CheckpointError::Different { path: path.to_path_buf(), problem: "it changed while it was read".to_owned() })
+    }
+}
+
+fn check_seeds(files: &[(Header, &Path)]) -> Result<(), MergeError> {
+    let of = |seeds: &Seeds, path: &Path| seeds.all.iter().map(|&seed| (seed, path.to_owned())).collect::<Vec<_>>();
+    let mut all: Vec<(u64, PathBuf)> = files.iter().flat_map(|(header, path)| of(&header.seeds, path)).collect();
+    all.sort();
+    match all.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+        Some([first, second]) => {
+            Err(MergeError::SameSeed { first: first.1.clone(), second: second.1.clone(), seed: first.0 })
+        }
+        _ => Ok(()),
+    }
+}

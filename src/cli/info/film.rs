@@ -1,0 +1,59 @@
+//! What a film's file holds, in words.
+
+use super::super::console::duration_in_words;
+use fechner::checkpoint::Checkpoint;
+use std::fmt::Write as _;
+
+/// The text that `info` prints of a film.
+pub(super) fn describe(checkpoint: &Checkpoint) -> String {
+    let Checkpoint { header, state } = checkpoint;
+    let (origin, settings, film) = (&header.origin, &header.settings, &state.film);
+    let pixels = film.width() as usize * film.height() as usize;
+    let counts = || (0..pixels).map(|pixel| film.samples(pixel));
+    let (least, most) = (counts().min().unwrap_or(0), counts().max().unwrap_or(0));
+    let pending: u64 = state.untraced_blocks().map(|block| u64::from(block.samples)).sum();
+    let mut text = format!("film of {}, {}×{} pixels\n\n", origin.program, film.width(), film.height());
+    let mut row = |name: &str, value: String| {
+        let _ = writeln!(text, "  {name:11}  {value}");
+    };
+    row("scene", format!("\"{}\", content {}", origin.scene_name, origin.scene));
+    row("traced by", origin.tracing.clone());
+    row(
+        "seeds",
+        match header.seeds.current {
+            Some(seed) => format!("{}; goes on with --seed {seed}", header.seeds.in_words()),
+            None => format!("{}; merged, goes on with another --seed", header.seeds.in_words()),
+        },
+    );
+    row("samples", {
+        let mean = film.total_samples() as f64 / pixels as f64;
+        format!("{}: {mean:.1} a pixel, {least} to {most}; {} not finite", film.total_samples(), film.nonfinite_samples)
+    });
+    row("planned", format!("{pending} samples after {} plans", state.plans));
+    row("time", duration_in_words(state.seconds_total));
+    row("sampling", format!("{:?}", settings.sampling));
+    row("visibility", {
+        let reached = state.finished_rung.map_or_else(|| "none".to_owned(), |rung| rung.to_string());
+        format!("{} aimed at, {reached} reached; variance × {}", header.visibility, state.inflation)
+    });
+    row("model", settings.model.clone());
+    row("display", {
+        let display = &settings.viewing.display;
+        let (ppd, white, black) = (display.pixels_per_degree, display.white_cd_m2, display.black_cd_m2);
+        format!("{}: {ppd} pixels a degree, white {white} and black {black} cd/m²", display.name)
+    });
+    row("operator", {
+        let stops = settings.exposure_stops.map_or_else(String::new, |stops| format!(", {stops:+} stops"));
+        format!("{}{stops}; RGB (1, 1, 1) is {} cd/m²", settings.operator, settings.nits_per_unit)
+    });
+    if let Some(audit) = state.audit {
+        row(
+            "audit",
+            format!(
+                "{} tiles, ratio {:.2} ± {:.2}, the last of {}",
+                audit.tiles, audit.ratio, audit.standard_error, state.audits
+            ),
+        );
+    }
+    text
+}

@@ -1,0 +1,236 @@
+//! Keeping the film of a render safe: checkpoints while it runs, and a clean end when a signal asks for it.
+
+use super::console::Console;
+use super::seeing::parse_positive;
+use anyhow::{Context, bail};
+use clap::Args;
+use fechner::adaptive::settings::Limits;
+use fechner::adaptive::state::RenderState;
+use fechner::adaptive::{Directive, Monitor, Progress};
+use fechner::checkpoint::{Checkpoint, CheckpointError, Header, read_checkpoint, write_checkpoint};
+use fechner::output::{self, OutputError};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Arguments of `render` about its film's file.
+#[derive(Debug, Args)]
+pub(super) struct CheckpointArguments {
+    /// Keep all samples in this file while rendering, for --resume and `fechner merge`.
+    #[arg(long, value_name = "FILE", help_heading = "Running")]
+    checkpoint: Option<PathBuf>,
+    /// Seconds of work that a kill may cost at most [default: 60].
+    #[arg(long, value_name = "SECONDS", value_parser = parse_positive, requires = "checkpoint", allow_negative_numbers = true, help_heading = "Running")]
+    checkpoint_every: Option<f64>,
+    /// Go on from the checkpoint, if it is there; limits count from the first start.
+    #[arg(long, requires = "checkpoint", help_heading = "Running")]
+    resume: bool,
+}
+
+/// Where a render starts or goes on.
+pub(super) struct Start {
+    pub(super) header: Header,
+    pub(super) state: RenderState,
+}
+
+impl CheckpointArguments {
+    /// Whether there is to be a file.
+    pub(super) fn is_wanted(&self) -> bool {
+        self.checkpoint.is_some()
+    }
+
+    /// Finds out whether the file can be written before the work is done, and refuses to write over the work of others.
+    pub(super) fn check(&self) -> anyhow::Result<()> {
+        let Some(path) = &self.checkpoint else { return Ok(()) };
+        output::check_writable(path)?;
+        if path.exists() && !self.resume {
+            bail!(
+                "{} is there already: go on with it by --resume, name another --checkpoint, or remove it",
+                path.display()
+            );
+        }
+        Ok(())
+    }
+
+    /// The state to start from: `fresh`, or what the file holds if it fits `header`.
+    pub(super) fn start(&self, header: Header, fresh: RenderState, limits: &Limits) -> anyhow::Result<Start> {
+        let Some(path) = self.checkpoint.as_ref().filter(|_| self.resume) else {
+            return Ok(Start { header, state: fresh });
+        };
+        if !path.exists() {
+            eprintln!("note: {} is not there yet: starting from the beginning", path.display());
+            return Ok(Start { header, state: fresh });
+        }
+        output::remove_leftovers(path)?;
+        let Checkpoint { header: found, state } = read_checkpoint(path)?;
+        let different = |problem| CheckpointError::Different { path: path.clone(), problem };
+        if let Some(problem) = found.origin.difference(&header.origin) {
+            return Err(different(problem).into());
+        }
+        let [seed] = header.seeds.all[..] else { bail!("a render has one seed") };
+        let seeds = found.seeds.continued_by(seed).map_err(different)?;
+        let state = if found.settings != header.settings {
+            eprintln!("note: the film was sampled by other settings: its samples are kept, its ladder begins anew");
+            begun_anew(state, limits, 1.0)
+        } else if found.seeds.current.is_none() {
+            let inflation = state.inflation;
+            begun_anew(state, limits, inflation)
+        } else {
+            state
+        };
+        Ok(Start { header: Header { seeds, ..header }, state })
+    }
+}
+
+/// The samples and the time of a state, less what was decided.
+fn begun_anew(state: RenderState, limits: &Limits, inflation: f64) -> RenderState {
+    let RenderState { film, plans, passes, seconds_total, seconds_perception, .. } = state;
+    let fresh = RenderState::of_film(film, limits.max_samples.min(limits.mean_samples.unwrap_or(u32::MAX)));
+    RenderState { inflation, plans, passes, seconds_total, seconds_perception, ..fresh }
+}
+
+/// Writes the film's file so often that a kill never costs more than was agreed.
+pub(super) struct Keeper {
+    path: PathBuf,
+    every: Duration,
+    header: Header,
+    history: Mutex<History>,
+}
+
+/// What was written so far, and how long it took.
+struct History {
+    last_snapshot: Instant,
+    last_chance: Instant,
+    longest_wait: Duration,
+    longest_write: Duration,
+    writing: Duration,
+    writes: u32,
+    bytes: u64,
+    failure: Option<OutputError>,
+}
+
+impl Keeper {
+    pub(super) fn new(arguments: &CheckpointArguments, header: Header) -> Self {
+        let now = Instant::now();
+        Self {
+            path: arguments.checkpoint.clone().unwrap_or_default(),
+            every: Duration::from_secs_f64(arguments.checkpoint_every.unwrap_or(60.0)),
+            header,
+            history: Mutex::new(History {
+                last_snapshot: now,
+                last_chance: now,
+                longest_wait: Duration::ZERO,
+                longest_write: Duration::ZERO,
+                writing: Duration::ZERO,
+                writes: 0,
+                bytes: 0,
+                failure: None,
+            }),
+        }
+    }
+
+    /// Writes if waiting for the next chance could lose too much: the longest wait and the longest write so far are
+    /// counted in, since a kill in the middle of writing leaves the file before. They count for half the interval at
+    /// most: a look or an audit that once took longer must not make every batch write.
+    fn chance(&self, state: &RenderState) {
+        let mut history = self.history.lock().unwrap_or_else(PoisonError::into_inner);
+        history.longest_wait = history.longest_wait.max(history.last_chance.elapsed());
+        let reserve = (history.longest_wait + history.longest_write).min(self.every / 2);
+        if history.last_snapshot.elapsed() + reserve >= self.every {
+            self.write(state, &mut history);
+        }
+        history.last_chance = Instant::now();
+    }
+
+    /// A file that cannot be written must not end a render of hours: it is told at once and again at the end.
+    fn write(&self, state: &RenderState, history: &mut History) {
+        let snapshot = Instant::now();
+        match write_checkpoint(&self.path, &self.header, state) {
+            Ok(bytes) => {
+                history.failure = None;
+                history.last_snapshot = snapshot;
+                history.bytes = bytes;
+                history.writes += 1;
+            }
+            Err(error) => {
+                eprintln!("note: {error}; rendering goes on");
+                history.failure = Some(error);
+            }
+        }
+        history.longest_write = history.longest_write.max(snapshot.elapsed());
+        history.writing += snapshot.elapsed();
+    }
+}
+
+/// Console, keeper and signals together.
+pub(super) struct Watch {
+    console: Console,
+    keeper: Option<Keeper>,
+    stop: Arc<AtomicBool>,
+    started: Instant,
+}
+
+impl Watch {
+    /// From here on SIGINT, SIGTERM and SIGHUP end the render with the picture so far; a second one ends the program.
+    pub(super) fn new(console: Console, keeper: Option<Keeper>) -> anyhow::Result<Self> {
+        let stop = Arc::new(AtomicBool::new(false));
+        let asked = Arc::clone(&stop);
+        ctrlc::set_handler(move || {
+            if asked.swap(true, Ordering::Relaxed) {
+                std::process::exit(130);
+            }
+        })
+        .context("signals cannot be waited for")?;
+        Ok(Self { console, keeper, stop, started: Instant::now() })
+    }
+
+    /// Removes the progress bar.
+    pub(super) fn finish(&self) {
+        self.console.finish();
+    }
+
+    /// Says what keeping the film took; an error if its last state could not be written.
+    pub(super) fn report(self) -> anyhow::Result<()> {
+        let Some(Keeper { path, history, .. }) = self.keeper else { return Ok(()) };
+        let history = history.into_inner().unwrap_or_else(PoisonError::into_inner);
+        if let Some(error) = history.failure {
+            return Err(error.into());
+        }
+        eprintln!(
+            "Checkpoint {}: {:.1} MB, written {} times in {:.2} s, {:.1} % of the time.",
+            path.display(),
+            history.bytes as f64 / 1e6,
+            history.writes,
+            history.writing.as_secs_f64(),
+            100.0 * history.writing.as_secs_f64() / self.started.elapsed().as_secs_f64()
+        );
+        Ok(())
+    }
+}
+
+impl Monitor for Watch {
+    fn looked(&self, progress: &Progress) {
+        self.console.looked(progress);
+    }
+
+    fn samples_done(&self, samples: u64) {
+        self.console.samples_done(samples);
+    }
+
+    fn between_batches(&self, state: &RenderState) -> Directive {
+        if self.stop.load(Ordering::Relaxed) {
+            return Directive::Stop;
+        }
+        if let Some(keeper) = &self.keeper {
+            keeper.chance(state);
+        }
+        Directive::GoOn
+    }
+
+    fn ended(&self, state: &RenderState) {
+        if let Some(keeper) = &self.keeper {
+            keeper.write(state, &mut keeper.history.lock().unwrap_or_else(PoisonError::into_inner));
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! `fechner merge`: films of different seeds in, one film or its picture out.
+
+use super::render::{write_json, write_picture};
+use super::report::{Report, summary};
+use super::seeing::parse_positive;
+use clap::Args;
+use fechner::adaptive::judge::judge;
+use fechner::adaptive::settings::{DEFAULT_MAX_SAMPLES, Limits};
+use fechner::adaptive::{Rendered, StopReason, is_reached};
+use fechner::checkpoint::{merge_files, write_checkpoint};
+use fechner::output;
+use fechner::output::rendered::Background;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `merge`.
+#[derive(Debug, Args)]
+pub(super) struct MergeArguments {
+    /// Films that render --checkpoint kept, of one scene and size and of different seeds; their order does not matter.
+    #[arg(required = true, value_name = "FILM")]
+    films: Vec<PathBuf>,
+    /// What to write: .film for the sum, to be merged or resumed by another seed; .png or .exr for its picture.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Visibility that may remain, in place of the smallest that the films aimed at.
+    #[arg(long, value_name = "V", value_parser = parse_positive, allow_negative_numbers = true)]
+    visibility: Option<f64>,
+    /// Write figures of the merged render here.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// Merges, looks again, writes and says what can be seen.
+pub(super) fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
+    let format = if is_film(&arguments.output) {
+        output::check_writable(&arguments.output)?;
+        None
+    } else {
+        Some(output::check_target(&arguments.output)?)
+    };
+    if let Some(json) = &arguments.json {
+        output::check_writable(json)?;
+    }
+    let mut merged = merge_files(&arguments.films)?;
+    merged.header.visibility = arguments.visibility.unwrap_or(merged.header.visibility);
+    let visibility = merged.header.visibility;
+    let settings = merged.header.settings.loop_settings(Limits {
+        visibility,
+        time: None,
+        mean_samples: None,
+        max_samples: DEFAULT_MAX_SAMPLES,
+        plans: None,
+    })?;
+    if format.is_none() {
+        write_checkpoint(&arguments.output, &merged.header, &merged.state)?;
+    }
+    let judgement = judge(&merged.state.film, &settings, merged.state.inflation)?;
+    let reason = if is_reached(&judgement, visibility) { StopReason::Visibility } else { StopReason::Merged };
+    let rendered = Rendered::new(merged.state, judgement, reason);
+    let report = Report::new(&merged.header.origin.scene_name, &merged.header.seeds.all, &settings, &rendered);
+    if let Some(format) = format {
+        write_picture(&arguments.output, format, Background::Shown, &rendered, &settings, &report)?;
+    }
+    write_json(arguments.json.as_deref(), &report)?;
+    eprintln!("Films of the seeds {}:", merged.header.seeds.in_words());
+    eprintln!("{}", summary(&report, &settings, &rendered));
+    Ok(())
+}
+
+fn is_film(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("film"))
+}

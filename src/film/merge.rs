@@ -1,0 +1,179 @@
+//! Adding films of the same picture, and checking one that was in a file.
+
+use super::{Film, HalfPixel, PixelGuide, opponent};
+
+/// Most samples of a pixel's half that a film may hold: sums of a few films stay far from where counts wrap around.
+const MOST_TAKEN: u32 = 1 << 29;
+
+impl Film {
+    /// Adds the samples of another film, half to half: as if one film had taken both. The other must be of this size and
+    /// of other random numbers.
+    ///
+    /// # Errors
+    /// Where a pixel would hold more samples than can be counted.
+    pub fn add(&mut self, other: &Film) -> Result<(), &'static str> {
+        assert_eq!((self.width, self.height), (other.width, other.height), "films of one size");
+        for (i, guide) in self.guides.iter_mut().enumerate() {
+            let count = |halves: &[Vec<HalfPixel>; 2]| halves[0][i].samples + halves[1][i].samples;
+            guide.add(&other.guides[i], count(&self.halves), count(&other.halves));
+        }
+        for (half, others) in self.halves.iter_mut().zip(&other.halves) {
+            for (pixel, other) in half.iter_mut().zip(others) {
+                pixel.add(other);
+                if pixel.taken > MOST_TAKEN {
+                    return Err("a pixel would have more samples than can be counted");
+                }
+            }
+        }
+        self.nonfinite_samples = self.nonfinite_samples.saturating_add(other.nonfinite_samples);
+        self.rays = self.rays.saturating_add(other.rays);
+        Ok(())
+    }
+
+    /// Finds what no render leaves in a film.
+    ///
+    /// # Errors
+    /// Says what is wrong.
+    pub fn check(&self) -> Result<(), &'static str> {
+        let pixels = u64::from(self.width) * u64::from(self.height);
+        if pixels == 0 || pixels > u64::from(u32::MAX) / 2 {
+            return Err("its size makes no sense");
+        }
+        let lengths = [self.halves[0].len(), self.halves[1].len(), self.guides.len()];
+        if lengths.iter().any(|&length| length as u64 != pixels) {
+            return Err("its pixels are not as many as its size says");
+        }
+        let is_sound = |pixel: &HalfPixel| {
+            pixel.samples <= pixel.taken
+                && pixel.taken <= MOST_TAKEN
+                && pixel.mean.iter().all(|mean| mean.is_finite())
+                && pixel.m2.iter().all(|m2| m2.is_finite() && *m2 >= 0.0)
+        };
+        let is_sound_guide = |guide: &PixelGuide| {
+            let finite = |values: &[f32; 3]| values.iter().all(|value| value.is_finite());
+            finite(&guide.albedo) && finite(&guide.normal) && !guide.depth.is_nan()
+        };
+        if !self.halves.iter().flatten().all(is_sound) || !self.guides.iter().all(is_sound_guide) {
+            return Err("a pixel holds what no samples can sum up to");
+        }
+        Ok(())
+    }
+}
+
+impl HalfPixel {
+    /// Adds another half's samples (Chan, Golub and LeVeque 1983).
+    fn add(&mut self, other: &HalfPixel) {
+        self.taken = self.taken.saturating_add(other.taken);
+        if other.samples == 0 {
+            return;
+        }
+        let (own, others) = (f64::from(self.samples), f64::from(other.samples));
+        let (old, new) = (opponent(self.mean), opponent(other.mean));
+        for (c, m2) in self.m2.iter_mut().enumerate() {
+            let difference = new[c] - old[c];
+            let between = difference * difference * own * others / (own + others);
+            *m2 = (f64::from(*m2) + f64::from(other.m2[c]) + between) as f32;
+        }
+        for (mean, other) in self.mean.iter_mut().zip(other.mean) {
+            *mean += (other - *mean) * others / (own + others);
+        }
+        self.samples = self.samples.saturating_add(other.samples);
+    }
+}
+
+impl PixelGuide {
+    /// Blends in another guide by the samples that both stand for.
+    fn add(&mut self, other: &PixelGuide, own_samples: u32, other_samples: u32) {
+        if own_samples == 0 {
+            *self = *other;
+        } else if other_samples > 0 {
+            let share = other_samples as f32 / (own_samples as f32 + other_samples as f32);
+            let blend = |old: &mut f32, new: f32| *old += (new - *old) * share;
+            self.albedo.iter_mut().zip(other.albedo).for_each(|(old, new)| blend(old, new));
+            self.normal.iter_mut().zip(other.normal).for_each(|(old, new)| blend(old, new));
+            blend(&mut self.depth, other.depth);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::BlockSum;
+    use crate::integrator::{BlockWork, FirstHit, PathSample};
+    use crate::sampler::Half;
+    use glam::Vec3;
+
+    fn film_of(values: &[f32]) -> Film {
+        let mut film = Film::new(1, 1);
+        for (half, values) in Half::BOTH.into_iter().zip(values.chunks(values.len().div_ceil(2))) {
+            let mut sum = BlockSum::default();
+            for &value in values {
+                let first_hit = FirstHit { albedo: Vec3::splat(value), normal: Vec3::Z, depth: value, object_id: 7 };
+                sum.add(&PathSample { radiance: Vec3::new(value, 2.0 * value, 0.5), first_hit, rays: 3 });
+            }
+            film.merge_block(BlockWork { half, ..BlockWork::whole(0, half, 0) }, &sum);
+        }
+        film
+    }
+
+    /// The sum of two films has the counts, means, variances and guides of all their samples together.
+    #[test]
+    fn sums_add() {
+        let values: Vec<f32> = (0..40).map(|i| ((i * 29) % 40) as f32 * 0.1 + 0.3).collect();
+        let (first, second) = values.split_at(14);
+        let mut sum = film_of(first);
+        sum.add(&film_of(second)).expect("few samples");
+        sum.check().expect("sound");
+        for half in Half::BOTH {
+            let own = |values: &[f32]| -> Vec<f64> {
+                let part = values.chunks(values.len().div_ceil(2)).nth(half.index()).expect("two halves");
+                part.iter().map(|&v| f64::from(v)).collect()
+            };
+            let all = [own(first), own(second)].concat();
+            let n = all.len() as f64;
+            let mean = all.iter().sum::<f64>() / n;
+            let luminance: Vec<f64> = all.iter().map(|&v| opponent([v, f64::from(2.0 * v as f32), 0.5])[0]).collect();
+            let centre = luminance.iter().sum::<f64>() / n;
+            let variance = luminance.iter().map(|y| (y - centre).powi(2)).sum::<f64>() / (n - 1.0);
+            let pixel = sum.half(half)[0];
+            assert_eq!((pixel.samples, pixel.taken), (all.len() as u32, all.len() as u32));
+            assert!((pixel.mean[0] - mean).abs() < 1e-12, "{} for {mean}", pixel.mean[0]);
+            assert!((pixel.sample_variance(0) / variance - 1.0).abs() < 1e-6);
+        }
+        let mean = values.iter().sum::<f32>() / 40.0;
+        let guide = sum.guides()[0];
+        assert!((guide.depth - mean).abs() < 1e-5 && (guide.albedo[2] - mean).abs() < 1e-5);
+        assert_eq!((guide.object_id, sum.rays), (7, 120));
+    }
+
+    #[test]
+    fn an_empty_film_changes_nothing_and_takes_everything() {
+        let film = film_of(&[1.0, 2.0, 5.0]);
+        let mut sum = film.clone();
+        sum.add(&Film::new(1, 1)).expect("few samples");
+        assert_eq!(sum, film);
+        let mut sum = Film::new(1, 1);
+        sum.add(&film).expect("few samples");
+        assert_eq!(sum, film);
+    }
+
+    #[test]
+    fn what_no_render_leaves_is_found() {
+        let changed = |change: &dyn Fn(&mut Film)| {
+            let mut film = film_of(&[1.0, 2.0]);
+            change(&mut film);
+            film.check().is_err()
+        };
+        assert!(!changed(&|_| {}));
+        assert!(changed(&|film| film.width = 0));
+        assert!(changed(&|film| film.height = 2));
+        assert!(changed(&|film| (film.width, film.height) = (1 << 16, 1 << 16)));
+        assert!(changed(&|film| film.halves[1][0].mean[2] = f64::NAN));
+        assert!(changed(&|film| film.halves[0][0].m2[1] = -1.0));
+        assert!(changed(&|film| film.halves[0][0].samples = 9));
+        assert!(changed(&|film| film.halves[0][0].taken = u32::MAX));
+        assert!(changed(&|film| film.guides[0].albedo[0] = f32::INFINITY));
+        assert!(changed(&|film| film.guides.clear()));
+    }
+}

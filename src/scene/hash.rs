@@ -1,0 +1,128 @@
+//! What a scene is, in 32 bytes: equal content gives equal hashes, whatever its files are called.
+//!
+//! Not for comparing machines of different byte order: large arrays are hashed as they stand in memory.
+
+use super::{FilmDefaults, Scene, Texels, ViewingDefaults};
+use bytemuck::NoUninit;
+use serde::{Deserialize, Serialize};
+use std::io::{BufWriter, Write};
+use std::mem::take;
+
+/// BLAKE3 of everything in a scene that samples depend on.
+#[derive(Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ContentHash([u8; 32]);
+
+impl std::fmt::Display for ContentHash {
+    /// The first 16 hexadecimal digits.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.0[..8].iter().try_for_each(|byte| write!(f, "{byte:02x}"))
+    }
+}
+
+impl std::fmt::Debug for ContentHash {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        std::fmt::Display::fmt(self, f)
+    }
+}
+
+/// Hashes a scene, less what no sample depends on: its name and notes, and what it asks for when the command line does not.
+///
+/// Large arrays are hashed as bytes, and all else as its `Debug` text, which is exact for floats and holds every field:
+/// one that is added to a type is covered without a word here. Takes a copy of the scene's arrays while it runs.
+pub fn content_hash(scene: &Scene) -> ContentHash {
+    let mut rest = scene.clone();
+    rest.name.clear();
+    rest.notes.clear();
+    rest.film = FilmDefaults { width: 0, height: 0 };
+    rest.viewing = ViewingDefaults::default();
+
+    let mut hasher = blake3::Hasher::new();
+    for mesh in &mut rest.meshes {
+        hash_array(&mut hasher, &take(&mut mesh.positions));
+        hash_array(&mut hasher, &take(&mut mesh.normals));
+        hash_array(&mut hasher, &take(&mut mesh.uvs));
+        hash_array(&mut hasher, &take(&mut mesh.tangents));
+        hash_array(&mut hasher, &take(&mut mesh.triangles));
+    }
+    for texture in &mut rest.textures {
+        texture.name.clear();
+        match &mut texture.texels {
+            Texels::Bytes(texels, _) => hash_array(&mut hasher, &take(texels)),
+            Texels::Floats(texels) => hash_array(&mut hasher, &take(texels)),
+        }
+    }
+    if let Some(environment) = &mut rest.environment {
+        hash_array(&mut hasher, &take(&mut environment.texels));
+    }
+    let mut text = BufWriter::with_capacity(1 << 16, &mut hasher);
+    write!(text, "{rest:?}").and_then(|()| text.flush()).expect("a hasher takes all bytes");
+    drop(text);
+    ContentHash(*hasher.finalize().as_bytes())
+}
+
+fn hash_array<T: NoUninit>(hasher: &mut blake3::Hasher, values: &[T]) {
+    hasher.update(&(values.len() as u64).to_le_bytes());
+    hasher.update(bytemuck::cast_slice(values));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::load::{LoadOptions, load};
+    use std::path::Path;
+    use std::sync::Arc;
+
+    fn scene(file: &str) -> Scene {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file);
+        load(&path, &LoadOptions::default()).expect("one of our own scenes loads")
+    }
+
+    #[test]
+    fn the_same_content_has_the_same_hash_under_another_name() {
+        let mut renamed = scene("still-life.toml");
+        renamed.name = "another".to_owned();
+        renamed.notes.push("a note".to_owned());
+        renamed.film.width += 1;
+        assert_eq!(content_hash(&renamed), content_hash(&scene("still-life.toml")));
+    }
+
+    /// Whatever changes, however little, gives a hash of its own.
+    #[test]
+    fn every_change_changes_the_hash() {
+        type Change = fn(&mut Scene);
+        let changes: [Change; 16] = [
+            |_| {},
+            |s| s.nits_per_unit *= 1.0 + f64::EPSILON,
+            |s| s.camera.position.x += 1e-6,
+            |s| s.camera.aperture_radius += 1e-7,
+            |s| s.meshes[0].positions[0].y += 1e-6,
+            |s| s.meshes[0].triangles[0].swap(0, 1),
+            |s| s.meshes[0].triangles[0].rotate_left(1),
+            |s| s.instances[0].to_world.translation.z += 1e-6,
+            |s| s.materials[0].emits_both_sides ^= true,
+            |s| s.materials[0].emission.factor.x += 1e-6,
+            |s| s.textures[0].nearest ^= true,
+            |s| match &mut s.textures[0].texels {
+                Texels::Bytes(texels, _) => Arc::make_mut(texels)[0][0] ^= 1,
+                Texels::Floats(texels) => Arc::make_mut(texels)[0][0] += 1e-6,
+            },
+            |s| s.meshes.swap(0, 1),
+            |s| s.meshes[0].uvs.clear(),
+            |s| s.lights.push(crate::scene::Light::Point { position: glam::Vec3::ZERO, intensity: glam::Vec3::ONE }),
+            |s| s.environment.iter_mut().for_each(|e| e.scale *= 1.0 + f32::EPSILON),
+        ];
+        let base = scene("still-life.toml");
+        let mut hashes: Vec<_> = changes
+            .iter()
+            .map(|change| {
+                let mut changed = base.clone();
+                change(&mut changed);
+                content_hash(&changed).0
+            })
+            .collect();
+        hashes.sort_unstable();
+        hashes.dedup();
+        let expected = if base.environment.is_some() { changes.len() } else { changes.len() - 1 };
+        assert_eq!(hashes.len(), expected);
+    }
+}

@@ -1,0 +1,340 @@
+//! Renders that were stopped, killed, continued and merged, against renders in one go.
+
+use crate::support::{loop_settings, trace_settings};
+use fechner::adaptive::settings::{LoopSettings, RivalRule, Sampling};
+use fechner::adaptive::state::RenderState;
+use fechner::adaptive::{Directive, Monitor, Progress, Quiet, Rendered, StopReason, render, resume};
+use fechner::checkpoint::{
+    Checkpoint, Header, Origin, Seeds, SettingsRecord, decode_checkpoint, merge_files, read_checkpoint, seal,
+    write_checkpoint,
+};
+use fechner::film::Film;
+use fechner::integrator::{PathTracer, SamplePlan};
+use fechner::sampler::Half;
+use fechner::scene::Scene;
+use fechner::scene::load::{LoadOptions, load};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Mutex};
+
+const SIZE: u32 = 40;
+
+fn cornell_box() -> Scene {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml");
+    load(&path, &LoadOptions::default()).expect("the first scene loads")
+}
+
+struct Setup {
+    tracer: PathTracer,
+    header: Header,
+}
+
+impl Setup {
+    fn new(seed: u64) -> Self {
+        let scene = cornell_box();
+        let settings = trace_settings(SIZE, SIZE, seed);
+        let like = loop_settings(scene.nits_per_unit, Sampling::Adaptive, 4.0, None);
+        let header = Header {
+            origin: Origin::of(&scene, &settings),
+            seeds: Seeds::one(seed),
+            settings: SettingsRecord {
+                sampling: Sampling::Adaptive,
+                allocation: like.allocation,
+                model: "csf-bands".to_owned(),
+                viewing: like.viewing,
+                nits_per_unit: like.nits_per_unit,
+                operator: "constant".to_owned(),
+                exposure_stops: None,
+            },
+            visibility: 4.0,
+        };
+        Self { tracer: PathTracer::new(Arc::new(scene), settings), header }
+    }
+
+    fn settings(&self, sampling: Sampling, visibility: f64) -> LoopSettings {
+        loop_settings(self.header.settings.nits_per_unit, sampling, visibility, None)
+    }
+
+    /// The state as it comes back from a file.
+    fn through_a_file(&self, state: &RenderState) -> RenderState {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.film");
+        let length = write_checkpoint(&path, &self.header, state).expect("written");
+        assert_eq!(path.metadata().expect("a file").len(), length);
+        let back = read_checkpoint(&path).expect("sound");
+        assert_eq!(back.header, self.header);
+        assert_eq!(back.state, *state);
+        back.state
+    }
+}
+
+/// Stops after some batches, and keeps the last state.
+struct Interrupter {
+    batches_left: AtomicU32,
+    last: Mutex<Option<RenderState>>,
+}
+
+impl Interrupter {
+    fn after(batches: u32) -> Self {
+        Self { batches_left: AtomicU32::new(batches), last: Mutex::new(None) }
+    }
+
+    fn state(self) -> RenderState {
+        self.last.into_inner().expect("no panic").expect("the render ended")
+    }
+}
+
+impl Monitor for Interrupter {
+    fn looked(&self, _: &Progress) {}
+    fn samples_done(&self, _: u64) {}
+    fn between_batches(&self, _: &RenderState) -> Directive {
+        if self.batches_left.fetch_sub(1, Ordering::Relaxed) == 1 { Directive::Stop } else { Directive::GoOn }
+    }
+    fn ended(&self, state: &RenderState) {
+        *self.last.lock().expect("no panic") = Some(state.clone());
+    }
+}
+
+fn assert_same(one: &Rendered, other: &Rendered) {
+    assert_eq!(one.film, other.film);
+    assert_eq!(one.judgement.predicted, other.judgement.predicted);
+    assert_eq!(one.judgement.tone.describe(), other.judgement.tone.describe());
+    assert_eq!((one.plans, one.inflation, one.audit), (other.plans, other.inflation, other.audit));
+    assert_eq!(one.stop_reason, other.stop_reason);
+}
+
+/// Stopped at visibility 8 and continued to 4, by way of a file, is 4 in one go; so it is when `--plans` stopped it.
+#[test]
+fn a_render_that_is_continued_equals_one_in_one_go() {
+    let setup = Setup::new(5);
+    let in_one_go = render(&setup.tracer, &setup.settings(Sampling::Adaptive, 4.0), &Quiet).expect("renders");
+    let mut by_plans = setup.settings(Sampling::Adaptive, 4.0);
+    by_plans.limits.plans = Some(in_one_go.plans - 2);
+    for limited in [setup.settings(Sampling::Adaptive, 8.0), by_plans] {
+        let monitor = Interrupter::after(u32::MAX);
+        let stopped = render(&setup.tracer, &limited, &monitor).expect("renders");
+        assert!(stopped.plans < in_one_go.plans);
+        let state = setup.through_a_file(&monitor.state());
+        let continued =
+            resume(&setup.tracer, &setup.settings(Sampling::Adaptive, 4.0), state, &Quiet).expect("goes on");
+        assert_same(&continued, &in_one_go);
+    }
+}
+
+/// Interrupted after every single batch, for a rule that looks seldom too.
+#[test]
+fn interruptions_change_no_bit() {
+    let setup = Setup::new(6);
+    let relative = Sampling::Rival(RivalRule::Relative { threshold: 0.08 });
+    for (sampling, visibility) in [(Sampling::Adaptive, 6.0), (Sampling::Uniform, 8.0), (relative, 1.0)] {
+        let settings = setup.settings(sampling, visibility);
+        let in_one_go = render(&setup.tracer, &settings, &Quiet).expect("renders");
+        let mut state = RenderState::new(SIZE, SIZE, &settings.limits);
+        let mut interruptions = 0;
+        let interrupted = loop {
+            let monitor = Interrupter::after(1);
+            let rendered = resume(&setup.tracer, &settings, state, &monitor).expect("goes on");
+            if rendered.stop_reason != StopReason::Interrupted {
+                break rendered;
+            }
+            interruptions += 1;
+            state = setup.through_a_file(&monitor.state());
+        };
+        assert!(interruptions >= in_one_go.plans, "{sampling:?}: {interruptions} interruptions");
+        assert_same(&interrupted, &in_one_go);
+    }
+}
+
+/// A batch that ends within a plan, as in renders too long for a test.
+#[test]
+fn a_state_within_a_plan_goes_on_to_the_same_film() {
+    let setup = Setup::new(7);
+    let settings = setup.settings(Sampling::Adaptive, 8.0);
+    let in_one_go = render(&setup.tracer, &settings, &Quiet).expect("renders");
+    let mut state = RenderState::new(SIZE, SIZE, &settings.limits);
+    let some = SamplePlan { blocks: state.pending[0].blocks[..1001].to_vec() };
+    setup.tracer.trace(&some, &mut state.film, &|_| {});
+    state.traced_blocks = 1001;
+    let continued = resume(&setup.tracer, &settings, setup.through_a_file(&state), &Quiet).expect("goes on");
+    assert_same(&continued, &in_one_go);
+}
+
+fn uniform_film(setup: &Setup, spp: u32) -> RenderState {
+    let mut settings = setup.settings(Sampling::Uniform, 0.0);
+    settings.limits.mean_samples = Some(spp);
+    let monitor = Interrupter::after(u32::MAX);
+    render(&setup.tracer, &settings, &monitor).expect("renders");
+    monitor.state()
+}
+
+/// Films of different seeds add up: every pixel's count, mean and variance are those of all samples, the halves' means
+/// come nearer as their variance says, and no order of the files changes a byte of the sum.
+#[test]
+fn films_of_different_seeds_add_up() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut films: Vec<(PathBuf, Film)> = Vec::new();
+    for (seed, spp) in [(1, 32), (2, 64), (9, 32)] {
+        let setup = Setup::new(seed);
+        let state = uniform_film(&setup, spp);
+        let path = folder.path().join(format!("{seed}.film"));
+        write_checkpoint(&path, &setup.header, &state).expect("written");
+        films.push((path, state.film));
+    }
+    let merged = |order: [usize; 3]| {
+        let sum = merge_files(&order.map(|i| films[i].0.clone())).expect("they fit");
+        let path = folder.path().join("sum.film");
+        write_checkpoint(&path, &sum.header, &sum.state).expect("written");
+        (sum, std::fs::read(path).expect("readable"))
+    };
+    let (sum, bytes) = merged([0, 1, 2]);
+    for order in [[2, 1, 0], [1, 2, 0], [1, 0, 2]] {
+        assert!(merged(order).1 == bytes, "another order gives other bytes");
+    }
+    assert_eq!(sum.header.seeds, Seeds { all: vec![1, 2, 9], current: None });
+    for half in Half::BOTH {
+        for (i, pixel) in sum.state.film.half(half).iter().enumerate() {
+            let parts: Vec<_> = films.iter().map(|(_, film)| film.half(half)[i]).collect();
+            let n: f64 = parts.iter().map(|part| f64::from(part.samples)).sum();
+            assert_eq!((pixel.samples, f64::from(pixel.taken)), (64, n));
+            let mean = parts.iter().map(|part| part.mean[1] * f64::from(part.samples)).sum::<f64>() / n;
+            assert!((pixel.mean[1] - mean).abs() <= 1e-12 * mean.max(1.0), "{} for {mean}", pixel.mean[1]);
+            let centre = |part: &fechner::film::HalfPixel| fechner::film::opponent(part.mean)[0];
+            let whole = parts.iter().map(|part| centre(part) * f64::from(part.samples)).sum::<f64>() / n;
+            let squares: f64 = parts
+                .iter()
+                .map(|part| f64::from(part.m2[0]) + f64::from(part.samples) * (centre(part) - whole).powi(2))
+                .sum();
+            let variance = squares / (n - 1.0);
+            assert!((pixel.sample_variance(0) - variance).abs() <= 1e-5 * variance, "pixel {i}");
+        }
+    }
+    // Σ (A − B)² falls with the count: 128 samples against 32, in stratified sampling at least fourfold less the chance of
+    // a ratio of two sums over 1600 pixels, heavy tails included.
+    let scatter = |film: &Film| {
+        let difference = |i: usize| film.half(Half::A)[i].mean[1] - film.half(Half::B)[i].mean[1];
+        (0..film.half(Half::A).len()).map(|i| difference(i).powi(2)).sum::<f64>()
+    };
+    let ratio = scatter(&films[0].1) / scatter(&sum.state.film);
+    println!("Σ (A − B)² of seed 1 over that of the sum: {ratio:.2}, 4 for independent samples");
+    assert!((2.5..8.0).contains(&ratio), "{ratio}");
+
+    // Merged films are merged again, but never with a part of themselves.
+    let path = folder.path().join("sum.film");
+    let message = merge_files(&[path, films[1].0.clone()]).expect_err("seed 2 would count twice").to_string();
+    assert!(message.contains("seed 2") && message.contains("sum.film") && message.contains("2.film"), "{message}");
+}
+
+/// A merged film goes on by a new seed, and by none that it has.
+#[test]
+fn a_merged_film_goes_on_by_another_seed() {
+    let merged = Seeds { all: vec![1, 4], current: None };
+    assert_eq!(merged.continued_by(3), Ok(Seeds { all: vec![1, 3, 4], current: Some(3) }));
+    assert!(merged.continued_by(4).is_err_and(|problem| problem.contains("1, 4")));
+    assert!(Seeds::one(1).continued_by(2).is_err_and(|problem| problem.contains("--seed 1")));
+
+    let films = [1, 4].map(|seed| uniform_film(&Setup::new(seed), 16).film);
+    let mut sum = films[0].clone();
+    sum.add(&films[1]).expect("few samples");
+    let setup = Setup::new(3);
+    let settings = setup.settings(Sampling::Adaptive, 6.0);
+    let state = RenderState::of_film(sum, settings.limits.max_samples);
+    assert!(state.pending.is_empty(), "the pilot is there");
+    let rendered = resume(&setup.tracer, &settings, state, &Quiet).expect("goes on");
+    assert_eq!(rendered.stop_reason, StopReason::Visibility);
+    let grown = (0..(SIZE * SIZE) as usize).filter(|&i| rendered.film.samples(i) > 32).count();
+    assert!(grown > 0 && (0..(SIZE * SIZE) as usize).all(|i| rendered.film.samples(i) >= 32));
+}
+
+fn small_file() -> (Vec<u8>, Checkpoint) {
+    let setup = Setup::new(1);
+    let settings = setup.settings(Sampling::Adaptive, 8.0);
+    let state = RenderState::new(3, 2, &settings.limits);
+    let mut header = setup.header;
+    (header.origin.width, header.origin.height) = (3, 2);
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.film");
+    write_checkpoint(&path, &header, &state).expect("written");
+    (std::fs::read(path).expect("readable"), Checkpoint { header, state })
+}
+
+/// Every cut and every flipped bit is found; what is damaged under a fitting checksum is refused or harmless.
+#[test]
+fn damaged_files_are_refused() {
+    const AROUND_THE_PAYLOAD: (usize, usize) = (16, 32);
+    let (sound, checkpoint) = small_file();
+    let path = Path::new("a.film");
+    assert_eq!(decode_checkpoint(path, &sound).expect("sound"), checkpoint);
+    for length in 0..sound.len() {
+        let message = decode_checkpoint(path, &sound[..length]).expect_err("cut").to_string();
+        assert!(message.contains("a.film") && !message.contains('\n'), "{message}");
+    }
+    for byte in 0..sound.len() {
+        let mut changed = sound.clone();
+        changed[byte] ^= 1 << (byte % 8);
+        assert!(decode_checkpoint(path, &changed).is_err(), "byte {byte}");
+    }
+    let mut longer = sound.clone();
+    longer.push(0);
+    assert!(decode_checkpoint(path, &longer).is_err());
+
+    let payload = &sound[AROUND_THE_PAYLOAD.0..sound.len() - AROUND_THE_PAYLOAD.1];
+    assert_eq!(seal(payload), sound);
+    let mut refused = 0;
+    for byte in 0..payload.len() {
+        for change in [0x00, 0x01, 0x7f, 0x80, 0xff] {
+            let mut changed = payload.to_vec();
+            changed[byte] = change;
+            match decode_checkpoint(path, &seal(&changed)) {
+                Ok(read) => assert_eq!(read.state.film.check(), Ok(())),
+                Err(_) => refused += 1,
+            }
+        }
+    }
+    for length in 0..payload.len() {
+        assert!(decode_checkpoint(path, &seal(&payload[..length])).is_err(), "cut at {length}");
+    }
+    println!("{refused} of {} changes under a fitting checksum are refused", 5 * payload.len());
+}
+
+#[test]
+fn foreign_files_and_versions_are_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.film");
+    let message = |bytes: &[u8]| {
+        std::fs::write(&path, bytes).expect("written");
+        read_checkpoint(&path).expect_err("refused").to_string()
+    };
+    let (sound, _) = small_file();
+    assert!(message(b"").contains("not a film's file"));
+    assert!(message(b"\x76\x2f\x31\x01 an EXR file, say").contains("not a film's file"));
+    let mut later = sound.clone();
+    later[12] += 1;
+    assert!(message(&later).contains("version 2"), "{}", message(&later));
+    assert!(message(&sound[..sound.len() / 2]).contains("damaged"));
+    assert!(read_checkpoint(folder.path()).expect_err("a folder").to_string().contains("folder"));
+}
+
+/// Another scene, size, version or way of tracing is no film to go on with.
+#[test]
+fn films_of_another_origin_are_refused() {
+    let own = Setup::new(1).header.origin;
+    let mut scene = cornell_box();
+    scene.camera.position.x += 1e-4;
+    let others = [
+        (Origin::of(&scene, &trace_settings(SIZE, SIZE, 1)), "another scene"),
+        (Origin::of(&cornell_box(), &trace_settings(SIZE, 41, 1)), "40x41"),
+        (Origin { program: "fechner 0.0.9".to_owned(), ..own.clone() }, "0.0.9"),
+        (
+            Origin::of(
+                &cornell_box(),
+                &fechner::integrator::TraceSettings { clamp: Some(3.0), ..trace_settings(SIZE, SIZE, 1) },
+            ),
+            "clamp: Some(3.0)",
+        ),
+    ];
+    for (other, fragment) in others {
+        let problem = other.difference(&own).expect("they differ");
+        assert!(problem.contains(fragment), "{problem}");
+    }
+    assert_eq!(Origin::of(&cornell_box(), &trace_settings(SIZE, SIZE, 2)).difference(&own), None);
+}

@@ -1,0 +1,174 @@
+//! The program, killed and interrupted, resumed and merged: as a farm or a power cut would do it.
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+fn fechner() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_fechner"))
+}
+
+fn scene() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml")
+}
+
+fn render(folder: &Path, arguments: &[&str]) -> Command {
+    render_sized(folder, "64x64", arguments)
+}
+
+fn render_sized(folder: &Path, size: &str, arguments: &[&str]) -> Command {
+    let mut command = fechner();
+    command.arg("render").arg(scene()).args(["--size", size]).args(arguments).current_dir(folder);
+    command.stdout(Stdio::null()).stderr(Stdio::piped());
+    command
+}
+
+fn text(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn run(mut command: Command) -> String {
+    let output = command.output().expect("runs");
+    assert!(output.status.success(), "{}", text(&output));
+    text(&output)
+}
+
+/// Runs and expects exit status 2 and one line with all the fragments.
+fn assert_refused(mut command: Command, fragments: &[&str]) {
+    let output = command.output().expect("runs");
+    let message = text(&output);
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    let line = message.lines().find(|line| line.starts_with("fechner:")).unwrap_or_default();
+    assert!(fragments.iter().all(|fragment| line.contains(fragment)), "{fragments:?} are not in: {message}");
+    assert!(!message.contains("panicked"), "{message}");
+}
+
+fn wait_for(path: &Path, child: &mut Child) {
+    let started = Instant::now();
+    while !path.exists() {
+        assert!(child.try_wait().expect("a child").is_none(), "the render ended before its first checkpoint");
+        assert!(started.elapsed() < Duration::from_secs(300), "no checkpoint after five minutes");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+fn file(folder: &Path, name: &str) -> Vec<u8> {
+    std::fs::read(folder.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).expect("readable");
+    let mut names: Vec<_> =
+        entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+const UNTIL: [&str; 4] = ["--visibility", "3", "--seed", "11"];
+
+/// Killed twice in the middle and resumed, the picture has the bytes of an uninterrupted one; so has one that a signal
+/// ended, and that made its picture so far.
+#[test]
+fn a_killed_render_resumes_to_the_same_bytes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let whole = ["-o", "whole.exr"];
+    run(render(at, &[&UNTIL[..], &whole].concat()));
+
+    let parts = ["-o", "parts.exr", "--checkpoint", "a.film", "--checkpoint-every", "0.001"];
+    let parts = [&UNTIL[..], &parts].concat();
+    let resumed = [&parts[..], &["--resume"]].concat();
+    let mut child = render(at, &parts).spawn().expect("runs");
+    wait_for(&at.join("a.film"), &mut child);
+    child.kill().expect("SIGKILL");
+    assert!(!child.wait().expect("ended").success());
+    assert!(!at.join("parts.exr").exists(), "the kill came too late to show anything");
+    assert_refused(render(at, &parts), &["a.film", "--resume"]);
+
+    let before = file(at, "a.film");
+    let mut child = render(at, &resumed).spawn().expect("runs");
+    while file(at, "a.film") == before && child.try_wait().expect("a child").is_none() {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    // Harmless if it has ended meanwhile.
+    child.kill().expect("SIGKILL");
+    child.wait().expect("ended");
+
+    let message = run(render(at, &resumed));
+    assert!(message.contains("Checkpoint a.film"), "{message}");
+    assert!(file(at, "parts.exr") == file(at, "whole.exr"), "the resumed picture differs");
+    assert_eq!(names(at), ["a.film", "parts.exr", "whole.exr"], "something was left behind");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_signal_ends_a_render_with_its_picture_so_far() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let endless = ["--visibility", "0.01", "-o", "a.png", "--json", "a.json", "--checkpoint", "a.film"];
+    let mut child = render(at, &[&endless[..], &["--checkpoint-every", "0.001"]].concat()).spawn().expect("runs");
+    wait_for(&at.join("a.film"), &mut child);
+    let killed = Command::new("kill").args(["-TERM", &child.id().to_string()]).status().expect("kill");
+    assert!(killed.success());
+    let output = child.wait_with_output().expect("ended");
+    assert!(output.status.success(), "{}", text(&output));
+    assert!(text(&output).contains("Stopped by a signal"), "{}", text(&output));
+    assert_eq!(image::open(at.join("a.png")).expect("a picture").width(), 64);
+    let json: serde_json::Value = serde_json::from_slice(&file(at, "a.json")).expect("JSON");
+    assert_eq!(json["stop_reason"], "interrupted");
+    let mut info = fechner();
+    info.args(["info", "a.film"]).current_dir(at);
+    let shown = String::from_utf8(info.output().expect("runs").stdout).expect("text");
+    for fragment in ["64×64", "seeds", "--seed 0", "desktop", "0.01 aimed at", "after"] {
+        assert!(shown.contains(fragment), "{fragment} is not in {shown}");
+    }
+    assert_eq!(names(at), ["a.film", "a.json", "a.png"]);
+}
+
+/// Merged films are looked at again; what does not fit is refused by name.
+#[test]
+fn films_are_merged_and_judged_again() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let spent = ["--sampling", "uniform", "--visibility", "4", "--spp", "32", "-o", "x.png"];
+    for seed in ["1", "2"] {
+        let film = format!("{seed}.film");
+        run(render(at, &[&spent[..], &["--seed", seed, "--checkpoint", &film]].concat()));
+    }
+    let merge = |arguments: &[&str]| {
+        let mut command = fechner();
+        command.arg("merge").args(arguments).current_dir(at).stderr(Stdio::piped());
+        command
+    };
+    let message = run(merge(&["1.film", "2.film", "-o", "sum.exr", "--json", "sum.json"]));
+    assert!(message.contains("seeds 1, 2") && message.contains("above the target visibility 4"), "{message}");
+    run(merge(&["2.film", "1.film", "-o", "mus.exr"]));
+    assert!(file(at, "sum.exr") == file(at, "mus.exr"), "the order of the films changes the picture");
+    let json: serde_json::Value = serde_json::from_slice(&file(at, "sum.json")).expect("JSON");
+    assert_eq!((&json["samples_total"], &json["seeds"]), (&(64 * 64 * 64).into(), &serde_json::json!([1, 2])));
+    // One film's picture without another sample is the one that its render made.
+    run(merge(&["2.film", "-o", "again.png"]));
+    assert!(file(at, "again.png") == file(at, "x.png"));
+
+    run(merge(&["1.film", "2.film", "-o", "sum.film"]));
+    let on = ["--visibility", "4", "--spp", "128", "-o", "x.png", "--checkpoint", "sum.film", "--resume", "--seed"];
+    assert_refused(render(at, &[&on[..], &["2"]].concat()), &["sum.film", "1, 2"]);
+    run(render(at, &[&on[..], &["3"]].concat()));
+    assert_refused(merge(&["sum.film", "2.film", "-o", "y.exr"]), &["2.film", "sum.film", "seed 2"]);
+    assert_refused(merge(&["1.film", "1.film", "-o", "y.exr"]), &["1.film", "seed 1"]);
+    assert_refused(merge(&["1.film", "x.png", "-o", "y.exr"]), &["x.png", "not a film"]);
+    assert_refused(merge(&["1.film", "-o", "y.gif"]), &["y.gif"]);
+
+    let resumed = ["-o", "z.png", "--checkpoint", "1.film", "--resume", "--spp", "64", "--seed"];
+    assert_refused(render(at, &[&resumed[..], &["5"]].concat()), &["1.film", "--seed 1"]);
+    assert_refused(render_sized(at, "32x64", &[&resumed[..], &["1"]].concat()), &["1.film", "64x64", "32x64"]);
+    assert_refused(render(at, &[&resumed[..], &["1", "--clamp", "9"]].concat()), &["1.film", "clamp"]);
+    let short = file(at, "1.film");
+    std::fs::write(at.join("cut.film"), &short[..short.len() - 100]).expect("written");
+    assert_refused(merge(&["cut.film", "2.film", "-o", "y.exr"]), &["cut.film", "damaged"]);
+    assert!(
+        names(at).iter().all(|name| !name.starts_with('.') && name != "y.exr" && name != "z.png"),
+        "{:?}",
+        names(at)
+    );
+}
