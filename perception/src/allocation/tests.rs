@@ -95,7 +95,7 @@ fn the_gap_closes_and_every_constraint_holds() {
 /// A conic interior-point solver finds the optimum of problems small enough for it.
 #[test]
 fn a_conic_solver_finds_the_same_cost() {
-    for (seed, min_samples, most) in [(4, 16.0, 1e6), (11, 16.0, 1e6)] {
+    for (seed, min_samples, most) in [(4, 1.0, 1e6), (11, 16.0, 1e6)] {
         let case = Case::patchy(12, 8, 20.0, seed);
         let problem = AllocationProblem { min_samples, max_samples: most, ..case.problem() };
         let found = allocate(&problem).unwrap();
