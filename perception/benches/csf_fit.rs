@@ -5,13 +5,15 @@
 //! error taken out. Static foveal gratings of at least 1 cd/m² and at most 20 cpd.
 
 mod support;
+#[path = "support/table.rs"]
+mod table;
 
 use fechner_perception::Error;
 use fechner_perception::csf::{
     Barten89, Barten99, CastleChromatic, CastleCsf, ChromaticChannel, ContrastSensitivity, Daly93, Daly98, HdrVdp2,
     Laird06, MannosSakrison, StelaCsf,
 };
-use support::{Row, Table};
+use table::{Row, Table};
 
 struct Measurement {
     luminance_cd_m2: f64,

@@ -50,7 +50,7 @@ impl ReducedPlane {
         let ratio = self.factor / factor;
         // Fine sample j stands (j − 1) / ratio of a step past coarse sample 1.
         let last = self.samples.height() - 1;
-        let (upper, fraction) = ((j + ratio - 1) / ratio, ((j + ratio - 1) % ratio) as f32 / ratio as f32);
+        let (upper, fraction) = (j.div_ceil(ratio), ((j + ratio - 1) % ratio) as f32 / ratio as f32);
         let (above, below) = (self.samples.row(upper.min(last)), self.samples.row((upper + 1).min(last)));
         buffer.clear();
         buffer.extend(above.iter().zip(below).map(|(above, below)| above + (below - above) * fraction));

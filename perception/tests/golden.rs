@@ -55,7 +55,8 @@ fn peaks() {
         );
     }
     // Section 3.3, 3.5 and 3.7: (luminance, peak) of Daly 1993, Barten 1999, castle and stela, to the digits printed there.
-    let peaks: [(&dyn ContrastSensitivity, &[(f64, f64)], f64); 4] = [
+    type Peaks<'a> = (&'a dyn ContrastSensitivity, &'a [(f64, f64)], f64);
+    let peaks: [Peaks<'_>; 4] = [
         (
             &Daly93::default(),
             &[(0.1, 27.667_19), (1.0, 64.532_33), (10.0, 117.1547), (30.0, 145.0632), (1000.0, 195.1269)],

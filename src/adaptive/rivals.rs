@@ -1,6 +1,6 @@
 //! The rules of today's renderers, on the same tracer and sampler, for comparison.
 //!
-//! They look at every [`STEP`] samples, as Cycles does, and know neither display nor eye: `exposure` is all that they are
+//! They look at every 16 samples, as Cycles does, and know neither display nor eye: `exposure` is all that they are
 //! told. Not for use: each has a knob without a unit, and stops dark regions and fireflies early.
 
 use super::settings::RivalRule;

@@ -29,7 +29,7 @@ pub(super) fn colour(exr: &ExrImage) -> Option<Colour<'_>> {
         .iter()
         .copied()
         .find(|layer| layer.is_empty())
-        .or_else(|| THE_PICTURE.iter().find_map(|name| called(*name)))
+        .or_else(|| THE_PICTURE.iter().find_map(|name| called(name)))
         .or_else(|| layers.iter().copied().find(|layer| !is_auxiliary(layer)));
     match best {
         Some(layer) => {

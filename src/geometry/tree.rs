@@ -1,6 +1,6 @@
 //! obvhs behind one small trait, fenced: the builder of every tree, and the walk of the binary ones.
 //!
-//! Triangles are walked in an eight-wide tree of our own (`wide_tree`), cut from what [`build_binary`] makes.
+//! Triangles are walked in an eight-wide tree of our own (`wide_tree`), cut from what `build_binary` makes.
 //!
 //! Four hazards of obvhs 0.4, each kept out and each with a regression test (here, in `mesh_tree` and in `world`):
 //! 1. its triangle test leaks at edges: we bring our own, and pad the boxes by 2e-7 of their largest coordinate;

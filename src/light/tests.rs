@@ -197,7 +197,7 @@ fn samples_follow_their_pdf() {
                     None => failed += 1.0,
                 }
             }
-            let total = expected.iter().sum::<f64>() + f64::from(failed) / SAMPLES as f64;
+            let total = expected.iter().sum::<f64>() + failed / SAMPLES as f64;
             assert!((total - 1.0).abs() < 4e-3, "{name}, normal {normal}: pdf and failures add up to {total}");
             let (mut statistic, mut degrees, mut rest) = (0.0, 0.0, (0.0, 0.0));
             for (expected, observed) in expected.iter().zip(&observed) {

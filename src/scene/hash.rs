@@ -100,7 +100,7 @@ mod tests {
             |s| s.meshes[0].triangles[0].rotate_left(1),
             |s| s.instances[0].to_world.translation.z += 1e-6,
             |s| s.materials[0].emits_both_sides ^= true,
-            |s| s.materials[0].emission.factor.x += 1e-6,
+            |s| s.materials[0].emission.factor.x += 1e-9 + f32::EPSILON * s.materials[0].emission.factor.x,
             |s| s.textures[0].nearest ^= true,
             |s| match &mut s.textures[0].texels {
                 Texels::Bytes(texels, _) => Arc::make_mut(texels)[0][0] ^= 1,

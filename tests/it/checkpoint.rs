@@ -236,7 +236,7 @@ fn a_merged_film_goes_on_by_another_seed() {
     let mut sum = films[0].clone();
     sum.add(&films[1]).expect("few samples");
     let setup = Setup::new(3);
-    let settings = setup.settings(Sampling::Adaptive, 6.0);
+    let settings = setup.settings(Sampling::Adaptive, 3.0);
     let state = RenderState::of_film(sum, settings.limits.max_samples);
     assert!(state.pending.is_empty(), "the pilot is there");
     let rendered = resume(&setup.tracer, &settings, state, &Quiet).expect("goes on");

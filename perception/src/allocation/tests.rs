@@ -121,12 +121,12 @@ fn conic_optimum(case: &Case, scale: &Plane, least: f64, most: f64) -> f64 {
         columns.push(column);
         values.push(value);
     };
-    for column in 0..count {
+    for (column, scale) in scale.iter().enumerate().take(count) {
         let mut unit = Plane::filled(width, height, 0.0);
         unit.values_mut()[column] = 1.0;
         let weight =
             2.0 * f64::from(case.thresholds.noise_gain().values()[column]) * f64::from(case.variance.values()[column])
-                / scale[column];
+                / scale;
         for (row, value) in case.thresholds.pooled(&unit).values().iter().enumerate() {
             if *value > 0.0 {
                 entry(row, column, f64::from(*value) * weight);

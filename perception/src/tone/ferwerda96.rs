@@ -76,7 +76,7 @@ mod tests {
         for (adaptation, expected) in cones {
             assert!((law(adaptation).cone_scale / expected - 1.0).abs() < 1e-6, "{adaptation}");
         }
-        for (adaptation, expected) in [(0.001, 1678.200_86), (0.01, 564.282_264_3), (1.0, 7.667_781_849)] {
+        for (adaptation, expected) in [(0.001, 1_678.200_86), (0.01, 564.282_264_3), (1.0, 7.667_781_849)] {
             assert!((law(adaptation).rod_scale / expected - 1.0).abs() < 1e-6, "{adaptation}");
         }
         for (adaptation, expected) in [(0.01, 0.848_485), (0.1, 0.545_455), (1.0, 0.242_424), (5.0, 0.030_615)] {

@@ -32,7 +32,7 @@ pub(super) fn pose(path: &Path, document: &gltf::Document, buffers: &Buffers, se
         let wrong =
             |problem: &str| LoadError::invalid(path, format_args!("animation {}: {problem}", animation.index()));
         let times: Vec<f32> = buffers.floats::<1>(&sampler.input())?.into_iter().map(|[time]| time).collect();
-        if times.is_empty() || times.windows(2).any(|pair| !(pair[0] <= pair[1])) || !times[0].is_finite() {
+        if times.is_empty() || !times.is_sorted() || times.iter().any(|time| !time.is_finite()) {
             return Err(wrong("its times are missing or do not increase"));
         }
         let cubic = sampler.interpolation() == Interpolation::CubicSpline;

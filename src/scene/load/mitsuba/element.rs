@@ -229,9 +229,9 @@ impl Element {
     /// The element's own x, y and z, or its three values.
     pub(super) fn own_vector(&self, default: f32) -> Result<Vec3, LoadError> {
         if let Some(value) = self.attribute("value") {
-            return match self.numbers(value)?.as_slice() {
-                &[all] => Ok(Vec3::splat(all)),
-                &[x, y, z] => Ok(Vec3::new(x, y, z)),
+            return match *self.numbers(value)?.as_slice() {
+                [all] => Ok(Vec3::splat(all)),
+                [x, y, z] => Ok(Vec3::new(x, y, z)),
                 _ => Err(self.error("expected three numbers")),
             };
         }

@@ -75,6 +75,7 @@ const ALUMINIUM: &[Row] = &[
     [688.81, 1.8301, 8.0601],
     [729.32, 2.1606, 8.3565],
 ];
+#[allow(clippy::approx_constant, reason = "an absorption index that happens to be near π")]
 const CHROMIUM: &[Row] = &[
     [354.0, 1.84, 2.64],
     [381.0, 1.92, 2.74],
