@@ -101,7 +101,7 @@ fn child() {
 
 /// `cargo test --release -p fechner --test it thousands_of_mutations -- --ignored --nocapture`
 #[test]
-#[ignore = "minutes; its result stands in scenes/README.md"]
+#[ignore = "minutes"]
 fn thousands_of_mutations_end_well() {
     let program = std::env::current_exe().unwrap();
     for file in good_files() {

@@ -62,7 +62,7 @@ fn luminance(rgb: Vec3) -> f64 {
 
 /// `cargo test --release -p fechner --test it references -- --ignored --nocapture [scene's name in FECHNER_SCENE]`
 #[test]
-#[ignore = "minutes of rendering; its table stands in scenes/README.md"]
+#[ignore = "minutes of rendering"]
 fn pictures_have_their_references_brightness() {
     let Some(folder) = assets() else { return };
     let only = std::env::var("FECHNER_SCENE").unwrap_or_default();
