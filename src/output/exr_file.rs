@@ -127,7 +127,7 @@ fn text(text: &str) -> Text {
         c if c.is_ascii() => c,
         _ => '?',
     };
-    Text::new_or_none(&text.chars().map(plain).collect::<String>()).expect("every character fits a byte")
+    Text::new_or_none(text.chars().map(plain).collect::<String>()).expect("every character fits a byte")
 }
 
 fn attribute_value(value: &Attribute) -> AttributeValue {
