@@ -4,7 +4,7 @@ use super::Subject;
 use super::truth::Truth;
 use anyhow::{Context, Result};
 use colorvideovdp::{Color, Cvvdp, DisplayModel, Execution, Geometry, Image, Options, Photometry};
-use fechner_perception::Eotf;
+use fechner_perception::{Display, Eotf};
 use flip_rs::{RgbImage, Weighting, ldr_flip};
 
 /// How far a picture is from the reference by other people's measures.
@@ -37,15 +37,7 @@ pub(crate) fn measure(subject: &Subject, truth: &Truth, picture: &[[f32; 3]]) ->
         let light = truth.display_cd_m2(picture).into_iter().flatten().collect();
         Image::new(width, height, 3, light)
     };
-    let contrast = display.white_cd_m2 / display.black_cd_m2.max(display.white_cd_m2 * 1e-6);
-    let model = DisplayModel::new(
-        "fechner",
-        Photometry::new(display.white_cd_m2, contrast, 0.0, 0.0, 1.0)?,
-        Geometry::from_ppd([width, height], display.pixels_per_degree)?,
-        "BT.709-linear",
-    )?;
-    let metric = Cvvdp::new(model, Options::default().with_execution(Execution::SingleThread))?;
-    let prediction = metric
+    let prediction = color_video_vdp(display, [width, height])?
         .predict_image(&image(picture)?, &image(&truth.picture)?, Color::Linear)
         .context("ColorVideoVDP refuses the pictures")?;
     Ok(Metrics {
@@ -54,6 +46,33 @@ pub(crate) fn measure(subject: &Subject, truth: &Truth, picture: &[[f32; 3]]) ->
         jod: f64::from(prediction.jod),
         relmse: relative_mean_squared_error(&truth.picture, picture),
     })
+}
+
+/// ColorVideoVDP's just-objectionable differences between two sequences of displayed light, linear RGB in cd/m².
+pub(crate) fn video_jod(
+    display: &Display,
+    size: (usize, usize),
+    frames_per_second: f64,
+    [test, reference]: [Vec<Vec<f32>>; 2],
+) -> Result<f64> {
+    let images = |frames: Vec<Vec<f32>>| {
+        frames.into_iter().map(|light| Image::new(size.0, size.1, 3, light)).collect::<Result<Vec<Image>, _>>()
+    };
+    let prediction = color_video_vdp(display, [size.0, size.1])?
+        .predict_video(&images(test)?, &images(reference)?, frames_per_second as f32, Color::Linear)
+        .context("ColorVideoVDP refuses the frames")?;
+    Ok(f64::from(prediction.jod))
+}
+
+fn color_video_vdp(display: &Display, size: [usize; 2]) -> Result<Cvvdp> {
+    let contrast = display.white_cd_m2 / display.black_cd_m2.max(display.white_cd_m2 * 1e-6);
+    let model = DisplayModel::new(
+        "fechner",
+        Photometry::new(display.white_cd_m2, contrast, 0.0, 0.0, 1.0)?,
+        Geometry::from_ppd(size, display.pixels_per_degree)?,
+        "BT.709-linear",
+    )?;
+    Ok(Cvvdp::new(model, Options::default().with_execution(Execution::SingleThread))?)
 }
 
 /// Mean of (test − reference)² / (reference² + 0.01²).

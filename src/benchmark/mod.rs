@@ -7,6 +7,7 @@
 //!
 //! Not for timing the tracer: see `benches/`.
 
+mod animation;
 mod arm;
 mod metrics;
 mod oracle;
@@ -18,6 +19,7 @@ mod runner;
 mod summary;
 mod truth;
 
+pub use animation::{AnimationRow, AnimationSettings, animation};
 pub use arm::Arm;
 pub use record::{Record, Results};
 

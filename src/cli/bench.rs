@@ -1,15 +1,15 @@
 //! `fechner bench`: what adaptive sampling saves.
 
 use super::seeing::parse_positive;
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
-use fechner::benchmark::{Arm, BenchSettings, bounds, run as run_bench};
+use fechner::benchmark::{AnimationRow, AnimationSettings, Arm, BenchSettings, animation, bounds, run as run_bench};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `bench`.
 #[derive(Debug, Args)]
 pub(super) struct BenchArguments {
-    /// Scenes; without any, those of the folder `scenes`.
+    /// Scenes; without any, those of the suite in the folder `scenes`.
     scenes: Vec<PathBuf>,
     /// How much to do.
     #[arg(long, value_enum, default_value = "quick")]
@@ -46,15 +46,34 @@ enum Suite {
     Quick,
     /// 256×256, visibility 1, every arm, five seeds: a night.
     Full,
+    /// 96×54, visibility 2, eight frames at 24 and at 60 a second: what motion hides. Prints a table only.
+    Animation,
 }
+
+/// Stills of the suite, in `scenes/`.
+const STILLS: [&str; 10] = [
+    "complementary-lamps",
+    "cornell-box",
+    "cornell-glass",
+    "dark-window",
+    "glass-caustic",
+    "many-lights",
+    "product",
+    "still-life",
+    "textured-room",
+    "veach-mis",
+];
+/// Its shots.
+const SHOTS: [&str; 1] = ["rolling-ball"];
 
 /// Runs and prints the table.
 pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
-    let scenes = if arguments.scenes.is_empty() { scenes_of(Path::new("scenes"))? } else { arguments.scenes.clone() };
     let (size, visibility, seeds, arms) = match arguments.suite {
         Suite::Quick => (128, 4.0, 3, Arm::QUICK.to_vec()),
         Suite::Full => (256, 1.0, 5, Arm::ALL.to_vec()),
+        Suite::Animation => return run_animation(arguments),
     };
+    let scenes = scenes_or(&STILLS, arguments)?;
     let size = arguments.size.unwrap_or(size);
     let settings = BenchSettings {
         scenes,
@@ -96,6 +115,36 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
     Ok(())
 }
 
+fn run_animation(arguments: &BenchArguments) -> Result<()> {
+    let width = arguments.size.unwrap_or(96);
+    let settings = AnimationSettings {
+        scenes: scenes_or(&SHOTS, arguments)?,
+        size: (width, (width * 9).div_ceil(16)),
+        frames: 8,
+        rates: vec![24.0, 60.0],
+        visibility: arguments.visibility.unwrap_or(2.0),
+        reference_spp: 1024,
+        display: arguments.display.clone(),
+    };
+    let rows = animation(&settings, &|line: &str| eprintln!("{line}"))?;
+    println!(
+        "| shot | frames a second | motion: spp, JOD | still: spp, JOD | still / motion | even, as good: spp | even / motion |"
+    );
+    println!("| --- | --- | --- | --- | --- | --- | --- |");
+    for row in rows {
+        let ratio = row.still_spp / row.motion_spp;
+        let even = row
+            .uniform_spp
+            .map_or_else(|| "more than tried | ".to_owned(), |spp| format!("{spp:.0} | {:.2}", spp / row.motion_spp));
+        let AnimationRow { scene, frames_per_second, motion_spp, motion_jod, still_spp, still_jod, .. } = row;
+        println!(
+            "| {scene} | {frames_per_second} | {motion_spp:.0}, {motion_jod:.2} | {still_spp:.0}, {still_jod:.2} | \
+             {ratio:.2} | {even} |"
+        );
+    }
+    Ok(())
+}
+
 /// Arms by name, and those that others are compared with.
 fn named_arms(names: &[String]) -> Result<Vec<Arm>> {
     for name in names {
@@ -109,13 +158,14 @@ fn named_arms(names: &[String]) -> Result<Vec<Arm>> {
     Ok(Arm::ALL.into_iter().filter(|&arm| needed(arm) || is_named(arm)).collect())
 }
 
-fn scenes_of(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(folder)
-        .with_context(|| format!("{}: name scenes, or run this where the folder is", folder.display()))?;
-    let mut scenes: Vec<PathBuf> = entries
-        .filter_map(|entry| entry.ok().map(|entry| entry.path()))
-        .filter(|path| path.extension().is_some_and(|ending| ending == "toml"))
-        .collect();
-    scenes.sort();
-    Ok(scenes)
+/// The scenes that are asked for, or those of the suite.
+fn scenes_or(suite: &[&str], arguments: &BenchArguments) -> Result<Vec<PathBuf>> {
+    if !arguments.scenes.is_empty() {
+        return Ok(arguments.scenes.clone());
+    }
+    let folder = Path::new("scenes");
+    if !folder.is_dir() {
+        bail!("{}: not here; name scenes, or run this where the folder is", folder.display());
+    }
+    Ok(suite.iter().map(|name| folder.join(name).with_extension("toml")).collect())
 }

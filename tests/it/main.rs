@@ -18,6 +18,7 @@
 //! - `tonemap`: HDR pictures for displays, one by one and over time
 
 mod adaptive_render;
+mod animate;
 mod bad_input;
 mod bench;
 mod camera_and_time;

@@ -1,0 +1,230 @@
+//! What motion hides: the frames of a shot by the rule for motion and by the rule for stills, both asked for one visibility,
+//! and evenly sampled ones of the same judged quality.
+//!
+//! Judged as a video by ColorVideoVDP, which no rule optimises, against frames of many samples by other seeds. Not for
+//! stills.
+
+use super::metrics::video_jod;
+use crate::adaptive::plan::{pilot_plan, uniform_plan};
+use crate::adaptive::settings::{Limits, LoopSettings, Sampling};
+use crate::adaptive::{Quiet, render};
+use crate::animate::track::Track;
+use crate::animate::{SceneSource, ShotSettings};
+use crate::film::Film;
+use crate::integrator::{PathTracer, TraceSettings};
+use crate::sampler::hash_words;
+use crate::scene::Scene;
+use crate::scene::load::{LoadError, LoadOptions, load};
+use anyhow::{Context, Result};
+use fechner_perception::display::{Display, Viewing};
+use fechner_perception::tone;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// What to run.
+#[derive(Clone, Debug)]
+pub struct AnimationSettings {
+    /// Scenes that move.
+    pub scenes: Vec<PathBuf>,
+    /// Width and height in pixels.
+    pub size: (u32, u32),
+    /// Frames of each shot.
+    pub frames: u32,
+    /// Frame rates; the shot begins at the same second.
+    pub rates: Vec<f64>,
+    /// Visibility that both rules are asked for.
+    pub visibility: f64,
+    /// Samples a pixel of the reference.
+    pub reference_spp: u32,
+    /// Display preset.
+    pub display: String,
+}
+
+/// One shot.
+#[derive(Clone, Debug, Serialize)]
+pub struct AnimationRow {
+    /// Scene.
+    pub scene: String,
+    /// Frames a second.
+    pub frames_per_second: f64,
+    /// Mean samples a pixel by the rule for motion.
+    pub motion_spp: f64,
+    /// What they look like as a video.
+    pub motion_jod: f64,
+    /// Mean samples a pixel by the rule for stills.
+    pub still_spp: f64,
+    /// What they look like as a video.
+    pub still_jod: f64,
+    /// Samples a pixel with which evenly sampled frames look like those of the rule for motion; `None` where even the most
+    /// that were tried look worse.
+    pub uniform_spp: Option<f64>,
+}
+
+/// Seconds of scene time at which shots begin.
+const START_S: f64 = 0.25;
+/// Keeps the reference's seeds apart.
+const REFERENCE_STREAM: u64 = 0x5245_4645;
+
+struct Files<'a>(&'a Path);
+
+impl SceneSource for Files<'_> {
+    fn at(&self, seconds: f64) -> Result<Scene, LoadError> {
+        load(self.0, &LoadOptions { frame_time: seconds, ..LoadOptions::default() })
+    }
+}
+
+/// Displayed light of each frame, linear RGB in cd/m².
+type Frames = Vec<Vec<f32>>;
+
+/// Runs every shot.
+///
+/// # Errors
+/// Scenes that do not load.
+pub fn animation(settings: &AnimationSettings, say: &dyn Fn(&str)) -> Result<Vec<AnimationRow>> {
+    let mut rows = Vec::new();
+    for scene in &settings.scenes {
+        for &rate in &settings.rates {
+            let row = Bench::new(settings, scene, rate)?.row()?;
+            say(&format!("{} at {rate}: done", row.scene));
+            rows.push(row);
+        }
+    }
+    Ok(rows)
+}
+
+struct Bench<'a> {
+    settings: &'a AnimationSettings,
+    name: String,
+    shot: ShotSettings,
+    track: Track,
+    scenes: Vec<Arc<Scene>>,
+}
+
+impl<'a> Bench<'a> {
+    fn new(settings: &'a AnimationSettings, path: &'a Path, rate: f64) -> Result<Self> {
+        let source = Files(path);
+        let display = Display::preset(&settings.display).context("a display preset")?;
+        let first = (START_S * rate).round() as u32;
+        let shot = ShotSettings {
+            first,
+            last: first + settings.frames - 1,
+            frames_per_second: rate,
+            pausable: false,
+            trace: TraceSettings::new(settings.size.0, settings.size.1, 0),
+            sampling: Sampling::Adaptive,
+            limits: Limits::of_visibility(settings.visibility),
+            viewing: Viewing::of(display),
+            nits_per_unit: source.at(0.0)?.nits_per_unit,
+            adapted_to_cd_m2: None,
+        };
+        let operator = tone::operator("constant", None).context("an operator")?;
+        let track = Track::make(&source, &shot, operator.as_ref(), &|_| {})?;
+        let scenes = (shot.first..=shot.last).map(|frame| source.at(shot.seconds(f64::from(frame))).map(Arc::new));
+        let scenes = scenes.collect::<Result<Vec<_>, _>>()?;
+        let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+        Ok(Self { settings, name, shot, track, scenes })
+    }
+
+    fn row(&self) -> Result<AnimationRow> {
+        let reference = self.uniform(REFERENCE_STREAM, &[self.settings.reference_spp])?.remove(0);
+        let jod = |frames: Frames| {
+            let size = (self.settings.size.0 as usize, self.settings.size.1 as usize);
+            let rate = self.shot.frames_per_second;
+            video_jod(&self.shot.viewing.display, size, rate, [frames, reference.clone()])
+        };
+        let (motion_spp, motion) = self.adaptive(false)?;
+        let (still_spp, still) = self.adaptive(true)?;
+        let (motion_jod, still_jod) = (jod(motion)?, jod(still)?);
+        let counts: Vec<u32> =
+            (2..).map(|power| 1 << power).take_while(|n| 2 * n <= self.settings.reference_spp).collect();
+        let mut curve = Vec::new();
+        for (&spp, frames) in counts.iter().zip(self.uniform(0, &counts)?) {
+            curve.push((f64::from(spp), jod(frames)?));
+        }
+        Ok(AnimationRow {
+            scene: self.name.clone(),
+            frames_per_second: self.shot.frames_per_second,
+            motion_spp,
+            motion_jod,
+            still_spp,
+            still_jod,
+            uniform_spp: where_reached(&curve, motion_jod),
+        })
+    }
+
+    /// Mean samples a pixel and the frames by one of the rules.
+    fn adaptive(&self, pausable: bool) -> Result<(f64, Frames)> {
+        let shot = ShotSettings { pausable, viewing: self.shot.viewing.clone(), ..self.shot };
+        let (mut samples, mut frames) = (0, Vec::new());
+        for index in 0..self.scenes.len() {
+            let operator = tone::operator("constant", None).context("an operator")?;
+            let settings: LoopSettings = shot.frame_settings(operator, &self.track.frames[index]);
+            let rendered = render(&self.tracer(index, 0), &settings, &Quiet)?;
+            samples += rendered.film.total_samples();
+            frames.push(self.displayed(index, &rendered.film));
+        }
+        let pixels = f64::from(self.settings.size.0) * f64::from(self.settings.size.1);
+        Ok((samples as f64 / pixels / frames.len() as f64, frames))
+    }
+
+    /// The frames with each of these counts, which increase.
+    fn uniform(&self, stream: u64, counts: &[u32]) -> Result<Vec<Frames>> {
+        let mut by_count = vec![Frames::new(); counts.len()];
+        for index in 0..self.scenes.len() {
+            let tracer = self.tracer(index, stream);
+            let mut film = Film::new(self.settings.size.0, self.settings.size.1);
+            for (frames, &count) in by_count.iter_mut().zip(counts) {
+                while film.total_samples() < u64::from(count) * self.pixels() {
+                    let plan = match film.total_samples() {
+                        0 => pilot_plan(film.width() * film.height(), count),
+                        _ => uniform_plan(&film, count),
+                    };
+                    tracer.trace(&plan, &mut film, &|_| {});
+                }
+                frames.push(self.displayed(index, &film));
+            }
+        }
+        Ok(by_count)
+    }
+
+    fn pixels(&self) -> u64 {
+        u64::from(self.settings.size.0) * u64::from(self.settings.size.1)
+    }
+
+    fn tracer(&self, index: usize, stream: u64) -> PathTracer {
+        let seed = hash_words(stream, u64::from(self.shot.first) + index as u64);
+        PathTracer::new(Arc::clone(&self.scenes[index]), TraceSettings { seed, ..self.shot.trace })
+    }
+
+    fn displayed(&self, index: usize, film: &Film) -> Vec<f32> {
+        let fitted = self.track.frames[index].fitted.clone().restore();
+        let display = &self.shot.viewing.display;
+        let estimate = film.estimate(self.shot.nits_per_unit);
+        let light = estimate.rgb_cd_m2.iter().flat_map(|&rgb| fitted.map_rgb(rgb));
+        light.map(|value| display.luminance_cd_m2(f64::from(value)) as f32).collect()
+    }
+}
+
+/// Samples at which a curve of (samples, quality) first reaches a quality, straight between points in the logarithm.
+fn where_reached(curve: &[(f64, f64)], quality: f64) -> Option<f64> {
+    let first = curve.first().filter(|point| point.1 >= quality);
+    first.map(|point| point.0).or_else(|| {
+        let pair = curve.windows(2).find(|pair| pair[0].1 < quality && pair[1].1 >= quality)?;
+        let share = (quality - pair[0].1) / (pair[1].1 - pair[0].1);
+        Some((pair[0].0.ln() + share * (pair[1].0 / pair[0].0).ln()).exp())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn curves_are_read_between_their_points() {
+        let curve = [(4.0, 7.0), (8.0, 8.0), (16.0, 9.0)];
+        assert_eq!(where_reached(&curve, 6.0), Some(4.0));
+        assert!((where_reached(&curve, 8.5).expect("reached") - 128f64.sqrt()).abs() < 1e-9);
+        assert_eq!(where_reached(&curve, 9.5), None);
+    }
+}

@@ -1,0 +1,138 @@
+//! `fechner animate`: the same frames in any order and from any process, kept when they are there.
+
+use assert_cmd::Command;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// A lamp, a floor and a ball that crosses in a second, under a camera that turns.
+const SCENE: &str = r#"
+nits_per_unit = 100.0
+[film]
+size = [24, 16]
+[camera]
+keyframes = [
+    { time = 0.0, position = [0, 1, 4], look_at = [0, 0.6, 0] },
+    { time = 1.0, position = [0.5, 1, 4], look_at = [0.2, 0.6, 0] },
+]
+[materials.grey]
+type = "diffuse"
+reflectance = [0.5, 0.5, 0.5]
+[materials.lamp]
+type = "diffuse"
+reflectance = [0, 0, 0]
+emission = [8, 8, 8]
+[[objects]]
+rectangle = { corner = [-4, 0, 4], edge_u = [8, 0, 0], edge_v = [0, 0, -8] }
+material = "grey"
+[[objects]]
+rectangle = { corner = [-1, 3, -1], edge_u = [2, 0, 0], edge_v = [0, 0, 2] }
+material = "lamp"
+[[objects]]
+sphere = { center = [0, 0.5, 0], radius = 0.5 }
+material = "grey"
+keyframes = [ { time = 0.0, translate = [-1, 0, 0] }, { time = 1.0, translate = [1, 0, 0] } ]
+"#;
+
+/// Runs `animate` in a folder that has the scene; what it said.
+fn animate(folder: &Path, arguments: &[&str]) -> String {
+    std::fs::write(folder.join("scene.toml"), SCENE).expect("written");
+    let output = Command::cargo_bin("fechner")
+        .expect("the binary is built")
+        .current_dir(folder)
+        .args(["animate", "scene.toml"])
+        .args(arguments)
+        .output()
+        .expect("it starts");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{said}");
+    said
+}
+
+/// Every picture and track in a folder. Records hold times, which differ.
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    std::fs::read_dir(folder.join("out"))
+        .expect("there are frames")
+        .map(|entry| entry.expect("an entry").path())
+        .filter(|path| !path.ends_with("shot.json") && !path.to_string_lossy().contains("shot.0"))
+        .chain((0..4).map(|frame| folder.join(format!("out/shot.0{frame}.exr"))))
+        .map(|path| {
+            (path.to_string_lossy()[folder.to_string_lossy().len()..].to_owned(), std::fs::read(&path).expect("read"))
+        })
+        .collect()
+}
+
+#[test]
+fn frames_do_not_depend_on_order_or_process() {
+    let [at_once, backwards] = [(); 2].map(|()| tempfile::tempdir().expect("a folder"));
+    let common = ["--fps", "4", "--visibility", "8", "-o", "out/shot.##.exr"];
+    animate(at_once.path(), &[&["--frames", "0..3", "--video", "out/shot.y4m"], &common[..]].concat());
+    for frame in (0..4).rev() {
+        let frames = format!("{frame}..{frame}");
+        let last: &[&str] = if frame == 0 { &["--video", "out/shot.y4m"] } else { &[] };
+        animate(
+            backwards.path(),
+            &[&["--frames", &frames, "--shot", "0..3", "--threads", "1"], &common[..], last].concat(),
+        );
+    }
+    let (a, b) = (files(at_once.path()), files(backwards.path()));
+    assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>());
+    for (name, bytes) in &a {
+        assert!(*bytes == b[name], "{name} differs");
+    }
+    // Four frames of three bytes a pixel, and their headers.
+    assert!(a["/out/shot.y4m"].len() > 4 * 3 * 24 * 16 && a["/out/shot.y4m"].starts_with(b"YUV4MPEG2 W24 H16 F4:1"));
+}
+
+/// A run that was broken off goes on with what is missing; another target makes frames anew.
+#[test]
+fn finished_frames_are_kept() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let arguments = ["--frames", "0..1", "--spp", "16", "-o", "shot.##.png"];
+    animate(folder.path(), &arguments);
+    let frame = |number: u32| folder.path().join(format!("shot.0{number}.png"));
+    let first = std::fs::read(frame(0)).expect("read");
+    std::fs::remove_file(frame(1)).expect("removed");
+    let said = animate(folder.path(), &arguments);
+    assert!(said.contains("shot.00.png: is there") && !said.contains("shot.01.png: is there"), "{said}");
+    assert!(frame(1).is_file() && std::fs::read(frame(0)).expect("read") == first);
+    let said = animate(folder.path(), &["--frames", "0..1", "--spp", "17", "-o", "shot.##.png"]);
+    assert!(!said.contains("is there"), "{said}");
+}
+
+/// Noise that is gone in the next frame may be stronger than in a picture that somebody looks at for long.
+#[test]
+fn motion_needs_fewer_samples_than_a_pause() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let samples = |arguments: &[&str]| {
+        animate(folder.path(), &[&["--frames", "1..1", "--visibility", "1", "-o", "shot.##.png"], arguments].concat());
+        let text = std::fs::read_to_string(folder.path().join("shot.01.json")).expect("a record");
+        let record: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+        record["report"]["samples_total"].as_f64().expect("a number")
+    };
+    let (moving, paused) = (samples(&["--fps", "60"]), samples(&["--fps", "60", "--pausable"]));
+    assert!(2.0 * moving < paused, "{moving} and {paused} samples");
+}
+
+#[test]
+fn bad_arguments_are_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("scene.toml"), SCENE).expect("written");
+    for (arguments, expected) in [
+        (&["--frames", "5..2", "-o", "a.#.png"][..], "not a range of frames"),
+        (&["--frames", "0..2", "-o", "a.png"], "a sequence's name has #"),
+        (&["--frames", "0..2", "--shot", "1..2", "-o", "a.#.png"], "--frames reaches beyond --shot"),
+        (&["--frames", "0..2", "-o", "a.#.png", "--video", "a.gif"], "videos end in .y4m or .mp4"),
+        (&["--frames", "0..2", "-o", "a.#.png", "--operator", "sepia"], "no tone operator"),
+        (&["--frames", "0..2", "-o", "a.#.png", "--fps", "0.1"], "between 1 and 1000"),
+    ] {
+        let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+        let output = command
+            .current_dir(folder.path())
+            .args(["animate", "scene.toml"])
+            .args(arguments)
+            .output()
+            .expect("starts");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(2) && said.contains(expected), "{arguments:?}: {said}");
+    }
+}
