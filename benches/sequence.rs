@@ -82,6 +82,7 @@ fn rendered(scene: &Arc<Scene>, sequence: Sequence, seed: u64, effort: Effort) -
         viewing: Viewing::of(Display::preset("desktop").context("a preset")?),
         nits_per_unit: scene.nits_per_unit,
         operator: operator("constant", None).context("an operator")?,
+        importance: None,
     };
     let trace = TraceSettings { sequence, ..TraceSettings::new(SIZE, SIZE, seed) };
     Ok(render(&PathTracer::new(Arc::clone(scene), trace), &settings, &Quiet)?)

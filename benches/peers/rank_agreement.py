@@ -33,7 +33,8 @@ from scipy.stats import kendalltau, spearmanr
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 FECHNER = ROOT / "target" / "release" / "fechner"
 SCENES = ["cornell-box", "still-life", "textured-room", "dark-window"]
-SIZE = "256x192"
+SIZE = "160x120"
+REFERENCE_SAMPLES = 256
 PIXELS_PER_DEGREE = 38.0
 WHITE_CD_M2 = 200.0
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -44,7 +45,7 @@ def render(scene, spp, seed, folder):
     target = folder / f"{scene}-{spp}-{seed}.png"
     command = [FECHNER, "render", ROOT / "scenes" / f"{scene}.toml", "-o", target, "--size", SIZE]
     command += ["--sampling", "uniform", "--spp", str(spp), "--seed", str(seed)]
-    subprocess.run([str(part) for part in command], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([str(part) for part in command], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     return read(target)
 
 
@@ -140,7 +141,7 @@ def main():
             sets = {}
             for scene in SCENES:
                 few = {f"{spp} spp": render(scene, spp, 2, folder) for spp in (4, 16, 64)}
-                sets[scene] = (render(scene, 512, 1, folder), few)
+                sets[scene] = (render(scene, REFERENCE_SAMPLES, 1, folder), few)
         for scene, (reference, few) in sets.items():
             predictor = video_difference_predictor(reference.shape)
             for version, test in {**versions(reference), **few}.items():

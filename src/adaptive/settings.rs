@@ -1,5 +1,6 @@
 //! What a render is asked to do.
 
+use fechner_perception::Plane;
 use fechner_perception::display::Viewing;
 use fechner_perception::model::ThresholdModel;
 use fechner_perception::tone::ToneOperator;
@@ -75,6 +76,8 @@ pub struct LoopSettings {
     pub nits_per_unit: f64,
     /// How the picture is shown.
     pub operator: Box<dyn ToneOperator>,
+    /// What each pixel's thresholds are multiplied by, above 0, of the film's size: somebody's own idea of what matters.
+    pub importance: Option<Plane>,
 }
 
 /// Samples that a pixel gets at most when nobody says otherwise: beyond it, it is reported as visible instead.

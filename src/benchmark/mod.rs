@@ -105,6 +105,7 @@ impl Subject {
             viewing: self.viewing.clone(),
             nits_per_unit: self.scene.nits_per_unit,
             operator: tone::operator("constant", None).context("an operator")?,
+            importance: None,
         })
     }
 

@@ -113,6 +113,7 @@ pub(crate) fn loop_settings(nits_per_unit: f64, sampling: Sampling, visibility: 
         viewing: Viewing::of(Display::preset("desktop").expect("a preset")),
         nits_per_unit,
         operator: tone::operator("constant", None).expect("an operator"),
+        importance: None,
     }
 }
 
