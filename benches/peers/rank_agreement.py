@@ -7,7 +7,7 @@ correlations (Spearman's rho, Kendall's tau) over each scene's set and their mea
 
     python3 -m venv venv && venv/bin/pip install flip-evaluator cvvdp pypng scipy
     cargo build --release
-    venv/bin/python benches/peers/rank_agreement.py [--table versions.csv] [PICTURE.png ...]
+    venv/bin/python benches/peers/rank_agreement.py [--scenes cornell-box still-life] [--table versions.csv] [PICTURE.png ...]
 
 Without pictures it renders its own (a minute on two cores). All three metrics look at the same 16-bit sRGB pictures on the same
 display: 38 pixels a degree, white 200, black 0.2 cd/m² (`--display fullhd`).
@@ -129,6 +129,7 @@ def video_difference_predictor(shape):
 def main():
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("pictures", nargs="*", type=pathlib.Path)
+    arguments.add_argument("--scenes", nargs="+", default=SCENES, help="those to render, without their .toml")
     arguments.add_argument("--table", type=pathlib.Path, help="write every figure here")
     arguments = arguments.parse_args()
     columns = ["scene", "version", "worst v", "mean v", "FLIP mean", "FLIP 99 %", "JOD lost"]
@@ -139,7 +140,7 @@ def main():
             sets = {path.stem: (read(path), {}) for path in arguments.pictures}
         else:
             sets = {}
-            for scene in SCENES:
+            for scene in arguments.scenes:
                 few = {f"{spp} spp": render(scene, spp, 2, folder) for spp in (4, 16, 64)}
                 sets[scene] = (render(scene, REFERENCE_SAMPLES, 1, folder), few)
         for scene, (reference, few) in sets.items():

@@ -5,7 +5,7 @@ use super::statistics::{ChannelStatistics, SampleStatistics};
 use crate::film::{CHANNELS, Estimate, Film};
 use crate::sampler::Half;
 use fechner_perception::Plane;
-use fechner_perception::csf::CastleCsf;
+use fechner_perception::csf::{CastleCsf, ContrastSensitivity, FreshNoise};
 use fechner_perception::guide::{GuideInputs, denoise};
 use fechner_perception::model::ModelInputs;
 use fechner_perception::photometry::luminance;
@@ -14,6 +14,7 @@ use fechner_perception::threshold::{ThresholdInputs, ThresholdMap, threshold_map
 use fechner_perception::tone::acuity::BehindAcuity;
 use fechner_perception::tone::{FittedTone, SceneGuide};
 use fechner_perception::visibility::MeasuredError;
+use std::sync::OnceLock;
 
 /// What the perception model says of a film. Everything is in display cd/m² unless it says otherwise.
 #[derive(Debug)]
@@ -37,6 +38,8 @@ pub struct Judgement {
     pub pooled_variance_per_sample: Plane,
     /// The same as each half decides by it.
     pub variance_per_sample: [Plane; 2],
+    /// What the halves' difference shows, once somebody asked.
+    measured: OnceLock<MeasuredError>,
 }
 
 /// Perception failed on a picture that the loop made: a defect of ours, with the reason.
@@ -51,13 +54,16 @@ pub struct JudgeError(#[from] fechner_perception::Error);
 pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Judgement, JudgeError> {
     let estimate = film.estimate(settings.nits_per_unit);
     let guide = guide_luminance(film, &estimate);
-    let tone = settings.operator.fit(&SceneGuide::of(&guide), &settings.viewing, None);
+    let tone = match &settings.fitted {
+        Some(fitted) => fitted.clone().restore(),
+        None => settings.operator.fit(&SceneGuide::of(&guide), &settings.viewing, None),
+    };
     let statistics = SampleStatistics::of(film, &display_scale(film, &guide, tone.as_ref(), settings, inflation));
     let displayed_guide = seen::display_luminance(tone.as_ref(), &settings.viewing.display, &guide);
     let luminance_variance = variance_of_mean(film, statistics.luminance(), &statistics.luminance().pooled);
     // The noise before denoising bounds what is left of it in the guide, so masking fades in as samples come.
     // Noise goes through the loss of acuity that the operator shows, as the picture does.
-    let csf = BehindAcuity { csf: CastleCsf::new(settings.viewing.observer.csf_area_deg2)?, acuity: tone.acuity() };
+    let csf = BehindAcuity { csf: contrast_sensitivity(settings)?, acuity: tone.acuity() };
     let thresholds = threshold_map(
         &ThresholdInputs { display_luminance_cd_m2: &displayed_guide, guide_variance: Some(&luminance_variance) },
         &settings.viewing,
@@ -76,7 +82,11 @@ pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Jud
     };
 
     // A model of luminance alone judges luminance alone.
-    let gains = if settings.model.is_none() { Some(thresholds.chromatic_gains()?) } else { None };
+    let gains = match (&settings.model, settings.frames) {
+        (Some(_), _) => None,
+        (None, None) => Some(thresholds.chromatic_gains()?),
+        (None, Some(timing)) => Some(thresholds.chromatic_gains_of_fresh_noise(timing)?),
+    };
     let most_visible = |of: &dyn for<'a> Fn(&'a ChannelStatistics) -> &'a Plane| {
         let channel = |c: usize| variance_of_mean(film, &statistics.channels[c], of(&statistics.channels[c]));
         match &gains {
@@ -101,9 +111,19 @@ pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Jud
         predicted: Plane::filled(0, 0, 0.0),
         pooled_variance_per_sample: per_sample(&display_variance),
         variance_per_sample,
+        measured: OnceLock::new(),
     };
     judgement.predicted = judgement.visibility_of(&display_variance);
     Ok(judgement)
+}
+
+/// Of the eye for noise that stands still, or that is new in every frame.
+fn contrast_sensitivity(settings: &LoopSettings) -> Result<Box<dyn ContrastSensitivity>, JudgeError> {
+    let area_deg2 = settings.viewing.observer.csf_area_deg2;
+    Ok(match settings.frames {
+        None => Box::new(CastleCsf::new(area_deg2)?),
+        Some(timing) => Box::new(FreshNoise::new(area_deg2, timing)?),
+    })
 }
 
 impl Judgement {
@@ -138,15 +158,17 @@ impl Judgement {
     }
 
     /// What can be seen of the halves' luminance difference: the same as predicted, measured.
-    pub fn measured_error(&self, settings: &LoopSettings) -> MeasuredError {
-        let displayed = seen::display_half_difference(
-            self.tone.as_ref(),
-            &settings.viewing.display,
-            &self.estimate.luminance_cd_m2,
-            &self.estimate.half_difference,
-        );
-        let MeasuredError { visibility, amplitude } = self.thresholds.measured_error(&displayed);
-        MeasuredError { visibility: self.per_importance(visibility), amplitude: self.per_importance(amplitude) }
+    pub fn measured_error(&self) -> &MeasuredError {
+        self.measured.get_or_init(|| {
+            let displayed = seen::display_half_difference(
+                self.tone.as_ref(),
+                &self.thresholds.viewing().display,
+                &self.estimate.luminance_cd_m2,
+                &self.estimate.half_difference,
+            );
+            let MeasuredError { visibility, amplitude } = self.thresholds.measured_error(&displayed);
+            MeasuredError { visibility: self.per_importance(visibility), amplitude: self.per_importance(amplitude) }
+        })
     }
 }
 
@@ -193,7 +215,7 @@ fn variance_of_mean(film: &Film, statistics: &ChannelStatistics, per_sample: &Pl
 
 /// Luminance of the denoised picture: what adaptation, masking and the operator are made from, so that noise neither
 /// masks itself nor raises its own adaptation. Never output.
-fn guide_luminance(film: &Film, estimate: &Estimate) -> Plane {
+pub(crate) fn guide_luminance(film: &Film, estimate: &Estimate) -> Plane {
     let (width, height) = (film.width() as usize, film.height() as usize);
     let albedo: Vec<_> = film.guides().iter().map(|g| g.albedo).collect();
     let normal: Vec<_> = film.guides().iter().map(|g| g.normal).collect();
@@ -220,7 +242,6 @@ pub fn variance_share(film: &Film, pixel: usize) -> f64 {
 mod tests {
     use super::*;
     use crate::adaptive::plan::pilot_plan;
-    use crate::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, Sampling};
     use crate::film::BlockSum;
     use crate::integrator::{FirstHit, PathSample};
     use crate::sampler::hash_words;
@@ -229,22 +250,8 @@ mod tests {
     use glam::Vec3;
 
     fn settings() -> LoopSettings {
-        LoopSettings {
-            sampling: Sampling::Adaptive,
-            allocation: AllocationRule::Convex,
-            model: None,
-            limits: Limits {
-                visibility: 1.0,
-                time: None,
-                mean_samples: None,
-                max_samples: DEFAULT_MAX_SAMPLES,
-                plans: None,
-            },
-            viewing: Viewing::of(Display::preset("desktop").expect("a preset")),
-            nits_per_unit: 100.0,
-            operator: operator("absolute", None).expect("an operator"),
-            importance: None,
-        }
+        let viewing = Viewing::of(Display::preset("desktop").expect("a preset"));
+        LoopSettings::new(viewing, 100.0, operator("absolute", None).expect("an operator"))
     }
 
     /// A pilot of `color(pixel, random in −1..1)`.

@@ -1,9 +1,10 @@
 //! What a render is asked to do.
 
 use fechner_perception::Plane;
+use fechner_perception::csf::FrameTiming;
 use fechner_perception::display::Viewing;
 use fechner_perception::model::ThresholdModel;
-use fechner_perception::tone::ToneOperator;
+use fechner_perception::tone::{SavedTone, ToneOperator};
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
@@ -60,6 +61,13 @@ pub struct Limits {
     pub plans: Option<u32>,
 }
 
+impl Limits {
+    /// To a visibility, whatever it takes.
+    pub fn of_visibility(visibility: f64) -> Self {
+        Self { visibility, time: None, mean_samples: None, max_samples: DEFAULT_MAX_SAMPLES, plans: None }
+    }
+}
+
 /// Everything the loop needs to know besides the scene.
 pub struct LoopSettings {
     /// How samples are spread.
@@ -76,8 +84,31 @@ pub struct LoopSettings {
     pub nits_per_unit: f64,
     /// How the picture is shown.
     pub operator: Box<dyn ToneOperator>,
+    /// A fit of the operator that was made elsewhere, for the frames of one shot; without it, each look fits its own.
+    pub fitted: Option<SavedTone>,
+    /// For a frame of a moving picture, whose noise is gone in the next: how frames follow. `None` for stills and for
+    /// frames that may be paused.
+    pub frames: Option<FrameTiming>,
     /// What each pixel's thresholds are multiplied by, above 0, of the film's size: somebody's own idea of what matters.
     pub importance: Option<Plane>,
+}
+
+impl LoopSettings {
+    /// The default loop, to visibility 1.
+    pub fn new(viewing: Viewing, nits_per_unit: f64, operator: Box<dyn ToneOperator>) -> Self {
+        Self {
+            sampling: Sampling::Adaptive,
+            allocation: AllocationRule::Convex,
+            model: None,
+            limits: Limits::of_visibility(1.0),
+            viewing,
+            nits_per_unit,
+            operator,
+            fitted: None,
+            frames: None,
+            importance: None,
+        }
+    }
 }
 
 /// Samples that a pixel gets at most when nobody says otherwise: beyond it, it is reported as visible instead.

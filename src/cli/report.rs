@@ -89,8 +89,7 @@ impl Report {
         let judgement = &rendered.judgement;
         let display = &settings.viewing.display;
         let target = (settings.limits.visibility > 0.0).then_some(settings.limits.visibility);
-        let sorted = sorted_values(&judgement.predicted);
-        let p99 = quantile(&sorted, 0.99);
+        let p99 = judgement.predicted.quantile(0.99);
         let energy = |p: &Plane| p.values().iter().map(|&v| f64::from(v) * f64::from(v)).sum::<f64>();
         let samples_total = film.total_samples();
         let outliers = find_outliers(film);
@@ -109,7 +108,7 @@ impl Report {
                 Sampling::Rival(RivalRule::Budget) => "budget",
             },
             model: settings.model.as_ref().map_or("csf-bands", |model| model.name()),
-            csf: "castle",
+            csf: if settings.frames.is_some() { "castle-fresh-noise" } else { "castle" },
             operator: judgement.tone.describe(),
             nits_per_unit: settings.nits_per_unit,
             observer: ObserverReport {
@@ -131,13 +130,12 @@ impl Report {
             seconds_allocation: rendered.seconds_allocation,
             visibility_target: target,
             visibility_p99: p99,
-            visibility_p999: quantile(&sorted, 0.999),
-            visibility_max: quantile(&sorted, 1.0),
+            visibility_p999: judgement.predicted.quantile(0.999),
+            visibility_max: judgement.predicted.quantile(1.0),
             fraction_visible: visible_share(judgement, target.unwrap_or(1.0)),
             detection_probability_p99: detection_probability(p99),
             patches_noticed: patches_noticed(&judgement.predicted, display.pixels_per_degree),
-            measured_over_predicted: energy(&judgement.measured_error(settings).visibility)
-                / energy(&judgement.predicted),
+            measured_over_predicted: energy(&judgement.measured_error().visibility) / energy(&judgement.predicted),
             audit_ratio: rendered.audit.map(|audit| audit.ratio),
             audit_standard_error: rendered.audit.map(|audit| audit.standard_error),
             audit_tiles: rendered.audit.map_or(0, |audit| audit.tiles),
@@ -145,8 +143,8 @@ impl Report {
             outlier_pixels: outliers.pixels,
             outlier_energy_share: outliers.energy_share,
             importance_range: settings.importance.as_ref().map(|map| {
-                let sorted = sorted_values(map);
-                [quantile(&sorted, 0.0) as f32, quantile(&sorted, 1.0) as f32]
+                let values = || map.values().iter().copied();
+                [values().fold(f32::INFINITY, f32::min), values().fold(0.0, f32::max)]
             }),
             tone: output::tone_attribute(judgement.tone.as_ref()),
             nonfinite_samples: film.nonfinite_samples,
@@ -163,6 +161,17 @@ impl Report {
                 StopReason::Merged => "merged",
             },
         }
+    }
+
+    /// What a frame among many took.
+    pub(super) fn in_a_line(&self) -> String {
+        format!(
+            "{:.1} spp in {}, visibility {:.2} at the 99th percentile; {}",
+            self.spp_mean,
+            duration_in_words(self.seconds_total),
+            self.visibility_p99,
+            self.stop_reason
+        )
     }
 
     /// What an EXR file should say of itself.
@@ -268,17 +277,6 @@ pub(super) fn summary(report: &Report, settings: &LoopSettings, rendered: &Rende
         lines.push(format!("{} samples were not finite and are left out.", report.nonfinite_samples));
     }
     lines.join("\n")
-}
-
-fn sorted_values(plane: &Plane) -> Vec<f32> {
-    let mut values = plane.values().to_vec();
-    values.sort_by(f32::total_cmp);
-    values
-}
-
-fn quantile(sorted: &[f32], share: f64) -> f64 {
-    let last = sorted.len().saturating_sub(1);
-    sorted.get((share * last as f64).round() as usize).map_or(0.0, |&v| f64::from(v))
 }
 
 /// 1° × 1° patches in the picture.

@@ -21,7 +21,7 @@ pub use material::{Alpha, Material};
 pub use motion::{Motion, MotionKey, Pose};
 pub use surface::{Distribution, MetalRoughness, Roughness, RoughnessScale, Surface};
 
-use glam::{Affine3A, Vec2, Vec3, Vec4};
+use glam::{Affine3A, Vec2, Vec3, Vec3A, Vec4};
 use std::sync::Arc;
 
 /// Index into [`Scene::meshes`].
@@ -63,6 +63,27 @@ pub struct Scene {
     pub environment: Option<Environment>,
     /// What the loader assumed or left out, one sentence each, shown to the user once.
     pub notes: Vec<String>,
+}
+
+impl Default for Scene {
+    /// Nothing, seen from the origin along −z on one pixel; 1 cd/m² to the unit.
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            nits_per_unit: 1.0,
+            camera: Camera::pinhole(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 40.0),
+            film: FilmDefaults { width: 1, height: 1 },
+            viewing: ViewingDefaults::default(),
+            meshes: Vec::new(),
+            instances: Vec::new(),
+            spheres: Vec::new(),
+            materials: Vec::new(),
+            textures: Vec::new(),
+            lights: Vec::new(),
+            environment: None,
+            notes: Vec::new(),
+        }
+    }
 }
 
 impl Scene {
@@ -128,6 +149,13 @@ pub struct Instance {
     pub motion: Option<Motion>,
 }
 
+impl Instance {
+    /// Object space to world space at a share of the open shutter.
+    pub fn transform_at(&self, time: f32) -> Affine3A {
+        self.motion.as_ref().map_or(self.to_world, |motion| motion.at(time))
+    }
+}
+
 /// An analytic sphere in world space.
 #[derive(Clone, Debug)]
 pub struct Sphere {
@@ -141,6 +169,16 @@ pub struct Sphere {
     pub material: MaterialId,
     /// Moves centre and radius while the shutter is open (similarities only); `None` where it rests.
     pub motion: Option<Motion>,
+}
+
+impl Sphere {
+    /// Centre and radius at a share of the open shutter.
+    pub fn place_at(&self, time: f32) -> (Vec3A, f32) {
+        let center = Vec3A::from(self.center);
+        let Some(motion) = &self.motion else { return (center, self.radius) };
+        let moved = motion.at(time);
+        (moved.transform_point3a(center), self.radius * moved.matrix3.x_axis.length())
+    }
 }
 
 /// A colour that is constant or read from a texture and multiplied by a factor.

@@ -13,20 +13,21 @@ const REST_BITS: u32 = MANTISSA_BITS - PLACES.trailing_zeros();
 
 /// A positive number taken apart.
 struct Parts {
-    biased_exponent: usize,
+    biased_exponent: u8,
     place: usize,
     /// Way to the next place, 0 to 1.
     rest: f32,
 }
 
 /// `None` for what is not positive, normal and finite.
+#[inline]
 fn parts(x: f32) -> Option<Parts> {
     let bits = x.to_bits();
-    let biased_exponent = (bits >> MANTISSA_BITS) as usize;
+    let biased_exponent = bits >> MANTISSA_BITS;
     let rest = bits & ((1 << REST_BITS) - 1);
     // A sign counts as an exponent above all.
     (1..255).contains(&biased_exponent).then(|| Parts {
-        biased_exponent,
+        biased_exponent: biased_exponent as u8,
         place: (bits >> REST_BITS) as usize & (PLACES - 1),
         rest: rest as f32 * (1.0 / (1 << REST_BITS) as f32),
     })
@@ -35,8 +36,8 @@ fn parts(x: f32) -> Option<Parts> {
 /// x to a fixed power.
 pub(super) struct FixedPower {
     exponent: f64,
-    octaves: Vec<f64>,
-    mantissas: Vec<f64>,
+    octaves: [f64; 256],
+    mantissas: [f64; PLACES + 1],
 }
 
 impl FixedPower {
@@ -44,8 +45,8 @@ impl FixedPower {
         let mantissa = |place: usize| (1.0 + place as f64 / PLACES as f64).powf(exponent);
         Self {
             exponent,
-            octaves: (0..255).map(|biased| (exponent * (f64::from(biased) - 127.0)).exp2()).collect(),
-            mantissas: (0..=PLACES).map(mantissa).collect(),
+            octaves: std::array::from_fn(|biased| (exponent * (biased as f64 - 127.0)).exp2()),
+            mantissas: std::array::from_fn(mantissa),
         }
     }
 
@@ -54,21 +55,21 @@ impl FixedPower {
     pub(super) fn raise(&self, x: f32) -> f64 {
         let Some(Parts { biased_exponent, place, rest }) = parts(x) else { return f64::from(x).powf(self.exponent) };
         let (low, high) = (self.mantissas[place], self.mantissas[place + 1]);
-        self.octaves[biased_exponent] * (low + f64::from(rest) * (high - low))
+        self.octaves[usize::from(biased_exponent)] * (low + f64::from(rest) * (high - low))
     }
 }
 
 /// Logarithms of the mantissa and powers of two of a fraction.
 struct Logarithms {
-    log2: Vec<f32>,
-    exp2: Vec<f32>,
+    log2: [f32; PLACES + 1],
+    exp2: [f32; PLACES + 1],
 }
 
 static LOGARITHMS: LazyLock<Logarithms> = LazyLock::new(|| {
-    let places = || (0..=PLACES).map(|place| place as f64 / PLACES as f64);
+    let share = |place: usize| place as f64 / PLACES as f64;
     Logarithms {
-        log2: places().map(|share| (1.0 + share).log2() as f32).collect(),
-        exp2: places().map(|share| share.exp2() as f32).collect(),
+        log2: std::array::from_fn(|place| (1.0 + share(place)).log2() as f32),
+        exp2: std::array::from_fn(|place| share(place).exp2() as f32),
     }
 });
 
@@ -80,7 +81,7 @@ pub(super) fn powers(bases: [f32; 3], exponent: f32) -> [f32; 3] {
     bases.map(|base| {
         let Some(Parts { biased_exponent, place, rest }) = parts(base) else { return base.powf(exponent) };
         let mantissa = tables.log2[place] + rest * (tables.log2[place + 1] - tables.log2[place]);
-        let log = exponent * (biased_exponent as f32 - 127.0 + mantissa);
+        let log = exponent * (f32::from(biased_exponent) - 127.0 + mantissa);
         let whole = log.floor();
         if !(-126.0..127.0).contains(&whole) {
             return base.powf(exponent);

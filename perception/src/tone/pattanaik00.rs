@@ -66,6 +66,7 @@ struct Receptor {
 
 impl Receptor {
     /// Share of the greatest response.
+    #[inline]
     fn share(self, light_cd_m2: f32) -> f64 {
         let raised = RAISED.raise(light_cd_m2.max(0.0));
         // Infinite light and a σ of 0 at no light are the ends of the curve.
