@@ -43,6 +43,8 @@ pub struct ExrImage {
     pub lines_left_out: u32,
     /// What is to be shown; may be smaller or larger than the data.
     pub display_window: Window,
+    /// Width of a pixel over its height; 1 where the file's is none that a pixel can have (0.01 to 100).
+    pub pixel_aspect_ratio: f64,
     /// Primaries and white of R, G and B, where the file says them. Channels are as in the file: see
     /// [`ExrImage::scene_picture`].
     pub chromaticities: Option<Primaries>,
@@ -216,6 +218,9 @@ fn image_without_channels(first: &Header) -> ExrImage {
         } else {
             Window { origin, width, height }
         },
+        pixel_aspect_ratio: Some(f64::from(first.shared_attributes.pixel_aspect))
+            .filter(|ratio| (0.01..=100.0).contains(ratio))
+            .unwrap_or(1.0),
         chromaticities: first.shared_attributes.chromaticities.map(|c| Primaries {
             red: point(c.red),
             green: point(c.green),

@@ -7,7 +7,7 @@ correlations (Spearman's rho, Kendall's tau) over each scene's set and their mea
 
     python3 -m venv venv && venv/bin/pip install flip-evaluator cvvdp pypng scipy
     cargo build --release
-    venv/bin/python benches/peers/rank_agreement.py [--table versions.csv] [PICTURE.png ...]
+    venv/bin/python benches/peers/rank_agreement.py [--scenes cornell-box still-life] [--table versions.csv] [PICTURE.png ...]
 
 Without pictures it renders its own (a minute on two cores). All three metrics look at the same 16-bit sRGB pictures on the same
 display: 38 pixels a degree, white 200, black 0.2 cd/m² (`--display fullhd`).
@@ -33,7 +33,8 @@ from scipy.stats import kendalltau, spearmanr
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 FECHNER = ROOT / "target" / "release" / "fechner"
 SCENES = ["cornell-box", "still-life", "textured-room", "dark-window"]
-SIZE = "256x192"
+SIZE = "160x120"
+REFERENCE_SAMPLES = 256
 PIXELS_PER_DEGREE = 38.0
 WHITE_CD_M2 = 200.0
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -44,7 +45,7 @@ def render(scene, spp, seed, folder):
     target = folder / f"{scene}-{spp}-{seed}.png"
     command = [FECHNER, "render", ROOT / "scenes" / f"{scene}.toml", "-o", target, "--size", SIZE]
     command += ["--sampling", "uniform", "--spp", str(spp), "--seed", str(seed)]
-    subprocess.run([str(part) for part in command], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([str(part) for part in command], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     return read(target)
 
 
@@ -128,6 +129,7 @@ def video_difference_predictor(shape):
 def main():
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("pictures", nargs="*", type=pathlib.Path)
+    arguments.add_argument("--scenes", nargs="+", default=SCENES, help="those to render, without their .toml")
     arguments.add_argument("--table", type=pathlib.Path, help="write every figure here")
     arguments = arguments.parse_args()
     columns = ["scene", "version", "worst v", "mean v", "FLIP mean", "FLIP 99 %", "JOD lost"]
@@ -138,9 +140,9 @@ def main():
             sets = {path.stem: (read(path), {}) for path in arguments.pictures}
         else:
             sets = {}
-            for scene in SCENES:
+            for scene in arguments.scenes:
                 few = {f"{spp} spp": render(scene, spp, 2, folder) for spp in (4, 16, 64)}
-                sets[scene] = (render(scene, 512, 1, folder), few)
+                sets[scene] = (render(scene, REFERENCE_SAMPLES, 1, folder), few)
         for scene, (reference, few) in sets.items():
             predictor = video_difference_predictor(reference.shape)
             for version, test in {**versions(reference), **few}.items():

@@ -6,7 +6,9 @@
     /tmp/venv/bin/python benches/peers/tone.py
 
 Speed: processor time, all threads together, of `fechner tonemap` (reading EXR and writing PNG included) over that of the
-pfstmo program alone, which reads and writes a stream in memory. Runs alternate and the best of several counts.
+pfstmo program, which reads and writes a stream in memory. "alone" is the operator's own share of both: less the time of the
+cheapest way through either program with the same files (`absolute`, and `pfstag`). Runs alternate and the best of several
+counts.
 Agreement: displayed linear light of a ramp of greys through both, for the operators that are meant to be the same.
 """
 
@@ -27,7 +29,10 @@ PAIRS = [
     ("reinhard02", ["pfstmo_reinhard02"]),
     ("reinhard02 --adaptation local", ["pfstmo_reinhard02", "--scales"]),
     ("ward-larson97", ["pfstmo_mantiuk08", "--display-function", "l=200:b=0.2:g=2.2"]),
+    ("tumblin-rushmeier", ["pfstmo_drago03"]),
+    ("ferwerda96", ["pfstmo_drago03"]),
     ("durand-dorsey00", ["pfstmo_drago03"]),
+    ("ward94 --adaptation local", ["pfstmo_durand02"]),
 ]
 
 
@@ -68,16 +73,23 @@ def speed(folder):
     write_exr(source, picture(1920, 1080))
     with open(stream, "wb") as file:
         subprocess.run(["pfsinexr", source], check=True, stdout=file)
-    print("1920x1080                        fechner s   pfstmo s   fechner / pfstmo   pfstmo command")
-    for ours, theirs in PAIRS:
-        best = [float("inf")] * 2
-        name = ours.split()
+    def ours(*arguments):
+        command = tonemap(source, os.path.join(folder, "a.png"), "--operator", *arguments)
+        return seconds(command, stdout=subprocess.DEVNULL)
+
+    def theirs(command):
+        with open(stream, "rb") as file:
+            return seconds(command, stdin=file, stdout=subprocess.DEVNULL)
+
+    print("1920x1080                        fechner s   pfstmo s   ratio   alone s   pfstmo alone s   ratio   pfstmo command")
+    for name, command in PAIRS:
+        best = [float("inf")] * 4
         for _ in range(RUNS):
-            command = tonemap(source, os.path.join(folder, "a.png"), "--operator", *name)
-            best[0] = min(best[0], seconds(command, stdout=subprocess.DEVNULL))
-            with open(stream, "rb") as file:
-                best[1] = min(best[1], seconds(theirs, stdin=file, stdout=subprocess.DEVNULL))
-        print(f"{ours:32} {best[0]:9.2f} {best[1]:10.2f} {best[0] / best[1]:18.2f}   {' '.join(theirs)}")
+            times = [ours(*name.split()), theirs(command), ours("absolute"), theirs(["pfstag", "--set", "A=1"])]
+            best = [min(pair) for pair in zip(best, times)]
+        own, peer = best[0] - best[2], best[1] - best[3]
+        figures = f"{best[0]:9.2f} {best[1]:10.2f} {best[0] / best[1]:7.2f} {own:9.2f} {peer:16.2f} {own / peer:7.2f}"
+        print(f"{name:32} {figures}   {' '.join(command)}")
 
 
 def through_pfs(source, folder, command):

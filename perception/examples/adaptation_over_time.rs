@@ -1,24 +1,41 @@
-//! Out of a theatre into sunlight, and from there into a cave: what the eye sees (grey), what cones (red) and rods (blue) are
-//! adapted to, and what the display shows for a grey (black) and for a white (green) wall, over the time since the step from
-//! 1 ms to 1000 s, both axes logarithmic.
+//! Out of a theatre into sunlight, and from there into a cave: what is in view, what cones and rods are adapted to, and what the
+//! display shows for a grey and for a white wall, over the time since the step from 1 ms to 1000 s. Two pictures, named
+//! in what is printed; the first argument is the folder for them.
 
-mod support;
+#[path = "support/log_plot.rs"]
+mod log_plot;
 
 use fechner_perception::tone::{
     AdaptationScope, AdaptationState, Goal, Kinetics, Pattanaik00, SceneGuide, ToneOperator as _,
 };
 use fechner_perception::{Plane, Viewing};
+use log_plot::{Axis, Curve, log_plot};
+use plotters::prelude::{RGBColor, SeriesLabelPosition};
 
 /// A step of what is in view, cd/m².
 struct Step {
     name: &'static str,
+    title: &'static str,
     before: f64,
     after: f64,
+    legend_at: SeriesLabelPosition,
 }
 
 const STEPS: [Step; 2] = [
-    Step { name: "theatre_to_sun", before: 0.05, after: 5000.0 },
-    Step { name: "sun_to_cave", before: 5000.0, after: 0.005 },
+    Step {
+        name: "theatre_to_sun",
+        title: "Out of a theatre (0.05 cd/m²) into sunlight (5000)",
+        before: 0.05,
+        after: 5000.0,
+        legend_at: SeriesLabelPosition::LowerLeft,
+    },
+    Step {
+        name: "sun_to_cave",
+        title: "Out of sunlight (5000 cd/m²) into a cave (0.005)",
+        before: 5000.0,
+        after: 0.005,
+        legend_at: SeriesLabelPosition::UpperRight,
+    },
 ];
 
 impl Step {
@@ -39,15 +56,28 @@ impl Step {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let folder = std::env::args().nth(1).map_or_else(std::env::temp_dir, std::path::PathBuf::from);
     for step in &STEPS {
-        let mut plot = support::LogPlot::new(-3.0..3.0, -3.0..4.0);
-        plot.curve([170; 3], |_| step.after);
-        plot.curve([220, 60, 60], |seconds| step.state(seconds).cones.neural_cd_m2);
-        plot.curve([60, 60, 220], |seconds| step.state(seconds).rods.neural_cd_m2);
-        plot.curve([0; 3], |seconds| step.shown_cd_m2(seconds, 0.5));
-        plot.curve([40, 160, 60], |seconds| step.shown_cd_m2(seconds, 3.0));
-        let path = std::env::temp_dir().join(format!("{}.png", step.name));
-        plot.save(&path)?;
+        let path = folder.join(format!("{}.svg", step.name));
+        let curve = |label, colour: [u8; 3], value_at: Box<dyn Fn(f64) -> f64>| Curve {
+            label,
+            colour: RGBColor(colour[0], colour[1], colour[2]),
+            value_at,
+        };
+        log_plot(
+            &path,
+            step.title,
+            &Axis { label: "Seconds since the step", range: 1e-3..1e3 },
+            &Axis { label: "cd/m²", range: 1e-3..1e4 },
+            step.legend_at.clone(),
+            &[
+                curve("in view", [170; 3], Box::new(|_| step.after)),
+                curve("cones are adapted to", [220, 60, 60], Box::new(|t| step.state(t).cones.neural_cd_m2)),
+                curve("rods are adapted to", [60, 60, 220], Box::new(|t| step.state(t).rods.neural_cd_m2)),
+                curve("display, white wall", [40, 160, 60], Box::new(|t| step.shown_cd_m2(t, 3.0))),
+                curve("display, grey wall", [0; 3], Box::new(|t| step.shown_cd_m2(t, 0.5))),
+            ],
+        )?;
         println!("{}\n   seconds   cones cd/m²    rods cd/m²   rod pigment   grey shown   white shown", path.display());
         for seconds in [0.0, 0.02, 0.08, 0.2, 0.5, 1.0, 10.0, 60.0, 300.0, 1200.0] {
             let state = step.state(seconds);

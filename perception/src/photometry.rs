@@ -21,6 +21,7 @@ pub fn luminance(rgb: [f32; 3]) -> f32 {
 /// Weights of Ward Larson, Rushmeier and Piatko's 1997 operator as Radiance publishes it, made for its own primaries
 /// and used here as an approximation for Rec. 709. Multiply by 2.26 for scotopic cd/m² of an equal-energy white.
 #[must_use]
+#[inline]
 pub fn scotopic_luminance(rgb: [f32; 3]) -> f32 {
     rgb[0] * 0.062 + rgb[1] * 0.608 + rgb[2] * 0.330
 }

@@ -27,22 +27,10 @@ pub fn display_luminance(fitted: &dyn FittedTone, display: &Display, scene_lumin
 /// Pixels whose mean or variance is not finite get infinity; so does every pixel when the planes differ in size.
 #[must_use]
 pub fn display_variance(fitted: &dyn FittedTone, display: &Display, mean: &Plane, variance: &Plane) -> Plane {
-    let (width, height) = (mean.width(), mean.height());
-    if !mean.same_size(variance) {
-        return Plane::filled(width, height, f32::INFINITY);
-    }
     let shown = Shown { fitted, display };
-    let mut result = Plane::filled(width, height, 0.0);
-    result.for_each_row_mut(|y, row| {
-        for (x, (value, (mean, variance))) in row.iter_mut().zip(mean.row(y).iter().zip(variance.row(y))).enumerate() {
-            *value = if mean.is_finite() && variance.is_finite() {
-                shown.variance(Pixel { x, y }, f64::from(mean.max(0.0)), f64::from(variance.max(0.0)))
-            } else {
-                f32::INFINITY
-            };
-        }
-    });
-    result
+    by_pixel(mean, variance, f32::INFINITY, |pixel, mean, variance| {
+        shown.variance(pixel, f64::from(mean.max(0.0)), f64::from(variance.max(0.0)))
+    })
 }
 
 /// Variance of a chromatic signal as displayed, (cd/m²)², for one of variance `variance` ((cd/m²)², of the mean) on scene
@@ -52,21 +40,12 @@ pub fn display_variance(fitted: &dyn FittedTone, display: &Display, mean: &Plane
 /// Pixels that are not finite get infinity; so does every pixel when the planes differ in size.
 #[must_use]
 pub fn display_chromatic_variance(fitted: &dyn FittedTone, display: &Display, mean: &Plane, variance: &Plane) -> Plane {
-    let (width, height) = (mean.width(), mean.height());
-    if !mean.same_size(variance) {
-        return Plane::filled(width, height, f32::INFINITY);
-    }
     let shown = Shown { fitted, display };
-    let mut result = Plane::filled(width, height, 0.0);
-    result.for_each_row_mut(|y, row| {
-        for (x, (value, (mean, variance))) in row.iter_mut().zip(mean.row(y).iter().zip(variance.row(y))).enumerate() {
-            let (pixel, luminance) = (Pixel { x, y }, mean.max(1e-6));
-            let slope = (shown.cd_m2(pixel, luminance) - shown.cd_m2(pixel, 0.0)) / luminance;
-            let displayed = slope * slope * variance.max(0.0);
-            *value = if mean.is_finite() && displayed.is_finite() { displayed } else { f32::INFINITY };
-        }
-    });
-    result
+    by_pixel(mean, variance, f32::INFINITY, |pixel, mean, variance| {
+        let luminance = mean.max(1e-6);
+        let slope = (shown.cd_m2(pixel, luminance) - shown.cd_m2(pixel, 0.0)) / luminance;
+        slope * slope * variance.max(0.0)
+    })
 }
 
 /// Half the difference that the two halves make on the display, cd/m²: (tone(M + D) − tone(M − D)) / 2 for the mean M and
@@ -80,18 +59,24 @@ pub fn display_half_difference(
     mean: &Plane,
     half_difference: &Plane,
 ) -> Plane {
-    let (width, height) = (mean.width(), mean.height());
-    if !mean.same_size(half_difference) {
-        return Plane::filled(width, height, f32::INFINITY);
-    }
     let shown = Shown { fitted, display };
-    let mut result = Plane::filled(width, height, 0.0);
+    by_pixel(mean, half_difference, 0.0, |pixel, mean, difference| {
+        0.5 * (shown.cd_m2(pixel, mean + difference) - shown.cd_m2(pixel, mean - difference))
+    })
+}
+
+/// `of` two planes' values at each pixel; `else_value` where they, or what becomes of them, are not finite. Planes of different
+/// sizes give infinity.
+fn by_pixel(first: &Plane, second: &Plane, else_value: f32, of: impl Fn(Pixel, f32, f32) -> f32 + Sync) -> Plane {
+    if !first.same_size(second) {
+        return Plane::filled(first.width(), first.height(), f32::INFINITY);
+    }
+    let mut result = Plane::filled(first.width(), first.height(), else_value);
     result.for_each_row_mut(|y, row| {
-        let pixels = row.iter_mut().zip(mean.row(y).iter().zip(half_difference.row(y)));
-        for (x, (value, (&mean, &difference))) in pixels.enumerate() {
-            if mean.is_finite() && difference.is_finite() {
-                let pixel = Pixel { x, y };
-                *value = 0.5 * (shown.cd_m2(pixel, mean + difference) - shown.cd_m2(pixel, mean - difference));
+        for (x, (value, (&a, &b))) in row.iter_mut().zip(first.row(y).iter().zip(second.row(y))).enumerate() {
+            if a.is_finite() && b.is_finite() {
+                let found = of(Pixel { x, y }, a, b);
+                *value = if found.is_finite() { found } else { else_value };
             }
         }
     });

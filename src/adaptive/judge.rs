@@ -28,6 +28,9 @@ pub struct Judgement {
     /// Standard error that a pixel may have at visibility 1 by the model that drives the loop, where that is another one:
     /// a rule of its own for each pixel.
     pub pixel_thresholds: Option<Plane>,
+    /// What [`LoopSettings::importance`] multiplies thresholds by. `thresholds` and `pixel_thresholds` are without it; what
+    /// a judgement's methods say, and `predicted`, is with it.
+    pub importance: Option<Plane>,
     /// Visibility that the variance predicts.
     pub predicted: Plane,
     /// Displayed variance of one sample as the neighbours tell it, as the luminance variance that shows as much as the
@@ -104,6 +107,7 @@ pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Jud
         tone,
         thresholds,
         pixel_thresholds,
+        importance: settings.importance.clone(),
         predicted: Plane::filled(0, 0, 0.0),
         pooled_variance_per_sample: per_sample(&display_variance),
         variance_per_sample,
@@ -125,19 +129,31 @@ fn contrast_sensitivity(settings: &LoopSettings) -> Result<Box<dyn ContrastSensi
 impl Judgement {
     /// Visibility of a picture whose displayed luminance has this variance, (cd/m²)².
     pub fn visibility_of(&self, display_variance: &Plane) -> Plane {
-        match &self.pixel_thresholds {
+        self.per_importance(match &self.pixel_thresholds {
             None => self.thresholds.predicted_visibility(display_variance),
             Some(allowed) => Plane::from_fn(allowed.width(), allowed.height(), |x, y| {
                 display_variance.get(x, y).sqrt() / allowed.get(x, y)
             }),
-        }
+        })
     }
 
     /// Standard error of a pixel, cd/m² on the display, that is at visibility 1 by the model that drives the loop.
     pub fn allowed_standard_error_cd_m2(&self) -> Plane {
-        match &self.pixel_thresholds {
+        let allowed = match &self.pixel_thresholds {
             None => self.thresholds.allowed_standard_error_cd_m2(1.0),
             Some(allowed) => allowed.clone(),
+        };
+        match &self.importance {
+            None => allowed,
+            Some(map) => combined(&allowed, map, |allowed, factor| allowed * factor),
+        }
+    }
+
+    /// A visibility under thresholds that importance multiplies.
+    fn per_importance(&self, visibility: Plane) -> Plane {
+        match &self.importance {
+            None => visibility,
+            Some(map) => combined(&visibility, map, |visibility, factor| visibility / factor),
         }
     }
 
@@ -150,9 +166,14 @@ impl Judgement {
                 &self.estimate.luminance_cd_m2,
                 &self.estimate.half_difference,
             );
-            self.thresholds.measured_error(&displayed)
+            let MeasuredError { visibility, amplitude } = self.thresholds.measured_error(&displayed);
+            MeasuredError { visibility: self.per_importance(visibility), amplitude: self.per_importance(amplitude) }
         })
     }
+}
+
+fn combined(a: &Plane, b: &Plane, with: impl Fn(f32, f32) -> f32 + Sync) -> Plane {
+    Plane::from_fn(a.width(), a.height(), |x, y| with(a.get(x, y), b.get(x, y)))
 }
 
 /// Displayed variance over scene variance of each pixel, by channel, at the size that its variance has now: what the display

@@ -80,6 +80,8 @@ pub struct Rendered {
     pub seconds_total: f64,
     /// Of which in the perception model, planning and audits.
     pub seconds_perception: f64,
+    /// Of which in finding counts.
+    pub seconds_allocation: f64,
 }
 
 impl Rendered {
@@ -94,6 +96,7 @@ impl Rendered {
             inflation: state.inflation,
             seconds_total: state.seconds_total,
             seconds_perception: state.seconds_perception,
+            seconds_allocation: state.seconds_allocation,
         }
     }
 }
@@ -154,6 +157,7 @@ pub fn resume(
             Step::Trace(plan) => {
                 let film = &render.state.film;
                 render.state.pending.extend(slices(plan, film.width(), film.total_samples()));
+                render.state.tone = Some(judgement.tone.save());
                 last_look = Some(judgement);
             }
             Step::Stop(reason) => return render.finish(judgement, reason, monitor),
@@ -226,6 +230,7 @@ impl<'a> Loop<'a> {
             Sampling::Adaptive | Sampling::Uniform => judgement,
         };
         self.state.seconds_total = self.seconds_before + self.resumed_at.elapsed().as_secs_f64();
+        self.state.tone = Some(judgement.tone.save());
         monitor.ended(&self.state);
         Ok(Rendered::new(self.state, judgement, reason))
     }
@@ -278,7 +283,9 @@ impl<'a> Loop<'a> {
             return Ok(if is_reached(judgement, rung) { None } else { some(uniform_plan(&self.state.film, doubled)) });
         }
         if !is_reached(judgement, rung) {
+            let started = Instant::now();
             let wanted = wanted_samples(judgement, self.settings.allocation, rung, max_samples)?;
+            self.state.seconds_allocation += started.elapsed().as_secs_f64();
             if predicted_saving(&self.state.film, judgement, &wanted, rung) < LEAST_SAVING {
                 return Ok(some(uniform_plan(&self.state.film, doubled)));
             }

@@ -65,7 +65,7 @@ pub fn wanted_samples(
             variance_per_sample: variance,
             thresholds: &judgement.thresholds,
             cost: &Plane::filled(variance.width(), variance.height(), 1.0),
-            tolerance: None,
+            tolerance: judgement.importance.as_ref(),
             visibility,
             min_samples: least,
             max_samples: most,

@@ -1,5 +1,6 @@
 //! What a render is asked to do.
 
+use fechner_perception::Plane;
 use fechner_perception::csf::FrameTiming;
 use fechner_perception::display::Viewing;
 use fechner_perception::model::ThresholdModel;
@@ -88,6 +89,8 @@ pub struct LoopSettings {
     /// For a frame of a moving picture, whose noise is gone in the next: how frames follow. `None` for stills and for
     /// frames that may be paused.
     pub frames: Option<FrameTiming>,
+    /// What each pixel's thresholds are multiplied by, above 0, of the film's size: somebody's own idea of what matters.
+    pub importance: Option<Plane>,
 }
 
 impl LoopSettings {
@@ -103,6 +106,7 @@ impl LoopSettings {
             operator,
             fitted: None,
             frames: None,
+            importance: None,
         }
     }
 }

@@ -5,6 +5,7 @@ use super::plan::uniform_plan;
 use super::settings::Limits;
 use crate::film::Film;
 use crate::integrator::{BlockWork, PILOT_SAMPLES, SamplePlan};
+use fechner_perception::tone::SavedTone;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
@@ -35,6 +36,10 @@ pub struct RenderState {
     pub seconds_total: f64,
     /// Of which in the perception model, planning and audits.
     pub seconds_perception: f64,
+    /// Of which in finding counts.
+    pub seconds_allocation: f64,
+    /// The tone operator as fitted at the last look.
+    pub tone: Option<SavedTone>,
 }
 
 /// Exposure of the display as measured at a number of samples.
@@ -69,6 +74,8 @@ impl RenderState {
             passes: 0,
             seconds_total: 0.0,
             seconds_perception: 0.0,
+            seconds_allocation: 0.0,
+            tone: None,
         }
     }
 

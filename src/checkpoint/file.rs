@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 /// As in PNG, a byte that no text has and line ends that careless transfers change.
 const MAGIC: [u8; 12] = *b"fech film\r\n\x1a";
 /// Raised whenever the bytes after it mean something else.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 const PREAMBLE_BYTES: usize = MAGIC.len() + 4;
 const HASH_BYTES: usize = blake3::OUT_LEN;
 /// More than any header takes.
@@ -217,7 +217,7 @@ impl Checkpoint {
         }
         let is_rung = |visibility: f64| visibility >= 0.0;
         let exposure = state.exposure.map_or(0.0, |exposure| exposure.scene_unit_over_white);
-        let seconds = [state.seconds_total, state.seconds_perception];
+        let seconds = [state.seconds_total, state.seconds_perception, state.seconds_allocation];
         if !is_rung(header.visibility)
             || !state.finished_rung.is_none_or(is_rung)
             || !(1.0..=1e6).contains(&state.inflation)

@@ -66,6 +66,8 @@ pub struct SettingsRecord {
     pub operator: String,
     /// Exposure correction, where the operator was given one.
     pub exposure_stops: Option<f64>,
+    /// Importance map, where one was given.
+    pub importance: Option<ContentHash>,
 }
 
 /// A name that this version does not know.
@@ -155,7 +157,7 @@ impl Seeds {
 }
 
 impl SettingsRecord {
-    /// Settings for the loop.
+    /// Settings for the loop, less the importance map, of which only the hash is here.
     ///
     /// # Errors
     /// For names that nobody answers to.
@@ -186,6 +188,7 @@ impl SettingsRecord {
 
     /// Whether pictures made by both are seen alike, however their samples were spread.
     pub fn is_seen_like(&self, other: &Self) -> bool {
-        *self == Self { sampling: self.sampling, allocation: self.allocation, ..other.clone() }
+        let Self { sampling, allocation, importance, .. } = *self;
+        *self == Self { sampling, allocation, importance, ..other.clone() }
     }
 }

@@ -63,6 +63,7 @@ pub fn merge_files(paths: &[PathBuf]) -> Result<Checkpoint, MergeError> {
         sum.state.plans = sum.state.plans.saturating_add(next.state.plans);
         sum.state.seconds_total += next.state.seconds_total;
         sum.state.seconds_perception += next.state.seconds_perception;
+        sum.state.seconds_allocation += next.state.seconds_allocation;
         sum.header.visibility = sum.header.visibility.min(next.header.visibility);
         sum.header.seeds.all.extend(next.header.seeds.all);
     }
@@ -76,12 +77,13 @@ pub fn merge_files(paths: &[PathBuf]) -> Result<Checkpoint, MergeError> {
 
 /// The film of a state and what it took, without what was decided about it.
 fn undecided(state: RenderState) -> RenderState {
-    let RenderState { film, inflation, plans, seconds_total, seconds_perception, .. } = state;
+    let RenderState { film, inflation, plans, seconds_total, seconds_perception, seconds_allocation, .. } = state;
     RenderState {
         inflation,
         plans,
         seconds_total,
         seconds_perception,
+        seconds_allocation,
         ..RenderState::of_film(film, DEFAULT_MAX_SAMPLES)
     }
 }

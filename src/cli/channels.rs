@@ -105,6 +105,7 @@ mod tests {
             data_window_origin: (0, 0),
             display_window: Window { origin: (0, 0), width: 1, height: 1 },
             chromaticities: None,
+            pixel_aspect_ratio: 1.0,
             lines_left_out: 0,
             channels: names.iter().enumerate().map(|(i, name)| ((*name).to_owned(), vec![i as f32])).collect(),
             types: Vec::new(),

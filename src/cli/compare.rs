@@ -53,8 +53,6 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
     for target in arguments.map.iter().chain(&arguments.json) {
         output::check_writable(target)?;
     }
-    let viewing = arguments.seeing.viewing()?;
-    let csf = csf::by_name(&arguments.seeing.csf, &viewing)?;
     let nits_per_unit = arguments.seeing.nits_per_unit;
     let reference = InputPicture::read(&arguments.reference, nits_per_unit)?;
     let test = InputPicture::read(&arguments.test, nits_per_unit)?;
@@ -66,6 +64,16 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
             arguments.test.display()
         );
     }
+    let [wide, wide_too] = [&reference, &test].map(InputPicture::pixel_aspect_ratio);
+    if (wide / wide_too - 1.0).abs() > 1e-3 {
+        bail!(
+            "{} has pixels {wide} times as wide as high and {} {wide_too} times: only pictures of one shape can be compared",
+            arguments.reference.display(),
+            arguments.test.display()
+        );
+    }
+    let viewing = reference.viewed(&arguments.seeing.viewing()?)?;
+    let csf = csf::by_name(&arguments.seeing.csf, &viewing)?;
     let operator = tone::operator(&arguments.operator, None).with_context(|| {
         let known = tone::operator_names().join(", ");
         format!("there is no tone operator \"{}\"; known: {known}", arguments.operator)

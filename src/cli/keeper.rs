@@ -85,9 +85,9 @@ impl CheckpointArguments {
 
 /// The samples and the time of a state, less what was decided.
 fn begun_anew(state: RenderState, limits: &Limits, inflation: f64) -> RenderState {
-    let RenderState { film, plans, passes, seconds_total, seconds_perception, .. } = state;
+    let RenderState { film, plans, passes, seconds_total, seconds_perception, seconds_allocation, .. } = state;
     let fresh = RenderState::of_film(film, limits.max_samples.min(limits.mean_samples.unwrap_or(u32::MAX)));
-    RenderState { inflation, plans, passes, seconds_total, seconds_perception, ..fresh }
+    RenderState { inflation, plans, passes, seconds_total, seconds_perception, seconds_allocation, ..fresh }
 }
 
 /// Writes the film's file so often that a kill never costs more than was agreed.

@@ -5,6 +5,7 @@ mod bench;
 mod channels;
 mod compare;
 mod console;
+mod importance;
 mod info;
 mod keeper;
 mod merge;

@@ -16,6 +16,8 @@ pub(super) struct InputPicture {
     height: usize,
     rgb: Vec<[f32; 3]>,
     content: Content,
+    /// Width of a pixel over its height.
+    pixel_aspect_ratio: f64,
 }
 
 /// What the values mean.
@@ -57,7 +59,8 @@ impl InputPicture {
             eprintln!("note: {}: {note}", path.display());
         }
         let content = Content::Scene { nits_per_unit };
-        Ok(Self { width: picture.width as usize, height: picture.height as usize, rgb: picture.rgb, content })
+        let (width, height) = (picture.width as usize, picture.height as usize);
+        Ok(Self { width, height, rgb: picture.rgb, content, pixel_aspect_ratio: exr.pixel_aspect_ratio })
     }
 
     fn from_image(path: &Path, content: Content) -> Result<Self> {
@@ -72,7 +75,27 @@ impl InputPicture {
         let picture = reader.decode().with_context(|| format!("{}: not a readable picture", path.display()))?;
         let picture = picture.into_rgb32f();
         let (width, height) = (picture.width() as usize, picture.height() as usize);
-        Ok(Self { width, height, rgb: picture.pixels().map(|p| p.0).collect(), content })
+        Ok(Self { width, height, rgb: picture.pixels().map(|p| p.0).collect(), content, pixel_aspect_ratio: 1.0 })
+    }
+
+    /// The viewing of this picture, whose pixels may be oblong: its lines are as dense as the display's and its columns closer
+    /// together or wider apart, as players stretch them.
+    pub(super) fn viewed(&self, viewing: &Viewing) -> Result<Viewing> {
+        let mut viewing = viewing.clone();
+        viewing.display.pixels_per_degree /= self.pixel_aspect_ratio;
+        viewing.display.pixel_aspect_ratio *= self.pixel_aspect_ratio;
+        viewing.check().with_context(|| format!("pixels {} times as wide as high", self.pixel_aspect_ratio))?;
+        Ok(viewing)
+    }
+
+    /// Width of a pixel over its height.
+    pub(super) fn pixel_aspect_ratio(&self) -> f64 {
+        self.pixel_aspect_ratio
+    }
+
+    /// Luminance of the values as the file has them.
+    pub(super) fn values(&self) -> Plane {
+        Plane::from_fn(self.width, self.height, |x, y| luminance(self.rgb[y * self.width + x]))
     }
 
     /// Width and height in pixels.

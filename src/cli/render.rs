@@ -1,6 +1,7 @@
 //! `fechner render`: a scene file in, a picture out.
 
 use super::console::Console;
+use super::importance;
 use super::keeper::{CheckpointArguments, Keeper, Watch};
 use super::report::{Report, summary};
 use super::seeing::{self, parse_positive};
@@ -14,6 +15,7 @@ use fechner::integrator::{Crop, DEFAULT_MAX_DEPTH, PathTracer, TraceSettings};
 use fechner::output;
 use fechner::output::rendered::Background;
 use fechner::sampler::{PixelFilter, Sequence};
+use fechner::scene::hash::ContentHash;
 use fechner::scene::{Scene, load};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -83,6 +85,10 @@ pub(super) struct RenderArguments {
     /// How the samples of neighbouring pixels relate.
     #[arg(long, value_enum, default_value = "per-pixel", help_heading = "Sampling")]
     sequence: SequenceChoice,
+    /// Picture whose values multiply the thresholds: 1 changes nothing, 2 lets twice the noise stand, 0.5 half of it.
+    /// EXR or HDR as it stands, PNG from 0 to 1; of the picture's shape. Visibilities are told under it.
+    #[arg(long, value_name = "MAP", help_heading = "Sampling")]
+    importance: Option<PathBuf>,
     /// Seed of all random numbers.
     #[arg(long, default_value_t = 0, help_heading = "Sampling")]
     seed: u64,
@@ -251,8 +257,16 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     let size = arguments.size.unwrap_or(Size { width: scene.film.width, height: scene.film.height });
     check_memory(size)?;
     let trace = trace_settings(arguments, size)?;
-    let record = settings_record(arguments, &scene)?;
-    let settings = record.loop_settings(limits(arguments, &scene, record.sampling))?;
+    let mut record = settings_record(arguments, &scene)?;
+    let mut settings = record.loop_settings(limits(arguments, &scene, record.sampling))?;
+    if let Some(path) = &arguments.importance {
+        if matches!(settings.sampling, Sampling::Rival(_)) {
+            bail!("--importance multiplies thresholds, and this --sampling has none: use adaptive or uniform");
+        }
+        let map = importance::read(path, (size.width as usize, size.height as usize), trace.film_area())?;
+        record.importance = Some(ContentHash::of_values(map.values()));
+        settings.importance = Some(map);
+    }
     if trace.filter.is_signed() && settings.sampling != Sampling::Uniform {
         bail!(
             "--filter mitchell has negative lobes, whose scatter is not the picture's noise: adaptive sampling cannot \
@@ -384,6 +398,7 @@ fn settings_record(arguments: &RenderArguments, scene: &Scene) -> anyhow::Result
         nits_per_unit: arguments.nits_per_unit.unwrap_or(scene.nits_per_unit),
         operator: operator.to_owned(),
         exposure_stops: arguments.exposure.or(view.exposure_stops),
+        importance: None,
     })
 }
 

@@ -4,7 +4,7 @@ use super::console::duration_in_words;
 use fechner::adaptive::settings::{LoopSettings, RivalRule, Sampling};
 use fechner::adaptive::statistics::find_outliers;
 use fechner::adaptive::{Rendered, StopReason, visible_share};
-use fechner::output::Attribute;
+use fechner::output::{self, Attribute};
 use fechner_perception::Plane;
 use fechner_perception::psychometric::detection_probability;
 use serde::Serialize;
@@ -44,6 +44,8 @@ pub(super) struct Report {
     rays_total: u64,
     seconds_total: f64,
     seconds_perception: f64,
+    /// Of which in finding counts.
+    seconds_allocation: f64,
     visibility_target: Option<f64>,
     visibility_p99: f64,
     visibility_p999: f64,
@@ -67,6 +69,12 @@ pub(super) struct Report {
     outlier_pixels: usize,
     /// Share of the picture's energy by which they stand out.
     outlier_energy_share: f64,
+    /// Least and greatest number that thresholds are multiplied by, where a map of importance was given. All visibilities and
+    /// chances here are under it.
+    importance_range: Option<[f32; 2]>,
+    /// The tone operator's fit, which [`Report::attributes`] takes along.
+    #[serde(skip)]
+    tone: Option<(String, Attribute)>,
     nonfinite_samples: u64,
     peak_memory_bytes: Option<u64>,
     plans: u32,
@@ -119,6 +127,7 @@ impl Report {
             rays_total: film.rays,
             seconds_total: rendered.seconds_total,
             seconds_perception: rendered.seconds_perception,
+            seconds_allocation: rendered.seconds_allocation,
             visibility_target: target,
             visibility_p99: p99,
             visibility_p999: judgement.predicted.quantile(0.999),
@@ -133,6 +142,11 @@ impl Report {
             variance_inflation: rendered.inflation,
             outlier_pixels: outliers.pixels,
             outlier_energy_share: outliers.energy_share,
+            importance_range: settings.importance.as_ref().map(|map| {
+                let values = || map.values().iter().copied();
+                [values().fold(f32::INFINITY, f32::min), values().fold(0.0, f32::max)]
+            }),
+            tone: output::tone_attribute(judgement.tone.as_ref()),
             nonfinite_samples: film.nonfinite_samples,
             peak_memory_bytes: peak_memory_bytes(),
             plans: rendered.plans,
@@ -186,7 +200,11 @@ impl Report {
         if let Some(target) = self.visibility_target {
             attributes.push(("fechner.visibility_target", number(target)));
         }
-        attributes.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+        if let Some([least, greatest]) = self.importance_range {
+            attributes.push(("fechner.importance", text(&format!("thresholds times {least} to {greatest}"))));
+        }
+        let named = attributes.into_iter().map(|(name, value)| (name.to_owned(), value));
+        named.chain(self.tone.clone()).collect()
     }
 }
 
@@ -213,12 +231,14 @@ pub(super) fn summary(report: &Report, settings: &LoopSettings, rendered: &Rende
     );
     let mut lines = vec![
         format!(
-            "{} samples ({:.1} a pixel on average, {} at most) in {}, of which {:.1} % in the perception model.",
+            "{} samples ({:.1} a pixel on average, {} at most) in {}, of which {:.1} % in the perception model ({:.1} % in \
+             finding counts).",
             report.samples_total,
             report.spp_mean,
             report.spp_max,
             duration_in_words(report.seconds_total),
-            100.0 * report.seconds_perception / report.seconds_total
+            100.0 * report.seconds_perception / report.seconds_total,
+            100.0 * report.seconds_allocation / report.seconds_total
         ),
         format!("{why}; {target}."),
         format!(
@@ -235,6 +255,11 @@ pub(super) fn summary(report: &Report, settings: &LoopSettings, rendered: &Rende
         "Model-predicted, calibrated on gratings, not on renderings; light paths never sampled are not covered."
             .to_owned(),
     ];
+    if let Some([least, greatest]) = report.importance_range {
+        lines.push(format!(
+            "Thresholds are multiplied by the importance map, {least} to {greatest}, and visibilities and chances are under it."
+        ));
+    }
     if let Some(audit) = rendered.audit {
         lines.push(format!(
             "Audit: fresh samples in {} tiles differ from the picture by {:.2} ± {:.2} times the predicted visible energy.",

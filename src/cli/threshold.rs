@@ -6,7 +6,7 @@ use super::seeing::SeeingArguments;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::exr_read::read_exr;
-use fechner::output::{self, Attribute, Format, Picture};
+use fechner::output::{self, Attribute, Format, PIXEL_ASPECT_RATIO, Picture};
 use fechner_perception::display::Glare;
 use fechner_perception::model::{self, ModelInputs};
 use fechner_perception::motion::image_velocity_deg_s;
@@ -51,6 +51,9 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
         viewing.observer.glare = Glare::Cie { age_years };
         viewing.check().context("--glare")?;
     }
+    let nits_per_unit = arguments.seeing.nits_per_unit;
+    let guide = InputPicture::read(&arguments.input, nits_per_unit)?;
+    let viewing = guide.viewed(&viewing).with_context(|| arguments.input.display().to_string())?;
     let csf = csf::by_name(&arguments.seeing.csf, &viewing)?;
     let model = model::by_name(&arguments.model).with_context(|| {
         format!("there is no threshold model \"{}\"; known: {}", arguments.model, model::names().join(", "))
@@ -59,8 +62,6 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
         let known = tone::operator_names().join(", ");
         format!("there is no tone operator \"{}\"; known: {known}", arguments.operator)
     })?;
-    let nits_per_unit = arguments.seeing.nits_per_unit;
-    let guide = InputPicture::read(&arguments.input, nits_per_unit)?;
     let fitted = guide.fit(operator.as_ref(), &viewing);
     let shown = guide.displayed(fitted.as_deref(), &viewing);
     let velocity = match &arguments.velocity {
@@ -106,6 +107,7 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     picture.push_attribute("fechner.observer.display", text(&viewing.display.name));
     let ppd = viewing.display.pixels_per_degree as f32;
     picture.push_attribute("fechner.observer.pixels_per_degree", Attribute::Float(ppd));
+    picture.push_attribute(PIXEL_ASPECT_RATIO, Attribute::Float(guide.pixel_aspect_ratio() as f32));
     output::write_exr(&arguments.output, &picture)?;
     println!(
         "median threshold {:.3} cd/m² of standard error at visibility 1 (model-predicted; calibrated on gratings, not on renderings)",

@@ -93,11 +93,16 @@ pub(super) struct SceneFrame {
     photopic: Plane,
     scotopic: Plane,
     gaze: Option<Pixel>,
+    /// The display, in this picture's pixels.
+    viewing: Viewing,
+    pixel_aspect_ratio: f64,
 }
 
 impl SceneFrame {
-    fn read(path: &Path, arguments: &TonemapArguments) -> Result<Self> {
+    fn read(path: &Path, arguments: &TonemapArguments, viewing: &Viewing) -> Result<Self> {
         let picture = InputPicture::read(path, arguments.nits_per_unit)?;
+        let viewing = picture.viewed(viewing).with_context(|| path.display().to_string())?;
+        let pixel_aspect_ratio = picture.pixel_aspect_ratio();
         let (width, height) = picture.size();
         let Some(rgb_cd_m2) = picture.scene_rgb_cd_m2() else {
             bail!("{}: ready for a display already; .exr and .hdr files hold scenes", path.display());
@@ -108,7 +113,8 @@ impl SceneFrame {
         let plane =
             |of: fn([f32; 3]) -> f32| Plane::from_fn(width, height, |x, y| of(rgb_cd_m2[y * width + x]).max(0.0));
         let (photopic, scotopic) = (plane(luminance), plane(scotopic_luminance));
-        Ok(Self { width, rgb_cd_m2, photopic, scotopic, gaze: arguments.gaze.map(|gaze| gaze.0) })
+        let gaze = arguments.gaze.map(|gaze| gaze.0);
+        Ok(Self { width, rgb_cd_m2, photopic, scotopic, gaze, viewing, pixel_aspect_ratio })
     }
 
     fn guide(&self) -> SceneGuide<'_> {
@@ -143,10 +149,11 @@ pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
     }
     let mut eye = if timed { Some(Eye::new(arguments, operator.as_ref())?) } else { None };
     for (input, target) in arguments.input.iter().zip(&targets) {
-        let frame = SceneFrame::read(input, arguments)?;
+        let frame = SceneFrame::read(input, arguments, &viewing)?;
+        let viewing = &frame.viewing;
         let state = eye.as_mut().map(|eye| eye.look_at(Goal::of(&frame.guide(), viewing.display.pixels_per_degree)));
-        let fitted = operator.fit(&frame.guide(), &viewing, state.as_ref());
-        write(target, format, &frame, fitted.as_ref(), &viewing, state.as_ref())?;
+        let fitted = operator.fit(&frame.guide(), viewing, state.as_ref());
+        write(target, format, &frame, fitted.as_ref(), state.as_ref())?;
         println!("{}: {}", target.display(), fitted.describe());
     }
     if let (Some(path), Some(state)) = (&arguments.state, eye.and_then(|eye| eye.state)) {
@@ -169,8 +176,8 @@ fn run_all(
     if format != Format::Png {
         bail!("{}: a sheet of all operators is a picture; end the name in .png", targets[0].display());
     }
-    let frame = SceneFrame::read(&arguments.input[0], arguments)?;
-    let sheet = sheet::of_all_operators(&frame, viewing, settings);
+    let frame = SceneFrame::read(&arguments.input[0], arguments, viewing)?;
+    let sheet = sheet::of_all_operators(&frame, &frame.viewing, settings);
     output::write_png_for(&targets[0], sheet.width as u32, sheet.height as u32, &sheet.rgb, &viewing.display)?;
     Ok(())
 }
@@ -249,10 +256,10 @@ fn write(
     format: Format,
     frame: &SceneFrame,
     fitted: &dyn FittedTone,
-    viewing: &Viewing,
     state: Option<&AdaptationState>,
 ) -> Result<()> {
     let shown = frame.shown(fitted);
+    let viewing = &frame.viewing;
     let (width, height) = (frame.width as u32, frame.height() as u32);
     match format {
         Format::Png => output::write_png_for(target, width, height, &shown, &viewing.display)?,
@@ -267,6 +274,8 @@ fn write(
             let operator = fitted.describe().replace('²', "2").replace('×', "x");
             picture.push_attribute("fechner.operator", Attribute::Text(operator));
             picture.push_attribute("fechner.observer.display", Attribute::Text(viewing.display.name.clone()));
+            picture.push_attribute(output::PIXEL_ASPECT_RATIO, Attribute::Float(frame.pixel_aspect_ratio as f32));
+            picture.attributes.extend(output::tone_attribute(fitted));
             if let Some(state) = state {
                 let text = serde_json::to_string(state).context("the eye's state could not be put into words")?;
                 picture.push_attribute("fechner.adaptation", Attribute::Text(text));

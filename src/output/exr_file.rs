@@ -2,7 +2,9 @@
 
 use super::beside::write_beside;
 use super::exr_header::sort_attributes;
-use super::{Attribute, ChannelValues, NITS_PER_UNIT, OutputError, Picture, REPLACED_VALUES, check_size};
+use super::{
+    Attribute, ChannelValues, NITS_PER_UNIT, OutputError, PIXEL_ASPECT_RATIO, Picture, REPLACED_VALUES, check_size,
+};
 use ::exr::meta::attribute::{AttributeValue, Chromaticities};
 use ::exr::prelude::{
     AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds, Layer,
@@ -33,7 +35,12 @@ pub fn write_exr(path: &Path, picture: &Picture<'_>) -> Result<(), OutputError> 
 
     let size = Vec2(picture.width as usize, picture.height as usize);
     let mut layer_attributes = LayerAttributes { software_name: Some("fechner".into()), ..LayerAttributes::default() };
+    let mut pixel_aspect = 1.0;
     for (name, value) in &picture.attributes {
+        if let (PIXEL_ASPECT_RATIO, &Attribute::Float(ratio)) = (name.as_str(), value) {
+            pixel_aspect = ratio;
+            continue;
+        }
         if let (NITS_PER_UNIT, &Attribute::Float(nits)) = (name.as_str(), value) {
             layer_attributes.white_luminance = Some(nits);
         }
@@ -46,6 +53,7 @@ pub fn write_exr(path: &Path, picture: &Picture<'_>) -> Result<(), OutputError> 
     let encoding =
         Encoding { compression: Compression::ZIP16, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
     let mut image_attributes = ImageAttributes::new(IntegerBounds::from_dimensions(size));
+    image_attributes.pixel_aspect = pixel_aspect;
     image_attributes.chromaticities = Some(Chromaticities {
         red: Vec2(0.64, 0.33),
         green: Vec2(0.30, 0.60),

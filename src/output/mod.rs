@@ -16,6 +16,7 @@ pub use beside::{remove_leftovers, write_beside};
 pub use exr_file::write_exr;
 pub use png_file::{encode_srgb8, write_png, write_png_for, write_png_with_alpha, write_pq_png};
 
+use fechner_perception::tone::FittedTone;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -23,6 +24,19 @@ use std::path::{Path, PathBuf};
 pub const NITS_PER_UNIT: &str = "nits_per_unit";
 /// Set by [`write_exr`], and only when it had to change values: how many were not finite or too large for half floats.
 pub const REPLACED_VALUES: &str = "replaced_values";
+
+/// Width of a pixel over its height: [`write_exr`] puts this attribute where the format has it.
+pub const PIXEL_ASPECT_RATIO: &str = "pixelAspectRatio";
+/// The fit of the tone operator, see [`tone_attribute`].
+pub const TONE: &str = "fechner.tone";
+
+/// The fit of a tone operator as JSON of a [`fechner_perception::tone::SavedTone`]. None for one that knows places: it has values
+/// for each pixel, and can be fitted to the picture again.
+pub fn tone_attribute(fitted: &dyn FittedTone) -> Option<(String, Attribute)> {
+    const LONGEST: usize = 1 << 16;
+    let text = serde_json::to_string(&fitted.save()).ok().filter(|text| text.len() <= LONGEST)?;
+    Some((TONE.to_owned(), Attribute::Text(text)))
+}
 
 /// A picture of named channels, row-major from the top left.
 #[derive(Clone, Debug, Default)]

@@ -22,6 +22,9 @@ pub fn write_png_for(
     }
 }
 
+/// The default took a third of the time of a tone-mapped picture of 1920×1080.
+const COMPRESSION: png::Compression = png::Compression::Fast;
+
 /// Code points of ITU-T H.273: primaries of BT.2020, transfer of SMPTE ST 2084 (PQ), RGB, full range.
 const CICP_BT2020_PQ: [u8; 4] = [9, 16, 0, 1];
 
@@ -43,6 +46,7 @@ pub fn write_pq_png(
         let mut encoder = png::Encoder::new(&mut buffered, width, height);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Sixteen);
+        encoder.set_compression(COMPRESSION);
         let mut writer = encoder.write_header()?;
         writer.write_chunk(png::chunk::ChunkType(*b"cICP"), &CICP_BT2020_PQ)?;
         writer.write_image_data(&bytes)?;
@@ -99,6 +103,7 @@ fn write_bytes(path: &Path, width: u32, height: u32, color: png::ColorType, byte
         let mut encoder = png::Encoder::new(&mut buffered, width, height);
         encoder.set_color(color);
         encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_compression(COMPRESSION);
         encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
         // For readers that know only these; the values are those that the format's standard names beside sRGB.
         encoder.set_source_gamma(png::ScaledFloat::from_scaled(45_455));
@@ -118,14 +123,16 @@ fn write_bytes(path: &Path, width: u32, height: u32, color: png::ColorType, byte
 /// The bytes of [`write_png`]: sRGB-encoded, dithered, RGB after RGB, row after row.
 pub fn encode_srgb8(width: u32, rgb_linear_display: &[[f32; 3]]) -> Vec<u8> {
     let width = width.max(1) as usize;
-    let mut bytes = Vec::with_capacity(rgb_linear_display.len() * 3);
-    for (i, rgb) in rgb_linear_display.iter().enumerate() {
-        let offset = dither((i % width) as u32, (i / width) as u32);
-        for &value in rgb {
-            // A value that is a whole step stays that step whatever the offset in [0, 1).
-            bytes.push((srgb_from_linear(value) * 255.0 + offset) as u8);
-        }
-    }
+    let mut bytes = vec![0; rgb_linear_display.len() * 3];
+    bytes.par_chunks_mut(3 * width).zip(rgb_linear_display.par_chunks(width)).enumerate().for_each(
+        |(y, (bytes, row))| {
+            for (x, (bytes, rgb)) in bytes.as_chunks_mut::<3>().0.iter_mut().zip(row).enumerate() {
+                let offset = dither(x as u32, y as u32);
+                // A value that is a whole step stays that step whatever the offset in [0, 1).
+                *bytes = rgb.map(|value| (srgb_from_linear(value) * 255.0 + offset) as u8);
+            }
+        },
+    );
     bytes
 }
 

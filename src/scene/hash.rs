@@ -25,6 +25,15 @@ impl std::fmt::Debug for ContentHash {
     }
 }
 
+impl ContentHash {
+    /// Of an array of numbers.
+    pub fn of_values(values: &[f32]) -> Self {
+        let mut hasher = blake3::Hasher::new();
+        hash_array(&mut hasher, values);
+        Self(*hasher.finalize().as_bytes())
+    }
+}
+
 /// Hashes a scene, less what no sample depends on: its name and notes, and what it asks for when the command line does not.
 ///
 /// Large arrays are hashed as bytes, and all else as its `Debug` text, which is exact for floats and holds every field:

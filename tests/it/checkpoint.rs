@@ -45,6 +45,7 @@ impl Setup {
                 nits_per_unit: like.nits_per_unit,
                 operator: "constant".to_owned(),
                 exposure_stops: None,
+                importance: None,
             },
             visibility: 4.0,
         };
@@ -119,6 +120,19 @@ fn a_render_that_is_continued_equals_one_in_one_go() {
             resume(&setup.tracer, &setup.settings(Sampling::Adaptive, 4.0), state, &Quiet).expect("goes on");
         assert_same(&continued, &in_one_go);
     }
+}
+
+/// The film keeps the fit of the tone operator that its last look used.
+#[test]
+fn the_tone_fit_is_saved() {
+    let setup = Setup::new(8);
+    let monitor = Interrupter::after(3);
+    let stopped = render(&setup.tracer, &setup.settings(Sampling::Adaptive, 8.0), &monitor).expect("renders");
+    let saved = setup.through_a_file(&monitor.state()).tone.expect("a fit").restore();
+    for luminance in [0.1, 3.0, 40.0, 900.0] {
+        assert_eq!(saved.relative_luminance(luminance), stopped.judgement.tone.relative_luminance(luminance));
+    }
+    assert_eq!(saved.describe(), stopped.judgement.tone.describe());
 }
 
 /// Interrupted after every single batch, for a rule that looks seldom too.

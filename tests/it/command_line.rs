@@ -161,6 +161,47 @@ fn pictures_are_compared_and_thresholds_mapped() {
     assert_refused(&["threshold", "1.exr", "-o", "a.exr", "--model", "guess"], at, &["guess", "csf-bands"]);
 }
 
+/// An EXR with pixels twice as wide as high has thresholds as on a display that says so, and its ratio goes on into what is
+/// written.
+#[test]
+fn oblong_pixels_of_a_file_are_honoured() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    for (name, ratio) in [("oblong.exr", 2.0), ("square.exr", 1.0)] {
+        let mut picture = fechner::output::Picture::new(48, 40);
+        let values: Vec<f32> =
+            (0..48 * 40).map(|i| if (i % 48 / 6 + i / 480) % 2 == 0 { 20.0 } else { 60.0 }).collect();
+        ["R", "G", "B"].iter().for_each(|channel| picture.push_f32(channel, values.clone()));
+        picture.push_attribute("pixelAspectRatio", fechner::output::Attribute::Float(ratio));
+        fechner::output::write_exr(&at.join(name), &picture).expect("written");
+    }
+    let display = "name = \"oblong\"\npixels_per_degree = 30.0\npixel_aspect_ratio = 2.0\nwhite_cd_m2 = 200.0\n\
+                   black_cd_m2 = 0.2\nambient_cd_m2 = 0.0\neotf = \"srgb\"\n";
+    std::fs::write(at.join("oblong.toml"), display).expect("written");
+    let thresholds = |input: &str, display: &str| {
+        let arguments = ["threshold", input, "--nits-per-unit", "1", "--display", display, "-o", "out.exr"];
+        let output = fechner().args(arguments).current_dir(at).output().expect("runs");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        fechner::exr_read::read_exr(&at.join("out.exr")).expect("maps")
+    };
+    let of_file = thresholds("oblong.exr", "desktop");
+    let of_display = thresholds("square.exr", "oblong.toml");
+    assert_eq!((of_file.pixel_aspect_ratio, of_display.pixel_aspect_ratio), (2.0, 1.0));
+    assert_eq!(of_file.channel("threshold.Y"), of_display.channel("threshold.Y"));
+    assert_ne!(of_file.channel("threshold.Y"), thresholds("square.exr", "desktop").channel("threshold.Y"));
+    let told = ["compare", "oblong.exr", "square.exr", "--nits-per-unit", "1"];
+    assert_refused(&told, at, &["oblong.exr", "2 times as wide as high", "square.exr"]);
+    let shown = ["tonemap", "oblong.exr", "--nits-per-unit", "1", "--operator", "ptyg", "-o", "shown.exr"];
+    assert!(fechner().args(shown).current_dir(at).output().expect("runs").status.success());
+    let shown = fechner::exr_read::read_exr(&at.join("shown.exr")).expect("a picture");
+    assert_eq!(shown.pixel_aspect_ratio, 2.0);
+    let Some(fechner::output::Attribute::Text(fit)) = shown.attribute("fechner.tone") else { panic!("no fit") };
+    let fit: fechner_perception::tone::SavedTone = serde_json::from_str(fit).expect("a fit");
+    let black = shown.channel("R").expect("red").iter().copied().fold(f32::INFINITY, f32::min);
+    let again = fit.restore().map_rgb([20.0; 3])[0];
+    assert!((again - black).abs() < 1e-6, "the saved fit gives {again}, the picture has {black}");
+}
+
 /// Options that contradict each other or the picture are told apart before anything is traced.
 #[test]
 fn impossible_pictures_are_refused() {

@@ -8,6 +8,7 @@
 //! - `camera_and_time`: blur of lens and shutter, moving lamps, crops
 //! - `formats`: the same scene from several formats
 //! - `bad_input`: bad scene files, and our own ones
+//! - `importance`: samples go where a user's map sends them
 //! - `load_assets`: scenes that others made, sound and damaged
 //! - `mutations`: thousands of damaged files a format, in a child process (ignored)
 //! - `references`: scenes of others beside reference pictures (ignored)
@@ -27,6 +28,7 @@ mod command_line;
 mod direct_light;
 mod formats;
 mod furnace;
+mod importance;
 mod kill;
 mod load_assets;
 mod mutations;

@@ -22,6 +22,7 @@ mod clipped;
 mod constant;
 mod duplex;
 mod durand_dorsey00;
+mod fast_power;
 mod ferwerda96;
 mod field;
 mod gamut;

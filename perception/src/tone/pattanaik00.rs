@@ -1,7 +1,10 @@
 //! Pattanaik, Tumblin, Yee and Greenberg's time-dependent visual model.
 
+use std::sync::LazyLock;
+
 use serde::{Deserialize, Serialize};
 
+use super::fast_power::{FixedPower, powers};
 use super::field::{AdaptationScope, LocalAdaptation};
 use super::gamut::{fit_into_display, light};
 use super::guide::{Pixel, SceneGuide};
@@ -30,6 +33,9 @@ pub struct Pattanaik00 {
 
 /// Exponent of the response.
 const POWER: f64 = 0.73;
+/// Light to the power of the response, and back: half of an operator's time was `powf`.
+static RAISED: LazyLock<FixedPower> = LazyLock::new(|| FixedPower::new(POWER));
+static LOWERED: LazyLock<FixedPower> = LazyLock::new(|| FixedPower::new(POWER.recip()));
 const WHITE_FACTOR: f64 = 5.0;
 const BLACK_FACTOR: f64 = 5.0 / 32.0;
 /// The half-saturation formulas are 0 / 0 at 0 cd/m².
@@ -59,17 +65,26 @@ struct Receptor {
 }
 
 impl Receptor {
-    fn response(self, light_cd_m2: f64) -> f64 {
-        if light_cd_m2 <= 0.0 {
-            return 0.0;
+    /// Share of the greatest response.
+    #[inline]
+    fn share(self, light_cd_m2: f32) -> f64 {
+        let raised = RAISED.raise(light_cd_m2.max(0.0));
+        // Infinite light and a σ of 0 at no light are the ends of the curve.
+        if raised == f64::INFINITY {
+            1.0
+        } else if raised > 0.0 {
+            raised / (raised + self.sigma_power)
+        } else {
+            0.0
         }
-        // Written so that neither bright light nor a small σ overflows.
-        self.pigment / (1.0 + self.sigma_power / light_cd_m2.powf(POWER))
     }
 
-    /// Slope of the response over the natural logarithm of luminance.
-    fn slope(self, light_cd_m2: f64) -> f64 {
-        let share = self.response(light_cd_m2) / self.pigment.max(f64::MIN_POSITIVE);
+    fn response(self, light_cd_m2: f64) -> f64 {
+        self.pigment * self.share(light_cd_m2 as f32)
+    }
+
+    /// Slope of the response over the natural logarithm of luminance, where the response is `share` of the greatest.
+    fn slope(self, share: f64) -> f64 {
         self.pigment * POWER * share * (1.0 - share)
     }
 }
@@ -148,7 +163,7 @@ impl DisplayEye {
     /// The luminance, cd/m², that gives this response.
     fn luminance_cd_m2(self, response: f64) -> f64 {
         let response = response.clamp(0.0, 1.0 - 1e-6);
-        self.sigma_cd_m2 * (response / (1.0 - response)).powf(POWER.recip())
+        self.sigma_cd_m2 * LOWERED.raise((response / (1.0 - response)) as f32)
     }
 
     /// Mean slope of the response between black and white over the natural logarithm of luminance.
@@ -235,14 +250,15 @@ impl FittedTone for FittedPattanaik00 {
         let rgb = light(rgb_cd_m2);
         let scene = luminance(rgb);
         let retina = self.retina_at(pixel);
-        let cones = retina.cones.response(f64::from(scene));
+        let cone_share_of_most = retina.cones.share(scene);
+        let cones = retina.cones.pigment * cone_share_of_most;
         let rods = retina.rods.response(f64::from(scotopic_luminance(rgb)));
         let shown = self.screen.relative(self.shown_cd_m2(cones + rods));
         if scene <= 0.0 || cones + rods <= 0.0 {
             return [shown.min(1.0); 3];
         }
-        let strength = (retina.cones.slope(f64::from(scene)) / self.display_slope) as f32;
-        let coloured = rgb.map(|channel| (channel / scene).powf(strength));
+        let strength = (retina.cones.slope(cone_share_of_most) / self.display_slope) as f32;
+        let coloured = powers(rgb.map(|channel| channel / scene), strength);
         let brightness = luminance(coloured).max(f32::MIN_POSITIVE);
         let cone_share = (cones / (cones + rods)) as f32;
         fit_into_display(

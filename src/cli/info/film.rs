@@ -46,6 +46,12 @@ pub(super) fn describe(checkpoint: &Checkpoint) -> String {
         let stops = settings.exposure_stops.map_or_else(String::new, |stops| format!(", {stops:+} stops"));
         format!("{}{stops}; RGB (1, 1, 1) is {} cd/m²", settings.operator, settings.nits_per_unit)
     });
+    if let Some(tone) = &state.tone {
+        row("fit", tone.clone().restore().describe());
+    }
+    if let Some(importance) = settings.importance {
+        row("importance", format!("map of content {importance}"));
+    }
     if let Some(audit) = state.audit {
         row(
             "audit",

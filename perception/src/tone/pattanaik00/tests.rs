@@ -68,7 +68,7 @@ fn golden_mapping() {
 #[test]
 fn colour_strength_of_an_identity_is_nearly_one() {
     let fit = fitted(25.0);
-    close(fit.retina.cones.slope(25.0) / fit.display_slope, 0.947, 1e-3);
+    close(fit.retina.cones.slope(fit.retina.cones.share(25.0)) / fit.display_slope, 0.947, 1e-3);
 }
 
 #[test]

@@ -19,6 +19,8 @@ pub enum Ceiling {
 const BINS: usize = 100;
 /// Of the samples: what is left may be trimmed, or the picture is given up for a linear scale (`pcond`).
 const TOLERANCE: f64 = 0.025;
+/// Share of the samples that a last pass may cut: then at most a thousandth of the display's range (in logarithms) is not used.
+const SETTLED: f64 = 1e-3;
 const LEAST_CD_M2: f64 = 1e-4;
 /// Each pass trims more than the tolerance, so that there are at most ln(1 / 0.025) / 0.025 = 148.
 const MOST_PASSES: usize = 200;
@@ -81,25 +83,57 @@ impl Histogram {
         if self.step * BINS as f64 <= range.greatest - range.least {
             return linear;
         }
+        let Some(mut stop) = self.trim_as_published(range, ceiling) else { return linear };
+        let whole = match ceiling {
+            Ceiling::Linear => stop.before - stop.trimmed,
+            Ceiling::Human => self.settle(range, ceiling, &mut stop),
+        };
+        Adjustment::Curve(self.curve(range, whole, stop.passes))
+    }
+
+    /// Passes until one cuts hardly anything; `None` where hardly anything is left.
+    fn trim_as_published(&mut self, range: DisplayRange, ceiling: Ceiling) -> Option<LastPass> {
         let all: f64 = self.counts.iter().sum();
         for passes in 1..=MOST_PASSES {
-            let (total, trimmed) = self.trim(range, ceiling);
-            let left = total - trimmed;
-            if left <= TOLERANCE * all {
-                return linear;
+            let (before, trimmed) = self.trim(range, ceiling);
+            if before - trimmed <= TOLERANCE * all {
+                return None;
             }
-            if trimmed <= TOLERANCE * total {
-                return Adjustment::Curve(Curve {
-                    least: self.least,
-                    step: self.step,
-                    range_least: range.least,
-                    range: range.greatest - range.least,
-                    cumulative: self.cumulative(),
-                    passes,
-                });
+            if trimmed <= TOLERANCE * before {
+                return Some(LastPass { before, trimmed, passes });
             }
         }
-        linear
+        None
+    }
+
+    /// The map, `whole` samples of which would fill the display.
+    fn curve(&self, range: DisplayRange, whole: f64, passes: usize) -> Curve {
+        Curve {
+            least: self.least,
+            step: self.step,
+            range_least: range.least,
+            range: range.greatest - range.least,
+            cumulative: self.cumulative_of(whole),
+            passes,
+        }
+    }
+
+    /// Where the published passes stop, the last one has cut up to [`TOLERANCE`] of the samples, by which the rest would grow
+    /// above the ceiling it was just cut to. A few more passes make that less, as long as no more than that is lost in all;
+    /// what is left of it stays as light that the display has and the curve does not use. Returns the samples that stand
+    /// for all of the display's range: those before the last cut, so that every bin keeps to its ceiling.
+    fn settle(&mut self, range: DisplayRange, ceiling: Ceiling, last: &mut LastPass) -> f64 {
+        let least = (1.0 - TOLERANCE) * (last.before - last.trimmed);
+        while last.trimmed > SETTLED * last.before && last.passes < MOST_PASSES {
+            let mut next = self.clone();
+            let (before, trimmed) = next.trim(range, ceiling);
+            if before - trimmed < least {
+                break;
+            }
+            *self = next;
+            *last = LastPass { before, trimmed, passes: last.passes + 1 };
+        }
+        last.before
     }
 
     /// One pass; the samples there were and those cut off.
@@ -122,7 +156,12 @@ impl Histogram {
 
     /// Share of the samples below each edge of the bins.
     fn cumulative(&self) -> Vec<f64> {
-        let total = self.counts.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        self.cumulative_of(self.counts.iter().sum())
+    }
+
+    /// The same as shares of another number of samples.
+    fn cumulative_of(&self, total: f64) -> Vec<f64> {
+        let total = total.max(f64::MIN_POSITIVE);
         let mut sum = 0.0;
         let mut shares = vec![0.0];
         shares.extend(self.counts.iter().map(|count| {
@@ -131,6 +170,16 @@ impl Histogram {
         }));
         shares
     }
+}
+
+/// What the last pass over a histogram did.
+struct LastPass {
+    /// Samples before it.
+    before: f64,
+    /// Samples that it cut off.
+    trimmed: f64,
+    /// Passes so far.
+    passes: usize,
 }
 
 impl Ceiling {

@@ -51,8 +51,17 @@ fn golden_curves() {
         ],
     );
     assert!(matches!(linear, Adjustment::Curve(Curve { passes: 7, .. })), "{linear}");
-    let human = log_normal(0.5).adjust(DISPLAY, Ceiling::Human);
+    // Where the published passes stop; ours go on from there and leave a little of the display's range, which makes
+    // it up to 3 % darker here.
+    let mut histogram = log_normal(0.5);
+    let stop = histogram.trim_as_published(DISPLAY, Ceiling::Human).unwrap();
+    let human = Adjustment::Curve(histogram.curve(DISPLAY, stop.before - stop.trimmed, stop.passes));
     check(&human, &[(1.0, 1.206_19), (3.0, 2.964_73), (10.0, 10.119_64), (30.0, 30.721_15), (100.0, 82.905_67)]);
+    let settled = log_normal(0.5).adjust(DISPLAY, Ceiling::Human);
+    for scene in [1.0, 10.0, 100.0] {
+        let ratio = settled.display_cd_m2(scene) / human.display_cd_m2(scene);
+        assert!((0.96..1.01).contains(&ratio), "{scene}: {ratio}");
+    }
     let wide = log_normal(0.7).adjust(DISPLAY, Ceiling::Linear);
     check(&wide, &[(1.0, 1.447_94), (3.0, 2.999_15), (10.0, 10.0), (30.0, 30.24), (100.0, 69.063_87)]);
     assert!(matches!(wide, Adjustment::Curve(Curve { passes: 2, .. })), "{wide}");
@@ -65,12 +74,12 @@ fn an_even_spread_of_six_decades_is_shown_with_a_third_of_its_slope() {
     check(&adjustment, &[(1.0, 4.6416)]);
 }
 
-/// In each bin the displayed contrast is at most what can be seen of the scene's, but for what the last pass trimmed (2.5 % of
-/// the samples at most, by which the rest then grows).
+/// In each bin the displayed contrast is at most what can be seen of the scene's.
 #[test]
 fn no_contrast_is_exaggerated() {
     let range = DisplayRange { least: 0.2_f64.ln(), greatest: 200.0_f64.ln() };
-    for (shift, deviation) in [(1.0, 0.7), (0.01, 1.0), (100.0, 1.2), (1.0, 2.0)] {
+    for (shift, deviation) in [(1.0, 0.7), (0.01, 1.0), (100.0, 1.2), (1.0, 2.0), (10.0, 0.6), (300.0, 0.8), (0.3, 1.5)]
+    {
         let samples: Vec<f64> = (0..5000)
             .map(|i| shift * 10.0_f64.powf(deviation * normal_quantile((f64::from(i) + 0.5) / 5000.0)))
             .collect();
@@ -87,8 +96,10 @@ fn no_contrast_is_exaggerated() {
             let slope = curve.range * (curve.cumulative[bin + 1] - curve.cumulative[bin]) / curve.step;
             worst = worst.max(slope / Ceiling::Human.contrast(middle.exp(), shown));
         }
-        println!("{shift} {deviation}: {adjustment}, {worst}");
-        assert!(worst < 1.0 / (1.0 - TOLERANCE) * 1.01, "{shift} {deviation}: {worst}");
+        println!("{shift} {deviation}: {adjustment}, {worst}, ends at {}", curve.cumulative[BINS]);
+        // The threshold curve has a step of 0.1 % where two formulas meet.
+        assert!(worst < 1.001, "{shift} {deviation}: {worst}");
+        assert!(*curve.cumulative.last().unwrap() > 1.0 - TOLERANCE, "{shift} {deviation}");
     }
 }
 
