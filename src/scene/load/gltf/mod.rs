@@ -264,9 +264,7 @@ impl<'a> Reader<'a> {
         let normals = vectors(Semantic::Normals)?.unwrap_or_default().into_iter().map(Vec3::from_array).collect();
         let uvs = from.get(&Semantic::TexCoords(0)).map(|accessor| self.buffers.floats(&accessor)).transpose()?;
         let tangents = from.get(&Semantic::Tangents).map(|accessor| self.buffers.floats(&accessor)).transpose()?;
-        if from.get(&Semantic::Colors(0)).is_some() {
-            self.builder.note(format!("\"{name}\": vertex colours are not used."));
-        }
+        let colors = from.get(&Semantic::Colors(0)).map(|accessor| self.colors(&accessor, &name)).transpose()?;
         let indices = match from.indices() {
             Some(accessor) => self.buffers.indices(&accessor)?,
             None => (0..positions.len() as u32).collect(),
@@ -281,8 +279,21 @@ impl<'a> Reader<'a> {
             normals,
             uvs: uvs.unwrap_or_default().into_iter().map(Vec2::from_array).collect(),
             tangents: tangents.unwrap_or_default().into_iter().map(Vec4::from_array).collect(),
+            colors: colors.unwrap_or_default(),
             triangles: triangles(&indices, from.mode()),
         }))
+    }
+
+    /// Linear colours of vertices, without their alpha.
+    fn colors(&mut self, accessor: &::gltf::Accessor, name: &str) -> Result<Vec<Vec3>, LoadError> {
+        if accessor.dimensions().multiplicity() != 4 {
+            return Ok(self.buffers.floats(accessor)?.into_iter().map(Vec3::from_array).collect());
+        }
+        let colors: Vec<Vec4> = self.buffers.floats(accessor)?.into_iter().map(Vec4::from_array).collect();
+        if colors.iter().any(|color| color.w < 1.0) {
+            self.builder.note(format!("\"{name}\": the alpha of its vertex colours is not used."));
+        }
+        Ok(colors.into_iter().map(Vec4::truncate).collect())
     }
 
     fn camera(&mut self, camera: &::gltf::Camera, node: &str, to_world: &Affine3A) {
