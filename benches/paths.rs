@@ -18,7 +18,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 use support::peer::{MAX_DEPTH, Mitsuba, write_scene};
-use support::{ProcessClock, cornell_box, textured_cave};
+use support::{CpuClock, cornell_box, textured_cave};
 
 const SIZE: u32 = 256;
 const SAMPLES: u32 = 16;
@@ -72,7 +72,7 @@ fn bench_scene(name: &str, scene: fechner::scene::Scene) -> Result<()> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
         let (mut ours, mut theirs, mut rays) = (Best::NONE, Best::NONE, 0.0);
         for round in 0..ROUNDS {
-            let (cpu, wall) = (ProcessClock::start(), Instant::now());
+            let (cpu, wall) = (CpuClock::of_process(), Instant::now());
             let film = pool.install(|| {
                 let mut film = Film::new(SIZE, SIZE);
                 tracer.trace(&plan, &mut film, &|_| {});

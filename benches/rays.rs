@@ -16,7 +16,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::Arc;
-use support::{CaveSize, ThreadClock, cave_mesh, grey_scene};
+use support::{CaveSize, CpuClock, cave_mesh, grey_scene};
 
 const SIDE: u32 = 512;
 const ROUNDS: usize = 7;
@@ -68,7 +68,7 @@ fn bench_mesh(name: &str, size: CaveSize, folder: &Path, program: &Path) -> Resu
     for _ in 0..3 {
         let seconds;
         (world, seconds) = one_thread.install(|| {
-            let start = ThreadClock::start();
+            let start = CpuClock::of_thread();
             let world = World::new(scene.clone());
             (Some(world), start.seconds())
         });
@@ -133,7 +133,7 @@ fn print_row(mesh: &str, set: &RaySet, ours: Pass, theirs: Option<Pass>) {
 
 /// One pass of our own tree over a set.
 fn trace(world: &World, set: &RaySet) -> Pass {
-    let start = ThreadClock::start();
+    let start = CpuClock::of_thread();
     let (mut hits, mut distance) = (0, 0.0);
     for (ray, t_max) in &set.rays {
         if set.any {

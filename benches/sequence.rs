@@ -6,7 +6,7 @@
 //! one 256-sample render, and its root mean square over the picture is what the table calls error.
 
 use anyhow::{Context, Result};
-use fechner::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, Sampling};
+use fechner::adaptive::settings::{Limits, LoopSettings, Sampling};
 use fechner::adaptive::{Quiet, Rendered, render};
 use fechner::integrator::{PathTracer, TraceSettings};
 use fechner::sampler::Sequence;
@@ -74,15 +74,10 @@ fn rendered(scene: &Arc<Scene>, sequence: Sequence, seed: u64, effort: Effort) -
         Effort::Samples(samples) => (Sampling::Uniform, 0.0, Some(samples)),
         Effort::Visibility(visibility) => (Sampling::Adaptive, visibility, None),
     };
-    let settings = LoopSettings {
-        sampling,
-        allocation: AllocationRule::Convex,
-        model: None,
-        limits: Limits { visibility, time: None, mean_samples, max_samples: DEFAULT_MAX_SAMPLES, plans: None },
-        viewing: Viewing::of(Display::preset("desktop").context("a preset")?),
-        nits_per_unit: scene.nits_per_unit,
-        operator: operator("constant", None).context("an operator")?,
-    };
+    let viewing = Viewing::of(Display::preset("desktop").context("a preset")?);
+    let operator = operator("constant", None).context("an operator")?;
+    let limits = Limits { mean_samples, ..Limits::of_visibility(visibility) };
+    let settings = LoopSettings { sampling, limits, ..LoopSettings::new(viewing, scene.nits_per_unit, operator) };
     let trace = TraceSettings { sequence, ..TraceSettings::new(SIZE, SIZE, seed) };
     Ok(render(&PathTracer::new(Arc::clone(scene), trace), &settings, &Quiet)?)
 }

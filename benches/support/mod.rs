@@ -8,49 +8,41 @@ use anyhow::Result;
 use fechner::scene::load::{LoadOptions, load, shapes};
 use fechner::scene::{
     Alpha, Camera, ColorInput, Encoding, FilmDefaults, Instance, Material, MaterialId, Mesh, MeshId, Scene, Surface,
-    Texels, Texture, TextureId, TextureLookup, ViewingDefaults, Wrap,
+    Texels, Texture, TextureId, TextureLookup, Wrap,
 };
 use glam::{Affine3A, Vec2, Vec3};
 use rustix::time::{ClockId, clock_gettime};
 use std::path::Path;
 use std::sync::Arc;
 
-/// CPU time of the thread that asks: what other programs on the machine do does not count (their use of the caches does).
-pub(crate) struct ThreadClock(f64);
-
-impl ThreadClock {
-    /// Starts now.
-    pub(crate) fn start() -> Self {
-        Self(Self::now())
-    }
-
-    /// Seconds since the start.
-    pub(crate) fn seconds(&self) -> f64 {
-        Self::now() - self.0
-    }
-
-    fn now() -> f64 {
-        let time = clock_gettime(ClockId::ThreadCPUTime);
-        time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
-    }
+/// CPU time: what other programs on the machine do does not count (their use of the caches does).
+pub(crate) struct CpuClock {
+    id: ClockId,
+    start: f64,
 }
 
-/// CPU time of all threads of this program.
-pub(crate) struct ProcessClock(f64);
+impl CpuClock {
+    /// Starts now, for the thread that asks.
+    pub(crate) fn of_thread() -> Self {
+        Self::start(ClockId::ThreadCPUTime)
+    }
 
-impl ProcessClock {
-    /// Starts now.
-    pub(crate) fn start() -> Self {
-        Self(Self::now())
+    /// Starts now, for all threads of this program.
+    pub(crate) fn of_process() -> Self {
+        Self::start(ClockId::ProcessCPUTime)
     }
 
     /// Seconds since the start.
     pub(crate) fn seconds(&self) -> f64 {
-        Self::now() - self.0
+        Self::now(self.id) - self.start
     }
 
-    fn now() -> f64 {
-        let time = clock_gettime(ClockId::ProcessCPUTime);
+    fn start(id: ClockId) -> Self {
+        Self { id, start: Self::now(id) }
+    }
+
+    fn now(id: ClockId) -> f64 {
+        let time = clock_gettime(id);
         time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
     }
 }
@@ -185,13 +177,10 @@ pub(crate) fn grey_scene(meshes: Vec<Mesh>) -> Scene {
         .collect();
     Scene {
         name: "cave".to_owned(),
-        nits_per_unit: 1.0,
         camera: Camera::pinhole(Vec3::new(-0.9, 0.6, 0.9), Vec3::new(0.9, -0.25, -0.9).normalize(), Vec3::Y, 60.0),
         film: FilmDefaults { width: 512, height: 512 },
-        viewing: ViewingDefaults::default(),
         meshes,
         instances,
-        spheres: Vec::new(),
         materials: vec![Material {
             name: "grey".to_owned(),
             surface: Surface::Diffuse { reflectance: ColorInput::constant(Vec3::splat(0.5)) },
@@ -200,10 +189,7 @@ pub(crate) fn grey_scene(meshes: Vec<Mesh>) -> Scene {
             normal_map: None,
             alpha: Alpha::Opaque,
         }],
-        textures: Vec::new(),
-        lights: Vec::new(),
-        environment: None,
-        notes: Vec::new(),
+        ..Scene::default()
     }
 }
 

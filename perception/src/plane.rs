@@ -110,6 +110,24 @@ impl Plane {
         chunks.iter().sum::<f64>() / self.values.len() as f64
     }
 
+    /// The value that this share of the pixels, in [0, 1], stays at or below; 0 for a plane without pixels.
+    ///
+    /// ```
+    /// use fechner_perception::Plane;
+    /// let plane = Plane::from_fn(101, 1, |x, _| x as f32);
+    /// assert_eq!(plane.quantile(0.99), 99.0);
+    /// ```
+    #[must_use]
+    pub fn quantile(&self, share: f64) -> f64 {
+        let mut values = self.values.clone();
+        let rank = (share.clamp(0.0, 1.0) * values.len().saturating_sub(1) as f64).round() as usize;
+        if values.is_empty() {
+            return 0.0;
+        }
+        let (_, &mut value, _) = values.select_nth_unstable_by(rank, f32::total_cmp);
+        f64::from(value)
+    }
+
     /// Least and greatest value; (∞, 0) for a plane without pixels. Values must not be negative.
     pub(crate) fn range(&self) -> (f32, f32) {
         let join = |a: (f32, f32), b: (f32, f32)| (a.0.min(b.0), a.1.max(b.1));

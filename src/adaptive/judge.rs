@@ -14,6 +14,7 @@ use fechner_perception::threshold::{ThresholdInputs, ThresholdMap, threshold_map
 use fechner_perception::tone::acuity::BehindAcuity;
 use fechner_perception::tone::{FittedTone, SceneGuide};
 use fechner_perception::visibility::MeasuredError;
+use std::sync::OnceLock;
 
 /// What the perception model says of a film. Everything is in display cd/m² unless it says otherwise.
 #[derive(Debug)]
@@ -34,6 +35,8 @@ pub struct Judgement {
     pub pooled_variance_per_sample: Plane,
     /// The same as each half decides by it.
     pub variance_per_sample: [Plane; 2],
+    /// What the halves' difference shows, once somebody asked.
+    measured: OnceLock<MeasuredError>,
 }
 
 /// Perception failed on a picture that the loop made: a defect of ours, with the reason.
@@ -97,6 +100,7 @@ pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Jud
         predicted: Plane::filled(0, 0, 0.0),
         pooled_variance_per_sample: per_sample(&display_variance),
         variance_per_sample,
+        measured: OnceLock::new(),
     };
     judgement.predicted = judgement.visibility_of(&display_variance);
     Ok(judgement)
@@ -122,14 +126,16 @@ impl Judgement {
     }
 
     /// What can be seen of the halves' luminance difference: the same as predicted, measured.
-    pub fn measured_error(&self, settings: &LoopSettings) -> MeasuredError {
-        let displayed = seen::display_half_difference(
-            self.tone.as_ref(),
-            &settings.viewing.display,
-            &self.estimate.luminance_cd_m2,
-            &self.estimate.half_difference,
-        );
-        self.thresholds.measured_error(&displayed)
+    pub fn measured_error(&self) -> &MeasuredError {
+        self.measured.get_or_init(|| {
+            let displayed = seen::display_half_difference(
+                self.tone.as_ref(),
+                &self.thresholds.viewing().display,
+                &self.estimate.luminance_cd_m2,
+                &self.estimate.half_difference,
+            );
+            self.thresholds.measured_error(&displayed)
+        })
     }
 }
 
@@ -199,7 +205,6 @@ pub fn variance_share(film: &Film, pixel: usize) -> f64 {
 mod tests {
     use super::*;
     use crate::adaptive::plan::pilot_plan;
-    use crate::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, Sampling};
     use crate::film::BlockSum;
     use crate::integrator::{FirstHit, PathSample};
     use crate::sampler::hash_words;
@@ -208,21 +213,8 @@ mod tests {
     use glam::Vec3;
 
     fn settings() -> LoopSettings {
-        LoopSettings {
-            sampling: Sampling::Adaptive,
-            allocation: AllocationRule::Convex,
-            model: None,
-            limits: Limits {
-                visibility: 1.0,
-                time: None,
-                mean_samples: None,
-                max_samples: DEFAULT_MAX_SAMPLES,
-                plans: None,
-            },
-            viewing: Viewing::of(Display::preset("desktop").expect("a preset")),
-            nits_per_unit: 100.0,
-            operator: operator("absolute", None).expect("an operator"),
-        }
+        let viewing = Viewing::of(Display::preset("desktop").expect("a preset"));
+        LoopSettings::new(viewing, 100.0, operator("absolute", None).expect("an operator"))
     }
 
     /// A pilot of `color(pixel, random in −1..1)`.

@@ -59,6 +59,13 @@ pub struct Limits {
     pub plans: Option<u32>,
 }
 
+impl Limits {
+    /// To a visibility, whatever it takes.
+    pub fn of_visibility(visibility: f64) -> Self {
+        Self { visibility, time: None, mean_samples: None, max_samples: DEFAULT_MAX_SAMPLES, plans: None }
+    }
+}
+
 /// Everything the loop needs to know besides the scene.
 pub struct LoopSettings {
     /// How samples are spread.
@@ -75,6 +82,21 @@ pub struct LoopSettings {
     pub nits_per_unit: f64,
     /// How the picture is shown.
     pub operator: Box<dyn ToneOperator>,
+}
+
+impl LoopSettings {
+    /// The default loop, to visibility 1.
+    pub fn new(viewing: Viewing, nits_per_unit: f64, operator: Box<dyn ToneOperator>) -> Self {
+        Self {
+            sampling: Sampling::Adaptive,
+            allocation: AllocationRule::Convex,
+            model: None,
+            limits: Limits::of_visibility(1.0),
+            viewing,
+            nits_per_unit,
+            operator,
+        }
+    }
 }
 
 /// Samples that a pixel gets at most when nobody says otherwise: beyond it, it is reported as visible instead.

@@ -21,7 +21,7 @@ mod truth;
 pub use arm::Arm;
 pub use record::{Record, Results};
 
-use crate::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, Sampling};
+use crate::adaptive::settings::{Limits, LoopSettings};
 use crate::integrator::{PathTracer, TraceSettings};
 use crate::scene::Scene;
 use crate::scene::load::{LoadOptions, load};
@@ -91,20 +91,10 @@ impl Subject {
 
     /// Settings of the default loop, to be changed by an arm.
     pub(crate) fn loop_settings(&self) -> Result<LoopSettings> {
+        let operator = tone::operator("constant", None).context("an operator")?;
         Ok(LoopSettings {
-            sampling: Sampling::Adaptive,
-            allocation: AllocationRule::Convex,
-            model: None,
-            limits: Limits {
-                visibility: self.visibility,
-                time: None,
-                mean_samples: None,
-                max_samples: DEFAULT_MAX_SAMPLES,
-                plans: None,
-            },
-            viewing: self.viewing.clone(),
-            nits_per_unit: self.scene.nits_per_unit,
-            operator: tone::operator("constant", None).context("an operator")?,
+            limits: Limits::of_visibility(self.visibility),
+            ..LoopSettings::new(self.viewing.clone(), self.scene.nits_per_unit, operator)
         })
     }
 

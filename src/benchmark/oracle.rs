@@ -2,7 +2,6 @@
 
 use super::Subject;
 use super::reference::Reference;
-use super::runner::quantile;
 use super::truth::Truth;
 use crate::adaptive::settings::DEFAULT_MAX_SAMPLES;
 use crate::film::{CHANNELS, Film};
@@ -38,7 +37,7 @@ pub(crate) fn displayed_variance(subject: &Subject, reference: &Reference, truth
 
 /// Samples a pixel that uniform sampling needs for v\* on this share of the picture.
 pub(crate) fn uniform_samples(subject: &Subject, truth: &Truth, variance: &Plane, coverage: f64) -> f64 {
-    let hardest = quantile(&truth.thresholds.achromatic.predicted_visibility(variance), coverage);
+    let hardest = truth.thresholds.achromatic.predicted_visibility(variance).quantile(coverage);
     (hardest / subject.visibility).powi(2)
 }
 
@@ -46,7 +45,7 @@ pub(crate) fn uniform_samples(subject: &Subject, truth: &Truth, variance: &Plane
 /// sampling would leave above it are left above it.
 pub(crate) fn least_samples(subject: &Subject, truth: &Truth, variance: &Plane, coverage: f64) -> Result<f64> {
     let seen = truth.thresholds.achromatic.predicted_visibility(variance);
-    let hardest = quantile(&seen, coverage) as f32;
+    let hardest = seen.quantile(coverage) as f32;
     // Far above, not infinite: the solver's multipliers stay finite.
     let tolerance = seen.map(|v| if v > hardest { 30.0 } else { 1.0 });
     let counts = optimal_counts(truth, variance, subject.visibility, Some(&tolerance))?;

@@ -3,7 +3,7 @@
 use super::arm::Arm;
 use super::reference::Reference;
 use super::report::html;
-use super::runner::{Run, quantile};
+use super::runner::Run;
 use super::summary::{GeometricMean, geometric_mean};
 use super::{BenchSettings, COVERAGES, Subject};
 use anyhow::Result;
@@ -145,7 +145,7 @@ impl Results {
             let target = subject.visibility * subject.visibility;
             let above = energy.values().iter().filter(|&&v| f64::from(v) > 1.5625 * target).count();
             for coverage in COVERAGES {
-                let scale = quantile(energy, coverage) / target;
+                let scale = energy.quantile(coverage) / target;
                 self.records.push(Record {
                     scene: subject.name.clone(),
                     arm: arm.name(),

@@ -1,6 +1,5 @@
 //! The reference of a scene: a long uniform render with its halves and converged variances, kept by content.
 
-use super::runner::quantile;
 use super::{BenchSettings, Subject};
 use crate::adaptive::judge::{display_scale, judge};
 use crate::adaptive::plan::{pilot_plan, uniform_plan};
@@ -8,6 +7,7 @@ use crate::adaptive::statistics::SampleStatistics;
 use crate::film::{CHANNELS, Film};
 use crate::integrator::PathTracer;
 use crate::sampler::Half;
+use crate::scene::hash::content_hash;
 use anyhow::{Context, Result};
 use fechner_perception::Plane;
 use fechner_perception::tone::{FittedTone, SceneGuide};
@@ -38,7 +38,7 @@ impl Reference {
     /// Renders the reference, or reads it back.
     pub(crate) fn cached(subject: &Subject, settings: &BenchSettings, say: &dyn Fn(&str)) -> Result<Self> {
         let key = subject.key(settings.reference_factor);
-        let file = settings.output.join("references").join(format!("{}-{key:016x}.f32", subject.name));
+        let file = settings.output.join("references").join(format!("{}-{key}.f32", subject.name));
         if let Ok(bytes) = std::fs::read(&file) {
             return Self::from_bytes(&bytes, subject)
                 .with_context(|| format!("{} is no reference of this version: delete it", file.display()));
@@ -65,7 +65,7 @@ impl Reference {
         // Stratification pays more the more samples there are: its factor is taken where uniform sampling would end.
         let uniform_spp = loop {
             trace_up_to(&tracer, &mut film, spp);
-            let reached = quantile(&judge(&film, &settings, 1.0)?.predicted, 0.99) / subject.visibility;
+            let reached = judge(&film, &settings, 1.0)?.predicted.quantile(0.99) / subject.visibility;
             let needed = f64::from(spp) * reached * reached;
             if needed <= f64::from(spp) || f64::from(spp) >= MOST_SAMPLES {
                 break needed;
@@ -169,10 +169,11 @@ fn trace_up_to(tracer: &PathTracer, film: &mut Film, spp: u32) {
 
 impl Subject {
     /// Hash of the scene's content and of everything else that a reference depends on.
-    pub(crate) fn key(&self, factor: f64) -> u64 {
-        let text = format!("{:?}|{:?}|{}|{factor}|{:?}", self.scene, self.size, self.visibility, self.viewing);
-        // FNV-1a (Fowler, Noll and Vo): a name for a cache, not a seal.
-        text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+    pub(crate) fn key(&self, factor: f64) -> String {
+        let (scene, version) = (content_hash(&self.scene), env!("CARGO_PKG_VERSION"));
+        let text = format!("{scene}|{version}|{:?}|{}|{factor}|{:?}", self.size, self.visibility, self.viewing);
+        // The first 16 hexadecimal digits name a file well enough.
+        blake3::hash(text.as_bytes()).to_hex()[..16].to_owned()
     }
 }
 

@@ -118,7 +118,7 @@ impl<'a> ArmRunner<'a> {
         let mut run = self.run(arm, 0, Some(knob))?;
         for _ in 0..3 {
             let energy = run.squared_visibility.as_ref().context("a fresh run")?;
-            let step = (quantile(energy, 0.99).sqrt() / self.subject.visibility).clamp(0.1, 10.0);
+            let step = (energy.quantile(0.99).sqrt() / self.subject.visibility).clamp(0.1, 10.0);
             if (0.89..1.12).contains(&step) {
                 break;
             }
@@ -202,8 +202,7 @@ impl<'a> ArmRunner<'a> {
 
     fn file(&self, arm: Arm, seed: u64) -> PathBuf {
         let key = self.subject.key(self.settings.reference_factor);
-        let version = env!("CARGO_PKG_VERSION");
-        let name = format!("{}-{key:016x}-{version}-{}-{seed}.json", self.subject.name, arm.name());
+        let name = format!("{}-{key}-{}-{seed}.json", self.subject.name, arm.name());
         self.settings.output.join("runs").join(name)
     }
 
@@ -228,12 +227,4 @@ impl<'a> ArmRunner<'a> {
 fn half_difference(a: [f32; 3], b: [f32; 3]) -> f64 {
     use fechner_perception::photometry::luminance;
     0.5 * f64::from(luminance(a) - luminance(b))
-}
-
-/// The value that this share of a plane's pixels stays below.
-pub(crate) fn quantile(plane: &Plane, share: f64) -> f64 {
-    let mut values = plane.values().to_vec();
-    let rank = (share * (values.len() - 1) as f64).round() as usize;
-    let (_, &mut value, _) = values.select_nth_unstable_by(rank, f32::total_cmp);
-    f64::from(value)
 }

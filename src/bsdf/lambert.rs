@@ -5,7 +5,7 @@
 //! Source: J. H. Lambert, *Photometria* (1760). Not for surfaces with visible relief at grazing light (the moon, cloth,
 //! unfired clay), which look flatter than a Lambertian one.
 
-use super::{BsdfEvaluation, BsdfSample, to_front, warp};
+use super::{BsdfEvaluation, Reflector, warp};
 use glam::Vec3;
 use std::f32::consts::FRAC_1_PI;
 
@@ -21,25 +21,17 @@ impl Lambert {
         Self { reflectance }
     }
 
-    pub(super) fn evaluate(&self, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
-        let (wo, wi) = to_front(wo, wi);
-        if !(wo.z > 0.0 && wi.z > 0.0) {
-            return BsdfEvaluation::BLACK;
-        }
+    pub(super) fn albedo(&self) -> Vec3 {
+        self.reflectance
+    }
+}
+
+impl Reflector for Lambert {
+    fn evaluate_front(&self, _wo: Vec3, wi: Vec3) -> BsdfEvaluation {
         BsdfEvaluation { value: self.reflectance * (FRAC_1_PI * wi.z), pdf: warp::cosine_hemisphere_pdf(wi.z) }
     }
 
-    pub(super) fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
-        if wo.z == 0.0 {
-            return None;
-        }
-        let wi = warp::cosine_hemisphere([u[0], u[1]]);
-        let evaluation =
-            BsdfEvaluation { value: self.reflectance * (FRAC_1_PI * wi.z), pdf: warp::cosine_hemisphere_pdf(wi.z) };
-        evaluation.sample_turned(wi, wo)
-    }
-
-    pub(super) fn albedo(&self) -> Vec3 {
-        self.reflectance
+    fn sample_front(&self, _wo: Vec3, u: [f32; 3]) -> Vec3 {
+        warp::cosine_hemisphere([u[0], u[1]])
     }
 }

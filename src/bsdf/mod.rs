@@ -351,6 +351,30 @@ impl<'a> Bsdf<'a> {
     }
 }
 
+/// A model that only reflects, alike on both sides, told for directions above the surface.
+trait Reflector {
+    /// For two directions above the surface.
+    fn evaluate_front(&self, wo: Vec3, wi: Vec3) -> BsdfEvaluation;
+
+    /// A direction for a `wo` above the surface, by the density that [`Reflector::evaluate_front`] states; one below the surface
+    /// carries nothing.
+    fn sample_front(&self, wo: Vec3, u: [f32; 3]) -> Vec3;
+
+    fn evaluate(&self, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
+        let (wo, wi) = to_front(wo, wi);
+        if wo.z > 0.0 && wi.z > 0.0 { self.evaluate_front(wo, wi) } else { BsdfEvaluation::BLACK }
+    }
+
+    fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
+        if wo.z == 0.0 {
+            return None;
+        }
+        let front = if wo.z < 0.0 { turn(wo) } else { wo };
+        let wi = self.sample_front(front, u);
+        if wi.z > 0.0 { self.evaluate_front(front, wi).sample_turned(wi, wo) } else { None }
+    }
+}
+
 /// Turns both directions over if `wo` lies below the surface, so that an opaque model only sees its front.
 fn to_front(wo: Vec3, wi: Vec3) -> (Vec3, Vec3) {
     if wo.z < 0.0 { (turn(wo), turn(wi)) } else { (wo, wi) }

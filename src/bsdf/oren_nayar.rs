@@ -8,7 +8,7 @@
 //! with its closed-form albedo, and the reciprocal lobe for light between grooves. Not for glossy surfaces, nor where the
 //! original's exact angular shape matters.
 
-use super::{BsdfEvaluation, BsdfSample, to_front, warp};
+use super::{BsdfEvaluation, Reflector, warp};
 use glam::Vec3;
 use std::f32::consts::{FRAC_1_PI, PI};
 
@@ -45,6 +45,13 @@ impl OrenNayar {
         self.facing * (1.0 + self.roughness * FRAC_1_PI * groove)
     }
 
+    pub(super) fn albedo(&self, wo: Vec3) -> Vec3 {
+        let single = self.single_albedo(wo.z.abs());
+        self.reflectance * single + self.multiple * (1.0 - single)
+    }
+}
+
+impl Reflector for OrenNayar {
     fn evaluate_front(&self, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
         let s = wo.dot(wi) - wo.z * wi.z;
         let ratio = if s > 0.0 { s / wo.z.max(wi.z) } else { s };
@@ -57,22 +64,7 @@ impl OrenNayar {
         BsdfEvaluation { value: f * (FRAC_1_PI * wi.z), pdf: warp::cosine_hemisphere_pdf(wi.z) }
     }
 
-    pub(super) fn evaluate(&self, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
-        let (wo, wi) = to_front(wo, wi);
-        if wo.z > 0.0 && wi.z > 0.0 { self.evaluate_front(wo, wi) } else { BsdfEvaluation::BLACK }
-    }
-
-    pub(super) fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
-        if wo.z == 0.0 {
-            return None;
-        }
-        let wi = warp::cosine_hemisphere([u[0], u[1]]);
-        let (front, _) = to_front(wo, wi);
-        self.evaluate_front(front, wi).sample_turned(wi, wo)
-    }
-
-    pub(super) fn albedo(&self, wo: Vec3) -> Vec3 {
-        let single = self.single_albedo(wo.z.abs());
-        self.reflectance * single + self.multiple * (1.0 - single)
+    fn sample_front(&self, _wo: Vec3, u: [f32; 3]) -> Vec3 {
+        warp::cosine_hemisphere([u[0], u[1]])
     }
 }

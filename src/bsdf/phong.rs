@@ -8,7 +8,7 @@
 //! and its norm, with which the lobe's albedo is ρs face on and falls towards grazing angles, where part of it would lie below
 //! the surface. Not for metals or plastic: there is no Fresnel effect.
 
-use super::{BsdfEvaluation, BsdfSample, to_front, turn, warp};
+use super::{BsdfEvaluation, Reflector, warp};
 use glam::Vec3;
 use std::f32::consts::{FRAC_1_PI, TAU};
 
@@ -33,6 +33,13 @@ impl Phong {
         Self { diffuse, specular, exponent: exponent.clamp(0.0, LARGEST_EXPONENT), specular_share }
     }
 
+    /// Right face on; the lobe's loss towards grazing angles is left out.
+    pub(super) fn albedo(&self) -> Vec3 {
+        self.diffuse + self.specular
+    }
+}
+
+impl Reflector for Phong {
     fn evaluate_front(&self, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
         // cos α = 1 − |wi − r|²/2 keeps the digits that a narrow lobe needs.
         let mirror = Vec3::new(-wo.x, -wo.y, wo.z);
@@ -46,34 +53,16 @@ impl Phong {
         }
     }
 
-    pub(super) fn evaluate(&self, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
-        let (wo, wi) = to_front(wo, wi);
-        if wo.z > 0.0 && wi.z > 0.0 { self.evaluate_front(wo, wi) } else { BsdfEvaluation::BLACK }
-    }
-
-    pub(super) fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
-        if wo.z == 0.0 {
-            return None;
-        }
-        let front = if wo.z < 0.0 { turn(wo) } else { wo };
-        let wi = if u[2] < self.specular_share {
+    fn sample_front(&self, wo: Vec3, u: [f32; 3]) -> Vec3 {
+        if u[2] < self.specular_share {
             let cos = (1.0 - u[1]).powf(1.0 / (self.exponent + 1.0));
             let radius = (1.0 - cos * cos).max(0.0).sqrt();
             let (sin_phi, cos_phi) = (TAU * u[0]).sin_cos();
-            let mirror = Vec3::new(-front.x, -front.y, front.z);
+            let mirror = Vec3::new(-wo.x, -wo.y, wo.z);
             let (x, y) = mirror.any_orthonormal_pair();
             (x * (radius * cos_phi) + y * (radius * sin_phi) + mirror * cos).normalize()
         } else {
             warp::cosine_hemisphere([u[0], u[1]])
-        };
-        if wi.z <= 0.0 {
-            return None;
         }
-        self.evaluate_front(front, wi).sample_turned(wi, wo)
-    }
-
-    /// Right face on; the lobe's loss towards grazing angles is left out.
-    pub(super) fn albedo(&self) -> Vec3 {
-        self.diffuse + self.specular
     }
 }

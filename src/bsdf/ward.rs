@@ -9,7 +9,7 @@
 //! ‖wo + wi‖²/(cos θo + cos θi)⁴ in place of Ward's 1/(4√(cos θo cos θi)) keeps albedo at most 1 up to grazing angles and
 //! sample weights at most 2. Not for metals by index: there is no Fresnel effect.
 
-use super::{BsdfEvaluation, BsdfSample, SMALLEST_ALPHA, to_front, turn, warp};
+use super::{BsdfEvaluation, Reflector, SMALLEST_ALPHA, warp};
 use glam::Vec3;
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
@@ -38,6 +38,13 @@ impl Ward {
         }
     }
 
+    /// Right where the lobe is narrow; a wide lobe loses some of it.
+    pub(super) fn albedo(&self) -> Vec3 {
+        self.diffuse + self.specular
+    }
+}
+
+impl Reflector for Ward {
     fn evaluate_front(&self, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
         let half = wo + wi;
         let (x, y) = (half.x / (half.z * self.alpha_x), half.y / (half.z * self.alpha_y));
@@ -58,32 +65,14 @@ impl Ward {
         }
     }
 
-    pub(super) fn evaluate(&self, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
-        let (wo, wi) = to_front(wo, wi);
-        if wo.z > 0.0 && wi.z > 0.0 { self.evaluate_front(wo, wi) } else { BsdfEvaluation::BLACK }
-    }
-
-    pub(super) fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
-        if wo.z == 0.0 {
-            return None;
-        }
-        let front = if wo.z < 0.0 { turn(wo) } else { wo };
-        let wi = if u[2] < self.specular_share {
+    fn sample_front(&self, wo: Vec3, u: [f32; 3]) -> Vec3 {
+        if u[2] < self.specular_share {
             let radius = (-(1.0 - u[1]).ln()).sqrt();
             let (sin, cos) = (TAU * u[0]).sin_cos();
             let h = Vec3::new(self.alpha_x * radius * cos, self.alpha_y * radius * sin, 1.0).normalize();
-            2.0 * front.dot(h) * h - front
+            2.0 * wo.dot(h) * h - wo
         } else {
             warp::cosine_hemisphere([u[0], u[1]])
-        };
-        if wi.z <= 0.0 {
-            return None;
         }
-        self.evaluate_front(front, wi).sample_turned(wi, wo)
-    }
-
-    /// Right where the lobe is narrow; a wide lobe loses some of it.
-    pub(super) fn albedo(&self) -> Vec3 {
-        self.diffuse + self.specular
     }
 }

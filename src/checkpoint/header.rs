@@ -170,9 +170,7 @@ impl SettingsRecord {
             allocation: self.allocation,
             model: self.threshold_model()?,
             limits,
-            viewing: self.viewing.clone(),
-            nits_per_unit: self.nits_per_unit,
-            operator,
+            ..LoopSettings::new(self.viewing.clone(), self.nits_per_unit, operator)
         })
     }
 

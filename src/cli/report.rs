@@ -81,8 +81,7 @@ impl Report {
         let judgement = &rendered.judgement;
         let display = &settings.viewing.display;
         let target = (settings.limits.visibility > 0.0).then_some(settings.limits.visibility);
-        let sorted = sorted_values(&judgement.predicted);
-        let p99 = quantile(&sorted, 0.99);
+        let p99 = judgement.predicted.quantile(0.99);
         let energy = |p: &Plane| p.values().iter().map(|&v| f64::from(v) * f64::from(v)).sum::<f64>();
         let samples_total = film.total_samples();
         let outliers = find_outliers(film);
@@ -122,13 +121,12 @@ impl Report {
             seconds_perception: rendered.seconds_perception,
             visibility_target: target,
             visibility_p99: p99,
-            visibility_p999: quantile(&sorted, 0.999),
-            visibility_max: quantile(&sorted, 1.0),
+            visibility_p999: judgement.predicted.quantile(0.999),
+            visibility_max: judgement.predicted.quantile(1.0),
             fraction_visible: visible_share(judgement, target.unwrap_or(1.0)),
             detection_probability_p99: detection_probability(p99),
             patches_noticed: patches_noticed(&judgement.predicted, display.pixels_per_degree),
-            measured_over_predicted: energy(&judgement.measured_error(settings).visibility)
-                / energy(&judgement.predicted),
+            measured_over_predicted: energy(&judgement.measured_error().visibility) / energy(&judgement.predicted),
             audit_ratio: rendered.audit.map(|audit| audit.ratio),
             audit_standard_error: rendered.audit.map(|audit| audit.standard_error),
             audit_tiles: rendered.audit.map_or(0, |audit| audit.tiles),
@@ -243,17 +241,6 @@ pub(super) fn summary(report: &Report, settings: &LoopSettings, rendered: &Rende
         lines.push(format!("{} samples were not finite and are left out.", report.nonfinite_samples));
     }
     lines.join("\n")
-}
-
-fn sorted_values(plane: &Plane) -> Vec<f32> {
-    let mut values = plane.values().to_vec();
-    values.sort_by(f32::total_cmp);
-    values
-}
-
-fn quantile(sorted: &[f32], share: f64) -> f64 {
-    let last = sorted.len().saturating_sub(1);
-    sorted.get((share * last as f64).round() as usize).map_or(0.0, |&v| f64::from(v))
 }
 
 /// 1° × 1° patches in the picture.

@@ -3,7 +3,7 @@
 use super::solid_angle::{LEAST, SphericalRectangle, SphericalTriangle};
 use super::{LightPlace, LightSample};
 use crate::scene::{Alpha, Scene};
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 /// A flat emitter.
 #[derive(Clone, Debug)]
@@ -15,6 +15,8 @@ pub(super) struct FlatEmitter {
     corner: Vec3,
     edge_1: Vec3,
     edge_2: Vec3,
+    /// Sum of the edges' lengths: no point is farther than this from the corner.
+    reach: f32,
     /// Unit normal of the front.
     pub(super) normal: Vec3,
     pub(super) area: f32,
@@ -22,12 +24,26 @@ pub(super) struct FlatEmitter {
 }
 
 /// What the two edges span.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 enum Outline {
     Triangle,
     Parallelogram,
     /// A parallelogram whose edges are at a right angle.
-    Rectangle,
+    Rectangle(Edges),
+}
+
+/// Two edges at a right angle: unit directions and lengths, in f64 for [`SphericalRectangle`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Edges {
+    axes: [DVec3; 2],
+    lengths: [f64; 2],
+}
+
+impl Edges {
+    fn new(edges: [Vec3; 2]) -> Self {
+        let edges = edges.map(|edge| edge.as_dvec3());
+        Self { axes: edges.map(DVec3::normalize_or_zero), lengths: edges.map(DVec3::length) }
+    }
 }
 
 /// A point of the emitter: shares of the two edges.
@@ -45,6 +61,7 @@ impl FlatEmitter {
             corner: corners[0],
             edge_1,
             edge_2,
+            reach: edge_1.length() + edge_2.length(),
             normal: scaled_normal.normalize_or(Vec3::Y) * if mirrored { -1.0 } else { 1.0 },
             area: 0.5 * scaled_normal.length(),
             both_sides,
@@ -67,8 +84,12 @@ impl FlatEmitter {
         }
         let (edge_1, edge_2) = (self.edge_1, next.edge_2);
         let cosine = edge_1.normalize_or_zero().dot(edge_2.normalize_or_zero());
-        let outline = if cosine.abs() < 1e-5 { Outline::Rectangle } else { Outline::Parallelogram };
-        Some(Self { outline, edge_2, area: self.area + next.area, ..self.clone() })
+        let outline = match cosine.abs() < 1e-5 {
+            true => Outline::Rectangle(Edges::new([edge_1, edge_2])),
+            false => Outline::Parallelogram,
+        };
+        let reach = edge_1.length() + edge_2.length();
+        Some(Self { outline, edge_2, reach, area: self.area + next.area, ..self.clone() })
     }
 
     /// Corners of its outline, for bounds.
@@ -126,21 +147,20 @@ impl FlatEmitter {
 
     fn view(&self, from: Vec3) -> View {
         let corner = (self.corner - from).as_dvec3();
-        let (edge_1, edge_2) = (self.edge_1.as_dvec3(), self.edge_2.as_dvec3());
         // What looks small from its size and distance needs no closer look: A/d² bounds the solid angle only where the
         // emitter is not much nearer than its centre, so the nearest it can be is taken.
-        let reach = self.edge_1.length() + self.edge_2.length();
-        let nearest = corner.length() - f64::from(reach);
+        let nearest = corner.length() - f64::from(self.reach);
         if nearest > 0.0 && f64::from(self.area) < LEAST * nearest * nearest {
             return View::Small;
         }
         match self.outline {
             Outline::Triangle => {
-                let triangle = SphericalTriangle::new([corner, corner + edge_1, corner + edge_2]);
+                let others = [self.edge_1, self.edge_2].map(|edge| corner + edge.as_dvec3());
+                let triangle = SphericalTriangle::new([corner, others[0], others[1]]);
                 if triangle.solid_angle > LEAST { View::Triangle(triangle) } else { View::Small }
             }
-            Outline::Rectangle => {
-                let rectangle = SphericalRectangle::new(corner, [edge_1, edge_2]);
+            Outline::Rectangle(edges) => {
+                let rectangle = SphericalRectangle::new(corner, edges.axes, edges.lengths);
                 if rectangle.solid_angle > LEAST { View::Rectangle(rectangle) } else { View::Small }
             }
             Outline::Parallelogram => View::Small,
@@ -162,8 +182,9 @@ impl View {
             View::Small if emitter.outline == Outline::Triangle => Some(uniform_barycentrics(u)),
             View::Small => Some(u),
             View::Rectangle(rectangle) => {
+                let Outline::Rectangle(edges) = emitter.outline else { return None };
                 let [along_1, along_2] = rectangle.sample(u);
-                Some([along_1 as f32 / emitter.edge_1.length(), along_2 as f32 / emitter.edge_2.length()])
+                Some([(along_1 / edges.lengths[0]) as f32, (along_2 / edges.lengths[1]) as f32])
             }
             View::Triangle(triangle) => triangle.shares(triangle.sample(u)?),
         }

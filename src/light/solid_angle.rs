@@ -66,8 +66,38 @@ fn perpendicular(v: DVec3, axis: DVec3) -> Option<DVec3> {
     (v - v.dot(axis) * axis).try_normalize()
 }
 
+/// A turn as the complex number cos + i·sin: turns are added by multiplying, without a trigonometric function.
+#[derive(Clone, Copy, Debug)]
+struct Turn {
+    cos: f64,
+    sin: f64,
+}
+
+impl Turn {
+    /// From the cosine of an angle in [0, π].
+    fn of_cos(cos: f64) -> Self {
+        Self { cos, sin: (1.0 - cos * cos).max(0.0).sqrt() }
+    }
+
+    fn then(self, other: Self) -> Self {
+        Self { cos: self.cos * other.cos - self.sin * other.sin, sin: self.sin * other.cos + self.cos * other.sin }
+    }
+
+    fn back(self) -> Self {
+        Self { sin: -self.sin, ..self }
+    }
+
+    /// In [0, 2π).
+    fn angle(self) -> f64 {
+        let angle = self.sin.atan2(self.cos);
+        if angle < 0.0 { angle + 2.0 * PI } else { angle }
+    }
+}
+
 /// A rectangle as seen from the origin (Ureña, Fajardo and King, "An Area-Preserving Parametrization for Spherical
 /// Rectangles", 2013).
+///
+/// The paper's four arc cosines are kept as [`Turn`]s, so that one arc tangent is left of them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SphericalRectangle {
     /// Edges of the rectangle in its plane, relative to the observer's foot.
@@ -76,32 +106,36 @@ pub(super) struct SphericalRectangle {
     /// Distance of the plane, below 0: the paper's z axis points away from the rectangle.
     z: f64,
     b: [f64; 2],
-    k: f64,
+    k: Turn,
     pub(super) solid_angle: f64,
 }
 
 impl SphericalRectangle {
-    /// From a corner relative to the observer and two edges at a right angle.
-    pub(super) fn new(corner: DVec3, edges: [DVec3; 2]) -> Self {
-        let lengths = edges.map(DVec3::length);
-        let axes = [edges[0] / lengths[0], edges[1] / lengths[1]];
+    /// From a corner relative to the observer, the unit directions of two edges at a right angle, and their lengths.
+    pub(super) fn new(corner: DVec3, axes: [DVec3; 2], lengths: [f64; 2]) -> Self {
         let low = axes.map(|axis| corner.dot(axis));
         let high = [low[0] + lengths[0], low[1] + lengths[1]];
         let z = -corner.dot(axes[0].cross(axes[1])).abs();
-        let at = |x: f64, y: f64| DVec3::new(x, y, z);
-        let corners = [at(low[0], low[1]), at(high[0], low[1]), at(high[0], high[1]), at(low[0], high[1])];
-        let normals: [DVec3; 4] = std::array::from_fn(|i| corners[i].cross(corners[(i + 1) % 4]).normalize_or_zero());
-        let angle = |i: usize| (-normals[i].dot(normals[(i + 1) % 4])).clamp(-1.0, 1.0).acos();
-        let k = 2.0 * PI - angle(2) - angle(3);
-        Self { low, high, z, b: [normals[0].z, normals[2].z], k, solid_angle: angle(0) + angle(1) - k }
+        // The normals of the four planes through the origin and an edge lie in coordinate planes, so that two that follow
+        // each other have only their z in common.
+        let z_of_normal = |edge: f64| {
+            let length = (edge * edge + z * z).sqrt();
+            if length > 0.0 { edge / length } else { 0.0 }
+        };
+        let normals = [-z_of_normal(low[1]), z_of_normal(high[0]), z_of_normal(high[1]), -z_of_normal(low[0])];
+        let inner_angle = |i: usize| Turn::of_cos(-normals[i] * normals[(i + 1) % 4]);
+        let last_two = inner_angle(2).then(inner_angle(3));
+        let solid_angle = inner_angle(0).then(inner_angle(1)).then(last_two).angle();
+        Self { low, high, z, b: [normals[0], normals[2]], k: last_two.back(), solid_angle }
     }
 
     /// Distances along both edges from the corner of a point that is uniform in the solid angle.
     pub(super) fn sample(&self, u: [f32; 2]) -> [f64; 2] {
-        let (sin, cos) = (f64::from(u[0]) * self.solid_angle + self.k).sin_cos();
+        let (sin, cos) = (f64::from(u[0]) * self.solid_angle).sin_cos();
+        let Turn { sin, cos } = Turn { sin, cos }.then(self.k);
         let f = (cos * self.b[0] - self.b[1]) / sin;
-        let cos_u = (1.0 / (f * f + self.b[0] * self.b[0]).sqrt()).copysign(f).clamp(-1.0, 1.0);
-        let x = -cos_u * self.z / (1.0 - cos_u * cos_u).max(1e-300).sqrt();
+        // The paper's cu is ±1/√(f² + b₀²), and its x = −z·cu / √(1 − cu²).
+        let x = self.z.copysign(f) / (f * f + self.b[0] * self.b[0] - 1.0).max(1e-300).sqrt();
         let x = if x.is_nan() { self.low[0] } else { x.clamp(self.low[0], self.high[0]) };
         let distance_squared = x * x + self.z * self.z;
         let h = |y: f64| y / (distance_squared + y * y).sqrt();

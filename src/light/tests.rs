@@ -3,8 +3,8 @@
 use super::{LightReceiver, Lights};
 use crate::geometry::{Ray, World};
 use crate::scene::{
-    Alpha, Camera, ColorInput, Environment, FilmDefaults, Instance, Light, Material, MaterialId, Mesh, MeshId,
-    Parametrisation, Scene, Sphere, SpotFalloff, Surface, ViewingDefaults,
+    Alpha, ColorInput, Environment, Instance, Light, Material, MaterialId, Mesh, MeshId, Parametrisation, Scene,
+    Sphere, SpotFalloff, Surface,
 };
 use glam::{Affine3A, Mat3, Vec2, Vec3, Vec3A};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -13,24 +13,6 @@ use std::sync::Arc;
 
 fn random(index: u64, dimension: u64) -> f32 {
     (crate::sampler::hash_words(index, dimension) >> 40) as f32 / 16_777_216.0
-}
-
-fn empty() -> Scene {
-    Scene {
-        name: String::new(),
-        nits_per_unit: 1.0,
-        camera: Camera::pinhole(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 40.0),
-        film: FilmDefaults { width: 1, height: 1 },
-        viewing: ViewingDefaults::default(),
-        meshes: Vec::new(),
-        instances: Vec::new(),
-        spheres: Vec::new(),
-        materials: Vec::new(),
-        textures: Vec::new(),
-        lights: Vec::new(),
-        environment: None,
-        notes: Vec::new(),
-    }
 }
 
 fn add_emitter(scene: &mut Scene, radiance: f32, emits_both_sides: bool) -> MaterialId {
@@ -75,7 +57,7 @@ fn uneven(direction: Vec3) -> Vec3 {
 fn scenes() -> Vec<(&'static str, Scene)> {
     let mut all = Vec::new();
     let mut with = |name, fill: &dyn Fn(&mut Scene)| {
-        let mut scene = empty();
+        let mut scene = Scene::default();
         fill(&mut scene);
         all.push((name, scene));
     };
@@ -246,7 +228,7 @@ fn both_sides_of_mis_state_the_same_density() {
 /// Spots, points and suns that are far apart are all found, with probabilities that add up to 1.
 #[test]
 fn choices_without_area_add_up() {
-    let mut scene = empty();
+    let mut scene = Scene::default();
     for i in 0..7 {
         let position = Vec3::new(i as f32 * 3.0 - 9.0, 2.0 + (i % 3) as f32, 1.0);
         scene.lights.push(Light::Point { position, intensity: Vec3::splat(1.0 + i as f32) });
@@ -308,7 +290,7 @@ fn noise_under(lamps: &Scene) -> (f64, f64) {
 
 /// `count`² lamps of the same flux together, 3 units above the floor.
 fn ceiling(count: u32) -> Scene {
-    let mut scene = empty();
+    let mut scene = Scene::default();
     let side = 0.2f32;
     let radiance = 1000.0 / (count * count) as f32;
     let lamp = add_emitter(&mut scene, radiance, false);

@@ -259,12 +259,10 @@ impl LightTree {
         (importances, total)
     }
 
-    /// An emitter and the probability of its choice; `None` where no emitter can give anything.
+    /// An emitter and the probability of its choice; `None` where none of several can give anything. An only emitter is
+    /// always chosen: whether it can give is then for its own sampling to say.
     pub(super) fn sample(&self, receiver: &LightReceiver, mut u: f32) -> Option<(usize, f32)> {
         let (mut node, mut probability) = (&self.nodes[0], 1.0);
-        if node.children == 0 && node.giver.importance(receiver) == 0.0 {
-            return None;
-        }
         while node.children > 0 {
             let (importances, total) = self.importances(receiver, node);
             if !(total > 0.0 && total.is_finite()) {
@@ -294,9 +292,6 @@ impl LightTree {
     /// Probability that [`LightTree::sample`] chooses an emitter.
     pub(super) fn probability(&self, receiver: &LightReceiver, emitter: usize) -> f32 {
         let Some(mut place) = self.leaf_of[emitter] else { return 0.0 };
-        if place == 0 {
-            return if self.nodes[0].giver.importance(receiver) > 0.0 { 1.0 } else { 0.0 };
-        }
         let mut probability = 1.0;
         while place != 0 {
             let parent = &self.nodes[self.nodes[place as usize].parent as usize];

@@ -65,6 +65,27 @@ pub struct Scene {
     pub notes: Vec<String>,
 }
 
+impl Default for Scene {
+    /// Nothing, seen from the origin along −z on one pixel; 1 cd/m² to the unit.
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            nits_per_unit: 1.0,
+            camera: Camera::pinhole(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 40.0),
+            film: FilmDefaults { width: 1, height: 1 },
+            viewing: ViewingDefaults::default(),
+            meshes: Vec::new(),
+            instances: Vec::new(),
+            spheres: Vec::new(),
+            materials: Vec::new(),
+            textures: Vec::new(),
+            lights: Vec::new(),
+            environment: None,
+            notes: Vec::new(),
+        }
+    }
+}
+
 impl Scene {
     /// Whether anything moves while the shutter is open.
     pub fn moves(&self) -> bool {

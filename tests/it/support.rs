@@ -1,11 +1,11 @@
 //! Scenes made in code, and rendering them.
 
-use fechner::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, Sampling};
+use fechner::adaptive::settings::{Limits, LoopSettings, Sampling};
 use fechner::integrator::{PathTracer, TraceSettings};
 use fechner::sampler::{BlockKey, Half, Pixel, PixelFilter, Purpose, Sequence};
 use fechner::scene::{
     Alpha, Camera, ColorInput, Environment, FilmDefaults, Instance, Material, MaterialId, Mesh, MeshId, Scene, Sphere,
-    Surface, ViewingDefaults,
+    Surface,
 };
 use fechner_perception::display::{Display, Viewing};
 use fechner_perception::tone;
@@ -18,15 +18,7 @@ pub(crate) fn empty_scene() -> Scene {
         nits_per_unit: 100.0,
         camera: Camera { focus_distance: 5.0, ..Camera::pinhole(Vec3::new(0.0, 0.0, 5.0), Vec3::NEG_Z, Vec3::Y, 20.0) },
         film: FilmDefaults { width: 16, height: 16 },
-        viewing: ViewingDefaults::default(),
-        meshes: Vec::new(),
-        instances: Vec::new(),
-        spheres: Vec::new(),
-        materials: Vec::new(),
-        textures: Vec::new(),
-        lights: Vec::new(),
-        environment: None,
-        notes: Vec::new(),
+        ..Scene::default()
     }
 }
 
@@ -105,15 +97,10 @@ pub(crate) fn radiance_along(
 
 /// Settings for the display `desktop` and constant scaling.
 pub(crate) fn loop_settings(nits_per_unit: f64, sampling: Sampling, visibility: f64, spp: Option<u32>) -> LoopSettings {
-    LoopSettings {
-        sampling,
-        allocation: AllocationRule::default(),
-        model: None,
-        limits: Limits { visibility, time: None, mean_samples: spp, max_samples: DEFAULT_MAX_SAMPLES, plans: None },
-        viewing: Viewing::of(Display::preset("desktop").expect("a preset")),
-        nits_per_unit,
-        operator: tone::operator("constant", None).expect("an operator"),
-    }
+    let viewing = Viewing::of(Display::preset("desktop").expect("a preset"));
+    let operator = tone::operator("constant", None).expect("an operator");
+    let limits = Limits { mean_samples: spp, ..Limits::of_visibility(visibility) };
+    LoopSettings { sampling, limits, ..LoopSettings::new(viewing, nits_per_unit, operator) }
 }
 
 /// Keeps the purposes in the API honest: a sample's camera numbers are what the tracer uses for the pixel.

@@ -1,7 +1,7 @@
 //! Two levels against one, and mirrored instances.
 
 use super::*;
-use crate::scene::{Camera, ColorInput, FilmDefaults, Material, Mesh, MeshId, Sphere, Surface, ViewingDefaults};
+use crate::scene::{ColorInput, Material, Mesh, MeshId, Sphere, Surface};
 use glam::{Quat, vec3a};
 
 /// A tetrahedron placed by each of the transforms, and a sphere.
@@ -28,11 +28,6 @@ fn scene(transforms: &[Affine3A]) -> Scene {
         motion: None,
     };
     Scene {
-        name: String::new(),
-        nits_per_unit: 1.0,
-        camera: Camera::pinhole(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 40.0),
-        film: FilmDefaults { width: 1, height: 1 },
-        viewing: ViewingDefaults::default(),
         meshes: vec![mesh],
         instances: transforms.iter().map(instance).collect(),
         spheres: vec![Sphere {
@@ -43,10 +38,7 @@ fn scene(transforms: &[Affine3A]) -> Scene {
             motion: None,
         }],
         materials: vec![material],
-        textures: Vec::new(),
-        lights: Vec::new(),
-        environment: None,
-        notes: Vec::new(),
+        ..Scene::default()
     }
 }
 
