@@ -13,6 +13,7 @@
 //! No formula of vision stands in this crate, and no ray in `fechner-perception`.
 
 pub mod adaptive;
+pub mod animate;
 pub mod benchmark;
 pub mod bsdf;
 pub mod checkpoint;

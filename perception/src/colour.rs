@@ -1,6 +1,6 @@
 //! Visibility of colour errors: over the achromatic, red–green and yellow–violet channels the largest counts.
 
-use crate::csf::{CastleChromatic, CastleCsf, ChromaticChannel};
+use crate::csf::{CastleChromatic, CastleCsf, ChromaticChannel, FrameTiming};
 use crate::display::Viewing;
 use crate::error::Error;
 use crate::noise_gain::noise_gain;
@@ -98,6 +98,20 @@ impl ThresholdMap {
         Ok(ChromaticGains {
             red_green: self.chromatic_noise_gain(ChromaticChannel::RedGreen)?,
             yellow_violet: self.chromatic_noise_gain(ChromaticChannel::YellowViolet)?,
+        })
+    }
+
+    /// Gains of both chromatic channels for noise that is new in every frame.
+    ///
+    /// # Errors
+    /// As [`CastleChromatic::new`], and for an impossible timing.
+    pub fn chromatic_gains_of_fresh_noise(&self, timing: FrameTiming) -> Result<ChromaticGains, Error> {
+        let still = self.chromatic_gains()?;
+        let red_green = timing.chromatic_energy(ChromaticChannel::RedGreen)? as f32;
+        let yellow_violet = timing.chromatic_energy(ChromaticChannel::YellowViolet)? as f32;
+        Ok(ChromaticGains {
+            red_green: still.red_green.map(|gain| gain * red_green),
+            yellow_violet: still.yellow_violet.map(|gain| gain * yellow_violet),
         })
     }
 

@@ -5,7 +5,7 @@ use super::statistics::{ChannelStatistics, SampleStatistics};
 use crate::film::{CHANNELS, Estimate, Film};
 use crate::sampler::Half;
 use fechner_perception::Plane;
-use fechner_perception::csf::CastleCsf;
+use fechner_perception::csf::{CastleCsf, ContrastSensitivity, FreshNoise};
 use fechner_perception::guide::{GuideInputs, denoise};
 use fechner_perception::model::ModelInputs;
 use fechner_perception::photometry::luminance;
@@ -51,13 +51,16 @@ pub struct JudgeError(#[from] fechner_perception::Error);
 pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Judgement, JudgeError> {
     let estimate = film.estimate(settings.nits_per_unit);
     let guide = guide_luminance(film, &estimate);
-    let tone = settings.operator.fit(&SceneGuide::of(&guide), &settings.viewing, None);
+    let tone = match &settings.fitted {
+        Some(fitted) => fitted.clone().restore(),
+        None => settings.operator.fit(&SceneGuide::of(&guide), &settings.viewing, None),
+    };
     let statistics = SampleStatistics::of(film, &display_scale(film, &guide, tone.as_ref(), settings, inflation));
     let displayed_guide = seen::display_luminance(tone.as_ref(), &settings.viewing.display, &guide);
     let luminance_variance = variance_of_mean(film, statistics.luminance(), &statistics.luminance().pooled);
     // The noise before denoising bounds what is left of it in the guide, so masking fades in as samples come.
     // Noise goes through the loss of acuity that the operator shows, as the picture does.
-    let csf = BehindAcuity { csf: CastleCsf::new(settings.viewing.observer.csf_area_deg2)?, acuity: tone.acuity() };
+    let csf = BehindAcuity { csf: contrast_sensitivity(settings)?, acuity: tone.acuity() };
     let thresholds = threshold_map(
         &ThresholdInputs { display_luminance_cd_m2: &displayed_guide, guide_variance: Some(&luminance_variance) },
         &settings.viewing,
@@ -76,7 +79,11 @@ pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Jud
     };
 
     // A model of luminance alone judges luminance alone.
-    let gains = if settings.model.is_none() { Some(thresholds.chromatic_gains()?) } else { None };
+    let gains = match (&settings.model, settings.frames) {
+        (Some(_), _) => None,
+        (None, None) => Some(thresholds.chromatic_gains()?),
+        (None, Some(timing)) => Some(thresholds.chromatic_gains_of_fresh_noise(timing)?),
+    };
     let most_visible = |of: &dyn for<'a> Fn(&'a ChannelStatistics) -> &'a Plane| {
         let channel = |c: usize| variance_of_mean(film, &statistics.channels[c], of(&statistics.channels[c]));
         match &gains {
@@ -104,6 +111,15 @@ pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Jud
     };
     judgement.predicted = judgement.visibility_of(&display_variance);
     Ok(judgement)
+}
+
+/// Of the eye for noise that stands still, or that is new in every frame.
+fn contrast_sensitivity(settings: &LoopSettings) -> Result<Box<dyn ContrastSensitivity>, JudgeError> {
+    let area_deg2 = settings.viewing.observer.csf_area_deg2;
+    Ok(match settings.frames {
+        None => Box::new(CastleCsf::new(area_deg2)?),
+        Some(timing) => Box::new(FreshNoise::new(area_deg2, timing)?),
+    })
 }
 
 impl Judgement {
@@ -178,7 +194,7 @@ fn variance_of_mean(film: &Film, statistics: &ChannelStatistics, per_sample: &Pl
 
 /// Luminance of the denoised picture: what adaptation, masking and the operator are made from, so that noise neither
 /// masks itself nor raises its own adaptation. Never output.
-fn guide_luminance(film: &Film, estimate: &Estimate) -> Plane {
+pub(crate) fn guide_luminance(film: &Film, estimate: &Estimate) -> Plane {
     let (width, height) = (film.width() as usize, film.height() as usize);
     let albedo: Vec<_> = film.guides().iter().map(|g| g.albedo).collect();
     let normal: Vec<_> = film.guides().iter().map(|g| g.normal).collect();

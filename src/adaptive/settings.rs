@@ -1,8 +1,9 @@
 //! What a render is asked to do.
 
+use fechner_perception::csf::FrameTiming;
 use fechner_perception::display::Viewing;
 use fechner_perception::model::ThresholdModel;
-use fechner_perception::tone::ToneOperator;
+use fechner_perception::tone::{SavedTone, ToneOperator};
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
@@ -82,6 +83,11 @@ pub struct LoopSettings {
     pub nits_per_unit: f64,
     /// How the picture is shown.
     pub operator: Box<dyn ToneOperator>,
+    /// A fit of the operator that was made elsewhere, for the frames of one shot; without it, each look fits its own.
+    pub fitted: Option<SavedTone>,
+    /// For a frame of a moving picture, whose noise is gone in the next: how frames follow. `None` for stills and for
+    /// frames that may be paused.
+    pub frames: Option<FrameTiming>,
 }
 
 impl LoopSettings {
@@ -95,6 +101,8 @@ impl LoopSettings {
             viewing,
             nits_per_unit,
             operator,
+            fitted: None,
+            frames: None,
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The command line.
 
+mod animate;
 mod bench;
 mod channels;
 mod compare;
@@ -31,6 +32,8 @@ struct CommandLine {
 enum Command {
     /// Render a scene until nothing more can be seen, or until a limit.
     Render(Box<render::RenderArguments>),
+    /// Render the frames of a scene that moves, each until nothing more can be seen of its noise in motion.
+    Animate(Box<animate::AnimateArguments>),
     /// Measure what adaptive sampling saves against uniform sampling and other renderers' rules.
     Bench(bench::BenchArguments),
     /// Say whether one picture can be told from another by eye: exit status 0 same, 1 visible, 2 error.
@@ -52,6 +55,7 @@ enum Command {
 pub(crate) fn run() -> anyhow::Result<ExitCode> {
     match CommandLine::parse().command {
         Command::Render(arguments) => render::run(&arguments)?,
+        Command::Animate(arguments) => animate::run(&arguments)?,
         Command::Bench(arguments) => bench::run(&arguments)?,
         Command::Compare(arguments) => return compare::run(&arguments),
         Command::Tonemap(arguments) => tonemap::run(&arguments)?,

@@ -118,6 +118,12 @@ impl InputPicture {
         Some(self.rgb.iter().map(|pixel| pixel.map(cd_m2)).collect())
     }
 
+    /// The values as bytes, R′G′B′ after R′G′B′: of a picture that is ready for the display.
+    pub(super) fn codes8(&self) -> Vec<u8> {
+        let byte = |code: f32| (255.0 * code.clamp(0.0, 1.0)).round() as u8;
+        self.rgb.iter().flat_map(|rgb| rgb.map(byte)).collect()
+    }
+
     /// Luminance in cd/m² that the display sends to the eye.
     pub(super) fn displayed(&self, tone: Option<&dyn FittedTone>, viewing: &Viewing) -> Plane {
         let display = &viewing.display;

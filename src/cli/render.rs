@@ -121,13 +121,13 @@ pub(super) struct RenderArguments {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Size {
-    width: u32,
-    height: u32,
+pub(super) struct Size {
+    pub(super) width: u32,
+    pub(super) height: u32,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum Quality {
+pub(super) enum Quality {
     /// Visibility 4.
     Draft,
     /// Visibility 2.
@@ -204,7 +204,7 @@ fn check_crop(crop: Crop, size: Size) -> anyhow::Result<Crop> {
 }
 
 impl Quality {
-    fn visibility(self) -> f64 {
+    pub(super) fn visibility(self) -> f64 {
         match self {
             Quality::Draft => 4.0,
             Quality::Preview => 2.0,
@@ -215,7 +215,7 @@ impl Quality {
     }
 }
 
-fn parse_size(text: &str) -> Result<Size, String> {
+pub(super) fn parse_size(text: &str) -> Result<Size, String> {
     let wrong = || format!("\"{text}\" is not a size; expected WIDTHxHEIGHT in pixels, such as 640x360");
     let (width, height) = text.split_once(['x', 'X', '×']).ok_or_else(wrong)?;
     let (width, height) = (width.parse().map_err(|_| wrong())?, height.parse().map_err(|_| wrong())?);
@@ -389,7 +389,7 @@ fn settings_record(arguments: &RenderArguments, scene: &Scene) -> anyhow::Result
 }
 
 /// Refuses a size whose film and maps would not fit into memory.
-fn check_memory(size: Size) -> anyhow::Result<()> {
+pub(super) fn check_memory(size: Size) -> anyhow::Result<()> {
     /// Peak memory was 508 bytes a pixel at 256×256, program included (`peak_memory_bytes` of --json); the rest is margin.
     const BYTES_PER_PIXEL: u64 = 700;
     let needed = u64::from(size.width) * u64::from(size.height) * BYTES_PER_PIXEL;

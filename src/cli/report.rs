@@ -100,7 +100,7 @@ impl Report {
                 Sampling::Rival(RivalRule::Budget) => "budget",
             },
             model: settings.model.as_ref().map_or("csf-bands", |model| model.name()),
-            csf: "castle",
+            csf: if settings.frames.is_some() { "castle-fresh-noise" } else { "castle" },
             operator: judgement.tone.describe(),
             nits_per_unit: settings.nits_per_unit,
             observer: ObserverReport {
@@ -147,6 +147,17 @@ impl Report {
                 StopReason::Merged => "merged",
             },
         }
+    }
+
+    /// What a frame among many took.
+    pub(super) fn in_a_line(&self) -> String {
+        format!(
+            "{:.1} spp in {}, visibility {:.2} at the 99th percentile; {}",
+            self.spp_mean,
+            duration_in_words(self.seconds_total),
+            self.visibility_p99,
+            self.stop_reason
+        )
     }
 
     /// What an EXR file should say of itself.

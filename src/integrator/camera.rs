@@ -86,6 +86,39 @@ impl CameraRays {
     }
 }
 
+impl CameraRays {
+    /// Place in the picture, in pixels, of a world position as the shutter opens; `None` at and behind the lens.
+    pub fn project(&self, position: Vec3) -> Option<Vec2> {
+        let position = match &self.motion {
+            None => position,
+            Some(motion) => motion.at(0.0).inverse().transform_point3(position),
+        };
+        let way = position - self.position;
+        if self.parallel { Some(self.to_pixels(way)) } else { self.project_way(way) }
+    }
+
+    /// Place in the picture, in pixels, of what is infinitely far in a world direction; `None` beside and behind the lens,
+    /// and where rays are parallel.
+    pub fn project_direction(&self, direction: Vec3) -> Option<Vec2> {
+        let direction = match &self.motion {
+            None => direction,
+            Some(motion) => motion.at(0.0).inverse().transform_vector3(direction),
+        };
+        if self.parallel { None } else { self.project_way(direction) }
+    }
+
+    fn project_way(&self, way: Vec3) -> Option<Vec2> {
+        let depth = way.dot(self.forward);
+        (depth > 1e-6 * way.length()).then(|| self.to_pixels(way / depth))
+    }
+
+    /// Pixels of a vector from the axis on the plane at distance 1, or in the scene where rays are parallel.
+    fn to_pixels(&self, sideways: Vec3) -> Vec2 {
+        let along = |pixel: Vec3| sideways.dot(pixel) / pixel.length_squared();
+        self.center + Vec2::new(along(self.pixel_right), along(self.pixel_down))
+    }
+}
+
 /// Square to disc with little distortion (Shirley and Chiu 1997).
 fn concentric_disc([u, v]: [f32; 2]) -> Vec2 {
     let (x, y) = (2.0 * u - 1.0, 2.0 * v - 1.0);
@@ -135,6 +168,32 @@ mod tests {
         for (x, y, expected) in [(100.0, 50.0, Vec3::ZERO), (200.0, 0.0, Vec3::new(6.0, 3.0, 0.0))] {
             let (origin, direction) = ray(&rays, x, y, [0.5; 2], 0.0);
             assert!(origin.distance(Vec3::new(1.0, 2.0, 3.0) + expected) < 1e-5 && direction == Vec3::NEG_Z);
+        }
+    }
+
+    /// What a ray meets is projected to where the ray came from, at rest and in motion.
+    #[test]
+    fn projection_undoes_rays() {
+        let parallel = Camera { projection: Projection::Orthographic { height: 2.0 }, ..camera(0.5) };
+        let motion = Motion::between(
+            Affine3A::from_rotation_y(0.3) * Affine3A::from_translation(Vec3::new(0.2, -1.0, 0.5)),
+            Affine3A::from_translation(Vec3::X * 2.0),
+        );
+        let moving = Camera { motion: Some(motion), ..camera(0.5) };
+        let mirrored = Camera { mirrored: true, ..camera(0.5) };
+        for of in [camera(0.5), parallel, moving, mirrored] {
+            let rays = CameraRays::new(&of, 200, 100);
+            for (x, y) in [(100.0, 50.0), (3.5, 8.25), (180.0, 99.0)] {
+                let (origin, direction) = ray(&rays, x, y, [0.5; 2], 0.0);
+                for distance in [0.5, 30.0] {
+                    let place = rays.project(origin + direction * distance).expect("before the lens");
+                    assert!(place.distance(Vec2::new(x, y)) < 2e-3, "{x} {y}: {place}");
+                }
+                if let Some(place) = rays.project_direction(direction) {
+                    assert!(place.distance(Vec2::new(x, y)) < 2e-3, "{x} {y}: {place}");
+                    assert_eq!(rays.project_direction(-direction), None);
+                }
+            }
         }
     }
 

@@ -55,6 +55,16 @@ pub fn write_layers_exr(
     background: Background,
     attributes: &[(String, Attribute)],
 ) -> Result<(), OutputError> {
+    write_exr(path, &layers(rendered, nits_per_unit, background, attributes))
+}
+
+/// What [`write_layers_exr`] writes, to which more can be added.
+pub fn layers<'a>(
+    rendered: &'a Rendered,
+    nits_per_unit: f64,
+    background: Background,
+    attributes: &[(String, Attribute)],
+) -> Picture<'a> {
     let (film, judgement) = (&rendered.film, &rendered.judgement);
     let mut picture = Picture::new(film.width(), film.height());
     let to_units = (1.0 / nits_per_unit) as f32;
@@ -76,15 +86,15 @@ pub fn write_layers_exr(
     picture.push_u32("id.Y", film.guides().iter().map(|g| g.object_id).collect::<Vec<u32>>());
     picture.push_u32("samples.Y", sample_counts(film));
     let variance = picture_variance(film, nits_per_unit);
-    picture.push_f32("variance.Y", variance.values());
+    picture.push_f32("variance.Y", variance.into_values());
     let threshold = judgement.allowed_standard_error_cd_m2();
-    picture.push_f32("threshold.Y", threshold.values());
+    picture.push_f32("threshold.Y", threshold.into_values());
     picture.push_f32("visibility.Y", judgement.predicted.values());
     picture.push_attribute(NITS_PER_UNIT, Attribute::Float(nits_per_unit as f32));
     for (name, value) in attributes {
         picture.push_attribute(name, value.clone());
     }
-    write_exr(path, &picture)
+    picture
 }
 
 fn sample_counts(film: &Film) -> Vec<u32> {

@@ -21,7 +21,7 @@ pub use material::{Alpha, Material};
 pub use motion::{Motion, MotionKey, Pose};
 pub use surface::{Distribution, MetalRoughness, Roughness, RoughnessScale, Surface};
 
-use glam::{Affine3A, Vec2, Vec3, Vec4};
+use glam::{Affine3A, Vec2, Vec3, Vec3A, Vec4};
 use std::sync::Arc;
 
 /// Index into [`Scene::meshes`].
@@ -151,6 +151,13 @@ pub struct Instance {
     pub motion: Option<Motion>,
 }
 
+impl Instance {
+    /// Object space to world space at a share of the open shutter.
+    pub fn transform_at(&self, time: f32) -> Affine3A {
+        self.motion.as_ref().map_or(self.to_world, |motion| motion.at(time))
+    }
+}
+
 /// An analytic sphere in world space.
 #[derive(Clone, Debug)]
 pub struct Sphere {
@@ -164,6 +171,16 @@ pub struct Sphere {
     pub material: MaterialId,
     /// Moves centre and radius while the shutter is open (similarities only); `None` where it rests.
     pub motion: Option<Motion>,
+}
+
+impl Sphere {
+    /// Centre and radius at a share of the open shutter.
+    pub fn place_at(&self, time: f32) -> (Vec3A, f32) {
+        let center = Vec3A::from(self.center);
+        let Some(motion) = &self.motion else { return (center, self.radius) };
+        let moved = motion.at(time);
+        (moved.transform_point3a(center), self.radius * moved.matrix3.x_axis.length())
+    }
 }
 
 /// A colour that is constant or read from a texture and multiplied by a factor.

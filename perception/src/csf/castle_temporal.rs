@@ -24,22 +24,35 @@ impl ContrastSensitivity for CastleTemporal {
 
     fn sensitivity(&self, freq_cpd: f64, luminance_cd_m2: f64) -> f64 {
         let flicker_hz = if self.temporal_hz.is_nan() { 0.0 } else { self.temporal_hz.abs() };
-        let sustained =
-            (-flicker_hz.powf(1.3314) / 10.5795).exp() * self.sustained.sensitivity(freq_cpd, luminance_cd_m2);
+        let sustained = sustained_response(flicker_hz) * self.sustained.sensitivity(freq_cpd, luminance_cd_m2);
         if flicker_hz <= 0.0 || freq_cpd <= 0.0 {
             return sustained;
         }
-        let luminance = luminance_cd_m2.clamp(1e-3, 1e4);
-        let peak_hz = (2.414_82 * luminance.log10() + 4.7036).max(1.0);
-        let detuning = flicker_hz.powf(0.1898) - peak_hz.powf(0.1898);
-        let response = (-detuning * detuning / 0.084_483_6).exp();
-        sustained + response * transient(freq_cpd, luminance, self.sustained.area_deg2())
+        sustained
+            + transient_response(flicker_hz, luminance_cd_m2)
+                * transient(freq_cpd, luminance_cd_m2, self.sustained.area_deg2())
     }
 }
 
-/// Spatial sensitivity of the transient channel: low-pass, growing slowly with luminance.
-fn transient(freq_cpd: f64, luminance_cd_m2: f64, area_deg2: f64) -> f64 {
-    let peak = 2748.09 * luminance_cd_m2.powf(0.193_434);
+/// Share of the sustained channel's sensitivity that is left at a flicker frequency in Hz.
+pub(super) fn sustained_response(flicker_hz: f64) -> f64 {
+    (-flicker_hz.powf(1.3314) / 10.5795).exp()
+}
+
+/// Share of the transient channel's sensitivity that there is at a flicker frequency in Hz.
+pub(super) fn transient_response(flicker_hz: f64, luminance_cd_m2: f64) -> f64 {
+    let peak_hz = (2.414_82 * in_domain(luminance_cd_m2).log10() + 4.7036).max(1.0);
+    let detuning = flicker_hz.powf(0.1898) - peak_hz.powf(0.1898);
+    (-detuning * detuning / 0.084_483_6).exp()
+}
+
+fn in_domain(luminance_cd_m2: f64) -> f64 {
+    luminance_cd_m2.clamp(1e-3, 1e4)
+}
+
+/// Spatial sensitivity of the transient channel at its best flicker: low-pass, growing slowly with luminance.
+pub(super) fn transient(freq_cpd: f64, luminance_cd_m2: f64, area_deg2: f64) -> f64 {
+    let peak = 2748.09 * in_domain(luminance_cd_m2).powf(0.193_434);
     let decades_above = (freq_cpd / 0.000_316_696).log10().max(0.0);
     let log_parabola = 10.0_f64.powf(-decades_above * decades_above / 2.6761_f64.exp2());
     let critical_area_deg2 = 3.816_11 / (1.0 + (freq_cpd / 3.013_89).powi(2));

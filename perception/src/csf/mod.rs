@@ -10,6 +10,7 @@ mod castle_chromatic;
 mod castle_temporal;
 mod daly93;
 mod daly98;
+mod fresh_noise;
 mod hdrvdp2;
 mod laird06;
 mod mannos_sakrison;
@@ -23,6 +24,7 @@ pub use castle_chromatic::{CastleChromatic, ChromaticChannel};
 pub use castle_temporal::CastleTemporal;
 pub use daly93::Daly93;
 pub use daly98::{DRIFT_DEG_S, Daly98, FASTEST_PURSUIT_DEG_S, PURSUIT_GAIN};
+pub use fresh_noise::FreshNoise;
 pub use hdrvdp2::HdrVdp2;
 pub use laird06::Laird06;
 pub use mannos_sakrison::MannosSakrison;
@@ -30,7 +32,7 @@ pub use moving::Moving;
 pub use stela::StelaCsf;
 
 use crate::display::Viewing;
-use crate::error::Error;
+use crate::error::{Error, check_range};
 
 /// A contrast sensitivity function for static, achromatic gratings seen foveally.
 pub trait ContrastSensitivity: Send + Sync {
@@ -42,6 +44,32 @@ pub trait ContrastSensitivity: Send + Sync {
     /// Finite and not negative for every finite frequency ≥ 0 and luminance ≥ 0; a luminance outside the model's
     /// domain is moved to its edge.
     fn sensitivity(&self, freq_cpd: f64, luminance_cd_m2: f64) -> f64;
+}
+
+impl ContrastSensitivity for Box<dyn ContrastSensitivity> {
+    fn name(&self) -> &'static str {
+        (**self).name()
+    }
+
+    fn sensitivity(&self, freq_cpd: f64, luminance_cd_m2: f64) -> f64 {
+        (**self).sensitivity(freq_cpd, luminance_cd_m2)
+    }
+}
+
+/// How the frames of a moving picture follow each other on a display.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrameTiming {
+    /// New pictures a second, 1 to 1000.
+    pub frames_per_second: f64,
+    /// Share of its time for which a frame is lit, 0.001 to 1, at equal mean luminance: 1 for displays that hold.
+    pub persistence: f64,
+}
+
+impl FrameTiming {
+    fn check(self) -> Result<(), Error> {
+        check_range("frames_per_second", self.frames_per_second, 1.0, 1e3, "between 1 and 1000")?;
+        check_range("persistence", self.persistence, 1e-3, 1.0, "between 0.001 and 1")
+    }
 }
 
 const NAMES: [&str; 9] =

@@ -29,17 +29,12 @@ impl Placement {
 impl World {
     /// Object space to world space of an instance at a share of the open shutter.
     pub fn transform_at(&self, object: u32, time: f32) -> Affine3A {
-        let instance = &self.scene.instances[object as usize];
-        instance.motion.as_ref().map_or(instance.to_world, |motion| motion.at(time))
+        self.scene.instances[object as usize].transform_at(time)
     }
 
     /// Centre and radius of a sphere at a share of the open shutter.
     pub fn sphere_at(&self, object: u32, time: f32) -> (Vec3A, f32) {
-        let sphere = &self.scene.spheres[object as usize - self.scene.instances.len()];
-        let center = Vec3A::from(sphere.center);
-        let Some(motion) = &sphere.motion else { return (center, sphere.radius) };
-        let moved = motion.at(time);
-        (moved.transform_point3a(center), sphere.radius * moved.matrix3.x_axis.length())
+        self.scene.spheres[object as usize - self.scene.instances.len()].place_at(time)
     }
 
     /// World-space corners of a triangle of an instance at a share of the open shutter.

@@ -1,0 +1,190 @@
+//! castleCSF for noise that is new in every frame of a moving picture.
+//!
+//! Such noise is flicker of all temporal frequencies at once, of which the eye integrates a part: it may be stronger than
+//! noise that stands still. Not for pictures that somebody may pause, nor for error that travels with things.
+
+use super::castle::CastleCsf;
+use super::castle_chromatic::ChromaticChannel;
+use super::castle_temporal::{sustained_response, transient, transient_response};
+use super::{ContrastSensitivity, FrameTiming};
+use crate::error::Error;
+use std::f64::consts::PI;
+
+/// Sensitivity to the spatial frequencies of noise that is independent from frame to frame.
+///
+/// A pattern of one spatial frequency whose amplitude is drawn anew in each frame, and held for a share of it, has the
+/// temporal power density 2T sinc²(f T p) per Hz (T the time of a frame, p the share, sinc(x) = sin πx / πx). Weighted with
+/// castleCSF's temporal sensitivity ([`super::CastleTemporal`], squared) it gives the energy that the eye receives; its root
+/// is the sensitivity here, so that S of this function stands for S of still noise in every formula.
+///
+/// Spatial frequency and time separate within both channels, so three integrals over time for each luminance suffice.
+#[derive(Clone, Debug)]
+pub struct FreshNoise {
+    still: CastleCsf,
+    /// By luminance, in steps of [`DECADE_STEPS`] a decade from [`LOWEST_DECADE`] on.
+    by_luminance: Vec<Integrals>,
+}
+
+/// What is left of the product of two channels' responses.
+#[derive(Clone, Copy, Debug)]
+struct Integrals {
+    sustained: f64,
+    mixed: f64,
+    transient: f64,
+}
+
+const LOWEST_DECADE: f64 = -3.0;
+const HIGHEST_DECADE: f64 = 4.0;
+const DECADE_STEPS: usize = 4;
+/// Beyond this nothing flickers for the eye: the sustained channel is at e⁻⁴³, the transient at 4 %, both times sinc².
+const HIGHEST_HZ: f64 = 120.0;
+/// Steps of the integrals: at most this, and a sixteenth of the frame rate.
+const HZ_STEP: f64 = 0.25;
+
+impl FreshNoise {
+    /// For patterns that cover `area_deg2` square degrees.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for an area as in [`CastleCsf::new`] or an impossible timing.
+    ///
+    /// ```
+    /// use fechner_perception::csf::{CastleCsf, ContrastSensitivity, FrameTiming, FreshNoise};
+    /// let timing = FrameTiming { frames_per_second: 60.0, persistence: 1.0 };
+    /// let (fresh, still) = (FreshNoise::new(1.0, timing)?, CastleCsf::new(1.0)?);
+    /// // At 60 frames a second fine noise may have more than nine times the variance.
+    /// let ratio = still.sensitivity(16.0, 100.0) / fresh.sensitivity(16.0, 100.0);
+    /// assert!(ratio * ratio > 7.0);
+    /// # Ok::<(), fechner_perception::Error>(())
+    /// ```
+    pub fn new(area_deg2: f64, timing: FrameTiming) -> Result<Self, Error> {
+        timing.check()?;
+        let steps = ((HIGHEST_DECADE - LOWEST_DECADE) as usize) * DECADE_STEPS;
+        let by_luminance = (0..=steps)
+            .map(|step| {
+                let luminance_cd_m2 = 10f64.powf(LOWEST_DECADE + step as f64 / DECADE_STEPS as f64);
+                let transient = |hz: f64| transient_response(hz, luminance_cd_m2);
+                Integrals {
+                    sustained: timing.seen_energy(|hz| sustained_response(hz).powi(2)),
+                    mixed: timing.seen_energy(|hz| sustained_response(hz) * transient(hz)),
+                    transient: timing.seen_energy(|hz| transient(hz).powi(2)),
+                }
+            })
+            .collect();
+        Ok(Self { still: CastleCsf::new(area_deg2)?, by_luminance })
+    }
+
+    fn integrals(&self, luminance_cd_m2: f64) -> Integrals {
+        let decades = luminance_cd_m2.max(1e-12).log10().clamp(LOWEST_DECADE, HIGHEST_DECADE) - LOWEST_DECADE;
+        let position = decades * DECADE_STEPS as f64;
+        let below = (position as usize).min(self.by_luminance.len() - 2);
+        let (share, [low, high]) = (position - below as f64, [self.by_luminance[below], self.by_luminance[below + 1]]);
+        let between = |of: fn(&Integrals) -> f64| of(&low) + share * (of(&high) - of(&low));
+        Integrals {
+            sustained: between(|i| i.sustained),
+            mixed: between(|i| i.mixed),
+            transient: between(|i| i.transient),
+        }
+    }
+}
+
+impl ContrastSensitivity for FreshNoise {
+    fn name(&self) -> &'static str {
+        "castle-fresh-noise"
+    }
+
+    fn sensitivity(&self, freq_cpd: f64, luminance_cd_m2: f64) -> f64 {
+        let sustained = self.still.sensitivity(freq_cpd, luminance_cd_m2);
+        let transient = if freq_cpd > 0.0 { transient(freq_cpd, luminance_cd_m2, self.still.area_deg2()) } else { 0.0 };
+        let Integrals { sustained: a, mixed: b, transient: c } = self.integrals(luminance_cd_m2);
+        (a * sustained * sustained + 2.0 * b * sustained * transient + c * transient * transient).sqrt()
+    }
+}
+
+impl FrameTiming {
+    /// Share of the energy of fresh noise in a chromatic channel that the eye receives, against noise that stands still:
+    /// castleCSF's chromatic channels (Ashraf et al. 2024) are sustained ones alone.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for an impossible timing.
+    pub fn chromatic_energy(self, channel: ChromaticChannel) -> Result<f64, Error> {
+        self.check()?;
+        let (scale, exponent) = match channel {
+            ChromaticChannel::RedGreen => (16.4325, 1.155_91),
+            ChromaticChannel::YellowViolet => (7.150_12, 0.969_123),
+        };
+        Ok(self.seen_energy(|hz| (-hz.powf(exponent) / scale).exp().powi(2)))
+    }
+
+    /// ∫ 2T sinc²(f T p) r(f) df over what flickers for the eye, r being a squared response.
+    fn seen_energy(self, squared_response: impl Fn(f64) -> f64) -> f64 {
+        let frame_s = 1.0 / self.frames_per_second;
+        let density = |hz: f64| {
+            let phase = PI * hz * frame_s * self.persistence;
+            2.0 * frame_s * (phase.sin() / phase).powi(2)
+        };
+        let hz_step = HZ_STEP.min(self.frames_per_second / 16.0);
+        let steps = (HIGHEST_HZ / hz_step) as usize;
+        let middle = |step: usize| (step as f64 + 0.5) * hz_step;
+        let energy: f64 = (0..steps).map(|step| density(middle(step)) * squared_response(middle(step))).sum();
+        // Frames slower than the eye's own integration stand still for it, and no noise is seen better than that.
+        (energy * hz_step).min(1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn gain(frames_per_second: f64, freq_cpd: f64, luminance_cd_m2: f64) -> f64 {
+        let timing = FrameTiming { frames_per_second, persistence: 1.0 };
+        let fresh = FreshNoise::new(1.0, timing).expect("in range");
+        let still = CastleCsf::new(1.0).expect("in range");
+        (still.sensitivity(freq_cpd, luminance_cd_m2) / fresh.sensitivity(freq_cpd, luminance_cd_m2)).powi(2)
+    }
+
+    /// Against integrals made with steps of 0.01 Hz up to 400 Hz by another program, fine patterns first, where the transient
+    /// channel sees nothing.
+    #[test]
+    fn integrals_agree_with_fine_quadrature() {
+        for (fps, sustained, red_green, yellow_violet) in
+            [(24.0, 3.9671, 2.5108, 3.6391), (30.0, 4.8574, 2.9520, 4.3642), (60.0, 9.4348, 5.3265, 8.1627)]
+        {
+            let timing = FrameTiming { frames_per_second: fps, persistence: 1.0 };
+            let own = 1.0 / timing.seen_energy(|hz| sustained_response(hz).powi(2));
+            assert!((own / sustained - 1.0).abs() < 2e-3, "{fps}: {own}");
+            for (channel, expected) in
+                [(ChromaticChannel::RedGreen, red_green), (ChromaticChannel::YellowViolet, yellow_violet)]
+            {
+                let own = 1.0 / timing.chromatic_energy(channel).expect("in range");
+                assert!((own / expected - 1.0).abs() < 5e-3, "{fps} {channel:?}: {own}");
+            }
+        }
+    }
+
+    #[test]
+    fn faster_frames_hide_more_and_slow_ones_nothing() {
+        for freq_cpd in [2.0, 8.0, 20.0] {
+            let gains = [24.0, 30.0, 60.0, 120.0].map(|fps| gain(fps, freq_cpd, 100.0));
+            assert!(gains.windows(2).all(|pair| pair[0] < pair[1]), "{freq_cpd} cpd: {gains:?}");
+            assert!(gain(1.0, freq_cpd, 100.0) < 1.3, "{freq_cpd}: {}", gain(1.0, freq_cpd, 100.0));
+        }
+        // Coarse flicker is seen by the transient channel: it gains less than fine noise, and at 24 frames a second it is seen
+        // better than a still.
+        assert!(gain(24.0, 0.3, 100.0) < 1.0 && gain(60.0, 0.3, 100.0) < gain(60.0, 8.0, 100.0));
+    }
+
+    #[test]
+    fn nothing_is_out_of_range() {
+        let timing = FrameTiming { frames_per_second: 24.0, persistence: 0.5 };
+        let fresh = FreshNoise::new(1.0, timing).expect("in range");
+        for freq in [0.0, 1e-6, 1.0, 1e6] {
+            for luminance in [0.0, 1e-9, 1.0, 1e9] {
+                assert!(fresh.sensitivity(freq, luminance).is_finite());
+            }
+        }
+        for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(FreshNoise::new(1.0, FrameTiming { frames_per_second: bad, persistence: 1.0 }).is_err());
+            assert!(FreshNoise::new(1.0, FrameTiming { frames_per_second: 24.0, persistence: bad }).is_err());
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! Shots: frames of a scene that moves, each rendered until what is left cannot be seen in motion.
+//!
+//! A frame is a pure function of the scene, its number and the shot's settings, so frames can be made in any order and on any
+//! machine. What they share is the [`track`]: how light the view is over the shot, by which the tone operator is fitted
+//! once (or, for operators with eyes that adapt, frame by frame), so that exposure does not flicker with the noise. It is
+//! made from pilots of fixed seed, and made again to the same bytes wherever it is missing.
+//!
+//! Each frame's noise is its own. That is what the threshold model is told ([`FrameTiming`]): the eye integrates over
+//! frames, and noise that is gone in the next frame may be stronger than in a still, unless somebody pauses.
+//!
+//! Not for stills: see [`crate::adaptive`].
+
+pub mod name;
+pub mod track;
+pub mod velocity;
+pub mod video;
+
+use crate::adaptive::judge::JudgeError;
+use crate::adaptive::settings::{Limits, LoopSettings, Sampling};
+use crate::adaptive::{Monitor, Rendered, render};
+use crate::integrator::{PathTracer, TraceSettings};
+use crate::sampler::hash_words;
+use crate::scene::Scene;
+use crate::scene::load::LoadError;
+use fechner_perception::csf::FrameTiming;
+use fechner_perception::display::Viewing;
+use fechner_perception::tone::ToneOperator;
+use std::sync::Arc;
+use track::TrackFrame;
+use velocity::VelocityMap;
+
+/// Where the scenes of a shot come from.
+pub trait SceneSource {
+    /// The scene as it is at a time in seconds.
+    ///
+    /// # Errors
+    /// For files that cannot be read.
+    fn at(&self, seconds: f64) -> Result<Scene, LoadError>;
+}
+
+/// What the frames of a shot share.
+pub struct ShotSettings {
+    /// First frame, at `first / frames_per_second` seconds.
+    pub first: u32,
+    /// Last frame.
+    pub last: u32,
+    /// Frames a second of scene time and of the display.
+    pub frames_per_second: f64,
+    /// Whether people may stop at a frame and look at it as at a still.
+    pub pausable: bool,
+    /// How every frame is traced; each has a seed of its own, made from this one.
+    pub trace: TraceSettings,
+    /// How samples are spread.
+    pub sampling: Sampling,
+    /// When a frame is done.
+    pub limits: Limits,
+    /// Display and observer.
+    pub viewing: Viewing,
+    /// Luminance in cd/m² of RGB (1, 1, 1).
+    pub nits_per_unit: f64,
+    /// What the eye is adapted to before the first frame, cd/m², for operators that ask; `None`: to the first frame.
+    pub adapted_to_cd_m2: Option<f64>,
+}
+
+impl ShotSettings {
+    /// Time of a frame in seconds.
+    pub fn seconds(&self, frame: f64) -> f64 {
+        frame / self.frames_per_second
+    }
+
+    /// The loop's settings for one frame of the shot.
+    pub fn frame_settings(&self, operator: Box<dyn ToneOperator>, track: &TrackFrame) -> LoopSettings {
+        let timing =
+            FrameTiming { frames_per_second: self.frames_per_second, persistence: self.viewing.display.persistence };
+        LoopSettings {
+            sampling: self.sampling,
+            limits: self.limits,
+            fitted: Some(track.fitted.clone()),
+            frames: if self.pausable { None } else { Some(timing) },
+            ..LoopSettings::new(self.viewing.clone(), self.nits_per_unit, operator)
+        }
+    }
+
+    fn trace_settings(&self, frame: u32) -> TraceSettings {
+        TraceSettings { seed: hash_words(self.trace.seed, u64::from(frame)), ..self.trace }
+    }
+}
+
+/// One finished frame.
+#[derive(Debug)]
+pub struct RenderedFrame {
+    /// Its samples and the last look at them.
+    pub rendered: Rendered,
+    /// How what it shows moves to and from its neighbours.
+    pub velocity: VelocityMap,
+}
+
+/// The scenes that a frame depends on.
+pub struct FrameScenes {
+    /// One frame earlier.
+    pub previous: Scene,
+    /// At the frame's time.
+    pub now: Arc<Scene>,
+    /// One frame later.
+    pub next: Scene,
+}
+
+impl FrameScenes {
+    /// Loads all three.
+    ///
+    /// # Errors
+    /// For files that cannot be read.
+    pub fn load(source: &dyn SceneSource, shot: &ShotSettings, frame: u32) -> Result<Self, LoadError> {
+        let at = |offset: f64| source.at(shot.seconds(f64::from(frame) + offset));
+        Ok(Self { previous: at(-1.0)?, now: Arc::new(at(0.0)?), next: at(1.0)? })
+    }
+}
+
+/// Renders one frame.
+///
+/// # Errors
+/// Only if the perception model refuses the picture, which would be a defect of ours.
+pub fn render_frame(
+    scenes: &FrameScenes,
+    shot: &ShotSettings,
+    settings: &LoopSettings,
+    frame: u32,
+    monitor: &dyn Monitor,
+) -> Result<RenderedFrame, JudgeError> {
+    let tracer = PathTracer::new(Arc::clone(&scenes.now), shot.trace_settings(frame));
+    let velocity = VelocityMap::new(&tracer, &scenes.previous, &scenes.next);
+    let rendered = render(&tracer, settings, monitor)?;
+    Ok(RenderedFrame { rendered, velocity })
+}

@@ -1,0 +1,193 @@
+//! The luminance track of a shot: how light the view is in every frame, and how the tone operator is set for it.
+//!
+//! Made before the frames, from small pilots of one fixed seed. Operators whose eyes adapt go through the shot in time;
+//! all others are fitted once, to frames from all over it, so that exposure stands still while frames and noise change.
+
+use super::{SceneSource, ShotSettings};
+use crate::adaptive::judge::guide_luminance;
+use crate::adaptive::plan::pilot_plan;
+use crate::film::Film;
+use crate::integrator::{PathTracer, TraceSettings};
+use crate::scene::Scene;
+use crate::scene::hash::{ContentHash, content_hash};
+use crate::scene::load::LoadError;
+use fechner_perception::Plane;
+use fechner_perception::tone::{AdaptationState, Goal, SavedTone, SceneGuide, ToneOperator};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// Longest side of a pilot in pixels.
+const PILOT_SIDE: u32 = 64;
+/// Samples a pixel of a pilot.
+const PILOT_SAMPLES: u32 = 16;
+/// Frames, spread over the shot, that one fit for all looks at.
+const FITTED_FRAMES: usize = 16;
+
+/// One frame of the track.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TrackFrame {
+    /// Its number.
+    pub frame: u32,
+    /// The scene that it was made from.
+    pub scene: ContentHash,
+    /// Mean luminance of the view, cd/m².
+    pub goal: Goal,
+    /// What the eye is adapted to, for operators that ask.
+    pub eye: Option<AdaptationState>,
+    /// The tone operator as set for this frame.
+    pub fitted: SavedTone,
+}
+
+/// All frames of a shot.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Track {
+    /// What besides the scenes it depends on, in words.
+    pub made_for: String,
+    /// In order.
+    pub frames: Vec<TrackFrame>,
+}
+
+impl Track {
+    /// Looks at every frame of a shot; `say` is told how many are done.
+    ///
+    /// # Errors
+    /// For scenes that cannot be read.
+    pub fn make(
+        source: &dyn SceneSource,
+        shot: &ShotSettings,
+        operator: &dyn ToneOperator,
+        say: &dyn Fn(usize),
+    ) -> Result<Self, LoadError> {
+        let mut looks = Vec::new();
+        for frame in shot.first..=shot.last {
+            let scene = source.at(shot.seconds(f64::from(frame)))?;
+            let hash = content_hash(&scene);
+            looks.push((hash, Look::at(scene, shot)));
+            say(looks.len());
+        }
+        let goals: Vec<Goal> = looks.iter().map(|(_, look)| look.goal(shot)).collect();
+        let fits: Vec<(Option<AdaptationState>, SavedTone)> = if operator.sees_adaptation() {
+            let eyes = eyes(shot, operator, &goals);
+            let fit = |look: &Look, eye: AdaptationState| {
+                let guide = look.full_size(shot);
+                operator.fit(&SceneGuide::of(&guide), &shot.viewing, Some(&eye)).save()
+            };
+            looks.iter().zip(eyes).map(|((_, look), eye)| (Some(eye), fit(look, eye))).collect()
+        } else {
+            let all = stacked(&looks.iter().map(|(_, look)| look).collect::<Vec<_>>(), shot);
+            let fitted = operator.fit(&SceneGuide::of(&all), &shot.viewing, None).save();
+            looks.iter().map(|_| (None, fitted.clone())).collect()
+        };
+        let frames = (shot.first..=shot.last)
+            .zip(looks.iter().zip(goals).zip(fits))
+            .map(|(frame, (((scene, _), goal), (eye, fitted)))| TrackFrame { frame, scene: *scene, goal, eye, fitted })
+            .collect();
+        Ok(Self { made_for: made_for(shot, operator), frames })
+    }
+
+    /// The frame's part, if the track is of this shot and the frame's scene is still the same.
+    pub fn of_frame(
+        &self,
+        shot: &ShotSettings,
+        operator: &dyn ToneOperator,
+        frame: u32,
+        scene: &Scene,
+    ) -> Option<&TrackFrame> {
+        let found = self.frames.iter().find(|of_track| of_track.frame == frame)?;
+        (self.made_for == made_for(shot, operator) && found.scene == content_hash(scene)).then_some(found)
+    }
+}
+
+fn made_for(shot: &ShotSettings, operator: &dyn ToneOperator) -> String {
+    format!(
+        "version {}, frames {} to {} at {} a second, {}x{}, seed {}, {} cd/m² a unit, {:?}, eye {:?}, {:?}",
+        env!("CARGO_PKG_VERSION"),
+        shot.first,
+        shot.last,
+        shot.frames_per_second,
+        shot.trace.width,
+        shot.trace.height,
+        shot.trace.seed,
+        shot.nits_per_unit,
+        operator.name(),
+        shot.adapted_to_cd_m2,
+        shot.viewing,
+    )
+}
+
+/// The eye in every frame.
+fn eyes(shot: &ShotSettings, operator: &dyn ToneOperator, goals: &[Goal]) -> Vec<AdaptationState> {
+    let kinetics = operator.kinetics();
+    let mut state = match shot.adapted_to_cd_m2 {
+        Some(cd_m2) => AdaptationState::adapted_to(Goal::both(cd_m2), &kinetics).looking_at(goals[0]),
+        None => AdaptationState::adapted_to(goals[0], &kinetics),
+    };
+    let mut states = vec![state];
+    for goal in &goals[1..] {
+        state = state.after(*goal, 1.0 / shot.frames_per_second, &kinetics);
+        states.push(state);
+    }
+    states
+}
+
+/// A small, denoised picture of a frame's luminance, cd/m².
+struct Look {
+    luminance: Plane,
+}
+
+impl Look {
+    fn at(scene: Scene, shot: &ShotSettings) -> Self {
+        let (width, height) = pilot_size(shot.trace.width, shot.trace.height);
+        // The same seed in every frame: what noise is left changes with the scene, not with the frame's number.
+        let settings = TraceSettings { width, height, crop: None, ..shot.trace };
+        let tracer = PathTracer::new(Arc::new(scene), settings);
+        let mut film = Film::new(width, height);
+        tracer.trace(&pilot_plan(width * height, PILOT_SAMPLES), &mut film, &|_| {});
+        let estimate = film.estimate(shot.nits_per_unit);
+        Self { luminance: guide_luminance(&film, &estimate) }
+    }
+
+    fn goal(&self, shot: &ShotSettings) -> Goal {
+        let scale = self.luminance.width() as f64 / f64::from(shot.trace.width);
+        Goal::of(&SceneGuide::of(&self.luminance), shot.viewing.display.pixels_per_degree * scale)
+    }
+
+    /// At the frame's own size, as operators that count degrees need it.
+    fn full_size(&self, shot: &ShotSettings) -> Plane {
+        stacked(&[self], shot)
+    }
+}
+
+fn pilot_size(width: u32, height: u32) -> (u32, u32) {
+    let longest = width.max(height);
+    let scaled = |side: u32| {
+        if longest <= PILOT_SIDE {
+            side
+        } else {
+            (u64::from(side) * u64::from(PILOT_SIDE) / u64::from(longest)).max(1) as u32
+        }
+    };
+    (scaled(width), scaled(height))
+}
+
+/// Some of the looks, one below the other, at the frames' own size.
+fn stacked(looks: &[&Look], shot: &ShotSettings) -> Plane {
+    let count = looks.len().min(FITTED_FRAMES);
+    let (width, height) = (shot.trace.width as usize, shot.trace.height as usize);
+    Plane::from_fn(width, height * count, |x, y| {
+        let small = &looks[y / height * looks.len() / count].luminance;
+        small.get(x * small.width() / width, y % height * small.height() / height)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pilots_keep_the_shape() {
+        assert_eq!(pilot_size(1920, 1080), (64, 36));
+        assert_eq!(pilot_size(32, 18), (32, 18));
+        assert_eq!(pilot_size(4000, 2), (64, 1));
+    }
+}

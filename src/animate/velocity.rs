@@ -1,0 +1,87 @@
+//! Velocity maps: where the surface point that a pixel shows was one frame ago, and where it will be.
+//!
+//! Exact: the point keeps its place on its triangle or sphere, and the other frames' scenes and cameras say where that is,
+//! whatever moved it (camera, object, skin, morph). Backgrounds turn with the camera. Not for what mirrors and glass show,
+//! which moves otherwise: theirs is the motion of the surface itself.
+
+use crate::geometry::Hit;
+use crate::integrator::{CameraRays, CameraSample, PathTracer};
+use crate::scene::Scene;
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+
+/// Motion of what each pixel's centre shows when the shutter opens, in pixels, x to the right and y down; row-major.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VelocityMap {
+    /// From this frame to the next one: where it will be, less where it is.
+    pub to_next: Vec<Vec2>,
+    /// Where it was one frame ago, less where it is.
+    pub to_previous: Vec<Vec2>,
+}
+
+/// What a camera ray meets, by what moves with it.
+enum Seen {
+    Triangle(Hit),
+    /// Number of the sphere, and the normal at the point: how a sphere turns cannot be seen.
+    Sphere(usize, Vec3),
+    /// Nothing is in this direction.
+    Background(Vec3),
+}
+
+impl VelocityMap {
+    /// For the film of a tracer, and the same scene one frame earlier and later: equal objects, meshes of equal triangles.
+    /// What an object of another number or triangle would be has no motion.
+    pub fn new(tracer: &PathTracer, previous: &Scene, next: &Scene) -> Self {
+        let settings = tracer.settings();
+        let area = settings.film_area();
+        let camera_of = |scene: &Scene| CameraRays::new(&scene.camera, settings.width, settings.height);
+        let (now, before, after) = (camera_of(tracer.world().scene()), camera_of(previous), camera_of(next));
+        let motions: Vec<[Vec2; 2]> = (0..area.width * area.height)
+            .into_par_iter()
+            .map(|pixel| {
+                let corner = Vec2::new((area.x + pixel % area.width) as f32, (area.y + pixel / area.width) as f32);
+                let center = corner + 0.5;
+                let seen = seen_at(tracer, &now, center);
+                [(next, &after), (previous, &before)]
+                    .map(|(scene, camera)| place_in(scene, camera, &seen).map_or(Vec2::ZERO, |place| place - center))
+            })
+            .collect();
+        Self {
+            to_next: motions.iter().map(|motion| motion[0]).collect(),
+            to_previous: motions.iter().map(|motion| motion[1]).collect(),
+        }
+    }
+}
+
+fn seen_at(tracer: &PathTracer, camera: &CameraRays, position_px: Vec2) -> Seen {
+    // The middle of the lens: what is out of focus moves as its centre does.
+    let ray = camera.ray(&CameraSample { position_px, lens: [0.5, 0.5], time: 0.0 });
+    let Some(hit) = tracer.world().closest(&ray) else { return Seen::Background(ray.direction.into()) };
+    match (hit.object as usize).checked_sub(tracer.world().scene().instances.len()) {
+        None => Seen::Triangle(hit),
+        Some(sphere) => Seen::Sphere(sphere, tracer.world().surface(&ray, &hit).geometric_normal),
+    }
+}
+
+/// Where what was seen is in the picture of another moment; `None` where that camera cannot see its place.
+fn place_in(scene: &Scene, camera: &CameraRays, seen: &Seen) -> Option<Vec2> {
+    match seen {
+        Seen::Background(direction) => camera.project_direction(*direction),
+        Seen::Triangle(hit) => camera.project(point_of_triangle(scene, hit)?),
+        Seen::Sphere(number, normal) => {
+            let (center, radius) = scene.spheres.get(*number)?.place_at(0.0);
+            camera.project(Vec3::from(center) + radius * *normal)
+        }
+    }
+}
+
+fn point_of_triangle(scene: &Scene, hit: &Hit) -> Option<Vec3> {
+    let instance = scene.instances.get(hit.object as usize)?;
+    let mesh = scene.meshes.get(instance.mesh.0 as usize)?;
+    let [a, b, c] = mesh.triangles.get(hit.triangle as usize)?.map(|i| mesh.positions.get(i as usize));
+    let local = *a? * (1.0 - hit.b1 - hit.b2) + *b? * hit.b1 + *c? * hit.b2;
+    Some(instance.transform_at(0.0).transform_point3(local))
+}
+
+#[cfg(test)]
+mod tests;
