@@ -68,6 +68,17 @@ impl Monitor for Console {
     }
 }
 
+/// One line that counts decoded textures on a terminal; elsewhere a line at their end, where there are many.
+pub(super) fn texture_decoded(done: usize, total: usize) {
+    const MANY: usize = 8;
+    match (std::io::stderr().is_terminal(), done == total) {
+        (true, false) => eprint!("\rtextures: {done} of {total}\x1b[K"),
+        (true, true) => eprint!("\r\x1b[K"),
+        (false, true) if total >= MANY => eprintln!("textures: {total}"),
+        (false, _) => {}
+    }
+}
+
 /// "0.8 s", "42 s", "3 min 20 s", "2 h 5 min".
 pub(super) fn duration_in_words(seconds: f64) -> String {
     match seconds {

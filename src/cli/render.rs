@@ -1,6 +1,6 @@
 //! `fechner render`: a scene file in, a picture out.
 
-use super::console::Console;
+use super::console::{self, Console};
 use super::importance;
 use super::keeper::{CheckpointArguments, Keeper, Watch};
 use super::report::{Report, summary};
@@ -248,6 +248,7 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
         camera: arguments.camera.clone(),
         frame_time: arguments.at,
         environment_follows: arguments.staging.has_environment(),
+        on_texture: Some(console::texture_decoded),
     };
     let mut scene = load::load(&arguments.scene, &options)?;
     arguments.staging.apply(&mut scene, arguments.nits_per_unit)?;

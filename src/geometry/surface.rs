@@ -18,6 +18,8 @@ pub struct SurfacePoint {
     pub handedness: f32,
     /// Texture coordinates.
     pub uv: Vec2,
+    /// Colour of the vertices around, which multiplies what the material reflects; white where they have none.
+    pub color: Vec3,
     /// Index of the object: instances first, then spheres.
     pub object: u32,
     /// Triangle of the mesh, 0 for a sphere.

@@ -49,11 +49,17 @@ impl<'a> Components<'a> {
 struct Reader<'a> {
     textures: &'a [Texture],
     uv: Vec2,
+    vertex_color: Vec3,
 }
 
 impl Reader<'_> {
     fn color(&self, input: &ColorInput) -> Vec3 {
         input.evaluate(self.textures, self.uv)
+    }
+
+    /// The base colour, which the vertices' colours multiply.
+    fn base(&self, input: &ColorInput) -> Vec3 {
+        self.color(input) * self.vertex_color
     }
 
     fn scalar(&self, input: &ScalarInput) -> f32 {
@@ -82,7 +88,7 @@ impl Reader<'_> {
     ) -> Bsdf<'a> {
         let transmission = self.scalar(&model.transmission).clamp(0.0, 1.0);
         let parameters = MetalRoughnessParameters {
-            base_color: self.color(&model.base_color),
+            base_color: self.base(&model.base_color),
             metallic: self.scalar(&model.metallic),
             roughness: self.scalar(&model.roughness),
             anisotropy: self.scalar(&model.anisotropy),
@@ -110,9 +116,9 @@ impl Reader<'_> {
 
     fn bsdf<'a>(&self, surface: &Surface, tables: &'a SurfaceTables, components: &'a Components<'a>) -> Bsdf<'a> {
         match (surface, tables) {
-            (Surface::Diffuse { reflectance }, _) => Bsdf::lambert(self.color(reflectance)),
+            (Surface::Diffuse { reflectance }, _) => Bsdf::lambert(self.base(reflectance)),
             (Surface::OrenNayar { reflectance, roughness }, _) => {
-                Bsdf::oren_nayar(self.color(reflectance), self.scalar(roughness))
+                Bsdf::oren_nayar(self.base(reflectance), self.scalar(roughness))
             }
             (Surface::DiffuseTransmission { reflectance, transmittance }, _) => {
                 let [reflected, transmitted] = self.shares(reflectance, transmittance);
@@ -138,7 +144,7 @@ impl Reader<'_> {
             }
             (Surface::CoatedDiffuse { reflectance, roughness, saturates, .. }, SurfaceTables::Coat(tables)) => {
                 let facets = self.facets(roughness);
-                Bsdf::CoatedDiffuse(CoatedDiffuse::new(self.color(reflectance), facets, *saturates, tables))
+                Bsdf::CoatedDiffuse(CoatedDiffuse::new(self.base(reflectance), facets, *saturates, tables))
             }
             (Surface::CoatedConductor { eta, k, roughness, coat_roughness, .. }, SurfaceTables::Layers(tables)) => {
                 Bsdf::coated_conductor(*eta, *k, self.facets(roughness), self.facets(coat_roughness), tables)
@@ -203,7 +209,7 @@ impl PathTracer {
         let material_id = self.world.material_of(point.object).0 as usize;
         let material = &scene.materials[material_id];
         let normal = seen_side(self.shading_normal(material, point), point.geometric_normal, wo);
-        let reader = Reader { textures: &scene.textures, uv: point.uv };
+        let reader = Reader { textures: &scene.textures, uv: point.uv, vertex_color: point.color };
         let transmits = match &material.surface {
             Surface::MetalRoughness(model) => model.transmission.factor > 0.0,
             Surface::DiffuseTransmission { .. }

@@ -51,6 +51,7 @@ pub fn content_hash(scene: &Scene) -> ContentHash {
         hash_array(&mut hasher, &take(&mut mesh.normals));
         hash_array(&mut hasher, &take(&mut mesh.uvs));
         hash_array(&mut hasher, &take(&mut mesh.tangents));
+        hash_array(&mut hasher, &take(&mut mesh.colors));
         hash_array(&mut hasher, &take(&mut mesh.triangles));
     }
     for texture in &mut rest.textures {

@@ -130,6 +130,8 @@ pub struct Mesh {
     pub uvs: Vec<Vec2>,
     /// Tangent (xyz) and handedness (w), one a position, or empty (then derived from `uvs`).
     pub tangents: Vec<Vec4>,
+    /// Linear colour that multiplies what the material reflects (its base colour), one a position, or empty for white.
+    pub colors: Vec<Vec3>,
     /// Vertex indices of each triangle, counter-clockwise from the front.
     pub triangles: Vec<[u32; 3]>,
 }

@@ -61,3 +61,56 @@ fn the_cornell_box_is_the_same_in_three_formats() {
         println!("{file}: largest z {worst:.2}");
     }
 }
+
+/// Colours of vertices come linear from both formats that have them: glTF's as they stand, OBJ's through sRGB's curve.
+#[test]
+fn vertex_colours_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let read = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        load(&path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}")).meshes.swap_remove(0).colors
+    };
+    let obj = read("a.obj", "v 0 0 0 1 0 0\nv 1 0 0 0 0.5 0\nv 0 1 0 0 0 1\nf 1 2 3\n");
+    assert!(obj[1].abs_diff_eq(glam::Vec3::new(0.0, 0.21404, 0.0), 1e-5), "{obj:?}");
+    let some = read("b.obj", "v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0 0 0 1\nf 1 2 3\n");
+    assert!(some.is_empty(), "{some:?}");
+    // Three positions (9 floats), then three normalised colours of 4 bytes.
+    let bytes: Vec<u8> = [0.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]
+        .iter()
+        .flat_map(|v| v.to_le_bytes())
+        .chain([255, 0, 0, 255, 0, 51, 0, 255, 0, 0, 255, 255])
+        .collect();
+    std::fs::write(folder.path().join("a.bin"), bytes).unwrap();
+    let gltf = read(
+        "a.gltf",
+        r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+"meshes":[{"primitives":[{"attributes":{"POSITION":0,"COLOR_0":1}}]}],
+"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]},
+{"bufferView":1,"componentType":5121,"normalized":true,"count":3,"type":"VEC4"}],
+"bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":12}],
+"buffers":[{"byteLength":48,"uri":"a.bin"}]}"#,
+    );
+    assert!(gltf[1].abs_diff_eq(glam::Vec3::new(0.0, 0.2, 0.0), 1e-6), "{gltf:?}");
+}
+
+/// Normals of faces in a smoothing group are shared across their edges; elsewhere faces are flat.
+#[test]
+fn smoothing_groups_round_edges() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 0 1 1\ns 1\nf 1 2 3 4\nf 5 1 4 6\n";
+    let normals = |text: &str| {
+        let path = folder.path().join("a.obj");
+        std::fs::write(&path, text).unwrap();
+        load(&path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}")).meshes.swap_remove(0).normals
+    };
+    let round = normals(text);
+    let edge = glam::Vec3::new(1.0, 0.0, 1.0).normalize();
+    assert_eq!(round.iter().filter(|normal| normal.abs_diff_eq(edge, 1e-5)).count(), 2, "{round:?}");
+    assert!(normals(&text.replace("s 1", "s off")).is_empty());
+    // Errors still name the file's own line.
+    let path = folder.path().join("bad.obj");
+    std::fs::write(&path, format!("{text}vt a b\n")).unwrap();
+    let error = load(&path, &LoadOptions::default()).unwrap_err().to_string();
+    assert!(error.contains("bad.obj:10:"), "{error}");
+}

@@ -1,7 +1,7 @@
 //! White furnaces: what a lossless surface returns in a constant environment is the environment.
 
 use crate::support::{
-    add_material, add_sphere, constant_environment, diffuse, empty_scene, radiance_along, trace_settings,
+    add_material, add_rectangle, add_sphere, constant_environment, diffuse, empty_scene, radiance_along, trace_settings,
 };
 use fechner::geometry::Ray;
 use fechner::integrator::PathTracer;
@@ -46,6 +46,23 @@ fn assert_returns_within(surface: &Surface, expected: Vec3, most_error: f32) {
 fn diffuse_returns_its_albedo() {
     for albedo in [0.18, 0.5, 1.0] {
         assert_returns(&diffuse(albedo), Vec3::splat(albedo));
+    }
+}
+
+/// Colours of vertices, in between as between them, multiply what a surface reflects.
+#[test]
+fn vertex_colours_multiply_the_albedo() {
+    let mut scene = empty_scene();
+    scene.environment = constant_environment(1.0);
+    let material = add_material(&mut scene, diffuse(0.5), Vec3::ZERO);
+    add_rectangle(&mut scene, Vec3::new(-1.0, -1.0, 0.0), 2.0 * Vec3::X, 2.0 * Vec3::Y, material);
+    let (left, right) = (Vec3::new(1.0, 0.5, 0.0), Vec3::new(0.0, 0.5, 1.0));
+    scene.meshes[0].colors = vec![left, right, right, left];
+    let tracer = PathTracer::new(Arc::new(scene), trace_settings(16, 16, 0));
+    for x in [-0.9_f32, 0.0, 0.5] {
+        let (mean, _) = radiance_along(&tracer, Ray::new(vec3a(x, 0.2, 5.0), Vec3A::NEG_Z), 1, 16);
+        let expected = 0.5 * left.lerp(right, 0.5 + 0.5 * x);
+        assert!(mean.abs_diff_eq(expected, 1e-4), "{mean}, expected {expected}");
     }
 }
 

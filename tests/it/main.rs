@@ -11,6 +11,7 @@
 //! - `importance`: samples go where a user's map sends them
 //! - `load_assets`: scenes that others made, sound and damaged
 //! - `mutations`: thousands of damaged files a format, in a child process (ignored)
+//! - `scene_table`: scenes of others: how long until nothing is seen (ignored)
 //! - `references`: scenes of others beside reference pictures (ignored)
 //! - `no_allocation`: the heap is left alone while paths are traced
 //! - `command_line`: the program as a user runs it
@@ -34,5 +35,6 @@ mod load_assets;
 mod mutations;
 mod no_allocation;
 mod references;
+mod scene_table;
 mod support;
 mod tonemap;

@@ -19,8 +19,12 @@ impl<'a> FileSource<'a> {
 impl SceneSource for FileSource<'_> {
     fn at(&self, seconds: f64) -> Result<Scene, LoadError> {
         let AnimateArguments { scene: file, camera, staging, nits_per_unit, .. } = self.arguments;
-        let options =
-            LoadOptions { camera: camera.clone(), frame_time: seconds, environment_follows: staging.has_environment() };
+        let options = LoadOptions {
+            camera: camera.clone(),
+            frame_time: seconds,
+            environment_follows: staging.has_environment(),
+            on_texture: None,
+        };
         let mut scene = load(file, &options)?;
         staging
             .apply(&mut scene, *nits_per_unit)

@@ -60,6 +60,7 @@ impl World {
                     0.5 + normal.x.atan2(-normal.z) / std::f32::consts::TAU,
                     normal.y.clamp(-1.0, 1.0).acos() / std::f32::consts::PI,
                 ),
+                color: Vec3::ONE,
                 object: hit.object,
                 triangle: 0,
                 offset: self.offset_at(position),
@@ -101,6 +102,7 @@ impl World {
             tangent,
             handedness,
             uv: interpolate_uv(mesh, hit.triangle, b1, b2),
+            color: interpolate_color(mesh, hit.triangle, b1, b2),
             object: hit.object,
             triangle: hit.triangle,
             offset: self.offset_at(position),
@@ -113,6 +115,14 @@ pub(super) fn interpolate_uv(mesh: &Mesh, triangle: u32, b1: f32, b2: f32) -> Ve
         return Vec2::ZERO;
     }
     let [i, j, k] = mesh.triangles[triangle as usize].map(|i| mesh.uvs[i as usize]);
+    i * (1.0 - b1 - b2) + j * b1 + k * b2
+}
+
+fn interpolate_color(mesh: &Mesh, triangle: u32, b1: f32, b2: f32) -> Vec3 {
+    if mesh.colors.is_empty() {
+        return Vec3::ONE;
+    }
+    let [i, j, k] = mesh.triangles[triangle as usize].map(|i| mesh.colors[i as usize]);
     i * (1.0 - b1 - b2) + j * b1 + k * b2
 }
 

@@ -91,7 +91,7 @@ impl Builder {
     pub(super) fn finish(mut self, path: &Path, if_dark: IfDark, options: &LoadOptions) -> Result<Scene, LoadError> {
         validate::repair(&mut self, path)?;
         let camera = self.choose_camera(options)?;
-        let textures = std::mem::take(&mut self.textures).decode(&mut self.notes)?;
+        let textures = std::mem::take(&mut self.textures).decode(&mut self.notes, options.on_texture)?;
         let mut scene = Scene {
             name: self.name,
             nits_per_unit: self.nits_per_unit,

@@ -47,7 +47,7 @@ use crate::scene::{Instance, Scene};
 use std::path::Path;
 
 /// What the caller chooses about loading.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub struct LoadOptions {
     /// Camera's name, for files that hold several; else the first.
     pub camera: Option<String>,
@@ -55,6 +55,8 @@ pub struct LoadOptions {
     pub frame_time: f64,
     /// The caller will set [`Scene::environment`] itself: no light in the file is then neither an error nor replaced.
     pub environment_follows: bool,
+    /// Told after each decoded picture how many are done, and of how many; from several threads.
+    pub on_texture: Option<fn(done: usize, total: usize)>,
 }
 
 /// The formats that are read, for messages.

@@ -92,14 +92,16 @@ fn parse_map(text: &str) -> Map {
         let most = match word {
             "-o" | "-s" | "-t" => 3,
             "-mm" => 2,
-            "-bm" | "-boost" | "-texres" | "-clamp" | "-blendu" | "-blendv" | "-cc" | "-imfchan" | "-type" => 1,
+            "-bm" | "-boost" | "-texres" | "-clamp" | "-blendu" | "-blendv" | "-cc" | "-imfchan" | "-type"
+            | "-colorspace" => 1,
             _ => {
                 // From the first word of the name to its last one, with the spaces between as they are.
                 name = Some((name.map_or(start, |(first, _)| first), start + word.len()));
                 continue;
             }
         };
-        let is_word = matches!(word, "-clamp" | "-blendu" | "-blendv" | "-cc" | "-imfchan" | "-type" | "-texres");
+        let is_word =
+            matches!(word, "-clamp" | "-blendu" | "-blendv" | "-cc" | "-imfchan" | "-type" | "-texres" | "-colorspace");
         let mut arguments: Vec<&str> = Vec::new();
         while arguments.len() < most
             && let Some(&(_, argument)) = words.get(next)
@@ -322,6 +324,7 @@ mod tests {
         assert_eq!((map.file.as_str(), map.bump, map.channel), ("dir/bump 2.jpg", 1.5, Some(1)));
         // A name that starts with a digit after an option that takes up to three numbers.
         assert_eq!(parse_map("-o 0.1 diffuse.jpg").file, "diffuse.jpg");
+        assert_eq!(parse_map("-colorspace sRGB -o 0.1 diffuse.jpg").file, "diffuse.jpg");
         assert_eq!(parse_map("").file, "");
     }
 }

@@ -1,8 +1,10 @@
 //! Wavefront OBJ through `tobj`, which is strict about indices and loose about the rest: we clean the text before it and
 //! check what comes out of it.
 //!
-//! OBJ has neither camera nor lights nor units: see the table in [`super`]. Smoothing groups and vertex colours are not
-//! used; faces without normals are flat.
+//! OBJ has neither camera nor lights nor units: see the table in [`super`]. Faces without normals are flat unless they are
+//! in a smoothing group ([`smoothing`]); colours of vertices are taken as sRGB, where every vertex has one.
+
+mod smoothing;
 
 use super::builder::{Builder, IfDark};
 use super::error::{LoadError, Place, nearest};
@@ -30,7 +32,11 @@ pub(super) fn read_into(
     path: &Path,
     with_materials: bool,
 ) -> Result<Vec<(MeshId, MaterialId)>, LoadError> {
-    let Cleaned { text, has_vertex_colors } = clean(&files::decode_loosely(path, files::read(path)?)?);
+    let Cleaned { mut text, colors } = clean(&files::decode_loosely(path, files::read(path)?)?);
+    let mut added_lines = 0;
+    if let Some(smoothed) = smoothing::add_normals(&text) {
+        (text, added_lines) = (smoothed.text, smoothed.added_lines);
+    }
     let libraries = RefCell::new(Libraries::default());
     let mut reader = CountingReader { rest: text.as_bytes(), lines: 0 };
     let options = tobj::LoadOptions { single_index: true, triangulate: false, ..tobj::LoadOptions::default() };
@@ -42,8 +48,8 @@ pub(super) fn read_into(
         }
         libraries.index(first)
     });
-    let line = reader.lines;
-    let (models, _) = parsed.map_err(|error| explain(error, &text, path, line))?;
+    let line = reader.lines.saturating_sub(added_lines);
+    let (models, _) = parsed.map_err(|error| explain(error, &text, path, line, added_lines))?;
     let libraries = libraries.into_inner();
     if let Some(error) = libraries.error {
         return Err(error);
@@ -52,7 +58,7 @@ pub(super) fn read_into(
         builder.note(note);
     }
     if with_materials {
-        report_unknown_materials(builder, path, &text, &libraries.materials);
+        report_unknown_materials(builder, path, &text, added_lines, &libraries.materials);
     }
 
     // Materials are converted when a face uses them: libraries are often shared by many files.
@@ -86,8 +92,10 @@ pub(super) fn read_into(
     if sparse_faces > 0 {
         builder.note(format!("{name}: {sparse_faces} points and lines are not rendered."));
     }
-    if has_vertex_colors {
-        builder.note(format!("{name}: vertex colours are not used."));
+    match colors {
+        VertexColors::None => {}
+        VertexColors::All => builder.note(format!("{name}: the colours of its vertices are taken as sRGB.")),
+        VertexColors::Some => builder.note(format!("{name}: only some vertices have colours; none is used.")),
     }
     if placed.is_empty() {
         return Err(LoadError::invalid(path, "nothing to render: no face with three corners"));
@@ -107,12 +115,16 @@ impl Libraries {
     /// `mtllib` names one file that may hold spaces, or several files apart by spaces.
     fn open(&mut self, obj: &Path, named: &str) {
         let folder = obj.parent().unwrap_or(Path::new(""));
-        let whole = named.trim().trim_matches('"').replace("\\ ", " ").replace('\\', "/");
+        // A backslash before a space keeps it in the name; any other one is a separator of folders.
+        const KEPT_SPACE: &str = "\u{0}";
+        let kept = named.trim().trim_matches('"').replace("\\ ", KEPT_SPACE).replace('\\', "/");
+        let name = |text: &str| text.replace(KEPT_SPACE, " ");
+        let whole = name(&kept);
         let single = mtl::find_file(folder, &whole);
         let found: Vec<_> = if single.is_file() {
             vec![single]
         } else {
-            whole.split_whitespace().map(|word| mtl::find_file(folder, word)).filter(|file| file.is_file()).collect()
+            kept.split_whitespace().map(|word| mtl::find_file(folder, &name(word))).filter(|f| f.is_file()).collect()
         };
         if found.is_empty() {
             self.notes.push(format!("Material file \"{whole}\" not found: a plain grey stands in."));
@@ -136,13 +148,31 @@ impl Libraries {
 /// An OBJ file's text as `tobj` can read it.
 struct Cleaned {
     text: String,
-    has_vertex_colors: bool,
+    colors: VertexColors,
+}
+
+/// Which vertices have colours behind their positions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum VertexColors {
+    None,
+    Some,
+    All,
 }
 
 /// The text with continued lines joined (blank lines keep the count), comments behind numbers cut off, and empty
 /// `usemtl` statements left out: all three stop `tobj`.
 fn clean(text: &str) -> Cleaned {
-    let mut has_vertex_colors = false;
+    let is_vertex = |line: &&str| line.starts_with("v ");
+    let has_color = |line: &&str| line.split('#').next().unwrap_or(line).split_whitespace().count() == 7;
+    let vertices = || text.lines().map(str::trim_start).filter(is_vertex);
+    // Most files have no colours: their first vertex says so.
+    let colors = if !vertices().take(1).any(|line| has_color(&line)) && !vertices().any(|line| has_color(&line)) {
+        VertexColors::None
+    } else if vertices().all(|line| has_color(&line)) {
+        VertexColors::All
+    } else {
+        VertexColors::Some
+    };
     let mut cleaned = String::with_capacity(text.len() + 1);
     let mut joined = 0;
     let mut is_numeric = false;
@@ -154,10 +184,9 @@ fn clean(text: &str) -> Cleaned {
         let line = if is_numeric { line.split('#').next().unwrap_or(line) } else { line };
         let continued = line.trim_end().strip_suffix('\\');
         let part = continued.unwrap_or(line);
-        // Colours behind positions: tobj refuses files that give them to some vertices only, and we do not use them.
+        // Colours behind positions: tobj refuses files that give them to some vertices only.
         let mut part = part;
-        if is_start && part.starts_with("v ") && part.split_whitespace().count() > 6 {
-            has_vertex_colors = true;
+        if colors == VertexColors::Some && is_start && part.starts_with("v ") && part.split_whitespace().count() > 6 {
             let fourth = part.split_whitespace().nth(4).unwrap_or_default();
             part = &part[..fourth.as_ptr() as usize - part.as_ptr() as usize];
         }
@@ -173,7 +202,7 @@ fn clean(text: &str) -> Cleaned {
             joined = 0;
         }
     }
-    Cleaned { text: cleaned, has_vertex_colors }
+    Cleaned { text: cleaned, colors }
 }
 
 /// Hands out text and counts the lines, because `tobj`'s errors have none.
@@ -203,8 +232,10 @@ impl BufRead for CountingReader<'_> {
 }
 
 /// Our error for one of `tobj`'s; `line` is the last line that it has read.
-fn explain(error: tobj::LoadError, text: &str, path: &Path, line: usize) -> LoadError {
+fn explain(error: tobj::LoadError, text: &str, path: &Path, line: usize, added_lines: usize) -> LoadError {
     use tobj::LoadError as Cause;
+    let find_bad_index =
+        |text: &str| find_bad_index(text).map(|(line, problem)| (line.saturating_sub(added_lines), problem));
     let (line, problem) = match error {
         Cause::FaceVertexOutOfBounds | Cause::FaceTexCoordOutOfBounds | Cause::FaceNormalOutOfBounds => {
             // These are only noticed when the object ends: find the face.
@@ -260,12 +291,18 @@ fn find_bad_index(text: &str) -> Option<(usize, String)> {
 }
 
 /// Notes `usemtl` names that no library has, with the nearest that one has.
-fn report_unknown_materials(builder: &mut Builder, path: &Path, text: &str, known: &[mtl::Written]) {
+fn report_unknown_materials(
+    builder: &mut Builder,
+    path: &Path,
+    text: &str,
+    added_lines: usize,
+    known: &[mtl::Written],
+) {
     if known.is_empty() {
         return;
     }
     let names = || known.iter().map(|material| material.name.as_str());
-    for (number, line) in text.lines().enumerate() {
+    for (number, line) in text.lines().skip(added_lines).enumerate() {
         let Some(name) = line.strip_prefix("usemtl ").map(str::trim) else {
             continue;
         };
@@ -296,6 +333,12 @@ fn convert_mesh(model: &tobj::Model, path: &Path) -> Result<(Mesh, usize), LoadE
     } else {
         Vec::new()
     };
+    let colors = if of_all(&from.vertex_color, 3) {
+        let linear = |srgb: &f32| crate::scene::texture::srgb_to_linear(srgb.clamp(0.0, 1.0));
+        from.vertex_color.as_chunks::<3>().0.iter().map(|rgb| Vec3::from_array(rgb.each_ref().map(linear))).collect()
+    } else {
+        Vec::new()
+    };
     let mut triangles = Vec::new();
     let mut skipped = 0;
     if from.face_arities.is_empty() {
@@ -320,7 +363,7 @@ fn convert_mesh(model: &tobj::Model, path: &Path) -> Result<(Mesh, usize), LoadE
     } else {
         model.name.clone()
     };
-    Ok((Mesh { name, positions, normals, uvs, tangents: Vec::new(), triangles }, skipped))
+    Ok((Mesh { name, positions, normals, uvs, tangents: Vec::new(), colors, triangles }, skipped))
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use std::collections::HashMap;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Widest and highest picture that is decoded.
 const LONGEST_SIDE: u32 = 16_384;
@@ -127,7 +128,11 @@ impl Requests {
     }
 
     /// Decodes everything. `notes` gets a sentence for each missing file that was replaced.
-    pub(super) fn decode(self, notes: &mut Vec<String>) -> Result<Vec<Texture>, LoadError> {
+    pub(super) fn decode(
+        self,
+        notes: &mut Vec<String>,
+        on_texture: Option<fn(usize, usize)>,
+    ) -> Result<Vec<Texture>, LoadError> {
         let mut place_of = HashMap::new();
         let mut distinct = Vec::new();
         for request in &self.requests {
@@ -136,9 +141,16 @@ impl Requests {
                 distinct.len() - 1
             });
         }
+        let done = AtomicUsize::new(0);
         let decoded: Vec<Result<Decoded, LoadError>> = distinct
             .par_iter()
-            .map(|(picture, encoding, adjust)| Ok(adjust.apply(decode(picture, *encoding)?)))
+            .map(|(picture, encoding, adjust)| {
+                let decoded = decode(picture, *encoding);
+                if let Some(tell) = on_texture {
+                    tell(done.fetch_add(1, Ordering::Relaxed) + 1, distinct.len());
+                }
+                Ok(adjust.apply(decoded?))
+            })
             .collect();
         let mut decoded: Vec<Option<Result<Decoded, LoadError>>> = decoded.into_iter().map(Some).collect();
 

@@ -90,6 +90,12 @@ fn repair_attributes(mesh: &mut Mesh) -> bool {
     if mesh.uvs.len() != vertices {
         mesh.uvs.clear();
     }
+    if mesh.colors.len() != vertices {
+        mesh.colors.clear();
+    }
+    for color in &mut mesh.colors {
+        *color = if color.is_finite() { color.clamp(Vec3::ZERO, Vec3::ONE) } else { Vec3::ONE };
+    }
     for uv in &mut mesh.uvs {
         if !uv.is_finite() {
             *uv = Vec2::ZERO;

@@ -113,6 +113,7 @@ fn parse(path: &Path, json: &[u8], builder: &mut Builder) -> Result<::gltf::Docu
         return Err(LoadError::unsupported(path, format_args!("glTF version {version}; version 2 is read")));
     }
     check_positions(path, &root)?;
+    check_animations(path, &root)?;
     ::gltf::Document::from_json(root).map_err(|error| LoadError::invalid(path, format_args!("not valid glTF: {error}")))
 }
 
@@ -129,6 +130,26 @@ fn check_positions(path: &Path, root: &::gltf::json::Root) -> Result<(), LoadErr
                     path,
                     format_args!("mesh {mesh_number} has its positions in accessor {accessor}, but there are {count}"),
                 ));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Refuses animations of a node or property that does not exist: the crate's validation looks at neither, and its reader
+/// panics (gltf-json 1.4.1, found by damaging a file).
+fn check_animations(path: &Path, root: &::gltf::json::Root) -> Result<(), LoadError> {
+    for (number, animation) in root.animations.iter().enumerate() {
+        for target in animation.channels.iter().map(|channel| &channel.target) {
+            let (node, count) = (target.node.value(), root.nodes.len());
+            if node >= count {
+                let problem = format!("animation {number} moves node {node}, but there are {count}");
+                return Err(LoadError::invalid(path, problem));
+            }
+            if matches!(target.path, Checked::Invalid) {
+                let problem =
+                    format!("animation {number} moves what is not known; translation, rotation, scale and weights are");
+                return Err(LoadError::invalid(path, problem));
             }
         }
     }
@@ -264,9 +285,7 @@ impl<'a> Reader<'a> {
         let normals = vectors(Semantic::Normals)?.unwrap_or_default().into_iter().map(Vec3::from_array).collect();
         let uvs = from.get(&Semantic::TexCoords(0)).map(|accessor| self.buffers.floats(&accessor)).transpose()?;
         let tangents = from.get(&Semantic::Tangents).map(|accessor| self.buffers.floats(&accessor)).transpose()?;
-        if from.get(&Semantic::Colors(0)).is_some() {
-            self.builder.note(format!("\"{name}\": vertex colours are not used."));
-        }
+        let colors = from.get(&Semantic::Colors(0)).map(|accessor| self.colors(&accessor, &name)).transpose()?;
         let indices = match from.indices() {
             Some(accessor) => self.buffers.indices(&accessor)?,
             None => (0..positions.len() as u32).collect(),
@@ -281,8 +300,21 @@ impl<'a> Reader<'a> {
             normals,
             uvs: uvs.unwrap_or_default().into_iter().map(Vec2::from_array).collect(),
             tangents: tangents.unwrap_or_default().into_iter().map(Vec4::from_array).collect(),
+            colors: colors.unwrap_or_default(),
             triangles: triangles(&indices, from.mode()),
         }))
+    }
+
+    /// Linear colours of vertices, without their alpha.
+    fn colors(&mut self, accessor: &::gltf::Accessor, name: &str) -> Result<Vec<Vec3>, LoadError> {
+        if accessor.dimensions().multiplicity() != 4 {
+            return Ok(self.buffers.floats(accessor)?.into_iter().map(Vec3::from_array).collect());
+        }
+        let colors: Vec<Vec4> = self.buffers.floats(accessor)?.into_iter().map(Vec4::from_array).collect();
+        if colors.iter().any(|color| color.w < 1.0) {
+            self.builder.note(format!("\"{name}\": the alpha of its vertex colours is not used."));
+        }
+        Ok(colors.into_iter().map(Vec4::truncate).collect())
     }
 
     fn camera(&mut self, camera: &::gltf::Camera, node: &str, to_world: &Affine3A) {

@@ -2,13 +2,14 @@
 
 use super::super::environment;
 use super::super::error::LoadError;
+use super::super::sky::{self, Sky};
 use super::Reader;
 use super::element::Element;
 use super::textures::Meaning;
 use super::transform;
 use crate::scene::{ColorInput, Environment, Light, Parametrisation, SpotFalloff};
 use glam::{Affine3A, Mat3, Vec3};
-use std::f32::consts::PI;
+use std::f32::consts::{FRAC_PI_2, PI};
 
 impl Reader {
     /// An emitter that is not a surface's.
@@ -70,14 +71,72 @@ impl Reader {
                 emitter.ignore(&["gamma", "cache", "miscompensation"]);
                 self.surround(environment);
             }
+            "sky" | "sun" | "sunsky" => self.sky(emitter, &kind, &to_world)?,
             other => {
                 return Err(emitter.unsupported(format_args!(
-                    "emitter \"{other}\" is not rendered; area, point, spot, directional, constant and envmap are"
+                    "emitter \"{other}\" is not rendered; area, point, spot, directional, constant, envmap, sky, sun and \
+                     sunsky are"
                 )));
             }
         }
         emitter.ignore(&["samplingweight"]);
         self.note_unused(&format!("emitter \"{kind}\""), emitter);
+        Ok(())
+    }
+
+    /// Sky, sun or both, by our own model of a clear day in cd/m² ([`sky`]).
+    fn sky(&mut self, emitter: &Element, kind: &str, to_world: &Affine3A) -> Result<(), LoadError> {
+        // Version 3 has its zenith along +z, the dialects before it along +y; our model's is +y.
+        let to_model = if self.zenith_is_z { Mat3::from_rotation_x(-FRAC_PI_2) } else { Mat3::IDENTITY };
+        let from_world = to_model * rotation(to_world).transpose();
+        let towards_sun = match emitter.vector("sundirection")? {
+            Some(direction) => {
+                let local = direction.try_normalize().ok_or_else(|| emitter.error("a sun's direction of no length"))?;
+                to_model * local
+            }
+            None => {
+                self.builder.note(format!(
+                    "{}: a sun's place is not computed from date and place: it stands 45° high.",
+                    emitter.place()
+                ));
+                Vec3::new(0.0, 1.0, -1.0).normalize()
+            }
+        };
+        emitter.ignore(&["year", "month", "day", "hour", "minute", "second", "latitude", "longitude", "timezone"]);
+        emitter.ignore(&["resolution", "sunaperture", "complexsun", "stretch", "extend", "sunradiusscale"]);
+        let elevation = towards_sun.y.clamp(-1.0, 1.0).asin().to_degrees();
+        if elevation < 0.0 {
+            self.builder.note(format!("{}: a sun below the horizon is raised to it.", emitter.place()));
+        }
+        let turbidity = emitter.float_or("turbidity", 3.0)?;
+        let scale = emitter.float_or("scale", 1.0)?;
+        let [sky_scale, sun_scale] = [emitter.float_or("skyscale", 1.0)?, emitter.float_or("sunscale", 1.0)?];
+        let albedo = self.color(emitter, "albedo", Meaning::Reflectance)?.unwrap_or(Vec3::splat(0.2));
+        let day = Sky {
+            sun_elevation_deg: elevation.max(0.0),
+            sun_azimuth_deg: towards_sun.x.atan2(-towards_sun.z).to_degrees(),
+            turbidity: turbidity.clamp(2.0, 10.0),
+            ground_albedo: super::super::luminance(albedo).clamp(0.0, 1.0),
+            sun: kind != "sky",
+        };
+        let light = sky::light(&day, super::ASSUMED_NITS_PER_UNIT);
+        self.builder.note(format!(
+            "Emitter \"{kind}\": luminance is that of fechner's clear sky in cd/m², with the file's turbidity ({}).",
+            day.turbidity
+        ));
+        if kind != "sun" {
+            let scale = (light.environment.scale * scale * sky_scale).max(0.0);
+            self.surround(Environment {
+                scale,
+                from_world: light.environment.from_world * from_world,
+                ..light.environment
+            });
+        }
+        if let Some(Light::Directional { direction, irradiance, angular_radius }) = light.sun {
+            let irradiance = irradiance * (scale * sun_scale).max(0.0);
+            let direction = from_world.transpose() * direction;
+            self.builder.lights.push(Light::Directional { direction, irradiance, angular_radius });
+        }
         Ok(())
     }
 
@@ -116,4 +175,41 @@ fn rotation(transform: &Affine3A) -> Mat3 {
     let y = (y - y.dot(x) * x).try_normalize().unwrap_or_else(|| x.any_orthonormal_vector());
     let upright = x.cross(y);
     Mat3::from_cols(x, y, if upright.dot(z) < 0.0 { -upright } else { upright })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::{LoadOptions, load};
+    use super::*;
+
+    fn sun_of(version: &str, emitter: &str) -> (Vec3, Environment) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("sky.xml");
+        let text = format!("<scene version=\"{version}\">{emitter}<shape type=\"sphere\"/></scene>");
+        std::fs::write(&path, text).unwrap();
+        let scene = load(&path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        let [Light::Directional { direction, .. }] = scene.lights.as_slice() else { panic!("{:?}", scene.lights) };
+        (*direction, scene.environment.unwrap())
+    }
+
+    /// The sun stands where the file says, and the sky is brightest there, with the zenith along +z and along +y.
+    #[test]
+    fn a_sky_has_its_sun_where_the_file_says() {
+        let direction = Vec3::new(0.5, 0.6, 0.4).normalize();
+        for (version, name) in [("3.0.0", "sun_direction"), ("0.5.0", "sunDirection")] {
+            let [x, y, z] = direction.to_array();
+            let emitter =
+                format!("<emitter type=\"sunsky\"><vector name=\"{name}\" x=\"{x}\" y=\"{y}\" z=\"{z}\"/></emitter>");
+            let (travels, sky) = sun_of(version, &emitter);
+            assert!(travels.abs_diff_eq(-direction, 1e-5), "{version}: {travels}");
+            let up = if version.starts_with('3') { Vec3::Z } else { Vec3::Y };
+            let (near, ground) = (sky.radiance(direction), sky.radiance(-up));
+            let opposite = 2.0 * up.dot(direction) * up - direction;
+            assert!(near.min_element() > 2.0 * sky.radiance(opposite).max_element(), "{version}: {near}");
+            assert!(
+                ground.max_element() > 0.0 && near.min_element() > 2.0 * ground.max_element(),
+                "{version}: {ground}"
+            );
+        }
+    }
 }

@@ -39,6 +39,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
         groups: HashMap::new(),
         current_group: None,
         made_vertices: 0,
+        zenith_is_z: root.attribute("version").is_none_or(|version| !version.trim_start().starts_with("0.")),
     };
     reader.name_all(&root);
     for child in &root.children {
@@ -75,6 +76,8 @@ struct Reader {
     current_group: Option<Vec<(MeshId, MaterialId, Affine3A)>>,
     /// Of meshes that stand for disks and their like.
     made_vertices: usize,
+    /// Whether skies have their zenith along +z, as from version 2 on.
+    zenith_is_z: bool,
 }
 
 impl Reader {
