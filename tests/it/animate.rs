@@ -104,7 +104,10 @@ fn finished_frames_are_kept() {
 fn motion_needs_fewer_samples_than_a_pause() {
     let folder = tempfile::tempdir().expect("a folder");
     let samples = |arguments: &[&str]| {
-        animate(folder.path(), &[&["--frames", "1..1", "--visibility", "0.5", "-o", "shot.##.png"], arguments].concat());
+        animate(
+            folder.path(),
+            &[&["--frames", "1..1", "--visibility", "0.5", "-o", "shot.##.png"], arguments].concat(),
+        );
         let text = std::fs::read_to_string(folder.path().join("shot.01.json")).expect("a record");
         let record: serde_json::Value = serde_json::from_str(&text).expect("JSON");
         record["report"]["samples_total"].as_f64().expect("a number")
