@@ -152,4 +152,4 @@ def test_threads_run_while_the_crate_works():
         state["stop"] = True
         counter.join()
     # Held, the lock changes hands at most at the call's two ends.
-    assert during > 1000
+    assert during > 100
