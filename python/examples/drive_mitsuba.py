@@ -3,7 +3,8 @@
 Mitsuba's integrator is asked for the light of any list of pixels, so each pixel gets its own number of samples and nothing of Mitsuba
 is changed. A pilot goes everywhere; then, in rounds, thresholds of the picture so far and the allocation that brings the noise's
 visibility to the target, with every pixel's count growing at most threefold a round. Two independent halves are kept: what they
-show of the noise corrects what its variance predicts. It stops when noise is at most as visible as asked on 99 % of the picture.
+show of the noise corrects, place by place, what its variance predicts, and says when to stop: when the noise of 99 % of the picture
+is at most as visible as asked.
 
 The comparison is nobody's own opinion: visibility of (render − reference) under the reference's thresholds, for both. The figure
 is the number of samples at which `mi.render`, the same for every pixel, has 99 % of the picture at the visibility that the adaptive
@@ -52,7 +53,10 @@ def load(path, width, height):
     ElementTree.SubElement(film, "rfilter", type="box")
     sampler = tree.getroot().find("sensor/sampler")
     if sampler is not None:
+        sampler.clear()
         sampler.set("type", "independent")
+    for old in tree.iter("lookAt"):
+        old.tag = "lookat"  # Mitsuba 3 translates 0.4's names, but not this one
     mi.file_resolver().append(str(path.parent.resolve()))
     return mi.load_string(ElementTree.tostring(tree.getroot(), encoding="unicode"))
 
@@ -130,8 +134,9 @@ def box_mean(values, side):
 
 
 def steadied(variance, samples):
-    """A pixel's variance, leaning on its neighbours' as if they were 16 samples more: few samples know little of their own."""
-    return (samples * variance + 16 * box_mean(variance, 5)) / (samples + 16)
+    """A pixel's variance, leaning on its neighbours' as if they were 64 samples more: few samples know little of their own, and a
+    pixel that has not met its firefly yet believes that it is done."""
+    return (samples * variance + 64 * box_mean(variance, 9)) / (samples + 64)
 
 
 def adaptive(tracer, options, exposure):
@@ -147,32 +152,33 @@ def adaptive(tracer, options, exposure):
         samples = sum(film.samples for film in halves).reshape(shape)
         rgb = exposure * sum(film.rgb for film in halves).reshape(*shape, 3) / samples[..., None]
         of_one = [film.variance().reshape(shape) for film in halves]
-        variance = steadied(exposure**2 * 0.5 * (of_one[0] + of_one[1]), samples)
+        variance = exposure**2 * 0.5 * (of_one[0] + of_one[1])
 
         guide = fechner.denoise_guide(rgb, variance / samples, albedo, normal, depth)
         dim = fechner.luminance(guide)
         tone = fechner.fit_tone(dim, options.tone)
+        # As displayed, where a lamp's edge is bounded by white, before pixels lean on each other.
+        shown = steadied(tone.display_variance(dim, variance / samples), samples)
         # Before the picture is denoised its noise bounds what is left of it in every band.
-        shown = tone.display_variance(dim, variance / samples)
         thresholds = fechner.threshold_map(tone.display_luminance(dim), shown)
         predicted = thresholds.predicted_visibility(shown)
         a, b = (exposure * film.mean().reshape(*shape, 3) @ LUMINANCE for film in halves)
         measured = thresholds.measured_visibility(tone.display_half_difference(0.5 * (a + b), 0.5 * (a - b)))
-        correction = max(1.0, np.mean(measured**2) / np.mean(predicted**2))
-        left = np.sqrt(correction) * predicted
         print(
-            f"  round {round_number}: {samples.mean():7.1f} samples a pixel, 99 % below {np.quantile(left, COVERAGE):5.2f} predicted, "
+            f"  round {round_number}: {samples.mean():7.1f} samples a pixel, 99 % below {np.quantile(predicted, COVERAGE):5.2f} predicted, "
             f"{np.quantile(measured, COVERAGE):5.2f} measured"
         )
-        if np.quantile(left, COVERAGE) <= options.visibility:
+        if np.quantile(measured, COVERAGE) <= options.visibility:
             break
+        # What the halves show around a pixel, over hundreds of others, corrects what variances promise.
+        correction = np.clip((measured / np.maximum(predicted, 1e-6)) ** 2, 1 / 16, 16)
         of_one = correction * shown * samples
         # The hardest 1 % are left as uniform sampling would leave them.
         need = thresholds.predicted_visibility(of_one)
         tolerance = np.maximum(1, need / np.quantile(need, COVERAGE))
-        wanted = thresholds.allocate(
-            of_one, tolerance=tolerance, visibility=options.visibility, min_samples=options.pilot, max_samples=1e6
-        ).samples
+        # A little below the target, else the last rounds creep towards it.
+        aim = 0.97 * options.visibility
+        wanted = thresholds.allocate(of_one, tolerance=tolerance, visibility=aim, min_samples=options.pilot).samples
         # Two halves: even counts.
         more = 2 * np.ceil(np.clip(wanted - samples, 0, 2 * samples) / 2)
         if not more.any():
