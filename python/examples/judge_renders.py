@@ -6,7 +6,7 @@ of their mean; `ThresholdMap.measured_visibility` says how visible it is, in thr
     python python/examples/judge_renders.py a.npy b.npy --exposure 1000 -o map.png
     python python/examples/judge_renders.py a.pfm b.pfm --display laptop -o map.npy
 
-Files: .npy ((height, width, 3), linear Rec. 709), .pfm, and with `pip install imageio` .hdr; with `pip install mitsuba` .exr.
+Files: .npy ((height, width, 3), linear Rec. 709), .pfm, and with `pip install mitsuba` .exr and .hdr.
 Exit status 0 when at least 99 % of the picture is below threshold, else 1.
 """
 
@@ -26,11 +26,7 @@ def read(path):
         picture = np.load(path)
     elif kind == ".pfm":
         picture = read_pfm(path)
-    elif kind == ".hdr":
-        import imageio.v3 as imageio
-
-        picture = imageio.imread(path)
-    elif kind == ".exr":
+    elif kind in (".exr", ".hdr"):
         import mitsuba
 
         mitsuba.set_variant("scalar_rgb")
