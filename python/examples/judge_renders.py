@@ -1,0 +1,128 @@
+"""Judges two independent renders of one view, from any renderer: where does their noise still show?
+
+A and B are the same picture rendered with two seeds and equally many samples. Half their difference is a realisation of the error
+of their mean; `ThresholdMap.measured_visibility` says how visible it is, in threshold units, on the display that you name.
+
+    python python/examples/judge_renders.py a.npy b.npy --exposure 1000 -o map.png
+    python python/examples/judge_renders.py a.pfm b.pfm --display laptop -o map.npy
+
+Files: .npy ((height, width, 3), linear Rec. 709), .pfm, and with `pip install mitsuba` .exr and .hdr.
+Exit status 0 when at least 99 % of the picture is below threshold, else 1.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import fechner
+
+
+def read(path):
+    """Linear RGB, (height, width, 3), float32."""
+    kind = path.suffix.lower()
+    if kind == ".npy":
+        picture = np.load(path)
+    elif kind == ".pfm":
+        picture = read_pfm(path)
+    elif kind in (".exr", ".hdr"):
+        import mitsuba
+
+        mitsuba.set_variant("scalar_rgb")
+        bitmap = mitsuba.Bitmap(str(path)).convert(mitsuba.Bitmap.PixelFormat.RGB, mitsuba.Struct.Type.Float32, False)
+        picture = np.array(bitmap)
+    else:
+        raise ValueError(f"{path}: {kind or 'no ending'}; a picture is .npy, .pfm, .hdr or .exr")
+    if picture.ndim != 3 or picture.shape[2] < 3:
+        raise ValueError(f"{path} has the shape {picture.shape}; a picture has (height, width, 3)")
+    return np.ascontiguousarray(picture[..., :3], np.float32)
+
+
+def read_pfm(path):
+    """A portable float map: three lines of text, then rows from the bottom."""
+    with path.open("rb") as file:
+        if file.readline().strip() != b"PF":
+            raise ValueError(f"{path} is no PFM in colour; its first line must be PF")
+        width, height = map(int, file.readline().split())
+        order = "<" if float(file.readline()) < 0 else ">"
+        values = np.frombuffer(file.read(12 * width * height), order + "f4")
+    if values.size != 3 * width * height:
+        raise ValueError(f"{path} ends after {values.size} values; {3 * width * height} are needed")
+    return values.reshape(height, width, 3)[::-1]
+
+
+def judge(first, second, viewing, operator):
+    """Visibility, in threshold units, of the noise left in the mean of two renders (scene cd/m²)."""
+    mean = fechner.luminance(0.5 * (first + second))
+    half_difference = fechner.luminance(0.5 * (first - second))
+    tone = fechner.fit_tone(mean, operator, viewing)
+    shown = tone.display_luminance(mean)
+    # The two halves' squared half difference estimates the variance of the noise in their mean, which must not mask itself.
+    seen = tone.display_half_difference(mean, half_difference)
+    thresholds = fechner.threshold_map(shown, box_mean(seen**2, 7), viewing)
+    return thresholds.measured_visibility(seen)
+
+
+def box_mean(values, side):
+    """Mean over a window of side × side pixels, held at the borders."""
+    padded = np.pad(values, side // 2, mode="edge")
+    for axis in (0, 1):
+        padded = np.lib.stride_tricks.sliding_window_view(padded, side, axis=axis).mean(axis=-1)
+    return padded
+
+
+def report(visibility, columns=6, rows=4):
+    """Prints the figures of the picture and the tiles where noise shows most."""
+    print(f"below threshold     {100 * np.mean(visibility <= 1):.2f} % of the picture")
+    print(f"99 % lie below      v = {np.quantile(visibility, 0.99):.2f}")
+    # Noise falls with the square root of the samples.
+    print(f"samples for 99 %    {max(np.quantile(visibility, 0.99), 1e-9) ** 2:.2f} times as many")
+    height, width = visibility.shape
+    tiles = []
+    for row in range(rows):
+        for column in range(columns):
+            top, bottom = row * height // rows, (row + 1) * height // rows
+            left, right = column * width // columns, (column + 1) * width // columns
+            if bottom > top and right > left:
+                tile = visibility[top:bottom, left:right]
+                tiles.append((float(tile.mean()), float(np.mean(tile > 1)), (left, top, right, bottom)))
+    print("noise shows most in (left, top, right, bottom):")
+    for mean, share, corners in sorted(tiles, reverse=True)[:4]:
+        print(f"  {corners}: v = {mean:.2f} on average, above threshold on {100 * share:.1f} % of it")
+
+
+def write_map(path, visibility):
+    if path.suffix == ".npy":
+        np.save(path, visibility)
+        return
+    from matplotlib import pyplot
+
+    pyplot.imsave(path, visibility, vmin=0, vmax=2, cmap="magma")
+
+
+def main():
+    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    arguments.add_argument("first", type=Path)
+    arguments.add_argument("second", type=Path)
+    arguments.add_argument("--exposure", type=float, default=1.0, help="cd/m² of a pixel value of 1")
+    arguments.add_argument("--display", default="desktop", help=", ".join(fechner.Display.presets()))
+    arguments.add_argument("--tone", default="ward94", help=", ".join(fechner.tone_operators()))
+    arguments.add_argument("-o", "--output", type=Path, help="the map of v: .npy, or .png with matplotlib (white is 2)")
+    options = arguments.parse_args()
+    try:
+        first, second = (options.exposure * read(path) for path in (options.first, options.second))
+        if first.shape != second.shape:
+            raise ValueError(f"{options.second} has the shape {second.shape}, but {options.first} {first.shape}")
+        visibility = judge(first, second, fechner.Viewing(options.display), options.tone)
+        report(visibility)
+        if options.output:
+            write_map(options.output, visibility)
+    except (OSError, ValueError, ImportError) as error:
+        print(f"judge_renders: {error}", file=sys.stderr)
+        return 2
+    return 0 if np.mean(visibility <= 1) >= 0.99 else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

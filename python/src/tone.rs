@@ -1,0 +1,180 @@
+//! Tone operators by name, and error as it is seen through them.
+
+use fechner_perception::photometry::{luminance, scotopic_luminance};
+use fechner_perception::tone::{
+    AdaptationScope, FittedTone, Pixel, SceneGuide, ToneSettings, map_picture, operator_names, operator_with,
+};
+use fechner_perception::{Plane, display, seen};
+use numpy::{PyArray2, PyArray3};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::arrays::{Pixels, Shape, plane, plane_to_array, rgb_to_array};
+use crate::errors::{check_size, work};
+use crate::viewing::{Viewing, or_default, unknown};
+
+/// The names of the tone operators.
+#[pyfunction]
+pub(crate) fn tone_operators() -> Vec<&'static str> {
+    operator_names().to_vec()
+}
+
+/// A tone operator frozen for one picture and one viewing; made by `fit_tone`.
+#[pyclass(frozen, module = "fechner")]
+pub(crate) struct Tone {
+    fitted: Box<dyn FittedTone>,
+    display: display::Display,
+    shape: Shape,
+}
+
+/// Freezes the operator `name` for a picture, so that the same scene light always becomes the same display light.
+///
+/// scene: linear Rec. 709 RGB (height, width, 3) or luminance (height, width), scene cd/m². exposure_stops multiplies light by
+/// 2^stops. local: adapted at each pixel, for the operators that know it. gaze: (column, row) the eye rests on.
+/// ValueError for a name that there is not and for light below 0 or not finite.
+#[pyfunction]
+#[pyo3(signature = (scene, name, viewing = None, *, exposure_stops = 0.0, local = false, gaze = None))]
+pub(crate) fn fit_tone(
+    py: Python<'_>,
+    scene: &Bound<'_, PyAny>,
+    name: &str,
+    viewing: Option<&Viewing>,
+    exposure_stops: f64,
+    local: bool,
+    gaze: Option<(usize, usize)>,
+) -> PyResult<Tone> {
+    let scope = if local { AdaptationScope::Local } else { AdaptationScope::World };
+    let settings = ToneSettings { exposure_stops, scope, effects: None };
+    let operator = operator_with(name, &settings).ok_or_else(|| unknown("tone operator", name, operator_names()))?;
+    if !exposure_stops.is_finite() {
+        return Err(PyValueError::new_err(format!("exposure_stops is {exposure_stops}; it must be finite")));
+    }
+    let scene = Scene::read(py, &Pixels::borrow("scene", scene)?)?;
+    let shape = Shape { height: scene.photopic.height(), width: scene.photopic.width() };
+    if let Some((x, y)) = gaze.filter(|&(x, y)| x >= shape.width || y >= shape.height) {
+        let message = format!("gaze ({x}, {y}) lies outside the picture of {}×{} pixels", shape.width, shape.height);
+        return Err(PyValueError::new_err(message));
+    }
+    let viewing = or_default(viewing);
+    let fitted = work(py, || {
+        let guide = SceneGuide { scotopic_cd_m2: scene.scotopic.as_ref(), ..SceneGuide::of(&scene.photopic) };
+        operator.fit(&guide.with_gaze(gaze.map(|(x, y)| Pixel { x, y })), &viewing, None)
+    })?;
+    Ok(Tone { fitted, display: viewing.display, shape })
+}
+
+/// What cones and rods see of a picture, cd/m².
+struct Scene {
+    photopic: Plane,
+    scotopic: Option<Plane>,
+}
+
+impl Scene {
+    fn read(py: Python<'_>, pixels: &Pixels<'_>) -> PyResult<Self> {
+        let scene = if pixels.has_channels() {
+            let (shape, rgb) = pixels.rgb()?;
+            let seen_by = |weigh: fn([f32; 3]) -> f32| {
+                Plane::from_fn(shape.width, shape.height, |x, y| weigh(rgb[y * shape.width + x]).max(0.0))
+            };
+            check_finite(rgb.as_flattened())?;
+            work(py, || Self { photopic: seen_by(luminance), scotopic: Some(seen_by(scotopic_luminance)) })?
+        } else {
+            let photopic = pixels.plane()?;
+            check_finite(photopic.values())?;
+            Self { photopic: photopic.map(|value| value.max(0.0)), scotopic: None }
+        };
+        Ok(scene)
+    }
+}
+
+fn check_finite(values: &[f32]) -> PyResult<()> {
+    match values.iter().find(|value| !value.is_finite()) {
+        None => Ok(()),
+        Some(value) => Err(PyValueError::new_err(format!("scene holds {value}; light must be finite"))),
+    }
+}
+
+impl Tone {
+    fn plane_of_its_size(&self, what: &'static str, given: &Bound<'_, PyAny>) -> PyResult<Plane> {
+        let plane = plane(what, given)?;
+        check_size(what, &plane, self.shape.width, self.shape.height)?;
+        Ok(plane)
+    }
+}
+
+#[pymethods]
+impl Tone {
+    /// Linear display RGB 0..1, (height, width, 3), for linear Rec. 709 RGB in scene cd/m² of the same shape.
+    fn map<'py>(&self, py: Python<'py>, rgb: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray3<f32>>> {
+        let pixels = Pixels::borrow("rgb", rgb)?;
+        let (shape, rgb) = pixels.rgb()?;
+        if shape != self.shape {
+            let (found, fitted) = (shape, self.shape);
+            return Err(PyValueError::new_err(format!(
+                "rgb is {}×{} pixels, but {}×{} are needed",
+                found.width, found.height, fitted.width, fitted.height
+            )));
+        }
+        let shown = work(py, || map_picture(&*self.fitted, shape.width, rgb))?;
+        rgb_to_array(py, shape, shown)
+    }
+
+    /// Luminance that the display shows, cd/m², for scene luminance, cd/m²; both (height, width).
+    fn display_luminance<'py>(
+        &self,
+        py: Python<'py>,
+        scene_luminance: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let scene = self.plane_of_its_size("scene_luminance", scene_luminance)?;
+        plane_to_array(py, work(py, || seen::display_luminance(&*self.fitted, &self.display, &scene))?)
+    }
+
+    /// Variance of the displayed luminance, (cd/m²)², for scene luminance of this mean, cd/m², and variance, (cd/m²)²; all
+    /// (height, width). Pixels that are not finite get infinity.
+    fn display_variance<'py>(
+        &self,
+        py: Python<'py>,
+        mean: &Bound<'py, PyAny>,
+        variance: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let mean = self.plane_of_its_size("mean", mean)?;
+        let variance = self.plane_of_its_size("variance", variance)?;
+        plane_to_array(py, work(py, || seen::display_variance(&*self.fitted, &self.display, &mean, &variance))?)
+    }
+
+    /// Half the difference that two halves A and B make on the display, cd/m²: mean is (A + B)/2, half_difference (A − B)/2, scene
+    /// cd/m²; all (height, width). Pixels that are not finite give 0.
+    fn display_half_difference<'py>(
+        &self,
+        py: Python<'py>,
+        mean: &Bound<'py, PyAny>,
+        half_difference: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let mean = self.plane_of_its_size("mean", mean)?;
+        let error = self.plane_of_its_size("half_difference", half_difference)?;
+        plane_to_array(py, work(py, || seen::display_half_difference(&*self.fitted, &self.display, &mean, &error))?)
+    }
+
+    /// The fit in one line.
+    fn describe(&self) -> String {
+        self.fitted.describe()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<Tone: {}>", self.fitted.describe())
+    }
+}
+
+/// Linear display RGB 0..1 for a picture, (height, width, 3), through the operator `name` fitted to it: `fit_tone` and `map`.
+#[pyfunction]
+#[pyo3(signature = (rgb, name, viewing = None, *, exposure_stops = 0.0, local = false))]
+pub(crate) fn tone_map<'py>(
+    py: Python<'py>,
+    rgb: &Bound<'py, PyAny>,
+    name: &str,
+    viewing: Option<&Viewing>,
+    exposure_stops: f64,
+    local: bool,
+) -> PyResult<Bound<'py, PyArray3<f32>>> {
+    fit_tone(py, rgb, name, viewing, exposure_stops, local, None)?.map(py, rgb)
+}

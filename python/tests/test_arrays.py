@@ -1,0 +1,155 @@
+"""What goes in and out: memory, kinds of array, errors, threads."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import fechner
+
+GREY = np.full((24, 32), 50, np.float32)
+
+
+def visibility_of(picture):
+    return fechner.threshold_map(picture).allowed_standard_error()
+
+
+@pytest.mark.parametrize(
+    "same",
+    [
+        GREY.astype(np.float64),
+        GREY.astype(np.uint8),
+        np.asfortranarray(GREY),
+        np.repeat(GREY, 2, axis=1)[:, ::2],
+        GREY[::-1],
+        GREY.astype(">f4"),
+        GREY.tolist(),
+    ],
+    ids=["float64", "uint8", "fortran", "strided", "negative stride", "big endian", "list"],
+)
+def test_other_arrays_are_converted(same):
+    np.testing.assert_array_equal(visibility_of(same), visibility_of(GREY))
+
+
+def test_inputs_are_left_alone_and_may_be_read_only():
+    picture = np.random.default_rng(1).uniform(1, 100, (20, 30, 3)).astype(np.float32)
+    before = picture.copy()
+    picture.setflags(write=False)
+    fechner.luminance(picture)
+    fechner.tone_map(picture, "ferwerda96")
+    fechner.difference(picture, picture)
+    np.testing.assert_array_equal(picture, before)
+
+
+def test_rows_and_columns_are_not_swapped():
+    rgb = np.zeros((5, 9, 3), np.float32)
+    rgb[1, 7] = 10
+    assert np.argwhere(fechner.luminance(rgb)).tolist() == [[1, 7]]
+    assert fechner.threshold_map(np.full((5, 9), 10.0)).shape == (5, 9)
+
+
+def colour(shape):
+    return np.ones(shape, np.float32)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: fechner.threshold_map(np.where(np.eye(24, 32), np.nan, GREY)), r"holds NaN at pixel \(0, 0\)"),
+        (lambda: fechner.threshold_map(np.full((4, 4), np.inf)), "holds inf"),
+        (lambda: fechner.threshold_map(-GREY), "must be finite and not negative"),
+        (lambda: fechner.threshold_map(np.zeros((0, 4))), "display_luminance has no pixels"),
+        (lambda: fechner.threshold_map(np.zeros(4)), r"shape \[4\]; it must have \(height, width\)"),
+        (lambda: fechner.threshold_map(colour((4, 4, 3))), r"must have \(height, width\)"),
+        (lambda: fechner.threshold_map(None), "must have"),
+        (lambda: fechner.threshold_map("picture"), "display_luminance is no array of numbers"),
+        (lambda: fechner.threshold_map([[1.0, 2.0], [3.0]]), "display_luminance is no array of numbers"),
+        (lambda: fechner.threshold_map(GREY, GREY[1:]), "guide variance is 32×23 pixels, but 32×24 are needed"),
+        (lambda: fechner.threshold_map(GREY, csf="eagle"), "no contrast sensitivity function is called `eagle`"),
+        (lambda: fechner.threshold_map(GREY).predicted_visibility(GREY.T), "24×32 pixels, but 32×24 are needed"),
+        (lambda: fechner.threshold_map(GREY).measured_visibility(GREY[:, 1:]), "31×24 pixels, but 32×24"),
+        (lambda: fechner.threshold_map(GREY).allocate(GREY[1:]), "but 32×24 are needed"),
+        (lambda: fechner.threshold_map(GREY).allocate(np.full_like(GREY, np.nan)), "NaN"),
+        (lambda: fechner.threshold_map(GREY).allocate(GREY, visibility=0), "visibility is 0"),
+        (lambda: fechner.threshold_map(GREY).allocate(GREY, visibility=float("nan")), "visibility is NaN"),
+        (lambda: fechner.threshold_map(GREY).allocate(GREY, budget=-1), "budget is -1"),
+        (lambda: fechner.threshold_map(GREY).allocate(GREY, min_samples=9, max_samples=2), "samples"),
+        (lambda: fechner.luminance(GREY), r"must have \(height, width, 3\)"),
+        (lambda: fechner.luminance(colour((4, 4, 4))), r"must have \(height, width, 3\)"),
+        (lambda: fechner.luminance(colour((4, 0, 3))), "rgb has no pixels"),
+        (lambda: fechner.difference(GREY, GREY[1:]), "test picture is 32×23 pixels"),
+        (lambda: fechner.difference(colour((4, 4, 3)), colour((4, 5, 3))), "test is 5×4 pixels, but 4×4 are needed"),
+        (lambda: fechner.difference(colour((4, 4, 3)), GREY), r"must have \(height, width, 3\)"),
+        (lambda: fechner.difference(GREY * np.nan, GREY), "NaN"),
+        (lambda: fechner.tone_map(colour((4, 4, 3)) * np.nan, "ward94"), "NaN; light must be finite"),
+        (lambda: fechner.tone_map(colour((4, 4, 3)), "darkroom"), "no tone operator is called `darkroom`; there are:"),
+        (lambda: fechner.tone_map(colour((4, 4, 3)), "agx", exposure_stops=float("inf")), "exposure_stops is inf"),
+        (lambda: fechner.tone_map(GREY, "agx"), r"must have \(height, width, 3\)"),
+        (lambda: fechner.fit_tone(GREY, "agx").map(colour((4, 4, 3))), "4×4 pixels, but 32×24 are needed"),
+        (lambda: fechner.fit_tone(GREY, "agx", gaze=(32, 0)), "lies outside the picture"),
+        (lambda: fechner.fit_tone(GREY, "agx").display_variance(GREY, GREY[1:]), "variance is 32×23 pixels"),
+        (lambda: fechner.Display("television of 1936"), "no display preset is called `television of 1936`; there are:"),
+        (lambda: fechner.Viewing("television of 1936"), "no display preset"),
+        (lambda: fechner.Display(pixels_per_degree=0), "pixels_per_degree is 0; it must be between 1 and 1000"),
+        (lambda: fechner.Display(white_cd_m2=float("nan")), "white_cd_m2 is NaN"),
+        (lambda: fechner.Display(eotf="gamma"), "no transfer function is called `gamma`"),
+        (lambda: fechner.Observer(sensitivity=-1), "sensitivity is -1"),
+        (lambda: fechner.Observer(glare_age_years=900), "age_years is 900"),
+        (lambda: fechner.contrast_sensitivity(4, 100, csf=""), "no contrast sensitivity function"),
+        (
+            lambda: fechner.denoise_guide(colour((4, 4, 3)), GREY, colour((4, 4, 3)), colour((4, 4, 3)), GREY),
+            "variance is 32×24 pixels, but 4×4 are needed",
+        ),
+    ],
+)
+def test_what_cannot_be_answered_is_a_value_error(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 7), (3, 1), (2, 2)])
+def test_the_smallest_pictures_have_answers(shape):
+    picture = np.full(shape, 20, np.float32)
+    thresholds = fechner.threshold_map(picture)
+    assert np.isfinite(thresholds.allowed_standard_error()).all()
+    assert np.isfinite(thresholds.measured_visibility(picture)).all()
+    assert np.isfinite(thresholds.allocate(picture).samples).all()
+    assert np.isfinite(fechner.difference(picture, picture + 1).worst_visibility)
+    for name in fechner.tone_operators():
+        rgb = np.full((*shape, 3), 20, np.float32)
+        for local in (False, True):
+            assert np.isfinite(fechner.tone_map(rgb, name, local=local)).all()
+
+
+def test_broken_error_is_counted_as_the_crate_says():
+    thresholds = fechner.threshold_map(GREY)
+    broken = np.ones_like(GREY)
+    broken[3, 4] = np.nan
+    assert np.isinf(thresholds.predicted_visibility(broken)[3, 4])
+    assert np.isfinite(thresholds.measured_visibility(broken)).all()
+
+
+def test_threads_run_while_the_crate_works():
+    picture = np.random.default_rng(2).uniform(1, 200, (1080, 1920)).astype(np.float32)
+    state = {"counted": 0, "stop": False}
+
+    def count():
+        while not state["stop"]:
+            state["counted"] += 1
+            time.sleep(0)
+
+    counter = threading.Thread(target=count)
+    counter.start()
+    try:
+        while state["counted"] == 0:
+            time.sleep(0.001)
+        # Between these two lines Python's lock is either let go or held: nothing is timed.
+        before = state["counted"]
+        fechner.threshold_map(picture)
+        during = state["counted"] - before
+    finally:
+        state["stop"] = True
+        counter.join()
+    # Held, the lock changes hands at most at the call's two ends.
+    assert during > 100
