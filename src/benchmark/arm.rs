@@ -34,7 +34,7 @@ pub enum Arm {
     Default,
     /// The loop asked for v\* and not tuned: what it promises (99.9 % of the picture) against what it delivers.
     AsAsked,
-    /// Converged variance, thresholds of the reference, convex optimum; its target searched.
+    /// Converged variance, thresholds of the reference, convex optimum for 99 % of the picture; its target searched.
     Oracle,
 }
 

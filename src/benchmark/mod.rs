@@ -135,7 +135,7 @@ pub fn bounds(settings: &BenchSettings, say: &dyn Fn(&str)) -> Result<Vec<Bound>
                 scene: subject.name.clone(),
                 coverage,
                 uniform: uniform_samples(&subject, &truth, &variance, coverage),
-                optimum: least_samples(&subject, &truth, &variance, coverage)?,
+                optimum: least_samples(&truth, &variance, subject.visibility, coverage)?.mean(),
             });
         }
     }

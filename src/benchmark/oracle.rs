@@ -41,28 +41,18 @@ pub(crate) fn uniform_samples(subject: &Subject, truth: &Truth, variance: &Plane
     (hardest / subject.visibility).powi(2)
 }
 
-/// The least mean samples a pixel that any rule could take for v\* on this share of the picture: the pixels that uniform
+/// The least samples a pixel that any rule could take for a visibility on this share of the picture: the pixels that uniform
 /// sampling would leave above it are left above it.
-pub(crate) fn least_samples(subject: &Subject, truth: &Truth, variance: &Plane, coverage: f64) -> Result<f64> {
+pub(crate) fn least_samples(truth: &Truth, variance: &Plane, visibility: f64, coverage: f64) -> Result<Plane> {
     let seen = truth.thresholds.achromatic.predicted_visibility(variance);
     let hardest = seen.quantile(coverage) as f32;
     // Far above, not infinite: the solver's multipliers stay finite.
     let tolerance = seen.map(|v| if v > hardest { 30.0 } else { 1.0 });
-    let counts = optimal_counts(truth, variance, subject.visibility, Some(&tolerance))?;
-    Ok(counts.mean())
-}
-
-/// The cheapest counts for a visibility everywhere.
-pub(crate) fn optimal_samples(truth: &Truth, variance: &Plane, visibility: f64) -> Result<Plane> {
-    optimal_counts(truth, variance, visibility, None)
-}
-
-fn optimal_counts(truth: &Truth, variance: &Plane, visibility: f64, tolerance: Option<&Plane>) -> Result<Plane> {
     let allocation = allocate(&AllocationProblem {
         variance_per_sample: variance,
         thresholds: &truth.thresholds.achromatic,
         cost: &Plane::filled(variance.width(), variance.height(), 1.0),
-        tolerance,
+        tolerance: Some(&tolerance),
         visibility,
         min_samples: f64::from(2 * PILOT_SAMPLES),
         max_samples: f64::from(DEFAULT_MAX_SAMPLES),

@@ -2,7 +2,7 @@
 
 use super::arm::Arm;
 use super::metrics::{Metrics, measure};
-use super::oracle::{displayed_variance, optimal_samples, trace_counts, uniform_samples};
+use super::oracle::{displayed_variance, least_samples, trace_counts, uniform_samples};
 use super::pictures::{read_pictures, write_pictures};
 use super::record::ScenePictures;
 use super::reference::{Reference, read_plane, write_plane};
@@ -173,7 +173,7 @@ impl<'a> ArmRunner<'a> {
 
     fn make_oracle(&mut self, seed: u64, visibility: f64) -> Result<Made> {
         let variance = self.variance()?.clone();
-        let counts = optimal_samples(self.truth, &variance, visibility)?;
+        let counts = least_samples(self.truth, &variance, visibility, 0.99)?;
         let started = Instant::now();
         let film = trace_counts(self.subject, &counts, seed + 1);
         Ok(Made { film, seconds: started.elapsed().as_secs_f64(), seconds_perception: 0.0, audit_ratio: None })

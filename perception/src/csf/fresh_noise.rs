@@ -51,9 +51,9 @@ impl FreshNoise {
     /// use fechner_perception::csf::{CastleCsf, ContrastSensitivity, FrameTiming, FreshNoise};
     /// let timing = FrameTiming { frames_per_second: 60.0, persistence: 1.0 };
     /// let (fresh, still) = (FreshNoise::new(1.0, timing)?, CastleCsf::new(1.0)?);
-    /// // At 60 frames a second fine noise may have more than nine times the variance.
+    /// // At 60 frames a second fine noise may have more than four times the variance.
     /// let ratio = still.sensitivity(16.0, 100.0) / fresh.sensitivity(16.0, 100.0);
-    /// assert!(ratio * ratio > 7.0);
+    /// assert!(ratio * ratio > 4.0);
     /// # Ok::<(), fechner_perception::Error>(())
     /// ```
     pub fn new(area_deg2: f64, timing: FrameTiming) -> Result<Self, Error> {

@@ -52,7 +52,7 @@ fn golden_curves() {
     );
     assert!(matches!(linear, Adjustment::Curve(Curve { passes: 7, .. })), "{linear}");
     // Where the published passes stop; ours go on from there and leave a little of the display's range, which makes
-    // it up to 3 % darker here.
+    // it 5 % darker here at 100 cd/m².
     let mut histogram = log_normal(0.5);
     let stop = histogram.trim_as_published(DISPLAY, Ceiling::Human).unwrap();
     let human = Adjustment::Curve(histogram.curve(DISPLAY, stop.before - stop.trimmed, stop.passes));
@@ -60,7 +60,7 @@ fn golden_curves() {
     let settled = log_normal(0.5).adjust(DISPLAY, Ceiling::Human);
     for scene in [1.0, 10.0, 100.0] {
         let ratio = settled.display_cd_m2(scene) / human.display_cd_m2(scene);
-        assert!((0.96..1.01).contains(&ratio), "{scene}: {ratio}");
+        assert!((0.95..1.01).contains(&ratio), "{scene}: {ratio}");
     }
     let wide = log_normal(0.7).adjust(DISPLAY, Ceiling::Linear);
     check(&wide, &[(1.0, 1.447_94), (3.0, 2.999_15), (10.0, 10.0), (30.0, 30.24), (100.0, 69.063_87)]);
