@@ -16,9 +16,14 @@ fn spacing(x: u32, y: u32) -> u32 {
 
 /// One sample for every pixel, coarse grids first.
 pub(super) fn draft_plan(width: u32, height: u32) -> SamplePlan {
-    let one = |pixel| BlockWork { samples: 1, ..BlockWork::whole(pixel, Half::A, 0) };
-    let mut plan = SamplePlan { blocks: (0..width * height).map(one).collect() };
-    order(&mut plan, width);
+    let mut plan = SamplePlan::default();
+    for step in [COARSEST, 8, 4, 2, 1] {
+        for y in (0..height).step_by(step as usize) {
+            let row = (0..width).step_by(step as usize).filter(|&x| spacing(x, y) == step);
+            let one = |x| BlockWork { samples: 1, ..BlockWork::whole(y * width + x, Half::A, 0) };
+            plan.blocks.extend(row.map(one));
+        }
+    }
     plan
 }
 

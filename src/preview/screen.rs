@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 
 /// Time between frames, at least.
 const FRAME_INTERVAL: Duration = Duration::from_millis(100);
-/// For so long after a start frames may take a tenth of the time, then a fortieth: a hundredth of them shows a change.
+/// For so long after a start frames may take a tenth of the time, then a fortieth.
 const LIVELY: Duration = Duration::from_secs(5);
 
 /// What the last look at the film saw.

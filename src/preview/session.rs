@@ -2,9 +2,11 @@
 
 mod pace;
 mod saving;
+mod telling;
+mod watch;
 
 use super::coarse::{draft_plan, order};
-use super::command::{Command, Phase, SavedFormat, Status};
+use super::command::{Command, Phase, SavedFormat};
 use super::orbit::Held;
 use super::screen::{Looked, Scenery, Screen};
 use super::shared::Shared;
@@ -12,16 +14,16 @@ use super::{Host, Job};
 use crate::adaptive::judge::{Judgement, judge};
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::state::RenderState;
-use crate::adaptive::{Directive, LastLook, Monitor, Progress, StopReason, run as run_loop, visible_share};
+use crate::adaptive::{LastLook, Progress, StopReason, run as run_loop};
 use crate::film::Film;
 use crate::integrator::{Crop, PathTracer, SamplePlan};
 use crate::scene::Camera;
-use fechner_perception::tone::{SavedTone, operator_names};
 use pace::Pace;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
+use watch::{Moving, Watch};
 
 /// Renders and obeys until the preview closes. A defect that panics ends the picture, not the preview: a saved scene file
 /// starts it again.
@@ -74,6 +76,8 @@ struct Session<'a> {
     job: Job,
     live: Live,
     held: Held,
+    /// Whether the camera is another than the tracer's.
+    has_moved: bool,
     tracer: PathTracer,
     settings: LoopSettings,
     phase: Phase,
@@ -100,6 +104,7 @@ impl<'a> Session<'a> {
             host,
             shared,
             held: at_home(&job.scene.camera),
+            has_moved: false,
             tracer,
             phase: Phase::Drafting,
             draft_left: SamplePlan::default(),
@@ -124,6 +129,11 @@ impl<'a> Session<'a> {
             for command in self.shared.take_commands() {
                 self.obey(command);
             }
+            // Once for all movements that came: a restart for each would fall behind a hand that drags.
+            if std::mem::take(&mut self.has_moved) {
+                self.tracer.set_camera(&self.held.camera);
+                self.restart();
+            }
             match self.phase {
                 Phase::Drafting => self.trace_draft(),
                 Phase::Rendering => self.render(),
@@ -142,7 +152,6 @@ impl<'a> Session<'a> {
         self.draft_left = draft_plan(width, height);
         self.draft_left.blocks.reverse();
         self.state = RenderState::new(width, height, &self.settings.limits);
-        self.order_pilot();
         self.phase = Phase::Drafting;
         self.last_look = None;
         self.progress = None;
@@ -166,6 +175,7 @@ impl<'a> Session<'a> {
         self.tracer.trace(&batch, &mut self.draft, &|_| {});
         self.pace.done(batch.samples());
         if self.draft_left.blocks.is_empty() {
+            self.order_pilot();
             self.phase = Phase::Rendering;
         }
         if self.screen.is_due() || self.phase == Phase::Rendering {
@@ -255,13 +265,11 @@ impl<'a> Session<'a> {
             Command::Camera { movement } => {
                 self.find_pivot();
                 self.held.moved(movement);
-                self.tracer.set_camera(&self.held.camera);
-                self.restart();
+                self.has_moved = true;
             }
             Command::CameraHome => {
                 self.held = at_home(&self.job.scene.camera);
-                self.tracer.set_camera(&self.held.camera);
-                self.restart();
+                self.has_moved = true;
             }
             Command::Reload => self.reload(),
         }
@@ -321,7 +329,7 @@ impl<'a> Session<'a> {
     fn find_pivot(&mut self) {
         let film = if self.state.film.total_samples() > 0 { &self.state.film } else { &self.draft };
         let middle = (film.height() / 2 * film.width() + film.width() / 2) as usize;
-        let is_whole = self.draft_left.blocks.is_empty();
+        let is_whole = self.draft_left.blocks.is_empty() && !self.has_moved;
         if let Some(depth) = film.guides().get(middle).map(|guide| guide.depth).filter(|d| is_whole && d.is_normal()) {
             self.held.pivot_distance = depth;
         }
@@ -351,42 +359,6 @@ impl<'a> Session<'a> {
             is_at_rest: matches!(self.phase, Phase::Paused | Phase::Stopped),
         };
         self.screen.show(scenery, self.shared);
-    }
-
-    fn tell(&self) {
-        self.tell_of(&self.state);
-    }
-
-    fn tell_of(&self, state: &RenderState) {
-        publish(&self.status(state), self.shared);
-    }
-
-    fn status(&self, state: &RenderState) -> Status {
-        let target = self.settings.limits.visibility;
-        let mut status = Status {
-            kind: "status",
-            scene: self.job.scene.name.clone(),
-            phase: self.phase,
-            reason: self.last_look.as_ref().map(|look| in_words(look.stop_reason)),
-            width: state.film.width(),
-            height: state.film.height(),
-            total_samples: 0,
-            mean_samples: 0.0,
-            samples_a_second: 0.0,
-            seconds: 0.0,
-            seconds_left: None,
-            visible_share: self.last_look.as_ref().map(|look| visible_share(&look.judgement, target)),
-            target,
-            rung: None,
-            exposure: self.live.exposure.or(self.job.record.exposure_stops),
-            operator: self.live.operator.clone().unwrap_or_else(|| self.job.record.operator.clone()),
-            operators: operator_names(),
-            camera: self.held.to_toml(),
-            error: self.error.clone(),
-            note: self.note.clone(),
-        };
-        count(&mut status, state, self.progress.as_ref());
-        status
     }
 }
 
@@ -425,95 +397,4 @@ fn begin_anew(state: &mut RenderState, settings: &LoopSettings) {
         std::mem::replace(state, nothing);
     let fresh = RenderState::of_film(film, most_samples);
     *state = RenderState { inflation, plans, passes, seconds_total, seconds_perception, seconds_allocation, ..fresh };
-}
-
-fn count(status: &mut Status, state: &RenderState, progress: Option<&Progress>) {
-    let pixels = f64::from(state.film.width()) * f64::from(state.film.height());
-    status.total_samples = state.film.total_samples();
-    status.mean_samples = status.total_samples as f64 / pixels.max(1.0);
-    status.seconds = state.seconds_total;
-    status.samples_a_second = status.total_samples as f64 / state.seconds_total.max(1e-3);
-    if let Some(progress) = progress.filter(|_| status.phase != Phase::Stopped) {
-        status.visible_share = Some(progress.visible_share);
-        status.rung = Some(progress.rung);
-        let since = status.total_samples as f64 - progress.mean_samples * progress.pixels;
-        let left = (progress.remaining_samples - since).max(0.0) / status.samples_a_second.max(1.0);
-        status.seconds_left = Some(left).filter(|left| left.is_finite());
-    }
-}
-
-fn publish(status: &Status, shared: &Shared) {
-    if let Ok(text) = serde_json::to_string(status) {
-        shared.publish_status(text);
-    }
-}
-
-fn in_words(reason: StopReason) -> &'static str {
-    match reason {
-        StopReason::Visibility => "nothing more can be seen at this target",
-        StopReason::Time => "the time is up",
-        StopReason::Samples => "the samples are spent",
-        StopReason::MaxSamples => "what can be seen is in pixels that have the most samples allowed",
-        StopReason::Plans => "the plans are done",
-        StopReason::Rule => "the rule is satisfied",
-        StopReason::Interrupted => "as asked",
-        StopReason::Merged => "merged",
-    }
-}
-
-/// Shows the loop's film between batches, and leaves the loop when somebody asks for something.
-struct Watch<'a> {
-    shared: &'a Shared,
-    settings: &'a LoopSettings,
-    draft: &'a Film,
-    moving: Mutex<Moving<'a>>,
-}
-
-struct Moving<'a> {
-    screen: &'a mut Screen,
-    pace: &'a mut Pace,
-    progress: &'a mut Option<Progress>,
-    status: Status,
-}
-
-impl Watch<'_> {
-    fn show(&self, moving: &mut Moving<'_>, state: &RenderState) {
-        let tone: Option<&SavedTone> = state.tone.as_ref();
-        let Self { draft, settings, .. } = *self;
-        moving.screen.show(Scenery { film: &state.film, draft, tone, settings, is_at_rest: false }, self.shared);
-        moving.status.note = None;
-        count(&mut moving.status, state, moving.progress.as_ref());
-        publish(&moving.status, self.shared);
-    }
-}
-
-impl Monitor for Watch<'_> {
-    fn looked(&self, progress: &Progress) {
-        *self.moving.lock().unwrap_or_else(PoisonError::into_inner).progress = Some(*progress);
-    }
-
-    fn judged(&self, state: &RenderState, judgement: &Judgement) {
-        let mut moving = self.moving.lock().unwrap_or_else(PoisonError::into_inner);
-        moving.screen.looked = Some(Arc::new(Looked::of(judgement)));
-        self.show(&mut moving, state);
-        moving.pace.begin();
-    }
-
-    fn samples_done(&self, samples: u64) {
-        self.moving.lock().unwrap_or_else(PoisonError::into_inner).pace.count(samples);
-    }
-
-    fn most_samples_a_batch(&self) -> u64 {
-        self.moving.lock().unwrap_or_else(PoisonError::into_inner).pace.samples()
-    }
-
-    fn between_batches(&self, state: &RenderState) -> Directive {
-        let mut moving = self.moving.lock().unwrap_or_else(PoisonError::into_inner);
-        moving.pace.counted();
-        if moving.screen.is_due() {
-            self.show(&mut moving, state);
-        }
-        moving.pace.begin();
-        if self.shared.has_news() { Directive::Leave } else { Directive::GoOn }
-    }
 }
