@@ -23,5 +23,6 @@ pub mod geometry;
 pub mod integrator;
 pub mod light;
 pub mod output;
+pub mod preview;
 pub mod sampler;
 pub mod scene;

@@ -16,7 +16,7 @@ pub mod statistics;
 pub use monitor::{Directive, Monitor, Progress, Quiet};
 
 use crate::film::Film;
-use crate::integrator::{Crop, PathTracer, SamplePlan};
+use crate::integrator::{BlockWork, Crop, PathTracer, SamplePlan};
 use audit::{Audit, audit};
 use fechner_perception::Plane;
 use judge::{JudgeError, Judgement, judge};
@@ -101,11 +101,37 @@ impl Rendered {
     }
 }
 
+/// A render as its loop left it.
+#[derive(Debug)]
+pub struct Ended {
+    /// What a render to another limit would go on from.
+    pub state: RenderState,
+    /// The last look and why the render ended; `None` if it was left without a look.
+    pub last_look: Option<LastLook>,
+}
+
+/// Why a render ended, and what it was like then.
+#[derive(Debug)]
+pub struct LastLook {
+    /// What was seen.
+    pub judgement: Judgement,
+    /// Why it ended.
+    pub stop_reason: StopReason,
+}
+
 /// What to do after a look.
 #[derive(Debug)]
 enum Step {
     Trace(SamplePlan),
     Stop(StopReason),
+}
+
+/// How far the tracing of what is planned came.
+#[derive(Debug)]
+enum Traced {
+    Everything,
+    UntilLimit(StopReason),
+    UntilLeft,
 }
 
 /// A render under way.
@@ -137,10 +163,35 @@ pub fn resume(
     state: RenderState,
     monitor: &dyn Monitor,
 ) -> Result<Rendered, JudgeError> {
+    let Ended { state, last_look } = run(tracer, settings, state, monitor)?;
+    let LastLook { judgement, stop_reason } = match last_look {
+        Some(last_look) => last_look,
+        None => {
+            let judgement = judge(&state.film, settings, state.inflation)?;
+            LastLook { judgement, stop_reason: StopReason::Interrupted }
+        }
+    };
+    Ok(Rendered::new(state, judgement, stop_reason))
+}
+
+/// [`resume`] for somebody who may leave the render with [`Directive::Leave`] and go on from its state.
+///
+/// # Errors
+/// Only if the perception model refuses the picture, which would be a defect of ours.
+pub fn run(
+    tracer: &PathTracer,
+    settings: &LoopSettings,
+    state: RenderState,
+    monitor: &dyn Monitor,
+) -> Result<Ended, JudgeError> {
     let mut render = Loop::new(tracer, settings, state);
     let mut last_look: Option<Judgement> = None;
     loop {
-        let ended = render.trace_pending(monitor);
+        let ended = match render.trace_pending(monitor) {
+            Traced::Everything => None,
+            Traced::UntilLimit(reason) => Some(reason),
+            Traced::UntilLeft => return Ok(Ended { state: render.state, last_look: None }),
+        };
         let look = Instant::now();
         let mut judgement = match last_look.take() {
             Some(earlier) if ended.is_none() && render.exposure_holds() => earlier,
@@ -153,6 +204,7 @@ pub fn resume(
         render.state.seconds_perception += look.elapsed().as_secs_f64();
         render.state.passes += 1;
         monitor.looked(&progress(&render, &judgement, &step));
+        monitor.judged(&render.state, &judgement);
         match step {
             Step::Trace(plan) => {
                 let film = &render.state.film;
@@ -175,20 +227,23 @@ impl<'a> Loop<'a> {
 
     /// Traces what is planned, and says why the render ends if it does. A plan that was begun is finished first, unless
     /// the monitor stops it.
-    fn trace_pending(&mut self, monitor: &dyn Monitor) -> Option<StopReason> {
+    fn trace_pending(&mut self, monitor: &dyn Monitor) -> Traced {
         loop {
             if self.state.traced_blocks == 0
                 && let Some(reason) = self.limit_reached()
             {
-                return Some(reason);
+                return Traced::UntilLimit(reason);
             }
-            let blocks = &self.state.pending.front()?.blocks;
-            while let rest @ [_, ..] = &blocks[self.state.traced_blocks..] {
+            let Some(plan) = self.state.pending.front() else { return Traced::Everything };
+            while let rest @ [_, ..] = &plan.blocks[self.state.traced_blocks..] {
+                let batch = beginning(rest, monitor.most_samples_a_batch());
                 let progress = |samples| monitor.samples_done(samples);
-                self.state.traced_blocks += self.tracer.trace_batch(rest, &mut self.state.film, &progress);
+                self.state.traced_blocks += self.tracer.trace_batch(batch, &mut self.state.film, &progress);
                 self.state.seconds_total = self.seconds_before + self.resumed_at.elapsed().as_secs_f64();
-                if monitor.between_batches(&self.state) == Directive::Stop {
-                    return Some(StopReason::Interrupted);
+                match monitor.between_batches(&self.state) {
+                    Directive::GoOn => {}
+                    Directive::Stop => return Traced::UntilLimit(StopReason::Interrupted),
+                    Directive::Leave => return Traced::UntilLeft,
                 }
             }
             self.state.pending.pop_front();
@@ -219,12 +274,7 @@ impl<'a> Loop<'a> {
     }
 
     /// Tells the last state, and looks once more where the rule did not need to.
-    fn finish(
-        mut self,
-        judgement: Judgement,
-        reason: StopReason,
-        monitor: &dyn Monitor,
-    ) -> Result<Rendered, JudgeError> {
+    fn finish(mut self, judgement: Judgement, reason: StopReason, monitor: &dyn Monitor) -> Result<Ended, JudgeError> {
         let judgement = match self.settings.sampling {
             Sampling::Rival(_) => judge(&self.state.film, self.settings, self.state.inflation)?,
             Sampling::Adaptive | Sampling::Uniform => judgement,
@@ -232,7 +282,7 @@ impl<'a> Loop<'a> {
         self.state.seconds_total = self.seconds_before + self.resumed_at.elapsed().as_secs_f64();
         self.state.tone = Some(judgement.tone.save());
         monitor.ended(&self.state);
-        Ok(Rendered::new(self.state, judgement, reason))
+        Ok(Ended { state: self.state, last_look: Some(LastLook { judgement, stop_reason: reason }) })
     }
 
     /// Decides what comes next, leaving rungs of the ladder that are reached. An audit may make `judgement` stricter.
@@ -341,6 +391,17 @@ impl<'a> Loop<'a> {
         let samples = self.state.film.total_samples();
         self.state.exposure.is_some_and(|exposure| samples < 2 * exposure.samples)
     }
+}
+
+/// The first blocks of at most so many samples in all, at least one.
+fn beginning(blocks: &[BlockWork], most_samples: u64) -> &[BlockWork] {
+    let mut samples = 0;
+    let within = |block: &&BlockWork| {
+        samples += u64::from(block.samples);
+        samples <= most_samples
+    };
+    let count = if most_samples == u64::MAX { blocks.len() } else { blocks.iter().take_while(within).count() };
+    &blocks[..count.max(1).min(blocks.len())]
 }
 
 /// Share of display white that one scene unit makes near black: the exposure that other renderers are told.

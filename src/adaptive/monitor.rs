@@ -1,5 +1,6 @@
 //! How a render tells what it does, and is told to stop.
 
+use super::judge::Judgement;
 use super::state::RenderState;
 
 /// How far a render is, told after each look.
@@ -30,14 +31,22 @@ pub enum Directive {
     GoOn,
     /// At once, with the picture so far.
     Stop,
+    /// At once and without another look: somebody goes on from the state, or throws it away.
+    Leave,
 }
 
 /// Is told how a render goes. Called from the render's own thread, except `samples_done`.
 pub trait Monitor: Sync {
     /// After each look at the picture.
     fn looked(&self, progress: &Progress);
+    /// After each look, what was seen.
+    fn judged(&self, _state: &RenderState, _judgement: &Judgement) {}
     /// While a plan is traced, from any thread.
     fn samples_done(&self, samples: u64);
+    /// Most samples of a batch, where somebody waits for the next moment between two. The picture does not depend on it.
+    fn most_samples_a_batch(&self) -> u64 {
+        u64::MAX
+    }
     /// About once a second, between batches of samples; a render that is resumed from this state makes the same picture.
     fn between_batches(&self, _state: &RenderState) -> Directive {
         Directive::GoOn

@@ -4,7 +4,7 @@ mod source;
 mod video;
 
 use super::console::{Console, duration_in_words};
-use super::render::{Quality, Size, check_memory, parse_size};
+use super::job::{Quality, Size, check_memory, parse_size};
 use super::report::Report;
 use super::seeing::{self, parse_positive};
 use anyhow::{Context, Result, bail};

@@ -7,6 +7,7 @@ mod compare;
 mod console;
 mod importance;
 mod info;
+mod job;
 mod keeper;
 mod merge;
 mod picture;
@@ -16,6 +17,7 @@ mod seeing;
 mod staging;
 mod threshold;
 mod tonemap;
+mod view;
 
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
@@ -33,6 +35,8 @@ struct CommandLine {
 enum Command {
     /// Render a scene until nothing more can be seen, or until a limit.
     Render(Box<render::RenderArguments>),
+    /// Show a render in a browser while it is made: layers, live exposure and camera, stop, save.
+    View(Box<view::ViewArguments>),
     /// Render the frames of a scene that moves, each until nothing more can be seen of its noise in motion.
     Animate(Box<animate::AnimateArguments>),
     /// Measure what adaptive sampling saves against uniform sampling and other renderers' rules.
@@ -56,6 +60,7 @@ enum Command {
 pub(crate) fn run() -> anyhow::Result<ExitCode> {
     match CommandLine::parse().command {
         Command::Render(arguments) => render::run(&arguments)?,
+        Command::View(arguments) => view::run(&arguments)?,
         Command::Animate(arguments) => animate::run(&arguments)?,
         Command::Bench(arguments) => bench::run(&arguments)?,
         Command::Compare(arguments) => return compare::run(&arguments),

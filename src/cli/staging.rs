@@ -9,7 +9,7 @@ use glam::Vec3;
 use std::path::PathBuf;
 
 /// What is put in the place of the scene's own.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(super) struct Staging {
     /// Surroundings instead of the scene's: a lat-long picture (.hdr, .exr, .png), sky:ELEVATION[,AZIMUTH[,TURBIDITY]] in
     /// degrees, or constant:CD_M2.

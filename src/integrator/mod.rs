@@ -17,7 +17,7 @@ use crate::film::{BlockSum, Film};
 use crate::geometry::World;
 use crate::light::Lights;
 use crate::sampler::{BlockKey, Half, Pixel, PixelFilter, Purpose, Sequence};
-use crate::scene::Scene;
+use crate::scene::{Camera, Scene};
 use glam::Vec2;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -166,6 +166,12 @@ impl PathTracer {
         let world = World::new(scene);
         let lights = Lights::new(&world);
         Self { world, lights, camera, moves, settings, absorbs, surface_tables }
+    }
+
+    /// Looks from elsewhere at the same scene. The scene that it was made from keeps its own camera.
+    pub fn set_camera(&mut self, camera: &Camera) {
+        self.camera = CameraRays::new(camera, self.settings.width, self.settings.height);
+        self.moves |= camera.motion.is_some();
     }
 
     /// The settings it was made with.

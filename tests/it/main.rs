@@ -17,6 +17,7 @@
 //! - `command_line`: the program as a user runs it
 //! - `checkpoint`: renders stopped, continued and merged against renders in one go
 //! - `kill`: the program, killed and resumed
+//! - `view`: the live preview, over its WebSocket
 //! - `tonemap`: HDR pictures for displays, one by one and over time
 
 mod adaptive_render;
@@ -38,3 +39,4 @@ mod references;
 mod scene_table;
 mod support;
 mod tonemap;
+mod view;

@@ -1,0 +1,385 @@
+//! What is rendered and how: the arguments that `render` and `view` share, so that both make the same picture.
+
+use super::console;
+use super::importance;
+use super::seeing::{self, parse_positive};
+use anyhow::{Context, bail};
+use clap::{Args, ValueEnum};
+use fechner::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, RivalRule, Sampling};
+use fechner::checkpoint::SettingsRecord;
+use fechner::integrator::{Crop, DEFAULT_MAX_DEPTH, TraceSettings};
+use fechner::output::rendered::Background;
+use fechner::sampler::{PixelFilter, Sequence};
+use fechner::scene::hash::ContentHash;
+use fechner::scene::{Scene, load};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// A scene and how to render it.
+#[derive(Clone, Debug, Args)]
+pub(super) struct JobArguments {
+    /// Scene: .toml, .gltf, .glb, .obj, .ply, .pbrt or .xml (Mitsuba).
+    scene: PathBuf,
+    /// Picture size.
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<Size>,
+    /// Trace only this part of the picture, with the samples it has in the whole.
+    #[arg(long, value_name = "X,Y,W,H", value_parser = parse_crop)]
+    crop: Option<Crop>,
+    /// Camera of the scene file, by name.
+    #[arg(long, value_name = "NAME")]
+    camera: Option<String>,
+    #[command(flatten)]
+    staging: super::staging::Staging,
+    /// Time in the scene's keyframes, in seconds.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
+    at: f64,
+
+    /// Stop when the remaining noise is at most this visible: 1 is at threshold.
+    #[arg(long, value_name = "V", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Until")]
+    visibility: Option<f64>,
+    /// The same, by name.
+    #[arg(long, value_enum, conflicts_with = "visibility", help_heading = "Until")]
+    quality: Option<Quality>,
+    /// Stop after this many seconds of rendering.
+    #[arg(long, value_name = "SECONDS", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Until")]
+    time: Option<f64>,
+    /// Stop at this mean number of samples a pixel.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Until")]
+    spp: Option<u32>,
+    /// Most samples of one pixel.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(16..), help_heading = "Until")]
+    max_spp: Option<u32>,
+    /// Stop after this many plans: repeats a render that ended by --time.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Until")]
+    plans: Option<u32>,
+
+    /// How samples are spread.
+    #[arg(long, value_enum, default_value = "adaptive", help_heading = "Sampling")]
+    sampling: SamplingChoice,
+    /// Threshold at which --sampling relative and variance stop.
+    #[arg(long, value_name = "X", value_parser = parse_positive, allow_negative_numbers = true, default_value_t = 0.01, help_heading = "Sampling")]
+    noise_threshold: f64,
+    /// How --sampling adaptive finds counts.
+    #[arg(long, value_enum, default_value = "convex", help_heading = "Sampling")]
+    allocation: AllocationChoice,
+    /// Scale samples whose largest channel is above X scene units down to it. Darkens the picture where light is rare.
+    #[arg(long, value_name = "X", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Sampling")]
+    clamp: Option<f64>,
+    /// Most scattering events of a path.
+    #[arg(long, value_name = "N", help_heading = "Sampling")]
+    max_depth: Option<u32>,
+    /// Pixel filter.
+    #[arg(long, value_enum, default_value = "gaussian", help_heading = "Sampling")]
+    filter: FilterChoice,
+    /// How the samples of neighbouring pixels relate.
+    #[arg(long, value_enum, default_value = "per-pixel", help_heading = "Sampling")]
+    sequence: SequenceChoice,
+    /// Picture whose values multiply the thresholds: 1 changes nothing, 2 lets twice the noise stand, 0.5 half of it.
+    /// EXR or HDR as it stands, PNG from 0 to 1; of the picture's shape. Visibilities are told under it.
+    #[arg(long, value_name = "MAP", help_heading = "Sampling")]
+    importance: Option<PathBuf>,
+    /// Seed of all random numbers.
+    #[arg(long, default_value_t = 0, help_heading = "Sampling")]
+    seed: u64,
+
+    /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file.
+    #[arg(long, value_name = "NAME|FILE", help_heading = "Seeing")]
+    display: Option<String>,
+    /// Threshold model that drives the sampling: csf-bands, tvi, ramasubramanian, yee, bolin-meyer.
+    #[arg(long, value_name = "NAME", default_value = "csf-bands", help_heading = "Seeing")]
+    model: String,
+    /// Area in deg² over which the eye sums contrast.
+    #[arg(long, value_name = "DEG2", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Seeing")]
+    csf_area: Option<f64>,
+    /// Luminance in cd/m² of RGB (1, 1, 1), in place of the scene's.
+    #[arg(long, value_name = "CD_M2", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Seeing")]
+    nits_per_unit: Option<f64>,
+
+    /// Leave out what surrounds the scene and write alpha: straight in PNG, premultiplied in EXR.
+    #[arg(long, help_heading = "Picture")]
+    transparent: bool,
+    /// Tone operator.
+    #[arg(long, value_name = "NAME", help_heading = "Picture")]
+    operator: Option<String>,
+    /// Exposure correction in stops.
+    #[arg(long, value_name = "STOPS", allow_negative_numbers = true, help_heading = "Picture")]
+    exposure: Option<f64>,
+
+    /// Threads; the picture does not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..1024), help_heading = "Running")]
+    threads: Option<u32>,
+}
+
+/// A scene that was loaded, and all that the arguments and it ask for.
+pub(super) struct Prepared {
+    pub(super) scene: Scene,
+    pub(super) trace: TraceSettings,
+    pub(super) record: SettingsRecord,
+    pub(super) settings: LoopSettings,
+}
+
+impl JobArguments {
+    /// The scene file.
+    pub(super) fn scene_file(&self) -> &Path {
+        &self.scene
+    }
+
+    /// The scene's name in reports.
+    pub(super) fn scene_name(&self) -> String {
+        self.scene.display().to_string()
+    }
+
+    /// The seed of all random numbers.
+    pub(super) fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// What stands where no surface covers the picture.
+    pub(super) fn background(&self) -> Background {
+        if self.transparent { Background::Transparent } else { Background::Shown }
+    }
+
+    /// Threads of the render's own.
+    pub(super) fn thread_pool(&self) -> anyhow::Result<rayon::ThreadPool> {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(self.threads.unwrap_or(0) as usize)
+            .thread_name(|i| format!("render-{i}"))
+            .build()
+            .context("the threads could not be started")
+    }
+
+    /// Loads the scene and reads everything else that is named.
+    pub(super) fn prepare(&self) -> anyhow::Result<Prepared> {
+        let options = load::LoadOptions {
+            camera: self.camera.clone(),
+            frame_time: self.at,
+            environment_follows: self.staging.has_environment(),
+            on_texture: Some(console::texture_decoded),
+        };
+        let mut scene = load::load(&self.scene, &options)?;
+        self.staging.apply(&mut scene, self.nits_per_unit)?;
+        for note in &scene.notes {
+            eprintln!("note: {note}");
+        }
+        let size = self.size.unwrap_or(Size { width: scene.film.width, height: scene.film.height });
+        check_memory(size)?;
+        let trace = trace_settings(self, size)?;
+        let mut record = settings_record(self, &scene)?;
+        let mut settings = record.loop_settings(limits(self, &scene, record.sampling))?;
+        if let Some(path) = &self.importance {
+            if matches!(settings.sampling, Sampling::Rival(_)) {
+                bail!("--importance multiplies thresholds, and this --sampling has none: use adaptive or uniform");
+            }
+            let map = importance::read(path, (size.width as usize, size.height as usize), trace.film_area())?;
+            record.importance = Some(ContentHash::of_values(map.values()));
+            settings.importance = Some(map);
+        }
+        if trace.filter.is_signed() && settings.sampling != Sampling::Uniform {
+            bail!(
+                "--filter mitchell has negative lobes, whose scatter is not the picture's noise: adaptive sampling cannot \
+                 judge it; use --sampling uniform, or the filter blackman-harris"
+            );
+        }
+        Ok(Prepared { scene, trace, record, settings })
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Size {
+    pub(super) width: u32,
+    pub(super) height: u32,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum Quality {
+    /// Visibility 4.
+    Draft,
+    /// Visibility 2.
+    Preview,
+    /// Visibility 1.
+    Good,
+    /// Visibility 0.5.
+    Final,
+    /// Visibility 0.25.
+    Critical,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum SamplingChoice {
+    /// Where the remaining error can be seen.
+    Adaptive,
+    /// The same everywhere.
+    Uniform,
+    /// Another renderer's rule, for comparison: difference of two estimates over the square root of brightness (Cycles).
+    Relative,
+    /// For comparison: relative standard error of each pixel.
+    Variance,
+    /// For comparison: a budget (--spp) spread by relative variance of 4×4 pixels (Tungsten).
+    Budget,
+}
+
+/// How the adaptive mode finds counts.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum AllocationChoice {
+    /// The cheapest counts for the visibility pooled over the eye's window.
+    Convex,
+    /// Each pixel by its own threshold.
+    Local,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum FilterChoice {
+    /// One pixel wide.
+    Box,
+    /// Gaussian of σ 0.45 pixels.
+    Gaussian,
+    /// Window 3 pixels wide: a little sharper.
+    BlackmanHarris,
+    /// Cubic with negative lobes: sharpest, with --sampling uniform only.
+    Mitchell,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum SequenceChoice {
+    /// Neighbouring pixels are independent.
+    PerPixel,
+    /// Samples are spread over neighbouring pixels as well, in Z-order.
+    ZOrder,
+}
+
+/// X,Y,W,H in pixels of the full picture.
+fn parse_crop(text: &str) -> Result<Crop, String> {
+    let wrong = || format!("\"{text}\" is not a crop; expected X,Y,WIDTH,HEIGHT in pixels, such as 100,50,64,64");
+    let numbers: Vec<u32> = text.split(',').map(|n| n.trim().parse().map_err(|_| wrong())).collect::<Result<_, _>>()?;
+    match numbers[..] {
+        [x, y, width, height] if width > 0 && height > 0 => Ok(Crop { x, y, width, height }),
+        _ => Err(wrong()),
+    }
+}
+
+/// A crop must lie within the picture.
+fn check_crop(crop: Crop, size: Size) -> anyhow::Result<Crop> {
+    let inside = |start: u32, extent: u32, whole: u32| u64::from(start) + u64::from(extent) <= u64::from(whole);
+    if inside(crop.x, crop.width, size.width) && inside(crop.y, crop.height, size.height) {
+        return Ok(crop);
+    }
+    let Crop { x, y, width, height } = crop;
+    bail!("--crop {x},{y},{width},{height} reaches beyond the picture of {}x{} pixels", size.width, size.height)
+}
+
+impl Quality {
+    pub(super) fn visibility(self) -> f64 {
+        match self {
+            Quality::Draft => 4.0,
+            Quality::Preview => 2.0,
+            Quality::Good => 1.0,
+            Quality::Final => 0.5,
+            Quality::Critical => 0.25,
+        }
+    }
+}
+
+pub(super) fn parse_size(text: &str) -> Result<Size, String> {
+    let wrong = || format!("\"{text}\" is not a size; expected WIDTHxHEIGHT in pixels, such as 640x360");
+    let (width, height) = text.split_once(['x', 'X', '×']).ok_or_else(wrong)?;
+    let (width, height) = (width.parse().map_err(|_| wrong())?, height.parse().map_err(|_| wrong())?);
+    if width == 0 || height == 0 { Err(wrong()) } else { Ok(Size { width, height }) }
+}
+
+fn trace_settings(arguments: &JobArguments, size: Size) -> anyhow::Result<TraceSettings> {
+    Ok(TraceSettings {
+        width: size.width,
+        height: size.height,
+        seed: arguments.seed,
+        max_depth: arguments.max_depth.unwrap_or(DEFAULT_MAX_DEPTH),
+        clamp: arguments.clamp.map(|clamp| clamp as f32),
+        filter: match arguments.filter {
+            FilterChoice::Box => PixelFilter::Box,
+            FilterChoice::Gaussian => PixelFilter::Gaussian,
+            FilterChoice::BlackmanHarris => PixelFilter::BlackmanHarris,
+            FilterChoice::Mitchell => PixelFilter::Mitchell,
+        },
+        sequence: match arguments.sequence {
+            SequenceChoice::PerPixel => Sequence::PerPixel,
+            SequenceChoice::ZOrder => Sequence::ZOrder,
+        },
+        crop: arguments.crop.map(|crop| check_crop(crop, size)).transpose()?,
+        transparent: arguments.transparent,
+    })
+}
+
+/// When to stop.
+fn limits(arguments: &JobArguments, scene: &Scene, sampling: Sampling) -> Limits {
+    let asked = arguments.visibility.or(arguments.quality.map(Quality::visibility));
+    let visibility = match (asked, sampling) {
+        (Some(visibility), _) => visibility,
+        // A uniform render of so many samples or seconds is what was asked for, not an early end.
+        (None, Sampling::Uniform) if arguments.spp.is_some() || arguments.time.is_some() => 0.0,
+        (None, _) => scene.viewing.visibility.unwrap_or(1.0),
+    };
+    Limits {
+        visibility,
+        time: arguments.time.map(Duration::from_secs_f64),
+        mean_samples: arguments.spp,
+        max_samples: arguments.max_spp.unwrap_or(DEFAULT_MAX_SAMPLES),
+        plans: arguments.plans,
+    }
+}
+
+/// How to sample and for whom: command line before scene before default.
+fn settings_record(arguments: &JobArguments, scene: &Scene) -> anyhow::Result<SettingsRecord> {
+    let view = &scene.viewing;
+    let display_name = arguments.display.as_deref().or(view.display.as_deref()).unwrap_or("desktop");
+    let viewing = seeing::viewing(display_name, arguments.csf_area)?;
+    let operator = arguments.operator.as_deref().or(view.operator.as_deref()).unwrap_or("constant");
+    let threshold = arguments.noise_threshold;
+    let sampling = match arguments.sampling {
+        SamplingChoice::Adaptive => Sampling::Adaptive,
+        SamplingChoice::Uniform => Sampling::Uniform,
+        SamplingChoice::Relative => Sampling::Rival(RivalRule::Relative { threshold }),
+        SamplingChoice::Variance => Sampling::Rival(RivalRule::Variance { threshold }),
+        SamplingChoice::Budget if arguments.spp.is_none() && arguments.time.is_none() => {
+            bail!("--sampling budget has no stop of its own: add --spp or --time")
+        }
+        SamplingChoice::Budget => Sampling::Rival(RivalRule::Budget),
+    };
+    Ok(SettingsRecord {
+        sampling,
+        allocation: match arguments.allocation {
+            AllocationChoice::Convex => AllocationRule::Convex,
+            AllocationChoice::Local => AllocationRule::Local,
+        },
+        model: arguments.model.clone(),
+        viewing,
+        nits_per_unit: arguments.nits_per_unit.unwrap_or(scene.nits_per_unit),
+        operator: operator.to_owned(),
+        exposure_stops: arguments.exposure.or(view.exposure_stops),
+        importance: None,
+    })
+}
+
+/// Refuses a size whose film and maps would not fit into memory.
+pub(super) fn check_memory(size: Size) -> anyhow::Result<()> {
+    /// Peak memory was 508 bytes a pixel at 256×256, program included (`peak_memory_bytes` of --json); the rest is margin.
+    const BYTES_PER_PIXEL: u64 = 700;
+    let needed = u64::from(size.width) * u64::from(size.height) * BYTES_PER_PIXEL;
+    let available = available_memory_bytes().unwrap_or(8 << 30);
+    if needed > available || u64::from(size.width) * u64::from(size.height) > u64::from(u32::MAX) / 2 {
+        bail!(
+            "a picture of {}x{} needs about {:.1} GiB of memory, and {:.1} GiB are free: choose a smaller --size",
+            size.width,
+            size.height,
+            needed as f64 / f64::from(1 << 30),
+            available as f64 / f64::from(1 << 30)
+        );
+    }
+    Ok(())
+}
+
+/// Free memory as Linux states it; `None` elsewhere.
+fn available_memory_bytes() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text.lines().find_map(|l| l.strip_prefix("MemAvailable:"))?;
+    line.trim().trim_end_matches("kB").trim().parse::<u64>().ok().map(|kib| kib * 1024)
+}

@@ -1,0 +1,84 @@
+//! `fechner view`: a render in a browser, while it is made.
+
+use super::job::{JobArguments, Prepared};
+use super::render::write_picture;
+use super::report::Report;
+use anyhow::Context;
+use clap::Args;
+use fechner::adaptive::Rendered;
+use fechner::adaptive::settings::LoopSettings;
+use fechner::output;
+use fechner::preview::{self, Door, Host, Job};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Arguments of `view`.
+#[derive(Debug, Args)]
+pub(super) struct ViewArguments {
+    #[command(flatten)]
+    job: JobArguments,
+    /// Port to listen on; 0 takes a free one.
+    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Serving")]
+    port: u16,
+    /// Address to listen on. Others than this machine's own let everybody in who has the printed address.
+    #[arg(long, value_name = "IP", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST), help_heading = "Serving")]
+    host: IpAddr,
+}
+
+/// The scene file and the arguments that say how to render it.
+struct FileHost {
+    job: JobArguments,
+}
+
+impl Host for FileHost {
+    fn load(&self) -> Result<Job, String> {
+        self.job.prepare().map(job_of).map_err(|error| format!("{error:#}"))
+    }
+
+    fn save(&self, path: &Path, rendered: &Rendered, settings: &LoopSettings) -> Result<(), String> {
+        let write = || {
+            let format = output::check_target(path)?;
+            let report = Report::new(&self.job.scene_name(), &[self.job.seed()], settings, rendered);
+            write_picture(path, format, self.job.background(), rendered, settings, &report)
+        };
+        write().map_err(|error: anyhow::Error| format!("{error:#}"))
+    }
+
+    fn scene_file(&self) -> &Path {
+        self.job.scene_file()
+    }
+}
+
+fn job_of(prepared: Prepared) -> Job {
+    let Prepared { scene, trace, record, settings } = prepared;
+    Job { scene: Arc::new(scene), trace, record, limits: settings.limits, importance: settings.importance }
+}
+
+/// Serves until a signal comes.
+pub(super) fn run(arguments: &ViewArguments) -> anyhow::Result<()> {
+    let pool = arguments.job.thread_pool()?;
+    let asked = SocketAddr::new(arguments.host, arguments.port);
+    let listener = TcpListener::bind(asked)
+        .with_context(|| format!("cannot listen on {asked}: choose another --port, or an address of this machine"))?;
+    let address = listener.local_addr().context("the listener has no address")?;
+    let job = pool.install(|| arguments.job.prepare().map(job_of))?;
+    let token = preview::random_token().context("the system gives no random numbers for a token")?;
+    let host = FileHost { job: arguments.job.clone() };
+    let preview = preview::start(job, Box::new(host), pool).context("the threads could not be started")?;
+    let closer = preview.closer();
+    let asked_before = AtomicBool::new(false);
+    ctrlc::set_handler(move || {
+        if asked_before.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+        closer.close();
+    })
+    .context("signals cannot be waited for")?;
+    if !address.ip().is_loopback() {
+        eprintln!("note: {address} can be reached from other machines; whoever has the address can drive this preview");
+    }
+    println!("http://{address}/?token={token}");
+    preview.serve(listener, Door { address, token }).with_context(|| format!("cannot serve on {address}"))
+}

@@ -1,0 +1,78 @@
+//! From coarse to fine: an order of pixels in which every beginning covers the picture, and what stands in for pixels that
+//! have not had their turn.
+
+use crate::film::Film;
+use crate::integrator::{BlockWork, SamplePlan};
+use crate::sampler::Half;
+
+/// Distance in pixels of the coarsest grid.
+const COARSEST: u32 = 16;
+
+/// Finest power of two up to [`COARSEST`] on whose grid a pixel lies.
+fn spacing(x: u32, y: u32) -> u32 {
+    let both = x | y | COARSEST;
+    1 << both.trailing_zeros()
+}
+
+/// One sample for every pixel, coarse grids first.
+pub(super) fn draft_plan(width: u32, height: u32) -> SamplePlan {
+    let mut plan = SamplePlan::default();
+    for step in [COARSEST, 8, 4, 2, 1] {
+        for y in (0..height).step_by(step as usize) {
+            let row = (0..width).step_by(step as usize).filter(|&x| spacing(x, y) == step);
+            let one = |x| BlockWork { samples: 1, ..BlockWork::whole(y * width + x, Half::A, 0) };
+            plan.blocks.extend(row.map(one));
+        }
+    }
+    plan
+}
+
+/// Sorts a plan's blocks from coarse to fine. Blocks of one pixel keep their order, so the film that comes of it has the
+/// same bytes.
+pub(super) fn order(plan: &mut SamplePlan, width: u32) {
+    plan.blocks.sort_by_key(|block| std::cmp::Reverse(spacing(block.pixel % width, block.pixel / width)));
+}
+
+/// For each pixel the index of the one whose samples stand for it: itself, or the nearest above and to the left on a grid
+/// that has been sampled. `None` where there is none yet.
+pub(super) fn stand_ins(film: &Film) -> Vec<Option<usize>> {
+    let (width, height) = (film.width(), film.height());
+    let of = |x: u32, y: u32| {
+        let mut step = 1;
+        while step <= COARSEST {
+            let pixel = (y / step * step * width + x / step * step) as usize;
+            if film.samples(pixel) > 0 {
+                return Some(pixel);
+            }
+            step *= 2;
+        }
+        None
+    };
+    (0..height).flat_map(|y| (0..width).map(move |x| of(x, y))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::adaptive::plan::pilot_plan;
+
+    /// Every beginning of the order covers the picture as evenly as its length allows, and nothing is lost.
+    #[test]
+    fn coarse_grids_come_first() {
+        let plan = draft_plan(40, 24);
+        assert_eq!(plan.blocks.len(), 40 * 24);
+        let first: Vec<u32> = plan.blocks.iter().take(6).map(|b| b.pixel).collect();
+        assert_eq!(first, [0, 16, 32, 16 * 40, 16 * 40 + 16, 16 * 40 + 32]);
+        let mut pixels: Vec<u32> = plan.blocks.iter().map(|b| b.pixel).collect();
+        pixels.sort_unstable();
+        assert!(pixels.into_iter().eq(0..40 * 24));
+    }
+
+    #[test]
+    fn blocks_of_a_pixel_keep_their_order() {
+        let mut plan = pilot_plan(40 * 24, 16);
+        order(&mut plan, 40);
+        let blocks = &plan.blocks;
+        assert!(blocks.chunks(2).all(|b| b[0].pixel == b[1].pixel && (b[0].half, b[1].half) == (Half::A, Half::B)));
+    }
+}

@@ -1,0 +1,134 @@
+//! What viewers and the preview say to each other, as JSON.
+
+use super::layer::Layer;
+use super::orbit::Movement;
+use serde::{Deserialize, Serialize};
+
+/// What a viewer asks for.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(tag = "do", rename_all = "kebab-case")]
+pub(super) enum Command {
+    /// Show another layer, to this viewer.
+    Layer {
+        /// Which.
+        layer: Layer,
+    },
+    /// Say what is at a pixel, to this viewer.
+    Inspect {
+        /// Column.
+        x: usize,
+        /// Row.
+        y: usize,
+    },
+    /// Rest between two batches.
+    Pause,
+    /// Go on, also after a stop.
+    Resume,
+    /// End with the picture so far.
+    Stop,
+    /// Throw all samples away.
+    Restart,
+    /// Write the picture into the working folder.
+    Save {
+        /// As what.
+        format: SavedFormat,
+    },
+    /// Exposure correction in stops; none is the scene's.
+    Exposure {
+        /// Stops.
+        stops: Option<f64>,
+    },
+    /// Another tone operator.
+    Operator {
+        /// Its name.
+        name: String,
+    },
+    /// Another visibility to stop at.
+    Visibility {
+        /// Visibility, above 0.
+        target: f64,
+    },
+    /// Move the camera.
+    Camera {
+        /// How.
+        #[serde(flatten)]
+        movement: Movement,
+    },
+    /// The camera of the scene.
+    CameraHome,
+    /// Frames are missing that somebody looks at. Not from viewers.
+    #[serde(skip)]
+    Redraw,
+    /// The scene file has changed. Not from viewers.
+    #[serde(skip)]
+    Reload,
+}
+
+/// Formats of saved pictures.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum SavedFormat {
+    /// As the display shows it.
+    Png,
+    /// With all layers.
+    Exr,
+}
+
+/// What the preview does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Phase {
+    /// One sample a pixel that is shown and not kept.
+    Drafting,
+    /// The loop.
+    Rendering,
+    /// Nothing, until somebody says to go on.
+    Paused,
+    /// The loop ended, or somebody ended it.
+    Stopped,
+}
+
+/// Everything that a page shows beside the picture.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct Status {
+    pub(super) kind: &'static str,
+    pub(super) scene: String,
+    pub(super) phase: Phase,
+    /// Why it stopped.
+    pub(super) reason: Option<&'static str>,
+    pub(super) width: u32,
+    pub(super) height: u32,
+    pub(super) total_samples: u64,
+    pub(super) mean_samples: f64,
+    pub(super) samples_a_second: f64,
+    pub(super) seconds: f64,
+    pub(super) seconds_left: Option<f64>,
+    /// Share of pixels above the target at the last look.
+    pub(super) visible_share: Option<f64>,
+    pub(super) target: f64,
+    /// Visibility that is being worked towards.
+    pub(super) rung: Option<f64>,
+    pub(super) exposure: Option<f64>,
+    pub(super) operator: String,
+    pub(super) operators: &'static [&'static str],
+    pub(super) camera: String,
+    /// What went wrong last, until it goes right.
+    pub(super) error: Option<String>,
+    /// What was done last.
+    pub(super) note: Option<String>,
+}
+
+/// What is at a pixel.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct Inspected {
+    pub(super) kind: &'static str,
+    pub(super) x: usize,
+    pub(super) y: usize,
+    /// Linear RGB in scene units.
+    pub(super) rgb: [f32; 3],
+    pub(super) luminance_cd_m2: f32,
+    pub(super) samples: u32,
+    /// Standard error on the display that is at visibility 1, from the last look.
+    pub(super) threshold_cd_m2: Option<f32>,
+    pub(super) visibility: Option<f32>,
+}

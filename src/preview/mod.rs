@@ -1,0 +1,118 @@
+//! A live preview of a render in a browser.
+//!
+//! [`start`] renders on a thread of its own by the ordinary loop of [`crate::adaptive`], so that what stands at the end has
+//! the bytes of `fechner render`, and shows it to any number of viewers over a WebSocket. The order of work:
+//!
+//! 1. a draft of one sample a pixel, coarse to fine ([`coarse`]), into a film that is only ever shown;
+//! 2. the loop, in batches of about a tenth of a second, between which [`session`] obeys what viewers ask;
+//! 3. [`screen`] turns film into encoded frames, at most ten a second and never more than viewers look at.
+//!
+//! Viewers get the latest frame and none that they missed, so a slow one costs nobody else anything. Not for pictures that
+//! should be kept or compared: `render` writes those, and so does "save" here.
+
+mod coarse;
+mod command;
+mod layer;
+mod orbit;
+mod screen;
+mod server;
+mod session;
+mod shared;
+mod viewer;
+
+pub use server::{Door, random_token};
+
+use crate::adaptive::Rendered;
+use crate::adaptive::settings::{Limits, LoopSettings};
+use crate::checkpoint::SettingsRecord;
+use crate::integrator::TraceSettings;
+use crate::scene::Scene;
+use fechner_perception::Plane;
+use shared::Shared;
+use std::net::TcpListener;
+use std::path::Path;
+use std::sync::Arc;
+
+/// A loaded scene and how to render it.
+pub struct Job {
+    /// The scene.
+    pub scene: Arc<Scene>,
+    /// How its samples are traced.
+    pub trace: TraceSettings,
+    /// For whom, by which rule and operator.
+    pub record: SettingsRecord,
+    /// When to stop.
+    pub limits: Limits,
+    /// What thresholds are multiplied by.
+    pub importance: Option<Plane>,
+}
+
+/// Who knows where the scene comes from and how pictures are written.
+pub trait Host: Send + Sync {
+    /// The scene as its file now is.
+    ///
+    /// # Errors
+    /// In words for the user.
+    fn load(&self) -> Result<Job, String>;
+
+    /// Writes a picture in the format that the name's ending asks for.
+    ///
+    /// # Errors
+    /// In words for the user.
+    fn save(&self, path: &Path, rendered: &Rendered, settings: &LoopSettings) -> Result<(), String>;
+
+    /// The file whose changes make the scene load again.
+    fn scene_file(&self) -> &Path;
+}
+
+/// A preview under way.
+pub struct Preview {
+    shared: Arc<Shared>,
+    threads: Vec<std::thread::JoinHandle<()>>,
+}
+
+/// A way to end a preview from elsewhere, such as from a signal's handler.
+#[derive(Clone)]
+pub struct Closer(Arc<Shared>);
+
+impl Closer {
+    /// Ends rendering and serving; returns at once.
+    pub fn close(&self) {
+        self.0.close();
+    }
+}
+
+/// Renders `job` in `pool` on a thread of its own, and watches the scene file from another.
+///
+/// # Errors
+/// If the system gives no thread.
+pub fn start(job: Job, host: Box<dyn Host>, pool: rayon::ThreadPool) -> std::io::Result<Preview> {
+    let shared = Arc::new(Shared::new());
+    let scene_file = host.scene_file().to_owned();
+    let thread = |name: &str| std::thread::Builder::new().name(name.to_owned());
+    let (of_render, of_watch) = (Arc::clone(&shared), Arc::clone(&shared));
+    let render = thread("preview").spawn(move || pool.install(|| session::run(job, host.as_ref(), &of_render)))?;
+    let watch = thread("scene-file").spawn(move || session::watch_file(&scene_file, &of_watch))?;
+    Ok(Preview { shared, threads: vec![render, watch] })
+}
+
+impl Preview {
+    /// A way to end it.
+    pub fn closer(&self) -> Closer {
+        Closer(Arc::clone(&self.shared))
+    }
+
+    /// Serves viewers at the door until the preview is closed, then waits for its threads.
+    ///
+    /// # Errors
+    /// If the listener cannot be used.
+    pub fn serve(self, listener: TcpListener, door: Door) -> std::io::Result<()> {
+        let served = server::serve(listener, door, Arc::clone(&self.shared));
+        self.shared.close();
+        for thread in self.threads {
+            // A thread that panicked has said so.
+            let _ = thread.join();
+        }
+        served
+    }
+}

@@ -1,0 +1,163 @@
+//! The camera in somebody's hand.
+
+use crate::scene::{Camera, Projection};
+use glam::{Quat, Vec3};
+use serde::Deserialize;
+use std::f32::consts::FRAC_PI_2;
+use std::fmt::Write as _;
+
+/// A movement of the camera about the point that it looks at.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(tag = "by", rename_all = "kebab-case")]
+pub(super) enum Movement {
+    /// Around the point, in radians.
+    Orbit {
+        /// To the right of what is seen.
+        right: f32,
+        /// Over it.
+        up: f32,
+    },
+    /// With the point, in heights of the picture.
+    Pan {
+        /// To the right.
+        right: f32,
+        /// Up.
+        up: f32,
+    },
+    /// Towards the point: each step leaves nine tenths of the way.
+    Dolly {
+        /// Steps; below 0 away from it.
+        steps: f32,
+    },
+}
+
+/// A camera and the distance of the point about which it turns.
+#[derive(Clone, Debug)]
+pub(super) struct Held {
+    pub(super) camera: Camera,
+    pub(super) pivot_distance: f32,
+}
+
+impl Held {
+    /// Moves it. A camera that moved while its shutter was open rests from here on.
+    pub(super) fn moved(&mut self, movement: Movement) {
+        let before = self.clone();
+        self.camera.motion = None;
+        match movement {
+            Movement::Orbit { right, up } => self.orbit(right, up),
+            Movement::Pan { right, up } => self.pan(right, up),
+            Movement::Dolly { steps } => self.dolly(steps),
+        }
+        let Camera { position, forward, .. } = &self.camera;
+        if !(position.is_finite() && forward.is_finite() && self.pivot_distance.is_normal()) {
+            *self = before;
+        }
+    }
+
+    fn axes(&self) -> (Vec3, Vec3, Vec3) {
+        let camera = &self.camera;
+        let forward = camera.forward.normalize_or(Vec3::NEG_Z);
+        let right = forward.cross(camera.up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector());
+        let up = right.cross(forward);
+        (forward, if camera.mirrored { -right } else { right }, up)
+    }
+
+    fn orbit(&mut self, right: f32, up: f32) {
+        /// How near to the pole the camera may come, in radians.
+        const POLE: f32 = 0.02;
+        let (forward, sideways, _) = self.axes();
+        let pole = self.camera.up.normalize_or(Vec3::Y);
+        let pivot = self.camera.position + forward * self.pivot_distance;
+        let elevation = FRAC_PI_2 - (-forward).angle_between(pole);
+        let up = (elevation + up).clamp(POLE - FRAC_PI_2, FRAC_PI_2 - POLE) - elevation;
+        let turn =
+            Quat::from_axis_angle(pole, right) * Quat::from_axis_angle(forward.cross(pole).normalize_or(sideways), -up);
+        self.camera.forward = (turn * forward).normalize_or(forward);
+        self.camera.position = pivot - self.camera.forward * self.pivot_distance;
+    }
+
+    fn pan(&mut self, right: f32, up: f32) {
+        let (_, sideways, upwards) = self.axes();
+        let height = match self.camera.projection {
+            Projection::Perspective { vertical_fov_deg } => {
+                2.0 * self.pivot_distance * (0.5 * vertical_fov_deg.to_radians()).tan()
+            }
+            Projection::Orthographic { height } => height,
+        };
+        self.camera.position += (sideways * right + upwards * up) * height;
+    }
+
+    fn dolly(&mut self, steps: f32) {
+        let factor = 0.9f32.powf(steps.clamp(-20.0, 20.0));
+        if let Projection::Orthographic { height } = &mut self.camera.projection {
+            *height *= factor;
+            return;
+        }
+        let (forward, ..) = self.axes();
+        let way = self.pivot_distance * (1.0 - factor);
+        self.camera.position += forward * way;
+        self.pivot_distance -= way;
+        // What was in focus stays so, unless the camera went through it.
+        let focus = self.camera.focus_distance - way;
+        self.camera.focus_distance = if focus > 1e-3 * self.pivot_distance { focus } else { self.pivot_distance };
+    }
+
+    /// The camera as a scene file has it.
+    pub(super) fn to_toml(&self) -> String {
+        let camera = &self.camera;
+        let numbers = |v: Vec3| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
+        let mut text = format!(
+            "[camera]\nposition = {}\nlook_at = {}\nup = {}\n",
+            numbers(camera.position),
+            numbers(camera.position + camera.forward * self.pivot_distance),
+            numbers(camera.up)
+        );
+        let _ = match camera.projection {
+            Projection::Perspective { vertical_fov_deg } => writeln!(text, "vertical_fov_deg = {vertical_fov_deg:?}"),
+            Projection::Orthographic { height } => writeln!(text, "orthographic_height = {height:?}"),
+        };
+        if let Some(window) = camera.screen_window {
+            let (min, max) = (window.min, window.max);
+            let _ = writeln!(text, "screen_window = [{:?}, {:?}, {:?}, {:?}]", min.x, max.x, min.y, max.y);
+        }
+        if camera.aperture_radius > 0.0 {
+            let _ = writeln!(text, "aperture_radius = {:?}", camera.aperture_radius);
+            let _ = writeln!(text, "focus_distance = {:?}", camera.focus_distance);
+        }
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn held() -> Held {
+        Held { camera: Camera::pinhole(Vec3::new(0.0, 0.0, 5.0), Vec3::NEG_Z, Vec3::Y, 90.0), pivot_distance: 5.0 }
+    }
+
+    #[test]
+    fn an_orbit_keeps_the_point_and_stops_at_the_pole() {
+        let mut held = held();
+        held.moved(Movement::Orbit { right: FRAC_PI_2, up: 0.0 });
+        assert!(held.camera.position.distance(Vec3::new(5.0, 0.0, 0.0)) < 1e-4, "{}", held.camera.position);
+        held.moved(Movement::Orbit { right: 0.0, up: 0.5 });
+        let height = held.camera.position.y;
+        assert!((height - 5.0 * 0.5f32.sin()).abs() < 1e-3, "{height}");
+        held.moved(Movement::Orbit { right: 0.3, up: 9.0 });
+        let pivot = held.camera.position + held.camera.forward * held.pivot_distance;
+        assert!(pivot.length() < 1e-4 && held.camera.position.y < 5.0 && held.camera.position.y > 4.99, "{pivot}");
+    }
+
+    #[test]
+    fn pans_and_dollies_are_of_the_right_size() {
+        let mut held = held();
+        held.moved(Movement::Pan { right: 0.1, up: 0.2 });
+        assert!(held.camera.position.distance(Vec3::new(1.0, 2.0, 5.0)) < 1e-4, "{}", held.camera.position);
+        held.moved(Movement::Dolly { steps: 1.0 });
+        assert!(held.camera.position.distance(Vec3::new(1.0, 2.0, 4.5)) < 1e-4, "{}", held.camera.position);
+        held.moved(Movement::Pan { right: f32::NAN, up: 0.0 });
+        held.moved(Movement::Dolly { steps: f32::INFINITY });
+        assert!(held.camera.position.is_finite() && held.pivot_distance > 0.0);
+    }
+}

@@ -1,0 +1,190 @@
+//! From film to encoded frames of the layers that somebody looks at.
+
+use super::coarse::stand_ins;
+use super::layer::{self, Colours, Layer};
+use super::shared::Shared;
+use crate::adaptive::judge::Judgement;
+use crate::adaptive::settings::LoopSettings;
+use crate::adaptive::statistics::picture_variance;
+use crate::film::Film;
+use crate::output::encode_srgb8;
+use fechner_perception::Plane;
+use fechner_perception::photometry::luminance;
+use fechner_perception::tone::{FittedTone, SavedTone, SceneGuide, map_picture};
+use image::ExtendedColorType;
+use image::codecs::jpeg::JpegEncoder;
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ImageEncoder, ImageError};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Time between frames, at least.
+const FRAME_INTERVAL: Duration = Duration::from_millis(100);
+/// For so long after a start frames may take a tenth of the time, then a fortieth.
+const LIVELY: Duration = Duration::from_secs(5);
+
+/// What the last look at the film saw.
+pub(super) struct Looked {
+    /// Standard error on the display, cd/m², that is at visibility 1.
+    pub(super) threshold: Plane,
+    pub(super) visibility: Plane,
+}
+
+impl Looked {
+    pub(super) fn of(judgement: &Judgement) -> Self {
+        Self { threshold: judgement.allowed_standard_error_cd_m2(), visibility: judgement.predicted.clone() }
+    }
+}
+
+/// The picture as it was last shown, for who asks about a pixel.
+pub(super) struct Snapshot {
+    pub(super) width: usize,
+    pub(super) nits_per_unit: f64,
+    pub(super) rgb_cd_m2: Vec<[f32; 3]>,
+    pub(super) samples: Vec<u32>,
+    pub(super) looked: Option<Arc<Looked>>,
+}
+
+/// A film to be shown.
+#[derive(Clone, Copy)]
+pub(super) struct Scenery<'a> {
+    pub(super) film: &'a Film,
+    /// Stands in for pixels that the film has no samples of.
+    pub(super) draft: &'a Film,
+    /// The operator's fit at the last look.
+    pub(super) tone: Option<&'a SavedTone>,
+    pub(super) settings: &'a LoopSettings,
+    /// Whether nothing changes now: then frames are exact.
+    pub(super) is_at_rest: bool,
+}
+
+/// When was shown what, and what it took.
+pub(super) struct Screen {
+    started: Instant,
+    shown: Option<Instant>,
+    cost: Duration,
+    pub(super) looked: Option<Arc<Looked>>,
+}
+
+impl Screen {
+    pub(super) fn new() -> Self {
+        Self { started: Instant::now(), shown: None, cost: Duration::ZERO, looked: None }
+    }
+
+    /// A new picture begins: no look was taken and the next frame is due.
+    pub(super) fn begin(&mut self) {
+        *self = Self { cost: self.cost, ..Self::new() };
+    }
+
+    /// Whether a frame is due.
+    pub(super) fn is_due(&self) -> bool {
+        let times_cost = if self.started.elapsed() < LIVELY { 9 } else { 39 };
+        self.shown.is_none_or(|shown| shown.elapsed() >= FRAME_INTERVAL.max(self.cost * times_cost))
+    }
+
+    /// Shows a film to all viewers.
+    pub(super) fn show(&mut self, scenery: Scenery<'_>, shared: &Shared) {
+        let begun = Instant::now();
+        let nits_per_unit = scenery.settings.nits_per_unit;
+        let rgb_cd_m2 = composed(scenery.film, scenery.draft, nits_per_unit);
+        for layer in ALL.into_iter().filter(|&layer| shared.is_watched(layer)) {
+            let colours = self.colours(layer, scenery, &rgb_cd_m2);
+            // A frame that cannot be encoded is left out; the next may be.
+            if let Ok(frame) = encode(layer, &colours, scenery.film, scenery.is_at_rest) {
+                shared.publish_frame(layer, frame);
+            }
+        }
+        shared.publish_snapshot(Snapshot {
+            width: scenery.film.width() as usize,
+            nits_per_unit,
+            rgb_cd_m2,
+            samples: (0..pixels(scenery.film)).map(|pixel| scenery.film.samples(pixel)).collect(),
+            looked: self.looked.clone(),
+        });
+        self.shown = Some(Instant::now());
+        self.cost = begun.elapsed();
+    }
+
+    fn colours(&self, layer: Layer, scenery: Scenery<'_>, rgb_cd_m2: &[[f32; 3]]) -> Colours {
+        let Scenery { film, settings, draft, .. } = scenery;
+        let (width, height) = (film.width() as usize, film.height() as usize);
+        // First surfaces are known from the draft on.
+        let surfaces = if film.total_samples() >= draft.total_samples() { film } else { draft };
+        match (layer, &self.looked) {
+            (Layer::Picture, _) => {
+                let tone = scenery.tone.map_or_else(|| fit(settings, width, rgb_cd_m2), |tone| tone.clone().restore());
+                let shown = map_picture(tone.as_ref(), width, rgb_cd_m2);
+                Colours { rgb8: encode_srgb8(film.width(), &shown), legend: tone.describe() }
+            }
+            (Layer::Samples, _) => {
+                let counts = Plane::from_fn(width, height, |x, y| film.samples(y * width + x) as f32);
+                layer::logarithmic(&counts, "samples")
+            }
+            (Layer::Threshold, Some(looked)) => layer::logarithmic(&looked.threshold, "cd/m²"),
+            (Layer::Visibility, Some(looked)) => layer::visibility(&looked.visibility, settings.limits.visibility),
+            (Layer::Threshold | Layer::Visibility, None) => layer::nothing_yet(film),
+            (Layer::Variance, _) => {
+                layer::logarithmic(&picture_variance(film, settings.nits_per_unit), "(cd/m²)², of the scene")
+            }
+            (Layer::HalfDifference, _) => {
+                layer::signed(&film.estimate(settings.nits_per_unit).half_difference, "cd/m², of the scene")
+            }
+            (Layer::Albedo, _) => layer::albedo(surfaces),
+            (Layer::Normal, _) => layer::normal(surfaces),
+            (Layer::Depth, _) => layer::depth(surfaces),
+        }
+    }
+}
+
+const ALL: [Layer; layer::LAYERS] = [
+    Layer::Picture,
+    Layer::Samples,
+    Layer::Threshold,
+    Layer::Visibility,
+    Layer::Variance,
+    Layer::HalfDifference,
+    Layer::Albedo,
+    Layer::Normal,
+    Layer::Depth,
+];
+
+fn pixels(film: &Film) -> usize {
+    film.width() as usize * film.height() as usize
+}
+
+/// The film's picture; where it has no samples, the draft's.
+fn composed(film: &Film, draft: &Film, nits_per_unit: f64) -> Vec<[f32; 3]> {
+    let mut rgb = film.estimate(nits_per_unit).rgb_cd_m2;
+    if (0..pixels(film)).all(|pixel| film.samples(pixel) > 0) {
+        return rgb;
+    }
+    let below = draft.estimate(nits_per_unit).rgb_cd_m2;
+    for (pixel, stand_in) in stand_ins(draft).into_iter().enumerate() {
+        if film.samples(pixel) == 0 {
+            rgb[pixel] = stand_in.map_or([0.0; 3], |stand_in| below[stand_in]);
+        }
+    }
+    rgb
+}
+
+/// The operator on a picture that was not looked at yet.
+fn fit(settings: &LoopSettings, width: usize, rgb_cd_m2: &[[f32; 3]]) -> Box<dyn FittedTone> {
+    let height = rgb_cd_m2.len() / width.max(1);
+    let guide = Plane::from_fn(width, height, |x, y| luminance(rgb_cd_m2[y * width + x]).max(0.0));
+    settings.operator.fit(&SceneGuide::of(&guide), &settings.viewing, None)
+}
+
+/// The layer's number, the length of its legend, the legend in UTF-8, the picture. JPEG while it changes, PNG at rest.
+fn encode(layer: Layer, colours: &Colours, film: &Film, is_at_rest: bool) -> Result<Vec<u8>, ImageError> {
+    let legend = &colours.legend.as_bytes()[..colours.legend.floor_char_boundary(255)];
+    let mut frame = vec![layer.index() as u8, legend.len() as u8];
+    frame.extend_from_slice(legend);
+    let (width, height, kind) = (film.width(), film.height(), ExtendedColorType::Rgb8);
+    if is_at_rest {
+        let encoder = PngEncoder::new_with_quality(&mut frame, CompressionType::Fast, FilterType::Adaptive);
+        encoder.write_image(&colours.rgb8, width, height, kind)?;
+    } else {
+        JpegEncoder::new_with_quality(&mut frame, 92).write_image(&colours.rgb8, width, height, kind)?;
+    }
+    Ok(frame)
+}

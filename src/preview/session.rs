@@ -1,0 +1,400 @@
+//! The render's thread: drafts, renders, and obeys between two batches.
+
+mod pace;
+mod saving;
+mod telling;
+mod watch;
+
+use super::coarse::{draft_plan, order};
+use super::command::{Command, Phase, SavedFormat};
+use super::orbit::Held;
+use super::screen::{Looked, Scenery, Screen};
+use super::shared::Shared;
+use super::{Host, Job};
+use crate::adaptive::judge::{Judgement, judge};
+use crate::adaptive::settings::LoopSettings;
+use crate::adaptive::state::RenderState;
+use crate::adaptive::{LastLook, Progress, StopReason, run as run_loop};
+use crate::film::Film;
+use crate::integrator::{Crop, PathTracer, SamplePlan};
+use crate::scene::Camera;
+use pace::Pace;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+use watch::{Moving, Watch};
+
+/// Renders and obeys until the preview closes. A defect that panics ends the picture, not the preview: a saved scene file
+/// starts it again.
+pub(super) fn run(job: Job, host: &dyn Host, shared: &Shared) {
+    let mut next = Some(job);
+    while !shared.is_closing() {
+        let Some(job) = next.take() else {
+            let is_asked = shared.take_commands().iter().any(|c| matches!(c, Command::Reload | Command::Restart));
+            match host.load() {
+                Ok(job) if is_asked => next = Some(job),
+                _ => shared.wait(Duration::from_millis(250)),
+            }
+            continue;
+        };
+        let work = || Session::new(job, host, shared).map(Session::work);
+        let problem = match catch_unwind(AssertUnwindSafe(work)) {
+            Ok(Ok(())) => return,
+            Ok(Err(problem)) => problem,
+            Err(_) => "the program has a defect here; its message stands where fechner view was started".to_owned(),
+        };
+        shared.publish_status(serde_json::json!({ "kind": "status", "phase": "failed", "error": problem }).to_string());
+    }
+}
+
+/// Tells when the scene file changes.
+pub(super) fn watch_file(path: &Path, shared: &Shared) {
+    let stamp = || std::fs::metadata(path).ok().and_then(|file| Some((file.modified().ok()?, file.len())));
+    let mut last = stamp();
+    while !shared.is_closing() {
+        std::thread::sleep(Duration::from_millis(200));
+        // Between a save's removal and its renaming there may be no file.
+        if let Some(now) = stamp().filter(|now| last != Some(*now)) {
+            last = Some(now);
+            shared.send(Command::Reload);
+        }
+    }
+}
+
+/// What viewers changed, in place of what the job says.
+#[derive(Default)]
+struct Live {
+    exposure: Option<f64>,
+    operator: Option<String>,
+    visibility: Option<f64>,
+}
+
+struct Session<'a> {
+    host: &'a dyn Host,
+    shared: &'a Shared,
+    job: Job,
+    live: Live,
+    held: Held,
+    /// Whether the camera is another than the tracer's.
+    has_moved: bool,
+    tracer: PathTracer,
+    settings: LoopSettings,
+    phase: Phase,
+    /// What is left of the draft, from the last block on.
+    draft_left: SamplePlan,
+    draft: Film,
+    state: RenderState,
+    /// While stopped.
+    last_look: Option<LastLook>,
+    screen: Screen,
+    pace: Pace,
+    progress: Option<Progress>,
+    error: Option<String>,
+    note: Option<String>,
+}
+
+impl<'a> Session<'a> {
+    fn new(job: Job, host: &'a dyn Host, shared: &'a Shared) -> Result<Self, String> {
+        let live = Live::default();
+        let settings = settings_of(&job, &live)?;
+        let tracer = PathTracer::new(Arc::clone(&job.scene), job.trace);
+        let Crop { width, height, .. } = job.trace.film_area();
+        let mut session = Self {
+            host,
+            shared,
+            held: at_home(&job.scene.camera),
+            has_moved: false,
+            tracer,
+            phase: Phase::Drafting,
+            draft_left: SamplePlan::default(),
+            draft: Film::new(width, height),
+            state: RenderState::new(width, height, &settings.limits),
+            last_look: None,
+            screen: Screen::new(),
+            pace: Pace::new(),
+            progress: None,
+            error: None,
+            note: None,
+            settings,
+            live,
+            job,
+        };
+        session.restart();
+        Ok(session)
+    }
+
+    fn work(mut self) {
+        while !self.shared.is_closing() {
+            for command in self.shared.take_commands() {
+                self.obey(command);
+            }
+            // Once for all movements that came: a restart for each would fall behind a hand that drags.
+            if std::mem::take(&mut self.has_moved) {
+                self.tracer.set_camera(&self.held.camera);
+                self.restart();
+            }
+            match self.phase {
+                Phase::Drafting => self.trace_draft(),
+                Phase::Rendering => self.render(),
+                Phase::Paused | Phase::Stopped => {
+                    self.tell();
+                    self.shared.wait(Duration::from_secs(1));
+                }
+            }
+        }
+    }
+
+    /// Throws all samples away and begins with a draft.
+    fn restart(&mut self) {
+        let Crop { width, height, .. } = self.job.trace.film_area();
+        self.draft = Film::new(width, height);
+        self.draft_left = draft_plan(width, height);
+        self.draft_left.blocks.reverse();
+        self.state = RenderState::new(width, height, &self.settings.limits);
+        self.phase = Phase::Drafting;
+        self.last_look = None;
+        self.progress = None;
+        self.screen.begin();
+    }
+
+    fn order_pilot(&mut self) {
+        let width = self.state.film.width();
+        if let Some(pilot) = self.state.pending.front_mut().filter(|_| self.state.plans == 0) {
+            order(pilot, width);
+        }
+    }
+
+    /// One batch of the draft.
+    fn trace_draft(&mut self) {
+        let count = (self.pace.samples() as usize).min(self.draft_left.blocks.len());
+        let start = self.draft_left.blocks.len() - count;
+        let mut batch = SamplePlan { blocks: self.draft_left.blocks.split_off(start) };
+        batch.blocks.reverse();
+        self.pace.begin();
+        self.tracer.trace(&batch, &mut self.draft, &|_| {});
+        self.pace.done(batch.samples());
+        if self.draft_left.blocks.is_empty() {
+            self.order_pilot();
+            self.phase = Phase::Rendering;
+        }
+        if self.screen.is_due() || self.phase == Phase::Rendering {
+            self.show();
+            self.tell();
+        }
+    }
+
+    /// The loop, until it ends or somebody asks for something.
+    fn render(&mut self) {
+        let Crop { width, height, .. } = self.job.trace.film_area();
+        let state = std::mem::replace(&mut self.state, RenderState::new(0, 0, &self.settings.limits));
+        self.tell_of(&state);
+        self.pace.begin();
+        let ended = {
+            let status = self.status(&state);
+            let watch = Watch {
+                shared: self.shared,
+                settings: &self.settings,
+                draft: &self.draft,
+                moving: Mutex::new(Moving {
+                    screen: &mut self.screen,
+                    pace: &mut self.pace,
+                    progress: &mut self.progress,
+                    status,
+                }),
+            };
+            run_loop(&self.tracer, &self.settings, state, &watch)
+        };
+        match ended {
+            Ok(ended) => {
+                self.state = ended.state;
+                if let Some(last_look) = ended.last_look {
+                    self.stopped(last_look);
+                }
+            }
+            Err(error) => {
+                self.error = Some(error.to_string());
+                self.state = RenderState::new(width, height, &self.settings.limits);
+                self.phase = Phase::Paused;
+            }
+        }
+    }
+
+    /// The render is at an end, until somebody asks for more.
+    fn stopped(&mut self, last_look: LastLook) {
+        self.screen.looked = Some(Arc::new(Looked::of(&last_look.judgement)));
+        self.state.tone = Some(last_look.judgement.tone.save());
+        self.last_look = Some(last_look);
+        self.phase = Phase::Stopped;
+        self.show();
+        self.tell();
+    }
+
+    /// Looks at the film as it is.
+    fn look(&mut self) -> Option<Judgement> {
+        match judge(&self.state.film, &self.settings, self.state.inflation) {
+            Ok(judgement) => Some(judgement),
+            Err(error) => {
+                self.error = Some(error.to_string());
+                None
+            }
+        }
+    }
+
+    fn obey(&mut self, command: Command) {
+        self.note = None;
+        match command {
+            Command::Layer { .. } | Command::Inspect { .. } => {}
+            Command::Redraw => self.show(),
+            Command::Pause if matches!(self.phase, Phase::Rendering | Phase::Drafting) => {
+                self.phase = Phase::Paused;
+                self.show();
+            }
+            Command::Resume if matches!(self.phase, Phase::Paused | Phase::Stopped) => self.go_on(),
+            Command::Stop if self.phase != Phase::Stopped => {
+                if let Some(judgement) = self.look() {
+                    self.stopped(LastLook { judgement, stop_reason: StopReason::Interrupted });
+                }
+            }
+            Command::Pause | Command::Resume | Command::Stop => {}
+            Command::Restart => self.restart(),
+            Command::Save { format } => self.save(format),
+            Command::Exposure { stops } => self.change(|live| live.exposure = stops, Changed::Seen),
+            Command::Operator { name } => self.change(|live| live.operator = Some(name), Changed::Seen),
+            Command::Visibility { target } => self.change(|live| live.visibility = Some(target), Changed::Target),
+            Command::Camera { movement } => {
+                self.find_pivot();
+                self.held.moved(movement);
+                self.has_moved = true;
+            }
+            Command::CameraHome => {
+                self.held = at_home(&self.job.scene.camera);
+                self.has_moved = true;
+            }
+            Command::Reload => self.reload(),
+        }
+    }
+
+    fn go_on(&mut self) {
+        self.last_look = None;
+        self.phase = if self.draft_left.blocks.is_empty() { Phase::Rendering } else { Phase::Drafting };
+    }
+
+    /// Other settings for the samples that there are.
+    fn change(&mut self, edit: impl FnOnce(&mut Live), changed: Changed) {
+        let before = Live {
+            exposure: self.live.exposure,
+            operator: self.live.operator.clone(),
+            visibility: self.live.visibility,
+        };
+        edit(&mut self.live);
+        match settings_of(&self.job, &self.live) {
+            Err(problem) => {
+                self.live = before;
+                self.error = Some(problem);
+            }
+            Ok(settings) => {
+                self.settings = settings;
+                self.error = None;
+                self.adopt(changed);
+            }
+        }
+    }
+
+    fn adopt(&mut self, changed: Changed) {
+        let has_pilot = self.state.plans > 0;
+        match changed {
+            Changed::Target if has_pilot => {
+                self.state.pending.clear();
+                self.state.traced_blocks = 0;
+            }
+            Changed::Target => {}
+            Changed::Seen => {
+                begin_anew(&mut self.state, &self.settings);
+                self.order_pilot();
+                self.screen.looked = None;
+            }
+        }
+        if self.phase == Phase::Stopped {
+            if let Some(judgement) = self.look() {
+                let stop_reason = self.last_look.as_ref().map_or(StopReason::Interrupted, |look| look.stop_reason);
+                self.stopped(LastLook { judgement, stop_reason });
+            }
+        } else {
+            self.show();
+        }
+    }
+
+    /// The camera turns about what stands in the middle of the picture.
+    fn find_pivot(&mut self) {
+        let film = if self.state.film.total_samples() > 0 { &self.state.film } else { &self.draft };
+        let middle = (film.height() / 2 * film.width() + film.width() / 2) as usize;
+        let is_whole = self.draft_left.blocks.is_empty() && !self.has_moved;
+        if let Some(depth) = film.guides().get(middle).map(|guide| guide.depth).filter(|d| is_whole && d.is_normal()) {
+            self.held.pivot_distance = depth;
+        }
+    }
+
+    fn reload(&mut self) {
+        let loaded = self.host.load().and_then(|job| settings_of(&job, &self.live).map(|settings| (job, settings)));
+        match loaded {
+            Err(problem) => self.error = Some(problem),
+            Ok((job, settings)) => {
+                self.tracer = PathTracer::new(Arc::clone(&job.scene), job.trace);
+                self.held = at_home(&job.scene.camera);
+                (self.job, self.settings) = (job, settings);
+                self.error = None;
+                self.note = Some("the scene was loaded again".to_owned());
+                self.restart();
+            }
+        }
+    }
+
+    fn show(&mut self) {
+        let scenery = Scenery {
+            film: &self.state.film,
+            draft: &self.draft,
+            tone: self.state.tone.as_ref(),
+            settings: &self.settings,
+            is_at_rest: matches!(self.phase, Phase::Paused | Phase::Stopped),
+        };
+        self.screen.show(scenery, self.shared);
+    }
+}
+
+/// What a change of settings asks for.
+#[derive(Clone, Copy)]
+enum Changed {
+    /// What the eye is shown, and with it every threshold.
+    Seen,
+    /// When to stop.
+    Target,
+}
+
+fn at_home(camera: &Camera) -> Held {
+    Held { camera: camera.clone(), pivot_distance: camera.focus_distance }
+}
+
+fn settings_of(job: &Job, live: &Live) -> Result<LoopSettings, String> {
+    let mut record = job.record.clone();
+    record.exposure_stops = live.exposure.or(record.exposure_stops);
+    record.operator = live.operator.clone().unwrap_or(record.operator);
+    let visibility = live.visibility.unwrap_or(job.limits.visibility);
+    if visibility.is_nan() || visibility < 0.0 || record.exposure_stops.is_some_and(|stops| !stops.is_finite()) {
+        return Err("visibility must be above 0 and exposure a number".to_owned());
+    }
+    let limits = crate::adaptive::settings::Limits { visibility, ..job.limits };
+    let settings = record.loop_settings(limits).map_err(|error| error.to_string())?;
+    Ok(LoopSettings { importance: job.importance.clone(), ..settings })
+}
+
+/// Forgets what was decided and keeps the samples, their time and what audits found.
+fn begin_anew(state: &mut RenderState, settings: &LoopSettings) {
+    let limits = &settings.limits;
+    let most_samples = limits.max_samples.min(limits.mean_samples.unwrap_or(u32::MAX));
+    let nothing = RenderState::new(0, 0, limits);
+    let RenderState { film, inflation, plans, passes, seconds_total, seconds_perception, seconds_allocation, .. } =
+        std::mem::replace(state, nothing);
+    let fresh = RenderState::of_film(film, most_samples);
+    *state = RenderState { inflation, plans, passes, seconds_total, seconds_perception, seconds_allocation, ..fresh };
+}

@@ -1,0 +1,39 @@
+//! Pictures that a viewer asks for, written where fechner was started.
+
+use super::{SavedFormat, Session};
+use crate::adaptive::{LastLook, Rendered, StopReason};
+use std::path::PathBuf;
+
+impl Session<'_> {
+    /// Writes the picture so far under a name that is free.
+    pub(super) fn save(&mut self, format: SavedFormat) {
+        let was_stopped = self.last_look.is_some();
+        let last_look = match self.last_look.take() {
+            Some(last_look) => last_look,
+            None => {
+                let Some(judgement) = self.look() else { return };
+                LastLook { judgement, stop_reason: StopReason::Interrupted }
+            }
+        };
+        let path = self.free_name(format);
+        let rendered = Rendered::new(self.state.clone(), last_look.judgement, last_look.stop_reason);
+        match self.host.save(&path, &rendered, &self.settings) {
+            Ok(()) => self.note = Some(format!("saved {}", path.display())),
+            Err(problem) => self.error = Some(problem),
+        }
+        if was_stopped {
+            self.last_look = Some(LastLook { judgement: rendered.judgement, stop_reason: rendered.stop_reason });
+        }
+    }
+
+    /// The scene file's name and the first free number, in the working folder.
+    fn free_name(&self, format: SavedFormat) -> PathBuf {
+        let stem = self.host.scene_file().file_stem().map_or_else(|| "view".into(), |stem| stem.to_string_lossy());
+        let ending = match format {
+            SavedFormat::Png => "png",
+            SavedFormat::Exr => "exr",
+        };
+        let name = |number: u32| PathBuf::from(format!("{stem}-{number}.{ending}"));
+        (1..).map(name).find(|path| !path.exists()).unwrap_or_else(|| name(0))
+    }
+}

@@ -1,0 +1,81 @@
+//! What a session says of itself.
+
+use super::Session;
+use crate::adaptive::state::RenderState;
+use crate::adaptive::{Progress, StopReason, visible_share};
+use crate::preview::command::{Phase, Status};
+use crate::preview::shared::Shared;
+use fechner_perception::tone::operator_names;
+
+impl Session<'_> {
+    pub(super) fn tell(&self) {
+        self.tell_of(&self.state);
+    }
+
+    pub(super) fn tell_of(&self, state: &RenderState) {
+        publish(&self.status(state), self.shared);
+    }
+
+    pub(super) fn status(&self, state: &RenderState) -> Status {
+        let target = self.settings.limits.visibility;
+        let mut status = Status {
+            kind: "status",
+            scene: self.job.scene.name.clone(),
+            phase: self.phase,
+            reason: self.last_look.as_ref().map(|look| in_words(look.stop_reason)),
+            width: state.film.width(),
+            height: state.film.height(),
+            total_samples: 0,
+            mean_samples: 0.0,
+            samples_a_second: 0.0,
+            seconds: 0.0,
+            seconds_left: None,
+            visible_share: self.last_look.as_ref().map(|look| visible_share(&look.judgement, target)),
+            target,
+            rung: None,
+            exposure: self.live.exposure.or(self.job.record.exposure_stops),
+            operator: self.live.operator.clone().unwrap_or_else(|| self.job.record.operator.clone()),
+            operators: operator_names(),
+            camera: self.held.to_toml(),
+            error: self.error.clone(),
+            note: self.note.clone(),
+        };
+        count(&mut status, state, self.progress.as_ref());
+        status
+    }
+}
+
+/// Fills in what the samples so far say.
+pub(super) fn count(status: &mut Status, state: &RenderState, progress: Option<&Progress>) {
+    let pixels = f64::from(state.film.width()) * f64::from(state.film.height());
+    status.total_samples = state.film.total_samples();
+    status.mean_samples = status.total_samples as f64 / pixels.max(1.0);
+    status.seconds = state.seconds_total;
+    status.samples_a_second = status.total_samples as f64 / state.seconds_total.max(1e-3);
+    if let Some(progress) = progress.filter(|_| status.phase != Phase::Stopped) {
+        status.visible_share = Some(progress.visible_share);
+        status.rung = Some(progress.rung);
+        let since = status.total_samples as f64 - progress.mean_samples * progress.pixels;
+        let left = (progress.remaining_samples - since).max(0.0) / status.samples_a_second.max(1.0);
+        status.seconds_left = Some(left).filter(|left| left.is_finite());
+    }
+}
+
+pub(super) fn publish(status: &Status, shared: &Shared) {
+    if let Ok(text) = serde_json::to_string(status) {
+        shared.publish_status(text);
+    }
+}
+
+fn in_words(reason: StopReason) -> &'static str {
+    match reason {
+        StopReason::Visibility => "nothing more can be seen at this target",
+        StopReason::Time => "the time is up",
+        StopReason::Samples => "the samples are spent",
+        StopReason::MaxSamples => "what can be seen is in pixels that have the most samples allowed",
+        StopReason::Plans => "the plans are done",
+        StopReason::Rule => "the rule is satisfied",
+        StopReason::Interrupted => "as asked",
+        StopReason::Merged => "merged",
+    }
+}

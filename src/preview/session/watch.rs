@@ -1,0 +1,71 @@
+//! What the loop tells while it runs: frames and figures between batches, and the way out when somebody asks for something.
+
+use super::pace::Pace;
+use super::telling::{count, publish};
+use crate::adaptive::judge::Judgement;
+use crate::adaptive::settings::LoopSettings;
+use crate::adaptive::state::RenderState;
+use crate::adaptive::{Directive, Monitor, Progress};
+use crate::film::Film;
+use crate::preview::command::Status;
+use crate::preview::screen::{Looked, Scenery, Screen};
+use crate::preview::shared::Shared;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Shows the loop's film between batches, and leaves the loop when somebody asks for something.
+pub(super) struct Watch<'a> {
+    pub(super) shared: &'a Shared,
+    pub(super) settings: &'a LoopSettings,
+    pub(super) draft: &'a Film,
+    pub(super) moving: Mutex<Moving<'a>>,
+}
+
+/// What changes meanwhile.
+pub(super) struct Moving<'a> {
+    pub(super) screen: &'a mut Screen,
+    pub(super) pace: &'a mut Pace,
+    pub(super) progress: &'a mut Option<Progress>,
+    pub(super) status: Status,
+}
+
+impl Watch<'_> {
+    fn show(&self, moving: &mut Moving<'_>, state: &RenderState) {
+        let tone = state.tone.as_ref();
+        let Self { draft, settings, .. } = *self;
+        moving.screen.show(Scenery { film: &state.film, draft, tone, settings, is_at_rest: false }, self.shared);
+        moving.status.note = None;
+        count(&mut moving.status, state, moving.progress.as_ref());
+        publish(&moving.status, self.shared);
+    }
+}
+
+impl Monitor for Watch<'_> {
+    fn looked(&self, progress: &Progress) {
+        *self.moving.lock().unwrap_or_else(PoisonError::into_inner).progress = Some(*progress);
+    }
+
+    fn judged(&self, state: &RenderState, judgement: &Judgement) {
+        let mut moving = self.moving.lock().unwrap_or_else(PoisonError::into_inner);
+        moving.screen.looked = Some(Arc::new(Looked::of(judgement)));
+        self.show(&mut moving, state);
+        moving.pace.begin();
+    }
+
+    fn samples_done(&self, samples: u64) {
+        self.moving.lock().unwrap_or_else(PoisonError::into_inner).pace.count(samples);
+    }
+
+    fn most_samples_a_batch(&self) -> u64 {
+        self.moving.lock().unwrap_or_else(PoisonError::into_inner).pace.samples()
+    }
+
+    fn between_batches(&self, state: &RenderState) -> Directive {
+        let mut moving = self.moving.lock().unwrap_or_else(PoisonError::into_inner);
+        moving.pace.counted();
+        if moving.screen.is_due() {
+            self.show(&mut moving, state);
+        }
+        moving.pace.begin();
+        if self.shared.has_news() { Directive::Leave } else { Directive::GoOn }
+    }
+}

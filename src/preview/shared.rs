@@ -1,0 +1,132 @@
+//! What the render's thread and the viewers have in common. Nobody waits for a viewer: each slot holds the latest only.
+
+use super::command::Command;
+use super::layer::{LAYERS, Layer};
+use super::screen::Snapshot;
+use axum::body::Bytes;
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::time::Duration;
+use tokio::sync::watch;
+
+/// Commands that may wait; more are dropped, as only a broken page sends them.
+const MOST_COMMANDS: usize = 1024;
+
+pub(super) struct Shared {
+    commands: Mutex<VecDeque<Command>>,
+    arrived: Condvar,
+    /// Viewers of each layer.
+    viewers: [AtomicUsize; LAYERS],
+    frames: [watch::Sender<Bytes>; LAYERS],
+    status: watch::Sender<Arc<str>>,
+    snapshot: Mutex<Option<Arc<Snapshot>>>,
+    is_closing: AtomicBool,
+    closing: watch::Sender<bool>,
+}
+
+impl Shared {
+    pub(super) fn new() -> Self {
+        Self {
+            commands: Mutex::default(),
+            arrived: Condvar::new(),
+            viewers: std::array::from_fn(|_| AtomicUsize::new(0)),
+            frames: std::array::from_fn(|_| watch::Sender::new(Bytes::new())),
+            status: watch::Sender::new(Arc::from("")),
+            snapshot: Mutex::default(),
+            is_closing: AtomicBool::new(false),
+            closing: watch::Sender::new(false),
+        }
+    }
+
+    pub(super) fn send(&self, command: Command) {
+        let mut commands = self.commands.lock().unwrap_or_else(PoisonError::into_inner);
+        if commands.len() < MOST_COMMANDS {
+            commands.push_back(command);
+        }
+        self.arrived.notify_all();
+    }
+
+    /// Whether the render should look up.
+    pub(super) fn has_news(&self) -> bool {
+        self.is_closing() || !self.commands.lock().unwrap_or_else(PoisonError::into_inner).is_empty()
+    }
+
+    /// All commands that have come.
+    pub(super) fn take_commands(&self) -> VecDeque<Command> {
+        std::mem::take(&mut *self.commands.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Until a command comes, the preview closes or the time is up.
+    pub(super) fn wait(&self, most: Duration) {
+        let commands = self.commands.lock().unwrap_or_else(PoisonError::into_inner);
+        if commands.is_empty() && !self.is_closing() {
+            drop(self.arrived.wait_timeout(commands, most));
+        }
+    }
+
+    pub(super) fn close(&self) {
+        self.is_closing.store(true, Ordering::SeqCst);
+        self.closing.send_replace(true);
+        // With the lock held, so that nobody is between looking and waiting.
+        let _commands = self.commands.lock().unwrap_or_else(PoisonError::into_inner);
+        self.arrived.notify_all();
+    }
+
+    pub(super) fn is_closing(&self) -> bool {
+        self.is_closing.load(Ordering::SeqCst)
+    }
+
+    pub(super) fn until_closing(&self) -> watch::Receiver<bool> {
+        self.closing.subscribe()
+    }
+
+    pub(super) fn is_watched(&self, layer: Layer) -> bool {
+        self.viewers[layer.index()].load(Ordering::SeqCst) > 0
+    }
+
+    pub(super) fn publish_frame(&self, layer: Layer, frame: Vec<u8>) {
+        self.frames[layer.index()].send_replace(Bytes::from(frame));
+    }
+
+    pub(super) fn publish_status(&self, status: String) {
+        self.status.send_replace(Arc::from(status));
+    }
+
+    pub(super) fn status(&self) -> watch::Receiver<Arc<str>> {
+        self.status.subscribe()
+    }
+
+    pub(super) fn publish_snapshot(&self, snapshot: Snapshot) {
+        *self.snapshot.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::new(snapshot));
+    }
+
+    pub(super) fn snapshot(&self) -> Option<Arc<Snapshot>> {
+        self.snapshot.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+/// A viewer's place before one layer; frames of layers before which nobody sits are not made.
+pub(super) struct Seat {
+    shared: Arc<Shared>,
+    layer: Layer,
+}
+
+impl Seat {
+    pub(super) fn take(shared: &Arc<Shared>, layer: Layer) -> Self {
+        shared.viewers[layer.index()].fetch_add(1, Ordering::SeqCst);
+        shared.send(Command::Redraw);
+        Self { shared: Arc::clone(shared), layer }
+    }
+
+    /// The latest frame and those to come; empty before the first.
+    pub(super) fn frames(&self) -> watch::Receiver<Bytes> {
+        self.shared.frames[self.layer.index()].subscribe()
+    }
+}
+
+impl Drop for Seat {
+    fn drop(&mut self) {
+        self.shared.viewers[self.layer.index()].fetch_sub(1, Ordering::SeqCst);
+    }
+}

@@ -1,0 +1,78 @@
+//! One viewer: what a browser is sent, and what it says.
+
+use super::command::{Command, Inspected};
+use super::layer::Layer;
+use super::shared::{Seat, Shared};
+use axum::extract::ws::{Message, WebSocket};
+use fechner_perception::photometry::luminance;
+use std::sync::Arc;
+
+/// Serves one viewer until it goes or the preview closes. It is sent the latest frame whenever it has taken the one before.
+pub(super) async fn attend(mut socket: WebSocket, shared: Arc<Shared>) {
+    let mut seat = Seat::take(&shared, Layer::Picture);
+    let mut frames = seat.frames();
+    let mut status = shared.status();
+    let mut closing = shared.until_closing();
+    frames.mark_changed();
+    status.mark_changed();
+    loop {
+        let answer = tokio::select! {
+            said = socket.recv() => match said {
+                Some(Ok(Message::Text(text))) => match serde_json::from_str(&text) {
+                    Ok(Command::Layer { layer }) => {
+                        let empty = Seat::take(&shared, layer);
+                        frames = empty.frames();
+                        frames.mark_changed();
+                        seat = empty;
+                        None
+                    }
+                    Ok(Command::Inspect { x, y }) => inspected(&shared, x, y).map(|text| Message::Text(text.into())),
+                    Ok(command) => {
+                        shared.send(command);
+                        None
+                    }
+                    Err(error) => Some(Message::Text(not_understood(&error).into())),
+                },
+                Some(Ok(Message::Close(_)) | Err(_)) | None => break,
+                Some(Ok(_)) => None,
+            },
+            Ok(()) = frames.changed() => {
+                let frame = frames.borrow_and_update().clone();
+                (!frame.is_empty()).then_some(Message::Binary(frame))
+            }
+            Ok(()) = status.changed() => {
+                let text = status.borrow_and_update().to_string();
+                (!text.is_empty()).then(|| Message::Text(text.into()))
+            }
+            _ = closing.wait_for(|&closing| closing) => break,
+        };
+        if let Some(answer) = answer
+            && socket.send(answer).await.is_err()
+        {
+            break;
+        }
+    }
+    drop(seat);
+}
+
+fn not_understood(error: &serde_json::Error) -> String {
+    serde_json::json!({ "kind": "refused", "problem": error.to_string() }).to_string()
+}
+
+fn inspected(shared: &Shared, x: usize, y: usize) -> Option<String> {
+    let snapshot = shared.snapshot()?;
+    let pixel = y.checked_mul(snapshot.width)?.checked_add(x)?;
+    let rgb_cd_m2 = *snapshot.rgb_cd_m2.get(pixel).filter(|_| x < snapshot.width)?;
+    let looked = snapshot.looked.as_ref();
+    serde_json::to_string(&Inspected {
+        kind: "inspected",
+        x,
+        y,
+        rgb: rgb_cd_m2.map(|value| (f64::from(value) / snapshot.nits_per_unit) as f32),
+        luminance_cd_m2: luminance(rgb_cd_m2),
+        samples: snapshot.samples[pixel],
+        threshold_cd_m2: looked.map(|looked| looked.threshold.values()[pixel]),
+        visibility: looked.map(|looked| looked.visibility.values()[pixel]),
+    })
+    .ok()
+}

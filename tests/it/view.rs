@@ -1,0 +1,276 @@
+//! The live preview as a browser meets it: over HTTP and a WebSocket.
+
+use serde_json::{Value, json};
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+use tungstenite::client::IntoClientRequest;
+use tungstenite::http::HeaderValue;
+use tungstenite::{Message, WebSocket};
+
+/// Anything that takes longer hangs.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+fn cornell_box() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml")
+}
+
+/// `fechner view` under way; ended when dropped.
+struct View {
+    child: Child,
+    address: String,
+    token: String,
+}
+
+impl View {
+    fn of(scene: &Path, folder: &Path, arguments: &[&str]) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_fechner"));
+        command.arg("view").arg(scene).args(["--size", "32x32", "--threads", "1"]).args(arguments);
+        let mut child = command.current_dir(folder).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("runs");
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().expect("piped")).read_line(&mut line).expect("a line");
+        let rest = line.trim().strip_prefix("http://").unwrap_or_else(|| panic!("no address: {line}"));
+        let (address, token) = rest.split_once("/?token=").expect("a token");
+        Self { child, address: address.to_owned(), token: token.to_owned() }
+    }
+
+    /// The answer to a GET, from its status line on.
+    fn get(&self, path: &str, host: &str) -> String {
+        let mut stream = TcpStream::connect(&self.address).expect("listens");
+        write!(stream, "GET {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\n\r\n").expect("written");
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).expect("an answer");
+        answer
+    }
+
+    fn socket(&self, token: &str, origin: Option<&str>) -> Result<Viewer, String> {
+        let stream = TcpStream::connect(&self.address).expect("listens");
+        stream.set_read_timeout(Some(PATIENCE)).expect("a time");
+        let mut request = format!("ws://{}/ws?token={token}", self.address).into_client_request().expect("an address");
+        if let Some(origin) = origin {
+            request.headers_mut().insert("Origin", HeaderValue::from_str(origin).expect("an origin"));
+        }
+        let (socket, _) = tungstenite::client(request, stream).map_err(|error| error.to_string())?;
+        Ok(Viewer { socket })
+    }
+
+    fn viewer(&self) -> Viewer {
+        self.socket(&self.token, Some(&format!("http://{}", self.address))).expect("let in")
+    }
+}
+
+impl Drop for View {
+    fn drop(&mut self) {
+        // Harmless if it has ended.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+struct Viewer {
+    socket: WebSocket<TcpStream>,
+}
+
+impl Viewer {
+    fn send(&mut self, command: &Value) {
+        self.socket.send(Message::text(command.to_string())).expect("sent");
+    }
+
+    /// The first message that is what `pick` looks for.
+    fn until<T>(&mut self, what: &str, pick: impl Fn(&Message) -> Option<T>) -> T {
+        let started = Instant::now();
+        loop {
+            let message = self.socket.read().unwrap_or_else(|error| panic!("{what}: {error}"));
+            if let Some(found) = pick(&message) {
+                return found;
+            }
+            assert!(started.elapsed() < PATIENCE, "{what} never came");
+        }
+    }
+
+    /// The first JSON that fits.
+    fn json(&mut self, what: &str, fits: impl Fn(&Value) -> bool) -> Value {
+        self.until(what, |message| {
+            let value = serde_json::from_str(message.to_text().ok().filter(|_| message.is_text())?).expect("JSON");
+            Some(value).filter(&fits)
+        })
+    }
+
+    fn status(&mut self, what: &str, fits: impl Fn(&Value) -> bool) -> Value {
+        self.json(what, |value| value["kind"] == "status" && fits(value))
+    }
+
+    /// The next frame of a layer that fits.
+    fn frame(&mut self, layer: u8, what: &str, fits: impl Fn(&image::RgbImage) -> bool) -> image::RgbImage {
+        self.until(what, |message| {
+            let Message::Binary(bytes) = message else { return None };
+            let picture = &bytes[2 + usize::from(bytes[1])..];
+            let picture = image::load_from_memory(picture).expect("a picture").into_rgb8();
+            Some(picture).filter(|picture| bytes[0] == layer && fits(picture))
+        })
+    }
+
+    /// Asks for a file and returns its bytes.
+    fn saved(&mut self, folder: &Path, format: &str, name: &str) -> Vec<u8> {
+        self.send(&json!({ "do": "save", "format": format }));
+        self.status(name, |status| status["note"] == format!("saved {name}"));
+        std::fs::read(folder.join(name)).expect("written")
+    }
+}
+
+fn brightness(picture: &image::RgbImage) -> f64 {
+    picture.as_raw().iter().map(|&byte| f64::from(byte)).sum::<f64>() / picture.as_raw().len() as f64
+}
+
+fn is_stopped(status: &Value) -> bool {
+    status["phase"] == "stopped"
+}
+
+fn rendered(folder: &Path, arguments: &[&str], name: &str) -> Vec<u8> {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_fechner"));
+    command.arg("render").arg(cornell_box()).args(["--size", "32x32", "-o", name]).args(arguments).current_dir(folder);
+    let output = command.output().expect("runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    std::fs::read(folder.join(name)).expect("written")
+}
+
+#[test]
+fn who_has_no_token_or_comes_from_elsewhere_stays_outside() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let view = View::of(&cornell_box(), folder.path(), &["--visibility", "16"]);
+    let (address, token) = (&view.address, &view.token);
+    assert_eq!(token.len(), 32);
+    let page = view.get(&format!("/?token={token}"), address);
+    assert!(page.starts_with("HTTP/1.1 200") && page.contains("<canvas"), "{page}");
+    assert!(!page.contains("://") || !page.contains("src=\"http"), "the page asks for something else");
+    for path in ["/", "/?token=", "/?token=00000000000000000000000000000000", "/ws"] {
+        let answer = view.get(path, address);
+        assert!(answer.starts_with("HTTP/1.1 403") || path == "/ws", "{path}: {answer}");
+        assert!(!answer.contains("<canvas"), "{path}");
+    }
+    assert!(view.get(&format!("/?token={token}"), "evil.example").starts_with("HTTP/1.1 403"));
+    for (token, origin) in [("", None), (token.as_str(), Some("http://evil.example")), (token, Some("null"))] {
+        let refusal = view.socket(token, origin).err().expect("refused");
+        assert!(refusal.contains("403"), "{origin:?}: {refusal}");
+    }
+}
+
+/// Stopped by itself, the preview has the bytes of `render`, whatever viewers did meanwhile; carried on to a lower
+/// visibility, those of a render to there.
+#[test]
+fn a_finished_preview_is_what_render_writes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let view = View::of(&cornell_box(), at, &["--visibility", "6", "--seed", "3"]);
+    // One that never reads.
+    let _slow = view.viewer();
+    let mut viewer = view.viewer();
+    viewer.frame(0, "a picture", |picture| picture.dimensions() == (32, 32) && brightness(picture) > 5.0);
+    viewer.send(&json!({ "do": "pause" }));
+    viewer.status("a rest", |status| status["phase"] == "paused" || is_stopped(status));
+    viewer.send(&json!({ "do": "layer", "layer": "samples" }));
+    viewer.frame(1, "samples", |_| true);
+    viewer.send(&json!({ "do": "resume" }));
+    let status = viewer.status("the end", |status| is_stopped(status) && status["visible_share"].is_number());
+    assert!(status["visible_share"].as_f64() <= Some(0.001), "{status}");
+    let until = |v: &str, name: &str| rendered(at, &["--seed", "3", "--visibility", v], name);
+    assert!(viewer.saved(at, "png", "cornell-box-1.png") == until("6", "6.png"), "the PNG differs");
+    assert!(viewer.saved(at, "exr", "cornell-box-1.exr") == until("6", "6.exr"), "the EXR differs");
+
+    // Another viewer sees, exactly, what was saved.
+    let saved = image::open(at.join("6.png")).expect("a picture").into_rgb8();
+    view.viewer().frame(0, "the saved picture", |picture| *picture == saved);
+
+    viewer.send(&json!({ "do": "visibility", "target": 3.0 }));
+    viewer.send(&json!({ "do": "resume" }));
+    let fits = |status: &Value| {
+        is_stopped(status) && status["target"] == 3.0 && status["visible_share"].as_f64() <= Some(0.001)
+    };
+    viewer.status("the lower visibility", fits);
+    assert!(viewer.saved(at, "png", "cornell-box-2.png") == until("3", "3.png"), "going on gives another picture");
+}
+
+/// The tone operator works on the samples that there are.
+#[test]
+fn exposure_changes_the_picture_and_takes_no_samples() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let view = View::of(&cornell_box(), folder.path(), &["--visibility", "8"]);
+    let mut viewer = view.viewer();
+    let before = viewer.status("the end", is_stopped);
+    let dark = view.viewer().frame(0, "a picture", |picture| brightness(picture) > 0.0);
+    viewer.send(&json!({ "do": "exposure", "stops": 2.0 }));
+    let after = viewer.status("the exposure", |status| status["exposure"] == 2.0 && is_stopped(status));
+    assert_eq!(before["total_samples"], after["total_samples"]);
+    let bright = view.viewer().frame(0, "a brighter picture", |picture| brightness(picture) > 1.2 * brightness(&dark));
+    viewer.send(&json!({ "do": "operator", "name": "reinhard02" }));
+    viewer.status("the operator", |status| status["operator"] == "reinhard02" && is_stopped(status));
+    view.viewer().frame(0, "another picture", |picture| *picture != bright);
+    viewer.send(&json!({ "do": "operator", "name": "nobody" }));
+    let refused = viewer.status("a refusal", |status| !status["error"].is_null());
+    assert!(refused["error"].as_str().is_some_and(|error| error.contains("nobody")), "{refused}");
+    assert_eq!(refused["operator"], "reinhard02");
+
+    viewer.send(&json!({ "do": "inspect", "x": 16, "y": 20 }));
+    let pixel = viewer.json("a pixel", |value| value["kind"] == "inspected");
+    assert!(pixel["samples"].as_u64() >= Some(16), "{pixel}");
+    for figure in ["luminance_cd_m2", "threshold_cd_m2", "visibility"] {
+        assert!(pixel[figure].as_f64() > Some(0.0), "{figure}: {pixel}");
+    }
+    viewer.send(&json!({ "do": "inspect", "x": 32, "y": u64::MAX }));
+    viewer.send(&json!({ "do": "nonsense" }));
+    viewer.json("a word about nonsense", |value| value["kind"] == "refused");
+    for (index, name) in
+        ["threshold", "visibility", "variance", "half-difference", "albedo", "normal", "depth"].iter().enumerate()
+    {
+        viewer.send(&json!({ "do": "layer", "layer": name }));
+        viewer.frame(index as u8 + 2, name, |layer| layer.pixels().any(|pixel| pixel != layer.get_pixel(0, 0)));
+    }
+}
+
+/// A camera that was moved starts anew, and its TOML in the scene file is the same camera; a broken scene file says where
+/// and leaves the picture.
+#[test]
+fn the_camera_moves_and_the_scene_file_is_watched() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = folder.path().join("scene.toml");
+    let text = std::fs::read_to_string(cornell_box()).expect("a scene");
+    std::fs::write(&scene, &text).expect("written");
+    let view = View::of(&scene, folder.path(), &["--visibility", "8"]);
+    let mut viewer = view.viewer();
+    let home = viewer.status("the end", is_stopped);
+    viewer.send(&json!({ "do": "camera", "by": "orbit", "right": 0.2, "up": 0.1 }));
+    let moved = viewer.status("another camera", |status| status["camera"] != home["camera"] && is_stopped(status));
+    let seen = view.viewer().frame(0, "a picture", |picture| brightness(picture) > 5.0);
+
+    std::fs::write(&scene, text.replace("[camera]", "[camera]\nfoccus = 1")).expect("written");
+    let broken = viewer.status("an error", |status| !status["error"].is_null());
+    assert!(broken["error"].as_str().is_some_and(|error| error.contains("foccus")), "{broken}");
+    assert_eq!(broken["total_samples"], moved["total_samples"]);
+    view.viewer().frame(0, "the last good picture", |picture| *picture == seen);
+
+    let start = text.find("[camera]").expect("a camera");
+    let end = start + 1 + text[start + 1..].find("\n[").expect("more after it");
+    let copied = format!("{}{}{}", &text[..start], moved["camera"].as_str().expect("TOML"), &text[end..]);
+    std::fs::write(&scene, copied).expect("written");
+    let again = viewer.status("the scene again", |status| status["error"].is_null() && is_stopped(status));
+    assert_eq!(again["note"], "the scene was loaded again");
+    let difference = |picture: &image::RgbImage| {
+        picture.as_raw().iter().zip(seen.as_raw()).map(|(a, b)| f64::from(a.abs_diff(*b))).sum::<f64>() / 3072.0
+    };
+    view.viewer().frame(0, "the same picture", |picture| difference(picture) < 3.0);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_signal_ends_it_cleanly() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut view = View::of(&cornell_box(), folder.path(), &["--visibility", "0.01"]);
+    let mut viewer = view.viewer();
+    viewer.status("work", |status| status["phase"] == "rendering");
+    let told = Command::new("kill").args(["-INT", &view.child.id().to_string()]).status().expect("kill");
+    assert!(told.success());
+    assert!(view.child.wait().expect("ended").success());
+    assert_eq!(std::fs::read_dir(folder.path()).expect("readable").count(), 0);
+}
