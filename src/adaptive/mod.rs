@@ -12,13 +12,14 @@ pub mod rivals;
 pub mod settings;
 pub mod state;
 pub mod statistics;
+mod stop;
 
 pub use monitor::{Directive, Monitor, Progress, Quiet};
+pub use stop::{StopReason, TOLERATED_SHARE, is_reached, visible_share};
 
 use crate::film::Film;
 use crate::integrator::{BlockWork, Crop, PathTracer, SamplePlan};
 use audit::{Audit, audit};
-use fechner_perception::Plane;
 use judge::{JudgeError, Judgement, judge};
 use plan::{adaptive_plan, cut_to_budget, doubling_of, slices, uniform_plan, wanted_samples};
 use rivals::rival_plan;
@@ -26,40 +27,14 @@ use settings::{LoopSettings, Sampling, ladder};
 use state::{Exposure, RenderState};
 use std::collections::VecDeque;
 use std::time::Instant;
+use stop::{LEAST_SAVING, predicted_saving};
 
-/// Share of pixels that may remain above the target when the loop stops.
-pub const TOLERATED_SHARE: f64 = 0.001;
-/// No 1° patch may stay above this many times the target.
-const TOLERATED_PATCH: f64 = 2.0;
 /// No single pixel's measured amplitude may stay above this many times the target.
 const TOLERATED_PEAK: f64 = 4.0;
 /// Rungs above this are not audited: their few samples say little.
 const HIGHEST_AUDITED_RUNG: f64 = 4.0;
 /// What the variance may be multiplied by in all after audits that disagree.
 const MOST_INFLATION: f64 = 4.0;
-/// Below this predicted saving the loop samples uniformly: its estimates err by more.
-const LEAST_SAVING: f64 = 0.05;
-
-/// Why a render ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StopReason {
-    /// Predicted visibility is at most the target on 99.9 % of the picture.
-    Visibility,
-    /// The time was up.
-    Time,
-    /// The mean number of samples was reached.
-    Samples,
-    /// What can still be seen is in pixels that have the most samples allowed.
-    MaxSamples,
-    /// The number of plans was reached.
-    Plans,
-    /// Another renderer's rule was satisfied.
-    Rule,
-    /// The monitor asked for it.
-    Interrupted,
-    /// It is the sum of several, and what was asked for is not reached.
-    Merged,
-}
 
 /// A finished render.
 #[derive(Debug)]
@@ -408,36 +383,6 @@ fn beginning(blocks: &[BlockWork], most_samples: u64) -> &[BlockWork] {
 fn scene_unit_over_white(judgement: &Judgement, settings: &LoopSettings) -> f64 {
     const DIM_CD_M2: f32 = 0.1;
     f64::from(judgement.tone.relative_luminance(DIM_CD_M2) / DIM_CD_M2) * settings.nits_per_unit
-}
-
-/// Whether a rung's stop is met: the tolerated share of pixels is below it, and no patch is far above.
-pub fn is_reached(judgement: &Judgement, rung: f64) -> bool {
-    let worst = judgement.predicted.values().iter().fold(0.0, |a: f32, &v| a.max(v));
-    visible_share(judgement, rung) <= TOLERATED_SHARE && f64::from(worst) <= TOLERATED_PATCH * rung
-}
-
-/// Share of samples that the wanted counts save against as many everywhere as the hardest tolerated pixel needs.
-fn predicted_saving(film: &Film, judgement: &Judgement, wanted: &Plane, rung: f64) -> f64 {
-    let counts = wanted.values().iter().enumerate().map(|(i, &wanted)| f64::from(wanted).max(film.samples(i).into()));
-    let mean_count = counts.sum::<f64>() / wanted.values().len() as f64;
-    let saving = |for_one_sample: &Plane| {
-        let uniform = (for_one_sample.quantile(1.0 - TOLERATED_SHARE) / rung).powi(2);
-        1.0 - mean_count / uniform
-    };
-    // Mostly the saving is large. A look without the masks' pooling, which costs one blur and not twenty transforms, tells.
-    let variance = &judgement.pooled_variance_per_sample;
-    let allowed = judgement.allowed_standard_error_cd_m2();
-    let energy = Plane::from_fn(variance.width(), variance.height(), |x, y| {
-        variance.get(x, y) / (allowed.get(x, y) * allowed.get(x, y))
-    });
-    let roughly = saving(&judgement.thresholds.pooled(&energy).map(f32::sqrt));
-    if roughly > 4.0 * LEAST_SAVING { roughly } else { saving(&judgement.visibility_of(variance)) }
-}
-
-/// Share of pixels whose predicted visibility is above `visibility`.
-pub fn visible_share(judgement: &Judgement, visibility: f64) -> f64 {
-    let values = judgement.predicted.values();
-    values.iter().filter(|&&v| f64::from(v) > visibility).count() as f64 / values.len() as f64
 }
 
 fn progress(render: &Loop<'_>, judgement: &Judgement, step: &Step) -> Progress {

@@ -3,9 +3,9 @@
 //! [`start`] renders on a thread of its own by the ordinary loop of [`crate::adaptive`], so that what stands at the end has
 //! the bytes of `fechner render`, and shows it to any number of viewers over a WebSocket. The order of work:
 //!
-//! 1. a draft of one sample a pixel, coarse to fine ([`coarse`]), into a film that is only ever shown;
-//! 2. the loop, in batches of about a tenth of a second, between which [`session`] obeys what viewers ask;
-//! 3. [`screen`] turns film into encoded frames, at most ten a second and never more than viewers look at.
+//! 1. a draft of one sample a pixel, coarse to fine (`coarse`), into a film that is only ever shown;
+//! 2. the loop, in batches of about a tenth of a second, between which `session` obeys what viewers ask;
+//! 3. `screen` turns film into encoded frames, at most ten a second and never more than viewers look at.
 //!
 //! Viewers get the latest frame and none that they missed, so a slow one costs nobody else anything. Not for pictures that
 //! should be kept or compared: `render` writes those, and so does "save" here.

@@ -1,0 +1,63 @@
+//! When a render is done: why it ended, when a visibility is reached, and whether uneven counts are worth it.
+
+use super::judge::Judgement;
+use crate::film::Film;
+use fechner_perception::Plane;
+
+/// Share of pixels that may remain above the target when the loop stops.
+pub const TOLERATED_SHARE: f64 = 0.001;
+/// No 1° patch may stay above this many times the target.
+const TOLERATED_PATCH: f64 = 2.0;
+/// Below this predicted saving the loop samples uniformly: its estimates err by more.
+pub(super) const LEAST_SAVING: f64 = 0.05;
+
+/// Why a render ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StopReason {
+    /// Predicted visibility is at most the target on 99.9 % of the picture.
+    Visibility,
+    /// The time was up.
+    Time,
+    /// The mean number of samples was reached.
+    Samples,
+    /// What can still be seen is in pixels that have the most samples allowed.
+    MaxSamples,
+    /// The number of plans was reached.
+    Plans,
+    /// Another renderer's rule was satisfied.
+    Rule,
+    /// The monitor asked for it.
+    Interrupted,
+    /// It is the sum of several, and what was asked for is not reached.
+    Merged,
+}
+
+/// Whether a rung's stop is met: the tolerated share of pixels is below it, and no patch is far above.
+pub fn is_reached(judgement: &Judgement, rung: f64) -> bool {
+    let worst = judgement.predicted.values().iter().fold(0.0, |a: f32, &v| a.max(v));
+    visible_share(judgement, rung) <= TOLERATED_SHARE && f64::from(worst) <= TOLERATED_PATCH * rung
+}
+
+/// Share of samples that the wanted counts save against as many everywhere as the hardest tolerated pixel needs.
+pub(super) fn predicted_saving(film: &Film, judgement: &Judgement, wanted: &Plane, rung: f64) -> f64 {
+    let counts = wanted.values().iter().enumerate().map(|(i, &wanted)| f64::from(wanted).max(film.samples(i).into()));
+    let mean_count = counts.sum::<f64>() / wanted.values().len() as f64;
+    let saving = |for_one_sample: &Plane| {
+        let uniform = (for_one_sample.quantile(1.0 - TOLERATED_SHARE) / rung).powi(2);
+        1.0 - mean_count / uniform
+    };
+    // Mostly the saving is large. A look without the masks' pooling, which costs one blur and not twenty transforms, tells.
+    let variance = &judgement.pooled_variance_per_sample;
+    let allowed = judgement.allowed_standard_error_cd_m2();
+    let energy = Plane::from_fn(variance.width(), variance.height(), |x, y| {
+        variance.get(x, y) / (allowed.get(x, y) * allowed.get(x, y))
+    });
+    let roughly = saving(&judgement.thresholds.pooled(&energy).map(f32::sqrt));
+    if roughly > 4.0 * LEAST_SAVING { roughly } else { saving(&judgement.visibility_of(variance)) }
+}
+
+/// Share of pixels whose predicted visibility is above `visibility`.
+pub fn visible_share(judgement: &Judgement, visibility: f64) -> f64 {
+    let values = judgement.predicted.values();
+    values.iter().filter(|&&v| f64::from(v) > visibility).count() as f64 / values.len() as f64
+}
