@@ -6,7 +6,7 @@ use crate::display::Viewing;
 use crate::error::Error;
 use crate::plane::Plane;
 use crate::psychometric::detection_probability;
-use crate::threshold::{ThresholdInputs, ThresholdMap, chromatic_threshold_map, ratio, threshold_map};
+use crate::threshold::{ThresholdInputs, ThresholdMap, chromatic_threshold_map, threshold_map};
 
 /// What an observer sees of the difference of two pictures.
 #[derive(Clone, Debug, PartialEq)]
@@ -128,7 +128,7 @@ fn mutual_visibility(mut map: ThresholdMap, test_map: &ThresholdMap, reference: 
     for (elevation, test_elevation) in map.elevations.iter_mut().zip(&test_map.elevations) {
         elevation.combine(test_elevation, |reference, test, _, _| reference.min(test));
     }
-    map.measured_visibility(&ratio(test, reference, |test, reference| test - reference))
+    map.measured_visibility(&test.combined(reference, |test, reference| test - reference))
 }
 
 /// Sensitivity below 0.5 cpd as at 0.5 cpd, 0 included.

@@ -15,7 +15,7 @@ use crate::fft::{complex_plans, smooth_size};
 use crate::noise_gain::noise_gain;
 use crate::plane::Plane;
 use crate::sensitivity::luminance_coordinate;
-use crate::threshold::{ThresholdMap, ratio};
+use crate::threshold::ThresholdMap;
 
 /// Angles the formula holds for, degrees: closer in, scatter is part of the eye's point spread and of its contrast sensitivity.
 const VALID_DEG: std::ops::Range<f64> = 0.1..100.0;
@@ -96,7 +96,7 @@ pub(crate) fn keep_thresholds(veiled: &mut ThresholdMap, clear: &ThresholdMap) {
     }
     let gain = noise_gain(&veiled.tables, &veiled.adaptation_cd_m2, &veiled.elevations);
     // Elevations hold at every second pixel and are interpolated; this holds at every pixel.
-    veiled.noise_gain = ratio(&gain, &clear.noise_gain, f32::min);
+    veiled.noise_gain = gain.combined(&clear.noise_gain, f32::min);
 }
 
 /// Veil at a cell's centre from 1 cd/m² on one pixel of the cell `offset` cells away, on average over that cell.

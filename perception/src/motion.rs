@@ -70,7 +70,7 @@ pub fn image_velocity_deg_s(motion_x_px: &Plane, motion_y_px: &Plane, display: &
     let density = display.pixel_density();
     let scale = |pixels_per_degree: f64| (display.frames_per_second / pixels_per_degree) as f32;
     let (scale_x, scale_y) = (scale(density.horizontal), scale(density.vertical));
-    let speed = crate::threshold::ratio(motion_x_px, motion_y_px, |x, y| {
+    let speed = motion_x_px.combined(motion_y_px, |x, y| {
         let speed = (x * scale_x).hypot(y * scale_y);
         if speed.is_finite() { speed } else { 0.0 }
     });

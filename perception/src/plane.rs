@@ -98,6 +98,22 @@ impl Plane {
         mapped
     }
 
+    /// A plane of `with(a, b)` for the values of this plane and of another of the same shape.
+    ///
+    /// # Panics
+    /// Unless the other plane has as many columns and rows.
+    #[must_use]
+    pub fn combined(&self, other: &Self, with: impl Fn(f32, f32) -> f32 + Sync) -> Self {
+        assert_eq!((self.width, self.height), (other.width, other.height), "planes of two shapes");
+        let mut result = self.clone();
+        result.for_each_row_mut(|y, row| {
+            for (value, other) in row.iter_mut().zip(other.row(y)) {
+                *value = with(*value, *other);
+            }
+        });
+        result
+    }
+
     /// Arithmetic mean, summed in `f64`; 0 for a plane without pixels.
     #[must_use]
     pub fn mean(&self) -> f64 {

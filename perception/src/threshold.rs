@@ -148,7 +148,7 @@ fn masked(
         transform: &transform,
         contrast: &contrast,
         noise: noise_variance.map_or_else(Vec::new, |variance| {
-            halvings(&ratio(variance, &adaptation_cd_m2, |value, adaptation| value / adaptation / adaptation))
+            halvings(&variance.combined(&adaptation_cd_m2, |value, adaptation| value / adaptation / adaptation))
         }),
         coordinates: &reduced_coordinates(&adaptation_cd_m2, 2),
         density,
@@ -193,7 +193,7 @@ impl ThresholdMap {
     #[must_use]
     pub fn masking_elevation(&self) -> Plane {
         let unmasked = noise_gain(&self.tables, &self.adaptation_cd_m2, &[]);
-        ratio(&unmasked, &self.noise_gain, |unmasked, masked| (unmasked / masked).sqrt())
+        unmasked.combined(&self.noise_gain, |unmasked, masked| (unmasked / masked).sqrt())
     }
 
     /// The same thresholds for error that moves over the retina at `retinal_velocity_deg_s` (see [`crate::motion`]).
@@ -233,17 +233,6 @@ impl ThresholdMap {
     pub fn height(&self) -> usize {
         self.adaptation_cd_m2.height()
     }
-}
-
-/// `change(a, b)` at every pixel of two planes of one size.
-pub(crate) fn ratio(a: &Plane, b: &Plane, change: impl Fn(f32, f32) -> f32 + Sync) -> Plane {
-    let mut result = a.clone();
-    result.for_each_row_mut(|y, row| {
-        for (value, other) in row.iter_mut().zip(b.row(y)) {
-            *value = change(*value, *other);
-        }
-    });
-    result
 }
 
 #[cfg(test)]

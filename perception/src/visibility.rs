@@ -9,7 +9,7 @@ use crate::fft::{PictureTransform, Workspace, enlarged, reduced_pixel, reduced_s
 use crate::filter::gaussian_blur_xy;
 use crate::plane::Plane;
 use crate::sensitivity::luminance_coordinate;
-use crate::threshold::{POOLING_SIGMA_DEG, ThresholdMap, ratio};
+use crate::threshold::{POOLING_SIGMA_DEG, ThresholdMap};
 
 /// An error of this many times the adaptation luminance is hopelessly visible; more would only cost the rest of the
 /// transform its precision.
@@ -41,7 +41,7 @@ impl ThresholdMap {
         if !self.fits(variance_of_mean) {
             return self.infinite();
         }
-        let relative = ratio(variance_of_mean, &self.adaptation_cd_m2, |variance, adaptation| {
+        let relative = variance_of_mean.combined(&self.adaptation_cd_m2, |variance, adaptation| {
             if variance.is_finite() && variance >= 0.0 {
                 (variance / adaptation / adaptation).min(LARGEST_RELATIVE_VARIANCE)
             } else {
@@ -65,7 +65,7 @@ impl ThresholdMap {
             });
         }
         let visibility = self.pooled(&energy).map(|energy| (2.0 * energy).sqrt());
-        ratio(&visibility, variance_of_mean, |visibility, variance| {
+        visibility.combined(variance_of_mean, |visibility, variance| {
             if variance.is_finite() && variance >= 0.0 { visibility } else { f32::INFINITY }
         })
     }
@@ -113,7 +113,7 @@ impl ThresholdMap {
     /// Σ_b (`V_b` / `m_b`)² at every pixel.
     fn error_energy(&self, half_difference: &Plane) -> Plane {
         let density = self.viewing.display.pixel_density();
-        let relative = ratio(half_difference, &self.adaptation_cd_m2, |difference, adaptation| {
+        let relative = half_difference.combined(&self.adaptation_cd_m2, |difference, adaptation| {
             if difference.is_finite() {
                 (difference / adaptation).clamp(-LARGEST_RELATIVE_ERROR, LARGEST_RELATIVE_ERROR)
             } else {
@@ -270,7 +270,7 @@ mod tests {
         let mut measured = Plane::filled(256, 256, 0.0);
         for seed in 0..16 {
             let one = map.measured_visibility(&noise(256, 256, sigma, 100 + seed));
-            measured = ratio(&measured, &one, |sum, v| sum + v * v / 16.0);
+            measured = measured.combined(&one, |sum, v| sum + v * v / 16.0);
         }
         for (x, y) in [(32, 32), (96, 32), (160, 32), (224, 32), (32, 96), (96, 96), (224, 160), (160, 160), (128, 128)]
         {

@@ -145,7 +145,7 @@ impl Judgement {
         };
         match &self.importance {
             None => allowed,
-            Some(map) => combined(&allowed, map, |allowed, factor| allowed * factor),
+            Some(map) => allowed.combined(map, |allowed, factor| allowed * factor),
         }
     }
 
@@ -153,7 +153,7 @@ impl Judgement {
     fn per_importance(&self, visibility: Plane) -> Plane {
         match &self.importance {
             None => visibility,
-            Some(map) => combined(&visibility, map, |visibility, factor| visibility / factor),
+            Some(map) => visibility.combined(map, |visibility, factor| visibility / factor),
         }
     }
 
@@ -170,10 +170,6 @@ impl Judgement {
             MeasuredError { visibility: self.per_importance(visibility), amplitude: self.per_importance(amplitude) }
         })
     }
-}
-
-fn combined(a: &Plane, b: &Plane, with: impl Fn(f32, f32) -> f32 + Sync) -> Plane {
-    Plane::from_fn(a.width(), a.height(), |x, y| with(a.get(x, y), b.get(x, y)))
 }
 
 /// Displayed variance over scene variance of each pixel, by channel, at the size that its variance has now: what the display

@@ -57,6 +57,14 @@ impl RenderState {
         Self::of_film(Film::new(width, height), limits.max_samples.min(limits.mean_samples.unwrap_or(u32::MAX)))
     }
 
+    /// Its samples, the time that they took and what audits found, less what was decided: for other settings.
+    #[must_use]
+    pub fn begun_anew(self, limits: &Limits) -> Self {
+        let Self { film, inflation, plans, passes, seconds_total, seconds_perception, seconds_allocation, .. } = self;
+        let fresh = Self::of_film(film, limits.max_samples.min(limits.mean_samples.unwrap_or(u32::MAX)));
+        Self { inflation, plans, passes, seconds_total, seconds_perception, seconds_allocation, ..fresh }
+    }
+
     /// A film about which nothing has been decided: empty, merged from others, or made for other eyes. Planned is what it
     /// lacks of a pilot of 8 + 8 samples a pixel, or of `most_samples` in all.
     pub fn of_film(film: Film, most_samples: u32) -> Self {

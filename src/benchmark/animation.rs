@@ -5,7 +5,7 @@
 //! stills.
 
 use super::metrics::video_jod;
-use crate::adaptive::plan::{pilot_plan, uniform_plan};
+use super::reference::trace_up_to;
 use crate::adaptive::settings::{Limits, LoopSettings, Sampling};
 use crate::adaptive::{Quiet, render};
 use crate::animate::track::Track;
@@ -175,21 +175,11 @@ impl<'a> Bench<'a> {
             let tracer = self.tracer(index, stream);
             let mut film = Film::new(self.settings.size.0, self.settings.size.1);
             for (frames, &count) in by_count.iter_mut().zip(counts) {
-                while film.total_samples() < u64::from(count) * self.pixels() {
-                    let plan = match film.total_samples() {
-                        0 => pilot_plan(film.width() * film.height(), count),
-                        _ => uniform_plan(&film, count),
-                    };
-                    tracer.trace(&plan, &mut film, &|_| {});
-                }
+                trace_up_to(&tracer, &mut film, count);
                 frames.push(self.displayed(index, &film));
             }
         }
         Ok(by_count)
-    }
-
-    fn pixels(&self) -> u64 {
-        u64::from(self.settings.size.0) * u64::from(self.settings.size.1)
     }
 
     fn tracer(&self, index: usize, stream: u64) -> PathTracer {

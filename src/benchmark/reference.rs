@@ -2,7 +2,7 @@
 
 use super::{BenchSettings, Subject};
 use crate::adaptive::judge::{display_scale, judge};
-use crate::adaptive::plan::{pilot_plan, uniform_plan};
+use crate::adaptive::plan::uniform_plan;
 use crate::adaptive::statistics::SampleStatistics;
 use crate::film::{CHANNELS, Film};
 use crate::integrator::PathTracer;
@@ -160,11 +160,15 @@ impl Reference {
     }
 }
 
-/// Doubles every pixel of a film, or begins it, so that each has `spp` samples.
-fn trace_up_to(tracer: &PathTracer, film: &mut Film, spp: u32) {
-    let plan =
-        if film.total_samples() == 0 { pilot_plan(film.width() * film.height(), spp) } else { uniform_plan(film, spp) };
-    tracer.trace(&plan, film, &|_| {});
+/// Takes what a film lacks of `spp` samples in every pixel.
+pub(crate) fn trace_up_to(tracer: &PathTracer, film: &mut Film, spp: u32) {
+    loop {
+        let plan = uniform_plan(film, spp);
+        if plan.blocks.is_empty() {
+            return;
+        }
+        tracer.trace(&plan, film, &|_| {});
+    }
 }
 
 impl Subject {

@@ -37,7 +37,7 @@ impl Truth {
             signals(&displayed_rgb(&display, &mapped), width, height)
         });
         let own_energy = std::array::from_fn(|c| {
-            let half_difference = combine(&halves[0][c], &halves[1][c], |a, b| 0.5 * (a - b));
+            let half_difference = halves[0][c].combined(&halves[1][c], |a, b| 0.5 * (a - b));
             squared_visibility(channel(&thresholds, c), &half_difference)
         });
         let shown = signals(&displayed, width, height);
@@ -60,10 +60,10 @@ impl Truth {
         let mut most = Plane::filled(self.width, self.height, 0.0);
         let known = self.shown.iter().zip(&self.own_energy).enumerate();
         for (shown, (c, (reference, own_energy))) in shown.iter().zip(known) {
-            let difference = combine(shown, reference, |a, b| a - b);
+            let difference = shown.combined(reference, |a, b| a - b);
             let energy = squared_visibility(channel(&self.thresholds, c), &difference);
-            let of_render = combine(&energy, own_energy, |energy, own| (energy - own).max(0.0));
-            most = combine(&most, &of_render, f32::max);
+            let of_render = energy.combined(own_energy, |energy, own| (energy - own).max(0.0));
+            most = most.combined(&of_render, f32::max);
         }
         most
     }
@@ -88,9 +88,4 @@ fn signals(rgb_cd_m2: &[[f32; 3]], width: usize, height: usize) -> [Plane; CHANN
         signal(|rgb| opponent(rgb).red_green),
         signal(|rgb| opponent(rgb).yellow_violet),
     ]
-}
-
-/// A plane of two others' values.
-pub(crate) fn combine(a: &Plane, b: &Plane, with: impl Fn(f32, f32) -> f32 + Sync) -> Plane {
-    Plane::from_fn(a.width(), a.height(), |x, y| with(a.get(x, y), b.get(x, y)))
 }

@@ -72,22 +72,15 @@ impl CheckpointArguments {
         let seeds = found.seeds.continued_by(seed).map_err(different)?;
         let state = if found.settings != header.settings {
             eprintln!("note: the film was sampled by other settings: its samples are kept, its ladder begins anew");
-            begun_anew(state, limits, 1.0)
+            // Other eyes: what audits found of these samples' visible energy does not hold for them.
+            RenderState { inflation: 1.0, ..state.begun_anew(limits) }
         } else if found.seeds.current.is_none() {
-            let inflation = state.inflation;
-            begun_anew(state, limits, inflation)
+            state.begun_anew(limits)
         } else {
             state
         };
         Ok(Start { header: Header { seeds, ..header }, state })
     }
-}
-
-/// The samples and the time of a state, less what was decided.
-fn begun_anew(state: RenderState, limits: &Limits, inflation: f64) -> RenderState {
-    let RenderState { film, plans, passes, seconds_total, seconds_perception, seconds_allocation, .. } = state;
-    let fresh = RenderState::of_film(film, limits.max_samples.min(limits.mean_samples.unwrap_or(u32::MAX)));
-    RenderState { inflation, plans, passes, seconds_total, seconds_perception, seconds_allocation, ..fresh }
 }
 
 /// Writes the film's file so often that a kill never costs more than was agreed.

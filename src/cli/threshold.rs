@@ -126,16 +126,13 @@ fn half_difference(
     fitted: Option<&dyn tone::FittedTone>,
     viewing: &fechner_perception::Viewing,
 ) -> Plane {
-    let combine = |a: &Plane, b: &Plane, with: fn(f32, f32) -> f32| {
-        Plane::from_fn(a.width(), a.height(), |x, y| with(a.get(x, y), b.get(x, y)))
-    };
     match (a.scene_luminance(), b.scene_luminance(), fitted) {
         (Some(a), Some(b), Some(fitted)) => {
-            let mean = combine(&a, &b, |a, b| 0.5 * (a + b));
-            let difference = combine(&a, &b, |a, b| 0.5 * (a - b));
+            let mean = a.combined(&b, |a, b| 0.5 * (a + b));
+            let difference = a.combined(&b, |a, b| 0.5 * (a - b));
             seen::display_half_difference(fitted, &viewing.display, &mean, &difference)
         }
-        _ => combine(&a.displayed(fitted, viewing), &b.displayed(fitted, viewing), |a, b| 0.5 * (a - b)),
+        _ => a.displayed(fitted, viewing).combined(&b.displayed(fitted, viewing), |a, b| 0.5 * (a - b)),
     }
 }
 

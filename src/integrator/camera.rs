@@ -1,7 +1,7 @@
 //! Rays of the camera: perspective or orthographic, through a thin lens, from where it is while the shutter is open.
 
 use crate::geometry::Ray;
-use crate::scene::{Camera, Motion, Projection, ScreenWindow};
+use crate::scene::{Camera, CameraAxes, Motion, Projection, ScreenWindow};
 use glam::{Vec2, Vec3, Vec3A};
 use std::f32::consts::FRAC_PI_4;
 
@@ -37,10 +37,7 @@ pub struct CameraSample {
 impl CameraRays {
     /// For a picture of `width` × `height` pixels.
     pub fn new(camera: &Camera, width: u32, height: u32) -> Self {
-        let forward = camera.forward.normalize_or(Vec3::NEG_Z);
-        let right = forward.cross(camera.up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector());
-        let up = right.cross(forward);
-        let right = if camera.mirrored { -right } else { right };
+        let CameraAxes { forward, right, up } = camera.axes();
         let (half_height, parallel) = match camera.projection {
             Projection::Perspective { vertical_fov_deg } => ((vertical_fov_deg.to_radians() * 0.5).tan(), false),
             Projection::Orthographic { height } => (0.5 * height, true),

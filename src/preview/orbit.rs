@@ -1,6 +1,6 @@
 //! The camera in somebody's hand.
 
-use crate::scene::{Camera, Projection};
+use crate::scene::{Camera, CameraAxes, Projection};
 use glam::{Quat, Vec3};
 use serde::Deserialize;
 use std::f32::consts::FRAC_PI_2;
@@ -54,18 +54,10 @@ impl Held {
         }
     }
 
-    fn axes(&self) -> (Vec3, Vec3, Vec3) {
-        let camera = &self.camera;
-        let forward = camera.forward.normalize_or(Vec3::NEG_Z);
-        let right = forward.cross(camera.up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector());
-        let up = right.cross(forward);
-        (forward, if camera.mirrored { -right } else { right }, up)
-    }
-
     fn orbit(&mut self, right: f32, up: f32) {
         /// How near to the pole the camera may come, in radians.
         const POLE: f32 = 0.02;
-        let (forward, sideways, _) = self.axes();
+        let CameraAxes { forward, right: sideways, .. } = self.camera.axes();
         let pole = self.camera.up.normalize_or(Vec3::Y);
         let pivot = self.camera.position + forward * self.pivot_distance;
         let elevation = FRAC_PI_2 - (-forward).angle_between(pole);
@@ -77,7 +69,7 @@ impl Held {
     }
 
     fn pan(&mut self, right: f32, up: f32) {
-        let (_, sideways, upwards) = self.axes();
+        let CameraAxes { right: sideways, up: upwards, .. } = self.camera.axes();
         let height = match self.camera.projection {
             Projection::Perspective { vertical_fov_deg } => {
                 2.0 * self.pivot_distance * (0.5 * vertical_fov_deg.to_radians()).tan()
@@ -93,7 +85,7 @@ impl Held {
             *height *= factor;
             return;
         }
-        let (forward, ..) = self.axes();
+        let CameraAxes { forward, .. } = self.camera.axes();
         let way = self.pivot_distance * (1.0 - factor);
         self.camera.position += forward * way;
         self.pivot_distance -= way;

@@ -63,7 +63,7 @@ pub(super) fn watch_file(path: &Path, shared: &Shared) {
 }
 
 /// What viewers changed, in place of what the job says.
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Live {
     exposure: Option<f64>,
     operator: Option<String>,
@@ -282,11 +282,7 @@ impl<'a> Session<'a> {
 
     /// Other settings for the samples that there are.
     fn change(&mut self, edit: impl FnOnce(&mut Live), changed: Changed) {
-        let before = Live {
-            exposure: self.live.exposure,
-            operator: self.live.operator.clone(),
-            visibility: self.live.visibility,
-        };
+        let before = self.live.clone();
         edit(&mut self.live);
         match settings_of(&self.job, &self.live) {
             Err(problem) => {
@@ -310,7 +306,9 @@ impl<'a> Session<'a> {
             }
             Changed::Target => {}
             Changed::Seen => {
-                begin_anew(&mut self.state, &self.settings);
+                let limits = &self.settings.limits;
+                let state = std::mem::replace(&mut self.state, RenderState::new(0, 0, limits));
+                self.state = state.begun_anew(limits);
                 self.order_pilot();
                 self.screen.looked = None;
             }
@@ -386,15 +384,4 @@ fn settings_of(job: &Job, live: &Live) -> Result<LoopSettings, String> {
     let limits = crate::adaptive::settings::Limits { visibility, ..job.limits };
     let settings = record.loop_settings(limits).map_err(|error| error.to_string())?;
     Ok(LoopSettings { importance: job.importance.clone(), ..settings })
-}
-
-/// Forgets what was decided and keeps the samples, their time and what audits found.
-fn begin_anew(state: &mut RenderState, settings: &LoopSettings) {
-    let limits = &settings.limits;
-    let most_samples = limits.max_samples.min(limits.mean_samples.unwrap_or(u32::MAX));
-    let nothing = RenderState::new(0, 0, limits);
-    let RenderState { film, inflation, plans, passes, seconds_total, seconds_perception, seconds_allocation, .. } =
-        std::mem::replace(state, nothing);
-    let fresh = RenderState::of_film(film, most_samples);
-    *state = RenderState { inflation, plans, passes, seconds_total, seconds_perception, seconds_allocation, ..fresh };
 }

@@ -51,7 +51,26 @@ pub struct ScreenWindow {
     pub max: Vec2,
 }
 
+/// Unit directions of a camera in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraAxes {
+    /// Into the picture.
+    pub forward: Vec3,
+    /// Along its rows, from left to right.
+    pub right: Vec3,
+    /// Along its columns, from below to above.
+    pub up: Vec3,
+}
+
 impl Camera {
+    /// Where it looks and how the picture lies; any right and up where `up` is parallel to `forward`.
+    pub fn axes(&self) -> CameraAxes {
+        let forward = self.forward.normalize_or(Vec3::NEG_Z);
+        let right = forward.cross(self.up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector());
+        let up = right.cross(forward);
+        CameraAxes { forward, right: if self.mirrored { -right } else { right }, up }
+    }
+
     /// A pinhole at rest, focused (should it get a lens) at distance 1.
     pub fn pinhole(position: Vec3, forward: Vec3, up: Vec3, vertical_fov_deg: f32) -> Self {
         Self {

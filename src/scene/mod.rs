@@ -14,7 +14,7 @@ pub mod hash;
 pub mod load;
 pub mod texture;
 
-pub use camera::{Camera, Projection, ScreenWindow};
+pub use camera::{Camera, CameraAxes, Projection, ScreenWindow};
 pub use environment::{Environment, Parametrisation};
 pub use light::{Light, SpotFalloff};
 pub use material::{Alpha, Material};

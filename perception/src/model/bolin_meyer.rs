@@ -6,7 +6,6 @@ use crate::error::Error;
 use crate::filter::gaussian_blur;
 use crate::masking::threshold_elevation;
 use crate::plane::Plane;
-use crate::threshold::ratio;
 
 /// After "A perceptually based adaptive sampling algorithm", SIGGRAPH 1998: the picture in Haar bands, each with its own
 /// contrast sensitivity and masked by its own contrast; samples go where the error of a band could be seen.
@@ -37,11 +36,10 @@ impl ThresholdModel for BolinMeyer {
             let side = (1_usize << level) as f64;
             // A box of side s has the variance of a Gaussian of σ = √((s² − 1) / 12).
             let coarser = gaussian_blur(inputs.display_luminance_cd_m2, ((side * side - 1.0) / 12.0).sqrt());
-            let detail = ratio(&finer, &coarser, |finer, coarser| (finer - coarser).powi(2));
+            let detail = finer.combined(&coarser, |finer, coarser| (finer - coarser).powi(2));
             // √2 times the RMS over the block: the amplitude of a grating.
-            let contrast = ratio(&gaussian_blur(&detail, 0.5 * side), &adaptation, |energy, adaptation| {
-                (2.0 * energy.max(0.0)).sqrt() / adaptation
-            });
+            let contrast = gaussian_blur(&detail, 0.5 * side)
+                .combined(&adaptation, |energy, adaptation| (2.0 * energy.max(0.0)).sqrt() / adaptation);
             // A Haar detail of side s passes 1/(2s) to 1/s cycles a pixel; its middle is 0.75/s.
             let sensitivity =
                 PerLuminance::new(|luminance| gain * inputs.csf.sensitivity(0.75 * ppd / side, luminance));

@@ -89,7 +89,7 @@ fn scattered_fireflies_do_not_move_adaptation() {
     }
     assert!(fireflies > 20);
     let (clean, dirty) = (map_of(&clean, &viewing(60.0)), map_of(&dirty, &viewing(60.0)));
-    let change = ratio(dirty.adaptation_cd_m2(), clean.adaptation_cd_m2(), |dirty, clean| dirty / clean);
+    let change = dirty.adaptation_cd_m2().combined(clean.adaptation_cd_m2(), |dirty, clean| dirty / clean);
     let (least, greatest) = change.range();
     assert!(least > 0.999 && greatest < 1.02, "{least} {greatest}");
 }
