@@ -9,9 +9,11 @@
 
 mod animation;
 mod arm;
+mod curve;
 mod metrics;
 mod oracle;
 mod pictures;
+mod plot;
 mod record;
 mod reference;
 mod report;
@@ -21,6 +23,7 @@ mod truth;
 
 pub use animation::{AnimationRow, AnimationSettings, animation};
 pub use arm::Arm;
+pub use curve::{Curve, CurvePoint};
 pub use record::{Record, Results};
 
 use crate::adaptive::settings::{Limits, LoopSettings};
@@ -166,6 +169,7 @@ pub fn run(settings: &BenchSettings, say: &dyn Fn(&str)) -> Result<Results> {
             let runs = runner.runs(arm, say)?;
             results.add(&subject, &reference, arm, &runs);
             results.pictures.push(runner.pictures(arm));
+            results.curves.extend(runner.curve(arm, &runs)?);
         }
         say(&results.scene_lines(&subject.name));
         results.summarise();
