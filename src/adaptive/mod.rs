@@ -416,7 +416,7 @@ impl<'a> Loop<'a> {
 }
 
 /// The first blocks of at most so many samples in all, at least one.
-fn beginning(blocks: &[BlockWork], most_samples: u64) -> &[BlockWork] {
+pub(crate) fn beginning(blocks: &[BlockWork], most_samples: u64) -> &[BlockWork] {
     let mut samples = 0;
     let within = |block: &&BlockWork| {
         samples += u64::from(block.samples);

@@ -22,7 +22,7 @@ pub enum Progress {
         /// Numbers of the units that are missing, ascending.
         missing: Vec<u64>,
     },
-    /// All there is to wait for is there.
+    /// All there is to wait for is there, or orders have to be written again.
     ToMerge {
         /// Its last round; `None` where the merge begins with the first.
         round: Option<RoundRecord>,
@@ -39,7 +39,12 @@ pub fn progress(farm: &Farm, frame_index: usize) -> Progress {
     let Some(round) = open_round(farm, frame_index) else { return Progress::ToMerge { round: None } };
     let is_missing = |unit: &u64| !farm.unit_file(*unit, "sums").exists();
     let missing: Vec<u64> = round.units.iter().map(|unit| unit.unit).filter(is_missing).collect();
-    if missing.is_empty() { Progress::ToMerge { round: Some(round) } } else { Progress::Open { round, missing } }
+    let can_be_rendered = |unit: &u64| farm.unit_file(*unit, "order").exists();
+    if missing.iter().all(can_be_rendered) && !missing.is_empty() {
+        Progress::Open { round, missing }
+    } else {
+        Progress::ToMerge { round: Some(round) }
+    }
 }
 
 /// What a frame's film is traced and judged by.

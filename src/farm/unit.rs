@@ -1,6 +1,7 @@
 //! Units: what is to be sampled, and its sums. Executed here, never decided.
 
 use super::folder::Farm;
+use crate::adaptive::beginning;
 use crate::film::BlockSum;
 use crate::integrator::{BlockWork, PathTracer};
 use crate::output::OutputError;
@@ -161,6 +162,9 @@ impl UnitSums {
     }
 }
 
+/// Samples that a thread takes between two wishes: half a second in a simple scene. Schedulers kill 30 seconds after they asked.
+const MOST_SAMPLES_A_THREAD: u64 = 1 << 17;
+
 /// Samples what an order asks for after `begun`, and writes the sums: a checkpoint every so often and where `wish` asks for it,
 /// the result at the end.
 ///
@@ -180,7 +184,8 @@ pub fn render_unit(
     let seconds_before = sums.seconds;
     let mut last_kept = started;
     while let rest @ [_, ..] = &order.order.blocks[sums.sums.len()..] {
-        tracer.sum_batch(rest, &mut sums.sums, &|_| {});
+        let batch = beginning(rest, MOST_SAMPLES_A_THREAD * rayon::current_num_threads() as u64);
+        tracer.sum_batch(batch, &mut sums.sums, &|_| {});
         sums.seconds = seconds_before + started.elapsed().as_secs_f64();
         if sums.sums.len() == order.order.blocks.len() {
             break;

@@ -129,7 +129,7 @@ fn order_repetition_and_bad_files_change_nothing() {
     assert!(unit("2").contains("refused"));
     let message = unit("3");
     assert!(message.contains("unit-000003.partial") && message.contains("refused"), "{message}");
-    run(&farm, 2, &["farm", "unit", ".", "1"]);
+    assert!(run(&farm, 2, &["farm", "unit", ".", "1"]).contains("fechner farm merge writes it again"));
     run(&farm, 75, &["farm", "merge", "."]);
     unit("1");
     unit("0");

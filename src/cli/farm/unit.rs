@@ -63,6 +63,8 @@ pub(super) enum Went {
     Busy,
     /// A signal ended it; its checkpoint is there.
     Left,
+    /// Its order was damaged or lost; the next merge writes it again.
+    HasNoOrder,
 }
 
 /// Renders units of one farm, and keeps the last scene that it loaded.
@@ -83,8 +85,10 @@ pub(super) fn run(arguments: &UnitArguments) -> Result<ExitCode> {
         let job = options.job()?;
         let mut bench = Bench::new(&farm, &job, &signals, arguments.keeping.every());
         for &unit in &arguments.units {
-            if bench.render(unit, IfBusy::Wait)? == Went::Left {
-                return Ok(ExitCode::from(CALL_AGAIN));
+            match bench.render(unit, IfBusy::Wait)? {
+                Went::Rendered | Went::WasThere => {}
+                Went::Left | Went::Busy => return Ok(ExitCode::from(CALL_AGAIN)),
+                Went::HasNoOrder => bail!("unit {unit} has no order: fechner farm merge writes it again"),
             }
         }
         Ok(ExitCode::SUCCESS)
@@ -132,10 +136,10 @@ impl<'a> Bench<'a> {
     fn is_merged(&self, unit: u64) -> Result<bool> {
         let place = self.farm.place(unit);
         let number = self.farm.frame(place.frame_index).frame;
-        let (round, was_merged) = match progress(self.farm, place.frame_index) {
+        let round = match progress(self.farm, place.frame_index) {
             Progress::Done => return Ok(true),
-            Progress::Open { round, .. } => (Some(round), false),
-            Progress::ToMerge { round } => (round, false),
+            Progress::Open { round, .. } => Some(round),
+            Progress::ToMerge { round } => round,
         };
         let Some(round) = round else {
             bail!("unit {unit} is not planned: frame {number} has no round yet; fechner farm merge makes one")
@@ -151,11 +155,17 @@ impl<'a> Bench<'a> {
                 planned.join(", ")
             );
         }
-        Ok(was_merged)
+        Ok(false)
     }
 
     fn render_locked(&mut self, unit: u64) -> Result<Went> {
-        let order = NamedOrder::read(self.farm, unit)?;
+        let order = match NamedOrder::read(self.farm, unit) {
+            Ok(order) => order,
+            Err(error) => {
+                self.refuse(&self.farm.unit_file(unit, "order"), &error);
+                return Ok(Went::HasNoOrder);
+            }
+        };
         let sums = self.farm.unit_file(unit, "sums");
         match UnitSums::read(&sums, &order) {
             Ok(_) => {

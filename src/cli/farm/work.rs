@@ -54,7 +54,7 @@ pub(super) fn run(arguments: &WorkArguments) -> Result<ExitCode> {
                             match bench.render(unit, IfBusy::Skip)? {
                                 Went::Rendered => did_something = true,
                                 Went::Left => return Ok(ExitCode::from(CALL_AGAIN)),
-                                Went::WasThere | Went::Busy => {}
+                                Went::WasThere | Went::Busy | Went::HasNoOrder => {}
                             }
                         }
                     }
