@@ -5,6 +5,7 @@ use crate::adaptive::state::RenderState;
 use crate::adaptive::{Progress, StopReason, visible_share};
 use crate::preview::command::{Phase, Status};
 use crate::preview::shared::Shared;
+use fechner_perception::display::Display;
 use fechner_perception::tone::operator_names;
 
 impl Session<'_> {
@@ -36,6 +37,10 @@ impl Session<'_> {
             exposure: self.live.exposure.or(self.job.record.exposure_stops),
             operator: self.live.operator.clone().unwrap_or_else(|| self.job.record.operator.clone()),
             operators: operator_names(),
+            display: self.settings.viewing.display.name.clone(),
+            displays: Display::preset_names(),
+            distance: self.live.distance.unwrap_or(1.0),
+            pixels_per_degree: self.settings.viewing.display.pixels_per_degree,
             camera: self.held.to_toml(),
             error: self.error.clone(),
             note: self.note.clone(),
