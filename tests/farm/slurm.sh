@@ -27,6 +27,7 @@ chmod 755 "$run"
 mkdir "$run/munge" "$run/spool" "$run/state"
 chown munge "$run/munge"
 stop() {
+    squeue -h -o %A 2>/dev/null | sort -u | xargs -r timeout 10 scancel 2>/dev/null || true
     for daemon in slurmd slurmctld munge/munged; do
         [[ ! -s "$run/$daemon.pid" ]] || kill "$(cat "$run/$daemon.pid")" 2>/dev/null || true
     done
