@@ -187,7 +187,7 @@ pub fn run(
 #[derive(Debug)]
 pub enum Next {
     /// More is planned, and not traced.
-    Planned(RenderState),
+    Planned(Box<RenderState>),
     /// Nothing.
     Ended(Box<Ended>),
 }
@@ -211,7 +211,7 @@ pub fn decide(
         return Ok(Next::Ended(Box::new(render.finish(judgement, reason, monitor)?)));
     }
     render.state.seconds_total = render.seconds();
-    Ok(Next::Planned(render.state))
+    Ok(Next::Planned(Box::new(render.state)))
 }
 
 impl<'a> Loop<'a> {

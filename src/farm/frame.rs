@@ -118,7 +118,7 @@ pub fn merge_frame(
     }
     loop {
         state = match decide(job.tracer, job.settings, state, monitor)? {
-            Next::Planned(state) => state,
+            Next::Planned(state) => *state,
             Next::Ended(ended) => return Ok(Merged::Ended(ended)),
         };
         if orders(farm, frame_index, &state).next().is_some() {

@@ -13,6 +13,7 @@
 //! frame-0007/round-003/unit-001234.*     order, partial (checkpoint), sums (result), lock
 //! frame-0007/result.json                 the frame is done
 //! pictures/
+//! concluded                              what needs all frames is made
 //! ```
 //!
 //! Every file is complete or not there; locks spare work and protect nothing. Schedulers are outside: they run commands.

@@ -7,7 +7,8 @@ use clap::Args;
 use fechner::adaptive::{Ended, Quiet, Rendered};
 use fechner::farm::Farm;
 use fechner::farm::frame::{FrameJob, Merged, Progress, finish, merge_frame, progress};
-use fechner::farm::lock::wait_for_lock;
+use fechner::farm::lock::{try_lock, wait_for_lock};
+use fechner::output;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -99,8 +100,16 @@ pub(super) fn merge(farm: &Farm, job: &Job<'_>, frame_index: usize) -> Result<bo
     }
 }
 
-/// Makes what needs all frames, when all are done.
+/// Makes what needs all frames, once, when all are done; where another process is at it, leaves it to that.
 pub(super) fn conclude(farm: &Farm, job: &Job<'_>) -> Result<()> {
     let is_done = |frame_index| progress(farm, frame_index) == Progress::Done;
-    if (0..farm.manifest().frames.len()).all(is_done) { job.conclude() } else { Ok(()) }
+    let marker = farm.folder().join("concluded");
+    if marker.exists() || !(0..farm.manifest().frames.len()).all(is_done) {
+        return Ok(());
+    }
+    let Some(lock) = try_lock(&farm.folder().join("lock"))? else { return Ok(()) };
+    job.conclude()?;
+    output::write_beside(&marker, |_| Ok(()))?;
+    drop(lock);
+    Ok(())
 }
