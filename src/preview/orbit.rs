@@ -61,6 +61,11 @@ pub(super) struct Held {
 }
 
 impl Held {
+    /// Where the scene has put it; it turns about what is in focus.
+    pub(super) fn at_home(camera: &Camera) -> Self {
+        Self { camera: camera.clone(), pivot_distance: camera.focus_distance }
+    }
+
     /// Moves it. A camera that moved while its shutter was open rests from here on.
     pub(super) fn moved(&mut self, movement: Movement) {
         let before = self.clone();

@@ -17,13 +17,13 @@ use crate::adaptive::state::RenderState;
 use crate::adaptive::{LastLook, Progress, StopReason, run as run_loop};
 use crate::film::Film;
 use crate::integrator::{Crop, PathTracer, SamplePlan};
-use crate::scene::Camera;
 use fechner_perception::display::{Display, Observer, Viewing};
-use pace::Pace;
+pub(super) use pace::Pace;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
+pub(super) use telling::{blank_status, count, publish};
 use watch::{Moving, Watch};
 
 /// Renders and obeys until the preview closes. A defect that panics ends the picture, not the preview: a saved scene file
@@ -108,7 +108,7 @@ impl<'a> Session<'a> {
         let mut session = Self {
             host,
             shared,
-            held: at_home(&job.scene.camera),
+            held: Held::at_home(&job.scene.camera),
             has_moved: false,
             tracer,
             phase: Phase::Drafting,
@@ -276,7 +276,7 @@ impl<'a> Session<'a> {
             }
             Command::Focus { x, y } => self.focus_on(x, y),
             Command::CameraHome => {
-                self.held = at_home(&self.job.scene.camera);
+                self.held = Held::at_home(&self.job.scene.camera);
                 self.has_moved = true;
             }
             Command::Reload => self.reload(),
@@ -367,7 +367,7 @@ impl<'a> Session<'a> {
             Err(problem) => self.error = Some(problem),
             Ok((job, settings)) => {
                 self.tracer = PathTracer::new(Arc::clone(&job.scene), job.trace);
-                self.held = at_home(&job.scene.camera);
+                self.held = Held::at_home(&job.scene.camera);
                 (self.job, self.settings) = (job, settings);
                 self.error = None;
                 self.note = Some("the scene was loaded again".to_owned());
@@ -395,10 +395,6 @@ enum Changed {
     Seen,
     /// When to stop.
     Target,
-}
-
-fn at_home(camera: &Camera) -> Held {
-    Held { camera: camera.clone(), pivot_distance: camera.focus_distance }
 }
 
 fn settings_of(job: &Job, live: &Live) -> Result<LoopSettings, String> {
