@@ -1,5 +1,6 @@
 //! `fechner animate`: the frames of a scene that moves, and a video of them.
 
+mod frames;
 mod motion;
 mod source;
 mod video;
@@ -22,6 +23,7 @@ use fechner::scene::Scene;
 use fechner::scene::hash::content_hash;
 use fechner_perception::model;
 use fechner_perception::tone::{self, ToneOperator};
+use frames::{Frames, parse_frames, parse_rate};
 use motion::push_velocity;
 use serde::{Deserialize, Serialize};
 use source::FileSource;
@@ -105,12 +107,6 @@ pub(super) struct AnimateArguments {
     threads: Option<u32>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Frames {
-    first: u32,
-    last: u32,
-}
-
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum SamplingChoice {
     /// Where the remaining error can be seen.
@@ -125,24 +121,6 @@ enum AovNames {
     Fechner,
     /// Vector.X, .Y, .Z, .W as Blender writes them. x right, y up.
     Blender,
-}
-
-fn parse_frames(text: &str) -> Result<Frames, String> {
-    let wrong = || format!("\"{text}\" is not a range of frames; expected FIRST..LAST such as 0..47");
-    let (first, last) = text.split_once("..").ok_or_else(wrong)?;
-    let number = |text: &str| text.trim().trim_start_matches('=').parse::<u32>().map_err(|_| wrong());
-    let frames = Frames { first: number(first)?, last: number(last)? };
-    if frames.first > frames.last || frames.last - frames.first >= 1_000_000 { Err(wrong()) } else { Ok(frames) }
-}
-
-fn parse_rate(text: &str) -> Result<f64, String> {
-    parse_positive(text).and_then(|rate| {
-        if (1.0..=1000.0).contains(&rate) {
-            Ok(rate)
-        } else {
-            Err(format!("\"{text}\": between 1 and 1000 frames a second"))
-        }
-    })
 }
 
 /// The figures of one frame, beside its picture; by `key` a later run knows that it need not be made again.

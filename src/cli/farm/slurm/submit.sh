@@ -42,4 +42,4 @@ fi
 merges=$(submit --job-name=fechner-merge --requeue --open-mode=append $after \
     "$(array "frames.$name")" merge.sh "$farm/slurm/frames.$name")
 next=$(submit --job-name=fechner-next --requeue --dependency="afterok:$merges" submit.sh)
-echo "units ${units:-none}, merges $merges, next round $next"
+echo "jobs: units ${units:-none}, merges $merges, next round $next"
