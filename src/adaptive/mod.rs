@@ -176,28 +176,72 @@ pub fn run(
             Some(reason) => Step::Stop(reason),
             None => render.next_step(&mut judgement)?,
         };
-        render.state.seconds_perception += look.elapsed().as_secs_f64();
-        render.state.passes += 1;
-        monitor.looked(&progress(&render, &judgement, &step));
-        monitor.judged(&render.state, &judgement);
-        match step {
-            Step::Trace(plan) => {
-                let film = &render.state.film;
-                render.state.pending.extend(slices(plan, film.width(), film.total_samples()));
-                render.state.tone = Some(judgement.tone.save());
-                last_look = Some(judgement);
-            }
-            Step::Stop(reason) => return render.finish(judgement, reason, monitor),
+        match render.take(step, &judgement, look, monitor) {
+            None => last_look = Some(judgement),
+            Some(reason) => return render.finish(judgement, reason, monitor),
         }
     }
 }
 
+/// What comes after a state all of whose plans are traced.
+#[derive(Debug)]
+pub enum Next {
+    /// More is planned, and not traced.
+    Planned(Box<RenderState>),
+    /// Nothing.
+    Ended(Box<Ended>),
+}
+
+/// One look of [`run`]'s loop at a state all of whose plans are traced, for somebody who traces elsewhere. Limits of time
+/// and plans are not looked at.
+///
+/// # Errors
+/// Only if the perception model refuses the picture, which would be a defect of ours.
+pub fn decide(
+    tracer: &PathTracer,
+    settings: &LoopSettings,
+    state: RenderState,
+    monitor: &dyn Monitor,
+) -> Result<Next, JudgeError> {
+    let mut render = Loop::new(tracer, settings, state);
+    let look = Instant::now();
+    let mut judgement = judge(&render.state.film, settings, render.state.inflation)?;
+    let step = render.next_step(&mut judgement)?;
+    if let Some(reason) = render.take(step, &judgement, look, monitor) {
+        return Ok(Next::Ended(Box::new(render.finish(judgement, reason, monitor)?)));
+    }
+    render.state.seconds_total = render.seconds();
+    Ok(Next::Planned(Box::new(render.state)))
+}
+
 impl<'a> Loop<'a> {
     fn new(tracer: &'a PathTracer, settings: &'a LoopSettings, state: RenderState) -> Self {
-        let is_left = |&rung: &f64| state.finished_rung.is_none_or(|finished| rung < finished);
+        let is_below = |rung: f64, bound: Option<f64>| bound.is_none_or(|bound| rung < bound);
+        let is_left = |&rung: &f64| is_below(rung, state.finished_rung) && is_below(rung, state.left_rung);
         let rungs = ladder(settings.limits.visibility).into_iter().filter(is_left).collect();
         let seconds_before = state.seconds_total;
         Self { tracer, settings, rungs, state, resumed_at: Instant::now(), seconds_before }
+    }
+
+    /// Tells what was seen and enters the plan that came of it, or says why there is none.
+    fn take(&mut self, step: Step, judgement: &Judgement, look: Instant, monitor: &dyn Monitor) -> Option<StopReason> {
+        self.state.seconds_perception += look.elapsed().as_secs_f64();
+        self.state.passes += 1;
+        monitor.looked(&progress(self, judgement, &step));
+        monitor.judged(&self.state, judgement);
+        match step {
+            Step::Trace(plan) => {
+                let film = &self.state.film;
+                self.state.pending.extend(slices(plan, film.width(), film.total_samples()));
+                self.state.tone = Some(judgement.tone.save());
+                None
+            }
+            Step::Stop(reason) => Some(reason),
+        }
+    }
+
+    fn seconds(&self) -> f64 {
+        self.seconds_before + self.resumed_at.elapsed().as_secs_f64()
     }
 
     /// Traces what is planned, and says why the render ends if it does. A plan that was begun is finished first, unless
@@ -214,7 +258,7 @@ impl<'a> Loop<'a> {
                 let batch = beginning(rest, monitor.most_samples_a_batch());
                 let progress = |samples| monitor.samples_done(samples);
                 self.state.traced_blocks += self.tracer.trace_batch(batch, &mut self.state.film, &progress);
-                self.state.seconds_total = self.seconds_before + self.resumed_at.elapsed().as_secs_f64();
+                self.state.seconds_total = self.seconds();
                 match monitor.between_batches(&self.state) {
                     Directive::GoOn => {}
                     Directive::Stop => return Traced::UntilLimit(StopReason::Interrupted),
@@ -235,7 +279,7 @@ impl<'a> Loop<'a> {
             return None;
         }
         let traced = film.total_samples().max(1);
-        let elapsed = self.seconds_before + self.resumed_at.elapsed().as_secs_f64();
+        let elapsed = self.seconds();
         let next = pending.front().map_or(0, SamplePlan::samples);
         let middle_of_next = elapsed * (1.0 + 0.5 * next as f64 / traced as f64);
         let limits = &self.settings.limits;
@@ -254,8 +298,10 @@ impl<'a> Loop<'a> {
             Sampling::Rival(_) => judge(&self.state.film, self.settings, self.state.inflation)?,
             Sampling::Adaptive | Sampling::Uniform => judgement,
         };
-        self.state.seconds_total = self.seconds_before + self.resumed_at.elapsed().as_secs_f64();
+        self.state.seconds_total = self.seconds();
         self.state.tone = Some(judgement.tone.save());
+        // With other limits they may be reached.
+        self.state.left_rung = None;
         monitor.ended(&self.state);
         Ok(Ended { state: self.state, last_look: Some(LastLook { judgement, stop_reason: reason }) })
     }
@@ -282,6 +328,7 @@ impl<'a> Loop<'a> {
                 }
             }
             self.rungs.pop_front();
+            self.state.left_rung = Some(rung);
             if is_reached(judgement, rung) {
                 self.state.finished_rung = Some(rung);
             }
@@ -369,7 +416,7 @@ impl<'a> Loop<'a> {
 }
 
 /// The first blocks of at most so many samples in all, at least one.
-fn beginning(blocks: &[BlockWork], most_samples: u64) -> &[BlockWork] {
+pub(crate) fn beginning(blocks: &[BlockWork], most_samples: u64) -> &[BlockWork] {
     let mut samples = 0;
     let within = |block: &&BlockWork| {
         samples += u64::from(block.samples);
@@ -402,7 +449,7 @@ fn progress(render: &Loop<'_>, judgement: &Judgement, step: &Step) -> Progress {
     let remaining = by_budget.min(by_visibility);
     Progress {
         pass: *passes,
-        seconds: render.seconds_before + render.resumed_at.elapsed().as_secs_f64(),
+        seconds: render.seconds(),
         rung: rungs.front().copied().unwrap_or(target),
         pixels,
         mean_samples: film.total_samples() as f64 / pixels,

@@ -20,6 +20,8 @@ pub struct RenderState {
     pub traced_blocks: usize,
     /// The lowest visibility of the ladder that was reached.
     pub finished_rung: Option<f64>,
+    /// The lowest rung that was left, reached or not, in a render that has not ended: those above are not tried again.
+    pub left_rung: Option<f64>,
     /// What audits multiplied the variance by, at least 1.
     pub inflation: f64,
     /// The last audit.
@@ -74,6 +76,7 @@ impl RenderState {
             pending: if pilot.blocks.is_empty() { VecDeque::new() } else { VecDeque::from([pilot]) },
             traced_blocks: 0,
             finished_rung: None,
+            left_rung: None,
             inflation: 1.0,
             audit: None,
             audits: 0,

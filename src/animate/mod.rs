@@ -81,7 +81,8 @@ impl ShotSettings {
         }
     }
 
-    fn trace_settings(&self, frame: u32) -> TraceSettings {
+    /// How a frame is traced: with a seed of its own.
+    pub fn trace_settings(&self, frame: u32) -> TraceSettings {
         TraceSettings { seed: hash_words(self.trace.seed, u64::from(frame)), ..self.trace }
     }
 }

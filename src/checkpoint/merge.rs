@@ -31,7 +31,7 @@ pub enum MergeError {
 /// `paths` does not matter. What was decided for the single films (plans, rungs, audits) is left behind; the largest
 /// inflation stays.
 ///
-/// Films are read one after the other: two are in memory at a time.
+/// Three films are in memory at a time: the sum, the one that is added, and the next, which is read meanwhile.
 ///
 /// # Errors
 /// [`MergeError`] for a file that cannot be read, films of other scenes, sizes, versions or viewings than the first, and
@@ -45,7 +45,8 @@ pub fn merge_files(paths: &[PathBuf]) -> Result<Checkpoint, MergeError> {
     check_seeds(&files)?;
     let (first, rest) = files.split_first().expect("at least one film");
     let mut sum = read_same(first)?;
-    for file in rest {
+    let mut read = rest.first().map(read_same);
+    for (i, file) in rest.iter().enumerate() {
         let different = |problem: String| CheckpointError::Different { path: file.1.to_owned(), problem };
         if let Some(problem) = file.0.origin.difference(&first.0.origin) {
             return Err(different(format!("{problem}, as in {}", first.1.display())).into());
@@ -57,8 +58,10 @@ pub fn merge_files(paths: &[PathBuf]) -> Result<Checkpoint, MergeError> {
             ))
             .into());
         }
-        let next = read_same(file)?;
-        sum.state.film.add(&next.state.film).map_err(|problem| different(problem.to_owned()))?;
+        let next = read.take().expect("one for each file")?;
+        let added;
+        (added, read) = rayon::join(|| sum.state.film.add(&next.state.film), || rest.get(i + 1).map(read_same));
+        added.map_err(|problem| different(problem.to_owned()))?;
         sum.state.inflation = sum.state.inflation.max(next.state.inflation);
         sum.state.plans = sum.state.plans.saturating_add(next.state.plans);
         sum.state.seconds_total += next.state.seconds_total;

@@ -1,5 +1,7 @@
 //! `fechner animate`: the frames of a scene that moves, and a video of them.
 
+mod frames;
+mod motion;
 mod source;
 mod video;
 
@@ -9,17 +11,20 @@ use super::report::Report;
 use super::seeing::{self, parse_positive};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
-use fechner::adaptive::settings::{DEFAULT_MAX_SAMPLES, Limits, LoopSettings, Sampling};
+use fechner::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, Sampling};
 use fechner::animate::name::FrameName;
 use fechner::animate::track::{Track, TrackFrame};
-use fechner::animate::velocity::VelocityMap;
 use fechner::animate::{FrameScenes, RenderedFrame, SceneSource as _, ShotSettings, render_frame};
+use fechner::checkpoint::SettingsRecord;
 use fechner::integrator::TraceSettings;
 use fechner::output::rendered::{Background, layers, write_display_png};
-use fechner::output::{self, Format, Picture};
+use fechner::output::{self, Format};
 use fechner::scene::Scene;
 use fechner::scene::hash::content_hash;
+use fechner_perception::model;
 use fechner_perception::tone::{self, ToneOperator};
+use frames::{Frames, parse_frames, parse_rate};
+use motion::push_velocity;
 use serde::{Deserialize, Serialize};
 use source::FileSource;
 use std::io::Write as _;
@@ -102,12 +107,6 @@ pub(super) struct AnimateArguments {
     threads: Option<u32>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Frames {
-    first: u32,
-    last: u32,
-}
-
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum SamplingChoice {
     /// Where the remaining error can be seen.
@@ -124,24 +123,6 @@ enum AovNames {
     Blender,
 }
 
-fn parse_frames(text: &str) -> Result<Frames, String> {
-    let wrong = || format!("\"{text}\" is not a range of frames; expected FIRST..LAST such as 0..47");
-    let (first, last) = text.split_once("..").ok_or_else(wrong)?;
-    let number = |text: &str| text.trim().trim_start_matches('=').parse::<u32>().map_err(|_| wrong());
-    let frames = Frames { first: number(first)?, last: number(last)? };
-    if frames.first > frames.last || frames.last - frames.first >= 1_000_000 { Err(wrong()) } else { Ok(frames) }
-}
-
-fn parse_rate(text: &str) -> Result<f64, String> {
-    parse_positive(text).and_then(|rate| {
-        if (1.0..=1000.0).contains(&rate) {
-            Ok(rate)
-        } else {
-            Err(format!("\"{text}\": between 1 and 1000 frames a second"))
-        }
-    })
-}
-
 /// The figures of one frame, beside its picture; by `key` a later run knows that it need not be made again.
 #[derive(Serialize, Deserialize)]
 struct FrameRecord {
@@ -151,11 +132,19 @@ struct FrameRecord {
     report: serde_json::Value,
 }
 
+/// What a frame is made from and judged by.
+pub(super) struct FrameJob {
+    pub(super) scenes: FrameScenes,
+    pub(super) settings: LoopSettings,
+    /// All that its file depends on, as a name.
+    pub(super) key: String,
+}
+
 /// A shot on its way into files.
-struct Shot<'a> {
+pub(super) struct Shot<'a> {
     arguments: &'a AnimateArguments,
     source: FileSource<'a>,
-    settings: ShotSettings,
+    pub(super) settings: ShotSettings,
     operator_name: String,
     exposure_stops: Option<f64>,
     name: FrameName,
@@ -173,31 +162,29 @@ pub(super) fn run(arguments: &AnimateArguments) -> Result<()> {
 }
 
 fn render_shot(arguments: &AnimateArguments) -> Result<()> {
-    let video =
-        arguments.video.as_deref().map(|path| VideoFormat::of(path).map(|format| (path, format))).transpose()?;
+    arguments.video()?;
     let shot = Shot::new(arguments)?;
     let track = shot.track()?;
     for frame in arguments.frames.first..=arguments.frames.last {
         shot.make(frame, &track)?;
     }
-    let records = shot.records();
-    let missing = shot.settings.last - shot.settings.first + 1 - records.len() as u32;
-    if missing > 0 {
-        eprintln!("{missing} frames of the shot are not there yet.");
-        return Ok(());
+    shot.conclude(&track)
+}
+
+impl AnimateArguments {
+    /// Numbers of the frames to render.
+    pub(super) fn frame_numbers(&self) -> std::ops::RangeInclusive<u32> {
+        self.frames.first..=self.frames.last
     }
-    let text = serde_json::to_string_pretty(&records).context("the shot could not be put into words")?;
-    output::write_beside(&shot.name.of_shot("json"), |file| file.write_all(text.as_bytes()))?;
-    if let Some((path, format)) = video {
-        let files = (shot.settings.first..=shot.settings.last).map(|frame| shot.name.of(frame));
-        let fits = |frame: usize| track.frames[frame].fitted.clone().restore();
-        video::write(path, format, files, &fits, &shot.settings)?;
+
+    /// The video that is asked for; an error if it cannot be made.
+    fn video(&self) -> Result<Option<(&Path, VideoFormat)>> {
+        self.video.as_deref().map(|path| VideoFormat::of(path).map(|format| (path, format))).transpose()
     }
-    Ok(())
 }
 
 impl<'a> Shot<'a> {
-    fn new(arguments: &'a AnimateArguments) -> Result<Self> {
+    pub(super) fn new(arguments: &'a AnimateArguments) -> Result<Self> {
         let name = FrameName::parse(&arguments.output).with_context(|| {
             format!(
                 "{}: a sequence's name has # for each digit of the frame's number, as out/shot.####.exr",
@@ -227,6 +214,20 @@ impl<'a> Shot<'a> {
         Ok(shot)
     }
 
+    /// For whose eyes its frames are, as their films say it.
+    pub(super) fn settings_record(&self) -> SettingsRecord {
+        SettingsRecord {
+            sampling: self.settings.sampling,
+            allocation: AllocationRule::default(),
+            model: model::names()[0].to_owned(),
+            viewing: self.settings.viewing.clone(),
+            nits_per_unit: self.settings.nits_per_unit,
+            operator: self.operator_name.clone(),
+            exposure_stops: self.exposure_stops,
+            importance: None,
+        }
+    }
+
     fn operator(&self) -> Result<Box<dyn ToneOperator>> {
         tone::operator(&self.operator_name, self.exposure_stops).with_context(|| {
             format!(
@@ -238,7 +239,7 @@ impl<'a> Shot<'a> {
     }
 
     /// The track that lies beside the frames, or a new one where there is none for this shot.
-    fn track(&self) -> Result<Track> {
+    pub(super) fn track(&self) -> Result<Track> {
         let file = self.name.of_shot("track.json");
         let operator = self.operator()?;
         let wanted = self.arguments.frames;
@@ -263,6 +264,25 @@ impl<'a> Shot<'a> {
 
     /// Renders a frame, unless it is there.
     fn make(&self, frame: u32, track: &Track) -> Result<()> {
+        let job = self.frame(frame, track)?;
+        let file = self.name.of(frame);
+        if self.record(frame).is_some_and(|record| record.key == job.key) && file.is_file() {
+            eprintln!("{}: is there", file.display());
+            return Ok(());
+        }
+        let console = Console::new(None);
+        let made = render_frame(&job.scenes, &self.settings, &job.settings, frame, &console)?;
+        console.finish();
+        self.keep(frame, &job, &made).map(drop)
+    }
+
+    /// What a frame shows.
+    pub(super) fn scene(&self, frame: u32) -> Result<Scene> {
+        Ok(self.source.at(self.settings.seconds(f64::from(frame)))?)
+    }
+
+    /// What a frame is made from and judged by.
+    pub(super) fn frame(&self, frame: u32, track: &Track) -> Result<FrameJob> {
         let scenes = FrameScenes::load(&self.source, &self.settings, frame)?;
         let operator = self.operator()?;
         let Some(of_track) = track.of_frame(&self.settings, operator.as_ref(), frame, &scenes.now) else {
@@ -270,19 +290,17 @@ impl<'a> Shot<'a> {
         };
         let settings = self.settings.frame_settings(operator, of_track);
         let key = self.key(&settings, of_track, &scenes);
+        Ok(FrameJob { scenes, settings, key })
+    }
+
+    /// Writes a frame and its record.
+    pub(super) fn keep(&self, frame: u32, job: &FrameJob, made: &RenderedFrame) -> Result<Report> {
         let file = self.name.of(frame);
-        if self.record(frame).is_some_and(|record| record.key == key) && file.is_file() {
-            eprintln!("{}: is there", file.display());
-            return Ok(());
-        }
-        let console = Console::new(None);
-        let made = render_frame(&scenes, &self.settings, &settings, frame, &console)?;
-        console.finish();
         let scene_name = self.arguments.scene.display().to_string();
-        let report = Report::new(&scene_name, &[self.settings.trace.seed], &settings, &made.rendered);
-        self.write(&file, &made, &settings, &report)?;
+        let report = Report::new(&scene_name, &[self.settings.trace.seed], &job.settings, &made.rendered);
+        self.write(&file, made, &job.settings, &report)?;
         let record = FrameRecord {
-            key,
+            key: job.key.clone(),
             frame,
             seconds_of_shot: self.settings.seconds(f64::from(frame)),
             report: serde_json::to_value(&report).context("the report could not be put into words")?,
@@ -290,6 +308,24 @@ impl<'a> Shot<'a> {
         let text = serde_json::to_string_pretty(&record).context("the record could not be put into words")?;
         output::write_beside(&file.with_extension("json"), |file| file.write_all(text.as_bytes()))?;
         eprintln!("{}: {}", file.display(), report.in_a_line());
+        Ok(report)
+    }
+
+    /// Writes what only the whole shot has, if all its frames are there.
+    pub(super) fn conclude(&self, track: &Track) -> Result<()> {
+        let records = self.records();
+        let missing = self.settings.last - self.settings.first + 1 - records.len() as u32;
+        if missing > 0 {
+            eprintln!("{missing} frames of the shot are not there yet.");
+            return Ok(());
+        }
+        let text = serde_json::to_string_pretty(&records).context("the shot could not be put into words")?;
+        output::write_beside(&self.name.of_shot("json"), |file| file.write_all(text.as_bytes()))?;
+        if let Some((path, format)) = self.arguments.video()? {
+            let files = (self.settings.first..=self.settings.last).map(|frame| self.name.of(frame));
+            let fits = |frame: usize| track.frames[frame].fitted.clone().restore();
+            video::write(path, format, files, &fits, &self.settings)?;
+        }
         Ok(())
     }
 
@@ -364,25 +400,4 @@ fn shot_settings(arguments: &AnimateArguments, scene: &Scene, shot: Frames) -> R
         nits_per_unit: arguments.nits_per_unit.unwrap_or(scene.nits_per_unit),
         adapted_to_cd_m2: arguments.adapted_to,
     })
-}
-
-/// Adds the layers of motion, in pixels.
-fn push_velocity(picture: &mut Picture<'_>, velocity: &VelocityMap, names: AovNames) {
-    let next = |of: fn(glam::Vec2) -> f32| velocity.to_next.iter().map(|&motion| of(motion)).collect::<Vec<f32>>();
-    let previous = |of: fn(glam::Vec2) -> f32| velocity.to_previous.iter().map(|&m| of(m)).collect::<Vec<f32>>();
-    match names {
-        AovNames::Fechner => {
-            picture.push_f32("velocity.X", next(|m| m.x));
-            picture.push_f32("velocity.Y", next(|m| m.y));
-            picture.push_f32("velocity_previous.X", previous(|m| m.x));
-            picture.push_f32("velocity_previous.Y", previous(|m| m.y));
-        }
-        // Cycles' vector pass: where it was less where it is, then where it is less where it will be; y upwards.
-        AovNames::Blender => {
-            picture.push_f32("Vector.X", previous(|m| m.x));
-            picture.push_f32("Vector.Y", previous(|m| -m.y));
-            picture.push_f32("Vector.Z", next(|m| -m.x));
-            picture.push_f32("Vector.W", next(|m| m.y));
-        }
-    }
 }

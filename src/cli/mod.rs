@@ -5,6 +5,7 @@ mod bench;
 mod channels;
 mod compare;
 mod console;
+mod farm;
 mod importance;
 mod info;
 mod job;
@@ -49,6 +50,8 @@ enum Command {
     Threshold(threshold::ThresholdArguments),
     /// Add up renders of different seeds that were kept by --checkpoint, or make a picture of a single one.
     Merge(merge::MergeArguments),
+    /// Render by many processes and machines that share a folder, to the bytes of one process.
+    Farm(Box<farm::FarmArguments>),
     /// Say what is in a picture's or film's file.
     Info {
         /// EXR, PNG or HDR file, or a film kept by render --checkpoint.
@@ -56,7 +59,8 @@ enum Command {
     },
 }
 
-/// Runs what the arguments ask for. Exit status 0: done; 1: `compare` sees a difference; 2: bad input or a failed write.
+/// Runs what the arguments ask for. Exit status 0: done; 1: `compare` sees a difference; 2: bad input or a failed write;
+/// 75: a farm's work was stopped or has to wait, and should be called again.
 pub(crate) fn run() -> anyhow::Result<ExitCode> {
     match CommandLine::parse().command {
         Command::Render(arguments) => render::run(&arguments)?,
@@ -67,6 +71,7 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
         Command::Tonemap(arguments) => tonemap::run(&arguments)?,
         Command::Threshold(arguments) => threshold::run(&arguments)?,
         Command::Merge(arguments) => merge::run(&arguments)?,
+        Command::Farm(arguments) => return farm::run(&arguments),
         Command::Info { file } => info::run(&file)?,
     }
     Ok(ExitCode::SUCCESS)

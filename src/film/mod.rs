@@ -38,7 +38,7 @@ pub fn opponent(rgb: [f64; 3]) -> [f64; CHANNELS] {
 }
 
 /// Sum of one block of samples.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BlockSum {
     samples: u32,
     missed: u32,
@@ -91,6 +91,19 @@ impl BlockSum {
         self.albedo += sample.first_hit.albedo;
         self.normal += sample.first_hit.normal;
         self.depth += sample.first_hit.depth;
+    }
+}
+
+impl BlockSum {
+    /// Whether it can be the sum of a block of so many samples.
+    pub fn is_of(&self, samples: u32) -> bool {
+        self.samples.checked_add(self.nonfinite) == Some(samples)
+            && self.missed <= self.samples
+            && self.rgb.iter().all(|sum| sum.is_finite())
+            && self.squares.iter().all(|sum| sum.is_finite() && *sum >= 0.0)
+            && self.albedo.is_finite()
+            && self.normal.is_finite()
+            && !self.depth.is_nan()
     }
 }
 

@@ -109,6 +109,13 @@ impl BlockWork {
         Self { pixel, half, level, first: 0, samples: 1 << log2_block(level) }
     }
 
+    /// Whether it is a part of a doubling of a pixel of a film of so many.
+    pub fn is_sound(&self, pixels: u32) -> bool {
+        self.pixel < pixels
+            && self.level <= 27
+            && u64::from(self.first) + u64::from(self.samples) <= 1 << log2_block(self.level)
+    }
+
     /// What is left of the doubling that a half is in after `taken` samples.
     pub fn rest(pixel: u32, half: Half, taken: u32) -> Self {
         let level = if taken < PILOT_SAMPLES { 0 } else { 1 + (taken / PILOT_SAMPLES).ilog2() as u8 };
@@ -194,6 +201,11 @@ impl PathTracer {
     /// where they end.
     pub fn trace_batch(&self, blocks: &[BlockWork], film: &mut Film, progress: &(dyn Fn(u64) + Sync)) -> usize {
         self.batch_into(blocks, self.settings.seed, &mut |work, sum| film.merge_block(work, sum), progress)
+    }
+
+    /// As [`Self::trace_batch`], with the sums of the blocks behind one another in place of a film.
+    pub fn sum_batch(&self, blocks: &[BlockWork], sums: &mut Vec<BlockSum>, progress: &(dyn Fn(u64) + Sync)) -> usize {
+        self.batch_into(blocks, self.settings.seed, &mut |_, sum| sums.push(*sum), progress)
     }
 
     /// Hands the sums of a plan's blocks, sampled by `seed`, to `merge`: each block is summed by one thread, and blocks

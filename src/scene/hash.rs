@@ -4,13 +4,35 @@
 
 use super::{FilmDefaults, Scene, Texels, ViewingDefaults};
 use bytemuck::NoUninit;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::io::{BufWriter, Write};
 use std::mem::take;
 
 /// BLAKE3 of everything in a scene that samples depend on.
-#[derive(Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 pub struct ContentHash([u8; 32]);
+
+/// Hexadecimal where people read it, bytes elsewhere.
+impl Serialize for ContentHash {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        if serializer.is_human_readable() {
+            serializer.serialize_str(blake3::Hash::from_bytes(self.0).to_hex().as_str())
+        } else {
+            self.0.serialize(serializer)
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for ContentHash {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        if deserializer.is_human_readable() {
+            let hash = blake3::Hash::from_hex(String::deserialize(deserializer)?).map_err(serde::de::Error::custom)?;
+            Ok(Self(*hash.as_bytes()))
+        } else {
+            <[u8; 32]>::deserialize(deserializer).map(Self)
+        }
+    }
+}
 
 impl std::fmt::Display for ContentHash {
     /// The first 16 hexadecimal digits.
@@ -26,6 +48,11 @@ impl std::fmt::Debug for ContentHash {
 }
 
 impl ContentHash {
+    /// Of bytes.
+    pub fn of_bytes(bytes: &[u8]) -> Self {
+        Self(*blake3::hash(bytes).as_bytes())
+    }
+
     /// Of an array of numbers.
     pub fn of_values(values: &[f32]) -> Self {
         let mut hasher = blake3::Hasher::new();

@@ -17,6 +17,7 @@
 //! - `command_line`: the program as a user runs it
 //! - `checkpoint`: renders stopped, continued and merged against renders in one go
 //! - `kill`: the program, killed and resumed
+//! - `farm`: many processes on one folder
 //! - `view`: the live preview, over its WebSocket
 //! - `tonemap`: HDR pictures for displays, one by one and over time
 
@@ -28,6 +29,7 @@ mod camera_and_time;
 mod checkpoint;
 mod command_line;
 mod direct_light;
+mod farm;
 mod formats;
 mod furnace;
 mod importance;

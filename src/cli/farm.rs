@@ -1,0 +1,92 @@
+//! `fechner farm`: one render by many processes that share a folder.
+
+mod job;
+mod merge;
+mod plan;
+mod signals;
+mod slurm;
+mod status;
+mod unit;
+mod work;
+
+use anyhow::{Context, Result};
+use clap::{Args, Subcommand};
+use fechner::farm::Farm;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Arguments of `farm`.
+#[derive(Debug, Args)]
+pub(super) struct FarmArguments {
+    #[command(subcommand)]
+    command: FarmCommand,
+}
+
+/// What can be done with a farm's folder.
+#[derive(Debug, Subcommand)]
+enum FarmCommand {
+    /// Make a folder with a manifest and the units of the first round.
+    Plan(plan::PlanArguments),
+    /// Render units: complete or not at all, from their checkpoints where there are any. SIGUSR1 writes the checkpoint,
+    /// SIGTERM writes it and ends with status 75.
+    Unit(unit::UnitArguments),
+    /// Merge the frames whose units are all there, look at them, and hand out the next round or write the picture. Status 75
+    /// if units are missing.
+    Merge(merge::MergeArguments),
+    /// Render and merge until everything is done; any number of these may work on one folder.
+    Work(work::WorkArguments),
+    /// Say how far every frame is.
+    Status(status::StatusArguments),
+    /// Write scripts that run the farm on Slurm.
+    Slurm(slurm::SlurmArguments),
+}
+
+/// How much of the machine a process takes.
+#[derive(Debug, Args)]
+struct Threads {
+    /// Threads; nothing depends on it but the time.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..1024))]
+    threads: Option<u32>,
+}
+
+impl Threads {
+    fn pool(&self) -> Result<rayon::ThreadPool> {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(self.threads.unwrap_or(0) as usize)
+            .thread_name(|i| format!("farm-{i}"))
+            .build()
+            .context("the threads could not be started")
+    }
+}
+
+/// Units or frames are left: to be called again (`EX_TEMPFAIL` of sysexits.h).
+const CALL_AGAIN: u8 = 75;
+
+/// Runs one of them.
+pub(super) fn run(arguments: &FarmArguments) -> Result<ExitCode> {
+    match &arguments.command {
+        FarmCommand::Plan(arguments) => plan::run(arguments),
+        FarmCommand::Unit(arguments) => unit::run(arguments),
+        FarmCommand::Merge(arguments) => merge::run(arguments),
+        FarmCommand::Work(arguments) => work::run(arguments),
+        FarmCommand::Status(arguments) => status::run(arguments),
+        FarmCommand::Slurm(arguments) => slurm::run(arguments),
+    }
+}
+
+/// Opens a farm, and goes where it was planned, since its scene's name may begin there.
+fn open_for_work(folder: &Path) -> Result<Farm> {
+    let farm = Farm::open(&absolute(folder)?)?;
+    let directory = &farm.manifest().directory;
+    std::env::set_current_dir(directory).with_context(|| {
+        format!(
+            "the farm was planned in {}, which cannot be entered here: mount it at the same place",
+            directory.display()
+        )
+    })?;
+    Ok(farm)
+}
+
+fn absolute(folder: &Path) -> Result<PathBuf> {
+    folder.canonicalize().with_context(|| format!("{}", folder.display()))
+}

@@ -1,0 +1,251 @@
+//! What a farm renders, from the arguments in its manifest: as `render` or `animate` understand them.
+
+use crate::cli::animate::{AnimateArguments, FrameJob as ShotFrame, Shot};
+use crate::cli::job::{JobArguments, Prepared};
+use crate::cli::render::write_picture;
+use crate::cli::report::Report;
+use anyhow::{Context, Result, anyhow, bail};
+use clap::Parser;
+use fechner::adaptive::Rendered;
+use fechner::adaptive::settings::LoopSettings;
+use fechner::animate::RenderedFrame;
+use fechner::animate::track::Track;
+use fechner::animate::velocity::VelocityMap;
+use fechner::checkpoint::{Header, Origin, Seeds};
+use fechner::farm::{Farm, FrameEntry, PictureFormat, Work};
+use fechner::integrator::{PathTracer, TraceSettings};
+use fechner::output;
+use fechner::scene::Scene;
+use fechner::scene::hash::ContentHash;
+use std::cell::OnceCell;
+use std::path::Path;
+use std::sync::Arc;
+
+/// `render`'s options less its files.
+#[derive(Debug, Parser)]
+#[command(no_binary_name = true, disable_help_flag = true)]
+struct StillOptions {
+    #[command(flatten)]
+    job: JobArguments,
+}
+
+/// `animate`'s options.
+#[derive(Debug, Parser)]
+#[command(no_binary_name = true, disable_help_flag = true)]
+struct ShotOptions {
+    #[command(flatten)]
+    shot: AnimateArguments,
+}
+
+/// The arguments of the command that does the same in one process.
+pub(super) enum JobOptions {
+    Still(Box<JobArguments>),
+    Shot(Box<AnimateArguments>),
+}
+
+/// The same, with what all frames share.
+pub(super) enum Job<'a> {
+    Still(&'a JobArguments),
+    Shot { shot: Box<Shot<'a>>, track: OnceCell<Track> },
+}
+
+/// Everything about one frame.
+pub(super) struct Frame {
+    scene: Arc<Scene>,
+    trace: TraceSettings,
+    header: Header,
+    /// Hash of all that its film is judged by.
+    judged_by: ContentHash,
+    kind: FrameKind,
+}
+
+enum FrameKind {
+    Still(Box<LoopSettings>),
+    OfShot(Box<ShotFrame>),
+}
+
+impl JobOptions {
+    /// Reads what stands in a manifest. Pictures go to `pictures`.
+    pub(super) fn parse(work: Work, arguments: &[String], pictures: &Path, format: PictureFormat) -> Result<Self> {
+        let wrong = |error: clap::Error| anyhow!("{}", error.to_string().trim().trim_start_matches("error: "));
+        match work {
+            Work::Render => {
+                let options = StillOptions::try_parse_from(arguments).map_err(wrong)?;
+                Ok(Self::Still(Box::new(options.job)))
+            }
+            Work::Animate => {
+                let name = pictures.join(format!("frame.####.{}", format.ending()));
+                let name = name.to_str().context("the folder's name must be Unicode")?.to_owned();
+                let arguments = arguments.iter().cloned().chain(["--output".to_owned(), name]);
+                let options = ShotOptions::try_parse_from(arguments).map_err(wrong)?;
+                Ok(Self::Shot(Box::new(options.shot)))
+            }
+        }
+    }
+
+    /// Of a farm that is there.
+    pub(super) fn of(farm: &Farm) -> Result<Self> {
+        let manifest = farm.manifest();
+        Self::parse(manifest.work, &manifest.arguments, &farm.pictures(), manifest.picture_format)
+            .with_context(|| format!("{}", Farm::manifest_file(farm.folder()).display()))
+    }
+
+    /// Loads what all frames share.
+    pub(super) fn job(&self) -> Result<Job<'_>> {
+        match self {
+            Self::Still(arguments) => Ok(Job::Still(arguments)),
+            Self::Shot(arguments) => Ok(Job::Shot { shot: Box::new(Shot::new(arguments)?), track: OnceCell::new() }),
+        }
+    }
+
+    /// Numbers of the frames to render.
+    pub(super) fn frames(&self) -> Vec<u32> {
+        match self {
+            Self::Still(_) => vec![0],
+            Self::Shot(arguments) => arguments.frame_numbers().collect(),
+        }
+    }
+}
+
+impl Job<'_> {
+    /// Everything about a frame as it is now.
+    pub(super) fn frame(&self, number: u32) -> Result<Frame> {
+        match self {
+            Self::Still(arguments) => {
+                let Prepared { scene, trace, record, settings } = arguments.prepare()?;
+                let judged_by = ContentHash::of_bytes(format!("{record:?}|{:?}", settings.limits).as_bytes());
+                let header = Header {
+                    origin: Origin::of(&scene, &trace),
+                    seeds: Seeds::one(trace.seed),
+                    settings: record,
+                    visibility: settings.limits.visibility,
+                };
+                let kind = FrameKind::Still(Box::new(settings));
+                Ok(Frame { scene: Arc::new(scene), trace, header, judged_by, kind })
+            }
+            Self::Shot { shot, .. } => {
+                let of_shot = shot.frame(number, self.track()?)?;
+                let trace = shot.settings.trace_settings(number);
+                let header = Header {
+                    origin: Origin::of(&of_shot.scenes.now, &trace),
+                    seeds: Seeds::one(trace.seed),
+                    settings: shot.settings_record(),
+                    visibility: of_shot.settings.limits.visibility,
+                };
+                let judged_by = ContentHash::of_bytes(of_shot.key.as_bytes());
+                let scene = Arc::clone(&of_shot.scenes.now);
+                Ok(Frame { scene, trace, header, judged_by, kind: FrameKind::OfShot(Box::new(of_shot)) })
+            }
+        }
+    }
+
+    /// A frame of a farm, if it still is the one that was planned.
+    pub(super) fn planned_frame(&self, farm: &Farm, frame_index: usize) -> Result<Frame> {
+        let entry = farm.frame(frame_index);
+        let frame = self.frame(entry.frame)?;
+        check_origin(farm, entry, &frame.header.origin)?;
+        if frame.judged_by != entry.judged_by {
+            bail!(
+                "{}: frame {} would be judged otherwise than when it was planned (a display's file, an importance map or \
+                 a neighbouring frame has changed): plan anew",
+                farm.folder().display(),
+                entry.frame
+            );
+        }
+        Ok(frame)
+    }
+
+    /// What units of a frame need, if the scene still is the one that was planned.
+    pub(super) fn tracer(&self, farm: &Farm, frame_index: usize) -> Result<PathTracer> {
+        let entry = farm.frame(frame_index);
+        let (scene, trace) = match self {
+            Self::Still(arguments) => {
+                let Prepared { scene, trace, .. } = arguments.prepare()?;
+                (scene, trace)
+            }
+            Self::Shot { shot, .. } => (shot.scene(entry.frame)?, shot.settings.trace_settings(entry.frame)),
+        };
+        check_origin(farm, entry, &Origin::of(&scene, &trace))?;
+        Ok(PathTracer::new(Arc::new(scene), trace))
+    }
+
+    /// How light the shot is: from the file beside the pictures, or made anew.
+    fn track(&self) -> Result<&Track> {
+        let Self::Shot { shot, track } = self else { bail!("a still has no track") };
+        match track.get() {
+            Some(track) => Ok(track),
+            None => {
+                let found = shot.track()?;
+                Ok(track.get_or_init(|| found))
+            }
+        }
+    }
+
+    /// Writes the pictures of a finished frame, and says its figures.
+    pub(super) fn write(&self, farm: &Farm, number: u32, frame: &Frame, rendered: Rendered) -> Result<Report> {
+        match (self, &frame.kind) {
+            (Self::Still(arguments), FrameKind::Still(settings)) => {
+                let report = Report::new(&arguments.scene_name(), &frame.header.seeds.all, settings, &rendered);
+                let format = farm.manifest().picture_format;
+                let path = farm.pictures().join(format!("picture.{}", format.ending()));
+                let format = output::check_target(&path)?;
+                write_picture(&path, format, arguments.background(), &rendered, settings, &report)?;
+                eprintln!("{}: {}", path.display(), report.in_a_line());
+                Ok(report)
+            }
+            (Self::Shot { shot, .. }, FrameKind::OfShot(of_shot)) => {
+                let velocity = VelocityMap::new(&frame.tracer(), &of_shot.scenes.previous, &of_shot.scenes.next);
+                shot.keep(number, of_shot, &RenderedFrame { rendered, velocity })
+            }
+            _ => bail!("a frame of another farm"),
+        }
+    }
+
+    /// Makes what only a whole shot has.
+    pub(super) fn conclude(&self) -> Result<()> {
+        match self {
+            Self::Shot { shot, .. } => shot.conclude(self.track()?),
+            Self::Still(_) => Ok(()),
+        }
+    }
+}
+
+impl Frame {
+    /// Its entry in a manifest.
+    pub(super) fn entry(&self, frame: u32) -> Result<FrameEntry> {
+        let limits = &self.settings().limits;
+        if limits.time.is_some() || limits.plans.is_some() {
+            bail!("--time and --plans end one process: a farm goes by --visibility, --quality, --spp and --max-spp");
+        }
+        let origin = self.header.origin.clone();
+        Ok(FrameEntry { frame, seed: self.trace.seed, origin, judged_by: self.judged_by })
+    }
+
+    /// Its scene made ready.
+    pub(super) fn tracer(&self) -> PathTracer {
+        PathTracer::new(Arc::clone(&self.scene), self.trace)
+    }
+
+    /// By which its film is judged.
+    pub(super) fn settings(&self) -> &LoopSettings {
+        match &self.kind {
+            FrameKind::Still(settings) => settings,
+            FrameKind::OfShot(of_shot) => &of_shot.settings,
+        }
+    }
+
+    /// What its film's file says of it.
+    pub(super) fn header(&self) -> &Header {
+        &self.header
+    }
+}
+
+/// Refuses a scene that is not the one that was planned.
+fn check_origin(farm: &Farm, entry: &FrameEntry, own: &Origin) -> Result<()> {
+    match entry.origin.difference(own) {
+        None => Ok(()),
+        Some(problem) => {
+            bail!("{}: frame {}: {problem}: plan anew", Farm::manifest_file(farm.folder()).display(), entry.frame)
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! `farm plan`: a scene in, a folder with a manifest and the first round's units out.
+
+use super::job::JobOptions;
+use anyhow::{Context, Result, bail};
+use clap::{Args, ValueEnum};
+use fechner::adaptive::state::RenderState;
+use fechner::farm::round::hand_out;
+use fechner::farm::{Farm, FrameEntry, Manifest, PictureFormat, Work};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Arguments of `farm plan`.
+#[derive(Debug, Args)]
+pub(super) struct PlanArguments {
+    /// Scene, as for render and animate.
+    scene: String,
+    /// Frames of a scene that moves, first..last, both included; without them a still.
+    #[arg(long, value_name = "A..B")]
+    frames: Option<String>,
+    /// Most units that a round of a frame is cut into: about as many processes as should work on one frame.
+    #[arg(long, value_name = "P", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    passes: u32,
+    /// Fewest samples of a unit. A unit should last ten seconds or more; a round with fewer samples is traced by the merge
+    /// that planned it.
+    #[arg(long, value_name = "N", default_value_t = 4_000_000)]
+    unit_samples: u64,
+    /// Folder to make.
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// What finished frames become: exr with all layers, or png as the display shows it.
+    #[arg(long, value_enum, default_value = "exr")]
+    format: Format,
+    /// Keep the films of finished frames, for merge and for render --resume.
+    #[arg(long)]
+    keep_films: bool,
+    /// After --: options of render or, with --frames, of animate, such as --size 480x270 --visibility 2.
+    #[arg(last = true, value_name = "OPTIONS", allow_hyphen_values = true)]
+    options: Vec<String>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Format {
+    Exr,
+    Png,
+}
+
+/// Plans; a folder that has a manifest is left alone.
+pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode> {
+    let folder = &arguments.output;
+    if Farm::manifest_file(folder).exists() {
+        bail!("{} is a farm already: go on with it, name another folder, or remove it", folder.display());
+    }
+    let mut words = vec![arguments.scene.clone()];
+    let work = match &arguments.frames {
+        None => Work::Render,
+        Some(frames) => {
+            words.extend(["--frames".to_owned(), frames.clone()]);
+            Work::Animate
+        }
+    };
+    words.extend(arguments.options.iter().cloned());
+    let format = match arguments.format {
+        Format::Exr => PictureFormat::Exr,
+        Format::Png => PictureFormat::Png,
+    };
+    // Before anything is made: what cannot be understood leaves no folder.
+    JobOptions::parse(work, &words, folder, format).context("farm plan, after --")?;
+    let pictures = folder.join("pictures");
+    std::fs::create_dir_all(&pictures).with_context(|| format!("{}", pictures.display()))?;
+    let folder = super::absolute(folder)?;
+    let options = JobOptions::parse(work, &words, &folder.join("pictures"), format)?;
+    let job = options.job()?;
+    let (mut entries, mut limits) = (Vec::new(), None);
+    for number in options.frames() {
+        let frame = job.frame(number)?;
+        entries.push(frame.entry(number)?);
+        limits = Some(frame.settings().limits);
+    }
+    let directory = std::env::current_dir().context("where the farm is planned")?;
+    let farm = Farm::create(
+        &folder,
+        Manifest {
+            picture_format: format,
+            passes: arguments.passes,
+            unit_samples: arguments.unit_samples,
+            keeps_films: arguments.keep_films,
+            ..Manifest::new(work, directory, words, entries)
+        },
+    )?;
+    let limits = limits.context("there are no frames")?;
+    let (mut units, mut samples) = (0, 0);
+    for (frame_index, FrameEntry { origin, .. }) in farm.manifest().frames.iter().enumerate() {
+        let record = hand_out(&farm, frame_index, &RenderState::new(origin.width, origin.height, &limits))?;
+        units += record.units.len();
+        samples += record.samples;
+    }
+    eprintln!(
+        "{}: {} frames, {units} units in the first round, {:.1} million samples",
+        arguments.output.display(),
+        farm.manifest().frames.len(),
+        samples as f64 / 1e6
+    );
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,75 @@
+//! `farm slurm`: the farm as Slurm jobs.
+
+use super::absolute;
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use fechner::farm::Farm;
+use fechner::output;
+use std::io::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Arguments of `farm slurm`.
+#[derive(Debug, Args)]
+pub(super) struct SlurmArguments {
+    /// The farm's folder, on a file system that all nodes see under this name.
+    folder: PathBuf,
+    /// Processors of a unit or merge.
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..1024))]
+    cpus: u32,
+    /// Memory of a unit or merge, as Slurm writes it.
+    #[arg(long, value_name = "SIZE", default_value = "4G")]
+    memory: String,
+    /// Time limit of a unit or merge, as Slurm writes it; a unit that does not make it goes on from its checkpoint.
+    #[arg(long, value_name = "TIME", default_value = "01:00:00")]
+    time: String,
+    /// Most units at once.
+    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
+    at_once: u32,
+    /// Most tasks of a job array (less than the cluster's MaxArraySize); with more units than that a task has several.
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
+    array: u32,
+    /// Another option for every job, such as --option=--partition=render.
+    #[arg(long = "option", value_name = "OPTION", allow_hyphen_values = true)]
+    options: Vec<String>,
+}
+
+const SUBMIT: &str = include_str!("slurm/submit.sh");
+const UNITS: &str = include_str!("slurm/units.sh");
+const MERGE: &str = include_str!("slurm/merge.sh");
+
+/// Writes the scripts, and says how to start.
+pub(super) fn run(arguments: &SlurmArguments) -> Result<ExitCode> {
+    let folder = absolute(&arguments.folder)?;
+    Farm::open(&folder)?;
+    let program = std::env::current_exe().context("where this program is")?;
+    let word = |path: &std::path::Path| match path.to_str() {
+        Some(text) if !text.contains(['\'', '\n', '%']) => Ok(text.to_owned()),
+        _ => bail!("{}: a name that scripts cannot hold (Unicode without ', % and line ends)", path.display()),
+    };
+    let (farm, program) = (word(&folder)?, word(&program)?);
+    let mut head = format!(
+        "#SBATCH --cpus-per-task={}\n#SBATCH --mem={}\n#SBATCH --time={}\n",
+        arguments.cpus, arguments.memory, arguments.time
+    );
+    for option in &arguments.options {
+        if !option.starts_with('-') || option.contains('\n') {
+            bail!("--option {option}: an option of sbatch begins with -");
+        }
+        head.push_str(&format!("#SBATCH {option}\n"));
+    }
+    let scripts = folder.join("slurm");
+    std::fs::create_dir_all(&scripts).with_context(|| format!("{}", scripts.display()))?;
+    for (name, template) in [("submit.sh", SUBMIT), ("units.sh", UNITS), ("merge.sh", MERGE)] {
+        let text = template
+            .replace("#SBATCH @HEAD@\n", &head)
+            .replace("@FARM@", &farm)
+            .replace("@FECHNER@", &program)
+            .replace("@CPUS@", &arguments.cpus.to_string())
+            .replace("@ARRAY@", &arguments.array.to_string())
+            .replace("@AT_ONCE@", &arguments.at_once.to_string());
+        output::write_beside(&scripts.join(name), |file| file.write_all(text.as_bytes()))?;
+    }
+    println!("sh {}", scripts.join("submit.sh").display());
+    Ok(ExitCode::SUCCESS)
+}

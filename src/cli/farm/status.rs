@@ -1,0 +1,125 @@
+//! `farm status`: how far everything is, for people and schedulers.
+
+use super::absolute;
+use anyhow::{Context, Result};
+use clap::{Args, ValueEnum};
+use fechner::farm::Farm;
+use fechner::farm::frame::{Progress, progress};
+use fechner::farm::lock::try_lock;
+use serde::Serialize;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Arguments of `farm status`.
+#[derive(Debug, Args)]
+pub(super) struct StatusArguments {
+    /// The farm's folder.
+    folder: PathBuf,
+    /// As JSON.
+    #[arg(long, conflicts_with = "list")]
+    json: bool,
+    /// Only numbers, one a line: of units that are missing, or of frames that are not done.
+    #[arg(long, value_enum)]
+    list: Option<List>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum List {
+    Units,
+    Frames,
+}
+
+/// How far a frame is.
+#[derive(Debug, Serialize)]
+struct FrameStatus {
+    frame: u32,
+    state: State,
+    /// Looks taken.
+    round: Option<u32>,
+    /// Units of the open round.
+    units: usize,
+    /// Samples of these.
+    samples: u64,
+    /// Numbers of those that are missing.
+    missing: Vec<u64>,
+    /// Of these, how many a process has now.
+    running: usize,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+enum State {
+    /// Units are missing.
+    Open,
+    /// Can be merged.
+    Merge,
+    Done,
+}
+
+#[derive(Debug, Serialize)]
+struct Status {
+    done: bool,
+    frames: Vec<FrameStatus>,
+}
+
+/// Says it on standard output.
+pub(super) fn run(arguments: &StatusArguments) -> Result<ExitCode> {
+    let farm = Farm::open(&absolute(&arguments.folder)?)?;
+    let frames: Vec<FrameStatus> =
+        (0..farm.manifest().frames.len()).map(|frame_index| of_frame(&farm, frame_index)).collect();
+    let status = Status { done: frames.iter().all(|frame| frame.state == State::Done), frames };
+    if arguments.json {
+        println!("{}", serde_json::to_string_pretty(&status).context("the status could not be put into words")?);
+    } else {
+        match arguments.list {
+            Some(List::Units) => status.frames.iter().flat_map(|f| &f.missing).for_each(|unit| println!("{unit}")),
+            Some(List::Frames) => {
+                status.frames.iter().filter(|f| f.state != State::Done).for_each(|f| println!("{}", f.frame));
+            }
+            None => say(&status),
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn of_frame(farm: &Farm, frame_index: usize) -> FrameStatus {
+    let (state, round, missing) = match progress(farm, frame_index) {
+        Progress::Done => (State::Done, None, Vec::new()),
+        Progress::ToMerge { round } => (State::Merge, round, Vec::new()),
+        Progress::Open { round, missing } => (State::Open, Some(round), missing),
+    };
+    let is_running = |unit: &&u64| {
+        let lock = farm.unit_file(**unit, "lock");
+        lock.exists() && try_lock(&lock).is_ok_and(|lock| lock.is_none())
+    };
+    FrameStatus {
+        frame: farm.frame(frame_index).frame,
+        state,
+        units: round.as_ref().map_or(0, |round| round.units.len()),
+        samples: round.as_ref().map_or(0, |round| round.samples),
+        round: round.map(|round| round.round),
+        running: missing.iter().filter(is_running).count(),
+        missing,
+    }
+}
+
+fn say(status: &Status) {
+    for frame in &status.frames {
+        let number = frame.frame;
+        match (frame.state, frame.round) {
+            (State::Done, _) => println!("frame {number}: done"),
+            (State::Merge, None) => println!("frame {number}: to be merged"),
+            (State::Merge, Some(round)) => println!("frame {number}: round {round} is to be merged"),
+            (State::Open, _) => println!(
+                "frame {number}: round {} has {} of {} units, {} are being rendered, {:.2} million samples in all",
+                frame.round.unwrap_or(0),
+                frame.units - frame.missing.len(),
+                frame.units,
+                frame.running,
+                frame.samples as f64 / 1e6
+            ),
+        }
+    }
+    let done = status.frames.iter().filter(|frame| frame.state == State::Done).count();
+    println!("{done} of {} frames are done", status.frames.len());
+}

@@ -1,0 +1,228 @@
+//! `farm unit`: executes orders.
+
+use super::job::{Job, JobOptions};
+use super::signals::Signals;
+use super::{CALL_AGAIN, Threads, open_for_work};
+use crate::cli::console::duration_in_words;
+use crate::cli::seeing::parse_positive;
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use fechner::farm::frame::{Progress, progress};
+use fechner::farm::lock::{Lock, try_lock, wait_for_lock};
+use fechner::farm::unit::{NamedOrder, Outcome, UnitError, UnitSums, render_unit};
+use fechner::farm::{Farm, frame};
+use fechner::integrator::PathTracer;
+use std::io;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+/// Arguments of `farm unit`.
+#[derive(Debug, Args)]
+pub(super) struct UnitArguments {
+    /// The farm's folder.
+    folder: PathBuf,
+    /// Numbers of the units.
+    #[arg(required = true, value_name = "N")]
+    units: Vec<u64>,
+    #[command(flatten)]
+    keeping: Keeping,
+    #[command(flatten)]
+    threads: Threads,
+}
+
+/// How much a kill may cost.
+#[derive(Debug, Args)]
+pub(super) struct Keeping {
+    /// Seconds of work that a kill may cost.
+    #[arg(long, value_name = "SECONDS", value_parser = parse_positive, default_value_t = 60.0)]
+    checkpoint_every: f64,
+}
+
+impl Keeping {
+    pub(super) fn every(&self) -> Duration {
+        Duration::from_secs_f64(self.checkpoint_every.min(1e9))
+    }
+}
+
+/// What to do about a unit that another process renders.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum IfBusy {
+    Wait,
+    Skip,
+}
+
+/// How it went with a unit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Went {
+    /// Rendered here and now.
+    Rendered,
+    /// Nothing was to be done.
+    WasThere,
+    /// Another process has it.
+    Busy,
+    /// A signal ended it; its checkpoint is there.
+    Left,
+    /// Its order was damaged or lost; the next merge writes it again.
+    HasNoOrder,
+}
+
+/// Renders units of one farm, and keeps the last scene that it loaded.
+pub(super) struct Bench<'a> {
+    farm: &'a Farm,
+    job: &'a Job<'a>,
+    signals: &'a Signals,
+    every: Duration,
+    loaded: Option<(usize, PathTracer)>,
+}
+
+/// Renders what was asked for.
+pub(super) fn run(arguments: &UnitArguments) -> Result<ExitCode> {
+    let farm = open_for_work(&arguments.folder)?;
+    let signals = Signals::listen()?;
+    arguments.threads.pool()?.install(|| {
+        let options = JobOptions::of(&farm)?;
+        let job = options.job()?;
+        let mut bench = Bench::new(&farm, &job, &signals, arguments.keeping.every());
+        for &unit in &arguments.units {
+            match bench.render(unit, IfBusy::Wait)? {
+                Went::Rendered | Went::WasThere => {}
+                Went::Left | Went::Busy => return Ok(ExitCode::from(CALL_AGAIN)),
+                Went::HasNoOrder => bail!("unit {unit} has no order: fechner farm merge writes it again"),
+            }
+        }
+        Ok(ExitCode::SUCCESS)
+    })
+}
+
+impl<'a> Bench<'a> {
+    pub(super) fn new(farm: &'a Farm, job: &'a Job<'a>, signals: &'a Signals, every: Duration) -> Self {
+        Self { farm, job, signals, every, loaded: None }
+    }
+
+    /// Renders a unit, unless its result is there.
+    pub(super) fn render(&mut self, unit: u64, if_busy: IfBusy) -> Result<Went> {
+        if self.is_merged(unit)? {
+            eprintln!("unit {unit}: is merged");
+            return Ok(Went::WasThere);
+        }
+        let lock = match self.lock(unit, if_busy) {
+            Ok(Some(lock)) => lock,
+            Ok(None) => return Ok(if self.signals.leaves() { Went::Left } else { Went::Busy }),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                eprintln!("unit {unit}: was merged meanwhile");
+                return Ok(Went::WasThere);
+            }
+            Err(error) => return Err(error).with_context(|| format!("the lock of unit {unit}")),
+        };
+        let went = self.render_locked(unit);
+        drop(lock);
+        match went {
+            // Another process had it as well, and its result was merged.
+            Err(_) if self.is_merged(unit).unwrap_or(false) => Ok(Went::WasThere),
+            went => went,
+        }
+    }
+
+    fn lock(&self, unit: u64, if_busy: IfBusy) -> io::Result<Option<Lock>> {
+        let path = self.farm.unit_file(unit, "lock");
+        match if_busy {
+            IfBusy::Skip => try_lock(&path),
+            IfBusy::Wait => wait_for_lock(&path, &|| self.signals.leaves()),
+        }
+    }
+
+    /// Whether the unit's round is over; an error for one that was never handed out.
+    fn is_merged(&self, unit: u64) -> Result<bool> {
+        let place = self.farm.place(unit);
+        let number = self.farm.frame(place.frame_index).frame;
+        let round = match progress(self.farm, place.frame_index) {
+            Progress::Done => return Ok(true),
+            Progress::Open { round, .. } => Some(round),
+            Progress::ToMerge { round } => round,
+        };
+        let Some(round) = round else {
+            bail!("unit {unit} is not planned: frame {number} has no round yet; fechner farm merge makes one")
+        };
+        if round.round > place.round {
+            return Ok(true);
+        }
+        if round.units.iter().all(|planned| planned.unit != unit) {
+            let planned: Vec<String> = round.units.iter().map(|planned| planned.unit.to_string()).collect();
+            bail!(
+                "unit {unit} is not planned: frame {number} is in round {}, whose units are {}",
+                round.round,
+                planned.join(", ")
+            );
+        }
+        Ok(false)
+    }
+
+    fn render_locked(&mut self, unit: u64) -> Result<Went> {
+        let order = match NamedOrder::read(self.farm, unit) {
+            Ok(order) => order,
+            Err(error) => {
+                self.refuse(&self.farm.unit_file(unit, "order"), &error);
+                return Ok(Went::HasNoOrder);
+            }
+        };
+        let sums = self.farm.unit_file(unit, "sums");
+        match UnitSums::read(&sums, &order) {
+            Ok(_) => {
+                eprintln!("unit {unit}: is there");
+                return Ok(Went::WasThere);
+            }
+            Err(error) if error.is_missing() => {}
+            Err(error) => self.refuse(&sums, &error),
+        }
+        let partial = self.farm.unit_file(unit, "partial");
+        let begun = match UnitSums::read_beginning(&partial, &order) {
+            Ok(begun) => Some(begun),
+            Err(error) if error.is_missing() => None,
+            Err(error) => {
+                self.refuse(&partial, &error);
+                None
+            }
+        };
+        let samples: u64 = order.order.blocks.iter().map(|block| u64::from(block.samples)).sum();
+        let there = begun.as_ref().map_or(0, |begun| begun.sums.len());
+        if there > 0 {
+            eprintln!("unit {unit}: goes on from its checkpoint, {there} of {} blocks", order.order.blocks.len());
+        }
+        let started = Instant::now();
+        let Self { farm, signals, every, .. } = *self;
+        let tracer = self.tracer(farm.place(unit).frame_index)?;
+        let loaded = started.elapsed();
+        let wish = || signals.wish();
+        match render_unit(farm, &order, begun, tracer, every, &wish)? {
+            Outcome::Left => {
+                eprintln!("unit {unit}: left by a signal; its checkpoint is there");
+                Ok(Went::Left)
+            }
+            Outcome::Finished => {
+                eprintln!(
+                    "unit {unit}: frame {}, {:.2} million samples in {}, {} of it to load the scene",
+                    order.order.frame,
+                    samples as f64 / 1e6,
+                    duration_in_words(started.elapsed().as_secs_f64()),
+                    duration_in_words(loaded.as_secs_f64())
+                );
+                Ok(Went::Rendered)
+            }
+        }
+    }
+
+    fn refuse(&self, path: &std::path::Path, error: &UnitError) {
+        eprintln!("note: refused: {error}");
+        frame::set_aside(path);
+    }
+
+    /// The frame's tracer: the last one, if it is of this frame.
+    fn tracer(&mut self, frame_index: usize) -> Result<&PathTracer> {
+        if self.loaded.as_ref().is_none_or(|(loaded, _)| *loaded != frame_index) {
+            self.loaded = None;
+            self.loaded = Some((frame_index, self.job.tracer(self.farm, frame_index)?));
+        }
+        self.loaded.as_ref().map(|(_, tracer)| tracer).context("a scene was loaded")
+    }
+}

@@ -1,0 +1,73 @@
+//! `farm work`: one of any number of processes on a folder.
+
+use super::job::JobOptions;
+use super::merge::{conclude, merge};
+use super::signals::Signals;
+use super::unit::{Bench, IfBusy, Keeping, Went};
+use super::{CALL_AGAIN, Threads, open_for_work};
+use anyhow::Result;
+use clap::Args;
+use fechner::farm::frame::{Progress, progress};
+use fechner::farm::lock::try_lock;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
+
+/// Arguments of `farm work`.
+#[derive(Debug, Args)]
+pub(super) struct WorkArguments {
+    /// The farm's folder.
+    folder: PathBuf,
+    #[command(flatten)]
+    keeping: Keeping,
+    #[command(flatten)]
+    threads: Threads,
+}
+
+/// How long to wait where others have everything that can be done.
+const PAUSE: Duration = Duration::from_millis(200);
+
+/// Works until all frames are done. Where others merge or render, it takes what they leave.
+pub(super) fn run(arguments: &WorkArguments) -> Result<ExitCode> {
+    let farm = open_for_work(&arguments.folder)?;
+    let signals = Signals::listen()?;
+    arguments.threads.pool()?.install(|| {
+        let options = JobOptions::of(&farm)?;
+        let job = options.job()?;
+        let mut bench = Bench::new(&farm, &job, &signals, arguments.keeping.every());
+        loop {
+            let (mut all_done, mut did_something) = (true, false);
+            for frame_index in 0..farm.manifest().frames.len() {
+                if signals.leaves() {
+                    return Ok(ExitCode::from(CALL_AGAIN));
+                }
+                match progress(&farm, frame_index) {
+                    Progress::Done => continue,
+                    Progress::ToMerge { .. } => {
+                        if let Some(lock) = try_lock(&farm.frame_lock(frame_index))? {
+                            did_something |= merge(&farm, &job, frame_index)?;
+                            drop(lock);
+                        }
+                    }
+                    Progress::Open { missing, .. } => {
+                        for unit in missing {
+                            match bench.render(unit, IfBusy::Skip)? {
+                                Went::Rendered => did_something = true,
+                                Went::Left => return Ok(ExitCode::from(CALL_AGAIN)),
+                                Went::WasThere | Went::Busy | Went::HasNoOrder => {}
+                            }
+                        }
+                    }
+                }
+                all_done = false;
+            }
+            if all_done {
+                conclude(&farm, &job)?;
+                return Ok(ExitCode::SUCCESS);
+            }
+            if !did_something {
+                std::thread::sleep(PAUSE);
+            }
+        }
+    })
+}

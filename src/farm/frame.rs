@@ -1,0 +1,228 @@
+//! One frame's way through its rounds: merge, look, hand out the next one or end.
+
+use super::folder::Farm;
+use super::round::{RoundRecord, clear_before, hand_out, open_round, orders};
+use super::unit::{NamedOrder, UnitError, UnitSums};
+use crate::adaptive::judge::JudgeError;
+use crate::adaptive::settings::LoopSettings;
+use crate::adaptive::state::RenderState;
+use crate::adaptive::{Ended, Monitor, Next, decide};
+use crate::checkpoint::{CheckpointError, Header, read_checkpoint, write_checkpoint};
+use crate::integrator::PathTracer;
+use crate::output::OutputError;
+use std::path::Path;
+
+/// How far a frame is, as its files say.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Progress {
+    /// Units of a round are missing.
+    Open {
+        /// The round.
+        round: RoundRecord,
+        /// Numbers of the units that are missing, ascending.
+        missing: Vec<u64>,
+    },
+    /// All there is to wait for is there, or orders have to be written again.
+    ToMerge {
+        /// Its last round; `None` where the merge begins with the first.
+        round: Option<RoundRecord>,
+    },
+    /// Its picture is there.
+    Done,
+}
+
+/// How far a frame is. Reads names, not films.
+pub fn progress(farm: &Farm, frame_index: usize) -> Progress {
+    if farm.result(frame_index).exists() {
+        return Progress::Done;
+    }
+    let Some(round) = open_round(farm, frame_index) else { return Progress::ToMerge { round: None } };
+    let is_missing = |unit: &u64| !farm.unit_file(*unit, "sums").exists();
+    let missing: Vec<u64> = round.units.iter().map(|unit| unit.unit).filter(is_missing).collect();
+    let can_be_rendered = |unit: &u64| farm.unit_file(*unit, "order").exists();
+    if missing.iter().all(can_be_rendered) && !missing.is_empty() {
+        Progress::Open { round, missing }
+    } else {
+        Progress::ToMerge { round: Some(round) }
+    }
+}
+
+/// What a frame's film is traced and judged by.
+pub struct FrameJob<'a> {
+    /// Its scene, and its seed.
+    pub tracer: &'a PathTracer,
+    /// When it is done.
+    pub settings: &'a LoopSettings,
+    /// What its film's file says of it.
+    pub header: Header,
+}
+
+/// Why a frame could not be merged.
+#[derive(Debug, thiserror::Error)]
+pub enum FrameError {
+    /// Its film could not be read.
+    #[error(transparent)]
+    Film(#[from] CheckpointError),
+    /// Something could not be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// Its film could not be judged.
+    #[error(transparent)]
+    Judge(#[from] JudgeError),
+}
+
+/// What came of a merge.
+#[derive(Debug)]
+pub enum Merged {
+    /// Nothing yet: units are missing.
+    Waiting {
+        /// Their numbers.
+        missing: Vec<u64>,
+        /// What was there and was refused; renamed, so that it is rendered again.
+        refused: Vec<UnitError>,
+    },
+    /// The next round is handed out.
+    Planned(RoundRecord),
+    /// The frame needs no more: its picture is to be made, then [`finish`].
+    Ended(Box<Ended>),
+}
+
+/// Merges a frame's open round if all its units are there, and hands out the next. Rounds too small for units are traced here.
+/// Call it with the frame's lock. Killed at any moment, it does the same when it is called again.
+///
+/// # Errors
+/// [`FrameError`] if the film's file is not this frame's, or something cannot be written.
+pub fn merge_frame(
+    farm: &Farm,
+    frame_index: usize,
+    job: &FrameJob<'_>,
+    monitor: &dyn Monitor,
+) -> Result<Merged, FrameError> {
+    let mut state = state_so_far(farm, frame_index, job)?;
+    let units: Vec<(NamedOrder, Vec<u8>)> = orders(farm, frame_index, &state).collect();
+    if units.is_empty() {
+        trace_here(job.tracer, &mut state);
+    } else {
+        let refused = match enter(farm, &units, &mut state) {
+            Ok(()) => Vec::new(),
+            Err(refused) => refused,
+        };
+        let is_missing = |unit: &u64| !farm.unit_file(*unit, "sums").exists();
+        let missing: Vec<u64> = units.iter().map(|(named, _)| named.order.unit).filter(is_missing).collect();
+        if !missing.is_empty() {
+            drop(units);
+            let state = state_so_far(farm, frame_index, job)?;
+            hand_out(farm, frame_index, &state)?;
+            return Ok(Merged::Waiting { missing, refused });
+        }
+    }
+    loop {
+        state = match decide(job.tracer, job.settings, state, monitor)? {
+            Next::Planned(state) => *state,
+            Next::Ended(ended) => return Ok(Merged::Ended(ended)),
+        };
+        if orders(farm, frame_index, &state).next().is_some() {
+            break;
+        }
+        trace_here(job.tracer, &mut state);
+    }
+    write_checkpoint(&farm.film(frame_index), &job.header, &state)?;
+    let record = hand_out(farm, frame_index, &state)?;
+    clear_before(farm, frame_index, record.round);
+    Ok(Merged::Planned(record))
+}
+
+/// Marks a frame as done by its figures, after its picture is written, and `kept` beside it, its film. Clears everything away
+/// that only a render under way needs.
+///
+/// # Errors
+/// If something cannot be written.
+pub fn finish(
+    farm: &Farm,
+    frame_index: usize,
+    kept: Option<(&Header, &RenderState)>,
+    result: &[u8],
+) -> Result<(), OutputError> {
+    if let Some((header, state)) = kept {
+        write_checkpoint(&farm.finished_film(frame_index), header, state)?;
+    }
+    crate::output::write_beside(&farm.result(frame_index), |file| std::io::Write::write_all(file, result))?;
+    clear_before(farm, frame_index, u32::MAX);
+    std::fs::remove_file(farm.film(frame_index)).ok();
+    Ok(())
+}
+
+/// The film that rounds so far made, or an empty one.
+fn state_so_far(farm: &Farm, frame_index: usize, job: &FrameJob<'_>) -> Result<RenderState, FrameError> {
+    let path = farm.film(frame_index);
+    if !path.exists() {
+        let area = job.tracer.settings().film_area();
+        return Ok(RenderState::new(area.width, area.height, &job.settings.limits));
+    }
+    let checkpoint = read_checkpoint(&path)?;
+    if checkpoint.header != job.header {
+        let problem = "it is the film of another farm: remove it, and the frame begins anew".to_owned();
+        return Err(CheckpointError::Different { path, problem }.into());
+    }
+    Ok(checkpoint.state)
+}
+
+/// Enters the sums of all units into the film in the plan's order, as a render in one process does. Nothing is entered where
+/// one is missing; those that are refused are told.
+fn enter(farm: &Farm, units: &[(NamedOrder, Vec<u8>)], state: &mut RenderState) -> Result<(), Vec<UnitError>> {
+    let files: Vec<_> = units.iter().map(|(named, _)| (named, farm.unit_file(named.order.unit, "sums"))).collect();
+    if files.iter().any(|(_, path)| !path.exists()) {
+        return Err(Vec::new());
+    }
+    let mut refused = Vec::new();
+    let read = |(order, path): &(&NamedOrder, std::path::PathBuf)| UnitSums::read(path, order);
+    let mut next = files.first().map(read);
+    for (i, (named, path)) in files.iter().enumerate() {
+        // One file is decoded while the other is entered.
+        let (sums, following) = (next.take(), files.get(i + 1));
+        let enter_one = || match sums {
+            Some(Ok(sums)) => {
+                for (block, sum) in named.order.blocks.iter().zip(&sums.sums) {
+                    state.film.merge_block(*block, sum);
+                }
+                state.seconds_total += sums.seconds;
+            }
+            Some(Err(error)) => {
+                set_aside(path);
+                refused.push(error);
+            }
+            None => {}
+        };
+        ((), next) = rayon::join(enter_one, || following.map(read));
+    }
+    if !refused.is_empty() {
+        return Err(refused);
+    }
+    close_plans(state);
+    Ok(())
+}
+
+/// Takes a unit's refused file out of the way, and keeps it for whoever wants to know.
+pub fn set_aside(path: &Path) {
+    let mut aside = path.as_os_str().to_owned();
+    aside.push(".refused");
+    if std::fs::rename(path, &aside).is_err() {
+        std::fs::remove_file(path).ok();
+    }
+}
+
+fn trace_here(tracer: &PathTracer, state: &mut RenderState) {
+    let started = std::time::Instant::now();
+    for plan in &state.pending {
+        tracer.trace(plan, &mut state.film, &|_| {});
+    }
+    close_plans(state);
+    state.seconds_total += started.elapsed().as_secs_f64();
+}
+
+/// What was planned is in the film.
+fn close_plans(state: &mut RenderState) {
+    state.plans += state.pending.len() as u32;
+    state.pending.clear();
+    state.traced_blocks = 0;
+}
