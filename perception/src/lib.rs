@@ -96,6 +96,7 @@ pub mod allocation;
 mod bands;
 pub mod colour;
 pub mod csf;
+pub mod denoised;
 pub mod difference;
 pub mod display;
 pub mod eotf;

@@ -5,6 +5,7 @@
 //! and by `next_step`; what the eye sees is asked of the perception crate in [`mod@judge`]; variance is in [`statistics`].
 
 pub mod audit;
+pub mod denoised;
 pub mod judge;
 mod monitor;
 pub mod plan;
@@ -57,6 +58,8 @@ pub struct Rendered {
     pub seconds_perception: f64,
     /// Of which in finding counts.
     pub seconds_allocation: f64,
+    /// And in denoising.
+    pub seconds_denoising: f64,
 }
 
 impl Rendered {
@@ -72,6 +75,7 @@ impl Rendered {
             seconds_total: state.seconds_total,
             seconds_perception: state.seconds_perception,
             seconds_allocation: state.seconds_allocation,
+            seconds_denoising: state.seconds_denoising,
         }
     }
 }
@@ -170,7 +174,7 @@ pub fn run(
         let look = Instant::now();
         let mut judgement = match last_look.take() {
             Some(earlier) if ended.is_none() && render.exposure_holds() => earlier,
-            _ => judge(&render.state.film, settings, render.state.inflation)?,
+            _ => render.look()?,
         };
         let step = match ended {
             Some(reason) => Step::Stop(reason),
@@ -198,6 +202,13 @@ impl<'a> Loop<'a> {
         let rungs = ladder(settings.limits.visibility).into_iter().filter(is_left).collect();
         let seconds_before = state.seconds_total;
         Self { tracer, settings, rungs, state, resumed_at: Instant::now(), seconds_before }
+    }
+
+    /// Looks at the film.
+    fn look(&mut self) -> Result<Judgement, JudgeError> {
+        let judgement = judge(&self.state.film, self.settings, self.state.inflation)?;
+        self.state.seconds_denoising += judgement.seconds_denoising;
+        Ok(judgement)
     }
 
     /// Traces what is planned, and says why the render ends if it does. A plan that was begun is finished first, unless
@@ -251,7 +262,7 @@ impl<'a> Loop<'a> {
     /// Tells the last state, and looks once more where the rule did not need to.
     fn finish(mut self, judgement: Judgement, reason: StopReason, monitor: &dyn Monitor) -> Result<Ended, JudgeError> {
         let judgement = match self.settings.sampling {
-            Sampling::Rival(_) => judge(&self.state.film, self.settings, self.state.inflation)?,
+            Sampling::Rival(_) => self.look()?,
             Sampling::Adaptive | Sampling::Uniform => judgement,
         };
         self.state.seconds_total = self.seconds_before + self.resumed_at.elapsed().as_secs_f64();
@@ -301,7 +312,9 @@ impl<'a> Loop<'a> {
         let doubled = {
             let most = self.settings.limits.mean_samples.unwrap_or(max_samples).min(max_samples);
             let pixels = u64::from(self.state.film.width()) * u64::from(self.state.film.height());
-            (2 * (self.state.film.total_samples() / pixels).max(8) as u32).min(most)
+            (2 * (self.state.film.total_samples() / pixels).max(u64::from(self.settings.limits.pilot_samples) / 2)
+                as u32)
+                .min(most)
         };
         let some = |plan: SamplePlan| if plan.blocks.is_empty() { None } else { Some(plan) };
         if self.settings.sampling == Sampling::Uniform {
@@ -309,7 +322,7 @@ impl<'a> Loop<'a> {
         }
         if !is_reached(judgement, rung) {
             let started = Instant::now();
-            let wanted = wanted_samples(judgement, self.settings.allocation, rung, max_samples)?;
+            let wanted = wanted_samples(judgement, self.settings.allocation, rung, &self.settings.limits)?;
             self.state.seconds_allocation += started.elapsed().as_secs_f64();
             if predicted_saving(&self.state.film, judgement, &wanted, rung) < LEAST_SAVING {
                 return Ok(some(uniform_plan(&self.state.film, doubled)));
@@ -338,7 +351,8 @@ impl<'a> Loop<'a> {
     /// Audits a rung that is reached. Where the variance proves too low it is raised from here on, and the plan for it is
     /// returned.
     fn audited(&mut self, rung: f64, judgement: &mut Judgement) -> Result<Option<SamplePlan>, JudgeError> {
-        let may_audit = rung <= HIGHEST_AUDITED_RUNG && judgement.pixel_thresholds.is_none();
+        let is_raw = judgement.denoised.is_none();
+        let may_audit = rung <= HIGHEST_AUDITED_RUNG && judgement.pixel_thresholds.is_none() && is_raw;
         if !may_audit || self.state.inflation >= MOST_INFLATION {
             return Ok(None);
         }
@@ -347,7 +361,7 @@ impl<'a> Loop<'a> {
         self.state.audit = found.or(self.state.audit);
         let Some(found) = found.filter(Audit::disagrees) else { return Ok(None) };
         self.state.inflation = (self.state.inflation * found.ratio).min(MOST_INFLATION);
-        *judgement = judge(&self.state.film, self.settings, self.state.inflation)?;
+        *judgement = self.look()?;
         self.plan_towards(rung, judgement)
     }
 

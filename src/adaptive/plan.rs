@@ -5,7 +5,7 @@
 //! alone would cost 1.44 times the samples.
 
 use super::judge::Judgement;
-use super::settings::AllocationRule;
+use super::settings::{AllocationRule, Limits};
 use crate::film::Film;
 use crate::integrator::{BlockWork, PILOT_SAMPLES, SamplePlan};
 use crate::sampler::Half;
@@ -55,10 +55,10 @@ pub fn wanted_samples(
     judgement: &Judgement,
     rule: AllocationRule,
     visibility: f64,
-    max_samples: u32,
+    limits: &Limits,
 ) -> Result<Plane, fechner_perception::Error> {
-    let least = f64::from(2 * PILOT_SAMPLES);
-    let most = f64::from(max_samples).max(least);
+    let least = f64::from(limits.pilot_samples);
+    let most = f64::from(limits.max_samples).max(least);
     let variance = &judgement.pooled_variance_per_sample;
     if rule == AllocationRule::Convex && judgement.pixel_thresholds.is_none() {
         let allocation = allocate(&AllocationProblem {
@@ -122,7 +122,9 @@ fn doubling_plan(film: &Film, max_samples: u32, doublings: impl Fn(usize) -> [u3
         for half in Half::BOTH {
             let mut taken = film.half(half)[pixel].taken;
             for _ in 0..doublings[half.index()] {
-                let block = BlockWork::rest(pixel as u32, half, taken);
+                let rest = BlockWork::rest(pixel as u32, half, taken);
+                // A pilot may have been a part of the first block.
+                let block = BlockWork { samples: rest.samples.min(taken.max(1)), ..rest };
                 taken += block.samples;
                 if taken > max_samples / 2 {
                     break;

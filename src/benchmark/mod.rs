@@ -9,6 +9,7 @@
 
 mod animation;
 mod arm;
+mod denoise;
 mod metrics;
 mod oracle;
 mod pictures;
@@ -21,6 +22,7 @@ mod truth;
 
 pub use animation::{AnimationRow, AnimationSettings, animation};
 pub use arm::Arm;
+pub use denoise::{Calibration, DenoisingResults, DenoisingSettings, Race, denoising};
 pub use record::{Record, Results};
 
 use crate::adaptive::settings::{Limits, LoopSettings};

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 /// As in PNG, a byte that no text has and line ends that careless transfers change.
 const MAGIC: [u8; 12] = *b"fech film\r\n\x1a";
 /// Raised whenever the bytes after it mean something else.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 const PREAMBLE_BYTES: usize = MAGIC.len() + 4;
 const HASH_BYTES: usize = blake3::OUT_LEN;
 /// More than any header takes.

@@ -5,6 +5,7 @@ mod bench;
 mod channels;
 mod compare;
 mod console;
+mod denoise;
 mod importance;
 mod info;
 mod job;
