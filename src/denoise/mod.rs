@@ -4,6 +4,7 @@
 //! copy. What may be seen of its error is judged by `fechner_perception::denoised`. Not for animation as such: each frame is
 //! denoised by itself.
 
+mod builtin;
 mod of_film;
 pub mod oidn;
 
@@ -11,7 +12,6 @@ pub use of_film::{DenoisedFilm, denoise_film};
 pub use oidn::{Oidn, OidnError};
 
 use fechner_perception::Plane;
-use fechner_perception::guide::{GuideInputs, denoise};
 use serde::{Deserialize, Serialize};
 
 /// Which denoiser, as a setting that can be written down.
@@ -85,15 +85,7 @@ impl Denoiser {
     /// [`OidnError::Failed`] where the library fails.
     pub fn denoise(&self, picture: &NoisyPicture<'_>) -> Result<Vec<[f32; 3]>, OidnError> {
         let mut denoised = match self {
-            Self::Builtin => denoise(&GuideInputs {
-                rgb: picture.rgb,
-                variance: picture.variance,
-                albedo: picture.albedo,
-                normal: picture.normal,
-                depth: picture.depth,
-                width: picture.width,
-                height: picture.height,
-            }),
+            Self::Builtin => builtin::denoise(picture),
             Self::Oidn(oidn) => oidn.denoise(picture)?,
         };
         for value in denoised.iter_mut().flatten() {

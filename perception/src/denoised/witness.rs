@@ -6,15 +6,18 @@ use crate::plane::Plane;
 use crate::threshold::{POOLING_SIGMA_DEG, ThresholdMap};
 use crate::visibility::ErrorFilters;
 
-/// Squared bias over squared variance before anything is known of a picture: visible error was 1.1 to 1.6 times what the
-/// halves' difference shows in a prototype (Cornell box with glass, Open Image Denoise, 8 to 256 samples a pixel).
-const USUAL_FACTOR: f64 = 0.7;
+/// Squared bias over squared variance before anything is known of a picture: true error was 1.00 to 1.18 times what the
+/// halves' difference shows from 16 samples a pixel on (`fechner bench --suite denoise`, benches/README.md).
+const USUAL_FACTOR: f64 = 0.2;
 /// Its standard deviation between pictures.
-const FACTOR_DEVIATION: f64 = 0.7;
+const FACTOR_DEVIATION: f64 = 0.4;
 /// Standard errors above what the factor says from which a place's own witness begins to count, and from which it counts alone.
-/// Chance alone passes the first in 1 of 700 independent places.
-const BELIEVED_FROM: f32 = 3.0;
-const BELIEVED_FULLY: f32 = 5.0;
+/// Products of two normal values have long tails: at 3 and 5, raw noise of visibility 20 alone was taken for a bias of 1.8.
+const BELIEVED_FROM: f32 = 5.0;
+const BELIEVED_FULLY: f32 = 8.0;
+/// Half the width of the window over which a band is pooled, in its own periods: a narrower one holds so few independent
+/// values that neither noise nor witness means much. At least the eye's window.
+const WINDOW_CYCLES: f64 = 0.5;
 /// Fourth over squared second moment of a normal variable.
 const NORMAL_KURTOSIS: f32 = 3.0;
 
@@ -57,17 +60,19 @@ impl BandEvidence {
             spectra.each_ref().map(|spectrum| filters.response(spectrum, band));
         let noise = residual_noise.enlarged(|value| value * value);
         let pixels_a_deg2 = density.horizontal * density.vertical;
-        // ∫ g² of the pooling window is 1 over this area.
-        let window_deg2 = 4.0 * std::f64::consts::PI * POOLING_SIGMA_DEG * POOLING_SIGMA_DEG;
+        let sigma_deg = POOLING_SIGMA_DEG.max(WINDOW_CYCLES / map.bands.center_cpd(band));
+        // ∫ g² of the window is 1 over this area.
+        let window_deg2 = 4.0 * std::f64::consts::PI * sigma_deg * sigma_deg;
         let correlated = (correlation_area_px(map, filters, band) / pixels_a_deg2 / window_deg2).min(1.0) as f32;
         // rA · rB of two normal halves, each of twice the mean's variance s², has the variance 4 s⁴. The fourth power of
         // the half difference keeps rare, large noise where it is, so that a firefly calls itself uncertain.
-        let fourth = map.blurred(&noise.map(|energy| energy * energy), POOLING_SIGMA_DEG / std::f64::consts::SQRT_2);
+        let fourth = map.blurred(&noise.map(|energy| energy * energy), sigma_deg / std::f64::consts::SQRT_2);
+        let pooled = |energy: &Plane| map.blurred(energy, sigma_deg);
         Self {
-            variance: map.pooled(&left_noise.enlarged(|value| value * value)),
-            witness: map.pooled(&residual.enlarged_with(&residual_noise, |all, noise| all * all - noise * noise)),
+            variance: pooled(&left_noise.enlarged(|value| value * value)),
+            witness: pooled(&residual.enlarged_with(&residual_noise, |all, noise| all * all - noise * noise)),
             witness_variance: fourth.map(|fourth| 4.0 / NORMAL_KURTOSIS * correlated * fourth),
-            raw_noise: map.pooled(&noise),
+            raw_noise: pooled(&noise),
             window_pixels: window_deg2 * pixels_a_deg2,
         }
     }
@@ -85,7 +90,7 @@ fn correlation_area_px(map: &ThresholdMap, filters: &ErrorFilters<'_>, band: usi
     if second > 0.0 { fourth / (second * second) } else { f64::INFINITY }
 }
 
-/// Bias from the witness where it stands out of its noise, from the band's factor elsewhere.
+/// Bias from the witness where it stands out of its noise or is precise, from the band's factor elsewhere.
 pub(super) fn bias_energy(evidence: &BandEvidence) -> BandBias {
     let factor = factor(evidence);
     let expected = evidence.variance.map(|variance| factor as f32 * variance);
@@ -95,10 +100,16 @@ pub(super) fn bias_energy(evidence: &BandEvidence) -> BandBias {
         let proof = (errors - BELIEVED_FROM) / (BELIEVED_FULLY - BELIEVED_FROM);
         if proof.is_nan() { 0.0 } else { proof.clamp(0.0, 1.0) }
     });
-    let gained = excess.combined(&proof, |excess, proof| excess * proof);
+    // A place's bias scatters about what the factor says by about as much: a witness more precise than that is better.
+    let precision = expected.combined(&evidence.witness_variance, |expected, variance| {
+        let scatter = expected * expected;
+        if scatter > 0.0 { scatter / (scatter + variance) } else { 0.0 }
+    });
+    let trust = precision.combined(&proof, f32::max);
+    let gained = excess.combined(&trust, |excess, trust| excess * trust);
     BandBias {
-        energy: expected.combined(&gained, |expected, gained| expected + gained),
-        uncertainty: evidence.witness_variance.combined(&proof, |variance, proof| variance * (1.0 - proof)),
+        energy: expected.combined(&gained, |expected, gained| (expected + gained).max(0.0)),
+        uncertainty: evidence.witness_variance.combined(&trust, |variance, trust| variance * (1.0 - trust)),
         proof,
         factor,
     }
