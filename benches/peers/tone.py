@@ -5,10 +5,10 @@
     python3 -m venv /tmp/venv && /tmp/venv/bin/pip install numpy OpenEXR
     /tmp/venv/bin/python benches/peers/tone.py
 
-Speed: processor time, all threads together, of `fechner tonemap` (reading EXR and writing PNG included) over that of the
-pfstmo program, which reads and writes a stream in memory. "alone" is the operator's own share of both: less the time of the
-cheapest way through either program with the same files (`absolute`, and `pfstag`). Runs alternate and the best of several
-counts.
+Speed: processor time, all threads together. "files": an EXR made into a picture, `fechner tonemap` with its packed PNG over
+`pfsinexr | operator | pfsoutppm`, which does not pack (Debian's pfstools has no PNG writer of its own). "operator": less the
+time of the cheapest way through either with the same files (`absolute`, and `pfsinexr | pfsoutppm`). Runs alternate and the
+best of several counts.
 Agreement: displayed linear light of a ramp of greys through both, for the operators that are meant to be the same.
 """
 
@@ -69,27 +69,26 @@ def tonemap(source, target, *arguments):
 
 
 def speed(folder):
-    source, stream = os.path.join(folder, "large.exr"), os.path.join(folder, "large.pfs")
+    source = os.path.join(folder, "large.exr")
     write_exr(source, picture(1920, 1080))
-    with open(stream, "wb") as file:
-        subprocess.run(["pfsinexr", source], check=True, stdout=file)
+
     def ours(*arguments):
         command = tonemap(source, os.path.join(folder, "a.png"), "--operator", *arguments)
         return seconds(command, stdout=subprocess.DEVNULL)
 
     def theirs(command):
-        with open(stream, "rb") as file:
-            return seconds(command, stdin=file, stdout=subprocess.DEVNULL)
+        pipe = ["pfsinexr", source, "|", *command, "|"] if command else ["pfsinexr", source, "|"]
+        return seconds(["sh", "-c", " ".join([*pipe, "pfsoutppm", os.path.join(folder, "a.ppm")])], stdout=subprocess.DEVNULL)
 
-    print("1920x1080                        fechner s   pfstmo s   ratio   alone s   pfstmo alone s   ratio   pfstmo command")
+    print("| fechner | pfstools | files, s | ratio | operator, s | ratio |\n| --- | --- | --- | --- | --- | --- |")
     for name, command in PAIRS:
         best = [float("inf")] * 4
         for _ in range(RUNS):
-            times = [ours(*name.split()), theirs(command), ours("absolute"), theirs(["pfstag", "--set", "A=1"])]
+            times = [ours(*name.split()), theirs(command), ours("absolute"), theirs([])]
             best = [min(pair) for pair in zip(best, times)]
         own, peer = best[0] - best[2], best[1] - best[3]
-        figures = f"{best[0]:9.2f} {best[1]:10.2f} {best[0] / best[1]:7.2f} {own:9.2f} {peer:16.2f} {own / peer:7.2f}"
-        print(f"{name:32} {figures}   {' '.join(command)}")
+        files = f"{best[0]:.2f} / {best[1]:.2f} | {best[0] / best[1]:.2f}"
+        print(f"| `{name}` | `{' '.join(command)}` | {files} | {own:.2f} / {peer:.2f} | {own / peer:.2f} |", flush=True)
 
 
 def through_pfs(source, folder, command):

@@ -4,11 +4,13 @@ use super::console::Console;
 use super::seeing::parse_positive;
 use anyhow::{Context, bail};
 use clap::Args;
+use fechner::adaptive::judge::Judgement;
 use fechner::adaptive::settings::Limits;
 use fechner::adaptive::state::RenderState;
 use fechner::adaptive::{Directive, Monitor, Progress};
 use fechner::checkpoint::{Checkpoint, CheckpointError, Header, read_checkpoint, write_checkpoint};
 use fechner::output::{self, OutputError};
+use fechner::preview::Audience;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -156,17 +158,22 @@ impl Keeper {
     }
 }
 
-/// Console, keeper and signals together.
-pub(super) struct Watch {
+/// Console, keeper, viewers and signals together.
+pub(super) struct Watch<'a> {
     console: Console,
     keeper: Option<Keeper>,
+    audience: Option<Audience<'a>>,
     stop: Arc<AtomicBool>,
     started: Instant,
 }
 
-impl Watch {
+impl<'a> Watch<'a> {
     /// From here on SIGINT, SIGTERM and SIGHUP end the render with the picture so far; a second one ends the program.
-    pub(super) fn new(console: Console, keeper: Option<Keeper>) -> anyhow::Result<Self> {
+    pub(super) fn new(
+        console: Console,
+        keeper: Option<Keeper>,
+        audience: Option<Audience<'a>>,
+    ) -> anyhow::Result<Self> {
         let stop = Arc::new(AtomicBool::new(false));
         let asked = Arc::clone(&stop);
         ctrlc::set_handler(move || {
@@ -175,7 +182,7 @@ impl Watch {
             }
         })
         .context("signals cannot be waited for")?;
-        Ok(Self { console, keeper, stop, started: Instant::now() })
+        Ok(Self { console, keeper, audience, stop, started: Instant::now() })
     }
 
     /// Removes the progress bar.
@@ -202,13 +209,29 @@ impl Watch {
     }
 }
 
-impl Monitor for Watch {
+impl Monitor for Watch<'_> {
     fn looked(&self, progress: &Progress) {
         self.console.looked(progress);
+        if let Some(audience) = &self.audience {
+            audience.looked(progress);
+        }
+    }
+
+    fn judged(&self, state: &RenderState, judgement: &Judgement) {
+        if let Some(audience) = &self.audience {
+            audience.judged(state, judgement);
+        }
     }
 
     fn samples_done(&self, samples: u64) {
         self.console.samples_done(samples);
+        if let Some(audience) = &self.audience {
+            audience.samples_done(samples);
+        }
+    }
+
+    fn most_samples_a_batch(&self) -> u64 {
+        self.audience.as_ref().map_or(u64::MAX, Audience::most_samples_a_batch)
     }
 
     fn between_batches(&self, state: &RenderState) -> Directive {
@@ -218,10 +241,13 @@ impl Monitor for Watch {
         if let Some(keeper) = &self.keeper {
             keeper.chance(state);
         }
-        Directive::GoOn
+        self.audience.as_ref().map_or(Directive::GoOn, |audience| audience.between_batches(state))
     }
 
     fn ended(&self, state: &RenderState) {
+        if let Some(audience) = &self.audience {
+            audience.ended(state);
+        }
         if let Some(keeper) = &self.keeper {
             keeper.write(state, &mut keeper.history.lock().unwrap_or_else(PoisonError::into_inner));
         }

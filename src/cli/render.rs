@@ -4,6 +4,7 @@ use super::console::Console;
 use super::job::{JobArguments, Prepared};
 use super::keeper::{CheckpointArguments, Keeper, Watch};
 use super::report::{Report, summary};
+use super::view::audience;
 use anyhow::Context;
 use clap::Args;
 use fechner::adaptive::settings::LoopSettings;
@@ -28,6 +29,9 @@ pub(super) struct RenderArguments {
     /// Write figures of the render here.
     #[arg(long, value_name = "FILE", help_heading = "Running")]
     json: Option<PathBuf>,
+    /// Show it in a browser while it runs; prints an address of this machine.
+    #[arg(long, help_heading = "Running")]
+    view: bool,
     #[command(flatten)]
     checkpoint: CheckpointArguments,
 }
@@ -47,6 +51,7 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     let Prepared { scene, trace, record, settings } = arguments.job.prepare()?;
     let Crop { width, height, .. } = trace.film_area();
     let fresh = RenderState::new(width, height, &settings.limits);
+    let audience = arguments.view.then(|| audience(&scene, &settings, &record.operator)).transpose()?;
     let (state, seeds, keeper) = if arguments.checkpoint.is_wanted() {
         let origin = Origin::of(&scene, &trace);
         let seeds = Seeds::one(trace.seed);
@@ -62,7 +67,7 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     if degenerate > 0 {
         eprintln!("note: {degenerate} triangles without area were left out");
     }
-    let watch = Watch::new(Console::new(settings.limits.time), keeper)?;
+    let watch = Watch::new(Console::new(settings.limits.time), keeper, audience)?;
     let rendered = adaptive::resume(&tracer, &settings, state, &watch)?;
     watch.finish();
     let report = Report::new(&arguments.job.scene_name(), &seeds, &settings, &rendered);

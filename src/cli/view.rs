@@ -8,7 +8,8 @@ use clap::Args;
 use fechner::adaptive::Rendered;
 use fechner::adaptive::settings::LoopSettings;
 use fechner::output;
-use fechner::preview::{self, Door, Host, Job};
+use fechner::preview::{self, Audience, Door, Host, Job};
+use fechner::scene::Scene;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
 use std::path::Path;
 use std::sync::Arc;
@@ -56,15 +57,28 @@ fn job_of(prepared: Prepared) -> Job {
     Job { scene: Arc::new(scene), trace, record, limits: settings.limits, importance: settings.importance }
 }
 
+/// A running render, open to viewers on this machine at a free port; says where.
+pub(super) fn audience<'a>(scene: &Scene, settings: &'a LoopSettings, operator: &str) -> anyhow::Result<Audience<'a>> {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).context("no port to show the render at")?;
+    let (address, token) = door_of(&listener)?;
+    eprintln!("Watch it at http://{address}/?token={token}");
+    Audience::open(listener, Door { address, token }, scene, settings, operator)
+        .context("the thread for viewers could not be started")
+}
+
+fn door_of(listener: &TcpListener) -> anyhow::Result<(SocketAddr, String)> {
+    let address = listener.local_addr().context("the listener has no address")?;
+    Ok((address, preview::random_token().context("the system gives no random numbers for a token")?))
+}
+
 /// Serves until a signal comes.
 pub(super) fn run(arguments: &ViewArguments) -> anyhow::Result<()> {
     let pool = arguments.job.thread_pool()?;
     let asked = SocketAddr::new(arguments.host, arguments.port);
     let listener = TcpListener::bind(asked)
         .with_context(|| format!("cannot listen on {asked}: choose another --port, or an address of this machine"))?;
-    let address = listener.local_addr().context("the listener has no address")?;
+    let (address, token) = door_of(&listener)?;
     let job = pool.install(|| arguments.job.prepare().map(job_of))?;
-    let token = preview::random_token().context("the system gives no random numbers for a token")?;
     let host = FileHost { job: arguments.job.clone() };
     let preview = preview::start(job, Box::new(host), pool).context("the threads could not be started")?;
     let closer = preview.closer();

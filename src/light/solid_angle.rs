@@ -7,7 +7,7 @@ use glam::DVec3;
 use std::f64::consts::PI;
 
 /// Solid angle in steradian below which a shape is better sampled by area.
-pub(super) const LEAST: f64 = 2e-3;
+pub(super) const LEAST: f64 = 0.02;
 
 /// A triangle as seen from the origin.
 #[derive(Clone, Copy, Debug)]

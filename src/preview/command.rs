@@ -13,6 +13,11 @@ pub(super) enum Command {
         /// Which.
         layer: Layer,
     },
+    /// Show this layer beside the other, to this viewer; none shows the other alone.
+    Beside {
+        /// Which.
+        layer: Option<Layer>,
+    },
     /// Say what is at a pixel, to this viewer.
     Inspect {
         /// Column.
@@ -43,6 +48,16 @@ pub(super) enum Command {
         /// Its name.
         name: String,
     },
+    /// Another display, by its preset's name.
+    Display {
+        /// Its name.
+        name: String,
+    },
+    /// Another distance from the display.
+    Distance {
+        /// In distances that the display is made for.
+        factor: f64,
+    },
     /// Another visibility to stop at.
     Visibility {
         /// Visibility, above 0.
@@ -53,6 +68,13 @@ pub(super) enum Command {
         /// How.
         #[serde(flatten)]
         movement: Movement,
+    },
+    /// Bring what a pixel shows into focus.
+    Focus {
+        /// Column.
+        x: usize,
+        /// Row.
+        y: usize,
     },
     /// The camera of the scene.
     CameraHome,
@@ -111,6 +133,11 @@ pub(super) struct Status {
     pub(super) exposure: Option<f64>,
     pub(super) operator: String,
     pub(super) operators: &'static [&'static str],
+    pub(super) display: String,
+    pub(super) displays: &'static [&'static str],
+    /// In distances that the display is made for.
+    pub(super) distance: f64,
+    pub(super) pixels_per_degree: f64,
     pub(super) camera: String,
     /// What went wrong last, until it goes right.
     pub(super) error: Option<String>,

@@ -10,6 +10,7 @@
 //! Viewers get the latest frame and none that they missed, so a slow one costs nobody else anything. Not for pictures that
 //! should be kept or compared: `render` writes those, and so does "save" here.
 
+mod audience;
 mod coarse;
 mod command;
 mod layer;
@@ -20,6 +21,7 @@ mod session;
 mod shared;
 mod viewer;
 
+pub use audience::Audience;
 pub use server::{Door, random_token};
 
 use crate::adaptive::Rendered;

@@ -29,7 +29,29 @@ pub(super) enum Movement {
         /// Steps; below 0 away from it.
         steps: f32,
     },
+    /// Field of view: each step leaves nine tenths of it.
+    Zoom {
+        /// Steps; below 0 to see more.
+        steps: f32,
+    },
+    /// What is in focus: each step brings it a twentieth of its distance nearer.
+    Refocus {
+        /// Steps; below 0 away.
+        steps: f32,
+    },
+    /// The lens: each step widens it by a quarter; a pinhole becomes a lens first.
+    Aperture {
+        /// Steps; below 0 narrower.
+        steps: f32,
+    },
 }
+
+/// Width of the lens that a pinhole becomes, in distances of what it looks at.
+const FIRST_APERTURE: f32 = 0.005;
+/// Fields of view that zooming stays within, in degrees.
+const FIELDS_OF_VIEW_DEG: [f32; 2] = [1.0, 150.0];
+/// Steps that one movement may take.
+const MOST_STEPS: f32 = 20.0;
 
 /// A camera and the distance of the point about which it turns.
 #[derive(Clone, Debug)]
@@ -39,6 +61,11 @@ pub(super) struct Held {
 }
 
 impl Held {
+    /// Where the scene has put it; it turns about what is in focus.
+    pub(super) fn at_home(camera: &Camera) -> Self {
+        Self { camera: camera.clone(), pivot_distance: camera.focus_distance }
+    }
+
     /// Moves it. A camera that moved while its shutter was open rests from here on.
     pub(super) fn moved(&mut self, movement: Movement) {
         let before = self.clone();
@@ -47,9 +74,13 @@ impl Held {
             Movement::Orbit { right, up } => self.orbit(right, up),
             Movement::Pan { right, up } => self.pan(right, up),
             Movement::Dolly { steps } => self.dolly(steps),
+            Movement::Zoom { steps } => self.zoom(steps),
+            Movement::Refocus { steps } => self.camera.focus_distance *= power(0.95, steps),
+            Movement::Aperture { steps } => self.widen(steps),
         }
-        let Camera { position, forward, .. } = &self.camera;
-        if !(position.is_finite() && forward.is_finite() && self.pivot_distance.is_normal()) {
+        let Camera { position, forward, focus_distance, .. } = &self.camera;
+        let distances = [self.pivot_distance, *focus_distance];
+        if !(position.is_finite() && forward.is_finite() && distances.iter().all(|distance| distance.is_normal())) {
             *self = before;
         }
     }
@@ -79,8 +110,32 @@ impl Held {
         self.camera.position += (sideways * right + upwards * up) * height;
     }
 
+    fn zoom(&mut self, steps: f32) {
+        let factor = power(0.9, steps);
+        match &mut self.camera.projection {
+            Projection::Orthographic { height } => *height *= factor,
+            Projection::Perspective { vertical_fov_deg } => {
+                let [least, most] = FIELDS_OF_VIEW_DEG;
+                *vertical_fov_deg = (*vertical_fov_deg * factor).clamp(least, most);
+            }
+        }
+    }
+
+    fn widen(&mut self, steps: f32) {
+        let first = FIRST_APERTURE * self.pivot_distance;
+        let radius = if self.camera.aperture_radius > 0.0 {
+            self.camera.aperture_radius * power(1.25, steps)
+        } else if steps > 0.0 {
+            first
+        } else {
+            0.0
+        };
+        // Narrower than a tenth of the first lens nothing looks unsharp.
+        self.camera.aperture_radius = if radius < 0.1 * first { 0.0 } else { radius.min(self.pivot_distance) };
+    }
+
     fn dolly(&mut self, steps: f32) {
-        let factor = 0.9f32.powf(steps.clamp(-20.0, 20.0));
+        let factor = power(0.9, steps);
         if let Projection::Orthographic { height } = &mut self.camera.projection {
             *height *= factor;
             return;
@@ -120,6 +175,11 @@ impl Held {
     }
 }
 
+/// What so many steps multiply by; 1 for steps that are no number.
+fn power(base: f32, steps: f32) -> f32 {
+    base.powf(if steps.is_nan() { 0.0 } else { steps.clamp(-MOST_STEPS, MOST_STEPS) })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -139,6 +199,26 @@ mod tests {
         held.moved(Movement::Orbit { right: 0.3, up: 9.0 });
         let pivot = held.camera.position + held.camera.forward * held.pivot_distance;
         assert!(pivot.length() < 1e-4 && held.camera.position.y < 5.0 && held.camera.position.y > 4.99, "{pivot}");
+    }
+
+    #[test]
+    fn lenses_zoom_focus_and_open() {
+        let mut held = held();
+        held.camera.focus_distance = 4.0;
+        held.moved(Movement::Zoom { steps: 1.0 });
+        assert_eq!(held.camera.projection, Projection::Perspective { vertical_fov_deg: 81.0 });
+        held.moved(Movement::Zoom { steps: -1e9 });
+        assert_eq!(held.camera.projection, Projection::Perspective { vertical_fov_deg: 150.0 });
+        held.moved(Movement::Refocus { steps: 1.0 });
+        assert!((held.camera.focus_distance - 3.8).abs() < 1e-5, "{}", held.camera.focus_distance);
+        held.moved(Movement::Aperture { steps: -1.0 });
+        assert_eq!(held.camera.aperture_radius, 0.0);
+        held.moved(Movement::Aperture { steps: 1.0 });
+        assert!((held.camera.aperture_radius - 0.025).abs() < 1e-6, "{}", held.camera.aperture_radius);
+        held.moved(Movement::Aperture { steps: -20.0 });
+        assert_eq!(held.camera.aperture_radius, 0.0, "a narrow lens becomes a pinhole again");
+        held.moved(Movement::Refocus { steps: f32::NAN });
+        assert!(held.camera.focus_distance.is_finite());
     }
 
     #[test]

@@ -17,12 +17,13 @@ use crate::adaptive::state::RenderState;
 use crate::adaptive::{LastLook, Progress, StopReason, run as run_loop};
 use crate::film::Film;
 use crate::integrator::{Crop, PathTracer, SamplePlan};
-use crate::scene::Camera;
-use pace::Pace;
+use fechner_perception::display::{Display, Observer, Viewing};
+pub(super) use pace::Pace;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
+pub(super) use telling::{blank_status, count, publish};
 use watch::{Moving, Watch};
 
 /// Renders and obeys until the preview closes. A defect that panics ends the picture, not the preview: a saved scene file
@@ -67,6 +68,10 @@ pub(super) fn watch_file(path: &Path, shared: &Shared) {
 struct Live {
     exposure: Option<f64>,
     operator: Option<String>,
+    /// A preset's name.
+    display: Option<String>,
+    /// In distances that the display is made for.
+    distance: Option<f64>,
     visibility: Option<f64>,
 }
 
@@ -103,7 +108,7 @@ impl<'a> Session<'a> {
         let mut session = Self {
             host,
             shared,
-            held: at_home(&job.scene.camera),
+            held: Held::at_home(&job.scene.camera),
             has_moved: false,
             tracer,
             phase: Phase::Drafting,
@@ -244,7 +249,7 @@ impl<'a> Session<'a> {
     fn obey(&mut self, command: Command) {
         self.note = None;
         match command {
-            Command::Layer { .. } | Command::Inspect { .. } => {}
+            Command::Layer { .. } | Command::Beside { .. } | Command::Inspect { .. } => {}
             Command::Redraw => self.show(),
             Command::Pause if matches!(self.phase, Phase::Rendering | Phase::Drafting) => {
                 self.phase = Phase::Paused;
@@ -261,14 +266,17 @@ impl<'a> Session<'a> {
             Command::Save { format } => self.save(format),
             Command::Exposure { stops } => self.change(|live| live.exposure = stops, Changed::Seen),
             Command::Operator { name } => self.change(|live| live.operator = Some(name), Changed::Seen),
+            Command::Display { name } => self.change(|live| live.display = Some(name), Changed::Seen),
+            Command::Distance { factor } => self.change(|live| live.distance = Some(factor), Changed::Seen),
             Command::Visibility { target } => self.change(|live| live.visibility = Some(target), Changed::Target),
             Command::Camera { movement } => {
                 self.find_pivot();
                 self.held.moved(movement);
                 self.has_moved = true;
             }
+            Command::Focus { x, y } => self.focus_on(x, y),
             Command::CameraHome => {
-                self.held = at_home(&self.job.scene.camera);
+                self.held = Held::at_home(&self.job.scene.camera);
                 self.has_moved = true;
             }
             Command::Reload => self.reload(),
@@ -325,11 +333,31 @@ impl<'a> Session<'a> {
 
     /// The camera turns about what stands in the middle of the picture.
     fn find_pivot(&mut self) {
-        let film = if self.state.film.total_samples() > 0 { &self.state.film } else { &self.draft };
-        let middle = (film.height() / 2 * film.width() + film.width() / 2) as usize;
-        let is_whole = self.draft_left.blocks.is_empty() && !self.has_moved;
-        if let Some(depth) = film.guides().get(middle).map(|guide| guide.depth).filter(|d| is_whole && d.is_normal()) {
+        let (width, height) = (self.draft.width() as usize, self.draft.height() as usize);
+        if let Some(depth) = self.depth_at(width / 2, height / 2) {
             self.held.pivot_distance = depth;
+        }
+    }
+
+    /// Distance of what a pixel shows; none where nothing is or where the picture is of another camera.
+    fn depth_at(&self, x: usize, y: usize) -> Option<f32> {
+        let film = if self.state.film.total_samples() > 0 { &self.state.film } else { &self.draft };
+        let is_whole = self.draft_left.blocks.is_empty() && !self.has_moved && x < film.width() as usize;
+        let pixel = y.checked_mul(film.width() as usize)?.checked_add(x)?;
+        film.guides().get(pixel).map(|guide| guide.depth).filter(|depth| is_whole && depth.is_normal())
+    }
+
+    fn focus_on(&mut self, x: usize, y: usize) {
+        match self.depth_at(x, y) {
+            None => self.note = Some("nothing to focus on there".to_owned()),
+            Some(depth) => {
+                self.held.camera.focus_distance = depth;
+                if self.held.camera.aperture_radius > 0.0 {
+                    self.has_moved = true;
+                } else {
+                    self.note = Some("in focus, but the lens has no width: A widens it".to_owned());
+                }
+            }
         }
     }
 
@@ -339,7 +367,7 @@ impl<'a> Session<'a> {
             Err(problem) => self.error = Some(problem),
             Ok((job, settings)) => {
                 self.tracer = PathTracer::new(Arc::clone(&job.scene), job.trace);
-                self.held = at_home(&job.scene.camera);
+                self.held = Held::at_home(&job.scene.camera);
                 (self.job, self.settings) = (job, settings);
                 self.error = None;
                 self.note = Some("the scene was loaded again".to_owned());
@@ -369,14 +397,19 @@ enum Changed {
     Target,
 }
 
-fn at_home(camera: &Camera) -> Held {
-    Held { camera: camera.clone(), pivot_distance: camera.focus_distance }
-}
-
 fn settings_of(job: &Job, live: &Live) -> Result<LoopSettings, String> {
     let mut record = job.record.clone();
     record.exposure_stops = live.exposure.or(record.exposure_stops);
     record.operator = live.operator.clone().unwrap_or(record.operator);
+    if let Some(name) = &live.display {
+        let display = Display::preset(name).ok_or_else(|| format!("there is no display \"{name}\""))?;
+        let Observer { sensitivity, glare, .. } = record.viewing.observer;
+        record.viewing = Viewing::of(display);
+        record.viewing.observer = Observer { sensitivity, glare, ..record.viewing.observer };
+    }
+    // So many times as far, a pixel looks so many times as small.
+    record.viewing.display.pixels_per_degree *= live.distance.unwrap_or(1.0);
+    record.viewing.check().map_err(|error| error.to_string())?;
     let visibility = live.visibility.unwrap_or(job.limits.visibility);
     if visibility.is_nan() || visibility < 0.0 || record.exposure_stops.is_some_and(|stops| !stops.is_finite()) {
         return Err("visibility must be above 0 and exposure a number".to_owned());

@@ -3,27 +3,55 @@
 use super::command::{Command, Inspected};
 use super::layer::Layer;
 use super::shared::{Seat, Shared};
+use axum::body::Bytes;
 use axum::extract::ws::{Message, WebSocket};
 use fechner_perception::photometry::luminance;
 use std::sync::Arc;
+use tokio::sync::watch;
+
+/// A layer that a viewer looks at.
+struct Look {
+    /// Held, so that frames of the layer are made.
+    _seat: Seat,
+    frames: watch::Receiver<Bytes>,
+}
+
+impl Look {
+    fn at(shared: &Arc<Shared>, layer: Layer) -> Self {
+        let seat = Seat::take(shared, layer);
+        let mut frames = seat.frames();
+        frames.mark_changed();
+        Self { _seat: seat, frames }
+    }
+}
+
+/// The next frame of a layer; never, if none is looked at.
+async fn next_frame(look: &mut Option<Look>) -> Bytes {
+    if let Some(Look { frames, .. }) = look
+        && frames.changed().await.is_ok()
+    {
+        return frames.borrow_and_update().clone();
+    }
+    std::future::pending().await
+}
 
 /// Serves one viewer until it goes or the preview closes. It is sent the latest frame whenever it has taken the one before.
 pub(super) async fn attend(mut socket: WebSocket, shared: Arc<Shared>) {
-    let mut seat = Seat::take(&shared, Layer::Picture);
-    let mut frames = seat.frames();
+    let mut look = Some(Look::at(&shared, Layer::Picture));
+    let mut beside: Option<Look> = None;
     let mut status = shared.status();
     let mut closing = shared.until_closing();
-    frames.mark_changed();
     status.mark_changed();
     loop {
         let answer = tokio::select! {
             said = socket.recv() => match said {
                 Some(Ok(Message::Text(text))) => match serde_json::from_str(&text) {
                     Ok(Command::Layer { layer }) => {
-                        let empty = Seat::take(&shared, layer);
-                        frames = empty.frames();
-                        frames.mark_changed();
-                        seat = empty;
+                        look = Some(Look::at(&shared, layer));
+                        None
+                    }
+                    Ok(Command::Beside { layer }) => {
+                        beside = layer.map(|layer| Look::at(&shared, layer));
                         None
                     }
                     Ok(Command::Inspect { x, y }) => inspected(&shared, x, y).map(|text| Message::Text(text.into())),
@@ -36,10 +64,8 @@ pub(super) async fn attend(mut socket: WebSocket, shared: Arc<Shared>) {
                 Some(Ok(Message::Close(_)) | Err(_)) | None => break,
                 Some(Ok(_)) => None,
             },
-            Ok(()) = frames.changed() => {
-                let frame = frames.borrow_and_update().clone();
-                (!frame.is_empty()).then_some(Message::Binary(frame))
-            }
+            frame = next_frame(&mut look) => (!frame.is_empty()).then_some(Message::Binary(frame)),
+            frame = next_frame(&mut beside) => (!frame.is_empty()).then_some(Message::Binary(frame)),
             Ok(()) = status.changed() => {
                 let text = status.borrow_and_update().to_string();
                 (!text.is_empty()).then(|| Message::Text(text.into()))
@@ -52,7 +78,6 @@ pub(super) async fn attend(mut socket: WebSocket, shared: Arc<Shared>) {
             break;
         }
     }
-    drop(seat);
 }
 
 fn not_understood(error: &serde_json::Error) -> String {

@@ -29,11 +29,29 @@ impl View {
         let mut command = Command::new(env!("CARGO_BIN_EXE_fechner"));
         command.arg("view").arg(scene).args(["--size", "32x32", "--threads", "1"]).args(arguments);
         let mut child = command.current_dir(folder).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("runs");
-        let mut line = String::new();
-        BufReader::new(child.stdout.take().expect("piped")).read_line(&mut line).expect("a line");
-        let rest = line.trim().strip_prefix("http://").unwrap_or_else(|| panic!("no address: {line}"));
+        let said = child.stdout.take().expect("piped");
+        Self::that_says(child, said)
+    }
+
+    /// `fechner render --view` under way.
+    fn of_render(folder: &Path, arguments: &[&str]) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_fechner"));
+        command.arg("render").arg(cornell_box()).args(["--view", "--size", "32x32", "--threads", "1"]).args(arguments);
+        let mut child = command.current_dir(folder).stderr(Stdio::piped()).spawn().expect("runs");
+        let said = child.stderr.take().expect("piped");
+        Self::that_says(child, said)
+    }
+
+    /// By the first line that has an address.
+    fn that_says(child: Child, mut said: impl Read + Send + 'static) -> Self {
+        let mut lines = BufReader::new(&mut said).lines().map_while(Result::ok);
+        let line = lines.find(|line| line.contains("http://")).expect("an address");
+        let (_, rest) = line.trim().split_once("http://").expect("an address");
         let (address, token) = rest.split_once("/?token=").expect("a token");
-        Self { child, address: address.to_owned(), token: token.to_owned() }
+        let (address, token) = (address.to_owned(), token.to_owned());
+        // What else it says must not fill the pipe.
+        std::thread::spawn(move || std::io::copy(&mut said, &mut std::io::sink()));
+        Self { child, address, token }
     }
 
     /// The answer to a GET, from its status line on.
@@ -261,6 +279,31 @@ fn the_camera_moves_and_the_scene_file_is_watched() {
         picture.as_raw().iter().zip(seen.as_raw()).map(|(a, b)| f64::from(a.abs_diff(*b))).sum::<f64>() / 3072.0
     };
     view.viewer().frame(0, "the same picture", |picture| difference(picture) < 3.0);
+}
+
+/// A render that is watched writes the same bytes; it can be stopped from the page, and not driven.
+#[test]
+fn a_render_shows_itself_and_is_not_driven() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let mut view = View::of_render(at, &["--visibility", "6", "-o", "watched.png"]);
+    // It may be at an end before anybody has come.
+    if let Ok(mut viewer) = view.socket(&view.token, None) {
+        viewer.send(&json!({ "do": "exposure", "stops": 2.0 }));
+    }
+    assert!(view.child.wait().expect("ended").success());
+    let watched = std::fs::read(at.join("watched.png")).expect("written");
+    assert!(watched == rendered(at, &["--visibility", "6"], "alone.png"), "being watched changes the picture");
+
+    let mut view = View::of_render(at, &["--visibility", "0.01", "-o", "stopped.png"]);
+    let mut viewer = view.viewer();
+    viewer.frame(0, "a picture", |picture| picture.dimensions() == (32, 32) && brightness(picture) > 5.0);
+    viewer.send(&json!({ "do": "operator", "name": "reinhard02" }));
+    let refused = viewer.status("a refusal", |status| !status["error"].is_null());
+    assert!(refused["error"].as_str().is_some_and(|error| error.contains("running render")), "{refused}");
+    viewer.send(&json!({ "do": "stop" }));
+    assert!(view.child.wait().expect("ended").success());
+    assert!(image::open(at.join("stopped.png")).is_ok());
 }
 
 #[cfg(unix)]

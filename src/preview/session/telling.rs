@@ -1,10 +1,13 @@
 //! What a session says of itself.
 
 use super::Session;
+use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::state::RenderState;
 use crate::adaptive::{Progress, StopReason, visible_share};
 use crate::preview::command::{Phase, Status};
 use crate::preview::shared::Shared;
+use crate::scene::Scene;
+use fechner_perception::display::Display;
 use fechner_perception::tone::operator_names;
 
 impl Session<'_> {
@@ -18,35 +21,61 @@ impl Session<'_> {
 
     pub(super) fn status(&self, state: &RenderState) -> Status {
         let target = self.settings.limits.visibility;
+        let operator = self.live.operator.as_ref().unwrap_or(&self.job.record.operator);
         let mut status = Status {
-            kind: "status",
-            scene: self.job.scene.name.clone(),
             phase: self.phase,
             reason: self.last_look.as_ref().map(|look| in_words(look.stop_reason)),
             width: state.film.width(),
             height: state.film.height(),
-            total_samples: 0,
-            mean_samples: 0.0,
-            samples_a_second: 0.0,
-            seconds: 0.0,
-            seconds_left: None,
             visible_share: self.last_look.as_ref().map(|look| visible_share(&look.judgement, target)),
-            target,
-            rung: None,
             exposure: self.live.exposure.or(self.job.record.exposure_stops),
-            operator: self.live.operator.clone().unwrap_or_else(|| self.job.record.operator.clone()),
-            operators: operator_names(),
-            camera: self.held.to_toml(),
+            distance: self.live.distance.unwrap_or(1.0),
             error: self.error.clone(),
             note: self.note.clone(),
+            ..blank_status(&self.job.scene, &self.settings, operator, self.held.to_toml())
         };
         count(&mut status, state, self.progress.as_ref());
         status
     }
 }
 
+/// Of a render that has not begun.
+pub(in crate::preview) fn blank_status(
+    scene: &Scene,
+    settings: &LoopSettings,
+    operator: &str,
+    camera: String,
+) -> Status {
+    Status {
+        kind: "status",
+        scene: scene.name.clone(),
+        phase: Phase::Drafting,
+        reason: None,
+        width: 0,
+        height: 0,
+        total_samples: 0,
+        mean_samples: 0.0,
+        samples_a_second: 0.0,
+        seconds: 0.0,
+        seconds_left: None,
+        visible_share: None,
+        target: settings.limits.visibility,
+        rung: None,
+        exposure: None,
+        operator: operator.to_owned(),
+        operators: operator_names(),
+        display: settings.viewing.display.name.clone(),
+        displays: Display::preset_names(),
+        distance: 1.0,
+        pixels_per_degree: settings.viewing.display.pixels_per_degree,
+        camera,
+        error: None,
+        note: None,
+    }
+}
+
 /// Fills in what the samples so far say.
-pub(super) fn count(status: &mut Status, state: &RenderState, progress: Option<&Progress>) {
+pub(in crate::preview) fn count(status: &mut Status, state: &RenderState, progress: Option<&Progress>) {
     let pixels = f64::from(state.film.width()) * f64::from(state.film.height());
     status.total_samples = state.film.total_samples();
     status.mean_samples = status.total_samples as f64 / pixels.max(1.0);
@@ -61,7 +90,7 @@ pub(super) fn count(status: &mut Status, state: &RenderState, progress: Option<&
     }
 }
 
-pub(super) fn publish(status: &Status, shared: &Shared) {
+pub(in crate::preview) fn publish(status: &Status, shared: &Shared) {
     if let Ok(text) = serde_json::to_string(status) {
         shared.publish_status(text);
     }

@@ -1,0 +1,135 @@
+//! The page of a preview on a render that is somebody else's: it is watched and can be stopped, not driven.
+//!
+//! The render keeps its own loop, checkpoints and files; its monitor hands each moment on to an [`Audience`], which shows it to
+//! whoever looks, at the preview's rate. Not for renders that answer to viewers: [`super::start`] opens those.
+
+use super::command::{Command, Phase, Status};
+use super::orbit::Held;
+use super::screen::{Looked, Scenery, Screen};
+use super::server::{Door, serve};
+use super::session::{Pace, blank_status, count, publish};
+use super::shared::Shared;
+use crate::adaptive::judge::Judgement;
+use crate::adaptive::settings::LoopSettings;
+use crate::adaptive::state::RenderState;
+use crate::adaptive::{Directive, Progress};
+use crate::scene::Scene;
+use std::net::TcpListener;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+
+/// Viewers of a render under way; they are sent away when it is dropped.
+pub struct Audience<'a> {
+    shared: Arc<Shared>,
+    settings: &'a LoopSettings,
+    moving: Mutex<Moving>,
+    server: Option<JoinHandle<std::io::Result<()>>>,
+}
+
+struct Moving {
+    screen: Screen,
+    pace: Pace,
+    progress: Option<Progress>,
+    status: Status,
+}
+
+impl<'a> Audience<'a> {
+    /// Lets viewers in at the door, from a thread of its own.
+    ///
+    /// # Errors
+    /// If the system gives no thread.
+    pub fn open(
+        listener: TcpListener,
+        door: Door,
+        scene: &Scene,
+        settings: &'a LoopSettings,
+        operator: &str,
+    ) -> std::io::Result<Self> {
+        let shared = Arc::new(Shared::new());
+        let of_server = Arc::clone(&shared);
+        let server =
+            std::thread::Builder::new().name("viewers".to_owned()).spawn(move || serve(listener, door, of_server))?;
+        let camera = Held::at_home(&scene.camera).to_toml();
+        let status = Status { phase: Phase::Rendering, ..blank_status(scene, settings, operator, camera) };
+        let moving = Moving { screen: Screen::new(), pace: Pace::new(), progress: None, status };
+        Ok(Self { shared, settings, moving: Mutex::new(moving), server: Some(server) })
+    }
+
+    fn moving(&self) -> MutexGuard<'_, Moving> {
+        self.moving.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn show(&self, moving: &mut Moving, state: &RenderState) {
+        let is_at_rest = moving.status.phase == Phase::Stopped;
+        // The film stands in for itself where it has no samples yet.
+        let (film, tone, settings) = (&state.film, state.tone.as_ref(), self.settings);
+        moving.screen.show(Scenery { film, draft: film, tone, settings, is_at_rest }, &self.shared);
+        (moving.status.width, moving.status.height) = (film.width(), film.height());
+        count(&mut moving.status, state, moving.progress.as_ref());
+        publish(&moving.status, &self.shared);
+    }
+
+    /// After each look at the picture.
+    pub fn looked(&self, progress: &Progress) {
+        self.moving().progress = Some(*progress);
+    }
+
+    /// After each look, what was seen.
+    pub fn judged(&self, state: &RenderState, judgement: &Judgement) {
+        let mut moving = self.moving();
+        moving.screen.looked = Some(Arc::new(Looked::of(judgement)));
+        self.show(&mut moving, state);
+        moving.pace.begin();
+    }
+
+    /// While a plan is traced.
+    pub fn samples_done(&self, samples: u64) {
+        self.moving().pace.count(samples);
+    }
+
+    /// Most samples between two moments.
+    pub fn most_samples_a_batch(&self) -> u64 {
+        self.moving().pace.samples()
+    }
+
+    /// Shows the film if a frame is due, and says whether somebody wants the render to stop.
+    pub fn between_batches(&self, state: &RenderState) -> Directive {
+        let mut moving = self.moving();
+        moving.pace.counted();
+        let mut directive = Directive::GoOn;
+        let mut wants_a_frame = moving.screen.is_due();
+        for command in self.shared.take_commands() {
+            match command {
+                Command::Stop => directive = Directive::Stop,
+                Command::Redraw => wants_a_frame = true,
+                _ => {
+                    moving.status.error = Some(
+                        "this is a running render: it can be stopped; \"fechner view\" opens one to drive".to_owned(),
+                    );
+                }
+            }
+        }
+        if wants_a_frame {
+            self.show(&mut moving, state);
+        }
+        moving.pace.begin();
+        directive
+    }
+
+    /// The render is at an end.
+    pub fn ended(&self, state: &RenderState) {
+        let mut moving = self.moving();
+        moving.status.phase = Phase::Stopped;
+        self.show(&mut moving, state);
+    }
+}
+
+impl Drop for Audience<'_> {
+    fn drop(&mut self) {
+        self.shared.close();
+        if let Some(server) = self.server.take() {
+            // A thread that panicked has said so.
+            let _ = server.join();
+        }
+    }
+}

@@ -1,0 +1,225 @@
+#!/usr/bin/env python3
+"""`fechner view` in a headless Chromium, as its users meet it.
+
+Needs Debian's `chromium` and playwright, of which only the driver is used:
+
+    python3 -m venv venv && venv/bin/pip install playwright
+    cargo build --release
+    venv/bin/python tests/browser/view.py [--screenshot FILE.png]
+
+Leaves with 0 if every step holds, and says which did not.
+"""
+
+import argparse
+import contextlib
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+
+from playwright.sync_api import sync_playwright
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+FECHNER = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release/fechner"
+SCENE = ROOT / "scenes/cornell-box.toml"
+# Large enough to be watched, and at an end in seconds.
+JOB = [str(SCENE), "--size", "96x96", "--visibility", "8"]
+PATIENCE_S = 120
+
+
+@contextlib.contextmanager
+def preview(folder):
+    """The address of a preview, ended afterwards."""
+    command = [str(FECHNER), "view", *JOB]
+    process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True)
+    try:
+        yield process, process.stdout.readline().strip()
+    finally:
+        process.kill()
+        process.wait()
+
+
+class Page:
+    """The page, and what a user reads off it."""
+
+    def __init__(self, page):
+        self.page = page
+
+    def text(self, name):
+        return self.page.inner_text(f"#{name}")
+
+    def number(self, name):
+        words = self.text(name).replace("cd/m²", "").split()
+        return float(words[0]) if words and words[0] != "–" else None
+
+    def until(self, what, expression):
+        """Asks again and again until JavaScript says true: the page's content policy forbids playwright's own waiting."""
+        deadline = time.monotonic() + PATIENCE_S
+        while not self.page.evaluate(expression):
+            if time.monotonic() > deadline:
+                raise AssertionError(f"{what} never came; the page says:\n{self.page.evaluate('document.body.innerText')}")
+            self.page.wait_for_timeout(50)
+
+    def pixels(self, name="picture"):
+        """Bytes of a canvas, RGBA."""
+        script = f"""() => {{ const c = document.getElementById({name!r});
+            return [...c.getContext('2d').getImageData(0, 0, c.width, c.height).data]; }}"""
+        return self.page.evaluate(script)
+
+    def brightness(self, name="picture"):
+        pixels = self.pixels(name)
+        return sum(sum(pixels[channel::4]) for channel in range(3)) / (3 * len(pixels) / 4)
+
+    def place(self, x, y):
+        """Where a share of the picture's width and height is on the page."""
+        box = self.page.locator("#picture").bounding_box()
+        return box["x"] + x * box["width"], box["y"] + y * box["height"]
+
+    def until_stopped(self):
+        self.until("a stop", "document.getElementById('phase').textContent.startsWith('Stopped')")
+
+
+def saved(page, folder, button, name):
+    page.page.click(f"#{button}")
+    page.until(f"{name} saved", f"document.getElementById('note').textContent.includes({name!r})")
+    return (folder / name).read_bytes()
+
+
+def steps(page, folder):
+    """What must hold, one after the other; a step's name before it is tried."""
+    yield "opens and shows a picture that is not black"
+    page.until("a picture", "document.getElementById('picture').width === 96")
+    assert page.brightness() > 10, page.brightness()
+
+    yield "refines"
+    page.until_stopped()
+    # What the page says of samples a pixel from a new start on, and what its picture is.
+    page.page.evaluate("""() => { window.told_means = []; new MutationObserver(() => told_means.push(Number(
+        document.getElementById('mean').textContent))).observe(document.getElementById('mean'), { childList: true }); }""")
+    page.page.click("#restart")
+    page.until("a new start", "!document.getElementById('phase').textContent.startsWith('Stopped')")
+    page.until_stopped()
+    means = page.page.evaluate("told_means")
+    means = means[means.index(min(means)) :]
+    assert len(set(means)) >= 3 and means == sorted(means), means
+
+    yield "stops by itself, and saves the bytes that render writes"
+    page.until_stopped()
+    assert page.text("share") != "–"
+    picture = saved(page, folder, "png", "cornell-box-1.png")
+    command = [str(FECHNER), "render", *JOB, "-o", "rendered.png"]
+    subprocess.run(command, cwd=folder, check=True, capture_output=True)
+    assert picture == (folder / "rendered.png").read_bytes(), "the saved PNG is another than that of render"
+
+    yield "inspects a pixel"
+    x, y = page.place(0.5, 0.5)
+    page.page.mouse.move(x - 3, y)
+    page.page.mouse.move(x, y)
+    page.until("a pixel", "document.getElementById('rgb').textContent !== '–'")
+    assert page.number("count") >= 16 and page.number("luminance") > 0, page.text("count")
+    assert page.number("threshold") > 0 and page.number("visibility") > 0, page.text("threshold")
+
+    yield "shows every layer"
+    pictures = set()
+    for key in "123456789":
+        legend = page.text("legend")
+        page.page.keyboard.press(key)
+        if key != "1":
+            page.until(f"layer {key}", f"document.getElementById('legend').textContent !== {legend!r}")
+        pictures.add(tuple(page.pixels()))
+    assert len(pictures) == 9, len(pictures)
+    page.page.keyboard.press("1")
+
+    yield "sets a layer beside another, with a divider that moves"
+    page.page.keyboard.press("x")
+    page.until("the second layer", "document.getElementById('legend-second').textContent !== ''")
+    assert page.pixels("second") != page.pixels()
+    divider = page.page.locator("#divider").bounding_box()
+    page.page.mouse.move(divider["x"] + 6, divider["y"] + 50)
+    page.page.mouse.down()
+    page.page.mouse.move(*page.place(0.25, 0.5))
+    page.page.mouse.up()
+    split = float(page.page.evaluate("document.getElementById('frame').style.getPropertyValue('--split')").rstrip("%"))
+    assert abs(split - 25) < 2, split
+    page.page.keyboard.press("x")
+    assert not page.page.is_visible("#second") and not page.page.is_visible("#divider")
+
+    yield "changes the operator without new samples"
+    samples, before = page.number("mean"), page.pixels()
+    page.page.select_option("#operator", "ward-larson97")
+    page.until("another picture", f"""() => {{ const c = document.getElementById('picture');
+        const now = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+        return {before}.some((byte, i) => byte !== now[i]); }}""")
+    page.until_stopped()
+    assert page.number("mean") == samples, (page.number("mean"), samples)
+
+    yield "changes the display and the distance, and the threshold map follows"
+    page.page.select_option("#display", "phone")
+    page.until("the phone", "document.getElementById('ppd').textContent.startsWith('90 ')")
+    page.page.evaluate("""() => { const d = document.getElementById('distance'); d.value = 1;
+        d.dispatchEvent(new Event('input')); d.dispatchEvent(new Event('change')); }""")
+    page.until("twice as far", "document.getElementById('ppd').textContent.startsWith('180 ')")
+    page.until_stopped()
+
+    yield "orbits, and comes home"
+    before = page.text("mean")
+    page.page.mouse.move(*page.place(0.5, 0.5))
+    page.page.mouse.down()
+    page.page.mouse.move(*page.place(0.7, 0.45), steps=8)
+    page.page.mouse.up()
+    page.until("a new picture", "!document.getElementById('phase').textContent.startsWith('Stopped')")
+    page.until_stopped()
+    assert page.brightness() > 5
+    page.page.click("#home")
+    page.until("a new picture", "!document.getElementById('phase').textContent.startsWith('Stopped')")
+    page.until_stopped()
+
+    yield "zooms, opens the lens and focuses by keys"
+    page.page.locator("#stage").focus()
+    page.page.mouse.move(*page.place(0.4, 0.7))
+    page.page.keyboard.press("a")
+    page.until("a lens", "told.camera.includes('aperture_radius')")
+    page.until_stopped()
+    focus = page.page.evaluate("told.camera")
+    page.page.keyboard.press("f")
+    page.until("another focus", f"told.camera !== {focus!r}")
+    page.page.keyboard.press("+")
+    page.until("a longer lens", f"!told.camera.includes({focus.split('vertical_fov_deg')[1].splitlines()[0]!r})")
+
+    yield "pauses and goes on"
+    page.page.click("#pause")
+    page.until("a pause", "/^(Paused|Stopped)/.test(document.getElementById('phase').textContent)")
+    page.page.click("#pause")
+    page.until_stopped()
+
+
+def main():
+    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    arguments.add_argument("--screenshot", type=pathlib.Path, help="where a picture of the page goes")
+    arguments = arguments.parse_args()
+    chromium = shutil.which("chromium") or sys.exit("there is no chromium here: apt-get install chromium")
+    with tempfile.TemporaryDirectory() as name, preview(name) as (process, address), sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        tab = browser.new_page(viewport={"width": 1180, "height": 760})
+        complaints = []
+        tab.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
+        tab.on("pageerror", lambda error: complaints.append(str(error)))
+        tab.goto(address)
+        step = "starts"
+        try:
+            for step in steps(Page(tab), pathlib.Path(name)):
+                print(f"{step} ...", flush=True)
+            assert not complaints, complaints
+            assert process.poll() is None, "the server went down"
+            if arguments.screenshot:
+                tab.screenshot(path=arguments.screenshot)
+        except Exception as error:
+            sys.exit(f"FAILED: {step}\n{error}\nthe console says: {complaints}")
+        browser.close()
+    print("all steps hold")
+
+
+main()
