@@ -22,7 +22,7 @@ use crate::film::Film;
 use crate::integrator::{BlockWork, Crop, PathTracer, SamplePlan};
 use audit::{Audit, audit};
 use judge::{JudgeError, Judgement, judge};
-use plan::{adaptive_plan, cut_to_budget, doubling_of, slices, uniform_plan, wanted_samples};
+use plan::{adaptive_plan, cut_to_budget, denoised_plan, doubling_of, slices, uniform_plan, wanted_samples};
 use rivals::rival_plan;
 use settings::{LoopSettings, Sampling, ladder};
 use state::{Exposure, RenderState};
@@ -34,6 +34,8 @@ use stop::{LEAST_SAVING, predicted_saving};
 const TOLERATED_PEAK: f64 = 4.0;
 /// Rungs above this are not audited: their few samples say little.
 const HIGHEST_AUDITED_RUNG: f64 = 4.0;
+/// The ladder of a picture that is denoised begins here, or at its target.
+const HIGHEST_DENOISED_RUNG: f64 = 2.0;
 /// What the variance may be multiplied by in all after audits that disagree.
 const MOST_INFLATION: f64 = 4.0;
 
@@ -199,7 +201,11 @@ pub fn run(
 impl<'a> Loop<'a> {
     fn new(tracer: &'a PathTracer, settings: &'a LoopSettings, state: RenderState) -> Self {
         let is_left = |&rung: &f64| state.finished_rung.is_none_or(|finished| rung < finished);
-        let rungs = ladder(settings.limits.visibility).into_iter().filter(is_left).collect();
+        let target = settings.limits.visibility;
+        // Far above threshold a denoised picture's greatest error is in places that no denoiser can help: they may not have
+        // all samples before the rest is looked after.
+        let is_walked = |&rung: &f64| settings.denoiser.is_none() || rung <= HIGHEST_DENOISED_RUNG.max(target);
+        let rungs = ladder(target).into_iter().filter(is_left).filter(is_walked).collect();
         let seconds_before = state.seconds_total;
         Self { tracer, settings, rungs, state, resumed_at: Instant::now(), seconds_before }
     }
@@ -319,6 +325,9 @@ impl<'a> Loop<'a> {
         let some = |plan: SamplePlan| if plan.blocks.is_empty() { None } else { Some(plan) };
         if self.settings.sampling == Sampling::Uniform {
             return Ok(if is_reached(judgement, rung) { None } else { some(uniform_plan(&self.state.film, doubled)) });
+        }
+        if !is_reached(judgement, rung) && judgement.denoised.is_some() {
+            return Ok(some(denoised_plan(&self.state.film, &judgement.predicted, rung, max_samples)));
         }
         if !is_reached(judgement, rung) {
             let started = Instant::now();

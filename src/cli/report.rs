@@ -285,11 +285,12 @@ pub(super) fn summary(report: &Report, settings: &LoopSettings, rendered: &Rende
         ),
         format!("{why}; {target}."),
         format!(
-            "On the display \"{}\" ({} pixels a degree{distance}, white {} cd/m²): predicted chance that remaining noise \
+            "On the display \"{}\" ({} pixels a degree{distance}, white {} cd/m²): predicted chance that remaining {} \
              is detected in a 1° patch is {} at the 99th percentile (visibility {:.2}); about {:.1} of {:.0} patches.",
             display.name,
             display.pixels_per_degree,
             display.white_cd_m2,
+            if report.denoised.is_some() { "error" } else { "noise" },
             p(report.visibility_p99),
             report.visibility_p99,
             report.patches_noticed,

@@ -15,6 +15,8 @@ use rayon::prelude::*;
 const RADIUS: usize = 2;
 /// Brighter neighbours that a pixel needs to be believed: a firefly has none, the edge of a lamp has many.
 const WITNESSES: usize = 3;
+/// What of a neighbour's variance counts, over the median of the neighbourhood.
+const MOST_OVER_MEDIAN: f32 = 16.0;
 /// How far a pixel may outshine the last of them, in standard errors of its neighbourhood.
 const STANDARD_ERRORS: f32 = 1.0;
 
@@ -39,12 +41,12 @@ fn unit(normal: [f32; 3]) -> [f32; 3] {
     if length > 1e-3 && length.is_finite() { normal.map(|part| part / length) } else { [0.0; 3] }
 }
 
-/// Mean of the window around each pixel; values above four times its median count as that, so that a firefly's variance
-/// does not blur its neighbours.
+/// Mean of the window around each pixel; values above 16 times its median count as that, so that a firefly's variance does not
+/// blur its neighbours.
 fn smoothed(variance: &Plane) -> Plane {
     by_window(variance, |window| {
         let (_, &mut median, _) = window.select_nth_unstable_by(window.len() / 2, f32::total_cmp);
-        window.iter().map(|&value| value.min(4.0 * median)).sum::<f32>() / window.len() as f32
+        window.iter().map(|&value| value.min(MOST_OVER_MEDIAN * median)).sum::<f32>() / window.len() as f32
     })
 }
 
