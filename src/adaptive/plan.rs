@@ -16,6 +16,9 @@ use fechner_perception::allocation::{AllocationProblem, allocate};
 /// in between, since stratification pays more the more samples there are.
 const MOST_DOUBLINGS_AT_ONCE: u32 = 1;
 
+/// The same where the pixels are so few that their samples do not count.
+const MOST_DOUBLINGS_OF_A_HANDFUL: u32 = 3;
+
 /// The first samples of every pixel: 8 + 8, or as many as `max_samples` allows.
 pub fn pilot_plan(pixels: u32, max_samples: u32) -> SamplePlan {
     let mut plan = SamplePlan::default();
@@ -110,9 +113,14 @@ fn doublings_of_halves(film: &Film, pixel: usize, wanted: f32, pooled: f32, own:
     })
 }
 
-/// One doubling for every pixel of a mask.
+/// One doubling for every pixel of a mask; more at once, up to three, where that is next to nothing of the film's samples. A look
+/// at the picture costs about a sample for every pixel: several of them for a handful of pixels would be most of the work.
 pub fn doubling_of(film: &Film, max_samples: u32, mask: impl Fn(usize) -> bool) -> SamplePlan {
-    doubling_plan(film, max_samples, |pixel| [u32::from(mask(pixel)); 2])
+    let pixels = (film.width() * film.height()) as usize;
+    let masked: u64 = (0..pixels).filter(|&pixel| mask(pixel)).map(|pixel| u64::from(film.samples(pixel))).sum();
+    let is_small = |doublings: &u32| ((1 << doublings) - 1) * masked <= film.total_samples() / 256;
+    let doublings = (2..=MOST_DOUBLINGS_OF_A_HANDFUL).rev().find(is_small).unwrap_or(1);
+    doubling_plan(film, max_samples, |pixel| [if mask(pixel) { doublings } else { 0 }; 2])
 }
 
 /// Doublings for a picture that is denoised: of the pixels above `visibility`, the half where one more sample takes away most.
@@ -289,6 +297,20 @@ mod tests {
             });
             assert!(complete, "pieces of {step}");
         }
+    }
+
+    /// A handful of pixels is doubled three times at once, a picture once, and never beyond what a pixel may have.
+    #[test]
+    fn handfuls_are_not_looked_at_after_each_doubling() {
+        let mut film = Film::new(64, 64);
+        for block in pilot_plan(64 * 64, 16).blocks {
+            film.merge_block(block, &constant_block(block.samples));
+        }
+        assert_eq!(doubling_of(&film, 1 << 16, |pixel| pixel == 70).samples(), 7 * 16);
+        assert_eq!(doubling_of(&film, 1 << 16, |pixel| pixel < 5).samples(), 5 * 3 * 16);
+        assert_eq!(doubling_of(&film, 1 << 16, |_| true).samples(), 64 * 64 * 16);
+        assert_eq!(doubling_of(&film, 40, |pixel| pixel == 70).samples(), 16);
+        assert!(doubling_of(&film, 1 << 16, |_| false).blocks.is_empty());
     }
 
     #[test]

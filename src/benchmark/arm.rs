@@ -28,6 +28,11 @@ pub enum Arm {
     BolinMeyer,
     /// Ablation: contrast sensitivity in bands, but each pixel by itself; its target searched.
     NoPooling,
+    /// Ablation: as [`Arm::NoPooling`], and texture hides nothing; its target searched.
+    NoMasking,
+    /// Ablation: as [`Arm::NoPooling`], with masking on threshold versus intensity in place of contrast sensitivity; its
+    /// target searched.
+    NoCsf,
     /// Ablation: each pixel's count by its own threshold, not the convex optimum.
     LocalRule,
     /// The loop, its target searched like every other arm's knob.
@@ -40,7 +45,7 @@ pub enum Arm {
 
 impl Arm {
     /// Every arm.
-    pub const ALL: [Arm; 14] = [
+    pub const ALL: [Arm; 16] = [
         Arm::Uniform,
         Arm::Relative,
         Arm::Variance,
@@ -50,6 +55,8 @@ impl Arm {
         Arm::Yee,
         Arm::BolinMeyer,
         Arm::NoPooling,
+        Arm::NoMasking,
+        Arm::NoCsf,
         Arm::LocalRule,
         Arm::Default,
         Arm::AsAsked,
@@ -73,6 +80,8 @@ impl Arm {
             Arm::Yee => "yee",
             Arm::BolinMeyer => "bolin-meyer",
             Arm::NoPooling => "no-pooling",
+            Arm::NoMasking => "no-masking",
+            Arm::NoCsf => "no-csf",
             Arm::LocalRule => "local-rule",
             Arm::Default => "default",
             Arm::AsAsked => "as-asked",
@@ -113,6 +122,8 @@ impl Arm {
             }
             Arm::Tvi | Arm::Ramasubramanian | Arm::Yee | Arm::BolinMeyer => by_model(&mut settings, self.name())?,
             Arm::NoPooling => by_model(&mut settings, "csf-bands")?,
+            Arm::NoMasking => by_model(&mut settings, "csf-unmasked")?,
+            Arm::NoCsf => by_model(&mut settings, "tvi-masked")?,
             Arm::LocalRule => {
                 settings.allocation = AllocationRule::Local;
                 settings.limits.visibility = knob;

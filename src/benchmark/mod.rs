@@ -9,10 +9,12 @@
 
 mod animation;
 mod arm;
+mod curve;
 mod denoise;
 mod metrics;
 mod oracle;
 mod pictures;
+mod plot;
 mod record;
 mod reference;
 mod report;
@@ -22,6 +24,7 @@ mod truth;
 
 pub use animation::{AnimationRow, AnimationSettings, animation};
 pub use arm::Arm;
+pub use curve::{Curve, CurvePoint};
 pub use denoise::{Calibration, DenoisingResults, DenoisingSettings, Race, denoising};
 pub use record::{Record, Results};
 
@@ -168,6 +171,7 @@ pub fn run(settings: &BenchSettings, say: &dyn Fn(&str)) -> Result<Results> {
             let runs = runner.runs(arm, say)?;
             results.add(&subject, &reference, arm, &runs);
             results.pictures.push(runner.pictures(arm));
+            results.curves.extend(runner.curve(arm, &runs)?);
         }
         say(&results.scene_lines(&subject.name));
         results.summarise();

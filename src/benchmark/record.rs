@@ -1,6 +1,7 @@
 //! What the benchmark found: one record a scene, arm, seed and coverage, and the summary over scenes.
 
 use super::arm::Arm;
+use super::curve::Curve;
 use super::reference::Reference;
 use super::report::html;
 use super::runner::Run;
@@ -88,6 +89,8 @@ pub struct Results {
     pub records: Vec<Record>,
     /// Over scenes.
     pub summary: Vec<ArmSummary>,
+    /// How pictures come to be good, one a scene and arm.
+    pub curves: Vec<Curve>,
     #[serde(skip)]
     pub(crate) pictures: Vec<ScenePictures>,
 }
@@ -112,6 +115,7 @@ impl Results {
             seeds: settings.seeds,
             records: Vec::new(),
             summary: Vec::new(),
+            curves: Vec::new(),
             pictures: Vec::new(),
         }
     }

@@ -1,5 +1,7 @@
 //! `report.html`: one file that needs nothing else.
 
+use super::curve::Curve;
+use super::plot::plots;
 use super::record::{Record, Results};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
@@ -27,6 +29,8 @@ pub(crate) fn html(results: &Results) -> String {
         let _ = write!(page, "<h2>{scene}</h2>");
         page.push_str(&bars(results, &scene));
         page.push_str(&scene_table(results, &scene));
+        let curves: Vec<&Curve> = results.curves.iter().filter(|curve| curve.scene == scene).collect();
+        page.push_str(&plots(&curves));
         page.push_str(&pictures(results, &scene));
     }
     page.push_str("</html>\n");

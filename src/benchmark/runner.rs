@@ -1,6 +1,7 @@
 //! Rendering an arm, judging it, and keeping what was found.
 
 use super::arm::Arm;
+use super::curve::{Curve, course};
 use super::metrics::{Metrics, measure};
 use super::oracle::{displayed_variance, least_samples, trace_counts, uniform_samples};
 use super::pictures::{read_pictures, write_pictures};
@@ -19,6 +20,9 @@ use std::time::Instant;
 
 /// Arms whose pictures stand in the report.
 const PICTURED: [Arm; 4] = [Arm::Uniform, Arm::Relative, Arm::AsAsked, Arm::Oracle];
+
+/// Arms whose course stands in the report.
+const CURVED: [Arm; 3] = [Arm::Uniform, Arm::Relative, Arm::AsAsked];
 
 /// One render, judged.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -185,6 +189,25 @@ impl<'a> ArmRunner<'a> {
         // By the share of time outside of the tracer, which the machine's other work changes less than seconds.
         let tracing = 1.0 - run.seconds_perception / run.seconds;
         Ok((run.samples as f64 / self.subject.pixels() / tracing).max(16.0))
+    }
+
+    /// How the arm's picture comes to be good, for arms that have a curve: the first seed rendered once more.
+    pub(crate) fn curve(&mut self, arm: Arm, runs: &[Run]) -> Result<Option<Curve>> {
+        let Some(first) = runs.first().filter(|_| CURVED.contains(&arm)) else { return Ok(None) };
+        let file = self.file(arm, 0).with_extension("curve.json");
+        let kept = std::fs::read(&file).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
+        let points = match kept {
+            Some(points) => points,
+            None => {
+                let knob = first.knob.unwrap_or(self.subject.visibility);
+                let settings = arm.settings(self.subject, knob, self.reference.uniform_spp)?;
+                let points = course(self.subject, self.truth, &settings, first.seed + 1)?;
+                let text = serde_json::to_string_pretty(&points)?;
+                crate::output::write_beside(&file, |file| std::io::Write::write_all(file, text.as_bytes()))?;
+                points
+            }
+        };
+        Ok(Some(Curve { scene: self.subject.name.clone(), arm: arm.name(), points }))
     }
 
     /// What the report shows of the arm.

@@ -87,7 +87,8 @@ pub(super) struct JobArguments {
     /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file.
     #[arg(long, value_name = "NAME|FILE", help_heading = "Seeing")]
     display: Option<String>,
-    /// Threshold model that drives the sampling: csf-bands, tvi, ramasubramanian, yee, bolin-meyer.
+    /// Threshold model that drives the sampling: csf-bands, tvi, ramasubramanian, yee, bolin-meyer;
+    /// csf-unmasked and tvi-masked show what a part is worth.
     #[arg(long, value_name = "NAME", default_value = "csf-bands", help_heading = "Seeing")]
     model: String,
     /// Area in deg² over which the eye sums contrast.

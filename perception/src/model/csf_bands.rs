@@ -3,7 +3,7 @@
 use super::{ModelInputs, ThresholdModel};
 use crate::error::Error;
 use crate::plane::Plane;
-use crate::threshold::{ThresholdInputs, threshold_map};
+use crate::threshold::{ThresholdInputs, ThresholdMap, threshold_map};
 
 /// Noise gain and masking by octave bands under a luminance-aware contrast sensitivity function: [`threshold_map`], at
 /// visibility 1.
@@ -19,15 +19,20 @@ impl ThresholdModel for CsfBands {
     }
 
     fn allowed_standard_error_cd_m2(&self, inputs: &ModelInputs<'_>) -> Result<Plane, Error> {
-        inputs.check()?;
-        let guide = ThresholdInputs {
-            display_luminance_cd_m2: inputs.display_luminance_cd_m2,
-            guide_variance: inputs.guide_variance,
-        };
-        let mut map = threshold_map(&guide, inputs.viewing, inputs.csf)?;
-        if let Some(velocity) = inputs.retinal_velocity_deg_s() {
-            map = map.with_motion(&velocity)?;
-        }
-        Ok(map.allowed_standard_error_cd_m2(1.0))
+        Ok(still_or_moving(inputs)?.allowed_standard_error_cd_m2(1.0))
+    }
+}
+
+/// The threshold map of a still, or of what moves where a velocity is given.
+pub(super) fn still_or_moving(inputs: &ModelInputs<'_>) -> Result<ThresholdMap, Error> {
+    inputs.check()?;
+    let guide = ThresholdInputs {
+        display_luminance_cd_m2: inputs.display_luminance_cd_m2,
+        guide_variance: inputs.guide_variance,
+    };
+    let map = threshold_map(&guide, inputs.viewing, inputs.csf)?;
+    match inputs.retinal_velocity_deg_s() {
+        Some(velocity) => map.with_motion(&velocity),
+        None => Ok(map),
     }
 }

@@ -3,6 +3,7 @@
 //! All answer the same question, in the same unit: the standard error of a pixel's mean, in cd/m² on the display, at
 //! which its noise is just at threshold. They differ in what they take into account.
 
+mod ablation;
 mod bolin_meyer;
 mod csf_bands;
 mod pyramid;
@@ -10,6 +11,7 @@ mod ramasubramanian;
 mod tvi;
 mod yee;
 
+pub use ablation::{MaskedTvi, Unmasked};
 pub use bolin_meyer::BolinMeyer;
 pub use csf_bands::CsfBands;
 pub use ramasubramanian::Ramasubramanian;
@@ -82,7 +84,7 @@ pub trait ThresholdModel: Send + Sync {
 /// Two-sided 95 % of a normal distribution: models that stop on a confidence interval ask z σ ≤ T.
 const Z_95: f64 = 1.96;
 
-const NAMES: [&str; 5] = ["csf-bands", "ramasubramanian", "yee", "bolin-meyer", "tvi"];
+const NAMES: [&str; 7] = ["csf-bands", "ramasubramanian", "yee", "bolin-meyer", "tvi", "csf-unmasked", "tvi-masked"];
 
 /// The names that [`by_name`] knows; the first is the default.
 #[must_use]
@@ -105,6 +107,8 @@ pub fn by_name(name: &str) -> Option<Box<dyn ThresholdModel>> {
         "yee" => Box::new(Yee::default()),
         "bolin-meyer" => Box::new(BolinMeyer),
         "tvi" => Box::new(Tvi::default()),
+        "csf-unmasked" => Box::new(Unmasked),
+        "tvi-masked" => Box::new(MaskedTvi),
         _ => return None,
     })
 }
@@ -194,6 +198,8 @@ mod tests {
             ("yee", true, true),
             ("bolin-meyer", true, false),
             ("tvi", false, false),
+            ("csf-unmasked", false, false),
+            ("tvi-masked", true, true),
         ] {
             let textured = ask(name, &guide, None).get(120, 48);
             let flat = ask(name, &Plane::filled(160, 96, 50.0), None).get(120, 48);

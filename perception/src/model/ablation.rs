@@ -1,0 +1,41 @@
+//! The default with a part taken out, to show what the part is worth. Not for rendering.
+
+use super::csf_bands::still_or_moving;
+use super::{ModelInputs, ThresholdModel, Tvi};
+use crate::error::Error;
+use crate::plane::Plane;
+
+/// Contrast sensitivity in bands, nothing masked: texture hides no noise.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Unmasked;
+
+impl ThresholdModel for Unmasked {
+    fn name(&self) -> &'static str {
+        "csf-unmasked"
+    }
+
+    fn allowed_standard_error_cd_m2(&self, inputs: &ModelInputs<'_>) -> Result<Plane, Error> {
+        let map = still_or_moving(inputs)?;
+        let allowed = map.allowed_standard_error_cd_m2(1.0);
+        Ok(allowed.combined(&map.masking_elevation(), |allowed, elevation| allowed / elevation))
+    }
+}
+
+/// Masking without contrast sensitivity: threshold versus intensity, raised as texture raises the default's thresholds.
+///
+/// The curve is lowered by 0.95 log units to where contrast sensitivity puts it, so that resolution and fine noise are what
+/// is left out, and not a factor that any search would take back.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MaskedTvi;
+
+impl ThresholdModel for MaskedTvi {
+    fn name(&self) -> &'static str {
+        "tvi-masked"
+    }
+
+    fn allowed_standard_error_cd_m2(&self, inputs: &ModelInputs<'_>) -> Result<Plane, Error> {
+        let elevation = still_or_moving(inputs)?.masking_elevation();
+        let base = Tvi { shifted: true }.allowed_standard_error_cd_m2(inputs)?;
+        Ok(base.combined(&elevation, |base, elevation| base * elevation))
+    }
+}
