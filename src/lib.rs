@@ -17,6 +17,7 @@ pub mod animate;
 pub mod benchmark;
 pub mod bsdf;
 pub mod checkpoint;
+pub mod denoise;
 pub mod exr_read;
 pub mod farm;
 pub mod film;

@@ -40,6 +40,11 @@
 //! A picture that is noisy itself is first denoised into a [`guide`], whose variance is given along, so that noise does not hide
 //! noise. Colour noise is judged by [`colour`], error that moves by [`motion`], and what draws the eye by [`saliency`].
 //!
+//! # A denoised picture
+//!
+//! [`denoised`] says what can be seen of the noise that a denoiser left and of what it changed, from the two halves of a path
+//! tracer's samples, and where raw noise is too strong to tell.
+//!
 //! # Where the samples should go
 //!
 //! [`allocation::allocate`] finds the cheapest sample counts that leave a chosen visibility, and a bound that says how far from
@@ -96,6 +101,7 @@ pub mod allocation;
 mod bands;
 pub mod colour;
 pub mod csf;
+pub mod denoised;
 pub mod difference;
 pub mod display;
 pub mod eotf;

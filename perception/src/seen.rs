@@ -16,6 +16,18 @@ pub fn display_luminance(fitted: &dyn FittedTone, display: &Display, scene_lumin
     })
 }
 
+/// How much the displayed luminance changes with scene luminance around `scene_luminance` (cd/m²): the slope of the chord
+/// from 5 % below to 5 % above. Noise that is to stay without bias may not go through the operator itself, which is bent.
+#[must_use]
+pub fn display_slope(fitted: &dyn FittedTone, display: &Display, scene_luminance: &Plane) -> Plane {
+    let shown = Shown { fitted, display };
+    Plane::from_fn(scene_luminance.width(), scene_luminance.height(), |x, y| {
+        let at = scene_luminance.get(x, y).max(1e-4);
+        let (below, above) = (0.95 * at, 1.05 * at);
+        (shown.cd_m2(Pixel { x, y }, above) - shown.cd_m2(Pixel { x, y }, below)) / (above - below)
+    })
+}
+
 /// Variance of the displayed luminance, (cd/m²)², for scene luminance of mean `mean` (cd/m²) and variance `variance`
 /// ((cd/m²)², of the mean).
 ///

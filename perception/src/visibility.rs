@@ -5,7 +5,7 @@
 //! grating at its threshold has v = 1: the √2 turns its RMS into its amplitude.
 
 use crate::bands::RadialTable;
-use crate::fft::{PictureTransform, Workspace, enlarged, reduced_pixel, reduced_size, reduction};
+use crate::fft::{PictureTransform, Spectrum, Workspace, enlarged, reduced_pixel, reduced_size, reduction};
 use crate::filter::gaussian_blur_xy;
 use crate::plane::Plane;
 use crate::sensitivity::luminance_coordinate;
@@ -101,7 +101,7 @@ impl ThresholdMap {
         self.blurred(plane, POOLING_SIGMA_DEG)
     }
 
-    fn blurred(&self, plane: &Plane, sigma_deg: f64) -> Plane {
+    pub(crate) fn blurred(&self, plane: &Plane, sigma_deg: f64) -> Plane {
         let density = self.viewing.display.pixel_density();
         gaussian_blur_xy(plane, sigma_deg * density.horizontal, sigma_deg * density.vertical)
     }
@@ -112,52 +112,20 @@ impl ThresholdMap {
 
     /// Σ_b (`V_b` / `m_b`)² at every pixel.
     fn error_energy(&self, half_difference: &Plane) -> Plane {
-        let density = self.viewing.display.pixel_density();
-        let relative = half_difference.combined(&self.adaptation_cd_m2, |difference, adaptation| {
-            if difference.is_finite() {
-                (difference / adaptation).clamp(-LARGEST_RELATIVE_ERROR, LARGEST_RELATIVE_ERROR)
-            } else {
-                0.0
-            }
-        });
-        let transform = PictureTransform::new(self.width(), self.height(), density);
-        let mut workspace = Workspace::default();
-        let spectrum = transform.forward(&mut workspace, |y, row| row.copy_from_slice(relative.row(y)));
-        let positions = self.adaptation_cd_m2.map(|adaptation| self.level_position(adaptation));
+        let mut filters = ErrorFilters::new(self);
+        let spectrum = filters.spectrum(half_difference);
         let mut energy = Plane::filled(self.width(), self.height(), 0.0);
-        let (width, height) = (self.width(), self.height());
-        for (band, elevation) in self.elevations.iter().enumerate() {
-            let window = RadialTable::new(density, |freq| self.bands.gain(band, freq));
-            let limit_cpd = self.bands.limit_cpd(band);
-            // The energy reaches twice as far in frequency as the amplitude.
-            let factor = reduction(density, 2.0 * limit_cpd);
-            let mut response = Plane::filled(reduced_size(width, factor), reduced_size(height, factor), 0.0);
-            for (index, level) in self.levels.iter().enumerate() {
-                let gain = window.times(&level.sensitivity);
-                let filtered =
-                    transform.filtered_reduced(&mut workspace, &spectrum, limit_cpd, factor, |freq| gain.at(freq));
-                response.for_each_row_mut(|y, row| {
-                    let positions = positions.row(reduced_pixel(y, factor, height));
-                    for (x, (value, filtered)) in row.iter_mut().zip(filtered.row(y)).enumerate() {
-                        let position = positions[reduced_pixel(x, factor, width)];
-                        *value += filtered * (1.0 - (position - index as f32).abs()).max(0.0);
-                    }
-                });
-            }
-            response.for_each_row_mut(|y, row| {
-                let mut elevations = vec![0.0; width];
-                elevation.row_into(reduced_pixel(y, factor, height), &mut Vec::new(), &mut elevations);
-                for (x, value) in row.iter_mut().enumerate() {
-                    let visible = *value / elevations[reduced_pixel(x, factor, width)];
-                    *value = visible * visible;
-                }
-            });
-            let whole = enlarged(&response, factor, width, height);
+        for band in 0..self.band_count() {
+            let whole = filters.response(&spectrum, band).enlarged(|amplitude| amplitude * amplitude);
             energy.for_each_row_mut(|y, row| {
                 row.iter_mut().zip(whole.row(y)).for_each(|(value, more)| *value += more);
             });
         }
         energy
+    }
+
+    pub(crate) fn band_count(&self) -> usize {
+        self.elevations.len()
     }
 
     /// Where an adaptation luminance stands between the levels: 1.25 is a quarter of the way, in luminance, from the second level
@@ -180,6 +148,112 @@ impl ThresholdMap {
 
     fn infinite(&self) -> Plane {
         Plane::filled(self.width(), self.height(), f32::INFINITY)
+    }
+}
+
+/// The eye's filters over one threshold map's errors, band by band, with the buffers that they share.
+pub(crate) struct ErrorFilters<'a> {
+    map: &'a ThresholdMap,
+    transform: PictureTransform,
+    workspace: Workspace,
+    positions: Plane,
+}
+
+/// `V_b` / `m_b`: an error in one band, in threshold units, at every `factor`-th pixel and a frame of one around them.
+pub(crate) struct BandResponse {
+    pub(crate) amplitude: Plane,
+    factor: usize,
+    width: usize,
+    height: usize,
+}
+
+impl BandResponse {
+    /// `of` the amplitude at every pixel; twice the band's frequencies are sampled, so it may be a square.
+    pub(crate) fn enlarged(&self, of: impl Fn(f32) -> f32 + Sync) -> Plane {
+        enlarged(&self.amplitude.map(of), self.factor, self.width, self.height)
+    }
+
+    /// `of` this amplitude and another one's of the same band.
+    pub(crate) fn enlarged_with(&self, other: &Self, of: impl Fn(f32, f32) -> f32 + Sync) -> Plane {
+        enlarged(&self.amplitude.combined(&other.amplitude, of), self.factor, self.width, self.height)
+    }
+}
+
+impl<'a> ErrorFilters<'a> {
+    pub(crate) fn new(map: &'a ThresholdMap) -> Self {
+        let density = map.viewing.display.pixel_density();
+        Self {
+            map,
+            transform: PictureTransform::new(map.width(), map.height(), density),
+            workspace: Workspace::default(),
+            positions: map.adaptation_cd_m2.map(|adaptation| map.level_position(adaptation)),
+        }
+    }
+
+    /// Spectrum of an error, display cd/m², over the adaptation luminance.
+    pub(crate) fn spectrum(&mut self, error: &Plane) -> Spectrum {
+        let relative = error.combined(&self.map.adaptation_cd_m2, |difference, adaptation| {
+            if difference.is_finite() {
+                (difference / adaptation).clamp(-LARGEST_RELATIVE_ERROR, LARGEST_RELATIVE_ERROR)
+            } else {
+                0.0
+            }
+        });
+        self.transform.forward(&mut self.workspace, |y, row| row.copy_from_slice(relative.row(y)))
+    }
+
+    /// Amplitude gain of a band's filter at one of the map's adaptation levels.
+    pub(crate) fn gain(&self, band: usize, level: usize) -> RadialTable {
+        let density = self.map.viewing.display.pixel_density();
+        RadialTable::new(density, |freq| self.map.bands.gain(band, freq)).times(&self.map.levels[level].sensitivity)
+    }
+
+    /// What of an error stands in a band.
+    pub(crate) fn response(&mut self, spectrum: &Spectrum, band: usize) -> BandResponse {
+        let (width, height) = (self.map.width(), self.map.height());
+        let limit_cpd = self.map.bands.limit_cpd(band);
+        // The energy reaches twice as far in frequency as the amplitude.
+        let factor = reduction(self.map.viewing.display.pixel_density(), 2.0 * limit_cpd);
+        let mut amplitude = Plane::filled(reduced_size(width, factor), reduced_size(height, factor), 0.0);
+        for index in 0..self.map.levels.len() {
+            let gain = self.gain(band, index);
+            let filtered =
+                self.transform.filtered_reduced(&mut self.workspace, spectrum, limit_cpd, factor, |freq| gain.at(freq));
+            let positions = &self.positions;
+            amplitude.for_each_row_mut(|y, row| {
+                let positions = positions.row(reduced_pixel(y, factor, height));
+                for (x, (value, filtered)) in row.iter_mut().zip(filtered.row(y)).enumerate() {
+                    let position = positions[reduced_pixel(x, factor, width)];
+                    *value += filtered * (1.0 - (position - index as f32).abs()).max(0.0);
+                }
+            });
+        }
+        let elevation = &self.map.elevations[band];
+        amplitude.for_each_row_mut(|y, row| {
+            let mut elevations = vec![0.0; width];
+            elevation.row_into(reduced_pixel(y, factor, height), &mut Vec::new(), &mut elevations);
+            for (x, value) in row.iter_mut().enumerate() {
+                *value /= elevations[reduced_pixel(x, factor, width)];
+            }
+        });
+        BandResponse { amplitude, factor, width, height }
+    }
+
+    /// The error itself in a band, without the eye's sensitivity: the bands add up to it.
+    pub(crate) fn share_of_band(&mut self, spectrum: &Spectrum, band: usize) -> Plane {
+        let (width, height) = (self.map.width(), self.map.height());
+        let limit_cpd = self.map.bands.limit_cpd(band);
+        let factor = reduction(self.map.viewing.display.pixel_density(), 2.0 * limit_cpd);
+        let bands = &self.map.bands;
+        let gain = RadialTable::new(self.map.viewing.display.pixel_density(), |freq| bands.gain(band, freq).powi(2));
+        let filtered =
+            self.transform.filtered_reduced(&mut self.workspace, spectrum, limit_cpd, factor, |freq| gain.at(freq));
+        enlarged(&filtered, factor, width, height)
+    }
+
+    /// Spectrum of any plane, as it stands.
+    pub(crate) fn plain_spectrum(&mut self, plane: &Plane) -> Spectrum {
+        self.transform.forward(&mut self.workspace, |y, row| row.copy_from_slice(plane.row(y)))
     }
 }
 

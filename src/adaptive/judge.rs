@@ -1,7 +1,9 @@
 //! The film as it will be seen: thresholds, remaining visibility, and how each pixel's samples scatter on the display.
 
+use super::denoised::{DenoisedPicture, TimedDenoising};
 use super::settings::LoopSettings;
 use super::statistics::{ChannelStatistics, SampleStatistics};
+use crate::denoise::OidnError;
 use crate::film::{CHANNELS, Estimate, Film};
 use crate::sampler::Half;
 use fechner_perception::Plane;
@@ -19,8 +21,12 @@ use std::sync::OnceLock;
 /// What the perception model says of a film. Everything is in display cd/m² unless it says otherwise.
 #[derive(Debug)]
 pub struct Judgement {
-    /// The picture, in scene cd/m².
+    /// The raw mean, in scene cd/m².
     pub estimate: Estimate,
+    /// The picture where it is denoised.
+    pub denoised: Option<DenoisedPicture>,
+    /// What denoising it took.
+    pub seconds_denoising: f64,
     /// The tone operator as fitted to the guide.
     pub tone: Box<dyn FittedTone>,
     /// Thresholds from the guide, by contrast sensitivity in bands.
@@ -42,10 +48,16 @@ pub struct Judgement {
     measured: OnceLock<MeasuredError>,
 }
 
-/// Perception failed on a picture that the loop made: a defect of ours, with the reason.
+/// Why a film could not be looked at.
 #[derive(Debug, thiserror::Error)]
-#[error("the threshold map could not be made: {0}")]
-pub struct JudgeError(#[from] fechner_perception::Error);
+pub enum JudgeError {
+    /// Perception failed on a picture that the loop made: a defect of ours, with the reason.
+    #[error("the threshold map could not be made: {0}")]
+    Perception(#[from] fechner_perception::Error),
+    /// The denoiser failed.
+    #[error(transparent)]
+    Denoiser(#[from] OidnError),
+}
 
 /// Looks at the film through display and eye. `inflation` multiplies every variance (1, unless an audit found it low).
 ///
@@ -53,7 +65,11 @@ pub struct JudgeError(#[from] fechner_perception::Error);
 /// Only if the perception model refuses the film's maps.
 pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Judgement, JudgeError> {
     let estimate = film.estimate(settings.nits_per_unit);
-    let guide = guide_luminance(film, &estimate);
+    let denoised = match &settings.denoiser {
+        Some(denoiser) => Some(TimedDenoising::of(denoiser, film, settings.nits_per_unit)?),
+        None => None,
+    };
+    let guide = denoised.as_ref().map_or_else(|| guide_luminance(film, &estimate), |found| found.luminance.clone());
     let tone = match &settings.fitted {
         Some(fitted) => fitted.clone().restore(),
         None => settings.operator.fit(&SceneGuide::of(&guide), &settings.viewing, None),
@@ -102,8 +118,12 @@ pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Jud
     };
     let variance_per_sample =
         Half::BOTH.map(|half| per_sample(&most_visible(&|channel| &channel.for_half[half.index()])));
+    let seconds_denoising = denoised.as_ref().map_or(0.0, |found| found.seconds);
+    let denoised = denoised.map(|found| found.judged(film, settings, tone.as_ref(), &thresholds, &estimate));
     let mut judgement = Judgement {
         estimate,
+        denoised,
+        seconds_denoising,
         tone,
         thresholds,
         pixel_thresholds,
@@ -113,7 +133,10 @@ pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Jud
         variance_per_sample,
         measured: OnceLock::new(),
     };
-    judgement.predicted = judgement.visibility_of(&display_variance);
+    match judgement.denoised.take() {
+        Some(denoised) => judgement.turn_to(denoised, film, inflation),
+        None => judgement.predicted = judgement.visibility_of(&display_variance),
+    }
     Ok(judgement)
 }
 
@@ -127,6 +150,30 @@ fn contrast_sensitivity(settings: &LoopSettings) -> Result<Box<dyn ContrastSensi
 }
 
 impl Judgement {
+    /// Judges the denoised picture in the raw one's place. Counts then follow what is seen of it: the variance of one sample
+    /// is what white noise would need to be as visible, taken to fall with the count as the raw picture's does.
+    fn turn_to(&mut self, mut denoised: DenoisedPicture, film: &Film, inflation: f64) {
+        let root = inflation.sqrt() as f32;
+        let inflate = |plane: &mut Plane| *plane = plane.map(|visibility| root * visibility);
+        inflate(&mut denoised.error.visibility);
+        inflate(&mut denoised.error.blended_visibility);
+        let seen = &denoised.error.blended_visibility;
+        let (width, gain) = (seen.width(), self.thresholds.noise_gain());
+        let per_sample = Plane::from_fn(width, seen.height(), |x, y| {
+            let variance = seen.get(x, y) * seen.get(x, y) / (2.0 * gain.get(x, y));
+            if variance.is_finite() { (f64::from(variance) / variance_share(film, y * width + x)) as f32 } else { 0.0 }
+        });
+        self.predicted = self.per_importance(seen.clone());
+        self.variance_per_sample = [per_sample.clone(), per_sample.clone()];
+        self.pooled_variance_per_sample = per_sample;
+        self.denoised = Some(denoised);
+    }
+
+    /// The picture that is shown: linear RGB in cd/m², row-major.
+    pub fn picture(&self) -> &[[f32; 3]] {
+        self.denoised.as_ref().map_or(&self.estimate.rgb_cd_m2, |denoised| &denoised.rgb_cd_m2)
+    }
+
     /// Visibility of a picture whose displayed luminance has this variance, (cd/m²)².
     pub fn visibility_of(&self, display_variance: &Plane) -> Plane {
         self.per_importance(match &self.pixel_thresholds {
@@ -157,15 +204,19 @@ impl Judgement {
         }
     }
 
-    /// What can be seen of the halves' luminance difference: the same as predicted, measured.
+    /// What can be seen of the halves' luminance difference: the same as predicted, measured; of the denoised halves where the
+    /// picture is denoised.
     pub fn measured_error(&self) -> &MeasuredError {
         self.measured.get_or_init(|| {
-            let displayed = seen::display_half_difference(
-                self.tone.as_ref(),
-                &self.thresholds.viewing().display,
-                &self.estimate.luminance_cd_m2,
-                &self.estimate.half_difference,
-            );
+            let raw = || {
+                seen::display_half_difference(
+                    self.tone.as_ref(),
+                    &self.thresholds.viewing().display,
+                    &self.estimate.luminance_cd_m2,
+                    &self.estimate.half_difference,
+                )
+            };
+            let displayed = self.denoised.as_ref().map_or_else(raw, |denoised| denoised.half_difference.clone());
             let MeasuredError { visibility, amplitude } = self.thresholds.measured_error(&displayed);
             MeasuredError { visibility: self.per_importance(visibility), amplitude: self.per_importance(amplitude) }
         })

@@ -5,6 +5,7 @@
 //! and by `next_step`; what the eye sees is asked of the perception crate in [`mod@judge`]; variance is in [`statistics`].
 
 pub mod audit;
+pub mod denoised;
 pub mod judge;
 mod monitor;
 pub mod plan;
@@ -21,7 +22,7 @@ use crate::film::Film;
 use crate::integrator::{BlockWork, Crop, PathTracer, SamplePlan};
 use audit::{Audit, audit};
 use judge::{JudgeError, Judgement, judge};
-use plan::{adaptive_plan, cut_to_budget, doubling_of, slices, uniform_plan, wanted_samples};
+use plan::{adaptive_plan, cut_to_budget, denoised_plan, doubling_of, slices, uniform_plan, wanted_samples};
 use rivals::rival_plan;
 use settings::{LoopSettings, Sampling, ladder};
 use state::{Exposure, RenderState};
@@ -33,6 +34,8 @@ use stop::{LEAST_SAVING, predicted_saving};
 const TOLERATED_PEAK: f64 = 4.0;
 /// Rungs above this are not audited: their few samples say little.
 const HIGHEST_AUDITED_RUNG: f64 = 4.0;
+/// The ladder of a picture that is denoised begins here, or at its target.
+const HIGHEST_DENOISED_RUNG: f64 = 2.0;
 /// What the variance may be multiplied by in all after audits that disagree.
 const MOST_INFLATION: f64 = 4.0;
 
@@ -57,6 +60,8 @@ pub struct Rendered {
     pub seconds_perception: f64,
     /// Of which in finding counts.
     pub seconds_allocation: f64,
+    /// And in denoising.
+    pub seconds_denoising: f64,
 }
 
 impl Rendered {
@@ -72,6 +77,7 @@ impl Rendered {
             seconds_total: state.seconds_total,
             seconds_perception: state.seconds_perception,
             seconds_allocation: state.seconds_allocation,
+            seconds_denoising: state.seconds_denoising,
         }
     }
 }
@@ -170,7 +176,7 @@ pub fn run(
         let look = Instant::now();
         let mut judgement = match last_look.take() {
             Some(earlier) if ended.is_none() && render.exposure_holds() => earlier,
-            _ => judge(&render.state.film, settings, render.state.inflation)?,
+            _ => render.look()?,
         };
         let step = match ended {
             Some(reason) => Step::Stop(reason),
@@ -205,7 +211,7 @@ pub fn decide(
 ) -> Result<Next, JudgeError> {
     let mut render = Loop::new(tracer, settings, state);
     let look = Instant::now();
-    let mut judgement = judge(&render.state.film, settings, render.state.inflation)?;
+    let mut judgement = render.look()?;
     let step = render.next_step(&mut judgement)?;
     if let Some(reason) = render.take(step, &judgement, look, monitor) {
         return Ok(Next::Ended(Box::new(render.finish(judgement, reason, monitor)?)));
@@ -218,7 +224,11 @@ impl<'a> Loop<'a> {
     fn new(tracer: &'a PathTracer, settings: &'a LoopSettings, state: RenderState) -> Self {
         let is_below = |rung: f64, bound: Option<f64>| bound.is_none_or(|bound| rung < bound);
         let is_left = |&rung: &f64| is_below(rung, state.finished_rung) && is_below(rung, state.left_rung);
-        let rungs = ladder(settings.limits.visibility).into_iter().filter(is_left).collect();
+        let target = settings.limits.visibility;
+        // Far above threshold a denoised picture's greatest error is in places that no denoiser can help: they may not have
+        // all samples before the rest is looked after.
+        let is_walked = |&rung: &f64| settings.denoiser.is_none() || rung <= HIGHEST_DENOISED_RUNG.max(target);
+        let rungs = ladder(target).into_iter().filter(is_left).filter(is_walked).collect();
         let seconds_before = state.seconds_total;
         Self { tracer, settings, rungs, state, resumed_at: Instant::now(), seconds_before }
     }
@@ -242,6 +252,13 @@ impl<'a> Loop<'a> {
 
     fn seconds(&self) -> f64 {
         self.seconds_before + self.resumed_at.elapsed().as_secs_f64()
+    }
+
+    /// Looks at the film.
+    fn look(&mut self) -> Result<Judgement, JudgeError> {
+        let judgement = judge(&self.state.film, self.settings, self.state.inflation)?;
+        self.state.seconds_denoising += judgement.seconds_denoising;
+        Ok(judgement)
     }
 
     /// Traces what is planned, and says why the render ends if it does. A plan that was begun is finished first, unless
@@ -295,7 +312,7 @@ impl<'a> Loop<'a> {
     /// Tells the last state, and looks once more where the rule did not need to.
     fn finish(mut self, judgement: Judgement, reason: StopReason, monitor: &dyn Monitor) -> Result<Ended, JudgeError> {
         let judgement = match self.settings.sampling {
-            Sampling::Rival(_) => judge(&self.state.film, self.settings, self.state.inflation)?,
+            Sampling::Rival(_) => self.look()?,
             Sampling::Adaptive | Sampling::Uniform => judgement,
         };
         self.state.seconds_total = self.seconds();
@@ -348,15 +365,20 @@ impl<'a> Loop<'a> {
         let doubled = {
             let most = self.settings.limits.mean_samples.unwrap_or(max_samples).min(max_samples);
             let pixels = u64::from(self.state.film.width()) * u64::from(self.state.film.height());
-            (2 * (self.state.film.total_samples() / pixels).max(8) as u32).min(most)
+            (2 * (self.state.film.total_samples() / pixels).max(u64::from(self.settings.limits.pilot_samples) / 2)
+                as u32)
+                .min(most)
         };
         let some = |plan: SamplePlan| if plan.blocks.is_empty() { None } else { Some(plan) };
         if self.settings.sampling == Sampling::Uniform {
             return Ok(if is_reached(judgement, rung) { None } else { some(uniform_plan(&self.state.film, doubled)) });
         }
+        if !is_reached(judgement, rung) && judgement.denoised.is_some() {
+            return Ok(some(denoised_plan(&self.state.film, &judgement.predicted, rung, max_samples)));
+        }
         if !is_reached(judgement, rung) {
             let started = Instant::now();
-            let wanted = wanted_samples(judgement, self.settings.allocation, rung, max_samples)?;
+            let wanted = wanted_samples(judgement, self.settings.allocation, rung, &self.settings.limits)?;
             self.state.seconds_allocation += started.elapsed().as_secs_f64();
             if predicted_saving(&self.state.film, judgement, &wanted, rung) < LEAST_SAVING {
                 return Ok(some(uniform_plan(&self.state.film, doubled)));
@@ -385,7 +407,8 @@ impl<'a> Loop<'a> {
     /// Audits a rung that is reached. Where the variance proves too low it is raised from here on, and the plan for it is
     /// returned.
     fn audited(&mut self, rung: f64, judgement: &mut Judgement) -> Result<Option<SamplePlan>, JudgeError> {
-        let may_audit = rung <= HIGHEST_AUDITED_RUNG && judgement.pixel_thresholds.is_none();
+        let is_raw = judgement.denoised.is_none();
+        let may_audit = rung <= HIGHEST_AUDITED_RUNG && judgement.pixel_thresholds.is_none() && is_raw;
         if !may_audit || self.state.inflation >= MOST_INFLATION {
             return Ok(None);
         }
@@ -394,7 +417,7 @@ impl<'a> Loop<'a> {
         self.state.audit = found.or(self.state.audit);
         let Some(found) = found.filter(Audit::disagrees) else { return Ok(None) };
         self.state.inflation = (self.state.inflation * found.ratio).min(MOST_INFLATION);
-        *judgement = judge(&self.state.film, self.settings, self.state.inflation)?;
+        *judgement = self.look()?;
         self.plan_towards(rung, judgement)
     }
 

@@ -1,5 +1,7 @@
 //! What a render is asked to do.
 
+use crate::denoise::Denoiser;
+use crate::integrator::PILOT_SAMPLES;
 use fechner_perception::Plane;
 use fechner_perception::csf::FrameTiming;
 use fechner_perception::display::Viewing;
@@ -59,12 +61,29 @@ pub struct Limits {
     pub max_samples: u32,
     /// Number of plans, to repeat a render that ended by time.
     pub plans: Option<u32>,
+    /// Samples of every pixel before the first look, at least 2.
+    pub pilot_samples: u32,
 }
 
+/// Pilot of a picture that is denoised: the denoiser reads neighbours where raw variance needs samples of the pixel's own.
+pub const DENOISED_PILOT_SAMPLES: u32 = 4;
+
 impl Limits {
+    /// The visibility that is aimed at; 1, which is at threshold, where only other limits count.
+    pub fn visibility_or_threshold(&self) -> f64 {
+        if self.visibility > 0.0 && self.visibility.is_finite() { self.visibility } else { 1.0 }
+    }
+
     /// To a visibility, whatever it takes.
     pub fn of_visibility(visibility: f64) -> Self {
-        Self { visibility, time: None, mean_samples: None, max_samples: DEFAULT_MAX_SAMPLES, plans: None }
+        Self {
+            visibility,
+            time: None,
+            mean_samples: None,
+            max_samples: DEFAULT_MAX_SAMPLES,
+            plans: None,
+            pilot_samples: 2 * PILOT_SAMPLES,
+        }
     }
 }
 
@@ -91,6 +110,8 @@ pub struct LoopSettings {
     pub frames: Option<FrameTiming>,
     /// What each pixel's thresholds are multiplied by, above 0, of the film's size: somebody's own idea of what matters.
     pub importance: Option<Plane>,
+    /// What makes the output picture out of the mean; `None` leaves it raw.
+    pub denoiser: Option<Denoiser>,
 }
 
 impl LoopSettings {
@@ -107,6 +128,7 @@ impl LoopSettings {
             fitted: None,
             frames: None,
             importance: None,
+            denoiser: None,
         }
     }
 }

@@ -40,6 +40,8 @@ pub struct RenderState {
     pub seconds_perception: f64,
     /// Of which in finding counts.
     pub seconds_allocation: f64,
+    /// And in denoising.
+    pub seconds_denoising: f64,
     /// The tone operator as fitted at the last look.
     pub tone: Option<SavedTone>,
 }
@@ -56,15 +58,25 @@ pub struct Exposure {
 impl RenderState {
     /// The start of a render: nothing traced, the pilot planned.
     pub fn new(width: u32, height: u32, limits: &Limits) -> Self {
-        Self::of_film(Film::new(width, height), limits.max_samples.min(limits.mean_samples.unwrap_or(u32::MAX)))
+        Self::of_film(Film::new(width, height), pilot_samples(limits))
     }
 
     /// Its samples, the time that they took and what audits found, less what was decided: for other settings.
     #[must_use]
     pub fn begun_anew(self, limits: &Limits) -> Self {
-        let Self { film, inflation, plans, passes, seconds_total, seconds_perception, seconds_allocation, .. } = self;
-        let fresh = Self::of_film(film, limits.max_samples.min(limits.mean_samples.unwrap_or(u32::MAX)));
-        Self { inflation, plans, passes, seconds_total, seconds_perception, seconds_allocation, ..fresh }
+        let Self { film, inflation, plans, passes, seconds_total, seconds_perception, .. } = self;
+        let (seconds_allocation, seconds_denoising) = (self.seconds_allocation, self.seconds_denoising);
+        let fresh = Self::of_film(film, pilot_samples(limits));
+        Self {
+            inflation,
+            plans,
+            passes,
+            seconds_total,
+            seconds_perception,
+            seconds_allocation,
+            seconds_denoising,
+            ..fresh
+        }
     }
 
     /// A film about which nothing has been decided: empty, merged from others, or made for other eyes. Planned is what it
@@ -86,6 +98,7 @@ impl RenderState {
             seconds_total: 0.0,
             seconds_perception: 0.0,
             seconds_allocation: 0.0,
+            seconds_denoising: 0.0,
             tone: None,
         }
     }
@@ -94,4 +107,9 @@ impl RenderState {
     pub fn untraced_blocks(&self) -> impl Iterator<Item = &BlockWork> {
         self.pending.iter().flat_map(|plan| &plan.blocks).skip(self.traced_blocks)
     }
+}
+
+/// Samples of every pixel before the first look.
+fn pilot_samples(limits: &Limits) -> u32 {
+    limits.pilot_samples.min(limits.max_samples).min(limits.mean_samples.unwrap_or(u32::MAX))
 }

@@ -18,6 +18,7 @@ pub mod video;
 use crate::adaptive::judge::JudgeError;
 use crate::adaptive::settings::{Limits, LoopSettings, Sampling};
 use crate::adaptive::{Monitor, Rendered, render};
+use crate::denoise::Denoiser;
 use crate::integrator::{PathTracer, TraceSettings};
 use crate::sampler::hash_words;
 use crate::scene::Scene;
@@ -60,6 +61,8 @@ pub struct ShotSettings {
     pub nits_per_unit: f64,
     /// What the eye is adapted to before the first frame, cd/m², for operators that ask; `None`: to the first frame.
     pub adapted_to_cd_m2: Option<f64>,
+    /// What makes each frame out of its mean; `None` leaves them raw.
+    pub denoiser: Option<Denoiser>,
 }
 
 impl ShotSettings {
@@ -75,6 +78,7 @@ impl ShotSettings {
         LoopSettings {
             sampling: self.sampling,
             limits: self.limits,
+            denoiser: self.denoiser.clone(),
             fitted: Some(track.fitted.clone()),
             frames: if self.pausable { None } else { Some(timing) },
             ..LoopSettings::new(self.viewing.clone(), self.nits_per_unit, operator)

@@ -10,6 +10,7 @@
 mod animation;
 mod arm;
 mod curve;
+mod denoise;
 mod metrics;
 mod oracle;
 mod pictures;
@@ -24,6 +25,7 @@ mod truth;
 pub use animation::{AnimationRow, AnimationSettings, animation};
 pub use arm::Arm;
 pub use curve::{Curve, CurvePoint};
+pub use denoise::{Calibration, DenoisingResults, DenoisingSettings, Race, denoising};
 pub use record::{Record, Results};
 
 use crate::adaptive::settings::{Limits, LoopSettings};

@@ -1,6 +1,7 @@
 //! What was rendered and for whom: small, at the start of the film's file.
 
 use crate::adaptive::settings::{AllocationRule, Limits, LoopSettings, Sampling};
+use crate::denoise::{Denoiser, DenoiserKind, OidnError};
 use crate::integrator::{Crop, TraceSettings};
 use crate::scene::Scene;
 use crate::scene::hash::{ContentHash, content_hash};
@@ -68,6 +69,19 @@ pub struct SettingsRecord {
     pub exposure_stops: Option<f64>,
     /// Importance map, where one was given.
     pub importance: Option<ContentHash>,
+    /// What makes the output picture out of the mean.
+    pub denoiser: Option<DenoiserKind>,
+}
+
+/// Why settings that were written down cannot be used here.
+#[derive(Debug, thiserror::Error)]
+pub enum SettingsError {
+    /// A name that nobody answers to.
+    #[error(transparent)]
+    Name(#[from] UnknownName),
+    /// The denoiser is not on this machine.
+    #[error(transparent)]
+    Denoiser(#[from] OidnError),
 }
 
 /// A name that this version does not know.
@@ -157,11 +171,11 @@ impl Seeds {
 }
 
 impl SettingsRecord {
-    /// Settings for the loop, less the importance map, of which only the hash is here.
+    /// Settings for the loop, less the importance map, of which only the hash is here; the denoiser is opened.
     ///
     /// # Errors
-    /// For names that nobody answers to.
-    pub fn loop_settings(&self, limits: Limits) -> Result<LoopSettings, UnknownName> {
+    /// For names that nobody answers to, and denoisers that are not installed.
+    pub fn loop_settings(&self, limits: Limits) -> Result<LoopSettings, SettingsError> {
         let operator = tone::operator(&self.operator, self.exposure_stops).ok_or_else(|| UnknownName {
             kind: "tone operator",
             name: self.operator.clone(),
@@ -171,6 +185,7 @@ impl SettingsRecord {
             sampling: self.sampling,
             allocation: self.allocation,
             model: self.threshold_model()?,
+            denoiser: self.denoiser.map(Denoiser::open).transpose()?,
             limits,
             ..LoopSettings::new(self.viewing.clone(), self.nits_per_unit, operator)
         })

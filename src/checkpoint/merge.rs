@@ -80,13 +80,15 @@ pub fn merge_files(paths: &[PathBuf]) -> Result<Checkpoint, MergeError> {
 
 /// The film of a state and what it took, without what was decided about it.
 fn undecided(state: RenderState) -> RenderState {
-    let RenderState { film, inflation, plans, seconds_total, seconds_perception, seconds_allocation, .. } = state;
+    let RenderState { film, inflation, plans, seconds_total, seconds_perception, .. } = state;
+    let (seconds_allocation, seconds_denoising) = (state.seconds_allocation, state.seconds_denoising);
     RenderState {
         inflation,
         plans,
         seconds_total,
         seconds_perception,
         seconds_allocation,
+        seconds_denoising,
         ..RenderState::of_film(film, DEFAULT_MAX_SAMPLES)
     }
 }

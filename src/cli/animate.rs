@@ -6,6 +6,7 @@ mod source;
 mod video;
 
 use super::console::{Console, duration_in_words};
+use super::denoise::DenoiseChoice;
 use super::job::{Quality, Size, check_memory, parse_size};
 use super::report::Report;
 use super::seeing::{self, parse_positive};
@@ -16,6 +17,7 @@ use fechner::animate::name::FrameName;
 use fechner::animate::track::{Track, TrackFrame};
 use fechner::animate::{FrameScenes, RenderedFrame, SceneSource as _, ShotSettings, render_frame};
 use fechner::checkpoint::SettingsRecord;
+use fechner::denoise::Denoiser;
 use fechner::integrator::TraceSettings;
 use fechner::output::rendered::{Background, layers, write_display_png};
 use fechner::output::{self, Format};
@@ -95,6 +97,9 @@ pub(super) struct AnimateArguments {
     /// Exposure correction in stops.
     #[arg(long, value_name = "STOPS", allow_negative_numbers = true, help_heading = "Picture")]
     exposure: Option<f64>,
+    /// Take the noise out of every frame: by the built-in filter, or by Open Image Denoise where it is installed.
+    #[arg(long, value_enum, default_value = "none", help_heading = "Picture")]
+    denoise: DenoiseChoice,
     /// Names of the layers of motion in .exr files.
     #[arg(long, value_enum, default_value = "fechner", help_heading = "Picture")]
     aov_names: AovNames,
@@ -225,6 +230,7 @@ impl<'a> Shot<'a> {
             operator: self.operator_name.clone(),
             exposure_stops: self.exposure_stops,
             importance: None,
+            denoiser: self.settings.denoiser.as_ref().map(Denoiser::kind),
         }
     }
 
@@ -334,7 +340,7 @@ impl<'a> Shot<'a> {
             Format::Png => write_display_png(file, &made.rendered, &settings.viewing.display, Background::Shown)?,
             Format::Exr => {
                 let attributes = report.attributes();
-                let mut picture = layers(&made.rendered, settings.nits_per_unit, Background::Shown, &attributes);
+                let mut picture = layers(&made.rendered, settings, Background::Shown, &attributes);
                 push_velocity(&mut picture, &made.velocity, self.arguments.aov_names);
                 output::write_exr(file, &picture)?;
             }
@@ -345,12 +351,13 @@ impl<'a> Shot<'a> {
     /// All that a frame's file depends on, as a name.
     fn key(&self, settings: &LoopSettings, track: &TrackFrame, scenes: &FrameScenes) -> String {
         let text = format!(
-            "{}|{track:?}|{}|{}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}",
+            "{}|{track:?}|{}|{}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}",
             env!("CARGO_PKG_VERSION"),
             content_hash(&scenes.previous),
             content_hash(&scenes.next),
             self.settings.trace,
             settings.sampling,
+            settings.denoiser.as_ref().map(Denoiser::name),
             settings.limits,
             settings.viewing,
             settings.frames,
@@ -394,10 +401,12 @@ fn shot_settings(arguments: &AnimateArguments, scene: &Scene, shot: Frames) -> R
         limits: Limits {
             mean_samples: arguments.spp,
             max_samples: arguments.max_spp.unwrap_or(DEFAULT_MAX_SAMPLES),
+            pilot_samples: arguments.denoise.pilot_samples(),
             ..Limits::of_visibility(asked.unwrap_or(otherwise))
         },
         viewing: seeing::viewing(display, None)?,
         nits_per_unit: arguments.nits_per_unit.unwrap_or(scene.nits_per_unit),
         adapted_to_cd_m2: arguments.adapted_to,
+        denoiser: arguments.denoise.kind().map(Denoiser::open).transpose()?,
     })
 }

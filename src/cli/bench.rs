@@ -1,9 +1,13 @@
 //! `fechner bench`: what adaptive sampling saves.
 
+use super::denoise::DenoiseChoice;
 use super::seeing::parse_positive;
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
-use fechner::benchmark::{AnimationRow, AnimationSettings, Arm, BenchSettings, animation, bounds, run as run_bench};
+use fechner::benchmark::{
+    AnimationRow, AnimationSettings, Arm, BenchSettings, DenoisingSettings, Race, animation, bounds, denoising,
+    run as run_bench,
+};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `bench`.
@@ -38,6 +42,12 @@ pub(super) struct BenchArguments {
     /// Arms, separated by commas, in place of the suite's.
     #[arg(long, value_name = "ARM,…", value_delimiter = ',')]
     arms: Vec<String>,
+    /// Denoisers of the suite denoise, separated by commas.
+    #[arg(long, value_enum, value_name = "NAME,…", value_delimiter = ',', default_value = "builtin,oidn")]
+    denoise: Vec<DenoiseChoice>,
+    /// In the suite denoise, leave out what compares rules of sampling.
+    #[arg(long)]
+    law_only: bool,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -46,6 +56,8 @@ enum Suite {
     Quick,
     /// 256×256, visibility 1, every arm, five seeds: a night.
     Full,
+    /// 128×128, denoised pictures: the law against the truth, and samples to a quality. Prints tables, writes denoise.json.
+    Denoise,
     /// 96×54, visibility 2, eight frames at 24 and at 60 a second: what motion hides. Prints a table only.
     Animation,
 }
@@ -72,6 +84,7 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
         Suite::Quick => (128, 4.0, 3, Arm::QUICK.to_vec()),
         Suite::Full => (256, 1.0, 5, Arm::ALL.to_vec()),
         Suite::Animation => return run_animation(arguments),
+        Suite::Denoise => return run_denoise(arguments),
     };
     let scenes = scenes_or(&STILLS, arguments)?;
     let size = arguments.size.unwrap_or(size);
@@ -113,6 +126,86 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
     }
     eprintln!("{}", settings.output.join("report.html").display());
     Ok(())
+}
+
+/// Scenes of the denoising suite: a plain room, glass, texture, many lamps, a caustic.
+const DENOISED: [&str; 5] = ["cornell-box", "cornell-glass", "textured-room", "many-lights", "glass-caustic"];
+
+fn run_denoise(arguments: &BenchArguments) -> Result<()> {
+    let size = arguments.size.unwrap_or(128);
+    let settings = DenoisingSettings {
+        bench: BenchSettings {
+            scenes: scenes_or(&DENOISED, arguments)?,
+            size: (size, size),
+            visibility: 4.0,
+            arms: Vec::new(),
+            seeds: arguments.seeds.unwrap_or(2),
+            reference_factor: arguments.reference_factor,
+            display: arguments.display.clone(),
+            output: arguments.output.clone(),
+        },
+        denoisers: arguments.denoise.iter().filter_map(|choice| choice.kind()).collect(),
+        target: arguments.visibility.unwrap_or(1.0),
+        with_races: !arguments.law_only,
+    };
+    let results = denoising(&settings, &|line: &str| eprintln!("{line}"))?;
+    println!(
+        "| scene | denoiser | spp | rank corr. | predicted / true v | by variance alone | called fine | of it unproven | fine, \
+         proven, wrong | fine, unproven, wrong | truly wrong | JOD raw, denoised | FLIP raw, denoised | overhead |"
+    );
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    for c in &results.calibrations {
+        let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+        println!(
+            "| {} | {} | {} | {:.2} | {:.2} | {:.2} | {} | {} | {} | {} | {} | {:.2}, {:.2} | {:.3}, {:.3} | {:.2} |",
+            c.scene,
+            c.denoiser,
+            c.spp,
+            c.rank_correlation,
+            c.predicted_over_true,
+            c.variance_over_true,
+            percent(c.fine_share),
+            percent(c.unproven_share),
+            percent(c.wrong_share),
+            percent(c.wrong_unproven_share),
+            percent(c.truly_wrong_share),
+            c.jod_raw,
+            c.jod,
+            c.flip_raw,
+            c.flip,
+            c.overhead
+        );
+    }
+    print_races(&results.races);
+    Ok(())
+}
+
+/// Samples to three qualities by each rule, and uniform's over the others'.
+fn print_races(races: &[Race]) {
+    if races.is_empty() {
+        return;
+    }
+    println!("\n| scene | denoiser | rule | spp to JOD 9.8 | to JOD 9.9 | to FLIP of uniform at 64 |");
+    println!("| --- | --- | --- | --- | --- | --- |");
+    for race in races {
+        let uniform =
+            races.iter().find(|r| r.rule == "uniform" && (&r.scene, &r.denoiser) == (&race.scene, &race.denoiser));
+        let at_64 = uniform.and_then(|race| race.points.iter().find(|point| point[0] >= 64.0)).map_or(0.0, |p| p[2]);
+        let cell = |needed: &dyn Fn(&Race) -> Option<f64>| match (needed(race), uniform.and_then(needed)) {
+            (Some(own), Some(uniform)) => format!("{own:.1} ({:.2})", uniform / own),
+            (Some(own), None) => format!("{own:.1}"),
+            (None, _) => "more than tried".to_owned(),
+        };
+        println!(
+            "| {} | {} | {} | {} | {} | {} |",
+            race.scene,
+            race.denoiser,
+            race.rule,
+            cell(&|race: &Race| race.samples_to_jod(9.8)),
+            cell(&|race: &Race| race.samples_to_jod(9.9)),
+            cell(&|race: &Race| race.samples_to_flip(at_64))
+        );
+    }
 }
 
 fn run_animation(arguments: &BenchArguments) -> Result<()> {

@@ -1,6 +1,7 @@
 //! What is rendered and how: the arguments that `render` and `view` share, so that both make the same picture.
 
 use super::console;
+use super::denoise::DenoiseChoice;
 use super::importance;
 use super::seeing::{self, parse_positive};
 use anyhow::{Context, bail};
@@ -97,6 +98,10 @@ pub(super) struct JobArguments {
     #[arg(long, value_name = "CD_M2", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Seeing")]
     nits_per_unit: Option<f64>,
 
+    /// Take the noise out of the picture, and judge what can then be seen: by the built-in filter, or by Open Image Denoise
+    /// where it is installed. An EXR keeps the raw mean beside it.
+    #[arg(long, value_enum, default_value = "none", help_heading = "Picture")]
+    denoise: DenoiseChoice,
     /// Leave out what surrounds the scene and write alpha: straight in PNG, premultiplied in EXR.
     #[arg(long, help_heading = "Picture")]
     transparent: bool,
@@ -325,6 +330,7 @@ fn limits(arguments: &JobArguments, scene: &Scene, sampling: Sampling) -> Limits
         mean_samples: arguments.spp,
         max_samples: arguments.max_spp.unwrap_or(DEFAULT_MAX_SAMPLES),
         plans: arguments.plans,
+        pilot_samples: arguments.denoise.pilot_samples(),
     }
 }
 
@@ -357,6 +363,7 @@ fn settings_record(arguments: &JobArguments, scene: &Scene) -> anyhow::Result<Se
         operator: operator.to_owned(),
         exposure_stops: arguments.exposure.or(view.exposure_stops),
         importance: None,
+        denoiser: arguments.denoise.kind(),
     })
 }
 

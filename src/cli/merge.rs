@@ -5,7 +5,7 @@ use super::report::{Report, summary};
 use super::seeing::parse_positive;
 use clap::Args;
 use fechner::adaptive::judge::judge;
-use fechner::adaptive::settings::{DEFAULT_MAX_SAMPLES, Limits};
+use fechner::adaptive::settings::Limits;
 use fechner::adaptive::{Rendered, StopReason, is_reached};
 use fechner::checkpoint::{merge_files, write_checkpoint};
 use fechner::output;
@@ -43,13 +43,7 @@ pub(super) fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
     let mut merged = merge_files(&arguments.films)?;
     merged.header.visibility = arguments.visibility.unwrap_or(merged.header.visibility);
     let visibility = merged.header.visibility;
-    let settings = merged.header.settings.loop_settings(Limits {
-        visibility,
-        time: None,
-        mean_samples: None,
-        max_samples: DEFAULT_MAX_SAMPLES,
-        plans: None,
-    })?;
+    let settings = merged.header.settings.loop_settings(Limits::of_visibility(visibility))?;
     if format.is_none() {
         write_checkpoint(&arguments.output, &merged.header, &merged.state)?;
     }

@@ -5,6 +5,7 @@ mod bench;
 mod channels;
 mod compare;
 mod console;
+mod denoise;
 mod farm;
 mod importance;
 mod info;

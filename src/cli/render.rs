@@ -93,7 +93,7 @@ pub(super) fn write_picture(
         }
         output::Format::Exr => {
             let attributes = report.attributes();
-            output::rendered::write_layers_exr(path, rendered, settings.nits_per_unit, background, &attributes)?;
+            output::rendered::write_layers_exr(path, rendered, settings, background, &attributes)?;
         }
     }
     Ok(())

@@ -1,6 +1,7 @@
 //! The figures of a render, for machines (`--json`, EXR attributes) and in plain words.
 
 use super::console::duration_in_words;
+use fechner::adaptive::judge::Judgement;
 use fechner::adaptive::settings::{LoopSettings, RivalRule, Sampling};
 use fechner::adaptive::statistics::find_outliers;
 use fechner::adaptive::{Rendered, StopReason, visible_share};
@@ -20,6 +21,38 @@ pub(super) struct ObserverReport {
     distance_m: Option<f64>,
     sensitivity: f64,
     csf_area_deg2: f64,
+}
+
+/// What is known of a denoised picture besides its visibility.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct DenoisedReport {
+    denoiser: String,
+    /// Visibility of the noise that is left, and of what the denoiser changed, at the 99th percentile.
+    variance_visibility_p99: f64,
+    bias_visibility_p99: f64,
+    /// Share of pixels called fine where raw noise is too strong to show that bias stays below one and a half times the target.
+    unproven_fraction: f64,
+    /// Squared bias over squared variance as the whole picture shows it, by octave band from 0.5 cycles a degree on.
+    bias_factors: Vec<f64>,
+    /// Share of pixels whose picture was moved towards the raw mean.
+    blended_fraction: f64,
+}
+
+impl DenoisedReport {
+    fn of(settings: &LoopSettings, judgement: &Judgement) -> Option<Self> {
+        let (denoiser, picture) = (settings.denoiser.as_ref()?, judgement.denoised.as_ref()?);
+        let error = &picture.error;
+        let pixels = error.visibility.values().len();
+        let is_blended = |pixel: &usize| error.raw_shares.iter().any(|share| share.values()[*pixel] > 0.01);
+        Some(Self {
+            denoiser: denoiser.name(),
+            variance_visibility_p99: error.variance.quantile(0.99),
+            bias_visibility_p99: error.bias.quantile(0.99),
+            unproven_fraction: error.unproven(settings.limits.visibility_or_threshold()).mean(),
+            bias_factors: error.bias_factors.clone(),
+            blended_fraction: (0..pixels).filter(is_blended).count() as f64 / pixels as f64,
+        })
+    }
 }
 
 /// Everything that `--json` holds.
@@ -46,6 +79,10 @@ pub(super) struct Report {
     seconds_perception: f64,
     /// Of which in finding counts.
     seconds_allocation: f64,
+    /// And in denoising.
+    seconds_denoising: f64,
+    /// What made the picture out of the mean, and what can be seen of what it left and of what it changed.
+    denoised: Option<DenoisedReport>,
     visibility_target: Option<f64>,
     visibility_p99: f64,
     visibility_p999: f64,
@@ -128,6 +165,8 @@ impl Report {
             seconds_total: rendered.seconds_total,
             seconds_perception: rendered.seconds_perception,
             seconds_allocation: rendered.seconds_allocation,
+            seconds_denoising: rendered.seconds_denoising,
+            denoised: DenoisedReport::of(settings, judgement),
             visibility_target: target,
             visibility_p99: p99,
             visibility_p999: judgement.predicted.quantile(0.999),
@@ -200,6 +239,10 @@ impl Report {
         if let Some(target) = self.visibility_target {
             attributes.push(("fechner.visibility_target", number(target)));
         }
+        if let Some(denoised) = &self.denoised {
+            attributes.push(("fechner.denoiser", text(&denoised.denoiser)));
+            attributes.push(("fechner.unproven_fraction", number(denoised.unproven_fraction)));
+        }
         if let Some([least, greatest]) = self.importance_range {
             attributes.push(("fechner.importance", text(&format!("thresholds times {least} to {greatest}"))));
         }
@@ -242,11 +285,12 @@ pub(super) fn summary(report: &Report, settings: &LoopSettings, rendered: &Rende
         ),
         format!("{why}; {target}."),
         format!(
-            "On the display \"{}\" ({} pixels a degree{distance}, white {} cd/m²): predicted chance that remaining noise \
+            "On the display \"{}\" ({} pixels a degree{distance}, white {} cd/m²): predicted chance that remaining {} \
              is detected in a 1° patch is {} at the 99th percentile (visibility {:.2}); about {:.1} of {:.0} patches.",
             display.name,
             display.pixels_per_degree,
             display.white_cd_m2,
+            if report.denoised.is_some() { "error" } else { "noise" },
             p(report.visibility_p99),
             report.visibility_p99,
             report.patches_noticed,
@@ -258,6 +302,22 @@ pub(super) fn summary(report: &Report, settings: &LoopSettings, rendered: &Rende
     if let Some([least, greatest]) = report.importance_range {
         lines.push(format!(
             "Thresholds are multiplied by the importance map, {least} to {greatest}, and visibilities and chances are under it."
+        ));
+    }
+    if let Some(denoised) = &report.denoised {
+        lines.push(format!(
+            "Denoised by {} in {} ({:.1} % of the time); at the 99th percentile the noise that is left has visibility {:.2}, what \
+             the denoiser changed {:.2}.",
+            denoised.denoiser,
+            duration_in_words(report.seconds_denoising),
+            100.0 * report.seconds_denoising / report.seconds_total,
+            denoised.variance_visibility_p99,
+            denoised.bias_visibility_p99,
+        ));
+        lines.push(format!(
+            "Unproven: in {:.1} % of the picture, which is called fine, raw noise is too strong to show that the denoiser \
+             changed nothing visible; there its error is inferred from the rest of the picture.",
+            100.0 * denoised.unproven_fraction
         ));
     }
     if let Some(audit) = rendered.audit {

@@ -2,6 +2,7 @@
 
 use super::{Attribute, NITS_PER_UNIT, OutputError, Picture, write_exr, write_png_for, write_png_with_alpha};
 use crate::adaptive::Rendered;
+use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::statistics::picture_variance;
 use crate::film::{Film, PixelGuide};
 use crate::sampler::Half;
@@ -28,7 +29,7 @@ pub fn write_display_png(
 ) -> Result<(), OutputError> {
     let judgement = &rendered.judgement;
     let (width, height) = (rendered.film.width(), rendered.film.height());
-    let picture = &judgement.estimate.rgb_cd_m2;
+    let picture = judgement.picture();
     match background {
         Background::Shown => {
             let shown = map_picture(judgement.tone.as_ref(), width as usize, picture);
@@ -47,30 +48,42 @@ pub fn write_display_png(
 
 /// Writes the picture in scene units with its layers: alpha (premultiplied) where the background is transparent, albedo,
 /// normal, depth, object id, sample count, variance of the picture's luminance (scene cd/m², squared), threshold (standard
-/// error in display cd/m² that is at visibility 1) and predicted visibility.
+/// error in display cd/m² that is at visibility 1) and predicted visibility. A picture that is denoised has the raw mean in
+/// `raw` beside it, the visible parts of its noise and of its bias, and 1 in `unproven` where no witness shows that bias
+/// stays below one and a half times `target`.
 pub fn write_layers_exr(
     path: &Path,
     rendered: &Rendered,
-    nits_per_unit: f64,
+    settings: &LoopSettings,
     background: Background,
     attributes: &[(String, Attribute)],
 ) -> Result<(), OutputError> {
-    write_exr(path, &layers(rendered, nits_per_unit, background, attributes))
+    write_exr(path, &layers(rendered, settings, background, attributes))
 }
 
 /// What [`write_layers_exr`] writes, to which more can be added.
 pub fn layers<'a>(
     rendered: &'a Rendered,
-    nits_per_unit: f64,
+    settings: &LoopSettings,
     background: Background,
     attributes: &[(String, Attribute)],
 ) -> Picture<'a> {
     let (film, judgement) = (&rendered.film, &rendered.judgement);
+    let (nits_per_unit, target) = (settings.nits_per_unit, settings.limits.visibility_or_threshold());
     let mut picture = Picture::new(film.width(), film.height());
     let to_units = (1.0 / nits_per_unit) as f32;
     for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
-        let values: Vec<f32> = judgement.estimate.rgb_cd_m2.iter().map(|rgb| rgb[c] * to_units).collect();
+        let values: Vec<f32> = judgement.picture().iter().map(|rgb| rgb[c] * to_units).collect();
         picture.push_f32(name, values);
+    }
+    if let Some(denoised) = &judgement.denoised {
+        for (c, name) in ["raw.R", "raw.G", "raw.B"].into_iter().enumerate() {
+            let values: Vec<f32> = judgement.estimate.rgb_cd_m2.iter().map(|rgb| rgb[c] * to_units).collect();
+            picture.push_f32(name, values);
+        }
+        picture.push_f32("visibility_variance.Y", denoised.error.variance.values());
+        picture.push_f32("visibility_bias.Y", denoised.error.bias.values());
+        picture.push_f32("unproven.Y", denoised.error.unproven(target).into_values());
     }
     if background == Background::Transparent {
         picture.push_f32("A", film.coverage());

@@ -28,11 +28,17 @@ pub(super) struct Looked {
     /// Standard error on the display, cd/m², that is at visibility 1.
     pub(super) threshold: Plane,
     pub(super) visibility: Plane,
+    /// The picture, where it is denoised: linear RGB in cd/m².
+    denoised: Option<Vec<[f32; 3]>>,
 }
 
 impl Looked {
     pub(super) fn of(judgement: &Judgement) -> Self {
-        Self { threshold: judgement.allowed_standard_error_cd_m2(), visibility: judgement.predicted.clone() }
+        Self {
+            threshold: judgement.allowed_standard_error_cd_m2(),
+            visibility: judgement.predicted.clone(),
+            denoised: judgement.denoised.as_ref().map(|denoised| denoised.rgb_cd_m2.clone()),
+        }
     }
 }
 
@@ -86,7 +92,9 @@ impl Screen {
     pub(super) fn show(&mut self, scenery: Scenery<'_>, shared: &Shared) {
         let begun = Instant::now();
         let nits_per_unit = scenery.settings.nits_per_unit;
-        let rgb_cd_m2 = composed(scenery.film, scenery.draft, nits_per_unit);
+        // Denoised pictures are made by looks; between two the last one stays.
+        let denoised = self.looked.as_ref().and_then(|looked| looked.denoised.clone());
+        let rgb_cd_m2 = denoised.unwrap_or_else(|| composed(scenery.film, scenery.draft, nits_per_unit));
         for layer in ALL.into_iter().filter(|&layer| shared.is_watched(layer)) {
             let colours = self.colours(layer, scenery, &rgb_cd_m2);
             // A frame that cannot be encoded is left out; the next may be.

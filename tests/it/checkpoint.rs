@@ -46,6 +46,7 @@ impl Setup {
                 operator: "constant".to_owned(),
                 exposure_stops: None,
                 importance: None,
+                denoiser: None,
             },
             visibility: 4.0,
         };

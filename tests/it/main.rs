@@ -6,6 +6,7 @@
 //! - `adaptive_render`: adaptive and uniform renders against a reference: bias, calibration, determinism
 //! - `bench`: the benchmark from end to end, small
 //! - `camera_and_time`: blur of lens and shutter, moving lamps, crops
+//! - `denoise`: denoised pictures: the raw mean beside them, equal bytes, libraries that are not there
 //! - `formats`: the same scene from several formats
 //! - `bad_input`: bad scene files, and our own ones
 //! - `importance`: samples go where a user's map sends them
@@ -28,6 +29,7 @@ mod bench;
 mod camera_and_time;
 mod checkpoint;
 mod command_line;
+mod denoise;
 mod direct_light;
 mod farm;
 mod formats;

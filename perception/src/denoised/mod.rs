@@ -1,0 +1,135 @@
+//! What can be seen of the error of a denoised picture: what noise is left in it, and what the denoiser made up or wiped out.
+//!
+//! A path tracer's samples stand in two independent halves A and B. The picture d is the denoised mean M = (A + B)/2; the
+//! halves are also denoised by themselves, to dA and dB. Through the eye's filters and thresholds, band by band:
+//!
+//! * **Variance**: energy of the half difference (dA − dB)/2, as for raw pictures. Error that both halves share is not in it.
+//! * **Bias**: the raw mean is noisy and without bias, so it bears witness. With r = d − M and the same of the halves,
+//!   rA = dA − A and rB = dB − B, the energy of r less that of (rA − rB)/2, which is what noise puts into r, is the bias's
+//!   alone on average. For a linear denoiser it is rA · rB: a product of two independent looks, so that noise averages
+//!   out. It is pooled, compared with its own standard error, and taken at its word where it stands out.
+//! * **Factor**: elsewhere the witness is too noisy to tell a place's bias, but all places together tell how much bias
+//!   comes with how much variance: one factor a band, found by regression and drawn towards what was measured before.
+//!
+//! Visibility is both together. Where the witness would not have noticed a bias that can be seen, the picture is *unproven*.
+//!
+//! Not for pictures whose raw halves are not at hand, and not for denoisers that use other frames.
+
+mod blend;
+mod witness;
+
+pub use blend::blended;
+
+use crate::plane::Plane;
+use crate::threshold::ThresholdMap;
+use crate::visibility::ErrorFilters;
+use witness::{BandEvidence, bias_energy};
+
+/// Errors of one channel of a denoised picture, display cd/m². Planes of the threshold map's size.
+#[derive(Clone, Copy, Debug)]
+pub struct DenoisedDifferences<'a> {
+    /// (dA − dB)/2 of the denoised halves.
+    pub half_difference: &'a Plane,
+    /// d − M: denoised less raw mean. What turns it into display units must not bend: see
+    /// [`display_slope`](crate::seen::display_slope).
+    pub residual: &'a Plane,
+    /// ((dA − A) − (dB − B))/2, by the same slope.
+    pub residual_half_difference: &'a Plane,
+}
+
+/// What can be seen of a denoised picture's error. Visibilities are pooled and in threshold units, as everywhere.
+#[derive(Clone, Debug)]
+pub struct DenoisedError {
+    /// v of variance and bias together: √(variance² + bias²).
+    pub visibility: Plane,
+    /// v of the noise that is left.
+    pub variance: Plane,
+    /// v of the bias: proven where the witness tells, by the factor elsewhere.
+    pub bias: Plane,
+    /// Standard error of `bias`² from the witness's noise: a bias of less than about two of these would not be noticed
+    /// locally. 0 where the local bias is proven.
+    pub bias_squared_standard_error: Plane,
+    /// Squared bias over squared variance visibility that the whole picture shows, by band, lowest first.
+    pub bias_factors: Vec<f64>,
+    /// How far each band is worth moving towards the raw mean, 0 to 1, by band: the share of the denoised error in the sum of
+    /// its and the raw mean's squared errors, where a bias is proven; 0 elsewhere.
+    pub raw_shares: Vec<Plane>,
+    /// v of variance and bias after that.
+    pub blended_visibility: Plane,
+}
+
+/// A bias that one-sided 95 % of witnesses would have noticed.
+const NOTICED: f32 = 1.645;
+/// A tile is visibly wrong above this many times what was asked for.
+pub const VISIBLY_WRONG: f32 = 1.5;
+
+impl DenoisedError {
+    /// 1 where `visibility` is at most `target` and yet nothing proves that bias keeps the picture below
+    /// [`VISIBLY_WRONG`] × `target`: raw noise is too strong to testify. 0 elsewhere.
+    #[must_use]
+    pub fn unproven(&self, target: f64) -> Plane {
+        let target = target as f32;
+        let limit = (VISIBLY_WRONG * target) * (VISIBLY_WRONG * target);
+        self.visibility.combined(&self.bias_squared_standard_error, |visibility, standard_error| {
+            let could_be = visibility * visibility + NOTICED * standard_error;
+            f32::from(visibility <= target && could_be > limit)
+        })
+    }
+}
+
+impl ThresholdMap {
+    /// Judges a denoised picture. Planes of another size give infinity everywhere, and no factors.
+    #[must_use]
+    pub fn denoised_error(&self, differences: &DenoisedDifferences<'_>) -> DenoisedError {
+        let (width, height) = (self.width(), self.height());
+        let DenoisedDifferences { half_difference, residual, residual_half_difference } = *differences;
+        let planes = [half_difference, residual, residual_half_difference];
+        if planes.iter().any(|plane| !plane.same_size(&self.adaptation_cd_m2)) {
+            let infinite = Plane::filled(width, height, f32::INFINITY);
+            return DenoisedError {
+                visibility: infinite.clone(),
+                variance: infinite.clone(),
+                bias: infinite.clone(),
+                bias_squared_standard_error: infinite.clone(),
+                bias_factors: Vec::new(),
+                raw_shares: Vec::new(),
+                blended_visibility: infinite,
+            };
+        }
+        let mut filters = ErrorFilters::new(self);
+        let spectra = planes.map(|plane| filters.spectrum(plane));
+        let zero = Plane::filled(width, height, 0.0);
+        let (mut variance, mut bias) = (zero.clone(), zero.clone());
+        let (mut uncertainty, mut after_blend) = (zero.clone(), zero);
+        let (mut bias_factors, mut raw_shares) = (Vec::new(), Vec::new());
+        for band in 0..self.band_count() {
+            let evidence = BandEvidence::gather(self, &mut filters, &spectra, band);
+            let found = bias_energy(&evidence);
+            let share = blend::raw_share(&evidence, &found);
+            add(&mut variance, &evidence.variance);
+            add(&mut bias, &found.energy);
+            add(&mut uncertainty, &found.uncertainty);
+            add(&mut after_blend, &blend::energy_after(&evidence, &found, &share));
+            bias_factors.push(found.factor);
+            raw_shares.push(share);
+        }
+        let seen = |energy: &Plane| energy.map(|energy| (2.0 * energy.max(0.0)).sqrt());
+        let both = variance.combined(&bias, |variance, bias| variance + bias);
+        DenoisedError {
+            visibility: seen(&both),
+            variance: seen(&variance),
+            bias: seen(&bias),
+            bias_squared_standard_error: uncertainty.map(|squared| 2.0 * squared.sqrt()),
+            bias_factors,
+            raw_shares,
+            blended_visibility: seen(&after_blend),
+        }
+    }
+}
+
+fn add(sum: &mut Plane, more: &Plane) {
+    sum.for_each_row_mut(|y, row| row.iter_mut().zip(more.row(y)).for_each(|(sum, more)| *sum += more));
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,107 @@
+//! The film's denoised picture as it will be seen: what the perception crate says of its noise and of its bias.
+
+use super::judge::JudgeError;
+use super::settings::LoopSettings;
+use crate::denoise::{DenoisedFilm, Denoiser, denoise_film};
+use crate::film::{Estimate, Film, opponent};
+use crate::sampler::Half;
+use fechner_perception::Plane;
+use fechner_perception::denoised::{DenoisedDifferences, DenoisedError, blended};
+use fechner_perception::photometry::luminance;
+use fechner_perception::seen;
+use fechner_perception::threshold::ThresholdMap;
+use fechner_perception::tone::FittedTone;
+use std::time::Instant;
+
+/// A denoised picture, judged.
+#[derive(Debug)]
+pub struct DenoisedPicture {
+    /// Linear RGB in cd/m²: denoised, and moved towards the raw mean where that is proven better.
+    pub rgb_cd_m2: Vec<[f32; 3]>,
+    /// Its luminance.
+    pub luminance_cd_m2: Plane,
+    /// Half the difference of the denoised halves' luminance as displayed, cd/m².
+    pub half_difference: Plane,
+    /// What can be seen of its error, without importance.
+    pub error: DenoisedError,
+}
+
+/// The film's picture and halves, denoised, and how long it took.
+pub(super) struct TimedDenoising {
+    pub(super) film: DenoisedFilm,
+    pub(super) luminance: Plane,
+    pub(super) seconds: f64,
+}
+
+impl TimedDenoising {
+    pub(super) fn of(denoiser: &Denoiser, film: &Film, nits_per_unit: f64) -> Result<Self, JudgeError> {
+        let started = Instant::now();
+        let denoised = denoise_film(denoiser, film, nits_per_unit)?;
+        let luminance = luminance_plane(&denoised.rgb_cd_m2, film.width() as usize);
+        Ok(Self { film: denoised, luminance, seconds: started.elapsed().as_secs_f64() })
+    }
+
+    /// Looks at it. `thresholds` are the picture's own, `estimate` is the raw mean.
+    pub(super) fn judged(
+        self,
+        film: &Film,
+        settings: &LoopSettings,
+        tone: &dyn FittedTone,
+        thresholds: &ThresholdMap,
+        estimate: &Estimate,
+    ) -> DenoisedPicture {
+        let width = film.width() as usize;
+        let display = &settings.viewing.display;
+        let [a, b] = self.film.halves_rgb_cd_m2.each_ref().map(|half| luminance_plane(half, width));
+        let [raw_a, raw_b] = Half::BOTH.map(|half| raw_luminance(film, half, settings.nits_per_unit));
+        let half_of = |a: &Plane, b: &Plane| a.combined(b, |a, b| 0.5 * (a - b));
+        let half_difference = half_of(&a, &b);
+        let displayed = seen::display_half_difference(tone, display, &self.luminance, &half_difference);
+        // Through the operator itself the raw noise would be bent and bear false witness.
+        let slope = seen::display_slope(tone, display, &self.luminance);
+        let shown = |scene: &Plane| scene.combined(&slope, |scene, slope| scene * slope);
+        let residual = self.luminance.combined(&estimate.luminance_cd_m2, |denoised, raw| denoised - raw);
+        let raw_half_difference = half_of(&raw_a, &raw_b);
+        let residual_half_difference = half_difference.combined(&raw_half_difference, |denoised, raw| denoised - raw);
+        let error = thresholds.denoised_error(&DenoisedDifferences {
+            half_difference: &displayed,
+            residual: &shown(&residual),
+            residual_half_difference: &shown(&residual_half_difference),
+        });
+        let rgb_cd_m2 = blended_rgb(thresholds, &error, self.film.rgb_cd_m2, &estimate.rgb_cd_m2);
+        let luminance_cd_m2 = luminance_plane(&rgb_cd_m2, width);
+        DenoisedPicture { rgb_cd_m2, luminance_cd_m2, half_difference: displayed, error }
+    }
+}
+
+/// The denoised picture, moved towards the raw one where that is proven better.
+fn blended_rgb(
+    thresholds: &ThresholdMap,
+    error: &DenoisedError,
+    denoised: Vec<[f32; 3]>,
+    raw: &[[f32; 3]],
+) -> Vec<[f32; 3]> {
+    let (width, height) = (thresholds.width(), thresholds.height());
+    let channel = |picture: &[[f32; 3]], c: usize| Plane::from_fn(width, height, |x, y| picture[y * width + x][c]);
+    let mut picture = denoised;
+    for c in 0..3 {
+        let Some(moved) = blended(thresholds, error, &channel(&picture, c), &channel(raw, c)) else { break };
+        picture.iter_mut().zip(moved.values()).for_each(|(rgb, &value)| rgb[c] = value.max(0.0));
+    }
+    picture
+}
+
+fn luminance_plane(rgb: &[[f32; 3]], width: usize) -> Plane {
+    Plane::from_fn(width, rgb.len() / width.max(1), |x, y| luminance(rgb[y * width + x]).max(0.0))
+}
+
+/// Luminance of a half, cd/m²; the other half's where it has no samples.
+fn raw_luminance(film: &Film, half: Half, nits_per_unit: f64) -> Plane {
+    let width = film.width() as usize;
+    let (own, other) = (film.half(half), film.half(half.other()));
+    Plane::from_fn(width, film.height() as usize, |x, y| {
+        let i = y * width + x;
+        let pixel = if own[i].samples > 0 { &own[i] } else { &other[i] };
+        (nits_per_unit * opponent(pixel.mean)[0]) as f32
+    })
+}

@@ -1,0 +1,310 @@
+//! Denoised pictures: what the law says of them against what is true, and what samples cost to a quality.
+//!
+//! [`denoising`] renders the reference of each scene, then (1) judges uniform renders that are denoised and compares tile by
+//! tile with what can truly be seen of their error, and (2) spends growing budgets by three rules and reads off where the
+//! denoised pictures reach a quality by metrics that none of them optimises. Not for animation.
+
+use super::metrics::{Metrics, measure};
+use super::reference::Reference;
+use super::truth::Truth;
+use super::{BenchSettings, Subject, make_folders};
+use crate::adaptive::settings::{DENOISED_PILOT_SAMPLES, LoopSettings, RivalRule, Sampling};
+use crate::adaptive::{Quiet, render};
+use crate::denoise::{Denoiser, DenoiserKind, denoise_film};
+use anyhow::Result;
+use fechner_perception::Plane;
+use serde::Serialize;
+use std::time::Instant;
+
+/// Side of a tile, pixels.
+const TILE: usize = 16;
+/// A tile is visibly wrong above this many times the visibility that it is called fine for.
+const VISIBLY_WRONG: f64 = 1.5;
+/// Budgets, mean samples a pixel.
+const BUDGETS: [u32; 7] = [4, 8, 16, 32, 64, 128, 256];
+/// Budgets whose pictures the law is held against.
+const JUDGED: [u32; 4] = [4, 16, 64, 256];
+
+/// What to run beyond [`BenchSettings`].
+#[derive(Clone, Debug)]
+pub struct DenoisingSettings {
+    /// Scenes, size, display, seeds, folder; `visibility` and `reference_factor` make the reference.
+    pub bench: BenchSettings,
+    /// Denoisers.
+    pub denoisers: Vec<DenoiserKind>,
+    /// Visibility for which tiles are called fine.
+    pub target: f64,
+    /// Whether to spend budgets by the three rules.
+    pub with_races: bool,
+}
+
+/// The law against the truth for one picture.
+#[derive(Clone, Debug, Serialize)]
+pub struct Calibration {
+    /// Scene.
+    pub scene: String,
+    /// Denoiser.
+    pub denoiser: String,
+    /// Samples a pixel, uniform.
+    pub spp: u32,
+    /// Seed.
+    pub seed: u64,
+    /// Spearman's rank correlation of predicted and true visibility over tiles.
+    pub rank_correlation: f64,
+    /// Root of the ratio of predicted to true energy over the picture.
+    pub predicted_over_true: f64,
+    /// The same by the variance alone.
+    pub variance_over_true: f64,
+    /// Share of tiles called fine, and proven, whose true visibility is above 1.5 times the target.
+    pub wrong_share: f64,
+    /// The same among tiles called fine without proof.
+    pub wrong_unproven_share: f64,
+    /// Share of all tiles that are called fine.
+    pub fine_share: f64,
+    /// Share of all tiles called fine and unproven.
+    pub unproven_share: f64,
+    /// Share of all tiles whose true visibility is above 1.5 times the target.
+    pub truly_wrong_share: f64,
+    /// Squared bias over squared variance by band.
+    pub bias_factors: Vec<f64>,
+    /// ColorVideoVDP of the raw and of the denoised picture.
+    pub jod_raw: f64,
+    /// Denoised.
+    pub jod: f64,
+    /// FLIP of the raw and of the denoised picture.
+    pub flip_raw: f64,
+    /// Denoised.
+    pub flip: f64,
+    /// Seconds of denoising the mean and both halves over those of tracing.
+    pub overhead: f64,
+}
+
+/// How one rule's pictures get better with samples.
+#[derive(Clone, Debug, Serialize)]
+pub struct Race {
+    /// Scene.
+    pub scene: String,
+    /// Denoiser.
+    pub denoiser: String,
+    /// `uniform`, `relative` or `visible`.
+    pub rule: &'static str,
+    /// Mean samples a pixel, ColorVideoVDP, FLIP, seconds.
+    pub points: Vec<[f64; 4]>,
+}
+
+/// Everything that was found.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct DenoisingResults {
+    /// One a scene, denoiser, count and seed.
+    pub calibrations: Vec<Calibration>,
+    /// One a scene, denoiser and rule.
+    pub races: Vec<Race>,
+}
+
+/// Runs every scene.
+///
+/// # Errors
+/// Scenes that do not load, denoisers that are not installed, folders that cannot be written.
+pub fn denoising(settings: &DenoisingSettings, say: &dyn Fn(&str)) -> Result<DenoisingResults> {
+    make_folders(&settings.bench)?;
+    let denoisers = settings.denoisers.iter().map(|&kind| Denoiser::open(kind)).collect::<Result<Vec<_>, _>>()?;
+    let mut results = DenoisingResults::default();
+    for path in &settings.bench.scenes {
+        let subject = Subject::load(path, &settings.bench)?;
+        let reference = Reference::cached(&subject, &settings.bench, say)?;
+        let truth = Truth::new(&subject, &reference)?;
+        let scene = SceneBench { settings, subject: &subject, truth: &truth };
+        for denoiser in &denoisers {
+            for spp in JUDGED {
+                for seed in 0..u64::from(settings.bench.seeds) {
+                    results.calibrations.push(scene.calibration(denoiser, spp, seed)?);
+                }
+            }
+            if settings.with_races {
+                for rule in ["uniform", "relative", "visible"] {
+                    results.races.push(scene.race(denoiser, rule)?);
+                }
+            }
+        }
+        say(&format!("{}: done", subject.name));
+    }
+    let text = serde_json::to_string_pretty(&results)?;
+    let file = settings.bench.output.join("denoise.json");
+    crate::output::write_beside(&file, |file| std::io::Write::write_all(file, text.as_bytes()))?;
+    Ok(results)
+}
+
+/// One scene and what is true of it.
+struct SceneBench<'a> {
+    settings: &'a DenoisingSettings,
+    subject: &'a Subject,
+    truth: &'a Truth,
+}
+
+impl SceneBench<'_> {
+    fn loop_settings(&self, denoiser: &Denoiser, spp: u32) -> Result<LoopSettings> {
+        let mut settings = self.subject.loop_settings()?;
+        settings.limits.visibility = self.settings.target;
+        settings.limits.mean_samples = Some(spp);
+        settings.limits.pilot_samples = DENOISED_PILOT_SAMPLES;
+        settings.denoiser = Some(denoiser.clone());
+        Ok(settings)
+    }
+
+    fn measured(&self, rgb_cd_m2: &[[f32; 3]]) -> Result<Metrics> {
+        measure(self.subject, self.truth, &self.truth.displayed(rgb_cd_m2))
+    }
+
+    fn calibration(&self, denoiser: &Denoiser, spp: u32, seed: u64) -> Result<Calibration> {
+        let mut settings = self.loop_settings(denoiser, spp)?;
+        settings.sampling = Sampling::Uniform;
+        settings.limits.visibility = 0.0;
+        // One look, at the end.
+        settings.limits.pilot_samples = spp;
+        let rendered = render(&self.subject.tracer(seed), &settings, &Quiet)?;
+        let found = &rendered.judgement;
+        let picture = found.denoised.as_ref().ok_or_else(|| anyhow::anyhow!("the picture was denoised"))?;
+        let true_energy = self.truth.squared_visibility(&self.truth.displayed(&picture.rgb_cd_m2));
+        let predicted = found.predicted.map(|v| v * v);
+        let unproven = tiles(&picture.error.unproven(self.settings.target));
+        let (wrong, fine) = (VISIBLY_WRONG * self.settings.target, self.settings.target);
+        let truths: Vec<f64> = tiles(&true_energy).into_iter().map(f64::sqrt).collect();
+        let predictions: Vec<f64> = tiles(&predicted).into_iter().map(f64::sqrt).collect();
+        let share =
+            |is: &dyn Fn(usize) -> bool| (0..truths.len()).filter(|&i| is(i)).count() as f64 / truths.len() as f64;
+        let is_fine = |i: usize| predictions[i] <= fine;
+        let is_unproven = |i: usize| is_fine(i) && unproven[i] > 0.5;
+        let mean_square = |plane: &Plane| plane.map(|v| v * v).mean();
+        let (raw, denoised) = (self.measured(&found.estimate.rgb_cd_m2)?, self.measured(&picture.rgb_cd_m2)?);
+        let tracing = rendered.seconds_total - rendered.seconds_perception;
+        let started = Instant::now();
+        denoise_film(denoiser, &rendered.film, settings.nits_per_unit)?;
+        Ok(Calibration {
+            scene: self.subject.name.clone(),
+            denoiser: denoiser.name(),
+            spp,
+            seed,
+            rank_correlation: rank_correlation(&predictions, &truths),
+            predicted_over_true: (predicted.mean() / true_energy.mean()).sqrt(),
+            variance_over_true: (mean_square(&picture.error.variance) / true_energy.mean()).sqrt(),
+            wrong_share: share(&|i| is_fine(i) && !is_unproven(i) && truths[i] > wrong),
+            wrong_unproven_share: share(&|i| is_unproven(i) && truths[i] > wrong),
+            fine_share: share(&is_fine),
+            unproven_share: share(&is_unproven),
+            truly_wrong_share: share(&|i| truths[i] > wrong),
+            bias_factors: picture.error.bias_factors.clone(),
+            jod_raw: raw.jod,
+            jod: denoised.jod,
+            flip_raw: raw.flip_mean,
+            flip: denoised.flip_mean,
+            overhead: started.elapsed().as_secs_f64() / tracing,
+        })
+    }
+
+    fn race(&self, denoiser: &Denoiser, rule: &'static str) -> Result<Race> {
+        let mut points: Vec<[f64; 4]> = Vec::new();
+        for spp in BUDGETS {
+            let mut sums = [0.0; 4];
+            for seed in 0..u64::from(self.settings.bench.seeds) {
+                let mut settings = self.loop_settings(denoiser, spp)?;
+                match rule {
+                    "uniform" => {
+                        settings.sampling = Sampling::Uniform;
+                        settings.limits.visibility = 0.0;
+                        settings.limits.pilot_samples = spp;
+                    }
+                    "relative" => {
+                        // Its noise falls as the root of the count; what 16 samples a pixel leave is about 0.1.
+                        let threshold = 0.4 / f64::from(spp).sqrt();
+                        settings.sampling = Sampling::Rival(RivalRule::Relative { threshold });
+                        settings.limits.mean_samples = Some(8 * spp);
+                        settings.limits.pilot_samples = 16;
+                    }
+                    _ => settings.limits.visibility = 0.01,
+                }
+                let tracer = self.subject.tracer(seed);
+                let rendered = render(&tracer, &settings, &Quiet)?;
+                let metrics = self.measured(rendered.judgement.picture())?;
+                let spent = rendered.film.total_samples() as f64 / self.subject.pixels();
+                let values = [spent, metrics.jod, metrics.flip_mean, rendered.seconds_total];
+                sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+            }
+            points.push(sums.map(|sum| sum / f64::from(self.settings.bench.seeds)));
+        }
+        Ok(Race { scene: self.subject.name.clone(), denoiser: denoiser.name(), rule, points })
+    }
+}
+
+/// Mean of each whole tile, row by row.
+fn tiles(plane: &Plane) -> Vec<f64> {
+    let (columns, rows) = (plane.width() / TILE, plane.height() / TILE);
+    let mean = |index: usize| {
+        let (left, top) = (index % columns * TILE, index / columns * TILE);
+        let values = (top..top + TILE).flat_map(|y| (left..left + TILE).map(move |x| (x, y)));
+        values.map(|(x, y)| f64::from(plane.get(x, y))).sum::<f64>() / (TILE * TILE) as f64
+    };
+    (0..columns * rows).map(mean).collect()
+}
+
+/// Spearman's rank correlation.
+fn rank_correlation(a: &[f64], b: &[f64]) -> f64 {
+    let (a, b) = (ranks(a), ranks(b));
+    let mean = (a.len() as f64 - 1.0) / 2.0;
+    let product = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| (x - mean) * (y - mean)).sum::<f64>();
+    product(&a, &b) / (product(&a, &a) * product(&b, &b)).sqrt()
+}
+
+/// Each value's place in ascending order.
+fn ranks(values: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]).then(a.cmp(&b)));
+    let mut ranks = vec![0.0; values.len()];
+    order.into_iter().enumerate().for_each(|(rank, index)| ranks[index] = rank as f64);
+    ranks
+}
+
+impl Race {
+    /// Mean samples a pixel at which the denoised picture first has this ColorVideoVDP; `None` where no budget is enough.
+    pub fn samples_to_jod(&self, jod: f64) -> Option<f64> {
+        where_reached(self.points.iter().map(|point| (point[0], point[1])), jod)
+    }
+
+    /// The same to a FLIP at most this large.
+    pub fn samples_to_flip(&self, flip: f64) -> Option<f64> {
+        where_reached(self.points.iter().map(|point| (point[0], -point[2])), -flip)
+    }
+}
+
+/// Samples at which a curve first reaches a quality, straight between points in the logarithm; the first point's where
+/// that is good enough.
+fn where_reached(curve: impl Iterator<Item = (f64, f64)>, quality: f64) -> Option<f64> {
+    let mut last: Option<(f64, f64)> = None;
+    for (samples, found) in curve {
+        if found >= quality {
+            return Some(last.map_or(samples, |(from, before)| {
+                let share = (quality - before) / (found - before);
+                (from.ln() + share * (samples / from).ln()).exp()
+            }));
+        }
+        last = Some((samples, found));
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranks_agree_or_disagree() {
+        let values = [3.0, 1.0, 2.0, 10.0];
+        assert!((rank_correlation(&values, &values.map(|v| v * v)) - 1.0).abs() < 1e-12);
+        assert!((rank_correlation(&values, &values.map(|v| -v)) + 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn tiles_are_means() {
+        let plane = Plane::from_fn(40, 16, |x, _| if x < 16 { 1.0 } else { 3.0 });
+        assert_eq!(tiles(&plane), [1.0, 3.0]);
+    }
+}

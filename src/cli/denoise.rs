@@ -1,0 +1,34 @@
+//! The option `--denoise`.
+
+use clap::ValueEnum;
+use fechner::adaptive::settings::DENOISED_PILOT_SAMPLES;
+use fechner::denoise::DenoiserKind;
+use fechner::integrator::PILOT_SAMPLES;
+
+/// What makes the output picture out of the mean.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(super) enum DenoiseChoice {
+    /// Nothing: the mean is the picture.
+    #[default]
+    None,
+    /// A joint filter of our own, always there.
+    Builtin,
+    /// Intel's Open Image Denoise 2, where it is installed (OIDN_DIR, the system's, or the Python package pyoidn's).
+    Oidn,
+}
+
+impl DenoiseChoice {
+    /// Which denoiser, if any.
+    pub(super) fn kind(self) -> Option<DenoiserKind> {
+        match self {
+            Self::None => None,
+            Self::Builtin => Some(DenoiserKind::Builtin),
+            Self::Oidn => Some(DenoiserKind::Oidn),
+        }
+    }
+
+    /// Samples of every pixel before the first look.
+    pub(super) fn pilot_samples(self) -> u32 {
+        if self == Self::None { 2 * PILOT_SAMPLES } else { DENOISED_PILOT_SAMPLES }
+    }
+}

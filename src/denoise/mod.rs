@@ -1,0 +1,96 @@
+//! Denoisers of the output picture: our own joint filter, and Intel's where it is installed.
+//!
+//! The raw mean stays what it is in the film, in checkpoints and in the EXR's `raw` layer: a denoised picture is made from a
+//! copy. What may be seen of its error is judged by `fechner_perception::denoised`. Not for animation as such: each frame is
+//! denoised by itself.
+
+mod builtin;
+mod of_film;
+pub mod oidn;
+
+pub use of_film::{DenoisedFilm, denoise_film};
+pub use oidn::{Oidn, OidnError};
+
+use fechner_perception::Plane;
+use serde::{Deserialize, Serialize};
+
+/// Which denoiser, as a setting that can be written down.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum DenoiserKind {
+    /// Our own joint filter.
+    Builtin,
+    /// Open Image Denoise.
+    Oidn,
+}
+
+/// A denoiser, ready.
+#[derive(Clone, Debug)]
+pub enum Denoiser {
+    /// Our own joint filter: always there, equal bytes on any number of threads.
+    Builtin,
+    /// Open Image Denoise.
+    Oidn(Oidn),
+}
+
+/// A noisy picture and what is known of its first surfaces. All slices are row-major with `width * height` entries.
+#[derive(Clone, Copy, Debug)]
+pub struct NoisyPicture<'a> {
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Mean of the samples, linear RGB in cd/m².
+    pub rgb: &'a [[f32; 3]],
+    /// Variance of the mean's luminance, (cd/m²)².
+    pub variance: &'a Plane,
+    /// Albedo of the first surface, 0..1.
+    pub albedo: &'a [[f32; 3]],
+    /// Its normal; 0 where there is none.
+    pub normal: &'a [[f32; 3]],
+    /// Its distance.
+    pub depth: &'a [f32],
+}
+
+impl Denoiser {
+    /// Makes a denoiser ready.
+    ///
+    /// # Errors
+    /// [`OidnError::NotFound`] where the library is not installed.
+    pub fn open(kind: DenoiserKind) -> Result<Self, OidnError> {
+        match kind {
+            DenoiserKind::Builtin => Ok(Self::Builtin),
+            DenoiserKind::Oidn => Oidn::opened().map(Self::Oidn),
+        }
+    }
+
+    /// Which one it is.
+    pub fn kind(&self) -> DenoiserKind {
+        match self {
+            Self::Builtin => DenoiserKind::Builtin,
+            Self::Oidn(_) => DenoiserKind::Oidn,
+        }
+    }
+
+    /// Name and version.
+    pub fn name(&self) -> String {
+        match self {
+            Self::Builtin => "builtin".to_owned(),
+            Self::Oidn(oidn) => oidn.name(),
+        }
+    }
+
+    /// The picture without its noise, as far as the denoiser can tell noise from detail; finite and not negative.
+    ///
+    /// # Errors
+    /// [`OidnError::Failed`] where the library fails.
+    pub fn denoise(&self, picture: &NoisyPicture<'_>) -> Result<Vec<[f32; 3]>, OidnError> {
+        let mut denoised = match self {
+            Self::Builtin => builtin::denoise(picture),
+            Self::Oidn(oidn) => oidn.denoise(picture)?,
+        };
+        for value in denoised.iter_mut().flatten() {
+            *value = if value.is_finite() { value.max(0.0) } else { 0.0 };
+        }
+        Ok(denoised)
+    }
+}

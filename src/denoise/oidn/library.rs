@@ -1,0 +1,169 @@
+//! Intel's Open Image Denoise through its C interface, version 2, opened at run time.
+//!
+//! Every call into the library is in this file.
+
+#![allow(
+    unsafe_code,
+    reason = "a C library that is opened at run time can be called in no other way; measured gain in benches/README.md"
+)]
+
+use super::OidnError;
+use libloading::Library;
+use std::ffi::{CStr, c_char, c_int, c_void};
+use std::path::Path;
+use std::ptr::{null, null_mut};
+
+/// `OIDN_DEVICE_TYPE_CPU`: the same code on every machine, and no driver is asked.
+const DEVICE_CPU: c_int = 1;
+/// `OIDN_FORMAT_FLOAT3`.
+const FORMAT_FLOAT3: c_int = 3;
+
+type Handle = *mut c_void;
+type SetImage = unsafe extern "C" fn(Handle, *const c_char, *mut c_void, c_int, usize, usize, usize, usize, usize);
+
+/// The library's functions that we call, and its CPU device.
+pub(super) struct Device {
+    device: Handle,
+    functions: Functions,
+    /// Keeps the code loaded for as long as `functions` point into it.
+    _library: Library,
+}
+
+#[derive(Clone, Copy)]
+struct Functions {
+    new_device: unsafe extern "C" fn(c_int) -> Handle,
+    set_device_int: unsafe extern "C" fn(Handle, *const c_char, c_int),
+    get_device_int: unsafe extern "C" fn(Handle, *const c_char) -> c_int,
+    set_device_bool: unsafe extern "C" fn(Handle, *const c_char, bool),
+    commit_device: unsafe extern "C" fn(Handle),
+    device_error: unsafe extern "C" fn(Handle, *mut *const c_char) -> c_int,
+    release_device: unsafe extern "C" fn(Handle),
+    new_filter: unsafe extern "C" fn(Handle, *const c_char) -> Handle,
+    set_image: SetImage,
+    set_filter_bool: unsafe extern "C" fn(Handle, *const c_char, bool),
+    commit_filter: unsafe extern "C" fn(Handle),
+    execute_filter: unsafe extern "C" fn(Handle),
+    release_filter: unsafe extern "C" fn(Handle),
+}
+
+// SAFETY: a device may be used from any thread (the library's documentation, "Device"); it is used by one at a time, since
+// `Oidn` keeps it in a mutex. The function pointers are plain addresses.
+unsafe impl Send for Device {}
+
+/// Row-major pictures of one size: what is denoised, and what is known of the first surfaces.
+pub(super) struct Inputs<'a> {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    pub(super) color: &'a [[f32; 3]],
+    pub(super) albedo: &'a [[f32; 3]],
+    pub(super) normal: &'a [[f32; 3]],
+}
+
+impl Device {
+    /// Opens the library at `path` (or by that name, for the system's loader to find) and starts its CPU device.
+    pub(super) fn open(path: &Path, threads: usize) -> Result<Self, OidnError> {
+        let refused = |problem: String| OidnError::Library { path: path.to_owned(), problem };
+        // SAFETY: loading runs the library's own initialisers, which its documentation allows at any time.
+        let library = unsafe { Library::new(path) }.map_err(|error| refused(error.to_string()))?;
+        let functions = Functions::of(&library).map_err(|error| refused(error.to_string()))?;
+        // SAFETY: the functions have the signatures of oidn.h, version 2, and strings end in 0; the handle is checked.
+        let device = unsafe {
+            let device = (functions.new_device)(DEVICE_CPU);
+            if device.is_null() {
+                return Err(refused("it has no device for this CPU".to_owned()));
+            }
+            (functions.set_device_int)(device, c"numThreads".as_ptr(), c_int::try_from(threads).unwrap_or(0));
+            // Pinned threads would stand in the way of the tracer's own, which run between two denoisings.
+            (functions.set_device_bool)(device, c"setAffinity".as_ptr(), false);
+            (functions.commit_device)(device);
+            device
+        };
+        let opened = Self { device, functions, _library: library };
+        opened.check()?;
+        Ok(opened)
+    }
+
+    /// Version as major, minor and patch in one number, 20501 for 2.5.1.
+    pub(super) fn version(&self) -> i32 {
+        // SAFETY: the device is alive and the string ends in 0.
+        unsafe { (self.functions.get_device_int)(self.device, c"version".as_ptr()) }
+    }
+
+    /// Denoises a picture of any positive range.
+    pub(super) fn denoise(&self, inputs: &Inputs<'_>) -> Result<Vec<[f32; 3]>, OidnError> {
+        let count = inputs.width * inputs.height;
+        if [inputs.color, inputs.albedo, inputs.normal].iter().any(|picture| picture.len() != count) {
+            return Err(OidnError::Failed("pictures of different sizes".to_owned()));
+        }
+        let mut output = vec![[0.0f32; 3]; count];
+        let f = &self.functions;
+        // SAFETY: every picture has width × height × 3 floats without gaps (checked above), stays borrowed until the filter
+        // is released, and only `output`, which nobody else holds, is written to; the filter's handle is checked.
+        unsafe {
+            let filter = (f.new_filter)(self.device, c"RT".as_ptr());
+            if filter.is_null() {
+                self.check()?;
+                return Err(OidnError::Failed("it made no filter".to_owned()));
+            }
+            let set = |name: &CStr, values: *mut c_void| {
+                (f.set_image)(filter, name.as_ptr(), values, FORMAT_FLOAT3, inputs.width, inputs.height, 0, 0, 0);
+            };
+            set(c"color", inputs.color.as_ptr().cast_mut().cast());
+            set(c"albedo", inputs.albedo.as_ptr().cast_mut().cast());
+            set(c"normal", inputs.normal.as_ptr().cast_mut().cast());
+            set(c"output", output.as_mut_ptr().cast());
+            (f.set_filter_bool)(filter, c"hdr".as_ptr(), true);
+            (f.commit_filter)(filter);
+            (f.execute_filter)(filter);
+            (f.release_filter)(filter);
+        }
+        self.check()?;
+        Ok(output)
+    }
+
+    /// The first error since the last question.
+    fn check(&self) -> Result<(), OidnError> {
+        let mut message = null();
+        // SAFETY: the device is alive; the message, where there is one, stays valid until the next question.
+        unsafe {
+            if (self.functions.device_error)(self.device, &raw mut message) == 0 {
+                return Ok(());
+            }
+            let text =
+                if message.is_null() { "no reason given".into() } else { CStr::from_ptr(message).to_string_lossy() };
+            Err(OidnError::Failed(text.into_owned()))
+        }
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        // SAFETY: the handle is alive and used no more.
+        unsafe { (self.functions.release_device)(self.device) };
+        self.device = null_mut();
+    }
+}
+
+impl Functions {
+    fn of(library: &Library) -> Result<Self, libloading::Error> {
+        // SAFETY: each name has this signature in oidn.h of every version 2; the addresses live as long as the library, which
+        // stands beside them.
+        unsafe {
+            Ok(Self {
+                new_device: *library.get(b"oidnNewDevice\0")?,
+                set_device_int: *library.get(b"oidnSetDeviceInt\0")?,
+                get_device_int: *library.get(b"oidnGetDeviceInt\0")?,
+                set_device_bool: *library.get(b"oidnSetDeviceBool\0")?,
+                commit_device: *library.get(b"oidnCommitDevice\0")?,
+                device_error: *library.get(b"oidnGetDeviceError\0")?,
+                release_device: *library.get(b"oidnReleaseDevice\0")?,
+                new_filter: *library.get(b"oidnNewFilter\0")?,
+                set_image: *library.get(b"oidnSetSharedFilterImage\0")?,
+                set_filter_bool: *library.get(b"oidnSetFilterBool\0")?,
+                commit_filter: *library.get(b"oidnCommitFilter\0")?,
+                execute_filter: *library.get(b"oidnExecuteFilter\0")?,
+                release_filter: *library.get(b"oidnReleaseFilter\0")?,
+            })
+        }
+    }
+}
