@@ -36,7 +36,7 @@ pub trait SceneSource {
     ///
     /// # Errors
     /// For files that cannot be read.
-    fn at(&self, seconds: f64) -> Result<Scene, LoadError>;
+    fn at(&self, seconds: f64) -> Result<Arc<Scene>, LoadError>;
 }
 
 /// What the frames of a shot share.
@@ -103,11 +103,11 @@ pub struct RenderedFrame {
 /// The scenes that a frame depends on.
 pub struct FrameScenes {
     /// One frame earlier.
-    pub previous: Scene,
+    pub previous: Arc<Scene>,
     /// At the frame's time.
     pub now: Arc<Scene>,
     /// One frame later.
-    pub next: Scene,
+    pub next: Arc<Scene>,
 }
 
 impl FrameScenes {
@@ -117,7 +117,7 @@ impl FrameScenes {
     /// For files that cannot be read.
     pub fn load(source: &dyn SceneSource, shot: &ShotSettings, frame: u32) -> Result<Self, LoadError> {
         let at = |offset: f64| source.at(shot.seconds(f64::from(frame) + offset));
-        Ok(Self { previous: at(-1.0)?, now: Arc::new(at(0.0)?), next: at(1.0)? })
+        Ok(Self { previous: at(-1.0)?, now: at(0.0)?, next: at(1.0)? })
     }
 }
 

@@ -136,11 +136,11 @@ struct Look {
 }
 
 impl Look {
-    fn at(scene: Scene, shot: &ShotSettings) -> Self {
+    fn at(scene: Arc<Scene>, shot: &ShotSettings) -> Self {
         let (width, height) = pilot_size(shot.trace.width, shot.trace.height);
         // The same seed in every frame: what noise is left changes with the scene, not with the frame's number.
         let settings = TraceSettings { width, height, crop: None, ..shot.trace };
-        let tracer = PathTracer::new(Arc::new(scene), settings);
+        let tracer = PathTracer::new(scene, settings);
         let mut film = Film::new(width, height);
         tracer.trace(&pilot_plan(width * height, PILOT_SAMPLES), &mut film, &|_| {});
         let estimate = film.estimate(shot.nits_per_unit);

@@ -69,8 +69,8 @@ const REFERENCE_STREAM: u64 = 0x5245_4645;
 struct Files<'a>(&'a Path);
 
 impl SceneSource for Files<'_> {
-    fn at(&self, seconds: f64) -> Result<Scene, LoadError> {
-        load(self.0, &LoadOptions { frame_time: seconds, ..LoadOptions::default() })
+    fn at(&self, seconds: f64) -> Result<Arc<Scene>, LoadError> {
+        load(self.0, &LoadOptions { frame_time: seconds, ..LoadOptions::default() }).map(Arc::new)
     }
 }
 
@@ -121,7 +121,7 @@ impl<'a> Bench<'a> {
         };
         let operator = tone::operator("constant", None).context("an operator")?;
         let track = Track::make(&source, &shot, operator.as_ref(), &|_| {})?;
-        let scenes = (shot.first..=shot.last).map(|frame| source.at(shot.seconds(f64::from(frame))).map(Arc::new));
+        let scenes = (shot.first..=shot.last).map(|frame| source.at(shot.seconds(f64::from(frame))));
         let scenes = scenes.collect::<Result<Vec<_>, _>>()?;
         let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
         Ok(Self { settings, name, shot, track, scenes })

@@ -31,6 +31,7 @@ use serde::{Deserialize, Serialize};
 use source::FileSource;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 use video::VideoFormat;
 
@@ -283,7 +284,7 @@ impl<'a> Shot<'a> {
     }
 
     /// What a frame shows.
-    pub(super) fn scene(&self, frame: u32) -> Result<Scene> {
+    pub(super) fn scene(&self, frame: u32) -> Result<Arc<Scene>> {
         Ok(self.source.at(self.settings.seconds(f64::from(frame)))?)
     }
 

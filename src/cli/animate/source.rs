@@ -4,20 +4,25 @@ use super::AnimateArguments;
 use fechner::animate::SceneSource;
 use fechner::scene::Scene;
 use fechner::scene::load::{LoadError, LoadOptions, load};
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Scenes that are kept: a frame and both its neighbours, of which the next frame needs two.
+const KEPT: usize = 3;
 
 /// A scene file with what the command line puts into it.
 pub(super) struct FileSource<'a> {
     arguments: &'a AnimateArguments,
+    /// The last scenes that were read and their times, oldest first.
+    kept: Mutex<VecDeque<(f64, Arc<Scene>)>>,
 }
 
 impl<'a> FileSource<'a> {
     pub(super) fn new(arguments: &'a AnimateArguments) -> Self {
-        Self { arguments }
+        Self { arguments, kept: Mutex::default() }
     }
-}
 
-impl SceneSource for FileSource<'_> {
-    fn at(&self, seconds: f64) -> Result<Scene, LoadError> {
+    fn read(&self, seconds: f64) -> Result<Scene, LoadError> {
         let AnimateArguments { scene: file, camera, staging, nits_per_unit, .. } = self.arguments;
         let options = LoadOptions {
             camera: camera.clone(),
@@ -29,6 +34,22 @@ impl SceneSource for FileSource<'_> {
         staging
             .apply(&mut scene, *nits_per_unit)
             .map_err(|error| LoadError::Option { problem: format!("{error:#}") })?;
+        Ok(scene)
+    }
+}
+
+impl SceneSource for FileSource<'_> {
+    fn at(&self, seconds: f64) -> Result<Arc<Scene>, LoadError> {
+        let kept = || self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, scene)) = kept().iter().find(|(time, _)| *time == seconds) {
+            return Ok(Arc::clone(scene));
+        }
+        let scene = Arc::new(self.read(seconds)?);
+        let mut kept = kept();
+        while kept.len() >= KEPT {
+            kept.pop_front();
+        }
+        kept.push_back((seconds, Arc::clone(&scene)));
         Ok(scene)
     }
 }

@@ -161,12 +161,12 @@ impl Job<'_> {
         let (scene, trace) = match self {
             Self::Still(arguments) => {
                 let Prepared { scene, trace, .. } = arguments.prepare()?;
-                (scene, trace)
+                (Arc::new(scene), trace)
             }
             Self::Shot { shot, .. } => (shot.scene(entry.frame)?, shot.settings.trace_settings(entry.frame)),
         };
         check_origin(farm, entry, &Origin::of(&scene, &trace))?;
-        Ok(PathTracer::new(Arc::new(scene), trace))
+        Ok(PathTracer::new(scene, trace))
     }
 
     /// How light the shot is: from the file beside the pictures, or made anew.
