@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 const WIDTH: f64 = 400.0;
 const HEIGHT: f64 = 230.0;
 const LEFT: f64 = 58.0;
-const RIGHT: f64 = 10.0;
+const RIGHT: f64 = 22.0;
 const TOP: f64 = 26.0;
 const BOTTOM: f64 = 40.0;
 
@@ -159,7 +159,7 @@ mod tests {
         };
         let curve = Curve { scene: "s".into(), arm: "uniform", points: vec![point(16.0, 8.0), point(64.0, 9.0)] };
         let text = plot(&[&curve], SAMPLES, JOD).expect("a plot");
-        assert!(text.contains("points=\"58.0,190.0 390.0,26.0\""), "{text}");
+        assert!(text.contains("points=\"58.0,190.0 378.0,26.0\""), "{text}");
         assert!(plot(&[&curve], SAMPLES, RELMSE).is_none());
         assert!(plot(&[], SAMPLES, JOD).is_none());
         assert!(!plots(&[&curve]).contains("NaN"));
