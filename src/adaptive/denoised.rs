@@ -1,9 +1,12 @@
-//! The film's denoised picture as it will be seen: what the perception crate says of its noise and of its bias.
+//! The film's denoised picture as it will be seen, what the perception crate says of its noise and of its bias, and where it
+//! gets samples.
 
 use super::judge::JudgeError;
+use super::plan::doubling_of;
 use super::settings::LoopSettings;
 use crate::denoise::{DenoisedFilm, Denoiser, denoise_film};
 use crate::film::{Estimate, Film, opponent};
+use crate::integrator::SamplePlan;
 use crate::sampler::Half;
 use fechner_perception::Plane;
 use fechner_perception::denoised::{DenoisedDifferences, DenoisedError, blended};
@@ -98,10 +101,28 @@ fn luminance_plane(rgb: &[[f32; 3]], width: usize) -> Plane {
 /// Luminance of a half, cd/m²; the other half's where it has no samples.
 fn raw_luminance(film: &Film, half: Half, nits_per_unit: f64) -> Plane {
     let width = film.width() as usize;
-    let (own, other) = (film.half(half), film.half(half.other()));
     Plane::from_fn(width, film.height() as usize, |x, y| {
-        let i = y * width + x;
-        let pixel = if own[i].samples > 0 { &own[i] } else { &other[i] };
-        (nits_per_unit * opponent(pixel.mean)[0]) as f32
+        (nits_per_unit * opponent(film.half_or_other(half, y * width + x).mean)[0]) as f32
     })
+}
+
+/// Doublings for a picture that is denoised: of the pixels above `visibility`, the half where one more sample takes away most.
+///
+/// Visible energy falls about as 1/n, so a sample takes v²/n of it: the sum over the picture falls fastest where that is
+/// greatest. Counts then go as v, not as v² as they do where the worst place decides: denoised by Open Image Denoise, a glass
+/// ball whose caustic took every sample looked worse at 32 a pixel (JOD 9.28) than even counts (9.39).
+pub(super) fn denoised_plan(film: &Film, predicted: &Plane, visibility: f64, max_samples: u32) -> SamplePlan {
+    let gain = |pixel: usize| {
+        let v = f64::from(predicted.values()[pixel]);
+        let count = film.samples(pixel).max(1);
+        let is_open = v > visibility && count < max_samples;
+        if is_open { v * v / f64::from(count) } else { 0.0 }
+    };
+    let mut gains: Vec<f64> = (0..predicted.values().len()).map(gain).filter(|&gain| gain > 0.0).collect();
+    if gains.is_empty() {
+        return SamplePlan::default();
+    }
+    let middle = gains.len() / 2;
+    let (_, &mut median, _) = gains.select_nth_unstable_by(middle, f64::total_cmp);
+    doubling_of(film, max_samples, |pixel| gain(pixel) >= median)
 }

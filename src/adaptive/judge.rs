@@ -62,7 +62,7 @@ pub enum JudgeError {
 /// Looks at the film through display and eye. `inflation` multiplies every variance (1, unless an audit found it low).
 ///
 /// # Errors
-/// Only if the perception model refuses the film's maps.
+/// If the denoiser fails, or the perception model refuses the film's maps.
 pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Judgement, JudgeError> {
     let estimate = film.estimate(settings.nits_per_unit);
     let denoised = match &settings.denoiser {
@@ -134,7 +134,7 @@ pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Jud
         measured: OnceLock::new(),
     };
     match judgement.denoised.take() {
-        Some(denoised) => judgement.turn_to(denoised, film, inflation),
+        Some(denoised) => judgement.turn_to(denoised, inflation),
         None => judgement.predicted = judgement.visibility_of(&display_variance),
     }
     Ok(judgement)
@@ -150,22 +150,13 @@ fn contrast_sensitivity(settings: &LoopSettings) -> Result<Box<dyn ContrastSensi
 }
 
 impl Judgement {
-    /// Judges the denoised picture in the raw one's place. Counts then follow what is seen of it: the variance of one sample
-    /// is what white noise would need to be as visible, taken to fall with the count as the raw picture's does.
-    fn turn_to(&mut self, mut denoised: DenoisedPicture, film: &Film, inflation: f64) {
+    /// Judges the denoised picture in the raw one's place. The variances stay the raw picture's.
+    fn turn_to(&mut self, mut denoised: DenoisedPicture, inflation: f64) {
         let root = inflation.sqrt() as f32;
         let inflate = |plane: &mut Plane| *plane = plane.map(|visibility| root * visibility);
         inflate(&mut denoised.error.visibility);
         inflate(&mut denoised.error.blended_visibility);
-        let seen = &denoised.error.blended_visibility;
-        let (width, gain) = (seen.width(), self.thresholds.noise_gain());
-        let per_sample = Plane::from_fn(width, seen.height(), |x, y| {
-            let variance = seen.get(x, y) * seen.get(x, y) / (2.0 * gain.get(x, y));
-            if variance.is_finite() { (f64::from(variance) / variance_share(film, y * width + x)) as f32 } else { 0.0 }
-        });
-        self.predicted = self.per_importance(seen.clone());
-        self.variance_per_sample = [per_sample.clone(), per_sample.clone()];
-        self.pooled_variance_per_sample = per_sample;
+        self.predicted = self.per_importance(denoised.error.blended_visibility.clone());
         self.denoised = Some(denoised);
     }
 

@@ -1,13 +1,15 @@
 //! The loop: pilot, estimate, threshold map, plan, trace, until nothing more can be seen.
 //!
 //! [`render`] is the heart of the program. It walks a fixed ladder of visibilities and leaves each rung only when the
-//! picture has reached it, so that a preview is a prefix of the final picture. What to do next is decided in [`plan`]
-//! and by `next_step`; what the eye sees is asked of the perception crate in [`mod@judge`]; variance is in [`statistics`].
+//! picture has reached it, so that a preview is a prefix of the final picture. What to do next is decided in `next`
+//! and counted out in [`plan`]; what the eye sees is asked of the perception crate in [`mod@judge`]; variance is in
+//! [`statistics`].
 
 pub mod audit;
 pub mod denoised;
 pub mod judge;
 mod monitor;
+mod next;
 pub mod plan;
 pub mod rivals;
 pub mod settings;
@@ -20,24 +22,16 @@ pub use stop::{StopReason, TOLERATED_SHARE, is_reached, visible_share};
 
 use crate::film::Film;
 use crate::integrator::{BlockWork, Crop, PathTracer, SamplePlan};
-use audit::{Audit, audit};
+use audit::Audit;
 use judge::{JudgeError, Judgement, judge};
-use plan::{adaptive_plan, cut_to_budget, denoised_plan, doubling_of, slices, uniform_plan, wanted_samples};
-use rivals::rival_plan;
+use plan::slices;
 use settings::{LoopSettings, Sampling, ladder};
-use state::{Exposure, RenderState};
+use state::RenderState;
 use std::collections::VecDeque;
 use std::time::Instant;
-use stop::{LEAST_SAVING, predicted_saving};
 
-/// No single pixel's measured amplitude may stay above this many times the target.
-const TOLERATED_PEAK: f64 = 4.0;
-/// Rungs above this are not audited: their few samples say little.
-const HIGHEST_AUDITED_RUNG: f64 = 4.0;
 /// The ladder of a picture that is denoised begins here, or at its target.
 const HIGHEST_DENOISED_RUNG: f64 = 2.0;
-/// What the variance may be multiplied by in all after audits that disagree.
-const MOST_INFLATION: f64 = 4.0;
 
 /// A finished render.
 #[derive(Debug)]
@@ -128,7 +122,7 @@ struct Loop<'a> {
 /// Renders until a limit is reached.
 ///
 /// # Errors
-/// Only if the perception model refuses the picture, which would be a defect of ours.
+/// If the denoiser fails, or the perception model refuses the picture, which would be a defect of ours.
 pub fn render(tracer: &PathTracer, settings: &LoopSettings, monitor: &dyn Monitor) -> Result<Rendered, JudgeError> {
     let Crop { width, height, .. } = tracer.settings().film_area();
     resume(tracer, settings, RenderState::new(width, height, &settings.limits), monitor)
@@ -137,7 +131,7 @@ pub fn render(tracer: &PathTracer, settings: &LoopSettings, monitor: &dyn Monito
 /// Goes on with a render of the same scene, size and seed until a limit is reached. Limits count from the first start.
 ///
 /// # Errors
-/// Only if the perception model refuses the picture, which would be a defect of ours.
+/// If the denoiser fails, or the perception model refuses the picture, which would be a defect of ours.
 pub fn resume(
     tracer: &PathTracer,
     settings: &LoopSettings,
@@ -158,7 +152,7 @@ pub fn resume(
 /// [`resume`] for somebody who may leave the render with [`Directive::Leave`] and go on from its state.
 ///
 /// # Errors
-/// Only if the perception model refuses the picture, which would be a defect of ours.
+/// If the denoiser fails, or the perception model refuses the picture, which would be a defect of ours.
 pub fn run(
     tracer: &PathTracer,
     settings: &LoopSettings,
@@ -202,7 +196,7 @@ pub enum Next {
 /// and plans are not looked at.
 ///
 /// # Errors
-/// Only if the perception model refuses the picture, which would be a defect of ours.
+/// If the denoiser fails, or the perception model refuses the picture, which would be a defect of ours.
 pub fn decide(
     tracer: &PathTracer,
     settings: &LoopSettings,
@@ -322,120 +316,6 @@ impl<'a> Loop<'a> {
         monitor.ended(&self.state);
         Ok(Ended { state: self.state, last_look: Some(LastLook { judgement, stop_reason: reason }) })
     }
-
-    /// Decides what comes next, leaving rungs of the ladder that are reached. An audit may make `judgement` stricter.
-    fn next_step(&mut self, judgement: &mut Judgement) -> Result<Step, JudgeError> {
-        let limits = &self.settings.limits;
-        let pixels = u64::from(self.state.film.width()) * u64::from(self.state.film.height());
-        let budget = limits.mean_samples.map(|mean| u64::from(mean) * pixels);
-        let left = budget.map_or(u64::MAX, |b| b.saturating_sub(self.state.film.total_samples()));
-        if left == 0 {
-            return Ok(Step::Stop(StopReason::Samples));
-        }
-        if let Sampling::Rival(rule) = self.settings.sampling {
-            let exposure = self.exposure(judgement);
-            let plan = rival_plan(rule, &self.state.film, exposure, limits.mean_samples, limits.max_samples);
-            return Ok(if plan.blocks.is_empty() { Step::Stop(StopReason::Rule) } else { Step::Trace(plan) });
-        }
-        while let Some(&rung) = self.rungs.front() {
-            if let Some(plan) = self.plan_towards(rung, judgement)? {
-                let plan = if plan.samples() > left { cut_to_budget(plan, &judgement.predicted, left) } else { plan };
-                if !plan.blocks.is_empty() {
-                    return Ok(Step::Trace(plan));
-                }
-            }
-            self.rungs.pop_front();
-            self.state.left_rung = Some(rung);
-            if is_reached(judgement, rung) {
-                self.state.finished_rung = Some(rung);
-            }
-        }
-        Ok(Step::Stop(if is_reached(judgement, limits.visibility) {
-            StopReason::Visibility
-        } else if limits.mean_samples.is_some() {
-            StopReason::Samples
-        } else {
-            StopReason::MaxSamples
-        }))
-    }
-
-    /// More samples for a rung; `None` when it is reached or no pixel may have more.
-    fn plan_towards(&mut self, rung: f64, judgement: &mut Judgement) -> Result<Option<SamplePlan>, JudgeError> {
-        let max_samples = self.settings.limits.max_samples;
-        let doubled = {
-            let most = self.settings.limits.mean_samples.unwrap_or(max_samples).min(max_samples);
-            let pixels = u64::from(self.state.film.width()) * u64::from(self.state.film.height());
-            (2 * (self.state.film.total_samples() / pixels).max(u64::from(self.settings.limits.pilot_samples) / 2)
-                as u32)
-                .min(most)
-        };
-        let some = |plan: SamplePlan| if plan.blocks.is_empty() { None } else { Some(plan) };
-        if self.settings.sampling == Sampling::Uniform {
-            return Ok(if is_reached(judgement, rung) { None } else { some(uniform_plan(&self.state.film, doubled)) });
-        }
-        if !is_reached(judgement, rung) && judgement.denoised.is_some() {
-            return Ok(some(denoised_plan(&self.state.film, &judgement.predicted, rung, max_samples)));
-        }
-        if !is_reached(judgement, rung) {
-            let started = Instant::now();
-            let wanted = wanted_samples(judgement, self.settings.allocation, rung, &self.settings.limits)?;
-            self.state.seconds_allocation += started.elapsed().as_secs_f64();
-            if predicted_saving(&self.state.film, judgement, &wanted, rung) < LEAST_SAVING {
-                return Ok(some(uniform_plan(&self.state.film, doubled)));
-            }
-            let plan = adaptive_plan(&self.state.film, judgement, &wanted, max_samples);
-            if !plan.blocks.is_empty() {
-                return Ok(Some(plan));
-            }
-            // Each pixel by itself has what it needs, yet its surroundings show.
-            let predicted = judgement.predicted.values();
-            return Ok(some(doubling_of(&self.state.film, max_samples, |i| f64::from(predicted[i]) > rung)));
-        }
-        if let Some(plan) = some(self.peaks(rung, judgement)) {
-            return Ok(Some(plan));
-        }
-        Ok(self.audited(rung, judgement)?.and_then(some))
-    }
-
-    /// More samples for single pixels that stand out of what the halves show, which pooling hides.
-    fn peaks(&self, rung: f64, judgement: &Judgement) -> SamplePlan {
-        let amplitude = &judgement.measured_error().amplitude;
-        let limit = TOLERATED_PEAK * rung;
-        doubling_of(&self.state.film, self.settings.limits.max_samples, |i| f64::from(amplitude.values()[i]) > limit)
-    }
-
-    /// Audits a rung that is reached. Where the variance proves too low it is raised from here on, and the plan for it is
-    /// returned.
-    fn audited(&mut self, rung: f64, judgement: &mut Judgement) -> Result<Option<SamplePlan>, JudgeError> {
-        let is_raw = judgement.denoised.is_none();
-        let may_audit = rung <= HIGHEST_AUDITED_RUNG && judgement.pixel_thresholds.is_none() && is_raw;
-        if !may_audit || self.state.inflation >= MOST_INFLATION {
-            return Ok(None);
-        }
-        let found = audit(self.tracer, &self.state.film, judgement, self.settings, self.state.audits);
-        self.state.audits += 1;
-        self.state.audit = found.or(self.state.audit);
-        let Some(found) = found.filter(Audit::disagrees) else { return Ok(None) };
-        self.state.inflation = (self.state.inflation * found.ratio).min(MOST_INFLATION);
-        *judgement = self.look()?;
-        self.plan_towards(rung, judgement)
-    }
-
-    /// The exposure that rules without sight are told: measured anew at each doubling of the samples.
-    fn exposure(&mut self, judgement: &Judgement) -> f64 {
-        if !self.exposure_holds() {
-            let samples = self.state.film.total_samples();
-            let scene_unit_over_white = scene_unit_over_white(judgement, self.settings);
-            self.state.exposure = Some(Exposure { samples, scene_unit_over_white });
-        }
-        self.state.exposure.map_or(1.0, |exposure| exposure.scene_unit_over_white)
-    }
-
-    /// Whether a rule that does not see needs no look now, as after most of its many small steps.
-    fn exposure_holds(&self) -> bool {
-        let samples = self.state.film.total_samples();
-        self.state.exposure.is_some_and(|exposure| samples < 2 * exposure.samples)
-    }
 }
 
 /// The first blocks of at most so many samples in all, at least one.
@@ -447,12 +327,6 @@ pub(crate) fn beginning(blocks: &[BlockWork], most_samples: u64) -> &[BlockWork]
     };
     let count = if most_samples == u64::MAX { blocks.len() } else { blocks.iter().take_while(within).count() };
     &blocks[..count.max(1).min(blocks.len())]
-}
-
-/// Share of display white that one scene unit makes near black: the exposure that other renderers are told.
-fn scene_unit_over_white(judgement: &Judgement, settings: &LoopSettings) -> f64 {
-    const DIM_CD_M2: f32 = 0.1;
-    f64::from(judgement.tone.relative_luminance(DIM_CD_M2) / DIM_CD_M2) * settings.nits_per_unit
 }
 
 fn progress(render: &Loop<'_>, judgement: &Judgement, step: &Step) -> Progress {

@@ -123,27 +123,6 @@ pub fn doubling_of(film: &Film, max_samples: u32, mask: impl Fn(usize) -> bool) 
     doubling_plan(film, max_samples, |pixel| [if mask(pixel) { doublings } else { 0 }; 2])
 }
 
-/// Doublings for a picture that is denoised: of the pixels above `visibility`, the half where one more sample takes away most.
-///
-/// Visible energy falls about as 1/n, so a sample takes v²/n of it: the sum over the picture falls fastest where that is
-/// greatest. Counts then go as v, not as v² as they do where the worst place decides: denoised by Open Image Denoise, a glass
-/// ball whose caustic took every sample looked worse at 32 a pixel (JOD 9.28) than even counts (9.39).
-pub fn denoised_plan(film: &Film, predicted: &Plane, visibility: f64, max_samples: u32) -> SamplePlan {
-    let gain = |pixel: usize| {
-        let v = f64::from(predicted.values()[pixel]);
-        let count = film.samples(pixel).max(1);
-        let is_open = v > visibility && count < max_samples;
-        if is_open { v * v / f64::from(count) } else { 0.0 }
-    };
-    let mut gains: Vec<f64> = (0..predicted.values().len()).map(gain).filter(|&gain| gain > 0.0).collect();
-    if gains.is_empty() {
-        return SamplePlan::default();
-    }
-    let middle = gains.len() / 2;
-    let (_, &mut median, _) = gains.select_nth_unstable_by(middle, f64::total_cmp);
-    doubling_of(film, max_samples, |pixel| gain(pixel) >= median)
-}
-
 fn doubling_plan(film: &Film, max_samples: u32, doublings: impl Fn(usize) -> [u32; 2]) -> SamplePlan {
     let mut plan = SamplePlan::default();
     for pixel in 0..(film.width() * film.height()) as usize {

@@ -124,7 +124,7 @@ impl FrameScenes {
 /// Renders one frame.
 ///
 /// # Errors
-/// Only if the perception model refuses the picture, which would be a defect of ours.
+/// If the denoiser fails, or the perception model refuses the picture, which would be a defect of ours.
 pub fn render_frame(
     scenes: &FrameScenes,
     shot: &ShotSettings,

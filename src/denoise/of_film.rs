@@ -31,10 +31,9 @@ pub fn denoise_film(denoiser: &Denoiser, film: &Film, nits_per_unit: f64) -> Res
     // What two samples of a half say of their scatter is worth little: beside it stands what the halves differ by.
     let variance = estimate.variance_of_mean.combined(&estimate.half_difference, |own, half| 0.5 * (own + half * half));
     let of_half = |half: Half| {
-        let pixels = film.half(half).iter().zip(film.half(half.other()));
-        // A pixel of one sample has an empty half: the other stands in for it.
-        let own_or_other = |(own, other): (&HalfPixel, &HalfPixel)| if own.samples > 0 { *own } else { *other };
-        let rgb: Vec<[f32; 3]> = pixels.map(|pixel| mean_cd_m2(&own_or_other(pixel), nits_per_unit)).collect();
+        let pixels = 0..width * height;
+        let rgb: Vec<[f32; 3]> =
+            pixels.map(|pixel| mean_cd_m2(film.half_or_other(half, pixel), nits_per_unit)).collect();
         denoised(&rgb, &variance.map(|variance| 2.0 * variance))
     };
     Ok(DenoisedFilm {

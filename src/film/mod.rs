@@ -200,6 +200,12 @@ impl Film {
         &self.halves[half.index()]
     }
 
+    /// A pixel of a half, or of the other where this one has no samples, as in a render of one sample.
+    pub fn half_or_other(&self, half: Half, pixel: usize) -> &HalfPixel {
+        let own = &self.half(half)[pixel];
+        if own.samples > 0 { own } else { &self.half(half.other())[pixel] }
+    }
+
     /// First surfaces, row-major.
     pub fn guides(&self) -> &[PixelGuide] {
         &self.guides

@@ -112,7 +112,7 @@ impl BlockWork {
     /// Whether it is a part of a doubling of a pixel of a film of so many.
     pub fn is_sound(&self, pixels: u32) -> bool {
         self.pixel < pixels
-            && self.level <= 27
+            && self.level <= HIGHEST_LEVEL
             && u64::from(self.first) + u64::from(self.samples) <= 1 << log2_block(self.level)
     }
 
@@ -127,6 +127,9 @@ impl BlockWork {
 
 /// Samples of the pilot in each half.
 pub const PILOT_SAMPLES: u32 = 8;
+
+/// The last level of which a sample's number fits 32 bits: its block ends at 2³⁰ samples of the half.
+const HIGHEST_LEVEL: u8 = 27;
 
 /// log₂ of the samples of a level's whole block.
 fn log2_block(level: u8) -> u8 {

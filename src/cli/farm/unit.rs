@@ -13,7 +13,7 @@ use fechner::farm::unit::{NamedOrder, Outcome, UnitError, UnitSums, render_unit}
 use fechner::farm::{Farm, frame};
 use fechner::integrator::PathTracer;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -37,12 +37,6 @@ pub(super) struct Keeping {
     /// Seconds of work that a kill may cost.
     #[arg(long, value_name = "SECONDS", value_parser = parse_positive, default_value_t = 60.0)]
     checkpoint_every: f64,
-}
-
-impl Keeping {
-    pub(super) fn every(&self) -> Duration {
-        Duration::from_secs_f64(self.checkpoint_every.min(1e9))
-    }
 }
 
 /// What to do about a unit that another process renders.
@@ -69,21 +63,16 @@ pub(super) enum Went {
 
 /// Renders units of one farm, and keeps the last scene that it loaded.
 pub(super) struct Bench<'a> {
-    farm: &'a Farm,
-    job: &'a Job<'a>,
-    signals: &'a Signals,
+    pub(super) farm: &'a Farm,
+    pub(super) job: &'a Job<'a>,
+    pub(super) signals: &'a Signals,
     every: Duration,
     loaded: Option<(usize, PathTracer)>,
 }
 
 /// Renders what was asked for.
 pub(super) fn run(arguments: &UnitArguments) -> Result<ExitCode> {
-    let farm = open_for_work(&arguments.folder)?;
-    let signals = Signals::listen()?;
-    arguments.threads.pool()?.install(|| {
-        let options = JobOptions::of(&farm)?;
-        let job = options.job()?;
-        let mut bench = Bench::new(&farm, &job, &signals, arguments.keeping.every());
+    Bench::with(&arguments.folder, &arguments.keeping, &arguments.threads, |mut bench| {
         for &unit in &arguments.units {
             match bench.render(unit, IfBusy::Wait)? {
                 Went::Rendered | Went::WasThere => {}
@@ -96,8 +85,21 @@ pub(super) fn run(arguments: &UnitArguments) -> Result<ExitCode> {
 }
 
 impl<'a> Bench<'a> {
-    pub(super) fn new(farm: &'a Farm, job: &'a Job<'a>, signals: &'a Signals, every: Duration) -> Self {
-        Self { farm, job, signals, every, loaded: None }
+    /// Does work of the farm in a folder, in a pool of so many threads.
+    pub(super) fn with(
+        folder: &Path,
+        keeping: &Keeping,
+        threads: &Threads,
+        work: impl FnOnce(Bench<'_>) -> Result<ExitCode> + Send,
+    ) -> Result<ExitCode> {
+        let farm = open_for_work(folder)?;
+        let signals = Signals::listen()?;
+        let every = Duration::from_secs_f64(keeping.checkpoint_every.min(1e9));
+        threads.pool()?.install(|| {
+            let options = JobOptions::of(&farm)?;
+            let job = options.job()?;
+            work(Bench { farm: &farm, job: &job, signals: &signals, every, loaded: None })
+        })
     }
 
     /// Renders a unit, unless its result is there.

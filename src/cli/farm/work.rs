@@ -1,10 +1,8 @@
 //! `farm work`: one of any number of processes on a folder.
 
-use super::job::JobOptions;
 use super::merge::{conclude, merge};
-use super::signals::Signals;
 use super::unit::{Bench, IfBusy, Keeping, Went};
-use super::{CALL_AGAIN, Threads, open_for_work};
+use super::{CALL_AGAIN, Threads};
 use anyhow::Result;
 use clap::Args;
 use fechner::farm::frame::{Progress, progress};
@@ -29,23 +27,19 @@ const PAUSE: Duration = Duration::from_millis(200);
 
 /// Works until all frames are done. Where others merge or render, it takes what they leave.
 pub(super) fn run(arguments: &WorkArguments) -> Result<ExitCode> {
-    let farm = open_for_work(&arguments.folder)?;
-    let signals = Signals::listen()?;
-    arguments.threads.pool()?.install(|| {
-        let options = JobOptions::of(&farm)?;
-        let job = options.job()?;
-        let mut bench = Bench::new(&farm, &job, &signals, arguments.keeping.every());
+    Bench::with(&arguments.folder, &arguments.keeping, &arguments.threads, |mut bench| {
+        let Bench { farm, job, signals, .. } = bench;
         loop {
             let (mut all_done, mut did_something) = (true, false);
             for frame_index in 0..farm.manifest().frames.len() {
                 if signals.leaves() {
                     return Ok(ExitCode::from(CALL_AGAIN));
                 }
-                match progress(&farm, frame_index) {
+                match progress(farm, frame_index) {
                     Progress::Done => continue,
                     Progress::ToMerge { .. } => {
                         if let Some(lock) = try_lock(&farm.frame_lock(frame_index))? {
-                            did_something |= merge(&farm, &job, frame_index)?;
+                            did_something |= merge(farm, job, frame_index)?;
                             drop(lock);
                         }
                     }
@@ -62,7 +56,7 @@ pub(super) fn run(arguments: &WorkArguments) -> Result<ExitCode> {
                 all_done = false;
             }
             if all_done {
-                conclude(&farm, &job)?;
+                conclude(farm, job)?;
                 return Ok(ExitCode::SUCCESS);
             }
             if !did_something {
