@@ -4,7 +4,11 @@ use super::file::read_header;
 use super::{Checkpoint, CheckpointError, Header, Seeds, read_checkpoint};
 use crate::adaptive::settings::DEFAULT_MAX_SAMPLES;
 use crate::adaptive::state::RenderState;
+use rayon::prelude::*;
 use std::path::{Path, PathBuf};
+
+/// Bounds the memory of machines with many threads; more than that no disk feeds.
+const MOST_READ_AT_ONCE: usize = 8;
 
 /// Why films could not be merged.
 #[derive(Debug, thiserror::Error)]
@@ -31,7 +35,7 @@ pub enum MergeError {
 /// `paths` does not matter. What was decided for the single films (plans, rungs, audits) is left behind; the largest
 /// inflation stays.
 ///
-/// Three films are in memory at a time: the sum, the one that is added, and the next, which is read meanwhile.
+/// Beside the sum, as many films are in memory as there are threads (at most 8), and as many again, which are read meanwhile.
 ///
 /// # Errors
 /// [`MergeError`] for a file that cannot be read, films of other scenes, sizes, versions or viewings than the first, and
@@ -45,30 +49,19 @@ pub fn merge_files(paths: &[PathBuf]) -> Result<Checkpoint, MergeError> {
     check_seeds(&files)?;
     let (first, rest) = files.split_first().expect("at least one film");
     let mut sum = read_same(first)?;
-    let mut read = rest.first().map(read_same);
-    for (i, file) in rest.iter().enumerate() {
-        let different = |problem: String| CheckpointError::Different { path: file.1.to_owned(), problem };
-        if let Some(problem) = file.0.origin.difference(&first.0.origin) {
-            return Err(different(format!("{problem}, as in {}", first.1.display())).into());
-        }
-        if !file.0.settings.is_seen_like(&first.0.settings) {
-            return Err(different(format!(
-                "it was rendered for another display, observer, operator, model or unit than {}",
-                first.1.display()
-            ))
-            .into());
-        }
-        let next = read.take().expect("one for each file")?;
-        let added;
-        (added, read) = rayon::join(|| sum.state.film.add(&next.state.film), || rest.get(i + 1).map(read_same));
-        added.map_err(|problem| different(problem.to_owned()))?;
-        sum.state.inflation = sum.state.inflation.max(next.state.inflation);
-        sum.state.plans = sum.state.plans.saturating_add(next.state.plans);
-        sum.state.seconds_total += next.state.seconds_total;
-        sum.state.seconds_perception += next.state.seconds_perception;
-        sum.state.seconds_allocation += next.state.seconds_allocation;
-        sum.header.visibility = sum.header.visibility.min(next.header.visibility);
-        sum.header.seeds.all.extend(next.header.seeds.all);
+    // Films are added one after the other, and the next few are read meanwhile.
+    let mut batches = rest.chunks(rayon::current_num_threads().clamp(1, MOST_READ_AT_ONCE));
+    let read_all = |batch: &[(Header, &Path)]| batch.par_iter().map(read_same).collect::<Vec<_>>();
+    let mut batch = batches.next();
+    let mut read = batch.map(read_all).unwrap_or_default();
+    while let Some(files) = batch {
+        batch = batches.next();
+        let (added, next) = rayon::join(
+            || files.iter().zip(read).try_for_each(|(file, film)| add(&mut sum, first, file, film?)),
+            || batch.map(read_all).unwrap_or_default(),
+        );
+        added?;
+        read = next;
     }
     if !rest.is_empty() {
         sum.header.seeds.all.sort_unstable();
@@ -76,6 +69,34 @@ pub fn merge_files(paths: &[PathBuf]) -> Result<Checkpoint, MergeError> {
         sum.state = undecided(sum.state);
     }
     Ok(sum)
+}
+
+/// Adds what was read of a file to the sum that began with the first.
+fn add(
+    sum: &mut Checkpoint,
+    first: &(Header, &Path),
+    (header, path): &(Header, &Path),
+    next: Checkpoint,
+) -> Result<(), CheckpointError> {
+    let different = |problem: String| CheckpointError::Different { path: path.to_path_buf(), problem };
+    if let Some(problem) = header.origin.difference(&first.0.origin) {
+        return Err(different(format!("{problem}, as in {}", first.1.display())));
+    }
+    if !header.settings.is_seen_like(&first.0.settings) {
+        return Err(different(format!(
+            "it was rendered for another display, observer, operator, model or unit than {}",
+            first.1.display()
+        )));
+    }
+    sum.state.film.add(&next.state.film).map_err(|problem| different(problem.to_owned()))?;
+    sum.state.inflation = sum.state.inflation.max(next.state.inflation);
+    sum.state.plans = sum.state.plans.saturating_add(next.state.plans);
+    sum.state.seconds_total += next.state.seconds_total;
+    sum.state.seconds_perception += next.state.seconds_perception;
+    sum.state.seconds_allocation += next.state.seconds_allocation;
+    sum.header.visibility = sum.header.visibility.min(next.header.visibility);
+    sum.header.seeds.all.extend(next.header.seeds.all);
+    Ok(())
 }
 
 /// The film of a state and what it took, without what was decided about it.

@@ -114,3 +114,39 @@ fn smoothing_groups_round_edges() {
     let error = load(&path, &LoadOptions::default()).unwrap_err().to_string();
     assert!(error.contains("bad.obj:10:"), "{error}");
 }
+
+/// Where a file ends its paths its picture is darker than ours: that is said, in scatterings whatever the format counts.
+#[test]
+fn the_depth_of_the_files_paths_is_named() {
+    let pbrt = |integrator: &str| {
+        format!("{integrator} WorldBegin LightSource \"infinite\" \"rgb L\" [1 1 1] Shape \"sphere\"")
+    };
+    let mitsuba = |depth: i32| {
+        format!(
+            "<scene version=\"3.0.0\"><integrator type=\"path\"><integer name=\"maxDepth\" value=\"{depth}\"/></integrator>\
+             <emitter type=\"constant\"/><shape type=\"sphere\"/></scene>"
+        )
+    };
+    let place = tempfile::tempdir().unwrap();
+    for (name, text, scatterings) in [
+        ("said.pbrt", pbrt("Integrator \"path\" \"integer maxdepth\" [ 7 ]"), Some(7)),
+        ("default.pbrt", pbrt("Integrator \"volpath\""), Some(5)),
+        ("deep.pbrt", pbrt("Integrator \"path\" \"integer maxdepth\" [ 1000 ]"), None),
+        ("eight-edges.xml", mitsuba(8), Some(7)),
+        ("endless.xml", mitsuba(-1), None),
+    ] {
+        let path = place.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        let scene = load(&path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        let said = scene.notes.iter().find(|note| note.contains("scatterings"));
+        match scatterings {
+            None => assert_eq!(said, None, "{name}"),
+            Some(count) => {
+                assert!(
+                    said.is_some_and(|note| note.contains(&format!("after {count} scatterings"))),
+                    "{name}: {said:?}"
+                );
+            }
+        }
+    }
+}

@@ -48,6 +48,10 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
             "emitter" | "luminaire" => reader.emitter(child)?,
             "sensor" | "camera" => reader.sensor(child)?,
             "integrator" | "sampler" => {
+                // Edges, so one more than scatterings; −1 is no end.
+                if let Some(edges) = child.float("maxdepth")?.filter(|&edges| edges >= 1.0) {
+                    reader.builder.note_depth(edges as i64 - 1);
+                }
                 reader.builder.note("Integrator, sampler and filter are fechner's own, not the file's.");
             }
             // Defined here, used by reference.

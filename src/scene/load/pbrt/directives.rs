@@ -12,6 +12,8 @@ use std::rc::Rc;
 
 /// Deepest chain of includes.
 const DEEPEST_INCLUDE: usize = 32;
+/// Scatterings of pbrt's paths where the file does not say.
+const DEFAULT_DEPTH: i64 = 5;
 
 impl Reader<'_> {
     pub(super) fn read_file(&mut self, path: &Path) -> Result<(), LoadError> {
@@ -165,7 +167,10 @@ impl Reader<'_> {
             }
             "Integrator" | "Sampler" | "PixelFilter" | "Accelerator" => {
                 string(lexer, line)?;
-                Parameters::read(lexer, line)?;
+                let user = Parameters::read(lexer, line)?;
+                if directive == "Integrator" {
+                    self.builder.note_depth(user.integer("maxdepth")?.unwrap_or(DEFAULT_DEPTH));
+                }
                 self.builder.note("Integrator, sampler, filter and accelerator are fechner's own, not the file's.");
             }
             other => {
