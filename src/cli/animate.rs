@@ -12,10 +12,11 @@ use super::job::{Quality, Size, parse_size};
 use super::seeing::parse_positive;
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
-use frames::{Frames, parse_frames, parse_rate};
+use frames::{Frames, parse_frames};
 use std::path::{Path, PathBuf};
 use video::VideoFormat;
 
+pub(super) use frames::parse_rate;
 pub(super) use shot::{FrameJob, Shot};
 
 /// Arguments of `animate`.

@@ -139,3 +139,40 @@ fn bad_arguments_are_named() {
         assert!(output.status.code() == Some(2) && said.contains(expected), "{arguments:?}: {said}");
     }
 }
+
+/// A sequence does not differ from itself; flicker of its light does, and the same change that stays does not where it is
+/// small.
+#[test]
+fn sequences_are_compared_as_they_move() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    animate(at, &["--frames", "0..3", "--fps", "24", "--spp", "16", "-o", "a.##.exr"]);
+    animate(at, &["--frames", "0..3", "--fps", "24", "--spp", "16", "--seed", "7", "-o", "b.##.exr"]);
+    let compare = |arguments: &[&str]| {
+        let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+        let output = command.current_dir(at).arg("compare").args(arguments).output().expect("it starts");
+        let said = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+        (output.status.code(), said)
+    };
+    let moving = ["--fps", "24", "--velocity", "a.##.exr"];
+    let (status, said) = compare(&[&["a.##.exr", "a.##.exr"], &moving[..]].concat());
+    assert_eq!(status, Some(0), "{said}");
+    let files = ["--map", "map.##.png", "--json", "figures.json"];
+    let (status, said) = compare(&[&["a.##.exr", "b.##.exr"], &moving[..], &files].concat());
+    assert_eq!(status, Some(1), "{said}");
+    let figures: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(at.join("figures.json")).expect("written")).expect("JSON");
+    assert!(figures["worst_visibility"].as_f64().expect("a number") > 1.0 && figures["eye_follows"] == true);
+    assert_eq!(figures["frames"].as_array().expect("frames").len(), 4);
+    assert!((0..4).all(|frame| at.join(format!("map.0{frame}.png")).is_file()));
+    for (arguments, expected) in [
+        (&["a.##.exr", "b.##.exr"][..], "--fps"),
+        (&["a.##.exr", "b.00.exr", "--fps", "24"], "has # for each digit"),
+        (&["c.##.exr", "b.##.exr", "--fps", "24"], "no such files"),
+        (&["a.00.exr", "b.00.exr", "--fps", "24"], "are for sequences"),
+        (&["a.##.exr", "b.##.exr", "--fps", "24", "--csf", "daly98"], "only castle"),
+    ] {
+        let (status, said) = compare(arguments);
+        assert!(status == Some(2) && said.contains(expected), "{arguments:?}: {said}");
+    }
+}
