@@ -1,10 +1,12 @@
 //! `fechner animate`: the frames of a scene that moves, and a video of them.
 
+mod contact;
 mod frames;
 mod motion;
 mod settings;
 mod shot;
 mod source;
+mod time;
 mod video;
 
 use super::denoise::DenoiseChoice;
@@ -14,6 +16,7 @@ use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use frames::{Frames, parse_frames};
 use std::path::{Path, PathBuf};
+use time::ShotClock;
 use video::VideoFormat;
 
 pub(super) use frames::parse_rate;
@@ -51,9 +54,12 @@ pub(super) struct AnimateArguments {
     /// The same, by name.
     #[arg(long, value_enum, conflicts_with = "visibility", help_heading = "Until")]
     quality: Option<Quality>,
-    /// A frame is done at this mean number of samples a pixel.
+    /// A budget of this mean number of samples a pixel over the whole shot, spent on the frames that need it most.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Until")]
     spp: Option<u32>,
+    /// A budget of this many seconds for all frames that are rendered, spent on those that need it most.
+    #[arg(long, value_name = "S", value_parser = parse_positive, conflicts_with = "spp", help_heading = "Until")]
+    time: Option<f64>,
     /// Most samples of one pixel.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(16..), help_heading = "Until")]
     max_spp: Option<u32>,
@@ -127,8 +133,9 @@ fn render_shot(arguments: &AnimateArguments) -> Result<()> {
     arguments.video()?;
     let shot = Shot::new(arguments)?;
     let track = shot.track()?;
-    for frame in arguments.frames.first..=arguments.frames.last {
-        shot.make(frame, &track)?;
+    let mut clock = arguments.time.map(|seconds| ShotClock::start(&shot, &track, seconds)).transpose()?;
+    for frame in arguments.frame_numbers() {
+        shot.make(frame, &track, clock.as_mut().map(|clock| clock.share(frame)))?;
     }
     shot.conclude(&track)
 }

@@ -176,3 +176,33 @@ fn sequences_are_compared_as_they_move() {
         assert!(status == Some(2) && said.contains(expected), "{arguments:?}: {said}");
     }
 }
+
+/// A budget of the shot adds up, whoever renders which of its frames; a whole shot has a contact sheet.
+#[test]
+fn a_budget_is_the_whole_shots() {
+    let [at_once, alone] = [(); 2].map(|()| tempfile::tempdir().expect("a folder"));
+    let common = ["--fps", "4", "--spp", "24", "-o", "out/shot.##.exr"];
+    animate(at_once.path(), &[&["--frames", "0..3"], &common[..]].concat());
+    animate(alone.path(), &[&["--frames", "2..2", "--shot", "0..3", "--threads", "1"], &common[..]].concat());
+    let bytes = |folder: &Path| std::fs::read(folder.join("out/shot.02.exr")).expect("read");
+    assert!(bytes(at_once.path()) == bytes(alone.path()), "frame 2 differs");
+    let json = |name: &str| -> serde_json::Value {
+        let text = std::fs::read_to_string(at_once.path().join("out").join(name)).expect("written");
+        serde_json::from_str(&text).expect("JSON")
+    };
+    let track = json("shot.track.json");
+    let shares =
+        track["frames"].as_array().expect("frames").iter().map(|f| f["mean_samples"].as_u64().expect("a share"));
+    assert_eq!(shares.sum::<u64>(), 4 * 24);
+    let shot = json("shot.json");
+    let spent =
+        shot.as_array().expect("frames").iter().map(|f| f["report"]["samples_total"].as_u64().expect("a count"));
+    assert!(spent.sum::<u64>() <= 4 * 25 * 24 * 16);
+    let sheet = image::open(at_once.path().join("out/shot.contact.png")).expect("a contact sheet");
+    // Two by two, 4 pixels between them and around.
+    assert_eq!((sheet.width(), sheet.height()), (2 * 24 + 12, 2 * 16 + 12));
+    assert!(!alone.path().join("out/shot.contact.png").exists());
+    // By time: every frame has its pilot at the least.
+    let said = animate(at_once.path(), &["--frames", "0..1", "--time", "0.2", "-o", "time.##.png"]);
+    assert!(said.contains("time.01.png: ") && said.contains("spp in"), "{said}");
+}

@@ -1,13 +1,16 @@
 //! A shot on its way into files: its track, its frames and what only the whole of it has.
 
+use super::contact::{ContactSheet, on_sheet};
 use super::motion::push_velocity;
 use super::settings::shot_settings;
 use super::source::FileSource;
+use super::video::shown_rgb8;
 use super::{AnimateArguments, video};
 use crate::cli::console::{Console, duration_in_words};
 use crate::cli::report::Report;
 use anyhow::{Context, Result, bail};
-use fechner::adaptive::settings::{AllocationRule, LoopSettings};
+use fechner::adaptive::settings::{AllocationRule, LoopSettings, Sampling};
+use fechner::animate::budget::Needs;
 use fechner::animate::name::FrameName;
 use fechner::animate::track::{Track, TrackFrame};
 use fechner::animate::{FrameScenes, RenderedFrame, SceneSource as _, ShotSettings, render_frame};
@@ -23,7 +26,7 @@ use serde::{Deserialize, Serialize};
 use std::io::Write as _;
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// The figures of one frame, beside its picture; by `key` a later run knows that it need not be made again.
 #[derive(Serialize, Deserialize)]
@@ -126,16 +129,32 @@ impl<'a> Shot<'a> {
         }
         let count = self.settings.last - self.settings.first + 1;
         let started = Instant::now();
-        let track = Track::make(&self.source, &self.settings, operator.as_ref(), &|_| {})?;
+        let mut track = Track::make(&self.source, &self.settings, operator.as_ref(), &|_| {})?;
+        if let (Some(mean_samples), Sampling::Adaptive) = (self.settings.limits.mean_samples, self.settings.sampling) {
+            track.spread(&self.needs(&track)?, mean_samples);
+        }
         eprintln!("looked at {count} frames in {}", duration_in_words(started.elapsed().as_secs_f64()));
         let text = serde_json::to_string(&track).context("the track could not be put into words")?;
         output::write_beside(&file, |file| file.write_all(text.as_bytes()))?;
         Ok(track)
     }
 
-    /// Renders a frame, unless it is there.
-    pub(super) fn make(&self, frame: u32, track: &Track) -> Result<()> {
-        let job = self.frame(frame, track)?;
+    /// What each frame of the shot needs.
+    pub(super) fn needs(&self, track: &Track) -> Result<Needs> {
+        self.operator()?;
+        let operator = || self.operator().expect("there was one before");
+        Ok(Needs::of(&self.source, &self.settings, &operator, track)?)
+    }
+
+    /// Numbers of the first and the last frame that are rendered.
+    pub(super) fn rendered_frames(&self) -> (u32, u32) {
+        (self.arguments.frames.first, self.arguments.frames.last)
+    }
+
+    /// Renders a frame, unless it is there. `time` is a limit of the frame's own, beside those of the shot.
+    pub(super) fn make(&self, frame: u32, track: &Track, time: Option<Duration>) -> Result<()> {
+        let mut job = self.frame(frame, track)?;
+        job.settings.limits.time = time;
         let file = self.name.of(frame);
         if self.record(frame).is_some_and(|record| record.key == job.key) && file.is_file() {
             eprintln!("{}: is there", file.display());
@@ -192,9 +211,17 @@ impl<'a> Shot<'a> {
         }
         let text = serde_json::to_string_pretty(&records).context("the shot could not be put into words")?;
         output::write_beside(&self.name.of_shot("json"), |file| file.write_all(text.as_bytes()))?;
+        let fits = |frame: usize| track.frames[frame].fitted.clone().restore();
+        let count = records.len();
+        let size = (self.settings.trace.width as usize, self.settings.trace.height as usize);
+        let mut sheet = ContactSheet::new(on_sheet(count).count(), size);
+        for frame in on_sheet(count) {
+            let file = self.name.of(self.settings.first + frame as u32);
+            sheet.add(&shown_rgb8(&file, || fits(frame), &self.settings)?);
+        }
+        sheet.write(&self.name.of_shot("contact.png"))?;
         if let Some((path, format)) = self.arguments.video()? {
             let files = (self.settings.first..=self.settings.last).map(|frame| self.name.of(frame));
-            let fits = |frame: usize| track.frames[frame].fitted.clone().restore();
             video::write(path, format, files, &fits, &self.settings)?;
         }
         Ok(())
@@ -216,7 +243,7 @@ impl<'a> Shot<'a> {
     /// All that a frame's file depends on, as a name.
     fn key(&self, settings: &LoopSettings, track: &TrackFrame, scenes: &FrameScenes) -> String {
         let text = format!(
-            "{}|{track:?}|{}|{}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}",
+            "{}|{track:?}|{}|{}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}",
             env!("CARGO_PKG_VERSION"),
             content_hash(&scenes.previous),
             content_hash(&scenes.next),
@@ -226,7 +253,8 @@ impl<'a> Shot<'a> {
             settings.limits,
             settings.viewing,
             settings.frames,
-            self.arguments.aov_names
+            self.arguments.aov_names,
+            self.arguments.time
         );
         blake3::hash(text.as_bytes()).to_hex()[..32].to_owned()
     }
