@@ -8,8 +8,8 @@
 use super::track::Track;
 use super::{SceneSource, ShotSettings};
 use crate::adaptive::judge::{JudgeError, judge};
-use crate::adaptive::plan::{pilot_plan, wanted_samples};
-use crate::adaptive::settings::{AllocationRule, Limits};
+use crate::adaptive::plan::{needed_samples, pilot_plan};
+use crate::adaptive::settings::Limits;
 use crate::film::Film;
 use crate::integrator::{PILOT_SAMPLES, PathTracer};
 use crate::scene::load::LoadError;
@@ -74,8 +74,8 @@ impl Needs {
             let limits = Limits { pilot_samples: PILOT, ..shot.limits };
             let mut ln_samples = [0.0; ASKED.len()];
             for (ln_samples, visibility) in ln_samples.iter_mut().zip(ASKED) {
-                let wanted = wanted_samples(&judgement, AllocationRule::Convex, visibility, &limits);
-                *ln_samples = wanted.map_err(JudgeError::Perception)?.mean().ln();
+                let needed = needed_samples(&film, &judgement, visibility, &limits);
+                *ln_samples = needed.map_err(JudgeError::Perception)?.ln();
             }
             needs.push(ln_samples);
         }
