@@ -29,7 +29,8 @@ pub(super) struct CompareArguments {
     /// Tone operator that shows scene-linear pictures; it is fitted to the reference.
     #[arg(long, value_name = "NAME", default_value = "constant")]
     operator: String,
-    /// Frames a second, of sequences.
+    /// Frames a second, of sequences. Beyond its ends a sequence stands still, so that noise in the first and the last fifth
+    /// of a second is seen more as in a still.
     #[arg(long, value_name = "N", value_parser = parse_rate)]
     fps: Option<f64>,
     /// Motion of what a sequence shows, in pixels a frame, which the eye follows; without it, it rests. Frames of `animate`
