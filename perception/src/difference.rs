@@ -20,7 +20,7 @@ pub struct Difference {
 }
 
 impl Difference {
-    fn of(visibility: Plane) -> Self {
+    pub(crate) fn of(visibility: Plane) -> Self {
         let worst = visibility.values().iter().copied().fold(0.0, f32::max);
         let visible = visibility.values().iter().filter(|v| **v > 1.0).count();
         Self {
@@ -124,16 +124,21 @@ pub fn colour_difference(
 }
 
 /// Visibility of the difference between two signals, masked by what both of them mask.
-fn mutual_visibility(mut map: ThresholdMap, test_map: &ThresholdMap, reference: &Plane, test: &Plane) -> Plane {
-    for (elevation, test_elevation) in map.elevations.iter_mut().zip(&test_map.elevations) {
-        elevation.combine(test_elevation, |reference, test, _, _| reference.min(test));
+pub(crate) fn mutual_visibility(map: ThresholdMap, test_map: &ThresholdMap, reference: &Plane, test: &Plane) -> Plane {
+    masked_by_both(map, test_map).measured_visibility(&test.combined(reference, |test, reference| test - reference))
+}
+
+/// A map whose masks are the lesser of its own and another's.
+pub(crate) fn masked_by_both(mut map: ThresholdMap, other: &ThresholdMap) -> ThresholdMap {
+    for (elevation, other_elevation) in map.elevations.iter_mut().zip(&other.elevations) {
+        elevation.combine(other_elevation, |own, other, _, _| own.min(other));
     }
-    map.measured_visibility(&test.combined(reference, |test, reference| test - reference))
+    map
 }
 
 /// Sensitivity below 0.5 cpd as at 0.5 cpd, 0 included.
-struct HeldAtLowFrequencies<'a> {
-    base: &'a dyn ContrastSensitivity,
+pub(crate) struct HeldAtLowFrequencies<'a> {
+    pub(crate) base: &'a dyn ContrastSensitivity,
 }
 
 impl ContrastSensitivity for HeldAtLowFrequencies<'_> {

@@ -124,6 +124,7 @@ mod rows;
 pub mod saliency;
 pub mod seen;
 mod sensitivity;
+pub mod sequence;
 mod taps;
 #[cfg(test)]
 mod test_noise;

@@ -99,6 +99,20 @@ pub(super) fn wanted_samples(
     Ok(Wanted { samples, visibility })
 }
 
+/// Mean samples a pixel that a film needs for a visibility, by what it shows now.
+///
+/// # Errors
+/// Only if the allocation refuses the judgement's maps, which would be a defect of ours.
+pub fn needed_samples(
+    film: &Film,
+    judgement: &Judgement,
+    visibility: f64,
+    limits: &Limits,
+) -> Result<f64, fechner_perception::Error> {
+    let forecast = Forecast::of(film, judgement);
+    Ok(wanted_samples(judgement, &forecast, AllocationRule::Convex, visibility, limits)?.samples.mean())
+}
+
 /// Doublings for pixels that have fewer samples than `wanted`.
 ///
 /// Each half scales its share by what the other half knows of the pixel itself (counts go as the standard deviation,

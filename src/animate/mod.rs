@@ -5,11 +5,14 @@
 //! once (or, for operators with eyes that adapt, frame by frame), so that exposure does not flicker with the noise. It is
 //! made from pilots of fixed seed, and made again to the same bytes wherever it is missing.
 //!
+//! A [`budget`] of samples for the whole shot is spread by the track as well.
+//!
 //! Each frame's noise is its own. That is what the threshold model is told ([`FrameTiming`]): the eye integrates over
 //! frames, and noise that is gone in the next frame may be stronger than in a still, unless somebody pauses.
 //!
 //! Not for stills: see [`crate::adaptive`].
 
+pub mod budget;
 pub mod name;
 pub mod track;
 pub mod velocity;
@@ -53,7 +56,7 @@ pub struct ShotSettings {
     pub trace: TraceSettings,
     /// How samples are spread.
     pub sampling: Sampling,
-    /// When a frame is done.
+    /// When a frame is done; `mean_samples` is a budget for each of them on average.
     pub limits: Limits,
     /// Display and observer.
     pub viewing: Viewing,
@@ -77,7 +80,7 @@ impl ShotSettings {
             FrameTiming { frames_per_second: self.frames_per_second, persistence: self.viewing.display.persistence };
         LoopSettings {
             sampling: self.sampling,
-            limits: self.limits,
+            limits: Limits { mean_samples: track.mean_samples.or(self.limits.mean_samples), ..self.limits },
             denoiser: self.denoiser.clone(),
             fitted: Some(track.fitted.clone()),
             frames: if self.pausable { None } else { Some(timing) },

@@ -26,6 +26,30 @@ impl FrameName {
         PathBuf::from(format!("{}{frame:0digits$}{}", self.before, self.after, digits = self.digits))
     }
 
+    /// Numbers of the frames whose files are there, ascending.
+    ///
+    /// # Errors
+    /// If the folder cannot be read.
+    pub fn numbers(&self) -> std::io::Result<Vec<u32>> {
+        let example = self.of(0);
+        let folder = example.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let mut numbers = Vec::new();
+        for entry in std::fs::read_dir(folder)? {
+            let name = entry?.file_name();
+            let is_digit = |letter: char| letter.is_ascii_digit();
+            // Digits are all that stands between the name's two ends; any of them leads back to the file.
+            let text: String = name.to_string_lossy().into_owned();
+            let start = Path::new(&self.before).file_name().map_or("", |start| start.to_str().unwrap_or(""));
+            let start = if self.before.ends_with(['/', std::path::MAIN_SEPARATOR]) { "" } else { start };
+            let digits = text.strip_prefix(start).and_then(|rest| rest.strip_suffix(self.after.as_str()));
+            let digits = digits.filter(|digits| !digits.is_empty() && digits.chars().all(is_digit));
+            let number = digits.and_then(|digits| digits.parse::<u32>().ok());
+            numbers.extend(number.filter(|&number| self.of(number).file_name() == Some(name.as_os_str())));
+        }
+        numbers.sort_unstable();
+        Ok(numbers)
+    }
+
     /// A file of the whole sequence: the pattern without its number, with another ending.
     pub fn of_shot(&self, ending: &str) -> PathBuf {
         let before = Path::new(&self.before);
@@ -56,5 +80,16 @@ mod tests {
         for bad in ["shot.exr", "a#b#.png", "out##/shot.png", ""] {
             assert_eq!(FrameName::parse(bad), None, "{bad}");
         }
+    }
+
+    #[test]
+    fn files_that_are_there_have_numbers() {
+        let folder = tempfile::tempdir().expect("a folder");
+        for file in ["a.0007.png", "a.0012.png", "a.12345.png", "a.12.png", "a.0001.exr", "b.0002.png", "a.00x1.png"] {
+            std::fs::write(folder.path().join(file), "").expect("written");
+        }
+        let pattern = folder.path().join("a.####.png");
+        let name = FrameName::parse(pattern.to_str().expect("a path")).expect("a pattern");
+        assert_eq!(name.numbers().expect("readable"), [7, 12, 12345]);
     }
 }

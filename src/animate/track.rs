@@ -3,6 +3,7 @@
 //! Made before the frames, from small pilots of one fixed seed. Operators whose eyes adapt go through the shot in time;
 //! all others are fitted once, to frames from all over it, so that exposure stands still while frames and noise change.
 
+use super::budget::Needs;
 use super::{SceneSource, ShotSettings};
 use crate::adaptive::judge::guide_luminance;
 use crate::adaptive::plan::pilot_plan;
@@ -36,6 +37,8 @@ pub struct TrackFrame {
     pub eye: Option<AdaptationState>,
     /// The tone operator as set for this frame.
     pub fitted: SavedTone,
+    /// Its share of the shot's budget, samples a pixel, where there is one.
+    pub mean_samples: Option<u32>,
 }
 
 /// All frames of a shot.
@@ -80,9 +83,23 @@ impl Track {
         };
         let frames = (shot.first..=shot.last)
             .zip(looks.iter().zip(goals).zip(fits))
-            .map(|(frame, (((scene, _), goal), (eye, fitted)))| TrackFrame { frame, scene: *scene, goal, eye, fitted })
+            .map(|(frame, (((scene, _), goal), (eye, fitted)))| TrackFrame {
+                frame,
+                scene: *scene,
+                goal,
+                eye,
+                fitted,
+                mean_samples: None,
+            })
             .collect();
         Ok(Self { made_for: made_for(shot, operator), frames })
+    }
+
+    /// Gives each frame its share of a budget of so many samples a pixel on average.
+    pub fn spread(&mut self, needs: &Needs, mean_samples: u32) {
+        for (frame, share) in self.frames.iter_mut().zip(needs.shares(mean_samples)) {
+            frame.mean_samples = Some(share);
+        }
     }
 
     /// The frame's part, if the track is of this shot and the frame's scene is still the same.
@@ -100,7 +117,8 @@ impl Track {
 
 fn made_for(shot: &ShotSettings, operator: &dyn ToneOperator) -> String {
     format!(
-        "version {}, frames {} to {} at {} a second, {}x{}, seed {}, {} cd/m² a unit, {:?}, eye {:?}, {:?}",
+        "version {}, frames {} to {} at {} a second, {}x{}, seed {}, {} cd/m² a unit, {:?}, eye {:?}, \
+         budget {:?}, {:?}, {:?}",
         env!("CARGO_PKG_VERSION"),
         shot.first,
         shot.last,
@@ -111,6 +129,9 @@ fn made_for(shot: &ShotSettings, operator: &dyn ToneOperator) -> String {
         shot.nits_per_unit,
         operator.name(),
         shot.adapted_to_cd_m2,
+        shot.limits.mean_samples,
+        // Whether frames may be paused decides what they need of a budget.
+        shot.limits.mean_samples.map(|_| (shot.sampling, shot.pausable, shot.limits)),
         shot.viewing,
     )
 }

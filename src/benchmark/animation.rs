@@ -4,6 +4,7 @@
 //! Judged as a video by ColorVideoVDP, which no rule optimises, against frames of many samples by other seeds. Not for
 //! stills.
 
+use super::flicker::{FlickerJudge, Steadiness};
 use super::metrics::video_jod;
 use super::reference::trace_up_to;
 use crate::adaptive::settings::{Limits, LoopSettings, Sampling};
@@ -59,6 +60,12 @@ pub struct AnimationRow {
     /// Samples a pixel with which evenly sampled frames look like those of the rule for motion; `None` where even the most
     /// that were tried look worse.
     pub uniform_spp: Option<f64>,
+    /// Visibility of the error in single frames by the rule for motion, at the 99th percentile.
+    pub visibility: f64,
+    /// Root mean square visibility of what changes from frame to frame by the rule for motion, what moves brought together.
+    pub flicker: f64,
+    /// The same of even sampling whose single frames are as visible; `None` where none that was tried is.
+    pub uniform_flicker: Option<f64>,
 }
 
 /// Seconds of scene time at which shots begin.
@@ -136,11 +143,15 @@ impl<'a> Bench<'a> {
         };
         let (motion_spp, motion) = self.adaptive(false)?;
         let (still_spp, still) = self.adaptive(true)?;
+        let tracers: Vec<PathTracer> = (0..self.scenes.len()).map(|index| self.tracer(index, 0)).collect();
+        let judge = FlickerJudge::new(&reference, &tracers, &self.scenes, &self.shot.viewing)?;
+        let steady = judge.judge(&motion);
         let (motion_jod, still_jod) = (jod(motion)?, jod(still)?);
         let counts: Vec<u32> =
             (2..).map(|power| 1 << power).take_while(|n| 2 * n <= self.settings.reference_spp).collect();
-        let mut curve = Vec::new();
+        let (mut curve, mut steadiness) = (Vec::new(), Vec::new());
         for (&spp, frames) in counts.iter().zip(self.uniform(0, &counts)?) {
+            steadiness.push(judge.judge(&frames));
             curve.push((f64::from(spp), jod(frames)?));
         }
         Ok(AnimationRow {
@@ -151,6 +162,9 @@ impl<'a> Bench<'a> {
             still_spp,
             still_jod,
             uniform_spp: where_reached(&curve, motion_jod),
+            visibility: steady.visibility,
+            flicker: steady.flicker,
+            uniform_flicker: flicker_at(&steadiness, steady.visibility),
         })
     }
 
@@ -207,9 +221,26 @@ fn where_reached(curve: &[(f64, f64)], quality: f64) -> Option<f64> {
     })
 }
 
+/// Flicker where the frames of a row of ever more samples have a visibility, straight between points in the logarithms.
+fn flicker_at(steadiness: &[Steadiness], visibility: f64) -> Option<f64> {
+    let pair =
+        steadiness.windows(2).find(|pair| pair[0].visibility >= visibility && pair[1].visibility < visibility)?;
+    let share = (visibility / pair[0].visibility).ln() / (pair[1].visibility / pair[0].visibility).ln();
+    Some(pair[0].flicker * (pair[1].flicker / pair[0].flicker).powf(share))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn flicker_is_read_at_a_visibility() {
+        let steadiness =
+            [(8.0, 4.0), (4.0, 2.0), (2.0, 1.0)].map(|(visibility, flicker)| Steadiness { visibility, flicker });
+        assert!((flicker_at(&steadiness, 4.0).expect("reached") - 2.0).abs() < 1e-9);
+        assert!((flicker_at(&steadiness, 32f64.sqrt()).expect("reached") - 8f64.sqrt()).abs() < 1e-9);
+        assert_eq!(flicker_at(&steadiness, 1.0), None);
+    }
 
     #[test]
     fn curves_are_read_between_their_points() {

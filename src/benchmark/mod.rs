@@ -11,6 +11,7 @@ mod animation;
 mod arm;
 mod curve;
 mod denoise;
+mod flicker;
 mod metrics;
 mod oracle;
 mod pictures;

@@ -1,39 +1,26 @@
 //! `fechner animate`: the frames of a scene that moves, and a video of them.
 
+mod contact;
 mod frames;
 mod motion;
+mod settings;
+mod shot;
 mod source;
+mod time;
 mod video;
 
-use super::console::{Console, duration_in_words};
 use super::denoise::DenoiseChoice;
-use super::job::{Quality, Size, check_memory, parse_size};
-use super::report::Report;
-use super::seeing::{self, parse_positive};
-use anyhow::{Context, Result, bail};
+use super::job::{Quality, Size, parse_size};
+use super::seeing::parse_positive;
+use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
-use fechner::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, Sampling};
-use fechner::animate::name::FrameName;
-use fechner::animate::track::{Track, TrackFrame};
-use fechner::animate::{FrameScenes, RenderedFrame, SceneSource as _, ShotSettings, render_frame};
-use fechner::checkpoint::SettingsRecord;
-use fechner::denoise::Denoiser;
-use fechner::integrator::TraceSettings;
-use fechner::output::rendered::{Background, layers, write_display_png};
-use fechner::output::{self, Format};
-use fechner::scene::Scene;
-use fechner::scene::hash::content_hash;
-use fechner_perception::model;
-use fechner_perception::tone::{self, ToneOperator};
-use frames::{Frames, parse_frames, parse_rate};
-use motion::push_velocity;
-use serde::{Deserialize, Serialize};
-use source::FileSource;
-use std::io::Write as _;
+use frames::{Frames, parse_frames};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::time::Instant;
+use time::ShotClock;
 use video::VideoFormat;
+
+pub(super) use frames::parse_rate;
+pub(super) use shot::{FrameJob, Shot};
 
 /// Arguments of `animate`.
 #[derive(Debug, Args)]
@@ -67,9 +54,12 @@ pub(super) struct AnimateArguments {
     /// The same, by name.
     #[arg(long, value_enum, conflicts_with = "visibility", help_heading = "Until")]
     quality: Option<Quality>,
-    /// A frame is done at this mean number of samples a pixel.
+    /// A budget of this mean number of samples a pixel over the whole shot, spent on the frames that need it most.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Until")]
     spp: Option<u32>,
+    /// A budget of this many seconds for all frames that are rendered, spent on those that need it most.
+    #[arg(long, value_name = "S", value_parser = parse_positive, conflicts_with = "spp", help_heading = "Until")]
+    time: Option<f64>,
     /// Most samples of one pixel.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(16..), help_heading = "Until")]
     max_spp: Option<u32>,
@@ -129,34 +119,6 @@ enum AovNames {
     Blender,
 }
 
-/// The figures of one frame, beside its picture; by `key` a later run knows that it need not be made again.
-#[derive(Serialize, Deserialize)]
-struct FrameRecord {
-    key: String,
-    frame: u32,
-    seconds_of_shot: f64,
-    report: serde_json::Value,
-}
-
-/// What a frame is made from and judged by.
-pub(super) struct FrameJob {
-    pub(super) scenes: FrameScenes,
-    pub(super) settings: LoopSettings,
-    /// All that its file depends on, as a name.
-    pub(super) key: String,
-}
-
-/// A shot on its way into files.
-pub(super) struct Shot<'a> {
-    arguments: &'a AnimateArguments,
-    source: FileSource<'a>,
-    pub(super) settings: ShotSettings,
-    operator_name: String,
-    exposure_stops: Option<f64>,
-    name: FrameName,
-    format: Format,
-}
-
 /// Renders what is not there yet, and writes it.
 pub(super) fn run(arguments: &AnimateArguments) -> Result<()> {
     let pool = rayon::ThreadPoolBuilder::new()
@@ -171,8 +133,9 @@ fn render_shot(arguments: &AnimateArguments) -> Result<()> {
     arguments.video()?;
     let shot = Shot::new(arguments)?;
     let track = shot.track()?;
-    for frame in arguments.frames.first..=arguments.frames.last {
-        shot.make(frame, &track)?;
+    let mut clock = arguments.time.map(|seconds| ShotClock::start(&shot, &track, seconds)).transpose()?;
+    for frame in arguments.frame_numbers() {
+        shot.make(frame, &track, clock.as_mut().map(|clock| clock.share(frame)))?;
     }
     shot.conclude(&track)
 }
@@ -187,227 +150,4 @@ impl AnimateArguments {
     fn video(&self) -> Result<Option<(&Path, VideoFormat)>> {
         self.video.as_deref().map(|path| VideoFormat::of(path).map(|format| (path, format))).transpose()
     }
-}
-
-impl<'a> Shot<'a> {
-    pub(super) fn new(arguments: &'a AnimateArguments) -> Result<Self> {
-        let name = FrameName::parse(&arguments.output).with_context(|| {
-            format!(
-                "{}: a sequence's name has # for each digit of the frame's number, as out/shot.####.exr",
-                arguments.output
-            )
-        })?;
-        let whole = arguments.shot.unwrap_or(arguments.frames);
-        if arguments.frames.first < whole.first || arguments.frames.last > whole.last {
-            bail!("--frames reaches beyond --shot");
-        }
-        let first_file = name.of(arguments.frames.first);
-        if let Some(folder) = first_file.parent().filter(|folder| !folder.as_os_str().is_empty()) {
-            std::fs::create_dir_all(folder).with_context(|| format!("{}", folder.display()))?;
-        }
-        let format = output::check_target(&first_file)?;
-        let source = FileSource::new(arguments);
-        let scene = source.at(f64::from(arguments.frames.first) / arguments.fps)?;
-        for note in &scene.notes {
-            eprintln!("note: {note}");
-        }
-        let settings = shot_settings(arguments, &scene, whole)?;
-        let operator_name = arguments.operator.as_deref().or(scene.viewing.operator.as_deref()).unwrap_or("constant");
-        let exposure_stops = arguments.exposure.or(scene.viewing.exposure_stops);
-        let operator_name = operator_name.to_owned();
-        let shot = Self { arguments, source, settings, operator_name, exposure_stops, name, format };
-        shot.operator()?;
-        Ok(shot)
-    }
-
-    /// For whose eyes its frames are, as their films say it.
-    pub(super) fn settings_record(&self) -> SettingsRecord {
-        SettingsRecord {
-            sampling: self.settings.sampling,
-            allocation: AllocationRule::default(),
-            model: model::names()[0].to_owned(),
-            viewing: self.settings.viewing.clone(),
-            nits_per_unit: self.settings.nits_per_unit,
-            operator: self.operator_name.clone(),
-            exposure_stops: self.exposure_stops,
-            importance: None,
-            denoiser: self.settings.denoiser.as_ref().map(Denoiser::kind),
-        }
-    }
-
-    fn operator(&self) -> Result<Box<dyn ToneOperator>> {
-        tone::operator(&self.operator_name, self.exposure_stops).with_context(|| {
-            format!(
-                "there is no tone operator \"{}\"; known: {}",
-                self.operator_name,
-                tone::operator_names().join(", ")
-            )
-        })
-    }
-
-    /// The track that lies beside the frames, or a new one where there is none for this shot.
-    pub(super) fn track(&self) -> Result<Track> {
-        let file = self.name.of_shot("track.json");
-        let operator = self.operator()?;
-        let wanted = self.arguments.frames;
-        if let Some(track) = read_json::<Track>(&file) {
-            let is_of = |frame: u32| -> Result<bool> {
-                let scene = self.source.at(self.settings.seconds(f64::from(frame)))?;
-                Ok(track.of_frame(&self.settings, operator.as_ref(), frame, &scene).is_some())
-            };
-            // Each frame is looked at again before it is rendered; the ends tell here whether the track is of use at all.
-            if is_of(wanted.first)? && is_of(wanted.last)? {
-                return Ok(track);
-            }
-        }
-        let count = self.settings.last - self.settings.first + 1;
-        let started = Instant::now();
-        let track = Track::make(&self.source, &self.settings, operator.as_ref(), &|_| {})?;
-        eprintln!("looked at {count} frames in {}", duration_in_words(started.elapsed().as_secs_f64()));
-        let text = serde_json::to_string(&track).context("the track could not be put into words")?;
-        output::write_beside(&file, |file| file.write_all(text.as_bytes()))?;
-        Ok(track)
-    }
-
-    /// Renders a frame, unless it is there.
-    fn make(&self, frame: u32, track: &Track) -> Result<()> {
-        let job = self.frame(frame, track)?;
-        let file = self.name.of(frame);
-        if self.record(frame).is_some_and(|record| record.key == job.key) && file.is_file() {
-            eprintln!("{}: is there", file.display());
-            return Ok(());
-        }
-        let console = Console::new(None);
-        let made = render_frame(&job.scenes, &self.settings, &job.settings, frame, &console)?;
-        console.finish();
-        self.keep(frame, &job, &made).map(drop)
-    }
-
-    /// What a frame shows.
-    pub(super) fn scene(&self, frame: u32) -> Result<Arc<Scene>> {
-        Ok(self.source.at(self.settings.seconds(f64::from(frame)))?)
-    }
-
-    /// What a frame is made from and judged by.
-    pub(super) fn frame(&self, frame: u32, track: &Track) -> Result<FrameJob> {
-        let scenes = FrameScenes::load(&self.source, &self.settings, frame)?;
-        let operator = self.operator()?;
-        let Some(of_track) = track.of_frame(&self.settings, operator.as_ref(), frame, &scenes.now) else {
-            bail!("{}: not of this scene any more: delete it", self.name.of_shot("track.json").display());
-        };
-        let settings = self.settings.frame_settings(operator, of_track);
-        let key = self.key(&settings, of_track, &scenes);
-        Ok(FrameJob { scenes, settings, key })
-    }
-
-    /// Writes a frame and its record.
-    pub(super) fn keep(&self, frame: u32, job: &FrameJob, made: &RenderedFrame) -> Result<Report> {
-        let file = self.name.of(frame);
-        let scene_name = self.arguments.scene.display().to_string();
-        let report = Report::new(&scene_name, &[self.settings.trace.seed], &job.settings, &made.rendered);
-        self.write(&file, made, &job.settings, &report)?;
-        let record = FrameRecord {
-            key: job.key.clone(),
-            frame,
-            seconds_of_shot: self.settings.seconds(f64::from(frame)),
-            report: serde_json::to_value(&report).context("the report could not be put into words")?,
-        };
-        let text = serde_json::to_string_pretty(&record).context("the record could not be put into words")?;
-        output::write_beside(&file.with_extension("json"), |file| file.write_all(text.as_bytes()))?;
-        eprintln!("{}: {}", file.display(), report.in_a_line());
-        Ok(report)
-    }
-
-    /// Writes what only the whole shot has, if all its frames are there.
-    pub(super) fn conclude(&self, track: &Track) -> Result<()> {
-        let records = self.records();
-        let missing = self.settings.last - self.settings.first + 1 - records.len() as u32;
-        if missing > 0 {
-            eprintln!("{missing} frames of the shot are not there yet.");
-            return Ok(());
-        }
-        let text = serde_json::to_string_pretty(&records).context("the shot could not be put into words")?;
-        output::write_beside(&self.name.of_shot("json"), |file| file.write_all(text.as_bytes()))?;
-        if let Some((path, format)) = self.arguments.video()? {
-            let files = (self.settings.first..=self.settings.last).map(|frame| self.name.of(frame));
-            let fits = |frame: usize| track.frames[frame].fitted.clone().restore();
-            video::write(path, format, files, &fits, &self.settings)?;
-        }
-        Ok(())
-    }
-
-    fn write(&self, file: &Path, made: &RenderedFrame, settings: &LoopSettings, report: &Report) -> Result<()> {
-        match self.format {
-            Format::Png => write_display_png(file, &made.rendered, &settings.viewing.display, Background::Shown)?,
-            Format::Exr => {
-                let attributes = report.attributes();
-                let mut picture = layers(&made.rendered, settings, Background::Shown, &attributes);
-                push_velocity(&mut picture, &made.velocity, self.arguments.aov_names);
-                output::write_exr(file, &picture)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// All that a frame's file depends on, as a name.
-    fn key(&self, settings: &LoopSettings, track: &TrackFrame, scenes: &FrameScenes) -> String {
-        let text = format!(
-            "{}|{track:?}|{}|{}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}",
-            env!("CARGO_PKG_VERSION"),
-            content_hash(&scenes.previous),
-            content_hash(&scenes.next),
-            self.settings.trace,
-            settings.sampling,
-            settings.denoiser.as_ref().map(Denoiser::name),
-            settings.limits,
-            settings.viewing,
-            settings.frames,
-            self.arguments.aov_names
-        );
-        blake3::hash(text.as_bytes()).to_hex()[..32].to_owned()
-    }
-
-    fn record(&self, frame: u32) -> Option<FrameRecord> {
-        read_json(&self.name.of(frame).with_extension("json"))
-    }
-
-    /// Records of the frames that are there.
-    fn records(&self) -> Vec<FrameRecord> {
-        (self.settings.first..=self.settings.last).filter_map(|frame| self.record(frame)).collect()
-    }
-}
-
-/// What is in a file, or nothing if it is not there or not whole.
-fn read_json<T: serde::de::DeserializeOwned>(file: &Path) -> Option<T> {
-    serde_json::from_slice(&std::fs::read(file).ok()?).ok()
-}
-
-fn shot_settings(arguments: &AnimateArguments, scene: &Scene, shot: Frames) -> Result<ShotSettings> {
-    let size = arguments.size.unwrap_or(Size { width: scene.film.width, height: scene.film.height });
-    check_memory(size)?;
-    let display = arguments.display.as_deref().or(scene.viewing.display.as_deref()).unwrap_or("desktop");
-    let asked = arguments.visibility.or(arguments.quality.map(Quality::visibility));
-    let (sampling, otherwise) = match arguments.sampling {
-        SamplingChoice::Adaptive => (Sampling::Adaptive, scene.viewing.visibility.unwrap_or(1.0)),
-        SamplingChoice::Uniform if arguments.spp.is_some() => (Sampling::Uniform, 0.0),
-        SamplingChoice::Uniform => (Sampling::Uniform, scene.viewing.visibility.unwrap_or(1.0)),
-    };
-    Ok(ShotSettings {
-        first: shot.first,
-        last: shot.last,
-        frames_per_second: arguments.fps,
-        pausable: arguments.pausable,
-        trace: TraceSettings::new(size.width, size.height, arguments.seed),
-        sampling,
-        limits: Limits {
-            mean_samples: arguments.spp,
-            max_samples: arguments.max_spp.unwrap_or(DEFAULT_MAX_SAMPLES),
-            pilot_samples: arguments.denoise.pilot_samples(),
-            ..Limits::of_visibility(asked.unwrap_or(otherwise))
-        },
-        viewing: seeing::viewing(display, None)?,
-        nits_per_unit: arguments.nits_per_unit.unwrap_or(scene.nits_per_unit),
-        adapted_to_cd_m2: arguments.adapted_to,
-        denoiser: arguments.denoise.kind().map(Denoiser::open).transpose()?,
-    })
 }

@@ -1,5 +1,6 @@
 //! `fechner bench`: what adaptive sampling saves.
 
+use super::animate::parse_rate;
 use super::denoise::DenoiseChoice;
 use super::seeing::parse_positive;
 use anyhow::{Result, bail};
@@ -33,9 +34,13 @@ pub(super) struct BenchArguments {
     /// Display preset.
     #[arg(long, value_name = "NAME", default_value = "desktop")]
     display: String,
-    /// Samples of the reference, as a multiple of what uniform sampling needs (at least 512, at most 16384 a pixel).
+    /// Samples of the reference, as a multiple of what uniform sampling needs (at least 512, at most 16384 a pixel); in the
+    /// suite animation, of 64 a pixel.
     #[arg(long, value_name = "X", value_parser = parse_positive, default_value_t = 16.0)]
     reference_factor: f64,
+    /// Frames a second of the suite animation, in place of 24 and 60.
+    #[arg(long, value_name = "N", value_parser = parse_rate)]
+    fps: Option<f64>,
     /// Only say what uniform sampling and the optimum need by converged variances: what no rule can beat.
     #[arg(long)]
     bound: bool,
@@ -76,7 +81,7 @@ const STILLS: [&str; 10] = [
     "veach-mis",
 ];
 /// Its shots.
-const SHOTS: [&str; 1] = ["rolling-ball"];
+const SHOTS: [&str; 5] = ["light-switch", "opening-door", "rolling-ball", "textured-room", "turntable"];
 
 /// Runs and prints the table.
 pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
@@ -214,28 +219,45 @@ fn run_animation(arguments: &BenchArguments) -> Result<()> {
         scenes: scenes_or(&SHOTS, arguments)?,
         size: (width, (width * 9).div_ceil(16)),
         frames: 8,
-        rates: vec![24.0, 60.0],
+        rates: arguments.fps.map_or(vec![24.0, 60.0], |rate| vec![rate]),
         visibility: arguments.visibility.unwrap_or(2.0),
-        reference_spp: 1024,
+        reference_spp: (64.0 * arguments.reference_factor).clamp(64.0, 16384.0) as u32,
         display: arguments.display.clone(),
     };
     let rows = animation(&settings, &|line: &str| eprintln!("{line}"))?;
     println!(
-        "| shot | frames a second | motion: spp, JOD | still: spp, JOD | still / motion | even, as good: spp | even / motion |"
+        "| shot | frames a second | motion: spp, JOD | still: spp, JOD | still / motion | even, as good: spp | even / motion | \
+         flicker | of even, at equal visibility |"
     );
-    println!("| --- | --- | --- | --- | --- | --- | --- |");
-    for row in rows {
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    for row in &rows {
         let ratio = row.still_spp / row.motion_spp;
         let even = row
             .uniform_spp
             .map_or_else(|| "more than tried | ".to_owned(), |spp| format!("{spp:.0} | {:.2}", spp / row.motion_spp));
-        let AnimationRow { scene, frames_per_second, motion_spp, motion_jod, still_spp, still_jod, .. } = row;
+        let AnimationRow { scene, frames_per_second, motion_spp, motion_jod, still_spp, still_jod, flicker, .. } = row;
+        let even_flicker = row.uniform_flicker.map_or_else(|| "not tried".to_owned(), |even| format!("{even:.2}"));
         println!(
             "| {scene} | {frames_per_second} | {motion_spp:.0}, {motion_jod:.2} | {still_spp:.0}, {still_jod:.2} | \
-             {ratio:.2} | {even} |"
+             {ratio:.2} | {even} | {flicker:.2} | {even_flicker} |"
+        );
+    }
+    for &rate in &settings.rates {
+        let of_rate = || rows.iter().filter(|row| row.frames_per_second == rate);
+        let still = geometric_mean(of_rate().map(|row| row.still_spp / row.motion_spp));
+        let even = geometric_mean(of_rate().filter_map(|row| Some(row.uniform_spp? / row.motion_spp)));
+        let flicker = geometric_mean(of_rate().filter_map(|row| Some(row.flicker / row.uniform_flicker?)));
+        println!(
+            "at {rate}: still / motion {still:.2}, even / motion {even:.2}, flicker over that of even {flicker:.2}"
         );
     }
     Ok(())
+}
+
+/// 1 of nothing.
+fn geometric_mean(values: impl Iterator<Item = f64>) -> f64 {
+    let logarithms: Vec<f64> = values.map(f64::ln).collect();
+    (logarithms.iter().sum::<f64>() / logarithms.len().max(1) as f64).exp()
 }
 
 /// Arms by name, and those that others are compared with.

@@ -65,6 +65,38 @@ pub(super) fn motion(exr: &ExrImage) -> Option<(&str, [&[f32]; 2])> {
     None
 }
 
+/// Motion of what a frame shows in both directions of time, pixels, x to the right and y down.
+#[derive(Debug, PartialEq)]
+pub(super) struct BothMotions {
+    pub(super) to_next: [Vec<f32>; 2],
+    pub(super) to_previous: [Vec<f32>; 2],
+}
+
+/// What layers of motion to the previous frame are called.
+const BACKWARD_LAYERS: [&str; 2] = ["velocity_previous", "backward"];
+
+/// Both motions: ours, Blender's `Vector` of four, or any that [`motion`] finds, which is taken to have been the same before.
+pub(super) fn both_motions(exr: &ExrImage) -> Option<BothMotions> {
+    let negated = |values: &[f32]| values.iter().map(|value| -value).collect::<Vec<f32>>();
+    let is_called = |layer: &str, name: &str| layer.split('.').any(|part| part.eq_ignore_ascii_case(name));
+    let of_four = layers_with(exr, &["X", "Y", "Z", "W"]).into_iter().find(|layer| is_called(layer, "vector"));
+    if let Some(layer) = of_four {
+        // Where it was less where it is, then where it is less where it will be; y upwards.
+        let [Some(x), Some(y), Some(z), Some(w)] = ["X", "Y", "Z", "W"].map(|part| part_of(exr, layer, part)) else {
+            return None;
+        };
+        return Some(BothMotions { to_next: [negated(z), w.to_vec()], to_previous: [x.to_vec(), negated(y)] });
+    }
+    let (_, [x, y]) = motion(exr)?;
+    let backward = VECTOR_PARTS.iter().find_map(|[across, down]| {
+        let is_backward = |layer: &&str| BACKWARD_LAYERS.iter().any(|name| is_called(layer, name));
+        let layer = layers_with(exr, &[across, down]).into_iter().find(is_backward)?;
+        Some([part_of(exr, layer, across)?.to_vec(), part_of(exr, layer, down)?.to_vec()])
+    });
+    let to_previous = backward.unwrap_or_else(|| [negated(x), negated(y)]);
+    Some(BothMotions { to_next: [x.to_vec(), y.to_vec()], to_previous })
+}
+
 /// Layers (what stands before the last dot, perhaps nothing) that have all of `parts`, in the file's order.
 fn layers_with<'a>(exr: &'a ExrImage, parts: &[&str]) -> Vec<&'a str> {
     let mut layers: Vec<&str> = Vec::new();
@@ -159,5 +191,18 @@ mod tests {
         assert_eq!(motion_of(&["motionvector.B", "motionvector.G", "motionvector.R"]), found("motionvector", 2.0, 1.0));
         // One half of a vector, or the wrong way in time, is none.
         assert_eq!(motion_of(&["velocity.X", "backward.u", "backward.v", "normal.X", "normal.Y"]), None);
+    }
+
+    #[test]
+    fn motion_is_found_in_both_directions() {
+        let of = |names: &[&str]| {
+            let BothMotions { to_next: [a, b], to_previous: [c, d] } = both_motions(&exr(names))?;
+            Some([a[0], b[0], c[0], d[0]])
+        };
+        let ours = ["velocity.X", "velocity.Y", "velocity_previous.X", "velocity_previous.Y"];
+        assert_eq!(of(&ours), Some([0.0, 1.0, 2.0, 3.0]));
+        assert_eq!(of(&["A.Vector.W", "A.Vector.X", "A.Vector.Y", "A.Vector.Z"]), Some([-3.0, 0.0, 1.0, -2.0]));
+        assert_eq!(of(&["R", "motion.x", "motion.y"]), Some([1.0, 2.0, -1.0, -2.0]));
+        assert_eq!(of(&["R", "G", "B"]), None);
     }
 }

@@ -1,5 +1,8 @@
-//! `fechner compare`: can one picture be told from another by eye?
+//! `fechner compare`: can one picture, or one sequence of them, be told from another by eye?
 
+mod sequence;
+
+use super::animate::parse_rate;
 use super::picture::InputPicture;
 use super::seeing::SeeingArguments;
 use anyhow::{Context, Result, bail};
@@ -8,25 +11,33 @@ use fechner::output;
 use fechner_perception::csf;
 use fechner_perception::difference::{Difference, colour_difference};
 use fechner_perception::psychometric::detection_probability;
-use fechner_perception::tone;
+use fechner_perception::tone::{self, ToneOperator};
 use serde::Serialize;
 use std::io::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
 pub(super) struct CompareArguments {
-    /// The picture that is right.
+    /// The picture that is right; with # for each digit of a frame's number, a sequence of them: a.####.exr.
     reference: PathBuf,
-    /// The picture to be told from it.
+    /// The picture, or sequence, to be told from it.
     test: PathBuf,
     #[command(flatten)]
     seeing: SeeingArguments,
     /// Tone operator that shows scene-linear pictures; it is fitted to the reference.
     #[arg(long, value_name = "NAME", default_value = "constant")]
     operator: String,
-    /// Write where the difference is seen: grey below threshold, yellow to red above.
+    /// Frames a second, of sequences. Beyond its ends a sequence stands still, so that noise in the first and the last fifth
+    /// of a second is seen more as in a still.
+    #[arg(long, value_name = "N", value_parser = parse_rate)]
+    fps: Option<f64>,
+    /// Motion of what a sequence shows, in pixels a frame, which the eye follows; without it, it rests. Frames of `animate`
+    /// have it.
+    #[arg(long, value_name = "FILE.exr")]
+    velocity: Option<PathBuf>,
+    /// Write where the difference is seen: grey below threshold, yellow to red above; for a sequence with # in the name.
     #[arg(long, value_name = "FILE.png")]
     map: Option<PathBuf>,
     /// Write the figures here.
@@ -50,34 +61,23 @@ struct Figures {
 
 /// Exit status 0: the same to the eye; 1: told apart.
 pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
+    let has_number = |path: &Path| path.to_string_lossy().contains('#');
+    if has_number(&arguments.reference) || has_number(&arguments.test) {
+        return sequence::run(arguments);
+    }
+    if arguments.fps.is_some() || arguments.velocity.is_some() {
+        bail!("--fps and --velocity are for sequences, whose names have # for each digit of the frame's number");
+    }
     for target in arguments.map.iter().chain(&arguments.json) {
         output::check_writable(target)?;
     }
     let nits_per_unit = arguments.seeing.nits_per_unit;
     let reference = InputPicture::read(&arguments.reference, nits_per_unit)?;
     let test = InputPicture::read(&arguments.test, nits_per_unit)?;
-    if reference.size() != test.size() {
-        let ((a, b), (c, d)) = (reference.size(), test.size());
-        bail!(
-            "{} has {a}x{b} pixels and {} has {c}x{d}: only pictures of one size can be compared",
-            arguments.reference.display(),
-            arguments.test.display()
-        );
-    }
-    let [wide, wide_too] = [&reference, &test].map(InputPicture::pixel_aspect_ratio);
-    if (wide / wide_too - 1.0).abs() > 1e-3 {
-        bail!(
-            "{} has pixels {wide} times as wide as high and {} {wide_too} times: only pictures of one shape can be compared",
-            arguments.reference.display(),
-            arguments.test.display()
-        );
-    }
+    check_alike((&arguments.reference, &reference), (&arguments.test, &test))?;
     let viewing = reference.viewed(&arguments.seeing.viewing()?)?;
     let csf = csf::by_name(&arguments.seeing.csf, &viewing)?;
-    let operator = tone::operator(&arguments.operator, None).with_context(|| {
-        let known = tone::operator_names().join(", ");
-        format!("there is no tone operator \"{}\"; known: {known}", arguments.operator)
-    })?;
+    let operator = known_operator(&arguments.operator)?;
     let fitted = reference.fit(operator.as_ref(), &viewing).or_else(|| test.fit(operator.as_ref(), &viewing));
     let (width, height) = reference.size();
     let seen = colour_difference(
@@ -120,8 +120,34 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
     Ok(ExitCode::from(u8::from(figures.is_visible)))
 }
 
+fn known_operator(name: &str) -> Result<Box<dyn ToneOperator>> {
+    tone::operator(name, None).with_context(|| {
+        let known = tone::operator_names().join(", ");
+        format!("there is no tone operator \"{name}\"; known: {known}")
+    })
+}
+
+/// Only pictures of one size and shape can be compared.
+fn check_alike(
+    (reference_file, reference): (&Path, &InputPicture),
+    (test_file, test): (&Path, &InputPicture),
+) -> Result<()> {
+    let (a, b) = (reference_file.display(), test_file.display());
+    if reference.size() != test.size() {
+        let ((w, h), (x, y)) = (reference.size(), test.size());
+        bail!("{a} has {w}x{h} pixels and {b} has {x}x{y}: only pictures of one size can be compared");
+    }
+    let [wide, wide_too] = [reference, test].map(InputPicture::pixel_aspect_ratio);
+    if (wide / wide_too - 1.0).abs() > 1e-3 {
+        bail!(
+            "{a} has pixels {wide} times as wide as high and {b} {wide_too} times: only pictures of one shape can be compared"
+        );
+    }
+    Ok(())
+}
+
 /// Grey up to threshold, then yellow at v = 1 to red at v = 4 and above.
-fn write_map(path: &std::path::Path, seen: &Difference) -> Result<()> {
+fn write_map(path: &Path, seen: &Difference) -> Result<()> {
     let color = |v: f32| {
         if v <= 1.0 {
             [0.25 * v; 3]

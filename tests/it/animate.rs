@@ -139,3 +139,70 @@ fn bad_arguments_are_named() {
         assert!(output.status.code() == Some(2) && said.contains(expected), "{arguments:?}: {said}");
     }
 }
+
+/// A sequence does not differ from itself; flicker of its light does, and the same change that stays does not where it is
+/// small.
+#[test]
+fn sequences_are_compared_as_they_move() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    animate(at, &["--frames", "0..3", "--fps", "24", "--spp", "16", "-o", "a.##.exr"]);
+    animate(at, &["--frames", "0..3", "--fps", "24", "--spp", "16", "--seed", "7", "-o", "b.##.exr"]);
+    let compare = |arguments: &[&str]| {
+        let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+        let output = command.current_dir(at).arg("compare").args(arguments).output().expect("it starts");
+        let said = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+        (output.status.code(), said)
+    };
+    let moving = ["--fps", "24", "--velocity", "a.##.exr"];
+    let (status, said) = compare(&[&["a.##.exr", "a.##.exr"], &moving[..]].concat());
+    assert_eq!(status, Some(0), "{said}");
+    let files = ["--map", "map.##.png", "--json", "figures.json"];
+    let (status, said) = compare(&[&["a.##.exr", "b.##.exr"], &moving[..], &files].concat());
+    assert_eq!(status, Some(1), "{said}");
+    let figures: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(at.join("figures.json")).expect("written")).expect("JSON");
+    assert!(figures["worst_visibility"].as_f64().expect("a number") > 1.0 && figures["eye_follows"] == true);
+    assert_eq!(figures["frames"].as_array().expect("frames").len(), 4);
+    assert!((0..4).all(|frame| at.join(format!("map.0{frame}.png")).is_file()));
+    for (arguments, expected) in [
+        (&["a.##.exr", "b.##.exr"][..], "--fps"),
+        (&["a.##.exr", "b.00.exr", "--fps", "24"], "has # for each digit"),
+        (&["c.##.exr", "b.##.exr", "--fps", "24"], "no such files"),
+        (&["a.00.exr", "b.00.exr", "--fps", "24"], "are for sequences"),
+        (&["a.##.exr", "b.##.exr", "--fps", "24", "--csf", "daly98"], "only castle"),
+    ] {
+        let (status, said) = compare(arguments);
+        assert!(status == Some(2) && said.contains(expected), "{arguments:?}: {said}");
+    }
+}
+
+/// A budget of the shot adds up, whoever renders which of its frames; a whole shot has a contact sheet.
+#[test]
+fn a_budget_is_the_whole_shots() {
+    let [at_once, alone] = [(); 2].map(|()| tempfile::tempdir().expect("a folder"));
+    let common = ["--fps", "4", "--spp", "24", "-o", "out/shot.##.exr"];
+    animate(at_once.path(), &[&["--frames", "0..3"], &common[..]].concat());
+    animate(alone.path(), &[&["--frames", "2..2", "--shot", "0..3", "--threads", "1"], &common[..]].concat());
+    let bytes = |folder: &Path| std::fs::read(folder.join("out/shot.02.exr")).expect("read");
+    assert!(bytes(at_once.path()) == bytes(alone.path()), "frame 2 differs");
+    let json = |name: &str| -> serde_json::Value {
+        let text = std::fs::read_to_string(at_once.path().join("out").join(name)).expect("written");
+        serde_json::from_str(&text).expect("JSON")
+    };
+    let track = json("shot.track.json");
+    let shares =
+        track["frames"].as_array().expect("frames").iter().map(|f| f["mean_samples"].as_u64().expect("a share"));
+    assert_eq!(shares.sum::<u64>(), 4 * 24);
+    let shot = json("shot.json");
+    let spent =
+        shot.as_array().expect("frames").iter().map(|f| f["report"]["samples_total"].as_u64().expect("a count"));
+    assert!(spent.sum::<u64>() <= 4 * 25 * 24 * 16);
+    let sheet = image::open(at_once.path().join("out/shot.contact.png")).expect("a contact sheet");
+    // Two by two, 4 pixels between them and around.
+    assert_eq!((sheet.width(), sheet.height()), (2 * 24 + 12, 2 * 16 + 12));
+    assert!(!alone.path().join("out/shot.contact.png").exists());
+    // By time: every frame has its pilot at the least.
+    let said = animate(at_once.path(), &["--frames", "0..1", "--time", "0.2", "-o", "time.##.png"]);
+    assert!(said.contains("time.01.png: ") && said.contains("spp in"), "{said}");
+}

@@ -7,6 +7,7 @@ use fechner::film::Film;
 use fechner::geometry::Ray;
 use fechner::integrator::{BlockWork, Crop, PathTracer, SamplePlan, TraceSettings};
 use fechner::sampler::{Half, Sequence};
+use fechner::scene::hash::content_hash;
 use fechner::scene::load::{LoadOptions, load};
 use fechner::scene::{Motion, Scene};
 use glam::{Affine3A, Quat, Vec3, vec3a};
@@ -232,4 +233,45 @@ fn keyframes_move_things_while_the_shutter_is_open() {
     assert!((sphere.at(0.5).matrix3.x_axis.length() - 1.5).abs() < 1e-5);
     let still = load(&file, &LoadOptions { frame_time: 9.0, ..LoadOptions::default() }).expect("a sound scene");
     assert!(!still.moves(), "after the last keyframe everything rests");
+}
+
+/// Keyframes of materials and lights: what they say at the frame's time, as if it had been written; what is wrong is named
+/// with the keyframes' line.
+#[test]
+fn lights_and_materials_change_in_time() {
+    let of = |light: &str, material: &str| {
+        format!(
+            "[camera]\nposition = [0, 0, 5]\nlook_at = [0, 0, 0]\n[materials.red]\ntype = \"diffuse\"\n{material}\n\
+             [[objects]]\nsphere = {{ center = [0, 0, 0], radius = 1 }}\nmaterial = \"red\"\n\
+             [[lights]]\ntype = \"point\"\nposition = [0, 3, 0]\n{light}\n"
+        )
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("changing.toml");
+    let at = |text: &str, frame_time: f64| {
+        std::fs::write(&file, text).expect("written");
+        load(&file, &LoadOptions { frame_time, ..LoadOptions::default() })
+    };
+    let moving = of(
+        "keyframes = [ { time = 1, intensity_cd = 10, color = [1, 1, 1] }, { time = 3, intensity_cd = 30, color = [1, 1, 1] } ]",
+        "keyframes = [ { time = 0, reflectance = [0.5, 0, 0] }, { time = 2, reflectance = [0, 0.5, 0] } ]",
+    );
+    let fixed = of("intensity_cd = 15\ncolor = [1, 1, 1]", "reflectance = [0.125, 0.375, 0]");
+    let (moving, fixed) = (at(&moving, 1.5).expect("sound"), at(&fixed, 1.5).expect("sound"));
+    assert_eq!(content_hash(&moving), content_hash(&fixed));
+    for (light, material, expected) in [
+        ("keyframes = [ { time = 0, intensity_cd = -1 } ]", "reflectance = 0.5", [":13:", "negative"]),
+        ("intensity_cd = 5", "keyframes = [ { time = 0, reflectence = 0.5 } ]", [":6:", "reflectence"]),
+        ("intensity_cd = 5", "keyframes = []", [":6:", "each needs a time"]),
+        (
+            "intensity_cd = 5",
+            "keyframes = [ { time = 1, reflectance = 0.1 }, { time = 1, reflectance = 0.2 } ]",
+            [":6:", "increase"],
+        ),
+        ("intensity_cd = 5", "reflectance = 0.1\nkeyframes = [ { time = 1, reflectance = 0.1 } ]", [":6:", "as well"]),
+        ("intensity_cd = 5", "keyframes = [ { time = 1, reflectance = \"red\" } ]", [":6:", "expected a number"]),
+    ] {
+        let said = at(&of(light, material), 0.0).expect_err("not sound").to_string();
+        assert!(expected.iter().all(|part| said.contains(part)), "{said}");
+    }
 }

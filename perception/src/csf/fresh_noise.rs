@@ -37,7 +37,7 @@ const LOWEST_DECADE: f64 = -3.0;
 const HIGHEST_DECADE: f64 = 4.0;
 const DECADE_STEPS: usize = 4;
 /// Beyond this nothing flickers for the eye: the sustained channel is at e⁻⁴³, the transient at 4 %, both times sinc².
-const HIGHEST_HZ: f64 = 120.0;
+pub(super) const HIGHEST_HZ: f64 = 120.0;
 /// Steps of the integrals: at most this, and a sixteenth of the frame rate.
 const HZ_STEP: f64 = 0.25;
 
@@ -108,15 +108,11 @@ impl FrameTiming {
     /// [`Error::OutOfRange`] for an impossible timing.
     pub fn chromatic_energy(self, channel: ChromaticChannel) -> Result<f64, Error> {
         self.check()?;
-        let (scale, exponent) = match channel {
-            ChromaticChannel::RedGreen => (16.4325, 1.155_91),
-            ChromaticChannel::YellowViolet => (7.150_12, 0.969_123),
-        };
-        Ok(self.seen_energy(|hz| (-hz.powf(exponent) / scale).exp().powi(2)))
+        Ok(self.seen_energy(|hz| chromatic_response(channel, hz).powi(2)))
     }
 
     /// ∫ 2T sinc²(f T p) r(f) df over what flickers for the eye, r being a squared response.
-    fn seen_energy(self, squared_response: impl Fn(f64) -> f64) -> f64 {
+    pub(super) fn seen_energy(self, squared_response: impl Fn(f64) -> f64) -> f64 {
         let frame_s = 1.0 / self.frames_per_second;
         let density = |hz: f64| {
             let phase = PI * hz * frame_s * self.persistence;
@@ -129,6 +125,15 @@ impl FrameTiming {
         // Frames slower than the eye's own integration stand still for it, and no noise is seen better than that.
         (energy * hz_step).min(1.0)
     }
+}
+
+/// Share of a chromatic channel's sensitivity that is left at a flicker frequency in Hz.
+pub(super) fn chromatic_response(channel: ChromaticChannel, flicker_hz: f64) -> f64 {
+    let (scale, exponent) = match channel {
+        ChromaticChannel::RedGreen => (16.4325, 1.155_91),
+        ChromaticChannel::YellowViolet => (7.150_12, 0.969_123),
+    };
+    (-flicker_hz.powf(exponent) / scale).exp()
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ pub(super) fn parse_frames(text: &str) -> Result<Frames, String> {
     if frames.first > frames.last || frames.last - frames.first >= 1_000_000 { Err(wrong()) } else { Ok(frames) }
 }
 
-pub(super) fn parse_rate(text: &str) -> Result<f64, String> {
+pub(in crate::cli) fn parse_rate(text: &str) -> Result<f64, String> {
     parse_positive(text).and_then(|rate| {
         if (1.0..=1000.0).contains(&rate) {
             Ok(rate)

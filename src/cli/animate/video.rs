@@ -93,16 +93,26 @@ fn stream<W: Write>(
 ) -> Result<()> {
     let mut video = Y4mWriter::new(to, shot.trace.width, shot.trace.height, shot.frames_per_second)?;
     for (number, file) in files.enumerate() {
-        let picture = InputPicture::read(&file, None)?;
-        let rgb8 = match picture.scene_rgb_cd_m2() {
-            Some(scene) => {
-                let shown = map_picture(fitted(number).as_ref(), shot.trace.width as usize, &scene);
-                encode_srgb8(shot.trace.width, &shown)
-            }
-            None => picture.codes8(),
-        };
+        let rgb8 = shown_rgb8(&file, || fitted(number), shot)?;
         video.frame(&rgb8).with_context(|| format!("{}", file.display()))?;
     }
     video.finish()?;
     Ok(())
+}
+
+/// A frame's file as bytes for a display, R′G′B′ after R′G′B′; `fitted` makes its tone operator.
+pub(super) fn shown_rgb8(
+    file: &Path,
+    fitted: impl Fn() -> Box<dyn FittedTone>,
+    shot: &ShotSettings,
+) -> Result<Vec<u8>> {
+    let picture = InputPicture::read(file, None)?;
+    let (width, height) = (shot.trace.width, shot.trace.height);
+    if picture.size() != (width as usize, height as usize) {
+        bail!("{}: not of {width}x{height} pixels as the shot's frames are", file.display());
+    }
+    Ok(match picture.scene_rgb_cd_m2() {
+        Some(scene) => encode_srgb8(width, &map_picture(fitted().as_ref(), width as usize, &scene)),
+        None => picture.codes8(),
+    })
 }

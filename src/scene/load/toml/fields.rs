@@ -37,6 +37,7 @@ pub(super) struct Value<'a> {
     source: &'a Source<'a>,
     pub(super) path: String,
     line: usize,
+    start: usize,
     value: &'a DeValue<'a>,
 }
 
@@ -53,6 +54,11 @@ impl<'a> Value<'a> {
     /// Where the value stands.
     pub(super) fn place(&self) -> Place {
         Place::line(self.source.file, self.line)
+    }
+
+    /// The byte at which it begins.
+    pub(super) fn start(&self) -> usize {
+        self.start
     }
 
     /// An error about this value.
@@ -146,6 +152,7 @@ impl<'a> Value<'a> {
             source: self.source,
             path: format!("{}[{index}]", self.path),
             line: self.source.line_of(value.span().start),
+            start: value.span().start,
             value: value.get_ref(),
         };
         Ok(array.iter().enumerate().map(element).collect())
@@ -214,9 +221,14 @@ impl<'a> Value<'a> {
 impl<'a> Fields<'a> {
     /// The file's topmost table.
     pub(super) fn root(source: &'a Source<'a>, table: &'a DeTable<'a>, known: &[&str]) -> Result<Self, LoadError> {
-        let fields = Self { source, path: String::new(), line: 1, table };
+        let fields = Self::of_any(source, table);
         fields.check_known(known)?;
         Ok(fields)
+    }
+
+    /// The same, whatever its keys are.
+    pub(super) fn of_any(source: &'a Source<'a>, table: &'a DeTable<'a>) -> Self {
+        Self { source, path: String::new(), line: 1, table }
     }
 
     /// Refuses keys that are not in the list.
@@ -246,7 +258,8 @@ impl<'a> Fields<'a> {
 
     fn value(&self, key: &str, value: &'a Spanned<DeValue<'a>>) -> Value<'a> {
         let path = if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) };
-        Value { source: self.source, path, line: self.source.line_of(value.span().start), value: value.get_ref() }
+        let start = value.span().start;
+        Value { source: self.source, path, line: self.source.line_of(start), start, value: value.get_ref() }
     }
 
     pub(super) fn get(&self, key: &str) -> Option<Value<'a>> {

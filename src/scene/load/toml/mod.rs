@@ -1,5 +1,6 @@
 //! Our own scene format; scenes/README.md describes it by an example that has everything.
 
+mod animated;
 mod camera;
 mod fields;
 mod light;
@@ -17,7 +18,6 @@ use super::error::LoadError;
 use super::texture::{Adjust, IfMissing, Picture, Request};
 use super::{LoadOptions, files};
 use crate::scene::{Encoding, FilmDefaults, Scene, ViewingDefaults, Wrap};
-use ::toml::de::DeTable;
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -46,7 +46,8 @@ struct TextureEntry {
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
     let text = files::read_text(path)?;
     let source = Source { file: path, text: &text };
-    let document = DeTable::parse(&text).map_err(|error| source.syntax_error(&error))?;
+    let snapshots = animated::snapshots(&source, options.frame_time)?;
+    let document = animated::parse(&source, &snapshots)?;
     let root = Fields::root(
         &source,
         document.get_ref(),

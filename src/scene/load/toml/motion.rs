@@ -20,14 +20,19 @@ pub(super) struct Keyframes<T> {
 }
 
 /// The two keyframes around a time, and how far between them it is.
-struct Between<'a, T> {
-    before: &'a T,
-    after: &'a T,
-    share: f32,
+pub(super) struct Between<'a, T> {
+    pub(super) before: &'a T,
+    pub(super) after: &'a T,
+    pub(super) share: f32,
 }
 
 impl<T> Keyframes<T> {
-    fn read(list: &Value, known: &[&str], read: impl Fn(&Fields) -> Result<T, LoadError>) -> Result<Self, LoadError> {
+    /// Reads a list of tables that have a `time` and what `read` takes from them.
+    pub(super) fn read(
+        list: &Value,
+        known: &[&str],
+        read: impl Fn(&Fields) -> Result<T, LoadError>,
+    ) -> Result<Self, LoadError> {
         let mut frames: Vec<(f64, T)> = Vec::new();
         for value in list.array()? {
             let fields = value.fields(known)?;
@@ -57,7 +62,7 @@ impl<T> Keyframes<T> {
         times
     }
 
-    fn around(&self, time: f64) -> Between<'_, T> {
+    pub(super) fn around(&self, time: f64) -> Between<'_, T> {
         let after = self.frames.partition_point(|(seconds, _)| *seconds <= time);
         let clamp = |index: usize| &self.frames[index.min(self.frames.len() - 1)];
         let (before_time, before) = clamp(after.saturating_sub(1));

@@ -5,11 +5,10 @@
 
 use super::fields::{Fields, Source, Value};
 use super::motion::Shutter;
-use super::{camera, light, read_film, read_view, surroundings};
+use super::{animated, camera, light, read_film, read_view, surroundings};
 use crate::scene::load::error::LoadError;
 use crate::scene::load::{LoadOptions, files};
 use crate::scene::{Scene, ViewingDefaults};
-use ::toml::de::DeTable;
 use std::path::{Path, PathBuf};
 
 const KNOWN: [&str; 6] = ["nits_per_unit", "film", "view", "camera", "environment", "lights"];
@@ -22,12 +21,12 @@ pub(in crate::scene::load) fn of(scene: &Path) -> Option<PathBuf> {
 
 /// Whether the side file has lights or surroundings of its own.
 pub(in crate::scene::load) fn brings_light(path: &Path) -> Result<bool, LoadError> {
-    with_root(path, |root| Ok(root.get("environment").is_some() || root.get("lights").is_some()))
+    with_root(path, 0.0, |root| Ok(root.get("environment").is_some() || root.get("lights").is_some()))
 }
 
 /// Adds everything to the scene. The scene's own camera stays where the caller has asked for one by name.
 pub(in crate::scene::load) fn apply(path: &Path, options: &LoadOptions, scene: &mut Scene) -> Result<(), LoadError> {
-    with_root(path, |root| {
+    with_root(path, options.frame_time, |root| {
         let nits_per_unit = root.get_or("nits_per_unit", scene.nits_per_unit, Value::positive)?;
         if let Some(film) = root.get("film") {
             scene.film = read_film(&film)?;
@@ -71,10 +70,12 @@ pub(in crate::scene::load) fn apply(path: &Path, options: &LoadOptions, scene: &
     })
 }
 
-fn with_root<T>(path: &Path, read: impl FnOnce(&Fields) -> Result<T, LoadError>) -> Result<T, LoadError> {
+/// `seconds` is the time for keyframes of lights.
+fn with_root<T>(path: &Path, seconds: f64, read: impl FnOnce(&Fields) -> Result<T, LoadError>) -> Result<T, LoadError> {
     let text = files::read_text(path)?;
     let source = Source { file: path, text: &text };
-    let document = DeTable::parse(&text).map_err(|error| source.syntax_error(&error))?;
+    let snapshots = animated::snapshots(&source, seconds)?;
+    let document = animated::parse(&source, &snapshots)?;
     let root = Fields::root(&source, document.get_ref(), &KNOWN)?;
     read(&root)
 }

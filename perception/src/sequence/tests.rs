@@ -1,0 +1,136 @@
+use super::*;
+use crate::csf::{CastleTemporal, ContrastSensitivity, FreshNoise};
+use crate::difference::colour_difference;
+use crate::test_noise::normal;
+
+const SIDE: usize = 96;
+
+fn viewing(frames_per_second: f64) -> Viewing {
+    let mut viewing = Viewing::default();
+    viewing.display.pixels_per_degree = 32.0;
+    viewing.display.frames_per_second = frames_per_second;
+    viewing
+}
+
+fn grey(value_at: impl Fn(usize, usize) -> f32) -> Vec<[f32; 3]> {
+    (0..SIDE * SIDE).map(|pixel| [value_at(pixel % SIDE, pixel / SIDE); 3]).collect()
+}
+
+fn motion(right_px: f32) -> FrameMotion {
+    let plane = |value| Plane::filled(SIDE, SIDE, value);
+    FrameMotion { to_next: [plane(right_px), plane(0.0)], to_previous: [plane(-right_px), plane(0.0)] }
+}
+
+/// What is seen in the middle of a sequence of 2 × reach + 1 frames against grey of 100 cd/m², in the picture's middle.
+fn seen(frames_per_second: f64, right_px: Option<f32>, test: impl Fn(usize, usize, usize) -> f32) -> f64 {
+    let observer = SequenceObserver::new(&viewing(frames_per_second)).unwrap();
+    let still = grey(|_, _| 100.0);
+    let frames: Vec<SequenceFrame> = (0..=2 * observer.reach())
+        .map(|frame| {
+            let test = grey(|x, y| 100.0 + test(frame, x, y));
+            SequenceFrame::new(&still, &test, SIDE, SIDE, right_px.map(motion)).unwrap()
+        })
+        .collect();
+    let frames: Vec<&SequenceFrame> = frames.iter().collect();
+    f64::from(observer.difference(&frames, observer.reach()).unwrap().visibility.get(SIDE / 2, SIDE / 2))
+}
+
+#[test]
+fn equal_frames_are_seen_as_a_still() {
+    let reference = grey(|x, y| 60.0 + 20.0 * (x as f32 * 0.3).sin() + y as f32 * 0.1);
+    let mut test = reference.clone();
+    let mut state = 5;
+    test.iter_mut().for_each(|rgb| rgb[0] = (rgb[0] + 2.0 * normal(&mut state)).max(0.0));
+    let viewing = viewing(24.0);
+    let observer = SequenceObserver::new(&viewing).unwrap();
+    let frame = SequenceFrame::new(&reference, &test, SIDE, SIDE, None).unwrap();
+    let moving = observer.difference(&[&frame], 0).unwrap();
+    let still = colour_difference(&reference, &test, SIDE, SIDE, &viewing, &CastleCsf::default()).unwrap();
+    assert!((moving.worst_visibility / still.worst_visibility - 1.0).abs() < 2e-3);
+    let same = SequenceFrame::new(&reference, &reference, SIDE, SIDE, Some(motion(3.0))).unwrap();
+    assert_eq!(observer.difference(&[&same, &same], 1).unwrap().worst_visibility, 0.0);
+}
+
+/// Noise that is new in every frame against the closed form that rendering is judged by, with its own standard error: 1° of noise.
+#[test]
+fn fresh_noise_is_seen_as_predicted() {
+    for frames_per_second in [24.0, 60.0] {
+        let timing = FrameTiming { frames_per_second, persistence: 1.0 };
+        let csf = FreshNoise::new(1.0, timing).unwrap();
+        let picture = Plane::filled(SIDE, SIDE, 100.0);
+        let inputs = ThresholdInputs { display_luminance_cd_m2: &picture, guide_variance: None };
+        let map = threshold_map(&inputs, &viewing(frames_per_second), &csf).unwrap();
+        let predicted = f64::from(map.predicted_visibility(&picture.map(|_| 9.0)).get(SIDE / 2, SIDE / 2));
+        let squares: f64 = (0..4)
+            .map(|seed| {
+                let noise = |frame: usize, x: usize, y: usize| {
+                    let mut state = 1 + (((seed * 100 + frame) * SIDE + y) * SIDE + x) as u64 * 7919;
+                    normal(&mut state);
+                    3.0 * normal(&mut state)
+                };
+                seen(frames_per_second, None, noise).powi(2)
+            })
+            .sum();
+        let ratio = (squares / 4.0).sqrt() / predicted;
+        assert!((0.9..1.1).contains(&ratio), "{frames_per_second}: {ratio}");
+    }
+}
+
+/// A grating that flickers by castleCSF's threshold is at threshold when it is strongest.
+#[test]
+fn flicker_has_its_contrast_over_threshold() {
+    for (freq_cpd, flicker_hz) in [(1.0, 6.0), (4.0, 3.0), (1.0, 10.0), (8.0, 1.0)] {
+        let csf = CastleTemporal { sustained: CastleCsf::default(), temporal_hz: flicker_hz };
+        let threshold = 100.0 / csf.sensitivity(freq_cpd, 100.0);
+        let observer = SequenceObserver::new(&viewing(60.0)).unwrap();
+        let found = seen(60.0, None, |frame, x, _| {
+            let seconds = (frame as f64 - observer.reach() as f64) / 60.0;
+            let across = (std::f64::consts::TAU * freq_cpd * (x as f64 + 0.5) / 32.0).cos();
+            (threshold * across * (std::f64::consts::TAU * flicker_hz * seconds).cos()) as f32
+        });
+        assert!((found - 1.0).abs() < 0.1, "{freq_cpd} cpd at {flicker_hz} Hz: {found}");
+    }
+}
+
+/// Flicker of the picture as a whole by 1.5 % at 6 Hz is seen, by 0.5 % not; 1 % is at 0.87 of the threshold for 1 deg².
+#[test]
+fn whole_frames_may_not_flicker() {
+    let flicker =
+        |amplitude: f32| seen(24.0, None, move |frame, _, _| if frame % 4 < 2 { amplitude } else { -amplitude });
+    let (seen, unseen) = (flicker(1.5), flicker(0.5));
+    assert!(seen > 1.0 && unseen < 1.0, "{seen} {unseen}");
+}
+
+/// 2 pixels a frame are 3.75 degrees a second here.
+#[test]
+fn the_eye_sees_what_travels_with_what_it_follows() {
+    let mut state = 3;
+    let pattern: Vec<f32> = (0..SIDE * 4).map(|_| 4.0 * normal(&mut state)).collect();
+    let travelling = |frame: usize, x: usize, _: usize| pattern[(x + 4 * SIDE - 2 * frame) % SIDE];
+    let locked = |_: usize, x: usize, _: usize| pattern[x];
+    let [followed, passing] = [Some(2.0), None].map(|eye| seen(60.0, eye, travelling));
+    let [under_moving_eye, at_rest] = [Some(2.0), None].map(|eye| seen(60.0, eye, locked));
+    assert!(followed > 1.5 * passing, "travelling: {followed} followed, {passing} passing");
+    assert!(at_rest > 1.5 * under_moving_eye, "locked: {at_rest} at rest, {under_moving_eye} under a moving eye");
+}
+
+#[test]
+fn what_does_not_fit_is_an_error() {
+    let picture = grey(|_, _| 1.0);
+    assert!(SequenceFrame::new(&picture, &picture[1..], SIDE, SIDE, None).is_err());
+    assert!(
+        SequenceFrame::new(
+            &picture,
+            &picture,
+            SIDE,
+            SIDE,
+            Some(FrameMotion { to_next: [Plane::filled(2, 2, 0.0), Plane::filled(2, 2, 0.0)], ..motion(1.0) })
+        )
+        .is_err()
+    );
+    let observer = SequenceObserver::new(&viewing(24.0)).unwrap();
+    assert!(observer.difference(&[], 0).is_err());
+    let wild = SequenceFrame::new(&picture, &picture, SIDE, SIDE, Some(motion(f32::NAN))).unwrap();
+    let far = SequenceFrame::new(&picture, &picture, SIDE, SIDE, Some(motion(1e30))).unwrap();
+    assert!(observer.difference(&[&wild, &far], 0).is_ok());
+}

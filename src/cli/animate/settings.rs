@@ -1,0 +1,43 @@
+//! What the command line and the scene say about a shot as a whole.
+
+use super::frames::Frames;
+use super::{AnimateArguments, SamplingChoice};
+use crate::cli::job::{Quality, Size, check_memory};
+use crate::cli::seeing;
+use anyhow::Result;
+use fechner::adaptive::settings::{DEFAULT_MAX_SAMPLES, Limits, Sampling};
+use fechner::animate::ShotSettings;
+use fechner::denoise::Denoiser;
+use fechner::integrator::TraceSettings;
+use fechner::scene::Scene;
+
+/// Command line before scene before default.
+pub(super) fn shot_settings(arguments: &AnimateArguments, scene: &Scene, shot: Frames) -> Result<ShotSettings> {
+    let size = arguments.size.unwrap_or(Size { width: scene.film.width, height: scene.film.height });
+    check_memory(size)?;
+    let display = arguments.display.as_deref().or(scene.viewing.display.as_deref()).unwrap_or("desktop");
+    let asked = arguments.visibility.or(arguments.quality.map(Quality::visibility));
+    let (sampling, otherwise) = match arguments.sampling {
+        SamplingChoice::Adaptive => (Sampling::Adaptive, scene.viewing.visibility.unwrap_or(1.0)),
+        SamplingChoice::Uniform if arguments.spp.is_some() => (Sampling::Uniform, 0.0),
+        SamplingChoice::Uniform => (Sampling::Uniform, scene.viewing.visibility.unwrap_or(1.0)),
+    };
+    Ok(ShotSettings {
+        first: shot.first,
+        last: shot.last,
+        frames_per_second: arguments.fps,
+        pausable: arguments.pausable,
+        trace: TraceSettings::new(size.width, size.height, arguments.seed),
+        sampling,
+        limits: Limits {
+            mean_samples: arguments.spp,
+            max_samples: arguments.max_spp.unwrap_or(DEFAULT_MAX_SAMPLES),
+            pilot_samples: arguments.denoise.pilot_samples(),
+            ..Limits::of_visibility(asked.unwrap_or(otherwise))
+        },
+        viewing: seeing::viewing(display, None)?,
+        nits_per_unit: arguments.nits_per_unit.unwrap_or(scene.nits_per_unit),
+        adapted_to_cd_m2: arguments.adapted_to,
+        denoiser: arguments.denoise.kind().map(Denoiser::open).transpose()?,
+    })
+}

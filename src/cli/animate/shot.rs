@@ -1,0 +1,275 @@
+//! A shot on its way into files: its track, its frames and what only the whole of it has.
+
+use super::contact::{ContactSheet, on_sheet};
+use super::motion::push_velocity;
+use super::settings::shot_settings;
+use super::source::FileSource;
+use super::video::shown_rgb8;
+use super::{AnimateArguments, video};
+use crate::cli::console::{Console, duration_in_words};
+use crate::cli::report::Report;
+use anyhow::{Context, Result, bail};
+use fechner::adaptive::settings::{AllocationRule, LoopSettings, Sampling};
+use fechner::animate::budget::Needs;
+use fechner::animate::name::FrameName;
+use fechner::animate::track::{Track, TrackFrame};
+use fechner::animate::{FrameScenes, RenderedFrame, SceneSource as _, ShotSettings, render_frame};
+use fechner::checkpoint::SettingsRecord;
+use fechner::denoise::Denoiser;
+use fechner::output::rendered::{Background, layers, write_display_png};
+use fechner::output::{self, Format};
+use fechner::scene::Scene;
+use fechner::scene::hash::content_hash;
+use fechner_perception::model;
+use fechner_perception::tone::{self, ToneOperator};
+use serde::{Deserialize, Serialize};
+use std::io::Write as _;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// The figures of one frame, beside its picture; by `key` a later run knows that it need not be made again.
+#[derive(Serialize, Deserialize)]
+struct FrameRecord {
+    key: String,
+    frame: u32,
+    seconds_of_shot: f64,
+    report: serde_json::Value,
+}
+
+/// What a frame is made from and judged by.
+pub(in crate::cli) struct FrameJob {
+    pub(in crate::cli) scenes: FrameScenes,
+    pub(in crate::cli) settings: LoopSettings,
+    /// All that its file depends on, as a name.
+    pub(in crate::cli) key: String,
+}
+
+/// A shot on its way into files.
+pub(in crate::cli) struct Shot<'a> {
+    arguments: &'a AnimateArguments,
+    source: FileSource<'a>,
+    pub(in crate::cli) settings: ShotSettings,
+    operator_name: String,
+    exposure_stops: Option<f64>,
+    name: FrameName,
+    format: Format,
+}
+
+impl<'a> Shot<'a> {
+    pub(in crate::cli) fn new(arguments: &'a AnimateArguments) -> Result<Self> {
+        let name = FrameName::parse(&arguments.output).with_context(|| {
+            format!(
+                "{}: a sequence's name has # for each digit of the frame's number, as out/shot.####.exr",
+                arguments.output
+            )
+        })?;
+        let whole = arguments.shot.unwrap_or(arguments.frames);
+        if arguments.frames.first < whole.first || arguments.frames.last > whole.last {
+            bail!("--frames reaches beyond --shot");
+        }
+        let first_file = name.of(arguments.frames.first);
+        if let Some(folder) = first_file.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+            std::fs::create_dir_all(folder).with_context(|| format!("{}", folder.display()))?;
+        }
+        let format = output::check_target(&first_file)?;
+        let source = FileSource::new(arguments);
+        let scene = source.at(f64::from(arguments.frames.first) / arguments.fps)?;
+        for note in &scene.notes {
+            eprintln!("note: {note}");
+        }
+        let settings = shot_settings(arguments, &scene, whole)?;
+        let operator_name = arguments.operator.as_deref().or(scene.viewing.operator.as_deref()).unwrap_or("constant");
+        let exposure_stops = arguments.exposure.or(scene.viewing.exposure_stops);
+        let operator_name = operator_name.to_owned();
+        let shot = Self { arguments, source, settings, operator_name, exposure_stops, name, format };
+        shot.operator()?;
+        Ok(shot)
+    }
+
+    /// For whose eyes its frames are, as their films say it.
+    pub(in crate::cli) fn settings_record(&self) -> SettingsRecord {
+        SettingsRecord {
+            sampling: self.settings.sampling,
+            allocation: AllocationRule::default(),
+            model: model::names()[0].to_owned(),
+            viewing: self.settings.viewing.clone(),
+            nits_per_unit: self.settings.nits_per_unit,
+            operator: self.operator_name.clone(),
+            exposure_stops: self.exposure_stops,
+            importance: None,
+            denoiser: self.settings.denoiser.as_ref().map(Denoiser::kind),
+        }
+    }
+
+    fn operator(&self) -> Result<Box<dyn ToneOperator>> {
+        tone::operator(&self.operator_name, self.exposure_stops).with_context(|| {
+            format!(
+                "there is no tone operator \"{}\"; known: {}",
+                self.operator_name,
+                tone::operator_names().join(", ")
+            )
+        })
+    }
+
+    /// The track that lies beside the frames, or a new one where there is none for this shot.
+    pub(in crate::cli) fn track(&self) -> Result<Track> {
+        let file = self.name.of_shot("track.json");
+        let operator = self.operator()?;
+        let wanted = self.arguments.frames;
+        if let Some(track) = read_json::<Track>(&file) {
+            let is_of = |frame: u32| -> Result<bool> {
+                let scene = self.source.at(self.settings.seconds(f64::from(frame)))?;
+                Ok(track.of_frame(&self.settings, operator.as_ref(), frame, &scene).is_some())
+            };
+            // Each frame is looked at again before it is rendered; the ends tell here whether the track is of use at all.
+            if is_of(wanted.first)? && is_of(wanted.last)? {
+                return Ok(track);
+            }
+        }
+        let count = self.settings.last - self.settings.first + 1;
+        let started = Instant::now();
+        let mut track = Track::make(&self.source, &self.settings, operator.as_ref(), &|_| {})?;
+        if let (Some(mean_samples), Sampling::Adaptive) = (self.settings.limits.mean_samples, self.settings.sampling) {
+            track.spread(&self.needs(&track)?, mean_samples);
+        }
+        eprintln!("looked at {count} frames in {}", duration_in_words(started.elapsed().as_secs_f64()));
+        let text = serde_json::to_string(&track).context("the track could not be put into words")?;
+        output::write_beside(&file, |file| file.write_all(text.as_bytes()))?;
+        Ok(track)
+    }
+
+    /// What each frame of the shot needs.
+    pub(super) fn needs(&self, track: &Track) -> Result<Needs> {
+        self.operator()?;
+        let operator = || self.operator().expect("there was one before");
+        Ok(Needs::of(&self.source, &self.settings, &operator, track)?)
+    }
+
+    /// Numbers of the first and the last frame that are rendered.
+    pub(super) fn rendered_frames(&self) -> (u32, u32) {
+        (self.arguments.frames.first, self.arguments.frames.last)
+    }
+
+    /// Renders a frame, unless it is there. `time` is a limit of the frame's own, beside those of the shot.
+    pub(super) fn make(&self, frame: u32, track: &Track, time: Option<Duration>) -> Result<()> {
+        let mut job = self.frame(frame, track)?;
+        job.settings.limits.time = time;
+        let file = self.name.of(frame);
+        if self.record(frame).is_some_and(|record| record.key == job.key) && file.is_file() {
+            eprintln!("{}: is there", file.display());
+            return Ok(());
+        }
+        let console = Console::new(None);
+        let made = render_frame(&job.scenes, &self.settings, &job.settings, frame, &console)?;
+        console.finish();
+        self.keep(frame, &job, &made).map(drop)
+    }
+
+    /// What a frame shows.
+    pub(in crate::cli) fn scene(&self, frame: u32) -> Result<Arc<Scene>> {
+        Ok(self.source.at(self.settings.seconds(f64::from(frame)))?)
+    }
+
+    /// What a frame is made from and judged by.
+    pub(in crate::cli) fn frame(&self, frame: u32, track: &Track) -> Result<FrameJob> {
+        let scenes = FrameScenes::load(&self.source, &self.settings, frame)?;
+        let operator = self.operator()?;
+        let Some(of_track) = track.of_frame(&self.settings, operator.as_ref(), frame, &scenes.now) else {
+            bail!("{}: not of this scene any more: delete it", self.name.of_shot("track.json").display());
+        };
+        let settings = self.settings.frame_settings(operator, of_track);
+        let key = self.key(&settings, of_track, &scenes);
+        Ok(FrameJob { scenes, settings, key })
+    }
+
+    /// Writes a frame and its record.
+    pub(in crate::cli) fn keep(&self, frame: u32, job: &FrameJob, made: &RenderedFrame) -> Result<Report> {
+        let file = self.name.of(frame);
+        let scene_name = self.arguments.scene.display().to_string();
+        let report = Report::new(&scene_name, &[self.settings.trace.seed], &job.settings, &made.rendered);
+        self.write(&file, made, &job.settings, &report)?;
+        let record = FrameRecord {
+            key: job.key.clone(),
+            frame,
+            seconds_of_shot: self.settings.seconds(f64::from(frame)),
+            report: serde_json::to_value(&report).context("the report could not be put into words")?,
+        };
+        let text = serde_json::to_string_pretty(&record).context("the record could not be put into words")?;
+        output::write_beside(&file.with_extension("json"), |file| file.write_all(text.as_bytes()))?;
+        eprintln!("{}: {}", file.display(), report.in_a_line());
+        Ok(report)
+    }
+
+    /// Writes what only the whole shot has, if all its frames are there.
+    pub(in crate::cli) fn conclude(&self, track: &Track) -> Result<()> {
+        let records = self.records();
+        let missing = self.settings.last - self.settings.first + 1 - records.len() as u32;
+        if missing > 0 {
+            eprintln!("{missing} frames of the shot are not there yet.");
+            return Ok(());
+        }
+        let text = serde_json::to_string_pretty(&records).context("the shot could not be put into words")?;
+        output::write_beside(&self.name.of_shot("json"), |file| file.write_all(text.as_bytes()))?;
+        let fits = |frame: usize| track.frames[frame].fitted.clone().restore();
+        let count = records.len();
+        let size = (self.settings.trace.width as usize, self.settings.trace.height as usize);
+        let mut sheet = ContactSheet::new(on_sheet(count).count(), size);
+        for frame in on_sheet(count) {
+            let file = self.name.of(self.settings.first + frame as u32);
+            sheet.add(&shown_rgb8(&file, || fits(frame), &self.settings)?);
+        }
+        sheet.write(&self.name.of_shot("contact.png"))?;
+        if let Some((path, format)) = self.arguments.video()? {
+            let files = (self.settings.first..=self.settings.last).map(|frame| self.name.of(frame));
+            video::write(path, format, files, &fits, &self.settings)?;
+        }
+        Ok(())
+    }
+
+    fn write(&self, file: &Path, made: &RenderedFrame, settings: &LoopSettings, report: &Report) -> Result<()> {
+        match self.format {
+            Format::Png => write_display_png(file, &made.rendered, &settings.viewing.display, Background::Shown)?,
+            Format::Exr => {
+                let attributes = report.attributes();
+                let mut picture = layers(&made.rendered, settings, Background::Shown, &attributes);
+                push_velocity(&mut picture, &made.velocity, self.arguments.aov_names);
+                output::write_exr(file, &picture)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// All that a frame's file depends on, as a name.
+    fn key(&self, settings: &LoopSettings, track: &TrackFrame, scenes: &FrameScenes) -> String {
+        let text = format!(
+            "{}|{track:?}|{}|{}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}",
+            env!("CARGO_PKG_VERSION"),
+            content_hash(&scenes.previous),
+            content_hash(&scenes.next),
+            self.settings.trace,
+            settings.sampling,
+            settings.denoiser.as_ref().map(Denoiser::name),
+            settings.limits,
+            settings.viewing,
+            settings.frames,
+            self.arguments.aov_names,
+            self.arguments.time
+        );
+        blake3::hash(text.as_bytes()).to_hex()[..32].to_owned()
+    }
+
+    fn record(&self, frame: u32) -> Option<FrameRecord> {
+        read_json(&self.name.of(frame).with_extension("json"))
+    }
+
+    /// Records of the frames that are there.
+    fn records(&self) -> Vec<FrameRecord> {
+        (self.settings.first..=self.settings.last).filter_map(|frame| self.record(frame)).collect()
+    }
+}
+
+/// What is in a file, or nothing if it is not there or not whole.
+fn read_json<T: serde::de::DeserializeOwned>(file: &Path) -> Option<T> {
+    serde_json::from_slice(&std::fs::read(file).ok()?).ok()
+}

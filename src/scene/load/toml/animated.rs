@@ -1,0 +1,125 @@
+//! Keyframes of materials and lights: numbers and colours that change in time.
+//!
+//! `keyframes = [{ time = 0, intensity_cd = 0 }, { time = 1, intensity_cd = 800 }]` stands for `intensity_cd = 400` half a
+//! second after the beginning. What the keyframes say at the moment when the shutter opens is put in their place before
+//! anything else is read, so that every number and colour of every material and light can move, and each is checked as if
+//! it had been written. Nothing of this changes while the shutter is open. Not for cameras and objects, which move
+//! meanwhile: see [`super::motion`].
+
+use super::fields::{Fields, Source, Value};
+use super::motion::{Between, Keyframes};
+use crate::scene::load::LoadError;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+const KEYFRAMES: &str = "keyframes";
+
+/// Where a table with keyframes stands.
+#[derive(Clone, Debug)]
+enum Owner {
+    Material(String),
+    Light(usize),
+}
+
+/// A table's keyframes, as the TOML that they amount to.
+#[derive(Debug)]
+pub(super) struct Snapshot {
+    owner: Owner,
+    /// Entries of the table, each as a document with its value where the keyframes begin.
+    entries: Vec<String>,
+}
+
+/// What all keyframes of materials and lights amount to at a time in seconds.
+pub(super) fn snapshots(source: &Source, seconds: f64) -> Result<Vec<Snapshot>, LoadError> {
+    let document = DeTable::parse(source.text).map_err(|error| source.syntax_error(&error))?;
+    let root = Fields::of_any(source, document.get_ref());
+    let mut found = Vec::new();
+    if let Some(materials) = root.get("materials") {
+        for (name, value) in materials.entries()?.all() {
+            found.extend(snapshot(&value, Owner::Material(name.to_owned()), seconds)?);
+        }
+    }
+    if let Some(lights) = root.get("lights") {
+        for (index, value) in lights.array()?.iter().enumerate() {
+            found.extend(snapshot(value, Owner::Light(index), seconds)?);
+        }
+    }
+    Ok(found)
+}
+
+/// The file's document with the snapshots in the keyframes' places.
+pub(super) fn parse<'a>(source: &Source<'a>, snapshots: &'a [Snapshot]) -> Result<Spanned<DeTable<'a>>, LoadError> {
+    let mut document = DeTable::parse(source.text).map_err(|error| source.syntax_error(&error))?;
+    for Snapshot { owner, entries } in snapshots {
+        let Some(table) = table_of(document.get_mut(), owner) else { continue };
+        table.remove(KEYFRAMES);
+        for entry in entries {
+            let entry = DeTable::parse(entry).map_err(|error| source.syntax_error(&error))?;
+            for (key, value) in entry.into_inner() {
+                table.insert(key, value);
+            }
+        }
+    }
+    Ok(document)
+}
+
+fn table_of<'d, 'a>(document: &'d mut DeTable<'a>, owner: &Owner) -> Option<&'d mut DeTable<'a>> {
+    let value = match owner {
+        Owner::Material(name) => match document.get_mut("materials")?.get_mut() {
+            DeValue::Table(materials) => materials.get_mut(name.as_str())?.get_mut(),
+            _ => return None,
+        },
+        Owner::Light(index) => match document.get_mut("lights")?.get_mut() {
+            DeValue::Array(lights) => lights.get_mut(*index)?.get_mut(),
+            _ => return None,
+        },
+    };
+    match value {
+        DeValue::Table(table) => Some(table),
+        _ => None,
+    }
+}
+
+fn snapshot(value: &Value, owner: Owner, seconds: f64) -> Result<Option<Snapshot>, LoadError> {
+    let table = value.entries()?;
+    let Some(list) = table.get(KEYFRAMES) else { return Ok(None) };
+    let first = list.array()?.first().map(Value::entries).transpose()?;
+    let keys: Vec<String> = first
+        .map(|first| first.all().into_iter().map(|(key, _)| key.to_owned()).filter(|key| key != "time").collect())
+        .unwrap_or_default();
+    if keys.is_empty() {
+        return Err(list.error("each needs a time and what changes"));
+    }
+    let known: Vec<&str> = keys.iter().map(String::as_str).chain(["time"]).collect();
+    let keyframes = Keyframes::read(&list, &known, |fields| {
+        keys.iter().map(|key| numbers(&fields.require(key)?)).collect::<Result<Vec<_>, _>>()
+    })?;
+    let Between { before, after, share } = keyframes.around(seconds);
+    let mut entries = Vec::new();
+    for (key, (before, after)) in keys.iter().zip(before.iter().zip(after)) {
+        if let Some(fixed) = table.get(key) {
+            return Err(fixed.error("is given by keyframes as well"));
+        }
+        if before.len() != after.len() {
+            return Err(list.error(format_args!("\"{key}\" must have as many values in each keyframe")));
+        }
+        let share = f64::from(share);
+        let values: Vec<String> = before
+            .iter()
+            .zip(after)
+            .map(|(before, after)| format!("{:?}", before + share * (after - before)))
+            .collect();
+        let value = if values.len() == 1 { values[0].clone() } else { format!("[{}]", values.join(", ")) };
+        let key = format!("\"{}\" = ", key.escape_default());
+        // Spaces bring key and value to the keyframes' place in the file, whose line errors about them will name: a list that
+        // names the key is longer than it.
+        let before_key = list.start();
+        entries.push(format!("{:before_key$}{key}{value}", ""));
+    }
+    Ok(Some(Snapshot { owner, entries }))
+}
+
+/// One number, or a list of them.
+fn numbers(value: &Value) -> Result<Vec<f64>, LoadError> {
+    if value.is_array() { value.array()?.iter().map(Value::number).collect() } else { Ok(vec![value.number()?]) }
+}
