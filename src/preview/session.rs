@@ -1,5 +1,6 @@
 //! The render's thread: drafts, renders, and obeys between two batches.
 
+mod live;
 mod pace;
 mod saving;
 mod telling;
@@ -17,7 +18,7 @@ use crate::adaptive::state::RenderState;
 use crate::adaptive::{LastLook, Progress, StopReason, run as run_loop};
 use crate::film::Film;
 use crate::integrator::{Crop, PathTracer, SamplePlan};
-use fechner_perception::display::{Display, Observer, Viewing};
+use live::{Changed, Live, settings_of};
 pub(super) use pace::Pace;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -61,18 +62,6 @@ pub(super) fn watch_file(path: &Path, shared: &Shared) {
             shared.send(Command::Reload);
         }
     }
-}
-
-/// What viewers changed, in place of what the job says.
-#[derive(Clone, Default)]
-struct Live {
-    exposure: Option<f64>,
-    operator: Option<String>,
-    /// A preset's name.
-    display: Option<String>,
-    /// In distances that the display is made for.
-    distance: Option<f64>,
-    visibility: Option<f64>,
 }
 
 struct Session<'a> {
@@ -386,35 +375,4 @@ impl<'a> Session<'a> {
         };
         self.screen.show(scenery, self.shared);
     }
-}
-
-/// What a change of settings asks for.
-#[derive(Clone, Copy)]
-enum Changed {
-    /// What the eye is shown, and with it every threshold.
-    Seen,
-    /// When to stop.
-    Target,
-}
-
-fn settings_of(job: &Job, live: &Live) -> Result<LoopSettings, String> {
-    let mut record = job.record.clone();
-    record.exposure_stops = live.exposure.or(record.exposure_stops);
-    record.operator = live.operator.clone().unwrap_or(record.operator);
-    if let Some(name) = &live.display {
-        let display = Display::preset(name).ok_or_else(|| format!("there is no display \"{name}\""))?;
-        let Observer { sensitivity, glare, .. } = record.viewing.observer;
-        record.viewing = Viewing::of(display);
-        record.viewing.observer = Observer { sensitivity, glare, ..record.viewing.observer };
-    }
-    // So many times as far, a pixel looks so many times as small.
-    record.viewing.display.pixels_per_degree *= live.distance.unwrap_or(1.0);
-    record.viewing.check().map_err(|error| error.to_string())?;
-    let visibility = live.visibility.unwrap_or(job.limits.visibility);
-    if visibility.is_nan() || visibility < 0.0 || record.exposure_stops.is_some_and(|stops| !stops.is_finite()) {
-        return Err("visibility must be above 0 and exposure a number".to_owned());
-    }
-    let limits = crate::adaptive::settings::Limits { visibility, ..job.limits };
-    let settings = record.loop_settings(limits).map_err(|error| error.to_string())?;
-    Ok(LoopSettings { importance: job.importance.clone(), ..settings })
 }
