@@ -3,7 +3,7 @@
 
 use super::audit::{Audit, audit};
 use super::denoised::denoised_plan;
-use super::judge::{JudgeError, Judgement};
+use super::judge::{JudgeError, Judgement, still_wanted};
 use super::plan::{adaptive_plan, cut_to_budget, doubling_of, uniform_plan, wanted_samples};
 use super::rivals::rival_plan;
 use super::settings::{LoopSettings, Sampling};
@@ -75,6 +75,7 @@ impl Loop<'_> {
             return Ok(some(denoised_plan(&self.state.film, &judgement.predicted, rung, max_samples)));
         }
         if !is_reached(judgement, rung) {
+            still_wanted(self.settings)?;
             let started = Instant::now();
             let wanted = wanted_samples(judgement, self.settings.allocation, rung, &self.settings.limits)?;
             self.state.seconds_allocation += started.elapsed().as_secs_f64();
@@ -89,6 +90,7 @@ impl Loop<'_> {
             let predicted = judgement.predicted.values();
             return Ok(some(doubling_of(&self.state.film, max_samples, |i| f64::from(predicted[i]) > rung)));
         }
+        still_wanted(self.settings)?;
         if let Some(plan) = some(self.peaks(rung, judgement)) {
             return Ok(Some(plan));
         }
@@ -110,7 +112,7 @@ impl Loop<'_> {
         if !may_audit || self.state.inflation >= MOST_INFLATION {
             return Ok(None);
         }
-        let found = audit(self.tracer, &self.state.film, judgement, self.settings, self.state.audits);
+        let found = audit(self.tracer, &self.state.film, judgement, self.settings, self.state.audits)?;
         self.state.audits += 1;
         self.state.audit = found.or(self.state.audit);
         let Some(found) = found.filter(Audit::disagrees) else { return Ok(None) };

@@ -112,6 +112,8 @@ pub struct LoopSettings {
     pub importance: Option<Plane>,
     /// What makes the output picture out of the mean; `None` leaves it raw.
     pub denoiser: Option<Denoiser>,
+    /// Asked during a look: whether it is of no use any more, as somebody wants another picture. `None` never interrupts.
+    pub is_outdated: Option<Box<dyn Fn() -> bool + Send + Sync>>,
 }
 
 impl LoopSettings {
@@ -129,6 +131,7 @@ impl LoopSettings {
             frames: None,
             importance: None,
             denoiser: None,
+            is_outdated: None,
         }
     }
 }

@@ -38,6 +38,10 @@ impl Host for FileHost {
         self.job.prepare().map(job_of).map_err(|error| format!("{error:#}"))
     }
 
+    fn later(&self, seconds: f64) -> Result<Scene, String> {
+        self.job.scene_later(seconds).map_err(|error| format!("{error:#}"))
+    }
+
     fn save(&self, path: &Path, rendered: &Rendered, settings: &LoopSettings) -> Result<(), String> {
         let write = || {
             let format = output::check_target(path)?;
@@ -80,7 +84,7 @@ pub(super) fn run(arguments: &ViewArguments) -> anyhow::Result<()> {
     let (address, token) = door_of(&listener)?;
     let job = pool.install(|| arguments.job.prepare().map(job_of))?;
     let host = FileHost { job: arguments.job.clone() };
-    let preview = preview::start(job, Box::new(host), pool).context("the threads could not be started")?;
+    let preview = preview::start(job, Arc::new(host), pool).context("the threads could not be started")?;
     let closer = preview.closer();
     let asked_before = AtomicBool::new(false);
     ctrlc::set_handler(move || {

@@ -86,6 +86,21 @@ pub(super) enum Command {
     Reload,
 }
 
+impl Command {
+    /// Whether it makes work on the picture useless: a look at it need not be finished.
+    pub(super) fn throws_the_picture_away(&self) -> bool {
+        matches!(self, Self::Camera { .. } | Self::CameraHome | Self::Restart)
+    }
+
+    /// Whether it leaves a camera in motion as it is: what else is asked for is asked of the picture at rest.
+    pub(super) fn suits_motion(&self) -> bool {
+        matches!(
+            self,
+            Self::Camera { .. } | Self::Redraw | Self::Layer { .. } | Self::Beside { .. } | Self::Inspect { .. }
+        )
+    }
+}
+
 /// Formats of saved pictures.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -100,6 +115,8 @@ pub(super) enum SavedFormat {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum Phase {
+    /// Few pixels for each place of a camera that moves.
+    Moving,
     /// One sample a pixel that is shown and not kept.
     Drafting,
     /// The loop.

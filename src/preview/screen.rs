@@ -11,6 +11,7 @@ use crate::output::encode_srgb8;
 use fechner_perception::Plane;
 use fechner_perception::photometry::luminance;
 use fechner_perception::tone::{FittedTone, SavedTone, SceneGuide, map_picture};
+use glam::Vec2;
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
@@ -45,6 +46,8 @@ impl Looked {
 /// The picture as it was last shown, for who asks about a pixel.
 pub(super) struct Snapshot {
     pub(super) width: usize,
+    /// Pixels of the picture to each of these, each way.
+    pub(super) step: usize,
     pub(super) nits_per_unit: f64,
     pub(super) rgb_cd_m2: Vec<[f32; 3]>,
     pub(super) samples: Vec<u32>,
@@ -62,6 +65,21 @@ pub(super) struct Scenery<'a> {
     pub(super) settings: &'a LoopSettings,
     /// Whether nothing changes now: then frames are exact.
     pub(super) is_at_rest: bool,
+    /// Pixels of the picture to each of the film's, each way.
+    pub(super) step: u32,
+}
+
+/// What is known of motion in the picture.
+pub(super) enum Motion {
+    /// Nothing, and why.
+    Unknown(&'static str),
+    /// To the next frame.
+    Known {
+        /// In pixels, row-major.
+        to_next_px: Vec<Vec2>,
+        /// How long a frame is.
+        frames_per_second: f64,
+    },
 }
 
 /// When was shown what, and what it took.
@@ -70,11 +88,13 @@ pub(super) struct Screen {
     shown: Option<Instant>,
     cost: Duration,
     pub(super) looked: Option<Arc<Looked>>,
+    pub(super) motion: Motion,
 }
 
 impl Screen {
     pub(super) fn new() -> Self {
-        Self { started: Instant::now(), shown: None, cost: Duration::ZERO, looked: None }
+        let motion = Motion::Unknown("not known to a running render");
+        Self { started: Instant::now(), shown: None, cost: Duration::ZERO, looked: None, motion }
     }
 
     /// A new picture begins: no look was taken and the next frame is due.
@@ -88,9 +108,16 @@ impl Screen {
         self.shown.is_none_or(|shown| shown.elapsed() >= FRAME_INTERVAL.max(self.cost * times_cost))
     }
 
-    /// Shows a film to all viewers.
+    /// Shows a film to all viewers, and remembers what that took.
     pub(super) fn show(&mut self, scenery: Scenery<'_>, shared: &Shared) {
         let begun = Instant::now();
+        self.publish(scenery, shared);
+        self.shown = Some(Instant::now());
+        self.cost = begun.elapsed();
+    }
+
+    /// Shows a film to all viewers.
+    pub(super) fn publish(&self, scenery: Scenery<'_>, shared: &Shared) {
         let nits_per_unit = scenery.settings.nits_per_unit;
         // Denoised pictures are made by looks; between two the last one stays.
         let denoised = self.looked.as_ref().and_then(|looked| looked.denoised.clone());
@@ -104,13 +131,12 @@ impl Screen {
         }
         shared.publish_snapshot(Snapshot {
             width: scenery.film.width() as usize,
+            step: scenery.step as usize,
             nits_per_unit,
             rgb_cd_m2,
             samples: (0..pixels(scenery.film)).map(|pixel| scenery.film.samples(pixel)).collect(),
             looked: self.looked.clone(),
         });
-        self.shown = Some(Instant::now());
-        self.cost = begun.elapsed();
     }
 
     fn colours(&self, layer: Layer, scenery: Scenery<'_>, rgb_cd_m2: &[[f32; 3]]) -> Colours {
@@ -120,7 +146,10 @@ impl Screen {
         let surfaces = if film.total_samples() >= draft.total_samples() { film } else { draft };
         match (layer, &self.looked) {
             (Layer::Picture, _) => {
-                let tone = scenery.tone.map_or_else(|| fit(settings, width, rgb_cd_m2), |tone| tone.clone().restore());
+                let tone = match scenery.tone {
+                    Some(tone) => tone.clone().restore(),
+                    None => fit(settings, scenery.step, width, rgb_cd_m2),
+                };
                 let shown = map_picture(tone.as_ref(), width, rgb_cd_m2);
                 Colours { rgb8: encode_srgb8(film.width(), &shown), legend: tone.describe() }
             }
@@ -140,6 +169,13 @@ impl Screen {
             (Layer::Albedo, _) => layer::albedo(surfaces),
             (Layer::Normal, _) => layer::normal(surfaces),
             (Layer::Depth, _) => layer::depth(surfaces),
+            (Layer::Velocity, _) => match &self.motion {
+                Motion::Known { to_next_px, frames_per_second } if to_next_px.len() == pixels(film) => {
+                    layer::velocity(to_next_px, *frames_per_second)
+                }
+                Motion::Known { .. } => layer::unknown(film, "known when the camera rests"),
+                Motion::Unknown(why) => layer::unknown(film, why),
+            },
         }
     }
 }
@@ -154,6 +190,7 @@ const ALL: [Layer; layer::LAYERS] = [
     Layer::Albedo,
     Layer::Normal,
     Layer::Depth,
+    Layer::Velocity,
 ];
 
 fn pixels(film: &Film) -> usize {
@@ -175,11 +212,13 @@ fn composed(film: &Film, draft: &Film, nits_per_unit: f64) -> Vec<[f32; 3]> {
     rgb
 }
 
-/// The operator on a picture that was not looked at yet.
-fn fit(settings: &LoopSettings, width: usize, rgb_cd_m2: &[[f32; 3]]) -> Box<dyn FittedTone> {
+/// The operator on a picture that was not looked at yet, of pixels `step` times as large as the display's.
+fn fit(settings: &LoopSettings, step: u32, width: usize, rgb_cd_m2: &[[f32; 3]]) -> Box<dyn FittedTone> {
     let height = rgb_cd_m2.len() / width.max(1);
     let guide = Plane::from_fn(width, height, |x, y| luminance(rgb_cd_m2[y * width + x]).max(0.0));
-    settings.operator.fit(&SceneGuide::of(&guide), &settings.viewing, None)
+    let mut viewing = settings.viewing.clone();
+    viewing.display.pixels_per_degree /= f64::from(step);
+    settings.operator.fit(&SceneGuide::of(&guide), &viewing, None)
 }
 
 /// The layer's number, the length of its legend, the legend in UTF-8, the picture. JPEG while it changes, PNG at rest.

@@ -1,6 +1,7 @@
-//! The render's thread: drafts, renders, and obeys between two batches.
+//! The render's thread: glimpses, drafts, renders, and obeys between two batches.
 
 mod live;
+mod motion;
 mod pace;
 mod saving;
 mod telling;
@@ -8,28 +9,30 @@ mod watch;
 
 use super::coarse::{draft_plan, order};
 use super::command::{Command, Phase, SavedFormat};
+use super::glimpse::{Glimpse, Resolution};
 use super::orbit::Held;
 use super::screen::{Looked, Scenery, Screen};
 use super::shared::Shared;
 use super::{Host, Job};
-use crate::adaptive::judge::{Judgement, judge};
+use crate::adaptive::judge::{JudgeError, Judgement, judge};
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::state::RenderState;
 use crate::adaptive::{LastLook, Progress, StopReason, run as run_loop};
 use crate::film::Film;
 use crate::integrator::{Crop, PathTracer, SamplePlan};
 use live::{Changed, Live, settings_of};
+use motion::Neighbours;
 pub(super) use pace::Pace;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 pub(super) use telling::{blank_status, count, publish};
 use watch::{Moving, Watch};
 
 /// Renders and obeys until the preview closes. A defect that panics ends the picture, not the preview: a saved scene file
 /// starts it again.
-pub(super) fn run(job: Job, host: &dyn Host, shared: &Shared) {
+pub(super) fn run(job: Job, host: &Arc<dyn Host>, shared: &Arc<Shared>) {
     let mut next = Some(job);
     while !shared.is_closing() {
         let Some(job) = next.take() else {
@@ -64,14 +67,22 @@ pub(super) fn watch_file(path: &Path, shared: &Shared) {
     }
 }
 
+/// How long a camera must have rested for the whole picture to be begun: its film takes longer than a frame to make.
+const REST: Duration = Duration::from_millis(120);
+
 struct Session<'a> {
-    host: &'a dyn Host,
-    shared: &'a Shared,
+    host: &'a Arc<dyn Host>,
+    shared: &'a Arc<Shared>,
     job: Job,
     live: Live,
     held: Held,
     /// Whether the camera is another than the tracer's.
     has_moved: bool,
+    /// When it was moved last, unless the picture is the first.
+    moved_at: Option<Instant>,
+    resolution: Resolution,
+    /// Until the draft shows more.
+    glimpse: Option<Glimpse>,
     tracer: PathTracer,
     settings: LoopSettings,
     phase: Phase,
@@ -82,6 +93,8 @@ struct Session<'a> {
     /// While stopped.
     last_look: Option<LastLook>,
     screen: Screen,
+    /// The scenes a frame before and after, once somebody looks at motion.
+    neighbours: Option<Neighbours>,
     pace: Pace,
     progress: Option<Progress>,
     error: Option<String>,
@@ -89,23 +102,27 @@ struct Session<'a> {
 }
 
 impl<'a> Session<'a> {
-    fn new(job: Job, host: &'a dyn Host, shared: &'a Shared) -> Result<Self, String> {
+    fn new(job: Job, host: &'a Arc<dyn Host>, shared: &'a Arc<Shared>) -> Result<Self, String> {
         let live = Live::default();
-        let settings = settings_of(&job, &live)?;
+        let settings = interruptible(settings_of(&job, &live)?, shared);
         let tracer = PathTracer::new(Arc::clone(&job.scene), job.trace);
-        let Crop { width, height, .. } = job.trace.film_area();
-        let mut session = Self {
+        Ok(Self {
             host,
             shared,
             held: Held::at_home(&job.scene.camera),
-            has_moved: false,
+            // The first picture begins as one after a movement does.
+            has_moved: true,
+            moved_at: None,
+            resolution: Resolution::new(),
+            glimpse: None,
             tracer,
-            phase: Phase::Drafting,
+            phase: Phase::Moving,
             draft_left: SamplePlan::default(),
-            draft: Film::new(width, height),
-            state: RenderState::new(width, height, &settings.limits),
+            draft: Film::new(0, 0),
+            state: RenderState::new(0, 0, &settings.limits),
             last_look: None,
             screen: Screen::new(),
+            neighbours: None,
             pace: Pace::new(),
             progress: None,
             error: None,
@@ -113,9 +130,7 @@ impl<'a> Session<'a> {
             settings,
             live,
             job,
-        };
-        session.restart();
-        Ok(session)
+        })
     }
 
     fn work(mut self) {
@@ -123,12 +138,16 @@ impl<'a> Session<'a> {
             for command in self.shared.take_commands() {
                 self.obey(command);
             }
-            // Once for all movements that came: a restart for each would fall behind a hand that drags.
+            // Once for all movements that came: a glimpse for each would fall behind a hand that drags.
             if std::mem::take(&mut self.has_moved) {
                 self.tracer.set_camera(&self.held.camera);
-                self.restart();
+                self.glimpse();
             }
             match self.phase {
+                Phase::Moving => match self.moved_at.and_then(|moved_at| REST.checked_sub(moved_at.elapsed())) {
+                    Some(left) => self.shared.wait(left),
+                    None => self.restart(),
+                },
                 Phase::Drafting => self.trace_draft(),
                 Phase::Rendering => self.render(),
                 Phase::Paused | Phase::Stopped => {
@@ -137,6 +156,25 @@ impl<'a> Session<'a> {
                 }
             }
         }
+    }
+
+    /// Shows what the camera sees from where it is now, in few pixels.
+    fn glimpse(&mut self) {
+        let begun = Instant::now();
+        let Crop { width, height, .. } = self.job.trace.film_area();
+        self.phase = Phase::Moving;
+        self.last_look = None;
+        self.progress = None;
+        self.screen.looked = None;
+        // Films of another place are of no use, and counting their samples would take longer than the glimpse.
+        self.draft = Film::new(0, 0);
+        self.state = RenderState::new(0, 0, &self.settings.limits);
+        let glimpse = Glimpse::of(&self.tracer, self.resolution.step(width, height));
+        let pixels = glimpse.film.width() * glimpse.film.height();
+        self.glimpse = Some(glimpse);
+        self.show();
+        self.resolution.took(pixels, begun.elapsed());
+        self.tell();
     }
 
     /// Throws all samples away and begins with a draft.
@@ -150,6 +188,7 @@ impl<'a> Session<'a> {
         self.last_look = None;
         self.progress = None;
         self.screen.begin();
+        self.forget_motion();
     }
 
     fn order_pilot(&mut self) {
@@ -172,6 +211,13 @@ impl<'a> Session<'a> {
             self.order_pilot();
             self.phase = Phase::Rendering;
         }
+        // A grid coarser than the last glimpse would be a step back.
+        let glimpsed = self.glimpse.as_ref().map_or(0, |glimpse| glimpse.film.width() * glimpse.film.height());
+        let pixels = self.draft.width() * self.draft.height();
+        if pixels as usize - self.draft_left.blocks.len() < glimpsed as usize {
+            return;
+        }
+        self.glimpse = None;
         if self.screen.is_due() || self.phase == Phase::Rendering {
             self.show();
             self.tell();
@@ -206,6 +252,8 @@ impl<'a> Session<'a> {
                     self.stopped(last_look);
                 }
             }
+            // Who says so throws the picture away.
+            Err(JudgeError::Outdated) => self.state = RenderState::new(width, height, &self.settings.limits),
             Err(error) => {
                 self.error = Some(error.to_string());
                 self.state = RenderState::new(width, height, &self.settings.limits);
@@ -228,6 +276,7 @@ impl<'a> Session<'a> {
     fn look(&mut self) -> Option<Judgement> {
         match judge(&self.state.film, &self.settings, self.state.inflation) {
             Ok(judgement) => Some(judgement),
+            Err(JudgeError::Outdated) => None,
             Err(error) => {
                 self.error = Some(error.to_string());
                 None
@@ -237,6 +286,9 @@ impl<'a> Session<'a> {
 
     fn obey(&mut self, command: Command) {
         self.note = None;
+        if self.phase == Phase::Moving && !command.suits_motion() {
+            self.restart();
+        }
         match command {
             Command::Layer { .. } | Command::Beside { .. } | Command::Inspect { .. } => {}
             Command::Redraw => self.show(),
@@ -261,15 +313,20 @@ impl<'a> Session<'a> {
             Command::Camera { movement } => {
                 self.find_pivot();
                 self.held.moved(movement);
-                self.has_moved = true;
+                self.has_moved();
             }
             Command::Focus { x, y } => self.focus_on(x, y),
             Command::CameraHome => {
                 self.held = Held::at_home(&self.job.scene.camera);
-                self.has_moved = true;
+                self.has_moved();
             }
             Command::Reload => self.reload(),
         }
+    }
+
+    fn has_moved(&mut self) {
+        self.has_moved = true;
+        self.moved_at = Some(Instant::now());
     }
 
     fn go_on(&mut self) {
@@ -287,7 +344,7 @@ impl<'a> Session<'a> {
                 self.error = Some(problem);
             }
             Ok(settings) => {
-                self.settings = settings;
+                self.settings = interruptible(settings, self.shared);
                 self.error = None;
                 self.adopt(changed);
             }
@@ -342,7 +399,7 @@ impl<'a> Session<'a> {
             Some(depth) => {
                 self.held.camera.focus_distance = depth;
                 if self.held.camera.aperture_radius > 0.0 {
-                    self.has_moved = true;
+                    self.has_moved();
                 } else {
                     self.note = Some("in focus, but the lens has no width: A widens it".to_owned());
                 }
@@ -357,7 +414,8 @@ impl<'a> Session<'a> {
             Ok((job, settings)) => {
                 self.tracer = PathTracer::new(Arc::clone(&job.scene), job.trace);
                 self.held = Held::at_home(&job.scene.camera);
-                (self.job, self.settings) = (job, settings);
+                (self.job, self.settings) = (job, interruptible(settings, self.shared));
+                self.neighbours = None;
                 self.error = None;
                 self.note = Some("the scene was loaded again".to_owned());
                 self.restart();
@@ -366,13 +424,26 @@ impl<'a> Session<'a> {
     }
 
     fn show(&mut self) {
+        if let Some(Glimpse { film, step }) = &self.glimpse {
+            let settings = &self.settings;
+            let scenery = Scenery { film, draft: film, tone: None, settings, is_at_rest: false, step: *step };
+            return self.screen.publish(scenery, self.shared);
+        }
+        self.find_motion();
         let scenery = Scenery {
             film: &self.state.film,
             draft: &self.draft,
             tone: self.state.tone.as_ref(),
             settings: &self.settings,
             is_at_rest: matches!(self.phase, Phase::Paused | Phase::Stopped),
+            step: 1,
         };
         self.screen.show(scenery, self.shared);
     }
+}
+
+/// The same settings, whose looks end when somebody wants another picture.
+fn interruptible(settings: LoopSettings, shared: &Arc<Shared>) -> LoopSettings {
+    let shared = Arc::clone(shared);
+    LoopSettings { is_outdated: Some(Box::new(move || shared.is_outdated())), ..settings }
 }

@@ -16,6 +16,8 @@ const MOST_COMMANDS: usize = 1024;
 pub(super) struct Shared {
     commands: Mutex<VecDeque<Command>>,
     arrived: Condvar,
+    /// Whether a command that waits throws the picture away.
+    is_outdated: AtomicBool,
     /// Viewers of each layer.
     viewers: [AtomicUsize; LAYERS],
     frames: [watch::Sender<Bytes>; LAYERS],
@@ -30,6 +32,7 @@ impl Shared {
         Self {
             commands: Mutex::default(),
             arrived: Condvar::new(),
+            is_outdated: AtomicBool::new(false),
             viewers: std::array::from_fn(|_| AtomicUsize::new(0)),
             frames: std::array::from_fn(|_| watch::Sender::new(Bytes::new())),
             status: watch::Sender::new(Arc::from("")),
@@ -42,6 +45,7 @@ impl Shared {
     pub(super) fn send(&self, command: Command) {
         let mut commands = self.commands.lock().unwrap_or_else(PoisonError::into_inner);
         if commands.len() < MOST_COMMANDS {
+            self.is_outdated.fetch_or(command.throws_the_picture_away(), Ordering::SeqCst);
             commands.push_back(command);
         }
         self.arrived.notify_all();
@@ -54,7 +58,14 @@ impl Shared {
 
     /// All commands that have come.
     pub(super) fn take_commands(&self) -> VecDeque<Command> {
-        std::mem::take(&mut *self.commands.lock().unwrap_or_else(PoisonError::into_inner))
+        let mut commands = self.commands.lock().unwrap_or_else(PoisonError::into_inner);
+        self.is_outdated.store(false, Ordering::SeqCst);
+        std::mem::take(&mut *commands)
+    }
+
+    /// Whether work on the picture is of no use any more.
+    pub(super) fn is_outdated(&self) -> bool {
+        self.is_closing() || self.is_outdated.load(Ordering::SeqCst)
     }
 
     /// Until a command comes, the preview closes or the time is up.

@@ -86,8 +86,9 @@ fn not_understood(error: &serde_json::Error) -> String {
 
 fn inspected(shared: &Shared, x: usize, y: usize) -> Option<String> {
     let snapshot = shared.snapshot()?;
-    let pixel = y.checked_mul(snapshot.width)?.checked_add(x)?;
-    let rgb_cd_m2 = *snapshot.rgb_cd_m2.get(pixel).filter(|_| x < snapshot.width)?;
+    let (column, row) = (x / snapshot.step, y / snapshot.step);
+    let pixel = row.checked_mul(snapshot.width)?.checked_add(column)?;
+    let rgb_cd_m2 = *snapshot.rgb_cd_m2.get(pixel).filter(|_| column < snapshot.width)?;
     let looked = snapshot.looked.as_ref();
     serde_json::to_string(&Inspected {
         kind: "inspected",

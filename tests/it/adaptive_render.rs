@@ -180,7 +180,9 @@ fn an_audit_finds_variance_that_is_too_low() {
     let tracer = PathTracer::new(Arc::new(scene), trace_settings(256, 192, 9));
     let mut rendered = render(&tracer, &settings, &Quiet).expect("renders");
     let audited = |rendered: &Rendered| {
-        audit(&tracer, &rendered.film, &rendered.judgement, &settings, 0).expect("large enough to audit")
+        audit(&tracer, &rendered.film, &rendered.judgement, &settings, 0)
+            .expect("never outdated")
+            .expect("large enough to audit")
     };
     let honest = audited(&rendered);
     println!("honest {honest:?}");

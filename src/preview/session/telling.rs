@@ -25,8 +25,8 @@ impl Session<'_> {
         let mut status = Status {
             phase: self.phase,
             reason: self.last_look.as_ref().map(|look| in_words(look.stop_reason)),
-            width: state.film.width(),
-            height: state.film.height(),
+            width: self.tracer.settings().film_area().width,
+            height: self.tracer.settings().film_area().height,
             visible_share: self.last_look.as_ref().map(|look| visible_share(&look.judgement, target)),
             exposure: self.live.exposure.or(self.job.record.exposure_stops),
             distance: self.live.distance.unwrap_or(1.0),

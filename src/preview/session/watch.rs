@@ -32,7 +32,8 @@ impl Watch<'_> {
     fn show(&self, moving: &mut Moving<'_>, state: &RenderState) {
         let tone = state.tone.as_ref();
         let Self { draft, settings, .. } = *self;
-        moving.screen.show(Scenery { film: &state.film, draft, tone, settings, is_at_rest: false }, self.shared);
+        let film = &state.film;
+        moving.screen.show(Scenery { film, draft, tone, settings, is_at_rest: false, step: 1 }, self.shared);
         moving.status.note = None;
         count(&mut moving.status, state, moving.progress.as_ref());
         publish(&moving.status, self.shared);
