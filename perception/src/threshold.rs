@@ -41,6 +41,8 @@ pub struct ThresholdMap {
     /// Threshold elevation of each band.
     pub(crate) elevations: Vec<ReducedPlane>,
     pub(crate) noise_gain: Plane,
+    /// Where the gaze is known: degrees from it.
+    pub(crate) eccentricity_deg: Option<Plane>,
 }
 
 /// Finds adaptation, masking and thresholds of a picture.
@@ -165,7 +167,8 @@ fn masked(
     let noise_gain = noise_gain(&tables, &adaptation_cd_m2, &elevations);
     let (least, greatest) = adaptation_cd_m2.range();
     let levels = adaptation_levels(viewing, csf, least, greatest);
-    ThresholdMap { viewing: viewing.clone(), bands, tables, levels, adaptation_cd_m2, elevations, noise_gain }
+    let viewing = viewing.clone();
+    ThresholdMap { viewing, bands, tables, levels, adaptation_cd_m2, elevations, noise_gain, eccentricity_deg: None }
 }
 
 impl ThresholdMap {
