@@ -90,6 +90,10 @@ pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Jud
         &settings.viewing,
         &csf,
     )?;
+    let thresholds = match settings.gaze {
+        Some(gaze) => thresholds.with_gaze(gaze),
+        None => thresholds,
+    };
     still_wanted(settings)?;
     let pixel_thresholds = match &settings.model {
         None => None,

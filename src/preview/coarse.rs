@@ -33,22 +33,14 @@ pub(super) fn order(plan: &mut SamplePlan, width: u32) {
     plan.blocks.sort_by_key(|block| std::cmp::Reverse(spacing(block.pixel % width, block.pixel / width)));
 }
 
-/// For each pixel the index of the one whose samples stand for it: itself, or the nearest above and to the left on a grid
-/// that has been sampled. `None` where there is none yet.
-pub(super) fn stand_ins(film: &Film) -> Vec<Option<usize>> {
-    let (width, height) = (film.width(), film.height());
-    let of = |x: u32, y: u32| {
-        let mut step = 1;
-        while step <= COARSEST {
-            let pixel = (y / step * step * width + x / step * step) as usize;
-            if film.samples(pixel) > 0 {
-                return Some(pixel);
-            }
-            step *= 2;
-        }
-        None
-    };
-    (0..height).flat_map(|y| (0..width).map(move |x| of(x, y))).collect()
+/// The index of the pixel whose samples stand for one: itself, or the nearest above and to the left on a grid that has been
+/// sampled. `None` where there is none yet.
+pub(super) fn stand_in(film: &Film, pixel: usize) -> Option<usize> {
+    let width = film.width();
+    let (x, y) = (pixel as u32 % width, pixel as u32 / width);
+    let on_grid = |step: u32| (y / step * step * width + x / step * step) as usize;
+    let steps = (0..=COARSEST.ilog2()).map(|power| 1 << power);
+    steps.map(on_grid).find(|&pixel| film.samples(pixel) > 0)
 }
 
 #[cfg(test)]

@@ -76,6 +76,11 @@ pub(super) enum Command {
         /// Row.
         y: usize,
     },
+    /// Somebody looks at a place of the picture, in pixels; nowhere in particular without one.
+    Gaze {
+        /// Column and row.
+        at: Option<[f64; 2]>,
+    },
     /// The camera of the scene.
     CameraHome,
     /// Frames are missing that somebody looks at. Not from viewers.
@@ -160,6 +165,8 @@ pub(super) struct Status {
     pub(super) error: Option<String>,
     /// What was done last.
     pub(super) note: Option<String>,
+    /// Whether the pointer stands for the gaze.
+    pub(super) is_foveated: bool,
 }
 
 /// What is at a pixel.

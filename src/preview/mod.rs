@@ -21,10 +21,15 @@ mod screen;
 mod server;
 mod session;
 mod shared;
+mod spectator;
+mod tev;
 mod viewer;
 
 pub use audience::Audience;
+pub use screen::Looked;
 pub use server::{Door, random_token};
+pub use spectator::{Shown, Spectator};
+pub use tev::{TEV_PORT, Tev};
 
 use crate::adaptive::Rendered;
 use crate::adaptive::settings::{Limits, LoopSettings};
@@ -75,6 +80,15 @@ pub trait Host: Send + Sync {
     fn scene_file(&self) -> &Path;
 }
 
+/// What a preview does beside showing the picture to browsers.
+#[derive(Default)]
+pub struct Options {
+    /// Whether viewers' pointers stand for their gaze: see [`LoopSettings::gaze`].
+    pub is_foveated: bool,
+    /// Who else is shown each frame.
+    pub spectators: Vec<Box<dyn Spectator>>,
+}
+
 /// A preview under way.
 pub struct Preview {
     shared: Arc<Shared>,
@@ -96,12 +110,12 @@ impl Closer {
 ///
 /// # Errors
 /// If the system gives no thread.
-pub fn start(job: Job, host: Arc<dyn Host>, pool: rayon::ThreadPool) -> std::io::Result<Preview> {
+pub fn start(job: Job, host: Arc<dyn Host>, options: Options, pool: rayon::ThreadPool) -> std::io::Result<Preview> {
     let shared = Arc::new(Shared::new());
     let scene_file = host.scene_file().to_owned();
     let thread = |name: &str| std::thread::Builder::new().name(name.to_owned());
     let (of_render, of_watch) = (Arc::clone(&shared), Arc::clone(&shared));
-    let render = thread("preview").spawn(move || pool.install(|| session::run(job, &host, &of_render)))?;
+    let render = thread("preview").spawn(move || pool.install(|| session::run(job, &host, options, &of_render)))?;
     let watch = thread("scene-file").spawn(move || session::watch_file(&scene_file, &of_watch))?;
     Ok(Preview { shared, threads: vec![render, watch] })
 }

@@ -1,8 +1,9 @@
 //! From film to encoded frames of the layers that somebody looks at.
 
-use super::coarse::stand_ins;
+use super::coarse::stand_in;
 use super::layer::{self, Colours, Layer};
 use super::shared::Shared;
+use super::spectator::{Shown, Spectator};
 use crate::adaptive::judge::Judgement;
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::statistics::picture_variance;
@@ -16,6 +17,7 @@ use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ImageEncoder, ImageError};
+use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -25,16 +27,19 @@ const FRAME_INTERVAL: Duration = Duration::from_millis(100);
 const LIVELY: Duration = Duration::from_secs(5);
 
 /// What the last look at the film saw.
-pub(super) struct Looked {
+#[derive(Debug)]
+pub struct Looked {
     /// Standard error on the display, cd/m², that is at visibility 1.
-    pub(super) threshold: Plane,
-    pub(super) visibility: Plane,
+    pub threshold: Plane,
+    /// Of the remaining noise.
+    pub visibility: Plane,
     /// The picture, where it is denoised: linear RGB in cd/m².
-    denoised: Option<Vec<[f32; 3]>>,
+    pub denoised: Option<Vec<[f32; 3]>>,
 }
 
 impl Looked {
-    pub(super) fn of(judgement: &Judgement) -> Self {
+    /// The maps of a look.
+    pub fn of(judgement: &Judgement) -> Self {
         Self {
             threshold: judgement.allowed_standard_error_cd_m2(),
             visibility: judgement.predicted.clone(),
@@ -89,17 +94,29 @@ pub(super) struct Screen {
     cost: Duration,
     pub(super) looked: Option<Arc<Looked>>,
     pub(super) motion: Motion,
+    /// Samples of the film that was shown last.
+    pub(super) total_samples: u64,
+    spectators: Vec<Box<dyn Spectator>>,
 }
 
 impl Screen {
-    pub(super) fn new() -> Self {
+    pub(super) fn new(spectators: Vec<Box<dyn Spectator>>) -> Self {
         let motion = Motion::Unknown("not known to a running render");
-        Self { started: Instant::now(), shown: None, cost: Duration::ZERO, looked: None, motion }
+        Self {
+            started: Instant::now(),
+            shown: None,
+            cost: Duration::ZERO,
+            looked: None,
+            motion,
+            total_samples: 0,
+            spectators,
+        }
     }
 
     /// A new picture begins: no look was taken and the next frame is due.
     pub(super) fn begin(&mut self) {
-        *self = Self { cost: self.cost, ..Self::new() };
+        let spectators = std::mem::take(&mut self.spectators);
+        *self = Self { cost: self.cost, ..Self::new(spectators) };
     }
 
     /// Whether a frame is due.
@@ -117,7 +134,7 @@ impl Screen {
     }
 
     /// Shows a film to all viewers.
-    pub(super) fn publish(&self, scenery: Scenery<'_>, shared: &Shared) {
+    pub(super) fn publish(&mut self, scenery: Scenery<'_>, shared: &Shared) {
         let nits_per_unit = scenery.settings.nits_per_unit;
         // Denoised pictures are made by looks; between two the last one stays.
         let denoised = self.looked.as_ref().and_then(|looked| looked.denoised.clone());
@@ -129,12 +146,23 @@ impl Screen {
                 shared.publish_frame(layer, frame);
             }
         }
+        let shown = Shown {
+            film: scenery.film,
+            rgb_cd_m2: &rgb_cd_m2,
+            step: scenery.step,
+            looked: self.looked.as_deref(),
+            nits_per_unit,
+            is_at_rest: scenery.is_at_rest,
+        };
+        self.spectators.iter_mut().for_each(|spectator| spectator.shown(&shown));
+        let samples = samples(scenery.film);
+        self.total_samples = samples.iter().map(|&samples| u64::from(samples)).sum();
         shared.publish_snapshot(Snapshot {
             width: scenery.film.width() as usize,
             step: scenery.step as usize,
             nits_per_unit,
             rgb_cd_m2,
-            samples: (0..pixels(scenery.film)).map(|pixel| scenery.film.samples(pixel)).collect(),
+            samples,
             looked: self.looked.clone(),
         });
     }
@@ -143,7 +171,7 @@ impl Screen {
         let Scenery { film, settings, draft, .. } = scenery;
         let (width, height) = (film.width() as usize, film.height() as usize);
         // First surfaces are known from the draft on.
-        let surfaces = if film.total_samples() >= draft.total_samples() { film } else { draft };
+        let surfaces = || if film.total_samples() >= draft.total_samples() { film } else { draft };
         match (layer, &self.looked) {
             (Layer::Picture, _) => {
                 let tone = match scenery.tone {
@@ -166,9 +194,9 @@ impl Screen {
             (Layer::HalfDifference, _) => {
                 layer::signed(&film.estimate(settings.nits_per_unit).half_difference, "cd/m², of the scene")
             }
-            (Layer::Albedo, _) => layer::albedo(surfaces),
-            (Layer::Normal, _) => layer::normal(surfaces),
-            (Layer::Depth, _) => layer::depth(surfaces),
+            (Layer::Albedo, _) => layer::albedo(surfaces()),
+            (Layer::Normal, _) => layer::normal(surfaces()),
+            (Layer::Depth, _) => layer::depth(surfaces()),
             (Layer::Velocity, _) => match &self.motion {
                 Motion::Known { to_next_px, frames_per_second } if to_next_px.len() == pixels(film) => {
                     layer::velocity(to_next_px, *frames_per_second)
@@ -197,19 +225,20 @@ fn pixels(film: &Film) -> usize {
     film.width() as usize * film.height() as usize
 }
 
-/// The film's picture; where it has no samples, the draft's.
+/// Samples of every pixel.
+fn samples(film: &Film) -> Vec<u32> {
+    (0..pixels(film)).into_par_iter().map(|pixel| film.samples(pixel)).collect()
+}
+
+/// The film's picture, cd/m²; where it has no samples, the draft's.
 fn composed(film: &Film, draft: &Film, nits_per_unit: f64) -> Vec<[f32; 3]> {
-    let mut rgb = film.estimate(nits_per_unit).rgb_cd_m2;
-    if (0..pixels(film)).all(|pixel| film.samples(pixel) > 0) {
-        return rgb;
-    }
-    let below = draft.estimate(nits_per_unit).rgb_cd_m2;
-    for (pixel, stand_in) in stand_ins(draft).into_iter().enumerate() {
-        if film.samples(pixel) == 0 {
-            rgb[pixel] = stand_in.map_or([0.0; 3], |stand_in| below[stand_in]);
-        }
-    }
-    rgb
+    let stands_in =
+        |pixel: usize| stand_in(draft, pixel).map_or([0.0; 3], |stand_in| draft.rgb_cd_m2(stand_in, nits_per_unit));
+    let rgb = |pixel: usize| match film.samples(pixel) {
+        0 => stands_in(pixel),
+        _ => film.rgb_cd_m2(pixel, nits_per_unit),
+    };
+    (0..pixels(film)).into_par_iter().map(rgb).collect()
 }
 
 /// The operator on a picture that was not looked at yet, of pixels `step` times as large as the display's.

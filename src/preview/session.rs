@@ -1,5 +1,6 @@
 //! The render's thread: glimpses, drafts, renders, and obeys between two batches.
 
+mod gaze;
 mod live;
 mod motion;
 mod pace;
@@ -13,13 +14,14 @@ use super::glimpse::{Glimpse, Resolution};
 use super::orbit::Held;
 use super::screen::{Looked, Scenery, Screen};
 use super::shared::Shared;
-use super::{Host, Job};
+use super::{Host, Job, Options};
 use crate::adaptive::judge::{JudgeError, Judgement, judge};
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::state::RenderState;
 use crate::adaptive::{LastLook, Progress, StopReason, run as run_loop};
 use crate::film::Film;
 use crate::integrator::{Crop, PathTracer, SamplePlan};
+use gaze::Follower;
 use live::{Changed, Live, settings_of};
 use motion::Neighbours;
 pub(super) use pace::Pace;
@@ -32,7 +34,7 @@ use watch::{Moving, Watch};
 
 /// Renders and obeys until the preview closes. A defect that panics ends the picture, not the preview: a saved scene file
 /// starts it again.
-pub(super) fn run(job: Job, host: &Arc<dyn Host>, shared: &Arc<Shared>) {
+pub(super) fn run(job: Job, host: &Arc<dyn Host>, mut options: Options, shared: &Arc<Shared>) {
     let mut next = Some(job);
     while !shared.is_closing() {
         let Some(job) = next.take() else {
@@ -43,7 +45,7 @@ pub(super) fn run(job: Job, host: &Arc<dyn Host>, shared: &Arc<Shared>) {
             }
             continue;
         };
-        let work = || Session::new(job, host, shared).map(Session::work);
+        let work = || Session::new(job, host, &mut options, shared).map(Session::work);
         let problem = match catch_unwind(AssertUnwindSafe(work)) {
             Ok(Ok(())) => return,
             Ok(Err(problem)) => problem,
@@ -75,6 +77,8 @@ struct Session<'a> {
     shared: &'a Arc<Shared>,
     job: Job,
     live: Live,
+    /// Where the pointer stands for the gaze.
+    gaze: Option<Follower>,
     held: Held,
     /// Whether the camera is another than the tracer's.
     has_moved: bool,
@@ -102,13 +106,14 @@ struct Session<'a> {
 }
 
 impl<'a> Session<'a> {
-    fn new(job: Job, host: &'a Arc<dyn Host>, shared: &'a Arc<Shared>) -> Result<Self, String> {
+    fn new(job: Job, host: &'a Arc<dyn Host>, options: &mut Options, shared: &'a Arc<Shared>) -> Result<Self, String> {
         let live = Live::default();
         let settings = interruptible(settings_of(&job, &live)?, shared);
         let tracer = PathTracer::new(Arc::clone(&job.scene), job.trace);
         Ok(Self {
             host,
             shared,
+            gaze: options.is_foveated.then(|| Follower::new(settings.viewing.display.pixels_per_degree)),
             held: Held::at_home(&job.scene.camera),
             // The first picture begins as one after a movement does.
             has_moved: true,
@@ -121,7 +126,7 @@ impl<'a> Session<'a> {
             draft: Film::new(0, 0),
             state: RenderState::new(0, 0, &settings.limits),
             last_look: None,
-            screen: Screen::new(),
+            screen: Screen::new(std::mem::take(&mut options.spectators)),
             neighbours: None,
             pace: Pace::new(),
             progress: None,
@@ -143,6 +148,7 @@ impl<'a> Session<'a> {
                 self.tracer.set_camera(&self.held.camera);
                 self.glimpse();
             }
+            self.follow_gaze();
             match self.phase {
                 Phase::Moving => match self.moved_at.and_then(|moved_at| REST.checked_sub(moved_at.elapsed())) {
                     Some(left) => self.shared.wait(left),
@@ -236,6 +242,7 @@ impl<'a> Session<'a> {
                 shared: self.shared,
                 settings: &self.settings,
                 draft: &self.draft,
+                follower: self.gaze.as_ref(),
                 moving: Mutex::new(Moving {
                     screen: &mut self.screen,
                     pace: &mut self.pace,
@@ -290,7 +297,7 @@ impl<'a> Session<'a> {
             self.restart();
         }
         match command {
-            Command::Layer { .. } | Command::Beside { .. } | Command::Inspect { .. } => {}
+            Command::Layer { .. } | Command::Beside { .. } | Command::Inspect { .. } | Command::Gaze { .. } => {}
             Command::Redraw => self.show(),
             Command::Pause if matches!(self.phase, Phase::Rendering | Phase::Drafting) => {
                 self.phase = Phase::Paused;
@@ -334,6 +341,19 @@ impl<'a> Session<'a> {
         self.phase = if self.draft_left.blocks.is_empty() { Phase::Rendering } else { Phase::Drafting };
     }
 
+    /// Looks where the pointer is, if it is time.
+    fn follow_gaze(&mut self) {
+        let is_waiting = matches!(self.phase, Phase::Moving | Phase::Drafting | Phase::Paused);
+        let Some(follower) = self.gaze.as_mut().filter(|follower| !is_waiting && follower.is_due(self.shared)) else {
+            return;
+        };
+        let gaze = follower.follow(self.shared, self.settings.viewing.display.pixels_per_degree);
+        self.change(|live| live.gaze = gaze, Changed::Gaze);
+        if self.phase == Phase::Stopped {
+            self.go_on();
+        }
+    }
+
     /// Other settings for the samples that there are.
     fn change(&mut self, edit: impl FnOnce(&mut Live), changed: Changed) {
         let before = self.live.clone();
@@ -359,6 +379,14 @@ impl<'a> Session<'a> {
                 self.state.traced_blocks = 0;
             }
             Changed::Target => {}
+            Changed::Gaze => {
+                let tone = self.state.tone.take();
+                let limits = &self.settings.limits;
+                let state = std::mem::replace(&mut self.state, RenderState::new(0, 0, limits));
+                self.state = RenderState { tone, ..state.begun_anew(limits) };
+                self.order_pilot();
+                return;
+            }
             Changed::Seen => {
                 let limits = &self.settings.limits;
                 let state = std::mem::replace(&mut self.state, RenderState::new(0, 0, limits));

@@ -4,6 +4,7 @@ use super::command::Command;
 use super::layer::{LAYERS, Layer};
 use super::screen::Snapshot;
 use axum::body::Bytes;
+use fechner_perception::eccentricity::Gaze;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
@@ -23,6 +24,7 @@ pub(super) struct Shared {
     frames: [watch::Sender<Bytes>; LAYERS],
     status: watch::Sender<Arc<str>>,
     snapshot: Mutex<Option<Arc<Snapshot>>>,
+    gaze: Mutex<Option<Gaze>>,
     is_closing: AtomicBool,
     closing: watch::Sender<bool>,
 }
@@ -37,6 +39,7 @@ impl Shared {
             frames: std::array::from_fn(|_| watch::Sender::new(Bytes::new())),
             status: watch::Sender::new(Arc::from("")),
             snapshot: Mutex::default(),
+            gaze: Mutex::default(),
             is_closing: AtomicBool::new(false),
             closing: watch::Sender::new(false),
         }
@@ -106,6 +109,17 @@ impl Shared {
 
     pub(super) fn status(&self) -> watch::Receiver<Arc<str>> {
         self.status.subscribe()
+    }
+
+    /// Somebody looks elsewhere: the latest place counts.
+    pub(super) fn look_at(&self, gaze: Option<Gaze>) {
+        *self.gaze.lock().unwrap_or_else(PoisonError::into_inner) = gaze;
+        let _commands = self.commands.lock().unwrap_or_else(PoisonError::into_inner);
+        self.arrived.notify_all();
+    }
+
+    pub(super) fn gaze(&self) -> Option<Gaze> {
+        *self.gaze.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     pub(super) fn publish_snapshot(&self, snapshot: Snapshot) {

@@ -5,6 +5,7 @@ use super::layer::Layer;
 use super::shared::{Seat, Shared};
 use axum::body::Bytes;
 use axum::extract::ws::{Message, WebSocket};
+use fechner_perception::eccentricity::Gaze;
 use fechner_perception::photometry::luminance;
 use std::sync::Arc;
 use tokio::sync::watch;
@@ -52,6 +53,11 @@ pub(super) async fn attend(mut socket: WebSocket, shared: Arc<Shared>) {
                     }
                     Ok(Command::Beside { layer }) => {
                         beside = layer.map(|layer| Look::at(&shared, layer));
+                        None
+                    }
+                    Ok(Command::Gaze { at }) => {
+                        let is_place = |at: &[f64; 2]| at.iter().all(|place| place.is_finite());
+                        shared.look_at(at.filter(is_place).map(|[x_px, y_px]| Gaze { x_px, y_px }));
                         None
                     }
                     Ok(Command::Inspect { x, y }) => inspected(&shared, x, y).map(|text| Message::Text(text.into())),

@@ -3,6 +3,7 @@
 use crate::adaptive::settings::{Limits, LoopSettings};
 use crate::preview::Job;
 use fechner_perception::display::{Display, Observer, Viewing};
+use fechner_perception::eccentricity::Gaze;
 
 /// What viewers changed, in place of what the job says.
 #[derive(Clone, Default)]
@@ -14,6 +15,8 @@ pub(super) struct Live {
     /// In distances that the display is made for.
     pub(super) distance: Option<f64>,
     pub(super) visibility: Option<f64>,
+    /// Where somebody looks.
+    pub(super) gaze: Option<Gaze>,
 }
 
 /// What a change of settings asks for.
@@ -23,6 +26,8 @@ pub(super) enum Changed {
     Seen,
     /// When to stop.
     Target,
+    /// Where somebody looks: the picture is shown as before.
+    Gaze,
 }
 
 /// The loop's settings for a job that viewers changed.
@@ -48,5 +53,5 @@ pub(super) fn settings_of(job: &Job, live: &Live) -> Result<LoopSettings, String
     }
     let limits = Limits { visibility, ..job.limits };
     let settings = record.loop_settings(limits).map_err(|error| error.to_string())?;
-    Ok(LoopSettings { importance: job.importance.clone(), ..settings })
+    Ok(LoopSettings { importance: job.importance.clone(), gaze: live.gaze, ..settings })
 }

@@ -1,5 +1,6 @@
 //! What the loop tells while it runs: frames and figures between batches, and the way out when somebody asks for something.
 
+use super::gaze::Follower;
 use super::pace::Pace;
 use super::telling::{count, publish};
 use crate::adaptive::judge::Judgement;
@@ -17,6 +18,8 @@ pub(super) struct Watch<'a> {
     pub(super) shared: &'a Shared,
     pub(super) settings: &'a LoopSettings,
     pub(super) draft: &'a Film,
+    /// Where the gaze counts.
+    pub(super) follower: Option<&'a Follower>,
     pub(super) moving: Mutex<Moving<'a>>,
 }
 
@@ -35,7 +38,7 @@ impl Watch<'_> {
         let film = &state.film;
         moving.screen.show(Scenery { film, draft, tone, settings, is_at_rest: false, step: 1 }, self.shared);
         moving.status.note = None;
-        count(&mut moving.status, state, moving.progress.as_ref());
+        count(&mut moving.status, state, moving.screen.total_samples, moving.progress.as_ref());
         publish(&moving.status, self.shared);
     }
 }
@@ -67,6 +70,10 @@ impl Monitor for Watch<'_> {
             self.show(&mut moving, state);
         }
         moving.pace.begin();
-        if self.shared.has_news() { Directive::Leave } else { Directive::GoOn }
+        if self.shared.has_news() || self.follower.is_some_and(|follower| follower.is_due(self.shared)) {
+            Directive::Leave
+        } else {
+            Directive::GoOn
+        }
     }
 }
