@@ -36,6 +36,8 @@ const SCENES: [&str; 3] = ["cornell-box", "many-lights", "textured-room"];
 const MOMENTS: usize = 12;
 /// The first of them, in seconds.
 const FIRST_MOMENT: f64 = 0.15;
+/// Samples a pixel at which renders end that are compared by the clock.
+const OVERHEAD_SPP: u32 = 96;
 const REFERENCE_SEED: u64 = 0x5245_4645;
 
 struct Arguments {
@@ -65,7 +67,7 @@ fn main() -> Result<()> {
     let arguments = Arguments::read()?;
     let subjects = SCENES.map(|name| Subject::load(name, arguments.size)).into_iter().collect::<Result<Vec<_>>>()?;
     first_pictures(&subjects)?;
-    overheads(&subjects)?;
+    overheads(&subjects, &arguments)?;
     races(&subjects, &arguments)
 }
 
@@ -272,10 +274,11 @@ fn first_pictures(subjects: &[Subject]) -> Result<()> {
             pass.push(traced);
             let watched = Watched::start(subject, seed, Limits::of_visibility(1.0), false)?;
             let pixels = subject.pixels() as u64;
-            let moments = watched.until(|moment| moment.step == 1 && moment.samples >= pixels)?;
+            let moments = watched.until(|moment| moment.samples >= 2 * pixels)?;
             first.push(moments[0].seconds - tree);
-            // The draft is in a film of its own: the pilot's first frames come after it.
-            whole.extend(moments.iter().find(|moment| moment.step == 1).map(|moment| moment.seconds - tree));
+            // The draft is in a film of its own, and its end is always shown.
+            let is_drafted = |moment: &&Moment| moment.step == 1 && moment.samples == 0;
+            whole.extend(moments.iter().rfind(is_drafted).map(|moment| moment.seconds - tree));
         }
         let [trees, pass, first, whole] = [trees, pass, first, whole].map(|times| 1e3 * least(times));
         let (name, first_ratio, whole_ratio) = (subject.name, first / pass, whole / pass);
@@ -313,15 +316,13 @@ fn seconds_at(counts: &[(u64, f64)], samples: u64) -> f64 {
     from + (to - from) * (samples as f64 - low as f64) / ((high - low) as f64).max(1.0)
 }
 
-fn overheads(subjects: &[Subject]) -> Result<()> {
-    /// A preview of the default quality goes on for longer; this is enough to see rates.
-    const VISIBILITY: f64 = 2.0;
+fn overheads(subjects: &[Subject], arguments: &Arguments) -> Result<()> {
     println!("\n| scene | render, s | watched preview, s | whole overhead | after the first 5 s |");
     println!("| --- | --- | --- | --- | --- |");
     for subject in subjects {
         let (mut whole, mut steady, mut alone, mut watched) = (vec![], vec![], vec![], vec![]);
-        for seed in 0..3 {
-            let limits = Limits { time: None, ..Limits::of_visibility(VISIBILITY) };
+        for seed in 0..arguments.seeds {
+            let limits = Limits { mean_samples: Some(OVERHEAD_SPP), ..Limits::of_visibility(1.0) };
             let (rendered, counts) = one_thread()?.install(|| {
                 let notes = Notes { clock: CpuClock::of_thread(), counts: Mutex::default() };
                 let settings = subject.loop_settings(limits)?;

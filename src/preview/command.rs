@@ -101,7 +101,12 @@ impl Command {
     pub(super) fn suits_motion(&self) -> bool {
         matches!(
             self,
-            Self::Camera { .. } | Self::Redraw | Self::Layer { .. } | Self::Beside { .. } | Self::Inspect { .. }
+            Self::Camera { .. }
+                | Self::CameraHome
+                | Self::Redraw
+                | Self::Layer { .. }
+                | Self::Beside { .. }
+                | Self::Inspect { .. }
         )
     }
 }

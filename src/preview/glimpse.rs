@@ -9,7 +9,7 @@ use crate::sampler::Half;
 use std::time::Duration;
 
 /// Time that a glimpse may take, traced, encoded and sent: a tenth of a second less what waits before it.
-const FRAME: Duration = Duration::from_millis(70);
+const FRAME: Duration = Duration::from_millis(60);
 /// Pixels of the first glimpse, before anything was measured.
 const FIRST_PIXELS: f64 = 4096.0;
 /// Fewer say nothing.

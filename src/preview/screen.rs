@@ -135,10 +135,14 @@ impl Screen {
 
     /// Shows a film to all viewers.
     pub(super) fn publish(&mut self, scenery: Scenery<'_>, shared: &Shared) {
+        if pixels(scenery.film) == 0 {
+            return;
+        }
         let nits_per_unit = scenery.settings.nits_per_unit;
         // Denoised pictures are made by looks; between two the last one stays.
         let denoised = self.looked.as_ref().and_then(|looked| looked.denoised.clone());
-        let rgb_cd_m2 = denoised.unwrap_or_else(|| composed(scenery.film, scenery.draft, nits_per_unit));
+        let (raw, samples) = composed(scenery.film, scenery.draft, nits_per_unit);
+        let rgb_cd_m2 = denoised.unwrap_or(raw);
         for layer in ALL.into_iter().filter(|&layer| shared.is_watched(layer)) {
             let colours = self.colours(layer, scenery, &rgb_cd_m2);
             // A frame that cannot be encoded is left out; the next may be.
@@ -155,7 +159,6 @@ impl Screen {
             is_at_rest: scenery.is_at_rest,
         };
         self.spectators.iter_mut().for_each(|spectator| spectator.shown(&shown));
-        let samples = samples(scenery.film);
         self.total_samples = samples.iter().map(|&samples| u64::from(samples)).sum();
         shared.publish_snapshot(Snapshot {
             width: scenery.film.width() as usize,
@@ -225,20 +228,18 @@ fn pixels(film: &Film) -> usize {
     film.width() as usize * film.height() as usize
 }
 
-/// Samples of every pixel.
-fn samples(film: &Film) -> Vec<u32> {
-    (0..pixels(film)).into_par_iter().map(|pixel| film.samples(pixel)).collect()
-}
-
-/// The film's picture, cd/m²; where it has no samples, the draft's.
-fn composed(film: &Film, draft: &Film, nits_per_unit: f64) -> Vec<[f32; 3]> {
+/// The film's picture, cd/m², and its samples of each pixel; where it has none, the draft's picture. In one walk: a film is
+/// many times as large as a picture.
+fn composed(film: &Film, draft: &Film, nits_per_unit: f64) -> (Vec<[f32; 3]>, Vec<u32>) {
     let stands_in =
         |pixel: usize| stand_in(draft, pixel).map_or([0.0; 3], |stand_in| draft.rgb_cd_m2(stand_in, nits_per_unit));
-    let rgb = |pixel: usize| match film.samples(pixel) {
-        0 => stands_in(pixel),
-        _ => film.rgb_cd_m2(pixel, nits_per_unit),
+    let of_pixel = |pixel: usize| match film.samples(pixel) {
+        0 => (stands_in(pixel), 0),
+        samples => (film.rgb_cd_m2(pixel, nits_per_unit), samples),
     };
-    (0..pixels(film)).into_par_iter().map(rgb).collect()
+    let (mut rgb, mut samples) = (Vec::new(), Vec::new());
+    (0..pixels(film)).into_par_iter().map(of_pixel).unzip_into_vecs(&mut rgb, &mut samples);
+    (rgb, samples)
 }
 
 /// The operator on a picture that was not looked at yet, of pixels `step` times as large as the display's.

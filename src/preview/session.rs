@@ -3,13 +3,14 @@
 mod gaze;
 mod live;
 mod motion;
+mod obeying;
 mod pace;
 mod saving;
 mod telling;
 mod watch;
 
 use super::coarse::{draft_plan, order};
-use super::command::{Command, Phase, SavedFormat};
+use super::command::{Command, Phase};
 use super::glimpse::{Glimpse, Resolution};
 use super::orbit::Held;
 use super::screen::{Looked, Scenery, Screen};
@@ -18,11 +19,11 @@ use super::{Host, Job, Options};
 use crate::adaptive::judge::{JudgeError, Judgement, judge};
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::state::RenderState;
-use crate::adaptive::{LastLook, Progress, StopReason, run as run_loop};
+use crate::adaptive::{LastLook, Progress, run as run_loop};
 use crate::film::Film;
 use crate::integrator::{Crop, PathTracer, SamplePlan};
 use gaze::Follower;
-use live::{Changed, Live, settings_of};
+use live::{Live, settings_of};
 use motion::Neighbours;
 pub(super) use pace::Pace;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -248,6 +249,8 @@ impl<'a> Session<'a> {
                     pace: &mut self.pace,
                     progress: &mut self.progress,
                     status,
+                    samples_since: 0,
+                    told: Instant::now(),
                 }),
             };
             run_loop(&self.tracer, &self.settings, state, &watch)
@@ -287,166 +290,6 @@ impl<'a> Session<'a> {
             Err(error) => {
                 self.error = Some(error.to_string());
                 None
-            }
-        }
-    }
-
-    fn obey(&mut self, command: Command) {
-        self.note = None;
-        if self.phase == Phase::Moving && !command.suits_motion() {
-            self.restart();
-        }
-        match command {
-            Command::Layer { .. } | Command::Beside { .. } | Command::Inspect { .. } | Command::Gaze { .. } => {}
-            Command::Redraw => self.show(),
-            Command::Pause if matches!(self.phase, Phase::Rendering | Phase::Drafting) => {
-                self.phase = Phase::Paused;
-                self.show();
-            }
-            Command::Resume if matches!(self.phase, Phase::Paused | Phase::Stopped) => self.go_on(),
-            Command::Stop if self.phase != Phase::Stopped => {
-                if let Some(judgement) = self.look() {
-                    self.stopped(LastLook { judgement, stop_reason: StopReason::Interrupted });
-                }
-            }
-            Command::Pause | Command::Resume | Command::Stop => {}
-            Command::Restart => self.restart(),
-            Command::Save { format } => self.save(format),
-            Command::Exposure { stops } => self.change(|live| live.exposure = stops, Changed::Seen),
-            Command::Operator { name } => self.change(|live| live.operator = Some(name), Changed::Seen),
-            Command::Display { name } => self.change(|live| live.display = Some(name), Changed::Seen),
-            Command::Distance { factor } => self.change(|live| live.distance = Some(factor), Changed::Seen),
-            Command::Visibility { target } => self.change(|live| live.visibility = Some(target), Changed::Target),
-            Command::Camera { movement } => {
-                self.find_pivot();
-                self.held.moved(movement);
-                self.has_moved();
-            }
-            Command::Focus { x, y } => self.focus_on(x, y),
-            Command::CameraHome => {
-                self.held = Held::at_home(&self.job.scene.camera);
-                self.has_moved();
-            }
-            Command::Reload => self.reload(),
-        }
-    }
-
-    fn has_moved(&mut self) {
-        self.has_moved = true;
-        self.moved_at = Some(Instant::now());
-    }
-
-    fn go_on(&mut self) {
-        self.last_look = None;
-        self.phase = if self.draft_left.blocks.is_empty() { Phase::Rendering } else { Phase::Drafting };
-    }
-
-    /// Looks where the pointer is, if it is time.
-    fn follow_gaze(&mut self) {
-        let is_waiting = matches!(self.phase, Phase::Moving | Phase::Drafting | Phase::Paused);
-        let Some(follower) = self.gaze.as_mut().filter(|follower| !is_waiting && follower.is_due(self.shared)) else {
-            return;
-        };
-        let gaze = follower.follow(self.shared, self.settings.viewing.display.pixels_per_degree);
-        self.change(|live| live.gaze = gaze, Changed::Gaze);
-        if self.phase == Phase::Stopped {
-            self.go_on();
-        }
-    }
-
-    /// Other settings for the samples that there are.
-    fn change(&mut self, edit: impl FnOnce(&mut Live), changed: Changed) {
-        let before = self.live.clone();
-        edit(&mut self.live);
-        match settings_of(&self.job, &self.live) {
-            Err(problem) => {
-                self.live = before;
-                self.error = Some(problem);
-            }
-            Ok(settings) => {
-                self.settings = interruptible(settings, self.shared);
-                self.error = None;
-                self.adopt(changed);
-            }
-        }
-    }
-
-    fn adopt(&mut self, changed: Changed) {
-        let has_pilot = self.state.plans > 0;
-        match changed {
-            Changed::Target if has_pilot => {
-                self.state.pending.clear();
-                self.state.traced_blocks = 0;
-            }
-            Changed::Target => {}
-            Changed::Gaze => {
-                let tone = self.state.tone.take();
-                let limits = &self.settings.limits;
-                let state = std::mem::replace(&mut self.state, RenderState::new(0, 0, limits));
-                self.state = RenderState { tone, ..state.begun_anew(limits) };
-                self.order_pilot();
-                return;
-            }
-            Changed::Seen => {
-                let limits = &self.settings.limits;
-                let state = std::mem::replace(&mut self.state, RenderState::new(0, 0, limits));
-                self.state = state.begun_anew(limits);
-                self.order_pilot();
-                self.screen.looked = None;
-            }
-        }
-        if self.phase == Phase::Stopped {
-            if let Some(judgement) = self.look() {
-                let stop_reason = self.last_look.as_ref().map_or(StopReason::Interrupted, |look| look.stop_reason);
-                self.stopped(LastLook { judgement, stop_reason });
-            }
-        } else {
-            self.show();
-        }
-    }
-
-    /// The camera turns about what stands in the middle of the picture.
-    fn find_pivot(&mut self) {
-        let (width, height) = (self.draft.width() as usize, self.draft.height() as usize);
-        if let Some(depth) = self.depth_at(width / 2, height / 2) {
-            self.held.pivot_distance = depth;
-        }
-    }
-
-    /// Distance of what a pixel shows; none where nothing is or where the picture is of another camera.
-    fn depth_at(&self, x: usize, y: usize) -> Option<f32> {
-        let film = if self.state.film.total_samples() > 0 { &self.state.film } else { &self.draft };
-        let is_whole = self.draft_left.blocks.is_empty() && !self.has_moved && x < film.width() as usize;
-        let pixel = y.checked_mul(film.width() as usize)?.checked_add(x)?;
-        film.guides().get(pixel).map(|guide| guide.depth).filter(|depth| is_whole && depth.is_normal())
-    }
-
-    fn focus_on(&mut self, x: usize, y: usize) {
-        match self.depth_at(x, y) {
-            None => self.note = Some("nothing to focus on there".to_owned()),
-            Some(depth) => {
-                self.held.camera.focus_distance = depth;
-                if self.held.camera.aperture_radius > 0.0 {
-                    self.has_moved();
-                } else {
-                    self.note = Some("in focus, but the lens has no width: A widens it".to_owned());
-                }
-            }
-        }
-    }
-
-    fn reload(&mut self) {
-        let loaded = self.host.load().and_then(|job| settings_of(&job, &self.live).map(|settings| (job, settings)));
-        match loaded {
-            Err(problem) => self.error = Some(problem),
-            Ok((job, settings)) => {
-                self.tracer = PathTracer::new(Arc::clone(&job.scene), job.trace);
-                self.held = Held::at_home(&job.scene.camera);
-                (self.job, self.settings) = (job, interruptible(settings, self.shared));
-                self.neighbours = None;
-                self.error = None;
-                self.note = Some("the scene was loaded again".to_owned());
-                self.restart();
             }
         }
     }
