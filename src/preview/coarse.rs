@@ -30,7 +30,13 @@ pub(super) fn draft_plan(width: u32, height: u32) -> SamplePlan {
 /// Sorts a plan's blocks from coarse to fine. Blocks of one pixel keep their order, so the film that comes of it has the
 /// same bytes.
 pub(super) fn order(plan: &mut SamplePlan, width: u32) {
-    plan.blocks.sort_by_key(|block| std::cmp::Reverse(spacing(block.pixel % width, block.pixel / width)));
+    let place = |block: &BlockWork| {
+        let (x, y) = (block.pixel % width, block.pixel / width);
+        // Rows far apart after one another: the finest grid is most of the plan, and swept from above it would leave the lower
+        // part behind for seconds.
+        (std::cmp::Reverse(spacing(x, y)), y.reverse_bits())
+    };
+    plan.blocks.sort_by_cached_key(place);
 }
 
 /// The index of the pixel whose samples stand for one: itself, or the nearest above and to the left on a grid that has been

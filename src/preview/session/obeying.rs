@@ -4,7 +4,8 @@ use super::live::{Changed, Live, settings_of};
 use super::{Session, interruptible};
 use crate::adaptive::state::RenderState;
 use crate::adaptive::{LastLook, StopReason};
-use crate::integrator::PathTracer;
+use crate::film::Film;
+use crate::integrator::{Crop, PathTracer};
 use crate::preview::command::{Command, Phase};
 use crate::preview::orbit::Held;
 use std::sync::Arc;
@@ -125,20 +126,25 @@ impl Session<'_> {
         }
     }
 
-    /// The camera turns about what stands in the middle of the picture.
+    /// The camera turns about what stands in the middle of the picture, and about the same as long as it moves.
     fn find_pivot(&mut self) {
-        let (width, height) = (self.draft.width() as usize, self.draft.height() as usize);
-        if let Some(depth) = self.depth_at(width / 2, height / 2) {
+        let Crop { width, height, .. } = self.job.trace.film_area();
+        let is_in_motion = self.phase == Phase::Moving && self.moved_at.is_some();
+        if let Some(depth) = self.depth_at(width as usize / 2, height as usize / 2).filter(|_| !is_in_motion) {
             self.held.pivot_distance = depth;
         }
     }
 
-    /// Distance of what a pixel shows; none where nothing is or where the picture is of another camera.
+    /// Distance of what a pixel shows, from whichever film has it; none where nothing is or the picture is of another camera.
     fn depth_at(&self, x: usize, y: usize) -> Option<f32> {
-        let film = if self.state.film.total_samples() > 0 { &self.state.film } else { &self.draft };
-        let is_whole = self.draft_left.blocks.is_empty() && !self.has_moved && x < film.width() as usize;
-        let pixel = y.checked_mul(film.width() as usize)?.checked_add(x)?;
-        film.guides().get(pixel).map(|guide| guide.depth).filter(|depth| is_whole && depth.is_normal())
+        let in_film = |film: &Film, step: usize| {
+            let (column, row, width) = (x / step, y / step, film.width() as usize);
+            let pixel = row.checked_mul(width)?.checked_add(column).filter(|_| column < width)?;
+            film.guides().get(pixel).map(|guide| guide.depth).filter(|depth| depth.is_normal())
+        };
+        let in_glimpse = || self.glimpse.as_ref().and_then(|glimpse| in_film(&glimpse.film, glimpse.step as usize));
+        let found = in_film(&self.state.film, 1).or_else(|| in_film(&self.draft, 1)).or_else(in_glimpse);
+        found.filter(|_| !self.has_moved)
     }
 
     fn focus_on(&mut self, x: usize, y: usize) {
