@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use fechner_perception::allocation::{AllocationProblem, allocate};
+use fechner_perception::allocation::{AllocationProblem, FINE_GAP, allocate};
 use fechner_perception::guide::{GuideInputs, denoise};
 use fechner_perception::{CastleCsf, Plane, ThresholdInputs, Viewing, threshold_map};
 use rayon::prelude::*;
@@ -121,6 +121,7 @@ fn main() {
             visibility: 1.0,
             min_samples: 16.0,
             max_samples: 1e6,
+            enough_gap: FINE_GAP,
         };
         report("allocation", fastest(3, || drop(allocate(&problem))));
         if let Ok(found) = allocate(&problem) {

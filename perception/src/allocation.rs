@@ -31,7 +31,13 @@ pub struct AllocationProblem<'a> {
     pub min_samples: f64,
     /// Most samples a pixel gets.
     pub max_samples: f64,
+    /// Share above the cheapest cost at which the search may end: [`FINE_GAP`], or more where counts are rounded anyway. Not
+    /// a promise: the search also ends after a number of updates.
+    pub enough_gap: f64,
 }
+
+/// A gap as fine as the search reaches on most pictures.
+pub const FINE_GAP: f64 = 3e-3;
 
 /// Sample counts, and how far from the best they can at most be.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,7 +67,7 @@ pub struct Allocation {
 ///
 /// ```
 /// use fechner_perception::{CastleCsf, Plane, ThresholdInputs, Viewing, threshold_map};
-/// use fechner_perception::allocation::{AllocationProblem, allocate};
+/// use fechner_perception::allocation::{AllocationProblem, FINE_GAP, allocate};
 /// let grey = Plane::filled(64, 64, 50.0);
 /// let inputs = ThresholdInputs { display_luminance_cd_m2: &grey, guide_variance: None };
 /// let thresholds = threshold_map(&inputs, &Viewing::default(), &CastleCsf::default())?;
@@ -73,6 +79,7 @@ pub struct Allocation {
 ///     visibility: 1.0,
 ///     min_samples: 1.0,
 ///     max_samples: 1e6,
+///     enough_gap: FINE_GAP,
 /// })?;
 /// assert!(allocation.samples.get(5, 30) > 3.0 * allocation.samples.get(60, 30));
 /// assert!(allocation.gap < 0.02, "{}", allocation.gap);

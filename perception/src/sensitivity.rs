@@ -3,6 +3,7 @@
 use crate::bands::{OctaveBands, RadialTable, for_each_ring};
 use crate::csf::ContrastSensitivity;
 use crate::display::Viewing;
+use rayon::prelude::*;
 
 /// Luminances below this, cd/m², adapt the eye no further (the floor of vision).
 pub(crate) const LEAST_ADAPTATION_CD_M2: f32 = 1e-4;
@@ -99,29 +100,26 @@ impl SensitivityTables {
         let shares: Vec<Vec<f64>> = (0..count)
             .map(|band| rings.iter().map(|ring| ring.weight * bands.gain(band, ring.freq_cpd).powi(2)).collect())
             .collect();
-        // noise[sample][band], center[sample][band]
-        let mut noise = Vec::new();
-        let mut center = Vec::new();
-        for luminance in sample_luminances() {
-            let squares: Vec<f64> =
-                rings.iter().map(|ring| (gain * csf.sensitivity(ring.freq_cpd, luminance)).powi(2)).collect();
-            noise.push(
+        // [sample][band]; noise energy and the square at the centre.
+        let samples: Vec<Vec<BandSample>> = sample_luminances()
+            .collect::<Vec<_>>()
+            .into_par_iter()
+            .map(|luminance| {
+                let square = |freq_cpd| (gain * csf.sensitivity(freq_cpd, luminance)).powi(2);
+                let squares: Vec<f64> = rings.iter().map(|ring| square(ring.freq_cpd)).collect();
+                let noise = |shares: &[f64]| shares.iter().zip(&squares).map(|(share, square)| share * square).sum();
                 shares
                     .iter()
-                    .map(|shares| shares.iter().zip(&squares).map(|(share, square)| share * square).sum::<f64>())
-                    .collect::<Vec<_>>(),
-            );
-            center.push(
-                (0..count)
-                    .map(|band| (gain * csf.sensitivity(bands.center_cpd(band), luminance)).powi(2))
-                    .collect::<Vec<_>>(),
-            );
-        }
+                    .enumerate()
+                    .map(|(band, shares)| BandSample { noise: noise(shares), center: square(bands.center_cpd(band)) })
+                    .collect()
+            })
+            .collect();
         let grey_cd_m2 = 0.2 * viewing.display.white_cd_m2;
         let tables = (0..count)
             .map(|band| BandTables {
-                noise_energy: LuminanceTable::from_samples(|sample| noise[sample][band]),
-                center_sensitivity_squared: LuminanceTable::from_samples(|sample| center[sample][band]),
+                noise_energy: LuminanceTable::from_samples(|sample| samples[sample][band].noise),
+                center_sensitivity_squared: LuminanceTable::from_samples(|sample| samples[sample][band].center),
                 mask_noise_share: rings
                     .iter()
                     .map(|ring| ring.weight * bands.mask_gain(band, ring.freq_cpd).powi(2))
@@ -133,6 +131,12 @@ impl SensitivityTables {
             .collect();
         Self { bands: tables }
     }
+}
+
+/// What a band's tables are made from at one luminance.
+struct BandSample {
+    noise: f64,
+    center: f64,
 }
 
 struct Ring {

@@ -111,9 +111,18 @@ fn assemble(
     viewing: &Viewing,
     csf: &dyn ContrastSensitivity,
 ) -> ThresholdMap {
+    let bands = OctaveBands::for_grid(viewing.display.pixel_density());
+    // Whatever the glare: it changes what the eye adapts to, not how it sees.
+    let tables = SensitivityTables::new(&bands, viewing, csf);
     let under = |viewing: &Viewing| {
         let adaptation_cd_m2 = adapted(luminance_cd_m2, viewing);
-        masked(signal_cd_m2, mean, noise_variance, adaptation_cd_m2, viewing, csf)
+        masked(
+            signal_cd_m2,
+            mean,
+            noise_variance,
+            adaptation_cd_m2,
+            Eye { viewing, csf, bands: &bands, tables: &tables },
+        )
     };
     let mut map = under(viewing);
     if viewing.observer.glare != Glare::None {
@@ -124,6 +133,14 @@ fn assemble(
     map
 }
 
+/// Who looks, and what is tabulated of it.
+struct Eye<'a> {
+    viewing: &'a Viewing,
+    csf: &'a dyn ContrastSensitivity,
+    bands: &'a OctaveBands,
+    tables: &'a SensitivityTables,
+}
+
 /// Masks and noise gain of a signal, cd/m², under an adaptation luminance. `mean` is about the mean of signal over adaptation:
 /// no band passes it, and without it the transform's precision is for the detail.
 fn masked(
@@ -131,12 +148,10 @@ fn masked(
     mean: f32,
     noise_variance: Option<&Plane>,
     adaptation_cd_m2: Plane,
-    viewing: &Viewing,
-    csf: &dyn ContrastSensitivity,
+    eye: Eye<'_>,
 ) -> ThresholdMap {
+    let Eye { viewing, csf, bands, tables } = eye;
     let density = viewing.display.pixel_density();
-    let bands = OctaveBands::for_grid(density);
-    let tables = SensitivityTables::new(&bands, viewing, csf);
     let (width, height) = (signal_cd_m2.width(), signal_cd_m2.height());
     let transform = PictureTransform::new(width, height, density);
     let mut workspace = Workspace::default();
@@ -162,13 +177,21 @@ fn masked(
         .bands
         .iter()
         .enumerate()
-        .map(|(band, band_tables)| band_elevation(&source, &mut workspace, &bands, band, band_tables, &elevation))
+        .map(|(band, band_tables)| band_elevation(&source, &mut workspace, bands, band, band_tables, &elevation))
         .collect();
-    let noise_gain = noise_gain(&tables, &adaptation_cd_m2, &elevations);
+    let noise_gain = noise_gain(tables, &adaptation_cd_m2, &elevations);
     let (least, greatest) = adaptation_cd_m2.range();
     let levels = adaptation_levels(viewing, csf, least, greatest);
-    let viewing = viewing.clone();
-    ThresholdMap { viewing, bands, tables, levels, adaptation_cd_m2, elevations, noise_gain, eccentricity_deg: None }
+    ThresholdMap {
+        viewing: viewing.clone(),
+        bands: bands.clone(),
+        tables: tables.clone(),
+        levels,
+        adaptation_cd_m2,
+        elevations,
+        noise_gain,
+        eccentricity_deg: None,
+    }
 }
 
 impl ThresholdMap {

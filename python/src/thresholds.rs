@@ -1,6 +1,6 @@
 //! The threshold map, what it says of noise, and where samples should go.
 
-use fechner_perception::allocation::{self, AllocationProblem};
+use fechner_perception::allocation::{self, AllocationProblem, FINE_GAP};
 use fechner_perception::{Plane, ThresholdInputs, csf, threshold};
 use numpy::PyArray2;
 use pyo3::prelude::*;
@@ -139,6 +139,7 @@ impl ThresholdMap {
             visibility,
             min_samples,
             max_samples,
+            enough_gap: FINE_GAP,
         };
         let found = try_work(py, || match budget {
             None => allocation::allocate(&problem),

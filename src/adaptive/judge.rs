@@ -2,7 +2,7 @@
 
 use super::denoised::{DenoisedPicture, TimedDenoising};
 use super::settings::LoopSettings;
-use super::statistics::{ChannelStatistics, SampleStatistics};
+use super::statistics::{ChannelStatistics, SampleStatistics, by_channel};
 use crate::denoise::OidnError;
 use crate::film::{CHANNELS, Estimate, Film};
 use crate::sampler::Half;
@@ -114,22 +114,24 @@ pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Jud
         (None, Some(timing)) => Some(thresholds.chromatic_gains_of_fresh_noise(timing)?),
     };
     still_wanted(settings)?;
-    let most_visible = |of: &dyn for<'a> Fn(&'a ChannelStatistics) -> &'a Plane| {
+    let most_visible = |of: &(dyn for<'a> Fn(&'a ChannelStatistics) -> &'a Plane + Sync)| {
         let channel = |c: usize| variance_of_mean(film, &statistics.channels[c], of(&statistics.channels[c]));
         match &gains {
             None => channel(0),
-            Some(gains) => thresholds.luminance_equivalent_variance(gains, [&channel(0), &channel(1), &channel(2)]),
+            Some(gains) => thresholds.luminance_equivalent_variance(gains, by_channel(channel).each_ref()),
         }
     };
-    let display_variance = most_visible(&|channel| &channel.pooled);
+    let (display_variance, [variance_of_a, variance_of_b]) = rayon::join(
+        || most_visible(&|channel| &channel.pooled),
+        || Half::BOTH.map(|half| most_visible(&|channel| &channel.for_half[half.index()])),
+    );
     let per_sample = |variance: &Plane| {
         Plane::from_fn(variance.width(), variance.height(), |x, y| {
             (f64::from(variance.get(x, y)) / variance_share(film, y * variance.width() + x)) as f32
         })
     };
     still_wanted(settings)?;
-    let variance_per_sample =
-        Half::BOTH.map(|half| per_sample(&most_visible(&|channel| &channel.for_half[half.index()])));
+    let variance_per_sample = [per_sample(&variance_of_a), per_sample(&variance_of_b)];
     let seconds_denoising = denoised.as_ref().map_or(0.0, |found| found.seconds);
     let denoised = denoised.map(|found| found.judged(film, settings, tone.as_ref(), &thresholds, &estimate));
     still_wanted(settings)?;
@@ -194,6 +196,14 @@ impl Judgement {
         })
     }
 
+    /// The same with each pixel's noise judged where it is, before the bands smear it: what the allocation's constraints say. One
+    /// blur in the place of twenty.
+    pub fn rough_visibility_of(&self, display_variance: &Plane) -> Plane {
+        let allowed = self.allowed_standard_error_cd_m2();
+        let energy = display_variance.combined(&allowed, |variance, allowed| variance / (allowed * allowed));
+        self.thresholds.pooled(&energy).map(f32::sqrt)
+    }
+
     /// Standard error of a pixel, cd/m² on the display, that is at visibility 1 by the model that drives the loop.
     pub fn allowed_standard_error_cd_m2(&self) -> Plane {
         let allowed = match &self.pixel_thresholds {
@@ -245,7 +255,7 @@ pub fn display_scale(
     let (a, b) = (film.half(Half::A), film.half(Half::B));
     let nits_squared = settings.nits_per_unit * settings.nits_per_unit * inflation;
     let display = &settings.viewing.display;
-    std::array::from_fn(|c| {
+    by_channel(|c| {
         let own = |i: usize| 0.5 * (a[i].sample_variance(c) + b[i].sample_variance(c)) * variance_share(film, i);
         let scene =
             Plane::from_fn(guide.width(), guide.height(), |x, y| (own(y * guide.width() + x) * nits_squared) as f32);

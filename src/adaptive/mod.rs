@@ -7,6 +7,7 @@
 
 pub mod audit;
 pub mod denoised;
+mod forecast;
 pub mod judge;
 mod monitor;
 mod next;

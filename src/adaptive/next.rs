@@ -3,6 +3,7 @@
 
 use super::audit::{Audit, audit};
 use super::denoised::denoised_plan;
+use super::forecast::Forecast;
 use super::judge::{JudgeError, Judgement, still_wanted};
 use super::plan::{adaptive_plan, cut_to_budget, doubling_of, uniform_plan, wanted_samples};
 use super::rivals::rival_plan;
@@ -15,7 +16,8 @@ use std::time::Instant;
 
 /// No single pixel's measured amplitude may stay above this many times the target.
 const TOLERATED_PEAK: f64 = 4.0;
-/// Rungs above this are not audited: their few samples say little.
+/// Rungs above this are not audited, nor searched for pixels that stand out: their few samples say little, and the next rung asks
+/// again.
 const HIGHEST_AUDITED_RUNG: f64 = 4.0;
 /// What the variance may be multiplied by in all after audits that disagree.
 const MOST_INFLATION: f64 = 4.0;
@@ -71,30 +73,41 @@ impl Loop<'_> {
         if self.settings.sampling == Sampling::Uniform {
             return Ok(if is_reached(judgement, rung) { None } else { some(uniform_plan(&self.state.film, doubled)) });
         }
-        if !is_reached(judgement, rung) && judgement.denoised.is_some() {
-            return Ok(some(denoised_plan(&self.state.film, &judgement.predicted, rung, max_samples)));
-        }
         if !is_reached(judgement, rung) {
             still_wanted(self.settings)?;
-            let started = Instant::now();
-            let wanted = wanted_samples(judgement, self.settings.allocation, rung, &self.settings.limits)?;
-            self.state.seconds_allocation += started.elapsed().as_secs_f64();
-            if predicted_saving(&self.state.film, judgement, &wanted, rung) < LEAST_SAVING {
-                return Ok(some(uniform_plan(&self.state.film, doubled)));
-            }
-            let plan = adaptive_plan(&self.state.film, judgement, &wanted, max_samples);
-            if !plan.blocks.is_empty() {
-                return Ok(Some(plan));
-            }
-            // Each pixel by itself has what it needs, yet its surroundings show.
-            let predicted = judgement.predicted.values();
-            return Ok(some(doubling_of(&self.state.film, max_samples, |i| f64::from(predicted[i]) > rung)));
+            return Ok(some(match &judgement.denoised {
+                Some(_) => denoised_plan(&self.state.film, &judgement.predicted, rung, max_samples),
+                None => self.cheapest(rung, judgement)?.unwrap_or_else(|| uniform_plan(&self.state.film, doubled)),
+            }));
+        }
+        if rung > HIGHEST_AUDITED_RUNG {
+            return Ok(None);
         }
         still_wanted(self.settings)?;
         if let Some(plan) = some(self.peaks(rung, judgement)) {
             return Ok(Some(plan));
         }
         Ok(self.audited(rung, judgement)?.and_then(some))
+    }
+
+    /// What the cheapest counts that reach a rung add to those that are there; `None` where even counts cost hardly more.
+    fn cheapest(&mut self, rung: f64, judgement: &Judgement) -> Result<Option<SamplePlan>, JudgeError> {
+        let limits = &self.settings.limits;
+        let film = &self.state.film;
+        let started = Instant::now();
+        let forecast = Forecast::of(film, judgement);
+        let wanted = wanted_samples(judgement, &forecast, self.settings.allocation, rung, limits)?;
+        self.state.seconds_allocation += started.elapsed().as_secs_f64();
+        if predicted_saving(film, judgement, &wanted.samples, rung) < LEAST_SAVING {
+            return Ok(None);
+        }
+        let plan = adaptive_plan(film, judgement, &forecast, &wanted, limits.max_samples);
+        if !plan.blocks.is_empty() {
+            return Ok(Some(plan));
+        }
+        // Each pixel by itself has what it needs, yet its surroundings show.
+        let predicted = judgement.predicted.values();
+        Ok(Some(doubling_of(film, limits.max_samples, |i| f64::from(predicted[i]) > rung)))
     }
 
     /// More samples for single pixels that stand out of what the halves show, which pooling hides.
@@ -108,7 +121,7 @@ impl Loop<'_> {
     /// returned.
     fn audited(&mut self, rung: f64, judgement: &mut Judgement) -> Result<Option<SamplePlan>, JudgeError> {
         let is_raw = judgement.denoised.is_none();
-        let may_audit = rung <= HIGHEST_AUDITED_RUNG && judgement.pixel_thresholds.is_none() && is_raw;
+        let may_audit = judgement.pixel_thresholds.is_none() && is_raw;
         if !may_audit || self.state.inflation >= MOST_INFLATION {
             return Ok(None);
         }

@@ -46,13 +46,9 @@ pub(super) fn predicted_saving(film: &Film, judgement: &Judgement, wanted: &Plan
         let uniform = (for_one_sample.quantile(1.0 - TOLERATED_SHARE) / rung).powi(2);
         1.0 - mean_count / uniform
     };
-    // Mostly the saving is large. A look without the masks' pooling, which costs one blur and not twenty transforms, tells.
+    // Mostly the saving is large, and a rough look tells.
     let variance = &judgement.pooled_variance_per_sample;
-    let allowed = judgement.allowed_standard_error_cd_m2();
-    let energy = Plane::from_fn(variance.width(), variance.height(), |x, y| {
-        variance.get(x, y) / (allowed.get(x, y) * allowed.get(x, y))
-    });
-    let roughly = saving(&judgement.thresholds.pooled(&energy).map(f32::sqrt));
+    let roughly = saving(&judgement.rough_visibility_of(variance));
     if roughly > 4.0 * LEAST_SAVING { roughly } else { saving(&judgement.visibility_of(variance)) }
 }
 

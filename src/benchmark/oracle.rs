@@ -8,7 +8,7 @@ use crate::film::{CHANNELS, Film};
 use crate::integrator::{BlockWork, PILOT_SAMPLES, SamplePlan};
 use crate::sampler::{Half, hash_words};
 use anyhow::Result;
-use fechner_perception::allocation::{AllocationProblem, allocate};
+use fechner_perception::allocation::{AllocationProblem, FINE_GAP, allocate};
 use fechner_perception::{Plane, seen};
 
 /// Variance of one sample of each pixel on the display, as luminance that is as visible as the most visible channel.
@@ -56,6 +56,7 @@ pub(crate) fn least_samples(truth: &Truth, variance: &Plane, visibility: f64, co
         visibility,
         min_samples: f64::from(2 * PILOT_SAMPLES),
         max_samples: f64::from(DEFAULT_MAX_SAMPLES),
+        enough_gap: FINE_GAP,
     })?;
     Ok(allocation.samples)
 }

@@ -12,10 +12,8 @@ use crate::threshold::POOLING_SIGMA_DEG;
 const MOST_ITERATIONS: usize = 100;
 /// Multipliers of a small grid.
 const SMALL_GRID: usize = 4096;
-/// Gap on a small reduced grid at which to stop.
-const SMALL_GAP: f64 = 3e-3;
-/// The same on any other, where updates are dear.
-const ENOUGH_GAP: f64 = 5e-3;
+/// Gap at which to stop on any but a small grid, where updates are dear, whatever was asked for.
+const LEAST_GAP_OF_LARGE_GRIDS: f64 = 5e-3;
 /// How often the gap is looked at.
 const CHECK_EVERY: usize = 5;
 /// Slack given to constraints that cannot be met.
@@ -60,6 +58,7 @@ impl<'a> Solver<'a> {
         check_range("visibility", problem.visibility, 1e-9, 1e9, "between 1e-9 and 1e9")?;
         check_range("min_samples", problem.min_samples, 1e-6, problem.max_samples, LIMITS)?;
         check_range("max_samples", problem.max_samples, problem.min_samples, 1e12, LIMITS)?;
+        check_range("enough_gap", problem.enough_gap, 0.0, 1.0, "a share between 0 and 1")?;
         for (what, plane) in [("cost", Some(problem.cost)), ("tolerance", problem.tolerance)] {
             if let Some(least) = plane.and_then(|plane| plane.values().iter().copied().reduce(f32::min)) {
                 check_range(what, f64::from(least), 1e-12, f64::MAX, "at least 1e-12 at every pixel")?;
@@ -141,9 +140,9 @@ impl<'a> Solver<'a> {
         let mut best_bound = f64::NEG_INFINITY;
         let mut best_multipliers = multipliers.to_vec();
         let (most_iterations, enough_gap) = if multipliers.len() <= SMALL_GRID {
-            (10 * MOST_ITERATIONS, SMALL_GAP)
+            (10 * MOST_ITERATIONS, self.problem.enough_gap)
         } else {
-            (MOST_ITERATIONS, ENOUGH_GAP)
+            (MOST_ITERATIONS, self.problem.enough_gap.max(LEAST_GAP_OF_LARGE_GRIDS))
         };
         for iteration in 1..=most_iterations {
             iterations = iteration;

@@ -42,6 +42,7 @@ impl Case {
             visibility: 1.0,
             min_samples: 16.0,
             max_samples: 1e6,
+            enough_gap: FINE_GAP,
         }
     }
 
@@ -71,6 +72,7 @@ fn an_even_picture_needs_its_closed_form() {
         visibility: 0.5,
         min_samples: 1.0,
         max_samples: 1e9,
+        enough_gap: FINE_GAP,
     })
     .unwrap();
     let expected = 900.0 / thresholds.allowed_standard_error_cd_m2(0.5).get(3, 3).powi(2);
