@@ -1,6 +1,6 @@
 //! Visibility of colour errors: over the achromatic, red–green and yellow–violet channels the largest counts.
 
-use crate::csf::{CastleChromatic, CastleCsf, ChromaticChannel, FrameTiming};
+use crate::csf::{CastleChromatic, CastleCsf, ChromaticChannel, ContrastSensitivity, FrameTiming};
 use crate::display::Viewing;
 use crate::error::Error;
 use crate::noise_gain::noise_gain;
@@ -87,7 +87,9 @@ impl ThresholdMap {
     pub fn chromatic_noise_gain(&self, channel: ChromaticChannel) -> Result<Plane, Error> {
         let csf = CastleChromatic::new(channel, self.viewing.observer.csf_area_deg2)?;
         let tables = SensitivityTables::new(&self.bands, &self.viewing, &csf);
-        Ok(noise_gain(&tables, &self.adaptation_cd_m2, &[]))
+        let gain = noise_gain(&tables, &self.adaptation_cd_m2, &[]);
+        let grey_cd_m2 = 0.2 * self.viewing.display.white_cd_m2;
+        Ok(self.seen_from_gaze(gain, channel, |freq_cpd| csf.sensitivity(freq_cpd, grey_cd_m2)))
     }
 
     /// Gains of both chromatic channels.

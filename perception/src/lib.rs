@@ -104,6 +104,7 @@ pub mod csf;
 pub mod denoised;
 pub mod difference;
 pub mod display;
+pub mod eccentricity;
 pub mod eotf;
 mod error;
 mod fft;

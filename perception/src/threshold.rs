@@ -41,6 +41,8 @@ pub struct ThresholdMap {
     /// Threshold elevation of each band.
     pub(crate) elevations: Vec<ReducedPlane>,
     pub(crate) noise_gain: Plane,
+    /// Where the gaze is known: degrees from it.
+    pub(crate) eccentricity_deg: Option<Plane>,
 }
 
 /// Finds adaptation, masking and thresholds of a picture.
@@ -188,6 +190,7 @@ fn masked(
         adaptation_cd_m2,
         elevations,
         noise_gain,
+        eccentricity_deg: None,
     }
 }
 

@@ -4,9 +4,10 @@
 //! difference between fresh and kept, over what the variance predicts, is the audit's ratio: 1 if the variance is right,
 //! above 1 where light was found that the stopping samples had missed.
 
-use super::judge::{Judgement, variance_share};
+use super::beginning;
+use super::judge::{JudgeError, Judgement, still_wanted, variance_share};
 use super::settings::LoopSettings;
-use crate::film::{Film, HalfPixel, opponent};
+use crate::film::{BlockSum, Film, HalfPixel, opponent};
 use crate::integrator::{BlockWork, PathTracer, SamplePlan};
 use crate::sampler::{Half, hash_words};
 use fechner_perception::{Plane, seen};
@@ -41,16 +42,21 @@ impl Audit {
 }
 
 /// Audits a film. `None` for pictures of fewer than 75 tiles, of which 2 % are a single one.
+///
+/// # Errors
+/// [`JudgeError::Outdated`] alone.
 pub fn audit(
     tracer: &PathTracer,
     film: &Film,
     judgement: &Judgement,
     settings: &LoopSettings,
     round: u32,
-) -> Option<Audit> {
+) -> Result<Option<Audit>, JudgeError> {
+    /// Between two questions whether the audit is still wanted.
+    const SAMPLES_A_PIECE: u64 = 1 << 17;
     let tiles = choose_tiles(film, round);
     if tiles.len() < 2 {
-        return None;
+        return Ok(None);
     }
     let width = film.width() as usize;
     let pixels: Vec<usize> = tiles.iter().flat_map(|tile| tile.pixels(width)).collect();
@@ -59,17 +65,19 @@ pub fn audit(
     let mut fresh = vec![[HalfPixel::default(); 2]; pixels.len()];
     // Blocks come in the order of `pixels`.
     let mut place = 0;
-    tracer.trace_into(
-        &plan,
-        seed,
-        &mut |work, sum| {
-            while pixels[place] != work.pixel as usize {
-                place += 1;
-            }
-            fresh[place][work.half.index()].merge(sum);
-        },
-        &|_| {},
-    );
+    let mut merge = |work: BlockWork, sum: &BlockSum| {
+        while pixels[place] != work.pixel as usize {
+            place += 1;
+        }
+        fresh[place][work.half.index()].merge(sum);
+    };
+    let mut left = plan.blocks.as_slice();
+    while !left.is_empty() {
+        still_wanted(settings)?;
+        let piece = beginning(left, SAMPLES_A_PIECE);
+        tracer.trace_into(&SamplePlan { blocks: piece.to_vec() }, seed, &mut merge, &|_| {});
+        left = &left[piece.len()..];
+    }
 
     let nits = settings.nits_per_unit;
     let mut difference = Plane::filled(width, film.height() as usize, 0.0);
@@ -92,7 +100,7 @@ pub fn audit(
     let predicted = judgement.thresholds.predicted_visibility(&variance);
     let energies = tiles.iter().map(|tile| (tile.energy(&found), tile.energy(&predicted))).collect::<Vec<_>>();
     let (ratio, standard_error) = ratio_of_sums(&energies);
-    Some(Audit { tiles: tiles.len(), samples: plan.samples(), ratio, standard_error })
+    Ok(Some(Audit { tiles: tiles.len(), samples: plan.samples(), ratio, standard_error }))
 }
 
 #[derive(Clone, Copy, Debug)]

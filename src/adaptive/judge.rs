@@ -54,6 +54,9 @@ pub enum JudgeError {
     /// Perception failed on a picture that the loop made: a defect of ours, with the reason.
     #[error("the threshold map could not be made: {0}")]
     Perception(#[from] fechner_perception::Error),
+    /// [`LoopSettings::is_outdated`] said so.
+    #[error("the look was interrupted")]
+    Outdated,
     /// The denoiser failed.
     #[error(transparent)]
     Denoiser(#[from] OidnError),
@@ -70,11 +73,13 @@ pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Jud
         None => None,
     };
     let guide = denoised.as_ref().map_or_else(|| guide_luminance(film, &estimate), |found| found.luminance.clone());
+    still_wanted(settings)?;
     let tone = match &settings.fitted {
         Some(fitted) => fitted.clone().restore(),
         None => settings.operator.fit(&SceneGuide::of(&guide), &settings.viewing, None),
     };
     let statistics = SampleStatistics::of(film, &display_scale(film, &guide, tone.as_ref(), settings, inflation));
+    still_wanted(settings)?;
     let displayed_guide = seen::display_luminance(tone.as_ref(), &settings.viewing.display, &guide);
     let luminance_variance = variance_of_mean(film, statistics.luminance(), &statistics.luminance().pooled);
     // The noise before denoising bounds what is left of it in the guide, so masking fades in as samples come.
@@ -85,6 +90,11 @@ pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Jud
         &settings.viewing,
         &csf,
     )?;
+    let thresholds = match settings.gaze {
+        Some(gaze) => thresholds.with_gaze(gaze),
+        None => thresholds,
+    };
+    still_wanted(settings)?;
     let pixel_thresholds = match &settings.model {
         None => None,
         Some(model) => Some(model.allowed_standard_error_cd_m2(&ModelInputs {
@@ -103,6 +113,7 @@ pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Jud
         (None, None) => Some(thresholds.chromatic_gains()?),
         (None, Some(timing)) => Some(thresholds.chromatic_gains_of_fresh_noise(timing)?),
     };
+    still_wanted(settings)?;
     let most_visible = |of: &(dyn for<'a> Fn(&'a ChannelStatistics) -> &'a Plane + Sync)| {
         let channel = |c: usize| variance_of_mean(film, &statistics.channels[c], of(&statistics.channels[c]));
         match &gains {
@@ -119,9 +130,11 @@ pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Jud
             (f64::from(variance.get(x, y)) / variance_share(film, y * variance.width() + x)) as f32
         })
     };
+    still_wanted(settings)?;
     let variance_per_sample = [per_sample(&variance_of_a), per_sample(&variance_of_b)];
     let seconds_denoising = denoised.as_ref().map_or(0.0, |found| found.seconds);
     let denoised = denoised.map(|found| found.judged(film, settings, tone.as_ref(), &thresholds, &estimate));
+    still_wanted(settings)?;
     let mut judgement = Judgement {
         estimate,
         denoised,
@@ -140,6 +153,12 @@ pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Jud
         None => judgement.predicted = judgement.visibility_of(&display_variance),
     }
     Ok(judgement)
+}
+
+/// Between the parts of a look: goes on unless the look is of no use any more.
+pub(crate) fn still_wanted(settings: &LoopSettings) -> Result<(), JudgeError> {
+    let is_outdated = settings.is_outdated.as_ref().is_some_and(|is_outdated| is_outdated());
+    if is_outdated { Err(JudgeError::Outdated) } else { Ok(()) }
 }
 
 /// Of the eye for noise that stands still, or that is new in every frame.

@@ -150,7 +150,8 @@ pub fn resume(
     Ok(Rendered::new(state, judgement, stop_reason))
 }
 
-/// [`resume`] for somebody who may leave the render with [`Directive::Leave`] and go on from its state.
+/// [`resume`] for somebody who may leave the render with [`Directive::Leave`], or in the middle of a look by
+/// [`LoopSettings::is_outdated`], and go on from its state.
 ///
 /// # Errors
 /// If the denoiser fails, or the perception model refuses the picture, which would be a defect of ours.
@@ -169,13 +170,9 @@ pub fn run(
             Traced::UntilLeft => return Ok(Ended { state: render.state, last_look: None }),
         };
         let look = Instant::now();
-        let mut judgement = match last_look.take() {
-            Some(earlier) if ended.is_none() && render.exposure_holds() => earlier,
-            _ => render.look()?,
-        };
-        let step = match ended {
-            Some(reason) => Step::Stop(reason),
-            None => render.next_step(&mut judgement)?,
+        let (judgement, step) = match render.look_and_decide(last_look.take(), ended) {
+            Err(JudgeError::Outdated) => return Ok(Ended { state: render.state, last_look: None }),
+            decided => decided?,
         };
         match render.take(step, &judgement, look, monitor) {
             None => last_look = Some(judgement),
@@ -254,6 +251,23 @@ impl<'a> Loop<'a> {
         let judgement = judge(&self.state.film, self.settings, self.state.inflation)?;
         self.state.seconds_denoising += judgement.seconds_denoising;
         Ok(judgement)
+    }
+
+    /// What is seen, or was at an earlier look that still holds, and what comes of it.
+    fn look_and_decide(
+        &mut self,
+        earlier: Option<Judgement>,
+        ended: Option<StopReason>,
+    ) -> Result<(Judgement, Step), JudgeError> {
+        let mut judgement = match earlier {
+            Some(earlier) if ended.is_none() && self.exposure_holds() => earlier,
+            _ => self.look()?,
+        };
+        let step = match ended {
+            Some(reason) => Step::Stop(reason),
+            None => self.next_step(&mut judgement)?,
+        };
+        Ok((judgement, step))
     }
 
     /// Traces what is planned, and says why the render ends if it does. A plan that was begun is finished first, unless

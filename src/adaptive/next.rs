@@ -4,7 +4,7 @@
 use super::audit::{Audit, audit};
 use super::denoised::denoised_plan;
 use super::forecast::Forecast;
-use super::judge::{JudgeError, Judgement};
+use super::judge::{JudgeError, Judgement, still_wanted};
 use super::plan::{adaptive_plan, cut_to_budget, doubling_of, uniform_plan, wanted_samples};
 use super::rivals::rival_plan;
 use super::settings::{LoopSettings, Sampling};
@@ -74,6 +74,7 @@ impl Loop<'_> {
             return Ok(if is_reached(judgement, rung) { None } else { some(uniform_plan(&self.state.film, doubled)) });
         }
         if !is_reached(judgement, rung) {
+            still_wanted(self.settings)?;
             return Ok(some(match &judgement.denoised {
                 Some(_) => denoised_plan(&self.state.film, &judgement.predicted, rung, max_samples),
                 None => self.cheapest(rung, judgement)?.unwrap_or_else(|| uniform_plan(&self.state.film, doubled)),
@@ -82,6 +83,7 @@ impl Loop<'_> {
         if rung > HIGHEST_AUDITED_RUNG {
             return Ok(None);
         }
+        still_wanted(self.settings)?;
         if let Some(plan) = some(self.peaks(rung, judgement)) {
             return Ok(Some(plan));
         }
@@ -123,7 +125,7 @@ impl Loop<'_> {
         if !may_audit || self.state.inflation >= MOST_INFLATION {
             return Ok(None);
         }
-        let found = audit(self.tracer, &self.state.film, judgement, self.settings, self.state.audits);
+        let found = audit(self.tracer, &self.state.film, judgement, self.settings, self.state.audits)?;
         self.state.audits += 1;
         self.state.audit = found.or(self.state.audit);
         let Some(found) = found.filter(Audit::disagrees) else { return Ok(None) };

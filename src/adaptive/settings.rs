@@ -5,6 +5,7 @@ use crate::integrator::PILOT_SAMPLES;
 use fechner_perception::Plane;
 use fechner_perception::csf::FrameTiming;
 use fechner_perception::display::Viewing;
+use fechner_perception::eccentricity::Gaze;
 use fechner_perception::model::ThresholdModel;
 use fechner_perception::tone::{SavedTone, ToneOperator};
 use serde::{Deserialize, Serialize};
@@ -110,8 +111,13 @@ pub struct LoopSettings {
     pub frames: Option<FrameTiming>,
     /// What each pixel's thresholds are multiplied by, above 0, of the film's size: somebody's own idea of what matters.
     pub importance: Option<Plane>,
+    /// Where one looks, in pixels of the film: thresholds rise away from there. `None` for a picture that anybody may look at
+    /// anywhere. For the default threshold model alone.
+    pub gaze: Option<Gaze>,
     /// What makes the output picture out of the mean; `None` leaves it raw.
     pub denoiser: Option<Denoiser>,
+    /// Asked during a look: whether it is of no use any more, as somebody wants another picture. `None` never interrupts.
+    pub is_outdated: Option<Box<dyn Fn() -> bool + Send + Sync>>,
 }
 
 impl LoopSettings {
@@ -128,7 +134,9 @@ impl LoopSettings {
             fitted: None,
             frames: None,
             importance: None,
+            gaze: None,
             denoiser: None,
+            is_outdated: None,
         }
     }
 }

@@ -6,7 +6,7 @@
 
 use crate::geometry::Hit;
 use crate::integrator::{CameraRays, CameraSample, PathTracer};
-use crate::scene::Scene;
+use crate::scene::{Camera, Scene};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -32,10 +32,15 @@ impl VelocityMap {
     /// For the film of a tracer, and the same scene one frame earlier and later: equal objects, meshes of equal triangles.
     /// What an object of another number or triangle would be has no motion.
     pub fn new(tracer: &PathTracer, previous: &Scene, next: &Scene) -> Self {
+        let cameras = [&previous.camera, &tracer.world().scene().camera, &next.camera];
+        Self::seen_by(cameras, tracer, previous, next)
+    }
+
+    /// The same by other cameras than the scenes' own: one frame earlier, now, one frame later.
+    pub fn seen_by(cameras: [&Camera; 3], tracer: &PathTracer, previous: &Scene, next: &Scene) -> Self {
         let settings = tracer.settings();
         let area = settings.film_area();
-        let camera_of = |scene: &Scene| CameraRays::new(&scene.camera, settings.width, settings.height);
-        let (now, before, after) = (camera_of(tracer.world().scene()), camera_of(previous), camera_of(next));
+        let [before, now, after] = cameras.map(|camera| CameraRays::new(camera, settings.width, settings.height));
         let motions: Vec<[Vec2; 2]> = (0..area.width * area.height)
             .into_par_iter()
             .map(|pixel| {

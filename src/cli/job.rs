@@ -155,16 +155,26 @@ impl JobArguments {
             .context("the threads could not be started")
     }
 
-    /// Loads the scene and reads everything else that is named.
-    pub(super) fn prepare(&self) -> anyhow::Result<Prepared> {
+    /// The scene as it is so many seconds after the time that is asked for.
+    pub(super) fn scene_later(&self, seconds: f64) -> anyhow::Result<Scene> {
+        self.load_at(self.at + seconds, None)
+    }
+
+    fn load_at(&self, seconds: f64, on_texture: Option<fn(usize, usize)>) -> anyhow::Result<Scene> {
         let options = load::LoadOptions {
             camera: self.camera.clone(),
-            frame_time: self.at,
+            frame_time: seconds,
             environment_follows: self.staging.has_environment(),
-            on_texture: Some(console::texture_decoded),
+            on_texture,
         };
         let mut scene = load::load(&self.scene, &options)?;
         self.staging.apply(&mut scene, self.nits_per_unit)?;
+        Ok(scene)
+    }
+
+    /// Loads the scene and reads everything else that is named.
+    pub(super) fn prepare(&self) -> anyhow::Result<Prepared> {
+        let scene = self.load_at(self.at, Some(console::texture_decoded))?;
         for note in &scene.notes {
             eprintln!("note: {note}");
         }

@@ -2,6 +2,7 @@
 
 use super::console::Console;
 use super::seeing::parse_positive;
+use super::tev::Showing;
 use anyhow::{Context, bail};
 use clap::Args;
 use fechner::adaptive::judge::Judgement;
@@ -158,11 +159,12 @@ impl Keeper {
     }
 }
 
-/// Console, keeper, viewers and signals together.
+/// Console, keeper, viewers, tev and signals together.
 pub(super) struct Watch<'a> {
     console: Console,
     keeper: Option<Keeper>,
     audience: Option<Audience<'a>>,
+    tev: Option<Showing>,
     stop: Arc<AtomicBool>,
     started: Instant,
 }
@@ -173,6 +175,7 @@ impl<'a> Watch<'a> {
         console: Console,
         keeper: Option<Keeper>,
         audience: Option<Audience<'a>>,
+        tev: Option<Showing>,
     ) -> anyhow::Result<Self> {
         let stop = Arc::new(AtomicBool::new(false));
         let asked = Arc::clone(&stop);
@@ -182,7 +185,7 @@ impl<'a> Watch<'a> {
             }
         })
         .context("signals cannot be waited for")?;
-        Ok(Self { console, keeper, audience, stop, started: Instant::now() })
+        Ok(Self { console, keeper, audience, tev, stop, started: Instant::now() })
     }
 
     /// Removes the progress bar.
@@ -221,6 +224,9 @@ impl Monitor for Watch<'_> {
         if let Some(audience) = &self.audience {
             audience.judged(state, judgement);
         }
+        if let Some(tev) = &self.tev {
+            tev.judged(judgement);
+        }
     }
 
     fn samples_done(&self, samples: u64) {
@@ -241,12 +247,18 @@ impl Monitor for Watch<'_> {
         if let Some(keeper) = &self.keeper {
             keeper.chance(state);
         }
+        if let Some(tev) = &self.tev {
+            tev.between_batches(state);
+        }
         self.audience.as_ref().map_or(Directive::GoOn, |audience| audience.between_batches(state))
     }
 
     fn ended(&self, state: &RenderState) {
         if let Some(audience) = &self.audience {
             audience.ended(state);
+        }
+        if let Some(tev) = &self.tev {
+            tev.ended(state);
         }
         if let Some(keeper) = &self.keeper {
             keeper.write(state, &mut keeper.history.lock().unwrap_or_else(PoisonError::into_inner));

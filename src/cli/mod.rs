@@ -17,6 +17,7 @@ mod render;
 mod report;
 mod seeing;
 mod staging;
+mod tev;
 mod threshold;
 mod tonemap;
 mod view;

@@ -4,6 +4,7 @@ use super::console::Console;
 use super::job::{JobArguments, Prepared};
 use super::keeper::{CheckpointArguments, Keeper, Watch};
 use super::report::{Report, summary};
+use super::tev::{Showing, TevArguments};
 use super::view::audience;
 use anyhow::Context;
 use clap::Args;
@@ -32,6 +33,8 @@ pub(super) struct RenderArguments {
     /// Show it in a browser while it runs; prints an address of this machine.
     #[arg(long, help_heading = "Running")]
     view: bool,
+    #[command(flatten)]
+    tev: TevArguments,
     #[command(flatten)]
     checkpoint: CheckpointArguments,
 }
@@ -67,7 +70,8 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     if degenerate > 0 {
         eprintln!("note: {degenerate} triangles without area were left out");
     }
-    let watch = Watch::new(Console::new(settings.limits.time), keeper, audience)?;
+    let tev = arguments.tev.open(&arguments.job.scene_name())?.map(|tev| Showing::new(tev, settings.nits_per_unit));
+    let watch = Watch::new(Console::new(settings.limits.time), keeper, audience, tev)?;
     let rendered = adaptive::resume(&tracer, &settings, state, &watch)?;
     watch.finish();
     let report = Report::new(&arguments.job.scene_name(), &seeds, &settings, &rendered);

@@ -3,12 +3,13 @@
 use super::job::{JobArguments, Prepared};
 use super::render::write_picture;
 use super::report::Report;
-use anyhow::Context;
+use super::tev::TevArguments;
+use anyhow::{Context, bail};
 use clap::Args;
 use fechner::adaptive::Rendered;
 use fechner::adaptive::settings::LoopSettings;
 use fechner::output;
-use fechner::preview::{self, Audience, Door, Host, Job};
+use fechner::preview::{self, Audience, Door, Host, Job, Options, Spectator};
 use fechner::scene::Scene;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
 use std::path::Path;
@@ -26,7 +27,16 @@ pub(super) struct ViewArguments {
     /// Address to listen on. Others than this machine's own let everybody in who has the printed address.
     #[arg(long, value_name = "IP", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST), help_heading = "Serving")]
     host: IpAddr,
+    /// Take the pointer for the gaze: thresholds rise away from it, as castleCSF says, and samples go where one looks first.
+    /// Outside the picture it stands for nothing, and the whole picture counts as looked at.
+    #[arg(long, help_heading = "Seeing")]
+    foveated: bool,
+    #[command(flatten)]
+    tev: TevArguments,
 }
+
+/// The only threshold model that knows where one looks.
+const DEFAULT_MODEL: &str = "csf-bands";
 
 /// The scene file and the arguments that say how to render it.
 struct FileHost {
@@ -36,6 +46,10 @@ struct FileHost {
 impl Host for FileHost {
     fn load(&self) -> Result<Job, String> {
         self.job.prepare().map(job_of).map_err(|error| format!("{error:#}"))
+    }
+
+    fn later(&self, seconds: f64) -> Result<Scene, String> {
+        self.job.scene_later(seconds).map_err(|error| format!("{error:#}"))
     }
 
     fn save(&self, path: &Path, rendered: &Rendered, settings: &LoopSettings) -> Result<(), String> {
@@ -80,7 +94,13 @@ pub(super) fn run(arguments: &ViewArguments) -> anyhow::Result<()> {
     let (address, token) = door_of(&listener)?;
     let job = pool.install(|| arguments.job.prepare().map(job_of))?;
     let host = FileHost { job: arguments.job.clone() };
-    let preview = preview::start(job, Box::new(host), pool).context("the threads could not be started")?;
+    if arguments.foveated && job.record.model != DEFAULT_MODEL {
+        bail!("--foveated is for --model {DEFAULT_MODEL}: {} does not know where one looks", job.record.model);
+    }
+    let tev = arguments.tev.open(&arguments.job.scene_name())?;
+    let spectators = tev.into_iter().map(|tev| Box::new(tev) as Box<dyn Spectator>).collect();
+    let options = Options { is_foveated: arguments.foveated, spectators };
+    let preview = preview::start(job, Arc::new(host), options, pool).context("the threads could not be started")?;
     let closer = preview.closer();
     let asked_before = AtomicBool::new(false);
     ctrlc::set_handler(move || {

@@ -18,7 +18,22 @@ pub struct Estimate {
     pub half_difference: Plane,
 }
 
+/// A render of one sample has an empty half: the other is then the picture.
+fn average(of_a: f64, of_b: f64, a: &HalfPixel, b: &HalfPixel) -> f64 {
+    match (a.samples, b.samples) {
+        (_, 0) => of_a,
+        (0, _) => of_b,
+        _ => 0.5 * (of_a + of_b),
+    }
+}
+
 impl Film {
+    /// One pixel of [`Estimate::rgb_cd_m2`], for who needs no more.
+    pub fn rgb_cd_m2(&self, pixel: usize, nits_per_unit: f64) -> [f32; 3] {
+        let [a, b] = Half::BOTH.map(|half| &self.half(half)[pixel]);
+        std::array::from_fn(|c| (nits_per_unit * average(a.mean[c], b.mean[c], a, b)) as f32)
+    }
+
     /// The picture so far. `nits_per_unit`: luminance in cd/m² of RGB (1, 1, 1).
     pub fn estimate(&self, nits_per_unit: f64) -> Estimate {
         let (width, height) = (self.width() as usize, self.height() as usize);
@@ -28,19 +43,9 @@ impl Film {
         };
         let nits = nits_per_unit;
         let y = |half: &HalfPixel| opponent(half.mean)[0];
-        // A render of one sample has an empty half: the other is then the picture.
-        let average = |of_a: f64, of_b: f64, a: &HalfPixel, b: &HalfPixel| match (a.samples, b.samples) {
-            (_, 0) => of_a,
-            (0, _) => of_b,
-            _ => 0.5 * (of_a + of_b),
-        };
         let variance_of_half = |half: &HalfPixel| half.sample_variance(0) / f64::from(half.samples.max(1));
         Estimate {
-            rgb_cd_m2: a
-                .iter()
-                .zip(b)
-                .map(|(a, b)| std::array::from_fn(|c| (nits * average(a.mean[c], b.mean[c], a, b)) as f32))
-                .collect(),
+            rgb_cd_m2: (0..a.len()).map(|pixel| self.rgb_cd_m2(pixel, nits)).collect(),
             luminance_cd_m2: plane(&|a, b| nits * average(y(a), y(b), a, b)),
             variance_of_mean: plane(&|a, b| 0.25 * nits * nits * (variance_of_half(a) + variance_of_half(b))),
             half_difference: plane(&|a, b| 0.5 * nits * (y(a) - y(b))),

@@ -51,7 +51,7 @@ impl<'a> Audience<'a> {
             std::thread::Builder::new().name("viewers".to_owned()).spawn(move || serve(listener, door, of_server))?;
         let camera = Held::at_home(&scene.camera).to_toml();
         let status = Status { phase: Phase::Rendering, ..blank_status(scene, settings, operator, camera) };
-        let moving = Moving { screen: Screen::new(), pace: Pace::new(), progress: None, status };
+        let moving = Moving { screen: Screen::new(Vec::new()), pace: Pace::new(), progress: None, status };
         Ok(Self { shared, settings, moving: Mutex::new(moving), server: Some(server) })
     }
 
@@ -63,9 +63,10 @@ impl<'a> Audience<'a> {
         let is_at_rest = moving.status.phase == Phase::Stopped;
         // The film stands in for itself where it has no samples yet.
         let (film, tone, settings) = (&state.film, state.tone.as_ref(), self.settings);
-        moving.screen.show(Scenery { film, draft: film, tone, settings, is_at_rest }, &self.shared);
+        moving.screen.show(Scenery { film, draft: film, tone, settings, is_at_rest, step: 1 }, &self.shared);
         (moving.status.width, moving.status.height) = (film.width(), film.height());
-        count(&mut moving.status, state, moving.progress.as_ref());
+        let total_samples = moving.screen.total_samples;
+        count(&mut moving.status, state, total_samples, moving.progress.as_ref());
         publish(&moving.status, &self.shared);
     }
 

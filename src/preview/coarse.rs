@@ -27,28 +27,27 @@ pub(super) fn draft_plan(width: u32, height: u32) -> SamplePlan {
     plan
 }
 
-/// Sorts a plan's blocks from coarse to fine. Blocks of one pixel keep their order, so the film that comes of it has the
+/// Sorts a plan's blocks from coarse to fine, one half after the other: half of a pilot's samples for every pixel look better than
+/// all of them for half of the pixels. Blocks of one pixel keep their order, so the film that comes of it has the
 /// same bytes.
 pub(super) fn order(plan: &mut SamplePlan, width: u32) {
-    plan.blocks.sort_by_key(|block| std::cmp::Reverse(spacing(block.pixel % width, block.pixel / width)));
+    let place = |block: &BlockWork| {
+        let (x, y) = (block.pixel % width, block.pixel / width);
+        // Rows far apart after one another: the finest grid is most of the plan, and swept from above it would leave the lower
+        // part behind for seconds.
+        (block.half.index(), std::cmp::Reverse(spacing(x, y)), y.reverse_bits())
+    };
+    plan.blocks.sort_by_cached_key(place);
 }
 
-/// For each pixel the index of the one whose samples stand for it: itself, or the nearest above and to the left on a grid
-/// that has been sampled. `None` where there is none yet.
-pub(super) fn stand_ins(film: &Film) -> Vec<Option<usize>> {
-    let (width, height) = (film.width(), film.height());
-    let of = |x: u32, y: u32| {
-        let mut step = 1;
-        while step <= COARSEST {
-            let pixel = (y / step * step * width + x / step * step) as usize;
-            if film.samples(pixel) > 0 {
-                return Some(pixel);
-            }
-            step *= 2;
-        }
-        None
-    };
-    (0..height).flat_map(|y| (0..width).map(move |x| of(x, y))).collect()
+/// The index of the pixel whose samples stand for one: itself, or the nearest above and to the left on a grid that has been
+/// sampled. `None` where there is none yet.
+pub(super) fn stand_in(film: &Film, pixel: usize) -> Option<usize> {
+    let width = film.width();
+    let (x, y) = (pixel as u32 % width, pixel as u32 / width);
+    let on_grid = |step: u32| (y / step * step * width + x / step * step) as usize;
+    let steps = (0..=COARSEST.ilog2()).map(|power| 1 << power);
+    steps.map(on_grid).find(|&pixel| film.samples(pixel) > 0)
 }
 
 #[cfg(test)]
@@ -69,10 +68,12 @@ mod tests {
     }
 
     #[test]
-    fn blocks_of_a_pixel_keep_their_order() {
+    fn one_half_comes_after_the_other() {
         let mut plan = pilot_plan(40 * 24, 16);
         order(&mut plan, 40);
-        let blocks = &plan.blocks;
-        assert!(blocks.chunks(2).all(|b| b[0].pixel == b[1].pixel && (b[0].half, b[1].half) == (Half::A, Half::B)));
+        let (first, second) = plan.blocks.split_at(40 * 24);
+        assert!(first.iter().all(|b| b.half == Half::A) && second.iter().all(|b| b.half == Half::B));
+        let pixels = |blocks: &[BlockWork]| blocks.iter().map(|b| b.pixel).collect::<Vec<u32>>();
+        assert_eq!(pixels(first), pixels(second));
     }
 }

@@ -76,6 +76,11 @@ pub(super) enum Command {
         /// Row.
         y: usize,
     },
+    /// Somebody looks at a place of the picture, in pixels; nowhere in particular without one.
+    Gaze {
+        /// Column and row.
+        at: Option<[f64; 2]>,
+    },
     /// The camera of the scene.
     CameraHome,
     /// Frames are missing that somebody looks at. Not from viewers.
@@ -84,6 +89,26 @@ pub(super) enum Command {
     /// The scene file has changed. Not from viewers.
     #[serde(skip)]
     Reload,
+}
+
+impl Command {
+    /// Whether it makes work on the picture useless: a look at it need not be finished.
+    pub(super) fn throws_the_picture_away(&self) -> bool {
+        matches!(self, Self::Camera { .. } | Self::CameraHome | Self::Restart)
+    }
+
+    /// Whether it leaves a camera in motion as it is: what else is asked for is asked of the picture at rest.
+    pub(super) fn suits_motion(&self) -> bool {
+        matches!(
+            self,
+            Self::Camera { .. }
+                | Self::CameraHome
+                | Self::Redraw
+                | Self::Layer { .. }
+                | Self::Beside { .. }
+                | Self::Inspect { .. }
+        )
+    }
 }
 
 /// Formats of saved pictures.
@@ -100,6 +125,8 @@ pub(super) enum SavedFormat {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum Phase {
+    /// Few pixels for each place of a camera that moves.
+    Moving,
     /// One sample a pixel that is shown and not kept.
     Drafting,
     /// The loop.
@@ -143,6 +170,8 @@ pub(super) struct Status {
     pub(super) error: Option<String>,
     /// What was done last.
     pub(super) note: Option<String>,
+    /// Whether the pointer stands for the gaze.
+    pub(super) is_foveated: bool,
 }
 
 /// What is at a pixel.

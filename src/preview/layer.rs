@@ -3,6 +3,7 @@
 use crate::film::{Film, PixelGuide};
 use crate::output::encode_srgb8;
 use fechner_perception::Plane;
+use glam::Vec2;
 use serde::{Deserialize, Serialize};
 
 /// Layers, in the order of the page's buttons.
@@ -27,10 +28,12 @@ pub(super) enum Layer {
     Normal,
     /// Their distance.
     Depth,
+    /// Their motion in the picture, to the next frame.
+    Velocity,
 }
 
 /// How many layers there are.
-pub(super) const LAYERS: usize = 9;
+pub(super) const LAYERS: usize = 10;
 
 /// A layer in colours: 8 bits, RGB after RGB, and what the colours mean.
 pub(super) struct Colours {
@@ -116,10 +119,37 @@ pub(super) fn depth(film: &Film) -> Colours {
     Colours { rgb8, legend: format!("bright {} to dark {} scene units, logarithmic", figure(low), figure(high)) }
 }
 
+/// Motion to the next frame: to the right orange, left blue, down green, up magenta, still grey.
+pub(super) fn velocity(to_next_px: &[Vec2], frames_per_second: f64) -> Colours {
+    /// Motion that nobody sees, pixels a frame: what rounding leaves of stillness.
+    const STILL_PX: f32 = 1e-3;
+    let mut speeds: Vec<f32> = to_next_px.iter().map(|motion| motion.abs().max_element()).collect();
+    speeds.sort_unstable_by(f32::total_cmp);
+    let most = speeds.get((0.995 * speeds.len().saturating_sub(1) as f64) as usize).copied().unwrap_or(0.0);
+    let most = if most > STILL_PX { most } else { speeds.last().copied().unwrap_or(0.0) };
+    let (scale, legend) = if most > STILL_PX {
+        let most_px = figure(f64::from(most));
+        let legend = format!(
+            "right orange, left blue, down green, up magenta; full at {most_px} pixels in 1/{frames_per_second} s"
+        );
+        (127.5 / most, legend)
+    } else {
+        (0.0, "nothing moves here".to_owned())
+    };
+    let byte = |value: f32| (127.5 + (scale * value).clamp(-127.5, 127.5)) as u8;
+    let rgb8 = to_next_px.iter().flat_map(|motion| [byte(motion.x), byte(motion.y), byte(-motion.x)]).collect();
+    Colours { rgb8, legend }
+}
+
+/// For layers that are not known now, and why.
+pub(super) fn unknown(film: &Film, why: &str) -> Colours {
+    let bytes = 3 * film.width() as usize * film.height() as usize;
+    Colours { rgb8: vec![24; bytes], legend: why.to_owned() }
+}
+
 /// For layers that need a look at the film which has not been taken.
 pub(super) fn nothing_yet(film: &Film) -> Colours {
-    let bytes = 3 * film.width() as usize * film.height() as usize;
-    Colours { rgb8: vec![24; bytes], legend: "known after the first look".to_owned() }
+    unknown(film, "known after the first look")
 }
 
 /// The 0.5th and 99.5th percentile of what is above 0.
@@ -164,6 +194,22 @@ mod tests {
             assert_eq!(colours.rgb8.len(), 15, "{}", colours.legend);
         }
         assert_eq!((heat(0.0), heat(2.0)), ([4, 3, 18], [252, 252, 170]));
+    }
+
+    /// Directions are told apart, and a still picture is one grey with a word about it.
+    #[test]
+    fn motion_has_a_colour_for_each_direction() {
+        let [right, left, down, up] = [Vec2::X, -Vec2::X, Vec2::Y, -Vec2::Y].map(|motion| 2.0 * motion);
+        let colours = velocity(&[right, left, down, up, Vec2::ZERO], 24.0);
+        let rgb = |i: usize| <[u8; 3]>::try_from(&colours.rgb8[3 * i..3 * i + 3]).expect("three");
+        let found = [rgb(0), rgb(1), rgb(2), rgb(3), rgb(4)];
+        assert_eq!(found, [[255, 127, 0], [0, 127, 255], [127, 255, 127], [127, 0, 127], [127; 3]]);
+        let still = velocity(&[Vec2::splat(1e-5); 3], 24.0);
+        assert_eq!((still.rgb8, still.legend.as_str()), (vec![127; 9], "nothing moves here"));
+        // One small thing moves in a picture that is else still.
+        let mut mostly = vec![Vec2::ZERO; 1000];
+        mostly[500] = Vec2::X;
+        assert_eq!(velocity(&mostly, 24.0).rgb8[1500], 255);
     }
 
     /// What is above the target never looks like what is below it.

@@ -3,9 +3,10 @@
 //! [`start`] renders on a thread of its own by the ordinary loop of [`crate::adaptive`], so that what stands at the end has
 //! the bytes of `fechner render`, and shows it to any number of viewers over a WebSocket. The order of work:
 //!
-//! 1. a draft of one sample a pixel, coarse to fine (`coarse`), into a film that is only ever shown;
-//! 2. the loop, in batches of about a tenth of a second, between which `session` obeys what viewers ask;
-//! 3. `screen` turns film into encoded frames, at most ten a second and never more than viewers look at.
+//! 1. while the camera moves, and at first, a `glimpse` of as many pixels as a frame has time for;
+//! 2. a draft of one sample a pixel, coarse to fine (`coarse`), into a film that is only ever shown;
+//! 3. the loop, in batches of about a tenth of a second, between which `session` obeys what viewers ask;
+//! 4. `screen` turns film into encoded frames, at most ten a second and never more than viewers look at.
 //!
 //! Viewers get the latest frame and none that they missed, so a slow one costs nobody else anything. Not for pictures that
 //! should be kept or compared: `render` writes those, and so does "save" here.
@@ -13,16 +14,22 @@
 mod audience;
 mod coarse;
 mod command;
+mod glimpse;
 mod layer;
 mod orbit;
 mod screen;
 mod server;
 mod session;
 mod shared;
+mod spectator;
+mod tev;
 mod viewer;
 
 pub use audience::Audience;
+pub use screen::Looked;
 pub use server::{Door, random_token};
+pub use spectator::{Shown, Spectator};
+pub use tev::{TEV_PORT, Tev};
 
 use crate::adaptive::Rendered;
 use crate::adaptive::settings::{Limits, LoopSettings};
@@ -57,6 +64,12 @@ pub trait Host: Send + Sync {
     /// In words for the user.
     fn load(&self) -> Result<Job, String>;
 
+    /// The scene as it is so many seconds later, as the file now is; for its motion.
+    ///
+    /// # Errors
+    /// In words for the user.
+    fn later(&self, seconds: f64) -> Result<Scene, String>;
+
     /// Writes a picture in the format that the name's ending asks for.
     ///
     /// # Errors
@@ -65,6 +78,15 @@ pub trait Host: Send + Sync {
 
     /// The file whose changes make the scene load again.
     fn scene_file(&self) -> &Path;
+}
+
+/// What a preview does beside showing the picture to browsers.
+#[derive(Default)]
+pub struct Options {
+    /// Whether viewers' pointers stand for their gaze: see [`LoopSettings::gaze`].
+    pub is_foveated: bool,
+    /// Who else is shown each frame.
+    pub spectators: Vec<Box<dyn Spectator>>,
 }
 
 /// A preview under way.
@@ -88,12 +110,12 @@ impl Closer {
 ///
 /// # Errors
 /// If the system gives no thread.
-pub fn start(job: Job, host: Box<dyn Host>, pool: rayon::ThreadPool) -> std::io::Result<Preview> {
+pub fn start(job: Job, host: Arc<dyn Host>, options: Options, pool: rayon::ThreadPool) -> std::io::Result<Preview> {
     let shared = Arc::new(Shared::new());
     let scene_file = host.scene_file().to_owned();
     let thread = |name: &str| std::thread::Builder::new().name(name.to_owned());
     let (of_render, of_watch) = (Arc::clone(&shared), Arc::clone(&shared));
-    let render = thread("preview").spawn(move || pool.install(|| session::run(job, host.as_ref(), &of_render)))?;
+    let render = thread("preview").spawn(move || pool.install(|| session::run(job, &host, options, &of_render)))?;
     let watch = thread("scene-file").spawn(move || session::watch_file(&scene_file, &of_watch))?;
     Ok(Preview { shared, threads: vec![render, watch] })
 }

@@ -58,18 +58,21 @@ const MOST_STEPS: f32 = 20.0;
 pub(super) struct Held {
     pub(super) camera: Camera,
     pub(super) pivot_distance: f32,
+    /// Whether it is where the scene has put it.
+    pub(super) is_home: bool,
 }
 
 impl Held {
     /// Where the scene has put it; it turns about what is in focus.
     pub(super) fn at_home(camera: &Camera) -> Self {
-        Self { camera: camera.clone(), pivot_distance: camera.focus_distance }
+        Self { camera: camera.clone(), pivot_distance: camera.focus_distance, is_home: true }
     }
 
     /// Moves it. A camera that moved while its shutter was open rests from here on.
     pub(super) fn moved(&mut self, movement: Movement) {
         let before = self.clone();
         self.camera.motion = None;
+        self.is_home = false;
         match movement {
             Movement::Orbit { right, up } => self.orbit(right, up),
             Movement::Pan { right, up } => self.pan(right, up),
@@ -185,7 +188,11 @@ mod tests {
     use super::*;
 
     fn held() -> Held {
-        Held { camera: Camera::pinhole(Vec3::new(0.0, 0.0, 5.0), Vec3::NEG_Z, Vec3::Y, 90.0), pivot_distance: 5.0 }
+        Held {
+            camera: Camera::pinhole(Vec3::new(0.0, 0.0, 5.0), Vec3::NEG_Z, Vec3::Y, 90.0),
+            pivot_distance: 5.0,
+            is_home: true,
+        }
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! From film to encoded frames of the layers that somebody looks at.
 
-use super::coarse::stand_ins;
+use super::coarse::stand_in;
 use super::layer::{self, Colours, Layer};
 use super::shared::Shared;
+use super::spectator::{Shown, Spectator};
 use crate::adaptive::judge::Judgement;
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::statistics::picture_variance;
@@ -11,10 +12,12 @@ use crate::output::encode_srgb8;
 use fechner_perception::Plane;
 use fechner_perception::photometry::luminance;
 use fechner_perception::tone::{FittedTone, SavedTone, SceneGuide, map_picture};
+use glam::Vec2;
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ImageEncoder, ImageError};
+use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -24,16 +27,19 @@ const FRAME_INTERVAL: Duration = Duration::from_millis(100);
 const LIVELY: Duration = Duration::from_secs(5);
 
 /// What the last look at the film saw.
-pub(super) struct Looked {
+#[derive(Debug)]
+pub struct Looked {
     /// Standard error on the display, cd/m², that is at visibility 1.
-    pub(super) threshold: Plane,
-    pub(super) visibility: Plane,
+    pub threshold: Plane,
+    /// Of the remaining noise.
+    pub visibility: Plane,
     /// The picture, where it is denoised: linear RGB in cd/m².
-    denoised: Option<Vec<[f32; 3]>>,
+    pub denoised: Option<Vec<[f32; 3]>>,
 }
 
 impl Looked {
-    pub(super) fn of(judgement: &Judgement) -> Self {
+    /// The maps of a look.
+    pub fn of(judgement: &Judgement) -> Self {
         Self {
             threshold: judgement.allowed_standard_error_cd_m2(),
             visibility: judgement.predicted.clone(),
@@ -45,6 +51,8 @@ impl Looked {
 /// The picture as it was last shown, for who asks about a pixel.
 pub(super) struct Snapshot {
     pub(super) width: usize,
+    /// Pixels of the picture to each of these, each way.
+    pub(super) step: usize,
     pub(super) nits_per_unit: f64,
     pub(super) rgb_cd_m2: Vec<[f32; 3]>,
     pub(super) samples: Vec<u32>,
@@ -62,6 +70,21 @@ pub(super) struct Scenery<'a> {
     pub(super) settings: &'a LoopSettings,
     /// Whether nothing changes now: then frames are exact.
     pub(super) is_at_rest: bool,
+    /// Pixels of the picture to each of the film's, each way.
+    pub(super) step: u32,
+}
+
+/// What is known of motion in the picture.
+pub(super) enum Motion {
+    /// Nothing, and why.
+    Unknown(&'static str),
+    /// To the next frame.
+    Known {
+        /// In pixels, row-major.
+        to_next_px: Vec<Vec2>,
+        /// How long a frame is.
+        frames_per_second: f64,
+    },
 }
 
 /// When was shown what, and what it took.
@@ -70,16 +93,30 @@ pub(super) struct Screen {
     shown: Option<Instant>,
     cost: Duration,
     pub(super) looked: Option<Arc<Looked>>,
+    pub(super) motion: Motion,
+    /// Samples of the film that was shown last.
+    pub(super) total_samples: u64,
+    spectators: Vec<Box<dyn Spectator>>,
 }
 
 impl Screen {
-    pub(super) fn new() -> Self {
-        Self { started: Instant::now(), shown: None, cost: Duration::ZERO, looked: None }
+    pub(super) fn new(spectators: Vec<Box<dyn Spectator>>) -> Self {
+        let motion = Motion::Unknown("not known to a running render");
+        Self {
+            started: Instant::now(),
+            shown: None,
+            cost: Duration::ZERO,
+            looked: None,
+            motion,
+            total_samples: 0,
+            spectators,
+        }
     }
 
     /// A new picture begins: no look was taken and the next frame is due.
     pub(super) fn begin(&mut self) {
-        *self = Self { cost: self.cost, ..Self::new() };
+        let spectators = std::mem::take(&mut self.spectators);
+        *self = Self { cost: self.cost, ..Self::new(spectators) };
     }
 
     /// Whether a frame is due.
@@ -88,13 +125,24 @@ impl Screen {
         self.shown.is_none_or(|shown| shown.elapsed() >= FRAME_INTERVAL.max(self.cost * times_cost))
     }
 
-    /// Shows a film to all viewers.
+    /// Shows a film to all viewers, and remembers what that took.
     pub(super) fn show(&mut self, scenery: Scenery<'_>, shared: &Shared) {
         let begun = Instant::now();
+        self.publish(scenery, shared);
+        self.shown = Some(Instant::now());
+        self.cost = begun.elapsed();
+    }
+
+    /// Shows a film to all viewers.
+    pub(super) fn publish(&mut self, scenery: Scenery<'_>, shared: &Shared) {
+        if pixels(scenery.film) == 0 {
+            return;
+        }
         let nits_per_unit = scenery.settings.nits_per_unit;
         // Denoised pictures are made by looks; between two the last one stays.
         let denoised = self.looked.as_ref().and_then(|looked| looked.denoised.clone());
-        let rgb_cd_m2 = denoised.unwrap_or_else(|| composed(scenery.film, scenery.draft, nits_per_unit));
+        let (raw, samples) = composed(scenery.film, scenery.draft, nits_per_unit);
+        let rgb_cd_m2 = denoised.unwrap_or(raw);
         for layer in ALL.into_iter().filter(|&layer| shared.is_watched(layer)) {
             let colours = self.colours(layer, scenery, &rgb_cd_m2);
             // A frame that cannot be encoded is left out; the next may be.
@@ -102,25 +150,37 @@ impl Screen {
                 shared.publish_frame(layer, frame);
             }
         }
+        let shown = Shown {
+            film: scenery.film,
+            rgb_cd_m2: &rgb_cd_m2,
+            step: scenery.step,
+            looked: self.looked.as_deref(),
+            nits_per_unit,
+            is_at_rest: scenery.is_at_rest,
+        };
+        self.spectators.iter_mut().for_each(|spectator| spectator.shown(&shown));
+        self.total_samples = samples.iter().map(|&samples| u64::from(samples)).sum();
         shared.publish_snapshot(Snapshot {
             width: scenery.film.width() as usize,
+            step: scenery.step as usize,
             nits_per_unit,
             rgb_cd_m2,
-            samples: (0..pixels(scenery.film)).map(|pixel| scenery.film.samples(pixel)).collect(),
+            samples,
             looked: self.looked.clone(),
         });
-        self.shown = Some(Instant::now());
-        self.cost = begun.elapsed();
     }
 
     fn colours(&self, layer: Layer, scenery: Scenery<'_>, rgb_cd_m2: &[[f32; 3]]) -> Colours {
         let Scenery { film, settings, draft, .. } = scenery;
         let (width, height) = (film.width() as usize, film.height() as usize);
         // First surfaces are known from the draft on.
-        let surfaces = if film.total_samples() >= draft.total_samples() { film } else { draft };
+        let surfaces = || if film.total_samples() >= draft.total_samples() { film } else { draft };
         match (layer, &self.looked) {
             (Layer::Picture, _) => {
-                let tone = scenery.tone.map_or_else(|| fit(settings, width, rgb_cd_m2), |tone| tone.clone().restore());
+                let tone = match scenery.tone {
+                    Some(tone) => tone.clone().restore(),
+                    None => fit(settings, scenery.step, width, rgb_cd_m2),
+                };
                 let shown = map_picture(tone.as_ref(), width, rgb_cd_m2);
                 Colours { rgb8: encode_srgb8(film.width(), &shown), legend: tone.describe() }
             }
@@ -137,9 +197,16 @@ impl Screen {
             (Layer::HalfDifference, _) => {
                 layer::signed(&film.estimate(settings.nits_per_unit).half_difference, "cd/m², of the scene")
             }
-            (Layer::Albedo, _) => layer::albedo(surfaces),
-            (Layer::Normal, _) => layer::normal(surfaces),
-            (Layer::Depth, _) => layer::depth(surfaces),
+            (Layer::Albedo, _) => layer::albedo(surfaces()),
+            (Layer::Normal, _) => layer::normal(surfaces()),
+            (Layer::Depth, _) => layer::depth(surfaces()),
+            (Layer::Velocity, _) => match &self.motion {
+                Motion::Known { to_next_px, frames_per_second } if to_next_px.len() == pixels(film) => {
+                    layer::velocity(to_next_px, *frames_per_second)
+                }
+                Motion::Known { .. } => layer::unknown(film, "known when the camera rests"),
+                Motion::Unknown(why) => layer::unknown(film, why),
+            },
         }
     }
 }
@@ -154,32 +221,34 @@ const ALL: [Layer; layer::LAYERS] = [
     Layer::Albedo,
     Layer::Normal,
     Layer::Depth,
+    Layer::Velocity,
 ];
 
 fn pixels(film: &Film) -> usize {
     film.width() as usize * film.height() as usize
 }
 
-/// The film's picture; where it has no samples, the draft's.
-fn composed(film: &Film, draft: &Film, nits_per_unit: f64) -> Vec<[f32; 3]> {
-    let mut rgb = film.estimate(nits_per_unit).rgb_cd_m2;
-    if (0..pixels(film)).all(|pixel| film.samples(pixel) > 0) {
-        return rgb;
-    }
-    let below = draft.estimate(nits_per_unit).rgb_cd_m2;
-    for (pixel, stand_in) in stand_ins(draft).into_iter().enumerate() {
-        if film.samples(pixel) == 0 {
-            rgb[pixel] = stand_in.map_or([0.0; 3], |stand_in| below[stand_in]);
-        }
-    }
-    rgb
+/// The film's picture, cd/m², and its samples of each pixel; where it has none, the draft's picture. In one walk: a film is
+/// many times as large as a picture.
+fn composed(film: &Film, draft: &Film, nits_per_unit: f64) -> (Vec<[f32; 3]>, Vec<u32>) {
+    let stands_in =
+        |pixel: usize| stand_in(draft, pixel).map_or([0.0; 3], |stand_in| draft.rgb_cd_m2(stand_in, nits_per_unit));
+    let of_pixel = |pixel: usize| match film.samples(pixel) {
+        0 => (stands_in(pixel), 0),
+        samples => (film.rgb_cd_m2(pixel, nits_per_unit), samples),
+    };
+    let (mut rgb, mut samples) = (Vec::new(), Vec::new());
+    (0..pixels(film)).into_par_iter().map(of_pixel).unzip_into_vecs(&mut rgb, &mut samples);
+    (rgb, samples)
 }
 
-/// The operator on a picture that was not looked at yet.
-fn fit(settings: &LoopSettings, width: usize, rgb_cd_m2: &[[f32; 3]]) -> Box<dyn FittedTone> {
+/// The operator on a picture that was not looked at yet, of pixels `step` times as large as the display's.
+fn fit(settings: &LoopSettings, step: u32, width: usize, rgb_cd_m2: &[[f32; 3]]) -> Box<dyn FittedTone> {
     let height = rgb_cd_m2.len() / width.max(1);
     let guide = Plane::from_fn(width, height, |x, y| luminance(rgb_cd_m2[y * width + x]).max(0.0));
-    settings.operator.fit(&SceneGuide::of(&guide), &settings.viewing, None)
+    let mut viewing = settings.viewing.clone();
+    viewing.display.pixels_per_degree /= f64::from(step);
+    settings.operator.fit(&SceneGuide::of(&guide), &viewing, None)
 }
 
 /// The layer's number, the length of its legend, the legend in UTF-8, the picture. JPEG while it changes, PNG at rest.

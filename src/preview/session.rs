@@ -1,34 +1,41 @@
-//! The render's thread: drafts, renders, and obeys between two batches.
+//! The render's thread: glimpses, drafts, renders, and obeys between two batches.
 
+mod gaze;
+mod live;
+mod motion;
+mod obeying;
 mod pace;
 mod saving;
 mod telling;
 mod watch;
 
 use super::coarse::{draft_plan, order};
-use super::command::{Command, Phase, SavedFormat};
+use super::command::{Command, Phase};
+use super::glimpse::{Glimpse, Resolution};
 use super::orbit::Held;
 use super::screen::{Looked, Scenery, Screen};
 use super::shared::Shared;
-use super::{Host, Job};
-use crate::adaptive::judge::{Judgement, judge};
+use super::{Host, Job, Options};
+use crate::adaptive::judge::{JudgeError, Judgement, judge};
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::state::RenderState;
-use crate::adaptive::{LastLook, Progress, StopReason, run as run_loop};
+use crate::adaptive::{LastLook, Progress, run as run_loop};
 use crate::film::Film;
 use crate::integrator::{Crop, PathTracer, SamplePlan};
-use fechner_perception::display::{Display, Observer, Viewing};
+use gaze::Follower;
+use live::{Live, settings_of};
+use motion::Neighbours;
 pub(super) use pace::Pace;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 pub(super) use telling::{blank_status, count, publish};
 use watch::{Moving, Watch};
 
 /// Renders and obeys until the preview closes. A defect that panics ends the picture, not the preview: a saved scene file
 /// starts it again.
-pub(super) fn run(job: Job, host: &dyn Host, shared: &Shared) {
+pub(super) fn run(job: Job, host: &Arc<dyn Host>, mut options: Options, shared: &Arc<Shared>) {
     let mut next = Some(job);
     while !shared.is_closing() {
         let Some(job) = next.take() else {
@@ -39,7 +46,7 @@ pub(super) fn run(job: Job, host: &dyn Host, shared: &Shared) {
             }
             continue;
         };
-        let work = || Session::new(job, host, shared).map(Session::work);
+        let work = || Session::new(job, host, &mut options, shared).map(Session::work);
         let problem = match catch_unwind(AssertUnwindSafe(work)) {
             Ok(Ok(())) => return,
             Ok(Err(problem)) => problem,
@@ -63,26 +70,24 @@ pub(super) fn watch_file(path: &Path, shared: &Shared) {
     }
 }
 
-/// What viewers changed, in place of what the job says.
-#[derive(Clone, Default)]
-struct Live {
-    exposure: Option<f64>,
-    operator: Option<String>,
-    /// A preset's name.
-    display: Option<String>,
-    /// In distances that the display is made for.
-    distance: Option<f64>,
-    visibility: Option<f64>,
-}
+/// How long a camera must have rested for the whole picture to be begun: its film takes longer than a frame to make.
+const REST: Duration = Duration::from_millis(120);
 
 struct Session<'a> {
-    host: &'a dyn Host,
-    shared: &'a Shared,
+    host: &'a Arc<dyn Host>,
+    shared: &'a Arc<Shared>,
     job: Job,
     live: Live,
+    /// Where the pointer stands for the gaze.
+    gaze: Option<Follower>,
     held: Held,
     /// Whether the camera is another than the tracer's.
     has_moved: bool,
+    /// When it was moved last, unless the picture is the first.
+    moved_at: Option<Instant>,
+    resolution: Resolution,
+    /// Until the draft shows more.
+    glimpse: Option<Glimpse>,
     tracer: PathTracer,
     settings: LoopSettings,
     phase: Phase,
@@ -93,6 +98,8 @@ struct Session<'a> {
     /// While stopped.
     last_look: Option<LastLook>,
     screen: Screen,
+    /// The scenes a frame before and after, once somebody looks at motion.
+    neighbours: Option<Neighbours>,
     pace: Pace,
     progress: Option<Progress>,
     error: Option<String>,
@@ -100,23 +107,28 @@ struct Session<'a> {
 }
 
 impl<'a> Session<'a> {
-    fn new(job: Job, host: &'a dyn Host, shared: &'a Shared) -> Result<Self, String> {
+    fn new(job: Job, host: &'a Arc<dyn Host>, options: &mut Options, shared: &'a Arc<Shared>) -> Result<Self, String> {
         let live = Live::default();
-        let settings = settings_of(&job, &live)?;
+        let settings = interruptible(settings_of(&job, &live)?, shared);
         let tracer = PathTracer::new(Arc::clone(&job.scene), job.trace);
-        let Crop { width, height, .. } = job.trace.film_area();
-        let mut session = Self {
+        Ok(Self {
             host,
             shared,
+            gaze: options.is_foveated.then(|| Follower::new(settings.viewing.display.pixels_per_degree)),
             held: Held::at_home(&job.scene.camera),
-            has_moved: false,
+            // The first picture begins as one after a movement does.
+            has_moved: true,
+            moved_at: None,
+            resolution: Resolution::new(),
+            glimpse: None,
             tracer,
-            phase: Phase::Drafting,
+            phase: Phase::Moving,
             draft_left: SamplePlan::default(),
-            draft: Film::new(width, height),
-            state: RenderState::new(width, height, &settings.limits),
+            draft: Film::new(0, 0),
+            state: RenderState::new(0, 0, &settings.limits),
             last_look: None,
-            screen: Screen::new(),
+            screen: Screen::new(std::mem::take(&mut options.spectators)),
+            neighbours: None,
             pace: Pace::new(),
             progress: None,
             error: None,
@@ -124,9 +136,7 @@ impl<'a> Session<'a> {
             settings,
             live,
             job,
-        };
-        session.restart();
-        Ok(session)
+        })
     }
 
     fn work(mut self) {
@@ -134,12 +144,17 @@ impl<'a> Session<'a> {
             for command in self.shared.take_commands() {
                 self.obey(command);
             }
-            // Once for all movements that came: a restart for each would fall behind a hand that drags.
+            // Once for all movements that came: a glimpse for each would fall behind a hand that drags.
             if std::mem::take(&mut self.has_moved) {
                 self.tracer.set_camera(&self.held.camera);
-                self.restart();
+                self.glimpse();
             }
+            self.follow_gaze();
             match self.phase {
+                Phase::Moving => match self.moved_at.and_then(|moved_at| REST.checked_sub(moved_at.elapsed())) {
+                    Some(left) => self.shared.wait(left),
+                    None => self.restart(),
+                },
                 Phase::Drafting => self.trace_draft(),
                 Phase::Rendering => self.render(),
                 Phase::Paused | Phase::Stopped => {
@@ -148,6 +163,25 @@ impl<'a> Session<'a> {
                 }
             }
         }
+    }
+
+    /// Shows what the camera sees from where it is now, in few pixels.
+    fn glimpse(&mut self) {
+        let begun = Instant::now();
+        let Crop { width, height, .. } = self.job.trace.film_area();
+        self.phase = Phase::Moving;
+        self.last_look = None;
+        self.progress = None;
+        self.screen.looked = None;
+        // Films of another place are of no use, and counting their samples would take longer than the glimpse.
+        self.draft = Film::new(0, 0);
+        self.state = RenderState::new(0, 0, &self.settings.limits);
+        let glimpse = Glimpse::of(&self.tracer, self.resolution.step(width, height));
+        let pixels = glimpse.film.width() * glimpse.film.height();
+        self.glimpse = Some(glimpse);
+        self.show();
+        self.resolution.took(pixels, begun.elapsed());
+        self.tell();
     }
 
     /// Throws all samples away and begins with a draft.
@@ -161,6 +195,7 @@ impl<'a> Session<'a> {
         self.last_look = None;
         self.progress = None;
         self.screen.begin();
+        self.forget_motion();
     }
 
     fn order_pilot(&mut self) {
@@ -183,6 +218,13 @@ impl<'a> Session<'a> {
             self.order_pilot();
             self.phase = Phase::Rendering;
         }
+        // A grid coarser than the last glimpse would be a step back.
+        let glimpsed = self.glimpse.as_ref().map_or(0, |glimpse| glimpse.film.width() * glimpse.film.height());
+        let pixels = self.draft.width() * self.draft.height();
+        if pixels as usize - self.draft_left.blocks.len() < glimpsed as usize {
+            return;
+        }
+        self.glimpse = None;
         if self.screen.is_due() || self.phase == Phase::Rendering {
             self.show();
             self.tell();
@@ -201,11 +243,14 @@ impl<'a> Session<'a> {
                 shared: self.shared,
                 settings: &self.settings,
                 draft: &self.draft,
+                follower: self.gaze.as_ref(),
                 moving: Mutex::new(Moving {
                     screen: &mut self.screen,
                     pace: &mut self.pace,
                     progress: &mut self.progress,
                     status,
+                    samples_since: 0,
+                    told: Instant::now(),
                 }),
             };
             run_loop(&self.tracer, &self.settings, state, &watch)
@@ -217,6 +262,8 @@ impl<'a> Session<'a> {
                     self.stopped(last_look);
                 }
             }
+            // Who says so throws the picture away.
+            Err(JudgeError::Outdated) => self.state = RenderState::new(width, height, &self.settings.limits),
             Err(error) => {
                 self.error = Some(error.to_string());
                 self.state = RenderState::new(width, height, &self.settings.limits);
@@ -239,6 +286,7 @@ impl<'a> Session<'a> {
     fn look(&mut self) -> Option<Judgement> {
         match judge(&self.state.film, &self.settings, self.state.inflation) {
             Ok(judgement) => Some(judgement),
+            Err(JudgeError::Outdated) => None,
             Err(error) => {
                 self.error = Some(error.to_string());
                 None
@@ -246,175 +294,27 @@ impl<'a> Session<'a> {
         }
     }
 
-    fn obey(&mut self, command: Command) {
-        self.note = None;
-        match command {
-            Command::Layer { .. } | Command::Beside { .. } | Command::Inspect { .. } => {}
-            Command::Redraw => self.show(),
-            Command::Pause if matches!(self.phase, Phase::Rendering | Phase::Drafting) => {
-                self.phase = Phase::Paused;
-                self.show();
-            }
-            Command::Resume if matches!(self.phase, Phase::Paused | Phase::Stopped) => self.go_on(),
-            Command::Stop if self.phase != Phase::Stopped => {
-                if let Some(judgement) = self.look() {
-                    self.stopped(LastLook { judgement, stop_reason: StopReason::Interrupted });
-                }
-            }
-            Command::Pause | Command::Resume | Command::Stop => {}
-            Command::Restart => self.restart(),
-            Command::Save { format } => self.save(format),
-            Command::Exposure { stops } => self.change(|live| live.exposure = stops, Changed::Seen),
-            Command::Operator { name } => self.change(|live| live.operator = Some(name), Changed::Seen),
-            Command::Display { name } => self.change(|live| live.display = Some(name), Changed::Seen),
-            Command::Distance { factor } => self.change(|live| live.distance = Some(factor), Changed::Seen),
-            Command::Visibility { target } => self.change(|live| live.visibility = Some(target), Changed::Target),
-            Command::Camera { movement } => {
-                self.find_pivot();
-                self.held.moved(movement);
-                self.has_moved = true;
-            }
-            Command::Focus { x, y } => self.focus_on(x, y),
-            Command::CameraHome => {
-                self.held = Held::at_home(&self.job.scene.camera);
-                self.has_moved = true;
-            }
-            Command::Reload => self.reload(),
-        }
-    }
-
-    fn go_on(&mut self) {
-        self.last_look = None;
-        self.phase = if self.draft_left.blocks.is_empty() { Phase::Rendering } else { Phase::Drafting };
-    }
-
-    /// Other settings for the samples that there are.
-    fn change(&mut self, edit: impl FnOnce(&mut Live), changed: Changed) {
-        let before = self.live.clone();
-        edit(&mut self.live);
-        match settings_of(&self.job, &self.live) {
-            Err(problem) => {
-                self.live = before;
-                self.error = Some(problem);
-            }
-            Ok(settings) => {
-                self.settings = settings;
-                self.error = None;
-                self.adopt(changed);
-            }
-        }
-    }
-
-    fn adopt(&mut self, changed: Changed) {
-        let has_pilot = self.state.plans > 0;
-        match changed {
-            Changed::Target if has_pilot => {
-                self.state.pending.clear();
-                self.state.traced_blocks = 0;
-            }
-            Changed::Target => {}
-            Changed::Seen => {
-                let limits = &self.settings.limits;
-                let state = std::mem::replace(&mut self.state, RenderState::new(0, 0, limits));
-                self.state = state.begun_anew(limits);
-                self.order_pilot();
-                self.screen.looked = None;
-            }
-        }
-        if self.phase == Phase::Stopped {
-            if let Some(judgement) = self.look() {
-                let stop_reason = self.last_look.as_ref().map_or(StopReason::Interrupted, |look| look.stop_reason);
-                self.stopped(LastLook { judgement, stop_reason });
-            }
-        } else {
-            self.show();
-        }
-    }
-
-    /// The camera turns about what stands in the middle of the picture.
-    fn find_pivot(&mut self) {
-        let (width, height) = (self.draft.width() as usize, self.draft.height() as usize);
-        if let Some(depth) = self.depth_at(width / 2, height / 2) {
-            self.held.pivot_distance = depth;
-        }
-    }
-
-    /// Distance of what a pixel shows; none where nothing is or where the picture is of another camera.
-    fn depth_at(&self, x: usize, y: usize) -> Option<f32> {
-        let film = if self.state.film.total_samples() > 0 { &self.state.film } else { &self.draft };
-        let is_whole = self.draft_left.blocks.is_empty() && !self.has_moved && x < film.width() as usize;
-        let pixel = y.checked_mul(film.width() as usize)?.checked_add(x)?;
-        film.guides().get(pixel).map(|guide| guide.depth).filter(|depth| is_whole && depth.is_normal())
-    }
-
-    fn focus_on(&mut self, x: usize, y: usize) {
-        match self.depth_at(x, y) {
-            None => self.note = Some("nothing to focus on there".to_owned()),
-            Some(depth) => {
-                self.held.camera.focus_distance = depth;
-                if self.held.camera.aperture_radius > 0.0 {
-                    self.has_moved = true;
-                } else {
-                    self.note = Some("in focus, but the lens has no width: A widens it".to_owned());
-                }
-            }
-        }
-    }
-
-    fn reload(&mut self) {
-        let loaded = self.host.load().and_then(|job| settings_of(&job, &self.live).map(|settings| (job, settings)));
-        match loaded {
-            Err(problem) => self.error = Some(problem),
-            Ok((job, settings)) => {
-                self.tracer = PathTracer::new(Arc::clone(&job.scene), job.trace);
-                self.held = Held::at_home(&job.scene.camera);
-                (self.job, self.settings) = (job, settings);
-                self.error = None;
-                self.note = Some("the scene was loaded again".to_owned());
-                self.restart();
-            }
-        }
-    }
-
     fn show(&mut self) {
+        if let Some(Glimpse { film, step }) = &self.glimpse {
+            let settings = &self.settings;
+            let scenery = Scenery { film, draft: film, tone: None, settings, is_at_rest: false, step: *step };
+            return self.screen.publish(scenery, self.shared);
+        }
+        self.find_motion();
         let scenery = Scenery {
             film: &self.state.film,
             draft: &self.draft,
             tone: self.state.tone.as_ref(),
             settings: &self.settings,
             is_at_rest: matches!(self.phase, Phase::Paused | Phase::Stopped),
+            step: 1,
         };
         self.screen.show(scenery, self.shared);
     }
 }
 
-/// What a change of settings asks for.
-#[derive(Clone, Copy)]
-enum Changed {
-    /// What the eye is shown, and with it every threshold.
-    Seen,
-    /// When to stop.
-    Target,
-}
-
-fn settings_of(job: &Job, live: &Live) -> Result<LoopSettings, String> {
-    let mut record = job.record.clone();
-    record.exposure_stops = live.exposure.or(record.exposure_stops);
-    record.operator = live.operator.clone().unwrap_or(record.operator);
-    if let Some(name) = &live.display {
-        let display = Display::preset(name).ok_or_else(|| format!("there is no display \"{name}\""))?;
-        let Observer { sensitivity, glare, .. } = record.viewing.observer;
-        record.viewing = Viewing::of(display);
-        record.viewing.observer = Observer { sensitivity, glare, ..record.viewing.observer };
-    }
-    // So many times as far, a pixel looks so many times as small.
-    record.viewing.display.pixels_per_degree *= live.distance.unwrap_or(1.0);
-    record.viewing.check().map_err(|error| error.to_string())?;
-    let visibility = live.visibility.unwrap_or(job.limits.visibility);
-    if visibility.is_nan() || visibility < 0.0 || record.exposure_stops.is_some_and(|stops| !stops.is_finite()) {
-        return Err("visibility must be above 0 and exposure a number".to_owned());
-    }
-    let limits = crate::adaptive::settings::Limits { visibility, ..job.limits };
-    let settings = record.loop_settings(limits).map_err(|error| error.to_string())?;
-    Ok(LoopSettings { importance: job.importance.clone(), ..settings })
+/// The same settings, whose looks end when somebody wants another picture.
+fn interruptible(settings: LoopSettings, shared: &Arc<Shared>) -> LoopSettings {
+    let shared = Arc::clone(shared);
+    LoopSettings { is_outdated: Some(Box::new(move || shared.is_outdated())), ..settings }
 }

@@ -4,6 +4,7 @@ use super::command::Command;
 use super::layer::{LAYERS, Layer};
 use super::screen::Snapshot;
 use axum::body::Bytes;
+use fechner_perception::eccentricity::Gaze;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
@@ -16,11 +17,14 @@ const MOST_COMMANDS: usize = 1024;
 pub(super) struct Shared {
     commands: Mutex<VecDeque<Command>>,
     arrived: Condvar,
+    /// Whether a command that waits throws the picture away.
+    is_outdated: AtomicBool,
     /// Viewers of each layer.
     viewers: [AtomicUsize; LAYERS],
     frames: [watch::Sender<Bytes>; LAYERS],
     status: watch::Sender<Arc<str>>,
     snapshot: Mutex<Option<Arc<Snapshot>>>,
+    gaze: Mutex<Option<Gaze>>,
     is_closing: AtomicBool,
     closing: watch::Sender<bool>,
 }
@@ -30,10 +34,12 @@ impl Shared {
         Self {
             commands: Mutex::default(),
             arrived: Condvar::new(),
+            is_outdated: AtomicBool::new(false),
             viewers: std::array::from_fn(|_| AtomicUsize::new(0)),
             frames: std::array::from_fn(|_| watch::Sender::new(Bytes::new())),
             status: watch::Sender::new(Arc::from("")),
             snapshot: Mutex::default(),
+            gaze: Mutex::default(),
             is_closing: AtomicBool::new(false),
             closing: watch::Sender::new(false),
         }
@@ -42,6 +48,7 @@ impl Shared {
     pub(super) fn send(&self, command: Command) {
         let mut commands = self.commands.lock().unwrap_or_else(PoisonError::into_inner);
         if commands.len() < MOST_COMMANDS {
+            self.is_outdated.fetch_or(command.throws_the_picture_away(), Ordering::SeqCst);
             commands.push_back(command);
         }
         self.arrived.notify_all();
@@ -54,7 +61,14 @@ impl Shared {
 
     /// All commands that have come.
     pub(super) fn take_commands(&self) -> VecDeque<Command> {
-        std::mem::take(&mut *self.commands.lock().unwrap_or_else(PoisonError::into_inner))
+        let mut commands = self.commands.lock().unwrap_or_else(PoisonError::into_inner);
+        self.is_outdated.store(false, Ordering::SeqCst);
+        std::mem::take(&mut *commands)
+    }
+
+    /// Whether work on the picture is of no use any more.
+    pub(super) fn is_outdated(&self) -> bool {
+        self.is_closing() || self.is_outdated.load(Ordering::SeqCst)
     }
 
     /// Until a command comes, the preview closes or the time is up.
@@ -95,6 +109,17 @@ impl Shared {
 
     pub(super) fn status(&self) -> watch::Receiver<Arc<str>> {
         self.status.subscribe()
+    }
+
+    /// Somebody looks elsewhere: the latest place counts.
+    pub(super) fn look_at(&self, gaze: Option<Gaze>) {
+        *self.gaze.lock().unwrap_or_else(PoisonError::into_inner) = gaze;
+        let _commands = self.commands.lock().unwrap_or_else(PoisonError::into_inner);
+        self.arrived.notify_all();
+    }
+
+    pub(super) fn gaze(&self) -> Option<Gaze> {
+        *self.gaze.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     pub(super) fn publish_snapshot(&self, snapshot: Snapshot) {

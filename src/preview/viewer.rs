@@ -5,6 +5,7 @@ use super::layer::Layer;
 use super::shared::{Seat, Shared};
 use axum::body::Bytes;
 use axum::extract::ws::{Message, WebSocket};
+use fechner_perception::eccentricity::Gaze;
 use fechner_perception::photometry::luminance;
 use std::sync::Arc;
 use tokio::sync::watch;
@@ -54,6 +55,11 @@ pub(super) async fn attend(mut socket: WebSocket, shared: Arc<Shared>) {
                         beside = layer.map(|layer| Look::at(&shared, layer));
                         None
                     }
+                    Ok(Command::Gaze { at }) => {
+                        let is_place = |at: &[f64; 2]| at.iter().all(|place| place.is_finite());
+                        shared.look_at(at.filter(is_place).map(|[x_px, y_px]| Gaze { x_px, y_px }));
+                        None
+                    }
                     Ok(Command::Inspect { x, y }) => inspected(&shared, x, y).map(|text| Message::Text(text.into())),
                     Ok(command) => {
                         shared.send(command);
@@ -86,8 +92,9 @@ fn not_understood(error: &serde_json::Error) -> String {
 
 fn inspected(shared: &Shared, x: usize, y: usize) -> Option<String> {
     let snapshot = shared.snapshot()?;
-    let pixel = y.checked_mul(snapshot.width)?.checked_add(x)?;
-    let rgb_cd_m2 = *snapshot.rgb_cd_m2.get(pixel).filter(|_| x < snapshot.width)?;
+    let (column, row) = (x / snapshot.step, y / snapshot.step);
+    let pixel = row.checked_mul(snapshot.width)?.checked_add(column)?;
+    let rgb_cd_m2 = *snapshot.rgb_cd_m2.get(pixel).filter(|_| column < snapshot.width)?;
     let looked = snapshot.looked.as_ref();
     serde_json::to_string(&Inspected {
         kind: "inspected",

@@ -27,13 +27,20 @@ FECHNER = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "r
 SCENE = ROOT / "scenes/cornell-box.toml"
 # Large enough to be watched, and at an end in seconds.
 JOB = [str(SCENE), "--size", "96x96", "--visibility", "8"]
+# Something that moves, seen from so near that its margins are far from where one looks.
+MOVING_JOB = [str(ROOT / "scenes/rolling-ball.toml"), "--size", "80x40", "--visibility", "16", "--display", "near.toml", "--foveated"]
+NEAR_DISPLAY = """name = "near"
+pixels_per_degree = 5.0
+white_cd_m2 = 200.0
+black_cd_m2 = 0.2
+"""
 PATIENCE_S = 120
 
 
 @contextlib.contextmanager
-def preview(folder):
+def preview(folder, job):
     """The address of a preview, ended afterwards."""
-    command = [str(FECHNER), "view", *JOB]
+    command = [str(FECHNER), "view", *job]
     process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True)
     try:
         yield process, process.stdout.readline().strip()
@@ -77,6 +84,16 @@ class Page:
         """Where a share of the picture's width and height is on the page."""
         box = self.page.locator("#picture").bounding_box()
         return box["x"] + x * box["width"], box["y"] + y * box["height"]
+
+    def samples_at(self, x, y):
+        """Mean over some pixels around a place, asked for without a pointer there."""
+        counts = []
+        for place in range(-4, 5):
+            at = f"{x + place}, {y}"
+            self.page.evaluate(f"send({{ do: 'inspect', x: {x + place}, y: {y} }})")
+            self.until("a pixel", f"document.getElementById('at').textContent === {at!r}")
+            counts.append(self.number("count"))
+        return sum(counts) / len(counts)
 
     def until_stopped(self):
         self.until("a stop", "document.getElementById('phase').textContent.startsWith('Stopped')")
@@ -124,13 +141,14 @@ def steps(page, folder):
 
     yield "shows every layer"
     pictures = set()
-    for key in "123456789":
+    for key in "1234567890":
         legend = page.text("legend")
         page.page.keyboard.press(key)
         if key != "1":
             page.until(f"layer {key}", f"document.getElementById('legend').textContent !== {legend!r}")
         pictures.add(tuple(page.pixels()))
-    assert len(pictures) == 9, len(pictures)
+    assert len(pictures) == 10, len(pictures)
+    assert page.text("legend") == "nothing moves here", page.text("legend")
     page.page.keyboard.press("1")
 
     yield "sets a layer beside another, with a divider that moves"
@@ -168,10 +186,15 @@ def steps(page, folder):
     before = page.text("mean")
     page.page.mouse.move(*page.place(0.5, 0.5))
     page.page.mouse.down()
-    page.page.mouse.move(*page.place(0.7, 0.45), steps=8)
+    before_updates = page.page.evaluate("updates")
+    for step in range(20):
+        page.page.mouse.move(*page.place(0.5 + 0.01 * step, 0.5 - 0.002 * step))
+        page.page.wait_for_timeout(20)
+    page.until("what the camera sees on its way", f"updates >= {before_updates} + 3")
     page.page.mouse.up()
     page.until("a new picture", "!document.getElementById('phase').textContent.startsWith('Stopped')")
     page.until_stopped()
+    assert page.page.evaluate("document.getElementById('picture').width") == 96
     assert page.brightness() > 5
     page.page.click("#home")
     page.until("a new picture", "!document.getElementById('phase').textContent.startsWith('Stopped')")
@@ -196,13 +219,49 @@ def steps(page, folder):
     page.until_stopped()
 
 
+def steps_of_motion_and_gaze(page):
+    """The same for a scene that moves, whose viewer's pointer is his gaze."""
+    yield "shows what moves"
+    page.until("a picture", "document.getElementById('picture').width === 80")
+    page.page.keyboard.press("0")
+    page.until("motion", "document.getElementById('legend').textContent.includes('pixels in 1/24 s')")
+    grey = sum(page.pixels()[i : i + 3] == [127, 127, 127] for i in range(0, 80 * 40 * 4, 4 * 32))
+    assert grey < 100, "nothing moves"
+    page.page.keyboard.press("1")
+
+    yield "samples where one looks"
+    page.page.mouse.move(*page.place(0.5, 0.5))
+    page.page.mouse.move(*page.place(0.1, 0.6))
+    from_there = "document.getElementById('phase').textContent.includes('from there')"
+    page.until("a stop from there", from_there)
+    # Nobody has looked elsewhere since this new start.
+    page.page.evaluate("send({ do: 'restart' })")
+    page.until("a new start", "!document.getElementById('phase').textContent.startsWith('Stopped')")
+    page.until("a stop from there", from_there)
+    near, far = page.samples_at(8, 24), page.samples_at(72, 24)
+    page.page.mouse.move(2, 2)
+    page.until("a stop for anybody", "document.getElementById('phase').textContent.endsWith('at this target')")
+    assert page.samples_at(72, 24) > far, (near, far, page.samples_at(72, 24))
+
+
 def main():
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("--screenshot", type=pathlib.Path, help="where a picture of the page goes")
     arguments = arguments.parse_args()
     chromium = shutil.which("chromium") or sys.exit("there is no chromium here: apt-get install chromium")
-    with tempfile.TemporaryDirectory() as name, preview(name) as (process, address), sync_playwright() as playwright:
+    with tempfile.TemporaryDirectory() as name, sync_playwright() as playwright:
+        folder = pathlib.Path(name)
+        (folder / "near.toml").write_text(NEAR_DISPLAY)
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        visit(browser, folder, JOB, lambda page: steps(page, folder), arguments.screenshot)
+        visit(browser, folder, MOVING_JOB, steps_of_motion_and_gaze)
+        browser.close()
+    print("all steps hold")
+
+
+def visit(browser, folder, job, steps_of, screenshot=None):
+    """Opens a preview of a job and takes the steps; leaves the program at the first that does not hold."""
+    with preview(folder, job) as (process, address):
         tab = browser.new_page(viewport={"width": 1180, "height": 760})
         complaints = []
         tab.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
@@ -210,16 +269,15 @@ def main():
         tab.goto(address)
         step = "starts"
         try:
-            for step in steps(Page(tab), pathlib.Path(name)):
+            for step in steps_of(Page(tab)):
                 print(f"{step} ...", flush=True)
             assert not complaints, complaints
             assert process.poll() is None, "the server went down"
-            if arguments.screenshot:
-                tab.screenshot(path=arguments.screenshot)
+            if screenshot:
+                tab.screenshot(path=screenshot)
         except Exception as error:
             sys.exit(f"FAILED: {step}\n{error}\nthe console says: {complaints}")
-        browser.close()
-    print("all steps hold")
+        tab.close()
 
 
 main()

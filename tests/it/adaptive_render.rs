@@ -2,14 +2,16 @@
 
 use crate::support::{loop_settings, trace_settings};
 use fechner::adaptive::audit::audit;
-use fechner::adaptive::settings::Sampling;
+use fechner::adaptive::settings::{LoopSettings, Sampling};
+use fechner::adaptive::state::RenderState;
 use fechner::adaptive::statistics::picture_variance;
-use fechner::adaptive::{Quiet, Rendered, render};
+use fechner::adaptive::{Quiet, Rendered, render, run};
 use fechner::integrator::PathTracer;
 use fechner::scene::Scene;
 use fechner::scene::load::{LoadOptions, load};
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// What the scene file says.
 const NITS_PER_UNIT: f64 = 120.0;
@@ -147,6 +149,35 @@ fn a_preview_is_a_prefix_of_the_final_picture() {
     assert_eq!(preview.film, stopped.film);
 }
 
+/// A render whose looks and audits are broken off here and there, and which goes on from its state each time, ends with the
+/// same film: a preview's looks end when somebody wants another picture.
+#[test]
+fn looks_that_are_broken_off_change_nothing() {
+    let scene = Arc::new(cornell_box());
+    let settings = || loop_settings(scene.nits_per_unit, Sampling::Adaptive, 4.0, None);
+    let tracer = PathTracer::new(Arc::clone(&scene), trace_settings(160, 160, 5));
+    let undisturbed = render(&tracer, &settings(), &Quiet).expect("renders");
+    assert!(undisturbed.audit.is_some());
+    let questions = Arc::new(AtomicU32::new(0));
+    let asked = Arc::clone(&questions);
+    // Apart by numbers that no look's questions are a multiple of.
+    let is_outdated = move || [2, 5, 11, 18, 29, 37, 48].contains(&asked.fetch_add(1, Ordering::SeqCst));
+    let disturbed = LoopSettings { is_outdated: Some(Box::new(is_outdated)), ..settings() };
+    let mut state = RenderState::new(160, 160, &disturbed.limits);
+    let mut breaks = 0;
+    let last_look = loop {
+        let ended = run(&tracer, &disturbed, state, &Quiet).expect("renders");
+        state = ended.state;
+        match ended.last_look {
+            Some(last_look) => break last_look,
+            None => breaks += 1,
+        }
+    };
+    assert!(breaks >= 4, "{breaks} breaks in {} questions", questions.load(Ordering::SeqCst));
+    assert_eq!((state.film, state.plans), (undisturbed.film, undisturbed.plans));
+    assert_eq!(last_look.judgement.predicted, undisturbed.judgement.predicted);
+}
+
 /// Adaptive counts vary over the picture and the stop is met on 99.9 % of it.
 #[test]
 fn adaptive_sampling_adapts_and_stops() {
@@ -180,7 +211,9 @@ fn an_audit_finds_variance_that_is_too_low() {
     let tracer = PathTracer::new(Arc::new(scene), trace_settings(256, 192, 9));
     let mut rendered = render(&tracer, &settings, &Quiet).expect("renders");
     let audited = |rendered: &Rendered| {
-        audit(&tracer, &rendered.film, &rendered.judgement, &settings, 0).expect("large enough to audit")
+        audit(&tracer, &rendered.film, &rendered.judgement, &settings, 0)
+            .expect("never outdated")
+            .expect("large enough to audit")
     };
     let honest = audited(&rendered);
     println!("honest {honest:?}");

@@ -306,6 +306,47 @@ fn a_render_shows_itself_and_is_not_driven() {
     assert!(image::open(at.join("stopped.png")).is_ok());
 }
 
+/// A render whose tev is not there says so once and writes the same bytes; one whose tev is there sends it something.
+#[test]
+fn tev_changes_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let render_for = |address: &str, name: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_fechner"));
+        command.arg("render").arg(cornell_box()).args([
+            "--size",
+            "32x32",
+            "--visibility",
+            "8",
+            "--tev",
+            address,
+            "-o",
+            name,
+        ]);
+        let output = command.current_dir(at).output().expect("runs");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success(), "{said}");
+        (said, std::fs::read(at.join(name)).expect("written"))
+    };
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = listener.local_addr().expect("an address").to_string();
+    let tev = std::thread::spawn(move || {
+        let mut received = Vec::new();
+        listener.accept().expect("a caller").0.read_to_end(&mut received).expect("all of it");
+        received
+    });
+    let (said, there) = render_for(&address, "there.png");
+    assert!(!said.contains("warning"), "{said}");
+    let received = tev.join().expect("received");
+    // An empty picture is created first, then filled.
+    assert!(received.len() > 32 * 32 * 4 * 14 && received[4] == 4, "{} bytes", received.len());
+    // Nobody listens there any more.
+    let (said, gone) = render_for(&address, "gone.png");
+    assert_eq!(said.matches("warning: tev").count(), 1, "{said}");
+    let alone = rendered(at, &["--visibility", "8"], "alone.png");
+    assert!(there == alone && gone == alone, "tev changes the picture");
+}
+
 #[cfg(unix)]
 #[test]
 fn a_signal_ends_it_cleanly() {

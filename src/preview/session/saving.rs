@@ -1,7 +1,8 @@
 //! Pictures that a viewer asks for, written where fechner was started.
 
-use super::{SavedFormat, Session};
+use super::Session;
 use crate::adaptive::{LastLook, Rendered, StopReason};
+use crate::preview::command::SavedFormat;
 use std::path::PathBuf;
 
 impl Session<'_> {

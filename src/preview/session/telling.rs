@@ -24,17 +24,21 @@ impl Session<'_> {
         let operator = self.live.operator.as_ref().unwrap_or(&self.job.record.operator);
         let mut status = Status {
             phase: self.phase,
-            reason: self.last_look.as_ref().map(|look| in_words(look.stop_reason)),
-            width: state.film.width(),
-            height: state.film.height(),
+            reason: self.last_look.as_ref().map(|look| match look.stop_reason {
+                StopReason::Visibility if self.settings.gaze.is_some() => "nothing more can be seen from there",
+                reason => in_words(reason),
+            }),
+            width: self.tracer.settings().film_area().width,
+            height: self.tracer.settings().film_area().height,
             visible_share: self.last_look.as_ref().map(|look| visible_share(&look.judgement, target)),
             exposure: self.live.exposure.or(self.job.record.exposure_stops),
             distance: self.live.distance.unwrap_or(1.0),
             error: self.error.clone(),
             note: self.note.clone(),
+            is_foveated: self.gaze.is_some(),
             ..blank_status(&self.job.scene, &self.settings, operator, self.held.to_toml())
         };
-        count(&mut status, state, self.progress.as_ref());
+        count(&mut status, state, self.screen.total_samples, self.progress.as_ref());
         status
     }
 }
@@ -71,13 +75,19 @@ pub(in crate::preview) fn blank_status(
         camera,
         error: None,
         note: None,
+        is_foveated: false,
     }
 }
 
-/// Fills in what the samples so far say.
-pub(in crate::preview) fn count(status: &mut Status, state: &RenderState, progress: Option<&Progress>) {
-    let pixels = f64::from(state.film.width()) * f64::from(state.film.height());
-    status.total_samples = state.film.total_samples();
+/// Fills in what the samples so far say: `total_samples` at the last frame, as counting them takes as long as one.
+pub(in crate::preview) fn count(
+    status: &mut Status,
+    state: &RenderState,
+    total_samples: u64,
+    progress: Option<&Progress>,
+) {
+    let pixels = f64::from(status.width) * f64::from(status.height);
+    status.total_samples = total_samples;
     status.mean_samples = status.total_samples as f64 / pixels.max(1.0);
     status.seconds = state.seconds_total;
     status.samples_a_second = status.total_samples as f64 / state.seconds_total.max(1e-3);

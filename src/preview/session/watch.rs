@@ -1,5 +1,6 @@
 //! What the loop tells while it runs: frames and figures between batches, and the way out when somebody asks for something.
 
+use super::gaze::Follower;
 use super::pace::Pace;
 use super::telling::{count, publish};
 use crate::adaptive::judge::Judgement;
@@ -11,12 +12,18 @@ use crate::preview::command::Status;
 use crate::preview::screen::{Looked, Scenery, Screen};
 use crate::preview::shared::Shared;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Figures are told so often, also where frames are dear and seldom.
+const FIGURES_INTERVAL: Duration = Duration::from_millis(250);
 
 /// Shows the loop's film between batches, and leaves the loop when somebody asks for something.
 pub(super) struct Watch<'a> {
     pub(super) shared: &'a Shared,
     pub(super) settings: &'a LoopSettings,
     pub(super) draft: &'a Film,
+    /// Where the gaze counts.
+    pub(super) follower: Option<&'a Follower>,
     pub(super) moving: Mutex<Moving<'a>>,
 }
 
@@ -26,16 +33,28 @@ pub(super) struct Moving<'a> {
     pub(super) pace: &'a mut Pace,
     pub(super) progress: &'a mut Option<Progress>,
     pub(super) status: Status,
+    /// Samples since the last frame.
+    pub(super) samples_since: u64,
+    /// When figures were told last.
+    pub(super) told: Instant,
 }
 
 impl Watch<'_> {
+    fn tell(&self, moving: &mut Moving<'_>, state: &RenderState) {
+        let total_samples = moving.screen.total_samples + moving.samples_since;
+        count(&mut moving.status, state, total_samples, moving.progress.as_ref());
+        publish(&moving.status, self.shared);
+        moving.told = Instant::now();
+    }
+
     fn show(&self, moving: &mut Moving<'_>, state: &RenderState) {
         let tone = state.tone.as_ref();
         let Self { draft, settings, .. } = *self;
-        moving.screen.show(Scenery { film: &state.film, draft, tone, settings, is_at_rest: false }, self.shared);
+        let film = &state.film;
+        moving.screen.show(Scenery { film, draft, tone, settings, is_at_rest: false, step: 1 }, self.shared);
         moving.status.note = None;
-        count(&mut moving.status, state, moving.progress.as_ref());
-        publish(&moving.status, self.shared);
+        moving.samples_since = 0;
+        self.tell(moving, state);
     }
 }
 
@@ -52,7 +71,9 @@ impl Monitor for Watch<'_> {
     }
 
     fn samples_done(&self, samples: u64) {
-        self.moving.lock().unwrap_or_else(PoisonError::into_inner).pace.count(samples);
+        let mut moving = self.moving.lock().unwrap_or_else(PoisonError::into_inner);
+        moving.pace.count(samples);
+        moving.samples_since += samples;
     }
 
     fn most_samples_a_batch(&self) -> u64 {
@@ -64,8 +85,14 @@ impl Monitor for Watch<'_> {
         moving.pace.counted();
         if moving.screen.is_due() {
             self.show(&mut moving, state);
+        } else if moving.told.elapsed() >= FIGURES_INTERVAL {
+            self.tell(&mut moving, state);
         }
         moving.pace.begin();
-        if self.shared.has_news() { Directive::Leave } else { Directive::GoOn }
+        if self.shared.has_news() || self.follower.is_some_and(|follower| follower.is_due(self.shared)) {
+            Directive::Leave
+        } else {
+            Directive::GoOn
+        }
     }
 }

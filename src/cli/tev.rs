@@ -1,0 +1,91 @@
+//! `--tev`: the picture and its layers in tev while they are made.
+
+use anyhow::Context;
+use clap::Args;
+use fechner::adaptive::judge::Judgement;
+use fechner::adaptive::state::RenderState;
+use fechner::preview::{Looked, Shown, TEV_PORT, Tev};
+use std::net::{SocketAddr, ToSocketAddrs};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Where tev listens.
+#[derive(Clone, Debug, Args)]
+pub(super) struct TevArguments {
+    /// Send the picture and its layers to a running tev, about once a second; the port is tev's own if none is named.
+    #[arg(long, value_name = "HOST:PORT", value_parser = parse_addresses, help_heading = "Running")]
+    tev: Option<Addresses>,
+}
+
+#[derive(Clone, Debug)]
+struct Addresses(Vec<SocketAddr>);
+
+fn parse_addresses(text: &str) -> Result<Addresses, String> {
+    let resolve = || if text.contains(':') { text.to_socket_addrs() } else { (text, TEV_PORT).to_socket_addrs() };
+    match resolve() {
+        Ok(found) => Ok(Addresses(found.collect())),
+        Err(error) => {
+            Err(format!("\"{text}\" is no address ({error}); expected HOST:PORT, such as localhost:{TEV_PORT}"))
+        }
+    }
+}
+
+impl TevArguments {
+    /// The tev that is asked for; `scene` is what it lists.
+    pub(super) fn open(&self, scene: &str) -> anyhow::Result<Option<Tev>> {
+        let warn = |warning: &str| eprintln!("warning: {warning}");
+        let open = |Addresses(addresses): &Addresses| Tev::new(addresses.clone(), format!("fechner: {scene}"), warn);
+        self.tev.as_ref().map(open).transpose().context("the thread for tev could not be started")
+    }
+}
+
+/// A render whose states tev is shown.
+pub(super) struct Showing {
+    nits_per_unit: f64,
+    moving: Mutex<Moving>,
+}
+
+struct Moving {
+    tev: Tev,
+    looked: Option<Looked>,
+}
+
+impl Showing {
+    pub(super) fn new(tev: Tev, nits_per_unit: f64) -> Self {
+        Self { nits_per_unit, moving: Mutex::new(Moving { tev, looked: None }) }
+    }
+
+    fn moving(&self) -> MutexGuard<'_, Moving> {
+        self.moving.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// After each look.
+    pub(super) fn judged(&self, judgement: &Judgement) {
+        self.moving().looked = Some(Looked::of(judgement));
+    }
+
+    /// Between batches.
+    pub(super) fn between_batches(&self, state: &RenderState) {
+        let mut moving = self.moving();
+        if moving.tev.is_due() {
+            self.show(&mut moving, state, false);
+        }
+    }
+
+    /// At the end.
+    pub(super) fn ended(&self, state: &RenderState) {
+        self.show(&mut self.moving(), state, true);
+    }
+
+    fn show(&self, moving: &mut Moving, state: &RenderState, is_at_rest: bool) {
+        let Moving { tev, looked } = moving;
+        let (film, nits_per_unit) = (&state.film, self.nits_per_unit);
+        let raw = || {
+            let pixels = film.width() as usize * film.height() as usize;
+            (0..pixels).map(|pixel| film.rgb_cd_m2(pixel, nits_per_unit)).collect()
+        };
+        // Denoised pictures are made by looks; between two the last one stays.
+        let rgb_cd_m2: Vec<[f32; 3]> = looked.as_ref().and_then(|looked| looked.denoised.clone()).unwrap_or_else(raw);
+        let looked = looked.as_ref();
+        tev.offer(&Shown { film, rgb_cd_m2: &rgb_cd_m2, step: 1, looked, nits_per_unit, is_at_rest });
+    }
+}

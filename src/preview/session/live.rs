@@ -1,0 +1,57 @@
+//! What viewers change while a picture is made, and the settings that come of it.
+
+use crate::adaptive::settings::{Limits, LoopSettings};
+use crate::preview::Job;
+use fechner_perception::display::{Display, Observer, Viewing};
+use fechner_perception::eccentricity::Gaze;
+
+/// What viewers changed, in place of what the job says.
+#[derive(Clone, Default)]
+pub(super) struct Live {
+    pub(super) exposure: Option<f64>,
+    pub(super) operator: Option<String>,
+    /// A preset's name.
+    pub(super) display: Option<String>,
+    /// In distances that the display is made for.
+    pub(super) distance: Option<f64>,
+    pub(super) visibility: Option<f64>,
+    /// Where somebody looks.
+    pub(super) gaze: Option<Gaze>,
+}
+
+/// What a change of settings asks for.
+#[derive(Clone, Copy)]
+pub(super) enum Changed {
+    /// What the eye is shown, and with it every threshold.
+    Seen,
+    /// When to stop.
+    Target,
+    /// Where somebody looks: the picture is shown as before.
+    Gaze,
+}
+
+/// The loop's settings for a job that viewers changed.
+///
+/// # Errors
+/// In words for the user, about the change that cannot be.
+pub(super) fn settings_of(job: &Job, live: &Live) -> Result<LoopSettings, String> {
+    let mut record = job.record.clone();
+    record.exposure_stops = live.exposure.or(record.exposure_stops);
+    record.operator = live.operator.clone().unwrap_or(record.operator);
+    if let Some(name) = &live.display {
+        let display = Display::preset(name).ok_or_else(|| format!("there is no display \"{name}\""))?;
+        let Observer { sensitivity, glare, .. } = record.viewing.observer;
+        record.viewing = Viewing::of(display);
+        record.viewing.observer = Observer { sensitivity, glare, ..record.viewing.observer };
+    }
+    // So many times as far, a pixel looks so many times as small.
+    record.viewing.display.pixels_per_degree *= live.distance.unwrap_or(1.0);
+    record.viewing.check().map_err(|error| error.to_string())?;
+    let visibility = live.visibility.unwrap_or(job.limits.visibility);
+    if visibility.is_nan() || visibility < 0.0 || record.exposure_stops.is_some_and(|stops| !stops.is_finite()) {
+        return Err("visibility must be above 0 and exposure a number".to_owned());
+    }
+    let limits = Limits { visibility, ..job.limits };
+    let settings = record.loop_settings(limits).map_err(|error| error.to_string())?;
+    Ok(LoopSettings { importance: job.importance.clone(), gaze: live.gaze, ..settings })
+}

@@ -1,0 +1,179 @@
+//! What viewers ask for, done.
+
+use super::live::{Changed, Live, settings_of};
+use super::{Session, interruptible};
+use crate::adaptive::state::RenderState;
+use crate::adaptive::{LastLook, StopReason};
+use crate::film::Film;
+use crate::integrator::{Crop, PathTracer};
+use crate::preview::command::{Command, Phase};
+use crate::preview::orbit::Held;
+use std::sync::Arc;
+use std::time::Instant;
+
+impl Session<'_> {
+    pub(super) fn obey(&mut self, command: Command) {
+        self.note = None;
+        if self.phase == Phase::Moving && !command.suits_motion() {
+            self.restart();
+        }
+        match command {
+            Command::Layer { .. } | Command::Beside { .. } | Command::Inspect { .. } | Command::Gaze { .. } => {}
+            Command::Redraw => self.show(),
+            Command::Pause if matches!(self.phase, Phase::Rendering | Phase::Drafting) => {
+                self.phase = Phase::Paused;
+                self.show();
+            }
+            Command::Resume if matches!(self.phase, Phase::Paused | Phase::Stopped) => self.go_on(),
+            Command::Stop if self.phase != Phase::Stopped => {
+                if let Some(judgement) = self.look() {
+                    self.stopped(LastLook { judgement, stop_reason: StopReason::Interrupted });
+                }
+            }
+            Command::Pause | Command::Resume | Command::Stop => {}
+            Command::Restart => self.restart(),
+            Command::Save { format } => self.save(format),
+            Command::Exposure { stops } => self.change(|live| live.exposure = stops, Changed::Seen),
+            Command::Operator { name } => self.change(|live| live.operator = Some(name), Changed::Seen),
+            Command::Display { name } => self.change(|live| live.display = Some(name), Changed::Seen),
+            Command::Distance { factor } => self.change(|live| live.distance = Some(factor), Changed::Seen),
+            Command::Visibility { target } => self.change(|live| live.visibility = Some(target), Changed::Target),
+            Command::Camera { movement } => {
+                self.find_pivot();
+                self.held.moved(movement);
+                self.has_moved();
+            }
+            Command::Focus { x, y } => self.focus_on(x, y),
+            Command::CameraHome => {
+                self.held = Held::at_home(&self.job.scene.camera);
+                self.has_moved();
+            }
+            Command::Reload => self.reload(),
+        }
+    }
+
+    fn has_moved(&mut self) {
+        self.has_moved = true;
+        self.moved_at = Some(Instant::now());
+    }
+
+    fn go_on(&mut self) {
+        self.last_look = None;
+        self.phase = if self.draft_left.blocks.is_empty() { Phase::Rendering } else { Phase::Drafting };
+    }
+
+    /// Looks where the pointer is, if it is time.
+    pub(super) fn follow_gaze(&mut self) {
+        let is_waiting = matches!(self.phase, Phase::Moving | Phase::Drafting | Phase::Paused);
+        let Some(follower) = self.gaze.as_mut().filter(|follower| !is_waiting && follower.is_due(self.shared)) else {
+            return;
+        };
+        let gaze = follower.follow(self.shared, self.settings.viewing.display.pixels_per_degree);
+        self.change(|live| live.gaze = gaze, Changed::Gaze);
+        if self.phase == Phase::Stopped {
+            self.go_on();
+        }
+    }
+
+    /// Other settings for the samples that there are.
+    fn change(&mut self, edit: impl FnOnce(&mut Live), changed: Changed) {
+        let before = self.live.clone();
+        edit(&mut self.live);
+        match settings_of(&self.job, &self.live) {
+            Err(problem) => {
+                self.live = before;
+                self.error = Some(problem);
+            }
+            Ok(settings) => {
+                self.settings = interruptible(settings, self.shared);
+                self.error = None;
+                self.adopt(changed);
+            }
+        }
+    }
+
+    fn adopt(&mut self, changed: Changed) {
+        let has_pilot = self.state.plans > 0;
+        match changed {
+            Changed::Target if has_pilot => {
+                self.state.pending.clear();
+                self.state.traced_blocks = 0;
+            }
+            Changed::Target => {}
+            Changed::Gaze => {
+                let tone = self.state.tone.take();
+                let limits = &self.settings.limits;
+                let state = std::mem::replace(&mut self.state, RenderState::new(0, 0, limits));
+                self.state = RenderState { tone, ..state.begun_anew(limits) };
+                self.order_pilot();
+                return;
+            }
+            Changed::Seen => {
+                let limits = &self.settings.limits;
+                let state = std::mem::replace(&mut self.state, RenderState::new(0, 0, limits));
+                self.state = state.begun_anew(limits);
+                self.order_pilot();
+                self.screen.looked = None;
+            }
+        }
+        if self.phase == Phase::Stopped {
+            if let Some(judgement) = self.look() {
+                let stop_reason = self.last_look.as_ref().map_or(StopReason::Interrupted, |look| look.stop_reason);
+                self.stopped(LastLook { judgement, stop_reason });
+            }
+        } else {
+            self.show();
+        }
+    }
+
+    /// The camera turns about what stands in the middle of the picture, and about the same as long as it moves.
+    fn find_pivot(&mut self) {
+        let Crop { width, height, .. } = self.job.trace.film_area();
+        let is_in_motion = self.phase == Phase::Moving && self.moved_at.is_some();
+        if let Some(depth) = self.depth_at(width as usize / 2, height as usize / 2).filter(|_| !is_in_motion) {
+            self.held.pivot_distance = depth;
+        }
+    }
+
+    /// Distance of what a pixel shows, from whichever film has it; none where nothing is or the picture is of another camera.
+    fn depth_at(&self, x: usize, y: usize) -> Option<f32> {
+        let in_film = |film: &Film, step: usize| {
+            let (column, row, width) = (x / step, y / step, film.width() as usize);
+            let pixel = row.checked_mul(width)?.checked_add(column).filter(|_| column < width)?;
+            film.guides().get(pixel).map(|guide| guide.depth).filter(|depth| depth.is_normal())
+        };
+        let in_glimpse = || self.glimpse.as_ref().and_then(|glimpse| in_film(&glimpse.film, glimpse.step as usize));
+        let found = in_film(&self.state.film, 1).or_else(|| in_film(&self.draft, 1)).or_else(in_glimpse);
+        found.filter(|_| !self.has_moved)
+    }
+
+    fn focus_on(&mut self, x: usize, y: usize) {
+        match self.depth_at(x, y) {
+            None => self.note = Some("nothing to focus on there".to_owned()),
+            Some(depth) => {
+                self.held.camera.focus_distance = depth;
+                if self.held.camera.aperture_radius > 0.0 {
+                    self.has_moved();
+                } else {
+                    self.note = Some("in focus, but the lens has no width: A widens it".to_owned());
+                }
+            }
+        }
+    }
+
+    fn reload(&mut self) {
+        let loaded = self.host.load().and_then(|job| settings_of(&job, &self.live).map(|settings| (job, settings)));
+        match loaded {
+            Err(problem) => self.error = Some(problem),
+            Ok((job, settings)) => {
+                self.tracer = PathTracer::new(Arc::clone(&job.scene), job.trace);
+                self.held = Held::at_home(&job.scene.camera);
+                (self.job, self.settings) = (job, interruptible(settings, self.shared));
+                self.neighbours = None;
+                self.error = None;
+                self.note = Some("the scene was loaded again".to_owned());
+                self.restart();
+            }
+        }
+    }
+}
