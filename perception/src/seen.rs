@@ -54,9 +54,16 @@ pub fn display_variance(fitted: &dyn FittedTone, display: &Display, mean: &Plane
 pub fn display_chromatic_variance(fitted: &dyn FittedTone, display: &Display, mean: &Plane, variance: &Plane) -> Plane {
     let shown = Shown { fitted, display };
     by_pixel(mean, variance, f32::INFINITY, |pixel, mean, variance| {
-        let luminance = mean.max(1e-6);
-        let slope = (shown.cd_m2(pixel, luminance) - shown.cd_m2(pixel, 0.0)) / luminance;
-        slope * slope * variance.max(0.0)
+        shown.chromatic_slope(pixel, mean).powi(2) * variance.max(0.0)
+    })
+}
+
+/// How much a chromatic signal as displayed is of that of the scene: see [`display_chromatic_variance`].
+#[must_use]
+pub fn display_chromatic_slope(fitted: &dyn FittedTone, display: &Display, scene_luminance: &Plane) -> Plane {
+    let shown = Shown { fitted, display };
+    Plane::from_fn(scene_luminance.width(), scene_luminance.height(), |x, y| {
+        shown.chromatic_slope(Pixel { x, y }, scene_luminance.get(x, y))
     })
 }
 
@@ -105,6 +112,11 @@ impl Shown<'_> {
     fn cd_m2(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
         let relative = self.fitted.relative_luminance_at(pixel, scene_cd_m2.max(0.0));
         self.display.luminance_cd_m2(f64::from(relative)) as f32
+    }
+
+    fn chromatic_slope(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
+        let luminance = scene_cd_m2.max(1e-6);
+        (self.cd_m2(pixel, luminance) - self.cd_m2(pixel, 0.0)) / luminance
     }
 
     fn variance(&self, pixel: Pixel, mean: f64, variance: f64) -> f32 {

@@ -9,11 +9,13 @@ use crate::film::{Estimate, Film, opponent};
 use crate::integrator::SamplePlan;
 use crate::sampler::Half;
 use fechner_perception::Plane;
+use fechner_perception::csf::{CastleChromatic, ChromaticChannel};
 use fechner_perception::denoised::{DenoisedDifferences, DenoisedError, blended};
 use fechner_perception::photometry::luminance;
 use fechner_perception::seen;
-use fechner_perception::threshold::ThresholdMap;
+use fechner_perception::threshold::{ThresholdMap, chromatic_threshold_map};
 use fechner_perception::tone::FittedTone;
+use rayon::prelude::*;
 use std::time::Instant;
 
 /// A denoised picture, judged.
@@ -52,7 +54,7 @@ impl TimedDenoising {
         tone: &dyn FittedTone,
         thresholds: &ThresholdMap,
         estimate: &Estimate,
-    ) -> DenoisedPicture {
+    ) -> Result<DenoisedPicture, JudgeError> {
         let width = film.width() as usize;
         let display = &settings.viewing.display;
         let [a, b] = self.film.halves_rgb_cd_m2.each_ref().map(|half| luminance_plane(half, width));
@@ -71,9 +73,53 @@ impl TimedDenoising {
             residual: &shown(&residual),
             residual_half_difference: &shown(&residual_half_difference),
         });
+        let chromatic = self.chromatic_errors(film, settings, tone, estimate)?;
         let rgb_cd_m2 = blended_rgb(thresholds, &error, self.film.rgb_cd_m2, &estimate.rgb_cd_m2);
         let luminance_cd_m2 = luminance_plane(&rgb_cd_m2, width);
-        DenoisedPicture { rgb_cd_m2, luminance_cd_m2, half_difference: displayed, error }
+        let error = chromatic.iter().fold(error, DenoisedError::with_channel);
+        Ok(DenoisedPicture { rgb_cd_m2, luminance_cd_m2, half_difference: displayed, error })
+    }
+
+    /// What can be seen of the error in both chromatic channels; nothing by a model of luminance alone.
+    fn chromatic_errors(
+        &self,
+        film: &Film,
+        settings: &LoopSettings,
+        tone: &dyn FittedTone,
+        estimate: &Estimate,
+    ) -> Result<Vec<DenoisedError>, JudgeError> {
+        if settings.model.is_some() {
+            return Ok(Vec::new());
+        }
+        let display = &settings.viewing.display;
+        let displayed = seen::display_luminance(tone, display, &self.luminance);
+        let slope = seen::display_chromatic_slope(tone, display, &self.luminance);
+        let width = film.width() as usize;
+        let half_of = |[a, b]: [Plane; 2]| a.combined(&b, |a, b| 0.5 * (a - b));
+        let of_channel = |(c, channel)| {
+            let shown = |signal: &(dyn Fn(usize) -> f64 + Sync)| {
+                Plane::from_fn(width, slope.height(), |x, y| (signal(y * width + x) as f32) * slope.get(x, y))
+            };
+            let of_rgb = |rgb: &[[f32; 3]]| shown(&|pixel| opponent(rgb[pixel].map(f64::from))[c]);
+            let of_raw_half =
+                |half: Half| shown(&|pixel| settings.nits_per_unit * opponent(film.half_or_other(half, pixel).mean)[c]);
+            let picture = of_rgb(&self.film.rgb_cd_m2);
+            let csf = CastleChromatic::new(channel, settings.viewing.observer.csf_area_deg2)?;
+            let thresholds = chromatic_threshold_map(&picture, &displayed, &settings.viewing, &csf)?;
+            let half_difference = half_of(self.film.halves_rgb_cd_m2.each_ref().map(|half| of_rgb(half)));
+            let raw_half_difference = half_of(Half::BOTH.map(of_raw_half));
+            let error = thresholds.denoised_error(&DenoisedDifferences {
+                half_difference: &half_difference,
+                residual: &picture.combined(&of_rgb(&estimate.rgb_cd_m2), |denoised, raw| denoised - raw),
+                residual_half_difference: &half_difference
+                    .combined(&raw_half_difference, |denoised, raw| denoised - raw),
+            });
+            Ok(match settings.frames {
+                None => error,
+                Some(timing) => error.scaled(timing.chromatic_energy(channel)?.sqrt()),
+            })
+        };
+        [(1, ChromaticChannel::RedGreen), (2, ChromaticChannel::YellowViolet)].into_par_iter().map(of_channel).collect()
     }
 }
 

@@ -130,7 +130,10 @@ pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Jud
     still_wanted(settings)?;
     let variance_per_sample = [per_sample(&variance_of_a), per_sample(&variance_of_b)];
     let seconds_denoising = denoised.as_ref().map_or(0.0, |found| found.seconds);
-    let denoised = denoised.map(|found| found.judged(film, settings, tone.as_ref(), &thresholds, &estimate));
+    let denoised = match denoised {
+        Some(found) => Some(found.judged(film, settings, tone.as_ref(), &thresholds, &estimate)?),
+        None => None,
+    };
     still_wanted(settings)?;
     let mut judgement = Judgement {
         estimate,
@@ -306,6 +309,7 @@ pub fn variance_share(film: &Film, pixel: usize) -> f64 {
 mod tests {
     use super::*;
     use crate::adaptive::test_films::{film_of, settings};
+    use crate::denoise::Denoiser;
     use glam::Vec3;
 
     /// Noise that leaves luminance alone is seen by its colour: no stop at the pilot.
@@ -320,6 +324,18 @@ mod tests {
         let of_luminance = LoopSettings { model: fechner_perception::model::by_name("tvi"), ..settings() };
         let blind = judge(&film, &of_luminance, 1.0).expect("judges");
         assert!(blind.predicted.get(32, 32) < 0.01, "a model of luminance sees {}", blind.predicted.get(32, 32));
+    }
+
+    /// Nor does a denoiser hide it: what it leaves of colour's noise and smears of its patterns counts.
+    #[test]
+    fn isoluminant_noise_is_seen_in_denoised_pictures() {
+        let red_for_green = Vec3::new(1.0, -0.2126 / 0.7152, 0.0);
+        let film = film_of(|_, random| Vec3::splat(0.8) + 0.7 * random * red_for_green);
+        let denoised = || LoopSettings { denoiser: Some(Denoiser::Builtin), ..settings() };
+        let seen = judge(&film, &denoised(), 1.0).expect("judges").predicted;
+        let of_luminance = LoopSettings { model: fechner_perception::model::by_name("tvi"), ..denoised() };
+        let blind = judge(&film, &of_luminance, 1.0).expect("judges").predicted;
+        assert!(seen.get(32, 32) > 10.0 * blind.get(32, 32), "{} and {}", seen.get(32, 32), blind.get(32, 32));
     }
 
     /// What the display clips is not pooled into dark neighbours: a lamp that scatters by a thousand times white.

@@ -64,6 +64,30 @@ const NOTICED: f32 = 1.645;
 pub const VISIBLY_WRONG: f32 = 1.5;
 
 impl DenoisedError {
+    /// This error with another channel's beside it: the channel that shows most counts at every pixel. Factors and shares stay this
+    /// one's; what the other's becomes by their blend is not looked at.
+    #[must_use]
+    pub fn with_channel(mut self, other: &Self) -> Self {
+        let most = |own: &mut Plane, other: &Plane| *own = own.combined(other, f32::max);
+        most(&mut self.visibility, &other.visibility);
+        most(&mut self.variance, &other.variance);
+        most(&mut self.bias, &other.bias);
+        most(&mut self.bias_squared_standard_error, &other.bias_squared_standard_error);
+        most(&mut self.blended_visibility, &other.visibility);
+        self
+    }
+
+    /// The same error seen `factor` times as well.
+    #[must_use]
+    pub fn scaled(mut self, factor: f64) -> Self {
+        let scale = |plane: &mut Plane, factor: f64| *plane = plane.map(|value| factor as f32 * value);
+        for plane in [&mut self.visibility, &mut self.variance, &mut self.bias, &mut self.blended_visibility] {
+            scale(plane, factor);
+        }
+        scale(&mut self.bias_squared_standard_error, factor * factor);
+        self
+    }
+
     /// 1 where `visibility` is at most `target` and yet nothing proves that bias keeps the picture below
     /// [`VISIBLY_WRONG`] × `target`: raw noise is too strong to testify. 0 elsewhere.
     #[must_use]
