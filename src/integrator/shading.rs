@@ -2,6 +2,7 @@
 
 use super::PathTracer;
 use super::media::{Media, Medium};
+use super::relief;
 use super::tables::{SurfaceTables, slope_width};
 use crate::bsdf::{
     self, Bsdf, CoatedDiffuse, Conductor, Dielectric, HeTorrance, MetalRoughnessParameters, Microfacets, Phong,
@@ -10,7 +11,7 @@ use crate::bsdf::{
 use crate::geometry::SurfacePoint;
 use crate::geometry::surface::Frame;
 use crate::light::LightReceiver;
-use crate::scene::{ColorInput, Material, MaterialId, MetalRoughness, Roughness, ScalarInput, Surface, Texture};
+use crate::scene::{ColorInput, MaterialId, MetalRoughness, Roughness, ScalarInput, Surface, Texture};
 use glam::{Vec2, Vec3};
 use std::cell::{Cell, OnceCell};
 
@@ -203,12 +204,18 @@ impl Shading<'_> {
 }
 
 impl PathTracer {
-    /// The BSDF at a point seen from the direction `wo` (world, unit, away from the surface).
-    pub(super) fn shading<'a>(&'a self, point: &SurfacePoint, wo: Vec3, components: &'a Components<'a>) -> Shading<'a> {
+    /// The BSDF at a point seen from the direction `wo` (world, unit, away from the surface) at a share of the open shutter.
+    pub(super) fn shading<'a>(
+        &'a self,
+        point: &SurfacePoint,
+        wo: Vec3,
+        time: f32,
+        components: &'a Components<'a>,
+    ) -> Shading<'a> {
         let scene = self.world.scene();
         let material_id = self.world.material_of(point.object).0 as usize;
         let material = &scene.materials[material_id];
-        let normal = seen_side(self.shading_normal(material, point), point.geometric_normal, wo);
+        let normal = seen_side(relief::shading_normal(&self.world, material, point, time), point.geometric_normal, wo);
         let reader = Reader { textures: &scene.textures, uv: point.uv, vertex_color: point.color };
         let transmits = match &material.surface {
             Surface::MetalRoughness(model) => model.transmission.factor > 0.0,
@@ -225,20 +232,6 @@ impl PathTracer {
             transmits,
             medium: if self.absorbs { Medium::behind(MaterialId(material_id as u32), &material.surface) } else { None },
         }
-    }
-
-    fn shading_normal(&self, material: &Material, point: &SurfacePoint) -> Vec3 {
-        let Some((lookup, strength)) = &material.normal_map else {
-            return point.shading_normal;
-        };
-        let scene = self.world.scene();
-        let texel = scene.textures[lookup.texture.0 as usize].sample_rgba(lookup.transform(point.uv));
-        let mut mapped = texel.truncate() * 2.0 - 1.0;
-        mapped.x *= strength;
-        mapped.y *= strength;
-        let frame = Frame::new(point.shading_normal, point.tangent);
-        let local = Vec3::new(mapped.x, mapped.y * point.handedness, mapped.z);
-        frame.to_world(local).normalize_or(point.shading_normal)
     }
 }
 

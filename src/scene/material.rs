@@ -1,6 +1,6 @@
 //! Materials: how a surface scatters, emits and covers, and what a renderer asks of them besides values at a point.
 
-use super::{ColorInput, ScalarInput, Surface, Texels, Texture, TextureLookup};
+use super::{ColorInput, Relief, ScalarInput, Surface, Texture};
 use glam::{Vec2, Vec3};
 
 /// How a surface looks.
@@ -14,8 +14,8 @@ pub struct Material {
     pub emission: ColorInput,
     /// Whether it emits from its back side too.
     pub emits_both_sides: bool,
-    /// Tangent-space normal map and the strength of its x and y.
-    pub normal_map: Option<(TextureLookup, f32)>,
+    /// Where the shading normal differs from the mesh's.
+    pub relief: Option<Relief>,
     /// Coverage; what it cuts away is not there at all.
     pub alpha: Alpha,
 }
@@ -47,14 +47,14 @@ impl Material {
             surface,
             emission: ColorInput::constant(Vec3::ZERO),
             emits_both_sides: false,
-            normal_map: None,
+            relief: None,
             alpha: Alpha::Opaque,
         }
     }
 
     /// Whether shading needs to know along which way texture coordinates grow.
     pub fn needs_tangent(&self) -> bool {
-        self.normal_map.is_some() || self.surface.is_anisotropic()
+        matches!(self.relief, Some(Relief::Normals { .. })) || self.surface.is_anisotropic()
     }
 
     /// Mean emitted radiance over the texture's square, in scene units; `None` where nothing is emitted.
@@ -64,7 +64,7 @@ impl Material {
         }
         let mean = match &self.emission.texture {
             None => self.emission.factor,
-            Some(lookup) => self.emission.factor * mean_color(&textures[lookup.texture.0 as usize]),
+            Some(lookup) => self.emission.factor * textures[lookup.texture.0 as usize].mean_color(),
         };
         (mean.max_element() > 0.0).then_some(mean)
     }
@@ -79,23 +79,4 @@ impl Alpha {
             Self::Blend { value } => value.evaluate(textures, uv).clamp(0.0, 1.0),
         }
     }
-}
-
-/// Mean linear colour of a texture.
-fn mean_color(texture: &Texture) -> Vec3 {
-    let (width, height) = (texture.width as usize, texture.height as usize);
-    if let Texels::Floats(texels) = &texture.texels {
-        let sum: glam::DVec3 = texels.iter().map(|t| Vec3::new(t[0], t[1], t[2]).as_dvec3()).sum();
-        return (sum / texels.len().max(1) as f64).as_vec3();
-    }
-    // At most 256 × 256 places: a mean for choosing lights, not for shading.
-    let (columns, rows) = (width.min(256), height.min(256));
-    let mut sum = glam::DVec3::ZERO;
-    for y in 0..rows {
-        for x in 0..columns {
-            let uv = Vec2::new((x as f32 + 0.5) / columns as f32, (y as f32 + 0.5) / rows as f32);
-            sum += texture.sample_rgba(uv).truncate().as_dvec3();
-        }
-    }
-    (sum / (columns * rows) as f64).as_vec3()
 }

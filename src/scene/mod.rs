@@ -8,6 +8,7 @@ mod environment;
 mod light;
 mod material;
 mod motion;
+mod relief;
 mod surface;
 
 pub mod hash;
@@ -19,6 +20,7 @@ pub use environment::{Environment, Parametrisation};
 pub use light::{Light, SpotFalloff};
 pub use material::{Alpha, Material};
 pub use motion::{Motion, MotionKey, Pose};
+pub use relief::{HeightMap, HeightUnit, Relief};
 pub use surface::{Distribution, MetalRoughness, Roughness, RoughnessScale, Surface};
 
 use glam::{Affine3A, Vec2, Vec3, Vec3A, Vec4};

@@ -80,6 +80,24 @@ impl Texture {
         }
     }
 
+    /// Mean linear colour: of all texels if they are floats, else of at most 256 × 256 places. For choosing lights and telling
+    /// pictures apart, not for shading.
+    pub fn mean_color(&self) -> Vec3 {
+        if let Texels::Floats(texels) = &self.texels {
+            let sum: glam::DVec3 = texels.iter().map(|t| Vec3::new(t[0], t[1], t[2]).as_dvec3()).sum();
+            return (sum / texels.len().max(1) as f64).as_vec3();
+        }
+        let (columns, rows) = (self.width.min(256), self.height.min(256));
+        let mut sum = glam::DVec3::ZERO;
+        for y in 0..rows {
+            for x in 0..columns {
+                let uv = Vec2::new((x as f32 + 0.5) / columns as f32, (y as f32 + 0.5) / rows as f32);
+                sum += self.sample_rgba(uv).truncate().as_dvec3();
+            }
+        }
+        (sum / f64::from(columns * rows)).as_vec3()
+    }
+
     /// One texel as linear RGBA; both indices in range.
     fn texel(&self, column: i64, row: i64) -> Vec4 {
         let index = row as usize * self.width as usize + column as usize;

@@ -20,6 +20,7 @@
 //! hostile or oversized files end in a [`LoadError`] of one line; none panics or takes memory out of proportion.
 
 mod builder;
+mod bump;
 mod default_view;
 pub mod environment;
 mod error;

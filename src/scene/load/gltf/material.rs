@@ -5,7 +5,8 @@ use super::super::error::LoadError;
 use super::super::texture::{Adjust, IfMissing, Picture, Request};
 use super::buffers::{Buffers, Uri, resolve};
 use crate::scene::{
-    Alpha, ColorInput, Encoding, Material, MaterialId, MetalRoughness, ScalarInput, Surface, TextureLookup, Wrap,
+    Alpha, ColorInput, Encoding, Material, MaterialId, MetalRoughness, Relief, ScalarInput, Surface, TextureLookup,
+    Wrap,
 };
 use glam::{Vec2, Vec3};
 use gltf::texture::{MagFilter, WrappingMode};
@@ -96,7 +97,7 @@ impl<'a> Materials<'a> {
         } else {
             ColorInput { factor, texture: self.optional(builder, from.emissive_texture().as_ref(), Encoding::Srgb)? }
         };
-        let normal_map = match from.normal_texture() {
+        let relief = match from.normal_texture() {
             None => None,
             Some(normal) => {
                 if normal.tex_coord() != 0 {
@@ -106,7 +107,7 @@ impl<'a> Materials<'a> {
                 let lookup =
                     self.lookup(builder, &normal.texture(), Encoding::Linear, transform, [128, 128, 255, 255])?;
                 let strength = if normal.scale().is_finite() { normal.scale() } else { 1.0 };
-                lookup.map(|lookup| (lookup, strength))
+                lookup.map(|map| Relief::Normals { map, strength })
             }
         };
 
@@ -118,7 +119,7 @@ impl<'a> Materials<'a> {
             }
             gltf::material::AlphaMode::Blend => Alpha::Blend { value: coverage },
         };
-        Ok(Material { name, surface, emission, emits_both_sides: from.double_sided(), normal_map, alpha })
+        Ok(Material { name, surface, emission, emits_both_sides: from.double_sided(), relief, alpha })
     }
 
     /// What extensions say about the surface beyond the core's parameters.
