@@ -187,6 +187,7 @@ pub(crate) fn grey_scene(meshes: Vec<Mesh>) -> Scene {
             emission: ColorInput::constant(Vec3::ZERO),
             emits_both_sides: false,
             relief: None,
+            stretch: None,
             alpha: Alpha::Opaque,
         }],
         ..Scene::default()

@@ -11,7 +11,7 @@ use crate::bsdf::{
 use crate::geometry::SurfacePoint;
 use crate::geometry::surface::Frame;
 use crate::light::LightReceiver;
-use crate::scene::{ColorInput, MaterialId, MetalRoughness, Roughness, ScalarInput, Surface, Texture};
+use crate::scene::{ColorInput, Material, MaterialId, MetalRoughness, Roughness, ScalarInput, Surface, Texture};
 use glam::{Vec2, Vec3};
 use std::cell::{Cell, OnceCell};
 
@@ -227,12 +227,21 @@ impl PathTracer {
         };
         Shading {
             bsdf: reader.bsdf(&material.surface, &self.surface_tables[material_id], components),
-            frame: Frame::new(normal, point.tangent),
+            frame: stretched_frame(material, &scene.textures, point, normal),
             geometric_normal: point.geometric_normal,
             transmits,
             medium: if self.absorbs { Medium::behind(MaterialId(material_id as u32), &material.surface) } else { None },
         }
     }
+}
+
+/// The frame around a normal whose x axis is the tangent of anisotropic surfaces.
+fn stretched_frame(material: &Material, textures: &[Texture], point: &SurfacePoint, normal: Vec3) -> Frame {
+    let along_u = Frame::new(normal, point.tangent);
+    let Some(stretch) = &material.stretch else { return along_u };
+    let direction = stretch.evaluate(textures, point.uv);
+    let tangent = along_u.to_world(Vec3::new(direction.x, direction.y * point.handedness, 0.0));
+    Frame::new(normal, tangent)
 }
 
 /// A shading normal that the viewer can see: one that points away from the viewer, although the surface faces them, is
@@ -245,4 +254,57 @@ fn seen_side(normal: Vec3, geometric_normal: Vec3, wo: Vec3) -> Vec3 {
         return normal;
     }
     (normal + facing * wo * (LEAST_COSINE - cosine)).normalize_or(geometric_normal)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Encoding, StretchDirection, Texels, TextureId, TextureLookup, Wrap};
+    use std::sync::Arc;
+
+    fn texture(direction: [u8; 2]) -> Texture {
+        Texture {
+            name: String::new(),
+            width: 1,
+            height: 1,
+            texels: Texels::Bytes(Arc::new(vec![[direction[0], direction[1], 255, 255]]), Encoding::Linear),
+            wrap_u: Wrap::Repeat,
+            wrap_v: Wrap::Repeat,
+            nearest: false,
+        }
+    }
+
+    /// u grows along +x; the top of the picture is at +y, or at −y where it is mirrored.
+    #[test]
+    fn facets_are_stretched_where_rotation_and_picture_say() {
+        let third = std::f32::consts::FRAC_PI_3;
+        for (rotation, direction, handedness, expected) in [
+            (0.0, [255, 128], 1.0, Vec3::X),
+            (third, [255, 128], 1.0, Vec3::new(0.5, 0.866, 0.0)),
+            (third, [255, 128], -1.0, Vec3::new(0.5, -0.866, 0.0)),
+            (0.0, [128, 255], 1.0, Vec3::Y),
+            (0.0, [128, 0], -1.0, Vec3::Y),
+            (third, [128, 255], 1.0, Vec3::new(-0.866, 0.5, 0.0)),
+            (third, [128, 128], 1.0, Vec3::new(0.5, 0.866, 0.0)),
+        ] {
+            let mut material = Material::plain("test", Surface::clear_dielectric(1.5));
+            let map = Some(TextureLookup::plain(TextureId(0)));
+            material.stretch = Some(StretchDirection { rotation, map });
+            let point = SurfacePoint {
+                position: Vec3::ZERO,
+                geometric_normal: Vec3::Z,
+                shading_normal: Vec3::Z,
+                tangent: 3.0 * Vec3::X,
+                handedness,
+                uv: Vec2::splat(0.5),
+                color: Vec3::ONE,
+                object: 0,
+                triangle: 0,
+                offset: 0.0,
+            };
+            let frame = stretched_frame(&material, &[texture(direction)], &point, Vec3::Z);
+            let tangent = frame.to_world(Vec3::X);
+            assert!(tangent.abs_diff_eq(expected, 0.01), "{rotation} {direction:?} {handedness}: {tangent}");
+        }
+    }
 }

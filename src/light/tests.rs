@@ -22,6 +22,7 @@ fn add_emitter(scene: &mut Scene, radiance: f32, emits_both_sides: bool) -> Mate
         emission: ColorInput::constant(Vec3::splat(radiance)),
         emits_both_sides,
         relief: None,
+        stretch: None,
         alpha: Alpha::Opaque,
     });
     MaterialId(scene.materials.len() as u32 - 1)

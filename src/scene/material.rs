@@ -1,6 +1,6 @@
 //! Materials: how a surface scatters, emits and covers, and what a renderer asks of them besides values at a point.
 
-use super::{ColorInput, Relief, ScalarInput, Surface, Texture};
+use super::{ColorInput, Relief, ScalarInput, Surface, Texture, TextureLookup};
 use glam::{Vec2, Vec3};
 
 /// How a surface looks.
@@ -16,8 +16,33 @@ pub struct Material {
     pub emits_both_sides: bool,
     /// Where the shading normal differs from the mesh's.
     pub relief: Option<Relief>,
+    /// Where the facets of an anisotropic surface are turned; `None` where they lie along growing u.
+    pub stretch: Option<StretchDirection>,
     /// Coverage; what it cuts away is not there at all.
     pub alpha: Alpha,
+}
+
+/// The direction, in the plane of the surface, that an anisotropic surface takes for its tangent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StretchDirection {
+    /// Radians from growing u towards the top of the picture (falling v).
+    pub rotation: f32,
+    /// Picture whose red and green are the direction before the rotation, [0, 1] for [−1, 1]: (1, 0.5) is growing u.
+    pub map: Option<TextureLookup>,
+}
+
+impl StretchDirection {
+    /// Components along growing u and falling v at texture coordinates; of no particular length, (1, 0) where the picture has no
+    /// direction.
+    pub fn evaluate(&self, textures: &[Texture], uv: Vec2) -> Vec2 {
+        let mapped = self.map.map_or(Vec2::X, |map| {
+            let texel = textures[map.texture.0 as usize].sample_rgba(map.transform(uv));
+            2.0 * Vec2::new(texel.x, texel.y) - 1.0
+        });
+        // Grey bytes are 1/255 away from 0.
+        let direction = if mapped.length_squared() > 1e-4 { mapped } else { Vec2::X };
+        Vec2::from_angle(self.rotation).rotate(direction)
+    }
 }
 
 /// Coverage of a surface.
@@ -48,6 +73,7 @@ impl Material {
             emission: ColorInput::constant(Vec3::ZERO),
             emits_both_sides: false,
             relief: None,
+            stretch: None,
             alpha: Alpha::Opaque,
         }
     }

@@ -18,7 +18,7 @@ pub mod texture;
 pub use camera::{Camera, CameraAxes, Projection, ScreenWindow};
 pub use environment::{Environment, Parametrisation};
 pub use light::{Light, SpotFalloff};
-pub use material::{Alpha, Material};
+pub use material::{Alpha, Material, StretchDirection};
 pub use motion::{Motion, MotionKey, Pose};
 pub use relief::{HeightMap, HeightUnit, Relief};
 pub use surface::{Distribution, MetalRoughness, Roughness, RoughnessScale, Surface};

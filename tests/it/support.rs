@@ -35,6 +35,7 @@ pub(crate) fn add_material(scene: &mut Scene, surface: Surface, emission: Vec3) 
         emission: ColorInput::constant(emission),
         emits_both_sides: true,
         relief: None,
+        stretch: None,
         alpha: Alpha::Opaque,
     });
     MaterialId(scene.materials.len() as u32 - 1)

@@ -38,6 +38,7 @@ fn scene(wall: Vec3, ball: Vec3, yaw: f32, aside: Vec3) -> Scene {
             emission: ColorInput::constant(Vec3::ONE),
             emits_both_sides: true,
             relief: None,
+            stretch: None,
             alpha: Alpha::Opaque,
         }],
         ..Scene::default()

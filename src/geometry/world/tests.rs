@@ -18,6 +18,7 @@ fn scene(transforms: &[Affine3A]) -> Scene {
         emission: ColorInput::constant(Vec3::ZERO),
         emits_both_sides: false,
         relief: None,
+        stretch: None,
         alpha: Alpha::Opaque,
     };
     let instance = |to_world: &Affine3A| Instance {

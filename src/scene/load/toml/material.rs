@@ -6,13 +6,14 @@ use super::{Context, surface};
 use crate::scene::load::LoadError;
 use crate::scene::load::error::suggestion;
 use crate::scene::{
-    Alpha, ColorInput, Encoding, HeightMap, HeightUnit, Material, MaterialId, Relief, ScalarInput, TextureLookup,
+    Alpha, ColorInput, Encoding, HeightMap, HeightUnit, Material, MaterialId, Relief, ScalarInput, StretchDirection,
+    TextureLookup,
 };
 use glam::{Vec2, Vec3};
 use std::collections::HashMap;
 
 /// Keys that every material may have.
-const COMMON: [&str; 10] = [
+const COMMON: [&str; 11] = [
     "type",
     "emission",
     "emission_cd_m2",
@@ -21,6 +22,7 @@ const COMMON: [&str; 10] = [
     "emits_both_sides",
     "normal_map",
     "bump_map",
+    "stretch_rotation_deg",
     "alpha",
     "alpha_cutoff",
 ];
@@ -91,6 +93,9 @@ impl<'a> Materials<'a> {
             emission,
             emits_both_sides: fields.get_or("emits_both_sides", false, Value::boolean)?,
             relief: relief(context, &fields)?,
+            stretch: fields.get_some("stretch_rotation_deg", |value| {
+                Ok(StretchDirection { rotation: value.number()?.to_radians() as f32, map: None })
+            })?,
             alpha: alpha(context, &fields)?,
         };
         let id = context.builder.add_material(material);
