@@ -1,6 +1,6 @@
 //! Materials: how a surface scatters, emits and covers, and what a renderer asks of them besides values at a point.
 
-use super::{ColorInput, Relief, ScalarInput, Surface, Texture, TextureLookup};
+use super::{ColorInput, Relief, ScalarInput, Surface, Texture, TextureId, TextureLookup};
 use glam::{Vec2, Vec3};
 
 /// How a surface looks.
@@ -97,6 +97,16 @@ impl Material {
 }
 
 impl Alpha {
+    /// The texture whose alpha channel is the coverage.
+    pub fn texture_of_coverage(&self) -> Option<TextureId> {
+        match self {
+            Self::Opaque => None,
+            Self::Mask { value, .. } | Self::Blend { value } => {
+                value.texture.filter(|(_, channel)| *channel == 3).map(|(lookup, _)| lookup.texture)
+            }
+        }
+    }
+
     /// Probability that the surface is there, at texture coordinates.
     pub fn coverage(&self, textures: &[Texture], uv: Vec2) -> f32 {
         match self {

@@ -21,6 +21,7 @@
 //! - `kill`: the program, killed and resumed
 //! - `farm`: many processes on one folder
 //! - `view`: the live preview, over its WebSocket
+//! - `texture_memory`: textures within a limit
 //! - `tonemap`: HDR pictures for displays, one by one and over time
 
 mod adaptive_render;
@@ -44,5 +45,6 @@ mod references;
 mod relief;
 mod scene_table;
 mod support;
+mod texture_memory;
 mod tonemap;
 mod view;

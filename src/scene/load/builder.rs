@@ -108,7 +108,8 @@ impl Builder {
     pub(super) fn finish(mut self, path: &Path, if_dark: IfDark, options: &LoadOptions) -> Result<Scene, LoadError> {
         validate::repair(&mut self, path)?;
         let camera = self.choose_camera(options)?;
-        let textures = std::mem::take(&mut self.textures).decode(&mut self.notes, options.on_texture)?;
+        let coverage = |id| self.materials.iter().any(|material| material.alpha.texture_of_coverage() == Some(id));
+        let textures = std::mem::take(&mut self.textures).decode(&mut self.notes, options, coverage)?;
         bump::settle(&self.bumps, &mut self.materials, &textures, &mut self.notes);
         let mut scene = Scene {
             name: self.name,
