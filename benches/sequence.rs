@@ -1,6 +1,6 @@
 //! What handing out samples along a Z-curve gains over independent pixels, as the eye sees it.
 //!
-//! `cargo bench --bench sequence` prints the table of `benches/README.md` in about ten minutes of one core. Two renders of
+//! `cargo bench --bench sequence [-- SCENE...]` prints the table of `benches/README.md` in minutes of one core. Two renders of
 //! different seeds, uniform at 4, 16 and 64 samples a pixel and adaptive at visibility 4; their difference over √2 has the
 //! energy of one render's error and its frequencies, whatever they are. It is shown, filtered by the eye's contrast sensitivity
 //! with the thresholds of one 256-sample render, and its root mean square over the picture is what the table calls error.
@@ -19,9 +19,9 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::path::Path;
 use std::sync::Arc;
 
-const SIZE: u32 = 128;
+const SIZE: u32 = 96;
 const SCENES: [&str; 2] = ["cornell-box", "textured-room"];
-const PAIRS: u64 = 6;
+const PAIRS: u64 = 5;
 
 /// How long to sample.
 #[derive(Clone, Copy, Debug)]
@@ -34,7 +34,8 @@ fn main() -> Result<()> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     println!("| scene | samples a pixel | visible error, per pixel | in Z-order | worth in samples |");
     println!("| --- | --- | --- | --- | --- |");
-    for name in SCENES {
+    let wanted: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with('-')).collect();
+    for name in SCENES.into_iter().filter(|name| wanted.is_empty() || wanted.iter().any(|wanted| wanted == name)) {
         let scene = Arc::new(load(&root.join(format!("scenes/{name}.toml")), &LoadOptions::default())?);
         let judge = rendered(&scene, Sequence::PerPixel, 0, Effort::Samples(256))?;
         for effort in [Effort::Samples(4), Effort::Samples(16), Effort::Samples(64), Effort::Visibility(4.0)] {

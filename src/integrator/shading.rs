@@ -1,7 +1,7 @@
 //! From a material and a surface point to a BSDF in a frame.
 
 use super::PathTracer;
-use super::media::{Media, Medium};
+use super::media::Medium;
 use super::relief;
 use super::tables::{SurfaceTables, slope_width};
 use crate::bsdf::{
@@ -183,15 +183,12 @@ impl Shading<'_> {
         LightReceiver { position: point.position, normal }
     }
 
-    /// The volumes around a ray that came along `wo` through `media` and goes on along `wi`.
-    pub(super) fn media_after(&self, mut media: Media, wo: Vec3, wi: Vec3) -> Media {
+    /// The volume whose boundary a path crosses that came along `wo` and goes on along `wi`, and whether it enters; `None` where
+    /// it stays on its side, or no volume absorbs.
+    pub(super) fn crossed_medium(&self, wo: Vec3, wi: Vec3) -> Option<(Medium, bool)> {
+        let medium = self.medium?;
         let (from_front, to_front) = (wo.dot(self.geometric_normal) > 0.0, wi.dot(self.geometric_normal) > 0.0);
-        if let Some(medium) = self.medium
-            && from_front != to_front
-        {
-            media.cross(medium, from_front);
-        }
-        media
+        (from_front != to_front).then_some((medium, from_front))
     }
 
     /// Whether two world directions are on the same side of the surface by both normals, or on opposite sides by both.
