@@ -98,6 +98,9 @@ impl RadialTable {
     }
 }
 
+/// Rings over which noise's energy is summed.
+pub(crate) const RINGS: usize = 160;
+
 /// Calls `visit(freq_cpd, weight)` at the midpoints of rings that tile the Nyquist rectangle; the weights add to 1.
 ///
 /// The mean of H² over the rectangle is the share of white pixel noise's variance that a filter H passes.

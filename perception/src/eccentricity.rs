@@ -8,10 +8,9 @@
 //! For a gaze that is known, as by an eye tracker or a pointer that stands for one. Not for pictures that are kept: who looks at
 //! them may look anywhere.
 
-use crate::bands::for_each_ring;
+use crate::bands::{RINGS, for_each_ring};
 use crate::csf::ChromaticChannel;
 use crate::display::PixelDensity;
-use crate::error::Error;
 use crate::noise_gain::noise_gain;
 use crate::plane::Plane;
 use crate::sensitivity::AdaptationLevel;
@@ -41,8 +40,6 @@ pub const GAZE_MARGIN_DEG: f64 = 1.0;
 const FARTHEST_DEG: f64 = 60.0;
 /// Steps a degree of tables.
 const STEPS_A_DEGREE: f64 = 4.0;
-/// Rings of frequency over which noise's energy is summed.
-const RINGS: usize = 160;
 
 /// e₀ in 1/deg and e₁ in 1/(deg cpd), decades of sensitivity.
 struct Drop {
@@ -160,14 +157,6 @@ impl ThresholdMap {
         let density = self.viewing.display.pixel_density();
         let table = EnergyTable::new(Channel::Chromatic(channel), density, |freq| sensitivity_at(freq).powi(2));
         gain.combined(eccentricity, |gain, at| gain * table.at(at))
-    }
-
-    /// Checks that a gaze is a place.
-    ///
-    /// # Errors
-    /// [`Error::OutOfRange`] for one that is not finite.
-    pub fn check_gaze(gaze: Gaze) -> Result<(), Error> {
-        crate::error::check_range("gaze", gaze.x_px.abs().max(gaze.y_px.abs()), 0.0, 1e9, "a place in the picture")
     }
 }
 

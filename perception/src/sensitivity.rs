@@ -1,6 +1,6 @@
 //! A contrast sensitivity function, tabulated for one grid and band set.
 
-use crate::bands::{OctaveBands, RadialTable, for_each_ring};
+use crate::bands::{OctaveBands, RINGS, RadialTable, for_each_ring};
 use crate::csf::ContrastSensitivity;
 use crate::display::Viewing;
 use rayon::prelude::*;
@@ -14,7 +14,6 @@ const HIGHEST_DECADE: i32 = 6;
 const ENTRIES_A_DECADE: usize = 64;
 /// Luminances a decade at which the CSF is asked; between them tables are straight in logs.
 const SAMPLES_A_DECADE: usize = 4;
-const RINGS: usize = 160;
 
 /// A quantity against adaptation luminance.
 #[derive(Clone, Debug)]

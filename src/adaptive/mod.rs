@@ -17,6 +17,8 @@ pub mod settings;
 pub mod state;
 pub mod statistics;
 mod stop;
+#[cfg(test)]
+mod test_films;
 
 pub use monitor::{Directive, Monitor, Progress, Quiet};
 pub use stop::{StopReason, TOLERATED_SHARE, is_reached, visible_share};

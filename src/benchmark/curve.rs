@@ -1,7 +1,6 @@
 //! How a picture comes to be good: metrics that no arm optimises after each look of a render.
 
 use super::Subject;
-use super::metrics::measure;
 use super::truth::Truth;
 use crate::adaptive::judge::Judgement;
 use crate::adaptive::settings::LoopSettings;
@@ -58,7 +57,7 @@ impl Course<'_> {
     fn point(&self, state: &RenderState, measuring: Duration) -> Result<CurvePoint> {
         let estimate = state.film.estimate(self.subject.scene.nits_per_unit);
         let picture = self.truth.displayed(&estimate.rgb_cd_m2);
-        let metrics = measure(self.subject, self.truth, &picture)?;
+        let metrics = self.truth.measure(&picture)?;
         Ok(CurvePoint {
             samples: state.film.total_samples() as f64 / self.subject.pixels(),
             seconds: state.seconds_total - measuring.as_secs_f64(),

@@ -4,7 +4,7 @@
 //! tile with what can truly be seen of their error, and (2) spends growing budgets by three rules and reads off where the
 //! denoised pictures reach a quality by metrics that none of them optimises. Not for animation.
 
-use super::metrics::{Metrics, measure};
+use super::metrics::Metrics;
 use super::reference::Reference;
 use super::truth::Truth;
 use super::{BenchSettings, Subject, make_folders};
@@ -152,7 +152,7 @@ impl SceneBench<'_> {
     }
 
     fn measured(&self, rgb_cd_m2: &[[f32; 3]]) -> Result<Metrics> {
-        measure(self.subject, self.truth, &self.truth.displayed(rgb_cd_m2))
+        self.truth.measure(&self.truth.displayed(rgb_cd_m2))
     }
 
     fn calibration(&self, denoiser: &Denoiser, spp: u32, seed: u64) -> Result<Calibration> {

@@ -1,7 +1,6 @@
 //! Metrics that no arm optimises: FLIP, ColorVideoVDP, relative mean squared error.
 
-use super::Subject;
-use super::truth::Truth;
+use super::truth::displayed_rgb;
 use anyhow::{Context, Result};
 use colorvideovdp::{Color, Cvvdp, DisplayModel, Execution, Geometry, Image, Options, Photometry};
 use fechner_perception::{Display, Eotf};
@@ -9,42 +8,44 @@ use flip_rs::{RgbImage, Weighting, ldr_flip};
 
 /// How far a picture is from the reference by other people's measures.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Metrics {
+pub struct Metrics {
     /// Mean of LDR-FLIP.
-    pub(crate) flip_mean: f64,
+    pub flip_mean: f64,
     /// Its 99th percentile.
-    pub(crate) flip_p99: f64,
+    pub flip_p99: f64,
     /// ColorVideoVDP's just-objectionable differences, at most 10.
-    pub(crate) jod: f64,
+    pub jod: f64,
     /// Mean of squared error over squared reference, on displayed light.
-    pub(crate) relmse: f64,
+    pub relmse: f64,
 }
 
-/// Measures a displayed picture (linear RGB, 0..1).
-pub(crate) fn measure(subject: &Subject, truth: &Truth, picture: &[[f32; 3]]) -> Result<Metrics> {
-    let (width, height) = (subject.size.0 as usize, subject.size.1 as usize);
-    let display = &subject.viewing.display;
+/// Measures a picture as the display shows it against the reference shown there: linear RGB, 0..1, row-major, `width` pixels a row.
+///
+/// # Errors
+/// Where the two are not of one size, or too small for a metric.
+pub fn measure(display: &Display, width: usize, reference: &[[f32; 3]], picture: &[[f32; 3]]) -> Result<Metrics> {
+    let height = reference.len() / width;
     let encoded = |picture: &[[f32; 3]]| {
         let code = |&light: &f32| Eotf::Srgb.encode(f64::from(light), display.white_cd_m2) as f32;
         picture.iter().flatten().map(code).collect::<Vec<f32>>()
     };
     let flip = ldr_flip(
-        &RgbImage::new(width, height, encoded(&truth.picture))?,
+        &RgbImage::new(width, height, encoded(reference))?,
         &RgbImage::new(width, height, encoded(picture))?,
         display.pixels_per_degree as f32,
     )?;
     let image = |picture: &[[f32; 3]]| {
-        let light = truth.display_cd_m2(picture).into_iter().flatten().collect();
+        let light = displayed_rgb(display, picture).into_iter().flatten().collect();
         Image::new(width, height, 3, light)
     };
     let prediction = color_video_vdp(display, [width, height])?
-        .predict_image(&image(picture)?, &image(&truth.picture)?, Color::Linear)
+        .predict_image(&image(picture)?, &image(reference)?, Color::Linear)
         .context("ColorVideoVDP refuses the pictures")?;
     Ok(Metrics {
         flip_mean: f64::from(flip.statistics().mean),
         flip_p99: f64::from(flip.percentile(0.99, Weighting::Unweighted)?),
         jod: f64::from(prediction.jod),
-        relmse: relative_mean_squared_error(&truth.picture, picture),
+        relmse: relative_mean_squared_error(reference, picture),
     })
 }
 

@@ -27,7 +27,9 @@ pub use animation::{AnimationRow, AnimationSettings, animation};
 pub use arm::Arm;
 pub use curve::{Curve, CurvePoint};
 pub use denoise::{Calibration, DenoisingResults, DenoisingSettings, Race, denoising};
+pub use metrics::{Metrics, measure};
 pub use record::{Record, Results};
+pub use reference::trace_up_to;
 
 use crate::adaptive::settings::{Limits, LoopSettings};
 use crate::integrator::{PathTracer, TraceSettings};

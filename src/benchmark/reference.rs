@@ -161,7 +161,7 @@ impl Reference {
 }
 
 /// Takes what a film lacks of `spp` samples in every pixel.
-pub(crate) fn trace_up_to(tracer: &PathTracer, film: &mut Film, spp: u32) {
+pub fn trace_up_to(tracer: &PathTracer, film: &mut Film, spp: u32) {
     loop {
         let plan = uniform_plan(film, spp);
         if plan.blocks.is_empty() {

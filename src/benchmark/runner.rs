@@ -2,7 +2,7 @@
 
 use super::arm::Arm;
 use super::curve::{Curve, course};
-use super::metrics::{Metrics, measure};
+use super::metrics::Metrics;
 use super::oracle::{displayed_variance, least_samples, trace_counts, uniform_samples};
 use super::pictures::{read_pictures, write_pictures};
 use super::record::ScenePictures;
@@ -137,7 +137,7 @@ impl<'a> ArmRunner<'a> {
         let nits = self.subject.scene.nits_per_unit;
         let estimate = made.film.estimate(nits);
         let picture = self.truth.displayed(&estimate.rgb_cd_m2);
-        let metrics: Metrics = measure(self.subject, self.truth, &picture)?;
+        let metrics: Metrics = self.truth.measure(&picture)?;
         let sum = |plane: &Plane| plane.values().iter().map(|&v| f64::from(v)).sum::<f64>();
         let truth = sum(&self.reference.luminance());
         // The reference's own error, from its halves' scatter, belongs to the interval.

@@ -1,6 +1,7 @@
 //! What can truly be seen of a render's error.
 
 use super::Subject;
+use super::metrics::{Metrics, measure};
 use super::reference::Reference;
 use crate::film::CHANNELS;
 use anyhow::Result;
@@ -49,9 +50,9 @@ impl Truth {
         rgb_cd_m2.iter().map(|&rgb| self.tone.map_rgb(rgb)).collect()
     }
 
-    /// Linear RGB in cd/m² of the display for its light of 0..1.
-    pub(crate) fn display_cd_m2(&self, picture: &[[f32; 3]]) -> Vec<[f32; 3]> {
-        displayed_rgb(&self.display, picture)
+    /// How far a displayed picture (linear RGB, 0..1) is from the reference by other people's measures.
+    pub(crate) fn measure(&self, picture: &[[f32; 3]]) -> Result<Metrics> {
+        measure(&self.display, self.width, &self.picture, picture)
     }
 
     /// v² of a displayed picture's error, without the reference's part in the difference: the channel that shows most.
@@ -77,7 +78,8 @@ fn squared_visibility(thresholds: &ThresholdMap, error: &Plane) -> Plane {
     thresholds.measured_visibility(error).map(|v| v * v)
 }
 
-fn displayed_rgb(display: &Display, picture: &[[f32; 3]]) -> Vec<[f32; 3]> {
+/// Linear RGB in cd/m² of a display for its light of 0..1.
+pub(super) fn displayed_rgb(display: &Display, picture: &[[f32; 3]]) -> Vec<[f32; 3]> {
     picture.iter().map(|rgb| rgb.map(|light| display.luminance_cd_m2(f64::from(light)) as f32)).collect()
 }
 

@@ -35,7 +35,7 @@ pub enum MergeError {
 /// `paths` does not matter. What was decided for the single films (plans, rungs, audits) is left behind; the largest
 /// inflation stays.
 ///
-/// Beside the sum, as many films are in memory as there are threads (at most 8), and as many again, which are read meanwhile.
+/// Beside the sum, as many films are in memory as there are threads, at most 8.
 ///
 /// # Errors
 /// [`MergeError`] for a file that cannot be read, films of other scenes, sizes, versions or viewings than the first, and
@@ -49,19 +49,9 @@ pub fn merge_files(paths: &[PathBuf]) -> Result<Checkpoint, MergeError> {
     check_seeds(&files)?;
     let (first, rest) = files.split_first().expect("at least one film");
     let mut sum = read_same(first)?;
-    // Films are added one after the other, and the next few are read meanwhile.
-    let mut batches = rest.chunks(rayon::current_num_threads().clamp(1, MOST_READ_AT_ONCE));
-    let read_all = |batch: &[(Header, &Path)]| batch.par_iter().map(read_same).collect::<Vec<_>>();
-    let mut batch = batches.next();
-    let mut read = batch.map(read_all).unwrap_or_default();
-    while let Some(files) = batch {
-        batch = batches.next();
-        let (added, next) = rayon::join(
-            || files.iter().zip(read).try_for_each(|(file, film)| add(&mut sum, first, file, film?)),
-            || batch.map(read_all).unwrap_or_default(),
-        );
-        added?;
-        read = next;
+    for batch in rest.chunks(rayon::current_num_threads().clamp(1, MOST_READ_AT_ONCE)) {
+        let read: Vec<_> = batch.par_iter().map(read_same).collect();
+        batch.iter().zip(read).try_for_each(|(file, film)| add(&mut sum, first, file, film?))?;
     }
     if !rest.is_empty() {
         sum.header.seeds.all.sort_unstable();

@@ -247,17 +247,18 @@ fn run_animation(arguments: &BenchArguments) -> Result<()> {
         let still = geometric_mean(of_rate().map(|row| row.still_spp / row.motion_spp));
         let even = geometric_mean(of_rate().filter_map(|row| Some(row.uniform_spp? / row.motion_spp)));
         let flicker = geometric_mean(of_rate().filter_map(|row| Some(row.flicker / row.uniform_flicker?)));
-        println!(
-            "at {rate}: still / motion {still:.2}, even / motion {even:.2}, flicker over that of even {flicker:.2}"
-        );
+        println!("at {rate}: still / motion {still}, even / motion {even}, flicker over that of even {flicker}");
     }
     Ok(())
 }
 
-/// 1 of nothing.
-fn geometric_mean(values: impl Iterator<Item = f64>) -> f64 {
+/// A geometric mean in words.
+fn geometric_mean(values: impl Iterator<Item = f64>) -> String {
     let logarithms: Vec<f64> = values.map(f64::ln).collect();
-    (logarithms.iter().sum::<f64>() / logarithms.len().max(1) as f64).exp()
+    if logarithms.is_empty() {
+        return "–".to_owned();
+    }
+    format!("{:.2}", (logarithms.iter().sum::<f64>() / logarithms.len() as f64).exp())
 }
 
 /// Arms by name, and those that others are compared with.

@@ -3,17 +3,17 @@
 mod sequence;
 
 use super::animate::parse_rate;
+use super::json::write_json;
 use super::picture::InputPicture;
-use super::seeing::SeeingArguments;
-use anyhow::{Context, Result, bail};
+use super::seeing::{SeeingArguments, tone_operator};
+use anyhow::{Result, bail};
 use clap::Args;
 use fechner::output;
 use fechner_perception::csf;
 use fechner_perception::difference::{Difference, colour_difference};
 use fechner_perception::psychometric::detection_probability;
-use fechner_perception::tone::{self, ToneOperator};
+use fechner_perception::tone::ToneSettings;
 use serde::Serialize;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -45,6 +45,7 @@ pub(super) struct CompareArguments {
     json: Option<PathBuf>,
 }
 
+/// What is said of every comparison.
 #[derive(Serialize)]
 struct Figures {
     reference: String,
@@ -52,11 +53,30 @@ struct Figures {
     display: String,
     pixels_per_degree: f64,
     csf: &'static str,
+    #[serde(flatten)]
+    seen: Seen,
+}
+
+/// What is seen of a difference.
+#[derive(Clone, Copy, Serialize)]
+struct Seen {
     worst_visibility: f64,
     mean_visibility: f64,
     visible_fraction: f64,
     detection_probability_worst: f64,
     is_visible: bool,
+}
+
+impl Seen {
+    fn of(difference: &Difference) -> Self {
+        Self {
+            worst_visibility: difference.worst_visibility,
+            mean_visibility: difference.visibility.mean(),
+            visible_fraction: difference.visible_fraction,
+            detection_probability_worst: detection_probability(difference.worst_visibility),
+            is_visible: difference.is_visible(),
+        }
+    }
 }
 
 /// Exit status 0: the same to the eye; 1: told apart.
@@ -77,10 +97,10 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
     check_alike((&arguments.reference, &reference), (&arguments.test, &test))?;
     let viewing = reference.viewed(&arguments.seeing.viewing()?)?;
     let csf = csf::by_name(&arguments.seeing.csf, &viewing)?;
-    let operator = known_operator(&arguments.operator)?;
+    let operator = tone_operator(&arguments.operator, &ToneSettings::default())?;
     let fitted = reference.fit(operator.as_ref(), &viewing).or_else(|| test.fit(operator.as_ref(), &viewing));
     let (width, height) = reference.size();
-    let seen = colour_difference(
+    let difference = colour_difference(
         &reference.displayed_rgb(fitted.as_deref(), &viewing),
         &test.displayed_rgb(fitted.as_deref(), &viewing),
         width,
@@ -94,37 +114,25 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
         display: viewing.display.name.clone(),
         pixels_per_degree: viewing.display.pixels_per_degree,
         csf: csf.name(),
-        worst_visibility: seen.worst_visibility,
-        mean_visibility: seen.visibility.mean(),
-        visible_fraction: seen.visible_fraction,
-        detection_probability_worst: detection_probability(seen.worst_visibility),
-        is_visible: seen.is_visible(),
+        seen: Seen::of(&difference),
     };
     if let Some(path) = &arguments.map {
-        write_map(path, &seen)?;
+        write_map(path, &difference)?;
     }
     if let Some(path) = &arguments.json {
-        let text = serde_json::to_string_pretty(&figures).context("the figures could not be put into words")?;
-        output::write_beside(path, |file| file.write_all(text.as_bytes()))?;
+        write_json(path, &figures)?;
     }
     println!(
         "{}: worst visibility {:.2} (seen in a 1° patch with {:.1} %), {:.2} % of the picture above threshold, on \
          \"{}\" at {} pixels a degree (model-predicted; calibrated on gratings, not on renderings)",
-        if figures.is_visible { "visible" } else { "the same to the eye" },
-        figures.worst_visibility,
-        100.0 * figures.detection_probability_worst,
-        100.0 * figures.visible_fraction,
+        if figures.seen.is_visible { "visible" } else { "the same to the eye" },
+        figures.seen.worst_visibility,
+        100.0 * figures.seen.detection_probability_worst,
+        100.0 * figures.seen.visible_fraction,
         figures.display,
         figures.pixels_per_degree
     );
-    Ok(ExitCode::from(u8::from(figures.is_visible)))
-}
-
-fn known_operator(name: &str) -> Result<Box<dyn ToneOperator>> {
-    tone::operator(name, None).with_context(|| {
-        let known = tone::operator_names().join(", ");
-        format!("there is no tone operator \"{name}\"; known: {known}")
-    })
+    Ok(ExitCode::from(u8::from(figures.seen.is_visible)))
 }
 
 /// Only pictures of one size and shape can be compared.

@@ -1,6 +1,7 @@
 //! `fechner merge`: films of different seeds in, one film or its picture out.
 
-use super::render::{write_json, write_picture};
+use super::json::write_json;
+use super::render::write_picture;
 use super::report::{Report, summary};
 use super::seeing::parse_positive;
 use clap::Args;
@@ -54,7 +55,9 @@ pub(super) fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
     if let Some(format) = format {
         write_picture(&arguments.output, format, Background::Shown, &rendered, &settings, &report)?;
     }
-    write_json(arguments.json.as_deref(), &report)?;
+    if let Some(path) = &arguments.json {
+        write_json(path, &report)?;
+    }
     eprintln!("Films of the seeds {}:", merged.header.seeds.in_words());
     eprintln!("{}", summary(&report, &settings, &rendered));
     Ok(())

@@ -10,6 +10,7 @@ mod farm;
 mod importance;
 mod info;
 mod job;
+mod json;
 mod keeper;
 mod merge;
 mod picture;

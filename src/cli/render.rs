@@ -2,11 +2,11 @@
 
 use super::console::Console;
 use super::job::{JobArguments, Prepared};
+use super::json::write_json;
 use super::keeper::{CheckpointArguments, Keeper, Watch};
 use super::report::{Report, summary};
 use super::tev::{Showing, TevArguments};
 use super::view::audience;
-use anyhow::Context;
 use clap::Args;
 use fechner::adaptive::settings::LoopSettings;
 use fechner::adaptive::state::RenderState;
@@ -15,7 +15,6 @@ use fechner::checkpoint::{Header, Origin, Seeds};
 use fechner::integrator::{Crop, PathTracer};
 use fechner::output;
 use fechner::output::rendered::Background;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -77,7 +76,9 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     let report = Report::new(&arguments.job.scene_name(), &seeds, &settings, &rendered);
     let background = arguments.job.background();
     write_picture(&arguments.output, format, background, &rendered, &settings, &report)?;
-    write_json(arguments.json.as_deref(), &report)?;
+    if let Some(path) = &arguments.json {
+        write_json(path, &report)?;
+    }
     eprintln!("{}", summary(&report, &settings, &rendered));
     watch.report()
 }
@@ -100,13 +101,5 @@ pub(super) fn write_picture(
             output::rendered::write_layers_exr(path, rendered, settings, background, &attributes)?;
         }
     }
-    Ok(())
-}
-
-/// Writes the figures where they are asked for.
-pub(super) fn write_json(path: Option<&Path>, report: &Report) -> anyhow::Result<()> {
-    let Some(path) = path else { return Ok(()) };
-    let text = serde_json::to_string_pretty(report).context("the report could not be put into words")?;
-    output::write_beside(path, |file| file.write_all(text.as_bytes()))?;
     Ok(())
 }

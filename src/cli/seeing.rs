@@ -3,6 +3,7 @@
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner_perception::display::{Display, Viewing};
+use fechner_perception::tone::{self, ToneOperator, ToneSettings};
 use std::path::Path;
 
 /// Display, observer and units, for commands that judge pictures.
@@ -48,6 +49,14 @@ fn find_display(name: &str) -> Result<Display> {
     }
     let text = std::fs::read_to_string(Path::new(name)).with_context(|| format!("display file {name}"))?;
     Display::from_toml(&text).with_context(|| format!("display file {name}"))
+}
+
+/// The tone operator of that name, or an error that lists those that there are.
+pub(super) fn tone_operator(name: &str, settings: &ToneSettings) -> Result<Box<dyn ToneOperator>> {
+    tone::operator_with(name, settings).with_context(|| {
+        let known = tone::operator_names().join(", ");
+        format!("there is no tone operator \"{name}\"; known: {known}")
+    })
 }
 
 /// A number above 0.

@@ -2,7 +2,7 @@
 
 use super::channels;
 use super::picture::InputPicture;
-use super::seeing::SeeingArguments;
+use super::seeing::{SeeingArguments, tone_operator};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::exr_read::read_exr;
@@ -10,6 +10,7 @@ use fechner::output::{self, Attribute, Format, PIXEL_ASPECT_RATIO, Picture};
 use fechner_perception::display::Glare;
 use fechner_perception::model::{self, ModelInputs};
 use fechner_perception::motion::image_velocity_deg_s;
+use fechner_perception::tone::ToneSettings;
 use fechner_perception::{Plane, ThresholdInputs, csf, seen, threshold_map, tone};
 use std::path::{Path, PathBuf};
 
@@ -58,10 +59,7 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     let model = model::by_name(&arguments.model).with_context(|| {
         format!("there is no threshold model \"{}\"; known: {}", arguments.model, model::names().join(", "))
     })?;
-    let operator = tone::operator(&arguments.operator, None).with_context(|| {
-        let known = tone::operator_names().join(", ");
-        format!("there is no tone operator \"{}\"; known: {known}", arguments.operator)
-    })?;
+    let operator = tone_operator(&arguments.operator, &ToneSettings::default())?;
     let fitted = guide.fit(operator.as_ref(), &viewing);
     let shown = guide.displayed(fitted.as_deref(), &viewing);
     let velocity = match &arguments.velocity {

@@ -2,6 +2,7 @@
 
 mod sheet;
 
+use super::json::write_json;
 use super::picture::InputPicture;
 use super::seeing::{self, parse_positive};
 use anyhow::{Context, Result, bail};
@@ -13,7 +14,6 @@ use fechner_perception::tone::{
     map_picture,
 };
 use fechner_perception::{Plane, Viewing};
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `tonemap`.
@@ -139,10 +139,7 @@ pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
     if arguments.operator == "all" {
         return run_all(arguments, format, &targets, &viewing, &settings);
     }
-    let operator = tone::operator_with(&arguments.operator, &settings).with_context(|| {
-        let known = tone::operator_names().join(", ");
-        format!("there is no tone operator \"{}\"; known: {known}, all", arguments.operator)
-    })?;
+    let operator = seeing::tone_operator(&arguments.operator, &settings)?;
     let timed = arguments.input.len() > 1 || arguments.adapted_to.is_some() || arguments.state.is_some();
     if timed && arguments.adaptation == Scope::Local {
         bail!("--adaptation local has no course in time: leave it out for a sequence");
@@ -157,8 +154,7 @@ pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
         println!("{}: {}", target.display(), fitted.describe());
     }
     if let (Some(path), Some(state)) = (&arguments.state, eye.and_then(|eye| eye.state)) {
-        let text = serde_json::to_string_pretty(&state).context("the eye's state could not be put into words")?;
-        output::write_beside(path, |file| file.write_all(text.as_bytes()))?;
+        write_json(path, &state)?;
     }
     Ok(())
 }

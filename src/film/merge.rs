@@ -1,9 +1,12 @@
 //! Adding films of the same picture, and checking one that was in a file.
 
 use super::{Film, HalfPixel, PixelGuide, opponent};
+use rayon::prelude::*;
 
 /// Most samples of a pixel's half that a film may hold: sums of a few films stay far from where counts wrap around.
 const MOST_TAKEN: u32 = 1 << 29;
+/// Pixels that are worth handing to another thread.
+const PIXELS_A_TASK: usize = 1 << 12;
 
 impl Film {
     /// Adds the samples of another film, half to half: as if one film had taken both. The other must be of this size and
@@ -13,17 +16,19 @@ impl Film {
     /// Where a pixel would hold more samples than can be counted.
     pub fn add(&mut self, other: &Film) -> Result<(), &'static str> {
         assert_eq!((self.width, self.height), (other.width, other.height), "films of one size");
-        for (i, guide) in self.guides.iter_mut().enumerate() {
-            let count = |halves: &[Vec<HalfPixel>; 2]| halves[0][i].samples + halves[1][i].samples;
-            guide.add(&other.guides[i], count(&self.halves), count(&other.halves));
-        }
-        for (half, others) in self.halves.iter_mut().zip(&other.halves) {
-            for (pixel, other) in half.iter_mut().zip(others) {
-                pixel.add(other);
-                if pixel.taken > MOST_TAKEN {
-                    return Err("a pixel would have more samples than can be counted");
-                }
-            }
+        let [a, b] = &mut self.halves;
+        let [other_a, other_b] = &other.halves;
+        let pixels = (self.guides.par_iter_mut(), a, b).into_par_iter();
+        let others = (&other.guides, other_a, other_b).into_par_iter();
+        let fits =
+            pixels.zip(others).with_min_len(PIXELS_A_TASK).map(|((guide, a, b), (other_guide, other_a, other_b))| {
+                guide.add(other_guide, a.samples + b.samples, other_a.samples + other_b.samples);
+                a.add(other_a);
+                b.add(other_b);
+                a.taken.max(b.taken) <= MOST_TAKEN
+            });
+        if !fits.reduce(|| true, |one, two| one && two) {
+            return Err("a pixel would have more samples than can be counted");
         }
         self.nonfinite_samples = self.nonfinite_samples.saturating_add(other.nonfinite_samples);
         self.rays = self.rays.saturating_add(other.rays);

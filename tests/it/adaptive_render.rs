@@ -225,3 +225,15 @@ fn an_audit_finds_variance_that_is_too_low() {
     assert!(low.disagrees(), "{low:?}");
     assert!((low.ratio / honest.ratio - 4.0).abs() < 0.01, "{low:?}");
 }
+
+/// Pictures of a few pixels, narrower than any window of the statistics, are pictures too.
+#[test]
+fn the_smallest_pictures_are_rendered() {
+    for [width, height] in [[1, 1], [2, 2], [1, 5], [3, 1]] {
+        let scene = cornell_box();
+        let settings = loop_settings(scene.nits_per_unit, Sampling::Adaptive, 4.0, None);
+        let tracer = PathTracer::new(Arc::new(scene), trace_settings(width, height, 1));
+        let rendered = render(&tracer, &settings, &Quiet).expect("the perception model takes the picture");
+        assert!(rendered.judgement.estimate.luminance_cd_m2.values().iter().all(|&light| light > 0.0));
+    }
+}

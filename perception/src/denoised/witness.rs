@@ -1,6 +1,6 @@
 //! What the raw halves tell of a denoised picture's bias in one band.
 
-use crate::bands::for_each_ring;
+use crate::bands::{RINGS, for_each_ring};
 use crate::fft::Spectrum;
 use crate::plane::Plane;
 use crate::threshold::{POOLING_SIGMA_DEG, ThresholdMap};
@@ -82,7 +82,7 @@ impl BandEvidence {
 fn correlation_area_px(map: &ThresholdMap, filters: &ErrorFilters<'_>, band: usize) -> f64 {
     let gain = filters.gain(band, map.levels.len() / 2);
     let (mut second, mut fourth) = (0.0, 0.0);
-    for_each_ring(map.viewing.display.pixel_density(), 160, |freq_cpd, weight| {
+    for_each_ring(map.viewing.display.pixel_density(), RINGS, |freq_cpd, weight| {
         let square = f64::from(gain.at(freq_cpd as f32)).powi(2);
         second += weight * square;
         fourth += weight * square * square;

@@ -7,7 +7,9 @@ use super::source::FileSource;
 use super::video::shown_rgb8;
 use super::{AnimateArguments, video};
 use crate::cli::console::{Console, duration_in_words};
+use crate::cli::json::write_json;
 use crate::cli::report::Report;
+use crate::cli::seeing::tone_operator;
 use anyhow::{Context, Result, bail};
 use fechner::adaptive::settings::{AllocationRule, LoopSettings, Sampling};
 use fechner::animate::budget::Needs;
@@ -21,7 +23,7 @@ use fechner::output::{self, Format};
 use fechner::scene::Scene;
 use fechner::scene::hash::content_hash;
 use fechner_perception::model;
-use fechner_perception::tone::{self, ToneOperator};
+use fechner_perception::tone::{ToneOperator, ToneSettings};
 use serde::{Deserialize, Serialize};
 use std::io::Write as _;
 use std::path::Path;
@@ -103,13 +105,8 @@ impl<'a> Shot<'a> {
     }
 
     fn operator(&self) -> Result<Box<dyn ToneOperator>> {
-        tone::operator(&self.operator_name, self.exposure_stops).with_context(|| {
-            format!(
-                "there is no tone operator \"{}\"; known: {}",
-                self.operator_name,
-                tone::operator_names().join(", ")
-            )
-        })
+        let exposure_stops = self.exposure_stops.unwrap_or(0.0);
+        tone_operator(&self.operator_name, &ToneSettings { exposure_stops, ..ToneSettings::default() })
     }
 
     /// The track that lies beside the frames, or a new one where there is none for this shot.
@@ -195,8 +192,7 @@ impl<'a> Shot<'a> {
             seconds_of_shot: self.settings.seconds(f64::from(frame)),
             report: serde_json::to_value(&report).context("the report could not be put into words")?,
         };
-        let text = serde_json::to_string_pretty(&record).context("the record could not be put into words")?;
-        output::write_beside(&file.with_extension("json"), |file| file.write_all(text.as_bytes()))?;
+        write_json(&file.with_extension("json"), &record)?;
         eprintln!("{}: {}", file.display(), report.in_a_line());
         Ok(report)
     }
@@ -209,8 +205,7 @@ impl<'a> Shot<'a> {
             eprintln!("{missing} frames of the shot are not there yet.");
             return Ok(());
         }
-        let text = serde_json::to_string_pretty(&records).context("the shot could not be put into words")?;
-        output::write_beside(&self.name.of_shot("json"), |file| file.write_all(text.as_bytes()))?;
+        write_json(&self.name.of_shot("json"), &records)?;
         let fits = |frame: usize| track.frames[frame].fitted.clone().restore();
         let count = records.len();
         let size = (self.settings.trace.width as usize, self.settings.trace.height as usize);

@@ -1,21 +1,20 @@
 //! `fechner compare A.####.exr B.####.exr --fps F`: can one moving picture be told from another?
 
-use super::{CompareArguments, check_alike, known_operator, write_map};
+use super::{CompareArguments, Figures, Seen, check_alike, write_map};
 use crate::cli::channels::both_motions;
+use crate::cli::json::write_json;
 use crate::cli::picture::InputPicture;
+use crate::cli::seeing::tone_operator;
 use anyhow::{Context, Result, bail};
 use fechner::animate::name::FrameName;
 use fechner::exr_read::read_exr;
 use fechner::output;
 use fechner_perception::Plane;
-use fechner_perception::difference::Difference;
 use fechner_perception::display::Viewing;
-use fechner_perception::psychometric::detection_probability;
 use fechner_perception::sequence::{FrameMotion, SequenceFrame, SequenceObserver};
-use fechner_perception::tone::{FittedTone, SceneGuide};
+use fechner_perception::tone::{FittedTone, SceneGuide, ToneSettings};
 use serde::Serialize;
 use std::collections::VecDeque;
-use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -23,29 +22,20 @@ use std::process::ExitCode;
 const FITTED_FRAMES: usize = 16;
 
 #[derive(Serialize)]
-struct Figures {
-    reference: String,
-    test: String,
-    display: String,
-    pixels_per_degree: f64,
+struct SequenceFigures {
+    #[serde(flatten)]
+    all: Figures,
     frames_per_second: f64,
     eye_follows: bool,
-    csf: &'static str,
-    worst_visibility: f64,
     worst_frame: u32,
-    mean_visibility: f64,
-    visible_fraction: f64,
-    detection_probability_worst: f64,
-    is_visible: bool,
     frames: Vec<FrameFigures>,
 }
 
 #[derive(Serialize)]
 struct FrameFigures {
     frame: u32,
-    worst_visibility: f64,
-    mean_visibility: f64,
-    visible_fraction: f64,
+    #[serde(flatten)]
+    seen: Seen,
 }
 
 /// The files of two sequences, and how they are shown.
@@ -91,22 +81,13 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
             window.pop_front();
         }
         let now = frame as usize + window.len() - next as usize;
-        let seen = observer.difference(&window.iter().collect::<Vec<_>>(), now)?;
+        let difference = observer.difference(&window.iter().collect::<Vec<_>>(), now)?;
         if let Some(map) = &sequences.map {
-            write_map(&map.of(frame), &seen)?;
+            write_map(&map.of(frame), &difference)?;
         }
-        frames.push(figures_of(frame, &seen));
+        frames.push(FrameFigures { frame, seen: Seen::of(&difference) });
     }
     sequences.report(frames)
-}
-
-fn figures_of(frame: u32, seen: &Difference) -> FrameFigures {
-    FrameFigures {
-        frame,
-        worst_visibility: seen.worst_visibility,
-        mean_visibility: seen.visibility.mean(),
-        visible_fraction: seen.visible_fraction,
-    }
 }
 
 fn pattern(path: &Path, what: &str) -> Result<FrameName> {
@@ -126,7 +107,7 @@ impl<'a> Sequences<'a> {
         if let Some(map) = &map {
             output::check_writable(&map.of(numbers[0]))?;
         }
-        let operator = known_operator(&arguments.operator)?;
+        let operator = tone_operator(&arguments.operator, &ToneSettings::default())?;
         let nits_per_unit = arguments.seeing.nits_per_unit;
         let mut viewing = arguments.seeing.viewing()?;
         viewing.display.frames_per_second =
@@ -168,45 +149,48 @@ impl<'a> Sequences<'a> {
     }
 
     fn report(&self, frames: Vec<FrameFigures>) -> Result<ExitCode> {
-        let worst = frames.iter().max_by(|a, b| a.worst_visibility.total_cmp(&b.worst_visibility));
-        let (worst_visibility, worst_frame) = worst.map_or((0.0, 0), |worst| (worst.worst_visibility, worst.frame));
-        let mean = |of: fn(&FrameFigures) -> f64| frames.iter().map(of).sum::<f64>() / frames.len() as f64;
-        let figures = Figures {
-            reference: self.arguments.reference.display().to_string(),
-            test: self.arguments.test.display().to_string(),
-            display: self.viewing.display.name.clone(),
-            pixels_per_degree: self.viewing.display.pixels_per_degree,
+        let by_worst =
+            |a: &&FrameFigures, b: &&FrameFigures| a.seen.worst_visibility.total_cmp(&b.seen.worst_visibility);
+        let worst = frames.iter().max_by(by_worst).context("a sequence has at least one frame")?;
+        let mean = |of: fn(&Seen) -> f64| frames.iter().map(|frame| of(&frame.seen)).sum::<f64>() / frames.len() as f64;
+        let seen = Seen {
+            mean_visibility: mean(|seen| seen.mean_visibility),
+            visible_fraction: mean(|seen| seen.visible_fraction),
+            ..worst.seen
+        };
+        let figures = SequenceFigures {
+            all: Figures {
+                reference: self.arguments.reference.display().to_string(),
+                test: self.arguments.test.display().to_string(),
+                display: self.viewing.display.name.clone(),
+                pixels_per_degree: self.viewing.display.pixels_per_degree,
+                csf: "castle",
+                seen,
+            },
             frames_per_second: self.viewing.display.frames_per_second,
             eye_follows: self.velocity.is_some(),
-            csf: "castle",
-            worst_visibility,
-            worst_frame,
-            mean_visibility: mean(|frame| frame.mean_visibility),
-            visible_fraction: mean(|frame| frame.visible_fraction),
-            detection_probability_worst: detection_probability(worst_visibility),
-            is_visible: worst_visibility > 1.0,
+            worst_frame: worst.frame,
             frames,
         };
         if let Some(path) = &self.arguments.json {
-            let text = serde_json::to_string_pretty(&figures).context("the figures could not be put into words")?;
-            output::write_beside(path, |file| file.write_all(text.as_bytes()))?;
+            write_json(path, &figures)?;
         }
         println!(
             "{}: worst visibility {:.2} in frame {} (seen in a 1° patch with {:.1} %), {:.2} % of {} frames above threshold, \
              on \"{}\" at {} pixels a degree and {} frames a second, by an eye that {} (model-predicted; calibrated on \
              gratings, not on renderings)",
-            if figures.is_visible { "visible in motion" } else { "the same to the eye in motion" },
-            figures.worst_visibility,
+            if seen.is_visible { "visible in motion" } else { "the same to the eye in motion" },
+            seen.worst_visibility,
             figures.worst_frame,
-            100.0 * figures.detection_probability_worst,
-            100.0 * figures.visible_fraction,
+            100.0 * seen.detection_probability_worst,
+            100.0 * seen.visible_fraction,
             figures.frames.len(),
-            figures.display,
-            figures.pixels_per_degree,
+            figures.all.display,
+            figures.all.pixels_per_degree,
             figures.frames_per_second,
             if figures.eye_follows { "follows what moves" } else { "rests" },
         );
-        Ok(ExitCode::from(u8::from(figures.is_visible)))
+        Ok(ExitCode::from(u8::from(seen.is_visible)))
     }
 }
 
