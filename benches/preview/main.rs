@@ -27,7 +27,7 @@ use race::races;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 use support::CpuClock;
-use watched::{Moment, Watched};
+use watched::Watched;
 
 const SCENES: [&str; 3] = ["cornell-box", "many-lights", "textured-room"];
 /// Samples a pixel at which renders end that are compared by the clock.
@@ -151,9 +151,7 @@ fn first_pictures(subjects: &[Subject]) -> Result<()> {
             let pixels = subject.pixels() as u64;
             let moments = watched.until(|moment| moment.samples >= 2 * pixels)?;
             first.push(moments[0].seconds - tree);
-            // The draft is in a film of its own, and its end is always shown.
-            let is_drafted = |moment: &&Moment| moment.step == 1 && moment.samples == 0;
-            whole.extend(moments.iter().rfind(is_drafted).map(|moment| moment.seconds - tree));
+            whole.extend(moments.last().map(|moment| moment.seconds - tree));
         }
         let [trees, pass, first, whole] = [trees, pass, first, whole].map(|times| 1e3 * least(times));
         let (name, first_ratio, whole_ratio) = (subject.name, first / pass, whole / pass);

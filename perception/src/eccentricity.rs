@@ -120,14 +120,17 @@ impl EnergyTable {
 }
 
 impl ThresholdMap {
-    /// The same thresholds for an eye that looks at `gaze`.
+    /// The same thresholds for eyes that look at `gazes`, of which the nearest counts at every pixel; without any, nothing changes.
     ///
     /// Each band's threshold is raised by the root of what is left of the energy that white noise has in it, at the middle one of
     /// the picture's adaptation levels: the fall within a band is steep, and its centre alone would promise too much.
     #[must_use]
-    pub fn with_gaze(&self, gaze: Gaze) -> Self {
+    pub fn with_gazes(&self, gazes: &[Gaze]) -> Self {
         let density = self.viewing.display.pixel_density();
-        let eccentricity = eccentricity_deg(self.width(), self.height(), gaze, density);
+        let of_gaze = |gaze: &Gaze| eccentricity_deg(self.width(), self.height(), *gaze, density);
+        let Some(eccentricity) = gazes.iter().map(of_gaze).reduce(|a, b| a.combined(&b, f32::min)) else {
+            return self.clone();
+        };
         let mut turned = self.clone();
         for (band, elevation) in turned.elevations.iter_mut().enumerate() {
             let visible = |freq: f64| {
@@ -210,7 +213,12 @@ mod tests {
         let grey = Plane::filled(512, 256, 50.0);
         let inputs = ThresholdInputs { display_luminance_cd_m2: &grey, guide_variance: None };
         let map = threshold_map(&inputs, &viewing, &CastleCsf::default()).unwrap();
-        let turned = map.with_gaze(Gaze { x_px: 40.0, y_px: 128.0 });
+        let turned = map.with_gazes(&[Gaze { x_px: 40.0, y_px: 128.0 }]);
+        assert_eq!(map.with_gazes(&[]).noise_gain(), map.noise_gain());
+        let [left, right] = [40.0, 480.0].map(|x_px| Gaze { x_px, y_px: 128.0 });
+        let both = map.with_gazes(&[left, right]);
+        let nearest = turned.noise_gain().combined(map.with_gazes(&[right]).noise_gain(), f32::max);
+        assert!(both.noise_gain().values().iter().zip(nearest.values()).all(|(a, b)| (a / b - 1.0).abs() < 1e-3));
         let ratio = |x: usize| {
             turned.allowed_standard_error_cd_m2(1.0).get(x, 128) / map.allowed_standard_error_cd_m2(1.0).get(x, 128)
         };
@@ -245,7 +253,7 @@ mod tests {
         let viewing =
             Viewing { display: Display { pixels_per_degree: 10.0, ..Display::default() }, ..Viewing::default() };
         let map = threshold_map(&inputs, &viewing, &CastleCsf::default()).unwrap();
-        let turned = map.with_gaze(Gaze { x_px: 10.0, y_px: 32.0 });
+        let turned = map.with_gazes(&[Gaze { x_px: 10.0, y_px: 32.0 }]);
         let left = |before: &Plane, after: &Plane| after.get(230, 32) / before.get(230, 32);
         let (before, after) = (map.chromatic_gains().unwrap(), turned.chromatic_gains().unwrap());
         let luminance = left(map.noise_gain(), turned.noise_gain());

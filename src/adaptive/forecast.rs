@@ -107,6 +107,7 @@ mod tests {
         assert!((amid - 1.0).abs() < 0.01, "amid noise {amid}");
         assert!((0.9..0.98).contains(&beside), "beside it {beside}");
         judgement.importance = Some(Plane::filled(64, 64, 0.5));
+        judgement.predicted = judgement.predicted.map(|visibility| visibility / 0.5);
         let of_half = Forecast::of(&film, &judgement).tolerance();
         assert!((of_half.get(12, 30) / tolerance.get(12, 30) - 0.5).abs() < 1e-6);
     }

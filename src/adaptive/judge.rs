@@ -90,10 +90,7 @@ pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Jud
         &settings.viewing,
         &csf,
     )?;
-    let thresholds = match settings.gaze {
-        Some(gaze) => thresholds.with_gaze(gaze),
-        None => thresholds,
-    };
+    let thresholds = if settings.gazes.is_empty() { thresholds } else { thresholds.with_gazes(&settings.gazes) };
     still_wanted(settings)?;
     let pixel_thresholds = match &settings.model {
         None => None,

@@ -27,15 +27,22 @@ const SMALL_DOUBLING: u64 = 256;
 /// Gap to the cheapest counts that is enough: rounding to doublings and the confidence margin cost more than 1 %.
 const ENOUGH_GAP: f64 = 0.01;
 
-/// The first samples of every pixel: 8 + 8, or as many as `max_samples` allows.
-pub fn pilot_plan(pixels: u32, max_samples: u32) -> SamplePlan {
+/// Samples of each half that every pixel has before any has the rest of its pilot: who watches has a picture of 2 + 2 early, and
+/// one that is about even on the way to 8 + 8. Single samples at first would be as many sums again in a farm's files.
+const FIRST_PASS_SAMPLES: u32 = 2;
+
+/// What a film lacks of the first samples of every pixel: 8 + 8, or `most_samples` in all where they are fewer.
+pub fn pilot_plan(film: &Film, most_samples: u32) -> SamplePlan {
     let mut plan = SamplePlan::default();
-    for pixel in 0..pixels {
+    let share = |half: Half| ((most_samples + 1 - half.index() as u32) / 2).min(PILOT_SAMPLES);
+    for [from, to] in [[0, FIRST_PASS_SAMPLES], [FIRST_PASS_SAMPLES, PILOT_SAMPLES]] {
         for half in Half::BOTH {
-            let share = (max_samples + 1 - half.index() as u32) / 2;
-            let samples = PILOT_SAMPLES.min(share);
-            if samples > 0 {
-                plan.blocks.push(BlockWork { samples, ..BlockWork::whole(pixel, half, 0) });
+            let to = to.min(share(half));
+            for pixel in 0..film.width() * film.height() {
+                let first = film.half(half)[pixel as usize].taken.max(from);
+                if first < to {
+                    plan.blocks.push(BlockWork { first, samples: to - first, ..BlockWork::whole(pixel, half, 0) });
+                }
             }
         }
     }

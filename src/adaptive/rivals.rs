@@ -174,7 +174,7 @@ mod tests {
     /// A film whose left half is noise of standard deviation `noise` about 0.5, and whose right half is flat.
     fn film(noise: f32) -> Film {
         let mut film = Film::new(32, 16);
-        for block in pilot_plan(32 * 16, 16).blocks {
+        for block in pilot_plan(&film, 16).blocks {
             extend(&mut film, block, noise);
         }
         film

@@ -111,9 +111,9 @@ pub struct LoopSettings {
     pub frames: Option<FrameTiming>,
     /// What each pixel's thresholds are multiplied by, above 0, of the film's size: somebody's own idea of what matters.
     pub importance: Option<Plane>,
-    /// Where one looks, in pixels of the film: thresholds rise away from there. `None` for a picture that anybody may look at
+    /// Where one looks, in pixels of the film: thresholds rise away from all of these. None for a picture that anybody may look at
     /// anywhere. For the default threshold model alone.
-    pub gaze: Option<Gaze>,
+    pub gazes: Vec<Gaze>,
     /// What makes the output picture out of the mean; `None` leaves it raw.
     pub denoiser: Option<Denoiser>,
     /// Asked during a look: whether it is of no use any more, as somebody wants another picture. `None` never interrupts.
@@ -134,7 +134,7 @@ impl LoopSettings {
             fitted: None,
             frames: None,
             importance: None,
-            gaze: None,
+            gazes: Vec::new(),
             denoiser: None,
             is_outdated: None,
         }

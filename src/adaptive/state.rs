@@ -1,10 +1,10 @@
 //! All of a render that decides what comes next: what a checkpoint holds, and what a resumed render goes on from.
 
 use super::audit::Audit;
-use super::plan::uniform_plan;
+use super::plan::pilot_plan;
 use super::settings::Limits;
 use crate::film::Film;
-use crate::integrator::{BlockWork, PILOT_SAMPLES, SamplePlan};
+use crate::integrator::{BlockWork, SamplePlan};
 use fechner_perception::tone::SavedTone;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
@@ -82,7 +82,7 @@ impl RenderState {
     /// A film about which nothing has been decided: empty, merged from others, or made for other eyes. Planned is what it
     /// lacks of a pilot of 8 + 8 samples a pixel, or of `most_samples` in all.
     pub fn of_film(film: Film, most_samples: u32) -> Self {
-        let pilot = uniform_plan(&film, most_samples.min(2 * PILOT_SAMPLES));
+        let pilot = pilot_plan(&film, most_samples);
         Self {
             film,
             pending: if pilot.blocks.is_empty() { VecDeque::new() } else { VecDeque::from([pilot]) },

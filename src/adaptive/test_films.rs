@@ -18,9 +18,9 @@ pub(super) fn settings() -> LoopSettings {
 /// A pilot at 64×64 of `color(pixel, random in −1..1)`.
 pub(super) fn film_of(color: impl Fn(u32, f32) -> Vec3) -> Film {
     let mut film = Film::new(64, 64);
-    for block in pilot_plan(64 * 64, 16).blocks {
+    for block in pilot_plan(&film, 16).blocks {
         let mut sum = BlockSum::default();
-        for index in 0..block.samples {
+        for index in block.first..block.first + block.samples {
             let key = u64::from(block.pixel) << 8 | u64::from(index);
             let random = (hash_words(key, block.half.index() as u64) >> 40) as f32 / 8_388_608.0 - 1.0;
             let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1 };

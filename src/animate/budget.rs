@@ -67,7 +67,7 @@ impl Needs {
             let area = tracer.settings().film_area();
             let mut film = Film::new(area.width, area.height);
             let started = Instant::now();
-            tracer.trace(&pilot_plan(area.width * area.height, PILOT), &mut film, &|_| {});
+            tracer.trace(&pilot_plan(&film, PILOT), &mut film, &|_| {});
             seconds += started.elapsed().as_secs_f64();
             samples += film.total_samples();
             let judgement = judge(&film, &settings, 1.0)?;

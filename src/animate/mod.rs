@@ -13,6 +13,7 @@
 //! Not for stills: see [`crate::adaptive`].
 
 pub mod budget;
+pub mod gaze;
 pub mod name;
 pub mod track;
 pub mod velocity;
@@ -29,6 +30,7 @@ use crate::scene::load::LoadError;
 use fechner_perception::csf::FrameTiming;
 use fechner_perception::display::Viewing;
 use fechner_perception::tone::ToneOperator;
+use gaze::GazeTrack;
 use std::sync::Arc;
 use track::TrackFrame;
 use velocity::VelocityMap;
@@ -64,6 +66,8 @@ pub struct ShotSettings {
     pub nits_per_unit: f64,
     /// What the eye is adapted to before the first frame, cd/m², for operators that ask; `None`: to the first frame.
     pub adapted_to_cd_m2: Option<f64>,
+    /// Where the shot is looked at; `None`: anywhere.
+    pub gaze: Option<GazeTrack>,
     /// What makes each frame out of its mean; `None` leaves them raw.
     pub denoiser: Option<Denoiser>,
 }
@@ -78,8 +82,11 @@ impl ShotSettings {
     pub fn frame_settings(&self, operator: Box<dyn ToneOperator>, track: &TrackFrame) -> LoopSettings {
         let timing =
             FrameTiming { frames_per_second: self.frames_per_second, persistence: self.viewing.display.persistence };
+        let size = self.trace.film_area();
+        let gazes = self.gaze.as_ref().map(|gaze| gaze.of_frame(track.frame, size.width, size.height).to_vec());
         LoopSettings {
             sampling: self.sampling,
+            gazes: gazes.unwrap_or_default(),
             limits: Limits { mean_samples: track.mean_samples.or(self.limits.mean_samples), ..self.limits },
             denoiser: self.denoiser.clone(),
             fitted: Some(track.fitted.clone()),

@@ -130,10 +130,14 @@ fn made_for(shot: &ShotSettings, operator: &dyn ToneOperator) -> String {
         operator.name(),
         shot.adapted_to_cd_m2,
         shot.limits.mean_samples,
-        // Whether frames may be paused decides what they need of a budget.
-        shot.limits.mean_samples.map(|_| (shot.sampling, shot.pausable, shot.limits)),
+        // Whether frames may be paused, and where they are looked at, decides what they need of a budget.
+        shot.limits.mean_samples.map(|_| (shot.sampling, shot.pausable, shot.limits, gaze_hash(shot))),
         shot.viewing,
     )
+}
+
+fn gaze_hash(shot: &ShotSettings) -> Option<ContentHash> {
+    shot.gaze.as_ref().map(|gaze| ContentHash::of_bytes(format!("{gaze:?}").as_bytes()))
 }
 
 /// The eye in every frame.
@@ -163,7 +167,7 @@ impl Look {
         let settings = TraceSettings { width, height, crop: None, ..shot.trace };
         let tracer = PathTracer::new(scene, settings);
         let mut film = Film::new(width, height);
-        tracer.trace(&pilot_plan(width * height, PILOT_SAMPLES), &mut film, &|_| {});
+        tracer.trace(&pilot_plan(&film, PILOT_SAMPLES), &mut film, &|_| {});
         let estimate = film.estimate(shot.nits_per_unit);
         Self { luminance: guide_luminance(&film, &estimate) }
     }

@@ -124,6 +124,7 @@ impl<'a> Bench<'a> {
             viewing: Viewing::of(display),
             nits_per_unit: source.at(0.0)?.nits_per_unit,
             adapted_to_cd_m2: None,
+            gaze: None,
             denoiser: None,
         };
         let operator = tone::operator("constant", None).context("an operator")?;
@@ -170,7 +171,8 @@ impl<'a> Bench<'a> {
 
     /// Mean samples a pixel and the frames by one of the rules.
     fn adaptive(&self, pausable: bool) -> Result<(f64, Frames)> {
-        let shot = ShotSettings { pausable, viewing: self.shot.viewing.clone(), denoiser: None, ..self.shot };
+        let shot =
+            ShotSettings { pausable, viewing: self.shot.viewing.clone(), gaze: None, denoiser: None, ..self.shot };
         let (mut samples, mut frames) = (0, Vec::new());
         for index in 0..self.scenes.len() {
             let operator = tone::operator("constant", None).context("an operator")?;

@@ -85,6 +85,10 @@ pub(super) struct AnimateArguments {
     /// What the eye is adapted to before the first frame; without it, to the first frame.
     #[arg(long, value_name = "CD_M2", value_parser = parse_positive, help_heading = "Seeing")]
     adapted_to: Option<f64>,
+    /// Where viewers look: lines of frame,x,y in pixels. What is far from all gazes of a frame may stay noisier; in frames without a
+    /// line everything may be looked at.
+    #[arg(long, value_name = "FILE.csv", conflicts_with = "pausable", help_heading = "Seeing")]
+    gaze: Option<PathBuf>,
     /// Tone operator.
     #[arg(long, value_name = "NAME", help_heading = "Picture")]
     operator: Option<String>,

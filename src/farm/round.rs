@@ -144,11 +144,12 @@ pub(super) fn clear_before(farm: &Farm, frame_index: usize, round: u32) {
 mod tests {
     use super::*;
     use crate::adaptive::plan::pilot_plan;
+    use crate::film::Film;
 
     /// Every block is in one unit, in order, and units are about equal.
     #[test]
     fn cuts_hold_everything_and_are_even() {
-        let mut blocks = pilot_plan(100, 16).blocks;
+        let mut blocks = pilot_plan(&Film::new(10, 10), 16).blocks;
         for (i, block) in blocks.iter_mut().enumerate() {
             block.samples = 1 + (i as u32 * 37) % 64;
         }

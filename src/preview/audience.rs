@@ -63,7 +63,7 @@ impl<'a> Audience<'a> {
         let is_at_rest = moving.status.phase == Phase::Stopped;
         // The film stands in for itself where it has no samples yet.
         let (film, tone, settings) = (&state.film, state.tone.as_ref(), self.settings);
-        moving.screen.show(Scenery { film, draft: film, tone, settings, is_at_rest, step: 1 }, &self.shared);
+        moving.screen.show(Scenery { film, tone, settings, is_at_rest, step: 1 }, &self.shared);
         (moving.status.width, moving.status.height) = (film.width(), film.height());
         let total_samples = moving.screen.total_samples;
         count(&mut moving.status, state, total_samples, moving.progress.as_ref());

@@ -3,7 +3,6 @@
 
 use crate::film::Film;
 use crate::integrator::{BlockWork, SamplePlan};
-use crate::sampler::Half;
 
 /// Distance in pixels of the coarsest grid.
 const COARSEST: u32 = 16;
@@ -14,30 +13,17 @@ fn spacing(x: u32, y: u32) -> u32 {
     1 << both.trailing_zeros()
 }
 
-/// One sample for every pixel, coarse grids first.
-pub(super) fn draft_plan(width: u32, height: u32) -> SamplePlan {
-    let mut plan = SamplePlan::default();
-    for step in [COARSEST, 8, 4, 2, 1] {
-        for y in (0..height).step_by(step as usize) {
-            let row = (0..width).step_by(step as usize).filter(|&x| spacing(x, y) == step);
-            let one = |x| BlockWork { samples: 1, ..BlockWork::whole(y * width + x, Half::A, 0) };
-            plan.blocks.extend(row.map(one));
-        }
-    }
-    plan
-}
-
-/// Sorts a plan's blocks from coarse to fine, one half after the other: half of a pilot's samples for every pixel look better than
-/// all of them for half of the pixels. Blocks of one pixel keep their order, so the film that comes of it has the
-/// same bytes.
-pub(super) fn order(plan: &mut SamplePlan, width: u32) {
+/// Sorts a pilot's blocks from coarse to fine, one pass over the picture after the other: some of a pilot's samples for every pixel
+/// look better than all of them for some pixels. Blocks of one pixel's half keep their order, so the film that comes of it
+/// has the same bytes.
+pub(super) fn order(pilot: &mut SamplePlan, width: u32) {
     let place = |block: &BlockWork| {
         let (x, y) = (block.pixel % width, block.pixel / width);
         // Rows far apart after one another: the finest grid is most of the plan, and swept from above it would leave the lower
         // part behind for seconds.
-        (block.half.index(), std::cmp::Reverse(spacing(x, y)), y.reverse_bits())
+        (block.first, block.half.index(), std::cmp::Reverse(spacing(x, y)), y.reverse_bits(), x)
     };
-    plan.blocks.sort_by_cached_key(place);
+    pilot.blocks.sort_unstable_by_key(place);
 }
 
 /// The index of the pixel whose samples stand for one: itself, or the nearest above and to the left on a grid that has been
@@ -54,26 +40,31 @@ pub(super) fn stand_in(film: &Film, pixel: usize) -> Option<usize> {
 mod tests {
     use super::*;
     use crate::adaptive::plan::pilot_plan;
+    use crate::sampler::Half;
 
     /// Every beginning of the order covers the picture as evenly as its length allows, and nothing is lost.
     #[test]
     fn coarse_grids_come_first() {
-        let plan = draft_plan(40, 24);
-        assert_eq!(plan.blocks.len(), 40 * 24);
+        let mut plan = pilot_plan(&Film::new(40, 24), 16);
+        let unordered = plan.samples();
+        order(&mut plan, 40);
         let first: Vec<u32> = plan.blocks.iter().take(6).map(|b| b.pixel).collect();
         assert_eq!(first, [0, 16, 32, 16 * 40, 16 * 40 + 16, 16 * 40 + 32]);
-        let mut pixels: Vec<u32> = plan.blocks.iter().map(|b| b.pixel).collect();
+        let mut pixels: Vec<u32> = plan.blocks.iter().take(40 * 24).map(|b| b.pixel).collect();
         pixels.sort_unstable();
         assert!(pixels.into_iter().eq(0..40 * 24));
+        assert_eq!(plan.samples(), unordered);
     }
 
     #[test]
-    fn one_half_comes_after_the_other() {
-        let mut plan = pilot_plan(40 * 24, 16);
+    fn one_pass_comes_after_the_other() {
+        let mut plan = pilot_plan(&Film::new(40, 24), 16);
         order(&mut plan, 40);
-        let (first, second) = plan.blocks.split_at(40 * 24);
-        assert!(first.iter().all(|b| b.half == Half::A) && second.iter().all(|b| b.half == Half::B));
-        let pixels = |blocks: &[BlockWork]| blocks.iter().map(|b| b.pixel).collect::<Vec<u32>>();
-        assert_eq!(pixels(first), pixels(second));
+        let passes: Vec<&[BlockWork]> = plan.blocks.chunks(40 * 24).collect();
+        let kinds = [(Half::A, 0, 2), (Half::B, 0, 2), (Half::A, 2, 6), (Half::B, 2, 6)];
+        assert_eq!(passes.len(), kinds.len());
+        for (pass, kind) in passes.iter().zip(kinds) {
+            assert!(pass.iter().all(|b| (b.half, b.first, b.samples) == kind));
+        }
     }
 }

@@ -127,8 +127,6 @@ pub(super) enum SavedFormat {
 pub(super) enum Phase {
     /// Few pixels for each place of a camera that moves.
     Moving,
-    /// One sample a pixel that is shown and not kept.
-    Drafting,
     /// The loop.
     Rendering,
     /// Nothing, until somebody says to go on.

@@ -1,5 +1,6 @@
 //! What a viewer can look at, and how values become colours.
 
+use super::coarse::stand_in;
 use crate::film::{Film, PixelGuide};
 use crate::output::encode_srgb8;
 use fechner_perception::Plane;
@@ -93,20 +94,20 @@ pub(super) fn signed(values: &Plane, unit: &str) -> Colours {
 
 /// Colours between 0 and 1.
 pub(super) fn albedo(film: &Film) -> Colours {
-    let albedo: Vec<[f32; 3]> = film.guides().iter().map(|g| g.albedo).collect();
+    let albedo: Vec<[f32; 3]> = surfaces(film).map(|surface| surface.albedo).collect();
     Colours { rgb8: encode_srgb8(film.width(), &albedo), legend: "share of light that is reflected".to_owned() }
 }
 
 /// x, y, z from −1 to 1 as red, green, blue.
 pub(super) fn normal(film: &Film) -> Colours {
     let byte = |n: f32| (127.5 + 127.5 * n.clamp(-1.0, 1.0)) as u8;
-    let rgb8 = film.guides().iter().flat_map(|g| g.normal.map(byte)).collect();
+    let rgb8 = surfaces(film).flat_map(|surface| surface.normal.map(byte)).collect();
     Colours { rgb8, legend: "x, y, z of the world as red, green, blue; −1 dark, 1 bright".to_owned() }
 }
 
 /// Near is bright.
 pub(super) fn depth(film: &Film) -> Colours {
-    let depths: Vec<f32> = film.guides().iter().map(|g: &PixelGuide| g.depth).collect();
+    let depths: Vec<f32> = surfaces(film).map(|surface| surface.depth).collect();
     let plane = Plane::from_values(film.width() as usize, film.height() as usize, depths);
     let Ok(plane) = plane else { return nothing_yet(film) };
     let (low, high) = range(&plane);
@@ -145,6 +146,11 @@ pub(super) fn velocity(to_next_px: &[Vec2], frames_per_second: f64) -> Colours {
 pub(super) fn unknown(film: &Film, why: &str) -> Colours {
     let bytes = 3 * film.width() as usize * film.height() as usize;
     Colours { rgb8: vec![24; bytes], legend: why.to_owned() }
+}
+
+/// First surfaces; where a pixel has no samples yet, another's.
+fn surfaces(film: &Film) -> impl Iterator<Item = &PixelGuide> {
+    (0..film.guides().len()).map(|pixel| &film.guides()[stand_in(film, pixel).unwrap_or(pixel)])
 }
 
 /// For layers that need a look at the film which has not been taken.

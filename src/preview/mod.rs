@@ -4,9 +4,9 @@
 //! the bytes of `fechner render`, and shows it to any number of viewers over a WebSocket. The order of work:
 //!
 //! 1. while the camera moves, and at first, a `glimpse` of as many pixels as a frame has time for;
-//! 2. a draft of one sample a pixel, coarse to fine (`coarse`), into a film that is only ever shown;
-//! 3. the loop, in batches of about a tenth of a second, between which `session` obeys what viewers ask;
-//! 4. `screen` turns film into encoded frames, at most ten a second and never more than viewers look at.
+//! 2. the loop, in batches of about a tenth of a second, between which `session` obeys what viewers ask; its pilot goes from coarse
+//!    to fine (`coarse`);
+//! 3. `screen` turns film into encoded frames, at most ten a second and never more than viewers look at.
 //!
 //! Viewers get the latest frame and none that they missed, so a slow one costs nobody else anything. Not for pictures that
 //! should be kept or compared: `render` writes those, and so does "save" here.
@@ -83,7 +83,7 @@ pub trait Host: Send + Sync {
 /// What a preview does beside showing the picture to browsers.
 #[derive(Default)]
 pub struct Options {
-    /// Whether viewers' pointers stand for their gaze: see [`LoopSettings::gaze`].
+    /// Whether viewers' pointers stand for their gaze: see [`LoopSettings::gazes`].
     pub is_foveated: bool,
     /// Who else is shown each frame.
     pub spectators: Vec<Box<dyn Spectator>>,

@@ -23,8 +23,8 @@ use std::time::{Duration, Instant};
 
 /// Time between frames, at least.
 const FRAME_INTERVAL: Duration = Duration::from_millis(100);
-/// For so long after a start frames may take a tenth of the time, then a fortieth.
-const LIVELY: Duration = Duration::from_secs(5);
+/// For so long after a start frames may take a twentieth of the time, then a fortieth: 3 % of the first ten seconds.
+const LIVELY: Duration = Duration::from_secs(2);
 
 /// What the last look at the film saw.
 #[derive(Debug)]
@@ -63,8 +63,6 @@ pub(super) struct Snapshot {
 #[derive(Clone, Copy)]
 pub(super) struct Scenery<'a> {
     pub(super) film: &'a Film,
-    /// Stands in for pixels that the film has no samples of.
-    pub(super) draft: &'a Film,
     /// The operator's fit at the last look.
     pub(super) tone: Option<&'a SavedTone>,
     pub(super) settings: &'a LoopSettings,
@@ -121,7 +119,7 @@ impl Screen {
 
     /// Whether a frame is due.
     pub(super) fn is_due(&self) -> bool {
-        let times_cost = if self.started.elapsed() < LIVELY { 9 } else { 39 };
+        let times_cost = if self.started.elapsed() < LIVELY { 19 } else { 39 };
         self.shown.is_none_or(|shown| shown.elapsed() >= FRAME_INTERVAL.max(self.cost * times_cost))
     }
 
@@ -141,7 +139,8 @@ impl Screen {
         let nits_per_unit = scenery.settings.nits_per_unit;
         // Denoised pictures are made by looks; between two the last one stays.
         let denoised = self.looked.as_ref().and_then(|looked| looked.denoised.clone());
-        let (raw, samples) = composed(scenery.film, scenery.draft, nits_per_unit);
+        let is_pilot = self.looked.is_none() && !scenery.is_at_rest;
+        let (raw, samples) = composed(scenery.film, nits_per_unit, is_pilot);
         let rgb_cd_m2 = denoised.unwrap_or(raw);
         for layer in ALL.into_iter().filter(|&layer| shared.is_watched(layer)) {
             let colours = self.colours(layer, scenery, &rgb_cd_m2);
@@ -171,10 +170,8 @@ impl Screen {
     }
 
     fn colours(&self, layer: Layer, scenery: Scenery<'_>, rgb_cd_m2: &[[f32; 3]]) -> Colours {
-        let Scenery { film, settings, draft, .. } = scenery;
+        let Scenery { film, settings, .. } = scenery;
         let (width, height) = (film.width() as usize, film.height() as usize);
-        // First surfaces are known from the draft on.
-        let surfaces = || if film.total_samples() >= draft.total_samples() { film } else { draft };
         match (layer, &self.looked) {
             (Layer::Picture, _) => {
                 let tone = match scenery.tone {
@@ -197,9 +194,9 @@ impl Screen {
             (Layer::HalfDifference, _) => {
                 layer::signed(&film.estimate(settings.nits_per_unit).half_difference, "cd/m², of the scene")
             }
-            (Layer::Albedo, _) => layer::albedo(surfaces()),
-            (Layer::Normal, _) => layer::normal(surfaces()),
-            (Layer::Depth, _) => layer::depth(surfaces()),
+            (Layer::Albedo, _) => layer::albedo(film),
+            (Layer::Normal, _) => layer::normal(film),
+            (Layer::Depth, _) => layer::depth(film),
             (Layer::Velocity, _) => match &self.motion {
                 Motion::Known { to_next_px, frames_per_second } if to_next_px.len() == pixels(film) => {
                     layer::velocity(to_next_px, *frames_per_second)
@@ -228,14 +225,16 @@ fn pixels(film: &Film) -> usize {
     film.width() as usize * film.height() as usize
 }
 
-/// The film's picture, cd/m², and its samples of each pixel; where it has none, the draft's picture. In one walk: a film is
-/// many times as large as a picture.
-fn composed(film: &Film, draft: &Film, nits_per_unit: f64) -> (Vec<[f32; 3]>, Vec<u32>) {
-    let stands_in =
-        |pixel: usize| stand_in(draft, pixel).map_or([0.0; 3], |stand_in| draft.rgb_cd_m2(stand_in, nits_per_unit));
+/// The film's picture, cd/m², and its samples of each pixel; where it has none, another pixel's picture. In one walk: a film is
+/// many times as large as a picture. While a pilot is traced one half is ahead of the other.
+fn composed(film: &Film, nits_per_unit: f64, is_pilot: bool) -> (Vec<[f32; 3]>, Vec<u32>) {
+    let light = |pixel: usize| {
+        let light = if is_pilot { Film::mean_of_samples_cd_m2 } else { Film::rgb_cd_m2 };
+        light(film, pixel, nits_per_unit)
+    };
     let of_pixel = |pixel: usize| match film.samples(pixel) {
-        0 => (stands_in(pixel), 0),
-        samples => (film.rgb_cd_m2(pixel, nits_per_unit), samples),
+        0 => (stand_in(film, pixel).map_or([0.0; 3], light), 0),
+        samples => (light(pixel), samples),
     };
     let (mut rgb, mut samples) = (Vec::new(), Vec::new());
     (0..pixels(film)).into_par_iter().map(of_pixel).unzip_into_vecs(&mut rgb, &mut samples);

@@ -1,4 +1,4 @@
-//! The render's thread: glimpses, drafts, renders, and obeys between two batches.
+//! The render's thread: glimpses, renders, and obeys between two batches.
 
 mod gaze;
 mod live;
@@ -9,7 +9,7 @@ mod saving;
 mod telling;
 mod watch;
 
-use super::coarse::{draft_plan, order};
+use super::coarse::order;
 use super::command::{Command, Phase};
 use super::glimpse::{Glimpse, Resolution};
 use super::orbit::Held;
@@ -20,8 +20,7 @@ use crate::adaptive::judge::{JudgeError, Judgement, judge};
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::state::RenderState;
 use crate::adaptive::{LastLook, Progress, run as run_loop};
-use crate::film::Film;
-use crate::integrator::{Crop, PathTracer, SamplePlan};
+use crate::integrator::{Crop, PathTracer};
 use gaze::Follower;
 use live::{Live, settings_of};
 use motion::Neighbours;
@@ -86,14 +85,11 @@ struct Session<'a> {
     /// When it was moved last, unless the picture is the first.
     moved_at: Option<Instant>,
     resolution: Resolution,
-    /// Until the draft shows more.
+    /// Until the film shows more.
     glimpse: Option<Glimpse>,
     tracer: PathTracer,
     settings: LoopSettings,
     phase: Phase,
-    /// What is left of the draft, from the last block on.
-    draft_left: SamplePlan,
-    draft: Film,
     state: RenderState,
     /// While stopped.
     last_look: Option<LastLook>,
@@ -123,8 +119,6 @@ impl<'a> Session<'a> {
             glimpse: None,
             tracer,
             phase: Phase::Moving,
-            draft_left: SamplePlan::default(),
-            draft: Film::new(0, 0),
             state: RenderState::new(0, 0, &settings.limits),
             last_look: None,
             screen: Screen::new(std::mem::take(&mut options.spectators)),
@@ -155,7 +149,6 @@ impl<'a> Session<'a> {
                     Some(left) => self.shared.wait(left),
                     None => self.restart(),
                 },
-                Phase::Drafting => self.trace_draft(),
                 Phase::Rendering => self.render(),
                 Phase::Paused | Phase::Stopped => {
                     self.tell();
@@ -174,7 +167,6 @@ impl<'a> Session<'a> {
         self.progress = None;
         self.screen.looked = None;
         // Films of another place are of no use, and counting their samples would take longer than the glimpse.
-        self.draft = Film::new(0, 0);
         self.state = RenderState::new(0, 0, &self.settings.limits);
         let glimpse = Glimpse::of(&self.tracer, self.resolution.step(width, height));
         let pixels = glimpse.film.width() * glimpse.film.height();
@@ -184,14 +176,12 @@ impl<'a> Session<'a> {
         self.tell();
     }
 
-    /// Throws all samples away and begins with a draft.
+    /// Throws all samples away and begins anew.
     fn restart(&mut self) {
         let Crop { width, height, .. } = self.job.trace.film_area();
-        self.draft = Film::new(width, height);
-        self.draft_left = draft_plan(width, height);
-        self.draft_left.blocks.reverse();
         self.state = RenderState::new(width, height, &self.settings.limits);
-        self.phase = Phase::Drafting;
+        self.order_pilot();
+        self.phase = Phase::Rendering;
         self.last_look = None;
         self.progress = None;
         self.screen.begin();
@@ -202,32 +192,6 @@ impl<'a> Session<'a> {
         let width = self.state.film.width();
         if let Some(pilot) = self.state.pending.front_mut().filter(|_| self.state.plans == 0) {
             order(pilot, width);
-        }
-    }
-
-    /// One batch of the draft.
-    fn trace_draft(&mut self) {
-        let count = (self.pace.samples() as usize).min(self.draft_left.blocks.len());
-        let start = self.draft_left.blocks.len() - count;
-        let mut batch = SamplePlan { blocks: self.draft_left.blocks.split_off(start) };
-        batch.blocks.reverse();
-        self.pace.begin();
-        self.tracer.trace(&batch, &mut self.draft, &|_| {});
-        self.pace.done(batch.samples());
-        if self.draft_left.blocks.is_empty() {
-            self.order_pilot();
-            self.phase = Phase::Rendering;
-        }
-        // A grid coarser than the last glimpse would be a step back.
-        let glimpsed = self.glimpse.as_ref().map_or(0, |glimpse| glimpse.film.width() * glimpse.film.height());
-        let pixels = self.draft.width() * self.draft.height();
-        if pixels as usize - self.draft_left.blocks.len() < glimpsed as usize {
-            return;
-        }
-        self.glimpse = None;
-        if self.screen.is_due() || self.phase == Phase::Rendering {
-            self.show();
-            self.tell();
         }
     }
 
@@ -242,10 +206,10 @@ impl<'a> Session<'a> {
             let watch = Watch {
                 shared: self.shared,
                 settings: &self.settings,
-                draft: &self.draft,
                 follower: self.gaze.as_ref(),
                 moving: Mutex::new(Moving {
                     screen: &mut self.screen,
+                    glimpse: &mut self.glimpse,
                     pace: &mut self.pace,
                     progress: &mut self.progress,
                     status,
@@ -297,13 +261,12 @@ impl<'a> Session<'a> {
     fn show(&mut self) {
         if let Some(Glimpse { film, step }) = &self.glimpse {
             let settings = &self.settings;
-            let scenery = Scenery { film, draft: film, tone: None, settings, is_at_rest: false, step: *step };
+            let scenery = Scenery { film, tone: None, settings, is_at_rest: false, step: *step };
             return self.screen.publish(scenery, self.shared);
         }
         self.find_motion();
         let scenery = Scenery {
             film: &self.state.film,
-            draft: &self.draft,
             tone: self.state.tone.as_ref(),
             settings: &self.settings,
             is_at_rest: matches!(self.phase, Phase::Paused | Phase::Stopped),

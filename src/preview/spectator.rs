@@ -14,7 +14,7 @@ pub trait Spectator: Send {
 pub struct Shown<'a> {
     /// Samples; while the camera moves, of fewer pixels than the picture has.
     pub film: &'a Film,
-    /// The picture, linear RGB in cd/m², of the film's size: with a draft where the film has no samples, denoised where asked for.
+    /// The picture, linear RGB in cd/m², of the film's size: where a pixel has no samples, another's; denoised where asked for.
     pub rgb_cd_m2: &'a [[f32; 3]],
     /// Pixels of the picture to each of the film's, each way.
     pub step: u32,

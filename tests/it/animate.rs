@@ -116,10 +116,36 @@ fn motion_needs_fewer_samples_than_a_pause() {
     assert!(2.0 * moving < paused, "{moving} and {paused} samples");
 }
 
+/// Away from where viewers look, noise may stay: a corner that is looked at costs less than everything, and a frame without a line
+/// as much as a shot without gazes.
+#[test]
+fn frames_are_judged_from_where_they_are_looked_at() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let display = "name = \"wide\"\npixels_per_degree = 2.0\nwhite_cd_m2 = 200.0\nblack_cd_m2 = 0.2\n";
+    std::fs::write(folder.path().join("wide.toml"), display).expect("written");
+    let samples = |gazes: Option<&str>| {
+        let mut arguments =
+            vec!["--frames", "1..1", "--visibility", "2", "--display", "wide.toml", "-o", "shot.##.png"];
+        if let Some(gazes) = gazes {
+            std::fs::write(folder.path().join("gaze.csv"), gazes).expect("written");
+            arguments.extend(["--gaze", "gaze.csv"]);
+        }
+        animate(folder.path(), &arguments);
+        let text = std::fs::read_to_string(folder.path().join("shot.01.json")).expect("a record");
+        let record: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+        record["report"]["samples_total"].as_u64().expect("a number")
+    };
+    let everywhere = samples(None);
+    let corner = samples(Some("frame,x,y\n1,0,15\n"));
+    assert!(3 * corner < 2 * everywhere, "{corner} and {everywhere} samples");
+    assert_eq!(samples(Some("0,0,15\n")), everywhere);
+}
+
 #[test]
 fn bad_arguments_are_named() {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("scene.toml"), SCENE).expect("written");
+    std::fs::write(folder.path().join("gaze.csv"), "frame,x,y\n0,1\n").expect("written");
     for (arguments, expected) in [
         (&["--frames", "5..2", "-o", "a.#.png"][..], "not a range of frames"),
         (&["--frames", "0..2", "-o", "a.png"], "a sequence's name has #"),
@@ -127,6 +153,7 @@ fn bad_arguments_are_named() {
         (&["--frames", "0..2", "-o", "a.#.png", "--video", "a.gif"], "videos end in .y4m or .mp4"),
         (&["--frames", "0..2", "-o", "a.#.png", "--operator", "sepia"], "no tone operator"),
         (&["--frames", "0..2", "-o", "a.#.png", "--fps", "0.1"], "between 1 and 1000"),
+        (&["--frames", "0..2", "-o", "a.#.png", "--gaze", "gaze.csv"], "line 2: \"0,1\" is not a frame's number"),
     ] {
         let mut command = Command::cargo_bin("fechner").expect("the binary is built");
         let output = command

@@ -54,7 +54,7 @@ fn the_rest_of_a_doubling_follows_on() {
 #[test]
 fn handfuls_are_not_looked_at_after_each_doubling() {
     let mut film = Film::new(64, 64);
-    for block in pilot_plan(64 * 64, 16).blocks {
+    for block in pilot_plan(&film, 16).blocks {
         film.merge_block(block, &constant_block(block.samples));
     }
     assert_eq!(doubling_of(&film, 1 << 16, |pixel| pixel == 70).samples(), 7 * 16);
@@ -69,7 +69,7 @@ fn a_uniform_plan_takes_exactly_what_is_asked() {
     for spp in [1u32, 2, 7, 16, 17, 100, 256] {
         let mut film = Film::new(3, 2);
         let mut taken = 0;
-        let mut plan = pilot_plan(6, spp);
+        let mut plan = pilot_plan(&film, spp);
         while !plan.blocks.is_empty() {
             taken += plan.samples();
             for block in &plan.blocks {
@@ -121,7 +121,7 @@ fn counts_can_be_trusted_on_heavy_tails() {
 /// Samples a field until the count rule asks for no more.
 fn stopped_film(size: u32, draw: fn(f64, f64) -> f64, variance_of_mean: f64) -> Film {
     let mut film = Film::new(size, size);
-    let mut plan = pilot_plan(size * size, 16);
+    let mut plan = pilot_plan(&film, 16);
     while !plan.blocks.is_empty() {
         for block in &plan.blocks {
             film.merge_block(*block, &drawn_block(*block, draw));
@@ -152,7 +152,8 @@ fn drawn_block(block: BlockWork, draw: fn(f64, f64) -> f64) -> BlockSum {
 
 #[test]
 fn slices_hold_the_whole_plan_and_spread_evenly() {
-    let plan = pilot_plan(64, 16);
+    let of_pixel = |pixel: u32| Half::BOTH.map(|half| BlockWork::whole(pixel, half, 0));
+    let plan = SamplePlan { blocks: (0..64).flat_map(of_pixel).collect() };
     for (traced, count) in [(u64::MAX, 1), (plan.samples() * 2, 4), (0, 16)] {
         let parts = slices(plan.clone(), 8, traced);
         assert_eq!(parts.len(), count);

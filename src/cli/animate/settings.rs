@@ -4,12 +4,14 @@ use super::frames::Frames;
 use super::{AnimateArguments, SamplingChoice};
 use crate::cli::job::{Quality, Size, check_memory};
 use crate::cli::seeing;
-use anyhow::Result;
+use anyhow::{Context, Result};
 use fechner::adaptive::settings::{DEFAULT_MAX_SAMPLES, Limits, Sampling};
 use fechner::animate::ShotSettings;
+use fechner::animate::gaze::GazeTrack;
 use fechner::denoise::Denoiser;
 use fechner::integrator::TraceSettings;
 use fechner::scene::Scene;
+use std::path::Path;
 
 /// Command line before scene before default.
 pub(super) fn shot_settings(arguments: &AnimateArguments, scene: &Scene, shot: Frames) -> Result<ShotSettings> {
@@ -38,6 +40,12 @@ pub(super) fn shot_settings(arguments: &AnimateArguments, scene: &Scene, shot: F
         viewing: seeing::viewing(display, None)?,
         nits_per_unit: arguments.nits_per_unit.unwrap_or(scene.nits_per_unit),
         adapted_to_cd_m2: arguments.adapted_to,
+        gaze: arguments.gaze.as_deref().map(read_gaze).transpose()?,
         denoiser: arguments.denoise.kind().map(Denoiser::open).transpose()?,
     })
+}
+
+fn read_gaze(path: &Path) -> Result<GazeTrack> {
+    let table = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
+    GazeTrack::parse(&table).with_context(|| path.display().to_string())
 }

@@ -238,7 +238,7 @@ impl<'a> Shot<'a> {
     /// All that a frame's file depends on, as a name.
     fn key(&self, settings: &LoopSettings, track: &TrackFrame, scenes: &FrameScenes) -> String {
         let text = format!(
-            "{}|{track:?}|{}|{}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}",
+            "{}|{track:?}|{}|{}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}",
             env!("CARGO_PKG_VERSION"),
             content_hash(&scenes.previous),
             content_hash(&scenes.next),
@@ -248,6 +248,7 @@ impl<'a> Shot<'a> {
             settings.limits,
             settings.viewing,
             settings.frames,
+            settings.gazes,
             self.arguments.aov_names,
             self.arguments.time
         );

@@ -53,5 +53,5 @@ pub(super) fn settings_of(job: &Job, live: &Live) -> Result<LoopSettings, String
     }
     let limits = Limits { visibility, ..job.limits };
     let settings = record.loop_settings(limits).map_err(|error| error.to_string())?;
-    Ok(LoopSettings { importance: job.importance.clone(), gaze: live.gaze, ..settings })
+    Ok(LoopSettings { importance: job.importance.clone(), gazes: live.gaze.into_iter().collect(), ..settings })
 }

@@ -20,7 +20,7 @@ impl Session<'_> {
         match command {
             Command::Layer { .. } | Command::Beside { .. } | Command::Inspect { .. } | Command::Gaze { .. } => {}
             Command::Redraw => self.show(),
-            Command::Pause if matches!(self.phase, Phase::Rendering | Phase::Drafting) => {
+            Command::Pause if self.phase == Phase::Rendering => {
                 self.phase = Phase::Paused;
                 self.show();
             }
@@ -59,12 +59,12 @@ impl Session<'_> {
 
     fn go_on(&mut self) {
         self.last_look = None;
-        self.phase = if self.draft_left.blocks.is_empty() { Phase::Rendering } else { Phase::Drafting };
+        self.phase = Phase::Rendering;
     }
 
     /// Looks where the pointer is, if it is time.
     pub(super) fn follow_gaze(&mut self) {
-        let is_waiting = matches!(self.phase, Phase::Moving | Phase::Drafting | Phase::Paused);
+        let is_waiting = matches!(self.phase, Phase::Moving | Phase::Paused);
         let Some(follower) = self.gaze.as_mut().filter(|follower| !is_waiting && follower.is_due(self.shared)) else {
             return;
         };
@@ -143,7 +143,7 @@ impl Session<'_> {
             film.guides().get(pixel).map(|guide| guide.depth).filter(|depth| depth.is_normal())
         };
         let in_glimpse = || self.glimpse.as_ref().and_then(|glimpse| in_film(&glimpse.film, glimpse.step as usize));
-        let found = in_film(&self.state.film, 1).or_else(|| in_film(&self.draft, 1)).or_else(in_glimpse);
+        let found = in_film(&self.state.film, 1).or_else(in_glimpse);
         found.filter(|_| !self.has_moved)
     }
 

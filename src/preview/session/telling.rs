@@ -25,7 +25,7 @@ impl Session<'_> {
         let mut status = Status {
             phase: self.phase,
             reason: self.last_look.as_ref().map(|look| match look.stop_reason {
-                StopReason::Visibility if self.settings.gaze.is_some() => "nothing more can be seen from there",
+                StopReason::Visibility if !self.settings.gazes.is_empty() => "nothing more can be seen from there",
                 reason => in_words(reason),
             }),
             width: self.tracer.settings().film_area().width,
@@ -53,7 +53,7 @@ pub(in crate::preview) fn blank_status(
     Status {
         kind: "status",
         scene: scene.name.clone(),
-        phase: Phase::Drafting,
+        phase: Phase::Rendering,
         reason: None,
         width: 0,
         height: 0,

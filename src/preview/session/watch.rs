@@ -7,8 +7,8 @@ use crate::adaptive::judge::Judgement;
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::state::RenderState;
 use crate::adaptive::{Directive, Monitor, Progress};
-use crate::film::Film;
 use crate::preview::command::Status;
+use crate::preview::glimpse::Glimpse;
 use crate::preview::screen::{Looked, Scenery, Screen};
 use crate::preview::shared::Shared;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -21,7 +21,6 @@ const FIGURES_INTERVAL: Duration = Duration::from_millis(250);
 pub(super) struct Watch<'a> {
     pub(super) shared: &'a Shared,
     pub(super) settings: &'a LoopSettings,
-    pub(super) draft: &'a Film,
     /// Where the gaze counts.
     pub(super) follower: Option<&'a Follower>,
     pub(super) moving: Mutex<Moving<'a>>,
@@ -30,6 +29,8 @@ pub(super) struct Watch<'a> {
 /// What changes meanwhile.
 pub(super) struct Moving<'a> {
     pub(super) screen: &'a mut Screen,
+    /// Until the film shows more.
+    pub(super) glimpse: &'a mut Option<Glimpse>,
     pub(super) pace: &'a mut Pace,
     pub(super) progress: &'a mut Option<Progress>,
     pub(super) status: Status,
@@ -37,6 +38,14 @@ pub(super) struct Moving<'a> {
     pub(super) samples_since: u64,
     /// When figures were told last.
     pub(super) told: Instant,
+}
+
+impl Moving<'_> {
+    /// A grid coarser than the last glimpse would be a step back.
+    fn shows_more_than_glimpsed(&self, state: &RenderState) -> bool {
+        let glimpsed = self.glimpse.as_ref().map_or(0, |glimpse| glimpse.film.guides().len());
+        state.plans > 0 || state.traced_blocks >= glimpsed
+    }
 }
 
 impl Watch<'_> {
@@ -49,9 +58,9 @@ impl Watch<'_> {
 
     fn show(&self, moving: &mut Moving<'_>, state: &RenderState) {
         let tone = state.tone.as_ref();
-        let Self { draft, settings, .. } = *self;
-        let film = &state.film;
-        moving.screen.show(Scenery { film, draft, tone, settings, is_at_rest: false, step: 1 }, self.shared);
+        *moving.glimpse = None;
+        let scenery = Scenery { film: &state.film, tone, settings: self.settings, is_at_rest: false, step: 1 };
+        moving.screen.show(scenery, self.shared);
         moving.status.note = None;
         moving.samples_since = 0;
         self.tell(moving, state);
@@ -83,7 +92,7 @@ impl Monitor for Watch<'_> {
     fn between_batches(&self, state: &RenderState) -> Directive {
         let mut moving = self.moving.lock().unwrap_or_else(PoisonError::into_inner);
         moving.pace.counted();
-        if moving.screen.is_due() {
+        if moving.shows_more_than_glimpsed(state) && moving.screen.is_due() {
             self.show(&mut moving, state);
         } else if moving.told.elapsed() >= FIGURES_INTERVAL {
             self.tell(&mut moving, state);
