@@ -230,6 +230,13 @@ fn image_without_channels(first: &Header) -> ExrImage {
     }
 }
 
+/// Width and height of the first part of a file that is in memory.
+pub fn size(path: &Path, file: &[u8]) -> Result<[u32; 2], ExrReadError> {
+    let headers = read_headers(path, file)?;
+    // There is one, and its sides were checked against the limit of memory.
+    Ok(headers.first().map_or([0, 0], |first| [first.layer_size.0 as u32, first.layer_size.1 as u32]))
+}
+
 /// Reads the headers of all parts and refuses what could not be read within [`MEMORY_LIMIT_BYTES`].
 fn read_headers(path: &Path, file: &[u8]) -> Result<Vec<Header>, ExrReadError> {
     let damaged = |problem: String| ExrReadError::Damaged { path: path.to_owned(), problem };

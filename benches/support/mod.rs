@@ -186,7 +186,8 @@ pub(crate) fn grey_scene(meshes: Vec<Mesh>) -> Scene {
             surface: Surface::Diffuse { reflectance: ColorInput::constant(Vec3::splat(0.5)) },
             emission: ColorInput::constant(Vec3::ZERO),
             emits_both_sides: false,
-            normal_map: None,
+            relief: None,
+            stretch: None,
             alpha: Alpha::Opaque,
         }],
         ..Scene::default()

@@ -217,7 +217,7 @@ impl HeTorrance {
 
     fn sample_diffraction(&self, wo: Vec3, u: [f32; 2]) -> Option<Vec3> {
         let radius = self.diffraction_width() * (-2.0 * (1.0 - u[1]).ln()).sqrt();
-        let (sin, cos) = (TAU * u[0]).sin_cos();
+        let (sin, cos) = warp::sin_cos_of_turns(u[0]);
         let (x, y) = (radius * cos - wo.x, radius * sin - wo.y);
         let z2 = 1.0 - x * x - y * y;
         (z2 > 0.0).then(|| Vec3::new(x, y, z2.sqrt()))

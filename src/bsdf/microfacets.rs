@@ -8,10 +8,10 @@
 //! (2014), eqs. 72, 86 and 99 (anisotropic forms and the height-correlated G2); J. Dupuy & A. Benyoub, *Sampling visible
 //! GGX normals with spherical caps* (2023), listing 3. Visible Beckmann normals: see [`super::beckmann`].
 
-use super::{SMALLEST_ALPHA, beckmann};
+use super::{SMALLEST_ALPHA, beckmann, warp};
 use crate::scene::Distribution;
 use glam::Vec3;
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::PI;
 
 /// A distribution of facet normals. Every direction given to it lies above the macro-surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -175,7 +175,7 @@ impl VisibleNormals {
     /// The normal at `u` in [0, 1)²: uniform numbers give visible normals.
     pub(crate) fn normal(&self, u: [f32; 2]) -> Vec3 {
         let stretched = match self.facets.distribution {
-            Distribution::Ggx => self.normal_on_cap((TAU * u[0]).sin_cos(), u[1]),
+            Distribution::Ggx => self.normal_on_cap(warp::sin_cos_of_turns(u[0]), u[1]),
             Distribution::Beckmann => beckmann::visible_normal(self.stretched, u),
         };
         Vec3::new(self.facets.alpha_x * stretched.x, self.facets.alpha_y * stretched.y, stretched.z.max(0.0))

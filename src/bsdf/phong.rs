@@ -57,7 +57,7 @@ impl Reflector for Phong {
         if u[2] < self.specular_share {
             let cos = (1.0 - u[1]).powf(1.0 / (self.exponent + 1.0));
             let radius = (1.0 - cos * cos).max(0.0).sqrt();
-            let (sin_phi, cos_phi) = (TAU * u[0]).sin_cos();
+            let (sin_phi, cos_phi) = warp::sin_cos_of_turns(u[0]);
             let mirror = Vec3::new(-wo.x, -wo.y, wo.z);
             let (x, y) = mirror.any_orthonormal_pair();
             (x * (radius * cos_phi) + y * (radius * sin_phi) + mirror * cos).normalize()

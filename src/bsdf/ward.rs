@@ -11,7 +11,7 @@
 
 use super::{BsdfEvaluation, Reflector, SMALLEST_ALPHA, warp};
 use glam::Vec3;
-use std::f32::consts::{FRAC_1_PI, PI, TAU};
+use std::f32::consts::{FRAC_1_PI, PI};
 
 /// Diffuse base and Ward's lobe.
 #[derive(Clone, Copy, Debug)]
@@ -68,7 +68,7 @@ impl Reflector for Ward {
     fn sample_front(&self, wo: Vec3, u: [f32; 3]) -> Vec3 {
         if u[2] < self.specular_share {
             let radius = (-(1.0 - u[1]).ln()).sqrt();
-            let (sin, cos) = (TAU * u[0]).sin_cos();
+            let (sin, cos) = warp::sin_cos_of_turns(u[0]);
             let h = Vec3::new(self.alpha_x * radius * cos, self.alpha_y * radius * sin, 1.0).normalize();
             2.0 * wo.dot(h) * h - wo
         } else {

@@ -47,6 +47,9 @@ pub(super) struct AnimateArguments {
     camera: Option<String>,
     #[command(flatten)]
     staging: super::staging::Staging,
+    /// Most memory for decoded textures of one frame: beyond it the largest are halved until they fit. No limit unless told.
+    #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u32).range(1..))]
+    texture_memory: Option<u32>,
 
     /// A frame is done when its remaining noise is at most this visible in motion: 1 is at threshold.
     #[arg(long, value_name = "V", value_parser = parse_positive, help_heading = "Until")]

@@ -32,6 +32,9 @@ pub(super) struct JobArguments {
     camera: Option<String>,
     #[command(flatten)]
     staging: super::staging::Staging,
+    /// Most memory for decoded textures: beyond it the largest are halved until they fit. No limit unless told.
+    #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u32).range(1..))]
+    texture_memory: Option<u32>,
     /// Time in the scene's keyframes, in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
     at: f64,
@@ -166,6 +169,7 @@ impl JobArguments {
             frame_time: seconds,
             environment_follows: self.staging.has_environment(),
             on_texture,
+            texture_memory: self.texture_memory.map(load::megabytes),
         };
         let mut scene = load::load(&self.scene, &options)?;
         self.staging.apply(&mut scene, self.nits_per_unit)?;

@@ -36,6 +36,15 @@ impl SurfacePoint {
     }
 }
 
+/// Where a surface goes as its texture coordinates grow, in world units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceDerivatives {
+    /// ∂p/∂u.
+    pub along_u: Vec3,
+    /// ∂p/∂v.
+    pub along_v: Vec3,
+}
+
 /// An orthonormal frame: columns are tangent, bitangent, normal.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame(Mat3);

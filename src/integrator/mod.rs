@@ -1,12 +1,14 @@
 //! The path tracer: [`PathTracer::trace`] turns a [`SamplePlan`] into film.
 //!
-//! `path` holds the life of one sample, `camera` where it starts, `shading` what a surface point scatters like,
+//! `path` holds the life of one sample, `camera` where it starts, `shading` what a surface point scatters like, `relief` how
+//! maps turn its normal,
 //! `tables` what materials compute beforehand,
 //! `media` what a ray travels in.
 
 mod camera;
 mod media;
 mod path;
+mod relief;
 mod shading;
 mod tables;
 

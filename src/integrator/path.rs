@@ -83,7 +83,7 @@ impl PathTracer {
             let point = self.world.surface(&path.ray, &hit);
             let wo = -Vec3::from(path.ray.direction);
             let components = Components::new();
-            let shading = self.shading(&point, wo, &components);
+            let shading = self.shading(&point, wo, path.ray.time, &components);
             path.throughput *= match shading.medium {
                 Some(medium) if wo.dot(point.geometric_normal) < 0.0 => {
                     path.media.transmittance_to_back_of(medium, hit.distance)
@@ -158,7 +158,15 @@ impl PathTracer {
         let weight = if light.is_delta { 1.0 } else { power_heuristic(light.pdf, scattered.pdf) };
         path.rays += 1;
         if !self.is_hidden(point, &light, path.ray.time) {
-            let left = shading.media_after(path.media, wo, wi).transmittance(distance_to(point, &light));
+            let distance = distance_to(point, &light);
+            let left = match shading.crossed_medium(wo, wi) {
+                None => path.media.transmittance(distance),
+                Some((medium, enters)) => {
+                    let mut media = path.media;
+                    media.cross(medium, enters);
+                    media.transmittance(distance)
+                }
+            };
             path.radiance += path.throughput * left * scattered.value * light.radiance * (weight / light.pdf);
         }
     }
@@ -195,7 +203,9 @@ fn scatter(path: &mut PathState, point: &SurfacePoint, shading: &Shading, wo: Ve
     path.throughput *= scattered.weight;
     if let Some(index) = scattered.crossed_index {
         path.radiance_gain_on_exit *= index * index;
-        path.media = shading.media_after(path.media, wo, wi);
+        if let Some((medium, enters)) = shading.crossed_medium(wo, wi) {
+            path.media.cross(medium, enters);
+        }
     }
     path.scatter_pdf = (!scattered.lobe.is_delta()).then_some(scattered.pdf);
     path.from = shading.receiver(point, wo);

@@ -1,7 +1,8 @@
 //! From a material and a surface point to a BSDF in a frame.
 
 use super::PathTracer;
-use super::media::{Media, Medium};
+use super::media::Medium;
+use super::relief;
 use super::tables::{SurfaceTables, slope_width};
 use crate::bsdf::{
     self, Bsdf, CoatedDiffuse, Conductor, Dielectric, HeTorrance, MetalRoughnessParameters, Microfacets, Phong,
@@ -182,15 +183,12 @@ impl Shading<'_> {
         LightReceiver { position: point.position, normal }
     }
 
-    /// The volumes around a ray that came along `wo` through `media` and goes on along `wi`.
-    pub(super) fn media_after(&self, mut media: Media, wo: Vec3, wi: Vec3) -> Media {
+    /// The volume whose boundary a path crosses that came along `wo` and goes on along `wi`, and whether it enters; `None` where
+    /// it stays on its side, or no volume absorbs.
+    pub(super) fn crossed_medium(&self, wo: Vec3, wi: Vec3) -> Option<(Medium, bool)> {
+        let medium = self.medium?;
         let (from_front, to_front) = (wo.dot(self.geometric_normal) > 0.0, wi.dot(self.geometric_normal) > 0.0);
-        if let Some(medium) = self.medium
-            && from_front != to_front
-        {
-            media.cross(medium, from_front);
-        }
-        media
+        (from_front != to_front).then_some((medium, from_front))
     }
 
     /// Whether two world directions are on the same side of the surface by both normals, or on opposite sides by both.
@@ -203,12 +201,18 @@ impl Shading<'_> {
 }
 
 impl PathTracer {
-    /// The BSDF at a point seen from the direction `wo` (world, unit, away from the surface).
-    pub(super) fn shading<'a>(&'a self, point: &SurfacePoint, wo: Vec3, components: &'a Components<'a>) -> Shading<'a> {
+    /// The BSDF at a point seen from the direction `wo` (world, unit, away from the surface) at a share of the open shutter.
+    pub(super) fn shading<'a>(
+        &'a self,
+        point: &SurfacePoint,
+        wo: Vec3,
+        time: f32,
+        components: &'a Components<'a>,
+    ) -> Shading<'a> {
         let scene = self.world.scene();
         let material_id = self.world.material_of(point.object).0 as usize;
         let material = &scene.materials[material_id];
-        let normal = seen_side(self.shading_normal(material, point), point.geometric_normal, wo);
+        let normal = seen_side(relief::shading_normal(&self.world, material, point, time), point.geometric_normal, wo);
         let reader = Reader { textures: &scene.textures, uv: point.uv, vertex_color: point.color };
         let transmits = match &material.surface {
             Surface::MetalRoughness(model) => model.transmission.factor > 0.0,
@@ -220,26 +224,21 @@ impl PathTracer {
         };
         Shading {
             bsdf: reader.bsdf(&material.surface, &self.surface_tables[material_id], components),
-            frame: Frame::new(normal, point.tangent),
+            frame: stretched_frame(material, &scene.textures, point, normal),
             geometric_normal: point.geometric_normal,
             transmits,
             medium: if self.absorbs { Medium::behind(MaterialId(material_id as u32), &material.surface) } else { None },
         }
     }
+}
 
-    fn shading_normal(&self, material: &Material, point: &SurfacePoint) -> Vec3 {
-        let Some((lookup, strength)) = &material.normal_map else {
-            return point.shading_normal;
-        };
-        let scene = self.world.scene();
-        let texel = scene.textures[lookup.texture.0 as usize].sample_rgba(lookup.transform(point.uv));
-        let mut mapped = texel.truncate() * 2.0 - 1.0;
-        mapped.x *= strength;
-        mapped.y *= strength;
-        let frame = Frame::new(point.shading_normal, point.tangent);
-        let local = Vec3::new(mapped.x, mapped.y * point.handedness, mapped.z);
-        frame.to_world(local).normalize_or(point.shading_normal)
-    }
+/// The frame around a normal whose x axis is the tangent of anisotropic surfaces.
+fn stretched_frame(material: &Material, textures: &[Texture], point: &SurfacePoint, normal: Vec3) -> Frame {
+    let along_u = Frame::new(normal, point.tangent);
+    let Some(stretch) = &material.stretch else { return along_u };
+    let direction = stretch.evaluate(textures, point.uv);
+    let tangent = along_u.to_world(Vec3::new(direction.x, direction.y * point.handedness, 0.0));
+    Frame::new(normal, tangent)
 }
 
 /// A shading normal that the viewer can see: one that points away from the viewer, although the surface faces them, is
@@ -252,4 +251,57 @@ fn seen_side(normal: Vec3, geometric_normal: Vec3, wo: Vec3) -> Vec3 {
         return normal;
     }
     (normal + facing * wo * (LEAST_COSINE - cosine)).normalize_or(geometric_normal)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Encoding, StretchDirection, Texels, TextureId, TextureLookup, Wrap};
+    use std::sync::Arc;
+
+    fn texture(direction: [u8; 2]) -> Texture {
+        Texture {
+            name: String::new(),
+            width: 1,
+            height: 1,
+            texels: Texels::Bytes(Arc::new(vec![[direction[0], direction[1], 255, 255]]), Encoding::Linear),
+            wrap_u: Wrap::Repeat,
+            wrap_v: Wrap::Repeat,
+            nearest: false,
+        }
+    }
+
+    /// u grows along +x; the top of the picture is at +y, or at −y where it is mirrored.
+    #[test]
+    fn facets_are_stretched_where_rotation_and_picture_say() {
+        let third = std::f32::consts::FRAC_PI_3;
+        for (rotation, direction, handedness, expected) in [
+            (0.0, [255, 128], 1.0, Vec3::X),
+            (third, [255, 128], 1.0, Vec3::new(0.5, 0.866, 0.0)),
+            (third, [255, 128], -1.0, Vec3::new(0.5, -0.866, 0.0)),
+            (0.0, [128, 255], 1.0, Vec3::Y),
+            (0.0, [128, 0], -1.0, Vec3::Y),
+            (third, [128, 255], 1.0, Vec3::new(-0.866, 0.5, 0.0)),
+            (third, [128, 128], 1.0, Vec3::new(0.5, 0.866, 0.0)),
+        ] {
+            let mut material = Material::plain("test", Surface::clear_dielectric(1.5));
+            let map = Some(TextureLookup::plain(TextureId(0)));
+            material.stretch = Some(StretchDirection { rotation, map });
+            let point = SurfacePoint {
+                position: Vec3::ZERO,
+                geometric_normal: Vec3::Z,
+                shading_normal: Vec3::Z,
+                tangent: 3.0 * Vec3::X,
+                handedness,
+                uv: Vec2::splat(0.5),
+                color: Vec3::ONE,
+                object: 0,
+                triangle: 0,
+                offset: 0.0,
+            };
+            let frame = stretched_frame(&material, &[texture(direction)], &point, Vec3::Z);
+            let tangent = frame.to_world(Vec3::X);
+            assert!(tangent.abs_diff_eq(expected, 0.01), "{rotation} {direction:?} {handedness}: {tangent}");
+        }
+    }
 }

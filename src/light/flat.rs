@@ -1,7 +1,9 @@
-//! Triangles and parallelograms that emit: sampled by solid angle where they look large, else by area.
+//! Triangles and parallelograms that emit: sampled by solid angle where they look large, else by area, evenly or, parallelograms that
+//! are no specks, by what their corners give.
 
+use super::bilinear::BilinearDensity;
 use super::solid_angle::{LEAST, SphericalRectangle, SphericalTriangle};
-use super::{LightPlace, LightSample};
+use super::{LightPlace, LightReceiver, LightSample};
 use crate::scene::{Alpha, Scene};
 use glam::{DVec3, Vec2, Vec3};
 
@@ -15,13 +17,18 @@ pub(super) struct FlatEmitter {
     corner: Vec3,
     edge_1: Vec3,
     edge_2: Vec3,
-    /// Sum of the edges' lengths: no point is farther than this from the corner.
-    reach: f32,
+    /// Middle of the outline.
+    center: Vec3,
+    /// No point is farther than this from the centre.
+    radius: f32,
     /// Unit normal of the front.
     pub(super) normal: Vec3,
     pub(super) area: f32,
     pub(super) both_sides: bool,
 }
+
+/// Bound of the solid angle in steradian below which a rectangle is sampled by its corners.
+const MOST_BILINEAR: f32 = 1.0;
 
 /// What the two edges span.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,7 +68,12 @@ impl FlatEmitter {
             corner: corners[0],
             edge_1,
             edge_2,
-            reach: edge_1.length() + edge_2.length(),
+            center: corners[0] + (edge_1 + edge_2) / 3.0,
+            radius: (2.0 * edge_1 - edge_2)
+                .length()
+                .max((2.0 * edge_2 - edge_1).length())
+                .max((edge_1 + edge_2).length())
+                / 3.0,
             normal: scaled_normal.normalize_or(Vec3::Y) * if mirrored { -1.0 } else { 1.0 },
             area: 0.5 * scaled_normal.length(),
             both_sides,
@@ -88,8 +100,9 @@ impl FlatEmitter {
             true => Outline::Rectangle(Edges::new([edge_1, edge_2])),
             false => Outline::Parallelogram,
         };
-        let reach = edge_1.length() + edge_2.length();
-        Some(Self { outline, edge_2, reach, area: self.area + next.area, ..self.clone() })
+        let center = self.corner + 0.5 * (edge_1 + edge_2);
+        let radius = 0.5 * (edge_1 + edge_2).length().max((edge_1 - edge_2).length());
+        Some(Self { outline, edge_2, center, radius, area: self.area + next.area, ..self.clone() })
     }
 
     /// Corners of its outline, for bounds.
@@ -101,12 +114,13 @@ impl FlatEmitter {
         [self.corner, self.corner + self.edge_1, self.corner + self.edge_2].into_iter().chain(last)
     }
 
-    /// A direction from `from` to the emitter.
-    pub(super) fn sample(&self, scene: &Scene, from: Vec3, u: [f32; 2]) -> Option<LightSample> {
+    /// A direction from a receiver to the emitter.
+    pub(super) fn sample(&self, scene: &Scene, receiver: &LightReceiver, u: [f32; 2]) -> Option<LightSample> {
         if self.area == 0.0 {
             return None;
         }
-        let view = self.view(from);
+        let from = receiver.position;
+        let view = self.view(receiver);
         let shares = view.sample(self, u)?;
         let position = self.corner + shares[0] * self.edge_1 + shares[1] * self.edge_2;
         let to_light = position - from;
@@ -120,15 +134,24 @@ impl FlatEmitter {
             direction,
             place: Some(LightPlace { position, normal: self.normal * facing.signum() }),
             radiance: self.radiance(scene, shares),
-            pdf: view.pdf(self, direction, distance),
+            pdf: view.pdf(self, direction, distance, || shares),
             is_delta: false,
         })
         .filter(|s| s.pdf > 0.0 && s.pdf.is_finite())
     }
 
     /// Density per steradian of a direction that reaches the emitter at this distance.
-    pub(super) fn pdf(&self, from: Vec3, direction: Vec3, distance: f32) -> f32 {
-        self.view(from).pdf(self, direction, distance)
+    pub(super) fn pdf(&self, receiver: &LightReceiver, direction: Vec3, distance: f32) -> f32 {
+        let shares = || self.shares_of(receiver.position + distance * direction);
+        self.view(receiver).pdf(self, direction, distance, shares)
+    }
+
+    /// The shares of the edges at which a point of a parallelogram lies.
+    fn shares_of(&self, position: Vec3) -> Shares {
+        let way = position - self.corner;
+        let (across_1, across_2) = (self.normal.cross(self.edge_2), self.normal.cross(self.edge_1));
+        let share = |across: Vec3, edge: Vec3| (way.dot(across) / edge.dot(across)).clamp(0.0, 1.0);
+        [share(across_1, self.edge_1), share(across_2, self.edge_2)]
     }
 
     fn radiance(&self, scene: &Scene, [s1, s2]: Shares) -> Vec3 {
@@ -145,33 +168,40 @@ impl FlatEmitter {
         material.emission.evaluate(&scene.textures, uv) * material.alpha.coverage(&scene.textures, uv)
     }
 
-    fn view(&self, from: Vec3) -> View {
-        let corner = (self.corner - from).as_dvec3();
+    fn view(&self, receiver: &LightReceiver) -> View {
         // What looks small from its size and distance needs no closer look: A/d² bounds the solid angle only where the
         // emitter is not much nearer than its centre, so the nearest it can be is taken.
-        let nearest = corner.length() - f64::from(self.reach);
-        if nearest > 0.0 && f64::from(self.area) < LEAST * nearest * nearest {
+        let nearest = (self.center - receiver.position).length() - self.radius;
+        let looks_below = |solid_angle: f32| nearest > 0.0 && self.area < solid_angle * nearest * nearest;
+        if looks_below(LEAST as f32) {
             return View::Small;
         }
+        let corner = self.corner - receiver.position;
         match self.outline {
             Outline::Triangle => {
-                let others = [self.edge_1, self.edge_2].map(|edge| corner + edge.as_dvec3());
-                let triangle = SphericalTriangle::new([corner, others[0], others[1]]);
+                let others = [self.edge_1, self.edge_2].map(|edge| (corner + edge).as_dvec3());
+                let triangle = SphericalTriangle::new([corner.as_dvec3(), others[0], others[1]]);
                 if triangle.solid_angle > LEAST { View::Triangle(triangle) } else { View::Small }
             }
-            Outline::Rectangle(edges) => {
-                let rectangle = SphericalRectangle::new(corner, edges.axes, edges.lengths);
+            Outline::Rectangle(edges) if !looks_below(MOST_BILINEAR) => {
+                let rectangle = SphericalRectangle::new(corner.as_dvec3(), edges.axes, edges.lengths);
                 if rectangle.solid_angle > LEAST { View::Rectangle(rectangle) } else { View::Small }
             }
-            Outline::Parallelogram => View::Small,
+            Outline::Rectangle(_) | Outline::Parallelogram => {
+                let (right, up) = (corner + self.edge_1, corner + self.edge_2);
+                let corners = [corner, right, up, right + self.edge_2];
+                View::Bilinear(BilinearDensity::of_irradiance(corners, receiver.normal))
+            }
         }
     }
 }
 
 /// How an emitter is sampled from one point.
 enum View {
-    /// By area.
+    /// By area, evenly.
     Small,
+    /// By area, as much as the corners give.
+    Bilinear(BilinearDensity),
     Triangle(SphericalTriangle),
     Rectangle(SphericalRectangle),
 }
@@ -181,6 +211,7 @@ impl View {
         match self {
             View::Small if emitter.outline == Outline::Triangle => Some(uniform_barycentrics(u)),
             View::Small => Some(u),
+            View::Bilinear(density) => Some(density.sample(u)),
             View::Rectangle(rectangle) => {
                 let Outline::Rectangle(edges) = emitter.outline else { return None };
                 let [along_1, along_2] = rectangle.sample(u);
@@ -190,10 +221,12 @@ impl View {
         }
     }
 
-    fn pdf(&self, emitter: &FlatEmitter, direction: Vec3, distance: f32) -> f32 {
+    fn pdf(&self, emitter: &FlatEmitter, direction: Vec3, distance: f32, shares: impl Fn() -> Shares) -> f32 {
+        // Area density turned to solid angle.
+        let even = || distance * distance / (direction.dot(emitter.normal).abs() * emitter.area);
         match self {
-            // Area density turned to solid angle.
-            View::Small => distance * distance / (direction.dot(emitter.normal).abs() * emitter.area),
+            View::Small => even(),
+            View::Bilinear(density) => even() * density.at(shares()),
             View::Triangle(triangle) => (1.0 / triangle.solid_angle) as f32,
             View::Rectangle(rectangle) => (1.0 / rectangle.solid_angle) as f32,
         }

@@ -5,6 +5,7 @@
 //! direction by the light's own rule. All pdfs are per steradian at the receiver and include the choices, so they can be
 //! weighed against those of BSDFs.
 
+mod bilinear;
 mod collect;
 mod distant;
 mod distribution;
@@ -118,18 +119,26 @@ impl Lights {
         } else {
             let within = ((select - environment - distant) / placed).clamp(0.0, 1.0 - f32::EPSILON / 2.0);
             let (index, chosen) = self.tree.as_ref()?.sample(receiver, within)?;
-            (self.sample_emitter(world, index, receiver.position, time, [u0, u1])?, placed * chosen)
+            (self.sample_emitter(world, index, receiver, time, [u0, u1])?, placed * chosen)
         };
         Some(LightSample { pdf: sample.pdf * chosen, ..sample }).filter(|s| s.pdf > 0.0 && s.pdf.is_finite())
     }
 
-    fn sample_emitter(&self, world: &World, index: usize, from: Vec3, time: f32, u: [f32; 2]) -> Option<LightSample> {
+    fn sample_emitter(
+        &self,
+        world: &World,
+        index: usize,
+        receiver: &LightReceiver,
+        time: f32,
+        u: [f32; 2],
+    ) -> Option<LightSample> {
+        let from = receiver.position;
         match &self.emitters[index] {
-            Emitter::Flat(emitter) => emitter.sample(world.scene(), from, u),
+            Emitter::Flat(emitter) => emitter.sample(world.scene(), receiver, u),
             Emitter::Sphere(emitter) => emitter.sample(from, u),
             Emitter::Point(light) => punctual::sample(light, from),
             Emitter::MovingTriangle { object, triangle } => {
-                collect::triangle_at(world, *object, *triangle, time).sample(world.scene(), from, u)
+                collect::triangle_at(world, *object, *triangle, time).sample(world.scene(), receiver, u)
             }
             Emitter::MovingSphere { object, radiance } => {
                 collect::sphere_at(world, *object, *radiance, time).sample(from, u)
@@ -151,10 +160,10 @@ impl Lights {
         let (from, direction) = (receiver.position, Vec3::from(ray.direction));
         chosen
             * match &self.emitters[index] {
-                Emitter::Flat(emitter) => emitter.pdf(from, direction, hit.distance),
+                Emitter::Flat(emitter) => emitter.pdf(receiver, direction, hit.distance),
                 Emitter::Sphere(emitter) => emitter.pdf(from),
                 Emitter::MovingTriangle { object, triangle } => {
-                    collect::triangle_at(world, *object, *triangle, ray.time).pdf(from, direction, hit.distance)
+                    collect::triangle_at(world, *object, *triangle, ray.time).pdf(receiver, direction, hit.distance)
                 }
                 Emitter::MovingSphere { object, radiance } => {
                     collect::sphere_at(world, *object, *radiance, ray.time).pdf(from)

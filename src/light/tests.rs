@@ -21,7 +21,8 @@ fn add_emitter(scene: &mut Scene, radiance: f32, emits_both_sides: bool) -> Mate
         surface: Surface::Diffuse { reflectance: ColorInput::constant(Vec3::ZERO) },
         emission: ColorInput::constant(Vec3::splat(radiance)),
         emits_both_sides,
-        normal_map: None,
+        relief: None,
+        stretch: None,
         alpha: Alpha::Opaque,
     });
     MaterialId(scene.materials.len() as u32 - 1)

@@ -1,6 +1,7 @@
 //! Pictures for displays: 8-bit sRGB, or 16-bit PQ for HDR displays, tagged as such.
 
 use super::{OutputError, beside::write_beside, check_size};
+use crate::scene::texture::srgb_from_linear;
 use fechner_perception::display::{Display, Eotf};
 use fechner_perception::primaries::{Matrix, Primaries, apply};
 use rayon::prelude::*;
@@ -134,18 +135,6 @@ pub fn encode_srgb8(width: u32, rgb_linear_display: &[[f32; 3]]) -> Vec<u8> {
         },
     );
     bytes
-}
-
-/// The sRGB transfer function (IEC 61966-2-1) of a value clamped to [0, 1]; NaN stays, and becomes 0 as an integer.
-fn srgb_from_linear(value: f32) -> f32 {
-    let value = value.clamp(0.0, 1.0);
-    if value >= 1.0 {
-        1.0 // the formula gives a little less, which dither would show as specks in a white area
-    } else if value > 0.003_130_8 {
-        1.055 * value.powf(1.0 / 2.4) - 0.055
-    } else {
-        12.92 * value
-    }
 }
 
 /// A number in [0, 1) that looks random from pixel to pixel and is always the same at the same pixel.

@@ -171,6 +171,7 @@ fn z_curve(pixel: Pixel) -> u32 {
 
 impl Sample {
     /// Four numbers in [0, 1) for a purpose; the first two are stratified best together.
+    #[inline]
     pub fn draw(self, purpose: Purpose) -> [f32; 4] {
         let group_hash = sobol::mix32(self.block_hash ^ sobol::mix32(purpose.group().wrapping_add(0x68bc_21eb)));
         if self.is_independent {

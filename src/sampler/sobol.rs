@@ -94,6 +94,7 @@ fn to_unit(reversed: u32) -> f32 {
 }
 
 /// Point `index` of the four-dimensional Sobol sequence whose order and digits are scrambled by `seed`.
+#[inline(always)] // who draws three numbers does not pay for the fourth
 pub(super) fn owen_scrambled_4d(index: u32, seed: u32) -> [f32; 4] {
     let index = hash_low_to_high(index.reverse_bits(), seed).reverse_bits();
     let digit_seed = |dimension: u32| mix32(seed ^ (dimension + 1).wrapping_mul(0x9e37_79b9));

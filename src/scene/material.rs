@@ -1,6 +1,6 @@
 //! Materials: how a surface scatters, emits and covers, and what a renderer asks of them besides values at a point.
 
-use super::{ColorInput, ScalarInput, Surface, Texels, Texture, TextureLookup};
+use super::{ColorInput, Relief, ScalarInput, Surface, Texture, TextureId, TextureLookup};
 use glam::{Vec2, Vec3};
 
 /// How a surface looks.
@@ -14,10 +14,35 @@ pub struct Material {
     pub emission: ColorInput,
     /// Whether it emits from its back side too.
     pub emits_both_sides: bool,
-    /// Tangent-space normal map and the strength of its x and y.
-    pub normal_map: Option<(TextureLookup, f32)>,
+    /// Where the shading normal differs from the mesh's.
+    pub relief: Option<Relief>,
+    /// Where the facets of an anisotropic surface are turned; `None` where they lie along growing u.
+    pub stretch: Option<StretchDirection>,
     /// Coverage; what it cuts away is not there at all.
     pub alpha: Alpha,
+}
+
+/// The direction, in the plane of the surface, that an anisotropic surface takes for its tangent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StretchDirection {
+    /// Radians from growing u towards the top of the picture (falling v).
+    pub rotation: f32,
+    /// Picture whose red and green are the direction before the rotation, [0, 1] for [−1, 1]: (1, 0.5) is growing u.
+    pub map: Option<TextureLookup>,
+}
+
+impl StretchDirection {
+    /// Components along growing u and falling v at texture coordinates; of no particular length, (1, 0) where the picture has no
+    /// direction.
+    pub fn evaluate(&self, textures: &[Texture], uv: Vec2) -> Vec2 {
+        let mapped = self.map.map_or(Vec2::X, |map| {
+            let texel = textures[map.texture.0 as usize].sample_rgba(map.transform(uv));
+            2.0 * Vec2::new(texel.x, texel.y) - 1.0
+        });
+        // Grey bytes are 1/255 away from 0.
+        let direction = if mapped.length_squared() > 1e-4 { mapped } else { Vec2::X };
+        Vec2::from_angle(self.rotation).rotate(direction)
+    }
 }
 
 /// Coverage of a surface.
@@ -47,14 +72,15 @@ impl Material {
             surface,
             emission: ColorInput::constant(Vec3::ZERO),
             emits_both_sides: false,
-            normal_map: None,
+            relief: None,
+            stretch: None,
             alpha: Alpha::Opaque,
         }
     }
 
     /// Whether shading needs to know along which way texture coordinates grow.
     pub fn needs_tangent(&self) -> bool {
-        self.normal_map.is_some() || self.surface.is_anisotropic()
+        matches!(self.relief, Some(Relief::Normals { .. })) || self.surface.is_anisotropic()
     }
 
     /// Mean emitted radiance over the texture's square, in scene units; `None` where nothing is emitted.
@@ -64,13 +90,23 @@ impl Material {
         }
         let mean = match &self.emission.texture {
             None => self.emission.factor,
-            Some(lookup) => self.emission.factor * mean_color(&textures[lookup.texture.0 as usize]),
+            Some(lookup) => self.emission.factor * textures[lookup.texture.0 as usize].mean_color(),
         };
         (mean.max_element() > 0.0).then_some(mean)
     }
 }
 
 impl Alpha {
+    /// The texture whose alpha channel is the coverage.
+    pub fn texture_of_coverage(&self) -> Option<TextureId> {
+        match self {
+            Self::Opaque => None,
+            Self::Mask { value, .. } | Self::Blend { value } => {
+                value.texture.filter(|(_, channel)| *channel == 3).map(|(lookup, _)| lookup.texture)
+            }
+        }
+    }
+
     /// Probability that the surface is there, at texture coordinates.
     pub fn coverage(&self, textures: &[Texture], uv: Vec2) -> f32 {
         match self {
@@ -79,23 +115,4 @@ impl Alpha {
             Self::Blend { value } => value.evaluate(textures, uv).clamp(0.0, 1.0),
         }
     }
-}
-
-/// Mean linear colour of a texture.
-fn mean_color(texture: &Texture) -> Vec3 {
-    let (width, height) = (texture.width as usize, texture.height as usize);
-    if let Texels::Floats(texels) = &texture.texels {
-        let sum: glam::DVec3 = texels.iter().map(|t| Vec3::new(t[0], t[1], t[2]).as_dvec3()).sum();
-        return (sum / texels.len().max(1) as f64).as_vec3();
-    }
-    // At most 256 × 256 places: a mean for choosing lights, not for shading.
-    let (columns, rows) = (width.min(256), height.min(256));
-    let mut sum = glam::DVec3::ZERO;
-    for y in 0..rows {
-        for x in 0..columns {
-            let uv = Vec2::new((x as f32 + 0.5) / columns as f32, (y as f32 + 0.5) / rows as f32);
-            sum += texture.sample_rgba(uv).truncate().as_dvec3();
-        }
-    }
-    (sum / (columns * rows) as f64).as_vec3()
 }

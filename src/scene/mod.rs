@@ -8,6 +8,7 @@ mod environment;
 mod light;
 mod material;
 mod motion;
+mod relief;
 mod surface;
 
 pub mod hash;
@@ -17,8 +18,9 @@ pub mod texture;
 pub use camera::{Camera, CameraAxes, Projection, ScreenWindow};
 pub use environment::{Environment, Parametrisation};
 pub use light::{Light, SpotFalloff};
-pub use material::{Alpha, Material};
+pub use material::{Alpha, Material, StretchDirection};
 pub use motion::{Motion, MotionKey, Pose};
+pub use relief::{HeightMap, HeightUnit, Relief};
 pub use surface::{Distribution, MetalRoughness, Roughness, RoughnessScale, Surface};
 
 use glam::{Affine3A, Vec2, Vec3, Vec3A, Vec4};

@@ -182,7 +182,7 @@ pub enum Surface {
         /// Albedo in [0, 1] of what leaves after scattering beneath the surface.
         diffuse: ColorInput,
     },
-    /// The sum of two, weighted. Normal map, emission and alpha are the whole material's.
+    /// The sum of two, weighted. Relief, stretch direction, emission and alpha are the whole material's.
     Mix {
         /// Seen where `amount` is 0.
         first: Box<Surface>,
@@ -213,7 +213,7 @@ pub struct MetalRoughness {
     pub specular: ScalarInput,
     /// Tint of the dielectric's reflection face on.
     pub specular_color: ColorInput,
-    /// In [0, 1]: facets are stretched along the tangent.
+    /// In [0, 1]: facets are stretched along the tangent, which the material's stretch direction turns.
     pub anisotropy: ScalarInput,
     /// Coverage of a clear coat of index 1.5, in [0, 1].
     pub clearcoat: ScalarInput,

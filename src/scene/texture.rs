@@ -9,6 +9,18 @@ pub fn srgb_to_linear(value: f32) -> f32 {
     if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
 }
 
+/// The sRGB curve (IEC 61966-2-1) of a linear value clamped to [0, 1]; NaN stays.
+pub fn srgb_from_linear(value: f32) -> f32 {
+    let value = value.clamp(0.0, 1.0);
+    if value >= 1.0 {
+        1.0 // the formula gives a little less, which dither would show as specks in a white area
+    } else if value > 0.003_130_8 {
+        1.055 * value.powf(1.0 / 2.4) - 0.055
+    } else {
+        12.92 * value
+    }
+}
+
 /// The curve at all 256 byte values: `powf` for 12 values of every bilinear lookup would dominate it.
 static SRGB_TO_LINEAR: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|byte| srgb_to_linear(byte as f32 / 255.0)));
@@ -78,6 +90,24 @@ impl Texture {
             }
             Texels::Floats(texels) => texels.iter().map(|&[r, g, b, _]| r.max(g).max(b)).fold(0.0, f32::max),
         }
+    }
+
+    /// Mean linear colour: of all texels if they are floats, else of at most 256 × 256 places. For choosing lights and telling
+    /// pictures apart, not for shading.
+    pub fn mean_color(&self) -> Vec3 {
+        if let Texels::Floats(texels) = &self.texels {
+            let sum: glam::DVec3 = texels.iter().map(|t| Vec3::new(t[0], t[1], t[2]).as_dvec3()).sum();
+            return (sum / texels.len().max(1) as f64).as_vec3();
+        }
+        let (columns, rows) = (self.width.min(256), self.height.min(256));
+        let mut sum = glam::DVec3::ZERO;
+        for y in 0..rows {
+            for x in 0..columns {
+                let uv = Vec2::new((x as f32 + 0.5) / columns as f32, (y as f32 + 0.5) / rows as f32);
+                sum += self.sample_rgba(uv).truncate().as_dvec3();
+            }
+        }
+        (sum / f64::from(columns * rows)).as_vec3()
     }
 
     /// One texel as linear RGBA; both indices in range.

@@ -4,6 +4,7 @@ use crate::support::{loop_settings, trace_settings};
 use fechner::adaptive::settings::Sampling;
 use fechner::adaptive::{Quiet, render};
 use fechner::integrator::PathTracer;
+use fechner::scene::Surface;
 use fechner::scene::load::{LoadOptions, load};
 use std::path::Path;
 use std::sync::Arc;
@@ -149,4 +150,36 @@ fn the_depth_of_the_files_paths_is_named() {
             }
         }
     }
+}
+
+/// KHR_materials_anisotropy: a strength with its texture's blue, a direction from red and green and a rotation.
+#[test]
+fn the_direction_of_anisotropy_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let read = |anisotropy: &str| {
+        let path = folder.path().join("a.gltf");
+        let text = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+"extensionsUsed":["KHR_materials_anisotropy"],"images":[{"uri":"missing.png"}],"textures":[{"source":0}],
+"materials":[{"extensions":{"KHR_materials_anisotropy":{ANISOTROPY}}}],
+"meshes":[{"primitives":[{"attributes":{"POSITION":0},"material":0}]}],
+"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}],
+"bufferViews":[{"buffer":0,"byteLength":36}],"buffers":[{"byteLength":36,"uri":"a.bin"}]}"#;
+        let bytes: Vec<u8> =
+            [0.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].iter().flat_map(|v| v.to_le_bytes()).collect();
+        std::fs::write(folder.path().join("a.bin"), bytes).unwrap();
+        std::fs::write(&path, text.replace("ANISOTROPY", anisotropy)).unwrap();
+        let mut scene = load(&path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        assert!(scene.notes.iter().all(|note| !note.contains("not used")), "{:?}", scene.notes);
+        (scene.materials.swap_remove(0), scene.textures)
+    };
+    let (plain, _) = read(r#""anisotropyStrength":0.5"#);
+    assert_eq!(plain.stretch, None);
+    let (turned, _) = read(r#""anisotropyStrength":0.5,"anisotropyRotation":0.75"#);
+    assert_eq!(turned.stretch.map(|stretch| (stretch.rotation, stretch.map)), Some((0.75, None)));
+    // The missing picture is one of full strength along u.
+    let (mapped, textures) = read(r#""anisotropyStrength":0.5,"anisotropyTexture":{"index":0}"#);
+    let direction = mapped.stretch.expect("a direction").evaluate(&textures, glam::Vec2::ZERO);
+    assert!(direction.abs_diff_eq(glam::Vec2::X, 0.01), "{direction}");
+    let Surface::MetalRoughness(model) = &mapped.surface else { panic!("{:?}", mapped.surface) };
+    assert!((model.anisotropy.evaluate(&textures, glam::Vec2::ZERO) - 0.5).abs() < 1e-6);
 }

@@ -13,6 +13,7 @@
 //! - `load_assets`: scenes that others made, sound and damaged
 //! - `mutations`: thousands of damaged files a format, in a child process (ignored)
 //! - `scene_table`: scenes of others: how long until nothing is seen (ignored)
+//! - `relief`: height maps: normals, energy, every format
 //! - `references`: scenes of others beside reference pictures (ignored)
 //! - `no_allocation`: the heap is left alone while paths are traced
 //! - `command_line`: the program as a user runs it
@@ -20,6 +21,7 @@
 //! - `kill`: the program, killed and resumed
 //! - `farm`: many processes on one folder
 //! - `view`: the live preview, over its WebSocket
+//! - `texture_memory`: textures within a limit
 //! - `tonemap`: HDR pictures for displays, one by one and over time
 
 mod adaptive_render;
@@ -40,7 +42,9 @@ mod load_assets;
 mod mutations;
 mod no_allocation;
 mod references;
+mod relief;
 mod scene_table;
 mod support;
+mod texture_memory;
 mod tonemap;
 mod view;

@@ -34,7 +34,8 @@ pub(crate) fn add_material(scene: &mut Scene, surface: Surface, emission: Vec3) 
         surface,
         emission: ColorInput::constant(emission),
         emits_both_sides: true,
-        normal_map: None,
+        relief: None,
+        stretch: None,
         alpha: Alpha::Opaque,
     });
     MaterialId(scene.materials.len() as u32 - 1)

@@ -37,7 +37,8 @@ fn scene(wall: Vec3, ball: Vec3, yaw: f32, aside: Vec3) -> Scene {
             surface: Surface::Diffuse { reflectance: ColorInput::constant(Vec3::ONE) },
             emission: ColorInput::constant(Vec3::ONE),
             emits_both_sides: true,
-            normal_map: None,
+            relief: None,
+            stretch: None,
             alpha: Alpha::Opaque,
         }],
         ..Scene::default()

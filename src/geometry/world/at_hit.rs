@@ -1,9 +1,11 @@
 //! What is at a hit: from a place on a triangle or sphere at a time to a [`SurfacePoint`].
 
 use super::{Hit, World};
+use crate::geometry::surface::SurfaceDerivatives;
 use crate::geometry::{Ray, SurfacePoint};
 use crate::scene::{Instance, Mesh, Scene};
 use glam::{Affine3A, Mat3A, Vec2, Vec3, Vec3A};
+use std::f32::consts::{PI, TAU};
 
 /// What shading needs of an instance besides its transform.
 #[derive(Clone, Copy, Debug)]
@@ -44,6 +46,31 @@ impl World {
         mesh.triangles[triangle as usize].map(|i| to_world.transform_point3(mesh.positions[i as usize]))
     }
 
+    /// How the surface at a point goes along with its texture coordinates, at a share of the open shutter; `None` where it has
+    /// none, or they do not span it (the poles of spheres, triangles whose corners share a place in the picture).
+    pub fn derivatives(&self, point: &SurfacePoint, time: f32) -> Option<SurfaceDerivatives> {
+        let derivatives = match self.scene.instances.get(point.object as usize) {
+            None => sphere_derivatives(self.sphere_at(point.object, time).1, point.geometric_normal),
+            Some(instance) => {
+                let mesh = &self.scene.meshes[instance.mesh.0 as usize];
+                if mesh.uvs.is_empty() {
+                    return None;
+                }
+                let [p0, p1, p2] = self.triangle_corners(point.object, point.triangle, time);
+                let [a, b, c] = mesh.triangles[point.triangle as usize].map(|i| mesh.uvs[i as usize]);
+                let (d1, d2, e1, e2) = (b - a, c - a, p1 - p0, p2 - p0);
+                let inverse_area = 1.0 / d1.perp_dot(d2);
+                SurfaceDerivatives {
+                    along_u: (e1 * d2.y - e2 * d1.y) * inverse_area,
+                    along_v: (e2 * d1.x - e1 * d2.x) * inverse_area,
+                }
+            }
+        };
+        let SurfaceDerivatives { along_u, along_v } = derivatives;
+        let spans = along_u.is_finite() && along_v.is_finite() && along_u.cross(along_v) != Vec3::ZERO;
+        spans.then_some(derivatives)
+    }
+
     /// The surface at a hit.
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
         let Some(instance) = self.scene.instances.get(hit.object as usize) else {
@@ -56,10 +83,7 @@ impl World {
                 shading_normal: normal,
                 tangent: Vec3::Y.cross(normal).normalize_or(Vec3::X),
                 handedness: 1.0,
-                uv: Vec2::new(
-                    0.5 + normal.x.atan2(-normal.z) / std::f32::consts::TAU,
-                    normal.y.clamp(-1.0, 1.0).acos() / std::f32::consts::PI,
-                ),
+                uv: sphere_uv(normal),
                 color: Vec3::ONE,
                 object: hit.object,
                 triangle: 0,
@@ -107,6 +131,21 @@ impl World {
             triangle: hit.triangle,
             offset: self.offset_at(position),
         }
+    }
+}
+
+/// Texture coordinates of a sphere at a unit normal, as those of the mesh that stands in for it: u runs from +x against the
+/// clock seen from +y, v from +y down.
+fn sphere_uv(normal: Vec3) -> Vec2 {
+    let turn = (-normal.z).atan2(normal.x) / TAU;
+    Vec2::new(if turn < 0.0 { turn + 1.0 } else { turn }, normal.y.clamp(-1.0, 1.0).acos() / PI)
+}
+
+fn sphere_derivatives(radius: f32, normal: Vec3) -> SurfaceDerivatives {
+    let sin_theta = normal.x.hypot(normal.z);
+    SurfaceDerivatives {
+        along_u: TAU * radius * Vec3::new(normal.z, 0.0, -normal.x),
+        along_v: PI * radius * Vec3::new(normal.y * normal.x / sin_theta, -sin_theta, normal.y * normal.z / sin_theta),
     }
 }
 

@@ -17,7 +17,8 @@ fn scene(transforms: &[Affine3A]) -> Scene {
         surface: Surface::Diffuse { reflectance: ColorInput::constant(Vec3::splat(0.5)) },
         emission: ColorInput::constant(Vec3::ZERO),
         emits_both_sides: false,
-        normal_map: None,
+        relief: None,
+        stretch: None,
         alpha: Alpha::Opaque,
     };
     let instance = |to_world: &Affine3A| Instance {

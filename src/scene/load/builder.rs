@@ -1,5 +1,6 @@
 //! The scene while it is being read: what all formats add to, and the last look that keeps their promises.
 
+use super::bump::{self, Bump};
 use super::error::{LoadError, nearest, suggestion};
 use super::texture::Requests;
 use super::{LoadOptions, default_view, environment, validate};
@@ -44,6 +45,8 @@ pub(super) struct Builder {
     pub(super) spheres: Vec<Sphere>,
     pub(super) materials: Vec<Material>,
     pub(super) textures: Requests,
+    /// Reliefs that only their decoded pictures tell apart.
+    pub(super) bumps: Vec<Bump>,
     pub(super) lights: Vec<Light>,
     pub(super) environment: Option<Environment>,
     pub(super) notes: Vec<String>,
@@ -63,6 +66,7 @@ impl Builder {
             spheres: Vec::new(),
             materials: Vec::new(),
             textures: Requests::default(),
+            bumps: Vec::new(),
             lights: Vec::new(),
             environment: None,
             notes: Vec::new(),
@@ -104,7 +108,9 @@ impl Builder {
     pub(super) fn finish(mut self, path: &Path, if_dark: IfDark, options: &LoadOptions) -> Result<Scene, LoadError> {
         validate::repair(&mut self, path)?;
         let camera = self.choose_camera(options)?;
-        let textures = std::mem::take(&mut self.textures).decode(&mut self.notes, options.on_texture)?;
+        let coverage = |id| self.materials.iter().any(|material| material.alpha.texture_of_coverage() == Some(id));
+        let textures = std::mem::take(&mut self.textures).decode(&mut self.notes, options, coverage)?;
+        bump::settle(&self.bumps, &mut self.materials, &textures, &mut self.notes);
         let mut scene = Scene {
             name: self.name,
             nits_per_unit: self.nits_per_unit,

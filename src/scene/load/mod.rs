@@ -20,6 +20,7 @@
 //! hostile or oversized files end in a [`LoadError`] of one line; none panics or takes memory out of proportion.
 
 mod builder;
+mod bump;
 mod default_view;
 pub mod environment;
 mod error;
@@ -37,6 +38,7 @@ pub mod sky;
 mod spectrum;
 #[path = "texture.rs"]
 mod texture;
+mod texture_memory;
 mod toml;
 mod validate;
 
@@ -57,6 +59,13 @@ pub struct LoadOptions {
     pub environment_follows: bool,
     /// Told after each decoded picture how many are done, and of how many; from several threads.
     pub on_texture: Option<fn(done: usize, total: usize)>,
+    /// Most bytes that decoded textures may take together: beyond it the largest are halved. Surroundings do not count.
+    pub texture_memory: Option<u64>,
+}
+
+/// Bytes of so many megabytes.
+pub fn megabytes(count: u32) -> u64 {
+    1_000_000 * u64::from(count)
 }
 
 /// The formats that are read, for messages.

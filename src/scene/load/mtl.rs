@@ -1,15 +1,16 @@
-//! MTL files: materials of OBJ meshes, with the PBR extension (Pr, Pm, Ke, map_Pr, map_Pm, norm).
+//! MTL files: materials of OBJ meshes, with the PBR extension (Pr, Pm, Ke, map_Pr, map_Pm, norm) and bump maps.
 //!
 //! Read by ourselves because `tobj`'s reader panics on a colour with fewer than three numbers and leaves texture options
 //! (`map_Kd -s 2 2 1 -o .5 0 0 my wood.png`) unparsed. What files of the wild get wrong is skipped with a note.
 
 use super::builder::Builder;
+use super::bump::Bump;
 use super::error::LoadError;
 use super::files;
 use super::texture::{Adjust, IfMissing, Picture, Request};
 use crate::scene::{
-    Alpha, ColorInput, Encoding, Material, MaterialId, MetalRoughness, Roughness, ScalarInput, Surface, TextureLookup,
-    Wrap,
+    Alpha, ColorInput, Encoding, HeightMap, HeightUnit, Material, MaterialId, MetalRoughness, Relief, Roughness,
+    ScalarInput, Surface, TextureLookup, Wrap,
 };
 use glam::{Vec2, Vec3};
 use std::collections::HashMap;
@@ -206,18 +207,38 @@ impl Written {
         if self.color("ke").is_some_and(|emission| emission.max_element() > 0.0) || self.maps.contains_key("map_ke") {
             material.emission = self.color_input(builder, "ke", Vec3::ZERO);
         }
-        if let Some(map) = self.map(&["norm"]) {
-            material.normal_map = Some((self.lookup(builder, map, Encoding::Linear, [128, 128, 255, 255]), map.bump));
-        } else if self.map(&["bump", "map_bump", "disp", "map_disp"]).is_some() {
-            builder.note(format!(
-                "Material \"{}\": bump and displacement heights are not rendered (\"norm\" is).",
-                self.name
-            ));
-        }
+        material.relief = self.relief(builder);
         if !matches!(material.surface, Surface::Dielectric { .. }) {
             material.alpha = self.alpha(builder);
         }
         material
+    }
+
+    /// `norm` holds normals, `bump` heights unless it looks like normals, `disp` heights. Neither the format nor its readers agree
+    /// on the unit of heights: at a multiplier of 1, white is here a fiftieth of the picture's width above black.
+    fn relief(&self, builder: &mut Builder) -> Option<Relief> {
+        const MOST_HEIGHT: f32 = 0.02;
+        if let Some(map) = self.map(&["norm"]) {
+            let lookup = self.lookup(builder, map, Encoding::Linear, [128, 128, 255, 255]);
+            return Some(Relief::Normals { map: lookup, strength: map.bump });
+        }
+        let bump = self.map(&["bump", "map_bump"]);
+        let map = bump.or_else(|| self.map(&["disp", "map_disp"]))?;
+        if bump.is_none() {
+            builder.note(format!("Material \"{}\": displacement turns normals, the surface stays.", self.name));
+        }
+        let lookup = self.lookup(builder, map, Encoding::Linear, [128; 4]);
+        let heights = HeightMap {
+            height: ScalarInput {
+                factor: MOST_HEIGHT * map.bump,
+                texture: Some((lookup, map.channel.unwrap_or(0).min(2))),
+            },
+            unit: HeightUnit::PictureWidth,
+        };
+        if bump.is_some() {
+            builder.bumps.push(Bump { heights, strength: map.bump });
+        }
+        Some(Relief::Heights(heights))
     }
 
     fn alpha(&self, builder: &mut Builder) -> Alpha {

@@ -3,12 +3,14 @@
 //! Loaders ask for textures while they read their file; everything is decoded at the end, in parallel, each picture
 //! once. 8-bit pictures stay bytes (4 a texel), all others become linear floats (16 a texel).
 
+use super::LoadOptions;
 use super::error::{LoadError, Place};
+use super::texture_memory::{self, Alpha, Extent};
 use crate::exr_read;
 use crate::scene::{Encoding, Texels, Texture, TextureId, Wrap, texture};
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 use rayon::prelude::*;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -127,11 +129,13 @@ impl Requests {
         TextureId(place as u32)
     }
 
-    /// Decodes everything. `notes` gets a sentence for each missing file that was replaced.
+    /// Decodes everything. `notes` gets a sentence for each missing file that was replaced, and one of what was made smaller.
+    /// `coverage` says which textures' alpha is how much of the surface is there.
     pub(super) fn decode(
         self,
         notes: &mut Vec<String>,
-        on_texture: Option<fn(usize, usize)>,
+        options: &LoadOptions,
+        coverage: impl Fn(TextureId) -> bool,
     ) -> Result<Vec<Texture>, LoadError> {
         let mut place_of = HashMap::new();
         let mut distinct = Vec::new();
@@ -141,15 +145,30 @@ impl Requests {
                 distinct.len() - 1
             });
         }
+        let halvings = match options.texture_memory {
+            None => vec![0; distinct.len()],
+            Some(limit) => fit(&distinct, limit, notes),
+        };
+        // A colour and its coverage may be read with different encodings: it is the picture that counts.
+        let ids = (0..).map(TextureId);
+        let covering: HashSet<&Picture> = self
+            .requests
+            .iter()
+            .zip(ids)
+            .filter(|(_, id)| coverage(*id))
+            .map(|(request, _)| &request.picture)
+            .collect();
         let done = AtomicUsize::new(0);
         let decoded: Vec<Result<Decoded, LoadError>> = distinct
             .par_iter()
-            .map(|(picture, encoding, adjust)| {
+            .zip(&halvings)
+            .map(|((picture, encoding, adjust), halvings)| {
                 let decoded = decode(picture, *encoding);
-                if let Some(tell) = on_texture {
+                if let Some(tell) = options.on_texture {
                     tell(done.fetch_add(1, Ordering::Relaxed) + 1, distinct.len());
                 }
-                Ok(adjust.apply(decoded?))
+                let alpha = if covering.contains(picture) { Alpha::Coverage } else { Alpha::Independent };
+                Ok(texture_memory::shrunk(adjust.apply(decoded?), *halvings, alpha))
             })
             .collect();
         let mut decoded: Vec<Option<Result<Decoded, LoadError>>> = decoded.into_iter().map(Some).collect();
@@ -187,6 +206,50 @@ impl Requests {
         }
         Ok(textures)
     }
+}
+
+/// How often each picture must be halved to keep to `limit` bytes, with a note of what that does.
+fn fit(pictures: &[(&Picture, Encoding, Adjust)], limit: u64, notes: &mut Vec<String>) -> Vec<u32> {
+    let nothing = Extent { width: 0, height: 0, bytes_per_texel: 0 };
+    // What cannot be measured is not decoded either: its error comes then.
+    let extents: Vec<Extent> =
+        pictures.iter().map(|(picture, _, adjust)| extent(picture, *adjust).unwrap_or(nothing)).collect();
+    let halvings = texture_memory::halvings(&extents, limit);
+    let smaller: Vec<String> = (pictures.iter().zip(&extents).zip(&halvings))
+        .filter(|(_, halvings)| **halvings > 0)
+        .map(|(((picture, ..), Extent { width, height, .. }), &halvings)| {
+            let (new_width, new_height) =
+                (texture_memory::halved(*width, halvings), texture_memory::halved(*height, halvings));
+            format!("{} from {width} x {height} to {new_width} x {new_height}", picture.name())
+        })
+        .collect();
+    if !smaller.is_empty() {
+        let megabytes = limit as f64 / 1e6;
+        notes.push(format!("To keep textures within {megabytes} MB, some are smaller: {}.", smaller.join(", ")));
+    }
+    halvings
+}
+
+/// What a picture will take once it is decoded, by its header.
+fn extent(picture: &Picture, adjust: Adjust) -> Option<Extent> {
+    let (width, height, eight_bit) = match picture {
+        Picture::File(path) => measure(&super::files::read(path).ok()?, path)?,
+        Picture::Memory { name, bytes } => measure(bytes, Path::new(name))?,
+        Picture::Texels { size: [width, height], .. } => (*width, *height, false),
+    };
+    let bytes_per_texel = if eight_bit && adjust == Adjust::NONE { 4 } else { 16 };
+    Some(Extent { width, height, bytes_per_texel })
+}
+
+/// Width, height, and whether all channels have 8 bits.
+fn measure(bytes: &[u8], name: &Path) -> Option<(u32, u32, bool)> {
+    if exr_read::is_exr(bytes) {
+        let [width, height] = exr_read::size(name, bytes).ok()?;
+        return Some((width, height, false));
+    }
+    let decoder = ImageReader::with_format(Cursor::new(bytes), format_of(bytes, name)?).into_decoder().ok()?;
+    let (width, height) = decoder.dimensions();
+    Some((width, height, is_eight_bit(decoder.color_type())))
 }
 
 impl Picture {
@@ -240,9 +303,7 @@ pub(super) fn decode_bytes(bytes: &[u8], name: &Path, encoding: Encoding) -> Res
         image::ImageError::Limits(_) => LoadError::too_large(name, format_args!("the picture is too large: {error}")),
         _ => LoadError::invalid(name, format_args!("not a readable picture: {error}")),
     };
-    let format = image::guess_format(bytes).ok().or_else(|| ImageFormat::from_path(name).ok());
-    let known = [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Hdr, ImageFormat::Tga, ImageFormat::Tiff];
-    let Some(format) = format.filter(|format| known.contains(format)) else {
+    let Some(format) = format_of(bytes, name) else {
         return Err(LoadError::unsupported(name, "not a picture that is read: png, jpg, hdr, tga, tiff, exr are"));
     };
 
@@ -254,9 +315,7 @@ pub(super) fn decode_bytes(bytes: &[u8], name: &Path, encoding: Encoding) -> Res
     reader.limits(limits);
     let decoder = reader.into_decoder().map_err(wrong)?;
     let (width, height) = decoder.dimensions();
-    let color = decoder.color_type();
-    let eight_bit = matches!(color, image::ColorType::L8 | image::ColorType::La8)
-        || matches!(color, image::ColorType::Rgb8 | image::ColorType::Rgba8);
+    let eight_bit = is_eight_bit(decoder.color_type());
     // Not every decoder looks at the limits: these hold before any of them allocates.
     check_size(name, u64::from(width), u64::from(height), if eight_bit { 4 } else { 16 })?;
 
@@ -277,6 +336,18 @@ pub(super) fn decode_bytes(bytes: &[u8], name: &Path, encoding: Encoding) -> Res
         Texels::Floats(Arc::new(texels))
     };
     Ok(Decoded { width, height, texels })
+}
+
+/// The format of a picture other than EXR, if it is one that is read.
+fn format_of(bytes: &[u8], name: &Path) -> Option<ImageFormat> {
+    let known = [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Hdr, ImageFormat::Tga, ImageFormat::Tiff];
+    let format = image::guess_format(bytes).ok().or_else(|| ImageFormat::from_path(name).ok());
+    format.filter(|format| known.contains(format))
+}
+
+fn is_eight_bit(color: image::ColorType) -> bool {
+    use image::ColorType::{L8, La8, Rgb8, Rgba8};
+    matches!(color, L8 | La8 | Rgb8 | Rgba8)
 }
 
 fn decode_exr(bytes: &[u8], name: &Path) -> Result<Decoded, LoadError> {

@@ -5,7 +5,8 @@ use super::super::error::LoadError;
 use super::super::texture::{Adjust, IfMissing, Picture, Request};
 use super::buffers::{Buffers, Uri, resolve};
 use crate::scene::{
-    Alpha, ColorInput, Encoding, Material, MaterialId, MetalRoughness, ScalarInput, Surface, TextureLookup, Wrap,
+    Alpha, ColorInput, Encoding, Material, MaterialId, MetalRoughness, Relief, ScalarInput, StretchDirection, Surface,
+    TextureLookup, Wrap,
 };
 use glam::{Vec2, Vec3};
 use gltf::texture::{MagFilter, WrappingMode};
@@ -96,7 +97,7 @@ impl<'a> Materials<'a> {
         } else {
             ColorInput { factor, texture: self.optional(builder, from.emissive_texture().as_ref(), Encoding::Srgb)? }
         };
-        let normal_map = match from.normal_texture() {
+        let relief = match from.normal_texture() {
             None => None,
             Some(normal) => {
                 if normal.tex_coord() != 0 {
@@ -106,10 +107,11 @@ impl<'a> Materials<'a> {
                 let lookup =
                     self.lookup(builder, &normal.texture(), Encoding::Linear, transform, [128, 128, 255, 255])?;
                 let strength = if normal.scale().is_finite() { normal.scale() } else { 1.0 };
-                lookup.map(|lookup| (lookup, strength))
+                lookup.map(|map| Relief::Normals { map, strength })
             }
         };
 
+        let stretch = self.stretch(builder, from)?;
         let coverage = ScalarInput { factor: share(opacity), texture: base_lookup.map(|lookup| (lookup, 3)) };
         let alpha = match from.alpha_mode() {
             gltf::material::AlphaMode::Opaque => Alpha::Opaque,
@@ -118,7 +120,7 @@ impl<'a> Materials<'a> {
             }
             gltf::material::AlphaMode::Blend => Alpha::Blend { value: coverage },
         };
-        Ok(Material { name, surface, emission, emits_both_sides: from.double_sided(), normal_map, alpha })
+        Ok(Material { name, surface, emission, emits_both_sides: from.double_sided(), relief, stretch, alpha })
     }
 
     /// What extensions say about the surface beyond the core's parameters.
@@ -134,16 +136,16 @@ impl<'a> Materials<'a> {
         }
         if let Some(json) = from.extension_value("KHR_materials_sheen") {
             let factor = json_color(json, "sheenColorFactor", 0.0).min(Vec3::ONE);
-            let texture = self.json_lookup(builder, json, "sheenColorTexture", Encoding::Srgb)?;
+            let texture = self.json_lookup(builder, json, "sheenColorTexture", Encoding::Srgb, [255; 4])?;
             model.sheen_color = ColorInput { factor, texture };
             let keys = ["sheenRoughnessFactor", "sheenRoughnessTexture"];
             model.sheen_roughness = self.json_scalar(builder, json, keys, 3)?;
         }
         if let Some(json) = from.extension_value("KHR_materials_anisotropy") {
-            model.anisotropy = self.json_scalar(builder, json, ["anisotropyStrength", "anisotropyTexture"], 2)?;
-            if json.get("anisotropyRotation").is_some_and(|rotation| rotation.as_f64() != Some(0.0)) {
-                builder.note("KHR_materials_anisotropy: the stretch follows the tangent, its rotation is not used.");
-            }
+            let strength = json.get("anisotropyStrength").and_then(serde_json::Value::as_f64).unwrap_or(0.0) as f32;
+            let lookup = self.anisotropy_texture(builder, json)?;
+            model.anisotropy =
+                ScalarInput { factor: strength.clamp(0.0, 1.0), texture: lookup.map(|lookup| (lookup, 2)) };
         }
         if let Some(specular) = from.specular() {
             let factor = specular.specular_factor();
@@ -162,6 +164,24 @@ impl<'a> Materials<'a> {
         Ok(model)
     }
 
+    /// The direction of KHR_materials_anisotropy: red and green of its texture, whose blue is the strength, and its rotation.
+    fn stretch(&mut self, builder: &mut Builder, from: &gltf::Material) -> Result<Option<StretchDirection>, LoadError> {
+        let Some(json) = from.extension_value("KHR_materials_anisotropy") else { return Ok(None) };
+        let rotation = json.get("anisotropyRotation").and_then(serde_json::Value::as_f64).unwrap_or(0.0) as f32;
+        let rotation = if rotation.is_finite() { rotation } else { 0.0 };
+        let map = self.anisotropy_texture(builder, json)?;
+        Ok((rotation != 0.0 || map.is_some()).then_some(StretchDirection { rotation, map }))
+    }
+
+    /// Red and green are a direction, blue a strength; along u and in full where the picture is missing.
+    fn anisotropy_texture(
+        &mut self,
+        builder: &mut Builder,
+        json: &serde_json::Value,
+    ) -> Result<Option<TextureLookup>, LoadError> {
+        self.json_lookup(builder, json, "anisotropyTexture", Encoding::Linear, [255, 128, 255, 255])
+    }
+
     /// A factor in [0, 1], 0 unless told, and a channel of a texture, of an extension that the crate leaves as JSON.
     fn json_scalar(
         &mut self,
@@ -171,7 +191,7 @@ impl<'a> Materials<'a> {
         channel: u8,
     ) -> Result<ScalarInput, LoadError> {
         let number = json.get(factor).and_then(serde_json::Value::as_f64).unwrap_or(0.0) as f32;
-        let lookup = self.json_lookup(builder, json, texture, Encoding::Linear)?;
+        let lookup = self.json_lookup(builder, json, texture, Encoding::Linear, [255; 4])?;
         Ok(ScalarInput { factor: number.clamp(0.0, 1.0), texture: lookup.map(|lookup| (lookup, channel)) })
     }
 
@@ -181,6 +201,7 @@ impl<'a> Materials<'a> {
         json: &serde_json::Value,
         key: &str,
         encoding: Encoding,
+        if_missing: [u8; 4],
     ) -> Result<Option<TextureLookup>, LoadError> {
         let Some(info) = json.get(key) else { return Ok(None) };
         let index = info.get("index").and_then(serde_json::Value::as_u64);
@@ -191,7 +212,7 @@ impl<'a> Materials<'a> {
             builder.note("Texture coordinate sets beyond the first are not used.");
         }
         let transform = info.pointer("/extensions/KHR_texture_transform").map(read_transform);
-        self.lookup(builder, &texture, encoding, transform, [255; 4])
+        self.lookup(builder, &texture, encoding, transform, if_missing)
     }
 
     fn optional(

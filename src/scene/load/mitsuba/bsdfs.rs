@@ -7,8 +7,8 @@ use super::Reader;
 use super::element::Element;
 use super::textures::Meaning;
 use crate::scene::{
-    Alpha, ColorInput, Distribution, Material, MetalRoughness, Roughness, RoughnessScale, ScalarInput, Surface,
-    TextureLookup,
+    Alpha, ColorInput, Distribution, HeightMap, HeightUnit, Material, MetalRoughness, Relief, Roughness,
+    RoughnessScale, ScalarInput, Surface,
 };
 use glam::Vec3;
 use std::rc::Rc;
@@ -48,12 +48,12 @@ pub(super) struct Look {
     /// `None` for a surface that is not there.
     pub(super) surface: Option<Surface>,
     pub(super) alpha: Alpha,
-    normal_map: Option<(TextureLookup, f32)>,
+    relief: Option<Relief>,
 }
 
 impl From<Surface> for Look {
     fn from(surface: Surface) -> Self {
-        Self { surface: Some(surface), alpha: Alpha::Opaque, normal_map: None }
+        Self { surface: Some(surface), alpha: Alpha::Opaque, relief: None }
     }
 }
 
@@ -61,7 +61,7 @@ impl Look {
     pub(super) fn into_material(self, name: String) -> Option<Material> {
         let mut material = Material::plain(name, self.surface?);
         material.alpha = self.alpha;
-        material.normal_map = self.normal_map;
+        material.relief = self.relief;
         Some(material)
     }
 }
@@ -89,31 +89,52 @@ impl Reader {
                 look
             }
             "bumpmap" | "bump" => {
-                self.builder.note(format!("{}: bump heights are not rendered: the surface is smooth.", bsdf.place()));
-                bsdf.tagged("texture").count();
-                bsdf.ignore(&["scale"]);
                 let inner = self.inner(bsdf)?;
-                self.bsdf(&inner[0], depth + 1)?
+                let mut look = self.bsdf(&inner[0], depth + 1)?;
+                let relief = self.heights(bsdf)?;
+                self.add_relief(bsdf, &mut look, relief);
+                look
             }
             "normalmap" => {
                 let inner = self.inner(bsdf)?;
                 let mut look = self.bsdf(&inner[0], depth + 1)?;
                 // In 0.x the picture has no name.
                 let named = self.color_input(bsdf, "normalmap", Meaning::Coefficient)?;
-                look.normal_map = named.and_then(|input| input.texture).map(|lookup| (lookup, 1.0));
-                if look.normal_map.is_none() {
+                let map = named.and_then(|input| input.texture);
+                if map.is_none() {
                     self.builder.note(format!("{}: its normal map is not rendered.", bsdf.place()));
                 }
+                self.add_relief(bsdf, &mut look, map.map(|map| Relief::Normals { map, strength: 1.0 }));
                 look
             }
             "blendbsdf" | "mixturebsdf" => self.mix(bsdf, depth)?,
             "coating" | "roughcoating" => self.coating(bsdf, depth)?,
-            "null" => Look { surface: None, alpha: Alpha::Opaque, normal_map: None },
+            "null" => Look { surface: None, alpha: Alpha::Opaque, relief: None },
             kind => self.plain_surface(bsdf, kind)?.into(),
         };
         bsdf.ignore(&["sampleweight", "specularsamplingweight"]);
         self.note_unused(&format!("bsdf \"{}\"", bsdf.name()), bsdf);
         Ok(look)
+    }
+
+    /// What a wrapper adds. Two reliefs on top of each other are the outer one.
+    fn add_relief(&mut self, bsdf: &Element, look: &mut Look, relief: Option<Relief>) {
+        if look.relief.is_some() && relief.is_some() {
+            self.builder.note(format!("{}: the relief inside another is not rendered.", bsdf.place()));
+        }
+        look.relief = relief.or(look.relief);
+    }
+
+    /// Heights of a bump map in scene units: its texture, whatever that is called, times its scale.
+    fn heights(&mut self, bsdf: &Element) -> Result<Option<Relief>, LoadError> {
+        let scale = bsdf.float_or("scale", 1.0)?;
+        let Some(texture) = self.nested_texture(bsdf)? else {
+            return Err(bsdf.error("needs a texture of heights inside"));
+        };
+        let input = self.texture(&texture, Meaning::Coefficient, 0)?;
+        let height =
+            ScalarInput { factor: scale * luminance(input.factor), texture: input.texture.map(|lookup| (lookup, 0)) };
+        Ok(height.texture.map(|_| Relief::Heights(HeightMap { height, unit: HeightUnit::Scene })))
     }
 
     /// BSDFs inside another; at least one.

@@ -104,8 +104,27 @@ impl Reader {
         Ok(Some(scalar))
     }
 
+    /// A texture inside, of any name, here or elsewhere in the file.
+    pub(super) fn nested_texture(&mut self, owner: &Element) -> Result<Option<Rc<Element>>, LoadError> {
+        if let Some(texture) = owner.tagged("texture").next() {
+            return Ok(Some(texture.clone()));
+        }
+        for reference in owner.tagged("ref").cloned().collect::<Vec<_>>() {
+            let found = self.resolve(&reference)?;
+            if found.tag == "texture" {
+                return Ok(Some(found));
+            }
+        }
+        Ok(None)
+    }
+
     /// A texture plugin.
-    fn texture(&mut self, texture: &Rc<Element>, meaning: Meaning, depth: usize) -> Result<ColorInput, LoadError> {
+    pub(super) fn texture(
+        &mut self,
+        texture: &Rc<Element>,
+        meaning: Meaning,
+        depth: usize,
+    ) -> Result<ColorInput, LoadError> {
         if depth > 16 {
             return Err(texture.error("textures are nested too deeply"));
         }

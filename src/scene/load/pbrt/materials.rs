@@ -7,7 +7,8 @@ use super::Reader;
 use super::inputs::Meaning;
 use super::parameters::Parameters;
 use crate::scene::{
-    ColorInput, Distribution, Encoding, Material, Roughness, RoughnessScale, ScalarInput, Surface, TextureLookup, Wrap,
+    ColorInput, Distribution, Encoding, HeightMap, HeightUnit, Material, Relief, Roughness, RoughnessScale,
+    ScalarInput, Surface, TextureLookup, Wrap,
 };
 use glam::Vec3;
 use std::rc::Rc;
@@ -87,23 +88,30 @@ impl Reader<'_> {
             return Err(parameters.unsupported(format_args!("mixes of more than {most} materials are not rendered")));
         }
         let mut material = Material::plain(definition.name.clone(), surface);
-        if let Some(file) = parameters.string("normalmap")? {
-            let request = Request {
-                picture: Picture::File(self.file(file)),
-                encoding: Encoding::Linear,
-                wrap_u: Wrap::Repeat,
-                wrap_v: Wrap::Repeat,
-                nearest: false,
-                if_missing: IfMissing::Fail(parameters.place()),
-                adjust: Adjust::NONE,
-            };
-            material.normal_map = Some((TextureLookup::plain(self.builder.textures.add(request)), 1.0));
-        }
-        if parameters.find(&["float", "texture"], "displacement").is_some() {
-            self.builder.note(format!("{}: displacement is not rendered: the surface is smooth.", parameters.place()));
-        }
+        material.relief = self.relief(parameters)?;
         self.note_unread(&format!("material \"{}\"", definition.name), parameters);
         Ok(Some(material))
+    }
+
+    /// Heights in scene units, which win over normals where both are there.
+    fn relief(&mut self, parameters: &Parameters) -> Result<Option<Relief>, LoadError> {
+        let heights = self.scalar_input(parameters, "displacement")?;
+        let normals = parameters.string("normalmap")?;
+        if let Some(height) = heights.filter(|height| height.texture.is_some()) {
+            return Ok(Some(Relief::Heights(HeightMap { height, unit: HeightUnit::Scene })));
+        }
+        let Some(file) = normals else { return Ok(None) };
+        let request = Request {
+            picture: Picture::File(self.file(file)),
+            encoding: Encoding::Linear,
+            wrap_u: Wrap::Repeat,
+            wrap_v: Wrap::Repeat,
+            nearest: false,
+            if_missing: IfMissing::Fail(parameters.place()),
+            adjust: Adjust::NONE,
+        };
+        let map = TextureLookup::plain(self.builder.textures.add(request));
+        Ok(Some(Relief::Normals { map, strength: 1.0 }))
     }
 
     fn surface(&mut self, definition: &Definition, depth: usize) -> Result<Option<Surface>, LoadError> {

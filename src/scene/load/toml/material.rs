@@ -5,12 +5,15 @@ use super::light::unit_luminance;
 use super::{Context, surface};
 use crate::scene::load::LoadError;
 use crate::scene::load::error::suggestion;
-use crate::scene::{Alpha, ColorInput, Encoding, Material, MaterialId, ScalarInput, TextureLookup};
+use crate::scene::{
+    Alpha, ColorInput, Encoding, HeightMap, HeightUnit, Material, MaterialId, Relief, ScalarInput, StretchDirection,
+    TextureLookup,
+};
 use glam::{Vec2, Vec3};
 use std::collections::HashMap;
 
 /// Keys that every material may have.
-const COMMON: [&str; 9] = [
+const COMMON: [&str; 11] = [
     "type",
     "emission",
     "emission_cd_m2",
@@ -18,6 +21,8 @@ const COMMON: [&str; 9] = [
     "emission_color",
     "emits_both_sides",
     "normal_map",
+    "bump_map",
+    "stretch_rotation_deg",
     "alpha",
     "alpha_cutoff",
 ];
@@ -87,7 +92,10 @@ impl<'a> Materials<'a> {
             surface,
             emission,
             emits_both_sides: fields.get_or("emits_both_sides", false, Value::boolean)?,
-            normal_map: fields.get_some("normal_map", |value| normal_map(context, value))?,
+            relief: relief(context, &fields)?,
+            stretch: fields.get_some("stretch_rotation_deg", |value| {
+                Ok(StretchDirection { rotation: value.number()?.to_radians() as f32, map: None })
+            })?,
             alpha: alpha(context, &fields)?,
         };
         let id = context.builder.add_material(material);
@@ -176,17 +184,33 @@ pub(super) fn scalar<'a>(
         return Ok(ScalarInput::constant(value.within(0.0, 1.0)? as f32));
     }
     let fields = value.fields(&["texture", "channel", "factor", "scale", "offset", "rotation_deg"])?;
-    let channel = fields.get_or("channel", 0, |value| value.choice(&[("r", 0), ("g", 1), ("b", 2), ("a", 3)]))?;
     Ok(ScalarInput {
         factor: fields.get_or("factor", 1.0, |value| value.within(0.0, 1.0))? as f32,
-        texture: Some((lookup(context, &fields, Encoding::Linear)?, channel)),
+        texture: Some((lookup(context, &fields, Encoding::Linear)?, channel(&fields)?)),
     })
 }
 
-fn normal_map<'a>(context: &mut Context<'a>, value: &Value<'a>) -> Result<(TextureLookup, f32), LoadError> {
-    let fields = value.fields(&["texture", "strength", "scale", "offset", "rotation_deg"])?;
-    let strength = fields.get_or("strength", 1.0, Value::number)? as f32;
-    Ok((lookup(context, &fields, Encoding::Linear)?, strength))
+fn channel(fields: &Fields<'_>) -> Result<u8, LoadError> {
+    fields.get_or("channel", 0, |value| value.choice(&[("r", 0), ("g", 1), ("b", 2), ("a", 3)]))
+}
+
+fn relief<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Option<Relief>, LoadError> {
+    match (fields.get("normal_map"), fields.get("bump_map")) {
+        (None, None) => Ok(None),
+        (Some(value), None) => {
+            let fields = value.fields(&["texture", "strength", "scale", "offset", "rotation_deg"])?;
+            let strength = fields.get_or("strength", 1.0, Value::number)? as f32;
+            Ok(Some(Relief::Normals { map: lookup(context, &fields, Encoding::Linear)?, strength }))
+        }
+        (None, Some(value)) => {
+            let fields = value.fields(&["texture", "channel", "height", "scale", "offset", "rotation_deg"])?;
+            let height = fields.require("height")?.number()? as f32;
+            let texture = Some((lookup(context, &fields, Encoding::Linear)?, channel(&fields)?));
+            let height = ScalarInput { factor: height, texture };
+            Ok(Some(Relief::Heights(HeightMap { height, unit: HeightUnit::Scene })))
+        }
+        (Some(_), Some(bump)) => Err(bump.error("a material has either a normal_map or a bump_map")),
+    }
 }
 
 /// The texture that a table names. Its own `encoding` wins over what its use suggests.
