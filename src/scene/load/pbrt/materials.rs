@@ -208,6 +208,10 @@ impl Reader<'_> {
         for name in [first, second] {
             let definition = self.named_material(parameters, name)?;
             let surface = self.surface(&definition, depth + 1)?;
+            let part = &definition.parameters;
+            if part.find(&["texture"], "displacement").is_some() || part.string("normalmap")?.is_some() {
+                self.builder.note(format!("{}: relief of a mix's parts is not rendered.", part.place()));
+            }
             // Nested mixes double at each level: stop before they are many.
             let most = Surface::MOST_COMPONENTS;
             if surface.as_ref().is_some_and(|surface| surface.components() > most) {
