@@ -25,6 +25,9 @@ use std::time::{Duration, Instant};
 const FRAME_INTERVAL: Duration = Duration::from_millis(100);
 /// For so long after a start frames may take a twentieth of the time, then a fortieth: 3 % of the first ten seconds.
 const LIVELY: Duration = Duration::from_secs(2);
+/// Time between frames at most, while lively and later, where frames are large or the machine is busy: a picture that stands still
+/// for longer seems to be done.
+const LONGEST_INTERVALS: [Duration; 2] = [Duration::from_millis(500), Duration::from_secs(2)];
 
 /// What the last look at the film saw.
 #[derive(Debug)]
@@ -119,8 +122,10 @@ impl Screen {
 
     /// Whether a frame is due.
     pub(super) fn is_due(&self) -> bool {
-        let times_cost = if self.started.elapsed() < LIVELY { 19 } else { 39 };
-        self.shown.is_none_or(|shown| shown.elapsed() >= FRAME_INTERVAL.max(self.cost * times_cost))
+        let [lively, later] = LONGEST_INTERVALS;
+        let (times_cost, longest) = if self.started.elapsed() < LIVELY { (19, lively) } else { (39, later) };
+        let interval = (self.cost * times_cost).clamp(FRAME_INTERVAL, longest);
+        self.shown.is_none_or(|shown| shown.elapsed() >= interval)
     }
 
     /// Shows a film to all viewers, and remembers what that took.
