@@ -9,11 +9,11 @@ use crate::film::{Estimate, Film, opponent};
 use crate::integrator::SamplePlan;
 use crate::sampler::Half;
 use fechner_perception::Plane;
-use fechner_perception::csf::{CastleChromatic, ChromaticChannel};
-use fechner_perception::denoised::{DenoisedDifferences, DenoisedError, blended};
+use fechner_perception::csf::ChromaticChannel;
+use fechner_perception::denoised::{ChromaticPicture, DenoisedDifferences, DenoisedError, blended, chromatic_error};
 use fechner_perception::photometry::luminance;
 use fechner_perception::seen;
-use fechner_perception::threshold::{ThresholdMap, chromatic_threshold_map};
+use fechner_perception::threshold::ThresholdMap;
 use fechner_perception::tone::FittedTone;
 use rayon::prelude::*;
 use std::time::Instant;
@@ -104,20 +104,16 @@ impl TimedDenoising {
             let of_raw_half =
                 |half: Half| shown(&|pixel| settings.nits_per_unit * opponent(film.half_or_other(half, pixel).mean)[c]);
             let picture = of_rgb(&self.film.rgb_cd_m2);
-            let csf = CastleChromatic::new(channel, settings.viewing.observer.csf_area_deg2)?;
-            let thresholds = chromatic_threshold_map(&picture, &displayed, &settings.viewing, &csf)?;
             let half_difference = half_of(self.film.halves_rgb_cd_m2.each_ref().map(|half| of_rgb(half)));
             let raw_half_difference = half_of(Half::BOTH.map(of_raw_half));
-            let error = thresholds.denoised_error(&DenoisedDifferences {
+            let less_raw = |denoised: &Plane, raw: &Plane| denoised.combined(raw, |denoised, raw| denoised - raw);
+            let differences = DenoisedDifferences {
                 half_difference: &half_difference,
-                residual: &picture.combined(&of_rgb(&estimate.rgb_cd_m2), |denoised, raw| denoised - raw),
-                residual_half_difference: &half_difference
-                    .combined(&raw_half_difference, |denoised, raw| denoised - raw),
-            });
-            Ok(match settings.frames {
-                None => error,
-                Some(timing) => error.scaled(timing.chromatic_energy(channel)?.sqrt()),
-            })
+                residual: &less_raw(&picture, &of_rgb(&estimate.rgb_cd_m2)),
+                residual_half_difference: &less_raw(&half_difference, &raw_half_difference),
+            };
+            let picture = ChromaticPicture { signal: &picture, luminance_cd_m2: &displayed, differences };
+            Ok(chromatic_error(channel, &picture, &settings.viewing, settings.frames)?)
         };
         [(1, ChromaticChannel::RedGreen), (2, ChromaticChannel::YellowViolet)].into_par_iter().map(of_channel).collect()
     }

@@ -7,6 +7,11 @@ use crate::integrator::SamplePlan;
 use crate::sampler::Half;
 use fechner_perception::Plane;
 
+/// Forecasts aim at so much of the visibility asked for, since estimates will move and the worst pixels count: with 0.98 three
+/// scenes at 128×128 took 12, 12 and 6 looks, with this 10, 9 and 4, for as many samples (counted by hand on 22 November 2026, in
+/// `plans` of `render --json`).
+const AIM: f64 = 0.9;
+
 /// A film and how it was judged, from which the visibility after more samples is foretold: variances of a sample as they were, and
 /// each band's smear as it was.
 pub(super) struct Forecast<'a> {
@@ -39,9 +44,6 @@ impl<'a> Forecast<'a> {
 
     /// Whether the plan will bring the picture to a visibility, if nothing new is found.
     pub(super) fn is_reached_by(&self, plan: &SamplePlan, visibility: f64) -> bool {
-        /// Below it, since estimates will move and the worst pixels count: with 0.98 three scenes at 128×128 took 12, 12 and 6
-        /// looks, with this 10, 9 and 4, for as many samples (counted by hand on 22 November 2026, in `plans` of `render --json`).
-        const AIM: f64 = 0.9;
         let mut counts = self.counts();
         for block in &plan.blocks {
             counts[block.pixel as usize][block.half.index()] += block.samples;
@@ -86,8 +88,8 @@ mod tests {
         let forecast = Forecast::of(&film, &judgement);
         let [middle, worst] = [0.5, 1.0].map(|share| judgement.predicted.quantile(share) / 2.0_f64.sqrt());
         let doubled = uniform_plan(&film, 64);
-        assert!(forecast.is_reached_by(&doubled, worst / 0.9 * 1.01));
-        assert!(!forecast.is_reached_by(&doubled, middle / 0.9 * 0.99), "half of the picture would stay above");
+        assert!(forecast.is_reached_by(&doubled, worst / AIM * 1.01));
+        assert!(!forecast.is_reached_by(&doubled, middle / AIM * 0.99), "half of the picture would stay above");
         assert!(!forecast.is_reached_by(&SamplePlan::default(), worst), "without samples nothing changes");
     }
 

@@ -34,7 +34,8 @@ const FIRST_PASS_SAMPLES: u32 = 2;
 /// What a film lacks of the first samples of every pixel: 8 + 8, or `most_samples` in all where they are fewer.
 pub fn pilot_plan(film: &Film, most_samples: u32) -> SamplePlan {
     let mut plan = SamplePlan::default();
-    let share = |half: Half| ((most_samples + 1 - half.index() as u32) / 2).min(PILOT_SAMPLES);
+    let samples = most_samples.min(2 * PILOT_SAMPLES);
+    let share = |half: Half| (samples + 1 - half.index() as u32) / 2;
     for [from, to] in [[0, FIRST_PASS_SAMPLES], [FIRST_PASS_SAMPLES, PILOT_SAMPLES]] {
         for half in Half::BOTH {
             let to = to.min(share(half));

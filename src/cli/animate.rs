@@ -42,14 +42,8 @@ pub(super) struct AnimateArguments {
     /// Picture size.
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<Size>,
-    /// Camera of the scene file, by name.
-    #[arg(long, value_name = "NAME")]
-    camera: Option<String>,
     #[command(flatten)]
     staging: super::staging::Staging,
-    /// Most memory for decoded textures of one frame: beyond it the largest are halved until they fit. No limit unless told.
-    #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u32).range(1..))]
-    texture_memory: Option<u32>,
 
     /// A frame is done when its remaining noise is at most this visible in motion: 1 is at threshold.
     #[arg(long, value_name = "V", value_parser = parse_positive, help_heading = "Until")]

@@ -27,14 +27,8 @@ pub(super) struct JobArguments {
     /// Trace only this part of the picture, with the samples it has in the whole.
     #[arg(long, value_name = "X,Y,W,H", value_parser = parse_crop)]
     crop: Option<Crop>,
-    /// Camera of the scene file, by name.
-    #[arg(long, value_name = "NAME")]
-    camera: Option<String>,
     #[command(flatten)]
     staging: super::staging::Staging,
-    /// Most memory for decoded textures: beyond it the largest are halved until they fit. No limit unless told.
-    #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u32).range(1..))]
-    texture_memory: Option<u32>,
     /// Time in the scene's keyframes, in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
     at: f64,
@@ -164,13 +158,7 @@ impl JobArguments {
     }
 
     fn load_at(&self, seconds: f64, on_texture: Option<fn(usize, usize)>) -> anyhow::Result<Scene> {
-        let options = load::LoadOptions {
-            camera: self.camera.clone(),
-            frame_time: seconds,
-            environment_follows: self.staging.has_environment(),
-            on_texture,
-            texture_memory: self.texture_memory.map(load::megabytes),
-        };
+        let options = load::LoadOptions { on_texture, ..self.staging.load_options(seconds) };
         let mut scene = load::load(&self.scene, &options)?;
         self.staging.apply(&mut scene, self.nits_per_unit)?;
         Ok(scene)

@@ -4,13 +4,17 @@ use anyhow::{Context, bail};
 use clap::Args;
 use fechner::scene::load::environment;
 use fechner::scene::load::sky::{self, Sky};
+use fechner::scene::load::{LoadOptions, megabytes};
 use fechner::scene::{Camera, Environment, Projection, Scene};
 use glam::Vec3;
 use std::path::PathBuf;
 
-/// What is put in the place of the scene's own.
+/// What is chosen of the scene, and what is put in the place of its own.
 #[derive(Clone, Debug, Args)]
 pub(super) struct Staging {
+    /// Camera of the scene file, by name.
+    #[arg(long, value_name = "NAME")]
+    camera: Option<String>,
     /// Surroundings instead of the scene's: a lat-long picture (.hdr, .exr, .png), sky:ELEVATION[,AZIMUTH[,TURBIDITY]] in
     /// degrees, or constant:CD_M2.
     #[arg(long, value_name = "FILE|sky:...", value_parser = parse_surroundings)]
@@ -18,6 +22,10 @@ pub(super) struct Staging {
     /// Look from one point to another: X,Y,Z,X,Y,Z, and the vertical field of view in degrees if wanted.
     #[arg(long, value_name = "FROM,TO[,FOV]", value_parser = parse_look_at, allow_hyphen_values = true, conflicts_with = "camera")]
     look_at: Option<LookAt>,
+    /// Most memory for decoded textures, of one frame where there are several: beyond it the largest are halved until they fit. No
+    /// limit unless told.
+    #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u32).range(1..))]
+    texture_memory: Option<u32>,
 }
 
 #[derive(Clone, Debug)]
@@ -83,9 +91,15 @@ fn parse_look_at(text: &str) -> Result<LookAt, String> {
 }
 
 impl Staging {
-    /// Whether the scene's own lack of light does not matter.
-    pub(super) fn has_environment(&self) -> bool {
-        self.environment.is_some()
+    /// How the scene is read, as it is at a time.
+    pub(super) fn load_options(&self, seconds: f64) -> LoadOptions {
+        LoadOptions {
+            camera: self.camera.clone(),
+            frame_time: seconds,
+            environment_follows: self.environment.is_some(),
+            on_texture: None,
+            texture_memory: self.texture_memory.map(megabytes),
+        }
     }
 
     /// Puts everything into the scene. `nits_per_unit` is the command line's, if it names one.

@@ -27,7 +27,7 @@ pub(super) struct FlatEmitter {
     pub(super) both_sides: bool,
 }
 
-/// Bound of the solid angle in steradian below which a rectangle is sampled by its corners.
+/// Bound of the solid angle in steradian below which a parallelogram is sampled by its corners.
 const MOST_BILINEAR: f32 = 1.0;
 
 /// What the two edges span.
@@ -174,19 +174,20 @@ impl FlatEmitter {
         let nearest = (self.center - receiver.position).length() - self.radius;
         let looks_below = |solid_angle: f32| nearest > 0.0 && self.area < solid_angle * nearest * nearest;
         if looks_below(LEAST as f32) {
-            return View::Small;
+            return View::Even;
         }
         let corner = self.corner - receiver.position;
         match self.outline {
             Outline::Triangle => {
                 let others = [self.edge_1, self.edge_2].map(|edge| (corner + edge).as_dvec3());
                 let triangle = SphericalTriangle::new([corner.as_dvec3(), others[0], others[1]]);
-                if triangle.solid_angle > LEAST { View::Triangle(triangle) } else { View::Small }
+                if triangle.solid_angle > LEAST { View::Triangle(triangle) } else { View::Even }
             }
             Outline::Rectangle(edges) if !looks_below(MOST_BILINEAR) => {
                 let rectangle = SphericalRectangle::new(corner.as_dvec3(), edges.axes, edges.lengths);
-                if rectangle.solid_angle > LEAST { View::Rectangle(rectangle) } else { View::Small }
+                if rectangle.solid_angle > LEAST { View::Rectangle(rectangle) } else { View::Even }
             }
+            Outline::Parallelogram if !looks_below(MOST_BILINEAR) => View::Even,
             Outline::Rectangle(_) | Outline::Parallelogram => {
                 let (right, up) = (corner + self.edge_1, corner + self.edge_2);
                 let corners = [corner, right, up, right + self.edge_2];
@@ -199,7 +200,7 @@ impl FlatEmitter {
 /// How an emitter is sampled from one point.
 enum View {
     /// By area, evenly.
-    Small,
+    Even,
     /// By area, as much as the corners give.
     Bilinear(BilinearDensity),
     Triangle(SphericalTriangle),
@@ -209,8 +210,8 @@ enum View {
 impl View {
     fn sample(&self, emitter: &FlatEmitter, u: [f32; 2]) -> Option<Shares> {
         match self {
-            View::Small if emitter.outline == Outline::Triangle => Some(uniform_barycentrics(u)),
-            View::Small => Some(u),
+            View::Even if emitter.outline == Outline::Triangle => Some(uniform_barycentrics(u)),
+            View::Even => Some(u),
             View::Bilinear(density) => Some(density.sample(u)),
             View::Rectangle(rectangle) => {
                 let Outline::Rectangle(edges) = emitter.outline else { return None };
@@ -225,7 +226,7 @@ impl View {
         // Area density turned to solid angle.
         let even = || distance * distance / (direction.dot(emitter.normal).abs() * emitter.area);
         match self {
-            View::Small => even(),
+            View::Even => even(),
             View::Bilinear(density) => even() * density.at(shares()),
             View::Triangle(triangle) => (1.0 / triangle.solid_angle) as f32,
             View::Rectangle(rectangle) => (1.0 / rectangle.solid_angle) as f32,

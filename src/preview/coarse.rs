@@ -13,17 +13,33 @@ fn spacing(x: u32, y: u32) -> u32 {
     1 << both.trailing_zeros()
 }
 
-/// Sorts a pilot's blocks from coarse to fine, one pass over the picture after the other: some of a pilot's samples for every pixel
-/// look better than all of them for some pixels. Blocks of one pixel's half keep their order, so the film that comes of it
-/// has the same bytes.
-pub(super) fn order(pilot: &mut SamplePlan, width: u32) {
-    let place = |block: &BlockWork| {
-        let (x, y) = (block.pixel % width, block.pixel / width);
-        // Rows far apart after one another: the finest grid is most of the plan, and swept from above it would leave the lower
-        // part behind for seconds.
-        (block.first, block.half.index(), std::cmp::Reverse(spacing(x, y)), y.reverse_bits(), x)
-    };
-    pilot.blocks.sort_unstable_by_key(place);
+/// All pixels of a picture, grid after grid. Rows of a grid that follow one another lie far apart: the finest grid is most of the
+/// picture, and swept from above it would leave the lower part behind for seconds.
+fn coarse_to_fine(width: u32, height: u32) -> Vec<u32> {
+    let mut rows: Vec<u32> = (0..height).collect();
+    rows.sort_unstable_by_key(|y| y.reverse_bits());
+    let mut pixels = Vec::with_capacity(width as usize * height as usize);
+    for step in (0..=COARSEST.ilog2()).rev().map(|power| 1 << power) {
+        for &y in rows.iter().filter(|&y| y % step == 0) {
+            let columns = (0..width).step_by(step as usize).filter(|&x| spacing(x, y) == step);
+            pixels.extend(columns.map(|x| y * width + x));
+        }
+    }
+    pixels
+}
+
+/// Puts the blocks of a pilot's every pass over the picture in an order from coarse to fine. The passes stay: some of a pilot's
+/// samples for every pixel look better than all of them for some pixels. Blocks of one pixel's half keep their order, so the film
+/// that comes of it has the same bytes.
+pub(super) fn order(pilot: &mut SamplePlan, width: u32, height: u32) {
+    let order = coarse_to_fine(width, height);
+    let mut of_pixel: Vec<Option<BlockWork>> = vec![None; order.len()];
+    // Placed, not sorted: there are four blocks a pixel, and nothing is shown of a new picture before.
+    for pass in pilot.blocks.chunk_by_mut(|a, b| a.pixel < b.pixel) {
+        pass.iter().for_each(|block| of_pixel[block.pixel as usize] = Some(*block));
+        let ordered = order.iter().filter_map(|&pixel| of_pixel[pixel as usize].take());
+        pass.iter_mut().zip(ordered).for_each(|(place, block)| *place = block);
+    }
 }
 
 /// The index of the pixel whose samples stand for one: itself, or the nearest above and to the left on a grid that has been
@@ -47,7 +63,7 @@ mod tests {
     fn coarse_grids_come_first() {
         let mut plan = pilot_plan(&Film::new(40, 24), 16);
         let unordered = plan.samples();
-        order(&mut plan, 40);
+        order(&mut plan, 40, 24);
         let first: Vec<u32> = plan.blocks.iter().take(6).map(|b| b.pixel).collect();
         assert_eq!(first, [0, 16, 32, 16 * 40, 16 * 40 + 16, 16 * 40 + 32]);
         let mut pixels: Vec<u32> = plan.blocks.iter().take(40 * 24).map(|b| b.pixel).collect();
@@ -59,7 +75,7 @@ mod tests {
     #[test]
     fn one_pass_comes_after_the_other() {
         let mut plan = pilot_plan(&Film::new(40, 24), 16);
-        order(&mut plan, 40);
+        order(&mut plan, 40, 24);
         let passes: Vec<&[BlockWork]> = plan.blocks.chunks(40 * 24).collect();
         let kinds = [(Half::A, 0, 2), (Half::B, 0, 2), (Half::A, 2, 6), (Half::B, 2, 6)];
         assert_eq!(passes.len(), kinds.len());

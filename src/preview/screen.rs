@@ -8,7 +8,9 @@ use crate::adaptive::judge::Judgement;
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::statistics::picture_variance;
 use crate::film::Film;
+use crate::integrator::PILOT_SAMPLES;
 use crate::output::encode_srgb8;
+use crate::sampler::Half;
 use fechner_perception::Plane;
 use fechner_perception::photometry::luminance;
 use fechner_perception::tone::{FittedTone, SavedTone, SceneGuide, map_picture};
@@ -144,8 +146,7 @@ impl Screen {
         let nits_per_unit = scenery.settings.nits_per_unit;
         // Denoised pictures are made by looks; between two the last one stays.
         let denoised = self.looked.as_ref().and_then(|looked| looked.denoised.clone());
-        let is_pilot = self.looked.is_none() && !scenery.is_at_rest;
-        let (raw, samples) = composed(scenery.film, nits_per_unit, is_pilot);
+        let (raw, samples) = composed(scenery.film, nits_per_unit, scenery.is_at_rest);
         let rgb_cd_m2 = denoised.unwrap_or(raw);
         for layer in ALL.into_iter().filter(|&layer| shared.is_watched(layer)) {
             let colours = self.colours(layer, scenery, &rgb_cd_m2);
@@ -231,10 +232,12 @@ fn pixels(film: &Film) -> usize {
 }
 
 /// The film's picture, cd/m², and its samples of each pixel; where it has none, another pixel's picture. In one walk: a film is
-/// many times as large as a picture. While a pilot is traced one half is ahead of the other.
-fn composed(film: &Film, nits_per_unit: f64, is_pilot: bool) -> (Vec<[f32; 3]>, Vec<u32>) {
+/// many times as large as a picture.
+fn composed(film: &Film, nits_per_unit: f64, is_at_rest: bool) -> (Vec<[f32; 3]>, Vec<u32>) {
+    // While a pixel's pilot is traced one half is ahead of the other, and their samples count alike.
+    let is_in_pilot = |pixel: usize| Half::BOTH.iter().all(|&half| film.half(half)[pixel].taken <= PILOT_SAMPLES);
     let light = |pixel: usize| {
-        let light = if is_pilot { Film::mean_of_samples_cd_m2 } else { Film::rgb_cd_m2 };
+        let light = if !is_at_rest && is_in_pilot(pixel) { Film::mean_of_samples_cd_m2 } else { Film::rgb_cd_m2 };
         light(film, pixel, nits_per_unit)
     };
     let of_pixel = |pixel: usize| match film.samples(pixel) {
@@ -268,4 +271,39 @@ fn encode(layer: Layer, colours: &Colours, film: &Film, is_at_rest: bool) -> Res
         JpegEncoder::new_with_quality(&mut frame, 92).write_image(&colours.rgb8, width, height, kind)?;
     }
     Ok(frame)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::film::BlockSum;
+    use crate::integrator::{BlockWork, FirstHit, PathSample};
+    use glam::Vec3;
+
+    /// Adds a block of samples of one grey.
+    fn add(film: &mut Film, work: BlockWork, grey: f32) {
+        let mut sum = BlockSum::default();
+        let sample = PathSample {
+            radiance: Vec3::splat(grey),
+            first_hit: FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1 },
+            rays: 1,
+        };
+        (0..work.samples).for_each(|_| sum.add(&sample));
+        film.merge_block(work, &sum);
+    }
+
+    /// In a pixel's pilot samples count alike, later and at rest halves do, whatever was looked at before.
+    #[test]
+    fn a_half_that_is_ahead_counts_for_its_samples_only_in_the_pilot() {
+        let mut film = Film::new(2, 1);
+        for pixel in [0, 1] {
+            add(&mut film, BlockWork::whole(pixel, Half::A, 0), 1.0);
+        }
+        add(&mut film, BlockWork { samples: 2, ..BlockWork::whole(0, Half::B, 0) }, 2.0);
+        add(&mut film, BlockWork::whole(1, Half::B, 0), 2.0);
+        add(&mut film, BlockWork::whole(1, Half::A, 1), 1.0);
+        let greys = |is_at_rest| composed(&film, 1.0, is_at_rest).0.iter().map(|rgb| rgb[0]).collect::<Vec<f32>>();
+        assert_eq!(greys(false), [1.2, 1.5]);
+        assert_eq!(greys(true), [1.5, 1.5]);
+    }
 }

@@ -189,9 +189,9 @@ impl<'a> Session<'a> {
     }
 
     fn order_pilot(&mut self) {
-        let width = self.state.film.width();
+        let (width, height) = (self.state.film.width(), self.state.film.height());
         if let Some(pilot) = self.state.pending.front_mut().filter(|_| self.state.plans == 0) {
-            order(pilot, width);
+            order(pilot, width, height);
         }
     }
 
@@ -238,6 +238,8 @@ impl<'a> Session<'a> {
 
     /// The render is at an end, until somebody asks for more.
     fn stopped(&mut self, last_look: LastLook) {
+        // At rest the film is shown, however little it has.
+        self.glimpse = None;
         self.screen.looked = Some(Arc::new(Looked::of(&last_look.judgement)));
         self.state.tone = Some(last_look.judgement.tone.save());
         self.last_look = Some(last_look);

@@ -16,9 +16,11 @@
 //! Not for pictures whose raw halves are not at hand, and not for denoisers that use other frames.
 
 mod blend;
+mod chromatic;
 mod witness;
 
 pub use blend::blended;
+pub use chromatic::{ChromaticPicture, chromatic_error};
 
 use crate::plane::Plane;
 use crate::threshold::ThresholdMap;
@@ -78,8 +80,7 @@ impl DenoisedError {
     }
 
     /// The same error seen `factor` times as well.
-    #[must_use]
-    pub fn scaled(mut self, factor: f64) -> Self {
+    fn scaled(mut self, factor: f64) -> Self {
         let scale = |plane: &mut Plane, factor: f64| *plane = plane.map(|value| factor as f32 * value);
         for plane in [&mut self.visibility, &mut self.variance, &mut self.bias, &mut self.blended_visibility] {
             scale(plane, factor);

@@ -1,5 +1,5 @@
 use super::*;
-use crate::csf::CastleCsf;
+use crate::csf::{CastleCsf, ChromaticChannel, FrameTiming};
 use crate::display::{Display, Viewing};
 use crate::filter::gaussian_blur;
 use crate::test_noise::normal;
@@ -187,4 +187,54 @@ fn planes_of_another_size_are_infinitely_visible() {
     });
     assert!(found.visibility.get(0, 0).is_infinite());
     assert!(blended(&map, &found, &small, &small).is_none());
+}
+
+/// A channel beside luminance counts where it shows more, and nowhere else.
+#[test]
+fn the_channel_that_shows_most_counts() {
+    let of_error = |seed: u64, inside: fn(usize) -> bool| {
+        let noise = white_noise(seed, 4.0);
+        let mistake = Plane::from_fn(SIDE, SIDE, |x, y| if inside(x) { noise.get(x, y) } else { 0.0 });
+        let half = mistake.map(|value| -value);
+        Halves::of(&grey(), [mistake, half], 0.5, seed).judged(&map_of(&grey()))
+    };
+    let left = of_error(21, |x| x < SIDE / 2);
+    let right = of_error(22, |x| x >= SIDE / 2);
+    let both = left.clone().with_channel(&right);
+    for (x, most, least) in [(32, &left, &right), (224, &right, &left)] {
+        assert!(most.visibility.get(x, 128) > 2.0 * least.visibility.get(x, 128));
+        let planes = |error: &DenoisedError| {
+            [&error.visibility, &error.variance, &error.bias, &error.bias_squared_standard_error].map(|p| p.get(x, 128))
+        };
+        for (found, (most, least)) in planes(&both).into_iter().zip(planes(most).into_iter().zip(planes(least))) {
+            assert_eq!(found, most.max(least));
+        }
+    }
+}
+
+/// Chromatic noise that is gone in the next frame is less visible, by the energy that castleCSF's temporal channels leave.
+#[test]
+fn chromatic_noise_of_a_moving_picture_is_less_visible() {
+    let viewing = Viewing::of(Display::preset("strict").unwrap());
+    let timing = FrameTiming { frames_per_second: 24.0, persistence: 1.0 };
+    let (noise, nothing, luminance) = (white_noise(31, 2.0), Plane::filled(SIDE, SIDE, 0.0), grey());
+    for channel in [ChromaticChannel::RedGreen, ChromaticChannel::YellowViolet] {
+        let picture = ChromaticPicture {
+            signal: &nothing,
+            luminance_cd_m2: &luminance,
+            differences: DenoisedDifferences {
+                half_difference: &noise,
+                residual: &nothing,
+                residual_half_difference: &noise,
+            },
+        };
+        let of = |frames| chromatic_error(channel, &picture, &viewing, frames).unwrap();
+        let (still, moving) = (of(None), of(Some(timing)));
+        let expected = timing.chromatic_energy(channel).unwrap();
+        assert!(expected < 0.9, "{channel:?}: {expected}");
+        let ratio = |of: fn(&DenoisedError) -> &Plane| of(&moving).mean() / of(&still).mean();
+        assert!((ratio(|error| &error.visibility) / expected.sqrt() - 1.0).abs() < 1e-5);
+        assert!((ratio(|error| &error.variance) / expected.sqrt() - 1.0).abs() < 1e-5);
+        assert!((ratio(|error| &error.bias_squared_standard_error) / expected - 1.0).abs() < 1e-5);
+    }
 }

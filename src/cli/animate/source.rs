@@ -3,7 +3,7 @@
 use super::AnimateArguments;
 use fechner::animate::SceneSource;
 use fechner::scene::Scene;
-use fechner::scene::load::{LoadError, LoadOptions, load, megabytes};
+use fechner::scene::load::{LoadError, load};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -23,15 +23,8 @@ impl<'a> FileSource<'a> {
     }
 
     fn read(&self, seconds: f64) -> Result<Scene, LoadError> {
-        let AnimateArguments { scene: file, camera, staging, nits_per_unit, texture_memory, .. } = self.arguments;
-        let options = LoadOptions {
-            camera: camera.clone(),
-            frame_time: seconds,
-            environment_follows: staging.has_environment(),
-            on_texture: None,
-            texture_memory: texture_memory.map(megabytes),
-        };
-        let mut scene = load(file, &options)?;
+        let AnimateArguments { scene: file, staging, nits_per_unit, .. } = self.arguments;
+        let mut scene = load(file, &staging.load_options(seconds))?;
         staging
             .apply(&mut scene, *nits_per_unit)
             .map_err(|error| LoadError::Option { problem: format!("{error:#}") })?;

@@ -56,13 +56,12 @@ impl World {
                 if mesh.uvs.is_empty() {
                     return None;
                 }
-                let [p0, p1, p2] = self.triangle_corners(point.object, point.triangle, time);
-                let [a, b, c] = mesh.triangles[point.triangle as usize].map(|i| mesh.uvs[i as usize]);
-                let (d1, d2, e1, e2) = (b - a, c - a, p1 - p0, p2 - p0);
-                let inverse_area = 1.0 / d1.perp_dot(d2);
+                let corners = self.triangle_corners(point.object, point.triangle, time);
+                let (edges, uv_edges) = edges_on(mesh, point.triangle, &corners);
+                let inverse_area = 1.0 / uv_edges[0].perp_dot(uv_edges[1]);
                 SurfaceDerivatives {
-                    along_u: (e1 * d2.y - e2 * d1.y) * inverse_area,
-                    along_v: (e2 * d1.x - e1 * d2.x) * inverse_area,
+                    along_u: along_u_times_area(edges, uv_edges) * inverse_area,
+                    along_v: (edges[1] * uv_edges[0].x - edges[0] * uv_edges[1].x) * inverse_area,
                 }
             }
         };
@@ -165,16 +164,26 @@ fn interpolate_color(mesh: &Mesh, triangle: u32, b1: f32, b2: f32) -> Vec3 {
     i * (1.0 - b1 - b2) + j * b1 + k * b2
 }
 
+/// The two edges that leave a triangle's first corner, in space and on the picture. The mesh must have texture coordinates.
+fn edges_on(mesh: &Mesh, triangle: u32, corners: &[Vec3; 3]) -> ([Vec3; 2], [Vec2; 2]) {
+    let [a, b, c] = mesh.triangles[triangle as usize].map(|i| mesh.uvs[i as usize]);
+    ([corners[1] - corners[0], corners[2] - corners[0]], [b - a, c - a])
+}
+
+/// Way along growing u, times twice the triangle's signed area on the picture.
+fn along_u_times_area(edges: [Vec3; 2], uv_edges: [Vec2; 2]) -> Vec3 {
+    edges[0] * uv_edges[1].y - edges[1] * uv_edges[0].y
+}
+
 /// Direction of growing u on a triangle and the handedness of (u, v), from its texture coordinates.
 fn tangent_from_uv(mesh: &Mesh, triangle: u32, corners: &[Vec3; 3]) -> (Vec3, f32) {
     let along_edge = (corners[1] - corners[0]).normalize_or(Vec3::X);
     if mesh.uvs.is_empty() {
         return (along_edge, 1.0);
     }
-    let [a, b, c] = mesh.triangles[triangle as usize].map(|i| mesh.uvs[i as usize]);
-    let (d1, d2) = (b - a, c - a);
-    let area = d1.perp_dot(d2);
-    let tangent = ((corners[1] - corners[0]) * d2.y - (corners[2] - corners[0]) * d1.y) * area.signum();
+    let (edges, uv_edges) = edges_on(mesh, triangle, corners);
+    let area = uv_edges[0].perp_dot(uv_edges[1]);
+    let tangent = along_u_times_area(edges, uv_edges) * area.signum();
     // v runs down the picture, so a texture that is not mirrored has a negative uv area.
     (tangent.try_normalize().unwrap_or(along_edge), if area > 0.0 { -1.0 } else { 1.0 })
 }

@@ -4,12 +4,11 @@
 //! and `illuminance` lux, spread as pbrt-v4 does (its `lights.cpp`).
 
 use super::super::error::LoadError;
-use super::super::texture::{Adjust, IfMissing, Picture, Request};
 use super::super::{environment, luminance};
 use super::Reader;
 use super::inputs::Meaning;
 use super::parameters::Parameters;
-use crate::scene::{ColorInput, Encoding, Environment, Light, Parametrisation, SpotFalloff, TextureLookup, Wrap};
+use crate::scene::{ColorInput, Encoding, Environment, Light, Parametrisation, SpotFalloff, Wrap};
 use glam::{Affine3A, Mat3, Vec3};
 use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
@@ -159,21 +158,12 @@ impl Reader<'_> {
                 ColorInput::constant(color * scale)
             }
             Some(file) => {
-                let request = Request {
-                    picture: Picture::File(self.file(file)),
-                    encoding: Encoding::Srgb,
-                    wrap_u: Wrap::Clamp,
-                    wrap_v: Wrap::Clamp,
-                    nearest: false,
-                    if_missing: IfMissing::Fail(parameters.place()),
-                    adjust: Adjust::NONE,
-                };
                 if lumen.is_some() {
                     let note = format!("{}: \"power\" of a picture is spread as if it were white.", parameters.place());
                     self.builder.note(note);
                 }
-                let texture = self.builder.textures.add(request);
-                ColorInput { factor: Vec3::splat(scale), texture: Some(TextureLookup::plain(texture)) }
+                let picture = self.picture(file, parameters, Encoding::Srgb, Wrap::Clamp);
+                ColorInput { factor: Vec3::splat(scale), texture: Some(picture) }
             }
         };
         let both_sides = parameters.boolean_or("twosided", false)?;

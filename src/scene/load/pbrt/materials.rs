@@ -2,13 +2,12 @@
 
 use super::super::error::{LoadError, suggestion};
 use super::super::spectrum::named;
-use super::super::texture::{Adjust, IfMissing, Picture, Request};
 use super::Reader;
 use super::inputs::Meaning;
 use super::parameters::Parameters;
 use crate::scene::{
     ColorInput, Distribution, Encoding, HeightMap, HeightUnit, Material, Relief, Roughness, RoughnessScale,
-    ScalarInput, Surface, TextureLookup, Wrap,
+    ScalarInput, Surface, Wrap,
 };
 use glam::Vec3;
 use std::rc::Rc;
@@ -101,16 +100,7 @@ impl Reader<'_> {
             return Ok(Some(Relief::Heights(HeightMap { height, unit: HeightUnit::Scene })));
         }
         let Some(file) = normals else { return Ok(None) };
-        let request = Request {
-            picture: Picture::File(self.file(file)),
-            encoding: Encoding::Linear,
-            wrap_u: Wrap::Repeat,
-            wrap_v: Wrap::Repeat,
-            nearest: false,
-            if_missing: IfMissing::Fail(parameters.place()),
-            adjust: Adjust::NONE,
-        };
-        let map = TextureLookup::plain(self.builder.textures.add(request));
+        let map = self.picture(file, parameters, Encoding::Linear, Wrap::Repeat);
         Ok(Some(Relief::Normals { map, strength: 1.0 }))
     }
 

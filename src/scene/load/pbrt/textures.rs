@@ -235,6 +235,25 @@ impl Reader<'_> {
         Ok((lookup, scale))
     }
 
+    /// A picture that stands where a texture could, all of it over the unit square.
+    pub(super) fn picture(
+        &mut self,
+        file: &str,
+        parameters: &Parameters,
+        encoding: Encoding,
+        wrap: Wrap,
+    ) -> TextureLookup {
+        TextureLookup::plain(self.builder.textures.add(Request {
+            picture: Picture::File(self.file(file)),
+            encoding,
+            wrap_u: wrap,
+            wrap_v: wrap,
+            nearest: false,
+            if_missing: IfMissing::Fail(parameters.place()),
+            adjust: Adjust::NONE,
+        }))
+    }
+
     /// `uscale` and its like, for pbrt's v that runs up where ours runs down.
     fn mapping(&mut self, parameters: &Parameters) -> Result<TextureLookup, LoadError> {
         if let Some(other) = parameters.string("mapping")?.filter(|mapping| *mapping != "uv") {

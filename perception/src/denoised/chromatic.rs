@@ -1,0 +1,39 @@
+//! The law for denoised pictures in one of the two chromatic channels.
+
+use super::{DenoisedDifferences, DenoisedError};
+use crate::csf::{CastleChromatic, ChromaticChannel, FrameTiming};
+use crate::display::Viewing;
+use crate::error::Error;
+use crate::plane::Plane;
+use crate::threshold::chromatic_threshold_map;
+
+/// A denoised picture in one chromatic channel, on the display. Planes of one size.
+#[derive(Clone, Copy, Debug)]
+pub struct ChromaticPicture<'a> {
+    /// The channel's opponent signal, cd/m².
+    pub signal: &'a Plane,
+    /// Luminance, to which the eye adapts, cd/m².
+    pub luminance_cd_m2: &'a Plane,
+    /// Its errors' witnesses.
+    pub differences: DenoisedDifferences<'a>,
+}
+
+/// What can be seen of the picture's error in this channel. `frames`: of a moving picture, whose noise is new in every frame;
+/// `None` for stills.
+///
+/// # Errors
+/// As [`CastleChromatic::new`] and [`chromatic_threshold_map`], and for an impossible timing.
+pub fn chromatic_error(
+    channel: ChromaticChannel,
+    picture: &ChromaticPicture<'_>,
+    viewing: &Viewing,
+    frames: Option<FrameTiming>,
+) -> Result<DenoisedError, Error> {
+    let csf = CastleChromatic::new(channel, viewing.observer.csf_area_deg2)?;
+    let thresholds = chromatic_threshold_map(picture.signal, picture.luminance_cd_m2, viewing, &csf)?;
+    let error = thresholds.denoised_error(&picture.differences);
+    Ok(match frames {
+        None => error,
+        Some(timing) => error.scaled(timing.chromatic_energy(channel)?.sqrt()),
+    })
+}
