@@ -149,7 +149,10 @@ pub(super) struct Status {
     pub(super) mean_samples: f64,
     pub(super) samples_a_second: f64,
     pub(super) seconds: f64,
+    /// To the first look, later to the rung.
     pub(super) seconds_left: Option<f64>,
+    /// Of the plan before the first look.
+    pub(super) first_look_samples: u64,
     /// Share of pixels above the target at the last look.
     pub(super) visible_share: Option<f64>,
     pub(super) target: f64,

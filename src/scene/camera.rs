@@ -4,7 +4,7 @@ use super::Motion;
 use glam::{Vec2, Vec3};
 
 /// A camera that looks along `forward` with `up` towards the top of the picture.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
     /// Centre of the lens, world space.
     pub position: Vec3,

@@ -90,7 +90,7 @@ class Page:
         counts = []
         for place in range(-4, 5):
             at = f"{x + place}, {y}"
-            self.page.evaluate(f"send({{ do: 'inspect', x: {x + place}, y: {y} }})")
+            self.page.evaluate(f"pointed = {{ x: {x + place}, y: {y} }}; inspect()")
             self.until("a pixel", f"document.getElementById('at').textContent === {at!r}")
             counts.append(self.number("count"))
         return sum(counts) / len(counts)
@@ -164,6 +164,32 @@ def steps(page, folder):
     assert abs(split - 25) < 2, split
     page.page.keyboard.press("x")
     assert not page.page.is_visible("#second") and not page.page.is_visible("#divider")
+
+    yield "keeps a picture, and sets it beside a later one"
+    before = page.pixels()
+    page.page.keyboard.press("k")
+    page.page.evaluate("send({ do: 'exposure', stops: 1 })")
+    page.until("another exposure", "told.exposure === 1")
+    page.until_stopped()
+    page.page.keyboard.press("x")
+    assert page.text("legend-second").startswith("kept at"), page.text("legend-second")
+    assert page.pixels("second") == before and page.pixels() != before
+    page.page.keyboard.press("x")
+    page.page.evaluate("send({ do: 'exposure', stops: 0 })")
+    page.until("the first exposure", "told.exposure === 0")
+    page.until_stopped()
+
+    yield "shows the display's own pixels, and keeps what is under the pointer there"
+    fitted = page.page.locator("#picture").bounding_box()
+    page.page.mouse.move(*page.place(0.25, 0.25))
+    there = page.page.evaluate("pointer")
+    page.page.keyboard.press("z")
+    box = page.page.locator("#picture").bounding_box()
+    ratio = page.page.evaluate("devicePixelRatio")
+    assert abs(box["width"] * ratio - 96) < 0.5 and fitted["width"] > box["width"], box
+    assert all(abs(a - b) < 1 for a, b in zip(page.place(0.25, 0.25), there)), (page.place(0.25, 0.25), there)
+    page.page.keyboard.press("z")
+    assert page.page.locator("#picture").bounding_box() == fitted
 
     yield "changes the operator without new samples"
     samples, before = page.number("mean"), page.pixels()

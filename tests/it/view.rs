@@ -263,6 +263,13 @@ fn the_camera_moves_and_the_scene_file_is_watched() {
     let moved = viewer.status("another camera", |status| status["camera"] != home["camera"] && is_stopped(status));
     let seen = view.viewer().frame(0, "a picture", |picture| brightness(picture) > 5.0);
 
+    std::fs::write(&scene, format!("{text}\n# The same camera.\n")).expect("written");
+    let edited = viewer.status("the edited scene", |status| {
+        status["note"] == "the scene was loaded again, seen from where you are" && is_stopped(status)
+    });
+    assert_eq!(edited["camera"], moved["camera"]);
+    view.viewer().frame(0, "the same picture", |picture| *picture == seen);
+
     std::fs::write(&scene, text.replace("[camera]", "[camera]\nfoccus = 1")).expect("written");
     let broken = viewer.status("an error", |status| !status["error"].is_null());
     assert!(broken["error"].as_str().is_some_and(|error| error.contains("foccus")), "{broken}");

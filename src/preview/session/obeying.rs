@@ -167,11 +167,18 @@ impl Session<'_> {
             Err(problem) => self.error = Some(problem),
             Ok((job, settings)) => {
                 self.tracer = PathTracer::new(Arc::clone(&job.scene), job.trace);
-                self.held = Held::at_home(&job.scene.camera);
+                // Who edits a lamp wants to see it from where he was; who edits the camera, from there.
+                let is_kept = !self.held.is_home && job.scene.camera == self.job.scene.camera;
+                if is_kept {
+                    self.tracer.set_camera(&self.held.camera);
+                } else {
+                    self.held = Held::at_home(&job.scene.camera);
+                }
                 (self.job, self.settings) = (job, interruptible(settings, self.shared));
                 self.neighbours = None;
                 self.error = None;
-                self.note = Some("the scene was loaded again".to_owned());
+                let seen_from = if is_kept { ", seen from where you are" } else { "" };
+                self.note = Some(format!("the scene was loaded again{seen_from}"));
                 self.restart();
             }
         }

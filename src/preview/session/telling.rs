@@ -4,6 +4,7 @@ use super::Session;
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::state::RenderState;
 use crate::adaptive::{Progress, StopReason, visible_share};
+use crate::integrator::SamplePlan;
 use crate::preview::command::{Phase, Status};
 use crate::preview::shared::Shared;
 use crate::scene::Scene;
@@ -30,6 +31,10 @@ impl Session<'_> {
             }),
             width: self.tracer.settings().film_area().width,
             height: self.tracer.settings().film_area().height,
+            first_look_samples: match state.plans {
+                0 => state.pending.front().map_or(0, SamplePlan::samples),
+                _ => 0,
+            },
             visible_share: self.last_look.as_ref().map(|look| visible_share(&look.judgement, target)),
             exposure: self.live.exposure.or(self.job.record.exposure_stops),
             distance: self.live.distance.unwrap_or(1.0),
@@ -62,6 +67,7 @@ pub(in crate::preview) fn blank_status(
         samples_a_second: 0.0,
         seconds: 0.0,
         seconds_left: None,
+        first_look_samples: 0,
         visible_share: None,
         target: settings.limits.visibility,
         rung: None,
@@ -91,12 +97,15 @@ pub(in crate::preview) fn count(
     status.mean_samples = status.total_samples as f64 / pixels.max(1.0);
     status.seconds = state.seconds_total;
     status.samples_a_second = status.total_samples as f64 / state.seconds_total.max(1e-3);
+    let left_after = |samples: f64| Some(samples.max(0.0) / status.samples_a_second.max(1.0));
+    if progress.is_none() && state.plans == 0 && status.total_samples > 0 {
+        status.seconds_left = left_after(status.first_look_samples as f64 - status.total_samples as f64);
+    }
     if let Some(progress) = progress.filter(|_| status.phase != Phase::Stopped) {
         status.visible_share = Some(progress.visible_share);
         status.rung = Some(progress.rung);
         let since = status.total_samples as f64 - progress.mean_samples * progress.pixels;
-        let left = (progress.remaining_samples - since).max(0.0) / status.samples_a_second.max(1.0);
-        status.seconds_left = Some(left).filter(|left| left.is_finite());
+        status.seconds_left = left_after(progress.remaining_samples - since).filter(|left| left.is_finite());
     }
 }
 
