@@ -2,13 +2,13 @@
 
 Mitsuba's integrator is asked for the light of any list of pixels, so each pixel gets its own number of samples and nothing of Mitsuba
 is changed. A pilot goes everywhere; then, in rounds, thresholds of the picture so far and the allocation that brings the noise's
-visibility to the target, with every pixel's count growing at most threefold a round. Two independent halves are kept: what they
-show of the noise corrects, place by place, what its variance predicts, and says when to stop: when the noise of 99 % of the picture
-is at most as visible as asked.
+visibility to the target, with every pixel's count growing at most threefold a round. Two independent halves are kept: where they
+show more noise than its variance predicts, they are believed. It ends when the noise of 99 % of the picture is at most as visible as
+asked.
 
-The comparison is nobody's own opinion: visibility of (render − reference) under the reference's thresholds, for both. The figure
-is the number of samples at which `mi.render`, the same for every pixel, has 99 % of the picture at the visibility that the adaptive
-render reached there, over the adaptive render's mean number.
+The comparison is nobody's own opinion: visibility of (render − reference) under the reference's thresholds, for both, the
+reference's own noise taken off. The figure is the number of samples at which `mi.render`, the same for every pixel, has 99 % of the
+picture at the visibility that the adaptive render reached there, over the adaptive render's mean number.
 
     pip install ./python mitsuba
     python python/examples/drive_mitsuba.py
@@ -133,10 +133,11 @@ def box_mean(values, side):
     return padded
 
 
-def steadied(variance, samples):
-    """A pixel's variance, leaning on its neighbours' as if they were 64 samples more: few samples know little of their own, and a
-    pixel that has not met its firefly yet believes that it is done."""
-    return (samples * variance + 64 * box_mean(variance, 9)) / (samples + 64)
+def steadied(of_one, samples):
+    """Variance of one sample, leaning on the neighbours' as if they were 64 samples more: few samples know little of their own, and
+    a pixel that has not met its firefly yet believes that it is done."""
+    around = box_mean(samples * of_one, 5) / box_mean(samples, 5)
+    return (samples * of_one + 64 * around) / (samples + 64)
 
 
 def adaptive(tracer, options, exposure):
@@ -158,27 +159,28 @@ def adaptive(tracer, options, exposure):
         dim = fechner.luminance(guide)
         tone = fechner.fit_tone(dim, options.tone)
         # As displayed, where a lamp's edge is bounded by white, before pixels lean on each other.
-        shown = steadied(tone.display_variance(dim, variance / samples), samples)
+        shown = steadied(samples * tone.display_variance(dim, variance / samples), samples) / samples
         # Before the picture is denoised its noise bounds what is left of it in every band.
         thresholds = fechner.threshold_map(tone.display_luminance(dim), shown)
         predicted = thresholds.predicted_visibility(shown)
         a, b = (exposure * film.mean().reshape(*shape, 3) @ LUMINANCE for film in halves)
         measured = thresholds.measured_visibility(tone.display_half_difference(0.5 * (a + b), 0.5 * (a - b)))
+        # What the halves show around a pixel, over a thousand others, corrects what variances promise, and only upward: counts were
+        # decided by the same samples, so where the halves agree by chance they would be left to it.
+        correction = np.clip(box_mean(measured**2, 33) / np.maximum(box_mean(predicted**2, 33), 1e-12), 1, 16)
+        reached = np.quantile(np.sqrt(correction) * predicted, COVERAGE)
         print(
-            f"  round {round_number}: {samples.mean():7.1f} samples a pixel, 99 % below {np.quantile(predicted, COVERAGE):5.2f} predicted, "
-            f"{np.quantile(measured, COVERAGE):5.2f} measured"
+            f"  round {round_number}: {samples.mean():7.1f} samples a pixel, 99 % below {reached:5.2f}; "
+            f"{np.quantile(predicted, COVERAGE):5.2f} by variances, {np.quantile(measured, COVERAGE):5.2f} by halves"
         )
-        if np.quantile(measured, COVERAGE) <= options.visibility:
+        if reached <= options.visibility:
             break
-        # What the halves show around a pixel, over hundreds of others, corrects what variances promise.
-        correction = np.clip((measured / np.maximum(predicted, 1e-6)) ** 2, 1 / 16, 16)
         of_one = correction * shown * samples
         # The hardest 1 % are left as uniform sampling would leave them.
         need = thresholds.predicted_visibility(of_one)
         tolerance = np.maximum(1, need / np.quantile(need, COVERAGE))
-        # A little below the target, else the last rounds creep towards it.
-        aim = 0.97 * options.visibility
-        wanted = thresholds.allocate(of_one, tolerance=tolerance, visibility=aim, min_samples=options.pilot).samples
+        goal = dict(visibility=options.visibility, min_samples=options.pilot)
+        wanted = thresholds.allocate(of_one, tolerance=tolerance, **goal).samples
         # Two halves: even counts.
         more = 2 * np.ceil(np.clip(wanted - samples, 0, 2 * samples) / 2)
         if not more.any():
@@ -186,19 +188,31 @@ def adaptive(tracer, options, exposure):
     return rgb, samples
 
 
-def visibility_of_error(rgb, reference, options):
-    tone = fechner.fit_tone(fechner.luminance(reference), options.tone)
-    shown = tone.display_luminance(fechner.luminance(reference))
-    return fechner.threshold_map(shown).measured_visibility(tone.display_luminance(fechner.luminance(rgb)) - shown)
+class Judge:
+    """What can be seen of a picture's error, by a reference of several passes, (passes, height, width, 3) in cd/m²."""
+
+    def __init__(self, passes, tone):
+        luminances = np.stack([fechner.luminance(one) for one in passes])
+        mean = luminances.mean(axis=0)
+        self.tone = fechner.fit_tone(mean, tone)
+        self.shown = self.tone.display_luminance(mean)
+        variance = self.tone.display_variance(mean, luminances.var(axis=0, ddof=1) / len(passes))
+        # Without its variance the reference's noise would count as a texture that hides noise.
+        self.thresholds = fechner.threshold_map(self.shown, variance)
+        self.own = self.thresholds.predicted_visibility(variance)
+
+    def visibility(self, rgb):
+        error = self.tone.display_luminance(fechner.luminance(rgb)) - self.shown
+        return np.sqrt(np.maximum(self.thresholds.measured_visibility(error) ** 2 - self.own**2, 0))
 
 
-def uniform_need(scene, visibility, reference, options, exposure, step):
+def uniform_need(scene, visibility, judge, exposure, step):
     """Samples a pixel at which `mi.render` has 99 % of the picture at `visibility`, and the last measurement before and after."""
     total, samples, before = 0, 0, None
     while samples < 200 * step:
         total = total + np.array(mi.render(scene, spp=step, seed=90_000 + samples)).astype(float)[..., :3] * step
         samples += step
-        found = np.quantile(visibility_of_error(exposure * total / samples, reference, options), COVERAGE)
+        found = np.quantile(judge.visibility(exposure * total / samples), COVERAGE)
         if found <= visibility:
             if before is None:
                 return float(samples)
@@ -223,20 +237,22 @@ def main():
 
     start = time.time()
     scene = load(options.scene, options.width, options.height)
-    passes = [np.array(mi.render(scene, spp=256, seed=10_000 + i))[..., :3] for i in range(max(options.reference // 256, 1))]
-    reference = np.mean(passes, axis=0, dtype=float)
+    count = max(options.reference // 256, 4)
+    passes = np.stack([np.array(mi.render(scene, spp=256, seed=10_000 + i))[..., :3] for i in range(count)]).astype(float)
     # Arbitrary units become cd/m²: the middle of the picture, in logarithms, is 30.
-    exposure = 30 / np.exp(np.mean(np.log(np.maximum(fechner.luminance(reference), 1e-4))))
-    reference *= exposure
-    print(f"reference: {256 * len(passes)} samples a pixel, {time.time() - start:.0f} s")
+    exposure = 30 / np.exp(np.mean(np.log(np.maximum(fechner.luminance(passes.mean(axis=0)), 1e-4))))
+    judge = Judge(exposure * passes, options.tone)
+    print(
+        f"reference: {256 * count} samples a pixel, {time.time() - start:.0f} s, "
+        f"its own noise on 99 % below {np.quantile(judge.own, COVERAGE):.2f}"
+    )
     rows = []
     for seed in range(options.seeds):
         tracer = Tracer(scene, options.width, options.height, 1000 * (seed + 1))
         rgb, samples = adaptive(tracer, options, exposure)
-        seen = visibility_of_error(rgb, reference, options)
-        reached = float(np.quantile(seen, COVERAGE))
+        reached = float(np.quantile(judge.visibility(rgb), COVERAGE))
         step = max(8, int(samples.mean() / 8))
-        rows.append((seed, samples.mean(), reached, uniform_need(scene, reached, reference, options, exposure, step)))
+        rows.append((seed, samples.mean(), reached, uniform_need(scene, reached, judge, exposure, step)))
     print("| seed | adaptive, samples a pixel | 99 % below v | uniform for the same | ratio |\n| --- | --- | --- | --- | --- |")
     for seed, mean, reached, need in rows:
         print(f"| {seed} | {mean:.1f} | {reached:.2f} | {need:.1f} | {need / mean:.2f} |")

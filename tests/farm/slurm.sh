@@ -2,10 +2,12 @@
 # A farm on Slurm for real: one node, controller and daemons started here and stopped at the end, in a folder of their own.
 # A unit is requeued in the middle and must go on from its checkpoint; the picture must have the bytes of one process.
 #
-#     tests/farm/slurm.sh FECHNER
+#     tests/farm/slurm.sh FECHNER             requeued by hand, about three minutes
+#     tests/farm/slurm.sh FECHNER time-limit  a unit that its time limit does not suffice for, about five minutes
 #
 # Needs Debian's slurm-wlm and munge, and root, as whom the daemons run. A requeued job waits two minutes by Slurm's own rule.
 set -euo pipefail
+end=${2:-requeue}
 fechner=$(realpath "$1")
 scene=$(realpath "$(dirname "${BASH_SOURCE[0]}")/../../scenes/cornell-box.toml")
 
@@ -84,31 +86,49 @@ done
 [[ "$(sinfo -h -o %T)" == idle ]] || fail "the node is not idle: $(sinfo)"
 
 cd "$run"
-# Units of a few seconds, so that one can be met in the middle.
-options=(--size 320x320 --sampling uniform --spp 32 --seed 5)
-"$fechner" farm plan "$scene" --passes 2 --unit-samples 800000 -o farm -- "${options[@]}"
-"$fechner" farm slurm farm --cpus 1 --memory 500M --time 10 >/dev/null
+case $end in
+requeue) # Units of a few seconds, so that one can be met in the middle.
+    options=(--size 320x320 --sampling uniform --spp 32 --seed 5) unit_samples=800000 passes=2 minutes=10
+    units="farm/frame-0000/round-000/unit-000000"
+    ;;
+time-limit) # The last round is one unit of a minute and a half, which Slurm warns after a minute that its two are soon up.
+    options=(--size 720x720 --sampling uniform --spp 128 --seed 5) unit_samples=5000000 passes=1 minutes=2
+    units="farm/frame-0000/round-*/unit-*"
+    ;;
+*)
+    echo "$end: neither requeue nor time-limit" >&2
+    exit 2
+    ;;
+esac
+"$fechner" farm plan "$scene" --passes $passes --unit-samples $unit_samples -o farm -- "${options[@]}"
+"$fechner" farm slurm farm --cpus 1 --memory 500M --time $minutes >/dev/null
 sh farm/slurm/submit.sh
 
-# The first unit that runs is requeued as soon as it is under way: its checkpoint must be there afterwards.
-lock=farm/frame-0000/round-000/unit-000000.lock
-for _ in $(seq 300); do [[ -e $lock ]] && break; sleep 0.1; done
-[[ -e $lock ]] || fail "unit 0 does not start"
-sleep 0.5
-job=$(squeue -h -r -t RUNNING -n fechner-units -o %i | head -n 1)
-[[ -n $job ]] || fail "no unit runs"
-scontrol requeue "${job%_*}_0"
-for _ in $(seq 100); do [[ -e ${lock%lock}partial ]] && break; sleep 0.1; done
-[[ -e ${lock%lock}partial ]] || fail "the requeued unit left no checkpoint"
-echo "unit 0 was requeued and left its checkpoint; Slurm lets it wait two minutes"
+# The first unit that runs is ended in the middle: its checkpoint must be there afterwards.
+is_there() { compgen -G "$1" >/dev/null; }
+for _ in $(seq 1800); do is_there "$units.lock" && break; sleep 0.1; done
+is_there "$units.lock" || fail "no unit starts"
+running() { squeue -h -r -t RUNNING -n fechner-units -o %i | head -n 1; }
+if [[ $end == requeue ]]; then
+    sleep 0.5
+    job=$(running)
+    [[ -n $job ]] || fail "no unit runs"
+    scontrol requeue "${job%_*}_0"
+else
+    for _ in $(seq 400); do is_there "$units.partial" && [[ -z $(running) ]] && break; sleep 1; done
+    [[ -n "$(squeue -h -n fechner-units -o %i)" ]] || fail "the unit whose time was up is not queued again"
+fi
+for _ in $(seq 100); do is_there "$units.partial" && break; sleep 0.1; done
+is_there "$units.partial" || fail "the unit left no checkpoint"
+echo "a unit ended ($end) and left its checkpoint; Slurm lets it wait two minutes"
 
-for _ in $(seq 400); do
+for _ in $(seq 900); do
     [[ -e farm/frame-0000/result.json ]] && break
     [[ -n "$(squeue -h -o %i)" ]] || fail "nothing is left to run, and the frame is not done"
     sleep 1
 done
 [[ -e farm/frame-0000/result.json ]] || fail "not done in time"
-grep -q "unit 0: goes on from its checkpoint" farm/slurm/log/fechner-units-*_0.txt || fail "unit 0 began anew"
+grep -q "unit [0-9]*: goes on from its checkpoint" farm/slurm/log/fechner-units-*_0.txt || fail "the unit began anew"
 "$fechner" render "$scene" -o one.exr "${options[@]}" >/dev/null 2>&1
 cmp one.exr farm/pictures/picture.exr || fail "the picture is not that of one process"
-echo "Slurm: $(cat farm/slurm/log/fechner-units-*.txt | grep -c 'million samples in') units, one requeued; the bytes of one process"
+echo "Slurm: $(cat farm/slurm/log/fechner-units-*.txt | grep -c 'million samples in') units, one ended in the middle ($end); the bytes of one process"
