@@ -8,7 +8,7 @@ use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use fechner::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, RivalRule, Sampling};
 use fechner::checkpoint::SettingsRecord;
-use fechner::integrator::{Crop, DEFAULT_MAX_DEPTH, TraceSettings};
+use fechner::integrator::{Crop, DEFAULT_MAX_DEPTH, Pruning, TraceSettings};
 use fechner::output::rendered::Background;
 use fechner::sampler::{PixelFilter, Sequence};
 use fechner::scene::hash::ContentHash;
@@ -64,6 +64,9 @@ pub(super) struct JobArguments {
     /// Scale samples whose largest channel is above X scene units down to it. Darkens the picture where light is rare.
     #[arg(long, value_name = "X", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Sampling")]
     clamp: Option<f64>,
+    /// Leave to chance what light could not be seen beside what its path has found: fewer rays, more noise, no bias.
+    #[arg(long, value_enum, value_name = "BY", help_heading = "Sampling")]
+    prune: Option<PruneChoice>,
     /// Most scattering events of a path.
     #[arg(long, value_name = "N", help_heading = "Sampling")]
     max_depth: Option<u32>,
@@ -172,7 +175,7 @@ impl JobArguments {
         }
         let size = self.size.unwrap_or(Size { width: scene.film.width, height: scene.film.height });
         check_memory(size)?;
-        let trace = trace_settings(self, size)?;
+        let trace = trace_settings(self, size, self.nits_per_unit.unwrap_or(scene.nits_per_unit))?;
         let mut record = settings_record(self, &scene)?;
         let mut settings = record.loop_settings(limits(self, &scene, record.sampling))?;
         if let Some(path) = &self.importance {
@@ -256,6 +259,12 @@ enum SequenceChoice {
     ZOrder,
 }
 
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum PruneChoice {
+    /// The eye's threshold at the luminance found so far (threshold versus intensity).
+    Tvi,
+}
+
 /// X,Y,W,H in pixels of the full picture.
 fn parse_crop(text: &str) -> Result<Crop, String> {
     let wrong = || format!("\"{text}\" is not a crop; expected X,Y,WIDTH,HEIGHT in pixels, such as 100,50,64,64");
@@ -295,7 +304,7 @@ pub(super) fn parse_size(text: &str) -> Result<Size, String> {
     if width == 0 || height == 0 { Err(wrong()) } else { Ok(Size { width, height }) }
 }
 
-fn trace_settings(arguments: &JobArguments, size: Size) -> anyhow::Result<TraceSettings> {
+fn trace_settings(arguments: &JobArguments, size: Size, nits_per_unit: f64) -> anyhow::Result<TraceSettings> {
     Ok(TraceSettings {
         width: size.width,
         height: size.height,
@@ -314,6 +323,7 @@ fn trace_settings(arguments: &JobArguments, size: Size) -> anyhow::Result<TraceS
         },
         crop: arguments.crop.map(|crop| check_crop(crop, size)).transpose()?,
         transparent: arguments.transparent,
+        prune: arguments.prune.map(|PruneChoice::Tvi| Pruning { nits_per_unit }),
     })
 }
 

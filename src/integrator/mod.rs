@@ -3,17 +3,19 @@
 //! `path` holds the life of one sample, `camera` where it starts, `shading` what a surface point scatters like, `relief` how
 //! maps turn its normal,
 //! `tables` what materials compute beforehand,
-//! `media` what a ray travels in.
+//! `media` what a ray travels in, `prune` which light is left to chance.
 
 mod camera;
 mod media;
 mod path;
+mod prune;
 mod relief;
 mod shading;
 mod tables;
 
 pub use camera::{CameraRays, CameraSample};
 pub use path::{FirstHit, PathSample};
+pub use prune::Pruning;
 
 use crate::film::{BlockSum, Film};
 use crate::geometry::World;
@@ -21,6 +23,7 @@ use crate::light::Lights;
 use crate::sampler::{BlockKey, Half, Pixel, PixelFilter, Purpose, Sequence};
 use crate::scene::{Camera, Scene};
 use glam::Vec2;
+use prune::ThresholdTable;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -49,6 +52,8 @@ pub struct TraceSettings {
     /// Whether camera rays that meet nothing see nothing, so that the picture can be laid over another. Light from afar
     /// still falls on surfaces, and is seen in and through them.
     pub transparent: bool,
+    /// Light too faint to be seen is left to chance. `None` traces all of it.
+    pub prune: Option<Pruning>,
 }
 
 /// A rectangle of the picture in pixels, inside it.
@@ -77,6 +82,7 @@ impl TraceSettings {
             sequence: Sequence::PerPixel,
             crop: None,
             transparent: false,
+            prune: None,
         }
     }
 
@@ -164,6 +170,8 @@ pub struct PathTracer {
     absorbs: bool,
     /// By material.
     surface_tables: Vec<SurfaceTables>,
+    /// Where light is left to chance.
+    thresholds: Option<ThresholdTable>,
 }
 
 impl PathTracer {
@@ -174,10 +182,11 @@ impl PathTracer {
             material.surface.interior_absorption().is_some_and(|absorption| absorption.max_element() > 0.0)
         });
         let surface_tables = tables::of_materials(&scene.materials);
+        let thresholds = settings.prune.map(ThresholdTable::new);
         let moves = scene.moves();
         let world = World::new(scene);
         let lights = Lights::new(&world);
-        Self { world, lights, camera, moves, settings, absorbs, surface_tables }
+        Self { world, lights, camera, moves, settings, absorbs, surface_tables, thresholds }
     }
 
     /// Looks from elsewhere at the same scene. The scene that it was made from keeps its own camera.

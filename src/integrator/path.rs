@@ -9,6 +9,7 @@ use super::shading::{Components, Shading};
 use crate::geometry::{Hit, Ray, SurfacePoint};
 use crate::light::{LightReceiver, LightSample};
 use crate::sampler::{Purpose, Sample};
+use fechner_perception::photometry::luminance;
 use glam::{Vec3, Vec3A};
 
 /// What the first surface looks like: guides for the perception model and for denoisers.
@@ -156,6 +157,14 @@ impl PathTracer {
             return;
         }
         let weight = if light.is_delta { 1.0 } else { power_heuristic(light.pdf, scattered.pdf) };
+        let unshadowed = path.throughput * scattered.value * light.radiance * (weight / light.pdf);
+        let survival = self.thresholds.as_ref().map_or(1.0, |thresholds| {
+            let of = |rgb: Vec3| luminance(rgb.to_array());
+            thresholds.survival(of(unshadowed * path.radiance_gain_on_exit), of(path.radiance))
+        });
+        if u[3] >= survival {
+            return;
+        }
         path.rays += 1;
         if !self.is_hidden(point, &light, path.ray.time) {
             let distance = distance_to(point, &light);
@@ -167,7 +176,7 @@ impl PathTracer {
                     media.transmittance(distance)
                 }
             };
-            path.radiance += path.throughput * left * scattered.value * light.radiance * (weight / light.pdf);
+            path.radiance += unshadowed * left / survival;
         }
     }
 }

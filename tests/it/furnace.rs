@@ -1,10 +1,11 @@
 //! White furnaces: what a lossless surface returns in a constant environment is the environment.
 
 use crate::support::{
-    add_material, add_rectangle, add_sphere, constant_environment, diffuse, empty_scene, radiance_along, trace_settings,
+    add_material, add_rectangle, add_sphere, block_key, constant_environment, diffuse, empty_scene, radiance_along,
+    trace_settings,
 };
 use fechner::geometry::Ray;
-use fechner::integrator::PathTracer;
+use fechner::integrator::{PathTracer, Pruning, TraceSettings};
 use fechner::scene::{ColorInput, MetalRoughness, Roughness, ScalarInput, Scene, Surface};
 use glam::{Vec3, Vec3A, vec3a};
 use std::sync::Arc;
@@ -131,4 +132,35 @@ fn infinite_bounces_add_up() {
         );
         assert!(error.x < 0.005 * expected, "albedo {albedo}: too noisy to test, ± {}", error.x);
     }
+}
+
+/// Light that nobody could see is left to chance, and nothing of it is lost: in a dark closed box that emits, light after two
+/// scatterings and more is 1.1 % of all, and most of it is below threshold.
+#[test]
+fn pruned_light_is_not_lost() {
+    const ALBEDO: f32 = 0.1;
+    let ray = Ray::new(vec3a(0.3, -0.2, 0.1), vec3a(0.48, 0.6, 0.64));
+    let tracer_of = |prune| {
+        let mut scene: Scene = empty_scene();
+        let material = add_material(&mut scene, diffuse(ALBEDO), Vec3::ONE);
+        for [across, up] in [[Vec3::X, Vec3::Y], [Vec3::Y, Vec3::Z], [Vec3::Z, Vec3::X]] {
+            for side in [-1.0, 1.0] {
+                let corner = side * across.cross(up) - across - up;
+                add_rectangle(&mut scene, corner, 2.0 * across, 2.0 * up, material);
+            }
+        }
+        PathTracer::new(Arc::new(scene), TraceSettings { prune, ..trace_settings(16, 16, 0) })
+    };
+    let (pruned, whole) = (tracer_of(Some(Pruning { nits_per_unit: 100.0 })), tracer_of(None));
+    let [(mean, error), (expected, other)] = [&pruned, &whole].map(|tracer| radiance_along(tracer, ray, 16, 16384));
+    let error = error.x.hypot(other.x);
+    println!("{} and {}, ± {error}", mean.x, expected.x);
+    assert!((mean.x - expected.x).abs() < 3.3 * error, "{} for {}, ± {error}", mean.x, expected.x);
+    assert!(error < 0.0001 * expected.x, "too noisy to test, ± {error}");
+    assert!((expected.x * (1.0 - ALBEDO) - 1.0).abs() < 0.001, "{}", expected.x);
+    let rays = |tracer: &PathTracer| -> u32 {
+        block_key(0).samples(4096).map(|sample| tracer.trace_path(ray, sample).rays).sum()
+    };
+    let (some, all) = (rays(&pruned), rays(&whole));
+    assert!(f64::from(some) < 0.95 * f64::from(all), "{some} of {all} rays");
 }
