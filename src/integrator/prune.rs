@@ -3,7 +3,7 @@
 //! "If an intensity change is below threshold, do not render it" is an old idea for saving rays (with the threshold of the eye as a
 //! function of the luminance that it is adapted to). Left out, such light would be missing; traced by chance in proportion and weighted by
 //! the inverse, it is not. Only light straight from lamps is tried: how much a further bounce will bring nobody knows, and the roulette
-//! of whole paths by throughput is many times stricter than one per cent.
+//! of whole paths by throughput is many times stricter than a threshold of five per cent.
 //!
 //! Not for speed: see `benches/README.md`.
 
@@ -39,9 +39,9 @@ impl ThresholdTable {
 
     /// Share of the times that a change of luminance beside a luminance seen is to be traced, both in scene units.
     pub(super) fn survival(&self, change: f32, seen: f32) -> f32 {
-        let entry =
-            (STEPS_A_DOUBLING * ((self.nits_per_unit * seen).log2() - DARKEST)).clamp(0.0, (ENTRIES - 1) as f32);
-        let share = change / self.thresholds[entry as usize];
+        let entry = STEPS_A_DOUBLING * ((self.nits_per_unit * seen).log2() - DARKEST);
+        let nearest = (entry + 0.5).clamp(0.0, (ENTRIES - 1) as f32) as usize;
+        let share = change / self.thresholds[nearest];
         if share.is_nan() { 1.0 } else { share.clamp(LEAST_SURVIVAL, 1.0) }
     }
 }
@@ -50,14 +50,14 @@ impl ThresholdTable {
 mod tests {
     use super::*;
 
-    /// About one per cent of daylight is the threshold, more of the dark, whatever the scene's unit.
+    /// About five per cent of 100 cd/m² is the threshold, more of the dark, whatever the scene's unit.
     #[test]
     fn light_below_threshold_is_left_to_chance() {
         for nits_per_unit in [1.0, 100.0] {
             let table = ThresholdTable::new(Pruning { nits_per_unit });
             let survival =
                 |change: f64, seen: f64| table.survival((change / nits_per_unit) as f32, (seen / nits_per_unit) as f32);
-            assert_eq!(survival(3.0, 100.0), 1.0);
+            assert_eq!(survival(6.0, 100.0), 1.0);
             let half = 0.5 * combined_monotone(100.0);
             assert!((survival(half, 100.0) - 0.5).abs() < 0.05, "{}", survival(half, 100.0));
             assert_eq!(survival(1e-6, 100.0), LEAST_SURVIVAL);
