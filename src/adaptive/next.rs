@@ -76,7 +76,7 @@ impl Loop<'_> {
         if !is_reached(judgement, rung) {
             still_wanted(self.settings)?;
             return Ok(some(match &judgement.denoised {
-                Some(_) => denoised_plan(&self.state.film, &judgement.predicted, rung, max_samples),
+                Some(_) => denoised_plan(&self.state.film, judgement, rung, max_samples),
                 None => self.cheapest(rung, judgement)?.unwrap_or_else(|| uniform_plan(&self.state.film, doubled)),
             }));
         }
