@@ -110,6 +110,6 @@ impl RenderState {
 }
 
 /// Samples of every pixel before the first look.
-fn pilot_samples(limits: &Limits) -> u32 {
+pub(crate) fn pilot_samples(limits: &Limits) -> u32 {
     limits.pilot_samples.min(limits.max_samples).min(limits.mean_samples.unwrap_or(u32::MAX))
 }

@@ -151,8 +151,9 @@ pub(super) struct Status {
     pub(super) seconds: f64,
     /// To the first look, later to the rung.
     pub(super) seconds_left: Option<f64>,
-    /// Of the plan before the first look.
-    pub(super) first_look_samples: u64,
+    /// Of every pixel before the first look; not told.
+    #[serde(skip)]
+    pub(super) pilot_samples: u32,
     /// Share of pixels above the target at the last look.
     pub(super) visible_share: Option<f64>,
     pub(super) target: f64,

@@ -238,8 +238,10 @@ impl<'a> Session<'a> {
 
     /// The render is at an end, until somebody asks for more.
     fn stopped(&mut self, last_look: LastLook) {
-        // At rest the film is shown, however little it has.
-        self.glimpse = None;
+        // At rest the film is shown, however little it has: it is what will be saved.
+        if self.state.film.total_samples() > 0 {
+            self.glimpse = None;
+        }
         self.screen.looked = Some(Arc::new(Looked::of(&last_look.judgement)));
         self.state.tone = Some(last_look.judgement.tone.save());
         self.last_look = Some(last_look);

@@ -2,9 +2,8 @@
 
 use super::Session;
 use crate::adaptive::settings::LoopSettings;
-use crate::adaptive::state::RenderState;
+use crate::adaptive::state::{RenderState, pilot_samples};
 use crate::adaptive::{Progress, StopReason, visible_share};
-use crate::integrator::SamplePlan;
 use crate::preview::command::{Phase, Status};
 use crate::preview::shared::Shared;
 use crate::scene::Scene;
@@ -31,10 +30,6 @@ impl Session<'_> {
             }),
             width: self.tracer.settings().film_area().width,
             height: self.tracer.settings().film_area().height,
-            first_look_samples: match state.plans {
-                0 => state.pending.front().map_or(0, SamplePlan::samples),
-                _ => 0,
-            },
             visible_share: self.last_look.as_ref().map(|look| visible_share(&look.judgement, target)),
             exposure: self.live.exposure.or(self.job.record.exposure_stops),
             distance: self.live.distance.unwrap_or(1.0),
@@ -67,7 +62,7 @@ pub(in crate::preview) fn blank_status(
         samples_a_second: 0.0,
         seconds: 0.0,
         seconds_left: None,
-        first_look_samples: 0,
+        pilot_samples: pilot_samples(&settings.limits),
         visible_share: None,
         target: settings.limits.visibility,
         rung: None,
@@ -99,7 +94,7 @@ pub(in crate::preview) fn count(
     status.samples_a_second = status.total_samples as f64 / state.seconds_total.max(1e-3);
     let left_after = |samples: f64| Some(samples.max(0.0) / status.samples_a_second.max(1.0));
     if progress.is_none() && state.plans == 0 && status.total_samples > 0 {
-        status.seconds_left = left_after(status.first_look_samples as f64 - status.total_samples as f64);
+        status.seconds_left = left_after(pixels * f64::from(status.pilot_samples) - status.total_samples as f64);
     }
     if let Some(progress) = progress.filter(|_| status.phase != Phase::Stopped) {
         status.visible_share = Some(progress.visible_share);
@@ -125,5 +120,25 @@ fn in_words(reason: StopReason) -> &'static str {
         StopReason::Rule => "the rule is satisfied",
         StopReason::Interrupted => "as asked",
         StopReason::Merged => "merged",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fechner_perception::display::Viewing;
+    use fechner_perception::tone::operator;
+
+    /// Before the first look the pilot's rest is what is left, also for a render that is only watched.
+    #[test]
+    fn the_first_look_says_when_it_comes() {
+        let viewing = Viewing::of(Display::preset("desktop").expect("a preset"));
+        let settings = LoopSettings::new(viewing, 100.0, operator("constant", None).expect("an operator"));
+        let mut status = blank_status(&Scene::default(), &settings, "constant", String::new());
+        (status.width, status.height) = (10, 10);
+        let mut state = RenderState::new(10, 10, &settings.limits);
+        state.seconds_total = 2.0;
+        count(&mut status, &state, 400, None);
+        assert_eq!(status.seconds_left, Some(6.0), "1200 of 1600 samples at 200 a second");
     }
 }
