@@ -11,10 +11,8 @@ use anyhow::Result;
 use fechner::film::{Film, opponent};
 use fechner::integrator::{BlockWork, PathTracer, Pruning, SamplePlan, TraceSettings};
 use fechner::sampler::Half;
-use fechner::scene::load::{LoadOptions, load};
-use std::path::Path;
 use std::sync::Arc;
-use support::CpuClock;
+use support::{CpuClock, scenes_asked_for};
 
 const SIZE: u32 = 96;
 const SCENES: [&str; 5] = ["cornell-box", "dark-window", "many-lights", "product", "textured-room"];
@@ -31,12 +29,9 @@ struct Outcome {
 }
 
 fn main() -> Result<()> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     println!("| scene | rays a sample | with pruning | processor time | noise | worth | mean |");
     println!("| --- | --- | --- | --- | --- | --- | --- |");
-    let wanted: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with('-')).collect();
-    for name in SCENES.into_iter().filter(|name| wanted.is_empty() || wanted.iter().any(|wanted| wanted == name)) {
-        let scene = Arc::new(load(&root.join(format!("scenes/{name}.toml")), &LoadOptions::default())?);
+    for (name, scene) in scenes_asked_for(&SCENES)? {
         let pruning = Pruning { nits_per_unit: scene.nits_per_unit };
         let tracers = [None, Some(pruning)].map(|prune| {
             PathTracer::new(Arc::clone(&scene), TraceSettings { prune, ..TraceSettings::new(SIZE, SIZE, 1) })

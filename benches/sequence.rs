@@ -6,18 +6,20 @@
 //! with the thresholds of one 256-sample render, and its root mean square over the picture is what the table calls error.
 //! Both sequences have the same pairs of seeds; worth is the geometric mean over the pairs, with its 95 % interval by Student's t.
 
+#[path = "support/mod.rs"]
+mod support;
+
 use anyhow::{Context, Result};
 use fechner::adaptive::settings::{Limits, LoopSettings, Sampling};
 use fechner::adaptive::{Quiet, Rendered, render};
 use fechner::integrator::{PathTracer, TraceSettings};
 use fechner::sampler::Sequence;
 use fechner::scene::Scene;
-use fechner::scene::load::{LoadOptions, load};
 use fechner_perception::tone::operator;
 use fechner_perception::{Display, Plane, Viewing, seen};
 use statrs::distribution::{ContinuousCDF, StudentsT};
-use std::path::Path;
 use std::sync::Arc;
+use support::scenes_asked_for;
 
 const SIZE: u32 = 96;
 const SCENES: [&str; 2] = ["cornell-box", "textured-room"];
@@ -31,12 +33,9 @@ enum Effort {
 }
 
 fn main() -> Result<()> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     println!("| scene | samples a pixel | visible error, per pixel | in Z-order | worth in samples |");
     println!("| --- | --- | --- | --- | --- |");
-    let wanted: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with('-')).collect();
-    for name in SCENES.into_iter().filter(|name| wanted.is_empty() || wanted.iter().any(|wanted| wanted == name)) {
-        let scene = Arc::new(load(&root.join(format!("scenes/{name}.toml")), &LoadOptions::default())?);
+    for (name, scene) in scenes_asked_for(&SCENES)? {
         let judge = rendered(&scene, Sequence::PerPixel, 0, Effort::Samples(256))?;
         for effort in [Effort::Samples(4), Effort::Samples(16), Effort::Samples(64), Effort::Visibility(4.0)] {
             let mut pairs = Vec::new();

@@ -47,6 +47,15 @@ impl CpuClock {
     }
 }
 
+/// Those of our scenes that the command line names, all where it names none.
+pub(crate) fn scenes_asked_for(names: &[&'static str]) -> Result<Vec<(&'static str, Arc<Scene>)>> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let wanted: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with('-')).collect();
+    let is_wanted = |name: &&str| wanted.is_empty() || wanted.iter().any(|wanted| wanted == name);
+    let loaded = |name| Ok((name, Arc::new(load(&root.join(format!("{name}.toml")), &LoadOptions::default())?)));
+    names.iter().copied().filter(is_wanted).map(loaded).collect()
+}
+
 /// How finely the cave is cut.
 #[derive(Clone, Copy)]
 pub(crate) struct CaveSize {

@@ -21,7 +21,7 @@ const DARKEST: f32 = -20.0;
 /// Entries of the table for each doubling of luminance.
 const STEPS_A_DOUBLING: f32 = 4.0;
 const ENTRIES: usize = 200;
-/// Light is never traced less often: what a shadow lets through is multiplied by at most this many.
+/// Light is never traced less often, so what gets through is never multiplied by more than the inverse.
 const LEAST_SURVIVAL: f32 = 0.125;
 
 /// Thresholds at luminances a quarter of a doubling apart, all in scene units.

@@ -88,11 +88,11 @@ done
 cd "$run"
 case $end in
 requeue) # Units of a few seconds, so that one can be met in the middle.
-    options=(--size 320x320 --sampling uniform --spp 32 --seed 5) unit_samples=800000 passes=2 minutes=10
+    options=(--size 320x320 --sampling uniform --spp 32 --seed 5) unit_samples=800000 passes=2 minutes=10 patience_s=400
     units="farm/frame-0000/round-000/unit-000000"
     ;;
 time-limit) # The last round is one unit of a minute and a half, which Slurm warns after a minute that its two are soon up.
-    options=(--size 720x720 --sampling uniform --spp 128 --seed 5) unit_samples=5000000 passes=1 minutes=2
+    options=(--size 720x720 --sampling uniform --spp 128 --seed 5) unit_samples=5000000 passes=1 minutes=2 patience_s=900
     units="farm/frame-0000/round-*/unit-*"
     ;;
 *)
@@ -106,7 +106,7 @@ sh farm/slurm/submit.sh
 
 # The first unit that runs is ended in the middle: its checkpoint must be there afterwards.
 is_there() { compgen -G "$1" >/dev/null; }
-for _ in $(seq 1800); do is_there "$units.lock" && break; sleep 0.1; done
+for _ in $(seq 300); do is_there "$units.lock" && break; sleep 0.1; done
 is_there "$units.lock" || fail "no unit starts"
 running() { squeue -h -r -t RUNNING -n fechner-units -o %i | head -n 1; }
 if [[ $end == requeue ]]; then
@@ -122,7 +122,7 @@ for _ in $(seq 100); do is_there "$units.partial" && break; sleep 0.1; done
 is_there "$units.partial" || fail "the unit left no checkpoint"
 echo "a unit ended ($end) and left its checkpoint; Slurm lets it wait two minutes"
 
-for _ in $(seq 900); do
+for _ in $(seq $patience_s); do
     [[ -e farm/frame-0000/result.json ]] && break
     [[ -n "$(squeue -h -o %i)" ]] || fail "nothing is left to run, and the frame is not done"
     sleep 1
