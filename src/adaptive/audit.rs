@@ -2,7 +2,12 @@
 //!
 //! On a stratified 2 % of tiles, as many fresh samples as the tile has are taken and thrown away. What can be seen of the
 //! difference between fresh and kept, over what the variance predicts, is the audit's ratio: 1 if the variance is right,
-//! above 1 where light was found that the stopping samples had missed.
+//! above 1 where light was found that the stopping samples had missed. Denoised pictures have an audit of their own
+//! ([`audit_unproven`]).
+
+mod unproven;
+
+pub use unproven::audit_unproven;
 
 use super::beginning;
 use super::judge::{JudgeError, Judgement, still_wanted, variance_share};
@@ -52,37 +57,19 @@ pub fn audit(
     settings: &LoopSettings,
     round: u32,
 ) -> Result<Option<Audit>, JudgeError> {
-    /// Between two questions whether the audit is still wanted.
-    const SAMPLES_A_PIECE: u64 = 1 << 17;
-    let tiles = choose_tiles(film, round);
+    let all = Tile::all(film, TILE);
+    let tiles = choose_tiles(&all, (all.len() + STRATUM / 2) / STRATUM, round);
     if tiles.len() < 2 {
         return Ok(None);
     }
     let width = film.width() as usize;
     let pixels: Vec<usize> = tiles.iter().flat_map(|tile| tile.pixels(width)).collect();
-    let plan = repetition(film, &pixels);
-    let seed = hash_words(tracer.settings().seed, AUDIT_STREAM + u64::from(round));
-    let mut fresh = vec![[HalfPixel::default(); 2]; pixels.len()];
-    // Blocks come in the order of `pixels`.
-    let mut place = 0;
-    let mut merge = |work: BlockWork, sum: &BlockSum| {
-        while pixels[place] != work.pixel as usize {
-            place += 1;
-        }
-        fresh[place][work.half.index()].merge(sum);
-    };
-    let mut left = plan.blocks.as_slice();
-    while !left.is_empty() {
-        still_wanted(settings)?;
-        let piece = beginning(left, SAMPLES_A_PIECE);
-        tracer.trace_into(&SamplePlan { blocks: piece.to_vec() }, seed, &mut merge, &|_| {});
-        left = &left[piece.len()..];
-    }
+    let fresh = FreshSamples::take(tracer, film, &pixels, 1, settings, round)?;
 
     let nits = settings.nits_per_unit;
     let mut difference = Plane::filled(width, film.height() as usize, 0.0);
     let mut variance = Plane::filled(width, film.height() as usize, 0.0);
-    for (&pixel, halves) in pixels.iter().zip(&fresh) {
+    for (&pixel, halves) in pixels.iter().zip(&fresh.halves) {
         let kept: f64 = Half::BOTH.iter().map(|&h| 0.5 * opponent(film.half(h)[pixel].mean)[0]).sum();
         let again: f64 = halves.iter().map(|half| 0.5 * opponent(half.mean)[0]).sum();
         // Fresh less kept has twice the variance of one of them.
@@ -100,51 +87,103 @@ pub fn audit(
     let predicted = judgement.thresholds.predicted_visibility(&variance);
     let energies = tiles.iter().map(|tile| (tile.energy(&found), tile.energy(&predicted))).collect::<Vec<_>>();
     let (ratio, standard_error) = ratio_of_sums(&energies);
-    Ok(Some(Audit { tiles: tiles.len(), samples: plan.samples(), ratio, standard_error }))
+    Ok(Some(Audit { tiles: tiles.len(), samples: fresh.samples, ratio, standard_error }))
 }
 
+/// A square of pixels.
 #[derive(Clone, Copy, Debug)]
 struct Tile {
     left: usize,
     top: usize,
+    side: usize,
 }
 
 impl Tile {
+    /// All whole tiles of a film, in reading order.
+    fn all(film: &Film, side: usize) -> Vec<Self> {
+        let columns = film.width() as usize / side;
+        let rows = film.height() as usize / side;
+        (0..columns * rows)
+            .map(|index| Self { left: index % columns * side, top: index / columns * side, side })
+            .collect()
+    }
+
     fn pixels(self, width: usize) -> impl Iterator<Item = usize> {
-        (self.top..self.top + TILE).flat_map(move |y| (self.left..self.left + TILE).map(move |x| y * width + x))
+        let Self { left, top, side } = self;
+        (top..top + side).flat_map(move |y| (left..left + side).map(move |x| y * width + x))
     }
 
     /// Σ v² of the tile and, since the eye's window spreads it, of half a tile around.
     fn energy(self, visibility: &Plane) -> f64 {
-        let rows = self.top.saturating_sub(TILE / 2)..(self.top + 3 * TILE / 2).min(visibility.height());
-        let columns = self.left.saturating_sub(TILE / 2)..(self.left + 3 * TILE / 2).min(visibility.width());
+        let Self { left, top, side } = self;
+        let rows = top.saturating_sub(side / 2)..(top + 3 * side / 2).min(visibility.height());
+        let columns = left.saturating_sub(side / 2)..(left + 3 * side / 2).min(visibility.width());
         let squared = |x: usize, y: usize| f64::from(visibility.get(x, y)).powi(2);
         rows.flat_map(|y| columns.clone().map(move |x| (x, y))).map(|(x, y)| squared(x, y)).sum()
     }
 }
 
-/// One tile of every stratum of 50 in reading order, chosen by chance.
-fn choose_tiles(film: &Film, round: u32) -> Vec<Tile> {
-    let columns = film.width() as usize / TILE;
-    let tiles = columns * (film.height() as usize / TILE);
-    let strata = (tiles + STRATUM / 2) / STRATUM;
+/// One of every stratum of tiles in reading order, chosen by chance.
+fn choose_tiles(tiles: &[Tile], strata: usize, round: u32) -> Vec<Tile> {
     let chosen = |stratum: usize| {
-        let (start, end) = (stratum * tiles / strata, (stratum + 1) * tiles / strata);
-        let index = start + hash_words(u64::from(round), stratum as u64) as usize % (end - start);
-        Tile { left: index % columns * TILE, top: index / columns * TILE }
+        let (start, end) = (stratum * tiles.len() / strata, (stratum + 1) * tiles.len() / strata);
+        tiles[start + hash_words(u64::from(round), stratum as u64) as usize % (end - start)]
     };
     (0..strata).map(chosen).collect()
 }
 
-/// The same samples again.
-fn repetition(film: &Film, pixels: &[usize]) -> SamplePlan {
+/// Samples of some pixels that are in no picture.
+struct FreshSamples {
+    /// Of each pixel.
+    halves: Vec<[HalfPixel; 2]>,
+    /// How many in all.
+    samples: u64,
+}
+
+impl FreshSamples {
+    /// Takes `times` as many as each of the pixels has.
+    fn take(
+        tracer: &PathTracer,
+        film: &Film,
+        pixels: &[usize],
+        times: u32,
+        settings: &LoopSettings,
+        round: u32,
+    ) -> Result<Self, JudgeError> {
+        /// Between two questions whether the audit is still wanted.
+        const SAMPLES_A_PIECE: u64 = 1 << 17;
+        let plan = repetition(film, pixels, times);
+        let seed = hash_words(tracer.settings().seed, AUDIT_STREAM + u64::from(round));
+        let mut halves = vec![[HalfPixel::default(); 2]; pixels.len()];
+        // Blocks come in the order of `pixels`.
+        let mut place = 0;
+        let mut merge = |work: BlockWork, sum: &BlockSum| {
+            while pixels[place] != work.pixel as usize {
+                place += 1;
+            }
+            halves[place][work.half.index()].merge(sum);
+        };
+        let mut left = plan.blocks.as_slice();
+        while !left.is_empty() {
+            still_wanted(settings)?;
+            let piece = beginning(left, SAMPLES_A_PIECE);
+            tracer.trace_into(&SamplePlan { blocks: piece.to_vec() }, seed, &mut merge, &|_| {});
+            left = &left[piece.len()..];
+        }
+        Ok(Self { halves, samples: plan.samples() })
+    }
+}
+
+/// The same samples again, `times` as many.
+fn repetition(film: &Film, pixels: &[usize], times: u32) -> SamplePlan {
     let mut plan = SamplePlan::default();
     for &pixel in pixels {
         for half in Half::BOTH {
+            let wanted = film.half(half)[pixel].taken.saturating_mul(times);
             let mut taken = 0;
-            while taken < film.half(half)[pixel].taken {
+            while taken < wanted {
                 let rest = BlockWork::rest(pixel as u32, half, taken);
-                let samples = rest.samples.min(film.half(half)[pixel].taken - taken);
+                let samples = rest.samples.min(wanted - taken);
                 plan.blocks.push(BlockWork { samples, ..rest });
                 taken += samples;
             }

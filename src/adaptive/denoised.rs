@@ -164,19 +164,16 @@ const MOST_TIMES_MEAN: f64 = 16.0;
 pub(super) fn denoised_plan(film: &Film, judgement: &Judgement, visibility: f64, max_samples: u32) -> SamplePlan {
     let predicted = judgement.predicted.values();
     let is_open = |pixel: usize| f64::from(predicted[pixel]) > visibility;
-    let allowed = judgement.allowed_standard_error_cd_m2();
-    let variances = judgement.pooled_variance_per_sample.values().iter().zip(allowed.values());
-    let raw: Vec<f64> =
-        variances.map(|(&variance, &allowed)| f64::from(variance) / f64::from(allowed).powi(2)).collect();
-    plan_by_energy(film, &defended(&raw), is_open, max_samples)
+    let raw = judgement.energy_of(&judgement.pooled_variance_per_sample);
+    plan_by_energy(film, &defended(raw.values()), is_open, max_samples)
 }
 
 /// Energies with their mean added, and none much above it.
-fn defended(energies: &[f64]) -> Vec<f64> {
-    let sum: f64 = energies.iter().filter(|energy| energy.is_finite()).sum();
-    let mean = sum / energies.len().max(1) as f64;
+fn defended(energies: &[f32]) -> Vec<f64> {
+    let energies = || energies.iter().map(|&energy| f64::from(energy));
+    let mean = energies().filter(|energy| energy.is_finite()).sum::<f64>() / energies().len().max(1) as f64;
     // The order of `min` turns NaN into the most.
-    energies.iter().map(|energy| energy.min(MOST_TIMES_MEAN * mean) + mean).collect()
+    energies().map(|energy| energy.min(MOST_TIMES_MEAN * mean) + mean).collect()
 }
 
 /// A doubling for the half of the pixels where one more sample takes away most of e/n; among the open ones alone when they are few.
@@ -216,7 +213,8 @@ fn share_of_even(energies: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::test_films::film_of;
+    use super::super::judge::judge;
+    use super::super::test_films::{film_of, settings};
     use super::*;
     use glam::Vec3;
 
@@ -242,10 +240,21 @@ mod tests {
     #[test]
     fn quiet_pixels_keep_their_share() {
         let mut energies = vec![1.0; 100];
-        (energies[3], energies[5]) = (1e9, f64::NAN);
+        (energies[3], energies[5]) = (1e9, f32::NAN);
         let defended = defended(&energies);
         let mean_root = defended.iter().map(|energy| energy.sqrt()).sum::<f64>() / 100.0;
         assert!(defended.iter().all(|energy| energy.is_finite() && energy.sqrt() > 0.7 * mean_root));
         assert!(defended[3].sqrt() < 5.0 * mean_root);
+    }
+
+    /// It is raw noise that gets samples, while anything can be seen.
+    #[test]
+    fn noisy_pixels_are_sampled() {
+        let film = film_of(|pixel, random| Vec3::splat(1.0 + if pixel % 64 < 32 { 0.5 } else { 0.05 } * random));
+        let judgement = judge(&film, &settings(), 1.0).expect("judges");
+        let plan = denoised_plan(&film, &judgement, 0.01, 1024);
+        let left = plan.blocks.iter().filter(|block| block.pixel % 64 < 32).count();
+        assert!(left * 20 > plan.blocks.len() * 19, "{left} of {}", plan.blocks.len());
+        assert!(denoised_plan(&film, &judgement, f64::from(f32::MAX), 1024).blocks.is_empty());
     }
 }

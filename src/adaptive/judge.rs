@@ -62,7 +62,8 @@ pub enum JudgeError {
     Denoiser(#[from] OidnError),
 }
 
-/// Looks at the film through display and eye. `inflation` multiplies every variance (1, unless an audit found it low).
+/// Looks at the film through display and eye. `inflation` multiplies every variance (1, unless an audit found it low); of a denoised
+/// picture, the squared error that is inferred rather than witnessed.
 ///
 /// # Errors
 /// If the denoiser fails, or the perception model refuses the film's maps.
@@ -78,7 +79,8 @@ pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Jud
         Some(fitted) => fitted.clone().restore(),
         None => settings.operator.fit(&SceneGuide::of(&guide), &settings.viewing, None),
     };
-    let statistics = SampleStatistics::of(film, &display_scale(film, &guide, tone.as_ref(), settings, inflation));
+    let raw_inflation = if denoised.is_some() { 1.0 } else { inflation };
+    let statistics = SampleStatistics::of(film, &display_scale(film, &guide, tone.as_ref(), settings, raw_inflation));
     still_wanted(settings)?;
     let displayed_guide = seen::display_luminance(tone.as_ref(), &settings.viewing.display, &guide);
     let luminance_variance = variance_of_mean(film, statistics.luminance(), &statistics.luminance().pooled);
@@ -173,10 +175,7 @@ fn contrast_sensitivity(settings: &LoopSettings) -> Result<Box<dyn ContrastSensi
 impl Judgement {
     /// Judges the denoised picture in the raw one's place. The variances stay the raw picture's.
     fn turn_to(&mut self, mut denoised: DenoisedPicture, inflation: f64) {
-        let root = inflation.sqrt() as f32;
-        let inflate = |plane: &mut Plane| *plane = plane.map(|visibility| root * visibility);
-        inflate(&mut denoised.error.visibility);
-        inflate(&mut denoised.error.blended_visibility);
+        denoised.error.raise_inferred(inflation.sqrt());
         self.predicted = self.per_importance(denoised.error.blended_visibility.clone());
         self.denoised = Some(denoised);
     }
@@ -199,9 +198,13 @@ impl Judgement {
     /// The same with each pixel's noise judged where it is, before the bands smear it: what the allocation's constraints say. One
     /// blur in the place of twenty.
     pub fn rough_visibility_of(&self, display_variance: &Plane) -> Plane {
+        self.thresholds.pooled(&self.energy_of(display_variance)).map(f32::sqrt)
+    }
+
+    /// Squared visibility of each pixel's noise for itself, as if nothing around it had any.
+    pub fn energy_of(&self, display_variance: &Plane) -> Plane {
         let allowed = self.allowed_standard_error_cd_m2();
-        let energy = display_variance.combined(&allowed, |variance, allowed| variance / (allowed * allowed));
-        self.thresholds.pooled(&energy).map(f32::sqrt)
+        display_variance.combined(&allowed, |variance, allowed| variance / (allowed * allowed))
     }
 
     /// Standard error of a pixel, cd/m² on the display, that is at visibility 1 by the model that drives the loop.

@@ -1,7 +1,7 @@
 //! What comes after a look: the ladder's rungs, one after the other, and on each of them more samples until it is reached, no
 //! pixel stands out, and an audit agrees.
 
-use super::audit::{Audit, audit};
+use super::audit::{Audit, audit, audit_unproven};
 use super::denoised::denoised_plan;
 use super::forecast::Forecast;
 use super::judge::{JudgeError, Judgement, still_wanted};
@@ -120,12 +120,14 @@ impl Loop<'_> {
     /// Audits a rung that is reached. Where the variance proves too low it is raised from here on, and the plan for it is
     /// returned.
     fn audited(&mut self, rung: f64, judgement: &mut Judgement) -> Result<Option<SamplePlan>, JudgeError> {
-        let is_raw = judgement.denoised.is_none();
-        let may_audit = judgement.pixel_thresholds.is_none() && is_raw;
-        if !may_audit || self.state.inflation >= MOST_INFLATION {
+        if judgement.pixel_thresholds.is_some() || self.state.inflation >= MOST_INFLATION {
             return Ok(None);
         }
-        let found = audit(self.tracer, &self.state.film, judgement, self.settings, self.state.audits)?;
+        let (film, round) = (&self.state.film, self.state.audits);
+        let found = match judgement.denoised {
+            None => audit(self.tracer, film, judgement, self.settings, round)?,
+            Some(_) => audit_unproven(self.tracer, film, judgement, self.settings, rung, round)?,
+        };
         self.state.audits += 1;
         self.state.audit = found.or(self.state.audit);
         let Some(found) = found.filter(Audit::disagrees) else { return Ok(None) };

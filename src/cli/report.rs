@@ -321,8 +321,9 @@ pub(super) fn summary(report: &Report, settings: &LoopSettings, rendered: &Rende
         ));
     }
     if let Some(audit) = rendered.audit {
+        let whose = if report.denoised.is_some() { " unproven" } else { "" };
         lines.push(format!(
-            "Audit: fresh samples in {} tiles differ from the picture by {:.2} ± {:.2} times the predicted visible energy.",
+            "Audit: fresh samples in {}{whose} tiles differ from the picture by {:.2} ± {:.2} times the predicted visible energy.",
             audit.tiles, audit.ratio, audit.standard_error
         ));
     }

@@ -89,6 +89,18 @@ impl DenoisedError {
         self
     }
 
+    /// Multiplies visibility by `factor` where it is inferred: where even an error [`VISIBLY_WRONG`] times as visible would not be
+    /// noticed by the place's own witness. For what is learned elsewhere of errors that nothing at hand shows.
+    pub fn raise_inferred(&mut self, factor: f64) {
+        let standard_error = &self.bias_squared_standard_error;
+        for plane in [&mut self.visibility, &mut self.blended_visibility] {
+            *plane = plane.combined(standard_error, |visibility, standard_error| {
+                let unnoticed = visibility * visibility * (VISIBLY_WRONG * VISIBLY_WRONG - 1.0);
+                if NOTICED * standard_error > unnoticed { factor as f32 * visibility } else { visibility }
+            });
+        }
+    }
+
     /// 1 where `visibility` is at most `target` and yet nothing proves that bias keeps the picture below
     /// [`VISIBLY_WRONG`] × `target`: raw noise is too strong to testify. 0 elsewhere.
     #[must_use]

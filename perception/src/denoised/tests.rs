@@ -153,6 +153,23 @@ fn strong_raw_noise_leaves_the_picture_unproven() {
     assert!(faint == 0.0 && seen < 0.1, "{faint} {seen}");
 }
 
+/// What is learned elsewhere goes for what no witness of the place's own tells, and for nothing else.
+#[test]
+fn only_what_is_inferred_is_raised() {
+    let map = map_of(&grey());
+    let raised = |raw_deviation: f32| {
+        let mistakes = [15, 16].map(|seed| white_noise(seed, 2.0));
+        let before = Halves::of(&grey(), mistakes, raw_deviation, 17).judged(&map);
+        let mut after = before.clone();
+        after.raise_inferred(2.0);
+        (before.visibility.mean(), after.visibility.mean())
+    };
+    let (before, after) = raised(60.0);
+    assert!((after / before - 2.0).abs() < 1e-3, "{before} {after}");
+    let (before, after) = raised(0.2);
+    assert_eq!(before, after);
+}
+
 /// Independent noise without bias: no factor is invented where the witness can tell, and chance alone is not believed.
 #[test]
 fn noise_without_bias_is_variance() {
