@@ -11,6 +11,7 @@ pub use unproven::audit_unproven;
 
 use super::beginning;
 use super::judge::{JudgeError, Judgement, still_wanted, variance_share};
+use super::plan::blocks_between;
 use super::settings::LoopSettings;
 use crate::film::{BlockSum, Film, HalfPixel, opponent};
 use crate::integrator::{BlockWork, PathTracer, SamplePlan};
@@ -180,13 +181,7 @@ fn repetition(film: &Film, pixels: &[usize], times: u32) -> SamplePlan {
     for &pixel in pixels {
         for half in Half::BOTH {
             let wanted = film.half(half)[pixel].taken.saturating_mul(times);
-            let mut taken = 0;
-            while taken < wanted {
-                let rest = BlockWork::rest(pixel as u32, half, taken);
-                let samples = rest.samples.min(wanted - taken);
-                plan.blocks.push(BlockWork { samples, ..rest });
-                taken += samples;
-            }
+            plan.blocks.extend(blocks_between(pixel as u32, half, 0, wanted));
         }
     }
     plan

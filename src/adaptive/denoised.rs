@@ -2,7 +2,7 @@
 //! gets samples.
 
 use super::judge::{JudgeError, Judgement};
-use super::plan::{doubling_of, uniform_plan};
+use super::plan::{doubling_plan, plan_up_to};
 use super::settings::LoopSettings;
 use crate::denoise::{DenoisedFilm, Denoiser, denoise_film};
 use crate::film::{Estimate, Film, opponent};
@@ -150,22 +150,33 @@ fn raw_luminance(film: &Film, half: Half, nits_per_unit: f64) -> Plane {
 
 /// Even counts are kept where the best ones would take more than this share of their samples.
 const EVEN_ENOUGH: f64 = 0.95;
-/// Even counts grow by this factor between looks.
-const EVEN_GROWTH: f64 = 1.5;
+/// Counts grow in all by this share of what is there.
+const GROWTH: f64 = 0.5;
+/// What a look at a denoised picture costs, in samples for every pixel, about: three pictures to denoise, three channels to judge, 0.84 s
+/// for 192×192 where a sample each takes 0.046 s. A plan is no smaller while its pixels may have so many.
+const SAMPLES_OF_A_LOOK: f64 = 16.0;
+/// Doublings of a pixel before it is looked at again; early, that is less than a look costs, and all are doubled alike.
+const MOST_DOUBLINGS: u32 = 2;
 /// No pixel's noise counts as more than so many times the picture's mean: variances of few samples are not worth more trust.
 const MOST_TIMES_MEAN: f64 = 16.0;
 
-/// More samples for a picture that is denoised, while some of it is above `visibility`.
+/// More samples for a picture that is denoised, while some of it is above `visibility`; at most `left` in all.
 ///
 /// What raw noise would show at a pixel decides, not what is left of it: that is pooled over a degree and tells no noisy pixel from
 /// its neighbours. Counts go as the root of that energy plus the picture's mean. Without the mean, noisy pixels starve the rest: a dark
 /// room denoised by Open Image Denoise had JOD 9.52 at 256 samples a pixel where even counts have 9.74, with it 9.74; at 32 samples 9.50
 /// and 9.55, even 9.44 (`benches/README.md`).
-pub(super) fn denoised_plan(film: &Film, judgement: &Judgement, visibility: f64, max_samples: u32) -> SamplePlan {
+pub(super) fn denoised_plan(
+    film: &Film,
+    judgement: &Judgement,
+    visibility: f64,
+    max_samples: u32,
+    left: u64,
+) -> SamplePlan {
     let predicted = judgement.predicted.values();
     let is_open = |pixel: usize| f64::from(predicted[pixel]) > visibility;
     let raw = judgement.energy_of(&judgement.pooled_variance_per_sample);
-    plan_by_energy(film, &defended(raw.values()), is_open, max_samples)
+    plan_by_energy(film, &defended(raw.values()), is_open, max_samples, left)
 }
 
 /// Energies with their mean added, and none much above it.
@@ -176,31 +187,47 @@ fn defended(energies: &[f32]) -> Vec<f64> {
     energies().map(|energy| energy.min(MOST_TIMES_MEAN * mean) + mean).collect()
 }
 
-/// A doubling for the half of the pixels where one more sample takes away most of e/n; among the open ones alone when they are few.
-/// Half as many again for all where other than even counts would hardly be better.
-fn plan_by_energy(film: &Film, energies: &[f64], is_open: impl Fn(usize) -> bool, max_samples: u32) -> SamplePlan {
+/// Doublings, again and again for the half of the pixels where one more sample takes away most of e/n, until the plan is worth a look;
+/// among the open ones alone when they are few. As many for all where other than even counts would hardly be better.
+fn plan_by_energy(
+    film: &Film,
+    energies: &[f64],
+    is_open: impl Fn(usize) -> bool,
+    max_samples: u32,
+    left: u64,
+) -> SamplePlan {
     let pixels = energies.len();
     let open = (0..pixels).filter(|&pixel| is_open(pixel)).count();
     if open == 0 {
         return SamplePlan::default();
     }
     let is_for_all = 2 * open > pixels;
+    let is_wanted = |pixel: usize| is_for_all || is_open(pixel);
+    let present: f64 = (0..pixels).filter(|&pixel| is_wanted(pixel)).map(|pixel| f64::from(film.samples(pixel))).sum();
+    let worth_a_look = (GROWTH * present).max(SAMPLES_OF_A_LOOK * pixels as f64).min(left as f64);
     if is_for_all && share_of_even(energies) > EVEN_ENOUGH {
-        let mean_samples = EVEN_GROWTH * film.total_samples() as f64 / pixels as f64;
-        return uniform_plan(film, (mean_samples.ceil() as u32).min(max_samples));
+        let mean_samples = ((present + worth_a_look) / pixels as f64).round() as u32;
+        return plan_up_to(film, |_| mean_samples.min(max_samples));
     }
-    let gain = |pixel: usize| {
-        let count = film.samples(pixel).max(1);
-        let is_wanted = (is_for_all || is_open(pixel)) && count < max_samples;
-        if is_wanted { energies[pixel] / f64::from(count).powi(2) } else { 0.0 }
-    };
-    let mut gains: Vec<f64> = (0..pixels).map(gain).filter(|&gain| gain > 0.0).collect();
-    if gains.is_empty() {
-        return SamplePlan::default();
+    let mut doublings = vec![0; pixels];
+    let mut added = 0.0;
+    while added < worth_a_look {
+        let count = |pixel: usize| f64::from(film.samples(pixel).max(1) << doublings[pixel]);
+        let may_double = |pixel: usize| {
+            is_wanted(pixel) && doublings[pixel] < MOST_DOUBLINGS && count(pixel) < f64::from(max_samples)
+        };
+        let gain = |pixel: usize| if may_double(pixel) { energies[pixel] / count(pixel).powi(2) } else { 0.0 };
+        let mut gains: Vec<f64> = (0..pixels).map(gain).filter(|&gain| gain > 0.0).collect();
+        if gains.is_empty() {
+            break;
+        }
+        let middle = gains.len() / 2;
+        let (_, &mut median, _) = gains.select_nth_unstable_by(middle, f64::total_cmp);
+        let doubled: Vec<usize> = (0..pixels).filter(|&pixel| gain(pixel) >= median).collect();
+        added += doubled.iter().map(|&pixel| count(pixel)).sum::<f64>();
+        doubled.into_iter().for_each(|pixel| doublings[pixel] += 1);
     }
-    let middle = gains.len() / 2;
-    let (_, &mut median, _) = gains.select_nth_unstable_by(middle, f64::total_cmp);
-    doubling_of(film, max_samples, |pixel| gain(pixel) >= median)
+    doubling_plan(film, max_samples, |pixel| [doublings[pixel]; 2])
 }
 
 /// Samples that the best counts would need for the energy that even counts leave, as a share of theirs: the sum of e/n is smallest
@@ -225,14 +252,15 @@ mod tests {
         let film = film_of(|_, random| Vec3::splat(1.0 + random));
         let plan = |left: f64, right: f64, is_open: fn(usize) -> bool| {
             let energies: Vec<f64> = (0..64 * 64).map(|pixel| if pixel % 64 < 32 { left } else { right }).collect();
-            plan_by_energy(&film, &energies, is_open, 1024)
+            plan_by_energy(&film, &energies, is_open, 1024, u64::MAX)
         };
-        assert_eq!(plan(8.0, 6.0, |_| true).samples(), 8 * 64 * 64, "half as many again");
-        let uneven = plan(8.0, 1.0, |_| true);
+        assert_eq!(plan(8.0, 6.0, |_| true).samples(), 16 * 64 * 64, "what a look costs");
+        let uneven = plan(16.0, 1.0, |_| true);
         assert!(uneven.blocks.iter().all(|block| block.pixel % 64 < 32));
-        assert_eq!(uneven.samples(), 16 * 32 * 64);
+        assert_eq!(uneven.samples(), 48 * 32 * 64, "64 and 16");
         let few = plan(8.0, 6.0, |pixel| pixel % 64 < 16);
-        assert!(!few.blocks.is_empty() && few.blocks.iter().all(|block| block.pixel % 64 < 16));
+        assert!(few.blocks.iter().all(|block| block.pixel % 64 < 16));
+        assert_eq!(few.samples(), 48 * 16 * 64, "four times what they have");
         assert!(plan(8.0, 1.0, |_| false).blocks.is_empty());
     }
 
@@ -252,9 +280,9 @@ mod tests {
     fn noisy_pixels_are_sampled() {
         let film = film_of(|pixel, random| Vec3::splat(1.0 + if pixel % 64 < 32 { 0.5 } else { 0.05 } * random));
         let judgement = judge(&film, &settings(), 1.0).expect("judges");
-        let plan = denoised_plan(&film, &judgement, 0.01, 1024);
+        let plan = denoised_plan(&film, &judgement, 0.01, 1024, 4 * 64 * 64);
         let left = plan.blocks.iter().filter(|block| block.pixel % 64 < 32).count();
         assert!(left * 20 > plan.blocks.len() * 19, "{left} of {}", plan.blocks.len());
-        assert!(denoised_plan(&film, &judgement, f64::from(f32::MAX), 1024).blocks.is_empty());
+        assert!(denoised_plan(&film, &judgement, f64::from(f32::MAX), 1024, u64::MAX).blocks.is_empty());
     }
 }

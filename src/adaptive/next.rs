@@ -38,7 +38,7 @@ impl Loop<'_> {
             return Ok(if plan.blocks.is_empty() { Step::Stop(StopReason::Rule) } else { Step::Trace(plan) });
         }
         while let Some(&rung) = self.rungs.front() {
-            if let Some(plan) = self.plan_towards(rung, judgement)? {
+            if let Some(plan) = self.plan_towards(rung, judgement, left)? {
                 let plan = if plan.samples() > left { cut_to_budget(plan, &judgement.predicted, left) } else { plan };
                 if !plan.blocks.is_empty() {
                     return Ok(Step::Trace(plan));
@@ -59,8 +59,13 @@ impl Loop<'_> {
         }))
     }
 
-    /// More samples for a rung; `None` when it is reached or no pixel may have more.
-    fn plan_towards(&mut self, rung: f64, judgement: &mut Judgement) -> Result<Option<SamplePlan>, JudgeError> {
+    /// More samples for a rung; `None` when it is reached or no pixel may have more. `left`: of the budget.
+    fn plan_towards(
+        &mut self,
+        rung: f64,
+        judgement: &mut Judgement,
+        left: u64,
+    ) -> Result<Option<SamplePlan>, JudgeError> {
         let max_samples = self.settings.limits.max_samples;
         let doubled = {
             let most = self.settings.limits.mean_samples.unwrap_or(max_samples).min(max_samples);
@@ -76,7 +81,7 @@ impl Loop<'_> {
         if !is_reached(judgement, rung) {
             still_wanted(self.settings)?;
             return Ok(some(match &judgement.denoised {
-                Some(_) => denoised_plan(&self.state.film, judgement, rung, max_samples),
+                Some(_) => denoised_plan(&self.state.film, judgement, rung, max_samples, left),
                 None => self.cheapest(rung, judgement)?.unwrap_or_else(|| uniform_plan(&self.state.film, doubled)),
             }));
         }
@@ -87,7 +92,7 @@ impl Loop<'_> {
         if let Some(plan) = some(self.peaks(rung, judgement)) {
             return Ok(Some(plan));
         }
-        Ok(self.audited(rung, judgement)?.and_then(some))
+        Ok(self.audited(rung, judgement, left)?.and_then(some))
     }
 
     /// What the cheapest counts that reach a rung add to those that are there; `None` where even counts cost hardly more.
@@ -119,7 +124,7 @@ impl Loop<'_> {
 
     /// Audits a rung that is reached. Where the variance proves too low it is raised from here on, and the plan for it is
     /// returned.
-    fn audited(&mut self, rung: f64, judgement: &mut Judgement) -> Result<Option<SamplePlan>, JudgeError> {
+    fn audited(&mut self, rung: f64, judgement: &mut Judgement, left: u64) -> Result<Option<SamplePlan>, JudgeError> {
         if judgement.pixel_thresholds.is_some() || self.state.inflation >= MOST_INFLATION {
             return Ok(None);
         }
@@ -133,7 +138,7 @@ impl Loop<'_> {
         let Some(found) = found.filter(Audit::disagrees) else { return Ok(None) };
         self.state.inflation = (self.state.inflation * found.ratio).min(MOST_INFLATION);
         *judgement = self.look()?;
-        self.plan_towards(rung, judgement)
+        self.plan_towards(rung, judgement, left)
     }
 
     /// The exposure that rules without sight are told: measured anew at each doubling of the samples.

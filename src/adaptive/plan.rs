@@ -35,10 +35,9 @@ const FIRST_PASS_SAMPLES: u32 = 2;
 pub fn pilot_plan(film: &Film, most_samples: u32) -> SamplePlan {
     let mut plan = SamplePlan::default();
     let samples = most_samples.min(2 * PILOT_SAMPLES);
-    let share = |half: Half| (samples + 1 - half.index() as u32) / 2;
     for [from, to] in [[0, FIRST_PASS_SAMPLES], [FIRST_PASS_SAMPLES, PILOT_SAMPLES]] {
         for half in Half::BOTH {
-            let to = to.min(share(half));
+            let to = to.min(share_of_half(samples, half));
             for pixel in 0..film.width() * film.height() {
                 let first = film.half(half)[pixel as usize].taken.max(from);
                 if first < to {
@@ -56,7 +55,7 @@ pub fn uniform_plan(film: &Film, mean_samples: u32) -> SamplePlan {
     for pixel in 0..film.width() * film.height() {
         for half in Half::BOTH {
             let taken = film.half(half)[pixel as usize].taken;
-            let wanted = (mean_samples + 1 - half.index() as u32) / 2;
+            let wanted = share_of_half(mean_samples, half);
             if wanted > taken {
                 let block = BlockWork::rest(pixel, half, taken);
                 plan.blocks.push(BlockWork { samples: block.samples.min(wanted - taken), ..block });
@@ -64,6 +63,34 @@ pub fn uniform_plan(film: &Film, mean_samples: u32) -> SamplePlan {
         }
     }
     plan
+}
+
+/// What a film lacks of so many samples of each pixel, as many blocks as that takes.
+pub(super) fn plan_up_to(film: &Film, wanted_samples: impl Fn(usize) -> u32) -> SamplePlan {
+    let mut plan = SamplePlan::default();
+    for pixel in 0..(film.width() * film.height()) as usize {
+        let wanted_samples = wanted_samples(pixel);
+        for half in Half::BOTH {
+            let taken = film.half(half)[pixel].taken;
+            plan.blocks.extend(blocks_between(pixel as u32, half, taken, share_of_half(wanted_samples, half)));
+        }
+    }
+    plan
+}
+
+/// The blocks that take a half of a pixel from so many samples to so many.
+pub(super) fn blocks_between(pixel: u32, half: Half, mut from: u32, to: u32) -> impl Iterator<Item = BlockWork> {
+    std::iter::from_fn(move || {
+        let rest = (from < to).then(|| BlockWork::rest(pixel, half, from))?;
+        let block = BlockWork { samples: rest.samples.min(to - from), ..rest };
+        from += block.samples;
+        Some(block)
+    })
+}
+
+/// A half's part of a pixel's samples: the first has the odd one.
+fn share_of_half(samples: u32, half: Half) -> u32 {
+    (samples + 1 - half.index() as u32) / 2
 }
 
 /// How many samples each pixel should have in all, and for which visibility.
@@ -202,7 +229,8 @@ pub fn doubling_of(film: &Film, max_samples: u32, mask: impl Fn(usize) -> bool) 
     doubling_plan(film, max_samples, |pixel| [if mask(pixel) { doublings } else { 0 }; 2])
 }
 
-fn doubling_plan(film: &Film, max_samples: u32, doublings: impl Fn(usize) -> [u32; 2]) -> SamplePlan {
+/// So many doublings of each half of each pixel, up to `max_samples`.
+pub(super) fn doubling_plan(film: &Film, max_samples: u32, doublings: impl Fn(usize) -> [u32; 2]) -> SamplePlan {
     let mut plan = SamplePlan::default();
     for pixel in 0..(film.width() * film.height()) as usize {
         let doublings = doublings(pixel);
