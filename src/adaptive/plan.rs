@@ -55,11 +55,7 @@ pub fn uniform_plan(film: &Film, mean_samples: u32) -> SamplePlan {
     for pixel in 0..film.width() * film.height() {
         for half in Half::BOTH {
             let taken = film.half(half)[pixel as usize].taken;
-            let wanted = share_of_half(mean_samples, half);
-            if wanted > taken {
-                let block = BlockWork::rest(pixel, half, taken);
-                plan.blocks.push(BlockWork { samples: block.samples.min(wanted - taken), ..block });
-            }
+            plan.blocks.extend(blocks_between(pixel, half, taken, share_of_half(mean_samples, half)).next());
         }
     }
     plan
