@@ -17,6 +17,7 @@ import mathutils
 import numpy as np
 
 THREADS = 2
+REFERENCE_SEED = 77
 
 
 def material(description):
@@ -77,7 +78,7 @@ def add_camera(camera):
     bpy.context.scene.camera = placed
 
 
-def load(path, size):
+def load(path, size, is_unbiased):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.preferences.addon_enable(module="cycles")
     description = described.read(path)
@@ -95,11 +96,14 @@ def load(path, size):
     scene.render.image_settings.file_format = "OPEN_EXR"
     scene.render.image_settings.color_depth = "32"
     scene.cycles.denoiser = "OPENIMAGEDENOISE"
+    if is_unbiased:
+        scene.cycles.sample_clamp_indirect = scene.cycles.blur_glossy = 0.0
 
 
-def render(folder, samples, seconds=0.0, is_adaptive=True, is_denoised=True):
+def render(folder, samples, seed=1, seconds=0.0, is_adaptive=True, is_denoised=True):
     """The picture, and how long it took with all that Blender does."""
     scene = bpy.context.scene
+    scene.cycles.seed = seed
     scene.cycles.samples, scene.cycles.time_limit = samples, seconds
     scene.cycles.use_adaptive_sampling, scene.cycles.use_denoising = is_adaptive, is_denoised
     scene.render.filepath = f"{folder}/cycles.exr"
@@ -115,15 +119,18 @@ def render(folder, samples, seconds=0.0, is_adaptive=True, is_denoised=True):
 
 
 def main():
-    path, size, reference_spp, folder = sys.argv[1], int(sys.argv[2]), int(sys.argv[3]), sys.argv[4]
-    load(path, size)
-    picture, _ = render(folder, reference_spp, is_adaptive=False, is_denoised=False)
+    is_unbiased, words = "--unbiased" in sys.argv, [word for word in sys.argv[1:] if word != "--unbiased"]
+    path, size, reference_spp, folder, *times = words
+    size, reference_spp = int(size), int(reference_spp)
+    load(path, size, is_unbiased)
+    # Another seed: of the same one, the pictures' samples would be among the reference's.
+    picture, _ = render(folder, reference_spp, seed=REFERENCE_SEED, is_adaptive=False, is_denoised=False)
     np.save(f"{folder}/reference.npy", picture)
     render(folder, 1)
     least = lambda **options: min(render(folder, 1, **options)[1] for _ in range(3))
     around = least(is_denoised=False)
     denoising = max(0.0, least() - around)
-    for words in sys.argv[5:]:
+    for words in times:
         picture, taken = render(folder, 1 << 14, seconds=max(0.1, float(words) - denoising))
         np.save(f"{folder}/{words}.npy", picture)
         print("JSON", json.dumps({"asked": words, "seconds": taken - around, "spp": None}), flush=True)

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Denoised pictures at equal time: ours, Mitsuba 3 with Open Image Denoise, Cycles adaptive with its denoiser.
+"""Denoised pictures at equal time: ours, Mitsuba 3 with Open Image Denoise, Cycles adaptive with its denoiser, as it comes (it
+clamps indirect light and blurs what glossy surfaces show) and without that.
 
 Each is judged by ColorVideoVDP against its own converged picture, as a display of 200 cd/m² shows both. Two threads each, one after
 the other; loading, trees and compiling are not counted, denoising is.
@@ -54,8 +55,8 @@ def ours(scene, size, reference_spp, times, folder):
     return reference, made
 
 
-def peer(script, python, scene, size, reference_spp, times, folder):
-    command = [python, HERE / script, scene, str(size), str(reference_spp), folder, *times]
+def peer(script, python, scene, size, reference_spp, times, folder, *options):
+    command = [python, HERE / script, scene, str(size), str(reference_spp), folder, *times, *options]
     finished = subprocess.run([str(part) for part in command], check=True, capture_output=True, text=True, cwd=HERE)
     lines = [json.loads(line[line.index("{") :]) for line in finished.stdout.splitlines() if '"asked"' in line]
     made = {said["asked"]: [(np.load(folder / f"{said['asked']}.npy"), said["seconds"], said["spp"])] for said in lines}
@@ -84,6 +85,7 @@ def main():
                 "fechner + OIDN": lambda: ours(*arguments),
                 "Mitsuba 3 + OIDN": lambda: peer("mitsuba_oidn.py", os.environ["MITSUBA_PYTHON"], *arguments),
                 "Cycles": lambda: peer("blender.py", os.environ["CYCLES_PYTHON"], *arguments),
+                "Cycles, unbiased": lambda: peer("blender.py", os.environ["CYCLES_PYTHON"], *arguments, "--unbiased"),
             }
             for arm, run in arms.items():
                 reference, made = run()
