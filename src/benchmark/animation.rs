@@ -7,10 +7,11 @@
 use super::flicker::{FlickerJudge, Steadiness};
 use super::metrics::video_jod;
 use super::reference::trace_up_to;
-use crate::adaptive::settings::{Limits, LoopSettings, Sampling};
+use crate::adaptive::settings::{DENOISED_PILOT_SAMPLES, Limits, LoopSettings, Sampling};
 use crate::adaptive::{Quiet, render};
 use crate::animate::track::Track;
 use crate::animate::{SceneSource, ShotSettings};
+use crate::denoise::{Denoiser, DenoiserKind, denoise_film};
 use crate::film::Film;
 use crate::integrator::{PathTracer, TraceSettings};
 use crate::sampler::hash_words;
@@ -40,6 +41,8 @@ pub struct AnimationSettings {
     pub reference_spp: u32,
     /// Display preset.
     pub display: String,
+    /// What every frame but the reference's is denoised with.
+    pub denoiser: Option<DenoiserKind>,
 }
 
 /// One shot.
@@ -112,6 +115,11 @@ impl<'a> Bench<'a> {
     fn new(settings: &'a AnimationSettings, path: &'a Path, rate: f64) -> Result<Self> {
         let source = Files(path);
         let display = Display::preset(&settings.display).context("a display preset")?;
+        let denoiser = settings.denoiser.map(Denoiser::open).transpose()?;
+        let mut limits = Limits::of_visibility(settings.visibility);
+        if denoiser.is_some() {
+            limits.pilot_samples = DENOISED_PILOT_SAMPLES;
+        }
         let first = (START_S * rate).round() as u32;
         let shot = ShotSettings {
             first,
@@ -120,12 +128,12 @@ impl<'a> Bench<'a> {
             pausable: false,
             trace: TraceSettings::new(settings.size.0, settings.size.1, 0),
             sampling: Sampling::Adaptive,
-            limits: Limits::of_visibility(settings.visibility),
+            limits,
             viewing: Viewing::of(display),
             nits_per_unit: source.at(0.0)?.nits_per_unit,
             adapted_to_cd_m2: None,
             gaze: None,
-            denoiser: None,
+            denoiser,
         };
         let operator = tone::operator("constant", None).context("an operator")?;
         let track = Track::make(&source, &shot, operator.as_ref(), &|_| {})?;
@@ -136,7 +144,7 @@ impl<'a> Bench<'a> {
     }
 
     fn row(&self) -> Result<AnimationRow> {
-        let reference = self.uniform(REFERENCE_STREAM, &[self.settings.reference_spp])?.remove(0);
+        let reference = self.reference();
         let jod = |frames: Frames| {
             let size = (self.settings.size.0 as usize, self.settings.size.1 as usize);
             let rate = self.shot.frames_per_second;
@@ -151,7 +159,7 @@ impl<'a> Bench<'a> {
         let counts: Vec<u32> =
             (2..).map(|power| 1 << power).take_while(|n| 2 * n <= self.settings.reference_spp).collect();
         let (mut curve, mut steadiness) = (Vec::new(), Vec::new());
-        for (&spp, frames) in counts.iter().zip(self.uniform(0, &counts)?) {
+        for (&spp, frames) in counts.iter().zip(self.uniform(&counts)?) {
             steadiness.push(judge.judge(&frames));
             curve.push((f64::from(spp), jod(frames)?));
         }
@@ -171,29 +179,48 @@ impl<'a> Bench<'a> {
 
     /// Mean samples a pixel and the frames by one of the rules.
     fn adaptive(&self, pausable: bool) -> Result<(f64, Frames)> {
-        let shot =
-            ShotSettings { pausable, viewing: self.shot.viewing.clone(), gaze: None, denoiser: None, ..self.shot };
+        let shot = ShotSettings {
+            pausable,
+            viewing: self.shot.viewing.clone(),
+            gaze: None,
+            denoiser: self.shot.denoiser.clone(),
+            ..self.shot
+        };
         let (mut samples, mut frames) = (0, Vec::new());
         for index in 0..self.scenes.len() {
             let operator = tone::operator("constant", None).context("an operator")?;
             let settings: LoopSettings = shot.frame_settings(operator, &self.track.frames[index]);
             let rendered = render(&self.tracer(index, 0), &settings, &Quiet)?;
             samples += rendered.film.total_samples();
-            frames.push(self.displayed(index, &rendered.film));
+            frames.push(self.displayed(index, rendered.judgement.picture()));
         }
         let pixels = f64::from(self.settings.size.0) * f64::from(self.settings.size.1);
         Ok((samples as f64 / pixels / frames.len() as f64, frames))
     }
 
-    /// The frames with each of these counts, which increase.
-    fn uniform(&self, stream: u64, counts: &[u32]) -> Result<Vec<Frames>> {
+    /// Frames of many samples by other seeds, never denoised.
+    fn reference(&self) -> Frames {
+        let frame = |index| {
+            let mut film = Film::new(self.settings.size.0, self.settings.size.1);
+            trace_up_to(&self.tracer(index, REFERENCE_STREAM), &mut film, self.settings.reference_spp);
+            self.displayed(index, &film.estimate(self.shot.nits_per_unit).rgb_cd_m2)
+        };
+        (0..self.scenes.len()).map(frame).collect()
+    }
+
+    /// The frames with each of these counts, which increase, spread evenly.
+    fn uniform(&self, counts: &[u32]) -> Result<Vec<Frames>> {
         let mut by_count = vec![Frames::new(); counts.len()];
         for index in 0..self.scenes.len() {
-            let tracer = self.tracer(index, stream);
+            let tracer = self.tracer(index, 0);
             let mut film = Film::new(self.settings.size.0, self.settings.size.1);
             for (frames, &count) in by_count.iter_mut().zip(counts) {
                 trace_up_to(&tracer, &mut film, count);
-                frames.push(self.displayed(index, &film));
+                let picture = match &self.shot.denoiser {
+                    Some(denoiser) => denoise_film(denoiser, &film, self.shot.nits_per_unit)?.rgb_cd_m2,
+                    None => film.estimate(self.shot.nits_per_unit).rgb_cd_m2,
+                };
+                frames.push(self.displayed(index, &picture));
             }
         }
         Ok(by_count)
@@ -204,11 +231,10 @@ impl<'a> Bench<'a> {
         PathTracer::new(Arc::clone(&self.scenes[index]), TraceSettings { seed, ..self.shot.trace })
     }
 
-    fn displayed(&self, index: usize, film: &Film) -> Vec<f32> {
+    fn displayed(&self, index: usize, rgb_cd_m2: &[[f32; 3]]) -> Vec<f32> {
         let fitted = self.track.frames[index].fitted.clone().restore();
         let display = &self.shot.viewing.display;
-        let estimate = film.estimate(self.shot.nits_per_unit);
-        let light = estimate.rgb_cd_m2.iter().flat_map(|&rgb| fitted.map_rgb(rgb));
+        let light = rgb_cd_m2.iter().flat_map(|&rgb| fitted.map_rgb(rgb));
         light.map(|value| display.luminance_cd_m2(f64::from(value)) as f32).collect()
     }
 }

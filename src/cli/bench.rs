@@ -9,6 +9,7 @@ use fechner::benchmark::{
     AnimationRow, AnimationSettings, Arm, BenchSettings, DenoisingSettings, Race, animation, bounds, denoising,
     run as run_bench,
 };
+use fechner::denoise::DenoiserKind;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `bench`.
@@ -47,8 +48,8 @@ pub(super) struct BenchArguments {
     /// Arms, separated by commas, in place of the suite's.
     #[arg(long, value_name = "ARM,…", value_delimiter = ',')]
     arms: Vec<String>,
-    /// Denoisers of the suite denoise, separated by commas.
-    #[arg(long, value_enum, value_name = "NAME,…", value_delimiter = ',', default_value = "builtin,oidn")]
+    /// Denoisers, separated by commas: of the suite denoise, without any builtin and oidn; of the suite animation, without any none.
+    #[arg(long, value_enum, value_name = "NAME,…", value_delimiter = ',')]
     denoise: Vec<DenoiseChoice>,
     /// In the suite denoise, leave out what compares rules of sampling.
     #[arg(long)]
@@ -88,7 +89,7 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
     let (size, visibility, seeds, arms) = match arguments.suite {
         Suite::Quick => (128, 4.0, 3, Arm::QUICK.to_vec()),
         Suite::Full => (256, 1.0, 5, Arm::ALL.to_vec()),
-        Suite::Animation => return run_animation(arguments),
+        Suite::Animation => return run_animations(arguments),
         Suite::Denoise => return run_denoise(arguments),
     };
     let scenes = scenes_or(&STILLS, arguments)?;
@@ -149,7 +150,7 @@ fn run_denoise(arguments: &BenchArguments) -> Result<()> {
             display: arguments.display.clone(),
             output: arguments.output.clone(),
         },
-        denoisers: arguments.denoise.iter().filter_map(|choice| choice.kind()).collect(),
+        denoisers: denoisers_or(&[DenoiseChoice::Builtin, DenoiseChoice::Oidn], arguments).flatten().collect(),
         target: arguments.visibility.unwrap_or(1.0),
         with_races: !arguments.law_only,
     };
@@ -213,7 +214,20 @@ fn print_races(races: &[Race]) {
     }
 }
 
-fn run_animation(arguments: &BenchArguments) -> Result<()> {
+/// The denoisers that are asked for, or those of the suite.
+fn denoisers_or<'a>(
+    suite: &'a [DenoiseChoice],
+    arguments: &'a BenchArguments,
+) -> impl Iterator<Item = Option<DenoiserKind>> + 'a {
+    let asked = if arguments.denoise.is_empty() { suite } else { &arguments.denoise };
+    asked.iter().map(|choice| choice.kind())
+}
+
+fn run_animations(arguments: &BenchArguments) -> Result<()> {
+    denoisers_or(&[DenoiseChoice::None], arguments).try_for_each(|denoiser| run_animation(arguments, denoiser))
+}
+
+fn run_animation(arguments: &BenchArguments, denoiser: Option<DenoiserKind>) -> Result<()> {
     let width = arguments.size.unwrap_or(96);
     let settings = AnimationSettings {
         scenes: scenes_or(&SHOTS, arguments)?,
@@ -223,8 +237,12 @@ fn run_animation(arguments: &BenchArguments) -> Result<()> {
         visibility: arguments.visibility.unwrap_or(2.0),
         reference_spp: (64.0 * arguments.reference_factor).clamp(64.0, 16384.0) as u32,
         display: arguments.display.clone(),
+        denoiser,
     };
     let rows = animation(&settings, &|line: &str| eprintln!("{line}"))?;
+    if let Some(denoiser) = denoiser {
+        println!("All but the references denoised ({denoiser:?}):\n");
+    }
     println!(
         "| shot | frames a second | motion: spp, JOD | still: spp, JOD | still / motion | even, as good: spp | even / motion | \
          flicker | of even, at equal visibility |"
