@@ -5,7 +5,7 @@
 //! pixel's own says little), and light that was clipped to what its neighbourhood holds. Not for a picture without
 //! surfaces: glass and mirrors are filtered by what the first surface says.
 
-use super::NoisyPicture;
+use super::{NoisyPicture, SurfaceGuides};
 use fechner_perception::Plane;
 use fechner_perception::guide::{GuideInputs, denoise as filter};
 use fechner_perception::photometry::luminance;
@@ -20,19 +20,25 @@ const MOST_OVER_MEDIAN: f32 = 16.0;
 /// How far a pixel may outshine the last of them, in standard errors of its neighbourhood.
 const STANDARD_ERRORS: f32 = 1.0;
 
+/// Guides with unit normals.
+pub(super) fn prepare(mut guides: SurfaceGuides) -> SurfaceGuides {
+    guides.normal.par_iter_mut().for_each(|normal| *normal = unit(*normal));
+    guides
+}
+
 /// The picture without its noise.
 pub(super) fn denoise(picture: &NoisyPicture<'_>) -> Vec<[f32; 3]> {
-    let normal: Vec<[f32; 3]> = picture.normal.par_iter().map(|&normal| unit(normal)).collect();
+    let guides = picture.guides.get();
     let variance = smoothed(picture.variance);
     let rgb = without_fireflies(picture, &variance);
     filter(&GuideInputs {
         rgb: &rgb,
         variance: &variance,
-        albedo: picture.albedo,
-        normal: &normal,
-        depth: picture.depth,
-        width: picture.width,
-        height: picture.height,
+        albedo: &guides.albedo,
+        normal: &guides.normal,
+        depth: &guides.depth,
+        width: guides.width,
+        height: guides.height,
     })
 }
 
@@ -52,7 +58,8 @@ fn smoothed(variance: &Plane) -> Plane {
 
 /// The picture with pixels brought down to the [`WITNESSES`]-th brightest of their neighbourhood and a little more.
 fn without_fireflies(picture: &NoisyPicture<'_>, variance: &Plane) -> Vec<[f32; 3]> {
-    let bright = Plane::from_fn(picture.width, picture.height, |x, y| luminance(picture.rgb[y * picture.width + x]));
+    let (width, height) = (variance.width(), variance.height());
+    let bright = Plane::from_fn(width, height, |x, y| luminance(picture.rgb[y * width + x]));
     let limit = by_window(&bright, |window| {
         let place = window.len().saturating_sub(1 + WITNESSES);
         *window.select_nth_unstable_by(place, f32::total_cmp).1
@@ -88,6 +95,7 @@ fn by_window(plane: &Plane, of: impl Fn(&mut [f32]) -> f32 + Sync) -> Plane {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::denoise::Denoiser;
     use crate::sampler::hash_words;
 
     const SIDE: usize = 48;
@@ -107,15 +115,10 @@ mod tests {
                 std::cmp::Ordering::Greater => [0.0, 1.0, 0.0],
             })
             .collect();
-        denoise(&NoisyPicture {
-            width: SIDE,
-            height: SIDE,
-            rgb: &rgb,
-            variance: &Plane::filled(SIDE, SIDE, 400.0),
-            albedo: &vec![[0.5; 3]; SIDE * SIDE],
-            normal: &normal,
-            depth: &vec![1.0; SIDE * SIDE],
-        })
+        let albedo = vec![[0.5; 3]; SIDE * SIDE];
+        let guides = SurfaceGuides { width: SIDE, height: SIDE, albedo, normal, depth: vec![1.0; SIDE * SIDE] };
+        let guides = Denoiser::Builtin.prepare(guides).expect("cannot fail");
+        denoise(&NoisyPicture { rgb: &rgb, variance: &Plane::filled(SIDE, SIDE, 400.0), guides: &guides })
     }
 
     #[test]

@@ -32,23 +32,40 @@ pub enum Denoiser {
     Oidn(Oidn),
 }
 
-/// A noisy picture and what is known of its first surfaces. All slices are row-major with `width * height` entries.
-#[derive(Clone, Copy, Debug)]
-pub struct NoisyPicture<'a> {
+/// What is known of the first surfaces of a picture, row-major with `width * height` entries each.
+#[derive(Clone, Debug)]
+pub struct SurfaceGuides {
     /// Columns.
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// Mean of the samples, linear RGB in cd/m².
+    /// Albedo of the first surface, 0..1.
+    pub albedo: Vec<[f32; 3]>,
+    /// Its normal; 0 where there is none.
+    pub normal: Vec<[f32; 3]>,
+    /// Its distance.
+    pub depth: Vec<f32>,
+}
+
+/// Guides as a denoiser wants them, made by [`Denoiser::prepare`].
+#[derive(Clone, Debug)]
+pub struct PreparedGuides(SurfaceGuides);
+
+impl PreparedGuides {
+    fn get(&self) -> &SurfaceGuides {
+        &self.0
+    }
+}
+
+/// A noisy picture and what guides its denoising.
+#[derive(Clone, Copy, Debug)]
+pub struct NoisyPicture<'a> {
+    /// Mean of the samples, linear RGB in cd/m², row-major.
     pub rgb: &'a [[f32; 3]],
     /// Variance of the mean's luminance, (cd/m²)².
     pub variance: &'a Plane,
-    /// Albedo of the first surface, 0..1.
-    pub albedo: &'a [[f32; 3]],
-    /// Its normal; 0 where there is none.
-    pub normal: &'a [[f32; 3]],
-    /// Its distance.
-    pub depth: &'a [f32],
+    /// Of the same denoiser.
+    pub guides: &'a PreparedGuides,
 }
 
 impl Denoiser {
@@ -77,6 +94,18 @@ impl Denoiser {
             Self::Builtin => "builtin".to_owned(),
             Self::Oidn(oidn) => oidn.name(),
         }
+    }
+
+    /// Makes guides ready, once for all pictures that they guide. Open Image Denoise gets them denoised, each by itself, and is
+    /// told to trust them: worth 0.1 to 0.6 JOD (`benches/README.md`).
+    ///
+    /// # Errors
+    /// [`OidnError::Failed`] where the library fails.
+    pub fn prepare(&self, guides: SurfaceGuides) -> Result<PreparedGuides, OidnError> {
+        Ok(PreparedGuides(match self {
+            Self::Builtin => builtin::prepare(guides),
+            Self::Oidn(oidn) => oidn.denoise_guides(guides)?,
+        }))
     }
 
     /// The picture without its noise, as far as the denoiser can tell noise from detail; finite and not negative.

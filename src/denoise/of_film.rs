@@ -1,6 +1,6 @@
 //! The film's picture and both of its halves, denoised.
 
-use super::{Denoiser, NoisyPicture, OidnError};
+use super::{Denoiser, NoisyPicture, OidnError, SurfaceGuides};
 use crate::film::{Film, HalfPixel};
 use crate::sampler::Half;
 use fechner_perception::Plane;
@@ -20,13 +20,15 @@ pub struct DenoisedFilm {
 /// Where the denoiser fails.
 pub fn denoise_film(denoiser: &Denoiser, film: &Film, nits_per_unit: f64) -> Result<DenoisedFilm, OidnError> {
     let (width, height) = (film.width() as usize, film.height() as usize);
-    let albedo: Vec<[f32; 3]> = film.guides().iter().map(|guide| guide.albedo).collect();
-    let normal: Vec<[f32; 3]> = film.guides().iter().map(|guide| guide.normal).collect();
-    let depth: Vec<f32> = film.guides().iter().map(|guide| guide.depth).collect();
-    let denoised = |rgb: &[[f32; 3]], variance: &Plane| {
-        let guides = NoisyPicture { width, height, rgb, variance, albedo: &albedo, normal: &normal, depth: &depth };
-        denoiser.denoise(&guides)
-    };
+    let guides = denoiser.prepare(SurfaceGuides {
+        width,
+        height,
+        albedo: film.guides().iter().map(|guide| guide.albedo).collect(),
+        normal: film.guides().iter().map(|guide| guide.normal).collect(),
+        depth: film.guides().iter().map(|guide| guide.depth).collect(),
+    })?;
+    let denoised =
+        |rgb: &[[f32; 3]], variance: &Plane| denoiser.denoise(&NoisyPicture { rgb, variance, guides: &guides });
     let estimate = film.estimate(nits_per_unit);
     // What two samples of a half say of their scatter is worth little: beside it stands what the halves differ by.
     let variance = estimate.variance_of_mean.combined(&estimate.half_difference, |own, half| 0.5 * (own + half * half));

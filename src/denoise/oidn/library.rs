@@ -50,13 +50,18 @@ struct Functions {
 // `Oidn` keeps it in a mutex. The function pointers are plain addresses.
 unsafe impl Send for Device {}
 
-/// Row-major pictures of one size: what is denoised, and what is known of the first surfaces.
-pub(super) struct Inputs<'a> {
+/// Columns and rows of a picture, which is row-major.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Size {
     pub(super) width: usize,
     pub(super) height: usize,
-    pub(super) color: &'a [[f32; 3]],
-    pub(super) albedo: &'a [[f32; 3]],
-    pub(super) normal: &'a [[f32; 3]],
+}
+
+/// What is known of the first surfaces, itself noisy where edges, lenses and shutters are sampled.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Guide {
+    Albedo,
+    Normal,
 }
 
 impl Device {
@@ -89,10 +94,37 @@ impl Device {
         unsafe { (self.functions.get_device_int)(self.device, c"version".as_ptr()) }
     }
 
-    /// Denoises a picture of any positive range.
-    pub(super) fn denoise(&self, inputs: &Inputs<'_>) -> Result<Vec<[f32; 3]>, OidnError> {
-        let count = inputs.width * inputs.height;
-        if [inputs.color, inputs.albedo, inputs.normal].iter().any(|picture| picture.len() != count) {
+    /// Denoises a picture of any positive range, guided by what [`Self::denoise_alone`] made of albedo and normal.
+    pub(super) fn denoise(
+        &self,
+        size: Size,
+        color: &[[f32; 3]],
+        albedo: &[[f32; 3]],
+        normal: &[[f32; 3]],
+    ) -> Result<Vec<[f32; 3]>, OidnError> {
+        let images = [(c"color", color), (c"albedo", albedo), (c"normal", normal)];
+        self.run(size, &images, &[c"hdr", c"cleanAux"])
+    }
+
+    /// Denoises a guide by itself.
+    pub(super) fn denoise_alone(
+        &self,
+        guide: Guide,
+        size: Size,
+        values: &[[f32; 3]],
+    ) -> Result<Vec<[f32; 3]>, OidnError> {
+        let name = match guide {
+            Guide::Albedo => c"albedo",
+            Guide::Normal => c"normal",
+        };
+        self.run(size, &[(name, values)], &[])
+    }
+
+    /// Runs the filter `RT` on images by their names in its documentation, with some of its switches on.
+    fn run(&self, size: Size, images: &[(&CStr, &[[f32; 3]])], switches: &[&CStr]) -> Result<Vec<[f32; 3]>, OidnError> {
+        let Size { width, height } = size;
+        let count = width * height;
+        if images.iter().any(|(_, values)| values.len() != count) {
             return Err(OidnError::Failed("pictures of different sizes".to_owned()));
         }
         let mut output = vec![[0.0f32; 3]; count];
@@ -106,13 +138,11 @@ impl Device {
                 return Err(OidnError::Failed("it made no filter".to_owned()));
             }
             let set = |name: &CStr, values: *mut c_void| {
-                (f.set_image)(filter, name.as_ptr(), values, FORMAT_FLOAT3, inputs.width, inputs.height, 0, 0, 0);
+                (f.set_image)(filter, name.as_ptr(), values, FORMAT_FLOAT3, width, height, 0, 0, 0);
             };
-            set(c"color", inputs.color.as_ptr().cast_mut().cast());
-            set(c"albedo", inputs.albedo.as_ptr().cast_mut().cast());
-            set(c"normal", inputs.normal.as_ptr().cast_mut().cast());
+            images.iter().for_each(|(name, values)| set(name, values.as_ptr().cast_mut().cast()));
             set(c"output", output.as_mut_ptr().cast());
-            (f.set_filter_bool)(filter, c"hdr".as_ptr(), true);
+            switches.iter().for_each(|name| (f.set_filter_bool)(filter, name.as_ptr(), true));
             (f.commit_filter)(filter);
             (f.execute_filter)(filter);
             (f.release_filter)(filter);

@@ -6,12 +6,12 @@
 mod find;
 mod library;
 
-use super::NoisyPicture;
+use super::{NoisyPicture, SurfaceGuides};
 use find::{Environment, candidates};
-use library::{Device, Inputs};
+use library::{Device, Guide, Size};
 use std::fmt;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Why Open Image Denoise cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -100,17 +100,26 @@ impl Oidn {
         format!("Open Image Denoise {}", in_words(self.version))
     }
 
+    /// Albedo and normal without the noise of edges, lenses and shutters: guides that [`Self::denoise`] may trust.
+    pub(super) fn denoise_guides(&self, guides: SurfaceGuides) -> Result<SurfaceGuides, OidnError> {
+        let (device, size) = (self.device(), Size { width: guides.width, height: guides.height });
+        Ok(SurfaceGuides {
+            albedo: device.denoise_alone(Guide::Albedo, size, &guides.albedo)?,
+            normal: device.denoise_alone(Guide::Normal, size, &guides.normal)?,
+            ..guides
+        })
+    }
+
     /// Denoises a picture of non-negative radiance, any unit.
     pub(super) fn denoise(&self, picture: &NoisyPicture<'_>) -> Result<Vec<[f32; 3]>, OidnError> {
+        let guides = picture.guides.get();
+        let size = Size { width: guides.width, height: guides.height };
+        self.device().denoise(size, picture.rgb, &guides.albedo, &guides.normal)
+    }
+
+    fn device(&self) -> MutexGuard<'_, Device> {
         // A lock is poisoned by a panic of another thread between two calls; the device is whole.
-        let device = self.device.lock().unwrap_or_else(PoisonError::into_inner);
-        device.denoise(&Inputs {
-            width: picture.width,
-            height: picture.height,
-            color: picture.rgb,
-            albedo: picture.albedo,
-            normal: picture.normal,
-        })
+        self.device.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
