@@ -41,6 +41,8 @@ def load(path, size):
         origin=camera["position"], target=camera["look_at"], up=[0, 1, 0]
     )
     film = {"type": "hdrfilm", "width": size, "height": size, "pixel_format": "rgb", "component_format": "float32"}
+    # Any wider filter shares noise between pixels, which the denoiser takes for detail.
+    film["rfilter"] = {"type": "box"}
     made = {
         "type": "scene",
         "integrator": {"type": "aov", "aovs": "albedo:albedo,normal:sh_normal", "path": {"type": "path"}},
@@ -81,7 +83,8 @@ def render(scene, samples, seed):
 def denoised(layers):
     started = time.perf_counter()
     color, albedo, normal = layers
-    picture = pyoidn.denoise(color, albedo=albedo, normal=normal, hdr=True)
+    # Its guides have noise at edges alone: to trust them is worth 0.1 to 0.3 JOD, as it is for ours.
+    picture = pyoidn.denoise(color, albedo=albedo, normal=normal, hdr=True, clean_aux=True)
     return np.asarray(picture), time.perf_counter() - started
 
 
