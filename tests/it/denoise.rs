@@ -113,7 +113,8 @@ fn open_image_denoise_removes_noise_and_repeats_itself() {
     let first = denoised(&one);
     let squares = first.iter().zip(&albedo).map(|(rgb, albedo)| (rgb[1] - 100.0 * albedo).powi(2));
     let deviation = (squares.sum::<f32>() / first.len() as f32).sqrt();
-    assert!(deviation < 2.5, "{deviation} of 17, and bricks 10 to each side of their mean");
+    // 1.4 where the library takes the guides for noisy, 0.8 where it trusts them.
+    assert!(deviation < 1.1, "{deviation} of 17, and bricks 10 to each side of their mean");
     assert_eq!(first, denoised(&one), "the same on one thread");
     assert_eq!(first, denoised(&Oidn::open(2).expect("opens again")), "the same on two");
 }
