@@ -19,6 +19,7 @@ pub mod statistics;
 mod stop;
 #[cfg(test)]
 mod test_films;
+mod until_look;
 
 pub use monitor::{Directive, Monitor, Progress, Quiet};
 pub use stop::{StopReason, TOLERATED_SHARE, is_reached, visible_share};
@@ -120,6 +121,14 @@ struct Loop<'a> {
     state: RenderState,
     resumed_at: Instant,
     seconds_before: f64,
+    looked: Option<Looked>,
+}
+
+/// The last look of this run.
+#[derive(Clone, Copy, Debug)]
+struct Looked {
+    at_samples: u64,
+    seconds: f64,
 }
 
 /// Renders until a limit is reached.
@@ -171,6 +180,17 @@ pub fn run(
             Traced::UntilLimit(reason) => Some(reason),
             Traced::UntilLeft => return Ok(Ended { state: render.state, last_look: None }),
         };
+        if ended.is_none() {
+            match render.plan_between_looks() {
+                Ok(None) => {}
+                Ok(Some(plan)) => {
+                    render.enter(plan);
+                    continue;
+                }
+                Err(JudgeError::Outdated) => return Ok(Ended { state: render.state, last_look: None }),
+                Err(error) => return Err(error),
+            }
+        }
         let look = Instant::now();
         let (judgement, step) = match render.look_and_decide(last_look.take(), ended) {
             Err(JudgeError::Outdated) => return Ok(Ended { state: render.state, last_look: None }),
@@ -204,6 +224,11 @@ pub fn decide(
     monitor: &dyn Monitor,
 ) -> Result<Next, JudgeError> {
     let mut render = Loop::new(tracer, settings, state);
+    if let Some(plan) = render.plan_between_looks()? {
+        render.enter(plan);
+        render.state.seconds_total = render.seconds();
+        return Ok(Next::Planned(Box::new(render.state)));
+    }
     let look = Instant::now();
     let mut judgement = render.look()?;
     let step = render.next_step(&mut judgement)?;
@@ -224,7 +249,7 @@ impl<'a> Loop<'a> {
         let is_walked = |&rung: &f64| settings.denoiser.is_none() || rung <= HIGHEST_DENOISED_RUNG.max(target);
         let rungs = ladder(target).into_iter().filter(is_left).filter(is_walked).collect();
         let seconds_before = state.seconds_total;
-        Self { tracer, settings, rungs, state, resumed_at: Instant::now(), seconds_before }
+        Self { tracer, settings, rungs, state, resumed_at: Instant::now(), seconds_before, looked: None }
     }
 
     /// Tells what was seen and enters the plan that came of it, or says why there is none.
@@ -235,13 +260,17 @@ impl<'a> Loop<'a> {
         monitor.judged(&self.state, judgement);
         match step {
             Step::Trace(plan) => {
-                let film = &self.state.film;
-                self.state.pending.extend(slices(plan, film.width(), film.total_samples()));
+                self.enter(plan);
                 self.state.tone = Some(judgement.tone.save());
                 None
             }
             Step::Stop(reason) => Some(reason),
         }
+    }
+
+    fn enter(&mut self, plan: SamplePlan) {
+        let film = &self.state.film;
+        self.state.pending.extend(slices(plan, film.width(), film.total_samples()));
     }
 
     fn seconds(&self) -> f64 {
@@ -250,8 +279,11 @@ impl<'a> Loop<'a> {
 
     /// Looks at the film.
     fn look(&mut self) -> Result<Judgement, JudgeError> {
+        let started = Instant::now();
         let judgement = judge(&self.state.film, self.settings, self.state.inflation)?;
         self.state.seconds_denoising += judgement.seconds_denoising;
+        let at_samples = self.state.film.total_samples();
+        self.looked = Some(Looked { at_samples, seconds: started.elapsed().as_secs_f64() });
         Ok(judgement)
     }
 
@@ -262,7 +294,7 @@ impl<'a> Loop<'a> {
         ended: Option<StopReason>,
     ) -> Result<(Judgement, Step), JudgeError> {
         let mut judgement = match earlier {
-            Some(earlier) if ended.is_none() && self.exposure_holds() => earlier,
+            Some(earlier) if self.is_looked_at() || ended.is_none() && self.exposure_holds() => earlier,
             _ => self.look()?,
         };
         let step = match ended {
@@ -299,8 +331,13 @@ impl<'a> Loop<'a> {
         }
     }
 
-    /// Limits that do not depend on the picture: a render ends at the boundary between plans that is nearest to its limit
-    /// of time. The pilot is always traced.
+    /// Whether nothing was traced since the last look.
+    fn is_looked_at(&self) -> bool {
+        self.looked.is_some_and(|looked| looked.at_samples == self.state.film.total_samples())
+    }
+
+    /// Limits that do not depend on the picture: a render ends at the boundary between plans from which it is done, with a
+    /// last look, nearest to its limit of time. The pilot is always traced.
     fn limit_reached(&self) -> Option<StopReason> {
         let RenderState { film, pending, plans, .. } = &self.state;
         if *plans == 0 {
@@ -308,10 +345,13 @@ impl<'a> Loop<'a> {
         }
         let traced = film.total_samples().max(1);
         let elapsed = self.seconds();
-        let next = pending.front().map_or(0, SamplePlan::samples);
-        let middle_of_next = elapsed * (1.0 + 0.5 * next as f64 / traced as f64);
+        let seconds_per_sample = (elapsed - self.state.seconds_perception).max(0.0) / traced as f64;
+        let next = pending.front().map_or(0, SamplePlan::samples) as f64 * seconds_per_sample;
+        let look = self.looked.map_or(0.0, |looked| looked.seconds);
+        let done_now = elapsed + if self.is_looked_at() { 0.0 } else { look };
+        let done_after_next = elapsed + next + look;
         let limits = &self.settings.limits;
-        if limits.time.is_some_and(|limit| middle_of_next >= limit.as_secs_f64()) {
+        if limits.time.is_some_and(|limit| 0.5 * (done_now + done_after_next) >= limit.as_secs_f64()) {
             Some(StopReason::Time)
         } else if limits.plans.is_some_and(|limit| *plans >= limit) {
             Some(StopReason::Plans)
@@ -323,8 +363,8 @@ impl<'a> Loop<'a> {
     /// Tells the last state, and looks once more where the rule did not need to.
     fn finish(mut self, judgement: Judgement, reason: StopReason, monitor: &dyn Monitor) -> Result<Ended, JudgeError> {
         let judgement = match self.settings.sampling {
-            Sampling::Rival(_) => self.look()?,
-            Sampling::Adaptive | Sampling::Uniform => judgement,
+            Sampling::Rival(_) if !self.is_looked_at() => self.look()?,
+            _ => judgement,
         };
         self.state.seconds_total = self.seconds();
         self.state.tone = Some(judgement.tone.save());

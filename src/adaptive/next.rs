@@ -2,14 +2,14 @@
 //! pixel stands out, and an audit agrees.
 
 use super::audit::{Audit, audit, audit_unproven};
-use super::denoised::denoised_plan;
 use super::forecast::Forecast;
-use super::judge::{JudgeError, Judgement, still_wanted};
+use super::judge::{JudgeError, Judgement, judge_raw, still_wanted};
 use super::plan::{adaptive_plan, cut_to_budget, doubling_of, uniform_plan, wanted_samples};
 use super::rivals::rival_plan;
 use super::settings::{LoopSettings, Sampling};
 use super::state::Exposure;
 use super::stop::{LEAST_SAVING, predicted_saving};
+use super::until_look::UntilLook;
 use super::{Loop, Step, StopReason, is_reached};
 use crate::integrator::SamplePlan;
 use std::time::Instant;
@@ -26,9 +26,7 @@ impl Loop<'_> {
     /// Decides what comes next, leaving rungs of the ladder that are reached. An audit may make `judgement` stricter.
     pub(super) fn next_step(&mut self, judgement: &mut Judgement) -> Result<Step, JudgeError> {
         let limits = &self.settings.limits;
-        let pixels = u64::from(self.state.film.width()) * u64::from(self.state.film.height());
-        let budget = limits.mean_samples.map(|mean| u64::from(mean) * pixels);
-        let left = budget.map_or(u64::MAX, |b| b.saturating_sub(self.state.film.total_samples()));
+        let left = self.left_of_budget();
         if left == 0 {
             return Ok(Step::Stop(StopReason::Samples));
         }
@@ -38,11 +36,10 @@ impl Loop<'_> {
             return Ok(if plan.blocks.is_empty() { Step::Stop(StopReason::Rule) } else { Step::Trace(plan) });
         }
         while let Some(&rung) = self.rungs.front() {
-            if let Some(plan) = self.plan_towards(rung, judgement, left)? {
-                let plan = if plan.samples() > left { cut_to_budget(plan, &judgement.predicted, left) } else { plan };
-                if !plan.blocks.is_empty() {
-                    return Ok(Step::Trace(plan));
-                }
+            if let Some(plan) = self.plan_towards(rung, judgement, left)?
+                && let Some(plan) = some(cut(plan, judgement, left))
+            {
+                return Ok(Step::Trace(plan));
             }
             self.rungs.pop_front();
             self.state.left_rung = Some(rung);
@@ -59,6 +56,44 @@ impl Loop<'_> {
         }))
     }
 
+    /// Between two looks at a picture that is denoised: more samples by raw noise alone, `None` when it is time for a look.
+    pub(super) fn plan_between_looks(&mut self) -> Result<Option<SamplePlan>, JudgeError> {
+        let left = self.left_of_budget();
+        if self.settings.denoiser.is_none() || matches!(self.settings.sampling, Sampling::Rival(_)) || left == 0 {
+            return Ok(None);
+        }
+        let started = Instant::now();
+        let (film, doubled) = (&self.state.film, self.doubled());
+        let until_look = self.state.until_look.get_or_insert_with(|| UntilLook::first(film));
+        if until_look.is_over(film) {
+            return Ok(None);
+        }
+        let plan = if self.settings.sampling == Sampling::Uniform {
+            uniform_plan(film, doubled)
+        } else {
+            let raw = judge_raw(film, self.settings)?;
+            cut(until_look.plan(film, &raw, self.settings.limits.max_samples, left), &raw, left)
+        };
+        self.state.seconds_perception += started.elapsed().as_secs_f64();
+        Ok(some(plan))
+    }
+
+    /// Samples that the budget has left, of all pixels.
+    fn left_of_budget(&self) -> u64 {
+        let film = &self.state.film;
+        let pixels = u64::from(film.width()) * u64::from(film.height());
+        let budget = self.settings.limits.mean_samples.map(|mean| u64::from(mean) * pixels);
+        budget.map_or(u64::MAX, |budget| budget.saturating_sub(film.total_samples()))
+    }
+
+    /// Samples of each pixel after the next plan of uniform sampling.
+    fn doubled(&self) -> u32 {
+        let (film, limits) = (&self.state.film, &self.settings.limits);
+        let most = limits.mean_samples.unwrap_or(limits.max_samples).min(limits.max_samples);
+        let pixels = u64::from(film.width()) * u64::from(film.height());
+        (2 * (film.total_samples() / pixels).max(u64::from(limits.pilot_samples) / 2) as u32).min(most)
+    }
+
     /// More samples for a rung; `None` when it is reached or no pixel may have more. `left`: of the budget.
     fn plan_towards(
         &mut self,
@@ -66,24 +101,12 @@ impl Loop<'_> {
         judgement: &mut Judgement,
         left: u64,
     ) -> Result<Option<SamplePlan>, JudgeError> {
-        let max_samples = self.settings.limits.max_samples;
-        let doubled = {
-            let most = self.settings.limits.mean_samples.unwrap_or(max_samples).min(max_samples);
-            let pixels = u64::from(self.state.film.width()) * u64::from(self.state.film.height());
-            (2 * (self.state.film.total_samples() / pixels).max(u64::from(self.settings.limits.pilot_samples) / 2)
-                as u32)
-                .min(most)
-        };
-        let some = |plan: SamplePlan| if plan.blocks.is_empty() { None } else { Some(plan) };
-        if self.settings.sampling == Sampling::Uniform {
-            return Ok(if is_reached(judgement, rung) { None } else { some(uniform_plan(&self.state.film, doubled)) });
-        }
         if !is_reached(judgement, rung) {
             still_wanted(self.settings)?;
-            return Ok(some(match &judgement.denoised {
-                Some(_) => denoised_plan(&self.state.film, judgement, rung, max_samples, left),
-                None => self.cheapest(rung, judgement)?.unwrap_or_else(|| uniform_plan(&self.state.film, doubled)),
-            }));
+            return Ok(some(self.unreached(rung, judgement, left)?));
+        }
+        if self.settings.sampling == Sampling::Uniform {
+            return Ok(None);
         }
         if rung > HIGHEST_AUDITED_RUNG {
             return Ok(None);
@@ -93,6 +116,21 @@ impl Loop<'_> {
             return Ok(Some(plan));
         }
         Ok(self.audited(rung, judgement, left)?.and_then(some))
+    }
+
+    /// More samples for a rung that is not reached.
+    fn unreached(&mut self, rung: f64, judgement: &Judgement, left: u64) -> Result<SamplePlan, JudgeError> {
+        let (film, max_samples) = (&self.state.film, self.settings.limits.max_samples);
+        let until_look = judgement.denoised.is_some().then(|| UntilLook::after(film, judgement, rung));
+        let plan = match (&until_look, self.settings.sampling) {
+            (_, Sampling::Uniform) => uniform_plan(film, self.doubled()),
+            (Some(until_look), _) => until_look.plan(film, judgement, max_samples, left),
+            (None, _) => {
+                self.cheapest(rung, judgement)?.unwrap_or_else(|| uniform_plan(&self.state.film, self.doubled()))
+            }
+        };
+        self.state.until_look = until_look;
+        Ok(plan)
     }
 
     /// What the cheapest counts that reach a rung add to those that are there; `None` where even counts cost hardly more.
@@ -156,6 +194,15 @@ impl Loop<'_> {
         let samples = self.state.film.total_samples();
         self.state.exposure.is_some_and(|exposure| samples < 2 * exposure.samples)
     }
+}
+
+fn some(plan: SamplePlan) -> Option<SamplePlan> {
+    if plan.blocks.is_empty() { None } else { Some(plan) }
+}
+
+/// Cut to what is left of the budget: where most is to be seen first.
+fn cut(plan: SamplePlan, judgement: &Judgement, left: u64) -> SamplePlan {
+    if plan.samples() > left { cut_to_budget(plan, &judgement.predicted, left) } else { plan }
 }
 
 /// Share of display white that one scene unit makes near black: the exposure that other renderers are told.

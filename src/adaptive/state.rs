@@ -3,6 +3,7 @@
 use super::audit::Audit;
 use super::plan::pilot_plan;
 use super::settings::Limits;
+pub use super::until_look::UntilLook;
 use crate::film::Film;
 use crate::integrator::{BlockWork, SamplePlan};
 use fechner_perception::tone::SavedTone;
@@ -30,6 +31,8 @@ pub struct RenderState {
     pub audits: u32,
     /// What a rule without sight was told.
     pub exposure: Option<Exposure>,
+    /// Of a picture that is denoised: what comes before the next look at it.
+    pub until_look: Option<UntilLook>,
     /// Plans traced.
     pub plans: u32,
     /// Looks taken.
@@ -93,6 +96,7 @@ impl RenderState {
             audit: None,
             audits: 0,
             exposure: None,
+            until_look: None,
             plans: 0,
             passes: 0,
             seconds_total: 0.0,

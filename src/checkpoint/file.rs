@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 static FILM: Kind = Kind {
     magic: *b"fech film\r\n\x1a",
-    version: 3,
+    version: 4,
     what: "a film's file, such as fechner render --checkpoint FILE writes",
     remedy: "take another copy of it, or render anew",
 };
@@ -93,7 +93,8 @@ impl Checkpoint {
         }
         let is_rung = |visibility: f64| visibility >= 0.0;
         let exposure = state.exposure.map_or(0.0, |exposure| exposure.scene_unit_over_white);
-        let seconds = [state.seconds_total, state.seconds_perception, state.seconds_allocation];
+        let seconds =
+            [state.seconds_total, state.seconds_perception, state.seconds_allocation, state.seconds_denoising];
         if !is_rung(header.visibility)
             || !state.finished_rung.is_none_or(is_rung)
             || !state.left_rung.is_none_or(is_rung)
@@ -106,6 +107,7 @@ impl Checkpoint {
         let pixels = state.film.width() * state.film.height();
         if state.traced_blocks > state.pending.front().map_or(0, |plan| plan.blocks.len())
             || !state.pending.iter().flat_map(|plan| &plan.blocks).all(|block| block.is_sound(pixels))
+            || !state.until_look.as_ref().is_none_or(|until_look| until_look.is_sound(pixels))
         {
             return Err("its plans make no sense");
         }

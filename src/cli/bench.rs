@@ -9,7 +9,7 @@ use fechner::benchmark::{
     AnimationRow, AnimationSettings, Arm, BenchSettings, DenoisingSettings, Race, animation, bounds, denoising,
     run as run_bench,
 };
-use fechner::denoise::DenoiserKind;
+use fechner::denoise::{Denoiser, DenoiserKind};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `bench`.
@@ -241,7 +241,7 @@ fn run_animation(arguments: &BenchArguments, denoiser: Option<DenoiserKind>) -> 
     };
     let rows = animation(&settings, &|line: &str| eprintln!("{line}"))?;
     if let Some(denoiser) = denoiser {
-        println!("All but the references denoised ({denoiser:?}):\n");
+        println!("All but the references denoised by {}:\n", Denoiser::open(denoiser)?.name());
     }
     println!(
         "| shot | frames a second | motion: spp, JOD | still: spp, JOD | still / motion | even, as good: spp | even / motion | \

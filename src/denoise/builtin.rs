@@ -116,7 +116,8 @@ mod tests {
             })
             .collect();
         let albedo = vec![[0.5; 3]; SIDE * SIDE];
-        let guides = SurfaceGuides { width: SIDE, height: SIDE, albedo, normal, depth: vec![1.0; SIDE * SIDE] };
+        let guides =
+            SurfaceGuides { width: SIDE, height: SIDE, albedo, normal, depth: vec![1.0; SIDE * SIDE], samples: 16.0 };
         let guides = Denoiser::Builtin.prepare(guides).expect("cannot fail");
         denoise(&NoisyPicture { rgb: &rgb, variance: &Plane::filled(SIDE, SIDE, 400.0), guides: &guides })
     }

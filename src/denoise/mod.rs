@@ -45,6 +45,8 @@ pub struct SurfaceGuides {
     pub normal: Vec<[f32; 3]>,
     /// Its distance.
     pub depth: Vec<f32>,
+    /// Samples that each is the mean of, on average.
+    pub samples: f64,
 }
 
 /// Guides as a denoiser wants them, made by [`Denoiser::prepare`].
@@ -96,15 +98,15 @@ impl Denoiser {
         }
     }
 
-    /// Makes guides ready, once for all pictures that they guide. Open Image Denoise gets them denoised, each by itself, and is
-    /// told to trust them: worth 0.1 to 0.6 JOD (`benches/README.md`).
+    /// Makes guides ready, once for all pictures that they guide. Open Image Denoise is told to trust them, and while they are the
+    /// mean of few samples gets them denoised, each by itself: worth up to 0.6 JOD (`benches/README.md`).
     ///
     /// # Errors
     /// [`OidnError::Failed`] where the library fails.
     pub fn prepare(&self, guides: SurfaceGuides) -> Result<PreparedGuides, OidnError> {
         Ok(PreparedGuides(match self {
             Self::Builtin => builtin::prepare(guides),
-            Self::Oidn(oidn) => oidn.denoise_guides(guides)?,
+            Self::Oidn(oidn) => oidn.prepare(guides)?,
         }))
     }
 

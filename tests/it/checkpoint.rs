@@ -1,13 +1,14 @@
 //! Renders that were stopped, killed, continued and merged, against renders in one go.
 
 use crate::support::{loop_settings, trace_settings};
-use fechner::adaptive::settings::{LoopSettings, RivalRule, Sampling};
+use fechner::adaptive::settings::{Limits, LoopSettings, RivalRule, Sampling};
 use fechner::adaptive::state::RenderState;
-use fechner::adaptive::{Directive, Monitor, Progress, Quiet, Rendered, StopReason, render, resume};
+use fechner::adaptive::{Directive, Monitor, Progress, Quiet, Rendered, StopReason, render, resume, run};
 use fechner::checkpoint::{
     Checkpoint, Header, Origin, Seeds, SettingsRecord, decode_checkpoint, merge_files, read_checkpoint, seal,
     write_checkpoint,
 };
+use fechner::denoise::Denoiser;
 use fechner::film::Film;
 use fechner::integrator::{PathTracer, SamplePlan};
 use fechner::sampler::Half;
@@ -311,6 +312,29 @@ fn damaged_files_are_refused() {
     println!("{refused} of {} changes under a fitting checksum are refused", 5 * payload.len());
 }
 
+/// What is to come before the next look at a denoised picture comes back from a file; that of a picture of another size is refused.
+#[test]
+fn what_a_look_decided_belongs_to_its_picture() {
+    let setup = Setup::new(1);
+    let after_a_look = |size: u32| {
+        let settings = setup.settings(Sampling::Adaptive, 1.0);
+        let limits = Limits { plans: Some(2), ..settings.limits };
+        let settings = LoopSettings { denoiser: Some(Denoiser::Builtin), limits, ..settings };
+        let tracer = PathTracer::new(Arc::new(cornell_box()), trace_settings(size, size, 1));
+        let state = RenderState::new(size, size, &settings.limits);
+        run(&tracer, &settings, state, &Quiet).expect("renders").state
+    };
+    let (state, smaller) = (after_a_look(SIZE), after_a_look(8));
+    assert!(state.until_look.is_some());
+    setup.through_a_file(&state);
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.film");
+    let mixed = RenderState { until_look: smaller.until_look, ..state };
+    write_checkpoint(&path, &setup.header, &mixed).expect("written");
+    let message = read_checkpoint(&path).expect_err("of another picture").to_string();
+    assert!(message.contains("plans make no sense"), "{message}");
+}
+
 #[test]
 fn foreign_files_and_versions_are_named() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -324,7 +348,7 @@ fn foreign_files_and_versions_are_named() {
     assert!(message(b"\x76\x2f\x31\x01 an EXR file, say").contains("not a film's file"));
     let mut later = sound.clone();
     later[12] += 1;
-    assert!(message(&later).contains("version 3"), "{}", message(&later));
+    assert!(message(&later).contains("version 4"), "{}", message(&later));
     assert!(message(&sound[..sound.len() / 2]).contains("damaged"));
     assert!(read_checkpoint(folder.path()).expect_err("a folder").to_string().contains("folder"));
 }

@@ -119,21 +119,20 @@ def render(folder, samples, seed=1, seconds=0.0, is_adaptive=True, is_denoised=T
 
 
 def main():
-    is_unbiased, words = "--unbiased" in sys.argv, [word for word in sys.argv[1:] if word != "--unbiased"]
-    path, size, reference_spp, folder, *times = words
-    size, reference_spp = int(size), int(reference_spp)
-    load(path, size, is_unbiased)
+    arguments = [word for word in sys.argv[1:] if word != "--unbiased"]
+    path, size, reference_spp, folder, *times = arguments
+    load(path, int(size), is_unbiased="--unbiased" in sys.argv)
     # Another seed: of the same one, the pictures' samples would be among the reference's.
-    picture, _ = render(folder, reference_spp, seed=REFERENCE_SEED, is_adaptive=False, is_denoised=False)
+    picture, _ = render(folder, int(reference_spp), seed=REFERENCE_SEED, is_adaptive=False, is_denoised=False)
     np.save(f"{folder}/reference.npy", picture)
     render(folder, 1)
     least = lambda **options: min(render(folder, 1, **options)[1] for _ in range(3))
     around = least(is_denoised=False)
     denoising = max(0.0, least() - around)
-    for words in times:
-        picture, taken = render(folder, 1 << 14, seconds=max(0.1, float(words) - denoising))
-        np.save(f"{folder}/{words}.npy", picture)
-        print("JSON", json.dumps({"asked": words, "seconds": taken - around, "spp": None}), flush=True)
+    for asked in times:
+        picture, taken = render(folder, 1 << 14, seconds=max(0.1, float(asked) - denoising))
+        np.save(f"{folder}/{asked}.npy", picture)
+        print("JSON", json.dumps({"asked": asked, "seconds": taken - around, "spp": None}), flush=True)
 
 
 main()

@@ -9,7 +9,8 @@ the other; loading, trees and compiling are not counted, denoising is.
     python3 -m venv venv && venv/bin/pip install cvvdp OpenEXR numpy
     OIDN_DIR=... MITSUBA_PYTHON=... CYCLES_PYTHON=... venv/bin/python benches/peers/denoised/equal_time.py [SIZE SPP SECONDS...]
 
-MITSUBA_PYTHON has mitsuba and pyoidn, CYCLES_PYTHON has bpy (their numpy versions do not go together).
+MITSUBA_PYTHON has mitsuba and pyoidn, CYCLES_PYTHON has bpy (their numpy versions do not go together). Mitsuba 3.9 needs an
+LLVM newer than 16: `apt install libllvm19`, and DRJIT_LIBLLVM_PATH where an older one is found first.
 """
 
 import json

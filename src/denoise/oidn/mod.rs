@@ -40,6 +40,10 @@ fn tried(problems: &[String]) -> String {
     problems.iter().map(|problem| format!("\n  tried {problem}")).collect()
 }
 
+/// Guides of as many samples are trusted as they are: to denoise them costs half as much again as picture and halves do, and is
+/// worth 0.011 JOD where a shutter is open, 0.002 and 0.004 elsewhere (`benches/README.md`).
+const CLEAN_ENOUGH_SAMPLES: f64 = 16.0;
+
 /// The library, opened.
 #[derive(Clone)]
 pub struct Oidn {
@@ -100,8 +104,12 @@ impl Oidn {
         format!("Open Image Denoise {}", in_words(self.version))
     }
 
-    /// Albedo and normal without the noise of edges, lenses and shutters: guides that [`Self::denoise`] may trust.
-    pub(super) fn denoise_guides(&self, guides: SurfaceGuides) -> Result<SurfaceGuides, OidnError> {
+    /// Albedo and normal without the noise of edges, lenses and shutters, as far as that matters: guides that [`Self::denoise`] may
+    /// trust.
+    pub(super) fn prepare(&self, guides: SurfaceGuides) -> Result<SurfaceGuides, OidnError> {
+        if guides.samples >= CLEAN_ENOUGH_SAMPLES {
+            return Ok(guides);
+        }
         let (device, size) = (self.device(), Size { width: guides.width, height: guides.height });
         Ok(SurfaceGuides {
             albedo: device.denoise_alone(Guide::Albedo, size, &guides.albedo)?,

@@ -1,0 +1,252 @@
+//! Where a picture that is denoised gets samples between one look at it and the next.
+//!
+//! A look says whose noise shows; how much each pixel gets is decided, as samples come, by raw noise, which costs a tenth of a
+//! look to know. Not for pictures that stay raw: these have `plan`.
+
+use super::judge::Judgement;
+use super::plan::{doubling_plan, plan_up_to};
+use super::stop::TOLERATED_SHARE;
+use crate::film::Film;
+use crate::integrator::SamplePlan;
+use serde::{Deserialize, Serialize};
+
+/// Even counts are kept where the best ones would take more than this share of their samples.
+const EVEN_ENOUGH: f64 = 0.95;
+/// A plan adds this share of what is there. More, as far as the visibility is from the rung, was no gain (`benches/README.md`).
+const GROWTH: f64 = 0.5;
+/// Samples for every pixel that a plan adds at least, while its pixels may have so many: variances of four samples are not worth
+/// being asked more often.
+const LEAST_PLAN: f64 = 6.0;
+/// What a look at a denoised picture costs, in samples for every pixel, about: 5 to 15 with Open Image Denoise, 2 to 4 with the
+/// built-in filter (`benches/README.md`). Before the first look too it is better spent on more of them.
+const SAMPLES_OF_A_LOOK: f64 = 10.0;
+/// Most that comes between two looks, as a share of what is there.
+const MOST_GROWTH: f64 = 3.0;
+/// Doublings of a pixel in one plan.
+const MOST_DOUBLINGS: u32 = 2;
+/// What is in a pixel's window above the visibility asked for, as a share of what is in the window that has most, from which on
+/// its noise counts.
+const LEAST_BLAME: f32 = 0.1;
+/// No pixel's noise counts as more than so many times the picture's mean: variances of few samples are not worth more trust.
+const MOST_TIMES_MEAN: f64 = 16.0;
+
+/// What a look at a denoised picture decides until the next one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct UntilLook {
+    /// Pixels whose noise makes that something shows.
+    to_blame: Vec<bool>,
+    /// Samples of all pixels at which the next look is due.
+    samples: u64,
+}
+
+impl UntilLook {
+    /// Before the first look.
+    pub(super) fn first(film: &Film) -> Self {
+        let pixels = (film.width() * film.height()) as usize;
+        Self { to_blame: vec![true; pixels], samples: (SAMPLES_OF_A_LOOK * pixels as f64) as u64 }
+    }
+
+    /// After a look, while some of the picture is above `visibility`: until that may be reached, if errors fell as 1/n (measured
+    /// are 1/n^0.35 to 1/n^0.9), and at least until as many samples are traced as a look costs.
+    pub(super) fn after(film: &Film, judgement: &Judgement, visibility: f64) -> Self {
+        let to_blame = to_blame(judgement, visibility);
+        let present: f64 = wanted(&to_blame).map(|pixel| f64::from(film.samples(pixel))).sum();
+        let growth = judgement.predicted.quantile(1.0 - TOLERATED_SHARE) / visibility - 1.0;
+        let least = SAMPLES_OF_A_LOOK * to_blame.len() as f64;
+        // The order of `max` turns NaN, of 0 / 0, into the least.
+        let added = (growth.max(GROWTH) * present).max(least).min(MOST_GROWTH * present);
+        Self { to_blame, samples: film.total_samples() + added as u64 }
+    }
+
+    /// Whether it is of a picture of so many pixels.
+    pub(crate) fn is_sound(&self, pixels: u32) -> bool {
+        self.to_blame.len() == pixels as usize
+    }
+
+    /// Whether the next look is due. A sample a pixel is not worth another plan.
+    pub(super) fn is_over(&self, film: &Film) -> bool {
+        film.total_samples() + self.to_blame.len() as u64 > self.samples
+    }
+
+    /// More samples for those to blame; at most `left` in all. `judgement` may be of the raw picture.
+    ///
+    /// What raw noise would show at a pixel decides, not what is left of it: that is pooled over a degree and tells no noisy pixel
+    /// from its neighbours. Counts go as the root of that energy plus the picture's mean. Without the mean, noisy pixels starve the
+    /// rest: a dark room denoised by Open Image Denoise had JOD 9.52 at 256 samples a pixel where even counts have 9.74, with it 9.74;
+    /// at 32 samples 9.50 and 9.55, even 9.44 (`benches/README.md`).
+    pub(super) fn plan(&self, film: &Film, judgement: &Judgement, max_samples: u32, left: u64) -> SamplePlan {
+        let raw = judgement.energy_of(&judgement.pooled_variance_per_sample);
+        let left = left.min(self.samples.saturating_sub(film.total_samples()));
+        plan_by_energy(film, &defended(raw.values()), &self.to_blame, max_samples, left)
+    }
+}
+
+/// Which pixels' noise makes that some are above a visibility: these and those in whose window some are, and not just these, whose
+/// own noise may be the least of it. Sampled alone, 1.3 % of `turntable` (64×36, Open Image Denoise) had 16384 samples and stayed
+/// above 2.
+fn to_blame(judgement: &Judgement, visibility: f64) -> Vec<bool> {
+    let above = judgement.predicted.map(|predicted| f32::from(f64::from(predicted) > visibility));
+    let shares = judgement.thresholds.pooled(&above);
+    let most = shares.values().iter().fold(0.0, |a: f32, &share| a.max(share));
+    let is_to_blame = |(&above, &share): (&f32, &f32)| above > 0.0 || share > LEAST_BLAME * most;
+    above.values().iter().zip(shares.values()).map(is_to_blame).collect()
+}
+
+/// Energies with their mean added, and none much above it.
+fn defended(energies: &[f32]) -> Vec<f64> {
+    let energies = || energies.iter().map(|&energy| f64::from(energy));
+    let mean = energies().filter(|energy| energy.is_finite()).sum::<f64>() / energies().len().max(1) as f64;
+    // The order of `min` turns NaN into the most.
+    energies().map(|energy| energy.min(MOST_TIMES_MEAN * mean) + mean).collect()
+}
+
+/// Pixels that a plan is for: those to blame, or all where that is most of them.
+fn wanted(to_blame: &[bool]) -> impl Iterator<Item = usize> {
+    let is_for_all = is_for_all(to_blame);
+    (0..to_blame.len()).filter(move |&pixel| is_for_all || to_blame[pixel])
+}
+
+fn is_for_all(to_blame: &[bool]) -> bool {
+    2 * to_blame.iter().filter(|&&is_to_blame| is_to_blame).count() > to_blame.len()
+}
+
+/// Doublings, again and again for the half of the pixels where one more sample takes away most of e/n, until the plan is large
+/// enough; among those to blame alone when they are few. As many for all where other than even counts would hardly be better.
+fn plan_by_energy(film: &Film, energies: &[f64], to_blame: &[bool], max_samples: u32, left: u64) -> SamplePlan {
+    let pixels = energies.len();
+    let present: f64 = wanted(to_blame).map(|pixel| f64::from(film.samples(pixel))).sum();
+    let enough = (GROWTH * present).max(LEAST_PLAN * pixels as f64).min(left as f64);
+    if is_for_all(to_blame) && share_of_even(energies) > EVEN_ENOUGH {
+        let mean_samples = ((present + enough) / pixels as f64).round() as u32;
+        return plan_up_to(film, |_| mean_samples.min(max_samples));
+    }
+    let mut doublings = vec![0; pixels];
+    let mut added = 0.0;
+    while added < enough {
+        let count = |pixel: usize| f64::from(film.samples(pixel).max(1) << doublings[pixel]);
+        let may_double = |pixel: usize| doublings[pixel] < MOST_DOUBLINGS && count(pixel) < f64::from(max_samples);
+        let gain = |pixel: usize| if may_double(pixel) { energies[pixel] / count(pixel).powi(2) } else { 0.0 };
+        let mut gains: Vec<f64> = wanted(to_blame).map(gain).filter(|&gain| gain > 0.0).collect();
+        if gains.is_empty() {
+            break;
+        }
+        let middle = gains.len() / 2;
+        let (_, &mut median, _) = gains.select_nth_unstable_by(middle, f64::total_cmp);
+        let doubled: Vec<usize> = wanted(to_blame).filter(|&pixel| gain(pixel) >= median).collect();
+        added += doubled.iter().map(|&pixel| count(pixel)).sum::<f64>();
+        doubled.into_iter().for_each(|pixel| doublings[pixel] += 1);
+    }
+    doubling_plan(film, max_samples, |pixel| [doublings[pixel]; 2])
+}
+
+/// Samples that the best counts would need for the energy that even counts leave, as a share of theirs: the sum of e/n is smallest
+/// where n goes as √e, so (mean √e)² / mean e (Cauchy and Schwarz: at most 1).
+fn share_of_even(energies: &[f64]) -> f64 {
+    let root: f64 = energies.iter().map(|energy| energy.sqrt()).sum();
+    let sum: f64 = energies.iter().sum();
+    if sum > 0.0 { root * root / (sum * energies.len() as f64) } else { 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::judge::judge;
+    use super::super::test_films::{film_of, settings};
+    use super::*;
+    use fechner_perception::Plane;
+    use glam::Vec3;
+
+    /// Where every place is about as noisy, counts stay even; where one half of the picture is noisier, it gets the samples; few
+    /// pixels that are to blame get theirs alone.
+    #[test]
+    fn counts_are_even_unless_others_are_much_better() {
+        let film = film_of(|_, random| Vec3::splat(1.0 + random));
+        let plan = |left: f64, right: f64, is_to_blame: fn(usize) -> bool| {
+            let energies: Vec<f64> = (0..64 * 64).map(|pixel| if pixel % 64 < 32 { left } else { right }).collect();
+            let to_blame: Vec<bool> = (0..64 * 64).map(is_to_blame).collect();
+            plan_by_energy(&film, &energies, &to_blame, 1024, u64::MAX)
+        };
+        assert_eq!(plan(8.0, 6.0, |_| true).samples(), 8 * 64 * 64, "half as many again");
+        let uneven = plan(16.0, 1.0, |_| true);
+        assert!(uneven.blocks.iter().all(|block| block.pixel % 64 < 32));
+        assert_eq!(uneven.samples(), 16 * 32 * 64, "32 and 16");
+        let few = plan(8.0, 6.0, |pixel| pixel % 64 < 16);
+        assert!(few.blocks.iter().all(|block| block.pixel % 64 < 16));
+        assert_eq!(few.samples(), 48 * 16 * 64, "four times what they have");
+        assert!(plan(8.0, 1.0, |_| false).blocks.is_empty());
+    }
+
+    /// Nobody starves beside one whose variance is enormous, or no number.
+    #[test]
+    fn quiet_pixels_keep_their_share() {
+        let mut energies = vec![1.0; 100];
+        (energies[3], energies[5]) = (1e9, f32::NAN);
+        let defended = defended(&energies);
+        let mean_root = defended.iter().map(|energy| energy.sqrt()).sum::<f64>() / 100.0;
+        assert!(defended.iter().all(|energy| energy.is_finite() && energy.sqrt() > 0.7 * mean_root));
+        assert!(defended[3].sqrt() < 5.0 * mean_root);
+    }
+
+    fn plan_after(film: &Film, judgement: &Judgement, visibility: f64, left: u64) -> SamplePlan {
+        UntilLook::after(film, judgement, visibility).plan(film, judgement, 1024, left)
+    }
+
+    /// A film of 16 samples a pixel, and a look that finds this visibility.
+    fn looked_at(predicted: impl Fn(usize, usize) -> f32 + Sync) -> (Film, Judgement) {
+        let film = film_of(|_, random| Vec3::splat(1.0 + random));
+        let mut judgement = judge(&film, &settings(), 1.0).expect("judges");
+        judgement.predicted = Plane::from_fn(64, 64, predicted);
+        (film, judgement)
+    }
+
+    /// The first look is not at the pilot, and the next one not before as much is traced as a look costs; far from the target it comes
+    /// later, but what is there is at most four times as much then.
+    #[test]
+    fn looks_are_as_far_apart_as_they_cost() {
+        let pixels = 64 * 64;
+        assert_eq!(UntilLook::first(&Film::new(64, 64)).samples, 10 * pixels);
+        let due = |predicted: f32, visibility: f64| {
+            let (film, judgement) = looked_at(|_, _| predicted);
+            let until_look = UntilLook::after(&film, &judgement, visibility);
+            assert!(!until_look.is_over(&film), "it asks for samples");
+            until_look.samples / pixels
+        };
+        assert_eq!(due(2.2, 2.0), 16 + 10, "a look's worth");
+        assert_eq!(due(4.0, 2.0), 16 + 16, "what errors that fall as 1/n need");
+        assert_eq!(due(f32::INFINITY, 2.0), 4 * 16);
+        let (film, judgement) = looked_at(|_, _| 1.0);
+        assert!(UntilLook::after(&film, &judgement, 2.0).is_over(&film), "nothing shows");
+    }
+
+    /// Which pixels get samples where these are above the target.
+    fn sampled(is_above: fn(usize, usize) -> bool) -> impl Fn(u32, u32) -> bool {
+        let (film, judgement) = looked_at(|x, y| if is_above(x, y) { 3.0 } else { 1.0 });
+        let plan = plan_after(&film, &judgement, 2.0, u64::MAX);
+        move |x, y| plan.blocks.iter().any(|block| block.pixel == 64 * y + x)
+    }
+
+    /// What is above the target is the noise of a window: all of that window gets samples, and nothing far from it.
+    #[test]
+    fn the_surroundings_of_what_shows_are_sampled() {
+        let is_sampled = sampled(|x, y| (x, y) == (5, 5));
+        assert!(is_sampled(5, 5) && is_sampled(17, 5) && is_sampled(5, 17), "within a quarter of a degree, 15 pixels");
+        assert!(!is_sampled(60, 5) && !is_sampled(5, 60) && !is_sampled(60, 60));
+    }
+
+    /// Nothing that is above the target waits for a larger place to come down, which may have all the samples that it may have.
+    #[test]
+    fn a_lone_pixel_is_sampled_beside_a_large_place() {
+        let is_sampled = sampled(|x, y| (x, y) == (5, 5) || (x > 52 && y > 52));
+        assert!(is_sampled(5, 5) && is_sampled(60, 60));
+    }
+
+    /// It is raw noise that gets samples, while anything can be seen.
+    #[test]
+    fn noisy_pixels_are_sampled() {
+        let film = film_of(|pixel, random| Vec3::splat(1.0 + if pixel % 64 < 32 { 0.5 } else { 0.05 } * random));
+        let judgement = judge(&film, &settings(), 1.0).expect("judges");
+        let plan = plan_after(&film, &judgement, 0.01, 4 * 64 * 64);
+        let left = plan.blocks.iter().filter(|block| block.pixel % 64 < 32).count();
+        assert!(left * 20 > plan.blocks.len() * 19, "{left} of {}", plan.blocks.len());
+        assert!(plan_after(&film, &judgement, f64::from(f32::MAX), u64::MAX).blocks.is_empty());
+    }
+}
