@@ -181,7 +181,7 @@ mod tests {
     }
 
     fn extend(film: &mut Film, block: BlockWork, noise: f32) {
-        let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1 };
+        let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: false };
         let mut sum = BlockSum::default();
         for index in block.first..block.first + block.samples {
             let key = u64::from(block.pixel) << 32 | u64::from(block.level) << 24 | u64::from(index);

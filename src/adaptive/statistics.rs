@@ -180,7 +180,13 @@ mod tests {
                         let u = (crate::sampler::hash_words(counter, 99) >> 40) as f32 / 16_777_216.0;
                         sum.add(&PathSample {
                             radiance: Vec3::splat(value(pixel, u)),
-                            first_hit: FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1 },
+                            first_hit: FirstHit {
+                                albedo: Vec3::ONE,
+                                normal: Vec3::Z,
+                                depth: 1.0,
+                                object_id: 1,
+                                shines: false,
+                            },
                             rays: 1,
                         });
                     }
@@ -228,7 +234,7 @@ mod tests {
         let mut changed = base.clone();
         let wild = PathSample {
             radiance: Vec3::splat(1000.0),
-            first_hit: FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1 },
+            first_hit: FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: false },
             rays: 1,
         };
         let mut sum = BlockSum::default();

@@ -23,7 +23,7 @@ pub(super) fn film_of(color: impl Fn(u32, f32) -> Vec3) -> Film {
         for index in block.first..block.first + block.samples {
             let key = u64::from(block.pixel) << 8 | u64::from(index);
             let random = (hash_words(key, block.half.index() as u64) >> 40) as f32 / 8_388_608.0 - 1.0;
-            let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1 };
+            let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: false };
             sum.add(&PathSample { radiance: color(block.pixel, random), first_hit, rays: 1 });
         }
         film.merge_block(block, &sum);

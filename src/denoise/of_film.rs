@@ -1,9 +1,14 @@
 //! The film's picture and both of its halves, denoised.
+//!
+//! Of lamps that are seen, what is far above the rest of the picture is left out and added again afterwards, each half's own to
+//! each half: beside light that is a hundred times as strong a denoiser draws halos.
 
 use super::{Denoiser, NoisyPicture, OidnError, SurfaceGuides};
-use crate::film::{Film, HalfPixel};
+use crate::film::{Film, HalfPixel, PixelGuide};
 use crate::sampler::Half;
 use fechner_perception::Plane;
+use fechner_perception::photometry::luminance;
+use glam::Vec3;
 
 /// A film's picture without its noise. Linear RGB in cd/m², row-major.
 #[derive(Clone, Debug)]
@@ -28,9 +33,18 @@ pub fn denoise_film(denoiser: &Denoiser, film: &Film, nits_per_unit: f64) -> Res
         depth: film.guides().iter().map(|guide| guide.depth).collect(),
         samples: film.total_samples() as f64 / (width * height).max(1) as f64,
     })?;
-    let denoised =
-        |rgb: &[[f32; 3]], variance: &Plane| denoiser.denoise(&NoisyPicture { rgb, variance, guides: &guides });
     let estimate = film.estimate(nits_per_unit);
+    let most = nits_per_unit as f32 * most_of_lamps(film);
+    let denoised = |rgb: &[[f32; 3]], variance: &Plane| {
+        let of_lamp = |(guide, &rgb): (&PixelGuide, &[f32; 3])| {
+            if guide.seen.shines() { excess(rgb.into(), most) } else { Vec3::ZERO }
+        };
+        let lamps: Vec<Vec3> = film.guides().iter().zip(rgb).map(of_lamp).collect();
+        let rest: Vec<[f32; 3]> = rgb.iter().zip(&lamps).map(|(&rgb, &lamp)| (Vec3::from(rgb) - lamp).into()).collect();
+        let mut denoised = denoiser.denoise(&NoisyPicture { rgb: &rest, variance, guides: &guides })?;
+        denoised.iter_mut().zip(lamps).for_each(|(rgb, lamp)| *rgb = (Vec3::from(*rgb) + lamp).into());
+        Ok::<_, OidnError>(denoised)
+    };
     // What two samples of a half say of their scatter is worth little: beside it stands what the halves differ by.
     let variance = estimate.variance_of_mean.combined(&estimate.half_difference, |own, half| 0.5 * (own + half * half));
     let of_half = |half: Half| {
@@ -45,6 +59,89 @@ pub fn denoise_film(denoiser: &Denoiser, film: &Film, nits_per_unit: f64) -> Res
     })
 }
 
+/// What is seen to shine by itself is shown to the denoiser no brighter than so many times what the rest of the picture is on
+/// average: mostly above display white, so that edges are still smoothed where they are seen. 5 and 20 are as good
+/// (`benches/README.md`).
+const TIMES_THE_REST: f32 = 10.0;
+
+/// The most luminance that the denoiser is shown of what shines by itself, scene units.
+fn most_of_lamps(film: &Film) -> f32 {
+    let rest = || (0..film.guides().len()).filter(|&pixel| !film.guides()[pixel].seen.shines());
+    let sum: f64 = rest().map(|pixel| f64::from(luminance(film.rgb_cd_m2(pixel, 1.0)))).sum();
+    match rest().count() {
+        0 => f32::INFINITY,
+        count => TIMES_THE_REST * (sum / count as f64) as f32,
+    }
+}
+
+/// What light has above a luminance, of the same colour.
+fn excess(light: Vec3, most: f32) -> Vec3 {
+    let luminance = luminance(light.to_array());
+    if luminance > most { light * (1.0 - most / luminance) } else { Vec3::ZERO }
+}
+
 fn mean_cd_m2(pixel: &HalfPixel, nits_per_unit: f64) -> [f32; 3] {
     pixel.mean.map(|value| (value * nits_per_unit) as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::denoise::DenoiserKind;
+    use crate::film::BlockSum;
+    use crate::integrator::{BlockWork, FirstHit, PathSample};
+
+    const SIDE: u32 = 48;
+
+    /// A wall of radiance 1 with noise, and before it a lamp two pixels wide that is 10000 times as bright, whose edges cover pixels
+    /// by half.
+    fn wall_and_lamp() -> Film {
+        let mut film = Film::new(SIDE, SIDE);
+        let mut state = 3u64;
+        let mut random = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 40) as f32 / 16_777_216.0
+        };
+        for pixel in 0..SIDE * SIDE {
+            let coverage = if (23..25).contains(&(pixel % SIDE)) { 0.5 } else { 0.0 };
+            for half in Half::BOTH {
+                let mut sum = BlockSum::default();
+                for _ in 0..4 {
+                    let emitted = Vec3::splat(if random() < coverage { 1e4 } else { 0.0 });
+                    let first_hit = FirstHit {
+                        albedo: Vec3::ONE,
+                        normal: Vec3::Z,
+                        depth: 1.0,
+                        object_id: 1,
+                        shines: emitted != Vec3::ZERO,
+                    };
+                    sum.add(&PathSample { radiance: emitted + Vec3::splat(2.0 * random()), first_hit, rays: 1 });
+                }
+                film.merge_block(BlockWork { half, ..BlockWork::whole(pixel, half, 0) }, &sum);
+            }
+        }
+        film
+    }
+
+    /// The wall beside the lamp stays a wall, and of the lamp's light nothing is lost. Open Image Denoise where it is installed.
+    #[test]
+    fn lamps_have_no_halos() {
+        let film = wall_and_lamp();
+        for kind in [DenoiserKind::Builtin, DenoiserKind::Oidn] {
+            let Ok(denoiser) = Denoiser::open(kind) else {
+                eprintln!("{kind:?} is skipped: not installed");
+                continue;
+            };
+            let DenoisedFilm { rgb_cd_m2, halves_rgb_cd_m2 } = denoise_film(&denoiser, &film, 1.0).expect("denoises");
+            for picture in [&rgb_cd_m2, &halves_rgb_cd_m2[0], &halves_rgb_cd_m2[1]] {
+                let column = |x: u32| (0..SIDE).map(|y| picture[(y * SIDE + x) as usize][1]).sum::<f32>() / SIDE as f32;
+                for x in (8..21).chain(27..40) {
+                    assert!((0.5..2.0).contains(&column(x)), "{kind:?}: {} in column {x}", column(x));
+                }
+            }
+            let sum = |picture: &[[f32; 3]]| picture.iter().map(|rgb| f64::from(rgb[1])).sum::<f64>();
+            let raw = film.estimate(1.0).rgb_cd_m2;
+            assert!((sum(&rgb_cd_m2) / sum(&raw) - 1.0).abs() < 0.01, "{kind:?}");
+        }
+    }
 }

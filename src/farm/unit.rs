@@ -19,7 +19,7 @@ static ORDER: Kind = Kind {
 };
 static SUMS: Kind = Kind {
     magic: *b"fech sums\r\n\x1a",
-    version: 1,
+    version: 2,
     what: "a unit's sums, such as fechner farm unit writes",
     remedy: "the unit is rendered again",
 };

@@ -97,6 +97,7 @@ impl PixelGuide {
             self.albedo.iter_mut().zip(other.albedo).for_each(|(old, new)| blend(old, new));
             self.normal.iter_mut().zip(other.normal).for_each(|(old, new)| blend(old, new));
             blend(&mut self.depth, other.depth);
+            self.seen = self.seen.with(other.seen.shines());
         }
     }
 }
@@ -114,7 +115,13 @@ mod tests {
         for (half, values) in Half::BOTH.into_iter().zip(values.chunks(values.len().div_ceil(2))) {
             let mut sum = BlockSum::default();
             for &value in values {
-                let first_hit = FirstHit { albedo: Vec3::splat(value), normal: Vec3::Z, depth: value, object_id: 7 };
+                let first_hit = FirstHit {
+                    albedo: Vec3::splat(value),
+                    normal: Vec3::Z,
+                    depth: value,
+                    object_id: 7,
+                    shines: value > 4.0,
+                };
                 sum.add(&PathSample { radiance: Vec3::new(value, 2.0 * value, 0.5), first_hit, rays: 3 });
             }
             film.merge_block(BlockWork { half, ..BlockWork::whole(0, half, 0) }, &sum);
@@ -149,7 +156,7 @@ mod tests {
         let mean = values.iter().sum::<f32>() / 40.0;
         let guide = sum.guides()[0];
         assert!((guide.depth - mean).abs() < 1e-5 && (guide.albedo[2] - mean).abs() < 1e-5);
-        assert_eq!((guide.object_id, sum.rays), (7, 120));
+        assert_eq!((guide.seen.object_id(), guide.seen.shines(), sum.rays), (7, true, 120));
     }
 
     #[test]

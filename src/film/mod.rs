@@ -50,6 +50,7 @@ pub struct BlockSum {
     normal: Vec3,
     depth: f32,
     first_object_id: Option<u32>,
+    shines: bool,
 }
 
 impl Default for BlockSum {
@@ -65,6 +66,7 @@ impl Default for BlockSum {
             normal: Vec3::ZERO,
             depth: 0.0,
             first_object_id: None,
+            shines: false,
         }
     }
 }
@@ -79,6 +81,7 @@ impl BlockSum {
             return;
         }
         self.samples += 1;
+        self.shines |= sample.first_hit.shines;
         self.missed += u32::from(sample.first_hit.object_id == 0);
         let rgb = sample.radiance.as_dvec3().to_array();
         for (sum, value) in self.rgb.iter_mut().zip(rgb) {
@@ -153,8 +156,34 @@ pub struct PixelGuide {
     pub normal: [f32; 3],
     /// Mean distance.
     pub depth: f32,
-    /// Object number + 1 of the first sample.
-    pub object_id: u32,
+    /// What is there.
+    pub seen: Seen,
+}
+
+/// The number of an object, and whether anything shines in the same pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Seen(u32);
+
+impl Seen {
+    const SHINES: u32 = 1 << 31;
+
+    /// Object number + 1 of the first sample; 0 where it met nothing.
+    pub fn object_id(self) -> u32 {
+        self.0 & !Self::SHINES
+    }
+
+    /// Whether any sample first met what sends light to the camera by itself: a lamp, a screen, the environment.
+    pub fn shines(self) -> bool {
+        self.0 & Self::SHINES != 0
+    }
+
+    fn with_object(self, id: u32) -> Self {
+        Self(self.0 & Self::SHINES | id & !Self::SHINES)
+    }
+
+    fn with(self, shines: bool) -> Self {
+        if shines { Self(self.0 | Self::SHINES) } else { self }
+    }
 }
 
 /// The film.
@@ -174,7 +203,7 @@ impl Film {
     /// An empty film.
     pub fn new(width: u32, height: u32) -> Self {
         let pixels = width as usize * height as usize;
-        let nothing = PixelGuide { albedo: [0.0; 3], normal: [0.0; 3], depth: 0.0, object_id: 0 };
+        let nothing = PixelGuide { albedo: [0.0; 3], normal: [0.0; 3], depth: 0.0, seen: Seen::default() };
         Self {
             width,
             height,
@@ -220,8 +249,9 @@ impl Film {
         self.rays += block.rays;
         let guide = &mut self.guides[pixel];
         if let (0, Some(id)) = (before, block.first_object_id) {
-            guide.object_id = id;
+            guide.seen = guide.seen.with_object(id);
         }
+        guide.seen = guide.seen.with(block.shines);
         if block.samples > 0 {
             let share = block.samples as f32 / (before + block.samples) as f32;
             let scale = 1.0 / block.samples as f32;
@@ -262,7 +292,7 @@ mod tests {
     use crate::integrator::FirstHit;
 
     fn sample(radiance: f32) -> PathSample {
-        let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 2.0, object_id: 1 };
+        let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 2.0, object_id: 1, shines: false };
         PathSample { radiance: Vec3::splat(radiance), first_hit, rays: 1 }
     }
 

@@ -23,10 +23,12 @@ pub struct FirstHit {
     pub depth: f32,
     /// Object number + 1; 0 where nothing is hit.
     pub object_id: u32,
+    /// Whether it sends light to the camera by itself; the environment where nothing is hit.
+    pub shines: bool,
 }
 
 impl FirstHit {
-    const NOTHING: Self = Self { albedo: Vec3::ONE, normal: Vec3::ZERO, depth: 0.0, object_id: 0 };
+    const NOTHING: Self = Self { albedo: Vec3::ONE, normal: Vec3::ZERO, depth: 0.0, object_id: 0, shines: false };
 }
 
 /// What a sample found.
@@ -79,6 +81,9 @@ impl PathTracer {
                 if bounce > 0 || !self.settings.transparent {
                     self.add_environment(&mut path);
                 }
+                if bounce == 0 {
+                    first_hit.shines = path.radiance != Vec3::ZERO;
+                }
                 break;
             };
             let point = self.world.surface(&path.ray, &hit);
@@ -99,6 +104,7 @@ impl PathTracer {
                     normal: shading.frame.normal(),
                     depth: hit.distance,
                     object_id: hit.object + 1,
+                    shines: emitted,
                 };
             }
             if bounce >= self.settings.max_depth {

@@ -96,7 +96,7 @@ pub fn layers<'a>(
         picture.push_f16(name, guide(&|g| g.normal[c]));
     }
     picture.push_f32("depth.Z", guide(&|g| g.depth));
-    picture.push_u32("id.Y", film.guides().iter().map(|g| g.object_id).collect::<Vec<u32>>());
+    picture.push_u32("id.Y", film.guides().iter().map(|g| g.seen.object_id()).collect::<Vec<u32>>());
     picture.push_u32("samples.Y", sample_counts(film));
     let variance = picture_variance(film, nits_per_unit);
     picture.push_f32("variance.Y", variance.into_values());

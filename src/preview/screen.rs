@@ -285,7 +285,7 @@ mod tests {
         let mut sum = BlockSum::default();
         let sample = PathSample {
             radiance: Vec3::splat(grey),
-            first_hit: FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1 },
+            first_hit: FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: false },
             rays: 1,
         };
         (0..work.samples).for_each(|_| sum.add(&sample));

@@ -82,6 +82,21 @@ fn a_denoised_render_may_leave_off_between_looks() {
     }
 }
 
+/// Where something shines is known: the box's lamp, and nothing that it lights.
+#[test]
+fn lamps_are_known() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml");
+    let scene = Arc::new(load(&path, &LoadOptions::default()).expect("loads"));
+    let tracer = PathTracer::new(scene, trace_settings(48, 48, 1));
+    let mut film = Film::new(48, 48);
+    fechner::benchmark::trace_up_to(&tracer, &mut film, 8);
+    let pixels = || (0..48 * 48).map(|pixel| (film.guides()[pixel].seen.shines(), film.rgb_cd_m2(pixel, 1.0)[1]));
+    let brightest = pixels().fold((false, 0.0), |most: (bool, f32), pixel| if pixel.1 > most.1 { pixel } else { most });
+    assert!(brightest.0, "the lamp: {brightest:?}");
+    let others = pixels().filter(|&(shines, value)| !shines && value > 0.0).count();
+    assert!(others > 48 * 48 / 2, "{others}");
+}
+
 #[test]
 fn a_library_that_is_not_there_is_asked_for() {
     let folder = tempfile::tempdir().expect("a folder");

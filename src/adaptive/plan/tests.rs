@@ -24,7 +24,7 @@ fn mixing_two_counts_meets_the_need() {
 }
 
 fn constant_block(samples: u32) -> BlockSum {
-    let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1 };
+    let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: false };
     let mut sum = BlockSum::default();
     (0..samples).for_each(|_| sum.add(&PathSample { radiance: Vec3::ONE, first_hit, rays: 1 }));
     sum
@@ -139,7 +139,7 @@ fn stopped_film(size: u32, draw: fn(f64, f64) -> f64, variance_of_mean: f64) -> 
 }
 
 fn drawn_block(block: BlockWork, draw: fn(f64, f64) -> f64) -> BlockSum {
-    let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1 };
+    let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: false };
     let mut sum = BlockSum::default();
     let key = hash_words(u64::from(block.pixel) << 8 | u64::from(block.level), block.half.index() as u64);
     for index in block.first..block.first + block.samples {

@@ -201,6 +201,7 @@ impl ChannelSums {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::Seen;
     use crate::sampler::hash_words;
 
     const SIZE: [usize; 2] = [11, 6];
@@ -221,7 +222,7 @@ mod tests {
             albedo: std::array::from_fn(|band| (0.3 * random(pixel, 30 + band as u64)) as f32),
             normal: std::array::from_fn(|axis| random(pixel, 40 + axis as u64) as f32),
             depth: 2.0 + 0.2 * random(pixel, 50) as f32,
-            object_id: 1,
+            seen: Seen::default(),
         };
         let pixels = SIZE[0] * SIZE[1];
         ((0..pixels).map(evidence).collect(), (0..pixels).map(guide).collect())
