@@ -173,33 +173,10 @@ pub fn run(
     monitor: &dyn Monitor,
 ) -> Result<Ended, JudgeError> {
     let mut render = Loop::new(tracer, settings, state);
-    let mut last_look: Option<Judgement> = None;
-    loop {
-        let ended = match render.trace_pending(monitor) {
-            Traced::Everything => None,
-            Traced::UntilLimit(reason) => Some(reason),
-            Traced::UntilLeft => return Ok(Ended { state: render.state, last_look: None }),
-        };
-        if ended.is_none() {
-            match render.plan_between_looks() {
-                Ok(None) => {}
-                Ok(Some(plan)) => {
-                    render.enter(plan);
-                    continue;
-                }
-                Err(JudgeError::Outdated) => return Ok(Ended { state: render.state, last_look: None }),
-                Err(error) => return Err(error),
-            }
-        }
-        let look = Instant::now();
-        let (judgement, step) = match render.look_and_decide(last_look.take(), ended) {
-            Err(JudgeError::Outdated) => return Ok(Ended { state: render.state, last_look: None }),
-            decided => decided?,
-        };
-        match render.take(step, &judgement, look, monitor) {
-            None => last_look = Some(judgement),
-            Some(reason) => return render.finish(judgement, reason, monitor),
-        }
+    match render.until_end(monitor) {
+        Ok(Some(LastLook { judgement, stop_reason })) => render.finish(judgement, stop_reason, monitor),
+        Ok(None) | Err(JudgeError::Outdated) => Ok(Ended { state: render.state, last_look: None }),
+        Err(error) => Err(error),
     }
 }
 
@@ -224,16 +201,13 @@ pub fn decide(
     monitor: &dyn Monitor,
 ) -> Result<Next, JudgeError> {
     let mut render = Loop::new(tracer, settings, state);
-    if let Some(plan) = render.plan_between_looks()? {
-        render.enter(plan);
-        render.state.seconds_total = render.seconds();
-        return Ok(Next::Planned(Box::new(render.state)));
-    }
-    let look = Instant::now();
-    let mut judgement = render.look()?;
-    let step = render.next_step(&mut judgement)?;
-    if let Some(reason) = render.take(step, &judgement, look, monitor) {
-        return Ok(Next::Ended(Box::new(render.finish(judgement, reason, monitor)?)));
+    if !render.plans_between_looks()? {
+        let look = Instant::now();
+        let mut judgement = render.look()?;
+        let step = render.next_step(&mut judgement)?;
+        if let Some(reason) = render.take(step, &judgement, look, monitor) {
+            return Ok(Next::Ended(Box::new(render.finish(judgement, reason, monitor)?)));
+        }
     }
     render.state.seconds_total = render.seconds();
     Ok(Next::Planned(Box::new(render.state)))
@@ -250,6 +224,27 @@ impl<'a> Loop<'a> {
         let rungs = ladder(target).into_iter().filter(is_left).filter(is_walked).collect();
         let seconds_before = state.seconds_total;
         Self { tracer, settings, rungs, state, resumed_at: Instant::now(), seconds_before, looked: None }
+    }
+
+    /// Traces, looks and plans in turn; `None` if the monitor leaves the render.
+    fn until_end(&mut self, monitor: &dyn Monitor) -> Result<Option<LastLook>, JudgeError> {
+        let mut last_look: Option<Judgement> = None;
+        loop {
+            let ended = match self.trace_pending(monitor) {
+                Traced::Everything => None,
+                Traced::UntilLimit(reason) => Some(reason),
+                Traced::UntilLeft => return Ok(None),
+            };
+            if ended.is_none() && self.plans_between_looks()? {
+                continue;
+            }
+            let look = Instant::now();
+            let (judgement, step) = self.look_and_decide(last_look.take(), ended)?;
+            match self.take(step, &judgement, look, monitor) {
+                None => last_look = Some(judgement),
+                Some(stop_reason) => return Ok(Some(LastLook { judgement, stop_reason })),
+            }
+        }
     }
 
     /// Tells what was seen and enters the plan that came of it, or says why there is none.

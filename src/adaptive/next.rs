@@ -56,17 +56,17 @@ impl Loop<'_> {
         }))
     }
 
-    /// Between two looks at a picture that is denoised: more samples by raw noise alone, `None` when it is time for a look.
-    pub(super) fn plan_between_looks(&mut self) -> Result<Option<SamplePlan>, JudgeError> {
+    /// Between two looks at a picture that is denoised: enters a plan by raw noise alone; false when it is time for a look.
+    pub(super) fn plans_between_looks(&mut self) -> Result<bool, JudgeError> {
         let left = self.left_of_budget();
         if self.settings.denoiser.is_none() || matches!(self.settings.sampling, Sampling::Rival(_)) || left == 0 {
-            return Ok(None);
+            return Ok(false);
         }
         let started = Instant::now();
         let (film, doubled) = (&self.state.film, self.doubled());
         let until_look = self.state.until_look.get_or_insert_with(|| UntilLook::first(film));
         if until_look.is_over(film) {
-            return Ok(None);
+            return Ok(false);
         }
         let plan = if self.settings.sampling == Sampling::Uniform {
             uniform_plan(film, doubled)
@@ -75,7 +75,11 @@ impl Loop<'_> {
             cut(until_look.plan(film, &raw, self.settings.limits.max_samples, left), &raw, left)
         };
         self.state.seconds_perception += started.elapsed().as_secs_f64();
-        Ok(some(plan))
+        if plan.blocks.is_empty() {
+            return Ok(false);
+        }
+        self.enter(plan);
+        Ok(true)
     }
 
     /// Samples that the budget has left, of all pixels.

@@ -34,7 +34,7 @@ pub fn denoise_film(denoiser: &Denoiser, film: &Film, nits_per_unit: f64) -> Res
         samples: film.total_samples() as f64 / (width * height).max(1) as f64,
     })?;
     let estimate = film.estimate(nits_per_unit);
-    let most = nits_per_unit as f32 * most_of_lamps(film);
+    let most = most_of_lamps(film.guides(), &estimate.rgb_cd_m2);
     let denoised = |rgb: &[[f32; 3]], variance: &Plane| {
         let of_lamp = |(guide, &rgb): (&PixelGuide, &[f32; 3])| {
             if guide.seen.shines() { excess(rgb.into(), most) } else { Vec3::ZERO }
@@ -64,10 +64,10 @@ pub fn denoise_film(denoiser: &Denoiser, film: &Film, nits_per_unit: f64) -> Res
 /// (`benches/README.md`).
 const TIMES_THE_REST: f32 = 10.0;
 
-/// The most luminance that the denoiser is shown of what shines by itself, scene units.
-fn most_of_lamps(film: &Film) -> f32 {
-    let rest = || (0..film.guides().len()).filter(|&pixel| !film.guides()[pixel].seen.shines());
-    let sum: f64 = rest().map(|pixel| f64::from(luminance(film.rgb_cd_m2(pixel, 1.0)))).sum();
+/// The most luminance that the denoiser is shown of what shines by itself, cd/m².
+fn most_of_lamps(guides: &[PixelGuide], rgb_cd_m2: &[[f32; 3]]) -> f32 {
+    let rest = || guides.iter().zip(rgb_cd_m2).filter(|(guide, _)| !guide.seen.shines());
+    let sum: f64 = rest().map(|(_, &rgb)| f64::from(luminance(rgb))).sum();
     match rest().count() {
         0 => f32::INFINITY,
         count => TIMES_THE_REST * (sum / count as f64) as f32,
@@ -90,6 +90,7 @@ mod tests {
     use crate::denoise::DenoiserKind;
     use crate::film::BlockSum;
     use crate::integrator::{BlockWork, FirstHit, PathSample};
+    use crate::sampler::hash_words;
 
     const SIDE: u32 = 48;
 
@@ -97,10 +98,10 @@ mod tests {
     /// by half.
     fn wall_and_lamp() -> Film {
         let mut film = Film::new(SIDE, SIDE);
-        let mut state = 3u64;
+        let mut drawn = 0;
         let mut random = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 40) as f32 / 16_777_216.0
+            drawn += 1;
+            (hash_words(drawn, 3) >> 40) as f32 / 16_777_216.0
         };
         for pixel in 0..SIDE * SIDE {
             let coverage = if (23..25).contains(&(pixel % SIDE)) { 0.5 } else { 0.0 };

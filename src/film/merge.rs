@@ -83,6 +83,7 @@ impl HalfPixel {
             *mean += (other - *mean) * others / (own + others);
         }
         self.samples = self.samples.saturating_add(other.samples);
+        self.missed = self.missed.saturating_add(other.missed);
     }
 }
 
@@ -110,6 +111,9 @@ mod tests {
     use crate::sampler::Half;
     use glam::Vec3;
 
+    /// Samples of more than this have met a bright sky.
+    const MISSED_FROM: f32 = 4.0;
+
     fn film_of(values: &[f32]) -> Film {
         let mut film = Film::new(1, 1);
         for (half, values) in Half::BOTH.into_iter().zip(values.chunks(values.len().div_ceil(2))) {
@@ -119,8 +123,8 @@ mod tests {
                     albedo: Vec3::splat(value),
                     normal: Vec3::Z,
                     depth: value,
-                    object_id: 7,
-                    shines: value > 4.0,
+                    object_id: if value > MISSED_FROM { 0 } else { 7 },
+                    shines: value > MISSED_FROM,
                 };
                 sum.add(&PathSample { radiance: Vec3::new(value, 2.0 * value, 0.5), first_hit, rays: 3 });
             }
@@ -150,6 +154,8 @@ mod tests {
             let variance = luminance.iter().map(|y| (y - centre).powi(2)).sum::<f64>() / (n - 1.0);
             let pixel = sum.half(half)[0];
             assert_eq!((pixel.samples, pixel.taken), (all.len() as u32, all.len() as u32));
+            let missed = all.iter().filter(|&&value| value > f64::from(MISSED_FROM)).count();
+            assert_eq!(pixel.missed as usize, missed);
             assert!((pixel.mean[0] - mean).abs() < 1e-12, "{} for {mean}", pixel.mean[0]);
             assert!((pixel.sample_variance(0) / variance - 1.0).abs() < 1e-6);
         }

@@ -37,7 +37,8 @@ WHITE_CD_M2 = 200.0
 def fechner(scene, size, folder, *options):
     target = folder / "fechner.exr"
     command = [ROOT / "target/release/fechner", "render", scene, "-o", target, "--size", f"{size}x{size}", "--threads", "2"]
-    command += ["--json", folder / "fechner.json", *options]
+    # Else even counts would end at visibility 1.
+    command += ["--visibility", "0.1", "--json", folder / "fechner.json", *options]
     subprocess.run([str(part) for part in command], check=True, capture_output=True)
     with OpenEXR.File(str(target)) as file:
         channels = file.channels()
@@ -51,7 +52,7 @@ def ours(scene, size, reference_spp, times, folder):
     made = {}
     for time in times:
         for seed in SEEDS:
-            picture, said = fechner(scene, size, folder, "--denoise", "oidn", "--time", time, "--visibility", "0.1", "--seed", str(seed))
+            picture, said = fechner(scene, size, folder, "--denoise", "oidn", "--time", time, "--seed", str(seed))
             made.setdefault(time, []).append((picture, said["seconds_total"], said["spp_mean"]))
     return reference, made
 
