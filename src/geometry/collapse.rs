@@ -21,8 +21,6 @@ pub(super) struct Collapsed {
     pub(super) order: Vec<u32>,
     /// `None` where there is nothing.
     pub(super) root: Option<Child>,
-    /// Most children that wait while a walk is at the bottom: those beside the way from the root, added up.
-    pub(super) waiting: usize,
 }
 
 /// Builds over boxes; those that are not finite are left out.
@@ -65,7 +63,6 @@ impl<'a> Collapser<'a> {
                 blocks: Vec::new(),
                 order: Vec::with_capacity(built.numbers.len()),
                 root: None,
-                waiting: 0,
             },
         }
     }
@@ -109,23 +106,21 @@ impl<'a> Collapser<'a> {
         }
         self.out.nodes.push(Node::EMPTY);
         self.out.root = Some(Child::node(0));
-        let mut open = vec![(0u32, 0usize, 0usize)];
+        let mut open = vec![(0u32, 0usize)];
         let mut members = Vec::with_capacity(LANES);
-        while let Some((index, place, waiting)) = open.pop() {
+        while let Some((index, place)) = open.pop() {
             members.clear();
             let node = &self.binary.nodes[index as usize];
             let split = self.choices[index as usize].left[0];
             self.gather(node.first_index, split, &mut members);
             self.gather(node.first_index + 1, LANES as u8 - split, &mut members);
-            let waiting = waiting + members.len() - 1;
-            self.out.waiting = self.out.waiting.max(waiting);
             for (slot, &member) in members.iter().enumerate() {
                 let child = if self.becomes_leaf(member) {
                     self.emit_block(member)
                 } else {
                     let place = self.out.nodes.len();
                     self.out.nodes.push(Node::EMPTY);
-                    open.push((member, place, waiting));
+                    open.push((member, place));
                     Child::node(place)
                 };
                 let aabb = self.binary.nodes[member as usize].aabb();

@@ -185,12 +185,17 @@ impl World {
     }
 
     /// The closest surface along the ray.
+    #[inline]
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
-        if self.top.is_none() {
-            return self.closest_fixed(ray, f32::INFINITY);
+        match &self.top {
+            None => self.closest_fixed(ray, f32::INFINITY),
+            Some(top) => self.closest_of_items(top, ray),
         }
+    }
+
+    fn closest_of_items(&self, top: &BinaryTree, ray: &Ray) -> Option<Hit> {
         let mut best = None;
-        self.top.as_ref()?.closest(ray.origin, ray.direction, f32::INFINITY, |i, t_max| {
+        top.closest(ray.origin, ray.direction, f32::INFINITY, |i, t_max| {
             let hit = match &self.items[i] {
                 Item::Fixed => self.closest_fixed(ray, t_max),
                 Item::Placed { instance, shared, to_mesh } => {
@@ -229,16 +234,18 @@ impl World {
     }
 
     /// Whether anything is nearer than `distance` along the ray.
+    #[inline]
     pub fn occluded(&self, ray: &Ray, distance: f32) -> bool {
-        let fixed = |t_max: f32| {
-            self.fixed.any(ray.origin, ray.direction, t_max, |h| self.is_there(h.triangle.instance, h, ray))
-        };
-        let Some(top) = &self.top else {
-            return fixed(distance);
-        };
+        match &self.top {
+            None => self.occluded_by_fixed(ray, distance),
+            Some(top) => self.occluded_by_items(top, ray, distance),
+        }
+    }
+
+    fn occluded_by_items(&self, top: &BinaryTree, ray: &Ray, distance: f32) -> bool {
         top.any(ray.origin, ray.direction, distance, |i, t_max| {
             let blocked = match &self.items[i] {
-                Item::Fixed => fixed(t_max),
+                Item::Fixed => self.occluded_by_fixed(ray, t_max),
                 Item::Placed { instance, shared, to_mesh } => {
                     let local = LocalRay::new(ray, to_mesh);
                     self.shared[*shared]
@@ -263,6 +270,10 @@ impl World {
         self.fixed
             .closest(ray.origin, ray.direction, t_max, |h| self.is_there(h.triangle.instance, h, ray))
             .map(|h| world_hit(h.triangle.instance, h, h.t))
+    }
+
+    fn occluded_by_fixed(&self, ray: &Ray, distance: f32) -> bool {
+        self.fixed.any(ray.origin, ray.direction, distance, |h| self.is_there(h.triangle.instance, h, ray))
     }
 
     /// Whether alpha leaves this point of the surface in place.

@@ -63,8 +63,12 @@ impl CameraRays {
     pub fn ray(&self, sample: &CameraSample) -> Ray {
         let offset = sample.position_px - self.center;
         let sideways = offset.x * self.pixel_right + offset.y * self.pixel_down;
-        let disc = concentric_disc(sample.lens);
-        let on_lens = self.lens_right * disc.x + self.lens_up * disc.y;
+        let on_lens = if self.lens_right == Vec3::ZERO {
+            Vec3::ZERO
+        } else {
+            let disc = concentric_disc(sample.lens);
+            self.lens_right * disc.x + self.lens_up * disc.y
+        };
         let (origin, way) = if self.parallel {
             (self.position + sideways + on_lens, self.forward * self.focus_distance - on_lens)
         } else {

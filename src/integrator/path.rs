@@ -8,7 +8,7 @@ use super::media::Media;
 use super::shading::{Components, Shading};
 use crate::geometry::{Hit, Ray, SurfacePoint};
 use crate::light::{LightReceiver, LightSample};
-use crate::sampler::{Purpose, Sample};
+use crate::sampler::{Draws, Purpose, Sample};
 use fechner_perception::photometry::luminance;
 use glam::{Vec3, Vec3A};
 
@@ -111,10 +111,10 @@ impl PathTracer {
                 break;
             }
             if shading.bsdf.has_smooth_lobe() {
-                self.add_direct_light(&mut path, &point, &shading, wo, sample.draw(Purpose::Light { bounce }));
+                self.add_direct_light(&mut path, &point, &shading, wo, sample.draws(Purpose::Light { bounce }));
             }
-            let [u, v, lobe, survival] = sample.draw(Purpose::Scatter { bounce });
-            if !scatter(&mut path, &point, &shading, wo, [u, v, lobe]) || !survives(&mut path, bounce, survival) {
+            let u = sample.draws(Purpose::Scatter { bounce });
+            if !scatter(&mut path, &point, &shading, wo, u) || !survives(&mut path, bounce, u) {
                 break;
             }
         }
@@ -149,9 +149,9 @@ impl PathTracer {
     }
 
     /// Next-event estimation: light that arrives straight from a sampled light.
-    fn add_direct_light(&self, path: &mut PathState, point: &SurfacePoint, shading: &Shading, wo: Vec3, u: [f32; 4]) {
+    fn add_direct_light(&self, path: &mut PathState, point: &SurfacePoint, shading: &Shading, wo: Vec3, u: Draws) {
         let receiver = shading.receiver(point, wo);
-        let Some(light) = self.lights.sample(&self.world, &receiver, path.ray.time, [u[0], u[1], u[2]]) else {
+        let Some(light) = self.lights.sample(&self.world, &receiver, path.ray.time, u.first_three()) else {
             return;
         };
         let wi = light.direction;
@@ -168,7 +168,7 @@ impl PathTracer {
             let of = |rgb: Vec3| luminance(rgb.to_array());
             thresholds.survival(of(unshadowed * path.radiance_gain_on_exit), of(path.radiance))
         });
-        if u[3] >= survival {
+        if survival < 1.0 && u.number(3) >= survival {
             return;
         }
         path.rays += 1;
@@ -207,8 +207,8 @@ fn distance_to(point: &SurfacePoint, light: &LightSample) -> f32 {
 }
 
 /// Chooses the next direction; false where the path ends.
-fn scatter(path: &mut PathState, point: &SurfacePoint, shading: &Shading, wo: Vec3, u: [f32; 3]) -> bool {
-    let Some(scattered) = shading.bsdf.sample(shading.frame.to_local(wo), u) else {
+fn scatter(path: &mut PathState, point: &SurfacePoint, shading: &Shading, wo: Vec3, u: Draws) -> bool {
+    let Some(scattered) = shading.bsdf.sample(shading.frame.to_local(wo), u.first_three()) else {
         return false;
     };
     let wi = shading.frame.to_world(scattered.wi).normalize();
@@ -229,7 +229,7 @@ fn scatter(path: &mut PathState, point: &SurfacePoint, shading: &Shading, wo: Ve
 }
 
 /// Russian roulette by throughput from the fourth bounce on.
-fn survives(path: &mut PathState, bounce: u32, u: f32) -> bool {
+fn survives(path: &mut PathState, bounce: u32, u: Draws) -> bool {
     const FIRST_BOUNCE: u32 = 3;
     const ALWAYS_MORTAL_FROM: u32 = 8;
     if bounce < FIRST_BOUNCE {
@@ -237,7 +237,7 @@ fn survives(path: &mut PathState, bounce: u32, u: f32) -> bool {
     }
     let most = if bounce < ALWAYS_MORTAL_FROM { 1.0 } else { 0.98 };
     let survival = (path.throughput.max_element() * path.radiance_gain_on_exit).min(most);
-    if u >= survival {
+    if u.number(3) >= survival {
         return false;
     }
     path.throughput /= survival;

@@ -170,16 +170,51 @@ fn z_curve(pixel: Pixel) -> u32 {
 }
 
 impl Sample {
-    /// Four numbers in [0, 1) for a purpose; the first two are stratified best together.
+    /// The numbers for a purpose, to be asked for one by one.
     #[inline]
-    pub fn draw(self, purpose: Purpose) -> [f32; 4] {
+    pub fn draws(self, purpose: Purpose) -> Draws {
         let group_hash = sobol::mix32(self.block_hash ^ sobol::mix32(purpose.group().wrapping_add(0x68bc_21eb)));
         if self.is_independent {
-            let key = u64::from(group_hash) << 32 | u64::from(self.index);
-            return std::array::from_fn(|d| (hash_words(key, d as u64) >> 40) as f32 * (1.0 / 16_777_216.0));
+            Draws(Source::Independent(u64::from(group_hash) << 32 | u64::from(self.index)))
+        } else {
+            Draws(Source::Sobol(sobol::ScrambledPoint::new(self.index, group_hash)))
         }
-        sobol::owen_scrambled_4d(self.index, group_hash)
     }
+
+    /// All four of them.
+    #[inline]
+    pub fn draw(self, purpose: Purpose) -> [f32; 4] {
+        let draws = self.draws(purpose);
+        std::array::from_fn(|dimension| draws.number(dimension as u32))
+    }
+}
+
+/// Four numbers in [0, 1); the first two are stratified best together.
+#[derive(Clone, Copy, Debug)]
+pub struct Draws(Source);
+
+impl Draws {
+    /// Those of the first three dimensions.
+    #[inline]
+    pub fn first_three(self) -> [f32; 3] {
+        [self.number(0), self.number(1), self.number(2)]
+    }
+
+    /// The number of a dimension below 4.
+    #[inline]
+    pub fn number(self, dimension: u32) -> f32 {
+        match self.0 {
+            Source::Sobol(point) => point.number(dimension),
+            Source::Independent(key) => (hash_words(key, u64::from(dimension)) >> 40) as f32 * (1.0 / 16_777_216.0),
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Source {
+    Sobol(sobol::ScrambledPoint),
+    /// Hash of sample and purpose.
+    Independent(u64),
 }
 
 /// Mixes a word into a hash; for decisions that need a random number without a sample of their own.

@@ -93,18 +93,34 @@ fn to_unit(reversed: u32) -> f32 {
     (reversed.reverse_bits() >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
-/// Point `index` of the four-dimensional Sobol sequence whose order and digits are scrambled by `seed`.
-#[inline(always)] // who draws three numbers does not pay for the fourth
-pub(super) fn owen_scrambled_4d(index: u32, seed: u32) -> [f32; 4] {
-    let index = hash_low_to_high(index.reverse_bits(), seed).reverse_bits();
-    let digit_seed = |dimension: u32| mix32(seed ^ (dimension + 1).wrapping_mul(0x9e37_79b9));
-    [
-        // The first dimension is the radical inverse: its reversed digits are the index itself.
-        to_unit(hash_low_to_high(index, digit_seed(0))),
-        to_unit(hash_low_to_high(reversed_point(&DIMENSION_1, index), digit_seed(1))),
-        to_unit(hash_low_to_high(reversed_point(&DIMENSION_2, index), digit_seed(2))),
-        to_unit(hash_low_to_high(reversed_point(&DIMENSION_3, index), digit_seed(3))),
-    ]
+/// A point of the four-dimensional Sobol sequence whose order and digits are scrambled by a seed, one number at a time: who asks
+/// for three does not pay for the fourth.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ScrambledPoint {
+    shuffled_index: u32,
+    seed: u32,
+}
+
+impl ScrambledPoint {
+    #[inline(always)]
+    pub(super) fn new(index: u32, seed: u32) -> Self {
+        Self { shuffled_index: hash_low_to_high(index.reverse_bits(), seed).reverse_bits(), seed }
+    }
+
+    /// In [0, 1); `dimension` is below 4.
+    #[inline(always)]
+    pub(super) fn number(self, dimension: u32) -> f32 {
+        let index = self.shuffled_index;
+        let reversed = match dimension {
+            // The first dimension is the radical inverse: its reversed digits are the index itself.
+            0 => index,
+            1 => reversed_point(&DIMENSION_1, index),
+            2 => reversed_point(&DIMENSION_2, index),
+            _ => reversed_point(&DIMENSION_3, index),
+        };
+        let digit_seed = mix32(self.seed ^ (dimension + 1).wrapping_mul(0x9e37_79b9));
+        to_unit(hash_low_to_high(reversed, digit_seed))
+    }
 }
 
 #[cfg(test)]

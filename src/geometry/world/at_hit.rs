@@ -90,15 +90,16 @@ impl World {
             };
         };
         let mesh = &self.scene.meshes[instance.mesh.0 as usize];
-        let corners = self.triangle_corners(hit.object, hit.triangle, ray.time);
+        let to_world = instance.transform_at(ray.time);
+        let indices = mesh.triangles[hit.triangle as usize].map(|i| i as usize);
+        let corners = indices.map(|i| to_world.transform_point3(mesh.positions[i]));
         let (b1, b2) = (hit.b1, hit.b2);
         let position = corners[0] * (1.0 - b1 - b2) + corners[1] * b1 + corners[2] * b2;
         let Placement { normal_matrix, flip, needs_tangent } = match instance.motion {
-            Some(_) => Placement::new(&self.scene, instance, &self.transform_at(hit.object, ray.time)),
+            Some(_) => Placement::new(&self.scene, instance, &to_world),
             None => self.placements[hit.object as usize],
         };
         let geometric_normal = flip * (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or(Vec3::Y);
-        let indices = mesh.triangles[hit.triangle as usize].map(|i| i as usize);
         let shading_normal = if mesh.normals.is_empty() {
             geometric_normal
         } else {
@@ -115,7 +116,7 @@ impl World {
         } else {
             let [t0, t1, t2] = indices.map(|i| mesh.tangents[i]);
             let blended = t0.truncate() * (1.0 - b1 - b2) + t1.truncate() * b1 + t2.truncate() * b2;
-            let world = Vec3::from(self.transform_at(hit.object, ray.time).matrix3 * Vec3A::from(blended));
+            let world = Vec3::from(to_world.matrix3 * Vec3A::from(blended));
             (world.normalize_or(Vec3::X), if t0.w < 0.0 { -flip } else { flip })
         };
         SurfacePoint {
