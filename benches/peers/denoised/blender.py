@@ -2,7 +2,7 @@
 
     python blender.py SCENE.toml SIZE REFERENCE_SPP FOLDER SECONDS...      (pip install bpy numpy)
 
-Writes reference.npy and one picture for each time, linear RGB, and prints a line of JSON for each. What Blender does before and
+Writes reference.npy and three pictures for each time, linear RGB, and prints a line of JSON for each. What Blender does before and
 after the samples is measured on a render of one sample and not counted; denoising is.
 """
 
@@ -18,6 +18,7 @@ import numpy as np
 
 THREADS = 2
 REFERENCE_SEED = 77
+SEEDS = [1, 2, 3]
 
 
 def material(description):
@@ -130,9 +131,11 @@ def main():
     around = least(is_denoised=False)
     denoising = max(0.0, least() - around)
     for asked in times:
-        picture, taken = render(folder, 1 << 14, seconds=max(0.1, float(asked) - denoising))
-        np.save(f"{folder}/{asked}.npy", picture)
-        print("JSON", json.dumps({"asked": asked, "seconds": taken - around, "spp": None}), flush=True)
+        for seed in SEEDS:
+            picture, taken = render(folder, 1 << 14, seed=seed, seconds=max(0.1, float(asked) - denoising))
+            np.save(f"{folder}/{asked}-{seed}.npy", picture)
+            said = {"asked": asked, "seed": seed, "seconds": taken - around, "spp": None}
+            print("JSON", json.dumps(said), flush=True)
 
 
 main()

@@ -2,8 +2,9 @@
 """Denoised pictures at equal time: ours, Mitsuba 3 with Open Image Denoise, Cycles adaptive with its denoiser, as it comes (it
 clamps indirect light and blurs what glossy surfaces show) and without that.
 
-Each is judged by ColorVideoVDP against its own converged picture, as a display of 200 cd/m² shows both. Two threads each, one after
-the other; loading, trees and compiling are not counted, denoising is.
+Each is judged by ColorVideoVDP against its own converged picture, as a display of 200 cd/m² shows both; Cycles as it comes also
+against the one without clamp and blur, since against its own what they take away is not missed. Two threads each, one after the
+other; loading, trees and compiling are not counted, denoising is.
 
     cargo build --release
     python3 -m venv venv && venv/bin/pip install cvvdp OpenEXR numpy
@@ -61,7 +62,10 @@ def peer(script, python, scene, size, reference_spp, times, folder, *options):
     command = [python, HERE / script, scene, str(size), str(reference_spp), folder, *times, *options]
     finished = subprocess.run([str(part) for part in command], check=True, capture_output=True, text=True, cwd=HERE)
     lines = [json.loads(line[line.index("{") :]) for line in finished.stdout.splitlines() if '"asked"' in line]
-    made = {said["asked"]: [(np.load(folder / f"{said['asked']}.npy"), said["seconds"], said["spp"])] for said in lines}
+    made = {}
+    for said in lines:
+        picture = np.load(folder / f"{said['asked']}-{said['seed']}.npy")
+        made.setdefault(said["asked"], []).append((picture, said["seconds"], said["spp"]))
     return np.load(folder / "reference.npy"), made
 
 
@@ -69,6 +73,18 @@ def shown(picture, nits_per_unit):
     """sRGB values of a display that clips at its white."""
     light = np.clip(picture * nits_per_unit / WHITE_CD_M2, 0.0, 1.0)
     return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055).astype(np.float32)
+
+
+def rows(metric, nits_per_unit, head, reference, made):
+    for time, pictures in made.items():
+        jods = []
+        for picture, _, _ in pictures:
+            jod, _ = metric.predict(shown(picture, nits_per_unit), shown(reference, nits_per_unit), dim_order="HWC")
+            jods.append(float(jod))
+        seconds = np.mean([took for _, took, _ in pictures])
+        spp = [samples for _, _, samples in pictures if samples]
+        spp = f"{np.mean(spp):.0f}" if spp else "by its rule"
+        print(f"{head} {time} | {seconds:.2f} | {spp} | {np.mean(jods):.3f} ± {np.std(jods):.3f} |", flush=True)
 
 
 def main():
@@ -89,18 +105,15 @@ def main():
                 "Cycles": lambda: peer("blender.py", os.environ["CYCLES_PYTHON"], *arguments),
                 "Cycles, unbiased": lambda: peer("blender.py", os.environ["CYCLES_PYTHON"], *arguments, "--unbiased"),
             }
+            references = {}
             for arm, run in arms.items():
                 reference, made = run()
+                references[arm] = reference
                 print(f"{name}, {arm}: mean of the reference {reference.mean():.4f}", file=sys.stderr)
-                for time in times:
-                    jods = []
-                    for picture, _, _ in made[time]:
-                        jod, _ = metric.predict(shown(picture, nits_per_unit), shown(reference, nits_per_unit), dim_order="HWC")
-                        jods.append(float(jod))
-                    seconds = np.mean([took for _, took, _ in made[time]])
-                    spp = [samples for _, _, samples in made[time] if samples]
-                    spp = f"{np.mean(spp):.0f}" if spp else "by its rule"
-                    print(f"| {name} | {arm} | {time} | {seconds:.2f} | {spp} | {np.mean(jods):.3f} |", flush=True)
+                rows(metric, nits_per_unit, f"| {name} | {arm} |", reference, made)
+                if arm == "Cycles":
+                    as_it_comes = made
+            rows(metric, nits_per_unit, f"| {name} | Cycles, against unbiased |", references["Cycles, unbiased"], as_it_comes)
 
 
 if __name__ == "__main__":

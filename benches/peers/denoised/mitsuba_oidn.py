@@ -2,7 +2,7 @@
 
     python mitsuba_oidn.py SCENE.toml SIZE REFERENCE_SPP FOLDER SECONDS...      (pip install mitsuba numpy pyoidn)
 
-Writes reference.npy and one picture for each time, linear RGB, and prints a line of JSON for each. Loading and compiling are
+Writes reference.npy and three pictures for each time, linear RGB, and prints a line of JSON for each. Loading and compiling are
 not counted: each number of samples is rendered once before it is timed.
 """
 
@@ -18,6 +18,8 @@ import pyoidn
 
 mi.set_variant("llvm_ad_rgb")
 THREADS = 2
+# None of the reference, whose passes count from 0.
+SEEDS = [1001, 1002, 1003]
 
 
 def bsdf(material):
@@ -94,17 +96,19 @@ def main():
     scene = load(path, size)
     passes = [render(scene, 256, seed)[0][0] for seed in range(reference_spp // 256)]
     np.save(f"{folder}/reference.npy", np.mean(passes, axis=0))
-    layers, _ = render(scene, 16, 1)
-    _, tracing = render(scene, 16, 2)
+    layers, _ = render(scene, 16, SEEDS[0])
+    _, tracing = render(scene, 16, SEEDS[1])
     denoised(layers)
     _, denoising = denoised(layers)
     for words in sys.argv[5:]:
         samples = max(1, int((float(words) - denoising) / tracing * 16))
-        render(scene, samples, 3)
-        layers, tracing_s = render(scene, samples, 4)
-        picture, denoising_s = denoised(layers)
-        np.save(f"{folder}/{words}.npy", picture)
-        print(json.dumps({"asked": words, "seconds": tracing_s + denoising_s, "spp": samples}), flush=True)
+        render(scene, samples, SEEDS[0])
+        for seed in SEEDS:
+            layers, tracing_s = render(scene, samples, seed)
+            picture, denoising_s = denoised(layers)
+            np.save(f"{folder}/{words}-{seed}.npy", picture)
+            said = {"asked": words, "seed": seed, "seconds": tracing_s + denoising_s, "spp": samples}
+            print(json.dumps(said), flush=True)
 
 
 main()
