@@ -33,6 +33,7 @@ use settings::{LoopSettings, Sampling, ladder};
 use state::RenderState;
 use std::collections::VecDeque;
 use std::time::Instant;
+use until_look::SAMPLES_OF_A_LOOK;
 
 /// The ladder of a picture that is denoised begins here, or at its target.
 const HIGHEST_DENOISED_RUNG: f64 = 2.0;
@@ -342,7 +343,7 @@ impl<'a> Loop<'a> {
         let elapsed = self.seconds();
         let seconds_per_sample = (elapsed - self.state.seconds_perception).max(0.0) / traced as f64;
         let next = pending.front().map_or(0, SamplePlan::samples) as f64 * seconds_per_sample;
-        let look = self.looked.map_or(0.0, |looked| looked.seconds);
+        let look = self.looked.map_or_else(|| self.expected_look(seconds_per_sample), |looked| looked.seconds);
         let done_now = elapsed + if self.is_looked_at() { 0.0 } else { look };
         let done_after_next = elapsed + next + look;
         let limits = &self.settings.limits;
@@ -353,6 +354,12 @@ impl<'a> Loop<'a> {
         } else {
             None
         }
+    }
+
+    /// Seconds of the first look: next to none at a raw picture.
+    fn expected_look(&self, seconds_per_sample: f64) -> f64 {
+        let pixels = f64::from(self.state.film.width()) * f64::from(self.state.film.height());
+        if self.settings.denoiser.is_some() { SAMPLES_OF_A_LOOK * pixels * seconds_per_sample } else { 0.0 }
     }
 
     /// Tells the last state, and looks once more where the rule did not need to.

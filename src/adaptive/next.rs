@@ -64,14 +64,20 @@ impl Loop<'_> {
         }
         let started = Instant::now();
         let (film, doubled) = (&self.state.film, self.doubled());
+        let rung = self.rungs.front().copied().unwrap_or(self.settings.limits.visibility);
         let until_look = self.state.until_look.get_or_insert_with(|| UntilLook::first(film));
-        if until_look.is_over(film) {
-            return Ok(false);
-        }
+        let may_look = until_look.may_look(film);
         let plan = if self.settings.sampling == Sampling::Uniform {
+            if may_look {
+                return Ok(false);
+            }
             uniform_plan(film, doubled)
         } else {
             let raw = judge_raw(film, self.settings)?;
+            if may_look && until_look.must_look(film, &raw, rung) {
+                self.state.seconds_perception += started.elapsed().as_secs_f64();
+                return Ok(false);
+            }
             cut(until_look.plan(film, &raw, self.settings.limits.max_samples, left), &raw, left)
         };
         self.state.seconds_perception += started.elapsed().as_secs_f64();

@@ -19,9 +19,12 @@ const GROWTH: f64 = 0.5;
 const LEAST_PLAN: f64 = 6.0;
 /// What a look at a denoised picture costs, in samples for every pixel, about: 5 to 15 with Open Image Denoise, 2 to 4 with the
 /// built-in filter (`benches/README.md`). Before the first look too it is better spent on more of them.
-const SAMPLES_OF_A_LOOK: f64 = 10.0;
+pub(super) const SAMPLES_OF_A_LOOK: f64 = 10.0;
 /// Most that comes between two looks, as a share of what is there.
 const MOST_GROWTH: f64 = 3.0;
+/// What raw noise may be above the visibility asked for, so that a look is worth its cost: denoising made ten scenes 0.8 to 2.9 times
+/// better at 32 samples, one of them 4.4 times at 8 (`benches/README.md`).
+const MOST_GAIN: f64 = 3.0;
 /// Doublings of a pixel in one plan.
 const MOST_DOUBLINGS: u32 = 2;
 /// What is in a pixel's window above the visibility asked for, as a share of what is in the window that has most, from which on
@@ -35,15 +38,19 @@ const MOST_TIMES_MEAN: f64 = 16.0;
 pub struct UntilLook {
     /// Pixels whose noise makes that something shows.
     to_blame: Vec<bool>,
-    /// Samples of all pixels at which the next look is due.
-    samples: u64,
+    /// Samples of all pixels from which on there is a look, unless raw noise says that nothing can be reached.
+    earliest: u64,
+    /// Samples of all pixels at which there is one in any case.
+    latest: u64,
 }
 
 impl UntilLook {
     /// Before the first look.
     pub(super) fn first(film: &Film) -> Self {
         let pixels = (film.width() * film.height()) as usize;
-        Self { to_blame: vec![true; pixels], samples: (SAMPLES_OF_A_LOOK * pixels as f64) as u64 }
+        let earliest = SAMPLES_OF_A_LOOK * pixels as f64;
+        let latest = (1.0 + MOST_GROWTH) * earliest;
+        Self { to_blame: vec![true; pixels], earliest: earliest as u64, latest: latest as u64 }
     }
 
     /// After a look, while some of the picture is above `visibility`: until that may be reached, if errors fell as 1/n (measured
@@ -54,8 +61,10 @@ impl UntilLook {
         let growth = judgement.predicted.quantile(1.0 - TOLERATED_SHARE) / visibility - 1.0;
         let least = SAMPLES_OF_A_LOOK * to_blame.len() as f64;
         // The order of `max` turns NaN, of 0 / 0, into the least.
-        let added = (growth.max(GROWTH) * present).max(least).min(MOST_GROWTH * present);
-        Self { to_blame, samples: film.total_samples() + added as u64 }
+        let most = MOST_GROWTH * present;
+        let added = (growth.max(GROWTH) * present).max(least).min(most);
+        let after = |added: f64| film.total_samples() + added as u64;
+        Self { to_blame, earliest: after(added), latest: after(most) }
     }
 
     /// Whether it is of a picture of so many pixels.
@@ -63,9 +72,16 @@ impl UntilLook {
         self.to_blame.len() == pixels as usize
     }
 
-    /// Whether the next look is due. A sample a pixel is not worth another plan.
-    pub(super) fn is_over(&self, film: &Film) -> bool {
-        film.total_samples() + self.to_blame.len() as u64 > self.samples
+    /// Whether there may be a look. A sample a pixel is not worth another plan.
+    pub(super) fn may_look(&self, film: &Film) -> bool {
+        film.total_samples() + self.to_blame.len() as u64 > self.earliest
+    }
+
+    /// Whether there is one where there may: not yet while raw noise is so far above a visibility that no denoiser can bring the
+    /// picture to it.
+    pub(super) fn must_look(&self, film: &Film, raw: &Judgement, visibility: f64) -> bool {
+        let is_late = film.total_samples() + self.to_blame.len() as u64 > self.latest;
+        is_late || raw.predicted.quantile(1.0 - TOLERATED_SHARE) <= MOST_GAIN * visibility
     }
 
     /// More samples for those to blame; at most `left` in all. `judgement` may be of the raw picture.
@@ -76,7 +92,8 @@ impl UntilLook {
     /// at 32 samples 9.50 and 9.55, even 9.44 (`benches/README.md`).
     pub(super) fn plan(&self, film: &Film, judgement: &Judgement, max_samples: u32, left: u64) -> SamplePlan {
         let raw = judgement.energy_of(&judgement.pooled_variance_per_sample);
-        let left = left.min(self.samples.saturating_sub(film.total_samples()));
+        let due = if self.may_look(film) { self.latest } else { self.earliest };
+        let left = left.min(due.saturating_sub(film.total_samples()));
         plan_by_energy(film, &defended(raw.values()), &self.to_blame, max_samples, left)
     }
 }
@@ -203,18 +220,32 @@ mod tests {
     #[test]
     fn looks_are_as_far_apart_as_they_cost() {
         let pixels = 64 * 64;
-        assert_eq!(UntilLook::first(&Film::new(64, 64)).samples, 10 * pixels);
+        assert_eq!(UntilLook::first(&Film::new(64, 64)).earliest, 10 * pixels);
         let due = |predicted: f32, visibility: f64| {
             let (film, judgement) = looked_at(|_, _| predicted);
             let until_look = UntilLook::after(&film, &judgement, visibility);
-            assert!(!until_look.is_over(&film), "it asks for samples");
-            until_look.samples / pixels
+            assert!(!until_look.may_look(&film), "it asks for samples");
+            until_look.earliest / pixels
         };
         assert_eq!(due(2.2, 2.0), 16 + 10, "a look's worth");
         assert_eq!(due(4.0, 2.0), 16 + 16, "what errors that fall as 1/n need");
         assert_eq!(due(f32::INFINITY, 2.0), 4 * 16);
         let (film, judgement) = looked_at(|_, _| 1.0);
-        assert!(UntilLook::after(&film, &judgement, 2.0).is_over(&film), "nothing shows");
+        assert!(UntilLook::after(&film, &judgement, 2.0).may_look(&film), "nothing shows");
+    }
+
+    /// What raw noise already says costs no look: while it is above three times the visibility asked for there is none, though not for
+    /// ever.
+    #[test]
+    fn hopeless_looks_are_left_out() {
+        let until_look = |film: &Film| UntilLook::first(film);
+        let (film, raw) = looked_at(|_, _| 6.5);
+        assert!(until_look(&film).may_look(&film), "16 samples");
+        assert!(!until_look(&film).must_look(&film, &raw, 2.0));
+        assert!(until_look(&film).must_look(&film, &raw, 2.2));
+        assert!(!until_look(&film).plan(&film, &raw, 1024, u64::MAX).blocks.is_empty(), "it goes on without one");
+        let late = UntilLook { latest: film.total_samples(), ..until_look(&film) };
+        assert!(late.must_look(&film, &raw, 2.0));
     }
 
     /// Which pixels get samples where these are above the target.
