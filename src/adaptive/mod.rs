@@ -9,6 +9,7 @@ pub mod audit;
 pub mod denoised;
 mod forecast;
 pub mod judge;
+mod limits;
 mod monitor;
 mod next;
 pub mod plan;
@@ -33,7 +34,6 @@ use settings::{LoopSettings, Sampling, ladder};
 use state::RenderState;
 use std::collections::VecDeque;
 use std::time::Instant;
-use until_look::SAMPLES_OF_A_LOOK;
 
 /// The ladder of a picture that is denoised begins here, or at its target.
 const HIGHEST_DENOISED_RUNG: f64 = 2.0;
@@ -330,36 +330,6 @@ impl<'a> Loop<'a> {
     /// Whether nothing was traced since the last look.
     fn is_looked_at(&self) -> bool {
         self.looked.is_some_and(|looked| looked.at_samples == self.state.film.total_samples())
-    }
-
-    /// Limits that do not depend on the picture: a render ends at the boundary between plans from which it is done, with a
-    /// last look, nearest to its limit of time. The pilot is always traced.
-    fn limit_reached(&self) -> Option<StopReason> {
-        let RenderState { film, pending, plans, .. } = &self.state;
-        if *plans == 0 {
-            return None;
-        }
-        let traced = film.total_samples().max(1);
-        let elapsed = self.seconds();
-        let seconds_per_sample = (elapsed - self.state.seconds_perception).max(0.0) / traced as f64;
-        let next = pending.front().map_or(0, SamplePlan::samples) as f64 * seconds_per_sample;
-        let look = self.looked.map_or_else(|| self.expected_look(seconds_per_sample), |looked| looked.seconds);
-        let done_now = elapsed + if self.is_looked_at() { 0.0 } else { look };
-        let done_after_next = elapsed + next + look;
-        let limits = &self.settings.limits;
-        if limits.time.is_some_and(|limit| 0.5 * (done_now + done_after_next) >= limit.as_secs_f64()) {
-            Some(StopReason::Time)
-        } else if limits.plans.is_some_and(|limit| *plans >= limit) {
-            Some(StopReason::Plans)
-        } else {
-            None
-        }
-    }
-
-    /// Seconds of the first look: next to none at a raw picture.
-    fn expected_look(&self, seconds_per_sample: f64) -> f64 {
-        let pixels = f64::from(self.state.film.width()) * f64::from(self.state.film.height());
-        if self.settings.denoiser.is_some() { SAMPLES_OF_A_LOOK * pixels * seconds_per_sample } else { 0.0 }
     }
 
     /// Tells the last state, and looks once more where the rule did not need to.

@@ -88,14 +88,6 @@ impl Loop<'_> {
         Ok(true)
     }
 
-    /// Samples that the budget has left, of all pixels.
-    fn left_of_budget(&self) -> u64 {
-        let film = &self.state.film;
-        let pixels = u64::from(film.width()) * u64::from(film.height());
-        let budget = self.settings.limits.mean_samples.map(|mean| u64::from(mean) * pixels);
-        budget.map_or(u64::MAX, |budget| budget.saturating_sub(film.total_samples()))
-    }
-
     /// Samples of each pixel after the next plan of uniform sampling.
     fn doubled(&self) -> u32 {
         let (film, limits) = (&self.state.film, &self.settings.limits);

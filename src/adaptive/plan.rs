@@ -12,6 +12,7 @@ use crate::integrator::{BlockWork, PILOT_SAMPLES, SamplePlan};
 use crate::sampler::Half;
 use fechner_perception::Plane;
 use fechner_perception::allocation::{AllocationProblem, allocate};
+use rayon::prelude::*;
 
 /// Doublings that one plan gives a pixel at most where that costs no more than a look. Otherwise there is one: the pixel's
 /// variance, and what stratification makes of it, are looked at again in between, since stratification pays more the more
@@ -19,10 +20,13 @@ use fechner_perception::allocation::{AllocationProblem, allocate};
 const MOST_DOUBLINGS_AT_ONCE: u32 = 3;
 
 /// What a look at the picture costs, in samples for every pixel, about.
-const SAMPLES_OF_A_LOOK: f64 = 1.5;
+const SAMPLES_OF_A_RAW_LOOK: f64 = 1.5;
 
 /// One part in so many of the film's samples may go at once to pixels that are doubled on suspicion.
 const SMALL_DOUBLING: u64 = 256;
+
+/// Pixels that are worth handing to another thread.
+const PIXELS_A_TASK: usize = 1 << 12;
 
 /// Gap to the cheapest counts that is enough: rounding to doublings and the confidence margin cost more than 1 %.
 const ENOUGH_GAP: f64 = 0.01;
@@ -166,7 +170,7 @@ pub(super) fn adaptive_plan(
         })
     };
     let pixels = f64::from(film.width()) * f64::from(film.height());
-    let is_cheap = |plan: &SamplePlan| plan.samples() as f64 <= SAMPLES_OF_A_LOOK * pixels;
+    let is_cheap = |plan: &SamplePlan| plan.samples() as f64 <= SAMPLES_OF_A_RAW_LOOK * pixels;
     let mut best = None;
     for margin in MARGINS {
         let plan = plan_of(Haste { most_doublings: MOST_DOUBLINGS_AT_ONCE, margin });
@@ -200,24 +204,19 @@ const MARGINS: [f64; 6] = [1.0, 1.05, 1.1, 1.2, 1.4, 1.8];
 /// Doublings of both halves of a pixel that should have `wanted` samples if its variance were `pooled`; `own` is the larger of
 /// that and what each half may know of the pixel itself.
 fn doublings_of_halves(film: &Film, pixel: usize, wanted: f32, pooled: f32, own: [f32; 2], haste: Haste) -> [u32; 2] {
-    let doublings = Half::BOTH.map(|half| {
+    // A half that falls far behind makes the other's samples worthless, yet one that follows is decided by its own data after all,
+    // through the other's count: on the lognormal field of the tests a lag of at most one doubling costs 0.50 % of the energy, two
+    // 0.24 %, any 0.14 % (each ± 0.12), on a caustic two cost 0.32 %, any 0.27 % (± 0.06), for level samples (`benches/README.md`).
+    Half::BOTH.map(|half| {
         let taken = film.half(half)[pixel].taken.max(1);
         let harder = if pooled > 0.0 { f64::from(own[half.index()] / pooled).max(1.0).sqrt() } else { 1.0 };
         let need = 0.5 * f64::from(wanted) * harder * confidence_margin(f64::from(taken));
         doublings_for(haste.margin * need / f64::from(taken), dither(film.width(), pixel), haste.most_doublings)
-    });
-    // A half that falls far behind makes the other's samples worthless, yet one that follows closely is decided by its own
-    // data after all, through the other's count: on the lognormal field of the tests a lag of one doubling costs 0.50 % of
-    // the energy, two 0.24 %, none that is bounded 0.14 % (each ± 0.12).
-    let after = |half: Half| u64::from(film.half(half)[pixel].taken) << doublings[half.index()];
-    Half::BOTH.map(|half| {
-        let is_far_behind = 8 * after(half) <= after(half.other());
-        doublings[half.index()] + u32::from(is_far_behind)
     })
 }
 
 /// One doubling for every pixel of a mask; more at once, up to three, where that is next to nothing of the film's samples.
-pub fn doubling_of(film: &Film, max_samples: u32, mask: impl Fn(usize) -> bool) -> SamplePlan {
+pub fn doubling_of(film: &Film, max_samples: u32, mask: impl Fn(usize) -> bool + Sync) -> SamplePlan {
     let pixels = (film.width() * film.height()) as usize;
     let masked: u64 = (0..pixels).filter(|&pixel| mask(pixel)).map(|pixel| u64::from(film.samples(pixel))).sum();
     let is_small = |doublings: &u32| ((1 << doublings) - 1) * masked <= film.total_samples() / SMALL_DOUBLING;
@@ -226,25 +225,28 @@ pub fn doubling_of(film: &Film, max_samples: u32, mask: impl Fn(usize) -> bool) 
 }
 
 /// So many doublings of each half of each pixel, up to `max_samples`.
-pub(super) fn doubling_plan(film: &Film, max_samples: u32, doublings: impl Fn(usize) -> [u32; 2]) -> SamplePlan {
-    let mut plan = SamplePlan::default();
-    for pixel in 0..(film.width() * film.height()) as usize {
+pub(super) fn doubling_plan(film: &Film, max_samples: u32, doublings: impl Fn(usize) -> [u32; 2] + Sync) -> SamplePlan {
+    let of_pixel = |pixel: usize| {
         let doublings = doublings(pixel);
-        for half in Half::BOTH {
-            let mut taken = film.half(half)[pixel].taken;
-            for _ in 0..doublings[half.index()] {
-                let rest = BlockWork::rest(pixel as u32, half, taken);
-                // A pilot may have been a part of the first block.
-                let block = BlockWork { samples: rest.samples.min(taken.max(1)), ..rest };
-                taken += block.samples;
-                if taken > max_samples / 2 {
-                    break;
-                }
-                plan.blocks.push(block);
-            }
-        }
-    }
-    plan
+        Half::BOTH.into_iter().flat_map(move |half| {
+            let taken = film.half(half)[pixel].taken;
+            doubled_blocks(pixel as u32, half, taken, max_samples).take(doublings[half.index()] as usize)
+        })
+    };
+    let pixels = (film.width() * film.height()) as usize;
+    let blocks = (0..pixels).into_par_iter().with_min_len(PIXELS_A_TASK).flat_map_iter(of_pixel).collect();
+    SamplePlan { blocks }
+}
+
+/// The blocks that double a half of a pixel again and again, while it has at most its half of `max_samples`.
+fn doubled_blocks(pixel: u32, half: Half, mut taken: u32, max_samples: u32) -> impl Iterator<Item = BlockWork> {
+    std::iter::from_fn(move || {
+        let rest = BlockWork::rest(pixel, half, taken);
+        // A pilot may have been a part of the first block.
+        let block = BlockWork { samples: rest.samples.min(taken.max(1)), ..rest };
+        taken += block.samples;
+        (taken <= max_samples / 2).then_some(block)
+    })
 }
 
 /// How much more than the estimated need is asked for, against estimates that are low by chance. Pooling leaves few per

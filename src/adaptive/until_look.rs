@@ -19,7 +19,7 @@ const GROWTH: f64 = 0.5;
 const LEAST_PLAN: f64 = 6.0;
 /// What a look at a denoised picture costs, in samples for every pixel, about: 5 to 15 with Open Image Denoise, 2 to 4 with the
 /// built-in filter (`benches/README.md`). Before the first look too it is better spent on more of them.
-pub(super) const SAMPLES_OF_A_LOOK: f64 = 10.0;
+pub(super) const SAMPLES_OF_A_DENOISED_LOOK: f64 = 10.0;
 /// Most that comes between two looks, as a share of what is there.
 const MOST_GROWTH: f64 = 3.0;
 /// What raw noise may be above the visibility asked for, so that a look is worth its cost: denoising made ten scenes 0.8 to 2.9 times
@@ -48,7 +48,7 @@ impl UntilLook {
     /// Before the first look.
     pub(super) fn first(film: &Film) -> Self {
         let pixels = (film.width() * film.height()) as usize;
-        let earliest = SAMPLES_OF_A_LOOK * pixels as f64;
+        let earliest = SAMPLES_OF_A_DENOISED_LOOK * pixels as f64;
         let latest = (1.0 + MOST_GROWTH) * earliest;
         Self { to_blame: vec![true; pixels], earliest: earliest as u64, latest: latest as u64 }
     }
@@ -59,7 +59,7 @@ impl UntilLook {
         let to_blame = to_blame(judgement, visibility);
         let present: f64 = wanted(&to_blame).map(|pixel| f64::from(film.samples(pixel))).sum();
         let growth = judgement.predicted.quantile(1.0 - TOLERATED_SHARE) / visibility - 1.0;
-        let least = SAMPLES_OF_A_LOOK * to_blame.len() as f64;
+        let least = SAMPLES_OF_A_DENOISED_LOOK * to_blame.len() as f64;
         // The order of `max` turns NaN, of 0 / 0, into the least.
         let most = MOST_GROWTH * present;
         let added = (growth.max(GROWTH) * present).max(least).min(most);

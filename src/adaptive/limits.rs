@@ -1,0 +1,46 @@
+//! Limits that do not ask what the picture looks like: time, plans and the budget of samples.
+
+use super::state::RenderState;
+use super::until_look::SAMPLES_OF_A_DENOISED_LOOK;
+use super::{Loop, StopReason};
+use crate::integrator::SamplePlan;
+
+impl Loop<'_> {
+    /// Limits that do not depend on the picture: a render ends at the boundary between plans from which it is done, with a
+    /// last look, nearest to its limit of time. The pilot is always traced.
+    pub(super) fn limit_reached(&self) -> Option<StopReason> {
+        let RenderState { film, pending, plans, .. } = &self.state;
+        if *plans == 0 {
+            return None;
+        }
+        let traced = film.total_samples().max(1);
+        let elapsed = self.seconds();
+        let seconds_per_sample = (elapsed - self.state.seconds_perception).max(0.0) / traced as f64;
+        let next = pending.front().map_or(0, SamplePlan::samples) as f64 * seconds_per_sample;
+        let look = self.looked.map_or_else(|| self.expected_look(seconds_per_sample), |looked| looked.seconds);
+        let done_now = elapsed + if self.is_looked_at() { 0.0 } else { look };
+        let done_after_next = elapsed + next + look;
+        let limits = &self.settings.limits;
+        if limits.time.is_some_and(|limit| 0.5 * (done_now + done_after_next) >= limit.as_secs_f64()) {
+            Some(StopReason::Time)
+        } else if limits.plans.is_some_and(|limit| *plans >= limit) {
+            Some(StopReason::Plans)
+        } else {
+            None
+        }
+    }
+
+    /// Seconds of the first look: next to none at a raw picture.
+    fn expected_look(&self, seconds_per_sample: f64) -> f64 {
+        let pixels = f64::from(self.state.film.width()) * f64::from(self.state.film.height());
+        if self.settings.denoiser.is_some() { SAMPLES_OF_A_DENOISED_LOOK * pixels * seconds_per_sample } else { 0.0 }
+    }
+
+    /// Samples that the budget has left, of all pixels.
+    pub(super) fn left_of_budget(&self) -> u64 {
+        let film = &self.state.film;
+        let pixels = u64::from(film.width()) * u64::from(film.height());
+        let budget = self.settings.limits.mean_samples.map(|mean| u64::from(mean) * pixels);
+        budget.map_or(u64::MAX, |budget| budget.saturating_sub(film.total_samples()))
+    }
+}
