@@ -152,14 +152,14 @@ impl Loop<'_> {
         }
         // Each pixel by itself has what it needs, yet its surroundings show.
         let predicted = judgement.predicted.values();
-        Ok(Some(doubling_of(film, limits.max_samples, |i| f64::from(predicted[i]) > rung)))
+        Ok(Some(doubling_of(film, limits.max_samples, |i| f64::from(predicted[i]) / rung)))
     }
 
     /// More samples for single pixels that stand out of what the halves show, which pooling hides.
     fn peaks(&self, rung: f64, judgement: &Judgement) -> SamplePlan {
         let amplitude = &judgement.measured_error().amplitude;
         let limit = TOLERATED_PEAK * rung;
-        doubling_of(&self.state.film, self.settings.limits.max_samples, |i| f64::from(amplitude.values()[i]) > limit)
+        doubling_of(&self.state.film, self.settings.limits.max_samples, |i| f64::from(amplitude.values()[i]) / limit)
     }
 
     /// Audits a rung that is reached. Where the variance proves too low it is raised from here on, and the plan for it is

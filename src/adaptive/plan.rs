@@ -22,8 +22,11 @@ const MOST_DOUBLINGS_AT_ONCE: u32 = 3;
 /// What a look at the picture costs, in samples for every pixel, about.
 const SAMPLES_OF_A_RAW_LOOK: f64 = 1.5;
 
+/// Doublings that one plan gives at most to a pixel that shows too much by itself.
+const MOST_DOUBLINGS_OF_EXCESS: u32 = 4;
+
 /// One part in so many of the film's samples may go at once to pixels that are doubled on suspicion.
-const SMALL_DOUBLING: u64 = 256;
+const SMALL_DOUBLING: u64 = 32;
 
 /// Pixels that are worth handing to another thread.
 const PIXELS_A_TASK: usize = 1 << 12;
@@ -215,13 +218,21 @@ fn doublings_of_halves(film: &Film, pixel: usize, wanted: f32, pooled: f32, own:
     })
 }
 
-/// One doubling for every pixel of a mask; more at once, up to three, where that is next to nothing of the film's samples.
-pub fn doubling_of(film: &Film, max_samples: u32, mask: impl Fn(usize) -> bool + Sync) -> SamplePlan {
-    let pixels = (film.width() * film.height()) as usize;
-    let masked: u64 = (0..pixels).filter(|&pixel| mask(pixel)).map(|pixel| u64::from(film.samples(pixel))).sum();
-    let is_small = |doublings: &u32| ((1 << doublings) - 1) * masked <= film.total_samples() / SMALL_DOUBLING;
-    let doublings = (2..=MOST_DOUBLINGS_AT_ONCE).rev().find(is_small).unwrap_or(1);
-    doubling_plan(film, max_samples, |pixel| [if mask(pixel) { doublings } else { 0 }; 2])
+/// Doublings for every pixel that shows so many times what it may, `excess` (no more than 1: none): as many as bring that down
+/// and one more, since it is what a single pixel of the halves' difference says, while they are next to nothing of the film's samples;
+/// else one.
+///
+/// Asked for one to three at once without regard to the excess, a lamp's edge took seven looks for six pixels (`benches/README.md`).
+pub fn doubling_of(film: &Film, max_samples: u32, excess: impl Fn(usize) -> f64 + Sync) -> SamplePlan {
+    let plan_of = |most: u32| {
+        doubling_plan(film, max_samples, |pixel| {
+            let excess = excess(pixel);
+            let needed = (2.0 * excess.log2()).ceil() + 1.0;
+            [if excess > 1.0 { needed.min(f64::from(most)) as u32 } else { 0 }; 2]
+        })
+    };
+    let is_small = |plan: &SamplePlan| plan.samples() <= film.total_samples() / SMALL_DOUBLING;
+    (2..=MOST_DOUBLINGS_OF_EXCESS).rev().map(plan_of).find(is_small).unwrap_or_else(|| plan_of(1))
 }
 
 /// So many doublings of each half of each pixel, up to `max_samples`.

@@ -50,18 +50,23 @@ fn the_rest_of_a_doubling_follows_on() {
     }
 }
 
-/// A handful of pixels is doubled three times at once, a picture once, and never beyond what a pixel may have.
+/// A handful of pixels is doubled as often as what it shows asks for, a picture once, and none beyond what a pixel may have.
 #[test]
 fn handfuls_are_not_looked_at_after_each_doubling() {
     let mut film = Film::new(64, 64);
     for block in pilot_plan(&film, 16).blocks {
         film.merge_block(block, &constant_block(block.samples));
     }
-    assert_eq!(doubling_of(&film, 1 << 16, |pixel| pixel == 70).samples(), 7 * 16);
-    assert_eq!(doubling_of(&film, 1 << 16, |pixel| pixel < 5).samples(), 5 * 3 * 16);
-    assert_eq!(doubling_of(&film, 1 << 16, |_| true).samples(), 64 * 64 * 16);
-    assert_eq!(doubling_of(&film, 40, |pixel| pixel == 70).samples(), 16);
-    assert!(doubling_of(&film, 1 << 16, |_| false).blocks.is_empty());
+    let added = |max_samples: u32, pixels: usize, excess: f64| {
+        doubling_of(&film, max_samples, |pixel| if pixel < pixels { excess } else { 1.0 }).samples() / 16
+    };
+    assert_eq!(added(1 << 16, 1, 1.3), 3, "two doublings: the one that is needed, and one more");
+    assert_eq!(added(1 << 16, 1, 1.9), 7, "three");
+    assert_eq!(added(1 << 16, 1, f64::INFINITY), 15, "four at most");
+    assert_eq!(added(1 << 16, 20, 100.0), 20 * 3, "two: three would be more than a 32nd of the film");
+    assert_eq!(added(1 << 16, 64 * 64, 100.0), 64 * 64, "one");
+    assert_eq!(added(40, 1, 100.0), 1, "no pixel may have more");
+    assert_eq!(added(1 << 16, 1, f64::NAN) + added(1 << 16, 64 * 64, 1.0), 0, "nothing shows");
 }
 
 #[test]

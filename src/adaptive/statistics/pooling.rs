@@ -3,7 +3,7 @@
 //! By rows and in planes, so that one instruction works on several pixels: pixel by pixel, with each pixel's facts together, this
 //! took about a quarter of a look (a profile read by hand on 22 November 2026).
 
-use super::PixelEvidence;
+use super::{PixelEvidence, by_channel};
 use crate::film::{CHANNELS, PixelGuide};
 use rayon::prelude::*;
 
@@ -33,8 +33,8 @@ pub(super) fn pooled_by_neighbours(
         return Vec::new();
     }
     let height = evidence.len() / width;
-    let surfaces = Surfaces::of(guides);
-    let channels: [Evidence; CHANNELS] = std::array::from_fn(|c| Evidence::of(evidence, c));
+    let (surfaces, channels) =
+        rayon::join(|| Surfaces::of(guides), || by_channel(|channel| Evidence::of(evidence, channel)));
     let rows = (0..height).into_par_iter().flat_map_iter(|y| {
         let mut sums = RowSums::new(width);
         for neighbour_y in y.saturating_sub(POOL_RADIUS)..(y + POOL_RADIUS + 1).min(height) {
