@@ -224,15 +224,19 @@ fn doublings_of_halves(film: &Film, pixel: usize, wanted: f32, pooled: f32, own:
 ///
 /// Asked for one to three at once without regard to the excess, a lamp's edge took seven looks for six pixels (`benches/README.md`).
 pub fn doubling_of(film: &Film, max_samples: u32, excess: impl Fn(usize) -> f64 + Sync) -> SamplePlan {
-    let plan_of = |most: u32| {
-        doubling_plan(film, max_samples, |pixel| {
-            let excess = excess(pixel);
-            let needed = (2.0 * excess.log2()).ceil() + 1.0;
-            [if excess > 1.0 { needed.min(f64::from(most)) as u32 } else { 0 }; 2]
-        })
+    let doublings = |pixel: usize, most: u32| {
+        let excess = excess(pixel);
+        let needed = (2.0 * excess.log2()).ceil() + 1.0;
+        if excess > 1.0 { needed.min(f64::from(most)) as u32 } else { 0 }
     };
-    let is_small = |plan: &SamplePlan| plan.samples() <= film.total_samples() / SMALL_DOUBLING;
-    (2..=MOST_DOUBLINGS_OF_EXCESS).rev().map(plan_of).find(is_small).unwrap_or_else(|| plan_of(1))
+    let pixels = (film.width() * film.height()) as usize;
+    // Counted before it is made: four doublings of a whole picture would be hundreds of megabytes.
+    let cost = |most: u32| -> u64 {
+        (0..pixels).map(|pixel| ((1 << doublings(pixel, most)) - 1) * u64::from(film.samples(pixel))).sum()
+    };
+    let is_small = |&most: &u32| cost(most) <= film.total_samples() / SMALL_DOUBLING;
+    let most = (2..=MOST_DOUBLINGS_OF_EXCESS).rev().find(is_small).unwrap_or(1);
+    doubling_plan(film, max_samples, |pixel| [doublings(pixel, most); 2])
 }
 
 /// So many doublings of each half of each pixel, up to `max_samples`.
