@@ -8,6 +8,7 @@
 pub mod audit;
 pub mod denoised;
 mod forecast;
+mod gain;
 pub mod judge;
 mod limits;
 mod monitor;
@@ -34,9 +35,6 @@ use settings::{LoopSettings, Sampling, ladder};
 use state::RenderState;
 use std::collections::VecDeque;
 use std::time::Instant;
-
-/// The ladder of a picture that is denoised begins here, or at its target.
-const HIGHEST_DENOISED_RUNG: f64 = 2.0;
 
 /// A finished render.
 #[derive(Debug)]
@@ -219,10 +217,7 @@ impl<'a> Loop<'a> {
         let is_below = |rung: f64, bound: Option<f64>| bound.is_none_or(|bound| rung < bound);
         let is_left = |&rung: &f64| is_below(rung, state.finished_rung) && is_below(rung, state.left_rung);
         let target = settings.limits.visibility;
-        // Far above threshold a denoised picture's greatest error is in places that no denoiser can help: they may not have
-        // all samples before the rest is looked after.
-        let is_walked = |&rung: &f64| settings.denoiser.is_none() || rung <= HIGHEST_DENOISED_RUNG.max(target);
-        let rungs = ladder(target).into_iter().filter(is_left).filter(is_walked).collect();
+        let rungs = ladder(target, settings.denoiser.is_some()).into_iter().filter(is_left).collect();
         let seconds_before = state.seconds_total;
         Self { tracer, settings, rungs, state, resumed_at: Instant::now(), seconds_before, looked: None }
     }

@@ -3,10 +3,11 @@
 
 use super::audit::{Audit, audit, audit_unproven};
 use super::forecast::Forecast;
+use super::gain::{cut, most_worthwhile};
 use super::judge::{JudgeError, Judgement, judge_raw, still_wanted};
-use super::plan::{adaptive_plan, cut_to_budget, doubling_of, uniform_plan, wanted_samples};
+use super::plan::{adaptive_plan, doubling_of, uniform_plan, wanted_samples};
 use super::rivals::rival_plan;
-use super::settings::{LoopSettings, Sampling};
+use super::settings::{LoopSettings, Sampling, THRESHOLD};
 use super::state::Exposure;
 use super::stop::{LEAST_SAVING, predicted_saving};
 use super::until_look::UntilLook;
@@ -37,7 +38,7 @@ impl Loop<'_> {
         }
         while let Some(&rung) = self.rungs.front() {
             if let Some(plan) = self.plan_towards(rung, judgement, left)?
-                && let Some(plan) = some(cut(plan, judgement, left))
+                && let Some(plan) = some(cut(plan, &self.state.film, judgement, left))
             {
                 return Ok(Step::Trace(plan));
             }
@@ -78,7 +79,7 @@ impl Loop<'_> {
                 self.state.seconds_perception += started.elapsed().as_secs_f64();
                 return Ok(false);
             }
-            cut(until_look.plan(film, &raw, self.settings.limits.max_samples, left), &raw, left)
+            cut(until_look.plan(film, &raw, self.settings.limits.max_samples, left), film, &raw, left)
         };
         self.state.seconds_perception += started.elapsed().as_secs_f64();
         if plan.blocks.is_empty() {
@@ -148,7 +149,7 @@ impl Loop<'_> {
         }
         let plan = adaptive_plan(film, judgement, &forecast, &wanted, limits.max_samples);
         if !plan.blocks.is_empty() {
-            return Ok(Some(plan));
+            return Ok(Some(if rung > THRESHOLD { plan } else { most_worthwhile(plan, film, judgement) }));
         }
         // Each pixel by itself has what it needs, yet its surroundings show.
         let predicted = judgement.predicted.values();
@@ -200,11 +201,6 @@ impl Loop<'_> {
 
 fn some(plan: SamplePlan) -> Option<SamplePlan> {
     if plan.blocks.is_empty() { None } else { Some(plan) }
-}
-
-/// Cut to what is left of the budget: where most is to be seen first.
-fn cut(plan: SamplePlan, judgement: &Judgement, left: u64) -> SamplePlan {
-    if plan.samples() > left { cut_to_budget(plan, &judgement.predicted, left) } else { plan }
 }
 
 /// Share of display white that one scene unit makes near black: the exposure that other renderers are told.

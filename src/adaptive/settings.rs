@@ -144,12 +144,29 @@ impl LoopSettings {
 /// Samples that a pixel gets at most when nobody says otherwise: beyond it, it is reported as visible instead.
 pub const DEFAULT_MAX_SAMPLES: u32 = 1 << 18;
 
+/// The ladder of a picture that is denoised begins here, or at its target: far above threshold its greatest error is in places that
+/// no denoiser can help, and they may not have all samples before the rest is looked after.
+const HIGHEST_DENOISED_RUNG: f64 = 2.0;
+/// Where the ladder of any other picture begins whose target is above threshold.
+const HIGHEST_RUNG: f64 = 16.0;
+/// Visibility at threshold. On the way to it or below there is no rung above it: each leaves a picture that is equally visible
+/// everywhere, which is the cheapest when it is the last, but not the best when it is not (`benches/README.md`).
+pub(super) const THRESHOLD: f64 = 1.0;
+
 /// The visibilities that are passed on the way to `target`, largest first, `target` last. The ladder is fixed, so that a
-/// render continued to a lower rung equals one that went there in one go.
-pub fn ladder(target: f64) -> Vec<f64> {
-    let rungs = (-8..=4).rev().map(|power| 2f64.powi(power)).take_while(|&rung| rung > target);
-    rungs.chain(std::iter::once(target)).collect()
+/// render continued to a lower rung equals one that went there in one go, both above threshold or both at it or below.
+pub(super) fn ladder(target: f64, is_denoised: bool) -> Vec<f64> {
+    let highest = match is_denoised {
+        true => HIGHEST_DENOISED_RUNG,
+        false if target > THRESHOLD => HIGHEST_RUNG,
+        false => THRESHOLD,
+    };
+    let octaves = (0..).map(|octave| highest * 0.5f64.powi(octave));
+    octaves.take_while(|&rung| rung > target.max(LOWEST_RUNG)).chain(std::iter::once(target)).collect()
 }
+
+/// Below it nothing is in between.
+const LOWEST_RUNG: f64 = 1.0 / 512.0;
 
 #[cfg(test)]
 mod tests {
@@ -157,10 +174,16 @@ mod tests {
 
     #[test]
     fn ladders_share_their_beginnings() {
-        assert_eq!(ladder(1.0), [16.0, 8.0, 4.0, 2.0, 1.0]);
-        assert_eq!(ladder(0.5), [16.0, 8.0, 4.0, 2.0, 1.0, 0.5]);
-        assert_eq!(ladder(3.0), [16.0, 8.0, 4.0, 3.0]);
-        assert_eq!(ladder(100.0), [100.0]);
-        assert_eq!(ladder(0.25).last(), Some(&0.25));
+        let raw = |target: f64| ladder(target, false);
+        assert_eq!(raw(100.0), [100.0]);
+        assert_eq!(raw(3.0), [16.0, 8.0, 4.0, 3.0]);
+        assert_eq!(raw(2.0), [16.0, 8.0, 4.0, 2.0]);
+        assert_eq!(raw(1.0), [1.0]);
+        assert_eq!(raw(0.5), [1.0, 0.5]);
+        assert_eq!(raw(0.2), [1.0, 0.5, 0.25, 0.2]);
+        assert_eq!(raw(0.0).len(), 10, "1 to 1/256, and 0");
+        let denoised = |target: f64| ladder(target, true);
+        assert_eq!(denoised(4.0), [4.0]);
+        assert_eq!(denoised(0.5), [2.0, 1.0, 0.5]);
     }
 }

@@ -3,6 +3,7 @@
 //! A look says whose noise shows; how much each pixel gets is decided, as samples come, by raw noise, which costs a tenth of a
 //! look to know. Not for pictures that stay raw: these have `plan`.
 
+use super::gain::{defended, gain};
 use super::judge::Judgement;
 use super::plan::{doubling_plan, plan_up_to};
 use super::stop::TOLERATED_SHARE;
@@ -30,9 +31,6 @@ const MOST_DOUBLINGS: u32 = 2;
 /// What is in a pixel's window above the visibility asked for, as a share of what is in the window that has most, from which on
 /// its noise counts.
 const LEAST_BLAME: f32 = 0.1;
-/// No pixel's noise counts as more than so many times the picture's mean: variances of few samples are not worth more trust.
-const MOST_TIMES_MEAN: f64 = 16.0;
-
 /// What a look at a denoised picture decides until the next one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct UntilLook {
@@ -87,9 +85,7 @@ impl UntilLook {
     /// More samples for those to blame; at most `left` in all. `judgement` may be of the raw picture.
     ///
     /// What raw noise would show at a pixel decides, not what is left of it: that is pooled over a degree and tells no noisy pixel
-    /// from its neighbours. Counts go as the root of that energy plus the picture's mean. Without the mean, noisy pixels starve the
-    /// rest: a dark room denoised by Open Image Denoise had JOD 9.52 at 256 samples a pixel where even counts have 9.74, with it 9.74;
-    /// at 32 samples 9.50 and 9.55, even 9.44 (`benches/README.md`).
+    /// from its neighbours. Counts go as the root of that energy plus the picture's mean ([`defended`]).
     pub(super) fn plan(&self, film: &Film, judgement: &Judgement, max_samples: u32, left: u64) -> SamplePlan {
         let raw = judgement.energy_of(&judgement.pooled_variance_per_sample);
         let due = if self.may_look(film) { self.latest } else { self.earliest };
@@ -107,14 +103,6 @@ fn to_blame(judgement: &Judgement, visibility: f64) -> Vec<bool> {
     let most = shares.values().iter().fold(0.0, |a: f32, &share| a.max(share));
     let is_to_blame = |(&above, &share): (&f32, &f32)| above > 0.0 || share > LEAST_BLAME * most;
     above.values().iter().zip(shares.values()).map(is_to_blame).collect()
-}
-
-/// Energies with their mean added, and none much above it.
-fn defended(energies: &[f32]) -> Vec<f64> {
-    let energies = || energies.iter().map(|&energy| f64::from(energy));
-    let mean = energies().filter(|energy| energy.is_finite()).sum::<f64>() / energies().len().max(1) as f64;
-    // The order of `min` turns NaN into the most.
-    energies().map(|energy| energy.min(MOST_TIMES_MEAN * mean) + mean).collect()
 }
 
 /// Pixels that a plan is for: those to blame, or all where that is most of them.
@@ -142,7 +130,7 @@ fn plan_by_energy(film: &Film, energies: &[f64], to_blame: &[bool], max_samples:
     while added < enough {
         let count = |pixel: usize| f64::from(film.samples(pixel).max(1) << doublings[pixel]);
         let may_double = |pixel: usize| doublings[pixel] < MOST_DOUBLINGS && count(pixel) < f64::from(max_samples);
-        let gain = |pixel: usize| if may_double(pixel) { energies[pixel] / count(pixel).powi(2) } else { 0.0 };
+        let gain = |pixel: usize| if may_double(pixel) { gain(energies[pixel], count(pixel)) } else { 0.0 };
         let mut gains: Vec<f64> = wanted(to_blame).map(gain).filter(|&gain| gain > 0.0).collect();
         if gains.is_empty() {
             break;
@@ -190,17 +178,6 @@ mod tests {
         assert!(few.blocks.iter().all(|block| block.pixel % 64 < 16));
         assert_eq!(few.samples(), 48 * 16 * 64, "four times what they have");
         assert!(plan(8.0, 1.0, |_| false).blocks.is_empty());
-    }
-
-    /// Nobody starves beside one whose variance is enormous, or no number.
-    #[test]
-    fn quiet_pixels_keep_their_share() {
-        let mut energies = vec![1.0; 100];
-        (energies[3], energies[5]) = (1e9, f32::NAN);
-        let defended = defended(&energies);
-        let mean_root = defended.iter().map(|energy| energy.sqrt()).sum::<f64>() / 100.0;
-        assert!(defended.iter().all(|energy| energy.is_finite() && energy.sqrt() > 0.7 * mean_root));
-        assert!(defended[3].sqrt() < 5.0 * mean_root);
     }
 
     fn plan_after(film: &Film, judgement: &Judgement, visibility: f64, left: u64) -> SamplePlan {

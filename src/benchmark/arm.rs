@@ -39,13 +39,15 @@ pub enum Arm {
     Default,
     /// The loop asked for v\* and not tuned: what it promises (99.9 % of the picture) against what it delivers.
     AsAsked,
+    /// The loop on its way to threshold, ended at the samples that it took as asked: what `--spp` and `--time` leave.
+    ToThreshold,
     /// Converged variance, thresholds of the reference, convex optimum for 99 % of the picture; its target searched.
     Oracle,
 }
 
 impl Arm {
     /// Every arm.
-    pub const ALL: [Arm; 16] = [
+    pub const ALL: [Arm; 17] = [
         Arm::Uniform,
         Arm::Relative,
         Arm::Variance,
@@ -61,6 +63,7 @@ impl Arm {
         Arm::Default,
         Arm::AsAsked,
         Arm::UniformEqualTime,
+        Arm::ToThreshold,
         Arm::Oracle,
     ];
     /// Those of the quick suite.
@@ -85,6 +88,7 @@ impl Arm {
             Arm::LocalRule => "local-rule",
             Arm::Default => "default",
             Arm::AsAsked => "as-asked",
+            Arm::ToThreshold => "to-threshold",
             Arm::Oracle => "oracle",
         }
     }
@@ -98,7 +102,7 @@ impl Arm {
             // A mean count n, as 1/√n.
             Arm::Uniform => Some(uniform_spp.sqrt().recip()),
             Arm::Budget => Some((0.5 * uniform_spp).sqrt().recip()),
-            Arm::AsAsked | Arm::UniformEqualTime => None,
+            Arm::AsAsked | Arm::UniformEqualTime | Arm::ToThreshold => None,
             _ => Some(subject.visibility),
         }
     }
@@ -132,6 +136,10 @@ impl Arm {
             Arm::Uniform | Arm::UniformEqualTime => {
                 settings.sampling = Sampling::Uniform;
                 settings.limits.visibility = 0.0;
+                settings.limits.mean_samples = Some(samples_of(knob));
+            }
+            Arm::ToThreshold => {
+                settings.limits.visibility = 1.0;
                 settings.limits.mean_samples = Some(samples_of(knob));
             }
             Arm::AsAsked | Arm::Oracle => {}

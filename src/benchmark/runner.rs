@@ -169,6 +169,7 @@ impl<'a> ArmRunner<'a> {
         let knob = match arm {
             Arm::Oracle => return self.make_oracle(seed, knob.unwrap_or(self.subject.visibility)),
             Arm::UniformEqualTime => self.equal_time_spp(seed)?.sqrt().recip(),
+            Arm::ToThreshold => self.spp_as_asked(seed)?.sqrt().recip(),
             _ => knob.unwrap_or(self.subject.visibility),
         };
         let settings = arm.settings(self.subject, knob, self.reference.uniform_spp)?;
@@ -185,10 +186,19 @@ impl<'a> ArmRunner<'a> {
 
     /// Samples a pixel that uniform sampling takes in the time of the loop's run as asked with this seed.
     fn equal_time_spp(&self, seed: u64) -> Result<f64> {
-        let run = self.runs_as_asked.get(seed as usize).context("the arm as-asked comes before uniform-equal-time")?;
+        let run = self.run_as_asked(seed)?;
         // By the share of time outside of the tracer, which the machine's other work changes less than seconds.
         let tracing = 1.0 - run.seconds_perception / run.seconds;
         Ok((run.samples as f64 / self.subject.pixels() / tracing).max(16.0))
+    }
+
+    /// Samples a pixel of the loop's run as asked with this seed.
+    fn spp_as_asked(&self, seed: u64) -> Result<f64> {
+        Ok(self.run_as_asked(seed)?.samples as f64 / self.subject.pixels())
+    }
+
+    fn run_as_asked(&self, seed: u64) -> Result<&Run> {
+        self.runs_as_asked.get(seed as usize).context("the arm as-asked comes before those of as much time or samples")
     }
 
     /// How the arm's picture comes to be good, for arms that have a curve: the first seed rendered once more.

@@ -288,7 +288,8 @@ fn named_arms(names: &[String]) -> Result<Vec<Arm>> {
         }
     }
     let is_named = |arm: Arm| names.iter().any(|name| name == arm.name());
-    let needed = |arm: Arm| arm == Arm::Uniform || (arm == Arm::AsAsked && is_named(Arm::UniformEqualTime));
+    let is_after_as_asked = [Arm::UniformEqualTime, Arm::ToThreshold].into_iter().any(is_named);
+    let needed = |arm: Arm| arm == Arm::Uniform || (arm == Arm::AsAsked && is_after_as_asked);
     Ok(Arm::ALL.into_iter().filter(|&arm| needed(arm) || is_named(arm)).collect())
 }
 

@@ -106,21 +106,23 @@ fn assert_same(one: &Rendered, other: &Rendered) {
     assert_eq!(one.stop_reason, other.stop_reason);
 }
 
-/// Stopped at visibility 8 and continued to 4, by way of a file, is 4 in one go; so it is when `--plans` stopped it.
+/// Stopped at visibility 8 and continued to 4, by way of a file, is 4 in one go, and 1 continued to 0.5 is 0.5; so it is when
+/// `--plans` stopped it.
 #[test]
 fn a_render_that_is_continued_equals_one_in_one_go() {
     let setup = Setup::new(5);
-    let in_one_go = render(&setup.tracer, &setup.settings(Sampling::Adaptive, 4.0), &Quiet).expect("renders");
-    let mut by_plans = setup.settings(Sampling::Adaptive, 4.0);
-    by_plans.limits.plans = Some(in_one_go.plans - 2);
-    for limited in [setup.settings(Sampling::Adaptive, 8.0), by_plans] {
-        let monitor = Interrupter::after(u32::MAX);
-        let stopped = render(&setup.tracer, &limited, &monitor).expect("renders");
-        assert!(stopped.plans < in_one_go.plans);
-        let state = setup.through_a_file(&monitor.state());
-        let continued =
-            resume(&setup.tracer, &setup.settings(Sampling::Adaptive, 4.0), state, &Quiet).expect("goes on");
-        assert_same(&continued, &in_one_go);
+    for (first, target) in [(8.0, 4.0), (1.0, 0.5)] {
+        let to = |visibility: f64| setup.settings(Sampling::Adaptive, visibility);
+        let in_one_go = render(&setup.tracer, &to(target), &Quiet).expect("renders");
+        let mut by_plans = to(target);
+        by_plans.limits.plans = Some(in_one_go.plans - 2);
+        for limited in [to(first), by_plans] {
+            let monitor = Interrupter::after(u32::MAX);
+            let stopped = render(&setup.tracer, &limited, &monitor).expect("renders");
+            assert!(stopped.plans < in_one_go.plans);
+            let continued = resume(&setup.tracer, &to(target), setup.through_a_file(&monitor.state()), &Quiet);
+            assert_same(&continued.expect("goes on"), &in_one_go);
+        }
     }
 }
 

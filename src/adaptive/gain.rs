@@ -1,0 +1,102 @@
+//! What one more sample of a pixel does for the picture as a whole, where not everything that is wanted can be had at once.
+//!
+//! Not for how many samples a visibility takes: these are `plan`'s.
+
+use super::judge::Judgement;
+use super::plan::cut_to_budget;
+use crate::film::Film;
+use crate::integrator::SamplePlan;
+use fechner_perception::Plane;
+
+/// Samples for every pixel up to which a plan is not cut to half of what is there: a look costs about one.
+const LEAST_PLAN: u64 = 16;
+/// No pixel's noise counts as more than so many times the picture's mean: variances of few samples are not worth more trust.
+const MOST_TIMES_MEAN: f64 = 16.0;
+
+/// As much of a plan as there should be before the next look, where it does most for the picture.
+pub(super) fn most_worthwhile(plan: SamplePlan, film: &Film, judgement: &Judgement) -> SamplePlan {
+    let pixels = u64::from(film.width()) * u64::from(film.height());
+    let most = (film.total_samples() / 2).max(LEAST_PLAN * pixels);
+    cut(plan, film, judgement, most)
+}
+
+/// A plan cut to so many samples: where these do most for the picture.
+pub(super) fn cut(plan: SamplePlan, film: &Film, judgement: &Judgement, most: u64) -> SamplePlan {
+    if plan.samples() > most { cut_to_budget(plan, &gains(film, judgement), most) } else { plan }
+}
+
+/// What one more sample takes away of each pixel's visible energy e/n.
+///
+/// Samples that go where it is most make counts that go as √e and leave the least mean energy (Neyman 1934). Counts for equal
+/// visibility go as e and leave more to be seen on average: at 96 samples a pixel of the Cornell box FLIP was 1.09 times that
+/// of even counts, with these 1.015 (`benches/README.md`).
+fn gains(film: &Film, judgement: &Judgement) -> Plane {
+    let width = film.width() as usize;
+    let energies = defended(judgement.energy_of(&judgement.pooled_variance_per_sample).values());
+    Plane::from_fn(width, film.height() as usize, |x, y| {
+        let pixel = y * width + x;
+        gain(energies[pixel], f64::from(film.samples(pixel).max(1))) as f32
+    })
+}
+
+/// What one sample more than `samples` takes away of `energy` / `samples`, about.
+pub(super) fn gain(energy: f64, samples: f64) -> f64 {
+    energy / (samples * samples)
+}
+
+/// Energies of one sample with their mean added, and none much above it.
+///
+/// Without the mean, noisy pixels starve the rest: a dark room denoised by Open Image Denoise had JOD 9.52 at 256 samples a pixel
+/// where even counts have 9.74, with it 9.74; at 32 samples 9.50 and 9.55, even 9.44 (`benches/README.md`).
+pub(super) fn defended(energies: &[f32]) -> Vec<f64> {
+    let energies = || energies.iter().map(|&energy| f64::from(energy));
+    let mean = energies().filter(|energy| energy.is_finite()).sum::<f64>() / energies().len().max(1) as f64;
+    // The order of `min` turns NaN into the most.
+    energies().map(|energy| energy.min(MOST_TIMES_MEAN * mean) + mean).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::judge::judge;
+    use super::super::plan::plan_up_to;
+    use super::super::test_films::{film_of, settings};
+    use super::*;
+    use glam::Vec3;
+
+    /// Of more than can be had at once, noisy pixels have theirs first; what is little is not cut.
+    #[test]
+    fn plans_are_cut_where_least_is_lost() {
+        let film = film_of(|pixel, random| Vec3::splat(1.0 + if pixel % 64 < 32 { 0.5 } else { 0.05 } * random));
+        let judgement = judge(&film, &settings(), 1.0).expect("judges");
+        let plan_to = |samples: u32| plan_up_to(&film, move |_| samples);
+        assert_eq!(most_worthwhile(plan_to(32), &film, &judgement), plan_to(32));
+        let cut = most_worthwhile(plan_to(96), &film, &judgement);
+        let pixels = 64 * 64;
+        assert!((15 * pixels..=16 * pixels).contains(&cut.samples()), "{} a pixel", cut.samples() / pixels);
+        let left = cut.blocks.iter().filter(|block| block.pixel % 64 < 32).count();
+        assert!(left * 20 > cut.blocks.len() * 19, "{left} of {}", cut.blocks.len());
+    }
+
+    /// Nobody starves beside one whose variance is enormous, or no number.
+    #[test]
+    fn quiet_pixels_keep_their_share() {
+        let mut energies = vec![1.0; 100];
+        (energies[3], energies[5]) = (1e9, f32::NAN);
+        let defended = defended(&energies);
+        let mean_root = defended.iter().map(|energy| energy.sqrt()).sum::<f64>() / 100.0;
+        assert!(defended.iter().all(|energy| energy.is_finite() && energy.sqrt() > 0.7 * mean_root));
+        assert!(defended[3].sqrt() < 5.0 * mean_root);
+    }
+
+    /// Samples that go where the gain is most end in counts that go as the root of the energy.
+    #[test]
+    fn greatest_gains_lead_to_counts_as_the_root_of_energy() {
+        let energies = [1.0, 16.0];
+        let mut counts = [1.0; 2];
+        for _ in 0..1000 {
+            let gains = [0, 1].map(|pixel| gain(energies[pixel], counts[pixel]));
+            counts[usize::from(gains[1] > gains[0])] += 1.0;
+        }
+        assert!((counts[1] / counts[0] - 4.0).abs() < 0.05, "{counts:?}");
+    }
+}
