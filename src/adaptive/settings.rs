@@ -153,20 +153,22 @@ const HIGHEST_RUNG: f64 = 16.0;
 /// everywhere, which is the cheapest when it is the last, but not the best when it is not (`benches/README.md`).
 pub(super) const THRESHOLD: f64 = 1.0;
 
+/// Below it nothing is in between.
+const LOWEST_RUNG: f64 = 1.0 / 512.0;
+
 /// The visibilities that are passed on the way to `target`, largest first, `target` last. The ladder is fixed, so that a
 /// render continued to a lower rung equals one that went there in one go, both above threshold or both at it or below.
 pub(super) fn ladder(target: f64, is_denoised: bool) -> Vec<f64> {
-    let highest = match is_denoised {
-        true => HIGHEST_DENOISED_RUNG,
-        false if target > THRESHOLD => HIGHEST_RUNG,
-        false => THRESHOLD,
+    let highest = if is_denoised {
+        HIGHEST_DENOISED_RUNG
+    } else if target > THRESHOLD {
+        HIGHEST_RUNG
+    } else {
+        THRESHOLD
     };
     let octaves = (0..).map(|octave| highest * 0.5f64.powi(octave));
     octaves.take_while(|&rung| rung > target.max(LOWEST_RUNG)).chain(std::iter::once(target)).collect()
 }
-
-/// Below it nothing is in between.
-const LOWEST_RUNG: f64 = 1.0 / 512.0;
 
 #[cfg(test)]
 mod tests {
