@@ -8,16 +8,19 @@ use crate::film::Film;
 use crate::integrator::SamplePlan;
 use fechner_perception::Plane;
 
-/// Samples for every pixel up to which a plan is not cut to half of what is there: a look costs about one.
-const LEAST_PLAN: u64 = 16;
+/// What comes before the next plan is this share of what is there: counts adapt while variances become known. More, as far as the
+/// visibility is from the rung, was no gain (`benches/README.md`).
+pub(super) const GROWTH: f64 = 0.5;
+/// Samples for every pixel up to which a plan is never cut: less would hardly pay for the look before it.
+const LEAST_UNCUT: f64 = 16.0;
 /// No pixel's noise counts as more than so many times the picture's mean: variances of few samples are not worth more trust.
 const MOST_TIMES_MEAN: f64 = 16.0;
 
 /// As much of a plan as there should be before the next look, where it does most for the picture.
 pub(super) fn most_worthwhile(plan: SamplePlan, film: &Film, judgement: &Judgement) -> SamplePlan {
-    let pixels = u64::from(film.width()) * u64::from(film.height());
-    let most = (film.total_samples() / 2).max(LEAST_PLAN * pixels);
-    cut(plan, film, judgement, most)
+    let pixels = f64::from(film.width()) * f64::from(film.height());
+    let most = (GROWTH * film.total_samples() as f64).max(LEAST_UNCUT * pixels);
+    cut(plan, film, judgement, most as u64)
 }
 
 /// A plan cut to so many samples: where these do most for the picture.
@@ -27,9 +30,9 @@ pub(super) fn cut(plan: SamplePlan, film: &Film, judgement: &Judgement, most: u6
 
 /// What one more sample takes away of each pixel's visible energy e/n.
 ///
-/// Samples that go where it is most make counts that go as √e and leave the least mean energy (Neyman 1934). Counts for equal
-/// visibility go as e and leave more to be seen on average: at 96 samples a pixel of the Cornell box FLIP was 1.09 times that
-/// of even counts, with these 1.015 (`benches/README.md`).
+/// Samples that go where it is most make counts that go as √e and leave the least mean energy (Neyman 1934) of known variances.
+/// Counts for equal visibility go as e: at 96 samples a pixel of the Cornell box their FLIP was 1.09 times that of even counts, with
+/// these it is 1.015 (`benches/README.md`).
 fn gains(film: &Film, judgement: &Judgement) -> Plane {
     let width = film.width() as usize;
     let energies = defended(judgement.energy_of(&judgement.pooled_variance_per_sample).values());

@@ -31,7 +31,7 @@ use crate::integrator::{BlockWork, Crop, PathTracer, SamplePlan};
 use audit::Audit;
 use judge::{JudgeError, Judgement, judge};
 use plan::slices;
-use settings::{LoopSettings, Sampling, ladder};
+use settings::{LoopSettings, Sampling};
 use state::RenderState;
 use std::collections::VecDeque;
 use std::time::Instant;
@@ -216,8 +216,7 @@ impl<'a> Loop<'a> {
     fn new(tracer: &'a PathTracer, settings: &'a LoopSettings, state: RenderState) -> Self {
         let is_below = |rung: f64, bound: Option<f64>| bound.is_none_or(|bound| rung < bound);
         let is_left = |&rung: &f64| is_below(rung, state.finished_rung) && is_below(rung, state.left_rung);
-        let target = settings.limits.visibility;
-        let rungs = ladder(target, settings.denoiser.is_some()).into_iter().filter(is_left).collect();
+        let rungs = settings.rungs().into_iter().filter(is_left).collect();
         let seconds_before = state.seconds_total;
         Self { tracer, settings, rungs, state, resumed_at: Instant::now(), seconds_before, looked: None }
     }

@@ -72,7 +72,7 @@ pub const DENOISED_PILOT_SAMPLES: u32 = 4;
 impl Limits {
     /// The visibility that is aimed at; 1, which is at threshold, where only other limits count.
     pub fn visibility_or_threshold(&self) -> f64 {
-        if self.visibility > 0.0 && self.visibility.is_finite() { self.visibility } else { 1.0 }
+        if self.visibility > 0.0 && self.visibility.is_finite() { self.visibility } else { THRESHOLD }
     }
 
     /// To a visibility, whatever it takes.
@@ -139,6 +139,18 @@ impl LoopSettings {
             is_outdated: None,
         }
     }
+
+    /// The visibilities that are passed on the way to the one that is asked for, largest first. They are fixed, so that a
+    /// render continued to a lower rung equals one that went there in one go, both above threshold or both at it or below.
+    pub(super) fn rungs(&self) -> Vec<f64> {
+        let target = self.limits.visibility;
+        let highest = match self.denoiser {
+            Some(_) => HIGHEST_DENOISED_RUNG,
+            None if target > THRESHOLD => HIGHEST_RUNG,
+            None => THRESHOLD,
+        };
+        ladder(highest, target)
+    }
 }
 
 /// Samples that a pixel gets at most when nobody says otherwise: beyond it, it is reported as visible instead.
@@ -149,43 +161,44 @@ pub const DEFAULT_MAX_SAMPLES: u32 = 1 << 18;
 const HIGHEST_DENOISED_RUNG: f64 = 2.0;
 /// Where the ladder of any other picture begins whose target is above threshold.
 const HIGHEST_RUNG: f64 = 16.0;
-/// Visibility at threshold. On the way to it or below there is no rung above it: each leaves a picture that is equally visible
-/// everywhere, which is the cheapest when it is the last, but not the best when it is not (`benches/README.md`).
-pub(super) const THRESHOLD: f64 = 1.0;
+/// Visibility at threshold, as [`fechner_perception`] counts.
+///
+/// On the way to it or below there is no rung above it: each leaves a picture that is equally visible everywhere, which is the
+/// cheapest when it is the last, but not the best when it is not (`benches/README.md`).
+pub const THRESHOLD: f64 = 1.0;
 
 /// Below it nothing is in between.
 const LOWEST_RUNG: f64 = 1.0 / 512.0;
 
-/// The visibilities that are passed on the way to `target`, largest first, `target` last. The ladder is fixed, so that a
-/// render continued to a lower rung equals one that went there in one go, both above threshold or both at it or below.
-pub(super) fn ladder(target: f64, is_denoised: bool) -> Vec<f64> {
-    let highest = if is_denoised {
-        HIGHEST_DENOISED_RUNG
-    } else if target > THRESHOLD {
-        HIGHEST_RUNG
-    } else {
-        THRESHOLD
-    };
+/// The visibilities that are passed from `highest` on the way to `target`, in octaves, `target` last.
+fn ladder(highest: f64, target: f64) -> Vec<f64> {
     let octaves = (0..).map(|octave| highest * 0.5f64.powi(octave));
     octaves.take_while(|&rung| rung > target.max(LOWEST_RUNG)).chain(std::iter::once(target)).collect()
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::test_films::settings;
     use super::*;
+    use crate::denoise::DenoiserKind;
 
     #[test]
     fn ladders_share_their_beginnings() {
-        let raw = |target: f64| ladder(target, false);
-        assert_eq!(raw(100.0), [100.0]);
-        assert_eq!(raw(3.0), [16.0, 8.0, 4.0, 3.0]);
-        assert_eq!(raw(2.0), [16.0, 8.0, 4.0, 2.0]);
-        assert_eq!(raw(1.0), [1.0]);
-        assert_eq!(raw(0.5), [1.0, 0.5]);
-        assert_eq!(raw(0.2), [1.0, 0.5, 0.25, 0.2]);
-        assert_eq!(raw(0.0).len(), 10, "1 to 1/256, and 0");
-        let denoised = |target: f64| ladder(target, true);
-        assert_eq!(denoised(4.0), [4.0]);
-        assert_eq!(denoised(0.5), [2.0, 1.0, 0.5]);
+        let mut settings = settings();
+        let mut rungs = |denoiser: Option<Denoiser>, target: f64| {
+            settings.limits.visibility = target;
+            settings.denoiser = denoiser;
+            settings.rungs()
+        };
+        assert_eq!(rungs(None, 100.0), [100.0]);
+        assert_eq!(rungs(None, 3.0), [16.0, 8.0, 4.0, 3.0]);
+        assert_eq!(rungs(None, 2.0), [16.0, 8.0, 4.0, 2.0]);
+        assert_eq!(rungs(None, 1.0), [1.0]);
+        assert_eq!(rungs(None, 0.5), [1.0, 0.5]);
+        assert_eq!(rungs(None, 0.2), [1.0, 0.5, 0.25, 0.2]);
+        assert_eq!(rungs(None, 0.0).len(), 10, "1 to 1/256, and 0");
+        let builtin = || Denoiser::open(DenoiserKind::Builtin).ok();
+        assert_eq!(rungs(builtin(), 4.0), [4.0]);
+        assert_eq!(rungs(builtin(), 0.5), [2.0, 1.0, 0.5]);
     }
 }

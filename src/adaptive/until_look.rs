@@ -3,7 +3,7 @@
 //! A look says whose noise shows; how much each pixel gets is decided, as samples come, by raw noise, which costs a tenth of a
 //! look to know. Not for pictures that stay raw: these have `plan`.
 
-use super::gain::{defended, gain};
+use super::gain::{GROWTH, defended, gain};
 use super::judge::Judgement;
 use super::plan::{doubling_plan, plan_up_to};
 use super::stop::TOLERATED_SHARE;
@@ -13,8 +13,6 @@ use serde::{Deserialize, Serialize};
 
 /// Even counts are kept where the best ones would take more than this share of their samples.
 const EVEN_ENOUGH: f64 = 0.95;
-/// A plan adds this share of what is there. More, as far as the visibility is from the rung, was no gain (`benches/README.md`).
-const GROWTH: f64 = 0.5;
 /// Samples for every pixel that a plan adds at least, while its pixels may have so many: variances of four samples are not worth
 /// being asked more often.
 const LEAST_PLAN: f64 = 6.0;
@@ -31,6 +29,7 @@ const MOST_DOUBLINGS: u32 = 2;
 /// What is in a pixel's window above the visibility asked for, as a share of what is in the window that has most, from which on
 /// its noise counts.
 const LEAST_BLAME: f32 = 0.1;
+
 /// What a look at a denoised picture decides until the next one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct UntilLook {

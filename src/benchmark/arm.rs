@@ -1,7 +1,7 @@
 //! The arms of the benchmark.
 
 use super::Subject;
-use crate::adaptive::settings::{AllocationRule, LoopSettings, RivalRule, Sampling};
+use crate::adaptive::settings::{AllocationRule, LoopSettings, RivalRule, Sampling, THRESHOLD};
 use anyhow::{Context, Result};
 use fechner_perception::model;
 
@@ -139,7 +139,7 @@ impl Arm {
                 settings.limits.mean_samples = Some(samples_of(knob));
             }
             Arm::ToThreshold => {
-                settings.limits.visibility = 1.0;
+                settings.limits.visibility = THRESHOLD;
                 settings.limits.mean_samples = Some(samples_of(knob));
             }
             Arm::AsAsked | Arm::Oracle => {}

@@ -189,7 +189,7 @@ impl<'a> ArmRunner<'a> {
         let run = self.run_as_asked(seed)?;
         // By the share of time outside of the tracer, which the machine's other work changes less than seconds.
         let tracing = 1.0 - run.seconds_perception / run.seconds;
-        Ok((run.samples as f64 / self.subject.pixels() / tracing).max(16.0))
+        Ok((self.spp_as_asked(seed)? / tracing).max(16.0))
     }
 
     /// Samples a pixel of the loop's run as asked with this seed.

@@ -13,7 +13,7 @@ fn bench(output: &Path, more: &[&str]) -> std::process::Output {
 #[test]
 fn results_are_complete_and_a_second_run_goes_on() {
     let folder = tempfile::tempdir().expect("a folder");
-    let arms = ["--seeds", "2", "--arms", "relative,tvi,default,as-asked,uniform-equal-time,oracle"];
+    let arms = ["--seeds", "2", "--arms", "relative,tvi,default,as-asked,uniform-equal-time,to-threshold,oracle"];
     let first = bench(folder.path(), &arms);
     assert!(first.status.success(), "{}", String::from_utf8_lossy(&first.stderr));
     let results = || -> serde_json::Value {
@@ -21,8 +21,8 @@ fn results_are_complete_and_a_second_run_goes_on() {
     };
     let found = results();
     let records = found["records"].as_array().expect("records");
-    // Seven arms, two seeds and both together, three coverages.
-    assert_eq!(records.len(), 7 * 3 * 3);
+    // Eight arms, two seeds and both together, three coverages.
+    assert_eq!(records.len(), 8 * 3 * 3);
     for record in records {
         for key in ["samples", "seconds", "speedup_samples", "efficiency", "flip_mean", "flip_p99", "jod", "relmse"] {
             let value = record[key].as_f64().unwrap_or(f64::NAN);
@@ -32,7 +32,7 @@ fn results_are_complete_and_a_second_run_goes_on() {
     }
     let report = std::fs::read_to_string(folder.path().join("report.html")).expect("written");
     assert!(report.contains("data:image/png;base64,") && report.contains("</html>"));
-    assert_eq!(std::fs::read_to_string(folder.path().join("results.csv")).expect("written").lines().count(), 1 + 63);
+    assert_eq!(std::fs::read_to_string(folder.path().join("results.csv")).expect("written").lines().count(), 1 + 72);
 
     let renders = |folder: &Path| {
         let mut files: Vec<_> = std::fs::read_dir(folder.join("runs"))
