@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::noise_gain::noise_gain;
 use crate::opponent::{Opponent, opponent};
 use crate::plane::Plane;
-use crate::sensitivity::SensitivityTables;
+use crate::sensitivity::{LuminanceSpan, SensitivityTables};
 use crate::threshold::{ThresholdInputs, ThresholdMap, chromatic_threshold_map, threshold_map};
 
 /// Thresholds of one picture in each of the eye's three channels.
@@ -86,7 +86,8 @@ impl ThresholdMap {
     /// As [`CastleChromatic::new`].
     pub fn chromatic_noise_gain(&self, channel: ChromaticChannel) -> Result<Plane, Error> {
         let csf = CastleChromatic::new(channel, self.viewing.observer.csf_area_deg2)?;
-        let tables = SensitivityTables::new(&self.bands, &self.viewing, &csf);
+        let span = LuminanceSpan::of([&self.adaptation_cd_m2]);
+        let tables = SensitivityTables::new(&self.bands, &self.viewing, &csf, span);
         let gain = noise_gain(&tables, &self.adaptation_cd_m2, &[]);
         let grey_cd_m2 = 0.2 * self.viewing.display.white_cd_m2;
         Ok(self.seen_from_gaze(gain, channel, |freq_cpd| csf.sensitivity(freq_cpd, grey_cd_m2)))

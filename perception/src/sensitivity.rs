@@ -3,6 +3,7 @@
 use crate::bands::{OctaveBands, RINGS, RadialTable, for_each_ring};
 use crate::csf::ContrastSensitivity;
 use crate::display::Viewing;
+use crate::plane::Plane;
 use rayon::prelude::*;
 
 /// Luminances below this, cd/m², adapt the eye no further (the floor of vision).
@@ -22,17 +23,18 @@ pub(crate) struct LuminanceTable {
 }
 
 impl LuminanceTable {
-    /// `value_at(index)` gives the value at sample `index` of [`sample_luminances`].
-    fn from_samples(value_at: impl Fn(usize) -> f64) -> Self {
+    /// `value_at(index)` gives the value at sample `index` of the grid; beyond the span the table is flat.
+    fn from_samples(span: LuminanceSpan, value_at: impl Fn(usize) -> f64) -> Self {
+        let entry_at = |entry: usize| {
+            let position = entry as f64 * SAMPLES_A_DECADE as f64 / ENTRIES_A_DECADE as f64;
+            let below = (position as usize).min(span.last - 1);
+            let (low, high) = (value_at(below).max(1e-30), value_at(below + 1).max(1e-30));
+            (low.ln() + (position - below as f64) * (high / low).ln()).exp() as f32
+        };
+        let [first, last] = [span.first, span.last].map(|sample| sample * ENTRIES_A_DECADE / SAMPLES_A_DECADE);
+        let known: Vec<f32> = (first..=last).map(entry_at).collect();
         let decades = (HIGHEST_DECADE - LOWEST_DECADE) as usize;
-        let entries = (0..=decades * ENTRIES_A_DECADE)
-            .map(|entry| {
-                let position = entry as f64 * SAMPLES_A_DECADE as f64 / ENTRIES_A_DECADE as f64;
-                let below = (position as usize).min(decades * SAMPLES_A_DECADE - 1);
-                let (low, high) = (value_at(below).max(1e-30), value_at(below + 1).max(1e-30));
-                (low.ln() + (position - below as f64) * (high / low).ln()).exp() as f32
-            })
-            .collect();
+        let entries = (0..=decades * ENTRIES_A_DECADE).map(|entry| known[entry.clamp(first, last) - first]).collect();
         Self { entries }
     }
 
@@ -64,9 +66,38 @@ fn log2(value: f32) -> f32 {
     octaves as f32 + 2.0 * std::f32::consts::LOG2_E * ratio * series
 }
 
-fn sample_luminances() -> impl Iterator<Item = f64> {
-    let samples = (HIGHEST_DECADE - LOWEST_DECADE) * SAMPLES_A_DECADE as i32;
-    (0..=samples).map(|index| 10.0_f64.powf(f64::from(LOWEST_DECADE) + f64::from(index) / SAMPLES_A_DECADE as f64))
+/// The luminances that tables are made for, as samples of the whole grid: to ask a CSF for all ten decades took a tenth of a look
+/// at 128×128 pixels.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LuminanceSpan {
+    first: usize,
+    /// At least one more.
+    last: usize,
+}
+
+impl LuminanceSpan {
+    /// What encloses all pixels of some adaptation luminances, cd/m².
+    pub(crate) fn of<'a>(adaptations_cd_m2: impl IntoIterator<Item = &'a Plane>) -> Self {
+        let most = (HIGHEST_DECADE - LOWEST_DECADE) as usize * SAMPLES_A_DECADE;
+        let sample = |luminance_cd_m2: f32| {
+            luminance_coordinate(luminance_cd_m2) * SAMPLES_A_DECADE as f32 / ENTRIES_A_DECADE as f32
+        };
+        let (mut first, mut last) = (most, 0);
+        for adaptation in adaptations_cd_m2 {
+            let (least, greatest) = adaptation.range();
+            // A sample more on either side, for what rounding makes of means.
+            first = first.min((sample(least) as usize).saturating_sub(1));
+            last = last.max((sample(greatest) as usize).min(most) + 2);
+        }
+        let last = last.clamp(1, most);
+        Self { first: first.min(last - 1), last }
+    }
+
+    /// In cd/m², by sample.
+    fn luminances(self) -> impl Iterator<Item = f64> {
+        let decade = |sample: usize| f64::from(LOWEST_DECADE) + sample as f64 / SAMPLES_A_DECADE as f64;
+        (self.first..=self.last).map(move |sample| 10.0_f64.powf(decade(sample)))
+    }
 }
 
 /// What one band does to errors and masks.
@@ -83,14 +114,19 @@ pub(crate) struct BandTables {
     pub(crate) spread_deg: f64,
 }
 
-/// Tables for all bands of a grid; the observer's sensitivity is in them.
+/// Tables for all bands of a grid, for some luminances; the observer's sensitivity is in them.
 #[derive(Clone, Debug)]
 pub(crate) struct SensitivityTables {
     pub(crate) bands: Vec<BandTables>,
 }
 
 impl SensitivityTables {
-    pub(crate) fn new(bands: &OctaveBands, viewing: &Viewing, csf: &dyn ContrastSensitivity) -> Self {
+    pub(crate) fn new(
+        bands: &OctaveBands,
+        viewing: &Viewing,
+        csf: &dyn ContrastSensitivity,
+        span: LuminanceSpan,
+    ) -> Self {
         let density = viewing.display.pixel_density();
         let gain = viewing.observer.sensitivity;
         let count = bands.len();
@@ -100,7 +136,8 @@ impl SensitivityTables {
             .map(|band| rings.iter().map(|ring| ring.weight * bands.gain(band, ring.freq_cpd).powi(2)).collect())
             .collect();
         // [sample][band]; noise energy and the square at the centre.
-        let samples: Vec<Vec<BandSample>> = sample_luminances()
+        let samples: Vec<Vec<BandSample>> = span
+            .luminances()
             .collect::<Vec<_>>()
             .into_par_iter()
             .map(|luminance| {
@@ -117,8 +154,10 @@ impl SensitivityTables {
         let grey_cd_m2 = 0.2 * viewing.display.white_cd_m2;
         let tables = (0..count)
             .map(|band| BandTables {
-                noise_energy: LuminanceTable::from_samples(|sample| samples[sample][band].noise),
-                center_sensitivity_squared: LuminanceTable::from_samples(|sample| samples[sample][band].center),
+                noise_energy: LuminanceTable::from_samples(span, |sample| samples[sample - span.first][band].noise),
+                center_sensitivity_squared: LuminanceTable::from_samples(span, |sample| {
+                    samples[sample - span.first][band].center
+                }),
                 mask_noise_share: rings
                     .iter()
                     .map(|ring| ring.weight * bands.mask_gain(band, ring.freq_cpd).powi(2))
@@ -198,6 +237,31 @@ pub(crate) fn adaptation_levels(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::csf::CastleCsf;
+
+    /// A picture's own luminances have what a table of all luminances has for them, and beyond them nothing is asked.
+    #[test]
+    fn a_narrow_table_is_a_part_of_the_whole() {
+        let viewing = Viewing::default();
+        let bands = OctaveBands::for_grid(viewing.display.pixel_density());
+        let (dim, bright) = (Plane::filled(2, 2, 3.0), Plane::filled(2, 2, 140.0));
+        let whole = [1e-5, 1e7].map(|luminance| Plane::filled(1, 1, luminance));
+        let table = |planes: &[&Plane]| {
+            let span = LuminanceSpan::of(planes.iter().copied());
+            SensitivityTables::new(&bands, &viewing, &CastleCsf::default(), span)
+        };
+        let (narrow, whole) = (table(&[&bright, &dim]), table(&[&whole[0], &whole[1]]));
+        for (narrow, whole) in narrow.bands.iter().zip(&whole.bands) {
+            for luminance in [3.0, 3.7, 10.0, 99.0, 140.0] {
+                let at = |table: &LuminanceTable| table.at(luminance_coordinate(luminance));
+                assert_eq!(at(&narrow.noise_energy), at(&whole.noise_energy), "{luminance}");
+                assert_eq!(at(&narrow.center_sensitivity_squared), at(&whole.center_sensitivity_squared));
+            }
+            for luminance in [0.0, 1e-3, 1e5, f32::INFINITY] {
+                assert!(narrow.noise_energy.at(luminance_coordinate(luminance)).is_finite());
+            }
+        }
+    }
 
     #[test]
     fn the_quick_logarithm_is_one() {

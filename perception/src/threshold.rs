@@ -12,7 +12,7 @@ use crate::motion::MotionTable;
 use crate::noise_gain::{noise_gain, reduced_coordinates};
 use crate::plane::Plane;
 use crate::reduced::ReducedPlane;
-use crate::sensitivity::{AdaptationLevel, SensitivityTables, adaptation_levels};
+use crate::sensitivity::{AdaptationLevel, LuminanceSpan, SensitivityTables, adaptation_levels};
 
 /// Standard deviation of the windows over which the eye adapts and error is pooled, degrees: as wide as a disc of 1°.
 pub const POOLING_SIGMA_DEG: f64 = 0.25;
@@ -112,23 +112,20 @@ fn assemble(
     csf: &dyn ContrastSensitivity,
 ) -> ThresholdMap {
     let bands = OctaveBands::for_grid(viewing.display.pixel_density());
+    let mut clear = viewing.clone();
+    clear.observer.glare = Glare::None;
+    let adaptation_cd_m2 = adapted(luminance_cd_m2, viewing);
+    let without_glare = (viewing.observer.glare != Glare::None).then(|| adapted(luminance_cd_m2, &clear));
+    let span = LuminanceSpan::of(std::iter::once(&adaptation_cd_m2).chain(&without_glare));
     // Whatever the glare: it changes what the eye adapts to, not how it sees.
-    let tables = SensitivityTables::new(&bands, viewing, csf);
-    let under = |viewing: &Viewing| {
-        let adaptation_cd_m2 = adapted(luminance_cd_m2, viewing);
-        masked(
-            signal_cd_m2,
-            mean,
-            noise_variance,
-            adaptation_cd_m2,
-            Eye { viewing, csf, bands: &bands, tables: &tables },
-        )
+    let tables = SensitivityTables::new(&bands, viewing, csf, span);
+    let under = |viewing: &Viewing, adaptation_cd_m2: Plane| {
+        let eye = Eye { viewing, csf, bands: &bands, tables: &tables };
+        masked(signal_cd_m2, mean, noise_variance, adaptation_cd_m2, eye)
     };
-    let mut map = under(viewing);
-    if viewing.observer.glare != Glare::None {
-        let mut clear = viewing.clone();
-        clear.observer.glare = Glare::None;
-        keep_thresholds(&mut map, &under(&clear));
+    let mut map = under(viewing, adaptation_cd_m2);
+    if let Some(without_glare) = without_glare {
+        keep_thresholds(&mut map, &under(&clear, without_glare));
     }
     map
 }

@@ -3,7 +3,7 @@
 
 use super::audit::{Audit, audit, audit_unproven};
 use super::forecast::Forecast;
-use super::gain::{cut, most_worthwhile};
+use super::gain::{cut, most_worthwhile, while_far};
 use super::judge::{JudgeError, Judgement, judge_raw, still_wanted};
 use super::plan::{adaptive_plan, doubling_of, uniform_plan, wanted_samples};
 use super::rivals::rival_plan;
@@ -22,6 +22,12 @@ const TOLERATED_PEAK: f64 = 4.0;
 const HIGHEST_AUDITED_RUNG: f64 = 4.0;
 /// What the variance may be multiplied by in all after audits that disagree.
 const MOST_INFLATION: f64 = 4.0;
+
+/// A rung at threshold or below is far where it needs so many times the samples that are there, which are half as many again after
+/// the next plan.
+const FAR: f64 = 3.0;
+/// Share of the picture where it may be nearer.
+const ELSEWHERE: f64 = 0.1;
 
 impl Loop<'_> {
     /// Decides what comes next, leaving rungs of the ladder that are reached. An audit may make `judgement` stricter.
@@ -140,6 +146,9 @@ impl Loop<'_> {
     fn cheapest(&mut self, rung: f64, judgement: &Judgement) -> Result<Option<SamplePlan>, JudgeError> {
         let limits = &self.settings.limits;
         let film = &self.state.film;
+        if rung <= THRESHOLD && is_far(judgement, rung) {
+            return Ok(while_far(film, judgement, rung, limits.max_samples));
+        }
         let started = Instant::now();
         let forecast = Forecast::of(film, judgement);
         let wanted = wanted_samples(judgement, &forecast, self.settings.allocation, rung, limits)?;
@@ -197,6 +206,11 @@ impl Loop<'_> {
         let samples = self.state.film.total_samples();
         self.state.exposure.is_some_and(|exposure| samples < 2 * exposure.samples)
     }
+}
+
+/// Whether a rung needs, nearly everywhere, so much more than is there that the next plan does not depend on where the way ends.
+fn is_far(judgement: &Judgement, rung: f64) -> bool {
+    judgement.predicted.quantile(ELSEWHERE).powi(2) > FAR * rung * rung
 }
 
 fn some(plan: SamplePlan) -> Option<SamplePlan> {

@@ -173,11 +173,13 @@ pub(super) fn adaptive_plan(
         })
     };
     let pixels = f64::from(film.width()) * f64::from(film.height());
-    let is_cheap = |plan: &SamplePlan| plan.samples() as f64 <= SAMPLES_OF_A_RAW_LOOK * pixels;
+    let cheap = SAMPLES_OF_A_RAW_LOOK * pixels;
     let mut best = None;
-    for margin in MARGINS {
+    // Not made only to be found too large: that is a tenth of a small look.
+    let margins = if least_lack(film, wanted) > 2.0 * cheap { &[] } else { &MARGINS[..] };
+    for &margin in margins {
         let plan = plan_of(Haste { most_doublings: MOST_DOUBLINGS_AT_ONCE, margin });
-        if !is_cheap(&plan) {
+        if plan.samples() as f64 > cheap {
             break;
         }
         let is_enough = forecast.is_reached_by(&plan, wanted.visibility);
@@ -187,6 +189,15 @@ pub(super) fn adaptive_plan(
         }
     }
     best.unwrap_or_else(|| plan_of(Haste::NONE))
+}
+
+/// Samples that pixels lack of what they should have, doubled once at most.
+fn least_lack(film: &Film, wanted: &Wanted) -> f64 {
+    let lack = |(pixel, &wanted): (usize, &f32)| {
+        let taken = f64::from(film.samples(pixel));
+        (f64::from(wanted) - taken).clamp(0.0, taken)
+    };
+    wanted.samples.values().iter().enumerate().map(lack).sum()
 }
 
 /// How much is asked for before the next look.
@@ -317,20 +328,23 @@ pub fn slices(plan: SamplePlan, width: u32, traced_samples: u64) -> Vec<SamplePl
 /// Cuts a plan to a budget: the blocks of pixels with the largest `urgency` first.
 pub fn cut_to_budget(plan: SamplePlan, urgency: &Plane, samples: u64) -> SamplePlan {
     let mut blocks = plan.blocks;
-    let urgency = |b: &BlockWork| urgency.values()[b.pixel as usize];
-    blocks.sort_by(|a, b| urgency(b).total_cmp(&urgency(a)).then(a.pixel.cmp(&b.pixel)).then(a.level.cmp(&b.level)));
-    let mut left = samples;
-    blocks.retain(|b| {
-        let fits = u64::from(b.samples) <= left;
-        if fits {
-            left -= u64::from(b.samples);
-        }
-        fits
-    });
-    // A block of a later level must not come without the one before it.
+    // A block of a later level must not come without the one before it. Mostly plans are in order already.
     blocks.sort_by_key(|b| (b.pixel, b.half, b.level));
+    let by_urgency = |block: &BlockWork| !rank(urgency.values()[block.pixel as usize]);
+    let mut order: Vec<(u32, u32, u8, u32)> =
+        (0..).zip(&blocks).map(|(place, block)| (by_urgency(block), block.pixel, block.level, place)).collect();
+    order.sort_unstable();
+    let mut left = samples;
+    let mut fits = vec![false; blocks.len()];
+    for (.., place) in order {
+        let cost = u64::from(blocks[place as usize].samples);
+        if cost <= left {
+            left -= cost;
+            fits[place as usize] = true;
+        }
+    }
     let mut kept: Vec<BlockWork> = Vec::with_capacity(blocks.len());
-    for block in blocks {
+    for (block, _) in blocks.into_iter().zip(fits).filter(|(_, fits)| *fits) {
         let follows =
             kept.last().is_some_and(|k| k.pixel == block.pixel && k.half == block.half && k.level + 1 == block.level);
         let is_first = plan_first_level(&kept, &block);
@@ -339,6 +353,12 @@ pub fn cut_to_budget(plan: SamplePlan, urgency: &Plane, samples: u64) -> SampleP
         }
     }
     SamplePlan { blocks: kept }
+}
+
+/// A number that orders as `value` does in [`f32::total_cmp`].
+fn rank(value: f32) -> u32 {
+    let bits = value.to_bits();
+    if bits >> 31 == 0 { bits | 1 << 31 } else { !bits }
 }
 
 /// Whether no earlier block of the same pixel and half stands before this one.

@@ -3,7 +3,7 @@
 //! A look says whose noise shows; how much each pixel gets is decided, as samples come, by raw noise, which costs a tenth of a
 //! look to know. Not for pictures that stay raw: these have `plan`.
 
-use super::gain::{GROWTH, defended, gain};
+use super::gain::{EVEN_ENOUGH, GROWTH, defended, gain, share_of_even};
 use super::judge::Judgement;
 use super::plan::{doubling_plan, plan_up_to};
 use super::stop::TOLERATED_SHARE;
@@ -11,8 +11,6 @@ use crate::film::Film;
 use crate::integrator::SamplePlan;
 use serde::{Deserialize, Serialize};
 
-/// Even counts are kept where the best ones would take more than this share of their samples.
-const EVEN_ENOUGH: f64 = 0.95;
 /// Samples for every pixel that a plan adds at least, while its pixels may have so many: variances of four samples are not worth
 /// being asked more often.
 const LEAST_PLAN: f64 = 6.0;
@@ -141,14 +139,6 @@ fn plan_by_energy(film: &Film, energies: &[f64], to_blame: &[bool], max_samples:
         doubled.into_iter().for_each(|pixel| doublings[pixel] += 1);
     }
     doubling_plan(film, max_samples, |pixel| [doublings[pixel]; 2])
-}
-
-/// Samples that the best counts would need for the energy that even counts leave, as a share of theirs: the sum of e/n is smallest
-/// where n goes as √e, so (mean √e)² / mean e (Cauchy and Schwarz: at most 1).
-fn share_of_even(energies: &[f64]) -> f64 {
-    let root: f64 = energies.iter().map(|energy| energy.sqrt()).sum();
-    let sum: f64 = energies.iter().sum();
-    if sum > 0.0 { root * root / (sum * energies.len() as f64) } else { 1.0 }
 }
 
 #[cfg(test)]
