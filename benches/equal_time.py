@@ -21,42 +21,59 @@ LEAST_APART = 0.1
 OF_OURS = ("as-asked", "to-threshold")
 
 
+# One-sided 95 % of Student's t by degrees of freedom.
+T_95 = {1: 6.314, 2: 2.920, 3: 2.353, 4: 2.132, 5: 2.015, 6: 1.943, 7: 1.895, 8: 1.860, 9: 1.833}
+
+
 def read(folder):
-    """Means over seeds of what is needed, by scene and arm."""
-    rows = collections.defaultdict(list)
+    """What is needed of each seed's render, by scene, arm and seed."""
+    rows = collections.defaultdict(dict)
     with open(folder / "results.csv", newline="") as file:
         for row in csv.DictReader(file):
-            if row["coverage"] == "0.99" and row["seed"]:
+            if row["coverage"] == "0.99" and row["seed"] != "all":
                 # What was rendered, not what v* would have taken.
                 values = {key: float(row[key]) for key in ("overhead", "flip_mean", "jod")}
                 values["spp"] = float(row["samples"]) / float(row["reached"]) ** 2
-                rows[row["scene"], row["arm"]].append(values)
-    return {key: {name: sum(v[name] for v in values) / len(values) for name in values[0]} for key, values in rows.items()}
+                rows[row["scene"], row["arm"]][row["seed"]] = values
+    return rows
 
 
-def compare(ours, uniform, near):
+def compare(ours, uniform, near, overhead):
     """JOD less uniform's in the same time, FLIP over it, and FLIP over uniform's at as many samples."""
     apart = math.log(near["spp"] / uniform["spp"])
     slope = (near["jod"] - uniform["jod"]) / apart if abs(apart) > LEAST_APART else JOD_SLOPE
-    in_time = ours["spp"] / (1.0 - ours["overhead"])
+    in_time = ours["spp"] / (1.0 - overhead)
     jod = near["jod"] + slope * math.log(in_time / near["spp"])
     flip = {samples: near["flip_mean"] * (samples / near["spp"]) ** FLIP_POWER for samples in (in_time, ours["spp"])}
     return ours["jod"] - jod, ours["flip_mean"] / flip[in_time], ours["flip_mean"] / flip[ours["spp"]]
 
 
+def mean_and_margin(values):
+    """The mean, and what a one-sided 95 % interval adds to it or takes away."""
+    count = len(values)
+    mean = sum(values) / count
+    if count < 2:
+        return mean, math.inf
+    deviation = math.sqrt(sum((value - mean) ** 2 for value in values) / (count - 1) / count)
+    return mean, T_95.get(count - 1, 1.645) * deviation
+
+
 def main():
-    means = read(pathlib.Path(sys.argv[1]))
-    print("| scene | arm | spp | overhead | JOD | FLIP in the same time | FLIP at equal samples |")
+    rows = read(pathlib.Path(sys.argv[1]))
+    print("| scene | arm | spp | overhead | JOD (95 %: at least) | FLIP in the same time (95 %: at most) | FLIP at equal samples |")
     print("| --- | --- | --- | --- | --- | --- | --- |")
     found = collections.defaultdict(list)
-    for scene in dict.fromkeys(scene for scene, _ in means):
+    for scene in dict.fromkeys(scene for scene, _ in rows):
         for arm in OF_OURS:
-            ours = means[scene, arm]
-            compared = compare(ours, means[scene, "uniform"], means[scene, "uniform-equal-time"])
-            found[arm].append(compared)
-            jod, in_time, at_samples = compared
-            cells = f"{ours['spp']:.0f} | {100 * ours['overhead']:.1f} % | {jod:+.3f} | {in_time:.3f} | {at_samples:.3f}"
-            print(f"| {scene} | {arm} | {cells} |")
+            ours, uniform, near = (rows[scene, name] for name in (arm, "uniform", "uniform-equal-time"))
+            # One for all seeds: its scatter is the machine's.
+            overhead = sum(values["overhead"] for values in ours.values()) / len(ours)
+            compared = [compare(ours[seed], uniform[seed], near[seed], overhead) for seed in ours]
+            (jod, jod_margin), (flip, flip_margin), (at_samples, _) = map(mean_and_margin, zip(*compared))
+            found[arm].append((jod, flip, at_samples))
+            spp = sum(values["spp"] for values in ours.values()) / len(ours)
+            cells = f"{spp:.0f} | {100 * overhead:.1f} % | {jod:+.3f} ({jod - jod_margin:+.3f})"
+            print(f"| {scene} | {arm} | {cells} | {flip:.3f} ({flip + flip_margin:.3f}) | {at_samples:.3f} |")
     for arm, of_scenes in found.items():
         jod, in_time, at_samples = zip(*of_scenes)
         mean = sum(jod) / len(jod)
