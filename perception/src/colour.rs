@@ -98,10 +98,11 @@ impl ThresholdMap {
     /// # Errors
     /// As [`CastleChromatic::new`].
     pub fn chromatic_gains(&self) -> Result<ChromaticGains, Error> {
-        Ok(ChromaticGains {
-            red_green: self.chromatic_noise_gain(ChromaticChannel::RedGreen)?,
-            yellow_violet: self.chromatic_noise_gain(ChromaticChannel::YellowViolet)?,
-        })
+        let (red_green, yellow_violet) = rayon::join(
+            || self.chromatic_noise_gain(ChromaticChannel::RedGreen),
+            || self.chromatic_noise_gain(ChromaticChannel::YellowViolet),
+        );
+        Ok(ChromaticGains { red_green: red_green?, yellow_violet: yellow_violet? })
     }
 
     /// Gains of both chromatic channels for noise that is new in every frame.

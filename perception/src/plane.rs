@@ -15,6 +15,9 @@ pub struct Plane {
     values: Vec<f32>,
 }
 
+/// Pixels that are worth handing to another thread: 16,384 left a second core idle at 128×128.
+const PIXELS_A_TASK: usize = 1 << 12;
+
 impl Plane {
     /// A plane whose every pixel is `value`.
     ///
@@ -162,7 +165,7 @@ impl Plane {
             return;
         }
         // A few rows at a time: one row of a small picture is less work than handing it over.
-        let rows_at_once = (16_384 / self.width).max(1);
+        let rows_at_once = (PIXELS_A_TASK / self.width).max(1);
         let width = self.width;
         self.values.par_chunks_mut(width * rows_at_once).enumerate().for_each(|(chunk, rows)| {
             for (offset, row) in rows.chunks_exact_mut(width).enumerate() {

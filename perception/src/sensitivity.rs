@@ -153,6 +153,7 @@ impl SensitivityTables {
             .collect();
         let grey_cd_m2 = 0.2 * viewing.display.white_cd_m2;
         let tables = (0..count)
+            .into_par_iter()
             .map(|band| BandTables {
                 noise_energy: LuminanceTable::from_samples(span, |sample| samples[sample - span.first][band].noise),
                 center_sensitivity_squared: LuminanceTable::from_samples(span, |sample| {
@@ -224,6 +225,7 @@ pub(crate) fn adaptation_levels(
     let first = (half_decade(least_cd_m2) + 1e-6).floor() as i32;
     let last = ((half_decade(greatest_cd_m2) - 1e-6).ceil() as i32).clamp(first, 2 * HIGHEST_DECADE + 20);
     (first..=last)
+        .into_par_iter()
         .map(|level| {
             let luminance = 10.0_f64.powf(f64::from(level) / 2.0);
             let gain = viewing.observer.sensitivity;
