@@ -87,9 +87,9 @@ impl Subject {
         PathTracer::new(Arc::clone(&self.scene), self.trace_settings(seed))
     }
 
-    fn job(&self, seed: u64, limits: Limits) -> Job {
+    fn job(&self, seed: u64, limits: Limits, sampling: Sampling) -> Job {
         let record = SettingsRecord {
-            sampling: Sampling::Adaptive,
+            sampling,
             allocation: AllocationRule::Convex,
             model: "csf-bands".to_owned(),
             viewing: self.viewing.clone(),
@@ -147,7 +147,7 @@ fn first_pictures(subjects: &[Subject]) -> Result<()> {
             });
             trees.push(tree);
             pass.push(traced);
-            let watched = Watched::start(subject, seed, Limits::of_visibility(1.0), false)?;
+            let watched = Watched::start(subject, seed, Limits::of_visibility(1.0), Sampling::Adaptive, false)?;
             let pixels = subject.pixels() as u64;
             let moments = watched.until(|moment| moment.samples >= 2 * pixels)?;
             first.push(moments[0].seconds - tree);
@@ -205,7 +205,7 @@ fn overheads(subjects: &[Subject], arguments: &Arguments) -> Result<()> {
                 counts.push((rendered.film.total_samples() + 1, seconds));
                 anyhow::Ok((rendered, counts))
             })?;
-            let preview = Watched::start(subject, seed, limits, false)?;
+            let preview = Watched::start(subject, seed, limits, Sampling::Adaptive, false)?;
             let moments = preview.until(|moment| moment.is_at_rest)?;
             let end = moments.last().context("an end")?;
             anyhow::ensure!(end.samples == rendered.film.total_samples(), "the preview took another way");

@@ -1,10 +1,11 @@
-//! Quality over the first seconds: what one sees of a preview beside a uniform progressive render.
+//! Quality over the first seconds: what one sees of a preview beside a uniform progressive render that is shown at no cost, and
+//! beside the same preview where it samples evenly, which pays for frames and looks too.
 
 use super::watched::{Moment, Watched};
 use super::{Arguments, Subject, one_sample_each, one_thread};
 use crate::support::CpuClock;
 use anyhow::{Context, Result};
-use fechner::adaptive::settings::Limits;
+use fechner::adaptive::settings::{Limits, Sampling};
 use fechner::benchmark::{measure, trace_up_to};
 use fechner::film::Film;
 use fechner_perception::tone::{FittedTone, SceneGuide, map_picture, operator};
@@ -54,8 +55,8 @@ fn moments(seconds: f64) -> Vec<f64> {
 }
 
 /// What somebody who watches the preview has before him at each time.
-fn previewed(subject: &Subject, seed: u64, times: &[f64]) -> Result<Vec<Vec<[f32; 3]>>> {
-    let watched = Watched::start(subject, seed, Limits::of_visibility(1.0), true)?;
+fn previewed(subject: &Subject, seed: u64, sampling: Sampling, times: &[f64]) -> Result<Vec<Vec<[f32; 3]>>> {
+    let watched = Watched::start(subject, seed, Limits::of_visibility(1.0), sampling, true)?;
     let end = *times.last().context("a time")?;
     let mut before: Option<Moment> = None;
     let mut pictures = Vec::new();
@@ -111,55 +112,70 @@ fn time_average(times: &[f64], values: &[f64]) -> f64 {
     area / (times[times.len() - 1] - times[0])
 }
 
-pub(super) fn races(subjects: &[Subject], arguments: &Arguments) -> Result<()> {
-    let times = moments(arguments.seconds);
-    let seconds = arguments.seconds;
-    println!(
-        "\nMean over the first {seconds} s, preview less uniform (± standard error over {} seeds):\n",
-        arguments.seeds
-    );
-    println!("| scene | FLIP, uniform | FLIP, preview | difference | JOD, uniform | JOD, preview | difference |");
-    println!("| --- | --- | --- | --- | --- | --- | --- |");
-    let mut tracks = Vec::new();
-    for subject in subjects {
-        let judge = Judge::of(subject, arguments.reference_spp)?;
-        // [arm][measure][seed], and by moment.
-        let mut averages = [[vec![], vec![]], [vec![], vec![]]];
-        let mut track = vec![[[0.0; 2]; 2]; times.len()];
-        for seed in 1..=arguments.seeds {
-            let arms = [progressive(subject, seed, &times)?, previewed(subject, seed, &times)?];
-            for (arm, pictures) in arms.iter().enumerate() {
-                let measured = pictures.iter().map(|picture| judge.measure(picture)).collect::<Result<Vec<_>>>()?;
-                for measure in 0..2 {
-                    let values: Vec<f64> = measured.iter().map(|both| both[measure]).collect();
-                    averages[arm][measure].push(time_average(&times, &values));
-                    for (moment, value) in values.iter().enumerate() {
-                        track[moment][measure][arm] += value / arguments.seeds as f64;
-                    }
+/// What is compared, the preview last.
+const ARMS: [&str; 3] = ["uniform", "uniform preview", "preview"];
+const MEASURES: [&str; 2] = ["FLIP", "JOD"];
+
+/// A measure of each arm: its mean over the first seconds by seed, and its mean over seeds by moment.
+struct Raced {
+    averages: [Vec<f64>; ARMS.len()],
+    track: Vec<[f64; ARMS.len()]>,
+}
+
+fn race(subject: &Subject, arguments: &Arguments, times: &[f64]) -> Result<[Raced; MEASURES.len()]> {
+    let judge = Judge::of(subject, arguments.reference_spp)?;
+    let mut raced =
+        MEASURES.map(|_| Raced { averages: Default::default(), track: vec![[0.0; ARMS.len()]; times.len()] });
+    for seed in 1..=arguments.seeds {
+        let arms = [
+            progressive(subject, seed, times)?,
+            previewed(subject, seed, Sampling::Uniform, times)?,
+            previewed(subject, seed, Sampling::Adaptive, times)?,
+        ];
+        for (arm, pictures) in arms.iter().enumerate() {
+            let measured = pictures.iter().map(|picture| judge.measure(picture)).collect::<Result<Vec<_>>>()?;
+            for (measure, raced) in raced.iter_mut().enumerate() {
+                let values: Vec<f64> = measured.iter().map(|both| both[measure]).collect();
+                raced.averages[arm].push(time_average(times, &values));
+                for (of_moment, value) in raced.track.iter_mut().zip(&values) {
+                    of_moment[arm] += value / arguments.seeds as f64;
                 }
             }
         }
-        let [uniform, preview] = &averages;
-        let cells = [0, 1].map(|measure| {
-            let differences: Vec<f64> = preview[measure].iter().zip(&uniform[measure]).map(|(a, b)| a - b).collect();
-            let (difference, error) = mean_and_error(&differences);
-            let [of_uniform, of_preview] =
-                [&uniform[measure], &preview[measure]].map(|values| mean_and_error(values).0);
-            format!("{of_uniform:.4} | {of_preview:.4} | {difference:+.4} ± {error:.4}")
-        });
-        println!("| {} | {} | {} |", subject.name, cells[0], cells[1]);
-        tracks.push((subject, track));
     }
-    println!("\nOver time, uniform / preview:\n");
+    Ok(raced)
+}
+
+pub(super) fn races(subjects: &[Subject], arguments: &Arguments) -> Result<()> {
+    let times = moments(arguments.seconds);
+    let (seconds, seeds) = (arguments.seconds, arguments.seeds);
+    println!(
+        "\nMean over the first {seconds} s, and the preview less the others (± standard error over {seeds} seeds):\n"
+    );
+    println!("| scene, measure | {} | less uniform | less uniform preview |", ARMS.join(" | "));
+    println!("| --- | --- | --- | --- | --- | --- |");
+    let mut tracks = Vec::new();
+    for subject in subjects {
+        let raced = race(subject, arguments, &times)?;
+        for (name, Raced { averages: [uniform, uniform_preview, preview], track }) in MEASURES.iter().zip(raced) {
+            let [a, b, c] = [&uniform, &uniform_preview, &preview].map(|values| mean_and_error(values).0);
+            let less = |other: &[f64]| {
+                let differences: Vec<f64> = preview.iter().zip(other).map(|(preview, other)| preview - other).collect();
+                let (difference, error) = mean_and_error(&differences);
+                format!("{difference:+.4} ± {error:.4}")
+            };
+            let differences = [less(&uniform), less(&uniform_preview)].join(" | ");
+            println!("| {}, {name} | {a:.4} | {b:.4} | {c:.4} | {differences} |", subject.name);
+            tracks.push((subject.name, name, track));
+        }
+    }
+    println!("\nOver time, {}:\n", ARMS.join(" / "));
     let heads: Vec<String> = times.iter().map(|time| format!("{time:.2} s")).collect();
     println!("| scene, measure | {} |", heads.join(" | "));
     println!("| --- |{}", " --- |".repeat(times.len()));
-    for (subject, track) in &tracks {
-        for (measure, name) in ["FLIP", "JOD"].iter().enumerate() {
-            let cells: Vec<String> =
-                track.iter().map(|at| format!("{:.3} / {:.3}", at[measure][0], at[measure][1])).collect();
-            println!("| {}, {name} | {} |", subject.name, cells.join(" | "));
-        }
+    for (scene, name, track) in &tracks {
+        let cells: Vec<String> = track.iter().map(|[a, b, c]| format!("{a:.3} / {b:.3} / {c:.3}")).collect();
+        println!("| {scene}, {name} | {} |", cells.join(" | "));
     }
     println!("\nPixels: {}; reference: {} samples a pixel.", subjects[0].pixels(), arguments.reference_spp);
     Ok(())

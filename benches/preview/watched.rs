@@ -4,7 +4,7 @@ use super::{Subject, one_thread};
 use crate::support::CpuClock;
 use anyhow::{Context, Result};
 use fechner::adaptive::Rendered;
-use fechner::adaptive::settings::{Limits, LoopSettings};
+use fechner::adaptive::settings::{Limits, LoopSettings, Sampling};
 use fechner::preview::{Closer, Door, Host, Job, Options, Shown, Spectator, start};
 use fechner::scene::Scene;
 use std::net::{TcpListener, TcpStream};
@@ -82,7 +82,13 @@ pub(super) struct Watched {
 }
 
 impl Watched {
-    pub(super) fn start(subject: &Subject, seed: u64, limits: Limits, keeps_pictures: bool) -> Result<Self> {
+    pub(super) fn start(
+        subject: &Subject,
+        seed: u64,
+        limits: Limits,
+        sampling: Sampling,
+        keeps_pictures: bool,
+    ) -> Result<Self> {
         let pool = one_thread()?;
         let (sender, moments) = channel();
         // The clock is of the pool's thread, and starts before anything is made of the loaded scene.
@@ -100,7 +106,7 @@ impl Watched {
             anyhow::Ok(())
         };
         let viewer = std::thread::spawn(move || drop(viewer()));
-        let preview = start(subject.job(seed, limits), host, options, pool)?;
+        let preview = start(subject.job(seed, limits, sampling), host, options, pool)?;
         let closer = preview.closer();
         let door = Door { address, token: "bench".to_owned() };
         let server = std::thread::spawn(move || drop(preview.serve(listener, door)));
