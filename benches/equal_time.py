@@ -6,7 +6,8 @@
 
 prints the table of `benches/README.md`. In an arm's time uniform sampling takes the arm's samples over one less the arm's
 `overhead`, the share of time outside of the tracer. Its FLIP there is that of the arm `uniform-equal-time` by FLIP_POWER, its
-JOD by the line through that arm and `uniform` over the logarithm of samples, or by JOD_SLOPE where the two are too close.
+JOD by the line through that arm and `uniform` over the logarithm of samples, or by JOD_SLOPE where the two are too close. Bounds are
+of the seeds' scatter, one-sided, 95 %; an arm's overhead is the mean over its seeds.
 """
 
 import collections
@@ -19,8 +20,6 @@ FLIP_POWER = -0.41
 JOD_SLOPE = 0.35
 LEAST_APART = 0.1
 OF_OURS = ("as-asked", "to-threshold")
-
-
 # One-sided 95 % of Student's t by degrees of freedom.
 T_95 = {1: 6.314, 2: 2.920, 3: 2.353, 4: 2.132, 5: 2.015, 6: 1.943, 7: 1.895, 8: 1.860, 9: 1.833}
 
@@ -60,7 +59,8 @@ def mean_and_margin(values):
 
 def main():
     rows = read(pathlib.Path(sys.argv[1]))
-    print("| scene | arm | spp | overhead | JOD (95 %: at least) | FLIP in the same time (95 %: at most) | FLIP at equal samples |")
+    of_time = "JOD (95 %: at least) | FLIP in the same time (95 %: at most)"
+    print(f"| scene | arm | spp | overhead | {of_time} | FLIP at equal samples |")
     print("| --- | --- | --- | --- | --- | --- | --- |")
     found = collections.defaultdict(list)
     for scene in dict.fromkeys(scene for scene, _ in rows):

@@ -16,7 +16,7 @@ pub struct Plane {
 }
 
 /// Pixels that are worth handing to another thread: 16,384 left a second core idle at 128×128.
-const PIXELS_A_TASK: usize = 1 << 12;
+pub(crate) const PIXELS_A_TASK: usize = 1 << 12;
 
 impl Plane {
     /// A plane whose every pixel is `value`.

@@ -1,5 +1,6 @@
 //! A picture of several channels, row by row: all of a row's channels lie one after the other.
 
+use crate::plane::PIXELS_A_TASK;
 use rayon::prelude::*;
 
 /// Row y holds channel 0 of its pixels, then channel 1, and so on: loops along a row run on vector registers, and one
@@ -26,7 +27,7 @@ impl<const CHANNELS: usize> Rows<CHANNELS> {
         if width == 0 {
             return;
         }
-        let rows_at_once = (4096 / width).max(1);
+        let rows_at_once = (PIXELS_A_TASK / width).max(1);
         self.values.par_chunks_mut(CHANNELS * width).with_min_len(rows_at_once).enumerate().for_each(|(y, row)| {
             let mut channels = row.chunks_exact_mut(width);
             // There are exactly as many as channels; an empty slice never comes up.

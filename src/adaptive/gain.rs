@@ -14,7 +14,7 @@ pub(super) const GROWTH: f64 = 0.5;
 /// Even counts are kept where the best ones would take more than this share of their samples.
 pub(super) const EVEN_ENOUGH: f64 = 0.95;
 /// The same of raw pictures on the way to a far rung: between the Cornell box (0.95 to 0.96), whose squared error is 0.90 of even
-/// counts', and the product shot (0.98), where even counts have 9.875 JOD at 96 samples and uneven ones 9.837 (`benches/README.md`).
+/// counts', and the product shot (0.98), where even counts have 9.875 JOD at 96 samples and uneven ones 9.834 (`benches/README.md`).
 const EVEN_ENOUGH_WHILE_FAR: f64 = 0.97;
 /// Samples for every pixel up to which a plan is never cut: less would hardly pay for the look before it.
 const LEAST_UNCUT: f64 = 16.0;
@@ -23,9 +23,13 @@ const MOST_TIMES_MEAN: f64 = 16.0;
 
 /// As much of a plan as there should be before the next look, where it does most for the picture.
 pub(super) fn most_worthwhile(plan: SamplePlan, film: &Film, judgement: &Judgement) -> SamplePlan {
+    cut(plan, film, judgement, most_at_once(film))
+}
+
+/// Samples of a plan before the next look.
+fn most_at_once(film: &Film) -> u64 {
     let pixels = f64::from(film.width()) * f64::from(film.height());
-    let most = (GROWTH * film.total_samples() as f64).max(LEAST_UNCUT * pixels);
-    cut(plan, film, judgement, most as u64)
+    (GROWTH * film.total_samples() as f64).max(LEAST_UNCUT * pixels) as u64
 }
 
 /// Samples for a rung that is far nearly everywhere: where they do most for the picture among what shows by itself. `None` where even
@@ -33,18 +37,23 @@ pub(super) fn most_worthwhile(plan: SamplePlan, film: &Film, judgement: &Judgeme
 ///
 /// What the cheapest counts are does not matter yet, and to find them was a quarter of a small look.
 pub(super) fn while_far(film: &Film, judgement: &Judgement, rung: f64, max_samples: u32) -> Option<SamplePlan> {
-    let energies = judgement.energy_of(&judgement.pooled_variance_per_sample);
-    if share_of_even(&defended(energies.values())) > EVEN_ENOUGH_WHILE_FAR {
+    let own = judgement.energy_of(&judgement.pooled_variance_per_sample);
+    let energies = defended(own.values());
+    if share_of_even(&energies) > EVEN_ENOUGH_WHILE_FAR {
         return None;
     }
-    let shows = |pixel: usize| f64::from(energies.values()[pixel]) > rung * rung * f64::from(film.samples(pixel));
+    let shows = |pixel: usize| f64::from(own.values()[pixel]) > rung * rung * f64::from(film.samples(pixel));
     let plan = doubling_plan(film, max_samples, |pixel| [u32::from(shows(pixel)); 2]);
-    Some(most_worthwhile(plan, film, judgement))
+    Some(cut_to_budget(plan, &gains(film, &energies), most_at_once(film)))
 }
 
 /// A plan cut to so many samples: where these do most for the picture.
 pub(super) fn cut(plan: SamplePlan, film: &Film, judgement: &Judgement, most: u64) -> SamplePlan {
-    if plan.samples() > most { cut_to_budget(plan, &gains(film, judgement), most) } else { plan }
+    if plan.samples() <= most {
+        return plan;
+    }
+    let energies = defended(judgement.energy_of(&judgement.pooled_variance_per_sample).values());
+    cut_to_budget(plan, &gains(film, &energies), most)
 }
 
 /// What one more sample takes away of each pixel's visible energy e/n.
@@ -52,9 +61,8 @@ pub(super) fn cut(plan: SamplePlan, film: &Film, judgement: &Judgement, most: u6
 /// Samples that go where it is most make counts that go as √e and leave the least mean energy (Neyman 1934) of known variances.
 /// Counts for equal visibility go as e: at 96 samples a pixel of the Cornell box their FLIP was 1.09 times that of even counts, with
 /// these it is 1.015 (`benches/README.md`).
-fn gains(film: &Film, judgement: &Judgement) -> Plane {
+fn gains(film: &Film, energies: &[f64]) -> Plane {
     let width = film.width() as usize;
-    let energies = defended(judgement.energy_of(&judgement.pooled_variance_per_sample).values());
     Plane::from_fn(width, film.height() as usize, |x, y| {
         let pixel = y * width + x;
         gain(energies[pixel], f64::from(film.samples(pixel).max(1))) as f32

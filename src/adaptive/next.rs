@@ -23,7 +23,7 @@ const HIGHEST_AUDITED_RUNG: f64 = 4.0;
 /// What the variance may be multiplied by in all after audits that disagree.
 const MOST_INFLATION: f64 = 4.0;
 
-/// A rung at threshold or below is far where it needs so many times the samples that are there, which are half as many again after
+/// A rung at threshold or below is far where it needs so many times the samples that are there, which are twice as many at most after
 /// the next plan.
 const FAR: f64 = 3.0;
 /// Share of the picture where it may be nearer.

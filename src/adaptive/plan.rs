@@ -173,31 +173,24 @@ pub(super) fn adaptive_plan(
         })
     };
     let pixels = f64::from(film.width()) * f64::from(film.height());
-    let cheap = SAMPLES_OF_A_RAW_LOOK * pixels;
-    let mut best = None;
-    // Not made only to be found too large: that is a tenth of a small look.
-    let margins = if least_lack(film, wanted) > 2.0 * cheap { &[] } else { &MARGINS[..] };
-    for &margin in margins {
+    let is_cheap = |plan: &SamplePlan| plan.samples() as f64 <= SAMPLES_OF_A_RAW_LOOK * pixels;
+    let mut best = plan_of(Haste::NONE);
+    // What comes in haste holds all of it.
+    if !is_cheap(&best) {
+        return best;
+    }
+    for margin in MARGINS {
         let plan = plan_of(Haste { most_doublings: MOST_DOUBLINGS_AT_ONCE, margin });
-        if plan.samples() as f64 > cheap {
+        if !is_cheap(&plan) {
             break;
         }
         let is_enough = forecast.is_reached_by(&plan, wanted.visibility);
-        best = Some(plan);
+        best = plan;
         if is_enough {
             break;
         }
     }
-    best.unwrap_or_else(|| plan_of(Haste::NONE))
-}
-
-/// Samples that pixels lack of what they should have, doubled once at most.
-fn least_lack(film: &Film, wanted: &Wanted) -> f64 {
-    let lack = |(pixel, &wanted): (usize, &f32)| {
-        let taken = f64::from(film.samples(pixel));
-        (f64::from(wanted) - taken).clamp(0.0, taken)
-    };
-    wanted.samples.values().iter().enumerate().map(lack).sum()
+    best
 }
 
 /// How much is asked for before the next look.
@@ -327,6 +320,9 @@ pub fn slices(plan: SamplePlan, width: u32, traced_samples: u64) -> Vec<SamplePl
 
 /// Cuts a plan to a budget: the blocks of pixels with the largest `urgency` first.
 pub fn cut_to_budget(plan: SamplePlan, urgency: &Plane, samples: u64) -> SamplePlan {
+    if plan.samples() <= samples {
+        return plan;
+    }
     let mut blocks = plan.blocks;
     // A block of a later level must not come without the one before it. Mostly plans are in order already.
     blocks.sort_by_key(|b| (b.pixel, b.half, b.level));
