@@ -5,9 +5,10 @@
     python benches/equal_time.py FOLDER
 
 prints the table of `benches/README.md`. In an arm's time uniform sampling takes the arm's samples over one less the arm's
-`overhead`, the share of time outside of the tracer. Its FLIP there is that of the arm `uniform-equal-time` by FLIP_POWER, its
-JOD by the line through that arm and `uniform` over the logarithm of samples, or by JOD_SLOPE where the two are too close. Bounds are
-of the seeds' scatter, one-sided, 95 %; an arm's overhead is the mean over its seeds.
+`overhead`, the share of time outside of the tracer; where it ends with a look, as the arm does and as its report needs,
+times one less the share of the arm's last look. Its FLIP there is that of the arm `uniform-equal-time` by FLIP_POWER, its
+JOD by the line through that arm and `uniform` over the logarithm of samples, or by JOD_SLOPE where the two are too close.
+Bounds are of the seeds' scatter, one-sided, 95 %; an arm's overhead and last look are means over its seeds.
 """
 
 import collections
@@ -20,6 +21,8 @@ FLIP_POWER = -0.41
 JOD_SLOPE = 0.35
 LEAST_APART = 0.1
 OF_OURS = ("as-asked", "to-threshold")
+# What an arm is compared with: uniform sampling that takes as long and never looks; that ends with a look; that takes as many samples.
+AGAINST = ("in the same time", "with a last look too", "at equal samples")
 # One-sided 95 % of Student's t by degrees of freedom.
 T_95 = {1: 6.314, 2: 2.920, 3: 2.353, 4: 2.132, 5: 2.015, 6: 1.943, 7: 1.895, 8: 1.860, 9: 1.833}
 
@@ -31,54 +34,57 @@ def read(folder):
         for row in csv.DictReader(file):
             if row["coverage"] == "0.99" and row["seed"] != "all":
                 # What was rendered, not what v* would have taken.
-                values = {key: float(row[key]) for key in ("overhead", "flip_mean", "jod")}
+                values = {key: float(row[key]) for key in ("overhead", "last_look", "flip_mean", "jod")}
                 values["spp"] = float(row["samples"]) / float(row["reached"]) ** 2
                 rows[row["scene"], row["arm"]][row["seed"]] = values
     return rows
 
 
-def compare(ours, uniform, near, overhead):
-    """JOD less uniform's in the same time, FLIP over it, and FLIP over uniform's at as many samples."""
+def compare(ours, uniform, near, samples):
+    """JOD less that of uniform sampling with so many samples, and FLIP over it."""
     apart = math.log(near["spp"] / uniform["spp"])
     slope = (near["jod"] - uniform["jod"]) / apart if abs(apart) > LEAST_APART else JOD_SLOPE
-    in_time = ours["spp"] / (1.0 - overhead)
-    jod = near["jod"] + slope * math.log(in_time / near["spp"])
-    flip = {samples: near["flip_mean"] * (samples / near["spp"]) ** FLIP_POWER for samples in (in_time, ours["spp"])}
-    return ours["jod"] - jod, ours["flip_mean"] / flip[in_time], ours["flip_mean"] / flip[ours["spp"]]
+    jod = near["jod"] + slope * math.log(samples / near["spp"])
+    flip = near["flip_mean"] * (samples / near["spp"]) ** FLIP_POWER
+    return ours["jod"] - jod, ours["flip_mean"] / flip
+
+
+def mean(values):
+    return sum(values) / len(values)
 
 
 def mean_and_margin(values):
     """The mean, and what a one-sided 95 % interval adds to it or takes away."""
-    count = len(values)
-    mean = sum(values) / count
+    count, middle = len(values), mean(values)
     if count < 2:
-        return mean, math.inf
-    deviation = math.sqrt(sum((value - mean) ** 2 for value in values) / (count - 1) / count)
-    return mean, T_95.get(count - 1, 1.645) * deviation
+        return middle, math.inf
+    deviation = math.sqrt(sum((value - middle) ** 2 for value in values) / (count - 1) / count)
+    return middle, T_95.get(count - 1, 1.645) * deviation
 
 
 def main():
     rows = read(pathlib.Path(sys.argv[1]))
-    of_time = "JOD (95 %: at least) | FLIP in the same time (95 %: at most)"
-    print(f"| scene | arm | spp | overhead | {of_time} | FLIP at equal samples |")
-    print("| --- | --- | --- | --- | --- | --- | --- |")
+    print("| scene | arm | spp | overhead, last look |", " | ".join(f"JOD, FLIP {name}" for name in AGAINST), "|")
+    print("| --- | --- | --- | --- |" + " --- |" * len(AGAINST))
     found = collections.defaultdict(list)
     for scene in dict.fromkeys(scene for scene, _ in rows):
         for arm in OF_OURS:
             ours, uniform, near = (rows[scene, name] for name in (arm, "uniform", "uniform-equal-time"))
             # One for all seeds: its scatter is the machine's.
-            overhead = sum(values["overhead"] for values in ours.values()) / len(ours)
-            compared = [compare(ours[seed], uniform[seed], near[seed], overhead) for seed in ours]
-            (jod, jod_margin), (flip, flip_margin), (at_samples, _) = map(mean_and_margin, zip(*compared))
-            found[arm].append((jod, flip, at_samples))
-            spp = sum(values["spp"] for values in ours.values()) / len(ours)
-            cells = f"{spp:.0f} | {100 * overhead:.1f} % | {jod:+.3f} ({jod - jod_margin:+.3f})"
-            print(f"| {scene} | {arm} | {cells} | {flip:.3f} ({flip + flip_margin:.3f}) | {at_samples:.3f} |")
-    for arm, of_scenes in found.items():
-        jod, in_time, at_samples = zip(*of_scenes)
-        mean = sum(jod) / len(jod)
-        flips = (math.exp(sum(map(math.log, ratios)) / len(ratios)) for ratios in (in_time, at_samples))
-        print(f"| mean | {arm} | | | {mean:+.3f} |", " | ".join(f"{flip:.3f}" for flip in flips), "|")
+            spp, overhead, last = (mean([values[key] for values in ours.values()]) for key in ("spp", "overhead", "last_look"))
+            cells = []
+            for more in (1.0 / (1.0 - overhead), (1.0 - last) / (1.0 - overhead), 1.0):
+                compared = [compare(ours[seed], uniform[seed], near[seed], more * ours[seed]["spp"]) for seed in ours]
+                (jod, jod_margin), (flip, flip_margin) = map(mean_and_margin, zip(*compared))
+                found[arm].append((jod, flip))
+                cells.append(f"{jod:+.3f} ({jod - jod_margin:+.3f}), {flip:.3f} ({flip + flip_margin:.3f})")
+            print(f"| {scene} | {arm} | {spp:.0f} | {100 * overhead:.1f}, {100 * last:.1f} % |", " | ".join(cells), "|")
+    for arm, pairs in found.items():
+        means = []
+        for against in range(len(AGAINST)):
+            jods, flips = zip(*pairs[against :: len(AGAINST)])
+            means.append(f"{mean(jods):+.3f}, {math.exp(mean(list(map(math.log, flips)))):.3f}")
+        print(f"| mean | {arm} | | |", " | ".join(means), "|")
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ use fechner_perception::tone::acuity::BehindAcuity;
 use fechner_perception::tone::{FittedTone, SceneGuide};
 use fechner_perception::visibility::MeasuredError;
 use std::sync::OnceLock;
+use std::time::Instant;
 
 /// What the perception model says of a film. Everything is in display cd/m² unless it says otherwise.
 #[derive(Debug)]
@@ -25,7 +26,9 @@ pub struct Judgement {
     pub estimate: Estimate,
     /// The picture where it is denoised.
     pub denoised: Option<DenoisedPicture>,
-    /// What denoising it took.
+    /// What the look took.
+    pub seconds: f64,
+    /// And denoising of that.
     pub seconds_denoising: f64,
     /// The tone operator as fitted to the guide.
     pub tone: Box<dyn FittedTone>,
@@ -85,6 +88,7 @@ fn judge_by(
     settings: &LoopSettings,
     inflation: f64,
 ) -> Result<Judgement, JudgeError> {
+    let started = Instant::now();
     let estimate = film.estimate(settings.nits_per_unit);
     let denoised = match denoiser {
         Some(denoiser) => Some(TimedDenoising::of(denoiser, film, settings.nits_per_unit)?),
@@ -157,6 +161,7 @@ fn judge_by(
     let mut judgement = Judgement {
         estimate,
         denoised,
+        seconds: 0.0,
         seconds_denoising,
         tone,
         thresholds,
@@ -171,6 +176,7 @@ fn judge_by(
         Some(denoised) => judgement.turn_to(denoised, inflation),
         None => judgement.predicted = judgement.visibility_of(&display_variance),
     }
+    judgement.seconds = started.elapsed().as_secs_f64();
     Ok(judgement)
 }
 

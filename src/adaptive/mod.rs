@@ -200,7 +200,7 @@ pub fn decide(
     monitor: &dyn Monitor,
 ) -> Result<Next, JudgeError> {
     let mut render = Loop::new(tracer, settings, state);
-    if !render.plans_between_looks()? {
+    if !render.plans_without_a_look()? {
         let look = Instant::now();
         let mut judgement = render.look()?;
         let step = render.next_step(&mut judgement)?;
@@ -230,7 +230,7 @@ impl<'a> Loop<'a> {
                 Traced::UntilLimit(reason) => Some(reason),
                 Traced::UntilLeft => return Ok(None),
             };
-            if ended.is_none() && self.plans_between_looks()? {
+            if ended.is_none() && self.plans_without_a_look()? {
                 continue;
             }
             let look = Instant::now();

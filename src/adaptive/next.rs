@@ -5,7 +5,7 @@ use super::audit::{Audit, audit, audit_unproven};
 use super::forecast::Forecast;
 use super::gain::{cut, most_worthwhile, while_far};
 use super::judge::{JudgeError, Judgement, judge_raw, still_wanted};
-use super::plan::{adaptive_plan, doubling_of, uniform_plan, wanted_samples};
+use super::plan::{SAMPLES_OF_A_RAW_LOOK, adaptive_plan, doubling_of, even_plan, uniform_plan, wanted_samples};
 use super::rivals::rival_plan;
 use super::settings::{LoopSettings, Sampling, THRESHOLD};
 use super::state::Exposure;
@@ -63,9 +63,14 @@ impl Loop<'_> {
         }))
     }
 
-    /// Between two looks at a picture that is denoised: enters a plan by raw noise alone; false when it is time for a look.
-    pub(super) fn plans_between_looks(&mut self) -> Result<bool, JudgeError> {
+    /// Without a look: enters a plan for what is left of a budget where that is hardly more than a look costs, and between two looks at a
+    /// picture that is denoised a plan by raw noise alone; false when it is time for a look.
+    pub(super) fn plans_without_a_look(&mut self) -> Result<bool, JudgeError> {
         let left = self.left_of_budget();
+        if self.is_hardly_more_than_pilot(left) {
+            self.enter(even_plan(&self.state.film, left));
+            return Ok(true);
+        }
         if self.settings.denoiser.is_none() || matches!(self.settings.sampling, Sampling::Rival(_)) || left == 0 {
             return Ok(false);
         }
@@ -93,6 +98,21 @@ impl Loop<'_> {
         }
         self.enter(plan);
         Ok(true)
+    }
+
+    /// Whether the pilot of a raw picture on the way to threshold is done, and the budget has so little left that a look would cost more
+    /// than knowing where it goes is worth: that is a few per cent of it.
+    fn is_hardly_more_than_pilot(&self, left: u64) -> bool {
+        const WORTH_A_LOOK: f64 = 4.0 * SAMPLES_OF_A_RAW_LOOK;
+        let (film, limits) = (&self.state.film, &self.settings.limits);
+        let pixels = u64::from(film.width()) * u64::from(film.height());
+        let is_by_sight = self.settings.denoiser.is_none() && !matches!(self.settings.sampling, Sampling::Rival(_));
+        is_by_sight
+            && left > 0
+            && left as f64 <= WORTH_A_LOOK * pixels as f64
+            && film.total_samples() == u64::from(limits.pilot_samples) * pixels
+            && film.total_samples() + left <= u64::from(limits.max_samples) * pixels
+            && self.rungs.front().is_some_and(|&rung| rung <= THRESHOLD)
     }
 
     /// Samples of each pixel after the next plan of uniform sampling.

@@ -20,7 +20,7 @@ use rayon::prelude::*;
 const MOST_DOUBLINGS_AT_ONCE: u32 = 3;
 
 /// What a look at the picture costs, in samples for every pixel, about.
-const SAMPLES_OF_A_RAW_LOOK: f64 = 1.5;
+pub(super) const SAMPLES_OF_A_RAW_LOOK: f64 = 1.5;
 
 /// Doublings that one plan gives at most to a pixel that shows too much by itself.
 const MOST_DOUBLINGS_OF_EXCESS: u32 = 4;
@@ -66,6 +66,21 @@ pub fn uniform_plan(film: &Film, mean_samples: u32) -> SamplePlan {
         }
     }
     plan
+}
+
+/// As many more samples for every pixel, `samples` in all.
+pub(super) fn even_plan(film: &Film, samples: u64) -> SamplePlan {
+    let pixels = film.width() * film.height();
+    let more = samples.div_ceil(u64::from(pixels).max(1)) as u32;
+    let mut plan = SamplePlan::default();
+    for pixel in 0..pixels {
+        for half in Half::BOTH {
+            let taken = film.half(half)[pixel as usize].taken;
+            plan.blocks.extend(blocks_between(pixel, half, taken, taken + share_of_half(more, half)));
+        }
+    }
+    let any_first = Plane::filled(film.width() as usize, film.height() as usize, 0.0);
+    cut_to_budget(plan, &any_first, samples)
 }
 
 /// What a film lacks of so many samples of each pixel, as many blocks as that takes.

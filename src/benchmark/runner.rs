@@ -34,6 +34,9 @@ pub(crate) struct Run {
     pub(crate) seconds: f64,
     /// Time in perception, planning and audits.
     pub(crate) seconds_perception: f64,
+    /// Of that, the look at the finished picture, which its report takes whoever chose the samples.
+    #[serde(default)]
+    pub(crate) seconds_last_look: f64,
     /// Mean luminance over the reference's, less 1, and its standard error.
     pub(crate) energy_bias: f64,
     pub(crate) energy_bias_standard_error: f64,
@@ -52,6 +55,7 @@ struct Made {
     film: Film,
     seconds: f64,
     seconds_perception: f64,
+    seconds_last_look: f64,
     audit_ratio: Option<f64>,
 }
 
@@ -61,6 +65,7 @@ impl From<Rendered> for Made {
             film: rendered.film,
             seconds: rendered.seconds_total,
             seconds_perception: rendered.seconds_perception,
+            seconds_last_look: rendered.judgement.seconds,
             audit_ratio: rendered.audit.map(|audit| audit.ratio),
         }
     }
@@ -154,6 +159,7 @@ impl<'a> ArmRunner<'a> {
             samples: made.film.total_samples(),
             seconds: made.seconds,
             seconds_perception: made.seconds_perception,
+            seconds_last_look: made.seconds_last_look,
             energy_bias: sum(&estimate.luminance_cd_m2) / truth - 1.0,
             energy_bias_standard_error: variance.sqrt() / truth,
             flip_mean: metrics.flip_mean,
@@ -181,7 +187,8 @@ impl<'a> ArmRunner<'a> {
         let counts = least_samples(self.truth, &variance, visibility, 0.99)?;
         let started = Instant::now();
         let film = trace_counts(self.subject, &counts, seed + 1);
-        Ok(Made { film, seconds: started.elapsed().as_secs_f64(), seconds_perception: 0.0, audit_ratio: None })
+        let seconds = started.elapsed().as_secs_f64();
+        Ok(Made { film, seconds, seconds_perception: 0.0, seconds_last_look: 0.0, audit_ratio: None })
     }
 
     /// Samples a pixel that uniform sampling takes in the time of the loop's run as asked with this seed.

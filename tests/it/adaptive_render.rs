@@ -5,7 +5,7 @@ use fechner::adaptive::audit::audit;
 use fechner::adaptive::settings::{LoopSettings, Sampling};
 use fechner::adaptive::state::RenderState;
 use fechner::adaptive::statistics::picture_variance;
-use fechner::adaptive::{Quiet, Rendered, render, run};
+use fechner::adaptive::{Monitor, Progress, Quiet, Rendered, render, run};
 use fechner::integrator::PathTracer;
 use fechner::scene::Scene;
 use fechner::scene::load::{LoadOptions, load};
@@ -221,6 +221,38 @@ fn limits_end_a_render() {
     let capped = render(&tracer, &settings, &Quiet).expect("renders");
     assert_eq!(capped.stop_reason, fechner::adaptive::StopReason::MaxSamples);
     assert!((0..24 * 24).all(|i| capped.film.samples(i) <= 64));
+}
+
+/// Where a budget leaves hardly more than the pilot, no look before the last one: it would cost more than it is worth. What is left is
+/// spent evenly, to the last sample.
+#[test]
+fn a_budget_that_the_pilot_nearly_spends_takes_one_look() {
+    #[derive(Default)]
+    struct Looks(AtomicU32);
+    impl Monitor for Looks {
+        fn looked(&self, _: &Progress) {
+            self.0.fetch_add(1, Ordering::Relaxed);
+        }
+        fn samples_done(&self, _: u64) {}
+    }
+    let scene = Arc::new(cornell_box());
+    let tracer = PathTracer::new(Arc::clone(&scene), trace_settings(24, 24, 5));
+    let looks_of = |spp: u32, visibility: f64, most: u32| {
+        let mut settings = loop_settings(scene.nits_per_unit, Sampling::Adaptive, visibility, Some(spp));
+        settings.limits.max_samples = most;
+        let looks = Looks::default();
+        let rendered = render(&tracer, &settings, &looks).expect("renders");
+        let counts: Vec<u32> = (0..24 * 24).map(|i| rendered.film.samples(i)).collect();
+        (looks.0.into_inner(), counts)
+    };
+    for spp in [17, 20, 22] {
+        let (looks, counts) = looks_of(spp, 1.0, 1024);
+        assert_eq!(looks, 1, "{spp} samples");
+        assert!(counts.iter().all(|&count| count == spp), "{spp} samples: {counts:?}");
+    }
+    assert!(looks_of(23, 1.0, 1024).0 > 1, "seven samples are worth a look");
+    assert!(looks_of(20, 4.0, 1024).0 > 1, "the pilot may be enough");
+    assert!(looks_of(20, 1.0, 18).1.iter().all(|&count| count <= 18), "no pixel may have more");
 }
 
 /// Fresh samples agree with an honest variance, and disagree with one that is four times too low.
