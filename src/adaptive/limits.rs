@@ -36,11 +36,15 @@ impl Loop<'_> {
         if self.settings.denoiser.is_some() { SAMPLES_OF_A_DENOISED_LOOK * pixels * seconds_per_sample } else { 0.0 }
     }
 
-    /// Samples that the budget has left, of all pixels.
+    /// Samples that the budget has left, of all pixels; none where it is too little to look for: a cut that ends within a block of
+    /// samples leaves a few.
     pub(super) fn left_of_budget(&self) -> u64 {
+        /// One sample for so many pixels.
+        const PIXELS_WORTH_A_LOOK: u64 = 16;
         let film = &self.state.film;
         let pixels = u64::from(film.width()) * u64::from(film.height());
         let budget = self.settings.limits.mean_samples.map(|mean| u64::from(mean) * pixels);
-        budget.map_or(u64::MAX, |budget| budget.saturating_sub(film.total_samples()))
+        let left = budget.map_or(u64::MAX, |budget| budget.saturating_sub(film.total_samples()));
+        if left < pixels / PIXELS_WORTH_A_LOOK { 0 } else { left }
     }
 }

@@ -223,18 +223,37 @@ fn limits_end_a_render() {
     assert!((0..24 * 24).all(|i| capped.film.samples(i) <= 64));
 }
 
+#[derive(Default)]
+struct Looks(AtomicU32);
+
+impl Monitor for Looks {
+    fn looked(&self, _: &Progress) {
+        self.0.fetch_add(1, Ordering::Relaxed);
+    }
+    fn samples_done(&self, _: u64) {}
+}
+
+/// The few samples that a cut leaves of a budget, since it ends within a block, are not looked for.
+#[test]
+fn remains_of_a_budget_take_no_look() {
+    let scene = Arc::new(cornell_box());
+    let ends = (1..=8).map(|seed| {
+        let settings = loop_settings(scene.nits_per_unit, Sampling::Adaptive, 1.0, Some(70));
+        let tracer = PathTracer::new(Arc::clone(&scene), trace_settings(23, 21, seed));
+        let looks = Looks::default();
+        let rendered = render(&tracer, &settings, &looks).expect("renders");
+        (looks.0.into_inner(), 70 * 23 * 21 - rendered.film.total_samples())
+    });
+    let ends: Vec<(u32, u64)> = ends.collect();
+    assert!(ends.iter().all(|&(looks, _)| looks == 4), "after 16, 32, 48 and 70 samples a pixel: {ends:?}");
+    assert!(ends.iter().any(|&(_, left)| left > 0), "something is left of one: {ends:?}");
+    assert!(ends.iter().all(|&(_, left)| left < 23 * 21 / 16), "not much is left: {ends:?}");
+}
+
 /// Where a budget leaves hardly more than the pilot, no look before the last one: it would cost more than it is worth. What is left is
 /// spent evenly, to the last sample.
 #[test]
 fn a_budget_that_the_pilot_nearly_spends_takes_one_look() {
-    #[derive(Default)]
-    struct Looks(AtomicU32);
-    impl Monitor for Looks {
-        fn looked(&self, _: &Progress) {
-            self.0.fetch_add(1, Ordering::Relaxed);
-        }
-        fn samples_done(&self, _: u64) {}
-    }
     let scene = Arc::new(cornell_box());
     let tracer = PathTracer::new(Arc::clone(&scene), trace_settings(24, 24, 5));
     let looks_of = |spp: u32, visibility: f64, most: u32| {
