@@ -90,15 +90,13 @@ impl Facts {
             }
             set(DEPTH, &|x| guides[x].depth);
             set(IS_THERE, &|_| 1.0);
-            for channel in 0..CHANNELS {
-                let mut said = |fact: usize, of: fn(&PixelEvidence) -> f64| {
-                    let bounded = |x: usize| of(&evidence[x][channel]).min(MOST_EVIDENCE) as f32;
-                    set(EVIDENCE + 3 * channel + fact, &bounded);
-                };
-                said(VARIANCE, |pixel| pixel.variance);
-                said(SQUARED_DIFFERENCE, |pixel| pixel.squared_difference);
-                said(EXPECTED_DIFFERENCE, |pixel| pixel.expected_difference);
-            }
+            let mut said = |fact: usize, of: fn(&PixelEvidence) -> f64| {
+                let bounded = |x: usize, channel: usize| of(&evidence[x][channel]).min(MOST_EVIDENCE) as f32;
+                (0..CHANNELS).for_each(|channel| set(EVIDENCE + 3 * channel + fact, &|x| bounded(x, channel)));
+            };
+            said(VARIANCE, |pixel| pixel.variance);
+            said(SQUARED_DIFFERENCE, |pixel| pixel.squared_difference);
+            said(EXPECTED_DIFFERENCE, |pixel| pixel.expected_difference);
         });
         Self { stride, values }
     }
