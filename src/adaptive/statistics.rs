@@ -10,7 +10,7 @@ mod pooling;
 use crate::film::{CHANNELS, Film, HalfPixel, opponent};
 use crate::sampler::Half;
 use fechner_perception::Plane;
-use pooling::pooled_by_neighbours;
+use pooling::{Pooled, pooled_by_neighbours};
 use rayon::prelude::*;
 
 /// Variance of one sample in one opponent channel, per pixel, in the unit of the scale that was given, and what
@@ -47,20 +47,21 @@ impl SampleStatistics {
             .map(|i| PixelEvidence::of_pixel(&a[i], &b[i], scale.each_ref().map(|s| s.values()[i])))
             .collect();
         let pooled = pooled_by_neighbours(&evidence, film.guides(), width);
-        let channels = by_channel(|c| {
-            let plane =
-                |value: &(dyn Fn(usize) -> f32 + Sync)| Plane::from_fn(width, height, |x, y| value(y * width + x));
-            let decided_by = |other: &[HalfPixel], i: usize| {
-                let own = cautious_variance(&other[i], c) * f64::from(scale[c].values()[i]);
-                pooled[i][c].variance.max(own as f32)
-            };
-            ChannelStatistics {
-                pooled: plane(&|i| pooled[i][c].variance),
-                for_half: [plane(&|i| decided_by(b, i)), plane(&|i| decided_by(a, i))],
-                low_discrepancy_factor: plane(&|i| pooled[i][c].factor),
-                factor_with_own: plane(&|i| pooled[i][c].factor_with_own),
-            }
-        });
+        let decided_by = |c: usize, pooled: &Plane, other: &[HalfPixel]| {
+            Plane::from_fn(width, height, |x, y| {
+                let pixel = y * width + x;
+                let own = cautious_variance(&other[pixel], c) * f64::from(scale[c].values()[pixel]);
+                pooled.values()[pixel].max(own as f32)
+            })
+        };
+        let of_channel = |c: usize, Pooled { variance, factor, factor_with_own }| ChannelStatistics {
+            for_half: [decided_by(c, &variance, b), decided_by(c, &variance, a)],
+            pooled: variance,
+            low_discrepancy_factor: factor,
+            factor_with_own,
+        };
+        let [luminance, red_green, yellow_violet] = pooled;
+        let channels = [of_channel(0, luminance), of_channel(1, red_green), of_channel(2, yellow_violet)];
         Self { channels }
     }
 

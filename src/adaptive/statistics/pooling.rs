@@ -5,8 +5,10 @@
 
 use super::PixelEvidence;
 use crate::film::{CHANNELS, PixelGuide};
+use fechner_perception::Plane;
 use glam::Vec4;
 use rayon::prelude::*;
+use std::slice::ChunksMut;
 
 /// Pixels to each side that are pooled.
 const POOL_RADIUS: usize = 3;
@@ -15,12 +17,53 @@ const FACTOR_RANGE: (f32, f32) = (0.02, 1.2);
 /// Evidence is cut here, so that sums and products of weights stay finite.
 const MOST_EVIDENCE: f64 = 1e36;
 
-/// A channel's statistics of a pixel.
-#[derive(Clone, Copy)]
+/// A channel's statistics of every pixel.
 pub(super) struct Pooled {
-    pub(super) variance: f32,
-    pub(super) factor: f32,
-    pub(super) factor_with_own: f32,
+    pub(super) variance: Plane,
+    pub(super) factor: Plane,
+    pub(super) factor_with_own: Plane,
+}
+
+/// The rows of [`Pooled`] that are still to be handed out.
+struct PooledRows<'a> {
+    variance: ChunksMut<'a, f32>,
+    factor: ChunksMut<'a, f32>,
+    factor_with_own: ChunksMut<'a, f32>,
+}
+
+#[derive(Default)]
+struct PooledRow<'a> {
+    variance: &'a mut [f32],
+    factor: &'a mut [f32],
+    factor_with_own: &'a mut [f32],
+}
+
+impl Pooled {
+    fn new(width: usize, height: usize) -> Self {
+        let plane = || Plane::filled(width, height, 0.0);
+        Self { variance: plane(), factor: plane(), factor_with_own: plane() }
+    }
+
+    /// Of a picture that is not empty.
+    fn rows(&mut self) -> PooledRows<'_> {
+        let width = self.variance.width();
+        PooledRows {
+            variance: self.variance.values_mut().chunks_mut(width),
+            factor: self.factor.values_mut().chunks_mut(width),
+            factor_with_own: self.factor_with_own.values_mut().chunks_mut(width),
+        }
+    }
+}
+
+impl<'a> PooledRows<'a> {
+    /// The next row, empty after the last.
+    fn next(&mut self) -> PooledRow<'a> {
+        PooledRow {
+            variance: self.variance.next().unwrap_or_default(),
+            factor: self.factor.next().unwrap_or_default(),
+            factor_with_own: self.factor_with_own.next().unwrap_or_default(),
+        }
+    }
 }
 
 /// Columns that are pooled at once: a vector register of the baseline. Of two, the sums do not fit the registers.
@@ -32,20 +75,25 @@ pub(super) fn pooled_by_neighbours(
     evidence: &[[PixelEvidence; CHANNELS]],
     guides: &[PixelGuide],
     width: usize,
-) -> Vec<[Pooled; CHANNELS]> {
+) -> [Pooled; CHANNELS] {
+    let height = evidence.len().checked_div(width).unwrap_or(0);
+    let mut pooled: [Pooled; CHANNELS] = std::array::from_fn(|_| Pooled::new(width, height));
     if width == 0 {
-        return Vec::new();
+        return pooled;
     }
     let facts = Facts::of(evidence, guides, width);
-    let rows = evidence.par_chunks(width).enumerate().flat_map_iter(|(y, evidence)| {
-        let chunks = evidence.chunks(LANES).enumerate();
-        let pooled = chunks.flat_map(|(chunk, evidence)| {
-            let sums = Sums::of(&facts, y, chunk * LANES);
-            evidence.iter().enumerate().map(move |(lane, own)| sums.pooled(lane, own))
-        });
-        pooled.collect::<Vec<_>>()
+    let mut rows = pooled.each_mut().map(Pooled::rows);
+    let rows: Vec<[PooledRow<'_>; CHANNELS]> = (0..height).map(|_| rows.each_mut().map(PooledRows::next)).collect();
+    rows.into_par_iter().zip(evidence.par_chunks(width)).enumerate().for_each(|(y, (mut rows, evidence))| {
+        for (chunk, evidence) in evidence.chunks(LANES).enumerate() {
+            let column = chunk * LANES;
+            let sums = Sums::of(&facts, y, column);
+            for (lane, own) in evidence.iter().enumerate() {
+                sums.write(lane, own, &mut rows, column + lane);
+            }
+        }
     });
-    rows.collect()
+    pooled
 }
 
 // Of a pixel's facts.
@@ -194,20 +242,17 @@ impl Sums {
         }
     }
 
-    fn pooled(&self, lane: usize, own: &[PixelEvidence; CHANNELS]) -> [Pooled; CHANNELS] {
-        std::array::from_fn(|c| {
-            let (sums, own) = (&self.channels[c], &own[c]);
-            let weight = self.weight[lane];
-            Pooled {
-                // A pixel like none of its neighbours has only itself to go by.
-                variance: if weight > 0.0 { sums.variance[lane] / weight } else { own.variance as f32 },
-                factor: sums.factor(lane).clamp(FACTOR_RANGE.0, FACTOR_RANGE.1),
-                factor_with_own: match f64::from(sums.expected[lane]) + own.expected_difference {
-                    0.0 => 1.0,
-                    expected => ((f64::from(sums.squared[lane]) + own.squared_difference) / expected) as f32,
-                },
-            }
-        })
+    fn write(&self, lane: usize, own: &[PixelEvidence; CHANNELS], rows: &mut [PooledRow<'_>; CHANNELS], column: usize) {
+        let weight = self.weight[lane];
+        for ((sums, own), row) in self.channels.iter().zip(own).zip(rows) {
+            // A pixel like none of its neighbours has only itself to go by.
+            row.variance[column] = if weight > 0.0 { sums.variance[lane] / weight } else { own.variance as f32 };
+            row.factor[column] = sums.factor(lane).clamp(FACTOR_RANGE.0, FACTOR_RANGE.1);
+            row.factor_with_own[column] = match f64::from(sums.expected[lane]) + own.expected_difference {
+                0.0 => 1.0,
+                expected => ((f64::from(sums.squared[lane]) + own.squared_difference) / expected) as f32,
+            };
+        }
     }
 }
 
@@ -287,10 +332,11 @@ mod tests {
     fn rows_pool_what_pixels_would() {
         let (evidence, guides) = picture();
         let pooled = pooled_by_neighbours(&evidence, &guides, SIZE[0]);
-        assert_eq!(pooled.len(), evidence.len());
-        for (pixel, channels) in pooled.iter().enumerate() {
-            for (channel, pooled) in channels.iter().enumerate() {
-                let found = [pooled.variance, pooled.factor, pooled.factor_with_own];
+        for (channel, pooled) in pooled.iter().enumerate() {
+            let planes = [&pooled.variance, &pooled.factor, &pooled.factor_with_own];
+            assert!(planes.iter().all(|plane| plane.values().len() == evidence.len()));
+            for pixel in 0..evidence.len() {
+                let found = planes.map(|plane| plane.values()[pixel]);
                 let expected = expected(pixel, channel, &evidence, &guides);
                 for (found, expected) in found.into_iter().zip(expected) {
                     let error = (f64::from(found) / expected - 1.0).abs();
@@ -304,6 +350,6 @@ mod tests {
     fn a_lone_pixel_goes_by_itself() {
         let (evidence, guides) = picture();
         let pooled = pooled_by_neighbours(&evidence[..1], &guides[..1], 1);
-        assert_eq!(pooled[0][1].variance, evidence[0][1].variance as f32);
+        assert_eq!(pooled[1].variance.values(), [evidence[0][1].variance as f32]);
     }
 }
