@@ -32,7 +32,8 @@ pub struct GuideInputs<'a> {
     pub height: usize,
 }
 
-/// Passes of the filter, each with holes twice as wide: together a window of σ 13 pixels.
+/// Passes of the filter, each with holes twice as wide, the last as wide as [`crate::rows::BORDER`]: together a window of σ 13
+/// pixels.
 const PASSES: u32 = 5;
 /// Albedos below this, by luminance, are not divided out.
 const LEAST_ALBEDO: f32 = 0.02;

@@ -9,6 +9,8 @@ use crate::rows::Rows;
 pub(super) const NO_DEPTH: f32 = 1e15;
 /// Surfaces farther away than this are taken to be here.
 const FARTHEST: f32 = 1e14;
+/// Depth beside the picture: so far from any other that what lies there never weighs anything.
+const BEYOND: f32 = 1e30;
 
 // Channels of a row of surfaces.
 pub(super) const SURFACE_CHANNELS: usize = 5;
@@ -35,6 +37,7 @@ pub(super) fn surfaces(inputs: &GuideInputs<'_>) -> Rows<SURFACE_CHANNELS> {
             slope[x] = slopes[index].min(FARTHEST);
         }
     });
+    surfaces.fill_border(DEPTH, BEYOND);
     surfaces
 }
 

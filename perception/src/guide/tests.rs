@@ -117,3 +117,22 @@ fn wrong_lengths_and_tiny_pictures_do_no_harm() {
     inputs.width = 7;
     assert_eq!(denoise(&inputs), rgb);
 }
+
+/// Nothing beside the picture is taken for a neighbour, where nothing is hit least of all; in the second tile of a row, too.
+#[test]
+fn an_even_sky_stays_even() {
+    let (width, height) = (70, 5);
+    let pixels = width * height;
+    let denoised = denoise(&GuideInputs {
+        rgb: &vec![[1.0; 3]; pixels],
+        variance: &Plane::filled(width, height, 1.0),
+        albedo: &vec![[1.0; 3]; pixels],
+        normal: &vec![[0.0; 3]; pixels],
+        depth: &vec![f32::INFINITY; pixels],
+        width,
+        height,
+    });
+    for (index, rgb) in denoised.iter().enumerate() {
+        assert!(rgb.iter().all(|channel| (channel - 1.0).abs() < 1e-5), "pixel {index}: {rgb:?}");
+    }
+}
