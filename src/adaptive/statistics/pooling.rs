@@ -1,7 +1,6 @@
 //! What the neighbours of a pixel say of its variance: weighted sums over 7×7 pixels of like surface.
 //!
-//! In planes, [`LANES`] columns at a time, whose sums stay in registers and in the first cache: a whole row at a time, one neighbour
-//! after the other, it took 1.3 times the instructions and the time.
+//! In planes, [`LANES`] columns at a time, whose sums stay in registers and in the first cache.
 
 use super::PixelEvidence;
 use crate::film::{CHANNELS, PixelGuide};
@@ -68,6 +67,8 @@ impl<'a> PooledRows<'a> {
 
 /// Columns that are pooled at once: a vector register of the baseline. Of two, the sums do not fit the registers.
 const LANES: usize = 4;
+/// Columns of a [`Tile`].
+const TILE: usize = 32;
 
 /// Pools the neighbours of every pixel of a picture that is `width` wide, row-major. Each neighbour weighs the same whatever its
 /// count, so that a region's variance is not that of its hardest pixels.
@@ -87,7 +88,7 @@ pub(super) fn pooled_by_neighbours(
     rows.into_par_iter().zip(evidence.par_chunks(width)).enumerate().for_each(|(y, (mut rows, evidence))| {
         for (chunk, evidence) in evidence.chunks(LANES).enumerate() {
             let column = chunk * LANES;
-            let sums = Sums::of(&facts, y, column);
+            let sums = Sums::of(facts.window(y, column / TILE), column % TILE);
             for (lane, own) in evidence.iter().enumerate() {
                 sums.write(lane, own, &mut rows, column + lane);
             }
@@ -97,103 +98,109 @@ pub(super) fn pooled_by_neighbours(
 }
 
 // Of a pixel's facts.
-const NORMAL: usize = 0;
-const ALBEDO: usize = 3;
-const DEPTH: usize = 6;
-/// 1 in the picture, 0 beyond.
-const IS_THERE: usize = 7;
+/// The first of what its surface looks like, in units in which a distance of 1 halves a neighbour's weight.
+const LOOKS: usize = 0;
+/// Normal, albedo and the logarithm of the depth.
+const LOOK_FACTS: usize = 7;
+/// What a neighbour weighs at the least.
+const LEAST_WEIGHT: usize = LOOKS + LOOK_FACTS;
 /// The first of each channel's three; see [`PixelEvidence`].
-const EVIDENCE: usize = 8;
+const EVIDENCE: usize = LEAST_WEIGHT + 1;
 const VARIANCE: usize = 0;
 const SQUARED_DIFFERENCE: usize = 1;
 const EXPECTED_DIFFERENCE: usize = 2;
 const FACTS: usize = EVIDENCE + 3 * CHANNELS;
 
-/// What is known of each pixel: its first surface, and what it says about variance. A row holds one fact of all its pixels, then the
-/// next. Around the picture lies a border, so that every pixel has a whole window of neighbours: these say nothing.
-struct Facts {
-    /// From a fact to the next in a row.
-    stride: usize,
-    values: Vec<f32>,
+/// How surfaces look that are as unlike as can be: the weight of a neighbour beyond the picture is 0.
+const NOWHERE: f32 = 1e20;
+
+/// What a surface looks like. Half weight at: normals 25° apart, albedo 0.1 apart, depth 5 % apart.
+fn looks(guide: &PixelGuide) -> [f32; LOOK_FACTS] {
+    let [nx, ny, nz] = guide.normal.map(|part| 2.3 * part);
+    let [red, green, blue] = guide.albedo.map(|band| 10.0 * band);
+    // Nothing has been hit at depth 0.
+    let depth = 20.0 * libm::logf(guide.depth.max(f32::MIN_POSITIVE));
+    [nx, ny, nz, red, green, blue, depth]
 }
 
-/// The facts of all neighbours of [`LANES`] pixels in one row.
-type Window<'a> = [&'a [f32; LANES + 2 * POOL_RADIUS]; FACTS];
+/// The facts of [`TILE`] pixels of a row, and of their neighbours in it, fact by fact. Of a size that the compiler knows: where it did
+/// not, half of the instructions of pooling asked whether they might read.
+type Tile = [[f32; TILE + 2 * POOL_RADIUS]; FACTS];
+
+/// What is known of each pixel: its first surface, and what it says about variance. Around the picture lies a border, so that every
+/// pixel has a whole window of neighbours: these say and weigh nothing.
+struct Facts {
+    /// Tiles in a row.
+    across: usize,
+    tiles: Vec<Tile>,
+}
 
 impl Facts {
     fn of(evidence: &[[PixelEvidence; CHANNELS]], guides: &[PixelGuide], width: usize) -> Self {
-        let height = evidence.len() / width;
-        let stride = width.next_multiple_of(LANES) + 2 * POOL_RADIUS;
-        let mut values = vec![0.0; (height + 2 * POOL_RADIUS) * FACTS * stride];
-        let rows = values.par_chunks_mut(FACTS * stride).skip(POOL_RADIUS);
+        let (across, height) = (width.div_ceil(TILE), evidence.len() / width);
+        let mut beyond = [[0.0; TILE + 2 * POOL_RADIUS]; FACTS];
+        beyond[LOOKS].fill(NOWHERE);
+        let mut tiles = vec![beyond; (height + 2 * POOL_RADIUS) * across];
         let pictured = guides.par_chunks(width).zip(evidence.par_chunks(width));
-        rows.zip(pictured).for_each(|(row, (guides, evidence))| {
-            let mut set = |fact: usize, of: &dyn Fn(usize) -> f32| {
-                let values = &mut row[fact * stride + POOL_RADIUS..][..width];
-                values.iter_mut().enumerate().for_each(|(x, value)| *value = of(x));
-            };
-            for axis in 0..3 {
-                set(NORMAL + axis, &|x| guides[x].normal[axis]);
-                set(ALBEDO + axis, &|x| guides[x].albedo[axis]);
+        tiles.par_chunks_mut(across).skip(POOL_RADIUS).zip(pictured).for_each(|(tiles, (guides, evidence))| {
+            for (x, (guide, evidence)) in guides.iter().zip(evidence).enumerate() {
+                let facts = facts_of(guide, evidence);
+                // Near its edge a pixel is a neighbour to the tile beside its own, too.
+                let first = x.saturating_sub(TILE + POOL_RADIUS - 1).div_ceil(TILE);
+                let last = ((x + POOL_RADIUS) / TILE).min(across - 1);
+                for (number, tile) in tiles.iter_mut().enumerate().take(last + 1).skip(first) {
+                    let place = x + POOL_RADIUS - number * TILE;
+                    tile.iter_mut().zip(facts).for_each(|(row, fact)| row[place] = fact);
+                }
             }
-            set(DEPTH, &|x| guides[x].depth);
-            set(IS_THERE, &|_| 1.0);
-            let mut said = |fact: usize, of: fn(&PixelEvidence) -> f64| {
-                let bounded = |x: usize, channel: usize| of(&evidence[x][channel]).min(MOST_EVIDENCE) as f32;
-                (0..CHANNELS).for_each(|channel| set(EVIDENCE + 3 * channel + fact, &|x| bounded(x, channel)));
-            };
-            said(VARIANCE, |pixel| pixel.variance);
-            said(SQUARED_DIFFERENCE, |pixel| pixel.squared_difference);
-            said(EXPECTED_DIFFERENCE, |pixel| pixel.expected_difference);
         });
-        Self { stride, values }
+        Self { across, tiles }
     }
 
-    /// Row `row` of the window around the pixels that begin at `column` of row `y`.
-    #[inline(always)]
-    fn window(&self, y: usize, row: usize, column: usize) -> Window<'_> {
-        const NOTHING: [f32; LANES + 2 * POOL_RADIUS] = [0.0; LANES + 2 * POOL_RADIUS];
-        let begin = (y + row) * FACTS * self.stride + column;
-        // Never out of bounds: the border is as wide as the window.
-        std::array::from_fn(|fact| self.values[begin + fact * self.stride..].first_chunk().unwrap_or(&NOTHING))
+    /// The tiles of the rows around row `y`.
+    fn window(&self, y: usize, tile: usize) -> [&Tile; 2 * POOL_RADIUS + 1] {
+        std::array::from_fn(|row| &self.tiles[(y + row) * self.across + tile])
     }
 }
 
-/// One fact of the neighbours that are `shift` columns into a window.
+fn facts_of(guide: &PixelGuide, evidence: &[PixelEvidence; CHANNELS]) -> [f32; FACTS] {
+    let mut facts = [0.0; FACTS];
+    facts[LOOKS..LEAST_WEIGHT].copy_from_slice(&looks(guide));
+    // Never 0, so that a lone pixel still learns something.
+    facts[LEAST_WEIGHT] = 0.02;
+    for (facts, pixel) in facts[EVIDENCE..].chunks_exact_mut(3).zip(evidence) {
+        let bounded = |value: f64| value.min(MOST_EVIDENCE) as f32;
+        facts[VARIANCE] = bounded(pixel.variance);
+        facts[SQUARED_DIFFERENCE] = bounded(pixel.squared_difference);
+        facts[EXPECTED_DIFFERENCE] = bounded(pixel.expected_difference);
+    }
+    facts
+}
+
+/// A fact of [`LANES`] pixels.
 #[inline(always)]
-fn fact(window: &Window<'_>, fact: usize, shift: usize) -> Vec4 {
-    Vec4::from_slice(&window[fact][shift..])
+fn fact(tile: &Tile, fact: usize, at: usize) -> Vec4 {
+    Vec4::from_slice(&tile[fact][at..at + LANES])
 }
 
-/// The first surfaces of some pixels of a row.
-struct Surfaces {
-    normal: [Vec4; 3],
-    albedo: [Vec4; 3],
-    depth: Vec4,
-}
+/// What the first surfaces of some pixels of a row look like.
+struct Surfaces([Vec4; LOOK_FACTS]);
 
 impl Surfaces {
     #[inline(always)]
-    fn of(window: &Window<'_>, shift: usize) -> Self {
-        Self {
-            normal: std::array::from_fn(|axis| fact(window, NORMAL + axis, shift)),
-            albedo: std::array::from_fn(|band| fact(window, ALBEDO + band, shift)),
-            depth: fact(window, DEPTH, shift),
-        }
+    fn of(tile: &Tile, at: usize) -> Self {
+        Self(std::array::from_fn(|look| fact(tile, LOOKS + look, at)))
     }
 
-    /// How alike surfaces are, in [0.02, 1]: never 0, so that a lone pixel still learns something.
+    /// How alike the surfaces of neighbours are, in [0.02, 1]; 0 beyond the picture.
     #[inline(always)]
-    fn likeness(&self, other: &Self) -> Vec4 {
-        let squared_distance = |a: &[Vec4; 3], b: &[Vec4; 3]| {
-            let [dx, dy, dz] = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-            dx * dx + dy * dy + dz * dz
-        };
-        // Half weight at: normals 25° apart, albedo 0.1 apart, depth 5 % apart.
-        let depth = (self.depth - other.depth).abs() / (self.depth.max(other.depth) + f32::MIN_POSITIVE);
-        let unlike =
-            squared_distance(&self.normal, &other.normal) * 5.3 + squared_distance(&self.albedo, &other.albedo) * 100.0;
-        (1.0 / (1.0 + (unlike + depth * depth * 400.0))).max(Vec4::splat(0.02))
+    fn likeness(&self, tile: &Tile, at: usize) -> Vec4 {
+        let mut unlike = Vec4::ONE;
+        for (look, own) in self.0.iter().enumerate() {
+            let apart = *own - fact(tile, LOOKS + look, at);
+            unlike += apart * apart;
+        }
+        unlike.recip().max(fact(tile, LEAST_WEIGHT, at))
     }
 }
 
@@ -214,15 +221,15 @@ struct ChannelSums {
 }
 
 impl Sums {
-    /// Of the pixels that begin at `column` of row `y`.
-    fn of(facts: &Facts, y: usize, column: usize) -> Self {
-        let own = Surfaces::of(&facts.window(y, POOL_RADIUS, column), POOL_RADIUS);
+    /// Of the pixels that begin at `column` of the window.
+    fn of(window: [&Tile; 2 * POOL_RADIUS + 1], column: usize) -> Self {
+        let own = Surfaces::of(window[POOL_RADIUS], column + POOL_RADIUS);
         let mut sums = Self::default();
-        for row in 0..=2 * POOL_RADIUS {
-            let window = facts.window(y, row, column);
+        for (row, tile) in window.into_iter().enumerate() {
             for shift in 0..=2 * POOL_RADIUS {
                 if (row, shift) != (POOL_RADIUS, POOL_RADIUS) {
-                    sums.add(own.likeness(&Surfaces::of(&window, shift)), &window, shift);
+                    let at = column + shift;
+                    sums.add(own.likeness(tile, at), tile, at);
                 }
             }
         }
@@ -230,10 +237,10 @@ impl Sums {
     }
 
     #[inline(always)]
-    fn add(&mut self, weights: Vec4, window: &Window<'_>, shift: usize) {
-        self.weight += weights * fact(window, IS_THERE, shift);
+    fn add(&mut self, weights: Vec4, tile: &Tile, at: usize) {
+        self.weight += weights;
         for (channel, sums) in self.channels.iter_mut().enumerate() {
-            let weighted = |what: usize| weights * fact(window, EVIDENCE + 3 * channel + what, shift);
+            let weighted = |what: usize| weights * fact(tile, EVIDENCE + 3 * channel + what, at);
             let expected = weighted(EXPECTED_DIFFERENCE);
             sums.variance += weighted(VARIANCE);
             sums.squared += weighted(SQUARED_DIFFERENCE);
@@ -272,7 +279,8 @@ mod tests {
     use crate::film::Seen;
     use crate::sampler::hash_words;
 
-    const SIZE: [usize; 2] = [11, 6];
+    /// Of three tiles in a row.
+    const SIZE: [usize; 2] = [69, 6];
 
     fn random(pixel: usize, what: u64) -> f64 {
         (hash_words(pixel as u64, what) >> 11) as f64 / (1_u64 << 53) as f64
@@ -312,8 +320,8 @@ mod tests {
             let (p, q) = (&guides[pixel], &guides[other]);
             let square =
                 |p: [f32; 3], q: [f32; 3]| -> f64 { p.iter().zip(q).map(|(a, b)| f64::from(a - b).powi(2)).sum() };
-            let depth = f64::from((p.depth - q.depth).abs() / p.depth.max(q.depth));
-            let unlike = 5.3 * square(p.normal, q.normal) + 100.0 * square(p.albedo, q.albedo) + 400.0 * depth * depth;
+            let depth = f64::from(p.depth / q.depth).ln();
+            let unlike = 5.29 * square(p.normal, q.normal) + 100.0 * square(p.albedo, q.albedo) + 400.0 * depth * depth;
             let weight = (1.0 / (1.0 + unlike)).max(0.02);
             let neighbour = &evidence[other][channel];
             weights += weight;
