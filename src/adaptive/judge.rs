@@ -2,7 +2,7 @@
 
 use super::denoised::{DenoisedPicture, TimedDenoising};
 use super::settings::LoopSettings;
-use super::statistics::{ChannelStatistics, SampleStatistics, by_channel};
+use super::statistics::{SampleStatistics, by_channel};
 use crate::denoise::{Denoiser, OidnError};
 use crate::film::{CHANNELS, Estimate, Film};
 use crate::sampler::Half;
@@ -45,8 +45,8 @@ pub struct Judgement {
     /// Displayed variance of one sample as the neighbours tell it, as the luminance variance that shows as much as the
     /// most visible of the eye's three channels: the variance of the mean is this over the count.
     pub pooled_variance_per_sample: Plane,
-    /// The same as each half decides by it.
-    pub variance_per_sample: [Plane; 2],
+    /// The same as each half decides by it, from [`judge_to_plan`].
+    pub variance_per_sample: Option<[Plane; 2]>,
     /// What the halves' difference shows, once somebody asked.
     measured: OnceLock<MeasuredError>,
 }
@@ -71,7 +71,15 @@ pub enum JudgeError {
 /// # Errors
 /// If the denoiser fails, or the perception model refuses the film's maps.
 pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Judgement, JudgeError> {
-    judge_by(settings.denoiser.as_ref(), film, settings, inflation)
+    judge_by(settings.denoiser.as_ref(), film, settings, inflation, Purpose::Report)
+}
+
+/// The same with all that a plan is made of, for a sixth more of a raw look's price.
+///
+/// # Errors
+/// As [`judge`].
+pub(super) fn judge_to_plan(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Judgement, JudgeError> {
+    judge_by(settings.denoiser.as_ref(), film, settings, inflation, Purpose::Plan)
 }
 
 /// The same of the raw mean, which costs a tenth of a look at a denoised picture.
@@ -79,7 +87,16 @@ pub fn judge(film: &Film, settings: &LoopSettings, inflation: f64) -> Result<Jud
 /// # Errors
 /// If the perception model refuses the film's maps.
 pub(super) fn judge_raw(film: &Film, settings: &LoopSettings) -> Result<Judgement, JudgeError> {
-    judge_by(None, film, settings, 1.0)
+    judge_by(None, film, settings, 1.0, Purpose::Report)
+}
+
+/// What a look is for.
+#[derive(Clone, Copy, PartialEq)]
+enum Purpose {
+    /// To say what is seen.
+    Report,
+    /// And what each half makes of it.
+    Plan,
 }
 
 fn judge_by(
@@ -87,6 +104,7 @@ fn judge_by(
     film: &Film,
     settings: &LoopSettings,
     inflation: f64,
+    purpose: Purpose,
 ) -> Result<Judgement, JudgeError> {
     let started = Instant::now();
     let estimate = film.estimate(settings.nits_per_unit);
@@ -101,10 +119,13 @@ fn judge_by(
         None => settings.operator.fit(&SceneGuide::of(&guide), &settings.viewing, None),
     };
     let raw_inflation = if denoised.is_some() { 1.0 } else { inflation };
-    let statistics = SampleStatistics::of(film, &display_scale(film, &guide, tone.as_ref(), settings, raw_inflation));
+    let shares = variance_shares(film);
+    let scale = display_scale(film, &shares, &guide, tone.as_ref(), settings, raw_inflation);
+    let statistics = SampleStatistics::of(film, &scale);
     still_wanted(settings)?;
     let displayed_guide = seen::display_luminance(tone.as_ref(), &settings.viewing.display, &guide);
-    let luminance_variance = variance_of_mean(film, statistics.luminance(), &statistics.luminance().pooled);
+    let luminance_variance =
+        statistics.luminance().stratified_variance().combined(&shares, |sample, share| sample * share);
     // The noise before denoising bounds what is left of it in the guide, so masking fades in as samples come.
     // Noise goes through the loss of acuity that the operator shows, as the picture does.
     let csf = BehindAcuity { csf: contrast_sensitivity(settings)?, acuity: tone.acuity() };
@@ -134,24 +155,15 @@ fn judge_by(
         (None, Some(timing)) => Some(thresholds.chromatic_gains_of_fresh_noise(timing)?),
     };
     still_wanted(settings)?;
-    let most_visible = |of: &(dyn for<'a> Fn(&'a ChannelStatistics) -> &'a Plane + Sync)| {
-        let channel = |c: usize| variance_of_mean(film, &statistics.channels[c], of(&statistics.channels[c]));
-        match &gains {
-            None => channel(0),
-            Some(gains) => thresholds.luminance_equivalent_variance(gains, by_channel(channel).each_ref()),
-        }
+    let most_visible = |channel: &(dyn Fn(usize) -> Plane + Sync)| match &gains {
+        None => channel(0),
+        Some(gains) => thresholds.luminance_equivalent_variance(gains, by_channel(channel).each_ref()),
     };
-    let (display_variance, [variance_of_a, variance_of_b]) = rayon::join(
-        || most_visible(&|channel| &channel.pooled),
-        || Half::BOTH.map(|half| most_visible(&|channel| &channel.for_half[half.index()])),
-    );
-    let per_sample = |variance: &Plane| {
-        Plane::from_fn(variance.width(), variance.height(), |x, y| {
-            (f64::from(variance.get(x, y)) / variance_share(film, y * variance.width() + x)) as f32
-        })
-    };
+    let pooled_variance_per_sample = most_visible(&|c| statistics.channels[c].stratified_variance());
+    let variance_per_sample = (purpose == Purpose::Plan).then(|| {
+        Half::BOTH.map(|half| most_visible(&|c| statistics.stratified_variance_for_half(film, &scale, half, c)))
+    });
     still_wanted(settings)?;
-    let variance_per_sample = [per_sample(&variance_of_a), per_sample(&variance_of_b)];
     let seconds_denoising = denoised.as_ref().map_or(0.0, |found| found.seconds);
     let denoised = match denoised {
         Some(found) => Some(found.judged(film, settings, tone.as_ref(), &thresholds, &estimate)?),
@@ -168,13 +180,16 @@ fn judge_by(
         pixel_thresholds,
         importance: settings.importance.clone(),
         predicted: Plane::filled(0, 0, 0.0),
-        pooled_variance_per_sample: per_sample(&display_variance),
+        pooled_variance_per_sample,
         variance_per_sample,
         measured: OnceLock::new(),
     };
     match judgement.denoised.take() {
         Some(denoised) => judgement.turn_to(denoised, inflation),
-        None => judgement.predicted = judgement.visibility_of(&display_variance),
+        None => {
+            let of_mean = judgement.pooled_variance_per_sample.combined(&shares, |sample, share| sample * share);
+            judgement.predicted = judgement.visibility_of(&of_mean);
+        }
     }
     judgement.seconds = started.elapsed().as_secs_f64();
     Ok(judgement)
@@ -270,9 +285,10 @@ impl Judgement {
 }
 
 /// Displayed variance over scene variance of each pixel, by channel, at the size that its variance has now: what the display
-/// makes of a pixel's own noise, before any pooling. From scene units; inflation included.
+/// makes of a pixel's own noise, before any pooling. From scene units; inflation included. `shares`: [`variance_shares`].
 pub fn display_scale(
     film: &Film,
+    shares: &Plane,
     guide: &Plane,
     tone: &dyn FittedTone,
     settings: &LoopSettings,
@@ -282,27 +298,20 @@ pub fn display_scale(
     let nits_squared = settings.nits_per_unit * settings.nits_per_unit * inflation;
     let display = &settings.viewing.display;
     by_channel(|c| {
-        let own = |i: usize| 0.5 * (a[i].sample_variance(c) + b[i].sample_variance(c)) * variance_share(film, i);
-        let scene =
-            Plane::from_fn(guide.width(), guide.height(), |x, y| (own(y * guide.width() + x) * nits_squared) as f32);
+        let scene = Plane::from_fn(guide.width(), guide.height(), |x, y| {
+            let i = y * guide.width() + x;
+            let own = 0.5 * (a[i].sample_variance(c) + b[i].sample_variance(c)) * f64::from(shares.get(x, y));
+            (own * nits_squared) as f32
+        });
         let displayed = if c == 0 {
             seen::display_variance(tone, display, guide, &scene)
         } else {
             seen::display_chromatic_variance(tone, display, guide, &scene)
         };
-        Plane::from_fn(guide.width(), guide.height(), |x, y| {
-            let (scene, displayed) = (f64::from(scene.get(x, y)), f64::from(displayed.get(x, y)));
+        scene.combined(&displayed, |scene, displayed| {
+            let (scene, displayed) = (f64::from(scene), f64::from(displayed));
             if scene > 0.0 && displayed.is_finite() { (displayed / scene * nits_squared) as f32 } else { 0.0 }
         })
-    })
-}
-
-/// Variance of the picture's mean in a channel for the variance of one sample.
-fn variance_of_mean(film: &Film, statistics: &ChannelStatistics, per_sample: &Plane) -> Plane {
-    Plane::from_fn(per_sample.width(), per_sample.height(), |x, y| {
-        let factor = f64::from(statistics.low_discrepancy_factor.get(x, y));
-        let share = variance_share(film, y * per_sample.width() + x);
-        (f64::from(per_sample.get(x, y)) * share * factor) as f32
     })
 }
 
@@ -329,6 +338,12 @@ pub(crate) fn guide_luminance(film: &Film, estimate: &Estimate) -> Plane {
 pub fn variance_share(film: &Film, pixel: usize) -> f64 {
     let inverse = |half: Half| 1.0 / f64::from(film.half(half)[pixel].samples.max(1));
     0.25 * (inverse(Half::A) + inverse(Half::B))
+}
+
+/// The same of every pixel.
+pub fn variance_shares(film: &Film) -> Plane {
+    let width = film.width() as usize;
+    Plane::from_fn(width, film.height() as usize, |x, y| variance_share(film, y * width + x) as f32)
 }
 
 #[cfg(test)]

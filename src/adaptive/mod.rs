@@ -6,6 +6,7 @@
 //! [`statistics`].
 
 pub mod audit;
+mod awake;
 pub mod denoised;
 mod forecast;
 mod gain;
@@ -29,7 +30,8 @@ pub use stop::{StopReason, TOLERATED_SHARE, is_reached, visible_share};
 use crate::film::Film;
 use crate::integrator::{BlockWork, Crop, PathTracer, SamplePlan};
 use audit::Audit;
-use judge::{JudgeError, Judgement, judge};
+use awake::with_threads_awake;
+use judge::{JudgeError, Judgement, judge, judge_to_plan};
 use plan::slices;
 use settings::{LoopSettings, Sampling};
 use state::RenderState;
@@ -123,6 +125,9 @@ struct Loop<'a> {
     looked: Option<Looked>,
 }
 
+/// [`judge`] or [`judge_to_plan`].
+type Judge = fn(&Film, &LoopSettings, f64) -> Result<Judgement, JudgeError>;
+
 /// The last look of this run.
 #[derive(Clone, Copy, Debug)]
 struct Looked {
@@ -202,7 +207,7 @@ pub fn decide(
     let mut render = Loop::new(tracer, settings, state);
     if !render.plans_without_a_look()? {
         let look = Instant::now();
-        let mut judgement = render.look()?;
+        let mut judgement = render.look(judge_to_plan)?;
         let step = render.next_step(&mut judgement)?;
         if let Some(reason) = render.take(step, &judgement, look, monitor) {
             return Ok(Next::Ended(Box::new(render.finish(judgement, reason, monitor)?)));
@@ -234,7 +239,8 @@ impl<'a> Loop<'a> {
                 continue;
             }
             let look = Instant::now();
-            let (judgement, step) = self.look_and_decide(last_look.take(), ended)?;
+            let earlier = last_look.take();
+            let (judgement, step) = with_threads_awake(|| self.look_and_decide(earlier, ended))?;
             match self.take(step, &judgement, look, monitor) {
                 None => last_look = Some(judgement),
                 Some(stop_reason) => return Ok(Some(LastLook { judgement, stop_reason })),
@@ -267,8 +273,8 @@ impl<'a> Loop<'a> {
         self.seconds_before + self.resumed_at.elapsed().as_secs_f64()
     }
 
-    /// Looks at the film.
-    fn look(&mut self) -> Result<Judgement, JudgeError> {
+    /// Looks at the film, to plan more of it or at the end.
+    fn look(&mut self, judge: Judge) -> Result<Judgement, JudgeError> {
         let started = Instant::now();
         let judgement = judge(&self.state.film, self.settings, self.state.inflation)?;
         self.state.seconds_denoising += judgement.seconds_denoising;
@@ -285,7 +291,8 @@ impl<'a> Loop<'a> {
     ) -> Result<(Judgement, Step), JudgeError> {
         let mut judgement = match earlier {
             Some(earlier) if self.is_looked_at() || ended.is_none() && self.exposure_holds() => earlier,
-            _ => self.look()?,
+            _ if ended.is_some() => self.look(judge)?,
+            _ => self.look(judge_to_plan)?,
         };
         let step = match ended {
             Some(reason) => Step::Stop(reason),
@@ -329,7 +336,7 @@ impl<'a> Loop<'a> {
     /// Tells the last state, and looks once more where the rule did not need to.
     fn finish(mut self, judgement: Judgement, reason: StopReason, monitor: &dyn Monitor) -> Result<Ended, JudgeError> {
         let judgement = match self.settings.sampling {
-            Sampling::Rival(_) if !self.is_looked_at() => self.look()?,
+            Sampling::Rival(_) if !self.is_looked_at() => self.look(judge)?,
             _ => judgement,
         };
         self.state.seconds_total = self.seconds();

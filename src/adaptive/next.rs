@@ -4,7 +4,7 @@
 use super::audit::{Audit, audit, audit_unproven};
 use super::forecast::Forecast;
 use super::gain::{cut, most_worthwhile, while_far};
-use super::judge::{JudgeError, Judgement, judge_raw, still_wanted};
+use super::judge::{JudgeError, Judgement, judge_raw, judge_to_plan, still_wanted};
 use super::plan::{SAMPLES_OF_A_RAW_LOOK, adaptive_plan, doubling_of, even_plan, uniform_plan, wanted_samples};
 use super::rivals::rival_plan;
 use super::settings::{LoopSettings, Sampling, THRESHOLD};
@@ -207,7 +207,7 @@ impl Loop<'_> {
         self.state.audit = found.or(self.state.audit);
         let Some(found) = found.filter(Audit::disagrees) else { return Ok(None) };
         self.state.inflation = (self.state.inflation * found.ratio).min(MOST_INFLATION);
-        *judgement = self.look()?;
+        *judgement = self.look(judge_to_plan)?;
         self.plan_towards(rung, judgement, left)
     }
 

@@ -169,7 +169,7 @@ pub fn needed_samples(
 /// Doublings for pixels that have fewer samples than `wanted`.
 ///
 /// Each half scales its share by what the other half knows of the pixel itself (counts go as the standard deviation,
-/// Neyman 1934).
+/// Neyman 1934), if it was judged to plan.
 ///
 /// A plan that costs no more than a look asks for so much that no other should be needed: the last few pixels that miss the
 /// target narrowly, or whose half doubling was rounded away, would otherwise take several.
@@ -183,7 +183,10 @@ pub(super) fn adaptive_plan(
     let plan_of = |haste: Haste| {
         doubling_plan(film, max_samples, |pixel| {
             let pooled = judgement.pooled_variance_per_sample.values()[pixel];
-            let own = judgement.variance_per_sample.each_ref().map(|plane| plane.values()[pixel]);
+            let own = match &judgement.variance_per_sample {
+                Some(halves) => halves.each_ref().map(|plane| plane.values()[pixel]),
+                None => [pooled; 2],
+            };
             doublings_of_halves(film, pixel, wanted.samples.values()[pixel], pooled, own, haste)
         })
     };

@@ -19,13 +19,18 @@ use rayon::prelude::*;
 pub struct ChannelStatistics {
     /// Pooled over the neighbours of like surface, the pixel itself left out.
     pub pooled: Plane,
-    /// What half A decides by: pooled, or the pixel's own variance seen by B where that is larger.
-    pub for_half: [Plane; 2],
     /// Ratio of the halves' squared difference to what independent samples would show, pooled: below 1 where
     /// stratification pays.
     pub low_discrepancy_factor: Plane,
     /// The same factor with the pixel itself counted in. For reports, not for decisions.
     pub factor_with_own: Plane,
+}
+
+impl ChannelStatistics {
+    /// Pooled variance of one sample with what stratification makes of it.
+    pub(super) fn stratified_variance(&self) -> Plane {
+        self.pooled.combined(&self.low_discrepancy_factor, |variance, factor| variance * factor)
+    }
 }
 
 /// Statistics of luminance and the two chromatic channels.
@@ -39,7 +44,7 @@ impl SampleStatistics {
     /// Pools a film. `scale` turns each pixel's scene variance, by channel, into what counts: displayed variance, since a
     /// lamp's border scatters far above what the display can show, and its dark neighbours must not inherit that.
     pub fn of(film: &Film, scale: &[Plane; CHANNELS]) -> Self {
-        let (width, height) = (film.width() as usize, film.height() as usize);
+        let width = film.width() as usize;
         let (a, b) = (film.half(Half::A), film.half(Half::B));
         let evidence: Vec<[PixelEvidence; CHANNELS]> = (0..a.len())
             .into_par_iter()
@@ -47,22 +52,35 @@ impl SampleStatistics {
             .map(|i| PixelEvidence::of_pixel(&a[i], &b[i], scale.each_ref().map(|s| s.values()[i])))
             .collect();
         let pooled = pooled_by_neighbours(&evidence, film.guides(), width);
-        let decided_by = |c: usize, pooled: &Plane, other: &[HalfPixel]| {
-            Plane::from_fn(width, height, |x, y| {
-                let pixel = y * width + x;
-                let own = cautious_variance(&other[pixel], c) * f64::from(scale[c].values()[pixel]);
-                pooled.values()[pixel].max(own as f32)
-            })
-        };
-        let of_channel = |c: usize, Pooled { variance, factor, factor_with_own }| ChannelStatistics {
-            for_half: [decided_by(c, &variance, b), decided_by(c, &variance, a)],
+        let channels = pooled.map(|Pooled { variance, factor, factor_with_own }| ChannelStatistics {
             pooled: variance,
             low_discrepancy_factor: factor,
             factor_with_own,
-        };
-        let [luminance, red_green, yellow_violet] = pooled;
-        let channels = [of_channel(0, luminance), of_channel(1, red_green), of_channel(2, yellow_violet)];
+        });
         Self { channels }
+    }
+
+    /// Variance of one sample that a half of the film decides by: pooled, or the pixel's own variance seen by the other half where
+    /// that is larger. `scale` as in [`Self::of`].
+    pub fn for_half(&self, film: &Film, scale: &[Plane; CHANNELS], half: Half, channel: usize) -> Plane {
+        let pooled = &self.channels[channel].pooled;
+        let (other, scale) = (film.half(half.other()), &scale[channel]);
+        Plane::from_fn(pooled.width(), pooled.height(), |x, y| {
+            let own = cautious_variance(&other[y * pooled.width() + x], channel) * f64::from(scale.get(x, y));
+            pooled.get(x, y).max(own as f32)
+        })
+    }
+
+    /// The same with what stratification makes of it.
+    pub(super) fn stratified_variance_for_half(
+        &self,
+        film: &Film,
+        scale: &[Plane; CHANNELS],
+        half: Half,
+        channel: usize,
+    ) -> Plane {
+        let factor = &self.channels[channel].low_discrepancy_factor;
+        self.for_half(film, scale, half, channel).combined(factor, |variance, factor| variance * factor)
     }
 
     /// Statistics of luminance.
@@ -198,6 +216,12 @@ mod tests {
         film
     }
 
+    /// Luminance variance that a half decides by, in scene units.
+    fn for_half(film: &Film, half: Half) -> Plane {
+        let scale = scene_units(film);
+        SampleStatistics::of(film, &scale).for_half(film, &scale, half, 0)
+    }
+
     /// Uniform noise has variance 1/12, and independent halves differ as expected: factor 1.
     #[test]
     fn flat_noise_is_estimated_right() {
@@ -212,7 +236,7 @@ mod tests {
         let factor = mean(&statistics.luminance().low_discrepancy_factor);
         // The clamp at 1.2 cuts the upper half of a ±20 % scatter.
         assert!((factor - 1.0).abs() < 0.1, "{factor}");
-        let excess = mean(&statistics.luminance().for_half[0]) / mean(&statistics.luminance().pooled);
+        let excess = mean(&for_half(&film, Half::A)) / mean(&statistics.luminance().pooled);
         assert!(excess < 1.05, "maximum of pooled and own spends {excess}");
     }
 
@@ -224,7 +248,7 @@ mod tests {
         let statistics = SampleStatistics::of(&film, &scene_units(&film));
         let at = |p: &Plane| f64::from(p.values()[hard as usize]);
         assert!(at(&statistics.luminance().pooled) < 0.2, "the pool leaves the pixel itself out");
-        assert!(at(&statistics.luminance().for_half[0]) > 2.0 && at(&statistics.luminance().for_half[1]) > 2.0);
+        assert!(Half::BOTH.iter().all(|&half| at(&for_half(&film, half)) > 2.0));
     }
 
     /// A pixel's decision for half A must not change with A's own samples of that pixel.
@@ -241,13 +265,9 @@ mod tests {
         let mut sum = BlockSum::default();
         sum.add(&wild);
         changed.merge_block(BlockWork { samples: 1, ..BlockWork::whole(pixel, Half::A, 1) }, &sum);
-        let before = SampleStatistics::of(&base, &scene_units(&base)).luminance().for_half[0].values()[pixel as usize];
-        let after =
-            SampleStatistics::of(&changed, &scene_units(&changed)).luminance().for_half[0].values()[pixel as usize];
-        assert_eq!(before, after);
-        assert!(
-            SampleStatistics::of(&changed, &scene_units(&changed)).luminance().for_half[1].values()[pixel as usize]
-                > before * 100.0
-        );
+        let at = |film: &Film, half: Half| for_half(film, half).values()[pixel as usize];
+        let before = at(&base, Half::A);
+        assert_eq!(before, at(&changed, Half::A));
+        assert!(at(&changed, Half::B) > before * 100.0);
     }
 }

@@ -1,7 +1,7 @@
 //! The reference of a scene: a long uniform render with its halves and converged variances, kept by content.
 
 use super::{BenchSettings, Subject};
-use crate::adaptive::judge::{display_scale, judge};
+use crate::adaptive::judge::{display_scale, judge, variance_shares};
 use crate::adaptive::plan::uniform_plan;
 use crate::adaptive::statistics::SampleStatistics;
 use crate::film::{CHANNELS, Film};
@@ -103,7 +103,7 @@ impl Reference {
         let settings = subject.loop_settings()?;
         let luminance = film.estimate(settings.nits_per_unit).luminance_cd_m2.map(|v| v.max(0.0));
         let tone = settings.operator.fit(&SceneGuide::of(&luminance), &settings.viewing, None);
-        let scale = display_scale(film, &luminance, tone.as_ref(), &settings, 1.0);
+        let scale = display_scale(film, &variance_shares(film), &luminance, tone.as_ref(), &settings, 1.0);
         Ok(SampleStatistics::of(film, &scale).channels.map(|channel| channel.low_discrepancy_factor))
     }
 

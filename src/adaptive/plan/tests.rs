@@ -131,12 +131,14 @@ fn stopped_film(size: u32, draw: fn(f64, f64) -> f64, variance_of_mean: f64) -> 
         for block in &plan.blocks {
             film.merge_block(*block, &drawn_block(*block, draw));
         }
-        let statistics = SampleStatistics::of(&film, &scene_units(&film));
+        let scale = scene_units(&film);
+        let statistics = SampleStatistics::of(&film, &scale);
         let luminance = statistics.luminance();
+        let halves = Half::BOTH.map(|half| statistics.for_half(&film, &scale, half, 0));
         plan = doubling_plan(&film, 1 << 16, |i| {
             let factor = luminance.low_discrepancy_factor.values()[i];
             let pooled = luminance.pooled.values()[i] * factor;
-            let own = luminance.for_half.each_ref().map(|plane| plane.values()[i] * factor);
+            let own = halves.each_ref().map(|plane| plane.values()[i] * factor);
             doublings_of_halves(&film, i, pooled / variance_of_mean as f32, pooled, own, Haste::NONE)
         });
     }
