@@ -45,7 +45,7 @@ pub struct Judgement {
     /// Displayed variance of one sample as the neighbours tell it, as the luminance variance that shows as much as the
     /// most visible of the eye's three channels: the variance of the mean is this over the count.
     pub pooled_variance_per_sample: Plane,
-    /// The same as each half decides by it, from [`judge_to_plan`].
+    /// The same as each half decides by it; `None` where the look was for no plan.
     pub variance_per_sample: Option<[Plane; 2]>,
     /// What the halves' difference shows, once somebody asked.
     measured: OnceLock<MeasuredError>,
