@@ -1,7 +1,5 @@
 //! The edge-avoiding passes.
 
-use std::ops::Range;
-
 use super::surfaces::{DEPTH, NO_DEPTH, NORMAL_X, NORMAL_Y, NORMAL_Z, SLOPE, SURFACE_CHANNELS};
 use super::{BLUE, GREEN, LIGHT_CHANNELS, LUMINANCE, RED, VARIANCE};
 use crate::photometry::luminance;
@@ -29,17 +27,6 @@ fn falling(x: Vec4) -> Vec4 {
     let base = (1.0 - x / GONE).max(Vec4::ZERO);
     let fourth = base * base * base * base;
     fourth * fourth
-}
-
-/// The columns of a row that have a neighbour `step − center` columns on, and those neighbours.
-pub(super) fn shifted(width: usize, step: usize, center: usize) -> (Range<usize>, Range<usize>) {
-    if step >= center {
-        let by = (step - center).min(width);
-        (0..width - by, by..width)
-    } else {
-        let by = (center - step).min(width);
-        (by..width, 0..width - by)
-    }
 }
 
 /// One pass over a 3×3 kernel whose taps lie `hole` pixels apart, at most [`BORDER`]. All taps of a few columns at once, so that

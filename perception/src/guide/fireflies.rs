@@ -1,8 +1,8 @@
 //! Pixels far above everything around them: a firefly is no light.
 
-use super::filter::shifted;
 use super::{LIGHT_CHANNELS, LUMINANCE};
 use crate::rows::Rows;
+use std::ops::Range;
 
 /// Brings pixels down to four standard deviations above the mean of their 5×5 neighbourhood, themselves left out.
 pub(super) fn tame_fireflies(light: &mut Rows<LIGHT_CHANNELS>) {
@@ -44,4 +44,15 @@ pub(super) fn tame_fireflies(light: &mut Rows<LIGHT_CHANNELS>) {
             variance[x] *= scale * scale;
         }
     });
+}
+
+/// The columns of a row that have a neighbour `step − center` columns on, and those neighbours.
+fn shifted(width: usize, step: usize, center: usize) -> (Range<usize>, Range<usize>) {
+    if step >= center {
+        let by = (step - center).min(width);
+        (0..width - by, by..width)
+    } else {
+        let by = (center - step).min(width);
+        (by..width, 0..width - by)
+    }
 }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use crate::photometry::luminance;
 use crate::plane::Plane;
-use crate::rows::Rows;
+use crate::rows::{BORDER, Rows};
 use filter::filter_pass;
 use fireflies::tame_fireflies;
 use surfaces::surfaces;
@@ -32,9 +32,9 @@ pub struct GuideInputs<'a> {
     pub height: usize,
 }
 
-/// Passes of the filter, each with holes twice as wide, the last as wide as [`crate::rows::BORDER`]: together a window of σ 13
-/// pixels.
+/// Passes of the filter, each with holes twice as wide: together a window of σ 13 pixels.
 const PASSES: u32 = 5;
+const _: () = assert!(1 << (PASSES - 1) <= BORDER, "the widest hole reads beyond the border of a row");
 /// Albedos below this, by luminance, are not divided out.
 const LEAST_ALBEDO: f32 = 0.02;
 // Channels of a row of illumination: light that falls on the surface, its luminance and that luminance's variance.
