@@ -16,9 +16,8 @@ use fechner_perception::photometry::luminance;
 use fechner_perception::tone::{FittedTone, SavedTone, SceneGuide, map_picture};
 use glam::Vec2;
 use image::ExtendedColorType;
-use image::codecs::jpeg::JpegEncoder;
+use image::ImageEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ImageEncoder, ImageError};
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -30,6 +29,9 @@ const LIVELY: Duration = Duration::from_secs(2);
 /// Time between frames at most, while lively and later, where frames are large or the machine is busy: a picture that stands still
 /// for longer seems to be done.
 const LONGEST_INTERVALS: [Duration; 2] = [Duration::from_millis(500), Duration::from_secs(2)];
+
+/// Of frames of a picture that changes, 1 to 100.
+const JPEG_QUALITY: u8 = 92;
 
 /// What the last look at the film saw.
 #[derive(Debug)]
@@ -151,7 +153,7 @@ impl Screen {
         for layer in ALL.into_iter().filter(|&layer| shared.is_watched(layer)) {
             let colours = self.colours(layer, scenery, &rgb_cd_m2);
             // A frame that cannot be encoded is left out; the next may be.
-            if let Ok(frame) = encode(layer, &colours, scenery.film, scenery.is_at_rest) {
+            if let Some(frame) = encode(layer, &colours, scenery.film, scenery.is_at_rest) {
                 shared.publish_frame(layer, frame);
             }
         }
@@ -258,19 +260,24 @@ fn fit(settings: &LoopSettings, step: u32, width: usize, rgb_cd_m2: &[[f32; 3]])
     settings.operator.fit(&SceneGuide::of(&guide), &viewing, None)
 }
 
-/// The layer's number, the length of its legend, the legend in UTF-8, the picture. JPEG while it changes, PNG at rest.
-fn encode(layer: Layer, colours: &Colours, film: &Film, is_at_rest: bool) -> Result<Vec<u8>, ImageError> {
+/// The layer's number, the length of its legend, the legend in UTF-8, the picture. JPEG while it changes, PNG at rest; `None` if it
+/// cannot be encoded.
+fn encode(layer: Layer, colours: &Colours, film: &Film, is_at_rest: bool) -> Option<Vec<u8>> {
     let legend = &colours.legend.as_bytes()[..colours.legend.floor_char_boundary(255)];
     let mut frame = vec![layer.index() as u8, legend.len() as u8];
     frame.extend_from_slice(legend);
-    let (width, height, kind) = (film.width(), film.height(), ExtendedColorType::Rgb8);
+    let (width, height) = (film.width(), film.height());
     if is_at_rest {
         let encoder = PngEncoder::new_with_quality(&mut frame, CompressionType::Fast, FilterType::Adaptive);
-        encoder.write_image(&colours.rgb8, width, height, kind)?;
+        encoder.write_image(&colours.rgb8, width, height, ExtendedColorType::Rgb8).ok()?;
     } else {
-        JpegEncoder::new_with_quality(&mut frame, 92).write_image(&colours.rgb8, width, height, kind)?;
+        let mut encoder = jpeg_encoder::Encoder::new(&mut frame, JPEG_QUALITY);
+        // Noise has colours too, and is to be seen pixel by pixel.
+        encoder.set_sampling_factor(jpeg_encoder::SamplingFactor::R_4_4_4);
+        let [width, height] = [width, height].map(u16::try_from);
+        encoder.encode(&colours.rgb8, width.ok()?, height.ok()?, jpeg_encoder::ColorType::Rgb).ok()?;
     }
-    Ok(frame)
+    Some(frame)
 }
 
 #[cfg(test)]
@@ -305,5 +312,33 @@ mod tests {
         let greys = |is_at_rest| composed(&film, 1.0, is_at_rest).0.iter().map(|rgb| rgb[0]).collect::<Vec<f32>>();
         assert_eq!(greys(false), [1.2, 1.5]);
         assert_eq!(greys(true), [1.5, 1.5]);
+    }
+
+    /// What changes is sent as JPEG of every pixel's own colour, what rests as the picture itself.
+    #[test]
+    fn frames_show_the_picture() {
+        let film = Film::new(40, 24);
+        let pixel = |i: u32| if (i % 40 + i / 40).is_multiple_of(2) { [200, 40, 40] } else { [40, 40, 200] };
+        let rgb8: Vec<u8> = (0..40 * 24).flat_map(pixel).collect();
+        let colours = Colours { rgb8, legend: "legend".to_owned() };
+        for (is_at_rest, tolerance) in [(true, 0.0), (false, 8.0)] {
+            let frame = encode(Layer::Albedo, &colours, &film, is_at_rest).expect("a frame");
+            assert_eq!((frame[0], &frame[1..8]), (Layer::Albedo.index() as u8, &b"\x06legend"[..]));
+            let shown = image::load_from_memory(&frame[8..]).expect("a picture").to_rgb8();
+            assert_eq!(shown.dimensions(), (40, 24));
+            let square = |(a, b): (&u8, &u8)| (f64::from(*a) - f64::from(*b)).powi(2);
+            let sum: f64 = shown.as_raw().iter().zip(&colours.rgb8).map(square).sum();
+            let rms = (sum / colours.rgb8.len() as f64).sqrt();
+            assert!(rms <= tolerance, "{rms} of 255 off, at rest: {is_at_rest}");
+        }
+    }
+
+    /// JPEG has 16 bits for a side.
+    #[test]
+    fn a_picture_too_wide_for_a_frame_has_none() {
+        let film = Film::new(65_536, 1);
+        let colours = Colours { rgb8: vec![0; 3 * 65_536], legend: String::new() };
+        assert!(encode(Layer::Picture, &colours, &film, false).is_none());
+        assert!(encode(Layer::Picture, &colours, &film, true).is_some());
     }
 }
