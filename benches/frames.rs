@@ -1,9 +1,12 @@
-//! What a frame of the live preview costs as JPEG, by the encoder that is used and by the `image` crate's.
+//! What a frame of the live preview costs: its sRGB bytes, by our table and by `powf`, and its JPEG, by the encoder that is used and
+//! by the `image` crate's.
 //!
 //! `cargo bench --bench frames -- PICTURE.png ...` prints a row for each picture: milliseconds of one thread (best of 15, in turn),
-//! bytes, and the root mean square error in steps of 8 bits.
+//! bytes, and the JPEG's root mean square error in steps of 8 bits.
 
 use anyhow::{Context, Result};
+use fechner::output::encode_srgb8;
+use fechner::scene::texture::{srgb_from_linear, srgb_to_linear};
 use image::{ExtendedColorType, ImageEncoder, RgbImage};
 use std::time::Instant;
 
@@ -12,20 +15,36 @@ const QUALITY: u8 = 92;
 const ROUNDS: u32 = 15;
 
 fn main() -> Result<()> {
-    println!("| picture | size | image, ms | jpeg-encoder, ms | ratio | bytes | error |");
-    println!("| --- | --- | --- | --- | --- | --- | --- |");
+    println!(
+        "| picture | size | powf, ms | table, ms | ratio | image, ms | jpeg-encoder, ms | ratio | bytes | error |"
+    );
+    println!("| --- |{}", " --- |".repeat(9));
+    rayon::ThreadPoolBuilder::new().num_threads(1).build_global()?;
     for path in std::env::args().skip(1).filter(|argument| argument.ends_with(".png")) {
         let picture = image::open(&path).with_context(|| path.clone())?.into_rgb8();
+        let linear: Vec<[f32; 3]> =
+            picture.pixels().map(|pixel| pixel.0.map(|byte| srgb_to_linear(f32::from(byte) / 255.0))).collect();
+        let (mut by_powf, mut by_table) = (f64::INFINITY, f64::INFINITY);
         let (mut theirs, mut ours) = (f64::INFINITY, f64::INFINITY);
         let [mut by_image, mut by_ours] = [Vec::new(), Vec::new()];
+        let mut codes = Vec::new();
         for _ in 0..ROUNDS {
+            by_powf = by_powf.min(milliseconds(&mut codes, |bytes| {
+                bytes.extend(linear.iter().flatten().map(|&value| (srgb_from_linear(value) * 255.0 + 0.5) as u8));
+                Ok(())
+            })?);
+            by_table = by_table.min(milliseconds(&mut codes, |bytes| {
+                *bytes = encode_srgb8(picture.width(), &linear);
+                Ok(())
+            })?);
             theirs = theirs.min(milliseconds(&mut by_image, |bytes| image_jpeg(&picture, bytes))?);
             ours = ours.min(milliseconds(&mut by_ours, |bytes| preview_jpeg(&picture, bytes))?);
         }
         println!(
-            "| {path} | {}×{} | {theirs:.2} | {ours:.2} | {:.2} | {} → {} | {:.2} → {:.2} |",
+            "| {path} | {}×{} | {by_powf:.2} | {by_table:.2} | {:.2} | {theirs:.2} | {ours:.2} | {:.2} | {} → {} | {:.2} → {:.2} |",
             picture.width(),
             picture.height(),
+            by_table / by_powf,
             ours / theirs,
             by_image.len(),
             by_ours.len(),

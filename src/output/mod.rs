@@ -11,6 +11,7 @@ mod exr_file;
 mod exr_header;
 mod png_file;
 pub mod rendered;
+mod srgb_codes;
 
 pub use beside::{remove_leftovers, write_beside};
 pub use exr_file::write_exr;

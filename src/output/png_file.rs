@@ -1,7 +1,7 @@
 //! Pictures for displays: 8-bit sRGB, or 16-bit PQ for HDR displays, tagged as such.
 
+use super::srgb_codes::SrgbCodes;
 use super::{OutputError, beside::write_beside, check_size};
-use crate::scene::texture::srgb_from_linear;
 use fechner_perception::display::{Display, Eotf};
 use fechner_perception::primaries::{Matrix, Primaries, apply};
 use rayon::prelude::*;
@@ -124,13 +124,13 @@ fn write_bytes(path: &Path, width: u32, height: u32, color: png::ColorType, byte
 /// The bytes of [`write_png`]: sRGB-encoded, dithered, RGB after RGB, row after row.
 pub fn encode_srgb8(width: u32, rgb_linear_display: &[[f32; 3]]) -> Vec<u8> {
     let width = width.max(1) as usize;
+    let codes = SrgbCodes::new();
     let mut bytes = vec![0; rgb_linear_display.len() * 3];
     bytes.par_chunks_mut(3 * width).zip(rgb_linear_display.par_chunks(width)).enumerate().for_each(
         |(y, (bytes, row))| {
             for (x, (bytes, rgb)) in bytes.as_chunks_mut::<3>().0.iter_mut().zip(row).enumerate() {
                 let offset = dither(x as u32, y as u32);
-                // A value that is a whole step stays that step whatever the offset in [0, 1).
-                *bytes = rgb.map(|value| (srgb_from_linear(value) * 255.0 + offset) as u8);
+                *bytes = rgb.map(|value| codes.code(value, offset));
             }
         },
     );
