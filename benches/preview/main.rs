@@ -190,8 +190,9 @@ fn seconds_at(counts: &[(u64, f64)], samples: u64) -> f64 {
 }
 
 fn overheads(subjects: &[Subject], arguments: &Arguments) -> Result<()> {
-    println!("\n| scene | render, s | watched preview, s | whole overhead | after the first 5 s |");
-    println!("| --- | --- | --- | --- | --- |");
+    println!("\nOverhead by the least seconds of each and by the median of pairs:\n");
+    println!("| scene | render, s | watched preview, s | of the least | of pairs | after the first 5 s |");
+    println!("| --- |{}", " --- |".repeat(5));
     for subject in subjects {
         let (mut whole, mut steady, mut alone, mut watched) = (vec![], vec![], vec![], vec![]);
         for seed in 0..arguments.seeds {
@@ -227,7 +228,8 @@ fn overheads(subjects: &[Subject], arguments: &Arguments) -> Result<()> {
             }
         };
         let (name, alone, watched) = (subject.name, least(alone), least(watched));
-        println!("| {name} | {alone:.1} | {watched:.1} | {} | {} |", percent(whole), percent(steady));
+        let of_least = percent(vec![watched / alone]);
+        println!("| {name} | {alone:.2} | {watched:.2} | {of_least} | {} | {} |", percent(whole), percent(steady));
     }
     Ok(())
 }

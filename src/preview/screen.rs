@@ -21,8 +21,11 @@ use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Time between frames, at least.
-const FRAME_INTERVAL: Duration = Duration::from_millis(100);
+/// Time between frames at least, when a picture begins and later. In between it is [`FRESHNESS`] of the time that the picture has had:
+/// its noise falls as a root of that, so a frame that is older looks a twentieth worse than the film.
+const SHORTEST_INTERVALS: [Duration; 2] = [Duration::from_millis(25), Duration::from_millis(100)];
+/// One part in so many.
+const FRESHNESS: u32 = 10;
 /// For so long after a start frames may take a twentieth of the time, then a fortieth: 3 % of the first ten seconds.
 const LIVELY: Duration = Duration::from_secs(2);
 /// Time between frames at most, while lively and later, where frames are large or the machine is busy: a picture that stands still
@@ -100,7 +103,25 @@ pub(super) struct Screen {
     pub(super) motion: Motion,
     /// Samples of the film that was shown last.
     pub(super) total_samples: u64,
+    /// Before the first look.
+    provisional: Option<ProvisionalTone>,
     spectators: Vec<Box<dyn Spectator>>,
+}
+
+/// The operator on a picture that was not looked at yet.
+struct ProvisionalTone {
+    fitted: Box<dyn FittedTone>,
+    /// Pixels and samples of that picture.
+    pixels: usize,
+    samples: u64,
+}
+
+impl ProvisionalTone {
+    /// Whether it still suits a picture of so many pixels and samples. A fit takes as long as all else of a frame, and changes little
+    /// while samples do.
+    fn holds(&self, pixels: usize, samples: u64) -> bool {
+        pixels == self.pixels && (2 * self.samples..3 * self.samples).contains(&(2 * samples))
+    }
 }
 
 impl Screen {
@@ -113,6 +134,7 @@ impl Screen {
             looked: None,
             motion,
             total_samples: 0,
+            provisional: None,
             spectators,
         }
     }
@@ -123,12 +145,15 @@ impl Screen {
         *self = Self { cost: self.cost, ..Self::new(spectators) };
     }
 
+    /// What was seen holds no more: another place, or other eyes.
+    pub(super) fn forget_look(&mut self) {
+        self.looked = None;
+        self.provisional = None;
+    }
+
     /// Whether a frame is due.
     pub(super) fn is_due(&self) -> bool {
-        let [lively, later] = LONGEST_INTERVALS;
-        let (times_cost, longest) = if self.started.elapsed() < LIVELY { (19, lively) } else { (39, later) };
-        let interval = (self.cost * times_cost).clamp(FRAME_INTERVAL, longest);
-        self.shown.is_none_or(|shown| shown.elapsed() >= interval)
+        self.shown.is_none_or(|shown| shown.elapsed() >= interval(self.started.elapsed(), self.cost))
     }
 
     /// Shows a film to all viewers, and remembers what that took.
@@ -149,6 +174,7 @@ impl Screen {
         let denoised = self.looked.as_ref().and_then(|looked| looked.denoised.clone());
         let (raw, samples) = composed(scenery.film, nits_per_unit, scenery.is_at_rest);
         let rgb_cd_m2 = denoised.unwrap_or(raw);
+        self.total_samples = samples.iter().map(|&samples| u64::from(samples)).sum();
         for layer in ALL.into_iter().filter(|&layer| shared.is_watched(layer)) {
             let colours = self.colours(layer, scenery, &rgb_cd_m2);
             // A frame that cannot be encoded is left out; the next may be.
@@ -165,7 +191,6 @@ impl Screen {
             is_at_rest: scenery.is_at_rest,
         };
         self.spectators.iter_mut().for_each(|spectator| spectator.shown(&shown));
-        self.total_samples = samples.iter().map(|&samples| u64::from(samples)).sum();
         shared.publish_snapshot(Snapshot {
             width: scenery.film.width() as usize,
             step: scenery.step as usize,
@@ -176,18 +201,32 @@ impl Screen {
         });
     }
 
-    fn colours(&self, layer: Layer, scenery: Scenery<'_>, rgb_cd_m2: &[[f32; 3]]) -> Colours {
+    /// The picture as the operator shows it: as fitted at the last look, or else to the picture itself.
+    fn picture(&mut self, scenery: Scenery<'_>, rgb_cd_m2: &[[f32; 3]]) -> Colours {
+        let looked = scenery.tone.map(|tone| tone.clone().restore());
+        let tone = looked.as_deref().unwrap_or_else(|| self.provisional_tone(scenery, rgb_cd_m2));
+        let shown = map_picture(tone, scenery.film.width() as usize, rgb_cd_m2);
+        Colours { rgb8: encode_srgb8(scenery.film.width(), &shown), legend: tone.describe() }
+    }
+
+    fn provisional_tone(&mut self, scenery: Scenery<'_>, rgb_cd_m2: &[[f32; 3]]) -> &dyn FittedTone {
+        let Scenery { film, settings, is_at_rest, step, .. } = scenery;
+        let (pixels, samples) = (pixels(film), self.total_samples);
+        // What rests is shown by a fit of its own.
+        self.provisional = self.provisional.take().filter(|tone| !is_at_rest && tone.holds(pixels, samples));
+        let tone = self.provisional.get_or_insert_with(|| ProvisionalTone {
+            fitted: fit(settings, step, film.width() as usize, rgb_cd_m2),
+            pixels,
+            samples,
+        });
+        tone.fitted.as_ref()
+    }
+
+    fn colours(&mut self, layer: Layer, scenery: Scenery<'_>, rgb_cd_m2: &[[f32; 3]]) -> Colours {
         let Scenery { film, settings, .. } = scenery;
         let (width, height) = (film.width() as usize, film.height() as usize);
         match (layer, &self.looked) {
-            (Layer::Picture, _) => {
-                let tone = match scenery.tone {
-                    Some(tone) => tone.clone().restore(),
-                    None => fit(settings, scenery.step, width, rgb_cd_m2),
-                };
-                let shown = map_picture(tone.as_ref(), width, rgb_cd_m2);
-                Colours { rgb8: encode_srgb8(film.width(), &shown), legend: tone.describe() }
-            }
+            (Layer::Picture, _) => self.picture(scenery, rgb_cd_m2),
             (Layer::Samples, _) => {
                 let counts = Plane::from_fn(width, height, |x, y| film.samples(y * width + x) as f32);
                 layer::logarithmic(&counts, "samples")
@@ -213,6 +252,15 @@ impl Screen {
             },
         }
     }
+}
+
+/// Time between two frames of a picture that was begun so long ago, where the last one took `cost`.
+fn interval(since_start: Duration, cost: Duration) -> Duration {
+    let [first, later] = SHORTEST_INTERVALS;
+    let shortest = (since_start / FRESHNESS).clamp(first, later);
+    let [lively, later] = LONGEST_INTERVALS;
+    let (times_cost, longest) = if since_start < LIVELY { (19, lively) } else { (39, later) };
+    (cost * times_cost).clamp(shortest, longest)
 }
 
 const ALL: [Layer; layer::LAYERS] = [
@@ -296,6 +344,30 @@ mod tests {
         };
         (0..work.samples).for_each(|_| sum.add(&sample));
         film.merge_block(work, &sum);
+    }
+
+    /// What is fresh is shown sooner than what changes little, and dear frames seldom.
+    #[test]
+    fn frames_follow_the_picture_and_their_price() {
+        let between = |since_start_ms: u64, cost_ms: u64| {
+            interval(Duration::from_millis(since_start_ms), Duration::from_millis(cost_ms)).as_millis()
+        };
+        assert_eq!([0, 500, 1000, 9000].map(|since_start| between(since_start, 1)), [25, 50, 100, 100]);
+        assert_eq!([100, 9000].map(|since_start| between(since_start, 10)), [190, 390]);
+        assert_eq!([100, 9000].map(|since_start| between(since_start, 1000)), [500, 2000]);
+    }
+
+    /// Fitted anew where samples are half as many more, or the picture is another.
+    #[test]
+    fn a_provisional_tone_holds_while_little_changes() {
+        let fitted = fechner_perception::tone::operator("constant", None).expect("an operator").fit(
+            &SceneGuide::of(&Plane::filled(2, 2, 1.0)),
+            &fechner_perception::Viewing::default(),
+            None,
+        );
+        let tone = ProvisionalTone { fitted, pixels: 4, samples: 100 };
+        assert_eq!([99, 100, 149, 150].map(|samples| tone.holds(4, samples)), [false, true, true, false]);
+        assert!(!tone.holds(5, 100));
     }
 
     /// In a pixel's pilot samples count alike, later and at rest halves do, whatever was looked at before.

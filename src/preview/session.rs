@@ -165,7 +165,7 @@ impl<'a> Session<'a> {
         self.phase = Phase::Moving;
         self.last_look = None;
         self.progress = None;
-        self.screen.looked = None;
+        self.screen.forget_look();
         // Films of another place are of no use, and counting their samples would take longer than the glimpse.
         self.state = RenderState::new(0, 0, &self.settings.limits);
         let glimpse = Glimpse::of(&self.tracer, self.resolution.step(width, height));

@@ -113,7 +113,7 @@ impl Session<'_> {
                 let state = std::mem::replace(&mut self.state, RenderState::new(0, 0, limits));
                 self.state = state.begun_anew(limits);
                 self.order_pilot();
-                self.screen.looked = None;
+                self.screen.forget_look();
             }
         }
         if self.phase == Phase::Stopped {

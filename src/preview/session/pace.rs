@@ -1,8 +1,8 @@
-//! How many samples make a batch, so that a viewer's wish waits for about a twentieth of a second.
+//! How many samples make a batch, so that neither a frame that is due nor a viewer's wish waits for longer than one sees.
 
 use std::time::{Duration, Instant};
 
-const BATCH: Duration = Duration::from_millis(60);
+const BATCH: Duration = Duration::from_millis(25);
 const FEWEST: u64 = 1 << 12;
 const MOST: u64 = 1 << 20;
 
