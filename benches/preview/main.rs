@@ -1,7 +1,8 @@
 //! What a live preview costs and what it is worth: time to the first picture, samples a second beside a render that nobody
 //! watches, and quality over the first seconds against uniform progressive rendering by the same tracer.
 //!
-//! `cargo bench --bench preview [-- --size N --seconds S --seeds N --reference N]` prints the tables of `benches/README.md`. Every
+//! `cargo bench --bench preview [-- first|overhead|race --size N --seconds S --seeds N --reference N]` prints the tables of
+//! `benches/README.md`, or those that are named. Every
 //! arm renders on one thread, whose own processor time is the clock, so that others' work on the machine counts only through
 //! caches; a browser's part is played by a WebSocket that takes every frame, on another thread.
 
@@ -23,11 +24,11 @@ use fechner::scene::Scene;
 use fechner::scene::load::{LoadOptions, load};
 use fechner_perception::tone::operator;
 use fechner_perception::{Display, Viewing};
-use race::races;
+use race::{mean_and_error, races};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 use support::CpuClock;
-use watched::Watched;
+use watched::{Moment, Watched};
 
 const SCENES: [&str; 3] = ["cornell-box", "many-lights", "textured-room"];
 /// Samples a pixel at which renders end that are compared by the clock.
@@ -38,6 +39,8 @@ struct Arguments {
     seconds: f64,
     seeds: u64,
     reference_spp: u32,
+    /// Tables to print; all where none is named.
+    tables: Vec<String>,
 }
 
 impl Arguments {
@@ -52,16 +55,32 @@ impl Arguments {
             seconds: number("--seconds", 10.0)?,
             seeds: number("--seeds", 3.0)? as u64,
             reference_spp: number("--reference", 1024.0)? as u32,
+            tables: words
+                .iter()
+                .filter(|word| ["first", "overhead", "race"].contains(&word.as_str()))
+                .cloned()
+                .collect(),
         })
+    }
+
+    fn wants(&self, table: &str) -> bool {
+        self.tables.is_empty() || self.tables.iter().any(|wanted| wanted == table)
     }
 }
 
 fn main() -> Result<()> {
     let arguments = Arguments::read()?;
     let subjects = SCENES.map(|name| Subject::load(name, arguments.size)).into_iter().collect::<Result<Vec<_>>>()?;
-    first_pictures(&subjects)?;
-    overheads(&subjects, &arguments)?;
-    races(&subjects, &arguments)
+    if arguments.wants("first") {
+        first_pictures(&subjects)?;
+    }
+    if arguments.wants("overhead") {
+        overheads(&subjects, &arguments)?;
+    }
+    if arguments.wants("race") {
+        races(&subjects, &arguments)?;
+    }
+    Ok(())
 }
 
 /// A scene of the suite, at a size.
@@ -190,46 +209,82 @@ fn seconds_at(counts: &[(u64, f64)], samples: u64) -> f64 {
 }
 
 fn overheads(subjects: &[Subject], arguments: &Arguments) -> Result<()> {
-    println!("\nOverhead by the least seconds of each and by the median of pairs:\n");
-    println!("| scene | render, s | watched preview, s | of the least | of pairs | after the first 5 s |");
-    println!("| --- |{}", " --- |".repeat(5));
+    println!("\nWhat watching costs, mean ± standard error over {} pairs:\n", arguments.seeds);
+    println!("| scene | render, s | watched preview, s | whole overhead | after the first 5 s |");
+    println!("| --- |{}", " --- |".repeat(4));
     for subject in subjects {
-        let (mut whole, mut steady, mut alone, mut watched) = (vec![], vec![], vec![], vec![]);
+        let (mut alone, mut watched, mut whole, mut steady) = (vec![], vec![], vec![], vec![]);
         for seed in 0..arguments.seeds {
-            let limits = Limits { mean_samples: Some(OVERHEAD_SPP), ..Limits::of_visibility(1.0) };
-            let (rendered, counts) = one_thread()?.install(|| {
-                let notes = Notes { clock: CpuClock::of_thread(), counts: Mutex::default() };
-                let settings = subject.loop_settings(limits)?;
-                let rendered = render(&subject.tracer(seed), &settings, &notes)?;
-                let seconds = notes.clock.seconds();
-                let mut counts = notes.counts.into_inner().expect("nobody panics");
-                counts.push((rendered.film.total_samples() + 1, seconds));
-                anyhow::Ok((rendered, counts))
-            })?;
-            let preview = Watched::start(subject, seed, limits, Sampling::Adaptive, false)?;
-            let moments = preview.until(|moment| moment.is_at_rest)?;
-            let end = moments.last().context("an end")?;
-            anyhow::ensure!(end.samples == rendered.film.total_samples(), "the preview took another way");
-            let (_, render_seconds) = *counts.last().context("an end")?;
-            whole.push(end.seconds / render_seconds);
-            alone.push(render_seconds);
-            watched.push(end.seconds);
-            if let Some(from) = moments.iter().find(|moment| moment.step == 1 && moment.seconds > 5.0) {
-                let preview_seconds = end.seconds - from.seconds;
-                steady.push(preview_seconds / (render_seconds - seconds_at(&counts, from.samples)));
-            }
+            let pair = Pair::measured(subject, seed)?;
+            alone.push(pair.render_seconds());
+            watched.push(pair.preview_seconds());
+            whole.push((watched[watched.len() - 1] / alone[alone.len() - 1]).ln());
+            steady.extend(pair.ratio_after(5.0).map(f64::ln));
         }
-        let percent = |ratios: Vec<f64>| match ratios.len() {
-            0 => "ended before".to_owned(),
-            count => {
-                let mut ratios = ratios;
-                ratios.sort_unstable_by(f64::total_cmp);
-                format!("{:+.1} %", 100.0 * (ratios[count / 2] - 1.0))
+        let percent = |logarithms: &[f64]| {
+            let (mean, error) = mean_and_error(logarithms);
+            if logarithms.is_empty() {
+                "ended before".to_owned()
+            } else {
+                format!("{:+.1} ± {:.1} %", 100.0 * mean.exp_m1(), 100.0 * error)
             }
         };
         let (name, alone, watched) = (subject.name, least(alone), least(watched));
-        let of_least = percent(vec![watched / alone]);
-        println!("| {name} | {alone:.2} | {watched:.2} | {of_least} | {} | {} |", percent(whole), percent(steady));
+        println!("| {name} | {alone:.2} | {watched:.2} | {} | {} |", percent(&whole), percent(&steady));
     }
     Ok(())
+}
+
+/// A render and a watched preview that take the same samples.
+struct Pair {
+    /// Samples and seconds of the render.
+    counts: Vec<(u64, f64)>,
+    moments: Vec<Moment>,
+}
+
+impl Pair {
+    /// The machine's pace changes within minutes, so which comes first alternates.
+    fn measured(subject: &Subject, seed: u64) -> Result<Self> {
+        let limits = Limits { mean_samples: Some(OVERHEAD_SPP), ..Limits::of_visibility(1.0) };
+        let preview =
+            || Watched::start(subject, seed, limits, Sampling::Adaptive, false)?.until(|moment| moment.is_at_rest);
+        let pair = if seed.is_multiple_of(2) {
+            let counts = rendered(subject, seed, limits)?;
+            Self { counts, moments: preview()? }
+        } else {
+            let moments = preview()?;
+            Self { counts: rendered(subject, seed, limits)?, moments }
+        };
+        let [rendered, shown] = [pair.counts.last().map(|end| end.0), pair.moments.last().map(|end| end.samples)];
+        anyhow::ensure!(rendered == shown, "the preview took another way");
+        Ok(pair)
+    }
+
+    fn render_seconds(&self) -> f64 {
+        self.counts.last().map_or(f64::NAN, |end| end.1)
+    }
+
+    fn preview_seconds(&self) -> f64 {
+        self.moments.last().map_or(f64::NAN, |end| end.seconds)
+    }
+
+    /// Seconds of the preview over those of the render from the first whole frame after so many on.
+    fn ratio_after(&self, seconds: f64) -> Option<f64> {
+        let from = self.moments.iter().find(|moment| moment.step == 1 && moment.seconds > seconds)?;
+        let of_render = self.render_seconds() - seconds_at(&self.counts, from.samples);
+        Some((self.preview_seconds() - from.seconds) / of_render)
+    }
+}
+
+/// Samples and seconds on the way of a render that nobody watches.
+fn rendered(subject: &Subject, seed: u64, limits: Limits) -> Result<Vec<(u64, f64)>> {
+    one_thread()?.install(|| {
+        let notes = Notes { clock: CpuClock::of_thread(), counts: Mutex::default() };
+        let settings = subject.loop_settings(limits)?;
+        let rendered = render(&subject.tracer(seed), &settings, &notes)?;
+        let seconds = notes.clock.seconds();
+        let mut counts = notes.counts.into_inner().expect("nobody panics");
+        counts.push((rendered.film.total_samples(), seconds));
+        Ok(counts)
+    })
 }

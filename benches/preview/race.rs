@@ -182,7 +182,7 @@ pub(super) fn races(subjects: &[Subject], arguments: &Arguments) -> Result<()> {
 }
 
 /// Mean and its standard error.
-fn mean_and_error(values: &[f64]) -> (f64, f64) {
+pub(super) fn mean_and_error(values: &[f64]) -> (f64, f64) {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
     let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();

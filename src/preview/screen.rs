@@ -21,11 +21,8 @@ use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Time between frames at least, when a picture begins and later. In between it is [`FRESHNESS`] of the time that the picture has had:
-/// its noise falls as a root of that, so a frame that is older looks a twentieth worse than the film.
-const SHORTEST_INTERVALS: [Duration; 2] = [Duration::from_millis(25), Duration::from_millis(100)];
-/// One part in so many.
-const FRESHNESS: u32 = 10;
+/// Bounds of [`best_interval`]: batches are hardly shorter than the first, and a picture that changes less often seems to be done.
+const BEST_INTERVALS: [Duration; 2] = [Duration::from_millis(25), Duration::from_millis(500)];
 /// For so long after a start frames may take a twentieth of the time, then a fortieth: 3 % of the first ten seconds.
 const LIVELY: Duration = Duration::from_secs(2);
 /// Time between frames at most, while lively and later, where frames are large or the machine is busy: a picture that stands still
@@ -120,7 +117,7 @@ impl ProvisionalTone {
     /// Whether it still suits a picture of so many pixels and samples. A fit takes as long as all else of a frame, and changes little
     /// while samples do.
     fn holds(&self, pixels: usize, samples: u64) -> bool {
-        pixels == self.pixels && (2 * self.samples..3 * self.samples).contains(&(2 * samples))
+        pixels == self.pixels && (self.samples..2 * self.samples).contains(&samples)
     }
 }
 
@@ -256,11 +253,17 @@ impl Screen {
 
 /// Time between two frames of a picture that was begun so long ago, where the last one took `cost`.
 fn interval(since_start: Duration, cost: Duration) -> Duration {
-    let [first, later] = SHORTEST_INTERVALS;
-    let shortest = (since_start / FRESHNESS).clamp(first, later);
+    let [first, last] = BEST_INTERVALS;
+    let shortest = best_interval(since_start, cost).clamp(first, last);
     let [lively, later] = LONGEST_INTERVALS;
     let (times_cost, longest) = if since_start < LIVELY { (19, lively) } else { (39, later) };
     (cost * times_cost).clamp(shortest, longest)
+}
+
+/// √(2 cost time): where what is on the screen is nearest to what might be there. It lacks, of its time, cost / interval for frames and
+/// half an interval / time for its age.
+fn best_interval(since_start: Duration, cost: Duration) -> Duration {
+    Duration::from_secs_f64((2.0 * cost.as_secs_f64() * since_start.as_secs_f64()).sqrt())
 }
 
 const ALL: [Layer; layer::LAYERS] = [
@@ -352,12 +355,12 @@ mod tests {
         let between = |since_start_ms: u64, cost_ms: u64| {
             interval(Duration::from_millis(since_start_ms), Duration::from_millis(cost_ms)).as_millis()
         };
-        assert_eq!([0, 500, 1000, 9000].map(|since_start| between(since_start, 1)), [25, 50, 100, 100]);
-        assert_eq!([100, 9000].map(|since_start| between(since_start, 10)), [190, 390]);
+        assert_eq!([0, 800, 5000, 200_000].map(|since_start| between(since_start, 1)), [25, 40, 100, 500]);
+        assert_eq!([100, 9000, 20_000].map(|since_start| between(since_start, 10)), [190, 424, 500]);
         assert_eq!([100, 9000].map(|since_start| between(since_start, 1000)), [500, 2000]);
     }
 
-    /// Fitted anew where samples are half as many more, or the picture is another.
+    /// Fitted anew where samples have doubled, or the picture is another.
     #[test]
     fn a_provisional_tone_holds_while_little_changes() {
         let fitted = fechner_perception::tone::operator("constant", None).expect("an operator").fit(
@@ -366,7 +369,7 @@ mod tests {
             None,
         );
         let tone = ProvisionalTone { fitted, pixels: 4, samples: 100 };
-        assert_eq!([99, 100, 149, 150].map(|samples| tone.holds(4, samples)), [false, true, true, false]);
+        assert_eq!([99, 100, 199, 200].map(|samples| tone.holds(4, samples)), [false, true, true, false]);
         assert!(!tone.holds(5, 100));
     }
 
