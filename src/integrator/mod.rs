@@ -249,8 +249,12 @@ impl PathTracer {
         const BLOCKS_PER_BATCH: usize = 1 << 16;
         const CHUNKS_PER_THREAD: usize = 64;
         const SAMPLES_PER_THREAD: u64 = 1 << 19;
-        const SAMPLES_PER_CHUNK: u64 = 2_048;
+        const SAMPLES_PER_CHUNK: [u64; 2] = [64, 2_048];
         let threads = rayon::current_num_threads();
+        // Batches may be small: a preview's last 25 ms, a plan's few pixels.
+        let samples: u64 = blocks.iter().take(BLOCKS_PER_BATCH).map(|block| u64::from(block.samples)).sum();
+        let [least, most] = SAMPLES_PER_CHUNK;
+        let samples_per_chunk = (samples / (CHUNKS_PER_THREAD * threads) as u64).clamp(least, most);
         let mut chunks = Vec::new();
         let (mut start, mut in_chunk, mut in_batch) = (0, 0, 0);
         for (i, block) in blocks.iter().enumerate() {
@@ -258,7 +262,7 @@ impl PathTracer {
             in_batch += u64::from(block.samples);
             let is_full = i + 1 == blocks.len().min(BLOCKS_PER_BATCH)
                 || (in_batch >= SAMPLES_PER_THREAD * threads as u64 && chunks.len() + 1 >= CHUNKS_PER_THREAD * threads);
-            if in_chunk >= SAMPLES_PER_CHUNK || is_full {
+            if in_chunk >= samples_per_chunk || is_full {
                 chunks.push(&blocks[start..=i]);
                 (start, in_chunk) = (i + 1, 0);
             }

@@ -23,11 +23,11 @@ use std::time::{Duration, Instant};
 
 /// Bounds of [`best_interval`]: batches are hardly shorter than the first, and a picture that changes less often seems to be done.
 const BEST_INTERVALS: [Duration; 2] = [Duration::from_millis(25), Duration::from_millis(500)];
-/// For so long after a start frames may take a twentieth of the time, then a fortieth: 3 % of the first ten seconds.
+/// From so long after a start on frames may take a fortieth of the time.
 const LIVELY: Duration = Duration::from_secs(2);
-/// Time between frames at most, while lively and later, where frames are large or the machine is busy: a picture that stands still
-/// for longer seems to be done.
-const LONGEST_INTERVALS: [Duration; 2] = [Duration::from_millis(500), Duration::from_secs(2)];
+const TIMES_COST: u32 = 39;
+/// Time between frames at most, where they are large or the machine is busy.
+const LONGEST_INTERVAL: Duration = Duration::from_secs(2);
 
 /// Of frames of a picture that changes, 1 to 100.
 const JPEG_QUALITY: u8 = 92;
@@ -254,10 +254,8 @@ impl Screen {
 /// Time between two frames of a picture that was begun so long ago, where the last one took `cost`.
 fn interval(since_start: Duration, cost: Duration) -> Duration {
     let [first, last] = BEST_INTERVALS;
-    let shortest = best_interval(since_start, cost).clamp(first, last);
-    let [lively, later] = LONGEST_INTERVALS;
-    let (times_cost, longest) = if since_start < LIVELY { (19, lively) } else { (39, later) };
-    (cost * times_cost).clamp(shortest, longest)
+    let best = best_interval(since_start, cost).clamp(first, last);
+    if since_start < LIVELY { best } else { best.max((TIMES_COST * cost).min(LONGEST_INTERVAL)) }
 }
 
 /// √(2 cost time): where what is on the screen is nearest to what might be there. It lacks, of its time, cost / interval for frames and
@@ -356,8 +354,9 @@ mod tests {
             interval(Duration::from_millis(since_start_ms), Duration::from_millis(cost_ms)).as_millis()
         };
         assert_eq!([0, 800, 5000, 200_000].map(|since_start| between(since_start, 1)), [25, 40, 100, 500]);
-        assert_eq!([100, 9000, 20_000].map(|since_start| between(since_start, 10)), [190, 424, 500]);
-        assert_eq!([100, 9000].map(|since_start| between(since_start, 1000)), [500, 2000]);
+        assert_eq!([200, 1800, 9000, 20_000].map(|since_start| between(since_start, 10)), [63, 189, 424, 500]);
+        assert_eq!([100, 1900, 9000].map(|since_start| between(since_start, 40)), [89, 389, 1560]);
+        assert_eq!([100, 1900, 9000].map(|since_start| between(since_start, 1000)), [447, 500, 2000]);
     }
 
     /// Fitted anew where samples have doubled, or the picture is another.
