@@ -2,9 +2,9 @@
 //! watches, and quality over the first seconds against uniform progressive rendering by the same tracer.
 //!
 //! `cargo bench --bench preview [-- first|overhead|race --size N --seconds S --seeds N --reference N]` prints the tables of
-//! `benches/README.md`, or those that are named. Every
-//! arm renders on one thread, whose own processor time is the clock, so that others' work on the machine counts only through
-//! caches; a browser's part is played by a WebSocket that takes every frame, on another thread.
+//! `benches/README.md`, or those that are named. Every arm renders on one thread, whose own processor time is the clock, so that
+//! others' work on the machine counts only through caches; a browser's part is played by a WebSocket that takes every frame, on
+//! another thread.
 
 mod race;
 #[path = "../support/mod.rs"]

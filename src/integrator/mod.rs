@@ -249,12 +249,9 @@ impl PathTracer {
         const BLOCKS_PER_BATCH: usize = 1 << 16;
         const CHUNKS_PER_THREAD: usize = 64;
         const SAMPLES_PER_THREAD: u64 = 1 << 19;
-        const SAMPLES_PER_CHUNK: [u64; 2] = [64, 2_048];
         let threads = rayon::current_num_threads();
-        // Batches may be small: a preview's last 25 ms, a plan's few pixels.
-        let samples: u64 = blocks.iter().take(BLOCKS_PER_BATCH).map(|block| u64::from(block.samples)).sum();
-        let [least, most] = SAMPLES_PER_CHUNK;
-        let samples_per_chunk = (samples / (CHUNKS_PER_THREAD * threads) as u64).clamp(least, most);
+        let samples_per_chunk =
+            samples_per_chunk(&blocks[..blocks.len().min(BLOCKS_PER_BATCH)], CHUNKS_PER_THREAD * threads);
         let mut chunks = Vec::new();
         let (mut start, mut in_chunk, mut in_batch) = (0, 0, 0);
         for (i, block) in blocks.iter().enumerate() {
@@ -315,5 +312,29 @@ impl PathTracer {
             sum.add(&path);
         }
         sum
+    }
+}
+
+/// Samples after which a chunk of a batch is full: as many chunks as asked for where a batch is small, as a preview's are.
+fn samples_per_chunk(batch: &[BlockWork], chunks: usize) -> u64 {
+    const LEAST: u64 = 64;
+    const MOST: u64 = 2_048;
+    let samples: u64 = batch.iter().map(|block| u64::from(block.samples)).sum();
+    (samples / chunks.max(1) as u64).clamp(LEAST, MOST)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampler::Half;
+
+    /// Threads idle for half a chunk at the end of each batch.
+    #[test]
+    fn small_batches_have_small_chunks() {
+        let batch =
+            |blocks: u32| -> Vec<BlockWork> { (0..blocks).map(|pixel| BlockWork::whole(pixel, Half::A, 0)).collect() };
+        let samples = u64::from(batch(1)[0].samples);
+        assert_eq!(samples_per_chunk(&batch(8_192), 128), 64 * samples);
+        assert_eq!([0, 8, 1 << 16].map(|blocks| samples_per_chunk(&batch(blocks), 128)), [64, 64, 2_048]);
     }
 }

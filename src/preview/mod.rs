@@ -4,9 +4,10 @@
 //! the bytes of `fechner render`, and shows it to any number of viewers over a WebSocket. The order of work:
 //!
 //! 1. while the camera moves, and at first, a `glimpse` of as many pixels as a frame has time for;
-//! 2. the loop, in batches of about a tenth of a second, between which `session` obeys what viewers ask; its pilot goes from coarse
+//! 2. the loop, in batches of about 25 ms, between which `session` obeys what viewers ask; its pilot goes from coarse
 //!    to fine (`coarse`);
-//! 3. `screen` turns film into encoded frames, at most ten a second and never more than viewers look at.
+//! 3. `screen` turns film into encoded frames, at intervals that follow the picture's age and a frame's
+//!    price, and never more than viewers look at.
 //!
 //! Viewers get the latest frame and none that they missed, so a slow one costs nobody else anything. Not for pictures that
 //! should be kept or compared: `render` writes those, and so does "save" here.

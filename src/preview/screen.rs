@@ -21,11 +21,12 @@ use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Bounds of [`best_interval`]: batches are hardly shorter than the first, and a picture that changes less often seems to be done.
+/// Bounds of [`best_interval`]: a batch is about as long as the least, and a picture that changes less often seems to be done.
 const BEST_INTERVALS: [Duration; 2] = [Duration::from_millis(25), Duration::from_millis(500)];
-/// From so long after a start on frames may take a fortieth of the time.
+/// So long after a start intervals follow age and cost alone.
 const LIVELY: Duration = Duration::from_secs(2);
-const TIMES_COST: u32 = 39;
+/// Costs of a frame between two later on: a fortieth of the time.
+const COSTS_BETWEEN_FRAMES: u32 = 39;
 /// Time between frames at most, where they are large or the machine is busy.
 const LONGEST_INTERVAL: Duration = Duration::from_secs(2);
 
@@ -100,7 +101,7 @@ pub(super) struct Screen {
     pub(super) motion: Motion,
     /// Samples of the film that was shown last.
     pub(super) total_samples: u64,
-    /// Before the first look.
+    /// Until the first look.
     provisional: Option<ProvisionalTone>,
     spectators: Vec<Box<dyn Spectator>>,
 }
@@ -114,8 +115,8 @@ struct ProvisionalTone {
 }
 
 impl ProvisionalTone {
-    /// Whether it still suits a picture of so many pixels and samples. A fit takes as long as all else of a frame, and changes little
-    /// while samples do.
+    /// Whether it still suits a picture of so many pixels and samples. A fit takes about as long as all else of a frame, and changes
+    /// little while samples do.
     fn holds(&self, pixels: usize, samples: u64) -> bool {
         pixels == self.pixels && (self.samples..2 * self.samples).contains(&samples)
     }
@@ -201,6 +202,9 @@ impl Screen {
     /// The picture as the operator shows it: as fitted at the last look, or else to the picture itself.
     fn picture(&mut self, scenery: Scenery<'_>, rgb_cd_m2: &[[f32; 3]]) -> Colours {
         let looked = scenery.tone.map(|tone| tone.clone().restore());
+        if looked.is_some() {
+            self.provisional = None;
+        }
         let tone = looked.as_deref().unwrap_or_else(|| self.provisional_tone(scenery, rgb_cd_m2));
         let shown = map_picture(tone, scenery.film.width() as usize, rgb_cd_m2);
         Colours { rgb8: encode_srgb8(scenery.film.width(), &shown), legend: tone.describe() }
@@ -255,7 +259,7 @@ impl Screen {
 fn interval(since_start: Duration, cost: Duration) -> Duration {
     let [first, last] = BEST_INTERVALS;
     let best = best_interval(since_start, cost).clamp(first, last);
-    if since_start < LIVELY { best } else { best.max((TIMES_COST * cost).min(LONGEST_INTERVAL)) }
+    if since_start < LIVELY { best } else { best.max(cost.saturating_mul(COSTS_BETWEEN_FRAMES).min(LONGEST_INTERVAL)) }
 }
 
 /// √(2 cost time): where what is on the screen is nearest to what might be there. It lacks, of its time, cost / interval for frames and
@@ -370,6 +374,32 @@ mod tests {
         let tone = ProvisionalTone { fitted, pixels: 4, samples: 100 };
         assert_eq!([99, 100, 199, 200].map(|samples| tone.holds(4, samples)), [false, true, true, false]);
         assert!(!tone.holds(5, 100));
+    }
+
+    /// A change of operator shows after [`Screen::forget_look`], and at rest whatever was fitted before.
+    #[test]
+    fn no_fit_outlives_what_it_was_made_for() {
+        let mut film = Film::new(2, 1);
+        [0, 1].into_iter().for_each(|pixel| add(&mut film, BlockWork::whole(pixel, Half::A, 0), 1.0));
+        let settings = |operator: &str| {
+            let operator = fechner_perception::tone::operator(operator, None).expect("an operator");
+            LoopSettings::new(fechner_perception::Viewing::default(), 100.0, operator)
+        };
+        let (before, after) = (settings("constant"), settings("reinhard02"));
+        let mut screen = Screen::new(Vec::new());
+        screen.total_samples = film.total_samples();
+        let legend = |screen: &mut Screen, settings: &LoopSettings, is_at_rest: bool| {
+            let scenery = Scenery { film: &film, tone: None, settings, is_at_rest, step: 1 };
+            screen.picture(scenery, &[[100.0; 3]; 2]).legend
+        };
+        let first = legend(&mut screen, &before, false);
+        assert_eq!(legend(&mut screen, &after, false), first, "the fit is kept");
+        let at_rest = legend(&mut screen, &after, true);
+        assert_ne!(at_rest, first);
+        screen.forget_look();
+        assert_eq!(legend(&mut screen, &before, false), first);
+        screen.forget_look();
+        assert_eq!(legend(&mut screen, &after, false), at_rest);
     }
 
     /// In a pixel's pilot samples count alike, later and at rest halves do, whatever was looked at before.
