@@ -1,6 +1,6 @@
 //! Linear light to 8-bit sRGB codes with a dither, by straight lines between tabulated places of the curve.
 //!
-//! Every frame of a preview and every PNG passes here. `powf` for each channel took more of a frame than its JPEG (`cargo bench
+//! Every frame of a preview and every PNG passes here. `powf` for each channel took as much of a frame as its JPEG (`cargo bench
 //! --bench frames`). Between 512 places an octave a line is off by at most 5e-5 of a step of 8 bits.
 
 use crate::scene::texture::srgb_from_linear;
