@@ -243,18 +243,16 @@ struct Pair {
 }
 
 impl Pair {
-    /// The machine's pace changes within minutes, so which comes first alternates.
+    /// Both at once, each on a core of its own: the machine's pace changes within seconds, by more than watching costs.
     fn measured(subject: &Subject, seed: u64) -> Result<Self> {
         let limits = Limits { mean_samples: Some(OVERHEAD_SPP), ..Limits::of_visibility(1.0) };
-        let preview =
-            || Watched::start(subject, seed, limits, Sampling::Adaptive, false)?.until(|moment| moment.is_at_rest);
-        let pair = if seed.is_multiple_of(2) {
-            let counts = rendered(subject, seed, limits)?;
-            Self { counts, moments: preview()? }
-        } else {
-            let moments = preview()?;
-            Self { counts: rendered(subject, seed, limits)?, moments }
-        };
+        let pair = std::thread::scope(|scope| {
+            let render = scope.spawn(|| rendered(subject, seed, limits));
+            let preview = Watched::start(subject, seed, limits, Sampling::Adaptive, false)?;
+            let moments = preview.until(|moment| moment.is_at_rest)?;
+            let counts = render.join().map_err(|_| anyhow::anyhow!("the render panicked"))??;
+            anyhow::Ok(Self { counts, moments })
+        })?;
         let [rendered, shown] = [pair.counts.last().map(|end| end.0), pair.moments.last().map(|end| end.samples)];
         anyhow::ensure!(rendered == shown, "the preview took another way");
         Ok(pair)
