@@ -216,9 +216,10 @@ fn overheads(subjects: &[Subject], arguments: &Arguments) -> Result<()> {
         let (mut alone, mut watched, mut whole, mut steady) = (vec![], vec![], vec![], vec![]);
         for seed in 0..arguments.seeds {
             let pair = Pair::measured(subject, seed)?;
-            alone.push(pair.render_seconds());
-            watched.push(pair.preview_seconds());
-            whole.push((watched[watched.len() - 1] / alone[alone.len() - 1]).ln());
+            let (render_seconds, preview_seconds) = (pair.render_seconds(), pair.preview_seconds());
+            alone.push(render_seconds);
+            watched.push(preview_seconds);
+            whole.push((preview_seconds / render_seconds).ln());
             steady.extend(pair.ratio_after(5.0).map(f64::ln));
         }
         let percent = |logarithms: &[f64]| {

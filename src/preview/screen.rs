@@ -115,8 +115,8 @@ struct ProvisionalTone {
 }
 
 impl ProvisionalTone {
-    /// Whether it still suits a picture of so many pixels and samples. A fit takes about as long as all else of a frame, and changes
-    /// little while samples do.
+    /// Whether it still suits a picture of so many pixels and samples. A fit sorts the whole picture, and changes little while samples
+    /// do.
     fn holds(&self, pixels: usize, samples: u64) -> bool {
         pixels == self.pixels && (self.samples..2 * self.samples).contains(&samples)
     }
@@ -351,6 +351,11 @@ mod tests {
         film.merge_block(work, &sum);
     }
 
+    fn settings_with(operator: &str) -> LoopSettings {
+        let operator = fechner_perception::tone::operator(operator, None).expect("an operator");
+        LoopSettings::new(fechner_perception::Viewing::default(), 100.0, operator)
+    }
+
     /// What is fresh is shown sooner than what changes little, and dear frames seldom.
     #[test]
     fn frames_follow_the_picture_and_their_price() {
@@ -366,11 +371,7 @@ mod tests {
     /// Fitted anew where samples have doubled, or the picture is another.
     #[test]
     fn a_provisional_tone_holds_while_little_changes() {
-        let fitted = fechner_perception::tone::operator("constant", None).expect("an operator").fit(
-            &SceneGuide::of(&Plane::filled(2, 2, 1.0)),
-            &fechner_perception::Viewing::default(),
-            None,
-        );
+        let fitted = fit(&settings_with("constant"), 1, 2, &[[1.0; 3]; 4]);
         let tone = ProvisionalTone { fitted, pixels: 4, samples: 100 };
         assert_eq!([99, 100, 199, 200].map(|samples| tone.holds(4, samples)), [false, true, true, false]);
         assert!(!tone.holds(5, 100));
@@ -381,11 +382,7 @@ mod tests {
     fn no_fit_outlives_what_it_was_made_for() {
         let mut film = Film::new(2, 1);
         [0, 1].into_iter().for_each(|pixel| add(&mut film, BlockWork::whole(pixel, Half::A, 0), 1.0));
-        let settings = |operator: &str| {
-            let operator = fechner_perception::tone::operator(operator, None).expect("an operator");
-            LoopSettings::new(fechner_perception::Viewing::default(), 100.0, operator)
-        };
-        let (before, after) = (settings("constant"), settings("reinhard02"));
+        let (before, after) = (settings_with("constant"), settings_with("reinhard02"));
         let mut screen = Screen::new(Vec::new());
         screen.total_samples = film.total_samples();
         let legend = |screen: &mut Screen, settings: &LoopSettings, is_at_rest: bool| {
