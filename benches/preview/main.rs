@@ -1,11 +1,12 @@
 //! What a live preview costs and what it is worth: time to the first picture, samples a second beside a render that nobody
 //! watches, and quality over the first seconds against uniform progressive rendering by the same tracer.
 //!
-//! `cargo bench --bench preview [-- first|overhead|race --size N --seconds S --seeds N --reference N]` prints the tables of
-//! `benches/README.md`, or those that are named. Every arm renders on one thread, whose own processor time is the clock, so that
-//! others' work on the machine counts only through caches; a browser's part is played by a WebSocket that takes every frame, on
-//! another thread.
+//! `cargo bench --bench preview [-- first|overhead|two-threads|race --size N --seconds S --seeds N --reference N]` prints the tables of
+//! `benches/README.md`, or those that are named. Every arm but those of two threads renders on one, whose own processor time is
+//! the clock, so that others' work on the machine counts only through caches; a browser's part is played by a WebSocket that takes
+//! every frame, on another thread.
 
+mod overhead;
 mod race;
 #[path = "../support/mod.rs"]
 mod support;
@@ -13,8 +14,6 @@ mod watched;
 
 use anyhow::{Context, Result};
 use fechner::adaptive::settings::{AllocationRule, Limits, LoopSettings, Sampling};
-use fechner::adaptive::state::RenderState;
-use fechner::adaptive::{Directive, Monitor, Progress, render};
 use fechner::checkpoint::SettingsRecord;
 use fechner::film::Film;
 use fechner::integrator::{BlockWork, PathTracer, SamplePlan, TraceSettings};
@@ -24,15 +23,14 @@ use fechner::scene::Scene;
 use fechner::scene::load::{LoadOptions, load};
 use fechner_perception::tone::operator;
 use fechner_perception::{Display, Viewing};
-use race::{mean_and_error, races};
+use overhead::{overheads, overheads_on_two_threads};
+use race::races;
 use std::path::Path;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use support::CpuClock;
-use watched::{Moment, Watched};
+use watched::Watched;
 
 const SCENES: [&str; 3] = ["cornell-box", "many-lights", "textured-room"];
-/// Samples a pixel at which renders end that are compared by the clock.
-const OVERHEAD_SPP: u32 = 96;
 
 struct Arguments {
     size: u32,
@@ -57,7 +55,7 @@ impl Arguments {
             reference_spp: number("--reference", 1024.0)? as u32,
             tables: words
                 .iter()
-                .filter(|word| ["first", "overhead", "race"].contains(&word.as_str()))
+                .filter(|word| ["first", "overhead", "two-threads", "race"].contains(&word.as_str()))
                 .cloned()
                 .collect(),
         })
@@ -76,6 +74,9 @@ fn main() -> Result<()> {
     }
     if arguments.wants("overhead") {
         overheads(&subjects, &arguments)?;
+    }
+    if arguments.wants("two-threads") {
+        overheads_on_two_threads(&subjects, &arguments)?;
     }
     if arguments.wants("race") {
         races(&subjects, &arguments)?;
@@ -166,7 +167,11 @@ fn first_pictures(subjects: &[Subject]) -> Result<()> {
             });
             trees.push(tree);
             pass.push(traced);
-            let watched = Watched::start(subject, seed, Limits::of_visibility(1.0), Sampling::Adaptive, false)?;
+            let watched = Watched::start(
+                one_thread()?,
+                subject.job(seed, Limits::of_visibility(1.0), Sampling::Adaptive),
+                false,
+            )?;
             let pixels = subject.pixels() as u64;
             let moments = watched.until(|moment| moment.samples >= 2 * pixels)?;
             first.push(moments[0].seconds - tree);
@@ -177,113 +182,4 @@ fn first_pictures(subjects: &[Subject]) -> Result<()> {
         println!("| {name} | {trees:.1} | {pass:.0} | {first:.1} ({first_ratio:.2}) | {whole:.0} ({whole_ratio:.2}) |");
     }
     Ok(())
-}
-
-/// Notes when the film had how many samples.
-struct Notes {
-    clock: CpuClock,
-    counts: Mutex<Vec<(u64, f64)>>,
-}
-
-impl Monitor for Notes {
-    fn looked(&self, _: &Progress) {}
-
-    fn samples_done(&self, _: u64) {}
-
-    fn most_samples_a_batch(&self) -> u64 {
-        1 << 15
-    }
-
-    fn between_batches(&self, state: &RenderState) -> Directive {
-        let now = self.clock.seconds();
-        self.counts.lock().expect("nobody panics").push((state.film.total_samples(), now));
-        Directive::GoOn
-    }
-}
-
-/// Seconds at which so many samples were there, by the nearest counts on both sides.
-fn seconds_at(counts: &[(u64, f64)], samples: u64) -> f64 {
-    let above = counts.partition_point(|count| count.0 < samples).clamp(1, counts.len() - 1);
-    let [(low, from), (high, to)] = [counts[above - 1], counts[above]];
-    from + (to - from) * (samples as f64 - low as f64) / ((high - low) as f64).max(1.0)
-}
-
-fn overheads(subjects: &[Subject], arguments: &Arguments) -> Result<()> {
-    println!("\nWhat watching costs, mean ± standard error over {} pairs:\n", arguments.seeds);
-    println!("| scene | render, s | watched preview, s | whole overhead | after the first 5 s |");
-    println!("| --- |{}", " --- |".repeat(4));
-    for subject in subjects {
-        let (mut alone, mut watched, mut whole, mut steady) = (vec![], vec![], vec![], vec![]);
-        for seed in 0..arguments.seeds {
-            let pair = Pair::measured(subject, seed)?;
-            let (render_seconds, preview_seconds) = (pair.render_seconds(), pair.preview_seconds());
-            alone.push(render_seconds);
-            watched.push(preview_seconds);
-            whole.push((preview_seconds / render_seconds).ln());
-            steady.extend(pair.ratio_after(5.0).map(f64::ln));
-        }
-        let percent = |logarithms: &[f64]| {
-            let (mean, error) = mean_and_error(logarithms);
-            if logarithms.is_empty() {
-                "ended before".to_owned()
-            } else {
-                format!("{:+.1} ± {:.1} %", 100.0 * mean.exp_m1(), 100.0 * error)
-            }
-        };
-        let (name, alone, watched) = (subject.name, least(alone), least(watched));
-        println!("| {name} | {alone:.2} | {watched:.2} | {} | {} |", percent(&whole), percent(&steady));
-    }
-    Ok(())
-}
-
-/// A render and a watched preview that take the same samples.
-struct Pair {
-    /// Samples and seconds of the render.
-    counts: Vec<(u64, f64)>,
-    moments: Vec<Moment>,
-}
-
-impl Pair {
-    /// Both at once, each on a core of its own: the machine's pace changes within seconds, by more than watching costs.
-    fn measured(subject: &Subject, seed: u64) -> Result<Self> {
-        let limits = Limits { mean_samples: Some(OVERHEAD_SPP), ..Limits::of_visibility(1.0) };
-        let pair = std::thread::scope(|scope| {
-            let render = scope.spawn(|| rendered(subject, seed, limits));
-            let preview = Watched::start(subject, seed, limits, Sampling::Adaptive, false)?;
-            let moments = preview.until(|moment| moment.is_at_rest)?;
-            let counts = render.join().map_err(|_| anyhow::anyhow!("the render panicked"))??;
-            anyhow::Ok(Self { counts, moments })
-        })?;
-        let [rendered, shown] = [pair.counts.last().map(|end| end.0), pair.moments.last().map(|end| end.samples)];
-        anyhow::ensure!(rendered == shown, "the preview took another way");
-        Ok(pair)
-    }
-
-    fn render_seconds(&self) -> f64 {
-        self.counts.last().map_or(f64::NAN, |end| end.1)
-    }
-
-    fn preview_seconds(&self) -> f64 {
-        self.moments.last().map_or(f64::NAN, |end| end.seconds)
-    }
-
-    /// Seconds of the preview over those of the render from the first whole frame after so many on.
-    fn ratio_after(&self, seconds: f64) -> Option<f64> {
-        let from = self.moments.iter().find(|moment| moment.step == 1 && moment.seconds > seconds)?;
-        let of_render = self.render_seconds() - seconds_at(&self.counts, from.samples);
-        Some((self.preview_seconds() - from.seconds) / of_render)
-    }
-}
-
-/// Samples and seconds on the way of a render that nobody watches.
-fn rendered(subject: &Subject, seed: u64, limits: Limits) -> Result<Vec<(u64, f64)>> {
-    one_thread()?.install(|| {
-        let notes = Notes { clock: CpuClock::of_thread(), counts: Mutex::default() };
-        let settings = subject.loop_settings(limits)?;
-        let rendered = render(&subject.tracer(seed), &settings, &notes)?;
-        let seconds = notes.clock.seconds();
-        let mut counts = notes.counts.into_inner().expect("nobody panics");
-        counts.push((rendered.film.total_samples(), seconds));
-        Ok(counts)
-    })
 }

@@ -56,7 +56,7 @@ fn moments(seconds: f64) -> Vec<f64> {
 
 /// What somebody who watches the preview has before him at each time.
 fn previewed(subject: &Subject, seed: u64, sampling: Sampling, times: &[f64]) -> Result<Vec<Vec<[f32; 3]>>> {
-    let watched = Watched::start(subject, seed, Limits::of_visibility(1.0), sampling, true)?;
+    let watched = Watched::start(one_thread()?, subject.job(seed, Limits::of_visibility(1.0), sampling), true)?;
     let end = *times.last().context("a time")?;
     let mut before: Option<Moment> = None;
     let mut pictures = Vec::new();

@@ -1,17 +1,16 @@
 //! A preview that somebody watches over a socket, and what was shown when.
 
-use super::{Subject, one_thread};
 use crate::support::CpuClock;
 use anyhow::{Context, Result};
 use fechner::adaptive::Rendered;
-use fechner::adaptive::settings::{Limits, LoopSettings, Sampling};
+use fechner::adaptive::settings::LoopSettings;
 use fechner::preview::{Closer, Door, Host, Job, Options, Shown, Spectator, start};
 use fechner::scene::Scene;
 use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tungstenite::client::IntoClientRequest;
 
 /// A scene that never changes, and pictures that nobody keeps.
@@ -35,6 +34,30 @@ impl Host for Nowhere {
     }
 }
 
+/// What a preview's time is measured by.
+enum Clock {
+    /// The processor time of the one thread that renders.
+    OfThread(CpuClock),
+    /// The wall's, where several do.
+    Wall(Instant),
+}
+
+impl Clock {
+    fn start(pool: &rayon::ThreadPool) -> Self {
+        match pool.current_num_threads() {
+            1 => Self::OfThread(pool.install(CpuClock::of_thread)),
+            _ => Self::Wall(Instant::now()),
+        }
+    }
+
+    fn seconds(&self) -> f64 {
+        match self {
+            Self::OfThread(clock) => clock.seconds(),
+            Self::Wall(begun) => begun.elapsed().as_secs_f64(),
+        }
+    }
+}
+
 /// A moment of a picture.
 pub(super) struct Moment {
     pub(super) seconds: f64,
@@ -49,7 +72,7 @@ pub(super) struct Moment {
 
 /// Tells of every frame; its own time does not count.
 struct Watcher {
-    clock: Arc<Mutex<Option<CpuClock>>>,
+    clock: Clock,
     own_seconds: f64,
     keeps_pictures: bool,
     moments: Sender<Moment>,
@@ -57,9 +80,7 @@ struct Watcher {
 
 impl Spectator for Watcher {
     fn shown(&mut self, shown: &Shown<'_>) {
-        let clock = self.clock.lock().expect("nobody panics");
-        let Some(clock) = clock.as_ref() else { return };
-        let begun = clock.seconds();
+        let begun = self.clock.seconds();
         let moment = Moment {
             seconds: begun - self.own_seconds,
             samples: shown.film.total_samples(),
@@ -70,7 +91,7 @@ impl Spectator for Watcher {
         };
         // Nobody listens any more at the end.
         let _ = self.moments.send(moment);
-        self.own_seconds += clock.seconds() - begun;
+        self.own_seconds += self.clock.seconds() - begun;
     }
 }
 
@@ -82,18 +103,10 @@ pub(super) struct Watched {
 }
 
 impl Watched {
-    pub(super) fn start(
-        subject: &Subject,
-        seed: u64,
-        limits: Limits,
-        sampling: Sampling,
-        keeps_pictures: bool,
-    ) -> Result<Self> {
-        let pool = one_thread()?;
+    /// Starts to render a job, and somebody's watching. The clock starts before anything is made of the loaded scene.
+    pub(super) fn start(pool: rayon::ThreadPool, job: Job, keeps_pictures: bool) -> Result<Self> {
         let (sender, moments) = channel();
-        // The clock is of the pool's thread, and starts before anything is made of the loaded scene.
-        let clock = pool.install(|| Arc::new(Mutex::new(Some(CpuClock::of_thread()))));
-        let watcher = Watcher { clock, own_seconds: 0.0, keeps_pictures, moments: sender };
+        let watcher = Watcher { clock: Clock::start(&pool), own_seconds: 0.0, keeps_pictures, moments: sender };
         let options = Options { is_foveated: false, spectators: vec![Box::new(watcher)] };
         let host = Arc::new(Nowhere(PathBuf::from("nowhere.toml")));
         let listener = TcpListener::bind("127.0.0.1:0")?;
@@ -106,7 +119,7 @@ impl Watched {
             anyhow::Ok(())
         };
         let viewer = std::thread::spawn(move || drop(viewer()));
-        let preview = start(subject.job(seed, limits, sampling), host, options, pool)?;
+        let preview = start(job, host, options, pool)?;
         let closer = preview.closer();
         let door = Door { address, token: "bench".to_owned() };
         let server = std::thread::spawn(move || drop(preview.serve(listener, door)));

@@ -96,9 +96,10 @@ impl<'a> Audience<'a> {
     /// Shows the film if a frame is due, and says whether somebody wants the render to stop.
     pub fn between_batches(&self, state: &RenderState) -> Directive {
         let mut moving = self.moving();
-        moving.pace.counted();
+        let between_frames = moving.screen.between_frames(&self.shared);
+        moving.pace.counted(between_frames);
         let mut directive = Directive::GoOn;
-        let mut wants_a_frame = moving.screen.is_due();
+        let mut wants_a_frame = moving.screen.is_due(&self.shared);
         for command in self.shared.take_commands() {
             match command {
                 Command::Stop => directive = Directive::Stop,

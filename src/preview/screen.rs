@@ -149,9 +149,16 @@ impl Screen {
         self.provisional = None;
     }
 
+    /// Time between two frames now; `None` where nobody looks.
+    pub(super) fn between_frames(&self, shared: &Shared) -> Option<Duration> {
+        let is_watched = !self.spectators.is_empty() || shared.has_viewers();
+        is_watched.then(|| interval(self.started.elapsed(), self.cost))
+    }
+
     /// Whether a frame is due.
-    pub(super) fn is_due(&self) -> bool {
-        self.shown.is_none_or(|shown| shown.elapsed() >= interval(self.started.elapsed(), self.cost))
+    pub(super) fn is_due(&self, shared: &Shared) -> bool {
+        let between_frames = self.between_frames(shared);
+        between_frames.is_some_and(|interval| self.shown.is_none_or(|shown| shown.elapsed() >= interval))
     }
 
     /// Shows a film to all viewers, and remembers what that took.

@@ -99,6 +99,10 @@ impl Shared {
         self.viewers[layer.index()].load(Ordering::SeqCst) > 0
     }
 
+    pub(super) fn has_viewers(&self) -> bool {
+        self.viewers.iter().any(|viewers| viewers.load(Ordering::SeqCst) > 0)
+    }
+
     pub(super) fn publish_frame(&self, layer: Layer, frame: Vec<u8>) {
         self.frames[layer.index()].send_replace(Bytes::from(frame));
     }

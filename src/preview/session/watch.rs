@@ -91,8 +91,9 @@ impl Monitor for Watch<'_> {
 
     fn between_batches(&self, state: &RenderState) -> Directive {
         let mut moving = self.moving.lock().unwrap_or_else(PoisonError::into_inner);
-        moving.pace.counted();
-        if moving.shows_more_than_glimpsed(state) && moving.screen.is_due() {
+        let between_frames = moving.screen.between_frames(self.shared);
+        moving.pace.counted(between_frames);
+        if moving.shows_more_than_glimpsed(state) && moving.screen.is_due(self.shared) {
             self.show(&mut moving, state);
         } else if moving.told.elapsed() >= FIGURES_INTERVAL {
             self.tell(&mut moving, state);
