@@ -15,6 +15,7 @@
 mod audience;
 mod coarse;
 mod command;
+mod frame;
 mod glimpse;
 mod layer;
 mod orbit;

@@ -1,6 +1,7 @@
 //! From film to encoded frames of the layers that somebody looks at.
 
 use super::coarse::stand_in;
+use super::frame::{Encoding, Frame};
 use super::layer::{self, Colours, Layer};
 use super::shared::Shared;
 use super::spectator::{Shown, Spectator};
@@ -15,8 +16,6 @@ use fechner_perception::Plane;
 use fechner_perception::photometry::luminance;
 use fechner_perception::tone::{FittedTone, SavedTone, SceneGuide, map_picture};
 use glam::Vec2;
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder};
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -29,9 +28,6 @@ const LIVELY: Duration = Duration::from_secs(2);
 const COSTS_BETWEEN_FRAMES: u32 = 39;
 /// Time between frames at most, where they are large or the machine is busy.
 const LONGEST_INTERVAL: Duration = Duration::from_secs(2);
-
-/// Of frames of a picture that changes, 1 to 100.
-const JPEG_QUALITY: u8 = 92;
 
 /// What the last look at the film saw.
 #[derive(Debug)]
@@ -103,6 +99,7 @@ pub(super) struct Screen {
     pub(super) total_samples: u64,
     /// Until the first look.
     provisional: Option<ProvisionalTone>,
+    encoding: Arc<Encoding>,
     spectators: Vec<Box<dyn Spectator>>,
 }
 
@@ -133,6 +130,7 @@ impl Screen {
             motion,
             total_samples: 0,
             provisional: None,
+            encoding: Arc::default(),
             spectators,
         }
     }
@@ -140,7 +138,7 @@ impl Screen {
     /// A new picture begins: no look was taken and the next frame is due.
     pub(super) fn begin(&mut self) {
         let spectators = std::mem::take(&mut self.spectators);
-        *self = Self { cost: self.cost, ..Self::new(spectators) };
+        *self = Self { cost: self.cost, encoding: Arc::clone(&self.encoding), ..Self::new(spectators) };
     }
 
     /// What was seen holds no more: another place, or other eyes.
@@ -152,17 +150,20 @@ impl Screen {
     /// Time between two frames now; `None` where nobody looks.
     pub(super) fn between_frames(&self, shared: &Shared) -> Option<Duration> {
         let is_watched = !self.spectators.is_empty() || shared.has_viewers();
-        is_watched.then(|| interval(self.started.elapsed(), self.cost))
+        is_watched.then(|| interval(self.started.elapsed(), self.cost + self.encoding.cost()))
     }
 
-    /// Whether a frame is due.
+    /// Whether a frame is due, and the one before is on its way.
     pub(super) fn is_due(&self, shared: &Shared) -> bool {
+        if self.encoding.is_under_way() {
+            return false;
+        }
         let between_frames = self.between_frames(shared);
         between_frames.is_some_and(|interval| self.shown.is_none_or(|shown| shown.elapsed() >= interval))
     }
 
     /// Shows a film to all viewers, and remembers what that took.
-    pub(super) fn show(&mut self, scenery: Scenery<'_>, shared: &Shared) {
+    pub(super) fn show(&mut self, scenery: Scenery<'_>, shared: &Arc<Shared>) {
         let begun = Instant::now();
         self.publish(scenery, shared);
         self.shown = Some(Instant::now());
@@ -170,7 +171,7 @@ impl Screen {
     }
 
     /// Shows a film to all viewers.
-    pub(super) fn publish(&mut self, scenery: Scenery<'_>, shared: &Shared) {
+    pub(super) fn publish(&mut self, scenery: Scenery<'_>, shared: &Arc<Shared>) {
         if pixels(scenery.film) == 0 {
             return;
         }
@@ -182,10 +183,9 @@ impl Screen {
         self.total_samples = samples.iter().map(|&samples| u64::from(samples)).sum();
         for layer in ALL.into_iter().filter(|&layer| shared.is_watched(layer)) {
             let colours = self.colours(layer, scenery, &rgb_cd_m2);
-            // A frame that cannot be encoded is left out; the next may be.
-            if let Some(frame) = encode(layer, &colours, scenery.film, scenery.is_at_rest) {
-                shared.publish_frame(layer, frame);
-            }
+            let (width, height) = (scenery.film.width(), scenery.film.height());
+            let frame = Frame { layer, colours, width, height, is_at_rest: scenery.is_at_rest };
+            self.encoding.publish(frame, shared);
         }
         let shown = Shown {
             film: scenery.film,
@@ -319,26 +319,6 @@ fn fit(settings: &LoopSettings, step: u32, width: usize, rgb_cd_m2: &[[f32; 3]])
     settings.operator.fit(&SceneGuide::of(&guide), &viewing, None)
 }
 
-/// The layer's number, the length of its legend, the legend in UTF-8, the picture. JPEG while it changes, PNG at rest; `None` if it
-/// cannot be encoded.
-fn encode(layer: Layer, colours: &Colours, film: &Film, is_at_rest: bool) -> Option<Vec<u8>> {
-    let legend = &colours.legend.as_bytes()[..colours.legend.floor_char_boundary(255)];
-    let mut frame = vec![layer.index() as u8, legend.len() as u8];
-    frame.extend_from_slice(legend);
-    let (width, height) = (film.width(), film.height());
-    if is_at_rest {
-        let encoder = PngEncoder::new_with_quality(&mut frame, CompressionType::Fast, FilterType::Adaptive);
-        encoder.write_image(&colours.rgb8, width, height, ExtendedColorType::Rgb8).ok()?;
-    } else {
-        let mut encoder = jpeg_encoder::Encoder::new(&mut frame, JPEG_QUALITY);
-        // Noise has colours too, and is to be seen pixel by pixel.
-        encoder.set_sampling_factor(jpeg_encoder::SamplingFactor::R_4_4_4);
-        let [width, height] = [width, height].map(u16::try_from);
-        encoder.encode(&colours.rgb8, width.ok()?, height.ok()?, jpeg_encoder::ColorType::Rgb).ok()?;
-    }
-    Some(frame)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -419,33 +399,5 @@ mod tests {
         let greys = |is_at_rest| composed(&film, 1.0, is_at_rest).0.iter().map(|rgb| rgb[0]).collect::<Vec<f32>>();
         assert_eq!(greys(false), [1.2, 1.5]);
         assert_eq!(greys(true), [1.5, 1.5]);
-    }
-
-    /// What changes is sent as JPEG of every pixel's own colour, what rests as the picture itself.
-    #[test]
-    fn frames_show_the_picture() {
-        let film = Film::new(40, 24);
-        let pixel = |i: u32| if (i % 40 + i / 40).is_multiple_of(2) { [200, 40, 40] } else { [40, 40, 200] };
-        let rgb8: Vec<u8> = (0..40 * 24).flat_map(pixel).collect();
-        let colours = Colours { rgb8, legend: "legend".to_owned() };
-        for (is_at_rest, tolerance) in [(true, 0.0), (false, 8.0)] {
-            let frame = encode(Layer::Albedo, &colours, &film, is_at_rest).expect("a frame");
-            assert_eq!((frame[0], &frame[1..8]), (Layer::Albedo.index() as u8, &b"\x06legend"[..]));
-            let shown = image::load_from_memory(&frame[8..]).expect("a picture").to_rgb8();
-            assert_eq!(shown.dimensions(), (40, 24));
-            let square = |(a, b): (&u8, &u8)| (f64::from(*a) - f64::from(*b)).powi(2);
-            let sum: f64 = shown.as_raw().iter().zip(&colours.rgb8).map(square).sum();
-            let rms = (sum / colours.rgb8.len() as f64).sqrt();
-            assert!(rms <= tolerance, "{rms} of 255 off, at rest: {is_at_rest}");
-        }
-    }
-
-    /// JPEG has 16 bits for a side.
-    #[test]
-    fn a_picture_too_wide_for_a_frame_has_none() {
-        let film = Film::new(65_536, 1);
-        let colours = Colours { rgb8: vec![0; 3 * 65_536], legend: String::new() };
-        assert!(encode(Layer::Picture, &colours, &film, false).is_none());
-        assert!(encode(Layer::Picture, &colours, &film, true).is_some());
     }
 }

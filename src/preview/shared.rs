@@ -6,7 +6,7 @@ use super::screen::Snapshot;
 use axum::body::Bytes;
 use fechner_perception::eccentricity::Gaze;
 use std::collections::VecDeque;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;
 use tokio::sync::watch;
@@ -22,6 +22,9 @@ pub(super) struct Shared {
     /// Viewers of each layer.
     viewers: [AtomicUsize; LAYERS],
     frames: [watch::Sender<Bytes>; LAYERS],
+    /// Numbers of the latest frames, which may be encoded by several threads.
+    published: [Mutex<u64>; LAYERS],
+    numbered: AtomicU64,
     status: watch::Sender<Arc<str>>,
     snapshot: Mutex<Option<Arc<Snapshot>>>,
     gaze: Mutex<Option<Gaze>>,
@@ -37,6 +40,8 @@ impl Shared {
             is_outdated: AtomicBool::new(false),
             viewers: std::array::from_fn(|_| AtomicUsize::new(0)),
             frames: std::array::from_fn(|_| watch::Sender::new(Bytes::new())),
+            published: std::array::from_fn(|_| Mutex::new(0)),
+            numbered: AtomicU64::new(0),
             status: watch::Sender::new(Arc::from("")),
             snapshot: Mutex::default(),
             gaze: Mutex::default(),
@@ -103,8 +108,18 @@ impl Shared {
         self.viewers.iter().any(|viewers| viewers.load(Ordering::SeqCst) > 0)
     }
 
-    pub(super) fn publish_frame(&self, layer: Layer, frame: Vec<u8>) {
-        self.frames[layer.index()].send_replace(Bytes::from(frame));
+    /// A frame's place in the order in which frames are made.
+    pub(super) fn number_a_frame(&self) -> u64 {
+        self.numbered.fetch_add(1, Ordering::SeqCst) + 1
+    }
+
+    /// Leaves out a frame that comes after one of a higher number.
+    pub(super) fn publish_frame(&self, layer: Layer, number: u64, frame: Vec<u8>) {
+        let mut published = self.published[layer.index()].lock().unwrap_or_else(PoisonError::into_inner);
+        if number > *published {
+            *published = number;
+            self.frames[layer.index()].send_replace(Bytes::from(frame));
+        }
     }
 
     pub(super) fn publish_status(&self, status: String) {

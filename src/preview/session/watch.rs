@@ -19,7 +19,7 @@ const FIGURES_INTERVAL: Duration = Duration::from_millis(250);
 
 /// Shows the loop's film between batches, and leaves the loop when somebody asks for something.
 pub(super) struct Watch<'a> {
-    pub(super) shared: &'a Shared,
+    pub(super) shared: &'a Arc<Shared>,
     pub(super) settings: &'a LoopSettings,
     /// Where the gaze counts.
     pub(super) follower: Option<&'a Follower>,
