@@ -23,7 +23,7 @@ use fechner::scene::Scene;
 use fechner::scene::load::{LoadOptions, load};
 use fechner_perception::tone::operator;
 use fechner_perception::{Display, Viewing};
-use overhead::{overheads, overheads_on_two_threads};
+use overhead::{Threads, overheads};
 use race::races;
 use std::path::Path;
 use std::sync::Arc;
@@ -73,10 +73,10 @@ fn main() -> Result<()> {
         first_pictures(&subjects)?;
     }
     if arguments.wants("overhead") {
-        overheads(&subjects, &arguments)?;
+        overheads(&subjects, &arguments, Threads::One)?;
     }
     if arguments.wants("two-threads") {
-        overheads_on_two_threads(&subjects, &arguments)?;
+        overheads(&subjects, &arguments, Threads::Two)?;
     }
     if arguments.wants("race") {
         races(&subjects, &arguments)?;

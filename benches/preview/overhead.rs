@@ -1,40 +1,100 @@
 //! What watching costs: the same samples with and without viewers, by the clock.
 
 use super::race::mean_and_error;
-use super::watched::{Moment, Watched};
-use super::{Arguments, Subject, least, one_thread};
-use crate::support::CpuClock;
+use super::watched::{Clock, Moment, Watched};
+use super::{Arguments, Subject, least};
 use anyhow::Result;
 use fechner::adaptive::settings::{Limits, LoopSettings, Sampling};
-use fechner::adaptive::state::RenderState;
-use fechner::adaptive::{Directive, Monitor, Progress, Quiet, render};
+use fechner::adaptive::{Monitor, Progress, render};
 use std::sync::Mutex;
-use std::time::Instant;
 
 /// Samples a pixel at which renders end that are compared.
 const SPP: u32 = 96;
-/// The same on two threads: short, as the machine's pace changes between the two of a pair.
-const SPP_ON_TWO_THREADS: u32 = 48;
 
-/// Notes when the film had how many samples.
+/// Who renders, and how the two of a pair are timed.
+#[derive(Clone, Copy)]
+pub(super) enum Threads {
+    /// By their own processor time, each on a core of its own at once: the machine's pace changes within seconds, by more than
+    /// watching costs.
+    One,
+    /// By the wall's clock, one after the other in alternating order.
+    Two,
+}
+
+impl Threads {
+    fn pool(self) -> Result<rayon::ThreadPool> {
+        let threads = match self {
+            Self::One => 1,
+            Self::Two => 2,
+        };
+        Ok(rayon::ThreadPoolBuilder::new().num_threads(threads).build()?)
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::One => "On one thread",
+            Self::Two => "On two threads, even samples",
+        }
+    }
+
+    /// Adaptive ones end in looks, during which the machine's pace counts too.
+    fn sampling(self) -> Sampling {
+        match self {
+            Self::One => Sampling::Adaptive,
+            Self::Two => Sampling::Uniform,
+        }
+    }
+
+    /// Where the steady part begins: two threads take twice the samples in a second.
+    fn steady_from_seconds(self) -> f64 {
+        match self {
+            Self::One => 5.0,
+            Self::Two => 2.0,
+        }
+    }
+}
+
+/// Prints what watching costs.
+pub(super) fn overheads(subjects: &[Subject], arguments: &Arguments, threads: Threads) -> Result<()> {
+    let (who, pairs, steady_from) = (threads.name(), arguments.seeds, threads.steady_from_seconds());
+    println!("\n{who}, what watching costs, mean ± standard error over {pairs} pairs:\n");
+    println!("| scene | render, s | watched preview, s | whole overhead | after the first {steady_from} s |");
+    println!("| --- |{}", " --- |".repeat(4));
+    for subject in subjects {
+        let pairs = (0..pairs).map(|seed| Pair::measured(subject, seed, threads)).collect::<Result<Vec<_>>>()?;
+        let whole: Vec<f64> = pairs.iter().map(|pair| (pair.preview_seconds() / pair.render_seconds()).ln()).collect();
+        let steady: Vec<f64> = pairs.iter().filter_map(|pair| pair.ratio_after(steady_from)).map(f64::ln).collect();
+        let name = subject.name;
+        let (alone, watched) =
+            (least(pairs.iter().map(Pair::render_seconds)), least(pairs.iter().map(Pair::preview_seconds)));
+        println!("| {name} | {alone:.2} | {watched:.2} | {} | {} |", percent(&whole), percent(&steady));
+    }
+    Ok(())
+}
+
+fn percent(logarithms: &[f64]) -> String {
+    let (mean, error) = mean_and_error(logarithms);
+    if logarithms.is_empty() {
+        "ended before".to_owned()
+    } else {
+        format!("{:+.1} ± {:.1} %", 100.0 * mean.exp_m1(), 100.0 * error)
+    }
+}
+
+/// Notes how many samples were taken when.
 struct Notes {
-    clock: CpuClock,
+    clock: Clock,
     counts: Mutex<Vec<(u64, f64)>>,
 }
 
 impl Monitor for Notes {
     fn looked(&self, _: &Progress) {}
 
-    fn samples_done(&self, _: u64) {}
-
-    fn most_samples_a_batch(&self) -> u64 {
-        1 << 15
-    }
-
-    fn between_batches(&self, state: &RenderState) -> Directive {
+    fn samples_done(&self, samples: u64) {
         let now = self.clock.seconds();
-        self.counts.lock().expect("nobody panics").push((state.film.total_samples(), now));
-        Directive::GoOn
+        let mut counts = self.counts.lock().expect("nobody panics");
+        let before = counts.last().map_or(0, |last| last.0);
+        counts.push((before + samples, now));
     }
 }
 
@@ -45,26 +105,6 @@ fn seconds_at(counts: &[(u64, f64)], samples: u64) -> f64 {
     from + (to - from) * (samples as f64 - low as f64) / ((high - low) as f64).max(1.0)
 }
 
-pub(super) fn overheads(subjects: &[Subject], arguments: &Arguments) -> Result<()> {
-    println!("\nWhat watching costs, mean ± standard error over {} pairs:\n", arguments.seeds);
-    println!("| scene | render, s | watched preview, s | whole overhead | after the first 5 s |");
-    println!("| --- |{}", " --- |".repeat(4));
-    for subject in subjects {
-        let (mut alone, mut watched, mut whole, mut steady) = (vec![], vec![], vec![], vec![]);
-        for seed in 0..arguments.seeds {
-            let pair = Pair::measured(subject, seed)?;
-            let (render_seconds, preview_seconds) = (pair.render_seconds(), pair.preview_seconds());
-            alone.push(render_seconds);
-            watched.push(preview_seconds);
-            whole.push((preview_seconds / render_seconds).ln());
-            steady.extend(pair.ratio_after(5.0).map(f64::ln));
-        }
-        let (name, alone, watched) = (subject.name, least(alone), least(watched));
-        println!("| {name} | {alone:.2} | {watched:.2} | {} | {} |", percent(&whole), percent(&steady));
-    }
-    Ok(())
-}
-
 /// A render and a watched preview that take the same samples.
 struct Pair {
     /// Samples and seconds of the render.
@@ -73,19 +113,28 @@ struct Pair {
 }
 
 impl Pair {
-    /// Both at once, each on a core of its own: the machine's pace changes within seconds, by more than watching costs.
-    fn measured(subject: &Subject, seed: u64) -> Result<Self> {
-        let limits = Limits { mean_samples: Some(SPP), ..Limits::of_visibility(1.0) };
-        let pair = std::thread::scope(|scope| {
-            let render = scope.spawn(|| rendered(subject, seed, limits));
-            let preview = Watched::start(one_thread()?, subject.job(seed, limits, Sampling::Adaptive), false)?;
-            let moments = preview.until(|moment| moment.is_at_rest)?;
-            let counts = render.join().map_err(|_| anyhow::anyhow!("the render panicked"))??;
-            anyhow::Ok(Self { counts, moments })
-        })?;
-        let [rendered, shown] = [pair.counts.last().map(|end| end.0), pair.moments.last().map(|end| end.samples)];
+    fn measured(subject: &Subject, seed: u64, threads: Threads) -> Result<Self> {
+        let alone = || rendered(subject, seed, threads);
+        let watched = || watched(subject, seed, threads);
+        let (counts, moments) = match threads {
+            Threads::One => std::thread::scope(|scope| {
+                let render = scope.spawn(alone);
+                let moments = watched()?;
+                let counts = render.join().map_err(|_| anyhow::anyhow!("the render panicked"))??;
+                anyhow::Ok((counts, moments))
+            })?,
+            Threads::Two if seed % 2 == 0 => {
+                let counts = alone()?;
+                (counts, watched()?)
+            }
+            Threads::Two => {
+                let moments = watched()?;
+                (alone()?, moments)
+            }
+        };
+        let [rendered, shown] = [counts.last().map(|end| end.0), moments.last().map(|end| end.samples)];
         anyhow::ensure!(rendered == shown, "the preview took another way");
-        Ok(pair)
+        Ok(Self { counts, moments })
     }
 
     fn render_seconds(&self) -> f64 {
@@ -104,11 +153,16 @@ impl Pair {
     }
 }
 
-/// Samples and seconds on the way of a render that nobody watches.
-fn rendered(subject: &Subject, seed: u64, limits: Limits) -> Result<Vec<(u64, f64)>> {
-    one_thread()?.install(|| {
-        let notes = Notes { clock: CpuClock::of_thread(), counts: Mutex::default() };
-        let settings = subject.loop_settings(limits)?;
+fn limits() -> Limits {
+    Limits { mean_samples: Some(SPP), ..Limits::of_visibility(1.0) }
+}
+
+/// Samples and seconds on the way of a render that nobody watches, from the loaded scene on.
+fn rendered(subject: &Subject, seed: u64, threads: Threads) -> Result<Vec<(u64, f64)>> {
+    let pool = threads.pool()?;
+    let notes = Notes { clock: Clock::start(&pool), counts: Mutex::default() };
+    pool.install(|| {
+        let settings = LoopSettings { sampling: threads.sampling(), ..subject.loop_settings(limits())? };
         let rendered = render(&subject.tracer(seed), &settings, &notes)?;
         let seconds = notes.clock.seconds();
         let mut counts = notes.counts.into_inner().expect("nobody panics");
@@ -117,56 +171,8 @@ fn rendered(subject: &Subject, seed: u64, limits: Limits) -> Result<Vec<(u64, f6
     })
 }
 
-fn percent(logarithms: &[f64]) -> String {
-    let (mean, error) = mean_and_error(logarithms);
-    if logarithms.is_empty() {
-        "ended before".to_owned()
-    } else {
-        format!("{:+.1} ± {:.1} %", 100.0 * mean.exp_m1(), 100.0 * error)
-    }
-}
-
-/// Even samples on all of two threads, by the wall's clock: nobody watching, and somebody who takes every frame.
-pub(super) fn overheads_on_two_threads(subjects: &[Subject], arguments: &Arguments) -> Result<()> {
-    println!("\nOn two threads, mean ± standard error over {} pairs in alternating order:\n", arguments.seeds);
-    println!("| scene | render, s | watched preview, s | overhead |");
-    println!("| --- |{}", " --- |".repeat(3));
-    let limits = Limits { mean_samples: Some(SPP_ON_TWO_THREADS), ..Limits::of_visibility(1.0) };
-    for subject in subjects {
-        let (mut alone, mut watched) = (vec![], vec![]);
-        for seed in 0..arguments.seeds {
-            if seed % 2 == 0 {
-                alone.push(alone_on_two_threads(subject, seed, limits)?);
-            }
-            watched.push(watched_on_two_threads(subject, seed, limits)?);
-            if seed % 2 == 1 {
-                alone.push(alone_on_two_threads(subject, seed, limits)?);
-            }
-        }
-        let ratios: Vec<f64> = watched.iter().zip(&alone).map(|(watched, alone)| (watched / alone).ln()).collect();
-        let (name, alone, watched) = (subject.name, least(alone), least(watched));
-        println!("| {name} | {alone:.2} | {watched:.2} | {} |", percent(&ratios));
-    }
-    Ok(())
-}
-
-fn two_threads() -> Result<rayon::ThreadPool> {
-    Ok(rayon::ThreadPoolBuilder::new().num_threads(2).build()?)
-}
-
-/// Seconds from the loaded scene to the last sample.
-fn alone_on_two_threads(subject: &Subject, seed: u64, limits: Limits) -> Result<f64> {
-    two_threads()?.install(|| {
-        let begun = Instant::now();
-        let settings = LoopSettings { sampling: Sampling::Uniform, ..subject.loop_settings(limits)? };
-        render(&subject.tracer(seed), &settings, &Quiet)?;
-        Ok(begun.elapsed().as_secs_f64())
-    })
-}
-
-/// Seconds from the loaded scene to the last frame.
-fn watched_on_two_threads(subject: &Subject, seed: u64, limits: Limits) -> Result<f64> {
-    let watched = Watched::start(two_threads()?, subject.job(seed, limits, Sampling::Uniform), false)?;
-    let moments = watched.until(|moment| moment.is_at_rest)?;
-    Ok(moments.last().map_or(f64::NAN, |end| end.seconds))
+/// Every frame of a watched preview, up to the last.
+fn watched(subject: &Subject, seed: u64, threads: Threads) -> Result<Vec<Moment>> {
+    let watched = Watched::start(threads.pool()?, subject.job(seed, limits(), threads.sampling()), false)?;
+    watched.until(|moment| moment.is_at_rest)
 }

@@ -35,7 +35,7 @@ impl Host for Nowhere {
 }
 
 /// What a preview's time is measured by.
-enum Clock {
+pub(super) enum Clock {
     /// The processor time of the one thread that renders.
     OfThread(CpuClock),
     /// The wall's, where several do.
@@ -43,14 +43,14 @@ enum Clock {
 }
 
 impl Clock {
-    fn start(pool: &rayon::ThreadPool) -> Self {
+    pub(super) fn start(pool: &rayon::ThreadPool) -> Self {
         match pool.current_num_threads() {
             1 => Self::OfThread(pool.install(CpuClock::of_thread)),
             _ => Self::Wall(Instant::now()),
         }
     }
 
-    fn seconds(&self) -> f64 {
+    pub(super) fn seconds(&self) -> f64 {
         match self {
             Self::OfThread(clock) => clock.seconds(),
             Self::Wall(begun) => begun.elapsed().as_secs_f64(),
