@@ -32,6 +32,8 @@ use watched::Watched;
 
 const SCENES: [&str; 3] = ["cornell-box", "many-lights", "textured-room"];
 
+const TABLES: [&str; 4] = ["first", "overhead", "two-threads", "race"];
+
 struct Arguments {
     size: u32,
     seconds: f64,
@@ -48,16 +50,21 @@ impl Arguments {
             None => Ok(otherwise),
             Some(place) => words.get(place + 1).and_then(|word| word.parse().ok()).with_context(|| format!("{name} N")),
         };
+        // Cargo adds words of its own, which begin with dashes.
+        let is_name = |place: &usize| {
+            !words[*place].starts_with('-')
+                && !["--size", "--seconds", "--seeds", "--reference"].contains(&words[place - 1].as_str())
+        };
+        let tables: Vec<String> = (1..words.len()).filter(is_name).map(|place| words[place].clone()).collect();
+        if let Some(unknown) = tables.iter().find(|table| !TABLES.contains(&table.as_str())) {
+            anyhow::bail!("there is no table \"{unknown}\"; there are {}", TABLES.join(", "));
+        }
         Ok(Self {
             size: number("--size", 192.0)? as u32,
             seconds: number("--seconds", 10.0)?,
             seeds: number("--seeds", 3.0)? as u64,
             reference_spp: number("--reference", 1024.0)? as u32,
-            tables: words
-                .iter()
-                .filter(|word| ["first", "overhead", "two-threads", "race"].contains(&word.as_str()))
-                .cloned()
-                .collect(),
+            tables,
         })
     }
 

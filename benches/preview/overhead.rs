@@ -123,7 +123,7 @@ impl Pair {
                 let counts = render.join().map_err(|_| anyhow::anyhow!("the render panicked"))??;
                 anyhow::Ok((counts, moments))
             })?,
-            Threads::Two if seed % 2 == 0 => {
+            Threads::Two if seed.is_multiple_of(2) => {
                 let counts = alone()?;
                 (counts, watched()?)
             }
