@@ -1,7 +1,7 @@
 //! What a live preview costs and what it is worth: time to the first picture, samples a second beside a render that nobody
 //! watches, and quality over the first seconds against uniform progressive rendering by the same tracer.
 //!
-//! `cargo bench --bench preview [-- first|overhead|two-threads|race --size N --seconds S --seeds N --reference N]` prints the tables of
+//! `cargo bench --bench preview [-- first|overhead|two-threads|race SCENE --size N --seconds S --seeds N --reference N]` prints the tables of
 //! `benches/README.md`, or those that are named. Every arm but those of two threads renders on one, whose own processor time is
 //! the clock, so that others' work on the machine counts only through caches; a browser's part is played by a WebSocket that takes
 //! every frame, on another thread.
@@ -41,6 +41,8 @@ struct Arguments {
     reference_spp: u32,
     /// Tables to print; all where none is named.
     tables: Vec<String>,
+    /// Of these scenes; all where none is named.
+    scenes: Vec<String>,
 }
 
 impl Arguments {
@@ -55,9 +57,14 @@ impl Arguments {
             !words[*place].starts_with('-')
                 && !["--size", "--seconds", "--seeds", "--reference"].contains(&words[place - 1].as_str())
         };
-        let tables: Vec<String> = (1..words.len()).filter(is_name).map(|place| words[place].clone()).collect();
+        let names = (1..words.len()).filter(is_name).map(|place| words[place].clone());
+        let (scenes, tables): (Vec<String>, Vec<String>) = names.partition(|name| SCENES.contains(&name.as_str()));
         if let Some(unknown) = tables.iter().find(|table| !TABLES.contains(&table.as_str())) {
-            anyhow::bail!("there is no table \"{unknown}\"; there are {}", TABLES.join(", "));
+            anyhow::bail!(
+                "\"{unknown}\" is neither a table ({}) nor a scene ({})",
+                TABLES.join(", "),
+                SCENES.join(", ")
+            );
         }
         Ok(Self {
             size: number("--size", 192.0)? as u32,
@@ -65,6 +72,7 @@ impl Arguments {
             seeds: number("--seeds", 3.0)? as u64,
             reference_spp: number("--reference", 1024.0)? as u32,
             tables,
+            scenes,
         })
     }
 
@@ -75,7 +83,9 @@ impl Arguments {
 
 fn main() -> Result<()> {
     let arguments = Arguments::read()?;
-    let subjects = SCENES.map(|name| Subject::load(name, arguments.size)).into_iter().collect::<Result<Vec<_>>>()?;
+    let wanted =
+        SCENES.into_iter().filter(|scene| arguments.scenes.is_empty() || arguments.scenes.iter().any(|s| s == scene));
+    let subjects = wanted.map(|name| Subject::load(name, arguments.size)).collect::<Result<Vec<_>>>()?;
     if arguments.wants("first") {
         first_pictures(&subjects)?;
     }

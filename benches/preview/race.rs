@@ -127,12 +127,14 @@ fn race(subject: &Subject, arguments: &Arguments, times: &[f64]) -> Result<[Race
     let mut raced =
         MEASURES.map(|_| Raced { averages: Default::default(), track: vec![[0.0; ARMS.len()]; times.len()] });
     for seed in 1..=arguments.seeds {
-        let arms = [
-            progressive(subject, seed, times)?,
-            previewed(subject, seed, Sampling::Uniform, times)?,
-            previewed(subject, seed, Sampling::Adaptive, times)?,
-        ];
-        for (arm, pictures) in arms.iter().enumerate() {
+        // The machine's pace changes while they run: each is first, second and last in turn.
+        for place in 0..ARMS.len() {
+            let arm = (place + seed as usize) % ARMS.len();
+            let pictures = match arm {
+                0 => progressive(subject, seed, times)?,
+                1 => previewed(subject, seed, Sampling::Uniform, times)?,
+                _ => previewed(subject, seed, Sampling::Adaptive, times)?,
+            };
             let measured = pictures.iter().map(|picture| judge.measure(picture)).collect::<Result<Vec<_>>>()?;
             for (measure, raced) in raced.iter_mut().enumerate() {
                 let values: Vec<f64> = measured.iter().map(|both| both[measure]).collect();
