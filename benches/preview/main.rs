@@ -1,8 +1,8 @@
 //! What a live preview costs and what it is worth: time to the first picture, samples a second beside a render that nobody
 //! watches, and quality over the first seconds against uniform progressive rendering by the same tracer.
 //!
-//! `cargo bench --bench preview [-- first|overhead|two-threads|race SCENE --size N --seconds S --seeds N --reference N]` prints tables of
-//! `benches/README.md`, or those that are named. Every arm but those of two threads renders on one, whose own processor time is
+//! `cargo bench --bench preview [-- first|overhead|two-threads|race SCENE --size N --seconds S --seeds N --reference N]` prints the
+//! tables of `benches/README.md`, or those that are named, of all scenes or those that are named. Every arm but those of two threads renders on one, whose own processor time is
 //! the clock, so that others' work on the machine counts only through caches; a browser's part is played by a WebSocket that takes
 //! every frame, on another thread.
 
@@ -149,9 +149,13 @@ impl Subject {
     }
 }
 
+fn pool_of(threads: usize) -> Result<rayon::ThreadPool> {
+    Ok(rayon::ThreadPoolBuilder::new().num_threads(threads).build()?)
+}
+
 /// One thread, so that its processor time is what a quiet core would take.
 fn one_thread() -> Result<rayon::ThreadPool> {
-    Ok(rayon::ThreadPoolBuilder::new().num_threads(1).build()?)
+    pool_of(1)
 }
 
 /// Every pixel once.

@@ -2,7 +2,7 @@
 
 use super::race::mean_and_error;
 use super::watched::{Clock, Moment, Watched};
-use super::{Arguments, Subject, least};
+use super::{Arguments, Subject, least, one_thread, pool_of};
 use anyhow::Result;
 use fechner::adaptive::settings::{Limits, LoopSettings, Sampling};
 use fechner::adaptive::{Monitor, Progress, render};
@@ -23,11 +23,10 @@ pub(super) enum Threads {
 
 impl Threads {
     fn pool(self) -> Result<rayon::ThreadPool> {
-        let threads = match self {
-            Self::One => 1,
-            Self::Two => 2,
-        };
-        Ok(rayon::ThreadPoolBuilder::new().num_threads(threads).build()?)
+        match self {
+            Self::One => one_thread(),
+            Self::Two => pool_of(2),
+        }
     }
 
     fn name(self) -> &'static str {
@@ -37,7 +36,7 @@ impl Threads {
         }
     }
 
-    /// Adaptive ones end in looks, during which the machine's pace counts too.
+    /// On two threads even, as looks take the same with viewers as without, and add the machine's pace.
     fn sampling(self) -> Sampling {
         match self {
             Self::One => Sampling::Adaptive,

@@ -99,7 +99,7 @@ impl<'a> Audience<'a> {
         let between_frames = moving.screen.between_frames(&self.shared);
         moving.pace.counted(between_frames);
         let mut directive = Directive::GoOn;
-        let mut wants_a_frame = moving.screen.is_due(&self.shared);
+        let mut wants_a_frame = moving.screen.is_due(between_frames);
         for command in self.shared.take_commands() {
             match command {
                 Command::Stop => directive = Directive::Stop,

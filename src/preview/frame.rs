@@ -1,10 +1,10 @@
 //! From colours to the bytes that viewers are sent, beside the render where it has threads for that.
 
 use super::layer::{Colours, Layer};
-use super::shared::Shared;
+use super::shared::{Encoded, Shared};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
-use std::panic::catch_unwind;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -26,7 +26,7 @@ pub(super) struct Frame {
 #[derive(Default)]
 pub(super) struct Encoding {
     under_way: AtomicUsize,
-    /// Of all threads, for the last frame that was encoded beside the render.
+    /// Of all threads, for the last frames that were encoded beside the render.
     cost_ns: AtomicU64,
 }
 
@@ -35,32 +35,28 @@ impl Encoding {
         self.under_way.load(Ordering::SeqCst) > 0
     }
 
-    /// How much later samples are for the last frame that was encoded beside them.
+    /// How much later samples are for the last frames that were encoded beside them.
     pub(super) fn cost(&self) -> Duration {
         Duration::from_nanos(self.cost_ns.load(Ordering::SeqCst))
     }
 
-    /// Encodes a frame and publishes it: at once at rest, as the last one must not be late, and on a single thread; else on the first
-    /// of the pool's threads that is free, while the others go on.
-    pub(super) fn publish(self: &Arc<Self>, frame: Frame, shared: &Arc<Shared>) {
+    /// Encodes the frames of one moment and publishes them: at once on a single thread, and at rest, as the last ones must not be
+    /// late; else on the first of the pool's threads that is free, while the others go on.
+    pub(super) fn publish(self: &Arc<Self>, frames: Vec<Frame>, shared: &Arc<Shared>) {
         let number = shared.number_a_frame();
         let threads = rayon::current_num_threads() as u64;
-        if frame.is_at_rest || threads == 1 {
+        if threads == 1 || frames.iter().all(|frame| frame.is_at_rest) {
             self.cost_ns.store(0, Ordering::SeqCst);
-            // A frame that cannot be encoded is left out; the next may be.
-            if let Some(bytes) = frame.encode() {
-                shared.publish_frame(frame.layer, number, bytes);
-            }
+            frames.iter().for_each(|frame| frame.publish(number, shared));
             return;
         }
         self.under_way.fetch_add(1, Ordering::SeqCst);
         let (encoding, shared) = (Arc::clone(self), Arc::clone(shared));
         rayon::spawn(move || {
             let begun = Instant::now();
-            // A panic here would end the program.
-            if let Ok(Some(bytes)) = catch_unwind(|| frame.encode()) {
-                shared.publish_frame(frame.layer, number, bytes);
-            }
+            // Here a panic would end the program.
+            let publish_all = AssertUnwindSafe(|| frames.iter().for_each(|frame| frame.publish(number, &shared)));
+            let _ = catch_unwind(publish_all);
             encoding.cost_ns.store(begun.elapsed().as_nanos() as u64 / threads, Ordering::SeqCst);
             encoding.under_way.fetch_sub(1, Ordering::SeqCst);
         });
@@ -68,6 +64,13 @@ impl Encoding {
 }
 
 impl Frame {
+    /// A frame that cannot be encoded is left out; the next may be.
+    fn publish(&self, number: u64, shared: &Shared) {
+        if let Some(bytes) = self.encode() {
+            shared.publish_frame(self.layer, Encoded { number, bytes: bytes.into() });
+        }
+    }
+
     /// The layer's number, the length of its legend, the legend in UTF-8, the picture. JPEG while it changes, PNG at rest; `None` if it
     /// cannot be encoded.
     fn encode(&self) -> Option<Vec<u8>> {
@@ -139,13 +142,13 @@ mod tests {
         };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool");
         pool.install(|| {
-            (0..50).for_each(|grey| encoding.publish(frame(grey, false), &shared));
-            encoding.publish(frame(200, true), &shared);
+            (0..50).for_each(|grey| encoding.publish(vec![frame(grey, false)], &shared));
+            encoding.publish(vec![frame(200, true)], &shared);
         });
         while encoding.is_under_way() {
             std::thread::yield_now();
         }
-        let shown = image::load_from_memory(&frames.borrow()[2..]).expect("a picture").to_rgb8();
+        let shown = image::load_from_memory(&frames.borrow().bytes[2..]).expect("a picture").to_rgb8();
         assert_eq!(shown.get_pixel(0, 0).0, [200; 3]);
     }
 }

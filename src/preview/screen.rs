@@ -153,13 +153,10 @@ impl Screen {
         is_watched.then(|| interval(self.started.elapsed(), self.cost + self.encoding.cost()))
     }
 
-    /// Whether a frame is due, and the one before is on its way.
-    pub(super) fn is_due(&self, shared: &Shared) -> bool {
-        if self.encoding.is_under_way() {
-            return false;
-        }
-        let between_frames = self.between_frames(shared);
-        between_frames.is_some_and(|interval| self.shown.is_none_or(|shown| shown.elapsed() >= interval))
+    /// Whether a frame is due, so long after the one before, which must be encoded.
+    pub(super) fn is_due(&self, between_frames: Option<Duration>) -> bool {
+        let is_time = |interval| self.shown.is_none_or(|shown| shown.elapsed() >= interval);
+        between_frames.is_some_and(is_time) && !self.encoding.is_under_way()
     }
 
     /// Shows a film to all viewers, and remembers what that took.
@@ -181,12 +178,12 @@ impl Screen {
         let (raw, samples) = composed(scenery.film, nits_per_unit, scenery.is_at_rest);
         let rgb_cd_m2 = denoised.unwrap_or(raw);
         self.total_samples = samples.iter().map(|&samples| u64::from(samples)).sum();
-        for layer in ALL.into_iter().filter(|&layer| shared.is_watched(layer)) {
-            let colours = self.colours(layer, scenery, &rgb_cd_m2);
-            let (width, height) = (scenery.film.width(), scenery.film.height());
-            let frame = Frame { layer, colours, width, height, is_at_rest: scenery.is_at_rest };
-            self.encoding.publish(frame, shared);
-        }
+        let (width, height, is_at_rest) = (scenery.film.width(), scenery.film.height(), scenery.is_at_rest);
+        let watched = ALL.into_iter().filter(|&layer| shared.is_watched(layer));
+        let frames = watched
+            .map(|layer| Frame { layer, colours: self.colours(layer, scenery, &rgb_cd_m2), width, height, is_at_rest })
+            .collect();
+        self.encoding.publish(frames, shared);
         let shown = Shown {
             film: scenery.film,
             rgb_cd_m2: &rgb_cd_m2,
@@ -321,6 +318,7 @@ fn fit(settings: &LoopSettings, step: u32, width: usize, rgb_cd_m2: &[[f32; 3]])
 
 #[cfg(test)]
 mod tests {
+    use super::super::shared::Seat;
     use super::*;
     use crate::film::BlockSum;
     use crate::integrator::{BlockWork, FirstHit, PathSample};
@@ -353,6 +351,18 @@ mod tests {
         assert_eq!([200, 1800, 9000, 20_000].map(|since_start| between(since_start, 10)), [63, 189, 424, 500]);
         assert_eq!([100, 1900, 9000].map(|since_start| between(since_start, 40)), [89, 389, 1560]);
         assert_eq!([100, 1900, 9000].map(|since_start| between(since_start, 1000)), [447, 500, 2000]);
+    }
+
+    /// Until somebody takes a seat.
+    #[test]
+    fn nobody_is_shown_no_frame() {
+        let (screen, shared) = (Screen::new(Vec::new()), Arc::new(Shared::new()));
+        let is_due = || screen.is_due(screen.between_frames(&shared));
+        assert!(!is_due());
+        let seat = Seat::take(&shared, Layer::Depth);
+        assert!(is_due());
+        drop(seat);
+        assert!(!is_due());
     }
 
     /// Fitted anew where samples have doubled, or the picture is another.

@@ -14,6 +14,14 @@ use tokio::sync::watch;
 /// Commands that may wait; more are dropped, as only a broken page sends them.
 const MOST_COMMANDS: usize = 1024;
 
+/// A frame as viewers are sent it; without bytes before the first.
+#[derive(Default)]
+pub(super) struct Encoded {
+    /// Its place in the order in which frames are made; they may be encoded by several threads.
+    pub(super) number: u64,
+    pub(super) bytes: Bytes,
+}
+
 pub(super) struct Shared {
     commands: Mutex<VecDeque<Command>>,
     arrived: Condvar,
@@ -21,9 +29,8 @@ pub(super) struct Shared {
     is_outdated: AtomicBool,
     /// Viewers of each layer.
     viewers: [AtomicUsize; LAYERS],
-    frames: [watch::Sender<Bytes>; LAYERS],
-    /// Numbers of the latest frames, which may be encoded by several threads.
-    published: [Mutex<u64>; LAYERS],
+    frames: [watch::Sender<Encoded>; LAYERS],
+    /// Frames that were given a number.
     numbered: AtomicU64,
     status: watch::Sender<Arc<str>>,
     snapshot: Mutex<Option<Arc<Snapshot>>>,
@@ -39,8 +46,7 @@ impl Shared {
             arrived: Condvar::new(),
             is_outdated: AtomicBool::new(false),
             viewers: std::array::from_fn(|_| AtomicUsize::new(0)),
-            frames: std::array::from_fn(|_| watch::Sender::new(Bytes::new())),
-            published: std::array::from_fn(|_| Mutex::new(0)),
+            frames: std::array::from_fn(|_| watch::Sender::default()),
             numbered: AtomicU64::new(0),
             status: watch::Sender::new(Arc::from("")),
             snapshot: Mutex::default(),
@@ -114,12 +120,14 @@ impl Shared {
     }
 
     /// Leaves out a frame that comes after one of a higher number.
-    pub(super) fn publish_frame(&self, layer: Layer, number: u64, frame: Vec<u8>) {
-        let mut published = self.published[layer.index()].lock().unwrap_or_else(PoisonError::into_inner);
-        if number > *published {
-            *published = number;
-            self.frames[layer.index()].send_replace(Bytes::from(frame));
-        }
+    pub(super) fn publish_frame(&self, layer: Layer, frame: Encoded) {
+        self.frames[layer.index()].send_if_modified(|latest| {
+            let is_later = frame.number > latest.number;
+            if is_later {
+                *latest = frame;
+            }
+            is_later
+        });
     }
 
     pub(super) fn publish_status(&self, status: String) {
@@ -164,7 +172,7 @@ impl Seat {
     }
 
     /// The latest frame and those to come; empty before the first.
-    pub(super) fn frames(&self) -> watch::Receiver<Bytes> {
+    pub(super) fn frames(&self) -> watch::Receiver<Encoded> {
         self.shared.frames[self.layer.index()].subscribe()
     }
 }

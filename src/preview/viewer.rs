@@ -2,7 +2,7 @@
 
 use super::command::{Command, Inspected};
 use super::layer::Layer;
-use super::shared::{Seat, Shared};
+use super::shared::{Encoded, Seat, Shared};
 use axum::body::Bytes;
 use axum::extract::ws::{Message, WebSocket};
 use fechner_perception::eccentricity::Gaze;
@@ -14,7 +14,7 @@ use tokio::sync::watch;
 struct Look {
     /// Held, so that frames of the layer are made.
     _seat: Seat,
-    frames: watch::Receiver<Bytes>,
+    frames: watch::Receiver<Encoded>,
 }
 
 impl Look {
@@ -31,7 +31,7 @@ async fn next_frame(look: &mut Option<Look>) -> Bytes {
     if let Some(Look { frames, .. }) = look
         && frames.changed().await.is_ok()
     {
-        return frames.borrow_and_update().clone();
+        return frames.borrow_and_update().bytes.clone();
     }
     std::future::pending().await
 }

@@ -93,7 +93,7 @@ impl Monitor for Watch<'_> {
         let mut moving = self.moving.lock().unwrap_or_else(PoisonError::into_inner);
         let between_frames = moving.screen.between_frames(self.shared);
         moving.pace.counted(between_frames);
-        if moving.shows_more_than_glimpsed(state) && moving.screen.is_due(self.shared) {
+        if moving.shows_more_than_glimpsed(state) && moving.screen.is_due(between_frames) {
             self.show(&mut moving, state);
         } else if moving.told.elapsed() >= FIGURES_INTERVAL {
             self.tell(&mut moving, state);
