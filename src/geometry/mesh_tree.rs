@@ -6,7 +6,7 @@
 
 use super::tree::Bounds;
 use super::wide_tree::{TriangleRef, WideHit, WideTree};
-use glam::Vec3A;
+use glam::{Affine3A, Vec3A};
 
 /// Where a triangle is hit.
 #[derive(Clone, Copy, Debug)]
@@ -14,14 +14,36 @@ pub(super) struct MeshHit {
     /// Distance along the ray, in the units of the coordinates the tree was given.
     pub(super) t: f32,
     pub(super) triangle: TriangleRef,
+    /// Where the tree has the triangle, for [`MeshTree::shape`].
+    pub(super) place: u32,
     pub(super) b1: f32,
     pub(super) b2: f32,
+}
+
+/// A corner of a triangle and the edges that leave it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TriangleShape {
+    pub(super) corner: Vec3A,
+    /// To the second and to the third corner.
+    pub(super) edges: [Vec3A; 2],
+}
+
+impl TriangleShape {
+    #[inline]
+    pub(super) fn transformed(self, to_world: &Affine3A) -> Self {
+        Self {
+            corner: to_world.transform_point3a(self.corner),
+            edges: self.edges.map(|edge| to_world.transform_vector3a(edge)),
+        }
+    }
 }
 
 pub(super) struct MeshTree {
     tree: WideTree,
     center: Vec3A,
     scale: f32,
+    /// 1 / `scale`, exactly.
+    inverse_scale: f32,
     bounds: Bounds,
     /// Triangles left out because they have no area or a coordinate that is not finite.
     pub(super) degenerate: usize,
@@ -48,7 +70,7 @@ impl MeshTree {
         let references: Vec<TriangleRef> = triangles.iter().map(|(_, reference)| *reference).collect();
         let tree = WideTree::build(&local, &boxes, &references);
         let degenerate = boxes.iter().filter(|b| !b.is_finite()).count();
-        Self { tree, center, scale, bounds, degenerate }
+        Self { tree, center, scale, inverse_scale: 1.0 / scale, bounds, degenerate }
     }
 
     /// Bounds in the coordinates the tree was given; not finite when it is empty.
@@ -82,11 +104,22 @@ impl MeshTree {
         self.tree.any(origin, direction, t_max * self.scale, |h| accept(&self.given(h)))
     }
 
+    /// The triangle of a [`MeshHit::place`], in the coordinates that the tree was given: to within the rounding of the tree's own,
+    /// half a unit in the last place of their extent, and from memory that the walk has just read.
+    #[inline]
+    pub(super) fn shape(&self, place: u32) -> TriangleShape {
+        let [a, b, c] = self.tree.corners(place);
+        TriangleShape {
+            corner: a * self.inverse_scale + self.center,
+            edges: [(b - a) * self.inverse_scale, (c - a) * self.inverse_scale],
+        }
+    }
+
     /// A hit in the coordinates that the tree was given.
     #[inline]
     fn given(&self, found: &WideHit) -> MeshHit {
         let hit = &found.hit;
-        MeshHit { t: hit.t / self.scale, triangle: found.reference, b1: hit.b1, b2: hit.b2 }
+        MeshHit { t: hit.t * self.inverse_scale, triangle: found.reference, place: found.place, b1: hit.b1, b2: hit.b2 }
     }
 }
 

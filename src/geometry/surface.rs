@@ -11,12 +11,12 @@ pub struct SurfacePoint {
     pub geometric_normal: Vec3,
     /// Unit normal for shading, on the same side.
     pub shading_normal: Vec3,
-    /// Along growing u where the material asks for it (`needs_tangent`), else anywhere in the surface; neither of unit length nor
-    /// perpendicular to the shading normal.
-    pub tangent: Vec3,
+    /// Along growing u where the material asks for it (`needs_tangent`), else `None`; neither of unit length nor perpendicular to
+    /// the shading normal.
+    pub tangent: Option<Vec3>,
     /// +1 or −1: the bitangent is this times shading_normal × tangent.
     pub handedness: f32,
-    /// Texture coordinates.
+    /// Texture coordinates; zero where the scene has no texture.
     pub uv: Vec2,
     /// Colour of the vertices around, which multiplies what the material reflects; white where they have none.
     pub color: Vec3,
@@ -50,8 +50,13 @@ pub struct SurfaceDerivatives {
 pub struct Frame(Mat3);
 
 impl Frame {
-    /// Frame around a unit normal whose x axis leans towards `tangent` where that is possible.
-    pub fn new(normal: Vec3, tangent: Vec3) -> Self {
+    /// Frame around a unit normal whose x axis leans towards `tangent`, where there is one and that is possible.
+    #[inline]
+    pub fn new(normal: Vec3, tangent: Option<Vec3>) -> Self {
+        let Some(tangent) = tangent else {
+            let (x, y) = normal.any_orthonormal_pair();
+            return Self(Mat3::from_cols(x, y, normal));
+        };
         let along = tangent - normal * normal.dot(tangent);
         let x = along.try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector());
         Self(Mat3::from_cols(x, normal.cross(x), normal))

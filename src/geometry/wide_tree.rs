@@ -89,6 +89,7 @@ pub(super) struct Block {
 impl Block {
     const EMPTY: Self = Self { corners: [[[f32::NAN; LANES]; 3]; 3] };
 
+    #[inline(always)]
     fn triangle(&self, lane: usize) -> [[f32; 3]; 3] {
         std::array::from_fn(|vertex| std::array::from_fn(|axis| self.corners[axis][vertex][lane]))
     }
@@ -152,6 +153,8 @@ pub(super) struct Candidates {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct WideHit {
     pub(super) reference: TriangleRef,
+    /// Where the tree has the triangle, for [`WideTree::corners`].
+    pub(super) place: u32,
     pub(super) hit: TriangleHit,
 }
 
@@ -192,6 +195,13 @@ impl WideTree {
             }
         }
         tree
+    }
+
+    /// The corners of the triangle of a [`WideHit::place`].
+    #[inline]
+    pub(super) fn corners(&self, place: u32) -> [Vec3A; 3] {
+        let place = place as usize;
+        self.blocks[place / LANES].triangle(place % LANES).map(Vec3A::from)
     }
 
     /// Memory in bytes.
@@ -277,7 +287,7 @@ impl WideTree {
                     let lane = lanes.trailing_zeros();
                     lanes &= lanes - 1;
                     let Some(hit) = self.hit_of_lane(block, &found, lane, sheared, t_max) else { continue };
-                    let found = WideHit { reference: self.references[index * LANES + lane as usize], hit };
+                    let found = self.wide_hit(index, lane, hit);
                     let stands = match &best {
                         Some(best) => hit.t < best.hit.t || found.reference < best.reference,
                         None => hit.t < t_max,
@@ -337,7 +347,7 @@ impl WideTree {
                     lanes &= lanes - 1;
                     if let Some(hit) = self.hit_of_lane(block, &found, lane, sheared, t_max)
                         && hit.t < t_max
-                        && accept(&WideHit { reference: self.references[index * LANES + lane as usize], hit })
+                        && accept(&self.wide_hit(index, lane, hit))
                     {
                         return true;
                     }
@@ -346,6 +356,12 @@ impl WideTree {
             let Some(waiting) = stack.pop() else { return false };
             current = Child(waiting as u32);
         }
+    }
+
+    #[inline(always)]
+    fn wide_hit(&self, block: usize, lane: u32, hit: TriangleHit) -> WideHit {
+        let place = block * LANES + lane as usize;
+        WideHit { reference: self.references[place], place: place as u32, hit }
     }
 
     #[inline(always)]
@@ -433,7 +449,7 @@ mod tests {
                 let t_max = brute.map_or(f32::INFINITY, |b| b.hit.t);
                 let reference = TriangleRef { instance: 0, triangle: number as u32 };
                 match sheared.intersect(&corners.map(|c| c.to_array()), t_max) {
-                    Some(hit) if hit.t < t_max => brute = Some(WideHit { reference, hit }),
+                    Some(hit) if hit.t < t_max => brute = Some(WideHit { reference, place: number as u32, hit }),
                     _ => {}
                 }
             }

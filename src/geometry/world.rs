@@ -25,6 +25,8 @@ pub struct Hit {
     pub object: u32,
     /// Triangle of the mesh, 0 for a sphere.
     pub triangle: u32,
+    /// Where the instance's tree has the triangle.
+    place: u32,
     /// Barycentric weight of the second vertex.
     pub b1: f32,
     /// Barycentric weight of the third vertex.
@@ -33,7 +35,7 @@ pub struct Hit {
 
 impl Hit {
     fn on_sphere(object: u32, distance: f32) -> Self {
-        Self { distance, object, triangle: 0, b1: 0.0, b2: 0.0 }
+        Self { distance, object, triangle: 0, place: 0, b1: 0.0, b2: 0.0 }
     }
 }
 
@@ -145,7 +147,11 @@ impl World {
         } else {
             (Vec3::ZERO, 1.0)
         };
-        let placements = scene.instances.iter().map(|i| Placement::new(&scene, i, &i.to_world)).collect();
+        let placements = scene
+            .instances
+            .iter()
+            .map(|i| Placement::new(&scene, i, tree_of_mesh[i.mesh.0 as usize].map(|tree| tree as u32)))
+            .collect();
         Self { scene, fixed, shared, top, items, center, radius, has_alpha, placements }
     }
 
@@ -312,7 +318,7 @@ impl LocalRay {
 }
 
 fn world_hit(instance: u32, hit: MeshHit, distance: f32) -> Hit {
-    Hit { distance, object: instance, triangle: hit.triangle.triangle, b1: hit.b1, b2: hit.b2 }
+    Hit { distance, object: instance, triangle: hit.triangle.triangle, place: hit.place, b1: hit.b1, b2: hit.b2 }
 }
 
 fn own_triangles(scene: &Scene, mesh: usize) -> Vec<([Vec3A; 3], TriangleRef)> {

@@ -89,7 +89,8 @@ impl PathTracer {
             let point = self.world.surface(&path.ray, &hit);
             let wo = -Vec3::from(path.ray.direction);
             let components = Components::new();
-            let shading = self.shading(&point, wo, path.ray.time, &components);
+            let bsdf = self.bsdf(&point, &components);
+            let shading = self.shading(&bsdf, &point, wo, path.ray.time);
             path.throughput *= match shading.medium {
                 Some(medium) if wo.dot(point.geometric_normal) < 0.0 => {
                     path.media.transmittance_to_back_of(medium, hit.distance)

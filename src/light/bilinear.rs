@@ -4,40 +4,64 @@
 //! leaves less variance than the uniform solid angle, which knows nothing of the receiver's cosine, and takes no trigonometric
 //! function. Not for emitters that are near: between the corners anything may happen.
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 /// Density over the unit square of shares of two edges.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BilinearDensity {
     /// At (0, 0), (1, 0), (0, 1) and (1, 1), of no particular scale; above 0.
-    corners: [f32; 4],
+    corners: Vec4,
+}
+
+/// Four points by coordinate: at the shares (0, 0), (1, 0), (0, 1) and (1, 1) of two edges.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct FourCorners {
+    x: Vec4,
+    y: Vec4,
+    z: Vec4,
+}
+
+impl FourCorners {
+    /// Of the parallelogram that two edges span from a corner.
+    pub(super) fn new(corner: Vec3, edge_1: Vec3, edge_2: Vec3) -> Self {
+        let points = [corner, corner + edge_1, corner + edge_2, corner + edge_1 + edge_2];
+        let along = |axis: usize| Vec4::from_array(points.map(|point| point[axis]));
+        Self { x: along(0), y: along(1), z: along(2) }
+    }
+
+    /// As seen from a point.
+    #[inline]
+    pub(super) fn seen_from(&self, point: Vec3) -> Self {
+        Self { x: self.x - point.x, y: self.y - point.y, z: self.z - point.z }
+    }
 }
 
 impl BilinearDensity {
     /// In proportion to what an even emitter gives to a receiver of unit normal `normal` (zero if it receives from all sides):
     /// cos θ at the receiver over the fourth power of the distance, since the cosine at the emitter is its plane's distance over
-    /// the point's. `corners` are relative to the receiver.
-    pub(super) fn of_irradiance(corners: [Vec3; 4], normal: Vec3) -> Self {
-        let given = corners.map(|way| {
-            let squared = way.length_squared().max(f32::MIN_POSITIVE);
-            if normal == Vec3::ZERO {
-                1.0 / (squared * squared.sqrt())
-            } else {
-                way.dot(normal).max(0.0) / (squared * squared)
-            }
-        });
-        let most = given.into_iter().fold(0.0, f32::max);
+    /// the point's. `corners` are as seen from the receiver.
+    #[inline]
+    pub(super) fn of_irradiance(corners: &FourCorners, normal: Vec3) -> Self {
+        let FourCorners { x, y, z } = *corners;
+        let squared = (x * x + y * y + z * z).max(Vec4::splat(f32::MIN_POSITIVE));
+        let given = if normal == Vec3::ZERO {
+            let distance = Vec4::new(squared.x.sqrt(), squared.y.sqrt(), squared.z.sqrt(), squared.w.sqrt());
+            1.0 / (squared * distance)
+        } else {
+            (x * normal.x + y * normal.y + z * normal.z).max(Vec4::ZERO) / (squared * squared)
+        };
+        let most = given.max_element();
         if !(most > 0.0 && most.is_finite()) {
-            return Self { corners: [1.0; 4] };
+            return Self { corners: Vec4::ONE };
         }
         // What lies below the horizon at a corner may be above it beside the corner: no density falls far below the largest.
         const LEAST_SHARE: f32 = 0.1;
-        Self { corners: given.map(|given| (given / most).max(LEAST_SHARE)) }
+        Self { corners: (given / most).max(Vec4::splat(LEAST_SHARE)) }
     }
 
     /// Shares of the edges, for uniform numbers in [0, 1).
     pub(super) fn sample(&self, [u, v]: [f32; 2]) -> [f32; 2] {
-        let [low_left, low_right, high_left, high_right] = self.corners;
+        let [low_left, low_right, high_left, high_right] = self.corners.to_array();
         let y = sample_linear(v, low_left + low_right, high_left + high_right);
         let x = sample_linear(u, lerp(y, low_left, high_left), lerp(y, low_right, high_right));
         [x, y]
@@ -45,7 +69,7 @@ impl BilinearDensity {
 
     /// Density at shares of the edges; its mean over the square is 1.
     pub(super) fn at(&self, [x, y]: [f32; 2]) -> f32 {
-        let [low_left, low_right, high_left, high_right] = self.corners;
+        let [low_left, low_right, high_left, high_right] = self.corners.to_array();
         let here = lerp(y, lerp(x, low_left, low_right), lerp(x, high_left, high_right));
         4.0 * here / (low_left + low_right + high_left + high_right)
     }
@@ -80,10 +104,9 @@ mod tests {
 
     #[test]
     fn the_density_is_normalised_and_never_vanishes() {
-        let square =
-            [Vec3::new(1.0, 2.0, 0.5), Vec3::new(3.0, 2.0, 0.5), Vec3::new(1.0, 2.0, 2.5), Vec3::new(3.0, 2.0, 2.5)];
+        let square = FourCorners::new(Vec3::new(2.0, 3.0, 1.5), 2.0 * Vec3::X, 2.0 * Vec3::Z).seen_from(Vec3::ONE);
         for normal in [Vec3::Y, Vec3::X, -Vec3::Y, Vec3::ZERO, Vec3::new(-0.6, 0.8, 0.0)] {
-            let density = BilinearDensity::of_irradiance(square, normal);
+            let density = BilinearDensity::of_irradiance(&square, normal);
             let n = 64;
             let place = |i: usize| (i as f32 + 0.5) / n as f32;
             let sum: f32 = (0..n * n).map(|i| density.at([place(i % n), place(i / n)])).sum();

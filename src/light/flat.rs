@@ -1,7 +1,7 @@
 //! Triangles and parallelograms that emit: sampled by solid angle where they look large, else by area, evenly or, parallelograms that
 //! are no specks, by what their corners give.
 
-use super::bilinear::BilinearDensity;
+use super::bilinear::{BilinearDensity, FourCorners};
 use super::solid_angle::{LEAST, SphericalRectangle, SphericalTriangle};
 use super::{LightPlace, LightReceiver, LightSample};
 use crate::scene::{Alpha, Scene};
@@ -25,6 +25,8 @@ pub(super) struct FlatEmitter {
     pub(super) normal: Vec3,
     pub(super) area: f32,
     pub(super) both_sides: bool,
+    /// What it emits where that is the same everywhere; `None` where a picture says.
+    even_radiance: Option<Vec3>,
 }
 
 /// Bound of the solid angle in steradian below which a parallelogram is sampled by its corners.
@@ -34,9 +36,9 @@ const MOST_BILINEAR: f32 = 1.0;
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Outline {
     Triangle,
-    Parallelogram,
+    Parallelogram(FourCorners),
     /// A parallelogram whose edges are at a right angle.
-    Rectangle(Edges),
+    Rectangle(FourCorners, Edges),
 }
 
 /// Two edges at a right angle: unit directions and lengths, in f64 for [`SphericalRectangle`].
@@ -77,6 +79,7 @@ impl FlatEmitter {
             normal: scaled_normal.normalize_or(Vec3::Y) * if mirrored { -1.0 } else { 1.0 },
             area: 0.5 * scaled_normal.length(),
             both_sides,
+            even_radiance: None,
         }
     }
 
@@ -96,13 +99,15 @@ impl FlatEmitter {
         }
         let (edge_1, edge_2) = (self.edge_1, next.edge_2);
         let cosine = edge_1.normalize_or_zero().dot(edge_2.normalize_or_zero());
+        let corners = FourCorners::new(self.corner, edge_1, edge_2);
         let outline = match cosine.abs() < 1e-5 {
-            true => Outline::Rectangle(Edges::new([edge_1, edge_2])),
-            false => Outline::Parallelogram,
+            true => Outline::Rectangle(corners, Edges::new([edge_1, edge_2])),
+            false => Outline::Parallelogram(corners),
         };
+        let even_radiance = Some(material.emission.factor);
         let center = self.corner + 0.5 * (edge_1 + edge_2);
         let radius = 0.5 * (edge_1 + edge_2).length().max((edge_1 - edge_2).length());
-        Some(Self { outline, edge_2, center, radius, area: self.area + next.area, ..self.clone() })
+        Some(Self { outline, edge_2, center, radius, area: self.area + next.area, even_radiance, ..self.clone() })
     }
 
     /// Corners of its outline, for bounds.
@@ -130,14 +135,14 @@ impl FlatEmitter {
         if distance == 0.0 || (facing <= 0.0 && !self.both_sides) {
             return None;
         }
-        Some(LightSample {
+        let pdf = view.pdf(self, direction, distance, || shares);
+        (pdf > 0.0 && pdf.is_finite()).then(|| LightSample {
             direction,
             place: Some(LightPlace { position, normal: self.normal * facing.signum() }),
-            radiance: self.radiance(scene, shares),
-            pdf: view.pdf(self, direction, distance, || shares),
+            radiance: self.even_radiance.unwrap_or_else(|| self.radiance(scene, shares)),
+            pdf,
             is_delta: false,
         })
-        .filter(|s| s.pdf > 0.0 && s.pdf.is_finite())
     }
 
     /// Density per steradian of a direction that reaches the emitter at this distance.
@@ -154,12 +159,12 @@ impl FlatEmitter {
         [share(across_1, self.edge_1), share(across_2, self.edge_2)]
     }
 
+    /// What a triangle emits at a place.
     fn radiance(&self, scene: &Scene, [s1, s2]: Shares) -> Vec3 {
         let instance = &scene.instances[self.object as usize];
         let material = &scene.materials[instance.material.0 as usize];
-        // Only triangles are textured: parallelograms are merged where nothing depends on the place.
         let mesh = &scene.meshes[instance.mesh.0 as usize];
-        let uv = if mesh.uvs.is_empty() || self.outline != Outline::Triangle {
+        let uv = if mesh.uvs.is_empty() {
             Vec2::ZERO
         } else {
             let [a, b, c] = mesh.triangles[self.triangle as usize].map(|i| mesh.uvs[i as usize]);
@@ -176,22 +181,21 @@ impl FlatEmitter {
         if looks_below(LEAST as f32) {
             return View::Even;
         }
-        let corner = self.corner - receiver.position;
-        match self.outline {
+        match &self.outline {
             Outline::Triangle => {
+                let corner = self.corner - receiver.position;
                 let others = [self.edge_1, self.edge_2].map(|edge| (corner + edge).as_dvec3());
                 let triangle = SphericalTriangle::new([corner.as_dvec3(), others[0], others[1]]);
                 if triangle.solid_angle > LEAST { View::Triangle(triangle) } else { View::Even }
             }
-            Outline::Rectangle(edges) if !looks_below(MOST_BILINEAR) => {
+            Outline::Rectangle(_, edges) if !looks_below(MOST_BILINEAR) => {
+                let corner = self.corner - receiver.position;
                 let rectangle = SphericalRectangle::new(corner.as_dvec3(), edges.axes, edges.lengths);
                 if rectangle.solid_angle > LEAST { View::Rectangle(rectangle) } else { View::Even }
             }
-            Outline::Parallelogram if !looks_below(MOST_BILINEAR) => View::Even,
-            Outline::Rectangle(_) | Outline::Parallelogram => {
-                let (right, up) = (corner + self.edge_1, corner + self.edge_2);
-                let corners = [corner, right, up, right + self.edge_2];
-                View::Bilinear(BilinearDensity::of_irradiance(corners, receiver.normal))
+            Outline::Parallelogram(_) if !looks_below(MOST_BILINEAR) => View::Even,
+            Outline::Rectangle(corners, _) | Outline::Parallelogram(corners) => {
+                View::Bilinear(BilinearDensity::of_irradiance(&corners.seen_from(receiver.position), receiver.normal))
             }
         }
     }
@@ -214,7 +218,7 @@ impl View {
             View::Even => Some(u),
             View::Bilinear(density) => Some(density.sample(u)),
             View::Rectangle(rectangle) => {
-                let Outline::Rectangle(edges) = emitter.outline else { return None };
+                let Outline::Rectangle(_, edges) = &emitter.outline else { return None };
                 let [along_1, along_2] = rectangle.sample(u);
                 Some([(along_1 / edges.lengths[0]) as f32, (along_2 / edges.lengths[1]) as f32])
             }

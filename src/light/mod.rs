@@ -111,7 +111,7 @@ impl Lights {
     pub fn sample(&self, world: &World, receiver: &LightReceiver, time: f32, u: [f32; 3]) -> Option<LightSample> {
         let [u0, u1, select] = u;
         let Shares { environment, distant, placed } = self.shares;
-        let (sample, chosen) = if select < environment {
+        let (mut sample, chosen) = if select < environment {
             (self.environment.as_ref()?.sample([u0, u1])?, environment)
         } else if select < environment + distant {
             let within = (select - environment) / distant;
@@ -121,7 +121,8 @@ impl Lights {
             let (index, chosen) = self.tree.as_ref()?.sample(receiver, within)?;
             (self.sample_emitter(world, index, receiver, time, [u0, u1])?, placed * chosen)
         };
-        Some(LightSample { pdf: sample.pdf * chosen, ..sample }).filter(|s| s.pdf > 0.0 && s.pdf.is_finite())
+        sample.pdf *= chosen;
+        (sample.pdf > 0.0 && sample.pdf.is_finite()).then_some(sample)
     }
 
     fn sample_emitter(

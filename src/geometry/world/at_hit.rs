@@ -1,6 +1,7 @@
 //! What is at a hit: from a place on a triangle or sphere at a time to a [`SurfacePoint`].
 
 use super::{Hit, World};
+use crate::geometry::mesh_tree::TriangleShape;
 use crate::geometry::surface::SurfaceDerivatives;
 use crate::geometry::{Ray, SurfacePoint};
 use crate::scene::{Instance, Mesh, Scene};
@@ -16,15 +17,23 @@ pub(super) struct Placement {
     flip: f32,
     /// Whether the material asks for a tangent.
     needs_tangent: bool,
+    /// The tree that the mesh shares with others or moves with, in coordinates of its own; `None` where it is part of the fixed
+    /// tree, in world space.
+    shared: Option<u32>,
 }
 
 impl Placement {
-    pub(super) fn new(scene: &Scene, instance: &Instance, to_world: &Affine3A) -> Self {
+    pub(super) fn new(scene: &Scene, instance: &Instance, shared: Option<u32>) -> Self {
+        let needs_tangent = scene.materials[instance.material.0 as usize].needs_tangent();
+        Self { normal_matrix: Mat3A::ZERO, flip: 1.0, needs_tangent, shared }.moved_to(&instance.to_world)
+    }
+
+    /// The same of an instance that is elsewhere.
+    fn moved_to(self, to_world: &Affine3A) -> Self {
         let m = to_world.matrix3;
         let flip = if m.determinant() < 0.0 { -1.0 } else { 1.0 };
         let cofactors = Mat3A::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
-        let needs_tangent = scene.materials[instance.material.0 as usize].needs_tangent();
-        Self { normal_matrix: cofactors * flip, flip, needs_tangent }
+        Self { normal_matrix: cofactors * flip, flip, ..self }
     }
 }
 
@@ -57,7 +66,8 @@ impl World {
                     return None;
                 }
                 let corners = self.triangle_corners(point.object, point.triangle, time);
-                let (edges, uv_edges) = edges_on(mesh, point.triangle, &corners);
+                let edges = [corners[1] - corners[0], corners[2] - corners[0]];
+                let uv_edges = edges_on_picture(mesh, point.triangle);
                 let inverse_area = 1.0 / uv_edges[0].perp_dot(uv_edges[1]);
                 SurfaceDerivatives {
                     along_u: along_u_times_area(edges, uv_edges) * inverse_area,
@@ -72,52 +82,73 @@ impl World {
 
     /// The surface at a hit.
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
-        let Some(instance) = self.scene.instances.get(hit.object as usize) else {
-            let (center, radius) = self.sphere_at(hit.object, ray.time);
-            let normal = Vec3::from((ray.origin + ray.direction * hit.distance) - center).normalize_or(Vec3::Y);
-            let position = Vec3::from(center) + radius * normal;
-            return SurfacePoint {
-                position,
-                geometric_normal: normal,
-                shading_normal: normal,
-                tangent: Vec3::Y.cross(normal).normalize_or(Vec3::X),
-                handedness: 1.0,
-                uv: sphere_uv(normal),
-                color: Vec3::ONE,
-                object: hit.object,
-                triangle: 0,
-                offset: self.offset_at(position),
-            };
-        };
+        match self.scene.instances.get(hit.object as usize) {
+            Some(instance) => self.surface_of_triangle(instance, ray, hit),
+            None => self.surface_of_sphere(ray, hit),
+        }
+    }
+
+    fn surface_of_sphere(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
+        let (center, radius) = self.sphere_at(hit.object, ray.time);
+        let normal = Vec3::from((ray.origin + ray.direction * hit.distance) - center).normalize_or(Vec3::Y);
+        let position = Vec3::from(center) + radius * normal;
+        let needs_tangent = self.scene.materials[self.material_of(hit.object).0 as usize].needs_tangent();
+        SurfacePoint {
+            position,
+            geometric_normal: normal,
+            shading_normal: normal,
+            tangent: needs_tangent.then(|| Vec3::Y.cross(normal).normalize_or(Vec3::X)),
+            handedness: 1.0,
+            uv: sphere_uv(normal),
+            color: Vec3::ONE,
+            object: hit.object,
+            triangle: 0,
+            offset: self.offset_at(position),
+        }
+    }
+
+    fn surface_of_triangle(&self, instance: &Instance, ray: &Ray, hit: &Hit) -> SurfacePoint {
         let mesh = &self.scene.meshes[instance.mesh.0 as usize];
-        let to_world = instance.transform_at(ray.time);
-        let indices = mesh.triangles[hit.triangle as usize].map(|i| i as usize);
-        let corners = indices.map(|i| to_world.transform_point3(mesh.positions[i]));
-        let (b1, b2) = (hit.b1, hit.b2);
-        let position = corners[0] * (1.0 - b1 - b2) + corners[1] * b1 + corners[2] * b2;
-        let Placement { normal_matrix, flip, needs_tangent } = match instance.motion {
-            Some(_) => Placement::new(&self.scene, instance, &to_world),
-            None => self.placements[hit.object as usize],
+        let mut to_world = &instance.to_world;
+        let mut placement = &self.placements[hit.object as usize];
+        let moved;
+        if let Some(motion) = &instance.motion {
+            let transform = motion.at(ray.time);
+            moved = (transform, placement.moved_to(&transform));
+            (to_world, placement) = (&moved.0, &moved.1);
+        }
+        let shape = match placement.shared {
+            None => self.fixed.shape(hit.place),
+            Some(tree) => self.shared[tree as usize].shape(hit.place).transformed(to_world),
         };
-        let geometric_normal = flip * (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or(Vec3::Y);
+        let TriangleShape { corner, edges: [edge_1, edge_2] } = shape;
+        let (b0, b1, b2) = (1.0 - hit.b1 - hit.b2, hit.b1, hit.b2);
+        let position = Vec3::from(corner + edge_1 * b1 + edge_2 * b2);
+        let geometric_normal = Vec3::from(placement.flip * edge_1.cross(edge_2)).normalize_or(Vec3::Y);
+        let indices = || mesh.triangles[hit.triangle as usize].map(|i| i as usize);
         let shading_normal = if mesh.normals.is_empty() {
             geometric_normal
         } else {
-            let [n0, n1, n2] = indices.map(|i| mesh.normals[i]);
-            let blended = Vec3A::from(n0 * (1.0 - b1 - b2) + n1 * b1 + n2 * b2);
-            let n = Vec3::from(normal_matrix * blended).normalize_or(geometric_normal);
+            let [n0, n1, n2] = indices().map(|i| mesh.normals[i]);
+            let blended = Vec3A::from(n0 * b0 + n1 * b1 + n2 * b2);
+            let n = Vec3::from(placement.normal_matrix * blended).normalize_or(geometric_normal);
             // A file may wind its triangles against its normals; the geometric side is what counts.
             if n.dot(geometric_normal) < 0.0 { -n } else { n }
         };
-        let (tangent, handedness) = if !needs_tangent {
-            (corners[1] - corners[0], 1.0)
+        let (tangent, handedness) = if !placement.needs_tangent {
+            (None, 1.0)
         } else if mesh.tangents.is_empty() {
-            tangent_from_uv(mesh, hit.triangle, &corners)
+            let (tangent, handedness) = tangent_from_uv(mesh, hit.triangle, [edge_1.into(), edge_2.into()]);
+            (Some(tangent), handedness)
         } else {
-            let [t0, t1, t2] = indices.map(|i| mesh.tangents[i]);
-            let blended = t0.truncate() * (1.0 - b1 - b2) + t1.truncate() * b1 + t2.truncate() * b2;
+            let [t0, t1, t2] = indices().map(|i| mesh.tangents[i]);
+            let blended = t0.truncate() * b0 + t1.truncate() * b1 + t2.truncate() * b2;
             let world = Vec3::from(to_world.matrix3 * Vec3A::from(blended));
-            (world.normalize_or(Vec3::X), if t0.w < 0.0 { -flip } else { flip })
+            (Some(world.normalize_or(Vec3::X)), if t0.w < 0.0 { -placement.flip } else { placement.flip })
+        };
+        let uv = match self.scene.textures.is_empty() {
+            true => Vec2::ZERO,
+            false => interpolate_uv(mesh, hit.triangle, b1, b2),
         };
         SurfacePoint {
             position,
@@ -125,7 +156,7 @@ impl World {
             shading_normal,
             tangent,
             handedness,
-            uv: interpolate_uv(mesh, hit.triangle, b1, b2),
+            uv,
             color: interpolate_color(mesh, hit.triangle, b1, b2),
             object: hit.object,
             triangle: hit.triangle,
@@ -165,10 +196,10 @@ fn interpolate_color(mesh: &Mesh, triangle: u32, b1: f32, b2: f32) -> Vec3 {
     i * (1.0 - b1 - b2) + j * b1 + k * b2
 }
 
-/// The two edges that leave a triangle's first corner, in space and on the picture. The mesh must have texture coordinates.
-fn edges_on(mesh: &Mesh, triangle: u32, corners: &[Vec3; 3]) -> ([Vec3; 2], [Vec2; 2]) {
+/// The two edges that leave a triangle's first corner, on the picture. The mesh must have texture coordinates.
+fn edges_on_picture(mesh: &Mesh, triangle: u32) -> [Vec2; 2] {
     let [a, b, c] = mesh.triangles[triangle as usize].map(|i| mesh.uvs[i as usize]);
-    ([corners[1] - corners[0], corners[2] - corners[0]], [b - a, c - a])
+    [b - a, c - a]
 }
 
 /// Way along growing u, times twice the triangle's signed area on the picture.
@@ -177,12 +208,12 @@ fn along_u_times_area(edges: [Vec3; 2], uv_edges: [Vec2; 2]) -> Vec3 {
 }
 
 /// Direction of growing u on a triangle and the handedness of (u, v), from its texture coordinates.
-fn tangent_from_uv(mesh: &Mesh, triangle: u32, corners: &[Vec3; 3]) -> (Vec3, f32) {
-    let along_edge = (corners[1] - corners[0]).normalize_or(Vec3::X);
+fn tangent_from_uv(mesh: &Mesh, triangle: u32, edges: [Vec3; 2]) -> (Vec3, f32) {
+    let along_edge = edges[0].normalize_or(Vec3::X);
     if mesh.uvs.is_empty() {
         return (along_edge, 1.0);
     }
-    let (edges, uv_edges) = edges_on(mesh, triangle, corners);
+    let uv_edges = edges_on_picture(mesh, triangle);
     let area = uv_edges[0].perp_dot(uv_edges[1]);
     let tangent = along_u_times_area(edges, uv_edges) * area.signum();
     // v runs down the picture, so a texture that is not mirrored has a negative uv area.
