@@ -8,7 +8,7 @@ use super::media::Media;
 use super::shading::{Components, Shading};
 use crate::geometry::{Hit, Ray, SurfacePoint};
 use crate::light::{LightReceiver, LightSample};
-use crate::sampler::{Draws, Purpose, Sample};
+use crate::sampler::{Purpose, Sample};
 use fechner_perception::photometry::luminance;
 use glam::{Vec3, Vec3A};
 
@@ -112,10 +112,10 @@ impl PathTracer {
                 break;
             }
             if shading.bsdf.has_smooth_lobe() {
-                self.add_direct_light(&mut path, &point, &shading, wo, sample.draws(Purpose::Light { bounce }));
+                self.add_direct_light(&mut path, &point, &shading, wo, sample.draw(Purpose::Light { bounce }));
             }
-            let u = sample.draws(Purpose::Scatter { bounce });
-            if !scatter(&mut path, &point, &shading, wo, u) || !survives(&mut path, bounce, u) {
+            let [u0, u1, lobe, roulette] = sample.draw(Purpose::Scatter { bounce });
+            if !scatter(&mut path, &point, &shading, wo, [u0, u1, lobe]) || !survives(&mut path, bounce, roulette) {
                 break;
             }
         }
@@ -150,9 +150,10 @@ impl PathTracer {
     }
 
     /// Next-event estimation: light that arrives straight from a sampled light.
-    fn add_direct_light(&self, path: &mut PathState, point: &SurfacePoint, shading: &Shading, wo: Vec3, u: Draws) {
+    fn add_direct_light(&self, path: &mut PathState, point: &SurfacePoint, shading: &Shading, wo: Vec3, u: [f32; 4]) {
+        let [u0, u1, choice, roulette] = u;
         let receiver = shading.receiver(point, wo);
-        let Some(light) = self.lights.sample(&self.world, &receiver, path.ray.time, u.first_three()) else {
+        let Some(light) = self.lights.sample(&self.world, &receiver, path.ray.time, [u0, u1, choice]) else {
             return;
         };
         let wi = light.direction;
@@ -169,7 +170,7 @@ impl PathTracer {
             let of = |rgb: Vec3| luminance(rgb.to_array());
             thresholds.survival(of(unshadowed * path.radiance_gain_on_exit), of(path.radiance))
         });
-        if survival < 1.0 && u.number(3) >= survival {
+        if survival < 1.0 && roulette >= survival {
             return;
         }
         path.rays += 1;
@@ -208,8 +209,8 @@ fn distance_to(point: &SurfacePoint, light: &LightSample) -> f32 {
 }
 
 /// Chooses the next direction; false where the path ends.
-fn scatter(path: &mut PathState, point: &SurfacePoint, shading: &Shading, wo: Vec3, u: Draws) -> bool {
-    let Some(scattered) = shading.bsdf.sample(shading.frame.to_local(wo), u.first_three()) else {
+fn scatter(path: &mut PathState, point: &SurfacePoint, shading: &Shading, wo: Vec3, u: [f32; 3]) -> bool {
+    let Some(scattered) = shading.bsdf.sample(shading.frame.to_local(wo), u) else {
         return false;
     };
     let wi = shading.frame.to_world(scattered.wi).normalize();
@@ -230,7 +231,7 @@ fn scatter(path: &mut PathState, point: &SurfacePoint, shading: &Shading, wo: Ve
 }
 
 /// Russian roulette by throughput from the fourth bounce on.
-fn survives(path: &mut PathState, bounce: u32, u: Draws) -> bool {
+fn survives(path: &mut PathState, bounce: u32, u: f32) -> bool {
     const FIRST_BOUNCE: u32 = 3;
     const ALWAYS_MORTAL_FROM: u32 = 8;
     if bounce < FIRST_BOUNCE {
@@ -238,7 +239,7 @@ fn survives(path: &mut PathState, bounce: u32, u: Draws) -> bool {
     }
     let most = if bounce < ALWAYS_MORTAL_FROM { 1.0 } else { 0.98 };
     let survival = (path.throughput.max_element() * path.radiance_gain_on_exit).min(most);
-    if u.number(3) >= survival {
+    if u >= survival {
         return false;
     }
     path.throughput /= survival;

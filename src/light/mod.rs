@@ -111,20 +111,19 @@ impl Lights {
     pub fn sample(&self, world: &World, receiver: &LightReceiver, time: f32, u: [f32; 3]) -> Option<LightSample> {
         let [u0, u1, select] = u;
         let Shares { environment, distant, placed } = self.shares;
-        let (mut sample, chosen) = if select < environment {
-            (self.environment.as_ref()?.sample([u0, u1])?, environment)
-        } else if select < environment + distant {
+        if select < environment {
+            return chosen_by(self.environment.as_ref()?.sample([u0, u1]), environment);
+        }
+        if select < environment + distant {
             let within = (select - environment) / distant;
-            (self.distant.as_ref()?.sample([u0, u1, within]), distant)
-        } else {
-            let within = ((select - environment - distant) / placed).clamp(0.0, 1.0 - f32::EPSILON / 2.0);
-            let (index, chosen) = self.tree.as_ref()?.sample(receiver, within)?;
-            (self.sample_emitter(world, index, receiver, time, [u0, u1])?, placed * chosen)
-        };
-        sample.pdf *= chosen;
-        (sample.pdf > 0.0 && sample.pdf.is_finite()).then_some(sample)
+            return chosen_by(Some(self.distant.as_ref()?.sample([u0, u1, within])), distant);
+        }
+        let within = ((select - environment - distant) / placed).clamp(0.0, 1.0 - f32::EPSILON / 2.0);
+        let (index, chosen) = self.tree.as_ref()?.sample(receiver, within)?;
+        chosen_by(self.sample_emitter(world, index, receiver, time, [u0, u1]), placed * chosen)
     }
 
+    #[inline]
     fn sample_emitter(
         &self,
         world: &World,
@@ -184,4 +183,12 @@ impl Lights {
         let environment = self.environment.as_ref().map_or(0.0, |e| e.pdf(direction) * self.shares.environment);
         environment + self.distant.as_ref().map_or(0.0, |d| d.pdf(direction) * self.shares.distant)
     }
+}
+
+/// A sample whose light was chosen with a probability.
+#[inline(always)]
+fn chosen_by(sample: Option<LightSample>, probability: f32) -> Option<LightSample> {
+    let mut sample = sample?;
+    sample.pdf *= probability;
+    (sample.pdf > 0.0 && sample.pdf.is_finite()).then_some(sample)
 }

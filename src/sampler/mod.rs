@@ -119,7 +119,8 @@ impl Purpose {
 #[derive(Clone, Copy, Debug)]
 pub struct Sample {
     block_hash: u32,
-    index: u32,
+    /// Bits of the index in the sequence, the lowest first.
+    reversed_index: u32,
     is_independent: bool,
 }
 
@@ -152,15 +153,15 @@ impl BlockKey {
     pub fn sample(self, index: u32) -> Sample {
         Sample {
             block_hash: self.hash(),
-            index: self.first_index() + index,
+            reversed_index: (self.first_index() + index).reverse_bits(),
             is_independent: self.sequence == Sequence::Independent,
         }
     }
 
     /// All samples with indices below `count`; cheaper than asking one by one.
     pub fn samples(self, count: u32) -> impl Iterator<Item = Sample> {
-        let first = self.sample(0);
-        (0..count).map(move |index| Sample { index: first.index + index, ..first })
+        let (first, first_index) = (self.sample(0), self.first_index());
+        (0..count).map(move |index| Sample { reversed_index: (first_index + index).reverse_bits(), ..first })
     }
 }
 
@@ -170,51 +171,17 @@ fn z_curve(pixel: Pixel) -> u32 {
 }
 
 impl Sample {
-    /// The numbers for a purpose, to be asked for one by one.
-    #[inline]
-    pub fn draws(self, purpose: Purpose) -> Draws {
-        let group_hash = sobol::mix32(self.block_hash ^ sobol::mix32(purpose.group().wrapping_add(0x68bc_21eb)));
-        if self.is_independent {
-            Draws(Source::Independent(u64::from(group_hash) << 32 | u64::from(self.index)))
-        } else {
-            Draws(Source::Sobol(sobol::ScrambledPoint::new(self.index, group_hash)))
-        }
-    }
-
-    /// All four of them.
+    /// Four numbers in [0, 1) for a purpose; the first two are stratified best together.
     #[inline]
     pub fn draw(self, purpose: Purpose) -> [f32; 4] {
-        let draws = self.draws(purpose);
-        std::array::from_fn(|dimension| draws.number(dimension as u32))
-    }
-}
-
-/// Four numbers in [0, 1); the first two are stratified best together.
-#[derive(Clone, Copy, Debug)]
-pub struct Draws(Source);
-
-impl Draws {
-    /// Those of the first three dimensions.
-    #[inline]
-    pub fn first_three(self) -> [f32; 3] {
-        [self.number(0), self.number(1), self.number(2)]
-    }
-
-    /// The number of a dimension below 4.
-    #[inline]
-    pub fn number(self, dimension: u32) -> f32 {
-        match self.0 {
-            Source::Sobol(point) => point.number(dimension),
-            Source::Independent(key) => (hash_words(key, u64::from(dimension)) >> 40) as f32 * (1.0 / 16_777_216.0),
+        let group_hash = sobol::mix32(self.block_hash ^ sobol::mix32(purpose.group().wrapping_add(0x68bc_21eb)));
+        if self.is_independent {
+            let key = u64::from(group_hash) << 32 | u64::from(self.reversed_index.reverse_bits());
+            std::array::from_fn(|dimension| (hash_words(key, dimension as u64) >> 40) as f32 * (1.0 / 16_777_216.0))
+        } else {
+            sobol::scrambled_point(self.reversed_index, group_hash)
         }
     }
-}
-
-#[derive(Clone, Copy, Debug)]
-enum Source {
-    Sobol(sobol::ScrambledPoint),
-    /// Hash of sample and purpose.
-    Independent(u64),
 }
 
 /// Mixes a word into a hash; for decisions that need a random number without a sample of their own.

@@ -58,9 +58,32 @@ const fn reversed_directions(degree: usize, coefficients: u32, first: [u32; 3]) 
     reversed
 }
 
-/// XOR of direction numbers by byte of the index: 4 look-ups instead of 32 tests.
-const fn byte_tables(directions: [u32; 32]) -> [[u32; 256]; 4] {
-    let mut tables = [[0u32; 256]; 4];
+/// The same of the first dimension, whose reversed digits are the index itself.
+const fn radical_inverse() -> [u32; 32] {
+    let mut reversed = [0u32; 32];
+    let mut i = 0;
+    while i < 32 {
+        reversed[i] = 1 << i;
+        i += 1;
+    }
+    reversed
+}
+
+/// One number a dimension, as one vector.
+#[derive(Clone, Copy)]
+#[repr(align(16))]
+struct Row([u32; 4]);
+
+/// XOR of direction numbers of all dimensions by byte of the bit-reversed index: 4 look-ups instead of 128 tests.
+static DIRECTIONS: [[Row; 256]; 4] = byte_tables([
+    radical_inverse(),
+    reversed_directions(1, 0, [1, 0, 0]),
+    reversed_directions(2, 1, [1, 3, 0]),
+    reversed_directions(3, 1, [1, 3, 1]),
+]);
+
+const fn byte_tables(directions: [[u32; 32]; 4]) -> [[Row; 256]; 4] {
+    let mut tables = [[Row([0; 4]); 256]; 4];
     let mut byte = 0;
     while byte < 4 {
         let mut value = 0;
@@ -68,7 +91,11 @@ const fn byte_tables(directions: [u32; 32]) -> [[u32; 256]; 4] {
             let mut bit = 0;
             while bit < 8 {
                 if (value >> bit) & 1 == 1 {
-                    tables[byte][value] ^= directions[byte * 8 + bit];
+                    let mut dimension = 0;
+                    while dimension < 4 {
+                        tables[byte][value].0[dimension] ^= directions[dimension][31 - (byte * 8 + bit)];
+                        dimension += 1;
+                    }
                 }
                 bit += 1;
             }
@@ -79,48 +106,31 @@ const fn byte_tables(directions: [u32; 32]) -> [[u32; 256]; 4] {
     tables
 }
 
-static DIMENSION_1: [[u32; 256]; 4] = byte_tables(reversed_directions(1, 0, [1, 0, 0]));
-static DIMENSION_2: [[u32; 256]; 4] = byte_tables(reversed_directions(2, 1, [1, 3, 0]));
-static DIMENSION_3: [[u32; 256]; 4] = byte_tables(reversed_directions(3, 1, [1, 3, 1]));
-
-fn reversed_point(tables: &[[u32; 256]; 4], index: u32) -> u32 {
-    let b = index.to_le_bytes();
-    tables[0][b[0] as usize] ^ tables[1][b[1] as usize] ^ tables[2][b[2] as usize] ^ tables[3][b[3] as usize]
+/// The point with a bit-reversed index, its digits reversed too.
+#[inline(always)]
+fn reversed_point(reversed_index: u32) -> [u32; 4] {
+    let bytes = reversed_index.to_le_bytes();
+    let [a, b, c, d] = std::array::from_fn(|byte| &DIRECTIONS[byte][bytes[byte] as usize].0);
+    std::array::from_fn(|dimension| a[dimension] ^ b[dimension] ^ c[dimension] ^ d[dimension])
 }
 
 /// To [0, 1) with the 24 bits that f32 holds.
-fn to_unit(reversed: u32) -> f32 {
-    (reversed.reverse_bits() >> 8) as f32 * (1.0 / 16_777_216.0)
+#[inline(always)]
+fn to_unit(reversed: [u32; 4]) -> [f32; 4] {
+    reversed.map(|digits| (digits.reverse_bits() >> 8) as i32 as f32 * (1.0 / 16_777_216.0))
 }
 
-/// A point of the four-dimensional Sobol sequence whose order and digits are scrambled by a seed, one number at a time: who asks
-/// for three does not pay for the fourth.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct ScrambledPoint {
-    shuffled_index: u32,
-    seed: u32,
-}
-
-impl ScrambledPoint {
-    #[inline(always)]
-    pub(super) fn new(index: u32, seed: u32) -> Self {
-        Self { shuffled_index: hash_low_to_high(index.reverse_bits(), seed).reverse_bits(), seed }
+/// The four numbers in [0, 1) at a bit-reversed index of the Sobol sequence, its order and digits scrambled by a seed.
+///
+/// All four at once, in vectors of the baseline target: 110 instructions, of which three by themselves took 155.
+#[inline(always)]
+pub(super) fn scrambled_point(reversed_index: u32, seed: u32) -> [f32; 4] {
+    let mut point = reversed_point(hash_low_to_high(reversed_index, seed));
+    for (dimension, digits) in point.iter_mut().enumerate() {
+        let digit_seed = mix32(seed ^ (dimension as u32 + 1).wrapping_mul(0x9e37_79b9));
+        *digits = hash_low_to_high(*digits, digit_seed);
     }
-
-    /// In [0, 1); `dimension` is below 4.
-    #[inline(always)]
-    pub(super) fn number(self, dimension: u32) -> f32 {
-        let index = self.shuffled_index;
-        let reversed = match dimension {
-            // The first dimension is the radical inverse: its reversed digits are the index itself.
-            0 => index,
-            1 => reversed_point(&DIMENSION_1, index),
-            2 => reversed_point(&DIMENSION_2, index),
-            _ => reversed_point(&DIMENSION_3, index),
-        };
-        let digit_seed = mix32(self.seed ^ (dimension + 1).wrapping_mul(0x9e37_79b9));
-        to_unit(hash_low_to_high(reversed, digit_seed))
-    }
+    to_unit(point)
 }
 
 #[cfg(test)]
@@ -130,8 +140,10 @@ mod tests {
     /// The unscrambled sequence begins with the published points (Joe and Kuo 2008, in binary order, not Gray code).
     #[test]
     fn directions_give_the_published_points() {
-        let point =
-            |i: u32| [to_unit(i), to_unit(reversed_point(&DIMENSION_1, i)), to_unit(reversed_point(&DIMENSION_2, i))];
+        let point = |i: u32| {
+            let [x, y, z, _] = to_unit(reversed_point(i.reverse_bits()));
+            [x, y, z]
+        };
         assert_eq!(point(0), [0.0, 0.0, 0.0]);
         assert_eq!(point(1), [0.5, 0.5, 0.5]);
         assert_eq!(point(2), [0.25, 0.75, 0.75]);
