@@ -81,9 +81,6 @@ pub trait PrimitiveTree: Sized {
     fn any(&self, origin: Vec3A, direction: Vec3A, t_max: f32, test: impl FnMut(usize, f32) -> f32) -> bool;
 }
 
-/// Up to so many primitives are tested one after the other: a walk costs more than it saves.
-const FEW: usize = 4;
-
 /// obvhs's binary tree, walked by obvhs: for few large things such as instances, in any coordinates.
 pub struct BinaryTree {
     tree: Bvh2,
@@ -163,16 +160,6 @@ impl PrimitiveTree for BinaryTree {
         t_max: f32,
         mut test: impl FnMut(usize, f32) -> f32,
     ) -> Option<(usize, f32)> {
-        if self.order.len() <= FEW {
-            let mut best = None;
-            for i in 0..self.order.len() {
-                let t = test(i, best.map_or(t_max, |(_, t)| t));
-                if t < best.map_or(t_max, |(_, t)| t) {
-                    best = Some((i, t));
-                }
-            }
-            return best;
-        }
         let mut hit = RayHit::none();
         let ray = TreeRay::new(origin, direction, 0.0, t_max);
         self.tree
@@ -182,9 +169,6 @@ impl PrimitiveTree for BinaryTree {
 
     #[inline]
     fn any(&self, origin: Vec3A, direction: Vec3A, t_max: f32, mut test: impl FnMut(usize, f32) -> f32) -> bool {
-        if self.order.len() <= FEW {
-            return (0..self.order.len()).any(|i| test(i, t_max) < t_max);
-        }
         let ray = TreeRay::new(origin, direction, 0.0, t_max);
         !self.tree.ray_traverse_miss(ray, |ray, id| test(id, ray.tmax))
     }

@@ -27,23 +27,18 @@ pub struct TriangleHit {
     pub b2: f32,
 }
 
+/// The other two axes by the longest one: in turn, and the other way around for rays towards −z, which keeps the winding.
+const OTHER_AXES: [[[usize; 2]; 2]; 3] = [[[1, 2], [2, 1]], [[2, 0], [0, 2]], [[0, 1], [1, 0]]];
+
 impl ShearedRay {
     /// `direction` must not be zero.
     pub fn new(origin: Vec3A, direction: Vec3A) -> Self {
         let d = direction.to_array();
         let magnitude = direction.abs().to_array();
-        let axis_z = if magnitude[0] > magnitude[1] {
-            if magnitude[0] > magnitude[2] { 0 } else { 2 }
-        } else if magnitude[1] > magnitude[2] {
-            1
-        } else {
-            2
-        };
-        let (mut axis_x, mut axis_y) = ((axis_z + 1) % 3, (axis_z + 2) % 3);
-        // Keeps the winding when the ray runs towards −z.
-        if d[axis_z] < 0.0 {
-            std::mem::swap(&mut axis_x, &mut axis_y);
-        }
+        // By look-up: branches on the direction of a bounce would be guessed wrong half of the time.
+        let larger = usize::from(magnitude[0] <= magnitude[1]);
+        let axis_z = if magnitude[larger] > magnitude[2] { larger } else { 2 };
+        let [axis_x, axis_y] = OTHER_AXES[axis_z][usize::from(d[axis_z] < 0.0)];
         Self {
             origin: origin.to_array(),
             axes: [axis_x, axis_y, axis_z],

@@ -110,13 +110,17 @@ pub(super) struct BoxRay {
 
 impl BoxRay {
     fn new(origin: Vec3A, direction: Vec3A) -> Self {
-        let inverse = direction.to_array().map(|d| {
-            // Finite, so that no product with it is NaN.
-            const LEAST: f32 = 1e-18;
-            1.0 / if d.abs() < LEAST { LEAST.copysign(d) } else { d }
-        });
-        let near = std::array::from_fn(|axis| 2 * axis + usize::from(inverse[axis] < 0.0));
-        Self { origin: origin.to_array(), inverse, inverse_far: inverse.map(|i| i * 1.000_000_4), near }
+        // Finite, so that no product with it is NaN.
+        const LEAST: Vec3A = Vec3A::splat(1e-18);
+        let too_small = direction.abs().cmplt(LEAST);
+        let inverse = 1.0 / Vec3A::select(too_small, LEAST.copysign(direction), direction);
+        let negative = inverse.cmplt(Vec3A::ZERO).bitmask() as usize;
+        Self {
+            origin: origin.to_array(),
+            inverse: inverse.to_array(),
+            inverse_far: (inverse * 1.000_000_4).to_array(),
+            near: std::array::from_fn(|axis| 2 * axis + (negative >> axis & 1)),
+        }
     }
 }
 

@@ -46,7 +46,7 @@ pub struct World {
     fixed: MeshTree,
     /// Trees of meshes that are placed several times.
     shared: Vec<MeshTree>,
-    /// Over `items`, when there is more than the fixed tree.
+    /// Over `items`, when they are more than [`FEW`].
     top: Option<BinaryTree>,
     items: Vec<Item>,
     center: Vec3,
@@ -56,6 +56,9 @@ pub struct World {
     /// By instance.
     placements: Vec<Placement>,
 }
+
+/// Up to so many items are tested one after the other: a walk costs more than it saves.
+const FEW: usize = 4;
 
 /// What a leaf of the top tree holds.
 #[derive(Debug)]
@@ -131,15 +134,7 @@ impl World {
             item_bounds.push(s.motion.as_ref().map_or(bounds, |motion| swept_bounds(motion, bounds)));
         }
         let bounds = item_bounds.iter().fold(Bounds::EMPTY, |all, b| all.union(*b));
-        let only_fixed = matches!(items[..], [Item::Fixed]);
-        let (top, items) = if only_fixed {
-            (None, items)
-        } else {
-            let tree = BinaryTree::build(&item_bounds);
-            let mut slots: Vec<Option<Item>> = items.into_iter().map(Some).collect();
-            let ordered = tree.order().iter().filter_map(|&i| slots[i as usize].take()).collect();
-            (Some(tree), ordered)
-        };
+        let (top, items) = arranged(items, &item_bounds);
         let has_alpha = scene.materials.iter().any(|m| m.alpha != Alpha::Opaque);
         let (center, radius) = if bounds.is_finite() {
             let center = (bounds.min + bounds.max) * 0.5;
@@ -193,42 +188,21 @@ impl World {
     /// The closest surface along the ray.
     #[inline]
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
-        match &self.top {
-            None => self.closest_fixed(ray, f32::INFINITY),
-            Some(top) => self.closest_of_items(top, ray),
-        }
-    }
-
-    fn closest_of_items(&self, top: &BinaryTree, ray: &Ray) -> Option<Hit> {
-        let mut best = None;
-        top.closest(ray.origin, ray.direction, f32::INFINITY, |i, t_max| {
-            let hit = match &self.items[i] {
-                Item::Fixed => self.closest_fixed(ray, t_max),
-                Item::Placed { instance, shared, to_mesh } => {
-                    let local = LocalRay::new(ray, to_mesh);
-                    self.shared[*shared]
-                        .closest(local.origin, local.direction, t_max * local.length, |h| {
-                            self.is_there(*instance, h, ray)
-                        })
-                        .map(|h| world_hit(*instance, h, h.t / local.length))
+        let mut best: Option<Hit> = None;
+        let mut t_max = f32::INFINITY;
+        let Some(top) = &self.top else {
+            for item in &self.items {
+                if let Some(hit) = self.closest_of_item(item, ray, t_max)
+                    && hit.distance < t_max
+                {
+                    t_max = hit.distance;
+                    best = Some(hit);
                 }
-                Item::Moving { instance, shared } => {
-                    let local = LocalRay::new(ray, &self.transform_at(*instance, ray.time).inverse());
-                    self.shared[*shared]
-                        .closest(local.origin, local.direction, t_max * local.length, |h| {
-                            self.is_there(*instance, h, ray)
-                        })
-                        .map(|h| world_hit(*instance, h, h.t / local.length))
-                }
-                Item::Sphere { object, center, radius } => {
-                    sphere::intersect(ray, *center, *radius, t_max).map(|distance| Hit::on_sphere(*object, distance))
-                }
-                Item::MovingSphere { object } => {
-                    let (center, radius) = self.sphere_at(*object, ray.time);
-                    sphere::intersect(ray, center, radius, t_max).map(|distance| Hit::on_sphere(*object, distance))
-                }
-            };
-            match hit {
+            }
+            return best;
+        };
+        top.closest(ray.origin, ray.direction, t_max, |i, t_max| {
+            match self.closest_of_item(&self.items[i], ray, t_max) {
                 Some(hit) if hit.distance < t_max => {
                     best = Some(hit);
                     hit.distance
@@ -239,37 +213,75 @@ impl World {
         best
     }
 
+    /// The closest surface of an item nearer than `t_max`.
+    #[inline]
+    fn closest_of_item(&self, item: &Item, ray: &Ray, t_max: f32) -> Option<Hit> {
+        match item {
+            Item::Fixed => self.closest_fixed(ray, t_max),
+            Item::Sphere { object, center, radius } => {
+                sphere::intersect(ray, *center, *radius, t_max).map(|distance| Hit::on_sphere(*object, distance))
+            }
+            Item::MovingSphere { object } => {
+                let (center, radius) = self.sphere_at(*object, ray.time);
+                sphere::intersect(ray, center, radius, t_max).map(|distance| Hit::on_sphere(*object, distance))
+            }
+            Item::Placed { instance, shared, to_mesh } => {
+                self.closest_of_instance(*instance, *shared, &LocalRay::new(ray, to_mesh), ray, t_max)
+            }
+            Item::Moving { instance, shared } => {
+                let to_mesh = self.transform_at(*instance, ray.time).inverse();
+                self.closest_of_instance(*instance, *shared, &LocalRay::new(ray, &to_mesh), ray, t_max)
+            }
+        }
+    }
+
+    fn closest_of_instance(
+        &self,
+        instance: u32,
+        shared: usize,
+        local: &LocalRay,
+        ray: &Ray,
+        t_max: f32,
+    ) -> Option<Hit> {
+        self.shared[shared]
+            .closest(local.origin, local.direction, t_max * local.length, |h| self.is_there(instance, h, ray))
+            .map(|h| world_hit(instance, h, h.t / local.length))
+    }
+
     /// Whether anything is nearer than `distance` along the ray.
     #[inline]
     pub fn occluded(&self, ray: &Ray, distance: f32) -> bool {
         match &self.top {
-            None => self.occluded_by_fixed(ray, distance),
-            Some(top) => self.occluded_by_items(top, ray, distance),
+            None => self.items.iter().any(|item| self.is_before(item, ray, distance)),
+            Some(top) => top.any(ray.origin, ray.direction, distance, |i, t_max| {
+                if self.is_before(&self.items[i], ray, t_max) { 0.0 } else { f32::INFINITY }
+            }),
         }
     }
 
-    fn occluded_by_items(&self, top: &BinaryTree, ray: &Ray, distance: f32) -> bool {
-        top.any(ray.origin, ray.direction, distance, |i, t_max| {
-            let blocked = match &self.items[i] {
-                Item::Fixed => self.occluded_by_fixed(ray, t_max),
-                Item::Placed { instance, shared, to_mesh } => {
-                    let local = LocalRay::new(ray, to_mesh);
-                    self.shared[*shared]
-                        .any(local.origin, local.direction, t_max * local.length, |h| self.is_there(*instance, h, ray))
-                }
-                Item::Moving { instance, shared } => {
-                    let local = LocalRay::new(ray, &self.transform_at(*instance, ray.time).inverse());
-                    self.shared[*shared]
-                        .any(local.origin, local.direction, t_max * local.length, |h| self.is_there(*instance, h, ray))
-                }
-                Item::Sphere { center, radius, .. } => sphere::intersect(ray, *center, *radius, t_max).is_some(),
-                Item::MovingSphere { object } => {
-                    let (center, radius) = self.sphere_at(*object, ray.time);
-                    sphere::intersect(ray, center, radius, t_max).is_some()
-                }
-            };
-            if blocked { 0.0 } else { f32::INFINITY }
-        })
+    /// Whether anything of an item is nearer than `t_max` along the ray.
+    #[inline]
+    fn is_before(&self, item: &Item, ray: &Ray, t_max: f32) -> bool {
+        match item {
+            Item::Fixed => self.occluded_by_fixed(ray, t_max),
+            Item::Sphere { center, radius, .. } => sphere::intersect(ray, *center, *radius, t_max).is_some(),
+            Item::MovingSphere { object } => {
+                let (center, radius) = self.sphere_at(*object, ray.time);
+                sphere::intersect(ray, center, radius, t_max).is_some()
+            }
+            Item::Placed { instance, shared, to_mesh } => {
+                self.occluded_by_instance(*instance, *shared, &LocalRay::new(ray, to_mesh), ray, t_max)
+            }
+            Item::Moving { instance, shared } => {
+                let to_mesh = self.transform_at(*instance, ray.time).inverse();
+                self.occluded_by_instance(*instance, *shared, &LocalRay::new(ray, &to_mesh), ray, t_max)
+            }
+        }
+    }
+
+    fn occluded_by_instance(&self, instance: u32, shared: usize, local: &LocalRay, ray: &Ray, t_max: f32) -> bool {
+        self.shared[shared]
+            .any(local.origin, local.direction, t_max * local.length, |h| self.is_there(instance, h, ray))
     }
 
     fn closest_fixed(&self, ray: &Ray, t_max: f32) -> Option<Hit> {
@@ -283,10 +295,12 @@ impl World {
     }
 
     /// Whether alpha leaves this point of the surface in place.
+    #[inline]
     fn is_there(&self, instance: u32, hit: &MeshHit, ray: &Ray) -> bool {
-        if !self.has_alpha {
-            return true;
-        }
+        !self.has_alpha || self.is_covered(instance, hit, ray)
+    }
+
+    fn is_covered(&self, instance: u32, hit: &MeshHit, ray: &Ray) -> bool {
         let instance = &self.scene.instances[instance as usize];
         let coverage = |value: &ScalarInput| {
             let mesh = &self.scene.meshes[instance.mesh.0 as usize];
@@ -315,6 +329,18 @@ impl LocalRay {
         let length = direction.length();
         Self { origin: to_mesh.transform_point3a(ray.origin), direction: direction / length, length }
     }
+}
+
+/// Items in the order in which they are met, with a tree over them where they are many; those without a finite box are left out.
+fn arranged(items: Vec<Item>, bounds: &[Bounds]) -> (Option<BinaryTree>, Vec<Item>) {
+    if items.len() <= FEW {
+        let finite = items.into_iter().zip(bounds).filter(|(_, bounds)| bounds.is_finite());
+        return (None, finite.map(|(item, _)| item).collect());
+    }
+    let tree = BinaryTree::build(bounds);
+    let mut slots: Vec<Option<Item>> = items.into_iter().map(Some).collect();
+    let ordered = tree.order().iter().filter_map(|&i| slots[i as usize].take()).collect();
+    (Some(tree), ordered)
 }
 
 fn world_hit(instance: u32, hit: MeshHit, distance: f32) -> Hit {
