@@ -72,6 +72,13 @@ impl Frame {
         self.0.transpose() * world
     }
 
+    /// Local to world, for a direction whose length is 1 to within 1e-4: in the world it is 1 to within f32, by one step of Newton's
+    /// towards the inverse root.
+    pub fn to_world_direction(&self, local: Vec3) -> Vec3 {
+        let world = self.to_world(local);
+        world * (1.5 - 0.5 * world.length_squared())
+    }
+
     /// Local to world.
     pub fn to_world(&self, local: Vec3) -> Vec3 {
         self.0 * local

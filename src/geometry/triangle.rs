@@ -33,18 +33,25 @@ const OTHER_AXES: [[[usize; 2]; 2]; 3] = [[[1, 2], [2, 1]], [[2, 0], [0, 2]], [[
 impl ShearedRay {
     /// `direction` must not be zero.
     pub fn new(origin: Vec3A, direction: Vec3A) -> Self {
+        Self::with_inverse(origin, direction, (1.0 / direction).to_array())
+    }
+
+    /// The same where the inverse of the direction is known; what it says of axes other than the longest does not matter.
+    #[inline]
+    pub(super) fn with_inverse(origin: Vec3A, direction: Vec3A, inverse: [f32; 3]) -> Self {
         let d = direction.to_array();
         let magnitude = direction.abs().to_array();
         // By look-up: branches on the direction of a bounce would be guessed wrong half of the time.
         let larger = usize::from(magnitude[0] <= magnitude[1]);
         let axis_z = if magnitude[larger] > magnitude[2] { larger } else { 2 };
         let [axis_x, axis_y] = OTHER_AXES[axis_z][usize::from(d[axis_z] < 0.0)];
+        let scale_z = inverse[axis_z];
         Self {
             origin: origin.to_array(),
             axes: [axis_x, axis_y, axis_z],
-            shear_x: d[axis_x] / d[axis_z],
-            shear_y: d[axis_y] / d[axis_z],
-            scale_z: 1.0 / d[axis_z],
+            shear_x: d[axis_x] * scale_z,
+            shear_y: d[axis_y] * scale_z,
+            scale_z,
         }
     }
 

@@ -204,8 +204,9 @@ impl WideTree {
     /// The corners of the triangle of a [`WideHit::place`].
     #[inline]
     pub(super) fn corners(&self, place: u32) -> [Vec3A; 3] {
-        let place = place as usize;
-        self.blocks[place / LANES].triangle(place % LANES).map(Vec3A::from)
+        let (block, lane) = (&self.blocks[place as usize / LANES], place as usize % LANES);
+        let [x, y, z] = &block.corners;
+        std::array::from_fn(|vertex| Vec3A::new(x[vertex][lane], y[vertex][lane], z[vertex][lane]))
     }
 
     /// Memory in bytes.
@@ -224,14 +225,16 @@ impl WideTree {
         t_max: f32,
         accept: impl Fn(&WideHit) -> bool,
     ) -> Option<WideHit> {
-        let (boxes, sheared) = (BoxRay::new(origin, direction), ShearedRay::new(origin, direction));
+        let boxes = BoxRay::new(origin, direction);
+        let sheared = ShearedRay::with_inverse(origin, direction, boxes.inverse);
         simd::closest(self.path, self, &boxes, &sheared, t_max, accept)
     }
 
     /// Whether anything that `accept` lets stand is nearer than `t_max`.
     #[inline]
     pub(super) fn any(&self, origin: Vec3A, direction: Vec3A, t_max: f32, accept: impl Fn(&WideHit) -> bool) -> bool {
-        let (boxes, sheared) = (BoxRay::new(origin, direction), ShearedRay::new(origin, direction));
+        let boxes = BoxRay::new(origin, direction);
+        let sheared = ShearedRay::with_inverse(origin, direction, boxes.inverse);
         simd::any(self.path, self, &boxes, &sheared, t_max, accept)
     }
 

@@ -164,8 +164,9 @@ impl PathTracer {
         if scattered.value == Vec3::ZERO {
             return;
         }
-        let weight = if light.is_delta { 1.0 } else { power_heuristic(light.pdf, scattered.pdf) };
-        let unshadowed = path.throughput * scattered.value * light.radiance * (weight / light.pdf);
+        let scatter_pdf = if light.is_delta { 0.0 } else { scattered.pdf };
+        let weight = power_heuristic_over_own(light.pdf, scatter_pdf);
+        let unshadowed = path.throughput * scattered.value * light.radiance * weight;
         let survival = self.thresholds.as_ref().map_or(1.0, |thresholds| {
             let of = |rgb: Vec3| luminance(rgb.to_array());
             thresholds.survival(of(unshadowed * path.radiance_gain_on_exit), of(path.radiance))
@@ -213,7 +214,7 @@ fn scatter(path: &mut PathState, point: &SurfacePoint, shading: &Shading, wo: Ve
     let Some(scattered) = shading.bsdf.sample(shading.frame.to_local(wo), u) else {
         return false;
     };
-    let wi = shading.frame.to_world(scattered.wi).normalize();
+    let wi = shading.frame.to_world_direction(scattered.wi);
     if !shading.sides_agree(wo, wi) {
         return false;
     }
@@ -253,4 +254,10 @@ fn power_heuristic(own: f32, other: f32) -> f32 {
     }
     let ratio = other / own;
     if ratio.is_nan() { 0.0 } else { 1.0 / (1.0 + ratio * ratio) }
+}
+
+/// The weight over the technique's own density, in one division less.
+fn power_heuristic_over_own(own: f32, other: f32) -> f32 {
+    let ratio = other / own;
+    if ratio.is_nan() { 0.0 } else { 1.0 / (own * (1.0 + ratio * ratio)) }
 }

@@ -237,6 +237,7 @@ impl PathTracer {
 }
 
 /// The frame around a normal whose x axis is the tangent of anisotropic surfaces.
+#[inline(always)]
 fn stretched_frame(material: &Material, textures: &[Texture], point: &SurfacePoint, normal: Vec3) -> Frame {
     let along_u = Frame::new(normal, point.tangent);
     let Some(stretch) = &material.stretch else { return along_u };

@@ -19,8 +19,10 @@ pub(super) struct FlatEmitter {
     edge_2: Vec3,
     /// Middle of the outline.
     center: Vec3,
-    /// No point is farther than this from the centre.
-    radius: f32,
+    /// Square of the distance of the centre beyond which it looks smaller than [`LEAST`].
+    speck_beyond_squared: f32,
+    /// Likewise smaller than [`MOST_BILINEAR`].
+    bilinear_beyond_squared: f32,
     /// Unit normal of the front.
     pub(super) normal: Vec3,
     pub(super) area: f32,
@@ -63,6 +65,9 @@ impl FlatEmitter {
     pub(super) fn triangle(object: u32, triangle: u32, corners: [Vec3; 3], mirrored: bool, both_sides: bool) -> Self {
         let (edge_1, edge_2) = (corners[1] - corners[0], corners[2] - corners[0]);
         let scaled_normal = edge_1.cross(edge_2);
+        let area = 0.5 * scaled_normal.length();
+        let from_center = [2.0 * edge_1 - edge_2, 2.0 * edge_2 - edge_1, edge_1 + edge_2];
+        let radius = from_center.map(Vec3::length).into_iter().fold(0.0, f32::max) / 3.0;
         Self {
             object,
             triangle,
@@ -71,13 +76,10 @@ impl FlatEmitter {
             edge_1,
             edge_2,
             center: corners[0] + (edge_1 + edge_2) / 3.0,
-            radius: (2.0 * edge_1 - edge_2)
-                .length()
-                .max((2.0 * edge_2 - edge_1).length())
-                .max((edge_1 + edge_2).length())
-                / 3.0,
+            speck_beyond_squared: squared_distance_at(LEAST as f32, area, radius),
+            bilinear_beyond_squared: squared_distance_at(MOST_BILINEAR, area, radius),
             normal: scaled_normal.normalize_or(Vec3::Y) * if mirrored { -1.0 } else { 1.0 },
-            area: 0.5 * scaled_normal.length(),
+            area,
             both_sides,
             even_radiance: None,
         }
@@ -107,7 +109,17 @@ impl FlatEmitter {
         let even_radiance = Some(material.emission.factor);
         let center = self.corner + 0.5 * (edge_1 + edge_2);
         let radius = 0.5 * (edge_1 + edge_2).length().max((edge_1 - edge_2).length());
-        Some(Self { outline, edge_2, center, radius, area: self.area + next.area, even_radiance, ..self.clone() })
+        let area = self.area + next.area;
+        Some(Self {
+            outline,
+            edge_2,
+            center,
+            speck_beyond_squared: squared_distance_at(LEAST as f32, area, radius),
+            bilinear_beyond_squared: squared_distance_at(MOST_BILINEAR, area, radius),
+            area,
+            even_radiance,
+            ..self.clone()
+        })
     }
 
     /// Corners of its outline, for bounds.
@@ -174,13 +186,12 @@ impl FlatEmitter {
     }
 
     fn view(&self, receiver: &LightReceiver) -> View {
-        // What looks small from its size and distance needs no closer look: A/d² bounds the solid angle only where the
-        // emitter is not much nearer than its centre, so the nearest it can be is taken.
-        let nearest = (self.center - receiver.position).length() - self.radius;
-        let looks_below = |solid_angle: f32| nearest > 0.0 && self.area < solid_angle * nearest * nearest;
-        if looks_below(LEAST as f32) {
+        // What looks small from its size and distance needs no closer look.
+        let squared_distance = self.center.distance_squared(receiver.position);
+        if squared_distance > self.speck_beyond_squared {
             return View::Even;
         }
+        let is_near = squared_distance <= self.bilinear_beyond_squared;
         match &self.outline {
             Outline::Triangle => {
                 let corner = self.corner - receiver.position;
@@ -188,17 +199,23 @@ impl FlatEmitter {
                 let triangle = SphericalTriangle::new([corner.as_dvec3(), others[0], others[1]]);
                 if triangle.solid_angle > LEAST { View::Triangle(triangle) } else { View::Even }
             }
-            Outline::Rectangle(_, edges) if !looks_below(MOST_BILINEAR) => {
+            Outline::Rectangle(_, edges) if is_near => {
                 let corner = self.corner - receiver.position;
                 let rectangle = SphericalRectangle::new(corner.as_dvec3(), edges.axes, edges.lengths);
                 if rectangle.solid_angle > LEAST { View::Rectangle(rectangle) } else { View::Even }
             }
-            Outline::Parallelogram(_) if !looks_below(MOST_BILINEAR) => View::Even,
+            Outline::Parallelogram(_) if is_near => View::Even,
             Outline::Rectangle(corners, _) | Outline::Parallelogram(corners) => {
                 View::Bilinear(BilinearDensity::of_irradiance(&corners.seen_from(receiver.position), receiver.normal))
             }
         }
     }
+}
+
+/// Square of the distance from which an emitter of this area, none of which is farther than `radius` from its centre, looks smaller than
+/// a solid angle: A/d² bounds that only where the emitter is not much nearer than its centre, so the nearest it can be is taken.
+fn squared_distance_at(solid_angle: f32, area: f32, radius: f32) -> f32 {
+    (radius + (area / solid_angle).sqrt()).powi(2)
 }
 
 /// How an emitter is sampled from one point.
