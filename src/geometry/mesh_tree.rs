@@ -13,8 +13,7 @@ use glam::{Affine3A, Vec3A};
 pub(super) struct MeshHit {
     /// Distance along the ray, in the units of the coordinates the tree was given.
     pub(super) t: f32,
-    pub(super) triangle: TriangleRef,
-    /// Where the tree has the triangle, for [`MeshTree::shape`].
+    /// Where the tree has the triangle, for [`MeshTree::triangle`] and [`MeshTree::shape`].
     pub(super) place: u32,
     pub(super) b1: f32,
     pub(super) b2: f32,
@@ -104,7 +103,13 @@ impl MeshTree {
         self.tree.any(origin, direction, t_max * self.scale, |h| accept(&self.given(h)))
     }
 
-    /// The triangle of a [`MeshHit::place`], in the coordinates that the tree was given: to within the rounding of the tree's own,
+    /// Which triangle is at a [`MeshHit::place`].
+    #[inline]
+    pub(super) fn triangle(&self, place: u32) -> TriangleRef {
+        self.tree.reference(place)
+    }
+
+    /// The triangle at a [`MeshHit::place`], in the coordinates that the tree was given: to within the rounding of the tree's own,
     /// half a unit in the last place of their extent, and from memory that the walk has just read.
     #[inline]
     pub(super) fn shape(&self, place: u32) -> TriangleShape {
@@ -119,7 +124,7 @@ impl MeshTree {
     #[inline]
     fn given(&self, found: &WideHit) -> MeshHit {
         let hit = &found.hit;
-        MeshHit { t: hit.t * self.inverse_scale, triangle: found.reference, place: found.place, b1: hit.b1, b2: hit.b2 }
+        MeshHit { t: hit.t * self.inverse_scale, place: found.place, b1: hit.b1, b2: hit.b2 }
     }
 }
 

@@ -156,8 +156,7 @@ pub(super) struct Candidates {
 /// A triangle hit by a ray.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct WideHit {
-    pub(super) reference: TriangleRef,
-    /// Where the tree has the triangle, for [`WideTree::corners`].
+    /// Where the tree has the triangle, for [`WideTree::reference`] and [`WideTree::corners`].
     pub(super) place: u32,
     pub(super) hit: TriangleHit,
 }
@@ -199,6 +198,12 @@ impl WideTree {
             }
         }
         tree
+    }
+
+    /// Which triangle is at a [`WideHit::place`]. Read once a ray, not once a candidate: in a large tree that is a wait for memory.
+    #[inline]
+    pub(super) fn reference(&self, place: u32) -> TriangleRef {
+        self.references[place as usize]
     }
 
     /// The corners of the triangle of a [`WideHit::place`].
@@ -294,12 +299,13 @@ impl WideTree {
                     let lane = lanes.trailing_zeros();
                     lanes &= lanes - 1;
                     let Some(hit) = self.hit_of_lane(block, &found, lane, sheared, t_max) else { continue };
-                    let found = self.wide_hit(index, lane, hit);
+                    let found = WideHit { place: place(index, lane), hit };
                     let stands = match &best {
-                        Some(best) => hit.t < best.hit.t || found.reference < best.reference,
+                        Some(best) => hit.t < best.hit.t || self.reference(found.place) < self.reference(best.place),
                         None => hit.t < t_max,
                     };
                     if stands && hit.t <= t_max && accept(&found) {
+                        simd::prefetch(&self.references[found.place as usize]);
                         t_max = hit.t;
                         best = Some(found);
                     }
@@ -354,7 +360,7 @@ impl WideTree {
                     lanes &= lanes - 1;
                     if let Some(hit) = self.hit_of_lane(block, &found, lane, sheared, t_max)
                         && hit.t < t_max
-                        && accept(&self.wide_hit(index, lane, hit))
+                        && accept(&WideHit { place: place(index, lane), hit })
                     {
                         return true;
                     }
@@ -363,12 +369,6 @@ impl WideTree {
             let Some(waiting) = stack.pop() else { return false };
             current = Child(waiting as u32);
         }
-    }
-
-    #[inline(always)]
-    fn wide_hit(&self, block: usize, lane: u32, hit: TriangleHit) -> WideHit {
-        let place = block * LANES + lane as usize;
-        WideHit { reference: self.references[place], place: place as u32, hit }
     }
 
     #[inline(always)]
@@ -396,6 +396,12 @@ impl WideTree {
             simd::prefetch(&self.blocks[index]);
         }
     }
+}
+
+/// The place of a triangle by block and lane.
+#[inline(always)]
+fn place(block: usize, lane: u32) -> u32 {
+    (block * LANES) as u32 + lane
 }
 
 #[cfg(test)]
@@ -437,9 +443,8 @@ mod tests {
         })
     }
 
-    fn same(a: Option<WideHit>, b: Option<WideHit>) -> bool {
-        let bits = |h: WideHit| (h.reference, [h.hit.t, h.hit.b1, h.hit.b2].map(f32::to_bits));
-        a.map(bits) == b.map(bits)
+    fn bits(hit: &TriangleHit) -> [u32; 3] {
+        [hit.t, hit.b1, hit.b2].map(f32::to_bits)
     }
 
     /// Every set of instructions gives the same bytes as testing all triangles one by one does, of two equal hits the one
@@ -451,12 +456,11 @@ mod tests {
         let mut hits = 0;
         for (i, (origin, direction)) in rays().enumerate() {
             let sheared = ShearedRay::new(origin, direction);
-            let mut brute: Option<WideHit> = None;
+            let mut brute: Option<(u32, TriangleHit)> = None;
             for (number, corners) in triangles.iter().enumerate() {
-                let t_max = brute.map_or(f32::INFINITY, |b| b.hit.t);
-                let reference = TriangleRef { instance: 0, triangle: number as u32 };
+                let t_max = brute.map_or(f32::INFINITY, |(_, b)| b.t);
                 match sheared.intersect(&corners.map(|c| c.to_array()), t_max) {
-                    Some(hit) if hit.t < t_max => brute = Some(WideHit { reference, place: number as u32, hit }),
+                    Some(hit) if hit.t < t_max => brute = Some((number as u32, hit)),
                     _ => {}
                 }
             }
@@ -464,15 +468,17 @@ mod tests {
             for path in [Path::best(), Path::PORTABLE] {
                 tree.path = path;
                 let closest = tree.closest(origin, direction, f32::INFINITY, |_| true);
-                assert!(same(closest, brute), "ray {i}, {path:?}: {closest:?}, not {brute:?}");
+                let found = closest.map(|h| (tree.reference(h.place).triangle, bits(&h.hit)));
+                let expected = brute.map(|(number, hit)| (number, bits(&hit)));
+                assert_eq!(found, expected, "ray {i}, {path:?}: {closest:?}, not {brute:?}");
                 assert_eq!(tree.any(origin, direction, f32::INFINITY, |_| true), brute.is_some(), "ray {i}, {path:?}");
-                if let Some(brute) = brute {
-                    let t = brute.hit.t;
+                if let Some((number, TriangleHit { t, .. })) = brute {
                     assert!(!tree.any(origin, direction, t, |_| true), "ray {i}: a hit at the end is not before it");
                     assert!(tree.closest(origin, direction, t, |_| true).is_none(), "ray {i}");
-                    let rest = tree.closest(origin, direction, f32::INFINITY, |h| h.reference != brute.reference);
-                    let twin = rest.expect("each triangle is there twice").reference.triangle;
-                    assert_eq!(twin, brute.reference.triangle + 700, "ray {i}: the twin of what is not accepted");
+                    let is_other = |h: &WideHit| tree.reference(h.place).triangle != number;
+                    let rest = tree.closest(origin, direction, f32::INFINITY, is_other);
+                    let twin = tree.reference(rest.expect("each triangle is there twice").place).triangle;
+                    assert_eq!(twin, number + 700, "ray {i}: the twin of what is not accepted");
                 }
             }
         }

@@ -243,9 +243,16 @@ impl World {
         ray: &Ray,
         t_max: f32,
     ) -> Option<Hit> {
-        self.shared[shared]
-            .closest(local.origin, local.direction, t_max * local.length, |h| self.is_there(instance, h, ray))
-            .map(|h| world_hit(instance, h, h.t / local.length))
+        let tree = &self.shared[shared];
+        let accept = |h: &MeshHit| self.is_there(tree, Some(instance), h, ray);
+        tree.closest(local.origin, local.direction, t_max * local.length, accept).map(|h| Hit {
+            distance: h.t / local.length,
+            object: instance,
+            triangle: tree.triangle(h.place).triangle,
+            place: h.place,
+            b1: h.b1,
+            b2: h.b2,
+        })
     }
 
     /// Whether anything is nearer than `distance` along the ray.
@@ -280,38 +287,42 @@ impl World {
     }
 
     fn occluded_by_instance(&self, instance: u32, shared: usize, local: &LocalRay, ray: &Ray, t_max: f32) -> bool {
-        self.shared[shared]
-            .any(local.origin, local.direction, t_max * local.length, |h| self.is_there(instance, h, ray))
+        let tree = &self.shared[shared];
+        let accept = |h: &MeshHit| self.is_there(tree, Some(instance), h, ray);
+        tree.any(local.origin, local.direction, t_max * local.length, accept)
     }
 
     fn closest_fixed(&self, ray: &Ray, t_max: f32) -> Option<Hit> {
-        self.fixed
-            .closest(ray.origin, ray.direction, t_max, |h| self.is_there(h.triangle.instance, h, ray))
-            .map(|h| world_hit(h.triangle.instance, h, h.t))
+        let accept = |h: &MeshHit| self.is_there(&self.fixed, None, h, ray);
+        self.fixed.closest(ray.origin, ray.direction, t_max, accept).map(|h| {
+            let TriangleRef { instance, triangle } = self.fixed.triangle(h.place);
+            Hit { distance: h.t, object: instance, triangle, place: h.place, b1: h.b1, b2: h.b2 }
+        })
     }
 
     fn occluded_by_fixed(&self, ray: &Ray, distance: f32) -> bool {
-        self.fixed.any(ray.origin, ray.direction, distance, |h| self.is_there(h.triangle.instance, h, ray))
+        self.fixed.any(ray.origin, ray.direction, distance, |h| self.is_there(&self.fixed, None, h, ray))
     }
 
     /// Whether alpha leaves this point of the surface in place.
     #[inline]
-    fn is_there(&self, instance: u32, hit: &MeshHit, ray: &Ray) -> bool {
-        !self.has_alpha || self.is_covered(instance, hit, ray)
+    fn is_there(&self, tree: &MeshTree, instance: Option<u32>, hit: &MeshHit, ray: &Ray) -> bool {
+        !self.has_alpha || self.is_covered(tree.triangle(hit.place), instance, hit, ray)
     }
 
-    fn is_covered(&self, instance: u32, hit: &MeshHit, ray: &Ray) -> bool {
-        let instance = &self.scene.instances[instance as usize];
+    /// The same of a triangle of an instance, or of the instance that the fixed tree names.
+    fn is_covered(&self, triangle: TriangleRef, instance: Option<u32>, hit: &MeshHit, ray: &Ray) -> bool {
+        let instance = &self.scene.instances[instance.unwrap_or(triangle.instance) as usize];
         let coverage = |value: &ScalarInput| {
             let mesh = &self.scene.meshes[instance.mesh.0 as usize];
-            let uv = interpolate_uv(mesh, hit.triangle.triangle, hit.b1, hit.b2);
+            let uv = interpolate_uv(mesh, triangle.triangle, hit.b1, hit.b2);
             value.evaluate(&self.scene.textures, uv)
         };
         match &self.scene.materials[instance.material.0 as usize].alpha {
             Alpha::Opaque => true,
             Alpha::Mask { value, cutoff } => coverage(value) >= *cutoff,
             // A random number that is a pure function of the ray and the triangle: the same ray always agrees with itself.
-            Alpha::Blend { value } => coverage(value) > ray_hash(ray, hit.triangle.triangle),
+            Alpha::Blend { value } => coverage(value) > ray_hash(ray, triangle.triangle),
         }
     }
 }
@@ -341,10 +352,6 @@ fn arranged(items: Vec<Item>, bounds: &[Bounds]) -> (Option<BinaryTree>, Vec<Ite
     let mut slots: Vec<Option<Item>> = items.into_iter().map(Some).collect();
     let ordered = tree.order().iter().filter_map(|&i| slots[i as usize].take()).collect();
     (Some(tree), ordered)
-}
-
-fn world_hit(instance: u32, hit: MeshHit, distance: f32) -> Hit {
-    Hit { distance, object: instance, triangle: hit.triangle.triangle, place: hit.place, b1: hit.b1, b2: hit.b2 }
 }
 
 fn own_triangles(scene: &Scene, mesh: usize) -> Vec<([Vec3A; 3], TriangleRef)> {
