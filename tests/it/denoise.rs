@@ -224,9 +224,11 @@ fn an_audit_finds_what_a_denoiser_makes_up() {
     let stripes = |x: usize| 1.0 + 0.2 * (x as f32 / 2.0).cos();
     let picture = &denoised.luminance_cd_m2;
     denoised.luminance_cd_m2 = Plane::from_fn(picture.width(), picture.height(), |x, y| stripes(x) * picture.get(x, y));
-    let deceived = scene.audited(1e3, 0);
+    // Six tiles of very different contrast a round: one round of twelve has an error that just reaches to 1.
+    let deceived: Vec<Audit> = (0..5).map(|round| scene.audited(1e3, round)).collect();
     println!("{deceived:?}");
-    assert!(deceived.disagrees() && deceived.ratio > honest.ratio + 1.0, "{deceived:?}");
+    assert!(deceived.iter().filter(|audit| audit.disagrees()).count() >= 4, "{deceived:?}");
+    assert!(deceived.iter().all(|audit| audit.ratio > honest.ratio + 1.0), "{deceived:?}");
 }
 
 fn half_luminance(film: &Film, half: Half, nits_per_unit: f64) -> Plane {
