@@ -11,6 +11,7 @@ mod distant;
 mod distribution;
 mod environment;
 mod flat;
+mod givers;
 mod punctual;
 mod solid_angle;
 mod sphere;

@@ -4,6 +4,7 @@
 //! intensity and a cone of normals; the tree is built by their surface area orientation heuristic and walked with
 //! probabilities in proportion to what each child can give at most. Not for lights without a place.
 
+use super::givers::Givers;
 use glam::Vec3;
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -32,7 +33,7 @@ pub struct LightReceiver {
 }
 
 impl LightBounds {
-    fn center(&self) -> Vec3 {
+    pub(super) fn center(&self) -> Vec3 {
         0.5 * (self.min + self.max)
     }
 
@@ -52,82 +53,6 @@ impl LightBounds {
             normal_angle,
             emission_angle: self.emission_angle.max(other.emission_angle),
         }
-    }
-}
-
-/// [`LightBounds`] as the walk needs them: no angle is computed on the way.
-#[derive(Clone, Copy, Debug)]
-struct Giver {
-    center: Vec3,
-    /// Squared, of the ball around the box.
-    radius_squared: f32,
-    intensity: f32,
-    axis: Vec3,
-    cos_normal: f32,
-    sin_normal: f32,
-    cos_emission: f32,
-}
-
-impl Giver {
-    fn new(bounds: &LightBounds) -> Self {
-        let (sin_normal, cos_normal) = bounds.normal_angle.sin_cos();
-        Self {
-            center: bounds.center(),
-            radius_squared: 0.25 * (bounds.max - bounds.min).length_squared(),
-            intensity: bounds.intensity,
-            axis: bounds.axis,
-            cos_normal: if bounds.normal_angle >= PI { -1.0 } else { cos_normal },
-            sin_normal: sin_normal.max(0.0),
-            cos_emission: bounds.emission_angle.cos(),
-        }
-    }
-
-    /// Irradiance that the group gives to a receiver, roughly; 0 only where it can give none.
-    fn importance(&self, receiver: &LightReceiver) -> f32 {
-        let to_center = self.center - receiver.position;
-        let center_distance_squared = to_center.length_squared();
-        // Inside or near the box the distance to its centre says nothing.
-        let distance_squared = center_distance_squared.max(self.radius_squared).max(f32::MIN_POSITIVE);
-        if center_distance_squared <= self.radius_squared {
-            return self.intensity / distance_squared;
-        }
-        let way = to_center / center_distance_squared.sqrt();
-        let sin_squared = self.radius_squared / center_distance_squared;
-        let ball = Angle { cos: (1.0 - sin_squared).max(0.0).sqrt(), sin: sin_squared.sqrt() };
-        // Rounding must not make anything 0 that is not.
-        const SLACK: f32 = 1e-4;
-        let normals = Angle { cos: self.cos_normal, sin: self.sin_normal };
-        let leaving = Angle::of_cos(-self.axis.dot(way)).less(normals).less(ball).cos + SLACK;
-        if leaving < self.cos_emission {
-            return 0.0;
-        }
-        let arriving = if receiver.normal == Vec3::ZERO {
-            1.0
-        } else {
-            (Angle::of_cos(receiver.normal.dot(way)).less(ball).cos + SLACK).max(0.0)
-        };
-        self.intensity * leaving.max(1e-3) * arriving / distance_squared
-    }
-}
-
-/// An angle in [0, π].
-#[derive(Clone, Copy, Debug)]
-struct Angle {
-    cos: f32,
-    sin: f32,
-}
-
-impl Angle {
-    fn of_cos(cos: f32) -> Self {
-        Self { cos, sin: (1.0 - cos * cos).max(0.0).sqrt() }
-    }
-
-    /// The angle less another, at least 0.
-    fn less(self, other: Self) -> Self {
-        if self.cos >= other.cos {
-            return Self { cos: 1.0, sin: 0.0 };
-        }
-        Self { cos: self.cos * other.cos + self.sin * other.sin, sin: self.sin * other.cos - self.cos * other.sin }
     }
 }
 
@@ -169,19 +94,28 @@ enum Binary {
 /// A node as walked.
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    giver: Giver,
     /// Index of the first child in the list of nodes, or of the emitter of a leaf.
     first: u32,
     /// Children, which follow each other; 0 for a leaf.
     children: u32,
     /// Index of the node's parent; its own for the root.
     parent: u32,
+    /// Index of what the first children give in the list of givers.
+    givers: u32,
+}
+
+impl Node {
+    fn childless(parent: u32) -> Self {
+        Self { first: 0, children: 0, parent, givers: 0 }
+    }
 }
 
 /// The tree.
 #[derive(Debug)]
 pub(super) struct LightTree {
     nodes: Vec<Node>,
+    /// What the children of nodes give.
+    givers: Vec<Givers>,
     /// By emitter: its leaf.
     leaf_of: Vec<Option<u32>>,
 }
@@ -202,9 +136,13 @@ impl LightTree {
         if emitters.is_empty() {
             return None;
         }
-        let (root_bounds, root) = build(bounds, &mut emitters, 0);
-        let mut tree = Self { nodes: Vec::with_capacity(2 * emitters.len()), leaf_of: vec![None; bounds.len()] };
-        tree.nodes.push(Node { giver: Giver::new(&root_bounds), first: 0, children: 0, parent: 0 });
+        let (_, root) = build(bounds, &mut emitters, 0);
+        let mut tree = Self {
+            nodes: Vec::with_capacity(2 * emitters.len()),
+            givers: Vec::new(),
+            leaf_of: vec![None; bounds.len()],
+        };
+        tree.nodes.push(Node::childless(0));
         tree.place(0, root);
         Some(tree)
     }
@@ -235,14 +173,11 @@ impl LightTree {
             }
         }
         let first = self.nodes.len() as u32;
-        self.nodes[place as usize].first = first;
-        self.nodes[place as usize].children = group.len() as u32;
-        self.nodes.extend(group.iter().map(|(bounds, _)| Node {
-            giver: Giver::new(bounds),
-            first: 0,
-            children: 0,
-            parent: place,
-        }));
+        let node = &mut self.nodes[place as usize];
+        (node.first, node.children, node.givers) = (first, group.len() as u32, self.givers.len() as u32);
+        self.nodes.extend(group.iter().map(|_| Node::childless(place)));
+        let bounds: Vec<LightBounds> = group.iter().map(|(bounds, _)| *bounds).collect();
+        self.givers.extend(bounds.chunks(Givers::LANES).map(Givers::new));
         for (offset, (_, child)) in group.into_iter().enumerate() {
             self.place(first + offset as u32, child);
         }
@@ -251,11 +186,12 @@ impl LightTree {
     /// What each child of a node can give, the rest of the array being 0, and their sum.
     fn importances(&self, receiver: &LightReceiver, node: &Node) -> ([f32; WIDTH], f32) {
         let mut importances = [0.0; WIDTH];
-        let children = &self.nodes[node.first as usize..(node.first + node.children) as usize];
-        for (importance, child) in importances.iter_mut().zip(children) {
-            *importance = child.giver.importance(receiver);
+        let children = node.children as usize;
+        let givers = &self.givers[node.givers as usize..][..children.div_ceil(Givers::LANES)];
+        for (lanes, givers) in importances.chunks_exact_mut(Givers::LANES).zip(givers) {
+            lanes.copy_from_slice(&givers.importances(receiver).to_array());
         }
-        let total = importances.iter().sum();
+        let total = importances[..children].iter().sum();
         (importances, total)
     }
 
@@ -270,7 +206,7 @@ impl LightTree {
             }
             let target = u * total;
             let (mut before, mut chosen) = (0.0, None);
-            for (index, &importance) in importances.iter().enumerate() {
+            for (index, &importance) in importances[..node.children as usize].iter().enumerate() {
                 if importance > 0.0 {
                     // The last child that can give anything takes what rounding leaves over.
                     let is_it = target < before + importance;
