@@ -28,7 +28,7 @@ SCENE = ROOT / "scenes/cornell-box.toml"
 # Large enough to be watched, and at an end in seconds.
 JOB = [str(SCENE), "--size", "96x96", "--visibility", "8"]
 # Something that moves, seen from so near that its margins are far from where one looks.
-MOVING_JOB = [str(ROOT / "scenes/rolling-ball.toml"), "--size", "80x40", "--visibility", "16", "--display", "near.toml", "--foveated"]
+MOVING_JOB = [str(ROOT / "scenes/rolling-ball.toml"), "--size", "80x40", "--visibility", "8", "--display", "near.toml", "--foveated"]
 NEAR_DISPLAY = """name = "near"
 pixels_per_degree = 5.0
 white_cd_m2 = 200.0
@@ -85,14 +85,15 @@ class Page:
         box = self.page.locator("#picture").bounding_box()
         return box["x"] + x * box["width"], box["y"] + y * box["height"]
 
-    def samples_at(self, x, y):
-        """Mean over some pixels around a place, asked for without a pointer there."""
+    def samples_around(self, x, y):
+        """Mean over pixels of a field of 16x24, of whose blocks one or another is done early, asked for without a pointer there."""
         counts = []
-        for place in range(-4, 5):
-            at = f"{x + place}, {y}"
-            self.page.evaluate(f"pointed = {{ x: {x + place}, y: {y} }}; inspect()")
-            self.until("a pixel", f"document.getElementById('at').textContent === {at!r}")
-            counts.append(self.number("count"))
+        for column in range(x - 8, x + 8, 4):
+            for row in range(y - 12, y + 12, 4):
+                at = f"{column}, {row}"
+                self.page.evaluate(f"pointed = {{ x: {column}, y: {row} }}; inspect()")
+                self.until("a pixel", f"document.getElementById('at').textContent === {at!r}")
+                counts.append(self.number("count"))
         return sum(counts) / len(counts)
 
     def until_stopped(self):
@@ -264,10 +265,12 @@ def steps_of_motion_and_gaze(page):
     page.page.evaluate("send({ do: 'restart' })")
     page.until("a new start", "!document.getElementById('phase').textContent.startsWith('Stopped')")
     page.until("a stop from there", from_there)
-    near, far = page.samples_at(8, 24), page.samples_at(72, 24)
+    near, far = page.samples_around(8, 24), page.samples_around(72, 24)
     page.page.mouse.move(2, 2)
     page.until("a stop for anybody", "document.getElementById('phase').textContent.endsWith('at this target')")
-    assert page.samples_at(72, 24) > far, (near, far, page.samples_at(72, 24))
+    far_for_anybody = page.samples_around(72, 24)
+    # 40 and 144 when this was written; at a target of 16 they were 32 and 33, too near each other for a test.
+    assert far_for_anybody > 1.5 * far, (near, far, far_for_anybody)
 
 
 def main():
