@@ -14,6 +14,7 @@ pub mod triangle;
 mod wide_tree;
 mod world;
 
+pub(crate) use simd::prefetch;
 pub use surface::SurfacePoint;
 pub use world::{Hit, World};
 

@@ -1,10 +1,10 @@
 //! The path tracer: [`PathTracer::trace`] turns a [`SamplePlan`] into film.
 //!
-//! `path` holds the life of one sample, `camera` where it starts, `shading` what a surface point scatters like, `relief` how
-//! maps turn its normal,
-//! `tables` what materials compute beforehand,
-//! `media` what a ray travels in, `prune` which light is left to chance.
+//! `path` holds the life of one sample, `abreast` how several are followed at once, `camera` where they start, `shading` what a
+//! surface point scatters like, `relief` how maps turn its normal, `tables` what materials compute beforehand, `media` what a
+//! ray travels in, `prune` which light is left to chance.
 
+mod abreast;
 mod camera;
 mod media;
 mod path;
@@ -20,9 +20,8 @@ pub use prune::Pruning;
 use crate::film::{BlockSum, Film};
 use crate::geometry::World;
 use crate::light::Lights;
-use crate::sampler::{BlockKey, Half, Pixel, PixelFilter, Purpose, Sequence};
+use crate::sampler::{Half, PixelFilter, Sequence};
 use crate::scene::{Camera, Scene};
-use glam::Vec2;
 use prune::ThresholdTable;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -271,7 +270,7 @@ impl PathTracer {
             .par_iter()
             .with_max_len(1)
             .map(|chunk| {
-                let sums = chunk.iter().map(|&block| self.trace_block(block, seed)).collect();
+                let sums = self.sum_blocks(chunk, seed);
                 progress(chunk.iter().map(|b| u64::from(b.samples)).sum());
                 sums
             })
@@ -280,38 +279,6 @@ impl PathTracer {
             merge(*block, sum);
         }
         start
-    }
-
-    /// Sums one block of one pixel.
-    fn trace_block(&self, block: BlockWork, seed: u64) -> BlockSum {
-        let area = self.settings.film_area();
-        let pixel = Pixel { x: area.x + block.pixel % area.width, y: area.y + block.pixel / area.width };
-        let key = BlockKey {
-            seed,
-            pixel,
-            half: block.half,
-            level: block.level,
-            log2_samples: log2_block(block.level),
-            sequence: self.settings.sequence,
-        };
-        let center = Vec2::new(pixel.x as f32, pixel.y as f32) + 0.5;
-        let mut sum = BlockSum::default();
-        for sample in key.samples(block.first + block.samples).skip(block.first as usize) {
-            let [x, y, lens_u, lens_v] = sample.draw(Purpose::Camera);
-            let filtered = self.settings.filter.sample(x, y);
-            let ray = self.camera.ray(&CameraSample {
-                position_px: center + filtered.offset,
-                lens: [lens_u, lens_v],
-                time: if self.moves { sample.draw(Purpose::Time)[0] } else { 0.0 },
-            });
-            let mut path = self.trace_path(ray, sample);
-            if let Some(clamp) = self.settings.clamp {
-                path.radiance *= (clamp / path.radiance.max_element().max(clamp)).min(1.0);
-            }
-            path.radiance *= filtered.weight;
-            sum.add(&path);
-        }
-        sum
     }
 }
 

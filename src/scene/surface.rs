@@ -289,6 +289,25 @@ impl Surface {
         }
     }
 
+    /// The colour that most of its light depends on, of those which may have a picture.
+    pub fn base_color(&self) -> Option<&ColorInput> {
+        match self {
+            Self::Diffuse { reflectance }
+            | Self::OrenNayar { reflectance, .. }
+            | Self::DiffuseTransmission { reflectance, .. }
+            | Self::Mirror { reflectance }
+            | Self::CoatedDiffuse { reflectance, .. } => Some(reflectance),
+            Self::Conductor { tint, .. } => Some(tint),
+            Self::Dielectric { transmittance, .. } | Self::ThinDielectric { transmittance, .. } => Some(transmittance),
+            Self::Phong { diffuse, .. } | Self::Ward { diffuse, .. } | Self::HeTorrance { diffuse, .. } => {
+                Some(diffuse)
+            }
+            Self::MetalRoughness(model) => Some(&model.base_color),
+            Self::Mix { first, .. } => first.base_color(),
+            Self::CoatedConductor { .. } => None,
+        }
+    }
+
     /// Whether it looks different when turned about its normal.
     pub fn is_anisotropic(&self) -> bool {
         match self {

@@ -80,24 +80,44 @@ impl Texture {
     /// The same with texels by index.
     #[inline(always)]
     fn sample_of(&self, uv: Vec2, texel: impl Fn(usize) -> Vec4) -> Vec4 {
+        let Blend { texels: [upper_left, upper_right, lower_left, lower_right], fraction } = self.blend(uv);
+        if self.nearest {
+            return texel(upper_left);
+        }
+        let upper = texel(upper_left).lerp(texel(upper_right), fraction.x);
+        let lower = texel(lower_left).lerp(texel(lower_right), fraction.x);
+        upper.lerp(lower, fraction.y)
+    }
+
+    /// What is blended at coordinates.
+    #[inline(always)]
+    fn blend(&self, uv: Vec2) -> Blend {
         let uv = if uv.is_finite() { uv } else { Vec2::ZERO };
         let (width, height) = (i64::from(self.width), i64::from(self.height));
-        let at = |column: i64, row: i64| texel((row * width + column) as usize);
+        let index = |column: i64, row: i64| (row * width + column) as usize;
         // Beyond 2^30 texels the fraction is lost in f32 anyway; the clamp keeps the integers from overflowing.
         let limit = (1_i64 << 30) as f32;
         let x = (uv.x * self.width as f32).clamp(-limit, limit);
         let y = (uv.y * self.height as f32).clamp(-limit, limit);
         if self.nearest {
-            return at(self.wrap_u.apply(floor(x), width), self.wrap_v.apply(floor(y), height));
+            let texel = index(self.wrap_u.apply(floor(x), width), self.wrap_v.apply(floor(y), height));
+            return Blend { texels: [texel; 4], fraction: Vec2::ZERO };
         }
         let (x, y) = (x - 0.5, y - 0.5);
         let (left, top) = (floor(x), floor(y));
-        let (fraction_x, fraction_y) = (x - left as f32, y - top as f32);
         let columns = [self.wrap_u.apply(left, width), self.wrap_u.apply(left + 1, width)];
         let rows = [self.wrap_v.apply(top, height), self.wrap_v.apply(top + 1, height)];
-        let upper = at(columns[0], rows[0]).lerp(at(columns[1], rows[0]), fraction_x);
-        let lower = at(columns[0], rows[1]).lerp(at(columns[1], rows[1]), fraction_x);
-        upper.lerp(lower, fraction_y)
+        let [upper, lower] = rows.map(|row| columns.map(|column| index(column, row)));
+        Blend { texels: [upper[0], upper[1], lower[0], lower[1]], fraction: Vec2::new(x - left as f32, y - top as f32) }
+    }
+
+    /// The stored texels that [`Self::sample_rgba`] will read at these coordinates, to be fetched ahead; `None` for textures of
+    /// floats.
+    pub(crate) fn stored_at(&self, uv: Vec2) -> Option<[&[u8; 4]; 4]> {
+        match &self.texels {
+            Texels::Bytes(texels, _) => Some(self.blend(uv).texels.map(|index| &texels[index])),
+            Texels::Floats(_) => None,
+        }
     }
 
     /// The largest linear colour value of any texel.
@@ -129,6 +149,14 @@ impl Texture {
         }
         (sum / f64::from(columns * rows)).as_vec3()
     }
+}
+
+/// Texels that are blended.
+struct Blend {
+    /// By index: upper left, upper right, lower left, lower right.
+    texels: [usize; 4],
+    /// Way from the first to the last in [0, 1).
+    fraction: Vec2,
 }
 
 /// The largest whole number that is not above a value of less than 2³¹: `f32::floor` is a call on machines without SSE4.1.

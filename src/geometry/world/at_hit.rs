@@ -2,6 +2,7 @@
 
 use super::{Hit, World};
 use crate::geometry::mesh_tree::TriangleShape;
+use crate::geometry::simd::prefetch;
 use crate::geometry::surface::SurfaceDerivatives;
 use crate::geometry::{Ray, SurfacePoint};
 use crate::scene::{Instance, Mesh, Scene};
@@ -78,6 +79,25 @@ impl World {
         let SurfaceDerivatives { along_u, along_v } = derivatives;
         let spans = along_u.is_finite() && along_v.is_finite() && along_u.cross(along_v) != Vec3::ZERO;
         spans.then_some(derivatives)
+    }
+
+    /// Asks for the numbers of the corners of what was hit, which [`Self::prefetch_corners`] reads.
+    #[inline]
+    pub(crate) fn prefetch_indices(&self, hit: &Hit) {
+        if let Some(instance) = self.scene.instances.get(hit.object as usize) {
+            prefetch(&self.scene.meshes[instance.mesh.0 as usize].triangles[hit.triangle as usize]);
+        }
+    }
+
+    /// Asks for normals and texture coordinates of the corners, which [`Self::surface`] reads.
+    #[inline]
+    pub(crate) fn prefetch_corners(&self, hit: &Hit) {
+        let Some(instance) = self.scene.instances.get(hit.object as usize) else { return };
+        let mesh = &self.scene.meshes[instance.mesh.0 as usize];
+        for corner in mesh.triangles[hit.triangle as usize].map(|corner| corner as usize) {
+            mesh.normals.get(corner).into_iter().for_each(prefetch);
+            mesh.uvs.get(corner).into_iter().for_each(prefetch);
+        }
     }
 
     /// The surface at a hit.
