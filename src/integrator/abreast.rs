@@ -142,3 +142,34 @@ impl PathTracer {
         texels.into_iter().flatten().for_each(prefetch);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrator::TraceSettings;
+    use crate::sampler::Half;
+    use crate::scene::load::{LoadOptions, load};
+    use std::path::Path;
+    use std::sync::Arc;
+
+    /// Blocks that share rows, are cut by their ends or fill several have the sums that each has alone.
+    #[test]
+    fn the_company_of_a_path_changes_nothing() {
+        for name in ["textured-room", "glass-caustic"] {
+            let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml"));
+            let scene = load(&file, &LoadOptions::default()).expect("our own scene");
+            let tracer = PathTracer::new(Arc::new(scene), TraceSettings::new(16, 9, 5));
+            let part = |pixel, half, first, samples| BlockWork { pixel, half, level: 2, first, samples };
+            let blocks = [
+                BlockWork::whole(3, Half::A, 0),
+                part(70, Half::A, 1, 2),
+                BlockWork::whole(71, Half::B, 3),
+                part(71, Half::A, 5, 9),
+                BlockWork::whole(140, Half::B, 0),
+            ];
+            let alone: Vec<BlockSum> = blocks.iter().flat_map(|&block| tracer.sum_blocks(&[block], 5)).collect();
+            assert_eq!(tracer.sum_blocks(&blocks, 5), alone, "{name}");
+            assert_ne!(alone[0], alone[4], "{name}: the sums say nothing");
+        }
+    }
+}
