@@ -39,8 +39,8 @@ pub(crate) fn conductor(cos_incident: f32, eta: Vec3, k: Vec3) -> Vec3 {
     let k2 = k * k;
     // a² + b² is |n²−sin²|, where a + ib is the refracted wave's normal component.
     let difference = eta2 - k2 - Vec3::splat(sin2);
-    let modulus = sqrt(difference * difference + 4.0 * eta2 * k2);
-    let a = sqrt((0.5 * (modulus + difference)).max(Vec3::ZERO));
+    let modulus = (difference * difference + 4.0 * eta2 * k2).sqrt();
+    let a = (0.5 * (modulus + difference)).max(Vec3::ZERO).sqrt();
     let sum = modulus + Vec3::splat(cos2);
     let twice_a_cos = 2.0 * cos * a;
     let perpendicular = (sum - twice_a_cos) / (sum + twice_a_cos);
@@ -79,7 +79,3 @@ pub(crate) fn schlick_weight(cos_incident: f32) -> f32 {
 
 /// Average 2∫(1 − μ)⁵ μ dμ of [`schlick_weight`].
 pub(crate) const SCHLICK_AVERAGE: f32 = 1.0 / 21.0;
-
-fn sqrt(v: Vec3) -> Vec3 {
-    Vec3::new(v.x.sqrt(), v.y.sqrt(), v.z.sqrt())
-}

@@ -115,7 +115,6 @@ impl PathTracer {
 
     /// Gathers the light of the surface that the path's ray has hit, or of the environment, and chooses the next ray; false where
     /// the path ends.
-    #[inline(always)]
     pub(super) fn shade(&self, path: &mut PathState, bounce: u32) -> bool {
         let (Some(hit), Some(point)) = (path.hit, path.point) else {
             if bounce > 0 || !self.settings.transparent {

@@ -4,6 +4,7 @@
 //! leaves less variance than the uniform solid angle, which knows nothing of the receiver's cosine, and takes no trigonometric
 //! function. Not for emitters that are near: between the corners anything may happen.
 
+use super::lanes::FourVectors;
 use glam::{Vec3, Vec4};
 
 /// Density over the unit square of shares of two edges.
@@ -13,27 +14,9 @@ pub(super) struct BilinearDensity {
     corners: Vec4,
 }
 
-/// Four points by coordinate: at the shares (0, 0), (1, 0), (0, 1) and (1, 1) of two edges.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct FourCorners {
-    x: Vec4,
-    y: Vec4,
-    z: Vec4,
-}
-
-impl FourCorners {
-    /// Of the parallelogram that two edges span from a corner.
-    pub(super) fn new(corner: Vec3, edge_1: Vec3, edge_2: Vec3) -> Self {
-        let points = [corner, corner + edge_1, corner + edge_2, corner + edge_1 + edge_2];
-        let along = |axis: usize| Vec4::from_array(points.map(|point| point[axis]));
-        Self { x: along(0), y: along(1), z: along(2) }
-    }
-
-    /// As seen from a point.
-    #[inline]
-    pub(super) fn seen_from(&self, point: Vec3) -> Self {
-        Self { x: self.x - point.x, y: self.y - point.y, z: self.z - point.z }
-    }
+/// Corners of the parallelogram that two edges span, at their shares (0, 0), (1, 0), (0, 1) and (1, 1).
+pub(super) fn parallelogram_corners(corner: Vec3, edge_1: Vec3, edge_2: Vec3) -> FourVectors {
+    FourVectors::new([corner, corner + edge_1, corner + edge_2, corner + edge_1 + edge_2])
 }
 
 impl BilinearDensity {
@@ -41,14 +24,12 @@ impl BilinearDensity {
     /// cos θ at the receiver over the fourth power of the distance, since the cosine at the emitter is its plane's distance over
     /// the point's. `corners` are as seen from the receiver.
     #[inline]
-    pub(super) fn of_irradiance(corners: &FourCorners, normal: Vec3) -> Self {
-        let FourCorners { x, y, z } = *corners;
-        let squared = (x * x + y * y + z * z).max(Vec4::splat(f32::MIN_POSITIVE));
+    pub(super) fn of_irradiance(corners: &FourVectors, normal: Vec3) -> Self {
+        let squared = corners.dot_each(corners).max(Vec4::splat(f32::MIN_POSITIVE));
         let given = if normal == Vec3::ZERO {
-            let distance = Vec4::new(squared.x.sqrt(), squared.y.sqrt(), squared.z.sqrt(), squared.w.sqrt());
-            1.0 / (squared * distance)
+            1.0 / (squared * squared.sqrt())
         } else {
-            (x * normal.x + y * normal.y + z * normal.z).max(Vec4::ZERO) / (squared * squared)
+            corners.dot(normal).max(Vec4::ZERO) / (squared * squared)
         };
         let most = given.max_element();
         if !(most > 0.0 && most.is_finite()) {
@@ -104,7 +85,8 @@ mod tests {
 
     #[test]
     fn the_density_is_normalised_and_never_vanishes() {
-        let square = FourCorners::new(Vec3::new(2.0, 3.0, 1.5), 2.0 * Vec3::X, 2.0 * Vec3::Z).seen_from(Vec3::ONE);
+        let corners = parallelogram_corners(Vec3::new(2.0, 3.0, 1.5), 2.0 * Vec3::X, 2.0 * Vec3::Z);
+        let square = corners.seen_from(Vec3::ONE);
         for normal in [Vec3::Y, Vec3::X, -Vec3::Y, Vec3::ZERO, Vec3::new(-0.6, 0.8, 0.0)] {
             let density = BilinearDensity::of_irradiance(&square, normal);
             let n = 64;

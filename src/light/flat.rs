@@ -1,7 +1,8 @@
 //! Triangles and parallelograms that emit: sampled by solid angle where they look large, else by area, evenly or, parallelograms that
 //! are no specks, by what their corners give.
 
-use super::bilinear::{BilinearDensity, FourCorners};
+use super::bilinear::{BilinearDensity, parallelogram_corners};
+use super::lanes::FourVectors;
 use super::solid_angle::{LEAST, SphericalRectangle, SphericalTriangle};
 use super::{LightPlace, LightReceiver, LightSample};
 use crate::scene::{Alpha, Scene};
@@ -38,9 +39,9 @@ const MOST_BILINEAR: f32 = 1.0;
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Outline {
     Triangle,
-    Parallelogram(FourCorners),
+    Parallelogram(FourVectors),
     /// A parallelogram whose edges are at a right angle.
-    Rectangle(FourCorners, Edges),
+    Rectangle(FourVectors, Edges),
 }
 
 /// Two edges at a right angle: unit directions and lengths, in f64 for [`SphericalRectangle`].
@@ -101,7 +102,7 @@ impl FlatEmitter {
         }
         let (edge_1, edge_2) = (self.edge_1, next.edge_2);
         let cosine = edge_1.normalize_or_zero().dot(edge_2.normalize_or_zero());
-        let corners = FourCorners::new(self.corner, edge_1, edge_2);
+        let corners = parallelogram_corners(self.corner, edge_1, edge_2);
         let outline = match cosine.abs() < 1e-5 {
             true => Outline::Rectangle(corners, Edges::new([edge_1, edge_2])),
             false => Outline::Parallelogram(corners),

@@ -1,18 +1,19 @@
 //! What groups of emitters can give to a point, four groups at a time.
 
+use super::lanes::FourVectors;
 use super::tree::{LightBounds, LightReceiver};
-use glam::{BVec4A, Vec3, Vec4};
+use glam::{Vec3, Vec4};
 use std::f32::consts::PI;
 
 /// [`LightBounds`] of up to four groups as the walk of the tree needs them, one a lane: no angle is computed on the way.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Givers {
-    center: ThreeLanes,
+    center: FourVectors,
     /// Squared, of the ball around the box.
     radius_squared: Vec4,
     /// 0 in lanes without a group.
     intensity: Vec4,
-    axis: ThreeLanes,
+    axis: FourVectors,
     normals: Angles,
     cos_emission: Vec4,
 }
@@ -26,16 +27,14 @@ impl Givers {
         let lanes = |value_of: &dyn Fn(&LightBounds) -> f32| {
             Vec4::from_array(std::array::from_fn(|lane| groups.get(lane).map_or(0.0, value_of)))
         };
-        let three_lanes = |value_of: &dyn Fn(&LightBounds) -> Vec3| ThreeLanes {
-            x: lanes(&|bounds| value_of(bounds).x),
-            y: lanes(&|bounds| value_of(bounds).y),
-            z: lanes(&|bounds| value_of(bounds).z),
+        let vectors = |vector_of: &dyn Fn(&LightBounds) -> Vec3| {
+            FourVectors::new(std::array::from_fn(|lane| groups.get(lane).map_or(Vec3::ZERO, vector_of)))
         };
         Self {
-            center: three_lanes(&|bounds| bounds.center()),
+            center: vectors(&|bounds| bounds.center()),
             radius_squared: lanes(&|bounds| 0.25 * (bounds.max - bounds.min).length_squared()),
             intensity: lanes(&|bounds| bounds.intensity),
-            axis: three_lanes(&|bounds| bounds.axis),
+            axis: vectors(&|bounds| bounds.axis),
             normals: Angles {
                 cos: lanes(&|bounds| if bounds.normal_angle >= PI { -1.0 } else { bounds.normal_angle.cos() }),
                 sin: lanes(&|bounds| bounds.normal_angle.sin().max(0.0)),
@@ -47,17 +46,17 @@ impl Givers {
     /// Irradiance that each group gives to a receiver, roughly; 0 only where it can give none.
     #[inline]
     pub(super) fn importances(&self, receiver: &LightReceiver) -> Vec4 {
-        let to_center = self.center.less(receiver.position);
-        let center_distance_squared = to_center.dot_lanes(&to_center);
+        let to_center = self.center.seen_from(receiver.position);
+        let center_distance_squared = to_center.dot_each(&to_center);
         // Inside or near the box the distance to its centre says nothing.
         let distance_squared = center_distance_squared.max(self.radius_squared).max(Vec4::splat(f32::MIN_POSITIVE));
         let is_near = center_distance_squared.cmple(self.radius_squared);
-        let way = to_center.over(square_root(center_distance_squared));
+        let way = to_center.over(center_distance_squared.sqrt());
         let sin_squared = self.radius_squared / center_distance_squared;
-        let ball = Angles { cos: square_root((1.0 - sin_squared).max(Vec4::ZERO)), sin: square_root(sin_squared) };
+        let ball = Angles { cos: (1.0 - sin_squared).max(Vec4::ZERO).sqrt(), sin: sin_squared.sqrt() };
         // Rounding must not make anything 0 that is not.
         const SLACK: f32 = 1e-4;
-        let leaving = Angles::of_cos(-self.axis.dot_lanes(&way)).less(&self.normals).less(&ball).cos + SLACK;
+        let leaving = Angles::of_cos(-self.axis.dot_each(&way)).less(&self.normals).less(&ball).cos + SLACK;
         let arriving = if receiver.normal == Vec3::ZERO {
             Vec4::ONE
         } else {
@@ -66,36 +65,6 @@ impl Givers {
         let shines = leaving.cmpge(self.cos_emission);
         let far = self.intensity * leaving.max(Vec4::splat(1e-3)) * arriving / distance_squared;
         Vec4::select(is_near, self.intensity / distance_squared, Vec4::select(shines, far, Vec4::ZERO))
-    }
-}
-
-/// A vector a lane.
-#[derive(Clone, Copy, Debug)]
-struct ThreeLanes {
-    x: Vec4,
-    y: Vec4,
-    z: Vec4,
-}
-
-impl ThreeLanes {
-    #[inline(always)]
-    fn less(&self, point: Vec3) -> Self {
-        Self { x: self.x - point.x, y: self.y - point.y, z: self.z - point.z }
-    }
-
-    #[inline(always)]
-    fn over(&self, length: Vec4) -> Self {
-        Self { x: self.x / length, y: self.y / length, z: self.z / length }
-    }
-
-    #[inline(always)]
-    fn dot(&self, vector: Vec3) -> Vec4 {
-        self.x * vector.x + self.y * vector.y + self.z * vector.z
-    }
-
-    #[inline(always)]
-    fn dot_lanes(&self, other: &Self) -> Vec4 {
-        self.x * other.x + self.y * other.y + self.z * other.z
     }
 }
 
@@ -109,22 +78,16 @@ struct Angles {
 impl Angles {
     #[inline(always)]
     fn of_cos(cos: Vec4) -> Self {
-        Self { cos, sin: square_root((1.0 - cos * cos).max(Vec4::ZERO)) }
+        Self { cos, sin: (1.0 - cos * cos).max(Vec4::ZERO).sqrt() }
     }
 
     /// The angles less others, at least 0.
     #[inline(always)]
     fn less(&self, other: &Self) -> Self {
-        let is_none: BVec4A = self.cos.cmpge(other.cos);
+        let is_none = self.cos.cmpge(other.cos);
         Self {
             cos: Vec4::select(is_none, Vec4::ONE, self.cos * other.cos + self.sin * other.sin),
             sin: Vec4::select(is_none, Vec4::ZERO, self.sin * other.cos - self.cos * other.sin),
         }
     }
-}
-
-#[inline(always)]
-fn square_root(lanes: Vec4) -> Vec4 {
-    let [x, y, z, w] = lanes.to_array();
-    Vec4::new(x.sqrt(), y.sqrt(), z.sqrt(), w.sqrt())
 }

@@ -12,6 +12,7 @@ mod distribution;
 mod environment;
 mod flat;
 mod givers;
+mod lanes;
 mod punctual;
 mod solid_angle;
 mod sphere;

@@ -84,20 +84,30 @@ impl World {
     /// Asks for the numbers of the corners of what was hit, which [`Self::prefetch_corners`] reads.
     #[inline]
     pub(crate) fn prefetch_indices(&self, hit: &Hit) {
-        if let Some(instance) = self.scene.instances.get(hit.object as usize) {
-            prefetch(&self.scene.meshes[instance.mesh.0 as usize].triangles[hit.triangle as usize]);
+        if let Some(mesh) = self.mesh_with_corners(hit) {
+            prefetch(&mesh.triangles[hit.triangle as usize]);
         }
     }
 
     /// Asks for normals and texture coordinates of the corners, which [`Self::surface`] reads.
     #[inline]
     pub(crate) fn prefetch_corners(&self, hit: &Hit) {
-        let Some(instance) = self.scene.instances.get(hit.object as usize) else { return };
-        let mesh = &self.scene.meshes[instance.mesh.0 as usize];
+        let Some(mesh) = self.mesh_with_corners(hit) else { return };
         for corner in mesh.triangles[hit.triangle as usize].map(|corner| corner as usize) {
             mesh.normals.get(corner).into_iter().for_each(prefetch);
-            mesh.uvs.get(corner).into_iter().for_each(prefetch);
+            if !self.scene.textures.is_empty() {
+                mesh.uvs.get(corner).into_iter().for_each(prefetch);
+            }
         }
+    }
+
+    /// The mesh that was hit if [`Self::surface`] reads what its corners have.
+    #[inline]
+    fn mesh_with_corners(&self, hit: &Hit) -> Option<&Mesh> {
+        let instance = self.scene.instances.get(hit.object as usize)?;
+        let mesh = &self.scene.meshes[instance.mesh.0 as usize];
+        let reads = !mesh.normals.is_empty() || !(mesh.uvs.is_empty() || self.scene.textures.is_empty());
+        reads.then_some(mesh)
     }
 
     /// The surface at a hit.
