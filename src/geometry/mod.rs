@@ -14,7 +14,7 @@ pub mod triangle;
 mod wide_tree;
 mod world;
 
-pub(crate) use simd::prefetch;
+pub(crate) use simd::{VectorWork, prefetch, with_vectors};
 pub use surface::SurfacePoint;
 pub use world::{Hit, World};
 

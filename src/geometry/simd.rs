@@ -34,6 +34,23 @@ impl Path {
     }
 }
 
+/// Work on several values at once, as loops that the compiler turns into vectors.
+pub(crate) trait VectorWork {
+    /// Does it. `#[inline(always)]`, as must be all that it calls: what is no part of [`with_vectors`] is not compiled for vectors.
+    fn run(self);
+}
+
+/// Does work with the best vectors that this machine has. The results are equal to the bit on all.
+#[inline]
+pub(crate) fn with_vectors(work: impl VectorWork) {
+    match Path::best().0 {
+        // SAFETY: `Avx2` is made by `Path::best` alone, and only where the machine has AVX2.
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Avx2 => unsafe { avx2::run(work) },
+        Instructions::Portable => work.run(),
+    }
+}
+
 /// Asks for the cache lines of a value that is about to be read.
 #[inline(always)]
 pub(crate) fn prefetch<T>(value: &T) {
@@ -99,6 +116,11 @@ mod avx2 {
     use super::*;
     use bytemuck::cast;
     use std::arch::x86_64::*;
+
+    #[target_feature(enable = "avx2")]
+    pub(super) fn run(work: impl VectorWork) {
+        work.run();
+    }
 
     #[target_feature(enable = "avx2")]
     pub(super) fn closest(

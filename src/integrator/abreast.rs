@@ -4,10 +4,10 @@
 //! and the memory answers while the other paths' part of the stage is done. Which paths go abreast changes no byte of any, and
 //! a block is summed in the order of its samples.
 
-use super::path::PathState;
+use super::path::{BounceNumbers, PathState};
 use super::{BlockWork, CameraSample, PathTracer, log2_block};
 use crate::film::BlockSum;
-use crate::geometry::{SurfacePoint, prefetch};
+use crate::geometry::{Hit, SurfacePoint, prefetch};
 use crate::sampler::{BlockKey, Pixel, Purpose, Sample};
 use glam::Vec2;
 use smallvec::SmallVec;
@@ -16,26 +16,35 @@ use smallvec::SmallVec;
 /// of one block at a time.
 const ABREAST: usize = 16;
 
-/// Where a path's light goes.
+/// Samples of the paths of a row.
+type Samples = SmallVec<[Sample; ABREAST]>;
+
+/// A sample whose path is to be followed, and where its light goes.
 #[derive(Clone, Copy)]
-struct Destination {
+struct Start {
+    pixel: Pixel,
+    sample: Sample,
     /// Number of the block's sum.
     sum: usize,
-    filter_weight: f32,
 }
 
-/// Paths that wait to be followed, and their destinations.
+/// Samples that wait for their paths, and the places where these are followed.
 struct Row {
+    starts: Vec<Start>,
     paths: Vec<PathState>,
-    destinations: Vec<Destination>,
+    filter_weights: Vec<f32>,
 }
 
 impl PathTracer {
     /// Sums of blocks of samples.
     pub(super) fn sum_blocks(&self, blocks: &[BlockWork], seed: u64) -> Vec<BlockSum> {
         let mut sums = vec![BlockSum::default(); blocks.len()];
-        let mut row = Row { paths: Vec::with_capacity(ABREAST), destinations: Vec::with_capacity(ABREAST) };
-        for (number, block) in blocks.iter().enumerate() {
+        let mut row = Row {
+            starts: Vec::with_capacity(ABREAST),
+            paths: Vec::with_capacity(ABREAST),
+            filter_weights: Vec::with_capacity(ABREAST),
+        };
+        for (sum, block) in blocks.iter().enumerate() {
             let area = self.settings.film_area();
             let pixel = Pixel { x: area.x + block.pixel % area.width, y: area.y + block.pixel / area.width };
             let key = BlockKey {
@@ -47,8 +56,8 @@ impl PathTracer {
                 sequence: self.settings.sequence,
             };
             for sample in key.samples(block.first + block.samples).skip(block.first as usize) {
-                self.start(pixel, sample, number, &mut row);
-                if row.paths.len() == ABREAST {
+                row.starts.push(Start { pixel, sample, sum });
+                if row.starts.len() == ABREAST {
                     self.finish(&mut row, &mut sums);
                 }
             }
@@ -57,65 +66,78 @@ impl PathTracer {
         sums
     }
 
-    /// Puts a sample's path in the row.
-    fn start(&self, pixel: Pixel, sample: Sample, sum: usize, row: &mut Row) {
-        let [x, y, lens_u, lens_v] = sample.draw(Purpose::Camera);
-        let filtered = self.settings.filter.sample(x, y);
-        let ray = self.camera.ray(&CameraSample {
-            position_px: Vec2::new(pixel.x as f32, pixel.y as f32) + 0.5 + filtered.offset,
-            lens: [lens_u, lens_v],
-            time: if self.moves { sample.draw(Purpose::Time)[0] } else { 0.0 },
-        });
-        row.paths.push(PathState::new(ray, sample));
-        row.destinations.push(Destination { sum, filter_weight: filtered.weight });
-    }
-
     /// Follows the paths of the row to their ends, adds what they found to the sums, and leaves the row empty.
     fn finish(&self, row: &mut Row, sums: &mut [BlockSum]) {
+        self.start(row);
         self.follow_abreast(&mut row.paths);
-        for (path, destination) in row.paths.iter().zip(&row.destinations) {
+        for ((path, start), filter_weight) in row.paths.iter().zip(&row.starts).zip(&row.filter_weights) {
             let mut found = path.found();
             if let Some(clamp) = self.settings.clamp {
                 found.radiance *= (clamp / found.radiance.max_element().max(clamp)).min(1.0);
             }
-            found.radiance *= destination.filter_weight;
-            sums[destination.sum].add(&found);
+            found.radiance *= filter_weight;
+            sums[start.sum].add(&found);
         }
+        row.starts.clear();
         row.paths.clear();
-        row.destinations.clear();
+        row.filter_weights.clear();
     }
 
-    /// Follows paths to their ends.
+    /// Makes the paths of the row's samples, at the lens.
+    fn start(&self, row: &mut Row) {
+        let samples: Samples = row.starts.iter().map(|start| start.sample).collect();
+        let mut numbers = [[0.0; 4]; ABREAST];
+        Sample::draw_each(&samples, Purpose::Camera, &mut numbers);
+        for (Start { pixel, sample, .. }, [x, y, lens_u, lens_v]) in row.starts.iter().zip(numbers) {
+            let filtered = self.settings.filter.sample(x, y);
+            let ray = self.camera.ray(&CameraSample {
+                position_px: Vec2::new(pixel.x as f32, pixel.y as f32) + 0.5 + filtered.offset,
+                lens: [lens_u, lens_v],
+                time: if self.moves { sample.draw(Purpose::Time)[0] } else { 0.0 },
+            });
+            row.paths.push(PathState::new(ray, *sample));
+            row.filter_weights.push(filtered.weight);
+        }
+    }
+
+    /// Follows paths, at most [`ABREAST`], to their ends.
     pub(super) fn follow_abreast(&self, paths: &mut [PathState]) {
         let mut alive: SmallVec<[usize; ABREAST]> = (0..paths.len()).collect();
+        // Apart from the paths: what a stage hands to the next is read where it was written.
+        let mut hits: [Option<Hit>; ABREAST] = [None; ABREAST];
+        let mut points: [Option<SurfacePoint>; ABREAST] = [const { None }; ABREAST];
         for bounce in 0.. {
             for &i in &alive {
-                let path = &mut paths[i];
-                path.rays += 1;
-                path.hit = self.world.closest(&path.ray);
+                paths[i].rays += 1;
+                hits[i] = self.world.closest(&paths[i].ray);
             }
-            for &i in &alive {
-                if let Some(hit) = &paths[i].hit {
-                    self.world.prefetch_indices(hit);
+            alive.retain(|&mut i| {
+                if hits[i].is_none() {
+                    self.leave(&mut paths[i], bounce);
                 }
+                hits[i].is_some()
+            });
+            for hit in alive.iter().filter_map(|&i| hits[i].as_ref()) {
+                self.world.prefetch_indices(hit);
+            }
+            for hit in alive.iter().filter_map(|&i| hits[i].as_ref()) {
+                self.world.prefetch_corners(hit);
             }
             for &i in &alive {
-                if let Some(hit) = &paths[i].hit {
-                    self.world.prefetch_corners(hit);
-                }
+                points[i] = hits[i].as_ref().map(|hit| self.world.surface(&paths[i].ray, hit));
             }
-            for &i in &alive {
-                let path = &mut paths[i];
-                path.point = path.hit.as_ref().map(|hit| self.world.surface(&path.ray, hit));
+            for point in alive.iter().filter_map(|&i| points[i].as_ref()) {
+                self.prefetch_base_color(point);
             }
-            for &i in &alive {
-                if let Some(point) = &paths[i].point {
-                    self.prefetch_base_color(point);
-                }
-            }
+            let samples: Samples = alive.iter().map(|&i| paths[i].sample).collect();
+            let (mut light, mut scatter) = ([[0.0; 4]; ABREAST], [[0.0; 4]; ABREAST]);
+            Sample::draw_each(&samples, Purpose::Light { bounce }, &mut light);
+            Sample::draw_each(&samples, Purpose::Scatter { bounce }, &mut scatter);
             let mut left = SmallVec::new();
-            for &i in &alive {
-                if self.shade(&mut paths[i], bounce) {
+            for (number, &i) in alive.iter().enumerate() {
+                let (Some(hit), Some(point)) = (&hits[i], &points[i]) else { continue };
+                let numbers = BounceNumbers { light: light[number], scatter: scatter[number] };
+                if self.shade(&mut paths[i], hit, point, bounce, &numbers) {
                     left.push(i);
                 }
             }

@@ -8,7 +8,7 @@ use super::media::Media;
 use super::shading::{Components, Shading};
 use crate::geometry::{Hit, Ray, SurfacePoint};
 use crate::light::{LightReceiver, LightSample};
-use crate::sampler::{Purpose, Sample};
+use crate::sampler::Sample;
 use fechner_perception::photometry::luminance;
 use glam::{Vec3, Vec3A};
 
@@ -46,7 +46,7 @@ pub struct PathSample {
 pub(super) struct PathState {
     pub(super) ray: Ray,
     /// Its numbers.
-    sample: Sample,
+    pub(super) sample: Sample,
     /// Where the ray left a surface.
     from: LightReceiver,
     throughput: Vec3,
@@ -62,12 +62,17 @@ pub(super) struct PathState {
     media: Media,
     pub(super) rays: u32,
     first_hit: FirstHit,
-    /// What the ray hits, if anything.
-    pub(super) hit: Option<Hit>,
-    /// The surface there.
-    pub(super) point: Option<SurfacePoint>,
     /// Light that arrives there unless something hides it.
     direct: Option<DirectLight>,
+}
+
+/// What a path draws at a bounce.
+#[derive(Clone, Copy, Default)]
+pub(super) struct BounceNumbers {
+    /// Point on a light (x, y), which light (z) and survival of what it gives (w).
+    pub(super) light: [f32; 4],
+    /// Direction (x, y), lobe (z) and survival (w).
+    pub(super) scatter: [f32; 4],
 }
 
 /// Light that a path gains if nothing is in between.
@@ -93,8 +98,6 @@ impl PathState {
             media: Media::default(),
             rays: 0,
             first_hit: FirstHit::NOTHING,
-            hit: None,
-            point: None,
             direct: None,
         }
     }
@@ -113,29 +116,37 @@ impl PathTracer {
         path[0].found()
     }
 
-    /// Gathers the light of the surface that the path's ray has hit, or of the environment, and chooses the next ray; false where
-    /// the path ends.
-    pub(super) fn shade(&self, path: &mut PathState, bounce: u32) -> bool {
-        let (Some(hit), Some(point)) = (path.hit, path.point) else {
-            if bounce > 0 || !self.settings.transparent {
-                self.add_environment(path);
-            }
-            if bounce == 0 {
-                path.first_hit.shines = path.radiance != Vec3::ZERO;
-            }
-            return false;
-        };
+    /// Gathers the light of the environment, where the path's ray has hit nothing and the path ends.
+    pub(super) fn leave(&self, path: &mut PathState, bounce: u32) {
+        if bounce > 0 || !self.settings.transparent {
+            self.add_environment(path);
+        }
+        if bounce == 0 {
+            path.first_hit.shines = path.radiance != Vec3::ZERO;
+        }
+    }
+
+    /// Gathers the light of the surface that the path's ray has hit and chooses the next ray; false where the path ends.
+    #[inline(always)]
+    pub(super) fn shade(
+        &self,
+        path: &mut PathState,
+        hit: &Hit,
+        point: &SurfacePoint,
+        bounce: u32,
+        numbers: &BounceNumbers,
+    ) -> bool {
         let wo = -Vec3::from(path.ray.direction);
         let components = Components::new();
-        let bsdf = self.bsdf(&point, &components);
-        let shading = self.shading(&bsdf, &point, wo, path.ray.time);
+        let bsdf = self.bsdf(point, &components);
+        let shading = self.shading(&bsdf, point, wo, path.ray.time);
         path.throughput *= match shading.medium {
             Some(medium) if wo.dot(point.geometric_normal) < 0.0 => {
                 path.media.transmittance_to_back_of(medium, hit.distance)
             }
             _ => path.media.transmittance(hit.distance),
         };
-        let emitted = self.add_emission(path, &hit, &point);
+        let emitted = self.add_emission(path, hit, point);
         if bounce == 0 {
             let albedo = shading.bsdf.albedo(shading.frame.to_local(wo)).clamp(Vec3::ZERO, Vec3::ONE);
             path.first_hit = FirstHit {
@@ -150,11 +161,10 @@ impl PathTracer {
             return false;
         }
         if shading.bsdf.has_smooth_lobe() {
-            let u = path.sample.draw(Purpose::Light { bounce });
-            self.sample_light(path, &point, &shading, wo, u);
+            self.sample_light(path, point, &shading, wo, numbers.light);
         }
-        let [u0, u1, lobe, roulette] = path.sample.draw(Purpose::Scatter { bounce });
-        scatter(path, &point, &shading, wo, [u0, u1, lobe]) && survives(path, bounce, roulette)
+        let [u0, u1, lobe, roulette] = numbers.scatter;
+        scatter(path, point, &shading, wo, [u0, u1, lobe]) && survives(path, bounce, roulette)
     }
 
     /// Adds the light that was waiting for its shadow ray.

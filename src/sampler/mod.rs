@@ -27,7 +27,9 @@ pub enum Sequence {
     Independent,
 }
 
+use crate::geometry::{VectorWork, with_vectors};
 use serde::{Deserialize, Serialize};
+use std::array::from_fn;
 
 /// Which of the two independent estimates of a pixel a sample belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -174,12 +176,55 @@ impl Sample {
     /// Four numbers in [0, 1) for a purpose; the first two are stratified best together.
     #[inline]
     pub fn draw(self, purpose: Purpose) -> [f32; 4] {
-        let group_hash = sobol::mix32(self.block_hash ^ sobol::mix32(purpose.group().wrapping_add(0x68bc_21eb)));
+        let group_hash = group_hash(self.block_hash, purpose);
         if self.is_independent {
             let key = u64::from(group_hash) << 32 | u64::from(self.reversed_index.reverse_bits());
-            std::array::from_fn(|dimension| (hash_words(key, dimension as u64) >> 40) as f32 * (1.0 / 16_777_216.0))
+            from_fn(|dimension| (hash_words(key, dimension as u64) >> 40) as f32 * (1.0 / 16_777_216.0))
         } else {
-            sobol::scrambled_point(self.reversed_index, group_hash)
+            sobol::scrambled_points([self.reversed_index], [group_hash]).map(|[number]| number)
+        }
+    }
+
+    /// [`Self::draw`] for several samples, eight at a time, into the first of at least as many `numbers`: of few or of many, a sample's
+    /// numbers are the same.
+    pub fn draw_each(samples: &[Self], purpose: Purpose, numbers: &mut [[f32; 4]]) {
+        with_vectors(DrawEach { samples, purpose, numbers });
+    }
+}
+
+/// Hash of what the scrambling of four dimensions of a block depends on.
+#[inline(always)]
+fn group_hash(block_hash: u32, purpose: Purpose) -> u32 {
+    sobol::mix32(block_hash ^ sobol::mix32(purpose.group().wrapping_add(0x68bc_21eb)))
+}
+
+/// Samples that draw at once.
+const LANES: usize = 8;
+
+/// What [`Sample::draw_each`] does.
+struct DrawEach<'a> {
+    samples: &'a [Sample],
+    purpose: Purpose,
+    numbers: &'a mut [[f32; 4]],
+}
+
+impl VectorWork for DrawEach<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { samples, purpose, numbers } = self;
+        for (samples, numbers) in samples.chunks(LANES).zip(numbers.chunks_mut(LANES)) {
+            if samples.len() == 1 || samples.iter().any(|sample| sample.is_independent) {
+                samples.iter().zip(numbers).for_each(|(sample, numbers)| *numbers = sample.draw(purpose));
+                continue;
+            }
+            let (mut indices, mut hashes) = ([0; LANES], [0; LANES]);
+            for ((index, hash), sample) in indices.iter_mut().zip(&mut hashes).zip(samples) {
+                (*index, *hash) = (sample.reversed_index, sample.block_hash);
+            }
+            let points = sobol::scrambled_points(indices, hashes.map(|hash| group_hash(hash, purpose)));
+            for (lane, numbers) in numbers.iter_mut().enumerate() {
+                *numbers = points.map(|of_all| of_all[lane]);
+            }
         }
     }
 }
@@ -256,6 +301,23 @@ mod tests {
         for s in block(0, 12345).samples(1 << 14) {
             for x in s.draw(Purpose::Light { bounce: 7 }) {
                 assert!((0.0..1.0).contains(&x), "{x}");
+            }
+        }
+    }
+
+    /// Of few and of many samples, of one block and of several.
+    #[test]
+    fn many_samples_draw_what_each_draws() {
+        for sequence in [Sequence::PerPixel, Sequence::ZOrder, Sequence::Independent] {
+            let key = |pixel| BlockKey { sequence, ..block(3, pixel) };
+            let samples: Vec<Sample> = (0..5).flat_map(|pixel| key(pixel).samples(5)).collect();
+            for purpose in [Purpose::Camera, Purpose::Light { bounce: 2 }, Purpose::Time] {
+                for count in 0..=samples.len() {
+                    let mut numbers = vec![[f32::NAN; 4]; count + 3];
+                    Sample::draw_each(&samples[..count], purpose, &mut numbers);
+                    let alone: Vec<_> = samples[..count].iter().map(|sample| sample.draw(purpose)).collect();
+                    assert_eq!(numbers[..count], alone, "{sequence:?}, {purpose:?}");
+                }
             }
         }
     }

@@ -111,6 +111,7 @@ impl World {
     }
 
     /// The surface at a hit.
+    #[inline(always)]
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
         match self.scene.instances.get(hit.object as usize) {
             Some(instance) => self.surface_of_triangle(instance, ray, hit),
@@ -137,6 +138,7 @@ impl World {
         }
     }
 
+    #[inline(always)]
     fn surface_of_triangle(&self, instance: &Instance, ray: &Ray, hit: &Hit) -> SurfacePoint {
         let mesh = &self.scene.meshes[instance.mesh.0 as usize];
         let mut to_world = &instance.to_world;
