@@ -1,4 +1,5 @@
-//! Box and triangle tests of eight lanes at once, for AVX2 and for any machine, and the choice between the two.
+//! Box and triangle tests of eight lanes at once, for AVX2 and for any machine, the choice between the two, and the same choice
+//! for work elsewhere that the compiler turns into vectors.
 //!
 //! Both have the same operations in the same order and no fused multiply-add, so their results are equal to the bit;
 //! minimum and maximum are x86's: the second operand where one is NaN. The only `unsafe` of the crate is here: calling
