@@ -67,7 +67,6 @@ pub(super) struct PathState {
 }
 
 /// What a path draws at a bounce.
-#[derive(Clone, Copy, Default)]
 pub(super) struct BounceNumbers {
     /// Point on a light (x, y), which light (z) and survival of what it gives (w).
     pub(super) light: [f32; 4],

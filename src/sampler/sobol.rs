@@ -119,15 +119,13 @@ mod tests {
     /// The unscrambled sequence begins with the published points (Joe and Kuo 2008, in binary order, not Gray code).
     #[test]
     fn directions_give_the_published_points() {
-        let point = |i: u32| {
-            let [x, y, z, _] = reversed_points([i.reverse_bits()]).map(|[digits]| to_unit(digits));
-            [x, y, z]
-        };
-        assert_eq!(point(0), [0.0, 0.0, 0.0]);
-        assert_eq!(point(1), [0.5, 0.5, 0.5]);
-        assert_eq!(point(2), [0.25, 0.75, 0.75]);
-        assert_eq!(point(3), [0.75, 0.25, 0.25]);
+        let point = |i: u32| reversed_points([i.reverse_bits()]).map(|[digits]| to_unit(digits));
+        assert_eq!(point(0), [0.0, 0.0, 0.0, 0.0]);
+        assert_eq!(point(1), [0.5, 0.5, 0.5, 0.5]);
+        assert_eq!(point(2), [0.25, 0.75, 0.75, 0.75]);
+        assert_eq!(point(3), [0.75, 0.25, 0.25, 0.25]);
         assert_eq!(point(4)[0], 0.125);
         assert_eq!(point(4)[1], 0.625);
+        assert_eq!(point(4)[3], 0.125);
     }
 }
