@@ -7,6 +7,7 @@ use super::budget::Needs;
 use super::{SceneSource, ShotSettings};
 use crate::adaptive::judge::guide_luminance;
 use crate::adaptive::plan::pilot_plan;
+use crate::checkpoint::PROGRAM;
 use crate::film::Film;
 use crate::integrator::{PathTracer, TraceSettings};
 use crate::scene::Scene;
@@ -117,9 +118,9 @@ impl Track {
 
 fn made_for(shot: &ShotSettings, operator: &dyn ToneOperator) -> String {
     format!(
-        "version {}, frames {} to {} at {} a second, {}x{}, seed {}, {} cd/m² a unit, {:?}, eye {:?}, \
+        "{}, frames {} to {} at {} a second, {}x{}, seed {}, {} cd/m² a unit, {:?}, eye {:?}, \
          budget {:?}, {:?}, {:?}",
-        env!("CARGO_PKG_VERSION"),
+        PROGRAM,
         shot.first,
         shot.last,
         shot.frames_per_second,

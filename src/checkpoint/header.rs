@@ -10,6 +10,14 @@ use fechner_perception::model::{self, ThresholdModel};
 use fechner_perception::tone;
 use serde::{Deserialize, Serialize};
 
+/// This program, its version and what of its build changes the last bits of a sample: where the target has fused multiply-add
+/// (`-C target-cpu=native` without `-C target-feature=-fma`), glam's `Vec3A::cross` and `lerp` use it.
+pub const PROGRAM: &str = if cfg!(target_feature = "fma") {
+    concat!("fechner ", env!("CARGO_PKG_VERSION"), ", built for FMA")
+} else {
+    concat!("fechner ", env!("CARGO_PKG_VERSION"))
+};
+
 /// The start of a film's file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Header {
@@ -27,7 +35,7 @@ pub struct Header {
 /// may be added or continued.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Origin {
-    /// Program and version.
+    /// Its [`PROGRAM`].
     pub program: String,
     /// The scene's name, for messages.
     pub scene_name: String,
@@ -98,7 +106,7 @@ impl Origin {
     pub fn of(scene: &Scene, settings: &TraceSettings) -> Self {
         let Crop { width, height, .. } = settings.film_area();
         Self {
-            program: concat!("fechner ", env!("CARGO_PKG_VERSION")).to_owned(),
+            program: PROGRAM.to_owned(),
             scene_name: scene.name.clone(),
             scene: content_hash(scene),
             width,

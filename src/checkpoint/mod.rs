@@ -8,7 +8,7 @@ mod header;
 mod merge;
 
 pub use file::{CheckpointError, decode_checkpoint, is_checkpoint, read_checkpoint, seal, write_checkpoint};
-pub use header::{Header, Origin, Seeds, SettingsError, SettingsRecord, UnknownName};
+pub use header::{Header, Origin, PROGRAM, Seeds, SettingsError, SettingsRecord, UnknownName};
 pub use merge::{MergeError, merge_files};
 
 use crate::adaptive::state::RenderState;

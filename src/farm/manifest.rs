@@ -1,6 +1,6 @@
 //! What a farm renders.
 
-use crate::checkpoint::Origin;
+use crate::checkpoint::{Origin, PROGRAM};
 use crate::scene::hash::ContentHash;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ pub(super) const FORMAT: u32 = 1;
 pub struct Manifest {
     /// Version of this file.
     pub farm_format: u32,
-    /// Program and version that planned it; no other may work on it.
+    /// The [`PROGRAM`] that planned it; no other may work on it.
     pub program: String,
     /// Whose work it is.
     pub work: Work,
@@ -117,7 +117,7 @@ impl Manifest {
     }
 
     fn problem(&self) -> Option<String> {
-        let own = program();
+        let own = PROGRAM;
         let is_ascending = self.frames.windows(2).all(|pair| pair[0].frame < pair[1].frame);
         if self.farm_format != FORMAT {
             Some(format!("its format is version {}, and this program reads version {FORMAT}", self.farm_format))
@@ -133,17 +133,12 @@ impl Manifest {
     }
 }
 
-/// Program and version.
-pub(super) fn program() -> String {
-    concat!("fechner ", env!("CARGO_PKG_VERSION")).to_owned()
-}
-
 impl Manifest {
     /// One of this program and format.
     pub fn new(work: Work, directory: PathBuf, arguments: Vec<String>, frames: Vec<FrameEntry>) -> Self {
         Self {
             farm_format: FORMAT,
-            program: program(),
+            program: PROGRAM.to_owned(),
             work,
             directory,
             arguments,

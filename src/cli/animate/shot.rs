@@ -16,7 +16,7 @@ use fechner::animate::budget::Needs;
 use fechner::animate::name::FrameName;
 use fechner::animate::track::{Track, TrackFrame};
 use fechner::animate::{FrameScenes, RenderedFrame, SceneSource as _, ShotSettings, render_frame};
-use fechner::checkpoint::SettingsRecord;
+use fechner::checkpoint::{PROGRAM, SettingsRecord};
 use fechner::denoise::Denoiser;
 use fechner::output::rendered::{Background, layers, write_display_png};
 use fechner::output::{self, Format};
@@ -239,7 +239,7 @@ impl<'a> Shot<'a> {
     fn key(&self, settings: &LoopSettings, track: &TrackFrame, scenes: &FrameScenes) -> String {
         let text = format!(
             "{}|{track:?}|{}|{}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}",
-            env!("CARGO_PKG_VERSION"),
+            PROGRAM,
             content_hash(&scenes.previous),
             content_hash(&scenes.next),
             self.settings.trace,
