@@ -6,8 +6,8 @@
 
 use crate::geometry::Hit;
 use crate::integrator::{CameraRays, CameraSample, PathTracer};
-use crate::scene::{Camera, Scene};
-use glam::{Vec2, Vec3};
+use crate::scene::{Camera, Scene, SpherePlace};
+use glam::{Vec2, Vec3, Vec3A};
 use rayon::prelude::*;
 
 /// Motion of what each pixel's centre shows when the shutter opens, in pixels, x to the right and y down; row-major.
@@ -22,10 +22,18 @@ pub struct VelocityMap {
 /// What a camera ray meets, by what moves with it.
 enum Seen {
     Triangle(Hit),
-    /// Number of the sphere, and the normal at the point: how a sphere turns cannot be seen.
-    Sphere(usize, Vec3),
+    /// Number of the sphere, and the normal at the point: along the sphere's own axes where its turning can be seen, else in the world.
+    Sphere(usize, Normal),
     /// Nothing is in this direction.
     Background(Vec3),
+}
+
+/// A unit normal of a sphere.
+enum Normal {
+    /// Fixed to the sphere.
+    Own(Vec3A),
+    /// Of a sphere that looks the same however it is turned.
+    World(Vec3A),
 }
 
 impl VelocityMap {
@@ -62,10 +70,13 @@ fn seen_at(tracer: &PathTracer, camera: &CameraRays, position_px: Vec2) -> Seen 
     // The middle of the lens: what is out of focus moves as its centre does.
     let ray = camera.ray(&CameraSample { position_px, lens: [0.5, 0.5], time: 0.0 });
     let Some(hit) = tracer.world().closest(&ray) else { return Seen::Background(ray.direction.into()) };
-    match (hit.object as usize).checked_sub(tracer.world().scene().instances.len()) {
-        None => Seen::Triangle(hit),
-        Some(sphere) => Seen::Sphere(sphere, tracer.world().surface(&ray, &hit).geometric_normal),
-    }
+    let scene = tracer.world().scene();
+    let Some(number) = (hit.object as usize).checked_sub(scene.instances.len()) else { return Seen::Triangle(hit) };
+    let sphere = &scene.spheres[number];
+    let normal = Vec3A::from(tracer.world().surface(&ray, &hit).geometric_normal);
+    let turns_visibly = scene.materials[sphere.material.0 as usize].has_places();
+    let axes = sphere.place_at(0.0).axes;
+    Seen::Sphere(number, if turns_visibly { Normal::Own(axes.transpose() * normal) } else { Normal::World(normal) })
 }
 
 /// Where what was seen is in the picture of another moment; `None` where that camera cannot see its place.
@@ -74,8 +85,12 @@ fn place_in(scene: &Scene, camera: &CameraRays, seen: &Seen) -> Option<Vec2> {
         Seen::Background(direction) => camera.project_direction(*direction),
         Seen::Triangle(hit) => camera.project(point_of_triangle(scene, hit)?),
         Seen::Sphere(number, normal) => {
-            let (center, radius) = scene.spheres.get(*number)?.place_at(0.0);
-            camera.project(Vec3::from(center) + radius * *normal)
+            let SpherePlace { center, radius, axes } = scene.spheres.get(*number)?.place_at(0.0);
+            let normal = match normal {
+                Normal::Own(own) => axes * *own,
+                Normal::World(normal) => *normal,
+            };
+            camera.project((center + radius * normal).into())
         }
     }
 }

@@ -4,8 +4,17 @@
 use super::Ray;
 use glam::Vec3A;
 
-/// The nearest ray parameter in (0, `t_max`) at which the ray meets the sphere, from outside or inside.
-pub fn intersect(ray: &Ray, center: Vec3A, radius: f32, t_max: f32) -> Option<f32> {
+/// Which of the two places where a line meets a sphere.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// Where it enters.
+    Near,
+    /// Where it leaves.
+    Far,
+}
+
+/// The nearest ray parameter in (0, `t_max`) at which the ray meets the sphere, from outside or inside, and that is accepted.
+pub fn intersect(ray: &Ray, center: Vec3A, radius: f32, t_max: f32, accept: impl Fn(f32, Side) -> bool) -> Option<f32> {
     let to_center = center - ray.origin;
     let along = to_center.dot(ray.direction);
     // Squared distance of the centre from the ray, taken from the perpendicular itself: no cancellation.
@@ -23,13 +32,19 @@ pub fn intersect(ray: &Ray, center: Vec3A, radius: f32, t_max: f32) -> Option<f3
     if near > far {
         std::mem::swap(&mut near, &mut far);
     }
-    [near, far].into_iter().find(|&t| t > 0.0 && t < t_max)
+    let met =
+        [(near, Side::Near), (far, Side::Far)].into_iter().find(|&(t, side)| t > 0.0 && t < t_max && accept(t, side));
+    met.map(|(t, _)| t)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use glam::vec3a;
+
+    fn intersect(ray: &Ray, center: Vec3A, radius: f32, t_max: f32) -> Option<f32> {
+        super::intersect(ray, center, radius, t_max, |_, _| true)
+    }
 
     #[test]
     fn near_and_inside() {
@@ -40,6 +55,14 @@ mod tests {
         assert_eq!(intersect(&inside, Vec3A::ZERO, 2.0, f32::INFINITY), Some(2.0));
         let behind = Ray::new(vec3a(0.0, 0.0, 5.0), vec3a(0.0, 0.0, 1.0));
         assert_eq!(intersect(&behind, Vec3A::ZERO, 1.0, f32::INFINITY), None);
+    }
+
+    #[test]
+    fn what_is_not_accepted_is_not_there() {
+        let ray = Ray::new(vec3a(0.0, 0.0, 5.0), vec3a(0.0, 0.0, -1.0));
+        let far = super::intersect(&ray, Vec3A::ZERO, 1.0, f32::INFINITY, |_, side| side == Side::Far);
+        assert_eq!(far, Some(6.0));
+        assert_eq!(super::intersect(&ray, Vec3A::ZERO, 1.0, f32::INFINITY, |_, _| false), None);
     }
 
     #[test]

@@ -11,9 +11,9 @@ use super::mesh_tree::{MeshHit, MeshTree};
 use super::tree::{BinaryTree, Bounds, PrimitiveTree};
 use super::wide_tree::TriangleRef;
 use super::{Ray, sphere};
-use crate::scene::{Alpha, Instance, MaterialId, Motion, ScalarInput, Scene};
+use crate::scene::{Alpha, Instance, MaterialId, Motion, ScalarInput, Scene, SpherePlace};
 use at_hit::{Placement, interpolate_uv};
-use glam::{Affine3A, Vec3, Vec3A};
+use glam::{Affine3A, Vec2, Vec3, Vec3A};
 use std::sync::Arc;
 
 /// What a ray hits.
@@ -218,12 +218,12 @@ impl World {
     fn closest_of_item(&self, item: &Item, ray: &Ray, t_max: f32) -> Option<Hit> {
         match item {
             Item::Fixed => self.closest_fixed(ray, t_max),
-            Item::Sphere { object, center, radius } => {
-                sphere::intersect(ray, *center, *radius, t_max).map(|distance| Hit::on_sphere(*object, distance))
-            }
+            Item::Sphere { object, center, radius } => self
+                .meets_sphere(*object, *center, *radius, ray, t_max)
+                .map(|distance| Hit::on_sphere(*object, distance)),
             Item::MovingSphere { object } => {
-                let (center, radius) = self.sphere_at(*object, ray.time);
-                sphere::intersect(ray, center, radius, t_max).map(|distance| Hit::on_sphere(*object, distance))
+                let SpherePlace { center, radius, .. } = self.sphere_at(*object, ray.time);
+                self.meets_sphere(*object, center, radius, ray, t_max).map(|distance| Hit::on_sphere(*object, distance))
             }
             Item::Placed { instance, shared, to_mesh } => {
                 self.closest_of_instance(*instance, *shared, &LocalRay::new(ray, to_mesh), ray, t_max)
@@ -271,10 +271,12 @@ impl World {
     fn is_before(&self, item: &Item, ray: &Ray, t_max: f32) -> bool {
         match item {
             Item::Fixed => self.occluded_by_fixed(ray, t_max),
-            Item::Sphere { center, radius, .. } => sphere::intersect(ray, *center, *radius, t_max).is_some(),
+            Item::Sphere { object, center, radius } => {
+                self.meets_sphere(*object, *center, *radius, ray, t_max).is_some()
+            }
             Item::MovingSphere { object } => {
-                let (center, radius) = self.sphere_at(*object, ray.time);
-                sphere::intersect(ray, center, radius, t_max).is_some()
+                let SpherePlace { center, radius, .. } = self.sphere_at(*object, ray.time);
+                self.meets_sphere(*object, center, radius, ray, t_max).is_some()
             }
             Item::Placed { instance, shared, to_mesh } => {
                 self.occluded_by_instance(*instance, *shared, &LocalRay::new(ray, to_mesh), ray, t_max)
@@ -290,6 +292,14 @@ impl World {
         let tree = &self.shared[shared];
         let accept = |h: &MeshHit| self.is_there(tree, Some(instance), h, ray);
         tree.any(local.origin, local.direction, t_max * local.length, accept)
+    }
+
+    /// Where a sphere is met that alpha leaves in place there.
+    #[inline]
+    fn meets_sphere(&self, object: u32, center: Vec3A, radius: f32, ray: &Ray, t_max: f32) -> Option<f32> {
+        sphere::intersect(ray, center, radius, t_max, |distance, side| {
+            !self.has_alpha || self.sphere_is_covered(object, ray, distance, side)
+        })
     }
 
     fn closest_fixed(&self, ray: &Ray, t_max: f32) -> Option<Hit> {
@@ -312,17 +322,28 @@ impl World {
 
     /// The same of a triangle of an instance, or of the instance that the fixed tree names.
     fn is_covered(&self, triangle: TriangleRef, instance: Option<u32>, hit: &MeshHit, ray: &Ray) -> bool {
-        let instance = &self.scene.instances[instance.unwrap_or(triangle.instance) as usize];
-        let coverage = |value: &ScalarInput| {
-            let mesh = &self.scene.meshes[instance.mesh.0 as usize];
-            let uv = interpolate_uv(mesh, triangle.triangle, hit.b1, hit.b2);
-            value.evaluate(&self.scene.textures, uv)
-        };
-        match &self.scene.materials[instance.material.0 as usize].alpha {
+        let number = instance.unwrap_or(triangle.instance);
+        self.covers(Part { object: number, number: triangle.triangle }, ray, || {
+            let mesh = &self.scene.meshes[self.scene.instances[number as usize].mesh.0 as usize];
+            interpolate_uv(mesh, triangle.triangle, hit.b1, hit.b2)
+        })
+    }
+
+    /// The same of a sphere.
+    fn sphere_is_covered(&self, object: u32, ray: &Ray, distance: f32, side: sphere::Side) -> bool {
+        self.covers(Part { object, number: side as u32 }, ray, || {
+            let place = self.sphere_at(object, ray.time);
+            place.uv((ray.origin + ray.direction * distance - place.center).normalize_or(Vec3A::Y))
+        })
+    }
+
+    fn covers(&self, part: Part, ray: &Ray, uv: impl Fn() -> Vec2) -> bool {
+        let coverage = |value: &ScalarInput| value.evaluate(&self.scene.textures, uv());
+        match &self.scene.materials[self.material_of(part.object).0 as usize].alpha {
             Alpha::Opaque => true,
+            Alpha::Unseen => false,
             Alpha::Mask { value, cutoff } => coverage(value) >= *cutoff,
-            // A random number that is a pure function of the ray and the triangle: the same ray always agrees with itself.
-            Alpha::Blend { value } => coverage(value) > ray_hash(ray, triangle.triangle),
+            Alpha::Blend { value } => coverage(value) > part.chance(ray),
         }
     }
 }
@@ -397,10 +418,21 @@ fn swept_bounds(motion: &Motion, own: Bounds) -> Bounds {
     bounds
 }
 
-fn ray_hash(ray: &Ray, triangle: u32) -> f32 {
-    let mut h = u64::from(triangle);
-    for value in ray.origin.to_array().into_iter().chain(ray.direction.to_array()) {
-        h = crate::sampler::hash_words(h, u64::from(value.to_bits()));
+/// A triangle of an object, or the near or far side of a sphere.
+#[derive(Clone, Copy)]
+struct Part {
+    object: u32,
+    number: u32,
+}
+
+impl Part {
+    /// A random number in [0, 1) that is a pure function of the ray and the part: the same ray always agrees with itself, and
+    /// parts behind one another know nothing of each other.
+    fn chance(self, ray: &Ray) -> f32 {
+        let mut h = u64::from(self.object) << 32 | u64::from(self.number);
+        for value in ray.origin.to_array().into_iter().chain(ray.direction.to_array()) {
+            h = crate::sampler::hash_words(h, u64::from(value.to_bits()));
+        }
+        (h >> 40) as f32 * (1.0 / 16_777_216.0)
     }
-    (h >> 40) as f32 * (1.0 / 16_777_216.0)
 }

@@ -7,7 +7,7 @@ use super::PathTracer;
 use super::media::Media;
 use super::shading::{Components, Shading};
 use crate::geometry::{Hit, Ray, SurfacePoint};
-use crate::light::{LightReceiver, LightSample};
+use crate::light::{LightFromAfar, LightReceiver, LightSample};
 use crate::sampler::Sample;
 use fechner_perception::photometry::luminance;
 use glam::{Vec3, Vec3A};
@@ -179,13 +179,13 @@ impl PathTracer {
 
     /// Radiance of the environment along a ray that hit nothing.
     fn add_environment(&self, path: &mut PathState) {
-        let direction = path.ray.direction.into();
-        let radiance = self.lights.radiance_from_afar(direction);
-        if radiance == Vec3::ZERO {
-            return;
+        let weighed = self.lights.from_afar(path.ray.direction.into()).map(|LightFromAfar { radiance, pdf }| {
+            radiance * path.scatter_pdf.map_or(1.0, |scatter_pdf| power_heuristic(scatter_pdf, pdf))
+        });
+        let radiance: Vec3 = weighed.into_iter().sum();
+        if radiance != Vec3::ZERO {
+            path.radiance += path.throughput * path.media.transmittance(f32::INFINITY) * radiance;
         }
-        let weight = path.scatter_pdf.map_or(1.0, |pdf| power_heuristic(pdf, self.lights.pdf_from_afar(direction)));
-        path.radiance += path.throughput * path.media.transmittance(f32::INFINITY) * radiance * weight;
     }
 
     /// Radiance emitted by the surface that was hit; whether there was any.

@@ -5,7 +5,7 @@ use super::flat::FlatEmitter;
 use super::sphere::SphereEmitter;
 use super::tree::LightBounds;
 use crate::geometry::World;
-use crate::scene::{Light, Material};
+use crate::scene::Light;
 use glam::{Vec3, Vec3A};
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -76,19 +76,20 @@ fn instance(world: &World, object: u32, collected: &mut Collected) -> Option<Vec
 fn sphere(world: &World, number: usize, collected: &mut Collected) -> Option<u32> {
     let scene = world.scene();
     let sphere = &scene.spheres[number];
-    let radiance = emission_of_sphere(&scene.materials[sphere.material.0 as usize], world)?;
+    let mean_radiance = scene.materials[sphere.material.0 as usize].mean_emission(&scene.textures)?;
     let object = (scene.instances.len() + number) as u32;
-    let own = SphereEmitter { center: sphere.center, radius: sphere.radius, radiance };
+    let own = SphereEmitter::new(world, object, 0.0);
+    let intensity = own.cross_section() * mean_radiance.max_element();
     let (mut low, mut high) = (own.center - own.radius, own.center + own.radius);
     let Some(motion) = &sphere.motion else {
-        return Some(collected.add(Emitter::Sphere(own), all_around(low, high, intensity_of(&own))));
+        return Some(collected.add(Emitter::Sphere(own), all_around(low, high, intensity)));
     };
     let (box_low, box_high) = (low, high);
     let corners: Vec<Vec3A> = (0..8).map(|corner| Vec3A::from(box_corner(box_low, box_high, corner))).collect();
     motion.sweep(&corners, |center, radius| {
         (low, high) = (low.min(Vec3::from(center) - radius), high.max(Vec3::from(center) + radius));
     });
-    Some(collected.add(Emitter::MovingSphere { object, radiance }, all_around(low, high, intensity_of(&own))))
+    Some(collected.add(Emitter::MovingSphere { object }, all_around(low, high, intensity)))
 }
 
 fn box_corner(low: Vec3, high: Vec3, corner: u32) -> Vec3 {
@@ -96,27 +97,12 @@ fn box_corner(low: Vec3, high: Vec3, corner: u32) -> Vec3 {
     Vec3::new(pick(0, low.x, high.x), pick(1, low.y, high.y), pick(2, low.z, high.z))
 }
 
-fn emission_of_sphere(material: &Material, world: &World) -> Option<Vec3> {
-    material.mean_emission(&world.scene().textures)
-}
-
-fn intensity_of(sphere: &SphereEmitter) -> f32 {
-    sphere.cross_section() * sphere.radiance.max_element()
-}
-
 /// A triangle as it is at a time.
 pub(super) fn triangle_at(world: &World, object: u32, triangle: u32, time: f32) -> FlatEmitter {
     let scene = world.scene();
     let mirrored = world.transform_at(object, time).matrix3.determinant() < 0.0;
-    let material = scene.instances[object as usize].material;
-    let both_sides = scene.materials[material.0 as usize].emits_both_sides;
-    FlatEmitter::triangle(object, triangle, world.triangle_corners(object, triangle, time), mirrored, both_sides)
-}
-
-/// A sphere as it is at a time.
-pub(super) fn sphere_at(world: &World, object: u32, radiance: Vec3, time: f32) -> SphereEmitter {
-    let (center, radius) = world.sphere_at(object, time);
-    SphereEmitter { center: center.into(), radius, radiance }
+    let material = &scene.materials[scene.instances[object as usize].material.0 as usize];
+    FlatEmitter::triangle(object, triangle, world.triangle_corners(object, triangle, time), mirrored, material)
 }
 
 fn flat_bounds(emitter: &FlatEmitter, radiance: f32) -> LightBounds {

@@ -5,7 +5,7 @@ use super::bilinear::{BilinearDensity, parallelogram_corners};
 use super::lanes::FourVectors;
 use super::solid_angle::{LEAST, SphericalRectangle, SphericalTriangle};
 use super::{LightPlace, LightReceiver, LightSample};
-use crate::scene::{Alpha, Scene};
+use crate::scene::{Alpha, Material, Scene};
 use glam::{DVec3, Vec2, Vec3};
 
 /// A flat emitter.
@@ -28,6 +28,8 @@ pub(super) struct FlatEmitter {
     pub(super) normal: Vec3,
     pub(super) area: f32,
     pub(super) both_sides: bool,
+    /// No ray meets it.
+    is_unseen: bool,
     /// What it emits where that is the same everywhere; `None` where a picture says.
     even_radiance: Option<Vec3>,
 }
@@ -63,7 +65,13 @@ type Shares = [f32; 2];
 
 impl FlatEmitter {
     /// A triangle with these world corners; `mirrored` if its front is where the winding is clockwise.
-    pub(super) fn triangle(object: u32, triangle: u32, corners: [Vec3; 3], mirrored: bool, both_sides: bool) -> Self {
+    pub(super) fn triangle(
+        object: u32,
+        triangle: u32,
+        corners: [Vec3; 3],
+        mirrored: bool,
+        material: &Material,
+    ) -> Self {
         let (edge_1, edge_2) = (corners[1] - corners[0], corners[2] - corners[0]);
         let scaled_normal = edge_1.cross(edge_2);
         let area = 0.5 * scaled_normal.length();
@@ -81,7 +89,8 @@ impl FlatEmitter {
             bilinear_beyond_squared: squared_distance_at(MOST_BILINEAR, area, radius),
             normal: scaled_normal.normalize_or(Vec3::Y) * if mirrored { -1.0 } else { 1.0 },
             area,
-            both_sides,
+            both_sides: material.emits_both_sides,
+            is_unseen: material.alpha == Alpha::Unseen,
             even_radiance: None,
         }
     }
@@ -97,7 +106,7 @@ impl FlatEmitter {
             && self.both_sides == next.both_sides
             && self.normal.dot(next.normal) > 0.999_99;
         let material = &scene.materials[scene.instances[self.object as usize].material.0 as usize];
-        if !is_one || material.emission.texture.is_some() || material.alpha != Alpha::Opaque {
+        if !is_one || material.emission.texture.is_some() || !matches!(material.alpha, Alpha::Opaque | Alpha::Unseen) {
             return None;
         }
         let (edge_1, edge_2) = (self.edge_1, next.edge_2);
@@ -154,7 +163,7 @@ impl FlatEmitter {
             place: Some(LightPlace { position, normal: self.normal * facing.signum() }),
             radiance: self.even_radiance.unwrap_or_else(|| self.radiance(scene, shares)),
             pdf,
-            is_delta: false,
+            is_delta: self.is_unseen,
         })
     }
 

@@ -47,6 +47,15 @@ pub struct LightSample {
     pub is_delta: bool,
 }
 
+/// Light from infinitely far away in a direction.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LightFromAfar {
+    /// Radiance.
+    pub radiance: Vec3,
+    /// Probability per steradian that light sampling finds this light in the direction.
+    pub pdf: f32,
+}
+
 /// A point on a light.
 #[derive(Clone, Copy, Debug)]
 pub struct LightPlace {
@@ -69,7 +78,6 @@ enum Emitter {
     /// A sphere that moves.
     MovingSphere {
         object: u32,
-        radiance: Vec3,
     },
 }
 
@@ -137,14 +145,12 @@ impl Lights {
         let from = receiver.position;
         match &self.emitters[index] {
             Emitter::Flat(emitter) => emitter.sample(world.scene(), receiver, u),
-            Emitter::Sphere(emitter) => emitter.sample(from, u),
+            Emitter::Sphere(emitter) => emitter.sample(world, from, u),
             Emitter::Point(light) => punctual::sample(light, from),
             Emitter::MovingTriangle { object, triangle } => {
                 collect::triangle_at(world, *object, *triangle, time).sample(world.scene(), receiver, u)
             }
-            Emitter::MovingSphere { object, radiance } => {
-                collect::sphere_at(world, *object, *radiance, time).sample(from, u)
-            }
+            Emitter::MovingSphere { object } => SphereEmitter::new(world, *object, time).sample(world, from, u),
         }
     }
 
@@ -163,27 +169,29 @@ impl Lights {
         chosen
             * match &self.emitters[index] {
                 Emitter::Flat(emitter) => emitter.pdf(receiver, direction, hit.distance),
-                Emitter::Sphere(emitter) => emitter.pdf(from),
+                Emitter::Sphere(emitter) => emitter.pdf(from, direction, hit.distance),
                 Emitter::MovingTriangle { object, triangle } => {
                     collect::triangle_at(world, *object, *triangle, ray.time).pdf(receiver, direction, hit.distance)
                 }
-                Emitter::MovingSphere { object, radiance } => {
-                    collect::sphere_at(world, *object, *radiance, ray.time).pdf(from)
+                Emitter::MovingSphere { object } => {
+                    SphereEmitter::new(world, *object, ray.time).pdf(from, direction, hit.distance)
                 }
                 Emitter::Point(_) => 0.0,
             }
     }
 
-    /// Radiance that a ray which meets no surface sees: the environment and the discs of lights from afar.
-    pub fn radiance_from_afar(&self, direction: Vec3) -> Vec3 {
-        self.environment.as_ref().map_or(Vec3::ZERO, |e| e.radiance(direction))
-            + self.distant.as_ref().map_or(Vec3::ZERO, |d| d.radiance(direction))
-    }
-
-    /// Probability per steradian that [`Lights::sample`] chooses this direction by a light that is infinitely far.
-    pub fn pdf_from_afar(&self, direction: Vec3) -> f32 {
-        let environment = self.environment.as_ref().map_or(0.0, |e| e.pdf(direction) * self.shares.environment);
-        environment + self.distant.as_ref().map_or(0.0, |d| d.pdf(direction) * self.shares.distant)
+    /// What a ray which meets no surface sees of the environment and of the discs of lights from afar, apart: [`Lights::sample`] gives
+    /// light of the one it has chosen, so each is weighed against its own density.
+    pub fn from_afar(&self, direction: Vec3) -> [LightFromAfar; 2] {
+        let environment = self.environment.as_ref().map(|e| LightFromAfar {
+            radiance: e.radiance(direction),
+            pdf: e.pdf(direction) * self.shares.environment,
+        });
+        let discs = self
+            .distant
+            .as_ref()
+            .map(|d| LightFromAfar { radiance: d.radiance(direction), pdf: d.pdf(direction) * self.shares.distant });
+        [environment.unwrap_or_default(), discs.unwrap_or_default()]
     }
 }
 

@@ -1,18 +1,49 @@
 //! Spheres that emit: sampled uniformly in the cone that they fill. From inside they are left to the BSDF.
 
 use super::{LightPlace, LightSample};
-use glam::Vec3;
+use crate::geometry::World;
+use crate::scene::{Alpha, Material, SpherePlace};
+use glam::{Mat3A, Vec3};
 use std::f32::consts::{PI, TAU};
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SphereEmitter {
+    object: u32,
     pub(super) center: Vec3,
     pub(super) radius: f32,
-    /// The material's mean: textures on emitting spheres are seen, but sampled by their mean.
-    pub(super) radiance: Vec3,
+    axes: Mat3A,
+    /// What it emits where that is the same everywhere; `None` where a picture says.
+    even_radiance: Option<Vec3>,
+    /// No ray meets it.
+    is_unseen: bool,
 }
 
 impl SphereEmitter {
+    /// A sphere as it is at a share of the open shutter.
+    pub(super) fn new(world: &World, object: u32, time: f32) -> Self {
+        let SpherePlace { center, radius, axes } = world.sphere_at(object, time);
+        let material = material_of(world, object);
+        let is_even = material.emission.texture.is_none() && matches!(material.alpha, Alpha::Opaque | Alpha::Unseen);
+        Self {
+            object,
+            center: center.into(),
+            radius,
+            axes,
+            even_radiance: is_even.then_some(material.emission.factor),
+            is_unseen: material.alpha == Alpha::Unseen,
+        }
+    }
+
+    /// What it emits where its unit normal is `normal`.
+    fn radiance(&self, world: &World, normal: Vec3) -> Vec3 {
+        self.even_radiance.unwrap_or_else(|| {
+            let place = SpherePlace { center: self.center.into(), radius: self.radius, axes: self.axes };
+            let (textures, uv) = (&world.scene().textures, place.uv(normal.into()));
+            let material = material_of(world, self.object);
+            material.emission.evaluate(textures, uv) * material.alpha.coverage(textures, uv)
+        })
+    }
+
     /// Area of its outline.
     pub(super) fn cross_section(&self) -> f32 {
         PI * self.radius * self.radius
@@ -24,7 +55,7 @@ impl SphereEmitter {
         (sin_squared < 0.9999).then(|| sin_squared / (1.0 + (1.0 - sin_squared).sqrt()))
     }
 
-    pub(super) fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<LightSample> {
+    pub(super) fn sample(&self, world: &World, from: Vec3, u: [f32; 2]) -> Option<LightSample> {
         let one_minus_cos_max = self.one_minus_cos(from)?;
         let axis = self.center - from;
         let axis_length = axis.length();
@@ -37,18 +68,27 @@ impl SphereEmitter {
         let miss_squared = axis_length * axis_length * one_minus_cos * (2.0 - one_minus_cos);
         let distance = along - (self.radius * self.radius - miss_squared).max(0.0).sqrt();
         let position = from + direction * distance;
+        let normal = (position - self.center).normalize_or(-direction);
         Some(LightSample {
             direction,
-            place: Some(LightPlace { position, normal: (position - self.center).normalize_or(-direction) }),
-            radiance: self.radiance,
+            place: Some(LightPlace { position, normal }),
+            radiance: self.radiance(world, normal),
             pdf: in_cone.pdf(),
-            is_delta: false,
+            is_delta: self.is_unseen,
         })
     }
 
-    pub(super) fn pdf(&self, from: Vec3) -> f32 {
-        self.one_minus_cos(from).map_or(0.0, |one_minus_cos| Cone { axis: Vec3::Y, one_minus_cos }.pdf())
+    /// Density per steradian of a direction that reaches the sphere at this distance; 0 for its far side, which is seen through what
+    /// alpha leaves out and is never sampled.
+    pub(super) fn pdf(&self, from: Vec3, direction: Vec3, distance: f32) -> f32 {
+        let is_far_side = direction.dot(from + distance * direction - self.center) > 0.0;
+        let one_minus_cos = self.one_minus_cos(from).filter(|_| !is_far_side);
+        one_minus_cos.map_or(0.0, |one_minus_cos| Cone { axis: Vec3::Y, one_minus_cos }.pdf())
     }
+}
+
+fn material_of(world: &World, object: u32) -> &Material {
+    &world.scene().materials[world.material_of(object).0 as usize]
 }
 
 /// Directions around an axis.

@@ -45,7 +45,14 @@ fn add_parallelogram(scene: &mut Scene, corner: Vec3, u: Vec3, v: Vec3, material
 }
 
 fn add_sphere(scene: &mut Scene, center: Vec3, radius: f32, material: MaterialId) {
-    scene.spheres.push(Sphere { name: String::new(), center, radius, material, motion: None });
+    scene.spheres.push(Sphere {
+        name: String::new(),
+        center,
+        radius,
+        axes: glam::Mat3A::IDENTITY,
+        material,
+        motion: None,
+    });
 }
 
 /// A sky with a bright patch off the poles, dark below.
@@ -126,11 +133,15 @@ fn scenes() -> Vec<(&'static str, Scene)> {
     all
 }
 
+fn pdf_from_afar(lights: &Lights, direction: Vec3) -> f32 {
+    lights.from_afar(direction).map(|light| light.pdf).into_iter().sum()
+}
+
 /// Density of a direction, from whatever a ray that way meets.
 fn pdf(world: &World, lights: &Lights, receiver: &LightReceiver, direction: Vec3) -> f32 {
     let ray = Ray::new(Vec3A::from(receiver.position), direction.into());
     // Lights from afar are sampled whether something stands before them or not.
-    lights.pdf_from_afar(direction)
+    pdf_from_afar(lights, direction)
         + world.closest(&ray).map_or(0.0, |hit| lights.pdf_of_hit(world, receiver, &ray, &hit))
 }
 
@@ -217,8 +228,8 @@ fn both_sides_of_mis_state_the_same_density() {
             let Some(sample) = lights.sample(&world, &receiver, 0.0, u) else { continue };
             // What stands before lights from afar has a density of its own.
             let stated = match sample.place {
-                None => lights.pdf_from_afar(sample.direction),
-                Some(_) => pdf(&world, &lights, &receiver, sample.direction) - lights.pdf_from_afar(sample.direction),
+                None => pdf_from_afar(&lights, sample.direction),
+                Some(_) => pdf(&world, &lights, &receiver, sample.direction) - pdf_from_afar(&lights, sample.direction),
             };
             differ += u32::from((stated / sample.pdf - 1.0).abs() > 2e-3);
         }

@@ -62,6 +62,8 @@ pub enum Alpha {
         /// Coverage in [0, 1].
         value: ScalarInput,
     },
+    /// No ray meets it, and yet it shines in full (area lights of alpha 0 in pbrt-v4).
+    Unseen,
 }
 
 impl Material {
@@ -83,6 +85,21 @@ impl Material {
         matches!(self.relief, Some(Relief::Normals { .. })) || self.surface.is_anisotropic()
     }
 
+    /// Whether one place of the surface may look unlike another, or one direction along it unlike another.
+    pub fn has_places(&self) -> bool {
+        let reads_color = |color: &ColorInput| color.texture.is_some();
+        let covers = match &self.alpha {
+            Alpha::Opaque | Alpha::Unseen => false,
+            Alpha::Mask { value, .. } | Alpha::Blend { value } => value.texture.is_some(),
+        };
+        covers
+            || reads_color(&self.emission)
+            || self.relief.is_some()
+            || self.surface.is_anisotropic()
+            || self.surface.colors().into_iter().any(reads_color)
+            || self.surface.scalars().into_iter().any(|scalar| scalar.texture.is_some())
+    }
+
     /// Mean emitted radiance over the texture's square, in scene units; `None` where nothing is emitted.
     pub fn mean_emission(&self, textures: &[Texture]) -> Option<Vec3> {
         if self.emission.factor.max_element() <= 0.0 {
@@ -100,17 +117,17 @@ impl Alpha {
     /// The texture whose alpha channel is the coverage.
     pub fn texture_of_coverage(&self) -> Option<TextureId> {
         match self {
-            Self::Opaque => None,
+            Self::Opaque | Self::Unseen => None,
             Self::Mask { value, .. } | Self::Blend { value } => {
                 value.texture.filter(|(_, channel)| *channel == 3).map(|(lookup, _)| lookup.texture)
             }
         }
     }
 
-    /// Probability that the surface is there, at texture coordinates.
+    /// Share of what the surface emits that it sends out, at texture coordinates: the probability that it is there.
     pub fn coverage(&self, textures: &[Texture], uv: Vec2) -> f32 {
         match self {
-            Self::Opaque => 1.0,
+            Self::Opaque | Self::Unseen => 1.0,
             Self::Mask { value, cutoff } => f32::from(u8::from(value.evaluate(textures, uv) >= *cutoff)),
             Self::Blend { value } => value.evaluate(textures, uv).clamp(0.0, 1.0),
         }

@@ -23,7 +23,8 @@ pub use motion::{Motion, MotionKey, Pose};
 pub use relief::{HeightMap, HeightUnit, Relief};
 pub use surface::{Distribution, MetalRoughness, Roughness, RoughnessScale, Surface};
 
-use glam::{Affine3A, Vec2, Vec3, Vec3A, Vec4};
+use glam::{Affine3A, Mat3A, Vec2, Vec3, Vec3A, Vec4};
+use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
 
 /// Index into [`Scene::meshes`].
@@ -169,19 +170,58 @@ pub struct Sphere {
     pub center: Vec3,
     /// Radius, above 0.
     pub radius: f32,
+    /// Its own axes in the world: orthonormal, mirrored where its transform mirrors. Pictures lie around its own y.
+    pub axes: Mat3A,
     /// Which material.
     pub material: MaterialId,
-    /// Moves centre and radius while the shutter is open (similarities only); `None` where it rests.
+    /// Moves it while the shutter is open (similarities only); `None` where it rests.
     pub motion: Option<Motion>,
 }
 
+/// Where a sphere is at a moment, in world space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpherePlace {
+    /// Centre.
+    pub center: Vec3A,
+    /// Radius, above 0.
+    pub radius: f32,
+    /// Its own axes, orthonormal.
+    pub axes: Mat3A,
+}
+
 impl Sphere {
-    /// Centre and radius at a share of the open shutter.
-    pub fn place_at(&self, time: f32) -> (Vec3A, f32) {
+    /// The axes of a sphere that a similarity has put into the world.
+    pub fn axes_of(to_world: &Affine3A) -> Mat3A {
+        let Mat3A { x_axis, y_axis, z_axis } = to_world.matrix3;
+        Mat3A::from_cols(x_axis.normalize_or(Vec3A::X), y_axis.normalize_or(Vec3A::Y), z_axis.normalize_or(Vec3A::Z))
+    }
+
+    /// The same where the format's spheres have their poles on their own z and count their turn from x to y (pbrt, Mitsuba).
+    pub fn axes_with_poles_on_z(to_world: &Affine3A) -> Mat3A {
+        let axes = Self::axes_of(to_world);
+        Mat3A::from_cols(axes.x_axis, axes.z_axis, -axes.y_axis)
+    }
+
+    /// Where it is at a share of the open shutter.
+    pub fn place_at(&self, time: f32) -> SpherePlace {
         let center = Vec3A::from(self.center);
-        let Some(motion) = &self.motion else { return (center, self.radius) };
+        let Some(motion) = &self.motion else { return SpherePlace { center, radius: self.radius, axes: self.axes } };
         let moved = motion.at(time);
-        (moved.transform_point3a(center), self.radius * moved.matrix3.x_axis.length())
+        SpherePlace {
+            center: moved.transform_point3a(center),
+            radius: self.radius * moved.matrix3.x_axis.length(),
+            axes: Self::axes_of(&moved) * self.axes,
+        }
+    }
+}
+
+impl SpherePlace {
+    /// Texture coordinates where the unit normal is `normal`, as those of the mesh that stands in for a sphere: u runs from its own
+    /// +x against the clock seen from its own +y, v from +y down.
+    pub fn uv(&self, normal: Vec3A) -> Vec2 {
+        let own = self.axes.transpose() * normal;
+        let turn = (-own.z).atan2(own.x) / TAU;
+        Vec2::new(if turn < 0.0 { turn + 1.0 } else { turn }, own.y.clamp(-1.0, 1.0).acos() / PI)
     }
 }
 

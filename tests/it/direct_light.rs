@@ -6,8 +6,11 @@ use crate::support::{
 use fechner::geometry::Ray;
 use fechner::integrator::{PathTracer, TraceSettings};
 use fechner::scene::load::shapes;
-use fechner::scene::{Environment, Instance, Light, MeshId, Parametrisation, Scene, SpotFalloff};
-use glam::{Mat3, Vec2, Vec3, vec3a};
+use fechner::scene::{
+    Environment, Instance, Light, MeshId, Parametrisation, Scene, SpotFalloff, Texels, Texture, TextureId,
+    TextureLookup, Wrap,
+};
+use glam::{Mat3, Mat3A, Vec2, Vec3, vec3a};
 use std::f32::consts::{FRAC_1_PI, PI};
 use std::sync::Arc;
 
@@ -198,4 +201,58 @@ fn lights_add_up() {
     scene.environment = constant_environment(0.1);
     scene.lights.push(Light::Point { position: Vec3::new(0.0, 2.0, 0.0), intensity: Vec3::splat(8.0) });
     assert_irradiance(scene, 0.0, 0.1 * PI + 2.0, "sky and point");
+}
+
+/// A patch of sky and a wide disc in the same directions: each alone, and what both give together.
+#[test]
+fn sky_and_disc_in_one_place_add_up() {
+    let towards = Vec3::new(0.3, 1.0, 0.2).normalize();
+    let patch = Environment::from_directions(64, 32, |d| if d.dot(towards) > 0.8 { Vec3::ONE } else { Vec3::ZERO });
+    let disc = Light::Directional { direction: -towards, irradiance: Vec3::ONE, angular_radius: 1.0 };
+    let along = |sky: bool, sun: bool| {
+        let mut scene = floor();
+        scene.environment = sky.then(|| patch.clone());
+        scene.lights = if sun { vec![disc.clone()] } else { Vec::new() };
+        let tracer = PathTracer::new(Arc::new(scene), trace_settings(16, 16, 0));
+        let ray = Ray::new(vec3a(-0.1, 0.2, 0.0), vec3a(0.1, -0.2, 0.0).normalize());
+        let (mean, error) = radiance_along(&tracer, ray, 16, 4096);
+        (mean.x, error.x)
+    };
+    let (sky, sun, both) = (along(true, false), along(false, true), along(true, true));
+    let error = (sky.1 * sky.1 + sun.1 * sun.1 + both.1 * both.1).sqrt();
+    assert!((both.0 - sky.0 - sun.0).abs() < 4.0 * error, "{} + {} is not {} ± {error}", sky.0, sun.0, both.0);
+    assert!(error < 0.005 * both.0, "{error} of {}", both.0);
+}
+
+/// A lamp that is white above and black below gives nothing to the floor under it, and, turned over, all that it gives when it is white
+/// everywhere. The floor's point sees nothing of its upper half.
+#[test]
+fn a_sphere_shines_where_its_picture_says() {
+    let above = |turned: bool, pictured: bool| {
+        let mut scene = floor();
+        let lamp = add_material(&mut scene, diffuse(0.0), Vec3::splat(3.0));
+        let texels = (0..16).map(|row| [if row < 8 { 1.0 } else { 0.0 }; 4]).collect();
+        scene.textures.push(Texture {
+            name: "halves".to_owned(),
+            width: 1,
+            height: 16,
+            texels: Texels::Floats(Arc::new(texels)),
+            wrap_u: Wrap::Repeat,
+            wrap_v: Wrap::Clamp,
+            nearest: true,
+        });
+        if pictured {
+            scene.materials[lamp.0 as usize].emission.texture = Some(TextureLookup::plain(TextureId(0)));
+        }
+        add_sphere(&mut scene, Vec3::Y * 1.5, 0.5, lamp);
+        if turned {
+            scene.spheres[0].axes = Mat3A::from_rotation_x(PI);
+        }
+        let settings = TraceSettings { max_depth: 1, ..trace_settings(16, 16, 0) };
+        let ray = Ray::new(vec3a(-0.1, 0.2, 0.0), vec3a(0.1, -0.2, 0.0).normalize());
+        radiance_along(&PathTracer::new(Arc::new(scene), settings), ray, 16, 1024).0.x
+    };
+    assert_eq!(above(false, true), 0.0);
+    let (pictured, plain) = (above(true, true), above(true, false));
+    assert!((pictured / plain - 1.0).abs() < 1e-3, "{pictured} and {plain}");
 }

@@ -3,6 +3,7 @@
 //! - `support`: scenes made in code, and rendering them
 //! - `furnace`: energy: closed and open white furnaces with known answers
 //! - `direct_light`: irradiance from a rectangle, a disk, a sphere, a point and environments against closed forms; radiosity
+//! - `coverage`: alpha: stacks, spheres, lamps that no ray meets
 //! - `adaptive_render`: adaptive and uniform renders against a reference: bias, calibration, determinism
 //! - `bench`: the benchmark from end to end, small
 //! - `camera_and_time`: blur of lens and shutter, moving lamps, crops
@@ -31,6 +32,7 @@ mod bench;
 mod camera_and_time;
 mod checkpoint;
 mod command_line;
+mod coverage;
 mod denoise;
 mod direct_light;
 mod farm;

@@ -9,7 +9,7 @@ use fechner::scene::{
 };
 use fechner_perception::display::{Display, Viewing};
 use fechner_perception::tone;
-use glam::{Affine3A, Vec2, Vec3};
+use glam::{Affine3A, Mat3A, Vec2, Vec3};
 
 /// A scene of nothing, seen from z = 5.
 pub(crate) fn empty_scene() -> Scene {
@@ -46,7 +46,14 @@ pub(crate) fn diffuse(albedo: f32) -> Surface {
 }
 
 pub(crate) fn add_sphere(scene: &mut Scene, center: Vec3, radius: f32, material: MaterialId) {
-    scene.spheres.push(Sphere { name: "sphere".to_owned(), center, radius, material, motion: None });
+    scene.spheres.push(Sphere {
+        name: "sphere".to_owned(),
+        center,
+        radius,
+        axes: Mat3A::IDENTITY,
+        material,
+        motion: None,
+    });
 }
 
 /// Adds a parallelogram with the normal `edge_u` × `edge_v`.

@@ -29,6 +29,7 @@ fn scene(wall: Vec3, ball: Vec3, yaw: f32, aside: Vec3) -> Scene {
             name: String::new(),
             center: Vec3::new(0.0, 0.0, 5.0) + ball,
             radius: 1.0,
+            axes: glam::Mat3A::IDENTITY,
             material: MaterialId(0),
             motion: None,
         }],

@@ -5,7 +5,7 @@ use crate::geometry::mesh_tree::TriangleShape;
 use crate::geometry::simd::prefetch;
 use crate::geometry::surface::SurfaceDerivatives;
 use crate::geometry::{Ray, SurfacePoint};
-use crate::scene::{Instance, Mesh, Scene};
+use crate::scene::{Instance, Mesh, Scene, SpherePlace};
 use glam::{Affine3A, Mat3A, Vec2, Vec3, Vec3A};
 use std::f32::consts::{PI, TAU};
 
@@ -44,8 +44,8 @@ impl World {
         self.scene.instances[object as usize].transform_at(time)
     }
 
-    /// Centre and radius of a sphere at a share of the open shutter.
-    pub fn sphere_at(&self, object: u32, time: f32) -> (Vec3A, f32) {
+    /// Where a sphere is at a share of the open shutter.
+    pub fn sphere_at(&self, object: u32, time: f32) -> SpherePlace {
         self.scene.spheres[object as usize - self.scene.instances.len()].place_at(time)
     }
 
@@ -60,7 +60,7 @@ impl World {
     /// none, or they do not span it (the poles of spheres, triangles whose corners share a place in the picture).
     pub fn derivatives(&self, point: &SurfacePoint, time: f32) -> Option<SurfaceDerivatives> {
         let derivatives = match self.scene.instances.get(point.object as usize) {
-            None => sphere_derivatives(self.sphere_at(point.object, time).1, point.geometric_normal),
+            None => sphere_derivatives(&self.sphere_at(point.object, time), point.geometric_normal.into()),
             Some(instance) => {
                 let mesh = &self.scene.meshes[instance.mesh.0 as usize];
                 if mesh.uvs.is_empty() {
@@ -120,17 +120,19 @@ impl World {
     }
 
     fn surface_of_sphere(&self, ray: &Ray, hit: &Hit) -> SurfacePoint {
-        let (center, radius) = self.sphere_at(hit.object, ray.time);
-        let normal = Vec3::from((ray.origin + ray.direction * hit.distance) - center).normalize_or(Vec3::Y);
-        let position = Vec3::from(center) + radius * normal;
+        let place = self.sphere_at(hit.object, ray.time);
+        let normal_a = ((ray.origin + ray.direction * hit.distance) - place.center).normalize_or(Vec3A::Y);
+        let normal = Vec3::from(normal_a);
+        let position = Vec3::from(place.center) + place.radius * normal;
         let needs_tangent = self.scene.materials[self.material_of(hit.object).0 as usize].needs_tangent();
+        let along_u = || place.axes.determinant() * place.axes.y_axis.cross(normal_a).normalize_or(place.axes.x_axis);
         SurfacePoint {
             position,
             geometric_normal: normal,
             shading_normal: normal,
-            tangent: needs_tangent.then(|| Vec3::Y.cross(normal).normalize_or(Vec3::X)),
-            handedness: 1.0,
-            uv: sphere_uv(normal),
+            tangent: needs_tangent.then(|| along_u().into()),
+            handedness: place.axes.determinant(),
+            uv: if self.scene.textures.is_empty() { Vec2::ZERO } else { place.uv(normal_a) },
             color: Vec3::ONE,
             object: hit.object,
             triangle: 0,
@@ -197,19 +199,13 @@ impl World {
     }
 }
 
-/// Texture coordinates of a sphere at a unit normal, as those of the mesh that stands in for it: u runs from +x against the
-/// clock seen from +y, v from +y down.
-fn sphere_uv(normal: Vec3) -> Vec2 {
-    let turn = (-normal.z).atan2(normal.x) / TAU;
-    Vec2::new(if turn < 0.0 { turn + 1.0 } else { turn }, normal.y.clamp(-1.0, 1.0).acos() / PI)
-}
-
-fn sphere_derivatives(radius: f32, normal: Vec3) -> SurfaceDerivatives {
-    let sin_theta = normal.x.hypot(normal.z);
-    SurfaceDerivatives {
-        along_u: TAU * radius * Vec3::new(normal.z, 0.0, -normal.x),
-        along_v: PI * radius * Vec3::new(normal.y * normal.x / sin_theta, -sin_theta, normal.y * normal.z / sin_theta),
-    }
+fn sphere_derivatives(place: &SpherePlace, normal: Vec3A) -> SurfaceDerivatives {
+    let SpherePlace { radius, axes, .. } = *place;
+    let own = axes.transpose() * normal;
+    let sin_theta = own.x.hypot(own.z);
+    let along_u = TAU * radius * Vec3A::new(own.z, 0.0, -own.x);
+    let along_v = PI * radius * Vec3A::new(own.y * own.x / sin_theta, -sin_theta, own.y * own.z / sin_theta);
+    SurfaceDerivatives { along_u: (axes * along_u).into(), along_v: (axes * along_v).into() }
 }
 
 pub(super) fn interpolate_uv(mesh: &Mesh, triangle: u32, b1: f32, b2: f32) -> Vec2 {

@@ -35,6 +35,7 @@ fn scene(transforms: &[Affine3A]) -> Scene {
             name: String::new(),
             center: Vec3::splat(-3.0),
             radius: 1.0,
+            axes: glam::Mat3A::IDENTITY,
             material: MaterialId(0),
             motion: None,
         }],

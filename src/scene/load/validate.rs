@@ -165,7 +165,7 @@ pub(super) fn check(scene: &Scene, path: &Path) -> Result<(), LoadError> {
             .chain([material.relief.and_then(|relief| relief.texture().map(|lookup| lookup.texture.0))])
             .chain([material.stretch.and_then(|stretch| stretch.map.map(|lookup| lookup.texture.0))])
             .chain([match material.alpha {
-                Alpha::Opaque => None,
+                Alpha::Opaque | Alpha::Unseen => None,
                 Alpha::Mask { value, .. } | Alpha::Blend { value } => value.texture.map(|(lookup, _)| lookup.texture.0),
             }])
             .flatten()

@@ -34,14 +34,13 @@ impl Reader {
                     self.builder.note(format!("{}: a spot's texture is not rendered.", emitter.place()));
                 }
                 let direction = ahead()?;
-                self.builder.note("Spots fall off smoothly between their two angles, not linearly.");
                 self.builder.lights.push(Light::Spot {
                     position: to_world.translation.into(),
                     direction,
                     intensity,
                     inner_angle: inner.to_radians(),
                     outer_angle: outer.to_radians(),
-                    falloff: SpotFalloff::Smoothstep,
+                    falloff: SpotFalloff::LinearInAngle,
                 });
             }
             "directional" => {

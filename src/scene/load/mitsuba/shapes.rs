@@ -172,18 +172,21 @@ impl Reader {
                     name: "sphere".to_owned(),
                     center: placed,
                     radius,
+                    axes: Sphere::axes_with_poles_on_z(to_world),
                     material,
                     motion: None,
                 });
             }
             _ => {
-                let mut mesh = shapes::sphere(center, radius);
+                let mut mesh = shapes::sphere(Vec3::ZERO, radius);
                 if flip {
                     turn_over(&mut mesh);
                 }
                 self.count(shape, &mesh)?;
                 let mesh = self.builder.add_mesh(mesh);
-                self.place(mesh, material, *to_world);
+                let poles_on_z = Sphere::axes_with_poles_on_z(&Affine3A::IDENTITY);
+                let place = Affine3A { matrix3: poles_on_z, translation: center.into() };
+                self.place(mesh, material, *to_world * place);
             }
         }
         Ok(())

@@ -174,7 +174,10 @@ impl Reader<'_> {
                 if let Some(texture) = alpha {
                     material.alpha = Alpha::Blend { value: self.scalar_texture(shape, &texture, 0)? };
                 } else if let Some(number) = alpha_number.filter(|&number| number < 1.0) {
-                    material.alpha = Alpha::Blend { value: ScalarInput::constant(number.max(0.0)) };
+                    material.alpha = match light {
+                        Some(_) if number <= 0.0 => Alpha::Unseen,
+                        _ => Alpha::Blend { value: ScalarInput::constant(number.max(0.0)) },
+                    };
                 }
                 if let Some(name) = medium {
                     self.fill(&mut material, &name, shape)?;

@@ -66,6 +66,7 @@ impl Reader<'_> {
                             name: "sphere".to_owned(),
                             center,
                             radius,
+                            axes: Sphere::axes_with_poles_on_z(&placed),
                             material,
                             motion,
                         });

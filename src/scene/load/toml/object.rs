@@ -156,7 +156,8 @@ fn place_sphere(context: &mut Context, shape: &Value, fields: &Fields, placement
     let area = 4.0 * PI * f64::from(radius) * f64::from(radius);
     let material = with_power(context, entry, area, &placement.name, &fields.require("material")?)?;
     let motion = placement.motion.map(|motion| motion.since_open());
-    context.builder.spheres.push(Sphere { name: placement.name, center, radius, material, motion });
+    let axes = Sphere::axes_of(&placement.to_world);
+    context.builder.spheres.push(Sphere { name: placement.name, center, radius, axes, material, motion });
     Ok(())
 }
 
