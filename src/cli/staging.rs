@@ -96,6 +96,7 @@ impl Staging {
         LoadOptions {
             camera: self.camera.clone(),
             frame_time: seconds,
+            shutter_s: 0.0,
             environment_follows: self.environment.is_some(),
             on_texture: None,
             texture_memory: self.texture_memory.map(megabytes),

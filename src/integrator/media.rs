@@ -2,12 +2,13 @@
 //!
 //! A boundary pushes its inside when the path enters it from the front and takes it away again when the path leaves. A volume
 //! is known by its material, so that its boundary may be made of several objects; the innermost one absorbs. Thin sheets
-//! have no inside. A path that meets a boundary from behind without having entered it began in there, or came in through a
-//! face that belongs to another volume: the way to that boundary is inside it.
+//! have no inside. What the camera is in is asked once, by a ray from it out of the scene. A path that meets a boundary from behind
+//! without having entered it came in through a face that belongs to another volume: the way to that boundary is inside it.
 //!
 //! Source: A. Beer (1852); nesting as in C. Schmidt & B. Budge, *Simple nested dielectrics in ray traced images* (2002),
 //! without priorities, since our boundaries carry the index of both sides.
 
+use crate::geometry::{Ray, World};
 use crate::scene::{MaterialId, Surface};
 use glam::Vec3;
 
@@ -58,6 +59,32 @@ impl Media {
             self.entered.copy_within(place + 1..self.count, place);
             self.count -= 1;
         }
+    }
+
+    /// The volumes around a point of the camera, when the shutter opens: those whose boundaries a ray leaves without having entered them.
+    pub(super) fn around(world: &World, mut ray: Ray) -> Self {
+        // More than that are no boundaries of volumes.
+        const MOST_CROSSED: usize = 10_000;
+        let (mut entered, mut around) = (Vec::new(), Vec::new());
+        for _ in 0..MOST_CROSSED {
+            let Some(hit) = world.closest(&ray) else { break };
+            let point = world.surface(&ray, &hit);
+            let material = world.material_of(hit.object);
+            let direction = Vec3::from(ray.direction);
+            if let Some(medium) = Medium::behind(material, &world.scene().materials[material.0 as usize].surface) {
+                if direction.dot(point.geometric_normal) < 0.0 {
+                    entered.push(material);
+                } else if let Some(place) = entered.iter().rposition(|own| *own == material) {
+                    entered.remove(place);
+                } else {
+                    around.push(medium);
+                }
+            }
+            ray.origin = point.spawn(direction);
+        }
+        let mut media = Self::default();
+        around.into_iter().rev().for_each(|medium| media.cross(medium, true));
+        media
     }
 
     fn innermost(&self) -> Option<Medium> {

@@ -22,6 +22,8 @@ use crate::geometry::World;
 use crate::light::Lights;
 use crate::sampler::{Half, PixelFilter, Sequence};
 use crate::scene::{Camera, Scene};
+use glam::Vec2;
+use media::Media;
 use prune::ThresholdTable;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -167,6 +169,8 @@ pub struct PathTracer {
     settings: TraceSettings,
     /// Whether any volume absorbs, so that paths must know what they are in.
     absorbs: bool,
+    /// The volumes that the lens is in; none where none absorbs.
+    media_at_camera: Media,
     /// By material.
     surface_tables: Vec<SurfaceTables>,
     /// Where light is left to chance.
@@ -185,13 +189,27 @@ impl PathTracer {
         let moves = scene.moves();
         let world = World::new(scene);
         let lights = Lights::new(&world);
-        Self { world, lights, camera, moves, settings, absorbs, surface_tables, thresholds }
+        let media_at_camera = Media::default();
+        let mut tracer =
+            Self { world, lights, camera, moves, settings, absorbs, media_at_camera, surface_tables, thresholds };
+        tracer.look_around();
+        tracer
+    }
+
+    /// Asks what the lens is in.
+    fn look_around(&mut self) {
+        if self.absorbs {
+            let middle = Vec2::new(self.settings.width as f32, self.settings.height as f32) * 0.5;
+            let ray = self.camera.ray(&CameraSample { position_px: middle, lens: [0.5, 0.5], time: 0.0 });
+            self.media_at_camera = Media::around(&self.world, ray);
+        }
     }
 
     /// Looks from elsewhere at the same scene. The scene that it was made from keeps its own camera.
     pub fn set_camera(&mut self, camera: &Camera) {
         self.camera = CameraRays::new(camera, self.settings.width, self.settings.height);
         self.moves |= camera.motion.is_some();
+        self.look_around();
     }
 
     /// The settings it was made with.

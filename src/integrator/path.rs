@@ -85,7 +85,7 @@ struct DirectLight {
 
 impl PathState {
     /// At the lens.
-    pub(super) fn new(camera_ray: Ray, sample: Sample) -> Self {
+    pub(super) fn new(camera_ray: Ray, sample: Sample, media: Media) -> Self {
         Self {
             ray: camera_ray,
             sample,
@@ -94,7 +94,7 @@ impl PathState {
             radiance: Vec3::ZERO,
             scatter_pdf: None,
             radiance_gain_on_exit: 1.0,
-            media: Media::default(),
+            media,
             rays: 0,
             first_hit: FirstHit::NOTHING,
             direct: None,
@@ -110,7 +110,7 @@ impl PathState {
 impl PathTracer {
     /// Follows one path.
     pub fn trace_path(&self, camera_ray: Ray, sample: Sample) -> PathSample {
-        let mut path = [PathState::new(camera_ray, sample)];
+        let mut path = [PathState::new(camera_ray, sample, self.media_at_camera)];
         self.follow_abreast(&mut path);
         path[0].found()
     }

@@ -55,13 +55,15 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
+    /// A share of light in [0, 1]: pictures and their factors may go beyond, and what reflects more than comes in, or less than
+    /// nothing, breaks every model.
     fn color(&self, input: &ColorInput) -> Vec3 {
-        input.evaluate(self.textures, self.uv)
+        input.evaluate(self.textures, self.uv).clamp(Vec3::ZERO, Vec3::ONE)
     }
 
     /// The base colour, which the vertices' colours multiply.
     fn base(&self, input: &ColorInput) -> Vec3 {
-        self.color(input) * self.vertex_color
+        (input.evaluate(self.textures, self.uv) * self.vertex_color).clamp(Vec3::ZERO, Vec3::ONE)
     }
 
     fn scalar(&self, input: &ScalarInput) -> f32 {
@@ -96,7 +98,8 @@ impl Reader<'_> {
             anisotropy: self.scalar(&model.anisotropy),
             ior: model.ior,
             specular: self.scalar(&model.specular),
-            specular_color: self.color(&model.specular_color),
+            // Above 1 it is a stronger tint, which the model takes.
+            specular_color: model.specular_color.evaluate(self.textures, self.uv).max(Vec3::ZERO),
             transmission: if model.volume.is_some() { 0.0 } else { transmission },
         };
         let base = bsdf::MetalRoughness::new(&parameters);

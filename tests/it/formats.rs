@@ -4,8 +4,8 @@ use crate::support::{loop_settings, trace_settings};
 use fechner::adaptive::settings::Sampling;
 use fechner::adaptive::{Quiet, render};
 use fechner::integrator::PathTracer;
-use fechner::scene::Surface;
 use fechner::scene::load::{LoadOptions, load};
+use fechner::scene::{Alpha, ScalarInput, Surface};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -182,4 +182,100 @@ fn the_direction_of_anisotropy_is_read() {
     assert!(direction.abs_diff_eq(glam::Vec2::X, 0.01), "{direction}");
     let Surface::MetalRoughness(model) = &mapped.surface else { panic!("{:?}", mapped.surface) };
     assert!((model.anisotropy.evaluate(&textures, glam::Vec2::ZERO) - 0.5).abs() < 1e-6);
+}
+
+/// A node that turns about another and a camera that drives on blur for as long as a side file holds the shutter open, and are at every
+/// moment where the animation has them.
+#[test]
+fn rigid_nodes_of_gltf_move_while_the_shutter_is_open() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.gltf");
+    // A triangle; times 0 and 2; two rotations about y, 0 and 90 degrees; two translations.
+    let half = std::f32::consts::FRAC_PI_4;
+    let floats = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]
+        .into_iter()
+        .chain([0.0, 2.0])
+        .chain([0.0, 0.0, 0.0, 1.0, 0.0, half.sin(), 0.0, half.cos()])
+        .chain([0.0, 0.0, 0.0, 4.0, 0.0, 0.0]);
+    std::fs::write(folder.path().join("a.bin"), floats.flat_map(f32::to_le_bytes).collect::<Vec<u8>>()).unwrap();
+    let text = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0,2]}],
+"nodes":[{"children":[1]},{"mesh":0,"translation":[3,0,0]},{"camera":0}],
+"cameras":[{"type":"perspective","perspective":{"yfov":0.7,"znear":0.1}}],
+"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+"animations":[{"channels":[{"sampler":0,"target":{"node":0,"path":"rotation"}},
+{"sampler":1,"target":{"node":2,"path":"translation"}}],"samplers":[{"input":1,"output":2},{"input":1,"output":3}]}],
+"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]},
+{"bufferView":1,"componentType":5126,"count":2,"type":"SCALAR","min":[0],"max":[2]},
+{"bufferView":2,"componentType":5126,"count":2,"type":"VEC4"},{"bufferView":3,"componentType":5126,"count":2,"type":"VEC3"}],
+"bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":8},
+{"buffer":0,"byteOffset":44,"byteLength":32},{"buffer":0,"byteOffset":76,"byteLength":24}],
+"buffers":[{"byteLength":100,"uri":"a.bin"}]}"#;
+    std::fs::write(&path, text).unwrap();
+    let at = |seconds: f64| {
+        let options = LoadOptions { frame_time: seconds, ..LoadOptions::default() };
+        load(&path, &options).unwrap_or_else(|error| panic!("{error}"))
+    };
+    let still = at(0.5);
+    assert!(still.instances[0].motion.is_none() && still.camera.motion.is_none());
+    assert!(still.notes.iter().any(|note| note.contains("nothing blurs")), "{:?}", still.notes);
+
+    std::fs::write(folder.path().join("a.fechner.toml"), "[camera]\nshutter_s = 1.0\n").unwrap();
+    let moving = at(0.5);
+    let camera = moving.camera.motion.as_ref().expect("the camera moves");
+    for share in [0.0_f32, 0.3, 0.5, 1.0] {
+        let there = at(0.5 + f64::from(share));
+        let (found, expected) = (moving.instances[0].transform_at(share), there.instances[0].to_world);
+        // Chords of an eighth of 45 degrees on a radius of 3 leave the arc by at most 3·(0.098)²/8.
+        assert!(found.translation.distance(expected.translation) < 0.004, "{share}: {found:?}, {expected:?}");
+        assert!(found.matrix3.abs_diff_eq(expected.matrix3, 1e-4), "{share}: {found:?}, {expected:?}");
+        let lens = camera.at(share).transform_point3(moving.camera.position);
+        assert!(lens.abs_diff_eq(there.camera.position, 1e-4), "{share}: {lens}");
+    }
+}
+
+/// The first pole of a sphere is on its own z in pbrt and Mitsuba, on y in ours, and is turned with it.
+#[test]
+fn spheres_are_turned_as_their_files_say() {
+    let place = tempfile::tempdir().unwrap();
+    let pole = |name: &str, text: &str| {
+        let path = place.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        let scene = load(&path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        glam::Vec3::from(scene.spheres[0].axes.y_axis)
+    };
+    let pbrt = r#"WorldBegin LightSource "infinite" "rgb L" [1 1 1] Rotate 90 1 0 0 Shape "sphere""#;
+    assert!(pole("a.pbrt", pbrt).abs_diff_eq(glam::Vec3::NEG_Y, 1e-6));
+    let mitsuba = r#"<scene version="3.0.0"><emitter type="constant"/><shape type="sphere">
+<transform name="toWorld"><rotate x="1" angle="90"/></transform></shape></scene>"#;
+    assert!(pole("a.xml", mitsuba).abs_diff_eq(glam::Vec3::NEG_Y, 1e-6));
+    let ours = r#"
+[camera]
+position = [0, 0, 5]
+look_at = [0, 0, 0]
+[environment]
+luminance_cd_m2 = 100
+[materials.white]
+type = "diffuse"
+reflectance = 0.5
+[[objects]]
+material = "white"
+transform = [ { rotate_deg = 90, axis = [1, 0, 0] } ]
+sphere = { center = [0, 0, 0], radius = 1 }
+"#;
+    assert!(pole("a.toml", ours).abs_diff_eq(glam::Vec3::Z, 1e-6));
+}
+
+/// An area light of alpha 0 is one that no ray meets; of other shapes nothing is left.
+#[test]
+fn alpha_nought_hides_a_light_in_pbrt() {
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("a.pbrt");
+    let text = r#"WorldBegin LightSource "infinite" "rgb L" [1 1 1] AttributeBegin
+AreaLightSource "diffuse" "rgb L" [1 1 1] Shape "sphere" "float alpha" [ 0 ] AttributeEnd
+Shape "sphere" "float alpha" [ 0 ]"#;
+    std::fs::write(&path, text).unwrap();
+    let scene = load(&path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let alpha = |sphere: usize| scene.materials[scene.spheres[sphere].material.0 as usize].alpha;
+    assert_eq!(alpha(0), Alpha::Unseen);
+    assert_eq!(alpha(1), Alpha::Blend { value: ScalarInput::constant(0.0) });
 }

@@ -6,7 +6,9 @@ use crate::support::{
 };
 use fechner::geometry::Ray;
 use fechner::integrator::{PathTracer, Pruning, TraceSettings};
-use fechner::scene::{ColorInput, MetalRoughness, Roughness, ScalarInput, Scene, Surface};
+use fechner::scene::{
+    ColorInput, MetalRoughness, Roughness, ScalarInput, Scene, Surface, Texels, Texture, TextureId, TextureLookup, Wrap,
+};
 use glam::{Vec3, Vec3A, vec3a};
 use std::sync::Arc;
 
@@ -164,4 +166,54 @@ fn pruned_light_is_not_lost() {
     };
     let (some, all) = (rays(&pruned), rays(&whole));
     assert!(f64::from(some) < 0.95 * f64::from(all), "{some} of {all} rays");
+}
+
+/// A camera under water sees a lamp in the water through all of it, and one beyond its surface through what lies between.
+#[test]
+fn a_camera_in_a_volume_sees_through_it() {
+    let through = |lamp_at: f32| {
+        let mut scene = empty_scene();
+        let water = Surface::Dielectric {
+            ior: 1.0,
+            roughness: Roughness::SMOOTH,
+            transmittance: ColorInput::constant(Vec3::ONE),
+            absorption: Vec3::new(1.0, 0.5, 0.0),
+        };
+        let water = add_material(&mut scene, water, Vec3::ZERO);
+        add_sphere(&mut scene, Vec3::Z * 5.0, 6.0, water);
+        let lamp = add_material(&mut scene, diffuse(0.0), Vec3::ONE);
+        add_sphere(&mut scene, Vec3::Z * (4.0 - lamp_at), 1.0, lamp);
+        let tracer = PathTracer::new(Arc::new(scene), trace_settings(16, 16, 0));
+        let ray = Ray::new(vec3a(0.0, 0.0, 5.0), vec3a(0.0, 0.0, -1.0));
+        radiance_along(&tracer, ray, 4, 16).0
+    };
+    for (lamp_at, in_water) in [(4.0, 4.0_f32), (9.0, 6.0)] {
+        let (found, expected) = (through(lamp_at), Vec3::new((-in_water).exp(), (-0.5 * in_water).exp(), 1.0));
+        assert!(found.abs_diff_eq(expected, 1e-4), "lamp at {lamp_at}: {found}, expected {expected}");
+    }
+}
+
+/// Pictures beyond [0, 1] reflect at most what comes in, and nothing below 0.
+#[test]
+fn reflectance_ends_at_nothing_and_all() {
+    for (texel, expected) in [(3.0, 1.0), (-2.0, 0.0)] {
+        let mut scene = empty_scene();
+        scene.environment = constant_environment(1.0);
+        scene.textures.push(Texture {
+            name: "loud".to_owned(),
+            width: 1,
+            height: 1,
+            texels: Texels::Floats(Arc::new(vec![[texel; 4]])),
+            wrap_u: Wrap::Clamp,
+            wrap_v: Wrap::Clamp,
+            nearest: true,
+        });
+        let picture = ColorInput { factor: Vec3::ONE, texture: Some(TextureLookup::plain(TextureId(0))) };
+        let material = add_material(&mut scene, Surface::Diffuse { reflectance: picture }, Vec3::ZERO);
+        add_sphere(&mut scene, Vec3::ZERO, 1.0, material);
+        let tracer = PathTracer::new(Arc::new(scene), trace_settings(16, 16, 0));
+        let ray = Ray::new(vec3a(0.1, 0.2, 5.0), vec3a(0.0, 0.0, -1.0));
+        let found = radiance_along(&tracer, ray, 4, 64).0.x;
+        assert!((found - expected).abs() < 1e-4, "texel {texel}: {found}, expected {expected}");
+    }
 }

@@ -2,8 +2,11 @@
 
 use super::*;
 use crate::integrator::TraceSettings;
-use crate::scene::{Alpha, Camera, ColorInput, Instance, Material, MaterialId, Mesh, MeshId, Sphere, Surface};
-use glam::{Affine3A, Quat};
+use crate::scene::{
+    Alpha, Camera, ColorInput, Instance, Material, MaterialId, Mesh, MeshId, Relief, ScalarInput, Sphere, Surface,
+    TextureId, TextureLookup,
+};
+use glam::{Affine3A, Mat3A, Quat};
 use std::sync::Arc;
 
 /// A wall behind a ball, which have moved by so much; seen by a camera that has turned by `yaw` and gone aside.
@@ -29,7 +32,7 @@ fn scene(wall: Vec3, ball: Vec3, yaw: f32, aside: Vec3) -> Scene {
             name: String::new(),
             center: Vec3::new(0.0, 0.0, 5.0) + ball,
             radius: 1.0,
-            axes: glam::Mat3A::IDENTITY,
+            axes: Mat3A::IDENTITY,
             material: MaterialId(0),
             motion: None,
         }],
@@ -63,6 +66,27 @@ fn things_move_by_what_they_move() {
     near(map.to_previous[wall as usize], Vec2::new(-3.2, 0.0));
     near(map.to_next[ball as usize], Vec2::new(0.0, -8.0));
     near(map.to_previous[ball as usize], Vec2::new(0.0, 8.0));
+}
+
+/// The marks on a ball that spins go along with it, where it has any.
+#[test]
+fn only_what_is_marked_is_seen_to_turn() {
+    let at = |t: f32, marked: bool| {
+        let mut scene = scene(Vec3::ZERO, Vec3::ZERO, 0.0, Vec3::ZERO);
+        scene.spheres[0].axes = Mat3A::from_rotation_y(0.02 * t);
+        if marked {
+            scene.materials[0].alpha = Alpha::Mask { value: ScalarInput::constant(1.0), cutoff: 0.5 };
+            scene.materials[0].relief =
+                Some(Relief::Normals { map: TextureLookup::plain(TextureId(0)), strength: 1.0 });
+        }
+        scene
+    };
+    let ball = (32 * SIZE + 32) as usize;
+    let to_next =
+        |marked| VelocityMap::new(&tracer(at(0.0, marked)), &at(-1.0, marked), &at(1.0, marked)).to_next[ball];
+    assert!(to_next(false).length() < 1e-3, "{}", to_next(false));
+    // The front of the ball is 4 away: 8 pixels to a unit.
+    assert!(to_next(true).distance(Vec2::new(8.0 * 0.02, 0.0)) < 0.01, "{}", to_next(true));
 }
 
 /// A camera that turns and walks: the point that a pixel shows, looked for where its velocity says, is the same point.

@@ -55,6 +55,8 @@ pub struct LoadOptions {
     pub camera: Option<String>,
     /// Time in seconds at which keyframes are evaluated.
     pub frame_time: f64,
+    /// Seconds for which the shutter stays open from then on where the file's format cannot say (a side file's camera can).
+    pub shutter_s: f64,
     /// The caller will set [`Scene::environment`] itself: no light in the file is then neither an error nor replaced.
     pub environment_follows: bool,
     /// Told after each decoded picture how many are done, and of how many; from several threads.
@@ -80,7 +82,8 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
     let side = toml::side::of(path).filter(|side| side != path && path.extension().is_some_and(|e| e != "toml"));
     let Some(side) = side else { return load_alone(path, options) };
     let environment_follows = options.environment_follows || toml::side::brings_light(&side)?;
-    let mut scene = load_alone(path, &LoadOptions { environment_follows, ..options.clone() })?;
+    let shutter_s = toml::side::shutter_s(&side)?.unwrap_or(options.shutter_s);
+    let mut scene = load_alone(path, &LoadOptions { environment_follows, shutter_s, ..options.clone() })?;
     toml::side::apply(&side, options, &mut scene)?;
     Ok(scene)
 }

@@ -23,6 +23,15 @@ pub(super) struct Posed {
 /// The animated nodes, by index.
 pub(super) type Pose = HashMap<usize, Posed>;
 
+/// Times of the first animation's keys in seconds, in no order.
+pub(super) fn key_times(document: &gltf::Document, buffers: &Buffers) -> Result<Vec<f32>, LoadError> {
+    let mut times = Vec::new();
+    for channel in document.animations().next().into_iter().flat_map(|animation| animation.channels()) {
+        times.extend(buffers.floats::<1>(&channel.sampler().input())?.into_iter().flatten());
+    }
+    Ok(times)
+}
+
 /// The pose of the first animation at a time in seconds.
 pub(super) fn pose(path: &Path, document: &gltf::Document, buffers: &Buffers, seconds: f64) -> Result<Pose, LoadError> {
     let mut pose = Pose::new();

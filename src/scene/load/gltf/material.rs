@@ -63,7 +63,7 @@ impl<'a> Materials<'a> {
             builder.note("KHR_materials_unlit: rendered as a diffuse surface.");
             Surface::Diffuse { reflectance: base_color }
         } else {
-            Surface::MetalRoughness(MetalRoughness {
+            let model = MetalRoughness {
                 base_color,
                 metallic: ScalarInput {
                     factor: share(pbr.metallic_factor()),
@@ -73,7 +73,7 @@ impl<'a> Materials<'a> {
                     factor: share(pbr.roughness_factor()),
                     texture: rough_lookup.map(|lookup| (lookup, 1)),
                 },
-                ior: from.ior().filter(|ior| ior.is_finite() && *ior >= 1.0).unwrap_or(1.5),
+                ior: index_of_refraction(from),
                 transmission,
                 volume: from.volume().filter(|volume| volume.thickness_factor() > 0.0).map(|volume| {
                     let distance = volume.attenuation_distance();
@@ -85,7 +85,13 @@ impl<'a> Materials<'a> {
                     }
                 }),
                 ..self.extensions(builder, from)?
-            })
+            };
+            if passes_no_layers(&model) {
+                builder.note(format!(
+                    "\"{name}\": what goes through its volume has no clear coat, sheen or anisotropy, and reflects by its index alone."
+                ));
+            }
+            Surface::MetalRoughness(model)
         };
 
         // The file's unit is cd/m², and so is ours: nits_per_unit stays 1.
@@ -301,6 +307,23 @@ impl<'a> Materials<'a> {
 }
 
 /// A colour of an extension that the crate leaves as JSON; none below 0.
+/// At least 1, 1.5 unless told; 0, with which a coat reflects everything, where there is no volume for light to enter.
+fn index_of_refraction(from: &gltf::Material) -> f32 {
+    let is_volume = from.volume().is_some_and(|volume| volume.thickness_factor() > 0.0);
+    let usable = |ior: &f32| ior.is_finite() && (*ior >= 1.0 || *ior == 0.0 && !is_volume);
+    from.ior().filter(usable).unwrap_or(1.5)
+}
+
+/// Whether a volume's boundary, which is a plain dielectric, leaves out layers or strengths that the material asks for.
+fn passes_no_layers(model: &MetalRoughness) -> bool {
+    let asks = model.clearcoat.factor > 0.0
+        || model.sheen_color.factor != Vec3::ZERO
+        || model.anisotropy.factor > 0.0
+        || model.specular != ScalarInput::constant(1.0)
+        || model.specular_color != ColorInput::constant(Vec3::ONE);
+    model.volume.is_some() && model.transmission.factor > 0.0 && asks
+}
+
 fn json_color(json: &serde_json::Value, key: &str, default: f32) -> Vec3 {
     let channel = |place: usize| {
         let number = json.get(key).and_then(|color| color.get(place)).and_then(serde_json::Value::as_f64);

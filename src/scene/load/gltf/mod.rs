@@ -2,19 +2,20 @@
 //! [`buffers`]): its readers panic on damaged files.
 //!
 //! The first animation is played up to the time that the caller asks for; skins and morph targets bend the meshes of that
-//! moment.
+//! moment. While the shutter is open rigid nodes and cameras go on.
 
 mod animation;
 mod buffers;
 mod deform;
 mod material;
+mod motion;
 
 use self::buffers::Buffers;
 use self::material::Materials;
 use super::builder::{Builder, IfDark, NamedCamera};
 use super::error::LoadError;
 use super::{LoadOptions, files};
-use crate::scene::{Camera, Instance, Light, MaterialId, Mesh, MeshId, Projection, Scene, SpotFalloff};
+use crate::scene::{Camera, Instance, Light, MaterialId, Mesh, MeshId, Motion, Projection, Scene, SpotFalloff};
 use ::gltf::json::validation::Checked;
 use ::gltf::mesh::{Mode, Semantic};
 use glam::{Affine3A, Mat4, Vec2, Vec3, Vec4};
@@ -59,25 +60,34 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
         materials: Materials::new(path, &document, &buffers),
         meshes: HashMap::new(),
         ancestors: Vec::new(),
-        pose: animation::pose(path, &document, &buffers, options.frame_time)?,
+        moments: motion::moments(
+            path,
+            &document,
+            &buffers,
+            motion::Shutter { opens: options.frame_time, stays_open: options.shutter_s },
+        )?,
         placed: Vec::new(),
         world: HashMap::new(),
         builder: &mut builder,
     };
     for node in scene.nodes() {
-        reader.walk(node, Mat4::IDENTITY)?;
+        reader.walk(node, &vec![Mat4::IDENTITY; reader.moments.len()])?;
     }
     // Skins need the places of all nodes first.
-    for (node, matrix) in std::mem::take(&mut reader.placed) {
-        reader.node(&node, matrix)?;
+    for (node, matrices) in std::mem::take(&mut reader.placed) {
+        reader.node(&node, &matrices)?;
     }
     if let Some(first) = document.animations().next() {
         let count = document.animations().count();
         let name = first.name().map_or_else(String::new, |name| format!(" \"{name}\""));
-        builder.note(format!(
-            "Animation{name} (1 of {count}) at {} s; meshes that deform do not blur.",
-            options.frame_time
-        ));
+        let blur = match options.shutter_s > 0.0 {
+            true => format!(
+                "the shutter stays open for {} s, in which meshes that deform and lights rest",
+                options.shutter_s
+            ),
+            false => "nothing blurs, since no side file gives the camera a shutter_s".to_owned(),
+        };
+        builder.note(format!("Animation{name} (1 of {count}) at {} s; {blur}.", options.frame_time));
     }
     builder.finish(path, IfDark::Studio, options)
 }
@@ -164,17 +174,18 @@ struct Reader<'a> {
     meshes: HashMap<usize, Vec<(MeshId, MaterialId)>>,
     /// Nodes above the current one.
     ancestors: Vec<usize>,
-    pose: animation::Pose,
-    /// Every node with its transform, in the order of the file.
-    placed: Vec<(::gltf::Node<'a>, Mat4)>,
-    /// The same by index: where joints are.
+    /// At least one, the first when the shutter opens.
+    moments: Vec<motion::Moment>,
+    /// Every node with its transform at each of the moments, in the order of the file.
+    placed: Vec<(::gltf::Node<'a>, Vec<Mat4>)>,
+    /// Those when the shutter opens, by index: where joints are.
     world: HashMap<usize, Mat4>,
     builder: &'a mut Builder,
 }
 
 impl<'a> Reader<'a> {
     /// Notes where a node and all below it are.
-    fn walk(&mut self, node: ::gltf::Node<'a>, parent: Mat4) -> Result<(), LoadError> {
+    fn walk(&mut self, node: ::gltf::Node<'a>, parents: &[Mat4]) -> Result<(), LoadError> {
         if self.ancestors.contains(&node.index()) {
             return Err(LoadError::invalid(self.path, format_args!("node {} is its own ancestor", node.index())));
         }
@@ -184,32 +195,38 @@ impl<'a> Reader<'a> {
         if self.placed.len() >= MOST_INSTANCES {
             return Err(LoadError::too_large(self.path, format_args!("more than {MOST_INSTANCES} placed nodes")));
         }
-        let matrix = parent * animation::local(&node, &self.pose);
-        self.world.insert(node.index(), matrix);
+        let posed = self.moments.iter().zip(parents);
+        let matrices: Vec<Mat4> =
+            posed.map(|(moment, parent)| *parent * animation::local(&node, &moment.pose)).collect();
+        self.world.insert(node.index(), matrices[0]);
         self.ancestors.push(node.index());
-        self.placed.push((node.clone(), matrix));
+        let place = self.placed.len();
+        self.placed.push((node.clone(), Vec::new()));
         for child in node.children() {
-            self.walk(child, matrix)?;
+            self.walk(child, &matrices)?;
         }
+        self.placed[place].1 = matrices;
         self.ancestors.pop();
         Ok(())
     }
 
-    fn node(&mut self, node: &::gltf::Node<'a>, matrix: Mat4) -> Result<(), LoadError> {
-        let to_world = Affine3A::from_mat4(matrix);
+    /// Places what a node holds, by its transform at each of the moments.
+    fn node(&mut self, node: &::gltf::Node<'a>, matrices: &[Mat4]) -> Result<(), LoadError> {
+        let to_world = Affine3A::from_mat4(matrices[0]);
         let name = node.name().map_or_else(|| format!("node {}", node.index()), str::to_owned);
         if let Some(mesh) = node.mesh() {
-            let animated = self.pose.get(&node.index()).and_then(|posed| posed.weights.clone());
+            let animated = self.moments[0].pose.get(&node.index()).and_then(|posed| posed.weights.clone());
             let weights = animated.or(node.weights().map(<[f32]>::to_vec)).or(mesh.weights().map(<[f32]>::to_vec));
             let weights = weights.unwrap_or_default();
             if node.skin().is_some() || weights.iter().any(|weight| *weight != 0.0) {
                 self.place_deformed(node, &mesh, &name, &weights, to_world)?;
             } else {
-                self.place(&mesh, &name, to_world)?;
+                let motion = motion::through(&self.moments, matrices);
+                self.place(&mesh, &name, to_world, motion)?;
             }
         }
         if let Some(camera) = node.camera() {
-            self.camera(&camera, &name, &to_world);
+            self.camera(&camera, &name, &to_world, motion::of_camera(&self.moments, matrices));
         }
         if let Some(light) = node.light() {
             self.light(&light, &to_world);
@@ -217,7 +234,13 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    fn place(&mut self, mesh: &::gltf::Mesh, name: &str, to_world: Affine3A) -> Result<(), LoadError> {
+    fn place(
+        &mut self,
+        mesh: &::gltf::Mesh,
+        name: &str,
+        to_world: Affine3A,
+        motion: Option<Motion>,
+    ) -> Result<(), LoadError> {
         if !self.meshes.contains_key(&mesh.index()) {
             let mut parts = Vec::new();
             for primitive in mesh.primitives() {
@@ -229,7 +252,7 @@ impl<'a> Reader<'a> {
             self.meshes.insert(mesh.index(), parts);
         }
         let parts = self.meshes[&mesh.index()].clone();
-        self.place_parts(&parts, name, to_world)
+        self.place_parts(&parts, name, to_world, motion)
     }
 
     /// A mesh with a shape of its own: morphed, skinned or both.
@@ -253,10 +276,16 @@ impl<'a> Reader<'a> {
             parts.push((self.builder.add_mesh(converted), material));
         }
         // A skin's vertices are in world space already: the node's own transform does not count.
-        self.place_parts(&parts, name, if joints.is_some() { Affine3A::IDENTITY } else { to_world })
+        self.place_parts(&parts, name, if joints.is_some() { Affine3A::IDENTITY } else { to_world }, None)
     }
 
-    fn place_parts(&mut self, parts: &[(MeshId, MaterialId)], name: &str, to_world: Affine3A) -> Result<(), LoadError> {
+    fn place_parts(
+        &mut self,
+        parts: &[(MeshId, MaterialId)],
+        name: &str,
+        to_world: Affine3A,
+        motion: Option<Motion>,
+    ) -> Result<(), LoadError> {
         if self.builder.instances.len() + parts.len() > MOST_INSTANCES {
             return Err(LoadError::too_large(self.path, format_args!("more than {MOST_INSTANCES} placed meshes")));
         }
@@ -265,7 +294,7 @@ impl<'a> Reader<'a> {
             mesh,
             material,
             to_world,
-            motion: None,
+            motion: motion.clone(),
         }));
         Ok(())
     }
@@ -317,7 +346,7 @@ impl<'a> Reader<'a> {
         Ok(colors.into_iter().map(Vec4::truncate).collect())
     }
 
-    fn camera(&mut self, camera: &::gltf::Camera, node: &str, to_world: &Affine3A) {
+    fn camera(&mut self, camera: &::gltf::Camera, node: &str, to_world: &Affine3A, motion: Option<Motion>) {
         let name = camera.name().unwrap_or(node).to_owned();
         let position = Vec3::from(to_world.translation);
         let forward = to_world.transform_vector3(Vec3::NEG_Z).try_normalize();
@@ -339,7 +368,7 @@ impl<'a> Reader<'a> {
             self.builder.note(format!("Camera \"{name}\" is left out: its transform, angle or height is not usable."));
             return;
         }
-        let camera = Camera { projection, ..Camera::pinhole(position, forward, up, 40.0) };
+        let camera = Camera { projection, motion, ..Camera::pinhole(position, forward, up, 40.0) };
         self.builder.cameras.push(NamedCamera { name, camera });
     }
 

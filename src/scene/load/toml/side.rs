@@ -1,7 +1,8 @@
 //! The side file: `scene.fechner.toml` beside a scene of another format adds what that format lacks.
 //!
 //! It may hold `nits_per_unit`, `[film]`, `[view]`, `[camera]` (with keyframes), `[environment]` and `[[lights]]`, all as in
-//! our own format. Camera and environment take the place of the scene's, lights are added to them.
+//! our own format. Camera and environment take the place of the scene's, lights are added to them; a camera of which only `shutter_s` is
+//! given leaves the scene's own in place and blurs what moves in glTF.
 
 use super::fields::{Fields, Source, Value};
 use super::motion::Shutter;
@@ -24,6 +25,14 @@ pub(in crate::scene::load) fn brings_light(path: &Path) -> Result<bool, LoadErro
     with_root(path, 0.0, |root| Ok(root.get("environment").is_some() || root.get("lights").is_some()))
 }
 
+/// For how many seconds the side file's camera keeps its shutter open, if it says.
+pub(in crate::scene::load) fn shutter_s(path: &Path) -> Result<Option<f64>, LoadError> {
+    with_root(path, 0.0, |root| match root.get("camera") {
+        None => Ok(None),
+        Some(camera) => camera.entries()?.get_some("shutter_s", |seconds| seconds.non_negative()),
+    })
+}
+
 /// Adds everything to the scene. The scene's own camera stays where the caller has asked for one by name.
 pub(in crate::scene::load) fn apply(path: &Path, options: &LoadOptions, scene: &mut Scene) -> Result<(), LoadError> {
     with_root(path, options.frame_time, |root| {
@@ -41,7 +50,12 @@ pub(in crate::scene::load) fn apply(path: &Path, options: &LoadOptions, scene: &
                 exposure_stops: exposure_stops.or(old.exposure_stops),
             };
         }
-        if let Some(value) = root.get("camera")
+        // A shutter alone is one for the scene's own camera.
+        let brings_camera = match root.get("camera") {
+            None => false,
+            Some(value) => value.entries()?.all().iter().any(|(key, _)| *key != "shutter_s"),
+        };
+        if let Some(value) = root.get("camera").filter(|_| brings_camera)
             && options.camera.is_none()
         {
             let stays_open = value.entries()?.get_or("shutter_s", 0.0, Value::non_negative)?;
@@ -62,7 +76,7 @@ pub(in crate::scene::load) fn apply(path: &Path, options: &LoadOptions, scene: &
         if root.get("nits_per_unit").is_some() {
             scene.notes.retain(|note| !note.starts_with("Radiance has no unit"));
         }
-        if root.get("camera").is_some() {
+        if brings_camera {
             scene.notes.retain(|note| !note.starts_with("No camera in the file"));
         }
         scene.nits_per_unit = nits_per_unit;
