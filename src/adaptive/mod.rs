@@ -380,7 +380,7 @@ fn progress(render: &Loop<'_>, judgement: &Judgement, step: &Step) -> Progress {
         rung: rungs.front().copied().unwrap_or(target),
         pixels,
         mean_samples: film.total_samples() as f64 / pixels,
-        visible_share: visible_share(judgement, target),
+        visible_share: judgement.is_known.then(|| visible_share(judgement, target)),
         next_samples: match step {
             Step::Trace(plan) => plan.samples(),
             Step::Stop(_) => 0,

@@ -96,6 +96,36 @@ fn a_render_leaves_a_picture_and_its_figures() {
     assert!(String::from_utf8_lossy(&info.stdout).contains("visibility.Y"));
 }
 
+/// Two samples a pixel say how much noise there is, and one says nothing: it is not called fine.
+#[test]
+fn a_render_of_few_samples_makes_no_claim() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = scene("cornell-box.toml");
+    let told = |spp: &str, film: &str, more: &[&str]| {
+        let arguments = ["--size", "24x24", "--json", "out.json", "-o", "out.png", "--checkpoint", film, "--spp", spp];
+        let run = fechner().arg("render").arg(&scene).args(arguments).args(more).current_dir(folder.path()).output();
+        let run = run.expect("runs");
+        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+        let json = std::fs::read(folder.path().join("out.json")).expect("written");
+        let json: serde_json::Value = serde_json::from_slice(&json).expect("JSON");
+        (json, String::from_utf8_lossy(&run.stderr).into_owned())
+    };
+    let (two, _) = told("2", "two.film", &[]);
+    assert!(two["visibility_p99"].as_f64() > Some(1.0), "{}", two["visibility_p99"]);
+    for (film, more) in [("raw.film", &[][..]), ("denoised.film", &["--denoise", "builtin"][..])] {
+        let (one, message) = told("1", film, more);
+        for key in ["visibility_p99", "fraction_visible", "detection_probability_p99", "measured_over_predicted"] {
+            assert!(one[key].is_null(), "{key}: {}", one[key]);
+        }
+        assert!(message.contains("too few samples to tell") && !message.contains("visibility 0"), "{message}");
+        assert_eq!(one["outlier_pixels"], 0);
+        let merge = ["merge", film, "-o", "merged.png"];
+        let merged = fechner().args(merge).current_dir(folder.path()).output().expect("runs");
+        let message = String::from_utf8_lossy(&merged.stderr);
+        assert!(merged.status.success() && !message.contains("the target is reached"), "{message}");
+    }
+}
+
 #[test]
 fn bad_arguments_are_refused_in_one_line() {
     let folder = tempfile::tempdir().expect("a folder");
