@@ -242,7 +242,7 @@ impl<'a> ArmRunner<'a> {
 
     fn file(&self, arm: Arm, seed: u64) -> PathBuf {
         let key = self.subject.key(self.settings.reference_factor);
-        let name = format!("{}-{key}-{}-{seed}.json", self.subject.name, arm.name());
+        let name = format!("{}-{key}-{}-{seed}.json", self.subject.file_name(), arm.name());
         self.settings.output.join("runs").join(name)
     }
 
