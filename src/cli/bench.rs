@@ -124,9 +124,7 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
             "| {} | {} % | {:.2} ({:.2} to {:.2}) | {:.2} | {efficiency} |",
             s.arm,
             100.0 * s.coverage,
-            speedup.value,
-            speedup.low,
-            speedup.high,
+            speedup.in_words(),
             speedup.least
         );
     }

@@ -74,6 +74,7 @@ fn scenes_of_one_name_are_told_apart() {
         let uniform = own.iter().filter(|record| record["arm"] == "uniform");
         assert!(uniform.clone().all(|record| record["speedup_samples"] == 1.0), "{scene}");
     }
+    assert!(results["summary"][0]["speedup_samples"]["low"].is_null(), "one seed has no interval");
 }
 
 #[test]
