@@ -3,7 +3,7 @@
 use super::console;
 use super::denoise::DenoiseChoice;
 use super::importance;
-use super::seeing::{self, parse_positive};
+use super::seeing::{self, parse_positive, parse_seconds};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use fechner::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, RivalRule, Sampling};
@@ -40,8 +40,8 @@ pub(super) struct JobArguments {
     #[arg(long, value_enum, conflicts_with = "visibility", help_heading = "Until")]
     quality: Option<Quality>,
     /// Stop after this many seconds of rendering.
-    #[arg(long, value_name = "SECONDS", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Until")]
-    time: Option<f64>,
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_negative_numbers = true, help_heading = "Until")]
+    time: Option<Duration>,
     /// Stop at this mean number of samples a pixel.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Until")]
     spp: Option<u32>,
@@ -338,7 +338,7 @@ fn limits(arguments: &JobArguments, scene: &Scene, sampling: Sampling) -> Limits
     };
     Limits {
         visibility,
-        time: arguments.time.map(Duration::from_secs_f64),
+        time: arguments.time,
         mean_samples: arguments.spp,
         max_samples: arguments.max_spp.unwrap_or(DEFAULT_MAX_SAMPLES),
         plans: arguments.plans,

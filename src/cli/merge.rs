@@ -4,6 +4,7 @@ use super::json::write_json;
 use super::render::write_picture;
 use super::report::{Report, summary};
 use super::seeing::parse_positive;
+use super::targets::check_distinct;
 use clap::Args;
 use fechner::adaptive::judge::judge;
 use fechner::adaptive::settings::Limits;
@@ -39,6 +40,11 @@ pub(super) fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
         Some(output::check_target(&arguments.output)?)
     };
     if let Some(json) = &arguments.json {
+        // A sum may take the place of one of its films; figures may not.
+        let films = arguments.films.iter().map(|film| ("a film to merge", film));
+        for (what, path) in films.chain([("-o", &arguments.output)]) {
+            check_distinct(&[(what, Some(path)), ("--json", Some(json))])?;
+        }
         output::check_writable(json)?;
     }
     let mut merged = merge_files(&arguments.films)?;

@@ -96,6 +96,21 @@ fn a_render_leaves_a_picture_and_its_figures() {
     assert!(String::from_utf8_lossy(&info.stdout).contains("visibility.Y"));
 }
 
+/// Times beyond what clocks count are as good as none.
+#[test]
+fn endless_times_are_no_limit() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = fechner()
+        .arg("render")
+        .arg(scene("cornell-box.toml"))
+        .args(["--size", "16x16", "--spp", "4", "-o", "a.png", "--time", "1e20", "--checkpoint", "a.film"])
+        .args(["--checkpoint-every", "1e20"])
+        .current_dir(folder.path())
+        .output()
+        .expect("runs");
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+}
+
 /// Two samples a pixel say how much noise there is, and one says nothing: it is not called fine.
 #[test]
 fn a_render_of_few_samples_makes_no_claim() {
@@ -143,6 +158,12 @@ fn bad_arguments_are_refused_in_one_line() {
     assert_refused(&["render", cornell, "-o", "a.png", "--model", "guess"], at, &["guess", "csf-bands"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--display", "cinemax"], at, &["cinemax", "cinema"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--operator", "magic"], at, &["magic", "constant"]);
+    let render = |more: &[&'static str], fragments: &[&str]| {
+        assert_refused(&[&["render", cornell, "-o", "a.png", "--size", "16x16"], more].concat(), at, fragments);
+    };
+    render(&["--json", "a.png"], &["a.png: -o and --json name the same file"]);
+    render(&["--checkpoint", "./a.png"], &["-o and --checkpoint name the same file"]);
+    render(&["--checkpoint", "a.json", "--json", "a.json"], &["--json and --checkpoint name the same file"]);
     assert_refused(&["bench", cornell, cornell], at, &["named twice"]);
     assert_refused(&["info", "missing.exr"], at, &["missing.exr"]);
     assert_eq!(std::fs::read_dir(at).expect("readable").count(), 0, "something was written");
