@@ -141,6 +141,11 @@ impl JobArguments {
         self.seed
     }
 
+    /// Whether it ends by something that does not ask what the picture looks like.
+    fn has_other_limit(&self) -> bool {
+        self.spp.is_some() || self.time.is_some() || self.plans.is_some()
+    }
+
     /// What stands where no surface covers the picture.
     pub(super) fn background(&self) -> Background {
         if self.transparent { Background::Transparent } else { Background::Shown }
@@ -332,8 +337,8 @@ fn limits(arguments: &JobArguments, scene: &Scene, sampling: Sampling) -> Limits
     let asked = arguments.visibility.or(arguments.quality.map(Quality::visibility));
     let visibility = match (asked, sampling) {
         (Some(visibility), _) => visibility,
-        // A uniform render of so many samples or seconds is what was asked for, not an early end.
-        (None, Sampling::Uniform) if arguments.spp.is_some() || arguments.time.is_some() => 0.0,
+        // A uniform render of so many samples, seconds or plans is what was asked for, not an early end.
+        (None, Sampling::Uniform) if arguments.has_other_limit() => 0.0,
         (None, _) => scene.viewing.visibility.unwrap_or(1.0),
     };
     Limits {
@@ -358,8 +363,8 @@ fn settings_record(arguments: &JobArguments, scene: &Scene) -> anyhow::Result<Se
         SamplingChoice::Uniform => Sampling::Uniform,
         SamplingChoice::Relative => Sampling::Rival(RivalRule::Relative { threshold }),
         SamplingChoice::Variance => Sampling::Rival(RivalRule::Variance { threshold }),
-        SamplingChoice::Budget if arguments.spp.is_none() && arguments.time.is_none() => {
-            bail!("--sampling budget has no stop of its own: add --spp or --time")
+        SamplingChoice::Budget if !arguments.has_other_limit() => {
+            bail!("--sampling budget has no stop of its own: add --spp, --time or --plans")
         }
         SamplingChoice::Budget => Sampling::Rival(RivalRule::Budget),
     };

@@ -96,6 +96,32 @@ fn a_render_leaves_a_picture_and_its_figures() {
     assert!(String::from_utf8_lossy(&info.stdout).contains("visibility.Y"));
 }
 
+/// A render that ended by time is repeated by its number of plans, also where nothing but these ends it.
+#[test]
+fn plans_repeat_what_time_ended() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // Asked for so little that it is reached at once: not what ends a uniform render of so many plans.
+    let text =
+        std::fs::read_to_string(scene("cornell-box.toml")).expect("there").replace("visibility = 2", "visibility = 50");
+    std::fs::write(folder.path().join("easy.toml"), text).expect("written");
+    for sampling in ["uniform", "budget"] {
+        let rendered = |limit: [&str; 2]| {
+            let arguments = ["render", "easy.toml", "--size", "24x24", "-o", "a.png", "--json", "a.json"];
+            let arguments = [&arguments[..], &["--sampling", sampling], &limit[..]].concat();
+            let run = fechner().args(arguments).current_dir(folder.path()).output().expect("runs");
+            assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+            let json: serde_json::Value =
+                serde_json::from_slice(&std::fs::read(folder.path().join("a.json")).expect("written")).expect("JSON");
+            (std::fs::read(folder.path().join("a.png")).expect("written"), json)
+        };
+        let (by_time, told) = rendered(["--time", "0.2"]);
+        let plans = told["plans"].to_string();
+        let (by_plans, again) = rendered(["--plans", &plans]);
+        assert_eq!((&again["plans"], &again["stop_reason"]), (&told["plans"], &"plans".into()), "{sampling}");
+        assert!(by_time == by_plans, "{sampling}: {plans} plans make another picture");
+    }
+}
+
 /// Times beyond what clocks count are as good as none.
 #[test]
 fn endless_times_are_no_limit() {
