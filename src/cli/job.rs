@@ -55,9 +55,9 @@ pub(super) struct JobArguments {
     /// How samples are spread.
     #[arg(long, value_enum, default_value = "adaptive", help_heading = "Sampling")]
     sampling: SamplingChoice,
-    /// Threshold at which --sampling relative and variance stop.
-    #[arg(long, value_name = "X", value_parser = parse_positive, allow_negative_numbers = true, default_value_t = 0.01, help_heading = "Sampling")]
-    noise_threshold: f64,
+    /// Threshold at which --sampling relative and variance stop [default: 0.01].
+    #[arg(long, value_name = "X", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Sampling")]
+    noise_threshold: Option<f64>,
     /// How --sampling adaptive finds counts.
     #[arg(long, value_enum, default_value = "convex", help_heading = "Sampling")]
     allocation: AllocationChoice,
@@ -179,8 +179,9 @@ impl JobArguments {
             eprintln!("note: {note}");
         }
         let size = self.size.unwrap_or(Size { width: scene.film.width, height: scene.film.height });
-        check_memory(size)?;
         let trace = trace_settings(self, size, self.nits_per_unit.unwrap_or(scene.nits_per_unit))?;
+        let Crop { width, height, .. } = trace.film_area();
+        check_memory(Size { width, height })?;
         let mut record = settings_record(self, &scene)?;
         let mut settings = record.loop_settings(limits(self, &scene, record.sampling))?;
         if let Some(path) = &self.importance {
@@ -191,6 +192,7 @@ impl JobArguments {
             record.importance = Some(ContentHash::of_values(map.values()));
             settings.importance = Some(map);
         }
+        check_rule(self)?;
         if trace.filter.is_signed() && settings.sampling != Sampling::Uniform {
             bail!(
                 "--filter mitchell has negative lobes, whose scatter is not the picture's noise: adaptive sampling cannot \
@@ -351,13 +353,33 @@ fn limits(arguments: &JobArguments, scene: &Scene, sampling: Sampling) -> Limits
     }
 }
 
+/// Refuses limits that the rule of sampling would not look at.
+fn check_rule(arguments: &JobArguments) -> anyhow::Result<()> {
+    let (stops_by_noise, stops_by_sight) = match arguments.sampling {
+        SamplingChoice::Adaptive | SamplingChoice::Uniform => (false, true),
+        SamplingChoice::Relative | SamplingChoice::Variance => (true, false),
+        SamplingChoice::Budget => (false, false),
+    };
+    if arguments.noise_threshold.is_some() && !stops_by_noise {
+        bail!(
+            "--noise-threshold is where --sampling relative and variance stop, and this --sampling does not: leave it out"
+        );
+    }
+    if (arguments.visibility.is_some() || arguments.quality.is_some()) && !stops_by_sight {
+        bail!(
+            "--visibility and --quality are looked at by --sampling adaptive and uniform, not by this one: leave them out"
+        );
+    }
+    Ok(())
+}
+
 /// How to sample and for whom: command line before scene before default.
 fn settings_record(arguments: &JobArguments, scene: &Scene) -> anyhow::Result<SettingsRecord> {
     let view = &scene.viewing;
     let display_name = arguments.display.as_deref().or(view.display.as_deref()).unwrap_or("desktop");
     let viewing = seeing::viewing(display_name, arguments.csf_area)?;
     let operator = arguments.operator.as_deref().or(view.operator.as_deref()).unwrap_or("constant");
-    let threshold = arguments.noise_threshold;
+    let threshold = arguments.noise_threshold.unwrap_or(0.01);
     let sampling = match arguments.sampling {
         SamplingChoice::Adaptive => Sampling::Adaptive,
         SamplingChoice::Uniform => Sampling::Uniform,

@@ -137,6 +137,21 @@ fn endless_times_are_no_limit() {
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
 }
 
+/// The memory that a crop needs is its own, not the whole picture's.
+#[test]
+fn a_crop_of_a_huge_picture_fits_into_memory() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = fechner()
+        .arg("render")
+        .arg(scene("cornell-box.toml"))
+        .args(["--size", "40000x40000", "--crop", "20000,20000,16,16", "--spp", "4", "-o", "a.png"])
+        .current_dir(folder.path())
+        .output()
+        .expect("runs");
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    assert_eq!(image::open(folder.path().join("a.png")).expect("a picture").width(), 16);
+}
+
 /// Two samples a pixel say how much noise there is, and one says nothing: it is not called fine.
 #[test]
 fn a_render_of_few_samples_makes_no_claim() {
@@ -187,9 +202,29 @@ fn bad_arguments_are_refused_in_one_line() {
     let render = |more: &[&'static str], fragments: &[&str]| {
         assert_refused(&[&["render", cornell, "-o", "a.png", "--size", "16x16"], more].concat(), at, fragments);
     };
+    render(&["--noise-threshold", "0.1"], &["--noise-threshold", "--sampling relative"]);
+    for rule in ["relative", "variance", "budget"] {
+        render(
+            &["--sampling", rule, "--spp", "16", "--visibility", "2"],
+            &["--visibility and --quality", "leave them out"],
+        );
+        render(&["--sampling", rule, "--spp", "16", "--quality", "good"], &["--visibility and --quality"]);
+    }
+    render(&["--sampling", "budget", "--noise-threshold", "0.1", "--spp", "16"], &["--noise-threshold"]);
     render(&["--json", "a.png"], &["a.png: -o and --json name the same file"]);
     render(&["--checkpoint", "./a.png"], &["-o and --checkpoint name the same file"]);
     render(&["--checkpoint", "a.json", "--json", "a.json"], &["--json and --checkpoint name the same file"]);
+    let bench = |more: &[&'static str], fragments: &[&str]| {
+        assert_refused(&[&["bench", cornell], more].concat(), at, fragments);
+    };
+    bench(&["--denoise", "builtin"], &["--denoise is for --suite denoise and animation"]);
+    bench(&["--suite", "full", "--law-only"], &["--law-only is for --suite denoise"]);
+    bench(&["--fps", "24"], &["--fps is for --suite animation"]);
+    for suite in ["denoise", "animation"] {
+        bench(&["--suite", suite, "--bound"], &["--bound is for --suite quick and full"]);
+        bench(&["--suite", suite, "--arms", "tvi"], &["--arms is for --suite quick and full"]);
+    }
+    bench(&["--suite", "animation", "--seeds", "2"], &["--seeds is for"]);
     assert_refused(&["bench", cornell, cornell], at, &["named twice"]);
     assert_refused(&["info", "missing.exr"], at, &["missing.exr"]);
     assert_eq!(std::fs::read_dir(at).expect("readable").count(), 0, "something was written");
