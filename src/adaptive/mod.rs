@@ -223,6 +223,7 @@ impl<'a> Loop<'a> {
         let is_left = |&rung: &f64| is_below(rung, state.finished_rung) && is_below(rung, state.left_rung);
         let rungs = settings.rungs().into_iter().filter(is_left).collect();
         let seconds_before = state.seconds_total;
+        let state = state.kept_to(&settings.limits);
         Self { tracer, settings, rungs, state, resumed_at: Instant::now(), seconds_before, looked: None }
     }
 
