@@ -50,6 +50,12 @@ pub(super) fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
     let mut merged = merge_files(&arguments.films)?;
     merged.header.visibility = arguments.visibility.unwrap_or(merged.header.visibility);
     let visibility = merged.header.visibility;
+    if let Some(map) = merged.header.settings.importance {
+        eprintln!(
+            "note: sampled under an importance map (content {map}), which films do not keep: what can be seen is told without it"
+        );
+    }
+    let background = if merged.header.origin.is_transparent() { Background::Transparent } else { Background::Shown };
     let settings = merged.header.settings.loop_settings(Limits::of_visibility(visibility))?;
     if format.is_none() {
         write_checkpoint(&arguments.output, &merged.header, &merged.state)?;
@@ -59,7 +65,7 @@ pub(super) fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
     let rendered = Rendered::new(merged.state, judgement, reason);
     let report = Report::new(&merged.header.origin.scene_name, &merged.header.seeds.all, &settings, &rendered);
     if let Some(format) = format {
-        write_picture(&arguments.output, format, Background::Shown, &rendered, &settings, &report)?;
+        write_picture(&arguments.output, format, background, &rendered, &settings, &report)?;
     }
     if let Some(path) = &arguments.json {
         write_json(path, &report)?;

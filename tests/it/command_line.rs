@@ -152,6 +152,28 @@ fn a_crop_of_a_huge_picture_fits_into_memory() {
     assert_eq!(image::open(folder.path().join("a.png")).expect("a picture").width(), 16);
 }
 
+/// The picture of a film has alpha where the film's render would have, and figures do not take the place of a film.
+#[test]
+fn merging_keeps_alpha_and_films() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = |arguments: &[&str]| fechner().args(arguments).current_dir(folder.path()).output().expect("runs");
+    let dark = scene("cornell-box.toml");
+    let dark = dark.to_str().expect("text");
+    let render =
+        ["render", dark, "--size", "16x16", "--spp", "4", "-o", "a.exr", "--transparent", "--checkpoint", "a.film"];
+    assert!(run(&render).status.success());
+    let refused = run(&["merge", "a.film", "-o", "b.exr", "--json", "a.film"]);
+    let message = String::from_utf8_lossy(&refused.stderr);
+    assert!(refused.status.code() == Some(2) && message.contains("a film to merge and --json"), "{message}");
+    let refused = run(&["merge", "a.film", "-o", "b.exr", "--json", "b.exr"]);
+    assert_eq!(refused.status.code(), Some(2), "{}", String::from_utf8_lossy(&refused.stderr));
+    assert!(run(&["merge", "a.film", "-o", "b.exr"]).status.success());
+    let [rendered, merged] =
+        ["a.exr", "b.exr"].map(|name| fechner::exr_read::read_exr(&folder.path().join(name)).expect("an EXR"));
+    assert!(merged.channel("A").is_some(), "no alpha");
+    assert_eq!(rendered.channel("A"), merged.channel("A"));
+}
+
 /// Two samples a pixel say how much noise there is, and one says nothing: it is not called fine.
 #[test]
 fn a_render_of_few_samples_makes_no_claim() {
