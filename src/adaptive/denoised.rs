@@ -65,6 +65,16 @@ impl TimedDenoising {
         let residual = self.luminance.combined(&estimate.luminance_cd_m2, |denoised, raw| denoised - raw);
         let raw_half_difference = half_of(&raw_a, &raw_b);
         let residual_half_difference = half_difference.combined(&raw_half_difference, |denoised, raw| denoised - raw);
+        if !film.has_both_halves() {
+            // The halves are one picture: they would bear witness that it has no noise.
+            let (error, rgb_cd_m2) = (DenoisedError::unknown(width, slope.height()), self.film.rgb_cd_m2);
+            return Ok(DenoisedPicture {
+                rgb_cd_m2,
+                luminance_cd_m2: self.luminance,
+                half_difference: displayed,
+                error,
+            });
+        }
         let error = thresholds.denoised_error(&DenoisedDifferences {
             half_difference: &displayed,
             residual: &shown(&residual),

@@ -40,7 +40,9 @@ pub struct Judgement {
     /// What [`LoopSettings::importance`] multiplies thresholds by. `thresholds` and `pixel_thresholds` are without it; what
     /// a judgement's methods say, and `predicted`, is with it.
     pub importance: Option<Plane>,
-    /// Visibility that the variance predicts.
+    /// Whether the film has samples enough to tell what can be seen: [`Film::has_both_halves`].
+    pub is_known: bool,
+    /// Visibility that the variance predicts; infinite everywhere where it is not known.
     pub predicted: Plane,
     /// Displayed variance of one sample as the neighbours tell it, as the luminance variance that shows as much as the
     /// most visible of the eye's three channels: the variance of the mean is this over the count.
@@ -179,6 +181,7 @@ fn judge_by(
         thresholds,
         pixel_thresholds,
         importance: settings.importance.clone(),
+        is_known: film.has_both_halves(),
         predicted: Plane::filled(0, 0, 0.0),
         pooled_variance_per_sample,
         variance_per_sample,
@@ -190,6 +193,9 @@ fn judge_by(
             let of_mean = judgement.pooled_variance_per_sample.combined(&shares, |sample, share| sample * share);
             judgement.predicted = judgement.visibility_of(&of_mean);
         }
+    }
+    if !judgement.is_known {
+        judgement.predicted = judgement.predicted.map(|_| f32::INFINITY);
     }
     judgement.seconds = started.elapsed().as_secs_f64();
     Ok(judgement)
@@ -294,13 +300,12 @@ pub fn display_scale(
     settings: &LoopSettings,
     inflation: f64,
 ) -> [Plane; CHANNELS] {
-    let (a, b) = (film.half(Half::A), film.half(Half::B));
     let nits_squared = settings.nits_per_unit * settings.nits_per_unit * inflation;
     let display = &settings.viewing.display;
     by_channel(|c| {
         let scene = Plane::from_fn(guide.width(), guide.height(), |x, y| {
             let i = y * guide.width() + x;
-            let own = 0.5 * (a[i].sample_variance(c) + b[i].sample_variance(c)) * f64::from(shares.get(x, y));
+            let own = 0.5 * film.sample_variances(i, c).iter().sum::<f64>() * f64::from(shares.get(x, y));
             (own * nits_squared) as f32
         });
         let displayed = if c == 0 {
@@ -349,8 +354,12 @@ pub fn variance_shares(film: &Film) -> Plane {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::adaptive::is_reached;
     use crate::adaptive::test_films::{film_of, settings};
     use crate::denoise::Denoiser;
+    use crate::film::BlockSum;
+    use crate::integrator::{BlockWork, FirstHit, PathSample};
+    use crate::sampler::hash_words;
     use glam::Vec3;
 
     /// Noise that leaves luminance alone is seen by its colour: no stop at the pilot.
@@ -377,6 +386,53 @@ mod tests {
         let of_luminance = LoopSettings { model: fechner_perception::model::by_name("tvi"), ..denoised() };
         let blind = judge(&film, &of_luminance, 1.0).expect("judges").predicted;
         assert!(seen.get(32, 32) > 10.0 * blind.get(32, 32), "{} and {}", seen.get(32, 32), blind.get(32, 32));
+    }
+
+    /// A film of so many samples of grey noise in half A of each pixel, and so many in half B.
+    fn noisy(samples: [u32; 2]) -> Film {
+        let mut film = Film::new(64, 64);
+        for pixel in 0..64 * 64 {
+            for (half, samples) in Half::BOTH.into_iter().zip(samples) {
+                let mut sum = BlockSum::default();
+                for index in 0..samples {
+                    let key = u64::from(pixel) << 8 | u64::from(index);
+                    let random = (hash_words(key, half.index() as u64) >> 40) as f32 / 8_388_608.0 - 1.0;
+                    let first_hit =
+                        FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: false };
+                    sum.add(&PathSample { radiance: Vec3::splat(0.8 + 0.5 * random), first_hit, rays: 1 });
+                }
+                film.merge_block(BlockWork { samples, ..BlockWork::whole(pixel, half, 0) }, &sum);
+            }
+        }
+        film
+    }
+
+    /// Two single samples show √8 times the noise of eight each, about; of one alone nothing is claimed, denoised or not.
+    #[test]
+    fn few_samples_claim_no_more_than_they_know() {
+        let visible = |samples: [u32; 2]| judge(&noisy(samples), &settings(), 1.0).expect("judges").predicted.mean();
+        let ratio = visible([1, 1]) / visible([8, 8]);
+        assert!((0.7..1.3).contains(&(ratio / 8f64.sqrt())), "{ratio} times as visible");
+        for denoiser in [None, Some(Denoiser::Builtin)] {
+            let settings = LoopSettings { denoiser, ..settings() };
+            for samples in [[1, 0], [0, 0], [4, 0]] {
+                let judgement = judge(&noisy(samples), &settings, 1.0).expect("judges");
+                assert!(!judgement.is_known && !is_reached(&judgement, f64::INFINITY), "{samples:?}");
+                assert!(judgement.predicted.values().iter().all(|v| *v == f32::INFINITY), "{samples:?}");
+            }
+            assert!(judge(&noisy([1, 1]), &settings, 1.0).expect("judges").is_known);
+        }
+    }
+
+    /// One sample a pixel is no witness against its own denoising: the picture stays what the filter made of it.
+    #[test]
+    fn a_single_sample_does_not_undo_its_denoising() {
+        let film = noisy([1, 0]);
+        let settings = LoopSettings { denoiser: Some(Denoiser::Builtin), ..settings() };
+        let judgement = judge(&film, &settings, 1.0).expect("judges");
+        let denoised =
+            crate::denoise::denoise_film(&Denoiser::Builtin, &film, settings.nits_per_unit).expect("denoises");
+        assert_eq!(judgement.picture(), denoised.rgb_cd_m2);
     }
 
     /// What the display clips is not pooled into dark neighbours: a lamp that scatters by a thousand times white.

@@ -223,6 +223,7 @@ impl<'a> Loop<'a> {
         let is_left = |&rung: &f64| is_below(rung, state.finished_rung) && is_below(rung, state.left_rung);
         let rungs = settings.rungs().into_iter().filter(is_left).collect();
         let seconds_before = state.seconds_total;
+        let state = state.kept_to(&settings.limits);
         Self { tracer, settings, rungs, state, resumed_at: Instant::now(), seconds_before, looked: None }
     }
 
@@ -380,7 +381,7 @@ fn progress(render: &Loop<'_>, judgement: &Judgement, step: &Step) -> Progress {
         rung: rungs.front().copied().unwrap_or(target),
         pixels,
         mean_samples: film.total_samples() as f64 / pixels,
-        visible_share: visible_share(judgement, target),
+        visible_share: judgement.is_known.then(|| visible_share(judgement, target)),
         next_samples: match step {
             Step::Trace(plan) => plan.samples(),
             Step::Stop(_) => 0,

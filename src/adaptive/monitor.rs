@@ -16,8 +16,8 @@ pub struct Progress {
     pub pixels: f64,
     /// Mean samples a pixel so far.
     pub mean_samples: f64,
-    /// Share of pixels whose predicted visibility is above the final target.
-    pub visible_share: f64,
+    /// Share of pixels whose predicted visibility is above the final target; `None` where the samples are too few to tell.
+    pub visible_share: Option<f64>,
     /// Samples of the plan that comes next.
     pub next_samples: u64,
     /// Rough count of samples that the target will take from here, if the noise behaves as it did.

@@ -39,7 +39,7 @@ impl Loop<'_> {
         }
         if let Sampling::Rival(rule) = self.settings.sampling {
             let exposure = self.exposure(judgement);
-            let plan = rival_plan(rule, &self.state.film, exposure, limits.mean_samples, limits.max_samples);
+            let plan = rival_plan(rule, &self.state.film, exposure, left, limits.max_samples);
             return Ok(if plan.blocks.is_empty() { Step::Stop(StopReason::Rule) } else { Step::Trace(plan) });
         }
         while let Some(&rung) = self.rungs.front() {

@@ -3,10 +3,12 @@
 //! They look at every 16 samples, as Cycles does, and know neither display nor eye: `exposure` is all that they are
 //! told. Not for use: each has a knob without a unit, and stops dark regions and fireflies early.
 
+use super::plan::cut_to_budget;
 use super::settings::RivalRule;
 use crate::film::{Film, HalfPixel, opponent};
 use crate::integrator::{BlockWork, SamplePlan};
 use crate::sampler::{Half, hash_words};
+use fechner_perception::Plane;
 
 /// Samples between two looks, both halves together.
 const STEP: u32 = 16;
@@ -17,20 +19,25 @@ const RECORD_SIDE: usize = 4;
 /// Tungsten's least squared mean to divide by.
 const LEAST_SQUARED_MEAN: f64 = 1e-3;
 
-/// The next samples by a rule; empty when the rule would stop. `exposure` turns scene units into shares of display white;
-/// `mean_samples` ends a budget.
-pub fn rival_plan(
-    rule: RivalRule,
-    film: &Film,
-    exposure: f64,
-    mean_samples: Option<u32>,
-    max_samples: u32,
-) -> SamplePlan {
-    match rule {
-        RivalRule::Relative { threshold } => step_where(film, max_samples, &relative_active(film, threshold, exposure)),
-        RivalRule::Variance { threshold } => step_where(film, max_samples, &variance_active(film, threshold, exposure)),
-        RivalRule::Budget => budget_pass(film, exposure, mean_samples.unwrap_or(u32::MAX), max_samples),
+/// The next samples by a rule, `left` in all at most; empty when the rule would stop. `exposure` turns scene units into shares of
+/// display white.
+pub fn rival_plan(rule: RivalRule, film: &Film, exposure: f64, left: u64, max_samples: u32) -> SamplePlan {
+    let plan = match rule {
+        RivalRule::Relative { threshold } => {
+            step_where(film, max_samples, left, &relative_active(film, threshold, exposure))
+        }
+        RivalRule::Variance { threshold } => {
+            step_where(film, max_samples, left, &variance_active(film, threshold, exposure))
+        }
+        RivalRule::Budget => budget_pass(film, exposure, left, max_samples),
+    };
+    // None of the rules says who should have the last samples: chance does.
+    let by_chance =
+        |x: usize, y: usize| (hash_words(film.total_samples(), (y * film.width() as usize + x) as u64) >> 40) as f32;
+    if plan.samples() <= left {
+        return plan;
     }
+    cut_to_budget(plan, &Plane::from_fn(film.width() as usize, film.height() as usize, by_chance), left)
 }
 
 /// Takes `samples` of a pixel, half of them in each half, through as many doublings as they reach.
@@ -48,13 +55,13 @@ fn push_samples(plan: &mut SamplePlan, film: &Film, pixel: usize, samples: u32) 
     }
 }
 
-fn step_where(film: &Film, max_samples: u32, active: &[bool]) -> SamplePlan {
+/// A step for each pixel that is active and may have it; what is left goes evenly where it is too little for whole ones.
+fn step_where(film: &Film, max_samples: u32, left: u64, active: &[bool]) -> SamplePlan {
+    let may_have = |&pixel: &usize| active[pixel] && film.samples(pixel) + STEP <= max_samples;
+    let pixels: Vec<usize> = (0..active.len()).filter(may_have).collect();
+    let step = (left / pixels.len().max(1) as u64).clamp(1, u64::from(STEP)) as u32;
     let mut plan = SamplePlan::default();
-    for (pixel, _) in active.iter().enumerate().filter(|(_, active)| **active) {
-        if film.samples(pixel) + STEP <= max_samples {
-            push_samples(&mut plan, film, pixel, STEP);
-        }
-    }
+    pixels.into_iter().for_each(|pixel| push_samples(&mut plan, film, pixel, step));
     plan
 }
 
@@ -97,9 +104,8 @@ fn variance_active(film: &Film, threshold: f64, exposure: f64) -> Vec<bool> {
 
 /// One pass of Tungsten's: as many samples as 16 a pixel, one everywhere and the others in proportion to each record's
 /// error, which is clamped at its 95th percentile and dilated; fractions are rounded by chance.
-fn budget_pass(film: &Film, exposure: f64, mean_samples: u32, max_samples: u32) -> SamplePlan {
+fn budget_pass(film: &Film, exposure: f64, left: u64, max_samples: u32) -> SamplePlan {
     let pixels = film.width() as usize * film.height() as usize;
-    let left = (u64::from(mean_samples) * pixels as u64).saturating_sub(film.total_samples());
     let pass = left.min(u64::from(STEP) * pixels as u64);
     let mut plan = SamplePlan::default();
     if pass < pixels as u64 {
@@ -198,7 +204,7 @@ mod tests {
         for rule in [RivalRule::Relative { threshold: 0.01 }, RivalRule::Variance { threshold: 0.02 }] {
             let mut film = film(0.3);
             loop {
-                let plan = rival_plan(rule, &film, 1.0, None, 1 << 16);
+                let plan = rival_plan(rule, &film, 1.0, u64::MAX, 1 << 16);
                 if plan.blocks.is_empty() {
                     break;
                 }
@@ -227,7 +233,8 @@ mod tests {
     fn a_budget_is_spent_and_no_more() {
         let mut film = film(0.3);
         for _ in 0..100 {
-            let plan = rival_plan(RivalRule::Budget, &film, 1.0, Some(128), 1 << 16);
+            let left = (128 * 512u64).saturating_sub(film.total_samples());
+            let plan = rival_plan(RivalRule::Budget, &film, 1.0, left, 1 << 16);
             if plan.blocks.is_empty() {
                 break;
             }
@@ -236,7 +243,22 @@ mod tests {
             }
         }
         let mean = film.total_samples() as f64 / 512.0;
-        assert!((126.0..=129.0).contains(&mean), "{mean} samples a pixel");
+        assert!((126.0..=128.0).contains(&mean), "{mean} samples a pixel");
         assert!(film.samples(5 * 32 + 5) > 3 * film.samples(5 * 32 + 28));
+    }
+
+    /// What a budget leaves is less than a step: all active pixels have some of it, and it is not exceeded.
+    #[test]
+    fn a_step_beyond_the_budget_is_cut() {
+        let film = film(0.3);
+        for rule in [RivalRule::Relative { threshold: 1e-4 }, RivalRule::Variance { threshold: 1e-4 }] {
+            let active = rival_plan(rule, &film, 1.0, u64::MAX, 1 << 16).samples() / u64::from(STEP);
+            for left in [active / 2, active, 4 * active + 3] {
+                let plan = rival_plan(rule, &film, 1.0, left, 1 << 16);
+                assert!(plan.samples() <= left && 20 * plan.samples() > 19 * left - 80, "{} of {left}", plan.samples());
+                let rows = (0..16).filter(|row| plan.blocks.iter().any(|block| block.pixel / 32 == *row)).count();
+                assert_eq!(rows, 16, "{rule:?}: {left} samples in {rows} rows");
+            }
+        }
     }
 }

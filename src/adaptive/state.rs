@@ -5,7 +5,8 @@ use super::plan::pilot_plan;
 use super::settings::Limits;
 pub use super::until_look::UntilLook;
 use crate::film::Film;
-use crate::integrator::{BlockWork, SamplePlan};
+use crate::integrator::{BlockWork, PILOT_SAMPLES, SamplePlan};
+use crate::sampler::Half;
 use fechner_perception::tone::SavedTone;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
@@ -105,6 +106,39 @@ impl RenderState {
             seconds_denoising: 0.0,
             tone: None,
         }
+    }
+
+    /// What is planned is dropped where it would go beyond these limits, as it may when a render goes on to tighter ones than it was
+    /// planned for; of a pilot stays what they allow. What was planned within the same limits stays as it is.
+    #[must_use]
+    pub(super) fn kept_to(self, limits: &Limits) -> Self {
+        if self.is_planned_within(limits) {
+            return self;
+        }
+        let pilot = if self.plans == 0 { pilot_plan(&self.film, pilot_samples(limits)) } else { SamplePlan::default() };
+        let pending = if pilot.blocks.is_empty() { VecDeque::new() } else { VecDeque::from([pilot]) };
+        Self { pending, traced_blocks: 0, ..self }
+    }
+
+    /// Whether neither the picture nor any pixel has more than it may when all plans are traced.
+    fn is_planned_within(&self, limits: &Limits) -> bool {
+        let is_pilot = self.plans == 0;
+        if self.pending.is_empty()
+            || is_pilot && limits.mean_samples.is_none() && limits.max_samples >= 2 * PILOT_SAMPLES
+        {
+            return true;
+        }
+        let film = &self.film;
+        let [a, b] = Half::BOTH.map(|half| film.half(half));
+        let mut taken: Vec<u64> = a.iter().zip(b).map(|(a, b)| u64::from(a.taken) + u64::from(b.taken)).collect();
+        let mut planned = 0;
+        for block in self.untraced_blocks() {
+            taken[block.pixel as usize] += u64::from(block.samples);
+            planned += u64::from(block.samples);
+        }
+        let is_affordable = |mean: u32| film.total_samples() + planned <= u64::from(mean) * taken.len() as u64;
+        let may_have_it = |block: &BlockWork| taken[block.pixel as usize] <= u64::from(limits.max_samples);
+        limits.mean_samples.is_none_or(is_affordable) && self.untraced_blocks().all(may_have_it)
     }
 
     /// Blocks that are planned and not yet traced, in order.

@@ -122,9 +122,9 @@ fn cautious_variance(pixel: &HalfPixel, channel: usize) -> f64 {
 /// What one pixel has to say about variance in one channel.
 #[derive(Clone, Copy)]
 struct PixelEvidence {
-    /// Sample variance from the squared deviations of both halves about their own means.
+    /// Sample variance from the squared deviations of both halves about their own means; of two single samples, from their difference.
     variance: f64,
-    /// Squared half difference.
+    /// Squared half difference; none where a half is empty.
     squared_difference: f64,
     /// Its expectation for independent samples.
     expected_difference: f64,
@@ -134,16 +134,25 @@ impl PixelEvidence {
     fn of_pixel(a: &HalfPixel, b: &HalfPixel, scale: [f32; CHANNELS]) -> [Self; CHANNELS] {
         let means = [opponent(a.mean), opponent(b.mean)];
         let count = |h: &HalfPixel| f64::from(h.samples.max(1));
+        let has_both = a.samples > 0 && b.samples > 0;
         let degrees_of_freedom = (count(a) - 1.0) + (count(b) - 1.0);
         std::array::from_fn(|c| {
             let difference = means[0][c] - means[1][c];
             let m2 = f64::from(a.m2[c]) + f64::from(b.m2[c]);
             let scale = f64::from(scale[c]);
-            let variance = if degrees_of_freedom > 0.0 { scale * m2 / degrees_of_freedom } else { 0.0 };
+            let variance = if degrees_of_freedom > 0.0 {
+                scale * m2 / degrees_of_freedom
+            } else if has_both {
+                // A sample in each half: what they differ by is all that is known.
+                0.5 * scale * difference * difference
+            } else {
+                0.0
+            };
+            let of_difference = if has_both { 0.25 } else { 0.0 };
             Self {
                 variance,
-                squared_difference: 0.25 * scale * difference * difference,
-                expected_difference: 0.25 * variance * (1.0 / count(a) + 1.0 / count(b)),
+                squared_difference: of_difference * scale * difference * difference,
+                expected_difference: of_difference * variance * (1.0 / count(a) + 1.0 / count(b)),
             }
         })
     }
@@ -164,7 +173,7 @@ pub fn find_outliers(film: &Film) -> Outliers {
     let statistics = SampleStatistics::of(film, &scene_units(film));
     let (a, b) = (film.half(Half::A), film.half(Half::B));
     let (mut pixels, mut excess, mut energy) = (0, 0.0, 0.0);
-    for (i, (a, b)) in a.iter().zip(b).enumerate() {
+    for (i, (a, b)) in a.iter().zip(b).enumerate().filter(|(_, (a, b))| a.samples > 0 && b.samples > 0) {
         let means = [opponent(a.mean)[0], opponent(b.mean)[0]];
         energy += 0.5 * (means[0] + means[1]);
         let half_difference = 0.5 * (means[0] - means[1]).abs();

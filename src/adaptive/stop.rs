@@ -32,10 +32,12 @@ pub enum StopReason {
     Merged,
 }
 
-/// Whether a rung's stop is met: the tolerated share of pixels is below it, and no patch is far above.
+/// Whether a rung's stop is met: the tolerated share of pixels is below it, and no patch is far above. Never where too few samples tell.
 pub fn is_reached(judgement: &Judgement, rung: f64) -> bool {
     let worst = judgement.predicted.values().iter().fold(0.0, |a: f32, &v| a.max(v));
-    visible_share(judgement, rung) <= TOLERATED_SHARE && f64::from(worst) <= TOLERATED_PATCH * rung
+    judgement.is_known
+        && visible_share(judgement, rung) <= TOLERATED_SHARE
+        && f64::from(worst) <= TOLERATED_PATCH * rung
 }
 
 /// Share of samples that the wanted counts save against as many everywhere as the hardest tolerated pixel needs.

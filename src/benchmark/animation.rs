@@ -6,6 +6,7 @@
 
 use super::flicker::{FlickerJudge, Steadiness};
 use super::metrics::video_jod;
+use super::name::distinct_names;
 use super::reference::trace_up_to;
 use crate::adaptive::settings::{DENOISED_PILOT_SAMPLES, Limits, LoopSettings, Sampling};
 use crate::adaptive::{Quiet, render};
@@ -93,9 +94,9 @@ type Frames = Vec<Vec<f32>>;
 /// Scenes that do not load.
 pub fn animation(settings: &AnimationSettings, say: &dyn Fn(&str)) -> Result<Vec<AnimationRow>> {
     let mut rows = Vec::new();
-    for scene in &settings.scenes {
+    for (scene, name) in settings.scenes.iter().zip(distinct_names(&settings.scenes)?) {
         for &rate in &settings.rates {
-            let row = Bench::new(settings, scene, rate)?.row()?;
+            let row = Bench::new(settings, scene, name.clone(), rate)?.row()?;
             say(&format!("{} at {rate}: done", row.scene));
             rows.push(row);
         }
@@ -112,7 +113,7 @@ struct Bench<'a> {
 }
 
 impl<'a> Bench<'a> {
-    fn new(settings: &'a AnimationSettings, path: &'a Path, rate: f64) -> Result<Self> {
+    fn new(settings: &'a AnimationSettings, path: &'a Path, name: String, rate: f64) -> Result<Self> {
         let source = Files(path);
         let display = Display::preset(&settings.display).context("a display preset")?;
         let denoiser = settings.denoiser.map(Denoiser::open).transpose()?;
@@ -139,7 +140,6 @@ impl<'a> Bench<'a> {
         let track = Track::make(&source, &shot, operator.as_ref(), &|_| {})?;
         let scenes = (shot.first..=shot.last).map(|frame| source.at(shot.seconds(f64::from(frame))));
         let scenes = scenes.collect::<Result<Vec<_>, _>>()?;
-        let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
         Ok(Self { settings, name, shot, track, scenes })
     }
 

@@ -5,6 +5,7 @@
 //! denoised pictures reach a quality by metrics that none of them optimises. Not for animation.
 
 use super::metrics::Metrics;
+use super::name::distinct_names;
 use super::reference::Reference;
 use super::truth::Truth;
 use super::{BenchSettings, Subject, make_folders};
@@ -106,11 +107,12 @@ pub struct DenoisingResults {
 /// # Errors
 /// Scenes that do not load, denoisers that are not installed, folders that cannot be written.
 pub fn denoising(settings: &DenoisingSettings, say: &dyn Fn(&str)) -> Result<DenoisingResults> {
+    let names = distinct_names(&settings.bench.scenes)?;
     make_folders(&settings.bench)?;
     let denoisers = settings.denoisers.iter().map(|&kind| Denoiser::open(kind)).collect::<Result<Vec<_>, _>>()?;
     let mut results = DenoisingResults::default();
-    for path in &settings.bench.scenes {
-        let subject = Subject::load(path, &settings.bench)?;
+    for (path, name) in settings.bench.scenes.iter().zip(names) {
+        let subject = Subject::load(path, name, &settings.bench)?;
         let reference = Reference::cached(&subject, &settings.bench, say)?;
         let truth = Truth::new(&subject, &reference)?;
         let scene = SceneBench { settings, subject: &subject, truth: &truth };

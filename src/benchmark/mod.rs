@@ -13,6 +13,7 @@ mod curve;
 mod denoise;
 mod flicker;
 mod metrics;
+mod name;
 mod oracle;
 mod pictures;
 mod plot;
@@ -38,6 +39,7 @@ use crate::scene::load::{LoadOptions, load};
 use anyhow::{Context, Result};
 use fechner_perception::display::{Display, Viewing};
 use fechner_perception::tone;
+use name::distinct_names;
 use oracle::{displayed_variance, least_samples, uniform_samples};
 use reference::Reference;
 use runner::ArmRunner;
@@ -71,7 +73,7 @@ pub const COVERAGES: [f64; 3] = [0.95, 0.99, 0.999];
 
 /// One scene, ready to be rendered by any arm.
 pub(crate) struct Subject {
-    /// File name without its ending.
+    /// No other scene's of the same run: the file's name without its ending, with folders before it where others have that name.
     pub(crate) name: String,
     pub(crate) scene: Arc<Scene>,
     pub(crate) size: (u32, u32),
@@ -80,11 +82,10 @@ pub(crate) struct Subject {
 }
 
 impl Subject {
-    fn load(path: &Path, settings: &BenchSettings) -> Result<Self> {
+    fn load(path: &Path, name: String, settings: &BenchSettings) -> Result<Self> {
         let scene = load(path, &LoadOptions::default())?;
         let display = Display::preset(&settings.display)
             .with_context(|| format!("there is no display \"{}\"", settings.display))?;
-        let name = path.file_stem().map_or_else(|| scene.name.clone(), |stem| stem.to_string_lossy().into_owned());
         Ok(Self {
             name,
             scene: Arc::new(scene),
@@ -92,6 +93,11 @@ impl Subject {
             viewing: Viewing::of(display),
             visibility: settings.visibility,
         })
+    }
+
+    /// How names of files about this scene begin.
+    pub(crate) fn file_name(&self) -> String {
+        self.name.replace(['/', '\\'], "-")
     }
 
     pub(crate) fn tracer(&self, seed: u64) -> PathTracer {
@@ -131,10 +137,11 @@ pub struct Bound {
 /// # Errors
 /// As [`run`].
 pub fn bounds(settings: &BenchSettings, say: &dyn Fn(&str)) -> Result<Vec<Bound>> {
+    let names = distinct_names(&settings.scenes)?;
     make_folders(settings)?;
     let mut bounds = Vec::new();
-    for path in &settings.scenes {
-        let subject = Subject::load(path, settings)?;
+    for (path, name) in settings.scenes.iter().zip(names) {
+        let subject = Subject::load(path, name, settings)?;
         let reference = Reference::cached(&subject, settings, say)?;
         let truth = Truth::new(&subject, &reference)?;
         let variance = displayed_variance(&subject, &reference, &truth)?;
@@ -163,10 +170,11 @@ fn make_folders(settings: &BenchSettings) -> Result<()> {
 /// # Errors
 /// Scenes that do not load, and folders that cannot be written.
 pub fn run(settings: &BenchSettings, say: &dyn Fn(&str)) -> Result<Results> {
+    let names = distinct_names(&settings.scenes)?;
     make_folders(settings)?;
     let mut results = Results::new(settings);
-    for path in &settings.scenes {
-        let subject = Subject::load(path, settings)?;
+    for (path, name) in settings.scenes.iter().zip(names) {
+        let subject = Subject::load(path, name, settings)?;
         let reference = Reference::cached(&subject, settings, say)?;
         let truth = Truth::new(&subject, &reference)?;
         let mut runner = ArmRunner::new(&subject, &reference, &truth, settings);

@@ -38,7 +38,7 @@ impl Reference {
     /// Renders the reference, or reads it back.
     pub(crate) fn cached(subject: &Subject, settings: &BenchSettings, say: &dyn Fn(&str)) -> Result<Self> {
         let key = subject.key(settings.reference_factor);
-        let file = settings.output.join("references").join(format!("{}-{key}.f32", subject.name));
+        let file = settings.output.join("references").join(format!("{}-{key}.f32", subject.file_name()));
         if let Ok(bytes) = std::fs::read(&file) {
             return Self::from_bytes(&bytes, subject)
                 .with_context(|| format!("{} is no reference of this version: delete it", file.display()));

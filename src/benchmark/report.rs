@@ -58,18 +58,15 @@ fn summary_table(results: &Results) -> String {
          <th>worst scene</th><th>time, uniform / arm</th><th>oracle / arm</th></tr>",
     );
     for s in &results.summary {
-        let efficiency =
-            s.efficiency.map_or_else(String::new, |e| format!("{:.2} ({:.2} to {:.2})", e.value, e.low, e.high));
+        let efficiency = s.efficiency.map_or_else(String::new, |e| e.in_words());
         let (samples, seconds) = (s.speedup_samples, s.speedup_seconds);
         let loss = if samples.value < 1.0 { " class=\"loss\"" } else { "" };
         let _ = write!(
             text,
-            "<tr><td>{}</td><td>{} %</td><td{loss}>{:.2} ({:.2} to {:.2})</td><td>{:.2}</td><td>{:.2}</td><td>{efficiency}</td></tr>",
+            "<tr><td>{}</td><td>{} %</td><td{loss}>{}</td><td>{:.2}</td><td>{:.2}</td><td>{efficiency}</td></tr>",
             s.arm,
             100.0 * s.coverage,
-            samples.value,
-            samples.low,
-            samples.high,
+            samples.in_words(),
             samples.least,
             seconds.value
         );

@@ -40,6 +40,9 @@ pub(crate) struct Run {
     /// Mean luminance over the reference's, less 1, and its standard error.
     pub(crate) energy_bias: f64,
     pub(crate) energy_bias_standard_error: f64,
+    /// The reference's part of that, which is the same for all seeds.
+    #[serde(default)]
+    pub(crate) energy_bias_reference_error: f64,
     pub(crate) flip_mean: f64,
     pub(crate) flip_p99: f64,
     pub(crate) jod: f64,
@@ -162,6 +165,7 @@ impl<'a> ArmRunner<'a> {
             seconds_last_look: made.seconds_last_look,
             energy_bias: sum(&estimate.luminance_cd_m2) / truth - 1.0,
             energy_bias_standard_error: variance.sqrt() / truth,
+            energy_bias_reference_error: own.sqrt() / truth,
             flip_mean: metrics.flip_mean,
             flip_p99: metrics.flip_p99,
             jod: metrics.jod,
@@ -242,7 +246,7 @@ impl<'a> ArmRunner<'a> {
 
     fn file(&self, arm: Arm, seed: u64) -> PathBuf {
         let key = self.subject.key(self.settings.reference_factor);
-        let name = format!("{}-{key}-{}-{seed}.json", self.subject.name, arm.name());
+        let name = format!("{}-{key}-{}-{seed}.json", self.subject.file_name(), arm.name());
         self.settings.output.join("runs").join(name)
     }
 

@@ -115,6 +115,11 @@ impl Origin {
         }
     }
 
+    /// Whether what surrounds the scene was left out, so that pictures of the film have alpha.
+    pub fn is_transparent(&self) -> bool {
+        self.tracing.split(", ").any(|setting| setting == "transparent: true")
+    }
+
     /// What keeps a film from standing beside one of `own` origin; `None` if nothing does.
     pub fn difference(&self, own: &Origin) -> Option<String> {
         if self.program != own.program {

@@ -11,11 +11,12 @@ mod video;
 
 use super::denoise::DenoiseChoice;
 use super::job::{Quality, Size, parse_size};
-use super::seeing::parse_positive;
+use super::seeing::{parse_positive, parse_seconds};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use frames::{Frames, parse_frames};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 use time::ShotClock;
 use video::VideoFormat;
 
@@ -55,8 +56,8 @@ pub(super) struct AnimateArguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Until")]
     spp: Option<u32>,
     /// A budget of this many seconds for all frames that are rendered, spent on those that need it most.
-    #[arg(long, value_name = "S", value_parser = parse_positive, conflicts_with = "spp", help_heading = "Until")]
-    time: Option<f64>,
+    #[arg(long, value_name = "S", value_parser = parse_seconds, conflicts_with = "spp", help_heading = "Until")]
+    time: Option<Duration>,
     /// Most samples of one pixel.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(16..), help_heading = "Until")]
     max_spp: Option<u32>,
@@ -134,7 +135,7 @@ fn render_shot(arguments: &AnimateArguments) -> Result<()> {
     arguments.video()?;
     let shot = Shot::new(arguments)?;
     let track = shot.track()?;
-    let mut clock = arguments.time.map(|seconds| ShotClock::start(&shot, &track, seconds)).transpose()?;
+    let mut clock = arguments.time.map(|budget| ShotClock::start(&shot, &track, budget)).transpose()?;
     for frame in arguments.frame_numbers() {
         shot.make(frame, &track, clock.as_mut().map(|clock| clock.share(frame)))?;
     }

@@ -86,6 +86,7 @@ const SHOTS: [&str; 5] = ["light-switch", "opening-door", "rolling-ball", "textu
 
 /// Runs and prints the table.
 pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
+    check_suite(arguments)?;
     let (size, visibility, seeds, arms) = match arguments.suite {
         Suite::Quick => (128, 4.0, 3, Arm::QUICK.to_vec()),
         Suite::Full => (256, 1.0, 5, Arm::ALL.to_vec()),
@@ -121,16 +122,36 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
         let speedup = s.speedup_samples;
         let efficiency = s.efficiency.map_or_else(String::new, |e| format!("{:.2} (least {:.2})", e.value, e.least));
         println!(
-            "| {} | {} % | {:.2} ({:.2} to {:.2}) | {:.2} | {efficiency} |",
+            "| {} | {} % | {} | {:.2} | {efficiency} |",
             s.arm,
             100.0 * s.coverage,
-            speedup.value,
-            speedup.low,
-            speedup.high,
+            speedup.in_words(),
             speedup.least
         );
     }
     eprintln!("{}", settings.output.join("report.html").display());
+    Ok(())
+}
+
+/// Refuses options that the suite would not look at.
+fn check_suite(arguments: &BenchArguments) -> Result<()> {
+    let (is_of_arms, is_denoise, is_animation) = match arguments.suite {
+        Suite::Quick | Suite::Full => (true, false, false),
+        Suite::Denoise => (false, true, false),
+        Suite::Animation => (false, false, true),
+    };
+    for (option, is_given, is_used, suites) in [
+        ("--denoise", !arguments.denoise.is_empty(), is_denoise || is_animation, "denoise and animation"),
+        ("--law-only", arguments.law_only, is_denoise, "denoise"),
+        ("--fps", arguments.fps.is_some(), is_animation, "animation"),
+        ("--seeds", arguments.seeds.is_some(), is_of_arms || is_denoise, "quick, full and denoise"),
+        ("--bound", arguments.bound, is_of_arms, "quick and full"),
+        ("--arms", !arguments.arms.is_empty(), is_of_arms, "quick and full"),
+    ] {
+        if is_given && !is_used {
+            bail!("{option} is for --suite {suites}: this suite does not look at it");
+        }
+    }
     Ok(())
 }
 

@@ -43,11 +43,14 @@ impl Console {
 
 impl Monitor for Console {
     fn looked(&self, progress: &Progress) {
+        let visible = progress.visible_share.map_or_else(
+            || "too few samples to tell".to_owned(),
+            |share| format!("{:.1} % still visible", 100.0 * share),
+        );
         let message = format!(
-            "pass {}  {:.1} spp  {:.1} % still visible  {}",
+            "pass {}  {:.1} spp  {visible}  {}",
             progress.pass,
             progress.mean_samples,
-            100.0 * progress.visible_share,
             self.time_left(progress, progress.pixels),
         );
         match &self.bar {

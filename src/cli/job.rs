@@ -3,7 +3,7 @@
 use super::console;
 use super::denoise::DenoiseChoice;
 use super::importance;
-use super::seeing::{self, parse_positive};
+use super::seeing::{self, parse_positive, parse_seconds};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use fechner::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, RivalRule, Sampling};
@@ -40,8 +40,8 @@ pub(super) struct JobArguments {
     #[arg(long, value_enum, conflicts_with = "visibility", help_heading = "Until")]
     quality: Option<Quality>,
     /// Stop after this many seconds of rendering.
-    #[arg(long, value_name = "SECONDS", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Until")]
-    time: Option<f64>,
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_negative_numbers = true, help_heading = "Until")]
+    time: Option<Duration>,
     /// Stop at this mean number of samples a pixel.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Until")]
     spp: Option<u32>,
@@ -55,9 +55,9 @@ pub(super) struct JobArguments {
     /// How samples are spread.
     #[arg(long, value_enum, default_value = "adaptive", help_heading = "Sampling")]
     sampling: SamplingChoice,
-    /// Threshold at which --sampling relative and variance stop.
-    #[arg(long, value_name = "X", value_parser = parse_positive, allow_negative_numbers = true, default_value_t = 0.01, help_heading = "Sampling")]
-    noise_threshold: f64,
+    /// Threshold at which --sampling relative and variance stop [default: 0.01].
+    #[arg(long, value_name = "X", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Sampling")]
+    noise_threshold: Option<f64>,
     /// How --sampling adaptive finds counts.
     #[arg(long, value_enum, default_value = "convex", help_heading = "Sampling")]
     allocation: AllocationChoice,
@@ -141,6 +141,11 @@ impl JobArguments {
         self.seed
     }
 
+    /// Whether it ends by something that does not ask what the picture looks like.
+    fn has_other_limit(&self) -> bool {
+        self.spp.is_some() || self.time.is_some() || self.plans.is_some()
+    }
+
     /// What stands where no surface covers the picture.
     pub(super) fn background(&self) -> Background {
         if self.transparent { Background::Transparent } else { Background::Shown }
@@ -174,8 +179,9 @@ impl JobArguments {
             eprintln!("note: {note}");
         }
         let size = self.size.unwrap_or(Size { width: scene.film.width, height: scene.film.height });
-        check_memory(size)?;
         let trace = trace_settings(self, size, self.nits_per_unit.unwrap_or(scene.nits_per_unit))?;
+        let Crop { width, height, .. } = trace.film_area();
+        check_memory(Size { width, height })?;
         let mut record = settings_record(self, &scene)?;
         let mut settings = record.loop_settings(limits(self, &scene, record.sampling))?;
         if let Some(path) = &self.importance {
@@ -186,6 +192,7 @@ impl JobArguments {
             record.importance = Some(ContentHash::of_values(map.values()));
             settings.importance = Some(map);
         }
+        check_rule(self)?;
         if trace.filter.is_signed() && settings.sampling != Sampling::Uniform {
             bail!(
                 "--filter mitchell has negative lobes, whose scatter is not the picture's noise: adaptive sampling cannot \
@@ -332,18 +339,38 @@ fn limits(arguments: &JobArguments, scene: &Scene, sampling: Sampling) -> Limits
     let asked = arguments.visibility.or(arguments.quality.map(Quality::visibility));
     let visibility = match (asked, sampling) {
         (Some(visibility), _) => visibility,
-        // A uniform render of so many samples or seconds is what was asked for, not an early end.
-        (None, Sampling::Uniform) if arguments.spp.is_some() || arguments.time.is_some() => 0.0,
+        // A uniform render of so many samples, seconds or plans is what was asked for, not an early end.
+        (None, Sampling::Uniform) if arguments.has_other_limit() => 0.0,
         (None, _) => scene.viewing.visibility.unwrap_or(1.0),
     };
     Limits {
         visibility,
-        time: arguments.time.map(Duration::from_secs_f64),
+        time: arguments.time,
         mean_samples: arguments.spp,
         max_samples: arguments.max_spp.unwrap_or(DEFAULT_MAX_SAMPLES),
         plans: arguments.plans,
         pilot_samples: arguments.denoise.pilot_samples(),
     }
+}
+
+/// Refuses limits that the rule of sampling would not look at.
+fn check_rule(arguments: &JobArguments) -> anyhow::Result<()> {
+    let (stops_by_noise, stops_by_sight) = match arguments.sampling {
+        SamplingChoice::Adaptive | SamplingChoice::Uniform => (false, true),
+        SamplingChoice::Relative | SamplingChoice::Variance => (true, false),
+        SamplingChoice::Budget => (false, false),
+    };
+    if arguments.noise_threshold.is_some() && !stops_by_noise {
+        bail!(
+            "--noise-threshold is where --sampling relative and variance stop, and this --sampling does not: leave it out"
+        );
+    }
+    if (arguments.visibility.is_some() || arguments.quality.is_some()) && !stops_by_sight {
+        bail!(
+            "--visibility and --quality are looked at by --sampling adaptive and uniform, not by this one: leave them out"
+        );
+    }
+    Ok(())
 }
 
 /// How to sample and for whom: command line before scene before default.
@@ -352,14 +379,14 @@ fn settings_record(arguments: &JobArguments, scene: &Scene) -> anyhow::Result<Se
     let display_name = arguments.display.as_deref().or(view.display.as_deref()).unwrap_or("desktop");
     let viewing = seeing::viewing(display_name, arguments.csf_area)?;
     let operator = arguments.operator.as_deref().or(view.operator.as_deref()).unwrap_or("constant");
-    let threshold = arguments.noise_threshold;
+    let threshold = arguments.noise_threshold.unwrap_or(0.01);
     let sampling = match arguments.sampling {
         SamplingChoice::Adaptive => Sampling::Adaptive,
         SamplingChoice::Uniform => Sampling::Uniform,
         SamplingChoice::Relative => Sampling::Rival(RivalRule::Relative { threshold }),
         SamplingChoice::Variance => Sampling::Rival(RivalRule::Variance { threshold }),
-        SamplingChoice::Budget if arguments.spp.is_none() && arguments.time.is_none() => {
-            bail!("--sampling budget has no stop of its own: add --spp or --time")
+        SamplingChoice::Budget if !arguments.has_other_limit() => {
+            bail!("--sampling budget has no stop of its own: add --spp, --time or --plans")
         }
         SamplingChoice::Budget => Sampling::Rival(RivalRule::Budget),
     };

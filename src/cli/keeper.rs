@@ -1,7 +1,7 @@
 //! Keeping the film of a render safe: checkpoints while it runs, and a clean end when a signal asks for it.
 
 use super::console::Console;
-use super::seeing::parse_positive;
+use super::seeing::parse_seconds;
 use super::tev::Showing;
 use anyhow::{Context, bail};
 use clap::Args;
@@ -12,7 +12,7 @@ use fechner::adaptive::{Directive, Monitor, Progress};
 use fechner::checkpoint::{Checkpoint, CheckpointError, Header, read_checkpoint, write_checkpoint};
 use fechner::output::{self, OutputError};
 use fechner::preview::Audience;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -24,8 +24,8 @@ pub(super) struct CheckpointArguments {
     #[arg(long, value_name = "FILE", help_heading = "Running")]
     checkpoint: Option<PathBuf>,
     /// Seconds of work that a kill may cost at most [default: 60].
-    #[arg(long, value_name = "SECONDS", value_parser = parse_positive, requires = "checkpoint", allow_negative_numbers = true, help_heading = "Running")]
-    checkpoint_every: Option<f64>,
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, requires = "checkpoint", allow_negative_numbers = true, help_heading = "Running")]
+    checkpoint_every: Option<Duration>,
     /// Go on from the checkpoint, if it is there; limits count from the first start.
     #[arg(long, requires = "checkpoint", help_heading = "Running")]
     resume: bool,
@@ -38,6 +38,11 @@ pub(super) struct Start {
 }
 
 impl CheckpointArguments {
+    /// The file that is asked for.
+    pub(super) fn file(&self) -> Option<&Path> {
+        self.checkpoint.as_deref()
+    }
+
     /// Whether there is to be a file.
     pub(super) fn is_wanted(&self) -> bool {
         self.checkpoint.is_some()
@@ -111,7 +116,7 @@ impl Keeper {
         let now = Instant::now();
         Self {
             path: arguments.checkpoint.clone().unwrap_or_default(),
-            every: Duration::from_secs_f64(arguments.checkpoint_every.unwrap_or(60.0)),
+            every: arguments.checkpoint_every.unwrap_or(Duration::from_secs(60)),
             header,
             history: Mutex::new(History {
                 last_snapshot: now,

@@ -4,6 +4,7 @@ use super::json::write_json;
 use super::render::write_picture;
 use super::report::{Report, summary};
 use super::seeing::parse_positive;
+use super::targets::check_distinct;
 use clap::Args;
 use fechner::adaptive::judge::judge;
 use fechner::adaptive::settings::Limits;
@@ -39,11 +40,22 @@ pub(super) fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
         Some(output::check_target(&arguments.output)?)
     };
     if let Some(json) = &arguments.json {
+        // A sum may take the place of one of its films; figures may not.
+        let films = arguments.films.iter().map(|film| ("a film to merge", film));
+        for (what, path) in films.chain([("-o", &arguments.output)]) {
+            check_distinct(&[(what, Some(path)), ("--json", Some(json))])?;
+        }
         output::check_writable(json)?;
     }
     let mut merged = merge_files(&arguments.films)?;
     merged.header.visibility = arguments.visibility.unwrap_or(merged.header.visibility);
     let visibility = merged.header.visibility;
+    if let Some(map) = merged.header.settings.importance {
+        eprintln!(
+            "note: sampled under an importance map (content {map}), which films do not keep: what can be seen is told without it"
+        );
+    }
+    let background = if merged.header.origin.is_transparent() { Background::Transparent } else { Background::Shown };
     let settings = merged.header.settings.loop_settings(Limits::of_visibility(visibility))?;
     if format.is_none() {
         write_checkpoint(&arguments.output, &merged.header, &merged.state)?;
@@ -53,7 +65,7 @@ pub(super) fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
     let rendered = Rendered::new(merged.state, judgement, reason);
     let report = Report::new(&merged.header.origin.scene_name, &merged.header.seeds.all, &settings, &rendered);
     if let Some(format) = format {
-        write_picture(&arguments.output, format, Background::Shown, &rendered, &settings, &report)?;
+        write_picture(&arguments.output, format, background, &rendered, &settings, &report)?;
     }
     if let Some(path) = &arguments.json {
         write_json(path, &report)?;

@@ -18,6 +18,7 @@ mod render;
 mod report;
 mod seeing;
 mod staging;
+mod targets;
 mod tev;
 mod threshold;
 mod tonemap;

@@ -5,6 +5,7 @@ use super::job::{JobArguments, Prepared};
 use super::json::write_json;
 use super::keeper::{CheckpointArguments, Keeper, Watch};
 use super::report::{Report, summary};
+use super::targets::check_distinct;
 use super::tev::{Showing, TevArguments};
 use super::view::audience;
 use clap::Args;
@@ -41,6 +42,11 @@ pub(super) struct RenderArguments {
 /// Renders and writes.
 pub(super) fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     let format = output::check_target(&arguments.output)?;
+    check_distinct(&[
+        ("-o", Some(&arguments.output)),
+        ("--json", arguments.json.as_deref()),
+        ("--checkpoint", arguments.checkpoint.file()),
+    ])?;
     if let Some(json) = &arguments.json {
         output::check_writable(json)?;
     }

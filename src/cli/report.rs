@@ -10,6 +10,9 @@ use fechner_perception::Plane;
 use fechner_perception::psychometric::detection_probability;
 use serde::Serialize;
 
+/// Of noise that nobody can judge yet.
+const TOO_FEW: &str = "too few samples to tell what can be seen";
+
 /// Where the picture is seen.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct ObserverReport {
@@ -23,15 +26,15 @@ pub(super) struct ObserverReport {
     csf_area_deg2: f64,
 }
 
-/// What is known of a denoised picture besides its visibility.
+/// What is known of a denoised picture besides its visibility. None where the samples are too few to tell.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct DenoisedReport {
     denoiser: String,
     /// Visibility of the noise that is left, and of what the denoiser changed, at the 99th percentile.
-    variance_visibility_p99: f64,
-    bias_visibility_p99: f64,
+    variance_visibility_p99: Option<f64>,
+    bias_visibility_p99: Option<f64>,
     /// Share of pixels called fine where raw noise is too strong to show that bias stays below one and a half times the target.
-    unproven_fraction: f64,
+    unproven_fraction: Option<f64>,
     /// Squared bias over squared variance as the whole picture shows it, by octave band from 0.5 cycles a degree on.
     bias_factors: Vec<f64>,
     /// Share of pixels whose picture was moved towards the raw mean.
@@ -41,14 +44,14 @@ pub(super) struct DenoisedReport {
 impl DenoisedReport {
     fn of(settings: &LoopSettings, judgement: &Judgement) -> Option<Self> {
         let (denoiser, picture) = (settings.denoiser.as_ref()?, judgement.denoised.as_ref()?);
-        let error = &picture.error;
+        let (error, known) = (&picture.error, judgement.is_known);
         let pixels = error.visibility.values().len();
         let is_blended = |pixel: &usize| error.raw_shares.iter().any(|share| share.values()[*pixel] > 0.01);
         Some(Self {
             denoiser: denoiser.name(),
-            variance_visibility_p99: error.variance.quantile(0.99),
-            bias_visibility_p99: error.bias.quantile(0.99),
-            unproven_fraction: error.unproven(settings.limits.visibility_or_threshold()).mean(),
+            variance_visibility_p99: known.then(|| error.variance.quantile(0.99)),
+            bias_visibility_p99: known.then(|| error.bias.quantile(0.99)),
+            unproven_fraction: known.then(|| error.unproven(settings.limits.visibility_or_threshold()).mean()),
             bias_factors: error.bias_factors.clone(),
             blended_fraction: (0..pixels).filter(is_blended).count() as f64 / pixels as f64,
         })
@@ -84,17 +87,18 @@ pub(super) struct Report {
     /// What made the picture out of the mean, and what can be seen of what it left and of what it changed.
     denoised: Option<DenoisedReport>,
     visibility_target: Option<f64>,
-    visibility_p99: f64,
-    visibility_p999: f64,
-    visibility_max: f64,
+    /// None here and in the figures that follow from it where the samples are too few to tell, as in a render of one a pixel.
+    visibility_p99: Option<f64>,
+    visibility_p999: Option<f64>,
+    visibility_max: Option<f64>,
     /// Share of pixels whose predicted visibility is above the target (above 1 where there is none).
-    fraction_visible: f64,
+    fraction_visible: Option<f64>,
     /// Of a 1° patch at the 99th percentile.
-    detection_probability_p99: f64,
+    detection_probability_p99: Option<f64>,
     /// Expected number of 1° patches in which noise is noticed.
-    patches_noticed: f64,
+    patches_noticed: Option<f64>,
     /// Energy of the halves' difference through the eye's filter over the predicted energy; 1 when the prediction holds.
-    measured_over_predicted: f64,
+    measured_over_predicted: Option<f64>,
     /// Visible energy of fresh samples against the kept ones in audited tiles, over the predicted; none for small pictures.
     audit_ratio: Option<f64>,
     audit_standard_error: Option<f64>,
@@ -126,7 +130,8 @@ impl Report {
         let judgement = &rendered.judgement;
         let display = &settings.viewing.display;
         let target = (settings.limits.visibility > 0.0).then_some(settings.limits.visibility);
-        let p99 = judgement.predicted.quantile(0.99);
+        let predicted = judgement.is_known.then_some(&judgement.predicted);
+        let quantile = |share: f64| predicted.map(|predicted| predicted.quantile(share));
         let energy = |p: &Plane| p.values().iter().map(|&v| f64::from(v) * f64::from(v)).sum::<f64>();
         let samples_total = film.total_samples();
         let outliers = find_outliers(film);
@@ -168,13 +173,14 @@ impl Report {
             seconds_denoising: rendered.seconds_denoising,
             denoised: DenoisedReport::of(settings, judgement),
             visibility_target: target,
-            visibility_p99: p99,
-            visibility_p999: judgement.predicted.quantile(0.999),
-            visibility_max: judgement.predicted.quantile(1.0),
-            fraction_visible: visible_share(judgement, target.unwrap_or(1.0)),
-            detection_probability_p99: detection_probability(p99),
-            patches_noticed: patches_noticed(&judgement.predicted, display.pixels_per_degree),
-            measured_over_predicted: energy(&judgement.measured_error().visibility) / energy(&judgement.predicted),
+            visibility_p99: quantile(0.99),
+            visibility_p999: quantile(0.999),
+            visibility_max: quantile(1.0),
+            fraction_visible: predicted.map(|_| visible_share(judgement, target.unwrap_or(1.0))),
+            detection_probability_p99: quantile(0.99).map(detection_probability),
+            patches_noticed: predicted.map(|predicted| patches_noticed(predicted, display.pixels_per_degree)),
+            measured_over_predicted: predicted
+                .map(|predicted| energy(&judgement.measured_error().visibility) / energy(predicted)),
             audit_ratio: rendered.audit.map(|audit| audit.ratio),
             audit_standard_error: rendered.audit.map(|audit| audit.standard_error),
             audit_tiles: rendered.audit.map_or(0, |audit| audit.tiles),
@@ -204,11 +210,13 @@ impl Report {
 
     /// What a frame among many took.
     pub(super) fn in_a_line(&self) -> String {
+        let visibility = self
+            .visibility_p99
+            .map_or_else(|| TOO_FEW.to_owned(), |p99| format!("visibility {p99:.2} at the 99th percentile"));
         format!(
-            "{:.1} spp in {}, visibility {:.2} at the 99th percentile; {}",
+            "{:.1} spp in {}, {visibility}; {}",
             self.spp_mean,
             duration_in_words(self.seconds_total),
-            self.visibility_p99,
             self.stop_reason
         )
     }
@@ -241,7 +249,7 @@ impl Report {
         }
         if let Some(denoised) = &self.denoised {
             attributes.push(("fechner.denoiser", text(&denoised.denoiser)));
-            attributes.push(("fechner.unproven_fraction", number(denoised.unproven_fraction)));
+            attributes.extend(denoised.unproven_fraction.map(|share| ("fechner.unproven_fraction", number(share))));
         }
         if let Some([least, greatest]) = self.importance_range {
             attributes.push(("fechner.importance", text(&format!("thresholds times {least} to {greatest}"))));
@@ -268,10 +276,11 @@ pub(super) fn summary(report: &Report, settings: &LoopSettings, rendered: &Rende
         StopReason::Interrupted => "Stopped by a signal",
         StopReason::Merged => "Merged",
     };
-    let target = report.visibility_target.map_or_else(
-        || format!("{:.2} % of the picture is above visibility 1", 100.0 * report.fraction_visible),
-        |t| format!("{:.2} % of the picture is above the target visibility {t}", 100.0 * report.fraction_visible),
-    );
+    let target = match (report.fraction_visible, report.visibility_target) {
+        (None, _) => TOO_FEW.to_owned(),
+        (Some(share), None) => format!("{:.2} % of the picture is above visibility 1", 100.0 * share),
+        (Some(share), Some(t)) => format!("{:.2} % of the picture is above the target visibility {t}", 100.0 * share),
+    };
     let mut lines = vec![
         format!(
             "{} samples ({:.1} a pixel on average, {} at most) in {}, of which {:.1} % in the perception model ({:.1} % in \
@@ -284,41 +293,49 @@ pub(super) fn summary(report: &Report, settings: &LoopSettings, rendered: &Rende
             100.0 * report.seconds_allocation / report.seconds_total
         ),
         format!("{why}; {target}."),
-        format!(
+    ];
+    if let (Some(p99), Some(noticed)) = (report.visibility_p99, report.patches_noticed) {
+        lines.push(format!(
             "On the display \"{}\" ({} pixels a degree{distance}, white {} cd/m²): predicted chance that remaining {} \
-             is detected in a 1° patch is {} at the 99th percentile (visibility {:.2}); about {:.1} of {:.0} patches.",
+             is detected in a 1° patch is {} at the 99th percentile (visibility {p99:.2}); about {noticed:.1} of {:.0} patches.",
             display.name,
             display.pixels_per_degree,
             display.white_cd_m2,
             if report.denoised.is_some() { "error" } else { "noise" },
-            p(report.visibility_p99),
-            report.visibility_p99,
-            report.patches_noticed,
+            p(p99),
             patch_count(&rendered.judgement.predicted, display.pixels_per_degree),
-        ),
-        "Model-predicted, calibrated on gratings, not on renderings; light paths never sampled are not covered."
-            .to_owned(),
-    ];
+        ));
+        lines.push(
+            "Model-predicted, calibrated on gratings, not on renderings; light paths never sampled are not covered."
+                .to_owned(),
+        );
+    }
     if let Some([least, greatest]) = report.importance_range {
         lines.push(format!(
             "Thresholds are multiplied by the importance map, {least} to {greatest}, and visibilities and chances are under it."
         ));
     }
     if let Some(denoised) = &report.denoised {
-        lines.push(format!(
-            "Denoised by {} in {} ({:.1} % of the time); at the 99th percentile the noise that is left has visibility {:.2}, what \
-             the denoiser changed {:.2}.",
+        let by = format!(
+            "Denoised by {} in {} ({:.1} % of the time)",
             denoised.denoiser,
             duration_in_words(report.seconds_denoising),
             100.0 * report.seconds_denoising / report.seconds_total,
-            denoised.variance_visibility_p99,
-            denoised.bias_visibility_p99,
-        ));
-        lines.push(format!(
-            "Unproven: in {:.1} % of the picture, which is called fine, raw noise is too strong to show that the denoiser \
-             changed nothing visible; there its error is inferred from the rest of the picture.",
-            100.0 * denoised.unproven_fraction
-        ));
+        );
+        lines.push(match (denoised.variance_visibility_p99, denoised.bias_visibility_p99) {
+            (Some(variance), Some(bias)) => format!(
+                "{by}; at the 99th percentile the noise that is left has visibility {variance:.2}, what the denoiser changed \
+                 {bias:.2}."
+            ),
+            _ => format!("{by}."),
+        });
+        lines.extend(denoised.unproven_fraction.map(|share| {
+            format!(
+                "Unproven: in {:.1} % of the picture, which is called fine, raw noise is too strong to show that the \
+                 denoiser changed nothing visible; there its error is inferred from the rest of the picture.",
+                100.0 * share
+            )
+        }));
     }
     if let Some(audit) = rendered.audit {
         let whose = if report.denoised.is_some() { " unproven" } else { "" };

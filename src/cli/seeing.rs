@@ -5,6 +5,7 @@ use clap::Args;
 use fechner_perception::display::{Display, Viewing};
 use fechner_perception::tone::{self, ToneOperator, ToneSettings};
 use std::path::Path;
+use std::time::Duration;
 
 /// Display, observer and units, for commands that judge pictures.
 #[derive(Debug, Args)]
@@ -59,10 +60,32 @@ pub(super) fn tone_operator(name: &str, settings: &ToneSettings) -> Result<Box<d
     })
 }
 
+/// A time above 0 s, of thirty years at most: more is as good as no limit, and clocks must be able to add it.
+pub(super) fn parse_seconds(text: &str) -> Result<Duration, String> {
+    const MOST_SECONDS: f64 = 1e9;
+    parse_positive(text).map(|seconds| Duration::from_secs_f64(seconds.min(MOST_SECONDS)))
+}
+
 /// A number above 0.
 pub(super) fn parse_positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
         _ => Err(format!("\"{text}\" is not a number above 0")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_what_clocks_can_count() {
+        assert_eq!(parse_seconds("0.5"), Ok(Duration::from_millis(500)));
+        for endless in ["1e20", "1e308"] {
+            assert_eq!(parse_seconds(endless), Ok(Duration::from_secs(1_000_000_000)), "{endless}");
+        }
+        for refused in ["0", "-1", "inf", "nan", "a minute"] {
+            assert!(parse_seconds(refused).is_err(), "{refused}");
+        }
     }
 }

@@ -11,8 +11,8 @@ pub struct Estimate {
     pub rgb_cd_m2: Vec<[f32; 3]>,
     /// Luminance of the picture.
     pub luminance_cd_m2: Plane,
-    /// Variance of the picture's luminance from the samples' own scatter, (s_A²/n_A + s_B²/n_B) / 4, in (cd/m²)². Above
-    /// the true variance where samples are stratified.
+    /// Variance of the picture's luminance from the samples' own scatter, (s_A²/n_A + s_B²/n_B) / 4, in (cd/m²)²; see
+    /// [`Film::sample_variances`]. Above the true variance where samples are stratified.
     pub variance_of_mean: Plane,
     /// (A − B) / 2 in luminance: a realisation of the picture's error.
     pub half_difference: Plane,
@@ -51,11 +51,16 @@ impl Film {
         };
         let nits = nits_per_unit;
         let y = |half: &HalfPixel| opponent(half.mean)[0];
-        let variance_of_half = |half: &HalfPixel| half.sample_variance(0) / f64::from(half.samples.max(1));
+        let variance_of_mean = |x: usize, y: usize| {
+            let pixel = y * width + x;
+            let [of_a, of_b] = self.sample_variances(pixel, 0);
+            let count = |half: &HalfPixel| f64::from(half.samples.max(1));
+            (0.25 * nits * nits * (of_a / count(&a[pixel]) + of_b / count(&b[pixel]))) as f32
+        };
         Estimate {
             rgb_cd_m2: (0..a.len()).map(|pixel| self.rgb_cd_m2(pixel, nits)).collect(),
             luminance_cd_m2: plane(&|a, b| nits * average(y(a), y(b), a, b)),
-            variance_of_mean: plane(&|a, b| 0.25 * nits * nits * (variance_of_half(a) + variance_of_half(b))),
+            variance_of_mean: Plane::from_fn(width, height, variance_of_mean),
             half_difference: plane(&|a, b| 0.5 * nits * (y(a) - y(b))),
         }
     }

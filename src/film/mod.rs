@@ -264,6 +264,24 @@ impl Film {
         }
     }
 
+    /// Unbiased variance of one sample of a pixel in an opponent channel, as each half has it. A half of fewer than two samples takes
+    /// the other's; where both have one, what they differ by tells, and both have that. 0 where nothing does.
+    pub fn sample_variances(&self, pixel: usize, channel: usize) -> [f64; 2] {
+        let [a, b] = Half::BOTH.map(|half| &self.half(half)[pixel]);
+        match (a.samples, b.samples) {
+            (1, 1) => [0.5 * (opponent(a.mean)[channel] - opponent(b.mean)[channel]).powi(2); 2],
+            (1, 2..) => [b.sample_variance(channel); 2],
+            (2.., 1) => [a.sample_variance(channel); 2],
+            _ => [a.sample_variance(channel), b.sample_variance(channel)],
+        }
+    }
+
+    /// Whether every pixel was sampled in both halves. Otherwise nothing is known of its noise: in a render of one sample a pixel, or one
+    /// that was interrupted in its first pass.
+    pub fn has_both_halves(&self) -> bool {
+        self.halves.iter().flatten().all(|pixel| pixel.taken > 0)
+    }
+
     /// Share of each pixel that something covers, weighed as the picture is: the mean of the halves.
     pub fn coverage(&self) -> Vec<f32> {
         let [a, b] = &self.halves;
@@ -328,6 +346,31 @@ mod tests {
         assert_eq!(whole.samples, parts.samples);
         assert!((whole.mean[1] - parts.mean[1]).abs() < 1e-12);
         assert!((whole.sample_variance(0) / parts.sample_variance(0) - 1.0).abs() < 1e-6);
+    }
+
+    /// Of one sample in each half, half the squared difference is the variance without bias: 1/12 for uniform noise.
+    #[test]
+    fn two_single_samples_have_a_variance() {
+        let random = |i: u32, half: Half| {
+            (crate::sampler::hash_words(u64::from(i), half.index() as u64) >> 40) as f32 / 16_777_216.0
+        };
+        let mut film = Film::new(64, 64);
+        for pixel in 0..64 * 64 {
+            for half in Half::BOTH {
+                assert!(!film.has_both_halves());
+                let work = BlockWork { samples: 1, ..BlockWork::whole(pixel, half, 0) };
+                film.merge_block(work, &sum_of(&[random(pixel, half)]));
+            }
+        }
+        assert!(film.has_both_halves());
+        let mean = (0..64 * 64).map(|pixel| film.sample_variances(pixel, 0)[0]).sum::<f64>() / 4096.0;
+        assert!((12.0 * mean - 1.0).abs() < 0.06, "{} times the truth", 12.0 * mean);
+        let own = film.estimate(1.0).variance_of_mean;
+        assert!((24.0 * own.mean() - 1.0).abs() < 0.06, "{} times the truth", 24.0 * own.mean());
+        let more = BlockWork { first: 1, samples: 1, ..BlockWork::whole(0, Half::A, 0) };
+        film.merge_block(more, &sum_of(&[random(0, Half::A) + 1.0]));
+        let [a, b] = film.sample_variances(0, 0);
+        assert!((a - 0.5).abs() < 1e-6 && a == b, "a half of one sample takes the other's: {a} and {b}");
     }
 
     #[test]

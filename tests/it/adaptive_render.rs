@@ -155,7 +155,7 @@ fn a_preview_is_a_prefix_of_the_final_picture() {
 fn looks_that_are_broken_off_change_nothing() {
     let scene = Arc::new(cornell_box());
     let settings = || loop_settings(scene.nits_per_unit, Sampling::Adaptive, 4.0, None);
-    let tracer = PathTracer::new(Arc::clone(&scene), trace_settings(160, 160, 5));
+    let tracer = PathTracer::new(Arc::clone(&scene), trace_settings(208, 208, 5));
     let undisturbed = render(&tracer, &settings(), &Quiet).expect("renders");
     assert!(undisturbed.audit.is_some());
     let questions = Arc::new(AtomicU32::new(0));
@@ -163,7 +163,7 @@ fn looks_that_are_broken_off_change_nothing() {
     // Apart by numbers that no look's questions are a multiple of.
     let is_outdated = move || [2, 5, 11, 18, 29, 37, 48].contains(&asked.fetch_add(1, Ordering::SeqCst));
     let disturbed = LoopSettings { is_outdated: Some(Box::new(is_outdated)), ..settings() };
-    let mut state = RenderState::new(160, 160, &disturbed.limits);
+    let mut state = RenderState::new(208, 208, &disturbed.limits);
     let mut breaks = 0;
     let last_look = loop {
         let ended = run(&tracer, &disturbed, state, &Quiet).expect("renders");

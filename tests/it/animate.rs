@@ -233,6 +233,25 @@ fn a_budget_is_the_whole_shots() {
     // Two by two, 4 pixels between them and around.
     assert_eq!((sheet.width(), sheet.height()), (2 * 24 + 12, 2 * 16 + 12));
     assert!(!alone.path().join("out/shot.contact.png").exists());
+    // By time, uniform: the scene's visibility, reached at once, is not what ends it.
+    std::fs::write(at_once.path().join("easy.toml"), format!("{SCENE}[view]\nvisibility = 50.0\n")).expect("written");
+    let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+    command.args([
+        "animate",
+        "easy.toml",
+        "--frames",
+        "0..0",
+        "--time",
+        "0.3",
+        "--sampling",
+        "uniform",
+        "-o",
+        "even/a.#.png",
+    ]);
+    assert!(command.current_dir(at_once.path()).output().expect("starts").status.success());
+    let even = json("../even/a.json");
+    assert!(even[0]["report"]["visibility_target"].is_null(), "{even}");
+    assert_eq!(even[0]["report"]["stop_reason"], "time");
     // By time: every frame has its pilot at the least.
     let said = animate(at_once.path(), &["--frames", "0..1", "--time", "0.2", "-o", "time.##.png"]);
     assert!(said.contains("time.01.png: ") && said.contains("spp in"), "{said}");

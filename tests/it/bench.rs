@@ -49,6 +49,34 @@ fn results_are_complete_and_a_second_run_goes_on() {
     assert_eq!(found, results());
 }
 
+/// Scenes of one file name in two folders are two scenes: each has its own figures, compared with its own uniform render.
+#[test]
+fn scenes_of_one_name_are_told_apart() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml"));
+    let text = text.expect("there");
+    for (name, reflectance) in [("light", "[0.74, 0.73, 0.70]"), ("dark", "[0.2, 0.2, 0.2]")] {
+        std::fs::create_dir(folder.path().join(name)).expect("made");
+        let text = text.replace("[0.74, 0.73, 0.70]", reflectance);
+        std::fs::write(folder.path().join(name).join("box.toml"), text).expect("written");
+    }
+    let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+    command.args(["bench", "light/box.toml", "dark/box.toml", "--size", "32", "--visibility", "12"]);
+    command.args(["--reference-factor", "4", "--seeds", "1", "--arms", "uniform,tvi", "-o", "out"]);
+    let run = command.current_dir(folder.path()).output().expect("runs");
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let results: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(folder.path().join("out/results.json")).expect("written")).expect("JSON");
+    let records = results["records"].as_array().expect("records");
+    for scene in ["light/box", "dark/box"] {
+        let own: Vec<_> = records.iter().filter(|record| record["scene"] == scene).collect();
+        assert_eq!(own.len(), 2 * 2 * 3, "{scene}");
+        let uniform = own.iter().filter(|record| record["arm"] == "uniform");
+        assert!(uniform.clone().all(|record| record["speedup_samples"] == 1.0), "{scene}");
+    }
+    assert!(results["summary"][0]["speedup_samples"]["low"].is_null(), "one seed has no interval");
+}
+
 #[test]
 fn bounds_need_no_arms_and_unknown_arms_are_refused() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -126,6 +126,36 @@ fn a_render_that_is_continued_equals_one_in_one_go() {
     }
 }
 
+/// A render that goes on to fewer samples than were planned takes no more than it may now; with nothing traced, its pilot is cut.
+#[test]
+fn tighter_limits_hold_for_what_was_planned() {
+    let setup = Setup::new(5);
+    let mut by_plans = setup.settings(Sampling::Adaptive, 1.0);
+    by_plans.limits.plans = Some(2);
+    let monitor = Interrupter::after(u32::MAX);
+    render(&setup.tracer, &by_plans, &monitor).expect("renders");
+    let state = monitor.state();
+    let samples = |film: &Film| (0..(SIZE * SIZE) as usize).map(|pixel| film.samples(pixel)).max();
+    assert!(state.untraced_blocks().next().is_some() && samples(&state.film) > Some(20));
+    let go_on = |state: RenderState, limit: fn(&mut Limits)| {
+        let mut settings = setup.settings(Sampling::Adaptive, 1.0);
+        limit(&mut settings.limits);
+        resume(&setup.tracer, &settings, state, &Quiet).expect("goes on")
+    };
+    let pixels = u64::from(SIZE * SIZE);
+    let by_budget = go_on(state.clone(), |limits| limits.mean_samples = Some(20));
+    let total = by_budget.film.total_samples();
+    assert!(total > 19 * pixels && total <= 20 * pixels, "{} a pixel", total as f64 / pixels as f64);
+    let capped = go_on(state.clone(), |limits| limits.max_samples = 24);
+    let most = samples(&capped.film).max(samples(&state.film));
+    assert!(most <= samples(&state.film).max(Some(24)), "{most:?}");
+    let had = |film: &Film, pixel: usize| film.samples(pixel) > 24;
+    let more = (0..pixels as usize).filter(|&pixel| had(&capped.film, pixel) && !had(&state.film, pixel)).count();
+    assert_eq!(more, 0, "pixels above --max-spp");
+    let fresh = RenderState::new(SIZE, SIZE, &by_plans.limits);
+    assert_eq!(go_on(fresh, |limits| limits.mean_samples = Some(4)).film.total_samples(), 4 * pixels);
+}
+
 /// The film keeps the fit of the tone operator that its last look used.
 #[test]
 fn the_tone_fit_is_saved() {

@@ -96,6 +96,114 @@ fn a_render_leaves_a_picture_and_its_figures() {
     assert!(String::from_utf8_lossy(&info.stdout).contains("visibility.Y"));
 }
 
+/// A render that ended by time is repeated by its number of plans, also where nothing but these ends it.
+#[test]
+fn plans_repeat_what_time_ended() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // Asked for so little that it is reached at once: not what ends a uniform render of so many plans.
+    let text =
+        std::fs::read_to_string(scene("cornell-box.toml")).expect("there").replace("visibility = 2", "visibility = 50");
+    std::fs::write(folder.path().join("easy.toml"), text).expect("written");
+    for sampling in ["uniform", "budget"] {
+        let rendered = |limit: [&str; 2]| {
+            let arguments = ["render", "easy.toml", "--size", "24x24", "-o", "a.png", "--json", "a.json"];
+            let arguments = [&arguments[..], &["--sampling", sampling], &limit[..]].concat();
+            let run = fechner().args(arguments).current_dir(folder.path()).output().expect("runs");
+            assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+            let json: serde_json::Value =
+                serde_json::from_slice(&std::fs::read(folder.path().join("a.json")).expect("written")).expect("JSON");
+            (std::fs::read(folder.path().join("a.png")).expect("written"), json)
+        };
+        let (by_time, told) = rendered(["--time", "0.2"]);
+        let plans = told["plans"].to_string();
+        let (by_plans, again) = rendered(["--plans", &plans]);
+        assert_eq!((&again["plans"], &again["stop_reason"]), (&told["plans"], &"plans".into()), "{sampling}");
+        assert!(by_time == by_plans, "{sampling}: {plans} plans make another picture");
+    }
+}
+
+/// Times beyond what clocks count are as good as none.
+#[test]
+fn endless_times_are_no_limit() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = fechner()
+        .arg("render")
+        .arg(scene("cornell-box.toml"))
+        .args(["--size", "16x16", "--spp", "4", "-o", "a.png", "--time", "1e20", "--checkpoint", "a.film"])
+        .args(["--checkpoint-every", "1e20"])
+        .current_dir(folder.path())
+        .output()
+        .expect("runs");
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+}
+
+/// The memory that a crop needs is its own, not the whole picture's.
+#[test]
+fn a_crop_of_a_huge_picture_fits_into_memory() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = fechner()
+        .arg("render")
+        .arg(scene("cornell-box.toml"))
+        .args(["--size", "40000x40000", "--crop", "20000,20000,16,16", "--spp", "4", "-o", "a.png"])
+        .current_dir(folder.path())
+        .output()
+        .expect("runs");
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    assert_eq!(image::open(folder.path().join("a.png")).expect("a picture").width(), 16);
+}
+
+/// The picture of a film has alpha where the film's render would have, and figures do not take the place of a film.
+#[test]
+fn merging_keeps_alpha_and_films() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = |arguments: &[&str]| fechner().args(arguments).current_dir(folder.path()).output().expect("runs");
+    let dark = scene("cornell-box.toml");
+    let dark = dark.to_str().expect("text");
+    let render =
+        ["render", dark, "--size", "16x16", "--spp", "4", "-o", "a.exr", "--transparent", "--checkpoint", "a.film"];
+    assert!(run(&render).status.success());
+    let refused = run(&["merge", "a.film", "-o", "b.exr", "--json", "a.film"]);
+    let message = String::from_utf8_lossy(&refused.stderr);
+    assert!(refused.status.code() == Some(2) && message.contains("a film to merge and --json"), "{message}");
+    let refused = run(&["merge", "a.film", "-o", "b.exr", "--json", "b.exr"]);
+    assert_eq!(refused.status.code(), Some(2), "{}", String::from_utf8_lossy(&refused.stderr));
+    assert!(run(&["merge", "a.film", "-o", "b.exr"]).status.success());
+    let [rendered, merged] =
+        ["a.exr", "b.exr"].map(|name| fechner::exr_read::read_exr(&folder.path().join(name)).expect("an EXR"));
+    assert!(merged.channel("A").is_some(), "no alpha");
+    assert_eq!(rendered.channel("A"), merged.channel("A"));
+}
+
+/// Two samples a pixel say how much noise there is, and one says nothing: it is not called fine.
+#[test]
+fn a_render_of_few_samples_makes_no_claim() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = scene("cornell-box.toml");
+    let told = |spp: &str, film: &str, more: &[&str]| {
+        let arguments = ["--size", "24x24", "--json", "out.json", "-o", "out.png", "--checkpoint", film, "--spp", spp];
+        let run = fechner().arg("render").arg(&scene).args(arguments).args(more).current_dir(folder.path()).output();
+        let run = run.expect("runs");
+        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+        let json = std::fs::read(folder.path().join("out.json")).expect("written");
+        let json: serde_json::Value = serde_json::from_slice(&json).expect("JSON");
+        (json, String::from_utf8_lossy(&run.stderr).into_owned())
+    };
+    let (two, _) = told("2", "two.film", &[]);
+    assert!(two["visibility_p99"].as_f64() > Some(1.0), "{}", two["visibility_p99"]);
+    for (film, more) in [("raw.film", &[][..]), ("denoised.film", &["--denoise", "builtin"][..])] {
+        let (one, message) = told("1", film, more);
+        for key in ["visibility_p99", "fraction_visible", "detection_probability_p99", "measured_over_predicted"] {
+            assert!(one[key].is_null(), "{key}: {}", one[key]);
+        }
+        assert!(message.contains("too few samples to tell") && !message.contains("visibility 0"), "{message}");
+        assert_eq!(one["outlier_pixels"], 0);
+        let merge = ["merge", film, "-o", "merged.png"];
+        let merged = fechner().args(merge).current_dir(folder.path()).output().expect("runs");
+        let message = String::from_utf8_lossy(&merged.stderr);
+        assert!(merged.status.success() && !message.contains("the target is reached"), "{message}");
+    }
+}
+
 #[test]
 fn bad_arguments_are_refused_in_one_line() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -113,6 +221,33 @@ fn bad_arguments_are_refused_in_one_line() {
     assert_refused(&["render", cornell, "-o", "a.png", "--model", "guess"], at, &["guess", "csf-bands"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--display", "cinemax"], at, &["cinemax", "cinema"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--operator", "magic"], at, &["magic", "constant"]);
+    let render = |more: &[&'static str], fragments: &[&str]| {
+        assert_refused(&[&["render", cornell, "-o", "a.png", "--size", "16x16"], more].concat(), at, fragments);
+    };
+    render(&["--noise-threshold", "0.1"], &["--noise-threshold", "--sampling relative"]);
+    for rule in ["relative", "variance", "budget"] {
+        render(
+            &["--sampling", rule, "--spp", "16", "--visibility", "2"],
+            &["--visibility and --quality", "leave them out"],
+        );
+        render(&["--sampling", rule, "--spp", "16", "--quality", "good"], &["--visibility and --quality"]);
+    }
+    render(&["--sampling", "budget", "--noise-threshold", "0.1", "--spp", "16"], &["--noise-threshold"]);
+    render(&["--json", "a.png"], &["a.png: -o and --json name the same file"]);
+    render(&["--checkpoint", "./a.png"], &["-o and --checkpoint name the same file"]);
+    render(&["--checkpoint", "a.json", "--json", "a.json"], &["--json and --checkpoint name the same file"]);
+    let bench = |more: &[&'static str], fragments: &[&str]| {
+        assert_refused(&[&["bench", cornell], more].concat(), at, fragments);
+    };
+    bench(&["--denoise", "builtin"], &["--denoise is for --suite denoise and animation"]);
+    bench(&["--suite", "full", "--law-only"], &["--law-only is for --suite denoise"]);
+    bench(&["--fps", "24"], &["--fps is for --suite animation"]);
+    for suite in ["denoise", "animation"] {
+        bench(&["--suite", suite, "--bound"], &["--bound is for --suite quick and full"]);
+        bench(&["--suite", suite, "--arms", "tvi"], &["--arms is for --suite quick and full"]);
+    }
+    bench(&["--suite", "animation", "--seeds", "2"], &["--seeds is for"]);
+    assert_refused(&["bench", cornell, cornell], at, &["named twice"]);
     assert_refused(&["info", "missing.exr"], at, &["missing.exr"]);
     assert_eq!(std::fs::read_dir(at).expect("readable").count(), 0, "something was written");
 }

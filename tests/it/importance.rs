@@ -72,6 +72,10 @@ fn a_film_remembers_its_map() {
     assert!(again.status.success());
     let told = String::from_utf8_lossy(&again.stderr).into_owned();
     assert!(!told.contains("other settings"), "{told}");
+    let merge = ["merge", "a.film", "-o", "merged.png"];
+    let merged = Command::cargo_bin("fechner").expect("the binary is built").args(merge).current_dir(at).output();
+    let told = String::from_utf8_lossy(&merged.expect("runs").stderr).into_owned();
+    assert!(told.contains("note: sampled under an importance map"), "{told}");
     let without = run(at, &[&["-o", "c.exr", "--resume"], &film[..]].concat());
     let told = String::from_utf8_lossy(&without.stderr).into_owned();
     assert!(without.status.success() && told.contains("other settings"), "{told}");

@@ -66,6 +66,22 @@ const NOTICED: f32 = 1.645;
 pub const VISIBLY_WRONG: f32 = 1.5;
 
 impl DenoisedError {
+    /// Of a picture of this size whose error nothing tells, such as one without independent halves: infinite everywhere, without
+    /// factors, and with nothing that is worth moving towards the raw mean.
+    #[must_use]
+    pub fn unknown(width: usize, height: usize) -> Self {
+        let infinite = Plane::filled(width, height, f32::INFINITY);
+        Self {
+            visibility: infinite.clone(),
+            variance: infinite.clone(),
+            bias: infinite.clone(),
+            bias_squared_standard_error: infinite.clone(),
+            bias_factors: Vec::new(),
+            raw_shares: Vec::new(),
+            blended_visibility: infinite,
+        }
+    }
+
     /// This error with another channel's beside it: the channel that shows most counts at every pixel. Factors and shares stay this
     /// one's; what the other's becomes by their blend is not looked at.
     #[must_use]
@@ -122,16 +138,7 @@ impl ThresholdMap {
         let DenoisedDifferences { half_difference, residual, residual_half_difference } = *differences;
         let planes = [half_difference, residual, residual_half_difference];
         if planes.iter().any(|plane| !plane.same_size(&self.adaptation_cd_m2)) {
-            let infinite = Plane::filled(width, height, f32::INFINITY);
-            return DenoisedError {
-                visibility: infinite.clone(),
-                variance: infinite.clone(),
-                bias: infinite.clone(),
-                bias_squared_standard_error: infinite.clone(),
-                bias_factors: Vec::new(),
-                raw_shares: Vec::new(),
-                blended_visibility: infinite,
-            };
+            return DenoisedError::unknown(width, height);
         }
         let mut filters = ErrorFilters::new(self);
         let spectra = planes.map(|plane| filters.spectrum(plane));

@@ -8,7 +8,7 @@
 //! A tile is looked at through a window that fades to nothing at its borders, for the eye's filters would see an edge there
 //! (Welch 1967).
 
-use super::{Audit, FreshSamples, STRATUM, Tile, choose_tiles, ratio_of_sums};
+use super::{Audit, FreshSamples, LEAST_TILES, STRATUM, Tile, choose_tiles, is_large_enough, ratio_of_sums};
 use crate::adaptive::judge::{JudgeError, Judgement};
 use crate::adaptive::settings::LoopSettings;
 use crate::film::{Film, HalfPixel, opponent};
@@ -20,8 +20,6 @@ use std::f64::consts::PI;
 const TILE: usize = 32;
 /// Fresh samples over those that a tile has.
 const TIMES: u32 = 2;
-/// Fewer tiles' scatter says nothing of how sure the ratio is: two gave −2.53 ± 0.24 on `cornell-glass`.
-const LEAST_TILES: usize = 6;
 /// A tile is a candidate if so much of it is unproven.
 const UNPROVEN_SHARE: f64 = 0.5;
 
@@ -46,7 +44,7 @@ pub fn audit_unproven(
         tile.pixels(width).map(|pixel| f64::from(unproven.values()[pixel])).sum::<f64>() / (TILE * TILE) as f64
     };
     let candidates: Vec<Tile> = all.iter().copied().filter(|tile| share(tile) >= UNPROVEN_SHARE).collect();
-    if candidates.len() < LEAST_TILES || 2 * all.len() < LEAST_TILES * STRATUM {
+    if candidates.len() < LEAST_TILES || !is_large_enough(&all) {
         return Ok(None);
     }
     let tiles = choose_tiles(&candidates, (candidates.len() / STRATUM).max(LEAST_TILES), round);

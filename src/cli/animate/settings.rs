@@ -21,7 +21,7 @@ pub(super) fn shot_settings(arguments: &AnimateArguments, scene: &Scene, shot: F
     let asked = arguments.visibility.or(arguments.quality.map(Quality::visibility));
     let (sampling, otherwise) = match arguments.sampling {
         SamplingChoice::Adaptive => (Sampling::Adaptive, scene.viewing.visibility.unwrap_or(1.0)),
-        SamplingChoice::Uniform if arguments.spp.is_some() => (Sampling::Uniform, 0.0),
+        SamplingChoice::Uniform if arguments.spp.is_some() || arguments.time.is_some() => (Sampling::Uniform, 0.0),
         SamplingChoice::Uniform => (Sampling::Uniform, scene.viewing.visibility.unwrap_or(1.0)),
     };
     Ok(ShotSettings {

@@ -19,17 +19,17 @@ pub(super) struct ShotClock {
 
 impl ShotClock {
     /// Starts with the pilots, which say what the frames need for the visibility that fits the time.
-    pub(super) fn start(shot: &Shot<'_>, track: &Track, seconds: f64) -> Result<Self> {
+    pub(super) fn start(shot: &Shot<'_>, track: &Track, budget: Duration) -> Result<Self> {
         let started = Instant::now();
         let needs = shot.needs(track)?;
         let pixels = f64::from(shot.settings.trace.width) * f64::from(shot.settings.trace.height);
         let (first, last) = shot.rendered_frames();
         let frames = f64::from(last - first + 1);
-        let mean_samples = seconds / (needs.seconds_per_sample * pixels * frames).max(f64::MIN_POSITIVE);
+        let mean_samples = budget.as_secs_f64() / (needs.seconds_per_sample * pixels * frames).max(f64::MIN_POSITIVE);
         let of_shot = needs.samples(needs.visibility_for(mean_samples));
         let offset = (first - shot.settings.first) as usize;
         let needs = of_shot[offset..=offset + (last - first) as usize].to_vec();
-        Ok(Self { started, budget: Duration::from_secs_f64(seconds), first, needs })
+        Ok(Self { started, budget, first, needs })
     }
 
     /// The time for a frame: its part of what is left, if all those before it are done.

@@ -4,7 +4,7 @@ use super::job::{Job, JobOptions};
 use super::signals::Signals;
 use super::{CALL_AGAIN, Threads, open_for_work};
 use crate::cli::console::duration_in_words;
-use crate::cli::seeing::parse_positive;
+use crate::cli::seeing::parse_seconds;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::farm::frame::{Progress, progress};
@@ -35,8 +35,8 @@ pub(super) struct UnitArguments {
 #[derive(Debug, Args)]
 pub(super) struct Keeping {
     /// Seconds of work that a kill may cost.
-    #[arg(long, value_name = "SECONDS", value_parser = parse_positive, default_value_t = 60.0)]
-    checkpoint_every: f64,
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, default_value = "60")]
+    checkpoint_every: Duration,
 }
 
 /// What to do about a unit that another process renders.
@@ -94,7 +94,7 @@ impl<'a> Bench<'a> {
     ) -> Result<ExitCode> {
         let farm = open_for_work(folder)?;
         let signals = Signals::listen()?;
-        let every = Duration::from_secs_f64(keeping.checkpoint_every.min(1e9));
+        let every = keeping.checkpoint_every;
         threads.pool()?.install(|| {
             let options = JobOptions::of(&farm)?;
             let job = options.job()?;

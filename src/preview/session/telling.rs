@@ -30,7 +30,11 @@ impl Session<'_> {
             }),
             width: self.tracer.settings().film_area().width,
             height: self.tracer.settings().film_area().height,
-            visible_share: self.last_look.as_ref().map(|look| visible_share(&look.judgement, target)),
+            visible_share: self
+                .last_look
+                .as_ref()
+                .filter(|look| look.judgement.is_known)
+                .map(|look| visible_share(&look.judgement, target)),
             exposure: self.live.exposure.or(self.job.record.exposure_stops),
             distance: self.live.distance.unwrap_or(1.0),
             error: self.error.clone(),
@@ -97,7 +101,7 @@ pub(in crate::preview) fn count(
         status.seconds_left = left_after(pixels * f64::from(status.pilot_samples) - status.total_samples as f64);
     }
     if let Some(progress) = progress.filter(|_| status.phase != Phase::Stopped) {
-        status.visible_share = Some(progress.visible_share);
+        status.visible_share = progress.visible_share;
         status.rung = Some(progress.rung);
         let since = status.total_samples as f64 - progress.mean_samples * progress.pixels;
         status.seconds_left = left_after(progress.remaining_samples - since).filter(|left| left.is_finite());
