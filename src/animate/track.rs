@@ -8,6 +8,7 @@ use super::{SceneSource, ShotSettings};
 use crate::adaptive::judge::guide_luminance;
 use crate::adaptive::plan::pilot_plan;
 use crate::checkpoint::PROGRAM;
+use crate::denoise::Denoiser;
 use crate::film::Film;
 use crate::integrator::{PathTracer, TraceSettings};
 use crate::scene::Scene;
@@ -118,7 +119,7 @@ impl Track {
 
 fn made_for(shot: &ShotSettings, operator: &dyn ToneOperator) -> String {
     format!(
-        "{}, frames {} to {} at {} a second, {}x{}, seed {}, {} cd/m² a unit, {:?}, eye {:?}, \
+        "{}, frames {} to {} at {} a second, {}x{}, seed {}, {} cd/m² a unit, {} ({operator:?}), eye {:?}, \
          budget {:?}, {:?}, {:?}",
         PROGRAM,
         shot.first,
@@ -131,8 +132,11 @@ fn made_for(shot: &ShotSettings, operator: &dyn ToneOperator) -> String {
         operator.name(),
         shot.adapted_to_cd_m2,
         shot.limits.mean_samples,
-        // Whether frames may be paused, and where they are looked at, decides what they need of a budget.
-        shot.limits.mean_samples.map(|_| (shot.sampling, shot.pausable, shot.limits, gaze_hash(shot))),
+        // Whether frames may be paused, where they are looked at and what denoises them decides what they need of a budget.
+        shot.limits.mean_samples.map(|_| {
+            let denoiser = shot.denoiser.as_ref().map(Denoiser::name);
+            (shot.sampling, shot.pausable, shot.limits, gaze_hash(shot), denoiser)
+        }),
         shot.viewing,
     )
 }

@@ -3,6 +3,7 @@
 mod contact;
 mod frames;
 mod motion;
+mod record;
 mod settings;
 mod shot;
 mod source;
@@ -96,7 +97,8 @@ pub(super) struct AnimateArguments {
     /// Names of the layers of motion in .exr files.
     #[arg(long, value_enum, default_value = "fechner", help_heading = "Picture")]
     aov_names: AovNames,
-    /// Make a video of the shot when all its frames are there: .y4m, or .mp4 by an installed ffmpeg.
+    /// Make a video of the shot when all its frames are there: .y4m, or .mp4 by an installed ffmpeg. It is not HDR: an HDR
+    /// display's white becomes its white.
     #[arg(long, value_name = "FILE", help_heading = "Picture")]
     video: Option<PathBuf>,
 
@@ -134,12 +136,13 @@ pub(super) fn run(arguments: &AnimateArguments) -> Result<()> {
 fn render_shot(arguments: &AnimateArguments) -> Result<()> {
     arguments.video()?;
     let shot = Shot::new(arguments)?;
-    let track = shot.track()?;
+    shot.check_video()?;
+    let track = shot.track(arguments.frame_numbers())?;
     let mut clock = arguments.time.map(|budget| ShotClock::start(&shot, &track, budget)).transpose()?;
     for frame in arguments.frame_numbers() {
         shot.make(frame, &track, clock.as_mut().map(|clock| clock.share(frame)))?;
     }
-    shot.conclude(&track)
+    shot.conclude(&track).map(drop)
 }
 
 impl AnimateArguments {

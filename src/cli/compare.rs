@@ -26,7 +26,7 @@ pub(super) struct CompareArguments {
     test: PathBuf,
     #[command(flatten)]
     seeing: SeeingArguments,
-    /// Tone operator that shows scene-linear pictures; it is fitted to the reference.
+    /// Tone operator that shows scene-linear pictures; it is fitted to the reference, or to the test where only that is one.
     #[arg(long, value_name = "NAME", default_value = "constant")]
     operator: String,
     /// Frames a second, of sequences. Beyond its ends a sequence stands still, so that noise in the first and the last fifth

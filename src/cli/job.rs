@@ -13,6 +13,7 @@ use fechner::output::rendered::Background;
 use fechner::sampler::{PixelFilter, Sequence};
 use fechner::scene::hash::ContentHash;
 use fechner::scene::{Scene, load};
+use fechner_perception::model;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -88,7 +89,7 @@ pub(super) struct JobArguments {
     #[arg(long, value_name = "NAME|FILE", help_heading = "Seeing")]
     display: Option<String>,
     /// Threshold model that drives the sampling: csf-bands, tvi, ramasubramanian, yee, bolin-meyer;
-    /// csf-unmasked and tvi-masked show what a part is worth.
+    /// csf-unmasked and tvi-masked show what a part is worth. Only csf-bands can judge denoised pictures.
     #[arg(long, value_name = "NAME", default_value = "csf-bands", help_heading = "Seeing")]
     model: String,
     /// Area in deg² over which the eye sums contrast.
@@ -379,6 +380,13 @@ fn settings_record(arguments: &JobArguments, scene: &Scene) -> anyhow::Result<Se
     let display_name = arguments.display.as_deref().or(view.display.as_deref()).unwrap_or("desktop");
     let viewing = seeing::viewing(display_name, arguments.csf_area)?;
     let operator = arguments.operator.as_deref().or(view.operator.as_deref()).unwrap_or("constant");
+    let default_model = model::names()[0];
+    if arguments.denoise.kind().is_some() && arguments.model != default_model {
+        bail!(
+            "--denoise is for --model {default_model}: {} cannot say what is seen of a denoised picture",
+            arguments.model
+        );
+    }
     let threshold = arguments.noise_threshold.unwrap_or(0.01);
     let sampling = match arguments.sampling {
         SamplingChoice::Adaptive => Sampling::Adaptive,

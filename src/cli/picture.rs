@@ -141,6 +141,11 @@ impl InputPicture {
         Some(self.rgb.iter().map(|pixel| pixel.map(cd_m2)).collect())
     }
 
+    /// The values as the file has them; 0 to 1 in a picture that is ready for the display.
+    pub(super) fn codes(&self) -> &[[f32; 3]] {
+        &self.rgb
+    }
+
     /// The values as bytes, R′G′B′ after R′G′B′: of a picture that is ready for the display.
     pub(super) fn codes8(&self) -> Vec<u8> {
         let byte = |code: f32| (255.0 * code.clamp(0.0, 1.0)).round() as u8;

@@ -1,5 +1,6 @@
 //! `fechner threshold`: how much noise may stay in a picture, and how visible the noise is that it has.
 
+use super::animate::parse_rate;
 use super::channels;
 use super::picture::InputPicture;
 use super::seeing::{SeeingArguments, tone_operator};
@@ -10,8 +11,9 @@ use fechner::output::{self, Attribute, Format, PIXEL_ASPECT_RATIO, Picture};
 use fechner_perception::display::Glare;
 use fechner_perception::model::{self, ModelInputs};
 use fechner_perception::motion::image_velocity_deg_s;
+use fechner_perception::saliency::{SaliencyInputs, saliency};
 use fechner_perception::tone::ToneSettings;
-use fechner_perception::{Plane, ThresholdInputs, csf, seen, threshold_map, tone};
+use fechner_perception::{Plane, ThresholdInputs, Viewing, csf, seen, threshold_map, tone};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `threshold`.
@@ -20,15 +22,23 @@ pub(super) struct ThresholdArguments {
     /// Picture of any renderer, best without noise.
     input: PathBuf,
     /// EXR file to write: threshold.Y (standard error in display cd/m² at visibility 1), adaptation.Y and, with
-    /// --halves, visibility.Y.
+    /// --halves, visibility.Y by the model's thresholds.
     #[arg(short, long, value_name = "FILE.exr")]
     output: PathBuf,
     /// Two renders with independent samples: half of their difference is the noise that is judged.
     #[arg(long, num_args = 2, value_names = ["A", "B"])]
     halves: Option<Vec<PathBuf>>,
-    /// Motion in pixels a frame, for error that travels with what is shown.
+    /// Motion in pixels a frame, for error that travels with what is shown. For the models csf-bands, yee and tvi-masked; the
+    /// others know no motion.
     #[arg(long, value_name = "FILE.exr")]
     velocity: Option<PathBuf>,
+    /// Frames a second of --velocity. Without it the display's, which is 60 unless its file says otherwise.
+    #[arg(long, value_name = "N", value_parser = parse_rate, requires = "velocity")]
+    fps: Option<f64>,
+    /// Let the eye follow only what stands out in the picture and in its motion (Itti 1998, Yee 2001): what moves elsewhere is
+    /// seen less well. Without it, it follows everything.
+    #[arg(long, requires = "velocity")]
+    saliency: bool,
     /// Add the veil that bright things cast inside the eye (CIE), for an observer of this age (25 if none is given).
     #[arg(long, value_name = "AGE", num_args = 0..=1, default_missing_value = "25")]
     glare: Option<f64>,
@@ -52,6 +62,9 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
         viewing.observer.glare = Glare::Cie { age_years };
         viewing.check().context("--glare")?;
     }
+    if let Some(frames_per_second) = arguments.fps {
+        viewing.display.frames_per_second = frames_per_second;
+    }
     let nits_per_unit = arguments.seeing.nits_per_unit;
     let guide = InputPicture::read(&arguments.input, nits_per_unit)?;
     let viewing = guide.viewed(&viewing).with_context(|| arguments.input.display().to_string())?;
@@ -62,21 +75,24 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     let operator = tone_operator(&arguments.operator, &ToneSettings::default())?;
     let fitted = guide.fit(operator.as_ref(), &viewing);
     let shown = guide.displayed(fitted.as_deref(), &viewing);
-    let velocity = match &arguments.velocity {
-        Some(path) => {
-            let [x, y] = read_velocity(path, guide.size())?;
-            Some(image_velocity_deg_s(&x, &y, &viewing.display)?)
+    let motion = match &arguments.velocity {
+        Some(_) if !model.knows_motion() => {
+            let knows = |name: &&&str| model::by_name(name).is_some_and(|model| model.knows_motion());
+            let known: Vec<&str> = model::names().iter().filter(knows).copied().collect();
+            bail!("--velocity: the model {} knows no motion; {} do", model.name(), known.join(", "))
         }
+        Some(path) => Some(Motion::read(path, arguments.saliency, &guide, fitted.as_deref(), &viewing)?),
         None => None,
     };
-    let threshold = model.allowed_standard_error_cd_m2(&ModelInputs {
+    let inputs = ModelInputs {
         display_luminance_cd_m2: &shown,
         guide_variance: None,
-        image_velocity_deg_s: velocity.as_ref(),
-        attention: None,
+        image_velocity_deg_s: motion.as_ref().map(|motion| &motion.image_velocity_deg_s),
+        attention: motion.as_ref().and_then(|motion| motion.attention.as_ref()),
         viewing: &viewing,
         csf: csf.as_ref(),
-    })?;
+    };
+    let threshold = model.allowed_standard_error_cd_m2(&inputs)?;
     let map = threshold_map(
         &ThresholdInputs { display_luminance_cd_m2: &shown, guide_variance: None },
         &viewing,
@@ -92,7 +108,7 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
             if a.size() != guide.size() || b.size() != guide.size() {
                 bail!("the halves do not have the size of {}", arguments.input.display());
             }
-            Some(map.measured_visibility(&half_difference(&a, &b, fitted.as_deref(), &viewing)))
+            Some(model.measured_visibility(&inputs, &half_difference(&a, &b, fitted.as_deref(), &viewing))?)
         }
         _ => None,
     };
@@ -105,6 +121,10 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     picture.push_attribute("fechner.observer.display", text(&viewing.display.name));
     let ppd = viewing.display.pixels_per_degree as f32;
     picture.push_attribute("fechner.observer.pixels_per_degree", Attribute::Float(ppd));
+    if motion.is_some() {
+        let rate = viewing.display.frames_per_second as f32;
+        picture.push_attribute("fechner.observer.frames_per_second", Attribute::Float(rate));
+    }
     picture.push_attribute(PIXEL_ASPECT_RATIO, Attribute::Float(guide.pixel_aspect_ratio() as f32));
     output::write_exr(&arguments.output, &picture)?;
     println!(
@@ -122,7 +142,7 @@ fn half_difference(
     a: &InputPicture,
     b: &InputPicture,
     fitted: Option<&dyn tone::FittedTone>,
-    viewing: &fechner_perception::Viewing,
+    viewing: &Viewing,
 ) -> Plane {
     match (a.scene_luminance(), b.scene_luminance(), fitted) {
         (Some(a), Some(b), Some(fitted)) => {
@@ -134,8 +154,41 @@ fn half_difference(
     }
 }
 
+/// How what a picture shows moves.
+struct Motion {
+    /// Speed over the picture.
+    image_velocity_deg_s: Plane,
+    /// How much each pixel attracts the gaze, 0 to 1; `None`: everything is followed.
+    attention: Option<Plane>,
+}
+
+impl Motion {
+    fn read(
+        path: &Path,
+        by_saliency: bool,
+        guide: &InputPicture,
+        fitted: Option<&dyn tone::FittedTone>,
+        viewing: &Viewing,
+    ) -> Result<Self> {
+        let [x, y] = read_velocity(path, guide.size(), viewing.display.frames_per_second)?;
+        let image_velocity_deg_s = image_velocity_deg_s(&x, &y, &viewing.display)?;
+        let attention = if by_saliency {
+            let (width, height) = guide.size();
+            let rgb = guide.displayed_rgb(fitted, viewing);
+            let white = viewing.display.luminance_cd_m2(1.0) as f32;
+            let [red, green, blue] =
+                [0, 1, 2].map(|c| Plane::from_fn(width, height, |x, y| rgb[y * width + x][c] / white));
+            let inputs = SaliencyInputs { rgb: [&red, &green, &blue], velocity: Some(&image_velocity_deg_s) };
+            Some(saliency(&inputs)?)
+        } else {
+            None
+        };
+        Ok(Self { image_velocity_deg_s, attention })
+    }
+}
+
 /// Motion in pixels under the names that renderers give it.
-fn read_velocity(path: &Path, (width, height): (usize, usize)) -> Result<[Plane; 2]> {
+fn read_velocity(path: &Path, (width, height): (usize, usize), frames_per_second: f64) -> Result<[Plane; 2]> {
     let exr = read_exr(path)?;
     if (exr.width as usize, exr.height as usize) != (width, height) {
         bail!("{} has {}x{} pixels, the picture {width}x{height}", path.display(), exr.width, exr.height);
@@ -147,7 +200,7 @@ fn read_velocity(path: &Path, (width, height): (usize, usize)) -> Result<[Plane;
             path.display()
         );
     };
-    println!("motion from the channels of {layer}");
+    println!("motion from the channels of {layer} at {frames_per_second} frames a second");
     let plane = |values: &[f32]| {
         let finite = values.iter().map(|&v| if v.is_finite() { v } else { 0.0 }).collect();
         Plane::from_values(width, height, finite)

@@ -29,6 +29,11 @@ const COMPRESSION: png::Compression = png::Compression::Fast;
 /// Code points of ITU-T H.273: primaries of BT.2020, transfer of SMPTE ST 2084 (PQ), RGB, full range.
 const CICP_BT2020_PQ: [u8; 4] = [9, 16, 0, 1];
 
+/// Luminance of the highest PQ code.
+const PEAK_CD_M2: f64 = 10_000.0;
+/// Of primaries that cannot be brought into others, which ours can.
+const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
 /// Writes what the display emits as a 16-bit PNG in PQ code values and Rec.2020 primaries, with the cICP chunk (PNG, third
 /// edition) that says so.
 ///
@@ -58,8 +63,6 @@ pub fn write_pq_png(
 
 /// The bytes of [`write_pq_png`]: big-endian, RGB after RGB.
 fn encode_pq16(rgb_linear_display: &[[f32; 3]], display: &Display) -> Vec<u8> {
-    const PEAK_CD_M2: f64 = 10_000.0;
-    const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let wide = Primaries::REC709.to(&Primaries::REC2020).unwrap_or(IDENTITY);
     let mut bytes = vec![0; rgb_linear_display.len() * 6];
     bytes.par_chunks_mut(6).zip(rgb_linear_display).with_min_len(4096).for_each(|(bytes, rgb)| {
@@ -70,6 +73,16 @@ fn encode_pq16(rgb_linear_display: &[[f32; 3]], display: &Display) -> Vec<u8> {
         }
     });
     bytes
+}
+
+/// Linear display RGB, 0 the display's black and 1 its white, of the codes (0 to 1) that [`write_pq_png`] has written for the same
+/// display.
+pub fn decode_pq(codes: &[[f32; 3]], display: &Display) -> Vec<[f32; 3]> {
+    let narrow = Primaries::REC2020.to(&Primaries::REC709).unwrap_or(IDENTITY);
+    let (dark, span) =
+        (display.black_cd_m2 + display.ambient_cd_m2, (display.white_cd_m2 - display.black_cd_m2).max(1e-6));
+    let relative = |code: f32| (Eotf::Pq.decode(f64::from(code), PEAK_CD_M2) * PEAK_CD_M2 - dark) / span;
+    codes.par_iter().map(|codes| apply(&narrow, codes.map(relative)).map(|light| light as f32)).collect()
 }
 
 /// Writes linear display RGB, where 1 is the display's white, as an 8-bit PNG tagged sRGB.
@@ -177,6 +190,20 @@ mod tests {
         assert_eq!((r, b), (0, 255));
         assert!((187..=188).contains(&g), "linear 0.5 is 187.5 in sRGB, read {g}");
         assert!((127..=128).contains(&image.get_pixel(1, 0).0[2]));
+    }
+
+    /// In the display's gamut, down to its black, whatever the room adds.
+    #[test]
+    fn pq_codes_come_back_as_light() {
+        let display = Display { ambient_cd_m2: 2.0, ..Display::preset("hdr-1000").unwrap() };
+        let light = [[0.0; 3], [1.0; 3], [0.5, 0.02, 0.1], [1.0, 0.0, 0.0], [0.001, 0.3, 0.9]];
+        let codes: Vec<[f32; 3]> = encode_pq16(&light, &display)
+            .chunks_exact(6)
+            .map(|bytes| [0, 2, 4].map(|at| f32::from(u16::from_be_bytes([bytes[at], bytes[at + 1]])) / 65_535.0))
+            .collect();
+        for (found, light) in decode_pq(&codes, &display).iter().flatten().zip(light.iter().flatten()) {
+            assert!((found - light).abs() < 1e-3, "{light} came back as {found}");
+        }
     }
 
     #[test]

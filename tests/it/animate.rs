@@ -35,7 +35,12 @@ keyframes = [ { time = 0.0, translate = [-1, 0, 0] }, { time = 1.0, translate = 
 
 /// Runs `animate` in a folder that has the scene; what it said.
 fn animate(folder: &Path, arguments: &[&str]) -> String {
-    std::fs::write(folder.join("scene.toml"), SCENE).expect("written");
+    animate_scene(folder, SCENE, arguments)
+}
+
+/// The same with another scene.
+fn animate_scene(folder: &Path, scene: &str, arguments: &[&str]) -> String {
+    std::fs::write(folder.join("scene.toml"), scene).expect("written");
     let output = Command::cargo_bin("fechner")
         .expect("the binary is built")
         .current_dir(folder)
@@ -99,6 +104,94 @@ fn finished_frames_are_kept() {
     assert!(!said.contains("is there"), "{said}");
 }
 
+/// The operator's settings are a frame's own as much as its name, from the command line and from the scene, budget or not.
+#[test]
+fn another_exposure_makes_frames_anew() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let frame = || std::fs::read(folder.path().join("shot.00.png")).expect("read");
+    let brighter = format!("{SCENE}\n[view]\nexposure_stops = 3.0\n");
+    for target in [["--visibility", "8"], ["--spp", "16"]] {
+        let common = [&["--frames", "0..1", "-o", "shot.##.png"], &target[..]].concat();
+        animate(folder.path(), &[&common, &["--exposure", "0"][..]].concat());
+        let dark = frame();
+        let said = animate(folder.path(), &[&common, &["--exposure", "3"][..]].concat());
+        let bright = frame();
+        assert!(!said.contains("is there") && bright != dark, "{said}");
+        let said = animate(folder.path(), &common);
+        assert!(!said.contains("is there") && frame() == dark, "{said}");
+        let said = animate_scene(folder.path(), &brighter, &common);
+        assert!(!said.contains("is there") && frame() == bright, "{said}");
+    }
+}
+
+/// Pictures of another format, other settings or other bytes than their record's are frames to be made, for the shot as well.
+#[test]
+fn what_a_run_would_make_otherwise_is_not_there() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let both = |spp: &str, name: &str| animate(at, &["--frames", "0..1", "--spp", spp, "-o", name]);
+    let first = |spp: &str| animate(at, &["--frames", "0..0", "--shot", "0..1", "--spp", spp, "-o", "a.##.png"]);
+    both("16", "a.##.png");
+    assert!(both("16", "a.##.png").matches("is there").count() == 2 && at.join("a.contact.png").is_file());
+    let said = both("16", "a.##.exr");
+    assert!(!said.contains("is there"), "{said}");
+    let said = both("16", "a.##.png");
+    assert!(!said.contains("is there"), "the records are those of the .exr files: {said}");
+    // The second frame is of other settings.
+    let said = first("17");
+    assert!(said.contains("1 frames of the shot are not there yet"), "{said}");
+    both("17", "a.##.png");
+    let whole = std::fs::read(at.join("a.01.png")).expect("read");
+    std::fs::write(at.join("a.01.png"), std::fs::read(at.join("a.00.png")).expect("read")).expect("written");
+    let said = first("17");
+    assert!(said.contains("1 frames of the shot are not there yet"), "another picture under its record: {said}");
+    let said = both("17", "a.##.png");
+    assert!(said.contains("a.00.png: is there") && !said.contains("a.01.png: is there"), "{said}");
+    assert!(std::fs::read(at.join("a.01.png")).expect("read") == whole);
+    std::fs::remove_file(at.join("a.01.png")).expect("removed");
+    let said = first("17");
+    assert!(said.contains("1 frames of the shot are not there yet"), "without its picture: {said}");
+}
+
+/// A change between the ends makes the track anew, and the frames that it shows in.
+#[test]
+fn an_edit_in_the_middle_is_rendered() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let ball = |middle: &str| {
+        let ends = "{ time = 0.0, translate = [-1, 0, 0] }, { time = 1.0, translate = [1, 0, 0] }";
+        let moved = format!(
+            "{{ time = 0.0, translate = [-1, 0, 0] }}, {{ time = 0.4, translate = [0, 0, 0] }}, \
+             {{ time = 0.5, translate = {middle} }}, {{ time = 0.6, translate = [0, 0, 0] }}, \
+             {{ time = 1.0, translate = [1, 0, 0] }}"
+        );
+        assert!(SCENE.contains(ends));
+        SCENE.replace(ends, &moved)
+    };
+    let arguments = ["--frames", "0..4", "--fps", "4", "--spp", "16", "--operator", "linear", "-o", "out/shot.##.png"];
+    let frame = |number: u32| std::fs::read(folder.path().join(format!("out/shot.0{number}.png"))).expect("read");
+    animate_scene(folder.path(), &ball("[0, 0, 0]"), &arguments);
+    let before: Vec<_> = (0..5).map(frame).collect();
+    let said = animate_scene(folder.path(), &ball("[0, 0.8, 0]"), &arguments);
+    assert!(said.contains("made anew"), "{said}");
+    assert!(frame(2) != before[2] && !said.contains("shot.02.png: is there"), "{said}");
+}
+
+/// Frames for an HDR display hold other codes than a video does: both kinds of frames make the same one.
+#[test]
+fn videos_of_hdr_frames_are_not_hdr() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let video = |ending: &str| {
+        let (frames, name) = (format!("{ending}.##.{ending}"), format!("{ending}.y4m"));
+        let arguments = ["--frames", "0..1", "--spp", "16", "--display", "hdr-1000", "-o", &frames, "--video", &name];
+        animate(folder.path(), &arguments);
+        std::fs::read(folder.path().join(name)).expect("a video")
+    };
+    let (of_png, of_exr) = (video("png"), video("exr"));
+    assert_eq!(of_png.len(), of_exr.len());
+    let far = of_png.iter().zip(&of_exr).map(|(a, b)| a.abs_diff(*b)).max();
+    assert!(far <= Some(2), "{far:?} codes apart");
+}
+
 /// Noise that is gone in the next frame may be stronger than in a picture that somebody looks at for long: 2.3 times fewer samples, one
 /// seed's ratio scattering by 0.25.
 #[test]
@@ -155,6 +248,7 @@ fn bad_arguments_are_named() {
         (&["--frames", "0..2", "-o", "a.png"], "a sequence's name has #"),
         (&["--frames", "0..2", "--shot", "1..2", "-o", "a.#.png"], "--frames reaches beyond --shot"),
         (&["--frames", "0..2", "-o", "a.#.png", "--video", "a.gif"], "videos end in .y4m or .mp4"),
+        (&["--frames", "0..2", "-o", "a.#.png", "--video", "no/such.y4m"], "the folder no does not exist"),
         (&["--frames", "0..2", "-o", "a.#.png", "--operator", "sepia"], "no tone operator"),
         (&["--frames", "0..2", "-o", "a.#.png", "--fps", "0.1"], "between 1 and 1000"),
         (&["--frames", "0..2", "-o", "a.#.png", "--gaze", "gaze.csv"], "line 2: \"0,1\" is not a frame's number"),
@@ -168,6 +262,7 @@ fn bad_arguments_are_named() {
             .expect("starts");
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(output.status.code() == Some(2) && said.contains(expected), "{arguments:?}: {said}");
+        assert!(!folder.path().join("a.0.png").exists(), "{arguments:?}: rendered before it was refused");
     }
 }
 
@@ -206,6 +301,37 @@ fn sequences_are_compared_as_they_move() {
         let (status, said) = compare(arguments);
         assert!(status == Some(2) && said.contains(expected), "{arguments:?}: {said}");
     }
+    // What only one of them has is named before anything is compared.
+    std::fs::remove_file(at.join("b.03.exr")).expect("removed");
+    for pair in [["a.##.exr", "b.##.exr"], ["b.##.exr", "a.##.exr"]] {
+        let (status, said) = compare(&[&pair[..], &["--fps", "24"]].concat());
+        let expected = "a.##.exr: frames 3 are there, and missing of b.##.exr";
+        assert!(status == Some(2) && said.contains(expected), "{pair:?}: {said}");
+    }
+    let (status, said) = compare(&["a.##.exr", "a.##.exr", "--fps", "24", "--velocity", "b.##.exr"]);
+    assert!(status == Some(2) && said.contains("missing of b.##.exr"), "{said}");
+}
+
+/// The operator is fitted to whichever sequence holds the scene's light, as for stills: which of them is the reference changes
+/// little.
+#[test]
+fn a_sequence_for_the_display_is_compared_with_one_of_light() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    for ending in ["exr", "png"] {
+        animate(at, &["--frames", "0..1", "--fps", "24", "--spp", "64", "-o", &format!("{ending}.##.{ending}")]);
+    }
+    let worst = |reference: &str, test: &str| {
+        let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+        let files = [reference, test, "--fps", "24", "--json", "figures.json"];
+        let output = command.current_dir(at).arg("compare").args(files).output().expect("it starts");
+        assert!(output.status.code() < Some(2), "{}", String::from_utf8_lossy(&output.stderr));
+        let text = std::fs::read(at.join("figures.json")).expect("written");
+        let figures: serde_json::Value = serde_json::from_slice(&text).expect("JSON");
+        figures["worst_visibility"].as_f64().expect("a number")
+    };
+    let (of_light, of_display) = (worst("exr.##.exr", "png.##.png"), worst("png.##.png", "exr.##.exr"));
+    assert!((of_display / of_light).ln().abs() < 0.7, "{of_light} swapped is {of_display}");
 }
 
 /// A budget of the shot adds up, whoever renders which of its frames; a whole shot has a contact sheet.

@@ -219,6 +219,8 @@ fn bad_arguments_are_refused_in_one_line() {
     assert_refused(&["render", cornell, "-o", "a.png", "--visibility", "-1"], at, &["above 0"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--sampling", "budget"], at, &["--spp"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--model", "guess"], at, &["guess", "csf-bands"]);
+    let blind = ["render", cornell, "-o", "a.png", "--denoise", "builtin", "--model", "tvi"];
+    assert_refused(&blind, at, &["--denoise", "--model csf-bands", "tvi"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--display", "cinemax"], at, &["cinemax", "cinema"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--operator", "magic"], at, &["magic", "constant"]);
     let render = |more: &[&'static str], fragments: &[&str]| {
@@ -294,6 +296,62 @@ fn pictures_are_compared_and_thresholds_mapped() {
     assert_refused(&["compare", "unitless.exr", "unitless.exr"], at, &["unitless.exr", "--nits-per-unit"]);
     assert_refused(&["compare", "1.exr", "unitless.exr", "--nits-per-unit", "100"], at, &["64x48", "2x2"]);
     assert_refused(&["threshold", "1.exr", "-o", "a.exr", "--model", "guess"], at, &["guess", "csf-bands"]);
+}
+
+/// What is said of the noise of two halves is said by the thresholds of the model and the motion that were asked for.
+#[test]
+fn noise_is_judged_by_the_model_and_the_motion_asked_for() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let write = |name: &str, channels: &[&str], value: &dyn Fn(u32) -> f32| {
+        let mut picture = fechner::output::Picture::new(48, 40);
+        let values: Vec<f32> = (0..48 * 40).map(value).collect();
+        channels.iter().for_each(|channel| picture.push_f32(channel, values.clone()));
+        fechner::output::write_exr(&at.join(name), &picture).expect("written");
+    };
+    // Tiles that stand out a little, and noise that does not repeat.
+    let tiles = |i: u32| if (i % 48 / 4 + i / 192) % 2 == 0 { 20.0 } else { 40.0 };
+    let noise = |i: u32| (i.wrapping_mul(2_654_435_761) >> 24) as f32 / 64.0 - 2.0;
+    write("guide.exr", &["R", "G", "B"], &tiles);
+    write("a.exr", &["R", "G", "B"], &|i| tiles(i) + noise(i));
+    write("b.exr", &["R", "G", "B"], &|i| tiles(i) - noise(i));
+    write("motion.exr", &["velocity.X", "velocity.Y"], &|i| if i % 48 < 24 { 12.0 } else { 4.0 });
+    let mean = |more: &[&str], channel: &str| {
+        let common = ["threshold", "guide.exr", "--halves", "a.exr", "b.exr", "--nits-per-unit", "1", "-o", "out.exr"];
+        let output = fechner().args(common).args(more).current_dir(at).output().expect("runs");
+        assert!(output.status.success(), "{more:?}: {}", String::from_utf8_lossy(&output.stderr));
+        let maps = fechner::exr_read::read_exr(&at.join("out.exr")).expect("maps");
+        let values = maps.channel(channel).expect("a map");
+        (values.iter().sum::<f32>() / values.len() as f32, String::from_utf8_lossy(&output.stdout).into_owned())
+    };
+    let visibility = |more: &[&str]| mean(more, "visibility.Y").0;
+    let threshold = |more: &[&str]| mean(more, "threshold.Y").0;
+    let still = visibility(&[]);
+    let by_intensity = visibility(&["--model", "tvi"]);
+    assert!((by_intensity / still).ln().abs() > 0.2, "{still} by bands, {by_intensity} by intensity alone");
+    let moving = ["--velocity", "motion.exr"];
+    let moved = visibility(&moving);
+    assert!(moved < 0.9 * still, "{still} at rest, {moved} in motion");
+    // Slower frames are slower motion.
+    let (slow, said) = mean(&["--velocity", "motion.exr", "--fps", "10"], "visibility.Y");
+    assert!(slow > 1.05 * moved && said.contains("at 10 frames a second"), "{slow} and {moved}: {said}");
+    assert!(mean(&moving, "threshold.Y").1.contains("at 60 frames a second"), "the rate is not said");
+    // An eye that does not follow everything sees less of what moves.
+    let yee = ["--model", "yee", "--velocity", "motion.exr", "--fps", "10"];
+    let (followed, salient) = (threshold(&yee), threshold(&[&yee[..], &["--saliency"]].concat()));
+    assert!(salient > 1.05 * followed, "{followed} followed, {salient} by saliency");
+    for (more, expected) in [
+        (
+            &["--velocity", "motion.exr", "--model", "tvi"][..],
+            &["tvi knows no motion", "csf-bands, yee, tvi-masked"][..],
+        ),
+        (&["--fps", "24"], &["--velocity"]),
+        (&["--saliency"], &["--velocity"]),
+    ] {
+        let common = ["threshold", "guide.exr", "--nits-per-unit", "1", "-o", "none.exr"];
+        assert_refused(&[&common[..], more].concat(), at, expected);
+        assert!(!at.join("none.exr").exists());
+    }
 }
 
 /// An EXR with pixels twice as wide as high has thresholds as on a display that says so, and its ratio goes on into what is

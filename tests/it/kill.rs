@@ -100,6 +100,43 @@ fn a_killed_render_resumes_to_the_same_bytes() {
     assert_eq!(names(at), ["a.film", "parts.exr", "whole.exr"], "something was left behind");
 }
 
+/// Killed in the middle of a shot and called again, `animate` keeps the frames that were done and makes the others, to the bytes
+/// of a run in one go; no picture has its name before it is whole.
+#[test]
+fn a_killed_shot_goes_on_to_the_same_bytes() {
+    let [whole, parts] = [(); 2].map(|()| tempfile::tempdir().expect("a folder"));
+    let (whole, parts) = (whole.path(), parts.path());
+    let shot = |folder: &Path| {
+        let mut command = fechner();
+        command.arg("animate").arg(scene().with_file_name("rolling-ball.toml")).current_dir(folder);
+        command.args(["--frames", "0..7", "--size", "48x27", "--visibility", "3", "-o", "shot.#.exr"]);
+        command.args(["--video", "shot.y4m"]).stdout(Stdio::null()).stderr(Stdio::piped());
+        command
+    };
+    run(shot(whole));
+    let mut child = shot(parts).spawn().expect("runs");
+    wait_for(&parts.join("shot.1.json"), &mut child);
+    child.kill().expect("SIGKILL");
+    assert!(!child.wait().expect("ended").success(), "the kill came too late");
+
+    let pictures: Vec<String> = (0..8).map(|frame| format!("shot.{frame}.exr")).collect();
+    let is_done = |picture: &&String| parts.join(picture).with_extension("json").exists();
+    let done: Vec<&String> = pictures.iter().filter(is_done).collect();
+    assert!((2..8).contains(&done.len()), "{} frames were done", done.len());
+    for picture in pictures.iter().filter(|picture| parts.join(picture).exists()) {
+        assert!(file(parts, picture) == file(whole, picture), "{picture} was there and not whole");
+    }
+    let message = run(shot(parts));
+    assert_eq!(message.matches(": is there").count(), done.len(), "{message}");
+    assert!(done.iter().all(|picture| message.contains(&format!("{picture}: is there"))), "{message}");
+    // What a kill leaves of a file that was being written has a hidden name.
+    let shown = |folder: &Path| names(folder).into_iter().filter(|name| !name.starts_with('.')).collect::<Vec<_>>();
+    assert_eq!(shown(parts), shown(whole));
+    for name in shown(whole).iter().filter(|name| !name.ends_with(".json") || name.ends_with("track.json")) {
+        assert!(file(parts, name) == file(whole, name), "{name} differs");
+    }
+}
+
 #[cfg(unix)]
 #[test]
 fn a_signal_ends_a_render_with_its_picture_so_far() {

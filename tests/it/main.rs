@@ -15,6 +15,7 @@
 //! - `mutations`: thousands of damaged files a format, in a child process (ignored)
 //! - `scene_table`: scenes of others: how long until nothing is seen (ignored)
 //! - `relief`: height maps: normals, energy, every format
+//! - `reprojection`: velocity maps against rendered frames
 //! - `references`: scenes of others beside reference pictures (ignored)
 //! - `no_allocation`: the heap is left alone while paths are traced
 //! - `command_line`: the program as a user runs it
@@ -45,6 +46,7 @@ mod mutations;
 mod no_allocation;
 mod references;
 mod relief;
+mod reprojection;
 mod scene_table;
 mod support;
 mod texture_memory;

@@ -38,4 +38,8 @@ impl ThresholdModel for MaskedTvi {
         let base = Tvi { shifted: true }.allowed_standard_error_cd_m2(inputs)?;
         Ok(base.combined(&elevation, |base, elevation| base * elevation))
     }
+
+    fn knows_motion(&self) -> bool {
+        true
+    }
 }

@@ -21,6 +21,16 @@ impl ThresholdModel for CsfBands {
     fn allowed_standard_error_cd_m2(&self, inputs: &ModelInputs<'_>) -> Result<Plane, Error> {
         Ok(still_or_moving(inputs)?.allowed_standard_error_cd_m2(1.0))
     }
+
+    fn knows_motion(&self) -> bool {
+        true
+    }
+
+    fn measured_visibility(&self, inputs: &ModelInputs<'_>, half_difference: &Plane) -> Result<Plane, Error> {
+        let map = still_or_moving(inputs)?;
+        half_difference.check_size("half difference", map.width(), map.height())?;
+        Ok(map.measured_visibility(half_difference))
+    }
 }
 
 /// The threshold map of a still, or of what moves where a velocity is given.

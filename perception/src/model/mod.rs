@@ -21,7 +21,9 @@ pub use yee::Yee;
 use crate::csf::ContrastSensitivity;
 use crate::display::Viewing;
 use crate::error::Error;
+use crate::filter::gaussian_blur_xy;
 use crate::plane::Plane;
+use crate::threshold::POOLING_SIGMA_DEG;
 
 /// What a model may look at. All planes have one size.
 #[derive(Clone, Copy)]
@@ -79,6 +81,30 @@ pub trait ThresholdModel: Send + Sync {
     /// # Errors
     /// [`Error`] for planes of different sizes, values that are not finite or negative, and impossible viewings.
     fn allowed_standard_error_cd_m2(&self, inputs: &ModelInputs<'_>) -> Result<Plane, Error>;
+
+    /// Whether [`ModelInputs::image_velocity_deg_s`] changes what it allows.
+    fn knows_motion(&self) -> bool {
+        false
+    }
+
+    /// Visibility of the noise in half of the difference of two independent pictures, cd/m² on the display: 1 where noise of
+    /// what the model allows is expected to be.
+    ///
+    /// A model that knows only pixels gets the noise's energy pooled over a Gaussian of σ 0.25°, as the default's is.
+    ///
+    /// # Errors
+    /// As for [`ThresholdModel::allowed_standard_error_cd_m2`], and [`Error::SizeMismatch`] for a difference of another size.
+    fn measured_visibility(&self, inputs: &ModelInputs<'_>, half_difference: &Plane) -> Result<Plane, Error> {
+        let allowed = self.allowed_standard_error_cd_m2(inputs)?;
+        half_difference.check_size("half difference", allowed.width(), allowed.height())?;
+        let energy = half_difference.combined(&allowed, |difference, allowed| {
+            let relative = if difference.is_finite() { difference / allowed } else { 0.0 };
+            relative * relative
+        });
+        let density = inputs.viewing.display.pixel_density();
+        let (sigma_x, sigma_y) = (POOLING_SIGMA_DEG * density.horizontal, POOLING_SIGMA_DEG * density.vertical);
+        Ok(gaussian_blur_xy(&energy, sigma_x, sigma_y).map(f32::sqrt))
+    }
 }
 
 /// Two-sided 95 % of a normal distribution: models that stop on a confidence interval ask z σ ≤ T.
@@ -147,6 +173,7 @@ impl PerLuminance {
 mod tests {
     use super::*;
     use crate::csf::CastleCsf;
+    use crate::test_noise::normal;
 
     fn picture() -> Plane {
         Plane::from_fn(160, 96, |x, y| {
@@ -206,6 +233,36 @@ mod tests {
             assert_eq!(textured > 1.05 * flat, knows_texture, "{name}: flat {flat}, textured {textured}");
             let moved = ask(name, &guide, Some(&moving)).get(120, 48);
             assert_eq!(moved > 1.2 * textured, knows_motion, "{name}: still {textured}, moving {moved}");
+            assert_eq!(by_name(name).unwrap().knows_motion(), knows_motion, "{name} says otherwise");
+        }
+    }
+
+    /// White noise of what a model allows is at threshold by it; what moves hides noise from the models that know motion.
+    #[test]
+    fn noise_is_measured_by_the_models_own_thresholds() {
+        let (grey, moving) = (Plane::filled(160, 96, 50.0), Plane::filled(160, 96, 20.0));
+        let mut state = 3;
+        let white: Vec<f32> = (0..160 * 96).map(|_| normal(&mut state)).collect();
+        let white = Plane::from_values(160, 96, white).unwrap();
+        for name in names() {
+            let model = by_name(name).unwrap();
+            let visibility = |guide: &Plane, velocity: Option<&Plane>| {
+                let inputs = ModelInputs {
+                    display_luminance_cd_m2: guide,
+                    guide_variance: None,
+                    image_velocity_deg_s: velocity,
+                    attention: None,
+                    viewing: &Viewing::default(),
+                    csf: &CastleCsf::default(),
+                };
+                let noise = white.combined(&ask(name, guide, None), |white, allowed| white * allowed);
+                assert!(model.measured_visibility(&inputs, &Plane::filled(2, 2, 0.0)).is_err(), "{name}");
+                model.measured_visibility(&inputs, &noise).unwrap().map(|v| v * v).mean().sqrt()
+            };
+            let still = visibility(&grey, None);
+            assert!((still - 1.0).abs() < 0.1, "{name}: {still}");
+            let [still, moved] = [None, Some(&moving)].map(|velocity| visibility(&picture(), velocity));
+            assert_eq!(moved < 0.9 * still, model.knows_motion(), "{name}: still {still}, moving {moved}");
         }
     }
 

@@ -45,6 +45,10 @@ impl ThresholdModel for Yee {
         "yee"
     }
 
+    fn knows_motion(&self) -> bool {
+        true
+    }
+
     fn allowed_standard_error_cd_m2(&self, inputs: &ModelInputs<'_>) -> Result<Plane, Error> {
         inputs.check()?;
         let ppd = inputs.viewing.display.pixel_density().mean();

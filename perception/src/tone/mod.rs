@@ -69,8 +69,8 @@ pub use ward94::Ward94;
 
 use acuity::AcuityFilter;
 
-/// A way to bring scene light onto a display.
-pub trait ToneOperator: Send + Sync {
+/// A way to bring scene light onto a display. Its `Debug` form tells operators of different settings apart.
+pub trait ToneOperator: Send + Sync + Debug {
     /// What the command line calls it.
     fn name(&self) -> &'static str;
 

@@ -2,6 +2,7 @@
 
 use super::contact::{ContactSheet, on_sheet};
 use super::motion::push_velocity;
+use super::record::{self, FrameRecord, read_json};
 use super::settings::shot_settings;
 use super::source::FileSource;
 use super::video::shown_rgb8;
@@ -24,20 +25,11 @@ use fechner::scene::Scene;
 use fechner::scene::hash::content_hash;
 use fechner_perception::model;
 use fechner_perception::tone::{ToneOperator, ToneSettings};
-use serde::{Deserialize, Serialize};
 use std::io::Write as _;
+use std::ops::RangeInclusive;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-
-/// The figures of one frame, beside its picture; by `key` a later run knows that it need not be made again.
-#[derive(Serialize, Deserialize)]
-struct FrameRecord {
-    key: String,
-    frame: u32,
-    seconds_of_shot: f64,
-    report: serde_json::Value,
-}
 
 /// What a frame is made from and judged by.
 pub(in crate::cli) struct FrameJob {
@@ -104,25 +96,29 @@ impl<'a> Shot<'a> {
         }
     }
 
+    /// Whether the video that is asked for can be made and written: known before the frames are rendered.
+    pub(super) fn check_video(&self) -> Result<()> {
+        if let Some((path, _)) = self.arguments.video()? {
+            output::check_writable(path)?;
+        }
+        Ok(())
+    }
+
     fn operator(&self) -> Result<Box<dyn ToneOperator>> {
         let exposure_stops = self.exposure_stops.unwrap_or(0.0);
         tone_operator(&self.operator_name, &ToneSettings { exposure_stops, ..ToneSettings::default() })
     }
 
-    /// The track that lies beside the frames, or a new one where there is none for this shot.
-    pub(in crate::cli) fn track(&self) -> Result<Track> {
+    /// The track that lies beside the frames, if it is of this shot and the scenes of all `wanted` frames are still those that
+    /// it was made from; else a new one.
+    pub(in crate::cli) fn track(&self, wanted: RangeInclusive<u32>) -> Result<Track> {
         let file = self.name.of_shot("track.json");
         let operator = self.operator()?;
-        let wanted = self.arguments.frames;
         if let Some(track) = read_json::<Track>(&file) {
-            let is_of = |frame: u32| -> Result<bool> {
-                let scene = self.source.at(self.settings.seconds(f64::from(frame)))?;
-                Ok(track.of_frame(&self.settings, operator.as_ref(), frame, &scene).is_some())
-            };
-            // Each frame is looked at again before it is rendered; the ends tell here whether the track is of use at all.
-            if is_of(wanted.first)? && is_of(wanted.last)? {
+            if self.is_up_to_date(&track, operator.as_ref(), wanted)? {
                 return Ok(track);
             }
+            eprintln!("{}: of other settings or another scene, made anew", file.display());
         }
         let count = self.settings.last - self.settings.first + 1;
         let started = Instant::now();
@@ -134,6 +130,15 @@ impl<'a> Shot<'a> {
         let text = serde_json::to_string(&track).context("the track could not be put into words")?;
         output::write_beside(&file, |file| file.write_all(text.as_bytes()))?;
         Ok(track)
+    }
+
+    fn is_up_to_date(&self, track: &Track, operator: &dyn ToneOperator, wanted: RangeInclusive<u32>) -> Result<bool> {
+        for frame in wanted {
+            if track.of_frame(&self.settings, operator, frame, &*self.scene(frame)?).is_none() {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
     /// What each frame of the shot needs.
@@ -153,7 +158,7 @@ impl<'a> Shot<'a> {
         let mut job = self.frame(frame, track)?;
         job.settings.limits.time = time;
         let file = self.name.of(frame);
-        if self.record(frame).is_some_and(|record| record.key == job.key) && file.is_file() {
+        if self.record(frame, &job.key).is_some() {
             eprintln!("{}: is there", file.display());
             return Ok(());
         }
@@ -170,14 +175,24 @@ impl<'a> Shot<'a> {
 
     /// What a frame is made from and judged by.
     pub(in crate::cli) fn frame(&self, frame: u32, track: &Track) -> Result<FrameJob> {
+        self.frame_of_track(frame, track)?.with_context(|| {
+            format!(
+                "frame {frame}: its scene has changed since {} was made: call again; a farm must be planned anew",
+                self.name.of_shot("track.json").display()
+            )
+        })
+    }
+
+    /// The same; `None` where the track is not of the frame's scene.
+    fn frame_of_track(&self, frame: u32, track: &Track) -> Result<Option<FrameJob>> {
         let scenes = FrameScenes::load(&self.source, &self.settings, frame)?;
         let operator = self.operator()?;
         let Some(of_track) = track.of_frame(&self.settings, operator.as_ref(), frame, &scenes.now) else {
-            bail!("{}: not of this scene any more: delete it", self.name.of_shot("track.json").display());
+            return Ok(None);
         };
         let settings = self.settings.frame_settings(operator, of_track);
         let key = self.key(&settings, of_track, &scenes);
-        Ok(FrameJob { scenes, settings, key })
+        Ok(Some(FrameJob { scenes, settings, key }))
     }
 
     /// Writes a frame and its record.
@@ -185,25 +200,27 @@ impl<'a> Shot<'a> {
         let file = self.name.of(frame);
         let scene_name = self.arguments.scene.display().to_string();
         let report = Report::new(&scene_name, &[self.settings.trace.seed], &job.settings, &made.rendered);
+        FrameRecord::remove(&file)?;
         self.write(&file, made, &job.settings, &report)?;
         let record = FrameRecord {
             key: job.key.clone(),
+            picture: record::name(&file),
+            picture_hash: record::hash_of_file(&file)?,
             frame,
             seconds_of_shot: self.settings.seconds(f64::from(frame)),
             report: serde_json::to_value(&report).context("the report could not be put into words")?,
         };
-        write_json(&file.with_extension("json"), &record)?;
+        write_json(&FrameRecord::file(&file), &record)?;
         eprintln!("{}: {}", file.display(), report.in_a_line());
         Ok(report)
     }
 
-    /// Writes what only the whole shot has, if all its frames are there.
-    pub(in crate::cli) fn conclude(&self, track: &Track) -> Result<()> {
-        let records = self.records();
-        let missing = self.settings.last - self.settings.first + 1 - records.len() as u32;
+    /// Writes what only the whole shot has, if all its frames are there as this run would make them; whether they are.
+    pub(in crate::cli) fn conclude(&self, track: &Track) -> Result<bool> {
+        let FoundFrames { records, missing } = self.find_frames(track)?;
         if missing > 0 {
             eprintln!("{missing} frames of the shot are not there yet.");
-            return Ok(());
+            return Ok(false);
         }
         write_json(&self.name.of_shot("json"), &records)?;
         let fits = |frame: usize| track.frames[frame].fitted.clone().restore();
@@ -219,7 +236,7 @@ impl<'a> Shot<'a> {
             let files = (self.settings.first..=self.settings.last).map(|frame| self.name.of(frame));
             video::write(path, format, files, &fits, &self.settings)?;
         }
-        Ok(())
+        Ok(true)
     }
 
     fn write(&self, file: &Path, made: &RenderedFrame, settings: &LoopSettings, report: &Report) -> Result<()> {
@@ -238,8 +255,9 @@ impl<'a> Shot<'a> {
     /// All that a frame's file depends on, as a name.
     fn key(&self, settings: &LoopSettings, track: &TrackFrame, scenes: &FrameScenes) -> String {
         let text = format!(
-            "{}|{track:?}|{}|{}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}",
+            "{}|{:?}|{track:?}|{}|{}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}",
             PROGRAM,
+            self.format,
             content_hash(&scenes.previous),
             content_hash(&scenes.next),
             self.settings.trace,
@@ -255,17 +273,36 @@ impl<'a> Shot<'a> {
         blake3::hash(text.as_bytes()).to_hex()[..32].to_owned()
     }
 
-    fn record(&self, frame: u32) -> Option<FrameRecord> {
-        read_json(&self.name.of(frame).with_extension("json"))
+    /// The record of a frame that is there, made from all that a key names.
+    fn record(&self, frame: u32, key: &str) -> Option<FrameRecord> {
+        let file = self.name.of(frame);
+        FrameRecord::of_picture(&file).filter(|record| record.holds(key, &file))
     }
 
-    /// Records of the frames that are there.
-    fn records(&self) -> Vec<FrameRecord> {
-        (self.settings.first..=self.settings.last).filter_map(|frame| self.record(frame)).collect()
+    /// Looks for all frames of the shot. One of another scene, other settings or another format is not there.
+    fn find_frames(&self, track: &Track) -> Result<FoundFrames> {
+        let frames = || self.settings.first..=self.settings.last;
+        // Keys take reading every scene: not for each run that makes a part of a shot.
+        let missing = frames().filter(|&frame| FrameRecord::of_picture(&self.name.of(frame)).is_none()).count();
+        let mut found = FoundFrames { records: Vec::new(), missing };
+        if missing > 0 {
+            return Ok(found);
+        }
+        for frame in frames() {
+            let job = self.frame_of_track(frame, track)?;
+            match job.and_then(|job| self.record(frame, &job.key)) {
+                Some(record) => found.records.push(record),
+                None => found.missing += 1,
+            }
+        }
+        Ok(found)
     }
 }
 
-/// What is in a file, or nothing if it is not there or not whole.
-fn read_json<T: serde::de::DeserializeOwned>(file: &Path) -> Option<T> {
-    serde_json::from_slice(&std::fs::read(file).ok()?).ok()
+/// What there is of a shot.
+struct FoundFrames {
+    /// Of the frames that are there, in order, if their files all are.
+    records: Vec<FrameRecord>,
+    /// How many are not.
+    missing: usize,
 }

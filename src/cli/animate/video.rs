@@ -4,9 +4,10 @@ use crate::cli::picture::InputPicture;
 use anyhow::{Context, Result, bail};
 use fechner::animate::ShotSettings;
 use fechner::animate::video::Y4mWriter;
-use fechner::output::{encode_srgb8, write_beside};
+use fechner::output::{decode_pq, encode_srgb8, write_beside};
+use fechner_perception::display::Eotf;
 use fechner_perception::tone::{FittedTone, map_picture};
-use std::io::{BufWriter, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -45,12 +46,11 @@ pub(super) fn write(
 ) -> Result<()> {
     match format {
         VideoFormat::Y4m => {
-            let mut failed = Ok(());
             write_beside(path, |file| {
-                failed = stream(BufWriter::new(file), files, fitted, shot);
-                Ok(())
+                stream(BufWriter::new(file), files, fitted, shot)
+                    .map_err(|error| io::Error::other(format!("{error:#}")))
             })?;
-            failed
+            Ok(())
         }
         VideoFormat::Mp4 => {
             // ffmpeg tells the kind of file from its ending.
@@ -74,13 +74,16 @@ pub(super) fn write(
                 .context("ffmpeg could not be started")?;
             let pipe = ffmpeg.stdin.take().context("ffmpeg takes no input")?;
             let sent = stream(BufWriter::new(pipe), files, fitted, shot);
-            let status = ffmpeg.wait().context("ffmpeg")?;
-            if !status.success() {
+            let ended = ffmpeg.wait().context("ffmpeg").and_then(|status| match status.success() {
+                true => sent,
+                false => bail!("ffmpeg failed with {status}"),
+            });
+            if ended.is_err() {
                 std::fs::remove_file(&beside).ok();
-                bail!("{}: ffmpeg failed with {status}", path.display());
             }
-            sent?;
-            std::fs::rename(&beside, path).with_context(|| format!("{}", path.display()))
+            ended
+                .and_then(|()| std::fs::rename(&beside, path).map_err(Into::into))
+                .with_context(|| format!("cannot write {}", path.display()))
         }
     }
 }
@@ -100,7 +103,8 @@ fn stream<W: Write>(
     Ok(())
 }
 
-/// A frame's file as bytes for a display, R′G′B′ after R′G′B′; `fitted` makes its tone operator.
+/// A frame's file as sRGB bytes, R′G′B′ after R′G′B′; `fitted` makes its tone operator. Where the shot is for an HDR display,
+/// that display's white is white.
 pub(super) fn shown_rgb8(
     file: &Path,
     fitted: impl Fn() -> Box<dyn FittedTone>,
@@ -113,6 +117,50 @@ pub(super) fn shown_rgb8(
     }
     Ok(match picture.scene_rgb_cd_m2() {
         Some(scene) => encode_srgb8(width, &map_picture(fitted().as_ref(), width as usize, &scene)),
+        None if shot.viewing.display.eotf == Eotf::Pq => {
+            encode_srgb8(width, &decode_pq(picture.codes(), &shot.viewing.display))
+        }
         None => picture.codes8(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fechner::adaptive::settings::{Limits, Sampling};
+    use fechner::integrator::TraceSettings;
+    use fechner_perception::display::Viewing;
+
+    /// A frame that cannot be read leaves the video that was there, and nothing beside it.
+    #[test]
+    fn a_video_that_fails_replaces_none() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let shot = ShotSettings {
+            first: 0,
+            last: 1,
+            frames_per_second: 24.0,
+            pausable: false,
+            trace: TraceSettings::new(4, 2, 0),
+            sampling: Sampling::Adaptive,
+            limits: Limits::of_visibility(1.0),
+            viewing: Viewing::default(),
+            nits_per_unit: 100.0,
+            adapted_to_cd_m2: None,
+            gaze: None,
+            denoiser: None,
+        };
+        let frame = folder.path().join("a.0.png");
+        fechner::output::write_png(&frame, 4, 2, &[[0.5; 3]; 8]).expect("written");
+        let video = folder.path().join("a.y4m");
+        let fitted = |_: usize| -> Box<dyn FittedTone> { panic!("PNG frames need no operator") };
+        let make = |files: &[&Path]| {
+            write(&video, VideoFormat::Y4m, files.iter().map(|file| file.to_path_buf()), &fitted, &shot)
+        };
+        make(&[&frame, &frame]).expect("written");
+        let whole = std::fs::read(&video).expect("a video");
+        let error = make(&[&frame, &folder.path().join("a.1.png")]).expect_err("there is no such frame");
+        assert!(format!("{error:#}").contains("a.1.png"), "{error:#}");
+        assert!(std::fs::read(&video).expect("a video") == whole, "half a video has taken its place");
+        assert_eq!(std::fs::read_dir(folder.path()).expect("readable").count(), 2);
+    }
 }

@@ -58,15 +58,8 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
     if let Some(target) = &arguments.json {
         output::check_writable(target)?;
     }
-    let reference = pattern(&arguments.reference, "the reference")?;
-    let numbers = reference.numbers().with_context(|| arguments.reference.display().to_string())?;
-    let (Some(&first), Some(&last)) = (numbers.first(), numbers.last()) else {
-        bail!("{}: there are no such files", arguments.reference.display());
-    };
-    if let Some(pair) = numbers.windows(2).find(|pair| pair[1] != pair[0] + 1) {
-        bail!("{}: frame {} is missing", arguments.reference.display(), pair[0] + 1);
-    }
-    let sequences = Sequences::new(arguments, reference, &numbers)?;
+    let (numbers, sequences) = Sequences::open(arguments)?;
+    let (first, last) = (numbers[0], numbers[numbers.len() - 1]);
     let observer = SequenceObserver::new(&sequences.viewing)?;
     let reach = observer.reach() as u32;
     let mut window: VecDeque<SequenceFrame> = VecDeque::new();
@@ -99,10 +92,75 @@ fn pattern(path: &Path, what: &str) -> Result<FrameName> {
     })
 }
 
+/// Numbers of the frames whose files are there; at least one.
+fn numbers_of(name: &FrameName, path: &Path) -> Result<Vec<u32>> {
+    let numbers = name.numbers().with_context(|| path.display().to_string())?;
+    if numbers.is_empty() {
+        bail!("{}: there are no such files", path.display());
+    }
+    Ok(numbers)
+}
+
+/// Refuses frames that one sequence has and another has not.
+fn check_covered((path, numbers): (&Path, &[u32]), (by_path, by): (&Path, &[u32])) -> Result<()> {
+    /// Most that are named.
+    const NAMED: usize = 5;
+    let lonely: Vec<u32> = numbers.iter().copied().filter(|number| by.binary_search(number).is_err()).collect();
+    if lonely.is_empty() {
+        return Ok(());
+    }
+    let named: Vec<String> = lonely.iter().take(NAMED).map(u32::to_string).collect();
+    bail!(
+        "{}: frames {}{} are there, and missing of {}: sequences of equal frames can be compared",
+        path.display(),
+        named.join(", "),
+        if lonely.len() > NAMED { format!(" and {} more", lonely.len() - NAMED) } else { String::new() },
+        by_path.display()
+    )
+}
+
+/// Scene luminance, cd/m², of some frames from all over a sequence, one below the other; `None` for frames that are ready for
+/// the display.
+fn scene_luminance(name: &FrameName, numbers: &[u32], nits_per_unit: Option<f64>) -> Result<Option<Plane>> {
+    let count = numbers.len().min(FITTED_FRAMES);
+    let (mut values, mut width) = (Vec::new(), 0);
+    for index in 0..count {
+        let picture = InputPicture::read(&name.of(numbers[index * numbers.len() / count]), nits_per_unit)?;
+        let Some(luminance) = picture.scene_luminance() else { return Ok(None) };
+        width = luminance.width();
+        values.extend(luminance.into_values());
+    }
+    Ok(Some(Plane::from_values(width, values.len() / width, values).context("frames of several sizes")?))
+}
+
 impl<'a> Sequences<'a> {
-    fn new(arguments: &'a CompareArguments, reference: FrameName, numbers: &[u32]) -> Result<Self> {
+    /// Numbers of the frames, and how to read them.
+    fn open(arguments: &'a CompareArguments) -> Result<(Vec<u32>, Self)> {
+        let reference = pattern(&arguments.reference, "the reference")?;
         let test = pattern(&arguments.test, "the test")?;
         let velocity = arguments.velocity.as_deref().map(|path| pattern(path, "the motion")).transpose()?;
+        let numbers = numbers_of(&reference, &arguments.reference)?;
+        if let Some(pair) = numbers.windows(2).find(|pair| pair[1] != pair[0] + 1) {
+            bail!("{}: frame {} is missing", arguments.reference.display(), pair[0] + 1);
+        }
+        let of_reference = (arguments.reference.as_path(), numbers.as_slice());
+        let test_numbers = numbers_of(&test, &arguments.test)?;
+        let of_test = (arguments.test.as_path(), test_numbers.as_slice());
+        check_covered(of_reference, of_test)?;
+        check_covered(of_test, of_reference)?;
+        if let (Some(name), Some(path)) = (&velocity, &arguments.velocity) {
+            check_covered(of_reference, (path, &numbers_of(name, path)?))?;
+        }
+        let sequences = Self::new(arguments, [reference, test], velocity, &numbers)?;
+        Ok((numbers, sequences))
+    }
+
+    fn new(
+        arguments: &'a CompareArguments,
+        [reference, test]: [FrameName; 2],
+        velocity: Option<FrameName>,
+        numbers: &[u32],
+    ) -> Result<Self> {
         let map = arguments.map.as_deref().map(|path| pattern(path, "the map")).transpose()?;
         if let Some(map) = &map {
             output::check_writable(&map.of(numbers[0]))?;
@@ -114,21 +172,11 @@ impl<'a> Sequences<'a> {
             arguments.fps.context("--fps: how many frames a second a sequence has decides what is seen in it")?;
         let viewing = InputPicture::read(&reference.of(numbers[0]), nits_per_unit)?.viewed(&viewing)?;
         // One exposure for the whole sequence, as a viewer would hold it.
-        let count = numbers.len().min(FITTED_FRAMES);
-        let mut guide = Vec::new();
-        let mut width = 0;
-        for index in 0..count {
-            let frame = numbers[index * numbers.len() / count];
-            let picture = InputPicture::read(&reference.of(frame), nits_per_unit)?;
-            width = picture.size().0;
-            guide.extend(picture.scene_luminance().map_or_else(Vec::new, Plane::into_values));
-        }
-        let fitted = if guide.is_empty() {
-            None
-        } else {
-            let guide = Plane::from_values(width, guide.len() / width, guide).context("frames of several sizes")?;
-            Some(operator.fit(&SceneGuide::of(&guide), &viewing, None))
+        let guide = match scene_luminance(&reference, numbers, nits_per_unit)? {
+            Some(guide) => Some(guide),
+            None => scene_luminance(&test, numbers, nits_per_unit)?,
         };
+        let fitted = guide.map(|guide| operator.fit(&SceneGuide::of(&guide), &viewing, None));
         Ok(Self { arguments, reference, test, velocity, map, viewing, fitted })
     }
 

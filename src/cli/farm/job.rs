@@ -124,7 +124,7 @@ impl Job<'_> {
                 Ok(Frame { scene: Arc::new(scene), trace, header, judged_by, kind })
             }
             Self::Shot { shot, .. } => {
-                let of_shot = shot.frame(number, self.track()?)?;
+                let of_shot = shot.frame(number, self.track(number)?)?;
                 let trace = shot.settings.trace_settings(number);
                 let header = Header {
                     origin: Origin::of(&of_shot.scenes.now, &trace),
@@ -169,13 +169,14 @@ impl Job<'_> {
         Ok(PathTracer::new(scene, trace))
     }
 
-    /// How light the shot is: from the file beside the pictures, or made anew.
-    fn track(&self) -> Result<&Track> {
+    /// How light the shot is: from the file beside the pictures, or made anew where that is not of this frame's scene. Other
+    /// frames are looked at when they are asked for: a process that merges one should not have to read the scenes of all.
+    fn track(&self, number: u32) -> Result<&Track> {
         let Self::Shot { shot, track } = self else { bail!("a still has no track") };
         match track.get() {
             Some(track) => Ok(track),
             None => {
-                let found = shot.track()?;
+                let found = shot.track(number..=number)?;
                 Ok(track.get_or_init(|| found))
             }
         }
@@ -201,11 +202,11 @@ impl Job<'_> {
         }
     }
 
-    /// Makes what only a whole shot has.
-    pub(super) fn conclude(&self) -> Result<()> {
+    /// Makes what only a whole shot has, if all its frames are there; whether they are.
+    pub(super) fn conclude(&self) -> Result<bool> {
         match self {
-            Self::Shot { shot, .. } => shot.conclude(self.track()?),
-            Self::Still(_) => Ok(()),
+            Self::Shot { shot, .. } => shot.conclude(self.track(shot.settings.first)?),
+            Self::Still(_) => Ok(true),
         }
     }
 }

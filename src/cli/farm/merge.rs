@@ -108,8 +108,9 @@ pub(super) fn conclude(farm: &Farm, job: &Job<'_>) -> Result<()> {
         return Ok(());
     }
     let Some(lock) = try_lock(&farm.folder().join("lock"))? else { return Ok(()) };
-    job.conclude()?;
-    output::write_beside(&marker, |_| Ok(()))?;
+    if job.conclude()? {
+        output::write_beside(&marker, |_| Ok(()))?;
+    }
     drop(lock);
     Ok(())
 }
