@@ -310,7 +310,7 @@ fn noise_is_judged_by_the_model_and_the_motion_asked_for() {
         fechner::output::write_exr(&at.join(name), &picture).expect("written");
     };
     // Tiles that stand out a little, and noise that does not repeat.
-    let tiles = |i: u32| if (i % 48 / 4 + i / 192) % 2 == 0 { 20.0 } else { 40.0 };
+    let tiles = |i: u32| if (i % 48 / 4 + i / 192).is_multiple_of(2) { 20.0 } else { 40.0 };
     let noise = |i: u32| (i.wrapping_mul(2_654_435_761) >> 24) as f32 / 64.0 - 2.0;
     write("guide.exr", &["R", "G", "B"], &tiles);
     write("a.exr", &["R", "G", "B"], &|i| tiles(i) + noise(i));
