@@ -3,8 +3,8 @@
 use super::channels::{self, Colour};
 use anyhow::{Context, Result, bail};
 use fechner::exr_read::{ExrImage, read_exr};
-use fechner::output::{Attribute, NITS_PER_UNIT};
-use fechner_perception::display::Viewing;
+use fechner::output::{self, Attribute, NITS_PER_UNIT};
+use fechner_perception::display::{Display, Eotf, Viewing};
 use fechner_perception::photometry::luminance;
 use fechner_perception::tone::{FittedTone, SceneGuide, ToneOperator};
 use fechner_perception::{Plane, seen};
@@ -127,11 +127,17 @@ impl InputPicture {
                 let light = |value: f32| if value.is_finite() { value.max(0.0) * nits_per_unit as f32 } else { 0.0 };
                 self.rgb.iter().map(|rgb| tone.map_rgb(rgb.map(light)).map(cd_m2)).collect()
             }
-            _ => {
-                let linear = |code: f32| display.eotf.decode(f64::from(code), display.white_cd_m2) as f32;
-                self.rgb.iter().map(|rgb| rgb.map(|code| cd_m2(linear(code)))).collect()
-            }
+            _ => self.decoded(display).into_iter().map(|rgb| rgb.map(cd_m2)).collect(),
         }
+    }
+
+    /// Linear display RGB, 0 the display's black and 1 its white, of codes that are ready for the display.
+    fn decoded(&self, display: &Display) -> Vec<[f32; 3]> {
+        if display.eotf == Eotf::Pq {
+            return output::decode_pq(&self.rgb, display);
+        }
+        let linear = |code: f32| display.eotf.decode(f64::from(code), display.white_cd_m2) as f32;
+        self.rgb.iter().map(|rgb| rgb.map(linear)).collect()
     }
 
     /// Linear RGB in cd/m² of the scene; `None` for a picture that is ready for the display.
@@ -157,11 +163,12 @@ impl InputPicture {
         let display = &viewing.display;
         match (self.scene_luminance(), tone) {
             (Some(scene), Some(tone)) => seen::display_luminance(tone, display, &scene),
-            _ => Plane::from_fn(self.width, self.height, |x, y| {
-                let code = self.rgb[y * self.width + x];
-                let linear = code.map(|c| display.eotf.decode(f64::from(c), display.white_cd_m2) as f32);
-                display.luminance_cd_m2(f64::from(luminance(linear))) as f32
-            }),
+            _ => {
+                let linear = self.decoded(display);
+                Plane::from_fn(self.width, self.height, |x, y| {
+                    display.luminance_cd_m2(f64::from(luminance(linear[y * self.width + x]))) as f32
+                })
+            }
         }
     }
 }
@@ -183,4 +190,30 @@ fn no_unit(path: &Path) -> String {
          --nits-per-unit in cd/m²",
         path.display()
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What was written for a PQ display is seen as it was meant: its own primaries, and its black once.
+    #[test]
+    fn pq_pictures_are_seen_as_they_were_written() {
+        let viewing = Viewing::of(Display::preset("hdr-1000").expect("a preset"));
+        let light = [[0.0, 0.0, 0.0], [0.5, 0.1, 0.02], [0.001, 0.2, 0.9], [1.0, 1.0, 1.0]];
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("a.png");
+        output::write_pq_png(&file, 4, 1, &light, &viewing.display).expect("written");
+        let picture = InputPicture::read(&file, None).expect("read");
+        let cd_m2 = |relative: f32| viewing.display.luminance_cd_m2(f64::from(relative)) as f32;
+        let close = |found: f32, meant: f32| assert!((found - meant).abs() < 2e-3 * meant, "{found}, not {meant}");
+        for (found, meant) in picture.displayed_rgb(None, &viewing).iter().flatten().zip(light.iter().flatten()) {
+            // The darkest channel of a saturated colour is a small difference of large ones.
+            if *meant == 0.0 || *meant > 0.05 {
+                close(*found, cd_m2(*meant));
+            }
+        }
+        let displayed = picture.displayed(None, &viewing);
+        light.iter().enumerate().for_each(|(x, rgb)| close(displayed.get(x, 0), cd_m2(luminance(*rgb))));
+    }
 }
