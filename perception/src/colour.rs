@@ -120,10 +120,15 @@ impl ThresholdMap {
     }
 
     /// The luminance variance that would be as visible as the most visible of three channels' noise: max over channels of
-    /// `N_c` `σ_c²`, over N. Planes in (cd/m²)² on the display, in the order of [`Opponent`].
+    /// `N_c` `σ_c²`, over N. Planes in (cd/m²)² on the display, in the order of [`Opponent`]; infinite everywhere for planes of other
+    /// sizes than this map's.
     #[must_use]
     pub fn luminance_equivalent_variance(&self, gains: &ChromaticGains, variances: [&Plane; 3]) -> Plane {
         let [achromatic, red_green, yellow_violet] = variances;
+        let planes = [achromatic, red_green, yellow_violet, &gains.red_green, &gains.yellow_violet];
+        if planes.iter().any(|plane| !plane.same_size(&self.noise_gain)) {
+            return Plane::filled(self.width(), self.height(), f32::INFINITY);
+        }
         Plane::from_fn(self.width(), self.height(), |x, y| {
             let chromatic = (gains.red_green.get(x, y) * red_green.get(x, y))
                 .max(gains.yellow_violet.get(x, y) * yellow_violet.get(x, y));

@@ -56,13 +56,15 @@ pub(crate) fn veil_cd_m2(luminance_cd_m2: &Plane, adaptation_cd_m2: &Plane, view
         ((pixels_per_degree / CELLS_A_DEGREE) as usize).max(len.div_ceil(MOST_CELLS)).max(1)
     });
     let cells = (width.div_ceil(cell[0]), height.div_ceil(cell[1]));
-    // Real part: light; imaginary part: area. One complex transform convolves both.
+    // Real part: light over its mean; imaginary part: area. One complex transform convolves both, and each leaks into the other by
+    // rounding: at 1e8 cd/m² light itself would leave twice its own luminance where there is no veil.
+    let mean = (luminance_cd_m2.mean() as f32).max(f32::MIN_POSITIVE);
     let sides = [smooth_size(2 * cells.0), smooth_size(2 * cells.1)];
     let mut light_and_area = Grid::new(sides);
     for y in 0..height {
         let row = luminance_cd_m2.row(y);
         for (x, value) in row.iter().enumerate() {
-            *light_and_area.at(x / cell[0], y / cell[1]) += Complex32::new(*value, 1.0);
+            *light_and_area.at(x / cell[0], y / cell[1]) += Complex32::new(*value / mean, 1.0);
         }
     }
     let mut kernel = Grid::new(sides);
@@ -78,7 +80,7 @@ pub(crate) fn veil_cd_m2(luminance_cd_m2: &Plane, adaptation_cd_m2: &Plane, view
     let mut veil = Plane::filled(cells.0, cells.1, 0.0);
     for (index, value) in veil.values_mut().iter_mut().enumerate() {
         let scattered = *light_and_area.at(index % cells.0, index / cells.0);
-        *value = (scattered.re - mean_adaptation.values()[index] * scattered.im).max(0.0);
+        *value = (mean * (scattered.re - mean_adaptation.values()[index] / mean * scattered.im)).max(0.0);
     }
     Some(Veil { cells: veil, cell })
 }
@@ -231,8 +233,8 @@ mod tests {
 
     #[test]
     fn uniform_pictures_have_no_veil() {
-        for (width, height) in [(1, 1), (3, 50), (64, 48)] {
-            let grey = Plane::filled(width, height, 100.0);
+        for (width, height, light) in [(1, 1, 100.0), (3, 50, 100.0), (64, 48, 100.0), (320, 320, 1e8)] {
+            let grey = Plane::filled(width, height, light);
             let (clear, veiled) = (thresholds(&grey, Glare::None), thresholds(&grey, Glare::Cie { age_years: 40.0 }));
             for (clear, veiled) in clear.values().iter().zip(veiled.values()) {
                 assert!((veiled / clear - 1.0).abs() < 1e-4);

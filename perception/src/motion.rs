@@ -22,8 +22,14 @@ pub enum ErrorMotion {
 /// min(0.82 s v + 0.15, 80) (Daly 1998), with attention s in 0..1 (Yee et al. 2001): what stands out is followed.
 #[must_use]
 pub fn eye_velocity_deg_s(image_velocity_deg_s: f64, attention: f64) -> f64 {
-    let followed = PURSUIT_GAIN * attention.clamp(0.0, 1.0) * image_velocity_deg_s.abs() + DRIFT_DEG_S;
+    let attention = if attention.is_nan() { 1.0 } else { attention.clamp(0.0, 1.0) };
+    let followed = PURSUIT_GAIN * attention * image_speed_deg_s(image_velocity_deg_s) + DRIFT_DEG_S;
     followed.min(FASTEST_PURSUIT_DEG_S)
+}
+
+/// Speed of a velocity that may be anything: what is no number rests, which hides the least.
+fn image_speed_deg_s(image_velocity_deg_s: f64) -> f64 {
+    if image_velocity_deg_s.is_nan() { 0.0 } else { image_velocity_deg_s.abs().min(1e9) }
 }
 
 /// Speed over the retina, deg/s, at least the eye's drift of 0.15 deg/s: |v − v_eye|.
@@ -31,8 +37,7 @@ pub fn eye_velocity_deg_s(image_velocity_deg_s: f64, attention: f64) -> f64 {
 /// The floor is needed: at 0.833 deg/s the formula crosses zero and sensitivity would vanish.
 #[must_use]
 pub fn retinal_velocity_deg_s(image_velocity_deg_s: f64, attention: f64) -> f64 {
-    let image = image_velocity_deg_s.abs().min(1e9);
-    // `max` turns NaN into the drift.
+    let image = image_speed_deg_s(image_velocity_deg_s);
     (image - eye_velocity_deg_s(image, attention)).abs().max(DRIFT_DEG_S)
 }
 
@@ -142,7 +147,10 @@ mod tests {
             let found = retinal_velocity_deg_s(velocity, attention);
             assert!((found - expected).abs() < 1e-9, "{velocity} {attention}: {found}");
         }
-        assert!(retinal_velocity_deg_s(f64::NAN, f64::NAN).is_finite());
+        // What is no number rests, and is looked at.
+        assert_eq!(retinal_velocity_deg_s(f64::NAN, 1.0), DRIFT_DEG_S);
+        assert_eq!(retinal_velocity_deg_s(1.0, f64::NAN), retinal_velocity_deg_s(1.0, 1.0));
+        assert_eq!(ErrorMotion::Locked.retinal_velocity_deg_s(f64::NAN, 1.0), Some(DRIFT_DEG_S));
     }
 
     #[test]

@@ -222,8 +222,9 @@ pub(crate) fn adaptation_levels(
 ) -> Vec<AdaptationLevel> {
     let half_decade = |luminance: f32| 2.0 * f64::from(luminance.max(LEAST_ADAPTATION_CD_M2)).log10();
     // A luminance within a millionth of a level is that level: no second transform for rounding.
-    let first = (half_decade(least_cd_m2) + 1e-6).floor() as i32;
-    let last = ((half_decade(greatest_cd_m2) - 1e-6).ceil() as i32).clamp(first, 2 * HIGHEST_DECADE + 20);
+    let highest = 2 * HIGHEST_DECADE + 20;
+    let first = ((half_decade(least_cd_m2) + 1e-6).floor() as i32).min(highest);
+    let last = ((half_decade(greatest_cd_m2) - 1e-6).ceil() as i32).clamp(first, highest);
     (first..=last)
         .into_par_iter()
         .map(|level| {
@@ -240,6 +241,15 @@ pub(crate) fn adaptation_levels(
 mod tests {
     use super::*;
     use crate::csf::CastleCsf;
+
+    /// Light that no display has is judged as the brightest that levels are made for.
+    #[test]
+    fn levels_end_somewhere() {
+        let levels = |least, greatest| adaptation_levels(&Viewing::default(), &CastleCsf::default(), least, greatest);
+        for (least, greatest) in [(1e17, 1e17), (100.0, f32::INFINITY), (0.0, f32::MAX)] {
+            assert!(levels(least, greatest).last().is_some_and(|level| level.luminance_cd_m2.is_finite()));
+        }
+    }
 
     /// A picture's own luminances have what a table of all luminances has for them, and beyond them nothing is asked.
     #[test]

@@ -68,6 +68,12 @@ pub struct FrameTiming {
 }
 
 impl FrameTiming {
+    /// The timing nearest to these that responses are defined for: shorter flashes and faster displays look no otherwise.
+    #[must_use]
+    pub fn nearest(frames_per_second: f64, persistence: f64) -> Self {
+        Self { frames_per_second: frames_per_second.min(1e3), persistence: persistence.max(1e-3) }
+    }
+
     fn check(self) -> Result<(), Error> {
         check_range("frames_per_second", self.frames_per_second, 1.0, 1e3, "between 1 and 1000")?;
         check_range("persistence", self.persistence, 1e-3, 1.0, "between 0.001 and 1")

@@ -87,7 +87,7 @@ impl SequenceObserver {
     pub fn new(viewing: &Viewing) -> Result<Self, Error> {
         viewing.check()?;
         let display = &viewing.display;
-        let timing = FrameTiming { frames_per_second: display.frames_per_second, persistence: display.persistence };
+        let timing = FrameTiming::nearest(display.frames_per_second, display.persistence);
         Ok(Self { viewing: viewing.clone(), responses: FrameResponses::new(timing)? })
     }
 
@@ -155,11 +155,15 @@ impl SequenceObserver {
                     let mut place = Place::center_of(pixel % width, pixel / width);
                     let mut index = now;
                     for distance in 1..=self.reach() {
-                        place = place.followed(frames[index].motion.as_ref(), towards, &self.viewing.display);
-                        index = match towards {
+                        let next = match towards {
                             Towards::Earlier => index.saturating_sub(1),
                             Towards::Later => (index + 1).min(last),
                         };
+                        // Beyond the ends the picture rests, and the eye with it.
+                        if next != index {
+                            place = place.followed(frames[index].motion.as_ref(), towards, &self.viewing.display);
+                            index = next;
+                        }
                         self.add(&mut seen, frames[index], place.pixel(width, height), distance, adapted_to);
                     }
                 }

@@ -49,6 +49,17 @@ fn equal_frames_are_seen_as_a_still() {
     assert!((moving.worst_visibility / still.worst_visibility - 1.0).abs() < 2e-3);
     let same = SequenceFrame::new(&reference, &reference, SIDE, SIDE, Some(motion(3.0))).unwrap();
     assert_eq!(observer.difference(&[&same, &same], 1).unwrap().worst_visibility, 0.0);
+    // Beyond the ends nothing moves: one frame is a still, whatever its motion was.
+    let moved = SequenceFrame::new(&reference, &test, SIDE, SIDE, Some(motion(2.0))).unwrap();
+    assert_eq!(observer.difference(&[&moved], 0).unwrap().worst_visibility, moving.worst_visibility);
+}
+
+#[test]
+fn every_possible_display_shows_sequences() {
+    let mut viewing = viewing(1e4);
+    viewing.display.persistence = 0.0;
+    viewing.check().unwrap();
+    assert!(SequenceObserver::new(&viewing).is_ok());
 }
 
 /// Noise that is new in every frame against the closed form that rendering is judged by, with its own standard error: 1° of noise.
