@@ -62,7 +62,7 @@ pub use mix::Mix;
 pub use oren_nayar::OrenNayar;
 pub use phong::Phong;
 pub use thin_dielectric::ThinDielectric;
-pub use varnish::Varnish;
+pub use varnish::{Varnish, Varnished};
 pub use ward::Ward;
 
 /// Slope width α below which a microfacet surface counts as perfectly smooth. Its lobe would be 0.06° wide: less than a
@@ -176,7 +176,7 @@ pub enum Bsdf<'a> {
     /// The material of glTF 2.0.
     MetalRoughness(MetalRoughness),
     /// Clear coat and sheen over the material of glTF 2.0.
-    Varnish(Varnish),
+    Varnish(Varnish<'a>),
     /// Rough diffuse reflection.
     OrenNayar(OrenNayar),
     /// Thin diffuse sheet.

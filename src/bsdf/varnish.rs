@@ -1,11 +1,12 @@
-//! The upper layers of glTF's materials: a clear coat, and a sheen of fibres, over the metal-roughness model.
+//! The upper layers of glTF's materials: a clear coat, and a sheen of fibres, over the metal-roughness model or the boundary of a volume.
 //!
 //! Parameters: `clearcoat`, coverage in [0, 1] of a coat of index 1.5, and its perceptual roughness in [0, 1];
 //! `sheen_color` per linear RGB channel in [0, 1], and `sheen_roughness` in [0, 1], perceptual.
 //!
 //! A layer that reflects E(ω) lets (1 − E(ωo))(1 − E(ωi))/(1 − E(normal)) through to what lies beneath: reciprocal, and never
 //! more than came in, since a layer passes most face on. It is right face on and loses light towards grazing angles, where
-//! what the layer turns back inside is not followed.
+//! what the layer turns back inside is not followed. What goes through a volume's boundary passes the layer once, by
+//! 1 − E of the direction outside; light that stays inside does not meet it.
 //!
 //! Sources: Khronos Group, KHR_materials_clearcoat and KHR_materials_sheen; A. Estevez & C. Kulla, *Production friendly
 //! microfacet sheen BRDF* (2017), eq. 2, for the fibres' distribution; D. Neubelt & M. Pettineo (2013) for their visibility
@@ -16,7 +17,7 @@ use super::albedo_table::{AlbedoTable, direction_at};
 use super::coat::{Coat, CoatTables};
 use super::metal_roughness::MetalRoughness;
 use super::mirror::reflect_about_normal;
-use super::{BsdfEvaluation, BsdfSample, fresnel, to_front, turn, warp};
+use super::{Bsdf, BsdfEvaluation, BsdfSample, fresnel, to_front, turn, warp};
 use crate::scene::Distribution;
 use glam::Vec3;
 use std::f32::consts::TAU;
@@ -24,10 +25,49 @@ use std::sync::LazyLock;
 
 static COAT: LazyLock<CoatTables> = LazyLock::new(|| CoatTables::new(1.5, Distribution::Ggx));
 
-/// Clear coat and sheen over a metal-roughness base.
+/// What lies beneath the layers.
 #[derive(Clone, Copy, Debug)]
-pub struct Varnish {
-    base: MetalRoughness,
+pub enum Varnished<'a> {
+    /// A sheet: both sides have the layers.
+    Sheet(MetalRoughness),
+    /// The boundary of a volume, which has the layers on its outside.
+    Boundary(&'a Bsdf<'a>),
+}
+
+impl Varnished<'_> {
+    fn evaluate(&self, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
+        match self {
+            Self::Sheet(base) => base.evaluate(wo, wi),
+            Self::Boundary(base) => base.evaluate(wo, wi),
+        }
+    }
+
+    fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
+        match self {
+            Self::Sheet(base) => base.sample(wo, u),
+            Self::Boundary(base) => base.sample(wo, u),
+        }
+    }
+
+    fn albedo(&self, wo: Vec3) -> Vec3 {
+        match self {
+            Self::Sheet(base) => base.albedo(wo),
+            Self::Boundary(base) => base.albedo(wo),
+        }
+    }
+
+    fn has_smooth_lobe(&self) -> bool {
+        match self {
+            Self::Sheet(base) => base.has_smooth_lobe(),
+            Self::Boundary(base) => base.has_smooth_lobe(),
+        }
+    }
+}
+
+/// Clear coat and sheen over a base.
+#[derive(Clone, Copy, Debug)]
+pub struct Varnish<'a> {
+    base: Varnished<'a>,
     coat: Coat<'static>,
     clearcoat: f32,
     /// What the coat passes face on.
@@ -102,10 +142,10 @@ impl Sheen {
     }
 }
 
-impl Varnish {
+impl<'a> Varnish<'a> {
     /// Layers as in the file's head over a base.
     pub fn new(
-        base: MetalRoughness,
+        base: Varnished<'a>,
         clearcoat: f32,
         clearcoat_roughness: f32,
         sheen_color: Vec3,
@@ -138,6 +178,30 @@ impl Varnish {
         coat * sheen
     }
 
+    /// What the layers leave of light that comes from `wo` above and goes to `wi` through the base, on either side.
+    fn passed(&self, wo: Vec3, wi: Vec3) -> f32 {
+        match self.base {
+            _ if wi.z > 0.0 => self.passed_to_base(wo, wi),
+            Varnished::Sheet(_) => self.passed_to_base(wo, turn(wi)),
+            Varnished::Boundary(_) => self.passed_once(wo),
+        }
+    }
+
+    /// What the coat and the sheen leave of what passes them once, to or from `w` above.
+    fn passed_once(&self, w: Vec3) -> f32 {
+        self.coat_passed(w) * self.sheen.as_ref().map_or(1.0, |sheen| sheen.passed(w))
+    }
+
+    /// Whether a direction is in the volume.
+    fn is_inside(&self, w: Vec3) -> bool {
+        matches!(self.base, Varnished::Boundary(_)) && w.z < 0.0
+    }
+
+    /// What the layers leave of light that meets the boundary from inside and goes to `wi`.
+    fn passed_from_inside(&self, wi: Vec3) -> f32 {
+        if wi.z > 0.0 { self.passed_once(wi) } else { 1.0 }
+    }
+
     /// Probabilities of coat and sheen; the rest is the base's.
     fn shares(&self, wo: Vec3) -> [f32; 2] {
         let passed = self.coat_passed(wo);
@@ -149,14 +213,17 @@ impl Varnish {
     }
 
     pub(super) fn evaluate(&self, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
+        if self.is_inside(wo) {
+            let BsdfEvaluation { value, pdf } = self.base.evaluate(wo, wi);
+            return BsdfEvaluation { value: value * self.passed_from_inside(wi), pdf };
+        }
         let (wo, wi) = to_front(wo, wi);
         if wo.z > 0.0 && wi.z != 0.0 { self.evaluate_front(self.shares(wo), wo, wi) } else { BsdfEvaluation::BLACK }
     }
 
     fn evaluate_front(&self, [coat_share, sheen_share]: [f32; 2], wo: Vec3, wi: Vec3) -> BsdfEvaluation {
-        let up = if wi.z < 0.0 { turn(wi) } else { wi };
         let base = self.base.evaluate(wo, wi);
-        let mut value = base.value * self.passed_to_base(wo, up);
+        let mut value = base.value * self.passed(wo, wi);
         let mut pdf = base.pdf * (1.0 - coat_share - sheen_share).max(0.0);
         if wi.z > 0.0 {
             if let Some(sheen) = &self.sheen {
@@ -178,6 +245,10 @@ impl Varnish {
         if wo.z == 0.0 {
             return None;
         }
+        if self.is_inside(wo) {
+            let sample = self.base.sample(wo, u)?;
+            return Some(BsdfSample { weight: sample.weight * self.passed_from_inside(sample.wi), ..sample });
+        }
         let front = if wo.z < 0.0 { turn(wo) } else { wo };
         let shares = self.shares(front);
         let [coat_share, sheen_share] = shares;
@@ -197,16 +268,19 @@ impl Varnish {
             let (_, rest) = warp::choose(u[2], coat_share + sheen_share);
             let sample = self.base.sample(front, [u[0], u[1], rest])?;
             if sample.lobe.is_delta() {
-                let up = Vec3::new(sample.wi.x, sample.wi.y, sample.wi.z.abs());
-                let weight = sample.weight * (self.passed_to_base(front, up) / base_share);
+                let weight = sample.weight * (self.passed(front, sample.wi) / base_share);
                 return Some(BsdfSample { weight, pdf: base_share * sample.pdf, ..sample }.turned_like(wo));
             }
-            sample.wi
+            let whole = self.evaluate_front(shares, front, sample.wi).sample_turned(sample.wi, wo)?;
+            return Some(BsdfSample { crossed_index: sample.crossed_index, ..whole });
         };
         self.evaluate_front(shares, front, wi).sample_turned(wi, wo)
     }
 
     pub(super) fn albedo(&self, wo: Vec3) -> Vec3 {
+        if self.is_inside(wo) {
+            return self.base.albedo(wo);
+        }
         let (up, _) = to_front(wo, wo);
         let passed = self.coat_passed(up);
         let (sheen, left) = match &self.sheen {

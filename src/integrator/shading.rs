@@ -6,7 +6,7 @@ use super::relief;
 use super::tables::{SurfaceTables, slope_width};
 use crate::bsdf::{
     self, Bsdf, CoatedDiffuse, Conductor, Dielectric, HeTorrance, MetalRoughnessParameters, Microfacets, Phong,
-    Varnish, Ward,
+    Varnish, Varnished, Ward,
 };
 use crate::geometry::SurfacePoint;
 use crate::geometry::surface::Frame;
@@ -103,20 +103,24 @@ impl Reader<'_> {
             transmission: if model.volume.is_some() { 0.0 } else { transmission },
         };
         let base = bsdf::MetalRoughness::new(&parameters);
+        let boundary = match tables {
+            SurfaceTables::Dielectric(tables) => {
+                let boundary = Bsdf::dielectric(model.ior, parameters.roughness, parameters.base_color, Some(tables));
+                let amount = transmission * (1.0 - parameters.metallic.clamp(0.0, 1.0));
+                let opaque = components.keep(Bsdf::MetalRoughness(base));
+                Some(Bsdf::mix(opaque, components.keep(boundary), amount))
+            }
+            _ => None,
+        };
         let (clearcoat, sheen) = (self.scalar(&model.clearcoat), self.color(&model.sheen_color));
-        let surface = if clearcoat > 0.0 || sheen != Vec3::ZERO {
+        if clearcoat > 0.0 || sheen != Vec3::ZERO {
+            let base =
+                boundary.map_or(Varnished::Sheet(base), |boundary| Varnished::Boundary(components.keep(boundary)));
             let clearcoat_roughness = self.scalar(&model.clearcoat_roughness);
             let sheen_roughness = self.scalar(&model.sheen_roughness);
-            Bsdf::Varnish(Varnish::new(base, clearcoat, clearcoat_roughness, sheen, sheen_roughness))
-        } else {
-            Bsdf::MetalRoughness(base)
-        };
-        let SurfaceTables::Dielectric(tables) = tables else {
-            return surface;
-        };
-        let boundary = Bsdf::dielectric(model.ior, parameters.roughness, parameters.base_color, Some(tables));
-        let amount = transmission * (1.0 - parameters.metallic.clamp(0.0, 1.0));
-        Bsdf::mix(components.keep(surface), components.keep(boundary), amount)
+            return Bsdf::Varnish(Varnish::new(base, clearcoat, clearcoat_roughness, sheen, sheen_roughness));
+        }
+        boundary.unwrap_or(Bsdf::MetalRoughness(base))
     }
 
     fn bsdf<'a>(&self, surface: &Surface, tables: &'a SurfaceTables, components: &'a Components<'a>) -> Bsdf<'a> {

@@ -246,6 +246,13 @@ impl Default for MetalRoughness {
     }
 }
 
+impl MetalRoughness {
+    /// Whether a coat or fibres lie over the rest.
+    pub fn is_varnished(&self) -> bool {
+        self.clearcoat.factor > 0.0 || self.sheen_color.factor != Vec3::ZERO
+    }
+}
+
 impl Surface {
     /// Most components that nested mixes of one material may have together.
     pub const MOST_COMPONENTS: usize = 8;
@@ -280,11 +287,17 @@ impl Surface {
         }
     }
 
-    /// Models that are summed up: 1 unless it is a mix.
+    /// Models that it takes at a point: 1, but for mixes and for volumes, whose boundary is one more and layers over it another.
     pub fn components(&self) -> usize {
         match self {
             Self::Mix { first, second, .. } => first.components() + second.components(),
-            Self::MetalRoughness(model) if model.volume.is_some() => 2,
+            Self::MetalRoughness(model) if model.volume.is_some() => {
+                if model.is_varnished() {
+                    3
+                } else {
+                    2
+                }
+            }
             _ => 1,
         }
     }

@@ -217,3 +217,26 @@ fn reflectance_ends_at_nothing_and_all() {
         assert!((found - expected).abs() < 1e-4, "texel {texel}: {found}, expected {expected}");
     }
 }
+
+/// Layers over a volume's boundary are there, and return no more than comes in; without them clear glass returns everything.
+#[test]
+fn layers_lie_over_volumes() {
+    let returned = |clearcoat: f32, sheen: f32| {
+        let tracer = sphere_in_furnace(Surface::MetalRoughness(MetalRoughness {
+            roughness: ScalarInput::constant(0.0),
+            transmission: ScalarInput::constant(1.0),
+            volume: Some(Vec3::ZERO),
+            clearcoat: ScalarInput::constant(clearcoat),
+            sheen_color: ColorInput::constant(Vec3::splat(sheen)),
+            sheen_roughness: ScalarInput::constant(0.5),
+            ..MetalRoughness::default()
+        }));
+        radiance_along(&tracer, Ray::new(vec3a(0.8, 0.0, 5.0), Vec3A::NEG_Z), 16, 4096).0.x
+    };
+    let plain = returned(0.0, 0.0);
+    assert!((plain - 1.0).abs() < 1e-3, "{plain}");
+    for (clearcoat, sheen) in [(1.0, 0.0), (0.0, 1.0), (1.0, 0.5)] {
+        let layered = returned(clearcoat, sheen);
+        assert!((0.7..0.9995).contains(&layered), "coat {clearcoat}, sheen {sheen}: {layered}");
+    }
+}

@@ -3,7 +3,7 @@
 use super::sphere::Peak;
 use crate::bsdf::{
     AnisotropicTable, Bsdf, CoatTables, Conductor, DielectricTables, HeTorrance, LayerTables, MetalRoughness,
-    MetalRoughnessParameters, Microfacets, Phong, Varnish, Ward, WidthRange,
+    MetalRoughnessParameters, Microfacets, Phong, Varnish, Varnished, Ward, WidthRange,
 };
 use crate::scene::Distribution;
 use glam::Vec3;
@@ -195,13 +195,27 @@ fn gltf_cases(cases: &mut Vec<Case>) {
     });
     cases.push(Case::new("extended metal-roughness", Bsdf::MetalRoughness(extended), Budget::AtMost, 0.16));
     let white = MetalRoughness::new(&MetalRoughnessParameters::default());
+    static CLEAR: LazyLock<Bsdf<'static>> = LazyLock::new(|| Bsdf::dielectric(1.5, 0.0, Vec3::ONE, Some(&*GLASS)));
+    static FROSTED: LazyLock<Bsdf<'static>> = LazyLock::new(|| Bsdf::dielectric(1.5, 0.4, Vec3::ONE, Some(&*GLASS)));
     for (clearcoat, roughness, sheen, sheen_roughness) in
         [(1.0f32, 0.0f32, 0.0f32, 0.5f32), (1.0, 0.3, 0.0, 0.5), (0.0, 0.0, 1.0, 0.3), (0.6, 0.2, 0.5, 0.8)]
     {
-        let bsdf = Bsdf::Varnish(Varnish::new(white, clearcoat, roughness, Vec3::splat(sheen), sheen_roughness));
+        let over = |base: Varnished<'static>| {
+            Bsdf::Varnish(Varnish::new(base, clearcoat, roughness, Vec3::splat(sheen), sheen_roughness))
+        };
         let width = if clearcoat > 0.0 && roughness > 0.0 { roughness * roughness } else { 0.25 };
         let name = format!("varnish {clearcoat} {roughness}, sheen {sheen} {sheen_roughness}");
-        cases.push(Case::new(name, bsdf, Budget::AtMost, f64::from(width)));
+        cases.push(Case::new(name.as_str(), over(Varnished::Sheet(white)), Budget::AtMost, f64::from(width)));
+        for (of, boundary, width) in [("clear", &*CLEAR, 1.0), ("frosted", &*FROSTED, 0.3 * 0.16_f32)] {
+            // Of delta lobes alone, two of them in one direction, these tests cannot tell.
+            if of == "clear" && sheen == 0.0 && roughness == 0.0 {
+                continue;
+            }
+            let bsdf = over(Varnished::Boundary(boundary));
+            let width = if clearcoat > 0.0 && roughness > 0.0 { width.min(roughness * roughness) } else { width };
+            let case = Case::new(format!("{name} over {of} glass"), bsdf, Budget::AtMost, f64::from(width));
+            cases.push(Case { eta: 1.5, ..case });
+        }
     }
 }
 

@@ -86,9 +86,9 @@ impl<'a> Materials<'a> {
                 }),
                 ..self.extensions(builder, from)?
             };
-            if passes_no_layers(&model) {
+            if has_plain_boundary(&model) {
                 builder.note(format!(
-                    "\"{name}\": what goes through its volume has no clear coat, sheen or anisotropy, and reflects by its index alone."
+                    "\"{name}\": its volume's boundary is not stretched by its anisotropy, and reflects by its index alone."
                 ));
             }
             Surface::MetalRoughness(model)
@@ -314,11 +314,9 @@ fn index_of_refraction(from: &gltf::Material) -> f32 {
     from.ior().filter(usable).unwrap_or(1.5)
 }
 
-/// Whether a volume's boundary, which is a plain dielectric, leaves out layers or strengths that the material asks for.
-fn passes_no_layers(model: &MetalRoughness) -> bool {
-    let asks = model.clearcoat.factor > 0.0
-        || model.sheen_color.factor != Vec3::ZERO
-        || model.anisotropy.factor > 0.0
+/// Whether a volume's boundary, which is a plain dielectric, leaves out what the material asks for.
+fn has_plain_boundary(model: &MetalRoughness) -> bool {
+    let asks = model.anisotropy.factor > 0.0
         || model.specular != ScalarInput::constant(1.0)
         || model.specular_color != ColorInput::constant(Vec3::ONE);
     model.volume.is_some() && model.transmission.factor > 0.0 && asks
