@@ -31,12 +31,12 @@ pub fn rival_plan(rule: RivalRule, film: &Film, exposure: f64, left: u64, max_sa
         }
         RivalRule::Budget => budget_pass(film, exposure, left, max_samples),
     };
-    // None of the rules says who should have the last samples: chance does.
-    let by_chance =
-        |x: usize, y: usize| (hash_words(film.total_samples(), (y * film.width() as usize + x) as u64) >> 40) as f32;
     if plan.samples() <= left {
         return plan;
     }
+    // None of the rules says who should have the last samples: chance does.
+    let by_chance =
+        |x: usize, y: usize| (hash_words(film.total_samples(), (y * film.width() as usize + x) as u64) >> 40) as f32;
     cut_to_budget(plan, &Plane::from_fn(film.width() as usize, film.height() as usize, by_chance), left)
 }
 

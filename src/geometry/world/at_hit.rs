@@ -125,13 +125,15 @@ impl World {
         let normal = Vec3::from(normal_a);
         let position = Vec3::from(place.center) + place.radius * normal;
         let needs_tangent = self.scene.materials[self.material_of(hit.object).0 as usize].needs_tangent();
-        let along_u = || place.axes.determinant() * place.axes.y_axis.cross(normal_a).normalize_or(place.axes.x_axis);
+        // Whether the sphere is mirrored.
+        let handedness = place.axes.determinant().signum();
+        let along_u = || handedness * place.axes.y_axis.cross(normal_a).normalize_or(place.axes.x_axis);
         SurfacePoint {
             position,
             geometric_normal: normal,
             shading_normal: normal,
             tangent: needs_tangent.then(|| along_u().into()),
-            handedness: place.axes.determinant(),
+            handedness,
             uv: if self.scene.textures.is_empty() { Vec2::ZERO } else { place.uv(normal_a) },
             color: Vec3::ONE,
             object: hit.object,

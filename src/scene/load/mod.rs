@@ -65,6 +65,14 @@ pub struct LoadOptions {
     pub texture_memory: Option<u64>,
 }
 
+/// When the shutter is open, in seconds of a file's keyframes.
+#[derive(Clone, Copy, Debug)]
+struct Shutter {
+    opens: f64,
+    /// 0 for a picture of one moment.
+    stays_open: f64,
+}
+
 /// Bytes of so many megabytes.
 pub fn megabytes(count: u32) -> u64 {
     1_000_000 * u64::from(count)

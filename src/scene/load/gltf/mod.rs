@@ -14,7 +14,7 @@ use self::buffers::Buffers;
 use self::material::Materials;
 use super::builder::{Builder, IfDark, NamedCamera};
 use super::error::LoadError;
-use super::{LoadOptions, files};
+use super::{LoadOptions, Shutter, files};
 use crate::scene::{Camera, Instance, Light, MaterialId, Mesh, MeshId, Motion, Projection, Scene, SpotFalloff};
 use ::gltf::json::validation::Checked;
 use ::gltf::mesh::{Mode, Semantic};
@@ -64,7 +64,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
             path,
             &document,
             &buffers,
-            motion::Shutter { opens: options.frame_time, stays_open: options.shutter_s },
+            Shutter { opens: options.frame_time, stays_open: options.shutter_s },
         )?,
         placed: Vec::new(),
         world: HashMap::new(),

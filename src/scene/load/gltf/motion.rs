@@ -1,6 +1,7 @@
 //! Rigid nodes while the shutter is open: the animation's poses at several moments, and the motion through them. Not for meshes that
 //! deform, which do not blur.
 
+use super::super::Shutter;
 use super::super::error::LoadError;
 use super::animation;
 use super::buffers::Buffers;
@@ -20,14 +21,6 @@ pub(super) struct Moment {
     pub(super) pose: animation::Pose,
 }
 
-/// When the shutter is open, in seconds of the animation.
-#[derive(Clone, Copy)]
-pub(super) struct Shutter {
-    pub(super) opens: f64,
-    /// 0 for a picture of one moment.
-    pub(super) stays_open: f64,
-}
-
 /// The moments of a shutter in order, the first when it opens; that one alone where nothing is animated or it does not stay open.
 pub(super) fn moments(
     path: &Path,
@@ -38,8 +31,11 @@ pub(super) fn moments(
     let mut shares = vec![0.0];
     if shutter.stays_open > 0.0 && document.animations().next().is_some() {
         let inside = |time: f32| (f64::from(time) - shutter.opens) / shutter.stays_open;
-        let keys = animation::key_times(document, buffers)?.into_iter().map(inside);
-        shares.extend(keys.filter(|share| *share > 0.0 && *share < 1.0).take(MOST_KEYS));
+        // Channels share their times.
+        let mut keys = animation::key_times(document, buffers)?;
+        keys.sort_by(f32::total_cmp);
+        keys.dedup();
+        shares.extend(keys.into_iter().map(inside).filter(|share| *share > 0.0 && *share < 1.0).take(MOST_KEYS));
         shares.extend((1..=STEPS).map(|step| f64::from(step) / f64::from(STEPS)));
         shares.sort_by(f64::total_cmp);
         shares.dedup_by(|later, earlier| *later as f32 <= *earlier as f32);

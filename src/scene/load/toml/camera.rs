@@ -1,8 +1,8 @@
 //! `[camera]`.
 
 use super::fields::{Fields, Value};
-use super::motion::{self, Shutter};
-use crate::scene::load::LoadError;
+use super::motion;
+use crate::scene::load::{LoadError, Shutter};
 use crate::scene::{Camera, Projection, ScreenWindow};
 use glam::{Vec2, Vec3};
 

@@ -12,11 +12,10 @@ mod surface;
 mod surroundings;
 
 use self::fields::{Fields, Source, Value};
-use self::motion::Shutter;
 use super::builder::{Builder, IfDark, NamedCamera};
 use super::error::LoadError;
 use super::texture::{Adjust, IfMissing, Picture, Request};
-use super::{LoadOptions, files};
+use super::{LoadOptions, Shutter, files};
 use crate::scene::{Encoding, FilmDefaults, Scene, ViewingDefaults, Wrap};
 use std::collections::HashMap;
 use std::path::Path;

@@ -2,17 +2,9 @@
 //! and after the last keyframe everything rests.
 
 use super::fields::{Fields, Value};
-use crate::scene::load::LoadError;
+use crate::scene::load::{LoadError, Shutter};
 use crate::scene::{Camera, Motion, MotionKey, Pose};
 use glam::{Affine3A, Mat3A, Quat, Vec3, Vec3A};
-
-/// When the shutter is open, in seconds of the keyframes.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Shutter {
-    pub(super) opens: f64,
-    /// 0 for a picture of one moment.
-    pub(super) stays_open: f64,
-}
 
 /// Values at increasing times.
 pub(super) struct Keyframes<T> {

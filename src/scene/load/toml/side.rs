@@ -5,10 +5,9 @@
 //! given leaves the scene's own in place and blurs what moves in glTF.
 
 use super::fields::{Fields, Source, Value};
-use super::motion::Shutter;
 use super::{animated, camera, light, read_film, read_view, surroundings};
 use crate::scene::load::error::LoadError;
-use crate::scene::load::{LoadOptions, files};
+use crate::scene::load::{LoadOptions, Shutter, files};
 use crate::scene::{Scene, ViewingDefaults};
 use std::path::{Path, PathBuf};
 
