@@ -39,7 +39,7 @@ fn square() -> f64 {
 }
 
 /// Pixels a degree of visual angle along both axes.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PixelDensity {
     /// Along a row.
     pub horizontal: f64,
@@ -52,6 +52,12 @@ impl PixelDensity {
     #[must_use]
     pub fn square(pixels_per_degree: f64) -> Self {
         Self { horizontal: pixels_per_degree, vertical: pixels_per_degree }
+    }
+
+    /// Of a picture with this many times the pixels along both axes.
+    #[must_use]
+    pub fn times(self, scale: f64) -> Self {
+        Self { horizontal: scale * self.horizontal, vertical: scale * self.vertical }
     }
 
     /// Along the finer axis.

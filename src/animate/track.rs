@@ -179,7 +179,7 @@ impl Look {
 
     fn goal(&self, shot: &ShotSettings) -> Goal {
         let scale = self.luminance.width() as f64 / f64::from(shot.trace.width);
-        Goal::of(&SceneGuide::of(&self.luminance), shot.viewing.display.pixels_per_degree * scale)
+        Goal::of(&SceneGuide::of(&self.luminance), shot.viewing.display.pixel_density().times(scale))
     }
 
     /// At the frame's own size, as operators that count degrees need it.

@@ -148,7 +148,7 @@ pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
     for (input, target) in arguments.input.iter().zip(&targets) {
         let frame = SceneFrame::read(input, arguments, &viewing)?;
         let viewing = &frame.viewing;
-        let state = eye.as_mut().map(|eye| eye.look_at(Goal::of(&frame.guide(), viewing.display.pixels_per_degree)));
+        let state = eye.as_mut().map(|eye| eye.look_at(Goal::of(&frame.guide(), viewing.display.pixel_density())));
         let fitted = operator.fit(&frame.guide(), viewing, state.as_ref());
         write(target, format, &frame, fitted.as_ref(), state.as_ref())?;
         println!("{}: {}", target.display(), fitted.describe());

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::csf::{CastleCsf, ContrastSensitivity};
-use crate::display::Viewing;
-use crate::filter::gaussian_blur;
+use crate::display::{PixelDensity, Viewing};
+use crate::filter::gaussian_blur_xy;
 use crate::plane::Plane;
 use crate::tvi::acuity_cpd;
 
@@ -17,16 +17,16 @@ pub struct AcuityFilter {
     /// Standard deviation, degrees.
     pub sigma_deg: f64,
     /// Of the display.
-    pub pixels_per_degree: f64,
+    pub pixel_density: PixelDensity,
 }
 
 impl AcuityFilter {
     /// The filter for an eye adapted to `adaptation_cd_m2`; `None` where it resolves all that the display shows.
     #[must_use]
     pub fn for_adaptation(adaptation_cd_m2: f64, viewing: &Viewing) -> Option<Self> {
-        let pixels_per_degree = viewing.display.pixels_per_degree;
+        let pixel_density = viewing.display.pixel_density();
         let limit_cpd = acuity_cpd(adaptation_cd_m2);
-        if limit_cpd >= pixels_per_degree / 2.0 || limit_cpd <= 0.0 {
+        if limit_cpd >= pixel_density.finest() / 2.0 || limit_cpd <= 0.0 {
             return None;
         }
         let display_adaptation_cd_m2 = viewing.display.white_cd_m2 / 2.0;
@@ -35,7 +35,7 @@ impl AcuityFilter {
             return None;
         }
         let sigma_deg = (-threshold.ln() / 2.0).sqrt() / (std::f64::consts::PI * limit_cpd);
-        Some(Self { sigma_deg, pixels_per_degree })
+        Some(Self { sigma_deg, pixel_density })
     }
 
     /// Share of a grating's amplitude that is left at `freq_cpd` cycles a degree. White noise of a renderer passes the same
@@ -49,7 +49,8 @@ impl AcuityFilter {
     /// One channel through the filter.
     #[must_use]
     pub fn blur_plane(&self, plane: &Plane) -> Plane {
-        gaussian_blur(plane, self.sigma_deg * self.pixels_per_degree)
+        let PixelDensity { horizontal, vertical } = self.pixel_density;
+        gaussian_blur_xy(plane, self.sigma_deg * horizontal, self.sigma_deg * vertical)
     }
 
     /// A picture `width` pixels wide through the filter; pixels that are not finite count as black.
@@ -108,12 +109,24 @@ mod tests {
 
     #[test]
     fn the_blur_has_the_transfer_it_says() {
-        let filter = AcuityFilter { sigma_deg: 0.05, pixels_per_degree: 64.0 };
+        let filter = AcuityFilter { sigma_deg: 0.05, pixel_density: PixelDensity::square(64.0) };
         let grating = Plane::from_fn(256, 8, |x, _| 1.0 + (std::f32::consts::TAU * x as f32 / 32.0).cos());
         let blurred = filter.blur_plane(&grating);
         let amplitude =
             f64::from(blurred.values()[4 * 256 + 64..4 * 256 + 192].iter().copied().fold(0.0, f32::max)) - 1.0;
         // 32 pixels a period are 2 cycles a degree.
         assert!((amplitude / filter.transfer(2.0) - 1.0).abs() < 0.02, "{amplitude} {}", filter.transfer(2.0));
+    }
+    #[test]
+    fn the_blur_is_round_to_the_eye_where_pixels_are_oblong() {
+        // A dot on a display whose pixels are twice as wide as high.
+        let pixel_density = PixelDensity { horizontal: 40.0, vertical: 80.0 };
+        let filter = AcuityFilter { sigma_deg: 0.05, pixel_density };
+        let dot = Plane::from_fn(41, 81, |x, y| if (x, y) == (20, 40) { 1.0 } else { 0.0 });
+        let blurred = filter.blur_plane(&dot);
+        for pixels in 1..4 {
+            let (beside, below) = (blurred.get(20 + pixels, 40), blurred.get(20, 40 + 2 * pixels));
+            assert!((beside / below - 1.0).abs() < 0.03, "{pixels}: {beside} {below}");
+        }
     }
 }

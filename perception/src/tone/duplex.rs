@@ -10,6 +10,7 @@ use super::guide::{Pixel, SceneGuide};
 use super::saved::{Fit, SavedTone};
 use super::screen::finite;
 use super::time::{AdaptationState, Goal};
+use crate::display::PixelDensity;
 use crate::photometry::scotopic_luminance;
 use crate::tvi;
 
@@ -71,11 +72,11 @@ pub(super) struct FittedDuplex {
 }
 
 /// What cones and rods are adapted to: the state of the eye, or the picture.
-pub(super) fn adapted(guide: &SceneGuide<'_>, ppd: f64, state: Option<&AdaptationState>) -> Adapted {
+pub(super) fn adapted(guide: &SceneGuide<'_>, density: PixelDensity, state: Option<&AdaptationState>) -> Adapted {
     match state {
         Some(state) => Adapted { cones_cd_m2: state.cones.neural_cd_m2, rods_cd_m2: state.rods.neural_cd_m2 },
         None => {
-            let goal = Goal::of(guide, ppd);
+            let goal = Goal::of(guide, density);
             Adapted { cones_cd_m2: goal.cones_cd_m2, rods_cd_m2: goal.rods_cd_m2 }
         }
     }

@@ -37,9 +37,9 @@ impl ToneOperator for DurandDorsey00 {
     }
 
     fn fit(&self, guide: &SceneGuide<'_>, viewing: &Viewing, state: Option<&AdaptationState>) -> Box<dyn FittedTone> {
-        let ppd = viewing.display.pixels_per_degree;
+        let density = viewing.display.pixel_density();
         let white_cd_m2 = viewing.display.white_cd_m2.max(f64::MIN_POSITIVE);
-        let world = adapted(guide, ppd, state);
+        let world = adapted(guide, density, state);
         let weight = RodWeight::WalravenValeton;
         Box::new(FittedDuplex {
             operator: self.name().to_owned(),

@@ -39,9 +39,9 @@ impl ToneOperator for Ferwerda96 {
 
 impl Ferwerda96 {
     fn fit_duplex(&self, guide: &SceneGuide<'_>, viewing: &Viewing, state: Option<&AdaptationState>) -> FittedDuplex {
-        let ppd = viewing.display.pixels_per_degree;
+        let density = viewing.display.pixel_density();
         let white_cd_m2 = viewing.display.white_cd_m2.max(f64::MIN_POSITIVE);
-        let world = adapted(guide, ppd, state);
+        let world = adapted(guide, density, state);
         let weight = RodWeight::LogRamp;
         FittedDuplex {
             operator: self.name().to_owned(),

@@ -31,12 +31,20 @@ impl FrozenPlane {
         Self { width: plane.width(), height: plane.height(), values: plane.into_values() }
     }
 
+    pub(super) const fn width(&self) -> usize {
+        self.width
+    }
+
+    pub(super) const fn height(&self) -> usize {
+        self.height
+    }
+
     /// The value at a pixel; `None` outside.
     pub(super) fn at(&self, pixel: Pixel) -> Option<f64> {
         if pixel.x >= self.width || pixel.y >= self.height {
             return None;
         }
-        self.values.get(pixel.y * self.width + pixel.x).map(|&value| f64::from(value))
+        self.values.get(pixel.y.checked_mul(self.width)?.checked_add(pixel.x)?).map(|&value| f64::from(value))
     }
 }
 

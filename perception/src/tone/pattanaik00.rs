@@ -183,8 +183,8 @@ impl ToneOperator for Pattanaik00 {
     }
 
     fn fit(&self, guide: &SceneGuide<'_>, viewing: &Viewing, state: Option<&AdaptationState>) -> Box<dyn FittedTone> {
-        let ppd = viewing.display.pixels_per_degree;
-        let adapted = || AdaptationState::adapted_to(Goal::of(guide, ppd), &self.kinetics());
+        let density = viewing.display.pixel_density();
+        let adapted = || AdaptationState::adapted_to(Goal::of(guide, density), &self.kinetics());
         let state = state.copied().unwrap_or_else(adapted);
         let local = LocalAdaptation::of(guide, self.scope, &viewing.display);
         Box::new(FittedPattanaik00::new(state, local, viewing, self.exposure))

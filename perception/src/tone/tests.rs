@@ -106,6 +106,31 @@ fn a_saved_fit_is_the_same_operator() {
     }
 }
 
+/// Fits are read from files that may have been cut or written by hand.
+#[test]
+fn a_fit_with_numbers_missing_does_not_panic() {
+    let guide = Plane::from_fn(200, 100, |x, _| 10.0_f32.powf(x as f32 / 40.0 - 1.0));
+    for settings in settings() {
+        let operator = operator_with("ward-larson97", &settings).unwrap();
+        let fit = operator.fit(&SceneGuide::of(&guide), &Viewing::default(), None).save();
+        let mut json = serde_json::to_value(&fit).unwrap();
+        empty_lists(&mut json);
+        let restored = serde_json::from_value::<SavedTone>(json).unwrap().restore();
+        for (x, y) in [(0, 0), (199, 99), (usize::MAX, usize::MAX)] {
+            let shown = restored.relative_luminance_at(Pixel { x, y }, 3.0);
+            assert!(!shown.is_nan(), "{x} {y}");
+        }
+    }
+}
+
+fn empty_lists(json: &mut serde_json::Value) {
+    match json {
+        serde_json::Value::Array(list) => list.clear(),
+        serde_json::Value::Object(fields) => fields.values_mut().for_each(empty_lists),
+        _ => {}
+    }
+}
+
 /// A step of one threshold by Blackwell's law, as it was printed with the operator, is one on the display.
 #[test]
 fn ward94_keeps_blackwells_threshold() {

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::guide::SceneGuide;
 use super::statistics::{log_average, weighted_log_average};
+use crate::display::PixelDensity;
 
 /// The luminances, cd/m², that cones and rods would adapt to if the view stayed as it is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -31,13 +32,13 @@ impl Goal {
 
     /// The geometric mean of what is in view, around the gaze where one is given (a Gaussian of σ 5°).
     #[must_use]
-    pub fn of(guide: &SceneGuide<'_>, pixels_per_degree: f64) -> Self {
+    pub fn of(guide: &SceneGuide<'_>, density: PixelDensity) -> Self {
         let average = |plane| match guide.gaze {
             None => log_average(plane),
             Some(gaze) => weighted_log_average(plane, |x, y| {
-                let (dx, dy) = (x as f64 - gaze.x as f64, y as f64 - gaze.y as f64);
-                let sigma_px = GAZE_SIGMA_DEG * pixels_per_degree;
-                (-0.5 * (dx * dx + dy * dy) / (sigma_px * sigma_px)).exp()
+                let dx = (x as f64 - gaze.x as f64) / (GAZE_SIGMA_DEG * density.horizontal);
+                let dy = (y as f64 - gaze.y as f64) / (GAZE_SIGMA_DEG * density.vertical);
+                (-0.5 * (dx * dx + dy * dy)).exp()
             }),
         };
         Self {

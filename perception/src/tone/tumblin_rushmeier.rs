@@ -39,13 +39,13 @@ impl ToneOperator for TumblinRushmeier {
     }
 
     fn fit(&self, guide: &SceneGuide<'_>, viewing: &Viewing, state: Option<&AdaptationState>) -> Box<dyn FittedTone> {
-        let ppd = viewing.display.pixels_per_degree;
+        let density = viewing.display.pixel_density();
         let screen = Screen::of(&viewing.display);
         // A display without any black has no contrast to take the root of; 10 000:1 is as good as eyes need.
         let white_cd_m2 = screen.white_cd_m2();
         let display_adaptation = (white_cd_m2 * screen.black_cd_m2.max(white_cd_m2 * 1e-4)).sqrt();
         let scene_adaptation_cd_m2 =
-            state.map_or_else(|| Goal::of(guide, ppd).cones_cd_m2, |state| state.cones.neural_cd_m2);
+            state.map_or_else(|| Goal::of(guide, density).cones_cd_m2, |state| state.cones.neural_cd_m2);
         Box::new(FittedTumblinRushmeier {
             law: BrightnessMatch::between(scene_adaptation_cd_m2, display_adaptation),
             scene_adaptation_cd_m2,

@@ -33,8 +33,9 @@ impl ToneOperator for Ward94 {
     }
 
     fn fit(&self, guide: &SceneGuide<'_>, viewing: &Viewing, state: Option<&AdaptationState>) -> Box<dyn FittedTone> {
-        let ppd = viewing.display.pixels_per_degree;
-        let adaptation_cd_m2 = state.map_or_else(|| Goal::of(guide, ppd).cones_cd_m2, |state| state.cones.neural_cd_m2);
+        let density = viewing.display.pixel_density();
+        let adaptation_cd_m2 =
+            state.map_or_else(|| Goal::of(guide, density).cones_cd_m2, |state| state.cones.neural_cd_m2);
         Box::new(FittedWard94 {
             exposure: self.exposure,
             white_cd_m2: viewing.display.white_cd_m2.max(f64::MIN_POSITIVE),

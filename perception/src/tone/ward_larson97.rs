@@ -51,16 +51,16 @@ impl ToneOperator for WardLarson97 {
     }
 
     fn fit(&self, guide: &SceneGuide<'_>, viewing: &Viewing, _state: Option<&AdaptationState>) -> Box<dyn FittedTone> {
-        let ppd = viewing.display.pixels_per_degree;
+        let density = viewing.display.pixel_density();
         let clean = guide.luminance_cd_m2.map(|value| if value.is_finite() { value.max(0.0) } else { 0.0 });
-        let veil = if self.effects.glare { Veil::of(&clean, ppd) } else { None };
+        let veil = if self.effects.glare { Veil::of(&clean, density) } else { None };
         let retinal = veil.as_ref().map_or(clean.clone(), |veil| veil.over(&clean));
         let range = DisplayRange::of(&viewing.display);
         let adjustment = Histogram::of(foveal_samples(&retinal, &viewing.display)).map_or_else(
             || Adjustment::Linear { scale: 1.0, adaptation_cd_m2: range.middle_cd_m2() },
             |histogram| histogram.adjust(range, self.ceiling),
         );
-        let adaptation_cd_m2 = Goal::of(guide, ppd).cones_cd_m2;
+        let adaptation_cd_m2 = Goal::of(guide, density).cones_cd_m2;
         Box::new(FittedWardLarson97 {
             exposure: self.exposure,
             screen: Screen::of(&viewing.display),
@@ -74,11 +74,14 @@ impl ToneOperator for WardLarson97 {
 
 fn foveal_samples(luminance_cd_m2: &Plane, display: &Display) -> Vec<f64> {
     let Ok(foveal) = local_adaptation_cd_m2(luminance_cd_m2, display, Mean::Arithmetic) else { return Vec::new() };
-    let stride = ((display.pixels_per_degree / SAMPLES_PER_DEGREE).round() as usize).max(1);
+    let density = display.pixel_density();
     // From the middle of the first cell, so that no border is preferred.
-    let places = |length: usize| (stride.min(length) / 2..length).step_by(stride);
-    let rows = places(foveal.height()).map(|y| foveal.row(y));
-    rows.flat_map(|row| places(row.len()).map(|x| f64::from(row[x]))).collect()
+    let places = |length: usize, pixels_per_degree: f64| {
+        let stride = ((pixels_per_degree / SAMPLES_PER_DEGREE).round() as usize).max(1);
+        (stride.min(length) / 2..length).step_by(stride)
+    };
+    let rows = places(foveal.height(), density.vertical).map(|y| foveal.row(y));
+    rows.flat_map(|row| places(row.len(), density.horizontal).map(|x| f64::from(row[x]))).collect()
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

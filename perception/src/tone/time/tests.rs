@@ -1,5 +1,6 @@
 use super::super::guide::Pixel;
 use super::*;
+use crate::display::PixelDensity;
 use crate::plane::Plane;
 
 const EYE: Kinetics = Kinetics::PATTANAIK_2000;
@@ -91,9 +92,9 @@ fn an_adapted_eye_stays_as_it_is_and_nonsense_changes_nothing() {
 fn the_gaze_decides_what_is_adapted_to() {
     let view = Plane::from_fn(400, 40, |x, _| if x < 200 { 0.1 } else { 1000.0 });
     let guide = SceneGuide::of(&view);
-    close(Goal::of(&guide, 10.0).cones_cd_m2, 10.0, 1e-4);
-    let dark = Goal::of(&guide.with_gaze(Some(Pixel { x: 20, y: 20 })), 10.0);
-    let bright = Goal::of(&guide.with_gaze(Some(Pixel { x: 380, y: 20 })), 10.0);
+    close(Goal::of(&guide, PixelDensity::square(10.0)).cones_cd_m2, 10.0, 1e-4);
+    let dark = Goal::of(&guide.with_gaze(Some(Pixel { x: 20, y: 20 })), PixelDensity::square(10.0));
+    let bright = Goal::of(&guide.with_gaze(Some(Pixel { x: 380, y: 20 })), PixelDensity::square(10.0));
     assert!(dark.cones_cd_m2 < 0.11 && bright.cones_cd_m2 > 990.0, "{dark:?} {bright:?}");
-    close(Goal::of(&SceneGuide::of(&Plane::filled(2, 2, 0.0)), 10.0).rods_cd_m2, 1e-4, 1e-12);
+    close(Goal::of(&SceneGuide::of(&Plane::filled(2, 2, 0.0)), PixelDensity::square(10.0)).rods_cd_m2, 1e-4, 1e-12);
 }

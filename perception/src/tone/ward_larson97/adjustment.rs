@@ -218,7 +218,8 @@ impl Curve {
         let bins = self.cumulative.len().saturating_sub(1);
         let place = ((scene_cd_m2.max(LEAST_CD_M2).ln() - self.least) / self.step).clamp(0.0, bins as f64);
         let bin = (place as usize).min(bins.saturating_sub(1));
-        let (low, high) = (self.cumulative[bin], self.cumulative[(bin + 1).min(bins)]);
+        let share = |edge: usize| self.cumulative.get(edge).copied().unwrap_or(0.0);
+        let (low, high) = (share(bin), share((bin + 1).min(bins)));
         (self.range_least + self.range * (low + (place - bin as f64) * (high - low))).exp()
     }
 }
