@@ -1,9 +1,12 @@
 //! Motion: what moves over the picture, and what of it moves over the retina.
 
-use crate::csf::{DRIFT_DEG_S, Daly98, FASTEST_PURSUIT_DEG_S, PURSUIT_GAIN};
+use crate::csf::pursued_noise::PursuedNoise;
+use crate::csf::{DRIFT_DEG_S, Daly98, FASTEST_PURSUIT_DEG_S, FrameTiming, PURSUIT_GAIN};
 use crate::display::Display;
 use crate::error::Error;
+use crate::noise_gain::noise_gain;
 use crate::plane::Plane;
+use crate::threshold::ThresholdMap;
 
 /// How the error of a moving picture moves; each class is seen differently.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -111,9 +114,62 @@ impl MotionTable {
     }
 }
 
+/// What is left of the energy of fresh noise of one frequency, against the eye's log velocity.
+struct PursuitTable {
+    /// At rest, then from the velocity of drift on.
+    entries: Vec<f32>,
+}
+
+impl PursuitTable {
+    const STEPS_AN_OCTAVE: f32 = 4.0;
+
+    fn new(noise: &PursuedNoise, freq_cpd: f64) -> Self {
+        let velocity_deg_s = |step: u32| DRIFT_DEG_S * (f64::from(step) / f64::from(Self::STEPS_AN_OCTAVE)).exp2();
+        let entries = (0..=40).map(|step| noise.energy_left(freq_cpd, velocity_deg_s(step)) as f32).collect();
+        Self { entries }
+    }
+
+    fn at(&self, velocity_deg_s: f32) -> f32 {
+        let position = (velocity_deg_s / DRIFT_DEG_S as f32).max(1.0).log2() * Self::STEPS_AN_OCTAVE;
+        let index = (position as usize).min(self.entries.len() - 2);
+        let fraction = (position - index as f32).min(1.0);
+        self.entries[index] + fraction * (self.entries[index + 1] - self.entries[index])
+    }
+}
+
+impl ThresholdMap {
+    /// The same thresholds of noise that is new in every frame, for eyes that move at `eye_velocity_deg_s` at each place (see
+    /// [`eye_velocity_deg_s`]; at most 80 deg/s counts): each frame is smeared over the retina while the display holds it.
+    ///
+    /// Only for thresholds of fresh noise ([`crate::csf::FreshNoise`] with the same timing), and only where eyes do move: a viewer
+    /// who looks elsewhere sees the noise as at rest. Each band's threshold is raised by what is left of the energy at its centre
+    /// under the middle one of the picture's adaptation levels. Colour is left as at rest, which sees more.
+    ///
+    /// # Errors
+    /// [`Error::SizeMismatch`] and [`Error::BadPixel`] for velocities that do not fit, [`Error::OutOfRange`] for an impossible timing.
+    pub fn with_pursuit(&self, eye_velocity_deg_s: &Plane, timing: FrameTiming) -> Result<Self, Error> {
+        eye_velocity_deg_s.check_size("velocity", self.width(), self.height())?;
+        eye_velocity_deg_s.check_non_negative("velocity")?;
+        let (least, greatest) = self.adaptation_cd_m2.range();
+        let middle_cd_m2 = f64::from(least * greatest).sqrt();
+        let noise = PursuedNoise::new(self.viewing.observer.csf_area_deg2, timing, middle_cd_m2)?;
+        let mut followed = self.clone();
+        for (band, elevation) in followed.elevations.iter_mut().enumerate() {
+            let table = PursuitTable::new(&noise, self.bands.center_cpd(band));
+            *elevation = elevation
+                .change_by(eye_velocity_deg_s, |elevation, velocity| elevation / table.at(velocity).max(1e-6).sqrt());
+        }
+        followed.noise_gain = noise_gain(&self.tables, &self.adaptation_cd_m2, &followed.elevations);
+        Ok(followed)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::csf::FreshNoise;
+    use crate::display::Viewing;
+    use crate::threshold::{ThresholdInputs, threshold_map};
 
     #[test]
     fn pixels_a_frame_become_degrees_a_second() {
@@ -159,5 +215,27 @@ mod tests {
         assert!((ErrorMotion::Travelling.retinal_velocity_deg_s(10.0, 1.0).unwrap() - 1.65).abs() < 1e-9);
         assert!((ErrorMotion::Locked.retinal_velocity_deg_s(10.0, 1.0).unwrap() - 8.35).abs() < 1e-9);
         assert!((ErrorMotion::Locked.retinal_velocity_deg_s(0.0, 1.0).unwrap() - 0.15).abs() < 1e-9);
+    }
+
+    /// Noise at 24 frames a second that is at threshold for a resting eye may have so many times the variance for one that follows.
+    #[test]
+    fn pursuit_lets_fresh_noise_be_stronger() {
+        let timing = FrameTiming { frames_per_second: 24.0, persistence: 1.0 };
+        let csf = FreshNoise::new(1.0, timing).unwrap();
+        let grey = Plane::filled(64, 64, 100.0);
+        let inputs = ThresholdInputs { display_luminance_cd_m2: &grey, guide_variance: None };
+        let rest = threshold_map(&inputs, &Viewing::default(), &csf).unwrap();
+        let gain = |velocity: f32, timing| {
+            let followed = rest.with_pursuit(&Plane::filled(64, 64, velocity), timing).unwrap();
+            f64::from(rest.noise_gain().get(32, 32) / followed.noise_gain().get(32, 32))
+        };
+        let gains = [0.15, 1.0, 2.0, 4.25, 8.35].map(|velocity| gain(velocity, timing));
+        assert!((gains[0] - 1.0).abs() < 0.02 && gains.windows(2).all(|pair| pair[1] > pair[0]), "{gains:?}");
+        assert!(gains[2] > 1.3 && gains[4] > 4.0, "{gains:?}");
+        let fast = FrameTiming { frames_per_second: 240.0, persistence: 1.0 };
+        assert!(gain(2.0, fast) < 1.1);
+        let bad = Plane::filled(64, 64, -1.0);
+        assert!(rest.with_pursuit(&bad, timing).is_err());
+        assert!(rest.with_pursuit(&Plane::filled(3, 64, 1.0), timing).is_err());
     }
 }

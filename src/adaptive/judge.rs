@@ -137,6 +137,15 @@ fn judge_by(
         &csf,
     )?;
     let thresholds = if settings.gazes.is_empty() { thresholds } else { thresholds.with_gazes(&settings.gazes) };
+    let thresholds = match (&settings.pursuit, settings.frames) {
+        (Some(pursuit), Some(timing)) => {
+            let rgb = denoised.as_ref().map_or(&estimate.rgb_cd_m2, |found| &found.film.rgb_cd_m2);
+            let size = (guide.width(), guide.height());
+            let eye = pursuit.eye_velocity_deg_s(rgb, size, tone.as_ref(), &settings.viewing.display)?;
+            thresholds.with_pursuit(&eye, timing)?
+        }
+        _ => thresholds,
+    };
     still_wanted(settings)?;
     let pixel_thresholds = match &settings.model {
         None => None,

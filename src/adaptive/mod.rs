@@ -15,6 +15,7 @@ mod limits;
 mod monitor;
 mod next;
 pub mod plan;
+pub mod pursuit;
 pub mod rivals;
 pub mod settings;
 pub mod state;

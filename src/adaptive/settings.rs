@@ -1,5 +1,6 @@
 //! What a render is asked to do.
 
+use super::pursuit::Pursuit;
 use crate::denoise::Denoiser;
 use crate::integrator::PILOT_SAMPLES;
 use fechner_perception::Plane;
@@ -114,6 +115,8 @@ pub struct LoopSettings {
     /// Where one looks, in pixels of the film: thresholds rise away from all of these. None for a picture that anybody may look at
     /// anywhere. For the default threshold model alone.
     pub gazes: Vec<Gaze>,
+    /// Eyes that follow what moves, for [`Self::frames`] and the default threshold model alone; `None`: they rest.
+    pub pursuit: Option<Pursuit>,
     /// What makes the output picture out of the mean; `None` leaves it raw.
     pub denoiser: Option<Denoiser>,
     /// Asked during a look: whether it is of no use any more, as somebody wants another picture. `None` never interrupts.
@@ -135,6 +138,7 @@ impl LoopSettings {
             frames: None,
             importance: None,
             gazes: Vec::new(),
+            pursuit: None,
             denoiser: None,
             is_outdated: None,
         }

@@ -13,6 +13,7 @@
 //! Not for stills: see [`crate::adaptive`].
 
 pub mod budget;
+pub mod eye;
 pub mod gaze;
 pub mod name;
 pub mod track;
@@ -27,13 +28,14 @@ use crate::integrator::{PathTracer, TraceSettings};
 use crate::sampler::hash_words;
 use crate::scene::Scene;
 use crate::scene::load::LoadError;
+use eye::Eye;
 use fechner_perception::csf::FrameTiming;
 use fechner_perception::display::Viewing;
 use fechner_perception::tone::ToneOperator;
 use gaze::GazeTrack;
 use std::sync::Arc;
 use track::TrackFrame;
-use velocity::VelocityMap;
+use velocity::{VelocityMap, VelocityOf};
 
 /// Where the scenes of a shot come from.
 pub trait SceneSource {
@@ -68,8 +70,12 @@ pub struct ShotSettings {
     pub adapted_to_cd_m2: Option<f64>,
     /// Where the shot is looked at; `None`: anywhere.
     pub gaze: Option<GazeTrack>,
+    /// What eyes do there. Shares of a budget for the whole shot are found for eyes at rest.
+    pub eye: Eye,
     /// What makes each frame out of its mean; `None` leaves them raw.
     pub denoiser: Option<Denoiser>,
+    /// Whose motion velocity maps tell in mirrors and glass.
+    pub velocity_of: VelocityOf,
 }
 
 impl ShotSettings {
@@ -128,21 +134,34 @@ impl FrameScenes {
         let at = |offset: f64| source.at(shot.seconds(f64::from(frame) + offset));
         Ok(Self { previous: at(-1.0)?, now: at(0.0)?, next: at(1.0)? })
     }
+
+    /// How what a tracer of the frame's scene sees moves to and from its neighbours.
+    pub fn velocity(&self, tracer: &PathTracer, of: VelocityOf) -> VelocityMap {
+        match of {
+            VelocityOf::Image if tracer.has_specular_surfaces() => {
+                let [previous, next] =
+                    [&self.previous, &self.next].map(|scene| PathTracer::new(Arc::clone(scene), *tracer.settings()));
+                VelocityMap::of_images(tracer, &previous, &next)
+            }
+            VelocityOf::Image | VelocityOf::Surface => VelocityMap::new(tracer, &self.previous, &self.next),
+        }
+    }
 }
 
-/// Renders one frame.
+/// Renders one frame; `settings` are told how the eye moves in it.
 ///
 /// # Errors
 /// If the denoiser fails, or the perception model refuses the picture, which would be a defect of ours.
 pub fn render_frame(
     scenes: &FrameScenes,
     shot: &ShotSettings,
-    settings: &LoopSettings,
+    settings: &mut LoopSettings,
     frame: u32,
     monitor: &dyn Monitor,
 ) -> Result<RenderedFrame, JudgeError> {
     let tracer = PathTracer::new(Arc::clone(&scenes.now), shot.trace_settings(frame));
-    let velocity = VelocityMap::new(&tracer, &scenes.previous, &scenes.next);
+    let velocity = scenes.velocity(&tracer, shot.velocity_of);
+    settings.pursuit = shot.pursuit(frame, &velocity);
     let rendered = render(&tracer, settings, monitor)?;
     Ok(RenderedFrame { rendered, velocity })
 }

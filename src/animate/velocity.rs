@@ -1,10 +1,12 @@
 //! Velocity maps: where the surface point that a pixel shows was one frame ago, and where it will be.
 //!
 //! Exact: the point keeps its place on its triangle or sphere, and the other frames' scenes and cameras say where that is,
-//! whatever moved it (camera, object, skin, morph). Backgrounds turn with the camera. Not for what mirrors and glass show,
-//! which moves otherwise: theirs is the motion of the surface itself.
+//! whatever moved it (camera, object, skin, morph). Backgrounds turn with the camera. Mirrors and glass have the motion of their
+//! own surface, or, by [`VelocityMap::of_images`], that of what they show.
 
-use crate::geometry::Hit;
+mod image;
+
+use crate::geometry::{Hit, Ray};
 use crate::integrator::{CameraRays, CameraSample, PathTracer};
 use crate::scene::{Camera, Scene, SpherePlace};
 use glam::{Vec2, Vec3, Vec3A};
@@ -17,6 +19,16 @@ pub struct VelocityMap {
     pub to_next: Vec<Vec2>,
     /// Where it was one frame ago, less where it is.
     pub to_previous: Vec<Vec2>,
+}
+
+/// Whose motion a map tells where a pixel shows a perfectly smooth mirror or glass.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum VelocityOf {
+    /// The mirror's and the glass's own.
+    #[default]
+    Surface,
+    /// That of what is seen in it.
+    Image,
 }
 
 /// What a camera ray meets, by what moves with it.
@@ -66,14 +78,40 @@ impl VelocityMap {
     }
 }
 
+/// Where something is at another moment: in the scene, or in a direction infinitely far away.
+#[derive(Clone, Copy)]
+enum Target {
+    Point(Vec3),
+    Direction(Vec3),
+}
+
+impl Target {
+    /// Its place in the picture; `None` where that camera cannot see it.
+    fn place(self, camera: &CameraRays) -> Option<Vec2> {
+        match self {
+            Self::Point(position) => camera.project(position),
+            Self::Direction(direction) => camera.project_direction(direction),
+        }
+    }
+}
+
+/// As the shutter opens, through the middle of the lens: what is out of focus moves as its centre does.
+fn ray_through(camera: &CameraRays, position_px: Vec2) -> Ray {
+    camera.ray(&CameraSample { position_px, lens: [0.5, 0.5], time: 0.0 })
+}
+
 fn seen_at(tracer: &PathTracer, camera: &CameraRays, position_px: Vec2) -> Seen {
-    // The middle of the lens: what is out of focus moves as its centre does.
-    let ray = camera.ray(&CameraSample { position_px, lens: [0.5, 0.5], time: 0.0 });
-    let Some(hit) = tracer.world().closest(&ray) else { return Seen::Background(ray.direction.into()) };
+    let ray = ray_through(camera, position_px);
+    seen_along(tracer, &ray, tracer.world().closest(&ray))
+}
+
+/// What a ray has met.
+fn seen_along(tracer: &PathTracer, ray: &Ray, hit: Option<Hit>) -> Seen {
+    let Some(hit) = hit else { return Seen::Background(ray.direction.into()) };
     let scene = tracer.world().scene();
     let Some(number) = (hit.object as usize).checked_sub(scene.instances.len()) else { return Seen::Triangle(hit) };
     let sphere = &scene.spheres[number];
-    let normal = Vec3A::from(tracer.world().surface(&ray, &hit).geometric_normal);
+    let normal = Vec3A::from(tracer.world().surface(ray, &hit).geometric_normal);
     let turns_visibly = scene.materials[sphere.material.0 as usize].has_places();
     let axes = sphere.place_at(0.0).axes;
     Seen::Sphere(number, if turns_visibly { Normal::Own(axes.transpose() * normal) } else { Normal::World(normal) })
@@ -81,16 +119,21 @@ fn seen_at(tracer: &PathTracer, camera: &CameraRays, position_px: Vec2) -> Seen 
 
 /// Where what was seen is in the picture of another moment; `None` where that camera cannot see its place.
 fn place_in(scene: &Scene, camera: &CameraRays, seen: &Seen) -> Option<Vec2> {
+    target_in(scene, seen)?.place(camera)
+}
+
+/// Where what was seen is in the scene of another moment; `None` where there is no such thing.
+fn target_in(scene: &Scene, seen: &Seen) -> Option<Target> {
     match seen {
-        Seen::Background(direction) => camera.project_direction(*direction),
-        Seen::Triangle(hit) => camera.project(point_of_triangle(scene, hit)?),
+        Seen::Background(direction) => Some(Target::Direction(*direction)),
+        Seen::Triangle(hit) => point_of_triangle(scene, hit).map(Target::Point),
         Seen::Sphere(number, normal) => {
             let SpherePlace { center, radius, axes } = scene.spheres.get(*number)?.place_at(0.0);
             let normal = match normal {
                 Normal::Own(own) => axes * *own,
                 Normal::World(normal) => *normal,
             };
-            camera.project((center + radius * normal).into())
+            Some(Target::Point((center + radius * normal).into()))
         }
     }
 }

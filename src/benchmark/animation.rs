@@ -10,7 +10,9 @@ use super::name::distinct_names;
 use super::reference::trace_up_to;
 use crate::adaptive::settings::{DENOISED_PILOT_SAMPLES, Limits, LoopSettings, Sampling};
 use crate::adaptive::{Quiet, render};
+use crate::animate::eye::Eye;
 use crate::animate::track::Track;
+use crate::animate::velocity::VelocityOf;
 use crate::animate::{SceneSource, ShotSettings};
 use crate::denoise::{Denoiser, DenoiserKind, denoise_film};
 use crate::film::Film;
@@ -135,6 +137,8 @@ impl<'a> Bench<'a> {
             adapted_to_cd_m2: None,
             gaze: None,
             denoiser,
+            eye: Eye::Rests,
+            velocity_of: VelocityOf::Surface,
         };
         let operator = tone::operator("constant", None).context("an operator")?;
         let track = Track::make(&source, &shot, operator.as_ref(), &|_| {})?;

@@ -10,6 +10,7 @@ mod source;
 mod time;
 mod video;
 
+use super::console::duration_in_words;
 use super::denoise::DenoiseChoice;
 use super::job::{Quality, Size, parse_size};
 use super::seeing::{parse_positive, parse_seconds};
@@ -17,7 +18,7 @@ use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use frames::{Frames, parse_frames};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use time::ShotClock;
 use video::VideoFormat;
 
@@ -85,6 +86,10 @@ pub(super) struct AnimateArguments {
     /// line everything may be looked at.
     #[arg(long, value_name = "FILE.csv", conflicts_with = "pausable", help_heading = "Seeing")]
     gaze: Option<PathBuf>,
+    /// What viewers' eyes do. A frame's noise stands still on the display while it is held, so that an eye that follows what moves
+    /// smears it, and there may be more. An eye at rest sees the most.
+    #[arg(long, value_enum, default_value = "none", help_heading = "Seeing")]
+    eye: EyeChoice,
     /// Tone operator.
     #[arg(long, value_name = "NAME", help_heading = "Picture")]
     operator: Option<String>,
@@ -97,6 +102,9 @@ pub(super) struct AnimateArguments {
     /// Names of the layers of motion in .exr files.
     #[arg(long, value_enum, default_value = "fechner", help_heading = "Picture")]
     aov_names: AovNames,
+    /// Whose motion the layers of motion tell in mirrors and clear glass. Rough ones always have their surface's.
+    #[arg(long, value_enum, default_value = "surface", help_heading = "Picture")]
+    velocity_of: VelocityChoice,
     /// Make a video of the shot when all its frames are there: .y4m, or .mp4 by an installed ffmpeg. It is not HDR: an HDR
     /// display's white becomes its white.
     #[arg(long, value_name = "FILE", help_heading = "Picture")]
@@ -113,6 +121,26 @@ enum SamplingChoice {
     Adaptive,
     /// The same everywhere.
     Uniform,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum EyeChoice {
+    /// They rest: safe, whatever viewers do.
+    None,
+    /// They follow whatever they look at.
+    Track,
+    /// They follow what stands out in the picture and in its motion (Itti 1998, Yee 2001).
+    Saliency,
+    /// They move as --gaze does, where a frame and its neighbours have one line each.
+    Gaze,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum VelocityChoice {
+    /// The mirror's or the glass's own.
+    Surface,
+    /// That of what is seen in it.
+    Image,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -139,8 +167,14 @@ fn render_shot(arguments: &AnimateArguments) -> Result<()> {
     shot.check_video()?;
     let track = shot.track(arguments.frame_numbers())?;
     let mut clock = arguments.time.map(|budget| ShotClock::start(&shot, &track, budget)).transpose()?;
-    for frame in arguments.frame_numbers() {
-        shot.make(frame, &track, clock.as_mut().map(|clock| clock.share(frame)))?;
+    let (started, count, mut rendered) = (Instant::now(), arguments.frame_numbers().count(), 0.0);
+    for (done, frame) in (1..).zip(arguments.frame_numbers()) {
+        let was_rendered = shot.make(frame, &track, clock.as_mut().map(|clock| clock.share(frame)))?;
+        if was_rendered && done < count {
+            rendered += 1.0;
+            let seconds = started.elapsed().as_secs_f64() / rendered * (count - done) as f64;
+            eprintln!("{done} of {count} frames, about {} left", duration_in_words(seconds));
+        }
     }
     shot.conclude(&track).map(drop)
 }
@@ -149,6 +183,11 @@ impl AnimateArguments {
     /// Numbers of the frames to render.
     pub(super) fn frame_numbers(&self) -> std::ops::RangeInclusive<u32> {
         self.frames.first..=self.frames.last
+    }
+
+    /// Whether eyes are to follow what moves.
+    pub(super) fn eyes_move(&self) -> bool {
+        self.eye != EyeChoice::None
     }
 
     /// The video that is asked for; an error if it cannot be made.

@@ -2,7 +2,7 @@
 //!
 //! `path` holds the life of one sample, `abreast` how several are followed at once, `camera` where they start, `shading` what a
 //! surface point scatters like, `relief` how maps turn its normal, `tables` what materials compute beforehand, `media` what a
-//! ray travels in, `prune` which light is left to chance.
+//! ray travels in, `prune` which light is left to chance, `specular` what mirrors and glass show.
 
 mod abreast;
 mod camera;
@@ -11,11 +11,13 @@ mod path;
 mod prune;
 mod relief;
 mod shading;
+mod specular;
 mod tables;
 
 pub use camera::{CameraRays, CameraSample};
 pub use path::{FirstHit, PathSample};
 pub use prune::Pruning;
+pub use specular::{SpecularEvent, SpecularPath, SpecularVertex};
 
 use crate::film::{BlockSum, Film};
 use crate::geometry::World;

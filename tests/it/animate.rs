@@ -68,24 +68,27 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 
 #[test]
 fn frames_do_not_depend_on_order_or_process() {
-    let [at_once, backwards] = [(); 2].map(|()| tempfile::tempdir().expect("a folder"));
-    let common = ["--fps", "4", "--visibility", "8", "-o", "out/shot.##.exr"];
-    animate(at_once.path(), &[&["--frames", "0..3", "--video", "out/shot.y4m"], &common[..]].concat());
-    for frame in (0..4).rev() {
-        let frames = format!("{frame}..{frame}");
-        let last: &[&str] = if frame == 0 { &["--video", "out/shot.y4m"] } else { &[] };
-        animate(
-            backwards.path(),
-            &[&["--frames", &frames, "--shot", "0..3", "--threads", "1"], &common[..], last].concat(),
-        );
+    for options in [&[][..], &["--eye", "saliency", "--velocity-of", "image"]] {
+        let [at_once, backwards] = [(); 2].map(|()| tempfile::tempdir().expect("a folder"));
+        let common = [&["--fps", "4", "--visibility", "8", "-o", "out/shot.##.exr"], options].concat();
+        animate(at_once.path(), &[&["--frames", "0..3", "--video", "out/shot.y4m"], &common[..]].concat());
+        for frame in (0..4).rev() {
+            let frames = format!("{frame}..{frame}");
+            let last: &[&str] = if frame == 0 { &["--video", "out/shot.y4m"] } else { &[] };
+            animate(
+                backwards.path(),
+                &[&["--frames", &frames, "--shot", "0..3", "--threads", "1"], &common[..], last].concat(),
+            );
+        }
+        let (a, b) = (files(at_once.path()), files(backwards.path()));
+        assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>());
+        for (name, bytes) in &a {
+            assert!(*bytes == b[name], "{name} differs {options:?}");
+        }
+        // Four frames of three bytes a pixel, and their headers.
+        let video = &a["/out/shot.y4m"];
+        assert!(video.len() > 4 * 3 * 24 * 16 && video.starts_with(b"YUV4MPEG2 W24 H16 F4:1"));
     }
-    let (a, b) = (files(at_once.path()), files(backwards.path()));
-    assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>());
-    for (name, bytes) in &a {
-        assert!(*bytes == b[name], "{name} differs");
-    }
-    // Four frames of three bytes a pixel, and their headers.
-    assert!(a["/out/shot.y4m"].len() > 4 * 3 * 24 * 16 && a["/out/shot.y4m"].starts_with(b"YUV4MPEG2 W24 H16 F4:1"));
 }
 
 /// A run that was broken off goes on with what is missing; another target makes frames anew.
@@ -238,6 +241,29 @@ fn frames_are_judged_from_where_they_are_looked_at() {
     assert_eq!(samples(Some("0,0,15\n")), everywhere);
 }
 
+/// Noise that an eye smears as it follows what moves may be stronger. Frames of another eye are made anew.
+#[test]
+fn eyes_that_follow_let_noise_be_stronger() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let gaze: String = (0..3).map(|frame| format!("{frame},{},8\n", 4 + 8 * frame)).collect();
+    std::fs::write(folder.path().join("gaze.csv"), gaze).expect("written");
+    // Everything goes by, some three pixels a frame.
+    let panned =
+        SCENE.replace("look_at = [0.2, 0.6, 0]", "look_at = [1.5, 0.6, 0]").replace("time = 1.0", "time = 0.1");
+    let samples = |options: &[&str]| {
+        let always = ["--frames", "1..1", "--fps", "24", "--visibility", "0.25", "-o", "shot.##.png"];
+        let said = animate_scene(folder.path(), &panned, &[&always, options].concat());
+        assert!(!said.contains("is there"), "{options:?}: {said}");
+        let text = std::fs::read_to_string(folder.path().join("shot.01.json")).expect("a record");
+        let record: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+        record["report"]["samples_total"].as_f64().expect("a number")
+    };
+    let [rests, track, saliency] = ["none", "track", "saliency"].map(|eye| samples(&["--eye", eye]));
+    assert!(track < 0.9 * rests && track <= saliency && saliency <= rests, "{rests} {saliency} {track}");
+    let [still, watched] = ["none", "gaze"].map(|eye| samples(&["--gaze", "gaze.csv", "--eye", eye]));
+    assert!(watched < 0.6 * still, "{still} {watched}");
+}
+
 #[test]
 fn bad_arguments_are_named() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -252,6 +278,9 @@ fn bad_arguments_are_named() {
         (&["--frames", "0..2", "-o", "a.#.png", "--operator", "sepia"], "no tone operator"),
         (&["--frames", "0..2", "-o", "a.#.png", "--fps", "0.1"], "between 1 and 1000"),
         (&["--frames", "0..2", "-o", "a.#.png", "--gaze", "gaze.csv"], "line 2: \"0,1\" is not a frame's number"),
+        (&["--frames", "0..2", "-o", "a.#.png", "--eye", "track", "--pausable"], "frames that may be paused"),
+        (&["--frames", "0..2", "-o", "a.#.png", "--eye", "gaze"], "--gaze says where viewers look"),
+        (&["--frames", "0..2", "-o", "a.#.png", "--velocity-of", "image"], "PNG frames hold no motion"),
     ] {
         let mut command = Command::cargo_bin("fechner").expect("the binary is built");
         let output = command

@@ -16,6 +16,7 @@ mod hdrvdp2;
 mod laird06;
 mod mannos_sakrison;
 mod moving;
+pub(crate) mod pursued_noise;
 mod stela;
 
 pub use barten89::Barten89;

@@ -1,13 +1,15 @@
 //! What the command line and the scene say about a shot as a whole.
 
 use super::frames::Frames;
-use super::{AnimateArguments, SamplingChoice};
+use super::{AnimateArguments, EyeChoice, SamplingChoice, VelocityChoice};
 use crate::cli::job::{Quality, Size, check_memory};
 use crate::cli::seeing;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use fechner::adaptive::settings::{DEFAULT_MAX_SAMPLES, Limits, Sampling};
 use fechner::animate::ShotSettings;
+use fechner::animate::eye::Eye;
 use fechner::animate::gaze::GazeTrack;
+use fechner::animate::velocity::VelocityOf;
 use fechner::denoise::Denoiser;
 use fechner::integrator::TraceSettings;
 use fechner::scene::Scene;
@@ -41,8 +43,30 @@ pub(super) fn shot_settings(arguments: &AnimateArguments, scene: &Scene, shot: F
         nits_per_unit: arguments.nits_per_unit.unwrap_or(scene.nits_per_unit),
         adapted_to_cd_m2: arguments.adapted_to,
         gaze: arguments.gaze.as_deref().map(read_gaze).transpose()?,
+        eye: eye(arguments)?,
+        velocity_of: match arguments.velocity_of {
+            VelocityChoice::Surface => VelocityOf::Surface,
+            VelocityChoice::Image => VelocityOf::Image,
+        },
         denoiser: arguments.denoise.kind().map(Denoiser::open).transpose()?,
     })
+}
+
+fn eye(arguments: &AnimateArguments) -> Result<Eye> {
+    let followed = match arguments.eye {
+        EyeChoice::None => return Ok(Eye::Rests),
+        EyeChoice::Gaze if arguments.gaze.is_none() => bail!("--eye gaze: --gaze says where viewers look"),
+        EyeChoice::Saliency if arguments.gaze.is_some() => {
+            bail!("--eye saliency: --gaze says where viewers look; with it the eye is none, track or gaze")
+        }
+        EyeChoice::Gaze => Eye::FollowsGaze,
+        EyeChoice::Saliency => Eye::FollowsSalient,
+        EyeChoice::Track => Eye::FollowsAll,
+    };
+    if arguments.pausable {
+        bail!("--eye: frames that may be paused are judged as stills, whatever the eye does (--pausable)");
+    }
+    Ok(followed)
 }
 
 fn read_gaze(path: &Path) -> Result<GazeTrack> {

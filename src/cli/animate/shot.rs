@@ -6,7 +6,7 @@ use super::record::{self, FrameRecord, read_json};
 use super::settings::shot_settings;
 use super::source::FileSource;
 use super::video::shown_rgb8;
-use super::{AnimateArguments, video};
+use super::{AnimateArguments, EyeChoice, VelocityChoice, video};
 use crate::cli::console::{Console, duration_in_words};
 use crate::cli::json::write_json;
 use crate::cli::report::Report;
@@ -67,6 +67,10 @@ impl<'a> Shot<'a> {
             std::fs::create_dir_all(folder).with_context(|| format!("{}", folder.display()))?;
         }
         let format = output::check_target(&first_file)?;
+        let is_followed = matches!(arguments.eye, EyeChoice::Track | EyeChoice::Saliency);
+        if format == Format::Png && arguments.velocity_of == VelocityChoice::Image && !is_followed {
+            bail!("--velocity-of image: PNG frames hold no motion; name the frames .exr");
+        }
         let source = FileSource::new(arguments);
         let scene = source.at(f64::from(arguments.frames.first) / arguments.fps)?;
         for note in &scene.notes {
@@ -153,19 +157,23 @@ impl<'a> Shot<'a> {
         (self.arguments.frames.first, self.arguments.frames.last)
     }
 
-    /// Renders a frame, unless it is there. `time` is a limit of the frame's own, beside those of the shot.
-    pub(super) fn make(&self, frame: u32, track: &Track, time: Option<Duration>) -> Result<()> {
+    /// Renders a frame, unless it is there; whether it did. `time` is a limit of the frame's own, beside those of the shot.
+    pub(super) fn make(&self, frame: u32, track: &Track, time: Option<Duration>) -> Result<bool> {
         let mut job = self.frame(frame, track)?;
         job.settings.limits.time = time;
         let file = self.name.of(frame);
         if self.record(frame, &job.key).is_some() {
             eprintln!("{}: is there", file.display());
-            return Ok(());
+            return Ok(false);
+        }
+        if file.exists() {
+            eprintln!("{}: of other settings or another scene, made anew", file.display());
         }
         let console = Console::new(None);
-        let made = render_frame(&job.scenes, &self.settings, &job.settings, frame, &console)?;
+        let made = render_frame(&job.scenes, &self.settings, &mut job.settings, frame, &console)?;
         console.finish();
-        self.keep(frame, &job, &made).map(drop)
+        self.keep(frame, &job, &made)?;
+        Ok(true)
     }
 
     /// What a frame shows.
@@ -255,7 +263,7 @@ impl<'a> Shot<'a> {
     /// All that a frame's file depends on, as a name.
     fn key(&self, settings: &LoopSettings, track: &TrackFrame, scenes: &FrameScenes) -> String {
         let text = format!(
-            "{}|{:?}|{track:?}|{}|{}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}",
+            "{}|{:?}|{track:?}|{}|{}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}",
             PROGRAM,
             self.format,
             content_hash(&scenes.previous),
@@ -268,6 +276,8 @@ impl<'a> Shot<'a> {
             settings.frames,
             settings.gazes,
             self.arguments.aov_names,
+            self.settings.velocity_of,
+            self.settings.eye,
             self.arguments.time
         );
         blake3::hash(text.as_bytes()).to_hex()[..32].to_owned()

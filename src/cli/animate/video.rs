@@ -128,6 +128,8 @@ pub(super) fn shown_rgb8(
 mod tests {
     use super::*;
     use fechner::adaptive::settings::{Limits, Sampling};
+    use fechner::animate::eye::Eye;
+    use fechner::animate::velocity::VelocityOf;
     use fechner::integrator::TraceSettings;
     use fechner_perception::display::Viewing;
 
@@ -148,6 +150,8 @@ mod tests {
             adapted_to_cd_m2: None,
             gaze: None,
             denoiser: None,
+            eye: Eye::Rests,
+            velocity_of: VelocityOf::Surface,
         };
         let frame = folder.path().join("a.0.png");
         fechner::output::write_png(&frame, 4, 2, &[[0.5; 3]; 8]).expect("written");

@@ -10,7 +10,6 @@ use fechner::adaptive::Rendered;
 use fechner::adaptive::settings::LoopSettings;
 use fechner::animate::RenderedFrame;
 use fechner::animate::track::Track;
-use fechner::animate::velocity::VelocityMap;
 use fechner::checkpoint::{Header, Origin, Seeds};
 use fechner::farm::{Farm, FrameEntry, PictureFormat, Work};
 use fechner::integrator::{PathTracer, TraceSettings};
@@ -78,6 +77,9 @@ impl JobOptions {
                 let name = name.to_str().context("the folder's name must be Unicode")?.to_owned();
                 let arguments = arguments.iter().cloned().chain(["--output".to_owned(), name]);
                 let options = ShotOptions::try_parse_from(arguments).map_err(wrong)?;
+                if options.shot.eyes_move() {
+                    bail!("--eye: the frames of a farm are judged for eyes at rest");
+                }
                 Ok(Self::Shot(Box::new(options.shot)))
             }
         }
@@ -195,7 +197,7 @@ impl Job<'_> {
                 Ok(report)
             }
             (Self::Shot { shot, .. }, FrameKind::OfShot(of_shot)) => {
-                let velocity = VelocityMap::new(&frame.tracer(), &of_shot.scenes.previous, &of_shot.scenes.next);
+                let velocity = of_shot.scenes.velocity(&frame.tracer(), shot.settings.velocity_of);
                 shot.keep(number, of_shot, &RenderedFrame { rendered, velocity })
             }
             _ => bail!("a frame of another farm"),

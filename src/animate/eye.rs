@@ -1,0 +1,131 @@
+//! What the eyes of a shot's viewers do, frame by frame.
+
+use super::ShotSettings;
+use super::velocity::VelocityMap;
+use crate::adaptive::pursuit::Pursuit;
+use fechner_perception::Plane;
+use fechner_perception::csf::FASTEST_PURSUIT_DEG_S;
+use fechner_perception::display::Display;
+use fechner_perception::motion::image_velocity_deg_s;
+use glam::Vec2;
+
+/// Whether eyes follow what moves. Each frame's noise is its own and stands still on the display for as long as the frame does, so
+/// a moving eye smears it, and it may be stronger. Eyes that rest see it best.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Eye {
+    /// They rest: safe whatever viewers do.
+    #[default]
+    Rests,
+    /// They follow whatever they look at.
+    FollowsAll,
+    /// They follow what stands out in the picture and in its motion.
+    FollowsSalient,
+    /// They move as the gaze that the shot was watched with, where each frame has one.
+    FollowsGaze,
+}
+
+impl ShotSettings {
+    /// How the eyes move in a frame whose motion is known; `None` where they rest, and for frames that may be paused.
+    pub fn pursuit(&self, frame: u32, velocity: &VelocityMap) -> Option<Pursuit> {
+        if self.pausable {
+            return None;
+        }
+        match self.eye {
+            Eye::Rests => None,
+            Eye::FollowsAll => self.image_velocity_deg_s(velocity).map(Pursuit::All),
+            Eye::FollowsSalient => self.image_velocity_deg_s(velocity).map(Pursuit::Salient),
+            Eye::FollowsGaze => self.gaze_velocity_deg_s(frame).map(Pursuit::Watched),
+        }
+    }
+
+    /// Of what each pixel shows, by the slower of its motions from the frame before and to the next: eyes that follow less see
+    /// more.
+    fn image_velocity_deg_s(&self, velocity: &VelocityMap) -> Option<Plane> {
+        let area = self.trace.film_area();
+        let width = area.width as usize;
+        let slower = |x: usize, y: usize| -> Vec2 {
+            let [next, previous] = [&velocity.to_next, &velocity.to_previous].map(|motion| motion[y * width + x]);
+            if next.length_squared() <= previous.length_squared() { next } else { previous }
+        };
+        let of =
+            |component: fn(Vec2) -> f32| Plane::from_fn(width, area.height as usize, |x, y| component(slower(x, y)));
+        image_velocity_deg_s(&of(|motion| motion.x), &of(|motion| motion.y), &self.display()).ok()
+    }
+
+    /// Of the gaze from the frame before to the next, where each of the three has a single one.
+    fn gaze_velocity_deg_s(&self, frame: u32) -> Option<f64> {
+        let area = self.trace.film_area();
+        let at = |frame: u32| match self.gaze.as_ref()?.of_frame(frame, area.width, area.height) {
+            [gaze] => Some(*gaze),
+            _ => None,
+        };
+        at(frame)?;
+        let (before, after) = (at(frame.checked_sub(1)?)?, at(frame.checked_add(1)?)?);
+        let density = self.viewing.display.pixel_density();
+        let moved_deg =
+            ((after.x_px - before.x_px) / density.horizontal).hypot((after.y_px - before.y_px) / density.vertical);
+        Some((0.5 * moved_deg * self.frames_per_second).min(FASTEST_PURSUIT_DEG_S))
+    }
+
+    /// The display at the shot's own rate.
+    fn display(&self) -> Display {
+        Display { frames_per_second: self.frames_per_second, ..self.viewing.display.clone() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::adaptive::settings::{Limits, Sampling};
+    use crate::animate::gaze::GazeTrack;
+    use crate::animate::velocity::VelocityOf;
+    use crate::integrator::TraceSettings;
+    use fechner_perception::display::Viewing;
+
+    fn shot(eye: Eye, gaze: Option<&str>) -> ShotSettings {
+        ShotSettings {
+            first: 0,
+            last: 9,
+            frames_per_second: 24.0,
+            pausable: false,
+            trace: TraceSettings::new(100, 50, 0),
+            sampling: Sampling::Adaptive,
+            limits: Limits::of_visibility(1.0),
+            viewing: Viewing::of(Display { pixels_per_degree: 40.0, ..Display::default() }),
+            nits_per_unit: 1.0,
+            adapted_to_cd_m2: None,
+            gaze: gaze.map(|table| GazeTrack::parse(table).expect("a track")),
+            eye,
+            denoiser: None,
+            velocity_of: VelocityOf::Surface,
+        }
+    }
+
+    fn moving() -> VelocityMap {
+        VelocityMap { to_next: vec![Vec2::new(5.0, 0.0); 5000], to_previous: vec![Vec2::new(-3.0, -4.0); 5000] }
+    }
+
+    #[test]
+    fn eyes_follow_at_the_rate_of_the_shot() {
+        let velocity = match shot(Eye::FollowsAll, None).pursuit(3, &moving()) {
+            Some(Pursuit::All(velocity)) => velocity.get(50, 25),
+            other => panic!("{other:?}"),
+        };
+        // Five pixels of a fortieth degree, 24 times a second.
+        assert!((velocity - 3.0).abs() < 1e-5, "{velocity}");
+        assert!(matches!(shot(Eye::FollowsSalient, None).pursuit(3, &moving()), Some(Pursuit::Salient(_))));
+        assert_eq!(shot(Eye::Rests, None).pursuit(3, &moving()), None);
+        assert_eq!(ShotSettings { pausable: true, ..shot(Eye::FollowsAll, None) }.pursuit(3, &moving()), None);
+    }
+
+    #[test]
+    fn a_watched_eye_moves_as_its_gaze() {
+        let track = "frame,x,y\n1,10,20\n2,13,24\n3,16,28\n5,0,0\n6,80,0\n7,80,0\n8,1,1\n8,2,2\n9,3,3\n";
+        let watched = |frame| shot(Eye::FollowsGaze, Some(track)).pursuit(frame, &moving());
+        // Five pixels a frame.
+        assert_eq!(watched(2), Some(Pursuit::Watched(3.0)));
+        assert_eq!(watched(6), Some(Pursuit::Watched(24.0)));
+        // At the ends, beside frames without a line, and with two viewers nothing is known.
+        assert!([0, 1, 3, 4, 5, 7, 8, 9, u32::MAX].into_iter().all(|frame| watched(frame).is_none()));
+    }
+}

@@ -1,0 +1,164 @@
+//! Velocity of what mirrors and clear glass show.
+//!
+//! A camera ray is followed over mirrors and glass to what is seen there. In the other frame that point has moved, and so may have
+//! the mirrors: the pixel is looked for whose ray, over the same things, leads to it. Not for rough surfaces, whose image is a
+//! blur without a place: they keep their surface's motion.
+
+use super::{Seen, Target, VelocityMap, place_in, ray_through, seen_along, seen_at, target_in};
+use crate::geometry::Ray;
+use crate::integrator::{CameraRays, PathTracer, SpecularPath, SpecularVertex};
+use glam::{Vec2, Vec3A};
+use rayon::prelude::*;
+
+/// Another moment of a shot.
+struct Moment<'a> {
+    tracer: &'a PathTracer,
+    camera: CameraRays,
+}
+
+impl<'a> Moment<'a> {
+    fn of(tracer: &'a PathTracer) -> Self {
+        let settings = tracer.settings();
+        let camera = CameraRays::new(&tracer.world().scene().camera, settings.width, settings.height);
+        Self { tracer, camera }
+    }
+}
+
+impl VelocityMap {
+    /// As [`VelocityMap::new`], but where a pixel shows a perfectly smooth mirror or glass, of what is seen in it; where there is
+    /// no such place in the other frame, or none that can be found, of the surface.
+    pub fn of_images(tracer: &PathTracer, previous: &PathTracer, next: &PathTracer) -> Self {
+        let area = tracer.settings().film_area();
+        let [before, now, after] = [previous, tracer, next].map(Moment::of);
+        let motions: Vec<[Vec2; 2]> = (0..area.width * area.height)
+            .into_par_iter()
+            .map(|pixel| {
+                let corner = Vec2::new((area.x + pixel % area.width) as f32, (area.y + pixel / area.width) as f32);
+                let center = corner + 0.5;
+                let surface = seen_at(now.tracer, &now.camera, center);
+                let camera_ray = ray_through(&now.camera, center);
+                let image = now.tracer.follow_specular(camera_ray).map(|path| Image::of(tracer, camera_ray, path));
+                [&after, &before].map(|other| {
+                    let of_surface = place_in(other.tracer.world().scene(), &other.camera, &surface);
+                    let place = image.as_ref().and_then(|image| image.place_in(other, center, of_surface));
+                    place.or(of_surface).map_or(Vec2::ZERO, |place| place - center)
+                })
+            })
+            .collect();
+        Self {
+            to_next: motions.iter().map(|motion| motion[0]).collect(),
+            to_previous: motions.iter().map(|motion| motion[1]).collect(),
+        }
+    }
+}
+
+/// What a pixel shows over mirrors and glass.
+struct Image {
+    path: SpecularPath,
+    /// At its end.
+    seen: Seen,
+    /// Where it seems to be: along the camera ray, as far as the path is long.
+    virtual_place: Target,
+}
+
+impl Image {
+    fn of(tracer: &PathTracer, camera_ray: Ray, path: SpecularPath) -> Self {
+        let seen = seen_along(tracer, &path.last_ray, path.end);
+        let virtual_place = if path.length.is_finite() {
+            Target::Point((camera_ray.origin + camera_ray.direction * path.length).into())
+        } else {
+            Target::Direction(camera_ray.direction.into())
+        };
+        Self { path, seen, virtual_place }
+    }
+
+    /// Its place in the picture of another moment. It is looked for from where the virtual place would be, which is it for mirrors
+    /// at rest, from where the surface has gone, and from where it was. Of a curved mirror's several images, one that lies much
+    /// further away than these is not the one that was seen.
+    fn place_in(&self, other: &Moment, center: Vec2, of_surface: Option<Vec2>) -> Option<Vec2> {
+        const NEAR_PX: f32 = 8.0;
+        let target = target_in(other.tracer.world().scene(), &self.seen)?;
+        let search = Search { other, vertices: &self.path.vertices, target };
+        let starts = [self.virtual_place.place(&other.camera), of_surface, Some(center)];
+        let missed = |place: Vec2| search.miss(place).map(|miss| (place, miss));
+        let nearest = starts
+            .into_iter()
+            .flatten()
+            .filter_map(missed)
+            .min_by(|(_, a), (_, b)| a.length_squared().total_cmp(&b.length_squared()))?;
+        let place = search.solve(nearest)?;
+        let most = NEAR_PX.max(2.0 * nearest.0.distance(center));
+        (place.distance(nearest.0) <= most).then_some(place)
+    }
+}
+
+/// The search for the pixel whose ray leads to a target over the same mirrors and glass.
+struct Search<'a> {
+    other: &'a Moment<'a>,
+    vertices: &'a [SpecularVertex],
+    target: Target,
+}
+
+impl Search<'_> {
+    /// By how much the last ray from a place misses the target, as a difference of unit directions; `None` where there is no such
+    /// ray, or the target is behind it.
+    fn miss(&self, place: Vec2) -> Option<Vec3A> {
+        let last = self.other.tracer.follow_again(ray_through(&self.other.camera, place), self.vertices)?;
+        let wanted = match self.target {
+            Target::Point(position) => (Vec3A::from(position) - last.origin).normalize_or_zero(),
+            Target::Direction(direction) => Vec3A::from(direction).normalize_or_zero(),
+        };
+        (wanted.dot(last.direction) > 0.0).then(|| last.direction - wanted)
+    }
+
+    /// Gauss and Newton's method with a derivative by differences at every step; `None` where it does not come to rest.
+    fn solve(&self, (mut place, mut miss): (Vec2, Vec3A)) -> Option<Vec2> {
+        const MOST_STEPS: usize = 12;
+        const AT_REST_PX: f32 = 0.005;
+        for _ in 0..MOST_STEPS {
+            let step = self.step(place, miss)?;
+            let (next, next_miss) = self.shortened(place, miss, step)?;
+            let moved = next.distance(place);
+            (place, miss) = (next, next_miss);
+            if moved < AT_REST_PX && step.length() < 2.0 * AT_REST_PX {
+                return Some(place);
+            }
+        }
+        None
+    }
+
+    /// To where the miss would be least, if it were linear.
+    fn step(&self, place: Vec2, miss: Vec3A) -> Option<Vec2> {
+        let [by_x, by_y] = [Vec2::X, Vec2::Y].map(|axis| self.derivative(place, miss, axis));
+        let (by_x, by_y) = (by_x?, by_y?);
+        let (xx, xy, yy) = (by_x.dot(by_x), by_x.dot(by_y), by_y.dot(by_y));
+        let determinant = xx * yy - xy * xy;
+        // Where images fold, two of them meet and have no motion of their own.
+        if determinant <= 1e-6 * (0.5 * (xx + yy)).powi(2) {
+            return None;
+        }
+        let (x, y) = (by_x.dot(miss), by_y.dot(miss));
+        Some(Vec2::new(xy * y - yy * x, xy * x - xx * y) / determinant)
+    }
+
+    /// Of the miss, a pixel along an axis, from whichever side has a ray.
+    fn derivative(&self, place: Vec2, miss: Vec3A, axis: Vec2) -> Option<Vec3A> {
+        const STEP_PX: f32 = 0.25;
+        [STEP_PX, -STEP_PX].into_iter().find_map(|step| Some((self.miss(place + step * axis)? - miss) / step))
+    }
+
+    /// The step, or the part of it after which the target is missed by less.
+    fn shortened(&self, place: Vec2, miss: Vec3A, step: Vec2) -> Option<(Vec2, Vec3A)> {
+        const MOST_HALVINGS: i32 = 5;
+        // Where it is missed by rounding alone, no step makes it less.
+        const ROUNDING: f32 = 1e-6;
+        (0..=MOST_HALVINGS).find_map(|halving| {
+            let next = place + step * 0.5_f32.powi(halving);
+            let next_miss = self.miss(next)?;
+            (next_miss.length() <= miss.length().max(ROUNDING)).then_some((next, next_miss))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests;

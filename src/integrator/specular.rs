@@ -1,0 +1,134 @@
+//! What is seen in mirrors and through clear glass: a camera ray followed to the first thing that is neither.
+//!
+//! Not for light: only the likelier of reflection and refraction is followed, and nothing is weighed.
+
+use super::PathTracer;
+use super::shading::Components;
+use crate::geometry::{Hit, Ray};
+use crate::scene::{ScalarInput, Surface};
+use glam::Vec3;
+use smallvec::SmallVec;
+
+/// Mirrors and boundaries that are followed at most: what is seen behind more of them has hardly an image.
+const MOST_VERTICES: usize = 8;
+
+/// What a perfectly smooth surface does with a ray.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SpecularEvent {
+    /// As a mirror does.
+    Reflected,
+    /// As glass does.
+    Transmitted,
+}
+
+/// One surface that a ray is followed over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SpecularVertex {
+    /// Which thing, as [`Hit::object`].
+    pub object: u32,
+    /// What it does with the ray.
+    pub event: SpecularEvent,
+}
+
+/// A camera ray followed over perfectly smooth surfaces.
+#[derive(Clone, Debug)]
+pub struct SpecularPath {
+    /// The surfaces in order, at least one.
+    pub vertices: SmallVec<[SpecularVertex; 2]>,
+    /// From the last of them.
+    pub last_ray: Ray,
+    /// What that ray meets; `None` where it leaves the scene.
+    pub end: Option<Hit>,
+    /// From the camera to the end over all surfaces; infinite where the last ray leaves the scene.
+    pub length: f32,
+}
+
+impl PathTracer {
+    /// Whether any of the scene's surfaces may be perfectly smooth, so that following rays is worth while.
+    pub fn has_specular_surfaces(&self) -> bool {
+        self.world.scene().materials.iter().any(|material| may_be_specular(&material.surface))
+    }
+
+    /// Follows a camera ray over mirrors and glass, by the likelier event at each. `None` where the first thing in its way is
+    /// neither, or there are more than eight.
+    pub fn follow_specular(&self, camera_ray: Ray) -> Option<SpecularPath> {
+        let (mut ray, mut length, mut vertices) = (camera_ray, 0.0, SmallVec::new());
+        loop {
+            let hit = self.world.closest(&ray);
+            let next = hit.as_ref().and_then(|hit| self.specular_event(&ray, hit, None));
+            length += hit.as_ref().map_or(f32::INFINITY, |hit| hit.distance);
+            match (hit, next) {
+                (Some(hit), Some((event, next))) if vertices.len() < MOST_VERTICES => {
+                    vertices.push(SpecularVertex { object: hit.object, event });
+                    ray = next;
+                }
+                (_, Some(_)) => return None,
+                (end, None) => {
+                    return (!vertices.is_empty()).then_some(SpecularPath { vertices, last_ray: ray, end, length });
+                }
+            }
+        }
+    }
+
+    /// Follows a ray over the same things by the same events; the ray that leaves the last of them. `None` where it meets
+    /// something else in place of one of them, or cannot go on as asked, as under total reflection.
+    pub fn follow_again(&self, camera_ray: Ray, vertices: &[SpecularVertex]) -> Option<Ray> {
+        vertices.iter().try_fold(camera_ray, |ray, vertex| {
+            let hit = self.world.closest(&ray).filter(|hit| hit.object == vertex.object)?;
+            self.specular_event(&ray, &hit, Some(vertex.event)).map(|(_, next)| next)
+        })
+    }
+
+    /// What the surface at a hit does with a ray if it is perfectly smooth and does not shine: the event that is asked for, or
+    /// the likelier one.
+    fn specular_event(&self, ray: &Ray, hit: &Hit, wanted: Option<SpecularEvent>) -> Option<(SpecularEvent, Ray)> {
+        let material = &self.world.scene().materials[self.world.material_of(hit.object).0 as usize];
+        if !may_be_specular(&material.surface) || material.emission.factor != Vec3::ZERO {
+            return None;
+        }
+        let point = self.world.surface(ray, hit);
+        let wo = -Vec3::from(ray.direction);
+        let components = Components::new();
+        let bsdf = self.bsdf(&point, &components);
+        if bsdf.has_smooth_lobe() {
+            return None;
+        }
+        let shading = self.shading(&bsdf, &point, wo, ray.time);
+        // Of two lobes that share [0, 1), the likelier one has the middle; each end belongs to one of them.
+        [0.5, 0.0, 1.0 - f32::EPSILON].into_iter().find_map(|lobe| {
+            let scattered = shading.bsdf.sample(shading.frame.to_local(wo), [0.5, 0.5, lobe])?;
+            let event =
+                if scattered.lobe.is_transmission() { SpecularEvent::Transmitted } else { SpecularEvent::Reflected };
+            let wi = shading.frame.to_world_direction(scattered.wi);
+            let is_wanted = scattered.lobe.is_delta() && wanted.is_none_or(|wanted| wanted == event);
+            let next = Ray { origin: point.spawn(wi), direction: wi.into(), time: ray.time };
+            (is_wanted && shading.sides_agree(wo, wi)).then_some((event, next))
+        })
+    }
+}
+
+/// Whether some place of a surface may be perfectly smooth. What it says of none need not be asked at a point.
+fn may_be_specular(surface: &Surface) -> bool {
+    /// Below it a perceptual roughness counts as none.
+    const SMOOTH: f32 = 0.05;
+    let is_smooth = |input: &ScalarInput| input.texture.is_some() || input.factor < SMOOTH;
+    match surface {
+        Surface::Mirror { .. } | Surface::ThinDielectric { .. } | Surface::HeTorrance { .. } => true,
+        Surface::Conductor { roughness, .. } | Surface::Dielectric { roughness, .. } => is_smooth(&roughness.u),
+        Surface::CoatedDiffuse { reflectance, roughness, .. } => {
+            is_smooth(&roughness.u) && (reflectance.factor == Vec3::ZERO || reflectance.texture.is_some())
+        }
+        Surface::CoatedConductor { roughness, coat_roughness, .. } => {
+            is_smooth(&roughness.u) && is_smooth(&coat_roughness.u)
+        }
+        Surface::MetalRoughness(model) => {
+            is_smooth(&model.roughness) && (model.metallic.factor > 0.0 || model.transmission.factor > 0.0)
+        }
+        Surface::Mix { first, second, .. } => may_be_specular(first) || may_be_specular(second),
+        Surface::Diffuse { .. }
+        | Surface::OrenNayar { .. }
+        | Surface::DiffuseTransmission { .. }
+        | Surface::Phong { .. }
+        | Surface::Ward { .. } => false,
+    }
+}
