@@ -9,6 +9,7 @@ mod status;
 mod unit;
 mod work;
 
+use super::CALL_AGAIN;
 use anyhow::{Context, Result};
 use clap::{Args, Subcommand};
 use fechner::farm::Farm;
@@ -58,9 +59,6 @@ impl Threads {
             .context("the threads could not be started")
     }
 }
-
-/// Units or frames are left: to be called again (`EX_TEMPFAIL` of sysexits.h).
-const CALL_AGAIN: u8 = 75;
 
 /// Runs one of them.
 pub(super) fn run(arguments: &FarmArguments) -> Result<ExitCode> {
