@@ -85,6 +85,13 @@ fn open_for_work(folder: &Path) -> Result<Farm> {
     Ok(farm)
 }
 
+/// The file that is locked while a frame is merged. A plan that was interrupted has not made its folder.
+fn frame_lock(farm: &Farm, frame_index: usize) -> Result<PathBuf> {
+    let folder = farm.frame_folder(frame_index);
+    std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+    Ok(farm.frame_lock(frame_index))
+}
+
 fn absolute(folder: &Path) -> Result<PathBuf> {
     folder.canonicalize().with_context(|| format!("{}", folder.display()))
 }
