@@ -8,8 +8,7 @@ fn main() -> ExitCode {
     match cli::run() {
         Ok(code) => code,
         Err(error) => {
-            // One line, whatever the chain of causes.
-            eprintln!("fechner: {}", format!("{error:#}").replace('\n', " "));
+            eprintln!("fechner: {}", cli::in_a_line(&error));
             ExitCode::from(2)
         }
     }

@@ -198,14 +198,15 @@ impl Display {
         display.distance_m = file.distance_m.or(display.distance_m);
         display.csf_area_deg2 = file.csf_area_deg2.or(display.csf_area_deg2);
         match (file.pixels_per_degree, file.width_px, file.width_m, display.distance_m) {
-            (Some(_), None, None, _) | (None, None, None, _) => {}
+            (Some(_), None, None, _) | (None, None, None, None) => {}
             (None, Some(width_px), Some(width_m), Some(distance_m)) => {
                 display.pixels_per_degree = pixels_per_degree(width_px, width_m, distance_m)?;
             }
             _ => {
                 return Err(Error::Parse {
                     what: "display file",
-                    reason: "give either `pixels_per_degree`, or all of `width_px`, `width_m` and `distance_m`"
+                    reason: "from `distance_m` alone pixels a degree do not follow: give `pixels_per_degree`, or all of `width_px`, \
+                             `width_m` and `distance_m`"
                         .to_owned(),
                 });
             }
@@ -398,6 +399,7 @@ mod tests {
         assert!(matches!(Display::from_toml("colour = 'red'"), Err(Error::Parse { .. })));
         assert!(matches!(Display::from_toml("preset = 'wall'"), Err(Error::UnknownName { .. })));
         assert!(matches!(Display::from_toml("width_px = 1920"), Err(Error::Parse { .. })));
+        assert!(matches!(Display::from_toml("preset = 'desktop'\ndistance_m = 1.2"), Err(Error::Parse { .. })));
         let phone = Display::from_toml("preset = 'phone'\nwhite_cd_m2 = 700").unwrap();
         assert_eq!((phone.white_cd_m2, phone.pixels_per_degree), (700.0, 90.0));
     }

@@ -54,7 +54,8 @@ def read_pfm(path):
 
 def judge(first, second, viewing, operator):
     """Visibility, in threshold units, of the noise left in the mean of two renders (scene cd/m²)."""
-    mean = fechner.luminance(0.5 * (first + second))
+    # A filter with negative lobes may leave luminance below 0, which is no light.
+    mean = np.maximum(fechner.luminance(0.5 * (first + second)), 0)
     half_difference = fechner.luminance(0.5 * (first - second))
     tone = fechner.fit_tone(mean, operator, viewing)
     shown = tone.display_luminance(mean)

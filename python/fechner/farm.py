@@ -81,6 +81,8 @@ def run(folder, client, program: str = "fechner", threads: int = 1, say=print) -
             waiting[frame].discard(unit)
             if not waiting[frame]:
                 submit(frame, ["merge", "--frame", str(frame)], None)
+    # What needs all frames, such as a video, if it is not made yet.
+    client.submit(_run, program, folder, ["merge", "--threads", str(threads)], pure=False).result()
 
 
 def main() -> None:

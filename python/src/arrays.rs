@@ -1,6 +1,6 @@
 //! Pictures between numpy and the crate.
 //!
-//! A C-contiguous `float32` array is read where it lies; anything else that numpy can turn into one is converted first.
+//! A C-contiguous, aligned `float32` array is read where it lies; anything else that numpy can turn into one is converted first.
 //! Pictures in colour reach the crate without a copy, single-channel ones by one copy into its [`Plane`]; results go back without.
 
 use fechner_perception::Plane;
@@ -25,7 +25,9 @@ pub(crate) struct Pixels<'py> {
 impl<'py> Pixels<'py> {
     /// `what` names the argument in errors.
     pub(crate) fn borrow(what: &'static str, given: &Bound<'py, PyAny>) -> PyResult<Self> {
-        let in_place = given.cast::<PyArrayDyn<f32>>().ok().filter(|array| array.is_c_contiguous()).cloned();
+        check_unmasked(what, given)?;
+        let in_place = given.cast::<PyArrayDyn<f32>>().ok().filter(|array| array.is_c_contiguous());
+        let in_place = in_place.filter(|array| (array.data() as usize).is_multiple_of(align_of::<f32>())).cloned();
         let array = match in_place {
             Some(array) => array,
             None => converted(what, given)?,
@@ -86,13 +88,26 @@ pub(crate) fn optional_plane(what: &'static str, given: Option<&Bound<'_, PyAny>
     given.map(|given| plane(what, given)).transpose()
 }
 
+/// Refuses a masked array that hides something: what it hides would count.
+fn check_unmasked(what: &'static str, given: &Bound<'_, PyAny>) -> PyResult<()> {
+    let py = given.py();
+    let masked = py.import("numpy")?.getattr("ma")?;
+    if given.is_instance(&masked.getattr("MaskedArray")?)? && masked.call_method1("is_masked", (given,))?.is_truthy()? {
+        let message = format!("{what} is a masked array; fill in what it hides, as by its filled()");
+        return Err(PyValueError::new_err(message));
+    }
+    Ok(())
+}
+
 fn converted<'py>(what: &'static str, given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
     let py = given.py();
     let kind = PyDict::new(py);
     kind.set_item("dtype", "float32")?;
+    // Its own memory unless it is aligned as well, which `ascontiguousarray` does not see to.
+    kind.set_item("requirements", "CA")?;
     let array = py
         .import("numpy")?
-        .call_method("ascontiguousarray", (given,), Some(&kind))
+        .call_method("require", (given,), Some(&kind))
         .map_err(|error| PyValueError::new_err(format!("{what} is no array of numbers: {}", error.value(py))))?;
     Ok(array.cast_into::<PyArrayDyn<f32>>()?)
 }

@@ -3,6 +3,7 @@
 use fechner_perception::allocation::{self, AllocationProblem, FINE_GAP};
 use fechner_perception::{Plane, ThresholdInputs, csf, threshold};
 use numpy::PyArray2;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::arrays::{optional_plane, plane, plane_to_array};
@@ -41,7 +42,8 @@ pub(crate) fn contrast_sensitivity_functions() -> Vec<&'static str> {
     csf::names().to_vec()
 }
 
-/// Contrast sensitivity (1 over threshold contrast) of the function `csf` at a frequency, cpd, and a luminance, cd/m².
+/// Contrast sensitivity (1 over threshold contrast) of the function `csf` at a frequency, cpd, and a luminance, cd/m²: ValueError
+/// where one is below 0 or not finite.
 #[pyfunction]
 #[pyo3(signature = (frequency_cpd, luminance_cd_m2, viewing = None, csf = "castle"))]
 pub(crate) fn contrast_sensitivity(
@@ -50,8 +52,17 @@ pub(crate) fn contrast_sensitivity(
     viewing: Option<&Viewing>,
     csf: &str,
 ) -> PyResult<f64> {
+    check_number("frequency_cpd", frequency_cpd, frequency_cpd >= 0.0, "finite and not negative")?;
+    check_number("luminance_cd_m2", luminance_cd_m2, luminance_cd_m2 >= 0.0, "finite and not negative")?;
     let csf = csf::by_name(csf, &or_default(viewing)).map_err(value_error)?;
     Ok(csf.sensitivity(frequency_cpd, luminance_cd_m2))
+}
+
+fn check_number(what: &str, value: f64, is_sound: bool, must_be: &str) -> PyResult<()> {
+    if is_sound && value.is_finite() {
+        return Ok(());
+    }
+    Err(PyValueError::new_err(format!("{what} is {value}; it must be {must_be}")))
 }
 
 impl ThresholdMap {
@@ -75,9 +86,10 @@ impl ThresholdMap {
         plane_to_array(py, self.0.adaptation_cd_m2().clone())
     }
 
-    /// Standard error of each pixel's mean, cd/m², that leaves white noise at `visibility`; (height, width).
+    /// Standard error of each pixel's mean, cd/m², that leaves white noise at `visibility`, above 0; (height, width).
     #[pyo3(signature = (visibility = 1.0))]
     fn allowed_standard_error<'py>(&self, py: Python<'py>, visibility: f64) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        check_number("visibility", visibility, visibility > 0.0, "finite and above 0")?;
         plane_to_array(py, work(py, || self.0.allowed_standard_error_cd_m2(visibility))?)
     }
 

@@ -31,7 +31,7 @@ pub(crate) struct Tone {
 ///
 /// scene: linear Rec. 709 RGB (height, width, 3) or luminance (height, width), scene cd/m². exposure_stops multiplies light by
 /// 2^stops. local: adapted at each pixel, for the operators that know it. gaze: (column, row) the eye rests on.
-/// ValueError for a name that there is not and for light below 0 or not finite.
+/// ValueError for a name that there is not and for luminance below 0 and light that is not finite.
 #[pyfunction]
 #[pyo3(signature = (scene, name, viewing = None, *, exposure_stops = 0.0, local = false, gaze = None))]
 pub(crate) fn fit_tone(
@@ -41,7 +41,7 @@ pub(crate) fn fit_tone(
     viewing: Option<&Viewing>,
     exposure_stops: f64,
     local: bool,
-    gaze: Option<(usize, usize)>,
+    gaze: Option<(i64, i64)>,
 ) -> PyResult<Tone> {
     let scope = if local { AdaptationScope::Local } else { AdaptationScope::World };
     let settings = ToneSettings { exposure_stops, scope, effects: None };
@@ -51,16 +51,20 @@ pub(crate) fn fit_tone(
     }
     let scene = Scene::read(py, &Pixels::borrow("scene", scene)?)?;
     let shape = Shape { height: scene.photopic.height(), width: scene.photopic.width() };
-    if let Some((x, y)) = gaze.filter(|&(x, y)| x >= shape.width || y >= shape.height) {
-        let message = format!("gaze ({x}, {y}) lies outside the picture of {}×{} pixels", shape.width, shape.height);
-        return Err(PyValueError::new_err(message));
-    }
+    let gaze = gaze.map(|gaze| pixel_of(gaze, shape)).transpose()?;
     let viewing = or_default(viewing);
     let fitted = work(py, || {
         let guide = SceneGuide { scotopic_cd_m2: scene.scotopic.as_ref(), ..SceneGuide::of(&scene.photopic) };
-        operator.fit(&guide.with_gaze(gaze.map(|(x, y)| Pixel { x, y })), &viewing, None)
+        operator.fit(&guide.with_gaze(gaze), &viewing, None)
     })?;
     Ok(Tone { fitted, display: viewing.display, shape })
+}
+
+fn pixel_of((x, y): (i64, i64), Shape { height, width }: Shape) -> PyResult<Pixel> {
+    let within = |place: i64, size: usize| usize::try_from(place).ok().filter(|&place| place < size);
+    within(x, width).zip(within(y, height)).map(|(x, y)| Pixel { x, y }).ok_or_else(|| {
+        PyValueError::new_err(format!("gaze ({x}, {y}) lies outside the picture of {width}×{height} pixels"))
+    })
 }
 
 /// What cones and rods see of a picture, cd/m².
@@ -77,11 +81,13 @@ impl Scene {
                 Plane::from_fn(shape.width, shape.height, |x, y| weigh(rgb[y * shape.width + x]).max(0.0))
             };
             check_finite(rgb.as_flattened())?;
+            check_luminance(rgb.iter().map(|&rgb| luminance(rgb)))?;
             work(py, || Self { photopic: seen_by(luminance), scotopic: Some(seen_by(scotopic_luminance)) })?
         } else {
             let photopic = pixels.plane()?;
             check_finite(photopic.values())?;
-            Self { photopic: photopic.map(|value| value.max(0.0)), scotopic: None }
+            check_luminance(photopic.values().iter().copied())?;
+            Self { photopic, scotopic: None }
         };
         Ok(scene)
     }
@@ -91,6 +97,16 @@ fn check_finite(values: &[f32]) -> PyResult<()> {
     match values.iter().find(|value| !value.is_finite()) {
         None => Ok(()),
         Some(value) => Err(PyValueError::new_err(format!("scene holds {value}; light must be finite"))),
+    }
+}
+
+/// Single channels below 0 are colours that Rec. 709 does not hold; luminance below 0 is no light.
+fn check_luminance(mut values: impl Iterator<Item = f32>) -> PyResult<()> {
+    match values.find(|&value| value < 0.0) {
+        None => Ok(()),
+        Some(value) => {
+            Err(PyValueError::new_err(format!("scene holds the luminance {value}; light must not be negative")))
+        }
     }
 }
 

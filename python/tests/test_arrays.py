@@ -11,6 +11,13 @@ import fechner
 GREY = np.full((24, 32), 50, np.float32)
 
 
+def misaligned(picture):
+    memory = np.empty(picture.nbytes + 1, np.uint8)
+    array = memory[1:].view(np.float32).reshape(picture.shape)
+    array[:] = picture
+    return array
+
+
 def visibility_of(picture):
     return fechner.threshold_map(picture).allowed_standard_error()
 
@@ -25,8 +32,10 @@ def visibility_of(picture):
         GREY[::-1],
         GREY.astype(">f4"),
         GREY.tolist(),
+        misaligned(GREY),
+        np.ma.masked_array(GREY),
     ],
-    ids=["float64", "uint8", "fortran", "strided", "negative stride", "big endian", "list"],
+    ids=["float64", "uint8", "fortran", "strided", "negative stride", "big endian", "list", "misaligned", "nothing masked"],
 )
 def test_other_arrays_are_converted(same):
     np.testing.assert_array_equal(visibility_of(same), visibility_of(GREY))
@@ -63,6 +72,14 @@ def colour(shape):
         (lambda: fechner.threshold_map(np.zeros(4)), r"shape \[4\]; it must have \(height, width\)"),
         (lambda: fechner.threshold_map(colour((4, 4, 3))), r"must have \(height, width\)"),
         (lambda: fechner.threshold_map(None), "must have"),
+        (lambda: fechner.threshold_map(np.ma.masked_equal(GREY, 50)), "display_luminance is a masked array"),
+        (lambda: fechner.threshold_map(GREY).allowed_standard_error(-1), "visibility is -1; it must be finite and above 0"),
+        (lambda: fechner.threshold_map(GREY).allowed_standard_error(float("nan")), "visibility is NaN"),
+        (lambda: fechner.contrast_sensitivity(float("nan"), 100), "frequency_cpd is NaN; it must be finite and not"),
+        (lambda: fechner.contrast_sensitivity(1, -1), "luminance_cd_m2 is -1"),
+        (lambda: fechner.fit_tone(GREY, "agx", gaze=(-1, 0)), r"gaze \(-1, 0\) lies outside the picture"),
+        (lambda: fechner.fit_tone(-GREY, "agx"), "scene holds the luminance -50; light must not be negative"),
+        (lambda: fechner.tone_map(-colour((4, 4, 3)), "agx"), "scene holds the luminance -"),
         (lambda: fechner.threshold_map("picture"), "display_luminance is no array of numbers"),
         (lambda: fechner.threshold_map([[1.0, 2.0], [3.0]]), "display_luminance is no array of numbers"),
         (lambda: fechner.threshold_map(GREY, GREY[1:]), "guide variance is 32×23 pixels, but 32×24 are needed"),

@@ -13,12 +13,13 @@ pub struct FrameName {
 impl FrameName {
     /// Reads a pattern; `None` unless it has exactly one run of `#`, in the file's name.
     pub fn parse(pattern: &str) -> Option<Self> {
-        let start = pattern.find('#')?;
+        let name = pattern.rfind(['/', std::path::MAIN_SEPARATOR]).map_or(0, |separator| separator + 1);
+        let start = name + pattern[name..].find('#')?;
         let (before, rest) = pattern.split_at(start);
         let digits = rest.chars().take_while(|&letter| letter == '#').count();
         let after = &rest[digits..];
-        let is_in_folder = after.contains(['#', '/', std::path::MAIN_SEPARATOR]);
-        (!is_in_folder).then(|| Self { before: before.to_owned(), digits, after: after.to_owned() })
+        let is_one_run = !after.contains('#');
+        is_one_run.then(|| Self { before: before.to_owned(), digits, after: after.to_owned() })
     }
 
     /// The file of a frame.
@@ -77,6 +78,7 @@ mod tests {
         assert_eq!(name.of_shot("json"), Path::new("out/shot.json"));
         assert_eq!(FrameName::parse("##.png").expect("a pattern").of_shot("json"), Path::new("shot.json"));
         assert_eq!(FrameName::parse("out/##.png").expect("a pattern").of_shot("json"), Path::new("out/shot.json"));
+        assert_eq!(FrameName::parse("a#b/shot.##.exr").expect("a pattern").of(7), Path::new("a#b/shot.07.exr"));
         for bad in ["shot.exr", "a#b#.png", "out##/shot.png", ""] {
             assert_eq!(FrameName::parse(bad), None, "{bad}");
         }

@@ -84,6 +84,7 @@ fn add(
     sum.state.seconds_total += next.state.seconds_total;
     sum.state.seconds_perception += next.state.seconds_perception;
     sum.state.seconds_allocation += next.state.seconds_allocation;
+    sum.state.seconds_denoising += next.state.seconds_denoising;
     sum.header.settings.importance = sum.header.settings.importance.or(header.settings.importance);
     sum.header.visibility = sum.header.visibility.min(next.header.visibility);
     sum.header.seeds.all.extend(next.header.seeds.all);

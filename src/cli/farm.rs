@@ -9,6 +9,7 @@ mod status;
 mod unit;
 mod work;
 
+use super::CALL_AGAIN;
 use anyhow::{Context, Result};
 use clap::{Args, Subcommand};
 use fechner::farm::Farm;
@@ -59,9 +60,6 @@ impl Threads {
     }
 }
 
-/// Units or frames are left: to be called again (`EX_TEMPFAIL` of sysexits.h).
-const CALL_AGAIN: u8 = 75;
-
 /// Runs one of them.
 pub(super) fn run(arguments: &FarmArguments) -> Result<ExitCode> {
     match &arguments.command {
@@ -85,6 +83,13 @@ fn open_for_work(folder: &Path) -> Result<Farm> {
         )
     })?;
     Ok(farm)
+}
+
+/// The file that is locked while a frame is merged. A plan that was interrupted has not made its folder.
+fn frame_lock(farm: &Farm, frame_index: usize) -> Result<PathBuf> {
+    let folder = farm.frame_folder(frame_index);
+    std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+    Ok(farm.frame_lock(frame_index))
 }
 
 fn absolute(folder: &Path) -> Result<PathBuf> {

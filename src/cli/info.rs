@@ -33,10 +33,12 @@ fn describe(path: &Path) -> anyhow::Result<String> {
 /// A film's file may have any name.
 fn is_film(path: &Path) -> anyhow::Result<bool> {
     let cannot_read = || format!("cannot read {}", path.display());
-    let mut start = Vec::new();
-    if path.metadata().with_context(cannot_read)?.is_file() {
-        std::fs::File::open(path).and_then(|file| file.take(16).read_to_end(&mut start)).with_context(cannot_read)?;
+    let found = path.metadata().with_context(cannot_read)?;
+    if !found.is_file() {
+        bail!("{}: {}", cannot_read(), if found.is_dir() { "it is a folder" } else { "it is not an ordinary file" });
     }
+    let mut start = Vec::new();
+    std::fs::File::open(path).and_then(|file| file.take(16).read_to_end(&mut start)).with_context(cannot_read)?;
     Ok(is_checkpoint(&start))
 }
 
@@ -68,6 +70,11 @@ impl Range {
 
     fn row(&self, text: &mut String, name: &str, kind: &str, width: usize) {
         let Self { min, mean, max, nonfinite } = self;
+        if mean.is_nan() {
+            let none = if *nonfinite > 0 { format!("{nonfinite} values, none finite") } else { "no values".to_owned() };
+            let _ = writeln!(text, "  {name:width$}  {kind:5}  {none:>12}");
+            return;
+        }
         let _ = write!(
             text,
             "  {name:width$}  {kind:5}  {:>12}  {:>12}  {:>12}",
@@ -124,6 +131,14 @@ fn describe_exr(image: &ExrImage) -> String {
     text
 }
 
+/// Refuses what a small file can ask for.
+fn check_bytes(path: &Path, (width, height): (u32, u32), bytes: u64) -> anyhow::Result<()> {
+    if bytes > 1 << 30 {
+        bail!("cannot read {}: {width}×{height} pixels need more than 1 GiB", path.display());
+    }
+    Ok(())
+}
+
 fn describe_png(path: &Path) -> anyhow::Result<String> {
     let problem = || format!("cannot read {}: damaged or no PNG file", path.display());
     let file = std::fs::File::open(path).with_context(|| format!("cannot read {}", path.display()))?;
@@ -152,11 +167,13 @@ fn describe_png(path: &Path) -> anyhow::Result<String> {
         format!("PNG, {}×{} pixels, {:?}, {bits} bits a channel\n", info.width, info.height, info.color_type);
     let _ = writeln!(text, "colour tags: {}", tags.join(", "));
 
+    let (columns, rows) = (info.width, info.height);
     let size = reader.output_buffer_size().with_context(problem)?;
+    check_bytes(path, (columns, rows), size as u64)?;
     let mut pixels = vec![0; size];
     let frame = reader.next_frame(&mut pixels).with_context(problem)?;
     pixels.truncate(frame.buffer_size());
-    if bits == 8 {
+    if bits == 8 || bits == 16 {
         let names: &[&str] = match frame.color_type {
             png::ColorType::Grayscale => &["grey"],
             png::ColorType::GrayscaleAlpha => &["grey", "alpha"],
@@ -167,8 +184,11 @@ fn describe_png(path: &Path) -> anyhow::Result<String> {
         text.push('\n');
         heading(&mut text, "channel", 7);
         for (c, name) in names.iter().enumerate() {
-            let values = pixels.iter().skip(c).step_by(names.len()).map(|&byte| f32::from(byte));
-            Range::of(values).row(&mut text, name, "8-bit", 7);
+            let bytes = usize::from(bits / 8);
+            // 16 bits have their high byte first; of 8 there is one.
+            let value = |value: &[u8]| f32::from(value.iter().fold(0, |high: u16, &low| (high << 8) | u16::from(low)));
+            let values = pixels.chunks_exact(bytes).skip(c).step_by(names.len()).map(value);
+            Range::of(values).row(&mut text, name, if bits == 8 { "8-bit" } else { "16-bit" }, 7);
         }
     }
     Ok(text)
@@ -183,9 +203,7 @@ fn describe_hdr(path: &Path) -> anyhow::Result<String> {
     decoder.set_limits(limits).with_context(problem)?;
     let meta = decoder.metadata();
     let (width, height) = decoder.dimensions();
-    if decoder.total_bytes() > 1 << 30 {
-        bail!("cannot read {}: {width}×{height} pixels need more than 1 GiB", path.display());
-    }
+    check_bytes(path, (width, height), decoder.total_bytes())?;
     let pixels = image::DynamicImage::from_decoder(decoder).with_context(problem)?.into_rgb32f();
     let mut text = format!("Radiance HDR, {width}×{height} pixels, shared exponent\n");
     if let Some(exposure) = meta.exposure {
@@ -231,6 +249,43 @@ mod tests {
         write_png(&path, 2, 2, &[[1.0, 0.0, 0.0]; 4]).unwrap();
         let text = describe(&path).unwrap();
         assert!(text.contains("2×2 pixels, Rgb, 8 bits") && text.contains("sRGB"), "{text}");
+    }
+
+    #[test]
+    fn sixteen_bits_have_a_table_and_forty_thousand_rows_no_memory() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        let write = |(width, height): (u32, u32), depth, pixels: &[u8]| {
+            let mut encoder = png::Encoder::new(std::fs::File::create(&path).unwrap(), width, height);
+            encoder.set_color(png::ColorType::Grayscale);
+            encoder.set_depth(depth);
+            let mut writer = encoder.write_header().unwrap();
+            writer.write_image_data(pixels).ok();
+        };
+        write((2, 1), png::BitDepth::Sixteen, &[1, 0, 0, 3]);
+        let text = describe(&path).unwrap();
+        let row: Vec<_> = text.lines().last().unwrap().split_whitespace().collect();
+        assert_eq!(row, ["grey", "16-bit", "3", "129.5", "256"], "{text}");
+        write((40_000, 40_000), png::BitDepth::Eight, &[]);
+        assert!(format!("{:#}", describe(&path).unwrap_err()).contains("40000×40000 pixels need more than 1 GiB"));
+    }
+
+    #[test]
+    fn a_picture_without_pixels_has_no_range() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.hdr");
+        std::fs::write(&path, "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 0 +X 0\n").unwrap();
+        let text = describe(&path).unwrap();
+        assert!(text.contains("no values") && !text.contains("inf"), "{text}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_pipe_is_refused_and_not_waited_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
+        assert!(format!("{:#}", describe(&path).unwrap_err()).contains("not an ordinary file"));
     }
 
     #[test]

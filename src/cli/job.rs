@@ -40,7 +40,7 @@ pub(super) struct JobArguments {
     /// The same, by name.
     #[arg(long, value_enum, conflicts_with = "visibility", help_heading = "Until")]
     quality: Option<Quality>,
-    /// Stop after this many seconds of rendering.
+    /// Stop after this many seconds of rendering, between plans; the first of them, 16 samples a pixel, is always traced.
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_negative_numbers = true, help_heading = "Until")]
     time: Option<Duration>,
     /// Stop at this mean number of samples a pixel.

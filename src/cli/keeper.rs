@@ -2,8 +2,9 @@
 
 use super::console::Console;
 use super::seeing::parse_seconds;
+use super::signals::listen;
 use super::tev::Showing;
-use anyhow::{Context, bail};
+use anyhow::bail;
 use clap::Args;
 use fechner::adaptive::judge::Judgement;
 use fechner::adaptive::settings::Limits;
@@ -175,22 +176,20 @@ pub(super) struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    /// From here on SIGINT, SIGTERM and SIGHUP end the render with the picture so far; a second one ends the program.
+    /// From here on SIGINT, SIGTERM and SIGHUP end the render with the picture so far; one that comes seconds later ends the program.
     pub(super) fn new(
         console: Console,
         keeper: Option<Keeper>,
         audience: Option<Audience<'a>>,
         tev: Option<Showing>,
     ) -> anyhow::Result<Self> {
-        let stop = Arc::new(AtomicBool::new(false));
-        let asked = Arc::clone(&stop);
-        ctrlc::set_handler(move || {
-            if asked.swap(true, Ordering::Relaxed) {
-                std::process::exit(130);
-            }
-        })
-        .context("signals cannot be waited for")?;
+        let stop = listen(|| {})?;
         Ok(Self { console, keeper, audience, tev, stop, started: Instant::now() })
+    }
+
+    /// Whether a signal asked for the end.
+    pub(super) fn is_asked_to_end(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
     }
 
     /// Removes the progress bar.
@@ -246,7 +245,7 @@ impl Monitor for Watch<'_> {
     }
 
     fn between_batches(&self, state: &RenderState) -> Directive {
-        if self.stop.load(Ordering::Relaxed) {
+        if self.is_asked_to_end() {
             return Directive::Stop;
         }
         if let Some(keeper) = &self.keeper {

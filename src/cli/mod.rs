@@ -17,16 +17,20 @@ mod picture;
 mod render;
 mod report;
 mod seeing;
+mod signals;
 mod staging;
 mod targets;
 mod tev;
 mod threshold;
 mod tonemap;
 mod view;
+mod words;
 
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
+
+pub(crate) use words::in_a_line;
 
 /// A path tracer that stops sampling where the eye stops seeing.
 #[derive(Debug, Parser)]
@@ -38,7 +42,7 @@ struct CommandLine {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Render a scene until nothing more can be seen, or until a limit.
+    /// Render a scene until nothing more can be seen, or until a limit. Exit status 75 where a signal ended it before.
     Render(Box<render::RenderArguments>),
     /// Show a render in a browser while it is made: layers, live exposure and camera, stop, save.
     View(Box<view::ViewArguments>),
@@ -63,11 +67,14 @@ enum Command {
     },
 }
 
+/// A signal ended it, or it has to wait: to be called again (`EX_TEMPFAIL` of sysexits.h).
+const CALL_AGAIN: u8 = 75;
+
 /// Runs what the arguments ask for. Exit status 0: done; 1: `compare` sees a difference; 2: bad input or a failed write;
-/// 75: a farm's work was stopped or has to wait, and should be called again.
+/// 75: a render or a farm's work was stopped by a signal, or has to wait, and should be called again.
 pub(crate) fn run() -> anyhow::Result<ExitCode> {
     match CommandLine::parse().command {
-        Command::Render(arguments) => render::run(&arguments)?,
+        Command::Render(arguments) => return render::run(&arguments),
         Command::View(arguments) => view::run(&arguments)?,
         Command::Animate(arguments) => animate::run(&arguments)?,
         Command::Bench(arguments) => bench::run(&arguments)?,

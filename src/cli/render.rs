@@ -1,5 +1,6 @@
 //! `fechner render`: a scene file in, a picture out.
 
+use super::CALL_AGAIN;
 use super::console::Console;
 use super::job::{JobArguments, Prepared};
 use super::json::write_json;
@@ -11,12 +12,14 @@ use super::view::audience;
 use clap::Args;
 use fechner::adaptive::settings::LoopSettings;
 use fechner::adaptive::state::RenderState;
-use fechner::adaptive::{self, Rendered};
+use fechner::adaptive::{self, Rendered, StopReason};
 use fechner::checkpoint::{Header, Origin, Seeds};
 use fechner::integrator::{Crop, PathTracer};
 use fechner::output;
 use fechner::output::rendered::Background;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 use std::sync::Arc;
 
 /// Arguments of `render`.
@@ -40,7 +43,7 @@ pub(super) struct RenderArguments {
 }
 
 /// Renders and writes.
-pub(super) fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
+pub(super) fn run(arguments: &RenderArguments) -> anyhow::Result<ExitCode> {
     let format = output::check_target(&arguments.output)?;
     check_distinct(&[
         ("-o", Some(&arguments.output)),
@@ -55,7 +58,7 @@ pub(super) fn run(arguments: &RenderArguments) -> anyhow::Result<()> {
     pool.install(|| render_and_write(arguments, format))
 }
 
-fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyhow::Result<()> {
+fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyhow::Result<ExitCode> {
     let Prepared { scene, trace, record, settings } = arguments.job.prepare()?;
     let Crop { width, height, .. } = trace.film_area();
     let fresh = RenderState::new(width, height, &settings.limits);
@@ -81,12 +84,25 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     watch.finish();
     let report = Report::new(&arguments.job.scene_name(), &seeds, &settings, &rendered);
     let background = arguments.job.background();
-    write_picture(&arguments.output, format, background, &rendered, &settings, &report)?;
+    let write = |path: &Path| write_picture(path, format, background, &rendered, &settings, &report);
+    write(&arguments.output).map_err(|error| kept_elsewhere(&arguments.output, write, error))?;
     if let Some(path) = &arguments.json {
         write_json(path, &report)?;
     }
     eprintln!("{}", summary(&report, &settings, &rendered));
-    watch.report()
+    let is_unfinished = rendered.stop_reason == StopReason::Interrupted && watch.is_asked_to_end();
+    watch.report()?;
+    Ok(if is_unfinished { ExitCode::from(CALL_AGAIN) } else { ExitCode::SUCCESS })
+}
+
+/// Writes a picture that cannot be where it should into the folder for temporary files, and says so: its samples took long.
+fn kept_elsewhere(path: &Path, write: impl Fn(&Path) -> anyhow::Result<()>, error: anyhow::Error) -> anyhow::Error {
+    let name = path.file_name().unwrap_or(OsStr::new("picture")).to_string_lossy();
+    let elsewhere = std::env::temp_dir().join(format!("fechner-{}-{name}", std::process::id()));
+    match write(&elsewhere) {
+        Ok(()) => error.context(format!("the picture is in {}", elsewhere.display())),
+        Err(_) => error,
+    }
 }
 
 /// Writes the picture in the format that its name asks for.

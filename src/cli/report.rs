@@ -1,6 +1,7 @@
 //! The figures of a render, for machines (`--json`, EXR attributes) and in plain words.
 
 use super::console::duration_in_words;
+use super::words::rounded;
 use fechner::adaptive::judge::Judgement;
 use fechner::adaptive::settings::{LoopSettings, RivalRule, Sampling};
 use fechner::adaptive::statistics::find_outliers;
@@ -142,13 +143,7 @@ impl Report {
             height: film.height(),
             seed: seeds[0],
             seeds: seeds.to_vec(),
-            sampling: match settings.sampling {
-                Sampling::Adaptive => "adaptive",
-                Sampling::Uniform => "uniform",
-                Sampling::Rival(RivalRule::Relative { .. }) => "relative",
-                Sampling::Rival(RivalRule::Variance { .. }) => "variance",
-                Sampling::Rival(RivalRule::Budget) => "budget",
-            },
+            sampling: sampling_name(settings.sampling),
             model: settings.model.as_ref().map_or("csf-bands", |model| model.name()),
             csf: if settings.frames.is_some() { "castle-fresh-noise" } else { "castle" },
             operator: judgement.tone.describe(),
@@ -259,6 +254,17 @@ impl Report {
     }
 }
 
+/// As `--sampling` has it.
+pub(super) fn sampling_name(sampling: Sampling) -> &'static str {
+    match sampling {
+        Sampling::Adaptive => "adaptive",
+        Sampling::Uniform => "uniform",
+        Sampling::Rival(RivalRule::Relative { .. }) => "relative",
+        Sampling::Rival(RivalRule::Variance { .. }) => "variance",
+        Sampling::Rival(RivalRule::Budget) => "budget",
+    }
+}
+
 /// The end of a render in plain words.
 pub(super) fn summary(report: &Report, settings: &LoopSettings, rendered: &Rendered) -> String {
     let display = &settings.viewing.display;
@@ -266,6 +272,9 @@ pub(super) fn summary(report: &Report, settings: &LoopSettings, rendered: &Rende
     let p = |v: f64| format!("{:.1} %", 100.0 * detection_probability(v));
     let why = match rendered.stop_reason {
         StopReason::Visibility => "Stopped because the target is reached",
+        StopReason::Time if settings.limits.time.is_some_and(|limit| rendered.seconds_total < limit.as_secs_f64()) => {
+            "Stopped because the next plan would not fit into the time"
+        }
         StopReason::Time => "Stopped because the time was up",
         StopReason::Samples => "Stopped because the samples were spent",
         StopReason::MaxSamples => {
@@ -297,10 +306,10 @@ pub(super) fn summary(report: &Report, settings: &LoopSettings, rendered: &Rende
     if let (Some(p99), Some(noticed)) = (report.visibility_p99, report.patches_noticed) {
         lines.push(format!(
             "On the display \"{}\" ({} pixels a degree{distance}, white {} cd/m²): predicted chance that remaining {} \
-             is detected in a 1° patch is {} at the 99th percentile (visibility {p99:.2}); about {noticed:.1} of {:.0} patches.",
+             is detected in a 1° patch is {} at the 99th percentile (visibility {p99:.2}); about {noticed:.1} of {:.1} patches.",
             display.name,
-            display.pixels_per_degree,
-            display.white_cd_m2,
+            rounded(display.pixels_per_degree),
+            rounded(display.white_cd_m2),
             if report.denoised.is_some() { "error" } else { "noise" },
             p(p99),
             patch_count(&rendered.judgement.predicted, display.pixels_per_degree),

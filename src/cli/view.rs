@@ -3,6 +3,7 @@
 use super::job::{JobArguments, Prepared};
 use super::render::write_picture;
 use super::report::Report;
+use super::signals;
 use super::tev::TevArguments;
 use anyhow::{Context, bail};
 use clap::Args;
@@ -14,7 +15,6 @@ use fechner::scene::Scene;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Arguments of `view`.
 #[derive(Debug, Args)]
@@ -102,14 +102,7 @@ pub(super) fn run(arguments: &ViewArguments) -> anyhow::Result<()> {
     let options = Options { is_foveated: arguments.foveated, spectators };
     let preview = preview::start(job, Arc::new(host), options, pool).context("the threads could not be started")?;
     let closer = preview.closer();
-    let asked_before = AtomicBool::new(false);
-    ctrlc::set_handler(move || {
-        if asked_before.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-        closer.close();
-    })
-    .context("signals cannot be waited for")?;
+    signals::listen(move || closer.close())?;
     if !address.ip().is_loopback() {
         eprintln!("note: {address} can be reached from other machines; whoever has the address can drive this preview");
     }

@@ -6,6 +6,8 @@ use crate::scene::hash::ContentHash;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+const CONCLUDED: &str = "concluded";
+
 /// A folder with a manifest.
 #[derive(Clone, Debug)]
 pub struct Farm {
@@ -19,7 +21,7 @@ pub struct Farm {
 /// (round × frames + frame's index) × passes + part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UnitPlace {
-    /// Looks taken at the frame before the round.
+    /// Plans traced of the frame before the round.
     pub round: u32,
     /// Index of the frame in the manifest.
     pub frame_index: usize,
@@ -31,11 +33,20 @@ impl Farm {
     /// Writes the manifest of a new farm into a folder that exists.
     ///
     /// # Errors
-    /// If it cannot be written.
+    /// If it cannot be written, as where the name of its directory is not Unicode.
     pub fn create(folder: &Path, manifest: Manifest) -> Result<Self, OutputError> {
-        let text = serde_json::to_vec_pretty(&manifest).expect("a manifest has string keys alone");
-        write_beside(&Self::manifest_file(folder), |file| file.write_all(&text))?;
+        let path = Self::manifest_file(folder);
+        let text = serde_json::to_vec_pretty(&manifest)
+            .map_err(|error| OutputError::Io { path: path.clone(), source: error.into() })?;
+        write_beside(&path, |file| file.write_all(&text))?;
         Ok(Self { folder: folder.to_owned(), manifest, id: ContentHash::of_bytes(&text) })
+    }
+
+    /// What is left in a folder of a farm whose manifest is gone, if anything is: it would pass for a new farm's work.
+    pub fn remains(folder: &Path) -> Option<PathBuf> {
+        let is_remains = |name: &str| name.starts_with("frame-") || name == CONCLUDED;
+        let mut entries = folder.read_dir().ok()?.flatten();
+        entries.find(|entry| entry.file_name().to_str().is_some_and(is_remains)).map(|entry| entry.path())
     }
 
     /// Opens one.
@@ -72,6 +83,11 @@ impl Farm {
     /// A frame's entry.
     pub fn frame(&self, frame_index: usize) -> &FrameEntry {
         &self.manifest.frames[frame_index]
+    }
+
+    /// There once all is made that needs all frames.
+    pub fn concluded(&self) -> PathBuf {
+        self.folder.join(CONCLUDED)
     }
 
     /// Finished pictures.
@@ -162,5 +178,25 @@ mod tests {
         assert_eq!(farm.place(29), UnitPlace { round: 2, frame_index: 1, part: 1 });
         assert_eq!(farm.unit_file(29, "sums"), Path::new("f/frame-0005/round-002/unit-000029.sums"));
         farm.place(u64::MAX);
+    }
+
+    /// JSON has no words for it: an error, and no panic.
+    #[cfg(unix)]
+    #[test]
+    fn a_directory_that_is_not_unicode_is_refused() {
+        use std::os::unix::ffi::OsStrExt as _;
+        let folder = tempfile::tempdir().expect("a folder");
+        let directory = PathBuf::from(std::ffi::OsStr::from_bytes(b"bad\xff"));
+        let refused = Farm::create(folder.path(), Manifest::new(Work::Render, directory, Vec::new(), Vec::new()));
+        assert!(refused.expect_err("not Unicode").to_string().contains("manifest.json"));
+    }
+
+    #[test]
+    fn what_a_farm_left_is_found() {
+        let folder = tempfile::tempdir().expect("a folder");
+        std::fs::create_dir(folder.path().join("pictures")).expect("made");
+        assert_eq!(Farm::remains(folder.path()), None);
+        std::fs::create_dir(folder.path().join("frame-0000")).expect("made");
+        assert_eq!(Farm::remains(folder.path()), Some(folder.path().join("frame-0000")));
     }
 }

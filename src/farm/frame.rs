@@ -1,16 +1,18 @@
 //! One frame's way through its rounds: merge, look, hand out the next one or end.
 
 use super::folder::Farm;
-use super::round::{RoundRecord, clear_before, hand_out, open_round, orders};
-use super::unit::{NamedOrder, UnitError, UnitSums};
+use super::round::{RoundRecord, clear_after, clear_before, hand_out, open_round, orders};
+use super::unit::{Keeping, NamedOrder, Outcome, UnitError, UnitSums, Wish, most_samples_a_batch};
 use crate::adaptive::judge::JudgeError;
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::state::RenderState;
-use crate::adaptive::{Ended, Monitor, Next, decide};
+use crate::adaptive::{Ended, Monitor, Next, beginning, decide};
 use crate::checkpoint::{CheckpointError, Header, read_checkpoint, write_checkpoint};
 use crate::integrator::PathTracer;
 use crate::output::OutputError;
+use crate::sealed::SealedError;
 use std::path::Path;
+use std::time::Instant;
 
 /// How far a frame is, as its files say.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,7 +38,11 @@ pub fn progress(farm: &Farm, frame_index: usize) -> Progress {
     if farm.result(frame_index).exists() {
         return Progress::Done;
     }
-    let Some(round) = open_round(farm, frame_index) else { return Progress::ToMerge { round: None } };
+    let Some(round) = open_round(farm, frame_index) else {
+        // Rounds go when the result is there: it may have come between the two looks.
+        let is_done = farm.result(frame_index).exists();
+        return if is_done { Progress::Done } else { Progress::ToMerge { round: None } };
+    };
     let is_missing = |unit: &u64| !farm.unit_file(*unit, "sums").exists();
     let missing: Vec<u64> = round.units.iter().map(|unit| unit.unit).filter(is_missing).collect();
     let can_be_rendered = |unit: &u64| farm.unit_file(*unit, "order").exists();
@@ -83,25 +89,32 @@ pub enum Merged {
     },
     /// The next round is handed out.
     Planned(RoundRecord),
+    /// A signal ended it; its film is there.
+    Left,
     /// The frame needs no more: its picture is to be made, then [`finish`].
     Ended(Box<Ended>),
 }
 
 /// Merges a frame's open round if all its units are there, and hands out the next. Rounds too small for units are traced here.
-/// Call it with the frame's lock. Killed at any moment, it does the same when it is called again.
+/// Call it with the frame's lock. Killed at any moment, it does the same when it is called again. A film that is damaged is put
+/// aside, and the frame begins anew.
 ///
 /// # Errors
-/// [`FrameError`] if the film's file is not this frame's, or something cannot be written.
+/// [`FrameError`] if the film's file cannot be read, or something cannot be written.
 pub fn merge_frame(
     farm: &Farm,
     frame_index: usize,
     job: &FrameJob<'_>,
+    keeping: &Keeping<'_>,
     monitor: &dyn Monitor,
 ) -> Result<Merged, FrameError> {
     let mut state = state_so_far(farm, frame_index, job)?;
     let units: Vec<(NamedOrder, Vec<u8>)> = orders(farm, frame_index, &state).collect();
+    let trace = |state: &mut RenderState| trace_here(farm, frame_index, job, keeping, state);
     if units.is_empty() {
-        trace_here(job.tracer, &mut state);
+        if trace(&mut state)? == Outcome::Left {
+            return Ok(Merged::Left);
+        }
     } else {
         let refused = match enter(farm, &units, &mut state) {
             Ok(()) => Vec::new(),
@@ -112,6 +125,7 @@ pub fn merge_frame(
         if !missing.is_empty() {
             drop(units);
             let state = state_so_far(farm, frame_index, job)?;
+            clear_after(farm, frame_index, state.plans);
             hand_out(farm, frame_index, &state)?;
             return Ok(Merged::Waiting { missing, refused });
         }
@@ -124,9 +138,12 @@ pub fn merge_frame(
         if orders(farm, frame_index, &state).next().is_some() {
             break;
         }
-        trace_here(job.tracer, &mut state);
+        if trace(&mut state)? == Outcome::Left {
+            return Ok(Merged::Left);
+        }
     }
     write_checkpoint(&farm.film(frame_index), &job.header, &state)?;
+    clear_after(farm, frame_index, state.plans);
     let record = hand_out(farm, frame_index, &state)?;
     clear_before(farm, frame_index, record.round);
     Ok(Merged::Planned(record))
@@ -152,19 +169,26 @@ pub fn finish(
     Ok(())
 }
 
-/// The film that rounds so far made, or an empty one.
+/// The film that rounds so far made, or an empty one where there is none that can be used.
 fn state_so_far(farm: &Farm, frame_index: usize, job: &FrameJob<'_>) -> Result<RenderState, FrameError> {
     let path = farm.film(frame_index);
-    if !path.exists() {
-        let area = job.tracer.settings().film_area();
-        return Ok(RenderState::new(area.width, area.height, &job.settings.limits));
+    let refused = match read_checkpoint(&path) {
+        Ok(checkpoint) if checkpoint.header == job.header => return Ok(checkpoint.state),
+        Ok(_) => Some(CheckpointError::Different { path: path.clone(), problem: "it is of another farm".to_owned() }),
+        Err(CheckpointError::Sealed(SealedError::Io { source, .. }))
+            if source.kind() == std::io::ErrorKind::NotFound =>
+        {
+            None
+        }
+        Err(error @ CheckpointError::Sealed(SealedError::Io { .. })) => return Err(error.into()),
+        Err(error) => Some(error),
+    };
+    if let Some(error) = refused {
+        eprintln!("note: refused: {error}; the frame begins anew");
+        set_aside(&path);
     }
-    let checkpoint = read_checkpoint(&path)?;
-    if checkpoint.header != job.header {
-        let problem = "it is the film of another farm: remove it, and the frame begins anew".to_owned();
-        return Err(CheckpointError::Different { path, problem }.into());
-    }
-    Ok(checkpoint.state)
+    let area = job.tracer.settings().film_area();
+    Ok(RenderState::new(area.width, area.height, &job.settings.limits))
 }
 
 /// Enters the sums of all units into the film in the plan's order, as a render in one process does. Nothing is entered where
@@ -202,7 +226,7 @@ fn enter(farm: &Farm, units: &[(NamedOrder, Vec<u8>)], state: &mut RenderState) 
     Ok(())
 }
 
-/// Takes a unit's refused file out of the way, and keeps it for whoever wants to know.
+/// Takes a refused file out of the way, and keeps it for whoever wants to know.
 pub fn set_aside(path: &Path) {
     let mut aside = path.as_os_str().to_owned();
     aside.push(".refused");
@@ -211,13 +235,44 @@ pub fn set_aside(path: &Path) {
     }
 }
 
-fn trace_here(tracer: &PathTracer, state: &mut RenderState) {
-    let started = std::time::Instant::now();
-    for plan in &state.pending {
-        tracer.trace(plan, &mut state.film, &|_| {});
+/// Traces what is planned, and writes the film as often as it is asked for. It may be left between two batches: what is not traced
+/// then is still no unit's.
+fn trace_here(
+    farm: &Farm,
+    frame_index: usize,
+    job: &FrameJob<'_>,
+    keeping: &Keeping<'_>,
+    state: &mut RenderState,
+) -> Result<Outcome, FrameError> {
+    let (started, seconds_before) = (Instant::now(), state.seconds_total);
+    let write = |state: &RenderState| write_checkpoint(&farm.film(frame_index), &job.header, state);
+    let mut last_kept = started;
+    while let Some(plan) = state.pending.front() {
+        let rest = &plan.blocks[state.traced_blocks..];
+        if rest.is_empty() {
+            state.pending.pop_front();
+            state.traced_blocks = 0;
+            state.plans += 1;
+            continue;
+        }
+        let batch = beginning(rest, most_samples_a_batch());
+        state.traced_blocks += job.tracer.trace_batch(batch, &mut state.film, &|_| {});
+        state.seconds_total = seconds_before + started.elapsed().as_secs_f64();
+        match (keeping.wish)() {
+            Wish::Leave => {
+                write(state)?;
+                return Ok(Outcome::Left);
+            }
+            Wish::GoOn if last_kept.elapsed() < keeping.every => {}
+            Wish::GoOn | Wish::Keep => {
+                if let Err(error) = write(state) {
+                    eprintln!("note: {error}; rendering goes on");
+                }
+                last_kept = Instant::now();
+            }
+        }
     }
-    close_plans(state);
-    state.seconds_total += started.elapsed().as_secs_f64();
+    Ok(Outcome::Finished)
 }
 
 /// What was planned is in the film.

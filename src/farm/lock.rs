@@ -12,6 +12,14 @@ use std::time::Duration;
 #[derive(Debug)]
 pub struct Lock {
     _file: File,
+    is_sole: bool,
+}
+
+impl Lock {
+    /// Whether no other process has it; false where the file system has no locks.
+    pub fn is_sole(&self) -> bool {
+        self.is_sole
+    }
 }
 
 /// Takes a lock, unless another process has it.
@@ -22,8 +30,9 @@ pub fn try_lock(path: &Path) -> io::Result<Option<Lock>> {
     let file = File::options().create(true).truncate(false).write(true).open(path)?;
     match file.try_lock() {
         Err(TryLockError::WouldBlock) => Ok(None),
-        // Either taken, or a file system without locks.
-        Ok(()) | Err(TryLockError::Error(_)) => Ok(Some(Lock { _file: file })),
+        Ok(()) => Ok(Some(Lock { _file: file, is_sole: true })),
+        // A file system without locks.
+        Err(TryLockError::Error(_)) => Ok(Some(Lock { _file: file, is_sole: false })),
     }
 }
 

@@ -80,7 +80,7 @@ pub struct FrameEntry {
 #[derive(Debug, thiserror::Error)]
 pub enum ManifestError {
     /// The operating system refused.
-    #[error("cannot read {}: {source}; fechner farm plan writes it", .path.display())]
+    #[error("cannot read {}, which fechner farm plan writes: {source}", .path.display())]
     Io {
         /// The file.
         path: PathBuf,

@@ -9,7 +9,7 @@
 //! ```text
 //! manifest.json
 //! frame-0007/film                        all rounds merged so far, and the plan of the open one
-//! frame-0007/round-003/round.json        its units, written after their orders
+//! frame-0007/round-003/round.json        its units, written after their orders; numbered by the plans traced before
 //! frame-0007/round-003/unit-001234.*     order, partial (checkpoint), sums (result), lock
 //! frame-0007/result.json                 the frame is done
 //! pictures/

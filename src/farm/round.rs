@@ -14,7 +14,7 @@ use std::ops::Range;
 pub struct RoundRecord {
     /// Number of the frame.
     pub frame: u32,
-    /// Looks taken at the frame before.
+    /// Plans traced of the frame before: rises from round to round, by more than 1 where others were traced by the merge.
     pub round: u32,
     /// Samples of all units.
     pub samples: u64,
@@ -62,7 +62,7 @@ pub fn cut(blocks: &[BlockWork], passes: u32, unit_samples: u64) -> Vec<Range<us
 pub fn orders(farm: &Farm, frame_index: usize, state: &RenderState) -> impl Iterator<Item = (NamedOrder, Vec<u8>)> {
     let blocks: Vec<BlockWork> = state.untraced_blocks().copied().collect();
     let manifest = farm.manifest();
-    let round = state.passes;
+    let round = state.plans;
     let ranges = cut(&blocks, manifest.passes, manifest.unit_samples);
     let entry = farm.frame(frame_index);
     ranges.into_iter().enumerate().map(move |(part, range)| {
@@ -77,7 +77,7 @@ pub fn orders(farm: &Farm, frame_index: usize, state: &RenderState) -> impl Iter
 /// # Errors
 /// If something cannot be written.
 pub fn hand_out(farm: &Farm, frame_index: usize, state: &RenderState) -> Result<RoundRecord, OutputError> {
-    let folder = farm.round_folder(frame_index, state.passes);
+    let folder = farm.round_folder(frame_index, state.plans);
     std::fs::create_dir_all(&folder).map_err(|source| OutputError::Io { path: folder.clone(), source })?;
     let mut units = Vec::new();
     let mut first_block = 0;
@@ -97,7 +97,7 @@ pub fn hand_out(farm: &Farm, frame_index: usize, state: &RenderState) -> Result<
     }
     let record = RoundRecord {
         frame: farm.frame(frame_index).frame,
-        round: state.passes,
+        round: state.plans,
         samples: units.iter().map(|unit| unit.samples).sum(),
         units,
     };
@@ -110,17 +110,32 @@ const RECORD: &str = "round.json";
 
 /// The record of a frame's open round: the last that was handed out. `None` if there is none that can be read.
 pub fn open_round(farm: &Farm, frame_index: usize) -> Option<RoundRecord> {
-    let last = rounds(farm, frame_index).into_iter().rev();
-    last.filter_map(|round| {
-        let text = std::fs::read(farm.round_folder(frame_index, round).join(RECORD)).ok()?;
-        let record: RoundRecord = serde_json::from_slice(&text).ok()?;
-        let is_own = |unit: &UnitRecord| {
-            let place = farm.place(unit.unit);
-            (place.round, place.frame_index) == (round, frame_index)
-        };
-        record.units.iter().all(is_own).then_some(record)
-    })
-    .next()
+    last_record(|| rounds(farm, frame_index), |round| record(farm, frame_index, round))
+}
+
+/// The last record of those that are listed. A merge may clear a round away between list and record: then the list is another.
+fn last_record<T>(mut list: impl FnMut() -> Vec<u32>, read: impl Fn(u32) -> Option<T>) -> Option<T> {
+    let mut listed = list();
+    loop {
+        if let Some(record) = listed.iter().rev().find_map(|&round| read(round)) {
+            return Some(record);
+        }
+        let now = list();
+        if now == listed {
+            return None;
+        }
+        listed = now;
+    }
+}
+
+fn record(farm: &Farm, frame_index: usize, round: u32) -> Option<RoundRecord> {
+    let text = std::fs::read(farm.round_folder(frame_index, round).join(RECORD)).ok()?;
+    let record: RoundRecord = serde_json::from_slice(&text).ok()?;
+    let is_own = |unit: &UnitRecord| {
+        let place = farm.place(unit.unit);
+        (place.round, place.frame_index) == (round, frame_index)
+    };
+    record.units.iter().all(is_own).then_some(record)
 }
 
 /// Rounds that have a folder, ascending.
@@ -135,8 +150,17 @@ fn rounds(farm: &Farm, frame_index: usize) -> Vec<u32> {
 
 /// Removes the folders of rounds before `round`; what cannot be removed stays and does no harm.
 pub(super) fn clear_before(farm: &Farm, frame_index: usize, round: u32) {
-    for earlier in rounds(farm, frame_index).into_iter().filter(|&earlier| earlier < round) {
-        std::fs::remove_dir_all(farm.round_folder(frame_index, earlier)).ok();
+    clear(farm, frame_index, |found| found < round);
+}
+
+/// Removes the folders of rounds after `round`: those of a film that was lost.
+pub(super) fn clear_after(farm: &Farm, frame_index: usize, round: u32) {
+    clear(farm, frame_index, |found| found > round);
+}
+
+fn clear(farm: &Farm, frame_index: usize, is_over: impl Fn(u32) -> bool) {
+    for round in rounds(farm, frame_index).into_iter().filter(|&round| is_over(round)) {
+        std::fs::remove_dir_all(farm.round_folder(frame_index, round)).ok();
     }
 }
 
@@ -171,5 +195,17 @@ mod tests {
         // 1, 38 and 11 samples: a large block may take the place of two parts.
         assert_eq!(cut(&blocks[..3], 100, 0), [0..2, 2..3]);
         assert!(cut(&[], 4, 0).is_empty());
+    }
+
+    /// Cleared away after it was listed, a round is over, and the one after it is found.
+    #[test]
+    fn a_round_that_vanishes_is_not_the_last() {
+        let lists = std::cell::RefCell::new(vec![vec![4], vec![1]]);
+        let list = || {
+            let mut lists = lists.borrow_mut();
+            if lists.len() > 1 { lists.pop().expect("a list") } else { lists[0].clone() }
+        };
+        assert_eq!(last_record(list, |round| (round == 4).then_some(round)), Some(4));
+        assert_eq!(last_record(|| vec![1, 2], |_| None::<u32>), None);
     }
 }

@@ -162,11 +162,23 @@ impl UnitSums {
     }
 }
 
-/// Samples that a thread takes between two wishes: half a second in a simple scene. Schedulers kill 30 seconds after they asked.
-const MOST_SAMPLES_A_THREAD: u64 = 1 << 17;
+/// How work is kept safe.
+#[derive(Clone, Copy)]
+pub struct Keeping<'a> {
+    /// Time between two checkpoints.
+    pub every: Duration,
+    /// Asked between two batches.
+    pub wish: &'a dyn Fn() -> Wish,
+}
 
-/// Samples what an order asks for after `begun`, and writes the sums: a checkpoint every so often and where `wish` asks for it,
-/// the result at the end.
+/// Samples between two wishes: half a second in a simple scene. Schedulers kill 30 seconds after they asked.
+pub(super) fn most_samples_a_batch() -> u64 {
+    const MOST_SAMPLES_A_THREAD: u64 = 1 << 17;
+    MOST_SAMPLES_A_THREAD * rayon::current_num_threads() as u64
+}
+
+/// Samples what an order asks for after `begun`, and writes the sums: a checkpoint every so often and where it is wished, the result
+/// at the end.
 ///
 /// # Errors
 /// If the result, or the checkpoint that was asked for at the end, cannot be written.
@@ -175,8 +187,7 @@ pub fn render_unit(
     order: &NamedOrder,
     begun: Option<UnitSums>,
     tracer: &PathTracer,
-    every: Duration,
-    wish: &dyn Fn() -> Wish,
+    keeping: &Keeping<'_>,
 ) -> Result<Outcome, OutputError> {
     let started = Instant::now();
     let partial = farm.unit_file(order.order.unit, "partial");
@@ -184,18 +195,18 @@ pub fn render_unit(
     let seconds_before = sums.seconds;
     let mut last_kept = started;
     while let rest @ [_, ..] = &order.order.blocks[sums.sums.len()..] {
-        let batch = beginning(rest, MOST_SAMPLES_A_THREAD * rayon::current_num_threads() as u64);
+        let batch = beginning(rest, most_samples_a_batch());
         tracer.sum_batch(batch, &mut sums.sums, &|_| {});
         sums.seconds = seconds_before + started.elapsed().as_secs_f64();
         if sums.sums.len() == order.order.blocks.len() {
             break;
         }
-        match wish() {
+        match (keeping.wish)() {
             Wish::Leave => {
                 SUMS.write(&partial, &sums)?;
                 return Ok(Outcome::Left);
             }
-            Wish::GoOn if last_kept.elapsed() < every => {}
+            Wish::GoOn if last_kept.elapsed() < keeping.every => {}
             Wish::GoOn | Wish::Keep => {
                 // A checkpoint that cannot be written is no reason to lose the unit.
                 if let Err(error) = SUMS.write(&partial, &sums) {

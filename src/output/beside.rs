@@ -77,8 +77,10 @@ fn part_prefix(name: &OsStr) -> OsString {
 /// writing `path`.
 pub fn remove_leftovers(path: &Path) -> Result<(), OutputError> {
     let io = |source| OutputError::Io { path: path.to_owned(), source };
-    let target = path.canonicalize().map_err(io)?;
-    let (Some(folder), Some(name)) = (target.parent(), target.file_name()) else { return Ok(()) };
+    // The file itself may not be there yet; where it is a link, new files are made beside what it points to.
+    let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let Some(name) = target.file_name() else { return Ok(()) };
+    let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let prefix = part_prefix(name);
     for entry in folder.read_dir().map_err(io)? {
         let found = entry.map_err(io)?.file_name();
@@ -133,6 +135,8 @@ mod tests {
         }
         remove_leftovers(&folder.path().join("a.film")).unwrap();
         assert_eq!(names(folder.path()), [".a.film.part.png", ".b.film.x1Y2z3.part", "a.film"]);
+        remove_leftovers(&folder.path().join("b.film")).unwrap();
+        assert_eq!(names(folder.path()), [".a.film.part.png", "a.film"]);
     }
 
     #[test]

@@ -223,7 +223,8 @@ fn films_of_different_seeds_add_up() {
     let mut films: Vec<(PathBuf, Film)> = Vec::new();
     for (seed, spp) in [(1, 32), (2, 64), (9, 32)] {
         let setup = Setup::new(seed);
-        let state = uniform_film(&setup, spp);
+        let mut state = uniform_film(&setup, spp);
+        state.seconds_denoising = 0.5;
         let path = folder.path().join(format!("{seed}.film"));
         write_checkpoint(&path, &setup.header, &state).expect("written");
         films.push((path, state.film));
@@ -239,6 +240,7 @@ fn films_of_different_seeds_add_up() {
         assert!(merged(order).1 == bytes, "another order gives other bytes");
     }
     assert_eq!(sum.header.seeds, Seeds { all: vec![1, 2, 9], current: None });
+    assert_eq!(sum.state.seconds_denoising, 1.5);
     for half in Half::BOTH {
         for (i, pixel) in sum.state.film.half(half).iter().enumerate() {
             let parts: Vec<_> = films.iter().map(|(_, film)| film.half(half)[i]).collect();

@@ -145,10 +145,13 @@ fn a_signal_ends_a_render_with_its_picture_so_far() {
     let endless = ["--visibility", "0.01", "-o", "a.png", "--json", "a.json", "--checkpoint", "a.film"];
     let mut child = render(at, &[&endless[..], &["--checkpoint-every", "0.001"]].concat()).spawn().expect("runs");
     wait_for(&at.join("a.film"), &mut child);
-    let killed = Command::new("kill").args(["-TERM", &child.id().to_string()]).status().expect("kill");
-    assert!(killed.success());
+    // Twice, as `timeout` sends it to the program and to its group.
+    for _ in 0..2 {
+        let killed = Command::new("kill").args(["-TERM", &child.id().to_string()]).status().expect("kill");
+        assert!(killed.success());
+    }
     let output = child.wait_with_output().expect("ended");
-    assert!(output.status.success(), "{}", text(&output));
+    assert_eq!(output.status.code(), Some(75), "{}", text(&output));
     assert!(text(&output).contains("Stopped by a signal"), "{}", text(&output));
     assert_eq!(image::open(at.join("a.png")).expect("a picture").width(), 64);
     let json: serde_json::Value = serde_json::from_slice(&file(at, "a.json")).expect("JSON");
@@ -160,6 +163,25 @@ fn a_signal_ends_a_render_with_its_picture_so_far() {
         assert!(shown.contains(fragment), "{fragment} is not in {shown}");
     }
     assert_eq!(names(at), ["a.film", "a.json", "a.png"]);
+}
+
+/// Where a picture cannot be written at the end, its samples are not lost.
+#[test]
+fn a_picture_whose_folder_is_gone_is_kept_elsewhere() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let [gone, temporary] = ["gone", "temporary"].map(|name| at.join(name));
+    [&gone, &temporary].into_iter().for_each(|folder| std::fs::create_dir(folder).expect("made"));
+    let arguments = ["--visibility", "2", "-o", "gone/a.png", "--checkpoint", "a.film", "--checkpoint-every", "0.001"];
+    let mut child = render(at, &arguments).env("TMPDIR", &temporary).spawn().expect("runs");
+    wait_for(&at.join("a.film"), &mut child);
+    std::fs::remove_dir_all(&gone).expect("removed");
+    let output = child.wait_with_output().expect("ended");
+    let message = text(&output);
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    let [kept] = &names(&temporary)[..] else { panic!("no picture: {message}") };
+    assert!(message.contains(kept.as_str()) && message.contains("cannot write gone/a.png"), "{message}");
+    assert_eq!(image::open(temporary.join(kept)).expect("a picture").width(), 64);
 }
 
 /// Merged films are looked at again; what does not fit is refused by name.

@@ -22,6 +22,7 @@
 //! - `checkpoint`: renders stopped, continued and merged against renders in one go
 //! - `kill`: the program, killed and resumed
 //! - `farm`: many processes on one folder
+//! - `farm_mishaps`: farms that lost a file, were interrupted, or were asked for what cannot be
 //! - `view`: the live preview, over its WebSocket
 //! - `texture_memory`: textures within a limit
 //! - `tonemap`: HDR pictures for displays, one by one and over time
@@ -37,6 +38,7 @@ mod coverage;
 mod denoise;
 mod direct_light;
 mod farm;
+mod farm_mishaps;
 mod formats;
 mod furnace;
 mod importance;

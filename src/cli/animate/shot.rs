@@ -101,7 +101,7 @@ impl<'a> Shot<'a> {
     }
 
     /// Whether the video that is asked for can be made and written: known before the frames are rendered.
-    pub(super) fn check_video(&self) -> Result<()> {
+    pub(in crate::cli) fn check_video(&self) -> Result<()> {
         if let Some((path, _)) = self.arguments.video()? {
             output::check_writable(path)?;
         }

@@ -5,7 +5,7 @@ use crate::cli::job::{JobArguments, Prepared};
 use crate::cli::render::write_picture;
 use crate::cli::report::Report;
 use anyhow::{Context, Result, anyhow, bail};
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 use fechner::adaptive::Rendered;
 use fechner::adaptive::settings::LoopSettings;
 use fechner::animate::RenderedFrame;
@@ -17,7 +17,7 @@ use fechner::output;
 use fechner::scene::Scene;
 use fechner::scene::hash::ContentHash;
 use std::cell::OnceCell;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// `render`'s options less its files.
@@ -83,6 +83,26 @@ impl JobOptions {
                 Ok(Self::Shot(Box::new(options.shot)))
             }
         }
+    }
+
+    /// Refuses options that are about one process.
+    pub(super) fn check_are_for_all(work: Work, arguments: &[String]) -> Result<()> {
+        let command = match work {
+            Work::Render => StillOptions::command(),
+            // The pictures' name is the farm's.
+            Work::Animate => ShotOptions::command().mut_arg("output", |output| output.required(false)),
+        };
+        // What cannot be understood is told by the parser.
+        let Ok(found) = command.try_get_matches_from(arguments) else { return Ok(()) };
+        let is_given = |id: &str| found.value_source(id) == Some(clap::parser::ValueSource::CommandLine);
+        let known = |id: &&str| found.try_contains_id(id).is_ok();
+        if ["time", "plans"].iter().filter(|id| known(id)).any(|id| is_given(id)) {
+            bail!("--time and --plans end one process: a farm goes by --visibility, --quality, --spp and --max-spp");
+        }
+        if is_given("threads") {
+            bail!("--threads is of one process: farm unit, farm merge and farm work have it each");
+        }
+        Ok(())
     }
 
     /// Of a farm that is there.
@@ -189,8 +209,7 @@ impl Job<'_> {
         match (self, &frame.kind) {
             (Self::Still(arguments), FrameKind::Still(settings)) => {
                 let report = Report::new(&arguments.scene_name(), &frame.header.seeds.all, settings, &rendered);
-                let format = farm.manifest().picture_format;
-                let path = farm.pictures().join(format!("picture.{}", format.ending()));
+                let path = self.picture(farm, number);
                 let format = output::check_target(&path)?;
                 write_picture(&path, format, arguments.background(), &rendered, settings, &report)?;
                 eprintln!("{}: {}", path.display(), report.in_a_line());
@@ -201,6 +220,34 @@ impl Job<'_> {
                 shot.keep(number, of_shot, &RenderedFrame { rendered, velocity })
             }
             _ => bail!("a frame of another farm"),
+        }
+    }
+
+    /// The picture's file of a frame.
+    pub(super) fn picture(&self, farm: &Farm, number: u32) -> PathBuf {
+        let ending = farm.manifest().picture_format.ending();
+        farm.pictures().join(match self {
+            Self::Still(_) => format!("picture.{ending}"),
+            Self::Shot { .. } => format!("frame.{number:04}.{ending}"),
+        })
+    }
+
+    /// Whether the farm's frames are all of the shot, not a part of one.
+    pub(super) fn is_whole(&self, farm: &Farm) -> bool {
+        match self {
+            Self::Still(_) => true,
+            Self::Shot { shot, .. } => {
+                let all = shot.settings.last - shot.settings.first + 1;
+                farm.manifest().frames.len() == all as usize
+            }
+        }
+    }
+
+    /// Refuses a video that cannot be made: known before the frames are rendered.
+    pub(super) fn check_video(&self) -> Result<()> {
+        match self {
+            Self::Still(_) => Ok(()),
+            Self::Shot { shot, .. } => shot.check_video(),
         }
     }
 
@@ -215,13 +262,9 @@ impl Job<'_> {
 
 impl Frame {
     /// Its entry in a manifest.
-    pub(super) fn entry(&self, frame: u32) -> Result<FrameEntry> {
-        let limits = &self.settings().limits;
-        if limits.time.is_some() || limits.plans.is_some() {
-            bail!("--time and --plans end one process: a farm goes by --visibility, --quality, --spp and --max-spp");
-        }
+    pub(super) fn entry(&self, frame: u32) -> FrameEntry {
         let origin = self.header.origin.clone();
-        Ok(FrameEntry { frame, seed: self.trace.seed, origin, judged_by: self.judged_by })
+        FrameEntry { frame, seed: self.trace.seed, origin, judged_by: self.judged_by }
     }
 
     /// Its scene made ready.

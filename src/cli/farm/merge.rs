@@ -1,13 +1,16 @@
 //! `farm merge`: what is there into films, and what comes next.
 
-use super::job::{Job, JobOptions};
-use super::{CALL_AGAIN, Threads, open_for_work};
+use super::job::Job;
+use super::unit::{Bench, KeepingArguments};
+use super::{CALL_AGAIN, Threads, frame_lock};
+use crate::cli::words::{count, samples_in_words};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::adaptive::{Ended, Quiet, Rendered};
 use fechner::farm::Farm;
 use fechner::farm::frame::{FrameJob, Merged, Progress, finish, merge_frame, progress};
-use fechner::farm::lock::{try_lock, wait_for_lock};
+use fechner::farm::lock::{Lock, try_lock, wait_for_lock};
+use fechner::farm::unit::Keeping;
 use fechner::output;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -21,28 +24,43 @@ pub(super) struct MergeArguments {
     #[arg(long = "frame", value_name = "N")]
     frames: Vec<u32>,
     #[command(flatten)]
+    keeping: KeepingArguments,
+    #[command(flatten)]
     threads: Threads,
+}
+
+/// How it went with a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum MergeWent {
+    /// The next round is handed out, or the picture is there.
+    On,
+    /// Units are missing after all.
+    Waits,
+    /// A signal ended it; its film is there.
+    Left,
 }
 
 /// Merges all frames that can be merged.
 pub(super) fn run(arguments: &MergeArguments) -> Result<ExitCode> {
-    let farm = open_for_work(&arguments.folder)?;
-    let indices = chosen(&farm, &arguments.frames)?;
-    arguments.threads.pool()?.install(|| {
-        let options = JobOptions::of(&farm)?;
-        let job = options.job()?;
+    Bench::with(&arguments.folder, &arguments.keeping, &arguments.threads, |bench| {
+        let Bench { farm, job, signals, .. } = bench;
         let mut waits = false;
-        for frame_index in indices {
-            if let Progress::Open { missing, .. } = progress(&farm, frame_index) {
-                say_missing(&farm, frame_index, &missing);
+        for frame_index in chosen(farm, &arguments.frames)? {
+            if let Progress::Open { missing, .. } = progress(farm, frame_index) {
+                say_missing(farm, frame_index, &missing);
                 waits = true;
                 continue;
             }
-            let lock = wait_for_lock(&farm.frame_lock(frame_index), &|| false)?;
-            waits |= !merge(&farm, &job, frame_index)?;
-            drop(lock);
+            let path = frame_lock(farm, frame_index)?;
+            let lock = wait_for_lock(&path, &|| signals.leaves()).with_context(|| path.display().to_string())?;
+            let Some(lock) = lock else { return Ok(ExitCode::from(CALL_AGAIN)) };
+            match merge(&bench, frame_index, &lock)? {
+                MergeWent::On => {}
+                MergeWent::Waits => waits = true,
+                MergeWent::Left => return Ok(ExitCode::from(CALL_AGAIN)),
+            }
         }
-        conclude(&farm, &job)?;
+        conclude(farm, job)?;
         Ok(if waits { ExitCode::from(CALL_AGAIN) } else { ExitCode::SUCCESS })
     })
 }
@@ -61,31 +79,43 @@ fn say_missing(farm: &Farm, frame_index: usize, missing: &[u64]) {
     eprintln!("frame {}: waits for units {}", farm.frame(frame_index).frame, units.join(", "));
 }
 
-/// Merges a frame whose lock is held; false if units are missing after all.
-pub(super) fn merge(farm: &Farm, job: &Job<'_>, frame_index: usize) -> Result<bool> {
+/// Merges a frame whose lock is held.
+pub(super) fn merge(bench: &Bench<'_>, frame_index: usize, lock: &Lock) -> Result<MergeWent> {
+    let Bench { farm, job, signals, every, .. } = *bench;
     if progress(farm, frame_index) == Progress::Done {
-        return Ok(true);
+        return Ok(MergeWent::On);
     }
     let number = farm.frame(frame_index).frame;
+    if lock.is_sole() {
+        // Of merges that were killed as they wrote.
+        for path in [farm.film(frame_index), farm.finished_film(frame_index), job.picture(farm, number)] {
+            output::remove_leftovers(&path)?;
+        }
+    }
     let frame = job.planned_frame(farm, frame_index)?;
     let tracer = frame.tracer();
     let frame_job = FrameJob { tracer: &tracer, settings: frame.settings(), header: frame.header().clone() };
-    match merge_frame(farm, frame_index, &frame_job, &Quiet)? {
+    let keeping = Keeping { every, wish: &|| signals.wish() };
+    match merge_frame(farm, frame_index, &frame_job, &keeping, &Quiet)? {
         Merged::Waiting { missing, refused } => {
             for error in refused {
                 eprintln!("note: refused: {error}");
             }
             say_missing(farm, frame_index, &missing);
-            Ok(false)
+            Ok(MergeWent::Waits)
         }
         Merged::Planned(record) => {
             eprintln!(
-                "frame {number}: round {} has {} units, {:.2} million samples",
+                "frame {number}: round {} has {}, {}",
                 record.round,
-                record.units.len(),
-                record.samples as f64 / 1e6
+                count(record.units.len(), "unit"),
+                samples_in_words(record.samples)
             );
-            Ok(true)
+            Ok(MergeWent::On)
+        }
+        Merged::Left => {
+            eprintln!("frame {number}: left by a signal; its film is there");
+            Ok(MergeWent::Left)
         }
         Merged::Ended(ended) => {
             let Ended { state, last_look } = *ended;
@@ -95,22 +125,40 @@ pub(super) fn merge(farm: &Farm, job: &Job<'_>, frame_index: usize) -> Result<bo
             let report = job.write(farm, number, &frame, rendered)?;
             let text = serde_json::to_vec_pretty(&report).context("the report could not be put into words")?;
             finish(farm, frame_index, kept.as_ref().map(|state| (frame.header(), state)), &text)?;
-            Ok(true)
+            Ok(MergeWent::On)
         }
     }
 }
 
 /// Makes what needs all frames, once, when all are done; where another process is at it, leaves it to that.
 pub(super) fn conclude(farm: &Farm, job: &Job<'_>) -> Result<()> {
-    let is_done = |frame_index| progress(farm, frame_index) == Progress::Done;
-    let marker = farm.folder().join("concluded");
-    if marker.exists() || !(0..farm.manifest().frames.len()).all(is_done) {
+    let indices = 0..farm.manifest().frames.len();
+    if !indices.clone().all(|frame_index| progress(farm, frame_index) == Progress::Done) {
         return Ok(());
     }
-    let Some(lock) = try_lock(&farm.folder().join("lock"))? else { return Ok(()) };
-    if job.conclude()? {
-        output::write_beside(&marker, |_| Ok(()))?;
+    for frame_index in indices {
+        let picture = job.picture(farm, farm.frame(frame_index).frame);
+        if !picture.exists() {
+            let result = farm.result(frame_index);
+            bail!(
+                "{} is gone, though its frame is done: remove {}, and it is rendered again",
+                picture.display(),
+                result.display()
+            );
+        }
     }
+    if farm.concluded().exists() {
+        return Ok(());
+    }
+    let path = farm.folder().join("lock");
+    let Some(lock) = try_lock(&path).with_context(|| path.display().to_string())? else { return Ok(()) };
+    if !job.conclude()? && job.is_whole(farm) {
+        bail!(
+            "a picture in {} is not the one that the farm made: remove it and its frame's result.json, and it is rendered again",
+            farm.pictures().display()
+        );
+    }
+    output::write_beside(&farm.concluded(), |_| Ok(()))?;
     drop(lock);
     Ok(())
 }

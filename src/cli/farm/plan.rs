@@ -1,12 +1,13 @@
 //! `farm plan`: a scene in, a folder with a manifest and the first round's units out.
 
 use super::job::JobOptions;
+use crate::cli::words::{count, samples_in_words};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use fechner::adaptive::state::RenderState;
 use fechner::farm::round::hand_out;
 use fechner::farm::{Farm, FrameEntry, Manifest, PictureFormat, Work};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Arguments of `farm plan`.
@@ -44,11 +45,51 @@ enum Format {
     Png,
 }
 
+/// What a plan makes: removed again where it fails, less what was there before.
+struct Unfinished {
+    first_made: Option<PathBuf>,
+}
+
+impl Unfinished {
+    fn make(folder: &Path) -> Result<Self> {
+        let first_made =
+            folder.ancestors().take_while(|folder| !folder.exists() && !folder.as_os_str().is_empty()).last();
+        let unfinished = Self { first_made: first_made.map(Path::to_owned) };
+        std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+        Ok(unfinished)
+    }
+
+    fn keep(mut self) {
+        self.first_made = None;
+    }
+}
+
+impl Drop for Unfinished {
+    fn drop(&mut self) {
+        if let Some(folder) = &self.first_made {
+            std::fs::remove_dir_all(folder).ok();
+        }
+    }
+}
+
 /// Plans; a folder that has a manifest is left alone.
 pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode> {
     let folder = &arguments.output;
     if Farm::manifest_file(folder).exists() {
         bail!("{} is a farm already: go on with it, name another folder, or remove it", folder.display());
+    }
+    if let Some(remains) = Farm::remains(folder) {
+        bail!(
+            "{} is left of a farm whose manifest is gone, and would pass for this one's work: remove it, or name another folder",
+            remains.display()
+        );
+    }
+    let directory = std::env::current_dir().context("where the farm is planned")?;
+    if directory.to_str().is_none() {
+        bail!(
+            "{}: a farm is planned in a folder whose name is Unicode, since its manifest holds it",
+            directory.display()
+        );
     }
     let mut words = vec![arguments.scene.clone()];
     let work = match &arguments.frames {
@@ -63,20 +104,19 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode> {
         Format::Exr => PictureFormat::Exr,
         Format::Png => PictureFormat::Png,
     };
-    // Before anything is made: what cannot be understood leaves no folder.
     JobOptions::parse(work, &words, folder, format).context("farm plan, after --")?;
-    let pictures = folder.join("pictures");
-    std::fs::create_dir_all(&pictures).with_context(|| format!("{}", pictures.display()))?;
+    JobOptions::check_are_for_all(work, &words)?;
+    let unfinished = Unfinished::make(&folder.join("pictures"))?;
     let folder = super::absolute(folder)?;
     let options = JobOptions::parse(work, &words, &folder.join("pictures"), format)?;
     let job = options.job()?;
+    job.check_video()?;
     let (mut entries, mut limits) = (Vec::new(), None);
     for number in options.frames() {
         let frame = job.frame(number)?;
-        entries.push(frame.entry(number)?);
+        entries.push(frame.entry(number));
         limits = Some(frame.settings().limits);
     }
-    let directory = std::env::current_dir().context("where the farm is planned")?;
     let farm = Farm::create(
         &folder,
         Manifest {
@@ -94,11 +134,13 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode> {
         units += record.units.len();
         samples += record.samples;
     }
+    unfinished.keep();
     eprintln!(
-        "{}: {} frames, {units} units in the first round, {:.1} million samples",
+        "{}: {}, {} in the first round, {}",
         arguments.output.display(),
-        farm.manifest().frames.len(),
-        samples as f64 / 1e6
+        count(farm.manifest().frames.len(), "frame"),
+        count(units, "unit"),
+        samples_in_words(samples)
     );
     Ok(ExitCode::SUCCESS)
 }

@@ -48,6 +48,11 @@ pub(super) fn run(arguments: &SlurmArguments) -> Result<ExitCode> {
         _ => bail!("{}: a name that scripts cannot hold (Unicode without ', % and line ends)", path.display()),
     };
     let (farm, program) = (word(&folder)?, word(&program)?);
+    for (name, value) in [("--memory", &arguments.memory), ("--time", &arguments.time)] {
+        if value.is_empty() || value.contains(|letter: char| letter.is_whitespace() || letter.is_control()) {
+            bail!("{name} {value:?}: one word, as Slurm writes it");
+        }
+    }
     let mut head = format!(
         "#SBATCH --cpus-per-task={}\n#SBATCH --mem={}\n#SBATCH --time={}\n",
         arguments.cpus, arguments.memory, arguments.time
@@ -61,15 +66,42 @@ pub(super) fn run(arguments: &SlurmArguments) -> Result<ExitCode> {
     let scripts = folder.join("slurm");
     std::fs::create_dir_all(&scripts).with_context(|| format!("{}", scripts.display()))?;
     for (name, template) in [("submit.sh", SUBMIT), ("units.sh", UNITS), ("merge.sh", MERGE)] {
-        let text = template
-            .replace("#SBATCH @HEAD@\n", &head)
-            .replace("@FARM@", &farm)
-            .replace("@FECHNER@", &program)
-            .replace("@CPUS@", &arguments.cpus.to_string())
-            .replace("@ARRAY@", &arguments.array.to_string())
-            .replace("@AT_ONCE@", &arguments.at_once.to_string());
+        let text = filled(
+            template,
+            &[
+                ("#SBATCH @HEAD@\n", &head),
+                ("@FARM@", &farm),
+                ("@FECHNER@", &program),
+                ("@CPUS@", &arguments.cpus.to_string()),
+                ("@ARRAY@", &arguments.array.to_string()),
+                ("@AT_ONCE@", &arguments.at_once.to_string()),
+            ],
+        );
         output::write_beside(&scripts.join(name), |file| file.write_all(text.as_bytes()))?;
     }
-    println!("sh {}", scripts.join("submit.sh").display());
+    println!("sh '{}'", scripts.join("submit.sh").display());
     Ok(ExitCode::SUCCESS)
+}
+
+/// A template with values in the places of their names, in one go: a value that holds a name stays as it is.
+fn filled(template: &str, values: &[(&str, &str)]) -> String {
+    let (mut text, mut rest) = (String::new(), template);
+    let first = |rest: &str| values.iter().filter_map(|(name, value)| Some((rest.find(name)?, *name, *value))).min();
+    while let Some((start, name, value)) = first(rest) {
+        text.push_str(&rest[..start]);
+        text.push_str(value);
+        rest = &rest[start + name.len()..];
+    }
+    text + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_that_look_like_names_stay() {
+        let values = [("@FARM@", "a@CPUS@b"), ("@CPUS@", "8")];
+        assert_eq!(filled("cd @FARM@ -t @CPUS@ '@FARM@'.", &values), "cd a@CPUS@b -t 8 'a@CPUS@b'.");
+    }
 }

@@ -1,6 +1,7 @@
 //! `farm status`: how far everything is, for people and schedulers.
 
 use super::absolute;
+use crate::cli::words::{count, samples_in_words};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use fechner::farm::Farm;
@@ -34,7 +35,7 @@ enum List {
 struct FrameStatus {
     frame: u32,
     state: State,
-    /// Looks taken.
+    /// Number of the open round: plans traced before it.
     round: Option<u32>,
     /// Units of the open round.
     units: usize,
@@ -58,6 +59,7 @@ enum State {
 
 #[derive(Debug, Serialize)]
 struct Status {
+    /// Frames, and what needs them all.
     done: bool,
     frames: Vec<FrameStatus>,
 }
@@ -67,7 +69,8 @@ pub(super) fn run(arguments: &StatusArguments) -> Result<ExitCode> {
     let farm = Farm::open(&absolute(&arguments.folder)?)?;
     let frames: Vec<FrameStatus> =
         (0..farm.manifest().frames.len()).map(|frame_index| of_frame(&farm, frame_index)).collect();
-    let status = Status { done: frames.iter().all(|frame| frame.state == State::Done), frames };
+    let are_done = frames.iter().all(|frame| frame.state == State::Done);
+    let status = Status { done: are_done && farm.concluded().exists(), frames };
     if arguments.json {
         println!("{}", serde_json::to_string_pretty(&status).context("the status could not be put into words")?);
     } else {
@@ -111,15 +114,18 @@ fn say(status: &Status) {
             (State::Merge, None) => println!("frame {number}: to be merged"),
             (State::Merge, Some(round)) => println!("frame {number}: round {round} is to be merged"),
             (State::Open, _) => println!(
-                "frame {number}: round {} has {} of {} units, {} are being rendered, {:.2} million samples in all",
+                "frame {number}: round {} has {} of {}, {} being rendered, {} in all",
                 frame.round.unwrap_or(0),
                 frame.units - frame.missing.len(),
-                frame.units,
+                count(frame.units, "unit"),
                 frame.running,
-                frame.samples as f64 / 1e6
+                samples_in_words(frame.samples)
             ),
         }
     }
     let done = status.frames.iter().filter(|frame| frame.state == State::Done).count();
-    println!("{done} of {} frames are done", status.frames.len());
+    println!("{done} of {} done", count(status.frames.len(), "frame"));
+    if done == status.frames.len() && !status.done {
+        println!("what needs all frames is not made yet: fechner farm merge makes it");
+    }
 }

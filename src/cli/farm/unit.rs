@@ -5,11 +5,12 @@ use super::signals::Signals;
 use super::{CALL_AGAIN, Threads, open_for_work};
 use crate::cli::console::duration_in_words;
 use crate::cli::seeing::parse_seconds;
+use crate::cli::words::samples_in_words;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::farm::frame::{Progress, progress};
 use fechner::farm::lock::{Lock, try_lock, wait_for_lock};
-use fechner::farm::unit::{NamedOrder, Outcome, UnitError, UnitSums, render_unit};
+use fechner::farm::unit::{Keeping, NamedOrder, Outcome, UnitError, UnitSums, render_unit};
 use fechner::farm::{Farm, frame};
 use fechner::integrator::PathTracer;
 use std::io;
@@ -26,14 +27,14 @@ pub(super) struct UnitArguments {
     #[arg(required = true, value_name = "N")]
     units: Vec<u64>,
     #[command(flatten)]
-    keeping: Keeping,
+    keeping: KeepingArguments,
     #[command(flatten)]
     threads: Threads,
 }
 
 /// How much a kill may cost.
 #[derive(Debug, Args)]
-pub(super) struct Keeping {
+pub(super) struct KeepingArguments {
     /// Seconds of work that a kill may cost.
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, default_value = "60")]
     checkpoint_every: Duration,
@@ -53,7 +54,7 @@ pub(super) enum Went {
     Rendered,
     /// Nothing was to be done.
     WasThere,
-    /// Another process has it.
+    /// Another process has it, or has merged it as this one looked.
     Busy,
     /// A signal ended it; its checkpoint is there.
     Left,
@@ -61,12 +62,20 @@ pub(super) enum Went {
     HasNoOrder,
 }
 
+/// Where a unit's round is.
+enum Standing {
+    Open,
+    Merged,
+    /// It was never handed out, or is cleared away; in words.
+    Unknown(String),
+}
+
 /// Renders units of one farm, and keeps the last scene that it loaded.
 pub(super) struct Bench<'a> {
     pub(super) farm: &'a Farm,
     pub(super) job: &'a Job<'a>,
     pub(super) signals: &'a Signals,
-    every: Duration,
+    pub(super) every: Duration,
     loaded: Option<(usize, PathTracer)>,
 }
 
@@ -88,7 +97,7 @@ impl<'a> Bench<'a> {
     /// Does work of the farm in a folder, in a pool of so many threads.
     pub(super) fn with(
         folder: &Path,
-        keeping: &Keeping,
+        keeping: &KeepingArguments,
         threads: &Threads,
         work: impl FnOnce(Bench<'_>) -> Result<ExitCode> + Send,
     ) -> Result<ExitCode> {
@@ -104,9 +113,14 @@ impl<'a> Bench<'a> {
 
     /// Renders a unit, unless its result is there.
     pub(super) fn render(&mut self, unit: u64, if_busy: IfBusy) -> Result<Went> {
-        if self.is_merged(unit)? {
-            eprintln!("unit {unit}: is merged");
-            return Ok(Went::WasThere);
+        match self.standing(unit) {
+            Standing::Open => {}
+            Standing::Merged => {
+                eprintln!("unit {unit}: is merged");
+                return Ok(Went::WasThere);
+            }
+            Standing::Unknown(_) if if_busy == IfBusy::Skip => return Ok(Went::Busy),
+            Standing::Unknown(problem) => bail!("unit {unit} is not planned: {problem}"),
         }
         let lock = match self.lock(unit, if_busy) {
             Ok(Some(lock)) => lock,
@@ -121,7 +135,11 @@ impl<'a> Bench<'a> {
         drop(lock);
         match went {
             // Another process had it as well, and its result was merged.
-            Err(_) if self.is_merged(unit).unwrap_or(false) => Ok(Went::WasThere),
+            Err(error) => match self.standing(unit) {
+                Standing::Merged => Ok(Went::WasThere),
+                Standing::Unknown(_) if if_busy == IfBusy::Skip => Ok(Went::Busy),
+                Standing::Open | Standing::Unknown(_) => Err(error),
+            },
             went => went,
         }
     }
@@ -134,30 +152,26 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// Whether the unit's round is over; an error for one that was never handed out.
-    fn is_merged(&self, unit: u64) -> Result<bool> {
+    fn standing(&self, unit: u64) -> Standing {
         let place = self.farm.place(unit);
         let number = self.farm.frame(place.frame_index).frame;
         let round = match progress(self.farm, place.frame_index) {
-            Progress::Done => return Ok(true),
+            Progress::Done => return Standing::Merged,
             Progress::Open { round, .. } => Some(round),
             Progress::ToMerge { round } => round,
         };
         let Some(round) = round else {
-            bail!("unit {unit} is not planned: frame {number} has no round yet; fechner farm merge makes one")
+            return Standing::Unknown(format!("frame {number} has no round yet; fechner farm merge makes one"));
         };
         if round.round > place.round {
-            return Ok(true);
-        }
-        if round.units.iter().all(|planned| planned.unit != unit) {
+            Standing::Merged
+        } else if round.units.iter().any(|planned| planned.unit == unit) {
+            Standing::Open
+        } else {
             let planned: Vec<String> = round.units.iter().map(|planned| planned.unit.to_string()).collect();
-            bail!(
-                "unit {unit} is not planned: frame {number} is in round {}, whose units are {}",
-                round.round,
-                planned.join(", ")
-            );
+            let (round, planned) = (round.round, planned.join(", "));
+            Standing::Unknown(format!("frame {number} is in round {round}, whose units are {planned}"))
         }
-        Ok(false)
     }
 
     fn render_locked(&mut self, unit: u64) -> Result<Went> {
@@ -195,17 +209,17 @@ impl<'a> Bench<'a> {
         let Self { farm, signals, every, .. } = *self;
         let tracer = self.tracer(farm.place(unit).frame_index)?;
         let loaded = started.elapsed();
-        let wish = || signals.wish();
-        match render_unit(farm, &order, begun, tracer, every, &wish)? {
+        let keeping = Keeping { every, wish: &|| signals.wish() };
+        match render_unit(farm, &order, begun, tracer, &keeping)? {
             Outcome::Left => {
                 eprintln!("unit {unit}: left by a signal; its checkpoint is there");
                 Ok(Went::Left)
             }
             Outcome::Finished => {
                 eprintln!(
-                    "unit {unit}: frame {}, {:.2} million samples in {}, {} of it to load the scene",
+                    "unit {unit}: frame {}, {} in {}, {} of it to load the scene",
                     order.order.frame,
-                    samples as f64 / 1e6,
+                    samples_in_words(samples),
                     duration_in_words(started.elapsed().as_secs_f64()),
                     duration_in_words(loaded.as_secs_f64())
                 );

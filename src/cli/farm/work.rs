@@ -1,9 +1,9 @@
 //! `farm work`: one of any number of processes on a folder.
 
-use super::merge::{conclude, merge};
-use super::unit::{Bench, IfBusy, Keeping, Went};
-use super::{CALL_AGAIN, Threads};
-use anyhow::Result;
+use super::merge::{MergeWent, conclude, merge};
+use super::unit::{Bench, IfBusy, KeepingArguments, Went};
+use super::{CALL_AGAIN, Threads, frame_lock};
+use anyhow::{Context, Result};
 use clap::Args;
 use fechner::farm::frame::{Progress, progress};
 use fechner::farm::lock::try_lock;
@@ -17,7 +17,7 @@ pub(super) struct WorkArguments {
     /// The farm's folder.
     folder: PathBuf,
     #[command(flatten)]
-    keeping: Keeping,
+    keeping: KeepingArguments,
     #[command(flatten)]
     threads: Threads,
 }
@@ -38,9 +38,13 @@ pub(super) fn run(arguments: &WorkArguments) -> Result<ExitCode> {
                 match progress(farm, frame_index) {
                     Progress::Done => continue,
                     Progress::ToMerge { .. } => {
-                        if let Some(lock) = try_lock(&farm.frame_lock(frame_index))? {
-                            did_something |= merge(farm, job, frame_index)?;
-                            drop(lock);
+                        let path = frame_lock(farm, frame_index)?;
+                        if let Some(lock) = try_lock(&path).with_context(|| path.display().to_string())? {
+                            match merge(&bench, frame_index, &lock)? {
+                                MergeWent::On => did_something = true,
+                                MergeWent::Waits => {}
+                                MergeWent::Left => return Ok(ExitCode::from(CALL_AGAIN)),
+                            }
                         }
                     }
                     Progress::Open { missing, .. } => {

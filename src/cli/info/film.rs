@@ -1,6 +1,8 @@
 //! What a film's file holds, in words.
 
 use super::super::console::duration_in_words;
+use super::super::report::sampling_name;
+use super::super::words::rounded;
 use fechner::checkpoint::Checkpoint;
 use std::fmt::Write as _;
 
@@ -17,7 +19,7 @@ pub(super) fn describe(checkpoint: &Checkpoint) -> String {
         let _ = writeln!(text, "  {name:11}  {value}");
     };
     row("scene", format!("\"{}\", content {}", origin.scene_name, origin.scene));
-    row("traced by", origin.tracing.clone());
+    row("traced by", tracing_in_words(&origin.tracing));
     row(
         "seeds",
         match header.seeds.current {
@@ -31,20 +33,20 @@ pub(super) fn describe(checkpoint: &Checkpoint) -> String {
     });
     row("planned", format!("{pending} samples after {} plans", state.plans));
     row("time", duration_in_words(state.seconds_total));
-    row("sampling", format!("{:?}", settings.sampling));
+    row("sampling", sampling_name(settings.sampling).to_owned());
     row("visibility", {
-        let reached = state.finished_rung.map_or_else(|| "none".to_owned(), |rung| rung.to_string());
-        format!("{} aimed at, {reached} reached; variance × {}", header.visibility, state.inflation)
+        let reached = state.finished_rung.map_or_else(|| "none".to_owned(), rounded);
+        format!("{} aimed at, {reached} reached; variance × {}", rounded(header.visibility), rounded(state.inflation))
     });
     row("model", settings.model.clone());
     row("display", {
         let display = &settings.viewing.display;
-        let (ppd, white, black) = (display.pixels_per_degree, display.white_cd_m2, display.black_cd_m2);
+        let [ppd, white, black] = [display.pixels_per_degree, display.white_cd_m2, display.black_cd_m2].map(rounded);
         format!("{}: {ppd} pixels a degree, white {white} and black {black} cd/m²", display.name)
     });
     row("operator", {
-        let stops = settings.exposure_stops.map_or_else(String::new, |stops| format!(", {stops:+} stops"));
-        format!("{}{stops}; RGB (1, 1, 1) is {} cd/m²", settings.operator, settings.nits_per_unit)
+        let stops = settings.exposure_stops.map_or_else(String::new, |stops| format!(", {stops:+.2} stops"));
+        format!("{}{stops}; RGB (1, 1, 1) is {} cd/m²", settings.operator, rounded(settings.nits_per_unit))
     });
     if let Some(tone) = &state.tone {
         row("fit", tone.clone().restore().describe());
@@ -62,4 +64,47 @@ pub(super) fn describe(checkpoint: &Checkpoint) -> String {
         );
     }
     text
+}
+
+/// How a film was traced: "max depth 1000, filter gaussian". Fields that ask for nothing, and its size, are left out.
+fn tracing_in_words(tracing: &str) -> String {
+    let mut depth = 0;
+    let at_top = |letter: char| {
+        depth += i32::from("({[".contains(letter)) - i32::from(")}]".contains(letter));
+        letter == ',' && depth == 0
+    };
+    let fields = tracing.split(at_top).filter_map(|field| field.trim().split_once(": "));
+    let said =
+        fields.filter(|&(name, value)| !["width", "height"].contains(&name) && value != "None" && value != "false");
+    let words = said.map(|(name, value)| {
+        let value = value.strip_prefix("Some(").and_then(|value| value.strip_suffix(')')).unwrap_or(value);
+        let text = if value == "true" { name.to_owned() } else { format!("{name} {value}") };
+        text.replace('_', " ")
+    });
+    apart(&words.collect::<Vec<_>>().join(", "))
+}
+
+/// "blackman harris" of "BlackmanHarris".
+fn apart(text: &str) -> String {
+    let mut apart = String::new();
+    for letter in text.chars() {
+        if letter.is_uppercase() && apart.ends_with(char::is_lowercase) {
+            apart.push(' ');
+        }
+        apart.extend(letter.to_lowercase());
+    }
+    apart
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tracing_is_said_without_what_it_does_not_do() {
+        let tracing = "width: 64, max_depth: 1000, filter: BlackmanHarris, clamp: Some(9.0), crop: Some(Crop { x: 1, y: 2 }), \
+                       transparent: true, prune: None";
+        let words = "max depth 1000, filter blackman harris, clamp 9.0, crop crop { x: 1, y: 2 }, transparent";
+        assert_eq!(tracing_in_words(tracing), words);
+    }
 }

@@ -29,6 +29,8 @@ packed "frames.$name.all" >"frames.$name"
 packed "units.$name.all" >"units.$name"
 rm "frames.$name.all" "units.$name.all"
 if [ ! -s "frames.$name" ]; then
+    # What needs all frames, such as a video, if it is not made yet.
+    "$fechner" farm merge "$farm"
     echo "$farm: all frames are done"
     exit
 fi
