@@ -107,6 +107,14 @@ pub struct FilmDefaults {
     pub height: u32,
 }
 
+impl FilmDefaults {
+    /// A film whose longer side has so many pixels, for a view of this width over height.
+    pub fn of_aspect(longer_side: u32, aspect: f32) -> Self {
+        let shorter = |share: f32| (longer_side as f32 * share).round().max(1.0) as u32;
+        Self { width: shorter(aspect.min(1.0)), height: shorter((1.0 / aspect).min(1.0)) }
+    }
+}
+
 /// What the scene file asks of display, quality and picture; the command line overrides it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ViewingDefaults {

@@ -25,6 +25,7 @@
 //! - `view`: the live preview, over its WebSocket
 //! - `texture_memory`: textures within a limit
 //! - `tonemap`: HDR pictures for displays, one by one and over time
+//! - `units_and_views`: what the caller's unit and picture size change of a scene
 
 mod adaptive_render;
 mod animate;
@@ -51,4 +52,5 @@ mod scene_table;
 mod support;
 mod texture_memory;
 mod tonemap;
+mod units_and_views;
 mod view;

@@ -94,8 +94,8 @@ impl<'a> Materials<'a> {
             Surface::MetalRoughness(model)
         };
 
-        // The file's unit is cd/m², and so is ours: nits_per_unit stays 1.
-        let strength = from.emissive_strength().unwrap_or(1.0);
+        // The file's unit is cd/m².
+        let strength = from.emissive_strength().unwrap_or(1.0) / builder.nits_per_unit as f32;
         let factor = Vec3::from_array(from.emissive_factor()) * strength;
         let factor = if factor.is_finite() { factor.max(Vec3::ZERO) } else { Vec3::ZERO };
         let emission = if factor == Vec3::ZERO {

@@ -27,6 +27,9 @@ const DEEPEST_NODE: usize = 256;
 /// Most placed meshes: a node below many parents is placed once for each.
 const MOST_INSTANCES: usize = 4_000_000;
 
+/// Width over height, or the inverse, beyond which a camera's aspect is taken for a slip.
+const MOST_OBLONG: f32 = 100.0;
+
 /// Extensions that are done, or change nothing that a rest pose shows.
 const KNOWN: &[&str] = &[
     "KHR_lights_punctual",
@@ -48,6 +51,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
     let bytes = files::read(path)?;
     let container = buffers::split(path, &bytes)?;
     let mut builder = Builder::new(path);
+    builder.nits_per_unit = options.nits_per_unit.unwrap_or(1.0);
     let document = parse(path, container.json, &mut builder)?;
     let buffers = Buffers::read(path, &document, container.binary)?;
 
@@ -351,16 +355,19 @@ impl<'a> Reader<'a> {
         let position = Vec3::from(to_world.translation);
         let forward = to_world.transform_vector3(Vec3::NEG_Z).try_normalize();
         let up = to_world.transform_vector3(Vec3::Y).try_normalize();
-        let (projection, usable) = match camera.projection() {
+        let (projection, aspect, usable) = match camera.projection() {
             ::gltf::camera::Projection::Perspective(perspective) => {
                 let vertical_fov_deg = perspective.yfov().to_degrees();
-                (Projection::Perspective { vertical_fov_deg }, (0.001..=179.0).contains(&vertical_fov_deg))
+                let usable = (0.001..=179.0).contains(&vertical_fov_deg);
+                (Projection::Perspective { vertical_fov_deg }, perspective.aspect_ratio(), usable)
             }
             ::gltf::camera::Projection::Orthographic(parallel) => {
                 let height = 2.0 * parallel.ymag();
-                (Projection::Orthographic { height }, height > 0.0 && height.is_finite())
+                let aspect = Some(parallel.xmag() / parallel.ymag());
+                (Projection::Orthographic { height }, aspect, height > 0.0 && height.is_finite())
             }
         };
+        let aspect = aspect.filter(|aspect| (MOST_OBLONG.recip()..=MOST_OBLONG).contains(aspect));
         let (Some(forward), Some(up)) = (forward, up) else {
             return;
         };
@@ -369,12 +376,12 @@ impl<'a> Reader<'a> {
             return;
         }
         let camera = Camera { projection, motion, ..Camera::pinhole(position, forward, up, 40.0) };
-        self.builder.cameras.push(NamedCamera { name, camera });
+        self.builder.cameras.push(NamedCamera { name, camera, aspect });
     }
 
     fn light(&mut self, light: &::gltf::khr_lights_punctual::Light, to_world: &Affine3A) {
         use ::gltf::khr_lights_punctual::Kind;
-        let strength = Vec3::from_array(light.color()) * light.intensity();
+        let strength = Vec3::from_array(light.color()) * light.intensity() / self.builder.nits_per_unit as f32;
         let position = Vec3::from(to_world.translation);
         let Some(direction) = to_world.transform_vector3(Vec3::NEG_Z).try_normalize() else {
             return;
