@@ -170,12 +170,6 @@ impl World {
         self.fixed.bytes() + self.shared.iter().map(MeshTree::bytes).sum::<usize>()
     }
 
-    /// How far from a point new rays must start to clear the rounding of the trees' coordinates and of the point's own:
-    /// a few units in the last place of both.
-    pub fn offset_at(&self, position: Vec3) -> f32 {
-        4e-7 * (position.abs().max_element() + self.radius)
-    }
-
     /// The material of an object.
     pub fn material_of(&self, object: u32) -> MaterialId {
         let instances = self.scene.instances.len();
