@@ -139,7 +139,7 @@ pub struct Mesh {
     pub normals: Vec<Vec3>,
     /// Texture coordinates, one a position, or empty. v runs down the image as in glTF (v = 0 is the top row).
     pub uvs: Vec<Vec2>,
-    /// Tangent (xyz) and handedness (w), one a position, or empty (then derived from `uvs`).
+    /// Tangent (xyz) and handedness (w), one a position, or empty (then each triangle has that of its `uvs`).
     pub tangents: Vec<Vec4>,
     /// Linear colour that multiplies what the material reflects (its base colour), one a position, or empty for white.
     pub colors: Vec<Vec3>,

@@ -185,7 +185,7 @@ impl World {
             (None, 1.0)
         } else if mesh.tangents.is_empty() {
             let (tangent, handedness) = tangent_from_uv(mesh, hit.triangle, [edge_1.into(), edge_2.into()]);
-            (Some(tangent), handedness)
+            (Some(tangent), handedness * placement.flip)
         } else {
             let [t0, t1, t2] = indices().map(|i| mesh.tangents[i]);
             let blended = t0.truncate() * b0 + t1.truncate() * b1 + t2.truncate() * b2;

@@ -183,3 +183,32 @@ fn offsets_are_those_of_what_is_hit() {
     assert_eq!(with(10.0), with(1e6));
     assert!(with(10.0) < 1e-6);
 }
+
+/// A flat quad that its instance mirrors has the frame of one whose corners are mirrored.
+#[test]
+fn mirrored_instances_keep_their_bitangents() {
+    use crate::scene::{Relief, TextureId, TextureLookup};
+    let mut quad = crate::scene::load::shapes::rectangle(Vec3::new(-1.0, -1.0, 0.0), Vec3::X * 2.0, Vec3::Y * 2.0);
+    quad.normals.clear();
+    quad.tangents.clear();
+    quad.uvs = quad.positions.iter().map(|p| Vec2::new(0.5 + 0.5 * p.x, 0.5 - 0.5 * p.y)).collect();
+    let mirror = Affine3A::from_scale(Vec3::new(-1.0, 1.0, 1.0));
+    let mut mirrored = quad.clone();
+    mirrored.positions.iter_mut().for_each(|position| position.x = -position.x);
+    mirrored.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+    let frame = |mesh: Mesh, to_world: Affine3A| {
+        let mut one = scene(&[to_world]);
+        one.spheres.clear();
+        one.meshes = vec![mesh];
+        one.materials[0].relief = Some(Relief::Normals { map: TextureLookup::plain(TextureId(0)), strength: 1.0 });
+        let world = World::new(Arc::new(one));
+        let ray = Ray::new(vec3a(0.3, 0.2, 1.0), -Vec3A::Z);
+        let point = world.surface(&ray, &world.closest(&ray).expect("the quad"));
+        let tangent = point.tangent.expect("asked for");
+        (tangent.normalize(), point.handedness * point.shading_normal.cross(tangent).normalize())
+    };
+    let (by_instance, by_corners) = (frame(quad.clone(), mirror), frame(mirrored, Affine3A::IDENTITY));
+    assert!(by_instance.0.abs_diff_eq(by_corners.0, 1e-6) && by_instance.1.abs_diff_eq(by_corners.1, 1e-6));
+    let plain = frame(quad, Affine3A::IDENTITY);
+    assert!(plain.0.abs_diff_eq(Vec3::X, 1e-6) && plain.1.abs_diff_eq(Vec3::Y, 1e-6), "{plain:?}");
+}

@@ -3,7 +3,7 @@
 use super::bump::{self, Bump};
 use super::error::{LoadError, nearest, suggestion};
 use super::texture::Requests;
-use super::{LoadOptions, default_view, environment, validate};
+use super::{LoadOptions, default_view, environment, tangents, validate};
 use crate::scene::{
     Camera, Environment, FilmDefaults, Instance, Light, Material, MaterialId, Mesh, MeshId, Scene, Sphere,
     ViewingDefaults,
@@ -133,6 +133,7 @@ impl Builder {
             notes: self.notes,
         };
         validate::check(&scene, path)?;
+        add_tangents(&mut scene);
         if !options.environment_follows {
             light_if_dark(&mut scene, path, if_dark)?;
         }
@@ -178,6 +179,16 @@ impl Builder {
         let FilmDefaults { width, height } = options.film.unwrap_or(self.film);
         camera.heightened(aspect * height as f32 / width as f32)
     }
+}
+
+/// Gives smooth meshes the tangents that their materials ask for.
+fn add_tangents(scene: &mut Scene) {
+    let mut is_asked = vec![false; scene.meshes.len()];
+    for instance in &scene.instances {
+        is_asked[instance.mesh.0 as usize] |= scene.materials[instance.material.0 as usize].needs_tangent();
+    }
+    let asked = scene.meshes.iter_mut().zip(is_asked).filter(|(_, is_asked)| *is_asked);
+    asked.for_each(|(mesh, _)| tangents::add(mesh));
 }
 
 /// Puts a studio around a scene that has no light, where its format allows that.

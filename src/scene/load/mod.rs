@@ -36,6 +36,7 @@ mod polygon;
 pub mod shapes;
 pub mod sky;
 mod spectrum;
+mod tangents;
 #[path = "texture.rs"]
 mod texture;
 mod texture_memory;
