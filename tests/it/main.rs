@@ -23,6 +23,7 @@
 //! - `kill`: the program, killed and resumed
 //! - `farm`: many processes on one folder
 //! - `view`: the live preview, over its WebSocket
+//! - `wild_files`: files as other programs write them
 //! - `texture_memory`: textures within a limit
 //! - `tonemap`: HDR pictures for displays, one by one and over time
 //! - `units_and_views`: what the caller's unit and picture size change of a scene
@@ -54,3 +55,4 @@ mod texture_memory;
 mod tonemap;
 mod units_and_views;
 mod view;
+mod wild_files;
