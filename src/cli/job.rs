@@ -167,9 +167,10 @@ impl JobArguments {
     }
 
     fn load_at(&self, seconds: f64, on_texture: Option<fn(usize, usize)>) -> anyhow::Result<Scene> {
-        let options = load::LoadOptions { on_texture, ..self.staging.load_options(seconds) };
+        let options =
+            load::LoadOptions { on_texture, ..self.staging.load_options(seconds, self.nits_per_unit, self.size) };
         let mut scene = load::load(&self.scene, &options)?;
-        self.staging.apply(&mut scene, self.nits_per_unit)?;
+        self.staging.apply(&mut scene)?;
         Ok(scene)
     }
 
@@ -180,7 +181,7 @@ impl JobArguments {
             eprintln!("note: {note}");
         }
         let size = self.size.unwrap_or(Size { width: scene.film.width, height: scene.film.height });
-        let trace = trace_settings(self, size, self.nits_per_unit.unwrap_or(scene.nits_per_unit))?;
+        let trace = trace_settings(self, size, scene.nits_per_unit)?;
         let Crop { width, height, .. } = trace.film_area();
         check_memory(Size { width, height })?;
         let mut record = settings_record(self, &scene)?;
@@ -406,7 +407,7 @@ fn settings_record(arguments: &JobArguments, scene: &Scene) -> anyhow::Result<Se
         },
         model: arguments.model.clone(),
         viewing,
-        nits_per_unit: arguments.nits_per_unit.unwrap_or(scene.nits_per_unit),
+        nits_per_unit: scene.nits_per_unit,
         operator: operator.to_owned(),
         exposure_stops: arguments.exposure.or(view.exposure_stops),
         importance: None,

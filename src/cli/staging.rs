@@ -1,11 +1,12 @@
 //! Camera and surroundings from the command line, for scenes that lack them or have the wrong ones.
 
+use super::job::Size;
 use anyhow::{Context, bail};
 use clap::Args;
 use fechner::scene::load::environment;
 use fechner::scene::load::sky::{self, Sky};
 use fechner::scene::load::{LoadOptions, megabytes};
-use fechner::scene::{Camera, Environment, Projection, Scene};
+use fechner::scene::{Camera, Environment, FilmDefaults, Projection, Scene};
 use glam::Vec3;
 use std::path::PathBuf;
 
@@ -91,8 +92,8 @@ fn parse_look_at(text: &str) -> Result<LookAt, String> {
 }
 
 impl Staging {
-    /// How the scene is read, as it is at a time.
-    pub(super) fn load_options(&self, seconds: f64) -> LoadOptions {
+    /// How the scene is read, as it is at a time, for a unit and a picture of a size that the command line may name.
+    pub(super) fn load_options(&self, seconds: f64, nits_per_unit: Option<f64>, size: Option<Size>) -> LoadOptions {
         LoadOptions {
             camera: self.camera.clone(),
             frame_time: seconds,
@@ -100,12 +101,14 @@ impl Staging {
             environment_follows: self.environment.is_some(),
             on_texture: None,
             texture_memory: self.texture_memory.map(megabytes),
+            nits_per_unit,
+            film: size.map(|Size { width, height }| FilmDefaults { width, height }),
         }
     }
 
-    /// Puts everything into the scene. `nits_per_unit` is the command line's, if it names one.
-    pub(super) fn apply(&self, scene: &mut Scene, nits_per_unit: Option<f64>) -> anyhow::Result<()> {
-        let nits_per_unit = nits_per_unit.unwrap_or(scene.nits_per_unit);
+    /// Puts everything into the scene.
+    pub(super) fn apply(&self, scene: &mut Scene) -> anyhow::Result<()> {
+        let nits_per_unit = scene.nits_per_unit;
         match &self.environment {
             None => {}
             Some(Surroundings::Picture(file)) => {

@@ -1,8 +1,9 @@
 //! The wide tree of a mesh, in coordinates of its own.
 //!
-//! They are centred, so that box tests keep their precision far from the origin, and scaled by a power of two until the
-//! largest extent is between 512 and 1024, so that no product of the triangle test leaves the range of f32. A power of two
-//! changes no bit of a mantissa: shared vertices stay shared and distances scale exactly.
+//! They are centred along the axes on which that rounds no coordinate, so that tests keep their precision far from the origin,
+//! and scaled by a power of two until the largest extent is between 512 and 1024, so that no product of the triangle test leaves
+//! the range of f32. Neither changes a bit of what a coordinate says: shared vertices stay shared, distances scale exactly, and
+//! small things near the origin stay what they are however far away another one is.
 
 use super::tree::Bounds;
 use super::wide_tree::{TriangleRef, WideHit, WideTree};
@@ -56,7 +57,7 @@ impl MeshTree {
         let bounds = Bounds::of_points(triangles.iter().filter(|(t, _)| usable(t)).flat_map(|(t, _)| *t));
         let (center, scale) = if bounds.is_finite() {
             let extent = (bounds.max - bounds.min).max_element();
-            ((bounds.min + bounds.max) * 0.5, 2f32.powi(9 - extent.max(1e-30).log2().floor() as i32))
+            (exact_center(&bounds), 2f32.powi(9 - extent.max(1e-30).log2().floor() as i32))
         } else {
             (Vec3A::ZERO, 1.0)
         };
@@ -109,8 +110,8 @@ impl MeshTree {
         self.tree.reference(place)
     }
 
-    /// The triangle at a [`MeshHit::place`], in the coordinates that the tree was given: to within the rounding of the tree's own,
-    /// half a unit in the last place of their extent, and from memory that the walk has just read.
+    /// The triangle at a [`MeshHit::place`], in the coordinates that the tree was given, from memory that the walk has just read.
+    /// The corner is exact.
     #[inline]
     pub(super) fn shape(&self, place: u32) -> TriangleShape {
         let [a, b, c] = self.tree.corners(place);
@@ -126,6 +127,15 @@ impl MeshTree {
         let hit = &found.hit;
         MeshHit { t: hit.t * self.inverse_scale, place: found.place, b1: hit.b1, b2: hit.b2 }
     }
+}
+
+/// The centre along axes where no number of the bounds is three times another, 0 along the others. Taken from a number of at least its
+/// half and at most its double, a number leaves an exact difference (Sterbenz 1974).
+fn exact_center(bounds: &Bounds) -> Vec3A {
+    let center = 0.5 * bounds.min + 0.5 * bounds.max;
+    let (low, high) = (bounds.min.abs().min(bounds.max.abs()), bounds.min.abs().max(bounds.max.abs()));
+    let on_one_side = (bounds.min * bounds.max).cmpgt(Vec3A::ZERO);
+    Vec3A::select(on_one_side & high.cmplt(2.9 * low), center, Vec3A::ZERO)
 }
 
 #[cfg(test)]
@@ -213,6 +223,30 @@ mod tests {
                 assert!(tree.any(start, direction, f32::INFINITY, |_| true), "radius {radius} from inside");
             }
         }
+    }
+
+    /// A triangle far away, or a large one, rounds no corner of a small one.
+    #[test]
+    fn far_things_leave_small_ones_as_they_are() {
+        let small = [vec3a(0.123_456_79, 0.2, -0.3), vec3a(0.234_567_9, 0.2, -0.3), vec3a(0.1, 0.3, -0.312_345_67)];
+        for far in [1e3f32, 1e5, 1e7, 1e12] {
+            let tree = tree_of(&[small, [vec3a(far, 0.0, 0.0), vec3a(far, far, 0.0), vec3a(far, 0.0, 1.0)]]);
+            let middle = (small[0] + small[1] + small[2]) / 3.0;
+            let hit = tree.closest(middle + Vec3A::Z, -Vec3A::Z, f32::INFINITY, |_| true).expect("the small one");
+            let found = tree.shape(hit.place);
+            assert_eq!([found.corner, found.corner + found.edges[0]], [small[0], small[1]], "far: {far}");
+            assert!((hit.t - 1.0).abs() < 1e-5, "far: {far}: {}", hit.t);
+        }
+        // What lies beside its origin is centred.
+        let away = small.map(|corner| corner + 1e4);
+        let tree = tree_of(&[away]);
+        let hit = tree.closest(
+            away[0] + 0.3 * (away[1] - away[0]) + 0.3 * (away[2] - away[0]) + Vec3A::Z,
+            -Vec3A::Z,
+            2.0,
+            |_| true,
+        );
+        assert_eq!(tree.shape(hit.expect("hit").place).corner, away[0]);
     }
 
     /// Hazard 3, and triangles without area.

@@ -6,6 +6,7 @@
 
 mod collapse;
 mod mesh_tree;
+pub(crate) mod offset;
 mod simd;
 pub mod sphere;
 pub mod surface;

@@ -4,6 +4,7 @@
 //! tree each, in their own space, and are entered through their instance's transform. Spheres stay analytic.
 
 mod at_hit;
+mod build;
 #[cfg(test)]
 mod tests;
 
@@ -11,8 +12,9 @@ use super::mesh_tree::{MeshHit, MeshTree};
 use super::tree::{BinaryTree, Bounds, PrimitiveTree};
 use super::wide_tree::TriangleRef;
 use super::{Ray, sphere};
-use crate::scene::{Alpha, Instance, MaterialId, Motion, ScalarInput, Scene, SpherePlace};
+use crate::scene::{Alpha, Instance, MaterialId, ScalarInput, Scene, SpherePlace};
 use at_hit::{Placement, interpolate_uv};
+use build::{MOST_VERTICES, fixed_triangles, own_triangles, placed_bounds, swept_bounds};
 use glam::{Affine3A, Vec2, Vec3, Vec3A};
 use std::sync::Arc;
 
@@ -99,7 +101,9 @@ impl World {
             items.push(Item::Fixed);
             item_bounds.push(fixed.bounds());
         }
-        let mut shared = Vec::new();
+        let vertices = |instance: &Instance| scene.meshes[instance.mesh.0 as usize].positions.len();
+        let tightly = scene.instances.iter().map(vertices).sum::<usize>() <= MOST_VERTICES;
+        let mut shared: Vec<MeshTree> = Vec::new();
         let mut tree_of_mesh = vec![None; scene.meshes.len()];
         for (number, instance) in scene.instances.iter().enumerate() {
             let mesh = instance.mesh.0 as usize;
@@ -120,7 +124,7 @@ impl World {
             });
             item_bounds.push(match &instance.motion {
                 Some(motion) => swept_bounds(motion, shared[tree].bounds()),
-                None => placed_bounds(&scene, instance),
+                None => placed_bounds(&scene, instance, shared[tree].bounds(), tightly),
             });
         }
         for (number, s) in scene.spheres.iter().enumerate() {
@@ -168,12 +172,6 @@ impl World {
     /// Memory of the trees over triangles in bytes, their copies of the vertices included.
     pub fn tree_bytes(&self) -> usize {
         self.fixed.bytes() + self.shared.iter().map(MeshTree::bytes).sum::<usize>()
-    }
-
-    /// How far from a point new rays must start to clear the rounding of the trees' coordinates and of the point's own:
-    /// a few units in the last place of both.
-    pub fn offset_at(&self, position: Vec3) -> f32 {
-        4e-7 * (position.abs().max_element() + self.radius)
     }
 
     /// The material of an object.
@@ -373,49 +371,6 @@ fn arranged(items: Vec<Item>, bounds: &[Bounds]) -> (Option<BinaryTree>, Vec<Ite
     let mut slots: Vec<Option<Item>> = items.into_iter().map(Some).collect();
     let ordered = tree.order().iter().filter_map(|&i| slots[i as usize].take()).collect();
     (Some(tree), ordered)
-}
-
-fn own_triangles(scene: &Scene, mesh: usize) -> Vec<([Vec3A; 3], TriangleRef)> {
-    let mesh = &scene.meshes[mesh];
-    mesh.triangles
-        .iter()
-        .enumerate()
-        .map(|(triangle, indices)| {
-            let corners = indices.map(|i| Vec3A::from(mesh.positions[i as usize]));
-            (corners, TriangleRef { instance: 0, triangle: triangle as u32 })
-        })
-        .collect()
-}
-
-fn fixed_triangles(scene: &Scene, uses: &[u32]) -> Vec<([Vec3A; 3], TriangleRef)> {
-    let mut triangles = Vec::new();
-    for (number, instance) in scene.instances.iter().enumerate() {
-        if uses[instance.mesh.0 as usize] != 1 {
-            continue;
-        }
-        for (corners, reference) in own_triangles(scene, instance.mesh.0 as usize) {
-            let world = corners.map(|p| instance.to_world.transform_point3a(p));
-            triangles.push((world, TriangleRef { instance: number as u32, ..reference }));
-        }
-    }
-    triangles
-}
-
-fn placed_bounds(scene: &Scene, instance: &Instance) -> Bounds {
-    let mesh = &scene.meshes[instance.mesh.0 as usize];
-    Bounds::of_points(mesh.positions.iter().map(|&p| instance.to_world.transform_point3a(p.into())))
-}
-
-/// Where things with these bounds in their own space can be while the shutter is open.
-fn swept_bounds(motion: &Motion, own: Bounds) -> Bounds {
-    let pick = |corner: u32, bit: u32| if corner >> bit & 1 == 0 { own.min } else { own.max };
-    let corners: [Vec3A; 8] =
-        std::array::from_fn(|i| Vec3A::new(pick(i as u32, 0).x, pick(i as u32, 1).y, pick(i as u32, 2).z));
-    let mut bounds = Bounds::EMPTY;
-    motion.sweep(&corners, |center, radius| {
-        bounds = bounds.union(Bounds { min: center - radius, max: center + radius });
-    });
-    bounds
 }
 
 /// A triangle of an object, or the near or far side of a sphere.

@@ -250,7 +250,7 @@ impl PathTracer {
         let Some(place) = light.place else {
             return (Ray { origin, direction: light.direction.into(), time }, f32::INFINITY);
         };
-        let end = place.position + place.normal * self.world.offset_at(place.position);
+        let end = place.position + place.normal * place.offset;
         let way = Vec3A::from(end) - origin;
         let distance = way.length();
         (Ray { origin, direction: way / distance, time }, distance)

@@ -102,7 +102,8 @@ pub(super) fn triangle_at(world: &World, object: u32, triangle: u32, time: f32) 
     let scene = world.scene();
     let mirrored = world.transform_at(object, time).matrix3.determinant() < 0.0;
     let material = &scene.materials[scene.instances[object as usize].material.0 as usize];
-    FlatEmitter::triangle(object, triangle, world.triangle_corners(object, triangle, time), mirrored, material)
+    let corners = world.triangle_corners(object, triangle, time);
+    FlatEmitter::triangle(object, triangle, corners, world.translation_of_tree(object, time), mirrored, material)
 }
 
 fn flat_bounds(emitter: &FlatEmitter, radiance: f32) -> LightBounds {

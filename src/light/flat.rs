@@ -5,8 +5,9 @@ use super::bilinear::{BilinearDensity, parallelogram_corners};
 use super::lanes::FourVectors;
 use super::solid_angle::{LEAST, SphericalRectangle, SphericalTriangle};
 use super::{LightPlace, LightReceiver, LightSample};
+use crate::geometry::offset;
 use crate::scene::{Alpha, Material, Scene};
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3, Vec3A};
 
 /// A flat emitter.
 #[derive(Clone, Debug)]
@@ -27,6 +28,8 @@ pub(super) struct FlatEmitter {
     /// Unit normal of the front.
     pub(super) normal: Vec3,
     pub(super) area: f32,
+    /// How far before it a shadow ray ends.
+    offset: f32,
     pub(super) both_sides: bool,
     /// No ray meets it.
     is_unseen: bool,
@@ -64,11 +67,13 @@ impl Edges {
 type Shares = [f32; 2];
 
 impl FlatEmitter {
-    /// A triangle with these world corners; `mirrored` if its front is where the winding is clockwise.
+    /// A triangle with these world corners, put there by a transform with this translation; `mirrored` if its front is where the
+    /// winding is clockwise.
     pub(super) fn triangle(
         object: u32,
         triangle: u32,
         corners: [Vec3; 3],
+        translation: Vec3A,
         mirrored: bool,
         material: &Material,
     ) -> Self {
@@ -89,6 +94,7 @@ impl FlatEmitter {
             bilinear_beyond_squared: squared_distance_at(MOST_BILINEAR, area, radius),
             normal: scaled_normal.normalize_or(Vec3::Y) * if mirrored { -1.0 } else { 1.0 },
             area,
+            offset: offset::of_triangle(corners[0].into(), [edge_1.into(), edge_2.into()], translation),
             both_sides: material.emits_both_sides,
             is_unseen: material.alpha == Alpha::Unseen,
             even_radiance: None,
@@ -127,6 +133,7 @@ impl FlatEmitter {
             speck_beyond_squared: squared_distance_at(LEAST as f32, area, radius),
             bilinear_beyond_squared: squared_distance_at(MOST_BILINEAR, area, radius),
             area,
+            offset: self.offset.max(next.offset),
             even_radiance,
             ..self.clone()
         })
@@ -160,7 +167,7 @@ impl FlatEmitter {
         let pdf = view.pdf(self, direction, distance, || shares);
         (pdf > 0.0 && pdf.is_finite()).then(|| LightSample {
             direction,
-            place: Some(LightPlace { position, normal: self.normal * facing.signum() }),
+            place: Some(LightPlace { position, normal: self.normal * facing.signum(), offset: self.offset }),
             radiance: self.even_radiance.unwrap_or_else(|| self.radiance(scene, shares)),
             pdf,
             is_delta: self.is_unseen,

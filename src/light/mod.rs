@@ -63,6 +63,8 @@ pub struct LightPlace {
     pub position: Vec3,
     /// Unit normal on the side that shines on the shaded point; zero for lights without a surface.
     pub normal: Vec3,
+    /// How far before the surface a ray must end, to clear its rounding error.
+    pub offset: f32,
 }
 
 #[derive(Clone, Debug)]

@@ -21,7 +21,7 @@ pub(super) fn sample(light: &Light, from: Vec3) -> Option<LightSample> {
     };
     (distance > 0.0 && share > 0.0).then(|| LightSample {
         direction,
-        place: Some(LightPlace { position, normal: Vec3::ZERO }),
+        place: Some(LightPlace { position, normal: Vec3::ZERO, offset: 0.0 }),
         radiance: intensity * (share / (distance * distance)),
         pdf: 1.0,
         is_delta: true,

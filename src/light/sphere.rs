@@ -1,7 +1,7 @@
 //! Spheres that emit: sampled uniformly in the cone that they fill. From inside they are left to the BSDF.
 
 use super::{LightPlace, LightSample};
-use crate::geometry::World;
+use crate::geometry::{World, offset};
 use crate::scene::{Alpha, Material, SpherePlace};
 use glam::{Mat3A, Vec3};
 use std::f32::consts::{PI, TAU};
@@ -71,7 +71,7 @@ impl SphereEmitter {
         let normal = (position - self.center).normalize_or(-direction);
         Some(LightSample {
             direction,
-            place: Some(LightPlace { position, normal }),
+            place: Some(LightPlace { position, normal, offset: offset::of_sphere(position, self.radius) }),
             radiance: self.radiance(world, normal),
             pdf: in_cone.pdf(),
             is_delta: self.is_unseen,

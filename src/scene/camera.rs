@@ -85,6 +85,20 @@ impl Camera {
             motion: None,
         }
     }
+
+    /// The same camera with a view so many times as high, but never lower than it is.
+    pub fn heightened(self, times: f32) -> Self {
+        let times = times.max(1.0);
+        let projection = match self.projection {
+            _ if times == 1.0 => self.projection,
+            Projection::Orthographic { height } => Projection::Orthographic { height: height * times },
+            Projection::Perspective { vertical_fov_deg } => {
+                let half_height = (0.5 * vertical_fov_deg.to_radians()).tan() * times;
+                Projection::Perspective { vertical_fov_deg: 2.0 * half_height.atan().to_degrees() }
+            }
+        };
+        Self { projection, ..self }
+    }
 }
 
 impl ScreenWindow {

@@ -54,7 +54,7 @@ pub enum Alpha {
     Mask {
         /// Coverage.
         value: ScalarInput,
-        /// Threshold in [0, 1].
+        /// Threshold, at least 0; nothing is there above 1.
         cutoff: f32,
     },
     /// Points are there with this probability.

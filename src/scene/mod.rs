@@ -107,6 +107,14 @@ pub struct FilmDefaults {
     pub height: u32,
 }
 
+impl FilmDefaults {
+    /// A film whose longer side has so many pixels, for a view of this width over height.
+    pub fn of_aspect(longer_side: u32, aspect: f32) -> Self {
+        let shorter = |share: f32| (longer_side as f32 * share).round().max(1.0) as u32;
+        Self { width: shorter(aspect.min(1.0)), height: shorter((1.0 / aspect).min(1.0)) }
+    }
+}
+
 /// What the scene file asks of display, quality and picture; the command line overrides it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ViewingDefaults {
@@ -131,7 +139,7 @@ pub struct Mesh {
     pub normals: Vec<Vec3>,
     /// Texture coordinates, one a position, or empty. v runs down the image as in glTF (v = 0 is the top row).
     pub uvs: Vec<Vec2>,
-    /// Tangent (xyz) and handedness (w), one a position, or empty (then derived from `uvs`).
+    /// Tangent (xyz) and handedness (w), one a position, or empty (then each triangle has that of its `uvs`).
     pub tangents: Vec<Vec4>,
     /// Linear colour that multiplies what the material reflects (its base colour), one a position, or empty for white.
     pub colors: Vec<Vec3>,

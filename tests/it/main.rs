@@ -24,8 +24,10 @@
 //! - `farm`: many processes on one folder
 //! - `farm_mishaps`: farms that lost a file, were interrupted, or were asked for what cannot be
 //! - `view`: the live preview, over its WebSocket
+//! - `wild_files`: files as other programs write them
 //! - `texture_memory`: textures within a limit
 //! - `tonemap`: HDR pictures for displays, one by one and over time
+//! - `units_and_views`: what the caller's unit and picture size change of a scene
 
 mod adaptive_render;
 mod animate;
@@ -53,4 +55,6 @@ mod scene_table;
 mod support;
 mod texture_memory;
 mod tonemap;
+mod units_and_views;
 mod view;
+mod wild_files;

@@ -40,7 +40,7 @@ pub(super) fn shot_settings(arguments: &AnimateArguments, scene: &Scene, shot: F
             ..Limits::of_visibility(asked.unwrap_or(otherwise))
         },
         viewing: seeing::viewing(display, None)?,
-        nits_per_unit: arguments.nits_per_unit.unwrap_or(scene.nits_per_unit),
+        nits_per_unit: scene.nits_per_unit,
         adapted_to_cd_m2: arguments.adapted_to,
         gaze: arguments.gaze.as_deref().map(read_gaze).transpose()?,
         eye: eye(arguments)?,

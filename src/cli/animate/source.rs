@@ -23,11 +23,9 @@ impl<'a> FileSource<'a> {
     }
 
     fn read(&self, seconds: f64) -> Result<Scene, LoadError> {
-        let AnimateArguments { scene: file, staging, nits_per_unit, .. } = self.arguments;
-        let mut scene = load(file, &staging.load_options(seconds))?;
-        staging
-            .apply(&mut scene, *nits_per_unit)
-            .map_err(|error| LoadError::Option { problem: format!("{error:#}") })?;
+        let AnimateArguments { scene: file, staging, nits_per_unit, size, .. } = self.arguments;
+        let mut scene = load(file, &staging.load_options(seconds, *nits_per_unit, *size))?;
+        staging.apply(&mut scene).map_err(|error| LoadError::Option { problem: format!("{error:#}") })?;
         Ok(scene)
     }
 }

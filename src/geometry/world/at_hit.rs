@@ -2,6 +2,7 @@
 
 use super::{Hit, World};
 use crate::geometry::mesh_tree::TriangleShape;
+use crate::geometry::offset;
 use crate::geometry::simd::prefetch;
 use crate::geometry::surface::SurfaceDerivatives;
 use crate::geometry::{Ray, SurfacePoint};
@@ -47,6 +48,14 @@ impl World {
     /// Where a sphere is at a share of the open shutter.
     pub fn sphere_at(&self, object: u32, time: f32) -> SpherePlace {
         self.scene.spheres[object as usize - self.scene.instances.len()].place_at(time)
+    }
+
+    /// The translation that puts a mesh into the world where its tree is in coordinates of its own; zero where that is in world space.
+    pub(crate) fn translation_of_tree(&self, object: u32, time: f32) -> Vec3A {
+        match self.placements[object as usize].shared {
+            None => Vec3A::ZERO,
+            Some(_) => self.transform_at(object, time).translation,
+        }
     }
 
     /// World-space corners of a triangle of an instance at a share of the open shutter.
@@ -138,7 +147,7 @@ impl World {
             color: Vec3::ONE,
             object: hit.object,
             triangle: 0,
-            offset: self.offset_at(position),
+            offset: offset::of_sphere(position, place.radius),
         }
     }
 
@@ -153,11 +162,12 @@ impl World {
             moved = (transform, placement.moved_to(&transform));
             (to_world, placement) = (&moved.0, &moved.1);
         }
-        let shape = match placement.shared {
-            None => self.fixed.shape(hit.place),
-            Some(tree) => self.shared[tree as usize].shape(hit.place).transformed(to_world),
+        let (shape, translation) = match placement.shared {
+            None => (self.fixed.shape(hit.place), Vec3A::ZERO),
+            Some(tree) => (self.shared[tree as usize].shape(hit.place).transformed(to_world), to_world.translation),
         };
         let TriangleShape { corner, edges: [edge_1, edge_2] } = shape;
+        let offset = offset::of_triangle(corner, [edge_1, edge_2], translation);
         let (b0, b1, b2) = (1.0 - hit.b1 - hit.b2, hit.b1, hit.b2);
         let position = Vec3::from(corner + edge_1 * b1 + edge_2 * b2);
         let geometric_normal = Vec3::from(placement.flip * edge_1.cross(edge_2)).normalize_or(Vec3::Y);
@@ -175,7 +185,7 @@ impl World {
             (None, 1.0)
         } else if mesh.tangents.is_empty() {
             let (tangent, handedness) = tangent_from_uv(mesh, hit.triangle, [edge_1.into(), edge_2.into()]);
-            (Some(tangent), handedness)
+            (Some(tangent), handedness * placement.flip)
         } else {
             let [t0, t1, t2] = indices().map(|i| mesh.tangents[i]);
             let blended = t0.truncate() * b0 + t1.truncate() * b1 + t2.truncate() * b2;
@@ -196,7 +206,7 @@ impl World {
             color: interpolate_color(mesh, hit.triangle, b1, b2),
             object: hit.object,
             triangle: hit.triangle,
-            offset: self.offset_at(position),
+            offset,
         }
     }
 }

@@ -95,3 +95,120 @@ fn mirrored_instances_keep_their_outside() {
     let hit = world.closest(&ray).expect("the slanted face");
     assert!(world.surface(&ray, &hit).geometric_normal.dot(Vec3::from(ray.direction)) < 0.0);
 }
+
+/// How many of the rays that leave convex bodies where they are hit meet the body again.
+fn self_hits(world: &World, aims: &[(Vec3A, f32)]) -> usize {
+    let unit = |i: u64, k: u64| (crate::sampler::hash_words(i, k) >> 40) as f32 / 16_777_216.0 * 2.0 - 1.0;
+    let direction = |i: u64, k: u64| vec3a(unit(i, k), unit(i, k + 1), unit(i, k + 2)).normalize_or(Vec3A::X);
+    let mut met_again = 0;
+    let mut hits = 0;
+    for (number, &(center, size)) in aims.iter().enumerate() {
+        for i in 0..4000u64 {
+            let from = center + direction(i, 0) * size * 4.0;
+            let target = center + direction(i, 3) * size * unit(i, 6) * 0.8;
+            let ray = Ray::new(from, (target - from).normalize());
+            let Some(hit) = world.closest(&ray).filter(|hit| hit.distance < 6.0 * size) else { continue };
+            let point = world.surface(&ray, &hit);
+            let mut away = Vec3::from(direction(i, 7 + number as u64));
+            // Every other ray grazes the surface.
+            if i % 2 == 0 {
+                away = (away - point.geometric_normal * point.geometric_normal.dot(away) * 0.99).normalize();
+            }
+            away *= point.geometric_normal.dot(away).signum();
+            hits += 1;
+            let next = Ray::new(point.spawn(away), away.into());
+            met_again += usize::from(world.occluded(&next, 8.0 * size));
+        }
+    }
+    assert!(hits > 1000 * aims.len(), "{hits} hits: the test tests too little");
+    met_again
+}
+
+/// Rays leave what they hit without meeting it again, near the origin and far from it, in a tree of its own and in the common one,
+/// beside something small or huge.
+#[test]
+fn no_ray_meets_the_triangle_that_it_leaves() {
+    let turned = |scale: f32, at: Vec3| {
+        Affine3A::from_scale_rotation_translation(
+            Vec3::splat(scale),
+            Quat::from_rotation_y(0.7) * Quat::from_rotation_x(0.4),
+            at,
+        )
+    };
+    let way = Vec3::new(1.0, -0.7, 0.4);
+    for shift in [0.0, 1.0, 1e2, 1e4, 1e5, 1e6] {
+        for scale in [1.0, 50.0] {
+            let at = way * shift;
+            let mut placed = scene(&[turned(scale, at), turned(scale, -at - 1000.0 * Vec3::Y)]);
+            placed.meshes[0] = crate::scene::load::shapes::cuboid(-Vec3::ONE, Vec3::ONE);
+            placed.spheres.clear();
+            for scene in [flattened(&placed), placed] {
+                let aims = scene.instances.iter().map(|i| (i.to_world.translation, scale)).collect::<Vec<_>>();
+                let world = World::new(Arc::new(scene));
+                assert_eq!(self_hits(&world, &aims), 0, "shift {shift}, scale {scale}, trees {}", world.shared.len());
+            }
+        }
+    }
+}
+
+/// The same of a mesh whose own coordinates are far away, moved back by its transform.
+#[test]
+fn no_ray_meets_the_triangle_of_a_mesh_that_is_moved_back() {
+    for shift in [1e2, 1e4, 1e6] {
+        let far = Vec3::splat(shift);
+        let mut placed = scene(&[Affine3A::from_translation(-far), Affine3A::from_translation(Vec3::X * 30.0 - far)]);
+        placed.meshes[0] = crate::scene::load::shapes::cuboid(far - 1.0, far + 1.0);
+        placed.spheres.clear();
+        for scene in [flattened(&placed), placed] {
+            let world = World::new(Arc::new(scene));
+            assert_eq!(self_hits(&world, &[(Vec3A::ZERO, 1.0), (Vec3A::X * 30.0, 1.0)]), 0, "shift {shift}");
+        }
+    }
+}
+
+/// A huge thing beside a small one does not lift rays off the small one.
+#[test]
+fn offsets_are_those_of_what_is_hit() {
+    let with = |size: f32| {
+        let mut both = flattened(&scene(&[Affine3A::IDENTITY, Affine3A::from_translation(Vec3::Y * -size)]));
+        both.meshes[1] = crate::scene::load::shapes::rectangle(
+            Vec3::new(-size, size - 1.0, -size),
+            Vec3::Z * 2.0 * size,
+            Vec3::X * 2.0 * size,
+        );
+        let world = World::new(Arc::new(both));
+        let ray = Ray::new(vec3a(0.2, 0.2, -1.0), Vec3A::Z);
+        world.surface(&ray, &world.closest(&ray).expect("the tetrahedron")).offset
+    };
+    assert_eq!(with(10.0), with(1e6));
+    assert!(with(10.0) < 1e-6);
+}
+
+/// A flat quad that its instance mirrors has the frame of one whose corners are mirrored.
+#[test]
+fn mirrored_instances_keep_their_bitangents() {
+    use crate::scene::{Relief, TextureId, TextureLookup};
+    let mut quad = crate::scene::load::shapes::rectangle(Vec3::new(-1.0, -1.0, 0.0), Vec3::X * 2.0, Vec3::Y * 2.0);
+    quad.normals.clear();
+    quad.tangents.clear();
+    quad.uvs = quad.positions.iter().map(|p| Vec2::new(0.5 + 0.5 * p.x, 0.5 - 0.5 * p.y)).collect();
+    let mirror = Affine3A::from_scale(Vec3::new(-1.0, 1.0, 1.0));
+    let mut mirrored = quad.clone();
+    mirrored.positions.iter_mut().for_each(|position| position.x = -position.x);
+    mirrored.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+    let frame = |mesh: Mesh, to_world: Affine3A| {
+        let mut one = scene(&[to_world]);
+        one.spheres.clear();
+        one.meshes = vec![mesh];
+        one.materials[0].relief = Some(Relief::Normals { map: TextureLookup::plain(TextureId(0)), strength: 1.0 });
+        let world = World::new(Arc::new(one));
+        let ray = Ray::new(vec3a(0.3, 0.2, 1.0), -Vec3A::Z);
+        let point = world.surface(&ray, &world.closest(&ray).expect("the quad"));
+        let tangent = point.tangent.expect("asked for");
+        (tangent.normalize(), point.handedness * point.shading_normal.cross(tangent).normalize())
+    };
+    let (by_instance, by_corners) = (frame(quad.clone(), mirror), frame(mirrored, Affine3A::IDENTITY));
+    assert!(by_instance.0.abs_diff_eq(by_corners.0, 1e-6) && by_instance.1.abs_diff_eq(by_corners.1, 1e-6));
+    let plain = frame(quad, Affine3A::IDENTITY);
+    assert!(plain.0.abs_diff_eq(Vec3::X, 1e-6) && plain.1.abs_diff_eq(Vec3::Y, 1e-6), "{plain:?}");
+}

@@ -3,7 +3,7 @@
 use super::bump::{self, Bump};
 use super::error::{LoadError, nearest, suggestion};
 use super::texture::Requests;
-use super::{LoadOptions, default_view, environment, validate};
+use super::{LoadOptions, default_view, environment, tangents, validate};
 use crate::scene::{
     Camera, Environment, FilmDefaults, Instance, Light, Material, MaterialId, Mesh, MeshId, Scene, Sphere,
     ViewingDefaults,
@@ -15,6 +15,8 @@ use std::path::Path;
 pub(super) struct NamedCamera {
     pub(super) name: String,
     pub(super) camera: Camera,
+    /// Width over height of the view, where the file says.
+    pub(super) aspect: Option<f32>,
 }
 
 /// What to do with a scene that brings no light.
@@ -106,6 +108,10 @@ impl Builder {
 
     /// Chooses the camera, decodes the textures, checks everything, and adds what is missing.
     pub(super) fn finish(mut self, path: &Path, if_dark: IfDark, options: &LoadOptions) -> Result<Scene, LoadError> {
+        if let Some(nits_per_unit) = options.nits_per_unit {
+            self.nits_per_unit = nits_per_unit;
+            self.notes.retain(|note| !note.starts_with("Radiance has no unit"));
+        }
         validate::repair(&mut self, path)?;
         let camera = self.choose_camera(options)?;
         let coverage = |id| self.materials.iter().any(|material| material.alpha.texture_of_coverage() == Some(id));
@@ -127,50 +133,31 @@ impl Builder {
             notes: self.notes,
         };
         validate::check(&scene, path)?;
-        let weakest = match if_dark {
-            IfDark::Fail | IfDark::StudioWithoutLight => 0.0,
-            IfDark::Studio => WEAK_EMITTER_CD_M2 / scene.nits_per_unit as f32,
-        };
-        if !options.environment_follows && !is_lit(&scene, weakest) {
-            match if_dark {
-                IfDark::Fail => {
-                    return Err(LoadError::invalid(
-                        path,
-                        "scene has no light: add an [environment], [[lights]] or an object whose material has an emission",
-                    ));
-                }
-                IfDark::Studio | IfDark::StudioWithoutLight => {
-                    scene.environment = Some(environment::studio(scene.nits_per_unit, scene.camera.forward));
-                    scene.notes.push(
-                        "No light in the file: a soft studio of about 1000 cd/m² surrounds the scene.".to_owned(),
-                    );
-                }
-            }
+        add_tangents(&mut scene);
+        if !options.environment_follows {
+            light_if_dark(&mut scene, path, if_dark)?;
         }
         Ok(scene)
     }
 
     fn choose_camera(&mut self, options: &LoadOptions) -> Result<Camera, LoadError> {
-        let names = || self.cameras.iter().map(|camera| camera.name.as_str());
         let Some(wanted) = &options.camera else {
-            if let Some(first) = self.cameras.first() {
-                let camera = first.camera.clone();
-                if self.cameras.len() > 1 {
-                    let note = format!("{} cameras; the first one, \"{}\", is used.", self.cameras.len(), first.name);
-                    self.notes.push(note);
-                }
-                return Ok(camera);
+            let Some(first) = self.cameras.first().cloned() else {
+                self.notes.push("No camera in the file: a three-quarter view of the whole scene is used.".to_owned());
+                let FilmDefaults { width, height } = options.film.unwrap_or(self.film);
+                let bounds = default_view::bounds(&self.meshes, &self.instances, &self.spheres);
+                return Ok(default_view::framed(bounds, width as f32 / height as f32));
+            };
+            if self.cameras.len() > 1 {
+                let note = format!("{} cameras; the first one, \"{}\", is used.", self.cameras.len(), first.name);
+                self.notes.push(note);
             }
-            self.notes.push("No camera in the file: a three-quarter view of the whole scene is used.".to_owned());
-            let aspect = self.film.width as f32 / self.film.height as f32;
-            return Ok(default_view::framed(
-                default_view::bounds(&self.meshes, &self.instances, &self.spheres),
-                aspect,
-            ));
+            return Ok(self.fitted(first, options));
         };
-        if let Some(camera) = self.cameras.iter().find(|camera| camera.name == *wanted) {
-            return Ok(camera.camera.clone());
+        if let Some(camera) = self.cameras.iter().find(|camera| camera.name == *wanted).cloned() {
+            return Ok(self.fitted(camera, options));
         }
+        let names = || self.cameras.iter().map(|camera| camera.name.as_str());
         let problem = match names().count() {
             0 => format!("no camera \"{wanted}\": the scene has no named camera"),
             _ => format!("no camera \"{wanted}\"{}", {
@@ -183,6 +170,49 @@ impl Builder {
         };
         Err(LoadError::Option { problem })
     }
+
+    /// The camera for the picture: one that states its aspect gives it to a film of no other, and shows more above and below in
+    /// a narrower one, so that nothing at its sides is lost.
+    fn fitted(&mut self, NamedCamera { camera, aspect, .. }: NamedCamera, options: &LoadOptions) -> Camera {
+        let Some(aspect) = aspect else { return camera };
+        self.film = FilmDefaults::of_aspect(self.film.width.max(self.film.height), aspect);
+        let FilmDefaults { width, height } = options.film.unwrap_or(self.film);
+        camera.heightened(aspect * height as f32 / width as f32)
+    }
+}
+
+/// Gives smooth meshes the tangents that their materials ask for.
+fn add_tangents(scene: &mut Scene) {
+    let mut is_asked = vec![false; scene.meshes.len()];
+    for instance in &scene.instances {
+        is_asked[instance.mesh.0 as usize] |= scene.materials[instance.material.0 as usize].needs_tangent();
+    }
+    let asked = scene.meshes.iter_mut().zip(is_asked).filter(|(_, is_asked)| *is_asked);
+    asked.for_each(|(mesh, _)| tangents::add(mesh));
+}
+
+/// Puts a studio around a scene that has no light, where its format allows that.
+fn light_if_dark(scene: &mut Scene, path: &Path, if_dark: IfDark) -> Result<(), LoadError> {
+    let weakest = match if_dark {
+        IfDark::Fail | IfDark::StudioWithoutLight => 0.0,
+        IfDark::Studio => WEAK_EMITTER_CD_M2 / scene.nits_per_unit as f32,
+    };
+    if is_lit(scene, weakest) {
+        return Ok(());
+    }
+    if if_dark == IfDark::Fail {
+        return Err(LoadError::invalid(
+            path,
+            "scene has no light: add an [environment], [[lights]] or an object whose material has an emission",
+        ));
+    }
+    let what = match is_lit(scene, 0.0) {
+        true => format!("Only emitters below {WEAK_EMITTER_CD_M2} cd/m²"),
+        false => "No light".to_owned(),
+    };
+    scene.environment = Some(environment::studio(scene.nits_per_unit, scene.camera.forward));
+    scene.notes.push(format!("{what} in the file: a soft studio of about 1000 cd/m² surrounds the scene."));
+    Ok(())
 }
 
 /// Whether anything gives light: more radiance than `weakest` for surfaces.

@@ -1,7 +1,7 @@
 //! The camera of scenes that bring none: a three-quarter view with everything in the picture.
 
 use crate::scene::{Camera, Instance, Mesh, Sphere};
-use glam::{Vec3, Vec3A};
+use glam::{Affine3A, Vec3, Vec3A};
 
 const VERTICAL_FOV_DEG: f32 = 40.0;
 /// From the front (+z) towards +x, and above the horizon.
@@ -19,23 +19,58 @@ pub struct Bounds {
     pub max: Vec3,
 }
 
-/// The bounds of everything that is rendered. Only vertices that triangles use count.
+/// Corners of triangles up to which each is put into the world; of more, the corners of their meshes' boxes are.
+const MOST_CORNERS: usize = 30_000_000;
+
+/// The bounds of everything that is rendered, or somewhat larger ones where a scene places millions of triangles. Only vertices that
+/// triangles use count.
 pub fn bounds(meshes: &[Mesh], instances: &[Instance], spheres: &[Sphere]) -> Bounds {
-    let mut min = Vec3A::INFINITY;
-    let mut max = Vec3A::NEG_INFINITY;
-    for instance in instances {
-        let mesh = &meshes[instance.mesh.0 as usize];
-        for &index in mesh.triangles.iter().flatten() {
-            let point = instance.to_world.transform_point3a(mesh.positions[index as usize].into());
-            min = min.min(point);
-            max = max.max(point);
+    let corners = |instance: &Instance| 3 * meshes[instance.mesh.0 as usize].triangles.len();
+    let mut all = Bounds::EMPTY;
+    if instances.iter().map(corners).sum::<usize>() <= MOST_CORNERS {
+        for instance in instances {
+            all = all.union(Bounds::of_mesh(&meshes[instance.mesh.0 as usize], &instance.to_world));
+        }
+    } else {
+        let own: Vec<Bounds> = meshes.iter().map(|mesh| Bounds::of_mesh(mesh, &Affine3A::IDENTITY)).collect();
+        for instance in instances {
+            all = all.union(own[instance.mesh.0 as usize].transformed(&instance.to_world));
         }
     }
     for sphere in spheres {
-        min = min.min(Vec3A::from(sphere.center - sphere.radius));
-        max = max.max(Vec3A::from(sphere.center + sphere.radius));
+        all = all.union(Bounds { min: sphere.center - sphere.radius, max: sphere.center + sphere.radius });
     }
-    Bounds { min: min.into(), max: max.into() }
+    all
+}
+
+impl Bounds {
+    /// The bounds of nothing.
+    const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
+
+    fn union(self, other: Self) -> Self {
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    fn of_mesh(mesh: &Mesh, to_world: &Affine3A) -> Self {
+        let (mut min, mut max) = (Vec3A::INFINITY, Vec3A::NEG_INFINITY);
+        for &index in mesh.triangles.iter().flatten() {
+            let point = to_world.transform_point3a(mesh.positions[index as usize].into());
+            (min, max) = (min.min(point), max.max(point));
+        }
+        Self { min: min.into(), max: max.into() }
+    }
+
+    /// The bounds of the box after a transform; nothing stays nothing.
+    fn transformed(self, to_world: &Affine3A) -> Self {
+        if self.min.x > self.max.x {
+            return self;
+        }
+        (0..8).fold(Self::EMPTY, |all, corner| {
+            let pick = |bit: usize| if corner >> bit & 1 == 0 { self.min[bit] } else { self.max[bit] };
+            let point = to_world.transform_point3(Vec3::new(pick(0), pick(1), pick(2)));
+            all.union(Self { min: point, max: point })
+        })
+    }
 }
 
 /// A camera with all of the bounds in a picture of this aspect (width / height).
@@ -70,6 +105,16 @@ pub fn framed(bounds: Bounds, aspect: f32) -> Camera {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn boxes_of_placed_meshes_hold_them() {
+        let mesh = crate::scene::load::shapes::cuboid(Vec3::new(-1.0, 0.0, 2.0), Vec3::new(3.0, 1.0, 5.0));
+        let turned = Affine3A::from_rotation_y(0.7) * Affine3A::from_translation(Vec3::X);
+        let (own, exact) = (Bounds::of_mesh(&mesh, &Affine3A::IDENTITY), Bounds::of_mesh(&mesh, &turned));
+        let around = own.transformed(&turned);
+        assert!(around.min.abs_diff_eq(exact.min, 1e-5) && around.max.abs_diff_eq(exact.max, 1e-5));
+        assert_eq!(Bounds::EMPTY.transformed(&turned), Bounds::EMPTY);
+    }
 
     #[test]
     fn every_corner_is_in_the_picture_and_one_is_near_its_edge() {

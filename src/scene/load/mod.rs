@@ -36,6 +36,7 @@ mod polygon;
 pub mod shapes;
 pub mod sky;
 mod spectrum;
+mod tangents;
 #[path = "texture.rs"]
 mod texture;
 mod texture_memory;
@@ -45,7 +46,7 @@ mod validate;
 pub use default_view::{Bounds, bounds, framed};
 pub use error::{LoadError, Place};
 
-use crate::scene::{Instance, Scene};
+use crate::scene::{FilmDefaults, Instance, Scene};
 use std::path::Path;
 
 /// What the caller chooses about loading.
@@ -63,6 +64,10 @@ pub struct LoadOptions {
     pub on_texture: Option<fn(done: usize, total: usize)>,
     /// Most bytes that decoded textures may take together: beyond it the largest are halved. Surroundings do not count.
     pub texture_memory: Option<u64>,
+    /// Luminance in cd/m² of RGB (1, 1, 1) in place of the file's. What files give in cd/m², lm and lx stays as bright as it is.
+    pub nits_per_unit: Option<f64>,
+    /// Size of the picture, in place of the file's, for which default views are framed.
+    pub film: Option<FilmDefaults>,
 }
 
 /// When the shutter is open, in seconds of a file's keyframes.
@@ -89,9 +94,8 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
     }
     let side = toml::side::of(path).filter(|side| side != path && path.extension().is_some_and(|e| e != "toml"));
     let Some(side) = side else { return load_alone(path, options) };
-    let environment_follows = options.environment_follows || toml::side::brings_light(&side)?;
-    let shutter_s = toml::side::shutter_s(&side)?.unwrap_or(options.shutter_s);
-    let mut scene = load_alone(path, &LoadOptions { environment_follows, shutter_s, ..options.clone() })?;
+    let options = &toml::side::before(&side, options)?;
+    let mut scene = load_alone(path, options)?;
     toml::side::apply(&side, options, &mut scene)?;
     Ok(scene)
 }

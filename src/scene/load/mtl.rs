@@ -1,7 +1,9 @@
-//! MTL files: materials of OBJ meshes, with the PBR extension (Pr, Pm, Ke, map_Pr, map_Pm, norm) and bump maps.
+//! MTL files: materials of OBJ meshes, with the PBR extension (Pr, Pm, Pc, Pcr, Ps, aniso, anisor, Ke, their maps, norm) and bump maps.
 //!
 //! Read by ourselves because `tobj`'s reader panics on a colour with fewer than three numbers and leaves texture options
 //! (`map_Kd -s 2 2 1 -o .5 0 0 my wood.png`) unparsed. What files of the wild get wrong is skipped with a note.
+
+mod surface;
 
 use super::builder::Builder;
 use super::bump::Bump;
@@ -9,8 +11,8 @@ use super::error::LoadError;
 use super::files;
 use super::texture::{Adjust, IfMissing, Picture, Request};
 use crate::scene::{
-    Alpha, ColorInput, Encoding, HeightMap, HeightUnit, Material, MaterialId, MetalRoughness, Relief, Roughness,
-    ScalarInput, Surface, TextureLookup, Wrap,
+    Alpha, ColorInput, Encoding, HeightMap, HeightUnit, Material, MaterialId, Relief, ScalarInput, Surface,
+    TextureLookup, Wrap,
 };
 use glam::{Vec2, Vec3};
 use std::collections::HashMap;
@@ -34,7 +36,28 @@ struct Map {
     bump: f32,
     clamp: bool,
     channel: Option<u8>,
+    /// Added to the picture's values, which is not done.
+    base: f32,
+    /// Multiplies them.
+    gain: f32,
 }
+
+impl Map {
+    /// A file as it stands.
+    fn plain(file: String) -> Self {
+        let (offset, scale) = (Vec2::ZERO, Vec2::ONE);
+        Self { file, offset, scale, bump: 1.0, clamp: false, channel: None, base: 0.0, gain: 1.0 }
+    }
+}
+
+/// Statements that [`Written::convert`] reads.
+const READ: &[&str] = &[
+    "kd", "ks", "ke", "ns", "ni", "d", "tr", "tf", "illum", "pr", "pm", "pc", "pcr", "ps", "aniso", "anisor", "map_kd",
+    "map_ks", "map_ke", "map_d", "map_pr", "map_pm", "map_pc", "map_pcr", "map_ps", "norm", "bump", "map_bump", "disp",
+    "map_disp",
+];
+/// Statements that mean nothing to a path tracer: ambient light, and how pictures are to be filtered.
+const MEANINGLESS: &[&str] = &["ka", "map_ka", "map_aat", "sharpness"];
 
 /// The materials of a file, in its order.
 pub(super) fn read(path: &Path, notes: &mut Vec<String>) -> Result<Vec<Written>, LoadError> {
@@ -82,8 +105,7 @@ pub(super) fn read(path: &Path, notes: &mut Vec<String>) -> Result<Vec<Written>,
 
 /// Options, then a file name that may hold spaces; some writers put options behind it.
 fn parse_map(text: &str) -> Map {
-    let mut map =
-        Map { file: String::new(), offset: Vec2::ZERO, scale: Vec2::ONE, bump: 1.0, clamp: false, channel: None };
+    let mut map = Map::plain(String::new());
     let words: Vec<(usize, &str)> =
         text.split_whitespace().map(|word| (word.as_ptr() as usize - text.as_ptr() as usize, word)).collect();
     let mut name: Option<(usize, usize)> = None;
@@ -122,6 +144,7 @@ fn parse_map(text: &str) -> Map {
             "-o" => map.offset = Vec2::new(number(0, 0.0), number(1, 0.0)),
             "-s" => map.scale = Vec2::new(number(0, 1.0), number(1, 1.0)),
             "-bm" => map.bump = number(0, 1.0),
+            "-mm" => (map.base, map.gain) = (number(0, 0.0), number(1, 1.0)),
             "-clamp" => map.clamp = arguments.first() == Some(&"on"),
             "-imfchan" => map.channel = arguments.first().and_then(|channel| "rgbm".find(*channel)).map(|c| c as u8),
             _ => {}
@@ -181,10 +204,17 @@ impl Written {
             None => ColorInput::constant(factor.unwrap_or(default)),
             // Several exporters write a black factor beside a map, and mean the map.
             Some(map) => ColorInput {
-                factor: factor.filter(|factor| factor.max_element() > 0.0).unwrap_or(Vec3::ONE),
+                factor: factor.filter(|factor| factor.max_element() > 0.0).unwrap_or(Vec3::ONE) * map.gain.max(0.0),
                 texture: Some(self.lookup(builder, map, Encoding::Srgb, [180, 180, 180, 255])),
             },
         }
+    }
+
+    /// A share of light in [0, 1].
+    fn share_input(&self, builder: &mut Builder, key: &str) -> ColorInput {
+        let mut input = self.color_input(builder, key, Vec3::splat(0.7));
+        input.factor = input.factor.min(Vec3::ONE);
+        input
     }
 
     fn scalar_input(&self, builder: &mut Builder, key: &str, default: f32) -> ScalarInput {
@@ -195,7 +225,7 @@ impl Written {
                 let channel = map.channel.unwrap_or(0).min(2);
                 let lookup = self.lookup(builder, map, Encoding::Linear, [255; 4]);
                 let factor = factor.filter(|&factor| factor > 0.0).unwrap_or(1.0);
-                ScalarInput { factor, texture: Some((lookup, channel)) }
+                ScalarInput { factor: factor * map.gain.max(0.0), texture: Some((lookup, channel)) }
             }
         }
     }
@@ -208,10 +238,25 @@ impl Written {
             material.emission = self.color_input(builder, "ke", Vec3::ZERO);
         }
         material.relief = self.relief(builder);
+        material.stretch = self.stretch();
         if !matches!(material.surface, Surface::Dielectric { .. }) {
             material.alpha = self.alpha(builder);
         }
+        self.note_unread(builder);
         material
+    }
+
+    /// Names what was left out in one sentence.
+    fn note_unread(&self, builder: &mut Builder) {
+        let keys = self.numbers.keys().chain(self.maps.keys()).map(String::as_str);
+        let mut unread: Vec<String> =
+            keys.filter(|key| !READ.contains(key) && !MEANINGLESS.contains(key)).map(str::to_owned).collect();
+        let raised = self.maps.iter().filter(|(_, map)| map.base != 0.0);
+        unread.extend(raised.map(|(key, map)| format!("the first number of {key} -mm ({})", map.base)));
+        unread.sort_unstable();
+        if !unread.is_empty() {
+            builder.note(format!("Material \"{}\": not used: {}.", self.name, unread.join(", ")));
+        }
     }
 
     /// `norm` holds normals, `bump` heights unless it looks like normals, `disp` heights. Neither the format nor its readers agree
@@ -220,7 +265,7 @@ impl Written {
         const MOST_HEIGHT: f32 = 0.02;
         if let Some(map) = self.map(&["norm"]) {
             let lookup = self.lookup(builder, map, Encoding::Linear, [128, 128, 255, 255]);
-            return Some(Relief::Normals { map: lookup, strength: map.bump });
+            return Some(Relief::Normals { map: lookup, strength: map.bump * map.gain });
         }
         let bump = self.map(&["bump", "map_bump"]);
         let map = bump.or_else(|| self.map(&["disp", "map_disp"]))?;
@@ -230,13 +275,13 @@ impl Written {
         let lookup = self.lookup(builder, map, Encoding::Linear, [128; 4]);
         let heights = HeightMap {
             height: ScalarInput {
-                factor: MOST_HEIGHT * map.bump,
+                factor: MOST_HEIGHT * map.bump * map.gain,
                 texture: Some((lookup, map.channel.unwrap_or(0).min(2))),
             },
             unit: HeightUnit::PictureWidth,
         };
         if bump.is_some() {
-            builder.bumps.push(Bump { heights, strength: map.bump });
+            builder.bumps.push(Bump { heights, strength: map.bump * map.gain });
         }
         Some(Relief::Heights(heights))
     }
@@ -256,69 +301,12 @@ impl Written {
         let channel = map.channel.unwrap_or(if same_file { 3 } else { 0 });
         let lookup = self.lookup(builder, map, Encoding::Linear, [255; 4]);
         let factor = if opacity > 0.0 { opacity } else { 1.0 };
-        Alpha::Blend { value: ScalarInput { factor, texture: Some((lookup, channel)) } }
+        Alpha::Blend { value: ScalarInput { factor: factor * map.gain.max(0.0), texture: Some((lookup, channel)) } }
     }
 
     /// `d`, or 1 − `Tr`.
     fn opacity(&self) -> f32 {
         self.number("d").or(self.number("tr").map(|transparency| 1.0 - transparency)).unwrap_or(1.0).clamp(0.0, 1.0)
-    }
-
-    fn surface(&self, builder: &mut Builder) -> Surface {
-        let illumination = self.number("illum").unwrap_or(2.0) as i32;
-        let diffuse = self.color("kd").unwrap_or(Vec3::splat(0.7)).min(Vec3::ONE);
-        let specular = self.color("ks").unwrap_or(Vec3::ZERO).min(Vec3::ONE);
-        let is_black = diffuse.max_element() == 0.0 && !self.maps.contains_key("map_kd");
-        let is_pbr = ["pr", "pm"].iter().any(|key| self.numbers.contains_key(*key))
-            || ["map_pr", "map_pm"].iter().any(|key| self.maps.contains_key(*key));
-        let roughness = self.number("ns").map_or(0.5, |exponent| (2.0 / (exponent.max(0.0) + 2.0)).sqrt().sqrt());
-
-        // 4, 6, 7, 9 are "glass" in the format's list; 5 is a mirror that exporters also use for glass.
-        let lets_light_through = self.opacity() < 1.0 || self.numbers.contains_key("tf");
-        if matches!(illumination, 4 | 6 | 7 | 9) || illumination == 5 && lets_light_through {
-            let ior = self.number("ni").filter(|&ior| ior > 1.0).unwrap_or(1.5);
-            let transmittance =
-                self.color("tf").filter(|tint| tint.max_element() > 0.0).unwrap_or(Vec3::ONE).min(Vec3::ONE);
-            return Surface::Dielectric {
-                ior,
-                roughness: Roughness::constant(self.number("pr").unwrap_or(0.0).clamp(0.0, 1.0)),
-                transmittance: ColorInput::constant(transmittance),
-                absorption: Vec3::ZERO,
-            };
-        }
-        if is_pbr {
-            let mut base_color = self.color_input(builder, "kd", Vec3::splat(0.7));
-            base_color.factor = base_color.factor.min(Vec3::ONE);
-            return Surface::MetalRoughness(MetalRoughness {
-                base_color,
-                metallic: self.scalar_input(builder, "pm", 0.0),
-                roughness: self.scalar_input(builder, "pr", 0.5),
-                ior: self.number("ni").filter(|&ior| ior > 1.0).unwrap_or(1.5),
-                ..MetalRoughness::default()
-            });
-        }
-        if matches!(illumination, 3 | 5 | 8) && is_black && specular.max_element() > 0.0 {
-            return Surface::Mirror { reflectance: ColorInput::constant(specular) };
-        }
-        if is_black && specular.max_element() > 0.1 && illumination >= 2 {
-            return Surface::MetalRoughness(MetalRoughness {
-                base_color: ColorInput::constant(specular),
-                metallic: ScalarInput::constant(1.0),
-                roughness: ScalarInput::constant(roughness),
-                ..MetalRoughness::default()
-            });
-        }
-        let mut reflectance = self.color_input(builder, "kd", Vec3::splat(0.7));
-        reflectance.factor = reflectance.factor.min(Vec3::ONE);
-        if illumination < 2 || specular.max_element() == 0.0 {
-            return Surface::Diffuse { reflectance };
-        }
-        // A Phong highlight over a diffuse colour: plastic with the microfacet width of that exponent.
-        Surface::MetalRoughness(MetalRoughness {
-            base_color: reflectance,
-            roughness: ScalarInput::constant(roughness),
-            ..MetalRoughness::default()
-        })
     }
 }
 
@@ -341,6 +329,8 @@ mod tests {
         let map = parse_map("-bm 0.5 -o .1 .2 -s 2 3 1 -clamp on my  wood.png");
         assert_eq!(map.file, "my  wood.png");
         assert_eq!((map.offset, map.scale, map.bump, map.clamp), (Vec2::new(0.1, 0.2), Vec2::new(2.0, 3.0), 0.5, true));
+        let map = parse_map("-mm 0.1 0.5 wood.png");
+        assert_eq!((map.file.as_str(), map.base, map.gain), ("wood.png", 0.1, 0.5));
         let map = parse_map("-imfchan g dir\\bump 2.jpg -bm 1.5");
         assert_eq!((map.file.as_str(), map.bump, map.channel), ("dir/bump 2.jpg", 1.5, Some(1)));
         // A name that starts with a digit after an option that takes up to three numbers.

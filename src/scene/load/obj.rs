@@ -4,8 +4,11 @@
 //! OBJ has neither camera nor lights nor units: see the table in [`super`]. Faces without normals are flat unless they are
 //! in a smoothing group ([`smoothing`]); colours of vertices are taken as sRGB, where every vertex has one.
 
+mod clean;
+mod patterns;
 mod smoothing;
 
+use self::clean::{Cleaned, VertexColors, clean, hoist_libraries};
 use super::builder::{Builder, IfDark};
 use super::error::{LoadError, Place, nearest};
 use super::{LoadOptions, files, mtl, polygon};
@@ -37,22 +40,13 @@ pub(super) fn read_into(
     if let Some(smoothed) = smoothing::add_normals(&text) {
         (text, added_lines) = (smoothed.text, smoothed.added_lines);
     }
-    let libraries = RefCell::new(Libraries::default());
-    let mut reader = CountingReader { rest: text.as_bytes(), lines: 0 };
-    let options = tobj::LoadOptions { single_index: true, triangulate: false, ..tobj::LoadOptions::default() };
-    let parsed = tobj::load_obj_buf(&mut reader, &options, |named| {
-        let mut libraries = libraries.borrow_mut();
-        let first = libraries.materials.len();
-        if with_materials {
-            libraries.open(path, &named.to_string_lossy());
-        }
-        libraries.index(first)
-    });
-    let line = reader.lines.saturating_sub(added_lines);
-    let (models, _) = parsed.map_err(|error| explain(error, &text, path, line, added_lines))?;
-    let libraries = libraries.into_inner();
-    if let Some(error) = libraries.error {
-        return Err(error);
+    added_lines += hoist_libraries(&mut text);
+    let mut models = Vec::new();
+    let mut libraries = Libraries::default();
+    for part in patterns::separate(&text) {
+        let parsed = parse(path, &part, added_lines, with_materials)?;
+        models.extend(parsed.0);
+        libraries = parsed.1;
     }
     for note in libraries.notes {
         builder.note(note);
@@ -103,6 +97,33 @@ pub(super) fn read_into(
     Ok(placed)
 }
 
+/// The objects of a text, and the materials that it names.
+fn parse(
+    path: &Path,
+    text: &str,
+    added_lines: usize,
+    with_materials: bool,
+) -> Result<(Vec<tobj::Model>, Libraries), LoadError> {
+    let libraries = RefCell::new(Libraries::default());
+    let mut reader = CountingReader { rest: text.as_bytes(), lines: 0 };
+    let options = tobj::LoadOptions { single_index: true, triangulate: false, ..tobj::LoadOptions::default() };
+    let parsed = tobj::load_obj_buf(&mut reader, &options, |named| {
+        let mut libraries = libraries.borrow_mut();
+        let first = libraries.materials.len();
+        if with_materials {
+            libraries.open(path, &named.to_string_lossy());
+        }
+        libraries.index(first)
+    });
+    let line = reader.lines.saturating_sub(added_lines);
+    let (models, _) = parsed.map_err(|error| explain(error, text, path, line, added_lines))?;
+    let mut libraries = libraries.into_inner();
+    match libraries.error.take() {
+        Some(error) => Err(error),
+        None => Ok((models, libraries)),
+    }
+}
+
 /// The MTL files that an OBJ file names.
 #[derive(Default)]
 struct Libraries {
@@ -143,66 +164,6 @@ impl Libraries {
         let places = new.iter().enumerate().map(|(place, material)| (material.name.clone(), place)).collect();
         Ok((vec![tobj::Material::default(); new.len()], places))
     }
-}
-
-/// An OBJ file's text as `tobj` can read it.
-struct Cleaned {
-    text: String,
-    colors: VertexColors,
-}
-
-/// Which vertices have colours behind their positions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum VertexColors {
-    None,
-    Some,
-    All,
-}
-
-/// The text with continued lines joined (blank lines keep the count), comments behind numbers cut off, and empty
-/// `usemtl` statements left out: all three stop `tobj`.
-fn clean(text: &str) -> Cleaned {
-    let is_vertex = |line: &&str| line.starts_with("v ");
-    let has_color = |line: &&str| line.split('#').next().unwrap_or(line).split_whitespace().count() == 7;
-    let vertices = || text.lines().map(str::trim_start).filter(is_vertex);
-    // Most files have no colours: their first vertex says so.
-    let colors = if !vertices().take(1).any(|line| has_color(&line)) && !vertices().any(|line| has_color(&line)) {
-        VertexColors::None
-    } else if vertices().all(|line| has_color(&line)) {
-        VertexColors::All
-    } else {
-        VertexColors::Some
-    };
-    let mut cleaned = String::with_capacity(text.len() + 1);
-    let mut joined = 0;
-    let mut is_numeric = false;
-    for line in text.lines() {
-        let is_start = joined == 0;
-        let line = if is_start { line.trim_start() } else { line };
-        // A name may hold '#', numbers may not.
-        is_numeric = if is_start { line.starts_with(['v', 'f']) } else { is_numeric };
-        let line = if is_numeric { line.split('#').next().unwrap_or(line) } else { line };
-        let continued = line.trim_end().strip_suffix('\\');
-        let part = continued.unwrap_or(line);
-        // Colours behind positions: tobj refuses files that give them to some vertices only.
-        let mut part = part;
-        if colors == VertexColors::Some && is_start && part.starts_with("v ") && part.split_whitespace().count() > 6 {
-            let fourth = part.split_whitespace().nth(4).unwrap_or_default();
-            part = &part[..fourth.as_ptr() as usize - part.as_ptr() as usize];
-        }
-        match part.split_once('\t') {
-            Some(_) => cleaned.extend(part.chars().map(|c| if c == '\t' { ' ' } else { c })),
-            None => cleaned.push_str(if is_start && part.trim() == "usemtl" { "" } else { part }),
-        }
-        if continued.is_some() {
-            cleaned.push(' ');
-            joined += 1;
-        } else {
-            cleaned.extend(std::iter::repeat_n('\n', joined + 1));
-            joined = 0;
-        }
-    }
-    Cleaned { text: cleaned, colors }
 }
 
 /// Hands out text and counts the lines, because `tobj`'s errors have none.
@@ -321,7 +282,7 @@ fn convert_mesh(model: &tobj::Model, path: &Path) -> Result<(Mesh, usize), LoadE
     if let Some(bad) = positions.iter().find(|position| !position.is_finite()) {
         return Err(LoadError::invalid(path, format_args!("a vertex of \"{}\" is not finite: {bad}", model.name)));
     }
-    // Where only some faces have normals or coordinates, tobj's arrays are too short to belong to the positions.
+    // The same for all faces (`patterns`), so that there is one a position or none.
     let of_all = |values: &[f32], width: usize| values.len() == positions.len() * width;
     let normals = if of_all(&from.normals, 3) {
         from.normals.as_chunks::<3>().0.iter().copied().map(Vec3::from_array).collect()
@@ -369,12 +330,6 @@ fn convert_mesh(model: &tobj::Model, path: &Path) -> Result<(Mesh, usize), LoadE
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn cleaning_keeps_line_numbers() {
-        let text = clean("v 1 2 \\\n 3 # here\nusemtl \n\tf 1\t2 3\ng a#b\n").text;
-        assert_eq!(text.lines().collect::<Vec<_>>(), ["v 1 2   3 ", "", "", "f 1 2 3", "g a#b"]);
-    }
 
     #[test]
     fn a_bad_index_is_found_with_its_line() {

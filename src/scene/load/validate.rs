@@ -13,13 +13,13 @@ use std::path::Path;
 pub(super) fn repair(builder: &mut Builder, path: &Path) -> Result<(), LoadError> {
     for index in 0..builder.meshes.len() {
         let mesh = &mut builder.meshes[index];
-        if let Some(vertex) = mesh.positions.iter().position(|position| !position.is_finite()) {
-            let problem = format!("vertex {vertex} of \"{}\" is not finite: {}", mesh.name, mesh.positions[vertex]);
-            return Err(LoadError::invalid(path, problem));
-        }
         let vertices = mesh.positions.len();
         if let Some(triangle) = mesh.triangles.iter().flatten().find(|&&vertex| vertex as usize >= vertices) {
             let problem = format!("\"{}\" has {vertices} vertices, but a triangle uses number {triangle}", mesh.name);
+            return Err(LoadError::invalid(path, problem));
+        }
+        if let Some(vertex) = repair_unused_positions(mesh) {
+            let problem = format!("vertex {vertex} of \"{}\" is not finite: {}", mesh.name, mesh.positions[vertex]);
             return Err(LoadError::invalid(path, problem));
         }
         let degenerate = drop_degenerate(mesh);
@@ -55,6 +55,20 @@ pub(super) fn repair(builder: &mut Builder, path: &Path) -> Result<(), LoadError
         return Err(LoadError::invalid(path, format_args!("nothing to render: no triangle and no sphere{why}")));
     }
     check_extent(builder, path)
+}
+
+/// Makes positions finite that no triangle uses; returns the first one that is not and is used.
+fn repair_unused_positions(mesh: &mut Mesh) -> Option<usize> {
+    if mesh.positions.iter().all(|position| position.is_finite()) {
+        return None;
+    }
+    let bad = |vertex: &u32| !mesh.positions[*vertex as usize].is_finite();
+    if let Some(first) = mesh.triangles.iter().flatten().copied().filter(bad).min() {
+        return Some(first as usize);
+    }
+    let used = mesh.triangles.first().map_or(Vec3::ZERO, |triangle| mesh.positions[triangle[0] as usize]);
+    mesh.positions.iter_mut().filter(|position| !position.is_finite()).for_each(|position| *position = used);
+    None
 }
 
 /// World coordinates whose squares still fit a float: everything downstream multiplies lengths.

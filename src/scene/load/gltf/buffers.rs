@@ -4,11 +4,20 @@
 use super::super::error::LoadError;
 use super::super::files;
 use base64::Engine;
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use gltf::accessor::DataType;
 use std::path::{Path, PathBuf};
 
 /// Most elements that one accessor may claim: zero-filled ones have no bytes in the file that would bound them.
 const MOST_ELEMENTS: usize = 100_000_000;
+
+/// With or without "=" at its end: writers differ.
+const LENIENT_BASE64: GeneralPurpose = GeneralPurpose::new(
+    &base64::alphabet::STANDARD,
+    GeneralPurposeConfig::new()
+        .with_decode_padding_mode(DecodePaddingMode::Indifferent)
+        .with_decode_allow_trailing_bits(true),
+);
 
 /// The JSON part and the binary part of a GLB file.
 pub(super) struct Container<'a> {
@@ -28,6 +37,9 @@ pub(super) fn split<'a>(path: &Path, bytes: &'a [u8]) -> Result<Container<'a>, L
         return Err(LoadError::unsupported(path, format_args!("GLB version {version}; version 2 is read")));
     }
     let mut container = Container { json: &[], binary: None };
+    // What follows the length that the file states is not of the format.
+    let stated = word(8).map_or(bytes.len(), |length| length as usize);
+    let bytes = if stated >= 12 { &bytes[..stated.min(bytes.len())] } else { bytes };
     let mut at = 12;
     while at < bytes.len() {
         let (length, kind) = (word(at).ok_or_else(cut)? as usize, word(at + 4).ok_or_else(cut)?);
@@ -57,7 +69,7 @@ pub(super) fn resolve(path: &Path, uri: &str) -> Result<Uri, LoadError> {
     if let Some(data) = uri.strip_prefix("data:") {
         let encoded = data.split_once(";base64,").map(|(_, encoded)| encoded);
         let encoded = encoded.ok_or_else(|| LoadError::invalid(path, "a data: URI that is not base64"))?;
-        let bytes = base64::engine::general_purpose::STANDARD.decode(encoded.trim());
+        let bytes = LENIENT_BASE64.decode(encoded.trim());
         return bytes.map(Uri::Data).map_err(|error| LoadError::invalid(path, format_args!("a data: URI: {error}")));
     }
     if uri.contains("://") {

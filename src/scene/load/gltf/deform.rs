@@ -3,7 +3,7 @@
 use super::super::error::LoadError;
 use super::buffers::Buffers;
 use crate::scene::Mesh;
-use glam::{Mat4, Vec3};
+use glam::{Mat3, Mat4, Vec3};
 use gltf::mesh::Semantic;
 
 /// Adds weighted morph targets to a mesh.
@@ -59,12 +59,18 @@ pub(super) fn skin(
         let matrix = *matrix * (1.0 / total);
         mesh.positions[vertex] = matrix.transform_point3(mesh.positions[vertex]);
         if let Some(normal) = mesh.normals.get_mut(vertex) {
-            // Skins turn and scale alike; where they do not, the normal is slightly off.
-            *normal = matrix.transform_vector3(*normal).normalize_or(*normal);
+            *normal = (cofactors(&matrix) * *normal).normalize_or(*normal);
         }
     }
     mesh.tangents.clear();
     Ok(())
+}
+
+/// What turns normals where the matrix moves points; outwards stays outwards where it mirrors.
+fn cofactors(matrix: &Mat4) -> Mat3 {
+    let [x, y, z] = [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(glam::Vec4::truncate);
+    let cofactors = Mat3::from_cols(y.cross(z), z.cross(x), x.cross(y));
+    if x.dot(y.cross(z)) < 0.0 { cofactors * -1.0 } else { cofactors }
 }
 
 /// World transforms of a skin's joints times their inverse bind matrices.
@@ -82,4 +88,20 @@ pub(super) fn joints(
         world * bind.get(place).map_or(Mat4::IDENTITY, Mat4::from_cols_array)
     };
     Ok(skin.joints().enumerate().map(joint).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn normals_stay_perpendicular_under_uneven_scales() {
+        for scale in [Vec3::new(3.0, 1.0, 1.0), Vec3::new(-2.0, 1.0, 0.5)] {
+            let matrix = Mat4::from_scale(scale) * Mat4::from_rotation_y(0.4);
+            let (normal, along) = (Vec3::new(1.0, 0.0, 1.0), Vec3::new(1.0, 0.0, -1.0));
+            let turned = cofactors(&matrix) * normal;
+            assert!(turned.dot(matrix.transform_vector3(along)).abs() < 1e-5);
+            assert!(turned.dot(matrix.transform_vector3(normal)) > 0.0);
+        }
+    }
 }

@@ -94,8 +94,8 @@ impl<'a> Materials<'a> {
             Surface::MetalRoughness(model)
         };
 
-        // The file's unit is cd/m², and so is ours: nits_per_unit stays 1.
-        let strength = from.emissive_strength().unwrap_or(1.0);
+        // The file's unit is cd/m².
+        let strength = from.emissive_strength().unwrap_or(1.0) / builder.nits_per_unit as f32;
         let factor = Vec3::from_array(from.emissive_factor()) * strength;
         let factor = if factor.is_finite() { factor.max(Vec3::ZERO) } else { Vec3::ZERO };
         let emission = if factor == Vec3::ZERO {
@@ -106,10 +106,9 @@ impl<'a> Materials<'a> {
         let relief = match from.normal_texture() {
             None => None,
             Some(normal) => {
-                if normal.tex_coord() != 0 {
-                    builder.note("Texture coordinate sets beyond the first are not used.");
-                }
-                let transform = normal.extension_value("KHR_texture_transform").map(read_transform);
+                let transform = normal.extension_value("KHR_texture_transform");
+                note_coordinates(builder, Some(u64::from(normal.tex_coord())), transform);
+                let transform = transform.map(read_transform);
                 let lookup =
                     self.lookup(builder, &normal.texture(), Encoding::Linear, transform, [128, 128, 255, 255])?;
                 let strength = if normal.scale().is_finite() { normal.scale() } else { 1.0 };
@@ -122,7 +121,8 @@ impl<'a> Materials<'a> {
         let alpha = match from.alpha_mode() {
             gltf::material::AlphaMode::Opaque => Alpha::Opaque,
             gltf::material::AlphaMode::Mask => {
-                Alpha::Mask { value: coverage, cutoff: share(from.alpha_cutoff().unwrap_or(0.5)) }
+                let cutoff = from.alpha_cutoff().filter(|cutoff| cutoff.is_finite()).unwrap_or(0.5);
+                Alpha::Mask { value: coverage, cutoff: cutoff.max(0.0) }
             }
             gltf::material::AlphaMode::Blend => Alpha::Blend { value: coverage },
         };
@@ -214,10 +214,9 @@ impl<'a> Materials<'a> {
         let Some(texture) = index.and_then(|index| self.document.textures().nth(index as usize)) else {
             return Err(LoadError::invalid(self.path, format_args!("{key}: there is no texture of this index")));
         };
-        if info.get("texCoord").is_some_and(|set| set.as_u64() != Some(0)) {
-            builder.note("Texture coordinate sets beyond the first are not used.");
-        }
-        let transform = info.pointer("/extensions/KHR_texture_transform").map(read_transform);
+        let transform = info.pointer("/extensions/KHR_texture_transform");
+        note_coordinates(builder, info.get("texCoord").map_or(Some(0), serde_json::Value::as_u64), transform);
+        let transform = transform.map(read_transform);
         self.lookup(builder, &texture, encoding, transform, if_missing)
     }
 
@@ -230,9 +229,7 @@ impl<'a> Materials<'a> {
         let Some(info) = info else { return Ok(None) };
         let transform = info.texture_transform();
         let set = transform.as_ref().and_then(gltf::texture::TextureTransform::tex_coord).unwrap_or(info.tex_coord());
-        if set != 0 {
-            builder.note("Texture coordinate sets beyond the first are not used.");
-        }
+        note_coordinates(builder, Some(u64::from(set)), None);
         let transform = transform.map(|transform| Transform {
             offset: Vec2::from_array(transform.offset()),
             rotation: transform.rotation(),
@@ -251,7 +248,10 @@ impl<'a> Materials<'a> {
     ) -> Result<Option<TextureLookup>, LoadError> {
         let index = self.document.as_json().textures[texture.index()].source.value();
         let Some(picture) = self.picture(index)? else {
-            builder.note(format!("Image {index} has neither a file nor a buffer view and is left out."));
+            builder.note(format!(
+                "Texture {}: its image has neither a file nor a buffer view; left out.",
+                texture.index()
+            ));
             return Ok(None);
         };
         let sampler = texture.sampler();
@@ -306,7 +306,6 @@ impl<'a> Materials<'a> {
     }
 }
 
-/// A colour of an extension that the crate leaves as JSON; none below 0.
 /// At least 1, 1.5 unless told; 0, with which a coat reflects everything, where there is no volume for light to enter.
 fn index_of_refraction(from: &gltf::Material) -> f32 {
     let is_volume = from.volume().is_some_and(|volume| volume.thickness_factor() > 0.0);
@@ -322,6 +321,15 @@ fn has_plain_boundary(model: &MetalRoughness) -> bool {
     model.volume.is_some() && model.transmission.factor > 0.0 && asks
 }
 
+/// Says so where a texture asks for coordinates beyond the first set; a transform's own set stands over the texture's.
+fn note_coordinates(builder: &mut Builder, set: Option<u64>, transform: Option<&serde_json::Value>) {
+    let own = transform.and_then(|transform| transform.get("texCoord"));
+    if own.map_or(set, serde_json::Value::as_u64) != Some(0) {
+        builder.note("Texture coordinate sets beyond the first are not used.");
+    }
+}
+
+/// A colour of an extension that the crate leaves as JSON; none below 0.
 fn json_color(json: &serde_json::Value, key: &str, default: f32) -> Vec3 {
     let channel = |place: usize| {
         let number = json.get(key).and_then(|color| color.get(place)).and_then(serde_json::Value::as_f64);

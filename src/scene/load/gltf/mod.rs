@@ -7,6 +7,7 @@
 mod animation;
 mod buffers;
 mod deform;
+mod document;
 mod material;
 mod motion;
 
@@ -16,7 +17,6 @@ use super::builder::{Builder, IfDark, NamedCamera};
 use super::error::LoadError;
 use super::{LoadOptions, Shutter, files};
 use crate::scene::{Camera, Instance, Light, MaterialId, Mesh, MeshId, Motion, Projection, Scene, SpotFalloff};
-use ::gltf::json::validation::Checked;
 use ::gltf::mesh::{Mode, Semantic};
 use glam::{Affine3A, Mat4, Vec2, Vec3, Vec4};
 use std::collections::HashMap;
@@ -27,28 +27,16 @@ const DEEPEST_NODE: usize = 256;
 /// Most placed meshes: a node below many parents is placed once for each.
 const MOST_INSTANCES: usize = 4_000_000;
 
-/// Extensions that are done, or change nothing that a rest pose shows.
-const KNOWN: &[&str] = &[
-    "KHR_lights_punctual",
-    "KHR_materials_anisotropy",
-    "KHR_materials_clearcoat",
-    "KHR_materials_emissive_strength",
-    "KHR_materials_ior",
-    "KHR_materials_sheen",
-    "KHR_materials_specular",
-    "KHR_materials_transmission",
-    "KHR_materials_unlit",
-    "KHR_materials_volume",
-    "KHR_mesh_quantization",
-    "KHR_texture_transform",
-];
+/// Width over height, or the inverse, beyond which a camera's aspect is taken for a slip.
+const MOST_OBLONG: f32 = 100.0;
 
 /// Reads a glTF or GLB file.
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
     let bytes = files::read(path)?;
     let container = buffers::split(path, &bytes)?;
     let mut builder = Builder::new(path);
-    let document = parse(path, container.json, &mut builder)?;
+    builder.nits_per_unit = options.nits_per_unit.unwrap_or(1.0);
+    let document = document::parse(path, container.json, &mut builder)?;
     let buffers = Buffers::read(path, &document, container.binary)?;
 
     let Some(scene) = document.default_scene().or_else(|| document.scenes().next()) else {
@@ -90,80 +78,6 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
         builder.note(format!("Animation{name} (1 of {count}) at {} s; {blur}.", options.frame_time));
     }
     builder.finish(path, IfDark::Studio, options)
-}
-
-/// The document, checked by the crate, after our own look at its extensions.
-fn parse(path: &Path, json: &[u8], builder: &mut Builder) -> Result<::gltf::Document, LoadError> {
-    let mut root: ::gltf::json::Root = serde_json::from_slice(json).map_err(|error| {
-        let place = super::Place { file: path.to_owned(), line: Some(error.line()).filter(|&line| line > 0) };
-        LoadError::invalid_at(place, format_args!("not valid glTF: {error}"))
-    })?;
-    if let Some(refused) = root.extensions_required.iter().find(|name| !KNOWN.contains(&name.as_str())) {
-        let advice = match refused.as_str() {
-            "KHR_draco_mesh_compression" | "EXT_meshopt_compression" => "; export it without mesh compression",
-            "KHR_texture_basisu" | "EXT_texture_webp" => "; export its textures as PNG or JPEG",
-            _ => "",
-        };
-        return Err(LoadError::unsupported(
-            path,
-            format_args!("needs the extension {refused}, which is not read{advice}"),
-        ));
-    }
-    for name in root.extensions_used.iter().filter(|name| !KNOWN.contains(&name.as_str())) {
-        let instead = match name.as_str() {
-            "KHR_materials_variants" => "the default variant is rendered",
-            _ => "it is left out",
-        };
-        builder.note(format!("{name} is not supported: {instead}."));
-    }
-    // The crate refuses some that we do ourselves.
-    root.extensions_required.clear();
-    let version = root.asset.version.clone();
-    if !version.starts_with("2.") {
-        return Err(LoadError::unsupported(path, format_args!("glTF version {version}; version 2 is read")));
-    }
-    check_positions(path, &root)?;
-    check_animations(path, &root)?;
-    ::gltf::Document::from_json(root).map_err(|error| LoadError::invalid(path, format_args!("not valid glTF: {error}")))
-}
-
-/// Refuses primitives whose positions are in an accessor that is not there: the crate's own validation looks at the
-/// accessor's range before it looks whether it exists, and panics (gltf-json 1.4.1, found by damaging a file).
-fn check_positions(path: &Path, root: &::gltf::json::Root) -> Result<(), LoadError> {
-    let positions = Checked::Valid(Semantic::Positions);
-    for (mesh_number, mesh) in root.meshes.iter().enumerate() {
-        for primitive in &mesh.primitives {
-            let accessor = primitive.attributes.get(&positions).map(::gltf::json::Index::value);
-            if let Some(accessor) = accessor.filter(|&a| a >= root.accessors.len()) {
-                let count = root.accessors.len();
-                return Err(LoadError::invalid(
-                    path,
-                    format_args!("mesh {mesh_number} has its positions in accessor {accessor}, but there are {count}"),
-                ));
-            }
-        }
-    }
-    Ok(())
-}
-
-/// Refuses animations of a node or property that does not exist: the crate's validation looks at neither, and its reader
-/// panics (gltf-json 1.4.1, found by damaging a file).
-fn check_animations(path: &Path, root: &::gltf::json::Root) -> Result<(), LoadError> {
-    for (number, animation) in root.animations.iter().enumerate() {
-        for target in animation.channels.iter().map(|channel| &channel.target) {
-            let (node, count) = (target.node.value(), root.nodes.len());
-            if node >= count {
-                let problem = format!("animation {number} moves node {node}, but there are {count}");
-                return Err(LoadError::invalid(path, problem));
-            }
-            if matches!(target.path, Checked::Invalid) {
-                let problem =
-                    format!("animation {number} moves what is not known; translation, rotation, scale and weights are");
-                return Err(LoadError::invalid(path, problem));
-            }
-        }
-    }
-    Ok(())
 }
 
 struct Reader<'a> {
@@ -313,7 +227,9 @@ impl<'a> Reader<'a> {
         let vectors = |semantic| from.get(&semantic).map(|accessor| self.buffers.floats::<3>(&accessor)).transpose();
         let normals = vectors(Semantic::Normals)?.unwrap_or_default().into_iter().map(Vec3::from_array).collect();
         let uvs = from.get(&Semantic::TexCoords(0)).map(|accessor| self.buffers.floats(&accessor)).transpose()?;
-        let tangents = from.get(&Semantic::Tangents).map(|accessor| self.buffers.floats(&accessor)).transpose()?;
+        // Tangents mean nothing without normals.
+        let given = from.get(&Semantic::Tangents).filter(|_| from.get(&Semantic::Normals).is_some());
+        let tangents = given.map(|accessor| self.buffers.floats(&accessor)).transpose()?;
         let colors = from.get(&Semantic::Colors(0)).map(|accessor| self.colors(&accessor, &name)).transpose()?;
         let indices = match from.indices() {
             Some(accessor) => self.buffers.indices(&accessor)?,
@@ -351,16 +267,19 @@ impl<'a> Reader<'a> {
         let position = Vec3::from(to_world.translation);
         let forward = to_world.transform_vector3(Vec3::NEG_Z).try_normalize();
         let up = to_world.transform_vector3(Vec3::Y).try_normalize();
-        let (projection, usable) = match camera.projection() {
+        let (projection, aspect, usable) = match camera.projection() {
             ::gltf::camera::Projection::Perspective(perspective) => {
                 let vertical_fov_deg = perspective.yfov().to_degrees();
-                (Projection::Perspective { vertical_fov_deg }, (0.001..=179.0).contains(&vertical_fov_deg))
+                let usable = (0.001..=179.0).contains(&vertical_fov_deg);
+                (Projection::Perspective { vertical_fov_deg }, perspective.aspect_ratio(), usable)
             }
             ::gltf::camera::Projection::Orthographic(parallel) => {
                 let height = 2.0 * parallel.ymag();
-                (Projection::Orthographic { height }, height > 0.0 && height.is_finite())
+                let aspect = Some(parallel.xmag() / parallel.ymag());
+                (Projection::Orthographic { height }, aspect, height > 0.0 && height.is_finite())
             }
         };
+        let aspect = aspect.filter(|aspect| (MOST_OBLONG.recip()..=MOST_OBLONG).contains(aspect));
         let (Some(forward), Some(up)) = (forward, up) else {
             return;
         };
@@ -369,12 +288,12 @@ impl<'a> Reader<'a> {
             return;
         }
         let camera = Camera { projection, motion, ..Camera::pinhole(position, forward, up, 40.0) };
-        self.builder.cameras.push(NamedCamera { name, camera });
+        self.builder.cameras.push(NamedCamera { name, camera, aspect });
     }
 
     fn light(&mut self, light: &::gltf::khr_lights_punctual::Light, to_world: &Affine3A) {
         use ::gltf::khr_lights_punctual::Kind;
-        let strength = Vec3::from_array(light.color()) * light.intensity();
+        let strength = Vec3::from_array(light.color()) * light.intensity() / self.builder.nits_per_unit as f32;
         let position = Vec3::from(to_world.translation);
         let Some(direction) = to_world.transform_vector3(Vec3::NEG_Z).try_normalize() else {
             return;

@@ -64,7 +64,7 @@ impl Reader {
             focus_distance,
             ..Camera::pinhole(to_world.translation.into(), forward, up, 40.0)
         };
-        self.builder.cameras.push(NamedCamera { name: sensor.name(), camera });
+        self.builder.cameras.push(NamedCamera { name: sensor.name(), camera, aspect: None });
         Ok(())
     }
 

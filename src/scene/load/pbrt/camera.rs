@@ -80,7 +80,7 @@ impl Reader<'_> {
             ..Camera::pinhole(position, forward, up, 40.0)
         };
         self.note_unread("camera", &parameters);
-        self.builder.cameras.push(NamedCamera { name: kind, camera });
+        self.builder.cameras.push(NamedCamera { name: kind, camera, aspect: None });
         Ok(())
     }
 

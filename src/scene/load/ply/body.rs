@@ -152,7 +152,8 @@ impl<'a> Values<'a> {
         Ok(size as u32)
     }
 
-    fn list_size(&mut self, count: Kind, kind: Kind) -> Result<usize, LoadError> {
+    /// The length of the list that follows, for which there are bytes.
+    pub(super) fn list_size(&mut self, count: Kind, kind: Kind) -> Result<usize, LoadError> {
         let size = self.number(count)?;
         let width = if self.encoding == Encoding::Ascii { 2 } else { kind.size() };
         let most = (self.bytes_left() + 1) / width;

@@ -1,11 +1,12 @@
 //! Stanford PLY meshes: ASCII and binary of both byte orders, plain or under gzip.
 //!
-//! Vertices (`x y z`, `nx ny nz`, `u v` or `s t` and their longer names) and faces (`vertex_indices`) are read, everything
+//! Vertices (`x y z`, `nx ny nz`, `u v` or `s t` and their longer names), faces and `tristrips` (`vertex_indices`) are read, everything
 //! else is skipped and named. Written by ourselves: a million triangles load in little more than reading their bytes
 //! takes (benches/README.md), and every count is checked against the bytes that are there before memory is taken for it.
 
 mod body;
 mod header;
+mod strips;
 
 use super::error::{LoadError, Place};
 use super::{files, polygon};
@@ -36,6 +37,7 @@ pub(super) fn read(path: &Path) -> Result<Loaded, LoadError> {
         match element.name.as_str() {
             "vertex" => unused.extend(read_vertices(&mut values, element, &mut mesh)?),
             "face" => unused.extend(read_faces(&mut values, element, &mut polygons)?),
+            "tristrips" => strips::read(&mut values, element, &mut polygons)?,
             other => {
                 unused.push(other);
                 values.skip(element)?;
@@ -229,6 +231,19 @@ mod tests {
             assert_eq!((&other.positions, &other.triangles), (&text.mesh.positions, &text.mesh.triangles));
             assert_eq!(other.uvs, text.mesh.uvs);
         }
+    }
+
+    #[test]
+    fn strips_are_triangles() {
+        let text = String::from_utf8(ascii())
+            .unwrap()
+            .replace("face 2", "tristrips 1")
+            .replace("3 0 1 2\n3 0 2 3\n", "8 0 1 2 3 -1 3 1 0\n");
+        let text = text.replace("list uchar int", "list int int");
+        assert_eq!(
+            load(text.as_bytes()).unwrap_or_else(|e| panic!("{e}")).mesh.triangles,
+            [[0, 1, 2], [2, 1, 3], [3, 1, 0]]
+        );
     }
 
     #[test]

@@ -68,7 +68,8 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
     if let Some(name) = root.get_some("name", |value| value.string())? {
         builder.name = name.to_owned();
     }
-    builder.nits_per_unit = root.get_or("nits_per_unit", 1.0, Value::positive)?;
+    let own_unit = root.get_or("nits_per_unit", 1.0, Value::positive)?;
+    builder.nits_per_unit = options.nits_per_unit.unwrap_or(own_unit);
     if let Some(film) = root.get("film") {
         builder.film = read_film(&film)?;
     }
@@ -79,7 +80,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
     if let Some(camera) = root.get("camera") {
         shutter.stays_open = camera.entries()?.get_or("shutter_s", 0.0, Value::non_negative)?;
         let camera = camera::read(&camera, shutter)?;
-        builder.cameras.push(NamedCamera { name: "camera".to_owned(), camera });
+        builder.cameras.push(NamedCamera { name: "camera".to_owned(), camera, aspect: None });
     }
 
     let folder = path.parent().unwrap_or(Path::new(""));

@@ -19,23 +19,29 @@ pub(in crate::scene::load) fn of(scene: &Path) -> Option<PathBuf> {
     beside.is_file().then_some(beside)
 }
 
-/// Whether the side file has lights or surroundings of its own.
-pub(in crate::scene::load) fn brings_light(path: &Path) -> Result<bool, LoadError> {
-    with_root(path, 0.0, |root| Ok(root.get("environment").is_some() || root.get("lights").is_some()))
-}
-
-/// For how many seconds the side file's camera keeps its shutter open, if it says.
-pub(in crate::scene::load) fn shutter_s(path: &Path) -> Result<Option<f64>, LoadError> {
-    with_root(path, 0.0, |root| match root.get("camera") {
-        None => Ok(None),
-        Some(camera) => camera.entries()?.get_some("shutter_s", |seconds| seconds.non_negative()),
+/// The options with what the side file says of how its scene is read: its unit and size where the caller names none, whether light
+/// follows, and for how many seconds its camera keeps the shutter open.
+pub(in crate::scene::load) fn before(path: &Path, options: &LoadOptions) -> Result<LoadOptions, LoadError> {
+    with_root(path, 0.0, |root| {
+        let film = root.get("film").map(|film| read_film(&film)).transpose()?;
+        let shutter_s = match root.get("camera") {
+            None => None,
+            Some(camera) => camera.entries()?.get_some("shutter_s", |seconds| seconds.non_negative())?,
+        };
+        let brings_light = root.get("environment").is_some() || root.get("lights").is_some();
+        Ok(LoadOptions {
+            environment_follows: options.environment_follows || brings_light,
+            shutter_s: shutter_s.unwrap_or(options.shutter_s),
+            nits_per_unit: options.nits_per_unit.or(root.get_some("nits_per_unit", Value::positive)?),
+            film: options.film.or(film),
+            ..options.clone()
+        })
     })
 }
 
-/// Adds everything to the scene. The scene's own camera stays where the caller has asked for one by name.
+/// Adds everything to the scene, which was read with the options of [`before`]. The scene's own camera stays where the caller has asked for one by name.
 pub(in crate::scene::load) fn apply(path: &Path, options: &LoadOptions, scene: &mut Scene) -> Result<(), LoadError> {
     with_root(path, options.frame_time, |root| {
-        let nits_per_unit = root.get_or("nits_per_unit", scene.nits_per_unit, Value::positive)?;
         if let Some(film) = root.get("film") {
             scene.film = read_film(&film)?;
         }
@@ -62,23 +68,19 @@ pub(in crate::scene::load) fn apply(path: &Path, options: &LoadOptions, scene: &
         }
         if let Some(value) = root.get("environment") {
             let folder = path.parent().unwrap_or(Path::new(""));
-            let surroundings = surroundings::read(&value, folder, nits_per_unit)?;
+            let surroundings = surroundings::read(&value, folder, scene.nits_per_unit)?;
             scene.environment = Some(surroundings.environment);
             scene.lights.extend(surroundings.sun);
         }
         if let Some(list) = root.get("lights") {
             for value in list.array()? {
-                scene.lights.push(light::read(&value, nits_per_unit)?);
+                scene.lights.push(light::read(&value, scene.nits_per_unit)?);
             }
         }
         // What was assumed is no longer true.
-        if root.get("nits_per_unit").is_some() {
-            scene.notes.retain(|note| !note.starts_with("Radiance has no unit"));
-        }
         if brings_camera {
             scene.notes.retain(|note| !note.starts_with("No camera in the file"));
         }
-        scene.nits_per_unit = nits_per_unit;
         Ok(())
     })
 }

@@ -4,8 +4,8 @@ use super::super::error::LoadError;
 use super::super::metals::METALS;
 use super::Context;
 use super::fields::{Fields, Value};
-use super::material::{Materials, scalar, share, share_or_white};
-use crate::scene::{ColorInput, Distribution, MetalRoughness, Roughness, ScalarInput, Surface};
+use super::material::{Entry, Materials, scalar, share, share_or_white};
+use crate::scene::{Alpha, ColorInput, Distribution, Material, MetalRoughness, Roughness, ScalarInput, Surface};
 use glam::Vec3;
 
 /// Reads the keys of one kind of surface.
@@ -243,10 +243,12 @@ fn metal_roughness<'a>(
         roughness: scalar(context, fields, "roughness", 0.5)?,
         ior: fields.get_or("ior", 1.5, Value::positive)? as f32,
         transmission: scalar(context, fields, "transmission", 0.0)?,
-        volume: if fields.get("absorption").or(fields.get("attenuation_color")).is_some() {
-            Some(absorption(fields)?)
-        } else {
-            None
+        volume: match ["absorption", "attenuation_color", "attenuation_distance"]
+            .iter()
+            .any(|key| fields.get(key).is_some())
+        {
+            true => Some(absorption(fields)?),
+            false => None,
         },
         specular: scalar(context, fields, "specular", 1.0)?,
         specular_color: share_or_white(context, fields, "specular_color")?,
@@ -302,11 +304,33 @@ fn mix<'a>(materials: &Materials<'a>, context: &mut Context<'a>, fields: &Fields
     };
     let surface = |context: &Context<'a>, name: &Value<'a>| -> Result<Box<Surface>, LoadError> {
         let entry = materials.find_above(name)?;
-        Ok(Box::new(context.builder.materials[entry.id.0 as usize].surface.clone()))
+        let part = &context.builder.materials[entry.id.0 as usize];
+        if let Some(what) = beyond_surface(part, entry) {
+            return Err(name.error(format_args!(
+                "\"{}\" has {what} of its own, which a mix does not take over: give it to the mix",
+                part.name
+            )));
+        }
+        Ok(Box::new(part.surface.clone()))
     };
     Ok(Surface::Mix {
         first: surface(context, first)?,
         second: surface(context, second)?,
         amount: scalar(context, fields, "amount", 0.5)?,
     })
+}
+
+/// What a material has that is not part of how its surface scatters.
+fn beyond_surface(material: &Material, entry: Entry) -> Option<&'static str> {
+    if entry.power.is_some() || material.emission.factor != Vec3::ZERO {
+        Some("an emission")
+    } else if material.alpha != Alpha::Opaque {
+        Some("an alpha")
+    } else if material.relief.is_some() {
+        Some("a normal_map or bump_map")
+    } else if material.stretch.is_some() {
+        Some("a stretch_rotation_deg")
+    } else {
+        None
+    }
 }

@@ -1,0 +1,159 @@
+//! The JSON part of a glTF file, checked: its extensions, and what the crate's own checks leave out or are too strict about.
+
+use super::super::builder::Builder;
+use super::super::error::{LoadError, Place};
+use ::gltf::json::Root;
+use ::gltf::json::validation::{Checked, Validate};
+use ::gltf::mesh::Semantic;
+use serde_json::Value;
+use std::path::Path;
+
+/// Some editors put it before JSON.
+const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
+
+/// Extensions that are done, or change nothing that a rest pose shows.
+const KNOWN: &[&str] = &[
+    "KHR_lights_punctual",
+    "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+];
+
+/// The document, checked by the crate, after our own look at its extensions.
+pub(super) fn parse(path: &Path, json: &[u8], builder: &mut Builder) -> Result<::gltf::Document, LoadError> {
+    let json = json.strip_prefix(BYTE_ORDER_MARK).unwrap_or(json);
+    let mut root = read(json).map_err(|error| {
+        let place = Place { file: path.to_owned(), line: Some(error.line()).filter(|&line| line > 0) };
+        LoadError::invalid_at(place, format_args!("not valid glTF: {error}"))
+    })?;
+    if let Some(refused) = root.extensions_required.iter().find(|name| !KNOWN.contains(&name.as_str())) {
+        let advice = match refused.as_str() {
+            "KHR_draco_mesh_compression" | "EXT_meshopt_compression" => "; export it without mesh compression",
+            "KHR_texture_basisu" | "EXT_texture_webp" => "; export its textures as PNG or JPEG",
+            _ => "",
+        };
+        return Err(LoadError::unsupported(
+            path,
+            format_args!("needs the extension {refused}, which is not read{advice}"),
+        ));
+    }
+    for name in root.extensions_used.iter().filter(|name| !KNOWN.contains(&name.as_str())) {
+        let instead = match name.as_str() {
+            "KHR_materials_variants" => "the default variant is rendered",
+            _ => "it is left out",
+        };
+        builder.note(format!("{name} is not supported: {instead}."));
+    }
+    // The crate refuses some that we do ourselves.
+    root.extensions_required.clear();
+    let version = root.asset.version.clone();
+    if !version.starts_with("2.") {
+        return Err(LoadError::unsupported(path, format_args!("glTF version {version}; version 2 is read")));
+    }
+    check_positions(path, &root)?;
+    check_animations(path, &root)?;
+    check_by_crate(path, &root)?;
+    note_morphed_attributes(json, &root, builder);
+    Ok(::gltf::Document::from_json_without_validation(root))
+}
+
+/// The JSON's content. Where the crate misses something, once more without the animation's channels that name no node: they move
+/// nothing, and the crate wants one.
+fn read(json: &[u8]) -> serde_json::Result<Root> {
+    serde_json::from_slice(json).or_else(|error| {
+        let Ok(mut value) = serde_json::from_slice::<Value>(json) else { return Err(error) };
+        let animations = value.get_mut("animations").and_then(Value::as_array_mut);
+        for animation in animations.into_iter().flatten() {
+            if let Some(channels) = animation.get_mut("channels").and_then(Value::as_array_mut) {
+                channels.retain(|channel| channel.pointer("/target/node").is_some());
+            }
+        }
+        serde_json::from_value(value).map_err(|_| error)
+    })
+}
+
+/// What the crate finds wrong, but for what the format allows: accessors of zeros, which have no bytes, and textures without an image.
+fn check_by_crate(path: &Path, root: &Root) -> Result<(), LoadError> {
+    let mut errors = Vec::new();
+    root.validate(root, ::gltf::json::Path::new, &mut |place, error| {
+        let place = place();
+        let is_allowed = match place.as_str().split_once('[') {
+            Some(("accessors", rest)) => rest.ends_with("].bufferView"),
+            Some(("textures", rest)) => rest.ends_with("].source"),
+            _ => false,
+        };
+        if !(is_allowed && matches!(error, ::gltf::json::validation::Error::Missing)) {
+            errors.push((place, error));
+        }
+    });
+    if errors.is_empty() {
+        return Ok(());
+    }
+    let error = ::gltf::Error::Validation(errors);
+    Err(LoadError::invalid(path, format_args!("not valid glTF: {error}")))
+}
+
+/// Names what morph targets change besides positions, normals and tangents, which the crate does not hand on.
+fn note_morphed_attributes(json: &[u8], root: &Root, builder: &mut Builder) {
+    if !root.meshes.iter().flat_map(|mesh| &mesh.primitives).any(|primitive| primitive.targets.is_some()) {
+        return;
+    }
+    let Ok(value) = serde_json::from_slice::<Value>(json) else { return };
+    let array = |value: &Value, key: &str| value.get(key).and_then(Value::as_array).cloned().unwrap_or_default();
+    for mesh in array(&value, "meshes") {
+        let targets = array(&mesh, "primitives").into_iter().flat_map(|primitive| array(&primitive, "targets"));
+        let keys = targets
+            .flat_map(|target| target.as_object().into_iter().flat_map(|t| t.keys().cloned()).collect::<Vec<_>>());
+        if keys.into_iter().any(|key| key.starts_with("TEXCOORD_") || key.starts_with("COLOR_")) {
+            let name = mesh.get("name").and_then(Value::as_str).unwrap_or("a mesh");
+            builder.note(format!("\"{name}\": morph targets of texture coordinates and colours are not applied."));
+        }
+    }
+}
+
+/// Refuses primitives whose positions are in an accessor that is not there: the crate's own validation looks at the
+/// accessor's range before it looks whether it exists, and panics (gltf-json 1.4.1, found by damaging a file).
+fn check_positions(path: &Path, root: &Root) -> Result<(), LoadError> {
+    let positions = Checked::Valid(Semantic::Positions);
+    for (mesh_number, mesh) in root.meshes.iter().enumerate() {
+        for primitive in &mesh.primitives {
+            let accessor = primitive.attributes.get(&positions).map(::gltf::json::Index::value);
+            if let Some(accessor) = accessor.filter(|&a| a >= root.accessors.len()) {
+                let count = root.accessors.len();
+                return Err(LoadError::invalid(
+                    path,
+                    format_args!("mesh {mesh_number} has its positions in accessor {accessor}, but there are {count}"),
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Refuses animations of a node or property that does not exist: the crate's validation looks at neither, and its reader
+/// panics (gltf-json 1.4.1, found by damaging a file).
+fn check_animations(path: &Path, root: &Root) -> Result<(), LoadError> {
+    for (number, animation) in root.animations.iter().enumerate() {
+        for target in animation.channels.iter().map(|channel| &channel.target) {
+            let (node, count) = (target.node.value(), root.nodes.len());
+            if node >= count {
+                let problem = format!("animation {number} moves node {node}, but there are {count}");
+                return Err(LoadError::invalid(path, problem));
+            }
+            if matches!(target.path, Checked::Invalid) {
+                let problem =
+                    format!("animation {number} moves what is not known; translation, rotation, scale and weights are");
+                return Err(LoadError::invalid(path, problem));
+            }
+        }
+    }
+    Ok(())
+}
