@@ -2,6 +2,7 @@
 
 use super::bump::{self, Bump};
 use super::error::{LoadError, nearest, suggestion};
+use super::notes::AlikeNotes;
 use super::texture::Requests;
 use super::{LoadOptions, default_view, environment, validate};
 use crate::scene::{
@@ -50,6 +51,7 @@ pub(super) struct Builder {
     pub(super) lights: Vec<Light>,
     pub(super) environment: Option<Environment>,
     pub(super) notes: Vec<String>,
+    alike: AlikeNotes,
 }
 
 impl Builder {
@@ -70,6 +72,7 @@ impl Builder {
             lights: Vec::new(),
             environment: None,
             notes: Vec::new(),
+            alike: AlikeNotes::default(),
         }
     }
 
@@ -83,12 +86,9 @@ impl Builder {
         MaterialId(self.materials.len() as u32 - 1)
     }
 
-    /// Adds a sentence, once.
+    /// Adds a sentence, once; those that differ in their line alone are counted.
     pub(super) fn note(&mut self, note: impl Into<String>) {
-        let note = note.into();
-        if !self.notes.contains(&note) {
-            self.notes.push(note);
-        }
+        self.alike.add(note.into(), &mut self.notes);
     }
 
     /// Names the scatterings after which the file ends its paths, unless nothing is left then. In closed rooms what comes after
@@ -107,6 +107,7 @@ impl Builder {
     /// Chooses the camera, decodes the textures, checks everything, and adds what is missing.
     pub(super) fn finish(mut self, path: &Path, if_dark: IfDark, options: &LoadOptions) -> Result<Scene, LoadError> {
         validate::repair(&mut self, path)?;
+        std::mem::take(&mut self.alike).count_into(&mut self.notes);
         let camera = self.choose_camera(options)?;
         let coverage = |id| self.materials.iter().any(|material| material.alpha.texture_of_coverage() == Some(id));
         let textures = std::mem::take(&mut self.textures).decode(&mut self.notes, options, coverage)?;

@@ -29,6 +29,7 @@ mod gltf;
 pub mod metals;
 mod mitsuba;
 mod mtl;
+mod notes;
 mod obj;
 mod pbrt;
 mod ply;
