@@ -141,6 +141,10 @@ fn cameras_are_mitsubas() {
     let oblong = camera("orthographic", r#"<transform name="to_world"><scale x="2" y="1"/></transform>"#).camera;
     assert_eq!(oblong.projection, Projection::Orthographic { height: 2.0 });
     assert_eq!(oblong.screen_window, Some(ScreenWindow { min: Vec2::new(-2.0, -1.0), max: Vec2::new(2.0, 1.0) }));
+    assert!(!has_note(
+        &camera("perspective", r#"<transform name="to_world"><translate z="9"/></transform>"#),
+        "cuts the scene"
+    ));
     let back = r#"<transform name="to_world"><translate z="-4"/></transform>"#;
     assert!(!has_note(&camera("perspective", back), "cuts the scene"));
     let clipped = camera("perspective", &format!(r#"{back}<float name="near_clip" value="4.1"/>"#));

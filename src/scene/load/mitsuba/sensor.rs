@@ -93,7 +93,8 @@ impl Reader {
         let (nearest, farthest) =
             depths.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), depth| (low.min(depth), high.max(depth)));
         // From inside a scene, what lies within a hundredth of it is seldom anything.
-        let cuts_near = if nearest > 0.0 { near > nearest } else { near > 0.01 * size.length() };
+        let least = if nearest > 0.0 { nearest } else { 0.01 * size.length() };
+        let cuts_near = farthest > 0.0 && near > least;
         for (cuts, name, distance) in [(cuts_near, "near_clip", near), (far < farthest, "far_clip", far)] {
             if cuts {
                 self.builder.note(format!("{place}: {name} {distance} cuts the scene: here nothing is cut."));
