@@ -98,12 +98,12 @@ impl ExrImage {
 #[derive(Debug, thiserror::Error)]
 pub enum ExrReadError {
     /// The operating system refused.
-    #[error("cannot read {}: {source}", .path.display())]
+    #[error("cannot read {}: {error}", .path.display())]
     Io {
         /// The file.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        error: std::io::Error,
     },
     /// The file is damaged or no EXR file.
     #[error("cannot read {}: damaged or no EXR file ({problem})", .path.display())]
@@ -142,7 +142,7 @@ pub enum ExrReadError {
 
 /// Reads every channel of a file's parts.
 pub fn read_exr(path: &Path) -> Result<ExrImage, ExrReadError> {
-    let io = |source| ExrReadError::Io { path: path.to_owned(), source };
+    let io = |error| ExrReadError::Io { path: path.to_owned(), error };
     if path.metadata().map_err(io)?.is_dir() {
         return Err(io(std::io::Error::new(std::io::ErrorKind::IsADirectory, "it is a folder, not an EXR file")));
     }
@@ -297,7 +297,7 @@ fn guarded<T>(path: &Path, run: impl FnOnce() -> ::exr::error::Result<T>) -> Res
     let path = path.to_owned();
     match catch_unwind(AssertUnwindSafe(run)) {
         Ok(Ok(value)) => Ok(value),
-        Ok(Err(Error::Io(source))) => Err(ExrReadError::Io { path, source }),
+        Ok(Err(Error::Io(error))) => Err(ExrReadError::Io { path, error }),
         Ok(Err(Error::NotSupported(what))) => Err(ExrReadError::Unsupported {
             path,
             feature: format!("{what} is not read; convert the file to ZIP first"),

@@ -30,12 +30,12 @@ const HASH_BYTES: usize = blake3::OUT_LEN;
 #[derive(Debug, thiserror::Error)]
 pub enum SealedError {
     /// The operating system refused.
-    #[error("cannot read {}: {source}", .path.display())]
+    #[error("cannot read {}: {error}", .path.display())]
     Io {
         /// The file.
         path: PathBuf,
         /// What the system said.
-        source: io::Error,
+        error: io::Error,
     },
     /// Something else.
     #[error("cannot read {}: it is not {}", .path.display(), .kind.what)]
@@ -112,7 +112,7 @@ impl Kind {
     /// # Errors
     /// [`SealedError`] for what is not of this kind and version; what follows is not looked at.
     pub fn read(&'static self, path: &Path) -> Result<Vec<u8>, SealedError> {
-        let io = |source| SealedError::Io { path: path.to_owned(), source };
+        let io = |error| SealedError::Io { path: path.to_owned(), error };
         let mut file = open(path)?;
         let mut bytes = Vec::new();
         (&mut file).take(self.preamble().len() as u64).read_to_end(&mut bytes).map_err(io)?;
@@ -145,7 +145,7 @@ impl Kind {
     pub fn read_beginning<T: DeserializeOwned>(&'static self, path: &Path, limit: u64) -> Result<T, SealedError> {
         let mut bytes = Vec::new();
         let read = open(path)?.take(limit).read_to_end(&mut bytes);
-        read.map_err(|source| SealedError::Io { path: path.to_owned(), source })?;
+        read.map_err(|error| SealedError::Io { path: path.to_owned(), error })?;
         match postcard::take_from_bytes(self.after_preamble(path, &bytes)?) {
             Ok((value, _)) => Ok(value),
             Err(_) => Err(self.damaged(path, "its header cannot be read")),
@@ -206,5 +206,5 @@ fn open(path: &Path) -> Result<File, SealedError> {
         true => Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder")),
         false => Ok(file),
     });
-    file.map_err(|source| SealedError::Io { path: path.to_owned(), source })
+    file.map_err(|error| SealedError::Io { path: path.to_owned(), error })
 }

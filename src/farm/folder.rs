@@ -55,7 +55,7 @@ impl Farm {
     /// If there is none that this program can work on.
     pub fn open(folder: &Path) -> Result<Self, ManifestError> {
         let path = Self::manifest_file(folder);
-        let text = std::fs::read(&path).map_err(|source| ManifestError::Io { path: path.clone(), source })?;
+        let text = std::fs::read(&path).map_err(|error| ManifestError::Io { path: path.clone(), error })?;
         let manifest = Manifest::parse(&path, &text)?;
         Ok(Self { folder: folder.to_owned(), manifest, id: ContentHash::of_bytes(&text) })
     }

@@ -80,20 +80,20 @@ pub struct FrameEntry {
 #[derive(Debug, thiserror::Error)]
 pub enum ManifestError {
     /// The operating system refused.
-    #[error("cannot read {}, which fechner farm plan writes: {source}", .path.display())]
+    #[error("cannot read {}: {error}; fechner farm plan writes it", .path.display())]
     Io {
         /// The file.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        error: std::io::Error,
     },
     /// Not JSON, or not of this form.
-    #[error("{}: not a farm's manifest: {source}", .path.display())]
+    #[error("{}: not a farm's manifest: {error}", .path.display())]
     Syntax {
         /// The file.
         path: PathBuf,
         /// What is wrong, and where.
-        source: serde_json::Error,
+        error: serde_json::Error,
     },
     /// Well-formed, and cannot be.
     #[error("{}: {problem}", .path.display())]
@@ -109,7 +109,7 @@ impl Manifest {
     /// Reads and checks one; `path` is for messages.
     pub(super) fn parse(path: &Path, text: &[u8]) -> Result<Self, ManifestError> {
         let manifest: Self =
-            serde_json::from_slice(text).map_err(|source| ManifestError::Syntax { path: path.to_owned(), source })?;
+            serde_json::from_slice(text).map_err(|error| ManifestError::Syntax { path: path.to_owned(), error })?;
         match manifest.problem() {
             None => Ok(manifest),
             Some(problem) => Err(ManifestError::Wrong { path: path.to_owned(), problem }),

@@ -78,7 +78,7 @@ pub fn orders(farm: &Farm, frame_index: usize, state: &RenderState) -> impl Iter
 /// If something cannot be written.
 pub fn hand_out(farm: &Farm, frame_index: usize, state: &RenderState) -> Result<RoundRecord, OutputError> {
     let folder = farm.round_folder(frame_index, state.plans);
-    std::fs::create_dir_all(&folder).map_err(|source| OutputError::Io { path: folder.clone(), source })?;
+    std::fs::create_dir_all(&folder).map_err(|error| OutputError::Io { path: folder.clone(), error })?;
     let mut units = Vec::new();
     let mut first_block = 0;
     for (NamedOrder { order, .. }, file) in orders(farm, frame_index, state) {

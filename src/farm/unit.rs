@@ -78,7 +78,7 @@ pub enum UnitError {
 impl UnitError {
     /// Whether it is only that there is no such file.
     pub fn is_missing(&self) -> bool {
-        matches!(self, Self::Sealed(SealedError::Io { source, .. }) if source.kind() == std::io::ErrorKind::NotFound)
+        matches!(self, Self::Sealed(SealedError::Io { error, .. }) if error.kind() == std::io::ErrorKind::NotFound)
     }
 }
 

@@ -12,7 +12,7 @@ use tempfile::NamedTempFile;
 /// points to is replaced, not the link.
 pub fn write_beside(path: &Path, write: impl FnOnce(&mut File) -> std::io::Result<()>) -> Result<(), OutputError> {
     let (mut file, target) = create_beside(path)?;
-    let io = |source| OutputError::Io { path: path.to_owned(), source };
+    let io = |error| OutputError::Io { path: path.to_owned(), error };
     write(file.as_file_mut()).map_err(io)?;
     // Without this a crash of the machine after the rename could leave the new name with no content.
     file.as_file().sync_all().map_err(io)?;
@@ -22,7 +22,7 @@ pub fn write_beside(path: &Path, write: impl FnOnce(&mut File) -> std::io::Resul
 
 /// Makes the new file, which is removed when dropped, and says what it should be renamed to.
 pub(super) fn create_beside(path: &Path) -> Result<(NamedTempFile, PathBuf), OutputError> {
-    let io = |source| OutputError::Io { path: path.to_owned(), source };
+    let io = |error| OutputError::Io { path: path.to_owned(), error };
     let not_a_file = |found| OutputError::NotAFile { path: path.to_owned(), found };
     let target = match path.metadata() {
         Ok(found) if found.is_dir() => return Err(not_a_file("a folder")),
@@ -76,7 +76,7 @@ fn part_prefix(name: &OsStr) -> OsString {
 /// Removes new files beside `path` that a killed program could not complete. Call it only where no other program can be
 /// writing `path`.
 pub fn remove_leftovers(path: &Path) -> Result<(), OutputError> {
-    let io = |source| OutputError::Io { path: path.to_owned(), source };
+    let io = |error| OutputError::Io { path: path.to_owned(), error };
     // The file itself may not be there yet; where it is a link, new files are made beside what it points to.
     let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let Some(name) = target.file_name() else { return Ok(()) };

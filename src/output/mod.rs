@@ -161,12 +161,12 @@ pub enum OutputError {
         path: PathBuf,
     },
     /// The operating system refused.
-    #[error("cannot write {}: {source}", .path.display())]
+    #[error("cannot write {}: {error}", .path.display())]
     Io {
         /// The file asked for.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        error: std::io::Error,
     },
     /// The picture itself makes no sense; a mistake of the caller.
     #[error("cannot write {}: {problem}", .path.display())]

@@ -87,6 +87,11 @@ impl Material {
 
     /// Whether one place of the surface may look unlike another, or one direction along it unlike another.
     pub fn has_places(&self) -> bool {
+        self.reads_pictures() || self.relief.is_some() || self.surface.is_anisotropic()
+    }
+
+    /// Whether anything about it comes from a picture.
+    pub fn reads_pictures(&self) -> bool {
         let reads_color = |color: &ColorInput| color.texture.is_some();
         let covers = match &self.alpha {
             Alpha::Opaque | Alpha::Unseen => false,
@@ -94,8 +99,7 @@ impl Material {
         };
         covers
             || reads_color(&self.emission)
-            || self.relief.is_some()
-            || self.surface.is_anisotropic()
+            || self.relief.as_ref().is_some_and(|relief| relief.texture().is_some())
             || self.surface.colors().into_iter().any(reads_color)
             || self.surface.scalars().into_iter().any(|scalar| scalar.texture.is_some())
     }

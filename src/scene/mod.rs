@@ -141,6 +141,9 @@ pub struct Mesh {
     pub uvs: Vec<Vec2>,
     /// Tangent (xyz) and handedness (w), one a position, or empty (then each triangle has that of its `uvs`).
     pub tangents: Vec<Vec4>,
+    /// Whether the second axis of normal maps is normal × growing u whichever way v runs, as in pbrt and Mitsuba; else it is that
+    /// of falling v.
+    pub bitangent_ignores_v: bool,
     /// Linear colour that multiplies what the material reflects (its base colour), one a position, or empty for white.
     pub colors: Vec<Vec3>,
     /// Vertex indices of each triangle, counter-clockwise from the front.

@@ -9,6 +9,7 @@
 //! - `camera_and_time`: blur of lens and shutter, moving lamps, crops
 //! - `denoise`: denoised pictures: the raw mean beside them, equal bytes, libraries that are not there
 //! - `formats`: the same scene from several formats
+//! - `mitsuba_format`, `pbrt_format`: what their files mean where readers go wrong easily
 //! - `bad_input`: bad scene files, and our own ones
 //! - `importance`: samples go where a user's map sends them
 //! - `load_assets`: scenes that others made, sound and damaged
@@ -46,8 +47,10 @@ mod furnace;
 mod importance;
 mod kill;
 mod load_assets;
+mod mitsuba_format;
 mod mutations;
 mod no_allocation;
+mod pbrt_format;
 mod references;
 mod relief;
 mod reprojection;

@@ -192,6 +192,7 @@ impl World {
             let world = Vec3::from(to_world.matrix3 * Vec3A::from(blended));
             (Some(world.normalize_or(Vec3::X)), if t0.w < 0.0 { -placement.flip } else { placement.flip })
         };
+        let handedness = if mesh.bitangent_ignores_v { 1.0 } else { handedness };
         let uv = match self.scene.textures.is_empty() {
             true => Vec2::ZERO,
             false => interpolate_uv(mesh, hit.triangle, b1, b2),

@@ -2,6 +2,7 @@
 
 use super::bump::{self, Bump};
 use super::error::{LoadError, nearest, suggestion};
+use super::notes::AlikeNotes;
 use super::texture::Requests;
 use super::{LoadOptions, default_view, environment, tangents, validate};
 use crate::scene::{
@@ -52,6 +53,7 @@ pub(super) struct Builder {
     pub(super) lights: Vec<Light>,
     pub(super) environment: Option<Environment>,
     pub(super) notes: Vec<String>,
+    alike: AlikeNotes,
 }
 
 impl Builder {
@@ -72,6 +74,7 @@ impl Builder {
             lights: Vec::new(),
             environment: None,
             notes: Vec::new(),
+            alike: AlikeNotes::default(),
         }
     }
 
@@ -85,12 +88,9 @@ impl Builder {
         MaterialId(self.materials.len() as u32 - 1)
     }
 
-    /// Adds a sentence, once.
+    /// Adds a sentence, once; those that differ in their line alone are counted.
     pub(super) fn note(&mut self, note: impl Into<String>) {
-        let note = note.into();
-        if !self.notes.contains(&note) {
-            self.notes.push(note);
-        }
+        self.alike.add(note.into(), &mut self.notes);
     }
 
     /// Names the scatterings after which the file ends its paths, unless nothing is left then. In closed rooms what comes after
@@ -113,6 +113,7 @@ impl Builder {
             self.notes.retain(|note| !note.starts_with("Radiance has no unit"));
         }
         validate::repair(&mut self, path)?;
+        std::mem::take(&mut self.alike).count_into(&mut self.notes);
         let camera = self.choose_camera(options)?;
         let coverage = |id| self.materials.iter().any(|material| material.alpha.texture_of_coverage() == Some(id));
         let textures = std::mem::take(&mut self.textures).decode(&mut self.notes, options, coverage)?;

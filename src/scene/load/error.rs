@@ -46,12 +46,12 @@ pub enum LoadError {
         problem: String,
     },
     /// Another file that this one names is at fault.
-    #[error("{place}: {source}")]
+    #[error("{place}: {fault}")]
     Referenced {
         /// Where the other file is named.
         place: Place,
-        /// What is wrong with it.
-        source: Box<LoadError>,
+        /// What is wrong with it; told by this error's own text, so not its source.
+        fault: Box<LoadError>,
     },
 }
 
@@ -118,7 +118,7 @@ impl LoadError {
 
     /// The same error, with the place that named the file.
     pub fn referenced_from(self, place: Place) -> Self {
-        Self::Referenced { place, source: Box::new(self) }
+        Self::Referenced { place, fault: Box::new(self) }
     }
 
     /// Whether the file is not there at all (other than damaged).
@@ -191,6 +191,17 @@ mod tests {
         assert_eq!(nearest("ruoghness", keys), Some("roughness"));
         assert_eq!(nearest("colour", keys), None);
         assert_eq!(edit_distance("abc", "acb"), 1);
+    }
+
+    /// As the program prints it, with all sources.
+    #[test]
+    fn a_fault_in_another_file_is_told_once() {
+        let fault = LoadError::invalid(Path::new("b.ply"), "wrong");
+        let error = fault.referenced_from(Place::line(Path::new("a.pbrt"), 5));
+        assert_eq!(format!("{:#}", anyhow::Error::from(error)), "a.pbrt:5: b.ply: wrong");
+        let path = Path::new("a.film").to_owned();
+        let sealed = crate::sealed::SealedError::Io { path, error: std::io::Error::other("gone") };
+        assert_eq!(format!("{:#}", anyhow::Error::from(sealed)), "cannot read a.film: gone");
     }
 
     #[test]

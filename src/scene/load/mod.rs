@@ -19,6 +19,7 @@
 //! transforms invertible, ids of meshes, materials and textures valid, and there is something to render. Damaged,
 //! hostile or oversized files end in a [`LoadError`] of one line; none panics or takes memory out of proportion.
 
+mod adjust;
 mod builder;
 mod bump;
 mod default_view;
@@ -29,6 +30,7 @@ mod gltf;
 pub mod metals;
 mod mitsuba;
 mod mtl;
+mod notes;
 mod obj;
 mod pbrt;
 mod ply;

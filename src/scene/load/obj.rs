@@ -324,7 +324,7 @@ fn convert_mesh(model: &tobj::Model, path: &Path) -> Result<(Mesh, usize), LoadE
     } else {
         model.name.clone()
     };
-    Ok((Mesh { name, positions, normals, uvs, tangents: Vec::new(), colors, triangles }, skipped))
+    Ok((Mesh { name, positions, normals, uvs, colors, triangles, ..Mesh::default() }, skipped))
 }
 
 #[cfg(test)]

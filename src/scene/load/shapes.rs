@@ -60,6 +60,43 @@ pub fn disk(center: Vec3, normal: Vec3, radius: f32) -> Mesh {
     mesh
 }
 
+/// The disk around the origin that faces +z, its texture coordinates by the distance from the middle as a share of the radius
+/// and by the turn from +x in [0, 1]. Each triangle has a middle of its own, since that lies at every turn.
+pub(super) fn polar_disk(radius: f32, uv: impl Fn(f32, f32) -> Vec2) -> Mesh {
+    let mut mesh = Mesh { name: "disk".to_owned(), ..Mesh::default() };
+    for segment in 0..=DISK_SEGMENTS {
+        let turn = segment as f32 / DISK_SEGMENTS as f32;
+        // The last corner is the first one to the bit.
+        let (sin, cos) = (TAU * (segment % DISK_SEGMENTS) as f32 / DISK_SEGMENTS as f32).sin_cos();
+        mesh.positions.push(radius * Vec3::new(cos, sin, 0.0));
+        mesh.uvs.push(uv(1.0, turn));
+    }
+    for segment in 0..DISK_SEGMENTS {
+        let middle = mesh.positions.len() as u32;
+        mesh.positions.push(Vec3::ZERO);
+        mesh.uvs.push(uv(0.0, (segment as f32 + 0.5) / DISK_SEGMENTS as f32));
+        mesh.triangles.push([middle, segment, segment + 1]);
+    }
+    mesh
+}
+
+/// Gives every triangle of a mesh without texture coordinates the same ones, and so corners of its own.
+pub(super) fn give_each_triangle(mesh: &mut Mesh, uvs: [Vec2; 3]) {
+    fn apart<T: Copy>(values: &mut Vec<T>, triangles: &[[u32; 3]]) {
+        if !values.is_empty() {
+            *values = triangles.iter().flatten().map(|&index| values[index as usize]).collect();
+        }
+    }
+    let triangles = std::mem::take(&mut mesh.triangles);
+    apart(&mut mesh.positions, &triangles);
+    apart(&mut mesh.normals, &triangles);
+    apart(&mut mesh.tangents, &triangles);
+    apart(&mut mesh.colors, &triangles);
+    mesh.uvs = triangles.iter().flat_map(|_| uvs).collect();
+    mesh.triangles =
+        (0..triangles.len() as u32).map(|triangle| [0, 1, 2].map(|corner| 3 * triangle + corner)).collect();
+}
+
 /// A sphere as a mesh, for transforms that do not leave it a sphere.
 pub fn sphere(center: Vec3, radius: f32) -> Mesh {
     let mut mesh = Mesh { name: "sphere".to_owned(), ..Mesh::default() };

@@ -4,6 +4,7 @@
 //! once. 8-bit pictures stay bytes (4 a texel), all others become linear floats (16 a texel).
 
 use super::LoadOptions;
+pub(super) use super::adjust::Adjust;
 use super::error::{LoadError, Place};
 use super::texture_memory::{self, Alpha, Extent};
 use crate::exr_read;
@@ -30,44 +31,6 @@ pub(super) enum Picture {
     Memory { name: String, bytes: Arc<Vec<u8>> },
     /// Linear texels made by a loader, as the bits of their floats.
     Texels { name: String, size: [u32; 2], bits: Arc<Vec<[u32; 4]>> },
-}
-
-/// What is done to a picture's linear values before anything else sees them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) struct Adjust {
-    /// 1 minus the value.
-    pub(super) invert: bool,
-    /// Exponent of the (inverted) value, as the bits of an f32.
-    pub(super) exponent_bits: u32,
-}
-
-impl Adjust {
-    /// Values as they are.
-    pub(super) const NONE: Self = Self { invert: false, exponent_bits: 1.0_f32.to_bits() };
-
-    fn apply(self, picture: Decoded) -> Decoded {
-        if self == Self::NONE {
-            return picture;
-        }
-        let exponent = f32::from_bits(self.exponent_bits);
-        let change = |value: f32| {
-            let value = if self.invert { 1.0 - value } else { value };
-            if exponent == 1.0 { value } else { value.max(0.0).powf(exponent) }
-        };
-        let linear = |[r, g, b, a]: [f32; 4]| [change(r), change(g), change(b), a];
-        let texels = match &picture.texels {
-            Texels::Floats(floats) => floats.iter().map(|&texel| linear(texel)).collect(),
-            Texels::Bytes(bytes, encoding) => {
-                let decode = |byte: u8| match encoding {
-                    Encoding::Srgb => texture::srgb_to_linear(f32::from(byte) / 255.0),
-                    Encoding::Linear => f32::from(byte) / 255.0,
-                };
-                let texel = |&[r, g, b, a]: &[u8; 4]| linear([decode(r), decode(g), decode(b), f32::from(a) / 255.0]);
-                bytes.iter().map(texel).collect()
-            }
-        };
-        Decoded { texels: Texels::Floats(Arc::new(texels)), ..picture }
-    }
 }
 
 /// What to do when the file is not there at all. (A damaged one is always an error.)
@@ -277,9 +240,16 @@ impl Decoded {
 
 /// Whether a file is a picture with an alpha channel, by its header.
 pub(super) fn has_alpha(path: &Path) -> bool {
-    let decoder =
-        ImageReader::open(path).ok().and_then(|reader| reader.with_guessed_format().ok()?.into_decoder().ok());
-    decoder.is_some_and(|decoder| decoder.color_type().has_alpha())
+    color_type(path).is_some_and(|color| color.has_alpha())
+}
+
+/// Whether a file is a picture that is grey by its header.
+pub(super) fn is_grey(path: &Path) -> bool {
+    color_type(path).is_some_and(|color| !color.has_color())
+}
+
+fn color_type(path: &Path) -> Option<image::ColorType> {
+    Some(ImageReader::open(path).ok()?.with_guessed_format().ok()?.into_decoder().ok()?.color_type())
 }
 
 /// Decodes one picture.

@@ -16,6 +16,9 @@ const DEEPEST: usize = 64;
 /// Most elements of a document.
 const MOST_NODES: u32 = 4_000_000;
 
+/// Most bytes of a text after its `$name` were replaced: values that hold values grow without bounds.
+const LONGEST_VALUE: usize = 1 << 12;
+
 /// An element.
 #[derive(Debug)]
 pub(super) struct Element {
@@ -93,7 +96,12 @@ impl TreeBuilder<'_, '_> {
                     let root = read(&file, self.defaults, self.includes + 1).map_err(|error| {
                         if self.includes == 0 { error.referenced_from(converted.place()) } else { error }
                     })?;
-                    element.children.extend(root.children.iter().cloned());
+                    // A scene lends what it holds, any other file is one element.
+                    if root.tag == "scene" {
+                        element.children.extend(root.children.iter().cloned());
+                    } else {
+                        element.children.push(root);
+                    }
                 }
                 _ => element.children.push(converted),
             }
@@ -121,6 +129,10 @@ impl TreeBuilder<'_, '_> {
                 LoadError::invalid_at(place.clone(), problem)
             })?;
             result.push_str(value);
+            if result.len() > LONGEST_VALUE {
+                let problem = format!("with its values in place the text has more than {LONGEST_VALUE} bytes");
+                return Err(LoadError::invalid_at(place.clone(), problem));
+            }
             rest = after;
         }
         result.push_str(rest);
@@ -169,6 +181,11 @@ impl Element {
         Some(found)
     }
 
+    /// Says that something has asked for the element.
+    pub(super) fn mark_used(&self) {
+        self.used.set(true);
+    }
+
     /// Every child with this tag.
     pub(super) fn tagged<'e>(&'e self, tag: &'e str) -> impl Iterator<Item = &'e Rc<Element>> {
         self.children.iter().filter(move |child| child.tag == tag).inspect(|child| child.used.set(true))
@@ -209,7 +226,7 @@ impl Element {
 
     pub(super) fn boolean_or(&self, name: &str, default: bool) -> Result<bool, LoadError> {
         let Some(child) = self.child(name) else { return Ok(default) };
-        match child.require("value")?.trim() {
+        match child.require("value")?.trim().to_ascii_lowercase().as_str() {
             "true" => Ok(true),
             "false" => Ok(false),
             other => Err(child.error(format_args!("expected true or false, found \"{other}\""))),

@@ -86,7 +86,7 @@ impl Reader {
     /// Sky, sun or both, by our own model of a clear day in cd/m² ([`sky`]).
     fn sky(&mut self, emitter: &Element, kind: &str, to_world: &Affine3A) -> Result<(), LoadError> {
         // Version 3 has its zenith along +z, the dialects before it along +y; our model's is +y.
-        let to_model = if self.zenith_is_z { Mat3::from_rotation_x(-FRAC_PI_2) } else { Mat3::IDENTITY };
+        let to_model = if self.since_2 { Mat3::from_rotation_x(-FRAC_PI_2) } else { Mat3::IDENTITY };
         let from_world = to_model * rotation(to_world).transpose();
         let towards_sun = match emitter.vector("sundirection")? {
             Some(direction) => {
@@ -104,15 +104,18 @@ impl Reader {
         emitter.ignore(&["year", "month", "day", "hour", "minute", "second", "latitude", "longitude", "timezone"]);
         emitter.ignore(&["resolution", "sunaperture", "complexsun", "stretch", "extend", "sunradiusscale"]);
         let elevation = towards_sun.y.clamp(-1.0, 1.0).asin().to_degrees();
-        if elevation < 0.0 {
-            self.builder.note(format!("{}: a sun below the horizon is raised to it.", emitter.place()));
-        }
         let turbidity = emitter.float_or("turbidity", 3.0)?;
         let scale = emitter.float_or("scale", 1.0)?;
         let [sky_scale, sun_scale] = [emitter.float_or("skyscale", 1.0)?, emitter.float_or("sunscale", 1.0)?];
         let albedo = self.color(emitter, "albedo", Meaning::Reflectance)?.unwrap_or(Vec3::splat(0.2));
+        if elevation < 0.0 {
+            self.builder
+                .note(format!("{}: a sun below the horizon gives no light, nor does its sky.", emitter.place()));
+            self.surround(Environment::constant(Vec3::ZERO));
+            return Ok(());
+        }
         let day = Sky {
-            sun_elevation_deg: elevation.max(0.0),
+            sun_elevation_deg: elevation,
             sun_azimuth_deg: towards_sun.x.atan2(-towards_sun.z).to_degrees(),
             turbidity: turbidity.clamp(2.0, 10.0),
             ground_albedo: super::super::luminance(albedo).clamp(0.0, 1.0),

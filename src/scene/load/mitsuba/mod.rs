@@ -3,18 +3,21 @@
 //! RGB as it stands, tables of spectra through the CIE observer. One-sided BSDFs scatter on both sides here. Integrators,
 //! samplers and reconstruction filters are fechner's.
 
+mod blend;
 mod bsdfs;
 mod element;
 mod emitters;
+mod primitives;
 mod sensor;
 mod serialized;
 mod shapes;
+mod surfaces;
 mod textures;
 mod transform;
 
 use super::LoadOptions;
 use super::builder::{Builder, IfDark};
-use super::error::{LoadError, suggestion};
+use super::error::{LoadError, Place, suggestion};
 use crate::scene::{Material, MaterialId, MeshId, Scene, Surface};
 use element::Element;
 use glam::{Affine3A, Vec3};
@@ -32,6 +35,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
         return Err(root.error("expected a <scene>"));
     }
     let mut reader = Reader {
+        main: path.to_owned(),
         builder: Builder::new(path),
         named: HashMap::new(),
         materials: HashMap::new(),
@@ -39,7 +43,8 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
         groups: HashMap::new(),
         current_group: None,
         made_vertices: 0,
-        zenith_is_z: root.attribute("version").is_none_or(|version| !version.trim_start().starts_with("0.")),
+        clips: None,
+        since_2: root.attribute("version").is_none_or(|version| !version.trim_start().starts_with("0.")),
     };
     reader.name_all(&root);
     for child in &root.children {
@@ -52,6 +57,9 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
                 if let Some(edges) = child.float("maxdepth")?.filter(|&edges| edges >= 1.0) {
                     reader.builder.note_depth(edges as i64 - 1);
                 }
+                if child.boolean_or("hideemitters", false)? {
+                    reader.builder.note(format!("{}: hide_emitters is not rendered: lights are seen.", child.place()));
+                }
                 reader.builder.note("Integrator, sampler and filter are fechner's own, not the file's.");
             }
             // Defined here, used by reference.
@@ -62,6 +70,10 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
             }
         }
     }
+    for mesh in &mut reader.builder.meshes {
+        mesh.bitangent_ignores_v = true;
+    }
+    reader.note_clips();
     reader.builder.nits_per_unit = ASSUMED_NITS_PER_UNIT;
     reader.builder.note(format!(
         "Radiance has no unit in this file: 1 is taken as {ASSUMED_NITS_PER_UNIT} cd/m² (--nits-per-unit changes it)."
@@ -70,6 +82,8 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
 }
 
 struct Reader {
+    /// The file that was asked for.
+    main: PathBuf,
     builder: Builder,
     named: HashMap<String, Rc<Element>>,
     /// By addresses of BSDF and emitter; 0 for none.
@@ -80,8 +94,10 @@ struct Reader {
     current_group: Option<Vec<(MeshId, MaterialId, Affine3A)>>,
     /// Of meshes that stand for disks and their like.
     made_vertices: usize,
-    /// Whether skies have their zenith along +z, as from version 2 on.
-    zenith_is_z: bool,
+    /// Whether the file is of version 2 or later: other defaults, and skies with their zenith along +z.
+    since_2: bool,
+    /// Where the first camera stands in the file, and its clipping distances.
+    clips: Option<(Place, [f32; 2])>,
 }
 
 impl Reader {
@@ -113,9 +129,11 @@ impl Reader {
         })
     }
 
-    /// A file that an element names, beside the file that it stands in.
+    /// A file that an element names: beside the file that it stands in, or beside the first one.
     fn file(&self, element: &Element, name: &str) -> PathBuf {
-        element.file.parent().unwrap_or(Path::new("")).join(name.replace('\\', "/"))
+        let beside = |file: &Path| file.parent().unwrap_or(Path::new("")).join(name.replace('\\', "/"));
+        let here = beside(&element.file);
+        if here.is_file() { here } else { beside(&self.main) }
     }
 
     /// The material of a shape; `None` where the surface is not there.
@@ -152,9 +170,10 @@ impl Reader {
         };
         let mut material = match (converted, &emitter) {
             (Some(material), _) => material,
+            // A sheet of air: light goes through as if nothing were there.
             (None, Some(_)) => {
-                let reflectance = crate::scene::ColorInput::constant(Vec3::ZERO);
-                Material::plain("null", Surface::Diffuse { reflectance })
+                let transmittance = crate::scene::ColorInput::constant(Vec3::ONE);
+                Material::plain("null", Surface::ThinDielectric { ior: 1.0, transmittance })
             }
             (None, None) if media.is_empty() => {
                 self.builder.note("Shapes with the BSDF \"null\" are not there.");

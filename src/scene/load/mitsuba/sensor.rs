@@ -1,6 +1,7 @@
 //! `<sensor>` and its `<film>`.
 
 use super::super::builder::NamedCamera;
+use super::super::default_view;
 use super::super::error::LoadError;
 use super::Reader;
 use super::element::{Element, canonical};
@@ -8,6 +9,8 @@ use super::transform;
 use crate::scene::{Camera, FilmDefaults, Projection, ScreenWindow};
 use glam::{Vec2, Vec3};
 
+/// Mitsuba's default.
+const FAR_CLIP: f32 = 1e4;
 /// Widest and highest picture that a file may ask for.
 const LONGEST_SIDE: f32 = 32_768.0;
 
@@ -29,12 +32,17 @@ impl Reader {
         if forward.cross(up).length() < 1e-5 {
             return Err(sensor.error("its transform cannot be undone"));
         }
+        let mut screen_window = ScreenWindow::centered(aspect);
         let projection = match kind.as_str() {
             "perspective" | "thinlens" => Projection::Perspective { vertical_fov_deg: vertical_fov(sensor, aspect)? },
             "orthographic" | "telecentric" => {
-                // The picture's width spans [−1, 1] of the camera's own x.
-                let width = 2.0 * to_world.matrix3.x_axis.length();
-                Projection::Orthographic { height: width / aspect }
+                // The picture's width spans [−1, 1] of the camera's own x, its pixels are square in the camera's coordinates.
+                let [x, y] = [to_world.matrix3.x_axis, to_world.matrix3.y_axis].map(|axis| axis.length());
+                if (x - y).abs() > 1e-5 * x {
+                    let across = Vec2::new(x / y, 1.0);
+                    screen_window = ScreenWindow { min: screen_window.min * across, max: screen_window.max * across };
+                }
+                Projection::Orthographic { height: 2.0 * y / aspect }
             }
             other => {
                 return Err(sensor.unsupported(format_args!(
@@ -44,28 +52,54 @@ impl Reader {
         };
         let shift =
             Vec2::new(sensor.float_or("principalpointoffsetx", 0.0)?, sensor.float_or("principalpointoffsety", 0.0)?);
-        let screen_window = (shift != Vec2::ZERO).then(|| {
-            let window = ScreenWindow::centered(aspect);
-            let moved = Vec2::new(-shift.x * 2.0 * aspect, shift.y * 2.0);
-            ScreenWindow { min: window.min + moved, max: window.max + moved }
-        });
+        let moved = Vec2::new(shift.x, -shift.y) * (screen_window.max - screen_window.min);
+        screen_window.min += moved;
+        screen_window.max += moved;
         let has_lens = matches!(kind.as_str(), "thinlens" | "telecentric");
         let aperture_radius = if has_lens { sensor.float_or("apertureradius", 0.0)?.max(0.0) } else { 0.0 };
-        let focus_distance = sensor.float_or("focusdistance", 1.0)?.max(1e-6);
-        sensor.ignore(&["nearclip", "farclip", "shutteropen", "shutterclose"]);
+        let clips = [sensor.float_or("nearclip", 0.01)?, sensor.float_or("farclip", FAR_CLIP)?];
+        let focus_distance = sensor.float_or("focusdistance", clips[1])?.max(1e-6);
+        sensor.ignore(&["shutteropen", "shutterclose"]);
         sensor.tagged("sampler").count();
         self.note_unused(&format!("sensor \"{kind}\""), sensor);
         let camera = Camera {
             projection,
-            screen_window,
+            screen_window: (screen_window != ScreenWindow::centered(aspect)).then_some(screen_window),
             // Mitsuba's x points to the left of the picture.
             mirrored: forward.cross(up).dot(left) > 0.0,
             aperture_radius,
             focus_distance,
             ..Camera::pinhole(to_world.translation.into(), forward, up, 40.0)
         };
+        if is_first {
+            self.clips = Some((sensor.place(), clips));
+        }
         self.builder.cameras.push(NamedCamera { name: sensor.name(), camera, aspect: None });
         Ok(())
+    }
+
+    /// Names clipping distances of the first camera that would cut something off, once everything is there.
+    pub(super) fn note_clips(&mut self) {
+        let (Some((place, [near, far])), Some(first)) = (self.clips.take(), self.builder.cameras.first()) else {
+            return;
+        };
+        let bounds = default_view::bounds(&self.builder.meshes, &self.builder.instances, &self.builder.spheres);
+        let (position, forward) = (first.camera.position, first.camera.forward);
+        let size = bounds.max - bounds.min;
+        let depths = (0..8).map(|corner| {
+            let [x, y, z] = [0, 1, 2].map(|axis| (corner >> axis & 1) as f32);
+            (bounds.min + size * Vec3::new(x, y, z) - position).dot(forward)
+        });
+        let (nearest, farthest) =
+            depths.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), depth| (low.min(depth), high.max(depth)));
+        // From inside a scene, what lies within a hundredth of it is seldom anything.
+        let least = if nearest > 0.0 { nearest } else { 0.01 * size.length() };
+        let cuts_near = farthest > 0.0 && near > least;
+        for (cuts, name, distance) in [(cuts_near, "near_clip", near), (far < farthest, "far_clip", far)] {
+            if cuts {
+                self.builder.note(format!("{place}: {name} {distance} cuts the scene: here nothing is cut."));
+            }
+        }
     }
 
     fn film(&mut self, sensor: &Element) -> Result<FilmDefaults, LoadError> {

@@ -74,7 +74,7 @@ fn parse(bytes: &[u8], version: u16) -> Option<Mesh> {
     }
     if flags & HAS_TEXTURE_COORDINATES != 0 {
         let coordinates = cursor.floats(vertices, 2, double)?;
-        mesh.uvs = coordinates.as_chunks::<2>().0.iter().map(|&[u, v]| Vec2::new(u, 1.0 - v)).collect();
+        mesh.uvs = coordinates.as_chunks::<2>().0.iter().map(|&uv| Vec2::from_array(uv)).collect();
     }
     if flags & HAS_COLORS != 0 {
         cursor.floats(vertices, 3, double)?;
@@ -147,7 +147,7 @@ mod tests {
         std::fs::write(&path, &bytes).unwrap();
         let mesh = read(&path, 0).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!((mesh.name.as_str(), mesh.triangles.as_slice()), ("quad", [[0, 1, 2]].as_slice()));
-        assert_eq!(mesh.uvs[2], Vec2::new(0.0, 0.0));
+        assert_eq!(mesh.uvs[2], Vec2::Y);
         assert!(read(&path, 1).unwrap_err().to_string().contains("there is no mesh 1"));
         for length in 1..bytes.len() {
             std::fs::write(&path, &bytes[..length]).unwrap();

@@ -4,15 +4,30 @@ use super::super::error::LoadError;
 use super::super::{obj, ply, shapes};
 use super::Reader;
 use super::element::Element;
-use super::serialized;
-use super::transform;
+use super::{primitives, serialized, transform};
 use crate::scene::{Instance, MaterialId, Mesh, MeshId, Sphere};
-use glam::{Affine3A, Mat3, Vec2, Vec3};
-use std::f32::consts::TAU;
+use glam::{Affine3A, Vec2, Vec3};
+use std::path::PathBuf;
 use std::rc::Rc;
 
-/// A mesh file as it is used: path, number of the mesh in it, normals of faces, turned over.
-pub(super) type MeshKey = (std::path::PathBuf, usize, bool, bool);
+/// A mesh file as it is used.
+#[derive(Clone, PartialEq, Eq, Hash)]
+pub(super) struct MeshKey {
+    file: PathBuf,
+    /// Number of the mesh in it.
+    number: usize,
+    /// Without normals of vertices.
+    faces: bool,
+    /// Turned over.
+    flip: bool,
+    /// Pictures upside down against what stands in the file.
+    flip_v: bool,
+    /// Placed by a transform that mirrors.
+    mirrored: bool,
+}
+
+/// Texture coordinates of a triangle's corners where a mesh has none.
+const BARYCENTRIC: [Vec2; 3] = [Vec2::ZERO, Vec2::X, Vec2::Y];
 
 impl Reader {
     /// Adds a shape.
@@ -26,12 +41,16 @@ impl Reader {
         if kind == "sphere" {
             return self.sphere(shape, &to_world, flip);
         }
-        let meshes = self.meshes(shape, &kind, flip)?;
+        let meshes = self.meshes(shape, &kind, flip, &to_world)?;
         let material = self.material_of(shape)?;
         self.note_unused(&format!("shape \"{kind}\""), shape);
         let Some(material) = material else { return Ok(()) };
-        for mesh in meshes {
-            self.place(mesh, material, to_world);
+        for id in meshes {
+            let mesh = &mut self.builder.meshes[id.0 as usize];
+            if mesh.uvs.is_empty() && self.builder.materials[material.0 as usize].reads_pictures() {
+                shapes::give_each_triangle(mesh, BARYCENTRIC);
+            }
+            self.place(id, material, to_world);
         }
         Ok(())
     }
@@ -51,9 +70,11 @@ impl Reader {
             return Ok(());
         }
         let to_world = transform::of(shape, "toworld")?;
-        let named: Vec<Rc<Element>> = shape.tagged("ref").cloned().collect();
-        for reference in named {
-            let group = self.resolve(&reference)?;
+        let mut groups: Vec<Rc<Element>> = shape.tagged("shape").cloned().collect();
+        for reference in shape.tagged("ref").cloned().collect::<Vec<_>>() {
+            groups.push(self.resolve(&reference)?);
+        }
+        for group in groups {
             let key = Rc::as_ptr(&group) as usize;
             if !self.groups.contains_key(&key) {
                 self.collect_group(&group)?;
@@ -84,17 +105,22 @@ impl Reader {
         Ok(())
     }
 
-    fn meshes(&mut self, shape: &Element, kind: &str, flip: bool) -> Result<Vec<MeshId>, LoadError> {
+    fn meshes(
+        &mut self,
+        shape: &Element,
+        kind: &str,
+        flip: bool,
+        to_world: &Affine3A,
+    ) -> Result<Vec<MeshId>, LoadError> {
         let mut mesh = match kind {
-            "obj" | "ply" | "serialized" => return self.mesh_file(shape, kind, flip),
-            // v runs up from the first corner, as our rectangle's does.
-            "rectangle" => shapes::rectangle(Vec3::new(-1.0, -1.0, 0.0), Vec3::X * 2.0, Vec3::Y * 2.0),
-            "cube" => shapes::cuboid(Vec3::NEG_ONE, Vec3::ONE),
-            "disk" => shapes::disk(Vec3::ZERO, Vec3::Z, 1.0),
+            "obj" | "ply" | "serialized" => return self.mesh_file(shape, kind, flip, mirrors(to_world)),
+            "rectangle" => primitives::rectangle(),
+            "cube" => primitives::cube(),
+            "disk" => primitives::disk(),
             "cylinder" => {
                 let from = shape.vector("p0")?.unwrap_or(Vec3::ZERO);
                 let to = shape.vector("p1")?.unwrap_or(Vec3::Z);
-                cylinder(from, to, positive(shape, "radius")?)
+                primitives::cylinder(from, to, positive(shape, "radius")?)
                     .ok_or_else(|| shape.error("p0 and p1 are the same point"))?
             }
             other => {
@@ -115,43 +141,56 @@ impl Reader {
     }
 
     /// Each file is read once for each way of using it.
-    fn mesh_file(&mut self, shape: &Element, kind: &str, flip: bool) -> Result<Vec<MeshId>, LoadError> {
+    fn mesh_file(&mut self, shape: &Element, kind: &str, flip: bool, mirrored: bool) -> Result<Vec<MeshId>, LoadError> {
         let Some(name) = shape.string("filename")? else { return Err(shape.error("a mesh needs a filename")) };
-        let faces = shape.boolean_or("facenormals", false)?;
-        let number = shape.float_or("shapeindex", 0.0)?.max(0.0) as usize;
-        shape.ignore(&["fliptexcoords", "maxsmoothangle", "srgb", "collapse"]);
-        let key: MeshKey = (self.file(shape, name), number, faces, flip);
+        shape.ignore(&["maxsmoothangle", "srgb", "collapse"]);
+        let key = MeshKey {
+            file: self.file(shape, name),
+            number: shape.float_or("shapeindex", 0.0)?.max(0.0) as usize,
+            faces: shape.boolean_or("facenormals", false)?,
+            flip,
+            flip_v: shape.boolean_or("fliptexcoords", kind == "obj")?,
+            mirrored,
+        };
         if let Some(ids) = self.mesh_files.get(&key) {
             return Ok(ids.clone());
         }
         let referenced = |error: LoadError| error.referenced_from(shape.place());
+        // Our readers of OBJ and PLY turn v over.
+        let flip_v = key.flip_v != (kind != "serialized");
         let ids: Vec<MeshId> = match kind {
             "obj" => {
-                let parts = obj::read_into(&mut self.builder, &key.0, false).map_err(referenced)?;
+                let parts = obj::read_into(&mut self.builder, &key.file, false).map_err(referenced)?;
                 parts.into_iter().map(|(mesh, _)| mesh).collect()
             }
             "ply" => {
-                let loaded = ply::read(&key.0).map_err(referenced)?;
+                let loaded = ply::read(&key.file).map_err(referenced)?;
                 for note in loaded.notes {
                     self.builder.note(note);
                 }
                 vec![self.builder.add_mesh(loaded.mesh)]
             }
             _ => {
-                let mesh = serialized::read(&key.0, number).map_err(referenced)?;
+                let mesh = serialized::read(&key.file, key.number).map_err(referenced)?;
                 vec![self.builder.add_mesh(mesh)]
             }
         };
         for id in &ids {
             let mesh = &mut self.builder.meshes[id.0 as usize];
-            if faces {
+            if key.faces {
                 mesh.normals.clear();
-            } else if mesh.normals.is_empty() {
+            }
+            // Without normals Mitsuba's front follows from where the corners end up in the world.
+            let goes_by_corners = mesh.normals.is_empty();
+            if goes_by_corners && !key.faces {
                 smooth(mesh);
             }
             shapes::face_along_normals(mesh);
-            if flip {
+            if flip != (key.mirrored && goes_by_corners) {
                 turn_over(mesh);
+            }
+            if flip_v {
+                primitives::flip_v(mesh);
             }
         }
         self.mesh_files.insert(key, ids.clone());
@@ -164,6 +203,8 @@ impl Reader {
         let material = self.material_of(shape)?;
         self.note_unused("shape \"sphere\"", shape);
         let Some(material) = material else { return Ok(()) };
+        // Mitsuba turns mirrored spheres inside out; only light and volumes show it here.
+        let flip = flip != (mirrors(to_world) && self.has_front(material));
         let placed = to_world.transform_point3(center);
         let scaled = shapes::similarity_scale(to_world).map(|scale| radius * scale);
         match scaled.filter(|radius| *radius > 0.0 && radius.is_finite() && placed.is_finite()) {
@@ -191,6 +232,12 @@ impl Reader {
         }
         Ok(())
     }
+
+    /// Whether it matters from which side a material is seen.
+    fn has_front(&self, material: MaterialId) -> bool {
+        let material = &self.builder.materials[material.0 as usize];
+        material.emission.factor != Vec3::ZERO || material.surface.interior_absorption().is_some()
+    }
 }
 
 fn positive(shape: &Element, name: &str) -> Result<f32, LoadError> {
@@ -198,30 +245,9 @@ fn positive(shape: &Element, name: &str) -> Result<f32, LoadError> {
     if value > 0.0 { Ok(value) } else { Err(shape.error(format_args!("\"{name}\" must be above 0, not {value}"))) }
 }
 
-/// Without caps, seen from outside.
-fn cylinder(from: Vec3, to: Vec3, radius: f32) -> Option<Mesh> {
-    const SEGMENTS: u32 = 128;
-    let axis = (to - from).try_normalize()?;
-    let (x, y) = axis.any_orthonormal_pair();
-    let frame = Mat3::from_cols(x, y, axis);
-    let frame = if frame.determinant() < 0.0 { Mat3::from_cols(y, x, axis) } else { frame };
-    let mut mesh = Mesh { name: "cylinder".to_owned(), ..Mesh::default() };
-    for segment in 0..=SEGMENTS {
-        let u = segment as f32 / SEGMENTS as f32;
-        let (sin, cos) = (TAU * u).sin_cos();
-        let normal = frame * Vec3::new(cos, sin, 0.0);
-        for (end, v) in [(from, 1.0), (to, 0.0)] {
-            mesh.positions.push(end + radius * normal);
-            mesh.normals.push(normal);
-            mesh.uvs.push(Vec2::new(u, v));
-        }
-    }
-    for segment in 0..SEGMENTS {
-        let low = 2 * segment;
-        mesh.triangles.push([low, low + 2, low + 1]);
-        mesh.triangles.push([low + 1, low + 2, low + 3]);
-    }
-    Some(mesh)
+/// Whether a transform exchanges left and right.
+fn mirrors(transform: &Affine3A) -> bool {
+    transform.matrix3.determinant() < 0.0
 }
 
 fn turn_over(mesh: &mut Mesh) {
@@ -248,18 +274,6 @@ fn smooth(mesh: &mut Mesh) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_cylinder_faces_outwards() {
-        let mesh = cylinder(Vec3::ZERO, Vec3::new(0.0, 2.0, 0.0), 0.5).unwrap();
-        for triangle in &mesh.triangles {
-            let [a, b, c] = triangle.map(|index| mesh.positions[index as usize]);
-            let middle = (a + b + c) / 3.0;
-            assert!((b - a).cross(c - a).dot(Vec3::new(middle.x, 0.0, middle.z)) > 0.0);
-        }
-        let area = shapes::area(&mesh, &Affine3A::IDENTITY);
-        assert!((area / (std::f64::consts::TAU * 0.5 * 2.0) - 1.0).abs() < 1e-3);
-    }
 
     #[test]
     fn smooth_normals_of_a_box_point_along_its_diagonals() {

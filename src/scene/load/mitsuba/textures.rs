@@ -2,7 +2,7 @@
 
 use super::super::error::LoadError;
 use super::super::spectrum::Spectrum;
-use super::super::texture::{Adjust, IfMissing, Picture, Request};
+use super::super::texture::{Adjust, IfMissing, Picture, Request, has_alpha, is_grey};
 use super::super::{files, luminance};
 use super::Reader;
 use super::element::{Element, canonical};
@@ -17,13 +17,29 @@ use std::rc::Rc;
 pub(super) enum Meaning {
     Reflectance,
     Coefficient,
+    /// A single number: colours mean their luminance.
+    Number,
     Light,
 }
+
+/// Deepest chain of textures and colours that use each other.
+const DEEPEST: usize = 16;
 
 impl Reader {
     /// A colour without texture.
     pub(super) fn color(&mut self, owner: &Element, name: &str, meaning: Meaning) -> Result<Option<Vec3>, LoadError> {
-        let Some(input) = self.color_input(owner, name, meaning)? else { return Ok(None) };
+        self.nested_color(owner, name, meaning, 0)
+    }
+
+    /// The same inside so many textures.
+    fn nested_color(
+        &mut self,
+        owner: &Element,
+        name: &str,
+        meaning: Meaning,
+        depth: usize,
+    ) -> Result<Option<Vec3>, LoadError> {
+        let Some(input) = self.nested_input(owner, name, meaning, depth)? else { return Ok(None) };
         if input.texture.is_some() {
             self.builder.note(format!("{}: \"{name}\": a texture is not rendered here: its factor.", owner.place()));
         }
@@ -37,11 +53,22 @@ impl Reader {
         name: &str,
         meaning: Meaning,
     ) -> Result<Option<ColorInput>, LoadError> {
+        self.nested_input(owner, name, meaning, 0)
+    }
+
+    /// The same inside so many textures.
+    fn nested_input(
+        &mut self,
+        owner: &Element,
+        name: &str,
+        meaning: Meaning,
+        depth: usize,
+    ) -> Result<Option<ColorInput>, LoadError> {
         let Some(child) = owner.child(name).cloned() else { return Ok(None) };
         let child = if child.tag == "ref" { self.resolve(&child)? } else { child };
         let value = || child.attribute("value").unwrap_or("");
         let color = match child.tag.as_str() {
-            "texture" => return self.texture(&child, meaning, 0).map(Some),
+            "texture" => return self.texture(&child, meaning, depth).map(Some),
             "float" | "integer" => Vec3::splat(child.numbers(value())?.first().copied().unwrap_or(0.0)),
             "rgb" => rgb(&child, value())?,
             "srgb" => {
@@ -64,7 +91,22 @@ impl Reader {
         Ok(Some(ColorInput::constant(color)))
     }
 
+    /// Light of the same power at all wavelengths, which is the equal-energy white and not RGB's own.
+    fn flat_light(&self, child: &Element, value: &str) -> Result<Vec3, LoadError> {
+        let flat = Spectrum::from_list(&[555.0, 1.0]).map_or(Vec3::ONE, |spectrum| spectrum.emission());
+        Ok(rgb(child, value)? * flat)
+    }
+
     fn spectrum(&mut self, child: &Element, value: &str, meaning: Meaning) -> Result<Vec3, LoadError> {
+        match child.kind().as_str() {
+            // The white of RGB.
+            "d65" => {
+                let color = self.nested_color(child, "color", Meaning::Coefficient, 1)?.unwrap_or(Vec3::ONE);
+                return Ok(color * child.float_or("scale", 1.0)?);
+            }
+            "uniform" => return Ok(Vec3::splat(child.float_or("value", 1.0)?)),
+            _ => {}
+        }
         let spectrum = if let Some(name) = child.attribute("filename") {
             let text = files::read_text(&self.file(child, name)).map_err(|e| e.referenced_from(child.place()))?;
             Spectrum::from_text(&text)
@@ -72,6 +114,8 @@ impl Reader {
             let numbers = value.split([',', ':', ' ', '\n', '\t', '\r']).filter(|word| !word.is_empty());
             let numbers: Result<Vec<f64>, _> = numbers.map(str::parse).collect();
             numbers.ok().and_then(|numbers| Spectrum::from_list(&numbers))
+        } else if self.since_2 && meaning == Meaning::Light && !value.contains('#') {
+            return self.flat_light(child, value);
         } else {
             return rgb(child, value);
         };
@@ -85,7 +129,7 @@ impl Reader {
         if matches!(child.tag.as_str(), "float" | "integer") {
             return Ok(owner.float(name)?.map(ScalarInput::constant));
         }
-        let Some(color) = self.color_input(owner, name, Meaning::Coefficient)? else { return Ok(None) };
+        let Some(color) = self.color_input(owner, name, Meaning::Number)? else { return Ok(None) };
         Ok(Some(ScalarInput { factor: luminance(color.factor), texture: color.texture.map(|lookup| (lookup, 0)) }))
     }
 
@@ -95,7 +139,7 @@ impl Reader {
         if let Some(child) = owner.child("opacity").cloned() {
             let child = if child.tag == "ref" { self.resolve(&child)? } else { child };
             if let Some(name) = child.string("filename")?
-                && super::super::texture::has_alpha(&self.file(&child, name))
+                && has_alpha(&self.file(&child, name))
                 && let Some((_, channel)) = &mut scalar.texture
             {
                 *channel = 3;
@@ -125,16 +169,16 @@ impl Reader {
         meaning: Meaning,
         depth: usize,
     ) -> Result<ColorInput, LoadError> {
-        if depth > 16 {
-            return Err(texture.error("textures are nested too deeply"));
+        if depth > DEEPEST {
+            return Err(texture.error("textures are nested too deeply, or one uses itself"));
         }
         let input = match texture.kind().as_str() {
             "bitmap" => self.bitmap(texture, meaning)?,
-            "checkerboard" => self.checkerboard(texture)?,
+            "checkerboard" => self.checkerboard(texture, meaning, depth)?,
             "scale" => {
                 let inner = texture.tagged("texture").next().cloned();
                 let factor = match texture.child("scale").is_some() {
-                    true => self.color(texture, "scale", Meaning::Coefficient)?.unwrap_or(Vec3::ONE),
+                    true => self.nested_color(texture, "scale", Meaning::Coefficient, depth + 1)?.unwrap_or(Vec3::ONE),
                     false => Vec3::ONE,
                 };
                 let inner = inner.ok_or_else(|| texture.error("a scale needs a texture inside"))?;
@@ -165,12 +209,14 @@ impl Reader {
         let one = |name: &str| if texture.child(name).is_some() { wrap(name) } else { Ok(both) };
         let raw = texture.boolean_or("raw", false)? || texture.float("gamma")?.is_some_and(|gamma| gamma == 1.0);
         let filter = texture.string("filtertype")?.map(canonical);
-        let encoding = if raw || meaning == Meaning::Coefficient && texture.child("gamma").is_some() {
-            Encoding::Linear
-        } else {
-            Encoding::Srgb
-        };
-        let mut lookup = mapping(texture)?;
+        let encoding =
+            if raw || matches!(meaning, Meaning::Coefficient | Meaning::Number) && texture.child("gamma").is_some() {
+                Encoding::Linear
+            } else {
+                Encoding::Srgb
+            };
+        let to_luminance = meaning == Meaning::Number && !is_grey(&file);
+        let mut lookup = self.mapping(texture)?;
         lookup.texture = self.builder.textures.add(Request {
             picture: Picture::File(file),
             encoding,
@@ -178,36 +224,54 @@ impl Reader {
             wrap_v: one("wrapmodev")?,
             nearest: filter.as_deref() == Some("nearest"),
             if_missing: IfMissing::Fail(texture.place()),
-            adjust: Adjust::NONE,
+            adjust: Adjust { to_luminance, ..Adjust::NONE },
         });
         Ok(ColorInput { factor: Vec3::ONE, texture: Some(lookup) })
     }
 
-    fn checkerboard(&mut self, texture: &Element) -> Result<ColorInput, LoadError> {
-        let first = self.color(texture, "color0", Meaning::Reflectance)?.unwrap_or(Vec3::splat(0.4));
-        let second = self.color(texture, "color1", Meaning::Reflectance)?.unwrap_or(Vec3::splat(0.2));
-        let [a, b] = [first, second].map(|color| color.extend(1.0).to_array());
-        let request = Request { nearest: true, ..Request::texels("checkerboard", [2, 2], &[b, a, a, b]) };
-        let mut lookup = mapping(texture)?;
+    fn checkerboard(&mut self, texture: &Element, meaning: Meaning, depth: usize) -> Result<ColorInput, LoadError> {
+        let mut color = |name: &str, default: f32| -> Result<[f32; 4], LoadError> {
+            let color = self.nested_color(texture, name, Meaning::Reflectance, depth + 1)?;
+            let color = color.unwrap_or(Vec3::splat(default));
+            let color = if meaning == Meaning::Number { Vec3::splat(luminance(color)) } else { color };
+            Ok(color.extend(1.0).to_array())
+        };
+        let (first, second) = (color("color0", 0.4)?, color("color1", 0.2)?);
+        let request =
+            Request { nearest: true, ..Request::texels("checkerboard", [2, 2], &[first, second, second, first]) };
+        let mut lookup = self.mapping(texture)?;
         lookup.texture = self.builder.textures.add(request);
         Ok(ColorInput { factor: Vec3::ONE, texture: Some(lookup) })
     }
+
+    /// `uscale` and its like or `to_uv`.
+    fn mapping(&mut self, texture: &Element) -> Result<TextureLookup, LoadError> {
+        let all = texture.float_or("uvscale", 1.0)?;
+        let scale = Vec2::new(texture.float_or("uscale", all)?, texture.float_or("vscale", all)?);
+        let offset = Vec2::new(texture.float_or("uoffset", 0.0)?, texture.float_or("voffset", 0.0)?);
+        let to_uv = transform::of(texture, "touv")?;
+        let [along_u, along_v] = [to_uv.matrix3.x_axis * scale.x, to_uv.matrix3.y_axis * scale.y];
+        let [along_u, along_v] = [along_u, along_v].map(|axis| Vec2::new(axis.x, axis.y));
+        let offset = offset + Vec2::new(to_uv.translation.x, to_uv.translation.y);
+        let (rotation, scale) = turn_and_stretch(along_u, along_v).unwrap_or_else(|| {
+            self.builder.note(format!("{}: the shear of its \"to_uv\" is not rendered.", texture.place()));
+            (0.0, Vec2::new(along_u.x, along_v.y))
+        });
+        Ok(TextureLookup { texture: TextureId(0), offset, rotation, scale })
+    }
 }
 
-/// `uscale` and its like or `to_uv`, for a v that runs up where ours runs down.
-fn mapping(texture: &Element) -> Result<TextureLookup, LoadError> {
-    let all = texture.float_or("uvscale", 1.0)?;
-    let mut scale = Vec2::new(texture.float_or("uscale", all)?, texture.float_or("vscale", all)?);
-    let mut offset = Vec2::new(texture.float_or("uoffset", 0.0)?, texture.float_or("voffset", 0.0)?);
-    let to_uv = transform::of(texture, "touv")?;
-    scale *= Vec2::new(to_uv.matrix3.x_axis.x, to_uv.matrix3.y_axis.y);
-    offset += Vec2::new(to_uv.translation.x, to_uv.translation.y);
-    Ok(TextureLookup {
-        texture: TextureId(0),
-        offset: Vec2::new(offset.x, 1.0 - scale.y - offset.y),
-        rotation: 0.0,
-        scale,
-    })
+/// The rotation and the scale before it that take the axes of u and v to these; `None` where they do not stay perpendicular.
+fn turn_and_stretch(along_u: Vec2, along_v: Vec2) -> Option<(f32, Vec2)> {
+    let (length_u, length_v) = (along_u.length(), along_v.length());
+    if along_u.dot(along_v).abs() > 1e-5 * length_u * length_v {
+        return None;
+    }
+    if along_u.y.abs() <= 1e-6 * length_u && along_v.x.abs() <= 1e-6 * length_v {
+        return Some((0.0, Vec2::new(along_u.x, along_v.y)));
+    }
+    let side = along_u.perp_dot(along_v).signum();
+    Some(((-along_u.y).atan2(along_u.x), Vec2::new(length_u, side * length_v)))
 }
 
 /// Three numbers, one for all, or #rrggbb under the sRGB curve.

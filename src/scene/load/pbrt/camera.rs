@@ -37,9 +37,9 @@ impl Reader<'_> {
         if !position.is_finite() || forward.cross(up).length() < 1e-5 {
             return Err(parameters.error("the camera's transform cannot be undone"));
         }
-        let aspect = parameters.float("frameaspectratio")?.filter(|&aspect| aspect > 0.0);
-        let aspect = aspect.unwrap_or(full.width as f32 / full.height as f32);
-        let window = match parameters.numbers(&["float"], "screenwindow")? {
+        let film_aspect = full.width as f32 / full.height as f32;
+        let aspect = parameters.float("frameaspectratio")?.filter(|&aspect| aspect > 0.0).unwrap_or(film_aspect);
+        let mut window = match parameters.numbers(&["float"], "screenwindow")? {
             // The shorter side spans [−1, 1].
             None => ScreenWindow {
                 min: -Vec2::new(aspect.max(1.0), (1.0 / aspect).max(1.0)),
@@ -50,7 +50,13 @@ impl Reader<'_> {
             }
             Some(_) => return Err(parameters.error("\"screenwindow\": expected [ left right bottom top ]")),
         };
-        let is_usual = window.min == -window.max && aspect >= 1.0 && window.max == Vec2::new(aspect, 1.0);
+        let stretch = stretch_of(&placed);
+        let across = match kind.as_str() {
+            "orthographic" => stretch.truncate(),
+            _ => stretch.truncate() / stretch.z,
+        };
+        window = ScreenWindow { min: window.min * across, max: window.max * across };
+        let is_usual = window == ScreenWindow::centered(film_aspect);
         let projection = match kind.as_str() {
             "perspective" | "realistic" => {
                 if kind == "realistic" {
@@ -74,8 +80,9 @@ impl Reader<'_> {
             projection,
             screen_window: (!is_usual || crop.is_some()).then(|| cropped(window, crop)),
             mirrored: forward.cross(up).dot(right) < 0.0,
-            aperture_radius: parameters.float_or("lensradius", 0.0)?.max(0.0),
-            focus_distance: parameters.float_or("focaldistance", 1e6)?.max(1e-6),
+            // A lens that a transform made oval is as large as the oval.
+            aperture_radius: parameters.float_or("lensradius", 0.0)?.max(0.0) * (stretch.x * stretch.y).sqrt(),
+            focus_distance: (parameters.float_or("focaldistance", 1e6)? * stretch.z).max(1e-6),
             motion: self.motion(&to_world).map(|m| m.since_open()),
             ..Camera::pinhole(position, forward, up, 40.0)
         };
@@ -165,6 +172,18 @@ impl Reader<'_> {
         }
         self.note_unread("film", &film);
         Ok(if ratio > 0.0 && ratio.is_finite() { ratio } else { 1.0 })
+    }
+}
+
+/// How much longer a camera's axes are in the world; alike, or 1, where rounding alone makes a difference.
+fn stretch_of(placed: &Affine3A) -> Vec3 {
+    const ROUNDING: f32 = 1e-5;
+    let [x, y, z] = [placed.x_axis, placed.y_axis, placed.z_axis].map(|axis| axis.length());
+    let stretch = Vec3::new(x, y, z);
+    match (stretch / x - 1.0).abs().max_element() < ROUNDING {
+        true if (x - 1.0).abs() < ROUNDING => Vec3::ONE,
+        true => Vec3::splat(x),
+        false => stretch,
     }
 }
 

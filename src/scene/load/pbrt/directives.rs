@@ -12,6 +12,8 @@ use std::rc::Rc;
 
 /// Deepest chain of includes.
 const DEEPEST_INCLUDE: usize = 32;
+/// What `Attribute` may set defaults of.
+const ATTRIBUTE_TARGETS: [&str; 5] = ["shape", "light", "material", "medium", "texture"];
 /// Scatterings of pbrt's paths where the file does not say.
 const DEFAULT_DEPTH: i64 = 5;
 
@@ -94,6 +96,10 @@ impl Reader<'_> {
             "TransformEnd" => self.pop("TransformBegin", directive, lexer.place(line))?,
             "Attribute" => {
                 let target = string(lexer, line)?;
+                if !ATTRIBUTE_TARGETS.contains(&target.as_str()) {
+                    let problem = format!("Attribute \"{target}\"{}", suggestion(&target, ATTRIBUTE_TARGETS));
+                    return Err(LoadError::invalid_at(lexer.place(line), problem));
+                }
                 let parameters = Parameters::read(lexer, line)?;
                 self.state.attributes.entry(target).or_default().extend(parameters.into_list());
             }
@@ -119,9 +125,11 @@ impl Reader<'_> {
                 self.in_world = true;
             }
             "WorldEnd" => {}
-            "Include" | "Import" => {
-                let name = string(lexer, line)?;
-                self.include(&name, lexer.place(line))?;
+            "Include" => self.include(&string(lexer, line)?, lexer.place(line))?,
+            "Import" => {
+                let state = self.state.clone();
+                self.include(&string(lexer, line)?, lexer.place(line))?;
+                self.state = state;
             }
             "ColorSpace" => {
                 let name = string(lexer, line)?;

@@ -226,6 +226,9 @@ impl Reader<'_> {
             ));
             ASSUMED_NITS_PER_UNIT
         };
+        for mesh in &mut self.builder.meshes {
+            mesh.bitangent_ignores_v = true;
+        }
         self.builder.nits_per_unit = nits / f64::from(self.exposure);
         self.builder.finish(path, IfDark::StudioWithoutLight, self.options)
     }

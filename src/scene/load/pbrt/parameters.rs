@@ -105,9 +105,13 @@ impl Parameters {
         LoadError::Unsupported { place: self.place(), problem: super::super::error::one_line(problem) }
     }
 
-    /// Appends defaults that an `Attribute` directive set.
+    /// Appends defaults that `Attribute` directives set, of each name the last.
     pub(super) fn with_defaults(mut self, defaults: &[Parameter]) -> Self {
-        self.list.extend_from_slice(defaults);
+        for default in defaults.iter().rev() {
+            if self.list.iter().all(|parameter| parameter.name != default.name) {
+                self.list.push(default.clone());
+            }
+        }
         self
     }
 

@@ -15,6 +15,9 @@ use std::f32::consts::{PI, TAU};
 const AROUND: u32 = 128;
 const ALONG: u32 = 64;
 
+/// pbrt's texture coordinates (0, 0), (1, 0), (1, 1) of triangles that have none, as our v runs.
+const UVS_OF_TRIANGLE: [Vec2; 3] = [Vec2::Y, Vec2::ONE, Vec2::X];
+
 /// A shape in its own coordinates.
 enum Shape {
     Mesh(Mesh),
@@ -92,6 +95,10 @@ impl Reader<'_> {
             Shape::Sphere(_) => return Ok(()),
         };
         let Some(material) = self.current_material(parameters, area)? else { return Ok(()) };
+        let shared = &mut self.builder.meshes[mesh.0 as usize];
+        if shared.uvs.is_empty() && self.builder.materials[material.0 as usize].reads_pictures() {
+            shapes::give_each_triangle(shared, UVS_OF_TRIANGLE);
+        }
         self.note_unread(&format!("shape \"{kind}\""), parameters);
         let name = self.builder.meshes[mesh.0 as usize].name.clone();
         match &self.current_object {
@@ -199,14 +206,17 @@ fn whole_sphere(radius: f32) -> Mesh {
     })
 }
 
-/// A disk faces +z; the whole one is our own shape.
+/// A disk faces +z; a whole one is a fan.
 fn disk(parameters: &Parameters) -> Result<Mesh, LoadError> {
     let radius = radius(parameters)?;
     let height = parameters.float_or("height", 0.0)?;
     let inner = parameters.float_or("innerradius", 0.0)?.clamp(0.0, radius);
     let turn = full_turn(parameters)?;
     if inner == 0.0 && turn >= TAU {
-        return Ok(shapes::disk(Vec3::Z * height, Vec3::Z, radius));
+        // pbrt's v is 0 at the rim.
+        let mut mesh = shapes::polar_disk(radius, |way, turn| Vec2::new(turn, way));
+        mesh.positions.iter_mut().for_each(|position| position.z = height);
+        return Ok(mesh);
     }
     Ok(grid(|u, v| {
         let (sin, cos) = (turn * u).sin_cos();

@@ -7,6 +7,7 @@ use super::inputs::Meaning;
 use super::parameters::Parameters;
 use crate::scene::{ColorInput, Encoding, ScalarInput, TextureLookup, Wrap};
 use glam::{Vec2, Vec3};
+use std::cell::OnceCell;
 use std::rc::Rc;
 
 /// Deepest chain of textures that use textures.
@@ -16,11 +17,14 @@ const DEEPEST: usize = 32;
 pub(super) struct Definition {
     kind: String,
     parameters: Parameters,
+    /// What it came to where it was used first: textures may be named many times over.
+    color: OnceCell<ColorInput>,
+    scalar: OnceCell<ScalarInput>,
 }
 
 impl Definition {
     pub(super) fn new(kind: &str, parameters: Parameters) -> Self {
-        Self { kind: kind.to_owned(), parameters }
+        Self { kind: kind.to_owned(), parameters, color: OnceCell::new(), scalar: OnceCell::new() }
     }
 }
 
@@ -33,6 +37,14 @@ impl Reader<'_> {
         depth: usize,
     ) -> Result<ColorInput, LoadError> {
         let definition = self.find_texture(user, "spectrum", name, depth)?;
+        if let Some(color) = definition.color.get() {
+            return Ok(*color);
+        }
+        let color = self.color_of(&definition, name, depth)?;
+        Ok(*definition.color.get_or_init(|| color))
+    }
+
+    fn color_of(&mut self, definition: &Definition, name: &str, depth: usize) -> Result<ColorInput, LoadError> {
         let parameters = &definition.parameters;
         match definition.kind.as_str() {
             "constant" => {
@@ -92,6 +104,14 @@ impl Reader<'_> {
         depth: usize,
     ) -> Result<ScalarInput, LoadError> {
         let definition = self.find_texture(user, "float", name, depth)?;
+        if let Some(scalar) = definition.scalar.get() {
+            return Ok(*scalar);
+        }
+        let scalar = self.scalar_of(&definition, name, depth)?;
+        Ok(*definition.scalar.get_or_init(|| scalar))
+    }
+
+    fn scalar_of(&mut self, definition: &Definition, name: &str, depth: usize) -> Result<ScalarInput, LoadError> {
         let parameters = &definition.parameters;
         match definition.kind.as_str() {
             "constant" => Ok(ScalarInput::constant(parameters.float_or("value", 1.0)?)),
@@ -222,6 +242,7 @@ impl Reader<'_> {
             Some(other) => return Err(parameters.error(format_args!("filter \"{other}\" is not known"))),
         };
         let scale = parameters.float_or("scale", 1.0)?;
+        let inverts = parameters.boolean_or("invert", false)?;
         let mut lookup = self.mapping(parameters)?;
         lookup.texture = self.builder.textures.add(Request {
             picture: Picture::File(file),
@@ -230,9 +251,14 @@ impl Reader<'_> {
             wrap_v: wrap,
             nearest,
             if_missing: IfMissing::Fail(parameters.place()),
-            adjust: Adjust { invert: parameters.boolean_or("invert", false)?, exponent_bits: exponent.to_bits() },
+            adjust: Adjust {
+                exponent_bits: exponent.to_bits(),
+                inverted_scale_bits: inverts.then_some(scale.to_bits()),
+                to_luminance: false,
+            },
         });
-        Ok((lookup, scale))
+        // Inverting is the last that pbrt does.
+        Ok((lookup, if inverts { 1.0 } else { scale }))
     }
 
     /// A picture that stands where a texture could, all of it over the unit square.

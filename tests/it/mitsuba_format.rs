@@ -1,0 +1,281 @@
+//! What Mitsuba's files mean; figures are those of Mitsuba 3.9.
+
+use fechner::scene::load::{LoadOptions, load};
+use fechner::scene::{Alpha, Material, Projection, Scene, ScreenWindow, Surface};
+use glam::{Vec2, Vec3};
+use std::path::Path;
+
+const LIGHT: &str = r#"<emitter type="constant"/>"#;
+const SQUARE_OBJ: &str =
+    "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n";
+const BARE_OBJ: &str = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3\nf 1 3 4\n";
+const SQUARE_PLY: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+property float u\nproperty float v\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+0 0 0 0 0.25\n1 0 0 1 0.25\n0 1 0 0 1\n3 0 1 2\n";
+
+/// A folder with two meshes and a picture that is green.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("square.obj"), SQUARE_OBJ).unwrap();
+    std::fs::write(folder.path().join("bare.obj"), BARE_OBJ).unwrap();
+    std::fs::write(folder.path().join("square.ply"), SQUARE_PLY).unwrap();
+    image::RgbImage::from_pixel(2, 2, image::Rgb([0, 255, 0])).save(folder.path().join("green.png")).unwrap();
+    folder
+}
+
+fn try_load(folder: &Path, version: &str, body: &str) -> Result<Scene, String> {
+    let path = folder.join("scene.xml");
+    std::fs::write(&path, format!("<scene version=\"{version}\">{body}</scene>")).unwrap();
+    load(&path, &LoadOptions::default()).map_err(|error| error.to_string())
+}
+
+fn scene(body: &str) -> Scene {
+    try_load(folder().path(), "3.0.0", &format!("{LIGHT}{body}")).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn material(bsdf: &str) -> Material {
+    let scene = scene(&format!(r#"<shape type="rectangle">{bsdf}</shape>"#));
+    scene.materials[scene.instances[0].material.0 as usize].clone()
+}
+
+fn has_note(scene: &Scene, text: &str) -> bool {
+    scene.notes.iter().any(|note| note.contains(text))
+}
+
+/// v = 0 is the picture's first row; OBJ alone is turned over, unless it says otherwise.
+#[test]
+fn pictures_lie_as_mitsuba_lays_them() {
+    let uv = |shape: &str, x: f32, y: f32| {
+        let scene = scene(shape);
+        let mesh = &scene.meshes[0];
+        mesh.uvs[mesh.positions.iter().position(|p| p.abs_diff_eq(Vec3::new(x, y, 0.0), 1e-6)).unwrap()]
+    };
+    let file = |kind: &str, flip: &str| {
+        let flip = if flip.is_empty() {
+            String::new()
+        } else {
+            format!(r#"<boolean name="flip_tex_coords" value="{flip}"/>"#)
+        };
+        format!(r#"<shape type="{kind}"><string name="filename" value="square.{kind}"/>{flip}</shape>"#)
+    };
+    assert_eq!(uv(r#"<shape type="rectangle"/>"#, -1.0, -1.0), Vec2::ZERO);
+    assert_eq!(uv(&file("obj", ""), -1.0, -1.0), Vec2::Y);
+    assert_eq!(uv(&file("obj", "False"), -1.0, -1.0), Vec2::ZERO);
+    assert_eq!(uv(&file("ply", ""), 0.0, 0.0), Vec2::new(0.0, 0.25));
+    assert_eq!(uv(&file("ply", "true"), 0.0, 0.0), Vec2::new(0.0, 0.75));
+}
+
+#[test]
+fn texture_transforms_are_followed() {
+    let lookup = |transform: &str| {
+        let picture = r#"<string name="filename" value="green.png"/>"#;
+        let texture = format!(r#"<texture name="reflectance" type="bitmap">{picture}{transform}</texture>"#);
+        let Surface::Diffuse { reflectance } = material(&format!(r#"<bsdf type="diffuse">{texture}</bsdf>"#)).surface
+        else {
+            panic!("diffuse")
+        };
+        reflectance.texture.unwrap()
+    };
+    let at = Vec2::new(0.3, 0.2);
+    let old = r#"<float name="vscale" value="2"/><float name="uoffset" value="0.5"/>"#;
+    assert!(lookup(old).transform(at).abs_diff_eq(Vec2::new(0.8, 0.4), 1e-6));
+    let turned = r#"<transform name="to_uv"><rotate z="1" angle="90"/><translate x="1"/></transform>"#;
+    assert!(lookup(turned).transform(at).abs_diff_eq(Vec2::new(0.8, 0.3), 1e-6));
+    let mirrored = r#"<transform name="to_uv"><scale x="1" y="-2"/><rotate z="1" angle="30"/></transform>"#;
+    let (sin, cos) = 30_f32.to_radians().sin_cos();
+    let expected = Vec2::new(cos * at.x + 2.0 * sin * at.y, sin * at.x - 2.0 * cos * at.y);
+    assert!(lookup(mirrored).transform(at).abs_diff_eq(expected, 1e-6));
+}
+
+#[test]
+fn a_checkerboards_first_colour_is_its_first_square() {
+    let scene = scene(
+        r#"<shape type="rectangle"><bsdf type="diffuse"><texture name="reflectance" type="checkerboard">
+<rgb name="color0" value="0.9"/><rgb name="color1" value="0.1"/></texture></bsdf></shape>"#,
+    );
+    for (uv, expected) in [([0.2, 0.2], 0.9), ([0.7, 0.2], 0.1), ([0.2, 0.7], 0.1), ([0.7, 0.7], 0.9)] {
+        assert_eq!(scene.textures[0].sample_rgba(Vec2::from_array(uv)).x, expected, "{uv:?}");
+    }
+}
+
+#[test]
+fn bsdfs_inside_others_keep_their_order() {
+    let dark = r#"<bsdf type="diffuse"><rgb name="reflectance" value="0.1"/></bsdf>"#;
+    let blend = r#"<bsdf type="diffuse" id="light"><rgb name="reflectance" value="0.9"/></bsdf>"#;
+    let scene = scene(&format!(
+        r#"{blend}<shape type="rectangle"><bsdf type="blendbsdf"><float name="weight" value="0.25"/><ref id="light"/>{dark}</bsdf></shape>"#
+    ));
+    let Surface::Mix { first, .. } = &scene.materials[0].surface else { panic!("{:?}", scene.materials[0]) };
+    let Surface::Diffuse { reflectance } = **first else { panic!("{first:?}") };
+    assert_eq!(reflectance.factor, Vec3::splat(0.9));
+}
+
+#[test]
+fn what_never_ends_is_refused() {
+    let folder = folder();
+    let refused = |body: &str| try_load(folder.path(), "3.0.0", body).unwrap_err();
+    let itself = r#"<texture type="checkerboard" id="a"><ref name="color0" id="a"/></texture>
+<shape type="rectangle"><bsdf type="diffuse"><ref name="reflectance" id="a"/></bsdf></shape>"#;
+    assert!(refused(itself).contains("scene.xml:1: <texture>: textures are nested too deeply, or one uses itself"));
+    let mut defaults = r#"<default name="v0" value="0123456789"/>"#.to_owned();
+    for n in 1..30 {
+        let last = format!("$v{}", n - 1);
+        defaults += &format!(r#"<default name="v{n}" value="{last}{last}{last}"/>"#);
+    }
+    assert!(refused(&defaults).contains("with its values in place"));
+}
+
+#[test]
+fn cameras_are_mitsubas() {
+    let camera = |kind: &str, inside: &str| {
+        let film =
+            r#"<film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="32"/></film>"#;
+        scene(&format!(r#"<sensor type="{kind}">{film}{inside}</sensor><shape type="rectangle"/>"#))
+    };
+    assert_eq!(camera("thinlens", "").camera.focus_distance, 1e4);
+    assert_eq!(camera("thinlens", r#"<float name="far_clip" value="7"/>"#).camera.focus_distance, 7.0);
+    let offset =
+        r#"<float name="principal_point_offset_x" value="0.25"/><float name="principal_point_offset_y" value="0.5"/>"#;
+    let window = ScreenWindow { min: Vec2::new(-0.5, -2.0), max: Vec2::new(1.5, 0.0) };
+    assert_eq!(camera("perspective", offset).camera.screen_window, Some(window));
+    let oblong = camera("orthographic", r#"<transform name="to_world"><scale x="2" y="1"/></transform>"#).camera;
+    assert_eq!(oblong.projection, Projection::Orthographic { height: 2.0 });
+    assert_eq!(oblong.screen_window, Some(ScreenWindow { min: Vec2::new(-2.0, -1.0), max: Vec2::new(2.0, 1.0) }));
+    assert!(!has_note(
+        &camera("perspective", r#"<transform name="to_world"><translate z="9"/></transform>"#),
+        "cuts the scene"
+    ));
+    let back = r#"<transform name="to_world"><translate z="-4"/></transform>"#;
+    assert!(!has_note(&camera("perspective", back), "cuts the scene"));
+    let clipped = camera("perspective", &format!(r#"{back}<float name="near_clip" value="4.1"/>"#));
+    assert!(has_note(&clipped, "near_clip 4.1 cuts the scene"), "{:?}", clipped.notes);
+}
+
+#[test]
+fn metals_have_the_versions_defaults() {
+    assert!(matches!(material(r#"<bsdf type="conductor"/>"#).surface, Surface::Mirror { .. }));
+    let eta = r#"<bsdf type="conductor"><rgb name="eta" value="0.2,0.9,1.1"/></bsdf>"#;
+    let Surface::Conductor { k, .. } = material(eta).surface else { panic!("a metal") };
+    assert_eq!(k, Vec3::ONE);
+    let old = format!(r#"{LIGHT}<shape type="rectangle"><bsdf type="conductor"/></shape>"#);
+    let old = try_load(folder().path(), "0.5.0", &old).unwrap();
+    assert!(matches!(old.materials[0].surface, Surface::Conductor { .. }));
+}
+
+#[test]
+fn principled_glass_refracts_and_thin_does_not() {
+    for (kind, refracts) in [("principled", true), ("principledthin", false)] {
+        let bsdf = format!(r#"<bsdf type="{kind}"><float name="spec_trans" value="1"/></bsdf>"#);
+        assert_eq!(material(&bsdf).surface.interior_absorption().is_some(), refracts, "{kind}");
+    }
+}
+
+#[test]
+fn masks_and_blends_cover_what_they_should() {
+    let plain = r#"<bsdf type="diffuse"/>"#;
+    let covers = |bsdf: &str| match material(bsdf).alpha {
+        Alpha::Blend { value } => value.factor,
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(covers(&format!(r#"<bsdf type="mask">{plain}</bsdf>"#)), 0.5);
+    let unseen = format!(r#"<bsdf type="mask"><float name="opacity" value="0"/>{plain}</bsdf>"#);
+    assert_eq!(
+        covers(&format!(r#"<bsdf type="blendbsdf"><float name="weight" value="0.25"/>{unseen}{plain}</bsdf>"#)),
+        0.25
+    );
+    assert_eq!(
+        covers(&format!(
+            r#"<bsdf type="blendbsdf"><float name="weight" value="0.25"/>{plain}<bsdf type="null"/></bsdf>"#
+        )),
+        0.75
+    );
+}
+
+/// Green is bright: a number from a colour is its luminance.
+#[test]
+fn numbers_from_colours_are_luminances() {
+    let scene = scene(
+        r#"<shape type="rectangle"><bsdf type="mask"><bsdf type="diffuse"/>
+<texture name="opacity" type="bitmap"><string name="filename" value="green.png"/></texture></bsdf></shape>"#,
+    );
+    let Alpha::Blend { value } = scene.materials[0].alpha else { panic!("a mask") };
+    assert!((value.evaluate(&scene.textures, Vec2::splat(0.5)) - 0.7152).abs() < 1e-4);
+}
+
+#[test]
+fn flat_light_is_the_equal_energy_white() {
+    let radiance = |version: &str, spectrum: &str| {
+        let emitter = format!(r#"<emitter type="constant">{spectrum}</emitter><shape type="rectangle"/>"#);
+        let scene = try_load(folder().path(), version, &emitter).unwrap_or_else(|error| panic!("{error}"));
+        scene.environment.unwrap().radiance(Vec3::Y)
+    };
+    let flat = r#"<spectrum name="radiance" value="2"/>"#;
+    assert!(radiance("3.0.0", flat).abs_diff_eq(2.0 * Vec3::new(1.205, 0.949, 0.909), 2e-3));
+    assert_eq!(radiance("0.5.0", flat), Vec3::splat(2.0));
+    let day = r#"<spectrum name="radiance" type="d65"><float name="scale" value="3"/></spectrum>"#;
+    assert_eq!(radiance("3.0.0", day), Vec3::splat(3.0));
+}
+
+#[test]
+fn a_lamp_of_nothing_lets_light_through() {
+    let lamp = material(r#"<emitter type="area"/><bsdf type="null"/>"#);
+    assert_eq!(lamp.emission.factor, Vec3::ONE);
+    assert!(matches!(lamp.surface, Surface::ThinDielectric { ior: 1.0, .. }), "{:?}", lamp.surface);
+}
+
+#[test]
+fn includes_are_elements_and_know_their_folder() {
+    let folder = folder();
+    let inner = folder.path().join("inner");
+    std::fs::create_dir(&inner).unwrap();
+    let shape = r#"<shape type="obj"><string name="filename" value="square.obj"/></shape>"#;
+    std::fs::write(inner.join("alone.xml"), shape).unwrap();
+    std::fs::write(inner.join("scene.xml"), format!("<scene version=\"3.0.0\">{shape}</scene>")).unwrap();
+    for name in ["alone", "scene"] {
+        let body = format!(r#"{LIGHT}<include filename="inner/{name}.xml"/>"#);
+        let scene = try_load(folder.path(), "3.0.0", &body).unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert_eq!(scene.instances.len(), 1, "{name}");
+    }
+}
+
+/// Without normals in the file the front is where the corners are seen counter-clockwise in the world.
+#[test]
+fn mirrors_turn_meshes_without_normals_over() {
+    let turned = |shape: &str| {
+        let scene = scene(&format!(
+            r#"<shape {shape}<transform name="to_world"><scale x="-1"/></transform><emitter type="area"/></shape>"#
+        ));
+        let [a, b, c] = scene.meshes[0].triangles[0].map(|index| scene.meshes[0].positions[index as usize]);
+        (b - a).cross(c - a).z < 0.0
+    };
+    assert!(turned(r#"type="obj"><string name="filename" value="bare.obj"/>"#));
+    assert!(!turned(r#"type="rectangle">"#));
+    let sphere = scene(
+        r#"<shape type="sphere"><transform name="to_world"><scale x="-1"/></transform><emitter type="area"/></shape>"#,
+    );
+    assert!(sphere.spheres.is_empty(), "an analytic sphere shines outwards");
+}
+
+#[test]
+fn groups_inside_their_instance_are_placed() {
+    let group = r#"<shape type="instance"><shape type="shapegroup"><shape type="rectangle"/></shape></shape>"#;
+    assert_eq!(scene(group).instances.len(), 1);
+}
+
+#[test]
+fn triangles_without_coordinates_have_barycentric_ones() {
+    let picture = r#"<texture name="reflectance" type="bitmap"><string name="filename" value="green.png"/></texture>"#;
+    let bare = r#"<shape type="obj"><string name="filename" value="bare.obj"/>"#;
+    let textured = scene(&format!(r#"{bare}<bsdf type="diffuse">{picture}</bsdf></shape>"#));
+    assert_eq!(textured.meshes[0].uvs[3..], [Vec2::ZERO, Vec2::X, Vec2::Y]);
+    assert!(scene(&format!("{bare}</shape>")).meshes[0].uvs.is_empty());
+}
+
+#[test]
+fn what_is_not_followed_is_named() {
+    let hidden = r#"<integrator type="path"><boolean name="hide_emitters" value="true"/></integrator>"#;
+    assert!(has_note(&scene(&format!(r#"{hidden}<shape type="rectangle"/>"#)), "hide_emitters"));
+    let night = r#"<emitter type="sunsky"><vector name="sun_direction" x="1" y="0" z="-0.3"/></emitter>"#;
+    let night = try_load(folder().path(), "3.0.0", &format!(r#"{night}<shape type="rectangle"/>"#)).unwrap();
+    assert!(night.lights.is_empty() && has_note(&night, "below the horizon gives no light"), "{:?}", night.notes);
+}

@@ -1,0 +1,104 @@
+//! What pbrt's files mean.
+
+use fechner::scene::load::{LoadOptions, load};
+use fechner::scene::{Projection, Scene, ScreenWindow, Surface};
+use glam::{Vec2, Vec3};
+use std::path::Path;
+
+const SQUARE: &str =
+    r#"Shape "trianglemesh" "integer indices" [0 1 2 0 2 3] "point3 P" [-1 -1 0 1 -1 0 1 1 0 -1 1 0] "#;
+
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let half = image::GrayImage::from_pixel(2, 2, image::Luma([128]));
+    half.save(folder.path().join("grey.png")).unwrap();
+    folder
+}
+
+fn try_load(folder: &Path, head: &str, world: &str) -> Result<Scene, String> {
+    let path = folder.join("scene.pbrt");
+    let film = r#"Film "rgb" "integer xresolution" 32 "integer yresolution" 32"#;
+    std::fs::write(&path, format!("{head} {film} WorldBegin LightSource \"infinite\"\n{world}\n")).unwrap();
+    load(&path, &LoadOptions::default()).map_err(|error| error.to_string())
+}
+
+fn scene(head: &str, world: &str) -> Scene {
+    try_load(folder().path(), head, world).unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn inner_attributes_win_and_wrong_ones_are_refused() {
+    let inner = r#"Attribute "shape" "float radius" 0.3 AttributeBegin Attribute "shape" "float radius" 2 Shape "sphere" AttributeEnd"#;
+    assert_eq!(scene("", inner).spheres[0].radius, 2.0);
+    let wrong = try_load(folder().path(), "", r#"Attribute "shapes" "float radius" 2"#).unwrap_err();
+    assert!(wrong.contains(r#"scene.pbrt:2: Attribute "shapes"; did you mean "shape"?"#), "{wrong}");
+}
+
+#[test]
+fn imports_keep_their_state_to_themselves() {
+    let folder = folder();
+    std::fs::write(folder.path().join("part.pbrt"), "Translate 5 0 0\n").unwrap();
+    for (directive, x) in [("Import", 0.0), ("Include", 5.0)] {
+        let scene = try_load(folder.path(), "", &format!(r#"{directive} "part.pbrt" Shape "sphere""#)).unwrap();
+        assert_eq!(scene.spheres[0].center.x, x, "{directive}");
+    }
+}
+
+#[test]
+fn frames_and_scales_change_what_the_camera_sees() {
+    let camera = |head: &str| scene(head, SQUARE).camera;
+    let window = |x: f32, y: f32| Some(ScreenWindow { min: -Vec2::new(x, y), max: Vec2::new(x, y) });
+    let usual = camera(r#"LookAt 1 2 4 0 0 0 0 1 0 Camera "perspective""#);
+    assert_eq!(usual.screen_window, None);
+    assert_eq!(camera(r#"Camera "perspective" "float frameaspectratio" 2"#).screen_window, window(2.0, 1.0));
+    assert_eq!(camera(r#"Scale 0.5 0.5 1 Camera "orthographic""#).screen_window, window(2.0, 2.0));
+    assert_eq!(camera(r#"Scale 0.5 1 1 Camera "perspective""#).screen_window, window(2.0, 1.0));
+    let lens = camera(r#"Scale 2 2 2 Camera "perspective" "float lensradius" 0.8 "float focaldistance" 16"#);
+    assert_eq!((lens.screen_window, lens.aperture_radius, lens.focus_distance), (None, 0.4, 8.0));
+    assert_eq!(lens.projection, Projection::Perspective { vertical_fov_deg: 90.0 });
+}
+
+#[test]
+fn pictures_are_scaled_before_they_are_inverted() {
+    let texture = r#"Texture "q" "spectrum" "imagemap" "string filename" "grey.png" "bool invert" true "float scale" 0.5
+"string encoding" "linear" Material "diffuse" "texture reflectance" "q" "#;
+    let scene = scene("", &format!("{texture}{SQUARE}"));
+    let Surface::Diffuse { reflectance } = &scene.materials[0].surface else { panic!("diffuse") };
+    let seen = reflectance.evaluate(&scene.textures, Vec2::splat(0.5)).x;
+    assert!((seen - (1.0 - 0.5 * 128.0 / 255.0)).abs() < 1e-6, "{seen}");
+}
+
+#[test]
+fn a_whole_disk_has_pbrts_coordinates() {
+    let mesh = &scene("", r#"Shape "disk" "float radius" 2 "float height" 1"#).meshes[0];
+    let up = mesh.positions.iter().position(|p| p.abs_diff_eq(Vec3::new(0.0, 2.0, 1.0), 1e-5)).unwrap();
+    // A quarter turn, v = 0 at the rim; our v runs the other way.
+    assert!(mesh.uvs[up].abs_diff_eq(Vec2::new(0.25, 1.0), 1e-6), "{}", mesh.uvs[up]);
+}
+
+#[test]
+fn triangles_without_coordinates_have_pbrts() {
+    let texture = r#"Texture "q" "spectrum" "imagemap" "string filename" "grey.png" Material "diffuse" "texture reflectance" "q" "#;
+    let textured = scene("", &format!("{texture}{SQUARE}"));
+    assert_eq!(textured.meshes[0].uvs[..3], [Vec2::Y, Vec2::ONE, Vec2::X]);
+    assert!(scene("", SQUARE).meshes[0].uvs.is_empty());
+}
+
+/// Each level names the one before twice: 2^30 look-ups if each were followed.
+#[test]
+fn textures_are_followed_once_each() {
+    let mut world = r#"Texture "t0" "spectrum" "constant" "rgb value" [0.2 0.2 0.2] "#.to_owned();
+    for level in 1..=30 {
+        let last = level - 1;
+        world += &format!(r#"Texture "t{level}" "spectrum" "mix" "texture tex1" "t{last}" "texture tex2" "t{last}" "#);
+    }
+    scene("", &format!(r#"{world} Material "diffuse" "texture reflectance" "t30" {SQUARE}"#));
+}
+
+#[test]
+fn notes_of_many_lines_are_one() {
+    let scene = scene("", &"Shape \"sphere\" \"float odd\" 1\n".repeat(3));
+    let notes: Vec<&String> = scene.notes.iter().filter(|note| note.contains("odd")).collect();
+    assert_eq!(notes.len(), 1, "{notes:?}");
+    assert!(notes[0].ends_with("\"float odd\" (and 2 more like it)."), "{notes:?}");
+}
