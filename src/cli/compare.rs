@@ -8,7 +8,7 @@ use super::picture::InputPicture;
 use super::seeing::{SeeingArguments, tone_operator};
 use anyhow::{Result, bail};
 use clap::Args;
-use fechner::output;
+use fechner::output::{self, Format};
 use fechner_perception::csf;
 use fechner_perception::difference::{Difference, colour_difference};
 use fechner_perception::psychometric::detection_probability;
@@ -88,8 +88,11 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
     if arguments.fps.is_some() || arguments.velocity.is_some() {
         bail!("--fps and --velocity are for sequences, whose names have # for each digit of the frame's number");
     }
-    for target in arguments.map.iter().chain(&arguments.json) {
-        output::check_writable(target)?;
+    if let Some(map) = &arguments.map {
+        check_map(map)?;
+    }
+    if let Some(json) = &arguments.json {
+        output::check_writable(json)?;
     }
     let nits_per_unit = arguments.seeing.nits_per_unit;
     let reference = InputPicture::read(&arguments.reference, nits_per_unit)?;
@@ -133,6 +136,14 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
         figures.pixels_per_degree
     );
     Ok(ExitCode::from(u8::from(figures.seen.is_visible)))
+}
+
+/// Maps are pictures to look at.
+fn check_map(path: &Path) -> Result<()> {
+    if output::check_target(path)? != Format::Png {
+        bail!("{}: --map writes a picture to look at; end the name in .png", path.display());
+    }
+    Ok(())
 }
 
 /// Only pictures of one size and shape can be compared.
