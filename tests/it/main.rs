@@ -24,6 +24,7 @@
 //! - `farm`: many processes on one folder
 //! - `view`: the live preview, over its WebSocket
 //! - `texture_memory`: textures within a limit
+//! - `displayed`: pictures compared as the display shows them
 //! - `tonemap`: HDR pictures for displays, one by one and over time
 
 mod adaptive_render;
@@ -36,6 +37,7 @@ mod command_line;
 mod coverage;
 mod denoise;
 mod direct_light;
+mod displayed;
 mod farm;
 mod formats;
 mod furnace;
