@@ -20,7 +20,9 @@ use std::process::ExitCode;
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
 pub(super) struct CompareArguments {
-    /// The picture that is right; with # for each digit of a frame's number, a sequence of them: a.####.exr.
+    /// The picture that is right; with # for each digit of a frame's number, a sequence of them: a.####.exr. PNG and JPEG
+    /// files hold sRGB, or PQ where they say so, which colour management brings to the display; 16 bits without a tag are
+    /// the display's own codes.
     reference: PathBuf,
     /// The picture, or sequence, to be told from it.
     test: PathBuf,
