@@ -22,6 +22,7 @@ pub mod exr_read;
 pub mod farm;
 pub mod film;
 pub mod geometry;
+pub mod hdr_read;
 pub mod integrator;
 pub mod light;
 pub mod output;

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 pub use crate::eotf::Eotf;
 use crate::error::{Error, check_range};
+pub use crate::pixel_density::PixelDensity;
 
 /// A display at its viewing distance.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -36,47 +37,6 @@ pub struct Display {
 
 fn square() -> f64 {
     1.0
-}
-
-/// Pixels a degree of visual angle along both axes.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct PixelDensity {
-    /// Along a row.
-    pub horizontal: f64,
-    /// Along a column.
-    pub vertical: f64,
-}
-
-impl PixelDensity {
-    /// Of square pixels.
-    #[must_use]
-    pub fn square(pixels_per_degree: f64) -> Self {
-        Self { horizontal: pixels_per_degree, vertical: pixels_per_degree }
-    }
-
-    /// Of a picture with this many times the pixels along both axes.
-    #[must_use]
-    pub fn times(self, scale: f64) -> Self {
-        Self { horizontal: scale * self.horizontal, vertical: scale * self.vertical }
-    }
-
-    /// Along the finer axis.
-    #[must_use]
-    pub fn finest(self) -> f64 {
-        self.horizontal.max(self.vertical)
-    }
-
-    /// Along the coarser axis.
-    #[must_use]
-    pub fn coarsest(self) -> f64 {
-        self.horizontal.min(self.vertical)
-    }
-
-    /// The geometric mean: that of square pixels of the same area.
-    #[must_use]
-    pub fn mean(self) -> f64 {
-        (self.horizontal * self.vertical).sqrt()
-    }
 }
 
 struct Preset {
@@ -232,8 +192,27 @@ impl Display {
     /// black + ambient + (white − black) · relative.
     #[must_use]
     pub fn luminance_cd_m2(&self, relative: f64) -> f64 {
+        self.emitted_cd_m2(relative) + self.ambient_cd_m2
+    }
+
+    /// The part of it that is the display's own light: without what the screen reflects of the room's.
+    #[must_use]
+    pub fn emitted_cd_m2(&self, relative: f64) -> f64 {
         let light = if relative.is_nan() { 0.0 } else { relative.clamp(0.0, 1.0) };
-        self.black_cd_m2 + self.ambient_cd_m2 + (self.white_cd_m2 - self.black_cd_m2) * light
+        self.black_cd_m2 + (self.white_cd_m2 - self.black_cd_m2) * light
+    }
+
+    /// Linear light, 0 to 1, for which this display emits that luminance, as far as it can.
+    ///
+    /// ```
+    /// use fechner_perception::Display;
+    /// let display = Display::default();
+    /// assert!((display.relative_of_emitted(display.emitted_cd_m2(0.25)) - 0.25).abs() < 1e-12);
+    /// ```
+    #[must_use]
+    pub fn relative_of_emitted(&self, luminance_cd_m2: f64) -> f64 {
+        let span_cd_m2 = (self.white_cd_m2 - self.black_cd_m2).max(f64::MIN_POSITIVE);
+        ((luminance_cd_m2 - self.black_cd_m2) / span_cd_m2).clamp(0.0, 1.0)
     }
 
     /// Rejects a display that cannot be.
@@ -246,7 +225,13 @@ impl Display {
         check_range("pixels_per_degree", self.pixels_per_degree, 1.0, 1000.0, PPD)?;
         check_range("pixel_aspect_ratio", self.pixel_aspect_ratio, 0.1, 10.0, "between 0.1 and 10")?;
         check_range("white_cd_m2", self.white_cd_m2, 1e-3, 1e8, "between 0.001 and 1e8 cd/m²")?;
-        check_range("black_cd_m2", self.black_cd_m2, 0.0, self.white_cd_m2, "between 0 and white_cd_m2")?;
+        check_range(
+            "black_cd_m2",
+            self.black_cd_m2,
+            0.0,
+            self.white_cd_m2.next_down(),
+            "at least 0 and below white_cd_m2",
+        )?;
         check_range("ambient_cd_m2", self.ambient_cd_m2, 0.0, 1e8, LIGHT)?;
         check_range("frames_per_second", self.frames_per_second, 1.0, 1e4, "between 1 and 10000")?;
         check_range("persistence", self.persistence, 0.0, 1.0, "between 0 and 1")?;
@@ -396,6 +381,8 @@ mod tests {
     #[test]
     fn bad_files_say_why() {
         assert!(matches!(Display::from_toml("white_cd_m2 = -5"), Err(Error::OutOfRange { .. })));
+        let even = Display::from_toml("white_cd_m2 = 100\nblack_cd_m2 = 100");
+        assert!(even.unwrap_err().to_string().contains("below white_cd_m2"));
         assert!(matches!(Display::from_toml("colour = 'red'"), Err(Error::Parse { .. })));
         assert!(matches!(Display::from_toml("preset = 'wall'"), Err(Error::UnknownName { .. })));
         assert!(matches!(Display::from_toml("width_px = 1920"), Err(Error::Parse { .. })));

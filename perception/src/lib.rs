@@ -117,6 +117,7 @@ pub mod motion;
 mod noise_gain;
 pub mod opponent;
 pub mod photometry;
+mod pixel_density;
 mod plane;
 pub mod primaries;
 pub mod psychometric;

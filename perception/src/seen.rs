@@ -46,8 +46,8 @@ pub fn display_variance(fitted: &dyn FittedTone, display: &Display, mean: &Plane
 }
 
 /// Variance of a chromatic signal as displayed, (cd/m²)², for one of variance `variance` ((cd/m²)², of the mean) on scene
-/// luminance `mean` (cd/m²): operators keep the ratios of a colour's channels, so its signals scale as its luminance does.
-/// What a display's clip of single channels hides is not taken off.
+/// luminance `mean` (cd/m²), by what the operator leaves of a faint tint on a grey
+/// ([`FittedTone::chromatic_slope_at`]). What a display's clip of single channels hides is not taken off.
 ///
 /// Pixels that are not finite get infinity; so does every pixel when the planes differ in size.
 #[must_use]
@@ -115,8 +115,8 @@ impl Shown<'_> {
     }
 
     fn chromatic_slope(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
-        let luminance = scene_cd_m2.max(1e-6);
-        (self.cd_m2(pixel, luminance) - self.cd_m2(pixel, 0.0)) / luminance
+        let span_cd_m2 = (self.display.white_cd_m2 - self.display.black_cd_m2) as f32;
+        span_cd_m2 * self.fitted.chromatic_slope_at(pixel, scene_cd_m2)
     }
 
     fn variance(&self, pixel: Pixel, mean: f64, variance: f64) -> f32 {

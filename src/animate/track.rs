@@ -5,7 +5,7 @@
 
 use super::budget::Needs;
 use super::{SceneSource, ShotSettings};
-use crate::adaptive::judge::guide_luminance;
+use crate::adaptive::judge::guide_rgb;
 use crate::adaptive::plan::pilot_plan;
 use crate::checkpoint::PROGRAM;
 use crate::denoise::Denoiser;
@@ -15,7 +15,7 @@ use crate::scene::Scene;
 use crate::scene::hash::{ContentHash, content_hash};
 use crate::scene::load::LoadError;
 use fechner_perception::Plane;
-use fechner_perception::tone::{AdaptationState, Goal, SavedTone, SceneGuide, ToneOperator};
+use fechner_perception::tone::{AdaptationState, Goal, SavedTone, SceneGuide, SceneLight, ToneOperator};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -67,20 +67,19 @@ impl Track {
         for frame in shot.first..=shot.last {
             let scene = source.at(shot.seconds(f64::from(frame)))?;
             let hash = content_hash(&scene);
-            looks.push((hash, Look::at(scene, shot)));
+            looks.push((hash, Look::at(scene, shot, operator)));
             say(looks.len());
         }
         let goals: Vec<Goal> = looks.iter().map(|(_, look)| look.goal(shot)).collect();
         let fits: Vec<(Option<AdaptationState>, SavedTone)> = if operator.sees_adaptation() {
             let eyes = eyes(shot, operator, &goals);
             let fit = |look: &Look, eye: AdaptationState| {
-                let guide = look.full_size(shot);
-                operator.fit(&SceneGuide::of(&guide), &shot.viewing, Some(&eye)).save()
+                operator.fit(&Enlarged::of(&[look], shot).guide(), &shot.viewing, Some(&eye)).save()
             };
             looks.iter().zip(eyes).map(|((_, look), eye)| (Some(eye), fit(look, eye))).collect()
         } else {
-            let all = stacked(&looks.iter().map(|(_, look)| look).collect::<Vec<_>>(), shot);
-            let fitted = operator.fit(&SceneGuide::of(&all), &shot.viewing, None).save();
+            let all = Enlarged::of(&looks.iter().map(|(_, look)| look).collect::<Vec<_>>(), shot);
+            let fitted = operator.fit(&all.guide(), &shot.viewing, None).save();
             looks.iter().map(|_| (None, fitted.clone())).collect()
         };
         let frames = (shot.first..=shot.last)
@@ -160,13 +159,13 @@ fn eyes(shot: &ShotSettings, operator: &dyn ToneOperator, goals: &[Goal]) -> Vec
     states
 }
 
-/// A small, denoised picture of a frame's luminance, cd/m².
+/// A small, denoised picture of a frame.
 struct Look {
-    luminance: Plane,
+    light: SceneLight,
 }
 
 impl Look {
-    fn at(scene: Arc<Scene>, shot: &ShotSettings) -> Self {
+    fn at(scene: Arc<Scene>, shot: &ShotSettings, operator: &dyn ToneOperator) -> Self {
         let (width, height) = pilot_size(shot.trace.width, shot.trace.height);
         // The same seed in every frame: what noise is left changes with the scene, not with the frame's number.
         let settings = TraceSettings { width, height, crop: None, ..shot.trace };
@@ -174,17 +173,35 @@ impl Look {
         let mut film = Film::new(width, height);
         tracer.trace(&pilot_plan(&film, PILOT_SAMPLES), &mut film, &|_| {});
         let estimate = film.estimate(shot.nits_per_unit);
-        Self { luminance: guide_luminance(&film, &estimate) }
+        Self { light: SceneLight::of(operator, width as usize, &guide_rgb(&film, &estimate)) }
     }
 
     fn goal(&self, shot: &ShotSettings) -> Goal {
-        let scale = self.luminance.width() as f64 / f64::from(shot.trace.width);
-        Goal::of(&SceneGuide::of(&self.luminance), shot.viewing.display.pixel_density().times(scale))
+        let scale = self.light.luminance_cd_m2().width() as f64 / f64::from(shot.trace.width);
+        Goal::of(&self.light.guide(), shot.viewing.display.pixel_density().times(scale))
+    }
+}
+
+/// Some of the looks, one below the other, at the frames' own size, as operators that count degrees need it.
+struct Enlarged {
+    photopic: Plane,
+    scotopic: Option<Plane>,
+}
+
+impl Enlarged {
+    fn of(looks: &[&Look], shot: &ShotSettings) -> Self {
+        let count = looks.len().min(FITTED_FRAMES);
+        let some: Vec<SceneGuide<'_>> =
+            (0..count).map(|index| looks[index * looks.len() / count].light.guide()).collect();
+        let scotopic: Option<Vec<&Plane>> = some.iter().map(|guide| guide.scotopic_cd_m2).collect();
+        Self {
+            photopic: stacked(&some.iter().map(|guide| guide.luminance_cd_m2).collect::<Vec<_>>(), shot),
+            scotopic: scotopic.map(|planes| stacked(&planes, shot)),
+        }
     }
 
-    /// At the frame's own size, as operators that count degrees need it.
-    fn full_size(&self, shot: &ShotSettings) -> Plane {
-        stacked(&[self], shot)
+    fn guide(&self) -> SceneGuide<'_> {
+        SceneGuide { scotopic_cd_m2: self.scotopic.as_ref(), ..SceneGuide::of(&self.photopic) }
     }
 }
 
@@ -200,12 +217,11 @@ fn pilot_size(width: u32, height: u32) -> (u32, u32) {
     (scaled(width), scaled(height))
 }
 
-/// Some of the looks, one below the other, at the frames' own size.
-fn stacked(looks: &[&Look], shot: &ShotSettings) -> Plane {
-    let count = looks.len().min(FITTED_FRAMES);
+/// Small planes, one below the other, at the frames' own size.
+fn stacked(planes: &[&Plane], shot: &ShotSettings) -> Plane {
     let (width, height) = (shot.trace.width as usize, shot.trace.height as usize);
-    Plane::from_fn(width, height * count, |x, y| {
-        let small = &looks[y / height * looks.len() / count].luminance;
+    Plane::from_fn(width, height * planes.len(), |x, y| {
+        let small = planes[y / height];
         small.get(x * small.width() / width, y % height * small.height() / height)
     })
 }

@@ -10,7 +10,7 @@ use crate::sampler::Half;
 use crate::scene::hash::content_hash;
 use anyhow::{Context, Result};
 use fechner_perception::Plane;
-use fechner_perception::tone::{FittedTone, SceneGuide};
+use fechner_perception::tone::{FittedTone, SceneLight};
 use std::path::Path;
 
 /// Seed of references, far from those of arms.
@@ -101,9 +101,10 @@ impl Reference {
     /// What stratification makes of each pixel's displayed variance, by channel.
     fn display_factors(subject: &Subject, film: &Film) -> Result<[Plane; CHANNELS]> {
         let settings = subject.loop_settings()?;
-        let luminance = film.estimate(settings.nits_per_unit).luminance_cd_m2.map(|v| v.max(0.0));
-        let tone = settings.operator.fit(&SceneGuide::of(&luminance), &settings.viewing, None);
-        let scale = display_scale(film, &variance_shares(film), &luminance, tone.as_ref(), &settings, 1.0);
+        let estimate = film.estimate(settings.nits_per_unit);
+        let light = SceneLight::of(settings.operator.as_ref(), film.width() as usize, &estimate.rgb_cd_m2);
+        let tone = settings.operator.fit(&light.guide(), &settings.viewing, None);
+        let scale = display_scale(film, &variance_shares(film), light.luminance_cd_m2(), tone.as_ref(), &settings, 1.0);
         Ok(SampleStatistics::of(film, &scale).channels.map(|channel| channel.low_discrepancy_factor))
     }
 
@@ -124,8 +125,8 @@ impl Reference {
     /// The operator of the arms, fitted to the reference.
     pub(crate) fn fit(&self, subject: &Subject) -> Result<Box<dyn FittedTone>> {
         let settings = subject.loop_settings()?;
-        let luminance = self.luminance();
-        Ok(settings.operator.fit(&SceneGuide::of(&luminance), &subject.viewing, None))
+        let light = SceneLight::of(settings.operator.as_ref(), self.width, &self.rgb_cd_m2());
+        Ok(settings.operator.fit(&light.guide(), &subject.viewing, None))
     }
 
     fn to_bytes(&self) -> Vec<u8> {

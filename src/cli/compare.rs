@@ -8,7 +8,7 @@ use super::picture::InputPicture;
 use super::seeing::{SeeingArguments, tone_operator};
 use anyhow::{Result, bail};
 use clap::Args;
-use fechner::output;
+use fechner::output::{self, Format};
 use fechner_perception::csf;
 use fechner_perception::difference::{Difference, colour_difference};
 use fechner_perception::psychometric::detection_probability;
@@ -20,7 +20,9 @@ use std::process::ExitCode;
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
 pub(super) struct CompareArguments {
-    /// The picture that is right; with # for each digit of a frame's number, a sequence of them: a.####.exr.
+    /// The picture that is right; with # for each digit of a frame's number, a sequence of them: a.####.exr. PNG and JPEG
+    /// files hold sRGB, or PQ where they say so, which colour management brings to the display; 16 bits without a tag are
+    /// the display's own codes.
     reference: PathBuf,
     /// The picture, or sequence, to be told from it.
     test: PathBuf,
@@ -88,8 +90,11 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
     if arguments.fps.is_some() || arguments.velocity.is_some() {
         bail!("--fps and --velocity are for sequences, whose names have # for each digit of the frame's number");
     }
-    for target in arguments.map.iter().chain(&arguments.json) {
-        output::check_writable(target)?;
+    if let Some(map) = &arguments.map {
+        check_map(map)?;
+    }
+    if let Some(json) = &arguments.json {
+        output::check_writable(json)?;
     }
     let nits_per_unit = arguments.seeing.nits_per_unit;
     let reference = InputPicture::read(&arguments.reference, nits_per_unit)?;
@@ -133,6 +138,14 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
         figures.pixels_per_degree
     );
     Ok(ExitCode::from(u8::from(figures.seen.is_visible)))
+}
+
+/// Maps are pictures to look at.
+fn check_map(path: &Path) -> Result<()> {
+    if output::check_target(path)? != Format::Png {
+        bail!("{}: --map writes a picture to look at; end the name in .png", path.display());
+    }
+    Ok(())
 }
 
 /// Only pictures of one size and shape can be compared.

@@ -3,11 +3,13 @@
 use super::channels::{self, Colour};
 use anyhow::{Context, Result, bail};
 use fechner::exr_read::{ExrImage, read_exr};
-use fechner::output::{self, Attribute, NITS_PER_UNIT};
+use fechner::hdr_read::HdrHeader;
+use fechner::output::{self, Attribute, NITS_PER_UNIT, PngTransfer};
+use fechner_perception::Plane;
 use fechner_perception::display::{Display, Eotf, Viewing};
 use fechner_perception::photometry::luminance;
-use fechner_perception::tone::{FittedTone, SceneGuide, ToneOperator};
-use fechner_perception::{Plane, seen};
+use fechner_perception::tone::{FittedTone, SceneLight, ToneOperator, map_picture, map_pixels};
+use image::DynamicImage;
 use std::path::Path;
 
 /// A picture from a file.
@@ -20,12 +22,27 @@ pub(super) struct InputPicture {
     pixel_aspect_ratio: f64,
 }
 
+/// Brings scene light, cd/m², of a picture this wide to linear display RGB.
+type Mapping = fn(&dyn FittedTone, usize, &[[f32; 3]]) -> Vec<[f32; 3]>;
+
 /// What the values mean.
 #[derive(Clone, Copy, PartialEq)]
 enum Content {
     /// Linear radiance; RGB (1, 1, 1) has this luminance in cd/m².
     Scene { nits_per_unit: f64 },
-    /// Code values of a display, 0 to 1.
+    /// Code values, 0 to 1.
+    Display(Codes),
+}
+
+/// What code values mean.
+#[derive(Clone, Copy, PartialEq)]
+enum Codes {
+    /// Light of the display between its black and its white, under the curve of sRGB: colour management brings it to a display
+    /// of any other transfer function.
+    Srgb,
+    /// cd/m² in Rec.2020 primaries, under the curve of SMPTE ST 2084.
+    Pq,
+    /// What the display gets.
     Display,
 }
 
@@ -37,9 +54,9 @@ impl InputPicture {
             Some("exr") => Self::from_exr(path, &read_exr(path)?, nits_per_unit),
             Some("hdr") => {
                 let nits_per_unit = nits_per_unit.with_context(|| no_unit(path))?;
-                Self::from_image(path, Content::Scene { nits_per_unit })
+                Self::from_hdr(path, nits_per_unit)
             }
-            Some("png" | "jpg" | "jpeg") => Self::from_image(path, Content::Display),
+            Some("png" | "jpg" | "jpeg") => Self::from_codes(path),
             _ => bail!("{}: not a picture that can be judged: .exr, .hdr, .png and .jpg are read", path.display()),
         }
     }
@@ -63,19 +80,34 @@ impl InputPicture {
         Ok(Self { width, height, rgb: picture.rgb, content, pixel_aspect_ratio: exr.pixel_aspect_ratio })
     }
 
-    fn from_image(path: &Path, content: Content) -> Result<Self> {
-        let mut reader = image::ImageReader::open(path)
-            .and_then(image::ImageReader::with_guessed_format)
-            .with_context(|| format!("{}", path.display()))?;
-        let mut limits = image::Limits::default();
-        limits.max_image_width = Some(1 << 15);
-        limits.max_image_height = Some(1 << 15);
-        limits.max_alloc = Some(1 << 30);
-        reader.limits(limits);
-        let picture = reader.decode().with_context(|| format!("{}: not a readable picture", path.display()))?;
-        let picture = picture.into_rgb32f();
+    fn from_hdr(path: &Path, nits_per_unit: f64) -> Result<Self> {
+        let bytes = std::fs::read(path).with_context(|| format!("{}", path.display()))?;
+        let header = HdrHeader::of(&bytes);
+        let mut picture = Self::from_image(decoded_image(path, &bytes)?, Content::Scene { nits_per_unit });
+        picture.rgb.iter_mut().for_each(|rgb| *rgb = header.light(*rgb));
+        picture.pixel_aspect_ratio = header.pixel_aspect_ratio;
+        Ok(picture)
+    }
+
+    fn from_codes(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).with_context(|| format!("{}", path.display()))?;
+        let image = decoded_image(path, &bytes)?;
+        let codes = match output::png_transfer(path) {
+            PngTransfer::Pq => Codes::Pq,
+            PngTransfer::HybridLogGamma => bail!("{}: hybrid log-gamma is not read", path.display()),
+            PngTransfer::Untagged if bytes_a_channel(&image) > 1 => Codes::Display,
+            PngTransfer::Srgb | PngTransfer::Untagged => Codes::Srgb,
+        };
+        if image.color().has_alpha() && image.to_rgba32f().pixels().any(|pixel| pixel.0[3] < 1.0) {
+            eprintln!("note: {}: alpha is not looked at: each pixel is seen in the colour that it has", path.display());
+        }
+        Ok(Self::from_image(image, Content::Display(codes)))
+    }
+
+    fn from_image(image: DynamicImage, content: Content) -> Self {
+        let picture = image.into_rgb32f();
         let (width, height) = (picture.width() as usize, picture.height() as usize);
-        Ok(Self { width, height, rgb: picture.pixels().map(|p| p.0).collect(), content, pixel_aspect_ratio: 1.0 })
+        Self { width, height, rgb: picture.pixels().map(|p| p.0).collect(), content, pixel_aspect_ratio: 1.0 }
     }
 
     /// The viewing of this picture, whose pixels may be oblong: its lines are as dense as the display's and its columns closer
@@ -105,38 +137,36 @@ impl InputPicture {
 
     /// The operator fitted to this picture; `None` for one that is ready for the display.
     pub(super) fn fit(&self, operator: &dyn ToneOperator, viewing: &Viewing) -> Option<Box<dyn FittedTone>> {
-        let luminance_cd_m2 = self.scene_luminance()?;
-        Some(operator.fit(&SceneGuide::of(&luminance_cd_m2), viewing, None))
-    }
-
-    /// Luminance in cd/m² of the scene; `None` for a picture that is ready for the display.
-    pub(super) fn scene_luminance(&self) -> Option<Plane> {
-        let Content::Scene { nits_per_unit } = self.content else { return None };
-        Some(Plane::from_fn(self.width, self.height, |x, y| {
-            let value = luminance(self.rgb[y * self.width + x]) * nits_per_unit as f32;
-            if value.is_finite() { value.max(0.0) } else { 0.0 }
-        }))
+        let light = SceneLight::of(operator, self.width, &self.scene_rgb_cd_m2()?);
+        Some(operator.fit(&light.guide(), viewing, None))
     }
 
     /// Linear RGB in cd/m² that the display sends to the eye.
     pub(super) fn displayed_rgb(&self, tone: Option<&dyn FittedTone>, viewing: &Viewing) -> Vec<[f32; 3]> {
         let display = &viewing.display;
         let cd_m2 = |relative: f32| display.luminance_cd_m2(f64::from(relative)) as f32;
-        match (self.content, tone) {
-            (Content::Scene { nits_per_unit }, Some(tone)) => {
-                let light = |value: f32| if value.is_finite() { value.max(0.0) * nits_per_unit as f32 } else { 0.0 };
-                self.rgb.iter().map(|rgb| tone.map_rgb(rgb.map(light)).map(cd_m2)).collect()
-            }
-            _ => self.decoded(display).into_iter().map(|rgb| rgb.map(cd_m2)).collect(),
+        self.relative_rgb(tone, display, map_picture).into_iter().map(|rgb| rgb.map(cd_m2)).collect()
+    }
+
+    /// Linear display RGB, 0 the display's black and 1 its white; `map` brings a scene there.
+    fn relative_rgb(&self, tone: Option<&dyn FittedTone>, display: &Display, map: Mapping) -> Vec<[f32; 3]> {
+        match (self.scene_rgb_cd_m2(), tone) {
+            (Some(scene), Some(tone)) => map(tone, self.width, &scene),
+            _ => self.decoded(display),
         }
     }
 
-    /// Linear display RGB, 0 the display's black and 1 its white, of codes that are ready for the display.
+    /// The same of codes that are ready for the display.
     fn decoded(&self, display: &Display) -> Vec<[f32; 3]> {
-        if display.eotf == Eotf::Pq {
+        let eotf = match self.content {
+            Content::Display(Codes::Pq) => Eotf::Pq,
+            Content::Display(Codes::Display) => display.eotf,
+            Content::Display(Codes::Srgb) | Content::Scene { .. } => Eotf::Srgb,
+        };
+        if eotf == Eotf::Pq {
             return output::decode_pq(&self.rgb, display);
         }
-        let linear = |code: f32| display.eotf.decode(f64::from(code), display.white_cd_m2) as f32;
+        let linear = |code: f32| eotf.decode(f64::from(code), display.white_cd_m2) as f32;
         self.rgb.iter().map(|rgb| rgb.map(linear)).collect()
     }
 
@@ -158,19 +188,39 @@ impl InputPicture {
         self.rgb.iter().flat_map(|rgb| rgb.map(byte)).collect()
     }
 
-    /// Luminance in cd/m² that the display sends to the eye.
+    /// Luminance in cd/m² that the display sends to the eye, of the colours that it shows: those that it clips too.
     pub(super) fn displayed(&self, tone: Option<&dyn FittedTone>, viewing: &Viewing) -> Plane {
-        let display = &viewing.display;
-        match (self.scene_luminance(), tone) {
-            (Some(scene), Some(tone)) => seen::display_luminance(tone, display, &scene),
-            _ => {
-                let linear = self.decoded(display);
-                Plane::from_fn(self.width, self.height, |x, y| {
-                    display.luminance_cd_m2(f64::from(luminance(linear[y * self.width + x]))) as f32
-                })
-            }
-        }
+        self.luminance_of(&self.relative_rgb(tone, &viewing.display, map_picture), &viewing.display)
     }
+
+    /// The same without the operator's loss of acuity: for noise that is judged by an eye behind it.
+    pub(super) fn displayed_sharp(&self, tone: Option<&dyn FittedTone>, viewing: &Viewing) -> Plane {
+        self.luminance_of(&self.relative_rgb(tone, &viewing.display, map_pixels), &viewing.display)
+    }
+
+    fn luminance_of(&self, relative: &[[f32; 3]], display: &Display) -> Plane {
+        Plane::from_fn(self.width, self.height, |x, y| {
+            display.luminance_cd_m2(f64::from(luminance(relative[y * self.width + x]))) as f32
+        })
+    }
+}
+
+fn bytes_a_channel(image: &DynamicImage) -> u8 {
+    let color = image.color();
+    color.bytes_per_pixel() / color.channel_count()
+}
+
+/// A picture of a limited size, whatever its name says it is.
+fn decoded_image(path: &Path, bytes: &[u8]) -> Result<DynamicImage> {
+    let mut reader = image::ImageReader::new(std::io::Cursor::new(bytes))
+        .with_guessed_format()
+        .with_context(|| format!("{}", path.display()))?;
+    let mut limits = image::Limits::default();
+    limits.max_image_width = Some(1 << 15);
+    limits.max_image_height = Some(1 << 15);
+    limits.max_alloc = Some(1 << 30);
+    reader.limits(limits);
+    reader.decode().with_context(|| format!("{}: not a readable picture", path.display()))
 }
 
 /// A channel of the file's picture by its last name, all three from one layer.

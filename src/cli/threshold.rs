@@ -12,8 +12,9 @@ use fechner_perception::display::Glare;
 use fechner_perception::model::{self, ModelInputs};
 use fechner_perception::motion::image_velocity_deg_s;
 use fechner_perception::saliency::{SaliencyInputs, saliency};
-use fechner_perception::tone::ToneSettings;
-use fechner_perception::{Plane, ThresholdInputs, Viewing, csf, seen, threshold_map, tone};
+use fechner_perception::tone::acuity::BehindAcuity;
+use fechner_perception::tone::{FittedTone, ToneSettings};
+use fechner_perception::{ContrastSensitivity, Plane, ThresholdInputs, Viewing, csf, threshold_map};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `threshold`.
@@ -45,7 +46,7 @@ pub(super) struct ThresholdArguments {
     /// Threshold model.
     #[arg(long, value_name = "NAME", default_value = "csf-bands")]
     model: String,
-    /// Tone operator that shows scene-linear pictures.
+    /// Tone operator that shows scene-linear pictures; it is fitted to the input, or to the halves where only they are ones.
     #[arg(long, value_name = "NAME", default_value = "constant")]
     operator: String,
     #[command(flatten)]
@@ -65,15 +66,18 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     if let Some(frames_per_second) = arguments.fps {
         viewing.display.frames_per_second = frames_per_second;
     }
-    let nits_per_unit = arguments.seeing.nits_per_unit;
-    let guide = InputPicture::read(&arguments.input, nits_per_unit)?;
+    let guide = InputPicture::read(&arguments.input, arguments.seeing.nits_per_unit)?;
     let viewing = guide.viewed(&viewing).with_context(|| arguments.input.display().to_string())?;
-    let csf = csf::by_name(&arguments.seeing.csf, &viewing)?;
+    let halves = read_halves(arguments, &guide)?;
     let model = model::by_name(&arguments.model).with_context(|| {
         format!("there is no threshold model \"{}\"; known: {}", arguments.model, model::names().join(", "))
     })?;
     let operator = tone_operator(&arguments.operator, &ToneSettings::default())?;
-    let fitted = guide.fit(operator.as_ref(), &viewing);
+    let mut pictures = std::iter::once(&guide).chain(halves.iter().flatten());
+    let fitted = pictures.find_map(|picture| picture.fit(operator.as_ref(), &viewing));
+    // Noise goes through the loss of acuity that the operator shows.
+    let acuity = fitted.as_ref().and_then(|fitted| fitted.acuity());
+    let csf = BehindAcuity { csf: csf::by_name(&arguments.seeing.csf, &viewing)?, acuity };
     let shown = guide.displayed(fitted.as_deref(), &viewing);
     let motion = match &arguments.velocity {
         Some(_) if !model.knows_motion() => {
@@ -90,27 +94,19 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
         image_velocity_deg_s: motion.as_ref().map(|motion| &motion.image_velocity_deg_s),
         attention: motion.as_ref().and_then(|motion| motion.attention.as_ref()),
         viewing: &viewing,
-        csf: csf.as_ref(),
+        csf: &csf,
     };
     let threshold = model.allowed_standard_error_cd_m2(&inputs)?;
-    let map = threshold_map(
-        &ThresholdInputs { display_luminance_cd_m2: &shown, guide_variance: None },
-        &viewing,
-        csf.as_ref(),
-    )?;
+    let map =
+        threshold_map(&ThresholdInputs { display_luminance_cd_m2: &shown, guide_variance: None }, &viewing, &csf)?;
     let mut picture = Picture::new(shown.width() as u32, shown.height() as u32);
     picture.push_f32("threshold.Y", threshold.values());
     picture.push_f32("adaptation.Y", map.adaptation_cd_m2().values());
-    let visibility = match arguments.halves.as_deref() {
-        Some([a, b]) => {
-            let [a, b] = [a, b].map(|path| InputPicture::read(path, nits_per_unit));
-            let (a, b) = (a?, b?);
-            if a.size() != guide.size() || b.size() != guide.size() {
-                bail!("the halves do not have the size of {}", arguments.input.display());
-            }
-            Some(model.measured_visibility(&inputs, &half_difference(&a, &b, fitted.as_deref(), &viewing))?)
+    let visibility = match &halves {
+        Some(halves) => {
+            Some(model.measured_visibility(&inputs, &half_difference(halves, fitted.as_deref(), &viewing))?)
         }
-        _ => None,
+        None => None,
     };
     if let Some(visibility) = &visibility {
         picture.push_f32("visibility.Y", visibility.values());
@@ -137,21 +133,21 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     Ok(())
 }
 
-/// (A − B)/2 as the display shows it.
-fn half_difference(
-    a: &InputPicture,
-    b: &InputPicture,
-    fitted: Option<&dyn tone::FittedTone>,
-    viewing: &Viewing,
-) -> Plane {
-    match (a.scene_luminance(), b.scene_luminance(), fitted) {
-        (Some(a), Some(b), Some(fitted)) => {
-            let mean = a.combined(&b, |a, b| 0.5 * (a + b));
-            let difference = a.combined(&b, |a, b| 0.5 * (a - b));
-            seen::display_half_difference(fitted, &viewing.display, &mean, &difference)
-        }
-        _ => a.displayed(fitted, viewing).combined(&b.displayed(fitted, viewing), |a, b| 0.5 * (a - b)),
+/// The two renders, of the guide's size.
+fn read_halves(arguments: &ThresholdArguments, guide: &InputPicture) -> Result<Option<[InputPicture; 2]>> {
+    let Some([a, b]) = arguments.halves.as_deref() else { return Ok(None) };
+    let [a, b] = [a, b].map(|path| InputPicture::read(path, arguments.seeing.nits_per_unit));
+    let halves = [a?, b?];
+    if halves.iter().any(|half| half.size() != guide.size()) {
+        bail!("the halves do not have the size of {}", arguments.input.display());
     }
+    Ok(Some(halves))
+}
+
+/// (A − B)/2 as the display shows their colours.
+fn half_difference(halves: &[InputPicture; 2], fitted: Option<&dyn FittedTone>, viewing: &Viewing) -> Plane {
+    let [a, b] = halves.each_ref().map(|half| half.displayed_sharp(fitted, viewing));
+    a.combined(&b, |a, b| 0.5 * (a - b))
 }
 
 /// How what a picture shows moves.
@@ -167,7 +163,7 @@ impl Motion {
         path: &Path,
         by_saliency: bool,
         guide: &InputPicture,
-        fitted: Option<&dyn tone::FittedTone>,
+        fitted: Option<&dyn FittedTone>,
         viewing: &Viewing,
     ) -> Result<Self> {
         let [x, y] = read_velocity(path, guide.size(), viewing.display.frames_per_second)?;

@@ -22,15 +22,16 @@ pub(super) struct TonemapArguments {
     /// Pictures (.exr, .hdr); several are a sequence in time.
     #[arg(required = true, num_args = 1..)]
     input: Vec<PathBuf>,
-    /// .png as the display wants it (16-bit PQ for an HDR display), .exr in units of the display's white. The name of a
-    /// sequence has # for each digit of the frame's number: night.####.png.
+    /// .png (16-bit PQ for an HDR display, sRGB for all others, which colour management brings to them), .exr with what the
+    /// display emits in units of its white: `absolute` shows that as it is. The name of a sequence has # for each digit of the frame's number: night.####.png. Numbers are those in the inputs' names where all
+    /// have different ones, and else count from 1.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Tone operator, or "all" for a sheet with all of them.
     #[arg(long, value_name = "NAME|all")]
     operator: String,
     /// Exposure correction in stops.
-    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, value_parser = parse_stops, allow_negative_numbers = true)]
     exposure: f64,
     /// Luminance in cd/m² of RGB (1, 1, 1), for files that do not say it.
     #[arg(long, value_name = "CD_M2", value_parser = parse_positive, allow_negative_numbers = true)]
@@ -38,10 +39,11 @@ pub(super) struct TonemapArguments {
     /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file.
     #[arg(long, value_name = "NAME|FILE", default_value = "desktop")]
     display: String,
-    /// What the eye is adapted to: the view as a whole, or each place of it.
+    /// What the eye is adapted to: the view as a whole, or, for the operators that know it, each place of it.
     #[arg(long, value_enum, default_value = "world")]
     adaptation: Scope,
-    /// What else the eye loses, in place of what the operator's authors chose.
+    /// What else the eye loses, in place of what the operator's authors chose. ward-larson97 knows all three, ferwerda96
+    /// acuity.
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
     effects: Option<Vec<Effect>>,
 
@@ -71,9 +73,9 @@ enum Effect {
     Glare,
     /// Fine detail is lost in dim light.
     Acuity,
-    /// Colour is lost in dim light.
+    /// Colour is lost in dim light: ferwerda96, durand-dorsey00 and pattanaik00 always lose it.
     Colour,
-    /// Nothing is lost.
+    /// Nothing of all this but what the operator always loses.
     None,
 }
 
@@ -84,6 +86,15 @@ fn parse_pixel(text: &str) -> Result<Gaze, String> {
     let parsed =
         text.split_once(',').and_then(|(x, y)| Some(Pixel { x: x.trim().parse().ok()?, y: y.trim().parse().ok()? }));
     parsed.map(Gaze).ok_or_else(|| format!("\"{text}\" is not a pixel; expected X,Y such as 320,180"))
+}
+
+/// A number of stops that operators know.
+fn parse_stops(text: &str) -> Result<f64, String> {
+    const MOST_STOPS: f64 = 100.0;
+    match text.parse::<f64>() {
+        Ok(stops) if stops.abs() <= MOST_STOPS => Ok(stops),
+        _ => Err(format!("\"{text}\" is not a number of stops from -{MOST_STOPS} to {MOST_STOPS}")),
+    }
 }
 
 /// A picture in scene cd/m² with what operators look at.
@@ -135,11 +146,12 @@ pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
     let targets = targets(arguments)?;
     let format = output::check_target(&targets[0])?;
     let viewing = seeing::viewing(&arguments.display, None)?;
-    let settings = settings(arguments);
+    let settings = settings(arguments)?;
     if arguments.operator == "all" {
         return run_all(arguments, format, &targets, &viewing, &settings);
     }
     let operator = seeing::tone_operator(&arguments.operator, &settings)?;
+    check_settings(operator.as_ref(), &settings)?;
     let timed = arguments.input.len() > 1 || arguments.adapted_to.is_some() || arguments.state.is_some();
     if timed && arguments.adaptation == Scope::Local {
         bail!("--adaptation local has no course in time: leave it out for a sequence");
@@ -178,8 +190,11 @@ fn run_all(
     Ok(())
 }
 
-fn settings(arguments: &TonemapArguments) -> ToneSettings {
-    ToneSettings {
+fn settings(arguments: &TonemapArguments) -> Result<ToneSettings> {
+    if arguments.effects.as_ref().is_some_and(|list| list.len() > 1 && list.contains(&Effect::None)) {
+        bail!("--effects: none stands alone");
+    }
+    Ok(ToneSettings {
         exposure_stops: arguments.exposure,
         scope: match arguments.adaptation {
             Scope::World => AdaptationScope::World,
@@ -190,7 +205,41 @@ fn settings(arguments: &TonemapArguments) -> ToneSettings {
             acuity: list.contains(&Effect::Acuity),
             colour: list.contains(&Effect::Colour),
         }),
+    })
+}
+
+/// Operators that lose colour whatever is asked for.
+const ALWAYS_WITHOUT_COLOUR: [&str; 3] = ["ferwerda96", "durand-dorsey00", "pattanaik00"];
+
+/// Refuses what changes nothing of an operator.
+fn check_settings(operator: &dyn ToneOperator, settings: &ToneSettings) -> Result<()> {
+    let name = operator.name();
+    // Operators of different settings differ in their Debug form.
+    let with = |settings: ToneSettings| tone::operator_with(name, &settings).map(|operator| format!("{operator:?}"));
+    let is_known = |settings: ToneSettings| with(settings) != with(ToneSettings::default());
+    if settings.scope == AdaptationScope::Local
+        && !is_known(ToneSettings { scope: settings.scope, ..ToneSettings::default() })
+    {
+        bail!("--adaptation local: {name} knows no places");
     }
+    let Some(chosen) = settings.effects else { return Ok(()) };
+    let nothing = Effects::default();
+    let knows = |effect: Effects| {
+        let with = |effects| with(ToneSettings { effects: Some(effects), ..ToneSettings::default() });
+        with(effect) != with(nothing)
+    };
+    let effects = [
+        ("glare", chosen.glare, Effects { glare: true, ..nothing }),
+        ("acuity", chosen.acuity, Effects { acuity: true, ..nothing }),
+        ("colour", chosen.colour && !ALWAYS_WITHOUT_COLOUR.contains(&name), Effects { colour: true, ..nothing }),
+    ];
+    if let Some((effect, ..)) = effects.iter().find(|(_, is_chosen, effect)| *is_chosen && !knows(*effect)) {
+        bail!("--effects {effect}: {name} does not show it");
+    }
+    if chosen == nothing && !knows(Effects { glare: true, acuity: true, colour: true }) {
+        bail!("--effects none: there are none that {name} could leave out");
+    }
+    Ok(())
 }
 
 /// The eye of a sequence.
@@ -211,7 +260,7 @@ impl Eye {
         let mut is_between_frames = false;
         if let Some(path) = arguments.state.as_ref().filter(|path| path.exists()) {
             let text = std::fs::read_to_string(path).with_context(|| format!("{}", path.display()))?;
-            let read = serde_json::from_str(&text);
+            let read = serde_json::from_str(&text).ok().filter(AdaptationState::is_possible);
             state = Some(read.with_context(|| format!("{}: not an eye's state as tonemap leaves it", path.display()))?);
             is_between_frames = true;
         }
@@ -243,8 +292,20 @@ fn targets(arguments: &TonemapArguments) -> Result<Vec<PathBuf>> {
     if digits == 0 || !name.contains(&hashes) {
         bail!("{name}: the name of a sequence needs # for each digit of the frame's number, such as night.####.png");
     }
-    let number = |frame: usize| PathBuf::from(name.replace(&hashes, &format!("{frame:0digits$}")));
-    Ok((1..=arguments.input.len()).map(number).collect())
+    let target = |frame: u64| PathBuf::from(name.replace(&hashes, &format!("{frame:0digits$}")));
+    let numbers = frame_numbers(&arguments.input).unwrap_or_else(|| (1..=arguments.input.len() as u64).collect());
+    Ok(numbers.into_iter().map(target).collect())
+}
+
+/// The numbers at the end of the files' names, before what follows the last dot; `None` unless all have different ones.
+fn frame_numbers(files: &[PathBuf]) -> Option<Vec<u64>> {
+    let number = |file: &PathBuf| {
+        let stem = file.file_stem()?.to_str()?;
+        stem[stem.trim_end_matches(|c: char| c.is_ascii_digit()).len()..].parse().ok()
+    };
+    let numbers: Vec<u64> = files.iter().map(number).collect::<Option<_>>()?;
+    let different: std::collections::BTreeSet<u64> = numbers.iter().copied().collect();
+    (different.len() == numbers.len()).then_some(numbers)
 }
 
 fn write(
@@ -261,11 +322,13 @@ fn write(
         Format::Png => output::write_png_for(target, width, height, &shown, &viewing.display)?,
         Format::Exr => {
             let mut picture = Picture::new(width, height);
+            let display = &viewing.display;
+            // In units of white what the display emits, its black with it and the room's light without: value × unit is cd/m².
+            let emitted = |relative: f32| (display.emitted_cd_m2(f64::from(relative)) / display.white_cd_m2) as f32;
             for (channel, name) in ["R", "G", "B"].into_iter().enumerate() {
-                picture.push_f32(name, shown.iter().map(|pixel| pixel[channel]).collect::<Vec<_>>());
+                picture.push_f32(name, shown.iter().map(|pixel| emitted(pixel[channel])).collect::<Vec<_>>());
             }
-            let white = viewing.display.white_cd_m2 as f32;
-            picture.push_attribute(output::NITS_PER_UNIT, Attribute::Float(white));
+            picture.push_attribute(output::NITS_PER_UNIT, Attribute::Float(display.white_cd_m2 as f32));
             // Readers take text for UTF-8, the writer has Latin-1: only what both have in common is safe.
             let operator = fitted.describe().replace('²', "2").replace('×', "x");
             picture.push_attribute("fechner.operator", Attribute::Text(operator));

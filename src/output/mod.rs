@@ -15,7 +15,9 @@ mod srgb_codes;
 
 pub use beside::{remove_leftovers, write_beside};
 pub use exr_file::write_exr;
-pub use png_file::{decode_pq, encode_srgb8, write_png, write_png_for, write_png_with_alpha, write_pq_png};
+pub use png_file::{
+    PngTransfer, decode_pq, encode_srgb8, png_transfer, write_png, write_png_for, write_png_with_alpha, write_pq_png,
+};
 
 use fechner_perception::tone::FittedTone;
 use std::borrow::Cow;

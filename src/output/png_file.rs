@@ -37,7 +37,8 @@ const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 /// Writes what the display emits as a 16-bit PNG in PQ code values and Rec.2020 primaries, with the cICP chunk (PNG, third
 /// edition) that says so.
 ///
-/// Values are absolute: `rgb_linear_display` of 0 is the display's black, 1 its white, both in cd/m². NaN becomes black.
+/// Values are absolute: `rgb_linear_display` of 0 is the display's black, 1 its white, both in cd/m². What the screen reflects
+/// of the room is not in the codes, since it adds that by itself. NaN becomes black.
 pub fn write_pq_png(
     path: &Path,
     width: u32,
@@ -68,21 +69,49 @@ fn encode_pq16(rgb_linear_display: &[[f32; 3]], display: &Display) -> Vec<u8> {
     bytes.par_chunks_mut(6).zip(rgb_linear_display).with_min_len(4096).for_each(|(bytes, rgb)| {
         let shown = apply(&wide, rgb.map(|c| if c.is_nan() { 0.0 } else { f64::from(c) }));
         for (bytes, relative) in bytes.chunks_exact_mut(2).zip(shown) {
-            let code = Eotf::Pq.encode(display.luminance_cd_m2(relative) / PEAK_CD_M2, PEAK_CD_M2);
+            let code = Eotf::Pq.encode(display.emitted_cd_m2(relative) / PEAK_CD_M2, PEAK_CD_M2);
             bytes.copy_from_slice(&((code * 65_535.0).round() as u16).to_be_bytes());
         }
     });
     bytes
 }
 
-/// Linear display RGB, 0 the display's black and 1 its white, of the codes (0 to 1) that [`write_pq_png`] has written for the same
-/// display.
+/// Linear display RGB, 0 the display's black and 1 its white, of PQ codes (0 to 1) in Rec.2020 primaries, as [`write_pq_png`]
+/// writes them.
 pub fn decode_pq(codes: &[[f32; 3]], display: &Display) -> Vec<[f32; 3]> {
     let narrow = Primaries::REC2020.to(&Primaries::REC709).unwrap_or(IDENTITY);
-    let (dark, span) =
-        (display.black_cd_m2 + display.ambient_cd_m2, (display.white_cd_m2 - display.black_cd_m2).max(1e-6));
+    let (dark, span) = (display.black_cd_m2, (display.white_cd_m2 - display.black_cd_m2).max(1e-6));
     let relative = |code: f32| (Eotf::Pq.decode(f64::from(code), PEAK_CD_M2) * PEAK_CD_M2 - dark) / span;
     codes.par_iter().map(|codes| apply(&narrow, codes.map(relative)).map(|light| light as f32)).collect()
+}
+
+/// What the codes of a PNG file mean by its chunks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PngTransfer {
+    /// PQ in Rec.2020 primaries.
+    Pq,
+    /// Hybrid log-gamma.
+    HybridLogGamma,
+    /// sRGB, as anything else that is tagged is taken for.
+    Srgb,
+    /// Nothing says.
+    Untagged,
+}
+
+/// Reads the file's header; [`PngTransfer::Untagged`] for what is no PNG.
+pub fn png_transfer(path: &Path) -> PngTransfer {
+    let Ok(file) = std::fs::File::open(path) else { return PngTransfer::Untagged };
+    let Ok(reader) = png::Decoder::new(std::io::BufReader::new(file)).read_info() else {
+        return PngTransfer::Untagged;
+    };
+    let info = reader.info();
+    match info.coding_independent_code_points.map(|tag| tag.transfer_function) {
+        Some(16) => PngTransfer::Pq,
+        Some(18) => PngTransfer::HybridLogGamma,
+        Some(_) => PngTransfer::Srgb,
+        None if info.srgb.is_some() || info.gama_chunk.is_some() || info.icc_profile.is_some() => PngTransfer::Srgb,
+        None => PngTransfer::Untagged,
+    }
 }
 
 /// Writes linear display RGB, where 1 is the display's white, as an 8-bit PNG tagged sRGB.
@@ -180,6 +209,7 @@ mod tests {
         let path = folder.path().join("a.png");
         let pixels = [[0.0, 0.5, 1.0], [1.0, 0.0, 0.214_041_14]];
         write_png(&path, 2, 1, &pixels).unwrap();
+        assert_eq!(png_transfer(&path), PngTransfer::Srgb);
         let names = chunk_names(&std::fs::read(&path).unwrap());
         for name in ["sRGB", "gAMA", "cHRM"] {
             assert!(names.iter().any(|n| n == name), "{name} is missing from {names:?}");
@@ -192,15 +222,17 @@ mod tests {
         assert!((127..=128).contains(&image.get_pixel(1, 0).0[2]));
     }
 
-    /// In the display's gamut, down to its black, whatever the room adds.
+    /// In the display's gamut, down to its black; and the room, whose light the screen adds by itself, changes no code.
     #[test]
     fn pq_codes_come_back_as_light() {
-        let display = Display { ambient_cd_m2: 2.0, ..Display::preset("hdr-1000").unwrap() };
+        let dark_room = Display::preset("hdr-1000").unwrap();
+        let display = Display { ambient_cd_m2: 2.0, ..dark_room.clone() };
         let light = [[0.0; 3], [1.0; 3], [0.5, 0.02, 0.1], [1.0, 0.0, 0.0], [0.001, 0.3, 0.9]];
         let codes: Vec<[f32; 3]> = encode_pq16(&light, &display)
             .chunks_exact(6)
             .map(|bytes| [0, 2, 4].map(|at| f32::from(u16::from_be_bytes([bytes[at], bytes[at + 1]])) / 65_535.0))
             .collect();
+        assert_eq!(encode_pq16(&light, &dark_room), encode_pq16(&light, &display));
         for (found, light) in decode_pq(&codes, &display).iter().flatten().zip(light.iter().flatten()) {
             assert!((found - light).abs() < 1e-3, "{light} came back as {found}");
         }
@@ -212,6 +244,7 @@ mod tests {
         let path = folder.path().join("a.png");
         let display = Display::preset("hdr-1000").unwrap();
         write_png_for(&path, 3, 1, &[[1.0; 3], [0.0, f32::NAN, 0.0], [0.1, 0.0, 0.0]], &display).unwrap();
+        assert_eq!(png_transfer(&path), PngTransfer::Pq);
         let names = chunk_names(&std::fs::read(&path).unwrap());
         let place = |name: &str| names.iter().position(|n| n == name);
         assert!(place("cICP") > place("IHDR") && place("cICP") < place("IDAT"), "{names:?}");

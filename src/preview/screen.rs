@@ -13,8 +13,7 @@ use crate::integrator::PILOT_SAMPLES;
 use crate::output::encode_srgb8;
 use crate::sampler::Half;
 use fechner_perception::Plane;
-use fechner_perception::photometry::luminance;
-use fechner_perception::tone::{FittedTone, SavedTone, SceneGuide, map_picture};
+use fechner_perception::tone::{FittedTone, SavedTone, SceneLight, map_picture};
 use glam::Vec2;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -309,11 +308,10 @@ fn composed(film: &Film, nits_per_unit: f64, is_at_rest: bool) -> (Vec<[f32; 3]>
 
 /// The operator on a picture that was not looked at yet, of pixels `step` times as large as the display's.
 fn fit(settings: &LoopSettings, step: u32, width: usize, rgb_cd_m2: &[[f32; 3]]) -> Box<dyn FittedTone> {
-    let height = rgb_cd_m2.len() / width.max(1);
-    let guide = Plane::from_fn(width, height, |x, y| luminance(rgb_cd_m2[y * width + x]).max(0.0));
+    let light = SceneLight::of(settings.operator.as_ref(), width, rgb_cd_m2);
     let mut viewing = settings.viewing.clone();
     viewing.display.pixels_per_degree /= f64::from(step);
-    settings.operator.fit(&SceneGuide::of(&guide), &viewing, None)
+    settings.operator.fit(&light.guide(), &viewing, None)
 }
 
 #[cfg(test)]

@@ -27,6 +27,7 @@
 //! - `view`: the live preview, over its WebSocket
 //! - `wild_files`: files as other programs write them
 //! - `texture_memory`: textures within a limit
+//! - `displayed`: pictures compared as the display shows them
 //! - `tonemap`: HDR pictures for displays, one by one and over time
 //! - `units_and_views`: what the caller's unit and picture size change of a scene
 
@@ -40,6 +41,7 @@ mod command_line;
 mod coverage;
 mod denoise;
 mod direct_light;
+mod displayed;
 mod farm;
 mod farm_mishaps;
 mod formats;

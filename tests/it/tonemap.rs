@@ -70,7 +70,8 @@ fn a_sequence_is_blinded_and_recovers_and_can_be_continued() {
     part(&inputs[..2], "twice.#.exr", "twice.json");
     part(&inputs[2..], "rest.#.exr", "twice.json");
     let last = |name: &str| mean_green(&folder.path().join(name));
-    assert_eq!(last("once.4.exr").to_bits(), last("rest.2.exr").to_bits());
+    // Frames keep the numbers of their inputs.
+    assert_eq!(last("once.4.exr").to_bits(), last("rest.4.exr").to_bits());
 }
 
 #[test]
@@ -104,5 +105,20 @@ fn what_makes_no_sense_is_refused_in_one_line() {
         &["a.exr", "-o", "b.png", "--operator", "tr", "--adaptation", "local", "--adapted-to", "3"],
         "no course in time",
     );
+    for stops in ["nan", "inf", "-101"] {
+        refused(&["a.exr", "-o", "b.png", "--operator", "srgb", "--exposure", stops], "is not a number of stops");
+    }
+    refused(&["a.exr", "-o", "b.png", "--operator", "wrp", "--effects", "none,glare"], "none stands alone");
+    refused(&["a.exr", "-o", "b.png", "--operator", "ferwerda96", "--effects", "glare"], "does not show it");
+    refused(&["a.exr", "-o", "b.png", "--operator", "agx", "--effects", "none"], "there are none");
+    refused(&["a.exr", "-o", "b.png", "--operator", "agx", "--adaptation", "local"], "knows no places");
+    let blinded = r#"{"cones":{"neural_cd_m2":1.0,"pigment":1.0},"rods":{"neural_cd_m2":1.0,"pigment":-0.5},
+        "goal":{"cones_cd_m2":1.0,"rods_cd_m2":1.0}}"#;
+    std::fs::write(folder.path().join("state.json"), blinded).expect("written");
+    refused(&["a.exr", "-o", "b.png", "--operator", "ptyg", "--state", "state.json"], "not an eye's state");
     assert!(!folder.path().join("b.png").exists());
+    for accepted in [["wrp", "glare,colour"], ["wrp", "none"], ["ferwerda96", "acuity,colour"], ["ferwerda96", "none"]]
+    {
+        run(folder.path(), &["a.exr", "-o", "b.png", "--operator", accepted[0], "--effects", accepted[1]]);
+    }
 }

@@ -8,6 +8,7 @@ use super::guide::{Pixel, SceneGuide};
 use super::saved::{Fit, SavedTone};
 use super::screen::finite;
 use super::time::AdaptationState;
+use super::tint::tint_slope;
 use super::{FittedTone, ToneOperator};
 use crate::display::Viewing;
 use crate::photometry::luminance;
@@ -154,6 +155,10 @@ impl FittedTone for FittedAgx {
             return [0.0; 3];
         }
         self.picture(rgb.map(|c| f64::from(c) * self.relative_per_cd_m2)).map(|c| finite(c).min(1.0))
+    }
+
+    fn chromatic_slope_at(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
+        tint_slope(self, pixel, scene_cd_m2)
     }
 
     fn describe(&self) -> String {

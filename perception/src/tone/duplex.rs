@@ -107,6 +107,12 @@ impl FittedTone for FittedDuplex {
         fit_into_display(shown)
     }
 
+    /// Rods see no colour.
+    fn chromatic_slope_at(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
+        let cones = finite(self.exposure * self.law_at(pixel).cone_scale / self.white_cd_m2);
+        cones / self.relative_luminance_at(pixel, scene_cd_m2).max(1.0)
+    }
+
     fn describe(&self) -> String {
         format!(
             "{}: cones × {:.4}, rods × {:.4} × {:.3}, for an adaptation of {:.4} and {:.4} cd/m²",

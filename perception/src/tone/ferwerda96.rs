@@ -32,6 +32,10 @@ impl ToneOperator for Ferwerda96 {
         true
     }
 
+    fn sees_rods(&self) -> bool {
+        true
+    }
+
     fn fit(&self, guide: &SceneGuide<'_>, viewing: &Viewing, state: Option<&AdaptationState>) -> Box<dyn FittedTone> {
         Box::new(self.fit_duplex(guide, viewing, state))
     }

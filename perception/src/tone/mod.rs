@@ -34,6 +34,7 @@ mod picture;
 mod reinhard02;
 mod saved;
 mod scale;
+mod scene_light;
 mod scheel00;
 mod screen;
 #[cfg(test)]
@@ -42,6 +43,7 @@ mod statistics;
 #[cfg(test)]
 mod tests;
 pub mod time;
+mod tint;
 mod tumblin_rushmeier;
 mod veil;
 mod ward94;
@@ -58,9 +60,10 @@ pub use guide::{Pixel, SceneGuide};
 pub use names::{Effects, ToneSettings, operator, operator_names, operator_with};
 pub use pattanaik00::Pattanaik00;
 pub use pbr_neutral::PbrNeutral;
-pub use picture::map_picture;
+pub use picture::{map_picture, map_pixels};
 pub use reinhard02::Reinhard02;
 pub use saved::SavedTone;
+pub use scene_light::SceneLight;
 pub use scheel00::Scheel00;
 pub use time::{AdaptationState, Goal, Kinetics};
 pub use tumblin_rushmeier::TumblinRushmeier;
@@ -87,7 +90,15 @@ pub trait ToneOperator: Send + Sync + Debug {
     fn sees_adaptation(&self) -> bool {
         false
     }
+
+    /// Whether it looks at what the rods see of the guide ([`SceneGuide::scotopic_cd_m2`]).
+    fn sees_rods(&self) -> bool {
+        false
+    }
 }
+
+/// Darkest grey whose colours are asked for: below it ratios of channels are rounding.
+const LEAST_GREY_CD_M2: f32 = 1e-6;
 
 /// A tone operator with every parameter decided.
 pub trait FittedTone: Send + Sync + Debug {
@@ -121,6 +132,15 @@ pub trait FittedTone: Send + Sync + Debug {
     /// The same for an eye that is adapted to the view as a whole.
     fn map_rgb(&self, rgb_cd_m2: [f32; 3]) -> [f32; 3] {
         self.map_rgb_at(Pixel::NOWHERE, rgb_cd_m2)
+    }
+
+    /// Display light, 0 to 1, for each cd/m² of a chromatic signal of the scene: what is left of a faint tint on a grey of luminance
+    /// `scene_cd_m2` at `pixel`. What a clip of the display hides of it is not taken off, since noise may reach below.
+    ///
+    /// Unless the operator says otherwise it keeps the ratios of a colour's channels.
+    fn chromatic_slope_at(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
+        let luminance = scene_cd_m2.max(LEAST_GREY_CD_M2);
+        self.relative_luminance_at(pixel, luminance).min(1.0) / luminance
     }
 
     /// The loss of fine detail that the operator simulates. It mixes pixels: scene light goes through it before

@@ -11,7 +11,7 @@ use super::guide::{Pixel, SceneGuide};
 use super::saved::{Fit, SavedTone};
 use super::screen::Screen;
 use super::time::{AdaptationState, Goal, Kinetics, ReceptorState};
-use super::{FittedTone, ToneOperator};
+use super::{FittedTone, LEAST_GREY_CD_M2, ToneOperator};
 use crate::display::Viewing;
 use crate::photometry::{luminance, scotopic_luminance};
 
@@ -182,6 +182,10 @@ impl ToneOperator for Pattanaik00 {
         true
     }
 
+    fn sees_rods(&self) -> bool {
+        true
+    }
+
     fn fit(&self, guide: &SceneGuide<'_>, viewing: &Viewing, state: Option<&AdaptationState>) -> Box<dyn FittedTone> {
         let density = viewing.display.pixel_density();
         let adapted = || AdaptationState::adapted_to(Goal::of(guide, density), &self.kinetics());
@@ -233,6 +237,11 @@ impl FittedPattanaik00 {
         })
     }
 
+    /// Exponent of the ratios of a colour's channels, where the cones' response is `share` of the greatest.
+    fn strength(&self, cones: Receptor, share: f64) -> f32 {
+        (cones.slope(share) / self.display_slope) as f32
+    }
+
     /// Display luminance, cd/m², for a response in the scene.
     fn shown_cd_m2(&self, response: f64) -> f64 {
         let Appearance { from, scale, to } = self.appearance;
@@ -257,13 +266,24 @@ impl FittedTone for FittedPattanaik00 {
         if scene <= 0.0 || cones + rods <= 0.0 {
             return [shown.min(1.0); 3];
         }
-        let strength = (retina.cones.slope(cone_share_of_most) / self.display_slope) as f32;
-        let coloured = powers(rgb.map(|channel| channel / scene), strength);
+        let coloured = powers(rgb.map(|channel| channel / scene), self.strength(retina.cones, cone_share_of_most));
         let brightness = luminance(coloured).max(f32::MIN_POSITIVE);
         let cone_share = (cones / (cones + rods)) as f32;
         fit_into_display(
             coloured.map(|channel| (shown * (cone_share * channel / brightness + (1.0 - cone_share))).min(1e30)),
         )
+    }
+
+    fn chromatic_slope_at(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
+        let light = scene_cd_m2.max(LEAST_GREY_CD_M2);
+        let retina = self.retina_at(pixel);
+        let share = retina.cones.share(light);
+        let (cones, rods) = (retina.cones.pigment * share, retina.rods.response(f64::from(light)));
+        if cones <= 0.0 {
+            return 0.0;
+        }
+        let shown = self.screen.relative(self.shown_cd_m2(cones + rods)).min(1.0);
+        (cones / (cones + rods)) as f32 * self.strength(retina.cones, share) * shown / light
     }
 
     fn describe(&self) -> String {

@@ -8,6 +8,7 @@ use super::guide::{Pixel, SceneGuide};
 use super::saved::{Fit, SavedTone};
 use super::screen::finite;
 use super::time::AdaptationState;
+use super::tint::tint_slope;
 use super::{FittedTone, ToneOperator};
 use crate::display::Viewing;
 use crate::photometry::luminance;
@@ -59,13 +60,17 @@ pub(super) struct FittedPbrNeutral {
 
 impl FittedTone for FittedPbrNeutral {
     fn relative_luminance_at(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
-        luminance(self.map_rgb_at(pixel, [scene_cd_m2.min(f32::MAX); 3]))
+        luminance(self.map_rgb_at(pixel, [scene_cd_m2.clamp(0.0, f32::MAX); 3]))
     }
 
     fn map_rgb_at(&self, _pixel: Pixel, rgb_cd_m2: [f32; 3]) -> [f32; 3] {
         // Beyond 1e6 the curve is white to the last bit.
         let exposed = light(rgb_cd_m2).map(|c| finite(f64::from(c) * self.relative_per_cd_m2).min(1e6));
         compressed(exposed).map(|channel| channel.clamp(0.0, 1.0))
+    }
+
+    fn chromatic_slope_at(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
+        tint_slope(self, pixel, scene_cd_m2)
     }
 
     fn describe(&self) -> String {

@@ -7,7 +7,7 @@ use super::field::{AdaptationScope, FrozenPlane};
 use super::guide::{Pixel, SceneGuide};
 use super::saved::{Fit, SavedTone};
 use super::screen::finite;
-use super::statistics::log_average;
+use super::statistics::log_average_of_lit;
 use super::time::AdaptationState;
 use super::{FittedTone, ToneOperator};
 use crate::display::Viewing;
@@ -18,7 +18,8 @@ use crate::plane::Plane;
 ///
 /// "Photographic tone reproduction for digital images", SIGGRAPH 2002: key 0.18, equation 4. With
 /// [`AdaptationScope::Local`] equation 9, dodging and burning: each pixel is divided by the mean of the largest surround of
-/// even luminance (eight scales in steps of 1.6, φ = 8, ε = 0.05). It knows no unit: only ratios count.
+/// even luminance (eight scales in steps of 1.6, φ = 8, ε = 0.05). It knows no unit: only ratios count, and pixels below
+/// 1e-10 of the brightest are no part of the mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reinhard02 {
     /// Multiplies the scene: 2^stops.
@@ -34,8 +35,8 @@ impl ToneOperator for Reinhard02 {
 
     fn fit(&self, guide: &SceneGuide<'_>, _viewing: &Viewing, _state: Option<&AdaptationState>) -> Box<dyn FittedTone> {
         let plane = guide.luminance_cd_m2;
-        let scale = self.exposure * log_average(plane).map_or(1.0, |average| KEY / average);
         let greatest = plane.values().iter().copied().filter(|value| value.is_finite()).fold(0.0, f32::max);
+        let scale = self.exposure * log_average_of_lit(plane, greatest).map_or(1.0, |average| KEY / average);
         let surround = match self.scope {
             AdaptationScope::World => None,
             AdaptationScope::Local => Some(FrozenPlane::of(surround(plane, scale))),
@@ -114,6 +115,22 @@ mod tests {
         let fit = fit(&guide, AdaptationScope::World);
         assert!((fit.relative_luminance(1.0) - 0.18 / 1.18).abs() < 1e-3);
         assert!((fit.relative_luminance(100.0) - 1.0).abs() < 1e-5);
+    }
+
+    /// Moonlight and sunlight of one scene make one picture.
+    #[test]
+    fn a_unit_changes_nothing() {
+        let guide = Plane::from_fn(101, 1, |x, _| if x < 30 { 0.0 } else { 10.0_f32.powf((x as f32 - 50.0) / 25.0) });
+        let shown = |unit: f32| {
+            let guide = guide.map(|value| unit * value);
+            [AdaptationScope::World, AdaptationScope::Local]
+                .map(|scope| fit(&guide, scope).relative_luminance_at(Pixel { x: 60, y: 0 }, unit * 3.0))
+        };
+        let expected = shown(1.0);
+        for unit in [1e-6, 1e-4, 1e5] {
+            let found = shown(unit);
+            assert!(found.iter().zip(expected).all(|(a, b)| (a / b - 1.0).abs() < 1e-3), "{unit}: {found:?}");
+        }
     }
 
     #[test]

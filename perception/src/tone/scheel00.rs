@@ -1,6 +1,7 @@
 //! Scheel, Stamminger and Seidel's operator for walkthroughs.
 
 use super::scale::Scale;
+use super::statistics::as_eyes_see;
 use super::time::AdaptationState;
 use super::ward94::scale_factor;
 use super::{FittedTone, Pixel, SceneGuide, ToneOperator};
@@ -42,13 +43,12 @@ impl ToneOperator for Scheel00 {
     }
 }
 
-/// Geometric mean at the points that see light, cd/m².
+/// Geometric mean of what eyes see at the points, cd/m².
 fn sampled(guide: &SceneGuide<'_>) -> Option<f64> {
     let plane = guide.luminance_cd_m2;
     let (mut sum, mut count) = (0.0, 0.0);
     for Pixel { x, y } in points(plane.width(), plane.height(), guide.gaze) {
-        let value = plane.get(x, y);
-        if value.is_finite() && value > 1e-4 {
+        if let Some(value) = as_eyes_see(plane.get(x, y)) {
             sum += f64::from(value).ln();
             count += 1.0;
         }
@@ -84,7 +84,8 @@ mod tests {
         let guide = SceneGuide::of(&scene);
         assert!(sampled(&guide).unwrap() > 10.0);
         assert!(sampled(&guide.with_gaze(Some(Pixel { x: 20, y: 20 }))).unwrap() < 1.5);
-        assert!(sampled(&SceneGuide::of(&Plane::filled(4, 4, 0.0))).is_none());
+        assert!((sampled(&SceneGuide::of(&Plane::filled(4, 4, 0.0))).unwrap() / 1e-4 - 1.0).abs() < 1e-6);
+        assert!(sampled(&SceneGuide::of(&Plane::filled(0, 0, 0.0))).is_none());
         assert!((sampled(&SceneGuide::of(&Plane::filled(1, 1, 7.0))).unwrap() - 7.0).abs() < 1e-6);
     }
 

@@ -19,6 +19,12 @@ impl Screen {
         Self { black_cd_m2, span_cd_m2: (display.luminance_cd_m2(1.0) - black_cd_m2).max(f64::MIN_POSITIVE) }
     }
 
+    /// Without what it reflects of the room.
+    pub(super) fn emitting(display: &Display) -> Self {
+        let black_cd_m2 = display.emitted_cd_m2(0.0);
+        Self { black_cd_m2, span_cd_m2: (display.emitted_cd_m2(1.0) - black_cd_m2).max(f64::MIN_POSITIVE) }
+    }
+
     pub(super) fn white_cd_m2(self) -> f64 {
         self.black_cd_m2 + self.span_cd_m2
     }

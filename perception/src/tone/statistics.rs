@@ -4,8 +4,11 @@ use rayon::prelude::*;
 
 use crate::plane::Plane;
 
-/// Below this, cd/m², a pixel says nothing about how a picture should be exposed (the floor of human vision).
-const FLOOR_CD_M2: f32 = 1e-4;
+/// The floor of human vision, cd/m². Below it a pixel says nothing about how a picture should be exposed.
+pub(super) const FLOOR_CD_M2: f32 = 1e-4;
+/// Share of the brightest pixel at and below which a pixel says nothing to an operator that knows only ratios: leaked light
+/// and rounding, not darkness.
+const FAINTEST_SHARE: f32 = 1e-10;
 /// Pixels summed by one thread at a time. Sums are added in the picture's order, whatever the number of threads.
 const CHUNK: usize = 1 << 14;
 
@@ -15,24 +18,42 @@ fn counts(value: f32) -> bool {
     value.is_finite() && value > FLOOR_CD_M2
 }
 
-/// Geometric mean, cd/m², of the pixels above the floor of vision; `None` for a black picture.
-pub(super) fn log_average(luminance_cd_m2: &Plane) -> Option<f64> {
-    let sums: Vec<LogSum> = luminance_cd_m2
-        .values()
-        .par_chunks(CHUNK)
-        .map(|values| values.iter().fold(LogSum::default(), |sum, &value| sum.with(value, 1.0)))
-        .collect();
-    LogSum::mean(&sums)
+/// What an eye makes of a pixel: less than the floor of vision is as dark as the floor. `None` for what is no light.
+pub(super) fn as_eyes_see(value: f32) -> Option<f32> {
+    value.is_finite().then(|| value.max(FLOOR_CD_M2))
+}
+
+/// Geometric mean, cd/m², of what eyes see in all pixels; `None` for a picture without pixels.
+pub(super) fn log_average_to_eyes(luminance_cd_m2: &Plane) -> Option<f64> {
+    log_average(luminance_cd_m2, as_eyes_see)
 }
 
 /// The same with a weight for each pixel, `weight_at(x, y)`.
-pub(super) fn weighted_log_average(plane: &Plane, weight_at: impl Fn(usize, usize) -> f64 + Sync) -> Option<f64> {
+pub(super) fn weighted_log_average_to_eyes(
+    plane: &Plane,
+    weight_at: impl Fn(usize, usize) -> f64 + Sync,
+) -> Option<f64> {
     let sums: Vec<LogSum> = (0..plane.height())
         .into_par_iter()
         .map(|y| {
             let row = plane.row(y).iter().enumerate();
-            row.fold(LogSum::default(), |sum, (x, &value)| sum.with(value, weight_at(x, y)))
+            row.fold(LogSum::default(), |sum, (x, &value)| sum.with(as_eyes_see(value), weight_at(x, y)))
         })
+        .collect();
+    LogSum::mean(&sums)
+}
+
+/// Geometric mean of the pixels that are lit, whatever the unit; `None` for a black picture. `greatest` is the brightest one.
+pub(super) fn log_average_of_lit(luminance: &Plane, greatest: f32) -> Option<f64> {
+    let faintest = FAINTEST_SHARE * greatest;
+    log_average(luminance, |value| (value.is_finite() && value > faintest).then_some(value))
+}
+
+fn log_average(plane: &Plane, counted: impl Fn(f32) -> Option<f32> + Sync) -> Option<f64> {
+    let sums: Vec<LogSum> = plane
+        .values()
+        .par_chunks(CHUNK)
+        .map(|values| values.iter().fold(LogSum::default(), |sum, &value| sum.with(counted(value), 1.0)))
         .collect();
     LogSum::mean(&sums)
 }
@@ -44,11 +65,10 @@ struct LogSum {
 }
 
 impl LogSum {
-    fn with(self, value: f32, weight: f64) -> Self {
-        if counts(value) {
-            Self { log: self.log + weight * f64::from(value.ln()), weight: self.weight + weight }
-        } else {
-            self
+    fn with(self, value: Option<f32>, weight: f64) -> Self {
+        match value {
+            Some(value) => Self { log: self.log + weight * f64::from(value).ln(), weight: self.weight + weight },
+            None => self,
         }
     }
 
@@ -102,14 +122,27 @@ mod tests {
         assert!((statistics.log_average(0.03, 0.97).unwrap() - 3.0).abs() < 1e-9);
         assert_eq!(statistics.quantile(0.5), Some(3.0));
         assert!(SceneStatistics::of(&Plane::filled(4, 4, 0.0)).quantile(0.5).is_none());
-        assert!(log_average(&Plane::filled(4, 4, 0.0)).is_none());
+        assert!(log_average_of_lit(&Plane::filled(4, 4, 0.0), 0.0).is_none());
+    }
+
+    /// Eyes are in the dark where nothing can be seen; a background that crosses the floor of vision changes nothing at once.
+    #[test]
+    fn darkness_counts_to_eyes() {
+        let adapted = |background: f32| {
+            log_average_to_eyes(&Plane::from_fn(100, 1, |x, _| if x == 0 { 100.0 } else { background })).unwrap()
+        };
+        let expected = (0.01 * 100_f64.ln() + 0.99 * 1e-4_f64.ln()).exp();
+        for background in [0.0, 0.9e-4, 1.000_1e-4] {
+            assert!((adapted(background) / expected - 1.0).abs() < 1e-3, "{background}: {}", adapted(background));
+        }
+        assert!(log_average_to_eyes(&Plane::filled(2, 2, f32::NAN)).is_none());
     }
 
     #[test]
     fn weights_choose_what_is_averaged() {
         let plane = Plane::from_fn(20, 4, |x, _| if x < 10 { 1.0 } else { 100.0 });
-        assert!((log_average(&plane).unwrap() - 10.0).abs() < 1e-6);
-        let right = weighted_log_average(&plane, |x, _| f64::from(u8::from(x >= 10)));
+        assert!((log_average_to_eyes(&plane).unwrap() - 10.0).abs() < 1e-6);
+        let right = weighted_log_average_to_eyes(&plane, |x, _| f64::from(u8::from(x >= 10)));
         assert!((right.unwrap() - 100.0).abs() < 1e-4);
     }
 }

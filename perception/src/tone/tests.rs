@@ -57,7 +57,8 @@ fn check_fit(name: &str, fitted: &dyn FittedTone, pixel: Pixel) {
         assert!(relative >= last && relative.is_finite(), "{name} at {scene}: {relative} after {last}");
         last = relative;
     }
-    assert!(fitted.relative_luminance_at(pixel, f32::NAN).is_finite(), "{name}");
+    let [of_nothing, black] = [f32::NAN, 0.0].map(|scene| fitted.relative_luminance_at(pixel, scene));
+    assert!(of_nothing == black, "{name}: NaN is shown as {of_nothing}, black as {black}");
     for rgb in [[0.0; 3], [1e30, 0.0, 0.0], [f32::NAN, 1.0, f32::INFINITY], [3.0, 100.0, 0.2], [1e-6; 3], [-1.0; 3]] {
         let shown = fitted.map_rgb_at(pixel, rgb);
         assert!(shown.iter().all(|channel| (0.0..=1.0).contains(channel)), "{name} {rgb:?} {shown:?}");
@@ -170,6 +171,52 @@ fn a_state_of_the_eyes_moves_those_who_see_it_and_nobody_else() {
         let moved = (at(Some(&dark)) - at(None)).abs() > 0.01;
         assert_eq!(moved, operator.sees_adaptation(), "{name}: {} {}", at(Some(&dark)), at(None));
     }
+}
+
+#[test]
+fn what_rods_see_moves_those_who_look_at_it_and_nobody_else() {
+    let (photopic, scotopic) = (Plane::filled(8, 8, 0.05), Plane::filled(8, 8, 2.0));
+    for name in operator_names() {
+        let operator = operator(name, None).unwrap();
+        let at = |guide: SceneGuide<'_>| operator.fit(&guide, &Viewing::default(), None).relative_luminance(0.05);
+        let grey = SceneGuide::of(&photopic);
+        let moved = (at(grey.with_scotopic(&scotopic)) / at(grey) - 1.0).abs() > 0.01;
+        assert_eq!(moved, operator.sees_rods(), "{name}");
+    }
+}
+
+/// The chromatic slope is what a tint becomes in the picture, wherever the display does not clip it.
+#[test]
+fn a_tint_is_shown_as_strong_as_the_slope_says() {
+    for level in [0.02, 1.0, 100.0] {
+        let guide = Plane::from_fn(64, 64, |x, _| level * 10.0_f32.powf(x as f32 / 32.0 - 1.0));
+        for (name, settings) in operator_names().iter().flat_map(|name| settings().into_iter().map(move |s| (name, s)))
+        {
+            let fitted =
+                operator_with(name, &settings).unwrap().fit(&SceneGuide::of(&guide), &Viewing::default(), None);
+            let pixel = Pixel { x: 32, y: 32 };
+            for scene in [0.1, 0.5, 1.0, 3.0].map(|share| share * level) {
+                if fitted.relative_luminance_at(pixel, 1.1 * scene) >= 0.9 {
+                    continue;
+                }
+                let found = fitted.chromatic_slope_at(pixel, scene);
+                let shown = chroma_slope_of_picture(fitted.as_ref(), pixel, scene);
+                let close = (found - shown).abs() <= 0.03 * shown + 1e-3 / level;
+                assert!(close, "{name} {settings:?} at {scene}: {found}, shown {shown}");
+            }
+        }
+    }
+}
+
+/// Red–green signal of the picture for a red tint, over the scene's.
+fn chroma_slope_of_picture(fitted: &dyn FittedTone, pixel: Pixel, scene: f32) -> f32 {
+    let red_green = |sign: f32| {
+        let tint = [1.0, -0.2126 / 0.7152, 0.0].map(|part| scene * (1.0 + sign * 0.02 * part));
+        let red_green = |rgb| crate::opponent::opponent(rgb).red_green;
+        (red_green(fitted.map_rgb_at(pixel, tint)), red_green(tint))
+    };
+    let ((shown_up, up), (shown_down, down)) = (red_green(1.0), red_green(-1.0));
+    (shown_up - shown_down) / (up - down)
 }
 
 #[test]

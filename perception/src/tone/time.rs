@@ -5,7 +5,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::guide::SceneGuide;
-use super::statistics::{log_average, weighted_log_average};
+use super::statistics::{FLOOR_CD_M2, log_average_to_eyes, weighted_log_average_to_eyes};
 use crate::display::PixelDensity;
 
 /// The luminances, cd/m², that cones and rods would adapt to if the view stayed as it is.
@@ -17,8 +17,6 @@ pub struct Goal {
     pub rods_cd_m2: f64,
 }
 
-/// What a black view is to an eye: the floor of vision, cd/m².
-const DARK_CD_M2: f64 = 1e-4;
 /// Standard deviation, in degrees, of what counts around a given gaze. Ours: adaptation is mostly the fovea's and its
 /// surroundings'; no source fixes the number.
 const GAZE_SIGMA_DEG: f64 = 5.0;
@@ -30,21 +28,30 @@ impl Goal {
         Self { cones_cd_m2: luminance_cd_m2, rods_cd_m2: luminance_cd_m2 }
     }
 
-    /// The geometric mean of what is in view, around the gaze where one is given (a Gaussian of σ 5°).
+    /// The geometric mean of what is in view, around the gaze where one is given (a Gaussian of σ 5°). What is darker than
+    /// the floor of vision, 1e-4 cd/m², counts as the floor; without a view the eye is in the dark.
     #[must_use]
     pub fn of(guide: &SceneGuide<'_>, density: PixelDensity) -> Self {
         let average = |plane| match guide.gaze {
-            None => log_average(plane),
-            Some(gaze) => weighted_log_average(plane, |x, y| {
+            None => log_average_to_eyes(plane),
+            Some(gaze) => weighted_log_average_to_eyes(plane, |x, y| {
                 let dx = (x as f64 - gaze.x as f64) / (GAZE_SIGMA_DEG * density.horizontal);
                 let dy = (y as f64 - gaze.y as f64) / (GAZE_SIGMA_DEG * density.vertical);
                 (-0.5 * (dx * dx + dy * dy)).exp()
             }),
         };
-        Self {
-            cones_cd_m2: average(guide.luminance_cd_m2).unwrap_or(DARK_CD_M2),
-            rods_cd_m2: average(guide.rods()).unwrap_or(DARK_CD_M2),
-        }
+        let of = |plane| average(plane).unwrap_or(f64::from(FLOOR_CD_M2));
+        Self { cones_cd_m2: of(guide.luminance_cd_m2), rods_cd_m2: of(guide.rods()) }
+    }
+
+    /// The geometric mean of several views; the dark for none.
+    #[must_use]
+    pub fn mean(goals: &[Self]) -> Self {
+        let of = |receptor: fn(&Self) -> f64| {
+            let logs = goals.iter().map(|goal| receptor(goal).max(f64::from(FLOOR_CD_M2)).ln()).sum::<f64>();
+            if goals.is_empty() { f64::from(FLOOR_CD_M2) } else { (logs / goals.len() as f64).exp() }
+        };
+        Self { cones_cd_m2: of(|goal| goal.cones_cd_m2), rods_cd_m2: of(|goal| goal.rods_cd_m2) }
     }
 }
 
@@ -123,6 +130,16 @@ impl AdaptationState {
             rods: receptor(goal.rods_cd_m2, &kinetics.rods),
             goal,
         }
+    }
+
+    /// Whether an eye can be in this state: luminances are finite and not negative, shares of pigment from 0 to 1.
+    #[must_use]
+    pub fn is_possible(&self) -> bool {
+        let is_light = |cd_m2: f64| cd_m2.is_finite() && cd_m2 >= 0.0;
+        let receptors = [self.cones, self.rods];
+        receptors.iter().all(|state| is_light(state.neural_cd_m2) && (0.0..=1.0).contains(&state.pigment))
+            && is_light(self.goal.cones_cd_m2)
+            && is_light(self.goal.rods_cd_m2)
     }
 
     /// A cut: from now on `goal` is in view, and no time has passed.

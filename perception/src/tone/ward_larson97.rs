@@ -10,7 +10,7 @@ use super::saved::{Fit, SavedTone};
 use super::screen::{Screen, finite};
 use super::time::{AdaptationState, Goal};
 use super::veil::Veil;
-use super::{FittedTone, ToneOperator};
+use super::{FittedTone, LEAST_GREY_CD_M2, ToneOperator};
 use crate::adaptation::{Mean, local_adaptation_cd_m2};
 use crate::display::Display;
 use crate::display::Viewing;
@@ -106,10 +106,14 @@ impl FittedWardLarson97 {
     }
 }
 
+/// Share of a colour that is left in mesopic light.
+fn kept_colour(retinal_cd_m2: f32) -> f32 {
+    ((retinal_cd_m2 - SCOTOPIC_END_CD_M2) / (PHOTOPIC_END_CD_M2 - SCOTOPIC_END_CD_M2)).clamp(0.0, 1.0)
+}
+
 /// Colour lost as the luminance of a pixel falls through the mesopic range.
 fn faded(rgb: [f32; 3]) -> [f32; 3] {
-    let range = PHOTOPIC_END_CD_M2 - SCOTOPIC_END_CD_M2;
-    let kept = ((luminance(rgb) - SCOTOPIC_END_CD_M2) / range).clamp(0.0, 1.0);
+    let kept = kept_colour(luminance(rgb));
     let rods = scotopic_luminance(rgb);
     rgb.map(|channel| kept * channel + (1.0 - kept) * rods)
 }
@@ -124,6 +128,13 @@ impl FittedTone for FittedWardLarson97 {
         let seen = if self.colour { faded(veiled) } else { veiled };
         let retinal = luminance(seen);
         with_luminance(seen, retinal, self.shown(retinal))
+    }
+
+    fn chromatic_slope_at(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
+        let retinal = self.retinal(pixel, scene_cd_m2.max(LEAST_GREY_CD_M2));
+        let kept = if self.colour { kept_colour(retinal) } else { 1.0 };
+        let own_share = if self.veil.is_some() { Veil::own_share() } else { 1.0 };
+        own_share * kept * self.shown(retinal).min(1.0) / retinal
     }
 
     fn describe(&self) -> String {

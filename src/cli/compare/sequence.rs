@@ -1,6 +1,6 @@
 //! `fechner compare A.####.exr B.####.exr --fps F`: can one moving picture be told from another?
 
-use super::{CompareArguments, Figures, Seen, check_alike, write_map};
+use super::{CompareArguments, Figures, Seen, check_alike, check_map, write_map};
 use crate::cli::channels::both_motions;
 use crate::cli::json::write_json;
 use crate::cli::picture::InputPicture;
@@ -12,7 +12,7 @@ use fechner::output;
 use fechner_perception::Plane;
 use fechner_perception::display::Viewing;
 use fechner_perception::sequence::{FrameMotion, SequenceFrame, SequenceObserver};
-use fechner_perception::tone::{FittedTone, SceneGuide, ToneSettings};
+use fechner_perception::tone::{AdaptationState, FittedTone, Goal, SceneLight, ToneOperator, ToneSettings};
 use serde::Serialize;
 use std::collections::VecDeque;
 use std::path::Path;
@@ -119,18 +119,30 @@ fn check_covered((path, numbers): (&Path, &[u32]), (by_path, by): (&Path, &[u32]
     )
 }
 
-/// Scene luminance, cd/m², of some frames from all over a sequence, one below the other; `None` for frames that are ready for
-/// the display.
-fn scene_luminance(name: &FrameName, numbers: &[u32], nits_per_unit: Option<f64>) -> Result<Option<Plane>> {
+/// The operator as it shows a whole sequence, by some frames from all over it: fitted to them one below the other, with eyes
+/// that are adapted to each of them alike. `None` for frames that are ready for the display.
+fn fit(
+    operator: &dyn ToneOperator,
+    name: &FrameName,
+    numbers: &[u32],
+    nits_per_unit: Option<f64>,
+    viewing: &Viewing,
+) -> Result<Option<Box<dyn FittedTone>>> {
     let count = numbers.len().min(FITTED_FRAMES);
-    let (mut values, mut width) = (Vec::new(), 0);
+    let (mut stacked, mut goals, mut size) = (Vec::new(), Vec::new(), None);
     for index in 0..count {
         let picture = InputPicture::read(&name.of(numbers[index * numbers.len() / count]), nits_per_unit)?;
-        let Some(luminance) = picture.scene_luminance() else { return Ok(None) };
-        width = luminance.width();
-        values.extend(luminance.into_values());
+        let Some(rgb) = picture.scene_rgb_cd_m2() else { return Ok(None) };
+        if *size.get_or_insert(picture.size()) != picture.size() {
+            bail!("{}: frames of several sizes", name.of(numbers[0]).display());
+        }
+        let light = SceneLight::of(operator, picture.size().0, &rgb);
+        goals.push(Goal::of(&light.guide(), viewing.display.pixel_density()));
+        stacked.extend(rgb);
     }
-    Ok(Some(Plane::from_values(width, values.len() / width, values).context("frames of several sizes")?))
+    let width = size.map_or(0, |(width, _)| width);
+    let eye = AdaptationState::adapted_to(Goal::mean(&goals), &operator.kinetics());
+    Ok(Some(operator.fit(&SceneLight::of(operator, width, &stacked).guide(), viewing, Some(&eye))))
 }
 
 impl<'a> Sequences<'a> {
@@ -163,7 +175,7 @@ impl<'a> Sequences<'a> {
     ) -> Result<Self> {
         let map = arguments.map.as_deref().map(|path| pattern(path, "the map")).transpose()?;
         if let Some(map) = &map {
-            output::check_writable(&map.of(numbers[0]))?;
+            check_map(&map.of(numbers[0]))?;
         }
         let operator = tone_operator(&arguments.operator, &ToneSettings::default())?;
         let nits_per_unit = arguments.seeing.nits_per_unit;
@@ -172,11 +184,11 @@ impl<'a> Sequences<'a> {
             arguments.fps.context("--fps: how many frames a second a sequence has decides what is seen in it")?;
         let viewing = InputPicture::read(&reference.of(numbers[0]), nits_per_unit)?.viewed(&viewing)?;
         // One exposure for the whole sequence, as a viewer would hold it.
-        let guide = match scene_luminance(&reference, numbers, nits_per_unit)? {
-            Some(guide) => Some(guide),
-            None => scene_luminance(&test, numbers, nits_per_unit)?,
+        let fit_to = |name: &FrameName| fit(operator.as_ref(), name, numbers, nits_per_unit, &viewing);
+        let fitted = match fit_to(&reference)? {
+            Some(fitted) => Some(fitted),
+            None => fit_to(&test)?,
         };
-        let fitted = guide.map(|guide| operator.fit(&SceneGuide::of(&guide), &viewing, None));
         Ok(Self { arguments, reference, test, velocity, map, viewing, fitted })
     }
 
@@ -259,4 +271,30 @@ fn read_motion(path: &Path, (width, height): (usize, usize)) -> Result<FrameMoti
         Ok([Plane::from_values(width, height, x)?, Plane::from_values(width, height, y)?])
     };
     Ok(FrameMotion { to_next: planes(motions.to_next)?, to_previous: planes(motions.to_previous)? })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fechner::output::{Attribute, NITS_PER_UNIT, Picture, write_exr};
+
+    /// An operator that looks at the middle of a picture is not fitted to the middle frames alone.
+    #[test]
+    fn all_frames_count_alike() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let name = FrameName::parse(folder.path().join("a.#.exr").to_str().expect("a name")).expect("a pattern");
+        for (frame, light) in [(1, 0.1), (2, 1.0), (3, 1000.0), (4, 1.0)] {
+            let mut picture = Picture::new(16, 16);
+            ["R", "G", "B"].into_iter().for_each(|channel| picture.push_f32(channel, vec![light; 256]));
+            picture.push_attribute(NITS_PER_UNIT, Attribute::Float(1.0));
+            write_exr(&name.of(frame), &picture).expect("written");
+        }
+        let shown = |operator: &str| {
+            let operator = tone_operator(operator, &ToneSettings::default()).expect("an operator");
+            let fitted = fit(operator.as_ref(), &name, &[1, 2, 3, 4], None, &Viewing::default()).expect("read");
+            fitted.expect("scene light").relative_luminance(1.0)
+        };
+        let (scheel, ward) = (shown("scheel00"), shown("ward94"));
+        assert!((scheel / ward - 1.0).abs() < 1e-4, "{scheel} and {ward}");
+    }
 }

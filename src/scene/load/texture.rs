@@ -8,6 +8,7 @@ pub(super) use super::adjust::Adjust;
 use super::error::{LoadError, Place};
 use super::texture_memory::{self, Alpha, Extent};
 use crate::exr_read;
+use crate::hdr_read::HdrHeader;
 use crate::scene::{Encoding, Texels, Texture, TextureId, Wrap, texture};
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 use rayon::prelude::*;
@@ -290,6 +291,7 @@ pub(super) fn decode_bytes(bytes: &[u8], name: &Path, encoding: Encoding) -> Res
     check_size(name, u64::from(width), u64::from(height), if eight_bit { 4 } else { 16 })?;
 
     let image = DynamicImage::from_decoder(decoder).map_err(wrong)?;
+    let header = (format == ImageFormat::Hdr).then(|| HdrHeader::of(bytes));
     let texels = if eight_bit {
         let bytes = image.into_rgba8().into_raw();
         Texels::Bytes(Arc::new(bytes.as_chunks::<4>().0.to_vec()), encoding)
@@ -299,6 +301,7 @@ pub(super) fn decode_bytes(bytes: &[u8], name: &Path, encoding: Encoding) -> Res
             && !matches!(image, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_));
         let mut texels = image.into_rgba32f().into_raw().as_chunks::<4>().0.to_vec();
         for [r, g, b, _] in &mut texels {
+            [*r, *g, *b] = header.map_or([*r, *g, *b], |header| header.light([*r, *g, *b]));
             for value in [r, g, b] {
                 *value = if unfold { texture::srgb_to_linear(*value) } else { finite_or_zero(*value) };
             }

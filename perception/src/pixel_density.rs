@@ -1,0 +1,44 @@
+//! How fine a display is to the eye.
+
+use serde::{Deserialize, Serialize};
+
+/// Pixels a degree of visual angle along both axes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PixelDensity {
+    /// Along a row.
+    pub horizontal: f64,
+    /// Along a column.
+    pub vertical: f64,
+}
+
+impl PixelDensity {
+    /// Of square pixels.
+    #[must_use]
+    pub fn square(pixels_per_degree: f64) -> Self {
+        Self { horizontal: pixels_per_degree, vertical: pixels_per_degree }
+    }
+
+    /// Of a picture with this many times the pixels along both axes.
+    #[must_use]
+    pub fn times(self, scale: f64) -> Self {
+        Self { horizontal: scale * self.horizontal, vertical: scale * self.vertical }
+    }
+
+    /// Along the finer axis.
+    #[must_use]
+    pub fn finest(self) -> f64 {
+        self.horizontal.max(self.vertical)
+    }
+
+    /// Along the coarser axis.
+    #[must_use]
+    pub fn coarsest(self) -> f64 {
+        self.horizontal.min(self.vertical)
+    }
+
+    /// The geometric mean: that of square pixels of the same area.
+    #[must_use]
+    pub fn mean(self) -> f64 {
+        (self.horizontal * self.vertical).sqrt()
+    }
+}

@@ -1,0 +1,111 @@
+use super::*;
+use crate::adaptive::is_reached;
+use crate::adaptive::test_films::{film_of, settings};
+use crate::denoise::Denoiser;
+use crate::film::BlockSum;
+use crate::integrator::{BlockWork, FirstHit, PathSample};
+use crate::sampler::hash_words;
+use glam::Vec3;
+
+/// Noise that leaves luminance alone is seen by its colour: no stop at the pilot.
+#[test]
+fn isoluminant_noise_is_seen() {
+    let red_for_green = Vec3::new(1.0, -0.2126 / 0.7152, 0.0);
+    let film = film_of(|_, random| Vec3::splat(0.8) + 0.7 * random * red_for_green);
+    let judgement = judge(&film, &settings(), 1.0).expect("judges");
+    let luminance_variance = judgement.estimate.variance_of_mean.get(32, 32);
+    assert!(luminance_variance < 1e-4, "luminance varies by {luminance_variance}");
+    assert!(judgement.predicted.get(32, 32) > 1.0, "v = {}", judgement.predicted.get(32, 32));
+    let of_luminance = LoopSettings { model: fechner_perception::model::by_name("tvi"), ..settings() };
+    let blind = judge(&film, &of_luminance, 1.0).expect("judges");
+    assert!(blind.predicted.get(32, 32) < 0.01, "a model of luminance sees {}", blind.predicted.get(32, 32));
+}
+
+/// Nor does a denoiser hide it: what it leaves of colour's noise and smears of its patterns counts.
+#[test]
+fn isoluminant_noise_is_seen_in_denoised_pictures() {
+    let red_for_green = Vec3::new(1.0, -0.2126 / 0.7152, 0.0);
+    let film = film_of(|_, random| Vec3::splat(0.8) + 0.7 * random * red_for_green);
+    let denoised = || LoopSettings { denoiser: Some(Denoiser::Builtin), ..settings() };
+    let seen = judge(&film, &denoised(), 1.0).expect("judges").predicted;
+    let of_luminance = LoopSettings { model: fechner_perception::model::by_name("tvi"), ..denoised() };
+    let blind = judge(&film, &of_luminance, 1.0).expect("judges").predicted;
+    assert!(seen.get(32, 32) > 10.0 * blind.get(32, 32), "{} and {}", seen.get(32, 32), blind.get(32, 32));
+}
+
+/// A film of so many samples of grey noise in half A of each pixel, and so many in half B.
+fn noisy(samples: [u32; 2]) -> Film {
+    let mut film = Film::new(64, 64);
+    for pixel in 0..64 * 64 {
+        for (half, samples) in Half::BOTH.into_iter().zip(samples) {
+            let mut sum = BlockSum::default();
+            for index in 0..samples {
+                let key = u64::from(pixel) << 8 | u64::from(index);
+                let random = (hash_words(key, half.index() as u64) >> 40) as f32 / 8_388_608.0 - 1.0;
+                let first_hit =
+                    FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: false };
+                sum.add(&PathSample { radiance: Vec3::splat(0.8 + 0.5 * random), first_hit, rays: 1 });
+            }
+            film.merge_block(BlockWork { samples, ..BlockWork::whole(pixel, half, 0) }, &sum);
+        }
+    }
+    film
+}
+
+/// Two single samples show √8 times the noise of eight each, about; of one alone nothing is claimed, denoised or not.
+#[test]
+fn few_samples_claim_no_more_than_they_know() {
+    let visible = |samples: [u32; 2]| judge(&noisy(samples), &settings(), 1.0).expect("judges").predicted.mean();
+    let ratio = visible([1, 1]) / visible([8, 8]);
+    assert!((0.7..1.3).contains(&(ratio / 8f64.sqrt())), "{ratio} times as visible");
+    for denoiser in [None, Some(Denoiser::Builtin)] {
+        let settings = LoopSettings { denoiser, ..settings() };
+        for samples in [[1, 0], [0, 0], [4, 0]] {
+            let judgement = judge(&noisy(samples), &settings, 1.0).expect("judges");
+            assert!(!judgement.is_known && !is_reached(&judgement, f64::INFINITY), "{samples:?}");
+            assert!(judgement.predicted.values().iter().all(|v| *v == f32::INFINITY), "{samples:?}");
+        }
+        assert!(judge(&noisy([1, 1]), &settings, 1.0).expect("judges").is_known);
+    }
+}
+
+/// One sample a pixel is no witness against its own denoising: the picture stays what the filter made of it.
+#[test]
+fn a_single_sample_does_not_undo_its_denoising() {
+    let film = noisy([1, 0]);
+    let settings = LoopSettings { denoiser: Some(Denoiser::Builtin), ..settings() };
+    let judgement = judge(&film, &settings, 1.0).expect("judges");
+    let denoised = crate::denoise::denoise_film(&Denoiser::Builtin, &film, settings.nits_per_unit).expect("denoises");
+    assert_eq!(judgement.picture(), denoised.rgb_cd_m2);
+}
+
+/// What the display clips is not pooled into dark neighbours: a lamp that scatters by a thousand times white.
+#[test]
+fn a_clipped_lamp_does_not_trouble_its_neighbours() {
+    let dim = |random: f32| Vec3::splat(0.5 + 0.05 * random);
+    let film = film_of(|_, random| dim(random));
+    let is_lamp = |pixel: u32| (28..36).contains(&(pixel % 64)) && (28..36).contains(&(pixel / 64));
+    let lit = film_of(|pixel, random| if is_lamp(pixel) { Vec3::splat(2000.0 + 900.0 * random) } else { dim(random) });
+    let beside = |film: &Film| judge(film, &settings(), 1.0).expect("judges").pooled_variance_per_sample.get(37, 32);
+    let (before, after) = (beside(&film), beside(&lit));
+    assert!(after < 4.0 * before, "variance beside the lamp went from {before} to {after}");
+}
+
+/// An operator that sees rods is fitted to what they see: of blue, more than cones do.
+#[test]
+fn rods_see_the_colours_of_the_guide() {
+    let film = film_of(|_, random| (1.0 + 0.1 * random) * Vec3::new(0.002, 0.01, 0.05));
+    for denoiser in [None, Some(Denoiser::Builtin)] {
+        let operator = fechner_perception::tone::operator("ferwerda96", None).expect("an operator");
+        let settings = LoopSettings { operator, nits_per_unit: 1.0, denoiser, ..settings() };
+        let judgement = judge(&film, &settings, 1.0).expect("judges");
+        let light = [[0.002, 0.01, 0.05]; 4];
+        let expected = settings.operator.fit(
+            &SceneLight::of(settings.operator.as_ref(), 2, &light).guide(),
+            &settings.viewing,
+            None,
+        );
+        let [found, expected] = [judgement.tone.as_ref(), expected.as_ref()].map(|tone| tone.relative_luminance(0.01));
+        assert!((found / expected - 1.0).abs() < 0.02, "{found}, not {expected}");
+    }
+}

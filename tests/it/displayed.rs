@@ -1,0 +1,163 @@
+//! `fechner compare` and `threshold` see what the display shows: colours that it clips, PQ and sRGB files, rods, acuity, the
+//! room's light.
+
+use assert_cmd::Command;
+use fechner::exr_read::read_exr;
+use fechner::output::{Attribute, NITS_PER_UNIT, Picture, write_exr, write_png};
+use std::path::Path;
+
+const SIDE: usize = 64;
+
+fn fechner(folder: &Path, arguments: &[&str]) -> (i32, String) {
+    let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+    let output = command.args(arguments).current_dir(folder).output().expect("runs");
+    let said = [output.stdout, output.stderr].concat();
+    (output.status.code().unwrap_or(-1), String::from_utf8_lossy(&said).into_owned())
+}
+
+fn run(folder: &Path, arguments: &[&str]) -> String {
+    let (code, said) = fechner(folder, arguments);
+    assert_eq!(code, 0, "{arguments:?}: {said}");
+    said
+}
+
+/// A picture of light in cd/m², `rgb` of each pixel's number.
+fn write(folder: &Path, name: &str, rgb: impl Fn(usize) -> [f32; 3]) {
+    let mut picture = Picture::new(SIDE as u32, SIDE as u32);
+    for (channel, letter) in ["R", "G", "B"].into_iter().enumerate() {
+        picture.push_f32(letter, (0..SIDE * SIDE).map(|pixel| rgb(pixel)[channel]).collect::<Vec<_>>());
+    }
+    picture.push_attribute(NITS_PER_UNIT, Attribute::Float(1.0));
+    write_exr(&folder.join(name), &picture).expect("written");
+}
+
+/// From -1 to 1, another number for each pixel and key.
+fn random(pixel: usize, key: u64) -> f32 {
+    let mut hash = (pixel as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(key << 32);
+    for _ in 0..3 {
+        hash = (hash ^ (hash >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    }
+    (hash >> 40) as f32 / 8_388_608.0 - 1.0
+}
+
+fn mean(folder: &Path, name: &str, channel: &str) -> f32 {
+    let exr = read_exr(&folder.join(name)).expect("an EXR file");
+    let values = exr.channel(channel).expect("the channel");
+    values.iter().sum::<f32>() / values.len() as f32
+}
+
+fn visibility(said: &str) -> f32 {
+    let number = said.split("worst visibility ").nth(1).and_then(|rest| rest.split_whitespace().next());
+    number.and_then(|number| number.parse().ok()).unwrap_or_else(|| panic!("no visibility in {said}"))
+}
+
+/// Blue far above the clip: what the green below it does is seen, and the eye is adapted to what is shown.
+#[test]
+fn noise_beside_a_clipped_channel_is_seen() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let noise = |key| move |pixel| [0.0, 80.0 * (0.11 + 0.09 * random(pixel, key)), 1600.0];
+    write(folder.path(), "g.exr", |_| [0.0, 8.8, 1600.0]);
+    write(folder.path(), "a.exr", noise(1));
+    write(folder.path(), "b.exr", noise(2));
+    for operator in ["srgb", "linear"] {
+        let arguments = ["threshold", "g.exr", "--halves", "a.exr", "b.exr", "--operator", operator, "-o", "t.exr"];
+        run(folder.path(), &arguments);
+        let (adaptation, seen) =
+            (mean(folder.path(), "t.exr", "adaptation.Y"), mean(folder.path(), "t.exr", "visibility.Y"));
+        assert!(adaptation < 60.0 && seen > 1.0, "{operator}: adapted to {adaptation} cd/m², visibility {seen}");
+    }
+}
+
+/// Halves in scene light are shown by the operator even where the guide is ready for the display.
+#[test]
+fn halves_of_a_scene_are_fitted_where_the_guide_is_none() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, key) in [("a.exr", 1), ("b.exr", 2)] {
+        write(folder.path(), name, |pixel| [10.0 + 5.0 * random(pixel, key); 3]);
+    }
+    write_png(&folder.path().join("g.png"), SIDE as u32, SIDE as u32, &[[0.18; 3]; SIDE * SIDE]).expect("written");
+    run(folder.path(), &["threshold", "g.png", "--halves", "a.exr", "b.exr", "-o", "t.exr"]);
+    let seen = mean(folder.path(), "t.exr", "visibility.Y");
+    assert!(seen > 1.0, "{seen}");
+}
+
+/// Detail in the dark is there whatever the room adds, in PQ as in sRGB.
+#[test]
+fn dark_detail_of_an_hdr_picture_survives_a_lit_room() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("room.toml"), "preset = 'hdr-1000'\nambient_cd_m2 = 5").expect("written");
+    for (name, light) in [("one", 1.0), ("three", 3.0)] {
+        let exr = format!("{name}.exr");
+        write(folder.path(), &exr, |pixel| [if pixel / 8 % 2 == 0 { light } else { 1.0 }; 3]);
+        let png = format!("{name}.png");
+        run(folder.path(), &["tonemap", &exr, "-o", &png, "--operator", "absolute", "--display", "room.toml"]);
+    }
+    let (code, said) = fechner(folder.path(), &["compare", "one.png", "three.png", "--display", "room.toml"]);
+    assert!(code == 1 && visibility(&said) > 3.0, "{said}");
+}
+
+/// The program's own PNG of a picture looks like the picture: to rods, behind a loss of acuity, on displays of any curve.
+#[test]
+fn a_picture_looks_like_its_own_png() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), "blue.exr", |_| [0.002, 0.01, 0.05]);
+    write(folder.path(), "night.exr", |pixel| [0.01 * (1.0 + 0.5 * random(pixel, 3)); 3]);
+    write(folder.path(), "ramp.exr", |pixel| [80.0 * 0.01_f32.powf((pixel % SIDE) as f32 / SIDE as f32); 3]);
+    for (picture, operator, display) in [
+        ("blue.exr", "ferwerda96", "desktop"),
+        ("blue.exr", "pattanaik00", "desktop"),
+        ("night.exr", "ferwerda96", "desktop"),
+        ("ramp.exr", "srgb", "cinema"),
+        ("ramp.exr", "srgb", "uhd-tv"),
+        ("ramp.exr", "srgb", "hdr-1000"),
+    ] {
+        let how = ["--operator", operator, "--display", display];
+        run(folder.path(), &[&["tonemap", picture, "-o", "shown.png"][..], &how[..]].concat());
+        let (_, said) = fechner(folder.path(), &[&["compare", picture, "shown.png"][..], &how[..]].concat());
+        // One step of eight bits in the dark is near threshold.
+        assert!(visibility(&said) < 1.5, "{picture} by {operator} on {display}: {said}");
+    }
+}
+
+/// A tone-mapped EXR says what the screen emits, and is that again when it is shown as it is.
+#[test]
+fn a_tone_mapped_exr_is_shown_as_it_is() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), "dark.exr", |pixel| [80.0 * 1e-4_f32.powf((pixel % SIDE) as f32 / SIDE as f32); 3]);
+    for output in ["once.exr", "once.png"] {
+        run(folder.path(), &["tonemap", "dark.exr", "-o", output, "--operator", "srgb"]);
+    }
+    run(folder.path(), &["tonemap", "once.exr", "-o", "twice.exr", "--operator", "absolute"]);
+    let values = |name: &str| read_exr(&folder.path().join(name)).expect("read").channel("G").expect("green").to_vec();
+    for (once, twice) in values("once.exr").iter().zip(values("twice.exr")) {
+        assert!((once - twice).abs() < 1e-6, "{once} became {twice}");
+    }
+    let (_, said) = fechner(folder.path(), &["compare", "once.exr", "once.png", "--operator", "absolute"]);
+    assert!(visibility(&said) < 1.5, "{said}");
+}
+
+/// A Radiance picture that was brightened says by how much.
+#[test]
+fn exposure_of_radiance_pictures_is_taken_off() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, lines) in [("plain.hdr", ""), ("bright.hdr", "EXPOSURE=8\n")] {
+        let mut bytes = format!("#?RADIANCE\n{lines}FORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 4\n").into_bytes();
+        bytes.extend([128_u8, 128, 128, 128].repeat(16));
+        std::fs::write(folder.path().join(name), bytes).expect("written");
+    }
+    let shown = |name: &str| {
+        run(folder.path(), &["tonemap", name, "-o", "o.exr", "--operator", "absolute", "--nits-per-unit", "100"]);
+        200.0 * mean(folder.path(), "o.exr", "G")
+    };
+    let (plain, bright) = (shown("plain.hdr"), shown("bright.hdr"));
+    assert!((plain / 50.0 - 1.0).abs() < 0.02 && (bright / 6.25 - 1.0).abs() < 0.02, "{plain} {bright}");
+}
+
+/// What is no picture to look at is refused.
+#[test]
+fn a_map_is_a_png() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), "a.exr", |_| [1.0; 3]);
+    let (code, said) = fechner(folder.path(), &["compare", "a.exr", "a.exr", "--map", "map.exr"]);
+    assert!(code == 2 && said.contains("end the name in .png"), "{code}: {said}");
+}
