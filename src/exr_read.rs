@@ -15,11 +15,16 @@ use std::path::{Path, PathBuf};
 
 mod colour;
 mod subsampled;
+mod window;
 
 pub use colour::ScenePicture;
+pub use window::Window;
 
 /// Most memory that the pixels of a file may take as 32-bit floats: 1 GiB, a 4K frame with 30 channels.
 pub const MEMORY_LIMIT_BYTES: u64 = 1 << 30;
+
+/// Memory that a pixel of the display window takes, as linear RGB.
+const BYTES_PER_SHOWN_PIXEL: u64 = 12;
 
 /// An EXR file in memory.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,28 +42,19 @@ pub struct ExrImage {
     pub types: Vec<SampleType>,
     /// Attributes of the first part, sorted by name. Other types than text and numbers are given as text.
     pub attributes: Vec<(String, Attribute)>,
-    /// Parts that were left out because their size differs from the first one's.
+    /// Parts that were left out because their size differs from the first one's, or nothing of them lies in its data window.
     pub parts_left_out: Vec<String>,
     /// Lines at the bottom that could not be read: an odd rest of lines in a block of subsampled channels.
     pub lines_left_out: u32,
     /// What is to be shown; may be smaller or larger than the data.
     pub display_window: Window,
+    /// Whether the file's display window has no pixels or too many for memory, and the data window stands for it.
+    pub is_display_window_left_out: bool,
     /// Width of a pixel over its height; 1 where the file's is none that a pixel can have (0.01 to 100).
     pub pixel_aspect_ratio: f64,
     /// Primaries and white of R, G and B, where the file says them. Channels are as in the file: see
     /// [`ExrImage::scene_picture`].
     pub chromaticities: Option<Primaries>,
-}
-
-/// A rectangle of pixels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Window {
-    /// Its top left pixel, x to the right and y down.
-    pub origin: (i32, i32),
-    /// Width in pixels.
-    pub width: u32,
-    /// Height in pixels.
-    pub height: u32,
 }
 
 /// How a file stores a channel.
@@ -172,9 +168,12 @@ pub fn decode_exr(path: &Path, file: &[u8]) -> Result<ExrImage, ExrReadError> {
     let first = &headers[0];
     let mut result = image_without_channels(first);
     let several = image.layer_data.len() > 1;
+    let window = result.data_window();
     for layer in image.layer_data {
         let part = layer.attributes.layer_name.as_ref().map(Text::to_string).unwrap_or_default();
-        if layer.size != first.layer_size {
+        let Vec2(x, y) = layer.attributes.layer_position;
+        let own_window = Window { origin: (x, y), ..window };
+        if layer.size != first.layer_size || !own_window.meets(&window) {
             result.parts_left_out.push(part);
             continue;
         }
@@ -186,7 +185,7 @@ pub fn decode_exr(path: &Path, file: &[u8]) -> Result<ExrImage, ExrReadError> {
                 FlatSamples::F16(values) => (values.iter().map(|v| v.to_f32()).collect(), SampleType::Half),
                 FlatSamples::U32(values) => (values.iter().map(|&v| v as f32).collect(), SampleType::Uint),
             };
-            result.channels.push((name, values));
+            result.channels.push((name, own_window.put_into(&window, values, 0.0)));
             result.types.push(kind);
         }
     }
@@ -197,9 +196,10 @@ fn image_without_channels(first: &Header) -> ExrImage {
     let window = first.shared_attributes.display_window;
     // A display window that no memory could hold is no reason to refuse the data.
     let data = first.layer_size.0.saturating_mul(first.layer_size.1);
-    let sound = window.size.0 > 0
-        && window.size.1 > 0
-        && window.size.0.saturating_mul(window.size.1) <= (64 * data).max(1 << 24);
+    let shown = window.size.0.saturating_mul(window.size.1);
+    let is_sound = shown > 0
+        && shown <= data.saturating_mul(64).max(1 << 24)
+        && (shown as u64).saturating_mul(BYTES_PER_SHOWN_PIXEL) <= MEMORY_LIMIT_BYTES;
     let origin = (first.own_attributes.layer_position.0, first.own_attributes.layer_position.1);
     let (width, height) = (first.layer_size.0 as u32, first.layer_size.1 as u32);
     let point = |Vec2(x, y): Vec2<f32>| [f64::from(x), f64::from(y)];
@@ -212,7 +212,8 @@ fn image_without_channels(first: &Header) -> ExrImage {
         attributes: attributes(first),
         parts_left_out: Vec::new(),
         lines_left_out: 0,
-        display_window: if sound {
+        is_display_window_left_out: !is_sound,
+        display_window: if is_sound {
             let origin = (window.position.0, window.position.1);
             Window { origin, width: window.size.0 as u32, height: window.size.1 as u32 }
         } else {

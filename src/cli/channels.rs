@@ -19,18 +19,24 @@ const NOT_THE_PICTURE: [&str; 14] = [
 /// What renderers call the finished picture; R, G and B without a layer come first.
 const THE_PICTURE: [&str; 5] = ["combined", "beauty", "rgba", "color", "image"];
 
-/// The picture: `R`, `G`, `B` if the file has them, else of a layer called like a finished picture
-/// (`RenderLayer.Combined.R`), else of the first layer that is no auxiliary; else `Y`. All three come from one layer.
-pub(super) fn colour(exr: &ExrImage) -> Option<Colour<'_>> {
+/// The picture: `R`, `G`, `B` if the file has them, else of a layer a part of whose name, between dots, is what a finished picture is
+/// called (`RenderLayer.Combined.R`), else of the first layer; auxiliaries only where a part of their name says picture and nothing
+/// else is there; else `Y`. All three come from one layer.
+pub(super) fn colour<'a>(exr: &'a ExrImage) -> Option<Colour<'a>> {
     let layers = layers_with(exr, &["R", "G", "B"]);
-    let called = |name: &str| layers.iter().copied().find(|layer| layer.to_ascii_lowercase().contains(name));
     let is_auxiliary = |layer: &str| NOT_THE_PICTURE.iter().any(|name| layer.to_ascii_lowercase().contains(*name));
-    let best = layers
+    let (auxiliary, others): (Vec<&str>, Vec<&str>) = layers.into_iter().partition(|layer| is_auxiliary(layer));
+    let called = |layers: &[&'a str]| {
+        let is = |layer: &str, name: &str| layer.split('.').any(|part| part.eq_ignore_ascii_case(name));
+        THE_PICTURE.iter().find_map(|name| layers.iter().copied().find(|layer| is(layer, name)))
+    };
+    let best = others
         .iter()
         .copied()
         .find(|layer| layer.is_empty())
-        .or_else(|| THE_PICTURE.iter().find_map(|name| called(name)))
-        .or_else(|| layers.iter().copied().find(|layer| !is_auxiliary(layer)));
+        .or_else(|| called(&others))
+        .or_else(|| others.first().copied())
+        .or_else(|| called(&auxiliary));
     match best {
         Some(layer) => {
             let [Some(r), Some(g), Some(b)] = ["R", "G", "B"].map(|part| part_of(exr, layer, part)) else {
@@ -136,6 +142,7 @@ mod tests {
             height: 1,
             data_window_origin: (0, 0),
             display_window: Window { origin: (0, 0), width: 1, height: 1 },
+            is_display_window_left_out: false,
             chromaticities: None,
             pixel_aspect_ratio: 1.0,
             lines_left_out: 0,
@@ -169,6 +176,15 @@ mod tests {
         assert_eq!(rgb_of(&blender), Some([6.0, 5.0, 4.0]));
         assert_eq!(rgb_of(&["albedo.B", "albedo.G", "albedo.R", "main.b", "main.g", "main.r"]), Some([5.0, 4.0, 3.0]));
         assert_eq!(rgb_of(&["albedo.B", "albedo.G", "albedo.R"]), None);
+        // A pass that has a picture's name in its own is still a pass.
+        let passes = ["diffuse_color.B", "diffuse_color.G", "diffuse_color.R", "main.B", "main.G", "main.R"];
+        assert_eq!(rgb_of(&passes), Some([5.0, 4.0, 3.0]));
+        let passes = ["specular_color.B", "specular_color.G", "specular_color.R", "Beauty.B", "Beauty.G", "Beauty.R"];
+        assert_eq!(rgb_of(&passes), Some([5.0, 4.0, 3.0]));
+        assert_eq!(
+            rgb_of(&["MaskedView.Combined.B", "MaskedView.Combined.G", "MaskedView.Combined.R"]),
+            Some([2.0, 1.0, 0.0])
+        );
         assert_eq!(colour(&exr(&["Y"])), Some(Colour::Grey(&[0.0])));
         assert_eq!(colour(&exr(&["Z"])), None);
     }

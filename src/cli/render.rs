@@ -62,7 +62,7 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     let Prepared { scene, trace, record, settings } = arguments.job.prepare()?;
     let Crop { width, height, .. } = trace.film_area();
     let fresh = RenderState::new(width, height, &settings.limits);
-    let audience = arguments.view.then(|| audience(&scene, &settings, &record.operator)).transpose()?;
+    let audience = arguments.view.then(|| audience(&scene, &settings, &record)).transpose()?;
     let (state, seeds, keeper) = if arguments.checkpoint.is_wanted() {
         let origin = Origin::of(&scene, &trace);
         let seeds = Seeds::one(trace.seed);

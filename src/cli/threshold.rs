@@ -186,8 +186,9 @@ impl Motion {
 /// Motion in pixels under the names that renderers give it.
 fn read_velocity(path: &Path, (width, height): (usize, usize), frames_per_second: f64) -> Result<[Plane; 2]> {
     let exr = read_exr(path)?;
-    if (exr.width as usize, exr.height as usize) != (width, height) {
-        bail!("{} has {}x{} pixels, the picture {width}x{height}", path.display(), exr.width, exr.height);
+    let shown = exr.display_window;
+    if (shown.width as usize, shown.height as usize) != (width, height) {
+        bail!("{} has {}x{} pixels, the picture {width}x{height}", path.display(), shown.width, shown.height);
     }
     let Some((layer, [x, y])) = channels::motion(&exr) else {
         bail!(
@@ -199,7 +200,7 @@ fn read_velocity(path: &Path, (width, height): (usize, usize), frames_per_second
     println!("motion from the channels of {layer} at {frames_per_second} frames a second");
     let plane = |values: &[f32]| {
         let finite = values.iter().map(|&v| if v.is_finite() { v } else { 0.0 }).collect();
-        Plane::from_values(width, height, finite)
+        Plane::from_values(width, height, exr.in_display_window(finite))
     };
     Ok([plane(x)?, plane(y)?])
 }

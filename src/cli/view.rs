@@ -9,6 +9,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use fechner::adaptive::Rendered;
 use fechner::adaptive::settings::LoopSettings;
+use fechner::checkpoint::SettingsRecord;
 use fechner::output;
 use fechner::preview::{self, Audience, Door, Host, Job, Options, Spectator};
 use fechner::scene::Scene;
@@ -41,6 +42,8 @@ const DEFAULT_MODEL: &str = "csf-bands";
 /// The scene file and the arguments that say how to render it.
 struct FileHost {
     job: JobArguments,
+    /// Whether a picture was written.
+    has_saved: AtomicBool,
 }
 
 impl Host for FileHost {
@@ -58,7 +61,9 @@ impl Host for FileHost {
             let report = Report::new(&self.job.scene_name(), &[self.job.seed()], settings, rendered);
             write_picture(path, format, self.job.background(), rendered, settings, &report)
         };
-        write().map_err(|error: anyhow::Error| format!("{error:#}"))
+        write().map_err(|error: anyhow::Error| format!("{error:#}"))?;
+        self.has_saved.store(true, Ordering::Relaxed);
+        Ok(())
     }
 
     fn scene_file(&self) -> &Path {
@@ -72,11 +77,15 @@ fn job_of(prepared: Prepared) -> Job {
 }
 
 /// A running render, open to viewers on this machine at a free port; says where.
-pub(super) fn audience<'a>(scene: &Scene, settings: &'a LoopSettings, operator: &str) -> anyhow::Result<Audience<'a>> {
+pub(super) fn audience<'a>(
+    scene: &Scene,
+    settings: &'a LoopSettings,
+    record: &SettingsRecord,
+) -> anyhow::Result<Audience<'a>> {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).context("no port to show the render at")?;
     let (address, token) = door_of(&listener)?;
     eprintln!("Watch it at http://{address}/?token={token}");
-    Audience::open(listener, Door { address, token }, scene, settings, operator)
+    Audience::open(listener, Door { address, token }, scene, settings, record)
         .context("the thread for viewers could not be started")
 }
 
@@ -93,19 +102,26 @@ pub(super) fn run(arguments: &ViewArguments) -> anyhow::Result<()> {
         .with_context(|| format!("cannot listen on {asked}: choose another --port, or an address of this machine"))?;
     let (address, token) = door_of(&listener)?;
     let job = pool.install(|| arguments.job.prepare().map(job_of))?;
-    let host = FileHost { job: arguments.job.clone() };
+    let host = Arc::new(FileHost { job: arguments.job.clone(), has_saved: AtomicBool::new(false) });
     if arguments.foveated && job.record.model != DEFAULT_MODEL {
         bail!("--foveated is for --model {DEFAULT_MODEL}: {} does not know where one looks", job.record.model);
     }
     let tev = arguments.tev.open(&arguments.job.scene_name())?;
     let spectators = tev.into_iter().map(|tev| Box::new(tev) as Box<dyn Spectator>).collect();
     let options = Options { is_foveated: arguments.foveated, spectators };
-    let preview = preview::start(job, Arc::new(host), options, pool).context("the threads could not be started")?;
+    let preview = preview::start(job, Arc::clone(&host) as Arc<dyn Host>, options, pool)
+        .context("the threads could not be started")?;
     let closer = preview.closer();
     signals::listen(move || closer.close())?;
     if !address.ip().is_loopback() {
         eprintln!("note: {address} can be reached from other machines; whoever has the address can drive this preview");
     }
     println!("http://{address}/?token={token}");
-    preview.serve(listener, Door { address, token }).with_context(|| format!("cannot serve on {address}"))
+    preview.serve(listener, Door { address, token }).with_context(|| format!("cannot serve on {address}"))?;
+    if !host.has_saved.load(Ordering::Relaxed) {
+        eprintln!(
+            "note: no picture was saved: the page's \"Save PNG\" and \"Save EXR\" do that before the end, `render -o` at the end"
+        );
+    }
+    Ok(())
 }

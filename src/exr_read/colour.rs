@@ -65,12 +65,15 @@ impl ExrImage {
         if self.data_window() != self.display_window {
             let (w, h, (x, y)) = (self.width, self.height, self.data_window_origin);
             notes.push(format!("data of {w}x{h} pixels at ({x}, {y}) put into a window of {width}x{height}"));
-            rgb = self.in_display_window(&rgb);
+            rgb = self.data_window().put_into(&self.display_window, rgb, [0.0; 3]);
+        }
+        if self.is_display_window_left_out {
+            notes.push("its display window cannot be shown: all of the data is".to_owned());
         }
         Some(ScenePicture { width, height, rgb, notes })
     }
 
-    fn data_window(&self) -> Window {
+    pub(super) fn data_window(&self) -> Window {
         // Lines that could not be read leave a black border, which is said.
         Window { origin: self.data_window_origin, width: self.width, height: self.height }
     }
@@ -86,25 +89,9 @@ impl ExrImage {
         file.to(&Primaries::REC709)
     }
 
-    fn in_display_window(&self, rgb: &[[f32; 3]]) -> Vec<[f32; 3]> {
-        let Window { origin, width, height } = self.display_window;
-        let offset = |pixel: u32, window: i32, data: i32, size: u32| {
-            usize::try_from(i64::from(pixel) + i64::from(window) - i64::from(data))
-                .ok()
-                .filter(|at| *at < size as usize)
-        };
-        let mut shown = Vec::with_capacity(width as usize * height as usize);
-        for y in 0..height {
-            let row = offset(y, origin.1, self.data_window_origin.1, self.height);
-            for x in 0..width {
-                let column = offset(x, origin.0, self.data_window_origin.0, self.width);
-                shown.push(match (row, column) {
-                    (Some(row), Some(column)) => rgb[row * self.width as usize + column],
-                    _ => [0.0; 3],
-                });
-            }
-        }
-        shown
+    /// A channel's values over the display window; 0 where the file has no pixels.
+    pub fn in_display_window(&self, channel: Vec<f32>) -> Vec<f32> {
+        self.data_window().put_into(&self.display_window, channel, 0.0)
     }
 }
 

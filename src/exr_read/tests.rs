@@ -107,3 +107,56 @@ fn what_is_no_exr_file_is_named() {
     std::fs::write(&path, "not a picture").unwrap();
     assert!(message(&path).contains("damaged or no EXR file"));
 }
+
+/// Writes a file of parts that hold one channel each, at their places and of one size.
+fn write_parts(path: &Path, display: [i32; 4], size: usize, parts: &[(&str, [i32; 2], f32)]) {
+    use ::exr::prelude::{
+        AnyChannel, AnyChannels, Encoding, Image, ImageAttributes, IntegerBounds, Layer, LayerAttributes, WritableImage,
+    };
+    let layers: Vec<Layer<AnyChannels<FlatSamples>>> = parts
+        .iter()
+        .map(|&(name, [x, y], value)| {
+            let attributes = LayerAttributes { layer_position: Vec2(x, y), ..LayerAttributes::named(name) };
+            let values = (0..size * size).map(|pixel| value + pixel as f32).collect();
+            let channels = AnyChannels::sort([AnyChannel::new("Y", FlatSamples::F32(values))].into_iter().collect());
+            Layer::new((size, size), attributes, Encoding::FAST_LOSSLESS, channels)
+        })
+        .collect();
+    let [x, y, width, height] = display;
+    let attributes = ImageAttributes::new(IntegerBounds::new((x, y), (width as usize, height as usize)));
+    Image::from_layers(attributes, layers).write().to_file(path).unwrap();
+}
+
+/// Each pixel of a part stays where it is, and a part that is elsewhere altogether is left out.
+#[test]
+fn parts_stand_where_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("parts.exr");
+    write_parts(&path, [0, 0, 2, 2], 2, &[("a", [0, 0], 1.0), ("b", [1, 0], 5.0), ("c", [9, 9], 0.0)]);
+    let image = read_exr(&path).unwrap();
+    assert_eq!(image.channel("a.Y").unwrap(), [1.0, 2.0, 3.0, 4.0]);
+    assert_eq!(image.channel("b.Y").unwrap(), [0.0, 5.0, 0.0, 7.0]);
+    assert_eq!(image.parts_left_out, ["c"]);
+}
+
+/// What is laid out like the data, as motion is, can be laid out like the picture.
+#[test]
+fn channels_come_into_the_display_window() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("shifted.exr");
+    write_parts(&path, [0, 0, 3, 1], 2, &[("a", [1, -1], 1.0)]);
+    let image = read_exr(&path).unwrap();
+    assert_eq!(image.in_display_window(image.channel("Y").unwrap().to_vec()), [0.0, 3.0, 4.0]);
+}
+
+/// A display window that the memory has no room for is left out, with a word about it.
+#[test]
+fn a_display_window_too_large_for_memory_is_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("wide.exr");
+    write_parts(&path, [0, 0, 9600, 9600], 1200, &[("a", [0, 0], 0.0)]);
+    let image = read_exr(&path).unwrap();
+    assert_eq!((image.display_window.width, image.display_window.height), (1200, 1200));
+    let picture = image.scene_picture(ExrImage::channel).unwrap();
+    assert_eq!((picture.width, picture.notes.len()), (1200, 1), "{:?}", picture.notes);
+}

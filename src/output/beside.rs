@@ -9,7 +9,7 @@ use tempfile::NamedTempFile;
 /// Writes `path` by letting `write` fill a new file in the same folder, which then takes the target's place at once.
 ///
 /// If `write` fails, the new file is removed and the target stays as it was. A symbolic link is followed: the file that it
-/// points to is replaced, not the link.
+/// points to is replaced or made, not the link.
 pub fn write_beside(path: &Path, write: impl FnOnce(&mut File) -> std::io::Result<()>) -> Result<(), OutputError> {
     let (mut file, target) = create_beside(path)?;
     let io = |error| OutputError::Io { path: path.to_owned(), error };
@@ -29,7 +29,7 @@ pub(super) fn create_beside(path: &Path) -> Result<(NamedTempFile, PathBuf), Out
         // Renaming over a device such as /dev/null would replace the device.
         Ok(found) if !found.is_file() => return Err(not_a_file("not an ordinary file")),
         Ok(_) => path.canonicalize().map_err(io)?,
-        Err(_) => path.to_owned(),
+        Err(_) => end_of_links(path).map_err(io)?,
     };
     let Some(name) = target.file_name() else {
         return Err(not_a_file("a folder"));
@@ -64,6 +64,18 @@ pub(super) fn create_beside(path: &Path) -> Result<(NamedTempFile, PathBuf), Out
         // The error's own text names the temporary file, which the user never asked for.
         io(std::io::Error::new(error.kind(), format!("cannot make a file in {}: {}", folder.display(), plain(&error))))
     })
+}
+
+/// Where links lead from a path at whose end nothing is.
+fn end_of_links(path: &Path) -> std::io::Result<PathBuf> {
+    /// As many as Linux follows.
+    const MOST_LINKS: usize = 40;
+    let mut end = path.to_owned();
+    for _ in 0..MOST_LINKS {
+        let Ok(next) = end.read_link() else { return Ok(end) };
+        end = end.parent().unwrap_or(Path::new("")).join(next);
+    }
+    Err(std::io::Error::other("its links lead in a circle"))
 }
 
 /// How the names of new files end until they are renamed.
@@ -179,6 +191,18 @@ mod tests {
         write_beside(&link, |file| file.write_all(b"x")).unwrap();
         assert!(link.symlink_metadata().unwrap().is_symlink());
         assert_eq!(std::fs::read(&ours).unwrap(), b"x");
+
+        // Also where nothing is at its end yet; relative to where the link is.
+        std::fs::remove_file(&ours).unwrap();
+        let before = folder.path().join("b");
+        std::os::unix::fs::symlink("l", &before).unwrap();
+        write_beside(&before, |file| file.write_all(b"y")).unwrap();
+        assert!(link.symlink_metadata().unwrap().is_symlink() && before.symlink_metadata().unwrap().is_symlink());
+        assert_eq!(std::fs::read(&ours).unwrap(), b"y");
+
+        let circle = folder.path().join("c");
+        std::os::unix::fs::symlink("c", &circle).unwrap();
+        assert!(write_beside(&circle, |_| Ok(())).unwrap_err().to_string().contains("lead in a circle"));
     }
 
     #[test]

@@ -16,7 +16,7 @@ mod srgb_codes;
 pub use beside::{remove_leftovers, write_beside};
 pub use exr_file::write_exr;
 pub use png_file::{
-    PngTransfer, decode_pq, encode_srgb8, png_transfer, write_png, write_png_for, write_png_with_alpha, write_pq_png,
+    PngTransfer, decode_pq, encode_srgb8, png_transfer, write_png, write_png_for, write_png_with_alpha_for, write_pq_png,
 };
 
 use fechner_perception::tone::FittedTone;
@@ -119,7 +119,8 @@ impl<'a> Picture<'a> {
 /// A named fact about a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Attribute {
-    /// Text; other characters than those of Latin-1 become `?`, since the format knows only bytes.
+    /// Text in ASCII: a few signs (², ×, –) have a plain one instead, all other characters become `?`, since the format does not say
+    /// what its bytes mean.
     Text(String),
     /// A number.
     Float(f32),

@@ -47,16 +47,26 @@ pub fn write_pq_png(
     display: &Display,
 ) -> Result<(), OutputError> {
     check_size(path, width, height, &[("the picture", rgb_linear_display.len())])?;
-    let bytes = encode_pq16(rgb_linear_display, display);
+    write_pq_bytes(path, width, height, png::ColorType::Rgb, &encode_pq16(rgb_linear_display, display))
+}
+
+/// Writes 16-bit samples, tagged as PQ.
+fn write_pq_bytes(
+    path: &Path,
+    width: u32,
+    height: u32,
+    color: png::ColorType,
+    bytes: &[u8],
+) -> Result<(), OutputError> {
     write_beside(path, |file| {
         let mut buffered = BufWriter::new(file);
         let mut encoder = png::Encoder::new(&mut buffered, width, height);
-        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_color(color);
         encoder.set_depth(png::BitDepth::Sixteen);
         encoder.set_compression(COMPRESSION);
         let mut writer = encoder.write_header()?;
         writer.write_chunk(png::chunk::ChunkType(*b"cICP"), &CICP_BT2020_PQ)?;
-        writer.write_image_data(&bytes)?;
+        writer.write_image_data(bytes)?;
         writer.finish()?;
         buffered.flush()
     })
@@ -123,15 +133,26 @@ pub fn write_png(path: &Path, width: u32, height: u32, rgb_linear_display: &[[f3
     write_bytes(path, width, height, png::ColorType::Rgb, &encode_srgb8(width, rgb_linear_display))
 }
 
-/// The same with an alpha in [0, 1] a pixel, by which the colours are not multiplied.
-pub fn write_png_with_alpha(
+/// [`write_png_for`] with an alpha in [0, 1] a pixel, by which the colours are not multiplied.
+pub fn write_png_with_alpha_for(
     path: &Path,
     width: u32,
     height: u32,
     rgb_linear_display: &[[f32; 3]],
     alpha: &[f32],
+    display: &Display,
 ) -> Result<(), OutputError> {
     check_size(path, width, height, &[("the picture", rgb_linear_display.len()), ("alpha", alpha.len())])?;
+    if display.eotf == Eotf::Pq {
+        let colors = encode_pq16(rgb_linear_display, display);
+        let alphas = alpha.iter().map(|a| (a.clamp(0.0, 1.0) * 65_535.0 + 0.5) as u16);
+        let bytes: Vec<u8> = colors
+            .chunks_exact(6)
+            .zip(alphas)
+            .flat_map(|(rgb, a)| rgb.iter().copied().chain(a.to_be_bytes()))
+            .collect();
+        return write_pq_bytes(path, width, height, png::ColorType::Rgba, &bytes);
+    }
     let colors = encode_srgb8(width, rgb_linear_display);
     let alphas = alpha.iter().map(|a| (a.clamp(0.0, 1.0) * 255.0 + 0.5) as u8);
     let bytes: Vec<u8> =
@@ -260,6 +281,28 @@ mod tests {
         assert!((Eotf::Pq.decode(code(3), 1.0) - 0.005).abs() < 1e-4, "{}", code(3));
         // Red of Rec.709 is orange in Rec.2020's primaries.
         assert!(code(6) > code(7) && code(7) > code(8) && code(8) > code(5));
+    }
+
+    /// Somebody's transparent HDR picture has the same light where it covers, and says so.
+    #[test]
+    fn an_hdr_picture_keeps_its_codes_beside_an_alpha() {
+        let folder = tempfile::tempdir().unwrap();
+        let display = Display::preset("hdr-1000").unwrap();
+        let light = [[1.0, 0.5, 0.02], [0.0; 3]];
+        let read = |name: &str| {
+            let file = std::io::BufReader::new(std::fs::File::open(folder.path().join(name)).unwrap());
+            let mut reader = png::Decoder::new(file).read_info().unwrap();
+            let tag = reader.info().coding_independent_code_points.map(|tag| tag.transfer_function);
+            let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+            reader.next_frame(&mut bytes).unwrap();
+            (tag, bytes)
+        };
+        write_png_for(&folder.path().join("a.png"), 2, 1, &light, &display).unwrap();
+        write_png_with_alpha_for(&folder.path().join("b.png"), 2, 1, &light, &[1.0, 0.0], &display).unwrap();
+        let ((_, opaque), (tag, bytes)) = (read("a.png"), read("b.png"));
+        assert_eq!((tag, bytes.len()), (Some(16), 16));
+        assert_eq!((&bytes[..6], &bytes[6..8]), (&opaque[..6], &[255, 255][..]));
+        assert_eq!((&bytes[8..14], &bytes[14..]), (&opaque[6..], &[0, 0][..]));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The files a render leaves: what the display shows, or every layer of it.
 
-use super::{Attribute, NITS_PER_UNIT, OutputError, Picture, write_exr, write_png_for, write_png_with_alpha};
+use super::{Attribute, NITS_PER_UNIT, OutputError, Picture, write_exr, write_png_for, write_png_with_alpha_for};
 use crate::adaptive::Rendered;
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::statistics::picture_variance;
@@ -19,8 +19,8 @@ pub enum Background {
     Transparent,
 }
 
-/// Writes the picture through its tone operator, coded for the display. A transparent background gives straight alpha in
-/// sRGB, the colours being those of what covers the pixel.
+/// Writes the picture through its tone operator, coded for the display. A transparent background gives straight alpha, the
+/// colours being those of what covers the pixel.
 pub fn write_display_png(
     path: &Path,
     rendered: &Rendered,
@@ -41,7 +41,7 @@ pub fn write_display_png(
             let covering: Vec<[f32; 3]> =
                 picture.iter().zip(&coverage).map(|(rgb, &alpha)| rgb.map(|value| value * scale(alpha))).collect();
             let shown = map_picture(judgement.tone.as_ref(), width as usize, &covering);
-            write_png_with_alpha(path, width, height, &shown, &coverage)
+            write_png_with_alpha_for(path, width, height, &shown, &coverage, display)
         }
     }
 }

@@ -13,17 +13,18 @@ use crate::adaptive::judge::Judgement;
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::state::RenderState;
 use crate::adaptive::{Directive, Progress};
+use crate::checkpoint::SettingsRecord;
 use crate::scene::Scene;
 use std::net::TcpListener;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
-/// Viewers of a render under way; they are sent away when it is dropped.
+/// Viewers of a render under way; they are sent away when it has ended or is dropped.
 pub struct Audience<'a> {
     shared: Arc<Shared>,
     settings: &'a LoopSettings,
     moving: Mutex<Moving>,
-    server: Option<JoinHandle<std::io::Result<()>>>,
+    server: Mutex<Option<JoinHandle<std::io::Result<()>>>>,
 }
 
 struct Moving {
@@ -43,16 +44,17 @@ impl<'a> Audience<'a> {
         door: Door,
         scene: &Scene,
         settings: &'a LoopSettings,
-        operator: &str,
+        record: &SettingsRecord,
     ) -> std::io::Result<Self> {
         let shared = Arc::new(Shared::new());
         let of_server = Arc::clone(&shared);
         let server =
             std::thread::Builder::new().name("viewers".to_owned()).spawn(move || serve(listener, door, of_server))?;
         let camera = Held::at_home(&scene.camera).to_toml();
-        let status = Status { phase: Phase::Rendering, ..blank_status(scene, settings, operator, camera) };
+        let blank = blank_status(scene, settings, &record.operator, camera);
+        let status = Status { phase: Phase::Rendering, exposure: record.exposure_stops, ..blank };
         let moving = Moving { screen: Screen::new(Vec::new()), pace: Pace::new(), progress: None, status };
-        Ok(Self { shared, settings, moving: Mutex::new(moving), server: Some(server) })
+        Ok(Self { shared, settings, moving: Mutex::new(moving), server: Mutex::new(Some(server)) })
     }
 
     fn moving(&self) -> MutexGuard<'_, Moving> {
@@ -118,20 +120,26 @@ impl<'a> Audience<'a> {
         directive
     }
 
-    /// The render is at an end.
+    /// The render is at an end: shows its last frame and sends everybody away, so that no connection takes a file from what is written
+    /// next.
     pub fn ended(&self, state: &RenderState) {
         let mut moving = self.moving();
         moving.status.phase = Phase::Stopped;
         self.show(&mut moving, state);
+        self.close();
+    }
+
+    fn close(&self) {
+        self.shared.close();
+        if let Some(server) = self.server.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            // A thread that panicked has said so.
+            let _ = server.join();
+        }
     }
 }
 
 impl Drop for Audience<'_> {
     fn drop(&mut self) {
-        self.shared.close();
-        if let Some(server) = self.server.take() {
-            // A thread that panicked has said so.
-            let _ = server.join();
-        }
+        self.close();
     }
 }

@@ -60,7 +60,7 @@ pub(super) enum Command {
     },
     /// Another visibility to stop at.
     Visibility {
-        /// Visibility, above 0.
+        /// Visibility; 0 for as long as other limits let it.
         target: f64,
     },
     /// Move the camera.
@@ -163,12 +163,12 @@ pub(super) struct Status {
     pub(super) operator: String,
     pub(super) operators: &'static [&'static str],
     pub(super) display: String,
-    pub(super) displays: &'static [&'static str],
+    pub(super) displays: Vec<String>,
     /// In distances that the display is made for.
     pub(super) distance: f64,
     pub(super) pixels_per_degree: f64,
     pub(super) camera: String,
-    /// What went wrong last, until it goes right.
+    /// What went wrong and has not gone right since, a line each.
     pub(super) error: Option<String>,
     /// What was done last.
     pub(super) note: Option<String>,

@@ -75,7 +75,7 @@ pub(super) fn visibility(values: &Plane, target: f64) -> Colours {
     Colours {
         rgb8,
         legend: format!(
-            "blue: at most {}, not seen; red to yellow: up to {} and above",
+            "blue: at most the target, {}; red to yellow: up to {} and above",
             figure(target),
             figure(4.0 * target)
         ),

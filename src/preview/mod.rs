@@ -19,6 +19,7 @@ mod frame;
 mod glimpse;
 mod layer;
 mod orbit;
+mod porch;
 mod screen;
 mod server;
 mod session;

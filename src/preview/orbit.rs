@@ -58,7 +58,7 @@ const MOST_STEPS: f32 = 20.0;
 pub(super) struct Held {
     pub(super) camera: Camera,
     pub(super) pivot_distance: f32,
-    /// Whether it is where the scene has put it.
+    /// Whether it is as the scene has it.
     pub(super) is_home: bool,
 }
 
@@ -86,6 +86,18 @@ impl Held {
         if !(position.is_finite() && forward.is_finite() && distances.iter().all(|distance| distance.is_normal())) {
             *self = before;
         }
+    }
+
+    /// Brings what is so far along the axis into focus.
+    pub(super) fn focus_at(&mut self, distance: f32) {
+        self.camera.focus_distance = distance;
+        self.is_home = false;
+    }
+
+    /// Whether it sees from where this camera sees, and moves as it does, whatever is in focus.
+    pub(super) fn stands_like(&self, camera: &Camera) -> bool {
+        let Camera { aperture_radius, focus_distance, .. } = *camera;
+        Camera { aperture_radius, focus_distance, ..self.camera.clone() } == *camera
     }
 
     fn orbit(&mut self, right: f32, up: f32) {

@@ -1,20 +1,27 @@
 //! The door: one page and one WebSocket, for who has the token and comes from the page itself.
 
+use super::porch::{Porch, Stranger};
 use super::shared::Shared;
 use super::viewer::attend;
 use axum::Router;
-use axum::extract::{Query, State, WebSocketUpgrade};
+use axum::extract::{ConnectInfo, Query, State, WebSocketUpgrade};
 use axum::http::{HeaderMap, HeaderName, StatusCode, header};
 use axum::response::{Html, IntoResponse, Response};
 use axum::routing::get;
 use serde::Deserialize;
 use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
+use std::time::Duration;
+use tokio::sync::Semaphore;
 
 /// The page, whole: it asks for nothing else.
 const PAGE: &str = include_str!("page.html");
 /// Commands are small.
 const LARGEST_MESSAGE_BYTES: usize = 1 << 14;
+/// Viewers at a time; more are refused.
+const MOST_VIEWERS: u32 = 64;
+/// So long viewers may take for the last frame when the preview closes.
+const FAREWELL: Duration = Duration::from_secs(1);
 
 /// Who is let in.
 #[derive(Clone, Debug)]
@@ -35,6 +42,8 @@ struct Ticket {
 struct House {
     door: Arc<Door>,
     shared: Arc<Shared>,
+    /// Seats that are free.
+    seats: Arc<Semaphore>,
 }
 
 /// 128 bits from the system, in hexadecimal.
@@ -47,19 +56,24 @@ pub fn random_token() -> Result<String, getrandom::Error> {
     Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
 }
 
-/// Serves until the preview closes.
+/// Serves until the preview closes and its viewers have the last frame.
 pub(super) fn serve(listener: TcpListener, door: Door, shared: Arc<Shared>) -> std::io::Result<()> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build()?;
     let mut closing = shared.until_closing();
-    let house = House { door: Arc::new(door), shared };
+    let seats = Arc::new(Semaphore::new(MOST_VIEWERS as usize));
+    let house = House { door: Arc::new(door), shared, seats: Arc::clone(&seats) };
     let served = runtime.block_on(async {
         listener.set_nonblocking(true)?;
-        let listener = tokio::net::TcpListener::from_std(listener)?;
+        let porch = Porch::before(tokio::net::TcpListener::from_std(listener)?);
         let rooms = Router::new().route("/", get(page)).route("/ws", get(socket)).with_state(house);
+        let rooms = rooms.into_make_service_with_connect_info::<Stranger>();
         tokio::select! {
-            served = async { axum::serve(listener, rooms).await } => served,
-            _ = closing.wait_for(|&closing| closing) => Ok(()),
+            served = async { axum::serve(porch, rooms).await } => served?,
+            _ = closing.wait_for(|&closing| closing) => {}
         }
+        // All seats are free when everybody has left; who reads nothing is not waited for.
+        let _ = tokio::time::timeout(FAREWELL, seats.acquire_many(MOST_VIEWERS)).await;
+        Ok(())
     });
     runtime.shutdown_background();
     served
@@ -111,6 +125,7 @@ async fn page(State(house): State<House>, headers: HeaderMap, Query(ticket): Que
 
 async fn socket(
     State(house): State<House>,
+    ConnectInfo(stranger): ConnectInfo<Stranger>,
     headers: HeaderMap,
     Query(ticket): Query<Ticket>,
     upgrade: WebSocketUpgrade,
@@ -118,8 +133,15 @@ async fn socket(
     if !house.door.admits(&headers, &ticket) {
         return refusal();
     }
+    let Ok(seat) = house.seats.try_acquire_owned() else {
+        return (StatusCode::SERVICE_UNAVAILABLE, "503: there are too many viewers\n").into_response();
+    };
     let shared = house.shared;
-    upgrade.max_message_size(LARGEST_MESSAGE_BYTES).on_upgrade(move |socket| attend(socket, shared))
+    upgrade.max_message_size(LARGEST_MESSAGE_BYTES).on_upgrade(move |socket| async move {
+        stranger.let_in();
+        attend(socket, shared).await;
+        drop(seat);
+    })
 }
 
 #[cfg(test)]

@@ -5,8 +5,10 @@ mod live;
 mod motion;
 mod obeying;
 mod pace;
+mod problems;
 mod saving;
 mod telling;
+mod waiting;
 mod watch;
 
 use super::coarse::order;
@@ -25,6 +27,7 @@ use gaze::Follower;
 use live::{Live, settings_of};
 use motion::Neighbours;
 pub(super) use pace::Pace;
+use problems::{Cause, Problems};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
@@ -98,7 +101,9 @@ struct Session<'a> {
     neighbours: Option<Neighbours>,
     pace: Pace,
     progress: Option<Progress>,
-    error: Option<String>,
+    /// Commands for a picture that is not there yet.
+    waiting: Vec<Command>,
+    problems: Problems,
     note: Option<String>,
 }
 
@@ -125,7 +130,8 @@ impl<'a> Session<'a> {
             neighbours: None,
             pace: Pace::new(),
             progress: None,
-            error: None,
+            waiting: Vec::new(),
+            problems: Problems::default(),
             note: None,
             settings,
             live,
@@ -138,6 +144,7 @@ impl<'a> Session<'a> {
             for command in self.shared.take_commands() {
                 self.obey(command);
             }
+            self.obey_waiting();
             // Once for all movements that came: a glimpse for each would fall behind a hand that drags.
             if std::mem::take(&mut self.has_moved) {
                 self.tracer.set_camera(&self.held.camera);
@@ -200,6 +207,8 @@ impl<'a> Session<'a> {
         let Crop { width, height, .. } = self.job.trace.film_area();
         let state = std::mem::replace(&mut self.state, RenderState::new(0, 0, &self.settings.limits));
         self.tell_of(&state);
+        // The watch shows motion and cannot find it.
+        self.find_motion();
         self.pace.begin();
         let ended = {
             let status = self.status(&state);
@@ -207,6 +216,7 @@ impl<'a> Session<'a> {
                 shared: self.shared,
                 settings: &self.settings,
                 follower: self.gaze.as_ref(),
+                is_awaited: !self.waiting.is_empty(),
                 moving: Mutex::new(Moving {
                     screen: &mut self.screen,
                     glimpse: &mut self.glimpse,
@@ -214,6 +224,7 @@ impl<'a> Session<'a> {
                     progress: &mut self.progress,
                     status,
                     samples_since: 0,
+                    begun: Instant::now(),
                     told: Instant::now(),
                 }),
             };
@@ -229,7 +240,7 @@ impl<'a> Session<'a> {
             // Who says so throws the picture away.
             Err(JudgeError::Outdated) => self.state = RenderState::new(width, height, &self.settings.limits),
             Err(error) => {
-                self.error = Some(error.to_string());
+                self.problems.meet(Cause::Look, error.to_string());
                 self.state = RenderState::new(width, height, &self.settings.limits);
                 self.phase = Phase::Paused;
             }
@@ -242,6 +253,7 @@ impl<'a> Session<'a> {
         if self.state.film.total_samples() > 0 {
             self.glimpse = None;
         }
+        self.problems.solve(Cause::Look);
         self.screen.looked = Some(Arc::new(Looked::of(&last_look.judgement)));
         self.state.tone = Some(last_look.judgement.tone.save());
         self.last_look = Some(last_look);
@@ -253,10 +265,13 @@ impl<'a> Session<'a> {
     /// Looks at the film as it is.
     fn look(&mut self) -> Option<Judgement> {
         match judge(&self.state.film, &self.settings, self.state.inflation) {
-            Ok(judgement) => Some(judgement),
+            Ok(judgement) => {
+                self.problems.solve(Cause::Look);
+                Some(judgement)
+            }
             Err(JudgeError::Outdated) => None,
             Err(error) => {
-                self.error = Some(error.to_string());
+                self.problems.meet(Cause::Look, error.to_string());
                 None
             }
         }

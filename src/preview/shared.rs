@@ -34,7 +34,10 @@ pub(super) struct Shared {
     numbered: AtomicU64,
     status: watch::Sender<Arc<str>>,
     snapshot: Mutex<Option<Arc<Snapshot>>>,
-    gaze: Mutex<Option<Gaze>>,
+    /// Where somebody looks, and whose pointer says so.
+    gaze: Mutex<Option<(u64, Gaze)>>,
+    /// Pointers that were given a number.
+    pointers: AtomicU64,
     is_closing: AtomicBool,
     closing: watch::Sender<bool>,
 }
@@ -51,6 +54,7 @@ impl Shared {
             status: watch::Sender::new(Arc::from("")),
             snapshot: Mutex::default(),
             gaze: Mutex::default(),
+            pointers: AtomicU64::new(0),
             is_closing: AtomicBool::new(false),
             closing: watch::Sender::new(false),
         }
@@ -138,15 +142,15 @@ impl Shared {
         self.status.subscribe()
     }
 
-    /// Somebody looks elsewhere: the latest place counts.
-    pub(super) fn look_at(&self, gaze: Option<Gaze>) {
-        *self.gaze.lock().unwrap_or_else(PoisonError::into_inner) = gaze;
+    /// Somebody looks elsewhere.
+    fn change_gaze(&self, change: impl FnOnce(&mut Option<(u64, Gaze)>)) {
+        change(&mut self.gaze.lock().unwrap_or_else(PoisonError::into_inner));
         let _commands = self.commands.lock().unwrap_or_else(PoisonError::into_inner);
         self.arrived.notify_all();
     }
 
     pub(super) fn gaze(&self) -> Option<Gaze> {
-        *self.gaze.lock().unwrap_or_else(PoisonError::into_inner)
+        self.gaze.lock().unwrap_or_else(PoisonError::into_inner).map(|(_, gaze)| gaze)
     }
 
     pub(super) fn publish_snapshot(&self, snapshot: Snapshot) {
@@ -155,6 +159,28 @@ impl Shared {
 
     pub(super) fn snapshot(&self) -> Option<Arc<Snapshot>> {
         self.snapshot.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+}
+
+/// A viewer's pointer, which may stand for a gaze: the latest place of all viewers counts, while its viewer is there.
+pub(super) struct Pointer {
+    shared: Arc<Shared>,
+    number: u64,
+}
+
+impl Pointer {
+    pub(super) fn of(shared: &Arc<Shared>) -> Self {
+        Self { shared: Arc::clone(shared), number: shared.pointers.fetch_add(1, Ordering::SeqCst) }
+    }
+
+    pub(super) fn look_at(&mut self, place: Option<Gaze>) {
+        self.shared.change_gaze(|gaze| *gaze = place.map(|place| (self.number, place)));
+    }
+}
+
+impl Drop for Pointer {
+    fn drop(&mut self) {
+        self.shared.change_gaze(|gaze| *gaze = gaze.filter(|(owner, _)| *owner != self.number));
     }
 }
 
@@ -180,5 +206,24 @@ impl Seat {
 impl Drop for Seat {
     fn drop(&mut self) {
         self.shared.viewers[self.layer.index()].fetch_sub(1, Ordering::SeqCst);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Who leaves looks nowhere, and takes no other's gaze along.
+    #[test]
+    fn a_gaze_goes_with_its_viewer() {
+        let shared = Arc::new(Shared::new());
+        let place = |x_px: f64| Some(Gaze { x_px, y_px: 2.0 });
+        let (mut first, mut second) = (Pointer::of(&shared), Pointer::of(&shared));
+        first.look_at(place(1.0));
+        second.look_at(place(5.0));
+        drop(first);
+        assert_eq!(shared.gaze(), place(5.0));
+        drop(second);
+        assert_eq!(shared.gaze(), None);
     }
 }

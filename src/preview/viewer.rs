@@ -2,7 +2,7 @@
 
 use super::command::{Command, Inspected};
 use super::layer::Layer;
-use super::shared::{Encoded, Seat, Shared};
+use super::shared::{Encoded, Pointer, Seat, Shared};
 use axum::body::Bytes;
 use axum::extract::ws::{Message, WebSocket};
 use fechner_perception::eccentricity::Gaze;
@@ -24,6 +24,12 @@ impl Look {
         frames.mark_changed();
         Self { _seat: seat, frames }
     }
+
+    /// A frame that has not been sent.
+    fn unsent(&mut self) -> Option<Bytes> {
+        let is_new = self.frames.has_changed().unwrap_or(false);
+        is_new.then(|| self.frames.borrow_and_update().bytes.clone()).filter(|bytes| !bytes.is_empty())
+    }
 }
 
 /// The next frame of a layer; never, if none is looked at.
@@ -36,10 +42,12 @@ async fn next_frame(look: &mut Option<Look>) -> Bytes {
     std::future::pending().await
 }
 
-/// Serves one viewer until it goes or the preview closes. It is sent the latest frame whenever it has taken the one before.
+/// Serves one viewer until it goes, or the preview closes and it has the last frame. It is sent the latest frame whenever it has taken
+/// the one before.
 pub(super) async fn attend(mut socket: WebSocket, shared: Arc<Shared>) {
     let mut look = Some(Look::at(&shared, Layer::Picture));
     let mut beside: Option<Look> = None;
+    let mut pointer = Pointer::of(&shared);
     let mut status = shared.status();
     let mut closing = shared.until_closing();
     status.mark_changed();
@@ -57,7 +65,7 @@ pub(super) async fn attend(mut socket: WebSocket, shared: Arc<Shared>) {
                     }
                     Ok(Command::Gaze { at }) => {
                         let is_place = |at: &[f64; 2]| at.iter().all(|place| place.is_finite());
-                        shared.look_at(at.filter(is_place).map(|[x_px, y_px]| Gaze { x_px, y_px }));
+                        pointer.look_at(at.filter(is_place).map(|[x_px, y_px]| Gaze { x_px, y_px }));
                         None
                     }
                     Ok(Command::Inspect { x, y }) => inspected(&shared, x, y).map(|text| Message::Text(text.into())),
@@ -67,7 +75,7 @@ pub(super) async fn attend(mut socket: WebSocket, shared: Arc<Shared>) {
                     }
                     Err(error) => Some(Message::Text(not_understood(&error).into())),
                 },
-                Some(Ok(Message::Close(_)) | Err(_)) | None => break,
+                Some(Ok(Message::Close(_)) | Err(_)) | None => return,
                 Some(Ok(_)) => None,
             },
             frame = next_frame(&mut look) => (!frame.is_empty()).then_some(Message::Binary(frame)),
@@ -81,7 +89,15 @@ pub(super) async fn attend(mut socket: WebSocket, shared: Arc<Shared>) {
         if let Some(answer) = answer
             && socket.send(answer).await.is_err()
         {
-            break;
+            return;
+        }
+    }
+    let last_frames = [look, beside].into_iter().flatten().filter_map(|mut look| look.unsent()).map(Message::Binary);
+    let last_status = status.borrow_and_update().to_string();
+    let last_status = Some(last_status).filter(|text| !text.is_empty()).map(|text| Message::Text(text.into()));
+    for message in last_frames.chain(last_status).chain([Message::Close(None)]) {
+        if socket.send(message).await.is_err() {
+            return;
         }
     }
 }

@@ -16,6 +16,7 @@
 //! - `mutations`: thousands of damaged files a format, in a child process (ignored)
 //! - `scene_table`: scenes of others: how long until nothing is seen (ignored)
 //! - `relief`: height maps: normals, energy, every format
+//! - `overscan`: files whose data reach beyond what is to be shown
 //! - `reprojection`: velocity maps against rendered frames
 //! - `references`: scenes of others beside reference pictures (ignored)
 //! - `no_allocation`: the heap is left alone while paths are traced
@@ -52,6 +53,7 @@ mod load_assets;
 mod mitsuba_format;
 mod mutations;
 mod no_allocation;
+mod overscan;
 mod pbrt_format;
 mod references;
 mod relief;

@@ -10,6 +10,8 @@ use tungstenite::client::IntoClientRequest;
 use tungstenite::http::HeaderValue;
 use tungstenite::{Message, WebSocket};
 
+mod requests;
+
 /// Anything that takes longer hangs.
 const PATIENCE: Duration = Duration::from_secs(120);
 
@@ -26,8 +28,12 @@ struct View {
 
 impl View {
     fn of(scene: &Path, folder: &Path, arguments: &[&str]) -> Self {
+        Self::of_size("32x32", scene, folder, arguments)
+    }
+
+    fn of_size(size: &str, scene: &Path, folder: &Path, arguments: &[&str]) -> Self {
         let mut command = Command::new(env!("CARGO_BIN_EXE_fechner"));
-        command.arg("view").arg(scene).args(["--size", "32x32", "--threads", "1"]).args(arguments);
+        command.arg("view").arg(scene).args(["--size", size, "--threads", "1"]).args(arguments);
         let mut child = command.current_dir(folder).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().expect("runs");
         let said = child.stdout.take().expect("piped");
         Self::that_says(child, said)
@@ -128,6 +134,15 @@ impl Viewer {
             let picture = image::load_from_memory(picture).expect("a picture").into_rgb8();
             Some(picture).filter(|picture| bytes[0] == layer && fits(picture))
         })
+    }
+
+    /// The next word about what a layer's colours mean that fits.
+    fn legend(&mut self, layer: u8, what: &str, fits: impl Fn(&str) -> bool) {
+        self.until(what, |message| {
+            let Message::Binary(bytes) = message else { return None };
+            let legend = String::from_utf8_lossy(&bytes[2..2 + usize::from(bytes[1])]);
+            (bytes[0] == layer && fits(&legend)).then_some(())
+        });
     }
 
     /// Asks for a file and returns its bytes.

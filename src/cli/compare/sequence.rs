@@ -257,8 +257,9 @@ impl<'a> Sequences<'a> {
 /// Motion in pixels under the names that renderers give it.
 fn read_motion(path: &Path, (width, height): (usize, usize)) -> Result<FrameMotion> {
     let exr = read_exr(path)?;
-    if (exr.width as usize, exr.height as usize) != (width, height) {
-        bail!("{} has {}x{} pixels, the picture {width}x{height}", path.display(), exr.width, exr.height);
+    let shown = exr.display_window;
+    if (shown.width as usize, shown.height as usize) != (width, height) {
+        bail!("{} has {}x{} pixels, the picture {width}x{height}", path.display(), shown.width, shown.height);
     }
     let Some(motions) = both_motions(&exr) else {
         bail!(
@@ -267,9 +268,8 @@ fn read_motion(path: &Path, (width, height): (usize, usize)) -> Result<FrameMoti
             path.display()
         );
     };
-    let planes = |[x, y]: [Vec<f32>; 2]| -> Result<[Plane; 2]> {
-        Ok([Plane::from_values(width, height, x)?, Plane::from_values(width, height, y)?])
-    };
+    let plane = |values: Vec<f32>| Plane::from_values(width, height, exr.in_display_window(values));
+    let planes = |[x, y]: [Vec<f32>; 2]| -> Result<[Plane; 2]> { Ok([plane(x)?, plane(y)?]) };
     Ok(FrameMotion { to_next: planes(motions.to_next)?, to_previous: planes(motions.to_previous)? })
 }
 

@@ -10,7 +10,7 @@ use fechner_perception::eccentricity::Gaze;
 pub(super) struct Live {
     pub(super) exposure: Option<f64>,
     pub(super) operator: Option<String>,
-    /// A preset's name.
+    /// A preset's name, or the job's own display's.
     pub(super) display: Option<String>,
     /// In distances that the display is made for.
     pub(super) distance: Option<f64>,
@@ -38,7 +38,8 @@ pub(super) fn settings_of(job: &Job, live: &Live) -> Result<LoopSettings, String
     let mut record = job.record.clone();
     record.exposure_stops = live.exposure.or(record.exposure_stops);
     record.operator = live.operator.clone().unwrap_or(record.operator);
-    if let Some(name) = &live.display {
+    // The job's own display may have no preset's name, or more than the preset of its name.
+    if let Some(name) = live.display.as_ref().filter(|name| **name != record.viewing.display.name) {
         let display = Display::preset(name).ok_or_else(|| format!("there is no display \"{name}\""))?;
         let Observer { sensitivity, glare, .. } = record.viewing.observer;
         record.viewing = Viewing::of(display);
@@ -49,7 +50,7 @@ pub(super) fn settings_of(job: &Job, live: &Live) -> Result<LoopSettings, String
     record.viewing.check().map_err(|error| error.to_string())?;
     let visibility = live.visibility.unwrap_or(job.limits.visibility);
     if visibility.is_nan() || visibility < 0.0 || record.exposure_stops.is_some_and(|stops| !stops.is_finite()) {
-        return Err("visibility must be above 0 and exposure a number".to_owned());
+        return Err("visibility must be 0 or above and exposure a number".to_owned());
     }
     let limits = Limits { visibility, ..job.limits };
     let settings = record.loop_settings(limits).map_err(|error| error.to_string())?;

@@ -51,7 +51,7 @@ impl Session<'_> {
             Some(Err(_)) => Motion::Unknown("the scenes a frame before and after cannot be read"),
             Some(Ok([before, after])) => {
                 // A camera in somebody's hand rests.
-                let cameras = if self.held.is_home {
+                let cameras = if self.held.stands_like(&self.job.scene.camera) {
                     [&before.camera, &self.job.scene.camera, &after.camera]
                 } else {
                     [&self.held.camera; 3]

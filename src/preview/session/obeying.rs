@@ -1,19 +1,31 @@
 //! What viewers ask for, done.
 
 use super::live::{Changed, Live, settings_of};
+use super::problems::Cause;
+use super::waiting::is_whole;
 use super::{Session, interruptible};
+use crate::adaptive::judge::Judgement;
 use crate::adaptive::state::RenderState;
-use crate::adaptive::{LastLook, StopReason};
+use crate::adaptive::{LastLook, StopReason, is_reached};
 use crate::film::Film;
-use crate::integrator::{Crop, PathTracer};
+use crate::integrator::{CameraRays, CameraSample, Crop, PathTracer};
 use crate::preview::command::{Command, Phase};
 use crate::preview::orbit::Held;
+use crate::scene::Camera;
+use glam::Vec2;
 use std::sync::Arc;
 use std::time::Instant;
 
 impl Session<'_> {
     pub(super) fn obey(&mut self, command: Command) {
-        self.note = None;
+        if self.must_wait(&command) {
+            self.waiting.push(command);
+            return;
+        }
+        // Not from viewers, who have done nothing that would end it.
+        if !matches!(command, Command::Redraw) {
+            self.note = None;
+        }
         if self.phase == Phase::Moving && !command.suits_motion() {
             self.restart();
         }
@@ -22,15 +34,19 @@ impl Session<'_> {
             Command::Redraw => self.show(),
             Command::Pause if self.phase == Phase::Rendering => {
                 self.phase = Phase::Paused;
+                if is_whole(&self.state) {
+                    self.glimpse = None;
+                }
                 self.show();
             }
             Command::Resume if matches!(self.phase, Phase::Paused | Phase::Stopped) => self.go_on(),
+            Command::Resume => self.forget_rest(),
             Command::Stop if self.phase != Phase::Stopped => {
                 if let Some(judgement) = self.look() {
                     self.stopped(LastLook { judgement, stop_reason: StopReason::Interrupted });
                 }
             }
-            Command::Pause | Command::Resume | Command::Stop => {}
+            Command::Pause | Command::Stop => {}
             Command::Restart => self.restart(),
             Command::Save { format } => self.save(format),
             Command::Exposure { stops } => self.change(|live| live.exposure = stops, Changed::Seen),
@@ -82,11 +98,11 @@ impl Session<'_> {
         match settings_of(&self.job, &self.live) {
             Err(problem) => {
                 self.live = before;
-                self.error = Some(problem);
+                self.problems.meet(Cause::Setting, problem);
             }
             Ok(settings) => {
                 self.settings = interruptible(settings, self.shared);
-                self.error = None;
+                self.problems.solve(Cause::Setting);
                 self.adopt(changed);
             }
         }
@@ -118,12 +134,31 @@ impl Session<'_> {
         }
         if self.phase == Phase::Stopped {
             if let Some(judgement) = self.look() {
-                let stop_reason = self.last_look.as_ref().map_or(StopReason::Interrupted, |look| look.stop_reason);
-                self.stopped(LastLook { judgement, stop_reason });
+                self.rest_or_go_on(judgement, changed);
             }
         } else {
             self.show();
         }
+    }
+
+    /// A picture that rests because nothing more could be seen, or done about it, goes on where another target asks for more. For other
+    /// eyes it stays as it is, and says no longer why it rests.
+    fn rest_or_go_on(&mut self, judgement: Judgement, changed: Changed) {
+        let before = self.last_look.as_ref().map_or(StopReason::Interrupted, |look| look.stop_reason);
+        let is_reached = is_reached(&judgement, self.settings.limits.visibility);
+        let stop_reason = match before {
+            StopReason::Visibility | StopReason::MaxSamples | StopReason::Interrupted if is_reached => {
+                StopReason::Visibility
+            }
+            StopReason::Visibility | StopReason::MaxSamples if matches!(changed, Changed::Target) => {
+                self.go_on();
+                self.show();
+                return;
+            }
+            StopReason::Visibility | StopReason::MaxSamples => StopReason::Interrupted,
+            other => other,
+        };
+        self.stopped(LastLook { judgement, stop_reason });
     }
 
     /// The camera turns about what stands in the middle of the picture, and about the same as long as it moves.
@@ -135,7 +170,7 @@ impl Session<'_> {
         }
     }
 
-    /// Distance of what a pixel shows, from whichever film has it; none where nothing is or the picture is of another camera.
+    /// Distance of what a pixel shows along the camera's axis, as focus and pivot count it, from whichever film has it; none where nothing is or the picture is of another camera.
     fn depth_at(&self, x: usize, y: usize) -> Option<f32> {
         let in_film = |film: &Film, step: usize| {
             let (column, row, width) = (x / step, y / step, film.width() as usize);
@@ -144,14 +179,25 @@ impl Session<'_> {
         };
         let in_glimpse = || self.glimpse.as_ref().and_then(|glimpse| in_film(&glimpse.film, glimpse.step as usize));
         let found = in_film(&self.state.film, 1).or_else(in_glimpse);
-        found.filter(|_| !self.has_moved)
+        found.filter(|_| !self.has_moved).map(|depth| depth * self.cosine_at(x, y))
+    }
+
+    /// Of the angle between the ray through a pixel's middle and the camera's axis.
+    fn cosine_at(&self, x: usize, y: usize) -> f32 {
+        let settings = self.tracer.settings();
+        let (left, top) = (settings.film_area().x, settings.film_area().y);
+        let pinhole = Camera { aperture_radius: 0.0, motion: None, ..self.held.camera.clone() };
+        let position_px = Vec2::new((left as usize + x) as f32 + 0.5, (top as usize + y) as f32 + 0.5);
+        let sample = CameraSample { position_px, lens: [0.5; 2], time: 0.0 };
+        let ray = CameraRays::new(&pinhole, settings.width, settings.height).ray(&sample);
+        ray.direction.dot(pinhole.axes().forward.into())
     }
 
     fn focus_on(&mut self, x: usize, y: usize) {
         match self.depth_at(x, y) {
             None => self.note = Some("nothing to focus on there".to_owned()),
             Some(depth) => {
-                self.held.camera.focus_distance = depth;
+                self.held.focus_at(depth);
                 if self.held.camera.aperture_radius > 0.0 {
                     self.has_moved();
                 } else {
@@ -164,7 +210,7 @@ impl Session<'_> {
     fn reload(&mut self) {
         let loaded = self.host.load().and_then(|job| settings_of(&job, &self.live).map(|settings| (job, settings)));
         match loaded {
-            Err(problem) => self.error = Some(problem),
+            Err(problem) => self.problems.meet(Cause::Scene, problem),
             Ok((job, settings)) => {
                 self.tracer = PathTracer::new(Arc::clone(&job.scene), job.trace);
                 // Who edits a lamp wants to see it from where he was; who edits the camera, from there.
@@ -176,7 +222,7 @@ impl Session<'_> {
                 }
                 (self.job, self.settings) = (job, interruptible(settings, self.shared));
                 self.neighbours = None;
-                self.error = None;
+                self.problems.solve(Cause::Scene);
                 let seen_from = if is_kept { ", seen from where you are" } else { "" };
                 self.note = Some(format!("the scene was loaded again{seen_from}"));
                 self.restart();

@@ -35,9 +35,10 @@ impl Session<'_> {
                 .as_ref()
                 .filter(|look| look.judgement.is_known)
                 .map(|look| visible_share(&look.judgement, target)),
+            displays: displays_with(&self.job.record.viewing.display.name),
             exposure: self.live.exposure.or(self.job.record.exposure_stops),
             distance: self.live.distance.unwrap_or(1.0),
-            error: self.error.clone(),
+            error: self.problems.told(),
             note: self.note.clone(),
             is_foveated: self.gaze.is_some(),
             ..blank_status(&self.job.scene, &self.settings, operator, self.held.to_toml())
@@ -74,7 +75,7 @@ pub(in crate::preview) fn blank_status(
         operator: operator.to_owned(),
         operators: operator_names(),
         display: settings.viewing.display.name.clone(),
-        displays: Display::preset_names(),
+        displays: displays_with(&settings.viewing.display.name),
         distance: 1.0,
         pixels_per_degree: settings.viewing.display.pixels_per_degree,
         camera,
@@ -82,6 +83,13 @@ pub(in crate::preview) fn blank_status(
         note: None,
         is_foveated: false,
     }
+}
+
+/// Names of displays that can be chosen: the presets, and the one that the preview was opened for.
+fn displays_with(own: &str) -> Vec<String> {
+    let presets = Display::preset_names();
+    let own = Some(own).filter(|own| !presets.contains(own));
+    presets.iter().copied().chain(own).map(str::to_owned).collect()
 }
 
 /// Fills in what the samples so far say: `total_samples` at the last frame, as counting them takes as long as one.
@@ -122,7 +130,7 @@ fn in_words(reason: StopReason) -> &'static str {
         StopReason::MaxSamples => "what can be seen is in pixels that have the most samples allowed",
         StopReason::Plans => "the plans are done",
         StopReason::Rule => "the rule is satisfied",
-        StopReason::Interrupted => "as asked",
+        StopReason::Interrupted => "Resume goes on",
         StopReason::Merged => "merged",
     }
 }

@@ -3,6 +3,7 @@
 use super::gaze::Follower;
 use super::pace::Pace;
 use super::telling::{count, publish};
+use super::waiting::is_whole;
 use crate::adaptive::judge::Judgement;
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::state::RenderState;
@@ -17,12 +18,17 @@ use std::time::{Duration, Instant};
 /// Figures are told so often, also where frames are dear and seldom.
 const FIGURES_INTERVAL: Duration = Duration::from_millis(250);
 
+/// A note is told for so long at least: viewers are sent the latest status alone.
+const NOTE_TIME: Duration = Duration::from_secs(1);
+
 /// Shows the loop's film between batches, and leaves the loop when somebody asks for something.
 pub(super) struct Watch<'a> {
     pub(super) shared: &'a Arc<Shared>,
     pub(super) settings: &'a LoopSettings,
     /// Where the gaze counts.
     pub(super) follower: Option<&'a Follower>,
+    /// Whether somebody waits for a film with something of every pixel.
+    pub(super) is_awaited: bool,
     pub(super) moving: Mutex<Moving<'a>>,
 }
 
@@ -36,6 +42,8 @@ pub(super) struct Moving<'a> {
     pub(super) status: Status,
     /// Samples since the last frame.
     pub(super) samples_since: u64,
+    /// When the loop was entered.
+    pub(super) begun: Instant,
     /// When figures were told last.
     pub(super) told: Instant,
 }
@@ -61,7 +69,7 @@ impl Watch<'_> {
         *moving.glimpse = None;
         let scenery = Scenery { film: &state.film, tone, settings: self.settings, is_at_rest: false, step: 1 };
         moving.screen.show(scenery, self.shared);
-        moving.status.note = None;
+        moving.status.note = moving.status.note.take().filter(|_| moving.begun.elapsed() < NOTE_TIME);
         moving.samples_since = 0;
         self.tell(moving, state);
     }
@@ -99,7 +107,8 @@ impl Monitor for Watch<'_> {
             self.tell(&mut moving, state);
         }
         moving.pace.begin();
-        if self.shared.has_news() || self.follower.is_some_and(|follower| follower.is_due(self.shared)) {
+        let is_there = self.is_awaited && is_whole(state);
+        if is_there || self.shared.has_news() || self.follower.is_some_and(|follower| follower.is_due(self.shared)) {
             Directive::Leave
         } else {
             Directive::GoOn
