@@ -16,6 +16,7 @@ use fechner::scene::Scene;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Arguments of `view`.
 #[derive(Debug, Args)]

@@ -37,7 +37,7 @@ impl Farm {
     pub fn create(folder: &Path, manifest: Manifest) -> Result<Self, OutputError> {
         let path = Self::manifest_file(folder);
         let text = serde_json::to_vec_pretty(&manifest)
-            .map_err(|error| OutputError::Io { path: path.clone(), source: error.into() })?;
+            .map_err(|error| OutputError::Io { path: path.clone(), error: error.into() })?;
         write_beside(&path, |file| file.write_all(&text))?;
         Ok(Self { folder: folder.to_owned(), manifest, id: ContentHash::of_bytes(&text) })
     }

@@ -175,9 +175,7 @@ fn state_so_far(farm: &Farm, frame_index: usize, job: &FrameJob<'_>) -> Result<R
     let refused = match read_checkpoint(&path) {
         Ok(checkpoint) if checkpoint.header == job.header => return Ok(checkpoint.state),
         Ok(_) => Some(CheckpointError::Different { path: path.clone(), problem: "it is of another farm".to_owned() }),
-        Err(CheckpointError::Sealed(SealedError::Io { source, .. }))
-            if source.kind() == std::io::ErrorKind::NotFound =>
-        {
+        Err(CheckpointError::Sealed(SealedError::Io { error, .. })) if error.kind() == std::io::ErrorKind::NotFound => {
             None
         }
         Err(error @ CheckpointError::Sealed(SealedError::Io { .. })) => return Err(error.into()),
