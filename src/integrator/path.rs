@@ -258,6 +258,7 @@ impl PathTracer {
 }
 
 /// Chooses the next direction; false where the path ends.
+#[inline(always)]
 fn scatter(path: &mut PathState, point: &SurfacePoint, shading: &Shading, wo: Vec3, u: [f32; 3]) -> bool {
     let Some(scattered) = shading.bsdf.sample(shading.frame.to_local(wo), u) else {
         return false;
