@@ -42,6 +42,22 @@ fn has_note(scene: &Scene, text: &str) -> bool {
     scene.notes.iter().any(|note| note.contains(text))
 }
 
+/// A sky's luminance is ours, in cd/m², whatever RGB 1 is taken as.
+#[test]
+fn skies_are_as_bright_at_every_unit() {
+    let folder = folder();
+    let path = folder.path().join("scene.xml");
+    std::fs::write(&path, r#"<scene version="3.0.0"><emitter type="sky"/><shape type="rectangle"/></scene>"#).unwrap();
+    let brightest_cd_m2 = |nits_per_unit: Option<f64>| {
+        let scene = load(&path, &LoadOptions { nits_per_unit, ..LoadOptions::default() }).unwrap();
+        let sky = scene.environment.as_ref().unwrap();
+        let largest = sky.texels.iter().map(|texel| texel.max_element()).fold(0.0, f32::max);
+        f64::from(largest * sky.scale) * scene.nits_per_unit
+    };
+    let (assumed, asked) = (brightest_cd_m2(None), brightest_cd_m2(Some(7.0)));
+    assert!((asked / assumed - 1.0).abs() < 1e-5, "{assumed} {asked}");
+}
+
 /// v = 0 is the picture's first row; OBJ alone is turned over, unless it says otherwise.
 #[test]
 fn pictures_lie_as_mitsuba_lays_them() {

@@ -121,7 +121,7 @@ impl Reader {
             ground_albedo: super::super::luminance(albedo).clamp(0.0, 1.0),
             sun: kind != "sky",
         };
-        let light = sky::light(&day, super::ASSUMED_NITS_PER_UNIT);
+        let light = sky::light(&day, self.builder.nits_per_unit);
         self.builder.note(format!(
             "Emitter \"{kind}\": luminance is that of fechner's clear sky in cd/m², with the file's turbidity ({}).",
             day.turbidity

@@ -46,6 +46,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
         clips: None,
         since_2: root.attribute("version").is_none_or(|version| !version.trim_start().starts_with("0.")),
     };
+    reader.builder.nits_per_unit = options.nits_per_unit.unwrap_or(ASSUMED_NITS_PER_UNIT);
     reader.name_all(&root);
     for child in &root.children {
         match child.tag.as_str() {
@@ -74,7 +75,6 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
         mesh.bitangent_ignores_v = true;
     }
     reader.note_clips();
-    reader.builder.nits_per_unit = ASSUMED_NITS_PER_UNIT;
     reader.builder.note(format!(
         "Radiance has no unit in this file: 1 is taken as {ASSUMED_NITS_PER_UNIT} cd/m² (--nits-per-unit changes it)."
     ));
