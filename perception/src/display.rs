@@ -202,19 +202,6 @@ impl Display {
         self.black_cd_m2 + (self.white_cd_m2 - self.black_cd_m2) * light
     }
 
-    /// Linear light, 0 to 1, for which this display emits that luminance, as far as it can.
-    ///
-    /// ```
-    /// use fechner_perception::Display;
-    /// let display = Display::default();
-    /// assert!((display.relative_of_emitted(display.emitted_cd_m2(0.25)) - 0.25).abs() < 1e-12);
-    /// ```
-    #[must_use]
-    pub fn relative_of_emitted(&self, luminance_cd_m2: f64) -> f64 {
-        let span_cd_m2 = (self.white_cd_m2 - self.black_cd_m2).max(f64::MIN_POSITIVE);
-        ((luminance_cd_m2 - self.black_cd_m2) / span_cd_m2).clamp(0.0, 1.0)
-    }
-
     /// Rejects a display that cannot be.
     ///
     /// # Errors

@@ -145,7 +145,7 @@ impl ThresholdMap {
         turned
     }
 
-    fn middle_level(&self) -> Option<&AdaptationLevel> {
+    pub(crate) fn middle_level(&self) -> Option<&AdaptationLevel> {
         self.levels.get(self.levels.len() / 2)
     }
 

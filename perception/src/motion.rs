@@ -85,51 +85,30 @@ pub fn image_velocity_deg_s(motion_x_px: &Plane, motion_y_px: &Plane, display: &
     Ok(crate::filter::erode(&speed, 1))
 }
 
-/// Threshold elevation by motion of one frequency, against log retinal velocity.
-pub(crate) struct MotionTable {
+/// What changes with a velocity, against its logarithm from the eye's drift on.
+pub(crate) struct VelocityTable {
     entries: Vec<f32>,
 }
 
-impl MotionTable {
+impl VelocityTable {
     /// Steps a factor of 2 in velocity.
     const STEPS_AN_OCTAVE: f32 = 8.0;
 
-    pub(crate) fn new(freq_cpd: f64) -> Self {
+    fn new(at_deg_s: impl Fn(f64) -> f64) -> Self {
+        let velocity_deg_s = |step: u32| DRIFT_DEG_S * (f64::from(step) / f64::from(Self::STEPS_AN_OCTAVE)).exp2();
+        Self { entries: (0..=96).map(|step| at_deg_s(velocity_deg_s(step)) as f32).collect() }
+    }
+
+    /// Threshold elevation by motion over the retina of one frequency.
+    pub(crate) fn of_motion(freq_cpd: f64) -> Self {
         let rest = Daly98::default().ln_sensitivity(freq_cpd);
-        let entries = (0..=96)
-            .map(|index| {
-                let retinal_velocity_deg_s = DRIFT_DEG_S * (f64::from(index) / f64::from(Self::STEPS_AN_OCTAVE)).exp2();
-                let moving = Daly98 { retinal_velocity_deg_s }.ln_sensitivity(freq_cpd);
-                (rest - moving).exp().clamp(0.1, 20.0) as f32
-            })
-            .collect();
-        Self { entries }
+        Self::new(|retinal_velocity_deg_s| {
+            let moving = Daly98 { retinal_velocity_deg_s }.ln_sensitivity(freq_cpd);
+            (rest - moving).exp().clamp(0.1, 20.0)
+        })
     }
 
     pub(crate) fn at(&self, velocity_deg_s: f32) -> f32 {
-        let position = (velocity_deg_s / DRIFT_DEG_S as f32).max(1.0).log2() * Self::STEPS_AN_OCTAVE;
-        let index = (position as usize).min(self.entries.len() - 2);
-        let fraction = (position - index as f32).min(1.0);
-        self.entries[index] + fraction * (self.entries[index + 1] - self.entries[index])
-    }
-}
-
-/// What is left of the energy of fresh noise of one frequency, against the eye's log velocity.
-struct PursuitTable {
-    /// At rest, then from the velocity of drift on.
-    entries: Vec<f32>,
-}
-
-impl PursuitTable {
-    const STEPS_AN_OCTAVE: f32 = 4.0;
-
-    fn new(noise: &PursuedNoise, freq_cpd: f64) -> Self {
-        let velocity_deg_s = |step: u32| DRIFT_DEG_S * (f64::from(step) / f64::from(Self::STEPS_AN_OCTAVE)).exp2();
-        let entries = (0..=40).map(|step| noise.energy_left(freq_cpd, velocity_deg_s(step)) as f32).collect();
-        Self { entries }
-    }
-
-    fn at(&self, velocity_deg_s: f32) -> f32 {
         let position = (velocity_deg_s / DRIFT_DEG_S as f32).max(1.0).log2() * Self::STEPS_AN_OCTAVE;
         let index = (position as usize).min(self.entries.len() - 2);
         let fraction = (position - index as f32).min(1.0);
@@ -150,14 +129,15 @@ impl ThresholdMap {
     pub fn with_pursuit(&self, eye_velocity_deg_s: &Plane, timing: FrameTiming) -> Result<Self, Error> {
         eye_velocity_deg_s.check_size("velocity", self.width(), self.height())?;
         eye_velocity_deg_s.check_non_negative("velocity")?;
-        let (least, greatest) = self.adaptation_cd_m2.range();
-        let middle_cd_m2 = f64::from(least * greatest).sqrt();
+        let middle_cd_m2 = self.middle_level().map_or(1.0, |level| f64::from(level.luminance_cd_m2));
         let noise = PursuedNoise::new(self.viewing.observer.csf_area_deg2, timing, middle_cd_m2)?;
         let mut followed = self.clone();
         for (band, elevation) in followed.elevations.iter_mut().enumerate() {
-            let table = PursuitTable::new(&noise, self.bands.center_cpd(band));
-            *elevation = elevation
-                .change_by(eye_velocity_deg_s, |elevation, velocity| elevation / table.at(velocity).max(1e-6).sqrt());
+            let freq_cpd = self.bands.center_cpd(band);
+            let table = VelocityTable::new(|velocity_deg_s| noise.energy_left(freq_cpd, velocity_deg_s));
+            *elevation = elevation.change_by(eye_velocity_deg_s, |elevation, velocity| {
+                elevation / table.at(velocity.min(FASTEST_PURSUIT_DEG_S as f32)).max(1e-6).sqrt()
+            });
         }
         followed.noise_gain = noise_gain(&self.tables, &self.adaptation_cd_m2, &followed.elevations);
         Ok(followed)
@@ -232,6 +212,7 @@ mod tests {
         let gains = [0.15, 1.0, 2.0, 4.25, 8.35].map(|velocity| gain(velocity, timing));
         assert!((gains[0] - 1.0).abs() < 0.02 && gains.windows(2).all(|pair| pair[1] > pair[0]), "{gains:?}");
         assert!(gains[2] > 1.3 && gains[4] > 4.0, "{gains:?}");
+        assert!((gain(500.0, timing) / gain(80.0, timing) - 1.0).abs() < 1e-6);
         let fast = FrameTiming { frames_per_second: 240.0, persistence: 1.0 };
         assert!(gain(2.0, fast) < 1.1);
         let bad = Plane::filled(64, 64, -1.0);

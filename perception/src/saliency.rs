@@ -4,6 +4,7 @@
 //! centre–surround differences of intensity, opponent colour and orientation over a pyramid; and of motion, as Yee,
 //! Pattanaik and Greenberg added in 2001.
 
+use crate::display::Display;
 use crate::error::Error;
 use crate::filter::reflect;
 use crate::plane::Plane;
@@ -15,6 +16,26 @@ pub struct SaliencyInputs<'a> {
     pub rgb: [&'a Plane; 3],
     /// Speed over the picture, any unit; `None` for a still.
     pub velocity: Option<&'a Plane>,
+}
+
+/// Saliency of a moving picture as a display sends it to the eye: RGB in cd/m², row by row, `width` pixels wide, and speed over the
+/// picture in any unit.
+///
+/// # Errors
+/// As [`saliency`].
+pub fn saliency_of_displayed(
+    width: usize,
+    rgb_cd_m2: &[[f32; 3]],
+    velocity: &Plane,
+    display: &Display,
+) -> Result<Plane, Error> {
+    let white_cd_m2 = display.luminance_cd_m2(1.0) as f32;
+    let channel = |channel: usize| {
+        let relative = rgb_cd_m2.iter().map(|rgb| rgb[channel] / white_cd_m2).collect();
+        Plane::from_values(width, rgb_cd_m2.len() / width.max(1), relative)
+    };
+    let [red, green, blue] = [channel(0)?, channel(1)?, channel(2)?];
+    saliency(&SaliencyInputs { rgb: [&red, &green, &blue], velocity: Some(velocity) })
 }
 
 /// Saliency of each pixel, 0..1. A picture in which nothing stands out is 1 everywhere: all of it may be looked at.

@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::fft::{PictureTransform, Workspace};
 use crate::glare::keep_thresholds;
 use crate::masking::{ElevationTable, MaskSource, band_elevation, halvings};
-use crate::motion::MotionTable;
+use crate::motion::VelocityTable;
 use crate::noise_gain::{noise_gain, reduced_coordinates};
 use crate::plane::Plane;
 use crate::reduced::ReducedPlane;
@@ -238,7 +238,7 @@ impl ThresholdMap {
         retinal_velocity_deg_s.check_non_negative("velocity")?;
         let mut moved = self.clone();
         for (band, elevation) in moved.elevations.iter_mut().enumerate() {
-            let table = MotionTable::new(self.bands.center_cpd(band));
+            let table = VelocityTable::of_motion(self.bands.center_cpd(band));
             *elevation =
                 elevation.change_by(retinal_velocity_deg_s, |elevation, velocity| elevation * table.at(velocity));
         }

@@ -15,6 +15,7 @@ use fechner_perception::threshold::{ThresholdInputs, ThresholdMap, threshold_map
 use fechner_perception::tone::acuity::BehindAcuity;
 use fechner_perception::tone::{FittedTone, SceneLight};
 use fechner_perception::visibility::MeasuredError;
+use std::borrow::Cow;
 use std::sync::OnceLock;
 use std::time::Instant;
 
@@ -113,10 +114,10 @@ fn judge_by(
         Some(denoiser) => Some(TimedDenoising::of(denoiser, film, settings.nits_per_unit)?),
         None => None,
     };
-    let light = {
-        let of = |rgb: &[[f32; 3]]| SceneLight::of(settings.operator.as_ref(), film.width() as usize, rgb);
-        denoised.as_ref().map_or_else(|| of(&guide_rgb(film, &estimate)), |found| of(&found.film.rgb_cd_m2))
-    };
+    let guide_rgb = denoised
+        .as_ref()
+        .map_or_else(|| Cow::Owned(guide_rgb(film, &estimate)), |found| Cow::Borrowed(&found.film.rgb_cd_m2[..]));
+    let light = SceneLight::of(settings.operator.as_ref(), film.width() as usize, &guide_rgb);
     let guide = light.luminance_cd_m2();
     still_wanted(settings)?;
     let tone = match &settings.fitted {
@@ -142,9 +143,8 @@ fn judge_by(
     let thresholds = if settings.gazes.is_empty() { thresholds } else { thresholds.with_gazes(&settings.gazes) };
     let thresholds = match (&settings.pursuit, settings.frames) {
         (Some(pursuit), Some(timing)) => {
-            let rgb = denoised.as_ref().map_or(&estimate.rgb_cd_m2, |found| &found.film.rgb_cd_m2);
             let size = (guide.width(), guide.height());
-            let eye = pursuit.eye_velocity_deg_s(rgb, size, tone.as_ref(), &settings.viewing.display)?;
+            let eye = pursuit.eye_velocity_deg_s(&guide_rgb, size, tone.as_ref(), &settings.viewing.display)?;
             thresholds.with_pursuit(&eye, timing)?
         }
         _ => thresholds,

@@ -3,10 +3,9 @@
 use super::ShotSettings;
 use super::velocity::VelocityMap;
 use crate::adaptive::pursuit::Pursuit;
-use fechner_perception::Plane;
-use fechner_perception::csf::FASTEST_PURSUIT_DEG_S;
 use fechner_perception::display::Display;
 use fechner_perception::motion::image_velocity_deg_s;
+use fechner_perception::{Error, Plane};
 use glam::Vec2;
 
 /// Whether eyes follow what moves. Each frame's noise is its own and stands still on the display for as long as the frame does, so
@@ -26,34 +25,36 @@ pub enum Eye {
 
 impl ShotSettings {
     /// How the eyes move in a frame whose motion is known; `None` where they rest, and for frames that may be paused.
-    pub fn pursuit(&self, frame: u32, velocity: &VelocityMap) -> Option<Pursuit> {
+    ///
+    /// # Errors
+    /// For an impossible display.
+    pub fn pursuit(&self, frame: u32, velocity: &VelocityMap) -> Result<Option<Pursuit>, Error> {
         if self.pausable {
-            return None;
+            return Ok(None);
         }
-        match self.eye {
+        Ok(match self.eye {
             Eye::Rests => None,
-            Eye::FollowsAll => self.image_velocity_deg_s(velocity).map(Pursuit::All),
-            Eye::FollowsSalient => self.image_velocity_deg_s(velocity).map(Pursuit::Salient),
+            Eye::FollowsAll => Some(Pursuit::All(self.image_velocity_deg_s(velocity)?)),
+            Eye::FollowsSalient => Some(Pursuit::Salient(self.image_velocity_deg_s(velocity)?)),
             Eye::FollowsGaze => self.gaze_velocity_deg_s(frame).map(Pursuit::Watched),
-        }
+        })
     }
 
     /// Of what each pixel shows, by the slower of its motions from the frame before and to the next: eyes that follow less see
     /// more.
-    fn image_velocity_deg_s(&self, velocity: &VelocityMap) -> Option<Plane> {
+    fn image_velocity_deg_s(&self, velocity: &VelocityMap) -> Result<Plane, Error> {
         let area = self.trace.film_area();
-        let width = area.width as usize;
-        let slower = |x: usize, y: usize| -> Vec2 {
-            let [next, previous] = [&velocity.to_next, &velocity.to_previous].map(|motion| motion[y * width + x]);
-            if next.length_squared() <= previous.length_squared() { next } else { previous }
+        let (width, height) = (area.width as usize, area.height as usize);
+        let speed = |motion: &[Vec2]| {
+            let of =
+                |component: fn(Vec2) -> f32| Plane::from_fn(width, height, |x, y| component(motion[y * width + x]));
+            image_velocity_deg_s(&of(|motion| motion.x), &of(|motion| motion.y), &self.display())
         };
-        let of =
-            |component: fn(Vec2) -> f32| Plane::from_fn(width, area.height as usize, |x, y| component(slower(x, y)));
-        image_velocity_deg_s(&of(|motion| motion.x), &of(|motion| motion.y), &self.display()).ok()
+        Ok(speed(&velocity.to_next)?.combined(&speed(&velocity.to_previous)?, f32::min))
     }
 
     /// Of the gaze from the frame before to the next, where each of the three has a single one.
-    fn gaze_velocity_deg_s(&self, frame: u32) -> Option<f64> {
+    pub fn gaze_velocity_deg_s(&self, frame: u32) -> Option<f64> {
         let area = self.trace.film_area();
         let at = |frame: u32| match self.gaze.as_ref()?.of_frame(frame, area.width, area.height) {
             [gaze] => Some(*gaze),
@@ -64,7 +65,7 @@ impl ShotSettings {
         let density = self.viewing.display.pixel_density();
         let moved_deg =
             ((after.x_px - before.x_px) / density.horizontal).hypot((after.y_px - before.y_px) / density.vertical);
-        Some((0.5 * moved_deg * self.frames_per_second).min(FASTEST_PURSUIT_DEG_S))
+        Some(0.5 * moved_deg * self.frames_per_second)
     }
 
     /// The display at the shot's own rate.
@@ -107,21 +108,35 @@ mod tests {
 
     #[test]
     fn eyes_follow_at_the_rate_of_the_shot() {
-        let velocity = match shot(Eye::FollowsAll, None).pursuit(3, &moving()) {
+        let velocity = match shot(Eye::FollowsAll, None).pursuit(3, &moving()).expect("a display") {
             Some(Pursuit::All(velocity)) => velocity.get(50, 25),
             other => panic!("{other:?}"),
         };
         // Five pixels of a fortieth degree, 24 times a second.
         assert!((velocity - 3.0).abs() < 1e-5, "{velocity}");
-        assert!(matches!(shot(Eye::FollowsSalient, None).pursuit(3, &moving()), Some(Pursuit::Salient(_))));
-        assert_eq!(shot(Eye::Rests, None).pursuit(3, &moving()), None);
-        assert_eq!(ShotSettings { pausable: true, ..shot(Eye::FollowsAll, None) }.pursuit(3, &moving()), None);
+        assert!(matches!(
+            shot(Eye::FollowsSalient, None).pursuit(3, &moving()).expect("a display"),
+            Some(Pursuit::Salient(_))
+        ));
+        // Of oblong pixels five lines are less of the view than three columns.
+        let mut oblong = shot(Eye::FollowsAll, None);
+        oblong.viewing.display.pixel_aspect_ratio = 2.0;
+        let map = VelocityMap { to_next: vec![Vec2::X * 3.0; 5000], to_previous: vec![Vec2::Y * 5.0; 5000] };
+        match oblong.pursuit(3, &map).expect("a display") {
+            Some(Pursuit::All(velocity)) => assert!((velocity.get(50, 25) - 1.5).abs() < 1e-5),
+            other => panic!("{other:?}"),
+        }
+        assert_eq!(shot(Eye::Rests, None).pursuit(3, &moving()).expect("a display"), None);
+        assert_eq!(
+            ShotSettings { pausable: true, ..shot(Eye::FollowsAll, None) }.pursuit(3, &moving()).expect("a display"),
+            None
+        );
     }
 
     #[test]
     fn a_watched_eye_moves_as_its_gaze() {
         let track = "frame,x,y\n1,10,20\n2,13,24\n3,16,28\n5,0,0\n6,80,0\n7,80,0\n8,1,1\n8,2,2\n9,3,3\n";
-        let watched = |frame| shot(Eye::FollowsGaze, Some(track)).pursuit(frame, &moving());
+        let watched = |frame| shot(Eye::FollowsGaze, Some(track)).pursuit(frame, &moving()).expect("a display");
         // Five pixels a frame.
         assert_eq!(watched(2), Some(Pursuit::Watched(3.0)));
         assert_eq!(watched(6), Some(Pursuit::Watched(24.0)));

@@ -161,7 +161,7 @@ pub fn render_frame(
 ) -> Result<RenderedFrame, JudgeError> {
     let tracer = PathTracer::new(Arc::clone(&scenes.now), shot.trace_settings(frame));
     let velocity = scenes.velocity(&tracer, shot.velocity_of);
-    settings.pursuit = shot.pursuit(frame, &velocity);
+    settings.pursuit = shot.pursuit(frame, &velocity)?;
     let rendered = render(&tracer, settings, monitor)?;
     Ok(RenderedFrame { rendered, velocity })
 }

@@ -7,7 +7,7 @@
 mod image;
 
 use crate::geometry::{Hit, Ray};
-use crate::integrator::{CameraRays, CameraSample, PathTracer};
+use crate::integrator::{CameraRays, CameraSample, Crop, PathTracer};
 use crate::scene::{Camera, Scene, SpherePlace};
 use glam::{Vec2, Vec3, Vec3A};
 use rayon::prelude::*;
@@ -61,14 +61,20 @@ impl VelocityMap {
         let settings = tracer.settings();
         let area = settings.film_area();
         let [before, now, after] = cameras.map(|camera| CameraRays::new(camera, settings.width, settings.height));
+        Self::by_pixel(area, |center| {
+            let seen = seen_at(tracer, &now, center);
+            [(next, &after), (previous, &before)].map(|(scene, camera)| place_in(scene, camera, &seen))
+        })
+    }
+
+    /// From where what each pixel shows at its centre is in the next frame and in the one before; without a place it has no motion.
+    fn by_pixel(area: Crop, places: impl Fn(Vec2) -> [Option<Vec2>; 2] + Sync) -> Self {
         let motions: Vec<[Vec2; 2]> = (0..area.width * area.height)
             .into_par_iter()
             .map(|pixel| {
                 let corner = Vec2::new((area.x + pixel % area.width) as f32, (area.y + pixel / area.width) as f32);
                 let center = corner + 0.5;
-                let seen = seen_at(tracer, &now, center);
-                [(next, &after), (previous, &before)]
-                    .map(|(scene, camera)| place_in(scene, camera, &seen).map_or(Vec2::ZERO, |place| place - center))
+                places(center).map(|place| place.map_or(Vec2::ZERO, |place| place - center))
             })
             .collect();
         Self {

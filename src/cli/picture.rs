@@ -10,6 +10,7 @@ use fechner_perception::display::{Display, Eotf, Viewing};
 use fechner_perception::photometry::luminance;
 use fechner_perception::tone::{FittedTone, SceneLight, ToneOperator, map_picture, map_pixels};
 use image::DynamicImage;
+use image::GenericImageView as _;
 use std::path::Path;
 
 /// A picture from a file.
@@ -92,13 +93,13 @@ impl InputPicture {
     fn from_codes(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).with_context(|| format!("{}", path.display()))?;
         let image = decoded_image(path, &bytes)?;
-        let codes = match output::png_transfer(path) {
+        let codes = match output::png_transfer(&bytes) {
             PngTransfer::Pq => Codes::Pq,
             PngTransfer::HybridLogGamma => bail!("{}: hybrid log-gamma is not read", path.display()),
             PngTransfer::Untagged if bytes_a_channel(&image) > 1 => Codes::Display,
             PngTransfer::Srgb | PngTransfer::Untagged => Codes::Srgb,
         };
-        if image.color().has_alpha() && image.to_rgba32f().pixels().any(|pixel| pixel.0[3] < 1.0) {
+        if image.color().has_alpha() && image.pixels().any(|(_, _, pixel)| pixel.0[3] < u8::MAX) {
             eprintln!("note: {}: alpha is not looked at: each pixel is seen in the colour that it has", path.display());
         }
         Ok(Self::from_image(image, Content::Display(codes)))

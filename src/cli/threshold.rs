@@ -11,7 +11,7 @@ use fechner::output::{self, Attribute, Format, PIXEL_ASPECT_RATIO, Picture};
 use fechner_perception::display::Glare;
 use fechner_perception::model::{self, ModelInputs};
 use fechner_perception::motion::image_velocity_deg_s;
-use fechner_perception::saliency::{SaliencyInputs, saliency};
+use fechner_perception::saliency::saliency_of_displayed;
 use fechner_perception::tone::acuity::BehindAcuity;
 use fechner_perception::tone::{FittedTone, ToneSettings};
 use fechner_perception::{ContrastSensitivity, Plane, ThresholdInputs, Viewing, csf, threshold_map};
@@ -169,13 +169,8 @@ impl Motion {
         let [x, y] = read_velocity(path, guide.size(), viewing.display.frames_per_second)?;
         let image_velocity_deg_s = image_velocity_deg_s(&x, &y, &viewing.display)?;
         let attention = if by_saliency {
-            let (width, height) = guide.size();
             let rgb = guide.displayed_rgb(fitted, viewing);
-            let white = viewing.display.luminance_cd_m2(1.0) as f32;
-            let [red, green, blue] =
-                [0, 1, 2].map(|c| Plane::from_fn(width, height, |x, y| rgb[y * width + x][c] / white));
-            let inputs = SaliencyInputs { rgb: [&red, &green, &blue], velocity: Some(&image_velocity_deg_s) };
-            Some(saliency(&inputs)?)
+            Some(saliency_of_displayed(guide.size().0, &rgb, &image_velocity_deg_s, &viewing.display)?)
         } else {
             None
         };

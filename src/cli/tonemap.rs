@@ -281,8 +281,18 @@ impl Eye {
     }
 }
 
-/// One file name for each input.
+/// One file name for each input, which are none of the inputs'.
 fn targets(arguments: &TonemapArguments) -> Result<Vec<PathBuf>> {
+    let targets = named_targets(arguments)?;
+    let inputs: Vec<PathBuf> = arguments.input.iter().filter_map(|input| input.canonicalize().ok()).collect();
+    let replaced = targets.iter().find(|target| target.canonicalize().is_ok_and(|target| inputs.contains(&target)));
+    match replaced {
+        Some(target) => bail!("{}: would replace a picture that is read; choose another name", target.display()),
+        None => Ok(targets),
+    }
+}
+
+fn named_targets(arguments: &TonemapArguments) -> Result<Vec<PathBuf>> {
     let name = arguments.output.to_string_lossy();
     let digits = name.chars().filter(|c| *c == '#').count();
     if arguments.input.len() == 1 && digits == 0 {

@@ -28,8 +28,7 @@ pub(super) fn create_beside(path: &Path) -> Result<(NamedTempFile, PathBuf), Out
         Ok(found) if found.is_dir() => return Err(not_a_file("a folder")),
         // Renaming over a device such as /dev/null would replace the device.
         Ok(found) if !found.is_file() => return Err(not_a_file("not an ordinary file")),
-        Ok(_) => path.canonicalize().map_err(io)?,
-        Err(_) => end_of_links(path).map_err(io)?,
+        _ => target_of(path).map_err(io)?,
     };
     let Some(name) = target.file_name() else {
         return Err(not_a_file("a folder"));
@@ -66,6 +65,11 @@ pub(super) fn create_beside(path: &Path) -> Result<(NamedTempFile, PathBuf), Out
     })
 }
 
+/// What would be replaced: the path, or what its links lead to, which may not be there yet.
+fn target_of(path: &Path) -> std::io::Result<PathBuf> {
+    path.canonicalize().or_else(|_| end_of_links(path))
+}
+
 /// Where links lead from a path at whose end nothing is.
 fn end_of_links(path: &Path) -> std::io::Result<PathBuf> {
     /// As many as Linux follows.
@@ -89,8 +93,7 @@ fn part_prefix(name: &OsStr) -> OsString {
 /// writing `path`.
 pub fn remove_leftovers(path: &Path) -> Result<(), OutputError> {
     let io = |error| OutputError::Io { path: path.to_owned(), error };
-    // The file itself may not be there yet; where it is a link, new files are made beside what it points to.
-    let target = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let target = target_of(path).map_err(io)?;
     let Some(name) = target.file_name() else { return Ok(()) };
     let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let prefix = part_prefix(name);

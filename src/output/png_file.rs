@@ -108,10 +108,9 @@ pub enum PngTransfer {
     Untagged,
 }
 
-/// Reads the file's header; [`PngTransfer::Untagged`] for what is no PNG.
-pub fn png_transfer(path: &Path) -> PngTransfer {
-    let Ok(file) = std::fs::File::open(path) else { return PngTransfer::Untagged };
-    let Ok(reader) = png::Decoder::new(std::io::BufReader::new(file)).read_info() else {
+/// Of a file in memory, by its header; [`PngTransfer::Untagged`] for what is no PNG.
+pub fn png_transfer(bytes: &[u8]) -> PngTransfer {
+    let Ok(reader) = png::Decoder::new(std::io::Cursor::new(bytes)).read_info() else {
         return PngTransfer::Untagged;
     };
     let info = reader.info();
@@ -230,7 +229,7 @@ mod tests {
         let path = folder.path().join("a.png");
         let pixels = [[0.0, 0.5, 1.0], [1.0, 0.0, 0.214_041_14]];
         write_png(&path, 2, 1, &pixels).unwrap();
-        assert_eq!(png_transfer(&path), PngTransfer::Srgb);
+        assert_eq!(png_transfer(&std::fs::read(&path).unwrap()), PngTransfer::Srgb);
         let names = chunk_names(&std::fs::read(&path).unwrap());
         for name in ["sRGB", "gAMA", "cHRM"] {
             assert!(names.iter().any(|n| n == name), "{name} is missing from {names:?}");
@@ -265,7 +264,7 @@ mod tests {
         let path = folder.path().join("a.png");
         let display = Display::preset("hdr-1000").unwrap();
         write_png_for(&path, 3, 1, &[[1.0; 3], [0.0, f32::NAN, 0.0], [0.1, 0.0, 0.0]], &display).unwrap();
-        assert_eq!(png_transfer(&path), PngTransfer::Pq);
+        assert_eq!(png_transfer(&std::fs::read(&path).unwrap()), PngTransfer::Pq);
         let names = chunk_names(&std::fs::read(&path).unwrap());
         let place = |name: &str| names.iter().position(|n| n == name);
         assert!(place("cICP") > place("IHDR") && place("cICP") < place("IDAT"), "{names:?}");

@@ -259,8 +259,10 @@ fn eyes_that_follow_let_noise_be_stronger() {
         record["report"]["samples_total"].as_f64().expect("a number")
     };
     let [rests, track, saliency] = ["none", "track", "saliency"].map(|eye| samples(&["--eye", eye]));
+    eprintln!("of the samples for eyes at rest: track {:.2}, saliency {:.2}", track / rests, saliency / rests);
     assert!(track < 0.9 * rests && track <= saliency && saliency <= rests, "{rests} {saliency} {track}");
     let [still, watched] = ["none", "gaze"].map(|eye| samples(&["--gaze", "gaze.csv", "--eye", eye]));
+    eprintln!("with a gaze that moves {:.2}", watched / still);
     assert!(watched < 0.6 * still, "{still} {watched}");
 }
 

@@ -5,7 +5,7 @@ use super::castle_temporal::{sustained_response, transient_response};
 use super::fresh_noise::{HIGHEST_HZ, chromatic_response};
 use super::{ContrastSensitivity, FrameTiming};
 use crate::error::Error;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 /// Seconds before and after a moment whose frames it is seen with: the sustained channel's response has fallen to 1 % by then.
 const REACH_S: f64 = 0.2;
@@ -76,13 +76,10 @@ impl FrameTiming {
     fn weights(self, response: impl Fn(f64) -> f64) -> Vec<f64> {
         let frame_s = 1.0 / self.frames_per_second;
         let hz_step = 0.25f64.min(self.frames_per_second / 64.0);
-        let held = |hz: f64| {
-            let phase = PI * hz * frame_s * self.persistence;
-            phase.sin() / phase
-        };
         let middles: Vec<f64> =
             (0..(HIGHEST_HZ / hz_step) as usize).map(|step| (step as f64 + 0.5) * hz_step).collect();
-        let densities: Vec<f64> = middles.iter().map(|&hz| 2.0 * frame_s * hz_step * response(hz) * held(hz)).collect();
+        let densities: Vec<f64> =
+            middles.iter().map(|&hz| 2.0 * frame_s * hz_step * response(hz) * self.held(hz)).collect();
         let at = |frames: usize| {
             let phase = TAU * frames as f64 * frame_s;
             middles.iter().zip(&densities).map(|(hz, density)| density * (phase * hz).cos()).sum()

@@ -8,7 +8,6 @@ use super::castle_chromatic::ChromaticChannel;
 use super::castle_temporal::{sustained_response, transient, transient_response};
 use super::{ContrastSensitivity, FrameTiming};
 use crate::error::Error;
-use std::f64::consts::PI;
 
 /// Sensitivity to the spatial frequencies of noise that is independent from frame to frame.
 ///
@@ -114,10 +113,7 @@ impl FrameTiming {
     /// ∫ 2T sinc²(f T p) r(f) df over what flickers for the eye, r being a squared response.
     pub(super) fn seen_energy(self, squared_response: impl Fn(f64) -> f64) -> f64 {
         let frame_s = 1.0 / self.frames_per_second;
-        let density = |hz: f64| {
-            let phase = PI * hz * frame_s * self.persistence;
-            2.0 * frame_s * (phase.sin() / phase).powi(2)
-        };
+        let density = |hz: f64| 2.0 * frame_s * self.held(hz).powi(2);
         let hz_step = HZ_STEP.min(self.frames_per_second / 16.0);
         let steps = (HIGHEST_HZ / hz_step) as usize;
         let middle = |step: usize| (step as f64 + 0.5) * hz_step;

@@ -36,6 +36,7 @@ pub use stela::StelaCsf;
 
 use crate::display::Viewing;
 use crate::error::{Error, check_range};
+use std::f64::consts::PI;
 
 /// A contrast sensitivity function for static, achromatic gratings seen foveally.
 pub trait ContrastSensitivity: Send + Sync {
@@ -73,6 +74,12 @@ impl FrameTiming {
     #[must_use]
     pub fn nearest(frames_per_second: f64, persistence: f64) -> Self {
         Self { frames_per_second: frames_per_second.min(1e3), persistence: persistence.max(1e-3) }
+    }
+
+    /// What holding a frame for its share of the time leaves of the amplitude of a flicker: sinc(f T p), sinc(x) = sin πx / πx.
+    fn held(self, flicker_hz: f64) -> f64 {
+        let phase = PI * flicker_hz * (1.0 / self.frames_per_second) * self.persistence;
+        if phase.abs() < 1e-9 { 1.0 } else { phase.sin() / phase }
     }
 
     fn check(self) -> Result<(), Error> {

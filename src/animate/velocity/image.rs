@@ -8,7 +8,6 @@ use super::{Seen, Target, VelocityMap, place_in, ray_through, seen_along, seen_a
 use crate::geometry::Ray;
 use crate::integrator::{CameraRays, PathTracer, SpecularPath, SpecularVertex};
 use glam::{Vec2, Vec3A};
-use rayon::prelude::*;
 
 /// Another moment of a shot.
 struct Moment<'a> {
@@ -30,25 +29,16 @@ impl VelocityMap {
     pub fn of_images(tracer: &PathTracer, previous: &PathTracer, next: &PathTracer) -> Self {
         let area = tracer.settings().film_area();
         let [before, now, after] = [previous, tracer, next].map(Moment::of);
-        let motions: Vec<[Vec2; 2]> = (0..area.width * area.height)
-            .into_par_iter()
-            .map(|pixel| {
-                let corner = Vec2::new((area.x + pixel % area.width) as f32, (area.y + pixel / area.width) as f32);
-                let center = corner + 0.5;
-                let surface = seen_at(now.tracer, &now.camera, center);
-                let camera_ray = ray_through(&now.camera, center);
-                let image = now.tracer.follow_specular(camera_ray).map(|path| Image::of(tracer, camera_ray, path));
-                [&after, &before].map(|other| {
-                    let of_surface = place_in(other.tracer.world().scene(), &other.camera, &surface);
-                    let place = image.as_ref().and_then(|image| image.place_in(other, center, of_surface));
-                    place.or(of_surface).map_or(Vec2::ZERO, |place| place - center)
-                })
+        Self::by_pixel(area, |center| {
+            let surface = seen_at(now.tracer, &now.camera, center);
+            let camera_ray = ray_through(&now.camera, center);
+            let image = now.tracer.follow_specular(camera_ray).map(|path| Image::of(tracer, camera_ray, path));
+            [&after, &before].map(|other| {
+                let of_surface = place_in(other.tracer.world().scene(), &other.camera, &surface);
+                let place = image.as_ref().and_then(|image| image.place_in(other, center, of_surface));
+                place.or(of_surface)
             })
-            .collect();
-        Self {
-            to_next: motions.iter().map(|motion| motion[0]).collect(),
-            to_previous: motions.iter().map(|motion| motion[1]).collect(),
-        }
+        })
     }
 }
 

@@ -14,6 +14,7 @@ use crate::cli::seeing::tone_operator;
 use anyhow::{Context, Result, bail};
 use fechner::adaptive::settings::{AllocationRule, LoopSettings, Sampling};
 use fechner::animate::budget::Needs;
+use fechner::animate::eye::Eye;
 use fechner::animate::name::FrameName;
 use fechner::animate::track::{Track, TrackFrame};
 use fechner::animate::{FrameScenes, RenderedFrame, SceneSource as _, ShotSettings, render_frame};
@@ -262,6 +263,8 @@ impl<'a> Shot<'a> {
 
     /// All that a frame's file depends on, as a name.
     fn key(&self, settings: &LoopSettings, track: &TrackFrame, scenes: &FrameScenes) -> String {
+        let follows_gaze = self.settings.eye == Eye::FollowsGaze;
+        let gaze_velocity_deg_s = follows_gaze.then(|| self.settings.gaze_velocity_deg_s(track.frame));
         let text = format!(
             "{}|{:?}|{track:?}|{}|{}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}",
             PROGRAM,
@@ -277,7 +280,7 @@ impl<'a> Shot<'a> {
             settings.gazes,
             self.arguments.aov_names,
             self.settings.velocity_of,
-            self.settings.eye,
+            (self.settings.eye, gaze_velocity_deg_s),
             self.arguments.time
         );
         blake3::hash(text.as_bytes()).to_hex()[..32].to_owned()
