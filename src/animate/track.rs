@@ -14,8 +14,7 @@ use crate::integrator::{PathTracer, TraceSettings};
 use crate::scene::Scene;
 use crate::scene::hash::{ContentHash, content_hash};
 use crate::scene::load::LoadError;
-use fechner_perception::Plane;
-use fechner_perception::tone::{AdaptationState, Goal, SavedTone, SceneGuide, SceneLight, ToneOperator};
+use fechner_perception::tone::{AdaptationState, Goal, SavedTone, SceneLight, ToneOperator};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -74,11 +73,11 @@ impl Track {
         let fits: Vec<(Option<AdaptationState>, SavedTone)> = if operator.sees_adaptation() {
             let eyes = eyes(shot, operator, &goals);
             let fit = |look: &Look, eye: AdaptationState| {
-                operator.fit(&Enlarged::of(&[look], shot).guide(), &shot.viewing, Some(&eye)).save()
+                operator.fit(&enlarged(&[look], shot).guide(), &shot.viewing, Some(&eye)).save()
             };
             looks.iter().zip(eyes).map(|((_, look), eye)| (Some(eye), fit(look, eye))).collect()
         } else {
-            let all = Enlarged::of(&looks.iter().map(|(_, look)| look).collect::<Vec<_>>(), shot);
+            let all = enlarged(&looks.iter().map(|(_, look)| look).collect::<Vec<_>>(), shot);
             let fitted = operator.fit(&all.guide(), &shot.viewing, None).save();
             looks.iter().map(|_| (None, fitted.clone())).collect()
         };
@@ -183,26 +182,10 @@ impl Look {
 }
 
 /// Some of the looks, one below the other, at the frames' own size, as operators that count degrees need it.
-struct Enlarged {
-    photopic: Plane,
-    scotopic: Option<Plane>,
-}
-
-impl Enlarged {
-    fn of(looks: &[&Look], shot: &ShotSettings) -> Self {
-        let count = looks.len().min(FITTED_FRAMES);
-        let some: Vec<SceneGuide<'_>> =
-            (0..count).map(|index| looks[index * looks.len() / count].light.guide()).collect();
-        let scotopic: Option<Vec<&Plane>> = some.iter().map(|guide| guide.scotopic_cd_m2).collect();
-        Self {
-            photopic: stacked(&some.iter().map(|guide| guide.luminance_cd_m2).collect::<Vec<_>>(), shot),
-            scotopic: scotopic.map(|planes| stacked(&planes, shot)),
-        }
-    }
-
-    fn guide(&self) -> SceneGuide<'_> {
-        SceneGuide { scotopic_cd_m2: self.scotopic.as_ref(), ..SceneGuide::of(&self.photopic) }
-    }
+fn enlarged(looks: &[&Look], shot: &ShotSettings) -> SceneLight {
+    let count = looks.len().min(FITTED_FRAMES);
+    let some: Vec<&SceneLight> = (0..count).map(|index| &looks[index * looks.len() / count].light).collect();
+    SceneLight::stacked(&some, shot.trace.width as usize, shot.trace.height as usize)
 }
 
 fn pilot_size(width: u32, height: u32) -> (u32, u32) {
@@ -215,15 +198,6 @@ fn pilot_size(width: u32, height: u32) -> (u32, u32) {
         }
     };
     (scaled(width), scaled(height))
-}
-
-/// Small planes, one below the other, at the frames' own size.
-fn stacked(planes: &[&Plane], shot: &ShotSettings) -> Plane {
-    let (width, height) = (shot.trace.width as usize, shot.trace.height as usize);
-    Plane::from_fn(width, height * planes.len(), |x, y| {
-        let small = planes[y / height];
-        small.get(x * small.width() / width, y % height * small.height() / height)
-    })
 }
 
 #[cfg(test)]

@@ -1,6 +1,9 @@
 //! Which channels of another program's EXR file hold its colour and its motion.
 
-use fechner::exr_read::ExrImage;
+use anyhow::{Result, bail};
+use fechner::exr_read::{ExrImage, read_exr};
+use fechner_perception::Plane;
+use std::path::Path;
 
 /// Colour as it was found.
 #[derive(Debug, PartialEq)]
@@ -9,6 +12,23 @@ pub(super) enum Colour<'a> {
     Rgb([&'a [f32]; 3]),
     /// Luminance alone: a grey picture.
     Grey(&'a [f32]),
+}
+
+/// Reads a file that shows as many pixels as the picture it is for.
+pub(super) fn read_of_size(path: &Path, (width, height): (usize, usize)) -> Result<ExrImage> {
+    let exr = read_exr(path)?;
+    let shown = exr.display_window;
+    if (shown.width as usize, shown.height as usize) != (width, height) {
+        bail!("{} has {}x{} pixels, the picture {width}x{height}", path.display(), shown.width, shown.height);
+    }
+    Ok(exr)
+}
+
+/// One component of motion over the display window. What is not finite, and what has no pixels, rests.
+pub(super) fn motion_plane(exr: &ExrImage, values: Vec<f32>) -> Result<Plane> {
+    let finite = values.into_iter().map(|value| if value.is_finite() { value } else { 0.0 }).collect();
+    let shown = exr.display_window;
+    Ok(Plane::from_values(shown.width as usize, shown.height as usize, exr.in_display_window(finite))?)
 }
 
 /// Layers that hold colour, but not the picture's.

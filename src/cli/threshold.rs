@@ -6,7 +6,6 @@ use super::picture::InputPicture;
 use super::seeing::{SeeingArguments, tone_operator};
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use fechner::exr_read::read_exr;
 use fechner::output::{self, Attribute, Format, PIXEL_ASPECT_RATIO, Picture};
 use fechner_perception::display::Glare;
 use fechner_perception::model::{self, ModelInputs};
@@ -179,12 +178,8 @@ impl Motion {
 }
 
 /// Motion in pixels under the names that renderers give it.
-fn read_velocity(path: &Path, (width, height): (usize, usize), frames_per_second: f64) -> Result<[Plane; 2]> {
-    let exr = read_exr(path)?;
-    let shown = exr.display_window;
-    if (shown.width as usize, shown.height as usize) != (width, height) {
-        bail!("{} has {}x{} pixels, the picture {width}x{height}", path.display(), shown.width, shown.height);
-    }
+fn read_velocity(path: &Path, size: (usize, usize), frames_per_second: f64) -> Result<[Plane; 2]> {
+    let exr = channels::read_of_size(path, size)?;
     let Some((layer, [x, y])) = channels::motion(&exr) else {
         bail!(
             "{}: no motion channels; velocity.X/Y, Vector.X/Y, motion.X/Y and forward.u/v are known, with or without a layer \
@@ -193,11 +188,7 @@ fn read_velocity(path: &Path, (width, height): (usize, usize), frames_per_second
         );
     };
     println!("motion from the channels of {layer} at {frames_per_second} frames a second");
-    let plane = |values: &[f32]| {
-        let finite = values.iter().map(|&v| if v.is_finite() { v } else { 0.0 }).collect();
-        Plane::from_values(width, height, exr.in_display_window(finite))
-    };
-    Ok([plane(x)?, plane(y)?])
+    Ok([channels::motion_plane(&exr, x.to_vec())?, channels::motion_plane(&exr, y.to_vec())?])
 }
 
 fn median(plane: &Plane) -> f32 {

@@ -8,12 +8,11 @@ use super::seeing::{self, parse_positive};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use fechner::output::{self, Attribute, Format, Picture};
-use fechner_perception::photometry::{luminance, scotopic_luminance};
+use fechner_perception::Viewing;
 use fechner_perception::tone::{
-    self, AdaptationScope, AdaptationState, Effects, FittedTone, Goal, Pixel, SceneGuide, ToneOperator, ToneSettings,
-    map_picture,
+    self, AdaptationScope, AdaptationState, Effects, FittedTone, Goal, Pixel, SceneGuide, SceneLight, ToneOperator,
+    ToneSettings, map_picture,
 };
-use fechner_perception::{Plane, Viewing};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `tonemap`.
@@ -101,8 +100,7 @@ fn parse_stops(text: &str) -> Result<f64, String> {
 pub(super) struct SceneFrame {
     width: usize,
     rgb_cd_m2: Vec<[f32; 3]>,
-    photopic: Plane,
-    scotopic: Plane,
+    light: SceneLight,
     gaze: Option<Pixel>,
     /// The display, in this picture's pixels.
     viewing: Viewing,
@@ -121,19 +119,17 @@ impl SceneFrame {
         if let Some(Gaze(Pixel { x, y })) = arguments.gaze.filter(|gaze| gaze.0.x >= width || gaze.0.y >= height) {
             bail!("--gaze {x},{y} is outside {}, which has {width}x{height} pixels", path.display());
         }
-        let plane =
-            |of: fn([f32; 3]) -> f32| Plane::from_fn(width, height, |x, y| of(rgb_cd_m2[y * width + x]).max(0.0));
-        let (photopic, scotopic) = (plane(luminance), plane(scotopic_luminance));
+        let light = SceneLight::with_rods(width, &rgb_cd_m2);
         let gaze = arguments.gaze.map(|gaze| gaze.0);
-        Ok(Self { width, rgb_cd_m2, photopic, scotopic, gaze, viewing, pixel_aspect_ratio })
+        Ok(Self { width, rgb_cd_m2, light, gaze, viewing, pixel_aspect_ratio })
     }
 
     fn guide(&self) -> SceneGuide<'_> {
-        SceneGuide::of(&self.photopic).with_scotopic(&self.scotopic).with_gaze(self.gaze)
+        self.light.guide().with_gaze(self.gaze)
     }
 
     fn height(&self) -> usize {
-        self.photopic.height()
+        self.light.luminance_cd_m2().height()
     }
 
     fn shown(&self, fitted: &dyn FittedTone) -> Vec<[f32; 3]> {

@@ -262,6 +262,10 @@ fn eyes_that_follow_let_noise_be_stronger() {
     eprintln!("of the samples for eyes at rest: track {:.2}, saliency {:.2}", track / rests, saliency / rests);
     assert!(track < 0.9 * rests && track <= saliency && saliency <= rests, "{rests} {saliency} {track}");
     let [still, watched] = ["none", "gaze"].map(|eye| samples(&["--gaze", "gaze.csv", "--eye", eye]));
+    // The next frame's line alone says how fast the eye is.
+    std::fs::write(folder.path().join("gaze.csv"), "0,4,8\n1,12,8\n2,13,8\n").expect("written");
+    let slower = samples(&["--gaze", "gaze.csv", "--eye", "gaze"]);
+    assert!(slower > watched, "{slower} {watched}");
     eprintln!("with a gaze that moves {:.2}", watched / still);
     assert!(watched < 0.6 * still, "{still} {watched}");
 }

@@ -100,6 +100,7 @@ fn what_makes_no_sense_is_refused_in_one_line() {
     refused(&["a.exr", "a.exr", "-o", "b.png", "--operator", "ptyg"], "# for each digit");
     refused(&["a.exr", "a.exr", "-o", "b.#.png", "--operator", "agx"], "does not know an eye that adapts");
     refused(&["a.exr", "-o", "b.png", "--operator", "ptyg", "--gaze", "64,3"], "outside");
+    refused(&["a.exr", "-o", "./a.exr", "--operator", "agx"], "would replace a picture that is read");
     refused(&["a.exr", "-o", "b.exr", "--operator", "all"], "end the name in .png");
     refused(
         &["a.exr", "-o", "b.png", "--operator", "tr", "--adaptation", "local", "--adapted-to", "3"],

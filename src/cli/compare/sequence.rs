@@ -1,13 +1,12 @@
 //! `fechner compare A.####.exr B.####.exr --fps F`: can one moving picture be told from another?
 
 use super::{CompareArguments, Figures, Seen, check_alike, check_map, write_map};
-use crate::cli::channels::both_motions;
+use crate::cli::channels::{self, both_motions};
 use crate::cli::json::write_json;
 use crate::cli::picture::InputPicture;
 use crate::cli::seeing::tone_operator;
 use anyhow::{Context, Result, bail};
 use fechner::animate::name::FrameName;
-use fechner::exr_read::read_exr;
 use fechner::output;
 use fechner_perception::Plane;
 use fechner_perception::display::Viewing;
@@ -129,20 +128,22 @@ fn fit(
     viewing: &Viewing,
 ) -> Result<Option<Box<dyn FittedTone>>> {
     let count = numbers.len().min(FITTED_FRAMES);
-    let (mut stacked, mut goals, mut size) = (Vec::new(), Vec::new(), None);
+    let (mut lights, mut size): (Vec<SceneLight>, _) = (Vec::new(), None);
     for index in 0..count {
-        let picture = InputPicture::read(&name.of(numbers[index * numbers.len() / count]), nits_per_unit)?;
+        let path = name.of(numbers[index * numbers.len() / count]);
+        let picture = InputPicture::read(&path, nits_per_unit)?;
         let Some(rgb) = picture.scene_rgb_cd_m2() else { return Ok(None) };
         if *size.get_or_insert(picture.size()) != picture.size() {
-            bail!("{}: frames of several sizes", name.of(numbers[0]).display());
+            bail!("{}: it has another size than {}", path.display(), name.of(numbers[0]).display());
         }
-        let light = SceneLight::of(operator, picture.size().0, &rgb);
-        goals.push(Goal::of(&light.guide(), viewing.display.pixel_density()));
-        stacked.extend(rgb);
+        lights.push(SceneLight::of(operator, picture.size().0, &rgb));
     }
-    let width = size.map_or(0, |(width, _)| width);
+    let goals: Vec<Goal> =
+        lights.iter().map(|light| Goal::of(&light.guide(), viewing.display.pixel_density())).collect();
     let eye = AdaptationState::adapted_to(Goal::mean(&goals), &operator.kinetics());
-    Ok(Some(operator.fit(&SceneLight::of(operator, width, &stacked).guide(), viewing, Some(&eye))))
+    let (width, height) = size.unwrap_or_default();
+    let all = SceneLight::stacked(&lights.iter().collect::<Vec<_>>(), width, height);
+    Ok(Some(operator.fit(&all.guide(), viewing, Some(&eye))))
 }
 
 impl<'a> Sequences<'a> {
@@ -255,12 +256,8 @@ impl<'a> Sequences<'a> {
 }
 
 /// Motion in pixels under the names that renderers give it.
-fn read_motion(path: &Path, (width, height): (usize, usize)) -> Result<FrameMotion> {
-    let exr = read_exr(path)?;
-    let shown = exr.display_window;
-    if (shown.width as usize, shown.height as usize) != (width, height) {
-        bail!("{} has {}x{} pixels, the picture {width}x{height}", path.display(), shown.width, shown.height);
-    }
+fn read_motion(path: &Path, size: (usize, usize)) -> Result<FrameMotion> {
+    let exr = channels::read_of_size(path, size)?;
     let Some(motions) = both_motions(&exr) else {
         bail!(
             "{}: no motion channels; velocity.X/Y (and velocity_previous.X/Y), Vector.X/Y/Z/W, motion.X/Y and forward.u/v are \
@@ -268,8 +265,9 @@ fn read_motion(path: &Path, (width, height): (usize, usize)) -> Result<FrameMoti
             path.display()
         );
     };
-    let plane = |values: Vec<f32>| Plane::from_values(width, height, exr.in_display_window(values));
-    let planes = |[x, y]: [Vec<f32>; 2]| -> Result<[Plane; 2]> { Ok([plane(x)?, plane(y)?]) };
+    let planes = |[x, y]: [Vec<f32>; 2]| -> Result<[Plane; 2]> {
+        Ok([channels::motion_plane(&exr, x)?, channels::motion_plane(&exr, y)?])
+    };
     Ok(FrameMotion { to_next: planes(motions.to_next)?, to_previous: planes(motions.to_previous)? })
 }
 
