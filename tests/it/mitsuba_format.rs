@@ -133,6 +133,11 @@ fn what_never_ends_is_refused() {
     let itself = r#"<texture type="checkerboard" id="a"><ref name="color0" id="a"/></texture>
 <shape type="rectangle"><bsdf type="diffuse"><ref name="reflectance" id="a"/></bsdf></shape>"#;
     assert!(refused(itself).contains("scene.xml:1: <texture>: textures are nested too deeply, or one uses itself"));
+    let white = r#"<shape type="rectangle"><bsdf type="diffuse"><spectrum name="reflectance" type="d65" id="a"><ref name="color" id="a"/></spectrum></bsdf></shape>"#;
+    assert!(refused(white).contains("textures are nested too deeply, or one uses itself"));
+    let in_turn = r#"<texture type="checkerboard" id="a"><spectrum name="color0" type="d65"><ref name="color" id="a"/></spectrum></texture>
+<shape type="rectangle"><bsdf type="diffuse"><ref name="reflectance" id="a"/></bsdf></shape>"#;
+    assert!(refused(in_turn).contains("textures are nested too deeply, or one uses itself"));
     let mut defaults = r#"<default name="v0" value="0123456789"/>"#.to_owned();
     for n in 1..30 {
         let last = format!("$v{}", n - 1);
