@@ -35,7 +35,7 @@ pub(super) fn read_into(
     path: &Path,
     with_materials: bool,
 ) -> Result<Vec<(MeshId, MaterialId)>, LoadError> {
-    let Cleaned { mut text, colors } = clean(&files::decode_loosely(path, files::read(path)?)?);
+    let Cleaned { mut text, colors, points_and_lines } = clean(&files::decode_loosely(path, files::read(path)?)?);
     let mut added_lines = 0;
     if let Some(smoothed) = smoothing::add_normals(&text) {
         (text, added_lines) = (smoothed.text, smoothed.added_lines);
@@ -58,7 +58,7 @@ pub(super) fn read_into(
     // Materials are converted when a face uses them: libraries are often shared by many files.
     let mut converted: HashMap<Option<usize>, MaterialId> = HashMap::new();
     let mut placed = Vec::new();
-    let mut sparse_faces = 0;
+    let mut sparse_faces = points_and_lines;
     for model in &models {
         let (mesh, skipped) = convert_mesh(model, path)?;
         sparse_faces += skipped;
@@ -275,7 +275,7 @@ fn report_unknown_materials(
     }
 }
 
-/// Our mesh, and how many points and lines were skipped.
+/// Our mesh, and how many faces of fewer than three corners were skipped.
 fn convert_mesh(model: &tobj::Model, path: &Path) -> Result<(Mesh, usize), LoadError> {
     let from = &model.mesh;
     let positions: Vec<Vec3> = from.positions.as_chunks::<3>().0.iter().copied().map(Vec3::from_array).collect();
