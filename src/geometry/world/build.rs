@@ -33,7 +33,7 @@ pub(super) fn fixed_triangles(scene: &Scene, uses: &[u32]) -> Vec<([Vec3A; 3], T
     triangles
 }
 
-/// Vertices of placed meshes up to which boxes are made around each; of more, around the corners of the meshes' boxes.
+/// Vertices of all placed instances up to which boxes are made around each; of more, around the corners of the meshes' boxes.
 pub(super) const MOST_VERTICES: usize = 30_000_000;
 
 /// Bounds of an instance whose mesh has these bounds of its own.
