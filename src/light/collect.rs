@@ -100,10 +100,11 @@ fn box_corner(low: Vec3, high: Vec3, corner: u32) -> Vec3 {
 /// A triangle as it is at a time.
 pub(super) fn triangle_at(world: &World, object: u32, triangle: u32, time: f32) -> FlatEmitter {
     let scene = world.scene();
-    let mirrored = world.transform_at(object, time).matrix3.determinant() < 0.0;
+    let to_world = world.transform_at(object, time);
+    let mirrored = to_world.matrix3.determinant() < 0.0;
     let material = &scene.materials[scene.instances[object as usize].material.0 as usize];
-    let corners = world.triangle_corners(object, triangle, time);
-    FlatEmitter::triangle(object, triangle, corners, world.translation_of_tree(object, time), mirrored, material)
+    let corners = world.placed_corners(object, triangle, &to_world);
+    FlatEmitter::triangle(object, triangle, corners, world.translation_of_tree(object, &to_world), mirrored, material)
 }
 
 fn flat_bounds(emitter: &FlatEmitter, radiance: f32) -> LightBounds {

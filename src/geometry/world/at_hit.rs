@@ -50,17 +50,22 @@ impl World {
         self.scene.spheres[object as usize - self.scene.instances.len()].place_at(time)
     }
 
-    /// The translation that puts a mesh into the world where its tree is in coordinates of its own; zero where that is in world space.
-    pub(crate) fn translation_of_tree(&self, object: u32, time: f32) -> Vec3A {
+    /// The translation of a transform that puts a mesh into the world where its tree is in coordinates of its own; zero where that is
+    /// in world space.
+    pub(crate) fn translation_of_tree(&self, object: u32, to_world: &Affine3A) -> Vec3A {
         match self.placements[object as usize].shared {
             None => Vec3A::ZERO,
-            Some(_) => self.transform_at(object, time).translation,
+            Some(_) => to_world.translation,
         }
     }
 
     /// World-space corners of a triangle of an instance at a share of the open shutter.
     pub fn triangle_corners(&self, object: u32, triangle: u32, time: f32) -> [Vec3; 3] {
-        let to_world = self.transform_at(object, time);
+        self.placed_corners(object, triangle, &self.transform_at(object, time))
+    }
+
+    /// The same of an instance that is placed so.
+    pub(crate) fn placed_corners(&self, object: u32, triangle: u32, to_world: &Affine3A) -> [Vec3; 3] {
         let mesh = &self.scene.meshes[self.scene.instances[object as usize].mesh.0 as usize];
         mesh.triangles[triangle as usize].map(|i| to_world.transform_point3(mesh.positions[i as usize]))
     }
