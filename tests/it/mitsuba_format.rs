@@ -212,6 +212,22 @@ fn masks_and_blends_cover_what_they_should() {
     );
 }
 
+#[test]
+fn a_picture_of_colour_and_opacity_is_decoded_once() {
+    let folder = folder();
+    image::RgbaImage::from_pixel(2, 2, image::Rgba([0, 255, 0, 128])).save(folder.path().join("leaf.png")).unwrap();
+    let picture = |name: &str| {
+        format!(r#"<texture name="{name}" type="bitmap"><string name="filename" value="leaf.png"/></texture>"#)
+    };
+    let (color, opacity) = (picture("reflectance"), picture("opacity"));
+    let body = format!(
+        r#"{LIGHT}<shape type="rectangle"><bsdf type="mask"><bsdf type="diffuse">{color}</bsdf>{opacity}</bsdf></shape>"#
+    );
+    let scene = try_load(folder.path(), "3.0.0", &body).unwrap_or_else(|error| panic!("{error}"));
+    let Alpha::Blend { value } = scene.materials[0].alpha else { panic!("a mask") };
+    assert_eq!((scene.textures.len(), value.texture.map(|(_, channel)| channel)), (1, Some(3)));
+}
+
 /// Green is bright: a number from a colour is its luminance.
 #[test]
 fn numbers_from_colours_are_luminances() {

@@ -144,17 +144,18 @@ impl Reader {
 
     /// The opacity of a mask: a picture with an alpha channel means that channel.
     pub(super) fn opacity(&mut self, owner: &Element) -> Result<Option<ScalarInput>, LoadError> {
-        let Some(mut scalar) = self.scalar_input(owner, "opacity")? else { return Ok(None) };
         if let Some(child) = owner.child("opacity").cloned() {
             let child = if child.tag == "ref" { self.resolve(&child)? } else { child };
-            if let Some(name) = child.string("filename")?
+            if child.tag == "texture"
+                && let Some(name) = child.string("filename")?
                 && has_alpha(&self.file(&child, name))
-                && let Some((_, channel)) = &mut scalar.texture
             {
-                *channel = 3;
+                // As a surface's colour would ask for it: the luminance of its colours would be a second picture that nothing reads.
+                let picture = self.texture(&child, Meaning::Reflectance, 0)?;
+                return Ok(Some(ScalarInput { factor: picture.factor.x, texture: picture.texture.map(|t| (t, 3)) }));
             }
         }
-        Ok(Some(scalar))
+        self.scalar_input(owner, "opacity")
     }
 
     /// A texture inside, of any name, here or elsewhere in the file.
