@@ -9,6 +9,7 @@ use crate::scene::{
     Camera, Environment, FilmDefaults, Instance, Light, Material, MaterialId, Mesh, MeshId, Scene, Sphere,
     ViewingDefaults,
 };
+use rayon::prelude::*;
 use std::path::Path;
 
 /// A camera that a file holds.
@@ -188,7 +189,7 @@ fn add_tangents(scene: &mut Scene) {
     for instance in &scene.instances {
         is_asked[instance.mesh.0 as usize] |= scene.materials[instance.material.0 as usize].needs_tangent();
     }
-    let asked = scene.meshes.iter_mut().zip(is_asked).filter(|(_, is_asked)| *is_asked);
+    let asked = scene.meshes.par_iter_mut().zip(is_asked).filter(|(_, is_asked)| *is_asked);
     asked.for_each(|(mesh, _)| tangents::add(mesh));
 }
 
