@@ -43,19 +43,13 @@ pub(super) fn placed_bounds(scene: &Scene, instance: &Instance, own: Bounds, tig
         let mesh = &scene.meshes[instance.mesh.0 as usize];
         return Bounds::of_points(mesh.positions.iter().map(|&point| place(point.into())));
     }
-    Bounds::of_points(corners_of(own).map(place))
-}
-
-fn corners_of(bounds: Bounds) -> [Vec3A; 8] {
-    let pick = |corner: usize, bit: usize| if corner >> bit & 1 == 0 { bounds.min } else { bounds.max };
-    std::array::from_fn(|corner| Vec3A::new(pick(corner, 0).x, pick(corner, 1).y, pick(corner, 2).z))
+    Bounds::of_points(own.corners().map(place))
 }
 
 /// Where things with these bounds in their own space can be while the shutter is open.
 pub(super) fn swept_bounds(motion: &Motion, own: Bounds) -> Bounds {
-    let corners = corners_of(own);
     let mut bounds = Bounds::EMPTY;
-    motion.sweep(&corners, |center, radius| {
+    motion.sweep(&own.corners(), |center, radius| {
         bounds = bounds.union(Bounds { min: center - radius, max: center + radius });
     });
     bounds
