@@ -14,7 +14,7 @@ use super::error::{LoadError, Place, nearest};
 use super::{LoadOptions, files, mtl, polygon};
 use crate::scene::{Instance, MaterialId, Mesh, MeshId, Scene};
 use glam::{Affine3A, Vec2, Vec3};
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
 use std::io::{BufRead, Read};
 use std::path::Path;
@@ -42,12 +42,11 @@ pub(super) fn read_into(
     }
     added_lines += hoist_libraries(&mut text);
     let mut models = Vec::new();
-    let mut libraries = Libraries::default();
+    let libraries = RefCell::new(Libraries::default());
     for part in patterns::separate(&text) {
-        let parsed = parse(path, &part, added_lines, with_materials)?;
-        models.extend(parsed.0);
-        libraries = parsed.1;
+        models.extend(parse(path, &part, added_lines, with_materials.then_some(&libraries))?);
     }
+    let libraries = libraries.into_inner();
     for note in libraries.notes {
         builder.note(note);
     }
@@ -97,30 +96,25 @@ pub(super) fn read_into(
     Ok(placed)
 }
 
-/// The objects of a text, and the materials that it names.
+/// The objects of a text; the materials that it names are added to the libraries, if there are any.
 fn parse(
     path: &Path,
     text: &str,
     added_lines: usize,
-    with_materials: bool,
-) -> Result<(Vec<tobj::Model>, Libraries), LoadError> {
-    let libraries = RefCell::new(Libraries::default());
+    libraries: Option<&RefCell<Libraries>>,
+) -> Result<Vec<tobj::Model>, LoadError> {
     let mut reader = CountingReader { rest: text.as_bytes(), lines: 0 };
     let options = tobj::LoadOptions { single_index: true, triangulate: false, ..tobj::LoadOptions::default() };
+    let statements = Cell::new(0);
     let parsed = tobj::load_obj_buf(&mut reader, &options, |named| {
-        let mut libraries = libraries.borrow_mut();
-        let first = libraries.materials.len();
-        if with_materials {
-            libraries.open(path, &named.to_string_lossy());
-        }
-        libraries.index(first)
+        let Some(libraries) = libraries else { return Ok(Default::default()) };
+        libraries.borrow_mut().of_statement(statements.replace(statements.get() + 1), path, &named.to_string_lossy())
     });
     let line = reader.lines.saturating_sub(added_lines);
     let (models, _) = parsed.map_err(|error| explain(error, text, path, line, added_lines))?;
-    let mut libraries = libraries.into_inner();
-    match libraries.error.take() {
+    match libraries.and_then(|libraries| libraries.borrow_mut().error.take()) {
         Some(error) => Err(error),
-        None => Ok((models, libraries)),
+        None => Ok(models),
     }
 }
 
@@ -128,6 +122,8 @@ fn parse(
 #[derive(Default)]
 struct Libraries {
     materials: Vec<mtl::Written>,
+    /// How many materials there are after each of the `mtllib` statements that were read.
+    ends: Vec<usize>,
     notes: Vec<String>,
     error: Option<LoadError>,
 }
@@ -158,9 +154,15 @@ impl Libraries {
         }
     }
 
-    /// What `tobj` wants to know of the materials from number `first` on: their names. It counts on from what it has.
-    fn index(&self, first: usize) -> tobj::MTLLoadResult {
-        let new = &self.materials[first..];
+    /// What `tobj` wants to know of the materials of an `mtllib` statement: their names. It counts on from what it has. Its files are
+    /// read when the first part of the text names them.
+    fn of_statement(&mut self, number: usize, obj: &Path, named: &str) -> tobj::MTLLoadResult {
+        if number == self.ends.len() {
+            self.open(obj, named);
+            self.ends.push(self.materials.len());
+        }
+        let first = if number == 0 { 0 } else { self.ends[number - 1] };
+        let new = &self.materials[first..self.ends[number]];
         let places = new.iter().enumerate().map(|(place, material)| (material.name.clone(), place)).collect();
         Ok((vec![tobj::Material::default(); new.len()], places))
     }
