@@ -36,11 +36,16 @@ pub(super) enum IfDark {
 /// Emitters of interchange files below this many cd/m² are decoration (an "emissive" left at 1), not the scene's light.
 const WEAK_EMITTER_CD_M2: f32 = 10.0;
 
+/// Luminance of RGB (1, 1, 1) in formats without a unit.
+pub(super) const ASSUMED_NITS_PER_UNIT: f64 = 100.0;
+
 /// The scene while it is being read.
 #[derive(Debug)]
 pub(super) struct Builder {
     pub(super) name: String,
     pub(super) nits_per_unit: f64,
+    /// Whether the caller chose the unit: what files say of it does not count then.
+    unit_is_chosen: bool,
     pub(super) cameras: Vec<NamedCamera>,
     pub(super) film: FilmDefaults,
     pub(super) viewing: ViewingDefaults,
@@ -58,11 +63,12 @@ pub(super) struct Builder {
 }
 
 impl Builder {
-    /// An empty scene named after its file.
-    pub(super) fn new(path: &Path) -> Self {
+    /// An empty scene named after its file, in the caller's unit or in cd/m².
+    pub(super) fn new(path: &Path, options: &LoadOptions) -> Self {
         Self {
             name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
-            nits_per_unit: 1.0,
+            nits_per_unit: options.nits_per_unit.unwrap_or(1.0),
+            unit_is_chosen: options.nits_per_unit.is_some(),
             cameras: Vec::new(),
             film: FilmDefaults { width: 512, height: 512 },
             viewing: ViewingDefaults::default(),
@@ -76,6 +82,22 @@ impl Builder {
             environment: None,
             notes: Vec::new(),
             alike: AlikeNotes::default(),
+        }
+    }
+
+    /// Takes the file's unit, unless the caller chose one.
+    pub(super) fn set_nits_per_unit(&mut self, of_file: f64) {
+        if !self.unit_is_chosen {
+            self.nits_per_unit = of_file;
+        }
+    }
+
+    /// Says that the file has no unit, unless the caller chose one.
+    pub(super) fn note_assumed_unit(&mut self) {
+        if !self.unit_is_chosen {
+            self.note(format!(
+                "Radiance has no unit in this file: 1 is taken as {ASSUMED_NITS_PER_UNIT} cd/m² (--nits-per-unit changes it)."
+            ));
         }
     }
 
@@ -109,10 +131,6 @@ impl Builder {
 
     /// Chooses the camera, decodes the textures, checks everything, and adds what is missing.
     pub(super) fn finish(mut self, path: &Path, if_dark: IfDark, options: &LoadOptions) -> Result<Scene, LoadError> {
-        if let Some(nits_per_unit) = options.nits_per_unit {
-            self.nits_per_unit = nits_per_unit;
-            self.notes.retain(|note| !note.starts_with("Radiance has no unit"));
-        }
         validate::repair(&mut self, path)?;
         std::mem::take(&mut self.alike).count_into(&mut self.notes);
         let camera = self.choose_camera(options)?;

@@ -21,7 +21,7 @@ use std::path::Path;
 
 /// Reads an OBJ file as a whole scene.
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
-    let mut builder = Builder::new(path);
+    let mut builder = Builder::new(path, options);
     for (mesh, material) in read_into(&mut builder, path, true)? {
         let name = builder.meshes[mesh.0 as usize].name.clone();
         builder.instances.push(Instance { name, mesh, material, to_world: Affine3A::IDENTITY, motion: None });
