@@ -54,6 +54,8 @@ pub(super) struct Builder {
     pub(super) spheres: Vec<Sphere>,
     pub(super) materials: Vec<Material>,
     pub(super) textures: Requests,
+    /// As [`Scene::bitangent_ignores_v`].
+    pub(super) bitangent_ignores_v: bool,
     /// Reliefs that only their decoded pictures tell apart.
     pub(super) bumps: Vec<Bump>,
     pub(super) lights: Vec<Light>,
@@ -77,6 +79,7 @@ impl Builder {
             spheres: Vec::new(),
             materials: Vec::new(),
             textures: Requests::default(),
+            bitangent_ignores_v: false,
             bumps: Vec::new(),
             lights: Vec::new(),
             environment: None,
@@ -148,6 +151,7 @@ impl Builder {
             spheres: self.spheres,
             materials: self.materials,
             textures,
+            bitangent_ignores_v: self.bitangent_ignores_v,
             lights: self.lights,
             environment: self.environment,
             notes: self.notes,

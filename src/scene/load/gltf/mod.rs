@@ -246,7 +246,6 @@ impl<'a> Reader<'a> {
             tangents: tangents.unwrap_or_default().into_iter().map(Vec4::from_array).collect(),
             colors: colors.unwrap_or_default(),
             triangles: triangles(&indices, from.mode()),
-            bitangent_ignores_v: false,
         }))
     }
 

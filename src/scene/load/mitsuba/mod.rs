@@ -43,6 +43,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
         clips: None,
         since_2: root.attribute("version").is_none_or(|version| !version.trim_start().starts_with("0.")),
     };
+    reader.builder.bitangent_ignores_v = true;
     reader.builder.set_nits_per_unit(ASSUMED_NITS_PER_UNIT);
     reader.name_all(&root);
     for child in &root.children {
@@ -67,9 +68,6 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
                 return Err(child.error(format_args!("unknown element{}", suggestion(other, known))));
             }
         }
-    }
-    for mesh in &mut reader.builder.meshes {
-        mesh.bitangent_ignores_v = true;
     }
     reader.note_clips();
     reader.builder.note_assumed_unit();

@@ -222,9 +222,7 @@ impl Reader<'_> {
             self.builder.note_assumed_unit();
             ASSUMED_NITS_PER_UNIT
         };
-        for mesh in &mut self.builder.meshes {
-            mesh.bitangent_ignores_v = true;
-        }
+        self.builder.bitangent_ignores_v = true;
         self.builder.set_nits_per_unit(nits / f64::from(self.exposure));
         self.builder.finish(path, IfDark::StudioWithoutLight, self.options)
     }
