@@ -39,6 +39,12 @@ impl Bounds {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
+    /// The box's eight corners.
+    pub(crate) fn corners(self) -> [Vec3A; 8] {
+        let pick = |corner: usize, axis: usize| if corner >> axis & 1 == 0 { self.min[axis] } else { self.max[axis] };
+        std::array::from_fn(|corner| Vec3A::new(pick(corner, 0), pick(corner, 1), pick(corner, 2)))
+    }
+
     /// Whether all six numbers are finite (an empty box is not).
     pub fn is_finite(self) -> bool {
         self.min.is_finite() && self.max.is_finite()

@@ -101,8 +101,9 @@ impl World {
             items.push(Item::Fixed);
             item_bounds.push(fixed.bounds());
         }
+        let is_placed = |instance: &&Instance| uses[instance.mesh.0 as usize] >= 2 && instance.motion.is_none();
         let vertices = |instance: &Instance| scene.meshes[instance.mesh.0 as usize].positions.len();
-        let tightly = scene.instances.iter().map(vertices).sum::<usize>() <= MOST_VERTICES;
+        let tightly = scene.instances.iter().filter(is_placed).map(vertices).sum::<usize>() <= MOST_VERTICES;
         let mut shared: Vec<MeshTree> = Vec::new();
         let mut tree_of_mesh = vec![None; scene.meshes.len()];
         for (number, instance) in scene.instances.iter().enumerate() {

@@ -5,6 +5,7 @@ use super::flat::FlatEmitter;
 use super::sphere::SphereEmitter;
 use super::tree::LightBounds;
 use crate::geometry::World;
+use crate::geometry::tree::Bounds;
 use crate::scene::Light;
 use glam::{Vec3, Vec3A};
 use std::f32::consts::{FRAC_PI_2, PI};
@@ -84,26 +85,21 @@ fn sphere(world: &World, number: usize, collected: &mut Collected) -> Option<u32
     let Some(motion) = &sphere.motion else {
         return Some(collected.add(Emitter::Sphere(own), all_around(low, high, intensity)));
     };
-    let (box_low, box_high) = (low, high);
-    let corners: Vec<Vec3A> = (0..8).map(|corner| Vec3A::from(box_corner(box_low, box_high, corner))).collect();
+    let corners = Bounds { min: low.into(), max: high.into() }.corners();
     motion.sweep(&corners, |center, radius| {
         (low, high) = (low.min(Vec3::from(center) - radius), high.max(Vec3::from(center) + radius));
     });
     Some(collected.add(Emitter::MovingSphere { object }, all_around(low, high, intensity)))
 }
 
-fn box_corner(low: Vec3, high: Vec3, corner: u32) -> Vec3 {
-    let pick = |bit: u32, a: f32, b: f32| if corner >> bit & 1 == 0 { a } else { b };
-    Vec3::new(pick(0, low.x, high.x), pick(1, low.y, high.y), pick(2, low.z, high.z))
-}
-
 /// A triangle as it is at a time.
 pub(super) fn triangle_at(world: &World, object: u32, triangle: u32, time: f32) -> FlatEmitter {
     let scene = world.scene();
-    let mirrored = world.transform_at(object, time).matrix3.determinant() < 0.0;
+    let to_world = world.transform_at(object, time);
+    let mirrored = to_world.matrix3.determinant() < 0.0;
     let material = &scene.materials[scene.instances[object as usize].material.0 as usize];
-    let corners = world.triangle_corners(object, triangle, time);
-    FlatEmitter::triangle(object, triangle, corners, world.translation_of_tree(object, time), mirrored, material)
+    let corners = world.placed_corners(object, triangle, &to_world);
+    FlatEmitter::triangle(object, triangle, corners, world.translation_of_tree(object, &to_world), mirrored, material)
 }
 
 fn flat_bounds(emitter: &FlatEmitter, radiance: f32) -> LightBounds {

@@ -60,6 +60,9 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Decoded textures.
     pub textures: Vec<Texture>,
+    /// Whether the second axis of normal maps is normal × growing u whichever way v runs, as in pbrt and Mitsuba; else it is that
+    /// of falling v.
+    pub bitangent_ignores_v: bool,
     /// Point, spot and directional lights, and the sun's disc. Area lights are surfaces whose material emits.
     pub lights: Vec<Light>,
     /// What rays see that hit nothing; `None` is black.
@@ -82,6 +85,7 @@ impl Default for Scene {
             spheres: Vec::new(),
             materials: Vec::new(),
             textures: Vec::new(),
+            bitangent_ignores_v: false,
             lights: Vec::new(),
             environment: None,
             notes: Vec::new(),
@@ -141,9 +145,6 @@ pub struct Mesh {
     pub uvs: Vec<Vec2>,
     /// Tangent (xyz) and handedness (w), one a position, or empty (then each triangle has that of its `uvs`).
     pub tangents: Vec<Vec4>,
-    /// Whether the second axis of normal maps is normal × growing u whichever way v runs, as in pbrt and Mitsuba; else it is that
-    /// of falling v.
-    pub bitangent_ignores_v: bool,
     /// Linear colour that multiplies what the material reflects (its base colour), one a position, or empty for white.
     pub colors: Vec<Vec3>,
     /// Vertex indices of each triangle, counter-clockwise from the front.

@@ -25,6 +25,17 @@ pub fn srgb_from_linear(value: f32) -> f32 {
 static SRGB_TO_LINEAR: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|byte| srgb_to_linear(byte as f32 / 255.0)));
 
+impl Encoding {
+    /// The linear value of a stored colour.
+    #[inline]
+    pub fn linear(self, byte: u8) -> f32 {
+        match self {
+            Self::Srgb => SRGB_TO_LINEAR[usize::from(byte)],
+            Self::Linear => f32::from(byte) / 255.0,
+        }
+    }
+}
+
 impl Wrap {
     /// The texel index in [0, size) for any whole position; `size` is at least 1.
     fn apply(self, position: i64, size: i64) -> i64 {
@@ -125,8 +136,7 @@ impl Texture {
         match &self.texels {
             Texels::Bytes(texels, encoding) => {
                 let byte = texels.iter().map(|&[r, g, b, _]| r.max(g).max(b)).max().unwrap_or(0);
-                let value = f32::from(byte) / 255.0;
-                if *encoding == Encoding::Srgb { srgb_to_linear(value) } else { value }
+                encoding.linear(byte)
             }
             Texels::Floats(texels) => texels.iter().map(|&[r, g, b, _]| r.max(g).max(b)).fold(0.0, f32::max),
         }

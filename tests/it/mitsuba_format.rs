@@ -133,6 +133,11 @@ fn what_never_ends_is_refused() {
     let itself = r#"<texture type="checkerboard" id="a"><ref name="color0" id="a"/></texture>
 <shape type="rectangle"><bsdf type="diffuse"><ref name="reflectance" id="a"/></bsdf></shape>"#;
     assert!(refused(itself).contains("scene.xml:1: <texture>: textures are nested too deeply, or one uses itself"));
+    let white = r#"<shape type="rectangle"><bsdf type="diffuse"><spectrum name="reflectance" type="d65" id="a"><ref name="color" id="a"/></spectrum></bsdf></shape>"#;
+    assert!(refused(white).contains("textures are nested too deeply, or one uses itself"));
+    let in_turn = r#"<texture type="checkerboard" id="a"><spectrum name="color0" type="d65"><ref name="color" id="a"/></spectrum></texture>
+<shape type="rectangle"><bsdf type="diffuse"><ref name="reflectance" id="a"/></bsdf></shape>"#;
+    assert!(refused(in_turn).contains("textures are nested too deeply, or one uses itself"));
     let mut defaults = r#"<default name="v0" value="0123456789"/>"#.to_owned();
     for n in 1..30 {
         let last = format!("$v{}", n - 1);
@@ -205,6 +210,22 @@ fn masks_and_blends_cover_what_they_should() {
         )),
         0.75
     );
+}
+
+#[test]
+fn a_picture_of_colour_and_opacity_is_decoded_once() {
+    let folder = folder();
+    image::RgbaImage::from_pixel(2, 2, image::Rgba([0, 255, 0, 128])).save(folder.path().join("leaf.png")).unwrap();
+    let picture = |name: &str| {
+        format!(r#"<texture name="{name}" type="bitmap"><string name="filename" value="leaf.png"/></texture>"#)
+    };
+    let (color, opacity) = (picture("reflectance"), picture("opacity"));
+    let body = format!(
+        r#"{LIGHT}<shape type="rectangle"><bsdf type="mask"><bsdf type="diffuse">{color}</bsdf>{opacity}</bsdf></shape>"#
+    );
+    let scene = try_load(folder.path(), "3.0.0", &body).unwrap_or_else(|error| panic!("{error}"));
+    let Alpha::Blend { value } = scene.materials[0].alpha else { panic!("a mask") };
+    assert_eq!((scene.textures.len(), value.texture.map(|(_, channel)| channel)), (1, Some(3)));
 }
 
 /// Green is bright: a number from a colour is its luminance.

@@ -104,6 +104,17 @@ fn a_face_without_normals_or_coordinates_takes_none_from_others() {
             (1, has_uvs, has_normals)
         );
     }
+    let obj = format!("mtllib none.mtl\nmtllib m.mtl\n{QUAD}usemtl m\nf 1/1 2/2 3/3\nusemtl n\nf 1 2 4\n");
+    let parts = scene(&[("q.obj", obj.as_bytes()), ("m.mtl", b"newmtl m\nKd 1 0 0\nnewmtl n\nKd 0 1 0\n")]);
+    let names: Vec<&str> =
+        parts.instances.iter().map(|instance| parts.materials[instance.material.0 as usize].name.as_str()).collect();
+    assert_eq!(names, ["m", "n"], "libraries are read for the first part and known to all");
+    for statements in ["l 1 2\nl 2 3 4\n", "p 1 2\np 3\n"] {
+        let obj = format!("{QUAD}{statements}f 1/1/1 2/2/1 3/3/1 4/4/1\n");
+        let scene = scene(&[("q.obj", obj.as_bytes())]);
+        assert_eq!((scene.meshes[0].uvs.len(), scene.meshes[0].normals.len()), (4, 4), "{statements}");
+        assert!(has_note(&scene, "q.obj: 2 points and lines are not rendered."), "{:?}", scene.notes);
+    }
     let obj = "v 0 0 0 1 0 0 1\nv 1 0 0 1 0 0 1\nv 0 1 0 1 0 0 1\nvt 0.5\nf 1/1 2/1 3/1\n";
     let colored = scene(&[("q.obj", obj.as_bytes())]);
     assert_eq!((colored.meshes[0].colors[0], colored.meshes[0].uvs.len()), (glam::Vec3::X, 3));

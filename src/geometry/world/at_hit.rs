@@ -50,17 +50,22 @@ impl World {
         self.scene.spheres[object as usize - self.scene.instances.len()].place_at(time)
     }
 
-    /// The translation that puts a mesh into the world where its tree is in coordinates of its own; zero where that is in world space.
-    pub(crate) fn translation_of_tree(&self, object: u32, time: f32) -> Vec3A {
+    /// The translation of a transform that puts a mesh into the world where its tree is in coordinates of its own; zero where that is
+    /// in world space.
+    pub(crate) fn translation_of_tree(&self, object: u32, to_world: &Affine3A) -> Vec3A {
         match self.placements[object as usize].shared {
             None => Vec3A::ZERO,
-            Some(_) => self.transform_at(object, time).translation,
+            Some(_) => to_world.translation,
         }
     }
 
     /// World-space corners of a triangle of an instance at a share of the open shutter.
     pub fn triangle_corners(&self, object: u32, triangle: u32, time: f32) -> [Vec3; 3] {
-        let to_world = self.transform_at(object, time);
+        self.placed_corners(object, triangle, &self.transform_at(object, time))
+    }
+
+    /// The same of an instance that is placed so.
+    pub(crate) fn placed_corners(&self, object: u32, triangle: u32, to_world: &Affine3A) -> [Vec3; 3] {
         let mesh = &self.scene.meshes[self.scene.instances[object as usize].mesh.0 as usize];
         mesh.triangles[triangle as usize].map(|i| to_world.transform_point3(mesh.positions[i as usize]))
     }
@@ -134,15 +139,15 @@ impl World {
         let normal = Vec3::from(normal_a);
         let position = Vec3::from(place.center) + place.radius * normal;
         let needs_tangent = self.scene.materials[self.material_of(hit.object).0 as usize].needs_tangent();
-        // Whether the sphere is mirrored.
-        let handedness = place.axes.determinant().signum();
-        let along_u = || handedness * place.axes.y_axis.cross(normal_a).normalize_or(place.axes.x_axis);
+        // −1 where the sphere is mirrored.
+        let flip = place.axes.determinant().signum();
+        let along_u = || flip * place.axes.y_axis.cross(normal_a).normalize_or(place.axes.x_axis);
         SurfacePoint {
             position,
             geometric_normal: normal,
             shading_normal: normal,
             tangent: needs_tangent.then(|| along_u().into()),
-            handedness,
+            handedness: if self.scene.bitangent_ignores_v { 1.0 } else { flip },
             uv: if self.scene.textures.is_empty() { Vec2::ZERO } else { place.uv(normal_a) },
             color: Vec3::ONE,
             object: hit.object,
@@ -192,7 +197,7 @@ impl World {
             let world = Vec3::from(to_world.matrix3 * Vec3A::from(blended));
             (Some(world.normalize_or(Vec3::X)), if t0.w < 0.0 { -placement.flip } else { placement.flip })
         };
-        let handedness = if mesh.bitangent_ignores_v { 1.0 } else { handedness };
+        let handedness = if self.scene.bitangent_ignores_v { 1.0 } else { handedness };
         let uv = match self.scene.textures.is_empty() {
             true => Vec2::ZERO,
             false => interpolate_uv(mesh, hit.triangle, b1, b2),

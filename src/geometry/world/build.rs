@@ -33,7 +33,7 @@ pub(super) fn fixed_triangles(scene: &Scene, uses: &[u32]) -> Vec<([Vec3A; 3], T
     triangles
 }
 
-/// Vertices of placed meshes up to which boxes are made around each; of more, around the corners of the meshes' boxes.
+/// Vertices of all placed instances up to which boxes are made around each; of more, around the corners of the meshes' boxes.
 pub(super) const MOST_VERTICES: usize = 30_000_000;
 
 /// Bounds of an instance whose mesh has these bounds of its own.
@@ -43,19 +43,13 @@ pub(super) fn placed_bounds(scene: &Scene, instance: &Instance, own: Bounds, tig
         let mesh = &scene.meshes[instance.mesh.0 as usize];
         return Bounds::of_points(mesh.positions.iter().map(|&point| place(point.into())));
     }
-    Bounds::of_points(corners_of(own).map(place))
-}
-
-fn corners_of(bounds: Bounds) -> [Vec3A; 8] {
-    let pick = |corner: usize, bit: usize| if corner >> bit & 1 == 0 { bounds.min } else { bounds.max };
-    std::array::from_fn(|corner| Vec3A::new(pick(corner, 0).x, pick(corner, 1).y, pick(corner, 2).z))
+    Bounds::of_points(own.corners().map(place))
 }
 
 /// Where things with these bounds in their own space can be while the shutter is open.
 pub(super) fn swept_bounds(motion: &Motion, own: Bounds) -> Bounds {
-    let corners = corners_of(own);
     let mut bounds = Bounds::EMPTY;
-    motion.sweep(&corners, |center, radius| {
+    motion.sweep(&own.corners(), |center, radius| {
         bounds = bounds.union(Bounds { min: center - radius, max: center + radius });
     });
     bounds

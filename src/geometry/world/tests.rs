@@ -212,3 +212,16 @@ fn mirrored_instances_keep_their_bitangents() {
     let plain = frame(quad, Affine3A::IDENTITY);
     assert!(plain.0.abs_diff_eq(Vec3::X, 1e-6) && plain.1.abs_diff_eq(Vec3::Y, 1e-6), "{plain:?}");
 }
+
+/// Where formats say so, a mirrored sphere's bitangent is normal × growing u like that of meshes.
+#[test]
+fn mirrored_spheres_have_the_bitangents_of_their_format() {
+    let handedness = |bitangent_ignores_v: bool| {
+        let mut mirrored = Scene { bitangent_ignores_v, ..scene(&[]) };
+        mirrored.spheres[0].axes = glam::Mat3A::from_diagonal(Vec3::new(-1.0, 1.0, 1.0));
+        let world = World::new(Arc::new(mirrored));
+        let ray = Ray::new(vec3a(-3.0, -3.0, 3.0), -Vec3A::Z);
+        world.surface(&ray, &world.closest(&ray).expect("the sphere")).handedness
+    };
+    assert_eq!((handedness(false), handedness(true)), (-1.0, 1.0));
+}

@@ -2,7 +2,7 @@
 
 use super::luminance;
 use super::texture::Decoded;
-use crate::scene::{Encoding, Texels, texture};
+use crate::scene::Texels;
 use glam::Vec3;
 use std::sync::Arc;
 
@@ -29,10 +29,7 @@ impl Adjust {
         let texels = match &picture.texels {
             Texels::Floats(floats) => floats.iter().map(|&texel| self.texel(texel)).collect(),
             Texels::Bytes(bytes, encoding) => {
-                let decode = |byte: u8| match encoding {
-                    Encoding::Srgb => texture::srgb_to_linear(f32::from(byte) / 255.0),
-                    Encoding::Linear => f32::from(byte) / 255.0,
-                };
+                let decode = |byte| encoding.linear(byte);
                 let linear = |&[r, g, b, a]: &[u8; 4]| [decode(r), decode(g), decode(b), f32::from(a) / 255.0];
                 bytes.iter().map(|texel| self.texel(linear(texel))).collect()
             }

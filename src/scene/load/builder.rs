@@ -9,6 +9,7 @@ use crate::scene::{
     Camera, Environment, FilmDefaults, Instance, Light, Material, MaterialId, Mesh, MeshId, Scene, Sphere,
     ViewingDefaults,
 };
+use rayon::prelude::*;
 use std::path::Path;
 
 /// A camera that a file holds.
@@ -35,11 +36,16 @@ pub(super) enum IfDark {
 /// Emitters of interchange files below this many cd/m² are decoration (an "emissive" left at 1), not the scene's light.
 const WEAK_EMITTER_CD_M2: f32 = 10.0;
 
+/// Luminance of RGB (1, 1, 1) in formats without a unit.
+pub(super) const ASSUMED_NITS_PER_UNIT: f64 = 100.0;
+
 /// The scene while it is being read.
 #[derive(Debug)]
 pub(super) struct Builder {
     pub(super) name: String,
     pub(super) nits_per_unit: f64,
+    /// Whether the caller chose the unit: what files say of it does not count then.
+    unit_is_chosen: bool,
     pub(super) cameras: Vec<NamedCamera>,
     pub(super) film: FilmDefaults,
     pub(super) viewing: ViewingDefaults,
@@ -48,6 +54,8 @@ pub(super) struct Builder {
     pub(super) spheres: Vec<Sphere>,
     pub(super) materials: Vec<Material>,
     pub(super) textures: Requests,
+    /// As [`Scene::bitangent_ignores_v`].
+    pub(super) bitangent_ignores_v: bool,
     /// Reliefs that only their decoded pictures tell apart.
     pub(super) bumps: Vec<Bump>,
     pub(super) lights: Vec<Light>,
@@ -57,11 +65,12 @@ pub(super) struct Builder {
 }
 
 impl Builder {
-    /// An empty scene named after its file.
-    pub(super) fn new(path: &Path) -> Self {
+    /// An empty scene named after its file, in the caller's unit or in cd/m².
+    pub(super) fn new(path: &Path, options: &LoadOptions) -> Self {
         Self {
             name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
-            nits_per_unit: 1.0,
+            nits_per_unit: options.nits_per_unit.unwrap_or(1.0),
+            unit_is_chosen: options.nits_per_unit.is_some(),
             cameras: Vec::new(),
             film: FilmDefaults { width: 512, height: 512 },
             viewing: ViewingDefaults::default(),
@@ -70,11 +79,28 @@ impl Builder {
             spheres: Vec::new(),
             materials: Vec::new(),
             textures: Requests::default(),
+            bitangent_ignores_v: false,
             bumps: Vec::new(),
             lights: Vec::new(),
             environment: None,
             notes: Vec::new(),
             alike: AlikeNotes::default(),
+        }
+    }
+
+    /// Takes the file's unit, unless the caller chose one.
+    pub(super) fn set_nits_per_unit(&mut self, of_file: f64) {
+        if !self.unit_is_chosen {
+            self.nits_per_unit = of_file;
+        }
+    }
+
+    /// Says that the file has no unit, unless the caller chose one.
+    pub(super) fn note_assumed_unit(&mut self) {
+        if !self.unit_is_chosen {
+            self.note(format!(
+                "Radiance has no unit in this file: 1 is taken as {ASSUMED_NITS_PER_UNIT} cd/m² (--nits-per-unit changes it)."
+            ));
         }
     }
 
@@ -108,10 +134,6 @@ impl Builder {
 
     /// Chooses the camera, decodes the textures, checks everything, and adds what is missing.
     pub(super) fn finish(mut self, path: &Path, if_dark: IfDark, options: &LoadOptions) -> Result<Scene, LoadError> {
-        if let Some(nits_per_unit) = options.nits_per_unit {
-            self.nits_per_unit = nits_per_unit;
-            self.notes.retain(|note| !note.starts_with("Radiance has no unit"));
-        }
         validate::repair(&mut self, path)?;
         std::mem::take(&mut self.alike).count_into(&mut self.notes);
         let camera = self.choose_camera(options)?;
@@ -129,6 +151,7 @@ impl Builder {
             spheres: self.spheres,
             materials: self.materials,
             textures,
+            bitangent_ignores_v: self.bitangent_ignores_v,
             lights: self.lights,
             environment: self.environment,
             notes: self.notes,
@@ -188,7 +211,7 @@ fn add_tangents(scene: &mut Scene) {
     for instance in &scene.instances {
         is_asked[instance.mesh.0 as usize] |= scene.materials[instance.material.0 as usize].needs_tangent();
     }
-    let asked = scene.meshes.iter_mut().zip(is_asked).filter(|(_, is_asked)| *is_asked);
+    let asked = scene.meshes.par_iter_mut().zip(is_asked).filter(|(_, is_asked)| *is_asked);
     asked.for_each(|(mesh, _)| tangents::add(mesh));
 }
 

@@ -1,5 +1,6 @@
 //! The camera of scenes that bring none: a three-quarter view with everything in the picture.
 
+use crate::geometry::tree;
 use crate::scene::{Camera, Instance, Mesh, Sphere};
 use glam::{Affine3A, Vec3, Vec3A};
 
@@ -60,14 +61,18 @@ impl Bounds {
         Self { min: min.into(), max: max.into() }
     }
 
+    /// The box's eight corners.
+    pub(super) fn corners(self) -> [Vec3A; 8] {
+        tree::Bounds { min: self.min.into(), max: self.max.into() }.corners()
+    }
+
     /// The bounds of the box after a transform; nothing stays nothing.
     fn transformed(self, to_world: &Affine3A) -> Self {
         if self.min.x > self.max.x {
             return self;
         }
-        (0..8).fold(Self::EMPTY, |all, corner| {
-            let pick = |bit: usize| if corner >> bit & 1 == 0 { self.min[bit] } else { self.max[bit] };
-            let point = to_world.transform_point3(Vec3::new(pick(0), pick(1), pick(2)));
+        self.corners().into_iter().fold(Self::EMPTY, |all, corner| {
+            let point = to_world.transform_point3a(corner).into();
             all.union(Self { min: point, max: point })
         })
     }
@@ -125,9 +130,8 @@ mod tests {
             let up = right.cross(camera.forward);
             let tan = (0.5 * VERTICAL_FOV_DEG).to_radians().tan();
             let mut widest: f32 = 0.0;
-            for corner in 0..8 {
-                let pick = |bit: u32| if corner >> bit & 1 == 0 { 0.0 } else { 1.0 };
-                let point = bounds.min + size * Vec3::new(pick(0), pick(1), pick(2)) - camera.position;
+            for corner in bounds.corners() {
+                let point = Vec3::from(corner) - camera.position;
                 let depth = point.dot(camera.forward);
                 assert!(depth > 0.0);
                 widest =

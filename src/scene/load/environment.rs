@@ -29,10 +29,7 @@ pub fn read(path: &Path, parametrisation: Parametrisation) -> Result<Environment
     }
     let texels: Vec<Vec3> = match &picture.texels {
         Texels::Bytes(bytes, encoding) => {
-            let decode = |value: u8| match encoding {
-                Encoding::Srgb => crate::scene::texture::srgb_to_linear(f32::from(value) / 255.0),
-                Encoding::Linear => f32::from(value) / 255.0,
-            };
+            let decode = |byte| encoding.linear(byte);
             bytes.iter().map(|&[r, g, b, _]| Vec3::new(decode(r), decode(g), decode(b))).collect()
         }
         // Light is never negative; wide-gamut pictures hold negative Rec.709 values for colours outside it.

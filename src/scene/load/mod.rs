@@ -66,7 +66,8 @@ pub struct LoadOptions {
     pub on_texture: Option<fn(done: usize, total: usize)>,
     /// Most bytes that decoded textures may take together: beyond it the largest are halved. Surroundings do not count.
     pub texture_memory: Option<u64>,
-    /// Luminance in cd/m² of RGB (1, 1, 1) in place of the file's. What files give in cd/m², lm and lx stays as bright as it is.
+    /// Luminance in cd/m² of RGB (1, 1, 1) in place of the file's. What files give in cd/m², lm and lx stays as bright as it is,
+    /// but for the photometric amounts of pbrt's files, which scale with all their other light.
     pub nits_per_unit: Option<f64>,
     /// Size of the picture, in place of the file's, for which default views are framed.
     pub film: Option<FilmDefaults>,
@@ -147,7 +148,7 @@ fn stem_ends_with(path: &Path, extension: &str) -> bool {
 
 /// A mesh alone, in grey.
 fn load_ply(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
-    let mut builder = builder::Builder::new(path);
+    let mut builder = builder::Builder::new(path, options);
     let loaded = ply::read(path)?;
     loaded.notes.into_iter().for_each(|note| builder.note(note));
     let material = mtl::default_material(&mut builder);

@@ -14,14 +14,14 @@ use super::error::{LoadError, Place, nearest};
 use super::{LoadOptions, files, mtl, polygon};
 use crate::scene::{Instance, MaterialId, Mesh, MeshId, Scene};
 use glam::{Affine3A, Vec2, Vec3};
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
 use std::io::{BufRead, Read};
 use std::path::Path;
 
 /// Reads an OBJ file as a whole scene.
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
-    let mut builder = Builder::new(path);
+    let mut builder = Builder::new(path, options);
     for (mesh, material) in read_into(&mut builder, path, true)? {
         let name = builder.meshes[mesh.0 as usize].name.clone();
         builder.instances.push(Instance { name, mesh, material, to_world: Affine3A::IDENTITY, motion: None });
@@ -35,19 +35,18 @@ pub(super) fn read_into(
     path: &Path,
     with_materials: bool,
 ) -> Result<Vec<(MeshId, MaterialId)>, LoadError> {
-    let Cleaned { mut text, colors } = clean(&files::decode_loosely(path, files::read(path)?)?);
+    let Cleaned { mut text, colors, points_and_lines } = clean(&files::decode_loosely(path, files::read(path)?)?);
     let mut added_lines = 0;
     if let Some(smoothed) = smoothing::add_normals(&text) {
         (text, added_lines) = (smoothed.text, smoothed.added_lines);
     }
     added_lines += hoist_libraries(&mut text);
     let mut models = Vec::new();
-    let mut libraries = Libraries::default();
+    let libraries = RefCell::new(Libraries::default());
     for part in patterns::separate(&text) {
-        let parsed = parse(path, &part, added_lines, with_materials)?;
-        models.extend(parsed.0);
-        libraries = parsed.1;
+        models.extend(parse(path, &part, added_lines, with_materials.then_some(&libraries))?);
     }
+    let libraries = libraries.into_inner();
     for note in libraries.notes {
         builder.note(note);
     }
@@ -58,7 +57,7 @@ pub(super) fn read_into(
     // Materials are converted when a face uses them: libraries are often shared by many files.
     let mut converted: HashMap<Option<usize>, MaterialId> = HashMap::new();
     let mut placed = Vec::new();
-    let mut sparse_faces = 0;
+    let mut sparse_faces = points_and_lines;
     for model in &models {
         let (mesh, skipped) = convert_mesh(model, path)?;
         sparse_faces += skipped;
@@ -97,30 +96,25 @@ pub(super) fn read_into(
     Ok(placed)
 }
 
-/// The objects of a text, and the materials that it names.
+/// The objects of a text; the materials that it names are added to the libraries, if there are any.
 fn parse(
     path: &Path,
     text: &str,
     added_lines: usize,
-    with_materials: bool,
-) -> Result<(Vec<tobj::Model>, Libraries), LoadError> {
-    let libraries = RefCell::new(Libraries::default());
+    libraries: Option<&RefCell<Libraries>>,
+) -> Result<Vec<tobj::Model>, LoadError> {
     let mut reader = CountingReader { rest: text.as_bytes(), lines: 0 };
     let options = tobj::LoadOptions { single_index: true, triangulate: false, ..tobj::LoadOptions::default() };
+    let statements = Cell::new(0);
     let parsed = tobj::load_obj_buf(&mut reader, &options, |named| {
-        let mut libraries = libraries.borrow_mut();
-        let first = libraries.materials.len();
-        if with_materials {
-            libraries.open(path, &named.to_string_lossy());
-        }
-        libraries.index(first)
+        let Some(libraries) = libraries else { return Ok(Default::default()) };
+        libraries.borrow_mut().of_statement(statements.replace(statements.get() + 1), path, &named.to_string_lossy())
     });
     let line = reader.lines.saturating_sub(added_lines);
     let (models, _) = parsed.map_err(|error| explain(error, text, path, line, added_lines))?;
-    let mut libraries = libraries.into_inner();
-    match libraries.error.take() {
+    match libraries.and_then(|libraries| libraries.borrow_mut().error.take()) {
         Some(error) => Err(error),
-        None => Ok((models, libraries)),
+        None => Ok(models),
     }
 }
 
@@ -128,6 +122,8 @@ fn parse(
 #[derive(Default)]
 struct Libraries {
     materials: Vec<mtl::Written>,
+    /// How many materials there are after each of the `mtllib` statements that were read.
+    ends: Vec<usize>,
     notes: Vec<String>,
     error: Option<LoadError>,
 }
@@ -158,9 +154,15 @@ impl Libraries {
         }
     }
 
-    /// What `tobj` wants to know of the materials from number `first` on: their names. It counts on from what it has.
-    fn index(&self, first: usize) -> tobj::MTLLoadResult {
-        let new = &self.materials[first..];
+    /// What `tobj` wants to know of the materials of an `mtllib` statement: their names. It counts on from what it has. Its files are
+    /// read when the first part of the text names them.
+    fn of_statement(&mut self, number: usize, obj: &Path, named: &str) -> tobj::MTLLoadResult {
+        if number == self.ends.len() {
+            self.open(obj, named);
+            self.ends.push(self.materials.len());
+        }
+        let first = if number == 0 { 0 } else { self.ends[number - 1] };
+        let new = &self.materials[first..self.ends[number]];
         let places = new.iter().enumerate().map(|(place, material)| (material.name.clone(), place)).collect();
         Ok((vec![tobj::Material::default(); new.len()], places))
     }
@@ -275,7 +277,7 @@ fn report_unknown_materials(
     }
 }
 
-/// Our mesh, and how many points and lines were skipped.
+/// Our mesh, and how many faces of fewer than three corners were skipped.
 fn convert_mesh(model: &tobj::Model, path: &Path) -> Result<(Mesh, usize), LoadError> {
     let from = &model.mesh;
     let positions: Vec<Vec3> = from.positions.as_chunks::<3>().0.iter().copied().map(Vec3::from_array).collect();

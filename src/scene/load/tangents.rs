@@ -19,21 +19,21 @@ pub(super) fn add(mesh: &mut Mesh) {
     }
     let mirrored: Vec<bool> = mesh.triangles.iter().map(|triangle| is_mirrored(mesh, triangle)).collect();
     split_mirrored(mesh, &mirrored);
-    let mut sums: HashMap<Key, Vec3> = HashMap::new();
-    for (triangle, &mirrored) in mesh.triangles.iter().zip(&mirrored) {
+    let (group_of, groups) = groups(mesh, &mirrored);
+    let mut sums = vec![Vec3::ZERO; groups];
+    for triangle in &mesh.triangles {
         let Some(along) = along_u(mesh, triangle) else { continue };
         for place in 0..3 {
             let vertex = triangle[place] as usize;
             let normal = mesh.normals[vertex];
             let in_plane = (along - normal * normal.dot(along)).normalize_or_zero();
-            let sum = sums.entry(key(mesh, vertex, mirrored)).or_insert(Vec3::ZERO);
-            *sum += in_plane * angle_at(mesh, triangle, place);
+            sums[group_of[vertex]] += in_plane * angle_at(mesh, triangle, place);
         }
     }
     let mut tangents = vec![Vec4::new(1.0, 0.0, 0.0, 1.0); mesh.positions.len()];
     for (triangle, &mirrored) in mesh.triangles.iter().zip(&mirrored) {
         for vertex in triangle.map(|vertex| vertex as usize) {
-            let sum = sums.get(&key(mesh, vertex, mirrored)).copied().unwrap_or(Vec3::ZERO);
+            let sum = sums[group_of[vertex]];
             let tangent = sum.try_normalize().unwrap_or_else(|| mesh.normals[vertex].any_orthonormal_vector());
             tangents[vertex] = tangent.extend(if mirrored { -1.0 } else { 1.0 });
         }
@@ -41,10 +41,27 @@ pub(super) fn add(mesh: &mut Mesh) {
     mesh.tangents = tangents;
 }
 
+/// For each vertex the number of those that share its tangent, and how many numbers there are. Vertices of mirrored triangles have no
+/// others ([`split_mirrored`]); those that no triangle uses count as not mirrored.
+fn groups(mesh: &Mesh, mirrored: &[bool]) -> (Vec<usize>, usize) {
+    let mut is_mirrored = vec![false; mesh.positions.len()];
+    for (triangle, _) in mesh.triangles.iter().zip(mirrored).filter(|(_, mirrored)| **mirrored) {
+        triangle.iter().for_each(|&vertex| is_mirrored[vertex as usize] = true);
+    }
+    let mut numbers: HashMap<Key, usize> = HashMap::with_capacity(mesh.positions.len());
+    let mut group_of = Vec::with_capacity(mesh.positions.len());
+    for (vertex, mirrored) in is_mirrored.into_iter().enumerate() {
+        let next = numbers.len();
+        group_of.push(*numbers.entry(key(mesh, vertex, mirrored)).or_insert(next));
+    }
+    (group_of, numbers.len())
+}
+
+/// −0 is 0 here.
 fn key(mesh: &Mesh, vertex: usize, mirrored: bool) -> Key {
     let ([a, b, c], [d, e, f]) = (mesh.positions[vertex].to_array(), mesh.normals[vertex].to_array());
     let [u, v] = mesh.uvs[vertex].to_array();
-    ([a, b, c, d, e, f, u, v].map(f32::to_bits), mirrored)
+    ([a, b, c, d, e, f, u, v].map(|number| (number + 0.0).to_bits()), mirrored)
 }
 
 /// The two edges that leave a triangle's first corner, in space and on the picture.
@@ -159,6 +176,8 @@ mod tests {
         soup.normals = order.iter().map(|&vertex| whole.normals[vertex]).collect();
         soup.uvs = order.iter().map(|&vertex| whole.uvs[vertex]).collect();
         soup.triangles = (0..4).map(|triangle| [0, 1, 2].map(|corner| 3 * triangle + corner)).collect();
+        // 0 of either sign is the same place.
+        soup.positions.iter_mut().skip(6).filter(|at| at.y == 0.0).for_each(|at| at.y = -0.0);
         add(&mut soup);
         for (new, &old) in order.iter().enumerate() {
             assert!(soup.tangents[new].abs_diff_eq(whole.tangents[old], 1e-6));

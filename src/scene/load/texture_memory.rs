@@ -5,7 +5,7 @@
 //! differ: shading makes them unit length after its own interpolation, in which disagreeing texels should count less.
 
 use super::texture::Decoded;
-use crate::scene::texture::{srgb_from_linear, srgb_to_linear};
+use crate::scene::texture::srgb_from_linear;
 use crate::scene::{Encoding, Texels};
 use std::sync::Arc;
 
@@ -82,10 +82,6 @@ pub(super) fn shrunk(picture: Decoded, halvings: u32, alpha: Alpha) -> Decoded {
     let texels = match &picture.texels {
         Texels::Floats(floats) => Texels::Floats(Arc::new(means(&|place| floats[place]))),
         Texels::Bytes(bytes, encoding) => {
-            let to_linear: [f32; 256] = std::array::from_fn(|byte| match encoding {
-                Encoding::Srgb => srgb_to_linear(byte as f32 / 255.0),
-                Encoding::Linear => byte as f32 / 255.0,
-            });
             let from_linear = |value: f32| match encoding {
                 Encoding::Srgb => srgb_from_linear(value),
                 Encoding::Linear => value,
@@ -93,7 +89,7 @@ pub(super) fn shrunk(picture: Decoded, halvings: u32, alpha: Alpha) -> Decoded {
             let byte = |value: f32| (value * 255.0).round() as u8;
             let linear = means(&|place| {
                 let [r, g, b, a] = bytes[place];
-                [to_linear[r as usize], to_linear[g as usize], to_linear[b as usize], f32::from(a) / 255.0]
+                [encoding.linear(r), encoding.linear(g), encoding.linear(b), f32::from(a) / 255.0]
             });
             let encoded = linear
                 .iter()

@@ -34,8 +34,7 @@ const MOST_OBLONG: f32 = 100.0;
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
     let bytes = files::read(path)?;
     let container = buffers::split(path, &bytes)?;
-    let mut builder = Builder::new(path);
-    builder.nits_per_unit = options.nits_per_unit.unwrap_or(1.0);
+    let mut builder = Builder::new(path, options);
     let document = document::parse(path, container.json, &mut builder)?;
     let buffers = Buffers::read(path, &document, container.binary)?;
 
@@ -247,7 +246,6 @@ impl<'a> Reader<'a> {
             tangents: tangents.unwrap_or_default().into_iter().map(Vec4::from_array).collect(),
             colors: colors.unwrap_or_default(),
             triangles: triangles(&indices, from.mode()),
-            bitangent_ignores_v: false,
         }))
     }
 

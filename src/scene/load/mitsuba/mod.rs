@@ -16,7 +16,7 @@ mod textures;
 mod transform;
 
 use super::LoadOptions;
-use super::builder::{Builder, IfDark};
+use super::builder::{ASSUMED_NITS_PER_UNIT, Builder, IfDark};
 use super::error::{LoadError, Place, suggestion};
 use crate::scene::{Material, MaterialId, MeshId, Scene, Surface};
 use element::Element;
@@ -24,9 +24,6 @@ use glam::{Affine3A, Vec3};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
-
-/// Luminance of RGB (1, 1, 1): the format has no unit.
-const ASSUMED_NITS_PER_UNIT: f64 = 100.0;
 
 /// Reads a Mitsuba file.
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
@@ -36,7 +33,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
     }
     let mut reader = Reader {
         main: path.to_owned(),
-        builder: Builder::new(path),
+        builder: Builder::new(path, options),
         named: HashMap::new(),
         materials: HashMap::new(),
         mesh_files: HashMap::new(),
@@ -46,7 +43,8 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
         clips: None,
         since_2: root.attribute("version").is_none_or(|version| !version.trim_start().starts_with("0.")),
     };
-    reader.builder.nits_per_unit = options.nits_per_unit.unwrap_or(ASSUMED_NITS_PER_UNIT);
+    reader.builder.bitangent_ignores_v = true;
+    reader.builder.set_nits_per_unit(ASSUMED_NITS_PER_UNIT);
     reader.name_all(&root);
     for child in &root.children {
         match child.tag.as_str() {
@@ -71,13 +69,8 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
             }
         }
     }
-    for mesh in &mut reader.builder.meshes {
-        mesh.bitangent_ignores_v = true;
-    }
     reader.note_clips();
-    reader.builder.note(format!(
-        "Radiance has no unit in this file: 1 is taken as {ASSUMED_NITS_PER_UNIT} cd/m² (--nits-per-unit changes it)."
-    ));
+    reader.builder.note_assumed_unit();
     reader.builder.finish(path, IfDark::StudioWithoutLight, options)
 }
 

@@ -86,12 +86,13 @@ impl Reader {
         let bounds = default_view::bounds(&self.builder.meshes, &self.builder.instances, &self.builder.spheres);
         let (position, forward) = (first.camera.position, first.camera.forward);
         let size = bounds.max - bounds.min;
-        let depths = (0..8).map(|corner| {
-            let [x, y, z] = [0, 1, 2].map(|axis| (corner >> axis & 1) as f32);
-            (bounds.min + size * Vec3::new(x, y, z) - position).dot(forward)
-        });
-        let (nearest, farthest) =
-            depths.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), depth| (low.min(depth), high.max(depth)));
+        if !size.is_finite() {
+            return; // nothing that could be cut
+        }
+        let depths = bounds.corners().map(|corner| (Vec3::from(corner) - position).dot(forward));
+        let (nearest, farthest) = depths
+            .into_iter()
+            .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), depth| (low.min(depth), high.max(depth)));
         // From inside a scene, what lies within a hundredth of it is seldom anything.
         let least = if nearest > 0.0 { nearest } else { 0.01 * size.length() };
         let cuts_near = farthest > 0.0 && near > least;

@@ -25,6 +25,14 @@ pub(super) enum Meaning {
 /// Deepest chain of textures and colours that use each other.
 const DEEPEST: usize = 16;
 
+/// Refuses what is used deeper inside others than [`DEEPEST`].
+fn check_depth(user: &Element, depth: usize) -> Result<(), LoadError> {
+    if depth > DEEPEST {
+        return Err(user.error("textures are nested too deeply, or one uses itself"));
+    }
+    Ok(())
+}
+
 impl Reader {
     /// A colour without texture.
     pub(super) fn color(&mut self, owner: &Element, name: &str, meaning: Meaning) -> Result<Option<Vec3>, LoadError> {
@@ -64,6 +72,7 @@ impl Reader {
         meaning: Meaning,
         depth: usize,
     ) -> Result<Option<ColorInput>, LoadError> {
+        check_depth(owner, depth)?;
         let Some(child) = owner.child(name).cloned() else { return Ok(None) };
         let child = if child.tag == "ref" { self.resolve(&child)? } else { child };
         let value = || child.attribute("value").unwrap_or("");
@@ -75,7 +84,7 @@ impl Reader {
                 let encoded = rgb(&child, value())?;
                 if value().starts_with('#') { encoded } else { encoded.map(srgb_to_linear) }
             }
-            "spectrum" => self.spectrum(&child, value(), meaning)?,
+            "spectrum" => self.spectrum(&child, value(), meaning, depth)?,
             "blackbody" => blackbody(&child)?,
             other => return Err(child.error(format_args!("\"{other}\" is no colour"))),
         };
@@ -97,11 +106,11 @@ impl Reader {
         Ok(rgb(child, value)? * flat)
     }
 
-    fn spectrum(&mut self, child: &Element, value: &str, meaning: Meaning) -> Result<Vec3, LoadError> {
+    fn spectrum(&mut self, child: &Element, value: &str, meaning: Meaning, depth: usize) -> Result<Vec3, LoadError> {
         match child.kind().as_str() {
             // The white of RGB.
             "d65" => {
-                let color = self.nested_color(child, "color", Meaning::Coefficient, 1)?.unwrap_or(Vec3::ONE);
+                let color = self.nested_color(child, "color", Meaning::Coefficient, depth + 1)?.unwrap_or(Vec3::ONE);
                 return Ok(color * child.float_or("scale", 1.0)?);
             }
             "uniform" => return Ok(Vec3::splat(child.float_or("value", 1.0)?)),
@@ -135,17 +144,18 @@ impl Reader {
 
     /// The opacity of a mask: a picture with an alpha channel means that channel.
     pub(super) fn opacity(&mut self, owner: &Element) -> Result<Option<ScalarInput>, LoadError> {
-        let Some(mut scalar) = self.scalar_input(owner, "opacity")? else { return Ok(None) };
         if let Some(child) = owner.child("opacity").cloned() {
             let child = if child.tag == "ref" { self.resolve(&child)? } else { child };
-            if let Some(name) = child.string("filename")?
+            if child.tag == "texture"
+                && let Some(name) = child.string("filename")?
                 && has_alpha(&self.file(&child, name))
-                && let Some((_, channel)) = &mut scalar.texture
             {
-                *channel = 3;
+                // As a surface's colour would ask for it: the luminance of its colours would be a second picture that nothing reads.
+                let picture = self.texture(&child, Meaning::Reflectance, 0)?;
+                return Ok(Some(ScalarInput { factor: picture.factor.x, texture: picture.texture.map(|t| (t, 3)) }));
             }
         }
-        Ok(Some(scalar))
+        self.scalar_input(owner, "opacity")
     }
 
     /// A texture inside, of any name, here or elsewhere in the file.
@@ -169,9 +179,7 @@ impl Reader {
         meaning: Meaning,
         depth: usize,
     ) -> Result<ColorInput, LoadError> {
-        if depth > DEEPEST {
-            return Err(texture.error("textures are nested too deeply, or one uses itself"));
-        }
+        check_depth(texture, depth)?;
         let input = match texture.kind().as_str() {
             "bitmap" => self.bitmap(texture, meaning)?,
             "checkerboard" => self.checkerboard(texture, meaning, depth)?,

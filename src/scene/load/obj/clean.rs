@@ -4,6 +4,8 @@
 pub(super) struct Cleaned {
     pub(super) text: String,
     pub(super) colors: VertexColors,
+    /// Statements of points and of lines, which are left out.
+    pub(super) points_and_lines: usize,
 }
 
 /// Which vertices have colours behind their positions.
@@ -15,7 +17,8 @@ pub(super) enum VertexColors {
 }
 
 /// The text with continued lines joined (blank lines keep the count), comments behind numbers and opacities behind colours cut off,
-/// a 0 behind texture coordinates of one number, and empty `usemtl` statements left out: all of these stop `tobj`.
+/// a 0 behind texture coordinates of one number, and empty `usemtl` statements left out: all of these stop `tobj`. Points and lines
+/// are left out too: `tobj` takes a line for a face, and one without texture coordinates would take them from its whole object.
 pub(super) fn clean(text: &str) -> Cleaned {
     let is_vertex = |line: &&str| line.starts_with("v ");
     // Three numbers more than a position has, and perhaps an opacity.
@@ -32,6 +35,8 @@ pub(super) fn clean(text: &str) -> Cleaned {
     let mut cleaned = String::with_capacity(text.len() + 1);
     let mut joined = 0;
     let mut is_numeric = false;
+    let mut is_left_out = false;
+    let mut points_and_lines = 0;
     for line in text.lines() {
         let is_start = joined == 0;
         let line = if is_start { line.trim_start() } else { line };
@@ -40,6 +45,11 @@ pub(super) fn clean(text: &str) -> Cleaned {
         let line = if is_numeric { line.split('#').next().unwrap_or(line) } else { line };
         let continued = line.trim_end().strip_suffix('\\');
         let part = continued.unwrap_or(line);
+        if is_start {
+            is_left_out = part.starts_with(['l', 'p']) && matches!(part.split_whitespace().next(), Some("l" | "p"));
+            points_and_lines += usize::from(is_left_out);
+        }
+        let part = if is_left_out { "" } else { part };
         // Colours behind positions: tobj refuses files that give them to some vertices only.
         let words = if is_start && part.starts_with("v ") { part.split_whitespace().count() } else { 0 };
         let part = match colors {
@@ -62,7 +72,7 @@ pub(super) fn clean(text: &str) -> Cleaned {
             joined = 0;
         }
     }
-    Cleaned { text: cleaned, colors }
+    Cleaned { text: cleaned, colors, points_and_lines }
 }
 
 /// The line up to its word of this number, from 0.
@@ -100,6 +110,13 @@ mod tests {
     fn numbers_that_tobj_does_not_expect_are_mended() {
         let text = clean("v 1 2 3 0.5 0.5 0.5 1\nvt 0.5 # u\nvt 0 1\n").text;
         assert_eq!(text, "v 1 2 3 0.5 0.5 0.5 \nvt 0.5  0\nvt 0 1\n");
+    }
+
+    #[test]
+    fn points_and_lines_are_left_out_and_counted() {
+        let cleaned = clean("f 1 2 3\n l 1 2 \\\n 3\nl\t1 2\np 1\nlod 1\n");
+        assert_eq!(cleaned.text.lines().map(str::trim_end).collect::<Vec<_>>(), ["f 1 2 3", "", "", "", "", "lod 1"]);
+        assert_eq!(cleaned.points_and_lines, 3);
     }
 
     #[test]

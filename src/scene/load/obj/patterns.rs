@@ -33,8 +33,9 @@ impl Corners {
     }
 }
 
-/// The patterns of a file's faces, each with the text whose faces all have it; line for line that of the file.
-pub(super) fn separate(text: &str) -> Vec<Cow<'_, str>> {
+/// For each pattern of a file's faces the text whose faces all have it, line for line that of the file. Each is made when it is asked
+/// for: together they may take four times the file.
+pub(super) fn separate(text: &str) -> impl Iterator<Item = Cow<'_, str>> {
     let mut patterns: Vec<Pattern> = Vec::new();
     let mut are_ragged = false;
     for corners in text.lines().filter_map(|line| line.strip_prefix("f ")).map(Corners::of) {
@@ -43,10 +44,10 @@ pub(super) fn separate(text: &str) -> Vec<Cow<'_, str>> {
         }
         are_ragged |= corners.are_ragged;
     }
-    if patterns.len() < 2 && !are_ragged {
-        return vec![Cow::Borrowed(text)];
-    }
-    patterns.into_iter().map(|pattern| Cow::Owned(only(text, pattern))).collect()
+    let is_one = patterns.len() < 2 && !are_ragged;
+    let whole = is_one.then_some(Cow::Borrowed(text));
+    let parts = if is_one { Vec::new() } else { patterns };
+    whole.into_iter().chain(parts.into_iter().map(move |pattern| Cow::Owned(only(text, pattern))))
 }
 
 /// The text without the faces of other patterns.
@@ -81,8 +82,10 @@ mod tests {
 
     #[test]
     fn faces_part_by_what_they_have() {
-        assert_eq!(separate("v 0 0 0\nf 1/1 2/2 3/3\nf 3/1 2/2 1/3\n"), ["v 0 0 0\nf 1/1 2/2 3/3\nf 3/1 2/2 1/3\n"]);
-        let parts = separate("f 1/1 2/2 3/3\ng a\nf 1 2 3\nf 1/1/1 2//2 3/3/3\nf 1//1 2//2 3//3\nf 1/1 2 3\n");
+        let alike = "v 0 0 0\nf 1/1 2/2 3/3\nf 3/1 2/2 1/3\n";
+        assert_eq!(separate(alike).collect::<Vec<_>>(), [alike]);
+        let text = "f 1/1 2/2 3/3\ng a\nf 1 2 3\nf 1/1/1 2//2 3/3/3\nf 1//1 2//2 3//3\nf 1/1 2 3\n";
+        let parts: Vec<_> = separate(text).collect();
         let lines: Vec<Vec<&str>> = parts.iter().map(|part| part.lines().collect()).collect();
         assert_eq!(lines[0], ["f 1/1 2/2 3/3", "g a", "", "", "", ""]);
         assert_eq!(lines[1], ["", "g a", "f 1 2 3", "", "", "f 1 2 3"]);

@@ -17,7 +17,7 @@ mod state;
 mod textures;
 
 use super::LoadOptions;
-use super::builder::{Builder, IfDark};
+use super::builder::{ASSUMED_NITS_PER_UNIT, Builder, IfDark};
 use super::error::{LoadError, suggestion};
 use crate::scene::{Alpha, Material, MaterialId, MeshId, ScalarInput, Scene, Surface};
 use parameters::Parameters;
@@ -28,8 +28,6 @@ use std::rc::Rc;
 
 /// Most placed shapes.
 const MOST_INSTANCES: usize = 4_000_000;
-/// Luminance of RGB (1, 1, 1) where no light of the file is photometric.
-const ASSUMED_NITS_PER_UNIT: f64 = 100.0;
 
 /// Reads a pbrt file.
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
@@ -37,7 +35,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
         main: path.to_owned(),
         file: path.to_owned(),
         options,
-        builder: Builder::new(path),
+        builder: Builder::new(path, options),
         state: State::new(),
         stack: Vec::new(),
         coordinate_systems: HashMap::new(),
@@ -221,15 +219,11 @@ impl Reader<'_> {
         let nits = if self.is_photometric {
             1.0
         } else {
-            self.builder.note(format!(
-                "Radiance has no unit in this file: 1 is taken as {ASSUMED_NITS_PER_UNIT} cd/m² (--nits-per-unit changes it)."
-            ));
+            self.builder.note_assumed_unit();
             ASSUMED_NITS_PER_UNIT
         };
-        for mesh in &mut self.builder.meshes {
-            mesh.bitangent_ignores_v = true;
-        }
-        self.builder.nits_per_unit = nits / f64::from(self.exposure);
+        self.builder.bitangent_ignores_v = true;
+        self.builder.set_nits_per_unit(nits / f64::from(self.exposure));
         self.builder.finish(path, IfDark::StudioWithoutLight, self.options)
     }
 }

@@ -37,7 +37,7 @@ pub(super) fn read(path: &Path) -> Result<Loaded, LoadError> {
         match element.name.as_str() {
             "vertex" => unused.extend(read_vertices(&mut values, element, &mut mesh)?),
             "face" => unused.extend(read_faces(&mut values, element, &mut polygons)?),
-            "tristrips" => strips::read(&mut values, element, &mut polygons)?,
+            "tristrips" => unused.extend(strips::read(&mut values, element, &mut polygons)?),
             other => {
                 unused.push(other);
                 values.skip(element)?;
@@ -137,18 +137,25 @@ fn read_vertices<'h>(values: &mut Values, element: &'h Element, mesh: &mut Mesh)
     Ok(unused)
 }
 
+/// Whether a property of faces or strips lists their corners.
+fn is_corners(property: &Property) -> bool {
+    property.list.is_some() && ["vertex_indices", "vertex_index"].contains(&property.name.as_str())
+}
+
+/// The names of what is not used of faces or strips, which must have corners.
+fn all_but_corners<'h>(values: &Values, element: &'h Element) -> Result<Vec<&'h str>, LoadError> {
+    if !element.properties.iter().any(is_corners) {
+        return Err(values.error(format_args!("its \"{}\" has no list \"vertex_indices\"", element.name)));
+    }
+    Ok(element.properties.iter().filter(|property| !is_corners(property)).map(|p| p.name.as_str()).collect())
+}
+
 fn read_faces<'h>(
     values: &mut Values,
     element: &'h Element,
     polygons: &mut Polygons,
 ) -> Result<Vec<&'h str>, LoadError> {
-    let is_corners = |property: &Property| {
-        property.list.is_some() && ["vertex_indices", "vertex_index"].contains(&property.name.as_str())
-    };
-    if !element.properties.iter().any(is_corners) {
-        return Err(values.error("its faces have no list \"vertex_indices\""));
-    }
-    let unused = element.properties.iter().filter(|property| !is_corners(property)).map(|p| p.name.as_str()).collect();
+    let unused = all_but_corners(values, element)?;
     polygons.sizes.reserve_exact(element.count);
     polygons.indices.reserve_exact(element.count.saturating_mul(3).min(values.bytes_left()));
     for _ in 0..element.count {
@@ -244,6 +251,12 @@ mod tests {
             load(text.as_bytes()).unwrap_or_else(|e| panic!("{e}")).mesh.triangles,
             [[0, 1, 2], [2, 1, 3], [3, 1, 0]]
         );
+        let other = text
+            .replace("int vertex_indices", "int vertex_index\nproperty uchar group")
+            .replace("8 0 1 2 3 -1 3 1 0\n", "8 0 1 2 3 -1 3 1 0 7\n");
+        let other = load(other.as_bytes()).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(other.mesh.triangles.len(), 3);
+        assert_eq!(other.notes, ["mesh.ply: not used: red, group."]);
     }
 
     #[test]

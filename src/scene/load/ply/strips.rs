@@ -1,17 +1,23 @@
 //! Strips of triangles, which some scanners' files have in place of faces.
 
 use super::super::error::LoadError;
-use super::Polygons;
 use super::body::Values;
 use super::header::Element;
+use super::{Polygons, all_but_corners, is_corners};
 
-/// Adds the triangles of every strip; an index below 0 ends a strip, and what follows begins another.
-pub(super) fn read(values: &mut Values, element: &Element, polygons: &mut Polygons) -> Result<(), LoadError> {
+/// Adds the triangles of every strip; an index below 0 ends a strip, and what follows begins another. Returns the names of
+/// what is not used.
+pub(super) fn read<'h>(
+    values: &mut Values,
+    element: &'h Element,
+    polygons: &mut Polygons,
+) -> Result<Vec<&'h str>, LoadError> {
+    let unused = all_but_corners(values, element)?;
     for _ in 0..element.count {
         for property in &element.properties {
             match property.list {
                 None => _ = values.number(property.kind)?,
-                Some(count) if property.name != "vertex_indices" => values.skip_list(count, property.kind)?,
+                Some(count) if !is_corners(property) => values.skip_list(count, property.kind)?,
                 Some(count) => {
                     let mut strip: Vec<u32> = Vec::new();
                     for _ in 0..values.list_size(count, property.kind)? {
@@ -31,7 +37,7 @@ pub(super) fn read(values: &mut Values, element: &Element, polygons: &mut Polygo
             }
         }
     }
-    Ok(())
+    Ok(unused)
 }
 
 /// Every other triangle is wound the other way around.

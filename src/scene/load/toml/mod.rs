@@ -64,12 +64,12 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
         ],
     )?;
 
-    let mut builder = Builder::new(path);
+    let mut builder = Builder::new(path, options);
     if let Some(name) = root.get_some("name", |value| value.string())? {
         builder.name = name.to_owned();
     }
     let own_unit = root.get_or("nits_per_unit", 1.0, Value::positive)?;
-    builder.nits_per_unit = options.nits_per_unit.unwrap_or(own_unit);
+    builder.set_nits_per_unit(own_unit);
     if let Some(film) = root.get("film") {
         builder.film = read_film(&film)?;
     }
