@@ -2,7 +2,7 @@
 
 use crate::farm::{OPTIONS, fechner, file, is_done, missing, one_process, picture, plan, run, said, scene};
 #[cfg(unix)]
-use crate::farm::{signal, wait_for};
+use crate::support::{signal, wait_for};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -83,7 +83,7 @@ fn a_plan_that_was_interrupted_goes_on_and_remains_are_no_farm() {
 #[cfg(unix)]
 #[test]
 fn a_merge_that_traces_goes_on_from_its_film() {
-    let options = ["--size", "256x256", "--sampling", "uniform", "--spp", "16"];
+    let options = ["--size", "256x256", "--sampling", "uniform", "--spp", "64"];
     let (folder, whole) = one_process(&options);
     let plan = ["farm", "plan", &scene(), "--unit-samples", "1000000000", "-o", "farm", "--"];
     run(folder.path(), 0, &[&plan[..], &options].concat());
