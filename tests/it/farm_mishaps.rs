@@ -37,6 +37,7 @@ fn a_film_that_is_lost_or_damaged_is_made_anew() {
     let (folder, whole) = one_process(&OPTIONS);
     let lost = in_its_second_round(folder.path(), "lost");
     std::fs::remove_file(lost.join("frame-0000/film")).expect("was there");
+    assert!(missing(&lost).is_empty(), "units of a round without its film are of no use");
     work(&lost);
     assert!(picture(&lost) == whole, "the picture differs from one process's");
 
