@@ -44,7 +44,7 @@ def run(folder, client, program: str = "fechner", threads: int = 1, say=print) -
 
     Frames go through their rounds independently of each other: a frame is merged as soon as its own units are there, and its next
     round's units are handed out at once. ``threads`` is what each program takes; give workers one task at a time.
-    Raises ``RuntimeError`` with the program's words where a unit or merge fails.
+    Raises ``RuntimeError`` with the program's words where a unit or merge fails, and where the last merge leaves something to do.
     """
     from distributed import as_completed
 
@@ -81,8 +81,12 @@ def run(folder, client, program: str = "fechner", threads: int = 1, say=print) -
             waiting[frame].discard(unit)
             if not waiting[frame]:
                 submit(frame, ["merge", "--frame", str(frame)], None)
-    # What needs all frames, such as a video, if it is not made yet.
+    if status(folder, program)["done"]:
+        return
+    # What needs all frames, such as a video.
     client.submit(_run, program, folder, ["merge", "--threads", str(threads)], pure=False).result()
+    if not status(folder, program)["done"]:
+        raise RuntimeError(f"{folder}: the last merge was ended, or another is at it: call again")
 
 
 def main() -> None:

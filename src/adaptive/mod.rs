@@ -324,9 +324,7 @@ impl<'a> Loop<'a> {
                     Directive::Leave => return Traced::UntilLeft,
                 }
             }
-            self.state.pending.pop_front();
-            self.state.traced_blocks = 0;
-            self.state.plans += 1;
+            self.state.close_plan();
         }
     }
 

@@ -141,6 +141,13 @@ impl RenderState {
         limits.mean_samples.is_none_or(is_affordable) && self.untraced_blocks().all(may_have_it)
     }
 
+    /// The first of the plans is in the film.
+    pub(crate) fn close_plan(&mut self) {
+        self.pending.pop_front();
+        self.traced_blocks = 0;
+        self.plans += 1;
+    }
+
     /// Blocks that are planned and not yet traced, in order.
     pub fn untraced_blocks(&self) -> impl Iterator<Item = &BlockWork> {
         self.pending.iter().flat_map(|plan| &plan.blocks).skip(self.traced_blocks)

@@ -95,12 +95,17 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     Ok(if is_unfinished { ExitCode::from(CALL_AGAIN) } else { ExitCode::SUCCESS })
 }
 
-/// Writes a picture that cannot be where it should into the folder for temporary files, and says so: its samples took long.
+/// Writes a picture that cannot be where it should into a new folder among temporary files, and says so: its samples took long.
+/// Others may write there too, and must not know the folder's name beforehand.
 fn kept_elsewhere(path: &Path, write: impl Fn(&Path) -> anyhow::Result<()>, error: anyhow::Error) -> anyhow::Error {
-    let name = path.file_name().unwrap_or(OsStr::new("picture")).to_string_lossy();
-    let elsewhere = std::env::temp_dir().join(format!("fechner-{}-{name}", std::process::id()));
-    match write(&elsewhere) {
-        Ok(()) => error.context(format!("the picture is in {}", elsewhere.display())),
+    let name = path.file_name().unwrap_or(OsStr::new("picture"));
+    let keep = || -> anyhow::Result<PathBuf> {
+        let folder = tempfile::Builder::new().prefix("fechner-").tempdir()?;
+        write(&folder.path().join(name))?;
+        Ok(folder.keep().join(name))
+    };
+    match keep() {
+        Ok(elsewhere) => error.context(format!("the picture is in {}", elsewhere.display())),
         Err(_) => error,
     }
 }

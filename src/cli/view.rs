@@ -1,5 +1,6 @@
 //! `fechner view`: a render in a browser, while it is made.
 
+use super::in_a_line;
 use super::job::{JobArguments, Prepared};
 use super::render::write_picture;
 use super::report::Report;
@@ -49,11 +50,11 @@ struct FileHost {
 
 impl Host for FileHost {
     fn load(&self) -> Result<Job, String> {
-        self.job.prepare().map(job_of).map_err(|error| format!("{error:#}"))
+        self.job.prepare().map(job_of).map_err(|error| in_a_line(&error))
     }
 
     fn later(&self, seconds: f64) -> Result<Scene, String> {
-        self.job.scene_later(seconds).map_err(|error| format!("{error:#}"))
+        self.job.scene_later(seconds).map_err(|error| in_a_line(&error))
     }
 
     fn save(&self, path: &Path, rendered: &Rendered, settings: &LoopSettings) -> Result<(), String> {
@@ -62,7 +63,7 @@ impl Host for FileHost {
             let report = Report::new(&self.job.scene_name(), &[self.job.seed()], settings, rendered);
             write_picture(path, format, self.job.background(), rendered, settings, &report)
         };
-        write().map_err(|error: anyhow::Error| format!("{error:#}"))?;
+        write().map_err(|error| in_a_line(&error))?;
         self.has_saved.store(true, Ordering::Relaxed);
         Ok(())
     }

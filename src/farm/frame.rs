@@ -2,7 +2,7 @@
 
 use super::folder::Farm;
 use super::round::{RoundRecord, clear_after, clear_before, hand_out, open_round, orders};
-use super::unit::{Keeping, NamedOrder, Outcome, UnitError, UnitSums, Wish, most_samples_a_batch};
+use super::unit::{Keeping, NamedOrder, Outcome, UnitError, UnitSums, most_samples_a_batch};
 use crate::adaptive::judge::JudgeError;
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::state::RenderState;
@@ -11,6 +11,7 @@ use crate::checkpoint::{CheckpointError, Header, read_checkpoint, write_checkpoi
 use crate::integrator::PathTracer;
 use crate::output::OutputError;
 use crate::sealed::SealedError;
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 
@@ -43,6 +44,10 @@ pub fn progress(farm: &Farm, frame_index: usize) -> Progress {
         let is_done = farm.result(frame_index).exists();
         return if is_done { Progress::Done } else { Progress::ToMerge { round: None } };
     };
+    if round.round > 0 && !farm.film(frame_index).exists() {
+        // The film is lost, and the frame begins anew: nobody needs this round's units.
+        return Progress::ToMerge { round: Some(round) };
+    }
     let is_missing = |unit: &u64| !farm.unit_file(*unit, "sums").exists();
     let missing: Vec<u64> = round.units.iter().map(|unit| unit.unit).filter(is_missing).collect();
     let can_be_rendered = |unit: &u64| farm.unit_file(*unit, "order").exists();
@@ -115,20 +120,15 @@ pub fn merge_frame(
         if trace(&mut state)? == Outcome::Left {
             return Ok(Merged::Left);
         }
-    } else {
-        let refused = match enter(farm, &units, &mut state) {
-            Ok(()) => Vec::new(),
-            Err(refused) => refused,
-        };
-        let is_missing = |unit: &u64| !farm.unit_file(*unit, "sums").exists();
-        let missing: Vec<u64> = units.iter().map(|(named, _)| named.order.unit).filter(is_missing).collect();
-        if !missing.is_empty() {
-            drop(units);
-            let state = state_so_far(farm, frame_index, job)?;
-            clear_after(farm, frame_index, state.plans);
-            hand_out(farm, frame_index, &state)?;
-            return Ok(Merged::Waiting { missing, refused });
+    } else if let Err(Lacking { missing, refused }) = enter(farm, &units, &mut state) {
+        drop(units);
+        if !refused.is_empty() {
+            // Others were entered.
+            state = state_so_far(farm, frame_index, job)?;
         }
+        clear_after(farm, frame_index, state.plans);
+        hand_out(farm, frame_index, &state)?;
+        return Ok(Merged::Waiting { missing, refused });
     }
     loop {
         state = match decide(job.tracer, job.settings, state, monitor)? {
@@ -189,14 +189,23 @@ fn state_so_far(farm: &Farm, frame_index: usize, job: &FrameJob<'_>) -> Result<R
     Ok(RenderState::new(area.width, area.height, &job.settings.limits))
 }
 
+/// What keeps a round from being merged.
+struct Lacking {
+    /// Numbers of units that are missing, among them those that were refused.
+    missing: Vec<u64>,
+    refused: Vec<UnitError>,
+}
+
 /// Enters the sums of all units into the film in the plan's order, as a render in one process does. Nothing is entered where
-/// one is missing; those that are refused are told.
-fn enter(farm: &Farm, units: &[(NamedOrder, Vec<u8>)], state: &mut RenderState) -> Result<(), Vec<UnitError>> {
+/// one is missing; where one is refused, others are.
+fn enter(farm: &Farm, units: &[(NamedOrder, Vec<u8>)], state: &mut RenderState) -> Result<(), Lacking> {
     let files: Vec<_> = units.iter().map(|(named, _)| (named, farm.unit_file(named.order.unit, "sums"))).collect();
-    if files.iter().any(|(_, path)| !path.exists()) {
-        return Err(Vec::new());
-    }
+    let are_missing = files.iter().filter(|(_, path)| !path.exists());
+    let mut missing: Vec<u64> = are_missing.map(|(named, _)| named.order.unit).collect();
     let mut refused = Vec::new();
+    if !missing.is_empty() {
+        return Err(Lacking { missing, refused });
+    }
     let read = |(order, path): &(&NamedOrder, std::path::PathBuf)| UnitSums::read(path, order);
     let mut next = files.first().map(read);
     for (i, (named, path)) in files.iter().enumerate() {
@@ -211,6 +220,7 @@ fn enter(farm: &Farm, units: &[(NamedOrder, Vec<u8>)], state: &mut RenderState) 
             }
             Some(Err(error)) => {
                 set_aside(path);
+                missing.push(named.order.unit);
                 refused.push(error);
             }
             None => {}
@@ -218,9 +228,11 @@ fn enter(farm: &Farm, units: &[(NamedOrder, Vec<u8>)], state: &mut RenderState) 
         ((), next) = rayon::join(enter_one, || following.map(read));
     }
     if !refused.is_empty() {
-        return Err(refused);
+        return Err(Lacking { missing, refused });
     }
-    close_plans(state);
+    while !state.pending.is_empty() {
+        state.close_plan();
+    }
     Ok(())
 }
 
@@ -248,34 +260,15 @@ fn trace_here(
     while let Some(plan) = state.pending.front() {
         let rest = &plan.blocks[state.traced_blocks..];
         if rest.is_empty() {
-            state.pending.pop_front();
-            state.traced_blocks = 0;
-            state.plans += 1;
+            state.close_plan();
             continue;
         }
         let batch = beginning(rest, most_samples_a_batch());
         state.traced_blocks += job.tracer.trace_batch(batch, &mut state.film, &|_| {});
         state.seconds_total = seconds_before + started.elapsed().as_secs_f64();
-        match (keeping.wish)() {
-            Wish::Leave => {
-                write(state)?;
-                return Ok(Outcome::Left);
-            }
-            Wish::GoOn if last_kept.elapsed() < keeping.every => {}
-            Wish::GoOn | Wish::Keep => {
-                if let Err(error) = write(state) {
-                    eprintln!("note: {error}; rendering goes on");
-                }
-                last_kept = Instant::now();
-            }
+        if let ControlFlow::Break(outcome) = keeping.after_batch(&mut last_kept, || write(state))? {
+            return Ok(outcome);
         }
     }
     Ok(Outcome::Finished)
-}
-
-/// What was planned is in the film.
-fn close_plans(state: &mut RenderState) {
-    state.plans += state.pending.len() as u32;
-    state.pending.clear();
-    state.traced_blocks = 0;
 }

@@ -8,6 +8,7 @@ use crate::output::OutputError;
 use crate::scene::hash::ContentHash;
 use crate::sealed::{Kind, SealedError};
 use serde::{Deserialize, Serialize};
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -171,6 +172,34 @@ pub struct Keeping<'a> {
     pub wish: &'a dyn Fn() -> Wish,
 }
 
+impl Keeping<'_> {
+    /// Between two batches: writes what is there where that is wished, or where it is time to. A checkpoint that cannot be written
+    /// is no reason to lose the work, unless it ends with it.
+    ///
+    /// # Errors
+    /// If the checkpoint that was asked for at the end cannot be written.
+    pub(super) fn after_batch<T>(
+        &self,
+        last_kept: &mut Instant,
+        write: impl FnOnce() -> Result<T, OutputError>,
+    ) -> Result<ControlFlow<Outcome>, OutputError> {
+        match (self.wish)() {
+            Wish::Leave => {
+                write()?;
+                return Ok(ControlFlow::Break(Outcome::Left));
+            }
+            Wish::GoOn if last_kept.elapsed() < self.every => {}
+            Wish::GoOn | Wish::Keep => {
+                if let Err(error) = write() {
+                    eprintln!("note: {error}; rendering goes on");
+                }
+                *last_kept = Instant::now();
+            }
+        }
+        Ok(ControlFlow::Continue(()))
+    }
+}
+
 /// Samples between two wishes: half a second in a simple scene. Schedulers kill 30 seconds after they asked.
 pub(super) fn most_samples_a_batch() -> u64 {
     const MOST_SAMPLES_A_THREAD: u64 = 1 << 17;
@@ -201,19 +230,8 @@ pub fn render_unit(
         if sums.sums.len() == order.order.blocks.len() {
             break;
         }
-        match (keeping.wish)() {
-            Wish::Leave => {
-                SUMS.write(&partial, &sums)?;
-                return Ok(Outcome::Left);
-            }
-            Wish::GoOn if last_kept.elapsed() < keeping.every => {}
-            Wish::GoOn | Wish::Keep => {
-                // A checkpoint that cannot be written is no reason to lose the unit.
-                if let Err(error) = SUMS.write(&partial, &sums) {
-                    eprintln!("note: {error}; rendering goes on");
-                }
-                last_kept = Instant::now();
-            }
+        if let ControlFlow::Break(outcome) = keeping.after_batch(&mut last_kept, || SUMS.write(&partial, &sums))? {
+            return Ok(outcome);
         }
     }
     SUMS.write(&farm.unit_file(order.order.unit, "sums"), &sums)?;

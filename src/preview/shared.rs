@@ -173,14 +173,16 @@ impl Pointer {
         Self { shared: Arc::clone(shared), number: shared.pointers.fetch_add(1, Ordering::SeqCst) }
     }
 
+    /// Where its viewer looks; `None` where that is known no longer, which is no word about others.
     pub(super) fn look_at(&mut self, place: Option<Gaze>) {
-        self.shared.change_gaze(|gaze| *gaze = place.map(|place| (self.number, place)));
+        let own = place.map(|place| (self.number, place));
+        self.shared.change_gaze(|gaze| *gaze = own.or(gaze.filter(|(owner, _)| *owner != self.number)));
     }
 }
 
 impl Drop for Pointer {
     fn drop(&mut self) {
-        self.shared.change_gaze(|gaze| *gaze = gaze.filter(|(owner, _)| *owner != self.number));
+        self.look_at(None);
     }
 }
 
@@ -221,6 +223,8 @@ mod tests {
         let (mut first, mut second) = (Pointer::of(&shared), Pointer::of(&shared));
         first.look_at(place(1.0));
         second.look_at(place(5.0));
+        first.look_at(None);
+        assert_eq!(shared.gaze(), place(5.0));
         drop(first);
         assert_eq!(shared.gaze(), place(5.0));
         drop(second);

@@ -1,8 +1,9 @@
 //! `fechner farm`: many processes on one folder make the bytes of one process, whatever happens to them.
 
+#[cfg(unix)]
+use crate::support::{signal, wait_for};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
-use std::time::{Duration, Instant};
 
 /// The still that is rendered here: as one process, and as farms.
 pub(crate) const OPTIONS: [&str; 6] = ["--size", "48x48", "--visibility", "4", "--seed", "3"];
@@ -152,22 +153,6 @@ fn order_repetition_and_bad_files_change_nothing() {
     assert!(picture(&farm) == whole, "the picture differs from one process's");
 }
 
-#[cfg(unix)]
-pub(crate) fn signal(child: &Child, name: &str) {
-    let sent = Command::new("kill").args([name, &child.id().to_string()]).status().expect("kill");
-    assert!(sent.success());
-}
-
-#[cfg(unix)]
-pub(crate) fn wait_for(path: &Path, child: &mut Child) {
-    let started = Instant::now();
-    while !path.exists() {
-        assert!(child.try_wait().expect("a child").is_none(), "the unit ended before {} was there", path.display());
-        assert!(started.elapsed() < Duration::from_secs(300), "no {} after five minutes", path.display());
-        std::thread::sleep(Duration::from_millis(2));
-    }
-}
-
 /// SIGUSR1 writes the checkpoint and goes on, SIGTERM writes it and ends, SIGKILL leaves the last: each time the next process
 /// goes on from there.
 #[cfg(unix)]
@@ -189,7 +174,7 @@ fn a_unit_goes_on_from_its_checkpoint() {
     let mut child = fechner(&farm, &seldom).spawn().expect("runs");
     let lock = partial.with_extension("lock");
     wait_for(&lock, &mut child);
-    std::thread::sleep(Duration::from_millis(100));
+    std::thread::sleep(std::time::Duration::from_millis(100));
     signal(&child, "-USR1");
     wait_for(&partial, &mut child);
     assert!(child.try_wait().expect("a child").is_none(), "USR1 ends nothing");
@@ -201,7 +186,7 @@ fn a_unit_goes_on_from_its_checkpoint() {
 
     let mut child = fechner(&farm, &always).spawn().expect("runs");
     while file(&partial) == before && child.try_wait().expect("a child").is_none() {
-        std::thread::sleep(Duration::from_millis(2));
+        std::thread::sleep(std::time::Duration::from_millis(2));
     }
     child.kill().expect("SIGKILL");
     let output = child.wait_with_output().expect("ended");

@@ -2,7 +2,7 @@
 
 use crate::farm::{OPTIONS, fechner, file, is_done, missing, one_process, picture, plan, run, said, scene};
 #[cfg(unix)]
-use crate::farm::{signal, wait_for};
+use crate::support::{signal, wait_for};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -37,6 +37,7 @@ fn a_film_that_is_lost_or_damaged_is_made_anew() {
     let (folder, whole) = one_process(&OPTIONS);
     let lost = in_its_second_round(folder.path(), "lost");
     std::fs::remove_file(lost.join("frame-0000/film")).expect("was there");
+    assert!(missing(&lost).is_empty(), "units of a round without its film are of no use");
     work(&lost);
     assert!(picture(&lost) == whole, "the picture differs from one process's");
 
@@ -83,7 +84,7 @@ fn a_plan_that_was_interrupted_goes_on_and_remains_are_no_farm() {
 #[cfg(unix)]
 #[test]
 fn a_merge_that_traces_goes_on_from_its_film() {
-    let options = ["--size", "256x256", "--sampling", "uniform", "--spp", "16"];
+    let options = ["--size", "256x256", "--sampling", "uniform", "--spp", "64"];
     let (folder, whole) = one_process(&options);
     let plan = ["farm", "plan", &scene(), "--unit-samples", "1000000000", "-o", "farm", "--"];
     run(folder.path(), 0, &[&plan[..], &options].concat());

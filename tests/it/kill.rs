@@ -1,8 +1,11 @@
 //! The program, killed and interrupted, resumed and merged: as a farm or a power cut would do it.
 
+#[cfg(unix)]
+use crate::support::signal;
+use crate::support::wait_for;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
-use std::time::{Duration, Instant};
+use std::process::{Command, Output, Stdio};
+use std::time::Duration;
 
 fn fechner() -> Command {
     Command::new(env!("CARGO_BIN_EXE_fechner"))
@@ -41,15 +44,6 @@ fn assert_refused(mut command: Command, fragments: &[&str]) {
     let line = message.lines().find(|line| line.starts_with("fechner:")).unwrap_or_default();
     assert!(fragments.iter().all(|fragment| line.contains(fragment)), "{fragments:?} are not in: {message}");
     assert!(!message.contains("panicked"), "{message}");
-}
-
-fn wait_for(path: &Path, child: &mut Child) {
-    let started = Instant::now();
-    while !path.exists() {
-        assert!(child.try_wait().expect("a child").is_none(), "the render ended before its first checkpoint");
-        assert!(started.elapsed() < Duration::from_secs(300), "no checkpoint after five minutes");
-        std::thread::sleep(Duration::from_millis(2));
-    }
 }
 
 fn file(folder: &Path, name: &str) -> Vec<u8> {
@@ -147,8 +141,7 @@ fn a_signal_ends_a_render_with_its_picture_so_far() {
     wait_for(&at.join("a.film"), &mut child);
     // Twice, as `timeout` sends it to the program and to its group.
     for _ in 0..2 {
-        let killed = Command::new("kill").args(["-TERM", &child.id().to_string()]).status().expect("kill");
-        assert!(killed.success());
+        signal(&child, "-TERM");
     }
     let output = child.wait_with_output().expect("ended");
     assert_eq!(output.status.code(), Some(75), "{}", text(&output));
@@ -166,22 +159,26 @@ fn a_signal_ends_a_render_with_its_picture_so_far() {
 }
 
 /// Where a picture cannot be written at the end, its samples are not lost.
+#[cfg(unix)]
 #[test]
 fn a_picture_whose_folder_is_gone_is_kept_elsewhere() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = folder.path();
     let [gone, temporary] = ["gone", "temporary"].map(|name| at.join(name));
     [&gone, &temporary].into_iter().for_each(|folder| std::fs::create_dir(folder).expect("made"));
-    let arguments = ["--visibility", "2", "-o", "gone/a.png", "--checkpoint", "a.film", "--checkpoint-every", "0.001"];
-    let mut child = render(at, &arguments).env("TMPDIR", &temporary).spawn().expect("runs");
+    let endless = ["--visibility", "0.01", "-o", "gone/a.png", "--checkpoint", "a.film", "--checkpoint-every", "0.001"];
+    let mut child = render(at, &endless).env("TMPDIR", &temporary).spawn().expect("runs");
     wait_for(&at.join("a.film"), &mut child);
     std::fs::remove_dir_all(&gone).expect("removed");
+    signal(&child, "-TERM");
     let output = child.wait_with_output().expect("ended");
     let message = text(&output);
     assert_eq!(output.status.code(), Some(2), "{message}");
-    let [kept] = &names(&temporary)[..] else { panic!("no picture: {message}") };
-    assert!(message.contains(kept.as_str()) && message.contains("cannot write gone/a.png"), "{message}");
-    assert_eq!(image::open(temporary.join(kept)).expect("a picture").width(), 64);
+    let [own] = &names(&temporary)[..] else { panic!("no folder: {message}") };
+    let kept = temporary.join(own).join("a.png");
+    assert!(message.contains(&kept.display().to_string()), "{message}");
+    assert!(message.contains("cannot write gone/a.png"), "{message}");
+    assert_eq!(image::open(kept).expect("a picture").width(), 64);
 }
 
 /// Merged films are looked at again; what does not fit is refused by name.

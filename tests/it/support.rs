@@ -10,6 +10,9 @@ use fechner::scene::{
 use fechner_perception::display::{Display, Viewing};
 use fechner_perception::tone;
 use glam::{Affine3A, Mat3A, Vec2, Vec3};
+use std::path::Path;
+use std::process::Child;
+use std::time::{Duration, Instant};
 
 /// A scene of nothing, seen from z = 5.
 pub(crate) fn empty_scene() -> Scene {
@@ -117,4 +120,21 @@ fn camera_numbers_fill_the_pixel() {
     let key = block_key(3);
     let mean: f32 = key.samples(64).map(|s| s.draw(Purpose::Camera)[0]).sum::<f32>() / 64.0;
     assert!((mean - 0.5).abs() < 0.02, "{mean}");
+}
+
+/// Until a file is there that a program under way makes.
+pub(crate) fn wait_for(path: &Path, child: &mut Child) {
+    let started = Instant::now();
+    while !path.exists() {
+        assert!(child.try_wait().expect("a child").is_none(), "the program ended before {} was there", path.display());
+        assert!(started.elapsed() < Duration::from_secs(300), "no {} after five minutes", path.display());
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// Sends a signal by its name for `kill`, as "-TERM".
+#[cfg(unix)]
+pub(crate) fn signal(child: &Child, name: &str) {
+    let sent = std::process::Command::new("kill").args([name, &child.id().to_string()]).status().expect("kill");
+    assert!(sent.success());
 }

@@ -28,7 +28,7 @@ use fechner_perception::model;
 use fechner_perception::tone::{ToneOperator, ToneSettings};
 use std::io::Write as _;
 use std::ops::RangeInclusive;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -162,7 +162,7 @@ impl<'a> Shot<'a> {
     pub(super) fn make(&self, frame: u32, track: &Track, time: Option<Duration>) -> Result<bool> {
         let mut job = self.frame(frame, track)?;
         job.settings.limits.time = time;
-        let file = self.name.of(frame);
+        let file = self.file(frame);
         if self.record(frame, &job.key).is_some() {
             eprintln!("{}: is there", file.display());
             return Ok(false);
@@ -204,9 +204,14 @@ impl<'a> Shot<'a> {
         Ok(Some(FrameJob { scenes, settings, key }))
     }
 
+    /// The picture's file of a frame.
+    pub(in crate::cli) fn file(&self, frame: u32) -> PathBuf {
+        self.name.of(frame)
+    }
+
     /// Writes a frame and its record.
     pub(in crate::cli) fn keep(&self, frame: u32, job: &FrameJob, made: &RenderedFrame) -> Result<Report> {
-        let file = self.name.of(frame);
+        let file = self.file(frame);
         let scene_name = self.arguments.scene.display().to_string();
         let report = Report::new(&scene_name, &[self.settings.trace.seed], &job.settings, &made.rendered);
         FrameRecord::remove(&file)?;
@@ -237,12 +242,12 @@ impl<'a> Shot<'a> {
         let size = (self.settings.trace.width as usize, self.settings.trace.height as usize);
         let mut sheet = ContactSheet::new(on_sheet(count).count(), size);
         for frame in on_sheet(count) {
-            let file = self.name.of(self.settings.first + frame as u32);
+            let file = self.file(self.settings.first + frame as u32);
             sheet.add(&shown_rgb8(&file, || fits(frame), &self.settings)?);
         }
         sheet.write(&self.name.of_shot("contact.png"))?;
         if let Some((path, format)) = self.arguments.video()? {
-            let files = (self.settings.first..=self.settings.last).map(|frame| self.name.of(frame));
+            let files = (self.settings.first..=self.settings.last).map(|frame| self.file(frame));
             video::write(path, format, files, &fits, &self.settings)?;
         }
         Ok(true)
@@ -288,7 +293,7 @@ impl<'a> Shot<'a> {
 
     /// The record of a frame that is there, made from all that a key names.
     fn record(&self, frame: u32, key: &str) -> Option<FrameRecord> {
-        let file = self.name.of(frame);
+        let file = self.file(frame);
         FrameRecord::of_picture(&file).filter(|record| record.holds(key, &file))
     }
 
@@ -296,7 +301,7 @@ impl<'a> Shot<'a> {
     fn find_frames(&self, track: &Track) -> Result<FoundFrames> {
         let frames = || self.settings.first..=self.settings.last;
         // Keys take reading every scene: not for each run that makes a part of a shot.
-        let missing = frames().filter(|&frame| FrameRecord::of_picture(&self.name.of(frame)).is_none()).count();
+        let missing = frames().filter(|&frame| FrameRecord::of_picture(&self.file(frame)).is_none()).count();
         let mut found = FoundFrames { records: Vec::new(), missing };
         if missing > 0 {
             return Ok(found);

@@ -225,11 +225,10 @@ impl Job<'_> {
 
     /// The picture's file of a frame.
     pub(super) fn picture(&self, farm: &Farm, number: u32) -> PathBuf {
-        let ending = farm.manifest().picture_format.ending();
-        farm.pictures().join(match self {
-            Self::Still(_) => format!("picture.{ending}"),
-            Self::Shot { .. } => format!("frame.{number:04}.{ending}"),
-        })
+        match self {
+            Self::Still(_) => farm.pictures().join(format!("picture.{}", farm.manifest().picture_format.ending())),
+            Self::Shot { shot, .. } => shot.file(number),
+        }
     }
 
     /// Whether the farm's frames are all of the shot, not a part of one.

@@ -46,6 +46,9 @@ pub(super) fn run(arguments: &MergeArguments) -> Result<ExitCode> {
         let Bench { farm, job, signals, .. } = bench;
         let mut waits = false;
         for frame_index in chosen(farm, &arguments.frames)? {
+            if signals.leaves() {
+                return Ok(ExitCode::from(CALL_AGAIN));
+            }
             if let Progress::Open { missing, .. } = progress(farm, frame_index) {
                 say_missing(farm, frame_index, &missing);
                 waits = true;
@@ -59,6 +62,9 @@ pub(super) fn run(arguments: &MergeArguments) -> Result<ExitCode> {
                 MergeWent::Waits => waits = true,
                 MergeWent::Left => return Ok(ExitCode::from(CALL_AGAIN)),
             }
+        }
+        if signals.leaves() {
+            return Ok(ExitCode::from(CALL_AGAIN));
         }
         conclude(farm, job)?;
         Ok(if waits { ExitCode::from(CALL_AGAIN) } else { ExitCode::SUCCESS })

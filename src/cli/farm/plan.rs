@@ -45,7 +45,7 @@ enum Format {
     Png,
 }
 
-/// What a plan makes: removed again where it fails, less what was there before.
+/// What a plan makes before its manifest: removed again where it fails, less what was there before.
 struct Unfinished {
     first_made: Option<PathBuf>,
 }
@@ -117,6 +117,7 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode> {
         entries.push(frame.entry(number));
         limits = Some(frame.settings().limits);
     }
+    let limits = limits.context("there are no frames")?;
     let farm = Farm::create(
         &folder,
         Manifest {
@@ -127,14 +128,14 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode> {
             ..Manifest::new(work, directory, words, entries)
         },
     )?;
-    let limits = limits.context("there are no frames")?;
+    // From here on it is a farm: whatever works on it goes on from what is there.
+    unfinished.keep();
     let (mut units, mut samples) = (0, 0);
     for (frame_index, FrameEntry { origin, .. }) in farm.manifest().frames.iter().enumerate() {
         let record = hand_out(&farm, frame_index, &RenderState::new(origin.width, origin.height, &limits))?;
         units += record.units.len();
         samples += record.samples;
     }
-    unfinished.keep();
     eprintln!(
         "{}: {}, {} in the first round, {}",
         arguments.output.display(),

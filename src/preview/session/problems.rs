@@ -1,7 +1,9 @@
 //! What went wrong and has not gone right since.
 
+use std::collections::BTreeMap;
+
 /// What can go wrong, each by itself: what goes right elsewhere does not mend it.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Cause {
     /// The scene file.
     Scene,
@@ -13,27 +15,24 @@ pub(super) enum Cause {
     Look,
 }
 
-/// How many causes there are.
-const CAUSES: usize = 4;
-
 /// The last problem of each cause.
 #[derive(Default)]
-pub(super) struct Problems([Option<String>; CAUSES]);
+pub(super) struct Problems(BTreeMap<Cause, String>);
 
 impl Problems {
     /// It went wrong.
     pub(super) fn meet(&mut self, cause: Cause, problem: String) {
-        self.0[cause as usize] = Some(problem);
+        self.0.insert(cause, problem);
     }
 
     /// It went right.
     pub(super) fn solve(&mut self, cause: Cause) {
-        self.0[cause as usize] = None;
+        self.0.remove(&cause);
     }
 
     /// All of them, a line each; `None` where there is none.
     pub(super) fn told(&self) -> Option<String> {
-        let problems: Vec<&str> = self.0.iter().flatten().map(String::as_str).collect();
+        let problems: Vec<&str> = self.0.values().map(String::as_str).collect();
         (!problems.is_empty()).then(|| problems.join("\n"))
     }
 }

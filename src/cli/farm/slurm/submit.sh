@@ -30,7 +30,7 @@ packed "units.$name.all" >"units.$name"
 rm "frames.$name.all" "units.$name.all"
 if [ ! -s "frames.$name" ]; then
     # What needs all frames, such as a video, if it is not made yet.
-    "$fechner" farm merge "$farm"
+    "$fechner" farm merge "$farm" --threads @CPUS@
     echo "$farm: all frames are done"
     exit
 fi
