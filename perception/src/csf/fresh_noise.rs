@@ -143,7 +143,7 @@ mod tests {
         (still.sensitivity(freq_cpd, luminance_cd_m2) / fresh.sensitivity(freq_cpd, luminance_cd_m2)).powi(2)
     }
 
-    /// Against integrals made with steps of 0.01 Hz up to 400 Hz by another program, fine patterns first, where the transient
+    /// Against integrals in steps of 0.01 Hz up to 400 Hz (`benches/peers/fresh_noise.py`), fine patterns first, where the transient
     /// channel sees nothing.
     #[test]
     fn integrals_agree_with_fine_quadrature() {

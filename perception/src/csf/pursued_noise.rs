@@ -132,7 +132,7 @@ mod tests {
         assert!((left / smear - 1.0).abs() < 0.1, "{left} {smear}");
     }
 
-    /// Of the sustained channel alone, against sums in steps of 0.01 Hz up to 400 Hz and over 200 directions by another program.
+    /// Of the sustained channel alone, against sums in steps of 0.01 Hz up to 400 Hz and over 200 directions (`benches/peers/fresh_noise.py`).
     #[test]
     fn energies_agree_with_fine_quadrature() {
         for (fps, freq_cpd, velocity_deg_s, expected) in [
