@@ -133,10 +133,18 @@ impl Subject {
             nits_per_unit: self.scene.nits_per_unit,
             operator: "constant".to_owned(),
             exposure_stops: None,
+            fitted: None,
             importance: None,
             denoiser: None,
         };
-        Job { scene: Arc::clone(&self.scene), trace: self.trace_settings(seed), record, limits, importance: None }
+        Job {
+            scene: Arc::clone(&self.scene),
+            trace: self.trace_settings(seed),
+            record,
+            limits,
+            importance: None,
+            whole: None,
+        }
     }
 
     fn loop_settings(&self, limits: Limits) -> Result<LoopSettings> {

@@ -10,6 +10,7 @@ mod awake;
 pub mod denoised;
 mod forecast;
 mod gain;
+pub mod glimpse;
 pub mod judge;
 mod limits;
 mod monitor;

@@ -8,7 +8,7 @@ use fechner_perception::csf::FrameTiming;
 use fechner_perception::display::Viewing;
 use fechner_perception::eccentricity::Gaze;
 use fechner_perception::model::ThresholdModel;
-use fechner_perception::tone::{SavedTone, ToneOperator};
+use fechner_perception::tone::{SavedTone, SceneLight, ToneOperator};
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
@@ -105,7 +105,8 @@ pub struct LoopSettings {
     pub nits_per_unit: f64,
     /// How the picture is shown.
     pub operator: Box<dyn ToneOperator>,
-    /// A fit of the operator that was made elsewhere, for the frames of one shot; without it, each look fits its own.
+    /// A fit of the operator that was made elsewhere, for the frames of one shot or a part of a picture; without it, each look fits
+    /// its own.
     pub fitted: Option<SavedTone>,
     /// For a frame of a moving picture, whose noise is gone in the next: how frames follow. `None` for stills and for
     /// frames that may be paused.
@@ -124,6 +125,11 @@ pub struct LoopSettings {
 }
 
 impl LoopSettings {
+    /// Shows pictures as the whole is shown of which they are a part.
+    pub fn fit_to(&mut self, whole: &SceneLight) {
+        self.fitted = Some(self.operator.fit(&whole.guide(), &self.viewing, None).save());
+    }
+
     /// The default loop, to visibility 1.
     pub fn new(viewing: Viewing, nits_per_unit: f64, operator: Box<dyn ToneOperator>) -> Self {
         Self {

@@ -5,12 +5,9 @@
 
 use super::budget::Needs;
 use super::{SceneSource, ShotSettings};
-use crate::adaptive::judge::guide_rgb;
-use crate::adaptive::plan::pilot_plan;
+use crate::adaptive::glimpse::glimpse;
 use crate::checkpoint::PROGRAM;
 use crate::denoise::Denoiser;
-use crate::film::Film;
-use crate::integrator::{PathTracer, TraceSettings};
 use crate::scene::Scene;
 use crate::scene::hash::{ContentHash, content_hash};
 use crate::scene::load::LoadError;
@@ -18,10 +15,6 @@ use fechner_perception::tone::{AdaptationState, Goal, SavedTone, SceneLight, Ton
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Longest side of a pilot in pixels.
-const PILOT_SIDE: u32 = 64;
-/// Samples a pixel of a pilot.
-const PILOT_SAMPLES: u32 = 16;
 /// Frames, spread over the shot, that one fit for all looks at.
 const FITTED_FRAMES: usize = 16;
 
@@ -165,14 +158,8 @@ struct Look {
 
 impl Look {
     fn at(scene: Arc<Scene>, shot: &ShotSettings, operator: &dyn ToneOperator) -> Self {
-        let (width, height) = pilot_size(shot.trace.width, shot.trace.height);
         // The same seed in every frame: what noise is left changes with the scene, not with the frame's number.
-        let settings = TraceSettings { width, height, crop: None, ..shot.trace };
-        let tracer = PathTracer::new(scene, settings);
-        let mut film = Film::new(width, height);
-        tracer.trace(&pilot_plan(&film, PILOT_SAMPLES), &mut film, &|_| {});
-        let estimate = film.estimate(shot.nits_per_unit);
-        Self { light: SceneLight::of(operator, width as usize, &guide_rgb(&film, &estimate)) }
+        Self { light: glimpse(scene, &shot.trace, shot.nits_per_unit, Some(operator)) }
     }
 
     fn goal(&self, shot: &ShotSettings) -> Goal {
@@ -186,28 +173,4 @@ fn enlarged(looks: &[&Look], shot: &ShotSettings) -> SceneLight {
     let count = looks.len().min(FITTED_FRAMES);
     let some: Vec<&SceneLight> = (0..count).map(|index| &looks[index * looks.len() / count].light).collect();
     SceneLight::stacked(&some, shot.trace.width as usize, shot.trace.height as usize)
-}
-
-fn pilot_size(width: u32, height: u32) -> (u32, u32) {
-    let longest = width.max(height);
-    let scaled = |side: u32| {
-        if longest <= PILOT_SIDE {
-            side
-        } else {
-            (u64::from(side) * u64::from(PILOT_SIDE) / u64::from(longest)).max(1) as u32
-        }
-    };
-    (scaled(width), scaled(height))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn pilots_keep_the_shape() {
-        assert_eq!(pilot_size(1920, 1080), (64, 36));
-        assert_eq!(pilot_size(32, 18), (32, 18));
-        assert_eq!(pilot_size(4000, 2), (64, 1));
-    }
 }

@@ -7,7 +7,7 @@ use crate::scene::Scene;
 use crate::scene::hash::{ContentHash, content_hash};
 use fechner_perception::display::Viewing;
 use fechner_perception::model::{self, ThresholdModel};
-use fechner_perception::tone;
+use fechner_perception::tone::{self, SavedTone};
 use serde::{Deserialize, Serialize};
 
 /// This program, its version and what of its build changes the last bits of a sample: where the target has fused multiply-add
@@ -75,6 +75,8 @@ pub struct SettingsRecord {
     pub operator: String,
     /// Exposure correction, where the operator was given one.
     pub exposure_stops: Option<f64>,
+    /// The operator as fitted to something else than the picture: to the whole of which it is a part.
+    pub fitted: Option<SavedTone>,
     /// Importance map, where one was given.
     pub importance: Option<ContentHash>,
     /// What makes the output picture out of the mean.
@@ -200,6 +202,7 @@ impl SettingsRecord {
             model: self.threshold_model()?,
             denoiser: self.denoiser.map(Denoiser::open).transpose()?,
             limits,
+            fitted: self.fitted.clone(),
             ..LoopSettings::new(self.viewing.clone(), self.nits_per_unit, operator)
         })
     }

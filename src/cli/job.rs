@@ -6,6 +6,7 @@ use super::importance;
 use super::seeing::{self, parse_positive, parse_seconds};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
+use fechner::adaptive::glimpse::glimpse;
 use fechner::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, RivalRule, Sampling};
 use fechner::checkpoint::SettingsRecord;
 use fechner::integrator::{Crop, DEFAULT_MAX_DEPTH, Pruning, TraceSettings};
@@ -14,7 +15,9 @@ use fechner::sampler::{PixelFilter, Sequence};
 use fechner::scene::hash::ContentHash;
 use fechner::scene::{Scene, load};
 use fechner_perception::model;
+use fechner_perception::tone::SceneLight;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Duration;
 
 /// A scene and how to render it.
@@ -25,7 +28,7 @@ pub(super) struct JobArguments {
     /// Picture size.
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<Size>,
-    /// Trace only this part of the picture, with the samples it has in the whole.
+    /// Trace only this part of the picture, with the samples and the exposure it has in the whole.
     #[arg(long, value_name = "X,Y,W,H", value_parser = parse_crop)]
     crop: Option<Crop>,
     #[command(flatten)]
@@ -120,10 +123,12 @@ pub(super) struct JobArguments {
 
 /// A scene that was loaded, and all that the arguments and it ask for.
 pub(super) struct Prepared {
-    pub(super) scene: Scene,
+    pub(super) scene: Arc<Scene>,
     pub(super) trace: TraceSettings,
     pub(super) record: SettingsRecord,
     pub(super) settings: LoopSettings,
+    /// How light the whole is that the picture is cut out of.
+    pub(super) whole: Option<SceneLight>,
 }
 
 impl JobArguments {
@@ -201,7 +206,13 @@ impl JobArguments {
                  judge it; use --sampling uniform, or the filter blackman-harris"
             );
         }
-        Ok(Prepared { scene, trace, record, settings })
+        let scene = Arc::new(scene);
+        let whole = trace.crop.and_then(|_| whole_light(&scene, &trace));
+        if let Some(whole) = &whole {
+            settings.fit_to(whole);
+            record.fitted.clone_from(&settings.fitted);
+        }
+        Ok(Prepared { scene, trace, record, settings, whole })
     }
 }
 
@@ -336,6 +347,19 @@ fn trace_settings(arguments: &JobArguments, size: Size, nits_per_unit: f64) -> a
     })
 }
 
+/// How light all of the picture is, at its own size, as operators that count degrees need it: a part is shown as it is shown in the
+/// whole. `None` for pictures too large to be looked at as a whole.
+fn whole_light(scene: &Arc<Scene>, trace: &TraceSettings) -> Option<SceneLight> {
+    const MOST_PIXELS: u64 = 1 << 26;
+    if u64::from(trace.width) * u64::from(trace.height) > MOST_PIXELS {
+        eprintln!("note: tone is fitted to the crop alone: {}x{} pixels are too many", trace.width, trace.height);
+        return None;
+    }
+    // Films of other seeds must be shown alike, to be merged.
+    let light = glimpse(Arc::clone(scene), &TraceSettings { seed: 0, ..*trace }, scene.nits_per_unit, None);
+    Some(SceneLight::stacked(&[&light], trace.width as usize, trace.height as usize))
+}
+
 /// When to stop.
 fn limits(arguments: &JobArguments, scene: &Scene, sampling: Sampling) -> Limits {
     let asked = arguments.visibility.or(arguments.quality.map(Quality::visibility));
@@ -410,6 +434,7 @@ fn settings_record(arguments: &JobArguments, scene: &Scene) -> anyhow::Result<Se
         nits_per_unit: scene.nits_per_unit,
         operator: operator.to_owned(),
         exposure_stops: arguments.exposure.or(view.exposure_stops),
+        fitted: None,
         importance: None,
         denoiser: arguments.denoise.kind(),
     })

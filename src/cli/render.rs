@@ -20,7 +20,6 @@ use fechner::output::rendered::Background;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
 
 /// Arguments of `render`.
 #[derive(Debug, Args)]
@@ -59,7 +58,7 @@ pub(super) fn run(arguments: &RenderArguments) -> anyhow::Result<ExitCode> {
 }
 
 fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyhow::Result<ExitCode> {
-    let Prepared { scene, trace, record, settings } = arguments.job.prepare()?;
+    let Prepared { scene, trace, record, settings, .. } = arguments.job.prepare()?;
     let Crop { width, height, .. } = trace.film_area();
     let fresh = RenderState::new(width, height, &settings.limits);
     let audience = arguments.view.then(|| audience(&scene, &settings, &record)).transpose()?;
@@ -72,8 +71,7 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     } else {
         (fresh, vec![trace.seed], None)
     };
-    let scene = Arc::new(scene);
-    let tracer = PathTracer::new(Arc::clone(&scene), trace);
+    let tracer = PathTracer::new(scene, trace);
     let degenerate = tracer.world().degenerate_triangles();
     if degenerate > 0 {
         eprintln!("note: {degenerate} triangles without area were left out");

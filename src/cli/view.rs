@@ -74,8 +74,8 @@ impl Host for FileHost {
 }
 
 fn job_of(prepared: Prepared) -> Job {
-    let Prepared { scene, trace, record, settings } = prepared;
-    Job { scene: Arc::new(scene), trace, record, limits: settings.limits, importance: settings.importance }
+    let Prepared { scene, trace, record, settings, whole } = prepared;
+    Job { scene, trace, record, limits: settings.limits, importance: settings.importance, whole }
 }
 
 /// A running render, open to viewers on this machine at a free port; says where.

@@ -40,6 +40,7 @@ use crate::checkpoint::SettingsRecord;
 use crate::integrator::TraceSettings;
 use crate::scene::Scene;
 use fechner_perception::Plane;
+use fechner_perception::tone::SceneLight;
 use shared::Shared;
 use std::net::TcpListener;
 use std::path::Path;
@@ -57,6 +58,8 @@ pub struct Job {
     pub limits: Limits,
     /// What thresholds are multiplied by.
     pub importance: Option<Plane>,
+    /// How light the whole is of which the picture is a part: what the operator is fitted to, whichever it is.
+    pub whole: Option<SceneLight>,
 }
 
 /// Who knows where the scene comes from and how pictures are written.

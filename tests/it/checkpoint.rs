@@ -46,6 +46,7 @@ impl Setup {
                 nits_per_unit: like.nits_per_unit,
                 operator: "constant".to_owned(),
                 exposure_stops: None,
+                fitted: None,
                 importance: None,
                 denoiser: None,
             },

@@ -152,6 +152,34 @@ fn a_crop_of_a_huge_picture_fits_into_memory() {
     assert_eq!(image::open(folder.path().join("a.png")).expect("a picture").width(), 16);
 }
 
+/// A dark corner is as dark as it is in the whole picture: fitted to itself it would come out as light as any other.
+#[test]
+fn a_crop_is_exposed_as_the_whole() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let render = |name: &str, more: &[&str]| {
+        let run = fechner()
+            .arg("render")
+            .arg(scene("cornell-box.toml"))
+            .args(["--size", "96x96", "--sampling", "uniform", "--spp", "16", "-o", name])
+            .args(more)
+            .current_dir(folder.path())
+            .output()
+            .expect("runs");
+        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+        image::open(folder.path().join(name)).expect("a picture").into_rgb8()
+    };
+    let whole = render("whole.png", &[]);
+    let mean = |picture: image::RgbImage| {
+        picture.pixels().flat_map(|pixel| pixel.0).map(f64::from).sum::<f64>()
+            / f64::from(3 * picture.width() * picture.height())
+    };
+    for (x, y) in [(10, 70), (40, 0)] {
+        let part = mean(render("part.png", &["--crop", &format!("{x},{y},24,24")]));
+        let of_whole = mean(image::imageops::crop_imm(&whole, x, y, 24, 24).to_image());
+        assert!((part / of_whole - 1.0).abs() < 0.02, "at {x}, {y}: {part}, in the whole {of_whole}");
+    }
+}
+
 /// The picture of a film has alpha where the film's render would have, and figures do not take the place of a film.
 #[test]
 fn merging_keeps_alpha_and_films() {

@@ -96,6 +96,7 @@ impl<'a> Shot<'a> {
             nits_per_unit: self.settings.nits_per_unit,
             operator: self.operator_name.clone(),
             exposure_stops: self.exposure_stops,
+            fitted: None,
             importance: None,
             denoiser: self.settings.denoiser.as_ref().map(Denoiser::kind),
         }

@@ -134,7 +134,7 @@ impl Job<'_> {
     pub(super) fn frame(&self, number: u32) -> Result<Frame> {
         match self {
             Self::Still(arguments) => {
-                let Prepared { scene, trace, record, settings } = arguments.prepare()?;
+                let Prepared { scene, trace, record, settings, .. } = arguments.prepare()?;
                 let judged_by = ContentHash::of_bytes(format!("{record:?}|{:?}", settings.limits).as_bytes());
                 let header = Header {
                     origin: Origin::of(&scene, &trace),
@@ -143,7 +143,7 @@ impl Job<'_> {
                     visibility: settings.limits.visibility,
                 };
                 let kind = FrameKind::Still(Box::new(settings));
-                Ok(Frame { scene: Arc::new(scene), trace, header, judged_by, kind })
+                Ok(Frame { scene, trace, header, judged_by, kind })
             }
             Self::Shot { shot, .. } => {
                 let of_shot = shot.frame(number, self.track(number)?)?;
@@ -183,7 +183,7 @@ impl Job<'_> {
         let (scene, trace) = match self {
             Self::Still(arguments) => {
                 let Prepared { scene, trace, .. } = arguments.prepare()?;
-                (Arc::new(scene), trace)
+                (scene, trace)
             }
             Self::Shot { shot, .. } => (shot.scene(entry.frame)?, shot.settings.trace_settings(entry.frame)),
         };

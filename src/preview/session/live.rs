@@ -53,6 +53,9 @@ pub(super) fn settings_of(job: &Job, live: &Live) -> Result<LoopSettings, String
         return Err("visibility must be 0 or above and exposure a number".to_owned());
     }
     let limits = Limits { visibility, ..job.limits };
-    let settings = record.loop_settings(limits).map_err(|error| error.to_string())?;
+    let mut settings = record.loop_settings(limits).map_err(|error| error.to_string())?;
+    if let Some(whole) = &job.whole {
+        settings.fit_to(whole);
+    }
     Ok(LoopSettings { importance: job.importance.clone(), gazes: live.gaze.into_iter().collect(), ..settings })
 }

@@ -1,0 +1,60 @@
+//! A small, denoised picture of all that a camera sees: how light the view is, before any of it is rendered.
+//!
+//! For tone operators that must be fitted to more than the picture at hand: to a shot of which it is a frame, to the whole of
+//! which it is a part. Not for output, nor for thresholds.
+
+use super::judge::guide_rgb;
+use super::plan::pilot_plan;
+use crate::film::Film;
+use crate::integrator::{PathTracer, TraceSettings};
+use crate::scene::Scene;
+use fechner_perception::tone::{SceneLight, ToneOperator};
+use std::sync::Arc;
+
+/// Longest side of a glimpse in pixels.
+const LONGEST_SIDE: u32 = 64;
+/// Samples a pixel of a glimpse.
+const SAMPLES: u32 = 16;
+
+/// Looks at all of the picture, whatever part of it the settings ask for: a pure function of scene and settings. Light is what
+/// `operator` asks for; without one, what any may ask for.
+pub fn glimpse(
+    scene: Arc<Scene>,
+    trace: &TraceSettings,
+    nits_per_unit: f64,
+    operator: Option<&dyn ToneOperator>,
+) -> SceneLight {
+    let (width, height) = glimpse_size(trace.width, trace.height);
+    let tracer = PathTracer::new(scene, TraceSettings { width, height, crop: None, ..*trace });
+    let mut film = Film::new(width, height);
+    tracer.trace(&pilot_plan(&film, SAMPLES), &mut film, &|_| {});
+    let rgb_cd_m2 = guide_rgb(&film, &film.estimate(nits_per_unit));
+    match operator {
+        Some(operator) => SceneLight::of(operator, width as usize, &rgb_cd_m2),
+        None => SceneLight::with_rods(width as usize, &rgb_cd_m2),
+    }
+}
+
+fn glimpse_size(width: u32, height: u32) -> (u32, u32) {
+    let longest = width.max(height);
+    let scaled = |side: u32| {
+        if longest <= LONGEST_SIDE {
+            side
+        } else {
+            (u64::from(side) * u64::from(LONGEST_SIDE) / u64::from(longest)).max(1) as u32
+        }
+    };
+    (scaled(width), scaled(height))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn glimpses_keep_the_shape() {
+        assert_eq!(glimpse_size(1920, 1080), (64, 36));
+        assert_eq!(glimpse_size(32, 18), (32, 18));
+        assert_eq!(glimpse_size(4000, 2), (64, 1));
+    }
+}
