@@ -12,6 +12,7 @@ mod info;
 mod job;
 mod json;
 mod keeper;
+mod maps;
 mod merge;
 mod picture;
 mod render;

@@ -5,6 +5,7 @@ use super::console::Console;
 use super::job::{JobArguments, Prepared};
 use super::json::write_json;
 use super::keeper::{CheckpointArguments, Keeper, Watch};
+use super::maps::MapTarget;
 use super::report::{Report, summary};
 use super::targets::check_distinct;
 use super::tev::{Showing, TevArguments};
@@ -29,6 +30,9 @@ pub(super) struct RenderArguments {
     /// Picture to write: .png as the display shows it, .exr with all layers.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
+    /// Write a map in colours beside the picture: samples, threshold or visibility. May be given several times.
+    #[arg(long = "map", value_name = "LAYER=FILE.png", value_parser = MapTarget::parse, help_heading = "Picture")]
+    maps: Vec<MapTarget>,
     /// Write figures of the render here.
     #[arg(long, value_name = "FILE", help_heading = "Running")]
     json: Option<PathBuf>,
@@ -44,11 +48,14 @@ pub(super) struct RenderArguments {
 /// Renders and writes.
 pub(super) fn run(arguments: &RenderArguments) -> anyhow::Result<ExitCode> {
     let format = output::check_target(&arguments.output)?;
-    check_distinct(&[
-        ("-o", Some(&arguments.output)),
+    let mut targets = vec![
+        ("-o", Some(arguments.output.as_path())),
         ("--json", arguments.json.as_deref()),
         ("--checkpoint", arguments.checkpoint.file()),
-    ])?;
+    ];
+    targets.extend(arguments.maps.iter().map(|map| ("--map", Some(map.file()))));
+    check_distinct(&targets)?;
+    arguments.maps.iter().try_for_each(MapTarget::check)?;
     if let Some(json) = &arguments.json {
         output::check_writable(json)?;
     }
@@ -84,6 +91,9 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     let background = arguments.job.background();
     let write = |path: &Path| write_picture(path, format, background, &rendered, &settings, &report);
     write(&arguments.output).map_err(|error| kept_elsewhere(&arguments.output, write, error))?;
+    for map in &arguments.maps {
+        eprintln!("{}", map.write(&rendered, settings.limits.visibility)?);
+    }
     if let Some(path) = &arguments.json {
         write_json(path, &report)?;
     }

@@ -9,6 +9,7 @@
 mod beside;
 mod exr_file;
 mod exr_header;
+pub mod false_colour;
 mod png_file;
 pub mod rendered;
 mod srgb_codes;
@@ -16,8 +17,8 @@ mod srgb_codes;
 pub use beside::{remove_leftovers, write_beside};
 pub use exr_file::write_exr;
 pub use png_file::{
-    PngTransfer, decode_pq, encode_srgb8, png_transfer, write_png, write_png_for, write_png_with_alpha_for,
-    write_pq_png,
+    PngTransfer, decode_pq, encode_srgb8, png_transfer, write_codes_png, write_png, write_png_for,
+    write_png_with_alpha_for, write_pq_png,
 };
 
 use fechner_perception::tone::FittedTone;

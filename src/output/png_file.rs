@@ -132,6 +132,12 @@ pub fn write_png(path: &Path, width: u32, height: u32, rgb_linear_display: &[[f3
     write_bytes(path, width, height, png::ColorType::Rgb, &encode_srgb8(width, rgb_linear_display))
 }
 
+/// Writes 8-bit sRGB codes, RGB after RGB, as they are.
+pub fn write_codes_png(path: &Path, width: u32, height: u32, rgb8: &[u8]) -> Result<(), OutputError> {
+    check_size(path, width, height, &[("the picture", rgb8.len() / 3)])?;
+    write_bytes(path, width, height, png::ColorType::Rgb, rgb8)
+}
+
 /// [`write_png_for`] with an alpha in [0, 1] a pixel, by which the colours are not multiplied.
 pub fn write_png_with_alpha_for(
     path: &Path,

@@ -1,7 +1,8 @@
 //! From colours to the bytes that viewers are sent, beside the render where it has threads for that.
 
-use super::layer::{Colours, Layer};
+use super::layer::Layer;
 use super::shared::{Encoded, Shared};
+use crate::output::false_colour::Colours;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 use std::panic::{AssertUnwindSafe, catch_unwind};

@@ -2,7 +2,7 @@
 
 use super::coarse::stand_in;
 use super::frame::{Encoding, Frame};
-use super::layer::{self, Colours, Layer};
+use super::layer::{self, Layer};
 use super::shared::Shared;
 use super::spectator::{Shown, Spectator};
 use crate::adaptive::judge::Judgement;
@@ -11,6 +11,7 @@ use crate::adaptive::statistics::picture_variance;
 use crate::film::Film;
 use crate::integrator::PILOT_SAMPLES;
 use crate::output::encode_srgb8;
+use crate::output::false_colour::{self, Colours};
 use crate::sampler::Half;
 use fechner_perception::Plane;
 use fechner_perception::tone::{FittedTone, SavedTone, SceneLight, map_picture};
@@ -233,16 +234,18 @@ impl Screen {
             (Layer::Picture, _) => self.picture(scenery, rgb_cd_m2),
             (Layer::Samples, _) => {
                 let counts = Plane::from_fn(width, height, |x, y| film.samples(y * width + x) as f32);
-                layer::logarithmic(&counts, "samples")
+                false_colour::logarithmic(&counts, "samples")
             }
-            (Layer::Threshold, Some(looked)) => layer::logarithmic(&looked.threshold, "cd/m²"),
-            (Layer::Visibility, Some(looked)) => layer::visibility(&looked.visibility, settings.limits.visibility),
+            (Layer::Threshold, Some(looked)) => false_colour::logarithmic(&looked.threshold, "cd/m²"),
+            (Layer::Visibility, Some(looked)) => {
+                false_colour::visibility(&looked.visibility, settings.limits.visibility)
+            }
             (Layer::Threshold | Layer::Visibility, None) => layer::nothing_yet(film),
             (Layer::Variance, _) => {
-                layer::logarithmic(&picture_variance(film, settings.nits_per_unit), "(cd/m²)², of the scene")
+                false_colour::logarithmic(&picture_variance(film, settings.nits_per_unit), "(cd/m²)², of the scene")
             }
             (Layer::HalfDifference, _) => {
-                layer::signed(&film.estimate(settings.nits_per_unit).half_difference, "cd/m², of the scene")
+                false_colour::signed(&film.estimate(settings.nits_per_unit).half_difference, "cd/m², of the scene")
             }
             (Layer::Albedo, _) => layer::albedo(film),
             (Layer::Normal, _) => layer::normal(film),

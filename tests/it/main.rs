@@ -16,6 +16,7 @@
 //! - `mutations`: thousands of damaged files a format, in a child process (ignored)
 //! - `scene_table`: scenes of others: how long until nothing is seen (ignored)
 //! - `relief`: height maps: normals, energy, every format
+//! - `maps`: false-colour maps beside a picture
 //! - `overscan`: files whose data reach beyond what is to be shown
 //! - `reprojection`: velocity maps against rendered frames
 //! - `references`: scenes of others beside reference pictures (ignored)
@@ -50,6 +51,7 @@ mod furnace;
 mod importance;
 mod kill;
 mod load_assets;
+mod maps;
 mod mitsuba_format;
 mod mutations;
 mod no_allocation;

@@ -1,0 +1,47 @@
+//! Maps beside a picture: `render --map LAYER=FILE`.
+
+use assert_cmd::Command;
+use std::path::Path;
+
+fn render(arguments: &[&str], folder: &Path) -> std::process::Output {
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml");
+    let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+    command.arg("render").arg(scene).args(["--size", "24x16"]).args(arguments).current_dir(folder);
+    command.output().expect("runs")
+}
+
+/// Where counts are even the map has one colour; at a target far above what is left all is blue, far below it nothing is.
+#[test]
+fn maps_show_counts_and_what_can_be_seen() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let map = |name: &str, more: &[&str]| {
+        let asked = format!("{name}=map.png");
+        let run = render(&[&["-o", "a.png", "--map", &asked][..], more].concat(), folder.path());
+        let said = String::from_utf8_lossy(&run.stderr).into_owned();
+        assert!(run.status.success() && said.contains("map.png: "), "{said}");
+        image::open(folder.path().join("map.png")).expect("a picture").into_rgb8()
+    };
+    let even = map("samples", &["--sampling", "uniform", "--spp", "16"]);
+    assert_eq!((even.width(), even.height()), (24, 16));
+    assert!(even.pixels().all(|pixel| pixel == even.get_pixel(0, 0)));
+    let is_blue = |picture: &image::RgbImage| picture.pixels().all(|pixel| pixel.0[0] == 0);
+    assert!(is_blue(&map("visibility", &["--visibility", "1000"])));
+    assert!(!is_blue(&map("visibility", &["--visibility", "0.01", "--spp", "16"])));
+    map("threshold", &["--spp", "16"]);
+}
+
+#[test]
+fn maps_that_cannot_be_are_refused_before_the_picture() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (asked, words) in [
+        ("heat=a.png", "a layer among samples, threshold, visibility"),
+        ("samples", "expected LAYER=FILE.png"),
+        ("samples=b.exr", "end the name in .png"),
+        ("samples=a.png", "-o and --map name the same file"),
+    ] {
+        let run = render(&["-o", "a.png", "--map", asked], folder.path());
+        let said = String::from_utf8_lossy(&run.stderr).into_owned();
+        assert!(run.status.code() == Some(2) && said.contains(words), "{asked}: {said}");
+        assert_eq!(std::fs::read_dir(folder.path()).expect("there").count(), 0, "{asked}");
+    }
+}
