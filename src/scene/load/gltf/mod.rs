@@ -32,6 +32,10 @@ const MOST_OBLONG: f32 = 100.0;
 
 /// Reads a glTF or GLB file.
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
+    read(path, options)?.finish(path, IfDark::Studio, options)
+}
+
+fn read(path: &Path, options: &LoadOptions) -> Result<Builder, LoadError> {
     let bytes = files::read(path)?;
     let container = buffers::split(path, &bytes)?;
     let mut builder = Builder::new(path, options);
@@ -65,6 +69,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
         reader.node(&node, &matrices)?;
     }
     if let Some(first) = document.animations().next() {
+        builder.at_another_time = Some(read);
         let count = document.animations().count();
         let name = first.name().map_or_else(String::new, |name| format!(" \"{name}\""));
         let blur = match options.shutter_s > 0.0 {
@@ -76,7 +81,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
         };
         builder.note(format!("Animation{name} (1 of {count}) at {} s; {blur}.", options.frame_time));
     }
-    builder.finish(path, IfDark::Studio, options)
+    Ok(builder)
 }
 
 struct Reader<'a> {

@@ -69,6 +69,7 @@ impl Reader<'_> {
                 self.times = [start as f32, end as f32];
             }
             "ActiveTransform" => {
+                self.builder.at_another_time = Some(super::read);
                 self.state.active = match lexer.next()? {
                     Some((Token::Word("StartTime"), _)) => [true, false],
                     Some((Token::Word("EndTime"), _)) => [false, true],

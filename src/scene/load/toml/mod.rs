@@ -43,6 +43,10 @@ struct TextureEntry {
 
 /// Reads a scene file.
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
+    read(path, options)?.finish(path, IfDark::Fail, options)
+}
+
+fn read(path: &Path, options: &LoadOptions) -> Result<Builder, LoadError> {
     let text = files::read_text(path)?;
     let source = Source { file: path, text: &text };
     let snapshots = animated::snapshots(&source, options.frame_time)?;
@@ -113,7 +117,10 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
             context.builder.lights.push(light::read(&value, context.builder.nits_per_unit)?);
         }
     }
-    context.builder.finish(path, IfDark::Fail, options)
+    if objects.any_moves() {
+        context.builder.at_another_time = Some(read);
+    }
+    Ok(context.builder)
 }
 
 fn read_film(value: &Value) -> Result<FilmDefaults, LoadError> {

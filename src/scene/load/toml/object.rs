@@ -17,6 +17,7 @@ pub(super) struct Objects<'m, 'a> {
     /// By path and whether its own materials are used.
     files: HashMap<(PathBuf, bool), Vec<(MeshId, MaterialId)>>,
     read: usize,
+    any_moves: bool,
 }
 
 /// What every object has.
@@ -29,7 +30,12 @@ struct Placement {
 
 impl<'m, 'a> Objects<'m, 'a> {
     pub(super) fn new(materials: &'m Materials<'a>) -> Self {
-        Self { materials, files: HashMap::new(), read: 0 }
+        Self { materials, files: HashMap::new(), read: 0, any_moves: false }
+    }
+
+    /// Whether an object that was read has keyframes.
+    pub(super) fn any_moves(&self) -> bool {
+        self.any_moves
     }
 
     /// Reads one object.
@@ -52,6 +58,7 @@ impl<'m, 'a> Objects<'m, 'a> {
         let mut to_world = fields.get_or("transform", Affine3A::IDENTITY, motion::transform)?;
         let mut moves = None;
         if let Some(keyframes) = fields.get_some("keyframes", motion::object_keyframes)? {
+            self.any_moves = true;
             moves = keyframes.motion(to_world, context.shutter);
             to_world = keyframes.at(context.shutter.opens) * to_world;
         }

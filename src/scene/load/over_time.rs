@@ -1,0 +1,98 @@
+//! What one file holds at different times: the same things under the same numbers, seen and lit in the same way, where nothing in
+//! the file changes that.
+
+use super::{LoadError, LoadOptions, load};
+use crate::scene::Scene;
+use glam::Quat;
+use std::path::PathBuf;
+
+/// A file in a folder of its own, read at any time.
+struct File {
+    folder: tempfile::TempDir,
+    path: PathBuf,
+}
+
+impl File {
+    fn new(name: &str, text: &str) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).expect("written");
+        Self { folder, path }
+    }
+
+    /// A glTF file beside a buffer of floats: a unit triangle, the times 0, 1 and 2 s, then `values`.
+    fn gltf(nodes: &str, rest: &str, values: &[f32]) -> Self {
+        let text = format!(
+            r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0,1]}}],"nodes":[{nodes}],{rest},
+"cameras":[{{"type":"perspective","perspective":{{"yfov":0.7,"znear":0.1}}}}],
+"buffers":[{{"byteLength":{bytes},"uri":"a.bin"}}],"bufferViews":[{{"buffer":0,"byteLength":36}},
+{{"buffer":0,"byteOffset":36,"byteLength":12}},{{"buffer":0,"byteOffset":48,"byteLength":{of_values}}}]}}"#,
+            bytes = 48 + 4 * values.len(),
+            of_values = 4 * values.len(),
+        );
+        let file = Self::new("a.gltf", &text);
+        let fixed = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 2.0];
+        let bytes: Vec<u8> = fixed.iter().chain(values).flat_map(|number| number.to_le_bytes()).collect();
+        std::fs::write(file.folder.path().join("a.bin"), bytes).expect("written");
+        file
+    }
+
+    fn try_at(&self, seconds: f64) -> Result<Scene, LoadError> {
+        load(&self.path, &LoadOptions { frame_time: seconds, ..LoadOptions::default() })
+    }
+
+    fn at(&self, seconds: f64) -> Scene {
+        self.try_at(seconds).unwrap_or_else(|error| panic!("{error}"))
+    }
+}
+
+/// What a glTF file has beside its nodes where the third view holds three values a key of `path` of node 0 or 1.
+fn animated(node: usize, path: &str, kind: &str, interpolation: &str) -> String {
+    format!(
+        r#""meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}}}}]}}],
+"animations":[{{"channels":[{{"sampler":0,"target":{{"node":{node},"path":"{path}"}}}}],
+"samplers":[{{"input":1,"output":2,"interpolation":"{interpolation}"}}]}}],
+"accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}},
+{{"bufferView":1,"componentType":5126,"count":3,"type":"SCALAR","min":[0],"max":[2]}},
+{{"bufferView":2,"componentType":5126,"count":3,"type":"{kind}"}}]"#
+    )
+}
+
+const TOML: &str = r#"
+[camera]
+position = [0, 0, 5]
+look_at = [0, 0, 0]
+[materials.white]
+type = "diffuse"
+reflectance = 0.5
+"#;
+
+const LIT: &str = "[environment]\nluminance_cd_m2 = 100\n";
+
+/// The studio that stands in for light stays where it is when the camera turns: a wall in front of it went from 613 to 901 cd/m².
+#[test]
+fn a_studio_does_not_turn_with_the_camera() {
+    let turns: Vec<f32> = [0.0_f32, 1.0, 2.0].iter().flat_map(|a| Quat::from_rotation_y(*a).to_array()).collect();
+    let file = File::gltf(r#"{"mesh":0},{"camera":0}"#, &animated(1, "rotation", "VEC4", "LINEAR"), &turns);
+    let [first, later] = [0.0, 1.5].map(|time| file.at(time));
+    assert!(first.camera.forward.distance(later.camera.forward) > 1.0, "it turns");
+    let [first, later] = [first, later].map(|scene| scene.environment.expect("a studio"));
+    assert!(first.texels == later.texels && first.from_world == later.from_world);
+}
+
+/// A file without a camera is seen by one that stands still, whatever flies away.
+#[test]
+fn the_default_view_stands_still() {
+    let file = File::gltf(
+        r#"{"mesh":0},{"mesh":0}"#,
+        &animated(1, "translation", "VEC3", "LINEAR"),
+        &[1.0, 0.0, 0.0, 4.0, 0.0, 0.0, 9.0, 0.0, 0.0],
+    );
+    let toml = "[materials.white]\ntype = \"diffuse\"\nreflectance = 0.5\n[environment]\nluminance_cd_m2 = 100\n\
+                [[objects]]\nsphere = { center = [0, 0, 0], radius = 1 }\nmaterial = \"white\"\n\
+                keyframes = [ { time = 0 }, { time = 2, translate = [9, 0, 0] } ]\n";
+    for file in [file, File::new("a.toml", toml)] {
+        let [first, later] = [0.0, 1.5].map(|time| file.at(time).camera);
+        assert_eq!((first.position, first.forward), (later.position, later.forward), "{}", file.path.display());
+    }
+}
