@@ -164,7 +164,11 @@ impl<'a> Reader<'a> {
             for primitive in mesh.primitives() {
                 if let Some(converted) = self.primitive(mesh, &primitive)? {
                     let material = self.materials.get(self.builder, &primitive.material())?;
-                    parts.push((self.builder.add_mesh(converted), material));
+                    let mesh = self.builder.add_mesh(converted);
+                    if primitive.morph_targets().next().is_some() {
+                        self.builder.deforming.insert(mesh);
+                    }
+                    parts.push((mesh, material));
                 }
             }
             self.meshes.insert(mesh.index(), parts);
@@ -191,7 +195,9 @@ impl<'a> Reader<'a> {
                 deform::skin(self.buffers, &primitive, joints, &mut converted)?;
             }
             let material = self.materials.get(self.builder, &primitive.material())?;
-            parts.push((self.builder.add_mesh(converted), material));
+            let mesh = self.builder.add_mesh(converted);
+            self.builder.deforming.insert(mesh);
+            parts.push((mesh, material));
         }
         // A skin's vertices are in world space already: the node's own transform does not count.
         self.place_parts(&parts, name, if joints.is_some() { Affine3A::IDENTITY } else { to_world }, None)
