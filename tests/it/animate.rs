@@ -347,6 +347,21 @@ fn sequences_are_compared_as_they_move() {
     assert!(status == Some(2) && said.contains("missing of b.##.exr"), "{said}");
 }
 
+/// A lamp that is off at first: black frames, and light in the later ones.
+#[test]
+fn a_shot_may_begin_in_the_dark() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let glow = "keyframes = [ { time = 0, emission = [0, 0, 0] }, { time = 0.05, emission = [0, 0, 0] }, { time = 0.1, emission = [8, 8, 8] } ]";
+    let scene = SCENE.replace("emission = [8, 8, 8]", glow);
+    animate_scene(folder.path(), &scene, &["--frames", "0..2", "--spp", "16", "-o", "a.##.png"]);
+    let brightest = |frame: u32| {
+        let picture = image::open(folder.path().join(format!("a.0{frame}.png"))).expect("a picture").to_rgb8();
+        picture.pixels().map(|pixel| pixel.0[1]).max()
+    };
+    assert_eq!(brightest(0), Some(0));
+    assert!(brightest(2) > Some(100));
+}
+
 /// The operator is fitted to whichever sequence holds the scene's light, as for stills: which of them is the reference changes
 /// little.
 #[test]

@@ -33,6 +33,8 @@ pub(super) enum IfDark {
     Studio,
     /// The same, but the file's own lights are believed however weak they are.
     StudioWithoutLight,
+    /// There is light at other times: the picture is black.
+    Stay,
 }
 
 /// Emitters of interchange files below this many cd/m² are decoration (an "emissive" left at 1), not the scene's light.
@@ -251,14 +253,14 @@ fn at_start(read: Option<Read>, path: &Path, options: &LoadOptions) -> Result<Op
 /// Emitters weaker than this radiance are not the scene's light.
 fn weakest_light(if_dark: IfDark, nits_per_unit: f64) -> f32 {
     match if_dark {
-        IfDark::Fail | IfDark::StudioWithoutLight => 0.0,
+        IfDark::Fail | IfDark::StudioWithoutLight | IfDark::Stay => 0.0,
         IfDark::Studio => WEAK_EMITTER_CD_M2 / nits_per_unit as f32,
     }
 }
 
 /// Whether a scene has no light and its format allows a studio to stand in.
 fn needs_studio(scene: &Scene, path: &Path, if_dark: IfDark) -> Result<bool, LoadError> {
-    if is_lit(scene, weakest_light(if_dark, scene.nits_per_unit)) {
+    if if_dark == IfDark::Stay || is_lit(scene, weakest_light(if_dark, scene.nits_per_unit)) {
         return Ok(false);
     }
     if if_dark == IfDark::Fail {

@@ -2,8 +2,8 @@
 //! the file changes that.
 
 use super::{LoadError, LoadOptions, load};
-use crate::scene::Scene;
-use glam::Quat;
+use crate::scene::{Light, Scene};
+use glam::{Quat, Vec3};
 use std::path::PathBuf;
 
 /// A file in a folder of its own, read at any time.
@@ -130,5 +130,25 @@ fn the_default_view_stands_still() {
     for file in [file, File::new("a.toml", toml)] {
         let [first, later] = [0.0, 1.5].map(|time| file.at(time).camera);
         assert_eq!((first.position, first.forward), (later.position, later.forward), "{}", file.path.display());
+    }
+}
+
+/// A lamp may be off for a while; a scene without one is still refused.
+#[test]
+fn light_may_come_at_another_time() {
+    let object = "[[objects]]\nsphere = { center = [0, 0, 0], radius = 1 }\nmaterial = \"white\"\n";
+    let point =
+        |strength: &str| format!("{TOML}{object}[[lights]]\ntype = \"point\"\nposition = [0, 3, 0]\n{strength}\n");
+    let fades = "keyframes = [ { time = 0, intensity_cd = 0 }, { time = 1, intensity_cd = 50 } ]";
+    let dark = File::new("a.toml", &point(fades)).at(0.0);
+    assert!(matches!(dark.lights[..], [Light::Point { intensity: Vec3::ZERO, .. }]) && dark.environment.is_none());
+    let lamp = |emission: &str| {
+        let lamp = format!("[materials.lamp]\ntype = \"diffuse\"\nreflectance = 0.5\n{emission}\n");
+        format!("{TOML}{lamp}{}", object.replace("white", "lamp"))
+    };
+    File::new("a.toml", &lamp("keyframes = [ { time = 0, power_lm = 0 }, { time = 1, power_lm = 800 } ]")).at(0.0);
+    for unlit in [point("intensity_cd = 0"), lamp("emission_cd_m2 = 0")] {
+        let said = File::new("a.toml", &unlit).try_at(0.0).expect_err("no light at any time").to_string();
+        assert!(said.contains("no light"), "{said}");
     }
 }
