@@ -152,3 +152,41 @@ fn light_may_come_at_another_time() {
         assert!(said.contains("no light"), "{said}");
     }
 }
+
+/// Rotations go the way and as far as they are written, also while the shutter is open.
+#[test]
+fn turns_go_as_far_as_they_are_written() {
+    let turning = |keyframes: &str, shutter_s: f64| {
+        let text = format!(
+            "{}{LIT}[[objects]]\nbox = {{ min = [0, 0, 0], max = [1, 1, 1] }}\nmaterial = \"white\"\nkeyframes = {keyframes}\n",
+            TOML.replace("look_at = [0, 0, 0]", &format!("look_at = [0, 0, 0]\nshutter_s = {shutter_s}"))
+        );
+        File::new("a.toml", &text)
+    };
+    let about_y = |from: f64, to: f64| {
+        format!(
+            "[ {{ time = 0, rotate_deg = {from}, axis = [0, 1, 0] }}, {{ time = 1, rotate_deg = {to}, axis = [0, 1, 0] }} ]"
+        )
+    };
+    for (from, to) in [(0.0, 90.0), (0.0, 190.0), (0.0, 270.0), (0.0, 360.0), (30.0, -690.0)] {
+        let still = turning(&about_y(from, to), 0.0);
+        let open = turning(&about_y(from, to), 1.0).at(0.0);
+        let motion = open.instances[0].motion.as_ref().expect("it moves");
+        for share in [0.0_f32, 0.1, 0.3, 0.5, 0.85, 1.0] {
+            let degrees = from + (to - from) * f64::from(share);
+            let expected = Quat::from_rotation_y(degrees.to_radians() as f32) * Vec3::X;
+            let at_rest = still.at(f64::from(share)).instances[0].to_world.transform_vector3(Vec3::X);
+            let meanwhile = motion.at(share).transform_vector3(Vec3::X);
+            assert!(at_rest.distance(expected) < 1e-4, "{from} to {to} at {share}: {at_rest}, not {expected}");
+            assert!(meanwhile.distance(expected) < 1e-4, "{from} to {to} at {share}: {meanwhile}, not {expected}");
+        }
+    }
+    let two_axes = |degrees: f64| {
+        format!(
+            "[ {{ time = 0, rotate_deg = 10, axis = [0, 1, 0] }}, {{ time = 1, rotate_deg = {degrees}, axis = [1, 0, 0] }} ]"
+        )
+    };
+    turning(&two_axes(90.0), 0.0).at(0.5);
+    let said = turning(&two_axes(200.0), 0.0).try_at(0.5).expect_err("either way is as good").to_string();
+    assert!(said.contains("half a turn"), "{said}");
+}
