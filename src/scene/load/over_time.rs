@@ -69,6 +69,50 @@ reflectance = 0.5
 
 const LIT: &str = "[environment]\nluminance_cd_m2 = 100\n";
 
+/// Whether everything in the file has one number, and each mesh as many triangles, at all of these times.
+fn is_numbered_alike(file: &File, times: &[f64]) {
+    let numbers = |scene: &Scene| {
+        let instances = scene.instances.iter().map(|instance| instance.name.clone());
+        let spheres = scene.spheres.iter().map(|sphere| sphere.name.clone());
+        (instances.collect::<Vec<_>>(), spheres.collect::<Vec<_>>())
+    };
+    let first = numbers(&file.at(times[0]));
+    for &time in &times[1..] {
+        assert_eq!(numbers(&file.at(time)), first, "at {time} s");
+    }
+}
+
+/// glTF's way to hide a thing is a scale of 0. Before, whatever came after it was renumbered, and so had velocities of other things:
+/// 20.6 pixels instead of 0.9.
+#[test]
+fn what_is_hidden_keeps_its_number() {
+    let scales = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0];
+    let nodes = r#"{"mesh":0,"name":"hidden"},{"mesh":0,"name":"after it"}"#;
+    let file = File::gltf(nodes, &animated(0, "scale", "VEC3", "STEP"), &scales);
+    is_numbered_alike(&file, &[0.0, 1.0, 2.0]);
+    let hidden = file.at(1.0);
+    assert!(hidden.meshes[hidden.instances[0].mesh.0 as usize].triangles.is_empty());
+    assert_eq!(hidden.meshes[hidden.instances[1].mesh.0 as usize].triangles.len(), 1);
+
+    let through_nothing = r#"
+[[objects]]
+name = "box"
+box = { min = [0, 0, 0], max = [1, 1, 1] }
+material = "white"
+keyframes = [ { time = 0, scale = 1 }, { time = 1, scale = -1 } ]
+[[objects]]
+name = "ball"
+sphere = { center = [0, 0, 0], radius = 1 }
+material = "white"
+keyframes = [ { time = 0, scale = 1 }, { time = 1, scale = -1 } ]
+[[objects]]
+name = "wall"
+box = { min = [2, 0, 0], max = [3, 1, 1] }
+material = "white"
+"#;
+    is_numbered_alike(&File::new("a.toml", &format!("{TOML}{LIT}{through_nothing}")), &[0.0, 0.5, 1.0]);
+}
+
 /// A frame in which everything is hidden shows nothing; a file that holds nothing is still refused.
 #[test]
 fn everything_may_be_hidden_for_a_while() {
@@ -85,6 +129,31 @@ fn everything_may_be_hidden_for_a_while() {
     let flat = flat + "transform = [ { scale = [1e-30, 1e-30, 1e-30] } ]\n";
     let said = File::new("a.toml", &flat).try_at(1.0).expect_err("nothing is there").to_string();
     assert!(said.contains("nothing to render"), "{said}");
+}
+
+/// A sphere that is squashed later is a mesh from the start.
+#[test]
+fn a_sphere_or_a_mesh_is_one_at_all_times() {
+    let squashed = r#"
+[[objects]]
+name = "squashed"
+sphere = { center = [0, 0, 0], radius = 1 }
+material = "white"
+keyframes = [ { time = 1, scale = 1 }, { time = 2, scale = [1.3, 0.7, 1.3] } ]
+[[objects]]
+name = "mirrored"
+sphere = { center = [0, 0, 0], radius = 1 }
+material = "white"
+keyframes = [ { time = 1, scale = 1 }, { time = 2, scale = [1, 1, -1] } ]
+[[objects]]
+name = "round"
+sphere = { center = [3, 0, 0], radius = 1 }
+material = "white"
+keyframes = [ { time = 1, scale = 1 }, { time = 2, scale = 2 } ]
+"#;
+    let file = File::new("a.toml", &format!("{TOML}{LIT}{squashed}"));
+    is_numbered_alike(&file, &[0.0, 1.25, 3.0]);
+    assert_eq!(file.at(0.0).spheres.len(), 1);
 }
 
 /// Triangles that a morph target flattens keep their numbers. Before, a face at rest had 26.8 pixels of motion.
@@ -151,6 +220,23 @@ fn light_may_come_at_another_time() {
         let said = File::new("a.toml", &unlit).try_at(0.0).expect_err("no light at any time").to_string();
         assert!(said.contains("no light"), "{said}");
     }
+}
+
+fn pbrt(shutter: &str, times: &str, moves: &str, shape: &str) -> File {
+    let text = format!(
+        "TransformTimes {times}\nLookAt 0 0 6 0 0 0 0 1 0\nCamera \"perspective\" {shutter}\nWorldBegin\n\
+         LightSource \"infinite\" \"rgb L\" [1 1 1]\nActiveTransform EndTime\n{moves}\nActiveTransform All\n{shape}\n"
+    );
+    File::new("a.pbrt", &text)
+}
+
+/// A sphere that the end of its transform makes an ellipsoid is a mesh: as a sphere it grew in all directions.
+#[test]
+fn a_sphere_of_pbrt_that_is_squashed_is_a_mesh() {
+    let sphere = "Shape \"sphere\" \"float radius\" 0.4";
+    let squashed = pbrt("", "0 1", "Scale 4 1 1", sphere).at(0.0);
+    assert!(squashed.spheres.is_empty() && squashed.instances[0].motion.is_some());
+    assert_eq!(pbrt("", "0 1", "Scale 4 4 4", sphere).at(0.0).spheres.len(), 1);
 }
 
 /// Rotations go the way and as far as they are written, also while the shutter is open.
