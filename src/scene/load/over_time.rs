@@ -239,6 +239,30 @@ fn a_sphere_of_pbrt_that_is_squashed_is_a_mesh() {
     assert_eq!(pbrt("", "0 1", "Scale 4 4 4", sphere).at(0.0).spheres.len(), 1);
 }
 
+/// The shutter may open before and close after `TransformTimes`, beyond which everything rests.
+#[test]
+fn motion_of_pbrt_ends_where_its_times_do() {
+    let shutter = "\"float shutteropen\" 0 \"float shutterclose\" 1";
+    let scene = pbrt(shutter, "0.25 0.5", "Translate 3 0 0", "Shape \"sphere\"").at(0.0);
+    let motion = scene.spheres[0].motion.as_ref().expect("it moves");
+    for (share, x) in [(0.0, 0.0), (0.25, 0.0), (0.375, 1.5), (0.5, 3.0), (1.0, 3.0)] {
+        let moved = motion.at(share).transform_point3(scene.spheres[0].center) - scene.spheres[0].center;
+        assert!((moved.x - x).abs() < 1e-4, "{share}: {moved}");
+    }
+}
+
+/// Times of day in seconds: an f32 of 28 hours counts by 1/128 s, and 24 frames a second moved by fits and starts.
+#[test]
+fn late_times_are_as_fine_as_early_ones() {
+    let still = "\"float shutteropen\" 0 \"float shutterclose\" 0";
+    let file = pbrt(still, "100000 100010", "Translate 10 0 0", "Shape \"sphere\"");
+    for frame in 0..20 {
+        let seconds = f64::from(frame) / 24.0;
+        let x = f64::from(file.at(1e5 + seconds).spheres[0].center.x);
+        assert!((x - seconds).abs() < 1e-5, "{x}, not {seconds}");
+    }
+}
+
 /// Rotations go the way and as far as they are written, also while the shutter is open.
 #[test]
 fn turns_go_as_far_as_they_are_written() {

@@ -66,7 +66,7 @@ impl Reader<'_> {
             }
             "TransformTimes" => {
                 let [start, end] = numbers(lexer, line)?;
-                self.times = [start as f32, end as f32];
+                self.times = [start, end];
             }
             "ActiveTransform" => {
                 self.builder.at_another_time = Some(super::read);

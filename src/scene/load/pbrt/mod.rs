@@ -99,7 +99,7 @@ struct Reader<'a> {
     camera: Option<(String, Parameters, Transforms)>,
     film: Option<(String, Parameters)>,
     /// `TransformTimes`.
-    times: [f32; 2],
+    times: [f64; 2],
     /// When the shutter opens and closes.
     shutter: [f32; 2],
     /// The sensor's factor.
