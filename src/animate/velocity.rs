@@ -1,12 +1,13 @@
 //! Velocity maps: where the surface point that a pixel shows was one frame ago, and where it will be.
 //!
 //! Exact: the point keeps its place on its triangle or sphere, and the other frames' scenes and cameras say where that is,
-//! whatever moved it (camera, object, skin, morph). Backgrounds turn with the camera. Mirrors and glass have the motion of their
+//! whatever moved it (camera, object, skin, morph). Backgrounds turn with the camera and with their own pictures. Surfaces that
+//! blend are there where they cover half or more. Mirrors and glass have the motion of their
 //! own surface, or, by [`VelocityMap::of_images`], that of what they show.
 
 mod image;
 
-use crate::geometry::{Hit, Ray};
+use crate::geometry::{Coverage, Hit, Ray};
 use crate::integrator::{CameraRays, CameraSample, Crop, PathTracer};
 use crate::scene::{Camera, Scene, SpherePlace};
 use glam::{Vec2, Vec3, Vec3A};
@@ -103,7 +104,8 @@ impl Target {
 
 /// As the shutter opens, through the middle of the lens: what is out of focus moves as its centre does.
 fn ray_through(camera: &CameraRays, position_px: Vec2) -> Ray {
-    camera.ray(&CameraSample { position_px, lens: [0.5, 0.5], time: 0.0 })
+    let ray = camera.ray(&CameraSample { position_px, lens: [0.5, 0.5], time: 0.0 });
+    Ray { coverage: Coverage::ByHalf, ..ray }
 }
 
 fn seen_at(tracer: &PathTracer, camera: &CameraRays, position_px: Vec2) -> Seen {
