@@ -140,6 +140,7 @@ fn what_a_run_would_make_otherwise_is_not_there() {
     assert!(!said.contains("is there"), "{said}");
     let said = both("16", "a.##.png");
     assert!(!said.contains("is there"), "the records are those of the .exr files: {said}");
+    assert!(said.contains("a.00.png: its record is that of a.00.exr, made anew"), "{said}");
     // The second frame is of other settings.
     let said = first("17");
     assert!(said.contains("1 frames of the shot are not there yet"), "{said}");
