@@ -281,6 +281,7 @@ fn bad_arguments_are_named() {
         (&["--frames", "0..2", "-o", "a.png"], "a sequence's name has #"),
         (&["--frames", "0..2", "--shot", "1..2", "-o", "a.#.png"], "--frames reaches beyond --shot"),
         (&["--frames", "0..2", "-o", "a.#.png", "--video", "a.gif"], "videos end in .y4m or .mp4"),
+        (&["--frames", "0..2", "-o", "a.#.png", "--video", "a.mp4/"], "this is a folder's name"),
         (&["--frames", "0..2", "-o", "a.#.png", "--video", "no/such.y4m"], "the folder no does not exist"),
         (&["--frames", "0..2", "-o", "a.#.png", "--operator", "sepia"], "no tone operator"),
         (&["--frames", "0..2", "-o", "a.#.png", "--fps", "0.1"], "between 1 and 1000"),
