@@ -349,6 +349,29 @@ fn sequences_are_compared_as_they_move() {
     assert!(status == Some(2) && said.contains("missing of b.##.exr"), "{said}");
 }
 
+/// A table of another shot's frames is a slip where the eye is to follow it.
+#[test]
+fn a_gaze_table_says_something_of_the_shot() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    std::fs::write(at.join("scene.toml"), SCENE).expect("written");
+    let say = |table: &str, eye: &str| {
+        std::fs::write(at.join("gaze.csv"), table).expect("written");
+        let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+        let asked = ["--frames", "0..1", "--spp", "16", "--gaze", "gaze.csv", "--eye", eye, "-o", "a.##.png"];
+        let output = command.current_dir(at).args(["animate", "scene.toml"]).args(asked).output().expect("it starts");
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    for table in ["100,4,8\n101,4,8\n", "0,1e6,8\n", "frame,x,y\n"] {
+        let (status, said) = say(table, "gaze");
+        assert!(status == Some(2) && said.contains("says nothing of frames 0 to 1"), "{table}: {said}");
+    }
+    let (status, said) = say("100,4,8\n", "none");
+    assert!(status == Some(0) && said.contains("says of 0 of 2 frames"), "{said}");
+    let (status, said) = say("\u{feff}0,4,8\n1,4,8\n", "gaze");
+    assert!(status == Some(0) && !said.contains("says of"), "{said}");
+}
+
 /// A lamp that is off at first: black frames, and light in the later ones.
 #[test]
 fn a_shot_may_begin_in_the_dark() {
