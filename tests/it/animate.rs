@@ -349,6 +349,18 @@ fn sequences_are_compared_as_they_move() {
     assert!(status == Some(2) && said.contains("missing of b.##.exr"), "{said}");
 }
 
+/// The largest number of a frame, after which there is none.
+#[test]
+fn the_last_frames_are_compared() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    animate(at, &["--frames", "4294967294..4294967295", "--spp", "16", "-o", "a.##.exr"]);
+    let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+    let output = command.current_dir(at).args(["compare", "a.##.exr", "a.##.exr", "--fps", "24"]).output();
+    let output = output.expect("it starts");
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
 /// A table of another shot's frames is a slip where the eye is to follow it.
 #[test]
 fn a_gaze_table_says_something_of_the_shot() {
