@@ -30,6 +30,8 @@ impl GazeTrack {
     /// [`GazeError`] for the first line that cannot be understood.
     pub fn parse(table: &str) -> Result<Self, GazeError> {
         let mut track = Self::default();
+        // Spreadsheets begin UTF-8 with a mark of its byte order, which no trim takes for space.
+        let table = table.strip_prefix('\u{feff}').unwrap_or(table);
         for (index, whole) in table.lines().enumerate() {
             let text = whole.split('#').next().unwrap_or_default().trim();
             let is_head = index == 0 && text.replace(' ', "").eq_ignore_ascii_case("frame,x,y");
@@ -72,6 +74,8 @@ mod tests {
         assert_eq!(track.of_frame(3, 640, 480), [gaze(10.0, 20.5), gaze(600.0, 20.0)]);
         assert!(track.of_frame(4, 640, 480).is_empty(), "who looks elsewhere may look back at any time");
         assert!(track.of_frame(5, 640, 480).is_empty());
+        let marked = GazeTrack::parse("\u{feff}frame,x,y\r\n3,10,20\r\n").expect("a table of a spreadsheet");
+        assert_eq!(marked.of_frame(3, 640, 480), [gaze(10.0, 20.0)]);
     }
 
     #[test]

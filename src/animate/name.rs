@@ -13,7 +13,7 @@ pub struct FrameName {
 impl FrameName {
     /// Reads a pattern; `None` unless it has exactly one run of `#`, in the file's name.
     pub fn parse(pattern: &str) -> Option<Self> {
-        let name = pattern.rfind(['/', std::path::MAIN_SEPARATOR]).map_or(0, |separator| separator + 1);
+        let name = name_start(pattern);
         let start = name + pattern[name..].find('#')?;
         let (before, rest) = pattern.split_at(start);
         let digits = rest.chars().take_while(|&letter| letter == '#').count();
@@ -40,9 +40,7 @@ impl FrameName {
             let is_digit = |letter: char| letter.is_ascii_digit();
             // Digits are all that stands between the name's two ends; any of them leads back to the file.
             let text: String = name.to_string_lossy().into_owned();
-            let start = Path::new(&self.before).file_name().map_or("", |start| start.to_str().unwrap_or(""));
-            let start = if self.before.ends_with(['/', std::path::MAIN_SEPARATOR]) { "" } else { start };
-            let digits = text.strip_prefix(start).and_then(|rest| rest.strip_suffix(self.after.as_str()));
+            let digits = text.strip_prefix(self.split().1).and_then(|rest| rest.strip_suffix(self.after.as_str()));
             let digits = digits.filter(|digits| !digits.is_empty() && digits.chars().all(is_digit));
             let number = digits.and_then(|digits| digits.parse::<u32>().ok());
             numbers.extend(number.filter(|&number| self.of(number).file_name() == Some(name.as_os_str())));
@@ -53,17 +51,21 @@ impl FrameName {
 
     /// A file of the whole sequence: the pattern without its number, with another ending.
     pub fn of_shot(&self, ending: &str) -> PathBuf {
-        let before = Path::new(&self.before);
-        let stem = before.file_name().map_or("", |name| name.to_str().unwrap_or("")).trim_end_matches(['.', '_', '-']);
-        let stem =
-            if stem.is_empty() || self.before.ends_with(['/', std::path::MAIN_SEPARATOR]) { "shot" } else { stem };
-        let folder = if self.before.ends_with(['/', std::path::MAIN_SEPARATOR]) {
-            before
-        } else {
-            before.parent().unwrap_or(Path::new(""))
-        };
-        folder.join(format!("{stem}.{ending}"))
+        let (folder, start) = self.split();
+        let stem = start.trim_end_matches(['.', '_', '-']);
+        let stem = if stem.is_empty() { "shot" } else { stem };
+        Path::new(folder).join(format!("{stem}.{ending}"))
     }
+
+    /// The folder, and what file names in it begin with. Not by [`Path`], to which a name that is a dot so far is none.
+    fn split(&self) -> (&str, &str) {
+        self.before.split_at(name_start(&self.before))
+    }
+}
+
+/// Where the file's name begins in a path.
+fn name_start(path: &str) -> usize {
+    path.rfind(['/', std::path::MAIN_SEPARATOR]).map_or(0, |separator| separator + 1)
 }
 
 #[cfg(test)]
@@ -78,6 +80,9 @@ mod tests {
         assert_eq!(name.of_shot("json"), Path::new("out/shot.json"));
         assert_eq!(FrameName::parse("##.png").expect("a pattern").of_shot("json"), Path::new("shot.json"));
         assert_eq!(FrameName::parse("out/##.png").expect("a pattern").of_shot("json"), Path::new("out/shot.json"));
+        // A name that begins with a dot is not its folder's.
+        assert_eq!(FrameName::parse("out/.####.exr").expect("a pattern").of_shot("json"), Path::new("out/shot.json"));
+        assert_eq!(FrameName::parse(".##.exr").expect("a pattern").of_shot("json"), Path::new("shot.json"));
         assert_eq!(FrameName::parse("a#b/shot.##.exr").expect("a pattern").of(7), Path::new("a#b/shot.07.exr"));
         for bad in ["shot.exr", "a#b#.png", "out##/shot.png", ""] {
             assert_eq!(FrameName::parse(bad), None, "{bad}");
@@ -93,5 +98,8 @@ mod tests {
         let pattern = folder.path().join("a.####.png");
         let name = FrameName::parse(pattern.to_str().expect("a path")).expect("a pattern");
         assert_eq!(name.numbers().expect("readable"), [7, 12, 12345]);
+        std::fs::write(folder.path().join(".03.png"), "").expect("written");
+        let hidden = FrameName::parse(folder.path().join(".##.png").to_str().expect("a path")).expect("a pattern");
+        assert_eq!(hidden.numbers().expect("readable"), [3]);
     }
 }

@@ -1,15 +1,16 @@
 //! Velocity maps: where the surface point that a pixel shows was one frame ago, and where it will be.
 //!
 //! Exact: the point keeps its place on its triangle or sphere, and the other frames' scenes and cameras say where that is,
-//! whatever moved it (camera, object, skin, morph). Backgrounds turn with the camera. Mirrors and glass have the motion of their
+//! whatever moved it (camera, object, skin, morph). Backgrounds turn with the camera and with their own pictures. Surfaces that
+//! blend are there where they cover half or more. Mirrors and glass have the motion of their
 //! own surface, or, by [`VelocityMap::of_images`], that of what they show.
 
 mod image;
 
-use crate::geometry::{Hit, Ray};
+use crate::geometry::{Coverage, Hit, Ray};
 use crate::integrator::{CameraRays, CameraSample, Crop, PathTracer};
 use crate::scene::{Camera, Scene, SpherePlace};
-use glam::{Vec2, Vec3, Vec3A};
+use glam::{Mat3, Vec2, Vec3, Vec3A};
 use rayon::prelude::*;
 
 /// Motion of what each pixel's centre shows when the shutter opens, in pixels, x to the right and y down; row-major.
@@ -36,7 +37,7 @@ enum Seen {
     Triangle(Hit),
     /// Number of the sphere, and the normal at the point: along the sphere's own axes where its turning can be seen, else in the world.
     Sphere(usize, Normal),
-    /// Nothing is in this direction.
+    /// Nothing but the surroundings, in this direction of their own picture.
     Background(Vec3),
 }
 
@@ -103,7 +104,8 @@ impl Target {
 
 /// As the shutter opens, through the middle of the lens: what is out of focus moves as its centre does.
 fn ray_through(camera: &CameraRays, position_px: Vec2) -> Ray {
-    camera.ray(&CameraSample { position_px, lens: [0.5, 0.5], time: 0.0 })
+    let ray = camera.ray(&CameraSample { position_px, lens: [0.5, 0.5], time: 0.0 });
+    Ray { coverage: Coverage::ByHalf, ..ray }
 }
 
 fn seen_at(tracer: &PathTracer, camera: &CameraRays, position_px: Vec2) -> Seen {
@@ -113,8 +115,8 @@ fn seen_at(tracer: &PathTracer, camera: &CameraRays, position_px: Vec2) -> Seen 
 
 /// What a ray has met.
 fn seen_along(tracer: &PathTracer, ray: &Ray, hit: Option<Hit>) -> Seen {
-    let Some(hit) = hit else { return Seen::Background(ray.direction.into()) };
     let scene = tracer.world().scene();
+    let Some(hit) = hit else { return Seen::Background(to_surroundings(scene) * Vec3::from(ray.direction)) };
     let Some(number) = (hit.object as usize).checked_sub(scene.instances.len()) else { return Seen::Triangle(hit) };
     let sphere = &scene.spheres[number];
     let normal = Vec3A::from(tracer.world().surface(ray, &hit).geometric_normal);
@@ -131,7 +133,7 @@ fn place_in(scene: &Scene, camera: &CameraRays, seen: &Seen) -> Option<Vec2> {
 /// Where what was seen is in the scene of another moment; `None` where there is no such thing.
 fn target_in(scene: &Scene, seen: &Seen) -> Option<Target> {
     match seen {
-        Seen::Background(direction) => Some(Target::Direction(*direction)),
+        Seen::Background(own) => Some(Target::Direction(to_surroundings(scene).transpose() * *own)),
         Seen::Triangle(hit) => point_of_triangle(scene, hit).map(Target::Point),
         Seen::Sphere(number, normal) => {
             let SpherePlace { center, radius, axes } = scene.spheres.get(*number)?.place_at(0.0);
@@ -142,6 +144,11 @@ fn target_in(scene: &Scene, seen: &Seen) -> Option<Target> {
             Some(Target::Point((center + radius * normal).into()))
         }
     }
+}
+
+/// The world's directions to those of the picture around it, which a file can turn in time.
+fn to_surroundings(scene: &Scene) -> Mat3 {
+    scene.environment.as_ref().map_or(Mat3::IDENTITY, |environment| environment.from_world)
 }
 
 fn point_of_triangle(scene: &Scene, hit: &Hit) -> Option<Vec3> {

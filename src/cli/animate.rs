@@ -17,9 +17,10 @@ use super::seeing::{parse_positive, parse_seconds};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use frames::{Frames, parse_frames};
+use shot::Made;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use time::ShotClock;
+use time::{Progress, ShotClock};
 use video::VideoFormat;
 
 pub(super) use frames::parse_rate;
@@ -165,15 +166,20 @@ fn render_shot(arguments: &AnimateArguments) -> Result<()> {
     arguments.video()?;
     let shot = Shot::new(arguments)?;
     shot.check_video()?;
+    let started = Instant::now();
     let track = shot.track(arguments.frame_numbers())?;
-    let mut clock = arguments.time.map(|budget| ShotClock::start(&shot, &track, budget)).transpose()?;
-    let (started, count, mut rendered) = (Instant::now(), arguments.frame_numbers().count(), 0.0);
-    for (done, frame) in (1..).zip(arguments.frame_numbers()) {
-        let was_rendered = shot.make(frame, &track, clock.as_mut().map(|clock| clock.share(frame)))?;
-        if was_rendered && done < count {
-            rendered += 1.0;
-            let seconds = started.elapsed().as_secs_f64() / rendered * (count - done) as f64;
-            eprintln!("{done} of {count} frames, about {} left", duration_in_words(seconds));
+    let clock = match arguments.time {
+        Some(budget) => ShotClock::new(&shot, &track, started, budget)?,
+        None => None,
+    };
+    let mut progress = Progress::new(arguments.frame_numbers().map(|frame| shot.has_record(frame)));
+    for frame in arguments.frame_numbers() {
+        let started = Instant::now();
+        let made = shot.make(frame, &track, clock.as_ref().map(|clock| clock.share(frame)))?;
+        progress.add(made, started.elapsed());
+        if made != Made::Kept && frame < arguments.frames.last {
+            let (done, count) = (frame - arguments.frames.first + 1, arguments.frame_numbers().count());
+            eprintln!("{done} of {count} frames, about {} left", duration_in_words(progress.seconds_left()));
         }
     }
     shot.conclude(&track).map(drop)

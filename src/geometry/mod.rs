@@ -30,11 +30,23 @@ pub struct Ray {
     pub direction: Vec3A,
     /// When, as share of the open shutter, in [0, 1].
     pub time: f32,
+    /// What surfaces that blend are to it.
+    pub coverage: Coverage,
+}
+
+/// How a ray meets surfaces that alpha leaves in place only partly.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Coverage {
+    /// By chance, so that the mean over rays is the blend.
+    #[default]
+    ByChance,
+    /// Wherever they cover half or more: for what has one value at a point, such as motion, and would be salt and pepper by chance.
+    ByHalf,
 }
 
 impl Ray {
     /// A ray when the shutter opens.
     pub fn new(origin: Vec3A, direction: Vec3A) -> Self {
-        Self { origin, direction, time: 0.0 }
+        Self { origin, direction, time: 0.0, coverage: Coverage::ByChance }
     }
 }

@@ -11,7 +11,7 @@ mod tests;
 use super::mesh_tree::{MeshHit, MeshTree};
 use super::tree::{BinaryTree, Bounds, PrimitiveTree};
 use super::wide_tree::TriangleRef;
-use super::{Ray, sphere};
+use super::{Coverage, Ray, sphere};
 use crate::scene::{Alpha, Instance, MaterialId, ScalarInput, Scene, SpherePlace};
 use at_hit::{Placement, interpolate_uv};
 use build::{MOST_VERTICES, fixed_triangles, own_triangles, placed_bounds, swept_bounds};
@@ -342,7 +342,10 @@ impl World {
             Alpha::Opaque => true,
             Alpha::Unseen => false,
             Alpha::Mask { value, cutoff } => coverage(value) >= *cutoff,
-            Alpha::Blend { value } => coverage(value) > part.chance(ray),
+            Alpha::Blend { value } => match ray.coverage {
+                Coverage::ByChance => coverage(value) > part.chance(ray),
+                Coverage::ByHalf => coverage(value) >= 0.5,
+            },
         }
     }
 }

@@ -76,14 +76,11 @@ impl CameraRays {
         };
         let (origin, direction) = (Vec3A::from(origin), Vec3A::from(way).normalize());
         let Some(motion) = &self.motion else {
-            return Ray { origin, direction, time: sample.time };
+            return Ray { time: sample.time, ..Ray::new(origin, direction) };
         };
         let moved = motion.at(sample.time);
-        Ray {
-            origin: moved.transform_point3a(origin),
-            direction: moved.transform_vector3a(direction).normalize(),
-            time: sample.time,
-        }
+        let direction = moved.transform_vector3a(direction).normalize();
+        Ray { time: sample.time, ..Ray::new(moved.transform_point3a(origin), direction) }
     }
 }
 

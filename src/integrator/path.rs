@@ -248,12 +248,12 @@ impl PathTracer {
     fn shadow_ray(&self, point: &SurfacePoint, light: &LightSample, time: f32) -> (Ray, f32) {
         let origin = point.spawn(light.direction);
         let Some(place) = light.place else {
-            return (Ray { origin, direction: light.direction.into(), time }, f32::INFINITY);
+            return (Ray { time, ..Ray::new(origin, light.direction.into()) }, f32::INFINITY);
         };
         let end = place.position + place.normal * place.offset;
         let way = Vec3A::from(end) - origin;
         let distance = way.length();
-        (Ray { origin, direction: way / distance, time }, distance)
+        (Ray { time, ..Ray::new(origin, way / distance) }, distance)
     }
 }
 
@@ -276,7 +276,7 @@ fn scatter(path: &mut PathState, point: &SurfacePoint, shading: &Shading, wo: Ve
     }
     path.scatter_pdf = (!scattered.lobe.is_delta()).then_some(scattered.pdf);
     path.from = shading.receiver(point, wo);
-    path.ray = Ray { origin: point.spawn(wi), direction: wi.into(), time: path.ray.time };
+    path.ray = Ray { origin: point.spawn(wi), direction: wi.into(), ..path.ray };
     path.throughput.max_element() > 0.0 && path.throughput.is_finite()
 }
 

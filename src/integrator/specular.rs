@@ -101,7 +101,7 @@ impl PathTracer {
                 if scattered.lobe.is_transmission() { SpecularEvent::Transmitted } else { SpecularEvent::Reflected };
             let wi = shading.frame.to_world_direction(scattered.wi);
             let is_wanted = scattered.lobe.is_delta() && wanted.is_none_or(|wanted| wanted == event);
-            let next = Ray { origin: point.spawn(wi), direction: wi.into(), time: ray.time };
+            let next = Ray { origin: point.spawn(wi), direction: wi.into(), ..*ray };
             (is_wanted && shading.sides_agree(wo, wi)).then_some((event, next))
         })
     }

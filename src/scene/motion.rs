@@ -113,6 +113,10 @@ impl Motion {
 
     /// Whether all times of the open shutter see the same transform.
     pub fn rests(&self) -> bool {
+        // Between equal poses slerp rounds.
+        if self.keys.iter().all(|key| key.pose == self.keys[0].pose) {
+            return true;
+        }
         let (open, close) = (self.at(0.0), self.at(1.0));
         open == close && self.keys.iter().filter(|k| (0.0..1.0).contains(&k.time)).all(|k| self.at(k.time) == open)
     }

@@ -140,6 +140,7 @@ fn what_a_run_would_make_otherwise_is_not_there() {
     assert!(!said.contains("is there"), "{said}");
     let said = both("16", "a.##.png");
     assert!(!said.contains("is there"), "the records are those of the .exr files: {said}");
+    assert!(said.contains("a.00.png: its record is that of a.00.exr, made anew"), "{said}");
     // The second frame is of other settings.
     let said = first("17");
     assert!(said.contains("1 frames of the shot are not there yet"), "{said}");
@@ -276,10 +277,11 @@ fn bad_arguments_are_named() {
     std::fs::write(folder.path().join("scene.toml"), SCENE).expect("written");
     std::fs::write(folder.path().join("gaze.csv"), "frame,x,y\n0,1\n").expect("written");
     for (arguments, expected) in [
-        (&["--frames", "5..2", "-o", "a.#.png"][..], "not a range of frames"),
+        (&["--frames", "5..2", "-o", "a.#.png"][..], "ends before it begins"),
         (&["--frames", "0..2", "-o", "a.png"], "a sequence's name has #"),
         (&["--frames", "0..2", "--shot", "1..2", "-o", "a.#.png"], "--frames reaches beyond --shot"),
         (&["--frames", "0..2", "-o", "a.#.png", "--video", "a.gif"], "videos end in .y4m or .mp4"),
+        (&["--frames", "0..2", "-o", "a.#.png", "--video", "a.mp4/"], "this is a folder's name"),
         (&["--frames", "0..2", "-o", "a.#.png", "--video", "no/such.y4m"], "the folder no does not exist"),
         (&["--frames", "0..2", "-o", "a.#.png", "--operator", "sepia"], "no tone operator"),
         (&["--frames", "0..2", "-o", "a.#.png", "--fps", "0.1"], "between 1 and 1000"),
@@ -345,6 +347,56 @@ fn sequences_are_compared_as_they_move() {
     }
     let (status, said) = compare(&["a.##.exr", "a.##.exr", "--fps", "24", "--velocity", "b.##.exr"]);
     assert!(status == Some(2) && said.contains("missing of b.##.exr"), "{said}");
+}
+
+/// The largest number of a frame, after which there is none.
+#[test]
+fn the_last_frames_are_compared() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    animate(at, &["--frames", "4294967294..4294967295", "--spp", "16", "-o", "a.##.exr"]);
+    let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+    let output = command.current_dir(at).args(["compare", "a.##.exr", "a.##.exr", "--fps", "24"]).output();
+    let output = output.expect("it starts");
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+/// A table of another shot's frames is a slip where the eye is to follow it.
+#[test]
+fn a_gaze_table_says_something_of_the_shot() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    std::fs::write(at.join("scene.toml"), SCENE).expect("written");
+    let say = |table: &str, eye: &str| {
+        std::fs::write(at.join("gaze.csv"), table).expect("written");
+        let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+        let asked = ["--frames", "0..1", "--spp", "16", "--gaze", "gaze.csv", "--eye", eye, "-o", "a.##.png"];
+        let output = command.current_dir(at).args(["animate", "scene.toml"]).args(asked).output().expect("it starts");
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    for table in ["100,4,8\n101,4,8\n", "0,1e6,8\n", "frame,x,y\n"] {
+        let (status, said) = say(table, "gaze");
+        assert!(status == Some(2) && said.contains("says nothing of frames 0 to 1"), "{table}: {said}");
+    }
+    let (status, said) = say("100,4,8\n", "none");
+    assert!(status == Some(0) && said.contains("says of 0 of 2 frames"), "{said}");
+    let (status, said) = say("\u{feff}0,4,8\n1,4,8\n", "gaze");
+    assert!(status == Some(0) && !said.contains("says of"), "{said}");
+}
+
+/// A lamp that is off at first: black frames, and light in the later ones.
+#[test]
+fn a_shot_may_begin_in_the_dark() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let glow = "keyframes = [ { time = 0, emission = [0, 0, 0] }, { time = 0.05, emission = [0, 0, 0] }, { time = 0.1, emission = [8, 8, 8] } ]";
+    let scene = SCENE.replace("emission = [8, 8, 8]", glow);
+    animate_scene(folder.path(), &scene, &["--frames", "0..2", "--spp", "16", "-o", "a.##.png"]);
+    let brightest = |frame: u32| {
+        let picture = image::open(folder.path().join(format!("a.0{frame}.png"))).expect("a picture").to_rgb8();
+        picture.pixels().map(|pixel| pixel.0[1]).max()
+    };
+    assert_eq!(brightest(0), Some(0));
+    assert!(brightest(2) > Some(100));
 }
 
 /// The operator is fitted to whichever sequence holds the scene's light, as for stills: which of them is the reference changes

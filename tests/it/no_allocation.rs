@@ -23,7 +23,7 @@ fn paths_allocate_nothing() {
             let angle = pixel as f32;
             let direction = Vec3A::new(angle.sin(), -0.3 + 0.2 * (3.0 * angle).cos(), -angle.cos().abs()).normalize();
             let sample = block_key(pixel).sample(0);
-            tracer.trace_path(Ray { origin: eye, direction, time: 0.0 }, sample).rays
+            tracer.trace_path(Ray::new(eye, direction), sample).rays
         };
         // What is made once at first use, such as the sRGB table, may allocate.
         trace(0);

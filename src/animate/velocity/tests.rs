@@ -3,8 +3,8 @@
 use super::*;
 use crate::integrator::TraceSettings;
 use crate::scene::{
-    Alpha, Camera, ColorInput, Instance, Material, MaterialId, Mesh, MeshId, Relief, ScalarInput, Sphere, Surface,
-    TextureId, TextureLookup,
+    Alpha, Camera, ColorInput, Environment, Instance, Material, MaterialId, Mesh, MeshId, Parametrisation, Relief,
+    ScalarInput, Sphere, Surface, TextureId, TextureLookup,
 };
 use glam::{Affine3A, Mat3A, Quat};
 use std::sync::Arc;
@@ -136,4 +136,46 @@ fn a_background_turns() {
     let middle = (32 * SIZE + 32) as usize;
     assert!((turned.to_next[middle].x - 3.26).abs() < 0.1, "{}", turned.to_next[middle]);
     assert!((turned.to_previous[middle].x + 3.16).abs() < 0.1, "{}", turned.to_previous[middle]);
+}
+
+/// A picture around the scene that turns takes its pixels along.
+#[test]
+fn a_background_turns_by_itself() {
+    let at = |t: f32| Scene {
+        instances: Vec::new(),
+        spheres: Vec::new(),
+        environment: Some(Environment {
+            parametrisation: Parametrisation::LatLong,
+            width: 1,
+            height: 1,
+            texels: Arc::new(vec![Vec3::ONE]),
+            scale: 1.0,
+            from_world: Mat3::from_rotation_x(0.3) * Mat3::from_rotation_y(-0.1 * t),
+        }),
+        ..scene(Vec3::ZERO, Vec3::ZERO, 0.0, Vec3::ZERO)
+    };
+    let map = VelocityMap::new(&tracer(at(0.0)), &at(-1.0), &at(1.0));
+    // To the left of a camera that looks along -z, by tan 0.1 · 32, as if the camera had turned to the right.
+    let middle = (32 * SIZE + 32) as usize;
+    assert!((map.to_next[middle].x + 3.16).abs() < 0.1, "{}", map.to_next[middle]);
+    assert!((map.to_previous[middle].x - 3.26).abs() < 0.1, "{}", map.to_previous[middle]);
+}
+
+/// A veil before the wall moves: it is there in all pixels or in none, and not by chance.
+#[test]
+fn a_veil_has_one_motion() {
+    for (coverage, expected) in [(0.6, 8.0), (0.4, 0.0)] {
+        let at = |t: f32| {
+            let mut scene = scene(Vec3::ZERO, Vec3::ZERO, 0.0, Vec3::ZERO);
+            scene.spheres.clear();
+            let blend = Alpha::Blend { value: ScalarInput::constant(coverage) };
+            scene.materials.push(Material { alpha: blend, ..scene.materials[0].clone() });
+            let to_world = Affine3A::from_translation(Vec3::new(t, 0.0, 6.0));
+            scene.instances.push(Instance { material: MaterialId(1), to_world, ..scene.instances[0].clone() });
+            scene
+        };
+        let map = VelocityMap::new(&tracer(at(0.0)), &at(-1.0), &at(1.0));
+        let others = map.to_next.iter().filter(|motion| (motion.x - expected).abs() > 0.02).count();
+        assert_eq!(others, 0, "at a coverage of {coverage}");
+    }
 }

@@ -2,6 +2,9 @@
 
 use crate::cli::seeing::parse_positive;
 
+/// Most frames of a shot: eleven hours and a half at 24 a second.
+const MOST_FRAMES: u32 = 1_000_000;
+
 /// A range of frames, both ends included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Frames {
@@ -14,7 +17,13 @@ pub(super) fn parse_frames(text: &str) -> Result<Frames, String> {
     let (first, last) = text.split_once("..").ok_or_else(wrong)?;
     let number = |text: &str| text.trim().trim_start_matches('=').parse::<u32>().map_err(|_| wrong());
     let frames = Frames { first: number(first)?, last: number(last)? };
-    if frames.first > frames.last || frames.last - frames.first >= 1_000_000 { Err(wrong()) } else { Ok(frames) }
+    if frames.first > frames.last {
+        return Err(format!("\"{text}\" ends before it begins; expected FIRST..LAST such as 0..47"));
+    }
+    if frames.last - frames.first >= MOST_FRAMES {
+        return Err(format!("\"{text}\": at most {MOST_FRAMES} frames, both ends included"));
+    }
+    Ok(frames)
 }
 
 pub(in crate::cli) fn parse_rate(text: &str) -> Result<f64, String> {
@@ -25,4 +34,19 @@ pub(in crate::cli) fn parse_rate(text: &str) -> Result<f64, String> {
             Err(format!("\"{text}\": between 1 and 1000 frames a second"))
         }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_wrong_with_a_range_is_said() {
+        assert_eq!(parse_frames("0..999999"), Ok(Frames { first: 0, last: 999_999 }));
+        for (text, said) in [("0..1000000", "at most 1000000 frames"), ("3..1", "ends before"), ("3-4", "not a range")]
+        {
+            let error = parse_frames(text).expect_err(text);
+            assert!(error.contains(said), "{error}");
+        }
+    }
 }

@@ -31,6 +31,12 @@ impl FrameRecord {
         (picture.is_file() && record.picture == name(picture)).then_some(record)
     }
 
+    /// The picture that the record beside a picture that is there tells of instead: the same frame in another format.
+    pub(super) fn of_another_picture(picture: &Path) -> Option<String> {
+        let record: Self = read_json(&Self::file(picture))?;
+        (picture.is_file() && record.picture != name(picture)).then_some(record.picture)
+    }
+
     /// Whether a picture was made from all that this key names, and its file has not been changed since.
     pub(super) fn holds(&self, key: &str, picture: &Path) -> bool {
         self.key == key && hash_of_file(picture).is_ok_and(|hash| hash == self.picture_hash)

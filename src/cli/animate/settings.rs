@@ -13,7 +13,6 @@ use fechner::animate::velocity::VelocityOf;
 use fechner::denoise::Denoiser;
 use fechner::integrator::TraceSettings;
 use fechner::scene::Scene;
-use std::path::Path;
 
 /// Command line before scene before default.
 pub(super) fn shot_settings(arguments: &AnimateArguments, scene: &Scene, shot: Frames) -> Result<ShotSettings> {
@@ -42,7 +41,7 @@ pub(super) fn shot_settings(arguments: &AnimateArguments, scene: &Scene, shot: F
         viewing: seeing::viewing(display, None)?,
         nits_per_unit: scene.nits_per_unit,
         adapted_to_cd_m2: arguments.adapted_to,
-        gaze: arguments.gaze.as_deref().map(read_gaze).transpose()?,
+        gaze: gaze(arguments, size, shot)?,
         eye: eye(arguments)?,
         velocity_of: match arguments.velocity_of {
             VelocityChoice::Surface => VelocityOf::Surface,
@@ -69,7 +68,26 @@ fn eye(arguments: &AnimateArguments) -> Result<Eye> {
     Ok(followed)
 }
 
-fn read_gaze(path: &Path) -> Result<GazeTrack> {
+/// Where the shot is looked at. A table of another shot's frames, or of places outside the picture, is a slip.
+fn gaze(arguments: &AnimateArguments, size: Size, shot: Frames) -> Result<Option<GazeTrack>> {
+    let Some(path) = &arguments.gaze else { return Ok(None) };
     let table = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
-    GazeTrack::parse(&table).with_context(|| path.display().to_string())
+    let track = GazeTrack::parse(&table).with_context(|| path.display().to_string())?;
+    let says = |frame: &u32| !track.of_frame(*frame, size.width, size.height).is_empty();
+    let count = shot.last - shot.first + 1;
+    match (shot.first..=shot.last).filter(says).count() {
+        0 if arguments.eye == EyeChoice::Gaze => bail!(
+            "--eye gaze: {} says nothing of frames {} to {} inside the picture of {}x{}",
+            path.display(),
+            shot.first,
+            shot.last,
+            size.width,
+            size.height
+        ),
+        found if found < count as usize => {
+            eprintln!("note: {} says of {found} of {count} frames where in the picture is looked.", path.display());
+        }
+        _ => {}
+    }
+    Ok(Some(track))
 }

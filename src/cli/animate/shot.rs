@@ -154,28 +154,44 @@ impl<'a> Shot<'a> {
         Ok(Needs::of(&self.source, &self.settings, &operator, track)?)
     }
 
-    /// Numbers of the first and the last frame that are rendered.
-    pub(super) fn rendered_frames(&self) -> (u32, u32) {
-        (self.arguments.frames.first, self.arguments.frames.last)
+    /// Those of the frames to render that are not there as this run would make them. Reads all their scenes.
+    pub(super) fn missing_frames(&self, track: &Track) -> Result<Vec<u32>> {
+        let mut missing = Vec::new();
+        for frame in self.arguments.frame_numbers() {
+            if self.record(frame, &self.frame(frame, track)?.key).is_none() {
+                missing.push(frame);
+            }
+        }
+        Ok(missing)
     }
 
-    /// Renders a frame, unless it is there; whether it did. `time` is a limit of the frame's own, beside those of the shot.
-    pub(super) fn make(&self, frame: u32, track: &Track, time: Option<Duration>) -> Result<bool> {
+    /// Whether a frame has a picture and its record, of whatever settings.
+    pub(super) fn has_record(&self, frame: u32) -> bool {
+        FrameRecord::of_picture(&self.file(frame)).is_some()
+    }
+
+    /// Renders a frame, unless it is there. `time` is a limit of the frame's own, beside those of the shot.
+    pub(super) fn make(&self, frame: u32, track: &Track, time: Option<Duration>) -> Result<Made> {
         let mut job = self.frame(frame, track)?;
         job.settings.limits.time = time;
         let file = self.file(frame);
         if self.record(frame, &job.key).is_some() {
             eprintln!("{}: is there", file.display());
-            return Ok(false);
+            return Ok(Made::Kept);
         }
-        if file.exists() {
-            eprintln!("{}: of other settings or another scene, made anew", file.display());
+        let outdated = self.has_record(frame);
+        match FrameRecord::of_another_picture(&file) {
+            Some(other) => eprintln!("{}: its record is that of {other}, made anew", file.display()),
+            None if file.exists() => {
+                eprintln!("{}: of other settings or another scene, made anew", file.display());
+            }
+            None => {}
         }
         let console = Console::new(None);
         let made = render_frame(&job.scenes, &self.settings, &mut job.settings, frame, &console)?;
         console.finish();
         self.keep(frame, &job, &made)?;
-        Ok(true)
+        Ok(if outdated { Made::Anew } else { Made::New })
     }
 
     /// What a frame shows.
@@ -316,6 +332,17 @@ impl<'a> Shot<'a> {
         }
         Ok(found)
     }
+}
+
+/// What came of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Made {
+    /// It was there.
+    Kept,
+    /// It was not.
+    New,
+    /// There was one of other settings or another scene.
+    Anew,
 }
 
 /// What there is of a shot.

@@ -21,6 +21,9 @@ pub(super) enum VideoFormat {
 impl VideoFormat {
     /// By the file's ending; .mp4 only where there is an ffmpeg to write it.
     pub(super) fn of(path: &Path) -> Result<Self> {
+        if path.as_os_str().to_string_lossy().ends_with(['/', std::path::MAIN_SEPARATOR]) {
+            bail!("{}: a video is a file, and this is a folder's name", path.display());
+        }
         match path.extension().and_then(|ending| ending.to_str()) {
             Some("y4m") => Ok(Self::Y4m),
             Some("mp4") => {
@@ -53,8 +56,9 @@ pub(super) fn write(
             Ok(())
         }
         VideoFormat::Mp4 => {
-            // ffmpeg tells the kind of file from its ending.
-            let beside = path.with_extension("unfinished.mp4");
+            // ffmpeg tells the kind of file from its ending, and takes what begins with a dash or with letters and a colon for
+            // something else than a file, unless its folder is named.
+            let beside = std::path::absolute(path.with_extension("unfinished.mp4"))?;
             let mut ffmpeg = Command::new("ffmpeg")
                 .args(["-y", "-loglevel", "error", "-f", "yuv4mpegpipe", "-i", "-", "-c:v", "libx264", "-crf", "14"])
                 .args([
@@ -78,12 +82,11 @@ pub(super) fn write(
                 true => sent,
                 false => bail!("ffmpeg failed with {status}"),
             });
-            if ended.is_err() {
+            let placed = ended.and_then(|()| Ok(std::fs::rename(&beside, path)?));
+            if placed.is_err() {
                 std::fs::remove_file(&beside).ok();
             }
-            ended
-                .and_then(|()| std::fs::rename(&beside, path).map_err(Into::into))
-                .with_context(|| format!("cannot write {}", path.display()))
+            placed.with_context(|| format!("cannot write {}", path.display()))
         }
     }
 }
@@ -133,11 +136,8 @@ mod tests {
     use fechner::integrator::TraceSettings;
     use fechner_perception::display::Viewing;
 
-    /// A frame that cannot be read leaves the video that was there, and nothing beside it.
-    #[test]
-    fn a_video_that_fails_replaces_none() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let shot = ShotSettings {
+    fn shot() -> ShotSettings {
+        ShotSettings {
             first: 0,
             last: 1,
             frames_per_second: 24.0,
@@ -152,7 +152,44 @@ mod tests {
             denoiser: None,
             eye: Eye::Rests,
             velocity_of: VelocityOf::Surface,
-        };
+        }
+    }
+
+    #[test]
+    fn a_folder_is_no_video() {
+        for name in ["e.y4m/", "e.mp4/"] {
+            let error = VideoFormat::of(Path::new(name)).expect_err("a folder's name");
+            assert!(format!("{error}").contains("a folder's name"), "{error}");
+        }
+    }
+
+    /// Names that ffmpeg would take for an address or an option, and a place where no file can be put.
+    #[test]
+    fn ffmpeg_takes_any_name() {
+        if VideoFormat::of(Path::new("a.mp4")).is_err() {
+            eprintln!("no ffmpeg: not tested");
+            return;
+        }
+        // Relative to where the tests run: an absolute name was never a problem.
+        let folder = tempfile::Builder::new().prefix("video").tempdir_in(".").expect("a folder");
+        let frame = folder.path().join("a.0.png");
+        fechner::output::write_png(&frame, 4, 2, &[[0.5; 3]; 8]).expect("written");
+        let fitted = |_: usize| -> Box<dyn FittedTone> { panic!("PNG frames need no operator") };
+        let make = |path: &Path| write(path, VideoFormat::Mp4, [frame.clone()].into_iter(), &fitted, &shot());
+        let odd = format!("b{}:1.mp4", std::process::id());
+        make(Path::new(&odd)).expect("written");
+        std::fs::remove_file(&odd).expect("a video");
+        let taken = folder.path().join("c.mp4");
+        std::fs::create_dir(&taken).expect("a folder");
+        make(&taken).expect_err("there is a folder");
+        assert_eq!(std::fs::read_dir(folder.path()).expect("readable").count(), 2, "nothing is left beside it");
+    }
+
+    /// A frame that cannot be read leaves the video that was there, and nothing beside it.
+    #[test]
+    fn a_video_that_fails_replaces_none() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let shot = shot();
         let frame = folder.path().join("a.0.png");
         fechner::output::write_png(&frame, 4, 2, &[[0.5; 3]; 8]).expect("written");
         let video = folder.path().join("a.y4m");

@@ -60,19 +60,21 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
     let (numbers, sequences) = Sequences::open(arguments)?;
     let (first, last) = (numbers[0], numbers[numbers.len() - 1]);
     let observer = SequenceObserver::new(&sequences.viewing)?;
-    let reach = observer.reach() as u32;
+    // The last frame's number may be the largest of 32 bits.
+    let reach = observer.reach() as u64;
     let mut window: VecDeque<SequenceFrame> = VecDeque::new();
-    let mut next = first;
+    let mut next = u64::from(first);
     let mut frames = Vec::new();
     for frame in first..=last {
-        while next <= last && next <= frame + reach {
-            window.push_back(sequences.frame(next)?);
+        let middle = u64::from(frame);
+        while next <= u64::from(last).min(middle + reach) {
+            window.push_back(sequences.frame(next as u32)?);
             next += 1;
         }
-        while next as usize - window.len() < frame.saturating_sub(reach).max(first) as usize {
+        while next - (window.len() as u64) < middle.saturating_sub(reach).max(u64::from(first)) {
             window.pop_front();
         }
-        let now = frame as usize + window.len() - next as usize;
+        let now = (middle + window.len() as u64 - next) as usize;
         let difference = observer.difference(&window.iter().collect::<Vec<_>>(), now)?;
         if let Some(map) = &sequences.map {
             write_map(&map.of(frame), &difference)?;

@@ -9,7 +9,9 @@ use crate::scene::{
     Camera, Environment, FilmDefaults, Instance, Light, Material, MaterialId, Mesh, MeshId, Scene, Sphere,
     ViewingDefaults,
 };
+use glam::Vec3;
 use rayon::prelude::*;
+use std::collections::HashSet;
 use std::path::Path;
 
 /// A camera that a file holds.
@@ -31,6 +33,8 @@ pub(super) enum IfDark {
     Studio,
     /// The same, but the file's own lights are believed however weak they are.
     StudioWithoutLight,
+    /// There is light at other times: the picture is black.
+    Stay,
 }
 
 /// Emitters of interchange files below this many cd/m² are decoration (an "emissive" left at 1), not the scene's light.
@@ -38,6 +42,9 @@ const WEAK_EMITTER_CD_M2: f32 = 10.0;
 
 /// Luminance of RGB (1, 1, 1) in formats without a unit.
 pub(super) const ASSUMED_NITS_PER_UNIT: f64 = 100.0;
+
+/// Reads a file up to [`Builder::finish`].
+pub(super) type Read = fn(&Path, &LoadOptions) -> Result<Builder, LoadError>;
 
 /// The scene while it is being read.
 #[derive(Debug)]
@@ -50,6 +57,8 @@ pub(super) struct Builder {
     pub(super) film: FilmDefaults,
     pub(super) viewing: ViewingDefaults,
     pub(super) meshes: Vec<Mesh>,
+    /// Those of `meshes` that have another shape at other times.
+    pub(super) deforming: HashSet<MeshId>,
     pub(super) instances: Vec<Instance>,
     pub(super) spheres: Vec<Sphere>,
     pub(super) materials: Vec<Material>,
@@ -61,6 +70,8 @@ pub(super) struct Builder {
     pub(super) lights: Vec<Light>,
     pub(super) environment: Option<Environment>,
     pub(super) notes: Vec<String>,
+    /// Reads the file as it is at another time; `None` where it is the same at all times.
+    pub(super) at_another_time: Option<Read>,
     alike: AlikeNotes,
 }
 
@@ -75,6 +86,7 @@ impl Builder {
             film: FilmDefaults { width: 512, height: 512 },
             viewing: ViewingDefaults::default(),
             meshes: Vec::new(),
+            deforming: HashSet::new(),
             instances: Vec::new(),
             spheres: Vec::new(),
             materials: Vec::new(),
@@ -84,6 +96,7 @@ impl Builder {
             lights: Vec::new(),
             environment: None,
             notes: Vec::new(),
+            at_another_time: None,
             alike: AlikeNotes::default(),
         }
     }
@@ -136,7 +149,7 @@ impl Builder {
     pub(super) fn finish(mut self, path: &Path, if_dark: IfDark, options: &LoadOptions) -> Result<Scene, LoadError> {
         validate::repair(&mut self, path)?;
         std::mem::take(&mut self.alike).count_into(&mut self.notes);
-        let camera = self.choose_camera(options)?;
+        let camera = self.choose_camera(path, options)?;
         let coverage = |id| self.materials.iter().any(|material| material.alpha.texture_of_coverage() == Some(id));
         let textures = std::mem::take(&mut self.textures).decode(&mut self.notes, options, coverage)?;
         bump::settle(&self.bumps, &mut self.materials, &textures, &mut self.notes);
@@ -158,18 +171,24 @@ impl Builder {
         };
         validate::check(&scene, path)?;
         add_tangents(&mut scene);
-        if !options.environment_follows {
-            light_if_dark(&mut scene, path, if_dark)?;
+        if !options.environment_follows && needs_studio(&scene, path, if_dark)? {
+            let start = at_start(self.at_another_time, path, options)?;
+            // A camera that the file has at other times only is taken as it is.
+            let aimed_by = start.and_then(|mut start| start.choose_camera(path, options).ok());
+            add_studio(&mut scene, aimed_by.map(|camera| camera.forward));
         }
         Ok(scene)
     }
 
-    fn choose_camera(&mut self, options: &LoadOptions) -> Result<Camera, LoadError> {
+    fn choose_camera(&mut self, path: &Path, options: &LoadOptions) -> Result<Camera, LoadError> {
         let Some(wanted) = &options.camera else {
             let Some(first) = self.cameras.first().cloned() else {
                 self.notes.push("No camera in the file: a three-quarter view of the whole scene is used.".to_owned());
                 let FilmDefaults { width, height } = options.film.unwrap_or(self.film);
-                let bounds = default_view::bounds(&self.meshes, &self.instances, &self.spheres);
+                // Where everything is hidden at first, what is there now is framed, and then any place will do.
+                let start = at_start(self.at_another_time, path, options)?;
+                let bounds = start.and_then(|start| start.bounds()).or_else(|| self.bounds());
+                let bounds = bounds.unwrap_or(default_view::Bounds { min: Vec3::NEG_ONE, max: Vec3::ONE });
                 return Ok(default_view::framed(bounds, width as f32 / height as f32));
             };
             if self.cameras.len() > 1 {
@@ -195,6 +214,12 @@ impl Builder {
         Err(LoadError::Option { problem })
     }
 
+    /// The bounds of what is rendered, if anything is.
+    fn bounds(&self) -> Option<default_view::Bounds> {
+        let bounds = default_view::bounds(&self.meshes, &self.instances, &self.spheres);
+        (bounds.min.x <= bounds.max.x).then_some(bounds)
+    }
+
     /// The camera for the picture: one that states its aspect gives it to a film of no other, and shows more above and below in
     /// a narrower one, so that nothing at its sides is lost.
     fn fitted(&mut self, NamedCamera { camera, aspect, .. }: NamedCamera, options: &LoadOptions) -> Camera {
@@ -215,14 +240,28 @@ fn add_tangents(scene: &mut Scene) {
     asked.for_each(|(mesh, _)| tangents::add(mesh));
 }
 
-/// Puts a studio around a scene that has no light, where its format allows that.
-fn light_if_dark(scene: &mut Scene, path: &Path, if_dark: IfDark) -> Result<(), LoadError> {
-    let weakest = match if_dark {
-        IfDark::Fail | IfDark::StudioWithoutLight => 0.0,
-        IfDark::Studio => WEAK_EMITTER_CD_M2 / scene.nits_per_unit as f32,
-    };
-    if is_lit(scene, weakest) {
-        return Ok(());
+/// The file as it is at time 0, by which what is to stay for a whole shot is placed: the view of a scene without a camera, and the
+/// studio. `None` where that is now, or always.
+fn at_start(read: Option<Read>, path: &Path, options: &LoadOptions) -> Result<Option<Builder>, LoadError> {
+    let Some(read) = read.filter(|_| options.frame_time != 0.0) else { return Ok(None) };
+    let mut start = read(path, &LoadOptions { frame_time: 0.0, ..options.clone() })?;
+    validate::repair(&mut start, path)?;
+    start.at_another_time = None;
+    Ok(Some(start))
+}
+
+/// Emitters weaker than this radiance are not the scene's light.
+fn weakest_light(if_dark: IfDark, nits_per_unit: f64) -> f32 {
+    match if_dark {
+        IfDark::Fail | IfDark::StudioWithoutLight | IfDark::Stay => 0.0,
+        IfDark::Studio => WEAK_EMITTER_CD_M2 / nits_per_unit as f32,
+    }
+}
+
+/// Whether a scene has no light and its format allows a studio to stand in.
+fn needs_studio(scene: &Scene, path: &Path, if_dark: IfDark) -> Result<bool, LoadError> {
+    if if_dark == IfDark::Stay || is_lit(scene, weakest_light(if_dark, scene.nits_per_unit)) {
+        return Ok(false);
     }
     if if_dark == IfDark::Fail {
         return Err(LoadError::invalid(
@@ -230,13 +269,17 @@ fn light_if_dark(scene: &mut Scene, path: &Path, if_dark: IfDark) -> Result<(), 
             "scene has no light: add an [environment], [[lights]] or an object whose material has an emission",
         ));
     }
+    Ok(true)
+}
+
+/// Puts a studio around a scene, aimed by this direction or by its camera's.
+fn add_studio(scene: &mut Scene, forward: Option<Vec3>) {
     let what = match is_lit(scene, 0.0) {
         true => format!("Only emitters below {WEAK_EMITTER_CD_M2} cd/m²"),
         false => "No light".to_owned(),
     };
-    scene.environment = Some(environment::studio(scene.nits_per_unit, scene.camera.forward));
+    scene.environment = Some(environment::studio(scene.nits_per_unit, forward.unwrap_or(scene.camera.forward)));
     scene.notes.push(format!("{what} in the file: a soft studio of about 1000 cd/m² surrounds the scene."));
-    Ok(())
 }
 
 /// Whether anything gives light: more radiance than `weakest` for surfaces.

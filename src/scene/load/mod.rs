@@ -32,6 +32,8 @@ mod mitsuba;
 mod mtl;
 mod notes;
 mod obj;
+#[cfg(test)]
+mod over_time;
 mod pbrt;
 mod ply;
 mod polygon;

@@ -5,7 +5,7 @@
 
 use super::builder::Builder;
 use super::error::LoadError;
-use crate::scene::{Alpha, Mesh, Scene, Surface};
+use crate::scene::{Alpha, Instance, Mesh, MeshId, Scene, Surface};
 use glam::{Affine3A, Vec2, Vec3};
 use std::path::Path;
 
@@ -22,7 +22,8 @@ pub(super) fn repair(builder: &mut Builder, path: &Path) -> Result<(), LoadError
             let problem = format!("vertex {vertex} of \"{}\" is not finite: {}", mesh.name, mesh.positions[vertex]);
             return Err(LoadError::invalid(path, problem));
         }
-        let degenerate = drop_degenerate(mesh);
+        // Triangles of a mesh that deforms have an area at other times: there their numbers are to be the same.
+        let degenerate = if builder.deforming.contains(&MeshId(index as u32)) { 0 } else { drop_degenerate(mesh) };
         let changed_normals = repair_attributes(mesh);
         let name = mesh.name.clone();
         if degenerate > 0 {
@@ -34,27 +35,46 @@ pub(super) fn repair(builder: &mut Builder, path: &Path) -> Result<(), LoadError
                 .note(format!("\"{name}\": some normals had no length or were not finite; the faces' own are used."));
         }
     }
-    let mut notes = Vec::new();
-    let meshes = &builder.meshes;
-    builder.instances.retain(|instance| {
-        if meshes[instance.mesh.0 as usize].triangles.is_empty() {
-            notes.push(format!("\"{}\" has no triangles and is left out.", instance.name));
-            return false;
-        }
-        let invertible = is_invertible(&instance.to_world);
-        if !invertible {
-            notes.push(format!("\"{}\" is left out: its transform flattens it or is not finite.", instance.name));
-        }
-        invertible
-    });
-    for note in notes {
-        builder.note(note);
+    hide_unseen(builder);
+    let is_empty = builder.spheres.is_empty() && !builder.instances.iter().any(|i| has_triangles(builder, i));
+    // What is hidden now is there at other times.
+    if is_empty && builder.at_another_time.is_some() && !builder.instances.is_empty() {
+        return Ok(());
     }
-    if builder.instances.is_empty() && builder.spheres.is_empty() {
+    if is_empty {
         let why = builder.notes.first().map(|note| format!(" ({})", note.trim_end_matches('.'))).unwrap_or_default();
         return Err(LoadError::invalid(path, format_args!("nothing to render: no triangle and no sphere{why}")));
     }
     check_extent(builder, path)
+}
+
+fn has_triangles(builder: &Builder, instance: &Instance) -> bool {
+    !builder.meshes[instance.mesh.0 as usize].triangles.is_empty()
+}
+
+/// Takes out of the scene what no ray can meet. What a transform flattens keeps its place, with a mesh of nothing: at other times it
+/// may be there (glTF's way to hide a thing is a scale of 0), and whatever comes after it is to have one number all through a shot.
+fn hide_unseen(builder: &mut Builder) {
+    let mut notes = Vec::new();
+    let meshes = &builder.meshes;
+    builder.instances.retain(|instance| {
+        let has_triangles = !meshes[instance.mesh.0 as usize].triangles.is_empty();
+        if !has_triangles {
+            notes.push(format!("\"{}\" has no triangles and is left out.", instance.name));
+        }
+        has_triangles
+    });
+    let nothing = MeshId(builder.meshes.len() as u32);
+    for instance in builder.instances.iter_mut().filter(|instance| !is_invertible(&instance.to_world)) {
+        notes.push(format!("\"{}\" is left out: its transform flattens it or is not finite.", instance.name));
+        *instance = Instance { mesh: nothing, to_world: Affine3A::IDENTITY, motion: None, ..instance.clone() };
+    }
+    if builder.instances.iter().any(|instance| instance.mesh == nothing) {
+        builder.add_mesh(Mesh { name: "nothing".to_owned(), ..Mesh::default() });
+    }
+    for note in notes {
+        builder.note(note);
+    }
 }
 
 /// Makes positions finite that no triangle uses; returns the first one that is not and is used.

@@ -46,7 +46,7 @@ pub(super) fn pose(path: &Path, document: &gltf::Document, buffers: &Buffers, se
         }
         let cubic = sampler.interpolation() == Interpolation::CubicSpline;
         let per_key = if cubic { 3 } else { 1 };
-        let at = Place::of(&times, seconds as f32);
+        let at = Place::of(&times, seconds);
         let target = channel.target();
         let property = target.property();
         let width = match property {
@@ -111,11 +111,13 @@ struct Place {
 }
 
 impl Place {
-    fn of(times: &[f32], time: f32) -> Self {
-        let after = times.partition_point(|&key| key <= time);
+    /// The time is compared before it is narrowed: a shot's later hours have f32 times a frame apart.
+    fn of(times: &[f32], time: f64) -> Self {
+        let after = times.partition_point(|&key| f64::from(key) <= time);
         let (before, after) = (after.saturating_sub(1), after.min(times.len() - 1));
         let span = times[after] - times[before];
-        let share = if span > 0.0 { ((time - times[before]) / span).clamp(0.0, 1.0) } else { 0.0 };
+        let since = time - f64::from(times[before]);
+        let share = if span > 0.0 { (since / f64::from(span)).clamp(0.0, 1.0) as f32 } else { 0.0 };
         Self { before, after, share, span }
     }
 }
@@ -144,5 +146,8 @@ mod tests {
             let place = Place::of(&times, time);
             assert_eq!((place.before, place.after, place.share), (before, after, share), "at {time}");
         }
+        // A quarter second after 28 hours, where f32 times are 1/128 s apart.
+        let place = Place::of(&[1e5, 100_010.0], 1e5 + 0.241);
+        assert!((place.share - 0.0241).abs() < 1e-6, "{}", place.share);
     }
 }

@@ -32,6 +32,10 @@ const MOST_OBLONG: f32 = 100.0;
 
 /// Reads a glTF or GLB file.
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
+    read(path, options)?.finish(path, IfDark::Studio, options)
+}
+
+fn read(path: &Path, options: &LoadOptions) -> Result<Builder, LoadError> {
     let bytes = files::read(path)?;
     let container = buffers::split(path, &bytes)?;
     let mut builder = Builder::new(path, options);
@@ -65,6 +69,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
         reader.node(&node, &matrices)?;
     }
     if let Some(first) = document.animations().next() {
+        builder.at_another_time = Some(read);
         let count = document.animations().count();
         let name = first.name().map_or_else(String::new, |name| format!(" \"{name}\""));
         let blur = match options.shutter_s > 0.0 {
@@ -76,7 +81,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
         };
         builder.note(format!("Animation{name} (1 of {count}) at {} s; {blur}.", options.frame_time));
     }
-    builder.finish(path, IfDark::Studio, options)
+    Ok(builder)
 }
 
 struct Reader<'a> {
@@ -159,7 +164,11 @@ impl<'a> Reader<'a> {
             for primitive in mesh.primitives() {
                 if let Some(converted) = self.primitive(mesh, &primitive)? {
                     let material = self.materials.get(self.builder, &primitive.material())?;
-                    parts.push((self.builder.add_mesh(converted), material));
+                    let mesh = self.builder.add_mesh(converted);
+                    if primitive.morph_targets().next().is_some() {
+                        self.builder.deforming.insert(mesh);
+                    }
+                    parts.push((mesh, material));
                 }
             }
             self.meshes.insert(mesh.index(), parts);
@@ -186,7 +195,9 @@ impl<'a> Reader<'a> {
                 deform::skin(self.buffers, &primitive, joints, &mut converted)?;
             }
             let material = self.materials.get(self.builder, &primitive.material())?;
-            parts.push((self.builder.add_mesh(converted), material));
+            let mesh = self.builder.add_mesh(converted);
+            self.builder.deforming.insert(mesh);
+            parts.push((mesh, material));
         }
         // A skin's vertices are in world space already: the node's own transform does not count.
         self.place_parts(&parts, name, if joints.is_some() { Affine3A::IDENTITY } else { to_world }, None)

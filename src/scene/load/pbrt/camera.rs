@@ -4,7 +4,7 @@ use super::super::builder::NamedCamera;
 use super::super::error::LoadError;
 use super::Reader;
 use super::state::Transforms;
-use crate::scene::{Camera, FilmDefaults, Motion, Projection, ScreenWindow};
+use crate::scene::{Camera, FilmDefaults, Motion, MotionKey, Pose, Projection, ScreenWindow};
 use glam::{Affine3A, Vec2, Vec3};
 
 /// Widest and highest picture that a file may ask for.
@@ -93,7 +93,7 @@ impl Reader<'_> {
 
     /// Where a transform is when the shutter opens.
     pub(super) fn here(&self, transforms: &Transforms) -> Affine3A {
-        transforms.at(self.share_of(self.shutter[0]))
+        transforms.at(self.share_of(f64::from(self.shutter[0])))
     }
 
     /// The motion while the shutter is open; `None` where nothing moves.
@@ -101,17 +101,28 @@ impl Reader<'_> {
         if !transforms.moves() || self.shutter[1] <= self.shutter[0] {
             return None;
         }
-        let at = |time| transforms.at(self.share_of(time));
-        let (open, close) = (at(self.shutter[0]), at(self.shutter[1]));
-        let invertible = |transform: &Affine3A| transform.is_finite() && transform.matrix3.determinant() != 0.0;
-        (invertible(&open) && invertible(&close)).then(|| Motion::between(open, close)).filter(|motion| !motion.rests())
+        let (opens, stays_open) = (f64::from(self.shutter[0]), f64::from(self.shutter[1] - self.shutter[0]));
+        let frame_time = self.options.frame_time;
+        // Before and after `TransformTimes` everything rests: where the shutter reaches beyond, the motion does not fill it.
+        let ends = self.times.map(|time| ((time - frame_time - opens) / stays_open) as f32);
+        let mut shares: Vec<f32> = [0.0, 1.0].into_iter().chain(ends).filter(|s| (0.0..=1.0).contains(s)).collect();
+        shares.sort_by(f32::total_cmp);
+        shares.dedup();
+        let at = |share: f32| transforms.at(self.share_of(opens + f64::from(share) * stays_open));
+        let places: Vec<Affine3A> = shares.iter().map(|&share| at(share)).collect();
+        if !places.iter().all(|place| place.is_finite() && place.matrix3.determinant() != 0.0) {
+            return None;
+        }
+        let keys = shares.into_iter().zip(places).map(|(time, place)| MotionKey { time, pose: Pose::decompose(place) });
+        Motion::new(Affine3A::IDENTITY, keys.collect()).filter(|motion| !motion.rests())
     }
 
-    /// How far a time lies between those of `TransformTimes`.
-    fn share_of(&self, time: f32) -> f32 {
+    /// How far a time lies between those of `TransformTimes`. Subtracted before it is narrowed: a shot's later hours have f32 times
+    /// a frame apart.
+    fn share_of(&self, time: f64) -> f32 {
         let [start, end] = self.times;
-        let time = time + self.options.frame_time as f32;
-        if end > start { ((time - start) / (end - start)).clamp(0.0, 1.0) } else { 0.0 }
+        let time = time + self.options.frame_time;
+        if end > start { ((time - start) / (end - start)).clamp(0.0, 1.0) as f32 } else { 0.0 }
     }
 
     /// The film's size, and the part of it that is rendered.

@@ -66,9 +66,10 @@ impl Reader<'_> {
             }
             "TransformTimes" => {
                 let [start, end] = numbers(lexer, line)?;
-                self.times = [start as f32, end as f32];
+                self.times = [start, end];
             }
             "ActiveTransform" => {
+                self.builder.at_another_time = Some(super::read);
                 self.state.active = match lexer.next()? {
                     Some((Token::Word("StartTime"), _)) => [true, false],
                     Some((Token::Word("EndTime"), _)) => [false, true],

@@ -31,6 +31,10 @@ const MOST_INSTANCES: usize = 4_000_000;
 
 /// Reads a pbrt file.
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
+    read(path, options)?.finish(path, IfDark::StudioWithoutLight, options)
+}
+
+fn read(path: &Path, options: &LoadOptions) -> Result<Builder, LoadError> {
     let mut reader = Reader {
         main: path.to_owned(),
         file: path.to_owned(),
@@ -58,7 +62,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
         made_vertices: 0,
     };
     reader.read_file(path)?;
-    reader.finish(path)
+    reader.into_builder(path)
 }
 
 /// A shape of an object that may be placed many times.
@@ -95,7 +99,7 @@ struct Reader<'a> {
     camera: Option<(String, Parameters, Transforms)>,
     film: Option<(String, Parameters)>,
     /// `TransformTimes`.
-    times: [f32; 2],
+    times: [f64; 2],
     /// When the shutter opens and closes.
     shutter: [f32; 2],
     /// The sensor's factor.
@@ -209,7 +213,7 @@ impl Reader<'_> {
         }
     }
 
-    fn finish(mut self, path: &Path) -> Result<Scene, LoadError> {
+    fn into_builder(mut self, path: &Path) -> Result<Builder, LoadError> {
         if let Some((_, opened)) = self.stack.last() {
             return Err(LoadError::invalid(path, format_args!("{opened} is never closed")));
         }
@@ -224,6 +228,6 @@ impl Reader<'_> {
         };
         self.builder.bitangent_ignores_v = true;
         self.builder.set_nits_per_unit(nits / f64::from(self.exposure));
-        self.builder.finish(path, IfDark::StudioWithoutLight, self.options)
+        Ok(self.builder)
     }
 }

@@ -54,9 +54,9 @@ impl Reader<'_> {
         let motion = self.motion(&to_world);
         let area = |mesh: &Mesh| shapes::area(mesh, &placed);
         let shape = match shape {
-            // A sphere stays analytic while its transform leaves it one and nothing asks for pbrt's own coordinates.
+            // A sphere stays analytic if its transforms leave it one at all times and nothing asks for pbrt's own coordinates.
             Shape::Sphere(radius) => {
-                let scale = shapes::similarity_scale(&placed);
+                let scale = shapes::similarity_scale(&placed).filter(|_| to_world.leave_spheres());
                 let scale = scale.filter(|_| !reverse && self.current_object.is_none() && !self.uses_textures());
                 match scale.map(|scale| radius * scale).filter(|radius| *radius > 0.0 && radius.is_finite()) {
                     Some(radius) if placed.translation.is_finite() => {

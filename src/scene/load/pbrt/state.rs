@@ -1,5 +1,6 @@
 //! The graphics state: transforms and their stack, current material, light and medium.
 
+use super::super::shapes;
 use super::parameters::{Parameter, Parameters};
 use crate::scene::Pose;
 use glam::{Affine3A, DMat4, DVec3};
@@ -26,6 +27,11 @@ impl Transforms {
 
     pub(super) fn then(&self, inner: &Self) -> Self {
         Self([self.0[0] * inner.0[0], self.0[1] * inner.0[1]])
+    }
+
+    /// Whether spheres stay spheres all the way: at both ends and once between, as for keyframes of our own format.
+    pub(super) fn leave_spheres(&self) -> bool {
+        [0.0, 0.3, 1.0].into_iter().all(|share| shapes::similarity_scale(&self.at(share)).is_some())
     }
 
     /// The transform at a share of the way from start to end.

@@ -27,6 +27,15 @@ pub(super) struct Snapshot {
     owner: Owner,
     /// Entries of the table, each as a document with its value where the keyframes begin.
     entries: Vec<String>,
+    /// Whether it is of a light, or of what a material emits.
+    changes_light: bool,
+}
+
+impl Snapshot {
+    /// Whether something can be dark now and shine at other times.
+    pub(super) fn changes_light(&self) -> bool {
+        self.changes_light
+    }
 }
 
 /// What all keyframes of materials and lights amount to at a time in seconds.
@@ -50,7 +59,7 @@ pub(super) fn snapshots(source: &Source, seconds: f64) -> Result<Vec<Snapshot>, 
 /// The file's document with the snapshots in the keyframes' places.
 pub(super) fn parse<'a>(source: &Source<'a>, snapshots: &'a [Snapshot]) -> Result<Spanned<DeTable<'a>>, LoadError> {
     let mut document = DeTable::parse(source.text).map_err(|error| source.syntax_error(&error))?;
-    for Snapshot { owner, entries } in snapshots {
+    for Snapshot { owner, entries, .. } in snapshots {
         let Some(table) = table_of(document.get_mut(), owner) else { continue };
         table.remove(KEYFRAMES);
         for entry in entries {
@@ -116,7 +125,9 @@ fn snapshot(value: &Value, owner: Owner, seconds: f64) -> Result<Option<Snapshot
         let before_key = list.start();
         entries.push(format!("{:before_key$}{key}{value}", ""));
     }
-    Ok(Some(Snapshot { owner, entries }))
+    let is_emission = |key: &String| key.starts_with("emission") || key == "power_lm";
+    let changes_light = matches!(owner, Owner::Light(_)) || keys.iter().any(is_emission);
+    Ok(Some(Snapshot { owner, entries, changes_light }))
 }
 
 /// One number, or a list of them.

@@ -11,6 +11,7 @@ pub(super) mod side;
 mod surface;
 mod surroundings;
 
+use self::animated::Snapshot;
 use self::fields::{Fields, Source, Value};
 use super::builder::{Builder, IfDark, NamedCamera};
 use super::error::LoadError;
@@ -43,9 +44,16 @@ struct TextureEntry {
 
 /// Reads a scene file.
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
+    let (builder, if_dark) = read(path, options)?;
+    builder.finish(path, if_dark, options)
+}
+
+/// Everything in a scene file, and what to do if that is dark.
+fn read(path: &Path, options: &LoadOptions) -> Result<(Builder, IfDark), LoadError> {
     let text = files::read_text(path)?;
     let source = Source { file: path, text: &text };
     let snapshots = animated::snapshots(&source, options.frame_time)?;
+    let if_dark = if snapshots.iter().any(Snapshot::changes_light) { IfDark::Stay } else { IfDark::Fail };
     let document = animated::parse(&source, &snapshots)?;
     let root = Fields::root(
         &source,
@@ -113,7 +121,10 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
             context.builder.lights.push(light::read(&value, context.builder.nits_per_unit)?);
         }
     }
-    context.builder.finish(path, IfDark::Fail, options)
+    if objects.any_moves() {
+        context.builder.at_another_time = Some(|path, options| Ok(read(path, options)?.0));
+    }
+    Ok((context.builder, if_dark))
 }
 
 fn read_film(value: &Value) -> Result<FilmDefaults, LoadError> {

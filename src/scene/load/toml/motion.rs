@@ -1,5 +1,9 @@
-//! Transforms and keyframes. Positions and scales move linearly between keyframes, rotations by slerp; before the first
-//! and after the last keyframe everything rests.
+//! Transforms and keyframes. Positions and scales move linearly between keyframes; before the first and after the last keyframe
+//! everything rests. Objects' own are in [`turns`].
+
+mod turns;
+
+pub(super) use turns::object_keyframes;
 
 use super::fields::{Fields, Value};
 use crate::scene::load::{LoadError, Shutter};
@@ -105,37 +109,6 @@ fn moving(times: Vec<f64>, shutter: Shutter, pose: impl Fn(f64) -> Pose, before:
     Motion::new(before, keys).filter(|motion| !motion.rests())
 }
 
-/// An object's `keyframes`.
-pub(super) fn object_keyframes(list: &Value) -> Result<Keyframes<Pose>, LoadError> {
-    Keyframes::read(list, &["time", "translate", "rotate_deg", "axis", "scale"], |fields| {
-        Ok(Pose::from_parts(
-            fields.get_or("scale", Vec3::ONE, scale)?,
-            rotation(fields)?.unwrap_or(Quat::IDENTITY),
-            fields.get_or("translate", Vec3::ZERO, Value::vec3)?,
-        ))
-    })
-}
-
-impl Keyframes<Pose> {
-    fn pose(&self, time: f64) -> Pose {
-        let Between { before, after, share } = self.around(time);
-        before.interpolate(*after, share)
-    }
-
-    /// The transform at a time.
-    pub(super) fn at(&self, time: f64) -> Affine3A {
-        self.pose(time).to_affine()
-    }
-
-    /// The motion of something placed by `before` while the shutter is open; `None` where it rests.
-    pub(super) fn motion(&self, before: Affine3A, shutter: Shutter) -> Option<Motion> {
-        if shutter.stays_open == 0.0 {
-            return None;
-        }
-        moving(self.times(shutter, 0), shutter, |time| self.pose(time), before)
-    }
-}
-
 /// An object's `transform`: a list of steps, applied in this order.
 pub(super) fn transform(list: &Value) -> Result<Affine3A, LoadError> {
     let mut total = Affine3A::IDENTITY;
@@ -150,7 +123,7 @@ pub(super) fn transform(list: &Value) -> Result<Affine3A, LoadError> {
         let step = match kind {
             "scale" => Affine3A::from_scale(scale(&value)?),
             "translate" => Affine3A::from_translation(value.vec3()?),
-            _ => Affine3A::from_quat(rotation(&fields)?.unwrap_or(Quat::IDENTITY)),
+            _ => Affine3A::from_quat(turn(&fields)?.map_or(Quat::IDENTITY, Turn::rotation)),
         };
         total = step * total;
     }
@@ -166,14 +139,25 @@ fn scale(value: &Value) -> Result<Vec3, LoadError> {
     Ok(scale)
 }
 
+/// A rotation as it is written, by any number of full turns.
+#[derive(Clone, Copy, Debug)]
+struct Turn {
+    axis: Vec3,
+    degrees: f64,
+}
+
+impl Turn {
+    /// The quaternion of the whole turn: that of 360° more has the opposite sign.
+    fn rotation(self) -> Quat {
+        Quat::from_axis_angle(self.axis, (self.degrees % 720.0).to_radians() as f32)
+    }
+}
+
 /// `rotate_deg` about `axis`.
-fn rotation(fields: &Fields) -> Result<Option<Quat>, LoadError> {
+fn turn(fields: &Fields) -> Result<Option<Turn>, LoadError> {
     match (fields.get("rotate_deg"), fields.get("axis")) {
         (None, None) => Ok(None),
-        (Some(angle), Some(axis)) => {
-            let radians = (angle.number()? % 360.0).to_radians() as f32;
-            Ok(Some(Quat::from_axis_angle(axis.direction()?, radians)))
-        }
+        (Some(angle), Some(axis)) => Ok(Some(Turn { axis: axis.direction()?, degrees: angle.number()? })),
         _ => Err(fields.error("rotate_deg and axis belong together")),
     }
 }

@@ -17,6 +17,7 @@ pub(super) struct Objects<'m, 'a> {
     /// By path and whether its own materials are used.
     files: HashMap<(PathBuf, bool), Vec<(MeshId, MaterialId)>>,
     read: usize,
+    any_moves: bool,
 }
 
 /// What every object has.
@@ -25,11 +26,18 @@ struct Placement {
     material: Option<Entry>,
     to_world: Affine3A,
     motion: Option<Motion>,
+    /// Whether a sphere is one at all times.
+    stays_round: bool,
 }
 
 impl<'m, 'a> Objects<'m, 'a> {
     pub(super) fn new(materials: &'m Materials<'a>) -> Self {
-        Self { materials, files: HashMap::new(), read: 0 }
+        Self { materials, files: HashMap::new(), read: 0, any_moves: false }
+    }
+
+    /// Whether an object that was read has keyframes.
+    pub(super) fn any_moves(&self) -> bool {
+        self.any_moves
     }
 
     /// Reads one object.
@@ -50,8 +58,10 @@ impl<'m, 'a> Objects<'m, 'a> {
         self.read += 1;
 
         let mut to_world = fields.get_or("transform", Affine3A::IDENTITY, motion::transform)?;
-        let mut moves = None;
+        let (mut moves, mut stays_round) = (None, shapes::similarity_scale(&to_world).is_some());
         if let Some(keyframes) = fields.get_some("keyframes", motion::object_keyframes)? {
+            self.any_moves = true;
+            stays_round = keyframes.leave_spheres(to_world);
             moves = keyframes.motion(to_world, context.shutter);
             to_world = keyframes.at(context.shutter.opens) * to_world;
         }
@@ -62,6 +72,7 @@ impl<'m, 'a> Objects<'m, 'a> {
             material: fields.get_some("material", |name| self.materials.find(name))?,
             to_world,
             motion: moves,
+            stays_round,
         };
         if kind == "mesh" {
             return self.place_file(context, &shape, placement);
@@ -132,22 +143,20 @@ fn place_mesh(context: &mut Context, mesh: Mesh, fields: &Fields, placement: Pla
     Ok(())
 }
 
-/// A sphere stays analytic as long as the transform leaves it a sphere.
+/// A sphere stays analytic if its transform leaves it a sphere at all times: what is a sphere in one frame and a mesh in another
+/// would change the numbers of other objects, by which velocities know them.
 fn place_sphere(context: &mut Context, shape: &Value, fields: &Fields, placement: Placement) -> Result<(), LoadError> {
     let own = shape.fields(&["center", "radius"])?;
     let center = own.require("center")?.vec3()?;
     let radius = own.require("radius")?.positive()? as f32;
     let entry = placement.material.ok_or_else(|| fields.error("\"material\" is missing"))?;
-    // Between two similarities everything is one, too.
-    let stays_round = placement
-        .motion
-        .as_ref()
-        .is_none_or(|motion| motion.keys().iter().all(|key| shapes::similarity_scale(&motion.at(key.time)).is_some()));
-    let Some(scale) = shapes::similarity_scale(&placement.to_world).filter(|_| stays_round) else {
+    if !placement.stays_round {
         let mut mesh = shapes::sphere(center, radius);
         mesh.name.clone_from(&placement.name);
         return place_mesh(context, mesh, fields, placement);
-    };
+    }
+    // Between keyframes of opposite scales it is a point for a moment, too small to be met.
+    let scale = shapes::similarity_scale(&placement.to_world).unwrap_or(f32::MIN_POSITIVE / radius);
     let radius = radius * scale;
     let center = placement.to_world.transform_point3(center);
     if !(radius > 0.0 && radius.is_finite() && center.is_finite()) {
