@@ -7,7 +7,9 @@ use super::seeing::{self, parse_positive, parse_seconds};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use fechner::adaptive::glimpse::glimpse;
-use fechner::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, RivalRule, Sampling};
+use fechner::adaptive::settings::{
+    AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, RivalRule, Sampling, THRESHOLD,
+};
 use fechner::checkpoint::SettingsRecord;
 use fechner::integrator::{Crop, DEFAULT_MAX_DEPTH, Pruning, TraceSettings};
 use fechner::output::rendered::Background;
@@ -363,19 +365,27 @@ fn whole_light(scene: &Arc<Scene>, trace: &TraceSettings) -> Option<SceneLight> 
 /// When to stop.
 fn limits(arguments: &JobArguments, scene: &Scene, sampling: Sampling) -> Limits {
     let asked = arguments.visibility.or(arguments.quality.map(Quality::visibility));
-    let visibility = match (asked, sampling) {
-        (Some(visibility), _) => visibility,
-        // A uniform render of so many samples, seconds or plans is what was asked for, not an early end.
-        (None, Sampling::Uniform) if arguments.has_other_limit() => 0.0,
-        (None, _) => scene.viewing.visibility.unwrap_or(1.0),
-    };
     Limits {
-        visibility,
+        visibility: visibility_limit(asked, scene, sampling, arguments.has_other_limit()),
         time: arguments.time,
         mean_samples: arguments.spp,
         max_samples: arguments.max_spp.unwrap_or(DEFAULT_MAX_SAMPLES),
         plans: arguments.plans,
         pilot_samples: arguments.denoise.pilot_samples(),
+    }
+}
+
+/// The visibility to stop at: command line before scene before threshold.
+pub(super) fn visibility_limit(
+    asked: Option<f64>,
+    scene: &Scene,
+    sampling: Sampling,
+    has_other_limit: bool,
+) -> Option<f64> {
+    match sampling {
+        // A uniform render of so many samples, seconds or plans is what was asked for, not an early end.
+        Sampling::Uniform if has_other_limit => asked,
+        _ => asked.or(scene.viewing.visibility).or(Some(THRESHOLD)),
     }
 }
 

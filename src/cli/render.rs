@@ -65,7 +65,7 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     let (state, seeds, keeper) = if arguments.checkpoint.is_wanted() {
         let origin = Origin::of(&scene, &trace);
         let seeds = Seeds::one(trace.seed);
-        let header = Header { origin, seeds, settings: record, visibility: settings.limits.visibility };
+        let header = Header { origin, seeds, settings: record, visibility: settings.limits.last_rung() };
         let start = arguments.checkpoint.start(header, fresh, &settings.limits)?;
         (start.state, start.header.seeds.all.clone(), Some(Keeper::new(&arguments.checkpoint, start.header)))
     } else {

@@ -130,7 +130,7 @@ impl Report {
         let pixels = u64::from(film.width()) * u64::from(film.height());
         let judgement = &rendered.judgement;
         let display = &settings.viewing.display;
-        let target = (settings.limits.visibility > 0.0).then_some(settings.limits.visibility);
+        let target = settings.limits.visibility;
         let predicted = judgement.is_known.then_some(&judgement.predicted);
         let quantile = |share: f64| predicted.map(|predicted| predicted.quantile(share));
         let energy = |p: &Plane| p.values().iter().map(|&v| f64::from(v) * f64::from(v)).sum::<f64>();

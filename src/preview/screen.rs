@@ -236,7 +236,9 @@ impl Screen {
                 layer::logarithmic(&counts, "samples")
             }
             (Layer::Threshold, Some(looked)) => layer::logarithmic(&looked.threshold, "cd/m²"),
-            (Layer::Visibility, Some(looked)) => layer::visibility(&looked.visibility, settings.limits.visibility),
+            (Layer::Visibility, Some(looked)) => {
+                layer::visibility(&looked.visibility, settings.limits.visibility_or_threshold())
+            }
             (Layer::Threshold | Layer::Visibility, None) => layer::nothing_yet(film),
             (Layer::Variance, _) => {
                 layer::logarithmic(&picture_variance(film, settings.nits_per_unit), "(cd/m²)², of the scene")
