@@ -125,7 +125,7 @@ impl Arm {
                 settings.limits.mean_samples = Some(samples_of(knob).min(most));
             }
             Arm::Tvi | Arm::Ramasubramanian | Arm::Yee | Arm::BolinMeyer => by_model(&mut settings, self.name())?,
-            Arm::NoPooling => by_model(&mut settings, "csf-bands")?,
+            Arm::NoPooling => by_model(&mut settings, model::DEFAULT)?,
             Arm::NoMasking => by_model(&mut settings, "csf-unmasked")?,
             Arm::NoCsf => by_model(&mut settings, "tvi-masked")?,
             Arm::LocalRule => {

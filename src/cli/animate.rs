@@ -13,7 +13,7 @@ mod video;
 use super::console::duration_in_words;
 use super::denoise::DenoiseChoice;
 use super::job::{Quality, Size, parse_size};
-use super::seeing::{parse_positive, parse_seconds};
+use super::seeing::{AskedShowing, parse_positive, parse_seconds};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use frames::{Frames, parse_frames};
@@ -183,6 +183,15 @@ impl AnimateArguments {
     /// Numbers of the frames to render.
     pub(super) fn frame_numbers(&self) -> std::ops::RangeInclusive<u32> {
         self.frames.first..=self.frames.last
+    }
+
+    /// How the command line has the frames shown.
+    fn asked_showing(&self) -> AskedShowing<'_> {
+        AskedShowing {
+            display: self.display.as_deref(),
+            operator: self.operator.as_deref(),
+            exposure_stops: self.exposure,
+        }
     }
 
     /// Whether eyes are to follow what moves.

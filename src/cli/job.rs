@@ -3,7 +3,7 @@
 use super::console;
 use super::denoise::DenoiseChoice;
 use super::importance;
-use super::seeing::{self, parse_positive, parse_seconds};
+use super::seeing::{self, AskedShowing, Showing, parse_positive, parse_seconds};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use fechner::adaptive::glimpse::glimpse;
@@ -95,7 +95,7 @@ pub(super) struct JobArguments {
     display: Option<String>,
     /// Threshold model that drives the sampling: csf-bands, tvi, ramasubramanian, yee, bolin-meyer;
     /// csf-unmasked and tvi-masked show what a part is worth. Only csf-bands can judge denoised pictures.
-    #[arg(long, value_name = "NAME", default_value = "csf-bands", help_heading = "Seeing")]
+    #[arg(long, value_name = "NAME", default_value = model::DEFAULT, help_heading = "Seeing")]
     model: String,
     /// Area in deg² over which the eye sums contrast.
     #[arg(long, value_name = "DEG2", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Seeing")]
@@ -411,14 +411,17 @@ fn check_rule(arguments: &JobArguments) -> anyhow::Result<()> {
 
 /// How to sample and for whom: command line before scene before default.
 fn settings_record(arguments: &JobArguments, scene: &Scene) -> anyhow::Result<SettingsRecord> {
-    let view = &scene.viewing;
-    let display_name = arguments.display.as_deref().or(view.display.as_deref()).unwrap_or("desktop");
-    let viewing = seeing::viewing(display_name, arguments.csf_area)?;
-    let operator = arguments.operator.as_deref().or(view.operator.as_deref()).unwrap_or("constant");
-    let default_model = model::names()[0];
-    if arguments.denoise.kind().is_some() && arguments.model != default_model {
+    let asked = AskedShowing {
+        display: arguments.display.as_deref(),
+        operator: arguments.operator.as_deref(),
+        exposure_stops: arguments.exposure,
+    };
+    let Showing { display, operator, exposure_stops } = asked.of_scene(scene);
+    let viewing = seeing::viewing(display, arguments.csf_area)?;
+    if arguments.denoise.kind().is_some() && arguments.model != model::DEFAULT {
         bail!(
-            "--denoise is for --model {default_model}: {} cannot say what is seen of a denoised picture",
+            "--denoise is for --model {}: {} cannot say what is seen of a denoised picture",
+            model::DEFAULT,
             arguments.model
         );
     }
@@ -443,7 +446,7 @@ fn settings_record(arguments: &JobArguments, scene: &Scene) -> anyhow::Result<Se
         viewing,
         nits_per_unit: scene.nits_per_unit,
         operator: operator.to_owned(),
-        exposure_stops: arguments.exposure.or(view.exposure_stops),
+        exposure_stops,
         fitted: None,
         importance: None,
         denoiser: arguments.denoise.kind(),

@@ -8,6 +8,7 @@ use fechner::adaptive::statistics::find_outliers;
 use fechner::adaptive::{Rendered, StopReason, visible_share};
 use fechner::output::{self, Attribute};
 use fechner_perception::Plane;
+use fechner_perception::model;
 use fechner_perception::psychometric::detection_probability;
 use serde::Serialize;
 
@@ -144,7 +145,7 @@ impl Report {
             seed: seeds[0],
             seeds: seeds.to_vec(),
             sampling: sampling_name(settings.sampling),
-            model: settings.model.as_ref().map_or("csf-bands", |model| model.name()),
+            model: settings.model.as_ref().map_or(model::DEFAULT, |model| model.name()),
             csf: if settings.frames.is_some() { "castle-fresh-noise" } else { "castle" },
             operator: judgement.tone.describe(),
             nits_per_unit: settings.nits_per_unit,

@@ -2,16 +2,53 @@
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use fechner::scene::Scene;
 use fechner_perception::display::{Display, Viewing};
 use fechner_perception::tone::{self, ToneOperator, ToneSettings};
 use std::path::Path;
 use std::time::Duration;
 
+/// The display where none is named.
+pub(super) const DEFAULT_DISPLAY: &str = "desktop";
+/// The tone operator where none is named.
+pub(super) const DEFAULT_OPERATOR: &str = "constant";
+
+/// How a scene is shown: command line before scene before default.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Showing<'a> {
+    /// Name or file of the display.
+    pub(super) display: &'a str,
+    /// Name of the tone operator.
+    pub(super) operator: &'a str,
+    /// Exposure correction; `None` where nobody asked for one.
+    pub(super) exposure_stops: Option<f64>,
+}
+
+/// What of [`Showing`] the command line says.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct AskedShowing<'a> {
+    pub(super) display: Option<&'a str>,
+    pub(super) operator: Option<&'a str>,
+    pub(super) exposure_stops: Option<f64>,
+}
+
+impl<'a> AskedShowing<'a> {
+    /// What is left open as the scene has it.
+    pub(super) fn of_scene(self, scene: &'a Scene) -> Showing<'a> {
+        let view = &scene.viewing;
+        Showing {
+            display: self.display.or(view.display.as_deref()).unwrap_or(DEFAULT_DISPLAY),
+            operator: self.operator.or(view.operator.as_deref()).unwrap_or(DEFAULT_OPERATOR),
+            exposure_stops: self.exposure_stops.or(view.exposure_stops),
+        }
+    }
+}
+
 /// Display, observer and units, for commands that judge pictures.
 #[derive(Debug, Args)]
 pub(super) struct SeeingArguments {
     /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file.
-    #[arg(long, value_name = "NAME|FILE", default_value = "desktop")]
+    #[arg(long, value_name = "NAME|FILE", default_value = DEFAULT_DISPLAY)]
     display: String,
     /// Contrast sensitivity function.
     #[arg(long, value_name = "NAME", default_value = "castle")]

@@ -19,7 +19,7 @@ use std::path::Path;
 pub(super) fn shot_settings(arguments: &AnimateArguments, scene: &Scene, shot: Frames) -> Result<ShotSettings> {
     let size = arguments.size.unwrap_or(Size { width: scene.film.width, height: scene.film.height });
     check_memory(size)?;
-    let display = arguments.display.as_deref().or(scene.viewing.display.as_deref()).unwrap_or("desktop");
+    let display = arguments.asked_showing().of_scene(scene).display;
     let asked = arguments.visibility.or(arguments.quality.map(Quality::visibility));
     let sampling = match arguments.sampling {
         SamplingChoice::Adaptive => Sampling::Adaptive,
