@@ -3,7 +3,7 @@
 use super::console;
 use super::denoise::DenoiseChoice;
 use super::importance;
-use super::seeing::{self, AskedShowing, Showing, parse_positive, parse_seconds};
+use super::seeing::{self, AskedShowing, Showing, model_values, operator_values, parse_positive, parse_seconds};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use fechner::adaptive::glimpse::glimpse;
@@ -39,7 +39,8 @@ pub(super) struct JobArguments {
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
     at: f64,
 
-    /// Stop when the remaining noise is at most this visible: 1 is at threshold.
+    /// Stop when the remaining noise is at most this visible: 1 is at threshold [default: the scene's, else 1; none for uniform
+    /// sampling with --spp, --time or --plans].
     #[arg(long, value_name = "V", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Until")]
     visibility: Option<f64>,
     /// The same, by name.
@@ -52,8 +53,8 @@ pub(super) struct JobArguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Until")]
     spp: Option<u32>,
     /// Most samples of one pixel.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(16..), help_heading = "Until")]
-    max_spp: Option<u32>,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(16..), default_value_t = DEFAULT_MAX_SAMPLES, help_heading = "Until")]
+    max_spp: u32,
     /// Stop after this many plans: repeats a render that ended by --time.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Until")]
     plans: Option<u32>,
@@ -74,8 +75,8 @@ pub(super) struct JobArguments {
     #[arg(long, value_enum, value_name = "BY", help_heading = "Sampling")]
     prune: Option<PruneChoice>,
     /// Most scattering events of a path.
-    #[arg(long, value_name = "N", help_heading = "Sampling")]
-    max_depth: Option<u32>,
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_MAX_DEPTH, help_heading = "Sampling")]
+    max_depth: u32,
     /// Pixel filter.
     #[arg(long, value_enum, default_value = "gaussian", help_heading = "Sampling")]
     filter: FilterChoice,
@@ -90,14 +91,15 @@ pub(super) struct JobArguments {
     #[arg(long, default_value_t = 0, help_heading = "Sampling")]
     seed: u64,
 
-    /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file.
+    /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file
+    /// [default: the scene's, else desktop].
     #[arg(long, value_name = "NAME|FILE", help_heading = "Seeing")]
     display: Option<String>,
-    /// Threshold model that drives the sampling: csf-bands, tvi, ramasubramanian, yee, bolin-meyer;
-    /// csf-unmasked and tvi-masked show what a part is worth. Only csf-bands can judge denoised pictures.
-    #[arg(long, value_name = "NAME", default_value = model::DEFAULT, help_heading = "Seeing")]
+    /// Threshold model that drives the sampling; csf-unmasked and tvi-masked show what a part of csf-bands is worth. Only
+    /// csf-bands can judge denoised pictures.
+    #[arg(long, value_name = "NAME", value_parser = model_values(), default_value = model::DEFAULT, help_heading = "Seeing")]
     model: String,
-    /// Area in deg² over which the eye sums contrast.
+    /// Area in deg² over which the eye sums contrast [default: the display's, else 1].
     #[arg(long, value_name = "DEG2", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Seeing")]
     csf_area: Option<f64>,
     /// Luminance in cd/m² of RGB (1, 1, 1), in place of the scene's.
@@ -111,10 +113,10 @@ pub(super) struct JobArguments {
     /// Leave out what surrounds the scene and write alpha: straight in PNG, premultiplied in EXR.
     #[arg(long, help_heading = "Picture")]
     transparent: bool,
-    /// Tone operator.
-    #[arg(long, value_name = "NAME", help_heading = "Picture")]
+    /// Tone operator [default: the scene's, else constant].
+    #[arg(long, value_name = "NAME", value_parser = operator_values(), help_heading = "Picture")]
     operator: Option<String>,
-    /// Exposure correction in stops.
+    /// Exposure correction in stops [default: the scene's, else 0].
     #[arg(long, value_name = "STOPS", allow_negative_numbers = true, help_heading = "Picture")]
     exposure: Option<f64>,
 
@@ -331,7 +333,7 @@ fn trace_settings(arguments: &JobArguments, size: Size, nits_per_unit: f64) -> a
         width: size.width,
         height: size.height,
         seed: arguments.seed,
-        max_depth: arguments.max_depth.unwrap_or(DEFAULT_MAX_DEPTH),
+        max_depth: arguments.max_depth,
         clamp: arguments.clamp.map(|clamp| clamp as f32),
         filter: match arguments.filter {
             FilterChoice::Box => PixelFilter::Box,
@@ -369,7 +371,7 @@ fn limits(arguments: &JobArguments, scene: &Scene, sampling: Sampling) -> Limits
         visibility: visibility_limit(asked, scene, sampling, arguments.has_other_limit()),
         time: arguments.time,
         mean_samples: arguments.spp,
-        max_samples: arguments.max_spp.unwrap_or(DEFAULT_MAX_SAMPLES),
+        max_samples: arguments.max_spp,
         plans: arguments.plans,
         pilot_samples: arguments.denoise.pilot_samples(),
     }

@@ -2,8 +2,10 @@
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser};
 use fechner::scene::Scene;
 use fechner_perception::display::{Display, Viewing};
+use fechner_perception::model;
 use fechner_perception::tone::{self, ToneOperator, ToneSettings};
 use std::path::Path;
 use std::time::Duration;
@@ -53,7 +55,7 @@ pub(super) struct SeeingArguments {
     /// Contrast sensitivity function.
     #[arg(long, value_name = "NAME", default_value = "castle")]
     pub(super) csf: String,
-    /// Area in deg² over which the eye sums contrast.
+    /// Area in deg² over which the eye sums contrast [default: the display's, else 1].
     #[arg(long, value_name = "DEG2", value_parser = parse_positive, allow_negative_numbers = true)]
     csf_area: Option<f64>,
     /// Luminance in cd/m² of RGB (1, 1, 1), for files that do not say it.
@@ -94,6 +96,28 @@ pub(super) fn tone_operator(name: &str, settings: &ToneSettings) -> Result<Box<d
     tone::operator_with(name, settings).with_context(|| {
         let known = tone::operator_names().join(", ");
         format!("there is no tone operator \"{name}\"; known: {known}")
+    })
+}
+
+/// Names of threshold models.
+pub(super) fn model_values() -> PossibleValuesParser {
+    PossibleValuesParser::new(model::names())
+}
+
+/// Names and initials of tone operators.
+pub(super) fn operator_values() -> PossibleValuesParser {
+    PossibleValuesParser::new(named_operators())
+}
+
+/// The same, and "all".
+pub(super) fn operator_values_or_all() -> PossibleValuesParser {
+    PossibleValuesParser::new(named_operators().chain([PossibleValue::new("all")]))
+}
+
+fn named_operators() -> impl Iterator<Item = PossibleValue> {
+    tone::operator_names().iter().map(|&name| {
+        let initials = tone::operator_initials().iter().filter(move |(_, full)| *full == name);
+        PossibleValue::new(name).aliases(initials.map(|(initials, _)| *initials))
     })
 }
 

@@ -5,7 +5,7 @@ use super::{AnimateArguments, EyeChoice, SamplingChoice, VelocityChoice};
 use crate::cli::job::{Quality, Size, check_memory, visibility_limit};
 use crate::cli::seeing;
 use anyhow::{Context, Result, bail};
-use fechner::adaptive::settings::{DEFAULT_MAX_SAMPLES, Limits, Sampling};
+use fechner::adaptive::settings::{Limits, Sampling};
 use fechner::animate::ShotSettings;
 use fechner::animate::eye::Eye;
 use fechner::animate::gaze::GazeTrack;
@@ -37,7 +37,7 @@ pub(super) fn shot_settings(arguments: &AnimateArguments, scene: &Scene, shot: F
             visibility: visibility_limit(asked, scene, sampling, has_other_limit),
             time: None,
             mean_samples: arguments.spp,
-            max_samples: arguments.max_spp.unwrap_or(DEFAULT_MAX_SAMPLES),
+            max_samples: arguments.max_spp,
             plans: None,
             pilot_samples: arguments.denoise.pilot_samples(),
         },
