@@ -10,7 +10,7 @@
 mod support;
 
 use anyhow::{Context, Result};
-use fechner::adaptive::settings::{Limits, LoopSettings, Sampling};
+use fechner::adaptive::settings::{Limits, LoopSettings, Sampling, THRESHOLD};
 use fechner::adaptive::{Quiet, Rendered, render};
 use fechner::integrator::{PathTracer, TraceSettings};
 use fechner::sampler::Sequence;
@@ -112,12 +112,12 @@ fn visible_error(
 
 fn rendered(scene: &Arc<Scene>, sequence: Sequence, seed: u64, effort: Effort) -> Result<Rendered> {
     let (sampling, visibility, mean_samples) = match effort {
-        Effort::Samples(samples) => (Sampling::Uniform, 0.0, Some(samples)),
-        Effort::Visibility(visibility) => (Sampling::Adaptive, visibility, None),
+        Effort::Samples(samples) => (Sampling::Uniform, None, Some(samples)),
+        Effort::Visibility(visibility) => (Sampling::Adaptive, Some(visibility), None),
     };
     let viewing = Viewing::of(Display::preset("desktop").context("a preset")?);
     let operator = operator("constant", None).context("an operator")?;
-    let limits = Limits { mean_samples, ..Limits::of_visibility(visibility) };
+    let limits = Limits { visibility, mean_samples, ..Limits::of_visibility(THRESHOLD) };
     let settings = LoopSettings { sampling, limits, ..LoopSettings::new(viewing, scene.nits_per_unit, operator) };
     let trace = TraceSettings { sequence, ..TraceSettings::new(SIZE, SIZE, seed) };
     Ok(render(&PathTracer::new(Arc::clone(scene), trace), &settings, &Quiet)?)

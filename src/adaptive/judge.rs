@@ -1,21 +1,20 @@
 //! The film as it will be seen: thresholds, remaining visibility, and how each pixel's samples scatter on the display.
 
+mod steps;
+
+use self::steps::{Guide, Scatter, chromatic_gains, found_thresholds};
 use super::denoised::{DenoisedPicture, TimedDenoising};
 use super::settings::LoopSettings;
-use super::statistics::{SampleStatistics, by_channel};
+use super::statistics::by_channel;
 use crate::denoise::{Denoiser, OidnError};
 use crate::film::{CHANNELS, Estimate, Film};
 use crate::sampler::Half;
 use fechner_perception::Plane;
-use fechner_perception::csf::{CastleCsf, ContrastSensitivity, FreshNoise};
 use fechner_perception::guide::{GuideInputs, denoise};
-use fechner_perception::model::ModelInputs;
 use fechner_perception::seen;
-use fechner_perception::threshold::{ThresholdInputs, ThresholdMap, threshold_map};
-use fechner_perception::tone::acuity::BehindAcuity;
-use fechner_perception::tone::{FittedTone, SceneLight};
+use fechner_perception::threshold::ThresholdMap;
+use fechner_perception::tone::FittedTone;
 use fechner_perception::visibility::MeasuredError;
-use std::borrow::Cow;
 use std::sync::OnceLock;
 use std::time::Instant;
 
@@ -110,107 +109,74 @@ fn judge_by(
 ) -> Result<Judgement, JudgeError> {
     let started = Instant::now();
     let estimate = film.estimate(settings.nits_per_unit);
-    let denoised = match denoiser {
-        Some(denoiser) => Some(TimedDenoising::of(denoiser, film, settings.nits_per_unit)?),
-        None => None,
-    };
-    let guide_rgb = denoised
-        .as_ref()
-        .map_or_else(|| Cow::Owned(guide_rgb(film, &estimate)), |found| Cow::Borrowed(&found.film.rgb_cd_m2[..]));
-    let light = SceneLight::of(settings.operator.as_ref(), film.width() as usize, &guide_rgb);
-    let guide = light.luminance_cd_m2();
-    still_wanted(settings)?;
-    let tone = match &settings.fitted {
-        Some(fitted) => fitted.clone().restore(),
-        None => settings.operator.fit(&light.guide(), &settings.viewing, None),
-    };
-    let raw_inflation = if denoised.is_some() { 1.0 } else { inflation };
-    let shares = variance_shares(film);
-    let scale = display_scale(film, &shares, guide, tone.as_ref(), settings, raw_inflation);
-    let statistics = SampleStatistics::of(film, &scale);
-    still_wanted(settings)?;
-    let displayed_guide = seen::display_luminance(tone.as_ref(), &settings.viewing.display, guide);
-    let luminance_variance =
-        statistics.luminance().stratified_variance().combined(&shares, |sample, share| sample * share);
-    // The noise before denoising bounds what is left of it in the guide, so masking fades in as samples come.
-    // Noise goes through the loss of acuity that the operator shows, as the picture does.
-    let csf = BehindAcuity { csf: contrast_sensitivity(settings)?, acuity: tone.acuity() };
-    let thresholds = threshold_map(
-        &ThresholdInputs { display_luminance_cd_m2: &displayed_guide, guide_variance: Some(&luminance_variance) },
-        &settings.viewing,
-        &csf,
-    )?;
-    let thresholds = if settings.gazes.is_empty() { thresholds } else { thresholds.with_gazes(&settings.gazes) };
-    let thresholds = match (&settings.pursuit, settings.frames) {
-        (Some(pursuit), Some(timing)) => {
-            let size = (guide.width(), guide.height());
-            let eye = pursuit.eye_velocity_deg_s(&guide_rgb, size, tone.as_ref(), &settings.viewing.display)?;
-            thresholds.with_pursuit(&eye, timing)?
-        }
-        _ => thresholds,
-    };
-    still_wanted(settings)?;
-    let pixel_thresholds = match &settings.model {
-        None => None,
-        Some(model) => Some(model.allowed_standard_error_cd_m2(&ModelInputs {
-            display_luminance_cd_m2: &displayed_guide,
-            guide_variance: Some(&luminance_variance),
-            image_velocity_deg_s: None,
-            attention: None,
-            viewing: &settings.viewing,
-            csf: &csf,
-        })?),
-    };
-
-    // A model of luminance alone judges luminance alone.
-    let gains = match (&settings.model, settings.frames) {
-        (Some(_), _) => None,
-        (None, None) => Some(thresholds.chromatic_gains()?),
-        (None, Some(timing)) => Some(thresholds.chromatic_gains_of_fresh_noise(timing)?),
-    };
-    still_wanted(settings)?;
-    let most_visible = |channel: &(dyn Fn(usize) -> Plane + Sync)| match &gains {
-        None => channel(0),
-        Some(gains) => thresholds.luminance_equivalent_variance(gains, by_channel(channel).each_ref()),
-    };
-    let pooled_variance_per_sample = most_visible(&|c| statistics.channels[c].stratified_variance());
-    let variance_per_sample = (purpose == Purpose::Plan).then(|| {
-        Half::BOTH.map(|half| most_visible(&|c| statistics.stratified_variance_for_half(film, &scale, half, c)))
-    });
-    still_wanted(settings)?;
+    let denoised = denoiser.map(|denoiser| TimedDenoising::of(denoiser, film, settings.nits_per_unit)).transpose()?;
     let seconds_denoising = denoised.as_ref().map_or(0.0, |found| found.seconds);
+    let raw_inflation = if denoised.is_some() { 1.0 } else { inflation };
+
+    let guide = Guide::of(film, &estimate, denoised.as_ref(), settings);
+    still_wanted(settings)?;
+    let tone = guide.tone(settings);
+    let scatter = Scatter::of(film, guide.luminance_cd_m2(), tone.as_ref(), settings, raw_inflation);
+    still_wanted(settings)?;
+    let (thresholds, pixel_thresholds) =
+        found_thresholds(&guide, tone.as_ref(), &scatter.luminance_variance_of_mean(), settings)?;
+    let gains = chromatic_gains(&thresholds, settings)?;
+    still_wanted(settings)?;
+    let pooled_variance_per_sample = scatter.pooled_per_sample(&thresholds, gains.as_ref());
+    let variance_per_sample =
+        (purpose == Purpose::Plan).then(|| scatter.per_sample_of_halves(film, &thresholds, gains.as_ref()));
+    still_wanted(settings)?;
     let denoised = match denoised {
-        Some(found) => Some(found.judged(film, settings, tone.as_ref(), &thresholds, &estimate)?),
+        Some(found) => {
+            let mut picture = found.judged(film, settings, tone.as_ref(), &thresholds, &estimate)?;
+            picture.error.raise_inferred(inflation.sqrt());
+            Some(picture)
+        }
         None => None,
     };
     still_wanted(settings)?;
-    let mut judgement = Judgement {
+    let is_known = film.has_both_halves();
+    let predicted = if !is_known {
+        Plane::filled(film.width() as usize, film.height() as usize, f32::INFINITY)
+    } else if let Some(denoised) = &denoised {
+        per_importance(denoised.error.blended_visibility.clone(), settings.importance.as_ref())
+    } else {
+        let of_mean = scatter.of_mean(&pooled_variance_per_sample);
+        per_importance(visibility_under(&thresholds, pixel_thresholds.as_ref(), &of_mean), settings.importance.as_ref())
+    };
+    Ok(Judgement {
         estimate,
         denoised,
-        seconds: 0.0,
+        seconds: started.elapsed().as_secs_f64(),
         seconds_denoising,
         tone,
         thresholds,
         pixel_thresholds,
         importance: settings.importance.clone(),
-        is_known: film.has_both_halves(),
-        predicted: Plane::filled(0, 0, 0.0),
+        is_known,
+        predicted,
         pooled_variance_per_sample,
         variance_per_sample,
         measured: OnceLock::new(),
-    };
-    match judgement.denoised.take() {
-        Some(denoised) => judgement.turn_to(denoised, inflation),
-        None => {
-            let of_mean = judgement.pooled_variance_per_sample.combined(&shares, |sample, share| sample * share);
-            judgement.predicted = judgement.visibility_of(&of_mean);
-        }
+    })
+}
+
+/// Visibility, without importance, of a picture whose displayed luminance has this variance, (cd/m²)².
+fn visibility_under(thresholds: &ThresholdMap, pixel_thresholds: Option<&Plane>, display_variance: &Plane) -> Plane {
+    match pixel_thresholds {
+        None => thresholds.predicted_visibility(display_variance),
+        Some(allowed) => Plane::from_fn(allowed.width(), allowed.height(), |x, y| {
+            display_variance.get(x, y).sqrt() / allowed.get(x, y)
+        }),
     }
-    if !judgement.is_known {
-        judgement.predicted = judgement.predicted.map(|_| f32::INFINITY);
+}
+
+/// A visibility under thresholds that importance multiplies.
+fn per_importance(visibility: Plane, importance: Option<&Plane>) -> Plane {
+    match importance {
+        None => visibility,
+        Some(map) => visibility.combined(map, |visibility, factor| visibility / factor),
     }
-    judgement.seconds = started.elapsed().as_secs_f64();
-    Ok(judgement)
 }
 
 /// Between the parts of a look: goes on unless the look is of no use any more.
@@ -219,23 +185,7 @@ pub(crate) fn still_wanted(settings: &LoopSettings) -> Result<(), JudgeError> {
     if is_outdated { Err(JudgeError::Outdated) } else { Ok(()) }
 }
 
-/// Of the eye for noise that stands still, or that is new in every frame.
-fn contrast_sensitivity(settings: &LoopSettings) -> Result<Box<dyn ContrastSensitivity>, JudgeError> {
-    let area_deg2 = settings.viewing.observer.csf_area_deg2;
-    Ok(match settings.frames {
-        None => Box::new(CastleCsf::new(area_deg2)?),
-        Some(timing) => Box::new(FreshNoise::new(area_deg2, timing)?),
-    })
-}
-
 impl Judgement {
-    /// Judges the denoised picture in the raw one's place. The variances stay the raw picture's.
-    fn turn_to(&mut self, mut denoised: DenoisedPicture, inflation: f64) {
-        denoised.error.raise_inferred(inflation.sqrt());
-        self.predicted = self.per_importance(denoised.error.blended_visibility.clone());
-        self.denoised = Some(denoised);
-    }
-
     /// The picture that is shown: linear RGB in cd/m², row-major.
     pub fn picture(&self) -> &[[f32; 3]] {
         self.denoised.as_ref().map_or(&self.estimate.rgb_cd_m2, |denoised| &denoised.rgb_cd_m2)
@@ -243,12 +193,7 @@ impl Judgement {
 
     /// Visibility of a picture whose displayed luminance has this variance, (cd/m²)².
     pub fn visibility_of(&self, display_variance: &Plane) -> Plane {
-        self.per_importance(match &self.pixel_thresholds {
-            None => self.thresholds.predicted_visibility(display_variance),
-            Some(allowed) => Plane::from_fn(allowed.width(), allowed.height(), |x, y| {
-                display_variance.get(x, y).sqrt() / allowed.get(x, y)
-            }),
-        })
+        self.per_importance(visibility_under(&self.thresholds, self.pixel_thresholds.as_ref(), display_variance))
     }
 
     /// The same with each pixel's noise judged where it is, before the bands smear it: what the allocation's constraints say. One
@@ -275,12 +220,8 @@ impl Judgement {
         }
     }
 
-    /// A visibility under thresholds that importance multiplies.
     fn per_importance(&self, visibility: Plane) -> Plane {
-        match &self.importance {
-            None => visibility,
-            Some(map) => visibility.combined(map, |visibility, factor| visibility / factor),
-        }
+        per_importance(visibility, self.importance.as_ref())
     }
 
     /// What can be seen of the halves' luminance difference: the same as predicted, measured; of the denoised halves where the

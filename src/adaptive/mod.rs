@@ -363,7 +363,7 @@ pub(crate) fn beginning(blocks: &[BlockWork], most_samples: u64) -> &[BlockWork]
 fn progress(render: &Loop<'_>, judgement: &Judgement, step: &Step) -> Progress {
     let Loop { state: RenderState { film, passes, .. }, settings, rungs, .. } = render;
     let pixels = f64::from(film.width()) * f64::from(film.height());
-    let target = settings.limits.visibility;
+    let target = settings.limits.last_rung();
     let by_budget = settings
         .limits
         .mean_samples

@@ -54,7 +54,7 @@ impl Loop<'_> {
                 self.state.finished_rung = Some(rung);
             }
         }
-        Ok(Step::Stop(if is_reached(judgement, limits.visibility) {
+        Ok(Step::Stop(if is_reached(judgement, limits.last_rung()) {
             StopReason::Visibility
         } else if limits.mean_samples.is_some() {
             StopReason::Samples
@@ -76,7 +76,7 @@ impl Loop<'_> {
         }
         let started = Instant::now();
         let (film, doubled) = (&self.state.film, self.doubled());
-        let rung = self.rungs.front().copied().unwrap_or(self.settings.limits.visibility);
+        let rung = self.rungs.front().copied().unwrap_or(self.settings.limits.last_rung());
         let until_look = self.state.until_look.get_or_insert_with(|| UntilLook::first(film));
         let may_look = until_look.may_look(film);
         let plan = if self.settings.sampling == Sampling::Uniform {

@@ -53,8 +53,8 @@ pub enum AllocationRule {
 /// When to stop; the first that is reached does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// Visibility that may remain; 1 is at threshold. Infinite: only the other limits count.
-    pub visibility: f64,
+    /// Visibility that may remain; 1 is at threshold. `None`: only the other limits count.
+    pub visibility: Option<f64>,
     /// Time since the start; checked between plans.
     pub time: Option<Duration>,
     /// Mean samples a pixel.
@@ -73,13 +73,24 @@ pub const DENOISED_PILOT_SAMPLES: u32 = 4;
 impl Limits {
     /// The visibility that is aimed at; 1, which is at threshold, where only other limits count.
     pub fn visibility_or_threshold(&self) -> f64 {
-        if self.visibility > 0.0 && self.visibility.is_finite() { self.visibility } else { THRESHOLD }
+        self.visibility.unwrap_or(THRESHOLD)
+    }
+
+    /// The visibility at which the ladder ends: 0, which no noise gets below, where only other limits count. So films and the
+    /// viewer state what is aimed at.
+    pub fn last_rung(&self) -> f64 {
+        self.visibility.unwrap_or(0.0)
+    }
+
+    /// What a visibility as [`Self::last_rung`] states it aims at.
+    pub fn visibility_of_last_rung(rung: f64) -> Option<f64> {
+        (rung > 0.0 && rung.is_finite()).then_some(rung)
     }
 
     /// To a visibility, whatever it takes.
     pub fn of_visibility(visibility: f64) -> Self {
         Self {
-            visibility,
+            visibility: Some(visibility),
             time: None,
             mean_samples: None,
             max_samples: DEFAULT_MAX_SAMPLES,
@@ -153,7 +164,7 @@ impl LoopSettings {
     /// The visibilities that are passed on the way to the one that is asked for, largest first. They are fixed, so that a
     /// render continued to a lower rung equals one that went there in one go, both above threshold or both at it or below.
     pub(super) fn rungs(&self) -> Vec<f64> {
-        let target = self.limits.visibility;
+        let target = self.limits.last_rung();
         let highest = match self.denoiser {
             Some(_) => HIGHEST_DENOISED_RUNG,
             None if target > THRESHOLD => HIGHEST_RUNG,
@@ -195,20 +206,20 @@ mod tests {
     #[test]
     fn ladders_share_their_beginnings() {
         let mut settings = settings();
-        let mut rungs = |denoiser: Option<Denoiser>, target: f64| {
+        let mut rungs = |denoiser: Option<Denoiser>, target: Option<f64>| {
             settings.limits.visibility = target;
             settings.denoiser = denoiser;
             settings.rungs()
         };
-        assert_eq!(rungs(None, 100.0), [100.0]);
-        assert_eq!(rungs(None, 3.0), [16.0, 8.0, 4.0, 3.0]);
-        assert_eq!(rungs(None, 2.0), [16.0, 8.0, 4.0, 2.0]);
-        assert_eq!(rungs(None, 1.0), [1.0]);
-        assert_eq!(rungs(None, 0.5), [1.0, 0.5]);
-        assert_eq!(rungs(None, 0.2), [1.0, 0.5, 0.25, 0.2]);
-        assert_eq!(rungs(None, 0.0).len(), 10, "1 to 1/256, and 0");
+        assert_eq!(rungs(None, Some(100.0)), [100.0]);
+        assert_eq!(rungs(None, Some(3.0)), [16.0, 8.0, 4.0, 3.0]);
+        assert_eq!(rungs(None, Some(2.0)), [16.0, 8.0, 4.0, 2.0]);
+        assert_eq!(rungs(None, Some(1.0)), [1.0]);
+        assert_eq!(rungs(None, Some(0.5)), [1.0, 0.5]);
+        assert_eq!(rungs(None, Some(0.2)), [1.0, 0.5, 0.25, 0.2]);
+        assert_eq!(rungs(None, None).len(), 10, "1 to 1/256, and 0");
         let builtin = || Denoiser::open(DenoiserKind::Builtin).ok();
-        assert_eq!(rungs(builtin(), 4.0), [4.0]);
-        assert_eq!(rungs(builtin(), 0.5), [2.0, 1.0, 0.5]);
+        assert_eq!(rungs(builtin(), Some(4.0)), [4.0]);
+        assert_eq!(rungs(builtin(), Some(0.5)), [2.0, 1.0, 0.5]);
     }
 }

@@ -113,7 +113,7 @@ impl Arm {
         let most = (4.0 * uniform_spp).ceil() as u32;
         let by_model = |settings: &mut LoopSettings, name: &str| -> Result<()> {
             settings.model = Some(model::by_name(name).context("a model")?);
-            settings.limits.visibility = knob;
+            settings.limits.visibility = Some(knob);
             settings.limits.mean_samples = Some(most);
             Ok(())
         };
@@ -125,21 +125,21 @@ impl Arm {
                 settings.limits.mean_samples = Some(samples_of(knob).min(most));
             }
             Arm::Tvi | Arm::Ramasubramanian | Arm::Yee | Arm::BolinMeyer => by_model(&mut settings, self.name())?,
-            Arm::NoPooling => by_model(&mut settings, "csf-bands")?,
+            Arm::NoPooling => by_model(&mut settings, model::DEFAULT)?,
             Arm::NoMasking => by_model(&mut settings, "csf-unmasked")?,
             Arm::NoCsf => by_model(&mut settings, "tvi-masked")?,
             Arm::LocalRule => {
                 settings.allocation = AllocationRule::Local;
-                settings.limits.visibility = knob;
+                settings.limits.visibility = Some(knob);
             }
-            Arm::Default => settings.limits.visibility = knob,
+            Arm::Default => settings.limits.visibility = Some(knob),
             Arm::Uniform | Arm::UniformEqualTime => {
                 settings.sampling = Sampling::Uniform;
-                settings.limits.visibility = 0.0;
+                settings.limits.visibility = None;
                 settings.limits.mean_samples = Some(samples_of(knob));
             }
             Arm::ToThreshold => {
-                settings.limits.visibility = THRESHOLD;
+                settings.limits.visibility = Some(THRESHOLD);
                 settings.limits.mean_samples = Some(samples_of(knob));
             }
             Arm::AsAsked | Arm::Oracle => {}

@@ -146,7 +146,7 @@ struct SceneBench<'a> {
 impl SceneBench<'_> {
     fn loop_settings(&self, denoiser: &Denoiser, spp: u32) -> Result<LoopSettings> {
         let mut settings = self.subject.loop_settings()?;
-        settings.limits.visibility = self.settings.target;
+        settings.limits.visibility = Some(self.settings.target);
         settings.limits.mean_samples = Some(spp);
         settings.limits.pilot_samples = DENOISED_PILOT_SAMPLES;
         settings.denoiser = Some(denoiser.clone());
@@ -160,7 +160,7 @@ impl SceneBench<'_> {
     fn calibration(&self, denoiser: &Denoiser, spp: u32, seed: u64) -> Result<Calibration> {
         let mut settings = self.loop_settings(denoiser, spp)?;
         settings.sampling = Sampling::Uniform;
-        settings.limits.visibility = 0.0;
+        settings.limits.visibility = None;
         // One look, at the end.
         settings.limits.pilot_samples = spp;
         let rendered = render(&self.subject.tracer(seed), &settings, &Quiet)?;
@@ -212,7 +212,7 @@ impl SceneBench<'_> {
                 match rule {
                     "uniform" => {
                         settings.sampling = Sampling::Uniform;
-                        settings.limits.visibility = 0.0;
+                        settings.limits.visibility = None;
                         settings.limits.pilot_samples = spp;
                     }
                     "relative" => {
@@ -222,7 +222,7 @@ impl SceneBench<'_> {
                         settings.limits.mean_samples = Some(8 * spp);
                         settings.limits.pilot_samples = 16;
                     }
-                    _ => settings.limits.visibility = 0.01,
+                    _ => settings.limits.visibility = Some(0.01),
                 }
                 let tracer = self.subject.tracer(seed);
                 let rendered = render(&tracer, &settings, &Quiet)?;

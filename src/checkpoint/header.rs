@@ -214,7 +214,7 @@ impl SettingsRecord {
             name: self.model.clone(),
             known: model::names().join(", "),
         })?;
-        Ok(Some(found).filter(|_| self.model != model::names()[0]))
+        Ok(Some(found).filter(|_| self.model != model::DEFAULT))
     }
 
     /// Whether pictures made by both are seen alike, however their samples were spread.

@@ -13,9 +13,10 @@ mod video;
 use super::console::duration_in_words;
 use super::denoise::DenoiseChoice;
 use super::job::{Quality, Size, parse_size};
-use super::seeing::{parse_positive, parse_seconds};
+use super::seeing::{AskedShowing, operator_values, parse_positive, parse_seconds};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
+use fechner::adaptive::settings::DEFAULT_MAX_SAMPLES;
 use frames::{Frames, parse_frames};
 use shot::Made;
 use std::path::{Path, PathBuf};
@@ -49,7 +50,8 @@ pub(super) struct AnimateArguments {
     #[command(flatten)]
     staging: super::staging::Staging,
 
-    /// A frame is done when its remaining noise is at most this visible in motion: 1 is at threshold.
+    /// A frame is done when its remaining noise is at most this visible in motion: 1 is at threshold [default: the scene's, else
+    /// 1; none for uniform sampling with --spp or --time].
     #[arg(long, value_name = "V", value_parser = parse_positive, help_heading = "Until")]
     visibility: Option<f64>,
     /// The same, by name.
@@ -62,8 +64,8 @@ pub(super) struct AnimateArguments {
     #[arg(long, value_name = "S", value_parser = parse_seconds, conflicts_with = "spp", help_heading = "Until")]
     time: Option<Duration>,
     /// Most samples of one pixel.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(16..), help_heading = "Until")]
-    max_spp: Option<u32>,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(16..), default_value_t = DEFAULT_MAX_SAMPLES, help_heading = "Until")]
+    max_spp: u32,
     /// How samples are spread.
     #[arg(long, value_enum, default_value = "adaptive", help_heading = "Sampling")]
     sampling: SamplingChoice,
@@ -74,7 +76,8 @@ pub(super) struct AnimateArguments {
     /// Frames may be paused and looked at: each is held to what a still is.
     #[arg(long, help_heading = "Seeing")]
     pausable: bool,
-    /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file.
+    /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file
+    /// [default: the scene's, else desktop].
     #[arg(long, value_name = "NAME|FILE", help_heading = "Seeing")]
     display: Option<String>,
     /// Luminance in cd/m² of RGB (1, 1, 1), in place of the scene's.
@@ -91,10 +94,10 @@ pub(super) struct AnimateArguments {
     /// smears it, and there may be more. An eye at rest sees the most.
     #[arg(long, value_enum, default_value = "none", help_heading = "Seeing")]
     eye: EyeChoice,
-    /// Tone operator.
-    #[arg(long, value_name = "NAME", help_heading = "Picture")]
+    /// Tone operator [default: the scene's, else constant].
+    #[arg(long, value_name = "NAME", value_parser = operator_values(), help_heading = "Picture")]
     operator: Option<String>,
-    /// Exposure correction in stops.
+    /// Exposure correction in stops [default: the scene's, else 0].
     #[arg(long, value_name = "STOPS", allow_negative_numbers = true, help_heading = "Picture")]
     exposure: Option<f64>,
     /// Take the noise out of every frame: by the built-in filter, or by Open Image Denoise where it is installed.
@@ -189,6 +192,15 @@ impl AnimateArguments {
     /// Numbers of the frames to render.
     pub(super) fn frame_numbers(&self) -> std::ops::RangeInclusive<u32> {
         self.frames.first..=self.frames.last
+    }
+
+    /// How the command line has the frames shown.
+    fn asked_showing(&self) -> AskedShowing<'_> {
+        AskedShowing {
+            display: self.display.as_deref(),
+            operator: self.operator.as_deref(),
+            exposure_stops: self.exposure,
+        }
     }
 
     /// Whether eyes are to follow what moves.

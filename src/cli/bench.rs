@@ -2,7 +2,7 @@
 
 use super::animate::parse_rate;
 use super::denoise::DenoiseChoice;
-use super::seeing::parse_positive;
+use super::seeing::{DEFAULT_DISPLAY, parse_positive};
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use fechner::benchmark::{
@@ -33,7 +33,7 @@ pub(super) struct BenchArguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
     seeds: Option<u32>,
     /// Display preset.
-    #[arg(long, value_name = "NAME", default_value = "desktop")]
+    #[arg(long, value_name = "NAME", default_value = DEFAULT_DISPLAY)]
     display: String,
     /// Samples of the reference, as a multiple of what uniform sampling needs (at least 512, at most 16384 a pixel); in the
     /// suite animation, of 64 a pixel.

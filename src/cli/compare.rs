@@ -5,7 +5,7 @@ mod sequence;
 use super::animate::parse_rate;
 use super::json::write_json;
 use super::picture::InputPicture;
-use super::seeing::{SeeingArguments, tone_operator};
+use super::seeing::{DEFAULT_OPERATOR, SeeingArguments, operator_values, tone_operator};
 use anyhow::{Result, bail};
 use clap::Args;
 use fechner::output::{self, Format};
@@ -29,7 +29,7 @@ pub(super) struct CompareArguments {
     #[command(flatten)]
     seeing: SeeingArguments,
     /// Tone operator that shows scene-linear pictures; it is fitted to the reference, or to the test where only that is one.
-    #[arg(long, value_name = "NAME", default_value = "constant")]
+    #[arg(long, value_name = "NAME", value_parser = operator_values(), default_value = DEFAULT_OPERATOR)]
     operator: String,
     /// Frames a second, of sequences. Beyond its ends a sequence stands still, so that noise in the first and the last fifth
     /// of a second is seen more as in a still.

@@ -3,11 +3,13 @@
 use super::console;
 use super::denoise::DenoiseChoice;
 use super::importance;
-use super::seeing::{self, parse_positive, parse_seconds};
+use super::seeing::{self, AskedShowing, Showing, model_values, operator_values, parse_positive, parse_seconds};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use fechner::adaptive::glimpse::glimpse;
-use fechner::adaptive::settings::{AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, RivalRule, Sampling};
+use fechner::adaptive::settings::{
+    AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, RivalRule, Sampling, THRESHOLD,
+};
 use fechner::checkpoint::SettingsRecord;
 use fechner::integrator::{Crop, DEFAULT_MAX_DEPTH, Pruning, TraceSettings};
 use fechner::output::rendered::Background;
@@ -37,7 +39,8 @@ pub(super) struct JobArguments {
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
     at: f64,
 
-    /// Stop when the remaining noise is at most this visible: 1 is at threshold.
+    /// Stop when the remaining noise is at most this visible: 1 is at threshold [default: the scene's, else 1; none for uniform
+    /// sampling with --spp, --time or --plans].
     #[arg(long, value_name = "V", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Until")]
     visibility: Option<f64>,
     /// The same, by name.
@@ -50,8 +53,8 @@ pub(super) struct JobArguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Until")]
     spp: Option<u32>,
     /// Most samples of one pixel.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(16..), help_heading = "Until")]
-    max_spp: Option<u32>,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(16..), default_value_t = DEFAULT_MAX_SAMPLES, help_heading = "Until")]
+    max_spp: u32,
     /// Stop after this many plans: repeats a render that ended by --time.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Until")]
     plans: Option<u32>,
@@ -72,8 +75,8 @@ pub(super) struct JobArguments {
     #[arg(long, value_enum, value_name = "BY", help_heading = "Sampling")]
     prune: Option<PruneChoice>,
     /// Most scattering events of a path.
-    #[arg(long, value_name = "N", help_heading = "Sampling")]
-    max_depth: Option<u32>,
+    #[arg(long, value_name = "N", default_value_t = DEFAULT_MAX_DEPTH, help_heading = "Sampling")]
+    max_depth: u32,
     /// Pixel filter.
     #[arg(long, value_enum, default_value = "gaussian", help_heading = "Sampling")]
     filter: FilterChoice,
@@ -88,14 +91,15 @@ pub(super) struct JobArguments {
     #[arg(long, default_value_t = 0, help_heading = "Sampling")]
     seed: u64,
 
-    /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file.
+    /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file
+    /// [default: the scene's, else desktop].
     #[arg(long, value_name = "NAME|FILE", help_heading = "Seeing")]
     display: Option<String>,
-    /// Threshold model that drives the sampling: csf-bands, tvi, ramasubramanian, yee, bolin-meyer;
-    /// csf-unmasked and tvi-masked show what a part is worth. Only csf-bands can judge denoised pictures.
-    #[arg(long, value_name = "NAME", default_value = "csf-bands", help_heading = "Seeing")]
+    /// Threshold model that drives the sampling; csf-unmasked and tvi-masked show what a part of csf-bands is worth. Only
+    /// csf-bands can judge denoised pictures.
+    #[arg(long, value_name = "NAME", value_parser = model_values(), default_value = model::DEFAULT, help_heading = "Seeing")]
     model: String,
-    /// Area in deg² over which the eye sums contrast.
+    /// Area in deg² over which the eye sums contrast [default: the display's, else 1].
     #[arg(long, value_name = "DEG2", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Seeing")]
     csf_area: Option<f64>,
     /// Luminance in cd/m² of RGB (1, 1, 1), in place of the scene's.
@@ -109,10 +113,10 @@ pub(super) struct JobArguments {
     /// Leave out what surrounds the scene and write alpha: straight in PNG, premultiplied in EXR.
     #[arg(long, help_heading = "Picture")]
     transparent: bool,
-    /// Tone operator.
-    #[arg(long, value_name = "NAME", help_heading = "Picture")]
+    /// Tone operator [default: the scene's, else constant].
+    #[arg(long, value_name = "NAME", value_parser = operator_values(), help_heading = "Picture")]
     operator: Option<String>,
-    /// Exposure correction in stops.
+    /// Exposure correction in stops [default: the scene's, else 0].
     #[arg(long, value_name = "STOPS", allow_negative_numbers = true, help_heading = "Picture")]
     exposure: Option<f64>,
 
@@ -329,7 +333,7 @@ fn trace_settings(arguments: &JobArguments, size: Size, nits_per_unit: f64) -> a
         width: size.width,
         height: size.height,
         seed: arguments.seed,
-        max_depth: arguments.max_depth.unwrap_or(DEFAULT_MAX_DEPTH),
+        max_depth: arguments.max_depth,
         clamp: arguments.clamp.map(|clamp| clamp as f32),
         filter: match arguments.filter {
             FilterChoice::Box => PixelFilter::Box,
@@ -363,19 +367,27 @@ fn whole_light(scene: &Arc<Scene>, trace: &TraceSettings) -> Option<SceneLight> 
 /// When to stop.
 fn limits(arguments: &JobArguments, scene: &Scene, sampling: Sampling) -> Limits {
     let asked = arguments.visibility.or(arguments.quality.map(Quality::visibility));
-    let visibility = match (asked, sampling) {
-        (Some(visibility), _) => visibility,
-        // A uniform render of so many samples, seconds or plans is what was asked for, not an early end.
-        (None, Sampling::Uniform) if arguments.has_other_limit() => 0.0,
-        (None, _) => scene.viewing.visibility.unwrap_or(1.0),
-    };
     Limits {
-        visibility,
+        visibility: visibility_limit(asked, scene, sampling, arguments.has_other_limit()),
         time: arguments.time,
         mean_samples: arguments.spp,
-        max_samples: arguments.max_spp.unwrap_or(DEFAULT_MAX_SAMPLES),
+        max_samples: arguments.max_spp,
         plans: arguments.plans,
         pilot_samples: arguments.denoise.pilot_samples(),
+    }
+}
+
+/// The visibility to stop at: command line before scene before threshold.
+pub(super) fn visibility_limit(
+    asked: Option<f64>,
+    scene: &Scene,
+    sampling: Sampling,
+    has_other_limit: bool,
+) -> Option<f64> {
+    match sampling {
+        // A uniform render of so many samples, seconds or plans is what was asked for, not an early end.
+        Sampling::Uniform if has_other_limit => asked,
+        _ => asked.or(scene.viewing.visibility).or(Some(THRESHOLD)),
     }
 }
 
@@ -401,14 +413,17 @@ fn check_rule(arguments: &JobArguments) -> anyhow::Result<()> {
 
 /// How to sample and for whom: command line before scene before default.
 fn settings_record(arguments: &JobArguments, scene: &Scene) -> anyhow::Result<SettingsRecord> {
-    let view = &scene.viewing;
-    let display_name = arguments.display.as_deref().or(view.display.as_deref()).unwrap_or("desktop");
-    let viewing = seeing::viewing(display_name, arguments.csf_area)?;
-    let operator = arguments.operator.as_deref().or(view.operator.as_deref()).unwrap_or("constant");
-    let default_model = model::names()[0];
-    if arguments.denoise.kind().is_some() && arguments.model != default_model {
+    let asked = AskedShowing {
+        display: arguments.display.as_deref(),
+        operator: arguments.operator.as_deref(),
+        exposure_stops: arguments.exposure,
+    };
+    let Showing { display, operator, exposure_stops } = asked.of_scene(scene);
+    let viewing = seeing::viewing(display, arguments.csf_area)?;
+    if arguments.denoise.kind().is_some() && arguments.model != model::DEFAULT {
         bail!(
-            "--denoise is for --model {default_model}: {} cannot say what is seen of a denoised picture",
+            "--denoise is for --model {}: {} cannot say what is seen of a denoised picture",
+            model::DEFAULT,
             arguments.model
         );
     }
@@ -433,7 +448,7 @@ fn settings_record(arguments: &JobArguments, scene: &Scene) -> anyhow::Result<Se
         viewing,
         nits_per_unit: scene.nits_per_unit,
         operator: operator.to_owned(),
-        exposure_stops: arguments.exposure.or(view.exposure_stops),
+        exposure_stops,
         fitted: None,
         importance: None,
         denoiser: arguments.denoise.kind(),

@@ -7,7 +7,7 @@ use super::seeing::parse_positive;
 use super::targets::check_distinct;
 use clap::Args;
 use fechner::adaptive::judge::judge;
-use fechner::adaptive::settings::Limits;
+use fechner::adaptive::settings::{Limits, THRESHOLD};
 use fechner::adaptive::{Rendered, StopReason, is_reached};
 use fechner::checkpoint::{merge_files, write_checkpoint};
 use fechner::output;
@@ -56,7 +56,8 @@ pub(super) fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
         );
     }
     let background = if merged.header.origin.is_transparent() { Background::Transparent } else { Background::Shown };
-    let settings = merged.header.settings.loop_settings(Limits::of_visibility(visibility))?;
+    let limits = Limits { visibility: Limits::visibility_of_last_rung(visibility), ..Limits::of_visibility(THRESHOLD) };
+    let settings = merged.header.settings.loop_settings(limits)?;
     if format.is_none() {
         write_checkpoint(&arguments.output, &merged.header, &merged.state)?;
     }

@@ -72,7 +72,7 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     let (state, seeds, keeper) = if arguments.checkpoint.is_wanted() {
         let origin = Origin::of(&scene, &trace);
         let seeds = Seeds::one(trace.seed);
-        let header = Header { origin, seeds, settings: record, visibility: settings.limits.visibility };
+        let header = Header { origin, seeds, settings: record, visibility: settings.limits.last_rung() };
         let start = arguments.checkpoint.start(header, fresh, &settings.limits)?;
         (start.state, start.header.seeds.all.clone(), Some(Keeper::new(&arguments.checkpoint, start.header)))
     } else {
@@ -92,7 +92,7 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     let write = |path: &Path| write_picture(path, format, background, &rendered, &settings, &report);
     write(&arguments.output).map_err(|error| kept_elsewhere(&arguments.output, write, error))?;
     for map in &arguments.maps {
-        eprintln!("{}", map.write(&rendered, settings.limits.visibility)?);
+        eprintln!("{}", map.write(&rendered, settings.limits.visibility_or_threshold())?);
     }
     if let Some(path) = &arguments.json {
         write_json(path, &report)?;

@@ -8,6 +8,7 @@ use fechner::adaptive::statistics::find_outliers;
 use fechner::adaptive::{Rendered, StopReason, visible_share};
 use fechner::output::{self, Attribute};
 use fechner_perception::Plane;
+use fechner_perception::model;
 use fechner_perception::psychometric::detection_probability;
 use serde::Serialize;
 
@@ -130,7 +131,7 @@ impl Report {
         let pixels = u64::from(film.width()) * u64::from(film.height());
         let judgement = &rendered.judgement;
         let display = &settings.viewing.display;
-        let target = (settings.limits.visibility > 0.0).then_some(settings.limits.visibility);
+        let target = settings.limits.visibility;
         let predicted = judgement.is_known.then_some(&judgement.predicted);
         let quantile = |share: f64| predicted.map(|predicted| predicted.quantile(share));
         let energy = |p: &Plane| p.values().iter().map(|&v| f64::from(v) * f64::from(v)).sum::<f64>();
@@ -144,7 +145,7 @@ impl Report {
             seed: seeds[0],
             seeds: seeds.to_vec(),
             sampling: sampling_name(settings.sampling),
-            model: settings.model.as_ref().map_or("csf-bands", |model| model.name()),
+            model: settings.model.as_ref().map_or(model::DEFAULT, |model| model.name()),
             csf: if settings.frames.is_some() { "castle-fresh-noise" } else { "castle" },
             operator: judgement.tone.describe(),
             nits_per_unit: settings.nits_per_unit,

@@ -2,21 +2,60 @@
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser};
+use fechner::scene::Scene;
 use fechner_perception::display::{Display, Viewing};
+use fechner_perception::model;
 use fechner_perception::tone::{self, ToneOperator, ToneSettings};
 use std::path::Path;
 use std::time::Duration;
+
+/// The display where none is named.
+pub(super) const DEFAULT_DISPLAY: &str = "desktop";
+/// The tone operator where none is named.
+pub(super) const DEFAULT_OPERATOR: &str = "constant";
+
+/// How a scene is shown: command line before scene before default.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Showing<'a> {
+    /// Name or file of the display.
+    pub(super) display: &'a str,
+    /// Name of the tone operator.
+    pub(super) operator: &'a str,
+    /// Exposure correction; `None` where nobody asked for one.
+    pub(super) exposure_stops: Option<f64>,
+}
+
+/// What of [`Showing`] the command line says.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct AskedShowing<'a> {
+    pub(super) display: Option<&'a str>,
+    pub(super) operator: Option<&'a str>,
+    pub(super) exposure_stops: Option<f64>,
+}
+
+impl<'a> AskedShowing<'a> {
+    /// What is left open as the scene has it.
+    pub(super) fn of_scene(self, scene: &'a Scene) -> Showing<'a> {
+        let view = &scene.viewing;
+        Showing {
+            display: self.display.or(view.display.as_deref()).unwrap_or(DEFAULT_DISPLAY),
+            operator: self.operator.or(view.operator.as_deref()).unwrap_or(DEFAULT_OPERATOR),
+            exposure_stops: self.exposure_stops.or(view.exposure_stops),
+        }
+    }
+}
 
 /// Display, observer and units, for commands that judge pictures.
 #[derive(Debug, Args)]
 pub(super) struct SeeingArguments {
     /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file.
-    #[arg(long, value_name = "NAME|FILE", default_value = "desktop")]
+    #[arg(long, value_name = "NAME|FILE", default_value = DEFAULT_DISPLAY)]
     display: String,
     /// Contrast sensitivity function.
     #[arg(long, value_name = "NAME", default_value = "castle")]
     pub(super) csf: String,
-    /// Area in deg² over which the eye sums contrast.
+    /// Area in deg² over which the eye sums contrast [default: the display's, else 1].
     #[arg(long, value_name = "DEG2", value_parser = parse_positive, allow_negative_numbers = true)]
     csf_area: Option<f64>,
     /// Luminance in cd/m² of RGB (1, 1, 1), for files that do not say it.
@@ -57,6 +96,28 @@ pub(super) fn tone_operator(name: &str, settings: &ToneSettings) -> Result<Box<d
     tone::operator_with(name, settings).with_context(|| {
         let known = tone::operator_names().join(", ");
         format!("there is no tone operator \"{name}\"; known: {known}")
+    })
+}
+
+/// Names of threshold models.
+pub(super) fn model_values() -> PossibleValuesParser {
+    PossibleValuesParser::new(model::names())
+}
+
+/// Names and initials of tone operators.
+pub(super) fn operator_values() -> PossibleValuesParser {
+    PossibleValuesParser::new(named_operators())
+}
+
+/// The same, and "all".
+pub(super) fn operator_values_or_all() -> PossibleValuesParser {
+    PossibleValuesParser::new(named_operators().chain([PossibleValue::new("all")]))
+}
+
+fn named_operators() -> impl Iterator<Item = PossibleValue> {
+    tone::operator_names().iter().map(|&name| {
+        let initials = tone::operator_initials().iter().filter(move |(_, full)| *full == name);
+        PossibleValue::new(name).aliases(initials.map(|(initials, _)| *initials))
     })
 }
 

@@ -3,7 +3,7 @@
 use super::animate::parse_rate;
 use super::channels;
 use super::picture::InputPicture;
-use super::seeing::{SeeingArguments, tone_operator};
+use super::seeing::{DEFAULT_OPERATOR, SeeingArguments, model_values, operator_values, tone_operator};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::output::{self, Attribute, Format, PIXEL_ASPECT_RATIO, Picture};
@@ -43,10 +43,10 @@ pub(super) struct ThresholdArguments {
     #[arg(long, value_name = "AGE", num_args = 0..=1, default_missing_value = "25")]
     glare: Option<f64>,
     /// Threshold model.
-    #[arg(long, value_name = "NAME", default_value = "csf-bands")]
+    #[arg(long, value_name = "NAME", value_parser = model_values(), default_value = model::DEFAULT)]
     model: String,
     /// Tone operator that shows scene-linear pictures; it is fitted to the input, or to the halves where only they are ones.
-    #[arg(long, value_name = "NAME", default_value = "constant")]
+    #[arg(long, value_name = "NAME", value_parser = operator_values(), default_value = DEFAULT_OPERATOR)]
     operator: String,
     #[command(flatten)]
     seeing: SeeingArguments,

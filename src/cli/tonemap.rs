@@ -4,7 +4,7 @@ mod sheet;
 
 use super::json::write_json;
 use super::picture::InputPicture;
-use super::seeing::{self, parse_positive};
+use super::seeing::{self, DEFAULT_DISPLAY, operator_values_or_all, parse_positive};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use fechner::output::{self, Attribute, Format, Picture};
@@ -27,7 +27,7 @@ pub(super) struct TonemapArguments {
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Tone operator, or "all" for a sheet with all of them.
-    #[arg(long, value_name = "NAME|all")]
+    #[arg(long, value_name = "NAME|all", value_parser = operator_values_or_all())]
     operator: String,
     /// Exposure correction in stops.
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, value_parser = parse_stops, allow_negative_numbers = true)]
@@ -36,7 +36,7 @@ pub(super) struct TonemapArguments {
     #[arg(long, value_name = "CD_M2", value_parser = parse_positive, allow_negative_numbers = true)]
     nits_per_unit: Option<f64>,
     /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file.
-    #[arg(long, value_name = "NAME|FILE", default_value = "desktop")]
+    #[arg(long, value_name = "NAME|FILE", default_value = DEFAULT_DISPLAY)]
     display: String,
     /// What the eye is adapted to: the view as a whole, or, for the operators that know it, each place of it.
     #[arg(long, value_enum, default_value = "world")]

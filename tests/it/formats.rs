@@ -18,7 +18,7 @@ fn regions(file: &str, seed: u64) -> Vec<[f64; 2]> {
     let mut scene = load(&Path::new(env!("CARGO_MANIFEST_DIR")).join(file), &LoadOptions::default())
         .unwrap_or_else(|error| panic!("{error}"));
     scene.nits_per_unit = 1.0;
-    let settings = loop_settings(1.0, Sampling::Uniform, 0.0, Some(128));
+    let settings = loop_settings(1.0, Sampling::Uniform, None, Some(128));
     let tracer = PathTracer::new(Arc::new(scene), trace_settings(SIZE, SIZE, seed));
     let rendered = render(&tracer, &settings, &Quiet).expect("the perception model takes the picture");
     let estimate = &rendered.judgement.estimate;

@@ -166,7 +166,7 @@ fn pictures_have_their_references_brightness() {
         if let Some(known) = &case.known {
             (known.change)(&mut scene);
         }
-        let settings = loop_settings(1.0, Sampling::Uniform, 0.0, Some(case.samples));
+        let settings = loop_settings(1.0, Sampling::Uniform, None, Some(case.samples));
         let tracer = PathTracer::new(Arc::new(scene), trace);
         let rendered = render(&tracer, &settings, &Quiet).expect("the perception model takes the picture");
         let estimate = &rendered.judgement.estimate;

@@ -1,6 +1,6 @@
 //! Scenes made in code, and rendering them.
 
-use fechner::adaptive::settings::{Limits, LoopSettings, Sampling};
+use fechner::adaptive::settings::{Limits, LoopSettings, Sampling, THRESHOLD};
 use fechner::integrator::{PathTracer, TraceSettings};
 use fechner::sampler::{BlockKey, Half, Pixel, PixelFilter, Purpose, Sequence};
 use fechner::scene::{
@@ -107,10 +107,17 @@ pub(crate) fn radiance_along(
 }
 
 /// Settings for the display `desktop` and constant scaling.
-pub(crate) fn loop_settings(nits_per_unit: f64, sampling: Sampling, visibility: f64, spp: Option<u32>) -> LoopSettings {
+///
+/// Without a visibility only `spp` counts.
+pub(crate) fn loop_settings(
+    nits_per_unit: f64,
+    sampling: Sampling,
+    visibility: impl Into<Option<f64>>,
+    spp: Option<u32>,
+) -> LoopSettings {
     let viewing = Viewing::of(Display::preset("desktop").expect("a preset"));
     let operator = tone::operator("constant", None).expect("an operator");
-    let limits = Limits { mean_samples: spp, ..Limits::of_visibility(visibility) };
+    let limits = Limits { visibility: visibility.into(), mean_samples: spp, ..Limits::of_visibility(THRESHOLD) };
     LoopSettings { sampling, limits, ..LoopSettings::new(viewing, nits_per_unit, operator) }
 }
 

@@ -96,7 +96,7 @@ fn what_makes_no_sense_is_refused_in_one_line() {
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
         assert!(message.contains(fragment) && !message.contains("panicked"), "{arguments:?}: {message}");
     };
-    refused(&["a.exr", "-o", "b.png", "--operator", "darkroom"], "known: constant");
+    refused(&["a.exr", "-o", "b.png", "--operator", "darkroom"], "constant-long");
     refused(&["a.exr", "a.exr", "-o", "b.png", "--operator", "ptyg"], "# for each digit");
     refused(&["a.exr", "a.exr", "-o", "b.#.png", "--operator", "agx"], "does not know an eye that adapts");
     refused(&["a.exr", "-o", "b.png", "--operator", "ptyg", "--gaze", "64,3"], "outside");

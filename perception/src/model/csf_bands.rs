@@ -15,7 +15,7 @@ pub struct CsfBands;
 
 impl ThresholdModel for CsfBands {
     fn name(&self) -> &'static str {
-        "csf-bands"
+        super::DEFAULT
     }
 
     fn allowed_standard_error_cd_m2(&self, inputs: &ModelInputs<'_>) -> Result<Plane, Error> {

@@ -110,9 +110,12 @@ pub trait ThresholdModel: Send + Sync {
 /// Two-sided 95 % of a normal distribution: models that stop on a confidence interval ask z σ ≤ T.
 const Z_95: f64 = 1.96;
 
-const NAMES: [&str; 7] = ["csf-bands", "ramasubramanian", "yee", "bolin-meyer", "tvi", "csf-unmasked", "tvi-masked"];
+/// Name of the model that is meant where none is named, and the only one that knows denoised pictures and where one looks.
+pub const DEFAULT: &str = "csf-bands";
 
-/// The names that [`by_name`] knows; the first is the default.
+const NAMES: [&str; 7] = [DEFAULT, "ramasubramanian", "yee", "bolin-meyer", "tvi", "csf-unmasked", "tvi-masked"];
+
+/// The names that [`by_name`] knows; the first is [`DEFAULT`].
 #[must_use]
 pub fn names() -> &'static [&'static str] {
     &NAMES
@@ -128,7 +131,7 @@ pub fn names() -> &'static [&'static str] {
 #[must_use]
 pub fn by_name(name: &str) -> Option<Box<dyn ThresholdModel>> {
     Some(match name {
-        "csf-bands" => Box::new(CsfBands),
+        DEFAULT => Box::new(CsfBands),
         "ramasubramanian" => Box::new(Ramasubramanian::default()),
         "yee" => Box::new(Yee::default()),
         "bolin-meyer" => Box::new(BolinMeyer),

@@ -48,6 +48,10 @@ const OPERATOR_NAMES: [&str; 16] = [
     "agx",
 ];
 
+/// What operators are called by their authors' initials, and the names that these stand for.
+const OPERATOR_INITIALS: [(&str, &str); 4] =
+    [("tr", "tumblin-rushmeier"), ("fpsg", "ferwerda96"), ("wrp", "ward-larson97"), ("ptyg", "pattanaik00")];
+
 /// The operator of that name. `exposure_stops` multiplies what it shows by 2^stops; `None` is 0.
 ///
 /// ```
@@ -67,22 +71,23 @@ pub fn operator_with(name: &str, settings: &ToneSettings) -> Option<Box<dyn Tone
     let stops = if settings.exposure_stops.is_finite() { settings.exposure_stops } else { 0.0 };
     let exposure = stops.clamp(-100.0, 100.0).exp2();
     let scope = settings.scope;
-    Some(match name {
+    let full_name = OPERATOR_INITIALS.iter().find(|(initials, _)| *initials == name).map_or(name, |(_, full)| full);
+    Some(match full_name {
         "constant" => Box::new(Constant { exposure, time: Exposure::Automatic }),
         "constant-long" => Box::new(Constant { exposure, time: Exposure::Long }),
         "constant-short" => Box::new(Constant { exposure, time: Exposure::Short }),
         "absolute" => Box::new(Absolute { exposure }),
-        "tumblin-rushmeier" | "tr" => Box::new(TumblinRushmeier { exposure, scope }),
+        "tumblin-rushmeier" => Box::new(TumblinRushmeier { exposure, scope }),
         "ward94" => Box::new(Ward94 { exposure, scope }),
-        "ferwerda96" | "fpsg" => {
+        "ferwerda96" => {
             let acuity = settings.effects.is_none_or(|effects| effects.acuity);
             Box::new(Ferwerda96 { exposure, scope, acuity })
         }
-        "ward-larson97" | "wrp" => {
+        "ward-larson97" => {
             let effects = settings.effects.unwrap_or_default();
             Box::new(WardLarson97 { exposure, ceiling: Ceiling::Human, effects })
         }
-        "pattanaik00" | "ptyg" => Box::new(Pattanaik00 { exposure, scope }),
+        "pattanaik00" => Box::new(Pattanaik00 { exposure, scope }),
         "durand-dorsey00" => Box::new(DurandDorsey00 { exposure, scope }),
         "scheel00" => Box::new(Scheel00 { exposure }),
         "reinhard02" => Box::new(Reinhard02 { exposure, scope }),
@@ -92,6 +97,12 @@ pub fn operator_with(name: &str, settings: &ToneSettings) -> Option<Box<dyn Tone
         "agx" => Box::new(Agx { exposure }),
         _ => return None,
     })
+}
+
+/// The initials that [`operator`] knows besides, each with the name that it stands for.
+#[must_use]
+pub fn operator_initials() -> &'static [(&'static str, &'static str)] {
+    &OPERATOR_INITIALS
 }
 
 /// The names that [`operator`] knows, initials aside.

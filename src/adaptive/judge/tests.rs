@@ -5,6 +5,7 @@ use crate::denoise::Denoiser;
 use crate::film::BlockSum;
 use crate::integrator::{BlockWork, FirstHit, PathSample};
 use crate::sampler::hash_words;
+use fechner_perception::tone::SceneLight;
 use glam::Vec3;
 
 /// Noise that leaves luminance alone is seen by its colour: no stop at the pilot.

@@ -2,10 +2,10 @@
 
 use super::frames::Frames;
 use super::{AnimateArguments, EyeChoice, SamplingChoice, VelocityChoice};
-use crate::cli::job::{Quality, Size, check_memory};
+use crate::cli::job::{Quality, Size, check_memory, visibility_limit};
 use crate::cli::seeing;
 use anyhow::{Context, Result, bail};
-use fechner::adaptive::settings::{DEFAULT_MAX_SAMPLES, Limits, Sampling};
+use fechner::adaptive::settings::{Limits, Sampling};
 use fechner::animate::ShotSettings;
 use fechner::animate::eye::Eye;
 use fechner::animate::gaze::GazeTrack;
@@ -18,13 +18,13 @@ use fechner::scene::Scene;
 pub(super) fn shot_settings(arguments: &AnimateArguments, scene: &Scene, shot: Frames) -> Result<ShotSettings> {
     let size = arguments.size.unwrap_or(Size { width: scene.film.width, height: scene.film.height });
     check_memory(size)?;
-    let display = arguments.display.as_deref().or(scene.viewing.display.as_deref()).unwrap_or("desktop");
+    let display = arguments.asked_showing().of_scene(scene).display;
     let asked = arguments.visibility.or(arguments.quality.map(Quality::visibility));
-    let (sampling, otherwise) = match arguments.sampling {
-        SamplingChoice::Adaptive => (Sampling::Adaptive, scene.viewing.visibility.unwrap_or(1.0)),
-        SamplingChoice::Uniform if arguments.spp.is_some() || arguments.time.is_some() => (Sampling::Uniform, 0.0),
-        SamplingChoice::Uniform => (Sampling::Uniform, scene.viewing.visibility.unwrap_or(1.0)),
+    let sampling = match arguments.sampling {
+        SamplingChoice::Adaptive => Sampling::Adaptive,
+        SamplingChoice::Uniform => Sampling::Uniform,
     };
+    let has_other_limit = arguments.spp.is_some() || arguments.time.is_some();
     Ok(ShotSettings {
         first: shot.first,
         last: shot.last,
@@ -33,10 +33,12 @@ pub(super) fn shot_settings(arguments: &AnimateArguments, scene: &Scene, shot: F
         trace: TraceSettings::new(size.width, size.height, arguments.seed),
         sampling,
         limits: Limits {
+            visibility: visibility_limit(asked, scene, sampling, has_other_limit),
+            time: None,
             mean_samples: arguments.spp,
-            max_samples: arguments.max_spp.unwrap_or(DEFAULT_MAX_SAMPLES),
+            max_samples: arguments.max_spp,
+            plans: None,
             pilot_samples: arguments.denoise.pilot_samples(),
-            ..Limits::of_visibility(asked.unwrap_or(otherwise))
         },
         viewing: seeing::viewing(display, None)?,
         nits_per_unit: scene.nits_per_unit,

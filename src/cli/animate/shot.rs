@@ -10,7 +10,7 @@ use super::{AnimateArguments, EyeChoice, VelocityChoice, video};
 use crate::cli::console::{Console, duration_in_words};
 use crate::cli::json::write_json;
 use crate::cli::report::Report;
-use crate::cli::seeing::tone_operator;
+use crate::cli::seeing::{Showing, tone_operator};
 use anyhow::{Context, Result, bail};
 use fechner::adaptive::settings::{AllocationRule, LoopSettings, Sampling};
 use fechner::animate::budget::Needs;
@@ -78,9 +78,8 @@ impl<'a> Shot<'a> {
             eprintln!("note: {note}");
         }
         let settings = shot_settings(arguments, &scene, whole)?;
-        let operator_name = arguments.operator.as_deref().or(scene.viewing.operator.as_deref()).unwrap_or("constant");
-        let exposure_stops = arguments.exposure.or(scene.viewing.exposure_stops);
-        let operator_name = operator_name.to_owned();
+        let Showing { operator, exposure_stops, .. } = arguments.asked_showing().of_scene(&scene);
+        let operator_name = operator.to_owned();
         let shot = Self { arguments, source, settings, operator_name, exposure_stops, name, format };
         shot.operator()?;
         Ok(shot)
@@ -91,7 +90,7 @@ impl<'a> Shot<'a> {
         SettingsRecord {
             sampling: self.settings.sampling,
             allocation: AllocationRule::default(),
-            model: model::names()[0].to_owned(),
+            model: model::DEFAULT.to_owned(),
             viewing: self.settings.viewing.clone(),
             nits_per_unit: self.settings.nits_per_unit,
             operator: self.operator_name.clone(),

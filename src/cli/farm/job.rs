@@ -140,7 +140,7 @@ impl Job<'_> {
                     origin: Origin::of(&scene, &trace),
                     seeds: Seeds::one(trace.seed),
                     settings: record,
-                    visibility: settings.limits.visibility,
+                    visibility: settings.limits.last_rung(),
                 };
                 let kind = FrameKind::Still(Box::new(settings));
                 Ok(Frame { scene, trace, header, judged_by, kind })
@@ -152,7 +152,7 @@ impl Job<'_> {
                     origin: Origin::of(&of_shot.scenes.now, &trace),
                     seeds: Seeds::one(trace.seed),
                     settings: shot.settings_record(),
-                    visibility: of_shot.settings.limits.visibility,
+                    visibility: of_shot.settings.limits.last_rung(),
                 };
                 let judged_by = ContentHash::of_bytes(of_shot.key.as_bytes());
                 let scene = Arc::clone(&of_shot.scenes.now);

@@ -48,11 +48,11 @@ pub(super) fn settings_of(job: &Job, live: &Live) -> Result<LoopSettings, String
     // So many times as far, a pixel looks so many times as small.
     record.viewing.display.pixels_per_degree *= live.distance.unwrap_or(1.0);
     record.viewing.check().map_err(|error| error.to_string())?;
-    let visibility = live.visibility.unwrap_or(job.limits.visibility);
+    let visibility = live.visibility.unwrap_or(job.limits.last_rung());
     if visibility.is_nan() || visibility < 0.0 || record.exposure_stops.is_some_and(|stops| !stops.is_finite()) {
         return Err("visibility must be 0 or above and exposure a number".to_owned());
     }
-    let limits = Limits { visibility, ..job.limits };
+    let limits = Limits { visibility: Limits::visibility_of_last_rung(visibility), ..job.limits };
     let mut settings = record.loop_settings(limits).map_err(|error| error.to_string())?;
     if let Some(whole) = &job.whole {
         settings.fit_to(whole);

@@ -145,7 +145,7 @@ impl Session<'_> {
     /// eyes it stays as it is, and says no longer why it rests.
     fn rest_or_go_on(&mut self, judgement: Judgement, changed: Changed) {
         let before = self.last_look.as_ref().map_or(StopReason::Interrupted, |look| look.stop_reason);
-        let is_reached = is_reached(&judgement, self.settings.limits.visibility);
+        let is_reached = is_reached(&judgement, self.settings.limits.last_rung());
         let stop_reason = match before {
             StopReason::Visibility | StopReason::MaxSamples | StopReason::Interrupted if is_reached => {
                 StopReason::Visibility

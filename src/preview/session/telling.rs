@@ -20,7 +20,7 @@ impl Session<'_> {
     }
 
     pub(super) fn status(&self, state: &RenderState) -> Status {
-        let target = self.settings.limits.visibility;
+        let target = self.settings.limits.last_rung();
         let operator = self.live.operator.as_ref().unwrap_or(&self.job.record.operator);
         let mut status = Status {
             phase: self.phase,
@@ -69,7 +69,7 @@ pub(in crate::preview) fn blank_status(
         seconds_left: None,
         pilot_samples: pilot_samples(&settings.limits),
         visible_share: None,
-        target: settings.limits.visibility,
+        target: settings.limits.last_rung(),
         rung: None,
         exposure: None,
         operator: operator.to_owned(),

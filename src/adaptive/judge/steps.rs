@@ -1,0 +1,178 @@
+//! The steps of a look, each of what was found before it: guide and tone, scatter, thresholds, and what chromatic noise shows.
+
+use super::super::denoised::TimedDenoising;
+use super::super::settings::LoopSettings;
+use super::super::statistics::{SampleStatistics, by_channel};
+use super::{JudgeError, display_scale, guide_rgb, still_wanted, variance_shares};
+use crate::film::{CHANNELS, Estimate, Film};
+use crate::sampler::Half;
+use fechner_perception::Plane;
+use fechner_perception::colour::ChromaticGains;
+use fechner_perception::csf::{CastleCsf, ContrastSensitivity, FreshNoise};
+use fechner_perception::model::{ModelInputs, ThresholdModel};
+use fechner_perception::seen;
+use fechner_perception::threshold::{ThresholdInputs, ThresholdMap, threshold_map};
+use fechner_perception::tone::acuity::BehindAcuity;
+use fechner_perception::tone::{FittedTone, SceneLight};
+use std::borrow::Cow;
+
+/// The picture without its noise, from which the rest of a look is made: denoised for output where it is, else for this.
+pub(super) struct Guide<'a> {
+    rgb_cd_m2: Cow<'a, [[f32; 3]]>,
+    light: SceneLight,
+}
+
+impl<'a> Guide<'a> {
+    pub(super) fn of(
+        film: &Film,
+        estimate: &Estimate,
+        denoised: Option<&'a TimedDenoising>,
+        settings: &LoopSettings,
+    ) -> Self {
+        let rgb_cd_m2 = match denoised {
+            Some(found) => Cow::Borrowed(&found.film.rgb_cd_m2[..]),
+            None => Cow::Owned(guide_rgb(film, estimate)),
+        };
+        let light = SceneLight::of(settings.operator.as_ref(), film.width() as usize, &rgb_cd_m2);
+        Self { rgb_cd_m2, light }
+    }
+
+    pub(super) fn luminance_cd_m2(&self) -> &Plane {
+        self.light.luminance_cd_m2()
+    }
+
+    /// The operator's fit: one that was made elsewhere, or to this.
+    pub(super) fn tone(&self, settings: &LoopSettings) -> Box<dyn FittedTone> {
+        match &settings.fitted {
+            Some(fitted) => fitted.clone().restore(),
+            None => settings.operator.fit(&self.light.guide(), &settings.viewing, None),
+        }
+    }
+}
+
+/// How the samples scatter on the display, (cd/m²)².
+pub(super) struct Scatter {
+    /// [`variance_shares`].
+    shares: Plane,
+    /// [`display_scale`].
+    scale: [Plane; CHANNELS],
+    statistics: SampleStatistics,
+}
+
+impl Scatter {
+    pub(super) fn of(
+        film: &Film,
+        guide: &Plane,
+        tone: &dyn FittedTone,
+        settings: &LoopSettings,
+        inflation: f64,
+    ) -> Self {
+        let shares = variance_shares(film);
+        let scale = display_scale(film, &shares, guide, tone, settings, inflation);
+        let statistics = SampleStatistics::of(film, &scale);
+        Self { shares, scale, statistics }
+    }
+
+    /// Variance of each pixel's mean of which this is one sample's.
+    pub(super) fn of_mean(&self, per_sample: &Plane) -> Plane {
+        per_sample.combined(&self.shares, |sample, share| sample * share)
+    }
+
+    pub(super) fn luminance_variance_of_mean(&self) -> Plane {
+        self.of_mean(&self.statistics.luminance().stratified_variance())
+    }
+
+    /// [`super::Judgement::pooled_variance_per_sample`].
+    pub(super) fn pooled_per_sample(&self, thresholds: &ThresholdMap, gains: Option<&ChromaticGains>) -> Plane {
+        most_visible(thresholds, gains, |c| self.statistics.channels[c].stratified_variance())
+    }
+
+    /// [`super::Judgement::variance_per_sample`].
+    pub(super) fn per_sample_of_halves(
+        &self,
+        film: &Film,
+        thresholds: &ThresholdMap,
+        gains: Option<&ChromaticGains>,
+    ) -> [Plane; 2] {
+        Half::BOTH.map(|half| {
+            let of_channel = |c| self.statistics.stratified_variance_for_half(film, &self.scale, half, c);
+            most_visible(thresholds, gains, of_channel)
+        })
+    }
+}
+
+/// Luminance variance that shows as much as the most visible channel's: luminance's own where the others have no gains.
+fn most_visible(
+    thresholds: &ThresholdMap,
+    gains: Option<&ChromaticGains>,
+    variance_of_channel: impl Fn(usize) -> Plane + Sync,
+) -> Plane {
+    match gains {
+        None => variance_of_channel(0),
+        Some(gains) => thresholds.luminance_equivalent_variance(gains, by_channel(variance_of_channel).each_ref()),
+    }
+}
+
+/// [`super::Judgement::thresholds`] and [`super::Judgement::pixel_thresholds`]. `noise`: variance of the mean's luminance on the display, before
+/// denoising. It bounds what is left of it in the guide, so masking fades in as samples come.
+pub(super) fn found_thresholds(
+    guide: &Guide<'_>,
+    tone: &dyn FittedTone,
+    noise: &Plane,
+    settings: &LoopSettings,
+) -> Result<(ThresholdMap, Option<Plane>), JudgeError> {
+    let displayed_guide = seen::display_luminance(tone, &settings.viewing.display, guide.luminance_cd_m2());
+    // Noise goes through the loss of acuity that the operator shows, as the picture does.
+    let csf = BehindAcuity { csf: contrast_sensitivity(settings)?, acuity: tone.acuity() };
+    let inputs = ThresholdInputs { display_luminance_cd_m2: &displayed_guide, guide_variance: Some(noise) };
+    let at_rest = threshold_map(&inputs, &settings.viewing, &csf)?;
+    let thresholds = under_eye_movements(at_rest, guide, tone, settings)?;
+    still_wanted(settings)?;
+    let of_model = |model: &dyn ThresholdModel| {
+        model.allowed_standard_error_cd_m2(&ModelInputs {
+            display_luminance_cd_m2: &displayed_guide,
+            guide_variance: Some(noise),
+            image_velocity_deg_s: None,
+            attention: None,
+            viewing: &settings.viewing,
+            csf: &csf,
+        })
+    };
+    let pixel_thresholds = settings.model.as_deref().map(of_model).transpose()?;
+    Ok((thresholds, pixel_thresholds))
+}
+
+/// Thresholds away from where one looks, and on what the eye does not follow.
+fn under_eye_movements(
+    at_rest: ThresholdMap,
+    guide: &Guide<'_>,
+    tone: &dyn FittedTone,
+    settings: &LoopSettings,
+) -> Result<ThresholdMap, JudgeError> {
+    let thresholds = if settings.gazes.is_empty() { at_rest } else { at_rest.with_gazes(&settings.gazes) };
+    let (Some(pursuit), Some(timing)) = (&settings.pursuit, settings.frames) else { return Ok(thresholds) };
+    let size = (guide.luminance_cd_m2().width(), guide.luminance_cd_m2().height());
+    let eye = pursuit.eye_velocity_deg_s(&guide.rgb_cd_m2, size, tone, &settings.viewing.display)?;
+    Ok(thresholds.with_pursuit(&eye, timing)?)
+}
+
+/// What noise in the chromatic channels shows; `None` by a model of luminance alone, which judges luminance alone.
+pub(super) fn chromatic_gains(
+    thresholds: &ThresholdMap,
+    settings: &LoopSettings,
+) -> Result<Option<ChromaticGains>, JudgeError> {
+    Ok(match (&settings.model, settings.frames) {
+        (Some(_), _) => None,
+        (None, None) => Some(thresholds.chromatic_gains()?),
+        (None, Some(timing)) => Some(thresholds.chromatic_gains_of_fresh_noise(timing)?),
+    })
+}
+
+/// Of the eye for noise that stands still, or that is new in every frame.
+fn contrast_sensitivity(settings: &LoopSettings) -> Result<Box<dyn ContrastSensitivity>, JudgeError> {
+    let area_deg2 = settings.viewing.observer.csf_area_deg2;
+    Ok(match settings.frames {
+        None => Box::new(CastleCsf::new(area_deg2)?),
+        Some(timing) => Box::new(FreshNoise::new(area_deg2, timing)?),
+    })
+}
