@@ -173,7 +173,7 @@ fn render_shot(arguments: &AnimateArguments) -> Result<()> {
         if was_rendered && done < count {
             rendered += 1.0;
             let seconds = started.elapsed().as_secs_f64() / rendered * (count - done) as f64;
-            eprintln!("{done} of {count} frames, about {} left", duration_in_words(seconds));
+            say!("{done} of {count} frames, about {} left", duration_in_words(seconds));
         }
     }
     shot.conclude(&track).map(drop)

@@ -127,7 +127,7 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
     if let Some(path) = &arguments.json {
         write_json(path, &figures)?;
     }
-    println!(
+    answer!(
         "{}: worst visibility {:.2} (seen in a 1° patch with {:.1} %), {:.2} % of the picture above threshold, on \
          \"{}\" at {} pixels a degree (model-predicted; calibrated on gratings, not on renderings)",
         if figures.seen.is_visible { "visible" } else { "the same to the eye" },

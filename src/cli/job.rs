@@ -183,7 +183,7 @@ impl JobArguments {
     pub(super) fn prepare(&self) -> anyhow::Result<Prepared> {
         let scene = self.load_at(self.at, Some(console::texture_decoded))?;
         for note in &scene.notes {
-            eprintln!("note: {note}");
+            say!("note: {note}");
         }
         let size = self.size.unwrap_or(Size { width: scene.film.width, height: scene.film.height });
         let trace = trace_settings(self, size, scene.nits_per_unit)?;
@@ -352,7 +352,7 @@ fn trace_settings(arguments: &JobArguments, size: Size, nits_per_unit: f64) -> a
 fn whole_light(scene: &Arc<Scene>, trace: &TraceSettings) -> Option<SceneLight> {
     const MOST_PIXELS: u64 = 1 << 26;
     if u64::from(trace.width) * u64::from(trace.height) > MOST_PIXELS {
-        eprintln!("note: tone is fitted to the crop alone: {}x{} pixels are too many", trace.width, trace.height);
+        say!("note: tone is fitted to the crop alone: {}x{} pixels are too many", trace.width, trace.height);
         return None;
     }
     // Films of other seeds must be shown alike, to be merged.

@@ -74,7 +74,7 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     let tracer = PathTracer::new(scene, trace);
     let degenerate = tracer.world().degenerate_triangles();
     if degenerate > 0 {
-        eprintln!("note: {degenerate} triangles without area were left out");
+        say!("note: {degenerate} triangles without area were left out");
     }
     let tev = arguments.tev.open(&arguments.job.scene_name())?.map(|tev| Showing::new(tev, settings.nits_per_unit));
     let watch = Watch::new(Console::new(settings.limits.time), keeper, audience, tev)?;
@@ -87,7 +87,7 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     if let Some(path) = &arguments.json {
         write_json(path, &report)?;
     }
-    eprintln!("{}", summary(&report, &settings, &rendered));
+    say!("{}", summary(&report, &settings, &rendered));
     let is_unfinished = rendered.stop_reason == StopReason::Interrupted && watch.is_asked_to_end();
     watch.report()?;
     Ok(if is_unfinished { ExitCode::from(CALL_AGAIN) } else { ExitCode::SUCCESS })

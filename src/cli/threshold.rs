@@ -122,12 +122,12 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     }
     picture.push_attribute(PIXEL_ASPECT_RATIO, Attribute::Float(guide.pixel_aspect_ratio() as f32));
     output::write_exr(&arguments.output, &picture)?;
-    println!(
+    answer!(
         "median threshold {:.3} cd/m² of standard error at visibility 1 (model-predicted; calibrated on gratings, not on renderings)",
         median(&threshold)
     );
     if let Some(visibility) = &visibility {
-        println!("median visibility of the noise {:.2}", median(visibility));
+        answer!("median visibility of the noise {:.2}", median(visibility));
     }
     Ok(())
 }
@@ -187,7 +187,7 @@ fn read_velocity(path: &Path, size: (usize, usize), frames_per_second: f64) -> R
             path.display()
         );
     };
-    println!("motion from the channels of {layer} at {frames_per_second} frames a second");
+    answer!("motion from the channels of {layer} at {frames_per_second} frames a second");
     Ok([channels::motion_plane(&exr, x.to_vec())?, channels::motion_plane(&exr, y.to_vec())?])
 }
 

@@ -159,7 +159,7 @@ pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
         let state = eye.as_mut().map(|eye| eye.look_at(Goal::of(&frame.guide(), viewing.display.pixel_density())));
         let fitted = operator.fit(&frame.guide(), viewing, state.as_ref());
         write(target, format, &frame, fitted.as_ref(), state.as_ref())?;
-        println!("{}: {}", target.display(), fitted.describe());
+        answer!("{}: {}", target.display(), fitted.describe());
     }
     if let (Some(path), Some(state)) = (&arguments.state, eye.and_then(|eye| eye.state)) {
         write_json(path, &state)?;

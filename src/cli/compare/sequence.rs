@@ -236,7 +236,7 @@ impl<'a> Sequences<'a> {
         if let Some(path) = &self.arguments.json {
             write_json(path, &figures)?;
         }
-        println!(
+        answer!(
             "{}: worst visibility {:.2} in frame {} (seen in a 1° patch with {:.1} %), {:.2} % of {} frames above threshold, \
              on \"{}\" at {} pixels a degree and {} frames a second, by an eye that {} (model-predicted; calibrated on \
              gratings, not on renderings)",
