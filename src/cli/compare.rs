@@ -6,6 +6,7 @@ use super::animate::parse_rate;
 use super::json::write_json;
 use super::picture::InputPicture;
 use super::seeing::{SeeingArguments, tone_operator};
+use super::targets::check_kept;
 use anyhow::{Result, bail};
 use clap::Args;
 use fechner::output::{self, Format};
@@ -90,6 +91,12 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
     if arguments.fps.is_some() || arguments.velocity.is_some() {
         bail!("--fps and --velocity are for sequences, whose names have # for each digit of the frame's number");
     }
+    let read = [
+        ("the reference", Some(arguments.reference.as_path())),
+        ("the test", Some(&arguments.test)),
+        arguments.seeing.display_file(),
+    ];
+    check_kept(&read, &[("--map", arguments.map.as_deref()), ("--json", arguments.json.as_deref())])?;
     if let Some(map) = &arguments.map {
         check_map(map)?;
     }

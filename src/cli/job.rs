@@ -4,6 +4,7 @@ use super::console;
 use super::denoise::DenoiseChoice;
 use super::importance;
 use super::seeing::{self, parse_positive, parse_seconds};
+use super::targets::{Named, display_file};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use fechner::adaptive::glimpse::glimpse;
@@ -135,6 +136,15 @@ impl JobArguments {
     /// The scene file.
     pub(super) fn scene_file(&self) -> &Path {
         &self.scene
+    }
+
+    /// The files that it names.
+    pub(super) fn files(&self) -> [Named<'_>; 3] {
+        [
+            ("the scene", Some(&self.scene)),
+            ("the importance map", self.importance.as_deref()),
+            display_file(self.display.as_deref()),
+        ]
     }
 
     /// The scene's name in reports.

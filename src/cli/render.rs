@@ -6,7 +6,7 @@ use super::job::{JobArguments, Prepared};
 use super::json::write_json;
 use super::keeper::{CheckpointArguments, Keeper, Watch};
 use super::report::{Report, summary};
-use super::targets::check_distinct;
+use super::targets::check_kept;
 use super::tev::{Showing, TevArguments};
 use super::view::audience;
 use clap::Args;
@@ -44,11 +44,12 @@ pub(super) struct RenderArguments {
 /// Renders and writes.
 pub(super) fn run(arguments: &RenderArguments) -> anyhow::Result<ExitCode> {
     let format = output::check_target(&arguments.output)?;
-    check_distinct(&[
-        ("-o", Some(&arguments.output)),
+    let written = [
+        ("-o", Some(arguments.output.as_path())),
         ("--json", arguments.json.as_deref()),
         ("--checkpoint", arguments.checkpoint.file()),
-    ])?;
+    ];
+    check_kept(&arguments.job.files(), &written)?;
     if let Some(json) = &arguments.json {
         output::check_writable(json)?;
     }

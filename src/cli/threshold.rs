@@ -4,6 +4,7 @@ use super::animate::parse_rate;
 use super::channels;
 use super::picture::InputPicture;
 use super::seeing::{SeeingArguments, tone_operator};
+use super::targets::check_kept;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::output::{self, Attribute, Format, PIXEL_ASPECT_RATIO, Picture};
@@ -54,6 +55,13 @@ pub(super) struct ThresholdArguments {
 
 /// Writes the maps.
 pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
+    let halves = arguments.halves.iter().flatten().map(|half| ("a half", Some(half.as_path())));
+    let others = [
+        ("the picture", Some(arguments.input.as_path())),
+        ("the motion", arguments.velocity.as_deref()),
+        arguments.seeing.display_file(),
+    ];
+    check_kept(&halves.chain(others).collect::<Vec<_>>(), &[("-o", Some(&arguments.output))])?;
     if output::check_target(&arguments.output)? != Format::Exr {
         bail!("{}: threshold maps are data; end the name in .exr", arguments.output.display());
     }

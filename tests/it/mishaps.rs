@@ -82,3 +82,51 @@ fn a_limit_to_files_is_told() {
     assert_eq!(output.status.code(), Some(2), "{}", words(&output));
     assert!(words(&output).contains("a.film: File too large"), "{}", words(&output));
 }
+
+/// What a command reads is still there afterwards, whatever its outputs are called, and of two outputs none replaces the other.
+#[test]
+fn outputs_replace_no_inputs() {
+    let folder = folder();
+    for name in ["a.exr", "b.exr", "f.01.exr", "f.02.exr"] {
+        fechner(folder.path()).args(RENDER).args(["-o", name]).output().expect("runs");
+    }
+    let sequence = ["compare", "f.##.exr", "f.##.exr", "--fps", "24"];
+    let cases: [(&[&str], &str); 9] = [
+        (&[&RENDER[..], &["-o", "c.png", "--json", "s.toml"]].concat(), "--json would replace the scene"),
+        (&[&RENDER[..], &["-o", "b.exr", "--importance", "b.exr"]].concat(), "-o would replace the importance map"),
+        (&["compare", "a.exr", "b.exr", "--json", "./a.exr"], "--json would replace the reference"),
+        (&["compare", "a.exr", "b.exr", "--map", "m.png", "--json", "m.png"], "--map and --json name the same file"),
+        (&[&sequence[..], &["--json", "f.02.exr"]].concat(), "--json would replace a frame"),
+        (&["threshold", "a.exr", "-o", "a.exr"], "-o would replace the picture"),
+        (&["threshold", "a.exr", "--halves", "a.exr", "b.exr", "-o", "b.exr"], "-o would replace a half"),
+        (
+            &["tonemap", "a.exr", "-o", "c.png", "--operator", "ptyg", "--state", "a.exr"],
+            "--state would replace a picture",
+        ),
+        (
+            &["tonemap", "a.exr", "-o", "c.png", "--operator", "ptyg", "--state", "c.png"],
+            "-o and --state name the same",
+        ),
+    ];
+    let read = ["s.toml", "a.exr", "b.exr", "f.02.exr"].map(|name| folder.path().join(name));
+    let before = read.each_ref().map(|path| std::fs::read(path).expect("there"));
+    for (arguments, refusal) in cases {
+        let output = fechner(folder.path()).args(arguments).output().expect("runs");
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(words(&output).contains(refusal), "{arguments:?}: {}", words(&output));
+    }
+    assert!(read.iter().zip(before).all(|(path, before)| std::fs::read(path).is_ok_and(|now| now == before)));
+}
+
+/// The name of a sequence that cannot be kept to the byte is refused, not changed.
+#[test]
+#[cfg(target_os = "linux")]
+fn names_are_not_changed() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = folder();
+    fechner(folder.path()).args(RENDER).args(["-o", "a.exr"]).output().expect("runs");
+    let name = std::ffi::OsStr::from_bytes(b"t\xff.##.png");
+    let mut command = fechner(folder.path());
+    let output = command.args(["tonemap", "a.exr", "--operator", "agx", "-o"]).arg(name).output().expect("runs");
+    assert!(words(&output).contains("must be UTF-8"), "{}", words(&output));
+}
