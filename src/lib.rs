@@ -12,6 +12,8 @@
 //!
 //! No formula of vision stands in this crate, and no ray in `fechner-perception`.
 
+#![cfg_attr(not(test), deny(clippy::print_stdout, clippy::print_stderr))] // `say` instead: see there
+
 pub mod adaptive;
 pub mod animate;
 pub mod benchmark;
@@ -28,5 +30,6 @@ pub mod light;
 pub mod output;
 pub mod preview;
 pub mod sampler;
+pub mod say;
 pub mod scene;
 pub mod sealed;

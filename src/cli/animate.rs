@@ -182,7 +182,7 @@ fn render_shot(arguments: &AnimateArguments) -> Result<()> {
         progress.add(made, started.elapsed());
         if made != Made::Kept && frame < arguments.frames.last {
             let (done, count) = (frame - arguments.frames.first + 1, arguments.frame_numbers().count());
-            eprintln!("{done} of {count} frames, about {} left", duration_in_words(progress.seconds_left()));
+            say!("{done} of {count} frames, about {} left", duration_in_words(progress.seconds_left()));
         }
     }
     shot.conclude(&track).map(drop)

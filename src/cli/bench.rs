@@ -105,23 +105,23 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
         display: arguments.display.clone(),
         output: arguments.output.clone(),
     };
-    let say = |line: &str| eprintln!("{line}");
+    let say = |line: &str| say!("{line}");
     if arguments.bound {
-        println!("| scene | coverage | uniform, spp | optimum, spp | ratio |");
-        println!("| --- | --- | --- | --- | --- |");
+        answer!("| scene | coverage | uniform, spp | optimum, spp | ratio |");
+        answer!("| --- | --- | --- | --- | --- |");
         for b in bounds(&settings, &say)? {
             let (share, ratio) = (100.0 * b.coverage, b.uniform / b.optimum);
-            println!("| {} | {share} % | {:.0} | {:.0} | {ratio:.2} |", b.scene, b.uniform, b.optimum);
+            answer!("| {} | {share} % | {:.0} | {:.0} | {ratio:.2} |", b.scene, b.uniform, b.optimum);
         }
         return Ok(());
     }
     let results = run_bench(&settings, &say)?;
-    println!("| arm | coverage | samples, uniform / arm | worst scene | oracle / arm |");
-    println!("| --- | --- | --- | --- | --- |");
+    answer!("| arm | coverage | samples, uniform / arm | worst scene | oracle / arm |");
+    answer!("| --- | --- | --- | --- | --- |");
     for s in &results.summary {
         let speedup = s.speedup_samples;
         let efficiency = s.efficiency.map_or_else(String::new, |e| format!("{:.2} (least {:.2})", e.value, e.least));
-        println!(
+        answer!(
             "| {} | {} % | {} | {:.2} | {efficiency} |",
             s.arm,
             100.0 * s.coverage,
@@ -129,7 +129,7 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
             speedup.least
         );
     }
-    eprintln!("{}", settings.output.join("report.html").display());
+    say!("{}", settings.output.join("report.html").display());
     Ok(())
 }
 
@@ -175,15 +175,15 @@ fn run_denoise(arguments: &BenchArguments) -> Result<()> {
         target: arguments.visibility.unwrap_or(1.0),
         with_races: !arguments.law_only,
     };
-    let results = denoising(&settings, &|line: &str| eprintln!("{line}"))?;
-    println!(
+    let results = denoising(&settings, &|line: &str| say!("{line}"))?;
+    answer!(
         "| scene | denoiser | spp | rank corr. | predicted / true v | by variance alone | called fine | of it unproven | fine, \
          proven, wrong | fine, unproven, wrong | truly wrong | JOD raw, denoised | FLIP raw, denoised | overhead |"
     );
-    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    answer!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
     for c in &results.calibrations {
         let percent = |share: f64| format!("{:.1} %", 100.0 * share);
-        println!(
+        answer!(
             "| {} | {} | {} | {:.2} | {:.2} | {:.2} | {} | {} | {} | {} | {} | {:.2}, {:.2} | {:.3}, {:.3} | {:.2} |",
             c.scene,
             c.denoiser,
@@ -212,8 +212,8 @@ fn print_races(races: &[Race]) {
     if races.is_empty() {
         return;
     }
-    println!("\n| scene | denoiser | rule | spp to JOD 9.8 | to JOD 9.9 | to FLIP of uniform at 64 |");
-    println!("| --- | --- | --- | --- | --- | --- |");
+    answer!("\n| scene | denoiser | rule | spp to JOD 9.8 | to JOD 9.9 | to FLIP of uniform at 64 |");
+    answer!("| --- | --- | --- | --- | --- | --- |");
     for race in races {
         let uniform =
             races.iter().find(|r| r.rule == "uniform" && (&r.scene, &r.denoiser) == (&race.scene, &race.denoiser));
@@ -223,7 +223,7 @@ fn print_races(races: &[Race]) {
             (Some(own), None) => format!("{own:.1}"),
             (None, _) => "more than tried".to_owned(),
         };
-        println!(
+        answer!(
             "| {} | {} | {} | {} | {} | {} |",
             race.scene,
             race.denoiser,
@@ -260,15 +260,15 @@ fn run_animation(arguments: &BenchArguments, denoiser: Option<DenoiserKind>) -> 
         display: arguments.display.clone(),
         denoiser,
     };
-    let rows = animation(&settings, &|line: &str| eprintln!("{line}"))?;
+    let rows = animation(&settings, &|line: &str| say!("{line}"))?;
     if let Some(denoiser) = denoiser {
-        println!("All but the references denoised by {}:\n", Denoiser::open(denoiser)?.name());
+        answer!("All but the references denoised by {}:\n", Denoiser::open(denoiser)?.name());
     }
-    println!(
+    answer!(
         "| shot | frames a second | motion: spp, JOD | still: spp, JOD | still / motion | even, as good: spp | even / motion | \
          flicker | of even, at equal visibility |"
     );
-    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    answer!("| --- | --- | --- | --- | --- | --- | --- | --- | --- |");
     for row in &rows {
         let ratio = row.still_spp / row.motion_spp;
         let even = row
@@ -276,7 +276,7 @@ fn run_animation(arguments: &BenchArguments, denoiser: Option<DenoiserKind>) -> 
             .map_or_else(|| "more than tried | ".to_owned(), |spp| format!("{spp:.0} | {:.2}", spp / row.motion_spp));
         let AnimationRow { scene, frames_per_second, motion_spp, motion_jod, still_spp, still_jod, flicker, .. } = row;
         let even_flicker = row.uniform_flicker.map_or_else(|| "not tried".to_owned(), |even| format!("{even:.2}"));
-        println!(
+        answer!(
             "| {scene} | {frames_per_second} | {motion_spp:.0}, {motion_jod:.2} | {still_spp:.0}, {still_jod:.2} | \
              {ratio:.2} | {even} | {flicker:.2} | {even_flicker} |"
         );
@@ -286,7 +286,7 @@ fn run_animation(arguments: &BenchArguments, denoiser: Option<DenoiserKind>) -> 
         let still = geometric_mean(of_rate().map(|row| row.still_spp / row.motion_spp));
         let even = geometric_mean(of_rate().filter_map(|row| Some(row.uniform_spp? / row.motion_spp)));
         let flicker = geometric_mean(of_rate().filter_map(|row| Some(row.flicker / row.uniform_flicker?)));
-        println!("at {rate}: still / motion {still}, even / motion {even}, flicker over that of even {flicker}");
+        answer!("at {rate}: still / motion {still}, even / motion {even}, flicker over that of even {flicker}");
     }
     Ok(())
 }

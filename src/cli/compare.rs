@@ -6,6 +6,7 @@ use super::animate::parse_rate;
 use super::json::write_json;
 use super::picture::InputPicture;
 use super::seeing::{DEFAULT_OPERATOR, SeeingArguments, operator_values, tone_operator};
+use super::targets::check_kept;
 use anyhow::{Result, bail};
 use clap::Args;
 use fechner::output::{self, Format};
@@ -90,6 +91,12 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
     if arguments.fps.is_some() || arguments.velocity.is_some() {
         bail!("--fps and --velocity are for sequences, whose names have # for each digit of the frame's number");
     }
+    let read = [
+        ("the reference", Some(arguments.reference.as_path())),
+        ("the test", Some(&arguments.test)),
+        arguments.seeing.display_file(),
+    ];
+    check_kept(&read, &[("--map", arguments.map.as_deref()), ("--json", arguments.json.as_deref())])?;
     if let Some(map) = &arguments.map {
         check_map(map)?;
     }
@@ -127,7 +134,7 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
     if let Some(path) = &arguments.json {
         write_json(path, &figures)?;
     }
-    println!(
+    answer!(
         "{}: worst visibility {:.2} (seen in a 1° patch with {:.1} %), {:.2} % of the picture above threshold, on \
          \"{}\" at {} pixels a degree (model-predicted; calibrated on gratings, not on renderings)",
         if figures.seen.is_visible { "visible" } else { "the same to the eye" },

@@ -1,6 +1,7 @@
 //! What a person sees while a picture is made: a progress bar on a terminal, plain lines elsewhere.
 
 use fechner::adaptive::{Monitor, Progress};
+use fechner::say;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::Duration;
@@ -60,7 +61,7 @@ impl Monitor for Console {
                 bar.set_position(done);
                 bar.set_message(message);
             }
-            None => eprintln!("{message}"),
+            None => say!("{message}"),
         }
     }
 
@@ -75,9 +76,9 @@ impl Monitor for Console {
 pub(super) fn texture_decoded(done: usize, total: usize) {
     const MANY: usize = 8;
     match (std::io::stderr().is_terminal(), done == total) {
-        (true, false) => eprint!("\rtextures: {done} of {total}\x1b[K"),
-        (true, true) => eprint!("\r\x1b[K"),
-        (false, true) if total >= MANY => eprintln!("textures: {total}"),
+        (true, false) => say::part(format_args!("\rtextures: {done} of {total}\x1b[K")),
+        (true, true) => say::part(format_args!("\r\x1b[K")),
+        (false, true) if total >= MANY => say!("textures: {total}"),
         (false, _) => {}
     }
 }

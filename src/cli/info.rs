@@ -12,7 +12,7 @@ use std::path::Path;
 
 /// Prints what is in a picture file: size, channels with their range, attributes, colour tags.
 pub(crate) fn run(path: &Path) -> anyhow::Result<()> {
-    print!("{}", describe(path)?);
+    answer!("{}", describe(path)?.trim_end());
     Ok(())
 }
 

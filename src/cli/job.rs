@@ -4,6 +4,7 @@ use super::console;
 use super::denoise::DenoiseChoice;
 use super::importance;
 use super::seeing::{self, AskedShowing, Showing, model_values, operator_values, parse_positive, parse_seconds};
+use super::targets::{Named, display_file};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use fechner::adaptive::glimpse::glimpse;
@@ -141,6 +142,15 @@ impl JobArguments {
         &self.scene
     }
 
+    /// The files that it names.
+    pub(super) fn files(&self) -> [Named<'_>; 3] {
+        [
+            ("the scene", Some(&self.scene)),
+            ("the importance map", self.importance.as_deref()),
+            display_file(self.display.as_deref()),
+        ]
+    }
+
     /// The scene's name in reports.
     pub(super) fn scene_name(&self) -> String {
         self.scene.display().to_string()
@@ -187,7 +197,7 @@ impl JobArguments {
     pub(super) fn prepare(&self) -> anyhow::Result<Prepared> {
         let scene = self.load_at(self.at, Some(console::texture_decoded))?;
         for note in &scene.notes {
-            eprintln!("note: {note}");
+            say!("note: {note}");
         }
         let size = self.size.unwrap_or(Size { width: scene.film.width, height: scene.film.height });
         let trace = trace_settings(self, size, scene.nits_per_unit)?;
@@ -356,7 +366,7 @@ fn trace_settings(arguments: &JobArguments, size: Size, nits_per_unit: f64) -> a
 fn whole_light(scene: &Arc<Scene>, trace: &TraceSettings) -> Option<SceneLight> {
     const MOST_PIXELS: u64 = 1 << 26;
     if u64::from(trace.width) * u64::from(trace.height) > MOST_PIXELS {
-        eprintln!("note: tone is fitted to the crop alone: {}x{} pixels are too many", trace.width, trace.height);
+        say!("note: tone is fitted to the crop alone: {}x{} pixels are too many", trace.width, trace.height);
         return None;
     }
     // Films of other seeds must be shown alike, to be merged.

@@ -68,7 +68,7 @@ impl CheckpointArguments {
             return Ok(Start { header, state: fresh });
         };
         if !path.exists() {
-            eprintln!("note: {} is not there yet: starting from the beginning", path.display());
+            say!("note: {} is not there yet: starting from the beginning", path.display());
             return Ok(Start { header, state: fresh });
         }
         output::remove_leftovers(path)?;
@@ -80,7 +80,7 @@ impl CheckpointArguments {
         let [seed] = header.seeds.all[..] else { bail!("a render has one seed") };
         let seeds = found.seeds.continued_by(seed).map_err(different)?;
         let state = if found.settings != header.settings {
-            eprintln!("note: the film was sampled by other settings: its samples are kept, its ladder begins anew");
+            say!("note: the film was sampled by other settings: its samples are kept, its ladder begins anew");
             // Other eyes: what audits found of these samples' visible energy does not hold for them.
             RenderState { inflation: 1.0, ..state.begun_anew(limits) }
         } else if found.seeds.current.is_none() {
@@ -156,7 +156,7 @@ impl Keeper {
                 history.writes += 1;
             }
             Err(error) => {
-                eprintln!("note: {error}; rendering goes on");
+                say!("note: {error}; rendering goes on");
                 history.failure = Some(error);
             }
         }
@@ -204,7 +204,7 @@ impl<'a> Watch<'a> {
         if let Some(error) = history.failure {
             return Err(error.into());
         }
-        eprintln!(
+        say!(
             "Checkpoint {}: {:.1} MB, written {} times in {:.2} s, {:.1} % of the time.",
             path.display(),
             history.bytes as f64 / 1e6,

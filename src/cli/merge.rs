@@ -51,7 +51,7 @@ pub(super) fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
     merged.header.visibility = arguments.visibility.unwrap_or(merged.header.visibility);
     let visibility = merged.header.visibility;
     if let Some(map) = merged.header.settings.importance {
-        eprintln!(
+        say!(
             "note: sampled under an importance map (content {map}), which films do not keep: what can be seen is told without it"
         );
     }
@@ -71,8 +71,8 @@ pub(super) fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
     if let Some(path) = &arguments.json {
         write_json(path, &report)?;
     }
-    eprintln!("Films of the seeds {}:", merged.header.seeds.in_words());
-    eprintln!("{}", summary(&report, &settings, &rendered));
+    say!("Films of the seeds {}:", merged.header.seeds.in_words());
+    say!("{}", summary(&report, &settings, &rendered));
     Ok(())
 }
 

@@ -75,6 +75,7 @@ const CALL_AGAIN: u8 = 75;
 /// Runs what the arguments ask for. Exit status 0: done; 1: `compare` sees a difference; 2: bad input or a failed write;
 /// 75: a render or a farm's work was stopped by a signal, or has to wait, and should be called again.
 pub(crate) fn run() -> anyhow::Result<ExitCode> {
+    signals::outlive_file_limits();
     match CommandLine::parse().command {
         Command::Render(arguments) => return render::run(&arguments),
         Command::View(arguments) => view::run(&arguments)?,

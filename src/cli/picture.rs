@@ -74,7 +74,7 @@ impl InputPicture {
             bail!("{}: there are no channels R, G and B, nor Y; `fechner info` lists what there is", path.display());
         };
         for note in &picture.notes {
-            eprintln!("note: {}: {note}", path.display());
+            say!("note: {}: {note}", path.display());
         }
         let content = Content::Scene { nits_per_unit };
         let (width, height) = (picture.width as usize, picture.height as usize);
@@ -100,7 +100,7 @@ impl InputPicture {
             PngTransfer::Srgb | PngTransfer::Untagged => Codes::Srgb,
         };
         if image.color().has_alpha() && image.pixels().any(|(_, _, pixel)| pixel.0[3] < u8::MAX) {
-            eprintln!("note: {}: alpha is not looked at: each pixel is seen in the colour that it has", path.display());
+            say!("note: {}: alpha is not looked at: each pixel is seen in the colour that it has", path.display());
         }
         Ok(Self::from_image(image, Content::Display(codes)))
     }

@@ -7,7 +7,7 @@ use super::json::write_json;
 use super::keeper::{CheckpointArguments, Keeper, Watch};
 use super::maps::MapTarget;
 use super::report::{Report, summary};
-use super::targets::check_distinct;
+use super::targets::check_kept;
 use super::tev::{Showing, TevArguments};
 use super::view::audience;
 use clap::Args;
@@ -48,13 +48,13 @@ pub(super) struct RenderArguments {
 /// Renders and writes.
 pub(super) fn run(arguments: &RenderArguments) -> anyhow::Result<ExitCode> {
     let format = output::check_target(&arguments.output)?;
-    let mut targets = vec![
+    let mut written = vec![
         ("-o", Some(arguments.output.as_path())),
         ("--json", arguments.json.as_deref()),
         ("--checkpoint", arguments.checkpoint.file()),
     ];
-    targets.extend(arguments.maps.iter().map(|map| ("--map", Some(map.file()))));
-    check_distinct(&targets)?;
+    written.extend(arguments.maps.iter().map(|map| ("--map", Some(map.file()))));
+    check_kept(&arguments.job.files(), &written)?;
     arguments.maps.iter().try_for_each(MapTarget::check)?;
     if let Some(json) = &arguments.json {
         output::check_writable(json)?;
@@ -81,7 +81,7 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     let tracer = PathTracer::new(scene, trace);
     let degenerate = tracer.world().degenerate_triangles();
     if degenerate > 0 {
-        eprintln!("note: {degenerate} triangles without area were left out");
+        say!("note: {degenerate} triangles without area were left out");
     }
     let tev = arguments.tev.open(&arguments.job.scene_name())?.map(|tev| Showing::new(tev, settings.nits_per_unit));
     let watch = Watch::new(Console::new(settings.limits.time), keeper, audience, tev)?;
@@ -92,12 +92,12 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     let write = |path: &Path| write_picture(path, format, background, &rendered, &settings, &report);
     write(&arguments.output).map_err(|error| kept_elsewhere(&arguments.output, write, error))?;
     for map in &arguments.maps {
-        eprintln!("{}", map.write(&rendered, settings.limits.visibility_or_threshold())?);
+        say!("{}", map.write(&rendered, settings.limits.visibility_or_threshold())?);
     }
     if let Some(path) = &arguments.json {
         write_json(path, &report)?;
     }
-    eprintln!("{}", summary(&report, &settings, &rendered));
+    say!("{}", summary(&report, &settings, &rendered));
     let is_unfinished = rendered.stop_reason == StopReason::Interrupted && watch.is_asked_to_end();
     watch.report()?;
     Ok(if is_unfinished { ExitCode::from(CALL_AGAIN) } else { ExitCode::SUCCESS })

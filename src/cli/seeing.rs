@@ -1,5 +1,6 @@
 //! Arguments that say who looks at what.
 
+use super::targets::{Named, display_file};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
@@ -64,6 +65,11 @@ pub(super) struct SeeingArguments {
 }
 
 impl SeeingArguments {
+    /// The file that describes the display, if any.
+    pub(super) fn display_file(&self) -> Named<'_> {
+        display_file(Some(&self.display))
+    }
+
     /// The viewing that they mean.
     pub(super) fn viewing(&self) -> Result<Viewing> {
         viewing(&self.display, self.csf_area)

@@ -25,3 +25,13 @@ pub(super) fn listen(asked: impl Fn() + Send + 'static) -> Result<Arc<AtomicBool
     .context("signals cannot be waited for")?;
     Ok(leave)
 }
+
+/// From here on a write beyond the size that the system allows a file (`ulimit -f`) is an error, as on a full disk, in place of the
+/// program's end.
+pub(super) fn outlive_file_limits() {
+    #[cfg(unix)]
+    {
+        // That the signal is handled is all; where it cannot be, the render may still be lucky.
+        let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)));
+    }
+}

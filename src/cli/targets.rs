@@ -1,14 +1,36 @@
-//! The files that a command writes.
+//! The files that a command reads and writes.
 
 use anyhow::bail;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+
+/// A file, where there is one, with the option or words that name it.
+pub(super) type Named<'a> = (&'a str, Option<&'a Path>);
+
+/// Refuses to write in the place of what is read, or one file for two purposes: a reference or a scene is lost by that.
+pub(super) fn check_kept(read: &[Named], written: &[Named]) -> anyhow::Result<()> {
+    check_distinct(written)?;
+    let sources: HashMap<PathBuf, &str> =
+        read.iter().filter_map(|&(what, path)| Some((location(path?), what))).collect();
+    for (option, path) in written.iter().filter_map(|&(option, path)| Some((option, path?))) {
+        if let Some(what) = sources.get(&location(path)) {
+            bail!("{}: {option} would replace {what} that is read; choose another name", path.display());
+        }
+    }
+    Ok(())
+}
+
+/// The file of `--display`, which may be a preset's name.
+pub(super) fn display_file(display: Option<&str>) -> Named<'_> {
+    ("the display", display.filter(|name| name.ends_with(".toml")).map(Path::new))
+}
 
 /// Refuses one file for two purposes, each given with the option or words that name it: what is written later would take the place of
 /// what was written before.
-pub(super) fn check_distinct(files: &[(&str, Option<&Path>)]) -> anyhow::Result<()> {
-    let named: Vec<(&str, &Path)> = files.iter().filter_map(|&(what, path)| Some((what, path?))).collect();
-    for (place, (what, path)) in named.iter().enumerate() {
-        if let Some((other, _)) = named[..place].iter().find(|(_, other)| location(other) == location(path)) {
+pub(super) fn check_distinct(files: &[Named]) -> anyhow::Result<()> {
+    let mut purposes = HashMap::new();
+    for (what, path) in files.iter().filter_map(|&(what, path)| Some((what, path?))) {
+        if let Some(other) = purposes.insert(location(path), what) {
             bail!("{}: {other} and {what} name the same file; give each its own", path.display());
         }
     }
@@ -39,5 +61,18 @@ mod tests {
             let message = refused.expect_err("one file").to_string();
             assert!(message.contains("-o and --checkpoint") && message.contains("a.png"), "{message}");
         }
+    }
+
+    #[test]
+    fn what_is_read_is_kept() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [scene, again, other] = ["s.toml", "./s.toml", "b.png"].map(|name| folder.path().join(name));
+        std::fs::write(&scene, "").expect("written");
+        let read = [("the scene", Some(scene.as_path())), ("a copy", Some(&scene)), ("nothing", None)];
+        assert!(check_kept(&read, &[("-o", Some(&other))]).is_ok());
+        let refused = check_kept(&read[..1], &[("-o", Some(&other)), ("--json", Some(&again))]);
+        let message = refused.expect_err("the scene").to_string();
+        assert!(message.contains("--json would replace the scene that is read"), "{message}");
+        assert_eq!(display_file(Some("desktop")).1, None);
     }
 }

@@ -32,7 +32,7 @@ fn parse_addresses(text: &str) -> Result<Addresses, String> {
 impl TevArguments {
     /// The tev that is asked for; `scene` is what it lists.
     pub(super) fn open(&self, scene: &str) -> anyhow::Result<Option<Tev>> {
-        let warn = |warning: &str| eprintln!("warning: {warning}");
+        let warn = |warning: &str| say!("warning: {warning}");
         let open = |Addresses(addresses): &Addresses| Tev::new(addresses.clone(), format!("fechner: {scene}"), warn);
         self.tev.as_ref().map(open).transpose().context("the thread for tev could not be started")
     }

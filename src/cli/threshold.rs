@@ -4,6 +4,7 @@ use super::animate::parse_rate;
 use super::channels;
 use super::picture::InputPicture;
 use super::seeing::{DEFAULT_OPERATOR, SeeingArguments, model_values, operator_values, tone_operator};
+use super::targets::check_kept;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::output::{self, Attribute, Format, PIXEL_ASPECT_RATIO, Picture};
@@ -54,6 +55,13 @@ pub(super) struct ThresholdArguments {
 
 /// Writes the maps.
 pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
+    let halves = arguments.halves.iter().flatten().map(|half| ("a half", Some(half.as_path())));
+    let others = [
+        ("the picture", Some(arguments.input.as_path())),
+        ("the motion", arguments.velocity.as_deref()),
+        arguments.seeing.display_file(),
+    ];
+    check_kept(&halves.chain(others).collect::<Vec<_>>(), &[("-o", Some(&arguments.output))])?;
     if output::check_target(&arguments.output)? != Format::Exr {
         bail!("{}: threshold maps are data; end the name in .exr", arguments.output.display());
     }
@@ -122,12 +130,12 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     }
     picture.push_attribute(PIXEL_ASPECT_RATIO, Attribute::Float(guide.pixel_aspect_ratio() as f32));
     output::write_exr(&arguments.output, &picture)?;
-    println!(
+    answer!(
         "median threshold {:.3} cd/m² of standard error at visibility 1 (model-predicted; calibrated on gratings, not on renderings)",
         median(&threshold)
     );
     if let Some(visibility) = &visibility {
-        println!("median visibility of the noise {:.2}", median(visibility));
+        answer!("median visibility of the noise {:.2}", median(visibility));
     }
     Ok(())
 }
@@ -187,7 +195,7 @@ fn read_velocity(path: &Path, size: (usize, usize), frames_per_second: f64) -> R
             path.display()
         );
     };
-    println!("motion from the channels of {layer} at {frames_per_second} frames a second");
+    answer!("motion from the channels of {layer} at {frames_per_second} frames a second");
     Ok([channels::motion_plane(&exr, x.to_vec())?, channels::motion_plane(&exr, y.to_vec())?])
 }
 

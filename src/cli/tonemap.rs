@@ -5,6 +5,7 @@ mod sheet;
 use super::json::write_json;
 use super::picture::InputPicture;
 use super::seeing::{self, DEFAULT_DISPLAY, operator_values_or_all, parse_positive};
+use super::targets::{check_kept, display_file};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use fechner::output::{self, Attribute, Format, Picture};
@@ -159,7 +160,7 @@ pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
         let state = eye.as_mut().map(|eye| eye.look_at(Goal::of(&frame.guide(), viewing.display.pixel_density())));
         let fitted = operator.fit(&frame.guide(), viewing, state.as_ref());
         write(target, format, &frame, fitted.as_ref(), state.as_ref())?;
-        println!("{}: {}", target.display(), fitted.describe());
+        answer!("{}: {}", target.display(), fitted.describe());
     }
     if let (Some(path), Some(state)) = (&arguments.state, eye.and_then(|eye| eye.state)) {
         write_json(path, &state)?;
@@ -277,23 +278,25 @@ impl Eye {
     }
 }
 
-/// One file name for each input, which are none of the inputs'.
+/// One file name for each input. None of the files that are written is one that is read, nor another's.
 fn targets(arguments: &TonemapArguments) -> Result<Vec<PathBuf>> {
     let targets = named_targets(arguments)?;
-    let inputs: Vec<PathBuf> = arguments.input.iter().filter_map(|input| input.canonicalize().ok()).collect();
-    let replaced = targets.iter().find(|target| target.canonicalize().is_ok_and(|target| inputs.contains(&target)));
-    match replaced {
-        Some(target) => bail!("{}: would replace a picture that is read; choose another name", target.display()),
-        None => Ok(targets),
-    }
+    let pictures = arguments.input.iter().map(|path| ("a picture", Some(path.as_path())));
+    let read: Vec<_> = pictures.chain([display_file(Some(&arguments.display))]).collect();
+    let state = ("--state", arguments.state.as_deref());
+    let written: Vec<_> = targets.iter().map(|path| ("-o", Some(path.as_path()))).chain([state]).collect();
+    check_kept(&read, &written)?;
+    Ok(targets)
 }
 
 fn named_targets(arguments: &TonemapArguments) -> Result<Vec<PathBuf>> {
-    let name = arguments.output.to_string_lossy();
-    let digits = name.chars().filter(|c| *c == '#').count();
+    let digits = arguments.output.as_os_str().as_encoded_bytes().iter().filter(|&&byte| byte == b'#').count();
     if arguments.input.len() == 1 && digits == 0 {
         return Ok(vec![arguments.output.clone()]);
     }
+    let name = arguments.output.to_str().with_context(|| {
+        format!("{}: the name of a sequence must be UTF-8, for numbers to be put into it", arguments.output.display())
+    })?;
     let hashes = "#".repeat(digits);
     if digits == 0 || !name.contains(&hashes) {
         bail!("{name}: the name of a sequence needs # for each digit of the frame's number, such as night.####.png");

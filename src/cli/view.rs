@@ -84,7 +84,7 @@ pub(super) fn audience<'a>(
 ) -> anyhow::Result<Audience<'a>> {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).context("no port to show the render at")?;
     let (address, token) = door_of(&listener)?;
-    eprintln!("Watch it at http://{address}/?token={token}");
+    say!("Watch it at http://{address}/?token={token}");
     Audience::open(listener, Door { address, token }, scene, settings, record)
         .context("the thread for viewers could not be started")
 }
@@ -114,12 +114,12 @@ pub(super) fn run(arguments: &ViewArguments) -> anyhow::Result<()> {
     let closer = preview.closer();
     signals::listen(move || closer.close())?;
     if !address.ip().is_loopback() {
-        eprintln!("note: {address} can be reached from other machines; whoever has the address can drive this preview");
+        say!("note: {address} can be reached from other machines; whoever has the address can drive this preview");
     }
-    println!("http://{address}/?token={token}");
+    answer!("http://{address}/?token={token}");
     preview.serve(listener, Door { address, token }).with_context(|| format!("cannot serve on {address}"))?;
     if !host.has_saved.load(Ordering::Relaxed) {
-        eprintln!(
+        say!(
             "note: no picture was saved: the page's \"Save PNG\" and \"Save EXR\" do that before the end, `render -o` at the end"
         );
     }

@@ -182,7 +182,7 @@ fn state_so_far(farm: &Farm, frame_index: usize, job: &FrameJob<'_>) -> Result<R
         Err(error) => Some(error),
     };
     if let Some(error) = refused {
-        eprintln!("note: refused: {error}; the frame begins anew");
+        crate::say!("note: refused: {error}; the frame begins anew");
         set_aside(&path);
     }
     let area = job.tracer.settings().film_area();

@@ -191,7 +191,7 @@ impl Keeping<'_> {
             Wish::GoOn if last_kept.elapsed() < self.every => {}
             Wish::GoOn | Wish::Keep => {
                 if let Err(error) = write() {
-                    eprintln!("note: {error}; rendering goes on");
+                    crate::say!("note: {error}; rendering goes on");
                 }
                 *last_kept = Instant::now();
             }

@@ -24,6 +24,7 @@
 //! - `command_line`: the program as a user runs it
 //! - `checkpoint`: renders stopped, continued and merged against renders in one go
 //! - `kill`: the program, killed and resumed
+//! - `mishaps`: renders whose listeners go, whose disk is full, or whose files are asked for twice
 //! - `farm`: many processes on one folder
 //! - `farm_mishaps`: farms that lost a file, were interrupted, or were asked for what cannot be
 //! - `view`: the live preview, over its WebSocket
@@ -52,6 +53,7 @@ mod importance;
 mod kill;
 mod load_assets;
 mod maps;
+mod mishaps;
 mod mitsuba_format;
 mod mutations;
 mod no_allocation;

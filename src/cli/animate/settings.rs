@@ -12,6 +12,7 @@ use fechner::animate::gaze::GazeTrack;
 use fechner::animate::velocity::VelocityOf;
 use fechner::denoise::Denoiser;
 use fechner::integrator::TraceSettings;
+use fechner::say;
 use fechner::scene::Scene;
 
 /// Command line before scene before default.
@@ -87,7 +88,7 @@ fn gaze(arguments: &AnimateArguments, size: Size, shot: Frames) -> Result<Option
             size.height
         ),
         found if found < count as usize => {
-            eprintln!("note: {} says of {found} of {count} frames where in the picture is looked.", path.display());
+            say!("note: {} says of {found} of {count} frames where in the picture is looked.", path.display());
         }
         _ => {}
     }

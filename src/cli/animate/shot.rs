@@ -75,7 +75,7 @@ impl<'a> Shot<'a> {
         let source = FileSource::new(arguments);
         let scene = source.at(f64::from(arguments.frames.first) / arguments.fps)?;
         for note in &scene.notes {
-            eprintln!("note: {note}");
+            say!("note: {note}");
         }
         let settings = shot_settings(arguments, &scene, whole)?;
         let Showing { operator, exposure_stops, .. } = arguments.asked_showing().of_scene(&scene);
@@ -123,7 +123,7 @@ impl<'a> Shot<'a> {
             if self.is_up_to_date(&track, operator.as_ref(), wanted)? {
                 return Ok(track);
             }
-            eprintln!("{}: of other settings or another scene, made anew", file.display());
+            say!("{}: of other settings or another scene, made anew", file.display());
         }
         let count = self.settings.last - self.settings.first + 1;
         let started = Instant::now();
@@ -131,7 +131,7 @@ impl<'a> Shot<'a> {
         if let (Some(mean_samples), Sampling::Adaptive) = (self.settings.limits.mean_samples, self.settings.sampling) {
             track.spread(&self.needs(&track)?, mean_samples);
         }
-        eprintln!("looked at {count} frames in {}", duration_in_words(started.elapsed().as_secs_f64()));
+        say!("looked at {count} frames in {}", duration_in_words(started.elapsed().as_secs_f64()));
         let text = serde_json::to_string(&track).context("the track could not be put into words")?;
         output::write_beside(&file, |file| file.write_all(text.as_bytes()))?;
         Ok(track)
@@ -175,14 +175,14 @@ impl<'a> Shot<'a> {
         job.settings.limits.time = time;
         let file = self.file(frame);
         if self.record(frame, &job.key).is_some() {
-            eprintln!("{}: is there", file.display());
+            say!("{}: is there", file.display());
             return Ok(Made::Kept);
         }
         let outdated = self.has_record(frame);
         match FrameRecord::of_another_picture(&file) {
-            Some(other) => eprintln!("{}: its record is that of {other}, made anew", file.display()),
+            Some(other) => say!("{}: its record is that of {other}, made anew", file.display()),
             None if file.exists() => {
-                eprintln!("{}: of other settings or another scene, made anew", file.display());
+                say!("{}: of other settings or another scene, made anew", file.display());
             }
             None => {}
         }
@@ -241,7 +241,7 @@ impl<'a> Shot<'a> {
             report: serde_json::to_value(&report).context("the report could not be put into words")?,
         };
         write_json(&FrameRecord::file(&file), &record)?;
-        eprintln!("{}: {}", file.display(), report.in_a_line());
+        say!("{}: {}", file.display(), report.in_a_line());
         Ok(report)
     }
 
@@ -249,7 +249,7 @@ impl<'a> Shot<'a> {
     pub(in crate::cli) fn conclude(&self, track: &Track) -> Result<bool> {
         let FoundFrames { records, missing } = self.find_frames(track)?;
         if missing > 0 {
-            eprintln!("{missing} frames of the shot are not there yet.");
+            say!("{missing} frames of the shot are not there yet.");
             return Ok(false);
         }
         write_json(&self.name.of_shot("json"), &records)?;

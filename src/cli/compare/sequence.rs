@@ -5,6 +5,7 @@ use crate::cli::channels::{self, both_motions};
 use crate::cli::json::write_json;
 use crate::cli::picture::InputPicture;
 use crate::cli::seeing::tone_operator;
+use crate::cli::targets::check_kept;
 use anyhow::{Context, Result, bail};
 use fechner::animate::name::FrameName;
 use fechner::output;
@@ -14,7 +15,7 @@ use fechner_perception::sequence::{FrameMotion, SequenceFrame, SequenceObserver}
 use fechner_perception::tone::{AdaptationState, FittedTone, Goal, SceneLight, ToneOperator, ToneSettings};
 use serde::Serialize;
 use std::collections::VecDeque;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Frames, spread over the sequence, that the tone operator is fitted to.
@@ -120,6 +121,22 @@ fn check_covered((path, numbers): (&Path, &[u32]), (by_path, by): (&Path, &[u32]
     )
 }
 
+/// Refuses maps or figures in the place of a frame that is read.
+fn check_frames_kept(
+    arguments: &CompareArguments,
+    read: [Option<&FrameName>; 3],
+    map: Option<&FrameName>,
+    numbers: &[u32],
+) -> Result<()> {
+    let of_frames = |name: &FrameName| -> Vec<PathBuf> { numbers.iter().map(|&frame| name.of(frame)).collect() };
+    let frames: Vec<PathBuf> = read.into_iter().flatten().flat_map(of_frames).collect();
+    let maps = map.map_or_else(Vec::new, of_frames);
+    let read = frames.iter().map(|path| ("a frame", Some(path.as_path()))).chain([arguments.seeing.display_file()]);
+    let figures = ("--json", arguments.json.as_deref());
+    let written = maps.iter().map(|path| ("--map", Some(path.as_path()))).chain([figures]);
+    check_kept(&read.collect::<Vec<_>>(), &written.collect::<Vec<_>>())
+}
+
 /// The operator as it shows a whole sequence, by some frames from all over it: fitted to them one below the other, with eyes
 /// that are adapted to each of them alike. `None` for frames that are ready for the display.
 fn fit(
@@ -180,6 +197,7 @@ impl<'a> Sequences<'a> {
         if let Some(map) = &map {
             check_map(&map.of(numbers[0]))?;
         }
+        check_frames_kept(arguments, [Some(&reference), Some(&test), velocity.as_ref()], map.as_ref(), numbers)?;
         let operator = tone_operator(&arguments.operator, &ToneSettings::default())?;
         let nits_per_unit = arguments.seeing.nits_per_unit;
         let mut viewing = arguments.seeing.viewing()?;
@@ -238,7 +256,7 @@ impl<'a> Sequences<'a> {
         if let Some(path) = &self.arguments.json {
             write_json(path, &figures)?;
         }
-        println!(
+        answer!(
             "{}: worst visibility {:.2} in frame {} (seen in a 1° patch with {:.1} %), {:.2} % of {} frames above threshold, \
              on \"{}\" at {} pixels a degree and {} frames a second, by an eye that {} (model-predicted; calibrated on \
              gratings, not on renderings)",

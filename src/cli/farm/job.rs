@@ -212,7 +212,7 @@ impl Job<'_> {
                 let path = self.picture(farm, number);
                 let format = output::check_target(&path)?;
                 write_picture(&path, format, arguments.background(), &rendered, settings, &report)?;
-                eprintln!("{}: {}", path.display(), report.in_a_line());
+                say!("{}: {}", path.display(), report.in_a_line());
                 Ok(report)
             }
             (Self::Shot { shot, .. }, FrameKind::OfShot(of_shot)) => {

@@ -82,7 +82,7 @@ fn chosen(farm: &Farm, frames: &[u32]) -> Result<Vec<usize>> {
 
 fn say_missing(farm: &Farm, frame_index: usize, missing: &[u64]) {
     let units: Vec<String> = missing.iter().map(u64::to_string).collect();
-    eprintln!("frame {}: waits for units {}", farm.frame(frame_index).frame, units.join(", "));
+    say!("frame {}: waits for units {}", farm.frame(frame_index).frame, units.join(", "));
 }
 
 /// Merges a frame whose lock is held.
@@ -105,13 +105,13 @@ pub(super) fn merge(bench: &Bench<'_>, frame_index: usize, lock: &Lock) -> Resul
     match merge_frame(farm, frame_index, &frame_job, &keeping, &Quiet)? {
         Merged::Waiting { missing, refused } => {
             for error in refused {
-                eprintln!("note: refused: {error}");
+                say!("note: refused: {error}");
             }
             say_missing(farm, frame_index, &missing);
             Ok(MergeWent::Waits)
         }
         Merged::Planned(record) => {
-            eprintln!(
+            say!(
                 "frame {number}: round {} has {}, {}",
                 record.round,
                 count(record.units.len(), "unit"),
@@ -120,7 +120,7 @@ pub(super) fn merge(bench: &Bench<'_>, frame_index: usize, lock: &Lock) -> Resul
             Ok(MergeWent::On)
         }
         Merged::Left => {
-            eprintln!("frame {number}: left by a signal; its film is there");
+            say!("frame {number}: left by a signal; its film is there");
             Ok(MergeWent::Left)
         }
         Merged::Ended(ended) => {

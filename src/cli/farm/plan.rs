@@ -136,7 +136,7 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode> {
         units += record.units.len();
         samples += record.samples;
     }
-    eprintln!(
+    say!(
         "{}: {}, {} in the first round, {}",
         arguments.output.display(),
         count(farm.manifest().frames.len(), "frame"),

@@ -79,7 +79,7 @@ pub(super) fn run(arguments: &SlurmArguments) -> Result<ExitCode> {
         );
         output::write_beside(&scripts.join(name), |file| file.write_all(text.as_bytes()))?;
     }
-    println!("sh '{}'", scripts.join("submit.sh").display());
+    answer!("sh '{}'", scripts.join("submit.sh").display());
     Ok(ExitCode::SUCCESS)
 }
 

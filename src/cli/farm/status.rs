@@ -72,12 +72,12 @@ pub(super) fn run(arguments: &StatusArguments) -> Result<ExitCode> {
     let are_done = frames.iter().all(|frame| frame.state == State::Done);
     let status = Status { done: are_done && farm.concluded().exists(), frames };
     if arguments.json {
-        println!("{}", serde_json::to_string_pretty(&status).context("the status could not be put into words")?);
+        answer!("{}", serde_json::to_string_pretty(&status).context("the status could not be put into words")?);
     } else {
         match arguments.list {
-            Some(List::Units) => status.frames.iter().flat_map(|f| &f.missing).for_each(|unit| println!("{unit}")),
+            Some(List::Units) => status.frames.iter().flat_map(|f| &f.missing).for_each(|unit| answer!("{unit}")),
             Some(List::Frames) => {
-                status.frames.iter().filter(|f| f.state != State::Done).for_each(|f| println!("{}", f.frame));
+                status.frames.iter().filter(|f| f.state != State::Done).for_each(|f| answer!("{}", f.frame));
             }
             None => say(&status),
         }
@@ -110,10 +110,10 @@ fn say(status: &Status) {
     for frame in &status.frames {
         let number = frame.frame;
         match (frame.state, frame.round) {
-            (State::Done, _) => println!("frame {number}: done"),
-            (State::Merge, None) => println!("frame {number}: to be merged"),
-            (State::Merge, Some(round)) => println!("frame {number}: round {round} is to be merged"),
-            (State::Open, _) => println!(
+            (State::Done, _) => answer!("frame {number}: done"),
+            (State::Merge, None) => answer!("frame {number}: to be merged"),
+            (State::Merge, Some(round)) => answer!("frame {number}: round {round} is to be merged"),
+            (State::Open, _) => answer!(
                 "frame {number}: round {} has {} of {}, {} being rendered, {} in all",
                 frame.round.unwrap_or(0),
                 frame.units - frame.missing.len(),
@@ -124,8 +124,8 @@ fn say(status: &Status) {
         }
     }
     let done = status.frames.iter().filter(|frame| frame.state == State::Done).count();
-    println!("{done} of {} done", count(status.frames.len(), "frame"));
+    answer!("{done} of {} done", count(status.frames.len(), "frame"));
     if done == status.frames.len() && !status.done {
-        println!("what needs all frames is not made yet: fechner farm merge makes it");
+        answer!("what needs all frames is not made yet: fechner farm merge makes it");
     }
 }

@@ -116,7 +116,7 @@ impl<'a> Bench<'a> {
         match self.standing(unit) {
             Standing::Open => {}
             Standing::Merged => {
-                eprintln!("unit {unit}: is merged");
+                say!("unit {unit}: is merged");
                 return Ok(Went::WasThere);
             }
             Standing::Unknown(_) if if_busy == IfBusy::Skip => return Ok(Went::Busy),
@@ -126,7 +126,7 @@ impl<'a> Bench<'a> {
             Ok(Some(lock)) => lock,
             Ok(None) => return Ok(if self.signals.leaves() { Went::Left } else { Went::Busy }),
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                eprintln!("unit {unit}: was merged meanwhile");
+                say!("unit {unit}: was merged meanwhile");
                 return Ok(Went::WasThere);
             }
             Err(error) => return Err(error).with_context(|| format!("the lock of unit {unit}")),
@@ -185,7 +185,7 @@ impl<'a> Bench<'a> {
         let sums = self.farm.unit_file(unit, "sums");
         match UnitSums::read(&sums, &order) {
             Ok(_) => {
-                eprintln!("unit {unit}: is there");
+                say!("unit {unit}: is there");
                 return Ok(Went::WasThere);
             }
             Err(error) if error.is_missing() => {}
@@ -203,7 +203,7 @@ impl<'a> Bench<'a> {
         let samples: u64 = order.order.blocks.iter().map(|block| u64::from(block.samples)).sum();
         let there = begun.as_ref().map_or(0, |begun| begun.sums.len());
         if there > 0 {
-            eprintln!("unit {unit}: goes on from its checkpoint, {there} of {} blocks", order.order.blocks.len());
+            say!("unit {unit}: goes on from its checkpoint, {there} of {} blocks", order.order.blocks.len());
         }
         let started = Instant::now();
         let Self { farm, signals, every, .. } = *self;
@@ -212,11 +212,11 @@ impl<'a> Bench<'a> {
         let keeping = Keeping { every, wish: &|| signals.wish() };
         match render_unit(farm, &order, begun, tracer, &keeping)? {
             Outcome::Left => {
-                eprintln!("unit {unit}: left by a signal; its checkpoint is there");
+                say!("unit {unit}: left by a signal; its checkpoint is there");
                 Ok(Went::Left)
             }
             Outcome::Finished => {
-                eprintln!(
+                say!(
                     "unit {unit}: frame {}, {} in {}, {} of it to load the scene",
                     order.order.frame,
                     samples_in_words(samples),
@@ -229,7 +229,7 @@ impl<'a> Bench<'a> {
     }
 
     fn refuse(&self, path: &std::path::Path, error: &UnitError) {
-        eprintln!("note: refused: {error}");
+        say!("note: refused: {error}");
         frame::set_aside(path);
     }
 

@@ -1,0 +1,58 @@
+//! Words of the program to whoever started it, which cost nothing where nobody listens any more.
+//!
+//! `eprintln!` and `println!` panic where the other end is closed: a terminal that hangs up, or `2>&1 | head -1`, would end a
+//! render of hours without its picture. [`say!`](crate::say!) and [`answer!`](crate::answer!) take their place everywhere.
+
+use std::fmt::Arguments;
+use std::io::{self, Write, stderr, stdout};
+use std::sync::OnceLock;
+
+/// Why an answer is not complete.
+static FAILURE: OnceLock<io::Error> = OnceLock::new();
+
+/// A line for people, on standard error, as `eprintln!` writes it.
+#[macro_export]
+macro_rules! say {
+    ($($words:tt)*) => { $crate::say::line(format_args!($($words)*)) };
+}
+
+/// A line of what was asked for, on standard output, as `println!` writes it.
+#[macro_export]
+macro_rules! answer {
+    ($($words:tt)*) => { $crate::say::answer_line(format_args!($($words)*)) };
+}
+
+/// What [`say!`](crate::say!) does: all at once, so that threads do not mix their words.
+pub fn line(words: Arguments) {
+    part(format_args!("{words}\n"));
+}
+
+/// Words without the end of their line, for those that are written over each other.
+pub fn part(words: Arguments) {
+    // Nobody is left to be told that telling failed.
+    let _ = stderr().write_all(words.to_string().as_bytes());
+}
+
+/// What [`answer!`](crate::answer!) does.
+pub fn answer_line(words: Arguments) {
+    note_failure(writeln!(stdout(), "{words}"));
+}
+
+/// To be called at the end of the program.
+///
+/// # Errors
+/// If answers did not reach a standard output that still wanted them, as a file on a full disk.
+pub fn finish() -> Result<(), &'static io::Error> {
+    note_failure(stdout().flush());
+    FAILURE.get().map_or(Ok(()), Err)
+}
+
+/// A reader that has read enough, as `head`, is content.
+fn note_failure(written: io::Result<()>) {
+    if let Err(error) = written
+        && error.kind() != io::ErrorKind::BrokenPipe
+    {
+        // The first one says why.
+        let _ = FAILURE.set(error);
+    }
+}

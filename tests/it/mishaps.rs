@@ -1,0 +1,132 @@
+//! What goes wrong around a command: nobody listens any more, a disk is full, a file is asked for twice.
+
+use assert_cmd::cargo::cargo_bin;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+/// A scene that is rendered in a moment.
+const SPHERE: &str = "[camera]\nposition = [0, 0, 6]\nlook_at = [0, 0, 0]\nvertical_fov_deg = 45\n\n\
+     [[objects]]\nsphere = { center = [0, 0, 0], radius = 1 }\nmaterial = \"grey\"\n\n\
+     [[materials]]\nname = \"grey\"\ntype = \"diffuse\"\nreflectance = 0.5\n\n[environment]\nconstant = 100\n";
+
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("s.toml"), SPHERE).expect("written");
+    folder
+}
+
+fn fechner(folder: &Path) -> Command {
+    let mut command = Command::new(cargo_bin("fechner"));
+    command.current_dir(folder);
+    command
+}
+
+const RENDER: [&str; 6] = ["render", "s.toml", "--size", "16x16", "--visibility", "2"];
+
+fn words(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Where nobody reads what it says, a render still keeps its samples and writes its picture; where nobody reads an answer any more,
+/// the exit status is what it would have been.
+#[test]
+#[cfg(unix)]
+fn closed_ends_cost_nothing() {
+    let folder = folder();
+    let closed = || {
+        let (reader, writer) = std::io::pipe().expect("a pipe");
+        drop(reader);
+        Stdio::from(writer)
+    };
+    let status = |arguments: &[&str]| {
+        let mut command = fechner(folder.path());
+        command.args(arguments).stdout(closed()).stderr(closed());
+        command.status().expect("runs").code()
+    };
+    assert_eq!(status(&[&RENDER[..], &["-o", "a.png", "--checkpoint", "a.film"]].concat()), Some(0));
+    assert!(folder.path().join("a.png").exists() && folder.path().join("a.film").exists());
+    assert_eq!(status(&["animate", "s.toml", "--frames", "0..1", "--size", "16x16", "-o", "f.##.png"]), Some(0));
+    assert!(folder.path().join("f.01.png").exists());
+    assert_eq!(status(&[&RENDER[..], &["-o", "b.exr"]].concat()), Some(0));
+    assert_eq!(status(&["info", "b.exr"]), Some(0));
+    assert_eq!(status(&["compare", "b.exr", "b.exr"]), Some(0));
+    assert_eq!(status(&["threshold", "b.exr", "-o", "t.exr"]), Some(0));
+    assert_eq!(status(&["tonemap", "b.exr", "-o", "t.png", "--operator", "agx"]), Some(0));
+    assert_eq!(status(&["info", "none.exr"]), Some(2));
+}
+
+/// An answer that a full disk did not take is an error.
+#[test]
+#[cfg(target_os = "linux")]
+fn an_answer_that_is_lost_is_told() {
+    let folder = folder();
+    fechner(folder.path()).args(RENDER).args(["-o", "a.png"]).output().expect("runs");
+    let full = std::fs::File::create("/dev/full").expect("a device");
+    let output = fechner(folder.path()).args(["info", "a.png"]).stdout(full).output().expect("runs");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(words(&output).contains("cannot write to standard output"), "{}", words(&output));
+}
+
+/// A limit to the size of files is told as a full disk is, and what else was asked for is written.
+#[test]
+#[cfg(unix)]
+fn a_limit_to_files_is_told() {
+    let folder = folder();
+    let script = r#"ulimit -f 4; exec "$0" "$@""#;
+    let output = Command::new("sh")
+        .current_dir(folder.path())
+        .args(["-c", script, cargo_bin("fechner").to_str().expect("a name")])
+        .args(["render", "s.toml", "--size", "64x64", "--spp", "16", "-o", "a.png", "--checkpoint", "a.film"])
+        .output()
+        .expect("runs");
+    assert_eq!(output.status.code(), Some(2), "{}", words(&output));
+    assert!(words(&output).contains("a.film: File too large"), "{}", words(&output));
+}
+
+/// What a command reads is still there afterwards, whatever its outputs are called, and of two outputs none replaces the other.
+#[test]
+fn outputs_replace_no_inputs() {
+    let folder = folder();
+    for name in ["a.exr", "b.exr", "f.01.exr", "f.02.exr"] {
+        fechner(folder.path()).args(RENDER).args(["-o", name]).output().expect("runs");
+    }
+    let sequence = ["compare", "f.##.exr", "f.##.exr", "--fps", "24"];
+    let cases: [(&[&str], &str); 9] = [
+        (&[&RENDER[..], &["-o", "c.png", "--json", "s.toml"]].concat(), "--json would replace the scene"),
+        (&[&RENDER[..], &["-o", "b.exr", "--importance", "b.exr"]].concat(), "-o would replace the importance map"),
+        (&["compare", "a.exr", "b.exr", "--json", "./a.exr"], "--json would replace the reference"),
+        (&["compare", "a.exr", "b.exr", "--map", "m.png", "--json", "m.png"], "--map and --json name the same file"),
+        (&[&sequence[..], &["--json", "f.02.exr"]].concat(), "--json would replace a frame"),
+        (&["threshold", "a.exr", "-o", "a.exr"], "-o would replace the picture"),
+        (&["threshold", "a.exr", "--halves", "a.exr", "b.exr", "-o", "b.exr"], "-o would replace a half"),
+        (
+            &["tonemap", "a.exr", "-o", "c.png", "--operator", "ptyg", "--state", "a.exr"],
+            "--state would replace a picture",
+        ),
+        (
+            &["tonemap", "a.exr", "-o", "c.png", "--operator", "ptyg", "--state", "c.png"],
+            "-o and --state name the same",
+        ),
+    ];
+    let read = ["s.toml", "a.exr", "b.exr", "f.02.exr"].map(|name| folder.path().join(name));
+    let before = read.each_ref().map(|path| std::fs::read(path).expect("there"));
+    for (arguments, refusal) in cases {
+        let output = fechner(folder.path()).args(arguments).output().expect("runs");
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(words(&output).contains(refusal), "{arguments:?}: {}", words(&output));
+    }
+    assert!(read.iter().zip(before).all(|(path, before)| std::fs::read(path).is_ok_and(|now| now == before)));
+}
+
+/// The name of a sequence that cannot be kept to the byte is refused, not changed.
+#[test]
+#[cfg(target_os = "linux")]
+fn names_are_not_changed() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = folder();
+    fechner(folder.path()).args(RENDER).args(["-o", "a.exr"]).output().expect("runs");
+    let name = std::ffi::OsStr::from_bytes(b"t\xff.##.png");
+    let mut command = fechner(folder.path());
+    let output = command.args(["tonemap", "a.exr", "--operator", "agx", "-o"]).arg(name).output().expect("runs");
+    assert!(words(&output).contains("must be UTF-8"), "{}", words(&output));
+}
