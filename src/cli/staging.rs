@@ -112,16 +112,15 @@ impl Staging {
         match &self.environment {
             None => {}
             Some(Surroundings::Picture(file)) => {
-                scene.environment = Some(environment::from_file(file, 1.0, 0.0).context("--environment")?);
+                scene.surround(environment::from_file(file, 1.0, 0.0).context("--environment")?, None);
             }
             Some(Surroundings::Constant(nits)) => {
                 let radiance = (f64::from(*nits) / nits_per_unit) as f32;
-                scene.environment = Some(Environment::constant(Vec3::splat(radiance)));
+                scene.surround(Environment::constant(Vec3::splat(radiance)), None);
             }
             Some(Surroundings::Sky(sky)) => {
                 let light = sky::light(sky, nits_per_unit);
-                scene.environment = Some(light.environment);
-                scene.lights.extend(light.sun);
+                scene.surround(light.environment, light.sun);
             }
         }
         if let Some(look) = self.look_at {
@@ -140,5 +139,44 @@ impl Staging {
             scene.notes.retain(|note| !note.starts_with("No camera in the file"));
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+    use fechner::scene::Light;
+
+    #[derive(Parser)]
+    struct Arguments {
+        #[command(flatten)]
+        staging: Staging,
+    }
+
+    /// A scene as it is staged by the command line.
+    fn staged(scene: Scene, arguments: &[&str]) -> Scene {
+        let mut scene = scene;
+        let arguments = Arguments::parse_from(["fechner"].iter().chain(arguments));
+        arguments.staging.apply(&mut scene).unwrap();
+        scene
+    }
+
+    /// The sun goes with its sky, whatever comes in its place; what else shines from afar stays.
+    #[test]
+    fn other_surroundings_have_no_sun_but_their_own() {
+        let lamp =
+            Light::Directional { direction: Vec3::NEG_Y, irradiance: Vec3::ONE, angular_radius: 0.0, is_of_sky: false };
+        let under_a_sky = || {
+            let sky = sky::light(&Sky::default(), 1.0);
+            let lights = [lamp.clone()].into_iter().chain(sky.sun).collect();
+            Scene { environment: Some(sky.environment), lights, ..Scene::default() }
+        };
+        assert_eq!(under_a_sky().lights.len(), 2);
+        for (surroundings, suns) in [("constant:1000", 0), ("sky:30", 1)] {
+            let scene = staged(under_a_sky(), &["--environment", surroundings]);
+            assert_eq!(scene.lights[0], lamp, "{surroundings}");
+            assert_eq!(scene.lights.len(), 1 + suns, "{surroundings}: {:?}", scene.lights);
+        }
     }
 }

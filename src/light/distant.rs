@@ -28,7 +28,7 @@ impl DistantLights {
     pub(super) fn new(lights: &[Light]) -> Option<Self> {
         let (mut distant, mut weights) = (Vec::new(), Vec::new());
         for light in lights {
-            let &Light::Directional { direction, irradiance, angular_radius } = light else { continue };
+            let &Light::Directional { direction, irradiance, angular_radius, .. } = light else { continue };
             let half_sin = (0.5 * angular_radius).sin();
             let one_minus_cos = 2.0 * half_sin * half_sin;
             // Irradiance of a disc of radiance L that is faced: π L sin²θ.

@@ -128,6 +128,7 @@ fn scenes() -> Vec<(&'static str, Scene)> {
             direction: Vec3::new(0.0, 0.6, 0.8),
             irradiance: Vec3::ONE,
             angular_radius: 0.4,
+            is_of_sky: false,
         });
     });
     all
@@ -253,7 +254,12 @@ fn choices_without_area_add_up() {
         outer_angle: 0.6,
         falloff: SpotFalloff::Smoothstep,
     });
-    scene.lights.push(Light::Directional { direction: Vec3::NEG_Y, irradiance: Vec3::ONE, angular_radius: 0.0 });
+    scene.lights.push(Light::Directional {
+        direction: Vec3::NEG_Y,
+        irradiance: Vec3::ONE,
+        angular_radius: 0.0,
+        is_of_sky: false,
+    });
     let world = World::new(Arc::new(scene));
     let lights = Lights::new(&world);
     let receiver = LightReceiver { position: Vec3::ZERO, normal: Vec3::Y };

@@ -37,6 +37,8 @@ pub enum Light {
         irradiance: Vec3,
         /// Half angle of the disc in radians, below π/2; 0 is no disc (the sun's is 0.00465).
         angular_radius: f32,
+        /// Whether it is the sun of the surroundings and goes when others take their place.
+        is_of_sky: bool,
     },
 }
 

@@ -100,6 +100,13 @@ impl Scene {
             || self.instances.iter().any(|instance| instance.motion.is_some())
             || self.spheres.iter().any(|sphere| sphere.motion.is_some())
     }
+
+    /// Puts surroundings, and their sun if there is one, in the place of those that it has: the old sun sets with its sky.
+    pub fn surround(&mut self, environment: Environment, sun: Option<Light>) {
+        self.environment = Some(environment);
+        self.lights.retain(|light| !matches!(light, Light::Directional { is_of_sky: true, .. }));
+        self.lights.extend(sun);
+    }
 }
 
 /// Picture size in pixels.

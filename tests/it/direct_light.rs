@@ -159,6 +159,7 @@ fn a_sun_with_a_disc_gives_its_irradiance() {
         direction: Vec3::NEG_Y,
         irradiance: Vec3::splat(2.0),
         angular_radius: 15f32.to_radians(),
+        is_of_sky: false,
     });
     assert_irradiance(scene, 0.0, 2.0, "sun");
 }
@@ -183,6 +184,7 @@ fn lights_without_area_follow_their_laws() {
         direction: Vec3::new(0.6, -0.8, 0.0),
         irradiance: Vec3::splat(2.0),
         angular_radius: 0.0,
+        is_of_sky: false,
     });
     assert_irradiance(sun, 0.0, 1.6, "directional");
 }
@@ -208,7 +210,7 @@ fn lights_add_up() {
 fn sky_and_disc_in_one_place_add_up() {
     let towards = Vec3::new(0.3, 1.0, 0.2).normalize();
     let patch = Environment::from_directions(64, 32, |d| if d.dot(towards) > 0.8 { Vec3::ONE } else { Vec3::ZERO });
-    let disc = Light::Directional { direction: -towards, irradiance: Vec3::ONE, angular_radius: 1.0 };
+    let disc = Light::Directional { direction: -towards, irradiance: Vec3::ONE, angular_radius: 1.0, is_of_sky: false };
     let along = |sky: bool, sun: bool| {
         let mut scene = floor();
         scene.environment = sky.then(|| patch.clone());

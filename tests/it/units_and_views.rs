@@ -121,3 +121,15 @@ const GLTF_LAMP: &str = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"node
 "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}],
 "bufferViews":[{"buffer":0,"byteLength":36}],
 "buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]}"#;
+
+/// The surroundings of a side file take the sun away with the sky that they replace.
+#[test]
+fn a_side_files_surroundings_replace_the_sun() {
+    let sunny = "<scene version=\"3.0.0\"><emitter type=\"sunsky\"><vector name=\"sun_direction\" x=\"0\" y=\"1\" z=\"1\"/>\
+                 </emitter><shape type=\"sphere\"/></scene>";
+    let suns =
+        |side: &str| read(&[("sunny.xml", sunny), ("sunny.fechner.toml", side)], &LoadOptions::default()).lights.len();
+    assert_eq!(suns("[film]\nsize = [8, 8]\n"), 1);
+    assert_eq!(suns("[environment]\nluminance_cd_m2 = 1000\n"), 0);
+    assert_eq!(suns("[environment]\nsky = { sun_elevation_deg = 20 }\n"), 1);
+}

@@ -67,6 +67,7 @@ pub fn light(sky: &Sky, nits_per_unit: f64) -> SkyLight {
         direction: -towards_sun,
         irradiance: sun_irradiance,
         angular_radius: SUN_ANGULAR_RADIUS,
+        is_of_sky: true,
     });
     SkyLight { environment, sun }
 }

@@ -314,7 +314,9 @@ impl<'a> Reader<'a> {
         }
         let strength = strength.max(Vec3::ZERO);
         self.builder.lights.push(match light.kind() {
-            Kind::Directional => Light::Directional { direction, irradiance: strength, angular_radius: 0.0 },
+            Kind::Directional => {
+                Light::Directional { direction, irradiance: strength, angular_radius: 0.0, is_of_sky: false }
+            }
             Kind::Point => Light::Point { position, intensity: strength },
             Kind::Spot { inner_cone_angle, outer_cone_angle } => {
                 let quarter = std::f32::consts::FRAC_PI_2;

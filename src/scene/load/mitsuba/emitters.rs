@@ -51,7 +51,12 @@ impl Reader {
                     None => ahead()?,
                 };
                 let irradiance = self.light_color(emitter, "irradiance")?;
-                self.builder.lights.push(Light::Directional { direction, irradiance, angular_radius: 0.0 });
+                self.builder.lights.push(Light::Directional {
+                    direction,
+                    irradiance,
+                    angular_radius: 0.0,
+                    is_of_sky: false,
+                });
             }
             "constant" => {
                 let radiance = self.light_color(emitter, "radiance")?;
@@ -134,10 +139,10 @@ impl Reader {
                 ..light.environment
             });
         }
-        if let Some(Light::Directional { direction, irradiance, angular_radius }) = light.sun {
+        if let Some(Light::Directional { direction, irradiance, angular_radius, is_of_sky }) = light.sun {
             let irradiance = irradiance * (scale * sun_scale).max(0.0);
             let direction = from_world.transpose() * direction;
-            self.builder.lights.push(Light::Directional { direction, irradiance, angular_radius });
+            self.builder.lights.push(Light::Directional { direction, irradiance, angular_radius, is_of_sky });
         }
         Ok(())
     }

@@ -42,7 +42,12 @@ impl Reader<'_> {
                 let direction = direction.ok_or_else(|| parameters.error("\"from\" and \"to\" are the same point"))?;
                 let illuminance = self.positive(parameters, "illuminance")?;
                 let irradiance = self.light_color(parameters, "L", 1.0)? * illuminance.unwrap_or(1.0);
-                self.builder.lights.push(Light::Directional { direction, irradiance, angular_radius: 0.0 });
+                self.builder.lights.push(Light::Directional {
+                    direction,
+                    irradiance,
+                    angular_radius: 0.0,
+                    is_of_sky: false,
+                });
             }
             "infinite" => {
                 let environment = self.infinite(parameters, &to_world)?;

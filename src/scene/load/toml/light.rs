@@ -58,6 +58,7 @@ pub(super) fn read(value: &Value, nits_per_unit: f64) -> Result<Light, LoadError
                 direction: fields.require("direction")?.direction()?,
                 irradiance: lux / nits_per_unit as f32,
                 angular_radius: 0.5 * fields.get_or("diameter_deg", 0.0, |v| v.within(0.0, 170.0))?.to_radians() as f32,
+                is_of_sky: false,
             })
         }
     }

@@ -69,8 +69,7 @@ pub(in crate::scene::load) fn apply(path: &Path, options: &LoadOptions, scene: &
         if let Some(value) = root.get("environment") {
             let folder = path.parent().unwrap_or(Path::new(""));
             let surroundings = surroundings::read(&value, folder, scene.nits_per_unit)?;
-            scene.environment = Some(surroundings.environment);
-            scene.lights.extend(surroundings.sun);
+            scene.surround(surroundings.environment, surroundings.sun);
         }
         if let Some(list) = root.get("lights") {
             for value in list.array()? {
