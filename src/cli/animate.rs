@@ -13,7 +13,7 @@ mod video;
 use super::console::duration_in_words;
 use super::denoise::DenoiseChoice;
 use super::job::{Quality, Size, parse_size};
-use super::seeing::{parse_positive, parse_seconds};
+use super::seeing::{parse_positive, parse_seconds, parse_stops};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use frames::{Frames, parse_frames};
@@ -94,7 +94,7 @@ pub(super) struct AnimateArguments {
     #[arg(long, value_name = "NAME", help_heading = "Picture")]
     operator: Option<String>,
     /// Exposure correction in stops.
-    #[arg(long, value_name = "STOPS", allow_negative_numbers = true, help_heading = "Picture")]
+    #[arg(long, value_name = "STOPS", value_parser = parse_stops, allow_negative_numbers = true, help_heading = "Picture")]
     exposure: Option<f64>,
     /// Take the noise out of every frame: by the built-in filter, or by Open Image Denoise where it is installed.
     #[arg(long, value_enum, default_value = "none", help_heading = "Picture")]

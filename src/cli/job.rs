@@ -3,7 +3,7 @@
 use super::console;
 use super::denoise::DenoiseChoice;
 use super::importance;
-use super::seeing::{self, parse_positive, parse_seconds};
+use super::seeing::{self, parse_finite, parse_positive, parse_seconds, parse_stops};
 use super::targets::{Named, display_file};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
@@ -35,7 +35,7 @@ pub(super) struct JobArguments {
     #[command(flatten)]
     staging: super::staging::Staging,
     /// Time in the scene's keyframes, in seconds.
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = parse_finite, allow_negative_numbers = true)]
     at: f64,
 
     /// Stop when the remaining noise is at most this visible: 1 is at threshold.
@@ -114,7 +114,7 @@ pub(super) struct JobArguments {
     #[arg(long, value_name = "NAME", help_heading = "Picture")]
     operator: Option<String>,
     /// Exposure correction in stops.
-    #[arg(long, value_name = "STOPS", allow_negative_numbers = true, help_heading = "Picture")]
+    #[arg(long, value_name = "STOPS", value_parser = parse_stops, allow_negative_numbers = true, help_heading = "Picture")]
     exposure: Option<f64>,
 
     /// Threads; the picture does not depend on it.

@@ -80,6 +80,20 @@ pub(super) fn parse_positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Any number.
+pub(super) fn parse_finite(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(|| format!("\"{text}\" is not a number"))
+}
+
+/// A number of stops that operators know.
+pub(super) fn parse_stops(text: &str) -> Result<f64, String> {
+    const MOST_STOPS: f64 = 100.0;
+    match text.parse::<f64>() {
+        Ok(stops) if stops.abs() <= MOST_STOPS => Ok(stops),
+        _ => Err(format!("\"{text}\" is not a number of stops from -{MOST_STOPS} to {MOST_STOPS}")),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -93,5 +107,14 @@ mod tests {
         for refused in ["0", "-1", "inf", "nan", "a minute"] {
             assert!(parse_seconds(refused).is_err(), "{refused}");
         }
+    }
+
+    #[test]
+    fn stops_are_numbers_that_films_can_keep() {
+        assert_eq!((parse_stops("-2.5"), parse_finite("-1")), (Ok(-2.5), Ok(-1.0)));
+        for refused in ["nan", "inf", "-inf", "101", "much"] {
+            assert!(parse_stops(refused).is_err(), "{refused}");
+        }
+        assert!(parse_finite("nan").is_err() && parse_finite("inf").is_err());
     }
 }

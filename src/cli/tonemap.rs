@@ -4,7 +4,7 @@ mod sheet;
 
 use super::json::write_json;
 use super::picture::InputPicture;
-use super::seeing::{self, parse_positive};
+use super::seeing::{self, parse_positive, parse_stops};
 use super::targets::{check_kept, display_file};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
@@ -86,15 +86,6 @@ fn parse_pixel(text: &str) -> Result<Gaze, String> {
     let parsed =
         text.split_once(',').and_then(|(x, y)| Some(Pixel { x: x.trim().parse().ok()?, y: y.trim().parse().ok()? }));
     parsed.map(Gaze).ok_or_else(|| format!("\"{text}\" is not a pixel; expected X,Y such as 320,180"))
-}
-
-/// A number of stops that operators know.
-fn parse_stops(text: &str) -> Result<f64, String> {
-    const MOST_STOPS: f64 = 100.0;
-    match text.parse::<f64>() {
-        Ok(stops) if stops.abs() <= MOST_STOPS => Ok(stops),
-        _ => Err(format!("\"{text}\" is not a number of stops from -{MOST_STOPS} to {MOST_STOPS}")),
-    }
 }
 
 /// A picture in scene cd/m² with what operators look at.
