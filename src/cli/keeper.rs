@@ -1,5 +1,6 @@
 //! Keeping the film of a render safe: checkpoints while it runs, and a clean end when a signal asks for it.
 
+use super::claim::Claim;
 use super::console::Console;
 use super::seeing::parse_seconds;
 use super::signals::listen;
@@ -49,17 +50,19 @@ impl CheckpointArguments {
         self.checkpoint.is_some()
     }
 
-    /// Finds out whether the file can be written before the work is done, and refuses to write over the work of others.
-    pub(super) fn check(&self) -> anyhow::Result<()> {
-        let Some(path) = &self.checkpoint else { return Ok(()) };
+    /// Finds out whether the file can be written before the work is done, and refuses to write over the work of others, done or under
+    /// way. The claim lasts as long as the file is written.
+    pub(super) fn claim(&self) -> anyhow::Result<Option<Claim>> {
+        let Some(path) = &self.checkpoint else { return Ok(None) };
         output::check_writable(path)?;
+        let claim = Claim::on(path)?;
         if path.exists() && !self.resume {
             bail!(
                 "{} is there already: go on with it by --resume, name another --checkpoint, or remove it",
                 path.display()
             );
         }
-        Ok(())
+        Ok(Some(claim))
     }
 
     /// The state to start from: `fresh`, or what the file holds if it fits `header`.

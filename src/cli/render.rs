@@ -53,7 +53,7 @@ pub(super) fn run(arguments: &RenderArguments) -> anyhow::Result<ExitCode> {
     if let Some(json) = &arguments.json {
         output::check_writable(json)?;
     }
-    arguments.checkpoint.check()?;
+    let _claim = arguments.checkpoint.claim()?;
     let pool = arguments.job.thread_pool()?;
     pool.install(|| render_and_write(arguments, format))
 }

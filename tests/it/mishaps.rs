@@ -130,3 +130,25 @@ fn names_are_not_changed() {
     let output = command.args(["tonemap", "a.exr", "--operator", "agx", "-o"]).arg(name).output().expect("runs");
     assert!(words(&output).contains("must be UTF-8"), "{}", words(&output));
 }
+
+/// A film is written by one process at a time, and another is told by which.
+#[test]
+fn a_film_has_one_writer() {
+    let folder = folder();
+    let film = folder.path().join("a.film");
+    let endless =
+        ["render", "s.toml", "--size", "64x64", "--visibility", "0.001", "-o", "a.png", "--checkpoint", "a.film"];
+    let mut command = fechner(folder.path());
+    let mut child =
+        command.args(endless).args(["--checkpoint-every", "0.01"]).stderr(Stdio::null()).spawn().expect("runs");
+    crate::support::wait_for(&film, &mut child);
+    let second =
+        || fechner(folder.path()).args(RENDER).args(["-o", "b.png", "--checkpoint", "./a.film", "--resume"]).output();
+    let refused = second().expect("runs");
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(words(&refused).contains(&format!("process {} writes this film", child.id())), "{}", words(&refused));
+    child.kill().expect("killed");
+    child.wait().expect("ended");
+    let other_size = second().expect("runs");
+    assert!(words(&other_size).contains("64x64"), "free after a kill: {}", words(&other_size));
+}
