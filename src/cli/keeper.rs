@@ -144,6 +144,9 @@ impl Keeper {
         let reserve = (history.longest_wait + history.longest_write).min(self.every / 2);
         if history.last_snapshot.elapsed() + reserve >= self.every {
             self.write(state, &mut history);
+            if let Some(error) = &history.failure {
+                say!("note: {error}; rendering goes on");
+            }
         }
         history.last_chance = Instant::now();
     }
@@ -158,10 +161,7 @@ impl Keeper {
                 history.bytes = bytes;
                 history.writes += 1;
             }
-            Err(error) => {
-                say!("note: {error}; rendering goes on");
-                history.failure = Some(error);
-            }
+            Err(error) => history.failure = Some(error),
         }
         history.longest_write = history.longest_write.max(snapshot.elapsed());
         history.writing += snapshot.elapsed();
@@ -200,7 +200,10 @@ impl<'a> Watch<'a> {
         self.console.finish();
     }
 
-    /// Says what keeping the film took; an error if its last state could not be written.
+    /// Says what keeping the film took.
+    ///
+    /// # Errors
+    /// If its last state could not be written.
     pub(super) fn report(self) -> anyhow::Result<()> {
         let Some(Keeper { path, history, .. }) = self.keeper else { return Ok(()) };
         let history = history.into_inner().unwrap_or_else(PoisonError::into_inner);

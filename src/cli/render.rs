@@ -9,6 +9,8 @@ use super::report::{Report, summary};
 use super::targets::check_kept;
 use super::tev::{Showing, TevArguments};
 use super::view::audience;
+use super::words::in_a_line;
+use anyhow::bail;
 use clap::Args;
 use fechner::adaptive::settings::LoopSettings;
 use fechner::adaptive::state::RenderState;
@@ -84,14 +86,21 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     let report = Report::new(&arguments.job.scene_name(), &seeds, &settings, &rendered);
     let background = arguments.job.background();
     let write = |path: &Path| write_picture(path, format, background, &rendered, &settings, &report);
-    write(&arguments.output).map_err(|error| kept_elsewhere(&arguments.output, write, error))?;
-    if let Some(path) = &arguments.json {
-        write_json(path, &report)?;
-    }
+    let picture = write(&arguments.output).map_err(|error| kept_elsewhere(&arguments.output, write, error));
+    let figures = arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, &report));
     say!("{}", summary(&report, &settings, &rendered));
     let is_unfinished = rendered.stop_reason == StopReason::Interrupted && watch.is_asked_to_end();
-    watch.report()?;
+    if picture.is_ok() && figures.is_err() {
+        say!("note: the picture is in {}", arguments.output.display());
+    }
+    all_written([picture, figures, watch.report()])?;
     Ok(if is_unfinished { ExitCode::from(CALL_AGAIN) } else { ExitCode::SUCCESS })
+}
+
+/// All that could not be written, in one error: each file is tried, whatever became of the others.
+fn all_written(files: impl IntoIterator<Item = anyhow::Result<()>>) -> anyhow::Result<()> {
+    let failures: Vec<String> = files.into_iter().filter_map(Result::err).map(|error| in_a_line(&error)).collect();
+    if failures.is_empty() { Ok(()) } else { bail!(failures.join("; ")) }
 }
 
 /// Writes a picture that cannot be where it should into a new folder among temporary files, and says so: its samples took long.

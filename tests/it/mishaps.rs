@@ -67,20 +67,50 @@ fn an_answer_that_is_lost_is_told() {
     assert!(words(&output).contains("cannot write to standard output"), "{}", words(&output));
 }
 
-/// A limit to the size of files is told as a full disk is, and what else was asked for is written.
+/// A limit to the size of files is told as a full disk is: once while the render goes on, of each file at its end. What else was
+/// asked for is written, and what was found is said.
 #[test]
 #[cfg(unix)]
-fn a_limit_to_files_is_told() {
+fn what_cannot_be_written_keeps_nothing_else() {
     let folder = folder();
     let script = r#"ulimit -f 4; exec "$0" "$@""#;
-    let output = Command::new("sh")
-        .current_dir(folder.path())
-        .args(["-c", script, cargo_bin("fechner").to_str().expect("a name")])
-        .args(["render", "s.toml", "--size", "64x64", "--spp", "16", "-o", "a.png", "--checkpoint", "a.film"])
-        .output()
-        .expect("runs");
-    assert_eq!(output.status.code(), Some(2), "{}", words(&output));
-    assert!(words(&output).contains("a.film: File too large"), "{}", words(&output));
+    let render = |size: &str, others: &[&str]| {
+        let mut command = Command::new("sh");
+        command.current_dir(folder.path()).args(["-c", script]).arg(cargo_bin("fechner"));
+        let output =
+            command.args(["render", "s.toml", "--size", size, "--spp", "16"]).args(others).output().expect("runs");
+        assert_eq!(output.status.code(), Some(2), "{}", words(&output));
+        let words = words(&output);
+        assert!(words.contains("samples (16.0 a pixel on average") && !words.contains("rendering goes on"), "{words}");
+        words.lines().last().expect("an error").to_owned()
+    };
+    let error = render("8x8", &["-o", "a.png", "--checkpoint", "a.film"]);
+    assert!(error.contains("a.film: File too large") && folder.path().join("a.png").exists(), "{error}");
+    let error = render("64x64", &["-o", "b.exr", "--checkpoint", "b.film"]);
+    assert!(error.contains("b.exr: File too large") && error.contains("b.film: File too large"), "{error}");
+}
+
+/// Figures that cannot be written leave the picture and what is said of it.
+#[test]
+#[cfg(unix)]
+fn figures_that_are_lost_take_nothing_along() {
+    let folder = folder();
+    let figures = folder.path().join("figures");
+    std::fs::create_dir(&figures).expect("made");
+    let mut command = fechner(folder.path());
+    command.args(["render", "s.toml", "--size", "64x64", "--time", "1", "--visibility", "0.001", "-o", "a.png"]);
+    command.args(["--checkpoint", "a.film", "--checkpoint-every", "0.001"]);
+    let mut child = command.args(["--json", "figures/a.json"]).stderr(Stdio::piped()).spawn().expect("runs");
+    // By then it has found that its figures can be written.
+    crate::support::wait_for(&folder.path().join("a.film"), &mut child);
+    std::fs::remove_dir(&figures).expect("removed");
+    let output = child.wait_with_output().expect("ended");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        words(&output).contains("Stopped because") && words(&output).contains("the picture is in a.png"),
+        "{}",
+        words(&output)
+    );
 }
 
 /// What a command reads is still there afterwards, whatever its outputs are called, and of two outputs none replaces the other.
