@@ -66,7 +66,8 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     let fresh = RenderState::new(width, height, &settings.limits);
     let audience = arguments.view.then(|| audience(&scene, &settings, &record)).transpose()?;
     let (state, seeds, keeper) = if arguments.checkpoint.is_wanted() {
-        let origin = Origin::of(&scene, &trace);
+        // A film's picture tells the same of its scene, whether it is written now or by `merge`.
+        let origin = Origin { scene_name: arguments.job.scene_name(), ..Origin::of(&scene, &trace) };
         let seeds = Seeds::one(trace.seed);
         let header = Header { origin, seeds, settings: record, visibility: settings.limits.visibility };
         let start = arguments.checkpoint.start(header, fresh, &settings.limits)?;

@@ -288,7 +288,9 @@ pub(super) fn summary(report: &Report, settings: &LoopSettings, rendered: &Rende
     let target = match (report.fraction_visible, report.visibility_target) {
         (None, _) => TOO_FEW.to_owned(),
         (Some(share), None) => format!("{:.2} % of the picture is above visibility 1", 100.0 * share),
-        (Some(share), Some(t)) => format!("{:.2} % of the picture is above the target visibility {t}", 100.0 * share),
+        (Some(share), Some(t)) => {
+            format!("{:.2} % of the picture is above the target visibility {}", 100.0 * share, rounded(t))
+        }
     };
     let mut lines = vec![
         format!(

@@ -182,3 +182,17 @@ fn a_film_has_one_writer() {
     let other_size = second().expect("runs");
     assert!(words(&other_size).contains("64x64"), "free after a kill: {}", words(&other_size));
 }
+
+/// A film's picture names the scene as the render's own does.
+#[test]
+fn a_scene_has_one_name() {
+    let folder = folder();
+    let run = |arguments: &[&str]| fechner(folder.path()).args(arguments).output().expect("runs");
+    run(&[&RENDER[..], &["-o", "a.exr", "--json", "a.json", "--checkpoint", "a.film"]].concat());
+    run(&["merge", "a.film", "-o", "b.exr", "--json", "b.json"]);
+    let scene = |name: &str| -> serde_json::Value {
+        let text = std::fs::read(folder.path().join(name)).expect("written");
+        serde_json::from_slice::<serde_json::Value>(&text).expect("JSON")["scene"].clone()
+    };
+    assert_eq!((scene("a.json"), scene("b.json")), ("s.toml".into(), "s.toml".into()));
+}
