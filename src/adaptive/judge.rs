@@ -206,6 +206,9 @@ fn judge_by(
             judgement.predicted = judgement.visibility_of(&of_mean);
         }
     }
+    // An infinite variance, pooled with others, is NaN.
+    judgement.predicted =
+        judgement.predicted.map(|visibility| if visibility.is_nan() { f32::INFINITY } else { visibility });
     if !judgement.is_known {
         judgement.predicted = judgement.predicted.map(|_| f32::INFINITY);
     }
@@ -327,7 +330,12 @@ pub fn display_scale(
         };
         scene.combined(&displayed, |scene, displayed| {
             let (scene, displayed) = (f64::from(scene), f64::from(displayed));
-            if scene > 0.0 && displayed.is_finite() { (displayed / scene * nits_squared) as f32 } else { 0.0 }
+            match displayed / scene * nits_squared {
+                _ if scene == 0.0 => 0.0,
+                scale if scale.is_finite() => scale as f32,
+                // Nobody can say how it looks, least of all that it cannot be seen.
+                _ => f32::INFINITY,
+            }
         })
     })
 }

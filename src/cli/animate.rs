@@ -13,7 +13,7 @@ mod video;
 use super::console::duration_in_words;
 use super::denoise::DenoiseChoice;
 use super::job::{Quality, Size, parse_size};
-use super::seeing::{parse_positive, parse_seconds, parse_stops};
+use super::seeing::{parse_positive, parse_seconds, parse_stops, parse_unit};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use frames::{Frames, parse_frames};
@@ -77,7 +77,7 @@ pub(super) struct AnimateArguments {
     #[arg(long, value_name = "NAME|FILE", help_heading = "Seeing")]
     display: Option<String>,
     /// Luminance in cd/m² of RGB (1, 1, 1), in place of the scene's.
-    #[arg(long, value_name = "CD_M2", value_parser = parse_positive, help_heading = "Seeing")]
+    #[arg(long, value_name = "CD_M2", value_parser = parse_unit, help_heading = "Seeing")]
     nits_per_unit: Option<f64>,
     /// What the eye is adapted to before the first frame; without it, to the first frame.
     #[arg(long, value_name = "CD_M2", value_parser = parse_positive, help_heading = "Seeing")]

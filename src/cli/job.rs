@@ -3,7 +3,7 @@
 use super::console;
 use super::denoise::DenoiseChoice;
 use super::importance;
-use super::seeing::{self, parse_finite, parse_positive, parse_seconds, parse_stops};
+use super::seeing::{self, parse_finite, parse_positive, parse_seconds, parse_stops, parse_unit};
 use super::targets::{Named, display_file};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
@@ -100,7 +100,7 @@ pub(super) struct JobArguments {
     #[arg(long, value_name = "DEG2", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Seeing")]
     csf_area: Option<f64>,
     /// Luminance in cd/m² of RGB (1, 1, 1), in place of the scene's.
-    #[arg(long, value_name = "CD_M2", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Seeing")]
+    #[arg(long, value_name = "CD_M2", value_parser = parse_unit, allow_negative_numbers = true, help_heading = "Seeing")]
     nits_per_unit: Option<f64>,
 
     /// Take the noise out of the picture, and judge what can then be seen: by the built-in filter, or by Open Image Denoise

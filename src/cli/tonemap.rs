@@ -4,7 +4,7 @@ mod sheet;
 
 use super::json::write_json;
 use super::picture::InputPicture;
-use super::seeing::{self, parse_positive, parse_stops};
+use super::seeing::{self, parse_positive, parse_stops, parse_unit};
 use super::targets::{check_kept, display_file};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
@@ -34,7 +34,7 @@ pub(super) struct TonemapArguments {
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, value_parser = parse_stops, allow_negative_numbers = true)]
     exposure: f64,
     /// Luminance in cd/m² of RGB (1, 1, 1), for files that do not say it.
-    #[arg(long, value_name = "CD_M2", value_parser = parse_positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "CD_M2", value_parser = parse_unit, allow_negative_numbers = true)]
     nits_per_unit: Option<f64>,
     /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file.
     #[arg(long, value_name = "NAME|FILE", default_value = "desktop")]
