@@ -5,10 +5,11 @@ use super::console::Console;
 use super::seeing::parse_seconds;
 use super::signals::listen;
 use super::tev::Showing;
+use super::words::rounded;
 use anyhow::bail;
 use clap::Args;
 use fechner::adaptive::judge::Judgement;
-use fechner::adaptive::settings::Limits;
+use fechner::adaptive::settings::LoopSettings;
 use fechner::adaptive::state::RenderState;
 use fechner::adaptive::{Directive, Monitor, Progress};
 use fechner::checkpoint::{Checkpoint, CheckpointError, Header, read_checkpoint, write_checkpoint};
@@ -66,7 +67,7 @@ impl CheckpointArguments {
     }
 
     /// The state to start from: `fresh`, or what the file holds if it fits `header`.
-    pub(super) fn start(&self, header: Header, fresh: RenderState, limits: &Limits) -> anyhow::Result<Start> {
+    pub(super) fn start(&self, header: Header, fresh: RenderState, settings: &LoopSettings) -> anyhow::Result<Start> {
         let Some(path) = self.checkpoint.as_ref().filter(|_| self.resume) else {
             return Ok(Start { header, state: fresh });
         };
@@ -85,13 +86,26 @@ impl CheckpointArguments {
         let state = if found.settings != header.settings {
             say!("note: the film was sampled by other settings: its samples are kept, its ladder begins anew");
             // Other eyes: what audits found of these samples' visible energy does not hold for them.
-            RenderState { inflation: 1.0, ..state.begun_anew(limits) }
+            RenderState { inflation: 1.0, ..state.begun_anew(&settings.limits) }
         } else if found.seeds.current.is_none() {
-            state.begun_anew(limits)
+            state.begun_anew(&settings.limits)
         } else {
+            note_other_way(found.visibility, settings);
             state
         };
         Ok(Start { header: Header { seeds, ..header }, state })
+    }
+}
+
+/// Says where going on may not give what one go would: rungs that only one of the two passes leave other counts.
+fn note_other_way(aimed_at: f64, settings: &LoopSettings) {
+    if !settings.passes(aimed_at) {
+        say!(
+            "note: the film aimed at visibility {}, which a render to {} does not pass: the picture may not have the bytes of one in \
+             one go",
+            rounded(aimed_at),
+            rounded(settings.limits.visibility)
+        );
     }
 }
 

@@ -70,7 +70,7 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
         let origin = Origin { scene_name: arguments.job.scene_name(), ..Origin::of(&scene, &trace) };
         let seeds = Seeds::one(trace.seed);
         let header = Header { origin, seeds, settings: record, visibility: settings.limits.visibility };
-        let start = arguments.checkpoint.start(header, fresh, &settings.limits)?;
+        let start = arguments.checkpoint.start(header, fresh, &settings)?;
         (start.state, start.header.seeds.all.clone(), Some(Keeper::new(&arguments.checkpoint, start.header)))
     } else {
         (fresh, vec![trace.seed], None)

@@ -196,3 +196,23 @@ fn a_scene_has_one_name() {
     };
     assert_eq!((scene("a.json"), scene("b.json")), ("s.toml".into(), "s.toml".into()));
 }
+
+/// A film that was stopped where the way to the new target does not pass is told; one on it is not.
+#[test]
+fn a_film_beside_the_ladder_is_told() {
+    let folder = folder();
+    let render = |visibility: &str, others: &[&str]| {
+        let mut command = fechner(folder.path());
+        command.args(["render", "s.toml", "--size", "16x16", "-o", "a.png", "--visibility", visibility]).args(others);
+        words(&command.output().expect("runs"))
+    };
+    let note = "note: the film aimed at visibility 4, which a render to 0.5 does not pass";
+    let resumed = |from: &str, to: &str, film: &str, denoise: &str| {
+        let others = ["--denoise", denoise, "--checkpoint", film];
+        render(from, &others);
+        render(to, &[&others[..], &["--resume"]].concat())
+    };
+    assert!(resumed("4", "0.5", "a.film", "builtin").contains(note));
+    assert!(!resumed("2", "0.5", "b.film", "builtin").contains("does not pass"));
+    assert!(!resumed("4", "2", "c.film", "none").contains("does not pass"));
+}
