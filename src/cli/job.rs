@@ -216,6 +216,17 @@ impl JobArguments {
                  judge it; use --sampling uniform, or the filter blackman-harris"
             );
         }
+        if trace.filter.is_signed() {
+            if self.visibility.is_some() || self.quality.is_some() {
+                bail!(
+                    "--filter mitchell has negative lobes, whose scatter is not the picture's noise: no visibility can be asked \
+                     for; say --spp, --time or --plans, or use the filter blackman-harris"
+                );
+            }
+            say!(
+                "note: --filter mitchell: its negative lobes scatter samples, and what is told of visible noise counts that too"
+            );
+        }
         let scene = Arc::new(scene);
         let whole = trace.crop.and_then(|_| whole_light(&scene, &trace));
         if let Some(whole) = &whole {
