@@ -357,9 +357,15 @@ pub(super) fn summary(report: &Report, settings: &LoopSettings, rendered: &Rende
     }
     if report.outlier_pixels > 0 {
         lines.push(format!(
-            "{} pixels hold light that few samples find (fireflies): {:.2} % of the picture's energy. They are kept.",
+            "{} pixels hold light that few samples find (fireflies): {:.2} % of the picture's energy. They are kept{}.",
             report.outlier_pixels,
-            100.0 * report.outlier_energy_share
+            100.0 * report.outlier_energy_share,
+            // Measured under the caustic of `cornell-glass` (`benches/README.md`).
+            if settings.sampling == Sampling::Adaptive {
+                ", but a block of 8x8 pixels there may be up to 3 % too dark"
+            } else {
+                ""
+            }
         ));
     }
     if report.nonfinite_samples > 0 {
