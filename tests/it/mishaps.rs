@@ -7,7 +7,7 @@ use std::process::{Command, Output, Stdio};
 /// A scene that is rendered in a moment.
 const SPHERE: &str = "[camera]\nposition = [0, 0, 6]\nlook_at = [0, 0, 0]\nvertical_fov_deg = 45\n\n\
      [[objects]]\nsphere = { center = [0, 0, 0], radius = 1 }\nmaterial = \"grey\"\n\n\
-     [[materials]]\nname = \"grey\"\ntype = \"diffuse\"\nreflectance = 0.5\n\n[environment]\nconstant = 100\n";
+     [materials.grey]\ntype = \"diffuse\"\nreflectance = [0.5, 0.5, 0.5]\n\n[environment]\nradiance = [1, 1, 1]\n";
 
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
