@@ -136,13 +136,16 @@ fn judge_by(
     };
     still_wanted(settings)?;
     let is_known = film.has_both_halves();
+    // An infinite variance, pooled with others, is NaN.
+    let told = |visibility: Plane| visibility.map(|v| if v.is_nan() { f32::INFINITY } else { v });
     let predicted = if !is_known {
         Plane::filled(film.width() as usize, film.height() as usize, f32::INFINITY)
     } else if let Some(denoised) = &denoised {
-        per_importance(denoised.error.blended_visibility.clone(), settings.importance.as_ref())
+        told(per_importance(denoised.error.blended_visibility.clone(), settings.importance.as_ref()))
     } else {
         let of_mean = scatter.of_mean(&pooled_variance_per_sample);
-        per_importance(visibility_under(&thresholds, pixel_thresholds.as_ref(), &of_mean), settings.importance.as_ref())
+        let visibility = visibility_under(&thresholds, pixel_thresholds.as_ref(), &of_mean);
+        told(per_importance(visibility, settings.importance.as_ref()))
     };
     Ok(Judgement {
         estimate,
@@ -268,7 +271,12 @@ pub fn display_scale(
         };
         scene.combined(&displayed, |scene, displayed| {
             let (scene, displayed) = (f64::from(scene), f64::from(displayed));
-            if scene > 0.0 && displayed.is_finite() { (displayed / scene * nits_squared) as f32 } else { 0.0 }
+            match displayed / scene * nits_squared {
+                _ if scene == 0.0 => 0.0,
+                scale if scale.is_finite() => scale as f32,
+                // Nobody can say how it looks, least of all that it cannot be seen.
+                _ => f32::INFINITY,
+            }
         })
     })
 }

@@ -1,7 +1,7 @@
 //! Limits that do not ask what the picture looks like: time, plans and the budget of samples.
 
 use super::state::RenderState;
-use super::until_look::SAMPLES_OF_A_DENOISED_LOOK;
+use super::until_look::samples_of_a_look;
 use super::{Loop, StopReason};
 use crate::integrator::SamplePlan;
 
@@ -33,7 +33,8 @@ impl Loop<'_> {
     /// Seconds of the first look: next to none at a raw picture.
     fn expected_look(&self, seconds_per_sample: f64) -> f64 {
         let pixels = f64::from(self.state.film.width()) * f64::from(self.state.film.height());
-        if self.settings.denoiser.is_some() { SAMPLES_OF_A_DENOISED_LOOK * pixels * seconds_per_sample } else { 0.0 }
+        let samples = self.settings.denoiser.as_ref().map_or(0.0, samples_of_a_look);
+        samples * pixels * seconds_per_sample
     }
 
     /// Samples that the budget has left, of all pixels; none where it is too little to look for: a cut that ends within a block of

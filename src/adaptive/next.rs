@@ -6,7 +6,7 @@ use super::forecast::Forecast;
 use super::gain::{cut, most_worthwhile, while_far};
 use super::judge::{JudgeError, Judgement, judge_raw, judge_to_plan, still_wanted};
 use super::plan::{SAMPLES_OF_A_RAW_LOOK, adaptive_plan, doubling_of, even_plan, uniform_plan, wanted_samples};
-use super::rivals::rival_plan;
+use super::rivals::{rival_plan, rival_stop};
 use super::settings::{LoopSettings, Sampling, THRESHOLD};
 use super::state::Exposure;
 use super::stop::{LEAST_SAVING, predicted_saving};
@@ -40,13 +40,21 @@ impl Loop<'_> {
         if let Sampling::Rival(rule) = self.settings.sampling {
             let exposure = self.exposure(judgement);
             let plan = rival_plan(rule, &self.state.film, exposure, left, limits.max_samples);
-            return Ok(if plan.blocks.is_empty() { Step::Stop(StopReason::Rule) } else { Step::Trace(plan) });
+            return Ok(if plan.blocks.is_empty() {
+                Step::Stop(rival_stop(rule, &self.state.film, exposure, left))
+            } else {
+                Step::Trace(plan)
+            });
         }
+        // Less than a sample a pixel is as good as spent.
+        let pixels = u64::from(self.state.film.width()) * u64::from(self.state.film.height());
+        let mut is_spent = left < pixels;
         while let Some(&rung) = self.rungs.front() {
-            if let Some(plan) = self.plan_towards(rung, judgement, left)?
-                && let Some(plan) = some(cut(plan, &self.state.film, judgement, left))
-            {
-                return Ok(Step::Trace(plan));
+            if let Some(plan) = self.plan_towards(rung, judgement, left)? {
+                if let Some(plan) = some(cut(plan, &self.state.film, judgement, left)) {
+                    return Ok(Step::Trace(plan));
+                }
+                is_spent = true;
             }
             self.rungs.pop_front();
             self.state.left_rung = Some(rung);
@@ -56,7 +64,7 @@ impl Loop<'_> {
         }
         Ok(Step::Stop(if is_reached(judgement, limits.last_rung()) {
             StopReason::Visibility
-        } else if limits.mean_samples.is_some() {
+        } else if is_spent {
             StopReason::Samples
         } else {
             StopReason::MaxSamples

@@ -3,6 +3,7 @@
 //! They look at every 16 samples, as Cycles does, and know neither display nor eye: `exposure` is all that they are
 //! told. Not for use: each has a knob without a unit, and stops dark regions and fireflies early.
 
+use super::StopReason;
 use super::plan::cut_to_budget;
 use super::settings::RivalRule;
 use crate::film::{Film, HalfPixel, opponent};
@@ -38,6 +39,16 @@ pub fn rival_plan(rule: RivalRule, film: &Film, exposure: f64, left: u64, max_sa
     let by_chance =
         |x: usize, y: usize| (hash_words(film.total_samples(), (y * film.width() as usize + x) as u64) >> 40) as f32;
     cut_to_budget(plan, &Plane::from_fn(film.width() as usize, film.height() as usize, by_chance), left)
+}
+
+/// Why [`rival_plan`] has none: with the same arguments it was empty.
+pub fn rival_stop(rule: RivalRule, film: &Film, exposure: f64, left: u64) -> StopReason {
+    let pixels = u64::from(film.width()) * u64::from(film.height());
+    if rule == RivalRule::Budget && left < pixels {
+        return StopReason::Samples;
+    }
+    let would_go_on = !rival_plan(rule, film, exposure, left, u32::MAX).blocks.is_empty();
+    if would_go_on { StopReason::MaxSamples } else { StopReason::Rule }
 }
 
 /// Takes `samples` of a pixel, half of them in each half, through as many doublings as they reach.
@@ -245,6 +256,19 @@ mod tests {
         let mean = film.total_samples() as f64 / 512.0;
         assert!((126.0..=128.0).contains(&mean), "{mean} samples a pixel");
         assert!(film.samples(5 * 32 + 5) > 3 * film.samples(5 * 32 + 28));
+    }
+
+    /// A rule is satisfied where it asks for no more, not where a pixel may have no more.
+    #[test]
+    fn the_most_samples_satisfy_no_rule() {
+        let film = film(0.3);
+        let relative = |threshold: f64| RivalRule::Relative { threshold };
+        assert!(rival_plan(relative(1e-4), &film, 1.0, u64::MAX, 16).blocks.is_empty(), "all have 16");
+        assert_eq!(rival_stop(relative(1e-4), &film, 1.0, u64::MAX), StopReason::MaxSamples);
+        // Its least count is 16 from threshold 1 on.
+        assert_eq!(rival_stop(relative(10.0), &film, 1.0, u64::MAX), StopReason::Rule);
+        assert_eq!(rival_stop(RivalRule::Budget, &film, 1.0, u64::MAX), StopReason::MaxSamples);
+        assert_eq!(rival_stop(RivalRule::Budget, &film, 1.0, 511), StopReason::Samples, "less than a sample a pixel");
     }
 
     /// What a budget leaves is less than a step: all active pixels have some of it, and it is not exceeded.

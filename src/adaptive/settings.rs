@@ -161,6 +161,11 @@ impl LoopSettings {
         }
     }
 
+    /// Whether a render that stopped at a visibility is the beginning of this one, so that going on from it gives the same bytes.
+    pub fn passes(&self, visibility: f64) -> bool {
+        self.sampling != Sampling::Adaptive || self.rungs().contains(&visibility)
+    }
+
     /// The visibilities that are passed on the way to the one that is asked for, largest first. They are fixed, so that a
     /// render continued to a lower rung equals one that went there in one go, both above threshold or both at it or below.
     pub(super) fn rungs(&self) -> Vec<f64> {
@@ -221,5 +226,7 @@ mod tests {
         let builtin = || Denoiser::open(DenoiserKind::Builtin).ok();
         assert_eq!(rungs(builtin(), Some(4.0)), [4.0]);
         assert_eq!(rungs(builtin(), Some(0.5)), [2.0, 1.0, 0.5]);
+        settings.limits.visibility = Some(0.5);
+        assert!(settings.passes(2.0) && settings.passes(0.5) && !settings.passes(4.0) && !settings.passes(0.7));
     }
 }

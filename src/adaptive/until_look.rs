@@ -7,6 +7,7 @@ use super::gain::{EVEN_ENOUGH, GROWTH, defended, gain, share_of_even};
 use super::judge::Judgement;
 use super::plan::{doubling_plan, plan_up_to};
 use super::stop::TOLERATED_SHARE;
+use crate::denoise::{Denoiser, DenoiserKind};
 use crate::film::Film;
 use crate::integrator::SamplePlan;
 use serde::{Deserialize, Serialize};
@@ -14,9 +15,9 @@ use serde::{Deserialize, Serialize};
 /// Samples for every pixel that a plan adds at least, while its pixels may have so many: variances of four samples are not worth
 /// being asked more often.
 const LEAST_PLAN: f64 = 6.0;
-/// What a look at a denoised picture costs, in samples for every pixel, about: 5 to 15 with Open Image Denoise, 2 to 4 with the
-/// built-in filter (`benches/README.md`). Before the first look too it is better spent on more of them.
-pub(super) const SAMPLES_OF_A_DENOISED_LOOK: f64 = 10.0;
+/// Samples for every pixel between two looks at the least, about what a look costs ([`samples_of_a_look`]). Before the first look too it
+/// is better spent on more of them.
+const SAMPLES_OF_A_DENOISED_LOOK: f64 = 10.0;
 /// Most that comes between two looks, as a share of what is there.
 const MOST_GROWTH: f64 = 3.0;
 /// What raw noise may be above the visibility asked for, so that a look is worth its cost: denoising made ten scenes 0.8 to 2.9 times
@@ -27,6 +28,15 @@ const MOST_DOUBLINGS: u32 = 2;
 /// What is in a pixel's window above the visibility asked for, as a share of what is in the window that has most, from which on
 /// its noise counts.
 const LEAST_BLAME: f32 = 0.1;
+
+/// What a look at a denoised picture costs, in samples for every pixel, about: 5 to 15 with Open Image Denoise, 2 to 4 with the built-in
+/// filter (`benches/README.md`).
+pub(super) fn samples_of_a_look(denoiser: &Denoiser) -> f64 {
+    match denoiser.kind() {
+        DenoiserKind::Builtin => 3.0,
+        DenoiserKind::Oidn => 10.0,
+    }
+}
 
 /// What a look at a denoised picture decides until the next one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -37,7 +37,7 @@ pub struct Header {
 pub struct Origin {
     /// Its [`PROGRAM`].
     pub program: String,
-    /// The scene's name, for messages.
+    /// The scene's name or, where a file of it was rendered, that file's, for messages and reports.
     pub scene_name: String,
     /// The scene's content.
     pub scene: ContentHash,

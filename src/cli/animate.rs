@@ -13,7 +13,7 @@ mod video;
 use super::console::duration_in_words;
 use super::denoise::DenoiseChoice;
 use super::job::{Quality, Size, parse_size};
-use super::seeing::{AskedShowing, operator_values, parse_positive, parse_seconds};
+use super::seeing::{AskedShowing, operator_values, parse_positive, parse_seconds, parse_stops, parse_unit};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use fechner::adaptive::settings::DEFAULT_MAX_SAMPLES;
@@ -81,7 +81,7 @@ pub(super) struct AnimateArguments {
     #[arg(long, value_name = "NAME|FILE", help_heading = "Seeing")]
     display: Option<String>,
     /// Luminance in cd/m² of RGB (1, 1, 1), in place of the scene's.
-    #[arg(long, value_name = "CD_M2", value_parser = parse_positive, help_heading = "Seeing")]
+    #[arg(long, value_name = "CD_M2", value_parser = parse_unit, help_heading = "Seeing")]
     nits_per_unit: Option<f64>,
     /// What the eye is adapted to before the first frame; without it, to the first frame.
     #[arg(long, value_name = "CD_M2", value_parser = parse_positive, help_heading = "Seeing")]
@@ -98,7 +98,7 @@ pub(super) struct AnimateArguments {
     #[arg(long, value_name = "NAME", value_parser = operator_values(), help_heading = "Picture")]
     operator: Option<String>,
     /// Exposure correction in stops [default: the scene's, else 0].
-    #[arg(long, value_name = "STOPS", allow_negative_numbers = true, help_heading = "Picture")]
+    #[arg(long, value_name = "STOPS", value_parser = parse_stops, allow_negative_numbers = true, help_heading = "Picture")]
     exposure: Option<f64>,
     /// Take the noise out of every frame: by the built-in filter, or by Open Image Denoise where it is installed.
     #[arg(long, value_enum, default_value = "none", help_heading = "Picture")]

@@ -3,7 +3,10 @@
 use super::console;
 use super::denoise::DenoiseChoice;
 use super::importance;
-use super::seeing::{self, AskedShowing, Showing, model_values, operator_values, parse_positive, parse_seconds};
+use super::seeing::{
+    self, AskedShowing, Showing, model_values, operator_values, parse_finite, parse_positive, parse_seconds,
+    parse_stops, parse_unit,
+};
 use super::targets::{Named, display_file};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
@@ -37,7 +40,7 @@ pub(super) struct JobArguments {
     #[command(flatten)]
     staging: super::staging::Staging,
     /// Time in the scene's keyframes, in seconds.
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = parse_finite, allow_negative_numbers = true)]
     at: f64,
 
     /// Stop when the remaining noise is at most this visible: 1 is at threshold [default: the scene's, else 1; none for uniform
@@ -104,7 +107,7 @@ pub(super) struct JobArguments {
     #[arg(long, value_name = "DEG2", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Seeing")]
     csf_area: Option<f64>,
     /// Luminance in cd/m² of RGB (1, 1, 1), in place of the scene's.
-    #[arg(long, value_name = "CD_M2", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Seeing")]
+    #[arg(long, value_name = "CD_M2", value_parser = parse_unit, allow_negative_numbers = true, help_heading = "Seeing")]
     nits_per_unit: Option<f64>,
 
     /// Take the noise out of the picture, and judge what can then be seen: by the built-in filter, or by Open Image Denoise
@@ -118,7 +121,7 @@ pub(super) struct JobArguments {
     #[arg(long, value_name = "NAME", value_parser = operator_values(), help_heading = "Picture")]
     operator: Option<String>,
     /// Exposure correction in stops [default: the scene's, else 0].
-    #[arg(long, value_name = "STOPS", allow_negative_numbers = true, help_heading = "Picture")]
+    #[arg(long, value_name = "STOPS", value_parser = parse_stops, allow_negative_numbers = true, help_heading = "Picture")]
     exposure: Option<f64>,
 
     /// Threads; the picture does not depend on it.
@@ -218,6 +221,17 @@ impl JobArguments {
             bail!(
                 "--filter mitchell has negative lobes, whose scatter is not the picture's noise: adaptive sampling cannot \
                  judge it; use --sampling uniform, or the filter blackman-harris"
+            );
+        }
+        if trace.filter.is_signed() {
+            if self.visibility.is_some() || self.quality.is_some() {
+                bail!(
+                    "--filter mitchell has negative lobes, whose scatter is not the picture's noise: no visibility can be asked \
+                     for; say --spp, --time or --plans, or use the filter blackman-harris"
+                );
+            }
+            say!(
+                "note: --filter mitchell: its negative lobes scatter samples, and what is told of visible noise counts that too"
             );
         }
         let scene = Arc::new(scene);

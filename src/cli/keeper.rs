@@ -1,13 +1,15 @@
 //! Keeping the film of a render safe: checkpoints while it runs, and a clean end when a signal asks for it.
 
+use super::claim::Claim;
 use super::console::Console;
 use super::seeing::parse_seconds;
 use super::signals::listen;
 use super::tev::Showing;
+use super::words::rounded;
 use anyhow::bail;
 use clap::Args;
 use fechner::adaptive::judge::Judgement;
-use fechner::adaptive::settings::Limits;
+use fechner::adaptive::settings::LoopSettings;
 use fechner::adaptive::state::RenderState;
 use fechner::adaptive::{Directive, Monitor, Progress};
 use fechner::checkpoint::{Checkpoint, CheckpointError, Header, read_checkpoint, write_checkpoint};
@@ -49,21 +51,23 @@ impl CheckpointArguments {
         self.checkpoint.is_some()
     }
 
-    /// Finds out whether the file can be written before the work is done, and refuses to write over the work of others.
-    pub(super) fn check(&self) -> anyhow::Result<()> {
-        let Some(path) = &self.checkpoint else { return Ok(()) };
+    /// Finds out whether the file can be written before the work is done, and refuses to write over the work of others, done or under
+    /// way. The claim lasts as long as the file is written.
+    pub(super) fn claim(&self) -> anyhow::Result<Option<Claim>> {
+        let Some(path) = &self.checkpoint else { return Ok(None) };
         output::check_writable(path)?;
+        let claim = Claim::on(path)?;
         if path.exists() && !self.resume {
             bail!(
                 "{} is there already: go on with it by --resume, name another --checkpoint, or remove it",
                 path.display()
             );
         }
-        Ok(())
+        Ok(Some(claim))
     }
 
     /// The state to start from: `fresh`, or what the file holds if it fits `header`.
-    pub(super) fn start(&self, header: Header, fresh: RenderState, limits: &Limits) -> anyhow::Result<Start> {
+    pub(super) fn start(&self, header: Header, fresh: RenderState, settings: &LoopSettings) -> anyhow::Result<Start> {
         let Some(path) = self.checkpoint.as_ref().filter(|_| self.resume) else {
             return Ok(Start { header, state: fresh });
         };
@@ -82,13 +86,26 @@ impl CheckpointArguments {
         let state = if found.settings != header.settings {
             say!("note: the film was sampled by other settings: its samples are kept, its ladder begins anew");
             // Other eyes: what audits found of these samples' visible energy does not hold for them.
-            RenderState { inflation: 1.0, ..state.begun_anew(limits) }
+            RenderState { inflation: 1.0, ..state.begun_anew(&settings.limits) }
         } else if found.seeds.current.is_none() {
-            state.begun_anew(limits)
+            state.begun_anew(&settings.limits)
         } else {
+            note_other_way(found.visibility, settings);
             state
         };
         Ok(Start { header: Header { seeds, ..header }, state })
+    }
+}
+
+/// Says where going on may not give what one go would: rungs that only one of the two passes leave other counts.
+fn note_other_way(aimed_at: f64, settings: &LoopSettings) {
+    if !settings.passes(aimed_at) {
+        say!(
+            "note: the film aimed at visibility {}, which a render to {} does not pass: the picture may not have the bytes of one in \
+             one go",
+            rounded(aimed_at),
+            rounded(settings.limits.last_rung())
+        );
     }
 }
 
@@ -141,6 +158,9 @@ impl Keeper {
         let reserve = (history.longest_wait + history.longest_write).min(self.every / 2);
         if history.last_snapshot.elapsed() + reserve >= self.every {
             self.write(state, &mut history);
+            if let Some(error) = &history.failure {
+                say!("note: {error}; rendering goes on");
+            }
         }
         history.last_chance = Instant::now();
     }
@@ -155,10 +175,7 @@ impl Keeper {
                 history.bytes = bytes;
                 history.writes += 1;
             }
-            Err(error) => {
-                say!("note: {error}; rendering goes on");
-                history.failure = Some(error);
-            }
+            Err(error) => history.failure = Some(error),
         }
         history.longest_write = history.longest_write.max(snapshot.elapsed());
         history.writing += snapshot.elapsed();
@@ -197,7 +214,10 @@ impl<'a> Watch<'a> {
         self.console.finish();
     }
 
-    /// Says what keeping the film took; an error if its last state could not be written.
+    /// Says what keeping the film took.
+    ///
+    /// # Errors
+    /// If its last state could not be written.
     pub(super) fn report(self) -> anyhow::Result<()> {
         let Some(Keeper { path, history, .. }) = self.keeper else { return Ok(()) };
         let history = history.into_inner().unwrap_or_else(PoisonError::into_inner);

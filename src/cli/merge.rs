@@ -1,5 +1,6 @@
 //! `fechner merge`: films of different seeds in, one film or its picture out.
 
+use super::claim::Claim;
 use super::json::write_json;
 use super::render::write_picture;
 use super::report::{Report, summary};
@@ -33,11 +34,11 @@ pub(super) struct MergeArguments {
 
 /// Merges, looks again, writes and says what can be seen.
 pub(super) fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
-    let format = if is_film(&arguments.output) {
+    let (format, _claim) = if is_film(&arguments.output) {
         output::check_writable(&arguments.output)?;
-        None
+        (None, Some(Claim::on(&arguments.output)?))
     } else {
-        Some(output::check_target(&arguments.output)?)
+        (Some(output::check_target(&arguments.output)?), None)
     };
     if let Some(json) = &arguments.json {
         // A sum may take the place of one of its films; figures may not.

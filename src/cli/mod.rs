@@ -3,6 +3,7 @@
 mod animate;
 mod bench;
 mod channels;
+mod claim;
 mod compare;
 mod console;
 mod denoise;

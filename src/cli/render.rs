@@ -10,6 +10,8 @@ use super::report::{Report, summary};
 use super::targets::check_kept;
 use super::tev::{Showing, TevArguments};
 use super::view::audience;
+use super::words::in_a_line;
+use anyhow::bail;
 use clap::Args;
 use fechner::adaptive::settings::LoopSettings;
 use fechner::adaptive::state::RenderState;
@@ -59,7 +61,7 @@ pub(super) fn run(arguments: &RenderArguments) -> anyhow::Result<ExitCode> {
     if let Some(json) = &arguments.json {
         output::check_writable(json)?;
     }
-    arguments.checkpoint.check()?;
+    let _claim = arguments.checkpoint.claim()?;
     let pool = arguments.job.thread_pool()?;
     pool.install(|| render_and_write(arguments, format))
 }
@@ -70,10 +72,11 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     let fresh = RenderState::new(width, height, &settings.limits);
     let audience = arguments.view.then(|| audience(&scene, &settings, &record)).transpose()?;
     let (state, seeds, keeper) = if arguments.checkpoint.is_wanted() {
-        let origin = Origin::of(&scene, &trace);
+        // A film's picture tells the same of its scene, whether it is written now or by `merge`.
+        let origin = Origin { scene_name: arguments.job.scene_name(), ..Origin::of(&scene, &trace) };
         let seeds = Seeds::one(trace.seed);
         let header = Header { origin, seeds, settings: record, visibility: settings.limits.last_rung() };
-        let start = arguments.checkpoint.start(header, fresh, &settings.limits)?;
+        let start = arguments.checkpoint.start(header, fresh, &settings)?;
         (start.state, start.header.seeds.all.clone(), Some(Keeper::new(&arguments.checkpoint, start.header)))
     } else {
         (fresh, vec![trace.seed], None)
@@ -90,17 +93,25 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     let report = Report::new(&arguments.job.scene_name(), &seeds, &settings, &rendered);
     let background = arguments.job.background();
     let write = |path: &Path| write_picture(path, format, background, &rendered, &settings, &report);
-    write(&arguments.output).map_err(|error| kept_elsewhere(&arguments.output, write, error))?;
-    for map in &arguments.maps {
+    let picture = write(&arguments.output).map_err(|error| kept_elsewhere(&arguments.output, write, error));
+    let maps = arguments.maps.iter().try_for_each(|map| {
         say!("{}", map.write(&rendered, settings.limits.visibility_or_threshold())?);
-    }
-    if let Some(path) = &arguments.json {
-        write_json(path, &report)?;
-    }
+        Ok(())
+    });
+    let figures = arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, &report));
     say!("{}", summary(&report, &settings, &rendered));
     let is_unfinished = rendered.stop_reason == StopReason::Interrupted && watch.is_asked_to_end();
-    watch.report()?;
+    if picture.is_ok() && (maps.is_err() || figures.is_err()) {
+        say!("note: the picture is in {}", arguments.output.display());
+    }
+    all_written([picture, maps, figures, watch.report()])?;
     Ok(if is_unfinished { ExitCode::from(CALL_AGAIN) } else { ExitCode::SUCCESS })
+}
+
+/// All that could not be written, in one error: each file is tried, whatever became of the others.
+fn all_written(files: impl IntoIterator<Item = anyhow::Result<()>>) -> anyhow::Result<()> {
+    let failures: Vec<String> = files.into_iter().filter_map(Result::err).map(|error| in_a_line(&error)).collect();
+    if failures.is_empty() { Ok(()) } else { bail!(failures.join("; ")) }
 }
 
 /// Writes a picture that cannot be where it should into a new folder among temporary files, and says so: its samples took long.

@@ -4,7 +4,7 @@ use super::targets::{Named, display_file};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
-use fechner::scene::Scene;
+use fechner::scene::{MOST_EXPOSURE_STOPS, NITS_PER_UNIT, Scene};
 use fechner_perception::display::{Display, Viewing};
 use fechner_perception::model;
 use fechner_perception::tone::{self, ToneOperator, ToneSettings};
@@ -60,7 +60,7 @@ pub(super) struct SeeingArguments {
     #[arg(long, value_name = "DEG2", value_parser = parse_positive, allow_negative_numbers = true)]
     csf_area: Option<f64>,
     /// Luminance in cd/m² of RGB (1, 1, 1), for files that do not say it.
-    #[arg(long, value_name = "CD_M2", value_parser = parse_positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "CD_M2", value_parser = parse_unit, allow_negative_numbers = true)]
     pub(super) nits_per_unit: Option<f64>,
 }
 
@@ -141,6 +141,26 @@ pub(super) fn parse_positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A luminance of RGB (1, 1, 1) that pictures can have.
+pub(super) fn parse_unit(text: &str) -> Result<f64, String> {
+    let (least, most) = (NITS_PER_UNIT.start(), NITS_PER_UNIT.end());
+    let number = text.parse().ok().filter(|value| NITS_PER_UNIT.contains(value));
+    number.ok_or_else(|| format!("\"{text}\" is not a luminance from {least:e} to {most:e} cd/m²"))
+}
+
+/// Any number.
+pub(super) fn parse_finite(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(|| format!("\"{text}\" is not a number"))
+}
+
+/// A number of stops that operators know.
+pub(super) fn parse_stops(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(stops) if stops.abs() <= MOST_EXPOSURE_STOPS => Ok(stops),
+        _ => Err(format!("\"{text}\" is not a number of stops from -{MOST_EXPOSURE_STOPS} to {MOST_EXPOSURE_STOPS}")),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -154,5 +174,18 @@ mod tests {
         for refused in ["0", "-1", "inf", "nan", "a minute"] {
             assert!(parse_seconds(refused).is_err(), "{refused}");
         }
+    }
+
+    #[test]
+    fn stops_and_units_are_numbers_that_films_can_keep() {
+        assert_eq!((parse_stops("-2.5"), parse_finite("-1")), (Ok(-2.5), Ok(-1.0)));
+        for refused in ["nan", "inf", "-inf", "101", "much"] {
+            assert!(parse_stops(refused).is_err(), "{refused}");
+        }
+        assert_eq!((parse_unit("1e-6"), parse_unit("179")), (Ok(1e-6), Ok(179.0)));
+        for refused in ["0", "-1", "1e-7", "1e10", "1e300", "inf", "nan"] {
+            assert!(parse_unit(refused).is_err(), "{refused}");
+        }
+        assert!(parse_finite("nan").is_err() && parse_finite("inf").is_err());
     }
 }

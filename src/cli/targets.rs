@@ -38,7 +38,7 @@ pub(super) fn check_distinct(files: &[Named]) -> anyhow::Result<()> {
 }
 
 /// Where a file is or will be, whichever way its folder is spelled.
-fn location(path: &Path) -> PathBuf {
+pub(super) fn location(path: &Path) -> PathBuf {
     let in_its_folder = || {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         Some(folder.canonicalize().ok()?.join(path.file_name()?))

@@ -4,7 +4,7 @@ mod sheet;
 
 use super::json::write_json;
 use super::picture::InputPicture;
-use super::seeing::{self, DEFAULT_DISPLAY, operator_values_or_all, parse_positive};
+use super::seeing::{self, DEFAULT_DISPLAY, operator_values_or_all, parse_positive, parse_stops, parse_unit};
 use super::targets::{check_kept, display_file};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
@@ -34,7 +34,7 @@ pub(super) struct TonemapArguments {
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, value_parser = parse_stops, allow_negative_numbers = true)]
     exposure: f64,
     /// Luminance in cd/m² of RGB (1, 1, 1), for files that do not say it.
-    #[arg(long, value_name = "CD_M2", value_parser = parse_positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "CD_M2", value_parser = parse_unit, allow_negative_numbers = true)]
     nits_per_unit: Option<f64>,
     /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file.
     #[arg(long, value_name = "NAME|FILE", default_value = DEFAULT_DISPLAY)]
@@ -86,15 +86,6 @@ fn parse_pixel(text: &str) -> Result<Gaze, String> {
     let parsed =
         text.split_once(',').and_then(|(x, y)| Some(Pixel { x: x.trim().parse().ok()?, y: y.trim().parse().ok()? }));
     parsed.map(Gaze).ok_or_else(|| format!("\"{text}\" is not a pixel; expected X,Y such as 320,180"))
-}
-
-/// A number of stops that operators know.
-fn parse_stops(text: &str) -> Result<f64, String> {
-    const MOST_STOPS: f64 = 100.0;
-    match text.parse::<f64>() {
-        Ok(stops) if stops.abs() <= MOST_STOPS => Ok(stops),
-        _ => Err(format!("\"{text}\" is not a number of stops from -{MOST_STOPS} to {MOST_STOPS}")),
-    }
 }
 
 /// A picture in scene cd/m² with what operators look at.

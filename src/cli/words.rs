@@ -37,9 +37,14 @@ pub(super) fn samples_in_words(samples: u64) -> String {
     }
 }
 
-/// Two digits after the point, three of a small number that count, without a tail of zeros.
+/// Two digits after the point, three of a small number that count, without a tail of zeros; as a power of ten where that is long.
 pub(super) fn rounded(value: f64) -> String {
+    /// Powers of ten within which digits can be read.
+    const READABLE: std::ops::Range<f64> = -9.0..15.0;
     let size = value.abs().log10().floor();
+    if size.is_finite() && !READABLE.contains(&size) {
+        return format!("{value:e}");
+    }
     let digits = if size < 0.0 && size.is_finite() { (2.0 - size).min(12.0) as usize } else { 2 };
     format!("{value:.digits$}").trim_end_matches('0').trim_end_matches('.').to_owned()
 }
@@ -62,9 +67,16 @@ mod tests {
         assert_eq!((count(1, "frame"), count(0, "frame")), ("1 frame".to_owned(), "0 frames".to_owned()));
         assert_eq!(samples_in_words(6000), "6000 samples");
         assert_eq!(samples_in_words(4_250_000), "4.25 million samples");
-        for (value, text) in
-            [(94.84294051843514, "94.84"), (60.0, "60"), (0.2, "0.2"), (0.005, "0.005"), (0.0, "0"), (200.0, "200")]
-        {
+        for (value, text) in [
+            (94.84294051843514, "94.84"),
+            (60.0, "60"),
+            (0.2, "0.2"),
+            (0.005, "0.005"),
+            (0.0, "0"),
+            (200.0, "200"),
+            (1e300, "1e300"),
+            (2.5e-12, "2.5e-12"),
+        ] {
             assert_eq!(rounded(value), text);
         }
     }

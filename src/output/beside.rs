@@ -52,7 +52,7 @@ pub(super) fn create_beside(path: &Path) -> Result<(NamedTempFile, PathBuf), Out
     }
     let prefix = part_prefix(name);
     let mut builder = tempfile::Builder::new();
-    builder.prefix(&prefix).suffix(PART_SUFFIX);
+    builder.prefix(&prefix).rand_bytes(PART_LETTERS).suffix(PART_SUFFIX);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
@@ -84,6 +84,8 @@ fn end_of_links(path: &Path) -> std::io::Result<PathBuf> {
 
 /// How the names of new files end until they are renamed.
 const PART_SUFFIX: &str = ".part";
+/// Random letters and digits before that.
+const PART_LETTERS: usize = 6;
 
 fn part_prefix(name: &OsStr) -> OsString {
     [OsStr::new("."), name, OsStr::new(".")].into_iter().collect()
@@ -97,10 +99,15 @@ pub fn remove_leftovers(path: &Path) -> Result<(), OutputError> {
     let Some(name) = target.file_name() else { return Ok(()) };
     let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let prefix = part_prefix(name);
+    // No more than the random letters: `.a.film.png.x1Y2z3.part` is of a.film.png, which another program may be writing.
+    let is_leftover = |bytes: &[u8]| {
+        let rest = bytes.strip_prefix(prefix.as_encoded_bytes());
+        let letters = rest.and_then(|rest| rest.strip_suffix(PART_SUFFIX.as_bytes()));
+        letters.is_some_and(|letters| letters.len() == PART_LETTERS && letters.iter().all(u8::is_ascii_alphanumeric))
+    };
     for entry in folder.read_dir().map_err(io)? {
         let found = entry.map_err(io)?.file_name();
-        let bytes = found.as_encoded_bytes();
-        if bytes.starts_with(prefix.as_encoded_bytes()) && bytes.ends_with(PART_SUFFIX.as_bytes()) {
+        if is_leftover(found.as_encoded_bytes()) {
             std::fs::remove_file(folder.join(&found)).map_err(io)?;
         }
     }
@@ -145,13 +152,16 @@ mod tests {
     #[test]
     fn leftovers_of_this_file_are_removed_and_of_no_other() {
         let folder = tempfile::tempdir().unwrap();
-        for name in ["a.film", ".a.film.x1Y2z3.part", ".b.film.x1Y2z3.part", ".a.film.part.png"] {
+        let of_others = [".a.film.part.png", ".a.film.png.x1Y2z3.part"];
+        for name in of_others.into_iter().chain(["a.film", ".a.film.x1Y2z3.part", ".b.film.x1Y2z3.part"]) {
             std::fs::write(folder.path().join(name), "").unwrap();
         }
         remove_leftovers(&folder.path().join("a.film")).unwrap();
-        assert_eq!(names(folder.path()), [".a.film.part.png", ".b.film.x1Y2z3.part", "a.film"]);
+        assert_eq!(names(folder.path()), [of_others[0], of_others[1], ".b.film.x1Y2z3.part", "a.film"]);
+        let (file, _) = create_beside(&folder.path().join("b.film")).unwrap();
+        file.keep().unwrap();
         remove_leftovers(&folder.path().join("b.film")).unwrap();
-        assert_eq!(names(folder.path()), [".a.film.part.png", "a.film"]);
+        assert_eq!(names(folder.path()), [of_others[0], of_others[1], "a.film"]);
     }
 
     #[test]

@@ -25,6 +25,7 @@ pub use surface::{Distribution, MetalRoughness, Roughness, RoughnessScale, Surfa
 
 use glam::{Affine3A, Mat3A, Vec2, Vec3, Vec3A, Vec4};
 use std::f32::consts::{PI, TAU};
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 /// Index into [`Scene::meshes`].
@@ -36,6 +37,12 @@ pub struct MaterialId(pub u32);
 /// Index into [`Scene::textures`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct TextureId(pub u32);
+
+/// What [`Scene::nits_per_unit`] may be, with room on both sides of any unit in use: beyond it single-precision variances in (cd/m²)²
+/// vanish or are infinite, and nothing can be said of noise.
+pub const NITS_PER_UNIT: RangeInclusive<f64> = 1e-6..=1e9;
+/// Most that exposure may be corrected by, up or down.
+pub const MOST_EXPOSURE_STOPS: f64 = 100.0;
 
 /// Everything that is rendered, in memory.
 #[derive(Clone, Debug)]

@@ -227,6 +227,13 @@ fn limits_end_a_render() {
     let capped = render(&tracer, &settings, &Quiet).expect("renders");
     assert_eq!(capped.stop_reason, fechner::adaptive::StopReason::MaxSamples);
     assert!((0..24 * 24).all(|i| capped.film.samples(i) <= 64));
+    // A budget that the most samples of a pixel keep from being spent did not end it.
+    settings.limits.mean_samples = Some(1000);
+    for sampling in [Sampling::Adaptive, Sampling::Uniform] {
+        settings.sampling = sampling;
+        let capped = render(&tracer, &settings, &Quiet).expect("renders");
+        assert_eq!(capped.stop_reason, fechner::adaptive::StopReason::MaxSamples, "{sampling:?}");
+    }
 }
 
 #[derive(Default)]

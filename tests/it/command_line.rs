@@ -437,8 +437,9 @@ fn impossible_pictures_are_refused() {
         arguments.extend(extra);
         arguments.iter().map(|a| (*a).to_owned()).collect::<Vec<_>>()
     };
-    let cases: [(&[&'static str], &[&str]); 3] = [
+    let cases: [(&[&'static str], &[&str]); 4] = [
         (&["--filter", "mitchell"], &["negative lobes", "--sampling uniform", "blackman-harris"]),
+        (&["--filter", "mitchell", "--sampling", "uniform", "--quality", "draft"], &["no visibility can be asked for"]),
         (&["--crop", "20,0,20,10"], &["--crop 20,0,20,10 reaches beyond the picture of 32x32 pixels"]),
         (&["--crop", "1,2,3"], &["expected X,Y,WIDTH,HEIGHT"]),
     ];
@@ -462,5 +463,6 @@ fn impossible_pictures_are_refused() {
         .current_dir(folder.path())
         .output()
         .expect("runs");
-    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let message = String::from_utf8_lossy(&run.stderr);
+    assert!(run.status.success() && message.contains("note: --filter mitchell"), "{message}");
 }

@@ -7,7 +7,7 @@ use std::process::{Command, Output, Stdio};
 /// A scene that is rendered in a moment.
 const SPHERE: &str = "[camera]\nposition = [0, 0, 6]\nlook_at = [0, 0, 0]\nvertical_fov_deg = 45\n\n\
      [[objects]]\nsphere = { center = [0, 0, 0], radius = 1 }\nmaterial = \"grey\"\n\n\
-     [[materials]]\nname = \"grey\"\ntype = \"diffuse\"\nreflectance = 0.5\n\n[environment]\nconstant = 100\n";
+     [materials.grey]\ntype = \"diffuse\"\nreflectance = [0.5, 0.5, 0.5]\n\n[environment]\nradiance = [1, 1, 1]\n";
 
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
@@ -67,20 +67,50 @@ fn an_answer_that_is_lost_is_told() {
     assert!(words(&output).contains("cannot write to standard output"), "{}", words(&output));
 }
 
-/// A limit to the size of files is told as a full disk is, and what else was asked for is written.
+/// A limit to the size of files is told as a full disk is: once while the render goes on, of each file at its end. What else was
+/// asked for is written, and what was found is said.
 #[test]
 #[cfg(unix)]
-fn a_limit_to_files_is_told() {
+fn what_cannot_be_written_keeps_nothing_else() {
     let folder = folder();
     let script = r#"ulimit -f 4; exec "$0" "$@""#;
-    let output = Command::new("sh")
-        .current_dir(folder.path())
-        .args(["-c", script, cargo_bin("fechner").to_str().expect("a name")])
-        .args(["render", "s.toml", "--size", "64x64", "--spp", "16", "-o", "a.png", "--checkpoint", "a.film"])
-        .output()
-        .expect("runs");
-    assert_eq!(output.status.code(), Some(2), "{}", words(&output));
-    assert!(words(&output).contains("a.film: File too large"), "{}", words(&output));
+    let render = |size: &str, others: &[&str]| {
+        let mut command = Command::new("sh");
+        command.current_dir(folder.path()).args(["-c", script]).arg(cargo_bin("fechner"));
+        let output =
+            command.args(["render", "s.toml", "--size", size, "--spp", "16"]).args(others).output().expect("runs");
+        assert_eq!(output.status.code(), Some(2), "{}", words(&output));
+        let words = words(&output);
+        assert!(words.contains("samples (16.0 a pixel on average") && !words.contains("rendering goes on"), "{words}");
+        words.lines().last().expect("an error").to_owned()
+    };
+    let error = render("8x8", &["-o", "a.png", "--checkpoint", "a.film"]);
+    assert!(error.contains("a.film: File too large") && folder.path().join("a.png").exists(), "{error}");
+    let error = render("64x64", &["-o", "b.exr", "--checkpoint", "b.film"]);
+    assert!(error.contains("b.exr: File too large") && error.contains("b.film: File too large"), "{error}");
+}
+
+/// Figures that cannot be written leave the picture and what is said of it.
+#[test]
+#[cfg(unix)]
+fn figures_that_are_lost_take_nothing_along() {
+    let folder = folder();
+    let figures = folder.path().join("figures");
+    std::fs::create_dir(&figures).expect("made");
+    let mut command = fechner(folder.path());
+    command.args(["render", "s.toml", "--size", "64x64", "--time", "1", "--visibility", "0.001", "-o", "a.png"]);
+    command.args(["--checkpoint", "a.film", "--checkpoint-every", "0.001"]);
+    let mut child = command.args(["--json", "figures/a.json"]).stderr(Stdio::piped()).spawn().expect("runs");
+    // By then it has found that its figures can be written.
+    crate::support::wait_for(&folder.path().join("a.film"), &mut child);
+    std::fs::remove_dir(&figures).expect("removed");
+    let output = child.wait_with_output().expect("ended");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        words(&output).contains("Stopped because") && words(&output).contains("the picture is in a.png"),
+        "{}",
+        words(&output)
+    );
 }
 
 /// What a command reads is still there afterwards, whatever its outputs are called, and of two outputs none replaces the other.
@@ -129,4 +159,60 @@ fn names_are_not_changed() {
     let mut command = fechner(folder.path());
     let output = command.args(["tonemap", "a.exr", "--operator", "agx", "-o"]).arg(name).output().expect("runs");
     assert!(words(&output).contains("must be UTF-8"), "{}", words(&output));
+}
+
+/// A film is written by one process at a time, and another is told by which.
+#[test]
+fn a_film_has_one_writer() {
+    let folder = folder();
+    let film = folder.path().join("a.film");
+    let endless =
+        ["render", "s.toml", "--size", "64x64", "--visibility", "0.001", "-o", "a.png", "--checkpoint", "a.film"];
+    let mut command = fechner(folder.path());
+    let mut child =
+        command.args(endless).args(["--checkpoint-every", "0.01"]).stderr(Stdio::null()).spawn().expect("runs");
+    crate::support::wait_for(&film, &mut child);
+    let second =
+        || fechner(folder.path()).args(RENDER).args(["-o", "b.png", "--checkpoint", "./a.film", "--resume"]).output();
+    let refused = second().expect("runs");
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(words(&refused).contains(&format!("process {} writes this film", child.id())), "{}", words(&refused));
+    child.kill().expect("killed");
+    child.wait().expect("ended");
+    let other_size = second().expect("runs");
+    assert!(words(&other_size).contains("64x64"), "free after a kill: {}", words(&other_size));
+}
+
+/// A film's picture names the scene as the render's own does.
+#[test]
+fn a_scene_has_one_name() {
+    let folder = folder();
+    let run = |arguments: &[&str]| fechner(folder.path()).args(arguments).output().expect("runs");
+    run(&[&RENDER[..], &["-o", "a.exr", "--json", "a.json", "--checkpoint", "a.film"]].concat());
+    run(&["merge", "a.film", "-o", "b.exr", "--json", "b.json"]);
+    let scene = |name: &str| -> serde_json::Value {
+        let text = std::fs::read(folder.path().join(name)).expect("written");
+        serde_json::from_slice::<serde_json::Value>(&text).expect("JSON")["scene"].clone()
+    };
+    assert_eq!((scene("a.json"), scene("b.json")), ("s.toml".into(), "s.toml".into()));
+}
+
+/// A film that was stopped where the way to the new target does not pass is told; one on it is not.
+#[test]
+fn a_film_beside_the_ladder_is_told() {
+    let folder = folder();
+    let render = |visibility: &str, others: &[&str]| {
+        let mut command = fechner(folder.path());
+        command.args(["render", "s.toml", "--size", "16x16", "-o", "a.png", "--visibility", visibility]).args(others);
+        words(&command.output().expect("runs"))
+    };
+    let note = "note: the film aimed at visibility 4, which a render to 0.5 does not pass";
+    let resumed = |from: &str, to: &str, film: &str, denoise: &str| {
+        let others = ["--denoise", denoise, "--checkpoint", film];
+        render(from, &others);
+        render(to, &[&others[..], &["--resume"]].concat())
+    };
+    assert!(resumed("4", "0.5", "a.film", "builtin").contains(note));
+    assert!(!resumed("2", "0.5", "b.film", "builtin").contains("does not pass"));
+    assert!(!resumed("4", "2", "c.film", "none").contains("does not pass"));
 }

@@ -110,3 +110,15 @@ fn rods_see_the_colours_of_the_guide() {
         assert!((found / expected - 1.0).abs() < 0.02, "{found}, not {expected}");
     }
 }
+
+/// What is beyond all numbers cannot be called unseen: neither does a loop end there, nor does it fail.
+#[test]
+fn light_beyond_all_numbers_is_seen() {
+    let film = film_of(|pixel, random| Vec3::splat(if pixel < 64 { 1e12 * (1.0 + random) } else { 1.0 }));
+    for unit in [1e12, 1e15, 1e20] {
+        let extreme = LoopSettings { nits_per_unit: unit, ..settings() };
+        let judgement = judge_to_plan(&film, &extreme, 1.0).expect("judges");
+        assert!(!is_reached(&judgement, 1.0), "{unit:e}: {}", judgement.predicted.mean());
+        assert!(judgement.predicted.values().iter().all(|v| !v.is_nan()), "{unit:e}");
+    }
+}

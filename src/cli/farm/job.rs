@@ -137,7 +137,7 @@ impl Job<'_> {
                 let Prepared { scene, trace, record, settings, .. } = arguments.prepare()?;
                 let judged_by = ContentHash::of_bytes(format!("{record:?}|{:?}", settings.limits).as_bytes());
                 let header = Header {
-                    origin: Origin::of(&scene, &trace),
+                    origin: Origin { scene_name: arguments.scene_name(), ..Origin::of(&scene, &trace) },
                     seeds: Seeds::one(trace.seed),
                     settings: record,
                     visibility: settings.limits.last_rung(),

@@ -98,7 +98,11 @@ impl<'a> Value<'a> {
     /// A number above 0.
     pub(super) fn positive(&self) -> Result<f64, LoadError> {
         let number = self.number()?;
-        if (number as f32) > 0.0 { Ok(number) } else { Err(self.error(format_args!("must be above 0, not {number}"))) }
+        if (number as f32) > 0.0 {
+            Ok(number)
+        } else {
+            Err(self.error(format_args!("must be above 0, not {}", figure(number))))
+        }
     }
 
     /// A number of 0 or more.
@@ -112,9 +116,9 @@ impl<'a> Value<'a> {
         if (low..=high).contains(&number) {
             Ok(number)
         } else if high.is_infinite() {
-            Err(self.error(format_args!("must be at least {low}, not {number}")))
+            Err(self.error(format_args!("must be at least {low}, not {}", figure(number))))
         } else {
-            Err(self.error(format_args!("must lie in [{low}, {high}], not {number}")))
+            Err(self.error(format_args!("must lie in [{low}, {high}], not {}", figure(number))))
         }
     }
 
@@ -319,4 +323,10 @@ fn describe(value: &DeValue<'_>) -> String {
         DeValue::Array(array) => format!("a list of {}", array.len()),
         DeValue::Table(_) => "a table".to_owned(),
     }
+}
+
+/// A number as people read it: no three hundred digits.
+fn figure(number: f64) -> String {
+    let is_long = number != 0.0 && !(1e-9..1e15).contains(&number.abs());
+    if is_long { format!("{number:e}") } else { number.to_string() }
 }

@@ -17,7 +17,7 @@ use super::builder::{Builder, IfDark, NamedCamera};
 use super::error::LoadError;
 use super::texture::{Adjust, IfMissing, Picture, Request};
 use super::{LoadOptions, Shutter, files};
-use crate::scene::{Encoding, FilmDefaults, Scene, ViewingDefaults, Wrap};
+use crate::scene::{Encoding, FilmDefaults, MOST_EXPOSURE_STOPS, NITS_PER_UNIT, Scene, ViewingDefaults, Wrap};
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -76,7 +76,7 @@ fn read(path: &Path, options: &LoadOptions) -> Result<(Builder, IfDark), LoadErr
     if let Some(name) = root.get_some("name", |value| value.string())? {
         builder.name = name.to_owned();
     }
-    let own_unit = root.get_or("nits_per_unit", 1.0, Value::positive)?;
+    let own_unit = root.get_or("nits_per_unit", 1.0, read_unit)?;
     builder.set_nits_per_unit(own_unit);
     if let Some(film) = root.get("film") {
         builder.film = read_film(&film)?;
@@ -137,6 +137,11 @@ fn read_film(value: &Value) -> Result<FilmDefaults, LoadError> {
     }
 }
 
+/// Luminance of RGB (1, 1, 1).
+fn read_unit(value: &Value) -> Result<f64, LoadError> {
+    value.within(*NITS_PER_UNIT.start(), *NITS_PER_UNIT.end())
+}
+
 fn read_view(value: &Value) -> Result<ViewingDefaults, LoadError> {
     let fields = value.fields(&["display", "visibility", "operator", "exposure_stops"])?;
     let text = |key| fields.get_some(key, |value| value.string().map(str::to_owned));
@@ -144,7 +149,8 @@ fn read_view(value: &Value) -> Result<ViewingDefaults, LoadError> {
         display: text("display")?,
         visibility: fields.get_some("visibility", Value::positive)?,
         operator: text("operator")?,
-        exposure_stops: fields.get_some("exposure_stops", Value::number)?,
+        exposure_stops: fields
+            .get_some("exposure_stops", |stops| stops.within(-MOST_EXPOSURE_STOPS, MOST_EXPOSURE_STOPS))?,
     })
 }
 

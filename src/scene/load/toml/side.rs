@@ -5,7 +5,7 @@
 //! given leaves the scene's own in place and blurs what moves in glTF.
 
 use super::fields::{Fields, Source, Value};
-use super::{animated, camera, light, read_film, read_view, surroundings};
+use super::{animated, camera, light, read_film, read_unit, read_view, surroundings};
 use crate::scene::load::error::LoadError;
 use crate::scene::load::{LoadOptions, Shutter, files};
 use crate::scene::{Scene, ViewingDefaults};
@@ -32,7 +32,7 @@ pub(in crate::scene::load) fn before(path: &Path, options: &LoadOptions) -> Resu
         Ok(LoadOptions {
             environment_follows: options.environment_follows || brings_light,
             shutter_s: shutter_s.unwrap_or(options.shutter_s),
-            nits_per_unit: options.nits_per_unit.or(root.get_some("nits_per_unit", Value::positive)?),
+            nits_per_unit: options.nits_per_unit.or(root.get_some("nits_per_unit", read_unit)?),
             film: options.film.or(film),
             ..options.clone()
         })

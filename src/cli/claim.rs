@@ -1,0 +1,98 @@
+//! The right to write a film's file, which one process has at a time: of two that write one file, the one that writes last would
+//! throw away what the other sampled.
+
+use super::targets::location;
+use anyhow::{Context, Result, bail};
+use std::ffi::OsStr;
+use std::fs::{File, TryLockError};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Held until it is dropped or the process ends, however it ends: the lock is the system's own.
+pub(super) struct Claim {
+    /// Beside the film and not the film itself, which is replaced by every write.
+    path: PathBuf,
+    _lock: File,
+}
+
+impl Claim {
+    /// Of the film at this path, there or not.
+    ///
+    /// # Errors
+    /// If another process has it.
+    pub(super) fn on(film: &Path) -> Result<Self> {
+        let path = lock_beside(film);
+        loop {
+            let opened = File::options().create(true).truncate(false).write(true).open(&path);
+            let lock = opened.with_context(|| format!("{}: cannot be locked by {}", film.display(), path.display()))?;
+            match lock.try_lock() {
+                Err(TryLockError::WouldBlock) => {
+                    let owner = std::fs::read_to_string(&path).unwrap_or_default();
+                    bail!(
+                        "{}: process {} writes this film: wait for its end, or name another file",
+                        film.display(),
+                        if owner.is_empty() { "of another user" } else { &owner }
+                    );
+                }
+                // A file system without locks: everybody gets them, as before there were any.
+                Ok(()) | Err(TryLockError::Error(_)) if is_at(&lock, &path) => {
+                    // Only for the message above.
+                    let _ = lock.set_len(0).and_then(|()| write!(&lock, "{}", std::process::id()));
+                    return Ok(Self { path, _lock: lock });
+                }
+                // The process before removed it between the two steps: a lock that nobody else will find.
+                Ok(()) | Err(TryLockError::Error(_)) => {}
+            }
+        }
+    }
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        // One that stays is taken over by the next process.
+        let _ = std::fs::remove_file(&self.path);
+    }
+}
+
+fn lock_beside(film: &Path) -> PathBuf {
+    let film = location(film);
+    let mut name = std::ffi::OsString::from(".");
+    name.push(film.file_name().unwrap_or(OsStr::new("film")));
+    name.push(".lock");
+    film.with_file_name(name)
+}
+
+/// Whether a file is the one that has this name now.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let identity = |metadata: std::fs::Metadata| (metadata.dev(), metadata.ino());
+    let named = path.metadata().map(identity).ok();
+    named.is_some() && named == file.metadata().map(identity).ok()
+}
+
+/// Elsewhere a file that is open keeps its name.
+#[cfg(not(unix))]
+fn is_at(_: &File, _: &Path) -> bool {
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_at_a_time_has_a_film() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let film = folder.path().join("a.film");
+        let claim = Claim::on(&film).expect("free");
+        let refused = Claim::on(&folder.path().join("./a.film")).err().expect("taken").to_string();
+        assert!(refused.contains(&format!("process {}", std::process::id())), "{refused}");
+        assert!(Claim::on(&folder.path().join("b.film")).is_ok());
+        drop(claim);
+        assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 0, "nothing is left");
+        // As a killed process leaves it.
+        std::fs::write(lock_beside(&film), "1").expect("written");
+        assert!(Claim::on(&film).is_ok());
+    }
+}
