@@ -135,12 +135,16 @@ fn all_around(min: Vec3, max: Vec3, intensity: f32) -> LightBounds {
 fn point_bounds(light: &Light) -> Option<LightBounds> {
     match *light {
         Light::Point { position, intensity } => Some(all_around(position, position, intensity.max_element())),
-        Light::Spot { position, direction, intensity, inner_angle, outer_angle, .. } => Some(LightBounds {
-            axis: direction,
-            normal_angle: inner_angle,
-            emission_angle: (outer_angle - inner_angle).clamp(0.0, FRAC_PI_2),
-            ..all_around(position, position, intensity.max_element())
-        }),
+        Light::Spot { position, direction, intensity, inner_angle, outer_angle, .. } => {
+            // What a spot wider than a half-space has beyond it is said by its normals.
+            let normal_angle = inner_angle.max(outer_angle - FRAC_PI_2);
+            Some(LightBounds {
+                axis: direction,
+                normal_angle,
+                emission_angle: (outer_angle - normal_angle).clamp(0.0, FRAC_PI_2),
+                ..all_around(position, position, intensity.max_element())
+            })
+        }
         Light::Directional { .. } => None,
     }
 }

@@ -93,7 +93,7 @@ mod tests {
     #[test]
     fn solid_angles_are_the_integral_of_the_falloff() {
         for falloff in [SpotFalloff::Smoothstep, SpotFalloff::Squared, SpotFalloff::LinearInAngle] {
-            for (inner, outer) in [(0.2f32, 0.9f32), (0.0, 1.5), (0.5, 0.5)] {
+            for (inner, outer) in [(0.2f32, 0.9f32), (0.0, 1.5), (0.5, 0.5), (0.2, 2.6)] {
                 let n = 200_000;
                 let sum: f64 =
                     (0..n).map(|i| f64::from(falloff.at(1.0 - 2.0 * (i as f32 + 0.5) / n as f32, inner, outer))).sum();

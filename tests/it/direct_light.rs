@@ -179,6 +179,18 @@ fn lights_without_area_follow_their_laws() {
         falloff: SpotFalloff::Smoothstep,
     });
     assert_irradiance(spot, 1.5, 8.0 / 6.25 * 0.8, "inside the cone of a spot");
+    // Aimed upwards, 110° away from the point, beside a lamp that the choice might take it for.
+    let mut wide = floor();
+    wide.lights.push(Light::Spot {
+        position: Vec3::new(0.0, 2.0, 0.0),
+        direction: Vec3::new(0.0, -110f32.to_radians().cos(), 110f32.to_radians().sin()),
+        intensity: Vec3::splat(8.0),
+        inner_angle: 10f32.to_radians(),
+        outer_angle: 150f32.to_radians(),
+        falloff: SpotFalloff::LinearInAngle,
+    });
+    wide.lights.push(Light::Point { position: Vec3::new(0.0, 2.0, 3.0), intensity: Vec3::splat(13.0) });
+    assert_irradiance(wide, 0.0, 8.0 / 4.0 * 40.0 / 140.0 + 2.0 / 13f32.sqrt(), "behind a wide spot");
     let mut sun = floor();
     sun.lights.push(Light::Directional {
         direction: Vec3::new(0.6, -0.8, 0.0),

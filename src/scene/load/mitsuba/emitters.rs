@@ -27,7 +27,7 @@ impl Reader {
                 self.builder.lights.push(Light::Point { position: at, intensity });
             }
             "spot" => {
-                let outer = emitter.float_or("cutoffangle", 20.0)?.clamp(0.01, 90.0);
+                let outer = emitter.float_or("cutoffangle", 20.0)?.clamp(0.01, 180.0);
                 let inner = emitter.float_or("beamwidth", 0.75 * outer)?.clamp(0.0, outer);
                 let intensity = self.light_color(emitter, "intensity")?;
                 if emitter.child("texture").is_some() {
@@ -116,7 +116,6 @@ impl Reader {
         if elevation < 0.0 {
             self.builder
                 .note(format!("{}: a sun below the horizon gives no light, nor does its sky.", emitter.place()));
-            self.surround(Environment::constant(Vec3::ZERO));
             return Ok(());
         }
         let day = Sky {
@@ -188,15 +187,50 @@ fn rotation(transform: &Affine3A) -> Mat3 {
 mod tests {
     use super::super::super::{LoadOptions, load};
     use super::*;
+    use crate::scene::Scene;
 
-    fn sun_of(version: &str, emitter: &str) -> (Vec3, Environment) {
+    fn scene_with(version: &str, emitter: &str) -> Scene {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("sky.xml");
         let text = format!("<scene version=\"{version}\">{emitter}<shape type=\"sphere\"/></scene>");
         std::fs::write(&path, text).unwrap();
-        let scene = load(&path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        load(&path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    fn sun_of(version: &str, emitter: &str) -> (Vec3, Environment) {
+        let scene = scene_with(version, emitter);
         let [Light::Directional { direction, .. }] = scene.lights.as_slice() else { panic!("{:?}", scene.lights) };
         (*direction, scene.environment.unwrap())
+    }
+
+    /// A night is no surroundings: those that the file has besides are rendered, in whichever order they stand.
+    #[test]
+    fn a_set_sun_leaves_other_surroundings() {
+        let night = |kind| {
+            format!("<emitter type=\"{kind}\"><vector name=\"sun_direction\" x=\"0\" y=\"0.1\" z=\"-1\"/></emitter>")
+        };
+        let dusk = "<emitter type=\"constant\"><rgb name=\"radiance\" value=\"0.5\"/></emitter>";
+        for kind in ["sun", "sky", "sunsky"] {
+            for emitters in [format!("{}{dusk}", night(kind)), format!("{dusk}{}", night(kind))] {
+                let scene = scene_with("3.0.0", &emitters);
+                let environment = scene.environment.as_ref().expect("the constant one");
+                assert!((environment.radiance(Vec3::X).x - 0.5).abs() < 1e-3, "{emitters}: {:?}", scene.notes);
+                assert!(scene.lights.is_empty(), "{emitters}");
+                assert!(!scene.notes.iter().any(|note| note.contains("studio")), "{emitters}: {:?}", scene.notes);
+            }
+        }
+    }
+
+    /// Mitsuba's spots reach behind themselves.
+    #[test]
+    fn spots_may_be_wider_than_a_half_space() {
+        let wide = "<emitter type=\"spot\"><float name=\"cutoff_angle\" value=\"150\"/></emitter>";
+        let scene = scene_with("3.0.0", wide);
+        let [Light::Spot { inner_angle, outer_angle, .. }] = scene.lights.as_slice() else {
+            panic!("{:?}", scene.lights)
+        };
+        assert!((outer_angle.to_degrees() - 150.0).abs() < 1e-3, "{outer_angle}");
+        assert!((inner_angle.to_degrees() - 112.5).abs() < 1e-3, "{inner_angle}");
     }
 
     /// The sun stands where the file says, and the sky is brightest there, with the zenith along +z and along +y.

@@ -91,8 +91,8 @@ impl Reader<'_> {
         let direction = direction.ok_or_else(|| parameters.error("\"from\" and \"to\" are the same point"))?;
         let outer = parameters.float_or("coneangle", 30.0)?;
         let delta = parameters.float_or("conedeltaangle", 5.0)?;
-        if !(0.0..=90.0).contains(&outer) || delta < 0.0 {
-            return Err(parameters.error("\"coneangle\" must lie in [0, 90], \"conedeltaangle\" must not be negative"));
+        if !(0.0..=180.0).contains(&outer) || delta < 0.0 {
+            return Err(parameters.error("\"coneangle\" must lie in [0, 180], \"conedeltaangle\" must not be negative"));
         }
         let (outer_angle, inner_angle) = (outer.to_radians(), (outer - delta).max(0.0).to_radians());
         let (inner_cos, outer_cos) = (inner_angle.cos(), outer_angle.cos());

@@ -37,7 +37,7 @@ pub(super) fn read(value: &Value, nits_per_unit: f64) -> Result<Light, LoadError
             } else {
                 (aim.vec3()? - position).try_normalize().ok_or_else(|| aim.error("is the light's own position"))?
             };
-            let outer = fields.get_or("outer_deg", 30.0, |value| value.within(0.01, 90.0))?;
+            let outer = fields.get_or("outer_deg", 30.0, |value| value.within(0.01, 180.0))?;
             let inner = fields.get_or("inner_deg", 0.8 * outer, |value| value.within(0.0, outer))?;
             let (inner, outer) = (inner.to_radians(), outer.to_radians());
             let falloff = SpotFalloff::Smoothstep;
