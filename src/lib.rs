@@ -27,6 +27,7 @@ pub mod geometry;
 pub mod hdr_read;
 pub mod integrator;
 pub mod light;
+pub mod lock;
 pub mod output;
 pub mod preview;
 pub mod sampler;

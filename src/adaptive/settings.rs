@@ -136,11 +136,6 @@ pub struct LoopSettings {
 }
 
 impl LoopSettings {
-    /// Shows pictures as the whole is shown of which they are a part.
-    pub fn fit_to(&mut self, whole: &SceneLight) {
-        self.fitted = Some(self.operator.fit(&whole.guide(), &self.viewing, None).save());
-    }
-
     /// The default loop, to visibility 1.
     pub fn new(viewing: Viewing, nits_per_unit: f64, operator: Box<dyn ToneOperator>) -> Self {
         Self {
@@ -159,6 +154,11 @@ impl LoopSettings {
             denoiser: None,
             is_outdated: None,
         }
+    }
+
+    /// Shows pictures as the whole is shown of which they are a part.
+    pub fn fit_to(&mut self, whole: &SceneLight) {
+        self.fitted = Some(self.operator.fit(&whole.guide(), &self.viewing, None).save());
     }
 
     /// Whether a render that stopped at a visibility is the beginning of this one, so that going on from it gives the same bytes.

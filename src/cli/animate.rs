@@ -13,7 +13,7 @@ mod video;
 use super::console::duration_in_words;
 use super::denoise::DenoiseChoice;
 use super::job::{Quality, Size, parse_size};
-use super::seeing::{AskedShowing, operator_values, parse_positive, parse_seconds, parse_stops, parse_unit};
+use super::seeing::{AskedPresentation, operator_values, parse_positive, parse_seconds, parse_stops, parse_unit};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use fechner::adaptive::settings::DEFAULT_MAX_SAMPLES;
@@ -195,8 +195,8 @@ impl AnimateArguments {
     }
 
     /// How the command line has the frames shown.
-    fn asked_showing(&self) -> AskedShowing<'_> {
-        AskedShowing {
+    fn asked_presentation(&self) -> AskedPresentation<'_> {
+        AskedPresentation {
             display: self.display.as_deref(),
             operator: self.operator.as_deref(),
             exposure_stops: self.exposure,

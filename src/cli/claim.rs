@@ -3,16 +3,15 @@
 
 use super::targets::location;
 use anyhow::{Context, Result, bail};
-use std::ffi::OsStr;
-use std::fs::{File, TryLockError};
-use std::io::Write as _;
+use fechner::lock::{Lock, try_lock};
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 
-/// Held until it is dropped or the process ends, however it ends: the lock is the system's own.
+/// Held until it is dropped or the process ends, however it ends.
 pub(super) struct Claim {
     /// Beside the film and not the film itself, which is replaced by every write.
     path: PathBuf,
-    _lock: File,
+    _lock: Lock,
 }
 
 impl Claim {
@@ -23,25 +22,17 @@ impl Claim {
     pub(super) fn on(film: &Path) -> Result<Self> {
         let path = lock_beside(film);
         loop {
-            let opened = File::options().create(true).truncate(false).write(true).open(&path);
-            let lock = opened.with_context(|| format!("{}: cannot be locked by {}", film.display(), path.display()))?;
-            match lock.try_lock() {
-                Err(TryLockError::WouldBlock) => {
-                    let owner = std::fs::read_to_string(&path).unwrap_or_default();
-                    bail!(
-                        "{}: process {} writes this film: wait for its end, or name another file",
-                        film.display(),
-                        if owner.is_empty() { "of another user" } else { &owner }
-                    );
-                }
-                // A file system without locks: everybody gets them, as before there were any.
-                Ok(()) | Err(TryLockError::Error(_)) if is_at(&lock, &path) => {
-                    // Only for the message above.
-                    let _ = lock.set_len(0).and_then(|()| write!(&lock, "{}", std::process::id()));
-                    return Ok(Self { path, _lock: lock });
-                }
-                // The process before removed it between the two steps: a lock that nobody else will find.
-                Ok(()) | Err(TryLockError::Error(_)) => {}
+            let lock = try_lock(&path)
+                .with_context(|| format!("{}: cannot be locked by {}", film.display(), path.display()))?;
+            let Some(lock) = lock else {
+                let owner = std::fs::read_to_string(&path).unwrap_or_default();
+                let owner = if owner.is_empty() { "of another user" } else { &owner };
+                bail!("{}: process {owner} writes this film: wait for its end, or name another file", film.display());
+            };
+            if lock.is_at(&path) {
+                // Only for the message above.
+                let _ = lock.sign(&std::process::id().to_string());
+                return Ok(Self { path, _lock: lock });
             }
         }
     }
@@ -56,25 +47,10 @@ impl Drop for Claim {
 
 fn lock_beside(film: &Path) -> PathBuf {
     let film = location(film);
-    let mut name = std::ffi::OsString::from(".");
+    let mut name = OsString::from(".");
     name.push(film.file_name().unwrap_or(OsStr::new("film")));
     name.push(".lock");
     film.with_file_name(name)
-}
-
-/// Whether a file is the one that has this name now.
-#[cfg(unix)]
-fn is_at(file: &File, path: &Path) -> bool {
-    use std::os::unix::fs::MetadataExt;
-    let identity = |metadata: std::fs::Metadata| (metadata.dev(), metadata.ino());
-    let named = path.metadata().map(identity).ok();
-    named.is_some() && named == file.metadata().map(identity).ok()
-}
-
-/// Elsewhere a file that is open keeps its name.
-#[cfg(not(unix))]
-fn is_at(_: &File, _: &Path) -> bool {
-    true
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use super::console;
 use super::denoise::DenoiseChoice;
 use super::importance;
 use super::seeing::{
-    self, AskedShowing, Showing, model_values, operator_values, parse_finite, parse_positive, parse_seconds,
+    self, AskedPresentation, Presentation, model_values, operator_values, parse_finite, parse_positive, parse_seconds,
     parse_stops, parse_unit,
 };
 use super::targets::{Named, display_file};
@@ -196,8 +196,20 @@ impl JobArguments {
         Ok(scene)
     }
 
-    /// Loads the scene and reads everything else that is named.
+    /// Loads the scene and reads everything else that is named. A part is shown as the whole is.
     pub(super) fn prepare(&self) -> anyhow::Result<Prepared> {
+        let mut prepared = self.prepare_samples()?;
+        let Prepared { scene, trace, record, settings, whole } = &mut prepared;
+        *whole = trace.crop.and_then(|_| whole_light(scene, trace));
+        if let Some(whole) = whole {
+            settings.fit_to(whole);
+            record.fitted.clone_from(&settings.fitted);
+        }
+        Ok(prepared)
+    }
+
+    /// The same for who takes samples alone, and does not ask how they are shown.
+    pub(super) fn prepare_samples(&self) -> anyhow::Result<Prepared> {
         let scene = self.load_at(self.at, Some(console::texture_decoded))?;
         for note in &scene.notes {
             say!("note: {note}");
@@ -234,13 +246,7 @@ impl JobArguments {
                 "note: --filter mitchell: its negative lobes scatter samples, and what is told of visible noise counts that too"
             );
         }
-        let scene = Arc::new(scene);
-        let whole = trace.crop.and_then(|_| whole_light(&scene, &trace));
-        if let Some(whole) = &whole {
-            settings.fit_to(whole);
-            record.fitted.clone_from(&settings.fitted);
-        }
-        Ok(Prepared { scene, trace, record, settings, whole })
+        Ok(Prepared { scene: Arc::new(scene), trace, record, settings, whole: None })
     }
 }
 
@@ -378,7 +384,8 @@ fn trace_settings(arguments: &JobArguments, size: Size, nits_per_unit: f64) -> a
 /// How light all of the picture is, at its own size, as operators that count degrees need it: a part is shown as it is shown in the
 /// whole. `None` for pictures too large to be looked at as a whole.
 fn whole_light(scene: &Arc<Scene>, trace: &TraceSettings) -> Option<SceneLight> {
-    const MOST_PIXELS: u64 = 1 << 26;
+    /// 8192×4096, for which a third of a gigabyte is taken.
+    const MOST_PIXELS: u64 = 1 << 25;
     if u64::from(trace.width) * u64::from(trace.height) > MOST_PIXELS {
         say!("note: tone is fitted to the crop alone: {}x{} pixels are too many", trace.width, trace.height);
         return None;
@@ -437,12 +444,12 @@ fn check_rule(arguments: &JobArguments) -> anyhow::Result<()> {
 
 /// How to sample and for whom: command line before scene before default.
 fn settings_record(arguments: &JobArguments, scene: &Scene) -> anyhow::Result<SettingsRecord> {
-    let asked = AskedShowing {
+    let asked = AskedPresentation {
         display: arguments.display.as_deref(),
         operator: arguments.operator.as_deref(),
         exposure_stops: arguments.exposure,
     };
-    let Showing { display, operator, exposure_stops } = asked.of_scene(scene);
+    let Presentation { display, operator, exposure_stops } = asked.of_scene(scene);
     let viewing = seeing::viewing(display, arguments.csf_area)?;
     if arguments.denoise.kind().is_some() && arguments.model != model::DEFAULT {
         bail!(

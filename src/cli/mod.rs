@@ -28,6 +28,7 @@ mod tonemap;
 mod view;
 mod words;
 
+use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -44,8 +45,8 @@ struct CommandLine {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Render a scene until nothing more can be seen, or until a limit. Exits with 75 where a signal stopped it early: run it again with
-    /// --resume.
+    /// Render a scene until nothing more can be seen, or until a limit. Exits with 75 where a signal stopped it early: --resume
+    /// goes on from its --checkpoint.
     Render(Box<render::RenderArguments>),
     /// Show a render in a browser while it is made: layers, live exposure and camera, stop, save.
     View(Box<view::ViewArguments>),
@@ -73,11 +74,21 @@ enum Command {
 /// A signal ended it, or it has to wait: to be called again (`EX_TEMPFAIL` of sysexits.h).
 const CALL_AGAIN: u8 = 75;
 
+/// The arguments; one line about those that make no sense. Help and version are printed, and end the program.
+fn parsed() -> anyhow::Result<CommandLine> {
+    CommandLine::try_parse().map_err(|error| match error.kind() {
+        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+            error.exit()
+        }
+        _ => anyhow::anyhow!(words::in_a_line_of_arguments(&error)),
+    })
+}
+
 /// Runs what the arguments ask for. Exit status 0: done; 1: `compare` sees a difference; 2: bad input or a failed write;
 /// 75: a render or a farm's work was stopped by a signal, or has to wait, and should be called again.
 pub(crate) fn run() -> anyhow::Result<ExitCode> {
     signals::outlive_file_limits();
-    match CommandLine::parse().command {
+    match parsed()?.command {
         Command::Render(arguments) => return render::run(&arguments),
         Command::View(arguments) => view::run(&arguments)?,
         Command::Animate(arguments) => animate::run(&arguments)?,

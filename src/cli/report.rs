@@ -361,9 +361,9 @@ pub(super) fn summary(report: &Report, settings: &LoopSettings, rendered: &Rende
             "{} pixels hold light that few samples find (fireflies): {:.2} % of the picture's energy. They are kept{}.",
             report.outlier_pixels,
             100.0 * report.outlier_energy_share,
-            // Measured under the caustic of `cornell-glass` (`benches/README.md`).
+            // By 2 % in a block of `cornell-glass` (`benches/local_energy.py`).
             if settings.sampling == Sampling::Adaptive {
-                ", but a block of 8x8 pixels there may be up to 3 % too dark"
+                "; around them it may be a few per cent too dark"
             } else {
                 ""
             }

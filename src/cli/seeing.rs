@@ -18,7 +18,7 @@ pub(super) const DEFAULT_OPERATOR: &str = "constant";
 
 /// How a scene is shown: command line before scene before default.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Showing<'a> {
+pub(super) struct Presentation<'a> {
     /// Name or file of the display.
     pub(super) display: &'a str,
     /// Name of the tone operator.
@@ -27,19 +27,19 @@ pub(super) struct Showing<'a> {
     pub(super) exposure_stops: Option<f64>,
 }
 
-/// What of [`Showing`] the command line says.
+/// What of [`Presentation`] the command line says.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct AskedShowing<'a> {
+pub(super) struct AskedPresentation<'a> {
     pub(super) display: Option<&'a str>,
     pub(super) operator: Option<&'a str>,
     pub(super) exposure_stops: Option<f64>,
 }
 
-impl<'a> AskedShowing<'a> {
+impl<'a> AskedPresentation<'a> {
     /// What is left open as the scene has it.
-    pub(super) fn of_scene(self, scene: &'a Scene) -> Showing<'a> {
+    pub(super) fn of_scene(self, scene: &'a Scene) -> Presentation<'a> {
         let view = &scene.viewing;
-        Showing {
+        Presentation {
             display: self.display.or(view.display.as_deref()).unwrap_or(DEFAULT_DISPLAY),
             operator: self.operator.or(view.operator.as_deref()).unwrap_or(DEFAULT_OPERATOR),
             exposure_stops: self.exposure_stops.or(view.exposure_stops),

@@ -13,6 +13,15 @@ pub(crate) fn in_a_line(error: &anyhow::Error) -> String {
     line
 }
 
+/// What is wrong with the arguments, in one line: the message and its hint, without the usage and where to find help.
+pub(super) fn in_a_line_of_arguments(error: &clap::Error) -> String {
+    let text = error.to_string();
+    let lines =
+        text.lines().map(str::trim).take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more"));
+    let words: Vec<&str> = lines.filter(|line| !line.is_empty()).collect();
+    words.join("; ").trim_start_matches("error: ").replacen("; [", " [", 1).replacen(":; ", ": ", 1)
+}
+
 /// The lines of a message less those that begin as "3 |" or "|".
 fn without_quotes(message: &str) -> String {
     let is_quoted = |line: &str| line.trim_start_matches(|c: char| c.is_ascii_digit() || c == ' ').starts_with('|');

@@ -21,7 +21,6 @@
 
 pub mod folder;
 pub mod frame;
-pub mod lock;
 mod manifest;
 pub mod round;
 pub mod unit;

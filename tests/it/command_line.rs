@@ -11,7 +11,7 @@ fn scene(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name)
 }
 
-/// Runs and expects exit status 2, one line on stderr with all the `fragments`, and an empty folder.
+/// Runs and expects exit status 2, and one line about it on stderr with all the `fragments`, the last one.
 fn assert_refused(arguments: &[&str], folder: &Path, fragments: &[&str]) {
     let output = fechner().args(arguments).current_dir(folder).output().expect("runs");
     let message = String::from_utf8_lossy(&output.stderr);
@@ -19,8 +19,8 @@ fn assert_refused(arguments: &[&str], folder: &Path, fragments: &[&str]) {
     for fragment in fragments {
         assert!(message.contains(fragment), "{arguments:?}: \"{fragment}\" is not in: {message}");
     }
-    let errors = message.lines().filter(|l| l.starts_with("fechner:")).count();
-    assert!(errors == 1 || message.contains("Usage") || message.contains("error:"), "{message}");
+    let errors = message.lines().filter(|line| line.starts_with("fechner:")).count();
+    assert!(errors == 1 && message.lines().last().is_some_and(|line| line.starts_with("fechner:")), "{message}");
     assert!(!message.contains("panicked"), "{message}");
 }
 
@@ -240,6 +240,12 @@ fn bad_arguments_are_refused_in_one_line() {
     let at = folder.path();
     assert_refused(&["render", "missing.toml", "-o", "a.png"], at, &["missing.toml"]);
     assert_refused(&["render", ".", "-o", "a.png"], at, &["is a directory"]);
+    assert_refused(&["render", cornell], at, &["arguments were not provided: --output <FILE>"]);
+    assert_refused(
+        &["render", cornell, "-o", "a.png", "--sise", "8x8"],
+        at,
+        &["unexpected argument '--sise' found; tip:"],
+    );
     assert_refused(&["render", cornell, "-o", "a.gif"], at, &["a.gif", ".exr"]);
     assert_refused(&["render", cornell, "-o", "no/such/a.png"], at, &["no/such"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--size", "0x10"], at, &["0x10", "WIDTHxHEIGHT"]);

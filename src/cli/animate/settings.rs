@@ -12,14 +12,13 @@ use fechner::animate::gaze::GazeTrack;
 use fechner::animate::velocity::VelocityOf;
 use fechner::denoise::Denoiser;
 use fechner::integrator::TraceSettings;
-use fechner::say;
 use fechner::scene::Scene;
 
 /// Command line before scene before default.
 pub(super) fn shot_settings(arguments: &AnimateArguments, scene: &Scene, shot: Frames) -> Result<ShotSettings> {
     let size = arguments.size.unwrap_or(Size { width: scene.film.width, height: scene.film.height });
     check_memory(size)?;
-    let display = arguments.asked_showing().of_scene(scene).display;
+    let display = arguments.asked_presentation().of_scene(scene).display;
     let asked = arguments.visibility.or(arguments.quality.map(Quality::visibility));
     let sampling = match arguments.sampling {
         SamplingChoice::Adaptive => Sampling::Adaptive,

@@ -10,7 +10,7 @@ use super::{AnimateArguments, EyeChoice, VelocityChoice, video};
 use crate::cli::console::{Console, duration_in_words};
 use crate::cli::json::write_json;
 use crate::cli::report::Report;
-use crate::cli::seeing::{Showing, tone_operator};
+use crate::cli::seeing::{Presentation, tone_operator};
 use anyhow::{Context, Result, bail};
 use fechner::adaptive::settings::{AllocationRule, LoopSettings, Sampling};
 use fechner::animate::budget::Needs;
@@ -78,7 +78,7 @@ impl<'a> Shot<'a> {
             say!("note: {note}");
         }
         let settings = shot_settings(arguments, &scene, whole)?;
-        let Showing { operator, exposure_stops, .. } = arguments.asked_showing().of_scene(&scene);
+        let Presentation { operator, exposure_stops, .. } = arguments.asked_presentation().of_scene(&scene);
         let operator_name = operator.to_owned();
         let shot = Self { arguments, source, settings, operator_name, exposure_stops, name, format };
         shot.operator()?;

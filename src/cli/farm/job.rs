@@ -4,6 +4,7 @@ use crate::cli::animate::{AnimateArguments, FrameJob as ShotFrame, Shot};
 use crate::cli::job::{JobArguments, Prepared};
 use crate::cli::render::write_picture;
 use crate::cli::report::Report;
+use crate::cli::words::in_a_line_of_arguments;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::{CommandFactory, Parser};
 use fechner::adaptive::Rendered;
@@ -66,7 +67,7 @@ enum FrameKind {
 impl JobOptions {
     /// Reads what stands in a manifest. Pictures go to `pictures`.
     pub(super) fn parse(work: Work, arguments: &[String], pictures: &Path, format: PictureFormat) -> Result<Self> {
-        let wrong = |error: clap::Error| anyhow!("{}", error.to_string().trim().trim_start_matches("error: "));
+        let wrong = |error: clap::Error| anyhow!(in_a_line_of_arguments(&error));
         match work {
             Work::Render => {
                 let options = StillOptions::try_parse_from(arguments).map_err(wrong)?;
@@ -182,7 +183,7 @@ impl Job<'_> {
         let entry = farm.frame(frame_index);
         let (scene, trace) = match self {
             Self::Still(arguments) => {
-                let Prepared { scene, trace, .. } = arguments.prepare()?;
+                let Prepared { scene, trace, .. } = arguments.prepare_samples()?;
                 (scene, trace)
             }
             Self::Shot { shot, .. } => (shot.scene(entry.frame)?, shot.settings.trace_settings(entry.frame)),

@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use fechner::farm::Farm;
 use fechner::farm::frame::{Progress, progress};
-use fechner::farm::lock::try_lock;
+use fechner::lock::try_lock;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;

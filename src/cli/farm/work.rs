@@ -6,7 +6,7 @@ use super::{CALL_AGAIN, Threads, frame_lock};
 use anyhow::{Context, Result};
 use clap::Args;
 use fechner::farm::frame::{Progress, progress};
-use fechner::farm::lock::try_lock;
+use fechner::lock::try_lock;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
