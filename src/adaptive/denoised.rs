@@ -2,12 +2,14 @@
 
 use super::judge::JudgeError;
 use super::settings::LoopSettings;
-use crate::denoise::{DenoisedFilm, Denoiser, denoise_film};
+use crate::denoise::{DenoisedFilm, Denoiser, denoise_film, leave_the_void_dark};
 use crate::film::{Estimate, Film, opponent};
 use crate::sampler::Half;
 use fechner_perception::Plane;
 use fechner_perception::csf::ChromaticChannel;
-use fechner_perception::denoised::{ChromaticPicture, DenoisedDifferences, DenoisedError, blended, chromatic_error};
+use fechner_perception::denoised::{
+    ChromaticPicture, DenoisedDifferences, DenoisedError, chromatic_error, step_towards_raw,
+};
 use fechner_perception::photometry::luminance;
 use fechner_perception::seen;
 use fechner_perception::threshold::ThresholdMap;
@@ -81,7 +83,8 @@ impl TimedDenoising {
             residual_half_difference: &shown(&residual_half_difference),
         });
         let chromatic = self.chromatic_errors(film, settings, tone, estimate)?;
-        let rgb_cd_m2 = blended_rgb(thresholds, &error, self.film.rgb_cd_m2, &estimate.rgb_cd_m2);
+        let mut rgb_cd_m2 = blended_rgb(thresholds, &error, self.film.rgb_cd_m2, &estimate.rgb_cd_m2, &slope);
+        leave_the_void_dark(film, &mut rgb_cd_m2);
         let luminance_cd_m2 = luminance_plane(&rgb_cd_m2, width);
         let error = chromatic.iter().fold(error, DenoisedError::with_channel);
         Ok(DenoisedPicture { rgb_cd_m2, luminance_cd_m2, half_difference: displayed, error })
@@ -126,21 +129,44 @@ impl TimedDenoising {
     }
 }
 
-/// The denoised picture, moved towards the raw one where that is proven better.
+/// The denoised picture, moved towards the raw one where that is proven better, as far as the display shows a difference:
+/// `slope` is that of the displayed over the scene's light around the denoised picture.
 fn blended_rgb(
     thresholds: &ThresholdMap,
     error: &DenoisedError,
     denoised: Vec<[f32; 3]>,
     raw: &[[f32; 3]],
+    slope: &Plane,
 ) -> Vec<[f32; 3]> {
     let (width, height) = (thresholds.width(), thresholds.height());
-    let channel = |picture: &[[f32; 3]], c: usize| Plane::from_fn(width, height, |x, y| picture[y * width + x][c]);
     let mut picture = denoised;
     for c in 0..3 {
-        let Some(moved) = blended(thresholds, error, &channel(&picture, c), &channel(raw, c)) else { break };
-        picture.iter_mut().zip(moved.values()).for_each(|(rgb, &value)| rgb[c] = value.max(0.0));
+        let residual = Plane::from_fn(width, height, |x, y| {
+            let pixel = y * width + x;
+            slope.get(x, y) * (picture[pixel][c] - raw[pixel][c])
+        });
+        let Some(step) = step_towards_raw(thresholds, error, &residual) else { break };
+        let raw = Plane::from_fn(width, height, |x, y| raw[y * width + x][c]);
+        let moved = Plane::from_fn(width, height, |x, y| {
+            let (denoised, slope) = (picture[y * width + x][c], slope.get(x, y));
+            if slope > 0.0 {
+                let (least, most) = raw_range(&raw, x, y);
+                (denoised + step.get(x, y) / slope).clamp(least.min(denoised), most.max(denoised))
+            } else {
+                denoised
+            }
+        });
+        picture.iter_mut().zip(moved.values()).for_each(|(rgb, &value)| rgb[c] = value);
     }
     picture
+}
+
+/// The least and the most that a raw channel has at a pixel and the eight around it: bands that are moved by different shares
+/// may overshoot, and no further than to what paths have found.
+fn raw_range(raw: &Plane, x: usize, y: usize) -> (f32, f32) {
+    let (columns, rows) = (x.saturating_sub(1)..raw.width().min(x + 2), y.saturating_sub(1)..raw.height().min(y + 2));
+    let around = rows.flat_map(|y| columns.clone().map(move |x| raw.get(x, y)));
+    around.fold((f32::INFINITY, f32::NEG_INFINITY), |(least, most), value| (least.min(value), most.max(value)))
 }
 
 fn luminance_plane(rgb: &[[f32; 3]], width: usize) -> Plane {
@@ -153,4 +179,59 @@ fn raw_luminance(film: &Film, half: Half, nits_per_unit: f64) -> Plane {
     Plane::from_fn(width, film.height() as usize, |x, y| {
         (nits_per_unit * opponent(film.half_or_other(half, y * width + x).mean)[0]) as f32
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fechner_perception::csf::CastleCsf;
+    use fechner_perception::display::{Display, Viewing};
+    use fechner_perception::threshold::{ThresholdInputs, threshold_map};
+
+    const SIDE: usize = 64;
+    const WALL_CD_M2: f32 = 50.0;
+    /// A lamp that is 2000 times as bright as the display's white, four pixels wide.
+    const LAMP_CD_M2: f32 = 4e5;
+
+    fn lamp_covers(x: usize) -> bool {
+        (30..34).contains(&x)
+    }
+
+    /// A denoiser lost half of the lamp, and no band but the finest is worth moving back: what it lost stays the lamp's.
+    #[test]
+    fn a_lamp_does_not_ring_when_its_picture_moves_towards_the_raw_mean() {
+        let viewing = Viewing::of(Display::preset("strict").unwrap());
+        let white = viewing.display.white_cd_m2 as f32;
+        let shown = Plane::from_fn(SIDE, SIDE, |x, _| if lamp_covers(x) { white } else { WALL_CD_M2 });
+        let inputs = ThresholdInputs { display_luminance_cd_m2: &shown, guide_variance: None };
+        let thresholds = threshold_map(&inputs, &viewing, &CastleCsf::default()).unwrap();
+        let picture = |lamp: f32| -> Vec<[f32; 3]> {
+            (0..SIDE * SIDE).map(|pixel| [if lamp_covers(pixel % SIDE) { lamp } else { WALL_CD_M2 }; 3]).collect()
+        };
+        let slope = Plane::from_fn(SIDE, SIDE, |x, _| if lamp_covers(x) { 0.0 } else { 1.0 });
+        let mut error = DenoisedError::unknown(SIDE, SIDE);
+        let bands = 5;
+        error.raw_shares = (0..bands).map(|band| Plane::filled(SIDE, SIDE, f32::from(band + 1 == bands))).collect();
+        let (denoised, raw) = (picture(0.5 * LAMP_CD_M2), picture(LAMP_CD_M2));
+        let moved = blended_rgb(&thresholds, &error, denoised.clone(), &raw, &slope);
+        assert_eq!(moved, denoised, "the wall was right, and of the lamp no more is seen than white");
+    }
+
+    /// Shares of single bands overshoot beside an edge: no further than to what the raw mean has there.
+    #[test]
+    fn what_moves_towards_the_raw_mean_stays_within_it() {
+        let viewing = Viewing::of(Display::preset("strict").unwrap());
+        let grey = Plane::filled(SIDE, SIDE, WALL_CD_M2);
+        let inputs = ThresholdInputs { display_luminance_cd_m2: &grey, guide_variance: None };
+        let thresholds = threshold_map(&inputs, &viewing, &CastleCsf::default()).unwrap();
+        let mut error = DenoisedError::unknown(SIDE, SIDE);
+        error.raw_shares = (0..5).map(|band| Plane::filled(SIDE, SIDE, if band < 3 { 0.0 } else { 1.0 })).collect();
+        let raw: Vec<[f32; 3]> =
+            (0..SIDE * SIDE).map(|pixel| [if pixel % SIDE < 32 { 10.0 } else { 100.0 }; 3]).collect();
+        let denoised = vec![[55.0; 3]; SIDE * SIDE];
+        let moved = blended_rgb(&thresholds, &error, denoised, &raw, &Plane::filled(SIDE, SIDE, 1.0));
+        assert!(moved.iter().flatten().all(|value| (10.0..=100.0).contains(value)));
+        let edge = SIDE / 2 * SIDE + 32;
+        assert!(moved[edge - 1][0] < 30.0 && moved[edge][0] > 80.0, "{} {}", moved[edge - 1][0], moved[edge][0]);
+    }
 }

@@ -10,11 +10,13 @@ use crate::denoise::{Denoiser, OidnError};
 use crate::film::{CHANNELS, Estimate, Film};
 use crate::sampler::Half;
 use fechner_perception::Plane;
+use fechner_perception::denoised::DenoisedError;
 use fechner_perception::guide::{GuideInputs, denoise};
 use fechner_perception::seen;
 use fechner_perception::threshold::ThresholdMap;
 use fechner_perception::tone::FittedTone;
 use fechner_perception::visibility::MeasuredError;
+use std::borrow::Cow;
 use std::sync::OnceLock;
 use std::time::Instant;
 
@@ -192,6 +194,15 @@ impl Judgement {
     /// The picture that is shown: linear RGB in cd/m², row-major.
     pub fn picture(&self) -> &[[f32; 3]] {
         self.denoised.as_ref().map_or(&self.estimate.rgb_cd_m2, |denoised| &denoised.rgb_cd_m2)
+    }
+
+    /// What can be seen of the denoised picture's error, by importance as `predicted` is. `None` for raw pictures.
+    pub fn denoised_error(&self) -> Option<Cow<'_, DenoisedError>> {
+        let error = &self.denoised.as_ref()?.error;
+        Some(match &self.importance {
+            None => Cow::Borrowed(error),
+            Some(map) => Cow::Owned(error.with_thresholds_times(map)),
+        })
     }
 
     /// Visibility of a picture whose displayed luminance has this variance, (cd/m²)².

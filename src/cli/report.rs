@@ -45,8 +45,8 @@ pub(super) struct DenoisedReport {
 
 impl DenoisedReport {
     fn of(settings: &LoopSettings, judgement: &Judgement) -> Option<Self> {
-        let (denoiser, picture) = (settings.denoiser.as_ref()?, judgement.denoised.as_ref()?);
-        let (error, known) = (&picture.error, judgement.is_known);
+        let (denoiser, error) = (settings.denoiser.as_ref()?, judgement.denoised_error()?);
+        let known = judgement.is_known;
         let pixels = error.visibility.values().len();
         let is_blended = |pixel: &usize| error.raw_shares.iter().any(|share| share.values()[*pixel] > 0.01);
         Some(Self {

@@ -8,7 +8,7 @@ mod builtin;
 mod of_film;
 pub mod oidn;
 
-pub use of_film::{DenoisedFilm, denoise_film};
+pub use of_film::{DenoisedFilm, denoise_film, leave_the_void_dark};
 pub use oidn::{Oidn, OidnError};
 
 use fechner_perception::Plane;

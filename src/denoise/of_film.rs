@@ -43,6 +43,7 @@ pub fn denoise_film(denoiser: &Denoiser, film: &Film, nits_per_unit: f64) -> Res
         let rest: Vec<[f32; 3]> = rgb.iter().zip(&lamps).map(|(&rgb, &lamp)| (Vec3::from(rgb) - lamp).into()).collect();
         let mut denoised = denoiser.denoise(&NoisyPicture { rgb: &rest, variance, guides: &guides })?;
         denoised.iter_mut().zip(lamps).for_each(|(rgb, lamp)| *rgb = (Vec3::from(*rgb) + lamp).into());
+        leave_the_void_dark(film, &mut denoised);
         Ok::<_, OidnError>(denoised)
     };
     // What two samples of a half say of their scatter is worth little: beside it stands what the halves differ by.
@@ -57,6 +58,12 @@ pub fn denoise_film(denoiser: &Denoiser, film: &Film, nits_per_unit: f64) -> Res
         rgb_cd_m2: denoised(&estimate.rgb_cd_m2, &variance)?,
         halves_rgb_cd_m2: [of_half(Half::A)?, of_half(Half::B)?],
     })
+}
+
+/// Takes away what a denoiser spread into pixels that hold nothing. Behind them may stand another picture, to which it would be added.
+pub fn leave_the_void_dark(film: &Film, rgb: &mut [[f32; 3]]) {
+    let void = rgb.iter_mut().enumerate().filter(|(pixel, _)| film.is_void(*pixel));
+    void.for_each(|(_, rgb)| *rgb = [0.0; 3]);
 }
 
 /// What is seen to shine by itself is shown to the denoiser no brighter than so many times what the rest of the picture is on
@@ -122,6 +129,41 @@ mod tests {
             }
         }
         film
+    }
+
+    /// A noisy wall that ends at the middle column: right of it camera rays meet nothing.
+    fn wall_before_nothing() -> Film {
+        let mut film = Film::new(SIDE, SIDE);
+        for pixel in 0..SIDE * SIDE {
+            for half in Half::BOTH {
+                let mut sum = BlockSum::default();
+                for sample in 0..4 {
+                    let light = (hash_words(u64::from(16 * pixel + 4 * half.index() as u32 + sample), 5) >> 40) as f32
+                        / 16_777_216.0;
+                    let wall = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: false };
+                    sum.add(&if pixel % SIDE < SIDE / 2 {
+                        PathSample { radiance: Vec3::splat(2.0 * light), first_hit: wall, rays: 1 }
+                    } else {
+                        PathSample { radiance: Vec3::ZERO, first_hit: FirstHit::NOTHING, rays: 1 }
+                    });
+                }
+                film.merge_block(BlockWork { half, ..BlockWork::whole(pixel, half, 0) }, &sum);
+            }
+        }
+        film
+    }
+
+    /// Light of what stands before nothing stays on it, or it would be added to what a compositor puts behind.
+    #[test]
+    fn nothing_shines_where_nothing_is() {
+        let film = wall_before_nothing();
+        let denoised = denoise_film(&Denoiser::Builtin, &film, 1.0).expect("denoises");
+        for picture in [&denoised.rgb_cd_m2, &denoised.halves_rgb_cd_m2[0], &denoised.halves_rgb_cd_m2[1]] {
+            for (pixel, &rgb) in picture.iter().enumerate() {
+                let is_wall = pixel as u32 % SIDE < SIDE / 2;
+                assert_eq!(rgb != [0.0; 3], is_wall, "{rgb:?} in pixel {pixel}");
+            }
+        }
     }
 
     /// The wall beside the lamp stays a wall, and of the lamp's light nothing is lost. Open Image Denoise where it is installed.

@@ -293,6 +293,11 @@ impl Film {
         a.iter().zip(b).map(mean).collect()
     }
 
+    /// Whether no sample of a pixel met anything or brought any light: there is nothing in it.
+    pub fn is_void(&self, pixel: usize) -> bool {
+        self.halves.iter().map(|half| &half[pixel]).all(|half| half.missed == half.samples && half.mean == [0.0; 3])
+    }
+
     /// Samples of a pixel in both halves.
     pub fn samples(&self, pixel: usize) -> u32 {
         self.halves[0][pixel].samples + self.halves[1][pixel].samples

@@ -28,7 +28,8 @@ pub struct FirstHit {
 }
 
 impl FirstHit {
-    const NOTHING: Self = Self { albedo: Vec3::ONE, normal: Vec3::ZERO, depth: 0.0, object_id: 0, shines: false };
+    /// No surface.
+    pub const NOTHING: Self = Self { albedo: Vec3::ONE, normal: Vec3::ZERO, depth: 0.0, object_id: 0, shines: false };
 }
 
 /// What a sample found.

@@ -76,14 +76,14 @@ pub fn layers<'a>(
         let values: Vec<f32> = judgement.picture().iter().map(|rgb| rgb[c] * to_units).collect();
         picture.push_f32(name, values);
     }
-    if let Some(denoised) = &judgement.denoised {
+    if let Some(error) = judgement.denoised_error() {
         for (c, name) in ["raw.R", "raw.G", "raw.B"].into_iter().enumerate() {
             let values: Vec<f32> = judgement.estimate.rgb_cd_m2.iter().map(|rgb| rgb[c] * to_units).collect();
             picture.push_f32(name, values);
         }
-        picture.push_f32("visibility_variance.Y", denoised.error.variance.values());
-        picture.push_f32("visibility_bias.Y", denoised.error.bias.values());
-        picture.push_f32("unproven.Y", denoised.error.unproven(target).into_values());
+        picture.push_f32("visibility_variance.Y", error.variance.values().to_vec());
+        picture.push_f32("visibility_bias.Y", error.bias.values().to_vec());
+        picture.push_f32("unproven.Y", error.unproven(target).into_values());
     }
     if background == Background::Transparent {
         picture.push_f32("A", film.coverage());

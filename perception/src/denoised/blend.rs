@@ -30,25 +30,30 @@ pub(super) fn energy_after(evidence: &BandEvidence, found: &BandBias, share: &Pl
     left.combined(&raw, |left, raw| left + raw)
 }
 
-/// A channel of the denoised picture, moved towards the raw mean by [`DenoisedError::raw_shares`]. Both planes in any linear
-/// unit. `None` where nothing is worth moving, or planes do not fit.
+/// How far a denoised picture is to be moved towards its raw mean, by [`DenoisedError::raw_shares`], display cd/m². `residual`: of
+/// one channel, denoised less raw mean as displayed, as in [`DenoisedDifferences::residual`](super::DenoisedDifferences::residual).
+/// `None` where nothing is worth moving, or the planes do not fit.
+///
+/// Scene light must not be given: bands of a lamp's edge that is a thousand times as bright as the display's white ring far into
+/// what is seen beside it. What is shown ends at the display's range, to which the residual is held.
 #[must_use]
-pub fn blended(map: &ThresholdMap, error: &DenoisedError, denoised: &Plane, raw: &Plane) -> Option<Plane> {
+pub fn step_towards_raw(map: &ThresholdMap, error: &DenoisedError, residual: &Plane) -> Option<Plane> {
     let is_worth_it = |share: &Plane| share.values().iter().any(|&share| share > LEAST_SHARE);
-    let fits = denoised.same_size(&map.adaptation_cd_m2) && raw.same_size(&map.adaptation_cd_m2);
-    if !fits || !error.raw_shares.iter().any(is_worth_it) {
+    if !residual.same_size(&map.adaptation_cd_m2) || !error.raw_shares.iter().any(is_worth_it) {
         return None;
     }
+    let range = (map.viewing.display.white_cd_m2 - map.viewing.display.black_cd_m2) as f32;
+    let towards_raw = residual.map(|residual| if residual.is_nan() { 0.0 } else { (-residual).clamp(-range, range) });
     let mut filters = ErrorFilters::new(map);
-    let spectrum = filters.plain_spectrum(&raw.combined(denoised, |raw, denoised| raw - denoised));
-    let mut blended = denoised.clone();
+    let spectrum = filters.plain_spectrum(&towards_raw);
+    let mut step = Plane::filled(map.width(), map.height(), 0.0);
     for (band, share) in error.raw_shares.iter().enumerate().filter(|(_, share)| is_worth_it(share)) {
-        let step = filters.share_of_band(&spectrum, band);
-        blended.for_each_row_mut(|y, row| {
-            for (value, (step, share)) in row.iter_mut().zip(step.row(y).iter().zip(share.row(y))) {
-                *value += step * share;
+        let whole = filters.share_of_band(&spectrum, band);
+        step.for_each_row_mut(|y, row| {
+            for (value, (whole, share)) in row.iter_mut().zip(whole.row(y).iter().zip(share.row(y))) {
+                *value += whole * share;
             }
         });
     }
-    Some(blended)
+    Some(step)
 }

@@ -19,7 +19,7 @@ mod blend;
 mod chromatic;
 mod witness;
 
-pub use blend::blended;
+pub use blend::step_towards_raw;
 pub use chromatic::{ChromaticPicture, chromatic_error};
 
 use crate::plane::Plane;
@@ -93,6 +93,22 @@ impl DenoisedError {
         most(&mut self.bias_squared_standard_error, &other.bias_squared_standard_error);
         most(&mut self.blended_visibility, &other.visibility);
         self
+    }
+
+    /// This error for eyes whose thresholds are multiplied by a map of the same size, as where some places matter more than others.
+    #[must_use]
+    pub fn with_thresholds_times(&self, factors: &Plane) -> Self {
+        let over = |plane: &Plane| plane.combined(factors, |visibility, factor| visibility / factor);
+        let over_square = |plane: &Plane| plane.combined(factors, |squared, factor| squared / (factor * factor));
+        Self {
+            visibility: over(&self.visibility),
+            variance: over(&self.variance),
+            bias: over(&self.bias),
+            bias_squared_standard_error: over_square(&self.bias_squared_standard_error),
+            bias_factors: self.bias_factors.clone(),
+            raw_shares: self.raw_shares.clone(),
+            blended_visibility: over(&self.blended_visibility),
+        }
     }
 
     /// The same error seen `factor` times as well.

@@ -36,9 +36,9 @@ pub fn audit_unproven(
     target: f64,
     round: u32,
 ) -> Result<Option<Audit>, JudgeError> {
-    let Some(denoised) = &judgement.denoised else { return Ok(None) };
+    let (Some(denoised), Some(error)) = (&judgement.denoised, judgement.denoised_error()) else { return Ok(None) };
     let width = film.width() as usize;
-    let unproven = denoised.error.unproven(target);
+    let unproven = error.unproven(target);
     let all = Tile::all(film, TILE);
     let share = |tile: &Tile| {
         tile.pixels(width).map(|pixel| f64::from(unproven.values()[pixel])).sum::<f64>() / (TILE * TILE) as f64
