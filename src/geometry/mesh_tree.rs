@@ -8,7 +8,7 @@
 use super::face::Face;
 use super::tree::Bounds;
 use super::wide_tree::{TriangleRef, WideHit, WideTree};
-use glam::{Affine3A, Vec3, Vec3A};
+use glam::{Affine3A, Vec3A};
 
 /// Where a triangle is hit.
 #[derive(Clone, Copy, Debug)]
@@ -53,10 +53,8 @@ pub(super) struct MeshTree {
 impl MeshTree {
     /// Builds over triangles in any coordinates.
     pub(super) fn build(triangles: &[([Vec3A; 3], TriangleRef)]) -> Self {
-        let usable = |t: &[Vec3A; 3]| {
-            let edges = [t[1] - t[0], t[2] - t[0]].map(Vec3::from);
-            t.iter().all(|p| p.is_finite()) && Face::spanned_by(edges).is_some()
-        };
+        let usable =
+            |t: &[Vec3A; 3]| t.iter().all(|p| p.is_finite()) && Face::spanned_by([t[1] - t[0], t[2] - t[0]]).is_some();
         let bounds = Bounds::of_points(triangles.iter().filter(|(t, _)| usable(t)).flat_map(|(t, _)| *t));
         let (center, scale) = if bounds.is_finite() {
             let extent = (bounds.max - bounds.min).max_element();

@@ -78,7 +78,8 @@ impl FlatEmitter {
         material: &Material,
     ) -> Self {
         let (edge_1, edge_2) = (corners[1] - corners[0], corners[2] - corners[0]);
-        let Face { normal, area } = Face::spanned_by([edge_1, edge_2]).unwrap_or(Face { normal: Vec3::Y, area: 0.0 });
+        let Face { normal, area } =
+            Face::spanned_by([edge_1.into(), edge_2.into()]).unwrap_or(Face { normal: Vec3::Y, area: 0.0 });
         let from_center = [2.0 * edge_1 - edge_2, 2.0 * edge_2 - edge_1, edge_1 + edge_2];
         let radius = from_center.map(Vec3::length).into_iter().fold(0.0, f32::max) / 3.0;
         Self {

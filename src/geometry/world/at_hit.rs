@@ -176,7 +176,7 @@ impl World {
         let offset = offset::of_triangle(corner, [edge_1, edge_2], translation);
         let (b0, b1, b2) = (1.0 - hit.b1 - hit.b2, hit.b1, hit.b2);
         let position = Vec3::from(corner + edge_1 * b1 + edge_2 * b2);
-        let face = Face::spanned_by([edge_1.into(), edge_2.into()]);
+        let face = Face::spanned_by([edge_1, edge_2]);
         let geometric_normal = face.map_or(Vec3::Y, |face| placement.flip * face.normal);
         let indices = || mesh.triangles[hit.triangle as usize].map(|i| i as usize);
         let shading_normal = if mesh.normals.is_empty() {
