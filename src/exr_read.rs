@@ -3,7 +3,7 @@
 //! The header is read first and its claims are checked against the file's length and a limit on memory; only then are
 //! pixels read. The `exr` crate alone believes the header and asks for as much memory as it says, which ends the program.
 
-use crate::output::Attribute;
+use crate::output::{Attribute, CROP};
 use ::exr::meta::attribute::{AttributeValue, Text};
 use ::exr::meta::header::Header;
 use ::exr::meta::{BlockDescription, MetaData};
@@ -46,7 +46,8 @@ pub struct ExrImage {
     pub parts_left_out: Vec<String>,
     /// Lines at the bottom that could not be read: an odd rest of lines in a block of subsampled channels.
     pub lines_left_out: u32,
-    /// What is to be shown; may be smaller or larger than the data.
+    /// What is to be shown; may be smaller or larger than the data. Of a part that this renderer wrote ([`CROP`]) it is the data: the
+    /// file's own display window is that of the whole picture, most of which is not there.
     pub display_window: Window,
     /// Whether the file's display window has no pixels or too many for memory, and the data window stands for it.
     pub is_display_window_left_out: bool,
@@ -200,6 +201,7 @@ fn image_without_channels(first: &Header) -> ExrImage {
     let is_sound = shown > 0
         && shown <= data.saturating_mul(64).max(1 << 24)
         && (shown as u64).saturating_mul(BYTES_PER_SHOWN_PIXEL) <= MEMORY_LIMIT_BYTES;
+    let is_part = first.own_attributes.other.keys().any(|name| *name == *CROP);
     let origin = (first.own_attributes.layer_position.0, first.own_attributes.layer_position.1);
     let (width, height) = (first.layer_size.0 as u32, first.layer_size.1 as u32);
     let point = |Vec2(x, y): Vec2<f32>| [f64::from(x), f64::from(y)];
@@ -212,8 +214,8 @@ fn image_without_channels(first: &Header) -> ExrImage {
         attributes: attributes(first),
         parts_left_out: Vec::new(),
         lines_left_out: 0,
-        is_display_window_left_out: !is_sound,
-        display_window: if is_sound {
+        is_display_window_left_out: !is_sound && !is_part,
+        display_window: if is_sound && !is_part {
             let origin = (window.position.0, window.position.1);
             Window { origin, width: window.size.0 as u32, height: window.size.1 as u32 }
         } else {

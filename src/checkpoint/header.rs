@@ -3,6 +3,7 @@
 use crate::adaptive::settings::{AllocationRule, Limits, LoopSettings, Sampling};
 use crate::denoise::{Denoiser, DenoiserKind, OidnError};
 use crate::integrator::{Crop, TraceSettings};
+use crate::output::PartOf;
 use crate::scene::Scene;
 use crate::scene::hash::{ContentHash, content_hash};
 use fechner_perception::display::Viewing;
@@ -122,6 +123,17 @@ impl Origin {
         self.tracing.split(", ").any(|setting| setting == "transparent: true")
     }
 
+    /// Where the film lies in the whole picture, if it is a crop of it.
+    pub fn part_of(&self) -> Option<PartOf> {
+        let number = |text: &str, name: &str| {
+            let value = text.split(", ").find_map(|field| field.strip_prefix(name)?.strip_prefix(": "));
+            value.and_then(|value| value.parse().ok())
+        };
+        let (_, crop) = self.tracing.split_once("crop: Some(Crop { ")?;
+        let origin = [number(crop, "x")?, number(crop, "y")?];
+        Some(PartOf { origin, whole: [number(&self.tracing, "width")?, number(&self.tracing, "height")?] })
+    }
+
     /// What keeps a film from standing beside one of `own` origin; `None` if nothing does.
     pub fn difference(&self, own: &Origin) -> Option<String> {
         if self.program != own.program {
@@ -221,5 +233,19 @@ impl SettingsRecord {
     pub fn is_seen_like(&self, other: &Self) -> bool {
         let Self { sampling, allocation, importance, .. } = *self;
         *self == Self { sampling, allocation, importance, ..other.clone() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_film_knows_its_place_in_the_whole() {
+        let crop = Some(Crop { x: 20, y: 11, width: 3, height: 2 });
+        for crop in [None, crop] {
+            let trace = TraceSettings { crop, ..TraceSettings::new(64, 48, 7) };
+            assert_eq!(Origin::of(&Scene::default(), &trace).part_of(), PartOf::of(&trace));
+        }
     }
 }

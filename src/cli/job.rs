@@ -34,7 +34,7 @@ pub(super) struct JobArguments {
     /// Picture size.
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<Size>,
-    /// Trace only this part of the picture, with the samples and the exposure it has in the whole.
+    /// Trace only this part of the picture, with the samples and the exposure it has in the whole. An EXR says where it lies.
     #[arg(long, value_name = "X,Y,W,H", value_parser = parse_crop)]
     crop: Option<Crop>,
     #[command(flatten)]

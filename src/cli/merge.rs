@@ -67,7 +67,8 @@ pub(super) fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
     let rendered = Rendered::new(merged.state, judgement, reason);
     let report = Report::new(&merged.header.origin.scene_name, &merged.header.seeds.all, &settings, &rendered);
     if let Some(format) = format {
-        write_picture(&arguments.output, format, background, &rendered, &settings, &report)?;
+        let part_of = merged.header.origin.part_of();
+        write_picture(&arguments.output, format, background, &rendered, &settings, &report, part_of)?;
     }
     if let Some(path) = &arguments.json {
         write_json(path, &report)?;

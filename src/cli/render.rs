@@ -18,8 +18,8 @@ use fechner::adaptive::state::RenderState;
 use fechner::adaptive::{self, Rendered, StopReason};
 use fechner::checkpoint::{Header, Origin, Seeds};
 use fechner::integrator::{Crop, PathTracer};
-use fechner::output;
 use fechner::output::rendered::Background;
+use fechner::output::{self, PartOf};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -92,7 +92,8 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     watch.finish();
     let report = Report::new(&arguments.job.scene_name(), &seeds, &settings, &rendered);
     let background = arguments.job.background();
-    let write = |path: &Path| write_picture(path, format, background, &rendered, &settings, &report);
+    let part_of = PartOf::of(&trace);
+    let write = |path: &Path| write_picture(path, format, background, &rendered, &settings, &report, part_of);
     let picture = write(&arguments.output).map_err(|error| kept_elsewhere(&arguments.output, write, error));
     let maps = arguments.maps.iter().try_for_each(|map| {
         say!("{}", map.write(&rendered, settings.limits.visibility_or_threshold())?);
@@ -129,7 +130,7 @@ fn kept_elsewhere(path: &Path, write: impl Fn(&Path) -> anyhow::Result<()>, erro
     }
 }
 
-/// Writes the picture in the format that its name asks for.
+/// Writes the picture in the format that its name asks for; a PNG has no place in a whole.
 pub(super) fn write_picture(
     path: &Path,
     format: output::Format,
@@ -137,6 +138,7 @@ pub(super) fn write_picture(
     rendered: &Rendered,
     settings: &LoopSettings,
     report: &Report,
+    part_of: Option<PartOf>,
 ) -> anyhow::Result<()> {
     match format {
         output::Format::Png => {
@@ -144,7 +146,7 @@ pub(super) fn write_picture(
         }
         output::Format::Exr => {
             let attributes = report.attributes();
-            output::rendered::write_layers_exr(path, rendered, settings, background, &attributes)?;
+            output::rendered::write_layers_exr(path, rendered, settings, background, &attributes, part_of)?;
         }
     }
     Ok(())

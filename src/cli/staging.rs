@@ -91,6 +91,22 @@ fn parse_look_at(text: &str) -> Result<LookAt, String> {
     if look.from == look.to { Err("both points are the same".to_owned()) } else { Ok(look) }
 }
 
+impl LookAt {
+    /// The scene's camera, lens and projection and all, moved there, at rest and focused on the point looked at. A field of view that
+    /// is told is that of a central projection, pixels square.
+    fn camera(self, own: &Camera, forward: Vec3) -> Camera {
+        let up = if forward.cross(Vec3::Y).length() < 1e-3 { Vec3::NEG_Z } else { Vec3::Y };
+        let focus_distance = self.from.distance(self.to);
+        let moved = Camera { position: self.from, forward, up, focus_distance, motion: None, ..own.clone() };
+        match self.vertical_fov_deg {
+            None => moved,
+            Some(vertical_fov_deg) => {
+                Camera { projection: Projection::Perspective { vertical_fov_deg }, screen_window: None, ..moved }
+            }
+        }
+    }
+}
+
 impl Staging {
     /// How the scene is read, as it is at a time, for a unit and a picture of a size that the command line may name.
     pub(super) fn load_options(&self, seconds: f64, nits_per_unit: Option<f64>, size: Option<Size>) -> LoadOptions {
@@ -125,17 +141,10 @@ impl Staging {
         }
         if let Some(look) = self.look_at {
             let forward = (look.to - look.from).try_normalize().context("--look-at: the points are too close")?;
-            let own_fov = match scene.camera.projection {
-                Projection::Perspective { vertical_fov_deg } => vertical_fov_deg,
-                Projection::Orthographic { .. } => 40.0,
-            };
-            let up = if forward.cross(Vec3::Y).length() < 1e-3 { Vec3::NEG_Z } else { Vec3::Y };
-            let fov = look.vertical_fov_deg.unwrap_or(own_fov);
             if !look.from.is_finite() {
                 bail!("--look-at: the points must be finite");
             }
-            scene.camera =
-                Camera { focus_distance: look.from.distance(look.to), ..Camera::pinhole(look.from, forward, up, fov) };
+            scene.camera = look.camera(&scene.camera, forward);
             scene.notes.retain(|note| !note.starts_with("No camera in the file"));
         }
         Ok(())
@@ -146,7 +155,8 @@ impl Staging {
 mod tests {
     use super::*;
     use clap::Parser;
-    use fechner::scene::Light;
+    use fechner::scene::{Light, ScreenWindow};
+    use glam::Vec2;
 
     #[derive(Parser)]
     struct Arguments {
@@ -178,5 +188,28 @@ mod tests {
             assert_eq!(scene.lights[0], lamp, "{surroundings}");
             assert_eq!(scene.lights.len(), 1 + suns, "{surroundings}: {:?}", scene.lights);
         }
+    }
+
+    /// Where the scene's camera stands and looks is told anew, not what kind of camera it is.
+    #[test]
+    fn looking_elsewhere_keeps_lens_and_projection() {
+        let window = ScreenWindow { min: Vec2::new(-2.0, -1.0), max: Vec2::new(2.0, 0.5) };
+        let own = Camera {
+            projection: Projection::Orthographic { height: 3.0 },
+            aperture_radius: 0.1,
+            screen_window: Some(window),
+            mirrored: true,
+            ..Camera::pinhole(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 40.0)
+        };
+        let looking = |arguments: &str| {
+            staged(Scene { camera: own.clone(), ..Scene::default() }, &["--look-at", arguments]).camera
+        };
+        let moved = looking("1,2,3,1,2,8");
+        let expected =
+            Camera { position: Vec3::new(1.0, 2.0, 3.0), forward: Vec3::Z, focus_distance: 5.0, ..own.clone() };
+        assert_eq!(moved, expected);
+        let wider = looking("1,2,3,1,2,8,70");
+        let central = Projection::Perspective { vertical_fov_deg: 70.0 };
+        assert_eq!(wider, Camera { projection: central, screen_window: None, ..expected });
     }
 }

@@ -11,14 +11,14 @@ use clap::Args;
 use fechner::adaptive::Rendered;
 use fechner::adaptive::settings::LoopSettings;
 use fechner::checkpoint::SettingsRecord;
-use fechner::output;
+use fechner::output::{self, PartOf};
 use fechner::preview::{self, Audience, Door, Host, Job, Options, Spectator};
 use fechner::scene::Scene;
 use fechner_perception::model;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Arguments of `view`.
 #[derive(Debug, Args)]
@@ -42,13 +42,17 @@ pub(super) struct ViewArguments {
 /// The scene file and the arguments that say how to render it.
 struct FileHost {
     job: JobArguments,
+    /// Where the picture lies in the whole, if it is a crop of it.
+    part_of: Mutex<Option<PartOf>>,
     /// Whether a picture was written.
     has_saved: AtomicBool,
 }
 
 impl Host for FileHost {
     fn load(&self) -> Result<Job, String> {
-        self.job.prepare().map(job_of).map_err(|error| in_a_line(&error))
+        let prepared = self.job.prepare().map_err(|error| in_a_line(&error))?;
+        *self.part_of.lock().unwrap_or_else(PoisonError::into_inner) = PartOf::of(&prepared.trace);
+        Ok(job_of(prepared))
     }
 
     fn later(&self, seconds: f64) -> Result<Scene, String> {
@@ -59,7 +63,8 @@ impl Host for FileHost {
         let write = || {
             let format = output::check_target(path)?;
             let report = Report::new(&self.job.scene_name(), &[self.job.seed()], settings, rendered);
-            write_picture(path, format, self.job.background(), rendered, settings, &report)
+            let part_of = *self.part_of.lock().unwrap_or_else(PoisonError::into_inner);
+            write_picture(path, format, self.job.background(), rendered, settings, &report, part_of)
         };
         write().map_err(|error| in_a_line(&error))?;
         self.has_saved.store(true, Ordering::Relaxed);
@@ -102,7 +107,8 @@ pub(super) fn run(arguments: &ViewArguments) -> anyhow::Result<()> {
         .with_context(|| format!("cannot listen on {asked}: choose another --port, or an address of this machine"))?;
     let (address, token) = door_of(&listener)?;
     let job = pool.install(|| arguments.job.prepare().map(job_of))?;
-    let host = Arc::new(FileHost { job: arguments.job.clone(), has_saved: AtomicBool::new(false) });
+    let host =
+        Arc::new(FileHost { job: arguments.job.clone(), part_of: Mutex::new(None), has_saved: AtomicBool::new(false) });
     if arguments.foveated && job.record.model != model::DEFAULT {
         bail!("--foveated is for --model {}: {} does not know where one looks", model::DEFAULT, job.record.model);
     }

@@ -5,6 +5,7 @@
 //! the range of f32. Neither changes a bit of what a coordinate says: shared vertices stay shared, distances scale exactly, and
 //! small things near the origin stay what they are however far away another one is.
 
+use super::face::Face;
 use super::tree::Bounds;
 use super::wide_tree::{TriangleRef, WideHit, WideTree};
 use glam::{Affine3A, Vec3A};
@@ -53,7 +54,7 @@ impl MeshTree {
     /// Builds over triangles in any coordinates.
     pub(super) fn build(triangles: &[([Vec3A; 3], TriangleRef)]) -> Self {
         let usable =
-            |t: &[Vec3A; 3]| t.iter().all(|p| p.is_finite()) && (t[1] - t[0]).cross(t[2] - t[0]).length_squared() > 0.0;
+            |t: &[Vec3A; 3]| t.iter().all(|p| p.is_finite()) && Face::spanned_by([t[1] - t[0], t[2] - t[0]]).is_some();
         let bounds = Bounds::of_points(triangles.iter().filter(|(t, _)| usable(t)).flat_map(|(t, _)| *t));
         let (center, scale) = if bounds.is_finite() {
             let extent = (bounds.max - bounds.min).max_element();

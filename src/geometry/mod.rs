@@ -5,6 +5,7 @@
 //! firefly that an adaptive sampler would chase for ever.
 
 mod collapse;
+mod face;
 mod mesh_tree;
 pub(crate) mod offset;
 mod simd;
@@ -15,6 +16,7 @@ pub mod triangle;
 mod wide_tree;
 mod world;
 
+pub(crate) use face::Face;
 pub(crate) use simd::{VectorWork, prefetch, with_vectors};
 pub use surface::SurfacePoint;
 pub use world::{Hit, World};

@@ -271,9 +271,11 @@ fn scatter(path: &mut PathState, point: &SurfacePoint, shading: &Shading, wo: Ve
     path.throughput *= scattered.weight;
     if let Some(index) = scattered.crossed_index {
         path.radiance_gain_on_exit *= index * index;
-        if let Some((medium, enters)) = shading.crossed_medium(wo, wi) {
-            path.media.cross(medium, enters);
-        }
+    }
+    // Whatever the lobe: what a mix lets through diffusely comes into the volume behind it like what it refracts, and a light
+    // sample cannot tell the two apart.
+    if let Some((medium, enters)) = shading.crossed_medium(wo, wi) {
+        path.media.cross(medium, enters);
     }
     path.scatter_pdf = (!scattered.lobe.is_delta()).then_some(scattered.pdf);
     path.from = shading.receiver(point, wo);

@@ -151,12 +151,12 @@ impl Reader<'_> {
             (Surface::ThinDielectric { ior, transmittance }, _) => {
                 Bsdf::thin_dielectric(*ior, self.color(transmittance))
             }
-            (Surface::CoatedDiffuse { reflectance, roughness, saturates, .. }, SurfaceTables::Coat(tables)) => {
+            (Surface::CoatedDiffuse { reflectance, roughness, saturates, .. }, tables) => {
                 let facets = self.facets(roughness);
-                Bsdf::CoatedDiffuse(CoatedDiffuse::new(self.base(reflectance), facets, *saturates, tables))
+                Bsdf::CoatedDiffuse(CoatedDiffuse::new(self.base(reflectance), facets, *saturates, tables.coat()))
             }
-            (Surface::CoatedConductor { eta, k, roughness, coat_roughness, .. }, SurfaceTables::Layers(tables)) => {
-                Bsdf::coated_conductor(*eta, *k, self.facets(roughness), self.facets(coat_roughness), tables)
+            (Surface::CoatedConductor { eta, k, roughness, coat_roughness, .. }, tables) => {
+                Bsdf::coated_conductor(*eta, *k, self.facets(roughness), self.facets(coat_roughness), tables.layers())
             }
             (Surface::Phong { diffuse, specular, exponent }, _) => {
                 let [diffuse, specular] = self.shares(diffuse, specular);
@@ -170,14 +170,11 @@ impl Reader<'_> {
                 Bsdf::HeTorrance(HeTorrance::new(*eta, *k, *height_nm, *correlation_nm, self.color(diffuse)))
             }
             (Surface::MetalRoughness(model), tables) => self.metal_roughness(model, tables, components),
-            (Surface::Mix { first, second, amount }, SurfaceTables::Mix(tables)) => {
+            (Surface::Mix { first, second, amount }, tables) => {
+                let tables = tables.of_components();
                 let first = components.keep(self.bsdf(first, &tables[0], components));
                 let second = components.keep(self.bsdf(second, &tables[1], components));
                 Bsdf::mix(first, second, self.scalar(amount))
-            }
-            // Tables are made for every surface that needs them: nothing else remains.
-            (Surface::CoatedDiffuse { .. } | Surface::CoatedConductor { .. } | Surface::Mix { .. }, _) => {
-                Bsdf::lambert(Vec3::ZERO)
             }
         }
     }

@@ -21,6 +21,25 @@ pub(super) enum SurfaceTables {
     Mix(Box<[SurfaceTables; 2]>),
 }
 
+/// Tables without which a surface cannot be evaluated. A surface and tables that [`of_materials`] did not make for it are a mistake
+/// in this crate, which no scene file can bring about: that ends the program rather than paint the surface black.
+impl SurfaceTables {
+    pub(super) fn coat(&self) -> &CoatTables {
+        let Self::Coat(tables) = self else { unreachable!("a coated diffuse surface has tables of its coat") };
+        tables
+    }
+
+    pub(super) fn layers(&self) -> &LayerTables {
+        let Self::Layers(tables) = self else { unreachable!("a coated metal has tables of its layers") };
+        tables
+    }
+
+    pub(super) fn of_components(&self) -> &[Self; 2] {
+        let Self::Mix(tables) = self else { unreachable!("a mix has tables of both components") };
+        tables
+    }
+}
+
 /// Makes tables; equal ones only once.
 #[derive(Default)]
 struct Maker {

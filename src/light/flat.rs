@@ -5,7 +5,7 @@ use super::bilinear::{BilinearDensity, parallelogram_corners};
 use super::lanes::FourVectors;
 use super::solid_angle::{LEAST, SphericalRectangle, SphericalTriangle};
 use super::{LightPlace, LightReceiver, LightSample};
-use crate::geometry::offset;
+use crate::geometry::{Face, offset};
 use crate::scene::{Alpha, Material, Scene};
 use glam::{DVec3, Vec2, Vec3, Vec3A};
 
@@ -78,8 +78,8 @@ impl FlatEmitter {
         material: &Material,
     ) -> Self {
         let (edge_1, edge_2) = (corners[1] - corners[0], corners[2] - corners[0]);
-        let scaled_normal = edge_1.cross(edge_2);
-        let area = 0.5 * scaled_normal.length();
+        let Face { normal, area } =
+            Face::spanned_by([edge_1.into(), edge_2.into()]).unwrap_or(Face { normal: Vec3::Y, area: 0.0 });
         let from_center = [2.0 * edge_1 - edge_2, 2.0 * edge_2 - edge_1, edge_1 + edge_2];
         let radius = from_center.map(Vec3::length).into_iter().fold(0.0, f32::max) / 3.0;
         Self {
@@ -92,7 +92,7 @@ impl FlatEmitter {
             center: corners[0] + (edge_1 + edge_2) / 3.0,
             speck_beyond_squared: squared_distance_at(LEAST as f32, area, radius),
             bilinear_beyond_squared: squared_distance_at(MOST_BILINEAR, area, radius),
-            normal: scaled_normal.normalize_or(Vec3::Y) * if mirrored { -1.0 } else { 1.0 },
+            normal: normal * if mirrored { -1.0 } else { 1.0 },
             area,
             offset: offset::of_triangle(corners[0].into(), [edge_1.into(), edge_2.into()], translation),
             both_sides: material.emits_both_sides,

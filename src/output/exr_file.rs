@@ -3,7 +3,8 @@
 use super::beside::write_beside;
 use super::exr_header::sort_attributes;
 use super::{
-    Attribute, ChannelValues, NITS_PER_UNIT, OutputError, PIXEL_ASPECT_RATIO, Picture, REPLACED_VALUES, check_size,
+    Attribute, CROP, ChannelValues, NITS_PER_UNIT, OutputError, PIXEL_ASPECT_RATIO, PartOf, Picture, REPLACED_VALUES,
+    check_size,
 };
 use ::exr::meta::attribute::{AttributeValue, Chromaticities};
 use ::exr::prelude::{
@@ -17,7 +18,7 @@ use std::path::Path;
 const F16_MAX: f32 = 65504.0;
 
 /// Writes a picture as an EXR file: ZIP-compressed scan lines, Rec.709 primaries, and `whiteLuminance` from the attribute
-/// [`NITS_PER_UNIT`] if there is one.
+/// [`NITS_PER_UNIT`] if there is one. A part of a picture has its place as data window and the whole as display window.
 ///
 /// Values that a file should not hold are replaced rather than refused, since a picture may be hours of work: NaN by 0,
 /// infinities and halves out of range by the largest finite value. The attribute [`REPLACED_VALUES`] then counts them.
@@ -50,9 +51,16 @@ pub fn write_exr(path: &Path, picture: &Picture<'_>) -> Result<(), OutputError> 
         let count = i32::try_from(replaced).unwrap_or(i32::MAX);
         layer_attributes.other.insert(text(REPLACED_VALUES), AttributeValue::I32(count));
     }
+    let mut shown = IntegerBounds::from_dimensions(size);
+    if let Some(PartOf { origin: [x, y], whole }) = picture.part_of {
+        let place = format!("{x},{y},{},{}", picture.width, picture.height);
+        layer_attributes.other.insert(text(CROP), AttributeValue::Text(text(&place)));
+        layer_attributes.layer_position = Vec2(x as i32, y as i32);
+        shown = IntegerBounds::from_dimensions(Vec2(whole[0] as usize, whole[1] as usize));
+    }
     let encoding =
         Encoding { compression: Compression::ZIP16, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
-    let mut image_attributes = ImageAttributes::new(IntegerBounds::from_dimensions(size));
+    let mut image_attributes = ImageAttributes::new(shown);
     image_attributes.pixel_aspect = pixel_aspect;
     image_attributes.chromaticities = Some(Chromaticities {
         red: Vec2(0.64, 0.33),
@@ -249,5 +257,25 @@ mod tests {
         assert!(message(&|p| p.push_f32("ü", vec![1.0])).contains("cannot be a channel's name"));
         assert!(message(&|p| p.width = 0).contains("no pixels"));
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    /// Compositors put a part where it belongs; here it is read as what it is, a picture of its own.
+    #[test]
+    fn a_part_has_its_place_in_the_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let part_of = Some(PartOf { origin: [20, 11], whole: [64, 48] });
+        write_exr(&path, &Picture { part_of, ..sample_picture(&RED) }).unwrap();
+        let header = &::exr::meta::MetaData::read_from_file(&path, true).unwrap().headers[0];
+        let shown = header.shared_attributes.display_window;
+        assert_eq!((shown.position, shown.size), (Vec2(0, 0), Vec2(64, 48)));
+        assert_eq!((header.own_attributes.layer_position, header.layer_size), (Vec2(20, 11), Vec2(3, 2)));
+        let image = read_exr(&path).unwrap();
+        assert_eq!(image.data_window_origin, (20, 11));
+        assert_eq!(image.channel("R").unwrap(), RED);
+        let picture = image.scene_picture(|image, name| image.channel(name)).unwrap();
+        assert_eq!((picture.width, picture.height, picture.notes), (3, 2, Vec::new()));
+        assert_eq!(picture.rgb[4][0], RED[4]);
+        assert_eq!(image.in_display_window(RED.to_vec()), RED);
     }
 }

@@ -21,6 +21,7 @@ pub use png_file::{
     write_png_with_alpha_for, write_pq_png,
 };
 
+use crate::integrator::{Crop, TraceSettings};
 use fechner_perception::tone::FittedTone;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -32,6 +33,9 @@ pub const REPLACED_VALUES: &str = "replaced_values";
 
 /// Width of a pixel over its height: [`write_exr`] puts this attribute where the format has it.
 pub const PIXEL_ASPECT_RATIO: &str = "pixelAspectRatio";
+/// Written by [`write_exr`] where the picture is a part of a larger one: left, top, width and height in pixels. Readers here show
+/// such a part alone, not the display window around it.
+pub const CROP: &str = "fechner.crop";
 /// The fit of the tone operator, see [`tone_attribute`].
 pub const TONE: &str = "fechner.tone";
 
@@ -52,8 +56,27 @@ pub struct Picture<'a> {
     pub height: u32,
     /// Channels, in any order; the file holds them sorted by name, as the format asks.
     pub channels: Vec<Channel<'a>>,
+    /// Where it lies, if it is a part of a larger picture.
+    pub part_of: Option<PartOf>,
     /// What a reader should know: observer, seed, [`NITS_PER_UNIT`].
     pub attributes: Vec<(String, Attribute)>,
+}
+
+/// The place of a picture in a larger one, in whose window compositors put it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PartOf {
+    /// Its top left pixel in the whole, x to the right and y down.
+    pub origin: [u32; 2],
+    /// Width and height of the whole in pixels.
+    pub whole: [u32; 2],
+}
+
+impl PartOf {
+    /// Of a render; `None` where all of the picture is traced.
+    pub fn of(trace: &TraceSettings) -> Option<Self> {
+        let part = |crop: Crop| Self { origin: [crop.x, crop.y], whole: [trace.width, trace.height] };
+        trace.crop.map(part)
+    }
 }
 
 /// Values of one channel.

@@ -1,6 +1,8 @@
 //! The files a render leaves: what the display shows, or every layer of it.
 
-use super::{Attribute, NITS_PER_UNIT, OutputError, Picture, write_exr, write_png_for, write_png_with_alpha_for};
+use super::{
+    Attribute, NITS_PER_UNIT, OutputError, PartOf, Picture, write_exr, write_png_for, write_png_with_alpha_for,
+};
 use crate::adaptive::Rendered;
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::statistics::picture_variance;
@@ -50,15 +52,16 @@ pub fn write_display_png(
 /// normal, depth, object id, sample count, variance of the picture's luminance (scene cd/m², squared), threshold (standard
 /// error in display cd/m² that is at visibility 1) and predicted visibility. A picture that is denoised has the raw mean in
 /// `raw` beside it, the visible parts of its noise and of its bias, and 1 in `unproven` where no witness shows that bias
-/// stays below one and a half times `target`.
+/// stays below one and a half times `target`. A crop is a part of the whole picture.
 pub fn write_layers_exr(
     path: &Path,
     rendered: &Rendered,
     settings: &LoopSettings,
     background: Background,
     attributes: &[(String, Attribute)],
+    part_of: Option<PartOf>,
 ) -> Result<(), OutputError> {
-    write_exr(path, &layers(rendered, settings, background, attributes))
+    write_exr(path, &Picture { part_of, ..layers(rendered, settings, background, attributes) })
 }
 
 /// What [`write_layers_exr`] writes, to which more can be added.

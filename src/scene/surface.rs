@@ -202,7 +202,7 @@ pub struct MetalRoughness {
     pub metallic: ScalarInput,
     /// Perceptual roughness in [0, 1].
     pub roughness: ScalarInput,
-    /// Index of refraction of the dielectric part; 1.5 unless told.
+    /// Index of refraction of the dielectric part: 1.5 unless told, as [`MetalRoughness::problem_with_ior`] takes it.
     pub ior: f32,
     /// Share of the dielectric part's light that goes through, not into diffuse reflection: straight through a thin sheet, or
     /// refracted into a volume if there is one.
@@ -247,6 +247,16 @@ impl Default for MetalRoughness {
 }
 
 impl MetalRoughness {
+    /// Why it has no such index of refraction, with or without a volume behind it: the one rule of all loaders.
+    pub fn problem_with_ior(ior: f32, has_volume: bool) -> Option<&'static str> {
+        match has_volume {
+            _ if (1.0..f32::INFINITY).contains(&ior) => None,
+            false if ior == 0.0 => None,
+            false => Some("an index of refraction is at least 1, or 0 for a surface that reflects everything"),
+            true => Some("an index of refraction is at least 1 where light enters a volume"),
+        }
+    }
+
     /// Whether a coat or fibres lie over the rest.
     pub fn is_varnished(&self) -> bool {
         self.clearcoat.factor > 0.0 || self.sheen_color.factor != Vec3::ZERO

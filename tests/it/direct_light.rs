@@ -7,8 +7,8 @@ use fechner::geometry::Ray;
 use fechner::integrator::{PathTracer, TraceSettings};
 use fechner::scene::load::shapes;
 use fechner::scene::{
-    Environment, Instance, Light, MeshId, Parametrisation, Scene, SpotFalloff, Texels, Texture, TextureId,
-    TextureLookup, Wrap,
+    Alpha, ColorInput, Environment, Instance, Light, MeshId, Parametrisation, Roughness, ScalarInput, Scene,
+    SpotFalloff, Surface, Texels, Texture, TextureId, TextureLookup, Wrap,
 };
 use glam::{Mat3, Mat3A, Vec2, Vec3, vec3a};
 use std::f32::consts::{FRAC_1_PI, PI};
@@ -269,4 +269,43 @@ fn a_sphere_shines_where_its_picture_says() {
     assert_eq!(above(false, true), 0.0);
     let (pictured, plain) = (above(true, true), above(true, false));
     assert!((pictured / plain - 1.0).abs() < 1e-3, "{pictured} and {plain}");
+}
+
+/// A lamp in an absorbing volume, whose boundary lets light through by refraction and diffusely: what light samples alone find (no ray
+/// meets the lamp) is what they and scattering find together (Z test, significance 1e-3).
+#[test]
+fn light_samples_and_scattering_cross_a_mixed_boundary_alike() {
+    let absorption = Vec3::new(0.5, 2.0, 6.0);
+    let rough = Surface::Dielectric {
+        ior: 1.2,
+        roughness: Roughness::constant(0.6),
+        transmittance: ColorInput::constant(Vec3::ONE),
+        absorption,
+    };
+    let sheet = Surface::DiffuseTransmission {
+        reflectance: ColorInput::constant(Vec3::splat(0.2)),
+        transmittance: ColorInput::constant(Vec3::splat(0.7)),
+    };
+    let boundary = Surface::Mix { first: Box::new(rough), second: Box::new(sheet), amount: ScalarInput::constant(0.5) };
+    let found = |alpha: Alpha| {
+        let mut scene = empty_scene();
+        let boundary = add_material(&mut scene, boundary.clone(), Vec3::ZERO);
+        let lamp = add_material(&mut scene, diffuse(0.0), Vec3::splat(5.0));
+        scene.materials[lamp.0 as usize].alpha = alpha;
+        add_rectangle(&mut scene, Vec3::new(-50.0, 0.0, -50.0), Vec3::Z * 100.0, Vec3::X * 100.0, boundary);
+        add_rectangle(&mut scene, Vec3::new(-1.0, -0.5, -1.0), Vec3::Z * 2.0, Vec3::X * 2.0, lamp);
+        let settings = TraceSettings { max_depth: 1, ..trace_settings(16, 16, 0) };
+        let tracer = PathTracer::new(Arc::new(scene), settings);
+        radiance_along(&tracer, Ray::new(vec3a(-0.1, 0.2, 0.0), vec3a(0.1, -0.2, 0.0).normalize()), 16, 16384)
+    };
+    let ((by_lights, lights_error), (together, error)) = (found(Alpha::Unseen), found(Alpha::Opaque));
+    for channel in 0..3 {
+        let (a, b) = (by_lights[channel], together[channel]);
+        let deviation = lights_error[channel].hypot(error[channel]);
+        assert!(
+            (a - b).abs() < 3.5 * deviation + 1e-4 * a,
+            "channel {channel}: {a} by lights, {b} together ± {deviation}"
+        );
+        assert!(deviation < 0.005 * a, "too noisy to test: {deviation} of {a}");
+    }
 }

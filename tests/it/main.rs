@@ -11,6 +11,7 @@
 //! - `formats`: the same scene from several formats
 //! - `mitsuba_format`, `pbrt_format`: what their files mean where readers go wrong easily
 //! - `bad_input`: bad scene files, and our own ones
+//! - `own_format`: lamps of a luminous power, keys that change nothing, files beside the scene
 //! - `importance`: samples go where a user's map sends them
 //! - `load_assets`: scenes that others made, sound and damaged
 //! - `mutations`: thousands of damaged files a format, in a child process (ignored)
@@ -58,6 +59,7 @@ mod mitsuba_format;
 mod mutations;
 mod no_allocation;
 mod overscan;
+mod own_format;
 mod pbrt_format;
 mod references;
 mod relief;

@@ -29,3 +29,34 @@ fn motion_fits_its_own_picture() {
         assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     }
 }
+
+/// A crop says where it lies, to compositors; every command here takes it for a picture of its own, also out of a film.
+#[test]
+fn a_crop_lies_where_it_belongs() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml").display().to_string();
+    let run = |arguments: &[&str]| {
+        let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+        let output = command.args(arguments).current_dir(folder.path()).output().expect("runs");
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    let render =
+        ["render", &scene, "--size", "48x40", "--crop", "20,11,24,16", "--spp", "16", "--checkpoint", "a.film"];
+    run(&[&render[..], &["-o", "part.exr"]].concat());
+    run(&[&render[..], &["--resume", "-o", "resumed.exr"]].concat());
+    run(&["merge", "a.film", "-o", "merged.exr"]);
+    for name in ["part.exr", "resumed.exr", "merged.exr"] {
+        let meta = exr::meta::MetaData::read_from_file(folder.path().join(name), true).expect("an EXR file");
+        let header = &meta.headers[0];
+        let shown = header.shared_attributes.display_window;
+        assert_eq!((shown.position, shown.size), (Vec2(0, 0), Vec2(48, 40)), "{name}");
+        assert_eq!((header.own_attributes.layer_position, header.layer_size), (Vec2(20, 11), Vec2(24, 16)), "{name}");
+        run(&["compare", "part.exr", name]);
+    }
+    assert!(run(&["info", "part.exr"]).contains("24×16 pixels from (20, 11)"));
+    run(&["threshold", "part.exr", "-o", "threshold.exr"]);
+    run(&["tonemap", "part.exr", "--operator", "constant", "-o", "part.png"]);
+    let png = image::open(folder.path().join("part.png")).expect("a picture");
+    assert_eq!((png.width(), png.height()), (24, 16));
+}

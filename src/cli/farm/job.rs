@@ -212,7 +212,8 @@ impl Job<'_> {
                 let report = Report::new(&arguments.scene_name(), &frame.header.seeds.all, settings, &rendered);
                 let path = self.picture(farm, number);
                 let format = output::check_target(&path)?;
-                write_picture(&path, format, arguments.background(), &rendered, settings, &report)?;
+                let part_of = frame.header.origin.part_of();
+                write_picture(&path, format, arguments.background(), &rendered, settings, &report, part_of)?;
                 say!("{}: {}", path.display(), report.in_a_line());
                 Ok(report)
             }

@@ -1,6 +1,7 @@
 //! What is at a hit: from a place on a triangle or sphere at a time to a [`SurfacePoint`].
 
 use super::{Hit, World};
+use crate::geometry::face::{Face, scaled_to_one};
 use crate::geometry::mesh_tree::TriangleShape;
 use crate::geometry::offset;
 use crate::geometry::simd::prefetch;
@@ -32,7 +33,7 @@ impl Placement {
 
     /// The same of an instance that is elsewhere.
     fn moved_to(self, to_world: &Affine3A) -> Self {
-        let m = to_world.matrix3;
+        let m = scaled_to_one(to_world.matrix3);
         let flip = if m.determinant() < 0.0 { -1.0 } else { 1.0 };
         let cofactors = Mat3A::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis));
         Self { normal_matrix: cofactors * flip, flip, ..self }
@@ -175,7 +176,8 @@ impl World {
         let offset = offset::of_triangle(corner, [edge_1, edge_2], translation);
         let (b0, b1, b2) = (1.0 - hit.b1 - hit.b2, hit.b1, hit.b2);
         let position = Vec3::from(corner + edge_1 * b1 + edge_2 * b2);
-        let geometric_normal = Vec3::from(placement.flip * edge_1.cross(edge_2)).normalize_or(Vec3::Y);
+        let face = Face::spanned_by([edge_1, edge_2]);
+        let geometric_normal = face.map_or(Vec3::Y, |face| placement.flip * face.normal);
         let indices = || mesh.triangles[hit.triangle as usize].map(|i| i as usize);
         let shading_normal = if mesh.normals.is_empty() {
             geometric_normal

@@ -225,3 +225,31 @@ fn mirrored_spheres_have_the_bitangents_of_their_format() {
     };
     assert_eq!((handedness(false), handedness(true)), (-1.0, 1.0));
 }
+
+/// However large or small a triangle is, its normals are its own: of the plane, and those of its corners.
+#[test]
+fn triangles_of_any_size_have_their_normals() {
+    let slanted = Vec3::ONE.normalize();
+    for size in [1e-12, 1e-6, 1.0, 1e6, 1e12] {
+        let to_world = Affine3A::from_scale(Vec3::splat(size));
+        // Two of them, so that a mesh is placed by its instances.
+        let mut placed = scene(&[to_world, to_world * Affine3A::from_translation(4.0 * Vec3::X)]);
+        placed.spheres.clear();
+        let mut smooth = placed.clone();
+        smooth.meshes[0].normals = vec![Vec3::new(0.6, 0.8, 0.0); 4];
+        let expected_of_corners = Vec3::new(0.6, 0.8, 0.0);
+        for (scene, expected) in [
+            (flattened(&placed), slanted),
+            (placed, slanted),
+            (flattened(&smooth), expected_of_corners),
+            (smooth, expected_of_corners),
+        ] {
+            let world = World::new(Arc::new(scene));
+            let ray = Ray::new(Vec3A::splat(size), Vec3A::NEG_ONE.normalize());
+            let hit = world.closest(&ray).unwrap_or_else(|| panic!("the slanted face, {size:e}"));
+            let point = world.surface(&ray, &hit);
+            assert!(point.geometric_normal.abs_diff_eq(slanted, 1e-6), "{size:e}: {}", point.geometric_normal);
+            assert!(point.shading_normal.abs_diff_eq(expected, 1e-6), "{size:e}: {}", point.shading_normal);
+        }
+    }
+}

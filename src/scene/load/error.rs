@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// Why a scene could not be loaded. Its text is one line: file, line where there is one, what is wrong, what would be
 /// right.
-#[derive(Debug, thiserror::Error)]
+#[derive(Clone, Debug, thiserror::Error)]
 pub enum LoadError {
     /// The operating system did not give us the file.
     #[error("{}: {problem}", file.display())]

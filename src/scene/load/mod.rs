@@ -41,7 +41,6 @@ pub mod shapes;
 pub mod sky;
 mod spectrum;
 mod tangents;
-#[path = "texture.rs"]
 mod texture;
 mod texture_memory;
 mod toml;

@@ -4,6 +4,12 @@
 //! for turbidities outside [2, 10], for which the model was not fitted. Sun: the solar disc through the air masses and
 //! optical depths of the same paper's appendix (Rayleigh and aerosol; ozone, gases and water vapour are left out: below
 //! 5 % of illuminance at an air mass of 1).
+//!
+//! Limits of the sky. It is too bright, above all while the sun is low: on level ground at turbidity 3 it gives, at sun elevations
+//! of 0°, 3°, 10° and 60°, 11, 2.5, 2.0 and 2.1 times the illuminance that handbooks give for a clear sky (IES RP-21: 0.8 + 15.5 √sin h
+//! klx; `cargo test --lib brighter_than_handbooks -- --nocapture`), so that there is no dusk. Near the horizon it depends on turbidity
+//! more than real skies do: at 2 the horizon opposite a sun at 10° is about three times as bright as at 3. Below a sixteenth of a degree of elevation
+//! it is that of this elevation.
 
 use crate::scene::{Environment, Light};
 use glam::{Mat3, Vec3};
@@ -243,6 +249,24 @@ mod tests {
         assert!(blue.z > 1.5 * blue.x, "the zenith is blue: {blue}");
         let low = strength(&sky_of(3.0, 2.5));
         assert!(luminance(low) < 0.2 * luminance(strength(&high)) && low.x > 3.0 * low.z, "{low}");
+    }
+
+    /// The limits that the module's text tells of.
+    #[test]
+    fn a_low_suns_sky_is_brighter_than_handbooks_say() {
+        for (elevation, expected) in [(0.0f32, 11.0f32), (3.0, 2.45), (10.0, 1.96), (60.0, 2.07)] {
+            let of_handbook = 800.0 + 15_500.0 * f32::sqrt(elevation.to_radians().sin());
+            let ratio = luminance(sky_of(elevation, 3.0).environment.irradiance(Vec3::Y)) / of_handbook;
+            println!("sun at {elevation}°: {ratio:.2} times {of_handbook:.0} lx");
+            assert!((ratio / expected - 1.0).abs() < 0.05, "{elevation}°: {ratio}");
+        }
+        let opposite = |turbidity| {
+            let (azimuth, elevation) = (Sky::default().sun_azimuth_deg.to_radians(), 1.0f32.to_radians());
+            let direction =
+                Vec3::new(-azimuth.sin() * elevation.cos(), elevation.sin(), azimuth.cos() * elevation.cos());
+            luminance(sky_of(10.0, turbidity).environment.radiance(direction))
+        };
+        assert!((opposite(2.0) / opposite(3.0) / 2.87 - 1.0).abs() < 0.05, "{}", opposite(2.0) / opposite(3.0));
     }
 
     #[test]

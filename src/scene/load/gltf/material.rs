@@ -73,7 +73,7 @@ impl<'a> Materials<'a> {
                     factor: share(pbr.roughness_factor()),
                     texture: rough_lookup.map(|lookup| (lookup, 1)),
                 },
-                ior: index_of_refraction(from),
+                ior: index_of_refraction(builder, from, &name),
                 transmission,
                 volume: from.volume().filter(|volume| volume.thickness_factor() > 0.0).map(|volume| {
                     let distance = volume.attenuation_distance();
@@ -306,11 +306,18 @@ impl<'a> Materials<'a> {
     }
 }
 
-/// At least 1, 1.5 unless told; 0, with which a coat reflects everything, where there is no volume for light to enter.
-fn index_of_refraction(from: &gltf::Material) -> f32 {
-    let is_volume = from.volume().is_some_and(|volume| volume.thickness_factor() > 0.0);
-    let usable = |ior: &f32| ior.is_finite() && (*ior >= 1.0 || *ior == 0.0 && !is_volume);
-    from.ior().filter(usable).unwrap_or(1.5)
+/// What is told where it can be used, else 1.5.
+fn index_of_refraction(builder: &mut Builder, from: &gltf::Material, name: &str) -> f32 {
+    const USUAL: f32 = 1.5;
+    let has_volume = from.volume().is_some_and(|volume| volume.thickness_factor() > 0.0);
+    let Some(ior) = from.ior() else { return USUAL };
+    match MetalRoughness::problem_with_ior(ior, has_volume) {
+        None => ior,
+        Some(problem) => {
+            builder.note(format!("\"{name}\": ior {ior} is taken as {USUAL}: {problem}."));
+            USUAL
+        }
+    }
 }
 
 /// Whether a volume's boundary, which is a plain dielectric, leaves out what the material asks for.

@@ -183,16 +183,23 @@ impl Reader {
         base_color.factor = base_color.factor.min(Vec3::ONE);
         let specular = bsdf.float("specular")?.unwrap_or(0.5).clamp(0.0, 0.99);
         let transmission = input(self.scalar_input(bsdf, "spectrans")?, 0.0);
+        let volume = (!is_thin && transmission.factor > 0.0).then_some(Vec3::ZERO);
+        let eta = bsdf.float("eta")?;
+        if let Some((eta, problem)) =
+            eta.and_then(|e| Some((e, MetalRoughness::problem_with_ior(e, volume.is_some())?)))
+        {
+            return Err(bsdf.error(format_args!("eta {eta}: {problem}")));
+        }
         let metal = MetalRoughness {
             base_color,
             metallic: input(self.scalar_input(bsdf, "metallic")?, 0.0),
             roughness: input(self.scalar_input(bsdf, "roughness")?, 0.5),
             // specular 0.5 reflects 4 %: 0.08 · specular.
-            ior: bsdf.float("eta")?.unwrap_or_else(|| {
+            ior: eta.unwrap_or_else(|| {
                 let root = (0.08 * specular).sqrt();
                 (1.0 + root) / (1.0 - root)
             }),
-            volume: (!is_thin && transmission.factor > 0.0).then_some(Vec3::ZERO),
+            volume,
             transmission,
             ..MetalRoughness::default()
         };

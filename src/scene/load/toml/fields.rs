@@ -66,6 +66,11 @@ impl<'a> Value<'a> {
         LoadError::invalid_at(self.place(), format_args!("{}: {problem}", self.path))
     }
 
+    /// A note that this value, which is sound, changes nothing.
+    pub(super) fn without_effect(&self, why: impl std::fmt::Display) -> String {
+        format!("{}: {} has no effect: {why}.", self.place(), self.path)
+    }
+
     fn wrong_type(&self, expected: &str) -> LoadError {
         self.error(format_args!("expected {expected}, found {}", describe(self.value)))
     }

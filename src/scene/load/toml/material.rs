@@ -7,7 +7,7 @@ use crate::scene::load::LoadError;
 use crate::scene::load::error::suggestion;
 use crate::scene::{
     Alpha, ColorInput, Encoding, HeightMap, HeightUnit, Material, MaterialId, Relief, ScalarInput, StretchDirection,
-    TextureLookup,
+    Surface, TextureLookup,
 };
 use glam::{Vec2, Vec3};
 use std::collections::HashMap;
@@ -98,10 +98,32 @@ impl<'a> Materials<'a> {
             })?,
             alpha: alpha(context, &fields)?,
         };
+        note_without_effect(context, &fields, &material, power);
         let id = context.builder.add_material(material);
         self.by_name.insert(name, Entry { id, power });
         self.names.push(name);
         Ok(())
+    }
+}
+
+/// Says which keys are there for nothing. What is told to be 0 may be more at other times.
+fn note_without_effect(context: &mut Context, fields: &Fields, material: &Material, power: Option<Power>) {
+    let emits = power.is_some() || ["emission", "emission_cd_m2"].iter().any(|key| fields.get(key).is_some());
+    let is_stretched = material.surface.is_anisotropic() || fields.get("anisotropy").is_some();
+    let lets_in = match &material.surface {
+        Surface::MetalRoughness(model) => model.volume.is_none() || fields.get("transmission").is_some(),
+        _ => true,
+    };
+    let idle = [
+        ("emits_both_sides", !emits && material.emits_both_sides, "the material has no emission"),
+        ("stretch_rotation_deg", !is_stretched, "the surface has no roughness_v or anisotropy that stretches it"),
+        ("absorption", !lets_in, "the material has no transmission"),
+        ("attenuation_color", !lets_in, "the material has no transmission"),
+    ];
+    for (key, is_idle, why) in idle {
+        if is_idle && let Some(value) = fields.get(key) {
+            context.builder.note(value.without_effect(why));
+        }
     }
 }
 
@@ -217,10 +239,11 @@ fn relief<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Option<R
 fn lookup<'a>(context: &mut Context<'a>, fields: &Fields<'a>, usual: Encoding) -> Result<TextureLookup, LoadError> {
     let name = fields.require("texture")?;
     let written = name.string()?;
-    let Some(entry) = context.textures.get(written) else {
+    let Some(entry) = context.textures.get_mut(written) else {
         let known = context.texture_names.iter().copied();
         return Err(name.error(format_args!("unknown texture \"{written}\"{}", suggestion(written, known))));
     };
+    entry.is_used = true;
     let mut request = entry.request.clone();
     request.encoding = entry.encoding.unwrap_or(usual);
     let number_or_two = |value: &Value| {

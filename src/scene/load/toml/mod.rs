@@ -34,12 +34,17 @@ struct Context<'a> {
     texture_names: Vec<&'a str>,
     shutter: Shutter,
     builder: Builder,
+    /// Whether a lamp gives no light now because it is flat, and will give some at other times.
+    has_flat_lamp: bool,
 }
 
 /// A texture of the file; whether it is decoded as colour may depend on who uses it.
 struct TextureEntry {
     request: Request,
     encoding: Option<Encoding>,
+    /// Where the file has it, for a note should nobody use it.
+    note_if_idle: String,
+    is_used: bool,
 }
 
 /// Reads a scene file.
@@ -53,7 +58,6 @@ fn read(path: &Path, options: &LoadOptions) -> Result<(Builder, IfDark), LoadErr
     let text = files::read_text(path)?;
     let source = Source { file: path, text: &text };
     let snapshots = animated::snapshots(&source, options.frame_time)?;
-    let if_dark = if snapshots.iter().any(Snapshot::changes_light) { IfDark::Stay } else { IfDark::Fail };
     let document = animated::parse(&source, &snapshots)?;
     let root = Fields::root(
         &source,
@@ -72,6 +76,7 @@ fn read(path: &Path, options: &LoadOptions) -> Result<(Builder, IfDark), LoadErr
         ],
     )?;
 
+    let folder = path.parent().unwrap_or(Path::new(""));
     let mut builder = Builder::new(path, options);
     if let Some(name) = root.get_some("name", |value| value.string())? {
         builder.name = name.to_owned();
@@ -82,7 +87,7 @@ fn read(path: &Path, options: &LoadOptions) -> Result<(Builder, IfDark), LoadErr
         builder.film = read_film(&film)?;
     }
     if let Some(view) = root.get("view") {
-        builder.viewing = read_view(&view)?;
+        builder.viewing = read_view(&view, folder)?;
     }
     let mut shutter = Shutter { opens: options.frame_time, stays_open: 0.0 };
     if let Some(camera) = root.get("camera") {
@@ -91,8 +96,8 @@ fn read(path: &Path, options: &LoadOptions) -> Result<(Builder, IfDark), LoadErr
         builder.cameras.push(NamedCamera { name: "camera".to_owned(), camera, aspect: None });
     }
 
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let mut context = Context { folder, textures: HashMap::new(), texture_names: Vec::new(), shutter, builder };
+    let mut context =
+        Context { folder, textures: HashMap::new(), texture_names: Vec::new(), shutter, builder, has_flat_lamp: false };
     if let Some(surroundings) = root.get("environment") {
         let surroundings = surroundings::read(&surroundings, folder, context.builder.nits_per_unit)?;
         context.builder.environment = Some(surroundings.environment);
@@ -121,10 +126,16 @@ fn read(path: &Path, options: &LoadOptions) -> Result<(Builder, IfDark), LoadErr
             context.builder.lights.push(light::read(&value, context.builder.nits_per_unit)?);
         }
     }
+    for name in &context.texture_names {
+        if let Some(entry) = context.textures.get(name).filter(|entry| !entry.is_used) {
+            context.builder.note(entry.note_if_idle.as_str());
+        }
+    }
     if objects.any_moves() {
         context.builder.at_another_time = Some(|path, options| Ok(read(path, options)?.0));
     }
-    Ok((context.builder, if_dark))
+    let is_lit_later = context.has_flat_lamp || snapshots.iter().any(Snapshot::changes_light);
+    Ok((context.builder, if is_lit_later { IfDark::Stay } else { IfDark::Fail }))
 }
 
 fn read_film(value: &Value) -> Result<FilmDefaults, LoadError> {
@@ -142,11 +153,15 @@ fn read_unit(value: &Value) -> Result<f64, LoadError> {
     value.within(*NITS_PER_UNIT.start(), *NITS_PER_UNIT.end())
 }
 
-fn read_view(value: &Value) -> Result<ViewingDefaults, LoadError> {
+/// The file of a display is found from `folder`, like every file that a scene names.
+fn read_view(value: &Value, folder: &Path) -> Result<ViewingDefaults, LoadError> {
     let fields = value.fields(&["display", "visibility", "operator", "exposure_stops"])?;
     let text = |key| fields.get_some(key, |value| value.string().map(str::to_owned));
     Ok(ViewingDefaults {
-        display: text("display")?,
+        display: text("display")?.map(|display| match display.ends_with(".toml") {
+            true => folder.join(display).to_string_lossy().into_owned(),
+            false => display,
+        }),
         visibility: fields.get_some("visibility", Value::positive)?,
         operator: text("operator")?,
         exposure_stops: fields
@@ -171,5 +186,7 @@ fn read_texture(value: &Value, folder: &Path) -> Result<TextureEntry, LoadError>
             adjust: Adjust::NONE,
         },
         encoding: fields.get_some("encoding", |value| value.choice(&encodings))?,
+        note_if_idle: value.without_effect("no material reads it"),
+        is_used: false,
     })
 }

@@ -5,8 +5,8 @@ use super::fields::{Fields, Value};
 use super::material::{Entry, Materials};
 use super::motion;
 use crate::scene::load::{LoadError, obj, shapes};
-use crate::scene::{ColorInput, Instance, MaterialId, Mesh, MeshId, Motion, Sphere};
-use glam::{Affine3A, Vec3};
+use crate::scene::{Alpha, ColorInput, Instance, MaterialId, Mesh, MeshId, Motion, Sphere};
+use glam::{Affine3A, Vec2, Vec3};
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::path::PathBuf;
@@ -28,6 +28,8 @@ struct Placement {
     motion: Option<Motion>,
     /// Whether a sphere is one at all times.
     stays_round: bool,
+    /// Whether it has keyframes, which may give it another size at other times.
+    has_keyframes: bool,
 }
 
 impl<'m, 'a> Objects<'m, 'a> {
@@ -73,6 +75,7 @@ impl<'m, 'a> Objects<'m, 'a> {
             to_world,
             motion: moves,
             stays_round,
+            has_keyframes: fields.get("keyframes").is_some(),
         };
         if kind == "mesh" {
             return self.place_file(context, &shape, placement);
@@ -115,7 +118,7 @@ impl<'m, 'a> Objects<'m, 'a> {
                     .iter()
                     .map(|(mesh, _)| shapes::area(&context.builder.meshes[mesh.0 as usize], &placement.to_world));
                 let area = area.sum();
-                Some(with_power(context, entry, area, &placement.name, file)?)
+                Some(with_power(context, entry, area, &placement, file)?)
             }
         };
         for (part, (mesh, own)) in parts.iter().enumerate() {
@@ -136,7 +139,7 @@ impl<'m, 'a> Objects<'m, 'a> {
 fn place_mesh(context: &mut Context, mesh: Mesh, fields: &Fields, placement: Placement) -> Result<(), LoadError> {
     let entry = placement.material.ok_or_else(|| fields.error("\"material\" is missing"))?;
     let area = shapes::area(&mesh, &placement.to_world);
-    let material = with_power(context, entry, area, &placement.name, &fields.require("material")?)?;
+    let material = with_power(context, entry, area, &placement, &fields.require("material")?)?;
     let mesh = context.builder.add_mesh(mesh);
     let Placement { name, to_world, motion, .. } = placement;
     context.builder.instances.push(Instance { name, mesh, material, to_world, motion });
@@ -163,34 +166,55 @@ fn place_sphere(context: &mut Context, shape: &Value, fields: &Fields, placement
         return Err(shape.error("its transform leaves no finite sphere"));
     }
     let area = 4.0 * PI * f64::from(radius) * f64::from(radius);
-    let material = with_power(context, entry, area, &placement.name, &fields.require("material")?)?;
+    let material = with_power(context, entry, area, &placement, &fields.require("material")?)?;
     let motion = placement.motion.map(|motion| motion.since_open());
     let axes = Sphere::axes_of(&placement.to_world);
     context.builder.spheres.push(Sphere { name: placement.name, center, radius, axes, material, motion });
     Ok(())
 }
 
-/// The material; one that gives luminous power becomes the object's own, with the radiance for this area.
+/// The material; one that gives luminous power becomes the object's own, with the radiance for this area. A lamp that is flat for a
+/// moment of its keyframes is dark then.
 fn with_power(
     context: &mut Context,
     entry: Entry,
     area: f64,
-    name: &str,
+    placement: &Placement,
     place: &Value,
 ) -> Result<MaterialId, LoadError> {
     let Some(power) = entry.power else {
         return Ok(entry.id);
     };
     let mut own = context.builder.materials[entry.id.0 as usize].clone();
+    let name = &placement.name;
+    let Some(share) = opaque_share(&own.alpha) else {
+        let problem = "power_lm is not divided by what a picture of alpha leaves of an object: use emission_cd_m2";
+        return Err(place.error(problem));
+    };
     // A Lambertian emitter of luminance L gives π·L lumen per area and side.
     let sides = if own.emits_both_sides { 2.0 } else { 1.0 };
-    let radiance = power.lumen / (PI * area * sides) / context.builder.nits_per_unit;
+    let mut radiance = power.lumen / (PI * area * share * sides) / context.builder.nits_per_unit;
     if !(radiance as f32).is_finite() {
-        return Err(place.error("power_lm needs an object with an area above 0"));
+        if !placement.has_keyframes {
+            return Err(place.error("power_lm needs an object with an area above 0"));
+        }
+        context
+            .builder
+            .note(format!("\"{name}\" has no area now, and its power_lm no place to shine from: it is dark."));
+        context.has_flat_lamp = true;
+        radiance = 0.0;
     }
     own.name = format!("{} of {name}", own.name);
     own.emission = ColorInput::constant(power.tint * radiance as f32);
     Ok(context.builder.add_material(own))
+}
+
+/// Share of a surface that is there, and 1 where nothing is, which emits nothing at any radiance; `None` where a picture says.
+fn opaque_share(alpha: &Alpha) -> Option<f64> {
+    match alpha {
+        Alpha::Mask { value, .. } | Alpha::Blend { value } if value.texture.is_some() => None,
+        _ => Some(f64::from(alpha.coverage(&[], Vec2::ZERO))).map(|share| if share > 0.0 { share } else { 1.0 }),
+    }
 }
 
 fn rectangle(shape: &Value) -> Result<Mesh, LoadError> {

@@ -41,12 +41,13 @@ pub(in crate::scene::load) fn before(path: &Path, options: &LoadOptions) -> Resu
 
 /// Adds everything to the scene, which was read with the options of [`before`]. The scene's own camera stays where the caller has asked for one by name.
 pub(in crate::scene::load) fn apply(path: &Path, options: &LoadOptions, scene: &mut Scene) -> Result<(), LoadError> {
+    let folder = path.parent().unwrap_or(Path::new(""));
     with_root(path, options.frame_time, |root| {
         if let Some(film) = root.get("film") {
             scene.film = read_film(&film)?;
         }
         if let Some(view) = root.get("view") {
-            let ViewingDefaults { display, visibility, operator, exposure_stops } = read_view(&view)?;
+            let ViewingDefaults { display, visibility, operator, exposure_stops } = read_view(&view, folder)?;
             let old = std::mem::take(&mut scene.viewing);
             scene.viewing = ViewingDefaults {
                 display: display.or(old.display),
@@ -67,7 +68,6 @@ pub(in crate::scene::load) fn apply(path: &Path, options: &LoadOptions, scene: &
             scene.camera = camera::read(&value, Shutter { opens: options.frame_time, stays_open })?;
         }
         if let Some(value) = root.get("environment") {
-            let folder = path.parent().unwrap_or(Path::new(""));
             let surroundings = surroundings::read(&value, folder, scene.nits_per_unit)?;
             scene.surround(surroundings.environment, surroundings.sun);
         }

@@ -237,19 +237,22 @@ fn metal_roughness<'a>(
     context: &mut Context<'a>,
     fields: &Fields<'a>,
 ) -> Result<Surface, LoadError> {
+    let volume =
+        match ["absorption", "attenuation_color", "attenuation_distance"].iter().any(|key| fields.get(key).is_some()) {
+            true => Some(absorption(fields)?),
+            false => None,
+        };
     Ok(Surface::MetalRoughness(MetalRoughness {
         base_color: share_or_white(context, fields, "base_color")?,
         metallic: scalar(context, fields, "metallic", 0.0)?,
         roughness: scalar(context, fields, "roughness", 0.5)?,
-        ior: fields.get_or("ior", 1.5, Value::positive)? as f32,
+        ior: fields.get_or("ior", 1.5, |value| {
+            let ior = value.number()? as f32;
+            MetalRoughness::problem_with_ior(ior, volume.is_some())
+                .map_or(Ok(ior), |problem| Err(value.error(format_args!("{problem}, not {ior}"))))
+        })?,
         transmission: scalar(context, fields, "transmission", 0.0)?,
-        volume: match ["absorption", "attenuation_color", "attenuation_distance"]
-            .iter()
-            .any(|key| fields.get(key).is_some())
-        {
-            true => Some(absorption(fields)?),
-            false => None,
-        },
+        volume,
         specular: scalar(context, fields, "specular", 1.0)?,
         specular_color: share_or_white(context, fields, "specular_color")?,
         anisotropy: scalar(context, fields, "anisotropy", 0.0)?,

@@ -1,0 +1,158 @@
+//! Our own format: what lamps of a luminous power emit, keys that change nothing, and files that are found from the scene's folder.
+
+use fechner::scene::Scene;
+use fechner::scene::load::{LoadOptions, load};
+
+/// A scene in a folder of its own, at a time in seconds.
+fn at(text: &str, seconds: f64) -> Result<Scene, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("s.toml");
+    std::fs::write(&path, text).unwrap();
+    let options = LoadOptions { frame_time: seconds, ..LoadOptions::default() };
+    load(&path, &options).map_err(|error| error.to_string().replace(&path.display().to_string(), "s.toml"))
+}
+
+fn read(text: &str) -> Result<Scene, String> {
+    at(text, 0.0)
+}
+
+const LIT: &str = "[environment]\nluminance_cd_m2 = 100\n";
+
+/// A square metre of a material.
+fn square(material: &str) -> String {
+    format!(
+        "[materials.m]\n{material}\n[[objects]]\n\
+         rectangle = {{ corner = [0, 0, 0], edge_u = [1, 0, 0], edge_v = [0, 1, 0] }}\nmaterial = \"m\"\n"
+    )
+}
+
+#[test]
+fn a_lamp_gives_its_power_through_what_alpha_leaves() {
+    let lamp = |alpha: &str| square(&format!("type = \"diffuse\"\nreflectance = 0\npower_lm = 100\n{alpha}"));
+    let flux = |alpha: &str, share: f32| {
+        let scene = read(&lamp(alpha)).unwrap();
+        let own = scene.materials.last().expect("the lamp's own");
+        own.emission.factor.x * share * std::f32::consts::PI
+    };
+    for (alpha, share) in
+        [("", 1.0), ("alpha = 0.25", 0.25), ("alpha = 0.6\nalpha_cutoff = 0.5", 1.0), ("alpha = 1", 1.0)]
+    {
+        assert!((flux(alpha, share) - 100.0).abs() < 1e-3, "{alpha}: {} lm", flux(alpha, share));
+    }
+    let picture = "[textures.t]\nfile = \"t.png\"\n";
+    let refused = read(&format!("{picture}{}", lamp("alpha = { texture = \"t\" }"))).unwrap_err();
+    assert!(refused.starts_with("s.toml:10") && refused.contains("use emission_cd_m2"), "{refused}");
+}
+
+/// A lamp that grows from nothing is dark while it is flat; one that never has an area is a slip.
+#[test]
+fn a_lamp_that_is_flat_for_a_moment_is_dark_then() {
+    let lamp = "[materials.m]\ntype = \"diffuse\"\nreflectance = 0\npower_lm = 100\n[[objects]]\nname = \"bulb\"\nmaterial = \"m\"\n\
+                keyframes = [ { time = 0, scale = -1 }, { time = 2, scale = 1 } ]\n";
+    for shape in ["sphere = { center = [0, 0, 0], radius = 1 }", "box = { min = [-1, -1, -1], max = [1, 1, 1] }"] {
+        let text = format!("{LIT}{lamp}{shape}\n");
+        let flat = at(&text, 1.0).unwrap_or_else(|error| panic!("{shape}: {error}"));
+        assert!(flat.notes.iter().any(|note| note.contains("\"bulb\" has no area now")), "{shape}: {:?}", flat.notes);
+        assert!(at(&text, 2.0).unwrap().materials.iter().any(|own| own.emission.factor.x > 0.0), "{shape}");
+        // The only light of its scene may be off for a while, as other lamps may; what rays meet is beside it.
+        let beside = square("type = \"diffuse\"\nreflectance = 0.5").replace("materials.m]", "materials.plain]");
+        let alone = format!("{}{lamp}{shape}\n", beside.replace("\"m\"", "\"plain\""));
+        assert!(at(&alone, 1.0).is_ok(), "{shape}: {:?}", at(&alone, 1.0).err());
+    }
+}
+
+#[test]
+fn keys_that_change_nothing_are_named() {
+    let notes = |material: &str| {
+        let notes = read(&format!("{LIT}{}", square(material))).unwrap().notes;
+        notes.into_iter().filter(|note| note.contains("has no effect")).collect::<Vec<_>>()
+    };
+    let volume = "type = \"metal-roughness\"\nattenuation_color = [0.5, 0.5, 0.5]\nattenuation_distance = 1";
+    for (material, key) in [
+        (volume, "attenuation_color"),
+        ("type = \"metal-roughness\"\nabsorption = 1", "absorption"),
+        ("type = \"conductor\"\nmetal = \"gold\"\nroughness = 0.3\nstretch_rotation_deg = 30", "stretch_rotation_deg"),
+        ("type = \"diffuse\"\nreflectance = 0.5\nemits_both_sides = true", "emits_both_sides"),
+    ] {
+        let expected = format!("materials.m.{key} has no effect");
+        let notes = notes(material);
+        assert!(notes.len() == 1 && notes[0].contains(&expected) && notes[0].contains("s.toml:"), "{key}: {notes:?}");
+    }
+    let idle = format!("{LIT}[textures.idle]\nfile = \"nowhere.png\"\n{}", square("type = \"mirror\""));
+    let notes_of_texture = read(&idle).unwrap().notes;
+    assert!(
+        notes_of_texture.iter().any(|n| n.contains("s.toml:3: textures.idle has no effect")),
+        "{notes_of_texture:?}"
+    );
+    for used in [
+        &format!("{volume}\ntransmission = 1"),
+        &format!("{volume}\nkeyframes = [ {{ time = 0, transmission = 0 }}, {{ time = 1, transmission = 1 }} ]"),
+        "type = \"conductor\"\nmetal = \"gold\"\nroughness = 0.3\nroughness_v = 0.1\nstretch_rotation_deg = 30",
+        "type = \"diffuse\"\nreflectance = 0.5\nemission_cd_m2 = 5\nemits_both_sides = true",
+        "type = \"diffuse\"\nreflectance = 0.5\nemits_both_sides = false",
+    ] {
+        assert_eq!(notes(used), Vec::<String>::new(), "{used}");
+    }
+}
+
+/// One rule for the index of the metal-roughness model, in all formats that have it.
+#[test]
+fn an_index_of_refraction_is_at_least_1_or_0() {
+    let sheet = |ior: f64| read(&format!("{LIT}{}", square(&format!("type = \"metal-roughness\"\nior = {ior}"))));
+    for taken in [0.0, 1.0, 1.5] {
+        assert!(sheet(taken).is_ok(), "{taken}");
+    }
+    let refused = sheet(0.5).unwrap_err();
+    assert!(refused.contains("materials.m.ior") && refused.contains("at least 1, or 0"), "{refused}");
+    let volume = "type = \"metal-roughness\"\nior = 0.0\ntransmission = 1\nabsorption = 1";
+    let refused = read(&format!("{LIT}{}", square(volume))).unwrap_err();
+    assert!(refused.contains("at least 1 where light enters a volume"), "{refused}");
+
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("t.gltf");
+    let gltf = |ior: f64| {
+        let bytes: Vec<u8> =
+            [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].iter().flat_map(|x| x.to_le_bytes()).collect();
+        std::fs::write(folder.path().join("t.bin"), bytes).unwrap();
+        let text = format!(
+            r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{{"mesh":0}}],
+"extensionsUsed":["KHR_materials_ior"],
+"materials":[{{"name":"pane","extensions":{{"KHR_materials_ior":{{"ior":{ior}}}}}}}],
+"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"material":0}}]}}],
+"buffers":[{{"byteLength":36,"uri":"t.bin"}}],"bufferViews":[{{"buffer":0,"byteLength":36}}],
+"accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}}]}}"#
+        );
+        std::fs::write(&path, text).unwrap();
+        load(&path, &LoadOptions::default()).unwrap().notes
+    };
+    let named = |notes: &[String]| notes.iter().any(|note| note.contains("\"pane\": ior 0.5 is taken as 1.5"));
+    assert!(named(&gltf(0.5)), "{:?}", gltf(0.5));
+    assert!(!gltf(0.0).iter().any(|note| note.contains("ior")), "{:?}", gltf(0.0));
+
+    let mitsuba = folder.path().join("s.xml");
+    let eta = "<bsdf type=\"principled\"><float name=\"eta\" value=\"0.5\"/></bsdf>";
+    let text = format!("<scene version=\"3.0.0\"><shape type=\"sphere\">{eta}</shape></scene>");
+    std::fs::write(&mitsuba, text).unwrap();
+    let refused = load(&mitsuba, &LoadOptions::default()).expect_err("no index").to_string();
+    assert!(refused.contains("eta 0.5: an index of refraction is at least 1, or 0"), "{refused}");
+}
+
+/// The display's file is found from the scene's folder, like the scene's other files.
+#[test]
+fn a_display_file_lies_beside_its_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("s.toml");
+    let display = |named: &str| {
+        let text = format!("{LIT}[view]\ndisplay = \"{named}\"\n{}", square("type = \"mirror\""));
+        std::fs::write(&path, text).unwrap();
+        load(&path, &LoadOptions::default()).unwrap().viewing.display.expect("named")
+    };
+    assert_eq!(display("room.toml"), folder.path().join("room.toml").display().to_string());
+    assert_eq!(display("/far/room.toml"), "/far/room.toml");
+    assert_eq!(display("laptop"), "laptop");
+    let mesh = folder.path().join("t.obj");
+    std::fs::write(&mesh, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    std::fs::write(folder.path().join("t.fechner.toml"), "[view]\ndisplay = \"room.toml\"\n").unwrap();
+    let beside = load(&mesh, &LoadOptions::default()).unwrap().viewing.display.expect("named");
+    assert_eq!(beside, folder.path().join("room.toml").display().to_string());
+}
