@@ -61,7 +61,7 @@ pub fn denoise_film(denoiser: &Denoiser, film: &Film, nits_per_unit: f64) -> Res
 
 /// What is seen to shine by itself is shown to the denoiser no brighter than so many times what the rest of the picture is on
 /// average: mostly above display white, so that edges are still smoothed where they are seen. 5 and 20 are as good
-/// (`benches/README.md`).
+/// (`benches/results/denoising.md`).
 const TIMES_THE_REST: f32 = 10.0;
 
 /// The most luminance that the denoiser is shown of what shines by itself, cd/m².
