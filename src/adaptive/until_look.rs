@@ -21,7 +21,7 @@ const SAMPLES_OF_A_DENOISED_LOOK: f64 = 10.0;
 /// Most that comes between two looks, as a share of what is there.
 const MOST_GROWTH: f64 = 3.0;
 /// What raw noise may be above the visibility asked for, so that a look is worth its cost: denoising made ten scenes 0.8 to 2.9 times
-/// better at 32 samples, one of them 4.4 times at 8 (`benches/README.md`).
+/// better at 32 samples, one of them 4.4 times at 8 (`benches/results/denoising.md`).
 const MOST_GAIN: f64 = 3.0;
 /// Doublings of a pixel in one plan.
 const MOST_DOUBLINGS: u32 = 2;
@@ -30,7 +30,7 @@ const MOST_DOUBLINGS: u32 = 2;
 const LEAST_BLAME: f32 = 0.1;
 
 /// What a look at a denoised picture costs, in samples for every pixel, about: 5 to 15 with Open Image Denoise, 2 to 4 with the built-in
-/// filter (`benches/README.md`).
+/// filter (`benches/results/denoising.md`).
 pub(super) fn samples_of_a_look(denoiser: &Denoiser) -> f64 {
     match denoiser.kind() {
         DenoiserKind::Builtin => 3.0,

@@ -99,7 +99,7 @@ impl Denoiser {
     }
 
     /// Makes guides ready, once for all pictures that they guide. Open Image Denoise is told to trust them, and while they are the
-    /// mean of few samples gets them denoised, each by itself: worth up to 0.6 JOD (`benches/README.md`).
+    /// mean of few samples gets them denoised, each by itself: worth up to 0.6 JOD (`benches/results/denoising.md`).
     ///
     /// # Errors
     /// [`OidnError::Failed`] where the library fails.

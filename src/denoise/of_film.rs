@@ -68,7 +68,7 @@ pub fn leave_the_void_dark(film: &Film, rgb: &mut [[f32; 3]]) {
 
 /// What is seen to shine by itself is shown to the denoiser no brighter than so many times what the rest of the picture is on
 /// average: mostly above display white, so that edges are still smoothed where they are seen. 5 and 20 are as good
-/// (`benches/README.md`).
+/// (`benches/results/denoising.md`).
 const TIMES_THE_REST: f32 = 10.0;
 
 /// The most luminance that the denoiser is shown of what shines by itself, cd/m².

@@ -5,7 +5,10 @@
 //! minimum and maximum are x86's: the second operand where one is NaN. The only `unsafe` of the crate is here: calling
 //! a function that was compiled for AVX2, after asking the machine whether it has it.
 
-#![allow(unsafe_code, reason = "calls into functions compiled for AVX2: 2 times the rays a second (benches/README.md)")]
+#![allow(
+    unsafe_code,
+    reason = "calls into functions compiled for AVX2: 2 times the rays a second (benches/results/transport.md)"
+)]
 
 use super::triangle::ShearedRay;
 use super::wide_tree::{Block, BoxRay, Candidates, LANES, Lanes, Met, Node, WideHit, WideTree};

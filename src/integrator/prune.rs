@@ -5,7 +5,7 @@
 //! the inverse, it is not. Only light straight from lamps is tried: how much a further bounce will bring nobody knows, and the roulette
 //! of whole paths by throughput is many times stricter than a threshold of five per cent.
 //!
-//! Not for speed: see `benches/README.md`.
+//! Not for speed: see `benches/results/transport.md`.
 
 use fechner_perception::tvi::combined_monotone;
 

@@ -4,7 +4,7 @@
 
 #![allow(
     unsafe_code,
-    reason = "a C library that is opened at run time can be called in no other way; measured gain in benches/README.md"
+    reason = "a C library that is opened at run time can be called in no other way; measured gain in benches/results/denoising.md"
 )]
 
 use super::OidnError;

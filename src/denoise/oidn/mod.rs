@@ -41,7 +41,7 @@ fn tried(problems: &[String]) -> String {
 }
 
 /// Guides of as many samples are trusted as they are: to denoise them costs half as much again as picture and halves do, and is
-/// worth 0.011 JOD where a shutter is open, 0.002 and 0.004 elsewhere (`benches/README.md`).
+/// worth 0.011 JOD where a shutter is open, 0.002 and 0.004 elsewhere (`benches/results/denoising.md`).
 const CLEAN_ENOUGH_SAMPLES: f64 = 16.0;
 
 /// The library, opened.

@@ -2,7 +2,7 @@
 //!
 //! Vertices (`x y z`, `nx ny nz`, `u v` or `s t` and their longer names), faces and `tristrips` (`vertex_indices`) are read, everything
 //! else is skipped and named. Written by ourselves: a million triangles load in little more than reading their bytes
-//! takes (benches/README.md), and every count is checked against the bytes that are there before memory is taken for it.
+//! takes (benches/results/loading.md), and every count is checked against the bytes that are there before memory is taken for it.
 
 mod body;
 mod header;

@@ -1,0 +1,83 @@
+"""Do the documents hold what they promise?
+
+    python3 docs/check.py                          # every relative link of every Markdown file leads to a file and, after #, to a heading
+    python3 docs/check.py target/release/fechner   # and every example of docs/commands.md runs, in a copy of the scenes: a minute and a half
+
+Nothing to install. Exit status 1 names what does not hold.
+"""
+
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+
+ROOT = pathlib.Path(__file__).parent.parent
+CODE = re.compile(r"^```.*?^```", re.DOTALL | re.MULTILINE)
+# What `fechner view` would wait for is somebody who ends it.
+SECONDS_OF_A_VIEW = 6
+
+
+def documents():
+    listed = subprocess.run(["git", "ls-files", "-co", "--exclude-standard", "*.md"], cwd=ROOT, capture_output=True, text=True, check=True)
+    return [ROOT / name for name in listed.stdout.splitlines()]
+
+
+def anchors(document):
+    """What GitHub makes of headings."""
+    headings = re.findall(r"^#+ (.*)$", CODE.sub("", document.read_text(encoding="utf-8")), re.MULTILINE)
+    plain = (re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).strip().lower() for heading in headings)
+    return {"".join(c for c in heading if c.isalnum() or c in " -_").replace(" ", "-") for heading in plain}
+
+
+def broken_links():
+    for document in documents():
+        for link in re.findall(r"\]\(([^)\s]+)\)", CODE.sub("", document.read_text(encoding="utf-8"))):
+            if re.match(r"[a-z]+:", link):
+                continue
+            name, _, anchor = link.partition("#")
+            target = document.parent / name if name else document
+            if not target.exists():
+                yield f"{document.relative_to(ROOT)}: {link}: no such file"
+            elif anchor and anchor not in anchors(target):
+                yield f"{document.relative_to(ROOT)}: {link}: no such heading"
+
+
+def examples():
+    text = (ROOT / "docs/commands.md").read_text(encoding="utf-8")
+    for block in re.findall(r"^```sh\n(.*?)^```", text, re.DOTALL | re.MULTILINE):
+        if "<<" in block:
+            yield block
+        else:
+            yield from (line for line in block.splitlines() if re.match(r"(fechner|mkdir|printf) ", line))
+
+
+def failing_examples(program):
+    with tempfile.TemporaryDirectory() as folder:
+        shutil.copytree(ROOT / "scenes", pathlib.Path(folder) / "scenes")
+        programs = pathlib.Path(folder) / "bin"
+        programs.mkdir()
+        (programs / "fechner").symlink_to(pathlib.Path(program).resolve())
+        environment = os.environ | {"PATH": f"{programs}:{os.environ['PATH']}"}
+        for command in examples():
+            watched = command.startswith("fechner view ")
+            limited = f"timeout --signal=INT --preserve-status {SECONDS_OF_A_VIEW} {command}" if watched else command
+            done = subprocess.run(["bash", "-c", limited], cwd=folder, env=environment, capture_output=True, text=True)
+            print(f"{done.returncode}  {command.splitlines()[0]}", flush=True)
+            # 1 is an answer of `compare`: a difference can be seen.
+            if done.returncode not in ((0, 1) if command.startswith("fechner compare ") else (0,)):
+                yield f"docs/commands.md: exit status {done.returncode}: {command}\n{done.stderr.strip()}"
+
+
+def main():
+    problems = list(broken_links())
+    if len(sys.argv) > 1:
+        problems += failing_examples(sys.argv[1])
+    print("\n".join(problems) or "the documents hold")
+    sys.exit(bool(problems))
+
+
+if __name__ == "__main__":
+    main()
