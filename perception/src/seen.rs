@@ -18,11 +18,13 @@ pub fn display_luminance(fitted: &dyn FittedTone, display: &Display, scene_lumin
 
 /// How much the displayed luminance changes with scene luminance around `scene_luminance` (cd/m²): the slope of the chord
 /// from 5 % below to 5 % above. Noise that is to stay without bias may not go through the operator itself, which is bent.
+/// Finite everywhere: luminance counts as at least 1e-4 and at most 1e30 cd/m², NaN as the least.
 #[must_use]
 pub fn display_slope(fitted: &dyn FittedTone, display: &Display, scene_luminance: &Plane) -> Plane {
     let shown = Shown { fitted, display };
     Plane::from_fn(scene_luminance.width(), scene_luminance.height(), |x, y| {
-        let at = scene_luminance.get(x, y).max(1e-4);
+        // At most what leaves the chord's ends finite.
+        let at = scene_luminance.get(x, y).max(1e-4).min(1e30);
         let (below, above) = (0.95 * at, 1.05 * at);
         (shown.cd_m2(Pixel { x, y }, above) - shown.cd_m2(Pixel { x, y }, below)) / (above - below)
     })
@@ -35,6 +37,9 @@ pub fn display_slope(fitted: &dyn FittedTone, display: &Display, scene_luminance
 /// not. Where M ≥ √3 σ the points are those of Gauss and Hermite (M and M ± √3 σ); nearer to black, where light cannot
 /// go below 0, the lower point stays at 0 and the upper one moves out to M + 3σ²/M, which keeps mean and variance. An
 /// operator that is linear over the points gives exactly its slope² · σ².
+///
+/// Where normal noise (√3 σ ≤ M) reaches over a clip of the display, three points see too much of it or nothing at all; there the
+/// operator is asked at 21 points, −4σ to 4σ.
 ///
 /// Pixels whose mean or variance is not finite get infinity; so does every pixel when the planes differ in size.
 #[must_use]
@@ -102,6 +107,9 @@ fn by_pixel(first: &Plane, second: &Plane, else_value: f32, of: impl Fn(Pixel, f
     result
 }
 
+/// Standard deviations from the mean beyond which normal noise is let go: 4 lose 0.1 % of the variance.
+const FARTHEST: f64 = 4.0;
+
 /// A display behind an operator.
 struct Shown<'a> {
     fitted: &'a dyn FittedTone,
@@ -131,13 +139,53 @@ impl Shown<'_> {
             let swing = f64::from(self.cd_m2(pixel, gauss as f32) - self.cd_m2(pixel, 0.0));
             return (swing * swing / 3.0) as f32;
         }
+        let light = |scene: f64| self.fitted.relative_luminance_at(pixel, scene as f32);
+        let lights = [light(mean - below), light(mean), light(mean + above)];
+        if mean >= gauss && self.clip_is_in_reach(pixel, lights, mean, variance.sqrt()) {
+            return self.clipped_variance(pixel, mean, variance.sqrt());
+        }
         let weight_below = variance / (below * (below + above));
         let weight_above = variance / (above * (below + above));
-        let center = f64::from(self.cd_m2(pixel, mean as f32));
-        let low = f64::from(self.cd_m2(pixel, (mean - below) as f32)) - center;
-        let high = f64::from(self.cd_m2(pixel, (mean + above) as f32)) - center;
+        let [low, center, high] = lights.map(|relative| self.display.luminance_cd_m2(f64::from(relative)));
+        // As the planes have it: in single precision.
+        let [low, center, high] = [low, center, high].map(|cd_m2| f64::from(cd_m2 as f32));
+        let (low, high) = (low - center, high - center);
         let offset = weight_below * low + weight_above * high;
         (weight_below * low * low + weight_above * high * high - offset * offset).max(0.0) as f32
+    }
+
+    /// Whether normal noise about `mean` reaches over a clip of the display. `lights`: at √3 σ below the mean, there, and above.
+    fn clip_is_in_reach(&self, pixel: Pixel, lights: [f32; 3], mean: f64, deviation: f64) -> bool {
+        // An operator that clips by itself may round.
+        const WHITE: f32 = 1.0 - 1e-6;
+        let [low, center, high] = lights;
+        let at = |scene: f64| self.fitted.relative_luminance_at(pixel, scene.max(0.0) as f32);
+        if low >= WHITE {
+            // As bright as it gets: only the noise's tail may say otherwise. Without asking for most of them.
+            at(mean - FARTHEST * deviation) < WHITE
+        } else if high <= 0.0 {
+            at(mean + FARTHEST * deviation) > 0.0
+        } else {
+            // On goes the operator as it went from the mean: near enough, and two questions less for every pixel.
+            let further = (FARTHEST / 3.0_f64.sqrt()) as f32;
+            center + further * (high - center) >= WHITE || low <= 0.0 && mean > 1.001 * 3.0_f64.sqrt() * deviation
+        }
+    }
+
+    /// Variance as displayed of normal noise about `mean`, by the midpoint rule; no light is below 0.
+    fn clipped_variance(&self, pixel: Pixel, mean: f64, deviation: f64) -> f32 {
+        const STEPS: i32 = 10;
+        let (mut weights, mut sum, mut squares) = (0.0, 0.0, 0.0);
+        let center = f64::from(self.cd_m2(pixel, mean as f32));
+        for step in -STEPS..=STEPS {
+            let deviations = FARTHEST * f64::from(step) / f64::from(STEPS);
+            let weight = (-0.5 * deviations * deviations).exp();
+            let shown = f64::from(self.cd_m2(pixel, (mean + deviations * deviation) as f32)) - center;
+            weights += weight;
+            sum += weight * shown;
+            squares += weight * shown * shown;
+        }
+        (squares / weights - (sum / weights).powi(2)).max(0.0) as f32
     }
 }
 
@@ -181,6 +229,64 @@ mod tests {
         assert!(found > 50.0, "{found}");
         let far_above = display_variance(&*fitted, &display, &one(2000.0), &one(400.0)).get(0, 0);
         assert_eq!(far_above, 0.0);
+    }
+
+    /// Variance of a normal variable that is cut at black and white, by a fine sum.
+    fn variance_below(mean: f64, deviation: f64, white: f64) -> f64 {
+        let (mut weights, mut sum, mut squares) = (0.0, 0.0, 0.0);
+        for step in -4000..=4000 {
+            let z = f64::from(step) / 500.0;
+            let (weight, shown) = ((-0.5 * z * z).exp(), (mean + z * deviation).clamp(0.2, white));
+            weights += weight;
+            sum += weight * shown;
+            squares += weight * shown * shown;
+        }
+        squares / weights - (sum / weights).powi(2)
+    }
+
+    /// Means from far below the clip at 200 cd/m² to above it; three points gave 0 for means of 1.8 σ above.
+    #[test]
+    fn noise_at_a_clip_has_the_variance_that_it_shows() {
+        let display = Display::default();
+        let fitted = absolute(&display);
+        for (mean, deviation) in [
+            (150.0, 20.0),
+            (180.0, 20.0),
+            (195.0, 5.0),
+            (200.0, 5.0),
+            (205.0, 5.0),
+            (209.0, 5.0),
+            (220.0, 10.0),
+            (240.0, 20.0),
+        ] {
+            let variance = (deviation * deviation) as f32;
+            let found = f64::from(display_variance(&*fitted, &display, &one(mean as f32), &one(variance)).get(0, 0));
+            let expected = variance_below(mean, deviation, 200.0);
+            assert!(
+                (found / expected).sqrt() < 1.05 && (found / expected).sqrt() > 0.95,
+                "{mean} ± {deviation}: {found}, not {expected}"
+            );
+        }
+        // And at black, 0.2 cd/m².
+        for (mean, deviation) in [(0.18, 0.01), (0.2, 0.02), (0.21, 0.02)] {
+            let variance = (deviation * deviation) as f32;
+            let found = f64::from(display_variance(&*fitted, &display, &one(mean as f32), &one(variance)).get(0, 0));
+            let expected = variance_below(mean, deviation, 200.0);
+            assert!(
+                (found / expected).sqrt() < 1.05 && (found / expected).sqrt() > 0.95,
+                "{mean} ± {deviation}: {found}, not {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn slopes_are_finite() {
+        let display = Display::default();
+        let fitted = absolute(&display);
+        for light in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, 0.0] {
+            let slope = display_slope(&*fitted, &display, &one(light)).get(0, 0);
+            assert!(slope.is_finite(), "{light}: {slope}");
+        }
     }
 
     #[test]

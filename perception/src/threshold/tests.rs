@@ -72,6 +72,22 @@ fn a_firefly_does_not_raise_its_threshold() {
     assert!((adapted - 20.0).abs() < 1e-3, "{adapted}");
 }
 
+/// A lamp far beyond what any display shows must not blind the transform to everything else: its rounding would be a mask everywhere.
+#[test]
+fn one_lamp_does_not_mask_the_picture() {
+    let textured = Plane::from_fn(256, 256, |x, y| 20.0 + ((x * 7 + y * 13) % 11) as f32 * 0.05);
+    let alone = map_of(&textured, &viewing(60.0));
+    for lamp in [2e7, 1e30] {
+        let mut lit = textured.clone();
+        lit.values_mut()[40 * 256 + 40] = lamp;
+        let lit = map_of(&lit, &viewing(60.0));
+        for (x, y) in [(128, 128), (200, 60), (40, 200), (250, 250)] {
+            let ratio = lit.noise_gain().get(x, y) / alone.noise_gain().get(x, y);
+            assert!((ratio - 1.0).abs() < 0.01, "lamp of {lamp} cd/m², ({x}, {y}): noise gain × {ratio}");
+        }
+    }
+}
+
 /// Some of a path tracer's outliers, alone and in pairs, on a textured picture: adaptation hardly moves.
 #[test]
 fn scattered_fireflies_do_not_move_adaptation() {
