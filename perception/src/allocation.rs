@@ -39,6 +39,9 @@ pub struct AllocationProblem<'a> {
 /// A gap as fine as the search reaches on most pictures.
 pub const FINE_GAP: f64 = 3e-3;
 
+/// Least step of the search for a budget's log visibility until it has come from both sides; doubled each time.
+const LEAST_STEP: f64 = 0.25;
+
 /// Sample counts, and how far from the best they can at most be.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Allocation {
@@ -50,7 +53,8 @@ pub struct Allocation {
     pub lower_bound: f64,
     /// `cost / lower_bound − 1`.
     pub gap: f64,
-    /// The visibility that was asked for or, for a fixed budget, found.
+    /// The visibility that was asked for. For a fixed budget: the greatest that the counts leave anywhere, over what is tolerated
+    /// there, be it because `max_samples` does not reach further.
     pub visibility: f64,
     /// Pixels whose visibility stays above what was asked for even with `max_samples` everywhere. Their constraints are
     /// relaxed to what can be reached (plus 1 % of v²).
@@ -106,6 +110,7 @@ pub fn allocate_budget(problem: &AllocationProblem<'_>, budget: f64) -> Result<A
     // Bracket of log visibility; cost falls as visibility rises.
     let (mut too_dear, mut affordable) = (f64::NEG_INFINITY, f64::INFINITY);
     let mut best: Option<Allocation> = None;
+    let mut least_step = LEAST_STEP;
     for _ in 0..40 {
         let found = solver.solve(visibility, &mut multipliers);
         let excess = found.cost / budget;
@@ -135,8 +140,10 @@ pub fn allocate_budget(problem: &AllocationProblem<'_>, budget: f64) -> Result<A
             let margin = 0.1 * (affordable - too_dear);
             aimed.clamp(too_dear + margin, affordable - margin)
         } else {
-            // Limits make the cost respond less than the law says: go at least a quarter further.
-            visibility.ln() + (aimed - visibility.ln()).signum() * (aimed - visibility.ln()).abs().max(0.25)
+            // Limits make the cost respond less than the law says, and far from the answer not at all: ever greater steps.
+            let step = (aimed - visibility.ln()).abs().max(least_step);
+            least_step *= 2.0;
+            visibility.ln() + (aimed - visibility.ln()).signum() * step
         };
         if !(-30.0..=30.0).contains(&next) {
             break;
@@ -145,10 +152,9 @@ pub fn allocate_budget(problem: &AllocationProblem<'_>, budget: f64) -> Result<A
         multipliers.iter_mut().for_each(|multiplier| *multiplier *= factor);
         visibility = next.exp();
     }
-    match best {
-        Some(best) => Ok(best),
-        None => Ok(solver.solve(visibility, &mut multipliers)),
-    }
+    let mut found = best.unwrap_or_else(|| solver.solve(visibility, &mut multipliers));
+    found.visibility = solver.reached(&found.samples);
+    Ok(found)
 }
 
 #[cfg(test)]

@@ -74,13 +74,17 @@ pub(crate) struct RadialTable {
     steps_per_cpd: f32,
 }
 
+/// Fewest entries of a table.
 const RADIAL_STEPS: usize = 2048;
+/// Widest step of a table: sensitivity at low frequencies bends within a few of them, however fine the display's pixels.
+const WIDEST_STEP_CPD: f64 = 0.04;
 
 impl RadialTable {
     pub(crate) fn new(density: PixelDensity, value_at: impl Fn(f64) -> f64) -> Self {
         let highest_cpd = 0.5 * density.horizontal.hypot(density.vertical);
-        let step = highest_cpd / (RADIAL_STEPS - 2) as f64;
-        let values = (0..RADIAL_STEPS).map(|index| value_at(index as f64 * step) as f32).collect();
+        let steps = RADIAL_STEPS.max((highest_cpd / WIDEST_STEP_CPD).ceil() as usize + 2);
+        let step = highest_cpd / (steps - 2) as f64;
+        let values = (0..steps).map(|index| value_at(index as f64 * step) as f32).collect();
         Self { values, steps_per_cpd: step.recip() as f32 }
     }
 

@@ -50,7 +50,8 @@ impl Difference {
 /// cortex transform, bands added by energy and pooled over 1° instead of probability summation (so that its figure is the
 /// visibility that the rest of this crate uses), and sensitivity below 0.5 cpd held at its value there, so that a picture
 /// that is brighter as a whole counts. Masking is mutual, the lesser of what the two pictures mask: detail that only one
-/// of them has does not hide its own absence from the other.
+/// of them has does not hide its own absence from the other. The eye adapts to the reference, so the two are not to be exchanged
+/// where one is much brighter.
 ///
 /// # Errors
 /// [`Error::SizeMismatch`], [`Error::Empty`], [`Error::BadPixel`] for pictures that cannot be compared,

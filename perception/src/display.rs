@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 pub use crate::eotf::Eotf;
+use crate::eotf::PQ_PEAK_CD_M2;
 use crate::error::{Error, check_range};
 pub use crate::pixel_density::PixelDensity;
 
@@ -159,14 +160,29 @@ impl Display {
         display.csf_area_deg2 = file.csf_area_deg2.or(display.csf_area_deg2);
         match (file.pixels_per_degree, file.width_px, file.width_m, display.distance_m) {
             (Some(_), None, None, _) | (None, None, None, None) => {}
+            (Some(_), ..) => {
+                return Err(Error::Parse {
+                    what: "display file",
+                    reason: "`pixels_per_degree` follows from `width_px`, `width_m` and `distance_m`: give it or the widths, not both"
+                        .to_owned(),
+                });
+            }
+            (None, None, None, Some(_)) => {
+                return Err(Error::Parse {
+                    what: "display file",
+                    reason: "`distance_m` alone does not say how many pixels a degree has: give `pixels_per_degree` beside it, or \
+                             `width_px` and `width_m`"
+                        .to_owned(),
+                });
+            }
             (None, Some(width_px), Some(width_m), Some(distance_m)) => {
                 display.pixels_per_degree = pixels_per_degree(width_px, width_m, distance_m)?;
             }
             _ => {
                 return Err(Error::Parse {
                     what: "display file",
-                    reason: "from `distance_m` alone pixels a degree do not follow: give `pixels_per_degree`, or all of `width_px`, \
-                             `width_m` and `distance_m`"
+                    reason: "pixels a degree follow from `width_px`, `width_m` and `distance_m` together: give all three, or \
+                             `pixels_per_degree`"
                         .to_owned(),
                 });
             }
@@ -212,6 +228,9 @@ impl Display {
         check_range("pixels_per_degree", self.pixels_per_degree, 1.0, 1000.0, PPD)?;
         check_range("pixel_aspect_ratio", self.pixel_aspect_ratio, 0.1, 10.0, "between 0.1 and 10")?;
         check_range("white_cd_m2", self.white_cd_m2, 1e-3, 1e8, "between 0.001 and 1e8 cd/m²")?;
+        if self.eotf == Eotf::Pq {
+            check_range("white_cd_m2", self.white_cd_m2, 1e-3, PQ_PEAK_CD_M2, "at most 10000 cd/m² with the pq curve")?;
+        }
         check_range(
             "black_cd_m2",
             self.black_cd_m2,
@@ -347,6 +366,17 @@ mod tests {
             assert_eq!(&display.name, name);
             display.check().unwrap();
         }
+    }
+
+    #[test]
+    fn display_files_say_what_would_be_right() {
+        let error = |text: &str| Display::from_toml(text).unwrap_err().to_string();
+        assert!(error("distance_m = 0.6").contains("`distance_m` alone"));
+        assert!(error("pixels_per_degree = 60.0\nwidth_px = 1920").contains("not both"));
+        assert!(error("width_px = 1920").contains("give all three"));
+        let bright = error("eotf = 'pq'\nwhite_cd_m2 = 20000.0");
+        assert!(bright.contains("white_cd_m2") && bright.contains("10000"), "{bright}");
+        assert!(Display::from_toml("eotf = 'pq'\nwhite_cd_m2 = 10000.0").is_ok());
     }
 
     #[test]

@@ -76,13 +76,13 @@ impl ThresholdMap {
     /// D/`L_a` is filtered by the contrast sensitivity function of half-decade adaptation levels, interpolated linearly in
     /// luminance, band by band; each band is divided by its masking; energies are added and pooled.
     ///
-    /// Pixels that are not finite count as 0; a plane of another size gets infinity everywhere.
+    /// Pixels that are not finite get infinity and count as 0 for the others; a plane of another size gets infinity everywhere.
     #[must_use]
     pub fn measured_visibility(&self, half_difference: &Plane) -> Plane {
         if !self.fits(half_difference) {
             return self.infinite();
         }
-        self.visibility_of_energy(&self.error_energy(half_difference))
+        infinite_where_unknown(self.visibility_of_energy(&self.error_energy(half_difference)), half_difference)
     }
 
     /// [`ThresholdMap::measured_visibility`], and the unpooled amplitude beside it.
@@ -92,7 +92,10 @@ impl ThresholdMap {
             return MeasuredError { visibility: self.infinite(), amplitude: self.infinite() };
         }
         let energy = self.error_energy(half_difference);
-        MeasuredError { visibility: self.visibility_of_energy(&energy), amplitude: energy.map(f32::sqrt) }
+        MeasuredError {
+            visibility: infinite_where_unknown(self.visibility_of_energy(&energy), half_difference),
+            amplitude: infinite_where_unknown(energy.map(f32::sqrt), half_difference),
+        }
     }
 
     /// `plane` convolved with the pooling window g, a Gaussian of σ 0.25° (any unit, unchanged).
@@ -149,6 +152,11 @@ impl ThresholdMap {
     fn infinite(&self) -> Plane {
         Plane::filled(self.width(), self.height(), f32::INFINITY)
     }
+}
+
+/// `visibility`, and infinity where the error that it is of is no number.
+pub(crate) fn infinite_where_unknown(visibility: Plane, error: &Plane) -> Plane {
+    visibility.combined(error, |visibility, error| if error.is_finite() { visibility } else { f32::INFINITY })
 }
 
 /// The eye's filters over one threshold map's errors, band by band, with the buffers that they share.
@@ -363,7 +371,15 @@ mod tests {
         for visibility in [map.predicted_visibility(&broken), map.measured_visibility(&broken)] {
             assert!(visibility.values().iter().all(|v| !v.is_nan()));
         }
-        assert!(map.predicted_visibility(&broken).get(1, 1).is_infinite());
+        for visibility in
+            [map.predicted_visibility(&broken), map.measured_visibility(&broken), map.measured_error(&broken).amplitude]
+        {
+            assert!(
+                visibility.get(1, 1).is_infinite()
+                    && visibility.get(8, 2).is_infinite()
+                    && visibility.get(8, 8).is_finite()
+            );
+        }
         assert!(map.predicted_visibility(&broken).get(8, 8).is_finite());
         assert!(map.measured_visibility(&Plane::filled(3, 3, 1.0)).get(0, 0).is_infinite());
     }

@@ -19,6 +19,9 @@ const CHECK_EVERY: usize = 5;
 /// Slack given to constraints that cannot be met.
 const UNREACHABLE_SLACK: f32 = 1.01;
 
+/// Above every v² that counts within their limits can leave: weights are at most 1e18, samples at least 1e-6.
+const LARGEST_BOUND: f64 = 1e25;
+
 /// One problem, prepared.
 pub(super) struct Solver<'a> {
     problem: &'a AllocationProblem<'a>,
@@ -105,12 +108,13 @@ impl<'a> Solver<'a> {
 
     /// Largest v² allowed at each pixel, and how many had to be relaxed.
     fn bounds(&self, visibility: f64) -> (Plane, usize) {
-        let target = (visibility * visibility) as f32;
+        let target = visibility * visibility;
         let mut unreachable = 0;
         let mut bounds = self.floor.clone();
         let tolerance = self.problem.tolerance.map(Plane::values);
         for (index, bound) in bounds.values_mut().iter_mut().enumerate() {
-            let wanted = tolerance.map_or(target, |tolerance| target * tolerance[index] * tolerance[index]);
+            let tolerated = tolerance.map_or(1.0, |tolerance| f64::from(tolerance[index]));
+            let wanted = (target * tolerated * tolerated).min(LARGEST_BOUND) as f32;
             // Rounding alone must not call a constraint unreachable.
             if *bound > wanted * 1.000_01 {
                 unreachable += 1;
@@ -118,6 +122,16 @@ impl<'a> Solver<'a> {
             *bound = wanted.max(*bound * UNREACHABLE_SLACK).max(f32::MIN_POSITIVE);
         }
         (bounds, unreachable)
+    }
+
+    /// The greatest visibility that these counts leave, over what is tolerated at its pixel.
+    pub(super) fn reached(&self, samples: &Plane) -> f64 {
+        let tolerance = self.problem.tolerance.map(Plane::values);
+        let squared = self.pooled_noise(samples);
+        let over_tolerance = squared.values().iter().enumerate().map(|(index, &squared)| {
+            f64::from(squared).max(0.0).sqrt() / tolerance.map_or(1.0, |tolerance| f64::from(tolerance[index]))
+        });
+        over_tolerance.fold(0.0, f64::max)
     }
 
     /// Multipliers that would be right if every pixel were alone: n = w / v*², so μ = c w / v*⁴.
@@ -228,13 +242,18 @@ impl<'a> Solver<'a> {
         }
     }
 
-    /// v² over its bound at every pixel.
-    fn excess(&self, samples: &Plane, bounds: &Plane) -> Plane {
+    /// v² at every pixel.
+    fn pooled_noise(&self, samples: &Plane) -> Plane {
         let noise: Vec<f32> =
             self.weight.par_iter().zip(samples.values()).map(|(weight, count)| weight / count).collect();
         let noise = Plane::from_values(self.width(), self.height(), noise)
             .unwrap_or_else(|_| Plane::filled(self.width(), self.height(), f32::INFINITY));
-        let mut excess = gaussian_blur_xy(&noise, self.sigma_px[0], self.sigma_px[1]);
+        gaussian_blur_xy(&noise, self.sigma_px[0], self.sigma_px[1])
+    }
+
+    /// v² over its bound at every pixel.
+    fn excess(&self, samples: &Plane, bounds: &Plane) -> Plane {
+        let mut excess = self.pooled_noise(samples);
         excess.for_each_row_mut(|y, row| {
             row.iter_mut().zip(bounds.row(y)).for_each(|(value, bound)| *value /= bound);
         });

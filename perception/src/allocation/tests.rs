@@ -172,6 +172,17 @@ fn a_budget_is_spent_and_buys_the_lowest_visibility() {
         assert!(found.cost <= budget && found.cost > 0.98 * budget, "{share}: {} of {budget}", found.cost);
         assert!(f64::from(case.worst_visibility(&found.samples)) <= found.visibility * 1.000_1);
     }
+    // However far from the answer the search begins; and what is reported is what is reached.
+    for visibility in [1e-9, 1e-3, 1e4, 1e9] {
+        let problem = AllocationProblem { visibility, ..case.problem() };
+        let found = allocate_budget(&problem, free.cost).unwrap();
+        assert!(found.cost <= free.cost && found.cost > 0.98 * free.cost, "{visibility}: {}", found.cost / free.cost);
+        assert!((found.visibility / f64::from(case.worst_visibility(&found.samples)) - 1.0).abs() < 1e-3);
+    }
+    let capped = AllocationProblem { max_samples: 32.0, ..case.problem() };
+    let rich = allocate_budget(&capped, 1e3 * free.cost).unwrap();
+    let worst = f64::from(case.worst_visibility(&rich.samples));
+    assert!((rich.visibility / worst - 1.0).abs() < 1e-3, "{} is said, {worst} is left", rich.visibility);
     let tiny = allocate_budget(&case.problem(), 1.0).unwrap();
     assert!(tiny.samples.values().iter().all(|&count| count == 16.0));
 }
@@ -211,4 +222,10 @@ fn noise_free_pictures_and_bad_inputs() {
     assert!(ask(AllocationProblem { cost: &Plane::filled(2, 20, 1.0), ..problem }));
     assert!(ask(AllocationProblem { variance_per_sample: &Plane::filled(20, 20, f32::NAN), ..problem }));
     assert!(allocate_budget(&problem, f64::NAN).is_err());
+
+    // What nobody cares about is no reason to sample, however little: its square leaves single precision.
+    let careless = Plane::filled(20, 20, 1e30);
+    let found = allocate(&AllocationProblem { tolerance: Some(&careless), ..Case::patchy(20, 20, 30.0, 8).problem() });
+    let found = found.unwrap();
+    assert!(found.samples.values().iter().all(|&count| count == 16.0) && found.cost.is_finite() && found.gap < 1e-6);
 }

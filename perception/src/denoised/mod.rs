@@ -24,7 +24,7 @@ pub use chromatic::{ChromaticPicture, chromatic_error};
 
 use crate::plane::Plane;
 use crate::threshold::ThresholdMap;
-use crate::visibility::ErrorFilters;
+use crate::visibility::{ErrorFilters, infinite_where_unknown};
 use witness::{BandEvidence, bias_energy};
 
 /// Errors of one channel of a denoised picture, display cd/m². Planes of the threshold map's size.
@@ -147,7 +147,8 @@ impl DenoisedError {
 }
 
 impl ThresholdMap {
-    /// Judges a denoised picture. Planes of another size give infinity everywhere, and no factors.
+    /// Judges a denoised picture. Planes of another size give infinity everywhere, and no factors; pixels of which one is not finite
+    /// are infinitely visible and count as 0 for the others.
     #[must_use]
     pub fn denoised_error(&self, differences: &DenoisedDifferences<'_>) -> DenoisedError {
         let (width, height) = (self.width(), self.height());
@@ -173,7 +174,10 @@ impl ThresholdMap {
             bias_factors.push(found.factor);
             raw_shares.push(share);
         }
-        let seen = |energy: &Plane| energy.map(|energy| (2.0 * energy.max(0.0)).sqrt());
+        let seen = |energy: &Plane| {
+            let visibility = energy.map(|energy| (2.0 * energy.max(0.0)).sqrt());
+            planes.iter().fold(visibility, |visibility, plane| infinite_where_unknown(visibility, plane))
+        };
         let both = variance.combined(&bias, |variance, bias| variance + bias);
         DenoisedError {
             visibility: seen(&both),

@@ -208,6 +208,21 @@ fn planes_of_another_size_are_infinitely_visible() {
     assert!(step_towards_raw(&map, &found, &small).is_none());
 }
 
+#[test]
+fn broken_pixels_are_infinitely_visible() {
+    let map = map_of(&Plane::filled(16, 16, GREY));
+    let fine = Plane::filled(16, 16, 0.0);
+    for broken in 0..3 {
+        let mut planes = [fine.clone(), fine.clone(), fine.clone()];
+        planes[broken].values_mut()[17] = f32::NAN;
+        let [half_difference, residual, residual_half_difference] = &planes;
+        let found = map.denoised_error(&DenoisedDifferences { half_difference, residual, residual_half_difference });
+        for plane in [&found.visibility, &found.variance, &found.bias, &found.blended_visibility] {
+            assert!(plane.get(1, 1).is_infinite() && plane.get(8, 8) == 0.0, "plane {broken}");
+        }
+    }
+}
+
 /// A channel beside luminance counts where it shows more, and nowhere else.
 #[test]
 fn the_channel_that_shows_most_counts() {

@@ -28,15 +28,17 @@ impl Goal {
         Self { cones_cd_m2: luminance_cd_m2, rods_cd_m2: luminance_cd_m2 }
     }
 
-    /// The geometric mean of what is in view, around the gaze where one is given (a Gaussian of σ 5°). What is darker than
+    /// The geometric mean of what is in view, around the gaze where one is given (a Gaussian of σ 5°); of a gaze beside the picture,
+    /// around the picture's nearest pixel, since nothing is known of what is seen there. What is darker than
     /// the floor of vision, 1e-4 cd/m², counts as the floor; without a view the eye is in the dark.
     #[must_use]
     pub fn of(guide: &SceneGuide<'_>, density: PixelDensity) -> Self {
         let average = |plane| match guide.gaze {
             None => log_average_to_eyes(plane),
             Some(gaze) => weighted_log_average_to_eyes(plane, |x, y| {
-                let dx = (x as f64 - gaze.x as f64) / (GAZE_SIGMA_DEG * density.horizontal);
-                let dy = (y as f64 - gaze.y as f64) / (GAZE_SIGMA_DEG * density.vertical);
+                let within = |at: usize, size: usize| at.min(size.saturating_sub(1)) as f64;
+                let dx = (x as f64 - within(gaze.x, plane.width())) / (GAZE_SIGMA_DEG * density.horizontal);
+                let dy = (y as f64 - within(gaze.y, plane.height())) / (GAZE_SIGMA_DEG * density.vertical);
                 (-0.5 * (dx * dx + dy * dy)).exp()
             }),
         };
@@ -187,9 +189,12 @@ struct Ramp {
 impl Ramp {
     /// A' = (G − A) / τ with G on the ramp, solved exactly.
     fn neural(self, start: f64, kinetics: &ReceptorKinetics) -> f64 {
-        let decay = (-self.seconds / kinetics.neural_s).exp();
-        let lag = (self.to - self.from) / self.seconds * kinetics.neural_s;
-        self.to - lag + (start - self.from + lag) * decay
+        let constants = self.seconds / kinetics.neural_s;
+        let decay = (-constants).exp();
+        let gained = -(-constants).exp_m1();
+        // Share of the ramp's end in what is gained: 1 − (1 − e⁻ˣ)/x, whose terms cancel where x is small.
+        let of_end = if constants < 1e-4 { constants * (0.5 - constants / 6.0) } else { 1.0 - gained / constants };
+        start * decay + self.from * (gained - of_end) + self.to * of_end
     }
 
     /// B' = ((1 − B) − B G / G₀) / t₀.

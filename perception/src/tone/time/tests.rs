@@ -96,5 +96,18 @@ fn the_gaze_decides_what_is_adapted_to() {
     let dark = Goal::of(&guide.with_gaze(Some(Pixel { x: 20, y: 20 })), PixelDensity::square(10.0));
     let bright = Goal::of(&guide.with_gaze(Some(Pixel { x: 380, y: 20 })), PixelDensity::square(10.0));
     assert!(dark.cones_cd_m2 < 0.11 && bright.cones_cd_m2 > 990.0, "{dark:?} {bright:?}");
+    let beside = Goal::of(&guide.with_gaze(Some(Pixel { x: 4000, y: 900 })), PixelDensity::square(10.0));
+    assert!(beside.cones_cd_m2 > 990.0, "an eye that looks beside the bright half is not in the dark: {beside:?}");
     close(Goal::of(&SceneGuide::of(&Plane::filled(2, 2, 0.0)), PixelDensity::square(10.0)).rods_cd_m2, 1e-4, 1e-7);
+}
+
+/// However steep a ramp, an eye that has no time for it stays as it is.
+#[test]
+fn a_ramp_in_no_time_changes_nothing() {
+    for seconds in [1e-15, 1e-12, 1e-9, 1e-6] {
+        let state = AdaptationState::adapted_to(Goal::both(1.0), &EYE).looking_at(Goal::both(1e-4));
+        let after = state.after(Goal::both(1e8), seconds, &EYE);
+        let expected = 1.0 + (5e7 - 1.0) * seconds / 0.080;
+        close(after.cones.neural_cd_m2, expected, 1e-4);
+    }
 }
