@@ -5,9 +5,11 @@
 //! stills.
 
 use super::flicker::{FlickerJudge, Steadiness};
+use super::keep::keep;
 use super::metrics::video_jod;
 use super::name::distinct_names;
 use super::reference::trace_up_to;
+use super::viewing;
 use crate::adaptive::settings::{DENOISED_PILOT_SAMPLES, Limits, LoopSettings, Sampling};
 use crate::adaptive::{Quiet, render};
 use crate::animate::eye::Eye;
@@ -21,7 +23,6 @@ use crate::sampler::hash_words;
 use crate::scene::Scene;
 use crate::scene::load::{LoadError, LoadOptions, load};
 use anyhow::{Context, Result};
-use fechner_perception::display::{Display, Viewing};
 use fechner_perception::tone;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -74,6 +75,34 @@ pub struct AnimationRow {
     pub uniform_flicker: Option<f64>,
 }
 
+/// All shots with one denoiser, or with none.
+#[derive(Clone, Debug, Serialize)]
+pub struct AnimationResults {
+    /// What every frame but the references' is denoised with.
+    pub denoiser: Option<String>,
+    /// One a scene and rate.
+    pub rows: Vec<AnimationRow>,
+}
+
+impl AnimationResults {
+    /// Where they are written in a folder, which is made if need be.
+    ///
+    /// # Errors
+    /// A folder that cannot be made.
+    pub fn file(folder: &Path) -> Result<PathBuf> {
+        std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+        Ok(folder.join("animation.json"))
+    }
+
+    /// Writes results with several denoisers.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write(results: &[Self], file: &Path) -> Result<()> {
+        keep(file, results)
+    }
+}
+
 /// Seconds of scene time at which shots begin.
 const START_S: f64 = 0.25;
 /// Keeps the reference's seeds apart.
@@ -117,7 +146,7 @@ struct Bench<'a> {
 impl<'a> Bench<'a> {
     fn new(settings: &'a AnimationSettings, path: &'a Path, name: String, rate: f64) -> Result<Self> {
         let source = Files(path);
-        let display = Display::preset(&settings.display).context("a display preset")?;
+        let viewing = viewing(&settings.display)?;
         let denoiser = settings.denoiser.map(Denoiser::open).transpose()?;
         let mut limits = Limits::of_visibility(settings.visibility);
         if denoiser.is_some() {
@@ -132,7 +161,7 @@ impl<'a> Bench<'a> {
             trace: TraceSettings::new(settings.size.0, settings.size.1, 0),
             sampling: Sampling::Adaptive,
             limits,
-            viewing: Viewing::of(display),
+            viewing,
             nits_per_unit: source.at(0.0)?.nits_per_unit,
             adapted_to_cd_m2: None,
             gaze: None,

@@ -109,8 +109,7 @@ impl Arm {
 
     pub(super) fn settings(self, subject: &Subject, knob: f64, uniform_spp: f64) -> Result<LoopSettings> {
         let mut settings = subject.loop_settings()?;
-        // An arm that needs more than this has lost anyway.
-        let most = (4.0 * uniform_spp).ceil() as u32;
+        let most = most_samples(uniform_spp, settings.limits.pilot_samples);
         let by_model = |settings: &mut LoopSettings, name: &str| -> Result<()> {
             settings.model = Some(model::by_name(name).context("a model")?);
             settings.limits.visibility = Some(knob);
@@ -152,7 +151,24 @@ impl Arm {
     }
 }
 
+/// Most mean samples of an arm: one that needs more than this has lost anyway. Never fewer than the pilot, before which no rule can
+/// choose.
+fn most_samples(uniform_spp: f64, pilot_samples: u32) -> u32 {
+    ((4.0 * uniform_spp).ceil() as u32).max(pilot_samples)
+}
+
 /// Samples a pixel of a knob that stands for a mean count.
 fn samples_of(knob: f64) -> u32 {
     (1.0 / (knob * knob)).ceil().clamp(4.0, 1e9) as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_arm_may_take_its_pilot_however_little_uniform_sampling_needs() {
+        assert_eq!(most_samples(1.5, 16), 16);
+        assert_eq!(most_samples(44.1, 16), 177);
+    }
 }

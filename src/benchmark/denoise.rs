@@ -4,6 +4,7 @@
 //! tile with what can truly be seen of their error, and (2) spends growing budgets by three rules and reads off where the
 //! denoised pictures reach a quality by metrics that none of them optimises. Not for animation.
 
+use super::keep::{keep, kept_or_made};
 use super::metrics::Metrics;
 use super::name::distinct_names;
 use super::reference::Reference;
@@ -14,7 +15,8 @@ use crate::adaptive::{Quiet, render};
 use crate::denoise::{Denoiser, DenoiserKind, denoise_film};
 use anyhow::Result;
 use fechner_perception::Plane;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// Side of a tile, pixels.
@@ -40,7 +42,7 @@ pub struct DenoisingSettings {
 }
 
 /// The law against the truth for one picture.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Calibration {
     /// Scene.
     pub scene: String,
@@ -50,12 +52,12 @@ pub struct Calibration {
     pub spp: u32,
     /// Seed.
     pub seed: u64,
-    /// Spearman's rank correlation of predicted and true visibility over tiles.
-    pub rank_correlation: f64,
-    /// Root of the ratio of predicted to true energy over the picture.
-    pub predicted_over_true: f64,
+    /// Spearman's rank correlation of predicted and true visibility over tiles; `None` where all tiles are alike.
+    pub rank_correlation: Option<f64>,
+    /// Root of the ratio of predicted to true energy over the picture; `None`, as in the next, where nothing is truly wrong.
+    pub predicted_over_true: Option<f64>,
     /// The same by the variance alone.
-    pub variance_over_true: f64,
+    pub variance_over_true: Option<f64>,
     /// Share of tiles called fine, and proven, whose true visibility is above 1.5 times the target.
     pub wrong_share: f64,
     /// The same among tiles called fine without proof.
@@ -119,7 +121,8 @@ pub fn denoising(settings: &DenoisingSettings, say: &dyn Fn(&str)) -> Result<Den
         for denoiser in &denoisers {
             for spp in JUDGED {
                 for seed in 0..u64::from(settings.bench.seeds) {
-                    results.calibrations.push(scene.calibration(denoiser, spp, seed)?);
+                    let file = scene.file(denoiser, "law", spp, seed);
+                    results.calibrations.push(kept_or_made(&file, || scene.calibration(denoiser, spp, seed))?);
                 }
             }
             if settings.with_races {
@@ -130,9 +133,7 @@ pub fn denoising(settings: &DenoisingSettings, say: &dyn Fn(&str)) -> Result<Den
         }
         say(&format!("{}: done", subject.name));
     }
-    let text = serde_json::to_string_pretty(&results)?;
-    let file = settings.bench.output.join("denoise.json");
-    crate::output::write_beside(&file, |file| std::io::Write::write_all(file, text.as_bytes()))?;
+    keep(&settings.bench.output.join("denoise.json"), &results)?;
     Ok(results)
 }
 
@@ -177,6 +178,7 @@ impl SceneBench<'_> {
         let is_fine = |i: usize| predictions[i] <= fine;
         let is_unproven = |i: usize| is_fine(i) && unproven[i] > 0.5;
         let mean_square = |plane: &Plane| plane.map(|v| v * v).mean();
+        let over_true = |energy: f64| Some((energy / true_energy.mean()).sqrt()).filter(|ratio| ratio.is_finite());
         let (raw, denoised) = (self.measured(&found.estimate.rgb_cd_m2)?, self.measured(&picture.rgb_cd_m2)?);
         let tracing = rendered.seconds_total - rendered.seconds_perception;
         let started = Instant::now();
@@ -187,8 +189,8 @@ impl SceneBench<'_> {
             spp,
             seed,
             rank_correlation: rank_correlation(&predictions, &truths),
-            predicted_over_true: (predicted.mean() / true_energy.mean()).sqrt(),
-            variance_over_true: (mean_square(&picture.error.variance) / true_energy.mean()).sqrt(),
+            predicted_over_true: over_true(predicted.mean()),
+            variance_over_true: over_true(mean_square(&picture.error.variance)),
             wrong_share: share(&|i| is_fine(i) && !is_unproven(i) && truths[i] > wrong),
             wrong_unproven_share: share(&|i| is_unproven(i) && truths[i] > wrong),
             fine_share: share(&is_fine),
@@ -208,32 +210,46 @@ impl SceneBench<'_> {
         for spp in BUDGETS {
             let mut sums = [0.0; 4];
             for seed in 0..u64::from(self.settings.bench.seeds) {
-                let mut settings = self.loop_settings(denoiser, spp)?;
-                match rule {
-                    "uniform" => {
-                        settings.sampling = Sampling::Uniform;
-                        settings.limits.visibility = None;
-                        settings.limits.pilot_samples = spp;
-                    }
-                    "relative" => {
-                        // Its noise falls as the root of the count; what 16 samples a pixel leave is about 0.1.
-                        let threshold = 0.4 / f64::from(spp).sqrt();
-                        settings.sampling = Sampling::Rival(RivalRule::Relative { threshold });
-                        settings.limits.mean_samples = Some(8 * spp);
-                        settings.limits.pilot_samples = 16;
-                    }
-                    _ => settings.limits.visibility = Some(0.01),
-                }
-                let tracer = self.subject.tracer(seed);
-                let rendered = render(&tracer, &settings, &Quiet)?;
-                let metrics = self.measured(rendered.judgement.picture())?;
-                let spent = rendered.film.total_samples() as f64 / self.subject.pixels();
-                let values = [spent, metrics.jod, metrics.flip_mean, rendered.seconds_total];
+                let file = self.file(denoiser, rule, spp, seed);
+                let values = kept_or_made(&file, || self.lap(denoiser, rule, spp, seed))?;
                 sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
             }
             points.push(sums.map(|sum| sum / f64::from(self.settings.bench.seeds)));
         }
         Ok(Race { scene: self.subject.name.clone(), denoiser: denoiser.name(), rule, points })
+    }
+
+    /// One render of a race: what a point holds.
+    fn lap(&self, denoiser: &Denoiser, rule: &str, spp: u32, seed: u64) -> Result<[f64; 4]> {
+        let mut settings = self.loop_settings(denoiser, spp)?;
+        match rule {
+            "uniform" => {
+                settings.sampling = Sampling::Uniform;
+                settings.limits.visibility = None;
+                settings.limits.pilot_samples = spp;
+            }
+            "relative" => {
+                // Its noise falls as the root of the count; what 16 samples a pixel leave is about 0.1.
+                let threshold = 0.4 / f64::from(spp).sqrt();
+                settings.sampling = Sampling::Rival(RivalRule::Relative { threshold });
+                settings.limits.mean_samples = Some(8 * spp);
+                settings.limits.pilot_samples = 16;
+            }
+            _ => settings.limits.visibility = Some(0.01),
+        }
+        let rendered = render(&self.subject.tracer(seed), &settings, &Quiet)?;
+        let metrics = self.measured(rendered.judgement.picture())?;
+        let spent = rendered.film.total_samples() as f64 / self.subject.pixels();
+        Ok([spent, metrics.jod, metrics.flip_mean, rendered.seconds_total])
+    }
+
+    /// Where a render is kept, by all that it depends on.
+    fn file(&self, denoiser: &Denoiser, what: &str, spp: u32, seed: u64) -> PathBuf {
+        let key = self.subject.key(self.settings.bench.reference_factor);
+        let text = format!("{key}|{}|{}", self.settings.target, denoiser.name());
+        let key = &blake3::hash(text.as_bytes()).to_hex()[..16];
+        let name = format!("{}-{key}-denoised-{what}-{spp}-{seed}.json", self.subject.file_name());
+        self.settings.bench.output.join("runs").join(name)
     }
 }
 
@@ -248,20 +264,25 @@ fn tiles(plane: &Plane) -> Vec<f64> {
     (0..columns * rows).map(mean).collect()
 }
 
-/// Spearman's rank correlation.
-fn rank_correlation(a: &[f64], b: &[f64]) -> f64 {
+/// Spearman's rank correlation; `None` where one of the two is the same everywhere, and no rank correlates.
+fn rank_correlation(a: &[f64], b: &[f64]) -> Option<f64> {
     let (a, b) = (ranks(a), ranks(b));
     let mean = (a.len() as f64 - 1.0) / 2.0;
     let product = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| (x - mean) * (y - mean)).sum::<f64>();
-    product(&a, &b) / (product(&a, &a) * product(&b, &b)).sqrt()
+    Some(product(&a, &b) / (product(&a, &a) * product(&b, &b)).sqrt()).filter(|correlation| correlation.is_finite())
 }
 
-/// Each value's place in ascending order.
+/// Each value's place in ascending order; equal values have the mean of their places.
 fn ranks(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
-    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]).then(a.cmp(&b)));
+    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
     let mut ranks = vec![0.0; values.len()];
-    order.into_iter().enumerate().for_each(|(rank, index)| ranks[index] = rank as f64);
+    let mut first = 0;
+    for equal in order.chunk_by(|&a, &b| values[a] == values[b]) {
+        let mean = first as f64 + (equal.len() as f64 - 1.0) / 2.0;
+        equal.iter().for_each(|&index| ranks[index] = mean);
+        first += equal.len();
+    }
     ranks
 }
 
@@ -300,8 +321,18 @@ mod tests {
     #[test]
     fn ranks_agree_or_disagree() {
         let values = [3.0, 1.0, 2.0, 10.0];
-        assert!((rank_correlation(&values, &values.map(|v| v * v)) - 1.0).abs() < 1e-12);
-        assert!((rank_correlation(&values, &values.map(|v| -v)) + 1.0).abs() < 1e-12);
+        let correlation = |other: [f64; 4]| rank_correlation(&values, &other).expect("values differ");
+        assert!((correlation(values.map(|v| v * v)) - 1.0).abs() < 1e-12);
+        assert!((correlation(values.map(|v| -v)) + 1.0).abs() < 1e-12);
+    }
+
+    /// Equal values share a rank; otherwise these would seem to agree by the order in which they are listed.
+    #[test]
+    fn ties_have_no_order() {
+        assert_eq!(ranks(&[7.0, 1.0, 7.0, 0.0]), [2.5, 1.0, 2.5, 0.0]);
+        assert_eq!(rank_correlation(&[1.0; 4], &[1.0, 2.0, 3.0, 4.0]), None);
+        let (a, b) = ([0.0, 0.0, 1.0, 1.0], [0.0, 1.0, 0.0, 1.0]);
+        assert_eq!(rank_correlation(&a, &b), Some(0.0));
     }
 
     #[test]

@@ -12,24 +12,28 @@ mod arm;
 mod curve;
 mod denoise;
 mod flicker;
+mod keep;
+mod knob;
 mod metrics;
 mod name;
 mod oracle;
 mod pictures;
 mod plot;
+mod quote;
 mod record;
 mod reference;
 mod report;
 mod runner;
 mod summary;
+mod table;
 mod truth;
 
-pub use animation::{AnimationRow, AnimationSettings, animation};
+pub use animation::{AnimationResults, AnimationRow, AnimationSettings, animation};
 pub use arm::Arm;
 pub use curve::{Curve, CurvePoint};
 pub use denoise::{Calibration, DenoisingResults, DenoisingSettings, Race, denoising};
 pub use metrics::{Metrics, measure};
-pub use record::{Record, Results};
+pub use record::{ArmSummary, Record, Results};
 pub use reference::trace_up_to;
 
 use crate::adaptive::settings::{Limits, LoopSettings};
@@ -71,6 +75,12 @@ pub struct BenchSettings {
 /// Shares of the picture that have to be below v\*.
 pub const COVERAGES: [f64; 3] = [0.95, 0.99, 0.999];
 
+/// How a display preset is looked at.
+fn viewing(display: &str) -> Result<Viewing> {
+    let known = || format!("there is no display \"{display}\"; known: {}", Display::preset_names().join(", "));
+    Ok(Viewing::of(Display::preset(display).with_context(known)?))
+}
+
 /// One scene, ready to be rendered by any arm.
 pub(crate) struct Subject {
     /// No other scene's of the same run: the file's name without its ending, with folders before it where others have that name.
@@ -83,16 +93,9 @@ pub(crate) struct Subject {
 
 impl Subject {
     fn load(path: &Path, name: String, settings: &BenchSettings) -> Result<Self> {
+        let viewing = viewing(&settings.display)?;
         let scene = load(path, &LoadOptions::default())?;
-        let display = Display::preset(&settings.display)
-            .with_context(|| format!("there is no display \"{}\"", settings.display))?;
-        Ok(Self {
-            name,
-            scene: Arc::new(scene),
-            size: settings.size,
-            viewing: Viewing::of(display),
-            visibility: settings.visibility,
-        })
+        Ok(Self { name, scene: Arc::new(scene), size: settings.size, viewing, visibility: settings.visibility })
     }
 
     /// How names of files about this scene begin.
@@ -180,7 +183,7 @@ pub fn run(settings: &BenchSettings, say: &dyn Fn(&str)) -> Result<Results> {
         let mut runner = ArmRunner::new(&subject, &reference, &truth, settings);
         for &arm in &settings.arms {
             let runs = runner.runs(arm, say)?;
-            results.add(&subject, &reference, arm, &runs);
+            results.add(&subject.name, arm, &runs);
             results.pictures.push(runner.pictures(arm));
             results.curves.extend(runner.curve(arm, &runs)?);
         }

@@ -7,20 +7,35 @@ use std::path::{Path, PathBuf};
 /// as tell them apart. Files that differ by their ending alone keep it.
 ///
 /// # Errors
-/// If a scene is named twice.
+/// If a scene is named twice, be it by two spellings of its path.
 pub(super) fn distinct_names(scenes: &[PathBuf]) -> Result<Vec<String>> {
+    check_are_distinct(scenes)?;
     let name_of = |(place, scene): (usize, &PathBuf)| {
         let others = || scenes.iter().enumerate().filter(|(other, _)| *other != place).map(|(_, scene)| scene);
-        if others().any(|other| other == scene) {
-            bail!("{}: named twice, and results are told apart by scene: name it once", scene.display());
-        }
         let is_its_own = |parts: &usize| others().all(|other| last_parts(other, *parts) != last_parts(scene, *parts));
         // Beyond its own parts a path stays as it is, while those of others grow.
         let most_parts = scenes.iter().map(|scene| scene.components().count()).max().unwrap_or(0);
         let parts = (1..=most_parts).find(is_its_own);
-        Ok(parts.map_or_else(|| scene.clone(), |parts| last_parts(scene, parts)).display().to_string())
+        parts.map_or_else(|| scene.clone(), |parts| last_parts(scene, parts)).display().to_string()
     };
-    scenes.iter().enumerate().map(name_of).collect()
+    Ok(scenes.iter().enumerate().map(name_of).collect())
+}
+
+fn check_are_distinct(scenes: &[PathBuf]) -> Result<()> {
+    // A file that is not there is told of when it is loaded.
+    let file = |scene: &PathBuf| scene.canonicalize().unwrap_or_else(|_| scene.clone());
+    let files: Vec<PathBuf> = scenes.iter().map(file).collect();
+    for (place, scene) in scenes.iter().enumerate() {
+        let Some(first) = files.iter().position(|file| *file == files[place]).filter(|first| *first < place) else {
+            continue;
+        };
+        let spelling = match &scenes[first] {
+            first if first.as_os_str() == scene.as_os_str() => String::new(),
+            first => format!(", here and as {}", first.display()),
+        };
+        bail!("{}: named twice{spelling}, and results are told apart by scene: name it once", scene.display());
+    }
+    Ok(())
 }
 
 /// The end of a path without its ending: so many parts of it, or all.
@@ -48,5 +63,18 @@ mod tests {
         assert_eq!(named(&["box.toml", "a/box.toml"]), ["box", "a/box"]);
         assert_eq!(named(&["a/box.toml", "a/box.glb"]), ["a/box.toml", "a/box.glb"]);
         assert!(names(&["a/box.toml", "a/box.toml"]).is_err());
+    }
+
+    #[test]
+    fn a_scene_is_one_by_whatever_path() {
+        let folder = tempfile::tempdir().expect("a folder");
+        std::fs::create_dir(folder.path().join("a")).expect("made");
+        std::fs::write(folder.path().join("box.toml"), "").expect("written");
+        let paths = ["box.toml", "a/../box.toml"].map(|path| folder.path().join(path));
+        let error = distinct_names(&paths).expect_err("one file").to_string();
+        assert!(
+            error.contains("a/../box.toml: named twice, here and as ") && error.ends_with("name it once"),
+            "{error}"
+        );
     }
 }

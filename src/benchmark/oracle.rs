@@ -35,10 +35,10 @@ pub(crate) fn displayed_variance(subject: &Subject, reference: &Reference, truth
     Ok(equivalent.map(|variance| variance * spp))
 }
 
-/// Samples a pixel that uniform sampling needs for v\* on this share of the picture.
+/// Samples a pixel that uniform sampling needs for v\* on this share of the picture; at least one.
 pub(crate) fn uniform_samples(subject: &Subject, truth: &Truth, variance: &Plane, coverage: f64) -> f64 {
     let hardest = truth.thresholds.achromatic.predicted_visibility(variance).quantile(coverage);
-    (hardest / subject.visibility).powi(2)
+    (hardest / subject.visibility).powi(2).max(1.0)
 }
 
 /// The least samples a pixel that any rule could take for a visibility on this share of the picture: the pixels that uniform

@@ -7,12 +7,27 @@ use anyhow::Result;
 use fechner_perception::{Eotf, Plane};
 use std::path::{Path, PathBuf};
 
-/// File endings and titles.
-const KINDS: [(&str, &str); 3] = [
-    ("picture", "as displayed"),
-    ("samples", "samples a pixel (log scale, 16 to 16384)"),
-    ("visible", "true v / v*, 0 to 2"),
+/// A kind of picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Kind {
+    ending: &'static str,
+    pub(crate) title: &'static str,
+    /// What the colours of a map mean, from the least to the greatest, evenly spaced; none of a picture as displayed.
+    pub(crate) scale: &'static [&'static str],
+}
+
+const KINDS: [Kind; 3] = [
+    Kind { ending: "picture", title: "as displayed", scale: &[] },
+    Kind { ending: "samples", title: "samples a pixel", scale: &["≤ 16", "64", "256", "1024", "4096", "≥ 16384"] },
+    Kind { ending: "visible", title: "true v / v*", scale: &["0", "0.5", "1", "1.5", "≥ 2"] },
 ];
+
+/// A picture of the report.
+#[derive(Clone, Debug)]
+pub(crate) struct ShownPicture {
+    pub(crate) kind: Kind,
+    pub(crate) png: Vec<u8>,
+}
 
 /// Writes a render's pictures beside its record.
 pub(crate) fn write_pictures(
@@ -27,20 +42,25 @@ pub(crate) fn write_pictures(
     let counts: Vec<[f32; 3]> = counts.map(|share| heat(share as f32)).collect();
     let target = subject.visibility as f32;
     let visible: Vec<[f32; 3]> = squared_visibility.values().iter().map(|v| heat(v.sqrt() / target / 2.0)).collect();
-    for ((ending, _), rgb) in KINDS.iter().zip([picture, &counts, &visible]) {
-        write_png(&file(record, ending), width, height, rgb)?;
+    for (kind, rgb) in KINDS.iter().zip([picture, &counts, &visible]) {
+        write_png(&file(record, kind.ending), width, height, rgb)?;
     }
     Ok(())
 }
 
-/// Titles and bytes of the pictures beside a record; empty if they are not there.
-pub(crate) fn read_pictures(record: &Path) -> Vec<(String, Vec<u8>)> {
-    let read = |(ending, title): &(&str, &str)| Some(((*title).to_owned(), std::fs::read(file(record, ending)).ok()?));
+/// The pictures beside a record; empty if they are not there.
+pub(super) fn read_pictures(record: &Path) -> Vec<ShownPicture> {
+    let read = |&kind: &Kind| Some(ShownPicture { kind, png: std::fs::read(file(record, kind.ending)).ok()? });
     KINDS.iter().filter_map(read).collect()
 }
 
 fn file(record: &Path, ending: &str) -> PathBuf {
     record.with_extension(format!("{ending}.png"))
+}
+
+/// The colour map's codes of sRGB, 0..1, at so many even steps from its least to its greatest.
+pub(super) fn heat_codes(steps: usize) -> impl Iterator<Item = [f32; 3]> {
+    (0..=steps).map(move |step| flip_rs::MAGMA[255 * step / steps.max(1)])
 }
 
 /// Linear light of a share of 0..1 in the colour map of FLIP.

@@ -33,8 +33,10 @@ struct Scale {
 }
 
 impl Scale {
-    fn of(axis: Axis, curves: &[&Curve]) -> Option<Self> {
+    /// An axis on which all curves and a mark can be seen.
+    fn of(axis: Axis, curves: &[&Curve], mark: Option<f64>) -> Option<Self> {
         let values = curves.iter().flat_map(|curve| &curve.points).map(axis.of);
+        let values = values.chain(mark.filter(|_| !curves.is_empty()));
         let is_shown = |v: &f64| v.is_finite() && (!axis.is_logarithmic || *v > 0.0);
         let (least, greatest) =
             values.filter(is_shown).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
@@ -59,11 +61,12 @@ impl Scale {
     }
 }
 
-fn colour(arm: &str) -> &'static str {
+/// The style's name for an arm's colour.
+fn class(arm: &str) -> &'static str {
     match arm {
-        "as-asked" => "#c2410c",
-        "relative" => "#0369a1",
-        _ => "#64748b",
+        "as-asked" => "ours",
+        "relative" => "relative",
+        _ => "other",
     }
 }
 
@@ -79,67 +82,97 @@ fn in_short(value: f64) -> String {
     }
 }
 
-/// Every metric over samples and over time.
-pub(super) fn plots(curves: &[&Curve]) -> String {
-    let mut text = String::new();
-    for x in [SAMPLES, SECONDS] {
-        for y in [VISIBILITY, FLIP, JOD, RELMSE] {
-            text.push_str(&plot(curves, x, y).unwrap_or_default());
-        }
-        text.push_str("<br>");
-    }
-    text
+/// Every metric over samples and over time, with a line at v\*, `target`.
+pub(super) fn plots(curves: &[&Curve], target: f64) -> String {
+    let metrics = [(VISIBILITY, Some(target)), (FLIP, None), (JOD, None), (RELMSE, None)];
+    let row = |x: Axis| metrics.iter().filter_map(|&(y, mark)| plot(curves, x, y, mark)).collect::<String>();
+    let rows = [SAMPLES, SECONDS].map(row).into_iter().filter(|row| !row.is_empty());
+    rows.map(|row| format!("<div class=\"plots\">\n{row}</div>\n")).collect()
 }
 
-fn plot(curves: &[&Curve], x: Axis, y: Axis) -> Option<String> {
-    let (x, y) = (Scale::of(x, curves)?, Scale::of(y, curves)?);
-    let at_x = |value: f64| LEFT + (WIDTH - LEFT - RIGHT) * x.place(value);
-    let at_y = |value: f64| HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * y.place(value);
-    let label = format!("{} over {}", y.axis.title, x.axis.title);
-    let mut text = format!("<svg width=\"{WIDTH}\" height=\"{HEIGHT}\" role=\"img\" aria-label=\"{label}\">");
-    let _ = write!(text, "<text x=\"{LEFT}\" y=\"14\">{label}</text>");
-    for tick in x.ticks() {
-        let (x, bottom) = (at_x(tick), HEIGHT - BOTTOM);
-        let _ = write!(
-            text,
-            "<line x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{TOP}\" y2=\"{bottom}\" stroke=\"#e2e2e6\"/><text x=\"{x:.1}\" y=\"{}\" \
-             text-anchor=\"middle\">{}</text>",
-            bottom + 16.0,
-            in_short(tick)
-        );
+/// Two axes in the picture's units.
+struct Frame {
+    x: Scale,
+    y: Scale,
+}
+
+impl Frame {
+    fn left_of(&self, value: f64) -> f64 {
+        LEFT + (WIDTH - LEFT - RIGHT) * self.x.place(value)
     }
-    for tick in y.ticks() {
-        let (y, right) = (at_y(tick), WIDTH - RIGHT);
-        let _ = write!(
-            text,
-            "<line x1=\"{LEFT}\" x2=\"{right}\" y1=\"{y:.1}\" y2=\"{y:.1}\" stroke=\"#e2e2e6\"/><text x=\"{}\" y=\"{:.1}\" \
-             text-anchor=\"end\">{}</text>",
-            LEFT - 6.0,
-            y + 4.0,
-            in_short(tick)
-        );
+
+    fn top_of(&self, value: f64) -> f64 {
+        HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * self.y.place(value)
     }
-    for (place, curve) in curves.iter().enumerate() {
-        let colour = colour(curve.arm);
-        let line: Vec<String> = curve
+
+    fn place(&self, point: &CurvePoint) -> (f64, f64) {
+        (self.left_of((self.x.axis.of)(point)), self.top_of((self.y.axis.of)(point)))
+    }
+
+    fn grid(&self) -> String {
+        let (right, bottom) = (WIDTH - RIGHT, HEIGHT - BOTTOM);
+        let mut text = String::new();
+        for tick in self.x.ticks() {
+            let (x, label) = (self.left_of(tick), in_short(tick));
+            let _ = write!(
+                text,
+                "<line class=\"grid\" x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{TOP}\" y2=\"{bottom}\"/>\
+                 <text x=\"{x:.1}\" y=\"{}\" text-anchor=\"middle\">{label}</text>",
+                bottom + 16.0
+            );
+        }
+        for tick in self.y.ticks() {
+            let (y, label) = (self.top_of(tick), in_short(tick));
+            let _ = write!(
+                text,
+                "<line class=\"grid\" x1=\"{LEFT}\" x2=\"{right}\" y1=\"{y:.1}\" y2=\"{y:.1}\"/>\
+                 <text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{label}</text>",
+                LEFT - 6.0,
+                y + 4.0
+            );
+        }
+        text
+    }
+
+    /// The line at v\*.
+    fn target_line(&self, target: f64) -> String {
+        let (y, right) = (self.top_of(target), WIDTH - RIGHT);
+        format!(
+            "<line class=\"target\" x1=\"{LEFT}\" x2=\"{right}\" y1=\"{y:.1}\" y2=\"{y:.1}\"/>\
+             <text class=\"target\" x=\"{:.1}\" y=\"{:.1}\">v*</text>",
+            right + 4.0,
+            y + 4.0
+        )
+    }
+
+    fn curve(&self, curve: &Curve) -> String {
+        let line: Vec<String> =
+            curve.points.iter().map(|point| self.place(point)).map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
+        let circles: String = curve
             .points
             .iter()
-            .map(|point| format!("{:.1},{:.1}", at_x((x.axis.of)(point)), at_y((y.axis.of)(point))))
+            .map(|point| self.place(point))
+            .map(|(x, y)| format!("<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\"/>"))
             .collect();
-        let _ = write!(
-            text,
-            "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"/>",
-            line.join(" ")
-        );
-        for at in &line {
-            if let Some((x, y)) = at.split_once(',') {
-                let _ = write!(text, "<circle cx=\"{x}\" cy=\"{y}\" r=\"3\" fill=\"{colour}\"/>");
-            }
-        }
-        let left = LEFT + 110.0 * place as f64;
-        let _ = write!(text, "<text x=\"{left}\" y=\"{}\" fill=\"{colour}\">{}</text>", HEIGHT - 6.0, curve.arm);
+        format!("<polyline points=\"{}\"/>{circles}", line.join(" "))
     }
-    text.push_str("</svg>");
+}
+
+fn plot(curves: &[&Curve], x: Axis, y: Axis, mark: Option<f64>) -> Option<String> {
+    let frame = Frame { x: Scale::of(x, curves, None)?, y: Scale::of(y, curves, mark)? };
+    let label = format!("{} over {}", y.title, x.title);
+    let mut text = format!(
+        "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{label}\"><text class=\"title\" x=\"{LEFT}\" \
+         y=\"14\">{label}</text>{}{}",
+        frame.grid(),
+        mark.map_or_else(String::new, |target| frame.target_line(target))
+    );
+    for (place, curve) in curves.iter().enumerate() {
+        let (class, left) = (class(curve.arm), LEFT + 110.0 * place as f64);
+        let (line, name) = (frame.curve(curve), curve.arm);
+        let _ = write!(text, "<g class=\"{class}\">{line}<text x=\"{left}\" y=\"{}\">{name}</text></g>", HEIGHT - 6.0);
+    }
+    text.push_str("</svg>\n");
     Some(text)
 }
 
@@ -158,10 +191,30 @@ mod tests {
             relmse: f64::NAN,
         };
         let curve = Curve { scene: "s".into(), arm: "uniform", points: vec![point(16.0, 8.0), point(64.0, 9.0)] };
-        let text = plot(&[&curve], SAMPLES, JOD).expect("a plot");
+        let text = plot(&[&curve], SAMPLES, JOD, None).expect("a plot");
         assert!(text.contains("points=\"58.0,190.0 378.0,26.0\""), "{text}");
-        assert!(plot(&[&curve], SAMPLES, RELMSE).is_none());
-        assert!(plot(&[], SAMPLES, JOD).is_none());
-        assert!(!plots(&[&curve]).contains("NaN"));
+        assert!(plot(&[&curve], SAMPLES, RELMSE, None).is_none());
+        assert!(plot(&[], SAMPLES, JOD, None).is_none() && plot(&[], SAMPLES, VISIBILITY, Some(1.0)).is_none());
+        assert!(!plots(&[&curve], 1.0).contains("NaN"));
+    }
+
+    /// Visibilities of 1/16 and 1/64: a target above them all lies at the top, one between them between.
+    #[test]
+    fn the_target_is_a_line_within_the_frame() {
+        let point = |samples: f64| CurvePoint {
+            samples,
+            seconds: 1.0,
+            visibility: 1.0 / samples,
+            flip_mean: 0.1,
+            jod: 9.0,
+            relmse: 0.1,
+        };
+        let curve = Curve { scene: "s".into(), arm: "uniform", points: vec![point(16.0), point(64.0)] };
+        for (target, y) in [(1.0, "26.0"), (1.0 / 32.0, "108.0")] {
+            let text = plot(&[&curve], SAMPLES, VISIBILITY, Some(target)).expect("a plot");
+            let line = format!("<line class=\"target\" x1=\"58\" x2=\"378\" y1=\"{y}\" y2=\"{y}\"/>");
+            assert!(text.contains(&line), "{text}");
+        }
+        assert_eq!(plots(&[&curve], 1.0).matches("v*</text>").count(), 2);
     }
 }

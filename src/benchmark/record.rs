@@ -2,11 +2,12 @@
 
 use super::arm::Arm;
 use super::curve::Curve;
-use super::reference::Reference;
+use super::pictures::ShownPicture;
 use super::report::html;
-use super::runner::Run;
+use super::runner::{EnergyBias, Run};
 use super::summary::{GeometricMean, geometric_mean};
-use super::{BenchSettings, COVERAGES, Subject};
+use super::table::csv;
+use super::{BenchSettings, COVERAGES};
 use anyhow::Result;
 use fechner_perception::Plane;
 use serde::Serialize;
@@ -21,7 +22,7 @@ pub struct Record {
     pub scene: String,
     /// Arm.
     pub arm: &'static str,
-    /// Seed; `None` for all seeds pooled (mean of v² over them).
+    /// Seed; `None` for all seeds pooled (mean over them of v², and of what each pixel's v² needs).
     pub seed: Option<u64>,
     /// Share of the picture that has to be at v\*.
     pub coverage: f64,
@@ -31,16 +32,17 @@ pub struct Record {
     pub seconds: f64,
     /// True v at this coverage over v\* in the render itself.
     pub reached: f64,
-    /// Uniform sampling's need over this arm's.
-    pub speedup_samples: f64,
+    /// Uniform sampling's need over this arm's; `None`, as in the next two, where there is nobody to compare with, or one of the
+    /// two needs nothing since nothing of its error can be seen.
+    pub speedup_samples: Option<f64>,
     /// The same in seconds.
-    pub speedup_seconds: f64,
+    pub speedup_seconds: Option<f64>,
     /// The oracle's samples over this arm's.
     pub efficiency: Option<f64>,
-    /// Mean luminance over the reference's, less 1.
-    pub energy_bias: f64,
+    /// Mean luminance over the reference's, less 1; `None` where the reference is black.
+    pub energy_bias: Option<f64>,
     /// Half width of its 95 % interval.
-    pub energy_bias_ci: f64,
+    pub energy_bias_ci: Option<f64>,
     /// Share of pixels that ended with true v above 1.25 v\*.
     pub overshoot_fraction: f64,
     /// Share of the time that is not tracing.
@@ -57,6 +59,14 @@ pub struct Record {
     pub relmse: f64,
 }
 
+impl Record {
+    /// "+0.12 ± 0.69 %", or a dash where the reference is black.
+    pub(crate) fn energy_bias_in_words(&self) -> String {
+        let (Some(bias), Some(margin)) = (self.energy_bias, self.energy_bias_ci) else { return "–".to_owned() };
+        format!("{:+.2} ± {:.2} %", 100.0 * bias, 100.0 * margin)
+    }
+}
+
 /// Everything over all scenes at one coverage for one arm.
 #[derive(Clone, Debug, Serialize)]
 pub struct ArmSummary {
@@ -64,10 +74,10 @@ pub struct ArmSummary {
     pub arm: &'static str,
     /// Coverage.
     pub coverage: f64,
-    /// Uniform's samples over the arm's.
-    pub speedup_samples: GeometricMean,
+    /// Uniform's samples over the arm's; `None`, as in the next two, where no scene has such a ratio.
+    pub speedup_samples: Option<GeometricMean>,
     /// The same in seconds.
-    pub speedup_seconds: GeometricMean,
+    pub speedup_seconds: Option<GeometricMean>,
     /// Oracle's samples over the arm's.
     pub efficiency: Option<GeometricMean>,
 }
@@ -102,14 +112,13 @@ pub struct Results {
 pub(crate) struct ScenePictures {
     pub(crate) scene: String,
     pub(crate) arm: &'static str,
-    /// Title and PNG bytes.
-    pub(crate) pictures: Vec<(String, Vec<u8>)>,
+    pub(crate) pictures: Vec<ShownPicture>,
 }
 
 impl Results {
     pub(crate) fn new(settings: &BenchSettings) -> Self {
         Self {
-            schema: 1,
+            schema: 2,
             fechner_version: env!("CARGO_PKG_VERSION"),
             size: settings.size,
             visibility: settings.visibility,
@@ -122,61 +131,50 @@ impl Results {
         }
     }
 
-    /// Adds an arm's runs of a scene: a record each, and one for all of them pooled.
-    pub(crate) fn add(&mut self, subject: &Subject, reference: &Reference, arm: Arm, runs: &[Run]) {
-        let pixels = subject.pixels();
-        let planes: Vec<&Plane> = runs.iter().filter_map(|run| run.squared_visibility.as_ref()).collect();
-        let mean = |of: fn(&Run) -> f64| runs.iter().map(of).sum::<f64>() / runs.len() as f64;
-        let mut pooled = Run {
-            seed: 0,
-            knob: None,
-            samples: mean(|r| r.samples as f64) as u64,
-            seconds: mean(|r| r.seconds),
-            seconds_perception: mean(|r| r.seconds_perception),
-            seconds_last_look: mean(|r| r.seconds_last_look),
-            energy_bias: mean(|r| r.energy_bias),
-            energy_bias_standard_error: pooled_bias_error(runs),
-            energy_bias_reference_error: mean(|r| r.energy_bias_reference_error),
-            flip_mean: mean(|r| r.flip_mean),
-            flip_p99: mean(|r| r.flip_p99),
-            jod: mean(|r| r.jod),
-            relmse: mean(|r| r.relmse),
-            audit_ratio: None,
-            squared_visibility: None,
-        };
-        pooled.squared_visibility = Some(Plane::from_fn(reference.width, reference.height, |x, y| {
-            planes.iter().map(|plane| plane.get(x, y)).sum::<f32>() / planes.len() as f32
-        }));
-        let all = runs.iter().map(|run| (Some(run.seed), run)).chain(std::iter::once((None, &pooled)));
-        for (seed, run) in all {
-            let Some(energy) = &run.squared_visibility else { continue };
-            let target = subject.visibility * subject.visibility;
-            let above = energy.values().iter().filter(|&&v| f64::from(v) > 1.5625 * target).count();
-            for coverage in COVERAGES {
-                let scale = energy.quantile(coverage) / target;
-                self.records.push(Record {
-                    scene: subject.name.clone(),
-                    arm: arm.name(),
-                    seed,
-                    coverage,
-                    samples: run.samples as f64 / pixels * scale,
-                    seconds: run.seconds * scale,
-                    reached: scale.sqrt(),
-                    speedup_samples: 0.0,
-                    speedup_seconds: 0.0,
-                    efficiency: None,
-                    energy_bias: run.energy_bias,
-                    energy_bias_ci: 1.96 * run.energy_bias_standard_error,
-                    overshoot_fraction: above as f64 / energy.values().len() as f64,
-                    overhead: run.seconds_perception / run.seconds,
-                    last_look: run.seconds_last_look / run.seconds,
-                    flip_mean: run.flip_mean,
-                    flip_p99: run.flip_p99,
-                    jod: run.jod,
-                    relmse: run.relmse,
-                });
-            }
+    /// Adds an arm's runs of a scene: records of each, and of all of them pooled.
+    pub(crate) fn add(&mut self, scene: &str, arm: Arm, runs: &[Run]) {
+        for run in runs {
+            self.add_pooled(scene, arm, Some(run.seed), std::slice::from_ref(run));
         }
+        self.add_pooled(scene, arm, None, runs);
+    }
+
+    /// Adds the records of some runs as of one.
+    fn add_pooled(&mut self, scene: &str, arm: Arm, seed: Option<u64>, runs: &[Run]) {
+        let target = self.visibility * self.visibility;
+        let pixels = f64::from(self.size.0) * f64::from(self.size.1);
+        let mean = |of: fn(&Run) -> f64| runs.iter().map(of).sum::<f64>() / runs.len() as f64;
+        // A seed whose render took few samples shows more error and needs no more for it: v² counts by what its render took.
+        let (Some(energy), Some(by_samples), Some(by_seconds)) = (
+            mean_energy(runs, |_| 1.0),
+            mean_energy(runs, |run| run.samples as f64 / pixels),
+            mean_energy(runs, |run| run.seconds),
+        ) else {
+            return;
+        };
+        let above = energy.values().iter().filter(|&&v| f64::from(v) > 1.5625 * target).count();
+        let bias = pooled_bias(runs);
+        self.records.extend(COVERAGES.map(|coverage| Record {
+            scene: scene.to_owned(),
+            arm: arm.name(),
+            seed,
+            coverage,
+            samples: by_samples.quantile(coverage) / target,
+            seconds: by_seconds.quantile(coverage) / target,
+            reached: (energy.quantile(coverage) / target).sqrt(),
+            speedup_samples: None,
+            speedup_seconds: None,
+            efficiency: None,
+            energy_bias: bias.map(|bias| bias.value),
+            energy_bias_ci: bias.map(|bias| 1.96 * bias.standard_error),
+            overshoot_fraction: above as f64 / energy.values().len() as f64,
+            overhead: mean(|run| run.seconds_perception) / mean(|run| run.seconds),
+            last_look: mean(|run| run.seconds_last_look) / mean(|run| run.seconds),
+            flip_mean: mean(|run| run.flip_mean),
+            flip_p99: mean(|run| run.flip_p99),
+            jod: mean(|run| run.jod),
+            relmse: mean(|run| run.relmse),
+        }));
     }
 
     fn find(&self, scene: &str, arm: Arm, seed: Option<u64>, coverage: f64) -> Option<&Record> {
@@ -189,15 +187,12 @@ impl Results {
     pub(crate) fn summarise(&mut self) {
         for i in 0..self.records.len() {
             let r = &self.records[i];
-            let uniform = self.find(&r.scene, Arm::Uniform, r.seed, r.coverage).map(|u| (u.samples, u.seconds));
-            let oracle = self.find(&r.scene, Arm::Oracle, r.seed, r.coverage).map(|o| o.samples);
-            let (samples, seconds) = (r.samples, r.seconds);
-            let record = &mut self.records[i];
-            if let Some(uniform) = uniform {
-                record.speedup_samples = uniform.0 / samples;
-                record.speedup_seconds = uniform.1 / seconds;
-            }
-            record.efficiency = oracle.map(|oracle| oracle / samples);
+            let uniform = self.find(&r.scene, Arm::Uniform, r.seed, r.coverage);
+            let oracle = self.find(&r.scene, Arm::Oracle, r.seed, r.coverage);
+            let speedup_samples = uniform.and_then(|uniform| ratio(uniform.samples, r.samples));
+            let speedup_seconds = uniform.and_then(|uniform| ratio(uniform.seconds, r.seconds));
+            let efficiency = oracle.and_then(|oracle| ratio(oracle.samples, r.samples));
+            self.records[i] = Record { speedup_samples, speedup_seconds, efficiency, ..r.clone() };
         }
         let mut arms: Vec<&'static str> = Vec::new();
         for record in &self.records {
@@ -211,20 +206,19 @@ impl Results {
             .map(|(coverage, arm)| ArmSummary {
                 arm,
                 coverage,
-                speedup_samples: self.mean_of(arm, coverage, |r| Some(r.speedup_samples)).unwrap_or_else(nothing),
-                speedup_seconds: self.mean_of(arm, coverage, |r| Some(r.speedup_seconds)).unwrap_or_else(nothing),
+                speedup_samples: self.mean_of(arm, coverage, |r| r.speedup_samples),
+                speedup_seconds: self.mean_of(arm, coverage, |r| r.speedup_seconds),
                 efficiency: self.mean_of(arm, coverage, |r| r.efficiency),
             })
             .collect();
     }
 
+    /// Mean over the scenes that have such a figure.
     fn mean_of(&self, arm: &str, coverage: f64, of: fn(&Record) -> Option<f64>) -> Option<GeometricMean> {
         let mine = || self.records.iter().filter(|r| r.arm == arm && r.coverage == coverage);
-        let pooled: Vec<f64> = mine().filter(|r| r.seed.is_none()).filter_map(of).collect();
-        let scenes = mine().filter(|r| r.seed.is_none()).map(|r| &r.scene);
-        let by_seed: Vec<Vec<f64>> = scenes
-            .map(|scene| mine().filter(|r| r.seed.is_some() && r.scene == *scene).filter_map(of).collect())
-            .collect();
+        let of_seeds = |scene: &str| mine().filter(|r| r.seed.is_some() && r.scene == scene).filter_map(of).collect();
+        let by_scene = mine().filter(|r| r.seed.is_none()).filter_map(|r| Some((of(r)?, of_seeds(&r.scene))));
+        let (pooled, by_seed): (Vec<f64>, Vec<Vec<f64>>) = by_scene.unzip();
         (!pooled.is_empty()).then(|| geometric_mean(&pooled, &by_seed))
     }
 
@@ -234,14 +228,13 @@ impl Results {
         for r in self.records.iter().filter(|r| r.scene == scene && r.seed.is_none() && r.coverage == 0.99) {
             let _ = writeln!(
                 text,
-                "{scene}: {:<20} {:>8.1} spp for v* on 99 % (rendered at {:.2} v*), JOD {:.2}, FLIP {:.4}, bias {:+.2} ± {:.2} %",
+                "{scene}: {:<20} {:>8.1} spp for v* on 99 % (rendered at {:.2} v*), JOD {:.2}, FLIP {:.4}, bias {}",
                 r.arm,
                 r.samples,
                 r.reached,
                 r.jod,
                 r.flip_mean,
-                100.0 * r.energy_bias,
-                100.0 * r.energy_bias_ci
+                r.energy_bias_in_words()
             );
         }
         text
@@ -250,87 +243,115 @@ impl Results {
     /// Writes `results.json`, `results.csv` and `report.html`.
     pub(crate) fn write(&self, folder: &Path) -> Result<()> {
         let json = serde_json::to_string_pretty(self)?;
-        for (name, text) in [("results.json", json), ("results.csv", self.csv()), ("report.html", html(self))] {
+        for (name, text) in [("results.json", json), ("results.csv", csv(&self.records)), ("report.html", html(self))] {
             let path = folder.join(name);
             crate::output::write_beside(&path, |file| std::io::Write::write_all(file, text.as_bytes()))?;
         }
         Ok(())
     }
-
-    fn csv(&self) -> String {
-        let mut text = String::from(
-            "scene,arm,seed,coverage,samples,seconds,reached,speedup_samples,speedup_seconds,efficiency,energy_bias,\
-             energy_bias_ci,overshoot_fraction,overhead,last_look,flip_mean,flip_p99,jod,relmse\n",
-        );
-        for r in &self.records {
-            let seed = r.seed.map_or_else(|| "all".to_owned(), |seed| seed.to_string());
-            let efficiency = r.efficiency.map_or_else(String::new, |e| e.to_string());
-            let _ = writeln!(
-                text,
-                "{},{},{seed},{},{},{},{},{},{},{efficiency},{},{},{},{},{},{},{},{},{}",
-                r.scene,
-                r.arm,
-                r.coverage,
-                r.samples,
-                r.seconds,
-                r.reached,
-                r.speedup_samples,
-                r.speedup_seconds,
-                r.energy_bias,
-                r.energy_bias_ci,
-                r.overshoot_fraction,
-                r.overhead,
-                r.last_look,
-                r.flip_mean,
-                r.flip_p99,
-                r.jod,
-                r.relmse
-            );
-        }
-        text
-    }
 }
 
-/// Standard error of the mean energy bias of several seeds: each seed's own error averages out, the reference's is in all of them.
-fn pooled_bias_error(runs: &[Run]) -> f64 {
-    let of_runs = runs.len().max(1) as f64;
-    let own = |run: &Run| (run.energy_bias_standard_error.powi(2) - run.energy_bias_reference_error.powi(2)).max(0.0);
-    let own_variance = runs.iter().map(own).sum::<f64>() / (of_runs * of_runs);
-    let of_reference = runs.iter().map(|run| run.energy_bias_reference_error).sum::<f64>() / of_runs;
-    own_variance.sqrt().hypot(of_reference)
+/// How much larger one need is than another; `None` where one of them is nothing.
+fn ratio(of: f64, to: f64) -> Option<f64> {
+    Some(of / to).filter(|ratio| ratio.is_finite() && *ratio > 0.0)
 }
 
-fn nothing() -> GeometricMean {
-    GeometricMean { value: f64::NAN, low: None, high: None, least: f64::NAN }
+/// Mean over runs of their v² times a weight; `None` where none has it.
+fn mean_energy(runs: &[Run], weight: impl Fn(&Run) -> f64) -> Option<Plane> {
+    let weighted = |run: &Run| {
+        let weight = weight(run) as f32;
+        Some(run.squared_visibility.as_ref()?.map(|v| v * weight))
+    };
+    let planes: Vec<Plane> = runs.iter().filter_map(weighted).collect();
+    let sum = planes.iter().skip(1).fold(planes.first()?.clone(), |sum, plane| sum.combined(plane, |a, b| a + b));
+    Some(sum.map(|v| v / planes.len() as f32))
+}
+
+/// Mean energy bias of several seeds: each seed's own error averages out, the reference's is in all of them.
+fn pooled_bias(runs: &[Run]) -> Option<EnergyBias> {
+    let biases = runs.iter().map(|run| run.energy_bias).collect::<Option<Vec<EnergyBias>>>()?;
+    let seeds = biases.len() as f64;
+    let own = |bias: &EnergyBias| (bias.standard_error.powi(2) - bias.reference_error.powi(2)).max(0.0);
+    let own_variance = biases.iter().map(own).sum::<f64>() / (seeds * seeds);
+    let reference_error = biases.iter().map(|bias| bias.reference_error).sum::<f64>() / seeds;
+    Some(EnergyBias {
+        value: biases.iter().map(|bias| bias.value).sum::<f64>() / seeds,
+        standard_error: own_variance.sqrt().hypot(reference_error),
+        reference_error,
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// More seeds bring the interval down to what the reference leaves, and no further.
-    #[test]
-    fn the_references_error_is_in_every_seed() {
-        let run = |seed: u64| Run {
+    fn results(size: (u32, u32)) -> Results {
+        Results::new(&BenchSettings {
+            scenes: Vec::new(),
+            size,
+            visibility: 1.0,
+            arms: Vec::new(),
+            seeds: 1,
+            reference_factor: 1.0,
+            display: "desktop".into(),
+            output: "".into(),
+        })
+    }
+
+    /// A render of 2×1 pixels with this v².
+    fn run(seed: u64, samples: u64, squared_visibility: f32) -> Run {
+        Run {
             seed,
             knob: None,
-            samples: 1,
+            samples,
             seconds: 1.0,
             seconds_perception: 0.0,
             seconds_last_look: 0.0,
-            energy_bias: 0.0,
-            energy_bias_standard_error: 5.0,
-            energy_bias_reference_error: 3.0,
+            energy_bias: Some(EnergyBias { value: 0.0, standard_error: 5.0, reference_error: 3.0 }),
             flip_mean: 0.0,
             flip_p99: 0.0,
             jod: 10.0,
             relmse: 0.0,
             audit_ratio: None,
-            squared_visibility: None,
+            squared_visibility: Some(Plane::filled(2, 1, squared_visibility)),
+        }
+    }
+
+    /// More seeds bring the interval down to what the reference leaves, and no further.
+    #[test]
+    fn the_references_error_is_in_every_seed() {
+        let error = |seeds: u64| {
+            let runs: Vec<Run> = (0..seeds).map(|seed| run(seed, 1, 1.0)).collect();
+            pooled_bias(&runs).expect("known").standard_error
         };
-        let error = |seeds: u64| pooled_bias_error(&(0..seeds).map(run).collect::<Vec<_>>());
         assert!((error(1) - 5.0).abs() < 1e-12);
         assert!((error(4) - 13f64.sqrt()).abs() < 1e-12);
         assert!((error(10_000) - 3.0).abs() < 1e-3);
+    }
+
+    /// Two renders that each need 100 samples a pixel, one from 10 and one from 1000.
+    #[test]
+    fn seeds_of_one_need_have_that_need_together() {
+        let mut results = results((2, 1));
+        results.add("box", Arm::Relative, &[run(0, 20, 10.0), run(1, 2000, 0.1)]);
+        for record in &results.records {
+            assert!((record.samples - 100.0).abs() < 1e-3, "{record:?}");
+        }
+    }
+
+    /// Where nothing can be seen of an error there are no ratios, and means are of the other scenes.
+    #[test]
+    fn scenes_without_noise_have_no_ratios() {
+        let mut results = results((2, 1));
+        for (scene, energies) in [("flat", [0.0, 0.0]), ("half", [0.0, 1.0]), ("box", [2.0, 1.0])] {
+            for (arm, energy) in [Arm::Uniform, Arm::AsAsked].into_iter().zip(energies) {
+                results.add(scene, arm, &[Run { energy_bias: None, ..run(0, 32, energy) }]);
+            }
+        }
+        results.summarise();
+        let of = |scene: &str| results.records.iter().rfind(|r| r.scene == scene).and_then(|r| r.speedup_samples);
+        assert_eq!((of("flat"), of("half"), of("box")), (None, None, Some(2.0)));
+        assert!(results.summary.iter().all(|s| s.efficiency.is_none()), "no oracle");
+        assert_eq!(results.summary[1].speedup_samples.map(|mean| (mean.value, mean.least)), Some((2.0, 2.0)));
     }
 }

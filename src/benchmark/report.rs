@@ -1,47 +1,56 @@
 //! `report.html`: one file that needs nothing else.
 
 use super::curve::Curve;
+use super::pictures::{ShownPicture, heat_codes};
 use super::plot::plots;
-use super::record::{Record, Results};
+use super::quote::html_text;
+use super::record::{ArmSummary, Record, Results, ScenePictures};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use std::fmt::Write as _;
 
-const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:68rem;margin:2rem auto;padding:0 1rem;color:#1c1c22}\
-h1,h2{font-weight:600}table{border-collapse:collapse;margin:1rem 0}th,td{padding:.25rem .7rem;text-align:right;\
-border-bottom:1px solid #ddd}th:first-child,td:first-child{text-align:left}figure{display:inline-block;margin:.4rem}\
-figcaption{font-size:12px;color:#555}img{image-rendering:pixelated;width:18rem;height:auto}.note{color:#555}\
-.loss{color:#b3261e;font-weight:600}svg text{font:12px system-ui,sans-serif}";
+const STYLE: &str = include_str!("report.css");
 
 /// The whole report.
 pub(crate) fn html(results: &Results) -> String {
-    let mut page = String::new();
-    let _ = write!(
-        page,
-        "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>fechner bench</title><style>{STYLE}</style>\
-         <h1>Samples to equal visible quality</h1><p>{}×{} pixels, display {}, v* = {}, {} seeds, fechner {}. Samples are what \
-         each arm needs to bring 99 % of the picture to v*; truth is measured against a long reference, not predicted. \
-         v ∝ n<sup>−½</sup> scales each render to v*.</p>",
-        results.size.0, results.size.1, results.display, results.visibility, results.seeds, results.fechner_version
-    );
-    page.push_str(&summary_table(results));
-    for scene in scenes(results) {
-        let _ = write!(page, "<h2>{scene}</h2>");
-        page.push_str(&bars(results, &scene));
-        page.push_str(&scene_table(results, &scene));
-        let curves: Vec<&Curve> = results.curves.iter().filter(|curve| curve.scene == scene).collect();
-        page.push_str(&plots(&curves));
-        page.push_str(&pictures(results, &scene));
-    }
-    page.push_str("</html>\n");
-    page
+    let sections: String = scenes(results).into_iter().map(|scene| section(results, scene)).collect();
+    format!(
+        "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>fechner bench</title>\n\
+         <style>\n{STYLE}</style>\n{}{}{sections}</html>\n",
+        introduction(results),
+        summary_table(&results.summary)
+    )
 }
 
-fn scenes(results: &Results) -> Vec<String> {
-    let mut scenes: Vec<String> = Vec::new();
+fn introduction(results: &Results) -> String {
+    let seeds = if results.seeds == 1 { "1 seed".to_owned() } else { format!("{} seeds", results.seeds) };
+    format!(
+        "<h1>Samples to equal visible quality</h1>\n<p>{}×{} pixels, display {}, v* = {}, {seeds}, fechner {}. Samples are what \
+         each arm needs to bring 99 % of the picture to v*; truth is measured against a long reference, not predicted. \
+         v ∝ n<sup>−½</sup> scales each render to v*.</p>\n",
+        results.size.0,
+        results.size.1,
+        html_text(&results.display),
+        results.visibility,
+        results.fechner_version
+    )
+}
+
+fn section(results: &Results, scene: &str) -> String {
+    let records: Vec<&Record> = pooled(results, scene).collect();
+    let curves: Vec<&Curve> = results.curves.iter().filter(|curve| curve.scene == scene).collect();
+    let pictures: String = results.pictures.iter().filter(|shown| shown.scene == scene).map(pictures).collect();
+    let title = html_text(scene);
+    let (bars, table, plots) = (bars(&records), scene_table(&records), plots(&curves, results.visibility));
+    format!("<h2>{title}</h2>\n{bars}{table}{plots}{pictures}")
+}
+
+fn scenes(results: &Results) -> Vec<&str> {
+    let mut scenes: Vec<&str> = Vec::new();
     for record in &results.records {
-        if !scenes.contains(&record.scene) {
-            scenes.push(record.scene.clone());
+        if !scenes.contains(&record.scene.as_str()) {
+            scenes.push(&record.scene);
         }
     }
     scenes
@@ -52,100 +61,141 @@ fn pooled<'a>(results: &'a Results, scene: &'a str) -> impl Iterator<Item = &'a 
     results.records.iter().filter(move |r| r.scene == scene && r.seed.is_none() && r.coverage == 0.99)
 }
 
-fn summary_table(results: &Results) -> String {
+/// What a cell says of a figure that is not known.
+const UNKNOWN: &str = "–";
+
+fn if_known<T>(value: Option<T>, in_words: impl Fn(T) -> String) -> String {
+    value.map_or_else(|| UNKNOWN.to_owned(), in_words)
+}
+
+/// Marks arms that need more than uniform sampling.
+fn loss(speedup: Option<f64>) -> &'static str {
+    if speedup.is_some_and(|speedup| speedup < 1.0) { " class=\"loss\"" } else { "" }
+}
+
+fn summary_table(summary: &[ArmSummary]) -> String {
     let mut text = String::from(
-        "<h2>Geometric means over scenes</h2><table><tr><th>arm</th><th>coverage</th><th>samples, uniform / arm</th>\
-         <th>worst scene</th><th>time, uniform / arm</th><th>oracle / arm</th></tr>",
+        "<h2>Geometric means over scenes</h2>\n<div class=\"wide\"><table>\n<tr><th>arm</th><th>coverage</th>\
+         <th>samples, uniform / arm</th><th>worst scene</th><th>time, uniform / arm</th><th>oracle / arm</th></tr>\n",
     );
-    for s in &results.summary {
-        let efficiency = s.efficiency.map_or_else(String::new, |e| e.in_words());
+    let mut coverage = None;
+    for s in summary {
+        let group = if coverage.replace(s.coverage) == Some(s.coverage) { "" } else { " class=\"first-of-group\"" };
         let (samples, seconds) = (s.speedup_samples, s.speedup_seconds);
-        let loss = if samples.value < 1.0 { " class=\"loss\"" } else { "" };
-        let _ = write!(
+        let _ = writeln!(
             text,
-            "<tr><td>{}</td><td>{} %</td><td{loss}>{}</td><td>{:.2}</td><td>{:.2}</td><td>{efficiency}</td></tr>",
+            "<tr{group}><td>{}</td><td>{} %</td><td{}>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
             s.arm,
             100.0 * s.coverage,
-            samples.in_words(),
-            samples.least,
-            seconds.value
+            loss(samples.map(|mean| mean.value)),
+            if_known(samples, |mean| mean.in_words()),
+            if_known(samples, |mean| format!("{:.2}", mean.least)),
+            if_known(seconds, |mean| format!("{:.2}", mean.value)),
+            if_known(s.efficiency, |mean| mean.in_words())
         );
     }
-    text.push_str("</table>");
+    text.push_str("</table></div>\n");
     text
 }
 
 /// Samples of each arm as bars.
-fn bars(results: &Results, scene: &str) -> String {
-    const WIDTH: f64 = 560.0;
-    let records: Vec<&Record> = pooled(results, scene).collect();
+fn bars(records: &[&Record]) -> String {
     let most = records.iter().map(|r| r.samples).fold(1e-9, f64::max);
-    let height = 24 * records.len();
-    let mut text = format!("<svg width=\"860\" height=\"{height}\" role=\"img\" aria-label=\"samples by arm\">");
-    for (row, record) in records.iter().enumerate() {
-        let (y, length) = (24 * row, WIDTH * record.samples / most);
-        let colour = match record.arm {
-            "default" | "as-asked" => "#c2410c",
-            "oracle" => "#0f766e",
-            _ => "#94a3b8",
+    let mut text = String::from("<dl class=\"bars\" aria-label=\"samples a pixel by arm\">\n");
+    for record in records {
+        let class = match record.arm {
+            "default" | "as-asked" => "ours",
+            "oracle" => "oracle",
+            _ => "other",
         };
-        let _ = write!(
+        let _ = writeln!(
             text,
-            "<text x=\"140\" y=\"{}\" text-anchor=\"end\">{}</text><rect x=\"150\" y=\"{}\" width=\"{length:.1}\" height=\"16\" \
-             fill=\"{colour}\"/><text x=\"{:.1}\" y=\"{}\">{:.0} spp</text>",
-            y + 16,
+            "<dt>{}</dt><dd><i class=\"{class}\" style=\"--share:{:.4}\"></i>{:.0} spp</dd>",
             record.arm,
-            y + 4,
-            156.0 + length,
-            y + 16,
+            record.samples / most,
             record.samples
         );
     }
-    text.push_str("</svg>");
+    text.push_str("</dl>\n");
     text
 }
 
-fn scene_table(results: &Results, scene: &str) -> String {
+fn scene_table(records: &[&Record]) -> String {
     let mut text = String::from(
-        "<table><tr><th>arm</th><th>spp at 99 %</th><th>uniform / arm</th><th>oracle / arm</th><th>rendered at v / v*</th>\
-         <th>above 1.25 v*</th><th>FLIP</th><th>JOD</th><th>relMSE</th><th>energy bias</th><th>not tracing</th></tr>",
+        "<div class=\"wide\"><table>\n<tr><th>arm</th><th>spp at 99&nbsp;%</th><th>uniform /&nbsp;arm</th><th>oracle /&nbsp;arm</th>\
+         <th>rendered at v&nbsp;/&nbsp;v*</th><th>above 1.25&nbsp;v*</th><th>FLIP</th><th>JOD</th><th>relMSE</th><th>energy bias</th>\
+         <th>not tracing</th></tr>\n",
     );
-    for r in pooled(results, scene) {
-        let efficiency = r.efficiency.map_or_else(String::new, |e| format!("{e:.2}"));
-        let loss = if r.speedup_samples < 1.0 { " class=\"loss\"" } else { "" };
-        let _ = write!(
+    let ratio = |value: Option<f64>| if_known(value, |value| format!("{value:.2}"));
+    for r in records {
+        let _ = writeln!(
             text,
-            "<tr><td>{}</td><td>{:.0}</td><td{loss}>{:.2}</td><td>{efficiency}</td><td>{:.2}</td><td>{:.2} %</td><td>{:.4}</td>\
-             <td>{:.3}</td><td>{:.2e}</td><td>{:+.2} ± {:.2} %</td><td>{:.1} %</td></tr>",
+            "<tr><td>{}</td><td>{:.0}</td><td{}>{}</td><td>{}</td><td>{:.2}</td><td>{:.2} %</td><td>{:.4}</td>\
+             <td>{:.3}</td><td>{:.2e}</td><td>{}</td><td>{:.1} %</td></tr>",
             r.arm,
             r.samples,
-            r.speedup_samples,
+            loss(r.speedup_samples),
+            ratio(r.speedup_samples),
+            ratio(r.efficiency),
             r.reached,
             100.0 * r.overshoot_fraction,
             r.flip_mean,
             r.jod,
             r.relmse,
-            100.0 * r.energy_bias,
-            100.0 * r.energy_bias_ci,
+            r.energy_bias_in_words(),
             100.0 * r.overhead
         );
     }
-    text.push_str("</table><p class=\"note\">FLIP, JOD and relMSE are of the renders as made, not scaled.</p>");
+    text.push_str(
+        "</table></div>\n<p class=\"note\">FLIP, JOD and relMSE are of the renders as made, not scaled.</p>\n",
+    );
     text
 }
 
-fn pictures(results: &Results, scene: &str) -> String {
-    let mut text = String::new();
-    for shown in results.pictures.iter().filter(|p| p.scene == scene) {
-        for (title, png) in &shown.pictures {
-            let _ = write!(
-                text,
-                "<figure><img alt=\"{title}\" src=\"data:image/png;base64,{}\"><figcaption>{}: {title}</figcaption></figure>",
-                BASE64.encode(png),
-                shown.arm
-            );
-        }
-        text.push_str("<br>");
+fn pictures(shown: &ScenePictures) -> String {
+    let figures: String = shown.pictures.iter().map(|picture| figure(shown, picture)).collect();
+    if figures.is_empty() { figures } else { format!("<div class=\"pictures\">\n{figures}</div>\n") }
+}
+
+/// A picture with what its colours mean.
+fn figure(shown: &ScenePictures, picture: &ShownPicture) -> String {
+    let (arm, title) = (shown.arm, picture.kind.title);
+    format!(
+        "<figure><div class=\"map\"><img alt=\"{}, arm {arm}: {title}\" src=\"data:image/png;base64,{}\">{}</div>\
+         <figcaption>{arm}: {title}</figcaption></figure>\n",
+        html_text(&shown.scene),
+        BASE64.encode(&picture.png),
+        scale(picture.kind.scale)
+    )
+}
+
+/// The colours of a map beside what they mean, the least below; nothing of pictures without meanings.
+fn scale(meanings: &[&str]) -> String {
+    if meanings.is_empty() {
+        return String::new();
     }
-    text
+    let code = |rgb: [f32; 3]| {
+        let [r, g, b] = rgb.map(|value| (255.0 * value).round() as u8);
+        format!("#{r:02x}{g:02x}{b:02x}")
+    };
+    let colours: Vec<String> = heat_codes(16).map(code).collect();
+    let labels: String = meanings.iter().map(|meaning| format!("<li>{meaning}</li>")).collect();
+    format!(
+        "<div class=\"scale\"><i style=\"background:linear-gradient(to top,{})\"></i><ol>{labels}</ol></div>",
+        colours.join(",")
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn maps_say_what_their_colours_mean() {
+        let text = scale(&["0", "≥ 2"]);
+        // Magma from black-violet to cream, as in the maps.
+        assert!(text.contains("to top,#000004,") && text.contains(",#fcfdbf)"), "{text}");
+        assert!(text.contains("<ol><li>0</li><li>≥ 2</li></ol>"), "{text}");
+        assert_eq!(scale(&[]), "");
+    }
 }

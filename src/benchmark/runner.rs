@@ -2,6 +2,8 @@
 
 use super::arm::Arm;
 use super::curve::{Curve, course};
+use super::keep::{keep, kept, kept_or_made};
+use super::knob::nearest;
 use super::metrics::Metrics;
 use super::oracle::{displayed_variance, least_samples, trace_counts, uniform_samples};
 use super::pictures::{read_pictures, write_pictures};
@@ -35,14 +37,9 @@ pub(crate) struct Run {
     /// Time in perception, planning and audits.
     pub(crate) seconds_perception: f64,
     /// Of that, the look at the finished picture, which its report takes whoever chose the samples.
-    #[serde(default)]
     pub(crate) seconds_last_look: f64,
-    /// Mean luminance over the reference's, less 1, and its standard error.
-    pub(crate) energy_bias: f64,
-    pub(crate) energy_bias_standard_error: f64,
-    /// The reference's part of that, which is the same for all seeds.
-    #[serde(default)]
-    pub(crate) energy_bias_reference_error: f64,
+    /// `None` where the reference is black.
+    pub(crate) energy_bias: Option<EnergyBias>,
     pub(crate) flip_mean: f64,
     pub(crate) flip_p99: f64,
     pub(crate) jod: f64,
@@ -51,6 +48,23 @@ pub(crate) struct Run {
     /// v² of its error, written beside the record.
     #[serde(skip)]
     pub(crate) squared_visibility: Option<Plane>,
+}
+
+/// Mean luminance over the reference's, less 1.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub(crate) struct EnergyBias {
+    pub(crate) value: f64,
+    pub(crate) standard_error: f64,
+    /// The reference's part of that, which is the same for all seeds.
+    pub(crate) reference_error: f64,
+}
+
+/// A run and what its pictures are made of.
+struct Judged {
+    run: Run,
+    film: Film,
+    /// As displayed: linear RGB, 0..1.
+    picture: Vec<[f32; 3]>,
 }
 
 /// A film and what making it took.
@@ -104,7 +118,7 @@ impl<'a> ArmRunner<'a> {
             let run = match self.read(&file) {
                 Some(run) => run,
                 None => {
-                    let run = if seed == 0 { self.first_run(arm)? } else { self.run(arm, seed, knob)? };
+                    let run = if seed == 0 { self.first_run(arm)? } else { self.judged(arm, seed, knob)?.run };
                     self.write(&file, &run)?;
                     run
                 }
@@ -119,59 +133,68 @@ impl<'a> ArmRunner<'a> {
         Ok(runs)
     }
 
-    /// The run of the first seed. An arm with a knob is rendered up to four times, until 99 % of the picture is at v\* within
-    /// 12 %: knobs are like errors, and what is left scales with them.
+    /// The run of the first seed, its pictures written for the report. An arm with a knob is rendered up to four times for 99 %
+    /// of the picture at v\*.
     fn first_run(&mut self, arm: Arm) -> Result<Run> {
         let uniform_spp = match arm {
             Arm::Uniform => uniform_samples(self.subject, self.truth, &self.variance()?.clone(), 0.99),
             _ => self.reference.uniform_spp,
         };
-        let Some(mut knob) = arm.first_knob(self.subject, uniform_spp) else { return self.run(arm, 0, None) };
-        let mut run = self.run(arm, 0, Some(knob))?;
-        for _ in 0..3 {
-            let energy = run.squared_visibility.as_ref().context("a fresh run")?;
-            let step = (energy.quantile(0.99).sqrt() / self.subject.visibility).clamp(0.1, 10.0);
-            if (0.89..1.12).contains(&step) {
-                break;
-            }
-            knob /= step;
-            run = self.run(arm, 0, Some(knob))?;
+        let judged = match arm.first_knob(self.subject, uniform_spp) {
+            None => self.judged(arm, 0, None)?,
+            Some(first) => nearest(first, |knob| {
+                let judged = self.judged(arm, 0, Some(knob))?;
+                let energy = judged.run.squared_visibility.as_ref().context("a fresh run")?;
+                let reached = energy.quantile(0.99).sqrt() / self.subject.visibility;
+                Ok((judged, reached))
+            })?,
+        };
+        if PICTURED.contains(&arm) {
+            self.write_pictures(arm, &judged)?;
         }
-        Ok(run)
+        Ok(judged.run)
     }
 
-    fn run(&mut self, arm: Arm, seed: u64, knob: Option<f64>) -> Result<Run> {
+    fn write_pictures(&self, arm: Arm, judged: &Judged) -> Result<()> {
+        let Judged { run, film, picture } = judged;
+        let energy = run.squared_visibility.as_ref().context("a fresh run")?;
+        write_pictures(&self.file(arm, run.seed), self.subject, film, picture, energy)
+    }
+
+    fn judged(&mut self, arm: Arm, seed: u64, knob: Option<f64>) -> Result<Judged> {
         let made = self.make(arm, seed, knob)?;
-        let nits = self.subject.scene.nits_per_unit;
-        let estimate = made.film.estimate(nits);
+        let estimate = made.film.estimate(self.subject.scene.nits_per_unit);
         let picture = self.truth.displayed(&estimate.rgb_cd_m2);
         let metrics: Metrics = self.truth.measure(&picture)?;
-        let sum = |plane: &Plane| plane.values().iter().map(|&v| f64::from(v)).sum::<f64>();
-        let truth = sum(&self.reference.luminance());
-        // The reference's own error, from its halves' scatter, belongs to the interval.
-        let [a, b] = self.reference.halves.each_ref();
-        let own: f64 = a.iter().zip(b).map(|(a, b)| half_difference(*a, *b).powi(2)).sum();
-        let variance = sum(&picture_variance(&made.film, nits)) + own;
-        let squared_visibility = self.truth.squared_visibility(&picture);
-        if seed == 0 && PICTURED.contains(&arm) {
-            write_pictures(&self.file(arm, seed), self.subject, &made.film, &picture, &squared_visibility)?;
-        }
-        Ok(Run {
+        let run = Run {
             seed,
             knob,
             samples: made.film.total_samples(),
             seconds: made.seconds,
             seconds_perception: made.seconds_perception,
             seconds_last_look: made.seconds_last_look,
-            energy_bias: sum(&estimate.luminance_cd_m2) / truth - 1.0,
-            energy_bias_standard_error: variance.sqrt() / truth,
-            energy_bias_reference_error: own.sqrt() / truth,
+            energy_bias: self.energy_bias(&made.film, &estimate.luminance_cd_m2),
             flip_mean: metrics.flip_mean,
             flip_p99: metrics.flip_p99,
             jod: metrics.jod,
             relmse: metrics.relmse,
             audit_ratio: made.audit_ratio,
-            squared_visibility: Some(squared_visibility),
+            squared_visibility: Some(self.truth.squared_visibility(&picture)),
+        };
+        Ok(Judged { run, film: made.film, picture })
+    }
+
+    fn energy_bias(&self, film: &Film, luminance_cd_m2: &Plane) -> Option<EnergyBias> {
+        let sum = |plane: &Plane| plane.values().iter().map(|&v| f64::from(v)).sum::<f64>();
+        let truth = sum(&self.reference.luminance());
+        // The reference's own error, from its halves' scatter, belongs to the interval.
+        let [a, b] = self.reference.halves.each_ref();
+        let own: f64 = a.iter().zip(b).map(|(a, b)| half_difference(*a, *b).powi(2)).sum();
+        let variance = sum(&picture_variance(film, self.subject.scene.nits_per_unit)) + own;
+        (truth > 0.0).then(|| EnergyBias {
+            value: sum(luminance_cd_m2) / truth - 1.0,
+            standard_error: variance.sqrt() / truth,
+            reference_error: own.sqrt() / truth,
         })
     }
 
@@ -216,18 +239,11 @@ impl<'a> ArmRunner<'a> {
     pub(crate) fn curve(&mut self, arm: Arm, runs: &[Run]) -> Result<Option<Curve>> {
         let Some(first) = runs.first().filter(|_| CURVED.contains(&arm)) else { return Ok(None) };
         let file = self.file(arm, 0).with_extension("curve.json");
-        let kept = std::fs::read(&file).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
-        let points = match kept {
-            Some(points) => points,
-            None => {
-                let knob = first.knob.unwrap_or(self.subject.visibility);
-                let settings = arm.settings(self.subject, knob, self.reference.uniform_spp)?;
-                let points = course(self.subject, self.truth, &settings, first.seed + 1)?;
-                let text = serde_json::to_string_pretty(&points)?;
-                crate::output::write_beside(&file, |file| std::io::Write::write_all(file, text.as_bytes()))?;
-                points
-            }
-        };
+        let points = kept_or_made(&file, || {
+            let knob = first.knob.unwrap_or(self.subject.visibility);
+            let settings = arm.settings(self.subject, knob, self.reference.uniform_spp)?;
+            course(self.subject, self.truth, &settings, first.seed + 1)
+        })?;
         Ok(Some(Curve { scene: self.subject.name.clone(), arm: arm.name(), points }))
     }
 
@@ -251,7 +267,7 @@ impl<'a> ArmRunner<'a> {
     }
 
     fn read(&self, file: &Path) -> Option<Run> {
-        let mut run: Run = serde_json::from_slice(&std::fs::read(file).ok()?).ok()?;
+        let mut run: Run = kept(file)?;
         let plane = read_plane(&file.with_extension("f32"), self.reference.width, self.reference.height)?;
         run.squared_visibility = Some(plane);
         Some(run)
@@ -261,9 +277,7 @@ impl<'a> ArmRunner<'a> {
         if let Some(plane) = &run.squared_visibility {
             write_plane(&file.with_extension("f32"), plane)?;
         }
-        let text = serde_json::to_string_pretty(run)?;
-        crate::output::write_beside(file, |file| std::io::Write::write_all(file, text.as_bytes()))?;
-        Ok(())
+        keep(file, run)
     }
 }
 

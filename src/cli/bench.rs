@@ -6,8 +6,8 @@ use super::seeing::{DEFAULT_DISPLAY, parse_positive};
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use fechner::benchmark::{
-    AnimationRow, AnimationSettings, Arm, BenchSettings, DenoisingSettings, Race, animation, bounds, denoising,
-    run as run_bench,
+    AnimationResults, AnimationRow, AnimationSettings, Arm, ArmSummary, BenchSettings, DenoisingSettings, Race,
+    animation, bounds, denoising, run as run_bench,
 };
 use fechner::denoise::{Denoiser, DenoiserKind};
 use std::path::{Path, PathBuf};
@@ -20,7 +20,8 @@ pub(super) struct BenchArguments {
     /// How much to do.
     #[arg(long, value_enum, default_value = "quick")]
     suite: Suite,
-    /// Folder for results.json, results.csv and report.html; finished renders in it are not made again.
+    /// Folder for results.json, results.csv and report.html, for denoise.json or for animation.json; finished renders in it of all
+    /// suites but animation are not made again by the same build of the program.
     #[arg(short, long, value_name = "DIR", default_value = "bench")]
     output: PathBuf,
     /// Pixels to a side of the square pictures, in place of the suite's.
@@ -64,7 +65,7 @@ enum Suite {
     Full,
     /// 128×128, denoised pictures: the law against the truth, and samples to a quality. Prints tables, writes denoise.json.
     Denoise,
-    /// 96×54, visibility 2, eight frames at 24 and at 60 a second: what motion hides. Prints a table only.
+    /// 96×54, visibility 2, eight frames at 24 and at 60 a second: what motion hides. Prints tables, writes animation.json.
     Animation,
 }
 
@@ -116,21 +117,21 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
         return Ok(());
     }
     let results = run_bench(&settings, &say)?;
-    answer!("| arm | coverage | samples, uniform / arm | worst scene | oracle / arm |");
-    answer!("| --- | --- | --- | --- | --- |");
-    for s in &results.summary {
-        let speedup = s.speedup_samples;
-        let efficiency = s.efficiency.map_or_else(String::new, |e| format!("{:.2} (least {:.2})", e.value, e.least));
-        answer!(
-            "| {} | {} % | {} | {:.2} | {efficiency} |",
-            s.arm,
-            100.0 * s.coverage,
-            speedup.in_words(),
-            speedup.least
-        );
-    }
+    print_summary(&results.summary);
     say!("{}", settings.output.join("report.html").display());
     Ok(())
+}
+
+fn print_summary(summary: &[ArmSummary]) {
+    answer!("| arm | coverage | samples, uniform / arm | worst scene | oracle / arm |");
+    answer!("| --- | --- | --- | --- | --- |");
+    for s in summary {
+        let unknown = || "–".to_owned();
+        let speedup = s.speedup_samples.map_or_else(unknown, |mean| mean.in_words());
+        let least = s.speedup_samples.map_or_else(unknown, |mean| format!("{:.2}", mean.least));
+        let efficiency = s.efficiency.map_or_else(String::new, |e| format!("{:.2} (least {:.2})", e.value, e.least));
+        answer!("| {} | {} % | {speedup} | {least} | {efficiency} |", s.arm, 100.0 * s.coverage);
+    }
 }
 
 /// Refuses options that the suite would not look at.
@@ -151,6 +152,9 @@ fn check_suite(arguments: &BenchArguments) -> Result<()> {
         if is_given && !is_used {
             bail!("{option} is for --suite {suites}: this suite does not look at it");
         }
+    }
+    if is_denoise && arguments.denoise.iter().any(|choice| choice.kind().is_none()) {
+        bail!("--denoise none: the suite denoise judges denoised pictures; name builtin or oidn");
     }
     Ok(())
 }
@@ -183,14 +187,15 @@ fn run_denoise(arguments: &BenchArguments) -> Result<()> {
     answer!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
     for c in &results.calibrations {
         let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+        let ratio = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |value| format!("{value:.2}"));
         answer!(
-            "| {} | {} | {} | {:.2} | {:.2} | {:.2} | {} | {} | {} | {} | {} | {:.2}, {:.2} | {:.3}, {:.3} | {:.2} |",
+            "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {:.2}, {:.2} | {:.3}, {:.3} | {:.2} |",
             c.scene,
             c.denoiser,
             c.spp,
-            c.rank_correlation,
-            c.predicted_over_true,
-            c.variance_over_true,
+            ratio(c.rank_correlation),
+            ratio(c.predicted_over_true),
+            ratio(c.variance_over_true),
             percent(c.fine_share),
             percent(c.unproven_share),
             percent(c.wrong_share),
@@ -245,10 +250,20 @@ fn denoisers_or<'a>(
 }
 
 fn run_animations(arguments: &BenchArguments) -> Result<()> {
-    denoisers_or(&[DenoiseChoice::None], arguments).try_for_each(|denoiser| run_animation(arguments, denoiser))
+    let file = AnimationResults::file(&arguments.output)?;
+    let mut results = Vec::new();
+    for denoiser in denoisers_or(&[DenoiseChoice::None], arguments) {
+        let rows = run_animation(arguments, denoiser)?;
+        let denoiser = denoiser.map(Denoiser::open).transpose()?.map(|denoiser| denoiser.name());
+        print_animation(denoiser.as_deref(), &rows);
+        results.push(AnimationResults { denoiser, rows });
+        AnimationResults::write(&results, &file)?;
+    }
+    say!("{}", file.display());
+    Ok(())
 }
 
-fn run_animation(arguments: &BenchArguments, denoiser: Option<DenoiserKind>) -> Result<()> {
+fn run_animation(arguments: &BenchArguments, denoiser: Option<DenoiserKind>) -> Result<Vec<AnimationRow>> {
     let width = arguments.size.unwrap_or(96);
     let settings = AnimationSettings {
         scenes: scenes_or(&SHOTS, arguments)?,
@@ -260,16 +275,19 @@ fn run_animation(arguments: &BenchArguments, denoiser: Option<DenoiserKind>) -> 
         display: arguments.display.clone(),
         denoiser,
     };
-    let rows = animation(&settings, &|line: &str| say!("{line}"))?;
+    animation(&settings, &|line: &str| say!("{line}"))
+}
+
+fn print_animation(denoiser: Option<&str>, rows: &[AnimationRow]) {
     if let Some(denoiser) = denoiser {
-        answer!("All but the references denoised by {}:\n", Denoiser::open(denoiser)?.name());
+        answer!("All but the references denoised by {denoiser}:\n");
     }
     answer!(
         "| shot | frames a second | motion: spp, JOD | still: spp, JOD | still / motion | even, as good: spp | even / motion | \
          flicker | of even, at equal visibility |"
     );
     answer!("| --- | --- | --- | --- | --- | --- | --- | --- | --- |");
-    for row in &rows {
+    for row in rows {
         let ratio = row.still_spp / row.motion_spp;
         let even = row
             .uniform_spp
@@ -281,14 +299,16 @@ fn run_animation(arguments: &BenchArguments, denoiser: Option<DenoiserKind>) -> 
              {ratio:.2} | {even} | {flicker:.2} | {even_flicker} |"
         );
     }
-    for &rate in &settings.rates {
+    let mut rates: Vec<f64> = rows.iter().map(|row| row.frames_per_second).collect();
+    rates.sort_by(f64::total_cmp);
+    rates.dedup();
+    for rate in rates {
         let of_rate = || rows.iter().filter(|row| row.frames_per_second == rate);
         let still = geometric_mean(of_rate().map(|row| row.still_spp / row.motion_spp));
         let even = geometric_mean(of_rate().filter_map(|row| Some(row.uniform_spp? / row.motion_spp)));
         let flicker = geometric_mean(of_rate().filter_map(|row| Some(row.flicker / row.uniform_flicker?)));
         answer!("at {rate}: still / motion {still}, even / motion {even}, flicker over that of even {flicker}");
     }
-    Ok(())
 }
 
 /// A geometric mean in words.

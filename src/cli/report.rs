@@ -1,13 +1,17 @@
 //! The figures of a render, for machines (`--json`, EXR attributes) and in plain words.
 
+mod summary;
+
+pub(super) use summary::summary;
+
 use super::console::duration_in_words;
-use super::words::rounded;
 use fechner::adaptive::judge::Judgement;
 use fechner::adaptive::settings::{LoopSettings, RivalRule, Sampling};
 use fechner::adaptive::statistics::find_outliers;
 use fechner::adaptive::{Rendered, StopReason, visible_share};
 use fechner::output::{self, Attribute};
 use fechner_perception::Plane;
+use fechner_perception::display::{Display, Viewing};
 use fechner_perception::model;
 use fechner_perception::psychometric::detection_probability;
 use serde::Serialize;
@@ -26,6 +30,22 @@ pub(super) struct ObserverReport {
     distance_m: Option<f64>,
     sensitivity: f64,
     csf_area_deg2: f64,
+}
+
+impl ObserverReport {
+    fn of(viewing: &Viewing) -> Self {
+        let Viewing { display, observer, .. } = viewing;
+        Self {
+            display: display.name.clone(),
+            pixels_per_degree: display.pixels_per_degree,
+            white_cd_m2: display.white_cd_m2,
+            black_cd_m2: display.black_cd_m2,
+            ambient_cd_m2: display.ambient_cd_m2,
+            distance_m: display.distance_m,
+            sensitivity: observer.sensitivity,
+            csf_area_deg2: observer.csf_area_deg2,
+        }
+    }
 }
 
 /// What is known of a denoised picture besides its visibility. None where the samples are too few to tell.
@@ -130,11 +150,9 @@ impl Report {
         let film = &rendered.film;
         let pixels = u64::from(film.width()) * u64::from(film.height());
         let judgement = &rendered.judgement;
-        let display = &settings.viewing.display;
         let target = settings.limits.visibility;
         let predicted = judgement.is_known.then_some(&judgement.predicted);
         let quantile = |share: f64| predicted.map(|predicted| predicted.quantile(share));
-        let energy = |p: &Plane| p.values().iter().map(|&v| f64::from(v) * f64::from(v)).sum::<f64>();
         let samples_total = film.total_samples();
         let outliers = find_outliers(film);
         Self {
@@ -149,16 +167,7 @@ impl Report {
             csf: if settings.frames.is_some() { "castle-fresh-noise" } else { "castle" },
             operator: judgement.tone.describe(),
             nits_per_unit: settings.nits_per_unit,
-            observer: ObserverReport {
-                display: display.name.clone(),
-                pixels_per_degree: display.pixels_per_degree,
-                white_cd_m2: display.white_cd_m2,
-                black_cd_m2: display.black_cd_m2,
-                ambient_cd_m2: display.ambient_cd_m2,
-                distance_m: display.distance_m,
-                sensitivity: settings.viewing.observer.sensitivity,
-                csf_area_deg2: settings.viewing.observer.csf_area_deg2,
-            },
+            observer: ObserverReport::of(&settings.viewing),
             samples_total,
             spp_mean: samples_total as f64 / pixels as f64,
             spp_max: (0..pixels as usize).map(|i| film.samples(i)).max().unwrap_or(0),
@@ -174,7 +183,7 @@ impl Report {
             visibility_max: quantile(1.0),
             fraction_visible: predicted.map(|_| visible_share(judgement, target.unwrap_or(1.0))),
             detection_probability_p99: quantile(0.99).map(detection_probability),
-            patches_noticed: predicted.map(|predicted| patches_noticed(predicted, display.pixels_per_degree)),
+            patches_noticed: predicted.map(|predicted| patches_noticed(predicted, &settings.viewing.display)),
             measured_over_predicted: predicted
                 .map(|predicted| energy(&judgement.measured_error().visibility) / energy(predicted)),
             audit_ratio: rendered.audit.map(|audit| audit.ratio),
@@ -183,24 +192,12 @@ impl Report {
             variance_inflation: rendered.inflation,
             outlier_pixels: outliers.pixels,
             outlier_energy_share: outliers.energy_share,
-            importance_range: settings.importance.as_ref().map(|map| {
-                let values = || map.values().iter().copied();
-                [values().fold(f32::INFINITY, f32::min), values().fold(0.0, f32::max)]
-            }),
+            importance_range: settings.importance.as_ref().map(range),
             tone: output::tone_attribute(judgement.tone.as_ref()),
             nonfinite_samples: film.nonfinite_samples,
             peak_memory_bytes: peak_memory_bytes(),
             plans: rendered.plans,
-            stop_reason: match rendered.stop_reason {
-                StopReason::Visibility => "visibility",
-                StopReason::Time => "time",
-                StopReason::Samples => "spp",
-                StopReason::MaxSamples => "max-spp",
-                StopReason::Plans => "plans",
-                StopReason::Rule => "rule",
-                StopReason::Interrupted => "interrupted",
-                StopReason::Merged => "merged",
-            },
+            stop_reason: stop_reason_name(rendered.stop_reason),
         }
     }
 
@@ -266,124 +263,39 @@ pub(super) fn sampling_name(sampling: Sampling) -> &'static str {
     }
 }
 
-/// The end of a render in plain words.
-pub(super) fn summary(report: &Report, settings: &LoopSettings, rendered: &Rendered) -> String {
-    let display = &settings.viewing.display;
-    let distance = display.distance_m.map_or_else(String::new, |d| format!(" at {d:.2} m"));
-    let p = |v: f64| format!("{:.1} %", 100.0 * detection_probability(v));
-    let why = match rendered.stop_reason {
-        StopReason::Visibility => "Stopped because the target is reached",
-        StopReason::Time if settings.limits.time.is_some_and(|limit| rendered.seconds_total < limit.as_secs_f64()) => {
-            "Stopped because the next plan would not fit into the time"
-        }
-        StopReason::Time => "Stopped because the time was up",
-        StopReason::Samples => "Stopped because the samples were spent",
-        StopReason::MaxSamples => {
-            "Stopped although some pixels are above the target: they have the most samples allowed"
-        }
-        StopReason::Plans => "Stopped after the plans asked for",
-        StopReason::Rule => "Stopped because the rule asked for is satisfied",
-        StopReason::Interrupted => "Stopped by a signal",
-        StopReason::Merged => "Merged",
-    };
-    let target = match (report.fraction_visible, report.visibility_target) {
-        (None, _) => TOO_FEW.to_owned(),
-        (Some(share), None) => format!("{:.2} % of the picture is above visibility 1", 100.0 * share),
-        (Some(share), Some(t)) => {
-            format!("{:.2} % of the picture is above the target visibility {}", 100.0 * share, rounded(t))
-        }
-    };
-    let mut lines = vec![
-        format!(
-            "{} samples ({:.1} a pixel on average, {} at most) in {}, of which {:.1} % in the perception model ({:.1} % in \
-             finding counts).",
-            report.samples_total,
-            report.spp_mean,
-            report.spp_max,
-            duration_in_words(report.seconds_total),
-            100.0 * report.seconds_perception / report.seconds_total,
-            100.0 * report.seconds_allocation / report.seconds_total
-        ),
-        format!("{why}; {target}."),
-    ];
-    if let (Some(p99), Some(noticed)) = (report.visibility_p99, report.patches_noticed) {
-        lines.push(format!(
-            "On the display \"{}\" ({} pixels a degree{distance}, white {} cd/m²): predicted chance that remaining {} \
-             is detected in a 1° patch is {} at the 99th percentile (visibility {p99:.2}); about {noticed:.1} of {:.1} patches.",
-            display.name,
-            rounded(display.pixels_per_degree),
-            rounded(display.white_cd_m2),
-            if report.denoised.is_some() { "error" } else { "noise" },
-            p(p99),
-            patch_count(&rendered.judgement.predicted, display.pixels_per_degree),
-        ));
-        lines.push(
-            "Model-predicted, calibrated on gratings, not on renderings; light paths never sampled are not covered."
-                .to_owned(),
-        );
+fn stop_reason_name(reason: StopReason) -> &'static str {
+    match reason {
+        StopReason::Visibility => "visibility",
+        StopReason::Time => "time",
+        StopReason::Samples => "spp",
+        StopReason::MaxSamples => "max-spp",
+        StopReason::Plans => "plans",
+        StopReason::Rule => "rule",
+        StopReason::Interrupted => "interrupted",
+        StopReason::Merged => "merged",
     }
-    if let Some([least, greatest]) = report.importance_range {
-        lines.push(format!(
-            "Thresholds are multiplied by the importance map, {least} to {greatest}, and visibilities and chances are under it."
-        ));
-    }
-    if let Some(denoised) = &report.denoised {
-        let by = format!(
-            "Denoised by {} in {} ({:.1} % of the time)",
-            denoised.denoiser,
-            duration_in_words(report.seconds_denoising),
-            100.0 * report.seconds_denoising / report.seconds_total,
-        );
-        lines.push(match (denoised.variance_visibility_p99, denoised.bias_visibility_p99) {
-            (Some(variance), Some(bias)) => format!(
-                "{by}; at the 99th percentile the noise that is left has visibility {variance:.2}, what the denoiser changed \
-                 {bias:.2}."
-            ),
-            _ => format!("{by}."),
-        });
-        lines.extend(denoised.unproven_fraction.map(|share| {
-            format!(
-                "Unproven: in {:.1} % of the picture, which is called fine, raw noise is too strong to show that the \
-                 denoiser changed nothing visible; there its error is inferred from the rest of the picture.",
-                100.0 * share
-            )
-        }));
-    }
-    if let Some(audit) = rendered.audit {
-        let whose = if report.denoised.is_some() { " unproven" } else { "" };
-        lines.push(format!(
-            "Audit: fresh samples in {}{whose} tiles differ from the picture by {:.2} ± {:.2} times the predicted visible energy.",
-            audit.tiles, audit.ratio, audit.standard_error
-        ));
-    }
-    if report.outlier_pixels > 0 {
-        lines.push(format!(
-            "{} pixels hold light that few samples find (fireflies): {:.2} % of the picture's energy. They are kept{}.",
-            report.outlier_pixels,
-            100.0 * report.outlier_energy_share,
-            // By 2 % in a block of `cornell-glass` (`benches/local_energy.py`).
-            if settings.sampling == Sampling::Adaptive {
-                "; around them it may be a few per cent too dark"
-            } else {
-                ""
-            }
-        ));
-    }
-    if report.nonfinite_samples > 0 {
-        lines.push(format!("{} samples were not finite and are left out.", report.nonfinite_samples));
-    }
-    lines.join("\n")
+}
+
+/// Least and greatest value of a map.
+fn range(map: &Plane) -> [f32; 2] {
+    let values = || map.values().iter().copied();
+    [values().fold(f32::INFINITY, f32::min), values().fold(0.0, f32::max)]
+}
+
+/// Sum of squares.
+fn energy(visibility: &Plane) -> f64 {
+    visibility.values().iter().map(|&v| f64::from(v) * f64::from(v)).sum()
 }
 
 /// 1° × 1° patches in the picture.
-fn patch_count(visibility: &Plane, pixels_per_degree: f64) -> f64 {
-    visibility.values().len() as f64 / (pixels_per_degree * pixels_per_degree)
+fn patch_count(visibility: &Plane, display: &Display) -> f64 {
+    visibility.values().len() as f64 / (display.pixels_per_degree * display.pixels_per_degree)
 }
 
-fn patches_noticed(visibility: &Plane, pixels_per_degree: f64) -> f64 {
+fn patches_noticed(visibility: &Plane, display: &Display) -> f64 {
     let mean = visibility.values().iter().map(|&v| detection_probability(f64::from(v))).sum::<f64>()
         / visibility.values().len() as f64;
-    mean * patch_count(visibility, pixels_per_degree)
+    mean * patch_count(visibility, display)
 }
 
 /// Peak resident memory as Linux states it; `None` elsewhere.

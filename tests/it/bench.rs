@@ -32,6 +32,15 @@ fn results_are_complete_and_a_second_run_goes_on() {
     }
     let report = std::fs::read_to_string(folder.path().join("report.html")).expect("written");
     assert!(report.contains("data:image/png;base64,") && report.contains("</html>"));
+    for part in [
+        "name=\"viewport\"",
+        "prefers-color-scheme: dark",
+        "alt=\"cornell-box, arm oracle: true v / v*\"",
+        ">v*</text>",
+    ] {
+        assert!(report.contains(part), "{part}");
+    }
+    assert!(!report.contains("http") && !report.contains("url("), "the report needs nothing else");
     assert_eq!(std::fs::read_to_string(folder.path().join("results.csv")).expect("written").lines().count(), 1 + 72);
 
     let renders = |folder: &Path| {
@@ -86,4 +95,122 @@ fn bounds_need_no_arms_and_unknown_arms_are_refused() {
     let refused = bench(folder.path(), &["--arms", "magic"]);
     assert_eq!(refused.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&refused.stderr).contains("there is no arm \"magic\""));
+}
+
+/// Nothing but a sky of one colour, or of none: no noise, nothing to see, and still figures.
+#[test]
+fn scenes_without_noise_or_light_have_tables() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let camera = "[camera]\nposition = [0, 0, 3]\nlook_at = [0, 0, 0]\nvertical_fov_deg = 40\n";
+    let far = "[[objects]]\nsphere = { center = [0, 0, 90], radius = 1 }\nmaterial = \"m\"\n";
+    let grey =
+        "[materials.m]\ntype = \"diffuse\"\nreflectance = [0.5, 0.5, 0.5]\n[environment]\nradiance = [0.3, 0.3, 0.3]\n";
+    let lamp = "[materials.m]\ntype = \"diffuse\"\nreflectance = [0, 0, 0]\nemission = [9, 9, 9]\n";
+    for (name, parts) in [("flat.toml", grey), ("black.toml", lamp)] {
+        std::fs::write(folder.path().join(name), [camera, parts, far].concat()).expect("written");
+    }
+    let run = |more: &[&str]| {
+        let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+        command.args([
+            "bench",
+            "flat.toml",
+            "black.toml",
+            "--size",
+            "32",
+            "--seeds",
+            "1",
+            "--reference-factor",
+            "0.25",
+        ]);
+        command.args(["-o", "out"]).args(more).current_dir(folder.path());
+        let run = command.output().expect("runs");
+        let said = String::from_utf8_lossy(&[run.stdout, run.stderr].concat()).into_owned();
+        assert!(run.status.success() && !said.contains("NaN") && !said.contains("inf"), "{more:?}: {said}");
+    };
+    run(&["--arms", "uniform,relative,as-asked,oracle"]);
+    run(&["--suite", "denoise", "--denoise", "builtin", "--law-only"]);
+    for name in ["results.csv", "report.html"] {
+        let text = std::fs::read_to_string(folder.path().join("out").join(name)).expect("written");
+        assert!(!text.contains("NaN") && !text.contains("inf,"), "{name}");
+    }
+    let records: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(folder.path().join("out/results.json")).expect("written")).expect("JSON");
+    for record in records["records"].as_array().expect("records") {
+        assert_eq!(record["energy_bias"].is_null(), record["scene"] == "black", "{record}");
+        assert!(record["speedup_samples"].is_null() && record["reached"] == 0.0, "{record}");
+    }
+}
+
+/// A name with all that CSV and HTML read otherwise.
+#[test]
+fn names_of_scenes_are_quoted() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = folder.path().join("a, <b> & 'c'.toml");
+    std::fs::copy(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml"), &scene).expect("copied");
+    let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+    command.arg("bench").arg(&scene).args([
+        "--size",
+        "32",
+        "--visibility",
+        "12",
+        "--reference-factor",
+        "1",
+        "--seeds",
+        "1",
+    ]);
+    let run = command.args(["--arms", "uniform", "-o", "out"]).current_dir(folder.path()).output().expect("runs");
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let read = |name: &str| std::fs::read_to_string(folder.path().join("out").join(name)).expect("written");
+    assert!(read("results.csv").lines().skip(1).all(|line| line.starts_with("\"a, <b> & 'c'\",uniform,")));
+    let report = read("report.html");
+    assert!(report.contains("<h2>a, &lt;b&gt; &amp; &#39;c&#39;</h2>") && !report.contains("<b>"), "{report}");
+}
+
+/// Renders of the suite denoise are kept as those of arms are.
+#[test]
+fn denoised_renders_are_not_made_twice() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = || {
+        let done = bench(folder.path(), &["--suite", "denoise", "--denoise", "builtin", "--law-only", "--seeds", "1"]);
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        std::fs::read_to_string(folder.path().join("denoise.json")).expect("written")
+    };
+    // Seconds are in it, which no two renders share.
+    assert_eq!(run(), run());
+}
+
+#[test]
+fn the_suite_animation_writes_its_rows() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/rolling-ball.toml");
+    let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+    command.arg("bench").arg(scene).args(["--suite", "animation", "--size", "32", "--fps", "24", "--visibility", "12"]);
+    let run = command.args(["--reference-factor", "1", "-o"]).arg(folder.path().join("out")).output().expect("runs");
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let text = std::fs::read(folder.path().join("out/animation.json")).expect("written");
+    let results: serde_json::Value = serde_json::from_slice(&text).expect("JSON");
+    assert!(results[0]["denoiser"].is_null());
+    assert_eq!(results[0]["rows"][0]["scene"], "rolling-ball");
+}
+
+/// One line of what is wrong and what would be right, before anything is rendered.
+#[test]
+fn what_cannot_be_run_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml");
+    let again = scene.with_file_name("../scenes/cornell-box.toml").display().to_string();
+    for (arguments, why) in [
+        (
+            &["--suite", "denoise", "--denoise", "none"][..],
+            "--denoise none: the suite denoise judges denoised pictures",
+        ),
+        (&[&again], "named twice, here and as "),
+        (&["--display", "wall"], "there is no display \"wall\"; known: "),
+        (&["--suite", "animation", "--display", "wall"], "there is no display \"wall\"; known: "),
+    ] {
+        let refused = bench(&folder.path().join("out"), arguments);
+        let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert_eq!(refused.status.code(), Some(2), "{said}");
+        assert!(said.contains(why) && said.trim().lines().count() == 1, "{said}");
+    }
 }

@@ -87,7 +87,10 @@ fn a_merge_that_traces_goes_on_from_its_film() {
     let options = ["--size", "256x256", "--sampling", "uniform", "--spp", "64"];
     let (folder, whole) = one_process(&options);
     let plan = ["farm", "plan", &scene(), "--unit-samples", "1000000000", "-o", "farm", "--"];
-    run(folder.path(), 0, &[&plan[..], &options].concat());
+    let said_of_plan = run(folder.path(), 0, &[&plan[..], &options].concat());
+    // 16 × 256² samples.
+    let why = "a frame's first round has 1.05 million samples, fewer than --unit-samples 1000000000";
+    assert!(said_of_plan.contains(why) && !said_of_plan.contains("0 units"), "{said_of_plan}");
     let farm = folder.path().join("farm");
     let film = farm.join("frame-0000/film");
     let merge = ["farm", "merge", ".", "--threads", "1", "--checkpoint-every", "0.001"];

@@ -4,6 +4,7 @@ use super::job::JobOptions;
 use crate::cli::words::{count, samples_in_words};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
+use fechner::adaptive::settings::Limits;
 use fechner::adaptive::state::RenderState;
 use fechner::farm::round::hand_out;
 use fechner::farm::{Farm, FrameEntry, Manifest, PictureFormat, Work};
@@ -130,18 +131,46 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode> {
     )?;
     // From here on it is a farm: whatever works on it goes on from what is there.
     unfinished.keep();
-    let (mut units, mut samples) = (0, 0);
-    for (frame_index, FrameEntry { origin, .. }) in farm.manifest().frames.iter().enumerate() {
-        let record = hand_out(&farm, frame_index, &RenderState::new(origin.width, origin.height, &limits))?;
-        units += record.units.len();
-        samples += record.samples;
-    }
-    say!(
-        "{}: {}, {} in the first round, {}",
-        arguments.output.display(),
-        count(farm.manifest().frames.len(), "frame"),
-        count(units, "unit"),
-        samples_in_words(samples)
-    );
+    let round = FirstRounds::hand_out(&farm, &limits)?;
+    say!("{}: {}", arguments.output.display(), round.in_words(farm.manifest()));
     Ok(ExitCode::SUCCESS)
+}
+
+/// What all frames begin with.
+struct FirstRounds {
+    units: usize,
+    /// Samples of these.
+    samples: u64,
+    /// Most samples of a frame's round, whether units have them or not.
+    most_samples_a_frame: u64,
+}
+
+impl FirstRounds {
+    fn hand_out(farm: &Farm, limits: &Limits) -> Result<Self> {
+        let mut rounds = Self { units: 0, samples: 0, most_samples_a_frame: 0 };
+        for (frame_index, FrameEntry { origin, .. }) in farm.manifest().frames.iter().enumerate() {
+            let state = RenderState::new(origin.width, origin.height, limits);
+            let record = hand_out(farm, frame_index, &state)?;
+            rounds.units += record.units.len();
+            rounds.samples += record.samples;
+            let of_frame = state.untraced_blocks().map(|block| u64::from(block.samples)).sum();
+            rounds.most_samples_a_frame = rounds.most_samples_a_frame.max(of_frame);
+        }
+        Ok(rounds)
+    }
+
+    fn in_words(&self, manifest: &Manifest) -> String {
+        let frames = count(manifest.frames.len(), "frame");
+        if self.units > 0 {
+            let (units, samples) = (count(self.units, "unit"), samples_in_words(self.samples));
+            return format!("{frames}, {units} in the first round, {samples}");
+        }
+        format!(
+            "{frames}, nothing to share out yet: a frame's first round has {}, fewer than --unit-samples {}, so farm merge and \
+             farm work trace it whole; to share it out, plan with --unit-samples {} or less",
+            samples_in_words(self.most_samples_a_frame),
+            manifest.unit_samples,
+            self.most_samples_a_frame / 2
+        )
+    }
 }

@@ -1,0 +1,136 @@
+//! The end of a render in plain words.
+
+use super::{Report, TOO_FEW, patch_count};
+use crate::cli::console::duration_in_words;
+use crate::cli::words::rounded;
+use fechner::adaptive::settings::{LoopSettings, Sampling};
+use fechner::adaptive::{Rendered, StopReason};
+use fechner_perception::Plane;
+use fechner_perception::display::Display;
+use fechner_perception::psychometric::detection_probability;
+
+/// The end of a render in plain words.
+pub(in crate::cli) fn summary(report: &Report, settings: &LoopSettings, rendered: &Rendered) -> String {
+    let mut lines = vec![spent(report), stopped(report, settings, rendered)];
+    lines.extend(noticed(report, &settings.viewing.display, &rendered.judgement.predicted));
+    lines.extend(importance(report));
+    lines.extend(denoised(report));
+    lines.extend(audited(report, rendered));
+    lines.extend(fireflies(report, settings.sampling));
+    lines.extend(nonfinite(report));
+    lines.join("\n")
+}
+
+fn spent(report: &Report) -> String {
+    format!(
+        "{} samples ({:.1} a pixel on average, {} at most) in {}, of which {:.1} % in the perception model ({:.1} % in \
+         finding counts).",
+        report.samples_total,
+        report.spp_mean,
+        report.spp_max,
+        duration_in_words(report.seconds_total),
+        100.0 * report.seconds_perception / report.seconds_total,
+        100.0 * report.seconds_allocation / report.seconds_total
+    )
+}
+
+fn stopped(report: &Report, settings: &LoopSettings, rendered: &Rendered) -> String {
+    let why = match rendered.stop_reason {
+        StopReason::Visibility => "Stopped because the target is reached",
+        StopReason::Time if settings.limits.time.is_some_and(|limit| rendered.seconds_total < limit.as_secs_f64()) => {
+            "Stopped because the next plan would not fit into the time"
+        }
+        StopReason::Time => "Stopped because the time was up",
+        StopReason::Samples => "Stopped because the samples were spent",
+        StopReason::MaxSamples => {
+            "Stopped although some pixels are above the target: they have the most samples allowed"
+        }
+        StopReason::Plans => "Stopped after the plans asked for",
+        StopReason::Rule => "Stopped because the rule asked for is satisfied",
+        StopReason::Interrupted => "Stopped by a signal",
+        StopReason::Merged => "Merged",
+    };
+    let target = match (report.fraction_visible, report.visibility_target) {
+        (None, _) => TOO_FEW.to_owned(),
+        (Some(share), None) => format!("{:.2} % of the picture is above visibility 1", 100.0 * share),
+        (Some(share), Some(t)) => {
+            format!("{:.2} % of the picture is above the target visibility {}", 100.0 * share, rounded(t))
+        }
+    };
+    format!("{why}; {target}.")
+}
+
+fn noticed(report: &Report, display: &Display, predicted: &Plane) -> Option<String> {
+    let (p99, noticed) = (report.visibility_p99?, report.patches_noticed?);
+    let distance = display.distance_m.map_or_else(String::new, |d| format!(" at {d:.2} m"));
+    Some(format!(
+        "On the display \"{}\" ({} pixels a degree{distance}, white {} cd/m²): predicted chance that remaining {} \
+         is detected in a 1° patch is {:.1} % at the 99th percentile (visibility {p99:.2}); about {noticed:.1} of {:.1} patches.\n\
+         Model-predicted, calibrated on gratings, not on renderings; light paths never sampled are not covered.",
+        display.name,
+        rounded(display.pixels_per_degree),
+        rounded(display.white_cd_m2),
+        if report.denoised.is_some() { "error" } else { "noise" },
+        100.0 * detection_probability(p99),
+        patch_count(predicted, display),
+    ))
+}
+
+fn importance(report: &Report) -> Option<String> {
+    report.importance_range.map(|[least, greatest]| {
+        format!(
+            "Thresholds are multiplied by the importance map, {least} to {greatest}, and visibilities and chances are under it."
+        )
+    })
+}
+
+fn denoised(report: &Report) -> Vec<String> {
+    let Some(denoised) = &report.denoised else { return Vec::new() };
+    let by = format!(
+        "Denoised by {} in {} ({:.1} % of the time)",
+        denoised.denoiser,
+        duration_in_words(report.seconds_denoising),
+        100.0 * report.seconds_denoising / report.seconds_total,
+    );
+    let left = match (denoised.variance_visibility_p99, denoised.bias_visibility_p99) {
+        (Some(variance), Some(bias)) => format!(
+            "{by}; at the 99th percentile the noise that is left has visibility {variance:.2}, what the denoiser changed \
+             {bias:.2}."
+        ),
+        _ => format!("{by}."),
+    };
+    let unproven = denoised.unproven_fraction.map(|share| {
+        format!(
+            "Unproven: in {:.1} % of the picture, which is called fine, raw noise is too strong to show that the \
+             denoiser changed nothing visible; there its error is inferred from the rest of the picture.",
+            100.0 * share
+        )
+    });
+    std::iter::once(left).chain(unproven).collect()
+}
+
+fn audited(report: &Report, rendered: &Rendered) -> Option<String> {
+    let audit = rendered.audit?;
+    let whose = if report.denoised.is_some() { " unproven" } else { "" };
+    Some(format!(
+        "Audit: fresh samples in {}{whose} tiles differ from the picture by {:.2} ± {:.2} times the predicted visible energy.",
+        audit.tiles, audit.ratio, audit.standard_error
+    ))
+}
+
+fn fireflies(report: &Report, sampling: Sampling) -> Option<String> {
+    // By 2 % in a block of `cornell-glass` (`benches/local_energy.py`).
+    let darker = if sampling == Sampling::Adaptive { "; around them it may be a few per cent too dark" } else { "" };
+    (report.outlier_pixels > 0).then(|| {
+        format!(
+            "{} pixels hold light that few samples find (fireflies): {:.2} % of the picture's energy. They are kept{darker}.",
+            report.outlier_pixels,
+            100.0 * report.outlier_energy_share,
+        )
+    })
+}
+
+fn nonfinite(report: &Report) -> Option<String> {
+    let samples = report.nonfinite_samples;
+    (samples > 0).then(|| format!("{samples} samples were not finite and are left out."))
+}
