@@ -23,8 +23,9 @@ pub fn display_luminance(fitted: &dyn FittedTone, display: &Display, scene_lumin
 pub fn display_slope(fitted: &dyn FittedTone, display: &Display, scene_luminance: &Plane) -> Plane {
     let shown = Shown { fitted, display };
     Plane::from_fn(scene_luminance.width(), scene_luminance.height(), |x, y| {
-        // At most what leaves the chord's ends finite.
-        let at = scene_luminance.get(x, y).max(1e-4).min(1e30);
+        let luminance = scene_luminance.get(x, y);
+        // At most what leaves the chord's ends finite; NaN is not above anything.
+        let at = if luminance > 1e-4 { luminance.min(1e30) } else { 1e-4 };
         let (below, above) = (0.95 * at, 1.05 * at);
         (shown.cd_m2(Pixel { x, y }, above) - shown.cd_m2(Pixel { x, y }, below)) / (above - below)
     })
