@@ -110,7 +110,7 @@ impl ThresholdMap {
     }
 
     /// Visibility, in threshold units, of the error that two independent halves of a picture show: half_difference is (A − B)/2 in
-    /// display cd/m², (height, width). Pixels that are not finite count as 0.
+    /// display cd/m², (height, width). Pixels that are not finite get infinity and count as 0 for the others.
     fn measured_visibility<'py>(
         &self,
         py: Python<'py>,
