@@ -139,6 +139,20 @@ fn rectangle_disc_area(radius: f64, half_width: f64, half_height: f64) -> f64 {
 mod tests {
     use super::*;
 
+    /// A curve that bends below 1 cpd is as well tabulated for the finest display as for a coarse one.
+    #[test]
+    fn tables_of_fine_displays_are_as_fine() {
+        for ppd in [60.0, 1000.0] {
+            let bent = |freq_cpd: f64| (std::f64::consts::PI * freq_cpd).sin();
+            let table = RadialTable::new(PixelDensity::square(ppd), bent);
+            for step in 0..100 {
+                let freq_cpd = 0.013 * f64::from(step);
+                let error = f64::from(table.at(freq_cpd as f32)) - bent(freq_cpd);
+                assert!(error.abs() < 3e-3, "{ppd} ppd, {freq_cpd} cpd: {error}");
+            }
+        }
+    }
+
     #[test]
     fn energies_of_the_bands_add_to_one() {
         for ppd in [2.0, 30.0, 60.0, 110.0] {

@@ -224,8 +224,8 @@ impl ThresholdMap {
         self.noise_gain.map(|gain| (visibility / (2.0 * f64::from(gain)).sqrt()) as f32)
     }
 
-    /// How many times masking raises the allowed standard error of white noise at each pixel: 1 to 3 in a still picture without
-    /// glare; for error that moves, and elsewhere, as much as the unmasked thresholds of the same map differ.
+    /// How many times masking raises the allowed standard error of white noise at each pixel, 1 to 3. On a map
+    /// [`with_motion`](Self::with_motion) what motion raises or lowers is in it, too.
     #[must_use]
     pub fn masking_elevation(&self) -> Plane {
         let unmasked = noise_gain(&self.tables, &self.adaptation_cd_m2, &[]);

@@ -22,9 +22,10 @@ impl Face {
         const PLAIN: std::ops::Range<f32> = 1e-30..1e30;
         let cross = Vec3::from(edges[0].cross(edges[1]));
         let squared = cross.length_squared();
-        match PLAIN.contains(&squared) {
-            true => Some(Self { normal: cross * squared.sqrt().recip(), area: 0.5 * squared.sqrt() }),
-            false => Self::of_any_size(edges),
+        if PLAIN.contains(&squared) {
+            Some(Self { normal: cross * squared.sqrt().recip(), area: 0.5 * squared.sqrt() })
+        } else {
+            Self::of_any_size(edges)
         }
     }
 

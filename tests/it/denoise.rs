@@ -10,6 +10,8 @@ use fechner::denoise::{Denoiser, NoisyPicture, Oidn, SurfaceGuides};
 use fechner::exr_read::read_exr;
 use fechner::film::{Film, opponent};
 use fechner::integrator::{PathTracer, TraceSettings};
+use fechner::output::ChannelValues;
+use fechner::output::rendered::{Background, layers};
 use fechner::sampler::Half;
 use fechner::scene::Scene;
 use fechner::scene::load::{LoadOptions, load};
@@ -199,6 +201,29 @@ impl DenoisedScene {
             .expect("never outdated")
             .expect("unproven in some tiles")
     }
+}
+
+/// What matters half as much may show twice as much of either part of the error, in the file as in the stop.
+#[test]
+fn importance_goes_for_both_parts_of_the_error() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml");
+    let scene = Arc::new(load(&path, &LoadOptions::default()).expect("loads"));
+    let parts = |importance: Option<Plane>| {
+        let settings = loop_settings(scene.nits_per_unit, Sampling::Uniform, None, Some(4));
+        let settings = LoopSettings { denoiser: Some(Denoiser::Builtin), importance, ..settings };
+        let tracer = PathTracer::new(Arc::clone(&scene), trace_settings(32, 32, 1));
+        let rendered = render_scene(&tracer, &settings, &Quiet).expect("renders");
+        let picture = layers(&rendered, &settings, Background::Shown, &[]);
+        ["visibility_variance.Y", "visibility_bias.Y"].map(|name| {
+            match picture.channels.iter().find(|channel| channel.name == name).map(|channel| &channel.values) {
+                Some(ChannelValues::F32(values)) => values.to_vec(),
+                _ => panic!("{name} is a channel of floats"),
+            }
+        })
+    };
+    let halved = parts(None).map(|values| values.iter().map(|value| 0.5 * value).collect::<Vec<f32>>());
+    assert!(halved[0].iter().all(|&value| value > 0.0));
+    assert_eq!(parts(Some(Plane::filled(32, 32, 2.0))), halved);
 }
 
 /// A denoiser that does nothing leaves the raw noise, which the variance predicts; one that draws stripes is found out.

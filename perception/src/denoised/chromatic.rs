@@ -34,6 +34,9 @@ pub fn chromatic_error(
     let error = thresholds.denoised_error(&picture.differences);
     Ok(match frames {
         None => error,
-        Some(timing) => error.scaled(timing.chromatic_energy(channel)?.sqrt()),
+        Some(timing) => {
+            let factor = timing.chromatic_energy(channel)?.sqrt() as f32;
+            error.scaled(|plane| plane.map(|value| factor * value))
+        }
     })
 }

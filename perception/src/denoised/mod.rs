@@ -98,26 +98,15 @@ impl DenoisedError {
     /// This error for eyes whose thresholds are multiplied by a map of the same size, as where some places matter more than others.
     #[must_use]
     pub fn with_thresholds_times(&self, factors: &Plane) -> Self {
-        let over = |plane: &Plane| plane.combined(factors, |visibility, factor| visibility / factor);
-        let over_square = |plane: &Plane| plane.combined(factors, |squared, factor| squared / (factor * factor));
-        Self {
-            visibility: over(&self.visibility),
-            variance: over(&self.variance),
-            bias: over(&self.bias),
-            bias_squared_standard_error: over_square(&self.bias_squared_standard_error),
-            bias_factors: self.bias_factors.clone(),
-            raw_shares: self.raw_shares.clone(),
-            blended_visibility: over(&self.blended_visibility),
-        }
+        self.clone().scaled(|plane| plane.combined(factors, |value, factor| value / factor))
     }
 
-    /// The same error seen `factor` times as well.
-    fn scaled(mut self, factor: f64) -> Self {
-        let scale = |plane: &mut Plane, factor: f64| *plane = plane.map(|value| factor as f32 * value);
+    /// The same error seen as many times as well as `scale` makes of a visibility.
+    fn scaled(mut self, scale: impl Fn(&Plane) -> Plane) -> Self {
         for plane in [&mut self.visibility, &mut self.variance, &mut self.bias, &mut self.blended_visibility] {
-            scale(plane, factor);
+            *plane = scale(plane);
         }
-        scale(&mut self.bias_squared_standard_error, factor * factor);
+        self.bias_squared_standard_error = scale(&scale(&self.bias_squared_standard_error));
         self
     }
 
@@ -174,10 +163,10 @@ impl ThresholdMap {
             bias_factors.push(found.factor);
             raw_shares.push(share);
         }
-        let seen = |energy: &Plane| {
-            let visibility = energy.map(|energy| (2.0 * energy.max(0.0)).sqrt());
-            planes.iter().fold(visibility, |visibility, plane| infinite_where_unknown(visibility, plane))
-        };
+        // Finite where all three are.
+        let sum =
+            planes[1..].iter().fold(planes[0].clone(), |sum, plane| sum.combined(plane, |sum, value| sum + value));
+        let seen = |energy: &Plane| infinite_where_unknown(energy.map(|energy| (2.0 * energy.max(0.0)).sqrt()), &sum);
         let both = variance.combined(&bias, |variance, bias| variance + bias);
         DenoisedError {
             visibility: seen(&both),

@@ -208,6 +208,21 @@ fn planes_of_another_size_are_infinitely_visible() {
     assert!(step_towards_raw(&map, &found, &small).is_none());
 }
 
+/// Where thresholds are twice as high, what is called fine and unproven is what is so at half the target elsewhere.
+#[test]
+fn importance_goes_for_what_is_unproven_too() {
+    let map = map_of(&grey());
+    let mistakes = [18, 19].map(|seed| white_noise(seed, 2.0));
+    let plain = Halves::of(&grey(), mistakes, 20.0, 20).judged(&map);
+    let halved = plain.with_thresholds_times(&Plane::filled(SIDE, SIDE, 2.0));
+    let target = plain.visibility.quantile(0.5);
+    let expected = plain.unproven(target);
+    assert!((0.1..0.9).contains(&expected.mean()), "{}", expected.mean());
+    assert_eq!(halved.unproven(0.5 * target), expected);
+    assert_eq!(halved.variance, plain.variance.map(|v| 0.5 * v));
+    assert_eq!(halved.bias, plain.bias.map(|v| 0.5 * v));
+}
+
 #[test]
 fn broken_pixels_are_infinitely_visible() {
     let map = map_of(&Plane::filled(16, 16, GREY));

@@ -67,7 +67,14 @@ pub(super) enum Guide {
 impl Device {
     /// Opens the library at `path` (or by that name, for the system's loader to find) and starts its CPU device.
     pub(super) fn open(path: &Path, threads: usize) -> Result<Self, OidnError> {
-        let refused = |problem: String| OidnError::Library { path: path.to_owned(), problem };
+        let refused = |problem: String| {
+            // Loaders begin with the place, which the error names by itself.
+            let place = format!("{}: ", path.display());
+            OidnError::Library {
+                path: path.to_owned(),
+                problem: problem.strip_prefix(&place).unwrap_or(&problem).to_owned(),
+            }
+        };
         // SAFETY: loading runs the library's own initialisers, which its documentation allows at any time.
         let library = unsafe { Library::new(path) }.map_err(|error| refused(error.to_string()))?;
         let functions = Functions::of(&library).map_err(|error| refused(error.to_string()))?;
@@ -195,5 +202,19 @@ impl Functions {
                 release_filter: *library.get(b"oidnReleaseFilter\0")?,
             })
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_library_that_is_not_there_is_named_once() {
+        let Err(error) = Device::open(Path::new("/nowhere/libOpenImageDenoise.so.2"), 1) else {
+            panic!("there is none")
+        };
+        let text = error.to_string();
+        assert_eq!(text.matches("/nowhere/").count(), 1, "{text}");
     }
 }

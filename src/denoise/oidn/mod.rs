@@ -40,14 +40,6 @@ fn tried(problems: &[String]) -> String {
     problems.iter().map(|problem| format!("\n  tried {problem}")).collect()
 }
 
-/// A place and what is wrong with it, once: loaders begin with the place, too.
-fn in_short(error: &OidnError) -> String {
-    let OidnError::Library { path, problem } = error else { return error.to_string() };
-    let place = path.display().to_string();
-    let problem = problem.strip_prefix(&place).map_or(problem.as_str(), |rest| rest.trim_start_matches(": "));
-    format!("{place}: {problem}")
-}
-
 /// Guides of as many samples are trusted as they are: to denoise them costs half as much again as picture and halves do, and is
 /// worth 0.011 JOD where a shutter is open, 0.002 and 0.004 elsewhere (`benches/results/denoising.md`).
 const CLEAN_ENOUGH_SAMPLES: f64 = 16.0;
@@ -91,7 +83,7 @@ impl Oidn {
         for path in candidates(&Environment::of_process()) {
             match Self::open_at(&path, threads) {
                 Ok(opened) => return Ok(opened),
-                Err(error) => problems.push(in_short(&error)),
+                Err(error) => problems.push(error.to_string()),
             }
         }
         Err(OidnError::NotFound(problems))
@@ -141,18 +133,4 @@ impl Oidn {
 
 fn in_words(version: i32) -> String {
     format!("{}.{}.{}", version / 10_000, version / 100 % 100, version % 100)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_place_is_named_once() {
-        let path = PathBuf::from("/opt/libOpenImageDenoise.so.2");
-        let of = |problem: &str| in_short(&OidnError::Library { path: path.clone(), problem: problem.to_owned() });
-        let missing = of("/opt/libOpenImageDenoise.so.2: cannot open shared object file: No such file or directory");
-        assert_eq!(missing.matches("libOpenImageDenoise").count(), 1, "{missing}");
-        assert_eq!(of("it is version 1.4.3"), "/opt/libOpenImageDenoise.so.2: it is version 1.4.3");
-    }
 }
