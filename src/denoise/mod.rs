@@ -45,6 +45,8 @@ pub struct SurfaceGuides {
     pub normal: Vec<[f32; 3]>,
     /// Its distance.
     pub depth: Vec<f32>,
+    /// Whether something that is seen there shines by itself.
+    pub shines: Vec<bool>,
     /// Samples that each is the mean of, on average.
     pub samples: f64,
 }
@@ -105,7 +107,7 @@ impl Denoiser {
     /// [`OidnError::Failed`] where the library fails.
     pub fn prepare(&self, guides: SurfaceGuides) -> Result<PreparedGuides, OidnError> {
         Ok(PreparedGuides(match self {
-            Self::Builtin => builtin::prepare(guides),
+            Self::Builtin => guides,
             Self::Oidn(oidn) => oidn.prepare(guides)?,
         }))
     }

@@ -31,6 +31,7 @@ pub fn denoise_film(denoiser: &Denoiser, film: &Film, nits_per_unit: f64) -> Res
         albedo: film.guides().iter().map(|guide| guide.albedo).collect(),
         normal: film.guides().iter().map(|guide| guide.normal).collect(),
         depth: film.guides().iter().map(|guide| guide.depth).collect(),
+        shines: film.guides().iter().map(|guide| guide.seen.shines()).collect(),
         samples: film.total_samples() as f64 / (width * height).max(1) as f64,
     })?;
     let estimate = film.estimate(nits_per_unit);

@@ -144,6 +144,7 @@ fn open_image_denoise_removes_noise_and_repeats_itself() {
             albedo: albedo.iter().map(|&value| [value; 3]).collect(),
             normal: vec![[0.0, 0.0, 1.0]; width * height],
             depth: vec![1.0; width * height],
+            shines: vec![false; width * height],
             samples,
         };
         let guides = denoiser.prepare(guides).expect("prepares");

@@ -1,0 +1,187 @@
+//! How much a neighbour counts: by its surroundings, less what noise alone would make of them, and by its surface.
+
+use super::SurfaceGuides;
+use super::planes::{Beyond, PaddedPlane, TILE};
+use super::taps::{Tap, Taps};
+use fechner_perception::photometry::luminance;
+
+/// A neighbour whose normal is turned by this much less than 1 in cosine gets 1/e of the weight: one in this.
+const NORMAL_SHARPNESS: f32 = 12.0;
+/// A neighbour this many times farther off than the surface's slope explains gets 1/e of the weight.
+const DEPTH_SLOPES: f32 = 1.5;
+/// And so does one that is farther off by this share of the depth, where the surface has no slope.
+const DEPTH_SHARE: f32 = 2e-3;
+/// Depth beside the picture, so far from any other that what lies there never weighs anything; and half of it where there is no surface.
+const BEYOND: f32 = 1e30;
+const NO_SURFACE: f32 = 0.5 * BEYOND;
+/// Surfaces farther away than this are taken to be here.
+const FARTHEST_SURFACE: f32 = 1e14;
+/// From here on [`falling`] is 0.
+const GONE: f32 = 8.0;
+
+/// About exp(−x), 0 from [`GONE`] on, without the cost of an exponential.
+#[inline(always)]
+fn falling(x: f32) -> f32 {
+    let base = (1.0 - x / GONE).max(0.0);
+    let fourth = base * base * base * base;
+    fourth * fourth
+}
+
+/// Light that falls on surfaces: luminance, and its variance.
+pub(super) struct Light {
+    luminance: PaddedPlane,
+    pub(super) variance: PaddedPlane,
+}
+
+impl Light {
+    pub(super) fn of(guides: &SurfaceGuides, rgb: &[[f32; 3]], variance: &[f32]) -> Self {
+        let plane = |of: &dyn Fn(usize) -> f32| PaddedPlane::new(guides.width, guides.height, Beyond::Edge, of);
+        // A variance of nothing at all would make nothing of any difference: 0 over 0.
+        Self { luminance: plane(&|i| luminance(rgb[i])), variance: plane(&|i| variance[i].max(1e-12)) }
+    }
+}
+
+/// Surfaces as they are told apart.
+pub(super) struct Surfaces {
+    /// Columns and rows.
+    size: (usize, usize),
+    normal: [PaddedPlane; 3],
+    depth: PaddedPlane,
+    /// 1 over the difference of depth, per pixel of distance, at which a neighbour gets 1/e of the weight.
+    per_depth: PaddedPlane,
+    /// [`GONE`] where something shines by itself, else 0: its light may not leak out of it.
+    shining: PaddedPlane,
+}
+
+impl Surfaces {
+    pub(super) fn of(guides: &SurfaceGuides) -> Self {
+        let (width, height) = (guides.width, guides.height);
+        let normals: Vec<[f32; 3]> = guides.normal.iter().map(|&normal| unit(normal)).collect();
+        let depth = |i: usize| {
+            if guides.depth[i].is_finite() { guides.depth[i].clamp(0.0, FARTHEST_SURFACE) } else { NO_SURFACE }
+        };
+        let per_depth = |i: usize| {
+            1.0 / (DEPTH_SLOPES * slope(guides, i).min(FARTHEST_SURFACE) + DEPTH_SHARE * depth(i) + f32::MIN_POSITIVE)
+        };
+        Self {
+            size: (width, height),
+            normal: std::array::from_fn(|axis| PaddedPlane::new(width, height, Beyond::Edge, |i| normals[i][axis])),
+            depth: PaddedPlane::new(width, height, Beyond::Value(BEYOND), depth),
+            per_depth: PaddedPlane::new(width, height, Beyond::Value(0.0), |i| per_depth(i).min(1e6)),
+            shining: PaddedPlane::new(width, height, Beyond::Edge, |i| if guides.shines[i] { GONE } else { 0.0 }),
+        }
+    }
+}
+
+impl Surfaces {
+    /// Columns and rows.
+    pub(super) fn size(&self) -> (usize, usize) {
+        self.size
+    }
+}
+
+fn unit(normal: [f32; 3]) -> [f32; 3] {
+    let length = normal.iter().map(|part| part * part).sum::<f32>().sqrt();
+    if length > 1e-3 && length.is_finite() { normal.map(|part| part / length) } else { [0.0; 3] }
+}
+
+/// How much depth changes from a pixel to the next, taken on the flatter side so that silhouettes do not count.
+fn slope(guides: &SurfaceGuides, pixel: usize) -> f32 {
+    let (x, y) = (pixel % guides.width, pixel / guides.width);
+    let step = |other: Option<usize>| {
+        let step = other.map_or(f32::INFINITY, |other| (guides.depth[other] - guides.depth[pixel]).abs());
+        if step.is_nan() { f32::INFINITY } else { step }
+    };
+    let width = guides.width;
+    let across = step((x > 0).then(|| pixel - 1)).min(step((x + 1 < width).then(|| pixel + 1)));
+    let along = step((y > 0).then(|| pixel - width)).min(step((y + 1 < guides.height).then(|| pixel + width)));
+    let slope = across.max(along);
+    if slope.is_finite() { slope } else { 0.0 }
+}
+
+/// What tells how much each of the taps counts: `PATCH` pixels to each side are compared.
+pub(super) struct Likeness<'a, const PATCH: usize> {
+    pub(super) taps: &'a Taps,
+    pub(super) light: &'a Light,
+    pub(super) surfaces: &'a Surfaces,
+    /// Standard errors of the difference at which a neighbour gets 1/e of the weight.
+    pub(super) tolerance: f32,
+    /// A neighbour's variance counts as at most so many times the pixel's own: what is as bright as a lamp's reflection has the
+    /// variance to be anything, and would be taken for what is around it.
+    pub(super) most_variance_ratio: f32,
+}
+
+/// Weights of one tap for a tile's pixels.
+pub(super) type TileWeights = [[f32; TILE]; TILE];
+/// The widest that a tile's neighbourhoods are.
+const WIDEST: usize = TILE + 4;
+
+impl<const PATCH: usize> Likeness<'_, PATCH> {
+    const _FITS: () = assert!(2 * PATCH <= WIDEST - TILE, "a patch is wider than there is room for");
+
+    /// Weights of every tap for the pixels of the tile whose first pixel this is.
+    pub(super) fn weigh_tile(&self, y: isize, x: isize, weights: &mut Vec<TileWeights>) {
+        weights.clear();
+        weights.extend(self.taps.all().iter().map(|&tap| self.weights(y, x, tap)));
+    }
+
+    fn weights(&self, y: isize, x: isize, tap: Tap) -> TileWeights {
+        let () = Self::_FITS;
+        let unlike = self.unlike_surroundings(y, x, tap);
+        let mut weights = [[0.0; TILE]; TILE];
+        // The slope explains more the farther one goes.
+        let per_distance = 1.0 / tap.distance().max(1.0);
+        for (row, (weights, unlike)) in weights.iter_mut().zip(&unlike).enumerate() {
+            let y = y + row as isize;
+            let own_and_other =
+                |plane: &'_ PaddedPlane| (*plane.row::<TILE>(y, x), *plane.row::<TILE>(y + tap.dy, x + tap.dx));
+            let [nx, ny, nz] = self.surfaces.normal.each_ref().map(own_and_other);
+            let depth = own_and_other(&self.surfaces.depth);
+            let shining = own_and_other(&self.surfaces.shining);
+            let per_depth = self.surfaces.per_depth.row::<TILE>(y, x);
+            for i in 0..TILE {
+                let has_normal = nx.0[i].abs() + ny.0[i].abs() + nz.0[i].abs();
+                let cosine = nx.0[i] * nx.1[i] + ny.0[i] * ny.1[i] + nz.0[i] * nz.1[i];
+                let turned = if has_normal > 0.0 { NORMAL_SHARPNESS * (1.0 - cosine).max(0.0) } else { 0.0 };
+                let apart = (depth.0[i] - depth.1[i]).abs() * per_depth[i] * per_distance;
+                weights[i] = falling(unlike[i] + turned + apart + (shining.0[i] - shining.1[i]).abs());
+            }
+        }
+        weights
+    }
+
+    /// Mean over the pixels around of their squared difference from those around the neighbour, less what noise makes of it on
+    /// average, in units of the tolerance: 0 where it is no more than noise.
+    fn unlike_surroundings(&self, y: isize, x: isize, tap: Tap) -> TileWeights {
+        let patch = PATCH as isize;
+        let side = 2 * PATCH + 1;
+        let squared_tolerance = self.tolerance * self.tolerance;
+        let mut along = [[0.0_f32; TILE]; WIDEST];
+        for (row, along) in along.iter_mut().enumerate().take(TILE + 2 * PATCH) {
+            let (y, x) = (y + row as isize - patch, x - patch);
+            let own = self.light.luminance.row::<WIDEST>(y, x);
+            let other = self.light.luminance.row::<WIDEST>(y + tap.dy, x + tap.dx);
+            let own_variance = self.light.variance.row::<WIDEST>(y, x);
+            let other_variance = self.light.variance.row::<WIDEST>(y + tap.dy, x + tap.dx);
+            let mut unlike = [0.0_f32; WIDEST];
+            for i in 0..WIDEST {
+                let difference = own[i] - other[i];
+                let a = own_variance[i];
+                let b = other_variance[i].min(self.most_variance_ratio * a);
+                // Of a neighbour that is noisier than the pixel no more is taken off than the pixel's own: Rousselle et al. 2012, eq. 3.
+                unlike[i] = (difference * difference - (a + a.min(b))) / (squared_tolerance * (a + b));
+            }
+            for (i, sum) in along.iter_mut().enumerate() {
+                *sum = unlike[i..i + side].iter().sum();
+            }
+        }
+        let share = 1.0 / (side * side) as f32;
+        std::array::from_fn(|row| {
+            let mut sum = [0.0_f32; TILE];
+            for along in &along[row..row + side] {
+                sum.iter_mut().zip(along).for_each(|(sum, value)| *sum += value);
+            }
+            sum.map(|sum| (sum * share).max(0.0))
+        })
+    }
+}

@@ -1,0 +1,69 @@
+//! Pictures of one channel with a border that may be read.
+
+use super::taps::FARTHEST;
+
+/// Pixels to a tile's side: work is done by tiles, whose sums stay in the first cache.
+pub(super) const TILE: usize = 16;
+/// Pixels beyond the picture that may be read: the farthest neighbour's neighbourhood.
+pub(super) const BORDER: usize = FARTHEST + 4;
+
+/// What is read beyond the picture.
+#[derive(Clone, Copy)]
+pub(super) enum Beyond {
+    /// What its nearest pixel has.
+    Edge,
+    /// This.
+    Value(f32),
+}
+
+/// A picture with [`BORDER`] more on each side, of whole tiles.
+pub(super) struct PaddedPlane {
+    stride: usize,
+    values: Vec<f32>,
+}
+
+impl PaddedPlane {
+    /// Of the values `of` pixels in row-major order. The picture is not empty.
+    pub(super) fn new(width: usize, height: usize, beyond: Beyond, of: impl Fn(usize) -> f32) -> Self {
+        let stride = width.next_multiple_of(TILE) + 2 * BORDER;
+        let rows = height.next_multiple_of(TILE) + 2 * BORDER;
+        let mut values = vec![0.0; stride * rows];
+        for (v, row) in values.chunks_exact_mut(stride).enumerate() {
+            let y = v.saturating_sub(BORDER).min(height - 1);
+            for (u, value) in row.iter_mut().enumerate() {
+                let x = u.saturating_sub(BORDER).min(width - 1);
+                let is_inside = (y + BORDER, x + BORDER) == (v, u);
+                *value = match beyond {
+                    Beyond::Value(value) if !is_inside => value,
+                    _ => of(y * width + x),
+                };
+            }
+        }
+        Self { stride, values }
+    }
+
+    /// `N` values from a column of a row on; both may be up to [`BORDER`] beyond the picture.
+    #[inline(always)]
+    pub(super) fn row<const N: usize>(&self, y: isize, x: isize) -> &[f32; N] {
+        let start = (y + BORDER as isize) as usize * self.stride + (x + BORDER as isize) as usize;
+        let found = self.values.get(start..).and_then(|values| values.first_chunk());
+        found.expect("tiles and neighbours are within the border")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_border_goes_on_or_says_what_it_is_told() {
+        let of = |i: usize| i as f32;
+        let edge = PaddedPlane::new(3, 2, Beyond::Edge, of);
+        assert_eq!(edge.row::<5>(0, -1), &[0.0, 0.0, 1.0, 2.0, 2.0]);
+        assert_eq!(edge.row::<2>(-28, 15), &[2.0, 2.0]);
+        assert_eq!(edge.row::<1>(43, -28), &[3.0]);
+        let told = PaddedPlane::new(3, 2, Beyond::Value(9.0), of);
+        assert_eq!(told.row::<5>(1, -1), &[9.0, 3.0, 4.0, 5.0, 9.0]);
+        assert_eq!(told.row::<1>(2, 0), &[9.0]);
+    }
+}
