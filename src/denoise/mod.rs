@@ -53,11 +53,15 @@ pub struct SurfaceGuides {
 
 /// Guides as a denoiser wants them, made by [`Denoiser::prepare`].
 #[derive(Clone, Debug)]
-pub struct PreparedGuides(SurfaceGuides);
+pub struct PreparedGuides {
+    guides: SurfaceGuides,
+    /// As the built-in denoiser reads them; `None` for the other, and for a picture without pixels.
+    builtin: Option<builtin::Prepared>,
+}
 
 impl PreparedGuides {
     fn get(&self) -> &SurfaceGuides {
-        &self.0
+        &self.guides
     }
 }
 
@@ -106,10 +110,13 @@ impl Denoiser {
     /// # Errors
     /// [`OidnError::Failed`] where the library fails.
     pub fn prepare(&self, guides: SurfaceGuides) -> Result<PreparedGuides, OidnError> {
-        Ok(PreparedGuides(match self {
-            Self::Builtin => guides,
-            Self::Oidn(oidn) => oidn.prepare(guides)?,
-        }))
+        Ok(match self {
+            Self::Builtin => {
+                let builtin = (guides.width * guides.height > 0).then(|| builtin::Prepared::of(&guides));
+                PreparedGuides { guides, builtin }
+            }
+            Self::Oidn(oidn) => PreparedGuides { guides: oidn.prepare(guides)?, builtin: None },
+        })
     }
 
     /// The picture without its noise, as far as the denoiser can tell noise from detail; finite and not negative.
@@ -118,7 +125,10 @@ impl Denoiser {
     /// [`OidnError::Failed`] where the library fails.
     pub fn denoise(&self, picture: &NoisyPicture<'_>) -> Result<Vec<[f32; 3]>, OidnError> {
         let mut denoised = match self {
-            Self::Builtin => builtin::denoise(picture),
+            Self::Builtin => match &picture.guides.builtin {
+                Some(prepared) => builtin::denoise(picture, prepared),
+                None => picture.rgb.to_vec(),
+            },
             Self::Oidn(oidn) => oidn.denoise(picture)?,
         };
         for value in denoised.iter_mut().flatten() {

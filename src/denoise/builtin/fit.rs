@@ -1,15 +1,18 @@
-//! Weighted fits of planes through a pixel's neighbours, tile by tile, four pixels at once.
+//! Weighted fits of planes through a pixel's neighbours, tile by tile, eight pixels at once.
+//!
+//! Loops, not closures: what a tile's work calls must be inlined to be compiled for wide vectors (see [`with_vectors`]).
 
 use super::likeness::{Likeness, TileWeights};
 use super::planes::{PaddedPlane, TILE};
 use super::taps::Tap;
-use glam::Vec4;
+use crate::geometry::{VectorWork, with_vectors};
 use rayon::prelude::*;
 
 /// Albedo, normal, depth.
 pub(super) const FEATURES: usize = 7;
-/// Pixels that are fitted at once: a vector register of the baseline.
-const LANES: usize = 4;
+/// Pixels that are fitted at once.
+const LANES: usize = 8;
+const _: () = assert!(TILE.is_multiple_of(LANES), "a tile's rows are whole groups");
 /// Neighbours of less weight are passed over.
 const LEAST_WEIGHT: f32 = 1e-4;
 /// Variance of a sample's feature, about: what a fit follows may be the features' own noise, which is this over the samples.
@@ -32,20 +35,10 @@ pub(super) fn by_features<const PATCH: usize>(
     likeness: &Likeness<'_, PATCH>,
 ) -> Fitted {
     let ridge = (FEATURE_VARIANCE / samples.max(1.0)).clamp(1e-6, FEATURE_VARIANCE) as f32;
-    let found = by_tiles(likeness, |place, weights| {
-        let centers = features.each_ref().map(|plane| four(plane, place));
-        let mut equations = Equations::<{ FEATURES + 1 }>::default();
-        for (weight, tap) in neighbours(likeness, weights) {
-            let at = place.at(tap);
-            let terms = |i: usize| if i < FEATURES { four(&features[i], at) - centers[i] } else { Vec4::ONE };
-            equations.add(weight, std::array::from_fn(terms), colours.each_ref().map(|plane| four(plane, at)));
-        }
-        let [red, green, blue] = equations.value_at_center(ridge);
-        [red, green, blue, mean_variance(likeness, place, weights)]
-    });
+    let found = by_tiles(likeness, &ByFeatures { colours, features, ridge });
     Fitted {
-        rgb: found.iter().map(|&[red, green, blue, _]| [red, green, blue]).collect(),
-        variance: found.iter().map(|&[_, _, _, variance]| variance).collect(),
+        rgb: found.par_iter().map(|&[red, green, blue, _]| [red, green, blue]).collect(),
+        variance: found.par_iter().map(|&[_, _, _, variance]| variance).collect(),
     }
 }
 
@@ -54,18 +47,81 @@ pub(super) fn by_place<const PATCH: usize>(
     colours: &[PaddedPlane; 3],
     likeness: &Likeness<'_, PATCH>,
 ) -> Vec<[f32; 3]> {
-    let per_radius = 1.0 / likeness.taps.radius() as f32;
-    by_tiles(likeness, |place, weights| {
-        let mut equations = Equations::<3>::default();
-        for (weight, tap) in neighbours(likeness, weights) {
-            let [dx, dy] = [tap.dx, tap.dy].map(|step| Vec4::splat(step as f32 * per_radius));
-            equations.add(weight, [dx, dy, Vec4::ONE], colours.each_ref().map(|plane| four(plane, place.at(tap))));
-        }
-        equations.value_at_center(PLACE_RIDGE)
-    })
+    by_tiles(likeness, &ByPlace { colours, per_radius: 1.0 / likeness.taps.radius() as f32 })
 }
 
-/// Where the first of four pixels is.
+/// A value for each of the pixels that are fitted at once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Lanes([f32; LANES]);
+
+impl Lanes {
+    const ZERO: Self = Self([0.0; LANES]);
+    const ONE: Self = Self([1.0; LANES]);
+
+    /// Of a plane, from a place on.
+    #[inline(always)]
+    fn of(plane: &PaddedPlane, place: Place) -> Self {
+        Self(*plane.row(place.y, place.x))
+    }
+
+    #[inline(always)]
+    fn add_product(&mut self, a: Self, b: Self) {
+        for i in 0..LANES {
+            self.0[i] += a.0[i] * b.0[i];
+        }
+    }
+
+    #[inline(always)]
+    fn subtract_product(&mut self, a: Self, b: Self) {
+        for i in 0..LANES {
+            self.0[i] -= a.0[i] * b.0[i];
+        }
+    }
+
+    #[inline(always)]
+    fn times(mut self, other: Self) -> Self {
+        for i in 0..LANES {
+            self.0[i] *= other.0[i];
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn less(mut self, other: Self) -> Self {
+        for i in 0..LANES {
+            self.0[i] -= other.0[i];
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn over(mut self, other: Self) -> Self {
+        for i in 0..LANES {
+            self.0[i] /= other.0[i];
+        }
+        self
+    }
+
+    /// Each at least this.
+    #[inline(always)]
+    fn at_least(mut self, least: f32) -> Self {
+        for i in 0..LANES {
+            self.0[i] = self.0[i].max(least);
+        }
+        self
+    }
+
+    #[inline(always)]
+    fn any_is_at_least(self, least: f32) -> bool {
+        let mut is_any = false;
+        for i in 0..LANES {
+            is_any |= self.0[i] >= least;
+        }
+        is_any
+    }
+}
+
+/// Where the first of the pixels that are fitted at once is.
 #[derive(Clone, Copy)]
 struct Place {
     y: isize,
@@ -73,117 +129,208 @@ struct Place {
 }
 
 impl Place {
+    #[inline(always)]
     fn at(self, tap: Tap) -> Self {
         Self { y: self.y + tap.dy, x: self.x + tap.dx }
     }
 }
 
-/// Where four pixels' weights are in a tile's.
-#[derive(Clone, Copy)]
-struct InTile<'a> {
+/// `N` values of pixels from their neighbours.
+trait FromNeighbours<const N: usize>: Sync {
+    /// Of the pixels from a place on. `weigh` says how much each tap counts, by its number. `#[inline(always)]`.
+    fn values(&self, place: Place, neighbours: &Neighbours<'_>) -> [Lanes; N];
+}
+
+/// The taps of a tile, what they weigh, and which of its pixels are looked at.
+struct Neighbours<'a> {
+    taps: &'a [Tap],
     weights: &'a [TileWeights],
+    variance: &'a PaddedPlane,
     row: usize,
     column: usize,
 }
 
-/// Runs `of(place, weights)` over groups of four pixels, `N` values for each.
+impl Neighbours<'_> {
+    /// How much a tap counts; `None` where that is next to nothing.
+    #[inline(always)]
+    fn weight(&self, tap: usize) -> Option<Lanes> {
+        let mut weight = Lanes::ZERO;
+        weight.0.copy_from_slice(&self.weights[tap][self.row][self.column..self.column + LANES]);
+        if weight.any_is_at_least(LEAST_WEIGHT) { Some(weight) } else { None }
+    }
+}
+
+struct ByFeatures<'a> {
+    colours: &'a [PaddedPlane; 3],
+    features: &'a [PaddedPlane; FEATURES],
+    ridge: f32,
+}
+
+impl FromNeighbours<4> for ByFeatures<'_> {
+    #[inline(always)]
+    fn values(&self, place: Place, neighbours: &Neighbours<'_>) -> [Lanes; 4] {
+        let mut centers = [Lanes::ZERO; FEATURES];
+        for (center, plane) in centers.iter_mut().zip(self.features) {
+            *center = Lanes::of(plane, place);
+        }
+        let mut equations = Equations::<{ FEATURES + 1 }>::new();
+        let (mut variance, mut total) = (Lanes::ZERO, Lanes::ZERO);
+        for (number, &tap) in neighbours.taps.iter().enumerate() {
+            let Some(weight) = neighbours.weight(number) else { continue };
+            let at = place.at(tap);
+            let mut terms = [Lanes::ONE; FEATURES + 1];
+            for i in 0..FEATURES {
+                terms[i] = Lanes::of(&self.features[i], at).less(centers[i]);
+            }
+            equations.add(weight, &terms, colours_at(self.colours, at));
+            total.add_product(weight, Lanes::ONE);
+            variance.add_product(weight.times(weight), Lanes::of(neighbours.variance, at));
+        }
+        let [red, green, blue] = equations.value_at_center(self.ridge);
+        [red, green, blue, variance.over(total.times(total))]
+    }
+}
+
+struct ByPlace<'a> {
+    colours: &'a [PaddedPlane; 3],
+    /// 1 over the farthest tap's distance.
+    per_radius: f32,
+}
+
+impl FromNeighbours<3> for ByPlace<'_> {
+    #[inline(always)]
+    fn values(&self, place: Place, neighbours: &Neighbours<'_>) -> [Lanes; 3] {
+        let mut equations = Equations::<3>::new();
+        for (number, &tap) in neighbours.taps.iter().enumerate() {
+            let Some(weight) = neighbours.weight(number) else { continue };
+            let (dx, dy) = (tap.dx as f32 * self.per_radius, tap.dy as f32 * self.per_radius);
+            let terms = [Lanes([dx; LANES]), Lanes([dy; LANES]), Lanes::ONE];
+            equations.add(weight, &terms, colours_at(self.colours, place.at(tap)));
+        }
+        equations.value_at_center(PLACE_RIDGE)
+    }
+}
+
+#[inline(always)]
+fn colours_at(colours: &[PaddedPlane; 3], place: Place) -> [Lanes; 3] {
+    let [red, green, blue] = colours;
+    [Lanes::of(red, place), Lanes::of(green, place), Lanes::of(blue, place)]
+}
+
+/// Runs a fit over the picture, `N` values for each pixel.
 fn by_tiles<const N: usize, const PATCH: usize>(
     likeness: &Likeness<'_, PATCH>,
-    of: impl Fn(Place, InTile<'_>) -> [Vec4; N] + Sync,
+    fit: &impl FromNeighbours<N>,
 ) -> Vec<[f32; N]> {
     let (width, height) = likeness.surfaces.size();
     let mut found = vec![[0.0; N]; width * height];
-    found.par_chunks_mut(TILE * width).enumerate().for_each_init(Vec::new, |weights, (tile_y, rows)| {
-        for x in (0..width).step_by(TILE) {
-            likeness.weigh_tile((tile_y * TILE) as isize, x as isize, weights);
-            for (row, pixels) in rows.chunks_exact_mut(width).enumerate() {
-                for column in (x..width.min(x + TILE)).step_by(LANES) {
-                    let place = Place { y: (tile_y * TILE + row) as isize, x: column as isize };
-                    let in_tile = InTile { weights, row, column: column - x };
-                    let values = of(place, in_tile).map(|value| value.to_array());
-                    for (lane, pixel) in pixels[column..].iter_mut().take(LANES).enumerate() {
-                        *pixel = std::array::from_fn(|value| values[value][lane]);
-                    }
-                }
+    found.par_chunks_mut(TILE * width).enumerate().for_each_init(
+        || vec![[[0.0; TILE]; TILE]; likeness.taps.all().len()],
+        |weights, (tile_y, rows)| {
+            for x in (0..width).step_by(TILE) {
+                with_vectors(TileWork { likeness, fit, weights, y: tile_y * TILE, x, rows, width });
             }
-        }
-    });
+        },
+    );
     found
 }
 
-/// Four pixels' neighbours that count, and their weights.
-#[inline(always)]
-fn neighbours<'a, const PATCH: usize>(
-    likeness: &'a Likeness<'_, PATCH>,
-    in_tile: InTile<'a>,
-) -> impl Iterator<Item = (Vec4, Tap)> + 'a {
-    let weighed = likeness.taps.all().iter().zip(in_tile.weights);
-    weighed.filter_map(move |(&tap, weights)| {
-        let weight = Vec4::from_slice(&weights[in_tile.row][in_tile.column..]);
-        (weight.max_element() >= LEAST_WEIGHT).then_some((weight, tap))
-    })
+/// A tile that is to be fitted.
+struct TileWork<'a, F, const N: usize, const PATCH: usize> {
+    likeness: &'a Likeness<'a, PATCH>,
+    fit: &'a F,
+    /// Room for the weights of each tap.
+    weights: &'a mut [TileWeights],
+    /// The first row and column.
+    y: usize,
+    x: usize,
+    /// The values of the tile's rows, from the picture's left to its right.
+    rows: &'a mut [[f32; N]],
+    /// Of the picture.
+    width: usize,
 }
 
-#[inline(always)]
-fn four(plane: &PaddedPlane, place: Place) -> Vec4 {
-    Vec4::from_array(*plane.row::<LANES>(place.y, place.x))
-}
-
-fn mean_variance<const PATCH: usize>(likeness: &Likeness<'_, PATCH>, place: Place, weights: InTile<'_>) -> Vec4 {
-    let (mut variance, mut total) = (Vec4::ZERO, Vec4::ZERO);
-    for (weight, tap) in neighbours(likeness, weights) {
-        total += weight;
-        variance += weight * weight * four(&likeness.light.variance, place.at(tap));
+impl<F: FromNeighbours<N>, const N: usize, const PATCH: usize> VectorWork for TileWork<'_, F, N, PATCH> {
+    #[inline(always)]
+    fn run(self) {
+        let taps = self.likeness.taps.all();
+        for (weights, &tap) in self.weights.iter_mut().zip(taps) {
+            self.likeness.weigh(self.y as isize, self.x as isize, tap, weights);
+        }
+        for (row, pixels) in self.rows.chunks_exact_mut(self.width).enumerate() {
+            let end = self.width.min(self.x + TILE);
+            let mut first = self.x;
+            while first < end {
+                let neighbours = Neighbours {
+                    taps,
+                    weights: self.weights,
+                    variance: &self.likeness.light.variance,
+                    row,
+                    column: first - self.x,
+                };
+                let place = Place { y: (self.y + row) as isize, x: first as isize };
+                let values = self.fit.values(place, &neighbours);
+                for (lane, pixel) in pixels[first..end.min(first + LANES)].iter_mut().enumerate() {
+                    for (value, lanes) in pixel.iter_mut().zip(&values) {
+                        *value = lanes.0[lane];
+                    }
+                }
+                first += LANES;
+            }
+        }
     }
-    variance / (total * total)
 }
 
-/// Normal equations of four pixels' fits, the constant last.
+/// Normal equations of several pixels' fits, the constant last.
 struct Equations<const UNKNOWNS: usize> {
     /// The upper triangle.
-    matrix: [[Vec4; UNKNOWNS]; UNKNOWNS],
-    right: [[Vec4; 3]; UNKNOWNS],
-}
-
-impl<const UNKNOWNS: usize> Default for Equations<UNKNOWNS> {
-    fn default() -> Self {
-        Self { matrix: [[Vec4::ZERO; _]; _], right: [[Vec4::ZERO; _]; _] }
-    }
+    matrix: [[Lanes; UNKNOWNS]; UNKNOWNS],
+    right: [[Lanes; 3]; UNKNOWNS],
 }
 
 impl<const UNKNOWNS: usize> Equations<UNKNOWNS> {
+    #[inline(always)]
+    fn new() -> Self {
+        Self { matrix: [[Lanes::ZERO; _]; _], right: [[Lanes::ZERO; _]; _] }
+    }
+
     /// `terms` are relative to the pixel, so that it is where they are 0; the last is 1.
     #[inline(always)]
-    fn add(&mut self, weight: Vec4, terms: [Vec4; UNKNOWNS], colours: [Vec4; 3]) {
-        for (i, &term) in terms.iter().enumerate() {
-            let weighted = weight * term;
-            let row = self.matrix[i].iter_mut().zip(terms).skip(i);
-            row.for_each(|(sum, other)| *sum += weighted * other);
-            self.right[i].iter_mut().zip(colours).for_each(|(sum, colour)| *sum += weighted * colour);
+    fn add(&mut self, weight: Lanes, terms: &[Lanes; UNKNOWNS], colours: [Lanes; 3]) {
+        for i in 0..UNKNOWNS {
+            let weighted = weight.times(terms[i]);
+            for (sum, &term) in self.matrix[i][i..].iter_mut().zip(&terms[i..]) {
+                sum.add_product(weighted, term);
+            }
+            for (sum, &colour) in self.right[i].iter_mut().zip(&colours) {
+                sum.add_product(weighted, colour);
+            }
         }
     }
 
     /// The constant, by elimination: what the fit says of the pixel itself, not below 0. That one is among its neighbours with full
     /// weight, so the last pivot is 1 at least. `ridge` is added to each other term's square, per weight.
-    fn value_at_center(mut self, ridge: f32) -> [Vec4; 3] {
+    #[inline(always)]
+    fn value_at_center(mut self, ridge: f32) -> [Lanes; 3] {
         let last = UNKNOWNS - 1;
-        let damping = self.matrix[last][last] * ridge;
+        let damping = self.matrix[last][last].times(Lanes([ridge; LANES]));
         for k in 0..last {
-            let per_pivot = (self.matrix[k][k].max(Vec4::ZERO) + damping).recip();
+            let mut pivot = self.matrix[k][k].at_least(0.0);
+            pivot.add_product(damping, Lanes::ONE);
+            let (row, right) = (self.matrix[k], self.right[k]);
             for i in k + 1..UNKNOWNS {
-                let share = self.matrix[k][i] * per_pivot;
-                for j in i..UNKNOWNS {
-                    let part = share * self.matrix[k][j];
-                    self.matrix[i][j] -= part;
+                let share = row[i].over(pivot);
+                for (sum, &term) in self.matrix[i][i..].iter_mut().zip(&row[i..]) {
+                    sum.subtract_product(share, term);
                 }
-                for c in 0..3 {
-                    let part = share * self.right[k][c];
-                    self.right[i][c] -= part;
+                for (sum, &colour) in self.right[i].iter_mut().zip(&right) {
+                    sum.subtract_product(share, colour);
                 }
             }
         }
-        let pivot = self.matrix[last][last].max(Vec4::ONE);
-        self.right[last].map(|value| (value / pivot).max(Vec4::ZERO))
+        let pivot = self.matrix[last][last].at_least(1.0);
+        let [red, green, blue] = self.right[last];
+        [red.over(pivot).at_least(0.0), green.over(pivot).at_least(0.0), blue.over(pivot).at_least(0.0)]
     }
 }
 
@@ -194,25 +341,25 @@ mod tests {
     /// Three unknowns, colours of a plane: the constant comes out, also where some neighbours count for little.
     #[test]
     fn a_plane_is_found() {
-        let mut equations = Equations::<3>::default();
+        let mut equations = Equations::<3>::new();
         for i in 0..25 {
             let (dx, dy) = ((i % 5) as f32 - 2.0, (i / 5) as f32 - 1.0);
             let value = 7.0 + 2.0 * dx - 3.0 * dy;
             let weight = if (dx, dy) == (0.0, 0.0) { 1.0 } else { 1.0 / (1.0 + i as f32) };
-            let terms = [Vec4::splat(dx), Vec4::splat(dy), Vec4::ONE];
-            equations.add(Vec4::splat(weight), terms, [Vec4::splat(value); 3]);
+            let terms = [Lanes([dx; LANES]), Lanes([dy; LANES]), Lanes::ONE];
+            equations.add(Lanes([weight; LANES]), &terms, [Lanes([value; LANES]); 3]);
         }
         let [red, ..] = equations.value_at_center(1e-6);
-        assert!((red.x - 7.0).abs() < 1e-3, "{red}");
+        assert!((red.0[0] - 7.0).abs() < 1e-3, "{red:?}");
     }
 
     /// One pixel alone, whose features say nothing: its own colour.
     #[test]
     fn a_pixel_alone_keeps_its_colour() {
-        let mut equations = Equations::<8>::default();
-        let mut terms = [Vec4::ZERO; 8];
-        terms[7] = Vec4::ONE;
-        equations.add(Vec4::ONE, terms, [Vec4::splat(5.0); 3]);
-        assert_eq!(equations.value_at_center(1e-6)[0], Vec4::splat(5.0));
+        let mut equations = Equations::<8>::new();
+        let mut terms = [Lanes::ZERO; 8];
+        terms[7] = Lanes::ONE;
+        equations.add(Lanes::ONE, &terms, [Lanes([5.0; LANES]); 3]);
+        assert_eq!(equations.value_at_center(1e-6)[0], Lanes([5.0; LANES]));
     }
 }

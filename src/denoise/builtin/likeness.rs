@@ -4,6 +4,7 @@ use super::SurfaceGuides;
 use super::planes::{Beyond, PaddedPlane, TILE};
 use super::taps::{Tap, Taps};
 use fechner_perception::photometry::luminance;
+use rayon::prelude::*;
 
 /// A neighbour whose normal is turned by this much less than 1 in cosine gets 1/e of the weight: one in this.
 const NORMAL_SHARPNESS: f32 = 12.0;
@@ -35,13 +36,15 @@ pub(super) struct Light {
 
 impl Light {
     pub(super) fn of(guides: &SurfaceGuides, rgb: &[[f32; 3]], variance: &[f32]) -> Self {
-        let plane = |of: &dyn Fn(usize) -> f32| PaddedPlane::new(guides.width, guides.height, Beyond::Edge, of);
+        let plane =
+            |of: &(dyn Fn(usize) -> f32 + Sync)| PaddedPlane::new(guides.width, guides.height, Beyond::Edge, of);
         // A variance of nothing at all would make nothing of any difference: 0 over 0.
         Self { luminance: plane(&|i| luminance(rgb[i])), variance: plane(&|i| variance[i].max(1e-12)) }
     }
 }
 
 /// Surfaces as they are told apart.
+#[derive(Clone, Debug)]
 pub(super) struct Surfaces {
     /// Columns and rows.
     size: (usize, usize),
@@ -56,7 +59,7 @@ pub(super) struct Surfaces {
 impl Surfaces {
     pub(super) fn of(guides: &SurfaceGuides) -> Self {
         let (width, height) = (guides.width, guides.height);
-        let normals: Vec<[f32; 3]> = guides.normal.iter().map(|&normal| unit(normal)).collect();
+        let normals: Vec<[f32; 3]> = guides.normal.par_iter().map(|&normal| unit(normal)).collect();
         let depth = |i: usize| {
             if guides.depth[i].is_finite() { guides.depth[i].clamp(0.0, FARTHEST_SURFACE) } else { NO_SURFACE }
         };
@@ -119,39 +122,35 @@ const WIDEST: usize = TILE + 4;
 impl<const PATCH: usize> Likeness<'_, PATCH> {
     const _FITS: () = assert!(2 * PATCH <= WIDEST - TILE, "a patch is wider than there is room for");
 
-    /// Weights of every tap for the pixels of the tile whose first pixel this is.
-    pub(super) fn weigh_tile(&self, y: isize, x: isize, weights: &mut Vec<TileWeights>) {
-        weights.clear();
-        weights.extend(self.taps.all().iter().map(|&tap| self.weights(y, x, tap)));
-    }
-
-    fn weights(&self, y: isize, x: isize, tap: Tap) -> TileWeights {
+    /// Weights of a tap for the pixels of the tile whose first pixel this is. Inlined, as all that it calls, for wide vectors.
+    #[inline(always)]
+    pub(super) fn weigh(&self, y: isize, x: isize, tap: Tap, weights: &mut TileWeights) {
         let () = Self::_FITS;
         let unlike = self.unlike_surroundings(y, x, tap);
-        let mut weights = [[0.0; TILE]; TILE];
         // The slope explains more the farther one goes.
         let per_distance = 1.0 / tap.distance().max(1.0);
-        for (row, (weights, unlike)) in weights.iter_mut().zip(&unlike).enumerate() {
+        for row in 0..TILE {
             let y = y + row as isize;
-            let own_and_other =
-                |plane: &'_ PaddedPlane| (*plane.row::<TILE>(y, x), *plane.row::<TILE>(y + tap.dy, x + tap.dx));
-            let [nx, ny, nz] = self.surfaces.normal.each_ref().map(own_and_other);
-            let depth = own_and_other(&self.surfaces.depth);
-            let shining = own_and_other(&self.surfaces.shining);
+            let (other_y, other_x) = (y + tap.dy, x + tap.dx);
+            let [nx, ny, nz] = &self.surfaces.normal;
+            let own = [nx.row::<TILE>(y, x), ny.row(y, x), nz.row(y, x)];
+            let other = [nx.row::<TILE>(other_y, other_x), ny.row(other_y, other_x), nz.row(other_y, other_x)];
+            let depth = [self.surfaces.depth.row::<TILE>(y, x), self.surfaces.depth.row(other_y, other_x)];
+            let shining = [self.surfaces.shining.row::<TILE>(y, x), self.surfaces.shining.row(other_y, other_x)];
             let per_depth = self.surfaces.per_depth.row::<TILE>(y, x);
             for i in 0..TILE {
-                let has_normal = nx.0[i].abs() + ny.0[i].abs() + nz.0[i].abs();
-                let cosine = nx.0[i] * nx.1[i] + ny.0[i] * ny.1[i] + nz.0[i] * nz.1[i];
+                let has_normal = own[0][i].abs() + own[1][i].abs() + own[2][i].abs();
+                let cosine = own[0][i] * other[0][i] + own[1][i] * other[1][i] + own[2][i] * other[2][i];
                 let turned = if has_normal > 0.0 { NORMAL_SHARPNESS * (1.0 - cosine).max(0.0) } else { 0.0 };
-                let apart = (depth.0[i] - depth.1[i]).abs() * per_depth[i] * per_distance;
-                weights[i] = falling(unlike[i] + turned + apart + (shining.0[i] - shining.1[i]).abs());
+                let apart = (depth[0][i] - depth[1][i]).abs() * per_depth[i] * per_distance;
+                weights[row][i] = falling(unlike[row][i] + turned + apart + (shining[0][i] - shining[1][i]).abs());
             }
         }
-        weights
     }
 
     /// Mean over the pixels around of their squared difference from those around the neighbour, less what noise makes of it on
     /// average, in units of the tolerance: 0 where it is no more than noise.
+    #[inline(always)]
     fn unlike_surroundings(&self, y: isize, x: isize, tap: Tap) -> TileWeights {
         let patch = PATCH as isize;
         let side = 2 * PATCH + 1;
@@ -159,10 +158,11 @@ impl<const PATCH: usize> Likeness<'_, PATCH> {
         let mut along = [[0.0_f32; TILE]; WIDEST];
         for (row, along) in along.iter_mut().enumerate().take(TILE + 2 * PATCH) {
             let (y, x) = (y + row as isize - patch, x - patch);
+            let (other_y, other_x) = (y + tap.dy, x + tap.dx);
             let own = self.light.luminance.row::<WIDEST>(y, x);
-            let other = self.light.luminance.row::<WIDEST>(y + tap.dy, x + tap.dx);
+            let other = self.light.luminance.row::<WIDEST>(other_y, other_x);
             let own_variance = self.light.variance.row::<WIDEST>(y, x);
-            let other_variance = self.light.variance.row::<WIDEST>(y + tap.dy, x + tap.dx);
+            let other_variance = self.light.variance.row::<WIDEST>(other_y, other_x);
             let mut unlike = [0.0_f32; WIDEST];
             for i in 0..WIDEST {
                 let difference = own[i] - other[i];
@@ -171,17 +171,24 @@ impl<const PATCH: usize> Likeness<'_, PATCH> {
                 // Of a neighbour that is noisier than the pixel no more is taken off than the pixel's own: Rousselle et al. 2012, eq. 3.
                 unlike[i] = (difference * difference - (a + a.min(b))) / (squared_tolerance * (a + b));
             }
-            for (i, sum) in along.iter_mut().enumerate() {
-                *sum = unlike[i..i + side].iter().sum();
+            for step in 0..side {
+                for i in 0..TILE {
+                    along[i] += unlike[i + step];
+                }
             }
         }
         let share = 1.0 / (side * side) as f32;
-        std::array::from_fn(|row| {
-            let mut sum = [0.0_f32; TILE];
+        let mut mean = [[0.0_f32; TILE]; TILE];
+        for (row, mean) in mean.iter_mut().enumerate() {
             for along in &along[row..row + side] {
-                sum.iter_mut().zip(along).for_each(|(sum, value)| *sum += value);
+                for i in 0..TILE {
+                    mean[i] += along[i];
+                }
             }
-            sum.map(|sum| (sum * share).max(0.0))
-        })
+            for value in mean {
+                *value = (*value * share).max(0.0);
+            }
+        }
+        mean
     }
 }

@@ -14,10 +14,12 @@ mod planes;
 mod taps;
 
 use super::{NoisyPicture, SurfaceGuides};
+use fechner_perception::Plane;
 use fechner_perception::photometry::luminance;
 use fit::{FEATURES, by_features, by_place};
 use likeness::{Light, Likeness, Surfaces};
 use planes::{Beyond, PaddedPlane};
+use rayon::prelude::*;
 use taps::Taps;
 
 /// Albedos below this, by luminance, are not divided out.
@@ -34,37 +36,55 @@ const BRIGHT_LAMP: f32 = 2.0;
 /// Depth as a feature runs from 0 to this.
 const DEPTH_RANGE: f32 = 10.0;
 
+/// What guides the filter, once for all pictures.
+#[derive(Clone, Debug)]
+pub(super) struct Prepared {
+    surfaces: Surfaces,
+    features: [PaddedPlane; FEATURES],
+    /// What light is of what is seen: see [`divisor`].
+    divisors: Vec<[f32; 3]>,
+}
+
+impl Prepared {
+    /// Of guides that are not empty.
+    pub(super) fn of(guides: &SurfaceGuides) -> Self {
+        Self {
+            surfaces: Surfaces::of(guides),
+            features: features(guides),
+            divisors: guides.albedo.par_iter().map(|&albedo| divisor(albedo)).collect(),
+        }
+    }
+}
+
 /// The picture without its noise.
-pub(super) fn denoise(picture: &NoisyPicture<'_>) -> Vec<[f32; 3]> {
+pub(super) fn denoise(picture: &NoisyPicture<'_>, prepared: &Prepared) -> Vec<[f32; 3]> {
     let guides = picture.guides.get();
     let count = guides.width * guides.height;
-    if count == 0 || picture.rgb.len() != count || picture.variance.values().len() != count {
+    if picture.rgb.len() != count || picture.variance.values().len() != count {
         return picture.rgb.to_vec();
     }
+    let Prepared { surfaces, features, divisors } = prepared;
     let unit = unit_of(picture.rgb);
-    let rgb: Vec<[f32; 3]> = picture.rgb.iter().map(|rgb| rgb.map(|value| usable(value / unit))).collect();
-    let divisors: Vec<[f32; 3]> = guides.albedo.iter().map(|&albedo| divisor(albedo)).collect();
-    let surfaces = Surfaces::of(guides);
+    let rgb: Vec<[f32; 3]> = picture.rgb.par_iter().map(|rgb| rgb.map(|value| usable(value / unit))).collect();
+    let variance = picture.variance.map(|variance| usable(variance / (unit * unit)));
 
-    let variance = picture.variance.values().iter().map(|&variance| usable(variance / (unit * unit)));
-    let variance = shared(&variance.collect::<Vec<_>>(), guides.width);
-    let light = Light::of(guides, &illumination(&rgb, &divisors), &of_light(&variance, &divisors));
+    let light = Light::of(guides, &illumination(&rgb, divisors), &of_light(&shared(&variance), divisors));
     let near = Likeness::<2> {
         taps: &Taps::around(97, 9),
         light: &light,
-        surfaces: &surfaces,
+        surfaces,
         tolerance: 0.7,
         most_variance_ratio: 100.0,
     };
-    let first = by_features(&channels(guides, &rgb), &features(guides), guides.samples, &near);
+    let first = by_features(&channels(guides, &rgb), features, guides.samples, &near);
 
-    let illuminated = illumination(&first.rgb, &divisors);
+    let illuminated = illumination(&first.rgb, divisors);
     let left: Vec<f32> = first.variance.iter().map(|variance| CORRELATION * variance).collect();
     let light = Light::of(guides, &illuminated, &left);
     let far = Likeness::<1> {
         taps: &Taps::around(97, 24),
         light: &light,
-        surfaces: &surfaces,
+        surfaces,
         tolerance: 1.0,
         most_variance_ratio: 25.0,
     };
@@ -75,13 +95,13 @@ pub(super) fn denoise(picture: &NoisyPicture<'_>) -> Vec<[f32; 3]> {
         }
         std::array::from_fn(|c| unit * second[pixel][c] * divisors[pixel][c])
     };
-    (0..count).map(shown).collect()
+    (0..count).into_par_iter().map(shown).collect()
 }
 
 /// The mean luminance of all but the brightest hundredth of the picture, in units of which it is filtered: no firefly makes the rest
 /// vanish. The whole's where that is dark, and 1 where there is no light at all.
 fn unit_of(rgb: &[[f32; 3]]) -> f32 {
-    let mut bright: Vec<f32> = rgb.iter().map(|&rgb| luminance(rgb)).filter(|value| value.is_finite()).collect();
+    let mut bright: Vec<f32> = rgb.par_iter().map(|&rgb| luminance(rgb)).filter(|value| value.is_finite()).collect();
     let mean = |values: &[f32]| {
         let sum: f64 = values.iter().map(|&value| f64::from(value)).sum();
         (sum / values.len().max(1) as f64) as f32
@@ -107,26 +127,28 @@ fn divisor(albedo: [f32; 3]) -> [f32; 3] {
 
 /// Light that falls on each pixel's surface.
 fn illumination(rgb: &[[f32; 3]], divisors: &[[f32; 3]]) -> Vec<[f32; 3]> {
-    rgb.iter().zip(divisors).map(|(rgb, divisor)| std::array::from_fn(|c| rgb[c] / divisor[c])).collect()
+    let pixels = rgb.par_iter().zip(divisors);
+    pixels.map(|(rgb, divisor)| std::array::from_fn(|c| rgb[c] / divisor[c])).collect()
 }
 
 /// Variance of the luminance of that light.
-fn of_light(variance: &[f32], divisors: &[[f32; 3]]) -> Vec<f32> {
+fn of_light(variance: &Plane, divisors: &[[f32; 3]]) -> Vec<f32> {
     let squared = |divisor: [f32; 3]| luminance(divisor) * luminance(divisor);
-    variance.iter().zip(divisors).map(|(variance, &divisor)| variance / squared(divisor)).collect()
+    let pixels = variance.values().par_iter().zip(divisors);
+    pixels.map(|(variance, &divisor)| variance / squared(divisor)).collect()
 }
 
 /// Variance of which each pixel has at least a share of its neighbourhood's.
-fn shared(variance: &[f32], width: usize) -> Vec<f32> {
-    let height = variance.len() / width;
-    let smooth_along = |values: &[f32], step: usize, at: usize, index: usize, end: usize| {
-        let before = if at > 0 { values[index - step] } else { values[index] };
-        let after = if at + 1 < end { values[index + step] } else { values[index] };
-        0.25 * before + 0.5 * values[index] + 0.25 * after
-    };
-    let rows: Vec<f32> = (0..variance.len()).map(|i| smooth_along(variance, 1, i % width, i, width)).collect();
-    let around = |i: usize| smooth_along(&rows, width, i / width, i, height);
-    (0..variance.len()).map(|i| variance[i].max(SHARED_VARIANCE * around(i))).collect()
+fn shared(variance: &Plane) -> Plane {
+    let (width, height) = (variance.width(), variance.height());
+    let tent = |before: f32, own: f32, after: f32| 0.25 * before + 0.5 * own + 0.25 * after;
+    let rows = Plane::from_fn(width, height, |x, y| {
+        tent(variance.get(x.saturating_sub(1), y), variance.get(x, y), variance.get((x + 1).min(width - 1), y))
+    });
+    Plane::from_fn(width, height, |x, y| {
+        let around = tent(rows.get(x, y.saturating_sub(1)), rows.get(x, y), rows.get(x, (y + 1).min(height - 1)));
+        variance.get(x, y).max(SHARED_VARIANCE * around)
+    })
 }
 
 /// Each colour by itself.

@@ -1,6 +1,7 @@
 //! Pictures of one channel with a border that may be read.
 
 use super::taps::FARTHEST;
+use rayon::prelude::*;
 
 /// Pixels to a tile's side: work is done by tiles, whose sums stay in the first cache.
 pub(super) const TILE: usize = 16;
@@ -17,6 +18,7 @@ pub(super) enum Beyond {
 }
 
 /// A picture with [`BORDER`] more on each side, of whole tiles.
+#[derive(Clone, Debug)]
 pub(super) struct PaddedPlane {
     stride: usize,
     values: Vec<f32>,
@@ -24,21 +26,26 @@ pub(super) struct PaddedPlane {
 
 impl PaddedPlane {
     /// Of the values `of` pixels in row-major order. The picture is not empty.
-    pub(super) fn new(width: usize, height: usize, beyond: Beyond, of: impl Fn(usize) -> f32) -> Self {
+    pub(super) fn new(width: usize, height: usize, beyond: Beyond, of: impl Fn(usize) -> f32 + Sync) -> Self {
         let stride = width.next_multiple_of(TILE) + 2 * BORDER;
         let rows = height.next_multiple_of(TILE) + 2 * BORDER;
         let mut values = vec![0.0; stride * rows];
-        for (v, row) in values.chunks_exact_mut(stride).enumerate() {
+        values.par_chunks_exact_mut(stride).with_min_len(16).enumerate().for_each(|(v, row)| {
             let y = v.saturating_sub(BORDER).min(height - 1);
-            for (u, value) in row.iter_mut().enumerate() {
-                let x = u.saturating_sub(BORDER).min(width - 1);
-                let is_inside = (y + BORDER, x + BORDER) == (v, u);
-                *value = match beyond {
-                    Beyond::Value(value) if !is_inside => value,
-                    _ => of(y * width + x),
-                };
+            if let Beyond::Value(value) = beyond
+                && y + BORDER != v
+            {
+                return row.fill(value);
             }
-        }
+            let pictured = &mut row[BORDER..BORDER + width];
+            pictured.iter_mut().enumerate().for_each(|(x, value)| *value = of(y * width + x));
+            let [left, right] = match beyond {
+                Beyond::Edge => [row[BORDER], row[BORDER + width - 1]],
+                Beyond::Value(value) => [value; 2],
+            };
+            row[..BORDER].fill(left);
+            row[BORDER + width..].fill(right);
+        });
         Self { stride, values }
     }
 

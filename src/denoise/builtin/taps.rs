@@ -14,6 +14,7 @@ pub(super) struct Tap {
 
 impl Tap {
     /// How far it is.
+    #[inline(always)]
     pub(super) fn distance(self) -> f32 {
         ((self.dx * self.dx + self.dy * self.dy) as f32).sqrt()
     }

@@ -7,6 +7,10 @@ use fechner_perception::Plane;
 
 const SIDE: usize = 48;
 
+fn denoised(picture: &NoisyPicture<'_>) -> Vec<[f32; 3]> {
+    Denoiser::Builtin.denoise(picture).expect("cannot fail")
+}
+
 fn random(x: usize, y: usize) -> f32 {
     (hash_words(x as u64, y as u64) >> 40) as f32 / 8_388_608.0 - 1.0
 }
@@ -33,7 +37,7 @@ fn corner() -> Vec<[f32; 3]> {
         samples: 16.0,
     };
     let guides = Denoiser::Builtin.prepare(guides).expect("cannot fail");
-    denoise(&NoisyPicture { rgb: &rgb, variance: &Plane::filled(SIDE, SIDE, 400.0), guides: &guides })
+    denoised(&NoisyPicture { rgb: &rgb, variance: &Plane::filled(SIDE, SIDE, 400.0), guides: &guides })
 }
 
 /// A wall of albedo 0.5 or as told under even light, of which each pixel has its own noise and variance.
@@ -55,7 +59,7 @@ fn wall(
     };
     let guides = Denoiser::Builtin.prepare(guides).expect("cannot fail");
     let variance = Plane::from_fn(SIDE, SIDE, |x, y| pixel(x, y).1);
-    denoise(&NoisyPicture { rgb: &rgb, variance: &variance, guides: &guides }).iter().map(|rgb| rgb[1]).collect()
+    denoised(&NoisyPicture { rgb: &rgb, variance: &variance, guides: &guides }).iter().map(|rgb| rgb[1]).collect()
 }
 
 fn deviation(values: &[f32], truth: impl Fn(usize, usize) -> f32) -> f32 {
@@ -138,7 +142,7 @@ fn fireflies_side_by_side_are_spread() {
 fn threads_change_nothing() {
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-        pool.install(|| corner())
+        pool.install(corner)
     };
     assert_eq!(on(1), on(3));
 }
