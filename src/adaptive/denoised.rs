@@ -1,5 +1,8 @@
 //! The film's denoised picture as it will be seen, and what the perception crate says of its noise and of its bias.
 
+mod missed;
+
+use self::missed::{EdgeProfile, expected_darkness, missed_light};
 use super::judge::JudgeError;
 use super::settings::LoopSettings;
 use crate::denoise::{DenoisedFilm, Denoiser, denoise_film, leave_the_void_dark};
@@ -83,10 +86,24 @@ impl TimedDenoising {
             residual_half_difference: &shown(&residual_half_difference),
         });
         let chromatic = self.chromatic_errors(film, settings, tone, estimate)?;
-        let mut rgb_cd_m2 = blended_rgb(thresholds, &error, self.film.rgb_cd_m2, &estimate.rgb_cd_m2, &slope);
+        let DenoisedFilm { rgb_cd_m2, lamps_from_cd_m2, .. } = self.film;
+        let mut rgb_cd_m2 = blended_rgb(thresholds, &error, rgb_cd_m2, &estimate.rgb_cd_m2, &slope);
         leave_the_void_dark(film, &mut rgb_cd_m2);
         let luminance_cd_m2 = luminance_plane(&rgb_cd_m2, width);
         let error = chromatic.iter().fold(error, DenoisedError::with_channel);
+        let error = match EdgeProfile::of(settings.filter) {
+            Some(profile) => {
+                let missed = missed_light(&profile, film, &estimate.luminance_cd_m2, lamps_from_cd_m2);
+                let dark = expected_darkness(&missed, |light| {
+                    // A denoiser may have guessed some of it.
+                    let whole = estimate.luminance_cd_m2.combined(light, |sampled, missed| sampled + missed);
+                    let whole = whole.combined(&luminance_cd_m2, f32::max);
+                    seen::display_luminance(tone, display, &whole)
+                });
+                error.with_missed_light(&thresholds.measured_visibility(&dark))
+            }
+            None => error,
+        };
         Ok(DenoisedPicture { rgb_cd_m2, luminance_cd_m2, half_difference: displayed, error })
     }
 

@@ -3,6 +3,7 @@
 use super::pursuit::Pursuit;
 use crate::denoise::Denoiser;
 use crate::integrator::PILOT_SAMPLES;
+use crate::sampler::PixelFilter;
 use fechner_perception::Plane;
 use fechner_perception::csf::FrameTiming;
 use fechner_perception::display::Viewing;
@@ -129,6 +130,8 @@ pub struct LoopSettings {
     pub gazes: Vec<Gaze>,
     /// Eyes that follow what moves, for [`Self::frames`] and the default threshold model alone; `None`: they rest.
     pub pursuit: Option<Pursuit>,
+    /// How pixels take light, which tells where a lamp's edge may have been missed.
+    pub filter: PixelFilter,
     /// What makes the output picture out of the mean; `None` leaves it raw.
     pub denoiser: Option<Denoiser>,
     /// Asked during a look: whether it is of no use any more, as somebody wants another picture. `None` never interrupts.
@@ -151,6 +154,7 @@ impl LoopSettings {
             importance: None,
             gazes: Vec::new(),
             pursuit: None,
+            filter: PixelFilter::Gaussian,
             denoiser: None,
             is_outdated: None,
         }

@@ -4,6 +4,7 @@ use crate::adaptive::settings::{AllocationRule, Limits, LoopSettings, Sampling};
 use crate::denoise::{Denoiser, DenoiserKind, OidnError};
 use crate::integrator::{Crop, TraceSettings};
 use crate::output::PartOf;
+use crate::sampler::PixelFilter;
 use crate::scene::Scene;
 use crate::scene::hash::{ContentHash, content_hash};
 use fechner_perception::display::Viewing;
@@ -118,6 +119,13 @@ impl Origin {
         }
     }
 
+    /// The pixel filter of its samples, as [`Self::tracing`] names it; the default where it names none.
+    pub fn filter(&self) -> PixelFilter {
+        let is_named =
+            |filter: &PixelFilter| self.tracing.split(", ").any(|field| field == format!("filter: {filter:?}"));
+        PixelFilter::ALL.into_iter().find(is_named).unwrap_or(PixelFilter::Gaussian)
+    }
+
     /// Whether what surrounds the scene was left out, so that pictures of the film have alpha.
     pub fn is_transparent(&self) -> bool {
         self.tracing.split(", ").any(|setting| setting == "transparent: true")
@@ -198,11 +206,12 @@ impl Seeds {
 }
 
 impl SettingsRecord {
-    /// Settings for the loop, less the importance map, of which only the hash is here; the denoiser is opened.
+    /// Settings for the loop over samples that were traced by a filter, less the importance map, of which only the hash is here; the
+    /// denoiser is opened.
     ///
     /// # Errors
     /// For names that nobody answers to, and denoisers that are not installed.
-    pub fn loop_settings(&self, limits: Limits) -> Result<LoopSettings, SettingsError> {
+    pub fn loop_settings(&self, limits: Limits, filter: PixelFilter) -> Result<LoopSettings, SettingsError> {
         let operator = tone::operator(&self.operator, self.exposure_stops).ok_or_else(|| UnknownName {
             kind: "tone operator",
             name: self.operator.clone(),
@@ -214,6 +223,7 @@ impl SettingsRecord {
             model: self.threshold_model()?,
             denoiser: self.denoiser.map(Denoiser::open).transpose()?,
             limits,
+            filter,
             fitted: self.fitted.clone(),
             ..LoopSettings::new(self.viewing.clone(), self.nits_per_unit, operator)
         })
@@ -239,6 +249,14 @@ impl SettingsRecord {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_film_knows_its_filter() {
+        for filter in PixelFilter::ALL {
+            let trace = TraceSettings { filter, ..TraceSettings::new(64, 48, 7) };
+            assert_eq!(Origin::of(&Scene::default(), &trace).filter(), filter);
+        }
+    }
 
     #[test]
     fn a_film_knows_its_place_in_the_whole() {

@@ -17,6 +17,8 @@ pub struct DenoisedFilm {
     pub rgb_cd_m2: Vec<[f32; 3]>,
     /// Each half's mean by itself, denoised with the same guides: their difference is the noise that denoising left.
     pub halves_rgb_cd_m2: [Vec<[f32; 3]>; 2],
+    /// What shines by itself above this luminance, cd/m², was left as it was sampled.
+    pub lamps_from_cd_m2: f32,
 }
 
 /// Denoises the mean, and each half by itself, guided by what the film knows of the first surfaces.
@@ -58,6 +60,7 @@ pub fn denoise_film(denoiser: &Denoiser, film: &Film, nits_per_unit: f64) -> Res
     Ok(DenoisedFilm {
         rgb_cd_m2: denoised(&estimate.rgb_cd_m2, &variance)?,
         halves_rgb_cd_m2: [of_half(Half::A)?, of_half(Half::B)?],
+        lamps_from_cd_m2: most,
     })
 }
 
@@ -176,7 +179,8 @@ mod tests {
                 eprintln!("{kind:?} is skipped: not installed");
                 continue;
             };
-            let DenoisedFilm { rgb_cd_m2, halves_rgb_cd_m2 } = denoise_film(&denoiser, &film, 1.0).expect("denoises");
+            let DenoisedFilm { rgb_cd_m2, halves_rgb_cd_m2, .. } =
+                denoise_film(&denoiser, &film, 1.0).expect("denoises");
             for picture in [&rgb_cd_m2, &halves_rgb_cd_m2[0], &halves_rgb_cd_m2[1]] {
                 let column = |x: u32| (0..SIDE).map(|y| picture[(y * SIDE + x) as usize][1]).sum::<f32>() / SIDE as f32;
                 for x in (8..21).chain(27..40) {

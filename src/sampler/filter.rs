@@ -38,9 +38,37 @@ static BLACKMAN_HARRIS: LazyLock<Profile> = LazyLock::new(|| Profile::new(1.5, b
 static MITCHELL: LazyLock<Profile> = LazyLock::new(|| Profile::new(2.0, mitchell));
 
 impl PixelFilter {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Box, Self::Gaussian, Self::BlackmanHarris, Self::Mitchell];
+
     /// Whether it has negative lobes.
     pub fn is_signed(self) -> bool {
         self == Self::Mitchell
+    }
+
+    /// How far from a pixel's centre it still takes light, in pixels, where it is smooth and nowhere negative.
+    pub fn smooth_radius_px(self) -> Option<f32> {
+        match self {
+            PixelFilter::Gaussian => Some(GAUSSIAN_RADIUS_PX),
+            PixelFilter::BlackmanHarris => Some(BLACKMAN_HARRIS.radius_px),
+            PixelFilter::Box | PixelFilter::Mitchell => None,
+        }
+    }
+
+    /// Its height along an axis, of any scale, 0 beyond its radius.
+    pub fn height(self, offset_px: f32) -> f32 {
+        let within = |radius_px: f32, height: f32| if offset_px.abs() < radius_px { height } else { 0.0 };
+        match self {
+            PixelFilter::Box => within(0.5, 1.0),
+            PixelFilter::Gaussian => within(GAUSSIAN_RADIUS_PX, (-0.5 * (offset_px / GAUSSIAN_SIGMA_PX).powi(2)).exp()),
+            PixelFilter::BlackmanHarris => within(
+                BLACKMAN_HARRIS.radius_px,
+                blackman_harris(f64::from(offset_px / BLACKMAN_HARRIS.radius_px)) as f32,
+            ),
+            PixelFilter::Mitchell => {
+                within(MITCHELL.radius_px, mitchell(f64::from(offset_px / MITCHELL.radius_px)) as f32)
+            }
+        }
     }
 
     /// The sample for two numbers in [0, 1).

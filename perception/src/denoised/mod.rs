@@ -95,6 +95,16 @@ impl DenoisedError {
         self
     }
 
+    /// This error with light beside it that no sample has found, of which so much is seen: it is missing in the raw mean too, so no blend
+    /// brings it back.
+    #[must_use]
+    pub fn with_missed_light(mut self, missed: &Plane) -> Self {
+        for plane in [&mut self.visibility, &mut self.bias, &mut self.blended_visibility] {
+            *plane = plane.combined(missed, |own, missed| own.hypot(missed));
+        }
+        self
+    }
+
     /// This error for eyes whose thresholds are multiplied by a map of the same size, as where some places matter more than others.
     #[must_use]
     pub fn with_thresholds_times(&self, factors: &Plane) -> Self {

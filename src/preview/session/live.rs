@@ -53,7 +53,7 @@ pub(super) fn settings_of(job: &Job, live: &Live) -> Result<LoopSettings, String
         return Err("visibility must be 0 or above and exposure a number".to_owned());
     }
     let limits = Limits { visibility: Limits::visibility_of_last_rung(visibility), ..job.limits };
-    let mut settings = record.loop_settings(limits).map_err(|error| error.to_string())?;
+    let mut settings = record.loop_settings(limits, job.trace.filter).map_err(|error| error.to_string())?;
     if let Some(whole) = &job.whole {
         settings.fit_to(whole);
     }

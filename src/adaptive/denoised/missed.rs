@@ -1,0 +1,164 @@
+//! Edges of lamps that no sample has found.
+//!
+//! A pixel of which a bright lamp covers two per cent is white in truth, and dark in both halves until one sample in fifty meets the lamp:
+//! neither the halves' difference nor the raw mean tells of it. Its neighbour does, of which the lamp covers more. How coverage falls from
+//! a pixel to the next across an edge is known: it is the pixel filter's own shape.
+
+use crate::film::Film;
+use crate::sampler::PixelFilter;
+use fechner_perception::Plane;
+
+/// Pixels to each side in which a lamp's full light is looked for.
+const RADIUS: usize = 3;
+
+/// How much of a pixel lies beyond a straight edge, by the edge's distance, for a pixel filter.
+pub(super) struct EdgeProfile {
+    radius_px: f32,
+    /// Coverage where the edge is at −radius, …, +radius: falls from 1 to 0.
+    coverage: Vec<f32>,
+}
+
+impl EdgeProfile {
+    const CELLS: usize = 256;
+
+    /// `None` for a filter that tells of no neighbour, as the box, or has negative lobes.
+    pub(super) fn of(filter: PixelFilter) -> Option<Self> {
+        let radius_px = filter.smooth_radius_px()?;
+        let at = |cell: usize| radius_px * (2.0 * (cell as f32 + 0.5) / Self::CELLS as f32 - 1.0);
+        let heights: Vec<f32> = (0..Self::CELLS).map(|cell| filter.height(at(cell))).collect();
+        let all: f32 = heights.iter().sum();
+        let mut left = all;
+        let mut coverage = vec![1.0];
+        coverage.extend(heights.iter().map(|height| {
+            left -= height;
+            (left / all).max(0.0)
+        }));
+        Some(Self { radius_px, coverage })
+    }
+
+    /// Coverage of a pixel that is `step_px` farther out than one of this coverage.
+    pub(super) fn farther_out(&self, coverage: f32, step_px: f32) -> f32 {
+        let cell = self.coverage.partition_point(|&value| value > coverage);
+        let cells_a_px = Self::CELLS as f32 / (2.0 * self.radius_px);
+        let farther = cell as f32 + step_px * cells_a_px;
+        self.coverage.get(farther.round() as usize).copied().unwrap_or(0.0)
+    }
+}
+
+/// Luminance of lamps, cd/m², that is expected in each pixel beyond what its samples have found. `sampled_cd_m2`: the film's mean; what shines
+/// counts as a lamp from a luminance on.
+pub(super) fn missed_light(profile: &EdgeProfile, film: &Film, sampled_cd_m2: &Plane, lamps_from_cd_m2: f32) -> Plane {
+    let (width, height) = (sampled_cd_m2.width(), sampled_cd_m2.height());
+    let around = |(x, y): (usize, usize), radius: usize| {
+        let columns = x.saturating_sub(radius)..width.min(x + radius + 1);
+        let rows = y.saturating_sub(radius)..height.min(y + radius + 1);
+        rows.flat_map(move |y| columns.clone().map(move |x| (x, y)))
+    };
+    let shines = |(x, y): (usize, usize)| film.guides()[y * width + x].seen.shines();
+    let light = |(x, y): (usize, usize)| sampled_cd_m2.get(x, y);
+    let is_lamp = |at: (usize, usize)| shines(at) && light(at) > lamps_from_cd_m2;
+    let mut missed = Plane::filled(width, height, 0.0);
+    for lamp in (0..width * height).map(|pixel| (pixel % width, pixel / width)).filter(|&at| is_lamp(at)) {
+        let full = around(lamp, RADIUS).filter(|&at| is_lamp(at)).map(light).fold(0.0, f32::max);
+        for (x, y) in around(lamp, 1).filter(|&at| !shines(at)) {
+            let step_px = ((x.abs_diff(lamp.0) + y.abs_diff(lamp.1)) as f32).sqrt();
+            let coverage = profile.farther_out(light(lamp) / full, step_px);
+            let pixel = y * width + x;
+            // Of a coverage that scatters about this by as much, after so many samples without a hit.
+            let found = full * coverage / (1.0 + film.samples(pixel) as f32 * coverage);
+            missed.values_mut()[pixel] = found.max(missed.get(x, y));
+        }
+    }
+    missed
+}
+
+/// How much brighter a picture is expected to be seen with light that may be missing, display cd/m², where that scatters exponentially about
+/// its mean. `shown`: the picture as displayed with so much more light.
+pub(super) fn expected_darkness(missed: &Plane, shown: impl Fn(&Plane) -> Plane) -> Plane {
+    /// Means of fifths of an exponential variable of mean 1, about.
+    const FIFTHS: [f32; 5] = [0.105, 0.357, 0.693, 1.204, 2.642];
+    if missed.values().iter().all(|&light| light == 0.0) {
+        return missed.clone();
+    }
+    let without = shown(&missed.map(|_| 0.0));
+    FIFTHS.iter().fold(missed.map(|_| 0.0), |sum, times| {
+        let with = shown(&missed.map(|light| times * light));
+        let brighter = with.combined(&without, |with, without| (with - without) / FIFTHS.len() as f32);
+        sum.combined(&brighter, |sum, brighter| sum + brighter)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::adaptive::plan::pilot_plan;
+    use crate::film::BlockSum;
+    use crate::integrator::{FirstHit, PathSample};
+    use glam::Vec3;
+
+    /// A pilot of columns that shine as told.
+    fn film_of_columns(side: u32, radiance: impl Fn(u32) -> f32) -> Film {
+        let mut film = Film::new(side, side);
+        for block in pilot_plan(&film, 16).blocks {
+            let value = radiance(block.pixel % side);
+            let first_hit =
+                FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: value > 0.0 };
+            let mut sum = BlockSum::default();
+            for _ in 0..block.samples {
+                sum.add(&PathSample { radiance: Vec3::splat(value), first_hit, rays: 1 });
+            }
+            film.merge_block(block, &sum);
+        }
+        film
+    }
+
+    /// The Gaussian of σ 0.45 pixels, cut at 1.5: across a straight edge coverage goes 0.5, 0.013, 0.
+    #[test]
+    fn coverage_falls_by_the_filters_shape() {
+        let profile = EdgeProfile::of(PixelFilter::Gaussian).expect("is smooth");
+        assert!((profile.farther_out(0.5, 0.0) - 0.5).abs() < 0.02);
+        assert!((profile.farther_out(0.5, 1.0) - 0.013).abs() < 0.002, "{}", profile.farther_out(0.5, 1.0));
+        assert_eq!(profile.farther_out(0.5, 2.0), 0.0);
+        assert!((profile.farther_out(1.0, 1.5) - 0.5).abs() < 0.02, "{}", profile.farther_out(1.0, 1.5));
+        assert!(
+            EdgeProfile::of(PixelFilter::Box).is_none(),
+            "beside a pixel that is half covered lies one that is not"
+        );
+    }
+
+    /// Of a lamp whose edge covers half of a column, the column beside it has what the filter says, less for samples without a
+    /// hit, and the one after that nothing.
+    #[test]
+    fn light_is_missed_beside_lamps_alone() {
+        const SIDE: usize = 8;
+        let film = film_of_columns(SIDE as u32, |x| {
+            if x < 3 {
+                1e4
+            } else if x == 3 {
+                5e3
+            } else {
+                0.0
+            }
+        });
+        let sampled = film.estimate(1.0).luminance_cd_m2;
+        let profile = EdgeProfile::of(PixelFilter::Gaussian).expect("is smooth");
+        let missed = missed_light(&profile, &film, &sampled, 100.0);
+        let samples = film.samples(0) as f32;
+        let expected = 1e4 * 0.013 / (1.0 + 0.013 * samples);
+        for y in 0..SIDE {
+            assert!((missed.get(4, y) / expected - 1.0).abs() < 0.2, "{} for {expected}", missed.get(4, y));
+            assert!((0..SIDE).filter(|&x| x != 4).all(|x| missed.get(x, y) == 0.0));
+        }
+        assert!(missed_light(&profile, &film, &sampled, 1e6).values().iter().all(|&light| light == 0.0));
+    }
+
+    /// Far below white as much is seen as is missing; far above it, white.
+    #[test]
+    fn no_more_than_white_is_missing() {
+        let missed = Plane::from_fn(3, 1, |x, _| [0.0, 1.0, 1e6][x]);
+        let dark = expected_darkness(&missed, |light| light.map(|light| (50.0 + light).min(200.0)));
+        assert_eq!(dark.get(0, 0), 0.0);
+        assert!((dark.get(1, 0) - 1.0).abs() < 0.01, "{}", dark.get(1, 0));
+        assert!((dark.get(2, 0) - 150.0).abs() < 0.01, "{}", dark.get(2, 0));
+    }
+}
