@@ -261,6 +261,22 @@ fn the_channel_that_shows_most_counts() {
     }
 }
 
+/// Light that no half has found is bias, beside which noise stays what it is: squares add.
+#[test]
+fn missed_light_adds_to_the_bias() {
+    let noise = white_noise(41, 4.0);
+    let error = Halves::of(&grey(), [noise.clone(), noise.map(|value| -value)], 0.5, 41).judged(&map_of(&grey()));
+    let missed = Plane::from_fn(SIDE, SIDE, |x, _| if x < SIDE / 2 { 3.0 } else { 0.0 });
+    let found = error.clone().with_missed_light(&missed);
+    assert_eq!(found.variance.values(), error.variance.values());
+    let planes =
+        |error: &DenoisedError, x| [&error.visibility, &error.bias, &error.blended_visibility].map(|p| p.get(x, 9));
+    assert_eq!(planes(&found, SIDE - 1), planes(&error, SIDE - 1));
+    for (found, without) in planes(&found, 0).into_iter().zip(planes(&error, 0)) {
+        assert!((found * found - without * without - 9.0).abs() < 1e-3, "{found} {without}");
+    }
+}
+
 /// Chromatic noise that is gone in the next frame is less visible, by the energy that castleCSF's temporal channels leave.
 #[test]
 fn chromatic_noise_of_a_moving_picture_is_less_visible() {
