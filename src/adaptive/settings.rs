@@ -154,7 +154,7 @@ impl LoopSettings {
             importance: None,
             gazes: Vec::new(),
             pursuit: None,
-            filter: PixelFilter::Gaussian,
+            filter: PixelFilter::default(),
             denoiser: None,
             is_outdated: None,
         }

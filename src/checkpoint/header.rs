@@ -123,7 +123,7 @@ impl Origin {
     pub fn filter(&self) -> PixelFilter {
         let is_named =
             |filter: &PixelFilter| self.tracing.split(", ").any(|field| field == format!("filter: {filter:?}"));
-        PixelFilter::ALL.into_iter().find(is_named).unwrap_or(PixelFilter::Gaussian)
+        PixelFilter::ALL.into_iter().find(is_named).unwrap_or_default()
     }
 
     /// Whether what surrounds the scene was left out, so that pictures of the film have alpha.

@@ -125,9 +125,11 @@ impl Denoiser {
     /// [`OidnError::Failed`] where the library fails.
     pub fn denoise(&self, picture: &NoisyPicture<'_>) -> Result<Vec<[f32; 3]>, OidnError> {
         let mut denoised = match self {
-            Self::Builtin => match &picture.guides.builtin {
-                Some(prepared) => builtin::denoise(picture, prepared),
-                None => picture.rgb.to_vec(),
+            Self::Builtin => match (&picture.guides.builtin, picture.rgb.is_empty()) {
+                (_, true) => Vec::new(),
+                (Some(prepared), _) => builtin::denoise(picture, prepared),
+                // Prepared for the other: dearer, and no other picture.
+                (None, _) => builtin::denoise(picture, &builtin::Prepared::of(picture.guides.get())),
             },
             Self::Oidn(oidn) => oidn.denoise(picture)?,
         };

@@ -80,7 +80,7 @@ impl TraceSettings {
             height,
             seed,
             max_depth: DEFAULT_MAX_DEPTH,
-            filter: PixelFilter::Gaussian,
+            filter: PixelFilter::default(),
             clamp: None,
             sequence: Sequence::PerPixel,
             crop: None,

@@ -9,11 +9,12 @@ use std::f64::consts::PI;
 use std::sync::LazyLock;
 
 /// A pixel reconstruction filter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PixelFilter {
     /// One pixel wide; what most references use.
     Box,
     /// Gaussian of σ 0.45 pixels, cut at 1.5 pixels (weight 0.4 % there): softer edges.
+    #[default]
     Gaussian,
     /// The four-term window of Blackman and Harris, 3 pixels wide and separable (Harris 1978): sharper than the Gaussian,
     /// without its cut.

@@ -13,6 +13,8 @@ use filter::filter_pass;
 use fireflies::tame_fireflies;
 use surfaces::surfaces;
 
+pub use surfaces::depth_slopes;
+
 /// A noisy picture and what is known of its surfaces. All slices are row-major with `width * height` entries.
 #[derive(Clone, Copy, Debug)]
 pub struct GuideInputs<'a> {
@@ -84,8 +86,10 @@ pub fn denoise(inputs: &GuideInputs<'_>) -> Vec<[f32; 3]> {
     denoised
 }
 
-/// What a pixel is divided by to leave its illumination.
-fn divisor(albedo: [f32; 3]) -> [f32; 3] {
+/// What a pixel is divided by to leave its illumination: its albedo, 0.02 at the least in each channel; 1 where that is darker by
+/// luminance, or not finite.
+#[must_use]
+pub fn divisor(albedo: [f32; 3]) -> [f32; 3] {
     let usable = albedo.iter().all(|channel| channel.is_finite()) && luminance(albedo) > LEAST_ALBEDO;
     if usable { albedo.map(|channel| channel.max(LEAST_ALBEDO)) } else { [1.0; 3] }
 }

@@ -24,7 +24,7 @@ pub(super) const SLOPE: usize = 4;
 /// normal 0.
 pub(super) fn surfaces(inputs: &GuideInputs<'_>) -> Rows<SURFACE_CHANNELS> {
     let width = inputs.width;
-    let slopes = depth_slopes(inputs);
+    let slopes = depth_slopes(inputs.depth, width);
     let mut surfaces = Rows::new(width, inputs.height);
     surfaces.for_each_row(|y, [normal_x, normal_y, normal_z, depth, slope]| {
         for x in 0..width {
@@ -41,9 +41,11 @@ pub(super) fn surfaces(inputs: &GuideInputs<'_>) -> Rows<SURFACE_CHANNELS> {
     surfaces
 }
 
-/// How much depth changes from a pixel to the next, taken on the flatter side so that silhouettes do not count.
-fn depth_slopes(inputs: &GuideInputs<'_>) -> Vec<f32> {
-    let (width, height, depth) = (inputs.width, inputs.height, inputs.depth);
+/// How much depth, row-major in rows of `width`, changes from a pixel to the next, taken on the flatter side so that silhouettes do not
+/// count: finite, 0 where nothing tells.
+#[must_use]
+pub fn depth_slopes(depth: &[f32], width: usize) -> Vec<f32> {
+    let height = depth.len() / width.max(1);
     (0..depth.len())
         .into_par_iter()
         .map(|index| {

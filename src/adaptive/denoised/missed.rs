@@ -75,8 +75,8 @@ pub(super) fn missed_light(profile: &EdgeProfile, film: &Film, sampled_cd_m2: &P
 /// How much brighter a picture is expected to be seen with light that may be missing, display cd/m², where that scatters exponentially about
 /// its mean. `shown`: the picture as displayed with so much more light.
 pub(super) fn expected_darkness(missed: &Plane, shown: impl Fn(&Plane) -> Plane) -> Plane {
-    /// Means of fifths of an exponential variable of mean 1, about.
-    const FIFTHS: [f32; 5] = [0.105, 0.357, 0.693, 1.204, 2.642];
+    /// Means of the fifths of an exponential variable of mean 1.
+    const FIFTHS: [f32; 5] = [0.107, 0.360, 0.700, 1.223, 2.610];
     if missed.values().iter().all(|&light| light == 0.0) {
         return missed.clone();
     }

@@ -17,8 +17,8 @@ const _: () = assert!(TILE.is_multiple_of(LANES), "a tile's rows are whole group
 const LEAST_WEIGHT: f32 = 1e-4;
 /// Variance of a sample's feature, about: what a fit follows may be the features' own noise, which is this over the samples.
 const FEATURE_VARIANCE: f64 = 0.004;
-/// What keeps a fit by place level where all neighbours that count lie in one line. Places are in units of the taps' radius.
-const PLACE_RIDGE: f32 = 1e-3;
+/// What keeps a fit by place level where all neighbours that count lie in one line, square pixels.
+const PLACE_RIDGE: f32 = 0.58;
 
 /// A picture, and what is left of its light's variance.
 pub(super) struct Fitted {
@@ -47,7 +47,7 @@ pub(super) fn by_place<const PATCH: usize>(
     colours: &[PaddedPlane; 3],
     likeness: &Likeness<'_, PATCH>,
 ) -> Vec<[f32; 3]> {
-    by_tiles(likeness, &ByPlace { colours, per_radius: 1.0 / likeness.taps.radius() as f32 })
+    by_tiles(likeness, &ByPlace { colours })
 }
 
 /// A value for each of the pixels that are fitted at once.
@@ -137,7 +137,7 @@ impl Place {
 
 /// `N` values of pixels from their neighbours.
 trait FromNeighbours<const N: usize>: Sync {
-    /// Of the pixels from a place on. `weigh` says how much each tap counts, by its number. `#[inline(always)]`.
+    /// Of the pixels from a place on. `#[inline(always)]`.
     fn values(&self, place: Place, neighbours: &Neighbours<'_>) -> [Lanes; N];
 }
 
@@ -193,8 +193,6 @@ impl FromNeighbours<4> for ByFeatures<'_> {
 
 struct ByPlace<'a> {
     colours: &'a [PaddedPlane; 3],
-    /// 1 over the farthest tap's distance.
-    per_radius: f32,
 }
 
 impl FromNeighbours<3> for ByPlace<'_> {
@@ -203,8 +201,7 @@ impl FromNeighbours<3> for ByPlace<'_> {
         let mut equations = Equations::<3>::new();
         for (number, &tap) in neighbours.taps.iter().enumerate() {
             let Some(weight) = neighbours.weight(number) else { continue };
-            let (dx, dy) = (tap.dx as f32 * self.per_radius, tap.dy as f32 * self.per_radius);
-            let terms = [Lanes([dx; LANES]), Lanes([dy; LANES]), Lanes::ONE];
+            let terms = [Lanes([tap.dx as f32; LANES]), Lanes([tap.dy as f32; LANES]), Lanes::ONE];
             equations.add(weight, &terms, colours_at(self.colours, place.at(tap)));
         }
         equations.value_at_center(PLACE_RIDGE)

@@ -3,10 +3,11 @@
 use super::SurfaceGuides;
 use super::planes::{Beyond, PaddedPlane, TILE};
 use super::taps::{Tap, Taps};
+use fechner_perception::guide::depth_slopes;
 use fechner_perception::photometry::luminance;
 use rayon::prelude::*;
 
-/// A neighbour whose normal is turned by this much less than 1 in cosine gets 1/e of the weight: one in this.
+/// A neighbour gets 1/e of the weight where the cosine between the normals is below 1 by one part in so many.
 const NORMAL_SHARPNESS: f32 = 12.0;
 /// A neighbour this many times farther off than the surface's slope explains gets 1/e of the weight.
 const DEPTH_SLOPES: f32 = 1.5;
@@ -63,8 +64,9 @@ impl Surfaces {
         let depth = |i: usize| {
             if guides.depth[i].is_finite() { guides.depth[i].clamp(0.0, FARTHEST_SURFACE) } else { NO_SURFACE }
         };
+        let slopes = depth_slopes(&guides.depth, width);
         let per_depth = |i: usize| {
-            1.0 / (DEPTH_SLOPES * slope(guides, i).min(FARTHEST_SURFACE) + DEPTH_SHARE * depth(i) + f32::MIN_POSITIVE)
+            1.0 / (DEPTH_SLOPES * slopes[i].min(FARTHEST_SURFACE) + DEPTH_SHARE * depth(i) + f32::MIN_POSITIVE)
         };
         Self {
             size: (width, height),
@@ -74,9 +76,7 @@ impl Surfaces {
             shining: PaddedPlane::new(width, height, Beyond::Edge, |i| if guides.shines[i] { GONE } else { 0.0 }),
         }
     }
-}
 
-impl Surfaces {
     /// Columns and rows.
     pub(super) fn size(&self) -> (usize, usize) {
         self.size
@@ -86,20 +86,6 @@ impl Surfaces {
 fn unit(normal: [f32; 3]) -> [f32; 3] {
     let length = normal.iter().map(|part| part * part).sum::<f32>().sqrt();
     if length > 1e-3 && length.is_finite() { normal.map(|part| part / length) } else { [0.0; 3] }
-}
-
-/// How much depth changes from a pixel to the next, taken on the flatter side so that silhouettes do not count.
-fn slope(guides: &SurfaceGuides, pixel: usize) -> f32 {
-    let (x, y) = (pixel % guides.width, pixel / guides.width);
-    let step = |other: Option<usize>| {
-        let step = other.map_or(f32::INFINITY, |other| (guides.depth[other] - guides.depth[pixel]).abs());
-        if step.is_nan() { f32::INFINITY } else { step }
-    };
-    let width = guides.width;
-    let across = step((x > 0).then(|| pixel - 1)).min(step((x + 1 < width).then(|| pixel + 1)));
-    let along = step((y > 0).then(|| pixel - width)).min(step((y + 1 < guides.height).then(|| pixel + width)));
-    let slope = across.max(along);
-    if slope.is_finite() { slope } else { 0.0 }
 }
 
 /// What tells how much each of the taps counts: `PATCH` pixels to each side are compared.
@@ -120,12 +106,12 @@ pub(super) type TileWeights = [[f32; TILE]; TILE];
 const WIDEST: usize = TILE + 4;
 
 impl<const PATCH: usize> Likeness<'_, PATCH> {
-    const _FITS: () = assert!(2 * PATCH <= WIDEST - TILE, "a patch is wider than there is room for");
+    const FITS: () = assert!(2 * PATCH <= WIDEST - TILE, "a patch is wider than there is room for");
 
     /// Weights of a tap for the pixels of the tile whose first pixel this is. Inlined, as all that it calls, for wide vectors.
     #[inline(always)]
     pub(super) fn weigh(&self, y: isize, x: isize, tap: Tap, weights: &mut TileWeights) {
-        let () = Self::_FITS;
+        let () = Self::FITS;
         let unlike = self.unlike_surroundings(y, x, tap);
         // The slope explains more the farther one goes.
         let per_distance = 1.0 / tap.distance().max(1.0);

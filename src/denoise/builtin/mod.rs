@@ -1,10 +1,10 @@
-//! Our own denoiser: what is alike is averaged, twice, by what the first surfaces say and by the pixels themselves.
+//! Our own denoiser: what is alike is fitted, twice, by what the first surfaces say and by the pixels themselves.
 //!
 //! First, each pixel is fitted from the neighbours whose surroundings look like its own (non-local means, Buades, Coll and Morel
 //! 2005, with the distance of Rousselle, Knaus and Zwicker 2012, which knows the noise): a plane through albedo, normal and depth
 //! (first-order regression: Moon, Carr and Yoon 2014; Bitterli et al. 2016), so that textures and edges survive, whatever
-//! light makes of them. Then the light that falls on the surfaces is averaged again, farther out, by what the first pass left
-//! of the noise. Fireflies need no treatment of their own: their variance says that they may as well be their neighbours.
+//! light makes of them. Then the light that falls on the surfaces is fitted again, farther out, by a plane through the place, by what the
+//! first pass left of the noise. Fireflies need no treatment of their own: their variance says that they may as well be their neighbours.
 //!
 //! Not for a picture without surfaces: glass and mirrors are filtered by what the first surface says, and by what they show.
 
@@ -15,6 +15,7 @@ mod taps;
 
 use super::{NoisyPicture, SurfaceGuides};
 use fechner_perception::Plane;
+use fechner_perception::guide::divisor;
 use fechner_perception::photometry::luminance;
 use fit::{FEATURES, by_features, by_place};
 use likeness::{Light, Likeness, Surfaces};
@@ -22,8 +23,6 @@ use planes::{Beyond, PaddedPlane};
 use rayon::prelude::*;
 use taps::Taps;
 
-/// Albedos below this, by luminance, are not divided out.
-const LEAST_ALBEDO: f32 = 0.02;
 /// Values are cut here, in units of [`unit_of`], so that squares and sums stay finite.
 const MOST: f32 = 1e9;
 /// Share of its neighbours' variance that a pixel has at least: few samples may all be alike by chance.
@@ -70,7 +69,7 @@ pub(super) fn denoise(picture: &NoisyPicture<'_>, prepared: &Prepared) -> Vec<[f
 
     let light = Light::of(guides, &illumination(&rgb, divisors), &of_light(&shared(&variance), divisors));
     let near = Likeness::<2> {
-        taps: &Taps::around(97, 9),
+        taps: &Taps::around(97, 0.711),
         light: &light,
         surfaces,
         tolerance: 0.7,
@@ -82,7 +81,7 @@ pub(super) fn denoise(picture: &NoisyPicture<'_>, prepared: &Prepared) -> Vec<[f
     let left: Vec<f32> = first.variance.iter().map(|variance| CORRELATION * variance).collect();
     let light = Light::of(guides, &illuminated, &left);
     let far = Likeness::<1> {
-        taps: &Taps::around(97, 24),
+        taps: &Taps::around(97, 2.234),
         light: &light,
         surfaces,
         tolerance: 1.0,
@@ -117,12 +116,6 @@ fn unit_of(rgb: &[[f32; 3]]) -> f32 {
 /// Finite and not negative.
 fn usable(value: f32) -> f32 {
     if value.is_finite() { value.clamp(0.0, MOST) } else { 0.0 }
-}
-
-/// What a pixel is divided by to leave its illumination.
-fn divisor(albedo: [f32; 3]) -> [f32; 3] {
-    let is_usable = albedo.iter().all(|channel| channel.is_finite()) && luminance(albedo) > LEAST_ALBEDO;
-    if is_usable { albedo.map(|channel| channel.max(LEAST_ALBEDO)) } else { [1.0; 3] }
 }
 
 /// Light that falls on each pixel's surface.

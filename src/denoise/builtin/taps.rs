@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 /// The farthest neighbour, in pixels along an axis.
-pub(super) const FARTHEST: usize = 24;
+pub(super) const FARTHEST: usize = 16;
 
 /// Where a neighbour is, in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -22,39 +22,30 @@ impl Tap {
 
 /// All of the nearest 24 neighbours, and farther ones along a spiral of the golden angle, which leaves no rows or rings. The pixel
 /// itself is among them.
-pub(super) struct Taps {
-    radius: usize,
-    all: Vec<Tap>,
-}
+pub(super) struct Taps(Vec<Tap>);
 
 impl Taps {
-    /// About `count` within `radius`, at most [`FARTHEST`]; in order of rows, and with each its opposite.
-    pub(super) fn around(count: usize, radius: usize) -> Self {
+    /// So many, an odd number of at least 25, the k-th pair of the farther ones `spacing_px` · √k beyond the nearest; in order of rows. None is
+    /// farther than [`FARTHEST`].
+    pub(super) fn around(count: usize, spacing_px: f64) -> Self {
         const INNER: isize = 2;
-        let radius = radius.min(FARTHEST);
         let golden_angle = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
-        let reach = radius as f64 - INNER as f64;
         let mut taps: BTreeSet<Tap> =
             (-INNER..=INNER).flat_map(|dy| (-INNER..=INNER).map(move |dx| Tap { dy, dx })).collect();
-        for step in 0..count {
-            if taps.len() >= count {
+        for pair in 0.. {
+            let distance = INNER as f64 + spacing_px * (f64::from(pair) + 0.5).sqrt();
+            if taps.len() >= count || distance > FARTHEST as f64 {
                 break;
             }
-            let distance = INNER as f64 + reach * ((step as f64 + 0.5) / count as f64).sqrt();
-            let angle = step as f64 * golden_angle;
+            let angle = f64::from(pair) * golden_angle;
             let (dy, dx) = ((distance * angle.sin()).round() as isize, (distance * angle.cos()).round() as isize);
             taps.extend([Tap { dy, dx }, Tap { dy: -dy, dx: -dx }]);
         }
-        Self { radius, all: taps.into_iter().collect() }
+        Self(taps.into_iter().collect())
     }
 
     pub(super) fn all(&self) -> &[Tap] {
-        &self.all
-    }
-
-    /// How far the farthest may be.
-    pub(super) fn radius(&self) -> usize {
-        self.radius
+        &self.0
     }
 }
 
@@ -62,15 +53,17 @@ impl Taps {
 mod tests {
     use super::*;
 
+    /// Those that the denoiser uses, with the reach that the documents say, and some that would go too far.
     #[test]
     fn neighbours_are_many_symmetric_and_near() {
-        for (count, radius) in [(97, 9), (97, 24), (10, 3)] {
-            let taps = Taps::around(count, radius);
+        for (count, spacing_px, found, reach) in [(97, 0.711, 97, 6), (97, 2.234, 97, 15), (999, 9.0, 29, 10)] {
+            let taps = Taps::around(count, spacing_px);
             let all = taps.all();
-            assert!(all.len() >= count.min(24) && all.len() <= count.max(25) + 1, "{} of {count}", all.len());
+            assert_eq!(all.len(), found);
             assert!(all.contains(&Tap { dy: 0, dx: 0 }));
             assert!(all.iter().all(|tap| all.contains(&Tap { dy: -tap.dy, dx: -tap.dx })));
-            assert!(all.iter().all(|tap| tap.distance() <= radius as f32 + 1.0));
+            let farthest = all.iter().map(|tap| tap.dy.unsigned_abs().max(tap.dx.unsigned_abs())).max();
+            assert_eq!(farthest, Some(reach));
         }
     }
 }
