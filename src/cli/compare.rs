@@ -4,8 +4,9 @@ mod sequence;
 
 use super::animate::parse_rate;
 use super::json::write_json;
+use super::kept_tone::shown_by;
 use super::picture::InputPicture;
-use super::seeing::{DEFAULT_OPERATOR, SeeingArguments, operator_values, tone_operator};
+use super::seeing::{SeeingArguments, operator_values};
 use super::targets::check_kept;
 use anyhow::{Result, bail};
 use clap::Args;
@@ -13,7 +14,6 @@ use fechner::output::{self, Format};
 use fechner_perception::csf;
 use fechner_perception::difference::{Difference, colour_difference};
 use fechner_perception::psychometric::detection_probability;
-use fechner_perception::tone::ToneSettings;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -29,9 +29,10 @@ pub(super) struct CompareArguments {
     test: PathBuf,
     #[command(flatten)]
     seeing: SeeingArguments,
-    /// Tone operator that shows scene-linear pictures; it is fitted to the reference, or to the test where only that is one.
-    #[arg(long, value_name = "NAME", value_parser = operator_values(), default_value = DEFAULT_OPERATOR)]
-    operator: String,
+    /// Tone operator that shows scene-linear pictures, fitted to the reference, or to the test where only that is one [default: as that
+    /// one was shown when it was rendered, if its file says so and the display is as bright and dark, else constant].
+    #[arg(long, value_name = "NAME", value_parser = operator_values())]
+    operator: Option<String>,
     /// Frames a second, of sequences. Beyond its ends a sequence stands still, so that noise in the first and the last fifth
     /// of a second is seen more as in a still.
     #[arg(long, value_name = "N", value_parser = parse_rate)]
@@ -56,6 +57,8 @@ struct Figures {
     display: String,
     pixels_per_degree: f64,
     csf: &'static str,
+    /// What brought the scene's light to the display, where the pictures hold such light.
+    operator: Option<String>,
     #[serde(flatten)]
     seen: Seen,
 }
@@ -109,8 +112,8 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
     check_alike((&arguments.reference, &reference), (&arguments.test, &test))?;
     let viewing = reference.viewed(&arguments.seeing.viewing()?)?;
     let csf = csf::by_name(&arguments.seeing.csf, &viewing)?;
-    let operator = tone_operator(&arguments.operator, &ToneSettings::default())?;
-    let fitted = reference.fit(operator.as_ref(), &viewing).or_else(|| test.fit(operator.as_ref(), &viewing));
+    let pictures = [(arguments.reference.as_path(), &reference), (arguments.test.as_path(), &test)];
+    let fitted = shown_by(arguments.operator.as_deref(), &pictures, &viewing)?;
     let (width, height) = reference.size();
     let difference = colour_difference(
         &reference.displayed_rgb(fitted.as_deref(), &viewing),
@@ -126,6 +129,7 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
         display: viewing.display.name.clone(),
         pixels_per_degree: viewing.display.pixels_per_degree,
         csf: csf.name(),
+        operator: fitted.as_ref().map(|fitted| fitted.describe()),
         seen: Seen::of(&difference),
     };
     if let Some(path) = &arguments.map {

@@ -13,6 +13,7 @@ mod info;
 mod job;
 mod json;
 mod keeper;
+mod kept_tone;
 mod maps;
 mod merge;
 mod picture;

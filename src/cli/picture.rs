@@ -1,6 +1,7 @@
 //! Pictures of any renderer as the input of `compare` and `threshold`.
 
 use super::channels::{self, Colour};
+use super::kept_tone::KeptTone;
 use anyhow::{Context, Result, bail};
 use fechner::exr_read::{ExrImage, read_exr};
 use fechner::hdr_read::HdrHeader;
@@ -21,6 +22,8 @@ pub(super) struct InputPicture {
     content: Content,
     /// Width of a pixel over its height.
     pixel_aspect_ratio: f64,
+    /// How it was shown when it was rendered, where its file says so.
+    kept_tone: Option<KeptTone>,
 }
 
 /// Brings scene light, cd/m², of a picture this wide to linear display RGB.
@@ -78,7 +81,14 @@ impl InputPicture {
         }
         let content = Content::Scene { nits_per_unit };
         let (width, height) = (picture.width as usize, picture.height as usize);
-        Ok(Self { width, height, rgb: picture.rgb, content, pixel_aspect_ratio: exr.pixel_aspect_ratio })
+        Ok(Self {
+            width,
+            height,
+            rgb: picture.rgb,
+            content,
+            pixel_aspect_ratio: exr.pixel_aspect_ratio,
+            kept_tone: KeptTone::of(exr),
+        })
     }
 
     fn from_hdr(path: &Path, nits_per_unit: f64) -> Result<Self> {
@@ -108,7 +118,8 @@ impl InputPicture {
     fn from_image(image: DynamicImage, content: Content) -> Self {
         let picture = image.into_rgb32f();
         let (width, height) = (picture.width() as usize, picture.height() as usize);
-        Self { width, height, rgb: picture.pixels().map(|p| p.0).collect(), content, pixel_aspect_ratio: 1.0 }
+        let rgb = picture.pixels().map(|p| p.0).collect();
+        Self { width, height, rgb, content, pixel_aspect_ratio: 1.0, kept_tone: None }
     }
 
     /// The viewing of this picture, whose pixels may be oblong: its lines are as dense as the display's and its columns closer
@@ -134,6 +145,16 @@ impl InputPicture {
     /// Width and height in pixels.
     pub(super) fn size(&self) -> (usize, usize) {
         (self.width, self.height)
+    }
+
+    /// How it was shown when it was rendered, where its file says so.
+    pub(super) fn kept_tone(&self) -> Option<&KeptTone> {
+        self.kept_tone.as_ref()
+    }
+
+    /// Whether an operator has to bring it to a display.
+    pub(super) fn holds_scene_light(&self) -> bool {
+        matches!(self.content, Content::Scene { .. })
     }
 
     /// The operator fitted to this picture; `None` for one that is ready for the display.

@@ -2,8 +2,9 @@
 
 use super::animate::parse_rate;
 use super::channels;
+use super::kept_tone::shown_by;
 use super::picture::InputPicture;
-use super::seeing::{DEFAULT_OPERATOR, SeeingArguments, model_values, operator_values, tone_operator};
+use super::seeing::{SeeingArguments, model_values, operator_values};
 use super::targets::check_kept;
 use anyhow::{Context, Result, bail};
 use clap::Args;
@@ -12,8 +13,8 @@ use fechner_perception::display::Glare;
 use fechner_perception::model::{self, ModelInputs};
 use fechner_perception::motion::image_velocity_deg_s;
 use fechner_perception::saliency::saliency_of_displayed;
+use fechner_perception::tone::FittedTone;
 use fechner_perception::tone::acuity::BehindAcuity;
-use fechner_perception::tone::{FittedTone, ToneSettings};
 use fechner_perception::{ContrastSensitivity, Plane, ThresholdInputs, Viewing, csf, threshold_map};
 use std::path::{Path, PathBuf};
 
@@ -46,9 +47,10 @@ pub(super) struct ThresholdArguments {
     /// Threshold model.
     #[arg(long, value_name = "NAME", value_parser = model_values(), default_value = model::DEFAULT)]
     model: String,
-    /// Tone operator that shows scene-linear pictures; it is fitted to the input, or to the halves where only they are ones.
-    #[arg(long, value_name = "NAME", value_parser = operator_values(), default_value = DEFAULT_OPERATOR)]
-    operator: String,
+    /// Tone operator that shows scene-linear pictures, fitted to the input, or to the halves where only they are ones [default: as that
+    /// one was shown when it was rendered, if its file says so and the display is as bright and dark, else constant].
+    #[arg(long, value_name = "NAME", value_parser = operator_values())]
+    operator: Option<String>,
     #[command(flatten)]
     seeing: SeeingArguments,
 }
@@ -79,9 +81,10 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     let model = model::by_name(&arguments.model).with_context(|| {
         format!("there is no threshold model \"{}\"; known: {}", arguments.model, model::names().join(", "))
     })?;
-    let operator = tone_operator(&arguments.operator, &ToneSettings::default())?;
-    let mut pictures = std::iter::once(&guide).chain(halves.iter().flatten());
-    let fitted = pictures.find_map(|picture| picture.fit(operator.as_ref(), &viewing));
+    let names = std::iter::once(&arguments.input).chain(arguments.halves.iter().flatten());
+    let pictures = std::iter::once(&guide).chain(halves.iter().flatten());
+    let named: Vec<_> = names.map(PathBuf::as_path).zip(pictures).collect();
+    let fitted = shown_by(arguments.operator.as_deref(), &named, &viewing)?;
     // Noise goes through the loss of acuity that the operator shows.
     let acuity = fitted.as_ref().and_then(|fitted| fitted.acuity());
     let csf = BehindAcuity { csf: csf::by_name(&arguments.seeing.csf, &viewing)?, acuity };

@@ -119,6 +119,38 @@ fn a_picture_looks_like_its_own_png() {
     }
 }
 
+/// What a render judged is what is compared: its operator with its exposure, on the display that they are for.
+#[test]
+fn a_render_is_seen_as_it_was_judged() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box.toml");
+    for (name, how) in [("dimmed", &["--exposure", "-2"][..]), ("adapted", &["--operator", "pattanaik00"])] {
+        for ending in ["exr", "png"] {
+            let common = ["render", scene, "--size", "48x48", "--spp", "16", "-o"];
+            run(folder.path(), &[&common[..], &[&format!("{name}.{ending}")], how].concat());
+        }
+        let files = [format!("{name}.exr"), format!("{name}.png")];
+        let compare = |more: &[&str]| {
+            let (_, said) = fechner(folder.path(), &[&["compare", &files[0], &files[1]], more].concat());
+            (visibility(&said), said)
+        };
+        let (kept, said) = compare(&["--json", "figures.json"]);
+        assert!(kept < 1.5 && said.contains("when it was rendered"), "{name}: {said}");
+        let figures = std::fs::read_to_string(folder.path().join("figures.json")).expect("written");
+        assert!(figures.contains("\"operator\": \""), "{figures}");
+        let (by_another, said) = compare(&["--operator", "constant"]);
+        assert!(by_another > 3.0 && !said.contains("when it was rendered"), "{name}: {said}");
+        let (_, said) = compare(&["--display", "hdr-1000"]);
+        assert!(said.contains("was rendered for the display \"desktop\""), "{said}");
+        let threshold = |more: &[&str]| {
+            let arguments = ["threshold", &files[0], "-o", "thresholds.exr"];
+            run(folder.path(), &[&arguments[..], more].concat());
+            mean(folder.path(), "thresholds.exr", "adaptation.Y")
+        };
+        assert!((threshold(&[]) / threshold(&["--operator", "constant"])).ln().abs() > 0.01, "{name}");
+    }
+}
+
 /// A tone-mapped EXR says what the screen emits, and is that again when it is shown as it is.
 #[test]
 fn a_tone_mapped_exr_is_shown_as_it_is() {

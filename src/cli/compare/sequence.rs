@@ -3,8 +3,9 @@
 use super::{CompareArguments, Figures, Seen, check_alike, check_map, write_map};
 use crate::cli::channels::{self, both_motions};
 use crate::cli::json::write_json;
+use crate::cli::kept_tone::{as_rendered, first_scene};
 use crate::cli::picture::InputPicture;
-use crate::cli::seeing::tone_operator;
+use crate::cli::seeing::{DEFAULT_OPERATOR, tone_operator};
 use crate::cli::targets::check_kept;
 use anyhow::{Context, Result, bail};
 use fechner::animate::name::FrameName;
@@ -46,8 +47,15 @@ struct Sequences<'a> {
     velocity: Option<FrameName>,
     map: Option<FrameName>,
     viewing: Viewing,
-    /// For files that hold the scene's light.
-    fitted: Option<Box<dyn FittedTone>>,
+    showing: Showing,
+}
+
+/// What brings files that hold the scene's light to the display.
+enum Showing {
+    /// Each frame as it was shown when it was rendered: eyes may adapt from frame to frame.
+    AsRendered,
+    /// One operator for the whole sequence; none for frames that are ready for the display.
+    By(Option<Box<dyn FittedTone>>),
 }
 
 /// Exit status 0: the same to the eye; 1: told apart.
@@ -198,19 +206,28 @@ impl<'a> Sequences<'a> {
             check_map(&map.of(numbers[0]))?;
         }
         check_frames_kept(arguments, [Some(&reference), Some(&test), velocity.as_ref()], map.as_ref(), numbers)?;
-        let operator = tone_operator(&arguments.operator, &ToneSettings::default())?;
         let nits_per_unit = arguments.seeing.nits_per_unit;
         let mut viewing = arguments.seeing.viewing()?;
         viewing.display.frames_per_second =
             arguments.fps.context("--fps: how many frames a second a sequence has decides what is seen in it")?;
-        let viewing = InputPicture::read(&reference.of(numbers[0]), nits_per_unit)?.viewed(&viewing)?;
-        // One exposure for the whole sequence, as a viewer would hold it.
-        let fit_to = |name: &FrameName| fit(operator.as_ref(), name, numbers, nits_per_unit, &viewing);
-        let fitted = match fit_to(&reference)? {
-            Some(fitted) => Some(fitted),
-            None => fit_to(&test)?,
+        let files = [&reference, &test].map(|name| name.of(numbers[0]));
+        let [first, first_test] = files.each_ref().map(|file| InputPicture::read(file, nits_per_unit));
+        let (first, first_test) = (first?, first_test?);
+        let viewing = first.viewed(&viewing)?;
+        let firsts = [(files[0].as_path(), &first), (files[1].as_path(), &first_test)];
+        let asked = arguments.operator.as_deref();
+        let showing = if asked.is_none() && as_rendered(&firsts, &viewing.display).is_some() {
+            Showing::AsRendered
+        } else {
+            let operator = tone_operator(asked.unwrap_or(DEFAULT_OPERATOR), &ToneSettings::default())?;
+            // One exposure for the whole sequence, as a viewer would hold it.
+            let fit_to = |name: &FrameName| fit(operator.as_ref(), name, numbers, nits_per_unit, &viewing);
+            Showing::By(match fit_to(&reference)? {
+                Some(fitted) => Some(fitted),
+                None => fit_to(&test)?,
+            })
         };
-        Ok(Self { arguments, reference, test, velocity, map, viewing, fitted })
+        Ok(Self { arguments, reference, test, velocity, map, viewing, showing })
     }
 
     /// Reads one frame of both.
@@ -225,8 +242,29 @@ impl<'a> Sequences<'a> {
             Some(name) => Some(read_motion(&name.of(frame), (width, height))?),
             None => None,
         };
-        let shown = |picture: &InputPicture| picture.displayed_rgb(self.fitted.as_deref(), &self.viewing);
+        let kept;
+        let fitted = match &self.showing {
+            Showing::By(fitted) => fitted.as_deref(),
+            Showing::AsRendered => {
+                kept = self.kept_tone(&[(&files[0], &reference), (&files[1], &test)])?;
+                Some(kept.as_ref())
+            }
+        };
+        let shown = |picture: &InputPicture| picture.displayed_rgb(fitted, &self.viewing);
         Ok(SequenceFrame::new(&shown(&reference), &shown(&test), width, height, motion)?)
+    }
+
+    /// The operator by which a frame was shown when it was rendered.
+    fn kept_tone(&self, pictures: &[(&Path, &InputPicture)]) -> Result<Box<dyn FittedTone>> {
+        let kept = first_scene(pictures).and_then(|(_, picture)| picture.kept_tone());
+        kept.and_then(|kept| kept.on(&self.viewing.display)).with_context(|| {
+            format!(
+                "{}: it does not say how it was shown on \"{}\" when it was rendered, as the first frame does: --operator shows all frames \
+                 by one",
+                pictures[0].0.display(),
+                self.viewing.display.name
+            )
+        })
     }
 
     fn report(&self, frames: Vec<FrameFigures>) -> Result<ExitCode> {
@@ -246,6 +284,10 @@ impl<'a> Sequences<'a> {
                 display: self.viewing.display.name.clone(),
                 pixels_per_degree: self.viewing.display.pixels_per_degree,
                 csf: "castle",
+                operator: match &self.showing {
+                    Showing::AsRendered => Some("of each frame, as it was rendered".to_owned()),
+                    Showing::By(fitted) => fitted.as_ref().map(|fitted| fitted.describe()),
+                },
                 seen,
             },
             frames_per_second: self.viewing.display.frames_per_second,
