@@ -9,7 +9,7 @@ use super::keep::keep;
 use super::metrics::video_jod;
 use super::name::distinct_names;
 use super::reference::trace_up_to;
-use super::viewing;
+use super::{tone_operator, viewing};
 use crate::adaptive::settings::{DENOISED_PILOT_SAMPLES, Limits, LoopSettings, Sampling};
 use crate::adaptive::{Quiet, render};
 use crate::animate::eye::Eye;
@@ -23,7 +23,6 @@ use crate::sampler::hash_words;
 use crate::scene::Scene;
 use crate::scene::load::{LoadError, LoadOptions, load};
 use anyhow::{Context, Result};
-use fechner_perception::tone;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -169,7 +168,8 @@ impl<'a> Bench<'a> {
             eye: Eye::Rests,
             velocity_of: VelocityOf::Surface,
         };
-        let operator = tone::operator("constant", None).context("an operator")?;
+        let first_scene = source.at(0.0)?;
+        let operator = tone_operator(&first_scene)?;
         let track = Track::make(&source, &shot, operator.as_ref(), &|_| {})?;
         let scenes = (shot.first..=shot.last).map(|frame| source.at(shot.seconds(f64::from(frame))));
         let scenes = scenes.collect::<Result<Vec<_>, _>>()?;
@@ -221,7 +221,7 @@ impl<'a> Bench<'a> {
         };
         let (mut samples, mut frames) = (0, Vec::new());
         for index in 0..self.scenes.len() {
-            let operator = tone::operator("constant", None).context("an operator")?;
+            let operator = tone_operator(&self.scenes[index])?;
             let settings: LoopSettings = shot.frame_settings(operator, &self.track.frames[index]);
             let rendered = render(&self.tracer(index, 0), &settings, &Quiet)?;
             samples += rendered.film.total_samples();

@@ -42,7 +42,7 @@ use crate::scene::Scene;
 use crate::scene::load::{LoadOptions, load};
 use anyhow::{Context, Result};
 use fechner_perception::display::{Display, Viewing};
-use fechner_perception::tone;
+use fechner_perception::tone::{self, ToneOperator};
 use name::distinct_names;
 use oracle::{displayed_variance, least_samples, uniform_samples};
 use reference::Reference;
@@ -81,6 +81,13 @@ fn viewing(display: &str) -> Result<Viewing> {
     Ok(Viewing::of(Display::preset(display).with_context(known)?))
 }
 
+/// The operator that shows a scene, as the scene asks for it.
+fn tone_operator(scene: &Scene) -> Result<Box<dyn ToneOperator>> {
+    let name = scene.viewing.operator.as_deref().unwrap_or("constant");
+    tone::operator(name, scene.viewing.exposure_stops)
+        .with_context(|| format!("there is no tone operator \"{name}\"; known: {}", tone::operator_names().join(", ")))
+}
+
 /// One scene, ready to be rendered by any arm.
 pub(crate) struct Subject {
     /// No other scene's of the same run: the file's name without its ending, with folders before it where others have that name.
@@ -110,7 +117,7 @@ impl Subject {
 
     /// Settings of the default loop, to be changed by an arm.
     pub(crate) fn loop_settings(&self) -> Result<LoopSettings> {
-        let operator = tone::operator("constant", None).context("an operator")?;
+        let operator = tone_operator(&self.scene)?;
         Ok(LoopSettings {
             limits: Limits::of_visibility(self.visibility),
             ..LoopSettings::new(self.viewing.clone(), self.scene.nits_per_unit, operator)

@@ -7,6 +7,7 @@ use crate::adaptive::statistics::SampleStatistics;
 use crate::film::{CHANNELS, Film};
 use crate::integrator::PathTracer;
 use crate::sampler::Half;
+use crate::scene::ViewingDefaults;
 use crate::scene::hash::content_hash;
 use anyhow::{Context, Result};
 use fechner_perception::Plane;
@@ -178,7 +179,11 @@ impl Subject {
     /// Hash of the scene's content and of everything else that a reference depends on, the program among it.
     pub(crate) fn key(&self, factor: f64) -> String {
         let (scene, program) = (content_hash(&self.scene), program());
-        let text = format!("{scene}|{program}|{:?}|{}|{factor}|{:?}", self.size, self.visibility, self.viewing);
+        let ViewingDefaults { operator, exposure_stops, .. } = &self.scene.viewing;
+        let text = format!(
+            "{scene}|{program}|{:?}|{}|{factor}|{:?}|{operator:?}|{exposure_stops:?}",
+            self.size, self.visibility, self.viewing
+        );
         // The first 16 hexadecimal digits name a file well enough.
         blake3::hash(text.as_bytes()).to_hex()[..16].to_owned()
     }

@@ -97,6 +97,27 @@ fn bounds_need_no_arms_and_unknown_arms_are_refused() {
     assert!(String::from_utf8_lossy(&refused.stderr).contains("there is no arm \"magic\""));
 }
 
+/// A scene is judged as it is shown: one that is exposed four stops darker has less noise to be seen.
+#[test]
+fn scenes_are_judged_at_their_own_exposure() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell-box.toml"));
+    let text = text.expect("there");
+    std::fs::write(folder.path().join("plain.toml"), &text).expect("written");
+    let dim = text.replace("[view]\n", "[view]\nexposure_stops = -4.0\n");
+    assert_ne!(dim, text);
+    std::fs::write(folder.path().join("dim.toml"), dim).expect("written");
+    let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+    command.args(["bench", "plain.toml", "dim.toml", "--size", "32", "--visibility", "4", "--bound", "-o", "out"]);
+    let run = command.current_dir(folder.path()).output().expect("runs");
+    let table = String::from_utf8_lossy(&run.stdout).into_owned();
+    let uniform = |scene: &str| -> f64 {
+        let row = table.lines().find(|line| line.contains(scene)).unwrap_or_else(|| panic!("{table}"));
+        row.split('|').nth(3).and_then(|cell| cell.trim().parse().ok()).unwrap_or_else(|| panic!("{row}"))
+    };
+    assert!(uniform("dim") < 0.7 * uniform("plain"), "{table}");
+}
+
 /// Nothing but a sky of one colour, or of none: no noise, nothing to see, and still figures.
 #[test]
 fn scenes_without_noise_or_light_have_tables() {
