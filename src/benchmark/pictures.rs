@@ -2,6 +2,7 @@
 
 use super::Subject;
 use crate::film::Film;
+use crate::output::false_colour::heat;
 use crate::output::write_png;
 use anyhow::Result;
 use fechner_perception::{Eotf, Plane};
@@ -39,9 +40,12 @@ pub(crate) fn write_pictures(
 ) -> Result<()> {
     let (width, height) = subject.size;
     let counts = (0..picture.len()).map(|i| (f64::from(film.samples(i).max(16)) / 16.0).log2() / 10.0);
-    let counts: Vec<[f32; 3]> = counts.map(|share| heat(share as f32)).collect();
-    let target = subject.visibility as f32;
-    let visible: Vec<[f32; 3]> = squared_visibility.values().iter().map(|v| heat(v.sqrt() / target / 2.0)).collect();
+    let counts: Vec<[f32; 3]> = counts.map(heat_light).collect();
+    let visible: Vec<[f32; 3]> = squared_visibility
+        .values()
+        .iter()
+        .map(|v| heat_light(f64::from(v.sqrt()) / subject.visibility / 2.0))
+        .collect();
     for (kind, rgb) in KINDS.iter().zip([picture, &counts, &visible]) {
         write_png(&file(record, kind.ending), width, height, rgb)?;
     }
@@ -60,11 +64,10 @@ fn file(record: &Path, ending: &str) -> PathBuf {
 
 /// The colour map's codes of sRGB, 0..1, at so many even steps from its least to its greatest.
 pub(super) fn heat_codes(steps: usize) -> impl Iterator<Item = [f32; 3]> {
-    (0..=steps).map(move |step| flip_rs::MAGMA[255 * step / steps.max(1)])
+    (0..=steps).map(move |step| heat(step as f64 / steps.max(1) as f64))
 }
 
-/// Linear light of a share of 0..1 in the colour map of FLIP.
-fn heat(share: f32) -> [f32; 3] {
-    let index = (share.clamp(0.0, 1.0) * 255.0) as usize;
-    flip_rs::MAGMA[index].map(|code| Eotf::Srgb.decode(f64::from(code), 1.0) as f32)
+/// Linear light of a share of 0..1 in the colour map.
+fn heat_light(share: f64) -> [f32; 3] {
+    heat(share).map(|code| Eotf::Srgb.decode(f64::from(code), 1.0) as f32)
 }

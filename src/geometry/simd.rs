@@ -15,7 +15,7 @@ use super::wide_tree::{Block, BoxRay, Candidates, LANES, Lanes, Met, Node, WideH
 
 /// Which kernels a tree is walked with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Path(Instructions);
+pub(super) struct Kernels(Instructions);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Instructions {
@@ -24,7 +24,7 @@ enum Instructions {
     Avx2,
 }
 
-impl Path {
+impl Kernels {
     /// For any machine.
     pub(super) const PORTABLE: Self = Self(Instructions::Portable);
 
@@ -47,8 +47,8 @@ pub(crate) trait VectorWork {
 /// Does work with the best vectors that this machine has. The results are equal to the bit on all.
 #[inline]
 pub(crate) fn with_vectors(work: impl VectorWork) {
-    match Path::best().0 {
-        // SAFETY: `Avx2` is made by `Path::best` alone, and only where the machine has AVX2.
+    match Kernels::best().0 {
+        // SAFETY: `Avx2` is made by `Kernels::best` alone, and only where the machine has AVX2.
         #[cfg(target_arch = "x86_64")]
         Instructions::Avx2 => unsafe { avx2::run(work) },
         Instructions::Portable => work.run(),
@@ -67,18 +67,18 @@ pub(crate) fn prefetch<T>(value: &T) {
     }
 }
 
-/// [`WideTree::walk_closest`] with the kernels of `path`.
+/// [`WideTree::walk_closest`] with the kernels that are told.
 #[inline]
 pub(super) fn closest(
-    path: Path,
+    kernels: Kernels,
     tree: &WideTree,
     boxes: &BoxRay,
     sheared: &ShearedRay,
     t_max: f32,
     accept: impl Fn(&WideHit) -> bool,
 ) -> Option<WideHit> {
-    match path.0 {
-        // SAFETY: `Avx2` is made by `Path::best` alone, and only where the machine has AVX2.
+    match kernels.0 {
+        // SAFETY: `Avx2` is made by `Kernels::best` alone, and only where the machine has AVX2.
         #[cfg(target_arch = "x86_64")]
         Instructions::Avx2 => unsafe { avx2::closest(tree, boxes, sheared, t_max, accept) },
         Instructions::Portable => tree.walk_closest(
@@ -91,18 +91,18 @@ pub(super) fn closest(
     }
 }
 
-/// [`WideTree::walk_any`] with the kernels of `path`.
+/// [`WideTree::walk_any`] with the kernels that are told.
 #[inline]
 pub(super) fn any(
-    path: Path,
+    kernels: Kernels,
     tree: &WideTree,
     boxes: &BoxRay,
     sheared: &ShearedRay,
     t_max: f32,
     accept: impl Fn(&WideHit) -> bool,
 ) -> bool {
-    match path.0 {
-        // SAFETY: `Avx2` is made by `Path::best` alone, and only where the machine has AVX2.
+    match kernels.0 {
+        // SAFETY: `Avx2` is made by `Kernels::best` alone, and only where the machine has AVX2.
         #[cfg(target_arch = "x86_64")]
         Instructions::Avx2 => unsafe { avx2::any(tree, boxes, sheared, t_max, accept) },
         Instructions::Portable => tree.walk_any(

@@ -8,7 +8,7 @@
 //! Not for primitives other than triangles, nor for a handful of them: the binary tree ([`super::tree`]) serves those.
 
 use super::collapse;
-use super::simd::{self, Path};
+use super::simd::{self, Kernels};
 use super::tree::Bounds;
 use super::triangle::{ShearedRay, TriangleHit};
 use glam::Vec3A;
@@ -172,7 +172,7 @@ pub(super) struct WideTree {
     /// By block and lane.
     references: Vec<TriangleRef>,
     root: Option<Child>,
-    path: Path,
+    kernels: Kernels,
 }
 
 impl WideTree {
@@ -184,7 +184,7 @@ impl WideTree {
             blocks: vec![Block::EMPTY; cut.blocks.len()],
             references: vec![TriangleRef::NONE; cut.blocks.len() * LANES],
             root: cut.root,
-            path: Path::best(),
+            kernels: Kernels::best(),
         };
         for (index, range) in cut.blocks.iter().enumerate() {
             for (lane, &number) in cut.order[range.clone()].iter().enumerate() {
@@ -232,7 +232,7 @@ impl WideTree {
     ) -> Option<WideHit> {
         let boxes = BoxRay::new(origin, direction);
         let sheared = ShearedRay::with_inverse(origin, direction, boxes.inverse);
-        simd::closest(self.path, self, &boxes, &sheared, t_max, accept)
+        simd::closest(self.kernels, self, &boxes, &sheared, t_max, accept)
     }
 
     /// Whether anything that `accept` lets stand is nearer than `t_max`.
@@ -240,7 +240,7 @@ impl WideTree {
     pub(super) fn any(&self, origin: Vec3A, direction: Vec3A, t_max: f32, accept: impl Fn(&WideHit) -> bool) -> bool {
         let boxes = BoxRay::new(origin, direction);
         let sheared = ShearedRay::with_inverse(origin, direction, boxes.inverse);
-        simd::any(self.path, self, &boxes, &sheared, t_max, accept)
+        simd::any(self.kernels, self, &boxes, &sheared, t_max, accept)
     }
 
     /// The walk of [`Self::closest`], over any pair of kernels: `meet` gives the children of a node, `hits` the triangles
@@ -465,13 +465,17 @@ mod tests {
                 }
             }
             hits += u32::from(brute.is_some());
-            for path in [Path::best(), Path::PORTABLE] {
-                tree.path = path;
+            for kernels in [Kernels::best(), Kernels::PORTABLE] {
+                tree.kernels = kernels;
                 let closest = tree.closest(origin, direction, f32::INFINITY, |_| true);
                 let found = closest.map(|h| (tree.reference(h.place).triangle, bits(&h.hit)));
                 let expected = brute.map(|(number, hit)| (number, bits(&hit)));
-                assert_eq!(found, expected, "ray {i}, {path:?}: {closest:?}, not {brute:?}");
-                assert_eq!(tree.any(origin, direction, f32::INFINITY, |_| true), brute.is_some(), "ray {i}, {path:?}");
+                assert_eq!(found, expected, "ray {i}, {kernels:?}: {closest:?}, not {brute:?}");
+                assert_eq!(
+                    tree.any(origin, direction, f32::INFINITY, |_| true),
+                    brute.is_some(),
+                    "ray {i}, {kernels:?}"
+                );
                 if let Some((number, TriangleHit { t, .. })) = brute {
                     assert!(!tree.any(origin, direction, t, |_| true), "ray {i}: a hit at the end is not before it");
                     assert!(tree.closest(origin, direction, t, |_| true).is_none(), "ray {i}");

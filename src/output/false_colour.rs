@@ -14,7 +14,7 @@ pub struct Colours {
 pub fn logarithmic(values: &Plane, unit: &str) -> Colours {
     let (low, high) = range(values);
     let scale = 1.0 / (high / low).ln().max(1e-3);
-    let rgb8 = values.values().iter().flat_map(|&v| heat((f64::from(v).max(low) / low).ln() * scale)).collect();
+    let rgb8 = values.values().iter().flat_map(|&v| heat8((f64::from(v).max(low) / low).ln() * scale)).collect();
     Colours { rgb8, legend: format!("dark {} to bright {} {unit}, logarithmic", figure(low), figure(high)) }
 }
 
@@ -28,7 +28,7 @@ pub fn visibility(values: &Plane, target: f64) -> Colours {
             if ratio <= 1.0 {
                 [0, (40.0 * ratio) as u8, (40.0 + 60.0 * ratio) as u8]
             } else {
-                heat(0.3 + 0.35 * ratio.log2())
+                heat8(0.3 + 0.35 * ratio.log2())
             }
         })
         .collect();
@@ -63,14 +63,14 @@ pub(crate) fn range(values: &Plane) -> (f64, f64) {
     (at(0.005), at(0.995))
 }
 
-/// Black, purple, red, orange, pale yellow for 0 to 1.
-fn heat(share: f64) -> [u8; 3] {
-    const STOPS: [[f64; 3]; 5] =
-        [[4.0, 3.0, 18.0], [86.0, 18.0, 110.0], [190.0, 54.0, 84.0], [248.0, 142.0, 20.0], [252.0, 252.0, 170.0]];
-    let at = if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) } * (STOPS.len() - 1) as f64;
-    let below = (at as usize).min(STOPS.len() - 2);
-    let rest = at - below as f64;
-    std::array::from_fn(|c| (STOPS[below][c] + rest * (STOPS[below + 1][c] - STOPS[below][c])) as u8)
+/// Codes of sRGB, 0 to 1, for a share of 0 to 1: black, purple, red, orange, pale yellow (magma, in the steps that FLIP has).
+pub(crate) fn heat(share: f64) -> [f32; 3] {
+    // NaN becomes 0.
+    flip_rs::MAGMA[(share.clamp(0.0, 1.0) * 255.0) as usize]
+}
+
+fn heat8(share: f64) -> [u8; 3] {
+    heat(share).map(|code| (255.0 * code).round() as u8)
 }
 
 /// Three significant digits.
@@ -93,7 +93,7 @@ mod tests {
         for colours in [logarithmic(&plane, "x"), visibility(&plane, 1.0), signed(&plane, "x")] {
             assert_eq!(colours.rgb8.len(), 15, "{}", colours.legend);
         }
-        assert_eq!((heat(0.0), heat(2.0)), ([4, 3, 18], [252, 252, 170]));
+        assert_eq!((heat8(0.0), heat8(2.0)), ([0, 0, 4], [252, 253, 191]));
     }
 
     /// What is above the target never looks like what is below it.
