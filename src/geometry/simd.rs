@@ -204,6 +204,7 @@ mod avx2 {
         origin: [__m256; 3],
         shear: [__m256; 2],
         scale_z: __m256,
+        near_scale: __m256,
         axes: [usize; 3],
     }
 
@@ -219,6 +220,7 @@ mod avx2 {
                 ],
                 shear: [_mm256_set1_ps(ray.shear_x), _mm256_set1_ps(ray.shear_y)],
                 scale_z: _mm256_set1_ps(ray.scale_z),
+                near_scale: _mm256_set1_ps(ray.near_scale),
                 axes: ray.axes,
             }
         }
@@ -245,7 +247,7 @@ mod avx2 {
         let inside_lanes = _mm256_movemask_ps(inside) as u32;
         if inside_lanes == 0 {
             let none = Lanes([0.0; LANES]);
-            return Candidates { lanes: 0, doubtful: 0, t: none, b1: none, b2: none };
+            return Candidates { lanes: 0, doubtful: 0, near: 0, t: none, b1: none, b2: none };
         }
         let equal = |x: __m256| _mm256_cmp_ps::<_CMP_EQ_OQ>(x, zero);
         let doubtful =
@@ -255,10 +257,16 @@ mod avx2 {
         let t = _mm256_mul_ps(_mm256_mul_ps(ray.scale_z, sum), inverse);
         let ahead = _mm256_cmp_ps::<_CMP_GT_OQ>(t, zero);
         let before = _mm256_cmp_ps::<_CMP_LE_OQ>(t, _mm256_set1_ps(t_max));
-        let lanes = inside_lanes & _mm256_movemask_ps(_mm256_and_ps(ahead, before)) as u32 | doubtful;
+        let between = _mm256_movemask_ps(_mm256_and_ps(ahead, before)) as u32;
+        let sign = _mm256_set1_ps(-0.0);
+        let magnitude = |x: __m256| _mm256_andnot_ps(sign, x);
+        let farthest = _mm256_max_ps(_mm256_max_ps(magnitude(a[2]), magnitude(b[2])), magnitude(c[2]));
+        let near = _mm256_cmp_ps::<_CMP_LT_OQ>(magnitude(t), _mm256_mul_ps(ray.near_scale, farthest));
+        let near = inside_lanes & _mm256_movemask_ps(near) as u32;
         Candidates {
-            lanes,
+            lanes: inside_lanes & between | near | doubtful,
             doubtful,
+            near,
             t: Lanes(cast(t)),
             b1: Lanes(cast(_mm256_mul_ps(v, inverse))),
             b2: Lanes(cast(_mm256_mul_ps(w, inverse))),
@@ -325,7 +333,7 @@ mod portable {
         let inside = mask(from_fn(|lane| (least[lane] >= 0.0) | (most[lane] <= 0.0)));
         if inside == 0 {
             let none = Lanes([0.0; LANES]);
-            return Candidates { lanes: 0, doubtful: 0, t: none, b1: none, b2: none };
+            return Candidates { lanes: 0, doubtful: 0, near: 0, t: none, b1: none, b2: none };
         }
         let doubtful = inside & mask(from_fn(|lane| (u[lane] == 0.0) | (v[lane] == 0.0) | (w[lane] == 0.0)));
         let inverse: Row = from_fn(|lane| 1.0 / (u[lane] + v[lane] + w[lane]));
@@ -333,9 +341,12 @@ mod portable {
             ray.scale_z * (u[lane] * a[2][lane] + v[lane] * b[2][lane] + w[lane] * c[2][lane]) * inverse[lane]
         });
         let between = mask(from_fn(|lane| (t[lane] > 0.0) & (t[lane] <= t_max)));
+        let farthest: Row = from_fn(|lane| max(max(a[2][lane].abs(), b[2][lane].abs()), c[2][lane].abs()));
+        let near = inside & mask(from_fn(|lane| t[lane].abs() < ray.near_scale * farthest[lane]));
         Candidates {
-            lanes: inside & between | doubtful,
+            lanes: inside & between | near | doubtful,
             doubtful,
+            near,
             t: Lanes(t),
             b1: Lanes(from_fn(|lane| v[lane] * inverse[lane])),
             b2: Lanes(from_fn(|lane| w[lane] * inverse[lane])),

@@ -1,7 +1,8 @@
 //! Watertight ray–triangle test (Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2013).
 //!
 //! A ray that meets a closed mesh at an edge or a vertex hits at least one of the triangles that share it, which the
-//! usual Möller–Trumbore form does not promise (measured on obvhs's own test: 9.4 % of rays aimed at edges leak).
+//! usual Möller–Trumbore form does not promise (measured on obvhs's own test: 9.4 % of rays aimed at edges leak). Unlike there, how far
+//! away a near hit is comes from the triangle's plane.
 
 use glam::Vec3A;
 
@@ -14,7 +15,13 @@ pub struct ShearedRay {
     pub(super) shear_x: f32,
     pub(super) shear_y: f32,
     pub(super) scale_z: f32,
+    /// |scale_z| × [`NEAR`].
+    pub(super) near_scale: f32,
 }
+
+/// A hit this share as far as the farthest of the triangle's corners along the ray, or less, is near: there its distance is small against what
+/// it would be the difference of.
+const NEAR: f32 = 1.0 / 128.0;
 
 /// Where a triangle is hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,6 +59,7 @@ impl ShearedRay {
             shear_x: d[axis_x] * scale_z,
             shear_y: d[axis_y] * scale_z,
             scale_z,
+            near_scale: NEAR * scale_z.abs(),
         }
     }
 
@@ -90,12 +98,33 @@ impl ShearedRay {
             return None;
         }
         let inverse = 1.0 / determinant;
-        let t = self.scale_z * (u * az + v * bz + w * cz) * inverse;
+        let mut t = self.scale_z * (u * az + v * bz + w * cz) * inverse;
+        if t.abs() < self.near_scale * az.abs().max(bz.abs()).max(cz.abs()) {
+            t = self.distance_to_plane(triangle)?;
+        }
         // The negation also refuses NaN.
         if !(t > 0.0 && t <= t_max) {
             return None;
         }
         Some(TriangleHit { t, b1: v * inverse, b2: w * inverse })
+    }
+
+    /// The ray parameter at which the ray meets the plane of a triangle; `None` where that is not ahead, or the ray runs along the plane.
+    ///
+    /// In f64, for hits that are near ([`NEAR`]): the corners' distances by their weights are off by f32's rounding times l²/w for a triangle of
+    /// length l and width w, so that a plank of 200:1 shadowed itself and lost 8 % of a furnace's light. For all hits it would take 15 % of
+    /// the Cornell box's time.
+    #[inline]
+    pub(super) fn distance_to_plane(&self, triangle: &[[f32; 3]; 3]) -> Option<f32> {
+        let [a, b, c] = triangle.map(|corner| self.axes.map(|axis| f64::from(corner[axis])));
+        let [p, q] = [b, c].map(|corner| [corner[0] - a[0], corner[1] - a[1], corner[2] - a[2]]);
+        let normal = [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]];
+        let along = |v: [f64; 3]| normal[0] * v[0] + normal[1] * v[1] + normal[2] * v[2];
+        let way = std::array::from_fn(|i| a[i] - f64::from(self.origin[self.axes[i]]));
+        let steps = along(way) / along([f64::from(self.shear_x), f64::from(self.shear_y), 1.0]);
+        let t = (f64::from(self.scale_z) * steps) as f32;
+        // Refuses NaN, too.
+        (t > 0.0 && t < f32::INFINITY).then_some(t)
     }
 }
 

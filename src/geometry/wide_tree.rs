@@ -144,10 +144,12 @@ pub(super) struct Met {
 
 /// The triangles of a block that a ray hits.
 pub(super) struct Candidates {
-    /// One bit each: hit at 0 < t ≤ `t_max`.
+    /// One bit each: hit at 0 < t ≤ `t_max`, or `near` or `doubtful`.
     pub(super) lanes: u32,
     /// One bit each: on an edge to within f32, so that [`ShearedRay::intersect`] must decide.
     pub(super) doubtful: u32,
+    /// One bit each: so near that [`ShearedRay::distance_to_plane`] must say whether it is ahead, and where.
+    pub(super) near: u32,
     pub(super) t: Lanes,
     pub(super) b1: Lanes,
     pub(super) b2: Lanes,
@@ -359,7 +361,7 @@ impl WideTree {
                     let lane = lanes.trailing_zeros();
                     lanes &= lanes - 1;
                     if let Some(hit) = self.hit_of_lane(block, &found, lane, sheared, t_max)
-                        && hit.t < t_max
+                        && is_before(&hit, t_max, || sheared.distance_to_plane(&block.triangle(lane as usize)))
                         && accept(&WideHit { place: place(index, lane), hit })
                     {
                         return true;
@@ -380,10 +382,13 @@ impl WideTree {
         sheared: &ShearedRay,
         t_max: f32,
     ) -> Option<TriangleHit> {
-        if found.doubtful >> lane & 1 == 1 {
+        let is = |lanes: u32| lanes >> lane & 1 == 1;
+        if is(found.doubtful) {
             return sheared.intersect(&block.triangle(lane as usize), t_max);
         }
-        Some(TriangleHit { t: found.t.get(lane), b1: found.b1.get(lane), b2: found.b2.get(lane) })
+        let t =
+            if is(found.near) { sheared.distance_to_plane(&block.triangle(lane as usize))? } else { found.t.get(lane) };
+        Some(TriangleHit { t, b1: found.b1.get(lane), b2: found.b2.get(lane) })
     }
 
     /// Asks for the cache lines of a child that is about to be entered.
@@ -396,6 +401,13 @@ impl WideTree {
             simd::prefetch(&self.blocks[index]);
         }
     }
+}
+
+/// Whether a hit is before the end of a ray, which may lie just before the same triangle: where it is close, by its plane.
+#[inline(always)]
+fn is_before(hit: &TriangleHit, t_max: f32, to_plane: impl Fn() -> Option<f32>) -> bool {
+    const CLOSE: f32 = 0.99;
+    if hit.t <= CLOSE * t_max { true } else { to_plane().is_some_and(|t| t < t_max) }
 }
 
 /// The place of a triangle by block and lane.

@@ -166,6 +166,42 @@ fn no_ray_meets_the_triangle_of_a_mesh_that_is_moved_back() {
     }
 }
 
+/// Planks two hundred and two thousand times as long as wide, turned, do not shadow themselves, nor a lamp of that shape itself.
+#[test]
+fn long_thin_triangles_do_not_meet_their_own_rays() {
+    for width in [0.02, 0.002] {
+        let half = Vec3::new(2.0, 0.5 * width, 0.5 * width);
+        let turned = Affine3A::from_axis_angle(Vec3::new(0.2, 1.0, 0.3).normalize(), 0.65);
+        let mut placed = scene(&[turned, Affine3A::from_translation(Vec3::Y * 9.0) * turned]);
+        placed.meshes[0] = crate::scene::load::shapes::cuboid(-half, half);
+        placed.spheres.clear();
+        for scene in [flattened(&placed), placed] {
+            let world = World::new(Arc::new(scene));
+            let (mut left, mut met, mut hidden) = (0, 0, 0);
+            for i in 0..20_000u64 {
+                let unit = |k: u64| (crate::sampler::hash_words(i, k) >> 40) as f32 / 16_777_216.0 * 2.0 - 1.0;
+                let aim = turned.transform_point3a(vec3a(1.99 * unit(0), 0.0, 0.0));
+                let direction = vec3a(unit(1), unit(2), unit(3)).normalize_or(Vec3A::Y);
+                let ray = Ray::new(aim - 3.0 * direction, direction);
+                let Some(hit) = world.closest(&ray) else { continue };
+                let point = world.surface(&ray, &hit);
+                left += 1;
+                // A convex body: whatever leaves it goes free.
+                let normal = Vec3A::from(point.geometric_normal);
+                let out = vec3a(unit(4), unit(5), unit(6)).normalize_or(Vec3A::Y);
+                let out = if out.dot(normal) < 0.0 { -out } else { out };
+                met +=
+                    u32::from(world.closest(&Ray::new(point.spawn(out.into()), out)).is_some_and(|h| h.distance < 5.0));
+                // A shadow ray from outside ends before it.
+                let way = Vec3A::from(point.position) + point.offset * normal - ray.origin;
+                hidden += u32::from(world.occluded(&Ray::new(ray.origin, way / way.length()), way.length()));
+            }
+            assert!(left > 10_000, "{left}");
+            assert_eq!((met, hidden), (0, 0), "of {left}, width {width}, trees {}", world.shared.len());
+        }
+    }
+}
+
 /// A huge thing beside a small one does not lift rays off the small one.
 #[test]
 fn offsets_are_those_of_what_is_hit() {
