@@ -253,6 +253,15 @@ fn flat_light_is_the_equal_energy_white() {
     assert_eq!(radiance("3.0.0", day), Vec3::splat(3.0));
 }
 
+/// As in Mitsuba 3: what shines and has no BSDF reflects nothing, all else without one is 50 % grey.
+#[test]
+fn a_lamp_without_a_bsdf_is_black() {
+    for (inside, albedo) in [(r#"<emitter type="area"/>"#, 0.0), ("", 0.5)] {
+        let Surface::Diffuse { reflectance } = material(inside).surface else { panic!("{inside}: not diffuse") };
+        assert_eq!(reflectance.factor, Vec3::splat(albedo), "{inside}");
+    }
+}
+
 #[test]
 fn a_lamp_of_nothing_lets_light_through() {
     let lamp = material(r#"<emitter type="area"/><bsdf type="null"/>"#);

@@ -156,8 +156,10 @@ impl Reader {
         }
         let converted = match &bsdf {
             Some(bsdf) => self.bsdf(bsdf, 0)?.into_material(bsdf.name()),
+            // Mitsuba's own: what shines by itself is black.
             None => {
-                let reflectance = crate::scene::ColorInput::constant(Vec3::splat(0.5));
+                let albedo = if emitter.is_some() { 0.0 } else { 0.5 };
+                let reflectance = crate::scene::ColorInput::constant(Vec3::splat(albedo));
                 Some(Material::plain("default", Surface::Diffuse { reflectance }))
             }
         };
