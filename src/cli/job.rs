@@ -236,6 +236,12 @@ impl JobArguments {
             );
         }
         if trace.filter.is_signed() {
+            if trace.transparent {
+                bail!(
+                    "--filter mitchell has negative lobes, which alpha knows nothing of: a transparent picture would have fringes; use the \
+                     filter blackman-harris"
+                );
+            }
             if self.visibility.is_some() || self.quality.is_some() {
                 bail!(
                     "--filter mitchell has negative lobes, whose scatter is not the picture's noise: no visibility can be asked \
