@@ -11,10 +11,11 @@ use crate::scene::Scene;
 use fechner_perception::tone::{SceneLight, ToneOperator};
 use std::sync::Arc;
 
-/// Longest side of a glimpse in pixels.
-const LONGEST_SIDE: u32 = 64;
-/// Samples a pixel of a glimpse.
-const SAMPLES: u32 = 16;
+/// Longest side of a glimpse in pixels: at 64 the lamps of `scenes/many-lights.toml` touched more than one pixel in twenty, which is where the
+/// operator `constant` has its white, and that was at 911 cd/m² for a picture of 512×384 that has it at 137; here it is at 145.
+const LONGEST_SIDE: u32 = 256;
+/// Samples of a glimpse, about.
+const SAMPLES: u32 = 1 << 17;
 
 /// Looks at all of the picture, whatever part of it the settings ask for: a pure function of scene and settings. Light is what
 /// `operator` asks for; without one, what any may ask for.
@@ -27,12 +28,18 @@ pub fn glimpse(
     let (width, height) = glimpse_size(trace.width, trace.height);
     let tracer = PathTracer::new(scene, TraceSettings { width, height, crop: None, ..*trace });
     let mut film = Film::new(width, height);
-    tracer.trace(&pilot_plan(&film, SAMPLES), &mut film, &|_| {});
+    tracer.trace(&pilot_plan(&film, samples_per_pixel(width, height)), &mut film, &|_| {});
     let rgb_cd_m2 = guide_rgb(&film, &film.estimate(nits_per_unit));
     match operator {
         Some(operator) => SceneLight::of(operator, width as usize, &rgb_cd_m2),
         None => SceneLight::with_rods(width as usize, &rgb_cd_m2),
     }
+}
+
+/// A power of two from 4 to 16.
+fn samples_per_pixel(width: u32, height: u32) -> u32 {
+    let afforded = u64::from(SAMPLES) / (u64::from(width) * u64::from(height)).max(1);
+    1 << afforded.clamp(4, 16).ilog2()
 }
 
 fn glimpse_size(width: u32, height: u32) -> (u32, u32) {
@@ -53,8 +60,9 @@ mod tests {
 
     #[test]
     fn glimpses_keep_the_shape() {
-        assert_eq!(glimpse_size(1920, 1080), (64, 36));
+        assert_eq!(glimpse_size(1920, 1080), (256, 144));
         assert_eq!(glimpse_size(32, 18), (32, 18));
-        assert_eq!(glimpse_size(4000, 2), (64, 1));
+        assert_eq!(glimpse_size(4000, 2), (256, 1));
+        assert_eq!([(256, 256), (256, 144), (128, 96), (64, 36)].map(|(w, h)| samples_per_pixel(w, h)), [4, 4, 8, 16]);
     }
 }

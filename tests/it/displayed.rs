@@ -151,6 +151,29 @@ fn a_render_is_seen_as_it_was_judged() {
     }
 }
 
+/// A part of a picture, and a frame, have the exposure of the whole, where small lamps decide it, too.
+#[test]
+fn parts_and_frames_are_exposed_as_the_whole() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/many-lights.toml");
+    let white = |arguments: &[&str], picture: &str| -> f32 {
+        let common = ["--size", "384x288", "--sampling", "uniform", "--spp", "4", "-o"];
+        let name = picture.replace("00", "##");
+        run(folder.path(), &[&arguments[..1], &[scene], &arguments[1..], &common[..], &[&name]].concat());
+        let exr = read_exr(&folder.path().join(picture)).expect("a picture");
+        let Some(Attribute::Text(operator)) = exr.attribute("fechner.operator") else { panic!("no operator") };
+        let number = operator.split("white at ").nth(1).and_then(|rest| rest.split_whitespace().next());
+        number.and_then(|number| number.parse().ok()).unwrap_or_else(|| panic!("{operator}"))
+    };
+    let whole = white(&["render"], "whole.exr");
+    for (arguments, picture) in
+        [(&["render", "--crop", "100,80,40,40"][..], "part.exr"), (&["animate", "--frames", "0..0"], "frame.00.exr")]
+    {
+        let found = white(arguments, picture);
+        assert!((found / whole).log2().abs() < 0.15, "{picture}: white at {found}, of the whole at {whole} cd/m²");
+    }
+}
+
 /// A tone-mapped EXR says what the screen emits, and is that again when it is shown as it is.
 #[test]
 fn a_tone_mapped_exr_is_shown_as_it_is() {
