@@ -7,7 +7,7 @@ use super::json::write_json;
 use super::keeper::{CheckpointArguments, Keeper, Watch};
 use super::maps::MapTarget;
 use super::report::{Report, summary};
-use super::targets::check_kept;
+use super::targets::{Named, check_kept, check_scene_kept};
 use super::tev::{Showing, TevArguments};
 use super::view::audience;
 use super::words::in_a_line;
@@ -50,13 +50,7 @@ pub(super) struct RenderArguments {
 /// Renders and writes.
 pub(super) fn run(arguments: &RenderArguments) -> anyhow::Result<ExitCode> {
     let format = output::check_target(&arguments.output)?;
-    let mut written = vec![
-        ("-o", Some(arguments.output.as_path())),
-        ("--json", arguments.json.as_deref()),
-        ("--checkpoint", arguments.checkpoint.file()),
-    ];
-    written.extend(arguments.maps.iter().map(|map| ("--map", Some(map.file()))));
-    check_kept(&arguments.job.files(), &written)?;
+    check_kept(&arguments.job.files(), &written(arguments))?;
     arguments.maps.iter().try_for_each(MapTarget::check)?;
     if let Some(json) = &arguments.json {
         output::check_writable(json)?;
@@ -66,8 +60,19 @@ pub(super) fn run(arguments: &RenderArguments) -> anyhow::Result<ExitCode> {
     pool.install(|| render_and_write(arguments, format))
 }
 
+/// The files that it writes.
+fn written(arguments: &RenderArguments) -> Vec<Named<'_>> {
+    let files = [
+        ("-o", Some(arguments.output.as_path())),
+        ("--json", arguments.json.as_deref()),
+        ("--checkpoint", arguments.checkpoint.file()),
+    ];
+    files.into_iter().chain(arguments.maps.iter().map(|map| ("--map", Some(map.file())))).collect()
+}
+
 fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyhow::Result<ExitCode> {
     let Prepared { scene, trace, record, settings, .. } = arguments.job.prepare()?;
+    check_scene_kept(&written(arguments))?;
     let Crop { width, height, .. } = trace.film_area();
     let fresh = RenderState::new(width, height, &settings.limits);
     let audience = arguments.view.then(|| audience(&scene, &settings, &record)).transpose()?;

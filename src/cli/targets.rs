@@ -1,6 +1,7 @@
 //! The files that a command reads and writes.
 
 use anyhow::bail;
+use fechner::scene::load::was_read;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -15,6 +16,17 @@ pub(super) fn check_kept(read: &[Named], written: &[Named]) -> anyhow::Result<()
     for (option, path) in written.iter().filter_map(|&(option, path)| Some((option, path?))) {
         if let Some(what) = sources.get(&location(path)) {
             bail!("{}: {option} would replace {what} that is read; choose another name", path.display());
+        }
+    }
+    Ok(())
+}
+
+/// Refuses to write in the place of a file that the scene is made of: its meshes, pictures and included files, which are known once it is
+/// loaded.
+pub(super) fn check_scene_kept(written: &[Named]) -> anyhow::Result<()> {
+    for (option, path) in written.iter().filter_map(|&(option, path)| Some((option, path?))) {
+        if was_read(path) {
+            bail!("{}: {option} would replace a file that the scene is made of; choose another name", path.display());
         }
     }
     Ok(())

@@ -113,6 +113,29 @@ fn figures_that_are_lost_take_nothing_along() {
     );
 }
 
+/// Nor do they replace what the scene is made of.
+#[test]
+fn outputs_replace_no_texture() {
+    let folder = folder();
+    let scene = std::fs::read_to_string(folder.path().join("s.toml")).expect("there");
+    let textured = format!(
+        "{scene}\n[textures.t]\nfile = \"t.1.png\"\n[materials.textured]\ntype = \"diffuse\"\nreflectance = {{ texture = \"t\" }}\n"
+    );
+    std::fs::write(folder.path().join("t.toml"), textured).expect("written");
+    image::RgbImage::from_pixel(2, 2, image::Rgb([9, 99, 200])).save(folder.path().join("t.1.png")).expect("written");
+    let before = std::fs::read(folder.path().join("t.1.png")).expect("there");
+    for arguments in [
+        &["render", "t.toml", "--size", "8x8", "--spp", "4", "-o", "t.1.png"][..],
+        &["render", "t.toml", "--size", "8x8", "--spp", "4", "-o", "a.png", "--json", "t.1.png"],
+        &["animate", "t.toml", "--size", "8x8", "--spp", "4", "--frames", "0..2", "-o", "t.#.png"],
+    ] {
+        let output = fechner(folder.path()).args(arguments).output().expect("runs");
+        let said = words(&output);
+        assert!(output.status.code() == Some(2) && said.contains("that the scene is made of"), "{arguments:?}: {said}");
+        assert_eq!(std::fs::read(folder.path().join("t.1.png")).expect("there"), before, "{arguments:?}");
+    }
+}
+
 /// What a command reads is still there afterwards, whatever its outputs are called, and of two outputs none replaces the other.
 #[test]
 fn outputs_replace_no_inputs() {

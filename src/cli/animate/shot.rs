@@ -11,6 +11,7 @@ use crate::cli::console::{Console, duration_in_words};
 use crate::cli::json::write_json;
 use crate::cli::report::Report;
 use crate::cli::seeing::{Presentation, tone_operator};
+use crate::cli::targets::check_scene_kept;
 use anyhow::{Context, Result, bail};
 use fechner::adaptive::settings::{AllocationRule, LoopSettings, Sampling};
 use fechner::animate::budget::Needs;
@@ -76,6 +77,9 @@ impl<'a> Shot<'a> {
         let scene = source.at(f64::from(arguments.frames.first) / arguments.fps)?;
         for note in &scene.notes {
             say!("note: {note}");
+        }
+        for frame in arguments.frames.first..=arguments.frames.last {
+            check_scene_kept(&[("-o", Some(&name.of(frame)))])?;
         }
         let settings = shot_settings(arguments, &scene, whole)?;
         let Presentation { operator, exposure_stops, .. } = arguments.asked_presentation().of_scene(&scene);

@@ -1,14 +1,25 @@
 //! Reading whole files, with a limit and with errors that say what the path is when it is no file.
 
 use super::error::LoadError;
+use std::collections::BTreeSet;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
 /// No file larger than this is read: a picture, mesh or buffer above it is more likely a slip than a scene.
 const LARGEST_FILE_BYTES: u64 = 4 << 30;
 
 /// Most bytes that a packed file may unpack to: a few kB can stand for gigabytes of nothing.
 const MOST_UNPACKED_BYTES: u64 = 2 << 30;
+
+/// Files that this process has read, by their canonical paths.
+static READ: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+/// Whether this process has read a file as a scene or a part of one: a mesh, a texture, an included file. Writing in its place would lose it.
+pub fn was_read(path: &Path) -> bool {
+    let read = READ.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    path.canonicalize().is_ok_and(|path| read.contains(&path))
+}
 
 /// The whole file.
 pub(crate) fn read(path: &Path) -> Result<Vec<u8>, LoadError> {
@@ -25,6 +36,9 @@ pub(crate) fn read(path: &Path) -> Result<Vec<u8>, LoadError> {
         return Err(LoadError::too_large(path, problem));
     }
     let file = std::fs::File::open(path).map_err(|error| LoadError::unreadable(path, &error))?;
+    if let Ok(path) = path.canonicalize() {
+        READ.lock().unwrap_or_else(std::sync::PoisonError::into_inner).insert(path);
+    }
     let mut bytes = Vec::with_capacity(metadata.len() as usize);
     // The limit holds again here, for files that grow while they are read.
     file.take(LARGEST_FILE_BYTES).read_to_end(&mut bytes).map_err(|error| LoadError::unreadable(path, &error))?;

@@ -48,6 +48,7 @@ mod validate;
 
 pub use default_view::{Bounds, bounds, framed};
 pub use error::{LoadError, Place};
+pub use files::was_read;
 
 use crate::scene::{FilmDefaults, Instance, Scene};
 use std::path::Path;
