@@ -14,6 +14,7 @@ use super::console::duration_in_words;
 use super::denoise::DenoiseChoice;
 use super::job::{Quality, Size, parse_size};
 use super::seeing::{AskedPresentation, operator_values, parse_positive, parse_seconds, parse_stops, parse_unit};
+use super::signals;
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use fechner::adaptive::settings::DEFAULT_MAX_SAMPLES;
@@ -162,6 +163,11 @@ pub(super) fn run(arguments: &AnimateArguments) -> Result<()> {
         .thread_name(|i| format!("render-{i}"))
         .build()
         .context("the threads could not be started")?;
+    // Frames are written whole or not at all, so that there is nothing to wait for.
+    signals::listen(|| {
+        say!("stopped by a signal: finished frames are there, and the same command makes the others");
+        std::process::exit(i32::from(super::CALL_AGAIN));
+    })?;
     pool.install(|| render_shot(arguments))
 }
 

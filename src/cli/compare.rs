@@ -110,9 +110,9 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
     let reference = InputPicture::read(&arguments.reference, nits_per_unit)?;
     let test = InputPicture::read(&arguments.test, nits_per_unit)?;
     check_alike((&arguments.reference, &reference), (&arguments.test, &test))?;
-    let viewing = reference.viewed(&arguments.seeing.viewing()?)?;
-    let csf = csf::by_name(&arguments.seeing.csf, &viewing)?;
     let pictures = [(arguments.reference.as_path(), &reference), (arguments.test.as_path(), &test)];
+    let viewing = reference.viewed(&arguments.seeing.viewing(&pictures)?)?;
+    let csf = csf::by_name(&arguments.seeing.csf, &viewing)?;
     let fitted = shown_by(arguments.operator.as_deref(), &pictures, &viewing)?;
     let (width, height) = reference.size();
     let difference = colour_difference(

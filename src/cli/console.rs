@@ -35,7 +35,7 @@ impl Console {
     fn time_left(&self, progress: &Progress, pixels: f64) -> String {
         let elapsed = progress.seconds;
         let rate = progress.mean_samples * pixels / elapsed.max(1e-3);
-        let by_samples = progress.remaining_samples / rate;
+        let by_samples = progress.remaining_samples.max(0.0) / rate;
         let by_limit = self.time_limit.map_or(f64::INFINITY, |limit| (limit.as_secs_f64() - elapsed).max(0.0));
         let seconds = by_samples.min(by_limit);
         if seconds.is_finite() { format!("about {} left", duration_in_words(seconds)) } else { String::new() }

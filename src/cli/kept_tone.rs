@@ -2,16 +2,31 @@
 //! judged, with its operator and its exposure.
 
 use super::picture::InputPicture;
-use super::seeing::{DEFAULT_OPERATOR, tone_operator};
+use super::seeing::{DEFAULT_DISPLAY, DEFAULT_OPERATOR, tone_operator};
 use anyhow::Result;
 use fechner::exr_read::ExrImage;
 use fechner::output::{Attribute, TONE};
+use fechner_perception::Plane;
 use fechner_perception::display::{Display, Viewing};
-use fechner_perception::tone::{FittedTone, SavedTone, ToneSettings};
+use fechner_perception::tone::{self, FittedTone, SavedTone, SceneGuide, ToneSettings};
 use std::path::Path;
 
-/// The operator as fitted by the render, and the display that it was fitted for.
-pub(super) struct KeptTone {
+/// What `tonemap` says of its EXR files, and its value there: they hold light of a display, by a fit that has done its work.
+pub(super) const LIGHT: &str = "fechner.light";
+pub(super) const OF_DISPLAY: &str = "display";
+
+/// What brings a picture to the display as it was when it was made.
+#[derive(Clone)]
+pub(super) enum KeptTone {
+    /// Of a render.
+    Rendered(RenderTone),
+    /// Nothing: it is of a display.
+    Displayed,
+}
+
+/// The operator as fitted by a render, and the display that it was fitted for.
+#[derive(Clone)]
+pub(super) struct RenderTone {
     fitted: SavedTone,
     display: String,
     /// White, black, and the room's light on the screen.
@@ -19,8 +34,7 @@ pub(super) struct KeptTone {
 }
 
 impl KeptTone {
-    /// `None` for files that do not say it, those of `tonemap` among them: they hold light of the display, by a fit that has done its
-    /// work.
+    /// `None` for files that do not say it.
     pub(super) fn of(exr: &ExrImage) -> Option<Self> {
         let text = |name: &str| match exr.attribute(name) {
             Some(Attribute::Text(text)) => Some(text.as_str()),
@@ -30,8 +44,11 @@ impl KeptTone {
             Some(Attribute::Float(number)) => Some(*number),
             _ => None,
         };
+        if text(LIGHT) == Some(OF_DISPLAY) {
+            return Some(Self::Displayed);
+        }
         text("fechner.scene")?;
-        Some(Self {
+        Some(Self::Rendered(RenderTone {
             fitted: serde_json::from_str(text(TONE)?).ok()?,
             display: text("fechner.observer.display")?.to_owned(),
             luminances_cd_m2: [
@@ -39,13 +56,31 @@ impl KeptTone {
                 number("fechner.observer.black_cd_m2")?,
                 number("fechner.observer.ambient_cd_m2")?,
             ],
-        })
+        }))
     }
 
     /// The operator, if it was fitted for a display as bright and as dark as this one.
-    pub(super) fn on(&self, display: &Display) -> Option<Box<dyn FittedTone>> {
+    pub(super) fn on(&self, viewing: &Viewing) -> Option<Box<dyn FittedTone>> {
+        match self {
+            Self::Rendered(tone) => tone.is_for(&viewing.display).then(|| tone.fitted.clone().restore()),
+            // It looks at no picture.
+            Self::Displayed => {
+                Some(tone::operator("absolute", None)?.fit(&SceneGuide::of(&Plane::filled(1, 1, 1.0)), viewing, None))
+            }
+        }
+    }
+
+    /// The name of the display that it was rendered for, if that is one that everybody has.
+    pub(super) fn display(&self) -> Option<&str> {
+        let Self::Rendered(tone) = self else { return None };
+        Display::preset(&tone.display).filter(|preset| tone.is_for(preset)).map(|_| tone.display.as_str())
+    }
+}
+
+impl RenderTone {
+    fn is_for(&self, display: &Display) -> bool {
         let luminances = [display.white_cd_m2, display.black_cd_m2, display.ambient_cd_m2].map(|cd_m2| cd_m2 as f32);
-        (luminances == self.luminances_cd_m2).then(|| self.fitted.clone().restore())
+        luminances == self.luminances_cd_m2
     }
 }
 
@@ -55,21 +90,35 @@ pub(super) fn first_scene<'p>(pictures: &[(&'p Path, &'p InputPicture)]) -> Opti
 }
 
 /// The operator by which the first of the pictures that holds a scene's light was shown when it was rendered. Says so, or why not.
-pub(super) fn as_rendered(pictures: &[(&Path, &InputPicture)], display: &Display) -> Option<Box<dyn FittedTone>> {
+pub(super) fn as_rendered(pictures: &[(&Path, &InputPicture)], viewing: &Viewing) -> Option<Box<dyn FittedTone>> {
     let (path, picture) = first_scene(pictures)?;
     let kept = picture.kept_tone()?;
     let path = path.display();
-    let Some(fitted) = kept.on(display) else {
-        say!(
+    let fitted = kept.on(viewing);
+    match (kept, &fitted) {
+        (KeptTone::Displayed, _) => {
+            say!("note: {path} holds light of a display, and is shown as it is; --operator shows it by another")
+        }
+        (KeptTone::Rendered(_), Some(fitted)) => {
+            say!(
+                "note: shown as {path} was when it was rendered, by {}; --operator shows it by another",
+                fitted.describe()
+            );
+        }
+        (KeptTone::Rendered(tone), None) => say!(
             "note: {path} was rendered for the display \"{}\", which is not as bright and dark as \"{}\": it is shown by {DEFAULT_OPERATOR}, \
              and not by the render's operator and exposure",
-            kept.display,
-            display.name
-        );
-        return None;
-    };
-    say!("note: shown as {path} was when it was rendered, by {}; --operator shows it by another", fitted.describe());
-    Some(fitted)
+            tone.display,
+            viewing.display.name
+        ),
+    }
+    fitted
+}
+
+/// The name or file of the display: what was asked for, else what the first of the pictures that holds a scene's light was rendered for.
+pub(super) fn display_of<'a>(asked: Option<&'a str>, pictures: &[(&'a Path, &'a InputPicture)]) -> &'a str {
+    let kept = || first_scene(pictures)?.1.kept_tone()?.display();
+    asked.or_else(kept).unwrap_or(DEFAULT_DISPLAY)
 }
 
 /// What brings the scene's light of pictures to the display: the operator that was asked for, fitted to the first of them that holds
@@ -81,7 +130,7 @@ pub(super) fn shown_by(
     viewing: &Viewing,
 ) -> Result<Option<Box<dyn FittedTone>>> {
     if asked.is_none()
-        && let Some(fitted) = as_rendered(pictures, &viewing.display)
+        && let Some(fitted) = as_rendered(pictures, viewing)
     {
         return Ok(Some(fitted));
     }

@@ -102,7 +102,7 @@ impl InputPicture {
 
     fn from_codes(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).with_context(|| format!("{}", path.display()))?;
-        let image = decoded_image(path, &bytes)?;
+        let mut image = decoded_image(path, &bytes)?;
         let codes = match output::png_transfer(&bytes) {
             PngTransfer::Pq => Codes::Pq,
             PngTransfer::HybridLogGamma => bail!("{}: hybrid log-gamma is not read", path.display()),
@@ -110,7 +110,12 @@ impl InputPicture {
             PngTransfer::Srgb | PngTransfer::Untagged => Codes::Srgb,
         };
         if image.color().has_alpha() && image.pixels().any(|(_, _, pixel)| pixel.0[3] < u8::MAX) {
-            say!("note: {}: alpha is not looked at: each pixel is seen in the colour that it has", path.display());
+            if codes == Codes::Srgb {
+                say!("note: {}: what is transparent lies before black", path.display());
+                image = before_black(image);
+            } else {
+                say!("note: {}: alpha is not looked at: each pixel is seen in the colour that it has", path.display());
+            }
         }
         Ok(Self::from_image(image, Content::Display(codes)))
     }
@@ -230,6 +235,19 @@ impl InputPicture {
 fn bytes_a_channel(image: &DynamicImage) -> u8 {
     let color = image.color();
     color.bytes_per_pixel() / color.channel_count()
+}
+
+/// Straight alpha of sRGB codes laid before black, as the premultiplied channels of an EXR file are seen.
+fn before_black(image: DynamicImage) -> DynamicImage {
+    let mut picture = image.into_rgba32f();
+    for pixel in picture.pixels_mut() {
+        let [colour @ .., alpha] = &mut pixel.0;
+        for code in colour {
+            let light = Eotf::Srgb.decode(f64::from(*code), 1.0) * f64::from(*alpha);
+            *code = Eotf::Srgb.encode(light, 1.0) as f32;
+        }
+    }
+    DynamicImage::ImageRgba32F(picture)
 }
 
 /// A picture of a limited size, whatever its name says it is.

@@ -1,5 +1,7 @@
 //! Arguments that say who looks at what.
 
+use super::kept_tone::display_of;
+use super::picture::InputPicture;
 use super::targets::{Named, display_file};
 use anyhow::{Context, Result, bail};
 use clap::Args;
@@ -50,9 +52,10 @@ impl<'a> AskedPresentation<'a> {
 /// Display, observer and units, for commands that judge pictures.
 #[derive(Debug, Args)]
 pub(super) struct SeeingArguments {
-    /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file.
-    #[arg(long, value_name = "NAME|FILE", default_value = DEFAULT_DISPLAY)]
-    display: String,
+    /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file [default: the preset that the
+    /// picture was rendered for, if its file says so, else desktop].
+    #[arg(long, value_name = "NAME|FILE")]
+    display: Option<String>,
     /// Contrast sensitivity function.
     #[arg(long, value_name = "NAME", default_value = "castle")]
     pub(super) csf: String,
@@ -67,12 +70,12 @@ pub(super) struct SeeingArguments {
 impl SeeingArguments {
     /// The file that describes the display, if any.
     pub(super) fn display_file(&self) -> Named<'_> {
-        display_file(Some(&self.display))
+        display_file(self.display.as_deref())
     }
 
-    /// The viewing that they mean.
-    pub(super) fn viewing(&self) -> Result<Viewing> {
-        viewing(&self.display, self.csf_area)
+    /// The viewing of pictures that they mean.
+    pub(super) fn viewing(&self, pictures: &[(&Path, &InputPicture)]) -> Result<Viewing> {
+        viewing(display_of(self.display.as_deref(), pictures), self.csf_area)
     }
 }
 

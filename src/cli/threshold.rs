@@ -67,7 +67,12 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     if output::check_target(&arguments.output)? != Format::Exr {
         bail!("{}: threshold maps are data; end the name in .exr", arguments.output.display());
     }
-    let mut viewing = arguments.seeing.viewing()?;
+    let guide = InputPicture::read(&arguments.input, arguments.seeing.nits_per_unit)?;
+    let halves = read_halves(arguments, &guide)?;
+    let names = std::iter::once(&arguments.input).chain(arguments.halves.iter().flatten());
+    let pictures = std::iter::once(&guide).chain(halves.iter().flatten());
+    let named: Vec<_> = names.map(PathBuf::as_path).zip(pictures).collect();
+    let mut viewing = arguments.seeing.viewing(&named)?;
     if let Some(age_years) = arguments.glare {
         viewing.observer.glare = Glare::Cie { age_years };
         viewing.check().context("--glare")?;
@@ -75,15 +80,10 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     if let Some(frames_per_second) = arguments.fps {
         viewing.display.frames_per_second = frames_per_second;
     }
-    let guide = InputPicture::read(&arguments.input, arguments.seeing.nits_per_unit)?;
     let viewing = guide.viewed(&viewing).with_context(|| arguments.input.display().to_string())?;
-    let halves = read_halves(arguments, &guide)?;
     let model = model::by_name(&arguments.model).with_context(|| {
         format!("there is no threshold model \"{}\"; known: {}", arguments.model, model::names().join(", "))
     })?;
-    let names = std::iter::once(&arguments.input).chain(arguments.halves.iter().flatten());
-    let pictures = std::iter::once(&guide).chain(halves.iter().flatten());
-    let named: Vec<_> = names.map(PathBuf::as_path).zip(pictures).collect();
     let fitted = shown_by(arguments.operator.as_deref(), &named, &viewing)?;
     // Noise goes through the loss of acuity that the operator shows.
     let acuity = fitted.as_ref().and_then(|fitted| fitted.acuity());

@@ -3,6 +3,7 @@
 mod sheet;
 
 use super::json::write_json;
+use super::kept_tone::{LIGHT, OF_DISPLAY, display_of};
 use super::picture::InputPicture;
 use super::seeing::{self, DEFAULT_DISPLAY, operator_values_or_all, parse_positive, parse_stops, parse_unit};
 use super::targets::{check_kept, display_file};
@@ -27,18 +28,19 @@ pub(super) struct TonemapArguments {
     /// have different ones, and else count from 1.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Tone operator, or "all" for a sheet with all of them.
+    /// Tone operator, or "all" for a sheet with all of them [default: as the picture was shown when it was rendered, if its file says so].
     #[arg(long, value_name = "NAME|all", value_parser = operator_values_or_all())]
-    operator: String,
+    operator: Option<String>,
     /// Exposure correction in stops.
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, value_parser = parse_stops, allow_negative_numbers = true)]
     exposure: f64,
     /// Luminance in cd/m² of RGB (1, 1, 1), for files that do not say it.
     #[arg(long, value_name = "CD_M2", value_parser = parse_unit, allow_negative_numbers = true)]
     nits_per_unit: Option<f64>,
-    /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file.
-    #[arg(long, value_name = "NAME|FILE", default_value = DEFAULT_DISPLAY)]
-    display: String,
+    /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file [default: desktop; without
+    /// --operator the preset that the picture was rendered for].
+    #[arg(long, value_name = "NAME|FILE")]
+    display: Option<String>,
     /// What the eye is adapted to: the view as a whole, or, for the operators that know it, each place of it.
     #[arg(long, value_enum, default_value = "world")]
     adaptation: Scope,
@@ -101,7 +103,10 @@ pub(super) struct SceneFrame {
 
 impl SceneFrame {
     fn read(path: &Path, arguments: &TonemapArguments, viewing: &Viewing) -> Result<Self> {
-        let picture = InputPicture::read(path, arguments.nits_per_unit)?;
+        Self::of(InputPicture::read(path, arguments.nits_per_unit)?, path, arguments, viewing)
+    }
+
+    fn of(picture: InputPicture, path: &Path, arguments: &TonemapArguments, viewing: &Viewing) -> Result<Self> {
         let viewing = picture.viewed(viewing).with_context(|| path.display().to_string())?;
         let pixel_aspect_ratio = picture.pixel_aspect_ratio();
         let (width, height) = picture.size();
@@ -133,12 +138,15 @@ impl SceneFrame {
 pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
     let targets = targets(arguments)?;
     let format = output::check_target(&targets[0])?;
-    let viewing = seeing::viewing(&arguments.display, None)?;
+    let Some(operator) = arguments.operator.as_deref() else {
+        return run_as_rendered(arguments, format, &targets);
+    };
+    let viewing = seeing::viewing(arguments.display.as_deref().unwrap_or(DEFAULT_DISPLAY), None)?;
     let settings = settings(arguments)?;
-    if arguments.operator == "all" {
+    if operator == "all" {
         return run_all(arguments, format, &targets, &viewing, &settings);
     }
-    let operator = seeing::tone_operator(&arguments.operator, &settings)?;
+    let operator = seeing::tone_operator(operator, &settings)?;
     check_settings(operator.as_ref(), &settings)?;
     let timed = arguments.input.len() > 1 || arguments.adapted_to.is_some() || arguments.state.is_some();
     if timed && arguments.adaptation == Scope::Local {
@@ -155,6 +163,34 @@ pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
     }
     if let (Some(path), Some(state)) = (&arguments.state, eye.and_then(|eye| eye.state)) {
         write_json(path, &state)?;
+    }
+    Ok(())
+}
+
+/// Each picture by the operator that it was rendered for.
+fn run_as_rendered(arguments: &TonemapArguments, format: Format, targets: &[PathBuf]) -> Result<()> {
+    let is_asked_more = arguments.exposure != 0.0
+        || arguments.adaptation == Scope::Local
+        || arguments.effects.is_some()
+        || arguments.adapted_to.is_some()
+        || arguments.state.is_some()
+        || arguments.gaze.is_some();
+    if is_asked_more {
+        bail!("exposure, adaptation, effects and eyes are an operator's: name it by --operator");
+    }
+    for (input, target) in arguments.input.iter().zip(targets) {
+        let picture = InputPicture::read(input, arguments.nits_per_unit)?;
+        let viewing = seeing::viewing(display_of(arguments.display.as_deref(), &[(input, &picture)]), None)?;
+        let Some(fitted) = picture.kept_tone().and_then(|kept| kept.on(&viewing)) else {
+            bail!(
+                "{}: the file does not say by which operator it was shown on \"{}\" when it was rendered: give --operator",
+                input.display(),
+                viewing.display.name
+            );
+        };
+        let frame = SceneFrame::of(picture, input, arguments, &viewing)?;
+        write(target, format, &frame, fitted.as_ref(), None)?;
+        answer!("{}: {}", target.display(), fitted.describe());
     }
     Ok(())
 }
@@ -273,7 +309,7 @@ impl Eye {
 fn targets(arguments: &TonemapArguments) -> Result<Vec<PathBuf>> {
     let targets = named_targets(arguments)?;
     let pictures = arguments.input.iter().map(|path| ("a picture", Some(path.as_path())));
-    let read: Vec<_> = pictures.chain([display_file(Some(&arguments.display))]).collect();
+    let read: Vec<_> = pictures.chain([display_file(arguments.display.as_deref())]).collect();
     let state = ("--state", arguments.state.as_deref());
     let written: Vec<_> = targets.iter().map(|path| ("-o", Some(path.as_path()))).chain([state]).collect();
     check_kept(&read, &written)?;
@@ -332,6 +368,7 @@ fn write(
             // Readers take text for UTF-8, the writer has Latin-1: only what both have in common is safe.
             let operator = fitted.describe().replace('²', "2").replace('×', "x");
             picture.push_attribute("fechner.operator", Attribute::Text(operator));
+            picture.push_attribute(LIGHT, Attribute::Text(OF_DISPLAY.to_owned()));
             picture.push_attribute("fechner.observer.display", Attribute::Text(viewing.display.name.clone()));
             picture.push_attribute(output::PIXEL_ASPECT_RATIO, Attribute::Float(frame.pixel_aspect_ratio as f32));
             picture.attributes.extend(output::tone_attribute(fitted));

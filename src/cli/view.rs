@@ -106,9 +106,13 @@ pub(super) fn run(arguments: &ViewArguments) -> anyhow::Result<()> {
     let listener = TcpListener::bind(asked)
         .with_context(|| format!("cannot listen on {asked}: choose another --port, or an address of this machine"))?;
     let (address, token) = door_of(&listener)?;
-    let job = pool.install(|| arguments.job.prepare().map(job_of))?;
-    let host =
-        Arc::new(FileHost { job: arguments.job.clone(), part_of: Mutex::new(None), has_saved: AtomicBool::new(false) });
+    let prepared = pool.install(|| arguments.job.prepare())?;
+    let host = Arc::new(FileHost {
+        job: arguments.job.clone(),
+        part_of: Mutex::new(PartOf::of(&prepared.trace)),
+        has_saved: AtomicBool::new(false),
+    });
+    let job = job_of(prepared);
     if arguments.foveated && job.record.model != model::DEFAULT {
         bail!("--foveated is for --model {}: {} does not know where one looks", model::DEFAULT, job.record.model);
     }

@@ -142,6 +142,9 @@ fn a_render_is_seen_as_it_was_judged() {
         assert!(by_another > 3.0 && !said.contains("when it was rendered"), "{name}: {said}");
         let (_, said) = compare(&["--display", "hdr-1000"]);
         assert!(said.contains("was rendered for the display \"desktop\""), "{said}");
+        run(folder.path(), &["tonemap", &files[0], "-o", "again.png"]);
+        let bytes = |name: &str| std::fs::read(folder.path().join(name)).expect("there");
+        assert!(bytes("again.png") == bytes(&files[1]), "{name}: tonemap shows another picture");
         let threshold = |more: &[&str]| {
             let arguments = ["threshold", &files[0], "-o", "thresholds.exr"];
             run(folder.path(), &[&arguments[..], more].concat());
@@ -149,6 +152,40 @@ fn a_render_is_seen_as_it_was_judged() {
         };
         assert!((threshold(&[]) / threshold(&["--operator", "constant"])).ln().abs() > 0.01, "{name}");
     }
+}
+
+/// Premultiplied in the EXR file and straight in the PNG, a transparent picture is one.
+#[test]
+fn transparent_pictures_are_seen_alike() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/meshes/chess-pawn.obj");
+    let sky = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/skies/studio.hdr");
+    for name in ["a.exr", "a.png"] {
+        let common =
+            ["render", scene, "--environment", sky, "--transparent", "--size", "48x48", "--plans", "1", "-o", name];
+        run(folder.path(), &common);
+    }
+    let (_, said) = fechner(folder.path(), &["compare", "a.exr", "a.png"]);
+    assert!(visibility(&said) < 1.5 && said.contains("before black"), "{said}");
+}
+
+/// Who names no display sees a render on the one that it was made for.
+#[test]
+fn a_render_is_seen_on_its_own_display() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box.toml");
+    for name in ["a.exr", "a.png"] {
+        let common = ["render", scene, "--size", "32x32", "--spp", "16", "--operator", "absolute", "-o", name];
+        run(folder.path(), &[&common[..], &["--display", "hdr-1000"]].concat());
+    }
+    let (_, said) = fechner(folder.path(), &["compare", "a.exr", "a.png"]);
+    assert!(said.contains("on \"hdr-1000\"") && visibility(&said) < 1.0, "{said}");
+    run(folder.path(), &["tonemap", "a.exr", "-o", "b.png"]);
+    // Of 16 bits the last ones are rounding.
+    let (_, said) = fechner(folder.path(), &["compare", "a.png", "b.png", "--display", "hdr-1000"]);
+    assert!(visibility(&said) < 0.1, "{said}");
+    let (code, said) = fechner(folder.path(), &["tonemap", "a.exr", "-o", "b.png", "--display", "laptop"]);
+    assert!(code == 2 && said.contains("give --operator"), "{said}");
 }
 
 /// A part of a picture, and a frame, have the exposure of the whole, where small lamps decide it, too.
@@ -189,6 +226,8 @@ fn a_tone_mapped_exr_is_shown_as_it_is() {
     }
     let (_, said) = fechner(folder.path(), &["compare", "once.exr", "once.png", "--operator", "absolute"]);
     assert!(visibility(&said) < 1.5, "{said}");
+    let (_, said) = fechner(folder.path(), &["compare", "once.exr", "once.png"]);
+    assert!(visibility(&said) < 1.5 && said.contains("holds light of a display"), "{said}");
 }
 
 /// A Radiance picture that was brightened says by how much.

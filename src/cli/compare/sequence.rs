@@ -207,16 +207,16 @@ impl<'a> Sequences<'a> {
         }
         check_frames_kept(arguments, [Some(&reference), Some(&test), velocity.as_ref()], map.as_ref(), numbers)?;
         let nits_per_unit = arguments.seeing.nits_per_unit;
-        let mut viewing = arguments.seeing.viewing()?;
-        viewing.display.frames_per_second =
-            arguments.fps.context("--fps: how many frames a second a sequence has decides what is seen in it")?;
         let files = [&reference, &test].map(|name| name.of(numbers[0]));
         let [first, first_test] = files.each_ref().map(|file| InputPicture::read(file, nits_per_unit));
         let (first, first_test) = (first?, first_test?);
-        let viewing = first.viewed(&viewing)?;
         let firsts = [(files[0].as_path(), &first), (files[1].as_path(), &first_test)];
+        let mut viewing = arguments.seeing.viewing(&firsts)?;
+        viewing.display.frames_per_second =
+            arguments.fps.context("--fps: how many frames a second a sequence has decides what is seen in it")?;
+        let viewing = first.viewed(&viewing)?;
         let asked = arguments.operator.as_deref();
-        let showing = if asked.is_none() && as_rendered(&firsts, &viewing.display).is_some() {
+        let showing = if asked.is_none() && as_rendered(&firsts, &viewing).is_some() {
             Showing::AsRendered
         } else {
             let operator = tone_operator(asked.unwrap_or(DEFAULT_OPERATOR), &ToneSettings::default())?;
@@ -257,7 +257,7 @@ impl<'a> Sequences<'a> {
     /// The operator by which a frame was shown when it was rendered.
     fn kept_tone(&self, pictures: &[(&Path, &InputPicture)]) -> Result<Box<dyn FittedTone>> {
         let kept = first_scene(pictures).and_then(|(_, picture)| picture.kept_tone());
-        kept.and_then(|kept| kept.on(&self.viewing.display)).with_context(|| {
+        kept.and_then(|kept| kept.on(&self.viewing)).with_context(|| {
             format!(
                 "{}: it does not say how it was shown on \"{}\" when it was rendered, as the first frame does: --operator shows all frames \
                  by one",

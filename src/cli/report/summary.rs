@@ -57,7 +57,8 @@ fn stopped(report: &Report, settings: &LoopSettings, rendered: &Rendered) -> Str
             format!("{:.2} % of the picture is above the target visibility {}", 100.0 * share, rounded(t))
         }
     };
-    format!("{why}; {target}.")
+    // That many --plans make the same picture.
+    format!("{why}, after {} plans; {target}.", rendered.plans)
 }
 
 fn noticed(report: &Report, display: &Display, predicted: &Plane) -> Option<String> {
