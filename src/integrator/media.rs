@@ -5,12 +5,15 @@
 //! have no inside. What the camera is in is asked once, by a ray from it out of the scene. A path that meets a boundary from behind
 //! without having entered it came in through a face that belongs to another volume: the way to that boundary is inside it.
 //!
+//! Not for volumes that touch: a ray that crosses one of two faces in the same place is past the other. They must be a little apart or
+//! overlap, as of glass and what is in it.
+//!
 //! Source: A. Beer (1852); nesting as in C. Schmidt & B. Budge, *Simple nested dielectrics in ray traced images* (2002),
 //! without priorities, since our boundaries carry the index of both sides.
 
 use crate::geometry::{Ray, World};
 use crate::scene::{MaterialId, Surface};
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
 /// Volumes inside one another that are told apart; beyond it the innermost ones are forgotten.
 const DEEPEST: usize = 8;
@@ -61,8 +64,33 @@ impl Media {
         }
     }
 
-    /// The volumes around a point of the camera, when the shutter opens: those whose boundaries a ray leaves without having entered them.
-    pub(super) fn around(world: &World, mut ray: Ray) -> Self {
+    /// The volumes around a point of the camera, when the shutter opens: those whose boundaries a ray leaves without having entered them, as most
+    /// of seven rays say. One alone may pass where two volumes touch, or the back of a sheet, and took such a picture for one from inside.
+    pub(super) fn around(world: &World, ray: Ray) -> Self {
+        // In no plane that people build by.
+        const OTHERS: [[f32; 3]; 6] = [
+            [0.31, 0.83, 0.46],
+            [-0.87, 0.29, 0.39],
+            [0.42, -0.37, -0.83],
+            [-0.27, -0.79, 0.55],
+            [0.79, 0.33, -0.52],
+            [-0.51, 0.44, -0.74],
+        ];
+        let others = OTHERS.map(|direction| Vec3A::from(direction).normalize());
+        let said: Vec<Vec<Medium>> = std::iter::once(ray.direction)
+            .chain(others)
+            .map(|direction| Self::left_by(world, Ray { direction, ..ray }))
+            .collect();
+        let agreeing = |media: &Vec<Medium>| said.iter().filter(|other| *other == media).count();
+        // Of equals the ray that was given stands.
+        let most = said.iter().rev().max_by_key(|media| agreeing(media));
+        let mut media = Self::default();
+        most.into_iter().flatten().for_each(|medium| media.cross(*medium, true));
+        media
+    }
+
+    /// The volumes that a ray leaves without having entered them, outermost first.
+    fn left_by(world: &World, mut ray: Ray) -> Vec<Medium> {
         // More than that are no boundaries of volumes.
         const MOST_CROSSED: usize = 10_000;
         let (mut entered, mut around) = (Vec::new(), Vec::new());
@@ -82,9 +110,8 @@ impl Media {
             }
             ray.origin = point.spawn(direction);
         }
-        let mut media = Self::default();
-        around.into_iter().rev().for_each(|medium| media.cross(medium, true));
-        media
+        around.reverse();
+        around
     }
 
     fn innermost(&self) -> Option<Medium> {
@@ -106,6 +133,7 @@ impl Media {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::load::{LoadOptions, load};
 
     fn medium(material: u32, absorption: f32) -> Medium {
         Medium { material: MaterialId(material), absorption: Vec3::splat(absorption) }
@@ -133,6 +161,30 @@ mod tests {
         assert_eq!(media.transmittance_to_back_of(water, 0.5), Vec3::splat((-1.0f32).exp()));
         media.cross(water, false);
         assert_eq!(media.transmittance(0.5), Vec3::ONE);
+    }
+
+    /// Two absorbing boxes that touch: a ray through the face between them meets one of two boundaries, and seven know better.
+    #[test]
+    fn a_camera_before_touching_volumes_is_in_none() {
+        let scene = |boxes: &str| {
+            let text = format!(
+                "[camera]\nposition = [0, 0, 5]\nlook_at = [0, 0, 0]\nvertical_fov_deg = 60\n[environment]\nradiance = [1, 1, 1]\n\
+                 [materials.m]\ntype = \"dielectric\"\nior = 1.0\nabsorption = [0.5, 0.5, 0.5]\n\
+                 [materials.n]\ntype = \"dielectric\"\nior = 1.0\nabsorption = [1, 1, 1]\n{boxes}"
+            );
+            let folder = tempfile::tempdir().expect("a folder");
+            let file = folder.path().join("s.toml");
+            std::fs::write(&file, text).expect("written");
+            World::new(std::sync::Arc::new(load(&file, &LoadOptions::default()).expect("a scene")))
+        };
+        let touching = "[[objects]]\nbox = { min = [-1, -1, 0], max = [1, 1, 1] }\nmaterial = \"m\"\n\
+                        [[objects]]\nbox = { min = [-1, -1, -1], max = [1, 1, 0] }\nmaterial = \"n\"\n";
+        let ray = Ray::new(Vec3A::new(0.01, 0.02, 5.0), Vec3A::NEG_Z);
+        assert_eq!(Media::around(&scene(touching), ray).count, 0);
+        let inside = "[[objects]]\nbox = { min = [-9, -9, -9], max = [9, 9, 9] }\nmaterial = \"n\"\n";
+        let world = scene(&[touching, inside].concat());
+        let around = Media::around(&world, ray);
+        assert_eq!((around.count, around.innermost().map(|medium| medium.absorption)), (1, Some(Vec3::ONE)));
     }
 
     #[test]
