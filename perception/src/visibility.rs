@@ -309,6 +309,19 @@ mod tests {
         }
     }
 
+    /// The transform is periodic: what stands at one border must not be seen at the other, 7° away.
+    #[test]
+    fn an_error_at_a_border_stays_there() {
+        let last_degree =
+            |width: usize| Plane::from_fn(width, 64, move |x, _| if x + 32 >= width { 198.0 } else { 0.0 });
+        let at_opposite_border = |width: usize, column: usize| {
+            map_of(&Plane::filled(width, 64, 2.0), 32.0).measured_visibility(&last_degree(width)).get(column, 32)
+        };
+        // The same column where four more degrees of grey lie beside it.
+        let (found, expected) = (at_opposite_border(256, 0), at_opposite_border(256 + 128, 128));
+        assert!(found < 3.0 * expected, "{found}, not {expected}");
+    }
+
     #[test]
     fn a_lone_pixel_reaches_the_tabulated_peak() {
         let map = map_of(&Plane::filled(256, 256, 100.0), 30.0);
