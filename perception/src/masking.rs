@@ -1,6 +1,6 @@
 //! Masking: how much a band's own contrast raises its threshold.
 
-use crate::bands::{OctaveBands, RadialTable};
+use crate::bands::{OctaveBands, RINGS, RadialTable, for_each_ring};
 use crate::display::PixelDensity;
 use crate::fft::{MOST_REDUCTION, PictureTransform, Spectrum, Workspace, reduced_size, reduction};
 use crate::plane::Plane;
@@ -50,6 +50,8 @@ pub(crate) struct MaskSource<'a> {
     pub(crate) transform: &'a PictureTransform,
     /// Spectrum of the guide over its adaptation luminance.
     pub(crate) contrast: &'a Spectrum,
+    /// The eye's sensitivity under the middle one of the picture's adaptation levels.
+    pub(crate) sensitivity: Option<&'a RadialTable>,
     /// Variance of the guide's noise over the adaptation luminance squared, if any is known: at every second pixel, every
     /// fourth and so on, framed like any [`ReducedPlane`].
     pub(crate) noise: Vec<Plane>,
@@ -76,7 +78,8 @@ pub(crate) fn band_elevation(
     elevation: &ElevationTable,
 ) -> ReducedPlane {
     let density = source.density;
-    let gain = RadialTable::new(density, |freq| bands.mask_gain(band, freq));
+    let sensitivity = |freq: f64| source.sensitivity.map_or(1.0, |table| f64::from(table.at(freq as f32)));
+    let gain = RadialTable::new(density, |freq| bands.mask_gain(band, freq, sensitivity));
     let limit_cpd = bands.limit_cpd(band);
     // A quarter more densely than the band needs: its energy is blurred next.
     let amplitude_factor = reduction(density, 1.25 * limit_cpd);
@@ -89,7 +92,9 @@ pub(crate) fn band_elevation(
     let mut energy = halved(&amplitude, size, |value| value * value);
     drop(amplitude);
     if let Some(noise) = source.noise.get(amplitude_factor.ilog2() as usize) {
-        let share = tables.mask_noise_share as f32;
+        // Of white pixel noise's variance, what stands in the guide's band.
+        let mut share = 0.0;
+        for_each_ring(density, RINGS, |freq, weight| share += weight as f32 * gain.at(freq as f32).powi(2));
         energy.for_each_row_mut(|y, row| {
             row.iter_mut().zip(noise.row(y)).for_each(|(value, noise)| *value -= share * noise);
         });

@@ -108,8 +108,6 @@ pub(crate) struct BandTables {
     pub(crate) noise_energy: LuminanceTable,
     /// S² at the band's centre, against adaptation luminance.
     pub(crate) center_sensitivity_squared: LuminanceTable,
-    /// Mean of the guide's band gain squared: the share of white pixel noise that stands in the guide's band.
-    pub(crate) mask_noise_share: f64,
     /// Standard deviation, in degrees, of the band's squared impulse response: how far it smears noise energy.
     pub(crate) spread_deg: f64,
 }
@@ -159,10 +157,6 @@ impl SensitivityTables {
                 center_sensitivity_squared: LuminanceTable::from_samples(span, |sample| {
                     samples[sample - span.first][band].center
                 }),
-                mask_noise_share: rings
-                    .iter()
-                    .map(|ring| ring.weight * bands.mask_gain(band, ring.freq_cpd).powi(2))
-                    .sum(),
                 spread_deg: spread_deg(bands.limit_cpd(band).min(density.mean() / 2.0), |freq| {
                     bands.gain(band, freq) * csf.sensitivity(freq, grey_cd_m2)
                 }),

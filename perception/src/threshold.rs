@@ -168,9 +168,12 @@ fn masked(
             *value = (signal / adaptation - mean).clamp(-LARGEST_MASK_CONTRAST, LARGEST_MASK_CONTRAST);
         }
     });
+    let (least, greatest) = adaptation_cd_m2.range();
+    let levels = adaptation_levels(viewing, csf, least, greatest);
     let source = MaskSource {
         transform: &transform,
         contrast: &contrast,
+        sensitivity: levels.get(levels.len() / 2).map(|level| &level.sensitivity),
         noise: noise_variance.map_or_else(Vec::new, |variance| {
             halvings(&variance.combined(&adaptation_cd_m2, |value, adaptation| value / adaptation / adaptation))
         }),
@@ -189,8 +192,6 @@ fn masked(
         tables.bands.iter().enumerate().map(|band| of_band(&mut workspace, band)).collect()
     };
     let noise_gain = noise_gain(tables, &adaptation_cd_m2, &elevations);
-    let (least, greatest) = adaptation_cd_m2.range();
-    let levels = adaptation_levels(viewing, csf, least, greatest);
     ThresholdMap {
         viewing: viewing.clone(),
         bands: bands.clone(),

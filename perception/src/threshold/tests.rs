@@ -64,6 +64,14 @@ fn texture_masks_and_its_own_noise_does_not() {
     assert!(known.mean() < 1.01 && unknown.mean() > 1.2, "known {} unknown {}", known.mean(), unknown.mean());
 }
 
+/// Stripes of a pixel at 100 cpd and a tenth of their threshold hide nothing.
+#[test]
+fn an_invisible_pattern_masks_nothing() {
+    let stripes = Plane::from_fn(256, 256, |x, _| if x % 2 == 0 { 130.0 } else { 70.0 });
+    let found = map_of(&stripes, &viewing(200.0)).masking_elevation().get(128, 128);
+    assert!(found < 1.01, "{found}");
+}
+
 #[test]
 fn a_firefly_does_not_raise_its_threshold() {
     let mut picture = Plane::filled(64, 64, 20.0);
