@@ -94,6 +94,23 @@ fn the_gap_closes_and_every_constraint_holds() {
     }
 }
 
+/// Where half of the picture cannot be brought to the target, the counts' certificate is as good as elsewhere.
+#[test]
+fn what_is_out_of_reach_leaves_the_gap_closed() {
+    let grey = Plane::filled(256, 256, 60.0);
+    let inputs = ThresholdInputs { display_luminance_cd_m2: &grey, guide_variance: None };
+    let case = Case {
+        thresholds: threshold_map(&inputs, &Viewing::default(), &CastleCsf::default()).unwrap(),
+        variance: Plane::from_fn(256, 256, |x, _| if x < 128 { 4000.0 } else { 100.0 }),
+        cost: Plane::filled(256, 256, 1.0),
+    };
+    for max_samples in [16.0, 100.0, 1000.0] {
+        let found = allocate(&AllocationProblem { min_samples: 4.0, max_samples, ..case.problem() }).unwrap();
+        assert!(found.unreachable_pixels > 0);
+        assert!(found.gap < 0.02, "at most {max_samples}: gap {} after {} updates", found.gap, found.iterations);
+    }
+}
+
 /// A conic interior-point solver finds the optimum of problems small enough for it.
 #[test]
 fn a_conic_solver_finds_the_same_cost() {
