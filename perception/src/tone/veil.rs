@@ -26,22 +26,31 @@ pub(super) struct Veil {
     mean_cd_m2: f32,
 }
 
-/// Size of a cell.
+/// Size of a cell: all of a picture have one, which need not be whole pixels. When the last column was what the others left and weighed
+/// as much as they did, a lamp of 5 pixels at the right border of 130 lit what is 20 pixels away 2.5 times as much as one at the
+/// left.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct CellSize {
-    width_px: usize,
-    height_px: usize,
+    width_px: f64,
+    height_px: f64,
 }
 
-impl CellSize {
-    /// One degree, or as many as it takes to cut a picture into no more than [`MOST_CELLS`].
+/// Columns and rows of cells.
+#[derive(Clone, Copy, Debug)]
+struct CellCount {
+    columns: usize,
+    rows: usize,
+}
+
+impl CellCount {
+    /// As many as it takes for cells of at most one degree, or of as many as keep a picture below [`MOST_CELLS`].
     fn of(width: usize, height: usize, density: PixelDensity) -> Self {
         let pixels = |pixels_per_degree: f64| (pixels_per_degree.round() as usize).max(1);
-        let mut cell = Self { width_px: pixels(density.horizontal), height_px: pixels(density.vertical) };
-        while width.div_ceil(cell.width_px) * height.div_ceil(cell.height_px) > MOST_CELLS {
-            cell = Self { width_px: 2 * cell.width_px, height_px: 2 * cell.height_px };
+        let (mut width_px, mut height_px) = (pixels(density.horizontal), pixels(density.vertical));
+        while width.div_ceil(width_px) * height.div_ceil(height_px) > MOST_CELLS {
+            (width_px, height_px) = (2 * width_px, 2 * height_px);
         }
-        cell
+        Self { columns: width.div_ceil(width_px), rows: height.div_ceil(height_px) }
     }
 }
 
@@ -52,8 +61,8 @@ impl Veil {
     /// written as cos t / (2 (1 − cos t)).
     pub(super) fn of(luminance_cd_m2: &Plane, density: PixelDensity) -> Option<Self> {
         let (width, height) = (luminance_cd_m2.width(), luminance_cd_m2.height());
-        let cell = CellSize::of(width, height, density);
-        let (columns, rows) = (width.div_ceil(cell.width_px), height.div_ceil(cell.height_px));
+        let CellCount { columns, rows } = CellCount::of(width, height, density);
+        let cell = CellSize { width_px: width as f64 / columns as f64, height_px: height as f64 / rows as f64 };
         let foveal = Plane::from_fn(columns, rows, |column, row| mean_of_cell(luminance_cd_m2, cell, column, row));
         let (least, greatest) =
             foveal.values().iter().fold((f64::INFINITY, 0.0), |(least, greatest): (f64, f64), &value| {
@@ -63,8 +72,8 @@ impl Veil {
             return None;
         }
         let cell_rad = CellAngle {
-            width: (cell.width_px as f64 / density.horizontal).to_radians(),
-            height: (cell.height_px as f64 / density.vertical).to_radians(),
+            width: (cell.width_px / density.horizontal).to_radians(),
+            height: (cell.height_px / density.vertical).to_radians(),
         };
         let cells_cd_m2 = Plane::from_fn(columns, rows, |column, row| veil_at(&foveal, cell_rad, column, row));
         let mean_cd_m2 = cells_cd_m2.values().iter().sum::<f32>() / cells_cd_m2.values().len() as f32;
@@ -80,12 +89,13 @@ impl Veil {
     pub(super) fn at(&self, pixel: Pixel) -> f32 {
         let CellSize { width_px, height_px } = self.cell;
         let (columns, rows) = (self.cells_cd_m2.width(), self.cells_cd_m2.height());
-        if pixel.x >= columns.saturating_mul(width_px) || pixel.y >= rows.saturating_mul(height_px) {
+        let is_inside = |index: usize, cell_px: f64, count: usize| index as f64 + 0.5 < count as f64 * cell_px;
+        if !is_inside(pixel.x, width_px, columns) || !is_inside(pixel.y, height_px, rows) {
             return self.mean_cd_m2;
         }
-        let place = |index: usize, cell_px: usize, count: usize| {
-            let at = ((index as f32 + 0.5) / cell_px as f32 - 0.5).clamp(0.0, (count - 1) as f32);
-            (at as usize, (at as usize + 1).min(count - 1), at.fract())
+        let place = |index: usize, cell_px: f64, count: usize| {
+            let at = ((index as f64 + 0.5) / cell_px - 0.5).clamp(0.0, (count - 1) as f64);
+            (at as usize, (at as usize + 1).min(count - 1), at.fract() as f32)
         };
         let (left, right, x) = place(pixel.x, width_px, columns);
         let (top, bottom, y) = place(pixel.y, height_px, rows);
@@ -102,18 +112,24 @@ impl Veil {
     }
 }
 
+/// Pixels count by how much of them lies in the cell.
 fn mean_of_cell(plane: &Plane, cell: CellSize, column: usize, row: usize) -> f32 {
-    let span = |index: usize, cell_px: usize, len: usize| index * cell_px..((index + 1) * cell_px).min(len);
-    let (mut sum, mut count) = (0.0, 0.0);
-    for y in span(row, cell.height_px, plane.height()) {
-        for &value in &plane.row(y)[span(column, cell.width_px, plane.width())] {
+    let shares = |index: usize, cell_px: f64, len: usize| {
+        let (from, to) = (index as f64 * cell_px, (index + 1) as f64 * cell_px);
+        (from as usize..(to.ceil() as usize).min(len))
+            .map(move |pixel| (pixel, to.min((pixel + 1) as f64) - from.max(pixel as f64)))
+    };
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for (y, share_y) in shares(row, cell.height_px, plane.height()) {
+        for (x, share_x) in shares(column, cell.width_px, plane.width()) {
+            let value = plane.get(x, y);
             if value.is_finite() {
-                sum += f64::from(value.max(0.0));
-                count += 1.0;
+                sum += share_x * share_y * f64::from(value.max(0.0));
+                weights += share_x * share_y;
             }
         }
     }
-    if count > 0.0 { (sum / count) as f32 } else { 0.0 }
+    if weights > 0.0 { (sum / weights) as f32 } else { 0.0 }
 }
 
 /// What a cell covers of the view, in radians.
@@ -157,6 +173,26 @@ mod tests {
         assert!(Veil::of(&Plane::filled(200, 100, 5.0), PixelDensity::square(10.0)).is_none());
         assert!(Veil::of(&Plane::filled(0, 0, 5.0), PixelDensity::square(10.0)).is_none());
     }
+
+    /// Whatever is left over when a picture is cut into degrees: a lamp veils as much at its right and lower borders as at the
+    /// left and upper ones.
+    #[test]
+    fn a_mirrored_picture_has_the_mirrored_veil() {
+        const WIDTH: usize = 130;
+        const HEIGHT: usize = 77;
+        let lamp = |x: usize, y: usize| if x < 5 && y < 30 { 1e5 } else { 1.0 };
+        let of = |scene| Veil::of(&scene, PixelDensity::square(60.0)).unwrap();
+        let veil = of(Plane::from_fn(WIDTH, HEIGHT, lamp));
+        let across = of(Plane::from_fn(WIDTH, HEIGHT, |x, y| lamp(WIDTH - 1 - x, y)));
+        let down = of(Plane::from_fn(WIDTH, HEIGHT, |x, y| lamp(x, HEIGHT - 1 - y)));
+        for (x, y) in [(2, 2), (40, 10), (65, 38), (127, 74), (129, 0)] {
+            let here = veil.at(Pixel { x, y });
+            for there in [across.at(Pixel { x: WIDTH - 1 - x, y }), down.at(Pixel { x, y: HEIGHT - 1 - y })] {
+                assert!((there / here - 1.0).abs() < 1e-4, "({x}, {y}): {here}, mirrored {there}");
+            }
+        }
+    }
+
     #[test]
     fn a_picture_squeezed_for_oblong_pixels_has_the_same_veil() {
         let lamp = |x: usize, y: usize| if x < 20 && y < 20 { 1e5 } else { 1.0 };
