@@ -239,7 +239,7 @@ impl Display {
             "at least 0 and below white_cd_m2",
         )?;
         check_range("ambient_cd_m2", self.ambient_cd_m2, 0.0, 1e8, LIGHT)?;
-        check_range("frames_per_second", self.frames_per_second, 1.0, 1e4, "between 1 and 10000")?;
+        check_range("frames_per_second", self.frames_per_second, 1.0, 1e3, "between 1 and 1000")?;
         check_range("persistence", self.persistence, 0.0, 1.0, "between 0 and 1")?;
         if let Some(distance_m) = self.distance_m {
             check_range("distance_m", distance_m, 0.01, 1000.0, "between 0.01 and 1000 m")?;

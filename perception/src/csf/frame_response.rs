@@ -9,8 +9,6 @@ use std::f64::consts::TAU;
 
 /// Seconds before and after a moment whose frames it is seen with: the sustained channel's response has fallen to 1 % by then.
 const REACH_S: f64 = 0.2;
-/// Most frames to each side.
-const MOST_FRAMES: usize = 32;
 /// Transient responses are tabulated from this decade of luminance on, in steps of a quarter.
 const LOWEST_DECADE: f64 = -3.0;
 const DECADE_STEPS: usize = 4;
@@ -67,9 +65,9 @@ impl FrameResponses {
 }
 
 impl FrameTiming {
-    /// Frames to each side of one that reach it.
+    /// Frames to each side of one that reach it: up to 200 at the highest rate.
     fn reach(self) -> usize {
-        ((REACH_S * self.frames_per_second).ceil() as usize).clamp(1, MOST_FRAMES)
+        ((REACH_S * self.frames_per_second).ceil() as usize).max(1)
     }
 
     /// h(k) for k from 0 on.
