@@ -74,7 +74,7 @@ pub fn saliency(inputs: &SaliencyInputs<'_>) -> Result<Plane, Error> {
         return Ok(Plane::filled(width, height, 1.0));
     }
     let small = sum.map(|value| value / largest);
-    Ok(resized(&small, width, height))
+    Ok(resized(&small, pyramid.octave(COMMON), (0, width, height)))
 }
 
 /// Gaze at one point instead of a saliency map: 1 at (`x_px`, `y_px`), falling as a Gaussian of `sigma_px`.
@@ -112,8 +112,19 @@ impl Pyramid {
         Self { levels }
     }
 
-    fn level(&self, index: usize) -> &Plane {
-        &self.levels[index.min(self.levels.len() - 1)]
+    /// The nearest scale to `octave` that there is.
+    fn octave(&self, octave: usize) -> usize {
+        octave.min(self.levels.len() - 1)
+    }
+
+    fn level(&self, octave: usize) -> &Plane {
+        &self.levels[self.octave(octave)]
+    }
+
+    /// One scale interpolated to the pixels of another.
+    fn level_at(&self, octave: usize, to_octave: usize) -> Plane {
+        let to = self.level(to_octave);
+        resized(self.level(octave), self.octave(octave), (self.octave(to_octave), to.width(), to.height()))
     }
 
     /// Magnitude of the response to a Gabor patch at `turn` · 45° on every level.
@@ -146,16 +157,15 @@ fn conspicuity<'a>(pyramids: impl Iterator<Item = &'a Pyramid>) -> Plane {
     let mut sum: Option<Plane> = None;
     for pyramid in pyramids {
         let common = pyramid.level(COMMON);
-        let (width, height) = (common.width(), common.height());
+        let to = (pyramid.octave(COMMON), common.width(), common.height());
         for center in CENTERS {
             for delta in DELTAS {
-                let center_map = pyramid.level(center);
-                let surround = resized(pyramid.level(center + delta), center_map.width(), center_map.height());
-                let mut difference = center_map.clone();
+                let surround = pyramid.level_at(center + delta, center);
+                let mut difference = pyramid.level(center).clone();
                 difference.for_each_row_mut(|y, row| {
                     row.iter_mut().zip(surround.row(y)).for_each(|(value, other)| *value = (*value - other).abs());
                 });
-                let map = promoted(&resized(&difference, width, height));
+                let map = promoted(&resized(&difference, pyramid.octave(center), to));
                 match &mut sum {
                     Some(sum) => add(sum, &map),
                     None => sum = Some(map),
@@ -180,27 +190,14 @@ fn promoted(map: &Plane) -> Plane {
     scaled.map(|value| value * factor)
 }
 
+/// Local maxima below this share of the greatest are none: where nothing happens they are rounding's.
+const LEAST_MAXIMUM: f32 = 0.1;
+/// A maximum from which a higher one is reached without going down by this share of the greatest is a part of that one.
+const LEAST_DESCENT: f32 = 0.01;
+
 /// (M − m)² of a map scaled to M = 1.
 fn promotion(scaled: &Plane) -> f32 {
-    let (width, height) = (scaled.width(), scaled.height());
-    let mut maxima = Vec::new();
-    for y in 0..height {
-        for x in 0..width {
-            let value = scaled.get(x, y);
-            let mut is_peak = value > 0.0;
-            for v in y.saturating_sub(1)..(y + 2).min(height) {
-                for u in x.saturating_sub(1)..(x + 2).min(width) {
-                    // Of a plateau only its first pixel counts.
-                    let other = scaled.get(u, v);
-                    let earlier = (v, u) < (y, x);
-                    is_peak &= (u, v) == (x, y) || other < value || (other == value && !earlier);
-                }
-            }
-            if is_peak {
-                maxima.push(value);
-            }
-        }
-    }
+    let mut maxima = local_maxima(scaled);
     maxima.sort_unstable_by(f32::total_cmp);
     maxima.pop();
     if maxima.is_empty() {
@@ -210,30 +207,83 @@ fn promotion(scaled: &Plane) -> f32 {
     (1.0 - mean).powi(2)
 }
 
+/// Values of the local maxima, a plateau's once, whatever its shape.
+fn local_maxima(scaled: &Plane) -> Vec<f32> {
+    let (width, height) = (scaled.width(), scaled.height());
+    let mut maxima = Vec::new();
+    let mut is_found = vec![false; width * height];
+    for (pixel, &value) in scaled.values().iter().enumerate() {
+        let is_peak = neighbours(pixel, width, height).all(|other| scaled.values()[other] <= value);
+        if value >= LEAST_MAXIMUM
+            && is_peak
+            && !is_found[pixel]
+            && let Some(plateau) = plateau_of(scaled, pixel)
+        {
+            plateau.into_iter().for_each(|pixel| is_found[pixel] = true);
+            maxima.push(value);
+        }
+    }
+    maxima
+}
+
+/// What lies around a peak and at most [`LEAST_DESCENT`] below it; `None` if something higher does.
+fn plateau_of(scaled: &Plane, peak: usize) -> Option<Vec<usize>> {
+    let values = scaled.values();
+    let mut is_seen = vec![false; values.len()];
+    is_seen[peak] = true;
+    let (mut plateau, mut visited) = (vec![peak], 0);
+    while let Some(&pixel) = plateau.get(visited) {
+        visited += 1;
+        for other in neighbours(pixel, scaled.width(), scaled.height()) {
+            if values[other] > values[peak] {
+                return None;
+            }
+            if !is_seen[other] && values[other] >= values[peak] - LEAST_DESCENT {
+                is_seen[other] = true;
+                plateau.push(other);
+            }
+        }
+    }
+    Some(plateau)
+}
+
+/// The pixel itself and the up to eight around it.
+fn neighbours(pixel: usize, width: usize, height: usize) -> impl Iterator<Item = usize> {
+    let around = |index: usize, len: usize| index.saturating_sub(1)..(index + 2).min(len);
+    let columns = around(pixel % width, width);
+    around(pixel / width, height).flat_map(move |y| columns.clone().map(move |x| y * width + x))
+}
+
 fn add(sum: &mut Plane, other: &Plane) {
     for (value, other) in sum.values_mut().iter_mut().zip(other.values()) {
         *value += other;
     }
 }
 
-/// Blurred by the binomial kernel (1, 3, 3, 1)/8 and every two pixels taken for one, which lies between them as [`resized`] has it: a
-/// kernel around every second pixel would move each level half a pixel of the finer one towards the first pixel.
+/// Blurred, and every second pixel of it, both ends alike: an even row by the binomial kernel (1, 3, 3, 1)/8, each pixel between two, an
+/// odd one by (1, 8, 14, 8, 1)/32, which has the same variance, from its first pixel to its last. So each level stands around
+/// the picture's middle (see [`resized`]), and a mirrored picture has the mirrored levels.
 fn halved(plane: &Plane) -> Plane {
-    const KERNEL: [f32; 4] = [0.125, 0.375, 0.375, 0.125];
+    const BETWEEN: &[f32] = &[0.125, 0.375, 0.375, 0.125];
+    const AROUND: &[f32] = &[0.031_25, 0.25, 0.437_5, 0.25, 0.031_25];
     let (width, height) = (plane.width(), plane.height());
-    let tap = |center: usize, index: usize, len: usize| reflect((2 * center + index) as isize - 1, len);
-    let across = Plane::from_fn(width.div_ceil(2), height, |x, y| {
-        (0..4).map(|index| KERNEL[index] * plane.get(tap(x, index, width), y)).sum()
-    });
-    Plane::from_fn(across.width(), height.div_ceil(2), |x, y| {
-        (0..4).map(|index| KERNEL[index] * across.get(x, tap(y, index, height))).sum()
-    })
+    let sum = |at: usize, len: usize, value: &dyn Fn(usize) -> f32| -> f32 {
+        let (kernel, before) = if len.is_multiple_of(2) { (BETWEEN, 1) } else { (AROUND, 2) };
+        let taps = kernel.iter().zip(2 * at as isize - before..);
+        taps.map(|(weight, index)| weight * value(reflect(index, len))).sum()
+    };
+    let across = Plane::from_fn(width.div_ceil(2), height, |x, y| sum(x, width, &|x| plane.get(x, y)));
+    Plane::from_fn(across.width(), height.div_ceil(2), |x, y| sum(y, height, &|y| across.get(x, y)))
 }
 
-/// Bilinear interpolation to another size.
-fn resized(plane: &Plane, width: usize, height: usize) -> Plane {
+/// Bilinear interpolation of the scale `octave` to another one's size: (octave, width, height). A pixel of either is as wide as 2 to the
+/// power of its octave and the middles lie over one another; sides in proportion would move the levels of pictures that 256
+/// does not divide against each other.
+fn resized(plane: &Plane, octave: usize, (to_octave, width, height): (usize, usize, usize)) -> Plane {
+    let ratio = (to_octave as f32 - octave as f32).exp2();
+    let middle = |len: usize| 0.5 * (len - 1) as f32;
     let place = |index: usize, to: usize, from: usize| {
-        let position = ((index as f32 + 0.5) * from as f32 / to as f32 - 0.5).clamp(0.0, (from - 1) as f32);
+        let position = ((index as f32 - middle(to)) * ratio + middle(from)).clamp(0.0, (from - 1) as f32);
         let below = position as usize;
         (below, (below + 1).min(from - 1), position - below as f32)
     };
@@ -334,6 +384,45 @@ mod tests {
         let (grey, panned) = (Plane::filled(256, 256, 0.3), Plane::filled(256, 256, 30.1));
         let map = saliency(&SaliencyInputs { rgb: [&grey; 3], velocity: Some(&panned) }).unwrap();
         assert_eq!(map, Plane::filled(256, 256, 1.0));
+    }
+
+    /// Sides that 256 does not divide are no different.
+    #[test]
+    fn mirrored_pictures_of_any_size_attract_in_the_mirrored_place() {
+        for (width, height) in [(480, 270), (257, 256), (97, 61)] {
+            let picture = |x: usize, y: usize| {
+                let (u, v) = (x as f32 / width as f32, y as f32 / height as f32);
+                let spot = if (u - 0.3).abs() < 0.04 && (v - 0.35).abs() < 0.04 { 0.6 } else { 0.0 };
+                spot + 0.2 * u + 0.1 * v
+            };
+            let of = |picture: &(dyn Fn(usize, usize) -> f32 + Sync)| {
+                let plane = Plane::from_fn(width, height, picture);
+                saliency(&SaliencyInputs { rgb: [&plane; 3], velocity: None }).unwrap()
+            };
+            let map = of(&picture);
+            let across = of(&|x, y| picture(width - 1 - x, y));
+            let down = of(&|x, y| picture(x, height - 1 - y));
+            let mut worst = 0.0_f32;
+            for y in 0..height {
+                for x in 0..width {
+                    let here = map.get(x, y);
+                    worst = worst.max((here - across.get(width - 1 - x, y)).abs());
+                    worst = worst.max((here - down.get(x, height - 1 - y)).abs());
+                }
+            }
+            assert!(worst < 1e-3, "{width}×{height}: {worst}");
+        }
+    }
+
+    /// A plateau's shape is no number of peaks, and rounding makes none.
+    #[test]
+    fn a_plateau_is_one_peak() {
+        let ridge = |x: usize, y: usize| x.abs_diff(20) + y.abs_diff(20) == 8;
+        let map = Plane::from_fn(60, 40, |x, y| {
+            let rounding = 1e-6 * ((x * 7 + y * 13) % 5) as f32;
+            if ridge(x, y) || (x, y) == (50, 20) { 1.0 - rounding - if x == 50 { 0.5 } else { 0.0 } } else { rounding }
+        });
+        assert!((promotion(&map) - 0.25).abs() < 1e-3, "{}", promotion(&map));
     }
 
     #[test]
