@@ -2,7 +2,7 @@
 
 use crate::adaptation::adapted;
 use crate::bands::OctaveBands;
-use crate::csf::ContrastSensitivity;
+use crate::csf::{ContrastSensitivity, DRIFT_DEG_S};
 use crate::display::{Glare, Viewing};
 use crate::error::Error;
 use crate::fft::{PictureTransform, Workspace};
@@ -236,7 +236,8 @@ impl ThresholdMap {
     /// The same thresholds for error that moves over the retina at `retinal_velocity_deg_s` (see [`crate::motion`]).
     ///
     /// Each band's threshold is raised, or at low frequencies lowered, by the ratio of Daly's 1998 spatiovelocity
-    /// sensitivity at rest to that in motion at the band's centre, kept within 0.1 and 20.
+    /// sensitivity at rest to that in motion at the band's centre, kept within 0.1 and 20. What moves no faster than the eye drifts
+    /// keeps its thresholds.
     ///
     /// # Errors
     /// [`Error::SizeMismatch`] and [`Error::BadPixel`] for velocities that do not fit.
@@ -249,7 +250,14 @@ impl ThresholdMap {
             *elevation =
                 elevation.change_by(retinal_velocity_deg_s, |elevation, velocity| elevation * table.at(velocity));
         }
-        moved.noise_gain = noise_gain(&self.tables, &self.adaptation_cd_m2, &moved.elevations);
+        // The elevations that motion changes have every pixel's own value, the others' sum is interpolated (see `noise_gain`): up to
+        // 18 % between the two at the borders of masks, which is no motion.
+        let in_motion = noise_gain(&self.tables, &self.adaptation_cd_m2, &moved.elevations);
+        moved.noise_gain = Plane::from_fn(self.width(), self.height(), |x, y| {
+            let gain =
+                if retinal_velocity_deg_s.get(x, y) <= DRIFT_DEG_S as f32 { &self.noise_gain } else { &in_motion };
+            gain.get(x, y)
+        });
         Ok(moved)
     }
 

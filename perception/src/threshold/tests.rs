@@ -182,6 +182,20 @@ fn error_that_moves_fast_may_be_larger() {
     assert!(map.with_motion(&Plane::filled(3, 3, 0.0)).is_err());
 }
 
+/// What rests keeps its thresholds to the bit, at the borders of masks too, and beside what moves.
+#[test]
+fn no_motion_changes_nothing() {
+    let textured = Plane::from_fn(96, 96, |x, y| 100.0 + if x > 48 && (x / 3 + y / 3) % 2 == 0 { 60.0 } else { 0.0 });
+    let map = map_of(&textured, &viewing(60.0));
+    let moved = map.with_motion(&Plane::filled(96, 96, 0.0)).unwrap();
+    assert_eq!(moved.noise_gain(), map.noise_gain());
+    let half = map.with_motion(&Plane::from_fn(96, 96, |_, y| if y < 48 { 10.0 } else { 0.0 })).unwrap();
+    for x in 0..96 {
+        assert_eq!(half.noise_gain().get(x, 48), map.noise_gain().get(x, 48));
+        assert!(half.noise_gain().get(x, 47) < 0.5 * map.noise_gain().get(x, 47));
+    }
+}
+
 #[test]
 fn isoluminant_noise_is_not_missed() {
     use crate::csf::{CastleChromatic, ChromaticChannel};
