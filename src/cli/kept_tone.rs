@@ -19,7 +19,7 @@ pub(super) const OF_DISPLAY: &str = "display";
 #[derive(Clone)]
 pub(super) enum KeptTone {
     /// Of a render.
-    Rendered(RenderTone),
+    Rendered(Box<RenderTone>),
     /// Nothing: it is of a display.
     Displayed,
 }
@@ -48,7 +48,7 @@ impl KeptTone {
             return Some(Self::Displayed);
         }
         text("fechner.scene")?;
-        Some(Self::Rendered(RenderTone {
+        Some(Self::Rendered(Box::new(RenderTone {
             fitted: serde_json::from_str(text(TONE)?).ok()?,
             display: text("fechner.observer.display")?.to_owned(),
             luminances_cd_m2: [
@@ -56,7 +56,7 @@ impl KeptTone {
                 number("fechner.observer.black_cd_m2")?,
                 number("fechner.observer.ambient_cd_m2")?,
             ],
-        }))
+        })))
     }
 
     /// The operator, if it was fitted for a display as bright and as dark as this one.
