@@ -403,11 +403,11 @@ impl WideTree {
     }
 }
 
-/// Whether a hit is before the end of a ray, which may lie just before the same triangle: where it is close, by its plane.
+/// Whether a hit is before the end of a ray, which may lie just before the same triangle: where it is close, by its plane, too.
 #[inline(always)]
 fn is_before(hit: &TriangleHit, t_max: f32, to_plane: impl Fn() -> Option<f32>) -> bool {
     const CLOSE: f32 = 0.99;
-    if hit.t <= CLOSE * t_max { true } else { to_plane().is_some_and(|t| t < t_max) }
+    hit.t < t_max && (hit.t <= CLOSE * t_max || to_plane().is_some_and(|t| t < t_max))
 }
 
 /// The place of a triangle by block and lane.
