@@ -150,7 +150,7 @@ impl Origin {
         if self.scene != own.scene {
             return Some(format!(
                 "it holds another scene (\"{}\", content {}) than \"{}\", content {}: the scene file, a mesh or a texture \
-                 has changed, or --camera or --at is another",
+                 has changed, or what --camera, --look-at, --at, --environment or --nits-per-unit say of it",
                 self.scene_name, self.scene, own.scene_name, own.scene
             ));
         }
@@ -160,9 +160,18 @@ impl Origin {
                 self.width, self.height, own.width, own.height
             ));
         }
-        (self.tracing != own.tracing)
-            .then(|| format!("its samples were traced by {}, not by {}", self.tracing, own.tracing))
+        (self.tracing != own.tracing).then(|| {
+            let [its, this] =
+                [(&self.tracing, &own.tracing), (&own.tracing, &self.tracing)].map(|(a, b)| only_in(a, b));
+            format!("its samples were traced with {its}, and these are with {this}")
+        })
     }
+}
+
+/// The settings of one list that another has not.
+fn only_in(settings: &str, others: &str) -> String {
+    let is_new = |setting: &&str| !others.split(", ").any(|other| other == *setting);
+    settings.split(", ").filter(is_new).collect::<Vec<_>>().join(", ")
 }
 
 /// Every setting that changes a sample, also those to come, less the seed.

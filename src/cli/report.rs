@@ -135,6 +135,8 @@ pub(super) struct Report {
     /// Least and greatest number that thresholds are multiplied by, where a map of importance was given. All visibilities and
     /// chances here are under it.
     importance_range: Option<[f32; 2]>,
+    /// Whose eye all visibilities and chances here are of: what it looks at.
+    eye: String,
     /// The tone operator's fit, which [`Report::attributes`] takes along.
     #[serde(skip)]
     tone: Option<(String, Attribute)>,
@@ -193,6 +195,7 @@ impl Report {
             outlier_pixels: outliers.pixels,
             outlier_energy_share: outliers.energy_share,
             importance_range: settings.importance.as_ref().map(range),
+            eye: eye_in_words(settings),
             tone: output::tone_attribute(judgement.tone.as_ref()),
             nonfinite_samples: film.nonfinite_samples,
             peak_memory_bytes: peak_memory_bytes(),
@@ -224,6 +227,7 @@ impl Report {
             ("fechner.sampling", text(self.sampling)),
             ("fechner.model", text(self.model)),
             ("fechner.csf", text(self.csf)),
+            ("fechner.eye", text(&self.eye)),
             ("fechner.operator", text(&self.operator)),
             ("fechner.seen", text("display")),
             ("fechner.latitude_stops", Attribute::Float(0.0)),
@@ -249,6 +253,16 @@ impl Report {
         }
         let named = attributes.into_iter().map(|(name, value)| (name.to_owned(), value));
         named.chain(self.tone.clone()).collect()
+    }
+}
+
+/// What the eye looks at.
+fn eye_in_words(settings: &LoopSettings) -> String {
+    match (settings.gazes.as_slice(), &settings.pursuit) {
+        ([], None) => "anywhere".to_owned(),
+        ([], Some(_)) => "what moves, which it follows".to_owned(),
+        ([gaze], _) => format!("pixel {:.0},{:.0}", gaze.x_px, gaze.y_px),
+        (gazes, _) => format!("{} places", gazes.len()),
     }
 }
 

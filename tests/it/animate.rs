@@ -234,12 +234,14 @@ fn frames_are_judged_from_where_they_are_looked_at() {
         animate(folder.path(), &arguments);
         let text = std::fs::read_to_string(folder.path().join("shot.01.json")).expect("a record");
         let record: serde_json::Value = serde_json::from_str(&text).expect("JSON");
-        record["report"]["samples_total"].as_u64().expect("a number")
+        let told = |key: &str| record["report"][key].clone();
+        (told("samples_total").as_u64().expect("a number"), told("eye"))
     };
-    let everywhere = samples(None);
-    let corner = samples(Some("frame,x,y\n1,0,15\n"));
+    let (everywhere, anywhere) = samples(None);
+    let (corner, looked_at) = samples(Some("frame,x,y\n1,0,15\n"));
     assert!(3 * corner < 2 * everywhere, "{corner} and {everywhere} samples");
-    assert_eq!(samples(Some("0,0,15\n")), everywhere);
+    assert_eq!((anywhere.as_str(), looked_at.as_str()), (Some("anywhere"), Some("pixel 0,15")));
+    assert_eq!(samples(Some("0,0,15\n")), (everywhere, anywhere));
 }
 
 /// Noise that an eye smears as it follows what moves may be stronger. Frames of another eye are made anew.
