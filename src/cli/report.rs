@@ -210,7 +210,7 @@ impl Report {
             .visibility_p99
             .map_or_else(|| TOO_FEW.to_owned(), |p99| format!("visibility {p99:.2} at the 99th percentile"));
         format!(
-            "{:.1} spp in {}, {visibility}; {}",
+            "{:.1} spp in {}, {visibility}; ended by {}",
             self.spp_mean,
             duration_in_words(self.seconds_total),
             self.stop_reason

@@ -51,6 +51,9 @@ pub(super) fn describe(checkpoint: &Checkpoint) -> String {
     if let Some(tone) = &state.tone {
         row("fit", tone.clone().restore().describe());
     }
+    if let Some(denoiser) = settings.denoiser {
+        row("denoiser", format!("{denoiser:?}").to_lowercase());
+    }
     if let Some(importance) = settings.importance {
         row("importance", format!("map of content {importance}"));
     }
@@ -78,10 +81,19 @@ fn tracing_in_words(tracing: &str) -> String {
         fields.filter(|&(name, value)| !["width", "height"].contains(&name) && value != "None" && value != "false");
     let words = said.map(|(name, value)| {
         let value = value.strip_prefix("Some(").and_then(|value| value.strip_suffix(')')).unwrap_or(value);
-        let text = if value == "true" { name.to_owned() } else { format!("{name} {value}") };
+        let text = match value.strip_prefix("Crop {") {
+            _ if value == "true" => name.to_owned(),
+            Some(corners) => format!("{name} {}", numbers(corners).join(",")),
+            None => format!("{name} {value}"),
+        };
         text.replace('_', " ")
     });
     apart(&words.collect::<Vec<_>>().join(", "))
+}
+
+/// The numbers in a text, as `--crop` has them.
+fn numbers(text: &str) -> Vec<&str> {
+    text.split(|letter: char| !letter.is_ascii_digit()).filter(|number| !number.is_empty()).collect()
 }
 
 /// "blackman harris" of "BlackmanHarris".
@@ -104,7 +116,7 @@ mod tests {
     fn tracing_is_said_without_what_it_does_not_do() {
         let tracing = "width: 64, max_depth: 1000, filter: BlackmanHarris, clamp: Some(9.0), crop: Some(Crop { x: 1, y: 2 }), \
                        transparent: true, prune: None";
-        let words = "max depth 1000, filter blackman harris, clamp 9.0, crop crop { x: 1, y: 2 }, transparent";
+        let words = "max depth 1000, filter blackman harris, clamp 9.0, crop 1,2, transparent";
         assert_eq!(tracing_in_words(tracing), words);
     }
 }
