@@ -83,7 +83,7 @@ fn viewing(display: &str) -> Result<Viewing> {
 
 /// The operator that shows a scene, as the scene asks for it.
 fn tone_operator(scene: &Scene) -> Result<Box<dyn ToneOperator>> {
-    let name = scene.viewing.operator.as_deref().unwrap_or("constant");
+    let name = scene.viewing.operator.as_deref().unwrap_or(tone::DEFAULT_OPERATOR);
     tone::operator(name, scene.viewing.exposure_stops)
         .with_context(|| format!("there is no tone operator \"{name}\"; known: {}", tone::operator_names().join(", ")))
 }

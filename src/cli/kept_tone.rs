@@ -1,14 +1,14 @@
-//! How a picture was shown when it was rendered, as its file says: what `compare` and `threshold` see is what the render
-//! judged, with its operator and its exposure.
+//! How a picture was shown when it was rendered, as its file says: what `compare`, `threshold` and `tonemap` show is what
+//! the render judged, with its operator and its exposure.
 
 use super::picture::InputPicture;
-use super::seeing::{DEFAULT_DISPLAY, DEFAULT_OPERATOR, tone_operator};
+use super::seeing::{DEFAULT_DISPLAY, tone_operator};
 use anyhow::Result;
 use fechner::exr_read::ExrImage;
 use fechner::output::{Attribute, TONE};
 use fechner_perception::Plane;
 use fechner_perception::display::{Display, Viewing};
-use fechner_perception::tone::{self, FittedTone, SavedTone, SceneGuide, ToneSettings};
+use fechner_perception::tone::{self, DEFAULT_OPERATOR, FittedTone, SavedTone, SceneGuide, ToneSettings};
 use std::path::Path;
 
 /// What `tonemap` says of its EXR files, and its value there: they hold light of a display, by a fit that has done its work.
@@ -16,7 +16,6 @@ pub(super) const LIGHT: &str = "fechner.light";
 pub(super) const OF_DISPLAY: &str = "display";
 
 /// What brings a picture to the display as it was when it was made.
-#[derive(Clone)]
 pub(super) enum KeptTone {
     /// Of a render.
     Rendered(Box<RenderTone>),
@@ -25,7 +24,6 @@ pub(super) enum KeptTone {
 }
 
 /// The operator as fitted by a render, and the display that it was fitted for.
-#[derive(Clone)]
 pub(super) struct RenderTone {
     fitted: SavedTone,
     display: String,

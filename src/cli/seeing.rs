@@ -9,14 +9,12 @@ use clap::builder::{PossibleValue, PossibleValuesParser};
 use fechner::scene::{MOST_EXPOSURE_STOPS, NITS_PER_UNIT, Scene};
 use fechner_perception::display::{Display, Viewing};
 use fechner_perception::model;
-use fechner_perception::tone::{self, ToneOperator, ToneSettings};
+use fechner_perception::tone::{self, DEFAULT_OPERATOR, ToneOperator, ToneSettings};
 use std::path::Path;
 use std::time::Duration;
 
 /// The display where none is named.
 pub(super) const DEFAULT_DISPLAY: &str = "desktop";
-/// The tone operator where none is named.
-pub(super) const DEFAULT_OPERATOR: &str = "constant";
 
 /// How a scene is shown: command line before scene before default.
 #[derive(Clone, Copy, Debug)]

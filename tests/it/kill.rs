@@ -131,6 +131,47 @@ fn a_killed_shot_goes_on_to_the_same_bytes() {
     }
 }
 
+/// Frames that are finished stay, and the exit status says that there are more to make.
+#[cfg(unix)]
+#[test]
+fn a_signal_ends_a_shot_between_whole_frames() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let mut command = fechner();
+    command.arg("animate").arg(scene()).args([
+        "--size",
+        "32x32",
+        "--frames",
+        "0..30",
+        "--visibility",
+        "0.3",
+        "-o",
+        "f.####.png",
+    ]);
+    let mut child = command.current_dir(at).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("runs");
+    wait_for(&at.join("f.0000.json"), &mut child);
+    signal(&child, "-INT");
+    let output = child.wait_with_output().expect("ended");
+    assert_eq!(output.status.code(), Some(75), "{}", text(&output));
+    assert!(text(&output).contains("the same command makes the others"), "{}", text(&output));
+    assert_eq!(image::open(at.join("f.0000.png")).expect("a picture").width(), 32);
+}
+
+/// Of what was traced otherwise, only that is named.
+#[test]
+fn a_film_that_was_traced_otherwise_says_how() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let with = |depth: &'static str, more: &[&'static str]| {
+        let common = ["--spp", "4", "--max-depth", depth, "-o", "a.png", "--checkpoint", "a.film"];
+        render(folder.path(), &[&common[..], more].concat())
+    };
+    run(with("3", &[]));
+    let output = with("5", &["--resume"]).output().expect("runs");
+    let said = text(&output);
+    assert!(said.contains("traced with max_depth: 3, and these are with max_depth: 5"), "{said}");
+    assert!(!said.contains("clamp"), "{said}");
+}
+
 #[cfg(unix)]
 #[test]
 fn a_signal_ends_a_render_with_its_picture_so_far() {

@@ -226,6 +226,18 @@ fn a_finished_preview_is_what_render_writes() {
     assert!(viewer.saved(at, "png", "cornell-box-2.png") == until("3", "3.png"), "going on gives another picture");
 }
 
+/// A part is saved with its place in the whole, as `render` writes it.
+#[test]
+fn a_part_is_saved_where_it_lies() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let arguments = ["--visibility", "8", "--crop", "8,4,16,16"];
+    let view = View::of(&cornell_box(), folder.path(), &arguments);
+    let mut viewer = view.viewer();
+    viewer.status("the end", |status| is_stopped(status) && status["visible_share"].is_number());
+    let saved = viewer.saved(folder.path(), "exr", "cornell-box-1.exr");
+    assert!(saved == rendered(folder.path(), &arguments, "part.exr"), "the EXR differs");
+}
+
 /// The tone operator works on the samples that there are.
 #[test]
 fn exposure_changes_the_picture_and_takes_no_samples() {

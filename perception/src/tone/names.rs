@@ -29,8 +29,11 @@ pub struct ToneSettings {
     pub effects: Option<Effects>,
 }
 
+/// The operator where nobody names one.
+pub const DEFAULT_OPERATOR: &str = "constant";
+
 const OPERATOR_NAMES: [&str; 16] = [
-    "constant",
+    DEFAULT_OPERATOR,
     "constant-long",
     "constant-short",
     "absolute",

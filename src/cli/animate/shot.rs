@@ -78,9 +78,8 @@ impl<'a> Shot<'a> {
         for note in &scene.notes {
             say!("note: {note}");
         }
-        for frame in arguments.frames.first..=arguments.frames.last {
-            check_scene_kept(&[("-o", Some(&name.of(frame)))])?;
-        }
+        let files: Vec<PathBuf> = arguments.frame_numbers().map(|frame| name.of(frame)).collect();
+        check_scene_kept(&files.iter().map(|file| ("-o", Some(file.as_path()))).collect::<Vec<_>>())?;
         let settings = shot_settings(arguments, &scene, whole)?;
         let Presentation { operator, exposure_stops, .. } = arguments.asked_presentation().of_scene(&scene);
         let operator_name = operator.to_owned();

@@ -5,7 +5,7 @@ use crate::cli::channels::{self, both_motions};
 use crate::cli::json::write_json;
 use crate::cli::kept_tone::{as_rendered, first_scene};
 use crate::cli::picture::InputPicture;
-use crate::cli::seeing::{DEFAULT_OPERATOR, tone_operator};
+use crate::cli::seeing::tone_operator;
 use crate::cli::targets::check_kept;
 use anyhow::{Context, Result, bail};
 use fechner::animate::name::FrameName;
@@ -13,7 +13,9 @@ use fechner::output;
 use fechner_perception::Plane;
 use fechner_perception::display::Viewing;
 use fechner_perception::sequence::{FrameMotion, SequenceFrame, SequenceObserver};
-use fechner_perception::tone::{AdaptationState, FittedTone, Goal, SceneLight, ToneOperator, ToneSettings};
+use fechner_perception::tone::{
+    AdaptationState, DEFAULT_OPERATOR, FittedTone, Goal, SceneLight, ToneOperator, ToneSettings,
+};
 use serde::Serialize;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -255,13 +257,13 @@ impl<'a> Sequences<'a> {
     }
 
     /// The operator by which a frame was shown when it was rendered.
-    fn kept_tone(&self, pictures: &[(&Path, &InputPicture)]) -> Result<Box<dyn FittedTone>> {
-        let kept = first_scene(pictures).and_then(|(_, picture)| picture.kept_tone());
-        kept.and_then(|kept| kept.on(&self.viewing)).with_context(|| {
+    fn kept_tone(&self, pictures: &[(&Path, &InputPicture); 2]) -> Result<Box<dyn FittedTone>> {
+        let (path, picture) = first_scene(pictures).unwrap_or(pictures[0]);
+        picture.kept_tone().and_then(|kept| kept.on(&self.viewing)).with_context(|| {
             format!(
                 "{}: it does not say how it was shown on \"{}\" when it was rendered, as the first frame does: --operator shows all frames \
                  by one",
-                pictures[0].0.display(),
+                path.display(),
                 self.viewing.display.name
             )
         })

@@ -114,9 +114,9 @@ mod tests {
 
     #[test]
     fn tracing_is_said_without_what_it_does_not_do() {
-        let tracing = "width: 64, max_depth: 1000, filter: BlackmanHarris, clamp: Some(9.0), crop: Some(Crop { x: 1, y: 2 }), \
+        let tracing = "width: 64, max_depth: 1000, filter: BlackmanHarris, clamp: Some(9.0), crop: Some(Crop { x: 1, y: 2, width: 3, height: 4 }), \
                        transparent: true, prune: None";
-        let words = "max depth 1000, filter blackman harris, clamp 9.0, crop 1,2, transparent";
+        let words = "max depth 1000, filter blackman harris, clamp 9.0, crop 1,2,3,4, transparent";
         assert_eq!(tracing_in_words(tracing), words);
     }
 }

@@ -58,7 +58,11 @@ fn stopped(report: &Report, settings: &LoopSettings, rendered: &Rendered) -> Str
         }
     };
     // That many --plans make the same picture.
-    format!("{why}, after {} plans; {target}.", rendered.plans)
+    let plans = match rendered.stop_reason {
+        StopReason::Plans | StopReason::Merged => String::new(),
+        _ => format!(", after {} plans", rendered.plans),
+    };
+    format!("{why}{plans}; {target}.")
 }
 
 fn noticed(report: &Report, display: &Display, predicted: &Plane) -> Option<String> {
