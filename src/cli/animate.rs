@@ -71,7 +71,7 @@ pub(super) struct AnimateArguments {
     #[arg(long, value_enum, default_value = "adaptive", help_heading = "Sampling")]
     sampling: SamplingChoice,
     /// Seed of all random numbers; each frame has its own from it.
-    #[arg(long, default_value_t = 0, help_heading = "Sampling")]
+    #[arg(long, default_value_t = 0, allow_negative_numbers = true, help_heading = "Sampling")]
     seed: u64,
 
     /// Frames may be paused and looked at: each is held to what a still is.

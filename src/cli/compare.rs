@@ -111,6 +111,7 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
     let test = InputPicture::read(&arguments.test, nits_per_unit)?;
     check_alike((&arguments.reference, &reference), (&arguments.test, &test))?;
     let pictures = [(arguments.reference.as_path(), &reference), (arguments.test.as_path(), &test)];
+    arguments.seeing.note_idle(arguments.operator.as_deref(), &pictures);
     let viewing = reference.viewed(&arguments.seeing.viewing(&pictures)?)?;
     let csf = csf::by_name(&arguments.seeing.csf, &viewing)?;
     let fitted = shown_by(arguments.operator.as_deref(), &pictures, &viewing)?;

@@ -69,9 +69,9 @@ pub(super) struct JobArguments {
     /// Threshold at which --sampling relative and variance stop [default: 0.01].
     #[arg(long, value_name = "X", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Sampling")]
     noise_threshold: Option<f64>,
-    /// How --sampling adaptive finds counts.
-    #[arg(long, value_enum, default_value = "convex", help_heading = "Sampling")]
-    allocation: AllocationChoice,
+    /// How --sampling adaptive finds counts [default: convex].
+    #[arg(long, value_enum, help_heading = "Sampling")]
+    allocation: Option<AllocationChoice>,
     /// Scale samples whose largest channel is above X scene units down to it. Darkens the picture where light is rare.
     #[arg(long, value_name = "X", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Sampling")]
     clamp: Option<f64>,
@@ -92,7 +92,7 @@ pub(super) struct JobArguments {
     #[arg(long, value_name = "MAP", help_heading = "Sampling")]
     importance: Option<PathBuf>,
     /// Seed of all random numbers.
-    #[arg(long, default_value_t = 0, help_heading = "Sampling")]
+    #[arg(long, default_value_t = 0, allow_negative_numbers = true, help_heading = "Sampling")]
     seed: u64,
 
     /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file
@@ -428,8 +428,11 @@ pub(super) fn visibility_limit(
     }
 }
 
-/// Refuses limits that the rule of sampling would not look at.
+/// Refuses what the rule of sampling would not look at.
 fn check_rule(arguments: &JobArguments) -> anyhow::Result<()> {
+    if arguments.allocation.is_some() && !matches!(arguments.sampling, SamplingChoice::Adaptive) {
+        bail!("--allocation is how --sampling adaptive finds counts, and this --sampling does not ask: leave it out");
+    }
     let (stops_by_noise, stops_by_sight) = match arguments.sampling {
         SamplingChoice::Adaptive | SamplingChoice::Uniform => (false, true),
         SamplingChoice::Relative | SamplingChoice::Variance => (true, false),
@@ -478,8 +481,8 @@ fn settings_record(arguments: &JobArguments, scene: &Scene) -> anyhow::Result<Se
     Ok(SettingsRecord {
         sampling,
         allocation: match arguments.allocation {
-            AllocationChoice::Convex => AllocationRule::Convex,
-            AllocationChoice::Local => AllocationRule::Local,
+            None | Some(AllocationChoice::Convex) => AllocationRule::Convex,
+            Some(AllocationChoice::Local) => AllocationRule::Local,
         },
         model: arguments.model.clone(),
         viewing,

@@ -1,6 +1,6 @@
 //! Arguments that say who looks at what.
 
-use super::kept_tone::display_of;
+use super::kept_tone::{display_of, first_scene};
 use super::picture::InputPicture;
 use super::targets::{Named, display_file};
 use anyhow::{Context, Result, bail};
@@ -69,6 +69,18 @@ impl SeeingArguments {
     /// The file that describes the display, if any.
     pub(super) fn display_file(&self) -> Named<'_> {
         display_file(self.display.as_deref())
+    }
+
+    /// Says which arguments change nothing of pictures that are all ready for the display.
+    pub(super) fn note_idle(&self, operator: Option<&str>, pictures: &[(&Path, &InputPicture)]) {
+        let Some((path, _)) = pictures.first().filter(|_| first_scene(pictures).is_none()) else { return };
+        let is_asked = [("--operator", operator.is_some()), ("--nits-per-unit", self.nits_per_unit.is_some())];
+        for (argument, _) in is_asked.iter().filter(|(_, is_asked)| *is_asked) {
+            say!(
+                "note: {argument} changes nothing: {} is ready for the display, and so is all that is seen beside it",
+                path.display()
+            );
+        }
     }
 
     /// The viewing of pictures that they mean.

@@ -72,6 +72,7 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     let names = std::iter::once(&arguments.input).chain(arguments.halves.iter().flatten());
     let pictures = std::iter::once(&guide).chain(halves.iter().flatten());
     let named: Vec<_> = names.map(PathBuf::as_path).zip(pictures).collect();
+    arguments.seeing.note_idle(arguments.operator.as_deref(), &named);
     let mut viewing = arguments.seeing.viewing(&named)?;
     if let Some(age_years) = arguments.glare {
         viewing.observer.glare = Glare::Cie { age_years };

@@ -49,9 +49,9 @@ pub(super) struct TonemapArguments {
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
     effects: Option<Vec<Effect>>,
 
-    /// Frames a second of a sequence.
-    #[arg(long, value_name = "N", default_value_t = 24.0, value_parser = parse_positive, help_heading = "Over time")]
-    fps: f64,
+    /// Frames a second of a sequence [default: 24].
+    #[arg(long, value_name = "N", value_parser = parse_positive, help_heading = "Over time")]
+    fps: Option<f64>,
     /// What the eye is adapted to before the first frame; without it, to the first frame.
     #[arg(long, value_name = "CD_M2", value_parser = parse_positive, help_heading = "Over time")]
     adapted_to: Option<f64>,
@@ -148,9 +148,14 @@ pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
     }
     let operator = seeing::tone_operator(operator, &settings)?;
     check_settings(operator.as_ref(), &settings)?;
-    let timed = arguments.input.len() > 1 || arguments.adapted_to.is_some() || arguments.state.is_some();
+    let timed = is_timed(arguments);
     if timed && arguments.adaptation == Scope::Local {
         bail!("--adaptation local has no course in time: leave it out for a sequence");
+    }
+    if arguments.fps.is_some() && !timed {
+        bail!(
+            "--fps: one picture has no course in time; give several, or what the eye saw before by --adapted-to or --state"
+        );
     }
     let mut eye = if timed { Some(Eye::new(arguments, operator.as_ref())?) } else { None };
     for (input, target) in arguments.input.iter().zip(&targets) {
@@ -167,16 +172,22 @@ pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
     Ok(())
 }
 
+/// Whether the eye has a past.
+fn is_timed(arguments: &TonemapArguments) -> bool {
+    arguments.input.len() > 1 || arguments.adapted_to.is_some() || arguments.state.is_some()
+}
+
 /// Each picture by the operator that it was rendered for.
 fn run_as_rendered(arguments: &TonemapArguments, format: Format, targets: &[PathBuf]) -> Result<()> {
     let is_asked_more = arguments.exposure != 0.0
         || arguments.adaptation == Scope::Local
         || arguments.effects.is_some()
+        || arguments.fps.is_some()
         || arguments.adapted_to.is_some()
         || arguments.state.is_some()
         || arguments.gaze.is_some();
     if is_asked_more {
-        bail!("exposure, adaptation, effects and eyes are an operator's: name it by --operator");
+        bail!("exposure, adaptation, effects, eyes and their time are an operator's: name it by --operator");
     }
     for (input, target) in arguments.input.iter().zip(targets) {
         let picture = InputPicture::read(input, arguments.nits_per_unit)?;
@@ -202,8 +213,10 @@ fn run_all(
     viewing: &Viewing,
     settings: &ToneSettings,
 ) -> Result<()> {
-    if arguments.input.len() > 1 || arguments.adapted_to.is_some() || arguments.state.is_some() {
-        bail!("a sheet of all operators shows one picture at rest: give one file and no --adapted-to or --state");
+    if is_timed(arguments) || arguments.fps.is_some() {
+        bail!(
+            "a sheet of all operators shows one picture at rest: give one file and no --fps, --adapted-to or --state"
+        );
     }
     if format != Format::Png {
         bail!("{}: a sheet of all operators is a picture; end the name in .png", targets[0].display());
@@ -288,7 +301,7 @@ impl Eye {
             state = Some(read.with_context(|| format!("{}: not an eye's state as tonemap leaves it", path.display()))?);
             is_between_frames = true;
         }
-        Ok(Self { state, is_between_frames, seconds_per_frame: arguments.fps.recip(), kinetics })
+        Ok(Self { state, is_between_frames, seconds_per_frame: arguments.fps.unwrap_or(24.0).recip(), kinetics })
     }
 
     /// The state in which the next frame is seen. The first one is seen as it appears; between frames the light changes

@@ -13,12 +13,14 @@ pub(crate) fn in_a_line(error: &anyhow::Error) -> String {
     line
 }
 
-/// What is wrong with the arguments, in one line: the message and its hint, without the usage and where to find help.
+/// What is wrong with the arguments, in one line: the message and its hint, without the usage and where to find help. That a file may
+/// be called `--name` is no hint for who mistypes an argument.
 pub(super) fn in_a_line_of_arguments(error: &clap::Error) -> String {
+    let is_of_files = |line: &&str| line.starts_with("tip: to pass '-") && line.contains("as a value, use '-- ");
     let text = error.to_string();
     let lines =
         text.lines().map(str::trim).take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more"));
-    let words: Vec<&str> = lines.filter(|line| !line.is_empty()).collect();
+    let words: Vec<&str> = lines.filter(|line| !line.is_empty() && !is_of_files(line)).collect();
     words.join("; ").trim_start_matches("error: ").replacen("; [", " [", 1).replacen(":; ", ": ", 1)
 }
 

@@ -255,3 +255,23 @@ fn a_map_is_a_png() {
     let (code, said) = fechner(folder.path(), &["compare", "a.exr", "a.exr", "--map", "map.exr"]);
     assert!(code == 2 && said.contains("end the name in .png"), "{code}: {said}");
 }
+
+/// What changes nothing of pictures that are ready for the display is told, and what shows a scene's light is not.
+#[test]
+fn idle_arguments_are_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in ["1.png", "2.png"] {
+        write_png(&folder.path().join(name), SIDE as u32, SIDE as u32, &[[0.18; 3]; SIDE * SIDE]).expect("written");
+    }
+    write(folder.path(), "1.exr", |_| [10.0; 3]);
+    let more = ["--operator", "agx", "--nits-per-unit", "3"];
+    let (code, told) = fechner(folder.path(), &[&["compare", "1.png", "2.png"], &more[..]].concat());
+    assert_eq!(code, 0, "{told}");
+    for argument in ["--operator", "--nits-per-unit"] {
+        assert!(told.contains(&format!("note: {argument} changes nothing: 1.png")), "{told}");
+    }
+    for pictures in [["compare", "1.exr", "1.exr"], ["compare", "1.png", "1.exr"]] {
+        let (_, told) = fechner(folder.path(), &[&pictures[..], &more].concat());
+        assert!(!told.contains("changes nothing"), "{told}");
+    }
+}

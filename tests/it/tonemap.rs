@@ -106,6 +106,8 @@ fn what_makes_no_sense_is_refused_in_one_line() {
         &["a.exr", "-o", "b.png", "--operator", "tr", "--adaptation", "local", "--adapted-to", "3"],
         "no course in time",
     );
+    refused(&["a.exr", "-o", "b.png", "--operator", "tr", "--fps", "5"], "no course in time");
+    refused(&["a.exr", "-o", "b.png", "--fps", "5"], "name it by --operator");
     for stops in ["nan", "inf", "-101"] {
         refused(&["a.exr", "-o", "b.png", "--operator", "srgb", "--exposure", stops], "is not a number of stops");
     }
