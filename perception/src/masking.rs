@@ -63,12 +63,16 @@ pub(crate) struct MaskSource<'a> {
     pub(crate) height: usize,
 }
 
+/// Standard deviation of the window that softens the eroded elevation, in wavelengths: less than half of what the erosion takes off, so that
+/// nothing reaches what it has cleared.
+const EDGE_WAVELENGTHS: f64 = 0.25;
+
 /// Threshold elevation, 1 to 3, of one band, on a grid as fine as the band needs.
 ///
 /// The band's local contrast amplitude is √2 times its RMS over a Gaussian of a third of a wavelength (the band's
 /// signal itself crosses zero twice a wavelength), less the energy that the guide's own noise has there. It is then
-/// eroded over one wavelength to each side: an edge, whose contrast lives within a wavelength, masks nothing beside
-/// it; texture, which goes on, does.
+/// eroded over one wavelength around: an edge, whose contrast lives within a wavelength, masks nothing beside
+/// it; texture, which goes on, does. Where it does ends softly, well within what the erosion has left.
 pub(crate) fn band_elevation(
     source: &MaskSource<'_>,
     workspace: &mut Workspace,
@@ -114,8 +118,10 @@ pub(crate) fn band_elevation(
             *value = 2.0 * value.max(0.0) * tables.center_sensitivity_squared.at(coordinate);
         }
     });
-    let mut elevated = eroded(&mask, wavelength_x.round() as usize, wavelength_y.round() as usize);
+    let mut elevated = eroded(&mask, wavelength_x, wavelength_y);
     elevated.for_each_row_mut(|_, row| row.iter_mut().for_each(|value| *value = elevation.at(*value)));
+    let soft = |wavelength: f64| (EDGE_WAVELENGTHS * wavelength).powi(2);
+    let elevated = smoothed(&elevated, soft(wavelength_x), soft(wavelength_y));
     ReducedPlane::new(elevated, factor, source.width, source.height)
 }
 

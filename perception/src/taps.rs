@@ -6,8 +6,6 @@ use crate::plane::Plane;
 
 /// Beyond this variance, in samples, the box filters of [`filter::gaussian_blur_xy`] take over.
 const MOST_VARIANCE: f64 = 3.0;
-/// Beyond this radius, in samples, the running minima of [`filter::erode_xy`] take over.
-const MOST_RADIUS: usize = 8;
 
 /// `plane` through a window of the given variances along x and y, in squared samples, mirrored at the borders.
 pub(crate) fn smoothed(plane: &Plane, variance_x: f64, variance_y: f64) -> Plane {
@@ -30,21 +28,34 @@ pub(crate) fn smoothed(plane: &Plane, variance_x: f64, variance_y: f64) -> Plane
     })
 }
 
-/// The smallest value within a rectangle of these half-widths around each sample.
-pub(crate) fn eroded(plane: &Plane, radius_x: usize, radius_y: usize) -> Plane {
-    if radius_x.max(radius_y) > MOST_RADIUS {
-        return filter::erode_xy(plane, radius_x, radius_y);
-    }
-    over_rows(plane, radius_x, radius_y, |rows, extended, result| {
+/// The smallest value of the samples whose middles lie within an ellipse around each sample, whose half-axes are these radii and half a
+/// sample: of a radius along an axis so many samples to each side, rounded. Round, so that a picture that is turned has a turned result.
+///
+/// A column of the ellipse holds the rows of the one farther out, so that minima over rows are handed inwards from column to column.
+pub(crate) fn eroded(plane: &Plane, radius_x: f64, radius_y: f64) -> Plane {
+    // Twice a mirrored picture shows nothing new.
+    let half_axis = |radius: f64, len: usize| radius.clamp(0.0, 2.0 * len as f64) + 0.5;
+    let (half_x, half_y) = (half_axis(radius_x, plane.width()), half_axis(radius_y, plane.height()));
+    let rows_beside =
+        |column: usize| (half_y * (1.0 - (column as f64 / half_x).powi(2)).max(0.0).sqrt()).floor() as usize;
+    let reach_x = half_x.floor() as usize;
+    let heights: Vec<usize> = (0..=reach_x).map(rows_beside).collect();
+    let reach_y = heights[0];
+    over_rows(plane, reach_x, reach_y, |rows, extended, result| {
         let width = result.len();
-        extended[radius_x..radius_x + width].fill(f32::INFINITY);
-        for row in rows {
-            lower(&mut extended[radius_x..radius_x + width], row);
-        }
-        mirror(extended, radius_x, width);
-        result.copy_from_slice(&extended[..width]);
-        for tap in 1..=2 * radius_x {
-            lower(result, &extended[tap..tap + width]);
+        extended[reach_x..reach_x + width].copy_from_slice(rows[reach_y]);
+        result.copy_from_slice(rows[reach_y]);
+        let mut taken = 0;
+        for column in (0..=reach_x).rev() {
+            let least = &mut extended[reach_x..reach_x + width];
+            for row in taken + 1..=heights[column] {
+                lower(least, rows[reach_y - row]);
+                lower(least, rows[reach_y + row]);
+            }
+            taken = heights[column];
+            mirror_by(extended, reach_x, width, column);
+            lower(result, &extended[reach_x - column..reach_x - column + width]);
+            lower(result, &extended[reach_x + column..reach_x + column + width]);
         }
     })
 }
@@ -86,7 +97,12 @@ fn over_rows(
 
 /// Fills `padding` samples on each side of the `width` in the middle with their mirror image.
 fn mirror(extended: &mut [f32], padding: usize, width: usize) {
-    for index in (0..padding).chain(padding + width..2 * padding + width) {
+    mirror_by(extended, padding, width, padding);
+}
+
+/// The same of the `reach` samples next to the middle.
+fn mirror_by(extended: &mut [f32], padding: usize, width: usize, reach: usize) {
+    for index in (padding - reach..padding).chain(padding + width..padding + width + reach) {
         extended[index] = extended[padding + reflect(index as isize - padding as isize, width)];
     }
 }
@@ -117,11 +133,27 @@ mod tests {
     }
 
     #[test]
+    fn erosion_is_the_minimum_of_the_ellipse() {
+        let plane = Plane::from_fn(41, 27, |x, y| ((x * 31 + y * 17) % 101) as f32);
+        for (radius_x, radius_y) in [(0.0_f64, 0.0_f64), (0.4, 0.6), (1.0, 3.2), (8.0, 2.5), (5.3, 5.3), (60.0, 1.0)] {
+            let result = eroded(&plane, radius_x, radius_y);
+            let is_within = |dx: isize, dy: isize| {
+                let along = |way: isize, radius: f64| (way as f64 / (radius + 0.5)).powi(2);
+                along(dx, radius_x) + along(dy, radius_y) <= 1.0
+            };
+            let at = |x: isize, y: isize| plane.get(filter::reflect(x, 41), filter::reflect(y, 27));
+            for (x, y) in (0..41).flat_map(|x| (0..27).map(move |y| (x, y))) {
+                let offsets = (-61..=61).flat_map(|dx| (-9..=9).map(move |dy| (dx, dy)));
+                let within = offsets.filter(|&(dx, dy)| is_within(dx, dy));
+                let least = within.map(|(dx, dy)| at(x + dx, y + dy)).fold(f32::INFINITY, f32::min);
+                assert_eq!(result.get(x as usize, y as usize), least, "({x}, {y}) of {radius_x}, {radius_y}");
+            }
+        }
+    }
+
+    #[test]
     fn small_and_large_windows_agree() {
         let plane = Plane::from_fn(41, 27, |x, y| ((x * 31 + y * 17) % 101) as f32);
-        for (radius_x, radius_y) in [(0, 0), (1, 3), (8, 2)] {
-            assert_eq!(eroded(&plane, radius_x, radius_y), filter::erode_xy(&plane, radius_x, radius_y));
-        }
         let (taps, boxes) =
             (smoothed(&plane, 2.0, 2.5), filter::gaussian_blur_xy(&plane, 2.0_f64.sqrt(), 2.5_f64.sqrt()));
         for (a, b) in taps.values().iter().zip(boxes.values()) {
