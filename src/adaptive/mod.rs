@@ -39,6 +39,7 @@ use settings::{LoopSettings, Sampling};
 use state::RenderState;
 use std::collections::VecDeque;
 use std::time::Instant;
+use until_look::UntilLook;
 
 /// A finished render.
 #[derive(Debug)]
@@ -344,6 +345,10 @@ impl<'a> Loop<'a> {
         self.state.tone = Some(judgement.tone.save());
         // With other limits they may be reached.
         self.state.left_rung = None;
+        let is_by_a_look = matches!(reason, StopReason::Visibility | StopReason::MaxSamples);
+        if is_by_a_look && self.state.until_look.is_some() {
+            self.state.until_look = Some(UntilLook::at_once(&self.state.film));
+        }
         monitor.ended(&self.state);
         Ok(Ended { state: self.state, last_look: Some(LastLook { judgement, stop_reason: reason }) })
     }

@@ -58,6 +58,12 @@ impl UntilLook {
         Self { to_blame: vec![true; pixels], earliest: earliest as u64, latest: latest as u64 }
     }
 
+    /// A look before anything more is traced: whoever goes on from a film that a look has ended must see what that one saw.
+    pub(super) fn at_once(film: &Film) -> Self {
+        let now = film.total_samples();
+        Self { to_blame: vec![true; (film.width() * film.height()) as usize], earliest: now, latest: now }
+    }
+
     /// After a look, while some of the picture is above `visibility`: until that may be reached, if errors fell as 1/n (measured
     /// are 1/n^0.35 to 1/n^0.9), and at least until as many samples are traced as a look costs.
     pub(super) fn after(film: &Film, judgement: &Judgement, visibility: f64) -> Self {

@@ -1,14 +1,14 @@
 //! Renders that were stopped, killed, continued and merged, against renders in one go.
 
 use crate::support::{loop_settings, trace_settings};
-use fechner::adaptive::settings::{Limits, LoopSettings, RivalRule, Sampling};
+use fechner::adaptive::settings::{DENOISED_PILOT_SAMPLES, Limits, LoopSettings, RivalRule, Sampling};
 use fechner::adaptive::state::RenderState;
 use fechner::adaptive::{Directive, Monitor, Progress, Quiet, Rendered, StopReason, render, resume, run};
 use fechner::checkpoint::{
     Checkpoint, Header, Origin, Seeds, SettingsRecord, decode_checkpoint, merge_files, read_checkpoint, seal,
     write_checkpoint,
 };
-use fechner::denoise::Denoiser;
+use fechner::denoise::{Denoiser, DenoiserKind};
 use fechner::film::Film;
 use fechner::integrator::{PathTracer, SamplePlan};
 use fechner::sampler::Half;
@@ -125,6 +125,27 @@ fn a_render_that_is_continued_equals_one_in_one_go() {
             assert_same(&continued.expect("goes on"), &in_one_go);
         }
     }
+}
+
+/// So it is where looks at a denoised picture are far apart: the one that ended the first part is the straight way's, too.
+#[test]
+fn a_denoised_render_that_is_continued_equals_one_in_one_go() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/product.toml");
+    let scene = load(&path, &LoadOptions::default()).expect("our own scene");
+    let nits_per_unit = scene.nits_per_unit;
+    let tracer = PathTracer::new(Arc::new(scene), trace_settings(48, 48, 0));
+    let to = |visibility: f64| {
+        let mut settings = loop_settings(nits_per_unit, Sampling::Adaptive, visibility, None);
+        settings.denoiser = Some(Denoiser::open(DenoiserKind::Builtin).expect("built in"));
+        settings.limits.pilot_samples = DENOISED_PILOT_SAMPLES;
+        settings.limits.mean_samples = Some(150);
+        settings
+    };
+    let monitor = Interrupter::after(u32::MAX);
+    let stopped = render(&tracer, &to(2.0), &monitor).expect("renders");
+    assert_eq!(stopped.stop_reason, StopReason::Visibility);
+    let continued = resume(&tracer, &to(1.0), monitor.state(), &Quiet).expect("goes on");
+    assert_same(&continued, &render(&tracer, &to(1.0), &Quiet).expect("renders"));
 }
 
 /// A render that goes on to fewer samples than were planned takes no more than it may now; with nothing traced, its pilot is cut.
