@@ -14,6 +14,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 mod colour;
+mod dwa;
 mod subsampled;
 mod window;
 
@@ -40,9 +41,10 @@ pub struct ExrImage {
     pub channels: Vec<(String, Vec<f32>)>,
     /// How the file stores each of `channels`.
     pub types: Vec<SampleType>,
-    /// Attributes of the first part, sorted by name. Other types than text and numbers are given as text.
+    /// Attributes of the part that lays the picture out, and those of others that it lacks, sorted by name. Other types than text and
+    /// numbers are given as text.
     pub attributes: Vec<(String, Attribute)>,
-    /// Parts that were left out because their size differs from the first one's, or nothing of them lies in its data window.
+    /// Parts that were left out because nothing of them lies in the data window.
     pub parts_left_out: Vec<String>,
     /// Lines at the bottom that could not be read: an odd rest of lines in a block of subsampled channels.
     pub lines_left_out: u32,
@@ -85,7 +87,7 @@ impl ExrImage {
         self.channels.iter().find(|(n, _)| n == name).map(|(_, values)| values.as_slice())
     }
 
-    /// An attribute of the first part, if it is there.
+    /// An attribute, if it is there.
     pub fn attribute(&self, name: &str) -> Option<&Attribute> {
         self.attributes.iter().find(|(n, _)| n == name).map(|(_, value)| value)
     }
@@ -120,7 +122,7 @@ pub enum ExrReadError {
     },
     /// The pixels would take more than [`MEMORY_LIMIT_BYTES`].
     #[error(
-        "cannot read {}: {width}×{height} pixels of {channels} channels need {} MiB, more than the {} MiB allowed",
+        "cannot read {}: {width}×{height} pixels of {channels} channels need {} MiB, more than the {} MiB allowed; save it with fewer layers",
         .path.display(), .bytes >> 20, MEMORY_LIMIT_BYTES >> 20
     )]
     TooLarge {
@@ -157,6 +159,7 @@ pub fn decode_exr(path: &Path, file: &[u8]) -> Result<ExrImage, ExrReadError> {
         return Ok(image);
     }
     let headers = read_headers(path, file)?;
+    dwa::check(path, file, &headers)?;
     let image = guarded(path, || {
         read()
             .no_deep_data()
@@ -166,15 +169,15 @@ pub fn decode_exr(path: &Path, file: &[u8]) -> Result<ExrImage, ExrReadError> {
             .all_attributes()
             .from_buffered(Cursor::new(file))
     })?;
-    let first = &headers[0];
-    let mut result = image_without_channels(first);
+    let mut result = image_without_channels(layout(&headers));
+    add_missing(&mut result.attributes, &headers);
     let several = image.layer_data.len() > 1;
     let window = result.data_window();
     for layer in image.layer_data {
         let part = layer.attributes.layer_name.as_ref().map(Text::to_string).unwrap_or_default();
         let Vec2(x, y) = layer.attributes.layer_position;
-        let own_window = Window { origin: (x, y), ..window };
-        if layer.size != first.layer_size || !own_window.meets(&window) {
+        let own_window = Window { origin: (x, y), width: layer.size.0 as u32, height: layer.size.1 as u32 };
+        if !own_window.meets(&window) {
             result.parts_left_out.push(part);
             continue;
         }
@@ -191,6 +194,32 @@ pub fn decode_exr(path: &Path, file: &[u8]) -> Result<ExrImage, ExrReadError> {
         }
     }
     Ok(result)
+}
+
+/// The part whose data window all others are put into: the largest of those with a picture, the first of equals. Renderers crop what they
+/// can, and overscan what is filtered later.
+fn layout(headers: &[Header]) -> &Header {
+    let has = |header: &Header, names: &[&str]| {
+        let has_one = |name: &&str| {
+            let is_it = |own: &str| own.rsplit('.').next().is_some_and(|last| last.eq_ignore_ascii_case(name));
+            header.channels.list.iter().any(|channel| is_it(&channel.name.to_string()))
+        };
+        names.iter().all(has_one)
+    };
+    let area = |header: &Header| header.layer_size.0.saturating_mul(header.layer_size.1);
+    let rank = |header: &Header| (has(header, &["R", "G", "B"]), has(header, &["Y"]), area(header));
+    // Of equals `max_by_key` takes the last.
+    headers.iter().rev().max_by_key(|header| rank(header)).unwrap_or(&headers[0])
+}
+
+/// Adds the attributes that other parts have and the picture's has not, such as a unit.
+fn add_missing(list: &mut Vec<(String, Attribute)>, headers: &[Header]) {
+    for (name, value) in headers.iter().flat_map(attributes) {
+        if list.iter().all(|(own, _)| *own != name) {
+            list.push((name, value));
+        }
+    }
+    list.sort_by(|a, b| a.0.cmp(&b.0));
 }
 
 fn image_without_channels(first: &Header) -> ExrImage {
@@ -233,11 +262,12 @@ fn image_without_channels(first: &Header) -> ExrImage {
     }
 }
 
-/// Width and height of the first part of a file that is in memory.
+/// Width and height of the picture of a file that is in memory.
 pub fn size(path: &Path, file: &[u8]) -> Result<[u32; 2], ExrReadError> {
     let headers = read_headers(path, file)?;
-    // There is one, and its sides were checked against the limit of memory.
-    Ok(headers.first().map_or([0, 0], |first| [first.layer_size.0 as u32, first.layer_size.1 as u32]))
+    // Its sides were checked against the limit of memory.
+    let Vec2(width, height) = layout(&headers).layer_size;
+    Ok([width as u32, height as u32])
 }
 
 /// Reads the headers of all parts and refuses what could not be read within [`MEMORY_LIMIT_BYTES`].
@@ -249,12 +279,14 @@ fn read_headers(path: &Path, file: &[u8]) -> Result<Vec<Header>, ExrReadError> {
         return Err(damaged("it is empty".to_owned()));
     }
     let headers = guarded(path, || MetaData::read_from_buffered(Cursor::new(file), false))?.headers;
-    let Some(first) = headers.first() else {
+    if headers.is_empty() {
         return Err(damaged("it has no part".to_owned()));
-    };
+    }
 
     let mut bytes: u64 = 0;
     let mut chunks: u64 = 0;
+    let area = |header: &Header| (header.layer_size.0 as u64).saturating_mul(header.layer_size.1 as u64);
+    let laid_out = area(layout(&headers));
     for header in &headers {
         if header.deep {
             return Err(unsupported("deep pixels are not read; flatten the picture first"));
@@ -266,9 +298,8 @@ fn read_headers(path: &Path, file: &[u8]) -> Result<Vec<Header>, ExrReadError> {
         if width == 0 || height == 0 {
             return Err(damaged("it has no pixels".to_owned()));
         }
-        let pixels = (width as u64).saturating_mul(height as u64);
         let channels = header.channels.list.len() as u64;
-        bytes = bytes.saturating_add(pixels.saturating_mul(channels * 4));
+        bytes = bytes.saturating_add(area(header).max(laid_out).saturating_mul(channels * 4));
         // A single block is unpacked at once, and tiles may be larger than the picture.
         if let BlockDescription::Tiles(tiles) = header.blocks {
             let tile_pixels = (tiles.tile_size.0 as u64).saturating_mul(tiles.tile_size.1 as u64);
@@ -281,8 +312,8 @@ fn read_headers(path: &Path, file: &[u8]) -> Result<Vec<Header>, ExrReadError> {
     if bytes > MEMORY_LIMIT_BYTES {
         return Err(ExrReadError::TooLarge {
             path: path.to_owned(),
-            width: first.layer_size.0 as u64,
-            height: first.layer_size.1 as u64,
+            width: layout(&headers).layer_size.0 as u64,
+            height: layout(&headers).layer_size.1 as u64,
             channels: headers.iter().map(|header| header.channels.list.len()).sum(),
             bytes,
         });

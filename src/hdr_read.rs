@@ -1,15 +1,21 @@
 //! What the header of a Radiance picture (.hdr) does to its values.
 //!
 //! Tools of Radiance leave the pixels of a picture that they brighten as bright as they made them, and say so in its header:
-//! the light that was there is the value divided by all factors (Radiance's file formats, `EXPOSURE=` and `COLORCORR=`).
+//! the light that was there is the value divided by all factors (Radiance's file formats, `EXPOSURE=` and `COLORCORR=`). `PRIMARIES=`
+//! says of which colours that light is.
 
+use fechner_perception::primaries::{Matrix, Primaries, apply};
 use image::codecs::hdr::{HdrDecoder, HdrMetadata};
+use std::borrow::Cow;
 
 /// The factors of a header, those of its lines multiplied.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HdrHeader {
     /// What red, green and blue are to be multiplied by.
     to_light: [f32; 3],
+    /// To Rec.709, where the primaries are others. Their white becomes its white: that of Radiance's own is of equal energy, and means no
+    /// colour.
+    to_rec709: Option<Matrix>,
     /// Width of a pixel over its height; 1 where the file's is none that a pixel can have (0.01 to 100).
     pub pixel_aspect_ratio: f64,
 }
@@ -17,9 +23,10 @@ pub struct HdrHeader {
 impl HdrHeader {
     /// The header of a file's bytes; one that changes nothing where they are no Radiance picture.
     pub fn of(bytes: &[u8]) -> Self {
-        HdrDecoder::new(bytes).map_or(Self { to_light: [1.0; 3], pixel_aspect_ratio: 1.0 }, |decoder| {
-            Self::from_metadata(&decoder.metadata())
-        })
+        HdrDecoder::new(bytes)
+            .map_or(Self { to_light: [1.0; 3], to_rec709: None, pixel_aspect_ratio: 1.0 }, |decoder| {
+                Self::from_metadata(&decoder.metadata())
+            })
     }
 
     fn from_metadata(metadata: &HdrMetadata) -> Self {
@@ -30,6 +37,7 @@ impl HdrHeader {
         let height_over_width = f64::from(metadata.pixel_aspect_ratio.unwrap_or(1.0));
         Self {
             to_light: [red, green, blue].map(|correction| (divisor(exposure) * divisor(correction)).recip()),
+            to_rec709: primaries(metadata).and_then(|own| own.to_adapted(&Primaries::REC709)),
             pixel_aspect_ratio: if (0.01..=100.0).contains(&height_over_width) {
                 height_over_width.recip()
             } else {
@@ -40,7 +48,30 @@ impl HdrHeader {
 
     /// The light that a pixel's value stands for.
     pub fn light(&self, [red, green, blue]: [f32; 3]) -> [f32; 3] {
-        [red * self.to_light[0], green * self.to_light[1], blue * self.to_light[2]]
+        let light = [red * self.to_light[0], green * self.to_light[1], blue * self.to_light[2]];
+        self.to_rec709.map_or(light, |matrix| apply(&matrix, light.map(f64::from)).map(|value| value as f32))
+    }
+}
+
+/// The last line of primaries, where it holds eight coordinates of others than Rec.709's.
+fn primaries(metadata: &HdrMetadata) -> Option<Primaries> {
+    let (_, text) = metadata.custom_attributes.iter().rfind(|(key, _)| key.trim() == "PRIMARIES")?;
+    let numbers: Vec<f64> = text.split_whitespace().map(|word| word.parse().ok()).collect::<Option<_>>()?;
+    let &[rx, ry, gx, gy, bx, by, wx, wy] = &numbers[..] else { return None };
+    let own = Primaries { red: [rx, ry], green: [gx, gy], blue: [bx, by], white: [wx, wy] };
+    let points = |p: &Primaries| [p.red, p.green, p.blue, p.white];
+    let ours = points(&Primaries::REC709);
+    let is_ours = points(&own).iter().flatten().zip(ours.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-3);
+    (!is_ours).then_some(own)
+}
+
+/// The file with the signature that decoders look for: some programs write `#?RGBE`.
+pub fn with_known_signature(bytes: &[u8]) -> Cow<'_, [u8]> {
+    match bytes.strip_prefix(b"#?RGBE") {
+        Some(rest) if rest.first().is_some_and(|byte| byte.is_ascii_whitespace()) => {
+            Cow::Owned([b"#?RADIANCE", rest].concat())
+        }
+        _ => Cow::Borrowed(bytes),
     }
 }
 
@@ -59,7 +90,14 @@ mod tests {
         let twice = picture("EXPOSURE=2\nEXPOSURE= 4\nCOLORCORR=1 0.5 2\nPIXASPECT=0.5\n");
         assert_eq!(twice.light([1.0; 3]), [0.125, 0.25, 0.0625]);
         assert_eq!(twice.pixel_aspect_ratio, 2.0);
-        for useless in ["", "EXPOSURE=0\n", "EXPOSURE=-3\nPIXASPECT=0\n"] {
+        let wide = picture("PRIMARIES=0.708 0.292 0.17 0.797 0.131 0.046 0.3127 0.329\n");
+        let [red, green, blue] = wide.light([1.0, 0.0, 0.0]);
+        assert!((red - 1.6605).abs() < 1e-3 && (green + 0.1246).abs() < 1e-3 && (blue + 0.0182).abs() < 1e-3);
+        let own = picture("PRIMARIES= 0.640 0.330 0.290 0.600 0.150 0.060 0.333 0.333\n").light([0.5; 3]);
+        assert!(own.iter().all(|value| (value - 0.5).abs() < 1e-6), "{own:?}");
+        for useless in
+            ["", "EXPOSURE=0\n", "EXPOSURE=-3\nPIXASPECT=0\n", "PRIMARIES=1 2 3\n", "PRIMARIES=0 0 0 0 0 0 0 0\n"]
+        {
             assert_eq!(picture(useless).light([1.0; 3]), [1.0; 3], "{useless}");
             assert_eq!(picture(useless).pixel_aspect_ratio, 1.0, "{useless}");
         }

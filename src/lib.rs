@@ -26,6 +26,7 @@ pub mod film;
 pub mod geometry;
 pub mod hdr_read;
 pub mod integrator;
+pub mod jpeg_read;
 pub mod light;
 pub mod lock;
 pub mod output;

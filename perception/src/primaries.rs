@@ -24,6 +24,12 @@ impl Primaries {
     pub const REC2020: Self =
         Self { red: [0.708, 0.292], green: [0.170, 0.797], blue: [0.131, 0.046], white: [0.3127, 0.3290] };
 
+    /// Display P3: DCI-P3 with the white of Rec.709.
+    pub const DISPLAY_P3: Self =
+        Self { red: [0.680, 0.320], green: [0.265, 0.690], blue: [0.150, 0.060], white: [0.3127, 0.3290] };
+    /// CIE XYZ itself, whose white is that of equal energy.
+    pub const XYZ: Self = Self { red: [1.0, 0.0], green: [0.0, 1.0], blue: [0.0, 0.0], white: [1.0 / 3.0, 1.0 / 3.0] };
+
     /// From linear RGB to XYZ with the white at Y = 1; `None` where the three primaries span no colours.
     #[must_use]
     pub fn to_xyz(&self) -> Option<Matrix> {

@@ -39,33 +39,67 @@ const NOT_THE_PICTURE: [&str; 14] = [
 /// What renderers call the finished picture; R, G and B without a layer come first.
 const THE_PICTURE: [&str; 5] = ["combined", "beauty", "rgba", "color", "image"];
 
-/// The picture: `R`, `G`, `B` if the file has them, else of a layer a part of whose name, between dots, is what a finished picture is
-/// called (`RenderLayer.Combined.R`), else of the first layer; auxiliaries only where a part of their name says picture and nothing
-/// else is there; else `Y`. All three come from one layer.
-pub(super) fn colour<'a>(exr: &'a ExrImage) -> Option<Colour<'a>> {
+/// What Blender calls passes of light and of colour.
+const BLENDER_PASSES: [&str; 14] = [
+    "diffcol",
+    "diffdir",
+    "diffind",
+    "glosscol",
+    "glossdir",
+    "glossind",
+    "transcol",
+    "transdir",
+    "transind",
+    "volumedir",
+    "volumeind",
+    "emit",
+    "env",
+    "ao",
+];
+
+/// The layer that is taken for the picture.
+struct PictureLayer<'a> {
+    name: &'a str,
+    /// Those that could be meant as well, it among them; empty where its name says that it is the picture, or no other is one.
+    of: Vec<&'a str>,
+}
+
+/// The root if it has `R`, `G` and `B`, else a layer a part of whose name, between dots, is what a finished picture is
+/// called (`RenderLayer.Combined.R`), else the first layer; auxiliaries only where a part of their name says picture and nothing
+/// else is there.
+fn picture_layer<'a>(exr: &'a ExrImage) -> Option<PictureLayer<'a>> {
     let layers = layers_with(exr, &["R", "G", "B"]);
-    let is_auxiliary = |layer: &str| NOT_THE_PICTURE.iter().any(|name| layer.to_ascii_lowercase().contains(*name));
+    let is_part = |layer: &str, name: &str| layer.split('.').any(|part| part.eq_ignore_ascii_case(name));
+    let is_auxiliary = |layer: &str| {
+        NOT_THE_PICTURE.iter().any(|name| layer.to_ascii_lowercase().contains(*name))
+            || BLENDER_PASSES.iter().any(|name| is_part(layer, name))
+    };
     let (auxiliary, others): (Vec<&str>, Vec<&str>) = layers.into_iter().partition(|layer| is_auxiliary(layer));
     let called = |layers: &[&'a str]| {
-        let is = |layer: &str, name: &str| layer.split('.').any(|part| part.eq_ignore_ascii_case(name));
-        THE_PICTURE.iter().find_map(|name| layers.iter().copied().find(|layer| is(layer, name)))
+        THE_PICTURE.iter().find_map(|name| layers.iter().copied().find(|layer| is_part(layer, name)))
     };
-    let best = others
-        .iter()
-        .copied()
-        .find(|layer| layer.is_empty())
-        .or_else(|| called(&others))
-        .or_else(|| others.first().copied())
-        .or_else(|| called(&auxiliary));
-    match best {
-        Some(layer) => {
-            let [Some(r), Some(g), Some(b)] = ["R", "G", "B"].map(|part| part_of(exr, layer, part)) else {
-                return None;
-            };
-            Some(Colour::Rgb([r, g, b]))
-        }
-        None => exr.channel("Y").map(Colour::Grey),
+    let named = others.iter().copied().find(|layer| layer.is_empty()).or_else(|| called(&others));
+    let sure = |name| PictureLayer { name, of: Vec::new() };
+    match (named, &others[..]) {
+        (Some(name), _) | (None, &[name]) => Some(sure(name)),
+        (None, []) => called(&auxiliary).map(sure),
+        (None, &[name, ..]) => Some(PictureLayer { name, of: others }),
     }
+}
+
+/// What to say of a picture whose layer had to be guessed.
+pub(super) fn guess(exr: &ExrImage) -> Option<String> {
+    let layer = picture_layer(exr).filter(|layer| !layer.of.is_empty())?;
+    Some(format!("the layer {} is taken for the picture, of {}", layer.name, layer.of.join(", ")))
+}
+
+/// The picture: `R`, `G` and `B` of one layer, else `Y`.
+pub(super) fn colour<'a>(exr: &'a ExrImage) -> Option<Colour<'a>> {
+    let Some(layer) = picture_layer(exr) else { return exr.channel("Y").map(Colour::Grey) };
+    let [Some(r), Some(g), Some(b)] = ["R", "G", "B"].map(|part| part_of(exr, layer.name, part)) else {
+        return None;
+    };
+    Some(Colour::Rgb([r, g, b]))
 }
 
 /// Names of layers that hold motion from this frame to the next, the surest first.
@@ -205,6 +239,11 @@ mod tests {
             rgb_of(&["MaskedView.Combined.B", "MaskedView.Combined.G", "MaskedView.Combined.R"]),
             Some([2.0, 1.0, 0.0])
         );
+        let blender = ["V.DiffCol.B", "V.DiffCol.G", "V.DiffCol.R", "V.Noisy.B", "V.Noisy.G", "V.Noisy.R"];
+        assert_eq!((rgb_of(&blender), guess(&exr(&blender))), (Some([5.0, 4.0, 3.0]), None));
+        let two = ["a.B", "a.G", "a.R", "b.B", "b.G", "b.R"];
+        assert_eq!(rgb_of(&two), Some([2.0, 1.0, 0.0]));
+        assert_eq!(guess(&exr(&two)).as_deref(), Some("the layer a is taken for the picture, of a, b"));
         assert_eq!(colour(&exr(&["Y"])), Some(Colour::Grey(&[0.0])));
         assert_eq!(colour(&exr(&["Z"])), None);
     }

@@ -8,7 +8,7 @@ use super::kept_tone::shown_by;
 use super::picture::InputPicture;
 use super::seeing::{SeeingArguments, operator_values};
 use super::targets::check_kept;
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::output::{self, Format};
 use fechner_perception::csf;
@@ -87,7 +87,7 @@ impl Seen {
 
 /// Exit status 0: the same to the eye; 1: told apart.
 pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
-    let has_number = |path: &Path| path.to_string_lossy().contains('#');
+    let has_number = |path: &Path| path.file_name().is_some_and(|name| name.to_string_lossy().contains('#'));
     if has_number(&arguments.reference) || has_number(&arguments.test) {
         return sequence::run(arguments);
     }
@@ -111,8 +111,10 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
     let test = InputPicture::read(&arguments.test, nits_per_unit)?;
     check_alike((&arguments.reference, &reference), (&arguments.test, &test))?;
     let pictures = [(arguments.reference.as_path(), &reference), (arguments.test.as_path(), &test)];
-    arguments.seeing.note_idle(arguments.operator.as_deref(), &pictures);
-    let viewing = reference.viewed(&arguments.seeing.viewing(&pictures)?)?;
+    arguments.seeing.note_what_is_ready(arguments.operator.as_deref(), &pictures);
+    let viewing = reference
+        .viewed(&arguments.seeing.viewing(&pictures)?)
+        .with_context(|| arguments.reference.display().to_string())?;
     let csf = csf::by_name(&arguments.seeing.csf, &viewing)?;
     let fitted = shown_by(arguments.operator.as_deref(), &pictures, &viewing)?;
     let (width, height) = reference.size();
@@ -161,7 +163,7 @@ fn check_map(path: &Path) -> Result<()> {
 }
 
 /// Only pictures of one size and shape can be compared.
-fn check_alike(
+pub(super) fn check_alike(
     (reference_file, reference): (&Path, &InputPicture),
     (test_file, test): (&Path, &InputPicture),
 ) -> Result<()> {

@@ -119,7 +119,7 @@ fn describe_exr(image: &ExrImage) -> String {
         Range::of(values.iter().copied()).row(&mut text, name, &kind.to_string(), width);
     }
     for part in &image.parts_left_out {
-        let _ = writeln!(text, "  part \"{part}\" has another size and is not shown");
+        let _ = writeln!(text, "  part \"{part}\" lies elsewhere and is not shown");
     }
     if !image.attributes.is_empty() {
         text.push('\n');

@@ -91,19 +91,17 @@ pub(super) fn first_scene<'p>(pictures: &[(&'p Path, &'p InputPicture)]) -> Opti
 pub(super) fn as_rendered(pictures: &[(&Path, &InputPicture)], viewing: &Viewing) -> Option<Box<dyn FittedTone>> {
     let (path, picture) = first_scene(pictures)?;
     let kept = picture.kept_tone()?;
+    let KeptTone::Rendered(tone) = kept else { return None };
     let path = path.display();
     let fitted = kept.on(viewing);
-    match (kept, &fitted) {
-        (KeptTone::Displayed, _) => {
-            say!("note: {path} holds light of a display, and is shown as it is; --operator shows it by another")
-        }
-        (KeptTone::Rendered(_), Some(fitted)) => {
+    match &fitted {
+        Some(fitted) => {
             say!(
                 "note: shown as {path} was when it was rendered, by {}; --operator shows it by another",
                 fitted.describe()
             );
         }
-        (KeptTone::Rendered(tone), None) => say!(
+        None => say!(
             "note: {path} was rendered for the display \"{}\", which is not as bright and dark as \"{}\": it is shown by {DEFAULT_OPERATOR}, \
              and not by the render's operator and exposure",
             tone.display,

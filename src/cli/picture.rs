@@ -4,14 +4,16 @@ use super::channels::{self, Colour};
 use super::kept_tone::KeptTone;
 use anyhow::{Context, Result, bail};
 use fechner::exr_read::{ExrImage, read_exr};
-use fechner::hdr_read::HdrHeader;
+use fechner::hdr_read::{HdrHeader, with_known_signature};
+use fechner::jpeg_read;
 use fechner::output::{self, Attribute, NITS_PER_UNIT, PngTransfer};
 use fechner_perception::Plane;
 use fechner_perception::display::{Display, Eotf, Viewing};
 use fechner_perception::photometry::luminance;
+use fechner_perception::primaries::{Primaries, apply};
 use fechner_perception::tone::{FittedTone, SceneLight, ToneOperator, map_picture, map_pixels};
-use image::DynamicImage;
 use image::GenericImageView as _;
+use image::{DynamicImage, ImageFormat};
 use std::path::Path;
 
 /// A picture from a file.
@@ -34,6 +36,8 @@ type Mapping = fn(&dyn FittedTone, usize, &[[f32; 3]]) -> Vec<[f32; 3]>;
 enum Content {
     /// Linear radiance; RGB (1, 1, 1) has this luminance in cd/m².
     Scene { nits_per_unit: f64 },
+    /// The same of what a display emits, as `tonemap` writes it: nothing more has to bring it there.
+    Emitted { nits_per_unit: f64 },
     /// Code values, 0 to 1.
     Display(Codes),
 }
@@ -43,9 +47,11 @@ enum Content {
 enum Codes {
     /// Light of the display between its black and its white, under the curve of sRGB: colour management brings it to a display
     /// of any other transfer function.
-    Srgb,
-    /// cd/m² in Rec.2020 primaries, under the curve of SMPTE ST 2084.
-    Pq,
+    Srgb(Primaries),
+    /// The same light as it is.
+    Linear(Primaries),
+    /// cd/m² under the curve of SMPTE ST 2084.
+    Pq(Primaries),
     /// What the display gets.
     Display,
 }
@@ -72,28 +78,31 @@ impl InputPicture {
                 _ => None,
             })
         };
-        let nits_per_unit = nits_per_unit.or_else(in_file).with_context(|| no_unit(path))?;
+        if let (Some(own), Some(asked)) = (in_file(), nits_per_unit) {
+            say!(
+                "note: {}: its own unit of {own} cd/m² stands; --nits-per-unit {asked} is for files that do not say it",
+                path.display()
+            );
+        }
+        let nits_per_unit = in_file().or(nits_per_unit).with_context(|| no_unit(path))?;
         let Some(picture) = exr.scene_picture(picture_channel) else {
             bail!("{}: there are no channels R, G and B, nor Y; `fechner info` lists what there is", path.display());
         };
-        for note in &picture.notes {
+        for note in channels::guess(exr).iter().chain(&picture.notes) {
             say!("note: {}: {note}", path.display());
         }
-        let content = Content::Scene { nits_per_unit };
+        let kept_tone = KeptTone::of(exr);
+        let content = match kept_tone {
+            Some(KeptTone::Displayed) => Content::Emitted { nits_per_unit },
+            _ => Content::Scene { nits_per_unit },
+        };
         let (width, height) = (picture.width as usize, picture.height as usize);
-        Ok(Self {
-            width,
-            height,
-            rgb: picture.rgb,
-            content,
-            pixel_aspect_ratio: exr.pixel_aspect_ratio,
-            kept_tone: KeptTone::of(exr),
-        })
+        Ok(Self { width, height, rgb: picture.rgb, content, pixel_aspect_ratio: exr.pixel_aspect_ratio, kept_tone })
     }
 
     fn from_hdr(path: &Path, nits_per_unit: f64) -> Result<Self> {
         let bytes = std::fs::read(path).with_context(|| format!("{}", path.display()))?;
-        let header = HdrHeader::of(&bytes);
+        let header = HdrHeader::of(&with_known_signature(&bytes));
         let mut picture = Self::from_image(decoded_image(path, &bytes)?, Content::Scene { nits_per_unit });
         picture.rgb.iter_mut().for_each(|rgb| *rgb = header.light(*rgb));
         picture.pixel_aspect_ratio = header.pixel_aspect_ratio;
@@ -103,14 +112,20 @@ impl InputPicture {
     fn from_codes(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).with_context(|| format!("{}", path.display()))?;
         let mut image = decoded_image(path, &bytes)?;
-        let codes = match output::png_transfer(&bytes) {
-            PngTransfer::Pq => Codes::Pq,
+        let colour = output::png_colour(&bytes);
+        for note in &colour.notes {
+            say!("note: {}: {note}", path.display());
+        }
+        let of = |primaries: Primaries| colour.primaries.unwrap_or(primaries);
+        let codes = match colour.transfer {
+            PngTransfer::Pq => Codes::Pq(of(Primaries::REC2020)),
             PngTransfer::HybridLogGamma => bail!("{}: hybrid log-gamma is not read", path.display()),
+            PngTransfer::Linear => Codes::Linear(of(Primaries::REC709)),
             PngTransfer::Untagged if bytes_a_channel(&image) > 1 => Codes::Display,
-            PngTransfer::Srgb | PngTransfer::Untagged => Codes::Srgb,
+            PngTransfer::Srgb | PngTransfer::Untagged => Codes::Srgb(of(Primaries::REC709)),
         };
         if image.color().has_alpha() && image.pixels().any(|(_, _, pixel)| pixel.0[3] < u8::MAX) {
-            if codes == Codes::Srgb {
+            if matches!(codes, Codes::Srgb(_)) {
                 say!("note: {}: what is transparent lies before black", path.display());
                 image = before_black(image);
             } else {
@@ -162,6 +177,11 @@ impl InputPicture {
         matches!(self.content, Content::Scene { .. })
     }
 
+    /// Whether it holds the light of a display, and not its codes.
+    pub(super) fn holds_emitted_light(&self) -> bool {
+        matches!(self.content, Content::Emitted { .. })
+    }
+
     /// The operator fitted to this picture; `None` for one that is ready for the display.
     pub(super) fn fit(&self, operator: &dyn ToneOperator, viewing: &Viewing) -> Option<Box<dyn FittedTone>> {
         let light = SceneLight::of(operator, self.width, &self.scene_rgb_cd_m2()?);
@@ -185,21 +205,39 @@ impl InputPicture {
 
     /// The same of codes that are ready for the display.
     fn decoded(&self, display: &Display) -> Vec<[f32; 3]> {
-        let eotf = match self.content {
-            Content::Display(Codes::Pq) => Eotf::Pq,
-            Content::Display(Codes::Display) => display.eotf,
-            Content::Display(Codes::Srgb) | Content::Scene { .. } => Eotf::Srgb,
+        let linear = |eotf: Eotf| {
+            let light = |code: f32| eotf.decode(f64::from(code), display.white_cd_m2) as f32;
+            self.rgb.iter().map(|rgb| rgb.map(light)).collect()
         };
-        if eotf == Eotf::Pq {
-            return output::decode_pq(&self.rgb, display);
+        match self.content {
+            Content::Display(Codes::Pq(primaries)) => output::decode_pq(&self.rgb, &primaries, display),
+            Content::Display(Codes::Display) if display.eotf == Eotf::Pq => {
+                output::decode_pq(&self.rgb, &Primaries::REC2020, display)
+            }
+            Content::Display(Codes::Display) => linear(display.eotf),
+            Content::Display(Codes::Srgb(primaries)) => in_rec709(linear(Eotf::Srgb), &primaries),
+            Content::Display(Codes::Linear(primaries)) => in_rec709(self.rgb.clone(), &primaries),
+            Content::Scene { nits_per_unit } | Content::Emitted { nits_per_unit } => {
+                self.emitted(nits_per_unit, display)
+            }
         }
-        let linear = |code: f32| eotf.decode(f64::from(code), display.white_cd_m2) as f32;
-        self.rgb.iter().map(|rgb| rgb.map(linear)).collect()
+    }
+
+    /// The same of what a display emits in such a unit.
+    fn emitted(&self, nits_per_unit: f64, display: &Display) -> Vec<[f32; 3]> {
+        let (dark, span) = (display.black_cd_m2, (display.white_cd_m2 - display.black_cd_m2).max(1e-6));
+        let relative = |value: f32| ((f64::from(value) * nits_per_unit - dark) / span) as f32;
+        self.rgb.iter().map(|rgb| rgb.map(relative)).collect()
     }
 
     /// Linear RGB in cd/m² of the scene; `None` for a picture that is ready for the display.
     pub(super) fn scene_rgb_cd_m2(&self) -> Option<Vec<[f32; 3]>> {
-        let Content::Scene { nits_per_unit } = self.content else { return None };
+        self.light_cd_m2().filter(|_| self.holds_scene_light())
+    }
+
+    /// Linear RGB in cd/m² of the scene, or of the display whose light it holds; `None` for code values.
+    pub(super) fn light_cd_m2(&self) -> Option<Vec<[f32; 3]>> {
+        let (Content::Scene { nits_per_unit } | Content::Emitted { nits_per_unit }) = self.content else { return None };
         let cd_m2 = |value: f32| (f64::from(value) * nits_per_unit).clamp(-1e30, 1e30) as f32;
         Some(self.rgb.iter().map(|pixel| pixel.map(cd_m2)).collect())
     }
@@ -232,6 +270,15 @@ impl InputPicture {
     }
 }
 
+/// Light of other primaries in those of Rec.709.
+fn in_rec709(light: Vec<[f32; 3]>, primaries: &Primaries) -> Vec<[f32; 3]> {
+    if *primaries == Primaries::REC709 {
+        return light;
+    }
+    let Some(matrix) = primaries.to(&Primaries::REC709) else { return light };
+    light.into_iter().map(|rgb| apply(&matrix, rgb.map(f64::from)).map(|value| value as f32)).collect()
+}
+
 fn bytes_a_channel(image: &DynamicImage) -> u8 {
     let color = image.color();
     color.bytes_per_pixel() / color.channel_count()
@@ -250,17 +297,30 @@ fn before_black(image: DynamicImage) -> DynamicImage {
     DynamicImage::ImageRgba32F(picture)
 }
 
-/// A picture of a limited size, whatever its name says it is.
+/// A picture of a limited size. What its values mean goes by its name, so that its bytes must be what that says.
 fn decoded_image(path: &Path, bytes: &[u8]) -> Result<DynamicImage> {
-    let mut reader = image::ImageReader::new(std::io::Cursor::new(bytes))
-        .with_guessed_format()
-        .with_context(|| format!("{}", path.display()))?;
+    let bytes = &*with_known_signature(bytes);
+    let named = ImageFormat::from_path(path).with_context(|| format!("{}", path.display()))?;
+    let found = image::guess_format(bytes).with_context(|| format!("{}: not a readable picture", path.display()))?;
+    if found != named {
+        bail!("{}: its bytes are those of a file of another kind ({}): name it so", path.display(), words_of(found));
+    }
+    if found == ImageFormat::Jpeg && !jpeg_read::has_end(bytes) {
+        bail!("{}: {}", path.display(), jpeg_read::CUT_OFF);
+    }
+    let mut reader = image::ImageReader::with_format(std::io::Cursor::new(bytes), found);
     let mut limits = image::Limits::default();
     limits.max_image_width = Some(1 << 15);
     limits.max_image_height = Some(1 << 15);
     limits.max_alloc = Some(1 << 30);
     reader.limits(limits);
     reader.decode().with_context(|| format!("{}: not a readable picture", path.display()))
+}
+
+/// What files of a format are called.
+fn words_of(format: ImageFormat) -> String {
+    let endings = format.extensions_str().first();
+    endings.map_or_else(|| format!("{format:?}"), |ending| format!(".{ending}"))
 }
 
 /// A channel of the file's picture by its last name, all three from one layer.

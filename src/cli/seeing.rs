@@ -71,8 +71,11 @@ impl SeeingArguments {
         display_file(self.display.as_deref())
     }
 
-    /// Says which arguments change nothing of pictures that are all ready for the display.
-    pub(super) fn note_idle(&self, operator: Option<&str>, pictures: &[(&Path, &InputPicture)]) {
+    /// Says which pictures hold light of a display, and which arguments change nothing of pictures that are all ready for it.
+    pub(super) fn note_what_is_ready(&self, operator: Option<&str>, pictures: &[(&Path, &InputPicture)]) {
+        for (path, _) in pictures.iter().filter(|(_, picture)| picture.holds_emitted_light()) {
+            say!("note: {} holds light of a display, and is shown as it is", path.display());
+        }
         let Some((path, _)) = pictures.first().filter(|_| first_scene(pictures).is_none()) else { return };
         let is_asked = [("--operator", operator.is_some()), ("--nits-per-unit", self.nits_per_unit.is_some())];
         for (argument, _) in is_asked.iter().filter(|(_, is_asked)| *is_asked) {

@@ -2,6 +2,7 @@
 
 use super::animate::parse_rate;
 use super::channels;
+use super::compare::check_alike;
 use super::kept_tone::shown_by;
 use super::picture::InputPicture;
 use super::seeing::{SeeingArguments, model_values, operator_values};
@@ -72,7 +73,7 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     let names = std::iter::once(&arguments.input).chain(arguments.halves.iter().flatten());
     let pictures = std::iter::once(&guide).chain(halves.iter().flatten());
     let named: Vec<_> = names.map(PathBuf::as_path).zip(pictures).collect();
-    arguments.seeing.note_idle(arguments.operator.as_deref(), &named);
+    arguments.seeing.note_what_is_ready(arguments.operator.as_deref(), &named);
     let mut viewing = arguments.seeing.viewing(&named)?;
     if let Some(age_years) = arguments.glare {
         viewing.observer.glare = Glare::Cie { age_years };
@@ -149,8 +150,8 @@ fn read_halves(arguments: &ThresholdArguments, guide: &InputPicture) -> Result<O
     let Some([a, b]) = arguments.halves.as_deref() else { return Ok(None) };
     let [a, b] = [a, b].map(|path| InputPicture::read(path, arguments.seeing.nits_per_unit));
     let halves = [a?, b?];
-    if halves.iter().any(|half| half.size() != guide.size()) {
-        bail!("the halves do not have the size of {}", arguments.input.display());
+    for (path, half) in arguments.halves.iter().flatten().zip(&halves) {
+        check_alike((&arguments.input, guide), (path, half))?;
     }
     Ok(Some(halves))
 }
@@ -163,7 +164,7 @@ fn half_difference(halves: &[InputPicture; 2], fitted: Option<&dyn FittedTone>, 
 
 /// How what a picture shows moves.
 struct Motion {
-    /// Speed over the picture.
+    /// Speed over the picture, of the motions to the next frame and to the previous one the slower.
     image_velocity_deg_s: Plane,
     /// How much each pixel attracts the gaze, 0 to 1; `None`: everything is followed.
     attention: Option<Plane>,
@@ -177,8 +178,10 @@ impl Motion {
         fitted: Option<&dyn FittedTone>,
         viewing: &Viewing,
     ) -> Result<Self> {
-        let [x, y] = read_velocity(path, guide.size(), viewing.display.frames_per_second)?;
-        let image_velocity_deg_s = image_velocity_deg_s(&x, &y, &viewing.display)?;
+        let motions = read_velocity(path, guide.size(), viewing.display.frames_per_second)?;
+        let speed = |[x, y]: &[Plane; 2]| image_velocity_deg_s(x, y, &viewing.display);
+        let [to_next, to_previous] = motions.each_ref().map(speed);
+        let image_velocity_deg_s = to_next?.combined(&to_previous?, f32::min);
         let attention = if by_saliency {
             let rgb = guide.displayed_rgb(fitted, viewing);
             Some(saliency_of_displayed(guide.size().0, &rgb, &image_velocity_deg_s, &viewing.display)?)
@@ -189,10 +192,10 @@ impl Motion {
     }
 }
 
-/// Motion in pixels under the names that renderers give it.
-fn read_velocity(path: &Path, size: (usize, usize), frames_per_second: f64) -> Result<[Plane; 2]> {
+/// Motion in pixels to the next frame and to the previous one, under the names that renderers give it.
+fn read_velocity(path: &Path, size: (usize, usize), frames_per_second: f64) -> Result<[[Plane; 2]; 2]> {
     let exr = channels::read_of_size(path, size)?;
-    let Some((layer, [x, y])) = channels::motion(&exr) else {
+    let (Some((layer, _)), Some(motions)) = (channels::motion(&exr), channels::both_motions(&exr)) else {
         bail!(
             "{}: no motion channels; velocity.X/Y, Vector.X/Y, motion.X/Y and forward.u/v are known, with or without a layer \
              before them",
@@ -200,7 +203,10 @@ fn read_velocity(path: &Path, size: (usize, usize), frames_per_second: f64) -> R
         );
     };
     answer!("motion from the channels of {layer} at {frames_per_second} frames a second");
-    Ok([channels::motion_plane(&exr, x.to_vec())?, channels::motion_plane(&exr, y.to_vec())?])
+    let planes = |[x, y]: [Vec<f32>; 2]| -> Result<[Plane; 2]> {
+        Ok([channels::motion_plane(&exr, x)?, channels::motion_plane(&exr, y)?])
+    };
+    Ok([planes(motions.to_next)?, planes(motions.to_previous)?])
 }
 
 fn median(plane: &Plane) -> f32 {

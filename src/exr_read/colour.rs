@@ -17,45 +17,39 @@ pub struct ScenePicture {
     pub notes: Vec<String>,
 }
 
-/// Channels of a picture, one value a pixel each.
-struct Channels<'a> {
-    red: &'a [f32],
-    green: &'a [f32],
-    blue: &'a [f32],
-}
-
 impl ExrImage {
     /// The picture in linear Rec.709 RGB over the display window; `None` where there is neither R, G and B nor luminance.
     ///
-    /// `find` finds a channel by its last name (renderers prefix layers). Chromaticities are honoured: colours stay what they
+    /// `find` finds a channel R, G or B by its last name (renderers prefix layers). Without them X, Y and Z are CIE XYZ. Chromaticities are honoured: colours stay what they
     /// are, white included. Not finite values become 0 (NaN, −∞) or the largest finite value of the picture (∞).
     pub fn scene_picture<'a>(&'a self, find: impl Fn(&'a Self, &str) -> Option<&'a [f32]>) -> Option<ScenePicture> {
         let mut notes = Vec::new();
-        let primaries = self.chromaticities.unwrap_or(Primaries::REC709);
-        let channel = |name: &str| find(self, name);
-        let mut rgb: Vec<[f32; 3]> = match (channel("R"), channel("G"), channel("B")) {
-            (Some(red), Some(green), Some(blue)) => {
-                let channels = Channels { red, green, blue };
-                (0..red.len()).map(|i| [channels.red[i], channels.green[i], channels.blue[i]]).collect()
-            }
-            _ => {
-                let luminance = self.channel("Y")?;
-                match (self.channel("RY"), self.channel("BY")) {
-                    (Some(red), Some(blue)) => {
-                        notes.push("luminance and chroma made RGB again".to_owned());
-                        from_chroma(luminance, red, blue, &primaries)
-                    }
-                    _ => luminance.iter().map(|&y| [y; 3]).collect(),
-                }
-            }
+        let mut primaries = self.chromaticities.unwrap_or(Primaries::REC709);
+        let of_three = |[red, green, blue]: [&[f32]; 3]| -> Vec<[f32; 3]> {
+            red.iter().zip(green).zip(blue).map(|((&r, &g), &b)| [r, g, b]).collect()
+        };
+        let own = |names: [&str; 3]| all(names.map(|name| self.channel(name)));
+        let mut rgb: Vec<[f32; 3]> = if let Some(channels) = all(["R", "G", "B"].map(|name| find(self, name))) {
+            of_three(channels)
+        } else if let Some(channels) = own(["X", "Y", "Z"]) {
+            notes.push("channels X, Y and Z taken for CIE XYZ".to_owned());
+            primaries = Primaries::XYZ;
+            of_three(channels)
+        } else if let Some([luminance, red, blue]) = own(["Y", "RY", "BY"]) {
+            notes.push("luminance and chroma made RGB again".to_owned());
+            from_chroma(luminance, red, blue, &primaries)
+        } else {
+            self.channel("Y")?.iter().map(|&y| [y; 3]).collect()
         };
         let replaced = replace_what_is_not_finite(&mut rgb);
         if replaced > 0 {
             notes.push(format!("{replaced} values that are not finite were replaced"));
         }
-        if let Some(matrix) = self.to_rec709() {
+        if let Some(matrix) = to_rec709(&primaries) {
             rgb.iter_mut().for_each(|pixel| *pixel = apply(&matrix, pixel.map(f64::from)).map(|c| c as f32));
-            notes.push("colours brought from the file's chromaticities to Rec.709".to_owned());
+            if self.chromaticities == Some(primaries) {
+                notes.push("colours brought from the file's chromaticities to Rec.709".to_owned());
+            }
             replace_what_is_not_finite(&mut rgb);
         }
         if self.lines_left_out > 0 {
@@ -78,21 +72,24 @@ impl ExrImage {
         Window { origin: self.data_window_origin, width: self.width, height: self.height }
     }
 
-    /// The matrix to Rec.709, where the file's primaries are others.
-    fn to_rec709(&self) -> Option<Matrix> {
-        let file = self.chromaticities?;
-        let points = |p: &Primaries| [p.red, p.green, p.blue, p.white];
-        let (own, ours) = (points(&file), points(&Primaries::REC709));
-        if own.iter().flatten().zip(ours.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-3) {
-            return None;
-        }
-        file.to(&Primaries::REC709)
-    }
-
     /// A channel's values over the display window; 0 where the file has no pixels.
     pub fn in_display_window(&self, channel: Vec<f32>) -> Vec<f32> {
         self.data_window().put_into(&self.display_window, channel, 0.0)
     }
+}
+
+/// The matrix to Rec.709, where the primaries are others.
+fn to_rec709(own: &Primaries) -> Option<Matrix> {
+    let points = |p: &Primaries| [p.red, p.green, p.blue, p.white];
+    let (own_points, ours) = (points(own), points(&Primaries::REC709));
+    if own_points.iter().flatten().zip(ours.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-3) {
+        return None;
+    }
+    own.to(&Primaries::REC709)
+}
+
+fn all<T>([first, second, third]: [Option<T>; 3]) -> Option<[T; 3]> {
+    Some([first?, second?, third?])
 }
 
 /// RY = (R − Y) / Y and BY = (B − Y) / Y, with Y the luminance by the file's own primaries.

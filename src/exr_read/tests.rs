@@ -1,5 +1,9 @@
 use super::*;
 use crate::output::{Picture, write_exr};
+use ::exr::prelude::{
+    AnyChannel, AnyChannels, Blocks, Compression, Encoding, Image, ImageAttributes, IntegerBounds, Layer,
+    LayerAttributes, LineOrder, WritableImage, f16,
+};
 
 /// Peak memory of this process in KiB, where the system tells.
 fn peak_memory_kib() -> Option<u64> {
@@ -114,9 +118,6 @@ fn what_is_no_exr_file_is_named() {
 
 /// Writes a file of parts that hold one channel each, at their places and of one size.
 fn write_parts(path: &Path, display: [i32; 4], size: usize, parts: &[(&str, [i32; 2], f32)]) {
-    use ::exr::prelude::{
-        AnyChannel, AnyChannels, Encoding, Image, ImageAttributes, IntegerBounds, Layer, LayerAttributes, WritableImage,
-    };
     let layers: Vec<Layer<AnyChannels<FlatSamples>>> = parts
         .iter()
         .map(|&(name, [x, y], value)| {
@@ -141,6 +142,71 @@ fn parts_stand_where_they_are() {
     assert_eq!(image.channel("a.Y").unwrap(), [1.0, 2.0, 3.0, 4.0]);
     assert_eq!(image.channel("b.Y").unwrap(), [0.0, 5.0, 0.0, 7.0]);
     assert_eq!(image.parts_left_out, ["c"]);
+}
+
+/// A part that was cropped or overscanned is put to the picture's pixels, and what the picture's part lacks is taken from others.
+#[test]
+fn parts_of_other_sizes_stand_where_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("parts.exr");
+    let part = |name: &str, [x, y]: [i32; 2], size: usize, names: &[&str], nits: Option<f32>| {
+        let attributes =
+            LayerAttributes { layer_position: Vec2(x, y), white_luminance: nits, ..LayerAttributes::named(name) };
+        let first = if size == 1 { 7 } else { 0 };
+        let values =
+            |value: usize| FlatSamples::F32((0..size * size).map(|pixel| (first + value + pixel) as f32).collect());
+        let channels = names.iter().enumerate().map(|(number, name)| AnyChannel::new(*name, values(100 * number)));
+        Layer::new((size, size), attributes, Encoding::FAST_LOSSLESS, AnyChannels::sort(channels.collect()))
+    };
+    let layers: Vec<Layer<AnyChannels<FlatSamples>>> = vec![
+        part("depth", [1, 1], 1, &["Z"], None),
+        part("beauty", [-1, -1], 4, &["B", "G", "R"], Some(80.0)),
+        part("albedo", [0, 0], 2, &["B", "G", "R"], None),
+    ];
+    let attributes = ImageAttributes::new(IntegerBounds::new((0, 0), (2, 2)));
+    Image::from_layers(attributes, layers).write().to_file(&path).unwrap();
+    let image = read_exr(&path).unwrap();
+    assert_eq!((image.width, image.height, image.data_window_origin), (4, 4, (-1, -1)));
+    assert_eq!(super::size(&path, &std::fs::read(&path).unwrap()).unwrap(), [4, 4]);
+    let shown = |name: &str| image.in_display_window(image.channel(name).unwrap().to_vec());
+    assert_eq!(shown("depth.Z"), [0.0, 0.0, 0.0, 7.0]);
+    assert_eq!(shown("beauty.B"), [5.0, 6.0, 9.0, 10.0]);
+    assert_eq!(shown("albedo.G"), [100.0, 101.0, 102.0, 103.0]);
+    assert_eq!(image.attribute("whiteLuminance"), Some(&Attribute::Float(80.0)));
+    assert!(image.parts_left_out.is_empty());
+}
+
+/// A block of DWAA says how much it unpacks to, and is not believed.
+#[test]
+fn a_block_that_claims_the_memory_of_the_world_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("dwaa.exr");
+    let values = FlatSamples::F16((0..64 * 64).map(|pixel| f16::from_f32(pixel as f32 * 0.01)).collect());
+    let channels = AnyChannels::sort([AnyChannel::new("Y", values)].into_iter().collect());
+    let encoding = Encoding {
+        compression: Compression::DWAA(None),
+        blocks: Blocks::ScanLines,
+        line_order: LineOrder::Increasing,
+        ..Encoding::FAST_LOSSLESS
+    };
+    let layer = Layer::new((64, 64), LayerAttributes::default(), encoding, channels);
+    Image::from_layer(layer).write().to_file(&path).unwrap();
+    let whole = std::fs::read(&path).unwrap();
+    read_exr(&path).unwrap();
+    // Its first block follows the table of the two blocks' places: line, length, then eleven counts.
+    let MetaData { headers, .. } = MetaData::read_from_buffered(Cursor::new(&whole), false).unwrap();
+    assert_eq!(headers[0].chunk_count, 2);
+    let place = (0..whole.len() - 16).find(|&at| {
+        let word = |at: usize| u64::from_le_bytes(whole[at..at + 8].try_into().unwrap());
+        word(at) as usize == at + 16 && word(at + 8) as usize > at + 16
+    });
+    let counts = place.unwrap() + 16 + 8;
+    for count in super::dwa::UNPACKED {
+        let mut bytes = whole.clone();
+        bytes[counts + 8 * count..counts + 8 * count + 8].copy_from_slice(&(1_u64 << 49).to_le_bytes());
+        let error = decode_exr(&path, &bytes).unwrap_err().to_string();
+        assert!(error.contains("claims more than its pixels"), "{error}");
+    }
 }
 
 /// What is laid out like the data, as motion is, can be laid out like the picture.

@@ -17,7 +17,7 @@ mod srgb_codes;
 pub use beside::{remove_leftovers, write_beside};
 pub use exr_file::write_exr;
 pub use png_file::{
-    PngTransfer, decode_pq, encode_srgb8, png_transfer, write_codes_png, write_png, write_png_for,
+    PngColour, PngTransfer, decode_pq, encode_srgb8, png_colour, write_codes_png, write_png, write_png_for,
     write_png_with_alpha_for, write_pq_png,
 };
 

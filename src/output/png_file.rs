@@ -87,39 +87,100 @@ fn encode_pq16(rgb_linear_display: &[[f32; 3]], display: &Display) -> Vec<u8> {
 }
 
 /// Linear display RGB, 0 the display's black and 1 its white, of PQ codes (0 to 1) in Rec.2020 primaries, as [`write_pq_png`]
-/// writes them.
-pub fn decode_pq(codes: &[[f32; 3]], display: &Display) -> Vec<[f32; 3]> {
-    let narrow = Primaries::REC2020.to(&Primaries::REC709).unwrap_or(IDENTITY);
+/// writes them, in these primaries.
+pub fn decode_pq(codes: &[[f32; 3]], primaries: &Primaries, display: &Display) -> Vec<[f32; 3]> {
+    let narrow = primaries.to(&Primaries::REC709).unwrap_or(IDENTITY);
     let (dark, span) = (display.black_cd_m2, (display.white_cd_m2 - display.black_cd_m2).max(1e-6));
     let relative = |code: f32| (Eotf::Pq.decode(f64::from(code), PEAK_CD_M2) * PEAK_CD_M2 - dark) / span;
     codes.par_iter().map(|codes| apply(&narrow, codes.map(relative)).map(|light| light as f32)).collect()
 }
 
 /// What the codes of a PNG file mean by its chunks.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PngColour {
+    /// Their curve.
+    pub transfer: PngTransfer,
+    /// Their primaries; `None` where nothing says, or what is said is not known.
+    pub primaries: Option<Primaries>,
+    /// What it says and is not heeded, for whoever should know.
+    pub notes: Vec<String>,
+}
+
+/// The curve of the codes of a PNG file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PngTransfer {
-    /// PQ in Rec.2020 primaries.
+    /// PQ.
     Pq,
     /// Hybrid log-gamma.
     HybridLogGamma,
     /// sRGB, as anything else that is tagged is taken for.
     Srgb,
+    /// Light itself.
+    Linear,
     /// Nothing says.
     Untagged,
 }
 
-/// Of a file in memory, by its header; [`PngTransfer::Untagged`] for what is no PNG.
-pub fn png_transfer(bytes: &[u8]) -> PngTransfer {
-    let Ok(reader) = png::Decoder::new(std::io::Cursor::new(bytes)).read_info() else {
-        return PngTransfer::Untagged;
-    };
+/// Of a file in memory, by its header; [`PngTransfer::Untagged`] for what is no PNG. Of what contradicts itself the surest holds: cICP, then a
+/// colour profile, then sRGB, then a gamma and chromaticities (PNG, third edition, 4.3).
+pub fn png_colour(bytes: &[u8]) -> PngColour {
+    let mut colour = PngColour { transfer: PngTransfer::Untagged, primaries: None, notes: Vec::new() };
+    let Ok(reader) = png::Decoder::new(std::io::Cursor::new(bytes)).read_info() else { return colour };
     let info = reader.info();
-    match info.coding_independent_code_points.map(|tag| tag.transfer_function) {
-        Some(16) => PngTransfer::Pq,
-        Some(18) => PngTransfer::HybridLogGamma,
-        Some(_) => PngTransfer::Srgb,
-        None if info.srgb.is_some() || info.gama_chunk.is_some() || info.icc_profile.is_some() => PngTransfer::Srgb,
-        None => PngTransfer::Untagged,
+    if let Some(tag) = info.coding_independent_code_points {
+        colour.transfer = match tag.transfer_function {
+            8 => PngTransfer::Linear,
+            16 => PngTransfer::Pq,
+            18 => PngTransfer::HybridLogGamma,
+            _ => PngTransfer::Srgb,
+        };
+        colour.primaries = coded_primaries(tag.color_primaries);
+        if colour.primaries.is_none() {
+            let number = tag.color_primaries;
+            colour
+                .notes
+                .push(format!("primaries {number} of its cICP chunk are not known, and taken for those of its curve"));
+        }
+    } else if let Some(profile) = &info.icc_profile {
+        colour.transfer = PngTransfer::Srgb;
+        if !names_srgb(profile) {
+            colour.notes.push("its colour profile is not read: its codes are taken for sRGB".to_owned());
+        }
+    } else if info.srgb.is_some() {
+        colour.transfer = PngTransfer::Srgb;
+    } else {
+        read_gamma(info, &mut colour);
+    }
+    colour
+}
+
+/// Gamma and chromaticities of files without a profile.
+fn read_gamma(info: &png::Info<'_>, colour: &mut PngColour) {
+    let point = |(x, y): (png::ScaledFloat, png::ScaledFloat)| [f64::from(x.into_value()), f64::from(y.into_value())];
+    let chromaticities = info.chrm_chunk;
+    colour.primaries = chromaticities
+        .map(|c| Primaries { red: point(c.red), green: point(c.green), blue: point(c.blue), white: point(c.white) })
+        .filter(|primaries| primaries.to_xyz().is_some());
+    let Some(gamma) = info.gama_chunk.map(png::ScaledFloat::into_value) else { return };
+    colour.transfer = if (gamma - 1.0).abs() < 0.02 { PngTransfer::Linear } else { PngTransfer::Srgb };
+    if colour.transfer == PngTransfer::Srgb && (gamma * 2.2 - 1.0).abs() > 0.05 {
+        colour.notes.push(format!("its gamma of {gamma} is not heeded: its codes are taken for sRGB"));
+    }
+}
+
+/// Whether a colour profile calls itself sRGB, in bytes or in words of two.
+fn names_srgb(profile: &[u8]) -> bool {
+    let has = |name: &[u8]| profile.windows(name.len()).any(|window| window == name);
+    has(b"sRGB") || has(b"s\0R\0G\0B")
+}
+
+/// Primaries by their number in ITU-T H.273, table 2.
+fn coded_primaries(number: u8) -> Option<Primaries> {
+    match number {
+        1 => Some(Primaries::REC709),
+        9 => Some(Primaries::REC2020),
+        12 => Some(Primaries::DISPLAY_P3),
+        _ => None,
     }
 }
 
@@ -235,7 +296,7 @@ mod tests {
         let path = folder.path().join("a.png");
         let pixels = [[0.0, 0.5, 1.0], [1.0, 0.0, 0.214_041_14]];
         write_png(&path, 2, 1, &pixels).unwrap();
-        assert_eq!(png_transfer(&std::fs::read(&path).unwrap()), PngTransfer::Srgb);
+        assert_eq!(png_colour(&std::fs::read(&path).unwrap()).transfer, PngTransfer::Srgb);
         let names = chunk_names(&std::fs::read(&path).unwrap());
         for name in ["sRGB", "gAMA", "cHRM"] {
             assert!(names.iter().any(|n| n == name), "{name} is missing from {names:?}");
@@ -259,7 +320,9 @@ mod tests {
             .map(|bytes| [0, 2, 4].map(|at| f32::from(u16::from_be_bytes([bytes[at], bytes[at + 1]])) / 65_535.0))
             .collect();
         assert_eq!(encode_pq16(&light, &dark_room), encode_pq16(&light, &display));
-        for (found, light) in decode_pq(&codes, &display).iter().flatten().zip(light.iter().flatten()) {
+        for (found, light) in
+            decode_pq(&codes, &Primaries::REC2020, &display).iter().flatten().zip(light.iter().flatten())
+        {
             assert!((found - light).abs() < 1e-3, "{light} came back as {found}");
         }
     }
@@ -270,7 +333,8 @@ mod tests {
         let path = folder.path().join("a.png");
         let display = Display::preset("hdr-1000").unwrap();
         write_png_for(&path, 3, 1, &[[1.0; 3], [0.0, f32::NAN, 0.0], [0.1, 0.0, 0.0]], &display).unwrap();
-        assert_eq!(png_transfer(&std::fs::read(&path).unwrap()), PngTransfer::Pq);
+        let colour = png_colour(&std::fs::read(&path).unwrap());
+        assert_eq!((colour.transfer, colour.primaries), (PngTransfer::Pq, Some(Primaries::REC2020)));
         let names = chunk_names(&std::fs::read(&path).unwrap());
         let place = |name: &str| names.iter().position(|n| n == name);
         assert!(place("cICP") > place("IHDR") && place("cICP") < place("IDAT"), "{names:?}");

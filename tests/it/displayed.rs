@@ -4,6 +4,8 @@
 use assert_cmd::Command;
 use fechner::exr_read::read_exr;
 use fechner::output::{Attribute, NITS_PER_UNIT, Picture, write_exr, write_png};
+use fechner_perception::display::Eotf;
+use fechner_perception::primaries::{Primaries, apply};
 use std::path::Path;
 
 const SIDE: usize = 64;
@@ -228,6 +230,96 @@ fn a_tone_mapped_exr_is_shown_as_it_is() {
     assert!(visibility(&said) < 1.5, "{said}");
     let (_, said) = fechner(folder.path(), &["compare", "once.exr", "once.png"]);
     assert!(visibility(&said) < 1.5 && said.contains("holds light of a display"), "{said}");
+    // Nor does the operator that shows the scene beside it, whichever is the reference.
+    for pair in [["dark.exr", "once.exr"], ["once.exr", "dark.exr"]] {
+        let (_, said) = fechner(folder.path(), &[&["compare"], &pair[..], &["--operator", "srgb"]].concat());
+        assert!(visibility(&said) < 0.1, "{said}");
+    }
+}
+
+/// A file's own unit stands, and the argument is for those without.
+#[test]
+fn the_unit_is_for_files_that_do_not_say_theirs() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), "own.exr", |pixel| [10.0 + pixel as f32 / 100.0; 3]);
+    let mut other = Picture::new(SIDE as u32, SIDE as u32);
+    for name in ["R", "G", "B"] {
+        let of = |pixel| (10.0 + pixel as f32 / 100.0) / 25.0;
+        other.push_f32(name, (0..SIDE * SIDE).map(of).collect::<Vec<_>>());
+    }
+    write_exr(&folder.path().join("other.exr"), &other).expect("written");
+    let (_, said) = fechner(folder.path(), &["compare", "own.exr", "other.exr", "--nits-per-unit", "25"]);
+    assert!(visibility(&said) < 0.01 && said.contains("note: own.exr: its own unit of 1 cd/m"), "{said}");
+}
+
+/// XYZ is a colour like others.
+#[test]
+fn pictures_in_xyz_are_seen_in_their_colours() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let colour = |pixel: usize| [20.0 + random(pixel, 1), 30.0, 10.0 + 20.0 * random(pixel, 2)];
+    write(folder.path(), "rgb.exr", colour);
+    let to_xyz = Primaries::REC709.to_xyz().expect("a space");
+    let mut xyz = Picture::new(SIDE as u32, SIDE as u32);
+    for (row, name) in ["X", "Y", "Z"].into_iter().enumerate() {
+        let of = |pixel| apply(&to_xyz, colour(pixel).map(f64::from))[row] as f32;
+        xyz.push_f32(name, (0..SIDE * SIDE).map(of).collect::<Vec<_>>());
+    }
+    xyz.push_attribute(NITS_PER_UNIT, Attribute::Float(1.0));
+    write_exr(&folder.path().join("xyz.exr"), &xyz).expect("written");
+    let (_, said) = fechner(folder.path(), &["compare", "rgb.exr", "xyz.exr"]);
+    assert!(visibility(&said) < 0.01 && said.contains("taken for CIE XYZ"), "{said}");
+}
+
+/// What values mean goes by a file's ending, so that its bytes must be of that kind, and whole.
+#[test]
+fn files_of_another_kind_and_cut_off_ones_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let refused = |name: &str, expected: &str| {
+        let (code, said) = fechner(folder.path(), &["compare", name, name, "--nits-per-unit", "100"]);
+        assert!(code == 2 && said.contains(name) && said.contains(expected), "{name}: {said}");
+    };
+    let png = folder.path().join("a.png");
+    write_png(&png, SIDE as u32, SIDE as u32, &[[0.18; 3]; SIDE * SIDE]).expect("written");
+    std::fs::copy(&png, folder.path().join("b.hdr")).expect("copied");
+    refused("b.hdr", "of another kind (.png)");
+    let photo = folder.path().join("c.jpg");
+    image::open(&png).expect("read").into_rgb8().save(&photo).expect("written");
+    let (code, said) = fechner(folder.path(), &["compare", "c.jpg", "c.jpg"]);
+    assert_eq!(code, 0, "{said}");
+    let bytes = std::fs::read(&photo).expect("read");
+    std::fs::write(&photo, &bytes[..bytes.len() * 9 / 10]).expect("written");
+    refused("c.jpg", "is cut off");
+}
+
+/// Curves and primaries that a PNG file names are heeded.
+#[test]
+fn a_png_is_seen_in_its_own_curve_and_primaries() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let light = |pixel: usize| [0.2 + 0.3 * random(pixel, 1), 0.3, 0.1 + 0.2 * random(pixel, 2)];
+    let in_p3 = Primaries::REC709.to(&Primaries::DISPLAY_P3).expect("spaces");
+    let p3 = |pixel: usize| apply(&in_p3, light(pixel).map(f64::from)).map(|value| value as f32);
+    let curve = |value: f32| Eotf::Srgb.encode(f64::from(value), 1.0) as f32;
+    type Codes<'a> = &'a dyn Fn(usize) -> [f32; 3];
+    let save = |name: &str, codes: Codes, tag: &[u8]| {
+        let of = |pixel| codes(pixel).map(|code| (code * 65535.0).round() as u16).map(u16::to_be_bytes);
+        let bytes: Vec<u8> = (0..SIDE * SIDE).flat_map(of).flatten().collect();
+        let file = std::fs::File::create(folder.path().join(name)).expect("made");
+        let mut encoder = png::Encoder::new(file, SIDE as u32, SIDE as u32);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Sixteen);
+        let mut writer = encoder.write_header().expect("written");
+        writer.write_chunk(png::chunk::ChunkType([tag[0], tag[1], tag[2], tag[3]]), &tag[4..]).expect("written");
+        writer.write_image_data(&bytes).expect("written");
+    };
+    let plain = |pixel: usize| light(pixel).map(curve);
+    save("srgb.png", &plain, b"sRGB\0");
+    save("p3.png", &|pixel| p3(pixel).map(curve), b"cICP\x0c\x0d\0\x01");
+    save("linear.png", &light, b"cICP\x01\x08\0\x01");
+    save("gamma.png", &light, b"gAMA\x00\x01\x86\xa0");
+    for name in ["p3.png", "linear.png", "gamma.png"] {
+        let (_, said) = fechner(folder.path(), &["compare", "srgb.png", name]);
+        assert!(visibility(&said) < 0.1, "{name}: {said}");
+    }
 }
 
 /// A Radiance picture that was brightened says by how much.

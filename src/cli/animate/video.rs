@@ -6,6 +6,7 @@ use fechner::animate::ShotSettings;
 use fechner::animate::video::Y4mWriter;
 use fechner::output::{decode_pq, encode_srgb8, write_beside};
 use fechner_perception::display::Eotf;
+use fechner_perception::primaries::Primaries;
 use fechner_perception::tone::{FittedTone, map_picture};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -121,7 +122,7 @@ pub(super) fn shown_rgb8(
     Ok(match picture.scene_rgb_cd_m2() {
         Some(scene) => encode_srgb8(width, &map_picture(fitted().as_ref(), width as usize, &scene)),
         None if shot.viewing.display.eotf == Eotf::Pq => {
-            encode_srgb8(width, &decode_pq(picture.codes(), &shot.viewing.display))
+            encode_srgb8(width, &decode_pq(picture.codes(), &Primaries::REC2020, &shot.viewing.display))
         }
         None => picture.codes8(),
     })

@@ -213,7 +213,7 @@ impl<'a> Sequences<'a> {
         let [first, first_test] = files.each_ref().map(|file| InputPicture::read(file, nits_per_unit));
         let (first, first_test) = (first?, first_test?);
         let firsts = [(files[0].as_path(), &first), (files[1].as_path(), &first_test)];
-        arguments.seeing.note_idle(arguments.operator.as_deref(), &firsts);
+        arguments.seeing.note_what_is_ready(arguments.operator.as_deref(), &firsts);
         let mut viewing = arguments.seeing.viewing(&firsts)?;
         viewing.display.frames_per_second =
             arguments.fps.context("--fps: how many frames a second a sequence has decides what is seen in it")?;

@@ -3,7 +3,8 @@
 
 use super::Picture;
 use crate::exr_read;
-use crate::hdr_read::HdrHeader;
+use crate::hdr_read::{HdrHeader, with_known_signature};
+use crate::jpeg_read;
 use crate::scene::load::{LoadError, files};
 use crate::scene::{Encoding, Texels, texture};
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
@@ -76,6 +77,7 @@ pub(in crate::scene::load) fn decode_bytes(
     if exr_read::is_exr(bytes) {
         return decode_exr(bytes, name);
     }
+    let bytes = &*with_known_signature(bytes);
     let wrong = |error: image::ImageError| match error {
         image::ImageError::Limits(_) => LoadError::too_large(name, format_args!("the picture is too large: {error}")),
         _ => LoadError::invalid(name, format_args!("not a readable picture: {error}")),
@@ -90,6 +92,9 @@ pub(in crate::scene::load) fn decode_bytes(
     // Not every decoder looks at the limits: these hold before any of them allocates.
     check_size(name, u64::from(width), u64::from(height), if eight_bit { 4 } else { 16 })?;
 
+    if format == ImageFormat::Jpeg && !jpeg_read::has_end(bytes) {
+        return Err(LoadError::invalid(name, jpeg_read::CUT_OFF));
+    }
     let image = DynamicImage::from_decoder(decoder).map_err(wrong)?;
     let texels = match eight_bit {
         true => Texels::Bytes(Arc::new(image.into_rgba8().into_raw().as_chunks::<4>().0.to_vec()), encoding),
