@@ -18,9 +18,10 @@ use fechner_perception::tone::{
 use std::path::{Path, PathBuf};
 
 /// Arguments of `tonemap`.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(super) struct TonemapArguments {
-    /// Pictures (.exr, .hdr); several are a sequence in time.
+    /// Pictures (.exr, .hdr); several are a sequence in time, by the numbers in their names where all have different ones, and else as they
+    /// are given.
     #[arg(required = true, num_args = 1..)]
     input: Vec<PathBuf>,
     /// .png (16-bit PQ for an HDR display, sRGB for all others, which colour management brings to them), .exr with what the
@@ -110,7 +111,7 @@ impl SceneFrame {
         let viewing = picture.viewed(viewing).with_context(|| path.display().to_string())?;
         let pixel_aspect_ratio = picture.pixel_aspect_ratio();
         let (width, height) = picture.size();
-        let Some(rgb_cd_m2) = picture.scene_rgb_cd_m2() else {
+        let Some(rgb_cd_m2) = picture.light_cd_m2() else {
             bail!("{}: ready for a display already; .exr and .hdr files hold scenes", path.display());
         };
         if let Some(Gaze(Pixel { x, y })) = arguments.gaze.filter(|gaze| gaze.0.x >= width || gaze.0.y >= height) {
@@ -136,7 +137,11 @@ impl SceneFrame {
 
 /// Reads, maps and writes.
 pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
+    let arguments = &in_time(arguments.clone());
     let targets = targets(arguments)?;
+    if let Some(state) = &arguments.state {
+        output::check_writable(state)?;
+    }
     let format = output::check_target(&targets[0])?;
     let Some(operator) = arguments.operator.as_deref() else {
         return run_as_rendered(arguments, format, &targets);
@@ -148,6 +153,9 @@ pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
     }
     let operator = seeing::tone_operator(operator, &settings)?;
     check_settings(operator.as_ref(), &settings)?;
+    if arguments.gaze.is_some() && !operator.sees_adaptation() {
+        bail!("--gaze: {} shows the same wherever the eye looks", operator.name());
+    }
     let timed = is_timed(arguments);
     if timed && arguments.adaptation == Scope::Local {
         bail!("--adaptation local has no course in time: leave it out for a sequence");
@@ -170,6 +178,18 @@ pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
         write_json(path, &state)?;
     }
     Ok(())
+}
+
+/// Its inputs in the order of the numbers in their names: a shell puts 10 before 9.
+fn in_time(mut arguments: TonemapArguments) -> TonemapArguments {
+    let numbers = frame_numbers(&arguments.input).filter(|numbers| !numbers.is_sorted());
+    if let Some(numbers) = numbers {
+        let mut numbered: Vec<(u64, PathBuf)> = numbers.into_iter().zip(std::mem::take(&mut arguments.input)).collect();
+        numbered.sort_unstable();
+        arguments.input = numbered.into_iter().map(|(_, path)| path).collect();
+        say!("note: frames are taken in the order of their numbers, from {}", arguments.input[0].display());
+    }
+    arguments
 }
 
 /// Whether the eye has a past.
@@ -330,18 +350,23 @@ fn targets(arguments: &TonemapArguments) -> Result<Vec<PathBuf>> {
 }
 
 fn named_targets(arguments: &TonemapArguments) -> Result<Vec<PathBuf>> {
-    let digits = arguments.output.as_os_str().as_encoded_bytes().iter().filter(|&&byte| byte == b'#').count();
+    let output = &arguments.output;
+    let name = output.file_name().unwrap_or_default();
+    let digits = name.as_encoded_bytes().iter().filter(|&&byte| byte == b'#').count();
     if arguments.input.len() == 1 && digits == 0 {
-        return Ok(vec![arguments.output.clone()]);
+        return Ok(vec![output.clone()]);
     }
-    let name = arguments.output.to_str().with_context(|| {
-        format!("{}: the name of a sequence must be UTF-8, for numbers to be put into it", arguments.output.display())
+    let name = name.to_str().with_context(|| {
+        format!("{}: the name of a sequence must be UTF-8, for numbers to be put into it", output.display())
     })?;
     let hashes = "#".repeat(digits);
     if digits == 0 || !name.contains(&hashes) {
-        bail!("{name}: the name of a sequence needs # for each digit of the frame's number, such as night.####.png");
+        bail!(
+            "{}: the name of a sequence needs one run of # for the digits of the frame's number, such as night.####.png",
+            output.display()
+        );
     }
-    let target = |frame: u64| PathBuf::from(name.replace(&hashes, &format!("{frame:0digits$}")));
+    let target = |frame: u64| output.with_file_name(name.replace(&hashes, &format!("{frame:0digits$}")));
     let numbers = frame_numbers(&arguments.input).unwrap_or_else(|| (1..=arguments.input.len() as u64).collect());
     Ok(numbers.into_iter().map(target).collect())
 }

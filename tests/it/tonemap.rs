@@ -56,6 +56,16 @@ fn a_sequence_is_blinded_and_recovers_and_can_be_continued() {
     assert!(course[0] > 0.99 && course.windows(2).all(|pair| pair[1] < pair[0] + 1e-6), "{course:?}");
     assert!(course[3] < 0.8, "{course:?}");
 
+    // A shell puts 10 before 9.
+    for (frame, name) in [(1, "n8.exr"), (2, "n9.exr"), (3, "n10.exr"), (4, "n11.exr")] {
+        std::fs::copy(folder.path().join(format!("in{frame}.exr")), folder.path().join(name)).expect("copied");
+    }
+    let by_shell = ["n10.exr", "n11.exr", "n8.exr", "n9.exr"];
+    run(folder.path(), &[&by_shell[..], &common[..], &["-o", "shell.##.exr", "--adapted-to", "0.1"][..]].concat());
+    let again: Vec<f32> =
+        (8..=11).map(|frame| mean_green(&folder.path().join(format!("shell.{frame:02}.exr")))).collect();
+    assert_eq!(again, course);
+
     // The same in two parts by way of a file.
     let start = r#"{"cones":{"neural_cd_m2":0.1,"pigment":1.0},"rods":{"neural_cd_m2":0.1,"pigment":0.3},
         "goal":{"cones_cd_m2":0.1,"rods_cd_m2":0.1}}"#;
@@ -97,7 +107,7 @@ fn what_makes_no_sense_is_refused_in_one_line() {
         assert!(message.contains(fragment) && !message.contains("panicked"), "{arguments:?}: {message}");
     };
     refused(&["a.exr", "-o", "b.png", "--operator", "darkroom"], "constant-long");
-    refused(&["a.exr", "a.exr", "-o", "b.png", "--operator", "ptyg"], "# for each digit");
+    refused(&["a.exr", "a.exr", "-o", "b.png", "--operator", "ptyg"], "one run of #");
     refused(&["a.exr", "a.exr", "-o", "b.#.png", "--operator", "agx"], "does not know an eye that adapts");
     refused(&["a.exr", "-o", "b.png", "--operator", "ptyg", "--gaze", "64,3"], "outside");
     refused(&["a.exr", "-o", "./a.exr", "--operator", "agx"], "would replace a picture that is read");
@@ -106,6 +116,8 @@ fn what_makes_no_sense_is_refused_in_one_line() {
         &["a.exr", "-o", "b.png", "--operator", "tr", "--adaptation", "local", "--adapted-to", "3"],
         "no course in time",
     );
+    refused(&["a.exr", "-o", "b.png", "--operator", "agx", "--gaze", "3,3"], "wherever the eye looks");
+    refused(&["a.exr", "-o", "b.png", "--operator", "tr", "--state", "no/state.json"], "no/state.json");
     refused(&["a.exr", "-o", "b.png", "--operator", "tr", "--fps", "5"], "no course in time");
     refused(&["a.exr", "-o", "b.png", "--fps", "5"], "name it by --operator");
     for stops in ["nan", "inf", "-101"] {
