@@ -53,6 +53,9 @@ impl Difference {
 /// of them has does not hide its own absence from the other. The eye adapts to the reference, so the two are not to be exchanged
 /// where one is much brighter.
 ///
+/// Beyond the border nothing differs: an error there is as visible as if both pictures went on alike. A difference that changes slowly
+/// (over 1° and more) has no edge at the border, since what is seen around a picture is no equal one.
+///
 /// # Errors
 /// [`Error::SizeMismatch`], [`Error::Empty`], [`Error::BadPixel`] for pictures that cannot be compared,
 /// [`Error::OutOfRange`] for an impossible viewing.
@@ -126,7 +129,7 @@ pub fn colour_difference(
 
 /// Visibility of the difference between two signals, masked by what both of them mask.
 pub(crate) fn mutual_visibility(map: ThresholdMap, test_map: &ThresholdMap, reference: &Plane, test: &Plane) -> Plane {
-    masked_by_both(map, test_map).measured_visibility(&test.combined(reference, |test, reference| test - reference))
+    masked_by_both(map, test_map).visibility_amid_equals(&test.combined(reference, |test, reference| test - reference))
 }
 
 /// A map whose masks are the lesser of its own and another's.
@@ -190,6 +193,57 @@ mod tests {
         let grey = Plane::filled(64, 64, 100.0);
         assert!(compare(&grey, &grey.map(|value| value * 1.1)).is_visible());
         assert!(!compare(&grey, &grey.map(|value| value * 1.002)).is_visible());
+    }
+
+    const GREY_CD_M2: f32 = 50.0;
+
+    /// Squares of `side` pixels, half brighter, on grey of 128 × 128: in the middle, at an edge and in a corner.
+    fn squares(side: usize) -> [(usize, usize); 3] {
+        [(64 - side / 2, 64 - side / 2), (0, 64 - side / 2), (128 - side, 128 - side)]
+    }
+
+    /// Grey of 128 × 128 with so much equal grey around it, and a square that is half brighter.
+    fn with_square(border: usize, side: usize, (left, top): (usize, usize)) -> Plane {
+        let within = |at: usize, first: usize| (border + first..border + first + side).contains(&at);
+        Plane::from_fn(128 + 2 * border, 128 + 2 * border, |x, y| {
+            if within(x, left) && within(y, top) { 1.5 * GREY_CD_M2 } else { GREY_CD_M2 }
+        })
+    }
+
+    /// Nothing differs beyond a border, so an error there is as visible as with an equal border around both pictures, at every pixel.
+    #[test]
+    fn an_error_at_the_border_is_as_visible_as_with_an_equal_surround() {
+        let wide = 128;
+        let seen = |border: usize, side, place| {
+            let test = with_square(border, side, place);
+            compare(&Plane::filled(test.width(), test.height(), GREY_CD_M2), &test).visibility
+        };
+        for side in [1, 3, 9] {
+            for place in squares(side) {
+                let (found, expected) = (seen(0, side, place), seen(wide, side, place));
+                let worst = expected.range().1;
+                for (x, y) in (0..128).flat_map(|x| (0..128).map(move |y| (x, y))) {
+                    let (found, expected) = (found.get(x, y), expected.get(x + wide, y + wide));
+                    assert!(
+                        (found - expected).abs() < 0.02 * worst,
+                        "square of {side} at {place:?}: {found} at ({x}, {y}), not {expected} (worst {worst})"
+                    );
+                }
+            }
+        }
+    }
+
+    /// What a picture's border is seen against is no part of the comparison: one that is brighter as a whole, or towards a side, must
+    /// not have an edge there.
+    #[test]
+    fn a_picture_brighter_as_a_whole_has_no_edge_at_its_border() {
+        let grey = Plane::filled(180, 180, GREY_CD_M2);
+        let seen = compare(&grey, &grey.map(|value| 1.02 * value)).visibility;
+        let (least, most) = seen.range();
+        assert!(most / least - 1.0 < 1e-3, "{least} to {most}");
+        // 2 % at one side, 0 at the other: 0.7 % a degree.
+        let slope = compare(&grey, &Plane::from_fn(180, 180, |x, _| GREY_CD_M2 * (1.0 + 0.02 * x as f32 / 180.0)));
+        assert!(slope.worst_visibility < 1.02 * f64::from(most), "{} {most}", slope.worst_visibility);
     }
 
     #[test]

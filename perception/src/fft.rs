@@ -109,19 +109,42 @@ impl PictureTransform {
         self.padded_width / 2 + 1
     }
 
-    /// The spectrum of the picture whose row y `fill_row(y, row)` writes.
+    /// The spectrum of the picture whose row y `fill_row(y, row)` writes, mirrored at its borders.
     pub(crate) fn forward(&self, workspace: &mut Workspace, fill_row: impl Fn(usize, &mut [f32]) + Sync) -> Spectrum {
+        self.forward_rows(workspace, |y, row| {
+            fill_row(reflect(y, self.height), &mut row[self.pad_x..self.pad_x + self.width]);
+            self.mirror_ends(row);
+        })
+    }
+
+    /// The spectrum of `picture` amid the mirror image of another one, `beyond`.
+    pub(crate) fn forward_amid(&self, workspace: &mut Workspace, picture: &Plane, beyond: &Plane) -> Spectrum {
+        let inside = self.pad_x..self.pad_x + self.width;
+        self.forward_rows(workspace, |y, row| {
+            row[inside.clone()].copy_from_slice(beyond.row(reflect(y, self.height)));
+            self.mirror_ends(row);
+            if (0..self.height as isize).contains(&y) {
+                row[inside.clone()].copy_from_slice(picture.row(y as usize));
+            }
+        })
+    }
+
+    /// Sets what lies beside the picture in a padded row to its mirror image.
+    fn mirror_ends(&self, row: &mut [f32]) {
+        for x in (0..self.pad_x).chain(self.pad_x + self.width..self.padded_width) {
+            row[x] = row[self.pad_x + reflect(x as isize - self.pad_x as isize, self.width)];
+        }
+    }
+
+    /// The spectrum of what `fill_row(y, padded row)` writes, y counted from the picture's first row.
+    fn forward_rows(&self, workspace: &mut Workspace, fill_row: impl Fn(isize, &mut [f32]) + Sync) -> Spectrum {
         let columns = self.columns();
         let zero = Complex32::default();
         let by_row = sized(&mut workspace.by_row, columns * self.padded_height);
         by_row.par_chunks_mut(columns).enumerate().for_each_init(
             || (self.rows_forward.make_input_vec(), self.rows_forward.make_scratch_vec()),
             |(row, scratch), (y, bins)| {
-                let inside = self.pad_x..self.pad_x + self.width;
-                fill_row(reflect(y as isize - self.pad_y as isize, self.height), &mut row[inside.clone()]);
-                for x in (0..inside.start).chain(inside.end..self.padded_width) {
-                    row[x] = row[self.pad_x + reflect(x as isize - self.pad_x as isize, self.width)];
-                }
+                fill_row(y as isize - self.pad_y as isize, row);
                 // Lengths come from the same plan, the only thing this call can complain of.
                 let _ = self.rows_forward.process_with_scratch(row, bins, scratch);
             },
@@ -136,7 +159,7 @@ impl PictureTransform {
     }
 
     /// The picture whose spectrum is `spectrum` with every bin multiplied by `gain(freq_cpd)`, at every `factor`-th pixel
-    /// only, from pixel −`factor` on until past the picture's end: sample j stands at pixel (j − 1) · `factor`.
+    /// only, framed: see [`Frame`].
     ///
     /// `limit_cpd` is a frequency above which `gain` is zero (infinite if there is none): columns beyond it are not
     /// transformed. `factor` must be one of 1, 2, 4, 8, 16, and leave room for `limit_cpd`.
@@ -145,18 +168,19 @@ impl PictureTransform {
         workspace: &mut Workspace,
         spectrum: &Spectrum,
         limit_cpd: f64,
-        factor: usize,
+        frame: Frame,
         gain: impl Fn(f32) -> f32 + Sync,
     ) -> Plane {
+        let factor = frame.factor;
         let mut planners = PLANNERS.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let back = BackTransform {
             columns: planners.complex.plan_fft_inverse(self.padded_height / factor),
             rows: planners.real.plan_fft_inverse(self.padded_width / factor),
             factor,
-            first_x: self.pad_x / factor - 1,
-            first_y: self.pad_y / factor - 1,
-            width: reduced_size(self.width, factor),
-            height: reduced_size(self.height, factor),
+            first_x: self.pad_x / factor - 1 - frame.beside,
+            first_y: self.pad_y / factor - 1 - frame.above,
+            width: frame.samples_across(self.width),
+            height: frame.samples_down(self.height),
         };
         drop(planners);
         self.filtered_columns(&back, &mut workspace.by_column, spectrum, limit_cpd, gain);
@@ -228,6 +252,46 @@ impl PictureTransform {
             },
         );
         picture
+    }
+}
+
+/// Where the samples of a reduced picture stand: at every `factor`-th pixel, from one sample before the picture on until at least
+/// one past it, and so many more on each side as `beside` and `above` say.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Frame {
+    pub(crate) factor: usize,
+    pub(crate) beside: usize,
+    pub(crate) above: usize,
+}
+
+impl Frame {
+    /// Sample j stands at pixel (j − 1) · `factor`.
+    pub(crate) fn narrow(factor: usize) -> Self {
+        Self { factor, beside: 0, above: 0 }
+    }
+
+    /// Samples of a row of `width` pixels.
+    pub(crate) fn samples_across(self, width: usize) -> usize {
+        reduced_size(width, self.factor) + 2 * self.beside
+    }
+
+    /// Samples of a column of `height` pixels.
+    pub(crate) fn samples_down(self, height: usize) -> usize {
+        reduced_size(height, self.factor) + 2 * self.above
+    }
+
+    /// The pixel of a row of `width` whose mirror image, or itself, each sample stands at.
+    pub(crate) fn columns(self, width: usize) -> Vec<usize> {
+        (0..self.samples_across(width)).map(|index| self.pixel(index, self.beside, width)).collect()
+    }
+
+    /// The row of a picture of `height` rows that row `index` of the samples stands at, or whose mirror image.
+    pub(crate) fn row(self, index: usize, height: usize) -> usize {
+        self.pixel(index, self.above, height)
+    }
+
+    fn pixel(self, index: usize, more: usize, len: usize) -> usize {
+        reflect((index as isize - 1 - more as isize) * self.factor as isize, len)
     }
 }
 
@@ -334,7 +398,7 @@ mod tests {
         limit_cpd: f64,
         gain: impl Fn(f32) -> f32 + Sync,
     ) -> Plane {
-        let whole = transform.filtered_reduced(&mut Workspace::default(), spectrum, limit_cpd, 1, gain);
+        let whole = transform.filtered_reduced(&mut Workspace::default(), spectrum, limit_cpd, Frame::narrow(1), gain);
         enlarged(&whole, 1, transform.width, transform.height)
     }
 
@@ -401,7 +465,8 @@ mod tests {
         let gain = |freq: f32| (1.0 - freq / 2.0).max(0.0).powi(2);
         let whole = filtered(&transform, &spectrum, 2.0, gain);
         for factor in [2, 4, 8] {
-            let reduced = transform.filtered_reduced(&mut Workspace::default(), &spectrum, 2.0, factor, gain);
+            let reduced =
+                transform.filtered_reduced(&mut Workspace::default(), &spectrum, 2.0, Frame::narrow(factor), gain);
             let back = enlarged(&reduced, factor, 75, 42);
             for y in 0..42 {
                 for x in 0..75 {

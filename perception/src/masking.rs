@@ -2,7 +2,7 @@
 
 use crate::bands::{OctaveBands, RINGS, RadialTable, for_each_ring};
 use crate::display::PixelDensity;
-use crate::fft::{MOST_REDUCTION, PictureTransform, Spectrum, Workspace, reduced_size, reduction};
+use crate::fft::{Frame, MOST_REDUCTION, PictureTransform, Spectrum, Workspace, reduced_size, reduction};
 use crate::plane::Plane;
 use crate::reduced::ReducedPlane;
 use crate::sensitivity::BandTables;
@@ -87,10 +87,13 @@ pub(crate) fn band_elevation(
     let limit_cpd = bands.limit_cpd(band);
     // A quarter more densely than the band needs: its energy is blurred next.
     let amplitude_factor = reduction(density, 1.25 * limit_cpd);
-    let amplitude =
-        source
-            .transform
-            .filtered_reduced(workspace, source.contrast, limit_cpd, amplitude_factor, |freq| gain.at(freq));
+    let amplitude = source.transform.filtered_reduced(
+        workspace,
+        source.contrast,
+        limit_cpd,
+        Frame::narrow(amplitude_factor),
+        |freq| gain.at(freq),
+    );
     let factor = 2 * amplitude_factor;
     let size = (reduced_size(source.width, factor), reduced_size(source.height, factor));
     let mut energy = halved(&amplitude, size, |value| value * value);

@@ -204,15 +204,15 @@ impl SequenceObserver {
         let flicker = HeldAtLowFrequencies { base: &CastleTransient { area_deg2 } };
         let for_transient =
             ThresholdMap { levels: adaptation_levels(&self.viewing, &flicker, least, greatest), ..map.clone() };
-        let (mut still, mut moving) = (ErrorFilters::new(&map), ErrorFilters::new(&for_transient));
+        let (mut still, mut moving) = (ErrorFilters::amid_equals(&map), ErrorFilters::amid_equals(&for_transient));
         let (sustained, transient) = (still.spectrum(sustained), moving.spectrum(transient));
-        let mut energy = Plane::filled(map.width(), map.height(), 0.0);
+        let mut energy = still.nothing();
         for band in 0..map.band_count() {
             let (a, b) = (still.response(&sustained, band), moving.response(&transient, band));
             let both = a.enlarged_with(&b, |sustained, transient| (sustained + transient).powi(2));
             energy.values_mut().iter_mut().zip(both.values()).for_each(|(sum, more)| *sum += more);
         }
-        Ok(map.pooled(&energy).map(|energy| (2.0 * energy).sqrt()))
+        Ok(still.visibility_of(&energy))
     }
 }
 

@@ -148,3 +148,24 @@ fn what_does_not_fit_is_an_error() {
     let far = SequenceFrame::new(&picture, &picture, SIDE, SIDE, Some(motion(1e30))).unwrap();
     assert!(observer.difference(&[&wild, &far], 0).is_ok());
 }
+
+/// A flickering spot in a corner is as visible as where all the frames go on alike around it.
+#[test]
+fn flicker_in_a_corner_is_as_visible_as_amid_equal_frames() {
+    let seen = |side: usize, corner: usize| {
+        let observer = SequenceObserver::new(&viewing(24.0)).unwrap();
+        let still = vec![[100.0; 3]; side * side];
+        let frames: Vec<SequenceFrame> = (0..=2 * observer.reach())
+            .map(|frame| {
+                let mut test = still.clone();
+                for (x, y) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                    test[(corner + y) * side + corner + x] = [if frame % 4 < 2 { 110.0 } else { 90.0 }; 3];
+                }
+                SequenceFrame::new(&still, &test, side, side, None).unwrap()
+            })
+            .collect();
+        observer.difference(&frames.iter().collect::<Vec<_>>(), observer.reach()).unwrap().worst_visibility
+    };
+    let (found, expected) = (seen(SIDE, 0), seen(SIDE + 64, 64));
+    assert!((found / expected - 1.0).abs() < 0.02, "{found}, not {expected}");
+}
