@@ -104,6 +104,13 @@ impl PictureTransform {
         }
     }
 
+    /// The frame of samples at every `factor`-th pixel, and at least so many more beside and above the picture as its mirror image in
+    /// the transform has room for, with every sample between them and one more of those on each side.
+    pub(crate) fn mirrored_frame(&self, factor: usize, beside: f64, above: f64) -> Frame {
+        let at_most = |wanted: f64, pad: usize| (wanted.ceil() as usize).min((2 * pad / factor).saturating_sub(3) / 2);
+        Frame { factor, beside: at_most(beside, self.pad_x), above: at_most(above, self.pad_y) }
+    }
+
     /// Horizontal frequencies kept: 0 up to Nyquist.
     fn columns(&self) -> usize {
         self.padded_width / 2 + 1

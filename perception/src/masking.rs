@@ -67,6 +67,11 @@ pub(crate) struct MaskSource<'a> {
 /// nothing reaches what it has cleared.
 const EDGE_WAVELENGTHS: f64 = 0.25;
 
+/// How far around the picture its mirror image is worked on, in wavelengths, where the transform has as much of it: what the windows
+/// and the erosion reach over. Each of them mirrors what it is given, too, but at a sample and not where the picture ends: that alone
+/// made thresholds in the first and the last rows of 96×96 pixels of noise differ by 5 % from those of the mirrored picture.
+const SURROUND_WAVELENGTHS: f64 = 2.0;
+
 /// Threshold elevation, 1 to 3, of one band, on a grid as fine as the band needs.
 ///
 /// The band's local contrast amplitude is √2 times its RMS over a Gaussian of a third of a wavelength (the band's
@@ -87,63 +92,68 @@ pub(crate) fn band_elevation(
     let limit_cpd = bands.limit_cpd(band);
     // A quarter more densely than the band needs: its energy is blurred next.
     let amplitude_factor = reduction(density, 1.25 * limit_cpd);
-    let amplitude = source.transform.filtered_reduced(
-        workspace,
-        source.contrast,
-        limit_cpd,
-        Frame::narrow(amplitude_factor),
-        |freq| gain.at(freq),
-    );
     let factor = 2 * amplitude_factor;
-    let size = (reduced_size(source.width, factor), reduced_size(source.height, factor));
+    // In samples.
+    let wavelength = |pixels_per_degree: f64| pixels_per_degree / bands.center_cpd(band) / factor as f64;
+    let (wavelength_x, wavelength_y) = (wavelength(density.horizontal), wavelength(density.vertical));
+    let frame = source.transform.mirrored_frame(
+        factor,
+        SURROUND_WAVELENGTHS * wavelength_x,
+        SURROUND_WAVELENGTHS * wavelength_y,
+    );
+    let halves = Frame { factor: amplitude_factor, beside: 2 * frame.beside + 2, above: 2 * frame.above + 2 };
+    let amplitude =
+        source.transform.filtered_reduced(workspace, source.contrast, limit_cpd, halves, |freq| gain.at(freq));
+    let size = (frame.samples_across(source.width), frame.samples_down(source.height));
     let mut energy = halved(&amplitude, size, |value| value * value);
     drop(amplitude);
+    let columns = frame.columns(source.width);
     if let Some(noise) = source.noise.get(amplitude_factor.ilog2() as usize) {
         // Of white pixel noise's variance, what stands in the guide's band.
         let mut share = 0.0;
         for_each_ring(density, RINGS, |freq, weight| share += weight as f32 * gain.at(freq as f32).powi(2));
+        let sample_at = |pixel: usize| (pixel + amplitude_factor) / factor + 1;
         energy.for_each_row_mut(|y, row| {
-            row.iter_mut().zip(noise.row(y)).for_each(|(value, noise)| *value -= share * noise);
+            let noise = noise.row(sample_at(frame.row(y, source.height)));
+            row.iter_mut().zip(&columns).for_each(|(value, x)| *value -= share * noise[sample_at(*x)]);
         });
     }
-    // In samples, less the variance of the window that halved.
-    let wavelength = |pixels_per_degree: f64| pixels_per_degree / bands.center_cpd(band) / factor as f64;
+    // Less the variance of the window that halved.
     let variance = |wavelength: f64| ((0.35 * wavelength).powi(2) - HALVING_VARIANCE / 4.0).max(0.0);
-    let (wavelength_x, wavelength_y) = (wavelength(density.horizontal), wavelength(density.vertical));
     let mut mask = smoothed(&energy, variance(wavelength_x), variance(wavelength_y));
     drop(energy);
-    let half = factor / 2;
-    let coordinate_at = |index: usize, len: usize| (index * half + 1).saturating_sub(half).min(len - 1);
     mask.for_each_row_mut(|y, row| {
-        let coordinates = source.coordinates.row(coordinate_at(y, source.coordinates.height()));
-        for (x, value) in row.iter_mut().enumerate() {
-            let coordinate = coordinates[coordinate_at(x, coordinates.len())];
-            *value = 2.0 * value.max(0.0) * tables.center_sensitivity_squared.at(coordinate);
+        let coordinates = source.coordinates.row(frame.row(y, source.height) / 2 + 1);
+        for (value, x) in row.iter_mut().zip(&columns) {
+            *value = 2.0 * value.max(0.0) * tables.center_sensitivity_squared.at(coordinates[x / 2 + 1]);
         }
     });
     let mut elevated = eroded(&mask, wavelength_x, wavelength_y);
     elevated.for_each_row_mut(|_, row| row.iter_mut().for_each(|value| *value = elevation.at(*value)));
     let soft = |wavelength: f64| (EDGE_WAVELENGTHS * wavelength).powi(2);
     let elevated = smoothed(&elevated, soft(wavelength_x), soft(wavelength_y));
+    let (across, down) = (reduced_size(source.width, factor), reduced_size(source.height, factor));
+    let elevated = Plane::from_fn(across, down, |x, y| elevated.get(x + frame.beside, y + frame.above));
     ReducedPlane::new(elevated, factor, source.width, source.height)
 }
 
 /// `plane` at every second pixel, every fourth and so on, up to what [`MaskSource`] can be asked for.
 pub(crate) fn halvings(plane: &Plane) -> Vec<Plane> {
     let (width, height) = (plane.width(), plane.height());
-    let mut framed = Plane::filled(width + 2, height + 2, 0.0);
-    framed.for_each_row_mut(|y, row| {
-        let source = plane.row(y.saturating_sub(1).min(height - 1));
-        row[1..=width].copy_from_slice(source);
-        row[0] = source[0];
-        row[width + 1] = source[width - 1];
-    });
     let mut planes: Vec<Plane> = Vec::new();
-    let mut factor = 2;
-    while factor <= 2 * MOST_REDUCTION {
-        let size = (reduced_size(width, factor), reduced_size(height, factor));
-        planes.push(halved(planes.last().unwrap_or(&framed), size, |value| value));
+    let mut factor = 1;
+    while factor <= MOST_REDUCTION {
+        // The window wants one sample more on each side of the frame.
+        let frame = Frame { factor, beside: 2, above: 2 };
+        let (columns, finer) = (frame.columns(width), planes.last().unwrap_or(plane));
+        let nearest = |pixel: usize| if factor == 1 { pixel } else { (pixel + factor / 2) / factor + 1 };
+        let mut framed = Plane::filled(columns.len(), frame.samples_down(height), 0.0);
+        framed.for_each_row_mut(|y, row| {
+            let source = finer.row(nearest(frame.row(y, height)));
+            row.iter_mut().zip(&columns).for_each(|(value, x)| *value = source[nearest(*x)]);
+        });
         factor *= 2;
+        planes.push(halved(&framed, (reduced_size(width, factor), reduced_size(height, factor)), |value| value));
     }
     planes
 }
@@ -151,21 +161,19 @@ pub(crate) fn halvings(plane: &Plane) -> Vec<Plane> {
 /// Variance of the window of [`halved`], in samples of its input.
 const HALVING_VARIANCE: f64 = 0.5;
 
-/// `change` of every sample of a framed plane, at every other one, to a plane of `size`: through a binomial window, since
-/// sampled bare it would alias.
+/// `change` of every second sample of a plane, from its second one on, to a plane of `size`: through a binomial window, since sampled
+/// bare it would alias.
 fn halved(plane: &Plane, size: (usize, usize), change: impl Fn(f32) -> f32 + Sync) -> Plane {
     const BINOMIAL: [f32; 3] = [0.25, 0.5, 0.25];
     let mut result = Plane::filled(size.0, size.1, 0.0);
     result.for_each_row_mut(|y, row| {
         let mut sums = vec![0.0_f32; plane.width()];
         for (offset, weight) in BINOMIAL.into_iter().enumerate() {
-            let source = plane.row((2 * y + offset).saturating_sub(2).min(plane.height() - 1));
+            let source = plane.row(2 * y + offset);
             sums.iter_mut().zip(source).for_each(|(sum, value)| *sum += weight * change(*value));
         }
-        let last = sums.len() - 1;
-        for (x, value) in row.iter_mut().enumerate() {
-            let at = |offset: usize| sums[(2 * x + offset).saturating_sub(2).min(last)];
-            *value = BINOMIAL[0] * at(0) + BINOMIAL[1] * at(1) + BINOMIAL[2] * at(2);
+        for (value, at) in row.iter_mut().zip(sums.windows(3).step_by(2)) {
+            *value = BINOMIAL[0] * at[0] + BINOMIAL[1] * at[1] + BINOMIAL[2] * at[2];
         }
     });
     result

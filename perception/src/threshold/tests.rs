@@ -237,3 +237,32 @@ fn bad_inputs_are_errors() {
 fn normal(state: &mut u64) -> f32 {
     crate::test_noise::normal(state)
 }
+
+/// Between −½ and ½, another value for every pixel.
+fn hashed(x: usize, y: usize) -> f32 {
+    let mut state = (x as u64 * 7919 + y as u64 * 104_729 + 12_345).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    state ^= state >> 31;
+    state = state.wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    state ^= state >> 29;
+    (state % 10_007) as f32 / 10_007.0 - 0.5
+}
+
+/// A mirrored picture has the mirrored thresholds, in its first and last rows too: grids of masks start at one side, what they hold does
+/// not. Pixels of an even number of columns are on the grid in one of the two pictures and off it in the other.
+#[test]
+fn a_mirrored_picture_has_the_mirrored_thresholds() {
+    for (width, height, textured, tolerance) in [(96, 96, 96, 0.02), (255, 253, 120, 0.015)] {
+        let at = |x: usize, y: usize| 50.0 * (1.0 + if x < textured { 0.6 * hashed(x, y) } else { 0.0 });
+        let allowed = |value_at: &(dyn Fn(usize, usize) -> f32 + Sync)| {
+            map_of(&Plane::from_fn(width, height, value_at), &viewing(60.0)).allowed_standard_error_cd_m2(1.0)
+        };
+        let seen = allowed(&at);
+        let (left_right, upside_down) = (allowed(&|x, y| at(width - 1 - x, y)), allowed(&|x, y| at(x, height - 1 - y)));
+        for (x, y) in (0..width).flat_map(|x| (0..height).map(move |y| (x, y))) {
+            let own = seen.get(x, y);
+            for other in [left_right.get(width - 1 - x, y), upside_down.get(x, height - 1 - y)] {
+                assert!((own / other - 1.0).abs() < tolerance, "{width}×{height}, ({x}, {y}): {own}, mirrored {other}");
+            }
+        }
+    }
+}
