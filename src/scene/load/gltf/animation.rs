@@ -111,9 +111,11 @@ struct Place {
 }
 
 impl Place {
-    /// The time is compared before it is narrowed: a shot's later hours have f32 times a frame apart.
+    /// Which keys are past is told by f32 times, as files hold them: frame n's own key lies after n / fps by f32 rounding in 34 of
+    /// 100 frames at 24 a second and in 53 at 30, and a STEP would come a frame late. How far past is told by f64: after 28 hours f32
+    /// times are a fifth of a frame apart.
     fn of(times: &[f32], time: f64) -> Self {
-        let after = times.partition_point(|&key| f64::from(key) <= time);
+        let after = times.partition_point(|&key| key <= time as f32);
         let (before, after) = (after.saturating_sub(1), after.min(times.len() - 1));
         let span = times[after] - times[before];
         let since = time - f64::from(times[before]);
@@ -149,5 +151,22 @@ mod tests {
         // A quarter second after 28 hours, where f32 times are 1/128 s apart.
         let place = Place::of(&[1e5, 100_010.0], 1e5 + 0.241);
         assert!((place.share - 0.0241).abs() < 1e-6, "{}", place.share);
+    }
+
+    /// Of keys at n / fps, that of every frame counts in that frame.
+    #[test]
+    fn a_key_at_a_frame_is_that_frames() {
+        for rate in [24.0, 25.0, 30.0, 30_000.0 / 1001.0] {
+            let times: Vec<f32> = (0..500).map(|frame| (f64::from(frame) / rate) as f32).collect();
+            for frame in 0..500 {
+                let place = Place::of(&times, frame as f64 / rate);
+                assert!(
+                    place.before == frame && place.share < 1e-3,
+                    "{frame} at {rate}: {} {}",
+                    place.before,
+                    place.share
+                );
+            }
+        }
     }
 }

@@ -30,12 +30,15 @@ pub(super) fn moments(
 ) -> Result<Vec<Moment>, LoadError> {
     let mut shares = vec![0.0];
     if shutter.stays_open > 0.0 && document.animations().next().is_some() {
-        let inside = |time: f32| (f64::from(time) - shutter.opens) / shutter.stays_open;
+        let share = |time: f32| (f64::from(time) - shutter.opens) / shutter.stays_open;
+        // By f32 times, as poses are found: a key that f32 rounding puts after the opening is met there.
+        let (opens, closes) = (shutter.opens as f32, (shutter.opens + shutter.stays_open) as f32);
         // Channels share their times.
         let mut keys = animation::key_times(document, buffers)?;
+        keys.retain(|&time| time > opens && time < closes);
         keys.sort_by(f32::total_cmp);
         keys.dedup();
-        shares.extend(keys.into_iter().map(inside).filter(|share| *share > 0.0 && *share < 1.0).take(MOST_KEYS));
+        shares.extend(keys.into_iter().map(share).take(MOST_KEYS));
         shares.extend((1..=STEPS).map(|step| f64::from(step) / f64::from(STEPS)));
         shares.sort_by(f64::total_cmp);
         shares.dedup_by(|later, earlier| *later as f32 <= *earlier as f32);
