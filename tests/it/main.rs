@@ -9,6 +9,7 @@
 //! - `camera_and_time`: blur of lens and shutter, moving lamps, crops
 //! - `denoise`: denoised pictures: the raw mean beside them, equal bytes, libraries that are not there
 //! - `formats`: the same scene from several formats
+//! - `gltf_motion`: jumps, hidden things and morphing nodes of glTF while the shutter is open
 //! - `mitsuba_format`, `pbrt_format`: what their files mean where readers go wrong easily
 //! - `bad_input`: bad scene files, and our own ones
 //! - `own_format`: lamps of a luminous power, keys that change nothing, files beside the scene
@@ -50,6 +51,7 @@ mod farm;
 mod farm_mishaps;
 mod formats;
 mod furnace;
+mod gltf_motion;
 mod importance;
 mod kill;
 mod load_assets;

@@ -23,11 +23,21 @@ pub(super) struct Posed {
 /// The animated nodes, by index.
 pub(super) type Pose = HashMap<usize, Posed>;
 
-/// Times of the first animation's keys in seconds, in no order.
-pub(super) fn key_times(document: &gltf::Document, buffers: &Buffers) -> Result<Vec<f32>, LoadError> {
+/// When a channel has a key.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct KeyTime {
+    pub(super) seconds: f32,
+    /// Whether what it says holds from then on at once.
+    pub(super) jumps: bool,
+}
+
+/// Times of the first animation's keys, in no order.
+pub(super) fn key_times(document: &gltf::Document, buffers: &Buffers) -> Result<Vec<KeyTime>, LoadError> {
     let mut times = Vec::new();
     for channel in document.animations().next().into_iter().flat_map(|animation| animation.channels()) {
-        times.extend(buffers.floats::<1>(&channel.sampler().input())?.into_iter().flatten());
+        let jumps = channel.sampler().interpolation() == Interpolation::Step;
+        let of_channel = buffers.floats::<1>(&channel.sampler().input())?.into_iter().flatten();
+        times.extend(of_channel.map(|seconds| KeyTime { seconds, jumps }));
     }
     Ok(times)
 }

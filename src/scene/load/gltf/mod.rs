@@ -2,7 +2,7 @@
 //! [`buffers`]): its readers panic on damaged files.
 //!
 //! The first animation is played up to the time that the caller asks for; skins and morph targets bend the meshes of that
-//! moment. While the shutter is open rigid nodes and cameras go on.
+//! moment. While the shutter is open nodes and cameras go on, and the shapes of that moment with them.
 
 mod animation;
 mod buffers;
@@ -74,7 +74,7 @@ fn read(path: &Path, options: &LoadOptions) -> Result<Builder, LoadError> {
         let name = first.name().map_or_else(String::new, |name| format!(" \"{name}\""));
         let blur = match options.shutter_s > 0.0 {
             true => format!(
-                "the shutter stays open for {} s, in which meshes that deform and lights rest",
+                "the shutter stays open for {} s, in which skins, the shapes of morph targets and lights rest",
                 options.shutter_s
             ),
             false => "nothing blurs, since no side file gives the camera a shutter_s".to_owned(),
@@ -136,10 +136,17 @@ impl<'a> Reader<'a> {
             let animated = self.moments[0].pose.get(&node.index()).and_then(|posed| posed.weights.clone());
             let weights = animated.or(node.weights().map(<[f32]>::to_vec)).or(mesh.weights().map(<[f32]>::to_vec));
             let weights = weights.unwrap_or_default();
-            if node.skin().is_some() || weights.iter().any(|weight| *weight != 0.0) {
-                self.place_deformed(node, &mesh, &name, &weights, to_world)?;
+            // A skin's vertices are in world space already: the node's own transform does not count.
+            let is_skinned = node.skin().is_some();
+            let motion = motion::through(&self.moments, matrices).filter(|_| !is_skinned);
+            let to_world = match &motion {
+                _ if is_skinned => Affine3A::IDENTITY,
+                Some(appears) if !motion::is_there(&matrices[0]) => appears.at(0.0),
+                _ => to_world,
+            };
+            if is_skinned || weights.iter().any(|weight| *weight != 0.0) {
+                self.place_deformed(node, &mesh, &name, &weights, to_world, motion)?;
             } else {
-                let motion = motion::through(&self.moments, matrices);
                 self.place(&mesh, &name, to_world, motion)?;
             }
         }
@@ -185,6 +192,7 @@ impl<'a> Reader<'a> {
         name: &str,
         weights: &[f32],
         to_world: Affine3A,
+        motion: Option<Motion>,
     ) -> Result<(), LoadError> {
         let joints = node.skin().map(|skin| deform::joints(self.buffers, &skin, &self.world)).transpose()?;
         let mut parts = Vec::new();
@@ -199,8 +207,7 @@ impl<'a> Reader<'a> {
             self.builder.deforming.insert(mesh);
             parts.push((mesh, material));
         }
-        // A skin's vertices are in world space already: the node's own transform does not count.
-        self.place_parts(&parts, name, if joints.is_some() { Affine3A::IDENTITY } else { to_world }, None)
+        self.place_parts(&parts, name, to_world, motion)
     }
 
     fn place_parts(
