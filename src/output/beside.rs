@@ -20,6 +20,19 @@ pub fn write_beside(path: &Path, write: impl FnOnce(&mut File) -> std::io::Resul
     Ok(())
 }
 
+/// The same where something else writes the file, by its name; what ends it says nothing of its kind.
+///
+/// # Errors
+/// If `write` fails, or the file cannot be made or renamed.
+pub fn write_beside_by_name(path: &Path, write: impl FnOnce(&Path) -> std::io::Result<()>) -> Result<(), OutputError> {
+    let (file, target) = create_beside(path)?;
+    let io = |error| OutputError::Io { path: path.to_owned(), error };
+    write(file.path()).map_err(io)?;
+    file.as_file().sync_all().map_err(io)?;
+    file.persist(target).map_err(|error| io(error.error))?;
+    Ok(())
+}
+
 /// Makes the new file, which is removed when dropped, and says what it should be renamed to.
 pub(super) fn create_beside(path: &Path) -> Result<(NamedTempFile, PathBuf), OutputError> {
     let io = |error| OutputError::Io { path: path.to_owned(), error };
@@ -147,6 +160,27 @@ mod tests {
         assert!(result.unwrap_err().to_string().ends_with("a.png: the disk is full"));
         assert_eq!(std::fs::read(&path).unwrap(), b"old");
         assert_eq!(names(folder.path()), ["a.png"]);
+    }
+
+    /// One fixed name beside the file was another's, who renamed it half written.
+    #[test]
+    fn two_that_write_one_file_by_name_do_not_meet() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.mp4");
+        write_beside_by_name(&path, |first| {
+            std::fs::write(first, "half")?;
+            write_beside_by_name(&path, |second| {
+                assert_ne!(first, second);
+                std::fs::write(second, "second")
+            })
+            .unwrap();
+            assert_eq!(std::fs::read_to_string(&path)?, "second");
+            std::fs::write(first, "first")
+        })
+        .unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "first");
+        write_beside_by_name(&path, |_| Err(std::io::Error::other("no encoder"))).unwrap_err();
+        assert_eq!(names(folder.path()), ["a.mp4"]);
     }
 
     #[test]

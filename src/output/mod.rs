@@ -14,7 +14,7 @@ mod png_file;
 pub mod rendered;
 mod srgb_codes;
 
-pub use beside::{remove_leftovers, write_beside};
+pub use beside::{remove_leftovers, write_beside, write_beside_by_name};
 pub use exr_file::write_exr;
 pub use png_file::{
     PngColour, PngTransfer, decode_pq, encode_srgb8, png_colour, write_codes_png, write_png, write_png_for,

@@ -4,7 +4,7 @@ use crate::cli::picture::InputPicture;
 use anyhow::{Context, Result, bail};
 use fechner::animate::ShotSettings;
 use fechner::animate::video::Y4mWriter;
-use fechner::output::{decode_pq, encode_srgb8, write_beside};
+use fechner::output::{decode_pq, encode_srgb8, write_beside, write_beside_by_name};
 use fechner_perception::display::Eotf;
 use fechner_perception::primaries::Primaries;
 use fechner_perception::tone::{FittedTone, map_picture};
@@ -48,48 +48,42 @@ pub(super) fn write(
     fitted: &dyn Fn(usize) -> Box<dyn FittedTone>,
     shot: &ShotSettings,
 ) -> Result<()> {
+    let failed = |error: anyhow::Error| io::Error::other(format!("{error:#}"));
     match format {
         VideoFormat::Y4m => {
-            write_beside(path, |file| {
-                stream(BufWriter::new(file), files, fitted, shot)
-                    .map_err(|error| io::Error::other(format!("{error:#}")))
-            })?;
-            Ok(())
+            write_beside(path, |file| stream(BufWriter::new(file), files, fitted, shot).map_err(failed))?;
         }
+        // Under a name of this process's own: several that complete one shot would write into each other's file.
         VideoFormat::Mp4 => {
-            // ffmpeg tells the kind of file from its ending, and takes what begins with a dash or with letters and a colon for
-            // something else than a file, unless its folder is named.
-            let beside = std::path::absolute(path.with_extension("unfinished.mp4"))?;
-            let mut ffmpeg = Command::new("ffmpeg")
-                .args(["-y", "-loglevel", "error", "-f", "yuv4mpegpipe", "-i", "-", "-c:v", "libx264", "-crf", "14"])
-                .args([
-                    "-pix_fmt",
-                    "yuv420p",
-                    "-color_primaries",
-                    "bt709",
-                    "-color_trc",
-                    "bt709",
-                    "-colorspace",
-                    "bt709",
-                ])
-                .args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2"])
-                .arg(&beside)
-                .stdin(Stdio::piped())
-                .spawn()
-                .context("ffmpeg could not be started")?;
-            let pipe = ffmpeg.stdin.take().context("ffmpeg takes no input")?;
-            let sent = stream(BufWriter::new(pipe), files, fitted, shot);
-            let ended = ffmpeg.wait().context("ffmpeg").and_then(|status| match status.success() {
-                true => sent,
-                false => bail!("ffmpeg failed with {status}"),
-            });
-            let placed = ended.and_then(|()| Ok(std::fs::rename(&beside, path)?));
-            if placed.is_err() {
-                std::fs::remove_file(&beside).ok();
-            }
-            placed.with_context(|| format!("cannot write {}", path.display()))
+            write_beside_by_name(path, |beside| encode(beside, files, fitted, shot).map_err(failed))?;
         }
     }
+    Ok(())
+}
+
+/// Has ffmpeg write a file.
+fn encode(
+    file: &Path,
+    files: impl Iterator<Item = PathBuf>,
+    fitted: &dyn Fn(usize) -> Box<dyn FittedTone>,
+    shot: &ShotSettings,
+) -> Result<()> {
+    let mut ffmpeg = Command::new("ffmpeg")
+        .args(["-y", "-loglevel", "error", "-f", "yuv4mpegpipe", "-i", "-", "-c:v", "libx264", "-crf", "14"])
+        .args(["-pix_fmt", "yuv420p", "-color_primaries", "bt709", "-color_trc", "bt709", "-colorspace", "bt709"])
+        .args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-f", "mp4"])
+        // It takes what begins with a dash or with letters and a colon for something else than a file, unless its folder is named.
+        .arg(std::path::absolute(file)?)
+        .stdin(Stdio::piped())
+        .spawn()
+        .context("ffmpeg could not be started")?;
+    let pipe = ffmpeg.stdin.take().context("ffmpeg takes no input")?;
+    let sent = stream(BufWriter::new(pipe), files, fitted, shot);
+    let ended = ffmpeg.wait().context("ffmpeg")?;
+    if !ended.success() {
+        bail!("ffmpeg failed with {ended}");
+    }
+    sent
 }
 
 fn stream<W: Write>(
