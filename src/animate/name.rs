@@ -49,12 +49,14 @@ impl FrameName {
         Ok(numbers)
     }
 
-    /// A file of the whole sequence: the pattern without its number, with another ending.
+    /// A file of the whole sequence: the pattern without its number, with another ending. What stands between number and ending stays:
+    /// it may be all that tells the left eye's frames from the right one's.
     pub fn of_shot(&self, ending: &str) -> PathBuf {
         let (folder, start) = self.split();
         let stem = start.trim_end_matches(['.', '_', '-']);
         let stem = if stem.is_empty() { "shot" } else { stem };
-        Path::new(folder).join(format!("{stem}.{ending}"))
+        let between = self.after.rfind('.').map_or("", |dot| &self.after[..dot]);
+        Path::new(folder).join(format!("{stem}{between}.{ending}"))
     }
 
     /// The folder, and what file names in it begin with. Not by [`Path`], to which a name that is a dot so far is none.
@@ -84,6 +86,12 @@ mod tests {
         assert_eq!(FrameName::parse("out/.####.exr").expect("a pattern").of_shot("json"), Path::new("out/shot.json"));
         assert_eq!(FrameName::parse(".##.exr").expect("a pattern").of_shot("json"), Path::new("shot.json"));
         assert_eq!(FrameName::parse("a#b/shot.##.exr").expect("a pattern").of(7), Path::new("a#b/shot.07.exr"));
+        // Two that differ after the number have two tracks.
+        for (pattern, expected) in
+            [("s.##.left.exr", "s.left.json"), ("s_##_r.exr", "s_r.json"), ("##.a.exr", "shot.a.json")]
+        {
+            assert_eq!(FrameName::parse(pattern).expect("a pattern").of_shot("json"), Path::new(expected));
+        }
         for bad in ["shot.exr", "a#b#.png", "out##/shot.png", ""] {
             assert_eq!(FrameName::parse(bad), None, "{bad}");
         }
