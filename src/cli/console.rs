@@ -3,8 +3,9 @@
 use fechner::adaptive::{Monitor, Progress};
 use fechner::say;
 use indicatif::{ProgressBar, ProgressStyle};
+use std::cell::Cell;
 use std::io::IsTerminal;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 pub(super) struct Console {
     bar: Option<ProgressBar>,
@@ -80,6 +81,36 @@ pub(super) fn texture_decoded(done: usize, total: usize) {
         (true, true) => say::part(format_args!("\r\x1b[K")),
         (false, true) if total >= MANY => say!("textures: {total}"),
         (false, _) => {}
+    }
+}
+
+/// Counts what takes long: on a terminal in one line, elsewhere by a line every ten seconds.
+pub(super) struct Counter {
+    what: &'static str,
+    total: usize,
+    on_terminal: bool,
+    said: Cell<Instant>,
+}
+
+impl Counter {
+    const QUIET: Duration = Duration::from_secs(10);
+
+    pub(super) fn new(what: &'static str, total: usize) -> Self {
+        Self { what, total, on_terminal: std::io::stderr().is_terminal(), said: Cell::new(Instant::now()) }
+    }
+
+    /// So many are done.
+    pub(super) fn count(&self, done: usize) {
+        let Self { what, total, on_terminal, ref said } = *self;
+        match (on_terminal, done == total) {
+            (true, false) => say::part(format_args!("\r{what}: {done} of {total}\x1b[K")),
+            (true, true) => say::part(format_args!("\r\x1b[K")),
+            (false, false) if said.get().elapsed() >= Self::QUIET => {
+                said.set(Instant::now());
+                say!("{what}: {done} of {total}");
+            }
+            (false, _) => {}
+        }
     }
 }
 

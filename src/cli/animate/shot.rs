@@ -7,7 +7,7 @@ use super::settings::shot_settings;
 use super::source::FileSource;
 use super::video::shown_rgb8;
 use super::{AnimateArguments, EyeChoice, VelocityChoice, video};
-use crate::cli::console::{Console, duration_in_words};
+use crate::cli::console::{Console, Counter, duration_in_words};
 use crate::cli::json::write_json;
 use crate::cli::report::Report;
 use crate::cli::seeing::{Presentation, tone_operator};
@@ -128,9 +128,11 @@ impl<'a> Shot<'a> {
             }
             say!("{}: of other settings or another scene, made anew", file.display());
         }
+        self.check_ends()?;
         let count = self.settings.last - self.settings.first + 1;
         let started = Instant::now();
-        let mut track = Track::make(&self.source, &self.settings, operator.as_ref(), &|_| {})?;
+        let looking = Counter::new("looking at frames", count as usize);
+        let mut track = Track::make(&self.source, &self.settings, operator.as_ref(), &|done| looking.count(done))?;
         if let (Some(mean_samples), Sampling::Adaptive) = (self.settings.limits.mean_samples, self.settings.sampling) {
             track.spread(&self.needs(&track)?, mean_samples);
         }
@@ -138,6 +140,17 @@ impl<'a> Shot<'a> {
         let text = serde_json::to_string(&track).context("the track could not be put into words")?;
         output::write_beside(&file, |file| file.write_all(text.as_bytes()))?;
         Ok(track)
+    }
+
+    /// Reads the scenes beyond both ends, which the first and the last frame alone need: else a shot would fail at its last frame, when
+    /// all others are rendered.
+    fn check_ends(&self) -> Result<()> {
+        let [first, last] = [self.settings.first, self.settings.last].map(f64::from);
+        for (beyond, end) in [(first - 1.0, "first"), (last + 1.0, "last")] {
+            let scene = self.source.at(self.settings.seconds(beyond));
+            scene.with_context(|| format!("the frame beyond the {end} one, by which its motion is told"))?;
+        }
+        Ok(())
     }
 
     fn is_up_to_date(&self, track: &Track, operator: &dyn ToneOperator, wanted: RangeInclusive<u32>) -> Result<bool> {

@@ -45,6 +45,14 @@ pub enum LoadError {
         /// What was asked for, and what there is.
         problem: String,
     },
+    /// A scene that moves is wrong at a time, and not at its beginning.
+    #[error("at {} s: {fault}", (seconds * 1e6).round() / 1e6)]
+    AtTime {
+        /// The time.
+        seconds: f64,
+        /// What is wrong then; told by this error's own text, so not its source.
+        fault: Box<LoadError>,
+    },
     /// Another file that this one names is at fault.
     #[error("{place}: {fault}")]
     Referenced {

@@ -99,6 +99,17 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
     }
     let side = toml::side::of(path).filter(|side| side != path && path.extension().is_some_and(|e| e != "toml"));
     let Some(side) = side else { return load_alone(path, options) };
+    load_at_time(path, options).map_err(|fault| {
+        // Files are right or wrong as a whole more often than at a time, and are quickly read where they are wrong.
+        let at_start = LoadOptions { frame_time: 0.0, ..options.clone() };
+        match options.frame_time != 0.0 && load_at_time(path, &at_start).is_ok() {
+            true => LoadError::AtTime { seconds: options.frame_time, fault: Box::new(fault) },
+            false => fault,
+        }
+    })
+}
+
+fn load_at_time(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
     let options = &toml::side::before(&side, options)?;
     let mut scene = load_alone(path, options)?;
     toml::side::apply(&side, options, &mut scene)?;
