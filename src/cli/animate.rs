@@ -33,7 +33,7 @@ pub(super) use shot::{FrameJob, Shot};
 pub(super) struct AnimateArguments {
     /// Scene with keyframes: .toml, .gltf, .glb, .pbrt, or any other with a side file that moves its camera.
     scene: PathBuf,
-    /// Frames to render, first..last, both included; frame 0 is at 0 s. Frames of the shot that are there already are kept.
+    /// Frames to render, first..last, both included, or one; frame 0 is at 0 s. Frames of the shot that are there already are kept.
     #[arg(long, value_name = "A..B", value_parser = parse_frames)]
     frames: Frames,
     /// All frames of the shot, where --frames renders a part of it: exposure and eyes are those of the whole shot.

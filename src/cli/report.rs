@@ -6,6 +6,7 @@ pub(super) use summary::summary;
 
 use super::console::duration_in_words;
 use fechner::adaptive::judge::Judgement;
+use fechner::adaptive::pursuit::Pursuit;
 use fechner::adaptive::settings::{LoopSettings, RivalRule, Sampling};
 use fechner::adaptive::statistics::find_outliers;
 use fechner::adaptive::{Rendered, StopReason, visible_share};
@@ -260,6 +261,7 @@ impl Report {
 fn eye_in_words(settings: &LoopSettings) -> String {
     match (settings.gazes.as_slice(), &settings.pursuit) {
         ([], None) => "anywhere".to_owned(),
+        ([], Some(Pursuit::Salient(_))) => "what stands out, which it follows".to_owned(),
         ([], Some(_)) => "what moves, which it follows".to_owned(),
         ([gaze], _) => format!("pixel {:.0},{:.0}", gaze.x_px, gaze.y_px),
         (gazes, _) => format!("{} places", gazes.len()),

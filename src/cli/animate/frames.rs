@@ -14,7 +14,8 @@ pub(super) struct Frames {
 
 pub(super) fn parse_frames(text: &str) -> Result<Frames, String> {
     let wrong = || format!("\"{text}\" is not a range of frames; expected FIRST..LAST such as 0..47");
-    let (first, last) = text.split_once("..").ok_or_else(wrong)?;
+    // A number alone is that frame.
+    let (first, last) = text.split_once("..").unwrap_or((text, text));
     let number = |text: &str| text.trim().trim_start_matches('=').parse::<u32>().map_err(|_| wrong());
     let frames = Frames { first: number(first)?, last: number(last)? };
     if frames.first > frames.last {
@@ -43,6 +44,7 @@ mod tests {
     #[test]
     fn what_is_wrong_with_a_range_is_said() {
         assert_eq!(parse_frames("0..999999"), Ok(Frames { first: 0, last: 999_999 }));
+        assert_eq!(parse_frames("5"), Ok(Frames { first: 5, last: 5 }));
         for (text, said) in [("0..1000000", "at most 1000000 frames"), ("3..1", "ends before"), ("3-4", "not a range")]
         {
             let error = parse_frames(text).expect_err(text);

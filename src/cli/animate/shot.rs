@@ -6,7 +6,7 @@ use super::record::{self, FrameRecord, read_json};
 use super::settings::shot_settings;
 use super::source::FileSource;
 use super::video::shown_rgb8;
-use super::{AnimateArguments, EyeChoice, VelocityChoice, video};
+use super::{AnimateArguments, AovNames, EyeChoice, VelocityChoice, video};
 use crate::cli::console::{Console, Counter, duration_in_words};
 use crate::cli::json::write_json;
 use crate::cli::report::Report;
@@ -56,7 +56,7 @@ impl<'a> Shot<'a> {
     pub(in crate::cli) fn new(arguments: &'a AnimateArguments) -> Result<Self> {
         let name = FrameName::parse(&arguments.output).with_context(|| {
             format!(
-                "{}: a sequence's name has # for each digit of the frame's number, as out/shot.####.exr",
+                "{}: a sequence's name has one run of #, one for each digit of the frame's number, as out/shot.####.exr",
                 arguments.output
             )
         })?;
@@ -65,13 +65,13 @@ impl<'a> Shot<'a> {
             bail!("--frames reaches beyond --shot");
         }
         let first_file = name.of(arguments.frames.first);
-        if let Some(folder) = first_file.parent().filter(|folder| !folder.as_os_str().is_empty()) {
-            std::fs::create_dir_all(folder).with_context(|| format!("{}", folder.display()))?;
-        }
-        let format = output::check_target(&first_file)?;
+        let format = Format::of(&first_file)?;
         let is_followed = matches!(arguments.eye, EyeChoice::Track | EyeChoice::Saliency);
         if format == Format::Png && arguments.velocity_of == VelocityChoice::Image && !is_followed {
             bail!("--velocity-of image: PNG frames hold no motion; name the frames .exr");
+        }
+        if format == Format::Png && arguments.aov_names == AovNames::Blender {
+            bail!("--aov-names blender: PNG frames hold no motion; name the frames .exr");
         }
         let source = FileSource::new(arguments);
         let scene = source.at(f64::from(arguments.frames.first) / arguments.fps)?;
@@ -84,8 +84,21 @@ impl<'a> Shot<'a> {
         let Presentation { operator, exposure_stops, .. } = arguments.asked_presentation().of_scene(&scene);
         let operator_name = operator.to_owned();
         let shot = Self { arguments, source, settings, operator_name, exposure_stops, name, format };
-        shot.operator()?;
+        let operator = shot.operator()?;
+        if arguments.adapted_to.is_some() && !operator.sees_adaptation() {
+            bail!("--adapted-to: {} does not know an eye that adapts over time", operator.name());
+        }
         Ok(shot)
+    }
+
+    /// Makes the folder of the frames, once all that can be refused has been, and checks that they can be written.
+    fn make_folder(&self) -> Result<()> {
+        let first_file = self.name.of(self.arguments.frames.first);
+        if let Some(folder) = folder_of(&first_file) {
+            std::fs::create_dir_all(folder).with_context(|| format!("{}", folder.display()))?;
+        }
+        output::check_target(&first_file)?;
+        Ok(())
     }
 
     /// For whose eyes its frames are, as their films say it.
@@ -107,7 +120,11 @@ impl<'a> Shot<'a> {
     /// Whether the video that is asked for can be made and written: known before the frames are rendered.
     pub(in crate::cli) fn check_video(&self) -> Result<()> {
         if let Some((path, _)) = self.arguments.video()? {
-            output::check_writable(path)?;
+            // The frames' own folder is not there yet.
+            let is_beside_frames = folder_of(path) == folder_of(&self.name.of(self.settings.first));
+            if !is_beside_frames || folder_of(path).is_none_or(Path::exists) {
+                output::check_writable(path)?;
+            }
         }
         Ok(())
     }
@@ -124,11 +141,15 @@ impl<'a> Shot<'a> {
         let operator = self.operator()?;
         if let Some(track) = read_json::<Track>(&file) {
             if self.is_up_to_date(&track, operator.as_ref(), wanted)? {
+                self.make_folder()?;
                 return Ok(track);
             }
             say!("{}: of other settings or another scene, made anew", file.display());
         }
         self.check_ends()?;
+        if folder_of(&self.file(self.settings.first)).is_none_or(Path::exists) {
+            self.make_folder()?;
+        }
         let count = self.settings.last - self.settings.first + 1;
         let started = Instant::now();
         let looking = Counter::new("looking at frames", count as usize);
@@ -136,6 +157,7 @@ impl<'a> Shot<'a> {
         if let (Some(mean_samples), Sampling::Adaptive) = (self.settings.limits.mean_samples, self.settings.sampling) {
             track.spread(&self.needs(&track)?, mean_samples);
         }
+        self.make_folder()?;
         say!("looked at {count} frames in {}", duration_in_words(started.elapsed().as_secs_f64()));
         let text = serde_json::to_string(&track).context("the track could not be put into words")?;
         output::write_beside(&file, |file| file.write_all(text.as_bytes()))?;
@@ -347,6 +369,11 @@ impl<'a> Shot<'a> {
         }
         Ok(found)
     }
+}
+
+/// A file's folder, where its name has one.
+fn folder_of(file: &Path) -> Option<&Path> {
+    file.parent().filter(|folder| !folder.as_os_str().is_empty())
 }
 
 /// What came of a frame.
