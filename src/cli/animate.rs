@@ -175,6 +175,7 @@ fn render_shot(arguments: &AnimateArguments) -> Result<()> {
     arguments.video()?;
     let shot = Shot::new(arguments)?;
     shot.check_video()?;
+    shot.note_other_frames();
     let started = Instant::now();
     let track = shot.track(arguments.frame_numbers())?;
     let clock = match arguments.time {
@@ -191,7 +192,22 @@ fn render_shot(arguments: &AnimateArguments) -> Result<()> {
             say!("{done} of {count} frames, about {} left", duration_in_words(progress.seconds_left()));
         }
     }
+    if let (Some(budget), Some(_)) = (arguments.time, clock) {
+        note_overrun(budget, started.elapsed());
+    }
     shot.conclude(&track).map(drop)
+}
+
+/// Says where a budget could not be kept: the track and each frame's first plans are made whatever they take.
+fn note_overrun(budget: Duration, taken: Duration) {
+    /// Beyond what the last plan of each frame may take too long.
+    const OVERRUN: f64 = 1.5;
+    if taken > budget.mul_f64(OVERRUN) {
+        let [asked, taken] = [budget, taken].map(|time| duration_in_words(time.as_secs_f64()));
+        say!(
+            "note: {taken} were taken of --time's {asked}: the first look and the first samples of each frame take that at the least."
+        );
+    }
 }
 
 impl AnimateArguments {

@@ -114,6 +114,7 @@ impl Staging {
             camera: self.camera.clone(),
             frame_time: seconds,
             shutter_s: 0.0,
+            frame_s: None,
             environment_follows: self.environment.is_some(),
             on_texture: None,
             texture_memory: self.texture_memory.map(megabytes),

@@ -1,6 +1,7 @@
 //! A shot on its way into files: its track, its frames and what only the whole of it has.
 
 use super::contact::{ContactSheet, on_sheet};
+use super::frames::Frames;
 use super::motion::push_velocity;
 use super::record::{self, FrameRecord, read_json};
 use super::settings::shot_settings;
@@ -99,6 +100,23 @@ impl<'a> Shot<'a> {
         }
         output::check_target(&first_file)?;
         Ok(())
+    }
+
+    /// Says where frames of another call are there already that may be of the same shot: each call would fit the exposure to its own.
+    pub(super) fn note_other_frames(&self) {
+        let Frames { first, last } = self.arguments.frames;
+        let found = self.name.numbers().unwrap_or_default();
+        if let (None, Some(&least), Some(&greatest)) = (self.arguments.shot, found.first(), found.last())
+            && (least < first || greatest > last)
+        {
+            let whole = Frames { first: first.min(least), last: last.max(greatest) };
+            say!(
+                "note: of this sequence frames {least} to {greatest} are there; one exposure for all its parts needs --shot {}..{} in \
+                 each call.",
+                whole.first,
+                whole.last
+            );
+        }
     }
 
     /// For whose eyes its frames are, as their films say it.

@@ -3,7 +3,7 @@
 use super::AnimateArguments;
 use fechner::animate::SceneSource;
 use fechner::scene::Scene;
-use fechner::scene::load::{LoadError, load};
+use fechner::scene::load::{LoadError, LoadOptions, load};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -24,7 +24,8 @@ impl<'a> FileSource<'a> {
 
     fn read(&self, seconds: f64) -> Result<Scene, LoadError> {
         let AnimateArguments { scene: file, staging, nits_per_unit, size, .. } = self.arguments;
-        let mut scene = load(file, &staging.load_options(seconds, *nits_per_unit, *size))?;
+        let options = staging.load_options(seconds, *nits_per_unit, *size);
+        let mut scene = load(file, &LoadOptions { frame_s: Some(self.arguments.fps.recip()), ..options })?;
         staging.apply(&mut scene).map_err(|error| LoadError::Option { problem: format!("{error:#}") })?;
         Ok(scene)
     }

@@ -70,6 +70,8 @@ pub(super) struct Builder {
     pub(super) lights: Vec<Light>,
     pub(super) environment: Option<Environment>,
     pub(super) notes: Vec<String>,
+    /// Seconds for which the shutter stays open.
+    pub(super) shutter_s: f64,
     /// Reads the file as it is at another time; `None` where it is the same at all times.
     pub(super) at_another_time: Option<Read>,
     alike: AlikeNotes,
@@ -96,6 +98,7 @@ impl Builder {
             lights: Vec::new(),
             environment: None,
             notes: Vec::new(),
+            shutter_s: 0.0,
             at_another_time: None,
             alike: AlikeNotes::default(),
         }
@@ -177,6 +180,7 @@ impl Builder {
             let aimed_by = start.and_then(|mut start| start.choose_camera(path, options).ok());
             add_studio(&mut scene, aimed_by.map(|camera| camera.forward));
         }
+        note_long_shutter(&mut scene, self.shutter_s, options);
         Ok(scene)
     }
 
@@ -227,6 +231,15 @@ impl Builder {
         self.film = FilmDefaults::of_aspect(self.film.width.max(self.film.height), aspect);
         let FilmDefaults { width, height } = options.film.unwrap_or(self.film);
         camera.heightened(aspect * height as f32 / width as f32)
+    }
+}
+
+/// Names a shutter that blurs what moves into the frames after it, as pbrt's does for a second where its file says nothing.
+fn note_long_shutter(scene: &mut Scene, shutter_s: f64, options: &LoadOptions) {
+    let is_longer = |frame_s: &f64| shutter_s > 1.001 * frame_s;
+    if let Some(frame_s) = options.frame_s.filter(is_longer).filter(|_| scene.moves()) {
+        let frames = shutter_s / frame_s;
+        scene.notes.push(format!("The shutter stays open for {shutter_s} s, as long as {frames:.1} frames."));
     }
 }
 

@@ -62,6 +62,8 @@ pub struct LoadOptions {
     pub frame_time: f64,
     /// Seconds for which the shutter stays open from then on where the file's format cannot say (a side file's camera can).
     pub shutter_s: f64,
+    /// Seconds of a frame, where the scene is one of a shot: a shutter that stays open for longer is noted.
+    pub frame_s: Option<f64>,
     /// The caller will set [`Scene::environment`] itself: no light in the file is then neither an error nor replaced.
     pub environment_follows: bool,
     /// Told after each decoded picture how many are done, and of how many; from several threads.
@@ -97,8 +99,6 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
     if !options.frame_time.is_finite() {
         return Err(LoadError::Option { problem: format!("frame time must be finite, not {}", options.frame_time) });
     }
-    let side = toml::side::of(path).filter(|side| side != path && path.extension().is_some_and(|e| e != "toml"));
-    let Some(side) = side else { return load_alone(path, options) };
     load_at_time(path, options).map_err(|fault| {
         // Files are right or wrong as a whole more often than at a time, and are quickly read where they are wrong.
         let at_start = LoadOptions { frame_time: 0.0, ..options.clone() };
@@ -110,6 +110,8 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
 }
 
 fn load_at_time(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
+    let side = toml::side::of(path).filter(|side| side != path && path.extension().is_some_and(|e| e != "toml"));
+    let Some(side) = side else { return load_alone(path, options) };
     let options = &toml::side::before(&side, options)?;
     let mut scene = load_alone(path, options)?;
     toml::side::apply(&side, options, &mut scene)?;

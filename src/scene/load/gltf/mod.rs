@@ -70,6 +70,7 @@ fn read(path: &Path, options: &LoadOptions) -> Result<Builder, LoadError> {
     }
     if let Some(first) = document.animations().next() {
         builder.at_another_time = Some(read);
+        builder.shutter_s = options.shutter_s;
         let count = document.animations().count();
         let name = first.name().map_or_else(String::new, |name| format!(" \"{name}\""));
         let blur = match options.shutter_s > 0.0 {

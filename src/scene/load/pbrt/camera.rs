@@ -26,6 +26,7 @@ impl Reader<'_> {
         let opens = parameters.float_or("shutteropen", 0.0)?;
         let closes = parameters.float_or("shutterclose", 1.0)?;
         self.shutter = [opens, closes.max(opens)];
+        self.builder.shutter_s = f64::from(self.shutter[1] - opens);
         self.exposure = self.sensor(closes - opens)?;
         let to_world = world_to_camera.inverse();
         let placed = self.here(&to_world);

@@ -92,6 +92,7 @@ fn read(path: &Path, options: &LoadOptions) -> Result<(Builder, IfDark), LoadErr
     let mut shutter = Shutter { opens: options.frame_time, stays_open: 0.0 };
     if let Some(camera) = root.get("camera") {
         shutter.stays_open = camera.entries()?.get_or("shutter_s", 0.0, Value::non_negative)?;
+        builder.shutter_s = shutter.stays_open;
         let camera = camera::read(&camera, shutter)?;
         builder.cameras.push(NamedCamera { name: "camera".to_owned(), camera, aspect: None });
     }
