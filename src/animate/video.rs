@@ -51,7 +51,7 @@ impl<W: Write> Y4mWriter<W> {
 }
 
 /// Frames a second as a fraction: 24000/1001 and its kin, else thousandths.
-fn fraction(frames_per_second: f64) -> (u64, u64) {
+pub(crate) fn fraction(frames_per_second: f64) -> (u64, u64) {
     let ntsc = (frames_per_second * 1.001).round();
     if (frames_per_second - ntsc / 1.001).abs() < 1e-3 && frames_per_second.fract() > 1e-6 {
         return ((ntsc * 1000.0) as u64, 1001);

@@ -35,7 +35,8 @@ pub(super) struct ThresholdArguments {
     /// others know no motion.
     #[arg(long, value_name = "FILE.exr")]
     velocity: Option<PathBuf>,
-    /// Frames a second of --velocity. Without it the display's, which is 60 unless its file says otherwise.
+    /// Frames a second of --velocity. Without it as its file says (frames of `animate` do), else the display's, which is 60 unless its
+    /// own file says otherwise.
     #[arg(long, value_name = "N", value_parser = parse_rate, requires = "velocity")]
     fps: Option<f64>,
     /// Let the eye follow only what stands out in the picture and in its motion (Itti 1998, Yee 2001): what moves elsewhere is
@@ -79,7 +80,8 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
         viewing.observer.glare = Glare::Cie { age_years };
         viewing.check().context("--glare")?;
     }
-    if let Some(frames_per_second) = arguments.fps {
+    let told = || arguments.velocity.as_deref().and_then(output::frames_per_second_of);
+    if let Some(frames_per_second) = arguments.fps.or_else(told) {
         viewing.display.frames_per_second = frames_per_second;
     }
     let viewing = guide.viewed(&viewing).with_context(|| arguments.input.display().to_string())?;

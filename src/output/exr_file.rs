@@ -3,8 +3,8 @@
 use super::beside::write_beside;
 use super::exr_header::sort_attributes;
 use super::{
-    Attribute, CROP, ChannelValues, NITS_PER_UNIT, OutputError, PIXEL_ASPECT_RATIO, PartOf, Picture, REPLACED_VALUES,
-    check_size,
+    Attribute, CROP, ChannelValues, FRAMES_PER_SECOND, NITS_PER_UNIT, OutputError, PIXEL_ASPECT_RATIO, PartOf, Picture,
+    REPLACED_VALUES, check_size, frame_rate,
 };
 use ::exr::meta::attribute::{AttributeValue, Chromaticities};
 use ::exr::prelude::{
@@ -40,6 +40,10 @@ pub fn write_exr(path: &Path, picture: &Picture<'_>) -> Result<(), OutputError> 
     for (name, value) in &picture.attributes {
         if let (PIXEL_ASPECT_RATIO, &Attribute::Float(ratio)) = (name.as_str(), value) {
             pixel_aspect = ratio;
+            continue;
+        }
+        if let (FRAMES_PER_SECOND, &Attribute::Float(rate)) = (name.as_str(), value) {
+            layer_attributes.frames_per_second = frame_rate::rational(rate);
             continue;
         }
         if let (NITS_PER_UNIT, &Attribute::Float(nits)) = (name.as_str(), value) {

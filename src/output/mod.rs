@@ -10,12 +10,14 @@ mod beside;
 mod exr_file;
 mod exr_header;
 pub mod false_colour;
+mod frame_rate;
 mod png_file;
 pub mod rendered;
 mod srgb_codes;
 
 pub use beside::{remove_leftovers, write_beside, write_beside_by_name};
 pub use exr_file::write_exr;
+pub use frame_rate::{FRAMES_PER_SECOND, frames_per_second_of};
 pub use png_file::{
     PngColour, PngTransfer, decode_pq, encode_srgb8, png_colour, write_codes_png, write_png, write_png_for,
     write_png_with_alpha_for, write_pq_png,

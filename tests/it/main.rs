@@ -11,6 +11,7 @@
 //! - `formats`: the same scene from several formats
 //! - `gltf_motion`: jumps, hidden things and morphing nodes of glTF while the shutter is open
 //! - `mitsuba_format`, `pbrt_format`: what their files mean where readers go wrong easily
+//! - `animate_mishaps`: shots that are refused before anything is rendered, or named
 //! - `bad_input`: bad scene files, and our own ones
 //! - `own_format`: lamps of a luminous power, keys that change nothing, files beside the scene
 //! - `importance`: samples go where a user's map sends them
@@ -38,6 +39,7 @@
 
 mod adaptive_render;
 mod animate;
+mod animate_mishaps;
 mod bad_input;
 mod bench;
 mod camera_and_time;

@@ -23,7 +23,7 @@ use fechner::animate::{FrameScenes, RenderedFrame, SceneSource as _, ShotSetting
 use fechner::checkpoint::{PROGRAM, SettingsRecord};
 use fechner::denoise::Denoiser;
 use fechner::output::rendered::{Background, layers, write_display_png};
-use fechner::output::{self, Format};
+use fechner::output::{self, Attribute, Format};
 use fechner::scene::Scene;
 use fechner::scene::hash::content_hash;
 use fechner_perception::model;
@@ -332,6 +332,8 @@ impl<'a> Shot<'a> {
                 let attributes = report.attributes();
                 let mut picture = layers(&made.rendered, settings, Background::Shown, &attributes);
                 push_velocity(&mut picture, &made.velocity, self.arguments.aov_names);
+                let rate = self.settings.frames_per_second as f32;
+                picture.push_attribute(output::FRAMES_PER_SECOND, Attribute::Float(rate));
                 output::write_exr(file, &picture)?;
             }
         }
