@@ -101,15 +101,22 @@ impl Counter {
 
     /// So many are done.
     pub(super) fn count(&self, done: usize) {
+        if let Some(words) = self.words(done, Instant::now()) {
+            say::part(format_args!("{words}"));
+        }
+    }
+
+    /// What is to be said of it at a time.
+    fn words(&self, done: usize, now: Instant) -> Option<String> {
         let Self { what, total, on_terminal, ref said } = *self;
         match (on_terminal, done == total) {
-            (true, false) => say::part(format_args!("\r{what}: {done} of {total}\x1b[K")),
-            (true, true) => say::part(format_args!("\r\x1b[K")),
-            (false, false) if said.get().elapsed() >= Self::QUIET => {
-                said.set(Instant::now());
-                say!("{what}: {done} of {total}");
+            (true, false) => Some(format!("\r{what}: {done} of {total}\x1b[K")),
+            (true, true) => Some("\r\x1b[K".to_owned()),
+            (false, false) if now.duration_since(said.get()) >= Self::QUIET => {
+                said.set(now);
+                Some(format!("{what}: {done} of {total}\n"))
             }
-            (false, _) => {}
+            (false, _) => None,
         }
     }
 }
@@ -128,6 +135,17 @@ pub(super) fn duration_in_words(seconds: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_takes_long_is_counted_now_and_then() {
+        let counter = Counter { on_terminal: false, ..Counter::new("looking", 4) };
+        let began = counter.said.get();
+        let said = |done: usize, seconds| counter.words(done, began + Duration::from_secs(seconds));
+        let expected = [None, Some("looking: 2 of 4\n".to_owned()), None, None];
+        assert_eq!([said(1, 9), said(2, 11), said(3, 20), said(4, 40)], expected);
+        let on_terminal = Counter { on_terminal: true, ..counter };
+        assert!(on_terminal.words(1, began).is_some_and(|words| words.starts_with("\rlooking: 1 of 4")));
+    }
 
     /// No 60 seconds or minutes beside the next larger unit.
     #[test]

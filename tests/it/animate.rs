@@ -280,7 +280,7 @@ fn bad_arguments_are_named() {
     std::fs::write(folder.path().join("gaze.csv"), "frame,x,y\n0,1\n").expect("written");
     for (arguments, expected) in [
         (&["--frames", "5..2", "-o", "a.#.png"][..], "ends before it begins"),
-        (&["--frames", "0..2", "-o", "a.png"], "a sequence's name has #"),
+        (&["--frames", "0..2", "-o", "a.png"], "a sequence's name has one run of #"),
         (&["--frames", "0..2", "--shot", "1..2", "-o", "a.#.png"], "--frames reaches beyond --shot"),
         (&["--frames", "0..2", "-o", "a.#.png", "--video", "a.gif"], "videos end in .y4m or .mp4"),
         (&["--frames", "0..2", "-o", "a.#.png", "--video", "a.mp4/"], "this is a folder's name"),

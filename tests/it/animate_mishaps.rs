@@ -93,6 +93,21 @@ fn what_is_not_as_meant_is_named() {
     assert!(!said.contains("as long as"), "{said}");
 }
 
+/// The records of frames say which eye they were judged for.
+#[test]
+fn eyes_that_follow_are_told_apart() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let eye_of = |eye: &str| {
+        let (status, said) = animate(folder.path(), &scene(CAMERA), &["--frames", "0", "-o", "a.#.exr", "--eye", eye]);
+        assert_eq!(status, Some(0), "{said}");
+        let record = std::fs::read(folder.path().join("a.0.json")).expect("a record");
+        let record: serde_json::Value = serde_json::from_slice(&record).expect("JSON");
+        record["report"]["eye"].as_str().expect("words").to_owned()
+    };
+    assert_eq!(eye_of("track"), "what moves, which it follows");
+    assert_eq!(eye_of("saliency"), "what stands out, which it follows");
+}
+
 /// The files of two sequences that differ after the number alone, and the rate that frames tell.
 #[test]
 fn stereo_frames_have_files_of_their_own() {
