@@ -58,7 +58,7 @@ fn at_keys(mut keys: Vec<KeyTime>, shutter: Shutter) -> Vec<(f32, f64)> {
         let share = ((f64::from(seconds) - shutter.opens) / shutter.stays_open).min(1.0) as f32;
         let before = f64::from(seconds.next_down());
         match (seconds < closes, jumps) {
-            (true, true) => times.extend([(share.next_down(), before), (share, f64::from(seconds))]),
+            (true, true) => times.extend([(share.next_down().max(0.0), before), (share, f64::from(seconds))]),
             (true, false) => times.push((share, f64::from(seconds))),
             // What comes when the shutter has closed is not seen.
             (false, true) => times.push((1.0, before)),
@@ -90,15 +90,15 @@ pub(super) fn through(moments: &[Moment], transforms: &[Mat4]) -> Option<Motion>
     Motion::new(Affine3A::IDENTITY, moments.iter().zip(transforms).map(key).collect())
 }
 
-/// Whether a transform is finite and flattens nothing.
-pub(super) fn is_there(transform: &Mat4) -> bool {
-    transform.is_finite() && Mat3A::from_mat4(*transform).determinant() != 0.0
-}
-
 /// The same of a camera, whose scale changes nothing: from where it is when the shutter opens.
 pub(super) fn of_camera(moments: &[Moment], transforms: &[Mat4]) -> Option<Motion> {
     let whole = through(moments, transforms)?;
     let rigid = |key: &MotionKey| MotionKey { pose: Pose { stretch: Mat3A::IDENTITY, ..key.pose }, ..*key };
     let keys = whole.keys().iter().map(rigid).collect();
     Motion::new(Affine3A::IDENTITY, keys).map(|motion| motion.since_open())
+}
+
+/// Whether a transform is finite and flattens nothing.
+pub(super) fn is_there(transform: &Mat4) -> bool {
+    transform.is_finite() && Mat3A::from_mat4(*transform).determinant() != 0.0
 }
