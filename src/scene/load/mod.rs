@@ -27,6 +27,7 @@ pub mod environment;
 mod error;
 mod files;
 mod gltf;
+mod lines;
 pub mod metals;
 mod mitsuba;
 mod mtl;

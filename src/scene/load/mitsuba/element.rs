@@ -5,6 +5,7 @@
 
 use super::super::error::{LoadError, Place};
 use super::super::files;
+use super::super::lines::LineStarts;
 use glam::Vec3;
 use std::cell::Cell;
 use std::collections::HashMap;
@@ -47,21 +48,21 @@ pub(super) fn read(
         LoadError::invalid_at(Place::line(path, error.pos().row as usize), format_args!("not valid XML: {error}"))
     })?;
     let file = Rc::new(path.to_owned());
-    let mut builder = TreeBuilder { document: &document, file, defaults, includes: depth };
+    let mut builder = TreeBuilder { lines: LineStarts::of(&text), file, defaults, includes: depth };
     let root = document.root_element();
     builder.element(root, 0)
 }
 
-struct TreeBuilder<'a, 'd> {
-    document: &'a roxmltree::Document<'d>,
+struct TreeBuilder<'a> {
+    lines: LineStarts,
     file: Rc<PathBuf>,
     defaults: &'a mut HashMap<String, String>,
     includes: usize,
 }
 
-impl TreeBuilder<'_, '_> {
+impl TreeBuilder<'_> {
     fn element(&mut self, node: roxmltree::Node, depth: usize) -> Result<Rc<Element>, LoadError> {
-        let line = self.document.text_pos_at(node.range().start).row as usize;
+        let line = self.lines.line_of(node.range().start);
         let place = Place::line(&self.file, line);
         if depth > DEEPEST {
             return Err(LoadError::invalid_at(place, format_args!("elements nested deeper than {DEEPEST}")));

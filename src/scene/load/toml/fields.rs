@@ -4,6 +4,7 @@
 //! loses the line inside tagged tables; this reader keeps both for a few lines a field.
 
 use super::super::error::{LoadError, Place, one_line, suggestion};
+use super::super::lines::LineStarts;
 use glam::{Vec2, Vec3};
 use std::path::Path;
 use toml::Spanned;
@@ -13,12 +14,16 @@ use toml::de::{DeTable, DeValue};
 pub(super) struct Source<'a> {
     pub(super) file: &'a Path,
     pub(super) text: &'a str,
+    lines: LineStarts,
 }
 
-impl Source<'_> {
-    /// The line of a byte, counted from 1.
-    pub(super) fn line_of(&self, byte: usize) -> usize {
-        self.text.as_bytes()[..byte.min(self.text.len())].iter().filter(|&&b| b == b'\n').count() + 1
+impl<'a> Source<'a> {
+    pub(super) fn new(file: &'a Path, text: &'a str) -> Self {
+        Self { file, text, lines: LineStarts::of(text) }
+    }
+
+    fn line_of(&self, byte: usize) -> usize {
+        self.lines.line_of(byte)
     }
 
     /// Turns the parser's error into ours.

@@ -56,7 +56,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
 /// Everything in a scene file, and what to do if that is dark.
 fn read(path: &Path, options: &LoadOptions) -> Result<(Builder, IfDark), LoadError> {
     let text = files::read_text(path)?;
-    let source = Source { file: path, text: &text };
+    let source = Source::new(path, &text);
     let snapshots = animated::snapshots(&source, options.frame_time)?;
     let document = animated::parse(&source, &snapshots)?;
     let root = Fields::root(

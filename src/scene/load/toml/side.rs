@@ -87,7 +87,7 @@ pub(in crate::scene::load) fn apply(path: &Path, options: &LoadOptions, scene: &
 /// `seconds` is the time for keyframes of lights.
 fn with_root<T>(path: &Path, seconds: f64, read: impl FnOnce(&Fields) -> Result<T, LoadError>) -> Result<T, LoadError> {
     let text = files::read_text(path)?;
-    let source = Source { file: path, text: &text };
+    let source = Source::new(path, &text);
     let snapshots = animated::snapshots(&source, seconds)?;
     let document = animated::parse(&source, &snapshots)?;
     let root = Fields::root(&source, document.get_ref(), &KNOWN)?;
