@@ -191,6 +191,28 @@ fn principled_glass_refracts_and_thin_does_not() {
     }
 }
 
+/// A body of base colour 0.25 lets through 0.25, so each of its two crossings half.
+#[test]
+fn principled_glass_is_tinted_by_the_root_of_its_colour() {
+    let glass = |parameters: &str| {
+        let scene = scene(&format!(r#"<shape type="rectangle"><bsdf type="principled">{parameters}</bsdf></shape>"#));
+        let (share, boundary) = match &scene.materials[0].surface {
+            Surface::Mix { second, amount, .. } => (amount.factor, second.as_ref()),
+            surface => (1.0, surface),
+        };
+        let Surface::Dielectric { transmittance, .. } = boundary else { panic!("{boundary:?}") };
+        (share, transmittance.evaluate(&scene.textures, Vec2::splat(0.5)))
+    };
+    let all = r#"<float name="spec_trans" value="1"/>"#;
+    let grey = r#"<rgb name="base_color" value="0.25"/>"#;
+    assert_eq!(glass(&format!("{all}{grey}")), (1.0, Vec3::splat(0.5)));
+    let part = r#"<float name="spec_trans" value="0.5"/><float name="metallic" value="0.5"/>"#;
+    assert_eq!(glass(&format!("{part}{grey}")), (0.25, Vec3::splat(0.5)));
+    let picture = r#"<texture name="base_color" type="checkerboard"><rgb name="color0" value="0.25"/>
+<rgb name="color1" value="0.25"/></texture>"#;
+    assert_eq!(glass(&format!("{all}{picture}")), (1.0, Vec3::splat(0.5)));
+}
+
 #[test]
 fn masks_and_blends_cover_what_they_should() {
     let plain = r#"<bsdf type="diffuse"/>"#;

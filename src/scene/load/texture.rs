@@ -98,6 +98,13 @@ impl Requests {
         TextureId(place as u32)
     }
 
+    /// The same picture with its values raised to a power, as a texture of its own.
+    pub(super) fn raised(&mut self, texture: TextureId, exponent: f32) -> TextureId {
+        let mut request = self.requests[texture.0 as usize].clone();
+        request.adjust.exponent_bits = (f32::from_bits(request.adjust.exponent_bits) * exponent).to_bits();
+        self.add(request)
+    }
+
     /// Decodes everything. `notes` gets a sentence for each missing file that was replaced, and one of what was made smaller.
     /// `coverage` says which textures' alpha is how much of the surface is there.
     pub(super) fn decode(

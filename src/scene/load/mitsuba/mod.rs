@@ -8,6 +8,7 @@ mod bsdfs;
 mod element;
 mod emitters;
 mod primitives;
+mod principled;
 mod sensor;
 mod serialized;
 mod shapes;

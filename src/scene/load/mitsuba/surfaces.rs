@@ -6,7 +6,7 @@ use super::super::spectrum::named;
 use super::Reader;
 use super::element::Element;
 use super::textures::Meaning;
-use crate::scene::{ColorInput, Distribution, MetalRoughness, Roughness, RoughnessScale, ScalarInput, Surface};
+use crate::scene::{ColorInput, Distribution, Roughness, RoughnessScale, ScalarInput, Surface};
 use glam::Vec3;
 
 /// Indices of refraction by name, at the yellow sodium line.
@@ -172,38 +172,6 @@ impl Reader {
         };
         let clamped = |input: ScalarInput| ScalarInput { factor: input.factor.clamp(0.0, 1.0), ..input };
         Ok(Roughness { u: clamped(u), v: (u != v).then_some(clamped(v)), scale: RoughnessScale::Alpha, distribution })
-    }
-
-    fn principled(&mut self, bsdf: &Element, is_thin: bool) -> Result<Surface, LoadError> {
-        let input = |input: Option<ScalarInput>, default: f32| {
-            let input = input.unwrap_or(ScalarInput::constant(default));
-            ScalarInput { factor: input.factor.clamp(0.0, 1.0), ..input }
-        };
-        let mut base_color = self.reflectance(bsdf, "basecolor", 0.5)?;
-        base_color.factor = base_color.factor.min(Vec3::ONE);
-        let specular = bsdf.float("specular")?.unwrap_or(0.5).clamp(0.0, 0.99);
-        let transmission = input(self.scalar_input(bsdf, "spectrans")?, 0.0);
-        let volume = (!is_thin && transmission.factor > 0.0).then_some(Vec3::ZERO);
-        let eta = bsdf.float("eta")?;
-        if let Some((eta, problem)) =
-            eta.and_then(|e| Some((e, MetalRoughness::problem_with_ior(e, volume.is_some())?)))
-        {
-            return Err(bsdf.error(format_args!("eta {eta}: {problem}")));
-        }
-        let metal = MetalRoughness {
-            base_color,
-            metallic: input(self.scalar_input(bsdf, "metallic")?, 0.0),
-            roughness: input(self.scalar_input(bsdf, "roughness")?, 0.5),
-            // specular 0.5 reflects 4 %: 0.08 · specular.
-            ior: eta.unwrap_or_else(|| {
-                let root = (0.08 * specular).sqrt();
-                (1.0 + root) / (1.0 - root)
-            }),
-            volume,
-            transmission,
-            ..MetalRoughness::default()
-        };
-        Ok(Surface::MetalRoughness(metal))
     }
 }
 

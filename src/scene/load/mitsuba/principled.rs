@@ -1,0 +1,79 @@
+//! `principled` and `principledthin`: Burley's model, by ours of metal and roughness.
+
+use super::super::error::LoadError;
+use super::Reader;
+use super::element::Element;
+use crate::scene::{ColorInput, MetalRoughness, Roughness, ScalarInput, Surface};
+use glam::Vec3;
+
+impl Reader {
+    pub(super) fn principled(&mut self, bsdf: &Element, is_thin: bool) -> Result<Surface, LoadError> {
+        let mut base_color = self.reflectance(bsdf, "basecolor", 0.5)?;
+        base_color.factor = base_color.factor.min(Vec3::ONE);
+        let specular = bsdf.float("specular")?.unwrap_or(0.5).clamp(0.0, 0.99);
+        let transmission = self.share(bsdf, "spectrans", 0.0)?;
+        let has_volume = !is_thin && transmission.factor > 0.0;
+        let eta = bsdf.float("eta")?;
+        if let Some((eta, problem)) = eta.and_then(|e| Some((e, MetalRoughness::problem_with_ior(e, has_volume)?))) {
+            return Err(bsdf.error(format_args!("eta {eta}: {problem}")));
+        }
+        let model = MetalRoughness {
+            base_color,
+            metallic: self.share(bsdf, "metallic", 0.0)?,
+            roughness: self.share(bsdf, "roughness", 0.5)?,
+            // specular 0.5 reflects 4 %: 0.08 · specular.
+            ior: eta.unwrap_or_else(|| {
+                let root = (0.08 * specular).sqrt();
+                (1.0 + root) / (1.0 - root)
+            }),
+            transmission,
+            ..MetalRoughness::default()
+        };
+        Ok(if has_volume { self.glass(bsdf, model) } else { Surface::MetalRoughness(model) })
+    }
+
+    fn share(&mut self, bsdf: &Element, name: &str, default: f32) -> Result<ScalarInput, LoadError> {
+        let input = self.scalar_input(bsdf, name)?.unwrap_or(ScalarInput::constant(default));
+        Ok(ScalarInput { factor: input.factor.clamp(0.0, 1.0), ..input })
+    }
+
+    /// What goes through is tinted by √base_color at each crossing, so by base_color through a whole body: glTF's model tints each
+    /// by all of it, and a ball of base colour 0.25 let through 0.0625 of the light.
+    fn glass(&mut self, bsdf: &Element, model: MetalRoughness) -> Surface {
+        let Some(amount) = share_of_glass(model.transmission, model.metallic) else {
+            self.builder.note(format!(
+                "{}: where \"metallic\" is a picture, what \"spec_trans\" lets through is tinted at each crossing by all of \
+                 \"base_color\", not by its square root.",
+                bsdf.place()
+            ));
+            return Surface::MetalRoughness(MetalRoughness { volume: Some(Vec3::ZERO), ..model });
+        };
+        let boundary = Surface::Dielectric {
+            ior: model.ior,
+            roughness: Roughness::isotropic(model.roughness),
+            transmittance: self.square_root(model.base_color),
+            absorption: Vec3::ZERO,
+        };
+        if amount == ScalarInput::constant(1.0) {
+            return boundary;
+        }
+        let opaque = Surface::MetalRoughness(MetalRoughness { transmission: ScalarInput::constant(0.0), ..model });
+        Surface::Mix { first: Box::new(opaque), second: Box::new(boundary), amount }
+    }
+
+    fn square_root(&mut self, color: ColorInput) -> ColorInput {
+        let texture = color.texture.map(|mut lookup| {
+            lookup.texture = self.builder.textures.raised(lookup.texture, 0.5);
+            lookup
+        });
+        ColorInput { factor: color.factor.map(f32::sqrt), texture }
+    }
+}
+
+/// `transmission` · (1 − `metallic`), where one picture is enough for it.
+fn share_of_glass(transmission: ScalarInput, metallic: ScalarInput) -> Option<ScalarInput> {
+    if metallic.texture.is_some() && metallic.factor > 0.0 {
+        return None;
+    }
+    Some(ScalarInput { factor: transmission.factor * (1.0 - metallic.factor), ..transmission })
+}
