@@ -153,8 +153,8 @@ impl Builder {
         validate::repair(&mut self, path)?;
         std::mem::take(&mut self.alike).count_into(&mut self.notes);
         let camera = self.choose_camera(path, options)?;
-        let coverage = |id| self.materials.iter().any(|material| material.alpha.texture_of_coverage() == Some(id));
-        let textures = std::mem::take(&mut self.textures).decode(&mut self.notes, options, coverage)?;
+        let coverage = self.materials.iter().filter_map(|material| material.alpha.texture_of_coverage()).collect();
+        let textures = std::mem::take(&mut self.textures).decode(&mut self.notes, options, &coverage)?;
         bump::settle(&self.bumps, &mut self.materials, &textures, &mut self.notes);
         let mut scene = Scene {
             name: self.name,

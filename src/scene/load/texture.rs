@@ -10,7 +10,9 @@ use super::error::{LoadError, Place};
 use super::texture_memory::{self, Alpha, Extent};
 use crate::scene::{Encoding, Texture, TextureId, Wrap};
 use rayon::prelude::*;
+use std::collections::hash_map::DefaultHasher;
 use std::collections::{HashMap, HashSet};
+use std::hash::{Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -61,6 +63,19 @@ impl Request {
         }
     }
 
+    /// The same number for the same wish. Of bytes in memory only the name counts: to hash megabytes for each material that reads them
+    /// would take longer than the comparison, which ends where both are the same allocation.
+    fn likeness(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        match &self.picture {
+            Picture::File(path) => path.hash(&mut hasher),
+            Picture::Memory { name, .. } => name.hash(&mut hasher),
+            Picture::Texels { name, bits, .. } => (name, bits).hash(&mut hasher),
+        }
+        (self.encoding, self.adjust).hash(&mut hasher);
+        hasher.finish()
+    }
+
     /// A picture that a loader made: `size` texels of linear RGBA, row 0 at the top.
     pub(super) fn texels(name: &str, size: [u32; 2], texels: &[[f32; 4]]) -> Self {
         let bits = Arc::new(texels.iter().map(|texel| texel.map(f32::to_bits)).collect());
@@ -80,6 +95,8 @@ impl Request {
 #[derive(Debug, Default)]
 pub(super) struct Requests {
     requests: Vec<Request>,
+    /// Places of requests by their likeness.
+    alike: HashMap<u64, Vec<usize>>,
 }
 
 impl Requests {
@@ -91,7 +108,10 @@ impl Requests {
                 && other.adjust == request.adjust
                 && (other.wrap_u, other.wrap_v, other.nearest) == (request.wrap_u, request.wrap_v, request.nearest)
         };
-        let place = self.requests.iter().position(same).unwrap_or_else(|| {
+        let alike = self.alike.entry(request.likeness()).or_default();
+        let known = alike.iter().copied().find(|&place| same(&self.requests[place]));
+        let place = known.unwrap_or_else(|| {
+            alike.push(self.requests.len());
             self.requests.push(request);
             self.requests.len() - 1
         });
@@ -106,12 +126,12 @@ impl Requests {
     }
 
     /// Decodes everything. `notes` gets a sentence for each missing file that was replaced, and one of what was made smaller.
-    /// `coverage` says which textures' alpha is how much of the surface is there.
+    /// `coverage` are the textures whose alpha is how much of the surface is there.
     pub(super) fn decode(
         self,
         notes: &mut Vec<String>,
         options: &LoadOptions,
-        coverage: impl Fn(TextureId) -> bool,
+        coverage: &HashSet<TextureId>,
     ) -> Result<Vec<Texture>, LoadError> {
         let Distinct { wanted, place_of } = self.distinct();
         let halvings = match options.texture_memory {
@@ -140,9 +160,9 @@ impl Requests {
     }
 
     /// The pictures whose alpha is coverage in any of their uses: a colour and its coverage may be read with different encodings.
-    fn covering(&self, coverage: impl Fn(TextureId) -> bool) -> HashSet<&Picture> {
+    fn covering(&self, coverage: &HashSet<TextureId>) -> HashSet<&Picture> {
         let ids = (0..).map(TextureId);
-        let covers = self.requests.iter().zip(ids).filter(|(_, id)| coverage(*id));
+        let covers = self.requests.iter().zip(ids).filter(|(_, id)| coverage.contains(id));
         covers.map(|(request, _)| &request.picture).collect()
     }
 }
