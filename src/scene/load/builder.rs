@@ -6,8 +6,8 @@ use super::notes::AlikeNotes;
 use super::texture::Requests;
 use super::{LoadOptions, default_view, environment, tangents, validate};
 use crate::scene::{
-    Camera, Environment, FilmDefaults, Instance, Light, Material, MaterialId, Mesh, MeshId, Scene, Sphere,
-    ViewingDefaults,
+    Camera, Environment, FilmDefaults, Instance, Light, Material, MaterialId, Mesh, MeshId, Relief, Scene, Sphere,
+    TextureLookup, ViewingDefaults,
 };
 use glam::Vec3;
 use rayon::prelude::*;
@@ -65,6 +65,8 @@ pub(super) struct Builder {
     pub(super) textures: Requests,
     /// As [`Scene::bitangent_ignores_v`].
     pub(super) bitangent_ignores_v: bool,
+    /// Whether tangents that the file does not have follow the coordinates at which a normal map is read, not the mesh's own.
+    pub(super) tangents_follow_maps: bool,
     /// Reliefs that only their decoded pictures tell apart.
     pub(super) bumps: Vec<Bump>,
     pub(super) lights: Vec<Light>,
@@ -94,6 +96,7 @@ impl Builder {
             materials: Vec::new(),
             textures: Requests::default(),
             bitangent_ignores_v: false,
+            tangents_follow_maps: false,
             bumps: Vec::new(),
             lights: Vec::new(),
             environment: None,
@@ -173,7 +176,7 @@ impl Builder {
             notes: self.notes,
         };
         validate::check(&scene, path)?;
-        add_tangents(&mut scene);
+        add_tangents(&mut scene, self.tangents_follow_maps);
         if !options.environment_follows && needs_studio(&scene, path, if_dark)? {
             let start = at_start(self.at_another_time, path, options)?;
             // A camera that the file has at other times only is taken as it is.
@@ -243,14 +246,22 @@ fn note_long_shutter(scene: &mut Scene, shutter_s: f64, options: &LoadOptions) {
     }
 }
 
-/// Gives smooth meshes the tangents that their materials ask for.
-fn add_tangents(scene: &mut Scene) {
-    let mut is_asked = vec![false; scene.meshes.len()];
+/// Gives smooth meshes the tangents that their materials ask for. Of several materials of a mesh that has to follow their maps, the
+/// first one counts; glTF gives each mesh one.
+fn add_tangents(scene: &mut Scene, follow_maps: bool) {
+    let mut asked: Vec<Option<Option<TextureLookup>>> = vec![None; scene.meshes.len()];
     for instance in &scene.instances {
-        is_asked[instance.mesh.0 as usize] |= scene.materials[instance.material.0 as usize].needs_tangent();
+        let material = &scene.materials[instance.material.0 as usize];
+        if material.needs_tangent() {
+            let map = material.relief.as_ref().filter(|_| follow_maps).and_then(Relief::texture).copied();
+            asked[instance.mesh.0 as usize].get_or_insert(map);
+        }
     }
-    let asked = scene.meshes.par_iter_mut().zip(is_asked).filter(|(_, is_asked)| *is_asked);
-    asked.for_each(|(mesh, _)| tangents::add(mesh));
+    scene.meshes.par_iter_mut().zip(asked).for_each(|(mesh, asked)| match asked {
+        None => {}
+        Some(None) => tangents::add(mesh),
+        Some(Some(map)) => tangents::add_for(mesh, &map),
+    });
 }
 
 /// The file as it is at time 0, by which what is to stay for a whole shot is placed: the view of a scene without a camera, and the

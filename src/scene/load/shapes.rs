@@ -82,6 +82,12 @@ pub(super) fn polar_disk(radius: f32, uv: impl Fn(f32, f32) -> Vec2) -> Mesh {
 
 /// Gives every triangle of a mesh without texture coordinates the same ones, and so corners of its own.
 pub(super) fn give_each_triangle(mesh: &mut Mesh, uvs: [Vec2; 3]) {
+    set_apart(mesh);
+    mesh.uvs = mesh.triangles.iter().flat_map(|_| uvs).collect();
+}
+
+/// Gives every triangle of a mesh corners of its own.
+pub(super) fn set_apart(mesh: &mut Mesh) {
     fn apart<T: Copy>(values: &mut Vec<T>, triangles: &[[u32; 3]]) {
         if !values.is_empty() {
             *values = triangles.iter().flatten().map(|&index| values[index as usize]).collect();
@@ -92,7 +98,7 @@ pub(super) fn give_each_triangle(mesh: &mut Mesh, uvs: [Vec2; 3]) {
     apart(&mut mesh.normals, &triangles);
     apart(&mut mesh.tangents, &triangles);
     apart(&mut mesh.colors, &triangles);
-    mesh.uvs = triangles.iter().flat_map(|_| uvs).collect();
+    apart(&mut mesh.uvs, &triangles);
     mesh.triangles =
         (0..triangles.len() as u32).map(|triangle| [0, 1, 2].map(|corner| 3 * triangle + corner)).collect();
 }

@@ -5,7 +5,8 @@
 //! as normal maps are commonly made for. Triangles whose picture is mirrored are averaged apart. Flat meshes need none: what a
 //! triangle says of itself is all there is.
 
-use crate::scene::Mesh;
+use super::shapes;
+use crate::scene::{Mesh, TextureLookup};
 use glam::{Vec2, Vec3, Vec4};
 use std::collections::HashMap;
 
@@ -14,15 +15,33 @@ type Key = ([u32; 8], bool);
 
 /// Gives a mesh tangents, if it has normals and coordinates and no tangents. A vertex where mirrored and other triangles meet becomes two.
 pub(super) fn add(mesh: &mut Mesh) {
-    if mesh.normals.is_empty() || mesh.uvs.is_empty() || !mesh.tangents.is_empty() {
+    if !mesh.normals.is_empty() {
+        add_along(mesh, |uv| uv);
+    }
+}
+
+/// The same by the coordinates at which a picture is read: glTF's tangents follow the normal map where the file has none. By the mesh's
+/// own, normals of a map that is turned by half a turn were lit from the opposite side.
+pub(super) fn add_for(mesh: &mut Mesh, picture: &TextureLookup) {
+    if picture.rotation == 0.0 && picture.scale.min_element() >= 0.0 {
+        return add(mesh);
+    }
+    if mesh.normals.is_empty() {
+        give_flat_normals(mesh);
+    }
+    add_along(mesh, |uv| picture.transform(uv));
+}
+
+fn add_along(mesh: &mut Mesh, on_picture: impl Fn(Vec2) -> Vec2) {
+    if mesh.uvs.is_empty() || !mesh.tangents.is_empty() {
         return;
     }
-    let mirrored: Vec<bool> = mesh.triangles.iter().map(|triangle| is_mirrored(mesh, triangle)).collect();
+    let mirrored: Vec<bool> = mesh.triangles.iter().map(|triangle| is_mirrored(mesh, triangle, &on_picture)).collect();
     split_mirrored(mesh, &mirrored);
     let (group_of, groups) = groups(mesh, &mirrored);
     let mut sums = vec![Vec3::ZERO; groups];
     for triangle in &mesh.triangles {
-        let Some(along) = along_u(mesh, triangle) else { continue };
+        let Some(along) = along_u(mesh, triangle, &on_picture) else { continue };
         for place in 0..3 {
             let vertex = triangle[place] as usize;
             let normal = mesh.normals[vertex];
@@ -65,23 +84,31 @@ fn key(mesh: &Mesh, vertex: usize, mirrored: bool) -> Key {
 }
 
 /// The two edges that leave a triangle's first corner, in space and on the picture.
-fn edges(mesh: &Mesh, triangle: &[u32; 3]) -> ([Vec3; 2], [Vec2; 2]) {
+fn edges(mesh: &Mesh, triangle: &[u32; 3], on_picture: impl Fn(Vec2) -> Vec2) -> ([Vec3; 2], [Vec2; 2]) {
     let [a, b, c] = triangle.map(|vertex| mesh.positions[vertex as usize]);
-    let [p, q, r] = triangle.map(|vertex| mesh.uvs[vertex as usize]);
+    let [p, q, r] = triangle.map(|vertex| on_picture(mesh.uvs[vertex as usize]));
     ([b - a, c - a], [q - p, r - p])
 }
 
 /// v runs down the picture, so one that is not mirrored has a negative area.
-fn is_mirrored(mesh: &Mesh, triangle: &[u32; 3]) -> bool {
-    let (_, [first, second]) = edges(mesh, triangle);
+fn is_mirrored(mesh: &Mesh, triangle: &[u32; 3], on_picture: impl Fn(Vec2) -> Vec2) -> bool {
+    let (_, [first, second]) = edges(mesh, triangle, on_picture);
     first.perp_dot(second) > 0.0
 }
 
 /// The direction of growing u; `None` where the triangle has no area on the picture.
-fn along_u(mesh: &Mesh, triangle: &[u32; 3]) -> Option<Vec3> {
-    let ([first, second], on_picture) = edges(mesh, triangle);
+fn along_u(mesh: &Mesh, triangle: &[u32; 3], on_picture: impl Fn(Vec2) -> Vec2) -> Option<Vec3> {
+    let ([first, second], on_picture) = edges(mesh, triangle, on_picture);
     let area = on_picture[0].perp_dot(on_picture[1]);
     ((first * on_picture[1].y - second * on_picture[0].y) * area.signum()).try_normalize().filter(|_| area != 0.0)
+}
+
+/// The faces' own normals, at corners of their own.
+fn give_flat_normals(mesh: &mut Mesh) {
+    shapes::set_apart(mesh);
+    let Mesh { positions, normals, .. } = mesh;
+    let faces = positions.as_chunks::<3>().0.iter();
+    normals.extend(faces.flat_map(|&[a, b, c]| [(b - a).cross(c - a).normalize_or(Vec3::Y); 3]));
 }
 
 fn angle_at(mesh: &Mesh, triangle: &[u32; 3], place: usize) -> f32 {
@@ -150,6 +177,31 @@ mod tests {
         assert!(at(0).abs_diff_eq(Vec3::X, 1e-5) && at(4).abs_diff_eq(Vec3::NEG_Z, 1e-5), "{:?}", mesh.tangents);
         assert!(at(2).abs_diff_eq(Vec3::new(1.0, 0.0, -1.0).normalize(), 1e-5), "{:?}", mesh.tangents);
         assert!(mesh.tangents.iter().all(|tangent| tangent.w == 1.0));
+    }
+
+    /// As if the picture's coordinates stood in the mesh, and flat meshes as smooth ones.
+    #[test]
+    fn tangents_follow_a_picture_that_is_turned_or_mirrored() {
+        let quarter = std::f32::consts::FRAC_PI_2;
+        let plain = TextureLookup::plain(crate::scene::TextureId(0));
+        for (rotation, scale, along, side) in [
+            (0.0, Vec2::new(-1.0, 1.0), Vec3::NEG_X, -1.0),
+            (2.0 * quarter, Vec2::ONE, Vec3::NEG_X, 1.0),
+            // u of the picture grows with v of the mesh, which runs down.
+            (quarter, Vec2::new(1.0, 2.0), Vec3::NEG_Y, 1.0),
+        ] {
+            let picture = TextureLookup { rotation, scale, ..plain };
+            let mut smooth = bent(false);
+            add_for(&mut smooth, &picture);
+            let mut flat = bent(false);
+            flat.normals.clear();
+            add_for(&mut flat, &picture);
+            for mesh in [&smooth, &flat] {
+                let tangent = mesh.tangents[mesh.triangles[0][0] as usize];
+                assert!(tangent.abs_diff_eq(along.extend(side), 1e-5), "{picture:?}: {tangent}");
+            }
+            assert_eq!((flat.positions.len(), flat.uvs.len(), flat.normals.len()), (12, 12, 12));
+        }
     }
 
     #[test]

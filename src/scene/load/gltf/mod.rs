@@ -39,6 +39,7 @@ fn read(path: &Path, options: &LoadOptions) -> Result<Builder, LoadError> {
     let bytes = files::read(path)?;
     let container = buffers::split(path, &bytes)?;
     let mut builder = Builder::new(path, options);
+    builder.tangents_follow_maps = true;
     let document = document::parse(path, container.json, &mut builder)?;
     let buffers = Buffers::read(path, &document, container.binary)?;
 
