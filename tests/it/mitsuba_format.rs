@@ -306,6 +306,32 @@ fn includes_are_elements_and_know_their_folder() {
     }
 }
 
+/// Relative to the file that they stand in; the last one is searched first.
+#[test]
+fn files_are_found_in_the_folders_of_path() {
+    let folder = folder();
+    for (place, name) in [("far/meshes", "a.obj"), ("far/last", "a.obj"), ("far", "part.xml")] {
+        let place = folder.path().join(place);
+        std::fs::create_dir_all(&place).unwrap();
+        let far = r#"<path value="meshes"/><path value="last"/>"#;
+        let shape = r#"<shape type="obj"><string name="filename" value="a.obj"/></shape>"#;
+        let text = match name {
+            "part.xml" => format!("<scene version=\"3.0.0\">{far}{shape}</scene>"),
+            _ if place.ends_with("last") => BARE_OBJ.replace("f 1 3 4\n", ""),
+            _ => BARE_OBJ.to_owned(),
+        };
+        std::fs::write(place.join(name), text).unwrap();
+    }
+    let include = format!(r#"{LIGHT}<path value="far"/><include filename="part.xml"/>"#);
+    let scene = try_load(folder.path(), "3.0.0", &include).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(scene.meshes[0].triangles.len(), 1);
+    let missing = r#"<path value="far"/><shape type="obj"><string name="filename" value="none.obj"/></shape>"#;
+    let error = try_load(folder.path(), "3.0.0", missing).unwrap_err();
+    let (far, here) = (folder.path().join("far/none.obj"), folder.path().join("none.obj"));
+    let expected = format!("none.obj: no such file at {} or {}", far.display(), here.display());
+    assert!(error.ends_with(&expected), "{error}");
+}
+
 /// Without normals in the file the front is where the corners are seen counter-clockwise in the world.
 #[test]
 fn mirrors_turn_meshes_without_normals_over() {

@@ -36,19 +36,57 @@ pub(super) fn canonical(name: &str) -> String {
     name.chars().filter(|&c| c != '_').flat_map(char::to_lowercase).collect()
 }
 
-/// Reads a file and all that it includes. `defaults` are the values of `$name`.
-pub(super) fn read(
-    path: &Path,
-    defaults: &mut HashMap<String, String>,
-    depth: usize,
-) -> Result<Rc<Element>, LoadError> {
+/// What elements say of the whole document, and not of what they stand in.
+#[derive(Debug, Default)]
+pub(super) struct Given {
+    /// Values of `$name`.
+    defaults: HashMap<String, String>,
+    /// Folders of `<path>`, the last one first.
+    folders: Vec<PathBuf>,
+}
+
+impl Given {
+    /// Where a file may be that is named in one of `files`: in the folders of `<path>`, or beside those, in this order.
+    fn candidates(&self, name: &str, files: &[&Path]) -> Vec<PathBuf> {
+        let name = name.replace('\\', "/");
+        let beside = files.iter().map(|file| folder_of(file));
+        let mut candidates: Vec<PathBuf> = Vec::new();
+        for candidate in self.folders.iter().map(PathBuf::as_path).chain(beside).map(|folder| folder.join(&name)) {
+            if !candidates.contains(&candidate) {
+                candidates.push(candidate);
+            }
+        }
+        candidates
+    }
+
+    /// The first of those that is a file, for a name that stands at `named_at`.
+    pub(super) fn find(&self, name: &str, files: &[&Path], named_at: Place) -> Result<PathBuf, LoadError> {
+        let candidates = self.candidates(name, files);
+        let is_there = candidates.iter().find(|candidate| candidate.is_file());
+        match (is_there.or(candidates.iter().find(|candidate| candidate.exists())), candidates.as_slice()) {
+            (Some(found), _) | (None, [found]) => Ok(found.clone()),
+            _ => {
+                let tried: Vec<String> = candidates.iter().map(|candidate| candidate.display().to_string()).collect();
+                let problem = format!("no such file at {}", tried.join(" or "));
+                Err(LoadError::Unreadable { file: PathBuf::from(name), problem }.referenced_from(named_at))
+            }
+        }
+    }
+}
+
+fn folder_of(file: &Path) -> &Path {
+    file.parent().unwrap_or(Path::new(""))
+}
+
+/// Reads a file and all that it includes.
+pub(super) fn read(path: &Path, given: &mut Given, depth: usize) -> Result<Rc<Element>, LoadError> {
     let text = files::decode_text(path, files::read_unpacked(path)?)?;
     let options = roxmltree::ParsingOptions { nodes_limit: MOST_NODES, ..Default::default() };
     let document = roxmltree::Document::parse_with_options(&text, options).map_err(|error| {
         LoadError::invalid_at(Place::line(path, error.pos().row as usize), format_args!("not valid XML: {error}"))
     })?;
     let file = Rc::new(path.to_owned());
-    let mut builder = TreeBuilder { lines: LineStarts::of(&text), file, defaults, includes: depth };
+    let mut builder = TreeBuilder { lines: LineStarts::of(&text), file, given, includes: depth };
     let root = document.root_element();
     builder.element(root, 0)
 }
@@ -56,7 +94,7 @@ pub(super) fn read(
 struct TreeBuilder<'a> {
     lines: LineStarts,
     file: Rc<PathBuf>,
-    defaults: &'a mut HashMap<String, String>,
+    given: &'a mut Given,
     includes: usize,
 }
 
@@ -85,16 +123,20 @@ impl TreeBuilder<'_> {
                 "default" => {
                     let (name, value) = (converted.attribute("name"), converted.attribute("value"));
                     if let (Some(name), Some(value)) = (name, value) {
-                        self.defaults.entry(name.to_owned()).or_insert_with(|| value.to_owned());
+                        self.given.defaults.entry(name.to_owned()).or_insert_with(|| value.to_owned());
                     }
+                }
+                "path" => {
+                    let folder = folder_of(&self.file).join(converted.require("value")?.replace('\\', "/"));
+                    self.given.folders.insert(0, folder);
                 }
                 "include" => {
                     if self.includes >= DEEPEST {
                         return Err(converted.error("includes nested too deeply, or a file that includes itself"));
                     }
                     let name = converted.require("filename")?;
-                    let file = self.file.parent().unwrap_or(Path::new("")).join(name);
-                    let root = read(&file, self.defaults, self.includes + 1).map_err(|error| {
+                    let file = self.given.find(name, &[self.file.as_path()], converted.place())?;
+                    let root = read(&file, self.given, self.includes + 1).map_err(|error| {
                         if self.includes == 0 { error.referenced_from(converted.place()) } else { error }
                     })?;
                     // A scene lends what it holds, any other file is one element.
@@ -124,7 +166,7 @@ impl TreeBuilder<'_> {
                     behind.split_at(end)
                 }
             };
-            let value = self.defaults.get(name).ok_or_else(|| {
+            let value = self.given.defaults.get(name).ok_or_else(|| {
                 let problem =
                     format!("\"${name}\" has no value: a <default name=\"{name}\" value=\"...\"/> before it gives one");
                 LoadError::invalid_at(place.clone(), problem)

@@ -66,7 +66,7 @@ impl Reader {
                 let Some(name) = emitter.string("filename")? else {
                     return Err(emitter.error("an envmap needs a filename"));
                 };
-                let file = self.file(emitter, name);
+                let file = self.file(emitter, name)?;
                 let mut environment = environment::read(&file, Parametrisation::LatLong)
                     .map_err(|error| error.referenced_from(emitter.place()))?;
                 environment.scale = emitter.float_or("scale", 1.0)?.max(0.0);

@@ -20,7 +20,7 @@ use super::LoadOptions;
 use super::builder::{ASSUMED_NITS_PER_UNIT, Builder, IfDark};
 use super::error::{LoadError, Place, suggestion};
 use crate::scene::{Material, MaterialId, MeshId, Scene, Surface};
-use element::Element;
+use element::{Element, Given};
 use glam::{Affine3A, Vec3};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -28,12 +28,14 @@ use std::rc::Rc;
 
 /// Reads a Mitsuba file.
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
-    let root = element::read(path, &mut HashMap::new(), 0)?;
+    let mut given = Given::default();
+    let root = element::read(path, &mut given, 0)?;
     if root.tag != "scene" {
         return Err(root.error("expected a <scene>"));
     }
     let mut reader = Reader {
         main: path.to_owned(),
+        given,
         builder: Builder::new(path, options),
         named: HashMap::new(),
         materials: HashMap::new(),
@@ -63,7 +65,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
                 reader.builder.note("Integrator, sampler and filter are fechner's own, not the file's.");
             }
             // Defined here, used by reference.
-            "bsdf" | "texture" | "ref" | "alias" | "medium" | "spectrum" | "rgb" | "path" => {}
+            "bsdf" | "texture" | "ref" | "alias" | "medium" | "spectrum" | "rgb" => {}
             other => {
                 let known = ["shape", "emitter", "sensor", "bsdf", "texture", "integrator", "include", "default"];
                 return Err(child.error(format_args!("unknown element{}", suggestion(other, known))));
@@ -78,6 +80,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
 struct Reader {
     /// The file that was asked for.
     main: PathBuf,
+    given: Given,
     builder: Builder,
     named: HashMap<String, Rc<Element>>,
     /// By addresses of BSDF and emitter; 0 for none.
@@ -123,11 +126,9 @@ impl Reader {
         })
     }
 
-    /// A file that an element names: beside the file that it stands in, or beside the first one.
-    fn file(&self, element: &Element, name: &str) -> PathBuf {
-        let beside = |file: &Path| file.parent().unwrap_or(Path::new("")).join(name.replace('\\', "/"));
-        let here = beside(&element.file);
-        if here.is_file() { here } else { beside(&self.main) }
+    /// A file that an element names: in a folder of `<path>`, beside the file that it stands in, or beside the first one.
+    fn file(&self, element: &Element, name: &str) -> Result<PathBuf, LoadError> {
+        self.given.find(name, &[element.file.as_path(), &self.main], element.place())
     }
 
     /// The material of a shape; `None` where the surface is not there.

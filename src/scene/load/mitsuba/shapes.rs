@@ -145,7 +145,7 @@ impl Reader {
         let Some(name) = shape.string("filename")? else { return Err(shape.error("a mesh needs a filename")) };
         shape.ignore(&["maxsmoothangle", "srgb", "collapse"]);
         let key = MeshKey {
-            file: self.file(shape, name),
+            file: self.file(shape, name)?,
             number: shape.float_or("shapeindex", 0.0)?.max(0.0) as usize,
             faces: shape.boolean_or("facenormals", false)?,
             flip,

@@ -117,7 +117,7 @@ impl Reader {
             _ => {}
         }
         let spectrum = if let Some(name) = child.attribute("filename") {
-            let text = files::read_text(&self.file(child, name)).map_err(|e| e.referenced_from(child.place()))?;
+            let text = files::read_text(&self.file(child, name)?).map_err(|e| e.referenced_from(child.place()))?;
             Spectrum::from_text(&text)
         } else if value.contains(':') {
             let numbers = value.split([',', ':', ' ', '\n', '\t', '\r']).filter(|word| !word.is_empty());
@@ -148,7 +148,7 @@ impl Reader {
             let child = if child.tag == "ref" { self.resolve(&child)? } else { child };
             if child.tag == "texture"
                 && let Some(name) = child.string("filename")?
-                && has_alpha(&self.file(&child, name))
+                && has_alpha(&self.file(&child, name)?)
             {
                 // As a surface's colour would ask for it: the luminance of its colours would be a second picture that nothing reads.
                 let picture = self.texture(&child, Meaning::Reflectance, 0)?;
@@ -206,7 +206,7 @@ impl Reader {
 
     fn bitmap(&mut self, texture: &Element, meaning: Meaning) -> Result<ColorInput, LoadError> {
         let Some(name) = texture.string("filename")? else { return Err(texture.error("a bitmap needs a filename")) };
-        let file = self.file(texture, name);
+        let file = self.file(texture, name)?;
         let wrap = |name: &str| match texture.string(name)?.map(canonical).as_deref() {
             None | Some("repeat") => Ok(Wrap::Repeat),
             Some("mirror") => Ok(Wrap::Mirror),
