@@ -1,7 +1,7 @@
 //! What Mitsuba's files mean; figures are those of Mitsuba 3.9.
 
 use fechner::scene::load::{LoadOptions, load};
-use fechner::scene::{Alpha, Material, Projection, Scene, ScreenWindow, Surface};
+use fechner::scene::{Alpha, FilmDefaults, Material, Projection, Scene, ScreenWindow, Surface};
 use glam::{Vec2, Vec3};
 use std::path::Path;
 
@@ -170,6 +170,23 @@ fn cameras_are_mitsubas() {
     assert!(!has_note(&camera("perspective", back), "cuts the scene"));
     let clipped = camera("perspective", &format!(r#"{back}<float name="near_clip" value="4.1"/>"#));
     assert!(has_note(&clipped, "near_clip 4.1 cuts the scene"), "{:?}", clipped.notes);
+}
+
+/// As far off the principal point as the file says, in shares of the picture, whatever its size.
+#[test]
+fn shifted_cameras_have_square_pixels_at_every_size() {
+    let folder = folder();
+    let path = folder.path().join("scene.xml");
+    let film = r#"<film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="32"/></film>"#;
+    let shift = r#"<float name="principal_point_offset_x" value="0.25"/>"#;
+    let body = format!(r#"{LIGHT}<shape type="rectangle"/><sensor type="perspective">{film}{shift}</sensor>"#);
+    std::fs::write(&path, format!("<scene version=\"3.0.0\">{body}</scene>")).unwrap();
+    for (width, half_width) in [(32, 1.0), (64, 2.0), (16, 0.5)] {
+        let options = LoadOptions { film: Some(FilmDefaults { width, height: 32 }), ..LoadOptions::default() };
+        let window = load(&path, &options).unwrap().camera.screen_window.unwrap();
+        let expected = ScreenWindow { min: Vec2::new(-0.5 * half_width, -1.0), max: Vec2::new(1.5 * half_width, 1.0) };
+        assert_eq!(window, expected, "{width}");
+    }
 }
 
 #[test]

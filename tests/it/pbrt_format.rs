@@ -1,7 +1,7 @@
 //! What pbrt's files mean.
 
 use fechner::scene::load::{LoadOptions, load};
-use fechner::scene::{Projection, Scene, ScreenWindow, Surface};
+use fechner::scene::{FilmDefaults, Projection, Scene, ScreenWindow, Surface};
 use glam::{Vec2, Vec3};
 use std::path::Path;
 
@@ -42,6 +42,27 @@ fn imports_keep_their_state_to_themselves() {
         let scene = try_load(folder.path(), "", &format!(r#"{directive} "part.pbrt" Shape "sphere""#)).unwrap();
         assert_eq!(scene.spheres[0].center.x, x, "{directive}");
     }
+}
+
+/// The shorter side of the whole film spans [−1, 1] at every size of the picture; only what the file states is stretched.
+#[test]
+fn pictures_of_another_size_have_square_pixels() {
+    let folder = folder();
+    let path = folder.path().join("scene.pbrt");
+    let window = |camera: &str, film: &str, width: u32, height: u32| {
+        let film = format!(r#"Film "rgb" "integer xresolution" 32 "integer yresolution" 32 {film}"#);
+        std::fs::write(&path, format!("{film} {camera} WorldBegin LightSource \"infinite\" {SQUARE}")).unwrap();
+        let options = LoadOptions { film: Some(FilmDefaults { width, height }), ..LoadOptions::default() };
+        let window = load(&path, &options).unwrap().camera.screen_window.unwrap();
+        [window.min.x, window.max.x, window.min.y, window.max.y]
+    };
+    let (camera, crop) = (r#"Camera "perspective""#, r#""float cropwindow" [0.25 0.75 0 0.5]"#);
+    assert_eq!(window(camera, crop, 16, 16), [-0.5, 0.5, 0.0, 1.0]);
+    assert_eq!(window(camera, crop, 64, 32), [-1.0, 1.0, 0.0, 1.0]);
+    assert_eq!(window(camera, crop, 16, 32), [-0.5, 0.5, 0.0, 2.0]);
+    assert_eq!(window(camera, "", 16, 32), [-1.0, 1.0, -2.0, 2.0]);
+    let stated = r#"Camera "perspective" "float screenwindow" [-1 2 -1 1]"#;
+    assert_eq!(window(stated, "", 16, 32), [-1.0, 2.0, -1.0, 1.0]);
 }
 
 #[test]

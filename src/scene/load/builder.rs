@@ -2,6 +2,7 @@
 
 use super::bump::{self, Bump};
 use super::error::{LoadError, nearest, suggestion};
+use super::framing::Framing;
 use super::notes::AlikeNotes;
 use super::texture::Requests;
 use super::{LoadOptions, default_view, environment, tangents, validate};
@@ -19,8 +20,7 @@ use std::path::Path;
 pub(super) struct NamedCamera {
     pub(super) name: String,
     pub(super) camera: Camera,
-    /// Width over height of the view, where the file says.
-    pub(super) aspect: Option<f32>,
+    pub(super) framing: Framing,
 }
 
 /// What to do with a scene that brings no light.
@@ -227,13 +227,12 @@ impl Builder {
         (bounds.min.x <= bounds.max.x).then_some(bounds)
     }
 
-    /// The camera for the picture: one that states its aspect gives it to a film of no other, and shows more above and below in
-    /// a narrower one, so that nothing at its sides is lost.
-    fn fitted(&mut self, NamedCamera { camera, aspect, .. }: NamedCamera, options: &LoadOptions) -> Camera {
-        let Some(aspect) = aspect else { return camera };
-        self.film = FilmDefaults::of_aspect(self.film.width.max(self.film.height), aspect);
-        let FilmDefaults { width, height } = options.film.unwrap_or(self.film);
-        camera.heightened(aspect * height as f32 / width as f32)
+    /// The camera for the picture.
+    fn fitted(&mut self, NamedCamera { camera, framing, .. }: NamedCamera, options: &LoadOptions) -> Camera {
+        if let Some(aspect) = framing.stated() {
+            self.film = FilmDefaults::of_aspect(self.film.width.max(self.film.height), aspect);
+        }
+        framing.fit(camera, options.film.unwrap_or(self.film))
     }
 }
 

@@ -26,6 +26,7 @@ mod default_view;
 pub mod environment;
 mod error;
 mod files;
+mod framing;
 mod gltf;
 mod lines;
 pub mod metals;

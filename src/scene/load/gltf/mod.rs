@@ -15,6 +15,7 @@ use self::buffers::Buffers;
 use self::material::Materials;
 use super::builder::{Builder, IfDark, NamedCamera};
 use super::error::LoadError;
+use super::framing::Framing;
 use super::{LoadOptions, Shutter, files};
 use crate::scene::{Camera, Instance, Light, MaterialId, Mesh, MeshId, Motion, Projection, Scene, SpotFalloff};
 use ::gltf::mesh::{Mode, Semantic};
@@ -306,8 +307,9 @@ impl<'a> Reader<'a> {
             self.builder.note(format!("Camera \"{name}\" is left out: its transform, angle or height is not usable."));
             return;
         }
+        let framing = aspect.map_or(Framing::Fixed, Framing::Stated);
         let camera = Camera { projection, motion, ..Camera::pinhole(position, forward, up, 40.0) };
-        self.builder.cameras.push(NamedCamera { name, camera, aspect });
+        self.builder.cameras.push(NamedCamera { name, camera, framing });
     }
 
     fn light(&mut self, light: &::gltf::khr_lights_punctual::Light, to_world: &Affine3A) {

@@ -3,6 +3,7 @@
 use super::super::builder::NamedCamera;
 use super::super::default_view;
 use super::super::error::LoadError;
+use super::super::framing::Framing;
 use super::Reader;
 use super::element::{Element, canonical};
 use super::transform;
@@ -62,9 +63,11 @@ impl Reader {
         sensor.ignore(&["shutteropen", "shutterclose"]);
         sensor.tagged("sampler").count();
         self.note_unused(&format!("sensor \"{kind}\""), sensor);
+        let screen_window = (screen_window != ScreenWindow::centered(aspect)).then_some(screen_window);
+        let framing = screen_window.map_or(Framing::Fixed, |_| Framing::Widening { film: aspect });
         let camera = Camera {
             projection,
-            screen_window: (screen_window != ScreenWindow::centered(aspect)).then_some(screen_window),
+            screen_window,
             // Mitsuba's x points to the left of the picture.
             mirrored: forward.cross(up).dot(left) > 0.0,
             aperture_radius,
@@ -74,7 +77,7 @@ impl Reader {
         if is_first {
             self.clips = Some((sensor.place(), clips));
         }
-        self.builder.cameras.push(NamedCamera { name: sensor.name(), camera, aspect: None });
+        self.builder.cameras.push(NamedCamera { name: sensor.name(), camera, framing });
         Ok(())
     }
 

@@ -2,6 +2,7 @@
 
 use super::super::builder::NamedCamera;
 use super::super::error::LoadError;
+use super::super::framing::{Framing, half_size};
 use super::Reader;
 use super::state::Transforms;
 use crate::scene::{Camera, FilmDefaults, Motion, MotionKey, Pose, Projection, ScreenWindow};
@@ -39,13 +40,20 @@ impl Reader<'_> {
             return Err(parameters.error("the camera's transform cannot be undone"));
         }
         let film_aspect = full.width as f32 / full.height as f32;
-        let aspect = parameters.float("frameaspectratio")?.filter(|&aspect| aspect > 0.0).unwrap_or(film_aspect);
-        let mut window = match parameters.numbers(&["float"], "screenwindow")? {
+        let stated_aspect = parameters.float("frameaspectratio")?.filter(|&aspect| aspect > 0.0);
+        let aspect = stated_aspect.unwrap_or(film_aspect);
+        let stated_window = parameters.numbers(&["float"], "screenwindow")?;
+        let framing = match (stated_aspect, stated_window) {
+            (None, None) => {
+                let FilmDefaults { width, height } = self.builder.film;
+                Framing::ShorterSide { film: width as f32 / height as f32, whole: film_aspect }
+            }
+            // pbrt stretches what the file states.
+            _ => Framing::Fixed,
+        };
+        let mut window = match stated_window {
             // The shorter side spans [−1, 1].
-            None => ScreenWindow {
-                min: -Vec2::new(aspect.max(1.0), (1.0 / aspect).max(1.0)),
-                max: Vec2::new(aspect.max(1.0), (1.0 / aspect).max(1.0)),
-            },
+            None => ScreenWindow { min: -half_size(aspect), max: half_size(aspect) },
             Some(&[left, right, bottom, top]) if left < right && bottom < top => {
                 ScreenWindow { min: Vec2::new(left as f32, bottom as f32), max: Vec2::new(right as f32, top as f32) }
             }
@@ -88,7 +96,7 @@ impl Reader<'_> {
             ..Camera::pinhole(position, forward, up, 40.0)
         };
         self.note_unread("camera", &parameters);
-        self.builder.cameras.push(NamedCamera { name: kind, camera, aspect: None });
+        self.builder.cameras.push(NamedCamera { name: kind, camera, framing });
         Ok(())
     }
 

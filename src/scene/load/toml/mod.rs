@@ -15,6 +15,7 @@ use self::animated::Snapshot;
 use self::fields::{Fields, Source, Value};
 use super::builder::{Builder, IfDark, NamedCamera};
 use super::error::LoadError;
+use super::framing::Framing;
 use super::texture::{Adjust, IfMissing, Picture, Request};
 use super::{LoadOptions, Shutter, files};
 use crate::scene::{Encoding, FilmDefaults, MOST_EXPOSURE_STOPS, NITS_PER_UNIT, Scene, ViewingDefaults, Wrap};
@@ -94,7 +95,7 @@ fn read(path: &Path, options: &LoadOptions) -> Result<(Builder, IfDark), LoadErr
         shutter.stays_open = camera.entries()?.get_or("shutter_s", 0.0, Value::non_negative)?;
         builder.shutter_s = shutter.stays_open;
         let camera = camera::read(&camera, shutter)?;
-        builder.cameras.push(NamedCamera { name: "camera".to_owned(), camera, aspect: None });
+        builder.cameras.push(NamedCamera { name: "camera".to_owned(), camera, framing: Framing::Fixed });
     }
 
     let mut context =

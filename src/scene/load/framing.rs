@@ -1,0 +1,56 @@
+//! What a file's camera shows in a picture of another aspect than the file's.
+
+use crate::scene::{Camera, FilmDefaults, ScreenWindow};
+use glam::Vec2;
+
+/// How a camera's view follows the picture's aspect, which is width over height throughout.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Framing {
+    /// Not beyond what every camera does: without a window its height stays, a window is stretched.
+    Fixed,
+    /// As the file states: a film of no other aspect takes it, and a narrower one shows more above and below, so that nothing at its
+    /// sides is lost.
+    Stated(f32),
+    /// Its window was made for a film of this aspect, and widens with the picture about the principal point.
+    Widening { film: f32 },
+    /// Its window was made by pbrt's rule that the shorter side of the film spans [−1, 1], for a picture of aspect `film` that is a
+    /// part of one of aspect `whole`.
+    ShorterSide { film: f32, whole: f32 },
+}
+
+impl Framing {
+    /// The aspect that the picture has unless somebody asks for another one.
+    pub(super) fn stated(self) -> Option<f32> {
+        match self {
+            Self::Stated(aspect) => Some(aspect),
+            _ => None,
+        }
+    }
+
+    /// The camera for a picture of this size.
+    pub(super) fn fit(self, camera: Camera, FilmDefaults { width, height }: FilmDefaults) -> Camera {
+        let aspect = width as f32 / height as f32;
+        match self {
+            Self::Fixed => camera,
+            Self::Stated(stated) => camera.heightened(stated / aspect),
+            Self::Widening { film } => stretched(camera, film, Vec2::new(aspect / film, 1.0)),
+            Self::ShorterSide { film, whole } => {
+                stretched(camera, film, half_size(whole * aspect / film) / half_size(whole))
+            }
+        }
+    }
+}
+
+/// Half of what pbrt's films of an aspect span on the image plane.
+pub(super) fn half_size(aspect: f32) -> Vec2 {
+    Vec2::new(aspect.max(1.0), (1.0 / aspect).max(1.0))
+}
+
+/// The window, else the one that a film of this aspect has, times so much about the principal point.
+fn stretched(camera: Camera, film: f32, times: Vec2) -> Camera {
+    if (times - 1.0).abs().max_element() < 1e-6 {
+        return camera;
+    }
+    let ScreenWindow { min, max } = camera.screen_window.unwrap_or(ScreenWindow::centered(film));
+    Camera { screen_window: Some(ScreenWindow { min: min * times, max: max * times }), ..camera }
+}
