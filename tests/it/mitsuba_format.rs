@@ -349,6 +349,22 @@ fn files_are_found_in_the_folders_of_path() {
     assert!(error.ends_with(&expected), "{error}");
 }
 
+/// Mitsuba knows no groups, materials or smoothing groups of OBJ files: normals are smooth across all of them.
+#[test]
+fn normals_are_smooth_across_groups() {
+    let folder = folder();
+    let roof = "v 0 0 0\nv 0 1 0\nv 1 0 1\nv 1 1 1\nv 2 0 0\nv 2 1 0\n";
+    for divider in ["", "g b\n", "o b\n", "usemtl b\n", "s off\n"] {
+        std::fs::write(folder.path().join("roof.obj"), format!("{roof}s 1\nf 1 3 4 2\n{divider}f 3 5 6 4\n")).unwrap();
+        let shape = r#"<shape type="obj"><string name="filename" value="roof.obj"/></shape>"#;
+        let scene = try_load(folder.path(), "3.0.0", &format!("{LIGHT}{shape}")).unwrap();
+        let mesh = &scene.meshes[0];
+        assert_eq!((scene.meshes.len(), mesh.positions.len()), (1, 6), "{divider}");
+        let ridge = mesh.positions.iter().zip(&mesh.normals).filter(|(place, _)| place.z == 1.0);
+        ridge.for_each(|(_, normal)| assert!(normal.abs_diff_eq(Vec3::Z, 1e-3), "{divider}: {normal}"));
+    }
+}
+
 /// Without normals in the file the front is where the corners are seen counter-clockwise in the world.
 #[test]
 fn mirrors_turn_meshes_without_normals_over() {

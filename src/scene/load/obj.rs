@@ -22,20 +22,35 @@ use std::path::Path;
 /// Reads an OBJ file as a whole scene.
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
     let mut builder = Builder::new(path, options);
-    for (mesh, material) in read_into(&mut builder, path, true)? {
+    for (mesh, material) in read_into(&mut builder, path, Wanted::WithMaterials)? {
         let name = builder.meshes[mesh.0 as usize].name.clone();
         builder.instances.push(Instance { name, mesh, material, to_world: Affine3A::IDENTITY, motion: None });
     }
     builder.finish(path, IfDark::Studio, options)
 }
 
-/// Adds a file's meshes, each with its material. Without `with_materials` its MTL files are not opened.
+/// What of an OBJ file is wanted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Wanted {
+    /// A mesh for each object, group and material, with its material.
+    WithMaterials,
+    /// The same without opening its MTL files.
+    Meshes,
+    /// As Mitsuba reads it: objects, groups, materials and smoothing groups mean nothing. (Still a mesh for each pattern of faces.)
+    Undivided,
+}
+
+/// Adds a file's meshes, each with its material.
 pub(super) fn read_into(
     builder: &mut Builder,
     path: &Path,
-    with_materials: bool,
+    wanted: Wanted,
 ) -> Result<Vec<(MeshId, MaterialId)>, LoadError> {
+    let with_materials = wanted == Wanted::WithMaterials;
     let Cleaned { mut text, colors, points_and_lines } = clean(&files::decode_loosely(path, files::read(path)?)?);
+    if wanted == Wanted::Undivided {
+        text = clean::undivided(&text);
+    }
     let mut added_lines = 0;
     if let Some(smoothed) = smoothing::add_normals(&text) {
         (text, added_lines) = (smoothed.text, smoothed.added_lines);

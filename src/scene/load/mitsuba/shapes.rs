@@ -160,7 +160,7 @@ impl Reader {
         let flip_v = key.flip_v != (kind != "serialized");
         let ids: Vec<MeshId> = match kind {
             "obj" => {
-                let parts = obj::read_into(&mut self.builder, &key.file, false).map_err(referenced)?;
+                let parts = obj::read_into(&mut self.builder, &key.file, obj::Wanted::Undivided).map_err(referenced)?;
                 parts.into_iter().map(|(mesh, _)| mesh).collect()
             }
             "ply" => {

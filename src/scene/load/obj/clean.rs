@@ -75,6 +75,12 @@ pub(super) fn clean(text: &str) -> Cleaned {
     Cleaned { text: cleaned, colors, points_and_lines }
 }
 
+/// The text with empty lines for those that part its faces.
+pub(super) fn undivided(text: &str) -> String {
+    let parts = |line: &&str| matches!(line.split_whitespace().next(), Some("o" | "g" | "s" | "usemtl" | "mtllib"));
+    text.lines().flat_map(|line| [if parts(&line) { "" } else { line }, "\n"]).collect()
+}
+
 /// The line up to its word of this number, from 0.
 fn before_word(line: &str, number: usize) -> &str {
     let word = line.split_whitespace().nth(number).unwrap_or_default();
@@ -117,6 +123,11 @@ mod tests {
         let cleaned = clean("f 1 2 3\n l 1 2 \\\n 3\nl\t1 2\np 1\nlod 1\n");
         assert_eq!(cleaned.text.lines().map(str::trim_end).collect::<Vec<_>>(), ["f 1 2 3", "", "", "", "", "lod 1"]);
         assert_eq!(cleaned.points_and_lines, 3);
+    }
+
+    #[test]
+    fn undivided_text_keeps_its_lines() {
+        assert_eq!(undivided("g\nv 0 0 0\nusemtl a\ng a b\nf 1 1 1"), "\nv 0 0 0\n\n\nf 1 1 1\n");
     }
 
     #[test]

@@ -105,7 +105,8 @@ impl<'m, 'a> Objects<'m, 'a> {
         let parts = match self.files.get(&key) {
             Some(parts) => parts.clone(),
             None => {
-                let parts = obj::read_into(&mut context.builder, &key.0, key.1)
+                let wanted = if key.1 { obj::Wanted::WithMaterials } else { obj::Wanted::Meshes };
+                let parts = obj::read_into(&mut context.builder, &key.0, wanted)
                     .map_err(|error| error.referenced_from(file.place()))?;
                 self.files.insert(key, parts.clone());
                 parts
