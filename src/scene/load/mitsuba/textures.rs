@@ -142,7 +142,8 @@ impl Reader {
         Ok(Some(ScalarInput { factor: luminance(color.factor), texture: color.texture.map(|lookup| (lookup, 0)) }))
     }
 
-    /// The opacity of a mask: a picture with an alpha channel means that channel.
+    /// The opacity of a mask. A picture with an alpha channel means that channel in files before version 2, whose exporters wrote leaves
+    /// so; Mitsuba 3 takes the luminance of its colours.
     pub(super) fn opacity(&mut self, owner: &Element) -> Result<Option<ScalarInput>, LoadError> {
         if let Some(child) = owner.child("opacity").cloned() {
             let child = if child.tag == "ref" { self.resolve(&child)? } else { child };
@@ -150,6 +151,15 @@ impl Reader {
                 && let Some(name) = child.string("filename")?
                 && has_alpha(&self.file(&child, name)?)
             {
+                let place = child.place();
+                if self.since_2 {
+                    self.builder.note(format!(
+                        "{place}: the opacity is the luminance of the picture's colours, as in Mitsuba 3: its alpha is not used."
+                    ));
+                    return self.scalar_input(owner, "opacity");
+                }
+                self.builder
+                    .note(format!("{place}: the opacity is the picture's alpha, as files before version 2 mean it."));
                 // As a surface's colour would ask for it: the luminance of its colours would be a second picture that nothing reads.
                 let picture = self.texture(&child, Meaning::Reflectance, 0)?;
                 return Ok(Some(ScalarInput { factor: picture.factor.x, texture: picture.texture.map(|t| (t, 3)) }));
