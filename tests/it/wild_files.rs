@@ -80,6 +80,33 @@ fn coats_fibres_and_stretch_of_mtl_are_read() {
     assert!(has_note(&scene, "Material \"m\": not used: map_ni, map_ns, refl."), "{:?}", scene.notes);
 }
 
+/// As the bytes of a picture in a format, of one colour.
+fn picture(format: image::ImageFormat) -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    image::RgbImage::from_pixel(2, 2, image::Rgb([0, 255, 0])).write_to(&mut bytes, format).unwrap();
+    bytes.into_inner()
+}
+
+/// A kind of picture that is not read costs the picture and not the scene; a damaged one names the line that asks for it.
+#[test]
+fn pictures_of_every_kind_leave_a_scene() {
+    let with = |name: &str, bytes: &[u8]| {
+        let mtl = format!("newmtl m\nKd 1 1 1\nmap_Kd {name}\n");
+        let obj = "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n";
+        read(&[("a.obj", obj.as_bytes()), ("a.mtl", mtl.as_bytes()), (name, bytes)])
+    };
+    for (name, format) in [("a.bmp", image::ImageFormat::Bmp), ("a.webp", image::ImageFormat::WebP)] {
+        let scene = with(name, &picture(format)).unwrap();
+        let green = scene.textures[0].mean_color();
+        assert!(green.y > 0.9 && green.x < 0.1 && !has_note(&scene, "stands in"), "{name}: {green}");
+    }
+    let scene = with("a.gif", b"GIF89a\x01\0\x01\0\0\0\0;").unwrap();
+    assert!(has_note(&scene, "Texture not read, a plain one stands in: "), "{:?}", scene.notes);
+    assert!(has_note(&scene, "a.mtl:3: "), "{:?}", scene.notes);
+    let damaged = with("a.png", b"\x89PNG\r\n\x1a\n").unwrap_err();
+    assert!(damaged.contains("a.mtl:3: "), "{damaged}");
+}
+
 #[test]
 fn a_late_material_file_counts() {
     let obj = format!("{QUAD}usemtl m\nmtllib m.mtl\nf 1/1/1 2/2/1 3/3/1 4/4/1\nusemtl n\n");

@@ -133,6 +133,11 @@ impl LoadError {
     pub fn is_unreadable(&self) -> bool {
         matches!(self, Self::Unreadable { .. })
     }
+
+    /// Whether the file is of a kind that is not read (other than damaged).
+    pub fn is_unsupported(&self) -> bool {
+        matches!(self, Self::Unsupported { .. })
+    }
 }
 
 /// Text on one line: what other crates say may hold line breaks, and damaged files may hold control characters.

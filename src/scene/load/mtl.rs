@@ -7,7 +7,7 @@ mod surface;
 
 use super::builder::Builder;
 use super::bump::Bump;
-use super::error::LoadError;
+use super::error::{LoadError, Place};
 use super::files;
 use super::texture::{Adjust, IfMissing, Picture, Request};
 use crate::scene::{
@@ -24,13 +24,16 @@ pub(super) struct Written {
     pub(super) name: String,
     numbers: HashMap<String, Vec<f32>>,
     maps: HashMap<String, Map>,
-    folder: PathBuf,
+    /// The file that it stands in.
+    file: PathBuf,
 }
 
 /// A texture statement.
 #[derive(Clone, Debug, PartialEq)]
 struct Map {
     file: String,
+    /// Where it stands.
+    line: usize,
     offset: Vec2,
     scale: Vec2,
     bump: f32,
@@ -46,7 +49,7 @@ impl Map {
     /// A file as it stands.
     fn plain(file: String) -> Self {
         let (offset, scale) = (Vec2::ZERO, Vec2::ONE);
-        Self { file, offset, scale, bump: 1.0, clamp: false, channel: None, base: 0.0, gain: 1.0 }
+        Self { file, line: 1, offset, scale, bump: 1.0, clamp: false, channel: None, base: 0.0, gain: 1.0 }
     }
 }
 
@@ -66,7 +69,6 @@ pub(super) fn read(path: &Path, notes: &mut Vec<String>) -> Result<Vec<Written>,
         other => other?,
     };
     let text = files::decode_loosely(path, bytes)?;
-    let folder = path.parent().unwrap_or(Path::new(""));
     let mut materials: Vec<Written> = Vec::new();
     for (number, line) in text.lines().enumerate() {
         let line = line.trim();
@@ -77,14 +79,14 @@ pub(super) fn read(path: &Path, notes: &mut Vec<String>) -> Result<Vec<Written>,
         }
         let key = key.to_ascii_lowercase();
         if key == "newmtl" {
-            materials.push(Written { name: rest.to_owned(), folder: folder.to_owned(), ..Written::default() });
+            materials.push(Written { name: rest.to_owned(), file: path.to_owned(), ..Written::default() });
             continue;
         }
         let Some(material) = materials.last_mut() else {
             continue;
         };
         if key.starts_with("map_") || ["norm", "bump", "disp", "refl", "decal"].contains(&key.as_str()) {
-            let map = parse_map(rest);
+            let map = Map { line: number + 1, ..parse_map(rest) };
             if !map.file.is_empty() {
                 material.maps.insert(key, map);
             }
@@ -181,12 +183,12 @@ impl Written {
     fn lookup(&self, builder: &mut Builder, map: &Map, encoding: Encoding, if_missing: [u8; 4]) -> TextureLookup {
         let wrap = if map.clamp { Wrap::Clamp } else { Wrap::Repeat };
         let texture = builder.textures.add(Request {
-            picture: Picture::File(find_file(&self.folder, &map.file)),
+            picture: Picture::File(find_file(self.file.parent().unwrap_or(Path::new("")), &map.file)),
             encoding,
             wrap_u: wrap,
             wrap_v: wrap,
             nearest: false,
-            if_missing: IfMissing::Replace(if_missing),
+            if_missing: IfMissing::Replace(if_missing, Place::line(&self.file, map.line)),
             adjust: Adjust::NONE,
         });
         // MTL's offset and scale are meant for v up; the mesh's coordinates were turned to v down.

@@ -28,13 +28,14 @@ pub(super) enum Picture {
     Texels { name: String, size: [u32; 2], bits: Arc<Vec<[u32; 4]>> },
 }
 
-/// What to do when the file is not there at all. (A damaged one is always an error.)
+/// What to do when the file is not there at all, or of a kind that is not read, and the place that names it. (A damaged one is always an
+/// error.)
 #[derive(Clone, Debug)]
 pub(super) enum IfMissing {
-    /// An error that names the place which names the file.
+    /// An error.
     Fail(Place),
     /// A note, and this texel everywhere instead.
-    Replace([u8; 4]),
+    Replace([u8; 4], Place),
 }
 
 /// A texture that a scene file asks for.
@@ -85,7 +86,7 @@ impl Request {
             wrap_u: Wrap::Repeat,
             wrap_v: Wrap::Repeat,
             nearest: false,
-            if_missing: IfMissing::Replace([128; 4]),
+            if_missing: IfMissing::Fail(Place::file(Path::new(name))),
             adjust: Adjust::NONE,
         }
     }
@@ -217,14 +218,15 @@ impl Slot {
             Self::Failed(error) => error,
         };
         match &request.if_missing {
-            IfMissing::Replace(texel) if error.is_unreadable() => {
-                notes.push(format!("Texture not found, a plain one stands in: {error}."));
+            IfMissing::Replace(texel, place) if error.is_unreadable() || error.is_unsupported() => {
+                let how = if error.is_unreadable() { "found" } else { "read" };
+                let error = error.clone().referenced_from(place.clone());
+                notes.push(format!("Texture not {how}, a plain one stands in: {error}."));
                 let plain = Decoded::plain(*texel, request.encoding);
                 *self = Self::Picture(plain.clone());
                 Ok(plain)
             }
-            IfMissing::Replace(_) => Err(error.clone()),
-            IfMissing::Fail(place) => Err(error.clone().referenced_from(place.clone())),
+            IfMissing::Replace(_, place) | IfMissing::Fail(place) => Err(error.clone().referenced_from(place.clone())),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! glTF materials and textures.
 
 use super::super::builder::Builder;
-use super::super::error::LoadError;
+use super::super::error::{LoadError, Place};
 use super::super::texture::{Adjust, IfMissing, Picture, Request};
 use super::buffers::{Buffers, Uri, resolve};
 use crate::scene::{
@@ -266,7 +266,7 @@ impl<'a> Materials<'a> {
             wrap_u: wrap(sampler.wrap_s()),
             wrap_v: wrap(sampler.wrap_t()),
             nearest: sampler.mag_filter() == Some(MagFilter::Nearest),
-            if_missing: IfMissing::Replace(if_missing),
+            if_missing: IfMissing::Replace(if_missing, Place::file(self.path)),
             adjust: Adjust::NONE,
         });
         let plain = TextureLookup::plain(texture);

@@ -1,4 +1,4 @@
-//! Decoding pictures: PNG, JPEG, Radiance HDR, TGA, TIFF through `image`, OpenEXR through `exr_read`. 8-bit pictures stay bytes
+//! Decoding pictures: PNG, JPEG, Radiance HDR, TGA, TIFF, BMP, WebP through `image`, OpenEXR through `exr_read`. 8-bit pictures stay bytes
 //! (4 a texel), all others become linear floats (16 a texel).
 
 use super::Picture;
@@ -83,7 +83,10 @@ pub(in crate::scene::load) fn decode_bytes(
         _ => LoadError::invalid(name, format_args!("not a readable picture: {error}")),
     };
     let Some(format) = format_of(bytes, name) else {
-        return Err(LoadError::unsupported(name, "not a picture that is read: png, jpg, hdr, tga, tiff, exr are"));
+        return Err(LoadError::unsupported(
+            name,
+            "not a picture that is read: png, jpg, hdr, tga, tiff, bmp, webp, exr are",
+        ));
     };
 
     let decoder = limited(ImageReader::with_format(Cursor::new(bytes), format)).into_decoder().map_err(wrong)?;
@@ -133,7 +136,8 @@ fn linear_floats(image: DynamicImage, encoding: Encoding, header: Option<HdrHead
 
 /// The format of a picture other than EXR, if it is one that is read.
 fn format_of(bytes: &[u8], name: &Path) -> Option<ImageFormat> {
-    let known = [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Hdr, ImageFormat::Tga, ImageFormat::Tiff];
+    use ImageFormat::{Bmp, Hdr, Jpeg, Png, Tga, Tiff, WebP};
+    let known = [Png, Jpeg, Hdr, Tga, Tiff, Bmp, WebP];
     let format = image::guess_format(bytes).ok().or_else(|| ImageFormat::from_path(name).ok());
     format.filter(|format| known.contains(format))
 }
