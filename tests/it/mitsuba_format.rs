@@ -172,6 +172,20 @@ fn cameras_are_mitsubas() {
     assert!(has_note(&clipped, "near_clip 4.1 cuts the scene"), "{:?}", clipped.notes);
 }
 
+#[test]
+fn cameras_without_an_up_stand_as_mitsubas_do() {
+    let axes = |look_at: &str| {
+        let sensor = format!(
+            r#"<sensor type="perspective"><transform name="to_world"><lookat {look_at}/></transform></sensor>"#
+        );
+        scene(&format!(r#"{sensor}<shape type="rectangle"/>"#)).camera.axes()
+    };
+    assert!(axes(r#"origin="0,0,4" target="0,0,0""#).up.abs_diff_eq(Vec3::X, 1e-6));
+    // As mi.coordinate_system says.
+    let up = axes(r#"origin="3,2,4" target="0,0,0" up="0,0,0""#).up;
+    assert!(up.abs_diff_eq(Vec3::new(0.82193, -0.11872, -0.55709), 1e-4), "{up}");
+}
+
 /// As far off the principal point as the file says, in shares of the picture, whatever its size.
 #[test]
 fn shifted_cameras_have_square_pixels_at_every_size() {

@@ -31,15 +31,24 @@ fn read(transform: &Element) -> Result<Affine3A, LoadError> {
 
 fn look_at(step: &Element) -> Result<Affine3A, LoadError> {
     let (origin, target) = (step.triple("origin")?, step.triple("target")?);
-    let up = if step.attribute("up").is_some() { step.triple("up")? } else { Vec3::Y };
+    let up = if step.attribute("up").is_some() { step.triple("up")? } else { Vec3::ZERO };
     let frame = || {
         let ahead = (target - origin).try_normalize()?;
+        let up = if up == Vec3::ZERO { any_up(ahead) } else { up };
         let left = up.cross(ahead).try_normalize()?;
         Some((left, ahead.cross(left), ahead))
     };
     let (left, up, ahead) =
         frame().ok_or_else(|| step.error("origin and target are the same point, or up lies along their line"))?;
     Ok(Affine3A::from_mat3_translation(glam::Mat3::from_cols(left, up, ahead), origin))
+}
+
+/// What Mitsuba takes for "up" where a file gives none: the first perpendicular of Duff et al. 2017 (Building an Orthonormal Basis,
+/// Revisited).
+fn any_up(ahead: Vec3) -> Vec3 {
+    let sign = 1.0_f32.copysign(ahead.z);
+    let a = -1.0 / (sign + ahead.z);
+    Vec3::new(1.0 + sign * ahead.x * ahead.x * a, sign * ahead.x * ahead.y * a, -sign * ahead.x)
 }
 
 fn matrix(step: &Element) -> Result<Affine3A, LoadError> {
