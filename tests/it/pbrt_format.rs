@@ -44,6 +44,15 @@ fn imports_keep_their_state_to_themselves() {
     }
 }
 
+#[test]
+fn files_of_version_3_are_told_what_to_do() {
+    let old = try_load(folder().path(), "", &format!(r#"Material "matte" {SQUARE}"#)).unwrap_err();
+    assert!(
+        old.ends_with("\"matte\" of pbrt-v3: `pbrt --upgrade` writes the file for version 4, which is read"),
+        "{old}"
+    );
+}
+
 /// The shorter side of the whole film spans [−1, 1] at every size of the picture; only what the file states is stretched.
 #[test]
 fn pictures_of_another_size_have_square_pixels() {

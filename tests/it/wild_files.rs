@@ -108,6 +108,22 @@ fn pictures_of_every_kind_leave_a_scene() {
 }
 
 #[test]
+fn unknown_materials_are_counted_after_ten() {
+    let uses: String = (0..30).flat_map(|name| [format!("usemtl q{}\nf 1 2 3\n", name % 15)]).collect();
+    let obj = format!("mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n{uses}");
+    let scene = scene(&[("a.obj", obj.as_bytes()), ("a.mtl", b"newmtl m\n")]);
+    let unknown = || scene.notes.iter().filter(|note| note.contains("unknown material"));
+    assert_eq!(unknown().count(), 11, "{:?}", scene.notes);
+    assert!(unknown().any(|note| note.contains("5 more unknown materials")), "{:?}", scene.notes);
+}
+
+#[test]
+fn an_opacity_with_a_halo_is_one() {
+    let (scene, faded) = of_mtl("Kd 1 1 1\nd -halo 0.25");
+    assert!(matches!(faded.alpha, Alpha::Blend { value } if value.factor == 0.25), "{:?}", scene.notes);
+}
+
+#[test]
 fn a_late_material_file_counts() {
     let obj = format!("{QUAD}usemtl m\nmtllib m.mtl\nf 1/1/1 2/2/1 3/3/1 4/4/1\nusemtl n\n");
     let scene = scene(&[("q.obj", obj.as_bytes()), ("m.mtl", b"newmtl m\nKd 1 0 0\nillum 1\n")]);

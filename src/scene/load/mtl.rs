@@ -93,7 +93,9 @@ pub(super) fn read(path: &Path, notes: &mut Vec<String>) -> Result<Vec<Written>,
             continue;
         }
         // Comments may follow the numbers; "Kd spectral file.rfl" and "Kd xyz ..." have none we could use.
-        let words = rest.split_whitespace().take_while(|word| !word.starts_with('#'));
+        // "d -halo" is an opacity that edges add to, which is not done.
+        let is_option = |word: &str| key == "d" && word == "-halo";
+        let words = rest.split_whitespace().take_while(|word| !word.starts_with('#')).filter(|word| !is_option(word));
         let numbers: Result<Vec<f32>, _> = words.map(str::parse).collect();
         match numbers {
             Ok(numbers) if !numbers.is_empty() && numbers.iter().all(|number| number.is_finite()) => {

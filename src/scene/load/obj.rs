@@ -15,7 +15,7 @@ use super::{LoadOptions, files, mtl, polygon};
 use crate::scene::{Instance, MaterialId, Mesh, MeshId, Scene};
 use glam::{Affine3A, Vec2, Vec3};
 use std::cell::{Cell, RefCell};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::io::{BufRead, Read};
 use std::path::Path;
 
@@ -279,16 +279,31 @@ fn report_unknown_materials(
     if known.is_empty() {
         return;
     }
+    // What a file of thousands needs to be told is that its library is another one's.
+    const MOST_NAMED: usize = 10;
     let names = || known.iter().map(|material| material.name.as_str());
+    let is_known: HashSet<&str> = names().collect();
+    let (mut named, mut others) = (Vec::new(), HashSet::new());
     for (number, line) in text.lines().skip(added_lines).enumerate() {
         let Some(name) = line.strip_prefix("usemtl ").map(str::trim) else {
             continue;
         };
-        if !names().any(|known| known == name) {
+        if is_known.contains(name) {
+            continue;
+        }
+        if named.len() < MOST_NAMED && !named.contains(&name) {
+            named.push(name);
+        }
+        if named.contains(&name) {
             let place = Place::line(path, number + 1);
             let guess = nearest(name, names()).map(|guess| format!(" (nearest: \"{guess}\")")).unwrap_or_default();
             builder.note(format!("{place}: unknown material \"{name}\"{guess}: a plain grey stands in."));
+        } else {
+            others.insert(name);
         }
+    }
+    if !others.is_empty() {
+        builder.note(format!("{}: {} more unknown materials: a plain grey stands in.", path.display(), others.len()));
     }
 }
 

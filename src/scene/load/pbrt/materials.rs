@@ -28,6 +28,21 @@ const KNOWN: [&str; 9] = [
     "interface",
 ];
 
+/// Materials that version 4 has no more, or under another name.
+const OF_VERSION_3: [&str; 11] = [
+    "matte",
+    "plastic",
+    "metal",
+    "glass",
+    "mirror",
+    "substrate",
+    "translucent",
+    "uber",
+    "kdsubsurface",
+    "fourier",
+    "disney",
+];
+
 /// A material as it was written; it is converted when a shape uses it.
 #[derive(Debug)]
 pub(super) struct Definition {
@@ -170,7 +185,11 @@ impl Reader<'_> {
                     .unsupported(format_args!("material \"{other}\" is not rendered; {} are", KNOWN.join(", "))));
             }
             other => {
-                return Err(parameters.error(format_args!("unknown material \"{other}\"{}", suggestion(other, KNOWN))));
+                let meant = match OF_VERSION_3.contains(&other) {
+                    true => " of pbrt-v3: `pbrt --upgrade` writes the file for version 4, which is read".to_owned(),
+                    false => suggestion(other, KNOWN),
+                };
+                return Err(parameters.error(format_args!("unknown material \"{other}\"{meant}")));
             }
         };
         Ok(Some(surface))
