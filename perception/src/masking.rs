@@ -63,6 +63,11 @@ pub(crate) struct MaskSource<'a> {
     pub(crate) height: usize,
 }
 
+/// Radius of the disc that erodes, in wavelengths: around the square of one wavelength to each side, whose corners clear what is beside
+/// corners of things. With a disc of one wavelength the edges of a lamp masked themselves: thresholds there rose by 4 to 12 %, and the squared
+/// error that 64 samples a pixel leave of the Cornell box, in units of thresholds, from 0.93 to 1.05 of even sampling's (now 0.96).
+const REACH_WAVELENGTHS: f64 = std::f64::consts::SQRT_2;
+
 /// Standard deviation of the window that softens the eroded elevation, in wavelengths: less than half of what the erosion takes off, so that
 /// nothing reaches what it has cleared.
 const EDGE_WAVELENGTHS: f64 = 0.25;
@@ -76,7 +81,7 @@ const SURROUND_WAVELENGTHS: f64 = 2.0;
 ///
 /// The band's local contrast amplitude is √2 times its RMS over a Gaussian of a third of a wavelength (the band's
 /// signal itself crosses zero twice a wavelength), less the energy that the guide's own noise has there. It is then
-/// eroded over one wavelength around: an edge, whose contrast lives within a wavelength, masks nothing beside
+/// eroded over more than one wavelength around: an edge, whose contrast lives within a wavelength, masks nothing beside
 /// it; texture, which goes on, does. Where it does ends softly, well within what the erosion has left.
 pub(crate) fn band_elevation(
     source: &MaskSource<'_>,
@@ -128,7 +133,7 @@ pub(crate) fn band_elevation(
             *value = 2.0 * value.max(0.0) * tables.center_sensitivity_squared.at(coordinates[x / 2 + 1]);
         }
     });
-    let mut elevated = eroded(&mask, wavelength_x, wavelength_y);
+    let mut elevated = eroded(&mask, REACH_WAVELENGTHS * wavelength_x, REACH_WAVELENGTHS * wavelength_y);
     elevated.for_each_row_mut(|_, row| row.iter_mut().for_each(|value| *value = elevation.at(*value)));
     let soft = |wavelength: f64| (EDGE_WAVELENGTHS * wavelength).powi(2);
     let elevated = smoothed(&elevated, soft(wavelength_x), soft(wavelength_y));
