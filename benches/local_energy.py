@@ -71,7 +71,8 @@ def main():
 
         whole, whole_error = offset(np.mean)
         local, local_error = offset(blocks)
-        t = local / local_error
+        # A block that nothing lights, or that all samples see alike, is not off.
+        t = np.divide(local, local_error, out=np.zeros_like(local), where=local_error > 0)
         worst = row, column = np.unravel_index(np.abs(t).argmax(), t.shape)
         print(
             f"{name}: {whole:+.2f} ± {whole_error:.2f} % in all; block {column}, {row}: {local[worst]:+.1f} ± {local_error[worst]:.1f} % "

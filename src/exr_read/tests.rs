@@ -183,12 +183,8 @@ fn a_block_that_claims_the_memory_of_the_world_is_refused() {
     let path = folder.path().join("dwaa.exr");
     let values = FlatSamples::F16((0..64 * 64).map(|pixel| f16::from_f32(pixel as f32 * 0.01)).collect());
     let channels = AnyChannels::sort([AnyChannel::new("Y", values)].into_iter().collect());
-    let encoding = Encoding {
-        compression: Compression::DWAA(None),
-        blocks: Blocks::ScanLines,
-        line_order: LineOrder::Increasing,
-        ..Encoding::FAST_LOSSLESS
-    };
+    let encoding =
+        Encoding { compression: Compression::DWAA(None), blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
     let layer = Layer::new((64, 64), LayerAttributes::default(), encoding, channels);
     Image::from_layer(layer).write().to_file(&path).unwrap();
     let whole = std::fs::read(&path).unwrap();
