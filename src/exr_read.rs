@@ -3,7 +3,7 @@
 //! The header is read first and its claims are checked against the file's length and a limit on memory; only then are
 //! pixels read. The `exr` crate alone believes the header and asks for as much memory as it says, which ends the program.
 
-use crate::output::{Attribute, CROP};
+use crate::output::{Attribute, CROP, FRAMES_PER_SECOND};
 use ::exr::meta::attribute::{AttributeValue, Text};
 use ::exr::meta::header::Header;
 use ::exr::meta::{BlockDescription, MetaData};
@@ -85,6 +85,12 @@ impl ExrImage {
     /// The values of a channel, if it is there.
     pub fn channel(&self, name: &str) -> Option<&[f32]> {
         self.channels.iter().find(|(n, _)| n == name).map(|(_, values)| values.as_slice())
+    }
+
+    /// Frames a second of the sequence that it is of, if it says so.
+    pub fn frames_per_second(&self) -> Option<f64> {
+        let Some(Attribute::Float(rate)) = self.attribute(FRAMES_PER_SECOND) else { return None };
+        Some(f64::from(*rate)).filter(|rate| rate.is_finite() && *rate > 0.0)
     }
 
     /// An attribute, if it is there.
@@ -361,6 +367,9 @@ fn attributes(header: &Header) -> Vec<(String, Attribute)> {
     text("comments", &own.comments);
     text("capDate", &own.capture_date);
     text("software", &own.software_name);
+    if let Some((frames, seconds)) = own.frames_per_second {
+        list.push((FRAMES_PER_SECOND.to_owned(), Attribute::Float(frames as f32 / seconds as f32)));
+    }
     if let Some(nits) = own.white_luminance {
         list.push(("whiteLuminance".to_owned(), Attribute::Float(nits)));
     }

@@ -59,10 +59,7 @@ fn primaries(metadata: &HdrMetadata) -> Option<Primaries> {
     let numbers: Vec<f64> = text.split_whitespace().map(|word| word.parse().ok()).collect::<Option<_>>()?;
     let &[rx, ry, gx, gy, bx, by, wx, wy] = &numbers[..] else { return None };
     let own = Primaries { red: [rx, ry], green: [gx, gy], blue: [bx, by], white: [wx, wy] };
-    let points = |p: &Primaries| [p.red, p.green, p.blue, p.white];
-    let ours = points(&Primaries::REC709);
-    let is_ours = points(&own).iter().flatten().zip(ours.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-3);
-    (!is_ours).then_some(own)
+    (!own.is_like(&Primaries::REC709)).then_some(own)
 }
 
 /// The file with the signature that decoders look for: some programs write `#?RGBE`.

@@ -218,6 +218,13 @@ impl Display {
         self.black_cd_m2 + (self.white_cd_m2 - self.black_cd_m2) * light
     }
 
+    /// The inverse of [`Display::emitted_cd_m2`]: what linear display RGB is emitted as so many cd/m², 0 at black and 1 at white, beyond
+    /// them where the display cannot reach it.
+    #[must_use]
+    pub fn relative_of_emitted(&self, cd_m2: f64) -> f64 {
+        (cd_m2 - self.black_cd_m2) / (self.white_cd_m2 - self.black_cd_m2).max(1e-6)
+    }
+
     /// Rejects a display that cannot be.
     ///
     /// # Errors

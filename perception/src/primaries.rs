@@ -48,7 +48,20 @@ impl Primaries {
         Some(product(&inverse(&other.to_xyz()?)?, &self.to_xyz()?))
     }
 
-    /// The same with this space's white becoming the other's (Bradford's adaptation, linear).
+    /// [`Primaries::to`], where the two differ by more than the digits that files write.
+    #[must_use]
+    pub fn to_other(&self, other: &Self) -> Option<Matrix> {
+        if self.is_like(other) { None } else { self.to(other) }
+    }
+
+    /// Whether all coordinates agree to 0.001.
+    #[must_use]
+    pub fn is_like(&self, other: &Self) -> bool {
+        let points = |p: &Self| [p.red, p.green, p.blue, p.white];
+        points(self).iter().flatten().zip(points(other).iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-3)
+    }
+
+    /// [`Primaries::to`] with this space's white becoming the other's (Bradford's adaptation, linear).
     #[must_use]
     pub fn to_adapted(&self, other: &Self) -> Option<Matrix> {
         const BRADFORD: Matrix = [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]];

@@ -3,6 +3,7 @@
 //! 8 bits, no chroma subsampling, ITU-R BT.709 in the limited range (16 to 235), which the header says. Not for keeping:
 //! three bytes a pixel and frame.
 
+use crate::output::fraction;
 use std::io::{self, Write};
 
 /// Writes frames of one size.
@@ -50,18 +51,6 @@ impl<W: Write> Y4mWriter<W> {
     }
 }
 
-/// Frames a second as a fraction: 24000/1001 and its kin, else thousandths.
-pub(crate) fn fraction(frames_per_second: f64) -> (u64, u64) {
-    let ntsc = (frames_per_second * 1.001).round();
-    if (frames_per_second - ntsc / 1.001).abs() < 1e-3 && frames_per_second.fract() > 1e-6 {
-        return ((ntsc * 1000.0) as u64, 1001);
-    }
-    if frames_per_second.fract() < 1e-9 {
-        return (frames_per_second as u64, 1);
-    }
-    ((frames_per_second * 1000.0).round() as u64, 1000)
-}
-
 /// ITU-R BT.709, limited range.
 fn ycbcr709(rgb: [u8; 3]) -> [u8; 3] {
     let [r, g, b] = rgb.map(|value| f32::from(value) / 255.0);
@@ -91,8 +80,5 @@ mod tests {
         let header = b"YUV4MPEG2 W2 H1 F24000:1001 Ip A1:1 C444 XCOLORRANGE=LIMITED\nFRAME\n";
         assert_eq!(&bytes[..header.len()], header);
         assert_eq!(bytes[header.len()..], [16, 235, 128, 128, 128, 128]);
-        assert_eq!(fraction(24.0), (24, 1));
-        assert_eq!(fraction(29.97), (30_000, 1001));
-        assert_eq!(fraction(12.5), (12_500, 1000));
     }
 }

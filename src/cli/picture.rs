@@ -225,8 +225,7 @@ impl InputPicture {
 
     /// The same of what a display emits in such a unit.
     fn emitted(&self, nits_per_unit: f64, display: &Display) -> Vec<[f32; 3]> {
-        let (dark, span) = (display.black_cd_m2, (display.white_cd_m2 - display.black_cd_m2).max(1e-6));
-        let relative = |value: f32| ((f64::from(value) * nits_per_unit - dark) / span) as f32;
+        let relative = |value: f32| display.relative_of_emitted(f64::from(value) * nits_per_unit) as f32;
         self.rgb.iter().map(|rgb| rgb.map(relative)).collect()
     }
 
@@ -272,10 +271,7 @@ impl InputPicture {
 
 /// Light of other primaries in those of Rec.709.
 fn in_rec709(light: Vec<[f32; 3]>, primaries: &Primaries) -> Vec<[f32; 3]> {
-    if *primaries == Primaries::REC709 {
-        return light;
-    }
-    let Some(matrix) = primaries.to(&Primaries::REC709) else { return light };
+    let Some(matrix) = primaries.to_other(&Primaries::REC709) else { return light };
     light.into_iter().map(|rgb| apply(&matrix, rgb.map(f64::from)).map(|value| value as f32)).collect()
 }
 

@@ -9,6 +9,7 @@ use super::seeing::{SeeingArguments, model_values, operator_values};
 use super::targets::check_kept;
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use fechner::exr_read::ExrImage;
 use fechner::output::{self, Attribute, Format, PIXEL_ASPECT_RATIO, Picture};
 use fechner_perception::display::Glare;
 use fechner_perception::model::{self, ModelInputs};
@@ -80,8 +81,11 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
         viewing.observer.glare = Glare::Cie { age_years };
         viewing.check().context("--glare")?;
     }
-    let told = || arguments.velocity.as_deref().and_then(output::frames_per_second_of);
-    if let Some(frames_per_second) = arguments.fps.or_else(told) {
+    let motion = arguments.velocity.as_deref();
+    let motion =
+        motion.map(|path| Ok::<_, anyhow::Error>((path, channels::read_of_size(path, guide.size())?))).transpose()?;
+    let told = motion.as_ref().and_then(|(_, exr)| exr.frames_per_second());
+    if let Some(frames_per_second) = arguments.fps.or(told) {
         viewing.display.frames_per_second = frames_per_second;
     }
     let viewing = guide.viewed(&viewing).with_context(|| arguments.input.display().to_string())?;
@@ -93,13 +97,16 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     let acuity = fitted.as_ref().and_then(|fitted| fitted.acuity());
     let csf = BehindAcuity { csf: csf::by_name(&arguments.seeing.csf, &viewing)?, acuity };
     let shown = guide.displayed(fitted.as_deref(), &viewing);
-    let motion = match &arguments.velocity {
+    let motion = match &motion {
         Some(_) if !model.knows_motion() => {
             let knows = |name: &&&str| model::by_name(name).is_some_and(|model| model.knows_motion());
             let known: Vec<&str> = model::names().iter().filter(knows).copied().collect();
             bail!("--velocity: the model {} knows no motion; {} do", model.name(), known.join(", "))
         }
-        Some(path) => Some(Motion::read(path, arguments.saliency, &guide, fitted.as_deref(), &viewing)?),
+        Some((path, exr)) => {
+            let motions = velocity_in(path, exr, viewing.display.frames_per_second)?;
+            Some(Motion::of(&motions, arguments.saliency, &guide, fitted.as_deref(), &viewing)?)
+        }
         None => None,
     };
     let inputs = ModelInputs {
@@ -173,14 +180,13 @@ struct Motion {
 }
 
 impl Motion {
-    fn read(
-        path: &Path,
+    fn of(
+        motions: &[[Plane; 2]; 2],
         by_saliency: bool,
         guide: &InputPicture,
         fitted: Option<&dyn FittedTone>,
         viewing: &Viewing,
     ) -> Result<Self> {
-        let motions = read_velocity(path, guide.size(), viewing.display.frames_per_second)?;
         let speed = |[x, y]: &[Plane; 2]| image_velocity_deg_s(x, y, &viewing.display);
         let [to_next, to_previous] = motions.each_ref().map(speed);
         let image_velocity_deg_s = to_next?.combined(&to_previous?, f32::min);
@@ -195,9 +201,8 @@ impl Motion {
 }
 
 /// Motion in pixels to the next frame and to the previous one, under the names that renderers give it.
-fn read_velocity(path: &Path, size: (usize, usize), frames_per_second: f64) -> Result<[[Plane; 2]; 2]> {
-    let exr = channels::read_of_size(path, size)?;
-    let (Some((layer, _)), Some(motions)) = (channels::motion(&exr), channels::both_motions(&exr)) else {
+fn velocity_in(path: &Path, exr: &ExrImage, frames_per_second: f64) -> Result<[[Plane; 2]; 2]> {
+    let (Some((layer, _)), Some(motions)) = (channels::motion(exr), channels::both_motions(exr)) else {
         bail!(
             "{}: no motion channels; velocity.X/Y, Vector.X/Y, motion.X/Y and forward.u/v are known, with or without a layer \
              before them",
@@ -206,7 +211,7 @@ fn read_velocity(path: &Path, size: (usize, usize), frames_per_second: f64) -> R
     };
     answer!("motion from the channels of {layer} at {frames_per_second} frames a second");
     let planes = |[x, y]: [Vec<f32>; 2]| -> Result<[Plane; 2]> {
-        Ok([channels::motion_plane(&exr, x)?, channels::motion_plane(&exr, y)?])
+        Ok([channels::motion_plane(exr, x)?, channels::motion_plane(exr, y)?])
     };
     Ok([planes(motions.to_next)?, planes(motions.to_previous)?])
 }

@@ -1,7 +1,7 @@
 //! The colours that an EXR file means: its own primaries, luminance and chroma, the window that is to be shown.
 
 use super::{ExrImage, Window};
-use fechner_perception::primaries::{Matrix, Primaries, apply};
+use fechner_perception::primaries::{Primaries, apply};
 
 /// The picture that a file is meant to show.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,7 +45,7 @@ impl ExrImage {
         if replaced > 0 {
             notes.push(format!("{replaced} values that are not finite were replaced"));
         }
-        if let Some(matrix) = to_rec709(&primaries) {
+        if let Some(matrix) = primaries.to_other(&Primaries::REC709) {
             rgb.iter_mut().for_each(|pixel| *pixel = apply(&matrix, pixel.map(f64::from)).map(|c| c as f32));
             if self.chromaticities == Some(primaries) {
                 notes.push("colours brought from the file's chromaticities to Rec.709".to_owned());
@@ -76,16 +76,6 @@ impl ExrImage {
     pub fn in_display_window(&self, channel: Vec<f32>) -> Vec<f32> {
         self.data_window().put_into(&self.display_window, channel, 0.0)
     }
-}
-
-/// The matrix to Rec.709, where the primaries are others.
-fn to_rec709(own: &Primaries) -> Option<Matrix> {
-    let points = |p: &Primaries| [p.red, p.green, p.blue, p.white];
-    let (own_points, ours) = (points(own), points(&Primaries::REC709));
-    if own_points.iter().flatten().zip(ours.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-3) {
-        return None;
-    }
-    own.to(&Primaries::REC709)
 }
 
 fn all<T>([first, second, third]: [Option<T>; 3]) -> Option<[T; 3]> {

@@ -17,7 +17,8 @@ mod srgb_codes;
 
 pub use beside::{remove_leftovers, write_beside, write_beside_by_name};
 pub use exr_file::write_exr;
-pub use frame_rate::{FRAMES_PER_SECOND, frames_per_second_of};
+pub use frame_rate::FRAMES_PER_SECOND;
+pub(crate) use frame_rate::fraction;
 pub use png_file::{
     PngColour, PngTransfer, decode_pq, encode_srgb8, png_colour, write_codes_png, write_png, write_png_for,
     write_png_with_alpha_for, write_pq_png,

@@ -90,8 +90,7 @@ fn encode_pq16(rgb_linear_display: &[[f32; 3]], display: &Display) -> Vec<u8> {
 /// writes them, in these primaries.
 pub fn decode_pq(codes: &[[f32; 3]], primaries: &Primaries, display: &Display) -> Vec<[f32; 3]> {
     let narrow = primaries.to(&Primaries::REC709).unwrap_or(IDENTITY);
-    let (dark, span) = (display.black_cd_m2, (display.white_cd_m2 - display.black_cd_m2).max(1e-6));
-    let relative = |code: f32| (Eotf::Pq.decode(f64::from(code), PEAK_CD_M2) * PEAK_CD_M2 - dark) / span;
+    let relative = |code: f32| display.relative_of_emitted(Eotf::Pq.decode(f64::from(code), PEAK_CD_M2) * PEAK_CD_M2);
     codes.par_iter().map(|codes| apply(&narrow, codes.map(relative)).map(|light| light as f32)).collect()
 }
 

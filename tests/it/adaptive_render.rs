@@ -211,7 +211,8 @@ fn a_budget_is_spent_for_the_whole_picture() {
         (1..=6).map(of_seed).sum()
     };
     let ratio = squared_error(Sampling::Adaptive) / squared_error(Sampling::Uniform);
-    // 0.90; six seeds leave a standard error of 0.03.
+    eprintln!("squared error over that of even counts: {ratio:.3}");
+    // 0.94; by 40 seeds 0.96, with a standard error of 0.04.
     assert!(ratio < 0.97, "{ratio}");
 }
 

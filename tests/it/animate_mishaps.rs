@@ -1,6 +1,7 @@
 //! Shots that cannot be, or are not what was meant: refused before anything is rendered, or named.
 
 use assert_cmd::Command;
+use fechner::exr_read::read_exr;
 use std::path::Path;
 
 /// A grey sphere that moves in front of a grey sky, seen by a camera that is told apart.
@@ -116,7 +117,7 @@ fn stereo_frames_have_files_of_their_own() {
         let name = format!("s.##.{eye}.exr");
         let (status, said) = animate(folder.path(), &scene(CAMERA), &["--frames", "0..1", "-o", &name, "--fps", "25"]);
         assert_eq!(status, Some(0), "{said}");
-        let rate = fechner::output::frames_per_second_of(&folder.path().join(format!("s.01.{eye}.exr")));
+        let rate = read_exr(&folder.path().join(format!("s.01.{eye}.exr"))).expect("an EXR file").frames_per_second();
         assert_eq!(rate, Some(25.0), "{eye}");
     }
     for file in ["json", "contact.png", "track.json"] {
