@@ -4,10 +4,11 @@
 //! pixels read. The `exr` crate alone believes the header and asks for as much memory as it says, which ends the program.
 
 use crate::output::{Attribute, CROP, FRAMES_PER_SECOND};
+use ::exr::image::read::any_channels::ReadAnyChannels;
 use ::exr::meta::attribute::{AttributeValue, Text};
 use ::exr::meta::header::Header;
 use ::exr::meta::{BlockDescription, MetaData};
-use ::exr::prelude::{FlatSamples, ReadChannels, ReadLayers, Vec2, read};
+use ::exr::prelude::{FlatSamples, ReadChannels, ReadLayers, Vec2};
 use fechner_perception::primaries::Primaries;
 use std::io::Cursor;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -16,12 +17,14 @@ use std::path::{Path, PathBuf};
 mod colour;
 mod dwa;
 mod subsampled;
+mod wanted;
 mod window;
 
 pub use colour::ScenePicture;
+use wanted::Wanted;
 pub use window::Window;
 
-/// Most memory that the pixels of a file may take as 32-bit floats: 1 GiB, a 4K frame with 30 channels.
+/// Most memory that the pixels read of a file may take as 32-bit floats: 1 GiB, a 4K frame with 30 channels.
 pub const MEMORY_LIMIT_BYTES: u64 = 1 << 30;
 
 /// Memory that a pixel of the display window takes, as linear RGB.
@@ -41,6 +44,8 @@ pub struct ExrImage {
     pub channels: Vec<(String, Vec<f32>)>,
     /// How the file stores each of `channels`.
     pub types: Vec<SampleType>,
+    /// Names of channels that were not asked for and are not among `channels`.
+    pub unread: Vec<String>,
     /// Attributes of the part that lays the picture out, and those of others that it lacks, sorted by name. Other types than text and
     /// numbers are given as text.
     pub attributes: Vec<(String, Attribute)>,
@@ -128,8 +133,8 @@ pub enum ExrReadError {
     },
     /// The pixels would take more than [`MEMORY_LIMIT_BYTES`].
     #[error(
-        "cannot read {}: {width}×{height} pixels of {channels} channels need {} MiB, more than the {} MiB allowed; save it with fewer layers",
-        .path.display(), .bytes >> 20, MEMORY_LIMIT_BYTES >> 20
+        "cannot read {}: {width}×{height} pixels of {channels} channel{} need {} MiB, more than the {} MiB allowed; save it smaller, or with fewer layers",
+        .path.display(), if *.channels == 1 { "" } else { "s" }, .bytes >> 20, MEMORY_LIMIT_BYTES >> 20
     )]
     TooLarge {
         /// The file.
@@ -138,8 +143,8 @@ pub enum ExrReadError {
         width: u64,
         /// Height that the header claims.
         height: u64,
-        /// Channels of all parts.
-        channels: usize,
+        /// Channels that were to be read, of all parts.
+        channels: u64,
         /// Memory that would be needed.
         bytes: u64,
     },
@@ -147,11 +152,16 @@ pub enum ExrReadError {
 
 /// Reads every channel of a file's parts.
 pub fn read_exr(path: &Path) -> Result<ExrImage, ExrReadError> {
+    read_exr_channels(path, |_, _| true)
+}
+
+/// Reads those channels of a file's parts that `is_wanted`, which is asked with the names of all and one of them. Only they take memory.
+pub fn read_exr_channels(path: &Path, is_wanted: impl Fn(&[String], &str) -> bool) -> Result<ExrImage, ExrReadError> {
     let io = |error| ExrReadError::Io { path: path.to_owned(), error };
     if path.metadata().map_err(io)?.is_dir() {
         return Err(io(std::io::Error::new(std::io::ErrorKind::IsADirectory, "it is a folder, not an EXR file")));
     }
-    decode_exr(path, &std::fs::read(path).map_err(io)?)
+    decode_exr_channels(path, &std::fs::read(path).map_err(io)?, is_wanted)
 }
 
 /// Whether these are the first bytes of an EXR file.
@@ -161,23 +171,27 @@ pub fn is_exr(bytes: &[u8]) -> bool {
 
 /// Reads every channel of the parts of a file that is in memory; `path` is for messages.
 pub fn decode_exr(path: &Path, file: &[u8]) -> Result<ExrImage, ExrReadError> {
+    decode_exr_channels(path, file, |_, _| true)
+}
+
+/// [`read_exr_channels`] of a file that is in memory; `path` is for messages.
+pub fn decode_exr_channels(
+    path: &Path,
+    file: &[u8],
+    is_wanted: impl Fn(&[String], &str) -> bool,
+) -> Result<ExrImage, ExrReadError> {
     if let Some(image) = subsampled::read(path, file)? {
         return Ok(image);
     }
     let headers = read_headers(path, file)?;
+    let wanted = Wanted::of(&headers, is_wanted);
+    check_memory(path, &headers, &wanted)?;
     dwa::check(path, file, &headers)?;
     let image = guarded(path, || {
-        read()
-            .no_deep_data()
-            .largest_resolution_level()
-            .all_channels()
-            .all_layers()
-            .all_attributes()
-            .from_buffered(Cursor::new(file))
+        ReadAnyChannels { read_samples: wanted.clone() }.all_layers().all_attributes().from_buffered(Cursor::new(file))
     })?;
     let mut result = image_without_channels(layout(&headers));
     add_missing(&mut result.attributes, &headers);
-    let several = image.layer_data.len() > 1;
     let window = result.data_window();
     for layer in image.layer_data {
         let part = layer.attributes.layer_name.as_ref().map(Text::to_string).unwrap_or_default();
@@ -188,12 +202,15 @@ pub fn decode_exr(path: &Path, file: &[u8]) -> Result<ExrImage, ExrReadError> {
             continue;
         }
         for channel in layer.channel_data.list {
-            let name = channel.name.to_string();
-            let name = if several && !part.is_empty() { format!("{part}.{name}") } else { name };
+            let name = wanted.full_name(&part, &channel.name.to_string());
             let (values, kind) = match channel.sample_data {
-                FlatSamples::F32(values) => (values, SampleType::Float),
-                FlatSamples::F16(values) => (values.iter().map(|v| v.to_f32()).collect(), SampleType::Half),
-                FlatSamples::U32(values) => (values.iter().map(|&v| v as f32).collect(), SampleType::Uint),
+                Some(FlatSamples::F32(values)) => (values, SampleType::Float),
+                Some(FlatSamples::F16(values)) => (values.iter().map(|v| v.to_f32()).collect(), SampleType::Half),
+                Some(FlatSamples::U32(values)) => (values.iter().map(|&v| v as f32).collect(), SampleType::Uint),
+                None => {
+                    result.unread.push(name);
+                    continue;
+                }
             };
             result.channels.push((name, own_window.put_into(&window, values, 0.0)));
             result.types.push(kind);
@@ -246,6 +263,7 @@ fn image_without_channels(first: &Header) -> ExrImage {
         data_window_origin: origin,
         channels: Vec::new(),
         types: Vec::new(),
+        unread: Vec::new(),
         attributes: attributes(first),
         parts_left_out: Vec::new(),
         lines_left_out: 0,
@@ -276,7 +294,7 @@ pub fn size(path: &Path, file: &[u8]) -> Result<[u32; 2], ExrReadError> {
     Ok([width as u32, height as u32])
 }
 
-/// Reads the headers of all parts and refuses what could not be read within [`MEMORY_LIMIT_BYTES`].
+/// Reads the headers of all parts and refuses those of which no channel could be read within [`MEMORY_LIMIT_BYTES`].
 fn read_headers(path: &Path, file: &[u8]) -> Result<Vec<Header>, ExrReadError> {
     let damaged = |problem: String| ExrReadError::Damaged { path: path.to_owned(), problem };
     let unsupported = |feature: &str| ExrReadError::Unsupported { path: path.to_owned(), feature: feature.to_owned() };
@@ -289,10 +307,8 @@ fn read_headers(path: &Path, file: &[u8]) -> Result<Vec<Header>, ExrReadError> {
         return Err(damaged("it has no part".to_owned()));
     }
 
-    let mut bytes: u64 = 0;
     let mut chunks: u64 = 0;
-    let area = |header: &Header| (header.layer_size.0 as u64).saturating_mul(header.layer_size.1 as u64);
-    let laid_out = area(layout(&headers));
+    check_memory_of(path, std::slice::from_ref(layout(&headers)), |_| 1)?;
     for header in &headers {
         if header.deep {
             return Err(unsupported("deep pixels are not read; flatten the picture first"));
@@ -305,7 +321,6 @@ fn read_headers(path: &Path, file: &[u8]) -> Result<Vec<Header>, ExrReadError> {
             return Err(damaged("it has no pixels".to_owned()));
         }
         let channels = header.channels.list.len() as u64;
-        bytes = bytes.saturating_add(area(header).max(laid_out).saturating_mul(channels * 4));
         // A single block is unpacked at once, and tiles may be larger than the picture.
         if let BlockDescription::Tiles(tiles) = header.blocks {
             let tile_pixels = (tiles.tile_size.0 as u64).saturating_mul(tiles.tile_size.1 as u64);
@@ -315,20 +330,33 @@ fn read_headers(path: &Path, file: &[u8]) -> Result<Vec<Header>, ExrReadError> {
         }
         chunks = chunks.saturating_add(header.chunk_count as u64);
     }
-    if bytes > MEMORY_LIMIT_BYTES {
-        return Err(ExrReadError::TooLarge {
-            path: path.to_owned(),
-            width: layout(&headers).layer_size.0 as u64,
-            height: layout(&headers).layer_size.1 as u64,
-            channels: headers.iter().map(|header| header.channels.list.len()).sum(),
-            bytes,
-        });
-    }
     // Each chunk takes 8 bytes in the table of offsets, and a place and a length of 4 bytes each where it stands.
     if chunks.saturating_mul(16) > file.len() as u64 {
         return Err(damaged(format!("it is too short for the {chunks} blocks that its header tells of")));
     }
     Ok(headers.into_vec())
+}
+
+/// Refuses channels that would take more than [`MEMORY_LIMIT_BYTES`].
+fn check_memory(path: &Path, headers: &[Header], wanted: &Wanted) -> Result<(), ExrReadError> {
+    check_memory_of(path, headers, |header| wanted.channels_of(header))
+}
+
+fn check_memory_of(path: &Path, headers: &[Header], channels_of: impl Fn(&Header) -> u64) -> Result<(), ExrReadError> {
+    let area = |header: &Header| (header.layer_size.0 as u64).saturating_mul(header.layer_size.1 as u64);
+    let laid_out = area(layout(headers));
+    let of_part = |header: &Header| area(header).max(laid_out).saturating_mul(channels_of(header).saturating_mul(4));
+    let bytes = headers.iter().map(of_part).fold(0_u64, u64::saturating_add);
+    if bytes > MEMORY_LIMIT_BYTES {
+        return Err(ExrReadError::TooLarge {
+            path: path.to_owned(),
+            width: layout(headers).layer_size.0 as u64,
+            height: layout(headers).layer_size.1 as u64,
+            channels: headers.iter().map(channels_of).sum(),
+            bytes,
+        });
+    }
+    Ok(())
 }
 
 /// Runs the library, and turns its errors, and panics on damaged data, into ours.

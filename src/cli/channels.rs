@@ -1,7 +1,7 @@
 //! Which channels of another program's EXR file hold its colour and its motion.
 
 use anyhow::{Result, bail};
-use fechner::exr_read::{ExrImage, read_exr};
+use fechner::exr_read::{ExrImage, read_exr_channels};
 use fechner_perception::Plane;
 use std::path::Path;
 
@@ -14,9 +14,9 @@ pub(super) enum Colour<'a> {
     Grey(&'a [f32]),
 }
 
-/// Reads a file that shows as many pixels as the picture it is for.
-pub(super) fn read_of_size(path: &Path, (width, height): (usize, usize)) -> Result<ExrImage> {
-    let exr = read_exr(path)?;
+/// Reads the motion of a file that shows as many pixels as the picture it is for.
+pub(super) fn read_motion(path: &Path, (width, height): (usize, usize)) -> Result<ExrImage> {
+    let exr = read_exr_channels(path, |_, name| is_of_motion(name))?;
     let shown = exr.display_window;
     if (shown.width as usize, shown.height as usize) != (width, height) {
         bail!("{} has {}x{} pixels, the picture {width}x{height}", path.display(), shown.width, shown.height);
@@ -64,19 +64,31 @@ struct PictureLayer<'a> {
     of: Vec<&'a str>,
 }
 
+/// Reads the channels of a file that may be its picture, and passes over the others.
+pub(super) fn read_picture(path: &Path) -> Result<ExrImage> {
+    Ok(read_exr_channels(path, |all, name| {
+        let all: Vec<&str> = all.iter().map(String::as_str).collect();
+        let (layer, part) = split(name);
+        let is_of_picture = picture_layer(&all).is_some_and(|picture| picture.name == layer);
+        match is_of_picture {
+            true => ["R", "G", "B"].iter().any(|own| part.eq_ignore_ascii_case(own)),
+            false => layer.is_empty() && ["X", "Y", "Z", "RY", "BY"].contains(&part),
+        }
+    })?)
+}
+
 /// The root if it has `R`, `G` and `B`, else a layer a part of whose name, between dots, is what a finished picture is
 /// called (`RenderLayer.Combined.R`), else the first layer; auxiliaries only where a part of their name says picture and nothing
 /// else is there.
-fn picture_layer<'a>(exr: &'a ExrImage) -> Option<PictureLayer<'a>> {
-    let layers = layers_with(exr, &["R", "G", "B"]);
-    let is_part = |layer: &str, name: &str| layer.split('.').any(|part| part.eq_ignore_ascii_case(name));
+fn picture_layer<'a>(names: &[&'a str]) -> Option<PictureLayer<'a>> {
+    let layers = layers_with(names, &["R", "G", "B"]);
     let is_auxiliary = |layer: &str| {
         NOT_THE_PICTURE.iter().any(|name| layer.to_ascii_lowercase().contains(*name))
-            || BLENDER_PASSES.iter().any(|name| is_part(layer, name))
+            || BLENDER_PASSES.iter().any(|name| is_called(layer, name))
     };
     let (auxiliary, others): (Vec<&str>, Vec<&str>) = layers.into_iter().partition(|layer| is_auxiliary(layer));
     let called = |layers: &[&'a str]| {
-        THE_PICTURE.iter().find_map(|name| layers.iter().copied().find(|layer| is_part(layer, name)))
+        THE_PICTURE.iter().find_map(|name| layers.iter().copied().find(|layer| is_called(layer, name)))
     };
     let named = others.iter().copied().find(|layer| layer.is_empty()).or_else(|| called(&others));
     let sure = |name| PictureLayer { name, of: Vec::new() };
@@ -89,13 +101,13 @@ fn picture_layer<'a>(exr: &'a ExrImage) -> Option<PictureLayer<'a>> {
 
 /// What to say of a picture whose layer had to be guessed.
 pub(super) fn guess(exr: &ExrImage) -> Option<String> {
-    let layer = picture_layer(exr).filter(|layer| !layer.of.is_empty())?;
+    let layer = picture_layer(&names(exr)).filter(|layer| !layer.of.is_empty())?;
     Some(format!("the layer {} is taken for the picture, of {}", layer.name, layer.of.join(", ")))
 }
 
 /// The picture: `R`, `G` and `B` of one layer, else `Y`.
 pub(super) fn colour<'a>(exr: &'a ExrImage) -> Option<Colour<'a>> {
-    let Some(layer) = picture_layer(exr) else { return exr.channel("Y").map(Colour::Grey) };
+    let Some(layer) = picture_layer(&names(exr)) else { return exr.channel("Y").map(Colour::Grey) };
     let [Some(r), Some(g), Some(b)] = ["R", "G", "B"].map(|part| part_of(exr, layer.name, part)) else {
         return None;
     };
@@ -112,11 +124,10 @@ const VECTOR_PARTS: [[&str; 2]; 3] = [["X", "Y"], ["U", "V"], ["R", "G"]];
 /// A layer counts if one part of its name, between dots, is one that renderers use (`velocity.X`, `ViewLayer.Vector.X`,
 /// `forward.left.u`, `motion.x`); case does not matter.
 pub(super) fn motion(exr: &ExrImage) -> Option<(&str, [&[f32]; 2])> {
+    let names = names(exr);
     for name in MOTION_LAYERS {
         for [across, down] in VECTOR_PARTS {
-            let found = layers_with(exr, &[across, down])
-                .into_iter()
-                .find(|layer| layer.split('.').any(|part| part.eq_ignore_ascii_case(name)));
+            let found = layers_with(&names, &[across, down]).into_iter().find(|layer| is_called(layer, name));
             if let Some(layer) = found {
                 return Some((layer, [part_of(exr, layer, across)?, part_of(exr, layer, down)?]));
             }
@@ -138,8 +149,8 @@ const BACKWARD_LAYERS: [&str; 2] = ["velocity_previous", "backward"];
 /// Both motions: ours, Blender's `Vector` of four, or any that [`motion`] finds, which is taken to have been the same before.
 pub(super) fn both_motions(exr: &ExrImage) -> Option<BothMotions> {
     let negated = |values: &[f32]| values.iter().map(|value| -value).collect::<Vec<f32>>();
-    let is_called = |layer: &str, name: &str| layer.split('.').any(|part| part.eq_ignore_ascii_case(name));
-    let of_four = layers_with(exr, &["X", "Y", "Z", "W"]).into_iter().find(|layer| is_called(layer, "vector"));
+    let names = names(exr);
+    let of_four = layers_with(&names, &["X", "Y", "Z", "W"]).into_iter().find(|layer| is_called(layer, "vector"));
     if let Some(layer) = of_four {
         // Where it was less where it is, then where it is less where it will be; y upwards.
         let [Some(x), Some(y), Some(z), Some(w)] = ["X", "Y", "Z", "W"].map(|part| part_of(exr, layer, part)) else {
@@ -150,34 +161,50 @@ pub(super) fn both_motions(exr: &ExrImage) -> Option<BothMotions> {
     let (_, [x, y]) = motion(exr)?;
     let backward = VECTOR_PARTS.iter().find_map(|[across, down]| {
         let is_backward = |layer: &&str| BACKWARD_LAYERS.iter().any(|name| is_called(layer, name));
-        let layer = layers_with(exr, &[across, down]).into_iter().find(is_backward)?;
+        let layer = layers_with(&names, &[across, down]).into_iter().find(is_backward)?;
         Some([part_of(exr, layer, across)?.to_vec(), part_of(exr, layer, down)?.to_vec()])
     });
     let to_previous = backward.unwrap_or_else(|| [negated(x), negated(y)]);
     Some(BothMotions { to_next: [x.to_vec(), y.to_vec()], to_previous })
 }
 
-/// Layers (what stands before the last dot, perhaps nothing) that have all of `parts`, in the file's order.
-fn layers_with<'a>(exr: &'a ExrImage, parts: &[&str]) -> Vec<&'a str> {
+/// Whether a channel may be one of those that [`both_motions`] looks for.
+fn is_of_motion(name: &str) -> bool {
+    let (layer, part) = split(name);
+    let is_layer = MOTION_LAYERS.iter().chain(&BACKWARD_LAYERS).any(|name| is_called(layer, name));
+    is_layer && VECTOR_PARTS.iter().flatten().chain(&["Z", "W"]).any(|own| part.eq_ignore_ascii_case(own))
+}
+
+/// Whether a part of the layer's name, between dots, is this.
+fn is_called(layer: &str, name: &str) -> bool {
+    layer.split('.').any(|part| part.eq_ignore_ascii_case(name))
+}
+
+/// Names of all channels of the file, in its order but those last that were not asked for.
+fn names(exr: &ExrImage) -> Vec<&str> {
+    exr.channels.iter().map(|(name, _)| name).chain(&exr.unread).map(String::as_str).collect()
+}
+
+/// Layers (what stands before the last dot, perhaps nothing) that have all of `parts`, in the order of `names`.
+fn layers_with<'a>(names: &[&'a str], parts: &[&str]) -> Vec<&'a str> {
     let mut layers: Vec<&str> = Vec::new();
-    for (name, _) in &exr.channels {
+    for name in names {
         let (layer, part) = split(name);
-        if part.eq_ignore_ascii_case(parts[0])
-            && !layers.contains(&layer)
-            && parts.iter().all(|part| part_of(exr, layer, part).is_some())
-        {
+        let has = |part: &&str| names.iter().any(|name| is_part(name, layer, part));
+        if part.eq_ignore_ascii_case(parts[0]) && !layers.contains(&layer) && parts.iter().all(has) {
             layers.push(layer);
         }
     }
     layers
 }
 
+fn is_part(name: &str, layer: &str, part: &str) -> bool {
+    let (own_layer, own_part) = split(name);
+    own_layer == layer && own_part.eq_ignore_ascii_case(part)
+}
+
 fn part_of<'a>(exr: &'a ExrImage, layer: &str, part: &str) -> Option<&'a [f32]> {
-    let is_it = |name: &str| {
-        let (own_layer, own_part) = split(name);
-        own_layer == layer && own_part.eq_ignore_ascii_case(part)
-    };
-    exr.channels.iter().find(|(name, _)| is_it(name)).map(|(_, values)| values.as_slice())
+    exr.channels.iter().find(|(name, _)| is_part(name, layer, part)).map(|(_, values)| values.as_slice())
 }
 
 fn split(name: &str) -> (&str, &str) {
@@ -202,6 +229,7 @@ mod tests {
             lines_left_out: 0,
             channels: names.iter().enumerate().map(|(i, name)| ((*name).to_owned(), vec![i as f32])).collect(),
             types: Vec::new(),
+            unread: Vec::new(),
             attributes: Vec::new(),
             parts_left_out: Vec::new(),
         }
@@ -246,6 +274,15 @@ mod tests {
         assert_eq!(guess(&exr(&two)).as_deref(), Some("the layer a is taken for the picture, of a, b"));
         assert_eq!(colour(&exr(&["Y"])), Some(Colour::Grey(&[0.0])));
         assert_eq!(colour(&exr(&["Z"])), None);
+    }
+
+    #[test]
+    fn layers_that_were_passed_over_are_named_still() {
+        let mut two = exr(&["a.B", "a.G", "a.R"]);
+        two.unread = ["b.B", "b.G", "b.R"].map(str::to_owned).to_vec();
+        assert_eq!(guess(&two).as_deref(), Some("the layer a is taken for the picture, of a, b"));
+        assert!(["velocity.X", "A.Vector.w", "forward.left.u", "motionvector.R"].into_iter().all(is_of_motion));
+        assert!(!["X", "R", "normal.X", "motion.A", "vector"].into_iter().any(is_of_motion));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::channels::{self, Colour};
 use super::kept_tone::KeptTone;
 use anyhow::{Context, Result, bail};
-use fechner::exr_read::{ExrImage, read_exr};
+use fechner::exr_read::ExrImage;
 use fechner::hdr_read::{HdrHeader, with_known_signature};
 use fechner::jpeg_read;
 use fechner::output::{self, Attribute, NITS_PER_UNIT, PngTransfer};
@@ -61,7 +61,7 @@ impl InputPicture {
     pub(super) fn read(path: &Path, nits_per_unit: Option<f64>) -> Result<Self> {
         let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
         match ending.as_deref() {
-            Some("exr") => Self::from_exr(path, &read_exr(path)?, nits_per_unit),
+            Some("exr") => Self::from_exr(path, &channels::read_picture(path)?, nits_per_unit),
             Some("hdr") => {
                 let nits_per_unit = nits_per_unit.with_context(|| no_unit(path))?;
                 Self::from_hdr(path, nits_per_unit)

@@ -83,7 +83,7 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     }
     let motion = arguments.velocity.as_deref();
     let motion =
-        motion.map(|path| Ok::<_, anyhow::Error>((path, channels::read_of_size(path, guide.size())?))).transpose()?;
+        motion.map(|path| Ok::<_, anyhow::Error>((path, channels::read_motion(path, guide.size())?))).transpose()?;
     let told = motion.as_ref().and_then(|(_, exr)| exr.frames_per_second());
     if let Some(frames_per_second) = arguments.fps.or(told) {
         viewing.display.frames_per_second = frames_per_second;

@@ -3,7 +3,8 @@
 //! The `exr` crate refuses them, though its decompression knows them. So its header reader is shown a copy whose channels
 //! all have full resolution, and the blocks are found and unpacked one by one here.
 
-use super::{ExrImage, ExrReadError, SampleType, guarded, image_without_channels, read_headers};
+use super::wanted::Wanted;
+use super::{ExrImage, ExrReadError, SampleType, check_memory, guarded, image_without_channels, read_headers};
 use ::exr::meta::attribute::{ChannelDescription, IntegerBounds, SampleType as FileType};
 use ::exr::meta::header::Header;
 use ::exr::prelude::{Vec2, f16};
@@ -69,6 +70,7 @@ pub(super) fn read(path: &Path, file: &[u8]) -> Result<Option<ExrImage>, ExrRead
         plain[sampling.at + 4..sampling.at + 8].copy_from_slice(&one);
     }
     let mut headers = read_headers(path, &plain)?;
+    check_memory(path, &headers, &Wanted::of(&headers, |_, _| true))?;
     let header = &mut headers[0];
     let unsupported = |feature: &str| ExrReadError::Unsupported { path: path.to_owned(), feature: feature.to_owned() };
     let Vec2(left, top) = header.own_attributes.layer_position;

@@ -100,7 +100,7 @@ fn a_picture_too_large_for_memory_is_refused_by_its_size() {
     let path = folder.path().join("large.exr");
     std::fs::write(&path, bytes).unwrap();
     let message = read_exr(&path).unwrap_err().to_string();
-    assert!(message.contains("100000×100000 pixels of 2 channels need 76293 MiB"), "{message}");
+    assert!(message.contains("100000×100000 pixels of 1 channel need 38146 MiB"), "{message}");
 }
 
 #[test]
@@ -225,4 +225,32 @@ fn a_display_window_too_large_for_memory_is_left_out() {
     assert_eq!((image.display_window.width, image.display_window.height), (1200, 1200));
     let picture = image.scene_picture(ExrImage::channel).unwrap();
     assert_eq!((picture.width, picture.notes.len()), (1200, 1), "{:?}", picture.notes);
+}
+
+/// What is not asked for is passed over, counted as no memory, and named.
+#[test]
+fn only_channels_that_are_asked_for_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("parts.exr");
+    write_parts(&path, [0, 0, 1, 1], 2, &[("beauty", [0, 0], 1.0), ("depth", [0, 0], 5.0)]);
+    let image = read_exr_channels(&path, |all, name| {
+        assert_eq!(all, ["beauty.Y", "depth.Y"]);
+        name == "depth.Y"
+    })
+    .unwrap();
+    let whole = read_exr(&path).unwrap();
+    assert_eq!((image.channels.len(), image.types.len(), &image.unread[..]), (1, 1, &["beauty.Y".to_owned()][..]));
+    assert_eq!((image.channel("depth.Y"), image.channel("beauty.Y")), (whole.channel("depth.Y"), None));
+    assert!(whole.unread.is_empty());
+
+    // Two such channels would be more than is allowed.
+    let mut headers = read_headers(&path, &std::fs::read(&path).unwrap()).unwrap();
+    headers.iter_mut().for_each(|header| header.layer_size = Vec2(8192, 24_000));
+    let refused = |is_wanted: fn(&[String], &str) -> bool| {
+        let wanted = Wanted::of(&headers, is_wanted);
+        check_memory(&path, &headers, &wanted).map_err(|error| error.to_string()).err()
+    };
+    assert_eq!(refused(|_, name| name == "depth.Y"), None);
+    let message = refused(|_, _| true).unwrap();
+    assert!(message.contains("8192×24000 pixels of 2 channels need 1500 MiB"), "{message}");
 }

@@ -322,7 +322,7 @@ impl<'a> Sequences<'a> {
 
 /// Motion in pixels under the names that renderers give it.
 fn read_motion(path: &Path, size: (usize, usize)) -> Result<FrameMotion> {
-    let exr = channels::read_of_size(path, size)?;
+    let exr = channels::read_motion(path, size)?;
     let Some(motions) = both_motions(&exr) else {
         bail!(
             "{}: no motion channels; velocity.X/Y (and velocity_previous.X/Y), Vector.X/Y/Z/W, motion.X/Y and forward.u/v are \

@@ -148,17 +148,17 @@ fn is_eight_bit(color: image::ColorType) -> bool {
 }
 
 fn decode_exr(bytes: &[u8], name: &Path) -> Result<Decoded, LoadError> {
-    let picture = exr_read::decode_exr(name, bytes).map_err(|error| match error {
+    // A picture of one channel is grey; parts prefix their names.
+    let is_of_colour = |_: &[String], name: &str| ["R", "G", "B", "A", "Y"].contains(&last_name(name));
+    let picture = exr_read::decode_exr_channels(name, bytes, is_of_colour).map_err(|error| match error {
         exr_read::ExrReadError::TooLarge { .. } => LoadError::too_large(name, error),
         _ => LoadError::invalid(name, error),
     })?;
     let (width, height) = (u64::from(picture.width), u64::from(picture.height));
     check_size(name, width, height, 16)?;
-    // A picture of one channel is grey; parts prefix their names.
     let find = |wanted: &str| {
-        let suffix = format!(".{wanted}");
         picture.channel(wanted).or_else(|| {
-            picture.channels.iter().find(|(n, _)| n.ends_with(&suffix)).map(|(_, values)| values.as_slice())
+            picture.channels.iter().find(|(n, _)| last_name(n) == wanted).map(|(_, values)| values.as_slice())
         })
     };
     let (Some(red), alpha) = (find("R").or_else(|| find("Y")), find("A")) else {
@@ -168,6 +168,11 @@ fn decode_exr(bytes: &[u8], name: &Path) -> Result<Decoded, LoadError> {
     let texels =
         (0..red.len()).map(|i| [red[i], green[i], blue[i], alpha.map_or(1.0, |a| a[i])].map(finite_or_zero)).collect();
     Ok(Decoded { width: picture.width, height: picture.height, texels: Texels::Floats(Arc::new(texels)) })
+}
+
+/// What stands after the layer's name.
+fn last_name(channel: &str) -> &str {
+    channel.rsplit_once('.').map_or(channel, |(_, last)| last)
 }
 
 fn check_size(name: &Path, width: u64, height: u64, bytes_per_texel: u64) -> Result<(), LoadError> {
