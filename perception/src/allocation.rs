@@ -95,10 +95,14 @@ pub fn allocate(problem: &AllocationProblem<'_>) -> Result<Allocation, Error> {
     Ok(solver.solve(problem.visibility, &mut multipliers))
 }
 
+/// Largest log visibility that the search goes to, either way.
+const FARTHEST: f64 = 20.7;
+
 /// Finds the lowest visibility that `budget` (Σ cᵢ nᵢ) can pay for, and the counts for it; `problem.visibility` is where
 /// the search begins.
 ///
-/// The cost stays within 1 % below the budget, unless `min_samples` everywhere costs more or `max_samples` less.
+/// The cost stays within 1 % below the budget, unless `min_samples` everywhere costs more (they are paid for all the same) or
+/// `max_samples` less. The certificate is of the visibility that is reached.
 ///
 /// # Errors
 /// As [`allocate`], and [`Error::OutOfRange`] for a budget that is not positive.
@@ -145,15 +149,24 @@ pub fn allocate_budget(problem: &AllocationProblem<'_>, budget: f64) -> Result<A
             least_step *= 2.0;
             visibility.ln() + (aimed - visibility.ln()).signum() * step
         };
-        if !(-30.0..=30.0).contains(&next) {
+        let next = next.clamp(-FARTHEST, FARTHEST);
+        if next == visibility.ln() {
             break;
         }
         let factor = (visibility.ln() - next).exp().powi(4) as f32;
-        multipliers.iter_mut().for_each(|multiplier| *multiplier *= factor);
+        multipliers.iter_mut().for_each(|multiplier| *multiplier = (*multiplier * factor).clamp(1e-30, 1e30));
         visibility = next.exp();
     }
     let mut found = best.unwrap_or_else(|| solver.solve(visibility, &mut multipliers));
-    found.visibility = solver.reached(&found.samples);
+    let reached = solver.reached(&found.samples);
+    if found.unreachable_pixels > 0 || (reached / found.visibility).ln().abs() > 0.01 {
+        // Where limits hold, the last target was not what the counts reach, and its certificate not theirs.
+        let of_reached = solver.solve(reached, &mut solver.first_multipliers(reached));
+        found.unreachable_pixels = of_reached.unreachable_pixels;
+        found.lower_bound = of_reached.lower_bound;
+        found.gap = (found.cost / found.lower_bound - 1.0).max(0.0);
+    }
+    found.visibility = reached;
     Ok(found)
 }
 

@@ -78,6 +78,8 @@ pub fn difference(
     csf: &dyn ContrastSensitivity,
 ) -> Result<Difference, Error> {
     test_cd_m2.check_size("test picture", reference_cd_m2.width(), reference_cd_m2.height())?;
+    reference_cd_m2.check_non_negative("reference picture")?;
+    test_cd_m2.check_non_negative("test picture")?;
     let csf = HeldAtLowFrequencies { base: csf };
     let map_of = |picture| {
         threshold_map(&ThresholdInputs { display_luminance_cd_m2: picture, guide_variance: None }, viewing, &csf)

@@ -47,7 +47,11 @@ pub fn display_slope(fitted: &dyn FittedTone, display: &Display, scene_luminance
 pub fn display_variance(fitted: &dyn FittedTone, display: &Display, mean: &Plane, variance: &Plane) -> Plane {
     let shown = Shown { fitted, display };
     by_pixel(mean, variance, f32::INFINITY, |pixel, mean, variance| {
-        shown.variance(pixel, f64::from(mean.max(0.0)), f64::from(variance.max(0.0)))
+        // No variance is negative: like one that is not finite it must not pass for none.
+        if variance < 0.0 {
+            return f32::INFINITY;
+        }
+        shown.variance(pixel, f64::from(mean.max(0.0)), f64::from(variance))
     })
 }
 
@@ -55,12 +59,12 @@ pub fn display_variance(fitted: &dyn FittedTone, display: &Display, mean: &Plane
 /// luminance `mean` (cd/m²), by what the operator leaves of a faint tint on a grey
 /// ([`FittedTone::chromatic_slope_at`]). What a display's clip of single channels hides is not taken off.
 ///
-/// Pixels that are not finite get infinity; so does every pixel when the planes differ in size.
+/// Pixels that are not finite, or of negative variance, get infinity; so does every pixel when the planes differ in size.
 #[must_use]
 pub fn display_chromatic_variance(fitted: &dyn FittedTone, display: &Display, mean: &Plane, variance: &Plane) -> Plane {
     let shown = Shown { fitted, display };
     by_pixel(mean, variance, f32::INFINITY, |pixel, mean, variance| {
-        shown.chromatic_slope(pixel, mean).powi(2) * variance.max(0.0)
+        if variance < 0.0 { f32::INFINITY } else { shown.chromatic_slope(pixel, mean).powi(2) * variance }
     })
 }
 
@@ -271,6 +275,18 @@ mod tests {
                 "{mean} ± {deviation}: {found}, not {expected}"
             );
         }
+    }
+
+    #[test]
+    fn a_negative_variance_does_not_pass_for_none() {
+        let display = Display::default();
+        let fitted = absolute(&display);
+        let of = |variance: f32| {
+            [display_variance, display_chromatic_variance]
+                .map(|shown| shown(&*fitted, &display, &one(50.0), &one(variance)).get(0, 0))
+        };
+        assert_eq!((of(-1e-3), of(f32::NAN)), ([f32::INFINITY; 2], [f32::INFINITY; 2]));
+        assert!(of(0.0) == [0.0; 2] && of(-0.0) == [0.0; 2]);
     }
 
     #[test]

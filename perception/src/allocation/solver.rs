@@ -37,6 +37,8 @@ pub(super) struct Solver<'a> {
     blocks_y: usize,
     /// What the pixels of each block come to.
     blocks: Vec<BlockStatistics>,
+    /// Share of its block's constraint that each pixel has, over that of an even one; `None` is 1 everywhere.
+    shares: Option<Vec<f32>>,
     /// v² reached with `max_samples` everywhere, over v*² = 1.
     floor: Plane,
     /// Σ cᵢ times `min_samples`.
@@ -93,8 +95,10 @@ impl<'a> Solver<'a> {
             floor,
             cheapest: total_cost * problem.min_samples,
             blocks: Vec::new(),
+            shares: None,
         };
         solver.blocks = solver.block_statistics();
+        solver.shares = problem.tolerance.map(|tolerance| solver.shares_by(tolerance.values()));
         Ok(solver)
     }
 
@@ -151,12 +155,12 @@ impl<'a> Solver<'a> {
                 alone.clamp(1e-30, 1e30) as f32
             })
             .collect();
-        self.block_means(&alone)
+        self.constraint_means(&alone)
     }
 
     pub(super) fn solve(&self, visibility: f64, multipliers: &mut [f32]) -> Allocation {
         let (bounds, unreachable_pixels) = self.bounds(visibility);
-        let coarse_bounds = self.block_means(bounds.values());
+        let coarse_bounds = self.constraint_means(bounds.values());
         let sigma_blocks = self.sigma_px.map(|sigma| sigma / self.block as f64);
         let mut iterations = 0;
         let mut best_bound = f64::NEG_INFINITY;
@@ -374,8 +378,34 @@ impl<'a> Solver<'a> {
         })
     }
 
-    fn block_means(&self, values: &[f32]) -> Vec<f32> {
-        self.over_blocks(|block| self.block_mean(block, |index| values[index]))
+    /// A block is constrained at those of its pixels that tolerate least: with them the others are within their limits, since
+    /// pooling hardly varies over a block. By the mean of its tolerances every fine mask of importance was missed: a chequerboard
+    /// of 0.3 and 1 cost 8.5 % too much, and its certificate said 430 %.
+    fn shares_by(&self, tolerance: &[f32]) -> Vec<f32> {
+        const AS_TIGHT: f32 = 1.001;
+        let mut shares = vec![0.0; tolerance.len()];
+        for block in 0..self.blocks_x * self.blocks_y {
+            let mut least = f32::INFINITY;
+            self.for_each_in(block, |index| least = least.min(tolerance[index]));
+            let is_tight = |index: usize| tolerance[index] <= least * AS_TIGHT;
+            let mut tight = 0;
+            self.for_each_in(block, |index| tight += usize::from(is_tight(index)));
+            let share = self.pixels_in(block) as f32 / tight as f32;
+            self.for_each_in(block, |index| shares[index] = if is_tight(index) { share } else { 0.0 });
+        }
+        shares
+    }
+
+    /// Mean of `values` over the constrained pixels of each block.
+    fn constraint_means(&self, values: &[f32]) -> Vec<f32> {
+        self.over_blocks(|block| match &self.shares {
+            None => self.block_mean(block, |index| values[index]),
+            // Not share times value, which may be infinite where the share is 0.
+            Some(shares) => self.block_mean(block, |index| match shares[index] {
+                0.0 => 0.0,
+                share => share * values[index],
+            }),
+        })
     }
 
     fn blur_blocks(&self, values: &[f32], sigma_blocks: [f64; 2]) -> Vec<f32> {
@@ -386,7 +416,10 @@ impl<'a> Solver<'a> {
     }
 
     fn spread_over_blocks(&self, values: &[f32]) -> Plane {
-        Plane::from_fn(self.width(), self.height(), |x, y| values[(y / self.block) * self.blocks_x + x / self.block])
+        Plane::from_fn(self.width(), self.height(), |x, y| {
+            let value = values[(y / self.block) * self.blocks_x + x / self.block];
+            self.shares.as_ref().map_or(value, |shares| value * shares[y * self.width() + x])
+        })
     }
 }
 

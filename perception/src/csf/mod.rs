@@ -73,7 +73,7 @@ impl FrameTiming {
     /// The timing nearest to these that responses are defined for: shorter flashes and faster displays look no otherwise.
     #[must_use]
     pub fn nearest(frames_per_second: f64, persistence: f64) -> Self {
-        Self { frames_per_second: frames_per_second.min(1e3), persistence: persistence.max(1e-3) }
+        Self { frames_per_second: frames_per_second.clamp(1.0, 1e3), persistence: persistence.clamp(1e-3, 1.0) }
     }
 
     /// What holding a frame for its share of the time leaves of the amplitude of a flicker: sinc(f T p), sinc(x) = sin πx / πx.

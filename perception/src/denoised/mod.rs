@@ -84,6 +84,9 @@ impl DenoisedError {
 
     /// This error with another channel's beside it: the channel that shows most counts at every pixel. Factors and shares stay this
     /// one's; what the other's becomes by their blend is not looked at.
+    ///
+    /// # Panics
+    /// Where the two are of pictures of two sizes.
     #[must_use]
     pub fn with_channel(mut self, other: &Self) -> Self {
         let most = |own: &mut Plane, other: &Plane| *own = own.combined(other, f32::max);
@@ -97,6 +100,9 @@ impl DenoisedError {
 
     /// This error with light beside it that no sample has found, of which so much is seen: it is missing in the raw mean too, so no blend
     /// brings it back.
+    ///
+    /// # Panics
+    /// Where `missed` has another size.
     #[must_use]
     pub fn with_missed_light(mut self, missed: &Plane) -> Self {
         for plane in [&mut self.visibility, &mut self.bias, &mut self.blended_visibility] {
@@ -106,6 +112,9 @@ impl DenoisedError {
     }
 
     /// This error for eyes whose thresholds are multiplied by a map of the same size, as where some places matter more than others.
+    ///
+    /// # Panics
+    /// Where `factors` has another size.
     #[must_use]
     pub fn with_thresholds_times(&self, factors: &Plane) -> Self {
         self.clone().scaled(|plane| plane.combined(factors, |value, factor| value / factor))

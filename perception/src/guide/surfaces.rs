@@ -45,14 +45,15 @@ pub(super) fn surfaces(inputs: &GuideInputs<'_>) -> Rows<SURFACE_CHANNELS> {
 /// count: finite, 0 where nothing tells.
 #[must_use]
 pub fn depth_slopes(depth: &[f32], width: usize) -> Vec<f32> {
-    let height = depth.len() / width.max(1);
+    let width = width.max(1);
+    let height = depth.len() / width;
     (0..depth.len())
         .into_par_iter()
         .map(|index| {
             let (x, y) = (index % width, index / width);
             let step = |other: Option<usize>| {
-                other.map_or(f32::INFINITY, |other| {
-                    let step = (depth[other] - depth[index]).abs();
+                other.and_then(|other| depth.get(other)).map_or(f32::INFINITY, |other| {
+                    let step = (other - depth[index]).abs();
                     if step.is_nan() { f32::INFINITY } else { step }
                 })
             };

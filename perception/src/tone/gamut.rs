@@ -33,14 +33,25 @@ fn desaturate(rgb: [f32; 3], grey: f32) -> [f32; 3] {
     rgb.map(|channel| (grey + keep * (channel - grey)).clamp(0.0, 1.0))
 }
 
-/// `rgb` without what no light is: negative and not finite channels become 0.
+/// Brighter than anything that is not shown as white, and far from where squares of luminances end.
+const BRIGHTEST_CD_M2: f32 = 1e15;
+
+/// `rgb` without what no light is: negative channels and those that are no number become 0, infinite ones very bright.
 pub(super) fn light(rgb: [f32; 3]) -> [f32; 3] {
-    rgb.map(|channel| if channel.is_finite() { channel.max(0.0) } else { 0.0 })
+    // `max` takes 0 for what is no number.
+    rgb.map(|channel| if channel == f32::INFINITY { BRIGHTEST_CD_M2 } else { channel.max(0.0) })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn infinite_light_is_light() {
+        assert_eq!(light([f32::NAN, -1.0, f32::NEG_INFINITY]), [0.0; 3]);
+        let lamp = light([f32::INFINITY, 1.0, 1.0]);
+        assert_eq!(with_luminance(lamp, luminance(lamp), 1.0), [1.0; 3]);
+    }
 
     #[test]
     fn what_is_too_bright_keeps_luminance_and_hue() {
