@@ -5,7 +5,7 @@
 
 use fechner_perception::Plane;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -105,11 +105,19 @@ fn converted<'py>(what: &'static str, given: &Bound<'py, PyAny>) -> PyResult<Bou
     kind.set_item("dtype", "float32")?;
     // Its own memory unless it is aligned as well, which `ascontiguousarray` does not see to.
     kind.set_item("requirements", "CA")?;
-    let array = py
-        .import("numpy")?
-        .call_method("require", (given,), Some(&kind))
-        .map_err(|error| PyValueError::new_err(format!("{what} is no array of numbers: {}", error.value(py))))?;
+    let array =
+        py.import("numpy")?.call_method("require", (given,), Some(&kind)).map_err(|error| no_array(what, py, error))?;
     Ok(array.cast_into::<PyArrayDyn<f32>>()?)
+}
+
+/// What numpy could not convert is a `ValueError`; an interrupt or a lack of memory on the way stays what it is.
+fn no_array(what: &'static str, py: Python<'_>, error: PyErr) -> PyErr {
+    if !error.is_instance_of::<PyTypeError>(py) && !error.is_instance_of::<PyValueError>(py) {
+        return error;
+    }
+    let named = PyValueError::new_err(format!("{what} is no array of numbers: {}", error.value(py)));
+    named.set_cause(py, Some(error));
+    named
 }
 
 /// A plane's memory as an array of shape (height, width).

@@ -7,15 +7,25 @@ use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::marker::Ungil;
 use pyo3::prelude::*;
 
-/// The crate's message as a `ValueError`.
+use crate::threads;
+
+/// The crate's message as a `ValueError`, places and sizes in the order of numpy.
 #[expect(clippy::needless_pass_by_value, reason = "stands in map_err")]
 pub(crate) fn value_error(error: Error) -> PyErr {
-    PyValueError::new_err(error.to_string())
+    PyValueError::new_err(match error {
+        Error::SizeMismatch { what, width, height, found_width, found_height } => {
+            format!("{what} has the shape ({found_height}, {found_width}), but ({height}, {width}) is needed")
+        }
+        Error::BadPixel { what, value, x, y } => {
+            format!("{what} holds {value} at [{y}, {x}]; it must be finite and not negative")
+        }
+        other => other.to_string(),
+    })
 }
 
 /// Runs `task` while other Python threads run. A panic, which would be a fault of the crate, becomes a `RuntimeError`.
 pub(crate) fn work<T: Send + Ungil>(py: Python<'_>, task: impl FnOnce() -> T + Send + Ungil) -> PyResult<T> {
-    py.detach(|| catch_unwind(AssertUnwindSafe(task)))
+    py.detach(|| catch_unwind(AssertUnwindSafe(|| threads::in_this_process(task))))
         .map_err(|_| PyRuntimeError::new_err("fechner-perception failed; this is a fault of its own, please report it"))
 }
 

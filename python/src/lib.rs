@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 mod arrays;
 mod errors;
 mod pictures;
+mod threads;
 mod thresholds;
 mod tone;
 mod viewing;

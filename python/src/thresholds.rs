@@ -42,8 +42,8 @@ pub(crate) fn contrast_sensitivity_functions() -> Vec<&'static str> {
     csf::names().to_vec()
 }
 
-/// Contrast sensitivity (1 over threshold contrast) of the function `csf` at a frequency, cpd, and a luminance, cd/m²: ValueError
-/// where one is below 0 or not finite.
+/// Contrast sensitivity (1 over threshold contrast) of the viewing's observer by the function `csf` at a frequency, cpd, and a
+/// luminance, cd/m²: ValueError where one is below 0 or not finite.
 #[pyfunction]
 #[pyo3(signature = (frequency_cpd, luminance_cd_m2, viewing = None, csf = "castle"))]
 pub(crate) fn contrast_sensitivity(
@@ -54,8 +54,9 @@ pub(crate) fn contrast_sensitivity(
 ) -> PyResult<f64> {
     check_number("frequency_cpd", frequency_cpd, frequency_cpd >= 0.0, "finite and not negative")?;
     check_number("luminance_cd_m2", luminance_cd_m2, luminance_cd_m2 >= 0.0, "finite and not negative")?;
-    let csf = csf::by_name(csf, &or_default(viewing)).map_err(value_error)?;
-    Ok(csf.sensitivity(frequency_cpd, luminance_cd_m2))
+    let viewing = or_default(viewing);
+    let csf = csf::by_name(csf, &viewing).map_err(value_error)?;
+    Ok(viewing.observer.sensitivity * csf.sensitivity(frequency_cpd, luminance_cd_m2))
 }
 
 fn check_number(what: &str, value: f64, is_sound: bool, must_be: &str) -> PyResult<()> {

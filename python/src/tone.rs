@@ -30,7 +30,8 @@ pub(crate) struct Tone {
 /// Freezes the operator `name` for a picture, so that the same scene light always becomes the same display light.
 ///
 /// scene: linear Rec. 709 RGB (height, width, 3) or luminance (height, width), scene cd/m². exposure_stops multiplies light by
-/// 2^stops. local: adapted at each pixel, for the operators that know it. gaze: (column, row) the eye rests on.
+/// 2^stops (between -100 and 100). local: adapted at each pixel, for the operators that know it (others take no notice). gaze:
+/// (column, row) the eye rests on, for operators whose eye adapts to what it looks at.
 /// ValueError for a name that there is not and for luminance below 0 and light that is not finite.
 #[pyfunction]
 #[pyo3(signature = (scene, name, viewing = None, *, exposure_stops = 0.0, local = false, gaze = None))]
@@ -46,8 +47,10 @@ pub(crate) fn fit_tone(
     let scope = if local { AdaptationScope::Local } else { AdaptationScope::World };
     let settings = ToneSettings { exposure_stops, scope, effects: None };
     let operator = operator_with(name, &settings).ok_or_else(|| unknown("tone operator", name, operator_names()))?;
-    if !exposure_stops.is_finite() {
-        return Err(PyValueError::new_err(format!("exposure_stops is {exposure_stops}; it must be finite")));
+    if !(-100.0..=100.0).contains(&exposure_stops) {
+        return Err(PyValueError::new_err(format!(
+            "exposure_stops is {exposure_stops}; it must be between -100 and 100"
+        )));
     }
     let scene = Scene::read(py, &Pixels::borrow("scene", scene)?)?;
     let shape = Shape { height: scene.photopic.height(), width: scene.photopic.width() };
@@ -63,7 +66,7 @@ pub(crate) fn fit_tone(
 fn pixel_of((x, y): (i64, i64), Shape { height, width }: Shape) -> PyResult<Pixel> {
     let within = |place: i64, size: usize| usize::try_from(place).ok().filter(|&place| place < size);
     within(x, width).zip(within(y, height)).map(|(x, y)| Pixel { x, y }).ok_or_else(|| {
-        PyValueError::new_err(format!("gaze ({x}, {y}) lies outside the picture of {width}×{height} pixels"))
+        PyValueError::new_err(format!("gaze ({x}, {y}) lies outside the picture of {width} columns and {height} rows"))
     })
 }
 
@@ -120,15 +123,16 @@ impl Tone {
 
 #[pymethods]
 impl Tone {
-    /// Linear display RGB 0..1, (height, width, 3), for linear Rec. 709 RGB in scene cd/m² of the same shape.
+    /// Linear display RGB 0..1, (height, width, 3), for linear Rec. 709 RGB in scene cd/m² of the same shape. Infinite channels are
+    /// very bright, negative ones and those that are no number dark.
     fn map<'py>(&self, py: Python<'py>, rgb: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray3<f32>>> {
         let pixels = Pixels::borrow("rgb", rgb)?;
         let (shape, rgb) = pixels.rgb()?;
         if shape != self.shape {
             let (found, fitted) = (shape, self.shape);
             return Err(PyValueError::new_err(format!(
-                "rgb is {}×{} pixels, but {}×{} are needed",
-                found.width, found.height, fitted.width, fitted.height
+                "rgb has the shape ({}, {}, 3), but ({}, {}, 3) is needed",
+                found.height, found.width, fitted.height, fitted.width
             )));
         }
         let shown = work(py, || map_picture(&*self.fitted, shape.width, rgb))?;

@@ -1,7 +1,8 @@
 //! Displays, observers, and who looks at what.
 
 use fechner_perception::display::Glare;
-use fechner_perception::{Eotf, Error, display};
+use fechner_perception::{Error, display};
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::errors::value_error;
@@ -9,8 +10,9 @@ use crate::errors::value_error;
 /// A display at its viewing distance: a preset, with fields of its own where they are given.
 ///
 /// Fields: pixels_per_degree (of visual angle, along a row), pixel_aspect_ratio (width over height of a pixel), white_cd_m2,
-/// black_cd_m2, ambient_cd_m2 (room light off the screen), eotf ("srgb", "bt1886", "pq", "linear"), distance_m,
-/// csf_area_deg2, frames_per_second, persistence. ValueError for an unknown preset and for values that no display has.
+/// black_cd_m2, ambient_cd_m2 (room light off the screen), distance_m (what the eye focuses on, for the function "daly93";
+/// changes pixels_per_degree, so it must be given beside it), csf_area_deg2 (area of the grating whose threshold is meant, for
+/// observers that do not say it). ValueError for an unknown preset and for values that no display has.
 #[pyclass(frozen, module = "fechner")]
 pub(crate) struct Display(pub(crate) display::Display);
 
@@ -19,7 +21,7 @@ impl Display {
     #[new]
     #[pyo3(signature = (
         preset = "desktop", *, pixels_per_degree = None, pixel_aspect_ratio = None, white_cd_m2 = None, black_cd_m2 = None,
-        ambient_cd_m2 = None, eotf = None, distance_m = None, csf_area_deg2 = None, frames_per_second = None, persistence = None
+        ambient_cd_m2 = None, distance_m = None, csf_area_deg2 = None
     ))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
     fn new(
@@ -29,25 +31,24 @@ impl Display {
         white_cd_m2: Option<f64>,
         black_cd_m2: Option<f64>,
         ambient_cd_m2: Option<f64>,
-        eotf: Option<&str>,
         distance_m: Option<f64>,
         csf_area_deg2: Option<f64>,
-        frames_per_second: Option<f64>,
-        persistence: Option<f64>,
     ) -> PyResult<Self> {
         let base = named_display(preset)?;
+        if distance_m.is_some() && pixels_per_degree.is_none() {
+            const MISSING: &str =
+                "distance_m alone does not say how many pixels a degree has: give pixels_per_degree beside it";
+            return Err(PyValueError::new_err(MISSING));
+        }
         let display = display::Display {
             pixels_per_degree: pixels_per_degree.unwrap_or(base.pixels_per_degree),
             pixel_aspect_ratio: pixel_aspect_ratio.unwrap_or(base.pixel_aspect_ratio),
             white_cd_m2: white_cd_m2.unwrap_or(base.white_cd_m2),
             black_cd_m2: black_cd_m2.unwrap_or(base.black_cd_m2),
             ambient_cd_m2: ambient_cd_m2.unwrap_or(base.ambient_cd_m2),
-            eotf: eotf.map_or(Ok(base.eotf), named_eotf)?,
             distance_m: distance_m.or(base.distance_m),
             csf_area_deg2: csf_area_deg2.or(base.csf_area_deg2),
-            frames_per_second: frames_per_second.unwrap_or(base.frames_per_second),
-            persistence: persistence.unwrap_or(base.persistence),
-            name: base.name,
+            ..base
         };
         display.check().map_err(value_error)?;
         Ok(Self(display))
@@ -100,24 +101,51 @@ impl Display {
         self.0.ambient_cd_m2
     }
 
+    /// How far away it is, m, where that is known.
+    #[getter]
+    fn distance_m(&self) -> Option<f64> {
+        self.0.distance_m
+    }
+
+    /// Area of the grating whose threshold is meant for observers that do not say it, deg².
+    #[getter]
+    fn csf_area_deg2(&self) -> Option<f64> {
+        self.0.csf_area_deg2
+    }
+
     fn __repr__(&self) -> String {
         let display = &self.0;
-        format!(
-            "Display({:?}, pixels_per_degree={}, white_cd_m2={}, black_cd_m2={}, ambient_cd_m2={})",
-            display.name, display.pixels_per_degree, display.white_cd_m2, display.black_cd_m2, display.ambient_cd_m2
-        )
+        let mut text = format!(
+            "Display({:?}, pixels_per_degree={}, pixel_aspect_ratio={}, white_cd_m2={}, black_cd_m2={}, ambient_cd_m2={}",
+            display.name,
+            display.pixels_per_degree,
+            display.pixel_aspect_ratio,
+            display.white_cd_m2,
+            display.black_cd_m2,
+            display.ambient_cd_m2
+        );
+        for (name, value) in [("distance_m", display.distance_m), ("csf_area_deg2", display.csf_area_deg2)] {
+            if let Some(value) = value {
+                text += &format!(", {name}={value}");
+            }
+        }
+        text + ")"
     }
+}
+
+fn display_or_preset(given: &Bound<'_, PyAny>) -> PyResult<display::Display> {
+    if let Ok(display) = given.cast::<Display>() {
+        return Ok(display.get().0.clone());
+    }
+    let Ok(name) = given.extract::<String>() else {
+        let message = format!("display is {}; it must be a Display or a preset's name", given.repr()?);
+        return Err(PyTypeError::new_err(message));
+    };
+    named_display(&name)
 }
 
 fn named_display(name: &str) -> PyResult<display::Display> {
     display::Display::preset(name).ok_or_else(|| unknown("display preset", name, display::Display::preset_names()))
-}
-
-fn named_eotf(name: &str) -> PyResult<Eotf> {
-    const NAMES: [(&str, Eotf); 4] =
-        [("srgb", Eotf::Srgb), ("bt1886", Eotf::Bt1886), ("pq", Eotf::Pq), ("linear", Eotf::Linear)];
-    let found = NAMES.iter().find(|(known, _)| *known == name);
-    found.map(|(_, eotf)| *eotf).ok_or_else(|| unknown("transfer function", name, &NAMES.map(|(name, _)| name)))
 }
 
 /// That `name` is nothing, and what there is.
@@ -126,41 +154,61 @@ pub(crate) fn unknown(kind: &'static str, name: &str, known: &[&str]) -> PyErr {
 }
 
 /// The eye: sensitivity (1 is the median observer, 1.75 a keen one), csf_area_deg2 (area of the grating whose threshold is
-/// meant, deg²), glare_age_years (light scattered in an eye of this age; None scatters none).
+/// meant, deg²; None takes the display's, or 1), glare_age_years (light scattered in an eye of this age; None scatters none).
 #[pyclass(frozen, module = "fechner")]
-pub(crate) struct Observer(display::Observer);
+pub(crate) struct Observer {
+    observer: display::Observer,
+    /// What was asked for, before a display has its say.
+    csf_area_deg2: Option<f64>,
+}
 
 #[pymethods]
 impl Observer {
     #[new]
-    #[pyo3(signature = (sensitivity = 1.0, csf_area_deg2 = 1.0, glare_age_years = None))]
-    fn new(sensitivity: f64, csf_area_deg2: f64, glare_age_years: Option<f64>) -> PyResult<Self> {
+    #[pyo3(signature = (sensitivity = 1.0, csf_area_deg2 = None, glare_age_years = None))]
+    fn new(sensitivity: f64, csf_area_deg2: Option<f64>, glare_age_years: Option<f64>) -> PyResult<Self> {
         let glare = glare_age_years.map_or(Glare::None, |age_years| Glare::Cie { age_years });
-        let observer = display::Observer { sensitivity, csf_area_deg2, glare };
+        let area = csf_area_deg2.unwrap_or(display::Observer::default().csf_area_deg2);
+        let observer = display::Observer { sensitivity, csf_area_deg2: area, glare };
         display::Viewing { observer: observer.clone(), ..display::Viewing::default() }.check().map_err(value_error)?;
-        Ok(Self(observer))
+        Ok(Self { observer, csf_area_deg2 })
     }
 
     /// 1.75 times the median sensitivity.
     #[staticmethod]
     fn keen() -> Self {
-        Self(display::Observer::keen())
+        Self { observer: display::Observer::keen(), csf_area_deg2: None }
     }
 
     /// Multiplies contrast sensitivity.
     #[getter]
     fn sensitivity(&self) -> f64 {
-        self.0.sensitivity
+        self.observer.sensitivity
     }
 
-    /// Area of the grating whose threshold is meant, deg².
+    /// Area of the grating whose threshold is meant, deg²; None where the display says it.
     #[getter]
-    fn csf_area_deg2(&self) -> f64 {
-        self.0.csf_area_deg2
+    fn csf_area_deg2(&self) -> Option<f64> {
+        self.csf_area_deg2
+    }
+
+    /// Age of the eye that scatters light, years; None scatters none.
+    #[getter]
+    fn glare_age_years(&self) -> Option<f64> {
+        match self.observer.glare {
+            Glare::None => None,
+            Glare::Cie { age_years } => Some(age_years),
+        }
     }
 
     fn __repr__(&self) -> String {
-        format!("Observer(sensitivity={}, csf_area_deg2={})", self.0.sensitivity, self.0.csf_area_deg2)
+        let or_none = |value: Option<f64>| value.map_or_else(|| "None".to_owned(), |value| value.to_string());
+        format!(
+            "Observer(sensitivity={}, csf_area_deg2={}, glare_age_years={})",
+            self.observer.sensitivity,
+            or_none(self.csf_area_deg2),
+            or_none(self.glare_age_years())
+        )
     }
 }
 
@@ -168,25 +216,16 @@ impl Observer {
 #[pyclass(frozen, module = "fechner")]
 pub(crate) struct Viewing(pub(crate) display::Viewing);
 
-#[derive(FromPyObject)]
-enum DisplayOrName<'py> {
-    Display(Bound<'py, Display>),
-    Name(String),
-}
-
 #[pymethods]
 impl Viewing {
     #[new]
     #[pyo3(signature = (display = None, observer = None))]
-    fn new(display: Option<DisplayOrName<'_>>, observer: Option<&Observer>) -> PyResult<Self> {
-        let display = match display {
-            None => display::Display::default(),
-            Some(DisplayOrName::Display(display)) => display.get().0.clone(),
-            Some(DisplayOrName::Name(name)) => named_display(&name)?,
-        };
+    fn new(display: Option<&Bound<'_, PyAny>>, observer: Option<&Observer>) -> PyResult<Self> {
+        let display = display.map_or_else(|| Ok(display::Display::default()), display_or_preset)?;
         let mut viewing = display::Viewing::of(display);
         if let Some(observer) = observer {
-            viewing.observer = observer.0.clone();
+            let area = observer.csf_area_deg2.unwrap_or(viewing.observer.csf_area_deg2);
+            viewing.observer = display::Observer { csf_area_deg2: area, ..observer.observer.clone() };
         }
         Ok(Self(viewing))
     }
@@ -200,7 +239,7 @@ impl Viewing {
     /// The eye in front of it.
     #[getter]
     fn observer(&self) -> Observer {
-        Observer(self.0.observer.clone())
+        Observer { observer: self.0.observer.clone(), csf_area_deg2: Some(self.0.observer.csf_area_deg2) }
     }
 
     fn __repr__(&self) -> String {

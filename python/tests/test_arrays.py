@@ -1,5 +1,6 @@
 """What goes in and out: memory, kinds of array, errors, threads."""
 
+import multiprocessing
 import threading
 import time
 
@@ -65,7 +66,7 @@ def colour(shape):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: fechner.threshold_map(np.where(np.eye(24, 32), np.nan, GREY)), r"holds NaN at pixel \(0, 0\)"),
+        (lambda: fechner.threshold_map(np.where(np.eye(24, 32), np.nan, GREY)), r"holds NaN at \[0, 0\]"),
         (lambda: fechner.threshold_map(np.full((4, 4), np.inf)), "holds inf"),
         (lambda: fechner.threshold_map(-GREY), "must be finite and not negative"),
         (lambda: fechner.threshold_map(np.zeros((0, 4))), "display_luminance has no pixels"),
@@ -82,11 +83,11 @@ def colour(shape):
         (lambda: fechner.tone_map(-colour((4, 4, 3)), "agx"), "scene holds the luminance -"),
         (lambda: fechner.threshold_map("picture"), "display_luminance is no array of numbers"),
         (lambda: fechner.threshold_map([[1.0, 2.0], [3.0]]), "display_luminance is no array of numbers"),
-        (lambda: fechner.threshold_map(GREY, GREY[1:]), "guide variance is 32×23 pixels, but 32×24 are needed"),
+        (lambda: fechner.threshold_map(GREY, GREY[1:]), r"guide variance has the shape \(23, 32\), but \(24, 32\) is needed"),
         (lambda: fechner.threshold_map(GREY, csf="eagle"), "no contrast sensitivity function is called `eagle`"),
-        (lambda: fechner.threshold_map(GREY).predicted_visibility(GREY.T), "24×32 pixels, but 32×24 are needed"),
-        (lambda: fechner.threshold_map(GREY).measured_visibility(GREY[:, 1:]), "31×24 pixels, but 32×24"),
-        (lambda: fechner.threshold_map(GREY).allocate(GREY[1:]), "but 32×24 are needed"),
+        (lambda: fechner.threshold_map(GREY).predicted_visibility(GREY.T), r"shape \(32, 24\), but \(24, 32\) is needed"),
+        (lambda: fechner.threshold_map(GREY).measured_visibility(GREY[:, 1:]), r"shape \(24, 31\), but \(24, 32\)"),
+        (lambda: fechner.threshold_map(GREY).allocate(GREY[1:]), r"but \(24, 32\) is needed"),
         (lambda: fechner.threshold_map(GREY).allocate(np.full_like(GREY, np.nan)), "NaN"),
         (lambda: fechner.threshold_map(GREY).allocate(GREY, visibility=0), "visibility is 0"),
         (lambda: fechner.threshold_map(GREY).allocate(GREY, visibility=float("nan")), "visibility is NaN"),
@@ -95,28 +96,29 @@ def colour(shape):
         (lambda: fechner.luminance(GREY), r"must have \(height, width, 3\)"),
         (lambda: fechner.luminance(colour((4, 4, 4))), r"must have \(height, width, 3\)"),
         (lambda: fechner.luminance(colour((4, 0, 3))), "rgb has no pixels"),
-        (lambda: fechner.difference(GREY, GREY[1:]), "test picture is 32×23 pixels"),
+        (lambda: fechner.difference(GREY, GREY[1:]), r"test picture has the shape \(23, 32\)"),
         (lambda: fechner.difference(colour((4, 4, 3)), colour((4, 5, 3))), "test is 5×4 pixels, but 4×4 are needed"),
         (lambda: fechner.difference(colour((4, 4, 3)), GREY), r"must have \(height, width, 3\)"),
         (lambda: fechner.difference(GREY * np.nan, GREY), "NaN"),
         (lambda: fechner.tone_map(colour((4, 4, 3)) * np.nan, "ward94"), "NaN; light must be finite"),
         (lambda: fechner.tone_map(colour((4, 4, 3)), "darkroom"), "no tone operator is called `darkroom`; there are:"),
         (lambda: fechner.tone_map(colour((4, 4, 3)), "agx", exposure_stops=float("inf")), "exposure_stops is inf"),
+        (lambda: fechner.fit_tone(GREY, "agx", exposure_stops=1e6), "exposure_stops is 1000000"),
         (lambda: fechner.tone_map(GREY, "agx"), r"must have \(height, width, 3\)"),
-        (lambda: fechner.fit_tone(GREY, "agx").map(colour((4, 4, 3))), "4×4 pixels, but 32×24 are needed"),
+        (lambda: fechner.fit_tone(GREY, "agx").map(colour((4, 4, 3))), r"shape \(4, 4, 3\), but \(24, 32, 3\)"),
         (lambda: fechner.fit_tone(GREY, "agx", gaze=(32, 0)), "lies outside the picture"),
-        (lambda: fechner.fit_tone(GREY, "agx").display_variance(GREY, GREY[1:]), "variance is 32×23 pixels"),
+        (lambda: fechner.fit_tone(GREY, "agx").display_variance(GREY, GREY[1:]), r"variance has the shape \(23, 32\)"),
         (lambda: fechner.Display("television of 1936"), "no display preset is called `television of 1936`; there are:"),
         (lambda: fechner.Viewing("television of 1936"), "no display preset"),
         (lambda: fechner.Display(pixels_per_degree=0), "pixels_per_degree is 0; it must be between 1 and 1000"),
         (lambda: fechner.Display(white_cd_m2=float("nan")), "white_cd_m2 is NaN"),
-        (lambda: fechner.Display(eotf="gamma"), "no transfer function is called `gamma`"),
+        (lambda: fechner.Display("laptop", distance_m=0.4), "distance_m alone does not say"),
         (lambda: fechner.Observer(sensitivity=-1), "sensitivity is -1"),
         (lambda: fechner.Observer(glare_age_years=900), "age_years is 900"),
         (lambda: fechner.contrast_sensitivity(4, 100, csf=""), "no contrast sensitivity function"),
         (
             lambda: fechner.denoise_guide(colour((4, 4, 3)), GREY, colour((4, 4, 3)), colour((4, 4, 3)), GREY),
-            "variance is 32×24 pixels, but 4×4 are needed",
+            r"variance has the shape \(24, 32\), but \(4, 4\) is needed",
         ),
     ],
 )
@@ -137,6 +139,38 @@ def test_the_smallest_pictures_have_answers(shape):
         rgb = np.full((*shape, 3), 20, np.float32)
         for local in (False, True):
             assert np.isfinite(fechner.tone_map(rgb, name, local=local)).all()
+
+
+def test_a_forked_process_has_threads_of_its_own():
+    picture = np.full((200, 200), 50.0)
+    expected = fechner.threshold_map(picture).allowed_standard_error()
+    with multiprocessing.get_context("fork").Pool(2) as pool:
+        found = pool.map_async(fork_worker, [picture] * 4).get(timeout=120)
+    assert all(np.array_equal(each, expected) for each in found)
+
+
+def fork_worker(picture):
+    return fechner.threshold_map(picture).allowed_standard_error()
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError, RuntimeError, TypeError])
+def test_what_happens_while_an_array_is_made_is_told(error):
+    class Broken:
+        def __array__(self, dtype=None, copy=None):
+            raise error("while it was made")
+
+    with pytest.raises(ValueError if error is TypeError else error, match="while it was made"):
+        fechner.threshold_map(Broken())
+
+
+def test_an_observer_and_a_display_both_have_their_say():
+    strict = fechner.Viewing("strict").observer.csf_area_deg2
+    assert strict == 7 and fechner.Viewing("strict", fechner.Observer.keen()).observer.csf_area_deg2 == strict
+    assert fechner.Viewing("strict", fechner.Observer(csf_area_deg2=2)).observer.csf_area_deg2 == 2
+    keen = fechner.contrast_sensitivity(4, 100, fechner.Viewing(None, fechner.Observer.keen()))
+    assert keen == pytest.approx(1.75 * fechner.contrast_sensitivity(4, 100))
+    with pytest.raises(TypeError, match="display is 5; it must be a Display or a preset's name"):
+        fechner.Viewing(5)
 
 
 def test_broken_error_is_counted_as_the_crate_says():
