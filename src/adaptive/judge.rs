@@ -143,7 +143,7 @@ fn judge_by(
     let predicted = if !is_known {
         Plane::filled(film.width() as usize, film.height() as usize, f32::INFINITY)
     } else if let Some(denoised) = &denoised {
-        told(per_importance(denoised.error.blended_visibility.clone(), settings.importance.as_ref()))
+        told(per_importance(denoised.error.visibility.clone(), settings.importance.as_ref()))
     } else {
         let of_mean = scatter.of_mean(&pooled_variance_per_sample);
         let visibility = visibility_under(&thresholds, pixel_thresholds.as_ref(), &of_mean);

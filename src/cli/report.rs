@@ -62,6 +62,8 @@ pub(super) struct DenoisedReport {
     bias_factors: Vec<f64>,
     /// Share of pixels whose picture was moved towards the raw mean.
     blended_fraction: f64,
+    /// The picture's mean luminance over that of its raw mean, which is unbiased, less 1.
+    energy_change: f64,
 }
 
 impl DenoisedReport {
@@ -77,8 +79,15 @@ impl DenoisedReport {
             unproven_fraction: known.then(|| error.unproven(settings.limits.visibility_or_threshold()).mean()),
             bias_factors: error.bias_factors.clone(),
             blended_fraction: (0..pixels).filter(is_blended).count() as f64 / pixels as f64,
+            energy_change: energy_change(judgement),
         })
     }
+}
+
+fn energy_change(judgement: &Judgement) -> f64 {
+    let raw = judgement.estimate.luminance_cd_m2.mean();
+    let change = judgement.denoised.as_ref().map(|denoised| denoised.luminance_cd_m2.mean() / raw - 1.0);
+    change.filter(|change| change.is_finite()).unwrap_or(0.0)
 }
 
 /// Everything that `--json` holds.

@@ -53,6 +53,46 @@ fn the_raw_mean_stays_beside_the_denoised_picture() {
     assert!(parts.zip(channel("visibility.Y")).all(|((a, b), v)| *v <= 1.001 * a.hypot(*b)), "both parts and no more");
 }
 
+/// A part of the error is not more than the whole: both are of the picture that is written, after it was moved towards the raw mean. What
+/// the denoiser changed was up to 1.18 times the whole here.
+#[test]
+fn no_part_of_the_error_is_more_than_the_whole() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (picture, json) = (folder.path().join("a.exr"), folder.path().join("a.json"));
+    let output = Command::cargo_bin("fechner")
+        .expect("the program")
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .args(["render", "scenes/glass-caustic.toml", "--size", "96x72", "--spp", "128"])
+        .args(["--sampling", "uniform", "--denoise", "builtin", "-o"])
+        .arg(&picture)
+        .arg("--json")
+        .arg(&json)
+        .output()
+        .expect("runs");
+    let exr = read_exr(&picture).expect("reads");
+    let channel = |name: &str| exr.channel(name).unwrap_or_else(|| panic!("{name} is there"));
+    for part in ["visibility_variance.Y", "visibility_bias.Y"] {
+        let worst =
+            channel(part).iter().zip(channel("visibility.Y")).map(|(part, whole)| part / whole).fold(0.0, f32::max);
+        assert!(worst < 1.001, "{part} is up to {worst} times the whole");
+    }
+
+    // And what light the denoiser lost is told.
+    let report: serde_json::Value = serde_json::from_slice(&std::fs::read(json).expect("a report")).expect("JSON");
+    let mean = |layer: &str| -> f64 {
+        let weights = [("R", 0.2126), ("G", 0.7152), ("B", 0.0722)];
+        let of = |(name, weight): (&str, f64)| {
+            weight * channel(&format!("{layer}{name}")).iter().map(|&value| f64::from(value)).sum::<f64>()
+        };
+        weights.into_iter().map(of).sum()
+    };
+    let (change, expected) =
+        (report["denoised"]["energy_change"].as_f64().expect("a number"), mean("") / mean("raw.") - 1.0);
+    assert!((change - expected).abs() < 1e-4, "{change}, not {expected}");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout);
+    assert_eq!(said.contains("less light than the raw mean"), change < -0.005, "{change}: {said}");
+}
+
 #[test]
 fn threads_change_no_byte_of_a_denoised_render() {
     let folder = tempfile::tempdir().expect("a folder");

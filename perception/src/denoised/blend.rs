@@ -22,12 +22,31 @@ pub(super) fn raw_share(evidence: &BandEvidence, found: &BandBias) -> Plane {
     share.combined(&found.proof, |share, proof| share * proof)
 }
 
-/// Squared error that is left by these shares of the raw mean.
-pub(super) fn energy_after(evidence: &BandEvidence, found: &BandBias, share: &Plane) -> Plane {
-    let denoised = evidence.variance.combined(&found.energy, |variance, bias| variance + bias);
-    let left = denoised.combined(share, |energy, share| energy * (1.0 - share) * (1.0 - share));
-    let raw = evidence.raw_noise.combined(share, |energy, share| energy * share * share);
-    left.combined(&raw, |left, raw| left + raw)
+/// What is left of one band's error, pooled energies in squared threshold units.
+pub(super) struct BandError {
+    pub(super) variance: Plane,
+    pub(super) bias: Plane,
+    /// Variance of `bias` where it is not proven.
+    pub(super) uncertainty: Plane,
+}
+
+impl BandError {
+    /// Of the denoised picture as it is.
+    pub(super) fn of(evidence: &BandEvidence, found: &BandBias) -> Self {
+        Self { variance: evidence.variance.clone(), bias: found.energy.clone(), uncertainty: found.uncertainty.clone() }
+    }
+
+    /// The same once so much of the raw mean, with such noise, has taken the denoised picture's place.
+    pub(super) fn blended(self, share: &Plane, raw_noise: &Plane) -> Self {
+        let kept = share.map(|share| (1.0 - share) * (1.0 - share));
+        let of_raw = raw_noise.combined(share, |energy, share| energy * share * share);
+        let times = |energy: &Plane, factor: &Plane| energy.combined(factor, |energy, factor| energy * factor);
+        Self {
+            variance: times(&self.variance, &kept).combined(&of_raw, |left, raw| left + raw),
+            bias: times(&self.bias, &kept),
+            uncertainty: times(&self.uncertainty, &kept.map(|kept| kept * kept)),
+        }
+    }
 }
 
 /// How far a denoised picture is to be moved towards its raw mean, by [`DenoisedError::raw_shares`], display cd/m². `residual`: of

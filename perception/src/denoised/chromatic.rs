@@ -1,6 +1,6 @@
 //! The law for denoised pictures in one of the two chromatic channels.
 
-use super::{DenoisedDifferences, DenoisedError};
+use super::{Blending, DenoisedDifferences, DenoisedError};
 use crate::csf::{CastleChromatic, ChromaticChannel, FrameTiming};
 use crate::display::Viewing;
 use crate::error::Error;
@@ -18,7 +18,7 @@ pub struct ChromaticPicture<'a> {
     pub differences: DenoisedDifferences<'a>,
 }
 
-/// What can be seen of the picture's error in this channel. `frames`: of a moving picture, whose noise is new in every frame;
+/// What can be seen of the picture's error in this channel, in which nothing moves it towards its raw mean. `frames`: of a moving picture, whose noise is new in every frame;
 /// `None` for stills.
 ///
 /// # Errors
@@ -31,7 +31,7 @@ pub fn chromatic_error(
 ) -> Result<DenoisedError, Error> {
     let csf = CastleChromatic::new(channel, viewing.observer.csf_area_deg2)?;
     let thresholds = chromatic_threshold_map(picture.signal, picture.luminance_cd_m2, viewing, &csf)?;
-    let error = thresholds.denoised_error(&picture.differences);
+    let error = thresholds.denoised_error_after(Blending::Never, &picture.differences);
     Ok(match frames {
         None => error,
         Some(timing) => {

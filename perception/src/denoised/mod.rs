@@ -19,6 +19,7 @@ mod blend;
 mod chromatic;
 mod witness;
 
+use blend::BandError;
 pub use blend::step_towards_raw;
 pub use chromatic::{ChromaticPicture, chromatic_error};
 
@@ -39,12 +40,13 @@ pub struct DenoisedDifferences<'a> {
     pub residual_half_difference: &'a Plane,
 }
 
-/// What can be seen of a denoised picture's error. Visibilities are pooled and in threshold units, as everywhere.
+/// What can be seen of a denoised picture's error once it is moved towards its raw mean by `raw_shares`. Visibilities are pooled and in
+/// threshold units, as everywhere.
 #[derive(Clone, Debug)]
 pub struct DenoisedError {
     /// v of variance and bias together: √(variance² + bias²).
     pub visibility: Plane,
-    /// v of the noise that is left.
+    /// v of the noise that is left, that which the raw mean brings among it.
     pub variance: Plane,
     /// v of the bias: proven where the witness tells, by the factor elsewhere.
     pub bias: Plane,
@@ -56,8 +58,13 @@ pub struct DenoisedError {
     /// How far each band is worth moving towards the raw mean, 0 to 1, by band: the share of the denoised error in the sum of
     /// its and the raw mean's squared errors, where a bias is proven; 0 elsewhere.
     pub raw_shares: Vec<Plane>,
-    /// v of variance and bias after that.
-    pub blended_visibility: Plane,
+}
+
+/// Whether a channel of the picture is moved towards its raw mean.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Blending {
+    Proven,
+    Never,
 }
 
 /// A bias that one-sided 95 % of witnesses would have noticed.
@@ -78,12 +85,11 @@ impl DenoisedError {
             bias_squared_standard_error: infinite.clone(),
             bias_factors: Vec::new(),
             raw_shares: Vec::new(),
-            blended_visibility: infinite,
         }
     }
 
     /// This error with another channel's beside it: the channel that shows most counts at every pixel. Factors and shares stay this
-    /// one's; what the other's becomes by their blend is not looked at.
+    /// one's; what the other's becomes by a blend for this one is not looked at.
     ///
     /// # Panics
     /// Where the two are of pictures of two sizes.
@@ -94,7 +100,6 @@ impl DenoisedError {
         most(&mut self.variance, &other.variance);
         most(&mut self.bias, &other.bias);
         most(&mut self.bias_squared_standard_error, &other.bias_squared_standard_error);
-        most(&mut self.blended_visibility, &other.visibility);
         self
     }
 
@@ -105,7 +110,7 @@ impl DenoisedError {
     /// Where `missed` has another size.
     #[must_use]
     pub fn with_missed_light(mut self, missed: &Plane) -> Self {
-        for plane in [&mut self.visibility, &mut self.bias, &mut self.blended_visibility] {
+        for plane in [&mut self.visibility, &mut self.bias] {
             *plane = plane.combined(missed, |own, missed| own.hypot(missed));
         }
         self
@@ -122,7 +127,7 @@ impl DenoisedError {
 
     /// The same error seen as many times as well as `scale` makes of a visibility.
     fn scaled(mut self, scale: impl Fn(&Plane) -> Plane) -> Self {
-        for plane in [&mut self.visibility, &mut self.variance, &mut self.bias, &mut self.blended_visibility] {
+        for plane in [&mut self.visibility, &mut self.variance, &mut self.bias] {
             *plane = scale(plane);
         }
         self.bias_squared_standard_error = scale(&scale(&self.bias_squared_standard_error));
@@ -133,12 +138,10 @@ impl DenoisedError {
     /// noticed by the place's own witness. For what is learned elsewhere of errors that nothing at hand shows.
     pub fn raise_inferred(&mut self, factor: f64) {
         let standard_error = &self.bias_squared_standard_error;
-        for plane in [&mut self.visibility, &mut self.blended_visibility] {
-            *plane = plane.combined(standard_error, |visibility, standard_error| {
-                let unnoticed = visibility * visibility * (VISIBLY_WRONG * VISIBLY_WRONG - 1.0);
-                if NOTICED * standard_error > unnoticed { factor as f32 * visibility } else { visibility }
-            });
-        }
+        self.visibility = self.visibility.combined(standard_error, |visibility, standard_error| {
+            let unnoticed = visibility * visibility * (VISIBLY_WRONG * VISIBLY_WRONG - 1.0);
+            if NOTICED * standard_error > unnoticed { factor as f32 * visibility } else { visibility }
+        });
     }
 
     /// 1 where `visibility` is at most `target` and yet nothing proves that bias keeps the picture below
@@ -155,10 +158,14 @@ impl DenoisedError {
 }
 
 impl ThresholdMap {
-    /// Judges a denoised picture. Planes of another size give infinity everywhere, and no factors; pixels of which one is not finite
-    /// are infinitely visible and count as 0 for the others.
+    /// Judges a denoised picture that [`step_towards_raw`] moves. Planes of another size give infinity everywhere, and no factors;
+    /// pixels of which one is not finite are infinitely visible and count as 0 for the others.
     #[must_use]
     pub fn denoised_error(&self, differences: &DenoisedDifferences<'_>) -> DenoisedError {
+        self.denoised_error_after(Blending::Proven, differences)
+    }
+
+    fn denoised_error_after(&self, blending: Blending, differences: &DenoisedDifferences<'_>) -> DenoisedError {
         let (width, height) = (self.width(), self.height());
         let DenoisedDifferences { half_difference, residual, residual_half_difference } = *differences;
         let planes = [half_difference, residual, residual_half_difference];
@@ -168,19 +175,24 @@ impl ThresholdMap {
         let mut filters = ErrorFilters::new(self);
         let spectra = planes.map(|plane| filters.spectrum(plane));
         let zero = Plane::filled(width, height, 0.0);
-        let (mut variance, mut bias) = (zero.clone(), zero.clone());
-        let (mut uncertainty, mut after_blend) = (zero.clone(), zero);
+        let (mut variance, mut bias, mut uncertainty) = (zero.clone(), zero.clone(), zero);
         let (mut bias_factors, mut raw_shares) = (Vec::new(), Vec::new());
         for band in 0..self.band_count() {
             let evidence = BandEvidence::gather(self, &mut filters, &spectra, band);
             let found = bias_energy(&evidence);
-            let share = blend::raw_share(&evidence, &found);
-            add(&mut variance, &evidence.variance);
-            add(&mut bias, &found.energy);
-            add(&mut uncertainty, &found.uncertainty);
-            add(&mut after_blend, &blend::energy_after(&evidence, &found, &share));
             bias_factors.push(found.factor);
-            raw_shares.push(share);
+            let left = match blending {
+                Blending::Proven => {
+                    let share = blend::raw_share(&evidence, &found);
+                    let left = BandError::of(&evidence, &found).blended(&share, &evidence.raw_noise);
+                    raw_shares.push(share);
+                    left
+                }
+                Blending::Never => BandError::of(&evidence, &found),
+            };
+            add(&mut variance, &left.variance);
+            add(&mut bias, &left.bias);
+            add(&mut uncertainty, &left.uncertainty);
         }
         // Finite where all three are.
         let sum =
@@ -194,7 +206,6 @@ impl ThresholdMap {
             bias_squared_standard_error: uncertainty.map(|squared| 2.0 * squared.sqrt()),
             bias_factors,
             raw_shares,
-            blended_visibility: seen(&after_blend),
         }
     }
 }

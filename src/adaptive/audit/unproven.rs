@@ -60,7 +60,7 @@ pub fn audit_unproven(
         let mean = Mean::of(halves, settings.nits_per_unit);
         difference.values_mut()[pixel] = shown * (denoised.luminance_cd_m2.values()[pixel] - mean.luminance_cd_m2);
         noise.values_mut()[pixel] = shown * mean.noise_cd_m2;
-        predicted.values_mut()[pixel] = window * denoised.error.blended_visibility.values()[pixel];
+        predicted.values_mut()[pixel] = window * denoised.error.visibility.values()[pixel];
     }
     // Not pooled over the eye's window, which would carry a third of it out of the tile's reach.
     let [difference, noise] = [difference, noise].map(|shown| judgement.thresholds.measured_error(&shown).amplitude);

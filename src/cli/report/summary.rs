@@ -89,6 +89,9 @@ fn importance(report: &Report) -> Option<String> {
     })
 }
 
+/// Change of a picture's light by its denoiser that is worth a line.
+const NOTABLE_ENERGY_CHANGE: f64 = 0.005;
+
 fn denoised(report: &Report) -> Vec<String> {
     let Some(denoised) = &report.denoised else { return Vec::new() };
     let by = format!(
@@ -111,7 +114,15 @@ fn denoised(report: &Report) -> Vec<String> {
             100.0 * share
         )
     });
-    std::iter::once(left).chain(unproven).collect()
+    let change = denoised.energy_change;
+    let energy = (change.abs() >= NOTABLE_ENERGY_CHANGE).then(|| {
+        format!(
+            "The denoised picture holds {:.1} % {} light than the raw mean, which is unbiased and is kept in an .exr.",
+            100.0 * change.abs(),
+            if change < 0.0 { "less" } else { "more" }
+        )
+    });
+    [Some(left), unproven, energy].into_iter().flatten().collect()
 }
 
 fn audited(report: &Report, rendered: &Rendered) -> Option<String> {
