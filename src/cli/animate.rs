@@ -166,6 +166,7 @@ pub(super) fn run(arguments: &AnimateArguments) -> Result<()> {
     // Frames are written whole or not at all, so that there is nothing to wait for.
     signals::listen(|| {
         say!("stopped by a signal: finished frames are there, and the same command makes the others");
+        fechner::output::abandon_unfinished();
         std::process::exit(i32::from(super::CALL_AGAIN));
     })?;
     pool.install(|| render_shot(arguments))

@@ -1,6 +1,7 @@
 //! The files that a command reads and writes.
 
 use anyhow::bail;
+use fechner::output::target_of;
 use fechner::scene::load::was_read;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -49,13 +50,14 @@ pub(super) fn check_distinct(files: &[Named]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Where a file is or will be, whichever way its folder is spelled.
+/// Where a file is or will be, whichever way its folder is spelled and whatever links lead there.
 pub(super) fn location(path: &Path) -> PathBuf {
+    let target = target_of(path).unwrap_or_else(|_| path.to_owned());
     let in_its_folder = || {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        Some(folder.canonicalize().ok()?.join(path.file_name()?))
+        let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        Some(folder.canonicalize().ok()?.join(target.file_name()?))
     };
-    path.canonicalize().ok().or_else(in_its_folder).unwrap_or_else(|| path.to_owned())
+    target.canonicalize().ok().or_else(in_its_folder).unwrap_or(target)
 }
 
 #[cfg(test)]
@@ -73,6 +75,21 @@ mod tests {
             let message = refused.expect_err("one file").to_string();
             assert!(message.contains("-o and --checkpoint") && message.contains("a.png"), "{message}");
         }
+    }
+
+    /// Before anything is at their end: two links were two files, and a picture took the film's place.
+    #[cfg(unix)]
+    #[test]
+    fn links_to_one_file_are_one_file() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [film, picture, end] = ["film", "picture", "end"].map(|name| folder.path().join(name));
+        for link in [&film, &picture] {
+            std::os::unix::fs::symlink("end", link).expect("a link");
+        }
+        for path in [&picture, &end] {
+            assert!(check_distinct(&[("-o", Some(path)), ("--checkpoint", Some(&film))]).is_err());
+        }
+        assert_eq!(location(&film), location(&end));
     }
 
     #[test]

@@ -4,6 +4,7 @@ use super::OutputError;
 use std::ffi::{OsStr, OsString};
 use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 use tempfile::NamedTempFile;
 
 /// Writes `path` by letting `write` fill a new file in the same folder, which then takes the target's place at once.
@@ -72,14 +73,33 @@ pub(super) fn create_beside(path: &Path) -> Result<(NamedTempFile, PathBuf), Out
         // As any new file: all may read and write, less the user's umask. The default of temporary files is owner only.
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    builder.tempfile_in(folder).map(|file| (file, target.clone())).map_err(|error| {
+    let file = builder.tempfile_in(folder).map_err(|error| {
         // The error's own text names the temporary file, which the user never asked for.
         io(std::io::Error::new(error.kind(), format!("cannot make a file in {}: {}", folder.display(), plain(&error))))
-    })
+    })?;
+    let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+    // Under that name until they are renamed or dropped.
+    unfinished.retain(|path| path.exists());
+    unfinished.push(file.path().to_owned());
+    Ok((file, target))
 }
 
-/// What would be replaced: the path, or what its links lead to, which may not be there yet.
-fn target_of(path: &Path) -> std::io::Result<PathBuf> {
+/// New files that are being written, and some that no longer are.
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// Removes the new files that this process is writing. For one that is about to end by `exit`, which drops nothing.
+pub fn abandon_unfinished() {
+    for path in UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).drain(..) {
+        // Nothing is there of those that are finished, and nobody is left to hear of another failure.
+        let _ = std::fs::remove_file(path);
+    }
+}
+
+/// What [`write_beside`] would replace: the path, or what its links lead to, which may not be there yet.
+///
+/// # Errors
+/// If links lead in a circle.
+pub fn target_of(path: &Path) -> std::io::Result<PathBuf> {
     path.canonicalize().or_else(|_| end_of_links(path))
 }
 
@@ -138,6 +158,19 @@ fn plain(error: &std::io::Error) -> String {
 mod tests {
     use super::*;
     use std::io::Write;
+
+    /// Not [`abandon_unfinished`] itself, which would take the files of tests beside this one.
+    #[test]
+    fn what_is_being_written_is_known() {
+        let folder = tempfile::tempdir().unwrap();
+        let is_known = |path: &Path| UNFINISHED.lock().unwrap().iter().any(|known| known == path);
+        let (file, _) = create_beside(&folder.path().join("a")).unwrap();
+        let path = file.path().to_owned();
+        assert!(is_known(&path));
+        drop(file);
+        create_beside(&folder.path().join("b")).unwrap();
+        assert!(!is_known(&path));
+    }
 
     fn names(folder: &Path) -> Vec<String> {
         let mut names: Vec<_> = std::fs::read_dir(folder)
