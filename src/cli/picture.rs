@@ -14,7 +14,9 @@ use fechner_perception::primaries::{Primaries, apply};
 use fechner_perception::tone::{FittedTone, SceneLight, ToneOperator, map_picture, map_pixels};
 use image::GenericImageView as _;
 use image::{DynamicImage, ImageFormat};
+use std::collections::BTreeSet;
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 
 /// A picture from a file.
 pub(super) struct InputPicture {
@@ -79,17 +81,17 @@ impl InputPicture {
             })
         };
         if let (Some(own), Some(asked)) = (in_file(), nits_per_unit) {
-            say!(
-                "note: {}: its own unit of {own} cd/m² stands; --nits-per-unit {asked} is for files that do not say it",
-                path.display()
+            note(
+                path,
+                &format!("its own unit of {own} cd/m² stands; --nits-per-unit {asked} is for files that do not say it"),
             );
         }
         let nits_per_unit = in_file().or(nits_per_unit).with_context(|| no_unit(path))?;
         let Some(picture) = exr.scene_picture(picture_channel) else {
             bail!("{}: there are no channels R, G and B, nor Y; `fechner info` lists what there is", path.display());
         };
-        for note in channels::guess(exr).iter().chain(&picture.notes) {
-            say!("note: {}: {note}", path.display());
+        for text in channels::guess(exr).iter().chain(&picture.notes) {
+            note(path, text);
         }
         let kept_tone = KeptTone::of(exr);
         let content = match kept_tone {
@@ -113,8 +115,8 @@ impl InputPicture {
         let bytes = std::fs::read(path).with_context(|| format!("{}", path.display()))?;
         let mut image = decoded_image(path, &bytes)?;
         let colour = output::png_colour(&bytes);
-        for note in &colour.notes {
-            say!("note: {}: {note}", path.display());
+        for text in &colour.notes {
+            note(path, text);
         }
         let of = |primaries: Primaries| colour.primaries.unwrap_or(primaries);
         let codes = match colour.transfer {
@@ -126,10 +128,10 @@ impl InputPicture {
         };
         if image.color().has_alpha() && image.pixels().any(|(_, _, pixel)| pixel.0[3] < u8::MAX) {
             if matches!(codes, Codes::Srgb(_)) {
-                say!("note: {}: what is transparent lies before black", path.display());
+                note(path, "what is transparent lies before black");
                 image = before_black(image);
             } else {
-                say!("note: {}: alpha is not looked at: each pixel is seen in the colour that it has", path.display());
+                note(path, "alpha is not looked at: each pixel is seen in the colour that it has");
             }
         }
         Ok(Self::from_image(image, Content::Display(codes)))
@@ -327,6 +329,15 @@ fn picture_channel<'a>(exr: &'a ExrImage, name: &str) -> Option<&'a [f32]> {
         "G" => Some(g),
         "B" => Some(b),
         _ => None,
+    }
+}
+
+/// Says something of a file, once of all the frames of a sequence, whose names differ by digits.
+fn note(path: &Path, text: &str) {
+    static SAID: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+    let of_sequence = format!("{}: {text}", path.display()).replace(|c: char| c.is_ascii_digit(), "#");
+    if SAID.lock().unwrap_or_else(PoisonError::into_inner).insert(of_sequence) {
+        say!("note: {}: {text}", path.display());
     }
 }
 

@@ -7,8 +7,9 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use fechner::scene::{MOST_EXPOSURE_STOPS, NITS_PER_UNIT, Scene};
+use fechner_perception::csf;
 use fechner_perception::display::{Display, Viewing};
-use fechner_perception::model;
+use fechner_perception::model::{self, ThresholdModel};
 use fechner_perception::tone::{self, DEFAULT_OPERATOR, ToneOperator, ToneSettings};
 use std::path::Path;
 use std::time::Duration;
@@ -83,6 +84,18 @@ impl SeeingArguments {
                 "note: {argument} changes nothing: {} is ready for the display, and so is all that is seen beside it",
                 path.display()
             );
+        }
+    }
+
+    /// Says which of what was asked for the model does not look at.
+    pub(super) fn note_what_is_idle(&self, model: &dyn ThresholdModel) {
+        if !model.knows_csf() {
+            let is_asked = [("--csf", self.csf != "castle"), ("--csf-area", self.csf_area.is_some())];
+            for (argument, _) in is_asked.iter().filter(|(_, is_asked)| *is_asked) {
+                say!("note: {argument} changes nothing: the model {} does not ask for it", model.name());
+            }
+        } else if self.csf_area.is_some() && !csf::knows_area(&self.csf) {
+            say!("note: --csf-area changes nothing: {} is of no area", self.csf);
         }
     }
 

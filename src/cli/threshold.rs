@@ -92,6 +92,7 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     let model = model::by_name(&arguments.model).with_context(|| {
         format!("there is no threshold model \"{}\"; known: {}", arguments.model, model::names().join(", "))
     })?;
+    arguments.seeing.note_what_is_idle(model.as_ref());
     let fitted = shown_by(arguments.operator.as_deref(), &named, &viewing)?;
     // Noise goes through the loss of acuity that the operator shows.
     let acuity = fitted.as_ref().and_then(|fitted| fitted.acuity());
@@ -134,7 +135,9 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     }
     let text = |s: &str| Attribute::Text(s.to_owned());
     picture.push_attribute("fechner.model", text(model.name()));
-    picture.push_attribute("fechner.csf", text(csf.name()));
+    if model.knows_csf() {
+        picture.push_attribute("fechner.csf", text(csf.name()));
+    }
     picture.push_attribute("fechner.observer.display", text(&viewing.display.name));
     let ppd = viewing.display.pixels_per_degree as f32;
     picture.push_attribute("fechner.observer.pixels_per_degree", Attribute::Float(ppd));

@@ -97,6 +97,12 @@ pub fn names() -> &'static [&'static str] {
     &NAMES
 }
 
+/// Whether the function of that name depends on the area of the grating.
+#[must_use]
+pub fn knows_area(name: &str) -> bool {
+    matches!(name, "castle" | "stela" | "barten99" | "daly93")
+}
+
 /// The function of that name, for the observer's area and the display's distance where it depends on them.
 ///
 /// # Errors

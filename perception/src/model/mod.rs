@@ -82,6 +82,11 @@ pub trait ThresholdModel: Send + Sync {
     /// [`Error`] for planes of different sizes, values that are not finite or negative, and impossible viewings.
     fn allowed_standard_error_cd_m2(&self, inputs: &ModelInputs<'_>) -> Result<Plane, Error>;
 
+    /// Whether [`ModelInputs::csf`] changes what it allows: not of models of intensity alone, nor of those with a function of their own.
+    fn knows_csf(&self) -> bool {
+        true
+    }
+
     /// Whether [`ModelInputs::image_velocity_deg_s`] changes what it allows.
     fn knows_motion(&self) -> bool {
         false
@@ -196,6 +201,27 @@ mod tests {
             csf: &CastleCsf::default(),
         };
         by_name(name).unwrap().allowed_standard_error_cd_m2(&inputs).unwrap()
+    }
+
+    /// What a model says it knows is what changes its thresholds.
+    #[test]
+    fn models_know_whether_they_ask_the_contrast_sensitivity_function() {
+        let (guide, viewing) = (picture(), Viewing::default());
+        for model in names().iter().filter_map(|name| by_name(name)) {
+            let by = |csf: &dyn ContrastSensitivity| {
+                let inputs = ModelInputs {
+                    display_luminance_cd_m2: &guide,
+                    guide_variance: None,
+                    image_velocity_deg_s: None,
+                    attention: None,
+                    viewing: &viewing,
+                    csf,
+                };
+                model.allowed_standard_error_cd_m2(&inputs).unwrap()
+            };
+            let differs = by(&CastleCsf::default()) != by(&crate::csf::MannosSakrison::default());
+            assert_eq!(model.knows_csf(), differs, "{}", model.name());
+        }
     }
 
     #[test]

@@ -22,6 +22,10 @@ impl ThresholdModel for Tvi {
         "tvi"
     }
 
+    fn knows_csf(&self) -> bool {
+        false
+    }
+
     fn allowed_standard_error_cd_m2(&self, inputs: &ModelInputs<'_>) -> Result<Plane, Error> {
         inputs.check()?;
         let base = if self.shifted { ThresholdBase::TviShifted } else { ThresholdBase::TviRaw };
