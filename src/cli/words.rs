@@ -60,6 +60,16 @@ pub(super) fn rounded(value: f64) -> String {
     format!("{value:.digits$}").trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
+/// Numbers one after the other, and of many only the first and how many more there are.
+pub(super) fn listed<T: std::fmt::Display>(numbers: &[T]) -> String {
+    const MOST: usize = 12;
+    let first: Vec<String> = numbers.iter().take(MOST).map(T::to_string).collect();
+    match numbers.len().saturating_sub(MOST) {
+        0 => first.join(", "),
+        more => format!("{} and {more} more", first.join(", ")),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -76,6 +86,8 @@ mod tests {
     #[test]
     fn figures_are_short() {
         assert_eq!((count(1, "frame"), count(0, "frame")), ("1 frame".to_owned(), "0 frames".to_owned()));
+        assert_eq!(listed(&[3, 5]), "3, 5");
+        assert!(listed(&(0..100).collect::<Vec<u32>>()).ends_with("10, 11 and 88 more"));
         assert_eq!(samples_in_words(6000), "6000 samples");
         assert_eq!(samples_in_words(4_250_000), "4.25 million samples");
         for (value, text) in [

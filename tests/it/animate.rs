@@ -143,18 +143,18 @@ fn what_a_run_would_make_otherwise_is_not_there() {
     assert!(said.contains("a.00.png: its record is that of a.00.exr, made anew"), "{said}");
     // The second frame is of other settings.
     let said = first("17");
-    assert!(said.contains("1 frames of the shot are not there yet"), "{said}");
+    assert!(said.contains("frame 1 of the shot is not there yet"), "{said}");
     both("17", "a.##.png");
     let whole = std::fs::read(at.join("a.01.png")).expect("read");
     std::fs::write(at.join("a.01.png"), std::fs::read(at.join("a.00.png")).expect("read")).expect("written");
     let said = first("17");
-    assert!(said.contains("1 frames of the shot are not there yet"), "another picture under its record: {said}");
+    assert!(said.contains("frame 1 of the shot is not there yet"), "another picture under its record: {said}");
     let said = both("17", "a.##.png");
     assert!(said.contains("a.00.png: is there") && !said.contains("a.01.png: is there"), "{said}");
     assert!(std::fs::read(at.join("a.01.png")).expect("read") == whole);
     std::fs::remove_file(at.join("a.01.png")).expect("removed");
     let said = first("17");
-    assert!(said.contains("1 frames of the shot are not there yet"), "without its picture: {said}");
+    assert!(said.contains("frame 1 of the shot is not there yet"), "without its picture: {said}");
 }
 
 /// A change between the ends makes the track anew, and the frames that it shows in.

@@ -278,7 +278,7 @@ fn an_audit_finds_what_a_denoiser_makes_up() {
     let denoised = scene.rendered.judgement.denoised.as_mut().expect("denoised");
     denoised.luminance_cd_m2 = raw.estimate.luminance_cd_m2;
     denoised.error.visibility = raw.predicted.clone();
-    denoised.error.blended_visibility = raw.predicted;
+    denoised.error.visibility = raw.predicted;
     let honest = scene.audited(1e3, 0);
     println!("{honest:?}, raw {audited_raw:?}");
     // Other tiles, by the same measure but for the window. Below 1, since colour is predicted too and luminance alone is found.
@@ -339,7 +339,7 @@ fn audits_of_unproven_tiles_agree_with_a_reference() {
         println!(
             "| {name} | {spp} | {:.1} % | {:.2} | {mean:.2} ± {:.2} | {scatter:.2} |",
             100.0 * unproven.mean(),
-            (energy(&found) - energy(&noise)) / energy(&denoised.error.blended_visibility),
+            (energy(&found) - energy(&noise)) / energy(&denoised.error.visibility),
             scatter / 12f64.sqrt(),
         );
     }

@@ -121,6 +121,7 @@ fn a_shot_is_whole_with_its_video_and_its_pictures() {
         (&["--time", "3"][..], "--time and --plans end one process"),
         (&["--threads", "3"], "--threads is of one process"),
         (&["--video", "shot.avi"], "videos end in .y4m or .mp4"),
+        (&["--video", "shot.y4m", "--shot", "0..9"], "--video needs all 10 frames of the shot"),
         (&["--video", "nowhere/shot.y4m"], "nowhere"),
     ] {
         let (status, message) = plan_shot(at, options);

@@ -13,6 +13,7 @@ use crate::cli::json::write_json;
 use crate::cli::report::Report;
 use crate::cli::seeing::{Presentation, tone_operator};
 use crate::cli::targets::check_scene_kept;
+use crate::cli::words::listed;
 use anyhow::{Context, Result, bail};
 use fechner::adaptive::settings::{AllocationRule, LoopSettings, Sampling};
 use fechner::animate::budget::Needs;
@@ -145,6 +146,11 @@ impl<'a> Shot<'a> {
             }
         }
         Ok(())
+    }
+
+    /// Whether a video is asked for.
+    pub(in crate::cli) fn asks_for_video(&self) -> Result<bool> {
+        Ok(self.arguments.video()?.is_some())
     }
 
     fn operator(&self) -> Result<Box<dyn ToneOperator>> {
@@ -304,8 +310,9 @@ impl<'a> Shot<'a> {
     /// Writes what only the whole shot has, if all its frames are there as this run would make them; whether they are.
     pub(in crate::cli) fn conclude(&self, track: &Track) -> Result<bool> {
         let FoundFrames { records, missing } = self.find_frames(track)?;
-        if missing > 0 {
-            say!("{missing} frames of the shot are not there yet.");
+        if !missing.is_empty() {
+            let (frames, are) = if missing.len() == 1 { ("frame", "is") } else { ("frames", "are") };
+            say!("{frames} {} of the shot {are} not there yet, or changed.", listed(&missing));
             return Ok(false);
         }
         write_json(&self.name.of_shot("json"), &records)?;
@@ -375,16 +382,16 @@ impl<'a> Shot<'a> {
     fn find_frames(&self, track: &Track) -> Result<FoundFrames> {
         let frames = || self.settings.first..=self.settings.last;
         // Keys take reading every scene: not for each run that makes a part of a shot.
-        let missing = frames().filter(|&frame| FrameRecord::of_picture(&self.file(frame)).is_none()).count();
+        let missing = frames().filter(|&frame| FrameRecord::of_picture(&self.file(frame)).is_none()).collect();
         let mut found = FoundFrames { records: Vec::new(), missing };
-        if missing > 0 {
+        if !found.missing.is_empty() {
             return Ok(found);
         }
         for frame in frames() {
             let job = self.frame_of_track(frame, track)?;
             match job.and_then(|job| self.record(frame, &job.key)) {
                 Some(record) => found.records.push(record),
-                None => found.missing += 1,
+                None => found.missing.push(frame),
             }
         }
         Ok(found)
@@ -411,6 +418,6 @@ pub(super) enum Made {
 struct FoundFrames {
     /// Of the frames that are there, in order, if their files all are.
     records: Vec<FrameRecord>,
-    /// How many are not.
-    missing: usize,
+    /// Those that are not.
+    missing: Vec<u32>,
 }

@@ -181,14 +181,19 @@ impl Job<'_> {
     /// What units of a frame need, if the scene still is the one that was planned.
     pub(super) fn tracer(&self, farm: &Farm, frame_index: usize) -> Result<PathTracer> {
         let entry = farm.frame(frame_index);
-        let (scene, trace) = match self {
+        let (scene, trace, origin) = match self {
             Self::Still(arguments) => {
                 let Prepared { scene, trace, .. } = arguments.prepare_samples()?;
-                (scene, trace)
+                let origin = Origin { scene_name: arguments.scene_name(), ..Origin::of(&scene, &trace) };
+                (scene, trace, origin)
             }
-            Self::Shot { shot, .. } => (shot.scene(entry.frame)?, shot.settings.trace_settings(entry.frame)),
+            Self::Shot { shot, .. } => {
+                let (scene, trace) = (shot.scene(entry.frame)?, shot.settings.trace_settings(entry.frame));
+                let origin = Origin::of(&scene, &trace);
+                (scene, trace, origin)
+            }
         };
-        check_origin(farm, entry, &Origin::of(&scene, &trace))?;
+        check_origin(farm, entry, &origin)?;
         Ok(PathTracer::new(scene, trace))
     }
 
@@ -250,6 +255,18 @@ impl Job<'_> {
             Self::Still(_) => Ok(()),
             Self::Shot { shot, .. } => shot.check_video(),
         }
+    }
+
+    /// Refuses a video of a shot of which the farm makes a part, whose other frames can never come to be beside them.
+    pub(super) fn check_whole_video(&self, frames: usize) -> Result<()> {
+        let Self::Shot { shot, .. } = self else { return Ok(()) };
+        let all = shot.settings.last - shot.settings.first + 1;
+        if shot.asks_for_video()? && frames != all as usize {
+            bail!(
+                "--video needs all {all} frames of the shot, and the farm makes {frames}: leave --shot or --video out"
+            );
+        }
+        Ok(())
     }
 
     /// Makes what only a whole shot has, if all its frames are there; whether they are.

@@ -3,7 +3,7 @@
 use super::job::Job;
 use super::unit::{Bench, KeepingArguments};
 use super::{CALL_AGAIN, Threads, frame_lock};
-use crate::cli::words::{count, samples_in_words};
+use crate::cli::words::{count, listed, samples_in_words};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::adaptive::{Ended, Quiet, Rendered};
@@ -81,8 +81,7 @@ fn chosen(farm: &Farm, frames: &[u32]) -> Result<Vec<usize>> {
 }
 
 fn say_missing(farm: &Farm, frame_index: usize, missing: &[u64]) {
-    let units: Vec<String> = missing.iter().map(u64::to_string).collect();
-    say!("frame {}: waits for units {}", farm.frame(frame_index).frame, units.join(", "));
+    say!("frame {}: waits for units {}", farm.frame(frame_index).frame, listed(missing));
 }
 
 /// Merges a frame whose lock is held.

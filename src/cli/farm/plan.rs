@@ -112,6 +112,7 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode> {
     let options = JobOptions::parse(work, &words, &folder.join("pictures"), format)?;
     let job = options.job()?;
     job.check_video()?;
+    job.check_whole_video(options.frames().len())?;
     let (mut entries, mut limits) = (Vec::new(), None);
     for number in options.frames() {
         let frame = job.frame(number)?;

@@ -5,7 +5,7 @@ use super::signals::Signals;
 use super::{CALL_AGAIN, Threads, open_for_work};
 use crate::cli::console::duration_in_words;
 use crate::cli::seeing::parse_seconds;
-use crate::cli::words::samples_in_words;
+use crate::cli::words::{listed, samples_in_words};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::farm::frame::{Progress, progress};
@@ -168,8 +168,8 @@ impl<'a> Bench<'a> {
         } else if round.units.iter().any(|planned| planned.unit == unit) {
             Standing::Open
         } else {
-            let planned: Vec<String> = round.units.iter().map(|planned| planned.unit.to_string()).collect();
-            let (round, planned) = (round.round, planned.join(", "));
+            let planned: Vec<u64> = round.units.iter().map(|planned| planned.unit).collect();
+            let (round, planned) = (round.round, listed(&planned));
             Standing::Unknown(format!("frame {number} is in round {round}, whose units are {planned}"))
         }
     }
