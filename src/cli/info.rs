@@ -4,7 +4,7 @@ mod film;
 
 use anyhow::{Context, bail};
 use fechner::checkpoint::{is_checkpoint, read_checkpoint};
-use fechner::exr_read::{ExrImage, read_exr};
+use fechner::exr_read::{ExrImage, MEMORY_LIMIT_BYTES, SampleType, read_exr_channels};
 use image::ImageDecoder;
 use std::fmt::Write as _;
 use std::io::Read as _;
@@ -23,7 +23,7 @@ fn describe(path: &Path) -> anyhow::Result<String> {
     }
     let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
     match ending.as_deref() {
-        Some("exr") => Ok(describe_exr(&read_exr(path)?)),
+        Some("exr") => describe_exr(path),
         Some("png") => describe_png(path),
         Some("hdr") => describe_hdr(path),
         _ => bail!("cannot tell what {} is: .exr, .png and .hdr files and films are known", path.display()),
@@ -107,16 +107,46 @@ fn heading(text: &mut String, first: &str, width: usize) {
     let _ = writeln!(text, "  {first:width$}  type   {:>12}  {:>12}  {:>12}", "min", "mean", "max");
 }
 
-fn describe_exr(image: &ExrImage) -> String {
+/// What a channel holds.
+struct ChannelRow {
+    name: String,
+    kind: SampleType,
+    range: Range,
+}
+
+fn channel_rows(image: &ExrImage) -> Vec<ChannelRow> {
+    let channels = image.channels.iter().zip(&image.types);
+    channels
+        .map(|((name, values), &kind)| ChannelRow {
+            name: name.clone(),
+            kind,
+            range: Range::of(values.iter().copied()),
+        })
+        .collect()
+}
+
+/// As many channels at once as memory is meant for: production files have more.
+fn describe_exr(path: &Path) -> anyhow::Result<String> {
+    let image = read_exr_channels(path, |_, _| false)?;
+    let mut rows = channel_rows(&image);
+    let bytes_a_channel = 4 * u64::from(image.width) * u64::from(image.height);
+    let at_once = (MEMORY_LIMIT_BYTES / bytes_a_channel.max(1)).max(1) as usize;
+    for names in image.unread.chunks(at_once) {
+        rows.extend(channel_rows(&read_exr_channels(path, |_, name| names.iter().any(|wanted| wanted == name))?));
+    }
+    Ok(exr_in_words(&image, &rows))
+}
+
+fn exr_in_words(image: &ExrImage, rows: &[ChannelRow]) -> String {
     let mut text = format!("OpenEXR, {}×{} pixels", image.width, image.height);
     if image.data_window_origin != (0, 0) {
         let _ = write!(text, " from ({}, {})", image.data_window_origin.0, image.data_window_origin.1);
     }
     text.push_str("\n\n");
-    let width = image.channels.iter().map(|(name, _)| name.len()).max().unwrap_or(0).max(7);
+    let width = rows.iter().map(|row| row.name.len()).max().unwrap_or(0).max(7);
     heading(&mut text, "channel", width);
-    for ((name, values), kind) in image.channels.iter().zip(&image.types) {
-        Range::of(values.iter().copied()).row(&mut text, name, &kind.to_string(), width);
+    for ChannelRow { name, kind, range } in rows {
+        range.row(&mut text, name, &kind.to_string(), width);
     }
     for part in &image.parts_left_out {
         let _ = writeln!(text, "  part \"{part}\" lies elsewhere and is not shown");

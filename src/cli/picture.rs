@@ -7,6 +7,7 @@ use fechner::exr_read::ExrImage;
 use fechner::hdr_read::{HdrHeader, with_known_signature};
 use fechner::jpeg_read;
 use fechner::output::{self, Attribute, NITS_PER_UNIT, PngTransfer};
+use fechner::scene;
 use fechner_perception::Plane;
 use fechner_perception::display::{Display, Eotf, Viewing};
 use fechner_perception::photometry::luminance;
@@ -74,19 +75,14 @@ impl InputPicture {
     }
 
     fn from_exr(path: &Path, exr: &ExrImage, nits_per_unit: Option<f64>) -> Result<Self> {
-        let in_file = || {
-            [NITS_PER_UNIT, "whiteLuminance"].into_iter().find_map(|name| match exr.attribute(name) {
-                Some(Attribute::Float(nits)) if *nits > 0.0 => Some(f64::from(*nits)),
-                _ => None,
-            })
-        };
-        if let (Some(own), Some(asked)) = (in_file(), nits_per_unit) {
+        let own_unit = unit_in_file(path, exr);
+        if let (Some(own), Some(asked)) = (own_unit, nits_per_unit) {
             note(
                 path,
                 &format!("its own unit of {own} cd/m² stands; --nits-per-unit {asked} is for files that do not say it"),
             );
         }
-        let nits_per_unit = in_file().or(nits_per_unit).with_context(|| no_unit(path))?;
+        let nits_per_unit = own_unit.or(nits_per_unit).with_context(|| no_unit(path))?;
         let Some(picture) = exr.scene_picture(picture_channel) else {
             bail!("{}: there are no channels R, G and B, nor Y; `fechner info` lists what there is", path.display());
         };
@@ -330,6 +326,23 @@ fn picture_channel<'a>(exr: &'a ExrImage, name: &str) -> Option<&'a [f32]> {
         "B" => Some(b),
         _ => None,
     }
+}
+
+/// Luminance of RGB (1, 1, 1) as the file says it, where it is one that a picture can have: `whiteLuminance` is written by many and read
+/// by few.
+fn unit_in_file(path: &Path, exr: &ExrImage) -> Option<f64> {
+    let said = [NITS_PER_UNIT, "whiteLuminance"].into_iter().find_map(|name| match exr.attribute(name) {
+        Some(Attribute::Float(nits)) if *nits > 0.0 => Some((name, *nits)),
+        _ => None,
+    });
+    let (name, nits) = said?;
+    // As files round it.
+    let (least, most) = (*scene::NITS_PER_UNIT.start() as f32, *scene::NITS_PER_UNIT.end() as f32);
+    if (least..=most).contains(&nits) {
+        return Some(f64::from(nits));
+    }
+    note(path, &format!("{name} {nits:e} is not a luminance from {least:e} to {most:e} cd/m², and is not looked at"));
+    None
 }
 
 /// Says something of a file, once of all the frames of a sequence, whose names differ by digits.

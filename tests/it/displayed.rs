@@ -250,6 +250,10 @@ fn the_unit_is_for_files_that_do_not_say_theirs() {
     write_exr(&folder.path().join("other.exr"), &other).expect("written");
     let (_, said) = fechner(folder.path(), &["compare", "own.exr", "other.exr", "--nits-per-unit", "25"]);
     assert!(visibility(&said) < 0.01 && said.contains("note: own.exr: its own unit of 1 cd/m"), "{said}");
+    other.push_attribute(NITS_PER_UNIT, Attribute::Float(1e30));
+    write_exr(&folder.path().join("other.exr"), &other).expect("written");
+    let (_, said) = fechner(folder.path(), &["compare", "own.exr", "other.exr", "--nits-per-unit", "25"]);
+    assert!(visibility(&said) < 0.01 && said.contains("nits_per_unit 1e30 is not a luminance"), "{said}");
 }
 
 /// XYZ is a colour like others.
