@@ -24,6 +24,7 @@ mod record;
 mod reference;
 mod report;
 mod runner;
+mod student;
 mod summary;
 mod table;
 mod truth;
@@ -35,6 +36,7 @@ pub use denoise::{Calibration, DenoisingResults, DenoisingSettings, Race, denois
 pub use metrics::{Metrics, measure};
 pub use record::{ArmSummary, Record, Results};
 pub use reference::trace_up_to;
+pub use summary::{GeometricMean, INTERVAL_LEVEL, intervals_in_words};
 
 use crate::adaptive::settings::{Limits, LoopSettings};
 use crate::integrator::{PathTracer, TraceSettings};

@@ -5,7 +5,7 @@ use super::curve::Curve;
 use super::pictures::ShownPicture;
 use super::report::html;
 use super::runner::{EnergyBias, Run};
-use super::summary::{GeometricMean, geometric_mean};
+use super::summary::{GeometricMean, INTERVAL_LEVEL, geometric_mean};
 use super::table::csv;
 use super::{BenchSettings, COVERAGES};
 use anyhow::Result;
@@ -97,6 +97,8 @@ pub struct Results {
     pub display: String,
     /// Seeds of each arm.
     pub seeds: u32,
+    /// Level of the intervals of `summary`.
+    pub interval_level: f64,
     /// One a scene, arm, seed and coverage.
     pub records: Vec<Record>,
     /// Over scenes.
@@ -118,12 +120,13 @@ pub(crate) struct ScenePictures {
 impl Results {
     pub(crate) fn new(settings: &BenchSettings) -> Self {
         Self {
-            schema: 2,
+            schema: 3,
             fechner_version: env!("CARGO_PKG_VERSION"),
             size: settings.size,
             visibility: settings.visibility,
             display: settings.display.clone(),
             seeds: settings.seeds,
+            interval_level: INTERVAL_LEVEL,
             records: Vec::new(),
             summary: Vec::new(),
             curves: Vec::new(),

@@ -5,6 +5,7 @@ use super::pictures::{ShownPicture, heat_codes};
 use super::plot::plots;
 use super::quote::html_text;
 use super::record::{ArmSummary, Record, Results, ScenePictures};
+use super::summary::intervals_in_words;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use std::fmt::Write as _;
@@ -94,7 +95,7 @@ fn summary_table(summary: &[ArmSummary]) -> String {
             if_known(s.efficiency, |mean| mean.in_words())
         );
     }
-    text.push_str("</table></div>\n");
+    let _ = writeln!(text, "</table></div>\n<p class=\"note\">{}</p>", intervals_in_words());
     text
 }
 
