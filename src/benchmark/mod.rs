@@ -46,7 +46,7 @@ use anyhow::{Context, Result};
 use fechner_perception::display::{Display, Viewing};
 use fechner_perception::tone::{self, ToneOperator};
 use name::distinct_names;
-use oracle::{displayed_variance, least_samples, uniform_samples};
+use oracle::{displayed_variance, least_mean_samples, uniform_samples};
 use reference::Reference;
 use runner::ArmRunner;
 use std::path::{Path, PathBuf};
@@ -138,9 +138,9 @@ pub struct Bound {
     pub scene: String,
     /// Share of the picture that has to be at v\*.
     pub coverage: f64,
-    /// Samples a pixel of uniform sampling.
+    /// Samples a pixel of uniform sampling, one at least.
     pub uniform: f64,
-    /// Mean samples a pixel of the cheapest counts.
+    /// Mean samples a pixel of the cheapest counts of one at least: never more than uniform sampling's.
     pub optimum: f64,
 }
 
@@ -162,7 +162,7 @@ pub fn bounds(settings: &BenchSettings, say: &dyn Fn(&str)) -> Result<Vec<Bound>
                 scene: subject.name.clone(),
                 coverage,
                 uniform: uniform_samples(&subject, &truth, &variance, coverage),
-                optimum: least_samples(&truth, &variance, subject.visibility, coverage)?.mean(),
+                optimum: least_mean_samples(&truth, &variance, subject.visibility, coverage)?,
             });
         }
     }
