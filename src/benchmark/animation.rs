@@ -8,6 +8,7 @@ use super::flicker::{FlickerJudge, Steadiness};
 use super::keep::keep;
 use super::metrics::video_jod;
 use super::name::distinct_names;
+use super::reached::Reached;
 use super::reference::trace_up_to;
 use super::{tone_operator, viewing};
 use crate::adaptive::settings::{DENOISED_PILOT_SAMPLES, Limits, LoopSettings, Sampling};
@@ -63,9 +64,8 @@ pub struct AnimationRow {
     pub still_spp: f64,
     /// What they look like as a video.
     pub still_jod: f64,
-    /// Samples a pixel with which evenly sampled frames look like those of the rule for motion; `None` where even the most
-    /// that were tried look worse.
-    pub uniform_spp: Option<f64>,
+    /// Samples a pixel with which evenly sampled frames look like those of the rule for motion.
+    pub uniform_spp: Reached,
     /// Visibility of the error in single frames by the rule for motion, at the 99th percentile.
     pub visibility: f64,
     /// Root mean square visibility of what changes from frame to frame by the rule for motion, what moves brought together.
@@ -203,7 +203,7 @@ impl<'a> Bench<'a> {
             motion_jod,
             still_spp,
             still_jod,
-            uniform_spp: where_reached(&curve, motion_jod),
+            uniform_spp: Reached::by(&curve, motion_jod),
             visibility: steady.visibility,
             flicker: steady.flicker,
             uniform_flicker: flicker_at(&steadiness, steady.visibility),
@@ -272,16 +272,6 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// Samples at which a curve of (samples, quality) first reaches a quality, straight between points in the logarithm.
-fn where_reached(curve: &[(f64, f64)], quality: f64) -> Option<f64> {
-    let first = curve.first().filter(|point| point.1 >= quality);
-    first.map(|point| point.0).or_else(|| {
-        let pair = curve.windows(2).find(|pair| pair[0].1 < quality && pair[1].1 >= quality)?;
-        let share = (quality - pair[0].1) / (pair[1].1 - pair[0].1);
-        Some((pair[0].0.ln() + share * (pair[1].0 / pair[0].0).ln()).exp())
-    })
-}
-
 /// Flicker where the frames of a row of ever more samples have a visibility, straight between points in the logarithms.
 fn flicker_at(steadiness: &[Steadiness], visibility: f64) -> Option<f64> {
     let pair =
@@ -301,13 +291,5 @@ mod tests {
         assert!((flicker_at(&steadiness, 4.0).expect("reached") - 2.0).abs() < 1e-9);
         assert!((flicker_at(&steadiness, 32f64.sqrt()).expect("reached") - 8f64.sqrt()).abs() < 1e-9);
         assert_eq!(flicker_at(&steadiness, 1.0), None);
-    }
-
-    #[test]
-    fn curves_are_read_between_their_points() {
-        let curve = [(4.0, 7.0), (8.0, 8.0), (16.0, 9.0)];
-        assert_eq!(where_reached(&curve, 6.0), Some(4.0));
-        assert!((where_reached(&curve, 8.5).expect("reached") - 128f64.sqrt()).abs() < 1e-9);
-        assert_eq!(where_reached(&curve, 9.5), None);
     }
 }

@@ -2,11 +2,12 @@
 //!
 //! [`denoising`] renders the reference of each scene, then (1) judges uniform renders that are denoised and compares tile by
 //! tile with what can truly be seen of their error, and (2) spends growing budgets by three rules and reads off where the
-//! denoised pictures reach a quality by metrics that none of them optimises. Not for animation.
+//! denoised pictures reach a quality by metrics that none of them optimises (`race.rs`). Not for animation.
 
 use super::keep::{keep, kept_or_made};
 use super::metrics::Metrics;
 use super::name::distinct_names;
+use super::race::{RULES, Race, RaceMean, UNIFORM, compare_with_uniform, means};
 use super::reference::Reference;
 use super::truth::Truth;
 use super::{BenchSettings, Subject, make_folders};
@@ -82,19 +83,6 @@ pub struct Calibration {
     pub overhead: f64,
 }
 
-/// How one rule's pictures get better with samples.
-#[derive(Clone, Debug, Serialize)]
-pub struct Race {
-    /// Scene.
-    pub scene: String,
-    /// Denoiser.
-    pub denoiser: String,
-    /// `uniform`, `relative` or `visible`.
-    pub rule: &'static str,
-    /// Mean samples a pixel, ColorVideoVDP, FLIP, seconds.
-    pub points: Vec<[f64; 4]>,
-}
-
 /// Everything that was found.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct DenoisingResults {
@@ -102,6 +90,8 @@ pub struct DenoisingResults {
     pub calibrations: Vec<Calibration>,
     /// One a scene, denoiser and rule.
     pub races: Vec<Race>,
+    /// Of those, one a rule and quality.
+    pub race_means: Vec<RaceMean>,
 }
 
 /// Runs every scene.
@@ -110,8 +100,8 @@ pub struct DenoisingResults {
 /// Scenes that do not load, denoisers that are not installed, folders that cannot be written.
 pub fn denoising(settings: &DenoisingSettings, say: &dyn Fn(&str)) -> Result<DenoisingResults> {
     let names = distinct_names(&settings.bench.scenes)?;
-    make_folders(&settings.bench)?;
     let denoisers = settings.denoisers.iter().map(|&kind| Denoiser::open(kind)).collect::<Result<Vec<_>, _>>()?;
+    make_folders(&settings.bench)?;
     let mut results = DenoisingResults::default();
     for (path, name) in settings.bench.scenes.iter().zip(names) {
         let subject = Subject::load(path, name, &settings.bench)?;
@@ -126,12 +116,15 @@ pub fn denoising(settings: &DenoisingSettings, say: &dyn Fn(&str)) -> Result<Den
                 }
             }
             if settings.with_races {
-                for rule in ["uniform", "relative", "visible"] {
-                    results.races.push(scene.race(denoiser, rule)?);
-                }
+                let mut races = RULES.into_iter().map(|rule| scene.race(denoiser, rule)).collect::<Result<Vec<_>>>()?;
+                compare_with_uniform(&mut races);
+                results.races.extend(races);
             }
         }
         say(&format!("{}: done", subject.name));
+    }
+    if settings.with_races {
+        results.race_means = means(&results.races);
     }
     keep(&settings.bench.output.join("denoise.json"), &results)?;
     Ok(results)
@@ -216,14 +209,14 @@ impl SceneBench<'_> {
             }
             points.push(sums.map(|sum| sum / f64::from(self.settings.bench.seeds)));
         }
-        Ok(Race { scene: self.subject.name.clone(), denoiser: denoiser.name(), rule, points })
+        Ok(Race { scene: self.subject.name.clone(), denoiser: denoiser.name(), rule, points, needs: Vec::new() })
     }
 
     /// One render of a race: what a point holds.
     fn lap(&self, denoiser: &Denoiser, rule: &str, spp: u32, seed: u64) -> Result<[f64; 4]> {
         let mut settings = self.loop_settings(denoiser, spp)?;
         match rule {
-            "uniform" => {
+            UNIFORM => {
                 settings.sampling = Sampling::Uniform;
                 settings.limits.visibility = None;
                 settings.limits.pilot_samples = spp;
@@ -284,34 +277,6 @@ fn ranks(values: &[f64]) -> Vec<f64> {
         first += equal.len();
     }
     ranks
-}
-
-impl Race {
-    /// Mean samples a pixel at which the denoised picture first has this ColorVideoVDP; `None` where no budget is enough.
-    pub fn samples_to_jod(&self, jod: f64) -> Option<f64> {
-        where_reached(self.points.iter().map(|point| (point[0], point[1])), jod)
-    }
-
-    /// The same to a FLIP at most this large.
-    pub fn samples_to_flip(&self, flip: f64) -> Option<f64> {
-        where_reached(self.points.iter().map(|point| (point[0], -point[2])), -flip)
-    }
-}
-
-/// Samples at which a curve first reaches a quality, straight between points in the logarithm; the first point's where
-/// that is good enough.
-fn where_reached(curve: impl Iterator<Item = (f64, f64)>, quality: f64) -> Option<f64> {
-    let mut last: Option<(f64, f64)> = None;
-    for (samples, found) in curve {
-        if found >= quality {
-            return Some(last.map_or(samples, |(from, before)| {
-                let share = (quality - before) / (found - before);
-                (from.ln() + share * (samples / from).ln()).exp()
-            }));
-        }
-        last = Some((samples, found));
-    }
-    None
 }
 
 #[cfg(test)]

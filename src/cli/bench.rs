@@ -1,13 +1,15 @@
 //! `fechner bench`: what adaptive sampling saves.
 
+mod tables;
+
 use super::animate::parse_rate;
 use super::denoise::DenoiseChoice;
 use super::seeing::{DEFAULT_DISPLAY, parse_positive};
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use fechner::benchmark::{
-    AnimationResults, AnimationRow, AnimationSettings, Arm, ArmSummary, BenchSettings, DenoisingSettings, Race,
-    animation, bounds, denoising, run as run_bench,
+    AnimationResults, AnimationRow, AnimationSettings, Arm, BenchSettings, DenoisingSettings, animation, bounds,
+    denoising, run as run_bench,
 };
 use fechner::denoise::{Denoiser, DenoiserKind};
 use std::path::{Path, PathBuf};
@@ -24,7 +26,7 @@ pub(super) struct BenchArguments {
     /// suites but animation are not made again by the same build of the program.
     #[arg(short, long, value_name = "DIR", default_value = "bench")]
     output: PathBuf,
-    /// Pixels to a side of the square pictures, in place of the suite's.
+    /// Pixels to a side of the square pictures, in the suite animation pixels across pictures of 16:9, in place of the suite's.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(32..=4096))]
     size: Option<u32>,
     /// Visibility that every arm has to reach, in place of the suite's.
@@ -43,7 +45,8 @@ pub(super) struct BenchArguments {
     /// Frames a second of the suite animation, in place of 24 and 60.
     #[arg(long, value_name = "N", value_parser = parse_rate)]
     fps: Option<f64>,
-    /// Only say what uniform sampling and the optimum need by converged variances: what no rule can beat.
+    /// Only say what uniform sampling and the optimum need by converged variances, with one sample in every pixel at least: what
+    /// no rule can beat.
     #[arg(long)]
     bound: bool,
     /// Arms, separated by commas, in place of the suite's.
@@ -108,30 +111,13 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
     };
     let say = |line: &str| say!("{line}");
     if arguments.bound {
-        answer!("| scene | coverage | uniform, spp | optimum, spp | ratio |");
-        answer!("| --- | --- | --- | --- | --- |");
-        for b in bounds(&settings, &say)? {
-            let (share, ratio) = (100.0 * b.coverage, b.uniform / b.optimum);
-            answer!("| {} | {share} % | {:.0} | {:.0} | {ratio:.2} |", b.scene, b.uniform, b.optimum);
-        }
+        tables::print_bounds(&bounds(&settings, &say)?);
         return Ok(());
     }
     let results = run_bench(&settings, &say)?;
-    print_summary(&results.summary);
+    tables::print_summary(&results.summary);
     say!("{}", settings.output.join("report.html").display());
     Ok(())
-}
-
-fn print_summary(summary: &[ArmSummary]) {
-    answer!("| arm | coverage | samples, uniform / arm | worst scene | oracle / arm |");
-    answer!("| --- | --- | --- | --- | --- |");
-    for s in summary {
-        let unknown = || "–".to_owned();
-        let speedup = s.speedup_samples.map_or_else(unknown, |mean| mean.in_words());
-        let least = s.speedup_samples.map_or_else(unknown, |mean| format!("{:.2}", mean.least));
-        let efficiency = s.efficiency.map_or_else(String::new, |e| format!("{:.2} (least {:.2})", e.value, e.least));
-        answer!("| {} | {} % | {speedup} | {least} | {efficiency} |", s.arm, 100.0 * s.coverage);
-    }
 }
 
 /// Refuses options that the suite would not look at.
@@ -180,64 +166,9 @@ fn run_denoise(arguments: &BenchArguments) -> Result<()> {
         with_races: !arguments.law_only,
     };
     let results = denoising(&settings, &|line: &str| say!("{line}"))?;
-    answer!(
-        "| scene | denoiser | spp | rank corr. | predicted / true v | by variance alone | called fine | of it unproven | fine, \
-         proven, wrong | fine, unproven, wrong | truly wrong | JOD raw, denoised | FLIP raw, denoised | overhead |"
-    );
-    answer!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
-    for c in &results.calibrations {
-        let percent = |share: f64| format!("{:.1} %", 100.0 * share);
-        let ratio = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |value| format!("{value:.2}"));
-        answer!(
-            "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {:.2}, {:.2} | {:.3}, {:.3} | {:.2} |",
-            c.scene,
-            c.denoiser,
-            c.spp,
-            ratio(c.rank_correlation),
-            ratio(c.predicted_over_true),
-            ratio(c.variance_over_true),
-            percent(c.fine_share),
-            percent(c.unproven_share),
-            percent(c.wrong_share),
-            percent(c.wrong_unproven_share),
-            percent(c.truly_wrong_share),
-            c.jod_raw,
-            c.jod,
-            c.flip_raw,
-            c.flip,
-            c.overhead
-        );
-    }
-    print_races(&results.races);
+    tables::print_calibrations(&results.calibrations);
+    tables::print_races(&results);
     Ok(())
-}
-
-/// Samples to three qualities by each rule, and uniform's over the others'.
-fn print_races(races: &[Race]) {
-    if races.is_empty() {
-        return;
-    }
-    answer!("\n| scene | denoiser | rule | spp to JOD 9.8 | to JOD 9.9 | to FLIP of uniform at 64 |");
-    answer!("| --- | --- | --- | --- | --- | --- |");
-    for race in races {
-        let uniform =
-            races.iter().find(|r| r.rule == "uniform" && (&r.scene, &r.denoiser) == (&race.scene, &race.denoiser));
-        let at_64 = uniform.and_then(|race| race.points.iter().find(|point| point[0] >= 64.0)).map_or(0.0, |p| p[2]);
-        let cell = |needed: &dyn Fn(&Race) -> Option<f64>| match (needed(race), uniform.and_then(needed)) {
-            (Some(own), Some(uniform)) => format!("{own:.1} ({:.2})", uniform / own),
-            (Some(own), None) => format!("{own:.1}"),
-            (None, _) => "more than tried".to_owned(),
-        };
-        answer!(
-            "| {} | {} | {} | {} | {} | {} |",
-            race.scene,
-            race.denoiser,
-            race.rule,
-            cell(&|race: &Race| race.samples_to_jod(9.8)),
-            cell(&|race: &Race| race.samples_to_jod(9.9)),
-            cell(&|race: &Race| race.samples_to_flip(at_64))
-        );
-    }
 }
 
 /// The denoisers that are asked for, or those of the suite.
@@ -250,12 +181,15 @@ fn denoisers_or<'a>(
 }
 
 fn run_animations(arguments: &BenchArguments) -> Result<()> {
+    // All of them before the first frame: what is not installed is told of before hours of others.
+    let open =
+        |kind: Option<DenoiserKind>| Ok((kind, kind.map(Denoiser::open).transpose()?.map(|opened| opened.name())));
+    let denoisers = denoisers_or(&[DenoiseChoice::None], arguments).map(open).collect::<Result<Vec<_>>>()?;
     let file = AnimationResults::file(&arguments.output)?;
     let mut results = Vec::new();
-    for denoiser in denoisers_or(&[DenoiseChoice::None], arguments) {
-        let rows = run_animation(arguments, denoiser)?;
-        let denoiser = denoiser.map(Denoiser::open).transpose()?.map(|denoiser| denoiser.name());
-        print_animation(denoiser.as_deref(), &rows);
+    for (kind, denoiser) in denoisers {
+        let rows = run_animation(arguments, kind)?;
+        tables::print_animation(denoiser.as_deref(), &rows);
         results.push(AnimationResults { denoiser, rows });
         AnimationResults::write(&results, &file)?;
     }
@@ -276,48 +210,6 @@ fn run_animation(arguments: &BenchArguments, denoiser: Option<DenoiserKind>) -> 
         denoiser,
     };
     animation(&settings, &|line: &str| say!("{line}"))
-}
-
-fn print_animation(denoiser: Option<&str>, rows: &[AnimationRow]) {
-    if let Some(denoiser) = denoiser {
-        answer!("All but the references denoised by {denoiser}:\n");
-    }
-    answer!(
-        "| shot | frames a second | motion: spp, JOD | still: spp, JOD | still / motion | even, as good: spp | even / motion | \
-         flicker | of even, at equal visibility |"
-    );
-    answer!("| --- | --- | --- | --- | --- | --- | --- | --- | --- |");
-    for row in rows {
-        let ratio = row.still_spp / row.motion_spp;
-        let even = row
-            .uniform_spp
-            .map_or_else(|| "more than tried | ".to_owned(), |spp| format!("{spp:.0} | {:.2}", spp / row.motion_spp));
-        let AnimationRow { scene, frames_per_second, motion_spp, motion_jod, still_spp, still_jod, flicker, .. } = row;
-        let even_flicker = row.uniform_flicker.map_or_else(|| "not tried".to_owned(), |even| format!("{even:.2}"));
-        answer!(
-            "| {scene} | {frames_per_second} | {motion_spp:.0}, {motion_jod:.2} | {still_spp:.0}, {still_jod:.2} | \
-             {ratio:.2} | {even} | {flicker:.2} | {even_flicker} |"
-        );
-    }
-    let mut rates: Vec<f64> = rows.iter().map(|row| row.frames_per_second).collect();
-    rates.sort_by(f64::total_cmp);
-    rates.dedup();
-    for rate in rates {
-        let of_rate = || rows.iter().filter(|row| row.frames_per_second == rate);
-        let still = geometric_mean(of_rate().map(|row| row.still_spp / row.motion_spp));
-        let even = geometric_mean(of_rate().filter_map(|row| Some(row.uniform_spp? / row.motion_spp)));
-        let flicker = geometric_mean(of_rate().filter_map(|row| Some(row.flicker / row.uniform_flicker?)));
-        answer!("at {rate}: still / motion {still}, even / motion {even}, flicker over that of even {flicker}");
-    }
-}
-
-/// A geometric mean in words.
-fn geometric_mean(values: impl Iterator<Item = f64>) -> String {
-    let logarithms: Vec<f64> = values.map(f64::ln).collect();
-    if logarithms.is_empty() {
-        return "–".to_owned();
-    }
-    format!("{:.2}", (logarithms.iter().sum::<f64>() / logarithms.len() as f64).exp())
 }
 
 /// Arms by name, and those that others are compared with.

@@ -1,0 +1,130 @@
+//! How denoised pictures get better with samples by three rules, and what each rule needs for a quality.
+
+use super::reached::Reached;
+use serde::Serialize;
+
+/// The rule that others are compared with.
+pub(super) const UNIFORM: &str = "uniform";
+/// Rules that race.
+pub(super) const RULES: [&str; 3] = [UNIFORM, "relative", "visible"];
+/// What the race is to.
+pub const QUALITIES: [&str; 3] = ["JOD 9.8", "JOD 9.9", "FLIP of uniform at 64"];
+
+/// How one rule's pictures get better with samples.
+#[derive(Clone, Debug, Serialize)]
+pub struct Race {
+    /// Scene.
+    pub scene: String,
+    /// Denoiser.
+    pub denoiser: String,
+    /// `uniform`, `relative` or `visible`.
+    pub rule: &'static str,
+    /// Mean samples a pixel, ColorVideoVDP, FLIP, seconds.
+    pub points: Vec<[f64; 4]>,
+    /// What it needs for each of [`QUALITIES`].
+    pub needs: Vec<Need>,
+}
+
+/// What a rule needs for a quality.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Need {
+    /// One of [`QUALITIES`].
+    pub quality: &'static str,
+    /// Mean samples a pixel.
+    pub samples: Reached,
+    /// Uniform sampling's over these; `None` where one of the two is a bound.
+    pub uniform_over: Option<f64>,
+}
+
+/// Uniform sampling's need over a rule's, in geometric mean of scenes and denoisers.
+#[derive(Clone, Debug, Serialize)]
+pub struct RaceMean {
+    /// The rule.
+    pub rule: &'static str,
+    /// One of [`QUALITIES`].
+    pub quality: &'static str,
+    /// The mean; `None` where no pair has a ratio.
+    pub uniform_over: Option<f64>,
+    /// Pairs of races that it is the mean of.
+    pub pairs: usize,
+    /// Pairs without a ratio, since one of the two is a bound.
+    pub pairs_left_out: usize,
+}
+
+/// Fills in what each rule needs, of the races of one scene with one denoiser.
+pub(super) fn compare_with_uniform(races: &mut [Race]) {
+    let Some(uniform) = races.iter().find(|race| race.rule == UNIFORM).cloned() else { return };
+    let flip = uniform.points.iter().find(|point| point[0] >= 64.0).map_or(0.0, |point| point[2]);
+    let needs = |race: &Race| [race.to_jod(9.8), race.to_jod(9.9), race.to_flip(flip)];
+    let of_uniform = needs(&uniform);
+    for race in races {
+        let compared = QUALITIES.into_iter().zip(needs(race)).zip(of_uniform);
+        let need = |((quality, samples), uniform): ((&'static str, Reached), Reached)| {
+            let uniform_over = uniform.known().zip(samples.known()).map(|(uniform, own)| uniform / own);
+            Need { quality, samples, uniform_over }
+        };
+        race.needs = compared.map(need).collect();
+    }
+}
+
+/// Means of every rule but uniform sampling.
+pub(super) fn means(races: &[Race]) -> Vec<RaceMean> {
+    let rules = RULES.into_iter().filter(|&rule| rule != UNIFORM);
+    let each = rules.flat_map(|rule| QUALITIES.into_iter().map(move |quality| (rule, quality)));
+    each.map(|(rule, quality)| {
+        let of_rule = races.iter().filter(|race| race.rule == rule).flat_map(|race| &race.needs);
+        let needs: Vec<&Need> = of_rule.filter(|need| need.quality == quality).collect();
+        let logs: Vec<f64> = needs.iter().filter_map(|need| need.uniform_over).map(f64::ln).collect();
+        let uniform_over = (!logs.is_empty()).then(|| (logs.iter().sum::<f64>() / logs.len() as f64).exp());
+        RaceMean { rule, quality, uniform_over, pairs: logs.len(), pairs_left_out: needs.len() - logs.len() }
+    })
+    .collect()
+}
+
+impl Race {
+    /// Where the denoised picture first has this ColorVideoVDP.
+    fn to_jod(&self, jod: f64) -> Reached {
+        let curve: Vec<(f64, f64)> = self.points.iter().map(|point| (point[0], point[1])).collect();
+        Reached::by(&curve, jod)
+    }
+
+    /// Where it first has a FLIP at most this large.
+    fn to_flip(&self, flip: f64) -> Reached {
+        let curve: Vec<(f64, f64)> = self.points.iter().map(|point| (point[0], -point[2])).collect();
+        Reached::by(&curve, -flip)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn race(scene: &str, rule: &'static str, points: &[[f64; 3]]) -> Race {
+        let points = points.iter().map(|&[spp, jod, flip]| [spp, jod, flip, 1.0]).collect();
+        Race { scene: scene.to_owned(), denoiser: "none".to_owned(), rule, points, needs: Vec::new() }
+    }
+
+    /// A rule that begins beyond the goal has no ratio, and the mean says that it leaves the pair out.
+    #[test]
+    fn bounds_have_no_ratios() {
+        let uniform = [[16.0, 9.7, 0.2], [32.0, 9.8, 0.1], [64.0, 9.85, 0.05]];
+        let mut easy =
+            [race("easy", "uniform", &uniform), race("easy", "relative", &[[32.0, 9.82, 0.1], [64.0, 9.9, 0.02]])];
+        let mut hard =
+            [race("hard", "uniform", &uniform), race("hard", "relative", &[[8.0, 9.6, 0.3], [16.0, 9.8, 0.05]])];
+        compare_with_uniform(&mut easy);
+        compare_with_uniform(&mut hard);
+        let need = &easy[1].needs[0];
+        assert_eq!((need.samples, need.uniform_over), (Reached::AtMost(32.0), None));
+        // Uniform sampling does not come to JOD 9.9.
+        assert_eq!((easy[0].needs[1].samples, easy[1].needs[1].uniform_over), (Reached::MoreThan(64.0), None));
+        let means = means(&[easy, hard].concat());
+        let of = |quality: &str| {
+            let mean = means.iter().find(|mean| mean.rule == "relative" && mean.quality == quality).expect("there");
+            (mean.uniform_over.map(|ratio| (100.0 * ratio).round()), mean.pairs, mean.pairs_left_out)
+        };
+        assert_eq!(of("JOD 9.8"), (Some(200.0), 1, 1));
+        assert_eq!(of("JOD 9.9"), (None, 0, 2));
+        assert_eq!(of("FLIP of uniform at 64").1, 2);
+    }
+}
