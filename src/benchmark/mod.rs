@@ -38,7 +38,7 @@ pub use denoise::{Calibration, DenoisingResults, DenoisingSettings, denoising};
 pub use metrics::{Metrics, measure};
 pub use race::{Need, QUALITIES, Race, RaceMean};
 pub use reached::Reached;
-pub use record::{ArmSummary, Record, Results};
+pub use record::{ArmSummary, Record, ReferenceOf, Results};
 pub use reference::trace_up_to;
 pub use summary::{GeometricMean, INTERVAL_LEVEL, intervals_in_words};
 
@@ -154,6 +154,7 @@ pub struct Bound {
 /// As [`run`].
 pub fn bounds(settings: &BenchSettings, say: &dyn Fn(&str)) -> Result<Vec<Bound>> {
     let names = distinct_names(&settings.scenes)?;
+    check_later_scenes(&settings.scenes)?;
     make_folders(settings)?;
     let mut bounds = Vec::new();
     for (path, name) in settings.scenes.iter().zip(names) {
@@ -173,6 +174,18 @@ pub fn bounds(settings: &BenchSettings, say: &dyn Fn(&str)) -> Result<Vec<Bound>
     Ok(bounds)
 }
 
+/// Loads every scene but the first, which is about to be loaded anyway: what is missing or broken late in a list is told of before
+/// hours are spent on those before it. [`animation()`] leaves this to its caller, who may call it once a denoiser.
+///
+/// # Errors
+/// Scenes that do not load, or ask for a tone operator that there is not.
+pub fn check_later_scenes(scenes: &[PathBuf]) -> Result<()> {
+    for path in scenes.iter().skip(1) {
+        tone_operator(&load(path, &LoadOptions::default())?).with_context(|| path.display().to_string())?;
+    }
+    Ok(())
+}
+
 fn make_folders(settings: &BenchSettings) -> Result<()> {
     for folder in ["runs", "references"] {
         let folder = settings.output.join(folder);
@@ -187,11 +200,17 @@ fn make_folders(settings: &BenchSettings) -> Result<()> {
 /// Scenes that do not load, and folders that cannot be written.
 pub fn run(settings: &BenchSettings, say: &dyn Fn(&str)) -> Result<Results> {
     let names = distinct_names(&settings.scenes)?;
+    check_later_scenes(&settings.scenes)?;
     make_folders(settings)?;
     let mut results = Results::new(settings);
     for (path, name) in settings.scenes.iter().zip(names) {
         let subject = Subject::load(path, name, settings)?;
         let reference = Reference::cached(&subject, settings, say)?;
+        results.references.push(ReferenceOf {
+            scene: subject.name.clone(),
+            spp: reference.spp,
+            uniform_spp: reference.uniform_spp,
+        });
         let truth = Truth::new(&subject, &reference)?;
         let mut runner = ArmRunner::new(&subject, &reference, &truth, settings);
         for &arm in &settings.arms {

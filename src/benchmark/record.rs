@@ -82,6 +82,17 @@ pub struct ArmSummary {
     pub efficiency: Option<GeometricMean>,
 }
 
+/// What a scene was judged against.
+#[derive(Clone, Debug, Serialize)]
+pub struct ReferenceOf {
+    /// Scene.
+    pub scene: String,
+    /// Samples a pixel of its reference.
+    pub spp: u32,
+    /// Samples a pixel that uniform sampling was found to need for v\* on 99 %, of which `reference_factor` is a multiple.
+    pub uniform_spp: f64,
+}
+
 /// All results.
 #[derive(Clone, Debug, Serialize)]
 pub struct Results {
@@ -97,6 +108,12 @@ pub struct Results {
     pub display: String,
     /// Seeds of each arm.
     pub seeds: u32,
+    /// Arms, in the order in which they ran.
+    pub arms: Vec<&'static str>,
+    /// Samples of the references that were asked for, as a multiple of what uniform sampling needs.
+    pub reference_factor: f64,
+    /// References, one a scene.
+    pub references: Vec<ReferenceOf>,
     /// Level of the intervals of `summary`.
     pub interval_level: f64,
     /// One a scene, arm, seed and coverage.
@@ -126,6 +143,9 @@ impl Results {
             visibility: settings.visibility,
             display: settings.display.clone(),
             seeds: settings.seeds,
+            arms: settings.arms.iter().map(|arm| arm.name()).collect(),
+            reference_factor: settings.reference_factor,
+            references: Vec::new(),
             interval_level: INTERVAL_LEVEL,
             records: Vec::new(),
             summary: Vec::new(),

@@ -70,8 +70,8 @@ impl Reference {
             let reached = judge(&film, &settings, 1.0)?.predicted.quantile(0.99) / subject.visibility;
             let needed = f64::from(spp) * reached * reached;
             if needed <= f64::from(spp) || f64::from(spp) >= MOST_SAMPLES {
-                // A picture without noise needs none; no render takes fewer than one.
-                break needed.max(1.0);
+                // A picture without noise needs none; no render takes fewer than one. As it is kept: a run that goes on has the same.
+                break f64::from(needed.max(1.0) as f32);
             }
             spp *= 2;
         };

@@ -9,7 +9,7 @@ use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use fechner::benchmark::{
     AnimationResults, AnimationRow, AnimationSettings, Arm, BenchSettings, DenoisingSettings, animation, bounds,
-    denoising, run as run_bench,
+    check_later_scenes, denoising, run as run_bench,
 };
 use fechner::denoise::{Denoiser, DenoiserKind};
 use std::path::{Path, PathBuf};
@@ -139,6 +139,11 @@ fn check_suite(arguments: &BenchArguments) -> Result<()> {
             bail!("{option} is for --suite {suites}: this suite does not look at it");
         }
     }
+    for (option, is_given) in [("--arms", !arguments.arms.is_empty()), ("--seeds", arguments.seeds.is_some())] {
+        if is_given && arguments.bound {
+            bail!("{option} is not for --bound, which renders nothing but references: leave one of them out");
+        }
+    }
     if is_denoise && arguments.denoise.iter().any(|choice| choice.kind().is_none()) {
         bail!("--denoise none: the suite denoise judges denoised pictures; name builtin or oidn");
     }
@@ -185,6 +190,7 @@ fn run_animations(arguments: &BenchArguments) -> Result<()> {
     let open =
         |kind: Option<DenoiserKind>| Ok((kind, kind.map(Denoiser::open).transpose()?.map(|opened| opened.name())));
     let denoisers = denoisers_or(&[DenoiseChoice::None], arguments).map(open).collect::<Result<Vec<_>>>()?;
+    check_later_scenes(&scenes_or(&SHOTS, arguments)?)?;
     let file = AnimationResults::file(&arguments.output)?;
     let mut results = Vec::new();
     for (kind, denoiser) in denoisers {

@@ -21,6 +21,13 @@ fn results_are_complete_and_a_second_run_goes_on() {
     };
     let found = results();
     let records = found["records"].as_array().expect("records");
+    assert_eq!(found["reference_factor"], 4.0);
+    assert_eq!((&found["arms"][0], &found["arms"][7]), (&"uniform".into(), &"oracle".into()));
+    assert_eq!(
+        (&found["references"][0]["scene"], &found["references"][0]["spp"]),
+        (&"cornell-box".into(), &512.into())
+    );
+    assert_eq!(found["interval_level"], 0.95);
     // Eight arms, two seeds and both together, three coverages.
     assert_eq!(records.len(), 8 * 3 * 3);
     for record in records {
@@ -32,6 +39,8 @@ fn results_are_complete_and_a_second_run_goes_on() {
     }
     let report = std::fs::read_to_string(folder.path().join("report.html")).expect("written");
     assert!(report.contains("data:image/png;base64,") && report.contains("</html>"));
+    let (table, printed) = (String::from_utf8_lossy(&first.stdout), "95 % intervals by the scatter between seeds");
+    assert!(report.contains(printed) && table.contains(printed), "{table}");
     for part in [
         "name=\"viewport\"",
         "prefers-color-scheme: dark",
@@ -97,6 +106,41 @@ fn bounds_need_no_arms_and_unknown_arms_are_refused() {
     assert!(String::from_utf8_lossy(&refused.stderr).contains("there is no arm \"magic\""));
 }
 
+/// Uniform sampling is a rule like others: its samples are enough for the optimum, too, where it needs fewer than a pilot.
+#[test]
+fn no_rule_beats_the_bound() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let bound = bench(folder.path(), &["--bound"]);
+    let table = String::from_utf8_lossy(&bound.stdout).into_owned();
+    for row in table.lines().skip(2) {
+        let figure =
+            |cell: usize| -> f64 { row.split('|').nth(cell).and_then(|c| c.trim().parse().ok()).unwrap_or(0.0) };
+        assert!(figure(3) < 16.0 && figure(5) >= 1.0, "{table}");
+    }
+}
+
+/// What is not installed is told of before the first denoiser's hours.
+#[test]
+fn denoisers_of_shots_are_opened_first() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/rolling-ball.toml");
+    let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+    command.arg("bench").arg(scene).args([
+        "--suite",
+        "animation",
+        "--size",
+        "32",
+        "--fps",
+        "24",
+        "--reference-factor",
+        "1",
+    ]);
+    command.args(["--denoise", "none,oidn", "-o", "out"]).env("OIDN_DIR", folder.path()).current_dir(folder.path());
+    let run = command.output().expect("runs");
+    assert_eq!((run.status.code(), run.stdout.len()), (Some(2), 0), "{}", String::from_utf8_lossy(&run.stderr));
+    assert!(!folder.path().join("out").exists(), "something was run");
+}
+
 /// A scene is judged as it is shown: one that is exposed four stops darker has less noise to be seen.
 #[test]
 fn scenes_are_judged_at_their_own_exposure() {
@@ -132,24 +176,17 @@ fn scenes_without_noise_or_light_have_tables() {
     }
     let run = |more: &[&str]| {
         let mut command = Command::cargo_bin("fechner").expect("the binary is built");
-        command.args([
-            "bench",
-            "flat.toml",
-            "black.toml",
-            "--size",
-            "32",
-            "--seeds",
-            "1",
-            "--reference-factor",
-            "0.25",
-        ]);
+        command.args(["bench", "flat.toml", "black.toml", "--size", "32", "--reference-factor", "0.25"]);
         command.args(["-o", "out"]).args(more).current_dir(folder.path());
         let run = command.output().expect("runs");
         let said = String::from_utf8_lossy(&[run.stdout, run.stderr].concat()).into_owned();
         assert!(run.status.success() && !said.contains("NaN") && !said.contains("inf"), "{more:?}: {said}");
+        said
     };
-    run(&["--arms", "uniform,relative,as-asked,oracle"]);
-    run(&["--suite", "denoise", "--denoise", "builtin", "--law-only"]);
+    run(&["--arms", "uniform,relative,as-asked,oracle", "--seeds", "1"]);
+    run(&["--suite", "denoise", "--denoise", "builtin", "--law-only", "--seeds", "1"]);
+    let table = run(&["--bound"]);
+    assert_eq!(table.matches("| 1.0 | 1.0 | 1.00 |").count(), 6, "{table}");
     for name in ["results.csv", "report.html"] {
         let text = std::fs::read_to_string(folder.path().join("out").join(name)).expect("written");
         assert!(!text.contains("NaN") && !text.contains("inf,"), "{name}");
@@ -212,6 +249,8 @@ fn the_suite_animation_writes_its_rows() {
     let results: serde_json::Value = serde_json::from_slice(&text).expect("JSON");
     assert!(results[0]["denoiser"].is_null());
     assert_eq!(results[0]["rows"][0]["scene"], "rolling-ball");
+    let even = results[0]["rows"][0]["uniform_spp"].as_object().expect("samples or a bound");
+    assert!(["about", "at_most", "more_than"].iter().any(|key| even.contains_key(*key)), "{even:?}");
 }
 
 /// One line of what is wrong and what would be right, before anything is rendered.

@@ -286,6 +286,11 @@ fn bad_arguments_are_refused_in_one_line() {
         bench(&["--suite", suite, "--arms", "tvi"], &["--arms is for --suite quick and full"]);
     }
     bench(&["--suite", "animation", "--seeds", "2"], &["--seeds is for"]);
+    bench(&["--bound", "--arms", "tvi"], &["--arms is not for --bound"]);
+    bench(&["--bound", "--seeds", "2"], &["--seeds is not for --bound"]);
+    for more in [&["--bound"][..], &["--suite", "denoise", "--denoise", "builtin"], &["--suite", "animation"], &[]] {
+        bench(&[&["missing.toml"], more].concat(), &["missing.toml: no such file"]);
+    }
     assert_refused(&["bench", cornell, cornell], at, &["named twice"]);
     assert_refused(&["info", "missing.exr"], at, &["missing.exr"]);
     assert_eq!(std::fs::read_dir(at).expect("readable").count(), 0, "something was written");
