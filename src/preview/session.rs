@@ -242,6 +242,8 @@ impl<'a> Session<'a> {
             Err(error) => {
                 self.problems.meet(Cause::Look, error.to_string());
                 self.state = RenderState::new(width, height, &self.settings.limits);
+                // What waits for this picture would wait for ever.
+                self.waiting.clear();
                 self.phase = Phase::Paused;
             }
         }

@@ -19,11 +19,11 @@ use std::time::Instant;
 impl Session<'_> {
     pub(super) fn obey(&mut self, command: Command) {
         if self.must_wait(&command) {
-            self.waiting.push(command);
+            self.let_wait(command);
             return;
         }
-        // Not from viewers, who have done nothing that would end it.
-        if !matches!(command, Command::Redraw) {
+        // Not from viewers, who have done nothing that would end it, or a pause that comes back after a file.
+        if !matches!(command, Command::Redraw | Command::Pause) {
             self.note = None;
         }
         if self.phase == Phase::Moving && !command.suits_motion() {
@@ -73,7 +73,7 @@ impl Session<'_> {
         self.moved_at = Some(Instant::now());
     }
 
-    fn go_on(&mut self) {
+    pub(super) fn go_on(&mut self) {
         self.last_look = None;
         self.phase = Phase::Rendering;
     }

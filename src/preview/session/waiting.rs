@@ -7,15 +7,28 @@ use crate::preview::command::{Command, Phase};
 use crate::sampler::Half;
 
 impl Session<'_> {
-    /// Whether it would be done to a picture before the one that it is meant for, or to one that is not whole.
+    /// Whether it would be done to a picture before the one that it is meant for, or to one that is not whole. What has stopped is
+    /// as whole as its limits let it be.
     pub(super) fn must_wait(&self, command: &Command) -> bool {
         let is_in_motion = self.has_moved || self.phase == Phase::Moving;
-        let is_whole = || self.phase != Phase::Rendering || is_whole(&self.state);
+        let is_whole = || self.phase == Phase::Stopped || is_whole(&self.state);
         match command {
             // A pause must not overtake what waits for samples.
             Command::Pause => is_in_motion || !self.waiting.is_empty(),
             Command::Stop | Command::Save { .. } => is_in_motion || !is_whole(),
             _ => false,
+        }
+    }
+
+    /// Keeps a command until it can be done. A pause in the first pass ends for what needs all of that pass, and comes back after a file.
+    pub(super) fn let_wait(&mut self, command: Command) {
+        let is_file = matches!(command, Command::Save { .. });
+        let breaks_a_pause = self.phase == Phase::Paused && !self.has_moved;
+        self.waiting.push(command);
+        if breaks_a_pause {
+            self.waiting.extend(is_file.then_some(Command::Pause));
+            self.note = Some("the first pass over the picture is traced to its end before".to_owned());
+            self.go_on();
         }
     }
 

@@ -1,6 +1,6 @@
 //! What viewers ask for while something else is under way, and what becomes of it.
 
-use super::{View, cornell_box, is_stopped};
+use super::{View, Viewer, cornell_box, is_stopped};
 use serde_json::{Value, json};
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
@@ -42,6 +42,34 @@ fn a_picture_in_motion_is_stopped_paused_and_saved_where_it_comes_to() {
         assert_ne!(status["camera"], home["camera"]);
         assert!(status["total_samples"].as_u64() >= Some(2048), "{rest}: {status}");
     }
+}
+
+/// A pause in the first pass does not make files of black pixels: that pass is traced to its end for a file, and the pause goes on.
+#[test]
+fn a_picture_that_was_paused_early_is_saved_whole() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let view = View::of_size("320x240", &cornell_box(), folder.path(), &["--visibility", "1"]);
+    let mut viewer = view.viewer();
+    let early = |status: &Value| status["phase"] == "paused" && status["mean_samples"].as_f64() < Some(2.0);
+    let pause = |viewer: &mut Viewer| {
+        viewer.status("the first samples", |status| {
+            status["phase"] == "rendering" && status["mean_samples"].as_f64().is_some_and(|mean| mean > 0.0 && mean < 2.0)
+        });
+        viewer.send(&json!({ "do": "pause" }));
+        viewer.status("an early rest", early);
+    };
+    pause(&mut viewer);
+    let saved = viewer.saved(folder.path(), "exr", "cornell-box-1.exr");
+    let picture = fechner::exr_read::decode_exr(Path::new("saved"), &saved).expect("a picture");
+    let samples = picture.channel("samples.Y").expect("samples");
+    let unseen = samples.iter().filter(|&&samples| samples < 2.0).count();
+    assert_eq!(unseen, 0, "pixels without samples");
+    viewer.status("the rest again", |status| status["phase"] == "paused");
+    viewer.send(&json!({ "do": "restart" }));
+    pause(&mut viewer);
+    viewer.send(&json!({ "do": "stop" }));
+    let stopped = viewer.status("a stop", is_stopped);
+    assert!(stopped["mean_samples"].as_f64() >= Some(2.0), "{stopped}");
 }
 
 /// A camera that moves during the look that a file takes does not take the file away.
