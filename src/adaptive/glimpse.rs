@@ -7,7 +7,7 @@ use super::judge::guide_rgb;
 use super::plan::pilot_plan;
 use crate::film::Film;
 use crate::integrator::{PathTracer, TraceSettings};
-use crate::scene::Scene;
+use crate::scene::{Camera, Scene};
 use fechner_perception::tone::{SceneLight, ToneOperator};
 use std::sync::Arc;
 
@@ -25,8 +25,32 @@ pub fn glimpse(
     nits_per_unit: f64,
     operator: Option<&dyn ToneOperator>,
 ) -> SceneLight {
+    light_seen_by(&PathTracer::new(scene, small(trace)), nits_per_unit, operator)
+}
+
+/// The same from where a camera is now, by a tracer that is there and works by the same settings again in the end.
+pub fn glimpse_from(
+    camera: &Camera,
+    tracer: &mut PathTracer,
+    trace: &TraceSettings,
+    nits_per_unit: f64,
+    operator: Option<&dyn ToneOperator>,
+) -> SceneLight {
+    let before = *tracer.settings();
+    tracer.set_view(camera, small(trace));
+    let light = light_seen_by(tracer, nits_per_unit, operator);
+    tracer.set_view(camera, before);
+    light
+}
+
+/// Settings of a small picture of the whole.
+fn small(trace: &TraceSettings) -> TraceSettings {
     let (width, height) = glimpse_size(trace.width, trace.height);
-    let tracer = PathTracer::new(scene, TraceSettings { width, height, crop: None, ..*trace });
+    TraceSettings { width, height, crop: None, ..*trace }
+}
+
+fn light_seen_by(tracer: &PathTracer, nits_per_unit: f64, operator: Option<&dyn ToneOperator>) -> SceneLight {
+    let TraceSettings { width, height, .. } = *tracer.settings();
     let mut film = Film::new(width, height);
     tracer.trace(&pilot_plan(&film, samples_per_pixel(width, height)), &mut film, &|_| {});
     let rgb_cd_m2 = guide_rgb(&film, &film.estimate(nits_per_unit));

@@ -214,7 +214,14 @@ impl PathTracer {
         self.look_around();
     }
 
-    /// The settings it was made with.
+    /// The same by other settings, such as for a picture of another size.
+    pub fn set_view(&mut self, camera: &Camera, settings: TraceSettings) {
+        self.thresholds = settings.prune.map(ThresholdTable::new);
+        self.settings = settings;
+        self.set_camera(camera);
+    }
+
+    /// The settings it works by.
     pub fn settings(&self) -> &TraceSettings {
         &self.settings
     }

@@ -58,7 +58,7 @@ pub struct Job {
     pub limits: Limits,
     /// What thresholds are multiplied by.
     pub importance: Option<Plane>,
-    /// How light the whole is of which the picture is a part: what the operator is fitted to, whichever it is.
+    /// How light the whole is of which the picture is a part, seen by the scene's camera: what the operator is fitted to, whichever it is.
     pub whole: Option<SceneLight>,
 }
 

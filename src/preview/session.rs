@@ -18,11 +18,13 @@ use super::orbit::Held;
 use super::screen::{Looked, Scenery, Screen};
 use super::shared::Shared;
 use super::{Host, Job, Options};
+use crate::adaptive::glimpse::glimpse_from;
 use crate::adaptive::judge::{JudgeError, Judgement, judge};
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::state::RenderState;
 use crate::adaptive::{LastLook, Progress, run as run_loop};
-use crate::integrator::{Crop, PathTracer};
+use crate::integrator::{Crop, PathTracer, TraceSettings};
+use fechner_perception::tone::SceneLight;
 use gaze::Follower;
 use live::{Live, settings_of};
 use motion::Neighbours;
@@ -91,6 +93,8 @@ struct Session<'a> {
     /// Until the film shows more.
     glimpse: Option<Glimpse>,
     tracer: PathTracer,
+    /// How light the whole is of which the picture is a part, seen by a camera that is not the scene's.
+    whole_from_elsewhere: Option<SceneLight>,
     settings: LoopSettings,
     phase: Phase,
     state: RenderState,
@@ -110,7 +114,7 @@ struct Session<'a> {
 impl<'a> Session<'a> {
     fn new(job: Job, host: &'a Arc<dyn Host>, options: &mut Options, shared: &'a Arc<Shared>) -> Result<Self, String> {
         let live = Live::default();
-        let settings = interruptible(settings_of(&job, &live)?, shared);
+        let settings = interruptible(settings_of(&job, &live, job.whole.as_ref())?, shared);
         let tracer = PathTracer::new(Arc::clone(&job.scene), job.trace);
         Ok(Self {
             host,
@@ -123,6 +127,7 @@ impl<'a> Session<'a> {
             resolution: Resolution::new(),
             glimpse: None,
             tracer,
+            whole_from_elsewhere: None,
             phase: Phase::Moving,
             state: RenderState::new(0, 0, &settings.limits),
             last_look: None,
@@ -186,6 +191,7 @@ impl<'a> Session<'a> {
     /// Throws all samples away and begins anew.
     fn restart(&mut self) {
         let Crop { width, height, .. } = self.job.trace.film_area();
+        self.fit_to_whole();
         self.state = RenderState::new(width, height, &self.settings.limits);
         self.order_pilot();
         self.phase = Phase::Rendering;
@@ -193,6 +199,26 @@ impl<'a> Session<'a> {
         self.progress = None;
         self.screen.begin();
         self.forget_motion();
+    }
+
+    /// Fits tone to the whole as it is seen from here, as `render` would. From home the job knows it; if it does not, there is no whole, or
+    /// it is too large to be looked at.
+    fn fit_to_whole(&mut self) {
+        self.whole_from_elsewhere = self.job.whole.as_ref().filter(|_| !self.held.is_home).map(|_| {
+            // Films of other seeds are shown alike.
+            let trace = TraceSettings { seed: 0, ..self.job.trace };
+            let nits_per_unit = self.settings.nits_per_unit;
+            let light = glimpse_from(&self.held.camera, &mut self.tracer, &trace, nits_per_unit, None);
+            SceneLight::stacked(&[&light], trace.width as usize, trace.height as usize)
+        });
+        // Not by the function below, which borrows the settings too.
+        if let Some(whole) = self.whole_from_elsewhere.as_ref().or(self.job.whole.as_ref()) {
+            self.settings.fit_to(whole);
+        }
+    }
+
+    fn whole(&self) -> Option<&SceneLight> {
+        self.whole_from_elsewhere.as_ref().or(self.job.whole.as_ref())
     }
 
     fn order_pilot(&mut self) {

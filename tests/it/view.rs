@@ -238,6 +238,36 @@ fn a_part_is_saved_where_it_lies() {
     assert!(saved == rendered(folder.path(), &arguments, "part.exr"), "the EXR differs");
 }
 
+/// A part that is seen from elsewhere has the exposure that `render` gives it there, not the one from home.
+#[test]
+fn a_part_is_as_bright_as_its_whole_from_another_camera() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let arguments = ["--visibility", "8", "--crop", "12,18,12,10", "--operator", "reinhard02"];
+    let view = View::of(&cornell_box(), folder.path(), &arguments);
+    let mut viewer = view.viewer();
+    let home = viewer.status("the end", is_stopped);
+    viewer.send(&json!({ "do": "camera", "by": "dolly", "steps": 6.0 }));
+    let moved = viewer.status("another camera", |status| status["camera"] != home["camera"] && is_stopped(status));
+    viewer.saved(folder.path(), "png", "cornell-box-1.png");
+
+    let copied = with_camera(&cornell_box(), moved["camera"].as_str().expect("TOML"));
+    std::fs::write(folder.path().join("moved.toml"), copied).expect("written");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_fechner"));
+    command.args(["render", "moved.toml", "--size", "32x32", "-o", "moved.png"]).args(arguments);
+    assert!(command.current_dir(folder.path()).output().expect("runs").status.success());
+    let [saved, rendered] = ["cornell-box-1.png", "moved.png"]
+        .map(|name| brightness(&image::open(folder.path().join(name)).expect("a picture").into_rgb8()));
+    assert!((saved / rendered - 1.0).abs() < 0.02, "{saved} is not {rendered}");
+}
+
+/// The text of a scene with another `[camera]`.
+fn with_camera(scene: &Path, camera: &str) -> String {
+    let text = std::fs::read_to_string(scene).expect("a scene");
+    let start = text.find("[camera]").expect("a camera");
+    let end = start + 1 + text[start + 1..].find("\n[").expect("more after it");
+    format!("{}{camera}{}", &text[..start], &text[end..])
+}
+
 /// The tone operator works on the samples that there are.
 #[test]
 fn exposure_changes_the_picture_and_takes_no_samples() {
@@ -303,9 +333,7 @@ fn the_camera_moves_and_the_scene_file_is_watched() {
     assert_eq!(broken["total_samples"], moved["total_samples"]);
     view.viewer().frame(0, "the last good picture", |picture| *picture == seen);
 
-    let start = text.find("[camera]").expect("a camera");
-    let end = start + 1 + text[start + 1..].find("\n[").expect("more after it");
-    let copied = format!("{}{}{}", &text[..start], moved["camera"].as_str().expect("TOML"), &text[end..]);
+    let copied = with_camera(&cornell_box(), moved["camera"].as_str().expect("TOML"));
     std::fs::write(&scene, copied).expect("written");
     let again = viewer.status("the scene again", |status| status["error"].is_null() && is_stopped(status));
     assert_eq!(again["note"], "the scene was loaded again");

@@ -4,6 +4,7 @@ use crate::adaptive::settings::{Limits, LoopSettings};
 use crate::preview::Job;
 use fechner_perception::display::{Display, Observer, Viewing};
 use fechner_perception::eccentricity::Gaze;
+use fechner_perception::tone::SceneLight;
 
 /// What viewers changed, in place of what the job says.
 #[derive(Clone, Default)]
@@ -30,11 +31,11 @@ pub(super) enum Changed {
     Gaze,
 }
 
-/// The loop's settings for a job that viewers changed.
+/// The loop's settings for a job that viewers changed, whose picture is shown as `whole` is of which it is a part.
 ///
 /// # Errors
 /// In words for the user, about the change that cannot be.
-pub(super) fn settings_of(job: &Job, live: &Live) -> Result<LoopSettings, String> {
+pub(super) fn settings_of(job: &Job, live: &Live, whole: Option<&SceneLight>) -> Result<LoopSettings, String> {
     let mut record = job.record.clone();
     record.exposure_stops = live.exposure.or(record.exposure_stops);
     record.operator = live.operator.clone().unwrap_or(record.operator);
@@ -54,7 +55,7 @@ pub(super) fn settings_of(job: &Job, live: &Live) -> Result<LoopSettings, String
     }
     let limits = Limits { visibility: Limits::visibility_of_last_rung(visibility), ..job.limits };
     let mut settings = record.loop_settings(limits, job.trace.filter).map_err(|error| error.to_string())?;
-    if let Some(whole) = &job.whole {
+    if let Some(whole) = whole {
         settings.fit_to(whole);
     }
     Ok(LoopSettings { importance: job.importance.clone(), gazes: live.gaze.into_iter().collect(), ..settings })

@@ -9,6 +9,7 @@ use crate::adaptive::state::RenderState;
 use crate::adaptive::{LastLook, StopReason, is_reached};
 use crate::film::Film;
 use crate::integrator::{CameraRays, CameraSample, Crop, PathTracer};
+use crate::preview::Job;
 use crate::preview::command::{Command, Phase};
 use crate::preview::orbit::Held;
 use crate::scene::Camera;
@@ -95,7 +96,7 @@ impl Session<'_> {
     fn change(&mut self, edit: impl FnOnce(&mut Live), changed: Changed) {
         let before = self.live.clone();
         edit(&mut self.live);
-        match settings_of(&self.job, &self.live) {
+        match settings_of(&self.job, &self.live, self.whole()) {
             Err(problem) => {
                 self.live = before;
                 self.problems.meet(Cause::Setting, problem);
@@ -208,7 +209,8 @@ impl Session<'_> {
     }
 
     fn reload(&mut self) {
-        let loaded = self.host.load().and_then(|job| settings_of(&job, &self.live).map(|settings| (job, settings)));
+        let settings_for = |job: &Job| settings_of(job, &self.live, job.whole.as_ref());
+        let loaded = self.host.load().and_then(|job| settings_for(&job).map(|settings| (job, settings)));
         match loaded {
             Err(problem) => self.problems.meet(Cause::Scene, problem),
             Ok((job, settings)) => {

@@ -53,7 +53,8 @@ fn a_picture_that_was_paused_early_is_saved_whole() {
     let early = |status: &Value| status["phase"] == "paused" && status["mean_samples"].as_f64() < Some(2.0);
     let pause = |viewer: &mut Viewer| {
         viewer.status("the first samples", |status| {
-            status["phase"] == "rendering" && status["mean_samples"].as_f64().is_some_and(|mean| mean > 0.0 && mean < 2.0)
+            status["phase"] == "rendering"
+                && status["mean_samples"].as_f64().is_some_and(|mean| mean > 0.0 && mean < 2.0)
         });
         viewer.send(&json!({ "do": "pause" }));
         viewer.status("an early rest", early);
