@@ -58,14 +58,16 @@ const MOST_STEPS: f32 = 20.0;
 pub(super) struct Held {
     pub(super) camera: Camera,
     pub(super) pivot_distance: f32,
+    /// Whether that is what the scene has there, and not what was in focus.
+    pub(super) knows_pivot: bool,
     /// Whether it is as the scene has it.
     pub(super) is_home: bool,
 }
 
 impl Held {
-    /// Where the scene has put it; it turns about what is in focus.
+    /// Where the scene has put it; it turns about what is in focus until something better is known.
     pub(super) fn at_home(camera: &Camera) -> Self {
-        Self { camera: camera.clone(), pivot_distance: camera.focus_distance, is_home: true }
+        Self { camera: camera.clone(), pivot_distance: camera.focus_distance, knows_pivot: false, is_home: true }
     }
 
     /// Moves it. A camera that moved while its shutter was open rests from here on.
@@ -203,6 +205,7 @@ mod tests {
         Held {
             camera: Camera::pinhole(Vec3::new(0.0, 0.0, 5.0), Vec3::NEG_Z, Vec3::Y, 90.0),
             pivot_distance: 5.0,
+            knows_pivot: true,
             is_home: true,
         }
     }

@@ -1,5 +1,6 @@
 //! The render's thread: glimpses, renders, and obeys between two batches.
 
+mod depth;
 mod gaze;
 mod live;
 mod motion;

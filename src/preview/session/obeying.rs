@@ -7,13 +7,10 @@ use super::{Session, interruptible};
 use crate::adaptive::judge::Judgement;
 use crate::adaptive::state::RenderState;
 use crate::adaptive::{LastLook, StopReason, is_reached};
-use crate::film::Film;
-use crate::integrator::{CameraRays, CameraSample, Crop, PathTracer};
+use crate::integrator::PathTracer;
 use crate::preview::Job;
 use crate::preview::command::{Command, Phase};
 use crate::preview::orbit::Held;
-use crate::scene::Camera;
-use glam::Vec2;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -69,7 +66,7 @@ impl Session<'_> {
         }
     }
 
-    fn has_moved(&mut self) {
+    pub(super) fn has_moved(&mut self) {
         self.has_moved = true;
         self.moved_at = Some(Instant::now());
     }
@@ -160,52 +157,6 @@ impl Session<'_> {
             other => other,
         };
         self.stopped(LastLook { judgement, stop_reason });
-    }
-
-    /// The camera turns about what stands in the middle of the picture, and about the same as long as it moves.
-    fn find_pivot(&mut self) {
-        let Crop { width, height, .. } = self.job.trace.film_area();
-        let is_in_motion = self.phase == Phase::Moving && self.moved_at.is_some();
-        if let Some(depth) = self.depth_at(width as usize / 2, height as usize / 2).filter(|_| !is_in_motion) {
-            self.held.pivot_distance = depth;
-        }
-    }
-
-    /// Distance of what a pixel shows along the camera's axis, as focus and pivot count it, from whichever film has it; none where nothing is or the picture is of another camera.
-    fn depth_at(&self, x: usize, y: usize) -> Option<f32> {
-        let in_film = |film: &Film, step: usize| {
-            let (column, row, width) = (x / step, y / step, film.width() as usize);
-            let pixel = row.checked_mul(width)?.checked_add(column).filter(|_| column < width)?;
-            film.guides().get(pixel).map(|guide| guide.depth).filter(|depth| depth.is_normal())
-        };
-        let in_glimpse = || self.glimpse.as_ref().and_then(|glimpse| in_film(&glimpse.film, glimpse.step as usize));
-        let found = in_film(&self.state.film, 1).or_else(in_glimpse);
-        found.filter(|_| !self.has_moved).map(|depth| depth * self.cosine_at(x, y))
-    }
-
-    /// Of the angle between the ray through a pixel's middle and the camera's axis.
-    fn cosine_at(&self, x: usize, y: usize) -> f32 {
-        let settings = self.tracer.settings();
-        let (left, top) = (settings.film_area().x, settings.film_area().y);
-        let pinhole = Camera { aperture_radius: 0.0, motion: None, ..self.held.camera.clone() };
-        let position_px = Vec2::new((left as usize + x) as f32 + 0.5, (top as usize + y) as f32 + 0.5);
-        let sample = CameraSample { position_px, lens: [0.5; 2], time: 0.0 };
-        let ray = CameraRays::new(&pinhole, settings.width, settings.height).ray(&sample);
-        ray.direction.dot(pinhole.axes().forward.into())
-    }
-
-    fn focus_on(&mut self, x: usize, y: usize) {
-        match self.depth_at(x, y) {
-            None => self.note = Some("nothing to focus on there".to_owned()),
-            Some(depth) => {
-                self.held.focus_at(depth);
-                if self.held.camera.aperture_radius > 0.0 {
-                    self.has_moved();
-                } else {
-                    self.note = Some("in focus, but the lens has no width: A widens it".to_owned());
-                }
-            }
-        }
     }
 
     fn reload(&mut self) {

@@ -88,6 +88,40 @@ fn a_picture_that_was_asked_for_is_saved_whatever_comes_then() {
     assert!(folder.path().join("cornell-box-1.png").exists());
 }
 
+/// A camera with nothing before its middle turns about what else it sees, from the first movement on and right after it has come
+/// home; pbrt's pinholes have their focus a million units away.
+#[test]
+fn a_camera_that_looks_past_everything_stays_with_the_scene() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = folder.path().join("sky.pbrt");
+    let text = "Scale -1 1 1
+LookAt 0 1.5 5  0 1.5 0  0 1 0
+Camera \"perspective\" \"float fov\" 50
+WorldBegin
+LightSource \"infinite\" \"rgb L\" [1 1 1]
+Shape \"sphere\" \"float radius\" 1
+Translate 0 3 0
+Shape \"sphere\" \"float radius\" 1
+";
+    std::fs::write(&scene, text).expect("written");
+    let view = View::of(&scene, folder.path(), &["--visibility", "16"]);
+    let mut viewer = view.viewer();
+    let mut camera = viewer.status("the end", is_stopped)["camera"].clone();
+    for goes_home in [false, true] {
+        if goes_home {
+            viewer.send(&json!({ "do": "camera-home" }));
+        }
+        viewer.send(&json!({ "do": "camera", "by": "orbit", "right": 0.3, "up": 0.0 }));
+        viewer.send(&json!({ "do": "camera", "by": "dolly", "steps": 1.0 }));
+        let status = viewer.status("another camera", |status| status["camera"] != camera && is_stopped(status));
+        camera = status["camera"].clone();
+        let position = camera.as_str().and_then(|text| text.lines().nth(1)).expect("a position");
+        let numbers = position.split(['[', ',', ']']).filter_map(|word| word.trim().parse::<f64>().ok());
+        let farthest = numbers.fold(0.0, |farthest: f64, number| farthest.max(number.abs()));
+        assert!((3.0..6.0).contains(&farthest), "{position}");
+    }
+}
+
 /// Motion is found again after each movement.
 #[test]
 fn motion_is_shown_from_another_camera_too() {
