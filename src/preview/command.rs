@@ -97,6 +97,19 @@ impl Command {
         matches!(self, Self::Camera { .. } | Self::CameraHome | Self::Restart)
     }
 
+    /// Whether it makes an earlier one useless that nobody has obeyed yet: a slider says where it stands.
+    pub(super) fn replaces(&self, earlier: &Self) -> bool {
+        let is_setting = matches!(
+            self,
+            Self::Exposure { .. }
+                | Self::Operator { .. }
+                | Self::Display { .. }
+                | Self::Distance { .. }
+                | Self::Visibility { .. }
+        );
+        is_setting && std::mem::discriminant(self) == std::mem::discriminant(earlier)
+    }
+
     /// Whether it leaves a camera in motion as it is: what else is asked for is asked of the picture at rest.
     pub(super) fn suits_motion(&self) -> bool {
         matches!(

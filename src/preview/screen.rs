@@ -94,6 +94,8 @@ pub(super) struct Screen {
     shown: Option<Instant>,
     cost: Duration,
     pub(super) looked: Option<Arc<Looked>>,
+    /// What other eyes saw in the last look, until the next.
+    looked_before: Option<Arc<Looked>>,
     pub(super) motion: Motion,
     /// Samples of the film that was shown last.
     pub(super) total_samples: u64,
@@ -127,6 +129,7 @@ impl Screen {
             shown: None,
             cost: Duration::ZERO,
             looked: None,
+            looked_before: None,
             motion,
             total_samples: 0,
             provisional: None,
@@ -141,10 +144,18 @@ impl Screen {
         *self = Self { cost: self.cost, encoding: Arc::clone(&self.encoding), ..Self::new(spectators) };
     }
 
-    /// What was seen holds no more: another place, or other eyes.
+    /// What was seen holds no more: another place.
     pub(super) fn forget_look(&mut self) {
         self.looked = None;
+        self.looked_before = None;
         self.provisional = None;
+    }
+
+    /// Other eyes see other things in the same light: a denoised picture stays, and nothing else.
+    pub(super) fn forget_eyes(&mut self) {
+        let looked = self.looked.take().or_else(|| self.looked_before.take());
+        self.forget_look();
+        self.looked_before = looked;
     }
 
     /// Time between two frames now; `None` where nobody looks.
@@ -174,7 +185,8 @@ impl Screen {
         }
         let nits_per_unit = scenery.settings.nits_per_unit;
         // Denoised pictures are made by looks; between two the last one stays.
-        let denoised = self.looked.as_ref().and_then(|looked| looked.denoised.clone());
+        let looked = self.looked.as_ref().or(self.looked_before.as_ref());
+        let denoised = looked.and_then(|looked| looked.denoised.clone());
         let (raw, samples) = composed(scenery.film, nits_per_unit, scenery.is_at_rest);
         let rgb_cd_m2 = denoised.unwrap_or(raw);
         self.total_samples = samples.iter().map(|&samples| u64::from(samples)).sum();
@@ -309,8 +321,11 @@ fn composed(film: &Film, nits_per_unit: f64, is_at_rest: bool) -> (Vec<[f32; 3]>
     (rgb, samples)
 }
 
-/// The operator on a picture that was not looked at yet, of pixels `step` times as large as the display's.
+/// The operator on a picture that was not looked at yet, of pixels `step` times as large as the display's; a part is shown as its whole.
 fn fit(settings: &LoopSettings, step: u32, width: usize, rgb_cd_m2: &[[f32; 3]]) -> Box<dyn FittedTone> {
+    if let Some(whole) = settings.fitted.clone().filter(|_| step == 1) {
+        return whole.restore();
+    }
     let light = SceneLight::of(settings.operator.as_ref(), width, rgb_cd_m2);
     let mut viewing = settings.viewing.clone();
     viewing.display.pixels_per_degree /= f64::from(step);
@@ -395,6 +410,31 @@ mod tests {
         assert_eq!(legend(&mut screen, &before, false), first);
         screen.forget_look();
         assert_eq!(legend(&mut screen, &after, false), at_rest);
+    }
+
+    /// Other eyes are shown the denoised picture too before they have looked, and another place is not.
+    #[test]
+    fn other_eyes_see_the_same_light() {
+        let mut film = Film::new(2, 1);
+        [0, 1].into_iter().for_each(|pixel| add(&mut film, BlockWork::whole(pixel, Half::A, 0), 1.0));
+        let settings = settings_with("constant");
+        let plane = || Plane::from_fn(2, 1, |_, _| 1.0);
+        let looked = Looked { threshold: plane(), visibility: plane(), denoised: Some(vec![[7.0; 3]; 2]) };
+        let shared = Arc::new(Shared::new());
+        let mut screen = Screen::new(Vec::new());
+        screen.looked = Some(Arc::new(looked));
+        let shown = |screen: &mut Screen| {
+            let scenery = Scenery { film: &film, tone: None, settings: &settings, is_at_rest: true, step: 1 };
+            screen.publish(scenery, &shared);
+            let snapshot = shared.snapshot().expect("something shown");
+            (snapshot.rgb_cd_m2[0], snapshot.looked.is_some())
+        };
+        assert_eq!(shown(&mut screen), ([7.0; 3], true));
+        screen.forget_eyes();
+        screen.forget_eyes();
+        assert_eq!(shown(&mut screen), ([7.0; 3], false));
+        screen.forget_look();
+        assert_eq!(shown(&mut screen), ([100.0; 3], false));
     }
 
     /// In a pixel's pilot samples count alike, later and at rest halves do, whatever was looked at before.

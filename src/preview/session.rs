@@ -7,6 +7,7 @@ mod motion;
 mod obeying;
 mod pace;
 mod problems;
+mod rest;
 mod saving;
 mod telling;
 mod waiting;
@@ -16,11 +17,11 @@ use super::coarse::order;
 use super::command::{Command, Phase};
 use super::glimpse::{Glimpse, Resolution};
 use super::orbit::Held;
-use super::screen::{Looked, Scenery, Screen};
+use super::screen::{Scenery, Screen};
 use super::shared::Shared;
 use super::{Host, Job, Options};
 use crate::adaptive::glimpse::glimpse_from;
-use crate::adaptive::judge::{JudgeError, Judgement, judge};
+use crate::adaptive::judge::JudgeError;
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::state::RenderState;
 use crate::adaptive::{LastLook, Progress, run as run_loop};
@@ -31,6 +32,7 @@ use live::{Live, settings_of};
 use motion::Neighbours;
 pub(super) use pace::Pace;
 use problems::{Cause, Problems};
+use rest::Unlooked;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::{Arc, Mutex};
@@ -99,8 +101,10 @@ struct Session<'a> {
     settings: LoopSettings,
     phase: Phase,
     state: RenderState,
-    /// While stopped.
+    /// Of the picture that rests, once it was looked at.
     last_look: Option<LastLook>,
+    /// While it rests and was not looked at as it is.
+    unlooked: Option<Unlooked>,
     screen: Screen,
     /// The scenes a frame before and after, once somebody looks at motion.
     neighbours: Option<Neighbours>,
@@ -132,6 +136,7 @@ impl<'a> Session<'a> {
             phase: Phase::Moving,
             state: RenderState::new(0, 0, &settings.limits),
             last_look: None,
+            unlooked: None,
             screen: Screen::new(std::mem::take(&mut options.spectators)),
             neighbours: None,
             pace: Pace::new(),
@@ -163,6 +168,7 @@ impl<'a> Session<'a> {
                     None => self.restart(),
                 },
                 Phase::Rendering => self.render(),
+                Phase::Paused | Phase::Stopped if self.unlooked.is_some() => self.look_at_rest(),
                 Phase::Paused | Phase::Stopped => {
                     self.tell();
                     self.shared.wait(Duration::from_secs(1));
@@ -176,7 +182,7 @@ impl<'a> Session<'a> {
         let begun = Instant::now();
         let Crop { width, height, .. } = self.job.trace.film_area();
         self.phase = Phase::Moving;
-        self.last_look = None;
+        self.forget_rest_look();
         self.progress = None;
         self.screen.forget_look();
         // Films of another place are of no use, and counting their samples would take longer than the glimpse.
@@ -196,7 +202,7 @@ impl<'a> Session<'a> {
         self.state = RenderState::new(width, height, &self.settings.limits);
         self.order_pilot();
         self.phase = Phase::Rendering;
-        self.last_look = None;
+        self.forget_rest_look();
         self.progress = None;
         self.screen.begin();
         self.forget_motion();
@@ -271,37 +277,8 @@ impl<'a> Session<'a> {
                 self.state = RenderState::new(width, height, &self.settings.limits);
                 // What waits for this picture would wait for ever.
                 self.waiting.clear();
+                self.forget_rest_look();
                 self.phase = Phase::Paused;
-            }
-        }
-    }
-
-    /// The render is at an end, until somebody asks for more.
-    fn stopped(&mut self, last_look: LastLook) {
-        // At rest the film is shown, however little it has: it is what will be saved.
-        if self.state.film.total_samples() > 0 {
-            self.glimpse = None;
-        }
-        self.problems.solve(Cause::Look);
-        self.screen.looked = Some(Arc::new(Looked::of(&last_look.judgement)));
-        self.state.tone = Some(last_look.judgement.tone.save());
-        self.last_look = Some(last_look);
-        self.phase = Phase::Stopped;
-        self.show();
-        self.tell();
-    }
-
-    /// Looks at the film as it is.
-    fn look(&mut self) -> Option<Judgement> {
-        match judge(&self.state.film, &self.settings, self.state.inflation) {
-            Ok(judgement) => {
-                self.problems.solve(Cause::Look);
-                Some(judgement)
-            }
-            Err(JudgeError::Outdated) => None,
-            Err(error) => {
-                self.problems.meet(Cause::Look, error.to_string());
-                None
             }
         }
     }

@@ -62,7 +62,9 @@ impl Shared {
 
     pub(super) fn send(&self, command: Command) {
         let mut commands = self.commands.lock().unwrap_or_else(PoisonError::into_inner);
-        if commands.len() < MOST_COMMANDS {
+        if let Some(earlier) = commands.back_mut().filter(|earlier| command.replaces(earlier)) {
+            *earlier = command;
+        } else if commands.len() < MOST_COMMANDS {
             self.is_outdated.fetch_or(command.throws_the_picture_away(), Ordering::SeqCst);
             commands.push_back(command);
         }
@@ -214,6 +216,18 @@ impl Drop for Seat {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Of a slider's ticks the last counts, and nothing that came between two of them is passed over.
+    #[test]
+    fn settings_replace_their_like() {
+        let shared = Shared::new();
+        let exposure = |stops: f64| Command::Exposure { stops: Some(stops) };
+        let sent = [exposure(1.0), exposure(2.0), Command::Pause, exposure(3.0), Command::Visibility { target: 2.0 }];
+        sent.into_iter().chain([exposure(4.0), exposure(5.0)]).for_each(|command| shared.send(command));
+        let stops = |command: &Command| if let Command::Exposure { stops } = command { *stops } else { None };
+        let left: Vec<Option<f64>> = shared.take_commands().iter().map(stops).collect();
+        assert_eq!(left, [Some(2.0), None, Some(3.0), None, Some(5.0)]);
+    }
 
     /// Who leaves looks nowhere, and takes no other's gaze along.
     #[test]

@@ -31,6 +31,17 @@ pub(super) enum Changed {
     Gaze,
 }
 
+impl Changed {
+    /// What two changes ask for together: another target is one also for other eyes.
+    pub(super) fn and(self, other: Self) -> Self {
+        match (self, other) {
+            (Self::Target, _) | (_, Self::Target) => Self::Target,
+            (Self::Seen, _) | (_, Self::Seen) => Self::Seen,
+            (Self::Gaze, Self::Gaze) => Self::Gaze,
+        }
+    }
+}
+
 /// The loop's settings for a job that viewers changed, whose picture is shown as `whole` is of which it is a part.
 ///
 /// # Errors

@@ -2,11 +2,9 @@
 
 use super::live::{Changed, Live, settings_of};
 use super::problems::Cause;
-use super::waiting::is_whole;
 use super::{Session, interruptible};
-use crate::adaptive::judge::Judgement;
 use crate::adaptive::state::RenderState;
-use crate::adaptive::{LastLook, StopReason, is_reached};
+use crate::adaptive::{LastLook, StopReason};
 use crate::integrator::PathTracer;
 use crate::preview::Job;
 use crate::preview::command::{Command, Phase};
@@ -30,17 +28,11 @@ impl Session<'_> {
         match command {
             Command::Layer { .. } | Command::Beside { .. } | Command::Inspect { .. } | Command::Gaze { .. } => {}
             Command::Redraw => self.show(),
-            Command::Pause if self.phase == Phase::Rendering => {
-                self.phase = Phase::Paused;
-                if is_whole(&self.state) {
-                    self.glimpse = None;
-                }
-                self.show();
-            }
+            Command::Pause if self.phase == Phase::Rendering => self.pause(),
             Command::Resume if matches!(self.phase, Phase::Paused | Phase::Stopped) => self.go_on(),
             Command::Resume => self.forget_rest(),
             Command::Stop if self.phase != Phase::Stopped => {
-                if let Some(judgement) = self.look() {
+                if let Some(judgement) = self.last_look.take().map(|look| look.judgement).or_else(|| self.look()) {
                     self.stopped(LastLook { judgement, stop_reason: StopReason::Interrupted });
                 }
             }
@@ -72,7 +64,7 @@ impl Session<'_> {
     }
 
     pub(super) fn go_on(&mut self) {
-        self.last_look = None;
+        self.forget_rest_look();
         self.phase = Phase::Rendering;
     }
 
@@ -120,43 +112,20 @@ impl Session<'_> {
                 let state = std::mem::replace(&mut self.state, RenderState::new(0, 0, limits));
                 self.state = RenderState { tone, ..state.begun_anew(limits) };
                 self.order_pilot();
-                return;
             }
             Changed::Seen => {
                 let limits = &self.settings.limits;
                 let state = std::mem::replace(&mut self.state, RenderState::new(0, 0, limits));
                 self.state = state.begun_anew(limits);
                 self.order_pilot();
-                self.screen.forget_look();
+                self.screen.forget_eyes();
             }
         }
-        if self.phase == Phase::Stopped {
-            if let Some(judgement) = self.look() {
-                self.rest_or_go_on(judgement, changed);
-            }
-        } else {
+        self.ask_for_a_look(changed);
+        // At once, by what the new settings make of the picture itself: the look that they ask for may take seconds.
+        if !matches!(changed, Changed::Gaze) {
             self.show();
         }
-    }
-
-    /// A picture that rests because nothing more could be seen, or done about it, goes on where another target asks for more. For other
-    /// eyes it stays as it is, and says no longer why it rests.
-    fn rest_or_go_on(&mut self, judgement: Judgement, changed: Changed) {
-        let before = self.last_look.as_ref().map_or(StopReason::Interrupted, |look| look.stop_reason);
-        let is_reached = is_reached(&judgement, self.settings.limits.last_rung());
-        let stop_reason = match before {
-            StopReason::Visibility | StopReason::MaxSamples | StopReason::Interrupted if is_reached => {
-                StopReason::Visibility
-            }
-            StopReason::Visibility | StopReason::MaxSamples if matches!(changed, Changed::Target) => {
-                self.go_on();
-                self.show();
-                return;
-            }
-            StopReason::Visibility | StopReason::MaxSamples => StopReason::Interrupted,
-            other => other,
-        };
-        self.stopped(LastLook { judgement, stop_reason });
     }
 
     fn reload(&mut self) {

@@ -2,9 +2,8 @@
 
 use super::Session;
 use super::problems::Cause;
-use crate::adaptive::judge::Judgement;
 use crate::adaptive::{LastLook, Rendered, StopReason};
-use crate::preview::command::SavedFormat;
+use crate::preview::command::{Phase, SavedFormat};
 use std::path::PathBuf;
 
 impl Session<'_> {
@@ -14,19 +13,13 @@ impl Session<'_> {
             self.problems.meet(Cause::Save, "not saved: the picture has no samples yet".to_owned());
             return;
         }
-        let was_stopped = self.last_look.is_some();
-        let last_look = match self.last_look.take() {
-            Some(last_look) => last_look,
-            None => {
-                let Some(judgement) = self.look_to_the_end() else {
-                    self.problems.meet(Cause::Save, "not saved: the picture cannot be looked at".to_owned());
-                    return;
-                };
-                LastLook { judgement, stop_reason: StopReason::Interrupted }
-            }
+        let was_looked_at = self.last_look.is_some();
+        let Some(LastLook { judgement, stop_reason }) = self.last_look.take().or_else(|| self.look_to_save()) else {
+            self.problems.meet(Cause::Save, "not saved: the picture cannot be looked at".to_owned());
+            return;
         };
         let path = self.free_name(format);
-        let rendered = Rendered::new(self.state.clone(), last_look.judgement, last_look.stop_reason);
+        let rendered = Rendered::new(self.state.clone(), judgement, stop_reason);
         match self.host.save(&path, &rendered, &self.settings) {
             Ok(()) => {
                 self.problems.solve(Cause::Save);
@@ -34,17 +27,22 @@ impl Session<'_> {
             }
             Err(problem) => self.problems.meet(Cause::Save, problem),
         }
-        if was_stopped {
-            self.last_look = Some(LastLook { judgement: rendered.judgement, stop_reason: rendered.stop_reason });
+        let Rendered { judgement, stop_reason, .. } = rendered;
+        if was_looked_at {
+            self.last_look = Some(LastLook { judgement, stop_reason });
+        } else if matches!(self.phase, Phase::Paused | Phase::Stopped) {
+            self.looked_at_rest(judgement);
         }
     }
 
     /// Looks at the film whoever wants another picture meanwhile: what is to be kept is kept first.
-    fn look_to_the_end(&mut self) -> Option<Judgement> {
+    fn look_to_save(&mut self) -> Option<LastLook> {
         let is_outdated = self.settings.is_outdated.take();
         let judgement = self.look();
         self.settings.is_outdated = is_outdated;
-        judgement
+        let judgement = judgement?;
+        let stop_reason = self.reason_to_rest(&judgement).unwrap_or(StopReason::Interrupted);
+        Some(LastLook { judgement, stop_reason })
     }
 
     /// The scene file's name and the first free number, in the working folder.

@@ -24,17 +24,14 @@ impl Session<'_> {
         let operator = self.live.operator.as_ref().unwrap_or(&self.job.record.operator);
         let mut status = Status {
             phase: self.phase,
-            reason: self.last_look.as_ref().map(|look| match look.stop_reason {
-                StopReason::Visibility if !self.settings.gazes.is_empty() => "nothing more can be seen from there",
-                reason => in_words(reason),
+            reason: self.last_look.as_ref().filter(|_| self.phase == Phase::Stopped).map(|look| {
+                match look.stop_reason {
+                    StopReason::Visibility if !self.settings.gazes.is_empty() => "nothing more can be seen from there",
+                    reason => in_words(reason),
+                }
             }),
             width: self.tracer.settings().film_area().width,
             height: self.tracer.settings().film_area().height,
-            visible_share: self
-                .last_look
-                .as_ref()
-                .filter(|look| look.judgement.is_known)
-                .map(|look| visible_share(&look.judgement, target)),
             displays: displays_with(&self.job.record.viewing.display.name),
             exposure: self.live.exposure.or(self.job.record.exposure_stops),
             distance: self.live.distance.unwrap_or(1.0),
@@ -44,6 +41,10 @@ impl Session<'_> {
             ..blank_status(&self.job.scene, &self.settings, operator, self.held.to_toml())
         };
         count(&mut status, state, self.screen.total_samples, self.progress.as_ref());
+        // What was seen at rest is later than what the loop saw.
+        if let Some(look) = self.last_look.as_ref().filter(|look| look.judgement.is_known) {
+            status.visible_share = Some(visible_share(&look.judgement, target));
+        }
         status
     }
 }

@@ -122,6 +122,25 @@ Shape \"sphere\" \"float radius\" 1
     }
 }
 
+/// A paused picture is shown as it is saved, whoever has looked at it last.
+#[test]
+fn a_paused_picture_is_what_is_saved() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let arguments = ["--visibility", "0.05", "--operator", "reinhard02", "--denoise", "builtin"];
+    let view = View::of_size("64x64", &cornell_box(), folder.path(), &arguments);
+    let mut viewer = view.viewer();
+    viewer.status("a plan", |status| !status["rung"].is_null());
+    viewer.send(&json!({ "do": "pause" }));
+    viewer.status("a rest", |status| status["phase"] == "paused" && !status["visible_share"].is_null());
+    for (stops, name) in [(0.0, "cornell-box-1.png"), (1.5, "cornell-box-2.png")] {
+        viewer.send(&json!({ "do": "exposure", "stops": stops }));
+        viewer.status("the exposure", |status| status["phase"] == "paused" && status["exposure"] == stops);
+        viewer.saved(folder.path(), "png", name);
+        let saved = image::open(folder.path().join(name)).expect("a picture").into_rgb8();
+        view.viewer().frame(0, "the saved picture", |picture| *picture == saved);
+    }
+}
+
 /// Motion is found again after each movement.
 #[test]
 fn motion_is_shown_from_another_camera_too() {

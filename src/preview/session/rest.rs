@@ -1,0 +1,143 @@
+//! The picture at rest: what is shown of it is what was seen in a look at it as it is, and what would be saved.
+//!
+//! A look may take seconds, and a viewer who drags a slider asks for ten a second. So a change is shown at once without one, and the look
+//! follows when nothing more is asked for.
+
+use super::Session;
+use super::live::Changed;
+use super::problems::Cause;
+use super::waiting::is_whole;
+use crate::adaptive::judge::{JudgeError, Judgement, judge};
+use crate::adaptive::{LastLook, StopReason, is_reached};
+use crate::preview::command::Phase;
+use crate::preview::screen::Looked;
+use std::sync::Arc;
+
+/// A rest that lacks a look.
+#[derive(Clone, Copy)]
+pub(super) struct Unlooked {
+    /// Why the picture rested before.
+    before: StopReason,
+    /// What has changed since.
+    changed: Changed,
+}
+
+impl Session<'_> {
+    pub(super) fn pause(&mut self) {
+        self.phase = Phase::Paused;
+        self.forget_rest_look();
+        if is_whole(&self.state) {
+            self.glimpse = None;
+            self.unlooked = Some(Unlooked { before: StopReason::Interrupted, changed: Changed::Seen });
+        }
+        self.show();
+        self.tell();
+    }
+
+    /// The render is at an end, until somebody asks for more.
+    pub(super) fn stopped(&mut self, last_look: LastLook) {
+        self.phase = Phase::Stopped;
+        self.rest(last_look);
+    }
+
+    /// Shows what a look saw of the picture at rest.
+    fn rest(&mut self, last_look: LastLook) {
+        // At rest the film is shown, however little it has: it is what will be saved.
+        if self.state.film.total_samples() > 0 {
+            self.glimpse = None;
+        }
+        self.problems.solve(Cause::Look);
+        self.screen.looked = Some(Arc::new(Looked::of(&last_look.judgement)));
+        self.state.tone = Some(last_look.judgement.tone.save());
+        self.last_look = Some(last_look);
+        self.unlooked = None;
+        self.show();
+        self.tell();
+    }
+
+    /// Why the picture rests, or did before something changed; `None` where nobody has looked.
+    pub(super) fn reason_of_rest(&self) -> Option<StopReason> {
+        let before = self.unlooked.map(|unlooked| unlooked.before);
+        before.or_else(|| self.last_look.as_ref().map(|look| look.stop_reason))
+    }
+
+    /// What was seen of a rest that is over.
+    pub(super) fn forget_rest_look(&mut self) {
+        self.last_look = None;
+        self.unlooked = None;
+    }
+
+    /// What was seen of the picture at rest holds no more. A pause has no target.
+    pub(super) fn ask_for_a_look(&mut self, changed: Changed) {
+        let is_concerned = match self.phase {
+            Phase::Stopped => true,
+            Phase::Paused => is_whole(&self.state) && !matches!(changed, Changed::Target),
+            Phase::Moving | Phase::Rendering => false,
+        };
+        if is_concerned {
+            let before = self.reason_of_rest().unwrap_or(StopReason::Interrupted);
+            let changed = self.unlooked.map_or(changed, |earlier| earlier.changed.and(changed));
+            self.last_look = None;
+            self.unlooked = Some(Unlooked { before, changed });
+        }
+    }
+
+    /// Looks at the picture at rest, until somebody asks for something.
+    pub(super) fn look_at_rest(&mut self) {
+        let shared = Arc::clone(self.shared);
+        let is_outdated = self.settings.is_outdated.replace(Box::new(move || shared.has_news()));
+        let found = judge(&self.state.film, &self.settings, self.state.inflation);
+        self.settings.is_outdated = is_outdated;
+        match found {
+            Ok(judgement) => self.looked_at_rest(judgement),
+            Err(JudgeError::Outdated) => {}
+            Err(error) => {
+                self.problems.meet(Cause::Look, error.to_string());
+                self.unlooked = None;
+            }
+        }
+    }
+
+    /// The picture at rest was looked at as it is.
+    pub(super) fn looked_at_rest(&mut self, judgement: Judgement) {
+        match self.reason_to_rest(&judgement) {
+            Some(stop_reason) => self.rest(LastLook { judgement, stop_reason }),
+            None => {
+                self.go_on();
+                self.show();
+            }
+        }
+    }
+
+    /// Why the picture rests from this look on; `None` where it does not. One that rested because nothing more could be seen, or done about
+    /// it, goes on where another target asks for more. For other eyes it stays as it is, and says no longer why it rests.
+    pub(super) fn reason_to_rest(&self, judgement: &Judgement) -> Option<StopReason> {
+        use StopReason::{Interrupted, MaxSamples, Visibility};
+        let Some(Unlooked { before, changed }) = self.unlooked else { return Some(Interrupted) };
+        let is_reached = is_reached(judgement, self.settings.limits.last_rung());
+        match (before, changed) {
+            // Somebody stopped it, or a pause is no end.
+            (_, Changed::Gaze) => Some(before),
+            _ if self.phase == Phase::Paused => Some(Interrupted),
+            (Visibility | MaxSamples | Interrupted, _) if is_reached => Some(Visibility),
+            (Visibility | MaxSamples, Changed::Target) => None,
+            (Visibility | MaxSamples, Changed::Seen) => Some(Interrupted),
+            (other, _) => Some(other),
+        }
+    }
+
+    /// Looks at the film as it is.
+    pub(super) fn look(&mut self) -> Option<Judgement> {
+        match judge(&self.state.film, &self.settings, self.state.inflation) {
+            Ok(judgement) => {
+                self.problems.solve(Cause::Look);
+                Some(judgement)
+            }
+            Err(JudgeError::Outdated) => None,
+            Err(error) => {
+                self.problems.meet(Cause::Look, error.to_string());
+                None
+            }
+        }
+    }
+}
