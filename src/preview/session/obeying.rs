@@ -75,8 +75,10 @@ impl Session<'_> {
             return;
         };
         let gaze = follower.follow(self.shared, self.settings.viewing.display.pixels_per_degree);
+        let rests_by_itself = matches!(self.reason_of_rest(), Some(StopReason::Visibility | StopReason::MaxSamples));
         self.change(|live| live.gaze = gaze, Changed::Gaze);
-        if self.phase == Phase::Stopped {
+        // Whom a viewer or a limit stopped, no pointer wakes.
+        if self.phase == Phase::Stopped && rests_by_itself {
             self.go_on();
         }
     }

@@ -141,6 +141,24 @@ fn a_paused_picture_is_what_is_saved() {
     }
 }
 
+/// Who stopped the picture finds it at rest, wherever the pointer goes.
+#[test]
+fn no_gaze_undoes_a_stop() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let view = View::of_size("64x64", &cornell_box(), folder.path(), &["--visibility", "0.05", "--foveated"]);
+    let mut viewer = view.viewer();
+    viewer.send(&json!({ "do": "gaze", "at": [32, 32] }));
+    viewer.status("a plan", |status| !status["rung"].is_null());
+    viewer.send(&json!({ "do": "stop" }));
+    let stopped = viewer.status("a stop", is_stopped);
+    viewer.send(&json!({ "do": "gaze", "at": null }));
+    // Gazes are followed every 0.7 s, and a picture at rest tells of itself every second.
+    for _ in 0..4 {
+        let later = viewer.status("another word", |_| true);
+        assert_eq!((&later["phase"], &later["total_samples"]), (&stopped["phase"], &stopped["total_samples"]));
+    }
+}
+
 /// Motion is found again after each movement.
 #[test]
 fn motion_is_shown_from_another_camera_too() {
