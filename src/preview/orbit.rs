@@ -50,6 +50,8 @@ pub(super) enum Movement {
 const FIRST_APERTURE: f32 = 0.005;
 /// Fields of view that zooming stays within, in degrees.
 const FIELDS_OF_VIEW_DEG: [f32; 2] = [1.0, 150.0];
+/// The same for parallel rays, in heights of what the scene's own camera sees.
+const TIMES_HOME_HEIGHT: [f32; 2] = [1e-3, 1e3];
 /// Steps that one movement may take.
 const MOST_STEPS: f32 = 20.0;
 
@@ -62,12 +64,20 @@ pub(super) struct Held {
     pub(super) knows_pivot: bool,
     /// Whether it is as the scene has it.
     pub(super) is_home: bool,
+    /// How the scene's own camera projects.
+    home_projection: Projection,
 }
 
 impl Held {
     /// Where the scene has put it; it turns about what is in focus until something better is known.
     pub(super) fn at_home(camera: &Camera) -> Self {
-        Self { camera: camera.clone(), pivot_distance: camera.focus_distance, knows_pivot: false, is_home: true }
+        Self {
+            camera: camera.clone(),
+            pivot_distance: camera.focus_distance,
+            knows_pivot: false,
+            is_home: true,
+            home_projection: camera.projection,
+        }
     }
 
     /// Moves it. A camera that moved while its shutter was open rests from here on.
@@ -130,7 +140,7 @@ impl Held {
     fn zoom(&mut self, steps: f32) {
         let factor = power(0.9, steps);
         match &mut self.camera.projection {
-            Projection::Orthographic { height } => *height *= factor,
+            Projection::Orthographic { height } => *height = bounded(*height * factor, self.home_projection),
             Projection::Perspective { vertical_fov_deg } => {
                 let [least, most] = FIELDS_OF_VIEW_DEG;
                 *vertical_fov_deg = (*vertical_fov_deg * factor).clamp(least, most);
@@ -154,7 +164,7 @@ impl Held {
     fn dolly(&mut self, steps: f32) {
         let factor = power(0.9, steps);
         if let Projection::Orthographic { height } = &mut self.camera.projection {
-            *height *= factor;
+            *height = bounded(*height * factor, self.home_projection);
             return;
         }
         let CameraAxes { forward, .. } = self.camera.axes();
@@ -192,6 +202,17 @@ impl Held {
     }
 }
 
+/// A height that can be rendered: without bounds it becomes 0, or rays begin so far away that all memory is taken.
+fn bounded(height: f32, home: Projection) -> f32 {
+    match home {
+        Projection::Orthographic { height: home } => {
+            let [least, most] = TIMES_HOME_HEIGHT.map(|times| (times * home).max(f32::MIN_POSITIVE).min(f32::MAX));
+            height.clamp(least, most)
+        }
+        Projection::Perspective { .. } => height,
+    }
+}
+
 /// What so many steps multiply by; 1 for steps that are no number.
 fn power(base: f32, steps: f32) -> f32 {
     base.powf(if steps.is_nan() { 0.0 } else { steps.clamp(-MOST_STEPS, MOST_STEPS) })
@@ -207,6 +228,26 @@ mod tests {
             pivot_distance: 5.0,
             knows_pivot: true,
             is_home: true,
+            home_projection: Projection::Perspective { vertical_fov_deg: 90.0 },
+        }
+    }
+
+    /// Zooms and dollies without end stay at heights that can be rendered, and come back.
+    #[test]
+    fn parallel_rays_keep_a_height() {
+        let projection = Projection::Orthographic { height: 2.0 };
+        let home = Camera { projection, ..held().camera };
+        let after = |movement: Movement| {
+            let mut held = Held::at_home(&home);
+            (0..100).for_each(|_| held.moved(movement));
+            held.camera.projection
+        };
+        let height = |height: f32| Projection::Orthographic { height };
+        for (near, far) in [
+            (Movement::Zoom { steps: 20.0 }, Movement::Zoom { steps: -20.0 }),
+            (Movement::Dolly { steps: 20.0 }, Movement::Dolly { steps: -20.0 }),
+        ] {
+            assert_eq!((after(near), after(far)), (height(2e-3), height(2e3)));
         }
     }
 
