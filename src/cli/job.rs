@@ -164,6 +164,11 @@ impl JobArguments {
         self.seed
     }
 
+    /// Area in deg² over which the eye sums contrast, if one is asked for.
+    pub(super) fn csf_area_deg2(&self) -> Option<f64> {
+        self.csf_area
+    }
+
     /// Whether it ends by something that does not ask what the picture looks like.
     fn has_other_limit(&self) -> bool {
         self.spp.is_some() || self.time.is_some() || self.plans.is_some()

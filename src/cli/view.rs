@@ -52,7 +52,7 @@ impl Host for FileHost {
     fn load(&self) -> Result<Job, String> {
         let prepared = self.job.prepare().map_err(|error| in_a_line(&error))?;
         *self.part_of.lock().unwrap_or_else(PoisonError::into_inner) = PartOf::of(&prepared.trace);
-        Ok(job_of(prepared))
+        Ok(job_of(prepared, &self.job))
     }
 
     fn later(&self, seconds: f64) -> Result<Scene, String> {
@@ -76,9 +76,10 @@ impl Host for FileHost {
     }
 }
 
-fn job_of(prepared: Prepared) -> Job {
+fn job_of(prepared: Prepared, arguments: &JobArguments) -> Job {
     let Prepared { scene, trace, record, settings, whole } = prepared;
-    Job { scene, trace, record, limits: settings.limits, importance: settings.importance, whole }
+    let (csf_area_deg2, limits) = (arguments.csf_area_deg2(), settings.limits);
+    Job { scene, trace, record, csf_area_deg2, limits, importance: settings.importance, whole }
 }
 
 /// A running render, open to viewers on this machine at a free port; says where.
@@ -112,7 +113,7 @@ pub(super) fn run(arguments: &ViewArguments) -> anyhow::Result<()> {
         part_of: Mutex::new(PartOf::of(&prepared.trace)),
         has_saved: AtomicBool::new(false),
     });
-    let job = job_of(prepared);
+    let job = job_of(prepared, &arguments.job);
     if arguments.foveated && job.record.model != model::DEFAULT {
         bail!("--foveated is for --model {}: {} does not know where one looks", model::DEFAULT, job.record.model);
     }

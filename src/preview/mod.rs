@@ -54,6 +54,8 @@ pub struct Job {
     pub trace: TraceSettings,
     /// For whom, by which rule and operator.
     pub record: SettingsRecord,
+    /// Area in deg² over which the eye sums contrast, on whichever display; none is the display's own.
+    pub csf_area_deg2: Option<f64>,
     /// When to stop.
     pub limits: Limits,
     /// What thresholds are multiplied by.

@@ -253,6 +253,26 @@ fn an_own_display_can_be_chosen_again() {
     viewer.status("no error", |status| status["error"].is_null() && status["display"] == "desktop");
 }
 
+/// An eye that was asked for looks at every display.
+#[test]
+fn another_display_leaves_the_eye_as_it_was_asked_for() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let arguments = ["--visibility", "8", "--csf-area", "16", "--sampling", "uniform", "--spp", "16"];
+    let view = View::of(&cornell_box(), folder.path(), &arguments);
+    let mut viewer = view.viewer();
+    viewer.status("the end", is_stopped);
+    viewer.send(&json!({ "do": "display", "name": "laptop" }));
+    viewer.status("the laptop", |status| status["display"] == "laptop" && is_stopped(status));
+    let saved = viewer.saved(folder.path(), "exr", "cornell-box-1.exr");
+    let on_laptop: Vec<&str> = arguments.into_iter().chain(["--display", "laptop"]).collect();
+    let thresholds = |bytes: &[u8]| {
+        let picture = fechner::exr_read::decode_exr(Path::new("saved"), bytes).expect("a picture");
+        picture.channel("threshold.Y").expect("thresholds").to_vec()
+    };
+    let rendered = thresholds(&super::rendered(folder.path(), &on_laptop, "laptop.exr"));
+    assert!(thresholds(&saved) == rendered, "the thresholds are another eye's");
+}
+
 /// Who opens connections and has no token takes no file from the picture, and no viewer's place.
 #[cfg(unix)]
 #[test]
