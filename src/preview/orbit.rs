@@ -118,6 +118,8 @@ impl Held {
         let CameraAxes { forward, right: sideways, .. } = self.camera.axes();
         let pole = self.camera.up.normalize_or(Vec3::Y);
         let pivot = self.camera.position + forward * self.pivot_distance;
+        // To the right of what is seen, which a mirror shows at the left.
+        let right = if self.camera.mirrored { -right } else { right };
         let elevation = FRAC_PI_2 - (-forward).angle_between(pole);
         let up = (elevation + up).clamp(POLE - FRAC_PI_2, FRAC_PI_2 - POLE) - elevation;
         let turn =
@@ -194,6 +196,9 @@ impl Held {
             let (min, max) = (window.min, window.max);
             let _ = writeln!(text, "screen_window = [{:?}, {:?}, {:?}, {:?}]", min.x, max.x, min.y, max.y);
         }
+        if camera.mirrored {
+            text.push_str("mirrored = true\n");
+        }
         if camera.aperture_radius > 0.0 {
             let _ = writeln!(text, "aperture_radius = {:?}", camera.aperture_radius);
             let _ = writeln!(text, "focus_distance = {:?}", camera.focus_distance);
@@ -230,6 +235,21 @@ mod tests {
             is_home: true,
             home_projection: Projection::Perspective { vertical_fov_deg: 90.0 },
         }
+    }
+
+    /// A mirrored camera shows the mirror image of what another shows, wherever both are moved, and its text says that it does.
+    #[test]
+    fn mirrored_cameras_move_as_they_show() {
+        let mut plain = held();
+        let mut mirrored = Held { camera: Camera { mirrored: true, ..plain.camera.clone() }, ..plain.clone() };
+        for movement in [Movement::Orbit { right: 0.4, up: 0.2 }, Movement::Pan { right: 0.1, up: 0.1 }] {
+            plain.moved(movement);
+            mirrored.moved(movement);
+        }
+        let (a, b) = (plain.camera.position, mirrored.camera.position);
+        // The picture's middle column is the plane x = 0 at first.
+        assert!(b.distance(Vec3::new(-a.x, a.y, a.z)) < 1e-5, "{a} {b}");
+        assert!(mirrored.to_toml().contains("\nmirrored = true\n") && !plain.to_toml().contains("mirrored"));
     }
 
     /// Zooms and dollies without end stay at heights that can be rendered, and come back.

@@ -15,6 +15,7 @@ pub(super) fn read(value: &Value, shutter: Shutter) -> Result<Camera, LoadError>
         "vertical_fov_deg",
         "orthographic_height",
         "screen_window",
+        "mirrored",
         "aperture_radius",
         "focus_distance",
         "shutter_s",
@@ -40,6 +41,7 @@ pub(super) fn read(value: &Value, shutter: Shutter) -> Result<Camera, LoadError>
     let mut camera = Camera {
         projection: projection(&fields)?,
         screen_window: fields.get_some("screen_window", screen_window)?,
+        mirrored: fields.get_or("mirrored", false, Value::boolean)?,
         aperture_radius: fields.get_or("aperture_radius", 0.0, Value::non_negative)? as f32,
         focus_distance: match fields.get("focus_distance") {
             Some(distance) => distance.positive()? as f32,
