@@ -180,6 +180,12 @@ def steps(page, folder):
     page.until("the first exposure", "told.exposure === 0")
     page.until_stopped()
 
+    yield "tells the exposure that there is, beyond the slider and between its steps"
+    for stops, told in [(-14, "-14"), (0.1, "0.1"), (0, "0")]:
+        page.page.evaluate(f"send({{ do: 'exposure', stops: {stops} }})")
+        page.until("the exposure", f"document.getElementById('stops').textContent === {told!r}")
+    page.until_stopped()
+
     yield "shows the display's own pixels, and keeps what is under the pointer there"
     fitted = page.page.locator("#picture").bounding_box()
     page.page.mouse.move(*page.place(0.25, 0.25))

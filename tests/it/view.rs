@@ -287,6 +287,9 @@ fn exposure_changes_the_picture_and_takes_no_samples() {
     let refused = viewer.status("a refusal", |status| !status["error"].is_null());
     assert!(refused["error"].as_str().is_some_and(|error| error.contains("nobody")), "{refused}");
     assert_eq!(refused["operator"], "reinhard02");
+    viewer.send(&json!({ "do": "exposure", "stops": 1e9 }));
+    let refused = viewer.status("another", |status| status["error"].as_str().is_some_and(|e| e.contains("100 stops")));
+    assert_eq!(refused["exposure"], 2.0);
 
     viewer.send(&json!({ "do": "inspect", "x": 16, "y": 20 }));
     let pixel = viewer.json("a pixel", |value| value["kind"] == "inspected");

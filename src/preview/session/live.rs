@@ -2,6 +2,7 @@
 
 use crate::adaptive::settings::{Limits, LoopSettings};
 use crate::preview::Job;
+use crate::scene::MOST_EXPOSURE_STOPS;
 use fechner_perception::display::{Display, Observer, Viewing};
 use fechner_perception::eccentricity::Gaze;
 use fechner_perception::tone::SceneLight;
@@ -63,8 +64,12 @@ pub(super) fn settings_of(job: &Job, live: &Live, whole: Option<&SceneLight>) ->
     record.viewing.display.pixels_per_degree *= live.distance.unwrap_or(1.0);
     record.viewing.check().map_err(|error| error.to_string())?;
     let visibility = live.visibility.unwrap_or(job.limits.last_rung());
-    if visibility.is_nan() || visibility < 0.0 || record.exposure_stops.is_some_and(|stops| !stops.is_finite()) {
-        return Err("visibility must be 0 or above and exposure a number".to_owned());
+    if visibility.is_nan() || visibility < 0.0 {
+        return Err("visibility must be 0 or above".to_owned());
+    }
+    let known_stops = -MOST_EXPOSURE_STOPS..=MOST_EXPOSURE_STOPS;
+    if record.exposure_stops.is_some_and(|stops| !known_stops.contains(&stops)) {
+        return Err(format!("exposure must be from -{MOST_EXPOSURE_STOPS} to {MOST_EXPOSURE_STOPS} stops"));
     }
     let limits = Limits { visibility: Limits::visibility_of_last_rung(visibility), ..job.limits };
     let mut settings = record.loop_settings(limits, job.trace.filter).map_err(|error| error.to_string())?;
