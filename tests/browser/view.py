@@ -233,6 +233,13 @@ def steps(page, folder):
     page.until("a new picture", "!document.getElementById('phase').textContent.startsWith('Stopped')")
     page.until_stopped()
 
+    yield "copies the camera where there is no clipboard"
+    page.page.evaluate("Object.defineProperty(navigator, 'clipboard', { value: undefined, configurable: true })")
+    page.page.click("#copy")
+    page.until("a word about it", "document.getElementById('note').textContent.includes('as TOML')")
+    selected = page.page.evaluate("[document.activeElement.id, getSelection().toString() || document.activeElement.value]")
+    assert selected[0] == "camera" and selected[1].startswith("[camera]"), selected
+
     yield "zooms, opens the lens and focuses by keys"
     page.page.locator("#stage").focus()
     page.page.mouse.move(*page.place(0.4, 0.7))
