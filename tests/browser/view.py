@@ -233,6 +233,22 @@ def steps(page, folder):
     page.until("a new picture", "!document.getElementById('phase').textContent.startsWith('Stopped')")
     page.until_stopped()
 
+    yield "keeps its keys after a slider and a list, and with caps lock"
+    page.page.locator("#target").focus()
+    page.page.keyboard.press("2")
+    assert page.page.evaluate("sides[0].layer") == 1
+    page.page.locator("#operator").focus()
+    page.page.evaluate("document.getElementById('operator').dispatchEvent(new Event('change'))")
+    page.page.keyboard.press("1")
+    assert page.page.evaluate("sides[0].layer") == 0
+    page.page.evaluate("""() => { window.asked = []; const before = send; send = message => asked.push(message);
+        pointed = { x: 1, y: 1 };
+        for (const key of ["F", "A"]) document.body.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true }));
+        setTimeout(() => { send = before; window.asked_all = true; }, 200); }""")
+    page.until("the keys", "window.asked_all")
+    asked = page.page.evaluate("asked.filter(message => message.do !== 'inspect')")
+    assert [message["do"] for message in asked] == ["focus", "camera"] and asked[1]["steps"] == 1, asked
+
     yield "copies the camera where there is no clipboard"
     page.page.evaluate("Object.defineProperty(navigator, 'clipboard', { value: undefined, configurable: true })")
     page.page.click("#copy")
