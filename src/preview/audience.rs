@@ -18,6 +18,10 @@ use crate::scene::Scene;
 use std::net::TcpListener;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// So long viewers are told that the render is not driven.
+const REFUSAL: Duration = Duration::from_secs(6);
 
 /// Viewers of a render under way; they are sent away when it has ended or is dropped.
 pub struct Audience<'a> {
@@ -32,6 +36,18 @@ struct Moving {
     pace: Pace,
     progress: Option<Progress>,
     status: Status,
+    /// When somebody asked for what is not to be had, while that is told.
+    refused: Option<Instant>,
+}
+
+impl Moving {
+    /// Says that a wish cannot be met, or after a while nothing of it.
+    fn refuse(&mut self, refused: Option<Instant>, shared: &Shared) {
+        let told = "this is a running render: it can be stopped; \"fechner view\" opens one to drive";
+        self.status.error = refused.map(|_| told.to_owned());
+        self.refused = refused;
+        publish(&self.status, shared);
+    }
 }
 
 impl<'a> Audience<'a> {
@@ -52,8 +68,9 @@ impl<'a> Audience<'a> {
             std::thread::Builder::new().name("viewers".to_owned()).spawn(move || serve(listener, door, of_server))?;
         let camera = Held::at_home(&scene.camera).to_toml();
         let blank = blank_status(scene, settings, &record.operator, camera);
-        let status = Status { phase: Phase::Rendering, exposure: record.exposure_stops, ..blank };
-        let moving = Moving { screen: Screen::new(Vec::new()), pace: Pace::new(), progress: None, status };
+        let status = Status { phase: Phase::Rendering, exposure: record.exposure_stops, is_driven: false, ..blank };
+        let moving =
+            Moving { screen: Screen::new(Vec::new()), pace: Pace::new(), progress: None, status, refused: None };
         Ok(Self { shared, settings, moving: Mutex::new(moving), server: Mutex::new(Some(server)) })
     }
 
@@ -106,12 +123,11 @@ impl<'a> Audience<'a> {
             match command {
                 Command::Stop => directive = Directive::Stop,
                 Command::Redraw => wants_a_frame = true,
-                _ => {
-                    moving.status.error = Some(
-                        "this is a running render: it can be stopped; \"fechner view\" opens one to drive".to_owned(),
-                    );
-                }
+                _ => moving.refuse(Some(Instant::now()), &self.shared),
             }
+        }
+        if moving.refused.is_some_and(|refused| refused.elapsed() >= REFUSAL) {
+            moving.refuse(None, &self.shared);
         }
         if wants_a_frame {
             self.show(&mut moving, state);

@@ -187,6 +187,8 @@ pub(super) struct Status {
     pub(super) note: Option<String>,
     /// Whether the pointer stands for the gaze.
     pub(super) is_foveated: bool,
+    /// Whether viewers may ask for more than a stop.
+    pub(super) is_driven: bool,
 }
 
 /// What is at a pixel.

@@ -302,6 +302,19 @@ def steps_of_motion_and_gaze(page):
     assert far_for_anybody > 1.5 * far, (near, far, far_for_anybody)
 
 
+def steps_of_a_render(page):
+    """The same for a render that is somebody else's."""
+    yield "offers its end and nothing else"
+    page.until("a picture", "document.getElementById('picture').width === 32")
+    enabled = page.page.evaluate("[...document.querySelectorAll('aside :is(button, input, select):enabled')].map(e => e.id)")
+    assert enabled == ["stop", "keep", "beside", "copy"], enabled
+    page.page.keyboard.press("+")
+    page.page.wait_for_timeout(500)
+    assert page.text("error") == "", page.text("error")
+    page.page.click("#stop")
+    page.until("the end", "document.getElementById('phase').textContent === 'Not connected'")
+
+
 def main():
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("--screenshot", type=pathlib.Path, help="where a picture of the page goes")
@@ -313,6 +326,7 @@ def main():
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         visit(browser, folder, JOB, lambda page: steps(page, folder), arguments.screenshot)
         visit(browser, folder, MOVING_JOB, steps_of_motion_and_gaze)
+        visit_render(browser, folder)
         browser.close()
     print("all steps hold")
 
@@ -336,6 +350,28 @@ def visit(browser, folder, job, steps_of, screenshot=None):
         except Exception as error:
             sys.exit(f"FAILED: {step}\n{error}\nthe console says: {complaints}")
         tab.close()
+
+
+def visit_render(browser, folder):
+    """Watches a render that would not end by itself."""
+    command = [str(FECHNER), "render", str(SCENE), "--view", "--size", "32x32", "--visibility", "0.01", "-o", "watched.png"]
+    process = subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True)
+    try:
+        address = next(line for line in process.stderr if "http://" in line).split()[-1]
+        tab = browser.new_page()
+        tab.goto(address)
+        step = "starts"
+        try:
+            for step in steps_of_a_render(Page(tab)):
+                print(f"{step} ...", flush=True)
+            process.communicate(timeout=PATIENCE_S)
+            assert process.returncode == 0 and (folder / "watched.png").exists()
+        except Exception as error:
+            sys.exit(f"FAILED: {step}\n{error}")
+        tab.close()
+    finally:
+        process.kill()
+        process.wait()
 
 
 main()

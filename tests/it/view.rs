@@ -366,6 +366,8 @@ fn a_render_shows_itself_and_is_not_driven() {
     viewer.send(&json!({ "do": "operator", "name": "reinhard02" }));
     let refused = viewer.status("a refusal", |status| !status["error"].is_null());
     assert!(refused["error"].as_str().is_some_and(|error| error.contains("running render")), "{refused}");
+    assert_eq!(refused["is_driven"], false);
+    viewer.status("no more of it", |status| status["error"].is_null());
     viewer.send(&json!({ "do": "stop" }));
     assert!(view.child.wait().expect("ended").success());
     assert!(image::open(at.join("stopped.png")).is_ok());

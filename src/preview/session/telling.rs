@@ -83,6 +83,7 @@ pub(in crate::preview) fn blank_status(
         error: None,
         note: None,
         is_foveated: false,
+        is_driven: true,
     }
 }
 
