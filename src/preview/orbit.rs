@@ -17,7 +17,7 @@ pub(super) enum Movement {
         /// Over it.
         up: f32,
     },
-    /// With the point, in heights of the picture.
+    /// With the point, in heights of what is shown.
     Pan {
         /// To the right.
         right: f32,
@@ -44,6 +44,16 @@ pub(super) enum Movement {
         /// Steps; below 0 narrower.
         steps: f32,
     },
+}
+
+impl Movement {
+    /// The same, told in heights of a part of the picture that is so many heights of it.
+    pub(super) fn in_part(self, height: f32) -> Self {
+        match self {
+            Self::Pan { right, up } => Self::Pan { right: right * height, up: up * height },
+            other => other,
+        }
+    }
 }
 
 /// Width of the lens that a pinhole becomes, in distances of what it looks at.
@@ -136,6 +146,7 @@ impl Held {
             }
             Projection::Orthographic { height } => height,
         };
+        let height = height * self.camera.screen_window.map_or(1.0, |window| 0.5 * (window.max.y - window.min.y));
         self.camera.position += (sideways * right + upwards * up) * height;
     }
 

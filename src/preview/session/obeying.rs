@@ -5,7 +5,7 @@ use super::problems::Cause;
 use super::{Session, interruptible};
 use crate::adaptive::state::RenderState;
 use crate::adaptive::{LastLook, StopReason};
-use crate::integrator::PathTracer;
+use crate::integrator::{Crop, PathTracer};
 use crate::preview::Job;
 use crate::preview::command::{Command, Phase};
 use crate::preview::orbit::Held;
@@ -46,7 +46,8 @@ impl Session<'_> {
             Command::Visibility { target } => self.change(|live| live.visibility = Some(target), Changed::Target),
             Command::Camera { movement } => {
                 self.find_pivot();
-                self.held.moved(movement);
+                let Crop { height, .. } = self.job.trace.film_area();
+                self.held.moved(movement.in_part(height as f32 / self.job.trace.height as f32));
                 self.has_moved();
             }
             Command::Focus { x, y } => self.focus_on(x, y),

@@ -159,6 +159,24 @@ fn no_gaze_undoes_a_stop() {
     }
 }
 
+/// What is dragged follows the hand, also where a part of the picture is shown.
+#[test]
+fn a_part_is_dragged_by_its_own_height() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let position = |crop: &str| -> f64 {
+        let view = View::of(&cornell_box(), folder.path(), &["--visibility", "16", "--crop", crop]);
+        let mut viewer = view.viewer();
+        let home = viewer.status("the end", is_stopped);
+        viewer.send(&json!({ "do": "camera", "by": "pan", "right": 0.25, "up": 0.0 }));
+        let moved = viewer.status("another camera", |status| status["camera"] != home["camera"] && is_stopped(status));
+        let (_, numbers) = moved["camera"].as_str().and_then(|text| text.split_once("position = [")).expect("TOML");
+        numbers.split(',').next().and_then(|x| x.parse().ok()).expect("a number")
+    };
+    // Around the same middle, one four times as high as the other.
+    let (whole, part) = (position("0,0,32,32"), position("12,12,8,8"));
+    assert!((whole / part - 4.0).abs() < 0.2, "{whole} and {part}");
+}
+
 /// Motion is found again after each movement.
 #[test]
 fn motion_is_shown_from_another_camera_too() {
