@@ -15,7 +15,7 @@ use fechner::output::{self, PartOf};
 use fechner::preview::{self, Audience, Door, Host, Job, Options, Spectator};
 use fechner::scene::Scene;
 use fechner_perception::model;
-use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, UdpSocket};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -100,6 +100,25 @@ fn door_of(listener: &TcpListener) -> anyhow::Result<(SocketAddr, String)> {
     Ok((address, preview::random_token().context("the system gives no random numbers for a token")?))
 }
 
+/// Where somebody who listens on all addresses of this machine is found: at the one that others see it by, or else at its own.
+fn reachable(listener: SocketAddr) -> SocketAddr {
+    // Nothing is sent: the system says which address it would send from to one of documentation's.
+    let (any, elsewhere, own) = match listener.ip() {
+        IpAddr::V4(ip) => (ip.is_unspecified(), "192.0.2.1:9", IpAddr::V4(Ipv4Addr::LOCALHOST)),
+        IpAddr::V6(ip) => (ip.is_unspecified(), "[2001:db8::1]:9", IpAddr::V6(Ipv6Addr::LOCALHOST)),
+    };
+    if !any {
+        return listener;
+    }
+    let seen_by_others = || {
+        let socket = UdpSocket::bind((listener.ip(), 0))?;
+        socket.connect(elsewhere)?;
+        socket.local_addr()
+    };
+    let ip = seen_by_others().map_or(own, |address: SocketAddr| address.ip());
+    SocketAddr::new(ip, listener.port())
+}
+
 /// Serves until a signal comes.
 pub(super) fn run(arguments: &ViewArguments) -> anyhow::Result<()> {
     let pool = arguments.job.thread_pool()?;
@@ -127,7 +146,7 @@ pub(super) fn run(arguments: &ViewArguments) -> anyhow::Result<()> {
     if !address.ip().is_loopback() {
         say!("note: {address} can be reached from other machines; whoever has the address can drive this preview");
     }
-    answer!("http://{address}/?token={token}");
+    answer!("http://{}/?token={token}", reachable(address));
     preview.serve(listener, Door { address, token }).with_context(|| format!("cannot serve on {address}"))?;
     if !host.has_saved.load(Ordering::Relaxed) {
         say!(
@@ -135,4 +154,20 @@ pub(super) fn run(arguments: &ViewArguments) -> anyhow::Result<()> {
         );
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An address that can be opened, with the listener's port.
+    #[test]
+    fn all_addresses_are_told_as_one() {
+        for (listener, is_kept) in [("127.0.0.1:80", true), ("0.0.0.0:81", false), ("[::]:82", false)] {
+            let listener: SocketAddr = listener.parse().expect("an address");
+            let told = reachable(listener);
+            assert!(told.port() == listener.port() && !told.ip().is_unspecified(), "{told}");
+            assert_eq!(told == listener, is_kept);
+        }
+    }
 }
