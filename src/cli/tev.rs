@@ -5,7 +5,7 @@ use clap::Args;
 use fechner::adaptive::judge::Judgement;
 use fechner::adaptive::state::RenderState;
 use fechner::preview::{Looked, Shown, TEV_PORT, Tev};
-use std::net::{SocketAddr, ToSocketAddrs};
+use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Where tev listens.
@@ -20,7 +20,11 @@ pub(super) struct TevArguments {
 struct Addresses(Vec<SocketAddr>);
 
 fn parse_addresses(text: &str) -> Result<Addresses, String> {
-    let resolve = || if text.contains(':') { text.to_socket_addrs() } else { (text, TEV_PORT).to_socket_addrs() };
+    let resolve = || match text.trim_matches(['[', ']']).parse::<IpAddr>() {
+        Ok(ip) => Ok(vec![SocketAddr::new(ip, TEV_PORT)].into_iter()),
+        Err(_) if text.contains(':') => text.to_socket_addrs(),
+        Err(_) => (text, TEV_PORT).to_socket_addrs(),
+    };
     match resolve() {
         Ok(found) => Ok(Addresses(found.collect())),
         Err(error) => {
@@ -87,5 +91,24 @@ impl Showing {
         let rgb_cd_m2: Vec<[f32; 3]> = looked.as_ref().and_then(|looked| looked.denoised.clone()).unwrap_or_else(raw);
         let looked = looked.as_ref();
         tev.offer(&Shown { film, rgb_cd_m2: &rgb_cd_m2, step: 1, looked, nits_per_unit, is_at_rest });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ports_may_be_left_out() {
+        let own = |text: &str| parse_addresses(text).map(|found| found.0.iter().map(ToString::to_string).collect());
+        for (text, address) in [
+            ("127.0.0.1", "127.0.0.1:14158"),
+            ("127.0.0.1:9", "127.0.0.1:9"),
+            ("::1", "[::1]:14158"),
+            ("[::1]", "[::1]:14158"),
+            ("[::1]:9", "[::1]:9"),
+        ] {
+            assert_eq!(own(text), Ok(vec![address.to_owned()]), "{text}");
+        }
     }
 }

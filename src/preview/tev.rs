@@ -58,7 +58,7 @@ pub struct Tev {
 }
 
 impl Tev {
-    /// Connects from a thread of its own. `name` is what tev lists; `warn` is told, once, if it cannot be reached any more.
+    /// Connects from a thread of its own. `name` is what tev lists; `warn` is told, once, if it cannot be reached, or not any more.
     ///
     /// # Errors
     /// If the system gives no thread.
@@ -66,8 +66,14 @@ impl Tev {
         let post = Arc::new(Post::default());
         let of_sender = Arc::clone(&post);
         let work = move || {
-            if let Err(error) = send(&addresses, &name, &of_sender) {
-                warn(&format!("tev is not shown the picture any more: {error}"));
+            let sent =
+                connect(&addresses).map_err(|error| format!("tev is not there to be shown the picture: {error}"));
+            let sent = sent.and_then(|stream| {
+                send(stream, &name, &of_sender)
+                    .map_err(|error| format!("tev is not shown the picture any more: {error}"))
+            });
+            if let Err(problem) = sent {
+                warn(&problem);
             }
             of_sender.mailbox.lock().unwrap_or_else(PoisonError::into_inner).has_ended = true;
             of_sender.changed.notify_all();
@@ -127,8 +133,7 @@ impl Drop for Tev {
 }
 
 /// Sends states as they come, until no more will.
-fn send(addresses: &[SocketAddr], name: &str, post: &Post) -> std::io::Result<()> {
-    let mut stream = connect(addresses)?;
+fn send(mut stream: TcpStream, name: &str, post: &Post) -> std::io::Result<()> {
     stream.set_write_timeout(Some(PATIENCE))?;
     let mut size = None;
     while let Some(Message { width, height, layers }) = next(post) {

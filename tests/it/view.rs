@@ -409,7 +409,7 @@ fn tev_changes_nothing() {
     assert!(received.len() > 32 * 32 * 4 * 14 && received[4] == 4, "{} bytes", received.len());
     // Nobody listens there any more.
     let (said, gone) = render_for(&address, "gone.png");
-    assert_eq!(said.matches("warning: tev").count(), 1, "{said}");
+    assert_eq!(said.matches("warning: tev is not there").count(), 1, "{said}");
     let alone = rendered(at, &["--visibility", "8"], "alone.png");
     assert!(there == alone && gone == alone, "tev changes the picture");
 }
