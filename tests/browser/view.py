@@ -233,6 +233,19 @@ def steps(page, folder):
     page.until("a new picture", "!document.getElementById('phase').textContent.startsWith('Stopped')")
     page.until_stopped()
 
+    yield "pans and comes nearer by two fingers, and orbits by one"
+    script = """() => { window.asked = []; const before = move; move = movement => asked.push(movement);
+        const touch = (type, pointerId, clientX, clientY) => stage.dispatchEvent(new PointerEvent(type,
+            { pointerId, clientX, clientY, pointerType: "touch", bubbles: true }));
+        const capture = stage.setPointerCapture; stage.setPointerCapture = () => {};
+        touch("pointerdown", 7, 100, 200); touch("pointerdown", 8, 200, 200);
+        touch("pointermove", 8, 300, 200);
+        touch("pointerup", 8, 300, 200); touch("pointermove", 7, 140, 200); touch("pointerup", 7, 140, 200);
+        move = before; stage.setPointerCapture = capture; return asked; }"""
+    pan, dolly, orbit = page.page.evaluate(script)
+    assert (pan["by"], dolly["by"], orbit["by"]) == ("pan", "dolly", "orbit"), (pan, dolly, orbit)
+    assert pan["right"] < 0 and abs(0.9 ** dolly["steps"] - 0.5) < 1e-6, (pan, dolly)
+
     yield "keeps its keys after a slider and a list, and with caps lock"
     page.page.locator("#target").focus()
     page.page.keyboard.press("2")
