@@ -141,6 +141,7 @@ impl Subject {
             scene: Arc::clone(&self.scene),
             trace: self.trace_settings(seed),
             record,
+            csf_area_deg2: None,
             limits,
             importance: None,
             whole: None,

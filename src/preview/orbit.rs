@@ -221,11 +221,11 @@ impl Held {
 /// A height that can be rendered: without bounds it becomes 0, or rays begin so far away that all memory is taken.
 fn bounded(height: f32, home: Projection) -> f32 {
     match home {
-        Projection::Orthographic { height: home } => {
-            let [least, most] = TIMES_HOME_HEIGHT.map(|times| (times * home).max(f32::MIN_POSITIVE).min(f32::MAX));
+        Projection::Orthographic { height: home } if home.is_finite() => {
+            let [least, most] = TIMES_HOME_HEIGHT.map(|times| (times * home).clamp(f32::MIN_POSITIVE, f32::MAX));
             height.clamp(least, most)
         }
-        Projection::Perspective { .. } => height,
+        Projection::Orthographic { .. } | Projection::Perspective { .. } => height,
     }
 }
 

@@ -58,7 +58,7 @@ pub(super) fn settings_of(job: &Job, live: &Live, whole: Option<&SceneLight>) ->
         record.viewing = Viewing::of(display);
         let own = record.viewing.observer.csf_area_deg2;
         let csf_area_deg2 = job.csf_area_deg2.unwrap_or(own);
-        record.viewing.observer = Observer { sensitivity, glare, csf_area_deg2, ..record.viewing.observer };
+        record.viewing.observer = Observer { sensitivity, glare, csf_area_deg2 };
     }
     // So many times as far, a pixel looks so many times as small.
     record.viewing.display.pixels_per_degree *= live.distance.unwrap_or(1.0);
