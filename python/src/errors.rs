@@ -10,7 +10,6 @@ use pyo3::prelude::*;
 use crate::threads;
 
 /// The crate's message as a `ValueError`, places and sizes in the order of numpy.
-#[expect(clippy::needless_pass_by_value, reason = "stands in map_err")]
 pub(crate) fn value_error(error: Error) -> PyErr {
     PyValueError::new_err(match error {
         Error::SizeMismatch { what, width, height, found_width, found_height } => {
