@@ -152,16 +152,21 @@ pub enum ExrReadError {
 
 /// Reads every channel of a file's parts.
 pub fn read_exr(path: &Path) -> Result<ExrImage, ExrReadError> {
-    read_exr_channels(path, |_, _| true)
+    read_exr_channels(path, |all| all.to_vec())
 }
 
-/// Reads those channels of a file's parts that `is_wanted`, which is asked with the names of all and one of them. Only they take memory.
-pub fn read_exr_channels(path: &Path, is_wanted: impl Fn(&[String], &str) -> bool) -> Result<ExrImage, ExrReadError> {
+/// Reads those channels of a file's parts that `choose` chooses among the names of all. Only they take memory.
+pub fn read_exr_channels(path: &Path, choose: impl FnOnce(&[String]) -> Vec<String>) -> Result<ExrImage, ExrReadError> {
     let io = |error| ExrReadError::Io { path: path.to_owned(), error };
     if path.metadata().map_err(io)?.is_dir() {
         return Err(io(std::io::Error::new(std::io::ErrorKind::IsADirectory, "it is a folder, not an EXR file")));
     }
-    decode_exr_channels(path, &std::fs::read(path).map_err(io)?, is_wanted)
+    decode_exr_channels(path, &std::fs::read(path).map_err(io)?, choose)
+}
+
+/// The layer and the last part of a channel's name, which a dot parts: `beauty.R` is R of beauty, `R` is R of the layer without a name.
+pub fn layer_and_part(channel: &str) -> (&str, &str) {
+    channel.rsplit_once('.').unwrap_or(("", channel))
 }
 
 /// Whether these are the first bytes of an EXR file.
@@ -171,20 +176,20 @@ pub fn is_exr(bytes: &[u8]) -> bool {
 
 /// Reads every channel of the parts of a file that is in memory; `path` is for messages.
 pub fn decode_exr(path: &Path, file: &[u8]) -> Result<ExrImage, ExrReadError> {
-    decode_exr_channels(path, file, |_, _| true)
+    decode_exr_channels(path, file, |all| all.to_vec())
 }
 
 /// [`read_exr_channels`] of a file that is in memory; `path` is for messages.
 pub fn decode_exr_channels(
     path: &Path,
     file: &[u8],
-    is_wanted: impl Fn(&[String], &str) -> bool,
+    choose: impl FnOnce(&[String]) -> Vec<String>,
 ) -> Result<ExrImage, ExrReadError> {
     if let Some(image) = subsampled::read(path, file)? {
         return Ok(image);
     }
     let headers = read_headers(path, file)?;
-    let wanted = Wanted::of(&headers, is_wanted);
+    let wanted = Wanted::of(&headers, choose);
     check_memory(path, &headers, &wanted)?;
     dwa::check(path, file, &headers)?;
     let image = guarded(path, || {
@@ -224,7 +229,7 @@ pub fn decode_exr_channels(
 fn layout(headers: &[Header]) -> &Header {
     let has = |header: &Header, names: &[&str]| {
         let has_one = |name: &&str| {
-            let is_it = |own: &str| own.rsplit('.').next().is_some_and(|last| last.eq_ignore_ascii_case(name));
+            let is_it = |own: &str| layer_and_part(own).1.eq_ignore_ascii_case(name);
             header.channels.list.iter().any(|channel| is_it(&channel.name.to_string()))
         };
         names.iter().all(has_one)

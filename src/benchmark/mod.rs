@@ -40,7 +40,7 @@ pub use race::{Need, QUALITIES, Race, RaceMean};
 pub use reached::Reached;
 pub use record::{ArmSummary, Record, ReferenceOf, Results};
 pub use reference::trace_up_to;
-pub use summary::{GeometricMean, INTERVAL_LEVEL, intervals_in_words};
+pub use summary::{GeometricMean, INTERVAL_LEVEL, intervals_in_words, mean_ratio};
 
 use crate::adaptive::settings::{Limits, LoopSettings};
 use crate::integrator::{PathTracer, TraceSettings};

@@ -1,6 +1,7 @@
 //! How denoised pictures get better with samples by three rules, and what each rule needs for a quality.
 
 use super::reached::Reached;
+use super::summary::mean_ratio;
 use serde::Serialize;
 
 /// The rule that others are compared with.
@@ -74,9 +75,9 @@ pub(super) fn means(races: &[Race]) -> Vec<RaceMean> {
     each.map(|(rule, quality)| {
         let of_rule = races.iter().filter(|race| race.rule == rule).flat_map(|race| &race.needs);
         let needs: Vec<&Need> = of_rule.filter(|need| need.quality == quality).collect();
-        let logs: Vec<f64> = needs.iter().filter_map(|need| need.uniform_over).map(f64::ln).collect();
-        let uniform_over = (!logs.is_empty()).then(|| (logs.iter().sum::<f64>() / logs.len() as f64).exp());
-        RaceMean { rule, quality, uniform_over, pairs: logs.len(), pairs_left_out: needs.len() - logs.len() }
+        let ratios: Vec<f64> = needs.iter().filter_map(|need| need.uniform_over).collect();
+        let (pairs, pairs_left_out) = (ratios.len(), needs.len() - ratios.len());
+        RaceMean { rule, quality, uniform_over: mean_ratio(ratios), pairs, pairs_left_out }
     })
     .collect()
 }

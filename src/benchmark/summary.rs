@@ -41,11 +41,16 @@ pub fn intervals_in_words() -> String {
     )
 }
 
+/// e to the mean of the logarithms; `None` of none.
+pub fn mean_ratio(ratios: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let logs: Vec<f64> = ratios.into_iter().map(f64::ln).collect();
+    (!logs.is_empty()).then(|| (logs.iter().sum::<f64>() / logs.len() as f64).exp())
+}
+
 /// Geometric mean of ratios: each scene's is `ratios[scene]` by seed, and `pooled[scene]` for all its seeds together, which is
 /// what the mean is taken of.
 pub(crate) fn geometric_mean(pooled: &[f64], ratios: &[Vec<f64>]) -> GeometricMean {
-    let logs: Vec<f64> = pooled.iter().map(|ratio| ratio.ln()).collect();
-    let value = (logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp();
+    let value = mean_ratio(pooled.iter().copied()).unwrap_or(1.0);
     let least = pooled.iter().copied().fold(f64::INFINITY, f64::min);
     let factor = half_width_of_log(ratios).map(f64::exp);
     GeometricMean { value, low: factor.map(|factor| value / factor), high: factor.map(|factor| value * factor), least }

@@ -1,7 +1,7 @@
 //! Which channels of another program's EXR file hold its colour and its motion.
 
 use anyhow::{Result, bail};
-use fechner::exr_read::{ExrImage, read_exr_channels};
+use fechner::exr_read::{ExrImage, layer_and_part, read_exr_channels};
 use fechner_perception::Plane;
 use std::path::Path;
 
@@ -16,7 +16,7 @@ pub(super) enum Colour<'a> {
 
 /// Reads the motion of a file that shows as many pixels as the picture it is for.
 pub(super) fn read_motion(path: &Path, (width, height): (usize, usize)) -> Result<ExrImage> {
-    let exr = read_exr_channels(path, |_, name| is_of_motion(name))?;
+    let exr = read_exr_channels(path, |all| all.iter().filter(|name| is_of_motion(name)).cloned().collect())?;
     let shown = exr.display_window;
     if (shown.width as usize, shown.height as usize) != (width, height) {
         bail!("{} has {}x{} pixels, the picture {width}x{height}", path.display(), shown.width, shown.height);
@@ -66,14 +66,18 @@ struct PictureLayer<'a> {
 
 /// Reads the channels of a file that may be its picture, and passes over the others.
 pub(super) fn read_picture(path: &Path) -> Result<ExrImage> {
-    Ok(read_exr_channels(path, |all, name| {
-        let all: Vec<&str> = all.iter().map(String::as_str).collect();
-        let (layer, part) = split(name);
-        let is_of_picture = picture_layer(&all).is_some_and(|picture| picture.name == layer);
-        match is_of_picture {
-            true => ["R", "G", "B"].iter().any(|own| part.eq_ignore_ascii_case(own)),
-            false => layer.is_empty() && ["X", "Y", "Z", "RY", "BY"].contains(&part),
-        }
+    Ok(read_exr_channels(path, |all| {
+        let names: Vec<&str> = all.iter().map(String::as_str).collect();
+        let picture = picture_layer(&names);
+        let may_be = |name: &&String| {
+            let (layer, part) = layer_and_part(name);
+            if picture.as_ref().is_some_and(|picture| picture.name == layer) {
+                ["R", "G", "B"].iter().any(|own| part.eq_ignore_ascii_case(own))
+            } else {
+                layer.is_empty() && ["X", "Y", "Z", "RY", "BY"].contains(&part)
+            }
+        };
+        all.iter().filter(may_be).cloned().collect()
     })?)
 }
 
@@ -170,7 +174,7 @@ pub(super) fn both_motions(exr: &ExrImage) -> Option<BothMotions> {
 
 /// Whether a channel may be one of those that [`both_motions`] looks for.
 fn is_of_motion(name: &str) -> bool {
-    let (layer, part) = split(name);
+    let (layer, part) = layer_and_part(name);
     let is_layer = MOTION_LAYERS.iter().chain(&BACKWARD_LAYERS).any(|name| is_called(layer, name));
     is_layer && VECTOR_PARTS.iter().flatten().chain(&["Z", "W"]).any(|own| part.eq_ignore_ascii_case(own))
 }
@@ -189,7 +193,7 @@ fn names(exr: &ExrImage) -> Vec<&str> {
 fn layers_with<'a>(names: &[&'a str], parts: &[&str]) -> Vec<&'a str> {
     let mut layers: Vec<&str> = Vec::new();
     for name in names {
-        let (layer, part) = split(name);
+        let (layer, part) = layer_and_part(name);
         let has = |part: &&str| names.iter().any(|name| is_part(name, layer, part));
         if part.eq_ignore_ascii_case(parts[0]) && !layers.contains(&layer) && parts.iter().all(has) {
             layers.push(layer);
@@ -199,16 +203,12 @@ fn layers_with<'a>(names: &[&'a str], parts: &[&str]) -> Vec<&'a str> {
 }
 
 fn is_part(name: &str, layer: &str, part: &str) -> bool {
-    let (own_layer, own_part) = split(name);
+    let (own_layer, own_part) = layer_and_part(name);
     own_layer == layer && own_part.eq_ignore_ascii_case(part)
 }
 
 fn part_of<'a>(exr: &'a ExrImage, layer: &str, part: &str) -> Option<&'a [f32]> {
     exr.channels.iter().find(|(name, _)| is_part(name, layer, part)).map(|(_, values)| values.as_slice())
-}
-
-fn split(name: &str) -> (&str, &str) {
-    name.rsplit_once('.').unwrap_or(("", name))
 }
 
 #[cfg(test)]

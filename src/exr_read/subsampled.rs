@@ -70,7 +70,7 @@ pub(super) fn read(path: &Path, file: &[u8]) -> Result<Option<ExrImage>, ExrRead
         plain[sampling.at + 4..sampling.at + 8].copy_from_slice(&one);
     }
     let mut headers = read_headers(path, &plain)?;
-    check_memory(path, &headers, &Wanted::of(&headers, |_, _| true))?;
+    check_memory(path, &headers, &Wanted::of(&headers, |all| all.to_vec()))?;
     let header = &mut headers[0];
     let unsupported = |feature: &str| ExrReadError::Unsupported { path: path.to_owned(), feature: feature.to_owned() };
     let Vec2(left, top) = header.own_attributes.layer_position;

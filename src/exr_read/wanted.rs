@@ -19,11 +19,11 @@ pub(super) struct Wanted {
 }
 
 impl Wanted {
-    /// Those of all parts for which `is_wanted`, asked with the names of all and one of them, says yes.
-    pub(super) fn of(headers: &[Header], is_wanted: impl Fn(&[String], &str) -> bool) -> Self {
+    /// Those of all parts that `choose` chooses among the names of all.
+    pub(super) fn of(headers: &[Header], choose: impl FnOnce(&[String]) -> Vec<String>) -> Self {
         let mut wanted = Self { names: HashSet::new(), has_several_parts: headers.len() > 1 };
         let all: Vec<String> = headers.iter().flat_map(|header| wanted.names_of(header)).collect();
-        wanted.names = all.iter().filter(|name| is_wanted(&all, name)).cloned().collect();
+        wanted.names = choose(&all).into_iter().collect();
         wanted
     }
 

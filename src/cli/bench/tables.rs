@@ -2,6 +2,7 @@
 
 use fechner::benchmark::{
     AnimationRow, ArmSummary, Bound, Calibration, DenoisingResults, Need, QUALITIES, RaceMean, intervals_in_words,
+    mean_ratio,
 };
 
 /// What each arm saves, over scenes.
@@ -131,14 +132,12 @@ pub(super) fn print_animation(denoiser: Option<&str>, rows: &[AnimationRow]) {
 /// A geometric mean of what is known, in words, with how many are left out: "1.02 (of 3; 2 without a figure left out)".
 fn geometric_mean(values: impl Iterator<Item = Option<f64>>) -> String {
     let values: Vec<Option<f64>> = values.collect();
-    let logarithms: Vec<f64> = values.iter().flatten().map(|value| value.ln()).collect();
-    let (known, unknown) = (logarithms.len(), values.len() - logarithms.len());
+    let known = values.iter().flatten().count();
+    let unknown = values.len() - known;
     let left_out =
         if unknown == 0 { String::new() } else { format!(" (of {known}; {unknown} without a figure left out)") };
-    if logarithms.is_empty() {
-        return format!("–{left_out}");
-    }
-    format!("{:.2}{left_out}", (logarithms.iter().sum::<f64>() / known as f64).exp())
+    let mean = mean_ratio(values.into_iter().flatten()).map_or_else(|| "–".to_owned(), |mean| format!("{mean:.2}"));
+    format!("{mean}{left_out}")
 }
 
 #[cfg(test)]

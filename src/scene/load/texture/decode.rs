@@ -2,7 +2,7 @@
 //! (4 a texel), all others become linear floats (16 a texel).
 
 use super::Picture;
-use crate::exr_read;
+use crate::exr_read::{self, layer_and_part};
 use crate::hdr_read::{HdrHeader, with_known_signature};
 use crate::jpeg_read;
 use crate::scene::load::{LoadError, files};
@@ -149,8 +149,10 @@ fn is_eight_bit(color: image::ColorType) -> bool {
 
 fn decode_exr(bytes: &[u8], name: &Path) -> Result<Decoded, LoadError> {
     // A picture of one channel is grey; parts prefix their names.
-    let is_of_colour = |_: &[String], name: &str| ["R", "G", "B", "A", "Y"].contains(&last_name(name));
-    let picture = exr_read::decode_exr_channels(name, bytes, is_of_colour).map_err(|error| match error {
+    let of_colour = |all: &[String]| {
+        all.iter().filter(|name| ["R", "G", "B", "A", "Y"].contains(&layer_and_part(name).1)).cloned().collect()
+    };
+    let picture = exr_read::decode_exr_channels(name, bytes, of_colour).map_err(|error| match error {
         exr_read::ExrReadError::TooLarge { .. } => LoadError::too_large(name, error),
         _ => LoadError::invalid(name, error),
     })?;
@@ -158,7 +160,7 @@ fn decode_exr(bytes: &[u8], name: &Path) -> Result<Decoded, LoadError> {
     check_size(name, width, height, 16)?;
     let find = |wanted: &str| {
         picture.channel(wanted).or_else(|| {
-            picture.channels.iter().find(|(n, _)| last_name(n) == wanted).map(|(_, values)| values.as_slice())
+            picture.channels.iter().find(|(n, _)| layer_and_part(n).1 == wanted).map(|(_, values)| values.as_slice())
         })
     };
     let (Some(red), alpha) = (find("R").or_else(|| find("Y")), find("A")) else {
@@ -168,11 +170,6 @@ fn decode_exr(bytes: &[u8], name: &Path) -> Result<Decoded, LoadError> {
     let texels =
         (0..red.len()).map(|i| [red[i], green[i], blue[i], alpha.map_or(1.0, |a| a[i])].map(finite_or_zero)).collect();
     Ok(Decoded { width: picture.width, height: picture.height, texels: Texels::Floats(Arc::new(texels)) })
-}
-
-/// What stands after the layer's name.
-fn last_name(channel: &str) -> &str {
-    channel.rsplit_once('.').map_or(channel, |(_, last)| last)
 }
 
 fn check_size(name: &Path, width: u64, height: u64, bytes_per_texel: u64) -> Result<(), LoadError> {
