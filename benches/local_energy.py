@@ -2,9 +2,9 @@
 
     cargo build --release
     python3 -m venv venv && venv/bin/pip install numpy OpenEXR
-    venv/bin/python benches/local_energy.py scenes/cornell-glass.toml [--seeds 50] [--visibility 4]
+    venv/bin/python benches/local_energy.py scenes/cornell-glass.toml [--seeds 50] [--visibility 4] [--spp 30]
 
-renders a scene by many seeds, adaptively to a visibility and evenly by --even samples a pixel, and a reference of --reference even
+renders a scene by many seeds, adaptively to a visibility or a budget and evenly by --even samples a pixel, and a reference of --reference even
 samples of a seed of its own. Printed are, of both, the energy of the mean over that of the reference in per cent with its standard
 error, the block of 8x8 pixels that is off by most standard errors, and the mean of t^2 over the blocks, 1 where nothing is
 biased. The scatter of a block is that of its seeds and of the reference, whose own is that of one even render scaled by its samples.
@@ -39,6 +39,7 @@ def main():
     parser.add_argument("--seeds", type=int, default=50)
     parser.add_argument("--size", default="48x48")
     parser.add_argument("--visibility", default="4")
+    parser.add_argument("--spp")
     parser.add_argument("--even", type=int, default=160)
     parser.add_argument("--reference", type=int, default=16384)
     parser.add_argument("--program", default="target/release/fechner")
@@ -57,7 +58,8 @@ def main():
         reference = even(10_000_019, arguments.reference)
         seeds = range(1, arguments.seeds + 1)
         evenly = np.array([even(seed, arguments.even) for seed in seeds])
-        adaptively = np.array([render(seed, "--visibility", arguments.visibility) for seed in seeds])
+        limits = ["--visibility", arguments.visibility, *(["--spp", arguments.spp] if arguments.spp else [])]
+        adaptively = np.array([render(seed, *limits) for seed in seeds])
 
     def spread(of):
         values = np.array([of(one) for one in evenly])

@@ -6,6 +6,7 @@
 Nothing to install. Exit status 1 names what does not hold.
 """
 
+import json
 import os
 import pathlib
 import re
@@ -45,6 +46,27 @@ def broken_links():
                 yield f"{document.relative_to(ROOT)}: {link}: no such heading"
 
 
+def fields(figures):
+    """Names of a JSON object's fields, and of the objects in it."""
+    if isinstance(figures, list):
+        figures = {"": figures[0]} if figures and isinstance(figures[0], dict) else {}
+    for name, value in figures.items():
+        if name:
+            yield name
+        if isinstance(value, (dict, list)):
+            yield from fields(value)
+
+
+def unexplained_fields(folder):
+    """Fields of the JSON files that the examples wrote which docs/figures.md does not name."""
+    text = (ROOT / "docs/figures.md").read_text(encoding="utf-8")
+    named = {word for words in re.findall(r"`([a-z0-9_.]+)`", text) for word in words.split(".")}
+    for file in ("out/cornell.json", "out/denoised.json", "out/difference.json", "out/apart.json", "out/ball.json"):
+        for field in sorted(set(fields(json.loads((folder / file).read_text(encoding="utf-8"))))):
+            if field not in named:
+                yield f"{file}: {field} is not in docs/figures.md"
+
+
 def examples():
     text = (ROOT / "docs/commands.md").read_text(encoding="utf-8")
     for block in re.findall(r"^```sh\n(.*?)^```", text, re.DOTALL | re.MULTILINE):
@@ -69,6 +91,7 @@ def failing_examples(program):
             # 1 is an answer of `compare`: a difference can be seen.
             if done.returncode not in ((0, 1) if command.startswith("fechner compare ") else (0,)):
                 yield f"docs/commands.md: exit status {done.returncode}: {command}\n{done.stderr.strip()}"
+        yield from unexplained_fields(pathlib.Path(folder))
 
 
 def main():

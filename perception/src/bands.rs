@@ -2,7 +2,7 @@
 
 use crate::display::PixelDensity;
 
-/// A set of octave bands: raised cosines over log frequency with Σ_b B_b(f)² = 1 at every frequency.
+/// A set of octave bands: cosines over log frequency with Σ_b B_b(f)² = 1 at every frequency.
 ///
 /// Centres are fixed in cycles per degree (0.5, 1, 2, …), since masking belongs to the eye and not to the pixel grid.
 /// The lowest band takes everything below its centre and the highest everything above.
@@ -45,7 +45,7 @@ impl OctaveBands {
         if (band == 0 && octaves <= 0.0) || (band + 1 == self.len() && octaves >= 0.0) {
             return 1.0;
         }
-        raised_cosine(octaves)
+        cosine_flank(octaves)
     }
 
     /// Amplitude gain of `band` for the guide: closed at the bottom, so that a slow gradient is no mask.
@@ -61,7 +61,7 @@ impl OctaveBands {
         let center_cpd = self.centers_cpd[band];
         let octaves = (freq_cpd / center_cpd).log2();
         if band + 1 < self.len() || octaves < 0.0 {
-            return raised_cosine(octaves);
+            return cosine_flank(octaves);
         }
         // A coarse grid ends its last band by itself.
         let fade = if center_cpd < HIGHEST_CPD { 0.0 } else { (octaves - 1.0).clamp(0.0, 1.0) };
@@ -74,7 +74,7 @@ impl OctaveBands {
     }
 }
 
-fn raised_cosine(octaves: f64) -> f64 {
+fn cosine_flank(octaves: f64) -> f64 {
     if octaves.abs() >= 1.0 { 0.0 } else { (octaves * std::f64::consts::FRAC_PI_2).cos() }
 }
 

@@ -100,7 +100,11 @@ pub(super) fn by_channel<T: Send>(of: impl Fn(usize) -> T + Sync) -> [T; CHANNEL
 pub fn picture_variance(film: &Film, nits_per_unit: f64) -> Plane {
     let own = film.estimate(nits_per_unit).variance_of_mean;
     let factor = SampleStatistics::of(film, &scene_units(film)).channels[0].factor_with_own.clone();
-    Plane::from_fn(own.width(), own.height(), |x, y| own.get(x, y) * factor.get(x, y))
+    let samples = |pixel: usize| Half::BOTH.iter().map(|&half| film.half(half)[pixel].samples).sum::<u32>();
+    Plane::from_fn(own.width(), own.height(), |x, y| {
+        let is_known = samples(y * own.width() + x) > 1;
+        if is_known { own.get(x, y) * factor.get(x, y) } else { f32::INFINITY }
+    })
 }
 
 /// The scale that leaves variances in scene units.

@@ -13,6 +13,7 @@ mod video;
 use super::console::duration_in_words;
 use super::denoise::DenoiseChoice;
 use super::job::{Quality, Size, parse_size};
+use super::numbers::{parse_seed, whole};
 use super::seeing::{AskedPresentation, operator_values, parse_positive, parse_seconds, parse_stops, parse_unit};
 use super::signals;
 use anyhow::{Context, Result};
@@ -59,19 +60,19 @@ pub(super) struct AnimateArguments {
     #[arg(long, value_enum, conflicts_with = "visibility", help_heading = "Until")]
     quality: Option<Quality>,
     /// A budget of this mean number of samples a pixel over the whole shot, spent on the frames that need it most.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Until")]
+    #[arg(long, value_name = "N", value_parser = whole(1..=u32::MAX), allow_negative_numbers = true, help_heading = "Until")]
     spp: Option<u32>,
     /// A budget of this many seconds for all frames that are rendered, spent on those that need it most.
     #[arg(long, value_name = "S", value_parser = parse_seconds, conflicts_with = "spp", help_heading = "Until")]
     time: Option<Duration>,
     /// Most samples of one pixel.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(16..), default_value_t = DEFAULT_MAX_SAMPLES, help_heading = "Until")]
+    #[arg(long, value_name = "N", value_parser = whole(16..=u32::MAX), allow_negative_numbers = true, default_value_t = DEFAULT_MAX_SAMPLES, help_heading = "Until")]
     max_spp: u32,
     /// How samples are spread.
     #[arg(long, value_enum, default_value = "adaptive", help_heading = "Sampling")]
     sampling: SamplingChoice,
     /// Seed of all random numbers; each frame has its own from it.
-    #[arg(long, default_value_t = 0, allow_negative_numbers = true, help_heading = "Sampling")]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse_seed, allow_negative_numbers = true, help_heading = "Sampling")]
     seed: u64,
 
     /// Frames may be paused and looked at: each is held to what a still is.
@@ -116,7 +117,7 @@ pub(super) struct AnimateArguments {
     video: Option<PathBuf>,
 
     /// Threads; the pictures do not depend on it.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..1024), help_heading = "Running")]
+    #[arg(long, value_name = "N", value_parser = whole(1..=1023), allow_negative_numbers = true, help_heading = "Running")]
     threads: Option<u32>,
 }
 

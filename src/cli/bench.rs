@@ -4,8 +4,10 @@ mod tables;
 
 use super::animate::parse_rate;
 use super::denoise::DenoiseChoice;
+use super::numbers::whole;
 use super::seeing::{DEFAULT_DISPLAY, parse_positive};
 use anyhow::{Result, bail};
+use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum};
 use fechner::benchmark::{
     AnimationResults, AnimationRow, AnimationSettings, Arm, BenchSettings, DenoisingSettings, animation, bounds,
@@ -27,13 +29,13 @@ pub(super) struct BenchArguments {
     #[arg(short, long, value_name = "DIR", default_value = "bench")]
     output: PathBuf,
     /// Pixels to a side of the square pictures, in the suite animation pixels across pictures of 16:9, in place of the suite's.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(32..=4096))]
+    #[arg(long, value_name = "N", value_parser = whole(32..=4096), allow_negative_numbers = true)]
     size: Option<u32>,
     /// Visibility that every arm has to reach, in place of the suite's.
     #[arg(long, value_name = "V", value_parser = parse_positive)]
     visibility: Option<f64>,
     /// Renders of each arm, in place of the suite's.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
+    #[arg(long, value_name = "N", value_parser = whole(1..=64), allow_negative_numbers = true)]
     seeds: Option<u32>,
     /// Display preset.
     #[arg(long, value_name = "NAME", default_value = DEFAULT_DISPLAY)]
@@ -50,7 +52,7 @@ pub(super) struct BenchArguments {
     #[arg(long)]
     bound: bool,
     /// Arms, separated by commas, in place of the suite's.
-    #[arg(long, value_name = "ARM,…", value_delimiter = ',')]
+    #[arg(long, value_name = "ARM,…", value_delimiter = ',', value_parser = PossibleValuesParser::new(Arm::ALL.map(Arm::name)))]
     arms: Vec<String>,
     /// Denoisers, separated by commas: of the suite denoise, without any builtin and oidn; of the suite animation, without any none.
     #[arg(long, value_enum, value_name = "NAME,…", value_delimiter = ',')]
@@ -103,7 +105,7 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<()> {
         scenes,
         size: (size, size),
         visibility: arguments.visibility.unwrap_or(visibility),
-        arms: if arguments.arms.is_empty() { arms } else { named_arms(&arguments.arms)? },
+        arms: if arguments.arms.is_empty() { arms } else { named_arms(&arguments.arms) },
         seeds: arguments.seeds.unwrap_or(seeds),
         reference_factor: arguments.reference_factor,
         display: arguments.display.clone(),
@@ -219,17 +221,11 @@ fn run_animation(arguments: &BenchArguments, denoiser: Option<DenoiserKind>) -> 
 }
 
 /// Arms by name, and those that others are compared with.
-fn named_arms(names: &[String]) -> Result<Vec<Arm>> {
-    for name in names {
-        if !Arm::ALL.iter().any(|arm| arm.name() == name) {
-            let known: Vec<&str> = Arm::ALL.iter().map(|arm| arm.name()).collect();
-            bail!("there is no arm \"{name}\"; known: {}", known.join(", "));
-        }
-    }
+fn named_arms(names: &[String]) -> Vec<Arm> {
     let is_named = |arm: Arm| names.iter().any(|name| name == arm.name());
     let is_after_as_asked = [Arm::UniformEqualTime, Arm::ToThreshold].into_iter().any(is_named);
     let needed = |arm: Arm| arm == Arm::Uniform || (arm == Arm::AsAsked && is_after_as_asked);
-    Ok(Arm::ALL.into_iter().filter(|&arm| needed(arm) || is_named(arm)).collect())
+    Arm::ALL.into_iter().filter(|&arm| needed(arm) || is_named(arm)).collect()
 }
 
 /// The scenes that are asked for, or those of the suite.

@@ -10,6 +10,7 @@ mod unit;
 mod work;
 
 use super::CALL_AGAIN;
+use super::numbers::whole;
 use anyhow::{Context, Result};
 use clap::{Args, Subcommand};
 use fechner::farm::Farm;
@@ -46,7 +47,7 @@ enum FarmCommand {
 #[derive(Debug, Args)]
 struct Threads {
     /// Threads; nothing depends on it but the time.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..1024))]
+    #[arg(long, value_name = "N", value_parser = whole(1..=1023), allow_negative_numbers = true)]
     threads: Option<u32>,
 }
 

@@ -3,6 +3,7 @@
 use super::console;
 use super::denoise::DenoiseChoice;
 use super::importance;
+use super::numbers::{parse_seed, whole};
 use super::seeing::{
     self, AskedPresentation, Presentation, model_values, operator_values, parse_finite, parse_positive, parse_seconds,
     parse_stops, parse_unit,
@@ -50,17 +51,18 @@ pub(super) struct JobArguments {
     /// The same, by name.
     #[arg(long, value_enum, conflicts_with = "visibility", help_heading = "Until")]
     quality: Option<Quality>,
-    /// Stop after this many seconds of rendering, between plans; the first of them, 16 samples a pixel, is always traced.
+    /// Stop after this many seconds of rendering, between plans; the first of them, 16 samples a pixel (4 of a denoised
+    /// picture), is always traced.
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_negative_numbers = true, help_heading = "Until")]
     time: Option<Duration>,
     /// Stop at this mean number of samples a pixel.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Until")]
+    #[arg(long, value_name = "N", value_parser = whole(1..=u32::MAX), allow_negative_numbers = true, help_heading = "Until")]
     spp: Option<u32>,
     /// Most samples of one pixel.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(16..), default_value_t = DEFAULT_MAX_SAMPLES, help_heading = "Until")]
+    #[arg(long, value_name = "N", value_parser = whole(16..=u32::MAX), allow_negative_numbers = true, default_value_t = DEFAULT_MAX_SAMPLES, help_heading = "Until")]
     max_spp: u32,
     /// Stop after this many plans: repeats a render that ended by --time.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Until")]
+    #[arg(long, value_name = "N", value_parser = whole(1..=u32::MAX), allow_negative_numbers = true, help_heading = "Until")]
     plans: Option<u32>,
 
     /// How samples are spread.
@@ -92,7 +94,7 @@ pub(super) struct JobArguments {
     #[arg(long, value_name = "MAP", help_heading = "Sampling")]
     importance: Option<PathBuf>,
     /// Seed of all random numbers.
-    #[arg(long, default_value_t = 0, allow_negative_numbers = true, help_heading = "Sampling")]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse_seed, allow_negative_numbers = true, help_heading = "Sampling")]
     seed: u64,
 
     /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file
@@ -125,7 +127,7 @@ pub(super) struct JobArguments {
     exposure: Option<f64>,
 
     /// Threads; the picture does not depend on it.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..1024), help_heading = "Running")]
+    #[arg(long, value_name = "N", value_parser = whole(1..=1023), allow_negative_numbers = true, help_heading = "Running")]
     threads: Option<u32>,
 }
 

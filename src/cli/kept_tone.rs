@@ -2,10 +2,10 @@
 //! the render judged, with its operator and its exposure.
 
 use super::picture::InputPicture;
-use super::seeing::{DEFAULT_DISPLAY, tone_operator};
+use super::seeing::tone_operator;
 use anyhow::Result;
 use fechner::exr_read::ExrImage;
-use fechner::output::{Attribute, TONE};
+use fechner::output::{Attribute, DISPLAY, TONE};
 use fechner_perception::Plane;
 use fechner_perception::display::{Display, Viewing};
 use fechner_perception::tone::{self, DEFAULT_OPERATOR, FittedTone, SavedTone, SceneGuide, ToneSettings};
@@ -34,25 +34,17 @@ pub(super) struct RenderTone {
 impl KeptTone {
     /// `None` for files that do not say it.
     pub(super) fn of(exr: &ExrImage) -> Option<Self> {
-        let text = |name: &str| match exr.attribute(name) {
-            Some(Attribute::Text(text)) => Some(text.as_str()),
-            _ => None,
-        };
-        let number = |name: &str| match exr.attribute(name) {
-            Some(Attribute::Float(number)) => Some(*number),
-            _ => None,
-        };
-        if text(LIGHT) == Some(OF_DISPLAY) {
+        if text(exr, LIGHT) == Some(OF_DISPLAY) {
             return Some(Self::Displayed);
         }
-        text("fechner.scene")?;
+        text(exr, "fechner.scene")?;
         Some(Self::Rendered(Box::new(RenderTone {
-            fitted: serde_json::from_str(text(TONE)?).ok()?,
-            display: text("fechner.observer.display")?.to_owned(),
+            fitted: serde_json::from_str(text(exr, TONE)?).ok()?,
+            display: text(exr, "fechner.observer.display")?.to_owned(),
             luminances_cd_m2: [
-                number("fechner.observer.white_cd_m2")?,
-                number("fechner.observer.black_cd_m2")?,
-                number("fechner.observer.ambient_cd_m2")?,
+                number(exr, "fechner.observer.white_cd_m2")?,
+                number(exr, "fechner.observer.black_cd_m2")?,
+                number(exr, "fechner.observer.ambient_cd_m2")?,
             ],
         })))
     }
@@ -67,12 +59,6 @@ impl KeptTone {
             }
         }
     }
-
-    /// The name of the display that it was rendered for, if that is one that everybody has.
-    pub(super) fn display(&self) -> Option<&str> {
-        let Self::Rendered(tone) = self else { return None };
-        Display::preset(&tone.display).filter(|preset| tone.is_for(preset)).map(|_| tone.display.as_str())
-    }
 }
 
 impl RenderTone {
@@ -80,6 +66,39 @@ impl RenderTone {
         let luminances = [display.white_cd_m2, display.black_cd_m2, display.ambient_cd_m2].map(|cd_m2| cd_m2 as f32);
         luminances == self.luminances_cd_m2
     }
+}
+
+fn text<'e>(exr: &'e ExrImage, name: &str) -> Option<&'e str> {
+    match exr.attribute(name) {
+        Some(Attribute::Text(text)) => Some(text),
+        _ => None,
+    }
+}
+
+fn number(exr: &ExrImage, name: &str) -> Option<f32> {
+    match exr.attribute(name) {
+        Some(Attribute::Float(number)) => Some(*number),
+        _ => None,
+    }
+}
+
+/// The display that a file was made for: as the file has it, else, of an older one, the preset that it names, where that is still the
+/// same.
+pub(super) fn display_in(exr: &ExrImage) -> Option<Display> {
+    if let Some(said) = text(exr, DISPLAY) {
+        return serde_json::from_str(said).ok().filter(|display: &Display| display.check().is_ok());
+    }
+    let preset = Display::preset(text(exr, "fechner.observer.display")?)?;
+    let values = [
+        ("pixels_per_degree", preset.pixels_per_degree),
+        ("white_cd_m2", preset.white_cd_m2),
+        ("black_cd_m2", preset.black_cd_m2),
+        ("ambient_cd_m2", preset.ambient_cd_m2),
+    ];
+    let is_same = |&(name, value): &(&str, f64)| {
+        number(exr, &format!("fechner.observer.{name}")).is_none_or(|said| said == value as f32)
+    };
+    values.iter().all(is_same).then_some(preset)
 }
 
 /// The first picture that holds a scene's light: the one that an operator is fitted to.
@@ -109,12 +128,6 @@ pub(super) fn as_rendered(pictures: &[(&Path, &InputPicture)], viewing: &Viewing
         ),
     }
     fitted
-}
-
-/// The name or file of the display: what was asked for, else what the first of the pictures that holds a scene's light was rendered for.
-pub(super) fn display_of<'a>(asked: Option<&'a str>, pictures: &[(&'a Path, &'a InputPicture)]) -> &'a str {
-    let kept = || first_scene(pictures)?.1.kept_tone()?.display();
-    asked.or_else(kept).unwrap_or(DEFAULT_DISPLAY)
 }
 
 /// What brings the scene's light of pictures to the display: the operator that was asked for, fitted to the first of them that holds

@@ -16,6 +16,7 @@ mod keeper;
 mod kept_tone;
 mod maps;
 mod merge;
+mod numbers;
 mod picture;
 mod render;
 mod report;

@@ -1,7 +1,7 @@
 //! Pictures of any renderer as the input of `compare` and `threshold`.
 
 use super::channels::{self, Colour};
-use super::kept_tone::KeptTone;
+use super::kept_tone::{self, KeptTone};
 use anyhow::{Context, Result, bail};
 use fechner::exr_read::ExrImage;
 use fechner::hdr_read::{HdrHeader, with_known_signature};
@@ -27,6 +27,8 @@ pub(super) struct InputPicture {
     content: Content,
     /// Width of a pixel over its height.
     pixel_aspect_ratio: f64,
+    /// The display that it was made for, where that is known.
+    made_for: Option<Display>,
     /// How it was shown when it was rendered, where its file says so.
     kept_tone: Option<KeptTone>,
 }
@@ -95,7 +97,9 @@ impl InputPicture {
             _ => Content::Scene { nits_per_unit },
         };
         let (width, height) = (picture.width as usize, picture.height as usize);
-        Ok(Self { width, height, rgb: picture.rgb, content, pixel_aspect_ratio: exr.pixel_aspect_ratio, kept_tone })
+        let made_for = kept_tone::display_in(exr);
+        let pixel_aspect_ratio = exr.pixel_aspect_ratio;
+        Ok(Self { width, height, rgb: picture.rgb, content, pixel_aspect_ratio, made_for, kept_tone })
     }
 
     fn from_hdr(path: &Path, nits_per_unit: f64) -> Result<Self> {
@@ -137,7 +141,9 @@ impl InputPicture {
         let picture = image.into_rgb32f();
         let (width, height) = (picture.width() as usize, picture.height() as usize);
         let rgb = picture.pixels().map(|p| p.0).collect();
-        Self { width, height, rgb, content, pixel_aspect_ratio: 1.0, kept_tone: None }
+        let is_pq = matches!(content, Content::Display(Codes::Pq(_)));
+        let made_for = if is_pq { Display::preset("hdr-1000") } else { None };
+        Self { width, height, rgb, content, pixel_aspect_ratio: 1.0, made_for, kept_tone: None }
     }
 
     /// The viewing of this picture, whose pixels may be oblong: its lines are as dense as the display's and its columns closer
@@ -163,6 +169,11 @@ impl InputPicture {
     /// Width and height in pixels.
     pub(super) fn size(&self) -> (usize, usize) {
         (self.width, self.height)
+    }
+
+    /// The display that it was made for, where its file says so; one that shows PQ, of pictures in PQ.
+    pub(super) fn made_for(&self) -> Option<&Display> {
+        self.made_for.as_ref()
     }
 
     /// How it was shown when it was rendered, where its file says so.
@@ -262,7 +273,9 @@ impl InputPicture {
 
     fn luminance_of(&self, relative: &[[f32; 3]], display: &Display) -> Plane {
         Plane::from_fn(self.width, self.height, |x, y| {
-            display.luminance_cd_m2(f64::from(luminance(relative[y * self.width + x]))) as f32
+            // What a channel has beyond the display's black and white is not seen.
+            let shown = relative[y * self.width + x].map(|light| light.clamp(0.0, 1.0));
+            display.luminance_cd_m2(f64::from(luminance(shown))) as f32
         })
     }
 }

@@ -147,7 +147,10 @@ pub(super) struct Report {
     importance_range: Option<[f32; 2]>,
     /// Whose eye all visibilities and chances here are of: what it looks at.
     eye: String,
-    /// The tone operator's fit, which [`Report::attributes`] takes along.
+    /// The display, which [`Report::attributes`] takes along.
+    #[serde(skip)]
+    display: Option<(String, Attribute)>,
+    /// The tone operator's fit, which it takes along, too.
     #[serde(skip)]
     tone: Option<(String, Attribute)>,
     nonfinite_samples: u64,
@@ -206,6 +209,7 @@ impl Report {
             outlier_energy_share: outliers.energy_share,
             importance_range: settings.importance.as_ref().map(range),
             eye: eye_in_words(settings),
+            display: output::display_attribute(&settings.viewing.display),
             tone: output::tone_attribute(judgement.tone.as_ref()),
             nonfinite_samples: film.nonfinite_samples,
             peak_memory_bytes: peak_memory_bytes(),
@@ -262,7 +266,7 @@ impl Report {
             attributes.push(("fechner.importance", text(&format!("thresholds times {least} to {greatest}"))));
         }
         let named = attributes.into_iter().map(|(name, value)| (name.to_owned(), value));
-        named.chain(self.tone.clone()).collect()
+        named.chain(self.display.clone()).chain(self.tone.clone()).collect()
     }
 }
 

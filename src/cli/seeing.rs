@@ -1,11 +1,12 @@
 //! Arguments that say who looks at what.
 
-use super::kept_tone::{display_of, first_scene};
+use super::kept_tone::first_scene;
 use super::picture::InputPicture;
 use super::targets::{Named, display_file};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
+use fechner::scene::load::count_as_read;
 use fechner::scene::{MOST_EXPOSURE_STOPS, NITS_PER_UNIT, Scene};
 use fechner_perception::csf;
 use fechner_perception::display::{Display, Viewing};
@@ -51,12 +52,12 @@ impl<'a> AskedPresentation<'a> {
 /// Display, observer and units, for commands that judge pictures.
 #[derive(Debug, Args)]
 pub(super) struct SeeingArguments {
-    /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file [default: the preset that the
-    /// picture was rendered for, if its file says so, else desktop].
+    /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file [default: the one that the
+    /// picture was made for, if its file says so; hdr-1000 for PQ; else desktop].
     #[arg(long, value_name = "NAME|FILE")]
     display: Option<String>,
     /// Contrast sensitivity function.
-    #[arg(long, value_name = "NAME", default_value = "castle")]
+    #[arg(long, value_name = "NAME", default_value = "castle", value_parser = PossibleValuesParser::new(csf::names()))]
     pub(super) csf: String,
     /// Area in deg² over which the eye sums contrast [default: the display's, else 1].
     #[arg(long, value_name = "DEG2", value_parser = parse_positive, allow_negative_numbers = true)]
@@ -101,13 +102,26 @@ impl SeeingArguments {
 
     /// The viewing of pictures that they mean.
     pub(super) fn viewing(&self, pictures: &[(&Path, &InputPicture)]) -> Result<Viewing> {
-        viewing(display_of(self.display.as_deref(), pictures), self.csf_area)
+        viewing_on(display_of(self.display.as_deref(), pictures)?, self.csf_area)
     }
 }
 
 /// The viewing for a display's name or file and, where given, a contrast sensitivity area in deg².
 pub(super) fn viewing(display: &str, csf_area_deg2: Option<f64>) -> Result<Viewing> {
-    let mut viewing = Viewing::of(find_display(display)?);
+    viewing_on(find_display(display)?, csf_area_deg2)
+}
+
+/// The display that was asked for, else the one that the first of the pictures that says so was made for.
+pub(super) fn display_of(asked: Option<&str>, pictures: &[(&Path, &InputPicture)]) -> Result<Display> {
+    match asked {
+        Some(name) => find_display(name),
+        None => Ok(pictures.iter().find_map(|(_, picture)| picture.made_for()).cloned().unwrap_or_default()),
+    }
+}
+
+/// The viewing on a display.
+pub(super) fn viewing_on(display: Display, csf_area_deg2: Option<f64>) -> Result<Viewing> {
+    let mut viewing = Viewing::of(display);
     if let Some(area) = csf_area_deg2 {
         viewing.observer.csf_area_deg2 = area;
     }
@@ -123,6 +137,7 @@ fn find_display(name: &str) -> Result<Display> {
         bail!("there is no display \"{name}\"; known: {}, or a .toml file", Display::preset_names().join(", "));
     }
     let text = std::fs::read_to_string(Path::new(name)).with_context(|| format!("display file {name}"))?;
+    count_as_read(Path::new(name));
     Display::from_toml(&text).with_context(|| format!("display file {name}"))
 }
 

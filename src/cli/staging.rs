@@ -1,6 +1,7 @@
 //! Camera and surroundings from the command line, for scenes that lack them or have the wrong ones.
 
 use super::job::Size;
+use super::numbers::whole;
 use anyhow::{Context, bail};
 use clap::Args;
 use fechner::scene::load::environment;
@@ -25,7 +26,7 @@ pub(super) struct Staging {
     look_at: Option<LookAt>,
     /// Most memory for decoded textures, of one frame where there are several: beyond it the largest are halved until they fit. No
     /// limit unless told.
-    #[arg(long, value_name = "MB", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "MB", value_parser = whole(1..=u32::MAX), allow_negative_numbers = true)]
     texture_memory: Option<u32>,
 }
 

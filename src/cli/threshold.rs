@@ -88,6 +88,7 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     if let Some(frames_per_second) = arguments.fps.or(told) {
         viewing.display.frames_per_second = frames_per_second;
     }
+    let made_for = output::display_attribute(&viewing.display);
     let viewing = guide.viewed(&viewing).with_context(|| arguments.input.display().to_string())?;
     let model = model::by_name(&arguments.model).with_context(|| {
         format!("there is no threshold model \"{}\"; known: {}", arguments.model, model::names().join(", "))
@@ -139,6 +140,7 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
         picture.push_attribute("fechner.csf", text(csf.name()));
     }
     picture.push_attribute("fechner.observer.display", text(&viewing.display.name));
+    picture.attributes.extend(made_for);
     let ppd = viewing.display.pixels_per_degree as f32;
     picture.push_attribute("fechner.observer.pixels_per_degree", Attribute::Float(ppd));
     if motion.is_some() {
@@ -159,9 +161,16 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
 
 /// The two renders, of the guide's size.
 fn read_halves(arguments: &ThresholdArguments, guide: &InputPicture) -> Result<Option<[InputPicture; 2]>> {
-    let Some([a, b]) = arguments.halves.as_deref() else { return Ok(None) };
-    let [a, b] = [a, b].map(|path| InputPicture::read(path, arguments.seeing.nits_per_unit));
+    let Some([a_path, b_path]) = arguments.halves.as_deref() else { return Ok(None) };
+    let [a, b] = [a_path, b_path].map(|path| InputPicture::read(path, arguments.seeing.nits_per_unit));
     let halves = [a?, b?];
+    if halves[0].codes() == halves[1].codes() {
+        bail!(
+            "--halves {} {}: one picture twice, or two renders by one seed, which tell nothing of noise: give two renders by different seeds",
+            a_path.display(),
+            b_path.display()
+        );
+    }
     for (path, half) in arguments.halves.iter().flatten().zip(&halves) {
         check_alike((&arguments.input, guide), (path, half))?;
     }

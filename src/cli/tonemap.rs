@@ -3,18 +3,18 @@
 mod sheet;
 
 use super::json::write_json;
-use super::kept_tone::{LIGHT, OF_DISPLAY, display_of};
+use super::kept_tone::{LIGHT, OF_DISPLAY};
 use super::picture::InputPicture;
 use super::seeing::{self, DEFAULT_DISPLAY, operator_values_or_all, parse_positive, parse_stops, parse_unit};
 use super::targets::{check_kept, display_file};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use fechner::output::{self, Attribute, Format, Picture};
-use fechner_perception::Viewing;
 use fechner_perception::tone::{
     self, AdaptationScope, AdaptationState, Effects, FittedTone, Goal, Pixel, SceneGuide, SceneLight, ToneOperator,
     ToneSettings, map_picture,
 };
+use fechner_perception::{Display, Viewing};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `tonemap`.
@@ -39,7 +39,7 @@ pub(super) struct TonemapArguments {
     #[arg(long, value_name = "CD_M2", value_parser = parse_unit, allow_negative_numbers = true)]
     nits_per_unit: Option<f64>,
     /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file [default: desktop; without
-    /// --operator the preset that the picture was rendered for].
+    /// --operator the one that the picture was made for].
     #[arg(long, value_name = "NAME|FILE")]
     display: Option<String>,
     /// What the eye is adapted to: the view as a whole, or, for the operators that know it, each place of it.
@@ -99,6 +99,8 @@ pub(super) struct SceneFrame {
     gaze: Option<Pixel>,
     /// The display, in this picture's pixels.
     viewing: Viewing,
+    /// The display in its own.
+    display: Display,
     pixel_aspect_ratio: f64,
 }
 
@@ -108,6 +110,7 @@ impl SceneFrame {
     }
 
     fn of(picture: InputPicture, path: &Path, arguments: &TonemapArguments, viewing: &Viewing) -> Result<Self> {
+        let display = viewing.display.clone();
         let viewing = picture.viewed(viewing).with_context(|| path.display().to_string())?;
         let pixel_aspect_ratio = picture.pixel_aspect_ratio();
         let (width, height) = picture.size();
@@ -119,7 +122,7 @@ impl SceneFrame {
         }
         let light = SceneLight::with_rods(width, &rgb_cd_m2);
         let gaze = arguments.gaze.map(|gaze| gaze.0);
-        Ok(Self { width, rgb_cd_m2, light, gaze, viewing, pixel_aspect_ratio })
+        Ok(Self { width, rgb_cd_m2, light, gaze, viewing, display, pixel_aspect_ratio })
     }
 
     fn guide(&self) -> SceneGuide<'_> {
@@ -211,7 +214,8 @@ fn run_as_rendered(arguments: &TonemapArguments, format: Format, targets: &[Path
     }
     for (input, target) in arguments.input.iter().zip(targets) {
         let picture = InputPicture::read(input, arguments.nits_per_unit)?;
-        let viewing = seeing::viewing(display_of(arguments.display.as_deref(), &[(input, &picture)]), None)?;
+        let viewing =
+            seeing::viewing_on(seeing::display_of(arguments.display.as_deref(), &[(input, &picture)])?, None)?;
         let Some(fitted) = picture.kept_tone().and_then(|kept| kept.on(&viewing)) else {
             bail!(
                 "{}: the file does not say by which operator it was shown on \"{}\" when it was rendered: give --operator",
@@ -409,6 +413,7 @@ fn write(
             picture.push_attribute(LIGHT, Attribute::Text(OF_DISPLAY.to_owned()));
             picture.push_attribute("fechner.observer.display", Attribute::Text(viewing.display.name.clone()));
             picture.push_attribute(output::PIXEL_ASPECT_RATIO, Attribute::Float(frame.pixel_aspect_ratio as f32));
+            picture.attributes.extend(output::display_attribute(&frame.display));
             picture.attributes.extend(output::tone_attribute(fitted));
             if let Some(state) = state {
                 let text = serde_json::to_string(state).context("the eye's state could not be put into words")?;

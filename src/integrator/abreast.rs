@@ -95,7 +95,7 @@ impl PathTracer {
                 lens: [lens_u, lens_v],
                 time: if self.moves { sample.draw(Purpose::Time)[0] } else { 0.0 },
             });
-            row.paths.push(PathState::new(ray, *sample, self.media_at_camera));
+            row.paths.push(PathState::new(ray, *sample, self.around_camera.at(&self.world, &ray)));
             row.filter_weights.push(filtered.weight);
         }
     }

@@ -85,6 +85,16 @@ impl CameraRays {
 }
 
 impl CameraRays {
+    /// Whether rays begin at more than one place: of a picture that is seen without perspective.
+    pub(super) fn is_parallel(&self) -> bool {
+        self.parallel
+    }
+
+    /// Whether rays begin all over a lens.
+    pub(super) fn has_lens(&self) -> bool {
+        self.lens_right != Vec3::ZERO
+    }
+
     /// Place in the picture, in pixels, of a world position as the shutter opens; `None` at and behind the lens.
     pub fn project(&self, position: Vec3) -> Option<Vec2> {
         let position = match &self.motion {

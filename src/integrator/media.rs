@@ -2,7 +2,7 @@
 //!
 //! A boundary pushes its inside when the path enters it from the front and takes it away again when the path leaves. A volume
 //! is known by its material, so that its boundary may be made of several objects; the innermost one absorbs. Thin sheets
-//! have no inside. What the camera is in is asked once, by a ray from it out of the scene. A path that meets a boundary from behind
+//! have no inside. What the camera is in is asked by rays from it out of the scene. A path that meets a boundary from behind
 //! without having entered it came in through a face that belongs to another volume: the way to that boundary is inside it.
 //!
 //! Not for volumes that touch: a ray that crosses one of two faces in the same place is past the other. They must be a little apart or
@@ -41,7 +41,7 @@ impl Medium {
 }
 
 /// The volumes that a path is in, outermost first.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Media {
     entered: [Option<Medium>; DEEPEST],
     count: usize,
@@ -64,7 +64,7 @@ impl Media {
         }
     }
 
-    /// The volumes around a point of the camera, when the shutter opens: those whose boundaries a ray leaves without having entered them, as most
+    /// The volumes around the beginning of a camera ray at its time: those whose boundaries a ray leaves without having entered them, as most
     /// of seven rays say. One alone may pass where two volumes touch, or the back of a sheet, and took such a picture for one from inside.
     pub(super) fn around(world: &World, ray: Ray) -> Self {
         // In no plane that people build by.

@@ -5,6 +5,7 @@
 //! ray travels in, `prune` which light is left to chance, `specular` what mirrors and glass show.
 
 mod abreast;
+mod around_camera;
 mod camera;
 mod media;
 mod path;
@@ -24,6 +25,7 @@ use crate::geometry::World;
 use crate::light::Lights;
 use crate::sampler::{Half, PixelFilter, Sequence};
 use crate::scene::{Camera, Scene};
+use around_camera::AroundCamera;
 use glam::Vec2;
 use media::Media;
 use prune::ThresholdTable;
@@ -171,8 +173,8 @@ pub struct PathTracer {
     settings: TraceSettings,
     /// Whether any volume absorbs, so that paths must know what they are in.
     absorbs: bool,
-    /// The volumes that the lens is in; none where none absorbs.
-    media_at_camera: Media,
+    /// The volumes that camera rays begin in; none where none absorbs.
+    around_camera: AroundCamera,
     /// By material.
     surface_tables: Vec<SurfaceTables>,
     /// Where light is left to chance.
@@ -191,19 +193,18 @@ impl PathTracer {
         let moves = scene.moves();
         let world = World::new(scene);
         let lights = Lights::new(&world);
-        let media_at_camera = Media::default();
+        let around_camera = AroundCamera::Everywhere(Media::default());
         let mut tracer =
-            Self { world, lights, camera, moves, settings, absorbs, media_at_camera, surface_tables, thresholds };
+            Self { world, lights, camera, moves, settings, absorbs, around_camera, surface_tables, thresholds };
         tracer.look_around();
         tracer
     }
 
-    /// Asks what the lens is in.
+    /// Asks what the camera is in.
     fn look_around(&mut self) {
         if self.absorbs {
-            let middle = Vec2::new(self.settings.width as f32, self.settings.height as f32) * 0.5;
-            let ray = self.camera.ray(&CameraSample { position_px: middle, lens: [0.5, 0.5], time: 0.0 });
-            self.media_at_camera = Media::around(&self.world, ray);
+            let size_px = Vec2::new(self.settings.width as f32, self.settings.height as f32);
+            self.around_camera = AroundCamera::of(&self.world, &self.camera, size_px, self.moves);
         }
     }
 

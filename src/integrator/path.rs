@@ -111,7 +111,7 @@ impl PathState {
 impl PathTracer {
     /// Follows one path.
     pub fn trace_path(&self, camera_ray: Ray, sample: Sample) -> PathSample {
-        let mut path = [PathState::new(camera_ray, sample, self.media_at_camera)];
+        let mut path = [PathState::new(camera_ray, sample, self.around_camera.at(&self.world, &camera_ray))];
         self.follow_abreast(&mut path);
         path[0].found()
     }

@@ -25,6 +25,7 @@ pub use png_file::{
 };
 
 use crate::integrator::{Crop, TraceSettings};
+use fechner_perception::Display;
 use fechner_perception::tone::FittedTone;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -39,6 +40,23 @@ pub const PIXEL_ASPECT_RATIO: &str = "pixelAspectRatio";
 /// Written by [`write_exr`] where the picture is a part of a larger one: left, top, width and height in pixels. Readers here show
 /// such a part alone, not the display window around it.
 pub const CROP: &str = "fechner.crop";
+/// The display that a picture was made for, see [`display_attribute`].
+pub const DISPLAY: &str = "fechner.display";
+
+/// All of a display as JSON, in ASCII: readers take an attribute's text for UTF-8, the writer has Latin-1.
+pub fn display_attribute(display: &Display) -> Option<(String, Attribute)> {
+    let text = serde_json::to_string(display).ok()?;
+    let mut ascii = String::with_capacity(text.len());
+    for character in text.chars() {
+        if character.is_ascii() {
+            ascii.push(character);
+        } else {
+            character.encode_utf16(&mut [0; 2]).iter().for_each(|unit| ascii += &format!("\\u{unit:04x}"));
+        }
+    }
+    Some((DISPLAY.to_owned(), Attribute::Text(ascii)))
+}
+
 /// The fit of the tone operator, see [`tone_attribute`].
 pub const TONE: &str = "fechner.tone";
 

@@ -5,7 +5,7 @@ use fechner::adaptive::audit::audit;
 use fechner::adaptive::settings::{LoopSettings, Sampling};
 use fechner::adaptive::state::RenderState;
 use fechner::adaptive::statistics::picture_variance;
-use fechner::adaptive::{Monitor, Progress, Quiet, Rendered, render, run};
+use fechner::adaptive::{Monitor, Progress, Quiet, Rendered, StopReason, render, run};
 use fechner::integrator::PathTracer;
 use fechner::scene::Scene;
 use fechner::scene::load::{LoadOptions, load};
@@ -214,6 +214,22 @@ fn a_budget_is_spent_for_the_whole_picture() {
     eprintln!("squared error over that of even counts: {ratio:.3}");
     // 0.94; by 40 seeds 0.96, with a standard error of 0.04.
     assert!(ratio < 0.97, "{ratio}");
+}
+
+/// A lamp that the first samples have missed leaves no noise: even sampling goes on to what was asked for all the same.
+#[test]
+fn even_sampling_does_not_end_where_no_noise_is_found() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("s.toml");
+    let text = "[camera]\nposition = [0, 0, 3]\nlook_at = [0, 0, 0]\n[environment]\nradiance = [0.5, 0.5, 0.5]\n\
+                [materials.m]\ntype = \"mirror\"\n[[objects]]\nsphere = { center = [0, 0, 9], radius = 1 }\nmaterial = \"m\"\n";
+    std::fs::write(&file, text).expect("written");
+    let scene = load(&file, &LoadOptions::default()).expect("a scene");
+    let settings = loop_settings(scene.nits_per_unit, Sampling::Uniform, None, Some(64));
+    let tracer = PathTracer::new(Arc::new(scene), trace_settings(16, 16, 1));
+    let rendered = render(&tracer, &settings, &Quiet).expect("the perception model takes the picture");
+    assert_eq!(rendered.film.total_samples(), 64 * 256);
+    assert_eq!(rendered.stop_reason, StopReason::Samples);
 }
 
 #[test]

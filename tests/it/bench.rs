@@ -103,7 +103,8 @@ fn bounds_need_no_arms_and_unknown_arms_are_refused() {
     assert!(bound.status.success() && table.lines().count() == 5, "{table}");
     let refused = bench(folder.path(), &["--arms", "magic"]);
     assert_eq!(refused.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&refused.stderr).contains("there is no arm \"magic\""));
+    let told = String::from_utf8_lossy(&refused.stderr);
+    assert!(told.contains("magic") && told.contains("no-masking"), "{told}");
 }
 
 /// Uniform sampling is a rule like others: its samples are enough for the optimum, too, where it needs fewer than a pilot.

@@ -53,6 +53,50 @@ fn spot_of(scene: &Scene) -> Spot {
     Spot { variance }
 }
 
+/// Mean of the pixels of some columns of 16, of a scene of such text.
+fn mean_of_columns(text: &str, columns: std::ops::Range<u32>) -> [f32; 3] {
+    const SIDE: u32 = 16;
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("s.toml");
+    std::fs::write(&file, text).expect("written");
+    let scene = load(&file, &LoadOptions::default()).expect("a scene");
+    let rgb = film_of(&scene, trace_settings(SIDE, SIDE, 5), 4).estimate(1.0).rgb_cd_m2;
+    let pixels: Vec<_> = (0..SIDE).flat_map(|y| columns.clone().map(move |x| (y * SIDE + x) as usize)).collect();
+    std::array::from_fn(|c| pixels.iter().map(|&pixel| rgb[pixel][c]).sum::<f32>() / pixels.len() as f32)
+}
+
+/// A camera that leaves an absorbing box, one that is left by it, and parallel rays that begin in it and beside it: each ray knows.
+#[test]
+fn each_ray_knows_what_it_begins_in() {
+    const ABSORPTION: [f32; 3] = [1.0, 0.5, 0.1];
+    let scene = |camera: &str, of_box: &str| {
+        format!(
+            "nits_per_unit = 1.0\n[camera]\n{camera}\n[environment]\nradiance = [1, 1, 1]\n[materials.m]\ntype = \"dielectric\"\nior = 1.0\n\
+             absorption = [1.0, 0.5, 0.1]\n[[objects]]\nbox = {{ min = [-1, -1, -1], max = [1, 1, 1] }}\nmaterial = \"m\"\n{of_box}"
+        )
+    };
+    let at = |time: f32, x: f32| format!("{{ time = {time:?}, position = [{x:?}, 0, 0.5], look_at = [{x:?}, 0, -5] }}");
+    let shutter = "vertical_fov_deg = 2\nshutter_s = 1.0";
+    let moving = scene(&format!("{shutter}\nkeyframes = [{}, {}]", at(0.0, 0.0), at(1.0, 3.0)), "");
+    let resting = format!("{shutter}\nposition = [0, 0, 0.5]\nlook_at = [0, 0, -5]");
+    let moves = "keyframes = [ { time = 0.0, translate = [0, 0, 0] }, { time = 1.0, translate = [3, 0, 0] } ]";
+    for (what, text) in [("the camera leaves", moving), ("the box leaves", scene(&resting, moves))] {
+        // A third of the time 1.5 of the box lie before the lens, then nothing.
+        let found = mean_of_columns(&text, 0..16);
+        for (absorption, found) in ABSORPTION.into_iter().zip(found) {
+            let right = (-1.5 * absorption).exp() / 3.0 + 2.0 / 3.0;
+            assert!((found - right).abs() < 0.02, "{what}: {found}, not {right}");
+        }
+    }
+    let parallel = scene("orthographic_height = 4\nposition = [0, 0, 0.5]\nlook_at = [0, 0, -5]", "");
+    for (columns, right) in [(0..3, 1.0), (6..10, (-1.5f32).exp()), (13..16, 1.0)] {
+        // Above and below the box is nothing, too: of four units of height it has two.
+        let right = 0.5 * (1.0 + right);
+        let found = mean_of_columns(&parallel, columns.clone())[0];
+        assert!((found - right).abs() < 0.02, "columns {columns:?}: {found}, not {right}");
+    }
+}
+
 /// Pixels that a length at a distance from the camera of `empty_scene` (20°, at z = 5) takes.
 fn pixels(length: f64, distance: f64) -> f64 {
     length / (2.0 * 10f64.to_radians().tan() * distance / f64::from(SIZE))

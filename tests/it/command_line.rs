@@ -269,7 +269,7 @@ fn bad_arguments_are_refused_in_one_line() {
         render(&["--sampling", rule, "--spp", "16", "--quality", "good"], &["--visibility and --quality"]);
     }
     render(&["--sampling", "budget", "--noise-threshold", "0.1", "--spp", "16"], &["--noise-threshold"]);
-    render(&["--seed", "-1"], &["invalid value '-1' for '--seed <SEED>'"]);
+    render(&["--seed", "-1"], &["invalid value '-1' for '--seed <N>'"]);
     render(&["--no-such-thing"], &["unexpected argument '--no-such-thing' found\n"]);
     render(&["--sampling", "uniform", "--allocation", "local"], &["--allocation", "--sampling adaptive"]);
     render(&["--json", "a.png"], &["a.png: -o and --json name the same file"]);

@@ -190,6 +190,61 @@ fn a_render_is_seen_on_its_own_display() {
     assert!(code == 2 && said.contains("give --operator"), "{said}");
 }
 
+/// A display of one's own is kept with what was made for it: with a preset's name and another distance, with a name beyond ASCII.
+#[test]
+fn a_render_is_seen_on_a_display_of_ones_own() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box.toml");
+    for (file, display) in [
+        ("near.toml", "preset = 'phone'\npixels_per_degree = 20.0"),
+        ("wide.toml", "preset = 'desktop'\ncsf_area_deg2 = 7.0"),
+        ("named.toml", "name = 'Büro 🖥'\nwhite_cd_m2 = 90.0"),
+    ] {
+        std::fs::write(folder.path().join(file), display).expect("written");
+        for seed in ["1", "2"] {
+            let (exr, shown) = (format!("{seed}.exr"), format!("shown{seed}.exr"));
+            let common = ["render", scene, "--size", "32x32", "--sampling", "uniform", "--spp", "16", "--seed", seed];
+            run(folder.path(), &[&common[..], &["--display", file, "-o", &exr]].concat());
+            run(folder.path(), &["tonemap", &exr, "-o", &shown]);
+        }
+        for pictures in [["1.exr", "2.exr"], ["shown1.exr", "shown2.exr"]] {
+            let compare =
+                |more: &[&str]| visibility(&fechner(folder.path(), &[&["compare"], &pictures[..], more].concat()).1);
+            let (own, preset) = (compare(&["--display", file]), compare(&["--display", "laptop"]));
+            assert_eq!(compare(&[]), own, "{file}, {pictures:?}");
+            assert!(preset != own, "{file}: nothing is told by {preset}");
+        }
+    }
+}
+
+/// Light that only an HDR display has is seen on one, in the files that `tonemap` makes for it, and no more of it than it has.
+#[test]
+fn pictures_for_hdr_displays_are_seen_on_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let square = |pixel: usize| (24..40).contains(&(pixel % SIDE)) && (24..40).contains(&(pixel / SIDE));
+    write(folder.path(), "even.exr", |_| [400.0; 3]);
+    write(folder.path(), "square.exr", |pixel| [if square(pixel) { 800.0 } else { 400.0 }; 3]);
+    for ending in ["exr", "png"] {
+        let shown = ["even", "square"].map(|name| format!("{name}-shown.{ending}"));
+        for (scene, shown) in ["even.exr", "square.exr"].iter().zip(&shown) {
+            run(folder.path(), &["tonemap", scene, "-o", shown, "--operator", "absolute", "--display", "hdr-1000"]);
+        }
+        let (code, said) = fechner(folder.path(), &["compare", &shown[0], &shown[1]]);
+        assert!(code == 1 && visibility(&said) > 20.0 && said.contains("hdr-1000"), "{ending}: {said}");
+    }
+    let adaptation = |red_cd_m2: f32| {
+        write(folder.path(), "red.exr", |_| [red_cd_m2, 0.0, 0.0]);
+        run(
+            folder.path(),
+            &["tonemap", "red.exr", "-o", "red-shown.exr", "--operator", "absolute", "--display", "hdr-1000"],
+        );
+        run(folder.path(), &["threshold", "red-shown.exr", "--display", "desktop", "-o", "t.exr"]);
+        mean(folder.path(), "t.exr", "adaptation.Y")
+    };
+    let (clipped, at_most) = (adaptation(800.0), adaptation(200.0));
+    assert!((clipped / at_most).ln().abs() < 0.01, "adapted to {clipped} cd/m² where the display has {at_most}");
+}
+
 /// A part of a picture, and a frame, have the exposure of the whole, where small lamps decide it, too.
 #[test]
 fn parts_and_frames_are_exposed_as_the_whole() {

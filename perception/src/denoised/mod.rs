@@ -116,6 +116,19 @@ impl DenoisedError {
         self
     }
 
+    /// This error with no less noise than that of such a visibility: where a picture is so small that its halves' difference has hardly a
+    /// frequency by which it could be seen.
+    ///
+    /// # Panics
+    /// Where `noise` has another size.
+    #[must_use]
+    pub fn with_noise_of_at_least(mut self, noise: &Plane) -> Self {
+        for plane in [&mut self.visibility, &mut self.variance] {
+            *plane = plane.combined(noise, f32::max);
+        }
+        self
+    }
+
     /// This error for eyes whose thresholds are multiplied by a map of the same size, as where some places matter more than others.
     ///
     /// # Panics

@@ -1,6 +1,7 @@
 //! `farm plan`: a scene in, a folder with a manifest and the first round's units out.
 
 use super::job::JobOptions;
+use crate::cli::numbers::whole;
 use crate::cli::words::{count, samples_in_words};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
@@ -20,7 +21,7 @@ pub(super) struct PlanArguments {
     #[arg(long, value_name = "A..B")]
     frames: Option<String>,
     /// Most units that a round of a frame is cut into: about as many processes as should work on one frame.
-    #[arg(long, value_name = "P", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_name = "P", default_value_t = 16, value_parser = whole(1..=100_000), allow_negative_numbers = true)]
     passes: u32,
     /// Fewest samples of a unit. A unit should last ten seconds or more; a round with fewer samples is traced by the merge
     /// that planned it.

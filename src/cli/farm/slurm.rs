@@ -1,6 +1,7 @@
 //! `farm slurm`: the farm as Slurm jobs.
 
 use super::absolute;
+use crate::cli::numbers::whole;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::farm::Farm;
@@ -15,7 +16,7 @@ pub(super) struct SlurmArguments {
     /// The farm's folder, on a file system that all nodes see under this name.
     folder: PathBuf,
     /// Processors of a unit or merge.
-    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..1024))]
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = whole(1..=1023), allow_negative_numbers = true)]
     cpus: u32,
     /// Memory of a unit or merge, as Slurm writes it.
     #[arg(long, value_name = "SIZE", default_value = "4G")]
@@ -24,10 +25,10 @@ pub(super) struct SlurmArguments {
     #[arg(long, value_name = "TIME", default_value = "01:00:00")]
     time: String,
     /// Most units at once.
-    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 200, value_parser = whole(1..=u32::MAX), allow_negative_numbers = true)]
     at_once: u32,
     /// Most tasks of a job array (less than the cluster's MaxArraySize); with more units than that a task has several.
-    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = whole(1..=u32::MAX), allow_negative_numbers = true)]
     array: u32,
     /// Another option for every job, such as --option=--partition=render.
     #[arg(long = "option", value_name = "OPTION", allow_hyphen_values = true)]

@@ -21,6 +21,13 @@ pub fn was_read(path: &Path) -> bool {
     path.canonicalize().is_ok_and(|path| read.contains(&path))
 }
 
+/// Has [`was_read`] count a file that belongs to a scene and is read elsewhere: the display that it names.
+pub fn count_as_read(path: &Path) {
+    if let Ok(path) = path.canonicalize() {
+        READ.lock().unwrap_or_else(std::sync::PoisonError::into_inner).insert(path);
+    }
+}
+
 /// The whole file.
 pub(crate) fn read(path: &Path) -> Result<Vec<u8>, LoadError> {
     // Opened only after the look at its kind: opening a pipe would wait for a writer for ever.
@@ -36,9 +43,7 @@ pub(crate) fn read(path: &Path) -> Result<Vec<u8>, LoadError> {
         return Err(LoadError::too_large(path, problem));
     }
     let file = std::fs::File::open(path).map_err(|error| LoadError::unreadable(path, &error))?;
-    if let Ok(path) = path.canonicalize() {
-        READ.lock().unwrap_or_else(std::sync::PoisonError::into_inner).insert(path);
-    }
+    count_as_read(path);
     let mut bytes = Vec::with_capacity(metadata.len() as usize);
     // The limit holds again here, for files that grow while they are read.
     file.take(LARGEST_FILE_BYTES).read_to_end(&mut bytes).map_err(|error| LoadError::unreadable(path, &error))?;

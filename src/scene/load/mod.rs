@@ -50,7 +50,7 @@ mod validate;
 
 pub use default_view::{Bounds, bounds, framed};
 pub use error::{LoadError, Place};
-pub use files::was_read;
+pub use files::{count_as_read, was_read};
 
 use crate::scene::{FilmDefaults, Instance, Scene};
 use std::path::Path;
