@@ -5,7 +5,7 @@ mod decode;
 pub(super) use decode::{Decoded, decode_bytes, has_alpha, is_grey};
 
 use super::LoadOptions;
-pub(super) use super::adjust::Adjust;
+pub(super) use super::adjust::{Adjust, Number};
 use super::error::{LoadError, Place};
 use super::texture_memory::{self, Alpha, Extent};
 use crate::scene::{Encoding, Texture, TextureId, Wrap};

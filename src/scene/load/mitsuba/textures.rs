@@ -2,7 +2,7 @@
 
 use super::super::error::LoadError;
 use super::super::spectrum::Spectrum;
-use super::super::texture::{Adjust, IfMissing, Picture, Request, has_alpha, is_grey};
+use super::super::texture::{Adjust, IfMissing, Number, Picture, Request, has_alpha, is_grey};
 use super::super::{files, luminance};
 use super::Reader;
 use super::element::{Element, canonical};
@@ -233,7 +233,7 @@ impl Reader {
             } else {
                 Encoding::Srgb
             };
-        let to_luminance = meaning == Meaning::Number && !is_grey(&file);
+        let to_number = (meaning == Meaning::Number && !is_grey(&file)).then_some(Number::Luminance);
         let mut lookup = self.mapping(texture)?;
         lookup.texture = self.builder.textures.add(Request {
             picture: Picture::File(file),
@@ -242,7 +242,7 @@ impl Reader {
             wrap_v: one("wrapmodev")?,
             nearest: filter.as_deref() == Some("nearest"),
             if_missing: IfMissing::Fail(texture.place()),
-            adjust: Adjust { to_luminance, ..Adjust::NONE },
+            adjust: Adjust { to_number, ..Adjust::NONE },
         });
         Ok(ColorInput { factor: Vec3::ONE, texture: Some(lookup) })
     }

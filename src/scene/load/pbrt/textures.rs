@@ -1,7 +1,7 @@
 //! `Texture`: image maps, constants, products, checkerboards. What else pbrt can compute is named and averaged.
 
 use super::super::error::{LoadError, suggestion};
-use super::super::texture::{Adjust, IfMissing, Picture, Request};
+use super::super::texture::{Adjust, IfMissing, Number, Picture, Request, is_grey};
 use super::Reader;
 use super::inputs::Meaning;
 use super::parameters::Parameters;
@@ -52,7 +52,7 @@ impl Reader<'_> {
                 Ok(ColorInput::constant(value))
             }
             "imagemap" => {
-                let (lookup, scale) = self.image(parameters, Encoding::Srgb)?;
+                let (lookup, scale) = self.image(parameters, None)?;
                 Ok(ColorInput { factor: Vec3::splat(scale), texture: Some(lookup) })
             }
             "scale" => {
@@ -116,7 +116,7 @@ impl Reader<'_> {
         match definition.kind.as_str() {
             "constant" => Ok(ScalarInput::constant(parameters.float_or("value", 1.0)?)),
             "imagemap" => {
-                let (lookup, factor) = self.image(parameters, Encoding::Srgb)?;
+                let (lookup, factor) = self.image(parameters, Some(Number::AlphaOrMean))?;
                 Ok(ScalarInput { factor, texture: Some((lookup, 0)) })
             }
             "scale" => {
@@ -208,15 +208,14 @@ impl Reader<'_> {
         }
     }
 
-    /// An image file and its scale.
-    fn image(&mut self, parameters: &Parameters, usual: Encoding) -> Result<(TextureLookup, f32), LoadError> {
+    /// An image file, of colours or of some number, and its scale.
+    fn image(&mut self, parameters: &Parameters, of_number: Option<Number>) -> Result<(TextureLookup, f32), LoadError> {
         let Some(file) = parameters.string("filename")? else {
             return Err(parameters.error("an imagemap needs a \"string filename\""));
         };
         let file = self.file(file);
         let (encoding, exponent) = match parameters.string("encoding")? {
-            None => (usual, 1.0),
-            Some("sRGB") => (Encoding::Srgb, 1.0),
+            None | Some("sRGB") => (Encoding::Srgb, 1.0),
             Some("linear") => (Encoding::Linear, 1.0),
             Some(other) => match other.strip_prefix("gamma ").and_then(|gamma| gamma.trim().parse::<f32>().ok()) {
                 Some(gamma) if gamma > 0.0 && gamma.is_finite() => (Encoding::Linear, gamma),
@@ -244,6 +243,8 @@ impl Reader<'_> {
         let scale = parameters.float_or("scale", 1.0)?;
         let inverts = parameters.boolean_or("invert", false)?;
         let mut lookup = self.mapping(parameters)?;
+        // A picture of one channel is its number already, and stays small. pbrt drops its alpha.
+        let to_number = of_number.filter(|_| !is_grey(&file));
         lookup.texture = self.builder.textures.add(Request {
             picture: Picture::File(file),
             encoding,
@@ -254,7 +255,7 @@ impl Reader<'_> {
             adjust: Adjust {
                 exponent_bits: exponent.to_bits(),
                 inverted_scale_bits: inverts.then_some(scale.to_bits()),
-                to_luminance: false,
+                to_number,
             },
         });
         // Inverting is the last that pbrt does.
