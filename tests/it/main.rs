@@ -33,6 +33,7 @@
 //! - `view`: the live preview, over its WebSocket
 //! - `wild_files`: files as other programs write them
 //! - `texture_memory`: textures within a limit
+//! - `texture_values`: colours, numbers and infinities of EXR pictures as textures and surroundings
 //! - `displayed`: pictures compared as the display shows them
 //! - `tonemap`: HDR pictures for displays, one by one and over time
 //! - `units_and_views`: what the caller's unit and picture size change of a scene
@@ -71,6 +72,7 @@ mod reprojection;
 mod scene_table;
 mod support;
 mod texture_memory;
+mod texture_values;
 mod tonemap;
 mod units_and_views;
 mod view;

@@ -1,8 +1,8 @@
 //! What loaders do to a picture's values before anything else sees them.
 
 use super::luminance;
-use super::texture::Decoded;
-use crate::scene::Texels;
+use super::texture::{Decoded, Values};
+use crate::scene::{Encoding, Texels};
 use glam::Vec3;
 use std::sync::Arc;
 
@@ -30,6 +30,14 @@ pub(super) enum Number {
 impl Adjust {
     /// Values as they are.
     pub(super) const NONE: Self = Self { exponent_bits: 1.0_f32.to_bits(), inverted_scale_bits: None, to_number: None };
+
+    /// What the values of the picture are.
+    pub(super) fn values(self, encoding: Encoding) -> Values {
+        match (encoding, self.to_number) {
+            (Encoding::Linear, _) | (_, Some(Number::AlphaOrMean)) => Values::Numbers,
+            (Encoding::Srgb, None | Some(Number::Luminance)) => Values::Colours,
+        }
+    }
 
     pub(super) fn apply(self, picture: Decoded) -> Decoded {
         if self == Self::NONE {
@@ -81,7 +89,6 @@ fn has_holes(texels: &Texels) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Encoding;
 
     #[test]
     fn values_are_raised_then_scaled_and_inverted_then_weighed() {
@@ -97,7 +104,7 @@ mod tests {
     fn a_number_of_pbrts_is_alpha_and_the_mean_where_that_is_1_throughout() {
         let adjust = Adjust { to_number: Some(Number::AlphaOrMean), ..Adjust::NONE };
         let numbers = |texels| {
-            let picture = Decoded { width: 2, height: 1, texels };
+            let picture = Decoded { width: 2, height: 1, texels, notes: Vec::new() };
             let Texels::Floats(floats) = adjust.apply(picture).texels else { return Vec::new() };
             floats.iter().map(|texel| texel[0]).collect::<Vec<f32>>()
         };
