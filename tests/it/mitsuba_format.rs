@@ -357,6 +357,18 @@ fn spectra_of_mitsuba_3_are_read() {
     }
 }
 
+/// A checkerboard has no place for a picture: it was white.
+#[test]
+fn pictures_inside_a_checkerboard_are_their_mean() {
+    let picture = r#"<texture name="color0" type="bitmap"><string name="filename" value="green.png"/></texture>"#;
+    let scene = scene(&format!(
+        r#"<shape type="rectangle"><bsdf type="diffuse"><texture name="reflectance" type="checkerboard">{picture}</texture></bsdf></shape>"#
+    ));
+    let Surface::Diffuse { reflectance } = &scene.materials[0].surface else { panic!("diffuse") };
+    assert_eq!(reflectance.evaluate(&scene.textures, Vec2::splat(0.25)), Vec3::new(0.0, 1.0, 0.0));
+    assert!(has_note(&scene, "\"color0\": a texture is not rendered here: its mean colour"), "{:?}", scene.notes);
+}
+
 /// As in Mitsuba 3: what shines and has no BSDF reflects nothing, all else without one is 50 % grey.
 #[test]
 fn a_lamp_without_a_bsdf_is_black() {

@@ -9,6 +9,7 @@ pub(super) use super::adjust::{Adjust, Number};
 use super::error::{LoadError, Place};
 use super::texture_memory::{self, Alpha, Extent};
 use crate::scene::{Encoding, Texture, TextureId, Wrap};
+use glam::Vec3;
 use rayon::prelude::*;
 use std::collections::hash_map::DefaultHasher;
 use std::collections::{HashMap, HashSet};
@@ -124,6 +125,15 @@ impl Requests {
         let mut request = self.requests[texture.0 as usize].clone();
         request.adjust.exponent_bits = (f32::from_bits(request.adjust.exponent_bits) * exponent).to_bits();
         self.add(request)
+    }
+
+    /// Mean linear colour of a texture, for what has no place for a picture: which is decoded for it.
+    pub(super) fn mean_color(&self, texture: TextureId) -> Result<Vec3, LoadError> {
+        let request = &self.requests[texture.0 as usize];
+        let decoded = decode::decode(&request.picture, request.encoding, request.adjust.values(request.encoding));
+        let mut slot = Slot::from(decoded.map(|picture| request.adjust.apply(picture)));
+        // That a picture is not there is said where all are decoded.
+        Ok(request.texture(slot.take_for(request, &mut Vec::new())?).mean_color())
     }
 
     /// Decodes everything. `notes` gets a sentence for each missing file that was replaced, and one of what was made smaller.

@@ -47,11 +47,12 @@ impl Reader {
         meaning: Meaning,
         depth: usize,
     ) -> Result<Option<Vec3>, LoadError> {
-        let Some(input) = self.nested_input(owner, name, meaning, depth)? else { return Ok(None) };
-        if input.texture.is_some() {
-            self.builder.note(format!("{}: \"{name}\": a texture is not rendered here: its factor.", owner.place()));
-        }
-        Ok(Some(input.factor))
+        let Some(ColorInput { factor, texture }) = self.nested_input(owner, name, meaning, depth)? else {
+            return Ok(None);
+        };
+        let Some(lookup) = texture else { return Ok(Some(factor)) };
+        self.builder.note(format!("{}: \"{name}\": a texture is not rendered here: its mean colour.", owner.place()));
+        Ok(Some(factor * self.builder.textures.mean_color(lookup.texture)?))
     }
 
     /// A colour that may be a texture.
