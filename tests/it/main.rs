@@ -9,6 +9,7 @@
 //! - `camera_and_time`: blur of lens and shutter, moving lamps, crops
 //! - `denoise`: denoised pictures: the raw mean beside them, equal bytes, libraries that are not there
 //! - `formats`: the same scene from several formats
+//! - `gltf_counts`: attributes of glTF that do not fit their meshes
 //! - `gltf_motion`: jumps, hidden things and morphing nodes of glTF while the shutter is open
 //! - `mitsuba_format`, `pbrt_format`: what their files mean where readers go wrong easily
 //! - `animate_mishaps`: shots that are refused before anything is rendered, or named
@@ -54,6 +55,7 @@ mod farm;
 mod farm_mishaps;
 mod formats;
 mod furnace;
+mod gltf_counts;
 mod gltf_motion;
 mod importance;
 mod kill;
