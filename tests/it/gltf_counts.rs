@@ -121,3 +121,16 @@ fn attributes_of_another_length_are_refused() {
         assert!(error.contains(expected), "{error}\n  {expected}");
     }
 }
+
+/// The image is there, but only through an extension that is not read.
+#[test]
+fn a_texture_of_an_extension_alone_is_named_as_such() {
+    let mut file = File::new();
+    file.document["materials"] = json!([{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]);
+    file.document["meshes"][0]["primitives"][0]["material"] = json!(0);
+    file.document["textures"] = json!([{"extensions": {"EXT_texture_webp": {"source": 0}}}]);
+    file.document["images"] = json!([{"uri": "a.webp"}]);
+    let scene = file.load().unwrap();
+    let expected = "Texture 0: its image is that of EXT_texture_webp alone, which is not read; left out.";
+    assert!(scene.notes.iter().any(|note| note == expected), "{:?}", scene.notes);
+}
