@@ -134,3 +134,12 @@ fn a_texture_of_an_extension_alone_is_named_as_such() {
     let expected = "Texture 0: its image is that of EXT_texture_webp alone, which is not read; left out.";
     assert!(scene.notes.iter().any(|note| note == expected), "{:?}", scene.notes);
 }
+
+/// Only the first of them was named.
+#[test]
+fn every_hidden_node_is_named_where_nothing_is_left() {
+    let mut file = File::new();
+    file.document["nodes"] = json!([{"mesh": 0, "scale": [0, 0, 0]}, {"mesh": 0, "scale": [0, 0, 0]}]);
+    let error = file.load().unwrap_err();
+    assert!(error.contains("\"node 0\" is left out") && error.contains("\"node 1\" is left out"), "{error}");
+}
