@@ -55,6 +55,9 @@ fn files_of_version_3_are_told_what_to_do() {
         old.ends_with("\"matte\" of pbrt-v3: `pbrt --upgrade` writes the file for version 4, which is read"),
         "{old}"
     );
+    let old =
+        try_load(folder().path(), "", r#"Texture "t" "color" "imagemap" "string filename" "grey.png""#).unwrap_err();
+    assert!(old.contains("texture \"t\" is of \"color\" of pbrt-v3: `pbrt --upgrade`"), "{old}");
 }
 
 /// The shorter side of the whole film spans [−1, 1] at every size of the picture; only what the file states is stretched.
