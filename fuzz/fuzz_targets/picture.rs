@@ -11,7 +11,7 @@ fuzz_target!(|data: &[u8]| {
     let folder = tempfile::tempdir().expect("a folder for the file");
     let path = folder.path().join("picture").with_extension(extension);
     std::fs::write(&path, bytes).expect("the file is written");
-    if let Err(error) = environment::from_file(&path, 1.0, 0.0) {
+    if let Err(error) = environment::from_file(&path, 1.0, 0.0, &mut Vec::new()) {
         assert!(!error.to_string().is_empty());
     }
 });

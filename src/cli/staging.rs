@@ -130,7 +130,8 @@ impl Staging {
         match &self.environment {
             None => {}
             Some(Surroundings::Picture(file)) => {
-                scene.surround(environment::from_file(file, 1.0, 0.0).context("--environment")?, None);
+                let environment = environment::from_file(file, 1.0, 0.0, &mut scene.notes).context("--environment")?;
+                scene.surround(environment, None);
             }
             Some(Surroundings::Constant(nits)) => {
                 let radiance = (f64::from(*nits) / nits_per_unit) as f32;

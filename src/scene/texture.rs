@@ -142,8 +142,8 @@ impl Texture {
         }
     }
 
-    /// Mean linear colour: of all texels if they are floats, else of at most 256 × 256 places. For choosing lights and telling
-    /// pictures apart, not for shading.
+    /// Mean linear colour: of all texels if they are floats, else of at most 256 × 256 places. For choosing lights, telling
+    /// pictures apart and what has no place for a picture, not for shading.
     pub fn mean_color(&self) -> Vec3 {
         if let Texels::Floats(texels) = &self.texels {
             let sum: glam::DVec3 = texels.iter().map(|t| Vec3::new(t[0], t[1], t[2]).as_dvec3()).sum();

@@ -9,6 +9,7 @@
 //! - `camera_and_time`: blur of lens and shutter, moving lamps, crops
 //! - `denoise`: denoised pictures: the raw mean beside them, equal bytes, libraries that are not there
 //! - `formats`: the same scene from several formats
+//! - `gltf_counts`: attributes of glTF that do not fit their meshes
 //! - `gltf_motion`: jumps, hidden things and morphing nodes of glTF while the shutter is open
 //! - `mitsuba_format`, `pbrt_format`: what their files mean where readers go wrong easily
 //! - `animate_mishaps`: shots that are refused before anything is rendered, or named
@@ -33,6 +34,7 @@
 //! - `view`: the live preview, over its WebSocket
 //! - `wild_files`: files as other programs write them
 //! - `texture_memory`: textures within a limit
+//! - `texture_values`: colours, numbers and infinities of EXR pictures as textures and surroundings
 //! - `displayed`: pictures compared as the display shows them
 //! - `tonemap`: HDR pictures for displays, one by one and over time
 //! - `units_and_views`: what the caller's unit and picture size change of a scene
@@ -53,6 +55,7 @@ mod farm;
 mod farm_mishaps;
 mod formats;
 mod furnace;
+mod gltf_counts;
 mod gltf_motion;
 mod importance;
 mod kill;
@@ -71,6 +74,7 @@ mod reprojection;
 mod scene_table;
 mod support;
 mod texture_memory;
+mod texture_values;
 mod tonemap;
 mod units_and_views;
 mod view;

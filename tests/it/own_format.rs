@@ -156,3 +156,33 @@ fn a_display_file_lies_beside_its_scene() {
     let beside = load(&mesh, &LoadOptions::default()).unwrap().viewing.display.expect("named");
     assert_eq!(beside, folder.path().join("room.toml").display().to_string());
 }
+
+/// The example of `scenes/README.md`, with the files that it names, loads as it stands; so does its other kind of relief.
+#[test]
+fn the_example_of_the_format_loads() {
+    let document = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/README.md")).unwrap();
+    let (_, rest) = document.split_once("```toml\n").expect("an example");
+    let (example, _) = rest.split_once("```").expect("its end");
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["textures", "meshes"] {
+        std::fs::create_dir(folder.path().join(name)).unwrap();
+    }
+    let grey = image::RgbImage::from_pixel(2, 2, image::Rgb([128; 3]));
+    for name in ["wood", "bumps", "heights"] {
+        grey.save(folder.path().join(format!("textures/{name}.png"))).unwrap();
+    }
+    image::Rgb32FImage::from_pixel(2, 2, image::Rgb([1.0; 3])).save(folder.path().join("sky.hdr")).unwrap();
+    std::fs::write(folder.path().join("meshes/bunny.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let path = folder.path().join("example.toml");
+    let bumpy = example.replace("\nnormal_map =", "\n# normal_map =").replace("\n# bump_map =", "\nbump_map =");
+    let walking = example
+        .replace("\nposition = [0, 1, 4]\nlook_at = [0, 1, 0]", "")
+        .replace("position = [..], look_at = [..] }, ... ]", "position = [0, 1, 4], look_at = [0, 1, 0] } ]")
+        .replacen("\n# keyframes", "\nkeyframes", 1);
+    assert!(bumpy != example && walking.contains("\nkeyframes = [ { time = 0.0, position = [0"), "the example changed");
+    for text in [example, &bumpy, &walking] {
+        std::fs::write(&path, text).unwrap();
+        let scene = load(&path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(scene.instances.len(), 4, "{:?}", scene.notes);
+    }
+}

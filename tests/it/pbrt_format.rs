@@ -1,7 +1,8 @@
 //! What pbrt's files mean.
 
 use fechner::scene::load::{LoadOptions, load};
-use fechner::scene::{FilmDefaults, Projection, Scene, ScreenWindow, Surface};
+use fechner::scene::texture::srgb_to_linear;
+use fechner::scene::{Alpha, FilmDefaults, Projection, Scene, ScreenWindow, Surface};
 use glam::{Vec2, Vec3};
 use std::path::Path;
 
@@ -12,6 +13,9 @@ fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let half = image::GrayImage::from_pixel(2, 2, image::Luma([128]));
     half.save(folder.path().join("grey.png")).unwrap();
+    image::RgbImage::from_pixel(2, 2, image::Rgb([0, 255, 255])).save(folder.path().join("cyan.png")).unwrap();
+    let leaf = image::RgbaImage::from_fn(4, 2, |x, _| image::Rgba([0, 255, 0, if x < 1 { 255 } else { 0 }]));
+    leaf.save(folder.path().join("leaf.png")).unwrap();
     folder
 }
 
@@ -51,6 +55,9 @@ fn files_of_version_3_are_told_what_to_do() {
         old.ends_with("\"matte\" of pbrt-v3: `pbrt --upgrade` writes the file for version 4, which is read"),
         "{old}"
     );
+    let old =
+        try_load(folder().path(), "", r#"Texture "t" "color" "imagemap" "string filename" "grey.png""#).unwrap_err();
+    assert!(old.contains("texture \"t\" is of \"color\" of pbrt-v3: `pbrt --upgrade`"), "{old}");
 }
 
 /// The shorter side of the whole film spans [−1, 1] at every size of the picture; only what the file states is stretched.
@@ -96,6 +103,58 @@ fn pictures_are_scaled_before_they_are_inverted() {
     let Surface::Diffuse { reflectance } = &scene.materials[0].surface else { panic!("diffuse") };
     let seen = reflectance.evaluate(&scene.textures, Vec2::splat(0.5)).x;
     assert!((seen - (1.0 - 0.5 * 128.0 / 255.0)).abs() < 1e-6, "{seen}");
+}
+
+/// The colour of a diffuse surface at a place, and its scene.
+fn reflectance(textures: &str, at: Vec2) -> (Vec3, Scene) {
+    let scene = scene("", &format!("{textures} Material \"diffuse\" \"texture reflectance\" \"t\" {SQUARE}"));
+    let Surface::Diffuse { reflectance } = &scene.materials[0].surface else { panic!("diffuse") };
+    (reflectance.evaluate(&scene.textures, at), scene)
+}
+
+const PICTURES: &str = r#"Texture "cyan" "spectrum" "imagemap" "string filename" "cyan.png"
+Texture "share" "float" "imagemap" "string filename" "cyan.png" "#;
+
+/// pbrt's `MIPMap::Bilerp<Float>`: alpha, or the mean of three channels. It was the red one.
+#[test]
+fn a_number_of_a_picture_is_its_alpha_or_its_mean() {
+    let alpha = |file: &str| {
+        let texture = format!("Texture \"a\" \"float\" \"imagemap\" \"string filename\" \"{file}\" ");
+        let scene = scene("", &format!("{texture} {SQUARE} \"texture alpha\" \"a\""));
+        let (Alpha::Mask { value, .. } | Alpha::Blend { value }) = scene.materials[0].alpha else { panic!("no alpha") };
+        [0.125, 0.625].map(|u| value.evaluate(&scene.textures, Vec2::new(u, 0.5)))
+    };
+    assert_eq!(alpha("leaf.png"), [1.0, 0.0]);
+    assert!(alpha("cyan.png").iter().all(|share| (share - 2.0 / 3.0).abs() < 1e-6), "{:?}", alpha("cyan.png"));
+    let grey = srgb_to_linear(128.0 / 255.0);
+    assert!(alpha("grey.png").iter().all(|share| (share - grey).abs() < 1e-4), "{:?}", alpha("grey.png"));
+}
+
+/// What has no place for a picture takes its mean; it took 1.
+#[test]
+fn pictures_inside_others_count_by_their_mean() {
+    let note = |scene: &Scene, text: &str| scene.notes.iter().any(|note| note.contains(text));
+    let first_square = Vec2::new(0.25, 0.25);
+    let board = r#"Texture "t" "spectrum" "checkerboard" "texture tex1" "cyan" "texture tex2" "cyan" "#;
+    let (color, scene) = reflectance(&format!("{PICTURES}{board}"), first_square);
+    assert_eq!(color, Vec3::new(0.0, 1.0, 1.0));
+    assert!(note(&scene, "textures inside a checkerboard: their mean colours"), "{:?}", scene.notes);
+
+    let product = r#"Texture "t" "spectrum" "scale" "texture tex" "cyan" "texture scale" "share" "#;
+    let (color, scene) = reflectance(&format!("{PICTURES}{product}"), first_square);
+    assert!(color.abs_diff_eq(Vec3::new(0.0, 2.0, 2.0) / 3.0, 1e-6), "{color}");
+    assert!(note(&scene, "its scale's texture: its mean"), "{:?}", scene.notes);
+
+    // A colour times a picture of numbers is exact.
+    let tinted = r#"Texture "t" "spectrum" "scale" "rgb tex" [0.3 0.6 0.9] "texture scale" "share" "#;
+    let (color, scene) = reflectance(&format!("{PICTURES}{tinted}"), first_square);
+    assert!(color.abs_diff_eq(Vec3::new(0.2, 0.4, 0.6), 1e-6), "{color}");
+    assert!(!note(&scene, "mean"), "{:?}", scene.notes);
+
+    let mix = r#"Texture "t" "spectrum" "mix" "rgb tex1" [0 0 0] "rgb tex2" [0.9 0.6 0.3] "texture amount" "share" "#;
+    let (color, scene) = reflectance(&format!("{PICTURES}{mix}"), first_square);
+    assert!(color.abs_diff_eq(Vec3::new(0.6, 0.4, 0.2), 1e-6), "{color}");
+    assert!(note(&scene, "its amount's texture: its mean"), "{:?}", scene.notes);
 }
 
 #[test]

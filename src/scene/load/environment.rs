@@ -1,7 +1,7 @@
 //! What surrounds a scene: pictures, one colour, or the soft studio sky of scenes that bring no light.
 
 use super::error::LoadError;
-use super::texture;
+use super::texture::{self, Values};
 use crate::scene::{Encoding, Environment, Parametrisation, Texels};
 use glam::{Mat3, Vec3};
 use std::path::Path;
@@ -11,15 +11,22 @@ use std::sync::Arc;
 const STUDIO_SIZE: [u32; 2] = [256, 128];
 
 /// A lat-long picture (.hdr, .exr, .png, ...), times `scale`, turned by `rotation_deg` about +y (counter-clockwise seen
-/// from above).
-pub fn from_file(path: &Path, scale: f32, rotation_deg: f32) -> Result<Environment, LoadError> {
-    let environment = read(path, Parametrisation::LatLong)?;
+/// from above). `notes` gets a sentence for whatever was done to its values.
+pub fn from_file(
+    path: &Path,
+    scale: f32,
+    rotation_deg: f32,
+    notes: &mut Vec<String>,
+) -> Result<Environment, LoadError> {
+    let environment = read(path, Parametrisation::LatLong, notes)?;
     Ok(Environment { scale, from_world: Mat3::from_rotation_y(-rotation_deg.to_radians()), ..environment })
 }
 
-/// A picture in a parametrisation, of scale 1 and not turned. An equal-area picture must be square.
-pub fn read(path: &Path, parametrisation: Parametrisation) -> Result<Environment, LoadError> {
-    let picture = texture::decode_bytes(&super::files::read(path)?, path, Encoding::Srgb)?;
+/// A picture in a parametrisation, of scale 1 and not turned. An equal-area picture must be square. `notes` gets a sentence for
+/// whatever was done to its values.
+pub fn read(path: &Path, parametrisation: Parametrisation, notes: &mut Vec<String>) -> Result<Environment, LoadError> {
+    let picture = texture::decode_bytes(&super::files::read(path)?, path, Encoding::Srgb, Values::Colours)?;
+    notes.extend(picture.notes.iter().map(|note| format!("Environment {}: {note}.", path.display())));
     if parametrisation == Parametrisation::EqualArea && picture.width != picture.height {
         let problem = format_args!(
             "an equal-area environment is square, and the picture has {} x {} pixels",

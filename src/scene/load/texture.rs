@@ -2,13 +2,14 @@
 
 mod decode;
 
-pub(super) use decode::{Decoded, decode_bytes, has_alpha, is_grey};
+pub(super) use decode::{Decoded, Values, decode_bytes, has_alpha, is_grey};
 
 use super::LoadOptions;
-pub(super) use super::adjust::Adjust;
+pub(super) use super::adjust::{Adjust, Number};
 use super::error::{LoadError, Place};
 use super::texture_memory::{self, Alpha, Extent};
 use crate::scene::{Encoding, Texture, TextureId, Wrap};
+use glam::Vec3;
 use rayon::prelude::*;
 use std::collections::hash_map::DefaultHasher;
 use std::collections::{HashMap, HashSet};
@@ -126,6 +127,15 @@ impl Requests {
         self.add(request)
     }
 
+    /// Mean linear colour of a texture, for what has no place for a picture: which is decoded for it.
+    pub(super) fn mean_color(&self, texture: TextureId) -> Result<Vec3, LoadError> {
+        let request = &self.requests[texture.0 as usize];
+        let decoded = decode::decode(&request.picture, request.encoding, request.adjust.values(request.encoding));
+        let mut slot = Slot::from(decoded.map(|picture| request.adjust.apply(picture)));
+        // That a picture is not there is said where all are decoded.
+        Ok(request.texture(slot.take_for(request, &mut Vec::new())?).mean_color())
+    }
+
     /// Decodes everything. `notes` gets a sentence for each missing file that was replaced, and one of what was made smaller.
     /// `coverage` are the textures whose alpha is how much of the surface is there.
     pub(super) fn decode(
@@ -140,6 +150,7 @@ impl Requests {
             Some(limit) => fit(&wanted, limit, notes),
         };
         let decoded = decode_all(&wanted, &halvings, &self.covering(coverage), options.on_texture);
+        add_notes_of(&wanted, &decoded, notes);
         let mut slots: Vec<Slot> = decoded.into_iter().map(Slot::from).collect();
         let places = self.requests.iter().zip(place_of);
         places.map(|(request, place)| Ok(request.texture(slots[place].take_for(request, notes)?))).collect()
@@ -187,7 +198,7 @@ fn decode_all(
 ) -> Vec<Result<Decoded, LoadError>> {
     let done = AtomicUsize::new(0);
     let decode_one = |((picture, encoding, adjust), halvings): (&Wanted, &u32)| {
-        let decoded = decode::decode(picture, *encoding);
+        let decoded = decode::decode(picture, *encoding, adjust.values(*encoding));
         if let Some(tell) = on_texture {
             tell(done.fetch_add(1, Ordering::Relaxed) + 1, wanted.len());
         }
@@ -195,6 +206,18 @@ fn decode_all(
         Ok(texture_memory::shrunk(adjust.apply(decoded?), *halvings, alpha))
     };
     wanted.par_iter().zip(halvings).map(decode_one).collect()
+}
+
+/// Says what was done to the values of pictures, once of those that are decoded in several ways.
+fn add_notes_of(wanted: &[Wanted], decoded: &[Result<Decoded, LoadError>], notes: &mut Vec<String>) {
+    for ((picture, ..), decoded) in wanted.iter().zip(decoded) {
+        for note in decoded.iter().flat_map(|decoded| &decoded.notes) {
+            let note = format!("Texture {}: {note}.", picture.name());
+            if !notes.contains(&note) {
+                notes.push(note);
+            }
+        }
+    }
 }
 
 /// What decoding a picture came to, for all who asked for it.

@@ -42,10 +42,23 @@ pub(super) fn repair(builder: &mut Builder, path: &Path) -> Result<(), LoadError
         return Ok(());
     }
     if is_empty {
-        let why = builder.notes.first().map(|note| format!(" ({})", note.trim_end_matches('.'))).unwrap_or_default();
+        let why = reasons(&builder.notes);
         return Err(LoadError::invalid(path, format_args!("nothing to render: no triangle and no sphere{why}")));
     }
     check_extent(builder, path)
+}
+
+/// The first notes of a scene in which nothing is left, in brackets.
+fn reasons(notes: &[String]) -> String {
+    const MOST: usize = 3;
+    if notes.is_empty() {
+        return String::new();
+    }
+    let mut told: Vec<String> = notes.iter().take(MOST).map(|note| note.trim_end_matches('.').to_owned()).collect();
+    if notes.len() > MOST {
+        told.push(format!("and {} more", notes.len() - MOST));
+    }
+    format!(" ({})", told.join("; "))
 }
 
 fn has_triangles(builder: &Builder, instance: &Instance) -> bool {

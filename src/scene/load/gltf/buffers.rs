@@ -154,6 +154,28 @@ impl Buffers {
         self.elements(accessor, decode)
     }
 
+    /// The same of an attribute of a mesh, which has one element for each vertex (glTF 2.0, 3.7.2.1).
+    pub(super) fn of_vertices<const N: usize>(
+        &self,
+        accessor: &gltf::Accessor,
+        attribute: &str,
+        mesh: &str,
+        vertices: usize,
+    ) -> Result<Vec<[f32; N]>, LoadError> {
+        let found = accessor.count();
+        if found != vertices {
+            let problem =
+                format!("{attribute} of \"{mesh}\" has {found} elements, but the mesh has {vertices} vertices");
+            return Err(self.wrong(accessor, problem));
+        }
+        self.floats(accessor)
+    }
+
+    /// An error about a mesh.
+    pub(super) fn wrong_mesh(&self, mesh: &str, problem: impl std::fmt::Display) -> LoadError {
+        LoadError::invalid(&self.path, format_args!("\"{mesh}\": {problem}"))
+    }
+
     /// The accessor's elements as indices.
     pub(super) fn indices(&self, accessor: &gltf::Accessor) -> Result<Vec<u32>, LoadError> {
         let kind = accessor.data_type();

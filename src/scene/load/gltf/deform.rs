@@ -14,14 +14,16 @@ pub(super) fn morph(
     mesh: &mut Mesh,
 ) -> Result<(), LoadError> {
     for (target, &weight) in primitive.morph_targets().zip(weights).filter(|(_, weight)| **weight != 0.0) {
-        let add = |accessor: Option<gltf::Accessor>, values: &mut Vec<Vec3>| -> Result<(), LoadError> {
-            let Some(accessor) = accessor else { return Ok(()) };
-            let offsets = buffers.floats::<3>(&accessor)?;
-            values.iter_mut().zip(offsets).for_each(|(value, offset)| *value += weight * Vec3::from_array(offset));
-            Ok(())
-        };
-        add(target.positions(), &mut mesh.positions)?;
-        add(target.normals(), &mut mesh.normals)?;
+        let (name, vertices) = (&mesh.name, mesh.positions.len());
+        let add =
+            |accessor: Option<gltf::Accessor>, values: &mut Vec<Vec3>, attribute: &str| -> Result<(), LoadError> {
+                let Some(accessor) = accessor else { return Ok(()) };
+                let offsets = buffers.of_vertices::<3>(&accessor, attribute, name, vertices)?;
+                values.iter_mut().zip(offsets).for_each(|(value, offset)| *value += weight * Vec3::from_array(offset));
+                Ok(())
+            };
+        add(target.positions(), &mut mesh.positions, "a morph target's POSITION")?;
+        add(target.normals(), &mut mesh.normals, "a morph target's NORMAL")?;
     }
     // Tangents are made anew from the texture coordinates.
     mesh.tangents.clear();
@@ -44,11 +46,16 @@ pub(super) fn skin(
         else {
             break;
         };
-        let (indices, weights) = (buffers.floats::<4>(&indices)?, buffers.floats::<4>(&weights)?);
-        for (vertex, (indices, weights)) in indices.iter().zip(&weights).enumerate().take(blended.len()) {
-            for (&index, &weight) in indices.iter().zip(weights) {
-                let Some(joint) = joints.get(index as usize).filter(|_| weight > 0.0 && weight.is_finite()) else {
-                    continue;
+        let vertices = blended.len();
+        let indices = buffers.of_vertices::<4>(&indices, &format!("JOINTS_{set}"), &mesh.name, vertices)?;
+        let weights = buffers.of_vertices::<4>(&weights, &format!("WEIGHTS_{set}"), &mesh.name, vertices)?;
+        for (vertex, (indices, weights)) in indices.iter().zip(&weights).enumerate() {
+            let moves = |&(_, weight): &(f32, f32)| weight > 0.0 && weight.is_finite();
+            for (index, weight) in indices.iter().copied().zip(weights.iter().copied()).filter(moves) {
+                let Some(joint) = joints.get(index as usize) else {
+                    let problem =
+                        format!("vertex {vertex} hangs on joint {index}, but its skin has {} joints", joints.len());
+                    return Err(buffers.wrong_mesh(&mesh.name, problem));
                 };
                 blended[vertex] += *joint * weight;
                 total[vertex] += weight;
@@ -73,21 +80,26 @@ fn cofactors(matrix: &Mat4) -> Mat3 {
     if x.dot(y.cross(z)) < 0.0 { cofactors * -1.0 } else { cofactors }
 }
 
-/// World transforms of a skin's joints times their inverse bind matrices.
+/// World transforms of a skin's joints times their inverse bind matrices; `node` is who wears it.
 pub(super) fn joints(
     buffers: &Buffers,
     skin: &gltf::Skin,
+    node: &str,
     world: &std::collections::HashMap<usize, Mat4>,
 ) -> Result<Vec<Mat4>, LoadError> {
     let bind = match skin.inverse_bind_matrices() {
         Some(accessor) => buffers.floats::<16>(&accessor)?,
-        None => Vec::new(),
+        None => vec![Mat4::IDENTITY.to_cols_array(); skin.joints().count()],
     };
-    let joint = |(place, node): (usize, gltf::Node)| {
-        let world = world.get(&node.index()).copied().unwrap_or(Mat4::IDENTITY);
-        world * bind.get(place).map_or(Mat4::IDENTITY, Mat4::from_cols_array)
+    if bind.len() < skin.joints().count() {
+        let problem =
+            format!("its skin has {} joints, but {} inverse bind matrices", skin.joints().count(), bind.len());
+        return Err(buffers.wrong_mesh(node, problem));
+    }
+    let joint = |(node, bind): (gltf::Node, &[f32; 16])| {
+        world.get(&node.index()).copied().unwrap_or(Mat4::IDENTITY) * Mat4::from_cols_array(bind)
     };
-    Ok(skin.joints().enumerate().map(joint).collect())
+    Ok(skin.joints().zip(&bind).map(joint).collect())
 }
 
 #[cfg(test)]

@@ -246,12 +246,16 @@ impl<'a> Materials<'a> {
         transform: Option<Transform>,
         if_missing: [u8; 4],
     ) -> Result<Option<TextureLookup>, LoadError> {
-        let index = self.document.as_json().textures[texture.index()].source.value();
+        let json = &self.document.as_json().textures[texture.index()];
+        let extensions = json.extensions.iter().flat_map(|extensions| extensions.others.keys());
+        let extensions: Vec<&str> = extensions.map(String::as_str).collect();
+        let index = json.source.value();
         let Some(picture) = self.picture(index)? else {
-            builder.note(format!(
-                "Texture {}: its image has neither a file nor a buffer view; left out.",
-                texture.index()
-            ));
+            let why = match extensions.is_empty() || index < self.document.as_json().images.len() {
+                true => "its image has neither a file nor a buffer view".to_owned(),
+                false => format!("its image is that of {} alone, which is not read", extensions.join(", ")),
+            };
+            builder.note(format!("Texture {}: {why}; left out.", texture.index()));
             return Ok(None);
         };
         let sampler = texture.sampler();

@@ -197,7 +197,7 @@ impl<'a> Reader<'a> {
         to_world: Affine3A,
         motion: Option<Motion>,
     ) -> Result<(), LoadError> {
-        let joints = node.skin().map(|skin| deform::joints(self.buffers, &skin, &self.world)).transpose()?;
+        let joints = node.skin().map(|skin| deform::joints(self.buffers, &skin, name, &self.world)).transpose()?;
         let mut parts = Vec::new();
         for primitive in mesh.primitives() {
             let Some(mut converted) = self.primitive(mesh, &primitive)? else { continue };
@@ -244,13 +244,15 @@ impl<'a> Reader<'a> {
             return Ok(None);
         };
         let positions: Vec<Vec3> = self.buffers.floats(&positions)?.into_iter().map(Vec3::from_array).collect();
-        let vectors = |semantic| from.get(&semantic).map(|accessor| self.buffers.floats::<3>(&accessor)).transpose();
-        let normals = vectors(Semantic::Normals)?.unwrap_or_default().into_iter().map(Vec3::from_array).collect();
-        let uvs = from.get(&Semantic::TexCoords(0)).map(|accessor| self.buffers.floats(&accessor)).transpose()?;
+        let vertices = positions.len();
+        let normals = self.attribute::<3>(from, &Semantic::Normals, &name, vertices)?;
+        let uvs = self.attribute(from, &Semantic::TexCoords(0), &name, vertices)?;
         // Tangents mean nothing without normals.
-        let given = from.get(&Semantic::Tangents).filter(|_| from.get(&Semantic::Normals).is_some());
-        let tangents = given.map(|accessor| self.buffers.floats(&accessor)).transpose()?;
-        let colors = from.get(&Semantic::Colors(0)).map(|accessor| self.colors(&accessor, &name)).transpose()?;
+        let tangents = match normals.is_empty() {
+            true => Vec::new(),
+            false => self.attribute(from, &Semantic::Tangents, &name, vertices)?,
+        };
+        let colors = self.colors(from, &name, vertices)?;
         let indices = match from.indices() {
             Some(accessor) => self.buffers.indices(&accessor)?,
             None => (0..positions.len() as u32).collect(),
@@ -262,20 +264,34 @@ impl<'a> Reader<'a> {
         Ok(Some(Mesh {
             name,
             positions,
-            normals,
-            uvs: uvs.unwrap_or_default().into_iter().map(Vec2::from_array).collect(),
-            tangents: tangents.unwrap_or_default().into_iter().map(Vec4::from_array).collect(),
-            colors: colors.unwrap_or_default(),
+            normals: normals.into_iter().map(Vec3::from_array).collect(),
+            uvs: uvs.into_iter().map(Vec2::from_array).collect(),
+            tangents: tangents.into_iter().map(Vec4::from_array).collect(),
+            colors,
             triangles: triangles(&indices, from.mode()),
         }))
     }
 
+    /// An attribute of every vertex; empty where the primitive has none.
+    fn attribute<const N: usize>(
+        &self,
+        from: &::gltf::Primitive,
+        semantic: &Semantic,
+        mesh: &str,
+        vertices: usize,
+    ) -> Result<Vec<[f32; N]>, LoadError> {
+        let Some(accessor) = from.get(semantic) else { return Ok(Vec::new()) };
+        self.buffers.of_vertices(&accessor, &semantic.to_string(), mesh, vertices)
+    }
+
     /// Linear colours of vertices, without their alpha.
-    fn colors(&mut self, accessor: &::gltf::Accessor, name: &str) -> Result<Vec<Vec3>, LoadError> {
-        if accessor.dimensions().multiplicity() != 4 {
-            return Ok(self.buffers.floats(accessor)?.into_iter().map(Vec3::from_array).collect());
+    fn colors(&mut self, from: &::gltf::Primitive, name: &str, vertices: usize) -> Result<Vec<Vec3>, LoadError> {
+        let semantic = Semantic::Colors(0);
+        if from.get(&semantic).is_none_or(|accessor| accessor.dimensions().multiplicity() != 4) {
+            return Ok(self.attribute(from, &semantic, name, vertices)?.into_iter().map(Vec3::from_array).collect());
         }
-        let colors: Vec<Vec4> = self.buffers.floats(accessor)?.into_iter().map(Vec4::from_array).collect();
+        let colors = self.attribute(from, &semantic, name, vertices)?;
+        let colors: Vec<Vec4> = colors.into_iter().map(Vec4::from_array).collect();
         if colors.iter().any(|color| color.w < 1.0) {
             self.builder.note(format!("\"{name}\": the alpha of its vertex colours is not used."));
         }

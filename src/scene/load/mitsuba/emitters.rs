@@ -67,7 +67,7 @@ impl Reader {
                     return Err(emitter.error("an envmap needs a filename"));
                 };
                 let file = self.file(emitter, name)?;
-                let mut environment = environment::read(&file, Parametrisation::LatLong)
+                let mut environment = environment::read(&file, Parametrisation::LatLong, &mut self.builder.notes)
                     .map_err(|error| error.referenced_from(emitter.place()))?;
                 environment.scale = emitter.float_or("scale", 1.0)?.max(0.0);
                 // Mitsuba's picture has +z in its middle, ours −z; both turn the same way round.

@@ -2,7 +2,7 @@
 
 use super::super::error::LoadError;
 use super::super::spectrum::Spectrum;
-use super::super::texture::{Adjust, IfMissing, Picture, Request, has_alpha, is_grey};
+use super::super::texture::{Adjust, IfMissing, Number, Picture, Request, has_alpha, is_grey};
 use super::super::{files, luminance};
 use super::Reader;
 use super::element::{Element, canonical};
@@ -47,11 +47,12 @@ impl Reader {
         meaning: Meaning,
         depth: usize,
     ) -> Result<Option<Vec3>, LoadError> {
-        let Some(input) = self.nested_input(owner, name, meaning, depth)? else { return Ok(None) };
-        if input.texture.is_some() {
-            self.builder.note(format!("{}: \"{name}\": a texture is not rendered here: its factor.", owner.place()));
-        }
-        Ok(Some(input.factor))
+        let Some(ColorInput { factor, texture }) = self.nested_input(owner, name, meaning, depth)? else {
+            return Ok(None);
+        };
+        let Some(lookup) = texture else { return Ok(Some(factor)) };
+        self.builder.note(format!("{}: \"{name}\": a texture is not rendered here: its mean colour.", owner.place()));
+        Ok(Some(factor * self.builder.textures.mean_color(lookup.texture)?))
     }
 
     /// A colour that may be a texture.
@@ -85,7 +86,7 @@ impl Reader {
                 if value().starts_with('#') { encoded } else { encoded.map(srgb_to_linear) }
             }
             "spectrum" => self.spectrum(&child, value(), meaning, depth)?,
-            "blackbody" => blackbody(&child)?,
+            "blackbody" => blackbody_of_attributes(&child)?,
             other => return Err(child.error(format_args!("\"{other}\" is no colour"))),
         };
         if color.min_element() < 0.0 {
@@ -107,16 +108,31 @@ impl Reader {
     }
 
     fn spectrum(&mut self, child: &Element, value: &str, meaning: Meaning, depth: usize) -> Result<Vec3, LoadError> {
-        match child.kind().as_str() {
+        let listed = match child.kind().as_str() {
+            "" => None,
             // The white of RGB.
             "d65" => {
                 let color = self.nested_color(child, "color", Meaning::Coefficient, depth + 1)?.unwrap_or(Vec3::ONE);
                 return Ok(color * child.float_or("scale", 1.0)?);
             }
             "uniform" => return Ok(Vec3::splat(child.float_or("value", 1.0)?)),
-            _ => {}
-        }
-        let spectrum = if let Some(name) = child.attribute("filename") {
+            "srgb" => {
+                let color = self.nested_color(child, "color", Meaning::Coefficient, depth + 1)?;
+                return color.ok_or_else(|| child.error("a spectrum \"srgb\" needs a \"color\""));
+            }
+            "blackbody" => return blackbody_of_children(child),
+            "regular" => Some(regular(child)?),
+            "irregular" => Some(irregular(child)?),
+            _ => {
+                return Err(child.unsupported(format_args!(
+                    "spectrum \"{}\" is not read; blackbody, d65, irregular, regular, srgb and uniform are",
+                    child.attribute("type").unwrap_or("")
+                )));
+            }
+        };
+        let spectrum = if listed.is_some() {
+            listed
+        } else if let Some(name) = child.attribute("filename") {
             let text = files::read_text(&self.file(child, name)?).map_err(|e| e.referenced_from(child.place()))?;
             Spectrum::from_text(&text)
         } else if value.contains(':') {
@@ -233,7 +249,7 @@ impl Reader {
             } else {
                 Encoding::Srgb
             };
-        let to_luminance = meaning == Meaning::Number && !is_grey(&file);
+        let to_number = (meaning == Meaning::Number && !is_grey(&file)).then_some(Number::Luminance);
         let mut lookup = self.mapping(texture)?;
         lookup.texture = self.builder.textures.add(Request {
             picture: Picture::File(file),
@@ -242,7 +258,7 @@ impl Reader {
             wrap_v: one("wrapmodev")?,
             nearest: filter.as_deref() == Some("nearest"),
             if_missing: IfMissing::Fail(texture.place()),
-            adjust: Adjust { to_luminance, ..Adjust::NONE },
+            adjust: Adjust { to_number, ..Adjust::NONE },
         });
         Ok(ColorInput { factor: Vec3::ONE, texture: Some(lookup) })
     }
@@ -307,13 +323,61 @@ fn rgb(child: &Element, value: &str) -> Result<Vec3, LoadError> {
     }
 }
 
-/// Planck's law in W m⁻² sr⁻¹ nm⁻¹, as Mitsuba's spectra are, times `scale`.
-fn blackbody(child: &Element) -> Result<Vec3, LoadError> {
+/// Values at equal steps between two wavelengths in nanometres, as Mitsuba 3 writes them.
+fn regular(child: &Element) -> Result<Spectrum, LoadError> {
+    let nanometres = |name: &str, written: &str| {
+        let found = child.float(name)?.map(f64::from);
+        found.ok_or_else(|| child.error(format_args!("a regular spectrum needs a \"{written}\"")))
+    };
+    let from_nm = nanometres("wavelengthmin", "wavelength_min")?;
+    let to_nm = nanometres("wavelengthmax", "wavelength_max")?;
+    let values = list(child, "values")?;
+    if values.len() < 2 || from_nm >= to_nm {
+        return Err(child.error("a regular spectrum needs two values or more, and wavelength_min below wavelength_max"));
+    }
+    let step_nm = (to_nm - from_nm) / (values.len() - 1) as f64;
+    let pairs = values.iter().enumerate().map(|(place, &value)| [from_nm + step_nm * place as f64, f64::from(value)]);
+    Spectrum::from_pairs(pairs).ok_or_else(|| child.error("expected finite wavelengths and values"))
+}
+
+/// Values at wavelengths in nanometres, two lists of one length.
+fn irregular(child: &Element) -> Result<Spectrum, LoadError> {
+    let (wavelengths_nm, values) = (list(child, "wavelengths")?, list(child, "values")?);
+    if values.len() < 2 || wavelengths_nm.len() != values.len() {
+        let problem = format!(
+            "an irregular spectrum needs two wavelengths or more and as many values; found {} and {}",
+            wavelengths_nm.len(),
+            values.len()
+        );
+        return Err(child.error(problem));
+    }
+    let pairs = wavelengths_nm.iter().zip(&values).map(|(&nm, &value)| [f64::from(nm), f64::from(value)]);
+    Spectrum::from_pairs(pairs).ok_or_else(|| child.error("expected finite wavelengths and values"))
+}
+
+/// The numbers of a `<string>` inside.
+fn list(owner: &Element, name: &str) -> Result<Vec<f32>, LoadError> {
+    let text = owner.string(name)?;
+    owner.numbers(text.ok_or_else(|| owner.error(format_args!("the string \"{name}\" is missing")))?)
+}
+
+/// `<blackbody>` as Mitsuba 0.x writes it.
+fn blackbody_of_attributes(child: &Element) -> Result<Vec3, LoadError> {
     let text = child.attribute("temperature").unwrap_or("").trim().trim_end_matches(['K', 'k']);
     let kelvin = child.numbers(text)?.first().copied().map(f64::from).unwrap_or(0.0);
+    let scale = if child.attribute("scale").is_some() { child.number_attribute("scale")? } else { 1.0 };
+    blackbody(child, kelvin, scale)
+}
+
+/// `<spectrum type="blackbody">` as Mitsuba 3 writes it.
+fn blackbody_of_children(child: &Element) -> Result<Vec3, LoadError> {
+    blackbody(child, f64::from(child.float_or("temperature", 0.0)?), child.float_or("scale", 1.0)?)
+}
+
+/// Planck's law in W m⁻² sr⁻¹ nm⁻¹, as Mitsuba's spectra are, times `scale`.
+fn blackbody(child: &Element, kelvin: f64, scale: f32) -> Result<Vec3, LoadError> {
     let spectrum =
         Spectrum::blackbody(kelvin).ok_or_else(|| child.error("expected a temperature in kelvin above 0"))?;
-    let scale = if child.attribute("scale").is_some() { child.number_attribute("scale")? } else { 1.0 };
     // Radiance at the peak: 4.0957e-15 W m⁻² sr⁻¹ nm⁻¹ K⁻⁵ · T⁵.
     let color = spectrum.emission() * (4.0957e-15 * kelvin.powi(5)) as f32 * scale;
     if color.is_finite() { Ok(color) } else { Err(child.error("the temperature is too high")) }

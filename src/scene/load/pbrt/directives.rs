@@ -158,7 +158,8 @@ impl Reader<'_> {
                     "spectrum" => "spectrum",
                     "float" => "float",
                     other => {
-                        let problem = format!("texture \"{name}\" is of \"{other}\": expected spectrum or float");
+                        let meant = if other == "color" { materials::UPGRADE } else { ": expected spectrum or float" };
+                        let problem = format!("texture \"{name}\" is of \"{other}\"{meant}");
                         return Err(LoadError::invalid_at(lexer.place(line), problem));
                     }
                 };

@@ -121,7 +121,7 @@ impl Reader<'_> {
             return Ok(Environment::constant(color * scale * illuminance.map_or(1.0, |lux| lux / PI)));
         };
         let file = self.file(file);
-        let mut environment = environment::read(&file, Parametrisation::EqualArea)
+        let mut environment = environment::read(&file, Parametrisation::EqualArea, &mut self.builder.notes)
             .map_err(|error| error.referenced_from(parameters.place()))?;
         environment.from_world = rotation(to_world).transpose();
         environment.scale = scale;

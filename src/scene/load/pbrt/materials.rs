@@ -28,6 +28,9 @@ const KNOWN: [&str; 9] = [
     "interface",
 ];
 
+/// What to do with a word that version 4 has no more.
+pub(super) const UPGRADE: &str = " of pbrt-v3: `pbrt --upgrade` writes the file for version 4, which is read";
+
 /// Materials that version 4 has no more, or under another name.
 const OF_VERSION_3: [&str; 11] = [
     "matte",
@@ -186,7 +189,7 @@ impl Reader<'_> {
             }
             other => {
                 let meant = match OF_VERSION_3.contains(&other) {
-                    true => " of pbrt-v3: `pbrt --upgrade` writes the file for version 4, which is read".to_owned(),
+                    true => UPGRADE.to_owned(),
                     false => suggestion(other, KNOWN),
                 };
                 return Err(parameters.error(format_args!("unknown material \"{other}\"{meant}")));

@@ -1,7 +1,7 @@
 //! `Texture`: image maps, constants, products, checkerboards. What else pbrt can compute is named and averaged.
 
 use super::super::error::{LoadError, suggestion};
-use super::super::texture::{Adjust, IfMissing, Picture, Request};
+use super::super::texture::{Adjust, IfMissing, Number, Picture, Request, is_grey};
 use super::Reader;
 use super::inputs::Meaning;
 use super::parameters::Parameters;
@@ -12,6 +12,8 @@ use std::rc::Rc;
 
 /// Deepest chain of textures that use textures.
 const DEEPEST: usize = 32;
+/// What is done to textures that a checkerboard is made of.
+const INSIDE_A_CHECKERBOARD: &str = "textures inside a checkerboard: their mean colours";
 
 /// A texture as it was written.
 pub(super) struct Definition {
@@ -52,31 +54,32 @@ impl Reader<'_> {
                 Ok(ColorInput::constant(value))
             }
             "imagemap" => {
-                let (lookup, scale) = self.image(parameters, Encoding::Srgb)?;
+                let (lookup, scale) = self.image(parameters, None)?;
                 Ok(ColorInput { factor: Vec3::splat(scale), texture: Some(lookup) })
             }
             "scale" => {
                 let base = self.color_operand(parameters, "tex", Vec3::ONE, depth)?;
-                let factor = match self.scalar_operand(parameters, "scale", 1.0, depth)? {
-                    ScalarInput { factor, texture: None } => factor,
-                    ScalarInput { factor, .. } => {
-                        self.average(parameters, name, "its scale's texture");
-                        factor
+                let scale = self.scalar_operand(parameters, "scale", 1.0, depth)?;
+                // The three colours of a number's texture are that number.
+                let (rest, texture) = match (base.texture, scale.texture) {
+                    (None, texture) => (scale.factor, texture.map(|(lookup, _)| lookup)),
+                    (texture, None) => (scale.factor, texture),
+                    (texture, Some(_)) => {
+                        self.average(parameters, name, "its scale's texture: its mean");
+                        (self.mean_of_number(&scale)?, texture)
                     }
                 };
-                Ok(ColorInput { factor: base.factor * factor, texture: base.texture })
+                Ok(ColorInput { factor: base.factor * rest, texture })
             }
             "mix" => {
-                let amount = self.scalar_operand(parameters, "amount", 0.5, depth)?;
+                let amount = self.amount(parameters, name, depth)?;
                 let first = self.color_operand(parameters, "tex1", Vec3::ZERO, depth)?;
                 let second = self.color_operand(parameters, "tex2", Vec3::ONE, depth)?;
-                Ok(match (first.texture, second.texture, amount.texture) {
-                    (None, None, None) => ColorInput::constant(first.factor.lerp(second.factor, amount.factor)),
-                    _ => {
-                        self.average(parameters, name, "the mix of textures: the heavier one");
-                        if amount.factor < 0.5 { first } else { second }
-                    }
-                })
+                if first.texture.is_none() && second.texture.is_none() {
+                    return Ok(ColorInput::constant(first.factor.lerp(second.factor, amount)));
+                }
+                self.average(parameters, name, "the mix of textures: the heavier one");
+                Ok(if amount < 0.5 { first } else { second })
             }
             "checkerboard" => {
                 let colors = [
@@ -84,9 +87,10 @@ impl Reader<'_> {
                     self.color_operand(parameters, "tex2", Vec3::ZERO, depth)?,
                 ];
                 if colors.iter().any(|color| color.texture.is_some()) {
-                    self.average(parameters, name, "textures inside a checkerboard: their factors");
+                    self.average(parameters, name, INSIDE_A_CHECKERBOARD);
                 }
-                let lookup = self.checkerboard(parameters, colors.map(|color| color.factor))?;
+                let [even, odd] = [self.mean_of_color(&colors[0])?, self.mean_of_color(&colors[1])?];
+                let lookup = self.checkerboard(parameters, [even, odd])?;
                 Ok(ColorInput { factor: Vec3::ONE, texture: Some(lookup) })
             }
             other => {
@@ -116,19 +120,21 @@ impl Reader<'_> {
         match definition.kind.as_str() {
             "constant" => Ok(ScalarInput::constant(parameters.float_or("value", 1.0)?)),
             "imagemap" => {
-                let (lookup, factor) = self.image(parameters, Encoding::Srgb)?;
+                let (lookup, factor) = self.image(parameters, Some(Number::AlphaOrMean))?;
                 Ok(ScalarInput { factor, texture: Some((lookup, 0)) })
             }
             "scale" => {
                 let base = self.scalar_operand(parameters, "tex", 1.0, depth)?;
                 let scale = self.scalar_operand(parameters, "scale", 1.0, depth)?;
                 if base.texture.is_some() && scale.texture.is_some() {
-                    self.average(parameters, name, "its scale's texture");
+                    self.average(parameters, name, "its scale's texture: its mean");
+                    let factor = base.factor * self.mean_of_number(&scale)?;
+                    return Ok(ScalarInput { factor, texture: base.texture });
                 }
                 Ok(ScalarInput { factor: base.factor * scale.factor, texture: base.texture.or(scale.texture) })
             }
             "mix" => {
-                let amount = self.scalar_operand(parameters, "amount", 0.5, depth)?.factor;
+                let amount = self.amount(parameters, name, depth)?;
                 let first = self.scalar_operand(parameters, "tex1", 0.0, depth)?;
                 let second = self.scalar_operand(parameters, "tex2", 1.0, depth)?;
                 if first.texture.is_none() && second.texture.is_none() {
@@ -139,10 +145,14 @@ impl Reader<'_> {
             }
             "checkerboard" => {
                 let values = [
-                    self.scalar_operand(parameters, "tex1", 1.0, depth)?.factor,
-                    self.scalar_operand(parameters, "tex2", 0.0, depth)?.factor,
+                    self.scalar_operand(parameters, "tex1", 1.0, depth)?,
+                    self.scalar_operand(parameters, "tex2", 0.0, depth)?,
                 ];
-                let lookup = self.checkerboard(parameters, values.map(Vec3::splat))?;
+                if values.iter().any(|value| value.texture.is_some()) {
+                    self.average(parameters, name, INSIDE_A_CHECKERBOARD);
+                }
+                let [even, odd] = [self.mean_of_number(&values[0])?, self.mean_of_number(&values[1])?];
+                let lookup = self.checkerboard(parameters, [even, odd].map(Vec3::splat))?;
                 Ok(ScalarInput { factor: 1.0, texture: Some((lookup, 0)) })
             }
             other => {
@@ -150,6 +160,27 @@ impl Reader<'_> {
                 Ok(ScalarInput::constant(0.5))
             }
         }
+    }
+
+    /// The share of a mix's second part, which is one number here.
+    fn amount(&mut self, parameters: &Parameters, name: &str, depth: usize) -> Result<f32, LoadError> {
+        let amount = self.scalar_operand(parameters, "amount", 0.5, depth)?;
+        if amount.texture.is_some() {
+            self.average(parameters, name, "its amount's texture: its mean");
+        }
+        self.mean_of_number(&amount)
+    }
+
+    /// What stands for a texture where only a colour has a place.
+    fn mean_of_color(&self, input: &ColorInput) -> Result<Vec3, LoadError> {
+        let Some(lookup) = input.texture else { return Ok(input.factor) };
+        Ok(input.factor * self.builder.textures.mean_color(lookup.texture)?)
+    }
+
+    /// The same where only a number has one.
+    fn mean_of_number(&self, input: &ScalarInput) -> Result<f32, LoadError> {
+        let Some((lookup, _)) = input.texture else { return Ok(input.factor) };
+        Ok(input.factor * self.builder.textures.mean_color(lookup.texture)?.x)
     }
 
     fn average(&mut self, parameters: &Parameters, name: &str, what: &str) {
@@ -208,15 +239,14 @@ impl Reader<'_> {
         }
     }
 
-    /// An image file and its scale.
-    fn image(&mut self, parameters: &Parameters, usual: Encoding) -> Result<(TextureLookup, f32), LoadError> {
+    /// An image file, of colours or of some number, and its scale.
+    fn image(&mut self, parameters: &Parameters, of_number: Option<Number>) -> Result<(TextureLookup, f32), LoadError> {
         let Some(file) = parameters.string("filename")? else {
             return Err(parameters.error("an imagemap needs a \"string filename\""));
         };
         let file = self.file(file);
         let (encoding, exponent) = match parameters.string("encoding")? {
-            None => (usual, 1.0),
-            Some("sRGB") => (Encoding::Srgb, 1.0),
+            None | Some("sRGB") => (Encoding::Srgb, 1.0),
             Some("linear") => (Encoding::Linear, 1.0),
             Some(other) => match other.strip_prefix("gamma ").and_then(|gamma| gamma.trim().parse::<f32>().ok()) {
                 Some(gamma) if gamma > 0.0 && gamma.is_finite() => (Encoding::Linear, gamma),
@@ -244,6 +274,8 @@ impl Reader<'_> {
         let scale = parameters.float_or("scale", 1.0)?;
         let inverts = parameters.boolean_or("invert", false)?;
         let mut lookup = self.mapping(parameters)?;
+        // A picture of one channel is its number already, and stays small. pbrt drops its alpha.
+        let to_number = of_number.filter(|_| !is_grey(&file));
         lookup.texture = self.builder.textures.add(Request {
             picture: Picture::File(file),
             encoding,
@@ -254,7 +286,7 @@ impl Reader<'_> {
             adjust: Adjust {
                 exponent_bits: exponent.to_bits(),
                 inverted_scale_bits: inverts.then_some(scale.to_bits()),
-                to_luminance: false,
+                to_number,
             },
         });
         // Inverting is the last that pbrt does.

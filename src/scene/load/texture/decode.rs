@@ -2,7 +2,7 @@
 //! (4 a texel), all others become linear floats (16 a texel).
 
 use super::Picture;
-use crate::exr_read::{self, layer_and_part};
+use crate::exr_read::{self, ExrImage, Window, layer_and_part};
 use crate::hdr_read::{HdrHeader, with_known_signature};
 use crate::jpeg_read;
 use crate::scene::load::{LoadError, files};
@@ -17,18 +17,33 @@ const LONGEST_SIDE: u32 = 16_384;
 /// Most bytes that one decoded picture may take.
 const MOST_BYTES: u64 = 512 << 20;
 
+/// The largest finite value of a half: what infinity stands for in a file of halves is at least this.
+const LARGEST_HALF: f32 = 65_504.0;
+
 /// A decoded picture.
 #[derive(Clone, Debug)]
 pub(in crate::scene::load) struct Decoded {
     pub(in crate::scene::load) width: u32,
     pub(in crate::scene::load) height: u32,
     pub(in crate::scene::load) texels: Texels,
+    /// What was done to its values, a line each without a full stop, for whoever should know.
+    pub(in crate::scene::load) notes: Vec<String>,
 }
 
 impl Decoded {
     pub(super) fn plain(texel: [u8; 4], encoding: Encoding) -> Self {
-        Self { width: 1, height: 1, texels: Texels::Bytes(Arc::new(vec![texel]), encoding) }
+        let texels = Texels::Bytes(Arc::new(vec![texel]), encoding);
+        Self { width: 1, height: 1, texels, notes: Vec::new() }
     }
+}
+
+/// What a picture's values are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::scene::load) enum Values {
+    /// Of the primaries that the file names, to be brought to Rec.709.
+    Colours,
+    /// As they stand: normals, roughness, coverage.
+    Numbers,
 }
 
 /// Width, height, and whether all channels have 8 bits.
@@ -57,13 +72,14 @@ fn color_type(path: &Path) -> Option<image::ColorType> {
 }
 
 /// Decodes one picture.
-pub(super) fn decode(picture: &Picture, encoding: Encoding) -> Result<Decoded, LoadError> {
+pub(super) fn decode(picture: &Picture, encoding: Encoding, values: Values) -> Result<Decoded, LoadError> {
     match picture {
-        Picture::File(path) => decode_bytes(&files::read(path)?, path, encoding),
-        Picture::Memory { name, bytes } => decode_bytes(bytes, Path::new(name), encoding),
+        Picture::File(path) => decode_bytes(&files::read(path)?, path, encoding, values),
+        Picture::Memory { name, bytes } => decode_bytes(bytes, Path::new(name), encoding, values),
         Picture::Texels { size: [width, height], bits, .. } => {
             let texels = bits.iter().map(|texel| texel.map(f32::from_bits)).collect();
-            Ok(Decoded { width: *width, height: *height, texels: Texels::Floats(Arc::new(texels)) })
+            let texels = Texels::Floats(Arc::new(texels));
+            Ok(Decoded { width: *width, height: *height, texels, notes: Vec::new() })
         }
     }
 }
@@ -73,9 +89,10 @@ pub(in crate::scene::load) fn decode_bytes(
     bytes: &[u8],
     name: &Path,
     encoding: Encoding,
+    values: Values,
 ) -> Result<Decoded, LoadError> {
     if exr_read::is_exr(bytes) {
-        return decode_exr(bytes, name);
+        return decode_exr(bytes, name, values);
     }
     let bytes = &*with_known_signature(bytes);
     let wrong = |error: image::ImageError| match error {
@@ -99,14 +116,15 @@ pub(in crate::scene::load) fn decode_bytes(
         return Err(LoadError::invalid(name, jpeg_read::CUT_OFF));
     }
     let image = DynamicImage::from_decoder(decoder).map_err(wrong)?;
+    let mut notes = Vec::new();
     let texels = match eight_bit {
         true => Texels::Bytes(Arc::new(image.into_rgba8().into_raw().as_chunks::<4>().0.to_vec()), encoding),
         false => {
             let header = (format == ImageFormat::Hdr).then(|| HdrHeader::of(bytes));
-            Texels::Floats(Arc::new(linear_floats(image, encoding, header)))
+            Texels::Floats(Arc::new(linear_floats(image, encoding, header, &mut notes)))
         }
     };
-    Ok(Decoded { width, height, texels })
+    Ok(Decoded { width, height, texels, notes })
 }
 
 /// The reader with the limits that hold for textures.
@@ -121,16 +139,22 @@ fn limited<R: std::io::BufRead + std::io::Seek>(mut reader: ImageReader<R>) -> I
 
 /// Linear texels: 16-bit integers under the sRGB curve are unfolded, floats are linear already, but for what the header of a
 /// Radiance file says.
-fn linear_floats(image: DynamicImage, encoding: Encoding, header: Option<HdrHeader>) -> Vec<[f32; 4]> {
+fn linear_floats(
+    image: DynamicImage,
+    encoding: Encoding,
+    header: Option<HdrHeader>,
+    notes: &mut Vec<String>,
+) -> Vec<[f32; 4]> {
     let unfold =
         encoding == Encoding::Srgb && !matches!(image, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_));
     let mut texels = image.into_rgba32f().into_raw().as_chunks::<4>().0.to_vec();
     for [r, g, b, _] in &mut texels {
         [*r, *g, *b] = header.map_or([*r, *g, *b], |header| header.light([*r, *g, *b]));
-        for value in [r, g, b] {
-            *value = if unfold { texture::srgb_to_linear(*value) } else { finite_or_zero(*value) };
+        if unfold {
+            [*r, *g, *b] = [*r, *g, *b].map(texture::srgb_to_linear);
         }
     }
+    make_finite(&mut [texels.as_flattened_mut()], notes);
     texels
 }
 
@@ -147,29 +171,72 @@ fn is_eight_bit(color: image::ColorType) -> bool {
     matches!(color, L8 | La8 | Rgb8 | Rgba8)
 }
 
-fn decode_exr(bytes: &[u8], name: &Path) -> Result<Decoded, LoadError> {
-    // A picture of one channel is grey; parts prefix their names.
-    let of_colour = |all: &[String]| {
-        all.iter().filter(|name| ["R", "G", "B", "A", "Y"].contains(&layer_and_part(name).1)).cloned().collect()
-    };
-    let picture = exr_read::decode_exr_channels(name, bytes, of_colour).map_err(|error| match error {
+fn decode_exr(bytes: &[u8], name: &Path, values: Values) -> Result<Decoded, LoadError> {
+    let mut image = exr_read::decode_exr_channels(name, bytes, used_channels).map_err(|error| match error {
         exr_read::ExrReadError::TooLarge { .. } => LoadError::too_large(name, error),
         _ => LoadError::invalid(name, error),
     })?;
-    let (width, height) = (u64::from(picture.width), u64::from(picture.height));
-    check_size(name, width, height, 16)?;
-    let find = |wanted: &str| {
-        picture.channel(wanted).or_else(|| {
-            picture.channels.iter().find(|(n, _)| layer_and_part(n).1 == wanted).map(|(_, values)| values.as_slice())
-        })
+    let (width, height) = (image.width, image.height);
+    check_size(name, u64::from(width), u64::from(height), 16)?;
+    // All of the data is the texture, whatever part of it is to be shown: so pbrt and Mitsuba take it.
+    image.display_window = Window { origin: image.data_window_origin, width, height };
+    image.is_display_window_left_out = false;
+    let mut notes = Vec::new();
+    let mut channels: Vec<&mut [f32]> = image.channels.iter_mut().map(|(_, values)| values.as_mut_slice()).collect();
+    make_finite(&mut channels, &mut notes);
+    add_missing_primaries(&mut image, &mut notes);
+
+    let coloured = if values == Values::Colours { image.scene_picture(channel) } else { None };
+    let rgb = match coloured {
+        Some(picture) => {
+            notes.extend(picture.notes);
+            picture.rgb
+        }
+        None => plain_rgb(&image)
+            .ok_or_else(|| LoadError::unsupported(name, "the picture has neither a channel R nor a channel Y"))?,
     };
-    let (Some(red), alpha) = (find("R").or_else(|| find("Y")), find("A")) else {
-        return Err(LoadError::unsupported(name, "the picture has neither a channel R nor a channel Y"));
+    let alpha = channel(&image, "A");
+    let texel = |(i, [r, g, b]): (usize, [f32; 3])| [r, g, b, alpha.map_or(1.0, |alpha| alpha[i])];
+    let texels = Texels::Floats(Arc::new(rgb.into_iter().enumerate().map(texel).collect()));
+    Ok(Decoded { width, height, texels, notes })
+}
+
+/// The channels of an EXR file that a texture is made of: R, G, B and A of any layer, else luminance, chroma and CIE XYZ.
+fn used_channels(all: &[String]) -> Vec<String> {
+    let of_any_layer = |parts: &[&str]| -> Vec<String> {
+        all.iter().filter(|name| parts.contains(&layer_and_part(name).1)).cloned().collect()
     };
-    let (green, blue) = (find("G").unwrap_or(red), find("B").unwrap_or(red));
-    let texels =
-        (0..red.len()).map(|i| [red[i], green[i], blue[i], alpha.map_or(1.0, |a| a[i])].map(finite_or_zero)).collect();
-    Ok(Decoded { width: picture.width, height: picture.height, texels: Texels::Floats(Arc::new(texels)) })
+    match all.iter().any(|name| layer_and_part(name).1 == "R") {
+        true => of_any_layer(&["R", "G", "B", "A"]),
+        false => of_any_layer(&["Y", "RY", "BY", "X", "Z", "A"]),
+    }
+}
+
+/// A channel by its last name, that of the layer without a name before others.
+fn channel<'a>(image: &'a ExrImage, wanted: &str) -> Option<&'a [f32]> {
+    image.channel(wanted).or_else(|| {
+        image.channels.iter().find(|(name, _)| layer_and_part(name).1 == wanted).map(|(_, values)| values.as_slice())
+    })
+}
+
+/// A picture of R and one of G and B has none of the third; R alone is grey.
+fn add_missing_primaries(image: &mut ExrImage, notes: &mut Vec<String>) {
+    let has = |name| channel(image, name).is_some();
+    let missing = match ["R", "G", "B"].map(has) {
+        [true, true, false] => "B",
+        [true, false, true] => "G",
+        _ => return,
+    };
+    notes.push(format!("no channel {missing}: it is taken as 0"));
+    let nothing = vec![0.0; image.width as usize * image.height as usize];
+    image.channels.push((missing.to_owned(), nothing));
+}
+
+/// R, G and B as they stand; the only channel as grey.
+fn plain_rgb(image: &ExrImage) -> Option<Vec<[f32; 3]>> {
+    let red = channel(image, "R").or_else(|| channel(image, "Y"))?;
+    let (green, blue) = (channel(image, "G").unwrap_or(red), channel(image, "B").unwrap_or(red));
+    Some((0..red.len()).map(|i| [red[i], green[i], blue[i]]).collect())
 }
 
 fn check_size(name: &Path, width: u64, height: u64, bytes_per_texel: u64) -> Result<(), LoadError> {
@@ -189,7 +256,22 @@ fn check_size(name: &Path, width: u64, height: u64, bytes_per_texel: u64) -> Res
     Ok(())
 }
 
-/// A picture's value as radiance: NaN and infinities would poison every path that meets them.
-fn finite_or_zero(value: f32) -> f32 {
-    if value.is_finite() { value } else { 0.0 }
+/// Replaces what would poison every path that meets it: infinity, where files of halves clip a sun, becomes the largest value of
+/// the picture or of a half, what is no light at all (NaN, −∞) nothing.
+fn make_finite(channels: &mut [&mut [f32]], notes: &mut Vec<String>) {
+    let (mut replaced, mut largest) = (0_u64, LARGEST_HALF);
+    for &value in channels.iter().flat_map(|channel| channel.iter()) {
+        match value.is_finite() {
+            true => largest = largest.max(value),
+            false => replaced += 1,
+        }
+    }
+    if replaced == 0 {
+        return;
+    }
+    let not_finite = |value: &&mut f32| !value.is_finite();
+    for value in channels.iter_mut().flat_map(|channel| channel.iter_mut()).filter(not_finite) {
+        *value = if *value == f32::INFINITY { largest } else { 0.0 };
+    }
+    notes.push(format!("{replaced} values that are not finite were replaced: infinity by {largest}, others by 0"));
 }

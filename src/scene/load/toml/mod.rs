@@ -101,7 +101,8 @@ fn read(path: &Path, options: &LoadOptions) -> Result<(Builder, IfDark), LoadErr
     let mut context =
         Context { folder, textures: HashMap::new(), texture_names: Vec::new(), shutter, builder, has_flat_lamp: false };
     if let Some(surroundings) = root.get("environment") {
-        let surroundings = surroundings::read(&surroundings, folder, context.builder.nits_per_unit)?;
+        let surroundings =
+            surroundings::read(&surroundings, folder, context.builder.nits_per_unit, &mut context.builder.notes)?;
         context.builder.environment = Some(surroundings.environment);
         context.builder.lights.extend(surroundings.sun);
     }

@@ -68,7 +68,7 @@ pub(in crate::scene::load) fn apply(path: &Path, options: &LoadOptions, scene: &
             scene.camera = camera::read(&value, Shutter { opens: options.frame_time, stays_open })?;
         }
         if let Some(value) = root.get("environment") {
-            let surroundings = surroundings::read(&value, folder, scene.nits_per_unit)?;
+            let surroundings = surroundings::read(&value, folder, scene.nits_per_unit, &mut scene.notes)?;
             scene.surround(surroundings.environment, surroundings.sun);
         }
         if let Some(list) = root.get("lights") {

@@ -14,8 +14,13 @@ pub(super) struct Surroundings {
     pub(super) sun: Option<Light>,
 }
 
-/// Reads the environment; `nits_per_unit` turns cd/m² into scene units.
-pub(super) fn read(value: &Value, folder: &Path, nits_per_unit: f64) -> Result<Surroundings, LoadError> {
+/// Reads the environment; `nits_per_unit` turns cd/m² into scene units, `notes` gets what was done to a picture's values.
+pub(super) fn read(
+    value: &Value,
+    folder: &Path,
+    nits_per_unit: f64,
+    notes: &mut Vec<String>,
+) -> Result<Surroundings, LoadError> {
     let known = ["image", "radiance", "luminance_cd_m2", "color", "sky", "parametrisation", "scale", "rotation_deg"];
     let fields = value.fields(&known)?;
     let scale = fields.get_or("scale", 1.0, Value::non_negative)? as f32;
@@ -44,7 +49,7 @@ pub(super) fn read(value: &Value, folder: &Path, nits_per_unit: f64) -> Result<S
             let kinds = [("lat-long", Parametrisation::LatLong), ("equal-area", Parametrisation::EqualArea)];
             let parametrisation =
                 fields.get_or("parametrisation", Parametrisation::LatLong, |value| value.choice(&kinds))?;
-            environment::read(&folder.join(source.string()?), parametrisation)
+            environment::read(&folder.join(source.string()?), parametrisation, notes)
                 .map_err(|error| error.referenced_from(source.place()))?
         }
         "radiance" => Environment::constant(source.color()?),

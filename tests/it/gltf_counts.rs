@@ -1,0 +1,145 @@
+//! Attributes of glTF that do not fit their meshes: "all attribute accessors for a given primitive MUST have the same count" (2.0, 3.7.2.1).
+
+use fechner::scene::Scene;
+use fechner::scene::load::{LoadOptions, load};
+use serde_json::{Value, json};
+
+/// A file of a square of four vertices, its document and its bytes.
+struct File {
+    document: Value,
+    bytes: Vec<u8>,
+}
+
+impl File {
+    fn new() -> Self {
+        let document = json!({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1]}],
+            "nodes": [{"mesh": 0}, {}], "meshes": [{"name": "square", "primitives": [{"attributes": {}}]}],
+            "accessors": [], "bufferViews": [], "buffers": [{"uri": "a.bin"}]});
+        let mut file = Self { document, bytes: Vec::new() };
+        file.attribute("POSITION", &[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]);
+        file.document["meshes"][0]["primitives"][0]["mode"] = json!(5);
+        file
+    }
+
+    /// The number of a new accessor.
+    fn add<const N: usize>(&mut self, values: &[[f32; N]]) -> usize {
+        let kind = ["", "SCALAR", "VEC2", "VEC3", "VEC4", "MAT4"][if N == 16 { 5 } else { N }];
+        let view = json!({"buffer": 0, "byteOffset": self.bytes.len(), "byteLength": 4 * N * values.len()});
+        self.bytes.extend(values.as_flattened().iter().flat_map(|value| value.to_le_bytes()));
+        let views = self.document["bufferViews"].as_array_mut().unwrap();
+        views.push(view);
+        let number = views.len() - 1;
+        let mut accessor = json!({"bufferView": number, "componentType": 5126, "count": values.len(), "type": kind});
+        if N == 3 {
+            (accessor["min"], accessor["max"]) = (json!([0, 0, 0]), json!([1, 1, 1]));
+        }
+        self.document["accessors"].as_array_mut().unwrap().push(accessor);
+        number
+    }
+
+    fn attribute<const N: usize>(&mut self, name: &str, values: &[[f32; N]]) {
+        let accessor = self.add(values);
+        self.document["meshes"][0]["primitives"][0]["attributes"][name] = json!(accessor);
+    }
+
+    /// Hangs every vertex on a joint of a skin of one.
+    fn skin(&mut self, joint: f32, weights: usize) {
+        let accessor = self.add(&[[joint; 4]; 4]);
+        // Whole numbers of 16 bits.
+        let start = self.document["bufferViews"][accessor]["byteOffset"].as_u64().unwrap() as usize;
+        self.bytes.truncate(start);
+        self.bytes.extend([joint as u16; 32].iter().flat_map(|joint| joint.to_le_bytes()));
+        self.document["accessors"][accessor]["componentType"] = json!(5123);
+        self.document["meshes"][0]["primitives"][0]["attributes"]["JOINTS_0"] = json!(accessor);
+        self.attribute("WEIGHTS_0", &vec![[1.0, 0.0, 0.0, 0.0]; weights]);
+        self.document["skins"] = json!([{"joints": [1]}]);
+        self.document["nodes"][0]["skin"] = json!(0);
+    }
+
+    fn load(mut self) -> Result<Scene, String> {
+        let folder = tempfile::tempdir().unwrap();
+        self.document["buffers"][0]["byteLength"] = json!(self.bytes.len());
+        std::fs::write(folder.path().join("a.bin"), &self.bytes).unwrap();
+        let path = folder.path().join("a.gltf");
+        std::fs::write(&path, self.document.to_string()).unwrap();
+        load(&path, &LoadOptions::default()).map_err(|error| error.to_string())
+    }
+}
+
+/// They were left out without a word, or moved some of the vertices.
+#[test]
+fn attributes_of_another_length_are_refused() {
+    type Change<'a> = &'a dyn Fn(&mut File);
+    let changed = |change: Change| {
+        let mut file = File::new();
+        change(&mut file);
+        file.load()
+    };
+    assert!(changed(&|_| ()).is_ok() && changed(&|file| file.skin(0.0, 4)).is_ok());
+    let morph = |file: &mut File, name: &str| {
+        let accessor = file.add(&[[0.5; 3]; 2]);
+        file.document["meshes"][0]["primitives"][0]["targets"] = json!([{ name: accessor }]);
+        file.document["meshes"][0]["weights"] = json!([1.0]);
+    };
+    let normals = |file: &mut File, count| file.attribute("NORMAL", &vec![[0.0, 0.0, 1.0]; count]);
+    let cases: [(Change, &str); 10] = [
+        (
+            &|file| file.attribute("TEXCOORD_0", &[[0.0; 2]; 3]),
+            "TEXCOORD_0 of \"square\" has 3 elements, but the mesh has 4",
+        ),
+        (&|file| file.attribute("COLOR_0", &[[1.0; 3]; 2]), "COLOR_0 of \"square\" has 2 elements, but"),
+        (&|file| file.attribute("COLOR_0", &[[1.0; 4]; 2]), "COLOR_0 of \"square\" has 2 elements, but"),
+        (&|file| normals(file, 2), "NORMAL of \"square\" has 2 elements, but"),
+        (
+            &|file| {
+                normals(file, 4);
+                file.attribute("TANGENT", &[[1.0; 4]; 5]);
+            },
+            "TANGENT of \"square\" has 5 elements, but",
+        ),
+        (&|file| morph(file, "POSITION"), "a morph target's POSITION of \"square\" has 2 elements, but"),
+        (
+            &|file| {
+                normals(file, 4);
+                morph(file, "NORMAL");
+            },
+            "a morph target's NORMAL of \"square\" has 2 elements, but",
+        ),
+        (&|file| file.skin(0.0, 3), "WEIGHTS_0 of \"square\" has 3 elements, but"),
+        (&|file| file.skin(9.0, 4), "\"square\": vertex 0 hangs on joint 9, but its skin has 1 joints"),
+        (
+            &|file| {
+                file.skin(0.0, 4);
+                let accessor = file.add::<16>(&[]);
+                file.document["skins"][0]["inverseBindMatrices"] = json!(accessor);
+            },
+            "1 joints, but 0 inverse bind matrices",
+        ),
+    ];
+    for (change, expected) in cases {
+        let error = changed(change).expect_err(expected);
+        assert!(error.contains(expected), "{error}\n  {expected}");
+    }
+}
+
+/// The image is there, but only through an extension that is not read.
+#[test]
+fn a_texture_of_an_extension_alone_is_named_as_such() {
+    let mut file = File::new();
+    file.document["materials"] = json!([{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]);
+    file.document["meshes"][0]["primitives"][0]["material"] = json!(0);
+    file.document["textures"] = json!([{"extensions": {"EXT_texture_webp": {"source": 0}}}]);
+    file.document["images"] = json!([{"uri": "a.webp"}]);
+    let scene = file.load().unwrap();
+    let expected = "Texture 0: its image is that of EXT_texture_webp alone, which is not read; left out.";
+    assert!(scene.notes.iter().any(|note| note == expected), "{:?}", scene.notes);
+}
+
+/// Only the first of them was named.
+#[test]
+fn every_hidden_node_is_named_where_nothing_is_left() {
+    let mut file = File::new();
+    file.document["nodes"] = json!([{"mesh": 0, "scale": [0, 0, 0]}, {"mesh": 0, "scale": [0, 0, 0]}]);
+    let error = file.load().unwrap_err();
+    assert!(error.contains("\"node 0\" is left out") && error.contains("\"node 1\" is left out"), "{error}");
+}

@@ -1,0 +1,112 @@
+//! What the values of EXR pictures come to, as textures and as surroundings.
+
+use exr::image::{AnyChannel, AnyChannels, FlatSamples, Image};
+use exr::meta::attribute::Chromaticities;
+use exr::prelude::{Vec2 as Pair, WritableImage};
+use fechner::scene::load::{LoadOptions, load};
+use fechner::scene::{Scene, Surface};
+use glam::{Vec2, Vec3};
+use std::path::Path;
+
+/// Rec. ITU-R BT.2020-2, table 3.
+const REC2020: Chromaticities = Chromaticities {
+    red: Pair(0.708, 0.292),
+    green: Pair(0.170, 0.797),
+    blue: Pair(0.131, 0.046),
+    white: Pair(0.3127, 0.3290),
+};
+
+/// Writes a picture of 2 × 2 pixels.
+fn write(path: &Path, channels: &[(&str, [f32; 4])], chromaticities: Option<Chromaticities>) {
+    let channel = |&(name, values): &(&str, [f32; 4])| AnyChannel::new(name, FlatSamples::F32(values.to_vec()));
+    let mut image = Image::from_channels((2, 2), AnyChannels::sort(channels.iter().map(channel).collect()));
+    image.attributes.chromaticities = chromaticities;
+    image.write().to_file(path).unwrap();
+}
+
+fn even<'a>(channels: &[(&'a str, f32)]) -> Vec<(&'a str, [f32; 4])> {
+    channels.iter().map(|&(name, value)| (name, [value; 4])).collect()
+}
+
+/// A scene with the picture `p.exr` around it, and a metal of which it is the colour and the roughness.
+fn scene(channels: &[(&str, [f32; 4])], chromaticities: Option<Chromaticities>) -> Scene {
+    let folder = tempfile::tempdir().unwrap();
+    write(&folder.path().join("p.exr"), channels, chromaticities);
+    let path = folder.path().join("s.toml");
+    let text = "[environment]\nimage = \"p.exr\"\n[textures.p]\nfile = \"p.exr\"\n[materials.m]\ntype = \"metal-roughness\"\n\
+                base_color = { texture = \"p\" }\nroughness = { texture = \"p\", channel = \"g\" }\n\
+                [[objects]]\nsphere = { center = [0, 0, 0], radius = 1 }\nmaterial = \"m\"\n";
+    std::fs::write(&path, text).unwrap();
+    load(&path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The surface's colour, its roughness and the radiance of the surroundings.
+fn seen(scene: &Scene) -> (Vec3, f32, Vec3) {
+    let Surface::MetalRoughness(model) = &scene.materials[0].surface else { panic!("a metal-roughness surface") };
+    let middle = Vec2::splat(0.5);
+    let (color, roughness) =
+        (model.base_color.evaluate(&scene.textures, middle), model.roughness.evaluate(&scene.textures, middle));
+    (color, roughness, scene.environment.as_ref().unwrap().radiance(Vec3::Y))
+}
+
+fn notes(scene: &Scene, text: &str) -> usize {
+    scene.notes.iter().filter(|note| note.contains(text)).count()
+}
+
+/// Rec. ITU-R BT.2087-0 has the matrix; what is no colour stays.
+#[test]
+fn colours_of_other_primaries_are_brought_to_rec_709() {
+    let wide = scene(&even(&[("R", 0.3), ("G", 0.5), ("B", 0.2)]), Some(REC2020));
+    let expected = Vec3::new(
+        1.6605 * 0.3 - 0.5876 * 0.5 - 0.0728 * 0.2,
+        -0.1246 * 0.3 + 1.1329 * 0.5 - 0.0083 * 0.2,
+        -0.0182 * 0.3 - 0.1006 * 0.5 + 1.1187 * 0.2,
+    );
+    let (color, roughness, around) = seen(&wide);
+    assert!(color.abs_diff_eq(expected, 2e-3) && around.abs_diff_eq(expected, 2e-3), "{color} {around} {expected}");
+    assert!((roughness - 0.5).abs() < 1e-6, "{roughness}");
+    assert_eq!(
+        notes(&wide, "p.exr: colours brought from the file's chromaticities to Rec.709."),
+        2,
+        "{:?}",
+        wide.notes
+    );
+    let plain = scene(&even(&[("R", 0.3), ("G", 0.5), ("B", 0.2)]), None);
+    assert_eq!((seen(&plain).0, notes(&plain, "p.exr")), (Vec3::new(0.3, 0.5, 0.2), 0));
+}
+
+/// RY = (R − Y) / Y; the picture was grey.
+#[test]
+fn luminance_and_chroma_and_xyz_are_colours() {
+    let color = Vec3::new(0.4, 0.3, 0.1);
+    let y = color.dot(Vec3::new(0.2126, 0.7152, 0.0722));
+    let chroma = scene(&even(&[("Y", y), ("RY", color.x / y - 1.0), ("BY", color.z / y - 1.0)]), None);
+    assert!(seen(&chroma).0.abs_diff_eq(color, 1e-3), "{}", seen(&chroma).0);
+    assert!((seen(&chroma).1 - y).abs() < 1e-6, "a roughness from luminance");
+    let xyz = scene(&even(&[("X", 0.2903), ("Y", 0.3068), ("Z", 0.1385)]), None);
+    assert!(seen(&xyz).0.abs_diff_eq(color, 2e-3), "{}", seen(&xyz).0);
+    assert_eq!(seen(&scene(&even(&[("Y", 0.25)]), None)).0, Vec3::splat(0.25));
+    assert_eq!(seen(&scene(&even(&[("beauty.Y", 0.25)]), None)).0, Vec3::splat(0.25));
+}
+
+/// Files of halves clip a sun to infinity: it was black.
+#[test]
+fn infinity_is_the_largest_half_and_what_is_no_number_is_nothing() {
+    let halves = [f32::INFINITY; 4];
+    let sun = scene(&[("R", halves), ("G", [f32::NAN; 4]), ("B", [f32::NEG_INFINITY; 4])], None);
+    let environment = sun.environment.as_ref().unwrap();
+    assert!(environment.texels.iter().all(|texel| *texel == Vec3::new(65_504.0, 0.0, 0.0)), "{:?}", environment.texels);
+    let said = "p.exr: 12 values that are not finite were replaced: infinity by 65504, others by 0.";
+    assert_eq!(notes(&sun, said), 2, "{:?}", sun.notes);
+    // A picture of floats may be brighter than that.
+    let bright = scene(&[("R", [1e6, 1.0, 1.0, f32::INFINITY]), ("G", [0.0; 4]), ("B", [0.0; 4])], None);
+    assert_eq!(bright.environment.as_ref().unwrap().texels.last(), Some(&Vec3::new(1e6, 0.0, 0.0)));
+}
+
+#[test]
+fn a_picture_without_blue_has_none() {
+    let yellow = scene(&even(&[("R", 0.1), ("G", 0.2)]), None);
+    assert_eq!(seen(&yellow), (Vec3::new(0.1, 0.2, 0.0), 0.2, Vec3::new(0.1, 0.2, 0.0)));
+    assert_eq!(notes(&yellow, "no channel B"), 2, "{:?}", yellow.notes);
+    assert_eq!(seen(&scene(&even(&[("R", 0.1)]), None)).0, Vec3::splat(0.1));
+}
