@@ -169,7 +169,7 @@ pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
     for (input, target) in arguments.input.iter().zip(&targets) {
         let frame = SceneFrame::read(input, arguments, &viewing)?;
         let viewing = &frame.viewing;
-        let state = eye.as_mut().map(|eye| eye.look_at(Goal::of(&frame.guide(), viewing.display.pixel_density())));
+        let state = eye.as_mut().map(|eye| eye.look_at(operator.goal(&frame.guide(), viewing.display.pixel_density())));
         let fitted = operator.fit(&frame.guide(), viewing, state.as_ref());
         write(target, format, &frame, fitted.as_ref(), state.as_ref())?;
         answer!("{}: {}", target.display(), fitted.describe());
