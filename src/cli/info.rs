@@ -5,9 +5,11 @@ mod film;
 use anyhow::{Context, bail};
 use fechner::checkpoint::{is_checkpoint, read_checkpoint};
 use fechner::exr_read::{ExrImage, MEMORY_LIMIT_BYTES, SampleType, read_exr_channels};
+use fechner::hdr_read::with_known_header;
+use fechner::jpeg_read;
 use image::ImageDecoder;
 use std::fmt::Write as _;
-use std::io::Read as _;
+use std::io::{Cursor, Read as _};
 use std::path::Path;
 
 /// Prints what is in a picture file: size, channels with their range, attributes, colour tags.
@@ -226,8 +228,9 @@ fn describe_png(path: &Path) -> anyhow::Result<String> {
 
 fn describe_hdr(path: &Path) -> anyhow::Result<String> {
     let problem = || format!("cannot read {}: damaged or no Radiance file", path.display());
-    let file = std::fs::File::open(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let mut decoder = image::codecs::hdr::HdrDecoder::new(std::io::BufReader::new(file)).with_context(problem)?;
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let mut decoder =
+        image::codecs::hdr::HdrDecoder::new(Cursor::new(with_known_header(&bytes))).with_context(problem)?;
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(1 << 30);
     decoder.set_limits(limits).with_context(problem)?;

@@ -4,7 +4,7 @@ use super::channels::{self, Colour};
 use super::kept_tone::KeptTone;
 use anyhow::{Context, Result, bail};
 use fechner::exr_read::ExrImage;
-use fechner::hdr_read::{HdrHeader, with_known_signature};
+use fechner::hdr_read::{HdrHeader, with_known_header};
 use fechner::jpeg_read;
 use fechner::output::{self, Attribute, NITS_PER_UNIT, PngTransfer};
 use fechner::scene;
@@ -100,7 +100,7 @@ impl InputPicture {
 
     fn from_hdr(path: &Path, nits_per_unit: f64) -> Result<Self> {
         let bytes = std::fs::read(path).with_context(|| format!("{}", path.display()))?;
-        let header = HdrHeader::of(&with_known_signature(&bytes));
+        let header = HdrHeader::of(&with_known_header(&bytes));
         let mut picture = Self::from_image(decoded_image(path, &bytes)?, Content::Scene { nits_per_unit });
         picture.rgb.iter_mut().for_each(|rgb| *rgb = header.light(*rgb));
         picture.pixel_aspect_ratio = header.pixel_aspect_ratio;
@@ -293,7 +293,7 @@ fn before_black(image: DynamicImage) -> DynamicImage {
 
 /// A picture of a limited size. What its values mean goes by its name, so that its bytes must be what that says.
 fn decoded_image(path: &Path, bytes: &[u8]) -> Result<DynamicImage> {
-    let bytes = &*with_known_signature(bytes);
+    let bytes = &*with_known_header(bytes);
     let named = ImageFormat::from_path(path).with_context(|| format!("{}", path.display()))?;
     let found = image::guess_format(bytes).with_context(|| format!("{}: not a readable picture", path.display()))?;
     if found != named {
