@@ -6,7 +6,7 @@ use anyhow::{Context, Result, bail};
 use fechner::exr_read::ExrImage;
 use fechner::hdr_read::{HdrHeader, with_known_header};
 use fechner::jpeg_read;
-use fechner::output::{self, Attribute, NITS_PER_UNIT, PngTransfer};
+use fechner::output::{self, Attribute, NITS_PER_UNIT, PartOf, PngTransfer};
 use fechner::scene;
 use fechner_perception::Plane;
 use fechner_perception::display::{Display, Eotf, Viewing};
@@ -29,6 +29,10 @@ pub(super) struct InputPicture {
     pixel_aspect_ratio: f64,
     /// How it was shown when it was rendered, where its file says so.
     kept_tone: Option<KeptTone>,
+    /// How much of each pixel it covers, 0 to 1, where an EXR file leaves some of any uncovered. Its values are multiplied by it.
+    alpha: Option<Vec<f32>>,
+    /// Where it lies, if it is a part of a larger picture.
+    part_of: Option<PartOf>,
 }
 
 /// Brings scene light, cd/m², of a picture this wide to linear display RGB.
@@ -95,7 +99,16 @@ impl InputPicture {
             _ => Content::Scene { nits_per_unit },
         };
         let (width, height) = (picture.width as usize, picture.height as usize);
-        Ok(Self { width, height, rgb: picture.rgb, content, pixel_aspect_ratio: exr.pixel_aspect_ratio, kept_tone })
+        Ok(Self {
+            width,
+            height,
+            rgb: picture.rgb,
+            content,
+            pixel_aspect_ratio: exr.pixel_aspect_ratio,
+            kept_tone,
+            alpha: alpha(path, exr),
+            part_of: exr.part_of,
+        })
     }
 
     fn from_hdr(path: &Path, nits_per_unit: f64) -> Result<Self> {
@@ -137,7 +150,7 @@ impl InputPicture {
         let picture = image.into_rgb32f();
         let (width, height) = (picture.width() as usize, picture.height() as usize);
         let rgb = picture.pixels().map(|p| p.0).collect();
-        Self { width, height, rgb, content, pixel_aspect_ratio: 1.0, kept_tone: None }
+        Self { width, height, rgb, content, pixel_aspect_ratio: 1.0, kept_tone: None, alpha: None, part_of: None }
     }
 
     /// The viewing of this picture, whose pixels may be oblong: its lines are as dense as the display's and its columns closer
@@ -153,6 +166,16 @@ impl InputPicture {
     /// Width of a pixel over its height.
     pub(super) fn pixel_aspect_ratio(&self) -> f64 {
         self.pixel_aspect_ratio
+    }
+
+    /// How much of each pixel it covers, 0 to 1; `None` where it covers all of all.
+    pub(super) fn alpha(&self) -> Option<&[f32]> {
+        self.alpha.as_deref()
+    }
+
+    /// Where it lies, if it is a part of a larger picture.
+    pub(super) fn part_of(&self) -> Option<PartOf> {
+        self.part_of
     }
 
     /// Luminance of the values as the file has them.
@@ -315,6 +338,17 @@ fn decoded_image(path: &Path, bytes: &[u8]) -> Result<DynamicImage> {
 fn words_of(format: ImageFormat) -> String {
     let endings = format.extensions_str().first();
     endings.map_or_else(|| format!("{format:?}"), |ending| format!(".{ending}"))
+}
+
+/// How much of each pixel an EXR picture covers; `None` where that is all of all of them.
+fn alpha(path: &Path, exr: &ExrImage) -> Option<Vec<f32>> {
+    // `max` takes 0 for what is no number.
+    let alpha = exr.in_display_window(channels::alpha(exr)?.iter().map(|a| a.max(0.0).min(1.0)).collect());
+    if alpha.iter().all(|&a| a == 0.0) {
+        note(path, "its alpha is 0 all over, and is not looked at");
+        return None;
+    }
+    alpha.iter().any(|&a| a < 1.0).then_some(alpha)
 }
 
 /// A channel of the file's picture by its last name, all three from one layer.
