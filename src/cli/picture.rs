@@ -124,7 +124,7 @@ impl InputPicture {
         let bytes = std::fs::read(path).with_context(|| format!("{}", path.display()))?;
         let mut image = decoded_image(path, &bytes)?;
         let colour = output::png_colour(&bytes);
-        for text in &colour.notes {
+        for text in colour.notes.iter().chain(&jpeg_read::notes(&bytes)) {
             note(path, text);
         }
         let of = |primaries: Primaries| colour.primaries.unwrap_or(primaries);
