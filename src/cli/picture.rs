@@ -342,8 +342,8 @@ fn words_of(format: ImageFormat) -> String {
 
 /// How much of each pixel an EXR picture covers; `None` where that is all of all of them.
 fn alpha(path: &Path, exr: &ExrImage) -> Option<Vec<f32>> {
-    // `max` takes 0 for what is no number.
-    let alpha = exr.in_display_window(channels::alpha(exr)?.iter().map(|a| a.max(0.0).min(1.0)).collect());
+    let covered = |&alpha: &f32| if alpha.is_nan() { 0.0 } else { alpha.clamp(0.0, 1.0) };
+    let alpha = exr.in_display_window(channels::alpha(exr)?.iter().map(covered).collect());
     if alpha.iter().all(|&a| a == 0.0) {
         note(path, "its alpha is 0 all over, and is not looked at");
         return None;
