@@ -3,7 +3,7 @@
 //! The header is read first and its claims are checked against the file's length and a limit on memory; only then are
 //! pixels read. The `exr` crate alone believes the header and asks for as much memory as it says, which ends the program.
 
-use crate::output::{Attribute, CROP, FRAMES_PER_SECOND};
+use crate::output::{Attribute, CROP, FRAMES_PER_SECOND, PartOf};
 use ::exr::image::read::any_channels::ReadAnyChannels;
 use ::exr::meta::attribute::{AttributeValue, Text};
 use ::exr::meta::header::Header;
@@ -56,6 +56,8 @@ pub struct ExrImage {
     /// What is to be shown; may be smaller or larger than the data. Of a part that this renderer wrote ([`CROP`]) it is the data: the
     /// file's own display window is that of the whole picture, most of which is not there.
     pub display_window: Window,
+    /// Its place in the whole, where this renderer wrote it as a part.
+    pub part_of: Option<PartOf>,
     /// Whether the file's display window has no pixels or too many for memory, and the data window stands for it.
     pub is_display_window_left_out: bool,
     /// Width of a pixel over its height; 1 where the file's is none that a pixel can have (0.01 to 100).
@@ -272,6 +274,7 @@ fn image_without_channels(first: &Header) -> ExrImage {
         attributes: attributes(first),
         parts_left_out: Vec::new(),
         lines_left_out: 0,
+        part_of: if is_part { part_of(first) } else { None },
         is_display_window_left_out: !is_sound && !is_part,
         display_window: if is_sound && !is_part {
             let origin = (window.position.0, window.position.1);
@@ -289,6 +292,17 @@ fn image_without_channels(first: &Header) -> ExrImage {
             white: point(c.white),
         }),
     }
+}
+
+/// The place of a part in a whole that begins at (0, 0); `None` where it does not lie within it.
+fn part_of(header: &Header) -> Option<PartOf> {
+    let window = header.shared_attributes.display_window;
+    let Vec2(x, y) = header.own_attributes.layer_position;
+    let origin = [u32::try_from(x).ok()?, u32::try_from(y).ok()?];
+    let whole = [u32::try_from(window.size.0).ok()?, u32::try_from(window.size.1).ok()?];
+    let size = [header.layer_size.0, header.layer_size.1];
+    let is_within = (0..2).all(|side| origin[side] as usize + size[side] <= whole[side] as usize);
+    (window.position == Vec2(0, 0) && is_within).then_some(PartOf { origin, whole })
 }
 
 /// Width and height of the picture of a file that is in memory.

@@ -62,19 +62,54 @@ fn primaries(metadata: &HdrMetadata) -> Option<Primaries> {
     (!own.is_like(&Primaries::REC709)).then_some(own)
 }
 
-/// The file with the signature that decoders look for: some programs write `#?RGBE`.
-pub fn with_known_signature(bytes: &[u8]) -> Cow<'_, [u8]> {
-    match bytes.strip_prefix(b"#?RGBE") {
-        Some(rest) if rest.first().is_some_and(|byte| byte.is_ascii_whitespace()) => {
-            Cow::Owned([b"#?RADIANCE", rest].concat())
-        }
-        _ => Cow::Borrowed(bytes),
+/// The file as decoders know it: with the signature that they look for, where some programs write `#?RGBE`, and without the header's
+/// indented lines. Those are the headers of the pictures that it was made from, as `pcomb` and `pcompos` keep them; what they say was
+/// done to other pixels. Radiance takes variables at a line's start alone, the decoder's trims what stands before them.
+pub fn with_known_header(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let Some(header_bytes) = header_bytes(bytes) else { return Cow::Borrowed(bytes) };
+    let (header, pixels) = bytes.split_at(header_bytes);
+    let is_own = |line: &&[u8]| !matches!(line, [b' ' | b'\t', ..]);
+    let is_rgbe = header.strip_prefix(b"#?RGBE").is_some_and(|rest| rest.first().is_some_and(u8::is_ascii_whitespace));
+    let lines = || header.split_inclusive(|&byte| byte == b'\n');
+    if !is_rgbe && lines().all(|line| is_own(&line)) {
+        return Cow::Borrowed(bytes);
     }
+    let mut known = Vec::with_capacity(bytes.len() + 4);
+    for line in lines().filter(is_own) {
+        match line.strip_prefix(b"#?RGBE") {
+            Some(rest) if is_rgbe && known.is_empty() => known.extend([b"#?RADIANCE", rest].concat()),
+            _ => known.extend_from_slice(line),
+        }
+    }
+    known.extend_from_slice(pixels);
+    Cow::Owned(known)
+}
+
+/// Length of a Radiance picture's header with the empty line that ends it.
+fn header_bytes(bytes: &[u8]) -> Option<usize> {
+    let end = || bytes.windows(2).position(|pair| pair == b"\n\n");
+    bytes.starts_with(b"#?").then(end).flatten().map(|end| end + 2)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A picture that `pcomb` made of one that had been brightened: its own pixels are as bright as they are.
+    #[test]
+    fn lines_of_what_it_was_made_from_say_nothing_of_it() {
+        let picture = |header: &str| [header.as_bytes(), b"\n\n-Y 1 +X 1\n\x80\x80\n\n"].concat();
+        let light = |header: &str| HdrHeader::of(&with_known_header(&picture(header))).light([1.0; 3]);
+        let own = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\nEXPOSURE=4";
+        let made = "#?RADIANCE\na.hdr:\n\t#?RADIANCE\n\tFORMAT=32-bit_rle_xyze\n\tEXPOSURE=2.0\n  COLORCORR=2 2 2\n\
+                    pcomb a.hdr\nFORMAT=32-bit_rle_rgbe\nEXPOSURE=4";
+        assert_eq!((light(own), light(made)), ([0.25; 3], [0.25; 3]));
+        assert_eq!(with_known_header(&picture(own)), Cow::Borrowed(&picture(own)[..]));
+        let of_other_name = own.replace("RADIANCE", "RGBE");
+        assert_eq!(*with_known_header(&picture(&of_other_name)), picture(own));
+        assert_eq!(*with_known_header(b"#?RGBE"), *b"#?RGBE");
+        assert_eq!(*with_known_header(b"words\n\n\tmore"), *b"words\n\n\tmore");
+    }
 
     #[test]
     fn factors_of_all_lines_are_divided_by() {

@@ -25,7 +25,7 @@ pub struct TrackFrame {
     pub frame: u32,
     /// The scene that it was made from.
     pub scene: ContentHash,
-    /// Mean luminance of the view, cd/m².
+    /// Mean luminance of the view as the operator takes it, cd/m².
     pub goal: Goal,
     /// What the eye is adapted to, for operators that ask.
     pub eye: Option<AdaptationState>,
@@ -62,7 +62,7 @@ impl Track {
             looks.push((hash, Look::at(scene, shot, operator)));
             say(looks.len());
         }
-        let goals: Vec<Goal> = looks.iter().map(|(_, look)| look.goal(shot)).collect();
+        let goals: Vec<Goal> = looks.iter().map(|(_, look)| look.goal(shot, operator)).collect();
         let fits: Vec<(Option<AdaptationState>, SavedTone)> = if operator.sees_adaptation() {
             let eyes = eyes(shot, operator, &goals);
             let fit = |look: &Look, eye: AdaptationState| {
@@ -162,9 +162,9 @@ impl Look {
         Self { light: glimpse(scene, &shot.trace, shot.nits_per_unit, Some(operator)) }
     }
 
-    fn goal(&self, shot: &ShotSettings) -> Goal {
+    fn goal(&self, shot: &ShotSettings, operator: &dyn ToneOperator) -> Goal {
         let scale = self.light.luminance_cd_m2().width() as f64 / f64::from(shot.trace.width);
-        Goal::of(&self.light.guide(), shot.viewing.display.pixel_density().times(scale))
+        operator.goal(&self.light.guide(), shot.viewing.display.pixel_density().times(scale))
     }
 }
 

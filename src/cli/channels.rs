@@ -72,9 +72,9 @@ pub(super) fn read_picture(path: &Path) -> Result<ExrImage> {
         let may_be = |name: &&String| {
             let (layer, part) = layer_and_part(name);
             if picture.as_ref().is_some_and(|picture| picture.name == layer) {
-                ["R", "G", "B"].iter().any(|own| part.eq_ignore_ascii_case(own))
+                ["R", "G", "B", "A"].iter().any(|own| part.eq_ignore_ascii_case(own))
             } else {
-                layer.is_empty() && ["X", "Y", "Z", "RY", "BY"].contains(&part)
+                layer.is_empty() && ["X", "Y", "Z", "RY", "BY", "A"].contains(&part)
             }
         };
         all.iter().filter(may_be).cloned().collect()
@@ -116,6 +116,12 @@ pub(super) fn colour<'a>(exr: &'a ExrImage) -> Option<Colour<'a>> {
         return None;
     };
     Some(Colour::Rgb([r, g, b]))
+}
+
+/// How much of each pixel the picture covers: `A` of its layer.
+pub(super) fn alpha(exr: &ExrImage) -> Option<&[f32]> {
+    let layer = picture_layer(&names(exr)).map_or("", |layer| layer.name);
+    part_of(exr, layer, "A")
 }
 
 /// Names of layers that hold motion from this frame to the next, the surest first.
@@ -223,6 +229,7 @@ mod tests {
             height: 1,
             data_window_origin: (0, 0),
             display_window: Window { origin: (0, 0), width: 1, height: 1 },
+            part_of: None,
             is_display_window_left_out: false,
             chromaticities: None,
             pixel_aspect_ratio: 1.0,
@@ -274,6 +281,15 @@ mod tests {
         assert_eq!(guess(&exr(&two)).as_deref(), Some("the layer a is taken for the picture, of a, b"));
         assert_eq!(colour(&exr(&["Y"])), Some(Colour::Grey(&[0.0])));
         assert_eq!(colour(&exr(&["Z"])), None);
+    }
+
+    #[test]
+    fn alpha_is_of_the_pictures_layer() {
+        let of = |names: &[&str]| alpha(&exr(names)).map(|values| values[0]);
+        assert_eq!(of(&["A", "B", "G", "R"]), Some(0.0));
+        assert_eq!(of(&["A", "Y"]), Some(0.0));
+        assert_eq!(of(&["V.Combined.A", "V.Combined.B", "V.Combined.G", "V.Combined.R", "id.A"]), Some(0.0));
+        assert_eq!(of(&["B", "G", "R", "id.A"]), None);
     }
 
     #[test]

@@ -5,9 +5,11 @@ mod film;
 use anyhow::{Context, bail};
 use fechner::checkpoint::{is_checkpoint, read_checkpoint};
 use fechner::exr_read::{ExrImage, MEMORY_LIMIT_BYTES, SampleType, read_exr_channels};
+use fechner::hdr_read::with_known_header;
+use fechner::jpeg_read;
 use image::ImageDecoder;
 use std::fmt::Write as _;
-use std::io::Read as _;
+use std::io::{Cursor, Read as _};
 use std::path::Path;
 
 /// Prints what is in a picture file: size, channels with their range, attributes, colour tags.
@@ -26,7 +28,8 @@ fn describe(path: &Path) -> anyhow::Result<String> {
         Some("exr") => describe_exr(path),
         Some("png") => describe_png(path),
         Some("hdr") => describe_hdr(path),
-        _ => bail!("cannot tell what {} is: .exr, .png and .hdr files and films are known", path.display()),
+        Some("jpg" | "jpeg") => describe_jpeg(path),
+        _ => bail!("cannot tell what {} is: .exr, .png, .hdr and .jpg files and films are known", path.display()),
     }
 }
 
@@ -224,10 +227,26 @@ fn describe_png(path: &Path) -> anyhow::Result<String> {
     Ok(text)
 }
 
+fn describe_jpeg(path: &Path) -> anyhow::Result<String> {
+    let problem = || format!("cannot read {}: damaged or no JPEG file", path.display());
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let decoder = image::codecs::jpeg::JpegDecoder::new(Cursor::new(&bytes[..])).with_context(problem)?;
+    let (width, height) = decoder.dimensions();
+    let mut text = format!("JPEG, {width}×{height} pixels, {:?}\n", decoder.color_type());
+    if !jpeg_read::has_end(&bytes) {
+        let _ = writeln!(text, "{}", jpeg_read::CUT_OFF);
+    }
+    for note in jpeg_read::notes(&bytes) {
+        let _ = writeln!(text, "{note}");
+    }
+    Ok(text)
+}
+
 fn describe_hdr(path: &Path) -> anyhow::Result<String> {
     let problem = || format!("cannot read {}: damaged or no Radiance file", path.display());
-    let file = std::fs::File::open(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let mut decoder = image::codecs::hdr::HdrDecoder::new(std::io::BufReader::new(file)).with_context(problem)?;
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let mut decoder =
+        image::codecs::hdr::HdrDecoder::new(Cursor::new(with_known_header(&bytes))).with_context(problem)?;
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(1 << 30);
     decoder.set_limits(limits).with_context(problem)?;
@@ -327,8 +346,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let message = |name: &str| format!("{:#}", describe(&folder.path().join(name)).unwrap_err());
         std::fs::write(folder.path().join("a.txt"), "words").unwrap();
-        assert!(message("a.txt").contains(".exr, .png and .hdr files and films are known"));
-        for name in ["a.png", "a.hdr", "a.exr"] {
+        assert!(message("a.txt").contains(".exr, .png, .hdr and .jpg files and films are known"));
+        for name in ["a.png", "a.hdr", "a.exr", "a.jpg"] {
             assert!(message(name).contains(name), "{}", message(name));
             std::fs::write(folder.path().join(name), "rubbish").unwrap();
             assert!(message(name).contains("damaged or no"), "{}", message(name));

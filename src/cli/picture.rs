@@ -4,9 +4,9 @@ use super::channels::{self, Colour};
 use super::kept_tone::{self, KeptTone};
 use anyhow::{Context, Result, bail};
 use fechner::exr_read::ExrImage;
-use fechner::hdr_read::{HdrHeader, with_known_signature};
+use fechner::hdr_read::{HdrHeader, with_known_header};
 use fechner::jpeg_read;
-use fechner::output::{self, Attribute, NITS_PER_UNIT, PngTransfer};
+use fechner::output::{self, Attribute, NITS_PER_UNIT, PartOf, PngTransfer};
 use fechner::scene;
 use fechner_perception::Plane;
 use fechner_perception::display::{Display, Eotf, Viewing};
@@ -31,6 +31,10 @@ pub(super) struct InputPicture {
     made_for: Option<Display>,
     /// How it was shown when it was rendered, where its file says so.
     kept_tone: Option<KeptTone>,
+    /// How much of each pixel it covers, 0 to 1, where an EXR file leaves some of any uncovered. Its values are multiplied by it.
+    alpha: Option<Vec<f32>>,
+    /// Where it lies, if it is a part of a larger picture.
+    part_of: Option<PartOf>,
 }
 
 /// Brings scene light, cd/m², of a picture this wide to linear display RGB.
@@ -97,14 +101,22 @@ impl InputPicture {
             _ => Content::Scene { nits_per_unit },
         };
         let (width, height) = (picture.width as usize, picture.height as usize);
-        let made_for = kept_tone::display_in(exr);
-        let pixel_aspect_ratio = exr.pixel_aspect_ratio;
-        Ok(Self { width, height, rgb: picture.rgb, content, pixel_aspect_ratio, made_for, kept_tone })
+        Ok(Self {
+            width,
+            height,
+            rgb: picture.rgb,
+            content,
+            pixel_aspect_ratio: exr.pixel_aspect_ratio,
+            made_for: kept_tone::display_in(exr),
+            kept_tone,
+            alpha: alpha(path, exr),
+            part_of: exr.part_of,
+        })
     }
 
     fn from_hdr(path: &Path, nits_per_unit: f64) -> Result<Self> {
         let bytes = std::fs::read(path).with_context(|| format!("{}", path.display()))?;
-        let header = HdrHeader::of(&with_known_signature(&bytes));
+        let header = HdrHeader::of(&with_known_header(&bytes));
         let mut picture = Self::from_image(decoded_image(path, &bytes)?, Content::Scene { nits_per_unit });
         picture.rgb.iter_mut().for_each(|rgb| *rgb = header.light(*rgb));
         picture.pixel_aspect_ratio = header.pixel_aspect_ratio;
@@ -115,7 +127,7 @@ impl InputPicture {
         let bytes = std::fs::read(path).with_context(|| format!("{}", path.display()))?;
         let mut image = decoded_image(path, &bytes)?;
         let colour = output::png_colour(&bytes);
-        for text in &colour.notes {
+        for text in colour.notes.iter().chain(&jpeg_read::notes(&bytes)) {
             note(path, text);
         }
         let of = |primaries: Primaries| colour.primaries.unwrap_or(primaries);
@@ -143,7 +155,17 @@ impl InputPicture {
         let rgb = picture.pixels().map(|p| p.0).collect();
         let is_pq = matches!(content, Content::Display(Codes::Pq(_)));
         let made_for = if is_pq { Display::preset("hdr-1000") } else { None };
-        Self { width, height, rgb, content, pixel_aspect_ratio: 1.0, made_for, kept_tone: None }
+        Self {
+            width,
+            height,
+            rgb,
+            content,
+            pixel_aspect_ratio: 1.0,
+            made_for,
+            kept_tone: None,
+            alpha: None,
+            part_of: None,
+        }
     }
 
     /// The viewing of this picture, whose pixels may be oblong: its lines are as dense as the display's and its columns closer
@@ -159,6 +181,16 @@ impl InputPicture {
     /// Width of a pixel over its height.
     pub(super) fn pixel_aspect_ratio(&self) -> f64 {
         self.pixel_aspect_ratio
+    }
+
+    /// How much of each pixel it covers, 0 to 1; `None` where it covers all of all.
+    pub(super) fn alpha(&self) -> Option<&[f32]> {
+        self.alpha.as_deref()
+    }
+
+    /// Where it lies, if it is a part of a larger picture.
+    pub(super) fn part_of(&self) -> Option<PartOf> {
+        self.part_of
     }
 
     /// Luminance of the values as the file has them.
@@ -306,7 +338,7 @@ fn before_black(image: DynamicImage) -> DynamicImage {
 
 /// A picture of a limited size. What its values mean goes by its name, so that its bytes must be what that says.
 fn decoded_image(path: &Path, bytes: &[u8]) -> Result<DynamicImage> {
-    let bytes = &*with_known_signature(bytes);
+    let bytes = &*with_known_header(bytes);
     let named = ImageFormat::from_path(path).with_context(|| format!("{}", path.display()))?;
     let found = image::guess_format(bytes).with_context(|| format!("{}: not a readable picture", path.display()))?;
     if found != named {
@@ -328,6 +360,17 @@ fn decoded_image(path: &Path, bytes: &[u8]) -> Result<DynamicImage> {
 fn words_of(format: ImageFormat) -> String {
     let endings = format.extensions_str().first();
     endings.map_or_else(|| format!("{format:?}"), |ending| format!(".{ending}"))
+}
+
+/// How much of each pixel an EXR picture covers; `None` where that is all of all of them.
+fn alpha(path: &Path, exr: &ExrImage) -> Option<Vec<f32>> {
+    let covered = |&alpha: &f32| if alpha.is_nan() { 0.0 } else { alpha.clamp(0.0, 1.0) };
+    let alpha = exr.in_display_window(channels::alpha(exr)?.iter().map(covered).collect());
+    if alpha.iter().all(|&a| a == 0.0) {
+        note(path, "its alpha is 0 all over, and is not looked at");
+        return None;
+    }
+    alpha.iter().any(|&a| a < 1.0).then_some(alpha)
 }
 
 /// A channel of the file's picture by its last name, all three from one layer.

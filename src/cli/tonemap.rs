@@ -9,7 +9,7 @@ use super::seeing::{self, DEFAULT_DISPLAY, operator_values_or_all, parse_positiv
 use super::targets::{check_kept, display_file};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
-use fechner::output::{self, Attribute, Format, Picture};
+use fechner::output::{self, Attribute, Format, PartOf, Picture};
 use fechner_perception::tone::{
     self, AdaptationScope, AdaptationState, Effects, FittedTone, Goal, Pixel, SceneGuide, SceneLight, ToneOperator,
     ToneSettings, map_picture,
@@ -102,6 +102,10 @@ pub(super) struct SceneFrame {
     /// The display in its own.
     display: Display,
     pixel_aspect_ratio: f64,
+    /// How much of each pixel is covered, where that is not all: light is multiplied by it.
+    alpha: Option<Vec<f32>>,
+    /// Where it lies, if it is a part of a larger picture.
+    part_of: Option<PartOf>,
 }
 
 impl SceneFrame {
@@ -113,6 +117,7 @@ impl SceneFrame {
         let display = viewing.display.clone();
         let viewing = picture.viewed(viewing).with_context(|| path.display().to_string())?;
         let pixel_aspect_ratio = picture.pixel_aspect_ratio();
+        let (alpha, part_of) = (picture.alpha().map(<[f32]>::to_vec), picture.part_of());
         let (width, height) = picture.size();
         let Some(rgb_cd_m2) = picture.light_cd_m2() else {
             bail!("{}: ready for a display already; .exr and .hdr files hold scenes", path.display());
@@ -122,7 +127,7 @@ impl SceneFrame {
         }
         let light = SceneLight::with_rods(width, &rgb_cd_m2);
         let gaze = arguments.gaze.map(|gaze| gaze.0);
-        Ok(Self { width, rgb_cd_m2, light, gaze, viewing, display, pixel_aspect_ratio })
+        Ok(Self { width, rgb_cd_m2, light, gaze, viewing, display, pixel_aspect_ratio, alpha, part_of })
     }
 
     fn guide(&self) -> SceneGuide<'_> {
@@ -133,8 +138,15 @@ impl SceneFrame {
         self.light.luminance_cd_m2().height()
     }
 
+    /// As it is seen before black.
     fn shown(&self, fitted: &dyn FittedTone) -> Vec<[f32; 3]> {
         map_picture(fitted, self.width, &self.rgb_cd_m2)
+    }
+
+    /// The same of what covers the pixels, with how much of each.
+    fn covered(&self, fitted: &dyn FittedTone) -> Option<(Vec<[f32; 3]>, &[f32])> {
+        let alpha = self.alpha.as_deref()?;
+        Some((output::rendered::shown_where_covered(fitted, self.width, &self.rgb_cd_m2, alpha), alpha))
     }
 }
 
@@ -172,7 +184,7 @@ pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
     for (input, target) in arguments.input.iter().zip(&targets) {
         let frame = SceneFrame::read(input, arguments, &viewing)?;
         let viewing = &frame.viewing;
-        let state = eye.as_mut().map(|eye| eye.look_at(Goal::of(&frame.guide(), viewing.display.pixel_density())));
+        let state = eye.as_mut().map(|eye| eye.look_at(operator.goal(&frame.guide(), viewing.display.pixel_density())));
         let fitted = operator.fit(&frame.guide(), viewing, state.as_ref());
         write(target, format, &frame, fitted.as_ref(), state.as_ref())?;
         answer!("{}: {}", target.display(), fitted.describe());
@@ -393,34 +405,58 @@ fn write(
     fitted: &dyn FittedTone,
     state: Option<&AdaptationState>,
 ) -> Result<()> {
-    let shown = frame.shown(fitted);
-    let viewing = &frame.viewing;
-    let (width, height) = (frame.width as u32, frame.height() as u32);
     match format {
-        Format::Png => output::write_png_for(target, width, height, &shown, &viewing.display)?,
-        Format::Exr => {
-            let mut picture = Picture::new(width, height);
-            let display = &viewing.display;
-            // In units of white what the display emits, its black with it and the room's light without: value × unit is cd/m².
-            let emitted = |relative: f32| (display.emitted_cd_m2(f64::from(relative)) / display.white_cd_m2) as f32;
-            for (channel, name) in ["R", "G", "B"].into_iter().enumerate() {
-                picture.push_f32(name, shown.iter().map(|pixel| emitted(pixel[channel])).collect::<Vec<_>>());
-            }
-            picture.push_attribute(output::NITS_PER_UNIT, Attribute::Float(display.white_cd_m2 as f32));
-            // Readers take text for UTF-8, the writer has Latin-1: only what both have in common is safe.
-            let operator = fitted.describe().replace('²', "2").replace('×', "x");
-            picture.push_attribute("fechner.operator", Attribute::Text(operator));
-            picture.push_attribute(LIGHT, Attribute::Text(OF_DISPLAY.to_owned()));
-            picture.push_attribute("fechner.observer.display", Attribute::Text(viewing.display.name.clone()));
-            picture.push_attribute(output::PIXEL_ASPECT_RATIO, Attribute::Float(frame.pixel_aspect_ratio as f32));
-            picture.attributes.extend(output::display_attribute(&frame.display));
-            picture.attributes.extend(output::tone_attribute(fitted));
-            if let Some(state) = state {
-                let text = serde_json::to_string(state).context("the eye's state could not be put into words")?;
-                picture.push_attribute("fechner.adaptation", Attribute::Text(text));
-            }
-            output::write_exr(target, &picture)?;
-        }
+        Format::Png => write_png(target, frame, fitted),
+        Format::Exr => write_exr(target, frame, fitted, state),
     }
+}
+
+/// With straight alpha where it does not cover all, as a render of a transparent background.
+fn write_png(target: &Path, frame: &SceneFrame, fitted: &dyn FittedTone) -> Result<()> {
+    let (width, height, display) = (frame.width as u32, frame.height() as u32, &frame.viewing.display);
+    match frame.covered(fitted) {
+        Some((shown, alpha)) => output::write_png_with_alpha_for(target, width, height, &shown, alpha, display)?,
+        None => output::write_png_for(target, width, height, &frame.shown(fitted), display)?,
+    }
+    Ok(())
+}
+
+/// In units of white what the display emits, its black with it and the room's light without: value × unit is cd/m².
+fn write_exr(
+    target: &Path,
+    frame: &SceneFrame,
+    fitted: &dyn FittedTone,
+    state: Option<&AdaptationState>,
+) -> Result<()> {
+    let display = &frame.viewing.display;
+    let mut picture = Picture::new(frame.width as u32, frame.height() as u32);
+    picture.part_of = frame.part_of;
+    let emitted = |relative: f32| (display.emitted_cd_m2(f64::from(relative)) / display.white_cd_m2) as f32;
+    let shown = match frame.covered(fitted) {
+        Some((mut shown, alpha)) => {
+            // Multiplied by alpha, as the format has it; the display's black is there before whatever lies behind.
+            shown.iter_mut().zip(alpha).for_each(|(rgb, alpha)| *rgb = rgb.map(|light| light * alpha));
+            picture.push_f32("A", alpha);
+            shown
+        }
+        None => frame.shown(fitted),
+    };
+    for (channel, name) in ["R", "G", "B"].into_iter().enumerate() {
+        picture.push_f32(name, shown.iter().map(|pixel| emitted(pixel[channel])).collect::<Vec<_>>());
+    }
+    picture.push_attribute(output::NITS_PER_UNIT, Attribute::Float(display.white_cd_m2 as f32));
+    // Readers take text for UTF-8, the writer has Latin-1: only what both have in common is safe.
+    let operator = fitted.describe().replace('²', "2").replace('×', "x");
+    picture.push_attribute("fechner.operator", Attribute::Text(operator));
+    picture.push_attribute(LIGHT, Attribute::Text(OF_DISPLAY.to_owned()));
+    picture.push_attribute("fechner.observer.display", Attribute::Text(display.name.clone()));
+    picture.push_attribute(output::PIXEL_ASPECT_RATIO, Attribute::Float(frame.pixel_aspect_ratio as f32));
+    picture.attributes.extend(output::display_attribute(&frame.display));
+    picture.attributes.extend(output::tone_attribute(fitted));
+    if let Some(state) = state {
+        let text = serde_json::to_string(state).context("the eye's state could not be put into words")?;
+        picture.push_attribute("fechner.adaptation", Attribute::Text(text));
+    }
+    output::write_exr(target, &picture)?;
     Ok(())
 }

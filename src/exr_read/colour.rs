@@ -21,7 +21,8 @@ impl ExrImage {
     /// The picture in linear Rec.709 RGB over the display window; `None` where there is neither R, G and B nor luminance.
     ///
     /// `find` finds a channel R, G or B by its last name (renderers prefix layers). Without them X, Y and Z are CIE XYZ. Chromaticities are honoured: colours stay what they
-    /// are, white included. Not finite values become 0 (NaN, −∞) or the largest finite value of the picture (∞).
+    /// are, white included. Not finite values become 0 (NaN, −∞) or (∞) the largest finite value of the picture, at least 65504: what
+    /// overflows a half is a lamp or the sun, brighter than all else.
     pub fn scene_picture<'a>(&'a self, find: impl Fn(&'a Self, &str) -> Option<&'a [f32]>) -> Option<ScenePicture> {
         let mut notes = Vec::new();
         let mut primaries = self.chromaticities.unwrap_or(Primaries::REC709);
@@ -95,12 +96,15 @@ fn from_chroma(luminance: &[f32], red: &[f32], blue: &[f32], primaries: &Primari
         .collect()
 }
 
+/// Largest finite half float: light that a half could not hold is at least that bright, in the file's unit.
+const LARGEST_HALF: f32 = 65504.0;
+
 /// How many values were replaced.
 fn replace_what_is_not_finite(rgb: &mut [[f32; 3]]) -> usize {
     let values = || rgb.iter().flatten();
     let count = values().filter(|value| !value.is_finite()).count();
     if count > 0 {
-        let largest = values().copied().filter(|value| value.is_finite()).fold(0.0, f32::max);
+        let largest = values().copied().filter(|value| value.is_finite()).fold(LARGEST_HALF, f32::max);
         for value in rgb.iter_mut().flatten().filter(|value| !value.is_finite()) {
             *value = if *value == f32::INFINITY { largest } else { 0.0 };
         }
@@ -168,6 +172,19 @@ mod tests {
         let rings = picture(&path);
         assert!(rings.rgb.iter().flatten().all(|value| value.is_finite()));
         assert!(rings.notes.iter().any(|note| note.contains("not finite")), "{:?}", rings.notes);
+    }
+
+    /// The sun of a sky in half floats.
+    #[test]
+    fn what_overflowed_is_brighter_than_all_else() {
+        let replaced = |values: [f32; 3]| {
+            let mut rgb = [values];
+            replace_what_is_not_finite(&mut rgb);
+            rgb[0]
+        };
+        assert_eq!(replaced([10.0, f32::INFINITY, f32::NAN]), [10.0, 65504.0, 0.0]);
+        assert_eq!(replaced([f32::INFINITY; 3]), [65504.0; 3]);
+        assert_eq!(replaced([1e6, f32::INFINITY, f32::NEG_INFINITY]), [1e6, 1e6, 0.0]);
     }
 
     /// A file of ours with its windows and chromaticities changed by hand.

@@ -275,7 +275,7 @@ mod tests {
         assert_eq!((shown.position, shown.size), (Vec2(0, 0), Vec2(64, 48)));
         assert_eq!((header.own_attributes.layer_position, header.layer_size), (Vec2(20, 11), Vec2(3, 2)));
         let image = read_exr(&path).unwrap();
-        assert_eq!(image.data_window_origin, (20, 11));
+        assert_eq!((image.data_window_origin, image.part_of), ((20, 11), part_of));
         assert_eq!(image.channel("R").unwrap(), RED);
         let picture = image.scene_picture(|image, name| image.channel(name)).unwrap();
         assert_eq!((picture.width, picture.height, picture.notes), (3, 2, Vec::new()));

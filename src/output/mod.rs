@@ -19,6 +19,7 @@ pub use beside::{abandon_unfinished, remove_leftovers, target_of, write_beside, 
 pub use exr_file::write_exr;
 pub use frame_rate::FRAMES_PER_SECOND;
 pub(crate) use frame_rate::fraction;
+pub(crate) use png_file::{PROFILE_NOT_READ, names_srgb};
 pub use png_file::{
     PngColour, PngTransfer, decode_pq, encode_srgb8, png_colour, write_codes_png, write_png, write_png_for,
     write_png_with_alpha_for, write_pq_png,

@@ -29,6 +29,9 @@ const COMPRESSION: png::Compression = png::Compression::Fast;
 /// Code points of ITU-T H.273: primaries of BT.2020, transfer of SMPTE ST 2084 (PQ), RGB, full range.
 const CICP_BT2020_PQ: [u8; 4] = [9, 16, 0, 1];
 
+/// Transfer of sRGB (IEC 61966-2-1) in the same tables.
+const SRGB_TRANSFER: u8 = 13;
+
 /// Luminance of the highest PQ code.
 const PEAK_CD_M2: f64 = 10_000.0;
 /// Of primaries that cannot be brought into others, which ours can.
@@ -127,23 +130,11 @@ pub fn png_colour(bytes: &[u8]) -> PngColour {
     let Ok(reader) = png::Decoder::new(std::io::Cursor::new(bytes)).read_info() else { return colour };
     let info = reader.info();
     if let Some(tag) = info.coding_independent_code_points {
-        colour.transfer = match tag.transfer_function {
-            8 => PngTransfer::Linear,
-            16 => PngTransfer::Pq,
-            18 => PngTransfer::HybridLogGamma,
-            _ => PngTransfer::Srgb,
-        };
-        colour.primaries = coded_primaries(tag.color_primaries);
-        if colour.primaries.is_none() {
-            let number = tag.color_primaries;
-            colour
-                .notes
-                .push(format!("primaries {number} of its cICP chunk are not known, and taken for those of its curve"));
-        }
+        read_code_points(tag, &mut colour);
     } else if let Some(profile) = &info.icc_profile {
         colour.transfer = PngTransfer::Srgb;
         if !names_srgb(profile) {
-            colour.notes.push("its colour profile is not read: its codes are taken for sRGB".to_owned());
+            colour.notes.push(PROFILE_NOT_READ.to_owned());
         }
     } else if info.srgb.is_some() {
         colour.transfer = PngTransfer::Srgb;
@@ -151,6 +142,30 @@ pub fn png_colour(bytes: &[u8]) -> PngColour {
         read_gamma(info, &mut colour);
     }
     colour
+}
+
+/// Of a cICP chunk.
+fn read_code_points(tag: png::CodingIndependentCodePoints, colour: &mut PngColour) {
+    let (primaries, transfer) = (tag.color_primaries, tag.transfer_function);
+    colour.transfer = match transfer {
+        8 => PngTransfer::Linear,
+        16 => PngTransfer::Pq,
+        18 => PngTransfer::HybridLogGamma,
+        _ => PngTransfer::Srgb,
+    };
+    if colour.transfer == PngTransfer::Srgb && transfer != SRGB_TRANSFER {
+        let note = format!("transfer {transfer} of its cICP chunk is not heeded: its codes are taken for sRGB");
+        colour.notes.push(note);
+    }
+    if !tag.is_video_full_range_image {
+        let note = "the narrow range that its cICP chunk says is not heeded: its codes are taken for the full range";
+        colour.notes.push(note.to_owned());
+    }
+    colour.primaries = coded_primaries(primaries);
+    if colour.primaries.is_none() {
+        let note = format!("primaries {primaries} of its cICP chunk are not known, and taken for those of its curve");
+        colour.notes.push(note);
+    }
 }
 
 /// Gamma and chromaticities of files without a profile.
@@ -167,8 +182,11 @@ fn read_gamma(info: &png::Info<'_>, colour: &mut PngColour) {
     }
 }
 
+/// What to say of a colour profile that does not call itself sRGB.
+pub(crate) const PROFILE_NOT_READ: &str = "its colour profile is not read: its codes are taken for sRGB";
+
 /// Whether a colour profile calls itself sRGB, in bytes or in words of two.
-fn names_srgb(profile: &[u8]) -> bool {
+pub(crate) fn names_srgb(profile: &[u8]) -> bool {
     let has = |name: &[u8]| profile.windows(name.len()).any(|window| window == name);
     has(b"sRGB") || has(b"s\0R\0G\0B")
 }
@@ -349,6 +367,27 @@ mod tests {
         assert!((Eotf::Pq.decode(code(3), 1.0) - 0.005).abs() < 1e-4, "{}", code(3));
         // Red of Rec.709 is orange in Rec.2020's primaries.
         assert!(code(6) > code(7) && code(7) > code(8) && code(8) > code(5));
+    }
+
+    #[test]
+    fn what_a_tag_says_and_is_not_heeded_is_said() {
+        let notes_of = |code_points: [u8; 4]| {
+            let mut bytes = Vec::new();
+            let mut writer = png::Encoder::new(&mut bytes, 1, 1).write_header().unwrap();
+            writer.write_chunk(png::chunk::ChunkType(*b"cICP"), &code_points).unwrap();
+            writer.write_image_data(&[7]).unwrap();
+            writer.finish().unwrap();
+            png_colour(&bytes).notes
+        };
+        for known in [[1, 13, 0, 1], [9, 16, 0, 1], [12, 8, 0, 1]] {
+            assert!(notes_of(known).is_empty(), "{known:?}: {:?}", notes_of(known));
+        }
+        for transfer in [1, 4, 5, 17, 99] {
+            let notes = notes_of([1, transfer, 0, 1]);
+            assert!(notes.len() == 1 && notes[0].contains(&format!("transfer {transfer} ")), "{notes:?}");
+        }
+        assert!(notes_of([1, 13, 0, 0])[0].contains("narrow range"));
+        assert!(notes_of([77, 13, 0, 1])[0].contains("primaries 77"));
     }
 
     /// Somebody's transparent HDR picture has the same light where it covers, and says so.

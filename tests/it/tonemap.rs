@@ -2,7 +2,7 @@
 
 use assert_cmd::Command;
 use fechner::exr_read::read_exr;
-use fechner::output::{Attribute, NITS_PER_UNIT, Picture, write_exr};
+use fechner::output::{Attribute, NITS_PER_UNIT, PartOf, Picture, write_exr};
 use std::path::Path;
 
 fn tonemap(folder: &Path, arguments: &[&str]) -> std::process::Output {
@@ -39,6 +39,55 @@ fn all_operators_make_one_sheet() {
     run(folder.path(), &["a.exr", "-o", "all.png", "--operator", "all", "--adaptation", "local"]);
     let sheet = image::open(folder.path().join("all.png")).expect("a picture");
     assert!(sheet.width() > 4 * 64 && sheet.height() > 4 * 36);
+}
+
+/// A crop of a transparent render: alpha as in the render's own files, and the place in the whole.
+#[test]
+fn alpha_and_the_place_of_a_crop_stay() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut picture = Picture::new(2, 1);
+    // What covers both pixels has 40 cd/m², under a white of 80.
+    ["R", "G", "B"].into_iter().for_each(|channel| picture.push_f32(channel, vec![40.0, 10.0]));
+    picture.push_f32("A", vec![1.0, 0.25]);
+    picture.push_attribute(NITS_PER_UNIT, Attribute::Float(1.0));
+    picture.part_of = Some(PartOf { origin: [16, 8], whole: [64, 48] });
+    write_exr(&folder.path().join("a.exr"), &picture).expect("written");
+    for name in ["shown.png", "shown.exr"] {
+        run(folder.path(), &["a.exr", "-o", name, "--operator", "srgb"]);
+    }
+    let png = image::open(folder.path().join("shown.png")).expect("a picture");
+    assert_eq!(png.color(), image::ColorType::Rgba8);
+    let png = png.into_rgba8();
+    let [covered, seen_through] = [0, 1].map(|x| png.get_pixel(x, 0).0);
+    assert_eq!((covered[3], seen_through[3]), (255, 64));
+    // Codes are dithered by one step.
+    assert!(covered[1].abs_diff(188) <= 1 && seen_through[1].abs_diff(188) <= 1, "{covered:?} {seen_through:?}");
+    let exr = read_exr(&folder.path().join("shown.exr")).expect("an EXR file");
+    assert_eq!((exr.part_of, exr.data_window_origin), (picture.part_of, (16, 8)));
+    assert_eq!(exr.channel("A"), Some(&[1.0, 0.25][..]));
+    let green = exr.channel("G").expect("green");
+    assert!((green[0] - 0.5).abs() < 2e-3 && (green[1] - 0.125).abs() < 2e-3, "{green:?}");
+}
+
+/// Over time the same eye sees the same part of the view.
+#[test]
+fn equal_frames_are_seen_as_the_still_of_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut picture = Picture::new(64, 36);
+    let lamp = |i: i32| if (i % 64 - 32).abs() < 9 && (i / 64 - 18).abs() < 9 { 100.0 } else { 1.0 };
+    ["R", "G", "B"].into_iter().for_each(|c| picture.push_f32(c, (0..64 * 36).map(lamp).collect::<Vec<f32>>()));
+    picture.push_attribute(NITS_PER_UNIT, Attribute::Float(1.0));
+    for name in ["f1.exr", "f2.exr"] {
+        write_exr(&folder.path().join(name), &picture).expect("written");
+    }
+    for operator in ["scheel00", "ward94", "ptyg", "fpsg", "tr", "durand-dorsey00"] {
+        let still = run(folder.path(), &["f1.exr", "-o", "still.exr", "--operator", operator]);
+        let moving = run(folder.path(), &["f1.exr", "f2.exr", "-o", "moving.#.exr", "--operator", operator]);
+        let fit = |line: &str| line.split_once(": ").map(|(_, fit)| fit.to_owned());
+        for line in moving.lines() {
+            assert_eq!(fit(line), fit(still.trim_end()), "{operator}");
+        }
+    }
 }
 
 #[test]

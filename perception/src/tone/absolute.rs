@@ -2,14 +2,16 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::gamut::fit_into_display;
 use super::guide::{Pixel, SceneGuide};
 use super::saved::{Fit, SavedTone};
-use super::screen::Screen;
+use super::screen::{Screen, finite};
 use super::time::AdaptationState;
 use super::{FittedTone, ToneOperator};
 use crate::display::Viewing;
 
-/// Every scene luminance is emitted as itself as far as the display reaches: L is (L − black) / (white − black) of its light.
+/// All scene light is emitted as itself as far as the display reaches, each channel for itself: L is (L − black) / (white − black) of
+/// its light. A colour that the display's black greys too much, or that is too bright, keeps its luminance and is mixed with grey.
 /// What the screen reflects of the room comes on top and is not subtracted, as it would from a print beside it.
 ///
 /// For pictures that are display-referred already, for judging what a scene would look like through a window, and, with
@@ -41,6 +43,19 @@ impl FittedTone for FittedAbsolute {
         self.screen.relative(self.exposure * f64::from(scene_cd_m2.max(0.0)))
     }
 
+    /// Channel by channel, as the display's black is added to each: light that a display has shown comes back as it was.
+    fn map_rgb_at(&self, _pixel: Pixel, rgb_cd_m2: [f32; 3]) -> [f32; 3] {
+        fit_into_display(rgb_cd_m2.map(|channel| self.screen.channel(self.exposure * f64::from(channel))))
+    }
+
+    fn chromatic_slope_at(&self, pixel: Pixel, scene_cd_m2: f32) -> f32 {
+        match self.relative_luminance_at(pixel, scene_cd_m2) {
+            // Less than the display's black.
+            0.0 => 0.0,
+            relative => finite(self.exposure / self.screen.span_cd_m2) / relative.max(1.0),
+        }
+    }
+
     fn describe(&self) -> String {
         format!("absolute: {} cd/m² shown for each cd/m² of the scene", self.exposure)
     }
@@ -54,6 +69,7 @@ impl FittedTone for FittedAbsolute {
 mod tests {
     use super::*;
     use crate::display::Display;
+    use crate::photometry::luminance;
     use crate::plane::Plane;
 
     #[test]
@@ -66,6 +82,23 @@ mod tests {
                 let found = fit.relative_luminance(display.emitted_cd_m2(relative) as f32);
                 assert!((f64::from(found) - relative).abs() < 1e-6, "{relative} came out as {found}");
             }
+            for rgb in [[0.02, 0.001, 0.001], [1.0, 0.0, 0.0], [0.3, 0.9, 0.0], [1.0; 3]] {
+                let found = fit.map_rgb(rgb.map(|relative| display.emitted_cd_m2(f64::from(relative)) as f32));
+                let close = found.iter().zip(rgb).all(|(found, relative)| (found - relative).abs() < 1e-6);
+                assert!(close, "{rgb:?} came out as {found:?}");
+            }
+        }
+    }
+
+    /// What the display cannot show of a colour is grey, and no luminance.
+    #[test]
+    fn a_pure_colour_keeps_its_luminance() {
+        let display = Display { black_cd_m2: 1.0, white_cd_m2: 100.0, ..Display::default() };
+        let guide = Plane::filled(1, 1, 1.0);
+        let fit = Absolute { exposure: 1.0 }.fit(&SceneGuide::of(&guide), &Viewing::of(display), None);
+        for rgb in [[20.0, 0.0, 0.0], [0.0, 30.0, 3.0], [-10.0, 40.0, 0.0], [200.0, 0.0, 0.0]] {
+            let (found, expected) = (luminance(fit.map_rgb(rgb)), fit.relative_luminance(luminance(rgb)));
+            assert!((found - expected).abs() < 1e-6, "{rgb:?}: {found} for {expected}");
         }
     }
 }

@@ -86,6 +86,17 @@ mod tests {
         assert!((relative_of_ten(&Plane::filled(16, 16, 10.0)) - 0.18).abs() < 1e-6);
     }
 
+    /// A camera knows no unit of light.
+    #[test]
+    fn darkness_is_exposed_as_well() {
+        for light in [1e-30, 9.9e-5, 1.01e-4, 1e6] {
+            for (time, expected) in [(Exposure::Automatic, 0.18), (Exposure::Long, 0.18), (Exposure::Short, 1.0)] {
+                let found = fitted(&Plane::filled(16, 16, light), time).relative_luminance(light);
+                assert!((found - expected).abs() < 1e-6, "{light}, {time:?}: {found}");
+            }
+        }
+    }
+
     #[test]
     fn a_lamp_and_fireflies_do_not_darken_the_picture() {
         let mut lamp = Plane::filled(100, 100, 10.0);

@@ -2,10 +2,10 @@
 
 use crate::photometry::luminance;
 
-/// Linear display RGB in 0..1 of the same luminance and hue: luminance above 1 becomes white, and what does not fit is
-/// mixed with the grey of equal luminance. Channels must be finite; negative ones count as 0.
+/// Linear display RGB in 0..1 of the same luminance and hue: luminance above 1 becomes white, and what does not fit, at
+/// either end, is mixed with the grey of equal luminance.
 pub(super) fn fit_into_display(rgb: [f32; 3]) -> [f32; 3] {
-    let rgb = rgb.map(|channel| channel.max(0.0));
+    let rgb = light(rgb);
     let shown = luminance(rgb);
     if shown <= 0.0 {
         return [0.0; 3];
@@ -36,10 +36,25 @@ fn desaturate(rgb: [f32; 3], grey: f32) -> [f32; 3] {
 /// Brighter than anything that is not shown as white, and far from where squares of luminances end.
 const BRIGHTEST_CD_M2: f32 = 1e15;
 
-/// `rgb` without what no light is: negative channels and those that are no number become 0, infinite ones very bright.
+/// `rgb` as light that Rec.709 holds: a colour outside it, which has negative channels, is mixed with the grey of its own
+/// luminance until none is negative. Channels that are no number become 0, infinite ones very bright; what has no luminance
+/// above 0 is black.
 pub(super) fn light(rgb: [f32; 3]) -> [f32; 3] {
-    // `max` takes 0 for what is no number.
-    rgb.map(|channel| if channel == f32::INFINITY { BRIGHTEST_CD_M2 } else { channel.max(0.0) })
+    let rgb = rgb.map(|channel| match channel {
+        f32::INFINITY => BRIGHTEST_CD_M2,
+        finite if finite.is_finite() => finite,
+        _ => 0.0,
+    });
+    let least = rgb.into_iter().fold(0.0, f32::min);
+    if least >= 0.0 {
+        return rgb;
+    }
+    let grey = luminance(rgb);
+    if grey <= 0.0 {
+        return [0.0; 3];
+    }
+    let keep = grey / (grey - least);
+    rgb.map(|channel| (grey + keep * (channel - grey)).max(0.0))
 }
 
 #[cfg(test)]
@@ -51,6 +66,18 @@ mod tests {
         assert_eq!(light([f32::NAN, -1.0, f32::NEG_INFINITY]), [0.0; 3]);
         let lamp = light([f32::INFINITY, 1.0, 1.0]);
         assert_eq!(with_luminance(lamp, luminance(lamp), 1.0), [1.0; 3]);
+    }
+
+    /// Rec.2020's green: with its negative channels cut off it would be a fifth brighter.
+    #[test]
+    fn colours_outside_rec_709_keep_their_luminance() {
+        let green = [-0.5876, 1.1329, -0.1006];
+        let inside = light(green);
+        assert!((luminance(inside) / luminance(green) - 1.0).abs() < 1e-6, "{inside:?}");
+        assert!(inside[0] == 0.0 && inside[1] > inside[2] && inside[2] > 0.0, "{inside:?}");
+        assert_eq!(light([1.0, -20.0, 1.0]), [0.0; 3]);
+        let shown = fit_into_display([-0.2, 0.5, -0.1]);
+        assert!((luminance(shown) / luminance([-0.2, 0.5, -0.1]) - 1.0).abs() < 1e-6, "{shown:?}");
     }
 
     #[test]

@@ -12,7 +12,7 @@
 
 use std::fmt::Debug;
 
-use crate::display::Viewing;
+use crate::display::{PixelDensity, Viewing};
 use crate::photometry::luminance;
 
 mod absolute;
@@ -80,6 +80,11 @@ pub trait ToneOperator: Send + Sync + Debug {
     /// Freezes the operator for one picture, its observer, and, where time passes, what the observer's eyes are adapted to;
     /// without a state they are adapted to the picture.
     fn fit(&self, guide: &SceneGuide<'_>, viewing: &Viewing, state: Option<&AdaptationState>) -> Box<dyn FittedTone>;
+
+    /// What eyes would adapt to if the view stayed as the guide shows it: the goal of [`AdaptationState::after`].
+    fn goal(&self, guide: &SceneGuide<'_>, density: PixelDensity) -> Goal {
+        Goal::of(guide, density)
+    }
 
     /// How fast the eyes that it simulates adapt.
     fn kinetics(&self) -> Kinetics {

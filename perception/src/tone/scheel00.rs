@@ -2,10 +2,10 @@
 
 use super::scale::Scale;
 use super::statistics::as_eyes_see;
-use super::time::AdaptationState;
+use super::time::{AdaptationState, Goal};
 use super::ward94::scale_factor;
 use super::{FittedTone, Pixel, SceneGuide, ToneOperator};
-use crate::display::Viewing;
+use crate::display::{PixelDensity, Viewing};
 
 /// [`Ward94`](super::Ward94) with the world adaptation from some hundred points of the view, most of them at its centre (or where the eye
 /// looks), as rays into the scene would give it: cheap enough for each frame, whatever the picture's size.
@@ -29,6 +29,17 @@ impl ToneOperator for Scheel00 {
 
     fn sees_adaptation(&self) -> bool {
         true
+    }
+
+    /// Of the centre-weighted points, over time too.
+    fn goal(&self, guide: &SceneGuide<'_>, density: PixelDensity) -> Goal {
+        let view = Goal::of(guide, density);
+        let of_points =
+            |plane, of_view: f64| sampled(&SceneGuide { luminance_cd_m2: plane, ..*guide }).unwrap_or(of_view);
+        Goal {
+            cones_cd_m2: of_points(guide.luminance_cd_m2, view.cones_cd_m2),
+            rods_cd_m2: of_points(guide.rods(), view.rods_cd_m2),
+        }
     }
 
     fn fit(&self, guide: &SceneGuide<'_>, viewing: &Viewing, state: Option<&AdaptationState>) -> Box<dyn FittedTone> {
@@ -87,6 +98,20 @@ mod tests {
         assert!((sampled(&SceneGuide::of(&Plane::filled(4, 4, 0.0))).unwrap() / 1e-4 - 1.0).abs() < 1e-6);
         assert!(sampled(&SceneGuide::of(&Plane::filled(0, 0, 0.0))).is_none());
         assert!((sampled(&SceneGuide::of(&Plane::filled(1, 1, 7.0))).unwrap() - 7.0).abs() < 1e-6);
+    }
+
+    /// An eye that has long looked at a view is adapted to what the still of it is fitted to.
+    #[test]
+    fn an_adapted_eye_sees_the_centre_too() {
+        let lamp = Plane::from_fn(200, 100, |x, y| if x.abs_diff(100).max(y.abs_diff(50)) < 25 { 100.0 } else { 1.0 });
+        let guide = SceneGuide::of(&lamp);
+        let (operator, viewing) = (Scheel00 { exposure: 1.0 }, Viewing::default());
+        let goal = operator.goal(&guide, viewing.display.pixel_density());
+        let eye = AdaptationState::adapted_to(goal, &operator.kinetics());
+        let [still, moving] =
+            [None, Some(&eye)].map(|state| operator.fit(&guide, &viewing, state).relative_luminance(5.0));
+        assert!((moving / still - 1.0).abs() < 1e-6, "{still} and {moving}");
+        assert!(goal.cones_cd_m2 > 2.0 * Goal::of(&guide, viewing.display.pixel_density()).cones_cd_m2);
     }
 
     #[test]

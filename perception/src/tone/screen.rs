@@ -33,6 +33,11 @@ impl Screen {
     pub(super) fn relative(self, shown_cd_m2: f64) -> f32 {
         finite((shown_cd_m2 - self.black_cd_m2) / self.span_cd_m2)
     }
+
+    /// The same of one channel of a colour: less than 0 below black, NaN for NaN.
+    pub(super) fn channel(self, shown_cd_m2: f64) -> f32 {
+        ((shown_cd_m2 - self.black_cd_m2) / self.span_cd_m2) as f32
+    }
 }
 
 /// At least 0, at most the largest `f32`; NaN becomes 0.

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::plane::Plane;
 
-/// The floor of human vision, cd/m². Below it a pixel says nothing about how a picture should be exposed.
+/// The floor of human vision, cd/m².
 pub(super) const FLOOR_CD_M2: f32 = 1e-4;
 /// Share of the brightest pixel at and below which a pixel says nothing to an operator that knows only ratios: leaked light
 /// and rounding, not darkness.
@@ -12,11 +12,10 @@ const FAINTEST_SHARE: f32 = 1e-10;
 /// Pixels summed by one thread at a time. Sums are added in the picture's order, whatever the number of threads.
 const CHUNK: usize = 1 << 14;
 
-/// Whether a pixel says something about exposure: blacks (an empty background is no reason to expose longer) and values
-/// that are not finite do not.
-fn counts(value: f32) -> bool {
-    value.is_finite() && value > FLOOR_CD_M2
-}
+/// Share of the lit pixels that are no fireflies: the brightest of them is what a camera's darkness is measured by.
+const ORDINARY: f64 = 0.95;
+/// Share of that light at and below which a pixel says nothing about exposure: 20 stops, more than a camera records.
+const DARKEST_SHARE: f32 = 1e-6;
 
 /// What an eye makes of a pixel: less than the floor of vision is as dark as the floor. `None` for what is no light.
 pub(super) fn as_eyes_see(value: f32) -> Option<f32> {
@@ -78,7 +77,9 @@ impl LogSum {
     }
 }
 
-/// Scene luminances above the floor of vision, in rising order.
+/// Scene luminances that say something about exposure, in rising order. Blacks do not (an empty background is no reason to
+/// expose longer), and neither do values that are not finite. How dark a black is is a ratio, as a camera knows no unit:
+/// a picture and the same one a thousand times darker are exposed to the same.
 #[derive(Clone, Debug)]
 pub(super) struct SceneStatistics {
     sorted_cd_m2: Vec<f32>,
@@ -87,9 +88,12 @@ pub(super) struct SceneStatistics {
 impl SceneStatistics {
     pub(super) fn of(luminance_cd_m2: &Plane) -> Self {
         let mut sorted_cd_m2: Vec<f32> =
-            luminance_cd_m2.values().iter().copied().filter(|&value| counts(value)).collect();
+            luminance_cd_m2.values().iter().copied().filter(|&value| value.is_finite() && value > 0.0).collect();
         sorted_cd_m2.par_sort_unstable_by(f32::total_cmp);
-        Self { sorted_cd_m2 }
+        let mut lit = Self { sorted_cd_m2 };
+        let floor = DARKEST_SHARE * lit.quantile(ORDINARY).unwrap_or(0.0) as f32;
+        lit.sorted_cd_m2.drain(..lit.sorted_cd_m2.partition_point(|&value| value <= floor));
+        lit
     }
 
     /// The value below which the share `fraction` of the pixels lies; `None` for a black picture.
@@ -123,6 +127,28 @@ mod tests {
         assert_eq!(statistics.quantile(0.5), Some(3.0));
         assert!(SceneStatistics::of(&Plane::filled(4, 4, 0.0)).quantile(0.5).is_none());
         assert!(log_average_of_lit(&Plane::filled(4, 4, 0.0), 0.0).is_none());
+    }
+
+    /// Leaked light of a background is left out, whatever a few fireflies do.
+    #[test]
+    fn what_is_left_out_is_a_ratio() {
+        let scene = |scale: f32| {
+            SceneStatistics::of(&Plane::from_fn(100, 10, |x, y| {
+                scale
+                    * if x < 40 {
+                        1e-7
+                    } else if x == 99 && y < 3 {
+                        1e12
+                    } else {
+                        1.0 + y as f32
+                    }
+            }))
+        };
+        let of = |scale: f32| scene(scale).log_average(0.03, 0.97).unwrap() / f64::from(scale);
+        assert!((of(1.0) - 4.53).abs() < 0.2, "{}", of(1.0));
+        for scale in [1e-12, 1e-5, 1e-3, 1e6] {
+            assert!((of(scale) / of(1.0) - 1.0).abs() < 1e-5, "{scale}: {}", of(scale));
+        }
     }
 
     /// Eyes are in the dark where nothing can be seen; a background that crosses the floor of vision changes nothing at once.

@@ -168,7 +168,7 @@ fn fit(
         lights.push(SceneLight::of(operator, picture.size().0, &rgb));
     }
     let goals: Vec<Goal> =
-        lights.iter().map(|light| Goal::of(&light.guide(), viewing.display.pixel_density())).collect();
+        lights.iter().map(|light| operator.goal(&light.guide(), viewing.display.pixel_density())).collect();
     let eye = AdaptationState::adapted_to(Goal::mean(&goals), &operator.kinetics());
     let (width, height) = size.unwrap_or_default();
     let all = SceneLight::stacked(&lights.iter().collect::<Vec<_>>(), width, height);

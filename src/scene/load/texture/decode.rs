@@ -3,7 +3,7 @@
 
 use super::Picture;
 use crate::exr_read::{self, ExrImage, Window, layer_and_part};
-use crate::hdr_read::{HdrHeader, with_known_signature};
+use crate::hdr_read::{HdrHeader, with_known_header};
 use crate::jpeg_read;
 use crate::scene::load::{LoadError, files};
 use crate::scene::{Encoding, Texels, texture};
@@ -94,7 +94,7 @@ pub(in crate::scene::load) fn decode_bytes(
     if exr_read::is_exr(bytes) {
         return decode_exr(bytes, name, values);
     }
-    let bytes = &*with_known_signature(bytes);
+    let bytes = &*with_known_header(bytes);
     let wrong = |error: image::ImageError| match error {
         image::ImageError::Limits(_) => LoadError::too_large(name, format_args!("the picture is too large: {error}")),
         _ => LoadError::invalid(name, format_args!("not a readable picture: {error}")),
