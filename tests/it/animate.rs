@@ -327,6 +327,7 @@ fn sequences_are_compared_as_they_move() {
     let moving = ["--fps", "24", "--velocity", "a.##.exr"];
     let (status, said) = compare(&[&["a.##.exr", "a.##.exr"], &moving[..]].concat());
     assert_eq!(status, Some(0), "{said}");
+    assert!(said.contains("worst visibility 0.00 in frame 0 "), "the first of equals: {said}");
     let files = ["--map", "map.##.png", "--json", "figures.json"];
     let (status, said) = compare(&[&["a.##.exr", "b.##.exr"], &moving[..], &files].concat());
     assert_eq!(status, Some(1), "{said}");

@@ -273,7 +273,8 @@ impl<'a> Sequences<'a> {
     fn report(&self, frames: Vec<FrameFigures>) -> Result<ExitCode> {
         let by_worst =
             |a: &&FrameFigures, b: &&FrameFigures| a.seen.worst_visibility.total_cmp(&b.seen.worst_visibility);
-        let worst = frames.iter().max_by(by_worst).context("a sequence has at least one frame")?;
+        // The last of equals is taken: from behind, so that it is the first frame.
+        let worst = frames.iter().rev().max_by(by_worst).context("a sequence has at least one frame")?;
         let mean = |of: fn(&Seen) -> f64| frames.iter().map(|frame| of(&frame.seen)).sum::<f64>() / frames.len() as f64;
         let seen = Seen {
             mean_visibility: mean(|seen| seen.mean_visibility),
