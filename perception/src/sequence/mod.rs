@@ -24,7 +24,7 @@ use crate::plane::Plane;
 use crate::sensitivity::adaptation_levels;
 use crate::threshold::{ThresholdInputs, ThresholdMap, chromatic_threshold_map, threshold_map};
 use crate::visibility::ErrorFilters;
-use gaze::{Place, Towards};
+use gaze::{Place, Smears, Towards};
 use rayon::prelude::*;
 
 /// Looks that are taken together, for which pictures are held in memory.
@@ -124,6 +124,20 @@ impl SequenceObserver {
     #[must_use]
     pub fn reach(&self) -> usize {
         self.responses.reach()
+    }
+
+    /// A frame between others as it falls on the retina: an eye that follows smears it while it is held. Without motion nothing is
+    /// smeared. The first frame and the last are better left as they are, since beyond them all rests.
+    #[must_use]
+    pub fn held(&self, frame: SequenceFrame) -> SequenceFrame {
+        let Some(motion) = &frame.motion else { return frame };
+        let smears = Smears::of(motion, &self.viewing.display);
+        let held = |channels: &Channels| Channels {
+            achromatic: smears.over(&channels.achromatic),
+            red_green: smears.over(&channels.red_green),
+            yellow_violet: smears.over(&channels.yellow_violet),
+        };
+        SequenceFrame { reference: held(&frame.reference), test: held(&frame.test), ..frame }
     }
 
     /// What is seen of the difference while frame `now` of these is shown, at the worst moment for each pixel. Frames that would
