@@ -284,6 +284,17 @@ impl<'a> ErrorFilters<'a> {
         energy
     }
 
+    /// v of an error at every pixel of the picture; for errors that are finite.
+    pub(crate) fn visibility(&mut self, error: &Plane) -> Plane {
+        let energy = self.energy(error);
+        self.visibility_of(&energy)
+    }
+
+    /// Bands of the map.
+    pub(crate) fn band_count(&self) -> usize {
+        self.map.band_count()
+    }
+
     /// v at every pixel of the picture, from an energy over the field.
     pub(crate) fn visibility_of(&self, energy: &Plane) -> Plane {
         let pooled = self.map.pooled(energy);

@@ -386,7 +386,7 @@ fn progress(render: &Loop<'_>, judgement: &Judgement, step: &Step) -> Progress {
         rung: rungs.front().copied().unwrap_or(target),
         pixels,
         mean_samples: film.total_samples() as f64 / pixels,
-        visible_share: judgement.is_known.then(|| visible_share(judgement, target)),
+        visible_share: judgement.is_known.then(|| visible_share(judgement, settings.limits.visibility_or_threshold())),
         next_samples: match step {
             Step::Trace(plan) => plan.samples(),
             Step::Stop(_) => 0,

@@ -35,10 +35,10 @@ pub(super) struct AnimateArguments {
     /// Scene with keyframes: .toml, .gltf, .glb, .pbrt, or any other with a side file that moves its camera.
     scene: PathBuf,
     /// Frames to render, first..last, both included, or one; frame 0 is at 0 s. Frames of the shot that are there already are kept.
-    #[arg(long, value_name = "A..B", value_parser = parse_frames)]
+    #[arg(long, value_name = "A..B", value_parser = parse_frames, allow_hyphen_values = true)]
     frames: Frames,
     /// All frames of the shot, where --frames renders a part of it: exposure and eyes are those of the whole shot.
-    #[arg(long, value_name = "A..B", value_parser = parse_frames)]
+    #[arg(long, value_name = "A..B", value_parser = parse_frames, allow_hyphen_values = true)]
     shot: Option<Frames>,
     /// Files, with # for each digit of the frame's number: out/shot.####.exr (all layers) or .png (as the display shows it).
     #[arg(short, long, value_name = "FILE")]

@@ -129,7 +129,11 @@ const MOTION_LAYERS: [&str; 7] = ["velocity", "vector", "motion", "motionvector"
 /// What the two parts of a vector are called.
 const VECTOR_PARTS: [[&str; 2]; 3] = [["X", "Y"], ["U", "V"], ["R", "G"]];
 
-/// Motion in pixels: the layer's name, and its channels along x and y.
+/// Layers whose y is upwards: Nuke's names, and those of renderers that write for it. All others are taken to have it downwards, as
+/// their pixels are numbered.
+const UPWARD_LAYERS: [&str; 2] = ["forward", "backward"];
+
+/// Motion in pixels: the layer's name, and its channels along x and y as they stand in the file.
 ///
 /// A layer counts if one part of its name, between dots, is one that renderers use (`velocity.X`, `ViewLayer.Vector.X`,
 /// `forward.left.u`, `motion.x`); case does not matter.
@@ -168,14 +172,18 @@ pub(super) fn both_motions(exr: &ExrImage) -> Option<BothMotions> {
         };
         return Some(BothMotions { to_next: [negated(z), w.to_vec()], to_previous: [x.to_vec(), negated(y)] });
     }
-    let (_, [x, y]) = motion(exr)?;
+    let downwards = |layer: &str, y: &[f32]| {
+        if UPWARD_LAYERS.iter().any(|name| is_called(layer, name)) { negated(y) } else { y.to_vec() }
+    };
+    let (layer, [x, y]) = motion(exr)?;
+    let (x, y) = (x.to_vec(), downwards(layer, y));
     let backward = VECTOR_PARTS.iter().find_map(|[across, down]| {
         let is_backward = |layer: &&str| BACKWARD_LAYERS.iter().any(|name| is_called(layer, name));
         let layer = layers_with(&names, &[across, down]).into_iter().find(is_backward)?;
-        Some([part_of(exr, layer, across)?.to_vec(), part_of(exr, layer, down)?.to_vec()])
+        Some([part_of(exr, layer, across)?.to_vec(), downwards(layer, part_of(exr, layer, down)?)])
     });
-    let to_previous = backward.unwrap_or_else(|| [negated(x), negated(y)]);
-    Some(BothMotions { to_next: [x.to_vec(), y.to_vec()], to_previous })
+    let to_previous = backward.unwrap_or_else(|| [negated(&x), negated(&y)]);
+    Some(BothMotions { to_next: [x, y], to_previous })
 }
 
 /// Whether a channel may be one of those that [`both_motions`] looks for.
@@ -331,6 +339,10 @@ mod tests {
         assert_eq!(of(&ours), Some([0.0, 1.0, 2.0, 3.0]));
         assert_eq!(of(&["A.Vector.W", "A.Vector.X", "A.Vector.Y", "A.Vector.Z"]), Some([-3.0, 0.0, 1.0, -2.0]));
         assert_eq!(of(&["R", "motion.x", "motion.y"]), Some([1.0, 2.0, -1.0, -2.0]));
+        // Nuke's y is upwards.
+        assert_eq!(of(&["R", "forward.left.u", "forward.left.v"]), Some([1.0, -2.0, -1.0, 2.0]));
+        let both = ["R", "backward.u", "backward.v", "forward.u", "forward.v"];
+        assert_eq!(of(&both), Some([3.0, -4.0, 1.0, -2.0]));
         assert_eq!(of(&["R", "G", "B"]), None);
     }
 }

@@ -37,8 +37,8 @@ pub(super) struct CompareArguments {
     /// of a second is seen more as in a still.
     #[arg(long, value_name = "N", value_parser = parse_rate)]
     fps: Option<f64>,
-    /// Motion of what a sequence shows, in pixels a frame, which the eye follows; without it, it rests. Frames of `animate`
-    /// have it.
+    /// Motion of what a sequence shows, in pixels a frame, which the eye follows, smearing what is held; without it, it rests. Frames of
+    /// `animate` have it.
     #[arg(long, value_name = "FILE.exr")]
     velocity: Option<PathBuf>,
     /// Write where the difference is seen: grey below threshold, yellow to red above; for a sequence with # in the name.

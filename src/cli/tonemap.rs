@@ -50,7 +50,7 @@ pub(super) struct TonemapArguments {
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
     effects: Option<Vec<Effect>>,
 
-    /// Frames a second of a sequence [default: 24].
+    /// Frames a second of a sequence; numbers that are missing take their time [default: 24].
     #[arg(long, value_name = "N", value_parser = parse_positive, help_heading = "Over time")]
     fps: Option<f64>,
     /// What the eye is adapted to before the first frame; without it, to the first frame.
@@ -181,10 +181,12 @@ pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
         );
     }
     let mut eye = if timed { Some(Eye::new(arguments, operator.as_ref())?) } else { None };
-    for (input, target) in arguments.input.iter().zip(&targets) {
+    let steps = frames_since_last(frame_numbers(&arguments.input), arguments.input.len());
+    for ((input, target), frames) in arguments.input.iter().zip(&targets).zip(steps) {
         let frame = SceneFrame::read(input, arguments, &viewing)?;
         let viewing = &frame.viewing;
-        let state = eye.as_mut().map(|eye| eye.look_at(operator.goal(&frame.guide(), viewing.display.pixel_density())));
+        let goal = operator.goal(&frame.guide(), viewing.display.pixel_density());
+        let state = eye.as_mut().map(|eye| eye.look_at(goal, frames));
         let fitted = operator.fit(&frame.guide(), viewing, state.as_ref());
         write(target, format, &frame, fitted.as_ref(), state.as_ref())?;
         answer!("{}: {}", target.display(), fitted.describe());
@@ -340,12 +342,14 @@ impl Eye {
         Ok(Self { state, is_between_frames, seconds_per_frame: arguments.fps.unwrap_or(24.0).recip(), kinetics })
     }
 
-    /// The state in which the next frame is seen. The first one is seen as it appears; between frames the light changes
-    /// evenly.
-    fn look_at(&mut self, goal: Goal) -> AdaptationState {
+    /// The state in which the next frame is seen, so many frames after the last. The first one is seen as it appears; between frames
+    /// the light changes evenly.
+    fn look_at(&mut self, goal: Goal, frames: u64) -> AdaptationState {
         let state = match self.state {
             None => AdaptationState::adapted_to(goal, &self.kinetics),
-            Some(state) if self.is_between_frames => state.after(goal, self.seconds_per_frame, &self.kinetics),
+            Some(state) if self.is_between_frames => {
+                state.after(goal, frames as f64 * self.seconds_per_frame, &self.kinetics)
+            }
             Some(state) => state.looking_at(goal),
         };
         self.is_between_frames = true;
@@ -385,6 +389,13 @@ fn named_targets(arguments: &TonemapArguments) -> Result<Vec<PathBuf>> {
     let target = |frame: u64| output.with_file_name(name.replace(&hashes, &format!("{frame:0digits$}")));
     let numbers = frame_numbers(&arguments.input).unwrap_or_else(|| (1..=arguments.input.len() as u64).collect());
     Ok(numbers.into_iter().map(target).collect())
+}
+
+/// How many frames after the one before each is: by their numbers in order of time, else one.
+fn frames_since_last(numbers: Option<Vec<u64>>, count: usize) -> Vec<u64> {
+    let steps = numbers.map(|numbers| numbers.windows(2).map(|pair| pair[1].saturating_sub(pair[0])).collect());
+    let steps: Vec<u64> = steps.unwrap_or_else(|| vec![1; count.saturating_sub(1)]);
+    std::iter::once(1).chain(steps).collect()
 }
 
 /// The numbers at the end of the files' names, before what follows the last dot; `None` unless all have different ones.

@@ -141,9 +141,13 @@ fn what_a_run_would_make_otherwise_is_not_there() {
     let said = both("16", "a.##.png");
     assert!(!said.contains("is there"), "the records are those of the .exr files: {said}");
     assert!(said.contains("a.00.png: its record is that of a.00.exr, made anew"), "{said}");
-    // The second frame is of other settings.
+    // The second frame is of other settings, and what was written of the whole shot is of others than the first.
     let said = first("17");
     assert!(said.contains("frame 1 of the shot is not there yet"), "{said}");
+    assert!(
+        said.contains("of the shot as it was before, until all its frames are there: a.json, a.contact.png"),
+        "{said}"
+    );
     both("17", "a.##.png");
     let whole = std::fs::read(at.join("a.01.png")).expect("read");
     std::fs::write(at.join("a.01.png"), std::fs::read(at.join("a.00.png")).expect("read")).expect("written");
@@ -280,6 +284,7 @@ fn bad_arguments_are_named() {
     std::fs::write(folder.path().join("gaze.csv"), "frame,x,y\n0,1\n").expect("written");
     for (arguments, expected) in [
         (&["--frames", "5..2", "-o", "a.#.png"][..], "ends before it begins"),
+        (&["--frames", "-3..2", "-o", "a.#.png"], "frames are numbered from 0"),
         (&["--frames", "0..2", "-o", "a.png"], "a sequence's name has one run of #"),
         (&["--frames", "0..2", "--shot", "1..2", "-o", "a.#.png"], "--frames reaches beyond --shot"),
         (&["--frames", "0..2", "-o", "a.#.png", "--video", "a.gif"], "videos end in .y4m or .mp4"),
@@ -322,6 +327,7 @@ fn sequences_are_compared_as_they_move() {
     let moving = ["--fps", "24", "--velocity", "a.##.exr"];
     let (status, said) = compare(&[&["a.##.exr", "a.##.exr"], &moving[..]].concat());
     assert_eq!(status, Some(0), "{said}");
+    assert!(said.contains("worst visibility 0.00 in frame 0 "), "the first of equals: {said}");
     let files = ["--map", "map.##.png", "--json", "figures.json"];
     let (status, said) = compare(&[&["a.##.exr", "b.##.exr"], &moving[..], &files].concat());
     assert_eq!(status, Some(1), "{said}");

@@ -115,6 +115,14 @@ fn a_sequence_is_blinded_and_recovers_and_can_be_continued() {
         (8..=11).map(|frame| mean_green(&folder.path().join(format!("shell.{frame:02}.exr")))).collect();
     assert_eq!(again, course);
 
+    // Frames that are missing take their time: two steps of a tenth of a second are one of a fifth.
+    for (frame, name) in [(1, "gap1.exr"), (2, "gap3.exr")] {
+        std::fs::copy(folder.path().join(format!("in{frame}.exr")), folder.path().join(name)).expect("copied");
+    }
+    let gap = ["gap1.exr", "gap3.exr", "--operator", "ptyg", "--fps", "10", "-o", "gap.#.exr", "--adapted-to", "0.1"];
+    run(folder.path(), &gap);
+    assert_eq!(mean_green(&folder.path().join("gap.3.exr")), course[1]);
+
     // The same in two parts by way of a file.
     let start = r#"{"cones":{"neural_cd_m2":0.1,"pigment":1.0},"rods":{"neural_cd_m2":0.1,"pigment":0.3},
         "goal":{"cones_cd_m2":0.1,"rods_cd_m2":0.1}}"#;

@@ -14,53 +14,82 @@ const LOWEST_DECADE: f64 = -3.0;
 const DECADE_STEPS: usize = 4;
 const LEVELS: usize = 7 * DECADE_STEPS + 1;
 
-/// Weights of frames by their distance in time from the one that is looked at, 0 first.
+/// Looks at a display in a second, at the least. A step of light is seen most some 20 ms before and after it, and flicker of 12 Hz at
+/// its peak: from one look in the middle of each of 24 frames, ±3 % at 12 Hz had 0.80 of the contrast over threshold that it has.
+const LOOKS_A_SECOND: f64 = 120.0;
+
+/// Weights of frames around the one that is shown, from [`FrameResponses::reach`] frames earlier to as many later.
 pub(crate) type Weights = Vec<f32>;
 
-/// castleCSF's temporal channels (Ashraf et al. 2024) as weights of frames.
+/// castleCSF's temporal channels (Ashraf et al. 2024) as weights of frames, at several moments while one of them is shown.
 ///
-/// A channel with the temporal response R(f), taken without phase, leaves h(k) = T ∫ R(f) sinc(f T p) cos(2π f k T) df of a
-/// frame k frames away (T the time of a frame, p the share of it for which it is lit). The sustained channels' weights add
-/// up to 1, so that what stands still is seen as in a still; the transient one's to 0, with the energy for fresh noise that
-/// [`super::FreshNoise`] has.
+/// A channel with the temporal response R(f), taken without phase, leaves h(k, t) = T ∫ R(f) sinc(f T p) cos(2π f (k T − t)) df
+/// of a frame k frames away, t after the middle of the one that is shown (T the time of a frame, p the share of it for which it
+/// is lit). Without a scale of its own: over all moments fresh noise has the energy of [`super::FreshNoise`], and the same light
+/// is seen alike at any frame rate.
+///
+/// What stands still is seen as in a still: the sustained channels' weights add up to 1, and the transient one's to 0. The flicker
+/// that a display of short flashes adds to all that it shows is left out.
 #[derive(Clone, Debug)]
 pub(crate) struct FrameResponses {
-    pub(crate) sustained: Weights,
-    pub(crate) red_green: Weights,
-    pub(crate) yellow_violet: Weights,
+    reach: usize,
+    /// What the sustained channels hold in the middle of a frame.
+    pub(crate) middle: Sustained,
+    /// Spread evenly over the time of a frame.
+    pub(crate) looks: Vec<Look>,
+}
+
+/// Weights of luminance, red–green and yellow–violet in the sustained channels.
+pub(crate) type Sustained = [Weights; 3];
+
+/// What frames leave at one moment.
+#[derive(Clone, Debug)]
+pub(crate) struct Look {
+    pub(crate) sustained: Sustained,
     /// By luminance.
     transient: Vec<Weights>,
+}
+
+/// Where a luminance stands between those that transient responses are tabulated for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Level {
+    below: usize,
+    share: f32,
+}
+
+impl Level {
+    pub(crate) fn of(adaptation_cd_m2: f32) -> Self {
+        let decades = f64::from(adaptation_cd_m2.max(1e-6)).log10() - LOWEST_DECADE;
+        let position = (decades * DECADE_STEPS as f64).clamp(0.0, (LEVELS - 1) as f64);
+        let below = (position as usize).min(LEVELS - 2);
+        Self { below, share: (position - below as f64) as f32 }
+    }
+}
+
+impl Look {
+    /// The transient channel's weight of a frame, for an eye adapted to a luminance.
+    pub(crate) fn transient(&self, frame: usize, level: Level) -> f32 {
+        let [low, high] = [level.below, level.below + 1].map(|level| self.transient[level][frame]);
+        low + level.share * (high - low)
+    }
 }
 
 impl FrameResponses {
     pub(crate) fn new(timing: FrameTiming) -> Result<Self, Error> {
         timing.check()?;
-        let transient = (0..LEVELS).map(|level| {
-            let luminance_cd_m2 = 10f64.powf(LOWEST_DECADE + level as f64 / DECADE_STEPS as f64);
-            timing.transient_weights(|hz| transient_response(hz, luminance_cd_m2))
-        });
-        let chromatic = |channel| timing.still_weights(|hz| chromatic_response(channel, hz));
+        let count = (LOOKS_A_SECOND / timing.frames_per_second).ceil() as usize;
+        let frame_s = 1.0 / timing.frames_per_second;
+        let moment_s = |look: usize| ((look as f64 + 0.5) / count as f64 - 0.5) * frame_s;
         Ok(Self {
-            transient: transient.collect(),
-            red_green: chromatic(ChromaticChannel::RedGreen),
-            yellow_violet: chromatic(ChromaticChannel::YellowViolet),
-            sustained: timing.still_weights(sustained_response),
+            reach: timing.reach(),
+            middle: Moment::new(timing, 0.0).sustained(),
+            looks: (0..count).map(|look| Moment::new(timing, moment_s(look)).look()).collect(),
         })
     }
 
     /// Frames to each side that have a weight.
     pub(crate) fn reach(&self) -> usize {
-        self.sustained.len() - 1
-    }
-
-    /// The transient channel's weight of a frame that is this far away, for an eye adapted to a luminance.
-    pub(crate) fn transient(&self, distance: usize, adaptation_cd_m2: f32) -> f32 {
-        let decades = f64::from(adaptation_cd_m2.max(1e-6)).log10() - LOWEST_DECADE;
-        let position = (decades * DECADE_STEPS as f64).clamp(0.0, (LEVELS - 1) as f64);
-        let below = (position as usize).min(LEVELS - 2);
-        let share = (position - below as f64) as f32;
-        let [low, high] = [below, below + 1].map(|level| self.transient[level][distance]);
-        low + share * (high - low)
+        self.reach
     }
 }
 
@@ -69,45 +98,79 @@ impl FrameTiming {
     fn reach(self) -> usize {
         ((REACH_S * self.frames_per_second).ceil() as usize).max(1)
     }
+}
 
-    /// h(k) for k from 0 on.
-    fn weights(self, response: impl Fn(f64) -> f64) -> Vec<f64> {
-        let frame_s = 1.0 / self.frames_per_second;
-        let hz_step = 0.25f64.min(self.frames_per_second / 64.0);
-        let middles: Vec<f64> =
-            (0..(HIGHEST_HZ / hz_step) as usize).map(|step| (step as f64 + 0.5) * hz_step).collect();
-        let densities: Vec<f64> =
-            middles.iter().map(|&hz| 2.0 * frame_s * hz_step * response(hz) * self.held(hz)).collect();
-        let at = |frames: usize| {
-            let phase = TAU * frames as f64 * frame_s;
-            middles.iter().zip(&densities).map(|(hz, density)| density * (phase * hz).cos()).sum()
+/// One moment, and how the waves of all frequencies stand to it.
+struct Moment {
+    timing: FrameTiming,
+    hz_step: f64,
+    hz: Vec<f64>,
+    /// Of each frame, by frequency.
+    waves: Vec<Vec<f64>>,
+}
+
+impl Moment {
+    /// So long after the middle of the frame that is shown.
+    fn new(timing: FrameTiming, moment_s: f64) -> Self {
+        let hz_step = 0.25f64.min(timing.frames_per_second / 16.0);
+        let hz: Vec<f64> = (0..(HIGHEST_HZ / hz_step) as usize).map(|step| (step as f64 + 0.5) * hz_step).collect();
+        let reach = timing.reach() as f64;
+        let of_frame = |frame: usize| {
+            let distance_s = (frame as f64 - reach) / timing.frames_per_second - moment_s;
+            hz.iter().map(|hz| (TAU * hz * distance_s).cos()).collect()
         };
-        (0..=self.reach()).map(at).collect()
+        let waves = (0..=2 * timing.reach()).map(of_frame).collect();
+        Self { timing, hz_step, hz, waves }
     }
 
-    /// Weights of a channel that sees what stands still whole.
-    fn still_weights(self, response: impl Fn(f64) -> f64) -> Weights {
-        with_sum(self.weights(response), 1.0).iter().map(|&weight| weight as f32).collect()
+    /// h(k, t) of a display that is lit for a share of its time.
+    fn weights(&self, response: impl Fn(f64) -> f64, persistence: f64) -> Vec<f64> {
+        let timing = FrameTiming { persistence, ..self.timing };
+        let scale = 2.0 * self.hz_step / timing.frames_per_second;
+        let densities: Vec<f64> = self.hz.iter().map(|&hz| scale * response(hz) * timing.held(hz)).collect();
+        self.waves.iter().map(|wave| wave.iter().zip(&densities).map(|(wave, density)| wave * density).sum()).collect()
     }
 
-    /// Weights of a channel that sees nothing of what stands still.
-    fn transient_weights(self, response: impl Fn(f64) -> f64 + Copy) -> Weights {
-        let weights = with_sum(self.weights(response), 0.0);
-        let energy = sum_both_sides(&weights, |weight| weight * weight).max(1e-30);
-        let scale = (self.seen_energy(|hz| response(hz).powi(2)) / energy).sqrt();
-        weights.iter().map(|weight| (weight * scale) as f32).collect()
+    /// Weights in a sustained channel of frames that are held. They add up to 1: what the window's ends cut off is slow, and is spread
+    /// evenly over all frames.
+    fn held(&self, response: impl Fn(f64) -> f64) -> Vec<f64> {
+        let weights = self.weights(response, 1.0);
+        let cut_off = (1.0 - weights.iter().sum::<f64>()) / weights.len() as f64;
+        weights.iter().map(|weight| weight + cut_off).collect()
     }
-}
 
-/// What the window's end cuts off is slow: it is spread evenly over all frames.
-fn with_sum(weights: Vec<f64>, sum: f64) -> Vec<f64> {
-    let missing = (sum - sum_both_sides(&weights, |weight| weight)) / (2 * weights.len() - 1) as f64;
-    weights.iter().map(|weight| weight + missing).collect()
-}
+    /// Weights in a channel that leaves `still` of what stands still. Nothing is scaled, since what is there may be near 0: what the
+    /// window's ends cut off is spread evenly, and what a display's flashes add to a still is taken from frames as the eye holds them.
+    fn with_sum(&self, response: impl Fn(f64) -> f64 + Copy, still: f64, held: &[f64]) -> Weights {
+        let weights = self.weights(response, self.timing.persistence);
+        let sum_if_held = self.weights(response, 1.0).iter().sum::<f64>();
+        let cut_off = (still - sum_if_held) / weights.len() as f64;
+        let of_flashes = weights.iter().sum::<f64>() - sum_if_held;
+        weights.iter().zip(held).map(|(weight, held)| (weight + cut_off - of_flashes * held) as f32).collect()
+    }
 
-/// Over frames before, at and after.
-fn sum_both_sides(weights: &[f64], of: impl Fn(f64) -> f64) -> f64 {
-    2.0 * weights.iter().map(|&weight| of(weight)).sum::<f64>() - of(weights[0])
+    fn still(&self, response: impl Fn(f64) -> f64 + Copy) -> Weights {
+        self.with_sum(response, 1.0, &self.held(response))
+    }
+
+    fn sustained(&self) -> Sustained {
+        let chromatic = |channel| self.still(|hz| chromatic_response(channel, hz));
+        [
+            self.still(sustained_response),
+            chromatic(ChromaticChannel::RedGreen),
+            chromatic(ChromaticChannel::YellowViolet),
+        ]
+    }
+
+    fn look(&self) -> Look {
+        let held = self.held(sustained_response);
+        let transient = (0..LEVELS).map(|level| {
+            let luminance_cd_m2 = 10f64.powf(LOWEST_DECADE + level as f64 / DECADE_STEPS as f64);
+            let response = |hz: f64| transient_response(hz, luminance_cd_m2);
+            self.with_sum(response, 0.0, &held)
+        });
+        Look { transient: transient.collect(), sustained: self.sustained() }
+    }
 }
 
 /// The transient channel's spatial sensitivity, at its best flicker.
@@ -129,38 +192,60 @@ impl ContrastSensitivity for CastleTransient {
 mod tests {
     use super::*;
 
-    /// The weights' energy for noise that is new in every frame is what the integrals over all frequencies say: exactly for the
-    /// transient channel, but for what frames alias for the sustained one.
+    fn sum(weights: &[f32], of: impl Fn(f64) -> f64) -> f64 {
+        weights.iter().map(|&weight| of(f64::from(weight))).sum()
+    }
+
+    fn transient(look: &Look, luminance_cd_m2: f32) -> Weights {
+        (0..look.sustained[0].len()).map(|frame| look.transient(frame, Level::of(luminance_cd_m2))).collect()
+    }
+
+    /// Over all looks, the weights' energy for noise that is new in every frame is what the integrals over all frequencies say.
     #[test]
     fn fresh_noise_keeps_its_energy() {
-        for frames_per_second in [24.0, 30.0, 60.0, 120.0] {
+        for frames_per_second in [6.0, 24.0, 30.0, 60.0, 120.0] {
             let timing = FrameTiming { frames_per_second, persistence: 1.0 };
-            let responses = FrameResponses::new(timing).unwrap();
-            let energy = |weights: &Weights| {
-                sum_both_sides(&weights.iter().map(|&w| f64::from(w)).collect::<Vec<_>>(), |w| w * w)
-            };
-            let expected = timing.seen_energy(|hz| sustained_response(hz).powi(2));
-            let ratio = energy(&responses.sustained) / expected;
-            assert!((ratio - 1.0).abs() < 0.04, "{frames_per_second}: {ratio}");
-            let transient: Weights = (0..=responses.reach()).map(|k| responses.transient(k, 100.0)).collect();
-            let expected = timing.seen_energy(|hz| transient_response(hz, 100.0).powi(2));
-            assert!((energy(&transient) / expected - 1.0).abs() < 1e-3);
+            let looks = FrameResponses::new(timing).unwrap().looks;
+            let mean = |of: &dyn Fn(&Look) -> f64| looks.iter().map(of).sum::<f64>() / looks.len() as f64;
+            let energy = mean(&|look| sum(&look.sustained[0], |weight| weight * weight));
+            let ratio = energy / timing.seen_energy(|hz| sustained_response(hz).powi(2));
+            assert!((ratio - 1.0).abs() < 0.04, "{frames_per_second}, sustained: {ratio}");
+            for luminance in [10.0, 100.0, 1000.0] {
+                let energy = mean(&|look| sum(&transient(look, luminance), |weight| weight * weight));
+                let ratio = energy / timing.seen_energy(|hz| transient_response(hz, f64::from(luminance)).powi(2));
+                assert!((ratio - 1.0).abs() < 0.04, "{frames_per_second}, {luminance} cd/m²: {ratio}");
+            }
         }
     }
 
     #[test]
     fn what_stands_still_is_for_the_sustained_channels_alone() {
-        for frames_per_second in [1.0, 24.0, 240.0, 1000.0] {
-            let timing = FrameTiming { frames_per_second, persistence: 0.5 };
-            let responses = FrameResponses::new(timing).unwrap();
-            let sum =
-                |weights: &[f32]| sum_both_sides(&weights.iter().map(|&w| f64::from(w)).collect::<Vec<_>>(), |w| w);
-            for weights in [&responses.sustained, &responses.red_green, &responses.yellow_violet] {
-                assert!((sum(weights) - 1.0).abs() < 1e-5);
+        for (frames_per_second, persistence) in
+            [(1.0, 0.5), (1.0, 1e-3), (3.0, 0.5), (24.0, 0.5), (24.0, 1.0), (240.0, 0.5), (1000.0, 0.5)]
+        {
+            let responses = FrameResponses::new(FrameTiming { frames_per_second, persistence }).unwrap();
+            for look in &responses.looks {
+                for weights in look.sustained.iter().chain(&responses.middle) {
+                    assert!((sum(weights, |weight| weight) - 1.0).abs() < 1e-5);
+                }
+                for luminance in [0.0, 1e-3, 7.0, 1e9] {
+                    let weights = transient(look, luminance);
+                    let sum = sum(&weights, |weight| weight);
+                    assert!(sum.abs() < 1e-5, "{frames_per_second} {luminance}: {weights:?}");
+                }
             }
-            for luminance in [0.0, 1e-3, 7.0, 1e9] {
-                let transient: Weights = (0..=responses.reach()).map(|k| responses.transient(k, luminance)).collect();
-                assert!(sum(&transient).abs() < 1e-5, "{frames_per_second} {luminance}: {transient:?}");
+        }
+    }
+
+    /// No weights grow out of nearly nothing: they are at most what the channel leaves of all light.
+    #[test]
+    fn slow_frames_have_no_great_weights() {
+        for frames_per_second in [1.0, 1.5, 2.0, 3.0, 3.9, 4.0, 5.0] {
+            let responses = FrameResponses::new(FrameTiming { frames_per_second, persistence: 1.0 }).unwrap();
+            for look in &responses.looks {
+                let greatest =
+                    |weights: &[f32]| weights.iter().fold(0f32, |greatest, weight| greatest.max(weight.abs()));
+                assert!(greatest(&look.sustained[0]) < 1.05 && greatest(&transient(look, 100.0)) < 0.7);
             }
         }
     }

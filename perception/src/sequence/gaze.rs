@@ -4,6 +4,7 @@ use crate::csf::DRIFT_DEG_S;
 use crate::display::{Display, PixelDensity};
 use crate::motion::eye_velocity_deg_s;
 use crate::plane::Plane;
+use rayon::prelude::*;
 
 /// How what a frame shows moves over it, in pixels, x to the right and y down. What is not finite counts as rest.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,17 +43,87 @@ impl Place {
     /// One frame on, with an eye that follows what is here.
     pub(super) fn followed(self, motion: Option<&FrameMotion>, towards: Towards, display: &Display) -> Self {
         let Some(motion) = motion else { return self };
-        let [x, y] = match towards {
-            Towards::Earlier => &motion.to_previous,
-            Towards::Later => &motion.to_next,
+        let pixel = self.pixel(motion.to_next[0].width(), motion.to_next[0].height());
+        let (x, y) = eye_step(motion, pixel, towards, display);
+        self.moved(x, y)
+    }
+
+    fn moved(self, x: f32, y: f32) -> Self {
+        Self { x: self.x + x, y: self.y + y }
+    }
+}
+
+/// How far an eye that follows a pixel's content goes until the next or the previous frame, pixels.
+fn eye_step(motion: &FrameMotion, pixel: usize, towards: Towards, display: &Display) -> (f32, f32) {
+    let [x, y] = match towards {
+        Towards::Earlier => &motion.to_previous,
+        Towards::Later => &motion.to_next,
+    };
+    let (x, y) = (x.values()[pixel], y.values()[pixel]);
+    if !(x.is_finite() && y.is_finite()) {
+        return (0.0, 0.0);
+    }
+    let gain = pursuit_gain((x, y), display);
+    (gain * x, gain * y)
+}
+
+/// The longest time over which a frame is smeared, seconds: of one that is held for longer the eye sees parts one after the other.
+const LONGEST_SMEAR_S: f64 = 1.0 / 24.0;
+/// Places that half a smear is summed over: for each pixel of its length, beside as many as tell which part of a short one lies within
+/// the pixel itself.
+const TAPS_A_PIXEL: f32 = 2.0;
+const LEAST_TAPS: f32 = 6.0;
+const MOST_TAPS: f32 = 64.0;
+/// Pixels from a pixel's centre to its border.
+const WITHIN_PIXEL: f32 = 0.5;
+
+/// For half a smear of so many pixels.
+fn taps(length: f32) -> f32 {
+    if length <= WITHIN_PIXEL { 1.0 } else { (LEAST_TAPS + TAPS_A_PIXEL * length).min(MOST_TAPS).ceil() }
+}
+
+/// The way of each pixel's retinal place over a frame, from where it is when the frame is half through its time, pixels.
+#[derive(Clone, Copy, Debug)]
+struct Smear {
+    backward: (f32, f32),
+    forward: (f32, f32),
+}
+
+/// How an eye that follows smears a frame while it is held. Place and time are taken apart: a frame is smeared first, and weighed by
+/// its time then. Fresh noise keeps 0.81, 0.61, 0.46 and 0.36 of its visibility at rest under 2, 5, 10 and 20 pixels a frame so, where
+/// its moved spectrum says 0.89, 0.68, 0.51 and 0.37 (24 frames a second, 30 pixels a degree).
+pub(super) struct Smears(Vec<Smear>);
+
+impl Smears {
+    pub(super) fn of(motion: &FrameMotion, display: &Display) -> Self {
+        let lit_s = display.persistence / display.frames_per_second;
+        let half = (0.5 * lit_s.min(LONGEST_SMEAR_S) * display.frames_per_second) as f32;
+        let of_pixel = |pixel: usize| {
+            let step = |towards| {
+                let (x, y) = eye_step(motion, pixel, towards, display);
+                (half * x, half * y)
+            };
+            Smear { backward: step(Towards::Earlier), forward: step(Towards::Later) }
         };
-        let pixel = self.pixel(x.width(), x.height());
-        let (x, y) = (x.values()[pixel], y.values()[pixel]);
-        if !(x.is_finite() && y.is_finite()) {
-            return self;
-        }
-        let gain = pursuit_gain((x, y), display);
-        Self { x: self.x + gain * x, y: self.y + gain * y }
+        Self((0..motion.to_next[0].values().len()).into_par_iter().map(of_pixel).collect())
+    }
+
+    /// The mean of what passes each place.
+    pub(super) fn over(&self, plane: &Plane) -> Plane {
+        let (width, height) = (plane.width(), plane.height());
+        Plane::from_fn(width, height, |x, y| {
+            let place = Place::center_of(x, y);
+            let Smear { backward, forward } = self.0[y * width + x];
+            let sum_of = |(x, y): (f32, f32)| {
+                let taps = taps(x.hypot(y));
+                let tap = |index: u32| {
+                    let share = (index as f32 + 0.5) / taps;
+                    plane.values()[place.moved(share * x, share * y).pixel(width, height)]
+                };
+                (0..taps as u32).map(tap).sum::<f32>() / taps
+            };
+            0.5 * (sum_of(backward) + sum_of(forward))
+        })
     }
 }
 

@@ -5,7 +5,7 @@
 //! function of a velocity map. Here frames are brought together along the eye's way over the picture, and what then changes
 //! from frame to frame goes through castleCSF's temporal channels (Ashraf et al. 2024): noise that is new in every frame
 //! is integrated, error that travels with an object is seen nearly as in a still, and what is locked to the screen under a
-//! moving eye is blurred, all by one filter. Not for stills (see [`crate::difference`]; equal frames without end give the
+//! moving eye is blurred, all by one filter. A frame is looked at several times while it is shown, and counts as at the worst of them. Not for stills (see [`crate::difference`]; equal frames without end give the
 //! same), nor for frames that somebody may pause.
 
 mod gaze;
@@ -14,16 +14,23 @@ pub use gaze::FrameMotion;
 
 use crate::adaptation::adapted;
 use crate::colour::Channels;
-use crate::csf::{CastleChromatic, CastleCsf, CastleTransient, ChromaticChannel, FrameResponses, FrameTiming, Weights};
-use crate::difference::{Difference, HeldAtLowFrequencies, masked_by_both, mutual_visibility};
+use crate::csf::{
+    CastleChromatic, CastleCsf, CastleTransient, ChromaticChannel, FrameResponses, FrameTiming, Level, Look,
+};
+use crate::difference::{Difference, HeldAtLowFrequencies, masked_by_both};
 use crate::display::Viewing;
 use crate::error::Error;
 use crate::plane::Plane;
 use crate::sensitivity::adaptation_levels;
 use crate::threshold::{ThresholdInputs, ThresholdMap, chromatic_threshold_map, threshold_map};
 use crate::visibility::ErrorFilters;
-use gaze::{Place, Towards};
+use gaze::{Place, Smears, Towards};
 use rayon::prelude::*;
+
+/// Looks that are taken together, for which pictures are held in memory.
+const LOOKS_AT_ONCE: usize = 5;
+/// Of so many looks one is at colours, which are seen to flicker half as fast: it saves a quarter of the time.
+const LOOKS_A_COLOUR: usize = 2;
 
 /// A frame of two sequences that show the same, and how it moves.
 pub struct SequenceFrame {
@@ -69,13 +76,35 @@ pub struct SequenceObserver {
     responses: FrameResponses,
 }
 
-/// What the eye's channels hold of a frame and those around it, cd/m².
+/// What the sustained channels hold of both pictures, cd/m²: luminance, red–green, yellow–violet.
 #[derive(Clone, Copy, Default)]
-struct Seen {
+struct Light {
     reference: [f32; 3],
     test: [f32; 3],
-    /// Of the luminance difference, in the transient channel.
+}
+
+/// What the eye's channels hold of the difference at one moment, cd/m².
+#[derive(Clone, Copy, Default)]
+struct Seen {
+    sustained: [f32; 3],
+    /// Of luminance, in the transient channel.
     transient: f32,
+}
+
+/// What both pictures do to thresholds while a frame is shown.
+struct Thresholds {
+    achromatic: ThresholdMap,
+    transient: ThresholdMap,
+    red_green: ThresholdMap,
+    yellow_violet: ThresholdMap,
+}
+
+/// The eye's filters under these thresholds.
+struct Filters<'a> {
+    sustained: ErrorFilters<'a>,
+    transient: ErrorFilters<'a>,
+    red_green: ErrorFilters<'a>,
+    yellow_violet: ErrorFilters<'a>,
 }
 
 impl SequenceObserver {
@@ -97,8 +126,22 @@ impl SequenceObserver {
         self.responses.reach()
     }
 
-    /// What is seen of the difference while frame `now` of these is shown. Frames that would stand before the first or
-    /// after the last are like these.
+    /// A frame between others as it falls on the retina: an eye that follows smears it while it is held. Without motion nothing is
+    /// smeared. The first frame and the last are better left as they are, since beyond them all rests.
+    #[must_use]
+    pub fn held(&self, frame: SequenceFrame) -> SequenceFrame {
+        let Some(motion) = &frame.motion else { return frame };
+        let smears = Smears::of(motion, &self.viewing.display);
+        let held = |channels: &Channels| Channels {
+            achromatic: smears.over(&channels.achromatic),
+            red_green: smears.over(&channels.red_green),
+            yellow_violet: smears.over(&channels.yellow_violet),
+        };
+        SequenceFrame { reference: held(&frame.reference), test: held(&frame.test), ..frame }
+    }
+
+    /// What is seen of the difference while frame `now` of these is shown, at the worst moment for each pixel. Frames that would
+    /// stand before the first or after the last are like these.
     ///
     /// # Errors
     /// [`Error::SizeMismatch`] for frames of several sizes, [`Error::Empty`] unless there is a frame `now`.
@@ -122,98 +165,179 @@ impl SequenceObserver {
         for frame in frames {
             frame.reference.achromatic.check_size("frame", width, height)?;
         }
-        let seen = self.through_time(frames, now);
-        let plane = |of: &(dyn Fn(&Seen) -> f32 + Sync)| Plane::from_fn(width, height, |x, y| of(&seen[y * width + x]));
-        let light = |of: fn(&Seen) -> f32| plane(&|seen| of(seen).max(0.0));
-        let (reference, test) = (light(|seen| seen.reference[0]), light(|seen| seen.test[0]));
-        let mut greatest =
-            self.achromatic([&reference, &test], &plane(&|s| s.test[0] - s.reference[0]), &plane(&|s| s.transient))?;
-        for (index, channel) in [(1, ChromaticChannel::RedGreen), (2, ChromaticChannel::YellowViolet)] {
-            let csf = CastleChromatic::new(channel, self.viewing.observer.csf_area_deg2)?;
-            let csf = HeldAtLowFrequencies { base: &csf };
-            let (own, other) = (plane(&|seen| seen.reference[index]), plane(&|seen| seen.test[index]));
-            let map = chromatic_threshold_map(&own, &reference, &self.viewing, &csf)?;
-            let other_map = chromatic_threshold_map(&other, &test, &self.viewing, &csf)?;
-            let visibility = mutual_visibility(map, &other_map, &own, &other);
-            greatest.values_mut().iter_mut().zip(visibility.values()).for_each(|(v, other)| *v = v.max(*other));
+        let adaptation = adapted(&shown.reference.achromatic, &self.viewing);
+        let thresholds = self.thresholds(&self.light(frames, now), width, height)?;
+        let mut filters = Filters::new(&thresholds);
+        let mut greatest = Plane::filled(width, height, 0.0);
+        for (chunk, looks) in self.responses.looks.chunks(LOOKS_AT_ONCE).enumerate() {
+            for (look, seen) in self.seen(frames, now, looks, &adaptation).iter().enumerate() {
+                filters.add_achromatic(&mut greatest, seen);
+                if (chunk * LOOKS_AT_ONCE + look).is_multiple_of(LOOKS_A_COLOUR) {
+                    filters.add_chromatic(&mut greatest, seen);
+                }
+            }
         }
         Ok(Difference::of(greatest))
     }
 
-    /// Sums frames along the eye's way through them.
-    fn through_time(&self, frames: &[&SequenceFrame], now: usize) -> Vec<Seen> {
+    /// Calls `visit` with each frame that reaches the one that is shown, by its number among the weights, and the pixel of it that
+    /// is where the eye sees `pixel` of that one.
+    fn along_the_eyes_way<'f>(
+        &self,
+        frames: &[&'f SequenceFrame],
+        now: usize,
+        pixel: usize,
+        mut visit: impl FnMut(usize, &'f SequenceFrame, usize),
+    ) {
         let (width, height) = frames[now].size();
-        let adaptation = adapted(&frames[now].reference.achromatic, &self.viewing);
-        let last = frames.len() - 1;
-        (0..width * height)
-            .into_par_iter()
-            .map(|pixel| {
-                let mut seen = Seen::default();
-                let adapted_to = adaptation.values()[pixel];
-                self.add(&mut seen, frames[now], pixel, 0, adapted_to);
-                for towards in [Towards::Earlier, Towards::Later] {
-                    let mut place = Place::center_of(pixel % width, pixel / width);
-                    let mut index = now;
-                    for distance in 1..=self.reach() {
-                        let next = match towards {
-                            Towards::Earlier => index.saturating_sub(1),
-                            Towards::Later => (index + 1).min(last),
-                        };
-                        // Beyond the ends the picture rests, and the eye with it.
-                        if next != index {
-                            place = place.followed(frames[index].motion.as_ref(), towards, &self.viewing.display);
-                            index = next;
-                        }
-                        self.add(&mut seen, frames[index], place.pixel(width, height), distance, adapted_to);
-                    }
+        let (reach, last) = (self.reach(), frames.len() - 1);
+        visit(reach, frames[now], pixel);
+        for towards in [Towards::Earlier, Towards::Later] {
+            let mut place = Place::center_of(pixel % width, pixel / width);
+            let mut index = now;
+            for distance in 1..=reach {
+                let (next, weight) = match towards {
+                    Towards::Earlier => (index.saturating_sub(1), reach - distance),
+                    Towards::Later => ((index + 1).min(last), reach + distance),
+                };
+                // Beyond the ends the picture rests, and the eye with it.
+                if next != index {
+                    place = place.followed(frames[index].motion.as_ref(), towards, &self.viewing.display);
+                    index = next;
                 }
-                seen
-            })
-            .collect()
-    }
-
-    fn add(&self, seen: &mut Seen, frame: &SequenceFrame, pixel: usize, distance: usize, adapted_to: f32) {
-        let FrameResponses { sustained, red_green, yellow_violet, .. } = &self.responses;
-        let weight = |weights: &Weights| weights[distance];
-        let weights = [weight(sustained), weight(red_green), weight(yellow_violet)];
-        let of = |channels: &Channels| {
-            [&channels.achromatic, &channels.red_green, &channels.yellow_violet].map(|plane| plane.values()[pixel])
-        };
-        let (reference, test) = (of(&frame.reference), of(&frame.test));
-        for channel in 0..3 {
-            seen.reference[channel] += weights[channel] * reference[channel];
-            seen.test[channel] += weights[channel] * test[channel];
+                visit(weight, frames[index], place.pixel(width, height));
+            }
         }
-        seen.transient += self.responses.transient(distance, adapted_to) * (test[0] - reference[0]);
     }
 
-    /// Visibility of a luminance difference whose sustained and transient parts are given; both channels add in amplitude.
-    fn achromatic(&self, [reference, test]: [&Plane; 2], sustained: &Plane, transient: &Plane) -> Result<Plane, Error> {
+    /// What is held of both pictures in the middle of a frame.
+    fn light(&self, frames: &[&SequenceFrame], now: usize) -> Vec<Light> {
+        let (width, height) = frames[now].size();
+        let of = |pixel: usize| {
+            let mut light = Light::default();
+            self.along_the_eyes_way(frames, now, pixel, |weight, frame, pixel| {
+                let (reference, test) = (at(&frame.reference, pixel), at(&frame.test, pixel));
+                for (channel, weights) in self.responses.middle.iter().enumerate() {
+                    light.reference[channel] += weights[weight] * reference[channel];
+                    light.test[channel] += weights[weight] * test[channel];
+                }
+            });
+            light
+        };
+        (0..width * height).into_par_iter().map(of).collect()
+    }
+
+    /// What is held of the difference at some moments, each as planes.
+    fn seen(&self, frames: &[&SequenceFrame], now: usize, looks: &[Look], adaptation: &Plane) -> Vec<SeenPlanes> {
+        let (width, height) = frames[now].size();
+        let of = |pixel: usize| {
+            let mut seen = [Seen::default(); LOOKS_AT_ONCE];
+            let level = Level::of(adaptation.values()[pixel]);
+            self.along_the_eyes_way(frames, now, pixel, |weight, frame, pixel| {
+                let (reference, test) = (at(&frame.reference, pixel), at(&frame.test, pixel));
+                let difference = [0, 1, 2].map(|channel| test[channel] - reference[channel]);
+                for (seen, look) in seen.iter_mut().zip(looks) {
+                    for (channel, weights) in look.sustained.iter().enumerate() {
+                        seen.sustained[channel] += weights[weight] * difference[channel];
+                    }
+                    seen.transient += look.transient(weight, level) * difference[0];
+                }
+            });
+            seen
+        };
+        let seen: Vec<[Seen; LOOKS_AT_ONCE]> = (0..width * height).into_par_iter().map(of).collect();
+        let plane = |look: usize, of: &(dyn Fn(&Seen) -> f32 + Sync)| {
+            Plane::from_fn(width, height, |x, y| of(&seen[y * width + x][look]))
+        };
+        let planes = |look: usize| SeenPlanes {
+            sustained: [0, 1, 2].map(|channel| plane(look, &|seen: &Seen| seen.sustained[channel])),
+            transient: plane(look, &|seen: &Seen| seen.transient),
+        };
+        (0..looks.len()).map(planes).collect()
+    }
+
+    /// Thresholds between two pictures, with the masks that both of them have.
+    fn thresholds(&self, light: &[Light], width: usize, height: usize) -> Result<Thresholds, Error> {
+        let plane =
+            |of: &(dyn Fn(&Light) -> f32 + Sync)| Plane::from_fn(width, height, |x, y| of(&light[y * width + x]));
+        let reference = plane(&|light| light.reference[0].max(0.0));
+        let test = plane(&|light| light.test[0].max(0.0));
         let area_deg2 = self.viewing.observer.csf_area_deg2;
         let csf = CastleCsf::new(area_deg2)?;
         let csf = HeldAtLowFrequencies { base: &csf };
         let map_of = |picture: &Plane| {
-            threshold_map(
-                &ThresholdInputs { display_luminance_cd_m2: picture, guide_variance: None },
-                &self.viewing,
-                &csf,
-            )
+            let inputs = ThresholdInputs { display_luminance_cd_m2: picture, guide_variance: None };
+            threshold_map(&inputs, &self.viewing, &csf)
         };
-        let map = masked_by_both(map_of(reference)?, &map_of(test)?);
-        let (least, greatest) = map.adaptation_cd_m2().range();
+        let achromatic = masked_by_both(map_of(&reference)?, &map_of(&test)?);
+        let (least, greatest) = achromatic.adaptation_cd_m2().range();
         let flicker = HeldAtLowFrequencies { base: &CastleTransient { area_deg2 } };
-        let for_transient =
-            ThresholdMap { levels: adaptation_levels(&self.viewing, &flicker, least, greatest), ..map.clone() };
-        let (mut still, mut moving) = (ErrorFilters::amid_equals(&map), ErrorFilters::amid_equals(&for_transient));
-        let (sustained, transient) = (still.spectrum(sustained), moving.spectrum(transient));
-        let mut energy = still.nothing();
-        for band in 0..map.band_count() {
-            let (a, b) = (still.response(&sustained, band), moving.response(&transient, band));
+        let levels = adaptation_levels(&self.viewing, &flicker, least, greatest);
+        let chromatic = |index: usize, channel: ChromaticChannel| {
+            let csf = CastleChromatic::new(channel, area_deg2)?;
+            let csf = HeldAtLowFrequencies { base: &csf };
+            let map_of = |own: &Plane, luminance: &Plane| chromatic_threshold_map(own, luminance, &self.viewing, &csf);
+            let map = map_of(&plane(&|light| light.reference[index]), &reference)?;
+            Ok(masked_by_both(map, &map_of(&plane(&|light| light.test[index]), &test)?))
+        };
+        Ok(Thresholds {
+            transient: ThresholdMap { levels, ..achromatic.clone() },
+            red_green: chromatic(1, ChromaticChannel::RedGreen)?,
+            yellow_violet: chromatic(2, ChromaticChannel::YellowViolet)?,
+            achromatic,
+        })
+    }
+}
+
+/// [`Seen`] of all pixels.
+struct SeenPlanes {
+    sustained: [Plane; 3],
+    transient: Plane,
+}
+
+impl<'a> Filters<'a> {
+    fn new(thresholds: &'a Thresholds) -> Self {
+        Self {
+            sustained: ErrorFilters::amid_equals(&thresholds.achromatic),
+            transient: ErrorFilters::amid_equals(&thresholds.transient),
+            red_green: ErrorFilters::amid_equals(&thresholds.red_green),
+            yellow_violet: ErrorFilters::amid_equals(&thresholds.yellow_violet),
+        }
+    }
+
+    /// Raises a visibility to that of luminance at one moment where it is greater.
+    fn add_achromatic(&mut self, greatest: &mut Plane, seen: &SeenPlanes) {
+        let visibility = self.achromatic(&seen.sustained[0], &seen.transient);
+        raise(greatest, &visibility);
+    }
+
+    /// The same for colours.
+    fn add_chromatic(&mut self, greatest: &mut Plane, seen: &SeenPlanes) {
+        let [_, red_green, yellow_violet] = &seen.sustained;
+        raise(greatest, &self.red_green.visibility(red_green));
+        raise(greatest, &self.yellow_violet.visibility(yellow_violet));
+    }
+
+    /// Visibility of a luminance difference whose sustained and transient parts are given; both channels add in amplitude.
+    fn achromatic(&mut self, sustained: &Plane, transient: &Plane) -> Plane {
+        let (sustained, transient) = (self.sustained.spectrum(sustained), self.transient.spectrum(transient));
+        let mut energy = self.sustained.nothing();
+        for band in 0..self.sustained.band_count() {
+            let (a, b) = (self.sustained.response(&sustained, band), self.transient.response(&transient, band));
             let both = a.enlarged_with(&b, |sustained, transient| (sustained + transient).powi(2));
             energy.values_mut().iter_mut().zip(both.values()).for_each(|(sum, more)| *sum += more);
         }
-        Ok(still.visibility_of(&energy))
+        self.sustained.visibility_of(&energy)
     }
+}
+
+fn raise(greatest: &mut Plane, other: &Plane) {
+    greatest.values_mut().iter_mut().zip(other.values()).for_each(|(v, other)| *v = v.max(*other));
+}
+
+/// A pixel's luminance, red–green and yellow–violet.
+fn at(channels: &Channels, pixel: usize) -> [f32; 3] {
+    [&channels.achromatic, &channels.red_green, &channels.yellow_violet].map(|plane| plane.values()[pixel])
 }
 
 #[cfg(test)]

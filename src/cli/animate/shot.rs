@@ -111,12 +111,15 @@ impl<'a> Shot<'a> {
             && (least < first || greatest > last)
         {
             let whole = Frames { first: first.min(least), last: last.max(greatest) };
-            say!(
-                "note: of this sequence frames {least} to {greatest} are there; one exposure for all its parts needs --shot {}..{} in \
-                 each call.",
-                whole.first,
-                whole.last
-            );
+            // Frames that lie so far apart are not of one shot.
+            if whole.is_a_shot() {
+                say!(
+                    "note: of this sequence frames {least} to {greatest} are there; one exposure for all its parts needs --shot {}..{} \
+                     in each call.",
+                    whole.first,
+                    whole.last
+                );
+            }
         }
     }
 
@@ -313,6 +316,7 @@ impl<'a> Shot<'a> {
         if !missing.is_empty() {
             let (frames, are) = if missing.len() == 1 { ("frame", "is") } else { ("frames", "are") };
             say!("{frames} {} of the shot {are} not there yet, or changed.", listed(&missing));
+            self.note_outdated()?;
             return Ok(false);
         }
         write_json(&self.name.of_shot("json"), &records)?;
@@ -330,6 +334,18 @@ impl<'a> Shot<'a> {
             video::write(path, format, files, &fits, &self.settings)?;
         }
         Ok(true)
+    }
+
+    /// Names what there is of the shot as it was before, whose frames are no longer those.
+    fn note_outdated(&self) -> Result<()> {
+        let video = self.arguments.video()?.map(|(path, _)| path.to_owned());
+        let files = [Some(self.name.of_shot("json")), Some(self.name.of_shot("contact.png")), video];
+        let outdated: Vec<String> =
+            files.into_iter().flatten().filter(|file| file.is_file()).map(|file| file.display().to_string()).collect();
+        if !outdated.is_empty() {
+            say!("note: still of the shot as it was before, until all its frames are there: {}", outdated.join(", "));
+        }
+        Ok(())
     }
 
     fn write(&self, file: &Path, made: &RenderedFrame, settings: &LoopSettings, report: &Report) -> Result<()> {

@@ -79,7 +79,10 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
     for frame in first..=last {
         let middle = u64::from(frame);
         while next <= u64::from(last).min(middle + reach) {
-            window.push_back(sequences.frame(next as u32)?);
+            let shown = sequences.frame(next as u32)?;
+            // Beyond the ends all rests, and so does an eye that comes there.
+            let is_between = next > u64::from(first) && next < u64::from(last);
+            window.push_back(if is_between { observer.held(shown) } else { shown });
             next += 1;
         }
         while next - (window.len() as u64) < middle.saturating_sub(reach).max(u64::from(first)) {
@@ -273,7 +276,8 @@ impl<'a> Sequences<'a> {
     fn report(&self, frames: Vec<FrameFigures>) -> Result<ExitCode> {
         let by_worst =
             |a: &&FrameFigures, b: &&FrameFigures| a.seen.worst_visibility.total_cmp(&b.seen.worst_visibility);
-        let worst = frames.iter().max_by(by_worst).context("a sequence has at least one frame")?;
+        // The last of equals is taken: from behind, so that it is the first frame.
+        let worst = frames.iter().rev().max_by(by_worst).context("a sequence has at least one frame")?;
         let mean = |of: fn(&Seen) -> f64| frames.iter().map(|frame| of(&frame.seen)).sum::<f64>() / frames.len() as f64;
         let seen = Seen {
             mean_visibility: mean(|seen| seen.mean_visibility),

@@ -20,7 +20,6 @@ impl Session<'_> {
     }
 
     pub(super) fn status(&self, state: &RenderState) -> Status {
-        let target = self.settings.limits.last_rung();
         let operator = self.live.operator.as_ref().unwrap_or(&self.job.record.operator);
         let mut status = Status {
             phase: self.phase,
@@ -43,7 +42,8 @@ impl Session<'_> {
         count(&mut status, state, self.screen.total_samples, self.progress.as_ref());
         // What was seen at rest is later than what the loop saw.
         if let Some(look) = self.last_look.as_ref().filter(|look| look.judgement.is_known) {
-            status.visible_share = Some(visible_share(&look.judgement, target));
+            let aimed_at = self.settings.limits.visibility_or_threshold();
+            status.visible_share = Some(visible_share(&look.judgement, aimed_at));
         }
         status
     }
