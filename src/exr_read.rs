@@ -21,6 +21,7 @@ mod wanted;
 mod window;
 
 pub use colour::ScenePicture;
+pub(crate) use colour::{Replaced, make_finite};
 use wanted::Wanted;
 pub use window::Window;
 

@@ -4,8 +4,8 @@ mod tables;
 
 use super::animate::parse_rate;
 use super::denoise::DenoiseChoice;
-use super::numbers::whole;
-use super::seeing::{DEFAULT_DISPLAY, parse_positive};
+use super::numbers::{parse_positive, whole};
+use super::seeing::DEFAULT_DISPLAY;
 use anyhow::{Result, bail};
 use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum};

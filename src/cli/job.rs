@@ -3,11 +3,8 @@
 use super::console;
 use super::denoise::DenoiseChoice;
 use super::importance;
-use super::numbers::{parse_seed, whole};
-use super::seeing::{
-    self, AskedPresentation, Presentation, model_values, operator_values, parse_finite, parse_positive, parse_seconds,
-    parse_stops, parse_unit,
-};
+use super::numbers::{parse_finite, parse_positive, parse_seconds, parse_seed, parse_stops, parse_unit, whole};
+use super::seeing::{self, AskedPresentation, Presentation, model_values, operator_values};
 use super::targets::{Named, display_file};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};

@@ -2,7 +2,7 @@
 
 use super::claim::Claim;
 use super::console::Console;
-use super::seeing::parse_seconds;
+use super::numbers::parse_seconds;
 use super::signals::listen;
 use super::tev::Showing;
 use super::words::rounded;

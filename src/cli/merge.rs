@@ -2,9 +2,9 @@
 
 use super::claim::Claim;
 use super::json::write_json;
+use super::numbers::parse_positive;
 use super::render::write_picture;
 use super::report::{Report, summary};
-use super::seeing::parse_positive;
 use super::targets::check_distinct;
 use clap::Args;
 use fechner::adaptive::judge::judge;

@@ -1,6 +1,8 @@
-//! Whole numbers of arguments, refused in words that say what would be right.
+//! Numbers of arguments, refused in words that say what would be right.
 
+use fechner::scene::{MOST_EXPOSURE_STOPS, NITS_PER_UNIT};
 use std::ops::RangeInclusive;
+use std::time::Duration;
 
 /// A whole number of a range, for `value_parser`.
 pub(super) fn whole(
@@ -20,9 +22,67 @@ pub(super) fn parse_seed(text: &str) -> Result<u64, String> {
     text.parse().map_err(|_| format!("\"{text}\" is not a whole number from 0 to {}", u64::MAX))
 }
 
+/// A time above 0 s, of thirty years at most: more is as good as no limit, and clocks must be able to add it.
+pub(super) fn parse_seconds(text: &str) -> Result<Duration, String> {
+    const MOST_SECONDS: f64 = 1e9;
+    parse_positive(text).map(|seconds| Duration::from_secs_f64(seconds.min(MOST_SECONDS)))
+}
+
+/// A number above 0.
+pub(super) fn parse_positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err(format!("\"{text}\" is not a number above 0")),
+    }
+}
+
+/// A luminance of RGB (1, 1, 1) that pictures can have.
+pub(super) fn parse_unit(text: &str) -> Result<f64, String> {
+    let (least, most) = (NITS_PER_UNIT.start(), NITS_PER_UNIT.end());
+    let number = text.parse().ok().filter(|value| NITS_PER_UNIT.contains(value));
+    number.ok_or_else(|| format!("\"{text}\" is not a luminance from {least:e} to {most:e} cd/m²"))
+}
+
+/// Any number.
+pub(super) fn parse_finite(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|value: &f64| value.is_finite()).ok_or_else(|| format!("\"{text}\" is not a number"))
+}
+
+/// A number of stops that operators know.
+pub(super) fn parse_stops(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(stops) if stops.abs() <= MOST_EXPOSURE_STOPS => Ok(stops),
+        _ => Err(format!("\"{text}\" is not a number of stops from -{MOST_EXPOSURE_STOPS} to {MOST_EXPOSURE_STOPS}")),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn times_are_what_clocks_can_count() {
+        assert_eq!(parse_seconds("0.5"), Ok(Duration::from_millis(500)));
+        for endless in ["1e20", "1e308"] {
+            assert_eq!(parse_seconds(endless), Ok(Duration::from_secs(1_000_000_000)), "{endless}");
+        }
+        for refused in ["0", "-1", "inf", "nan", "a minute"] {
+            assert!(parse_seconds(refused).is_err(), "{refused}");
+        }
+    }
+
+    #[test]
+    fn stops_and_units_are_numbers_that_films_can_keep() {
+        assert_eq!((parse_stops("-2.5"), parse_finite("-1")), (Ok(-2.5), Ok(-1.0)));
+        for refused in ["nan", "inf", "-inf", "101", "much"] {
+            assert!(parse_stops(refused).is_err(), "{refused}");
+        }
+        assert_eq!((parse_unit("1e-6"), parse_unit("179")), (Ok(1e-6), Ok(179.0)));
+        for refused in ["0", "-1", "1e-7", "1e10", "1e300", "inf", "nan"] {
+            assert!(parse_unit(refused).is_err(), "{refused}");
+        }
+        assert!(parse_finite("nan").is_err() && parse_finite("inf").is_err());
+    }
 
     #[test]
     fn what_is_no_such_number_is_told() {

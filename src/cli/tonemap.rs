@@ -4,8 +4,9 @@ mod sheet;
 
 use super::json::write_json;
 use super::kept_tone::{LIGHT, OF_DISPLAY};
+use super::numbers::{parse_positive, parse_stops, parse_unit};
 use super::picture::InputPicture;
-use super::seeing::{self, DEFAULT_DISPLAY, operator_values_or_all, parse_positive, parse_stops, parse_unit};
+use super::seeing::{self, DEFAULT_DISPLAY, operator_values_or_all};
 use super::targets::{check_kept, display_file};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};

@@ -42,16 +42,15 @@ impl ExrImage {
         } else {
             self.channel("Y")?.iter().map(|&y| [y; 3]).collect()
         };
-        let replaced = replace_what_is_not_finite(&mut rgb);
-        if replaced > 0 {
-            notes.push(format!("{replaced} values that are not finite were replaced"));
+        if let Some(replaced) = make_finite(&mut [rgb.as_flattened_mut()]) {
+            notes.push(format!("{} values that are not finite were replaced", replaced.count));
         }
         if let Some(matrix) = primaries.to_other(&Primaries::REC709) {
             rgb.iter_mut().for_each(|pixel| *pixel = apply(&matrix, pixel.map(f64::from)).map(|c| c as f32));
             if self.chromaticities == Some(primaries) {
                 notes.push("colours brought from the file's chromaticities to Rec.709".to_owned());
             }
-            replace_what_is_not_finite(&mut rgb);
+            make_finite(&mut [rgb.as_flattened_mut()]);
         }
         if self.lines_left_out > 0 {
             notes.push(format!("the last {} lines could not be read", self.lines_left_out));
@@ -99,17 +98,25 @@ fn from_chroma(luminance: &[f32], red: &[f32], blue: &[f32], primaries: &Primari
 /// Largest finite half float: light that a half could not hold is at least that bright, in the file's unit.
 const LARGEST_HALF: f32 = 65504.0;
 
-/// How many values were replaced.
-fn replace_what_is_not_finite(rgb: &mut [[f32; 3]]) -> usize {
-    let values = || rgb.iter().flatten();
+/// Values that were not finite.
+pub(crate) struct Replaced {
+    pub(crate) count: usize,
+    /// What stands for infinity: the largest value of the picture or of a half. NaN and −∞ are no light at all, and became 0.
+    pub(crate) infinity: f32,
+}
+
+/// Replaces what would poison all that it meets; `None` where there is nothing to replace.
+pub(crate) fn make_finite(channels: &mut [&mut [f32]]) -> Option<Replaced> {
+    let values = || channels.iter().flat_map(|channel| channel.iter().copied());
     let count = values().filter(|value| !value.is_finite()).count();
-    if count > 0 {
-        let largest = values().copied().filter(|value| value.is_finite()).fold(LARGEST_HALF, f32::max);
-        for value in rgb.iter_mut().flatten().filter(|value| !value.is_finite()) {
-            *value = if *value == f32::INFINITY { largest } else { 0.0 };
-        }
+    if count == 0 {
+        return None;
     }
-    count
+    let infinity = values().filter(|value| value.is_finite()).fold(LARGEST_HALF, f32::max);
+    for value in channels.iter_mut().flat_map(|channel| channel.iter_mut()).filter(|value| !value.is_finite()) {
+        *value = if *value == f32::INFINITY { infinity } else { 0.0 };
+    }
+    Some(Replaced { count, infinity })
 }
 
 #[cfg(test)]
@@ -179,7 +186,7 @@ mod tests {
     fn what_overflowed_is_brighter_than_all_else() {
         let replaced = |values: [f32; 3]| {
             let mut rgb = [values];
-            replace_what_is_not_finite(&mut rgb);
+            make_finite(&mut [rgb.as_flattened_mut()]);
             rgb[0]
         };
         assert_eq!(replaced([10.0, f32::INFINITY, f32::NAN]), [10.0, 65504.0, 0.0]);

@@ -217,6 +217,43 @@ fn a_render_is_seen_on_a_display_of_ones_own() {
     }
 }
 
+/// What tells nothing of noise is not taken for its absence: halves of one seed, one sample, a denoised crop of one pixel.
+#[test]
+fn what_tells_nothing_of_noise_is_said() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box.toml");
+    let render = |more: &[&str]| {
+        let common = ["render", scene, "--sampling", "uniform", "--json", "j.json"];
+        run(folder.path(), &[&common[..], more].concat());
+        let text = std::fs::read_to_string(folder.path().join("j.json")).expect("written");
+        serde_json::from_str::<serde_json::Value>(&text).expect("JSON")
+    };
+    render(&["--size", "16x16", "--spp", "1", "-o", "one.exr"]);
+    let variance = read_exr(&folder.path().join("one.exr")).expect("an EXR file");
+    assert!(variance.channel("variance.Y").expect("the channel").iter().all(|&variance| variance == f32::MAX));
+    let (code, said) =
+        fechner(folder.path(), &["threshold", "one.exr", "--halves", "one.exr", "one.exr", "-o", "t.exr"]);
+    assert!(code == 2 && said.contains("one seed") && !folder.path().join("t.exr").exists(), "{said}");
+    let crop = ["--size", "256x256", "--crop", "20,20,1,1", "--spp", "4", "-o", "a.png"];
+    let seen = |figures: serde_json::Value| figures["visibility_p99"].as_f64().expect("known");
+    let (raw, denoised) = (seen(render(&crop)), seen(render(&[&crop[..], &["--denoise", "builtin"]].concat())));
+    assert!(denoised >= 0.99 * raw && raw > 1.0, "{denoised} denoised, {raw} raw");
+}
+
+/// The display that a scene names is one of its files.
+#[test]
+fn the_display_of_a_scene_is_kept() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("d.toml"), "white_cd_m2 = 250").expect("written");
+    let scene = "[camera]\nposition = [0, 0, 5]\nlook_at = [0, 0, 0]\n[view]\ndisplay = \"d.toml\"\n[materials.m]\ntype = \"diffuse\"\n\
+                 reflectance = [0, 0, 0]\nemission = [1, 1, 1]\n[[objects]]\nsphere = { center = [0, 0, 0], radius = 1 }\nmaterial = \"m\"\n";
+    std::fs::write(folder.path().join("s.toml"), scene).expect("written");
+    let arguments = ["render", "s.toml", "-o", "a.png", "--size", "8x8", "--plans", "1", "--json", "d.toml"];
+    let (code, said) = fechner(folder.path(), &arguments);
+    assert!(code == 2 && said.contains("--json would replace"), "{said}");
+    assert_eq!(std::fs::read(folder.path().join("d.toml")).expect("kept"), b"white_cd_m2 = 250");
+}
+
 /// Light that only an HDR display has is seen on one, in the files that `tonemap` makes for it, and no more of it than it has.
 #[test]
 fn pictures_for_hdr_displays_are_seen_on_one() {

@@ -1,6 +1,6 @@
 //! Numbers of frames and their rate, as the command line has them.
 
-use crate::cli::seeing::parse_positive;
+use crate::cli::numbers::parse_positive;
 
 /// Most frames of a shot: eleven hours and a half at 24 a second.
 const MOST_FRAMES: u32 = 1_000_000;

@@ -4,7 +4,7 @@ use super::job::{Job, JobOptions};
 use super::signals::Signals;
 use super::{CALL_AGAIN, Threads, open_for_work};
 use crate::cli::console::duration_in_words;
-use crate::cli::seeing::parse_seconds;
+use crate::cli::numbers::parse_seconds;
 use crate::cli::words::{listed, samples_in_words};
 use anyhow::{Context, Result, bail};
 use clap::Args;

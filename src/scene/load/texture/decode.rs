@@ -2,7 +2,7 @@
 //! (4 a texel), all others become linear floats (16 a texel).
 
 use super::Picture;
-use crate::exr_read::{self, ExrImage, Window, layer_and_part};
+use crate::exr_read::{self, ExrImage, Replaced, Window, layer_and_part};
 use crate::hdr_read::{HdrHeader, with_known_header};
 use crate::jpeg_read;
 use crate::scene::load::{LoadError, files};
@@ -16,9 +16,6 @@ use std::sync::Arc;
 const LONGEST_SIDE: u32 = 16_384;
 /// Most bytes that one decoded picture may take.
 const MOST_BYTES: u64 = 512 << 20;
-
-/// The largest finite value of a half: what infinity stands for in a file of halves is at least this.
-const LARGEST_HALF: f32 = 65_504.0;
 
 /// A decoded picture.
 #[derive(Clone, Debug)]
@@ -256,22 +253,9 @@ fn check_size(name: &Path, width: u64, height: u64, bytes_per_texel: u64) -> Res
     Ok(())
 }
 
-/// Replaces what would poison every path that meets it: infinity, where files of halves clip a sun, becomes the largest value of
-/// the picture or of a half, what is no light at all (NaN, −∞) nothing.
+/// As [`exr_read::make_finite`], with a note.
 fn make_finite(channels: &mut [&mut [f32]], notes: &mut Vec<String>) {
-    let (mut replaced, mut largest) = (0_u64, LARGEST_HALF);
-    for &value in channels.iter().flat_map(|channel| channel.iter()) {
-        match value.is_finite() {
-            true => largest = largest.max(value),
-            false => replaced += 1,
-        }
+    if let Some(Replaced { count, infinity }) = exr_read::make_finite(channels) {
+        notes.push(format!("{count} values that are not finite were replaced: infinity by {infinity}, others by 0"));
     }
-    if replaced == 0 {
-        return;
-    }
-    let not_finite = |value: &&mut f32| !value.is_finite();
-    for value in channels.iter_mut().flat_map(|channel| channel.iter_mut()).filter(not_finite) {
-        *value = if *value == f32::INFINITY { largest } else { 0.0 };
-    }
-    notes.push(format!("{replaced} values that are not finite were replaced: infinity by {largest}, others by 0"));
 }
