@@ -1,25 +1,32 @@
 //! What is rendered and how: the arguments that `render` and `view` share, so that both make the same picture.
 
+mod choices;
+mod memory;
+mod rules;
+
+pub(super) use choices::{Quality, Size, parse_size};
+pub(super) use memory::check_memory;
+pub(super) use rules::visibility_limit;
+
 use super::console;
 use super::denoise::DenoiseChoice;
 use super::importance;
 use super::numbers::{parse_finite, parse_positive, parse_seconds, parse_seed, parse_stops, parse_unit, whole};
-use super::seeing::{self, AskedPresentation, Presentation, model_values, operator_values};
+use super::seeing::{model_values, operator_values};
 use super::targets::{Named, display_file};
 use anyhow::{Context, bail};
-use clap::{Args, ValueEnum};
+use choices::{AllocationChoice, FilterChoice, PruneChoice, SamplingChoice, SequenceChoice, check_crop, parse_crop};
+use clap::Args;
 use fechner::adaptive::glimpse::glimpse;
-use fechner::adaptive::settings::{
-    AllocationRule, DEFAULT_MAX_SAMPLES, Limits, LoopSettings, RivalRule, Sampling, THRESHOLD,
-};
+use fechner::adaptive::settings::{DEFAULT_MAX_SAMPLES, LoopSettings, Sampling};
 use fechner::checkpoint::SettingsRecord;
 use fechner::integrator::{Crop, DEFAULT_MAX_DEPTH, Pruning, TraceSettings};
 use fechner::output::rendered::Background;
-use fechner::sampler::{PixelFilter, Sequence};
 use fechner::scene::hash::ContentHash;
 use fechner::scene::{Scene, load};
 use fechner_perception::model;
 use fechner_perception::tone::SceneLight;
+use rules::{check_filter, check_rule, limits, settings_record};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -233,139 +240,9 @@ impl JobArguments {
             settings.importance = Some(map);
         }
         check_rule(self)?;
-        if trace.filter.is_signed() && settings.sampling != Sampling::Uniform {
-            bail!(
-                "--filter mitchell has negative lobes, whose scatter is not the picture's noise: adaptive sampling cannot \
-                 judge it; use --sampling uniform, or the filter blackman-harris"
-            );
-        }
-        if trace.filter.is_signed() {
-            if trace.transparent {
-                bail!(
-                    "--filter mitchell has negative lobes, which alpha knows nothing of: a transparent picture would have fringes; use the \
-                     filter blackman-harris"
-                );
-            }
-            if self.visibility.is_some() || self.quality.is_some() {
-                bail!(
-                    "--filter mitchell has negative lobes, whose scatter is not the picture's noise: no visibility can be asked \
-                     for; say --spp, --time or --plans, or use the filter blackman-harris"
-                );
-            }
-            say!(
-                "note: --filter mitchell: its negative lobes scatter samples, and what is told of visible noise counts that too"
-            );
-        }
+        check_filter(self, trace.filter, settings.sampling)?;
         Ok(Prepared { scene: Arc::new(scene), trace, record, settings, whole: None })
     }
-}
-
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Size {
-    pub(super) width: u32,
-    pub(super) height: u32,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(super) enum Quality {
-    /// Visibility 4.
-    Draft,
-    /// Visibility 2.
-    Preview,
-    /// Visibility 1.
-    Good,
-    /// Visibility 0.5.
-    Final,
-    /// Visibility 0.25.
-    Critical,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum SamplingChoice {
-    /// Where the remaining error can be seen.
-    Adaptive,
-    /// The same everywhere.
-    Uniform,
-    /// Another renderer's rule, for comparison: difference of two estimates over the square root of brightness (Cycles).
-    Relative,
-    /// For comparison: relative standard error of each pixel.
-    Variance,
-    /// For comparison: a budget (--spp) spread by relative variance of 4×4 pixels (Tungsten).
-    Budget,
-}
-
-/// How the adaptive mode finds counts.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum AllocationChoice {
-    /// The cheapest counts for the visibility pooled over the eye's window.
-    Convex,
-    /// Each pixel by its own threshold.
-    Local,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum FilterChoice {
-    /// One pixel wide.
-    Box,
-    /// Gaussian of σ 0.45 pixels.
-    Gaussian,
-    /// Window 3 pixels wide: a little sharper.
-    BlackmanHarris,
-    /// Cubic with negative lobes: sharpest, with --sampling uniform only.
-    Mitchell,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum SequenceChoice {
-    /// Neighbouring pixels are independent.
-    PerPixel,
-    /// Samples are spread over neighbouring pixels as well, in Z-order.
-    ZOrder,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum PruneChoice {
-    /// The eye's threshold at the luminance found so far (threshold versus intensity).
-    Tvi,
-}
-
-/// X,Y,W,H in pixels of the full picture.
-fn parse_crop(text: &str) -> Result<Crop, String> {
-    let wrong = || format!("\"{text}\" is not a crop; expected X,Y,WIDTH,HEIGHT in pixels, such as 100,50,64,64");
-    let numbers: Vec<u32> = text.split(',').map(|n| n.trim().parse().map_err(|_| wrong())).collect::<Result<_, _>>()?;
-    match numbers[..] {
-        [x, y, width, height] if width > 0 && height > 0 => Ok(Crop { x, y, width, height }),
-        _ => Err(wrong()),
-    }
-}
-
-/// A crop must lie within the picture.
-fn check_crop(crop: Crop, size: Size) -> anyhow::Result<Crop> {
-    let inside = |start: u32, extent: u32, whole: u32| u64::from(start) + u64::from(extent) <= u64::from(whole);
-    if inside(crop.x, crop.width, size.width) && inside(crop.y, crop.height, size.height) {
-        return Ok(crop);
-    }
-    let Crop { x, y, width, height } = crop;
-    bail!("--crop {x},{y},{width},{height} reaches beyond the picture of {}x{} pixels", size.width, size.height)
-}
-
-impl Quality {
-    pub(super) fn visibility(self) -> f64 {
-        match self {
-            Quality::Draft => 4.0,
-            Quality::Preview => 2.0,
-            Quality::Good => 1.0,
-            Quality::Final => 0.5,
-            Quality::Critical => 0.25,
-        }
-    }
-}
-
-pub(super) fn parse_size(text: &str) -> Result<Size, String> {
-    let wrong = || format!("\"{text}\" is not a size; expected WIDTHxHEIGHT in pixels, such as 640x360");
-    let (width, height) = text.split_once(['x', 'X', '×']).ok_or_else(wrong)?;
-    let (width, height) = (width.parse().map_err(|_| wrong())?, height.parse().map_err(|_| wrong())?);
-    if width == 0 || height == 0 { Err(wrong()) } else { Ok(Size { width, height }) }
 }
 
 fn trace_settings(arguments: &JobArguments, size: Size, nits_per_unit: f64) -> anyhow::Result<TraceSettings> {
@@ -375,16 +252,8 @@ fn trace_settings(arguments: &JobArguments, size: Size, nits_per_unit: f64) -> a
         seed: arguments.seed,
         max_depth: arguments.max_depth,
         clamp: arguments.clamp.map(|clamp| clamp as f32),
-        filter: match arguments.filter {
-            FilterChoice::Box => PixelFilter::Box,
-            FilterChoice::Gaussian => PixelFilter::Gaussian,
-            FilterChoice::BlackmanHarris => PixelFilter::BlackmanHarris,
-            FilterChoice::Mitchell => PixelFilter::Mitchell,
-        },
-        sequence: match arguments.sequence {
-            SequenceChoice::PerPixel => Sequence::PerPixel,
-            SequenceChoice::ZOrder => Sequence::ZOrder,
-        },
+        filter: arguments.filter.filter(),
+        sequence: arguments.sequence.sequence(),
         crop: arguments.crop.map(|crop| check_crop(crop, size)).transpose()?,
         transparent: arguments.transparent,
         prune: arguments.prune.map(|PruneChoice::Tvi| Pruning { nits_per_unit }),
@@ -403,123 +272,4 @@ fn whole_light(scene: &Arc<Scene>, trace: &TraceSettings) -> Option<SceneLight> 
     // Films of other seeds must be shown alike, to be merged.
     let light = glimpse(Arc::clone(scene), &TraceSettings { seed: 0, ..*trace }, scene.nits_per_unit, None);
     Some(SceneLight::stacked(&[&light], trace.width as usize, trace.height as usize))
-}
-
-/// When to stop.
-fn limits(arguments: &JobArguments, scene: &Scene, sampling: Sampling) -> Limits {
-    let asked = arguments.visibility.or(arguments.quality.map(Quality::visibility));
-    Limits {
-        visibility: visibility_limit(asked, scene, sampling, arguments.has_other_limit()),
-        time: arguments.time,
-        mean_samples: arguments.spp,
-        max_samples: arguments.max_spp,
-        plans: arguments.plans,
-        pilot_samples: arguments.denoise.pilot_samples(),
-    }
-}
-
-/// The visibility to stop at: command line before scene before threshold.
-pub(super) fn visibility_limit(
-    asked: Option<f64>,
-    scene: &Scene,
-    sampling: Sampling,
-    has_other_limit: bool,
-) -> Option<f64> {
-    match sampling {
-        // A uniform render of so many samples, seconds or plans is what was asked for, not an early end.
-        Sampling::Uniform if has_other_limit => asked,
-        _ => asked.or(scene.viewing.visibility).or(Some(THRESHOLD)),
-    }
-}
-
-/// Refuses what the rule of sampling would not look at.
-fn check_rule(arguments: &JobArguments) -> anyhow::Result<()> {
-    if arguments.allocation.is_some() && !matches!(arguments.sampling, SamplingChoice::Adaptive) {
-        bail!("--allocation is how --sampling adaptive finds counts, and this --sampling does not ask: leave it out");
-    }
-    let (stops_by_noise, stops_by_sight) = match arguments.sampling {
-        SamplingChoice::Adaptive | SamplingChoice::Uniform => (false, true),
-        SamplingChoice::Relative | SamplingChoice::Variance => (true, false),
-        SamplingChoice::Budget => (false, false),
-    };
-    if arguments.noise_threshold.is_some() && !stops_by_noise {
-        bail!(
-            "--noise-threshold is where --sampling relative and variance stop, and this --sampling does not: leave it out"
-        );
-    }
-    if (arguments.visibility.is_some() || arguments.quality.is_some()) && !stops_by_sight {
-        bail!(
-            "--visibility and --quality are looked at by --sampling adaptive and uniform, not by this one: leave them out"
-        );
-    }
-    Ok(())
-}
-
-/// How to sample and for whom: command line before scene before default.
-fn settings_record(arguments: &JobArguments, scene: &Scene) -> anyhow::Result<SettingsRecord> {
-    let asked = AskedPresentation {
-        display: arguments.display.as_deref(),
-        operator: arguments.operator.as_deref(),
-        exposure_stops: arguments.exposure,
-    };
-    let Presentation { display, operator, exposure_stops } = asked.of_scene(scene);
-    let viewing = seeing::viewing(display, arguments.csf_area)?;
-    if arguments.denoise.kind().is_some() && arguments.model != model::DEFAULT {
-        bail!(
-            "--denoise is for --model {}: {} cannot say what is seen of a denoised picture",
-            model::DEFAULT,
-            arguments.model
-        );
-    }
-    let threshold = arguments.noise_threshold.unwrap_or(0.01);
-    let sampling = match arguments.sampling {
-        SamplingChoice::Adaptive => Sampling::Adaptive,
-        SamplingChoice::Uniform => Sampling::Uniform,
-        SamplingChoice::Relative => Sampling::Rival(RivalRule::Relative { threshold }),
-        SamplingChoice::Variance => Sampling::Rival(RivalRule::Variance { threshold }),
-        SamplingChoice::Budget if !arguments.has_other_limit() => {
-            bail!("--sampling budget has no stop of its own: add --spp, --time or --plans")
-        }
-        SamplingChoice::Budget => Sampling::Rival(RivalRule::Budget),
-    };
-    Ok(SettingsRecord {
-        sampling,
-        allocation: match arguments.allocation {
-            None | Some(AllocationChoice::Convex) => AllocationRule::Convex,
-            Some(AllocationChoice::Local) => AllocationRule::Local,
-        },
-        model: arguments.model.clone(),
-        viewing,
-        nits_per_unit: scene.nits_per_unit,
-        operator: operator.to_owned(),
-        exposure_stops,
-        fitted: None,
-        importance: None,
-        denoiser: arguments.denoise.kind(),
-    })
-}
-
-/// Refuses a size whose film and maps would not fit into memory.
-pub(super) fn check_memory(size: Size) -> anyhow::Result<()> {
-    /// Peak memory was 508 bytes a pixel at 256×256, program included (`peak_memory_bytes` of --json); the rest is margin.
-    const BYTES_PER_PIXEL: u64 = 700;
-    let needed = u64::from(size.width) * u64::from(size.height) * BYTES_PER_PIXEL;
-    let available = available_memory_bytes().unwrap_or(8 << 30);
-    if needed > available || u64::from(size.width) * u64::from(size.height) > u64::from(u32::MAX) / 2 {
-        bail!(
-            "a picture of {}x{} needs about {:.1} GiB of memory, and {:.1} GiB are free: choose a smaller --size",
-            size.width,
-            size.height,
-            needed as f64 / f64::from(1 << 30),
-            available as f64 / f64::from(1 << 30)
-        );
-    }
-    Ok(())
-}
-
-/// Free memory as Linux states it; `None` elsewhere.
-fn available_memory_bytes() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = text.lines().find_map(|l| l.strip_prefix("MemAvailable:"))?;
-    line.trim().trim_end_matches("kB").trim().parse::<u64>().ok().map(|kib| kib * 1024)
 }
