@@ -35,7 +35,7 @@ pub fn part(words: Arguments) {
 
 /// What [`answer!`](crate::answer!) does.
 pub fn answer_line(words: Arguments) {
-    note_failure(writeln!(stdout(), "{words}"));
+    answered(writeln!(stdout(), "{words}"));
 }
 
 /// To be called at the end of the program.
@@ -43,12 +43,12 @@ pub fn answer_line(words: Arguments) {
 /// # Errors
 /// If answers did not reach a standard output that still wanted them, as a file on a full disk.
 pub fn finish() -> Result<(), &'static io::Error> {
-    note_failure(stdout().flush());
+    answered(stdout().flush());
     FAILURE.get().map_or(Ok(()), Err)
 }
 
-/// A reader that has read enough, as `head`, is content.
-fn note_failure(written: io::Result<()>) {
+/// Notes whether an answer that was written in another way has arrived. A reader that has read enough, as `head`, is content.
+pub fn answered(written: io::Result<()>) {
     if let Err(error) = written
         && error.kind() != io::ErrorKind::BrokenPipe
     {

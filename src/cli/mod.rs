@@ -30,8 +30,10 @@ mod tonemap;
 mod view;
 mod words;
 
+use anyhow::bail;
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -77,20 +79,33 @@ enum Command {
 const CALL_AGAIN: u8 = 75;
 
 /// The arguments; one line about those that make no sense. Help and version are printed, and end the program.
-fn parsed() -> anyhow::Result<CommandLine> {
-    CommandLine::try_parse().map_err(|error| match error.kind() {
-        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
-            error.exit()
+fn parsed() -> anyhow::Result<ControlFlow<ExitCode, CommandLine>> {
+    match CommandLine::try_parse() {
+        Ok(arguments) => Ok(ControlFlow::Continue(arguments)),
+        Err(help)
+            if matches!(
+                help.kind(),
+                ErrorKind::DisplayHelp
+                    | ErrorKind::DisplayVersion
+                    | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
+            ) =>
+        {
+            fechner::say::answered(help.print());
+            Ok(ControlFlow::Break(ExitCode::from(help.exit_code() as u8)))
         }
-        _ => anyhow::anyhow!(words::in_a_line_of_arguments(&error)),
-    })
+        Err(error) => bail!(words::in_a_line_of_arguments(&error)),
+    }
 }
 
 /// Runs what the arguments ask for. Exit status 0: done; 1: `compare` sees a difference; 2: bad input or a failed write;
 /// 75: a render or a farm's work was stopped by a signal, or has to wait, and should be called again.
 pub(crate) fn run() -> anyhow::Result<ExitCode> {
     signals::outlive_file_limits();
-    match parsed()?.command {
+    let arguments = match parsed()? {
+        ControlFlow::Continue(arguments) => arguments,
+        ControlFlow::Break(code) => return Ok(code),
+    };
+    match arguments.command {
         Command::Render(arguments) => return render::run(&arguments),
         Command::View(arguments) => view::run(&arguments)?,
         Command::Animate(arguments) => animate::run(&arguments)?,

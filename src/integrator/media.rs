@@ -14,9 +14,13 @@
 use crate::geometry::{Ray, World};
 use crate::scene::{MaterialId, Surface};
 use glam::{Vec3, Vec3A};
+use smallvec::SmallVec;
 
 /// Volumes inside one another that are told apart; beyond it the innermost ones are forgotten.
 const DEEPEST: usize = 8;
+
+/// As many of something as volumes are told apart, without an allocation: cameras in volumes may ask at every ray.
+type Nested<T> = SmallVec<[T; DEEPEST]>;
 
 /// The inside of a boundary.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,11 +81,11 @@ impl Media {
             [-0.51, 0.44, -0.74],
         ];
         let others = OTHERS.map(|direction| Vec3A::from(direction).normalize());
-        let said: Vec<Vec<Medium>> = std::iter::once(ray.direction)
+        let said: SmallVec<[Nested<Medium>; 7]> = std::iter::once(ray.direction)
             .chain(others)
             .map(|direction| Self::left_by(world, Ray { direction, ..ray }))
             .collect();
-        let agreeing = |media: &Vec<Medium>| said.iter().filter(|other| *other == media).count();
+        let agreeing = |media: &Nested<Medium>| said.iter().filter(|other| *other == media).count();
         // Of equals the ray that was given stands.
         let most = said.iter().rev().max_by_key(|media| agreeing(media));
         let mut media = Self::default();
@@ -90,10 +94,10 @@ impl Media {
     }
 
     /// The volumes that a ray leaves without having entered them, outermost first.
-    fn left_by(world: &World, mut ray: Ray) -> Vec<Medium> {
+    fn left_by(world: &World, mut ray: Ray) -> Nested<Medium> {
         // More than that are no boundaries of volumes.
         const MOST_CROSSED: usize = 10_000;
-        let (mut entered, mut around) = (Vec::new(), Vec::new());
+        let (mut entered, mut around) = (Nested::new(), Nested::new());
         for _ in 0..MOST_CROSSED {
             let Some(hit) = world.closest(&ray) else { break };
             let point = world.surface(&ray, &hit);

@@ -21,6 +21,14 @@ impl File {
         file
     }
 
+    /// Its material has a texture for its colour.
+    fn textured() -> Self {
+        let mut file = Self::new();
+        file.document["materials"] = json!([{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]);
+        file.document["meshes"][0]["primitives"][0]["material"] = json!(0);
+        file
+    }
+
     /// The number of a new accessor.
     fn add<const N: usize>(&mut self, values: &[[f32; N]]) -> usize {
         let kind = ["", "SCALAR", "VEC2", "VEC3", "VEC4", "MAT4"][if N == 16 { 5 } else { N }];
@@ -122,16 +130,38 @@ fn attributes_of_another_length_are_refused() {
     }
 }
 
+/// WebP stands beside a picture for other programs, or alone.
+#[test]
+fn webp_textures_are_read_in_place_of_the_other() {
+    let webp = |rgb: [u8; 3]| {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        image::RgbImage::from_pixel(2, 2, image::Rgb(rgb)).write_to(&mut bytes, image::ImageFormat::WebP).unwrap();
+        let text = base64::Engine::encode(&base64::prelude::BASE64_STANDARD, bytes.into_inner());
+        json!({"uri": format!("data:image/webp;base64,{text}"), "mimeType": "image/webp"})
+    };
+    for texture in [json!({"source": 1}), json!({})] {
+        let mut file = File::textured();
+        file.document["extensionsUsed"] = json!(["EXT_texture_webp"]);
+        file.document["extensionsRequired"] = json!(["EXT_texture_webp"]);
+        file.document["images"] = json!([webp([255, 0, 0]), webp([0, 0, 255])]);
+        file.document["textures"] = json!([texture]);
+        file.document["textures"][0]["extensions"] = json!({"EXT_texture_webp": {"source": 0}});
+        let scene = file.load().unwrap();
+        assert!(!scene.notes.iter().any(|note| note.contains("webp")), "{:?}", scene.notes);
+        let color = scene.materials[scene.instances[0].material.0 as usize].surface.base_color().unwrap();
+        let shown = color.evaluate(&scene.textures, glam::Vec2::splat(0.5));
+        assert!((shown - glam::Vec3::X).length() < 1e-3, "{shown}");
+    }
+}
+
 /// The image is there, but only through an extension that is not read.
 #[test]
 fn a_texture_of_an_extension_alone_is_named_as_such() {
-    let mut file = File::new();
-    file.document["materials"] = json!([{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]);
-    file.document["meshes"][0]["primitives"][0]["material"] = json!(0);
-    file.document["textures"] = json!([{"extensions": {"EXT_texture_webp": {"source": 0}}}]);
-    file.document["images"] = json!([{"uri": "a.webp"}]);
+    let mut file = File::textured();
+    file.document["textures"] = json!([{"extensions": {"KHR_texture_basisu": {"source": 0}}}]);
+    file.document["images"] = json!([{"uri": "a.ktx2"}]);
     let scene = file.load().unwrap();
-    let expected = "Texture 0: its image is that of EXT_texture_webp alone, which is not read; left out.";
+    let expected = "Texture 0: its image is that of KHR_texture_basisu alone, which is not read; left out.";
     assert!(scene.notes.iter().any(|note| note == expected), "{:?}", scene.notes);
 }
 

@@ -62,9 +62,12 @@ fn an_answer_that_is_lost_is_told() {
     let folder = folder();
     fechner(folder.path()).args(RENDER).args(["-o", "a.png"]).output().expect("runs");
     let full = std::fs::File::create("/dev/full").expect("a device");
-    let output = fechner(folder.path()).args(["info", "a.png"]).stdout(full).output().expect("runs");
-    assert_eq!(output.status.code(), Some(2));
-    assert!(words(&output).contains("cannot write to standard output"), "{}", words(&output));
+    for arguments in [&["info", "a.png"][..], &["--help"], &["--version"], &["render", "--help"]] {
+        let full = full.try_clone().expect("a handle");
+        let output = fechner(folder.path()).args(arguments).stdout(full).output().expect("runs");
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(words(&output).contains("cannot write to standard output"), "{}", words(&output));
+    }
 }
 
 /// A limit to the size of files is told as a full disk is: once while the render goes on, of each file at its end. What else was

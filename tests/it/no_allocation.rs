@@ -33,3 +33,35 @@ fn paths_allocate_nothing() {
         assert!(rays > 1000, "{name}: {rays} rays test too little");
     }
 }
+
+/// Nor does a camera that asks at every ray which volumes it is in.
+#[test]
+fn parallel_rays_partly_in_a_volume_allocate_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("s.toml");
+    let text = r#"
+[camera]
+orthographic_height = 4
+position = [0, 0, 0.5]
+look_at = [0, 0, -5]
+[environment]
+radiance = [1, 1, 1]
+[materials.glass]
+type = "dielectric"
+ior = 1.5
+absorption = [1.0, 0.5, 0.1]
+[[objects]]
+box = { min = [-1, -1, -1], max = [1, 1, 1] }
+material = "glass"
+"#;
+    std::fs::write(&file, text).expect("a scene");
+    let scene = load(&file, &LoadOptions::default()).expect("a scene");
+    let tracer = PathTracer::new(Arc::new(scene), trace_settings(16, 16, 0));
+    let trace = |pixel: u32| {
+        let origin = vec3a(0.004 * pixel as f32 - 1.0, 0.1, 0.5);
+        tracer.trace_path(Ray::new(origin, Vec3A::NEG_Z), block_key(pixel).sample(0)).rays
+    };
+    trace(0);
+    let allocations = allocation_counter::measure(|| assert!((0..500).map(trace).sum::<u32>() > 1000));
+    assert_eq!(allocations.count_total, 0);
+}

@@ -19,10 +19,10 @@ pub(super) struct SlurmArguments {
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = whole(1..=1023), allow_negative_numbers = true)]
     cpus: u32,
     /// Memory of a unit or merge, as Slurm writes it.
-    #[arg(long, value_name = "SIZE", default_value = "4G")]
+    #[arg(long, value_name = "SIZE", default_value = "4G", value_parser = parse_memory)]
     memory: String,
     /// Time limit of a unit or merge, as Slurm writes it; a unit that does not make it goes on from its checkpoint.
-    #[arg(long, value_name = "TIME", default_value = "01:00:00")]
+    #[arg(long, value_name = "TIME", default_value = "01:00:00", value_parser = parse_time)]
     time: String,
     /// Most units at once.
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = whole(1..=u32::MAX), allow_negative_numbers = true)]
@@ -33,6 +33,31 @@ pub(super) struct SlurmArguments {
     /// Another option for every job, such as --option=--partition=render.
     #[arg(long = "option", value_name = "OPTION", allow_hyphen_values = true)]
     options: Vec<String>,
+}
+
+/// A size as sbatch reads it: MiB, or with the unit behind it.
+fn parse_memory(text: &str) -> Result<String, String> {
+    match text.strip_suffix(['K', 'M', 'G', 'T', 'k', 'm', 'g', 't']).unwrap_or(text) {
+        number if is_whole(number) => Ok(text.to_owned()),
+        _ => Err(format!("{text:?} is not a size of Slurm; expected MiB, or a number with K, M, G or T, such as 4G")),
+    }
+}
+
+/// A time as sbatch reads it: minutes, minutes:seconds or hours:minutes:seconds; days- before hours, hours:minutes or all three.
+fn parse_time(text: &str) -> Result<String, String> {
+    let (days, clock) = text.split_once('-').map_or((None, text), |(days, clock)| (Some(days), clock));
+    let is_clock = clock.split(':').count() <= 3 && clock.split(':').all(is_whole);
+    if (is_clock && days.is_none_or(is_whole)) || ["UNLIMITED", "INFINITE"].contains(&text.to_uppercase().as_str()) {
+        return Ok(text.to_owned());
+    }
+    Err(format!(
+        "{text:?} is not a time of Slurm; expected MINUTES, HOURS:MINUTES:SECONDS or DAYS-HOURS, such as 01:00:00"
+    ))
+}
+
+/// Digits alone.
+fn is_whole(text: &str) -> bool {
+    !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit())
 }
 
 const SUBMIT: &str = include_str!("slurm/submit.sh");
@@ -49,11 +74,6 @@ pub(super) fn run(arguments: &SlurmArguments) -> Result<ExitCode> {
         _ => bail!("{}: a name that scripts cannot hold (Unicode without ', % and line ends)", path.display()),
     };
     let (farm, program) = (word(&folder)?, word(&program)?);
-    for (name, value) in [("--memory", &arguments.memory), ("--time", &arguments.time)] {
-        if value.is_empty() || value.contains(|letter: char| letter.is_whitespace() || letter.is_control()) {
-            bail!("{name} {value:?}: one word, as Slurm writes it");
-        }
-    }
     let mut head = format!(
         "#SBATCH --cpus-per-task={}\n#SBATCH --mem={}\n#SBATCH --time={}\n",
         arguments.cpus, arguments.memory, arguments.time
@@ -99,6 +119,23 @@ fn filled(template: &str, values: &[(&str, &str)]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The words of sbatch(1).
+    #[test]
+    fn sizes_and_times_are_those_that_slurm_reads() {
+        for time in ["90", "90:30", "01:00:00", "2-12", "2-12:30", "2-12:30:00", "UNLIMITED", "infinite"] {
+            assert_eq!(parse_time(time).as_deref(), Ok(time));
+        }
+        for time in ["", "foo", "1h", "1:2:3:4", "-5", "1-", "1-2-3", "1:", "1 0"] {
+            assert!(parse_time(time).is_err(), "{time}");
+        }
+        for memory in ["4096", "4G", "512M", "0", "1T"] {
+            assert_eq!(parse_memory(memory).as_deref(), Ok(memory));
+        }
+        for memory in ["", "G", "4GB", "4.5G", "-1", "4 G"] {
+            assert!(parse_memory(memory).is_err(), "{memory}");
+        }
+    }
 
     #[test]
     fn values_that_look_like_names_stay() {

@@ -13,6 +13,7 @@ const BYTE_ORDER_MARK: &[u8] = b"\xEF\xBB\xBF";
 
 /// Extensions that are done, or change nothing that a rest pose shows.
 const KNOWN: &[&str] = &[
+    "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
     "KHR_materials_clearcoat",
@@ -37,7 +38,7 @@ pub(super) fn parse(path: &Path, json: &[u8], builder: &mut Builder) -> Result<:
     if let Some(refused) = root.extensions_required.iter().find(|name| !KNOWN.contains(&name.as_str())) {
         let advice = match refused.as_str() {
             "KHR_draco_mesh_compression" | "EXT_meshopt_compression" => "; export it without mesh compression",
-            "KHR_texture_basisu" | "EXT_texture_webp" => "; export its textures as PNG or JPEG",
+            "KHR_texture_basisu" => "; export its textures as PNG, JPEG or WebP",
             _ => "",
         };
         return Err(LoadError::unsupported(

@@ -247,13 +247,19 @@ impl<'a> Materials<'a> {
         if_missing: [u8; 4],
     ) -> Result<Option<TextureLookup>, LoadError> {
         let json = &self.document.as_json().textures[texture.index()];
-        let extensions = json.extensions.iter().flat_map(|extensions| extensions.others.keys());
-        let extensions: Vec<&str> = extensions.map(String::as_str).collect();
-        let index = json.source.value();
+        let others = || json.extensions.iter().flat_map(|extensions| &extensions.others);
+        // Its image stands for the other, which is for programs that do not read WebP.
+        let webp =
+            others().find(|(name, _)| *name == "EXT_texture_webp").and_then(|(_, webp)| webp.get("source")?.as_u64());
+        let index = webp.map_or(json.source.value(), |index| index as usize);
         let Some(picture) = self.picture(index)? else {
-            let why = match extensions.is_empty() || index < self.document.as_json().images.len() {
-                true => "its image has neither a file nor a buffer view".to_owned(),
-                false => format!("its image is that of {} alone, which is not read", extensions.join(", ")),
+            let extensions: Vec<&str> = others().map(|(name, _)| name.as_str()).collect();
+            let why = if index < self.document.as_json().images.len() {
+                "its image has neither a file nor a buffer view".to_owned()
+            } else if extensions.is_empty() || webp.is_some() {
+                "its image is not there".to_owned()
+            } else {
+                format!("its image is that of {} alone, which is not read", extensions.join(", "))
             };
             builder.note(format!("Texture {}: {why}; left out.", texture.index()));
             return Ok(None);
