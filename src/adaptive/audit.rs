@@ -29,6 +29,9 @@ const LEAST_TILES: usize = 6;
 /// Keeps audits' random numbers apart from the picture's.
 const AUDIT_STREAM: u64 = 0x0041_5544_4954;
 
+/// What the variance may be multiplied by in all after audits that disagree.
+pub const MOST_INFLATION: f64 = 4.0;
+
 /// What an audit found.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Audit {

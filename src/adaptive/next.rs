@@ -1,7 +1,7 @@
 //! What comes after a look: the ladder's rungs, one after the other, and on each of them more samples until it is reached, no
 //! pixel stands out, and an audit agrees.
 
-use super::audit::{Audit, audit, audit_unproven};
+use super::audit::{Audit, MOST_INFLATION, audit, audit_unproven};
 use super::forecast::Forecast;
 use super::gain::{cut, most_worthwhile, while_far};
 use super::judge::{JudgeError, Judgement, judge_raw, judge_to_plan, still_wanted};
@@ -20,8 +20,6 @@ const TOLERATED_PEAK: f64 = 4.0;
 /// Rungs above this are not audited, nor searched for pixels that stand out: their few samples say little, and the next rung asks
 /// again.
 const HIGHEST_AUDITED_RUNG: f64 = 4.0;
-/// What the variance may be multiplied by in all after audits that disagree.
-const MOST_INFLATION: f64 = 4.0;
 
 /// A rung at threshold or below is far where it needs so many times the samples that are there, which are twice as many at most after
 /// the next plan.

@@ -49,6 +49,8 @@ pub struct SurfaceGuides {
     pub shines: Vec<bool>,
     /// Samples that each is the mean of, on average.
     pub samples: f64,
+    /// Samples of the picture that they, or half of it, belong to: halves are denoised as the whole is.
+    pub samples_of_picture: f64,
 }
 
 /// Guides as a denoiser wants them, made by [`Denoiser::prepare`].
@@ -124,6 +126,10 @@ impl Denoiser {
     /// # Errors
     /// [`OidnError::Failed`] where the library fails.
     pub fn denoise(&self, picture: &NoisyPicture<'_>) -> Result<Vec<[f32; 3]>, OidnError> {
+        // Of black Open Image Denoise makes up to 4e-5, to which an operator then fits its exposure.
+        if picture.rgb.iter().flatten().all(|&value| value == 0.0) {
+            return Ok(picture.rgb.to_vec());
+        }
         let mut denoised = match self {
             Self::Builtin => match (&picture.guides.builtin, picture.rgb.is_empty()) {
                 (_, true) => Vec::new(),

@@ -15,7 +15,8 @@ use glam::Vec3;
 pub struct DenoisedFilm {
     /// The mean of all samples, denoised: the picture.
     pub rgb_cd_m2: Vec<[f32; 3]>,
-    /// Each half's mean by itself, denoised with the same guides: their difference is the noise that denoising left.
+    /// Each half's mean by itself, denoised with what its own samples have met: their difference is the noise that denoising left, and
+    /// that which guides brought in.
     pub halves_rgb_cd_m2: [Vec<[f32; 3]>; 2],
     /// What shines by itself above this luminance, cd/m², was left as it was sampled.
     pub lamps_from_cd_m2: f32,
@@ -27,18 +28,10 @@ pub struct DenoisedFilm {
 /// Where the denoiser fails.
 pub fn denoise_film(denoiser: &Denoiser, film: &Film, nits_per_unit: f64) -> Result<DenoisedFilm, OidnError> {
     let (width, height) = (film.width() as usize, film.height() as usize);
-    let guides = denoiser.prepare(SurfaceGuides {
-        width,
-        height,
-        albedo: film.guides().iter().map(|guide| guide.albedo).collect(),
-        normal: film.guides().iter().map(|guide| guide.normal).collect(),
-        depth: film.guides().iter().map(|guide| guide.depth).collect(),
-        shines: film.guides().iter().map(|guide| guide.seen.shines()).collect(),
-        samples: film.total_samples() as f64 / (width * height).max(1) as f64,
-    })?;
     let estimate = film.estimate(nits_per_unit);
     let most = most_of_lamps(film.guides(), &estimate.rgb_cd_m2);
-    let denoised = |rgb: &[[f32; 3]], variance: &Plane| {
+    let denoised = |rgb: &[[f32; 3]], variance: &Plane, guides: SurfaceGuides| {
+        let guides = denoiser.prepare(guides)?;
         let of_lamp = |(guide, &rgb): (&PixelGuide, &[f32; 3])| {
             if guide.seen.shines() { excess(rgb.into(), most) } else { Vec3::ZERO }
         };
@@ -55,13 +48,32 @@ pub fn denoise_film(denoiser: &Denoiser, film: &Film, nits_per_unit: f64) -> Res
         let pixels = 0..width * height;
         let rgb: Vec<[f32; 3]> =
             pixels.map(|pixel| mean_cd_m2(film.half_or_other(half, pixel), nits_per_unit)).collect();
-        denoised(&rgb, &variance.map(|variance| 2.0 * variance))
+        let guides = surface_guides(film, 0.5, |pixel| film.guide_of_half(half, pixel));
+        denoised(&rgb, &variance.map(|variance| 2.0 * variance), guides)
     };
-    Ok(DenoisedFilm {
-        rgb_cd_m2: denoised(&estimate.rgb_cd_m2, &variance)?,
-        halves_rgb_cd_m2: [of_half(Half::A)?, of_half(Half::B)?],
-        lamps_from_cd_m2: most,
-    })
+    let rgb_cd_m2 = denoised(&estimate.rgb_cd_m2, &variance, surface_guides(film, 1.0, |pixel| film.guides()[pixel]))?;
+    // Without both halves each is the picture.
+    let halves_rgb_cd_m2 = match film.has_both_halves() {
+        true => [of_half(Half::A)?, of_half(Half::B)?],
+        false => [rgb_cd_m2.clone(), rgb_cd_m2.clone()],
+    };
+    Ok(DenoisedFilm { rgb_cd_m2, halves_rgb_cd_m2, lamps_from_cd_m2: most })
+}
+
+/// What this share of the samples have met.
+fn surface_guides(film: &Film, share: f64, at: impl Fn(usize) -> PixelGuide) -> SurfaceGuides {
+    let guides: Vec<PixelGuide> = (0..film.guides().len()).map(at).collect();
+    let samples_of_picture = film.total_samples() as f64 / guides.len().max(1) as f64;
+    SurfaceGuides {
+        width: film.width() as usize,
+        height: film.height() as usize,
+        albedo: guides.iter().map(|guide| guide.albedo).collect(),
+        normal: guides.iter().map(|guide| guide.normal).collect(),
+        depth: guides.iter().map(|guide| guide.depth).collect(),
+        shines: guides.iter().map(|guide| guide.seen.shines()).collect(),
+        samples: share * samples_of_picture,
+        samples_of_picture,
+    }
 }
 
 /// Takes away what a denoiser spread into pixels that hold nothing. Behind them may stand another picture, to which it would be added.
@@ -155,6 +167,59 @@ mod tests {
             }
         }
         film
+    }
+
+    /// Light by which a black and white pattern, finer than pixels, is seen: all noise is in what is met first, and guides carry it into the
+    /// picture. Shared by both halves they would hide it from their difference, which then was 0.3 of the error.
+    #[test]
+    fn noise_of_the_guides_is_in_the_halves_difference() {
+        let mut film = Film::new(SIDE, SIDE);
+        for pixel in 0..SIDE * SIDE {
+            for half in Half::BOTH {
+                let mut sum = BlockSum::default();
+                for sample in 0..8 {
+                    let word = hash_words(u64::from(32 * pixel + 16 * half.index() as u32 + sample), 7);
+                    let albedo = Vec3::splat(if word >> 63 == 0 { 0.9 } else { 0.1 });
+                    let first_hit = FirstHit { albedo, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: false };
+                    sum.add(&PathSample { radiance: albedo, first_hit, rays: 1 });
+                }
+                film.merge_block(BlockWork { half, ..BlockWork::whole(pixel, half, 0) }, &sum);
+            }
+        }
+        for kind in [DenoiserKind::Builtin, DenoiserKind::Oidn] {
+            let Ok(denoiser) = Denoiser::open(kind) else {
+                eprintln!("{kind:?} is skipped: not installed");
+                continue;
+            };
+            let DenoisedFilm { rgb_cd_m2, halves_rgb_cd_m2: [a, b], .. } =
+                denoise_film(&denoiser, &film, 1.0).expect("denoises");
+            let rms = |error: &dyn Fn(usize) -> f32| {
+                let squares = (0..rgb_cd_m2.len()).map(|pixel| f64::from(error(pixel)).powi(2));
+                (squares.sum::<f64>() / rgb_cd_m2.len() as f64).sqrt()
+            };
+            let (error, told) = (rms(&|i| rgb_cd_m2[i][1] - 0.5), rms(&|i| 0.5 * (a[i][1] - b[i][1])));
+            assert!((0.8..1.6).contains(&(told / error)), "{kind:?}: {told}, not {error}");
+        }
+    }
+
+    /// Nothing is made of nothing.
+    #[test]
+    fn black_stays_black() {
+        let mut film = Film::new(SIDE, SIDE);
+        for pixel in 0..SIDE * SIDE {
+            for half in Half::BOTH {
+                let mut sum = BlockSum::default();
+                let first_hit =
+                    FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: false };
+                (0..8).for_each(|_| sum.add(&PathSample { radiance: Vec3::ZERO, first_hit, rays: 1 }));
+                film.merge_block(BlockWork { half, ..BlockWork::whole(pixel, half, 0) }, &sum);
+            }
+        }
+        for kind in [DenoiserKind::Builtin, DenoiserKind::Oidn] {
+            let Ok(denoiser) = Denoiser::open(kind) else { continue };
+            let denoised = denoise_film(&denoiser, &film, 1.0).expect("denoises");
+            assert!(denoised.rgb_cd_m2.iter().flatten().all(|&value| value == 0.0), "{kind:?}");
+        }
     }
 
     /// Light of what stands before nothing stays on it, or it would be added to what a compositor puts behind.

@@ -18,15 +18,17 @@ impl Film {
         assert_eq!((self.width, self.height), (other.width, other.height), "films of one size");
         let [a, b] = &mut self.halves;
         let [other_a, other_b] = &other.halves;
-        let pixels = (self.guides.par_iter_mut(), a, b).into_par_iter();
-        let others = (&other.guides, other_a, other_b).into_par_iter();
-        let fits =
-            pixels.zip(others).with_min_len(PIXELS_A_TASK).map(|((guide, a, b), (other_guide, other_a, other_b))| {
+        let pixels = (&mut self.guides, &mut self.guides_of_a, a, b).into_par_iter();
+        let others = (&other.guides, &other.guides_of_a, other_a, other_b).into_par_iter();
+        let fits = pixels.zip(others).with_min_len(PIXELS_A_TASK).map(
+            |((guide, guide_of_a, a, b), (other_guide, other_guide_of_a, other_a, other_b))| {
                 guide.add(other_guide, a.samples + b.samples, other_a.samples + other_b.samples);
+                guide_of_a.add(other_guide_of_a, a.samples, other_a.samples);
                 a.add(other_a);
                 b.add(other_b);
                 a.taken.max(b.taken) <= MOST_TAKEN
-            });
+            },
+        );
         if !fits.reduce(|| true, |one, two| one && two) {
             return Err("a pixel would have more samples than can be counted");
         }
@@ -44,7 +46,7 @@ impl Film {
         if pixels == 0 || pixels > u64::from(u32::MAX) / 2 {
             return Err("its size makes no sense");
         }
-        let lengths = [self.halves[0].len(), self.halves[1].len(), self.guides.len()];
+        let lengths = [self.halves[0].len(), self.halves[1].len(), self.guides.len(), self.guides_of_a.len()];
         if lengths.iter().any(|&length| length as u64 != pixels) {
             return Err("its pixels are not as many as its size says");
         }
@@ -58,7 +60,9 @@ impl Film {
             let finite = |values: &[f32; 3]| values.iter().all(|value| value.is_finite());
             finite(&guide.albedo) && finite(&guide.normal) && !guide.depth.is_nan()
         };
-        if !self.halves.iter().flatten().all(is_sound) || !self.guides.iter().all(is_sound_guide) {
+        if !self.halves.iter().flatten().all(is_sound)
+            || !self.guides.iter().chain(&self.guides_of_a).all(is_sound_guide)
+        {
             return Err("a pixel holds what no samples can sum up to");
         }
         Ok(())
@@ -193,5 +197,7 @@ mod tests {
         assert!(changed(&|film| film.halves[0][0].taken = u32::MAX));
         assert!(changed(&|film| film.guides[0].albedo[0] = f32::INFINITY));
         assert!(changed(&|film| film.guides.clear()));
+        assert!(changed(&|film| film.guides_of_a[0].normal[1] = f32::NAN));
+        assert!(changed(&|film| film.guides_of_a.clear()));
     }
 }

@@ -1,7 +1,7 @@
 //! What has been sampled so far: two independent half buffers with their statistics, and what the first surfaces are.
 //!
 //! The picture is the plain average of the halves' means: weighting by counts would let the data that chose the counts
-//! bias the picture. 128 bytes a pixel.
+//! bias the picture. 160 bytes a pixel.
 
 mod estimate;
 mod merge;
@@ -148,7 +148,7 @@ impl HalfPixel {
 }
 
 /// Mean of what the first surfaces of a pixel are.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PixelGuide {
     /// Mean albedo.
     pub albedo: [f32; 3],
@@ -158,6 +158,39 @@ pub struct PixelGuide {
     pub depth: f32,
     /// What is there.
     pub seen: Seen,
+}
+
+impl PixelGuide {
+    /// Adds a block to what `before` samples have seen.
+    fn add_block(&mut self, block: &BlockSum, before: u32) {
+        if let (0, Some(id)) = (before, block.first_object_id) {
+            self.seen = self.seen.with_object(id);
+        }
+        self.seen = self.seen.with(block.shines);
+        if block.samples > 0 {
+            let share = block.samples as f32 / (before + block.samples) as f32;
+            let scale = 1.0 / block.samples as f32;
+            let blend = |old: &mut [f32; 3], sum: Vec3| {
+                *old = Vec3::from_array(*old).lerp(sum * scale, share).to_array();
+            };
+            blend(&mut self.albedo, block.albedo);
+            blend(&mut self.normal, block.normal);
+            self.depth += (block.depth * scale - self.depth) * share;
+        }
+    }
+
+    /// What is left without a part that has this share, less than all, of the samples. Where that is no number, the whole.
+    fn without(&self, part: &Self, share: f32) -> Self {
+        let left = |whole: f32, part: f32| {
+            let left = whole + (whole - part) * (share / (1.0 - share));
+            if left.is_finite() { left } else { whole }
+        };
+        let lefts = |whole: [f32; 3], part: [f32; 3]| std::array::from_fn(|c| left(whole[c], part[c]));
+        let albedo: [f32; 3] = lefts(self.albedo, part.albedo);
+        // Rounding must not make the albedo of black less than that.
+        let albedo = albedo.map(|albedo| albedo.max(0.0));
+        Self { albedo, normal: lefts(self.normal, part.normal), depth: left(self.depth, part.depth), seen: self.seen }
+    }
 }
 
 /// The number of an object, and whether anything shines in the same pixel.
@@ -192,7 +225,10 @@ pub struct Film {
     width: u32,
     height: u32,
     halves: [Vec<HalfPixel>; 2],
+    /// Of all samples.
     guides: Vec<PixelGuide>,
+    /// Of the first half's. The other's are what is left.
+    guides_of_a: Vec<PixelGuide>,
     /// Samples that were not finite.
     pub nonfinite_samples: u64,
     /// Rays traced.
@@ -203,12 +239,12 @@ impl Film {
     /// An empty film.
     pub fn new(width: u32, height: u32) -> Self {
         let pixels = width as usize * height as usize;
-        let nothing = PixelGuide { albedo: [0.0; 3], normal: [0.0; 3], depth: 0.0, seen: Seen::default() };
         Self {
             width,
             height,
             halves: [vec![HalfPixel::default(); pixels], vec![HalfPixel::default(); pixels]],
-            guides: vec![nothing; pixels],
+            guides: vec![PixelGuide::default(); pixels],
+            guides_of_a: vec![PixelGuide::default(); pixels],
             nonfinite_samples: 0,
             rays: 0,
         }
@@ -240,27 +276,27 @@ impl Film {
         &self.guides
     }
 
+    /// First surface of a pixel as the samples of one half have seen it; of both where one half has no samples.
+    pub fn guide_of_half(&self, half: Half, pixel: usize) -> PixelGuide {
+        let [a, b] = Half::BOTH.map(|half| self.half(half)[pixel].samples);
+        let (whole, of_a) = (&self.guides[pixel], &self.guides_of_a[pixel]);
+        match half {
+            _ if a == 0 || b == 0 => *whole,
+            Half::A => *of_a,
+            Half::B => whole.without(of_a, a as f32 / (a as f32 + b as f32)),
+        }
+    }
+
     /// Adds a block of samples to a pixel.
     pub fn merge_block(&mut self, work: BlockWork, block: &BlockSum) {
         let pixel = work.pixel as usize;
-        let before = self.halves[0][pixel].samples + self.halves[1][pixel].samples;
+        let before = Half::BOTH.map(|half| self.half(half)[pixel].samples);
         self.halves[work.half.index()][pixel].merge(block);
         self.nonfinite_samples += u64::from(block.nonfinite);
         self.rays += block.rays;
-        let guide = &mut self.guides[pixel];
-        if let (0, Some(id)) = (before, block.first_object_id) {
-            guide.seen = guide.seen.with_object(id);
-        }
-        guide.seen = guide.seen.with(block.shines);
-        if block.samples > 0 {
-            let share = block.samples as f32 / (before + block.samples) as f32;
-            let scale = 1.0 / block.samples as f32;
-            let blend = |old: &mut [f32; 3], sum: Vec3| {
-                *old = Vec3::from_array(*old).lerp(sum * scale, share).to_array();
-            };
-            blend(&mut guide.albedo, block.albedo);
-            blend(&mut guide.normal, block.normal);
-            guide.depth += (block.depth * scale - guide.depth) * share;
+        self.guides[pixel].add_block(block, before[0] + before[1]);
+        if work.half == Half::A {
+            self.guides_of_a[pixel].add_block(block, before[0]);
         }
     }
 
@@ -378,8 +414,35 @@ mod tests {
         assert!((a - 0.5).abs() < 1e-6 && a == b, "a half of one sample takes the other's: {a} and {b}");
     }
 
+    /// Each half knows what its own samples have met, after blocks in any order; a surface at infinity leaves no number that is none.
     #[test]
-    fn a_pixel_takes_at_most_128_bytes() {
-        assert!(2 * size_of::<HalfPixel>() + size_of::<PixelGuide>() <= 128);
+    fn halves_have_guides_of_their_own() {
+        let sum = |albedo: f32, depth: f32, samples: u32| {
+            let mut sum = BlockSum::default();
+            for _ in 0..samples {
+                let first_hit =
+                    FirstHit { albedo: Vec3::splat(albedo), normal: Vec3::Z, depth, object_id: 1, shines: false };
+                sum.add(&PathSample { radiance: Vec3::ONE, first_hit, rays: 1 });
+            }
+            sum
+        };
+        let mut film = Film::new(1, 1);
+        let add = |film: &mut Film, half, level, sum: &BlockSum| {
+            film.merge_block(BlockWork { half, ..BlockWork::whole(0, half, level) }, sum);
+        };
+        add(&mut film, Half::B, 0, &sum(0.25, 2.0, 2));
+        assert_eq!(film.guide_of_half(Half::A, 0), film.guides()[0], "a half without samples has the other's");
+        add(&mut film, Half::A, 0, &sum(1.0, 4.0, 2));
+        add(&mut film, Half::B, 1, &sum(0.75, 3.0, 6));
+        let [a, b] = Half::BOTH.map(|half| film.guide_of_half(half, 0));
+        assert_eq!((a.albedo[0], a.depth), (1.0, 4.0));
+        assert!((b.albedo[0] - 0.625).abs() < 1e-6 && (b.depth - 2.75).abs() < 1e-6, "{b:?}");
+        add(&mut film, Half::A, 1, &sum(1.0, f32::INFINITY, 2));
+        assert_eq!(film.guide_of_half(Half::B, 0).depth, f32::INFINITY, "where the whole is infinite");
+    }
+
+    #[test]
+    fn a_pixel_takes_at_most_160_bytes() {
+        assert!(2 * size_of::<HalfPixel>() + 2 * size_of::<PixelGuide>() <= 160);
     }
 }

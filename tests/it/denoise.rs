@@ -186,6 +186,7 @@ fn open_image_denoise_removes_noise_and_repeats_itself() {
             depth: vec![1.0; width * height],
             shines: vec![false; width * height],
             samples,
+            samples_of_picture: samples,
         };
         let guides = denoiser.prepare(guides).expect("prepares");
         let variance = Plane::filled(width, height, 300.0);

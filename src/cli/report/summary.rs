@@ -3,6 +3,7 @@
 use super::{Report, TOO_FEW, patch_count};
 use crate::cli::console::duration_in_words;
 use crate::cli::words::rounded;
+use fechner::adaptive::audit::MOST_INFLATION;
 use fechner::adaptive::settings::{LoopSettings, Sampling};
 use fechner::adaptive::{Rendered, StopReason};
 use fechner_perception::Plane;
@@ -128,8 +129,16 @@ fn denoised(report: &Report) -> Vec<String> {
 fn audited(report: &Report, rendered: &Rendered) -> Option<String> {
     let audit = rendered.audit?;
     let whose = if report.denoised.is_some() { " unproven" } else { "" };
+    let times = rendered.inflation;
+    let since = if times >= MOST_INFLATION {
+        format!("; {times:.1} times as much is predicted since, the most that is believed: it may still be too little")
+    } else if audit.disagrees() {
+        format!("; {times:.1} times as much is predicted since")
+    } else {
+        String::new()
+    };
     Some(format!(
-        "Audit: fresh samples in {}{whose} tiles differ from the picture by {:.2} ± {:.2} times the predicted visible energy.",
+        "Audit: fresh samples in {}{whose} tiles differ from the picture by {:.2} ± {:.2} times the predicted visible energy{since}.",
         audit.tiles, audit.ratio, audit.standard_error
     ))
 }
@@ -137,9 +146,10 @@ fn audited(report: &Report, rendered: &Rendered) -> Option<String> {
 fn fireflies(report: &Report, sampling: Sampling) -> Option<String> {
     // By 2 % in a block of `cornell-glass` (`benches/local_energy.py`).
     let darker = if sampling == Sampling::Adaptive { "; around them it may be a few per cent too dark" } else { "" };
+    let kept = if report.denoised.is_some() { "kept in the raw mean" } else { "kept" };
     (report.outlier_pixels > 0).then(|| {
         format!(
-            "{} pixels hold light that few samples find (fireflies): {:.2} % of the picture's energy. They are kept{darker}.",
+            "{} pixels hold light that few samples find (fireflies): {:.2} % of the picture's energy. They are {kept}{darker}.",
             report.outlier_pixels,
             100.0 * report.outlier_energy_share,
         )

@@ -29,6 +29,7 @@ fn wall_guides() -> SurfaceGuides {
         depth: vec![1.0; SIDE * SIDE],
         shines: vec![false; SIDE * SIDE],
         samples: 16.0,
+        samples_of_picture: 16.0,
     }
 }
 

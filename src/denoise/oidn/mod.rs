@@ -107,7 +107,7 @@ impl Oidn {
     /// Albedo and normal without the noise of edges, lenses and shutters, as far as that matters: guides that [`Self::denoise`] may
     /// trust.
     pub(super) fn prepare(&self, guides: SurfaceGuides) -> Result<SurfaceGuides, OidnError> {
-        if guides.samples >= CLEAN_ENOUGH_SAMPLES {
+        if guides.samples_of_picture >= CLEAN_ENOUGH_SAMPLES {
             return Ok(guides);
         }
         let (device, size) = (self.device(), Size { width: guides.width, height: guides.height });
