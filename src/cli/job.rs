@@ -17,7 +17,7 @@ use super::targets::{Named, display_file};
 use anyhow::{Context, bail};
 use choices::{AllocationChoice, FilterChoice, PruneChoice, SamplingChoice, SequenceChoice, check_crop, parse_crop};
 use clap::Args;
-use fechner::adaptive::glimpse::glimpse;
+use fechner::adaptive::glimpse::steady_glimpse;
 use fechner::adaptive::settings::{DEFAULT_MAX_SAMPLES, LoopSettings, Sampling};
 use fechner::checkpoint::SettingsRecord;
 use fechner::integrator::{Crop, DEFAULT_MAX_DEPTH, Pruning, TraceSettings};
@@ -270,6 +270,6 @@ fn whole_light(scene: &Arc<Scene>, trace: &TraceSettings) -> Option<SceneLight> 
         return None;
     }
     // Films of other seeds must be shown alike, to be merged.
-    let light = glimpse(Arc::clone(scene), &TraceSettings { seed: 0, ..*trace }, scene.nits_per_unit, None);
+    let light = steady_glimpse(Arc::clone(scene), &TraceSettings { seed: 0, ..*trace }, scene.nits_per_unit);
     Some(SceneLight::stacked(&[&light], trace.width as usize, trace.height as usize))
 }

@@ -20,7 +20,7 @@ use super::orbit::Held;
 use super::screen::{Scenery, Screen};
 use super::shared::Shared;
 use super::{Host, Job, Options};
-use crate::adaptive::glimpse::glimpse_from;
+use crate::adaptive::glimpse::steady_glimpse_from;
 use crate::adaptive::judge::JudgeError;
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::state::RenderState;
@@ -215,7 +215,7 @@ impl<'a> Session<'a> {
             // Films of other seeds are shown alike.
             let trace = TraceSettings { seed: 0, ..self.job.trace };
             let nits_per_unit = self.settings.nits_per_unit;
-            let light = glimpse_from(&self.held.camera, &mut self.tracer, &trace, nits_per_unit, None);
+            let light = steady_glimpse_from(&self.held.camera, &mut self.tracer, &trace, nits_per_unit);
             SceneLight::stacked(&[&light], trace.width as usize, trace.height as usize)
         });
         // Not by the function below, which borrows the settings too.
