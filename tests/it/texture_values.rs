@@ -75,6 +75,32 @@ fn colours_of_other_primaries_are_brought_to_rec_709() {
     assert_eq!((seen(&plain).0, notes(&plain, "p.exr")), (Vec3::new(0.3, 0.5, 0.2), 0));
 }
 
+/// As Blender writes them: the first by the alphabet was taken.
+#[test]
+fn the_picture_of_many_layers_is_the_finished_one() {
+    let (ao, combined) = ("ViewLayer.AO", "ViewLayer.Combined");
+    let names = |layer: &str| ["R", "G", "B"].map(|part| format!("{layer}.{part}"));
+    let layered = |first: &str, second: &str| {
+        let (first, second) = (names(first), names(second));
+        let mut channels: Vec<(&str, f32)> = first.iter().map(|name| (name.as_str(), 0.1)).collect();
+        channels.extend(second.iter().map(String::as_str).zip([0.25, 0.5, 0.75]));
+        scene(&even(&channels), None)
+    };
+    let light = Vec3::new(0.25, 0.5, 0.75);
+    let blender = layered(ao, combined);
+    assert_eq!((seen(&blender), notes(&blender, "is taken for")), ((light, 0.5, light), 0), "{:?}", blender.notes);
+    let unsure = layered("one", "two");
+    assert_eq!(
+        (seen(&unsure).2, notes(&unsure, "the layer one is taken for the picture, of one, two")),
+        (Vec3::splat(0.1), 2)
+    );
+    // A texture may be a layer that is no finished picture.
+    assert_eq!(seen(&layered("normal", "albedo")).2, light);
+    let small = scene(&even(&[("r", 0.25), ("g", 0.5), ("b", 0.75)]), None);
+    assert_eq!(seen(&small), (light, 0.5, light));
+    assert_eq!(seen(&scene(&even(&[("y", 0.25)]), None)).0, Vec3::splat(0.25));
+}
+
 /// RY = (R − Y) / Y; the picture was grey.
 #[test]
 fn luminance_and_chroma_and_xyz_are_colours() {

@@ -2,6 +2,7 @@
 //! (4 a texel), all others become linear floats (16 a texel).
 
 use super::Picture;
+use crate::exr_read::layers::colour_layer;
 use crate::exr_read::{self, ExrImage, Replaced, Window, layer_and_part};
 use crate::hdr_read::{HdrHeader, with_known_header};
 use crate::jpeg_read;
@@ -179,6 +180,7 @@ fn decode_exr(bytes: &[u8], name: &Path, values: Values) -> Result<Decoded, Load
     image.display_window = Window { origin: image.data_window_origin, width, height };
     image.is_display_window_left_out = false;
     let mut notes = Vec::new();
+    notes.extend(colour_layer(&image.names()).and_then(|layer| layer.guess()));
     let mut channels: Vec<&mut [f32]> = image.channels.iter_mut().map(|(_, values)| values.as_mut_slice()).collect();
     make_finite(&mut channels, &mut notes);
     add_missing_primaries(&mut image, &mut notes);
@@ -198,22 +200,33 @@ fn decode_exr(bytes: &[u8], name: &Path, values: Values) -> Result<Decoded, Load
     Ok(Decoded { width, height, texels, notes })
 }
 
-/// The channels of an EXR file that a texture is made of: R, G, B and A of any layer, else luminance, chroma and CIE XYZ.
+/// The channels of an EXR file that a texture is made of: R, G, B and A of the picture's layer; where no layer has all colours, of any; else
+/// luminance, chroma and CIE XYZ.
 fn used_channels(all: &[String]) -> Vec<String> {
-    let of_any_layer = |parts: &[&str]| -> Vec<String> {
-        all.iter().filter(|name| parts.contains(&layer_and_part(name).1)).cloned().collect()
+    let names: Vec<&str> = all.iter().map(String::as_str).collect();
+    let layer = colour_layer(&names).map(|layer| layer.name);
+    let chosen = |parts: &[&str]| -> Vec<String> {
+        let is_chosen = |name: &&String| {
+            let (own_layer, own_part) = layer_and_part(name);
+            layer.is_none_or(|layer| layer == own_layer) && parts.iter().any(|part| own_part.eq_ignore_ascii_case(part))
+        };
+        all.iter().filter(is_chosen).cloned().collect()
     };
-    match all.iter().any(|name| layer_and_part(name).1 == "R") {
-        true => of_any_layer(&["R", "G", "B", "A"]),
-        false => of_any_layer(&["Y", "RY", "BY", "X", "Z", "A"]),
+    match all.iter().any(|name| layer_and_part(name).1.eq_ignore_ascii_case("R")) {
+        true => chosen(&["R", "G", "B", "A"]),
+        false => chosen(&["Y", "RY", "BY", "X", "Z", "A"]),
     }
 }
 
-/// A channel by its last name, that of the layer without a name before others.
+/// A channel of the picture's layer by its last name; where no layer has all colours, that of the layer without a name before others.
 fn channel<'a>(image: &'a ExrImage, wanted: &str) -> Option<&'a [f32]> {
-    image.channel(wanted).or_else(|| {
-        image.channels.iter().find(|(name, _)| layer_and_part(name).1 == wanted).map(|(_, values)| values.as_slice())
-    })
+    match colour_layer(&image.names()) {
+        Some(layer) => image.part(layer.name, wanted),
+        None => image.part("", wanted).or_else(|| {
+            let is_wanted = |name: &str| layer_and_part(name).1.eq_ignore_ascii_case(wanted);
+            image.channels.iter().find(|(name, _)| is_wanted(name)).map(|(_, values)| values.as_slice())
+        }),
+    }
 }
 
 /// A picture of R and one of G and B has none of the third; R alone is grey.
