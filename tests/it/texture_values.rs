@@ -75,6 +75,22 @@ fn colours_of_other_primaries_are_brought_to_rec_709() {
     assert_eq!((seen(&plain).0, notes(&plain, "p.exr")), (Vec3::new(0.3, 0.5, 0.2), 0));
 }
 
+/// Green of Rec.2020 is 0.678 of white. With its negative channels it was light that is taken away, with them cut off 19 % too bright.
+#[test]
+fn colours_outside_rec_709_are_light_of_their_own_luminance() {
+    let green = scene(&even(&[("R", 0.0), ("G", 1.0), ("B", 0.0)]), Some(REC2020));
+    let (color, roughness, around) = seen(&green);
+    for light in [color, around] {
+        let luminance = light.dot(Vec3::new(0.2126, 0.7152, 0.0722));
+        assert!((luminance - 0.678).abs() < 1e-3 && light.min_element() >= 0.0, "{light}");
+        assert!(light.max_element() <= 1.0, "a share of light: {light}");
+    }
+    assert_eq!(roughness, 1.0);
+    // Numbers may be negative, heights among them.
+    let mixed = scene(&[("R", [1.0, -0.5, -0.5, -0.5]), ("G", [-0.5; 4]), ("B", [1.0, -0.5, -0.5, -0.5])], None);
+    assert_eq!((seen(&mixed).0.min_element(), seen(&mixed).1), (0.0, -0.5));
+}
+
 /// As Blender writes them: the first by the alphabet was taken.
 #[test]
 fn the_picture_of_many_layers_is_the_finished_one() {

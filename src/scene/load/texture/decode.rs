@@ -8,6 +8,7 @@ use crate::hdr_read::{HdrHeader, with_known_header};
 use crate::jpeg_read;
 use crate::scene::load::{LoadError, files};
 use crate::scene::{Encoding, Texels, texture};
+use fechner_perception::tone::gamut;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 use std::io::Cursor;
 use std::path::Path;
@@ -38,8 +39,10 @@ impl Decoded {
 /// What a picture's values are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::scene::load) enum Values {
-    /// Of the primaries that the file names, to be brought to Rec.709.
+    /// Of the primaries that the file names, to be brought into Rec.709: light and reflectances, which are never negative.
     Colours,
+    /// Of the primaries that the file names, to be weighed as Rec.709's: heights among them, which may be negative.
+    Luminances,
     /// As they stand: normals, roughness, coverage.
     Numbers,
 }
@@ -119,7 +122,11 @@ pub(in crate::scene::load) fn decode_bytes(
         true => Texels::Bytes(Arc::new(image.into_rgba8().into_raw().as_chunks::<4>().0.to_vec()), encoding),
         false => {
             let header = (format == ImageFormat::Hdr).then(|| HdrHeader::of(bytes));
-            Texels::Floats(Arc::new(linear_floats(image, encoding, header, &mut notes)))
+            let mut texels = linear_floats(image, encoding, header, &mut notes);
+            if values == Values::Colours {
+                texels.iter_mut().for_each(|[rgb @ .., _]| *rgb = gamut::light(*rgb));
+            }
+            Texels::Floats(Arc::new(texels))
         }
     };
     Ok(Decoded { width, height, texels, notes })
@@ -185,8 +192,8 @@ fn decode_exr(bytes: &[u8], name: &Path, values: Values) -> Result<Decoded, Load
     make_finite(&mut channels, &mut notes);
     add_missing_primaries(&mut image, &mut notes);
 
-    let coloured = if values == Values::Colours { image.scene_picture(channel) } else { None };
-    let rgb = match coloured {
+    let coloured = if values == Values::Numbers { None } else { image.scene_picture(channel) };
+    let mut rgb = match coloured {
         Some(picture) => {
             notes.extend(picture.notes);
             picture.rgb
@@ -194,6 +201,9 @@ fn decode_exr(bytes: &[u8], name: &Path, values: Values) -> Result<Decoded, Load
         None => plain_rgb(&image)
             .ok_or_else(|| LoadError::unsupported(name, "the picture has neither a channel R nor a channel Y"))?,
     };
+    if values == Values::Colours {
+        rgb.iter_mut().for_each(|rgb| *rgb = gamut::light(*rgb));
+    }
     let alpha = channel(&image, "A");
     let texel = |(i, [r, g, b]): (usize, [f32; 3])| [r, g, b, alpha.map_or(1.0, |alpha| alpha[i])];
     let texels = Texels::Floats(Arc::new(rgb.into_iter().enumerate().map(texel).collect()));
