@@ -87,7 +87,7 @@ fn colours_outside_rec_709_are_light_of_their_own_luminance() {
     }
     assert_eq!(roughness, 1.0);
     // Numbers may be negative, heights among them.
-    let mixed = scene(&[("R", [1.0, -0.5, -0.5, -0.5]), ("G", [-0.5; 4]), ("B", [1.0, -0.5, -0.5, -0.5])], None);
+    let mixed = scene(&[("R", [10.0, -0.5, -0.5, -0.5]), ("G", [-0.5; 4]), ("B", [1.0, -0.5, -0.5, -0.5])], None);
     assert_eq!((seen(&mixed).0.min_element(), seen(&mixed).1), (0.0, -0.5));
 }
 
