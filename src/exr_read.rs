@@ -16,6 +16,7 @@ use std::path::{Path, PathBuf};
 
 mod colour;
 mod dwa;
+pub mod layers;
 mod subsampled;
 mod wanted;
 mod window;

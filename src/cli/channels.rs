@@ -1,6 +1,7 @@
 //! Which channels of another program's EXR file hold its colour and its motion.
 
 use anyhow::{Result, bail};
+use fechner::exr_read::layers::{is_called, layers_with, picture_layer};
 use fechner::exr_read::{ExrImage, layer_and_part, read_exr_channels};
 use fechner_perception::Plane;
 use std::path::Path;
@@ -31,39 +32,6 @@ pub(super) fn motion_plane(exr: &ExrImage, values: Vec<f32>) -> Result<Plane> {
     Ok(Plane::from_values(shown.width as usize, shown.height as usize, exr.in_display_window(finite))?)
 }
 
-/// Layers that hold colour, but not the picture's.
-const NOT_THE_PICTURE: [&str; 14] = [
-    "albedo", "normal", "depth", "position", "variance", "velocity", "vector", "motion", "forward", "backward",
-    "crypto", "shadow", "mask", "diffuse",
-];
-/// What renderers call the finished picture; R, G and B without a layer come first.
-const THE_PICTURE: [&str; 5] = ["combined", "beauty", "rgba", "color", "image"];
-
-/// What Blender calls passes of light and of colour.
-const BLENDER_PASSES: [&str; 14] = [
-    "diffcol",
-    "diffdir",
-    "diffind",
-    "glosscol",
-    "glossdir",
-    "glossind",
-    "transcol",
-    "transdir",
-    "transind",
-    "volumedir",
-    "volumeind",
-    "emit",
-    "env",
-    "ao",
-];
-
-/// The layer that is taken for the picture.
-struct PictureLayer<'a> {
-    name: &'a str,
-    /// Those that could be meant as well, it among them; empty where its name says that it is the picture, or no other is one.
-    of: Vec<&'a str>,
-}
-
 /// Reads the channels of a file that may be its picture, and passes over the others.
 pub(super) fn read_picture(path: &Path) -> Result<ExrImage> {
     Ok(read_exr_channels(path, |all| {
@@ -81,38 +49,15 @@ pub(super) fn read_picture(path: &Path) -> Result<ExrImage> {
     })?)
 }
 
-/// The root if it has `R`, `G` and `B`, else a layer a part of whose name, between dots, is what a finished picture is
-/// called (`RenderLayer.Combined.R`), else the first layer; auxiliaries only where a part of their name says picture and nothing
-/// else is there.
-fn picture_layer<'a>(names: &[&'a str]) -> Option<PictureLayer<'a>> {
-    let layers = layers_with(names, &["R", "G", "B"]);
-    let is_auxiliary = |layer: &str| {
-        NOT_THE_PICTURE.iter().any(|name| layer.to_ascii_lowercase().contains(*name))
-            || BLENDER_PASSES.iter().any(|name| is_called(layer, name))
-    };
-    let (auxiliary, others): (Vec<&str>, Vec<&str>) = layers.into_iter().partition(|layer| is_auxiliary(layer));
-    let called = |layers: &[&'a str]| {
-        THE_PICTURE.iter().find_map(|name| layers.iter().copied().find(|layer| is_called(layer, name)))
-    };
-    let named = others.iter().copied().find(|layer| layer.is_empty()).or_else(|| called(&others));
-    let sure = |name| PictureLayer { name, of: Vec::new() };
-    match (named, &others[..]) {
-        (Some(name), _) | (None, &[name]) => Some(sure(name)),
-        (None, []) => called(&auxiliary).map(sure),
-        (None, &[name, ..]) => Some(PictureLayer { name, of: others }),
-    }
-}
-
 /// What to say of a picture whose layer had to be guessed.
 pub(super) fn guess(exr: &ExrImage) -> Option<String> {
-    let layer = picture_layer(&names(exr)).filter(|layer| !layer.of.is_empty())?;
-    Some(format!("the layer {} is taken for the picture, of {}", layer.name, layer.of.join(", ")))
+    picture_layer(&exr.names())?.guess()
 }
 
 /// The picture: `R`, `G` and `B` of one layer, else `Y`.
 pub(super) fn colour<'a>(exr: &'a ExrImage) -> Option<Colour<'a>> {
-    let Some(layer) = picture_layer(&names(exr)) else { return exr.channel("Y").map(Colour::Grey) };
-    let [Some(r), Some(g), Some(b)] = ["R", "G", "B"].map(|part| part_of(exr, layer.name, part)) else {
+    let Some(layer) = picture_layer(&exr.names()) else { return exr.channel("Y").map(Colour::Grey) };
+    let [Some(r), Some(g), Some(b)] = ["R", "G", "B"].map(|part| exr.part(layer.name, part)) else {
         return None;
     };
     Some(Colour::Rgb([r, g, b]))
@@ -120,8 +65,8 @@ pub(super) fn colour<'a>(exr: &'a ExrImage) -> Option<Colour<'a>> {
 
 /// How much of each pixel the picture covers: `A` of its layer.
 pub(super) fn alpha(exr: &ExrImage) -> Option<&[f32]> {
-    let layer = picture_layer(&names(exr)).map_or("", |layer| layer.name);
-    part_of(exr, layer, "A")
+    let layer = picture_layer(&exr.names()).map_or("", |layer| layer.name);
+    exr.part(layer, "A")
 }
 
 /// Names of layers that hold motion from this frame to the next, the surest first.
@@ -138,12 +83,12 @@ const UPWARD_LAYERS: [&str; 2] = ["forward", "backward"];
 /// A layer counts if one part of its name, between dots, is one that renderers use (`velocity.X`, `ViewLayer.Vector.X`,
 /// `forward.left.u`, `motion.x`); case does not matter.
 pub(super) fn motion(exr: &ExrImage) -> Option<(&str, [&[f32]; 2])> {
-    let names = names(exr);
+    let names = exr.names();
     for name in MOTION_LAYERS {
         for [across, down] in VECTOR_PARTS {
             let found = layers_with(&names, &[across, down]).into_iter().find(|layer| is_called(layer, name));
             if let Some(layer) = found {
-                return Some((layer, [part_of(exr, layer, across)?, part_of(exr, layer, down)?]));
+                return Some((layer, [exr.part(layer, across)?, exr.part(layer, down)?]));
             }
         }
     }
@@ -163,11 +108,11 @@ const BACKWARD_LAYERS: [&str; 2] = ["velocity_previous", "backward"];
 /// Both motions: ours, Blender's `Vector` of four, or any that [`motion`] finds, which is taken to have been the same before.
 pub(super) fn both_motions(exr: &ExrImage) -> Option<BothMotions> {
     let negated = |values: &[f32]| values.iter().map(|value| -value).collect::<Vec<f32>>();
-    let names = names(exr);
+    let names = exr.names();
     let of_four = layers_with(&names, &["X", "Y", "Z", "W"]).into_iter().find(|layer| is_called(layer, "vector"));
     if let Some(layer) = of_four {
         // Where it was less where it is, then where it is less where it will be; y upwards.
-        let [Some(x), Some(y), Some(z), Some(w)] = ["X", "Y", "Z", "W"].map(|part| part_of(exr, layer, part)) else {
+        let [Some(x), Some(y), Some(z), Some(w)] = ["X", "Y", "Z", "W"].map(|part| exr.part(layer, part)) else {
             return None;
         };
         return Some(BothMotions { to_next: [negated(z), w.to_vec()], to_previous: [x.to_vec(), negated(y)] });
@@ -180,7 +125,7 @@ pub(super) fn both_motions(exr: &ExrImage) -> Option<BothMotions> {
     let backward = VECTOR_PARTS.iter().find_map(|[across, down]| {
         let is_backward = |layer: &&str| BACKWARD_LAYERS.iter().any(|name| is_called(layer, name));
         let layer = layers_with(&names, &[across, down]).into_iter().find(is_backward)?;
-        Some([part_of(exr, layer, across)?.to_vec(), downwards(layer, part_of(exr, layer, down)?)])
+        Some([exr.part(layer, across)?.to_vec(), downwards(layer, exr.part(layer, down)?)])
     });
     let to_previous = backward.unwrap_or_else(|| [negated(&x), negated(&y)]);
     Some(BothMotions { to_next: [x, y], to_previous })
@@ -191,38 +136,6 @@ fn is_of_motion(name: &str) -> bool {
     let (layer, part) = layer_and_part(name);
     let is_layer = MOTION_LAYERS.iter().chain(&BACKWARD_LAYERS).any(|name| is_called(layer, name));
     is_layer && VECTOR_PARTS.iter().flatten().chain(&["Z", "W"]).any(|own| part.eq_ignore_ascii_case(own))
-}
-
-/// Whether a part of the layer's name, between dots, is this.
-fn is_called(layer: &str, name: &str) -> bool {
-    layer.split('.').any(|part| part.eq_ignore_ascii_case(name))
-}
-
-/// Names of all channels of the file, in its order but those last that were not asked for.
-fn names(exr: &ExrImage) -> Vec<&str> {
-    exr.channels.iter().map(|(name, _)| name).chain(&exr.unread).map(String::as_str).collect()
-}
-
-/// Layers (what stands before the last dot, perhaps nothing) that have all of `parts`, in the order of `names`.
-fn layers_with<'a>(names: &[&'a str], parts: &[&str]) -> Vec<&'a str> {
-    let mut layers: Vec<&str> = Vec::new();
-    for name in names {
-        let (layer, part) = layer_and_part(name);
-        let has = |part: &&str| names.iter().any(|name| is_part(name, layer, part));
-        if part.eq_ignore_ascii_case(parts[0]) && !layers.contains(&layer) && parts.iter().all(has) {
-            layers.push(layer);
-        }
-    }
-    layers
-}
-
-fn is_part(name: &str, layer: &str, part: &str) -> bool {
-    let (own_layer, own_part) = layer_and_part(name);
-    own_layer == layer && own_part.eq_ignore_ascii_case(part)
-}
-
-fn part_of<'a>(exr: &'a ExrImage, layer: &str, part: &str) -> Option<&'a [f32]> {
-    exr.channels.iter().find(|(name, _)| is_part(name, layer, part)).map(|(_, values)| values.as_slice())
 }
 
 #[cfg(test)]

@@ -1,11 +1,13 @@
 //! `fechner tonemap`: HDR pictures as a display shows them to an eye, one by one or as a sequence in time.
 
+mod covered;
 mod sheet;
 
+use self::covered::Covered;
 use super::json::write_json;
 use super::kept_tone::{LIGHT, OF_DISPLAY};
 use super::numbers::{parse_positive, parse_stops, parse_unit};
-use super::picture::InputPicture;
+use super::picture::{InputPicture, note};
 use super::seeing::{self, DEFAULT_DISPLAY, operator_values_or_all};
 use super::targets::{check_kept, display_file};
 use anyhow::{Context, Result, bail};
@@ -144,10 +146,9 @@ impl SceneFrame {
         map_picture(fitted, self.width, &self.rgb_cd_m2)
     }
 
-    /// The same of what covers the pixels, with how much of each.
-    fn covered(&self, fitted: &dyn FittedTone) -> Option<(Vec<[f32; 3]>, &[f32])> {
-        let alpha = self.alpha.as_deref()?;
-        Some((output::rendered::shown_where_covered(fitted, self.width, &self.rgb_cd_m2, alpha), alpha))
+    /// The same before whatever lies behind a picture with alpha.
+    fn covered(&self, fitted: &dyn FittedTone) -> Option<Covered<'_>> {
+        Some(Covered::of(fitted, self.width, &self.rgb_cd_m2, self.alpha.as_deref()?))
     }
 }
 
@@ -423,11 +424,20 @@ fn write(
     }
 }
 
-/// With straight alpha where it does not cover all, as a render of a transparent background.
+/// With straight alpha where it does not cover all, as a render of a transparent background; light that covers nothing raises it.
 fn write_png(target: &Path, frame: &SceneFrame, fitted: &dyn FittedTone) -> Result<()> {
     let (width, height, display) = (frame.width as u32, frame.height() as u32, &frame.viewing.display);
     match frame.covered(fitted) {
-        Some((shown, alpha)) => output::write_png_with_alpha_for(target, width, height, &shown, alpha, display)?,
+        Some(covered) => {
+            if covered.has_light_in_front() {
+                note(
+                    target,
+                    "light that covers nothing (flames, glows) is kept, and covers what lies behind as far as a PNG's alpha must to hold it",
+                );
+            }
+            let (shown, alpha) = covered.straight();
+            output::write_png_with_alpha_for(target, width, height, &shown, &alpha, display)?;
+        }
         None => output::write_png_for(target, width, height, &frame.shown(fitted), display)?,
     }
     Ok(())
@@ -445,11 +455,10 @@ fn write_exr(
     picture.part_of = frame.part_of;
     let emitted = |relative: f32| (display.emitted_cd_m2(f64::from(relative)) / display.white_cd_m2) as f32;
     let shown = match frame.covered(fitted) {
-        Some((mut shown, alpha)) => {
+        Some(covered) => {
             // Multiplied by alpha, as the format has it; the display's black is there before whatever lies behind.
-            shown.iter_mut().zip(alpha).for_each(|(rgb, alpha)| *rgb = rgb.map(|light| light * alpha));
-            picture.push_f32("A", alpha);
-            shown
+            picture.push_f32("A", covered.alpha().to_vec());
+            covered.premultiplied()
         }
         None => frame.shown(fitted),
     };

@@ -4,6 +4,7 @@ use super::srgb_codes::SrgbCodes;
 use super::{OutputError, beside::write_beside, check_size};
 use fechner_perception::display::{Display, Eotf};
 use fechner_perception::primaries::{Matrix, Primaries, apply};
+use fechner_perception::tone::gamut;
 use rayon::prelude::*;
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -89,12 +90,17 @@ fn encode_pq16(rgb_linear_display: &[[f32; 3]], display: &Display) -> Vec<u8> {
     bytes
 }
 
-/// Linear display RGB, 0 the display's black and 1 its white, of PQ codes (0 to 1) in Rec.2020 primaries, as [`write_pq_png`]
-/// writes them, in these primaries.
+/// Linear display RGB, 0 the display's black and 1 its white, of PQ codes (0 to 1) in these primaries; [`write_pq_png`] writes
+/// Rec.2020's. The display clips each channel at its black and its white; a colour that Rec.709 does not reach is brought in at the luminance that
+/// it has.
 pub fn decode_pq(codes: &[[f32; 3]], primaries: &Primaries, display: &Display) -> Vec<[f32; 3]> {
     let narrow = primaries.to(&Primaries::REC709).unwrap_or(IDENTITY);
     let relative = |code: f32| display.relative_of_emitted(Eotf::Pq.decode(f64::from(code), PEAK_CD_M2) * PEAK_CD_M2);
-    codes.par_iter().map(|codes| apply(&narrow, codes.map(relative)).map(|light| light as f32)).collect()
+    let shown = |codes: &[f32; 3]| {
+        let clipped = codes.map(|code| relative(code).clamp(0.0, 1.0));
+        gamut::fit_into_display(apply(&narrow, clipped).map(|light| light as f32))
+    };
+    codes.par_iter().map(shown).collect()
 }
 
 /// What the codes of a PNG file mean by its chunks.
@@ -341,6 +347,21 @@ mod tests {
             decode_pq(&codes, &Primaries::REC2020, &display).iter().flatten().zip(light.iter().flatten())
         {
             assert!((found - light).abs() < 1e-3, "{light} came back as {found}");
+        }
+    }
+
+    /// Each channel of the display clips for itself; then Rec.2020's colours keep the luminance that they have, which was 20 % too much of green.
+    #[test]
+    fn pq_colours_outside_rec_709_keep_their_luminance() {
+        let display = Display::preset("hdr-1000").unwrap();
+        let code = |cd_m2: f64| Eotf::Pq.encode(cd_m2 / PEAK_CD_M2, PEAK_CD_M2) as f32;
+        let weights = Primaries::REC2020.to_xyz().unwrap()[1];
+        for rgb in [[0.0, 300.0, 0.0], [900.0, 0.0, 20.0], [0.0, 0.0, 1000.0], [4000.0, 50.0, 0.0]] {
+            let shown = decode_pq(&[rgb.map(code)], &Primaries::REC2020, &display)[0];
+            let meant: f64 = rgb.iter().zip(weights).map(|(light, weight)| light.min(1000.0) * weight / 1000.0).sum();
+            let found = f64::from(fechner_perception::photometry::luminance(shown));
+            assert!((found / meant - 1.0).abs() < 2e-3, "{rgb:?}: {found} for {meant}");
+            assert!(shown.iter().all(|light| (0.0..=1.0).contains(light)), "{shown:?}");
         }
     }
 

@@ -75,6 +75,48 @@ fn colours_of_other_primaries_are_brought_to_rec_709() {
     assert_eq!((seen(&plain).0, notes(&plain, "p.exr")), (Vec3::new(0.3, 0.5, 0.2), 0));
 }
 
+/// Green of Rec.2020 is 0.678 of white. With its negative channels it was light that is taken away, with them cut off 19 % too bright.
+#[test]
+fn colours_outside_rec_709_are_light_of_their_own_luminance() {
+    let green = scene(&even(&[("R", 0.0), ("G", 1.0), ("B", 0.0)]), Some(REC2020));
+    let (color, roughness, around) = seen(&green);
+    for light in [color, around] {
+        let luminance = light.dot(Vec3::new(0.2126, 0.7152, 0.0722));
+        assert!((luminance - 0.678).abs() < 1e-3 && light.min_element() >= 0.0, "{light}");
+        assert!(light.max_element() <= 1.0, "a share of light: {light}");
+    }
+    assert_eq!(roughness, 1.0);
+    // Numbers may be negative, heights among them.
+    let mixed = scene(&[("R", [10.0, -0.5, -0.5, -0.5]), ("G", [-0.5; 4]), ("B", [1.0, -0.5, -0.5, -0.5])], None);
+    assert_eq!((seen(&mixed).0.min_element(), seen(&mixed).1), (0.0, -0.5));
+}
+
+/// As Blender writes them: the first by the alphabet was taken.
+#[test]
+fn the_picture_of_many_layers_is_the_finished_one() {
+    let (ao, combined) = ("ViewLayer.AO", "ViewLayer.Combined");
+    let names = |layer: &str| ["R", "G", "B"].map(|part| format!("{layer}.{part}"));
+    let layered = |first: &str, second: &str| {
+        let (first, second) = (names(first), names(second));
+        let mut channels: Vec<(&str, f32)> = first.iter().map(|name| (name.as_str(), 0.1)).collect();
+        channels.extend(second.iter().map(String::as_str).zip([0.25, 0.5, 0.75]));
+        scene(&even(&channels), None)
+    };
+    let light = Vec3::new(0.25, 0.5, 0.75);
+    let blender = layered(ao, combined);
+    assert_eq!((seen(&blender), notes(&blender, "is taken for")), ((light, 0.5, light), 0), "{:?}", blender.notes);
+    let unsure = layered("one", "two");
+    assert_eq!(
+        (seen(&unsure).2, notes(&unsure, "the layer one is taken for the picture, of one, two")),
+        (Vec3::splat(0.1), 2)
+    );
+    // A texture may be a layer that is no finished picture.
+    assert_eq!(seen(&layered("normal", "albedo")).2, light);
+    let small = scene(&even(&[("r", 0.25), ("g", 0.5), ("b", 0.75)]), None);
+    assert_eq!(seen(&small), (light, 0.5, light));
+    assert_eq!(seen(&scene(&even(&[("y", 0.25)]), None)).0, Vec3::splat(0.25));
+}
+
 /// RY = (R − Y) / Y; the picture was grey.
 #[test]
 fn luminance_and_chroma_and_xyz_are_colours() {

@@ -69,6 +69,28 @@ fn alpha_and_the_place_of_a_crop_stay() {
     assert!((green[0] - 0.5).abs() < 2e-3 && (green[1] - 0.125).abs() < 2e-3, "{green:?}");
 }
 
+/// A flame of 50 cd/m² beside what covers its pixel, under a white of 80: it was gone.
+#[test]
+fn light_that_covers_nothing_is_kept() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut picture = Picture::new(2, 1);
+    ["R", "G", "B"].into_iter().for_each(|channel| picture.push_f32(channel, vec![20.0, 50.0]));
+    picture.push_f32("A", vec![1.0, 0.0]);
+    picture.push_attribute(NITS_PER_UNIT, Attribute::Float(1.0));
+    write_exr(&folder.path().join("a.exr"), &picture).expect("written");
+    run(folder.path(), &["a.exr", "-o", "shown.exr", "--operator", "srgb"]);
+    let exr = read_exr(&folder.path().join("shown.exr")).expect("an EXR file");
+    let green = exr.channel("G").expect("green");
+    assert!((green[1] - 0.625).abs() < 2e-3, "{green:?}");
+    assert_eq!(exr.channel("A"), Some(&[1.0, 0.0][..]));
+    let said = tonemap(folder.path(), &["a.exr", "-o", "shown.png", "--operator", "srgb"]).stderr;
+    let said = String::from_utf8_lossy(&said).into_owned();
+    assert!(said.contains("light that covers nothing"), "{said}");
+    let flame = image::open(folder.path().join("shown.png")).expect("a picture").into_rgba8().get_pixel(1, 0).0;
+    // 0.625 of white by alpha alone.
+    assert!(flame[3].abs_diff(159) <= 1 && flame[1] == 255, "{flame:?}");
+}
+
 /// Over time the same eye sees the same part of the view.
 #[test]
 fn equal_frames_are_seen_as_the_still_of_one() {

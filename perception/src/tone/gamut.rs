@@ -4,7 +4,8 @@ use crate::photometry::luminance;
 
 /// Linear display RGB in 0..1 of the same luminance and hue: luminance above 1 becomes white, and what does not fit, at
 /// either end, is mixed with the grey of equal luminance.
-pub(super) fn fit_into_display(rgb: [f32; 3]) -> [f32; 3] {
+#[must_use]
+pub fn fit_into_display(rgb: [f32; 3]) -> [f32; 3] {
     let rgb = light(rgb);
     let shown = luminance(rgb);
     if shown <= 0.0 {
@@ -39,7 +40,8 @@ const BRIGHTEST_CD_M2: f32 = 1e15;
 /// `rgb` as light that Rec.709 holds: a colour outside it, which has negative channels, is mixed with the grey of its own
 /// luminance until none is negative. Channels that are no number become 0, infinite ones very bright; what has no luminance
 /// above 0 is black.
-pub(super) fn light(rgb: [f32; 3]) -> [f32; 3] {
+#[must_use]
+pub fn light(rgb: [f32; 3]) -> [f32; 3] {
     let rgb = rgb.map(|channel| match channel {
         f32::INFINITY => BRIGHTEST_CD_M2,
         finite if finite.is_finite() => finite,

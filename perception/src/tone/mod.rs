@@ -25,7 +25,7 @@ mod durand_dorsey00;
 mod fast_power;
 mod ferwerda96;
 mod field;
-mod gamut;
+pub mod gamut;
 mod guide;
 mod names;
 mod pattanaik00;

@@ -35,7 +35,8 @@ impl Adjust {
     pub(super) fn values(self, encoding: Encoding) -> Values {
         match (encoding, self.to_number) {
             (Encoding::Linear, _) | (_, Some(Number::AlphaOrMean)) => Values::Numbers,
-            (Encoding::Srgb, None | Some(Number::Luminance)) => Values::Colours,
+            (Encoding::Srgb, None) => Values::Colours,
+            (Encoding::Srgb, Some(Number::Luminance)) => Values::Luminances,
         }
     }
 

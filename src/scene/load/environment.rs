@@ -39,8 +39,7 @@ pub fn read(path: &Path, parametrisation: Parametrisation, notes: &mut Vec<Strin
             let decode = |byte| encoding.linear(byte);
             bytes.iter().map(|&[r, g, b, _]| Vec3::new(decode(r), decode(g), decode(b))).collect()
         }
-        // Light is never negative; wide-gamut pictures hold negative Rec.709 values for colours outside it.
-        Texels::Floats(floats) => floats.iter().map(|&[r, g, b, _]| Vec3::new(r, g, b).max(Vec3::ZERO)).collect(),
+        Texels::Floats(floats) => floats.iter().map(|&[r, g, b, _]| Vec3::new(r, g, b)).collect(),
     };
     Ok(Environment {
         parametrisation,

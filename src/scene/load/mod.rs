@@ -179,3 +179,9 @@ fn load_ply(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
 fn luminance(color: glam::Vec3) -> f32 {
     color.dot(glam::Vec3::new(0.2126, 0.7152, 0.0722))
 }
+
+/// Linear Rec.709 RGB without negative channels: a colour outside it is mixed with the grey of its own luminance. What is not finite is left to
+/// those who refuse it.
+fn within_rec709(color: glam::Vec3) -> glam::Vec3 {
+    if color.is_finite() { fechner_perception::tone::gamut::light(color.to_array()).into() } else { color }
+}

@@ -11,6 +11,7 @@
 //! more than real skies do: at 2 the horizon opposite a sun at 10° is about three times as bright as at 3. Below a sixteenth of a degree of elevation
 //! it is that of this elevation.
 
+use super::within_rec709;
 use crate::scene::{Environment, Light};
 use glam::{Mat3, Vec3};
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_2};
@@ -155,10 +156,10 @@ fn perez_value([a, b, c, d, e]: &Perez, cos_theta: f32, gamma: f32) -> f32 {
     (1.0 + a * (b / cos_theta).exp()) * (1.0 + c * (d * gamma).exp() + e * cos_gamma * cos_gamma)
 }
 
-/// Linear Rec.709 of luminance 1 and this chromaticity; what lies outside the gamut is cut at 0.
+/// Linear Rec.709 of luminance 1 and this chromaticity; what lies outside the gamut is brought in at that luminance.
 fn rgb_of(x: f32, y: f32) -> Vec3 {
     let y = y.max(1e-3);
-    rgb_of_xyz(Vec3::new(x / y, 1.0, (1.0 - x - y) / y)).max(Vec3::ZERO)
+    within_rec709(rgb_of_xyz(Vec3::new(x / y, 1.0, (1.0 - x - y) / y)))
 }
 
 fn rgb_of_xyz(xyz: Vec3) -> Vec3 {
@@ -188,7 +189,7 @@ fn solar_irradiance(elevation: f32, turbidity: f32) -> Vec3 {
         arriving += response * (emitted * transmitted);
     }
     let xyz = (arriving * (SOLAR_ILLUMINANCE_LX / outside)).as_vec3();
-    rgb_of_xyz(xyz).max(Vec3::ZERO)
+    within_rec709(rgb_of_xyz(xyz))
 }
 
 /// Planck's law up to a factor.

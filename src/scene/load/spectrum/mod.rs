@@ -2,7 +2,7 @@
 //!
 //! A spectrum is integrated against the CIE 1931 observer. What reflects or refracts is seen under D65, so that a flat
 //! spectrum is grey; what emits is seen as it is. Three numbers are not a spectral render: dispersion and metamerism are
-//! lost, and colours outside Rec.709 are clipped at 0.
+//! lost, and colours outside Rec.709 are brought into it at the luminance that they have.
 
 mod cie;
 pub(in crate::scene::load) mod named;
@@ -96,7 +96,7 @@ impl Spectrum {
 
     /// The colour of light of this spectrum; its luminance is the mean of the spectrum over the eye's sensitivity.
     pub(super) fn emission(&self) -> Vec3 {
-        clip(xyz_to_rgb(self.xyz(|_| 1.0)))
+        within_rec709(xyz_to_rgb(self.xyz(|_| 1.0)))
     }
 
     /// The same with luminance 1; `None` for light that cannot be seen.
@@ -108,7 +108,7 @@ impl Spectrum {
 
     /// The colour of a surface of this reflectance under D65; the same for indices of refraction and coefficients.
     pub(super) fn reflectance(&self) -> Vec3 {
-        clip(xyz_to_rgb(self.xyz(|row| between(row, |i| D65[i]))))
+        within_rec709(xyz_to_rgb(self.xyz(|row| between(row, |i| D65[i]))))
     }
 }
 
@@ -133,8 +133,8 @@ pub(super) fn xyz_to_rgb(xyz: DVec3) -> DVec3 {
     FROM_XYZ * xyz
 }
 
-fn clip(rgb: DVec3) -> Vec3 {
-    rgb.as_vec3().max(Vec3::ZERO)
+fn within_rec709(rgb: DVec3) -> Vec3 {
+    super::within_rec709(rgb.as_vec3())
 }
 
 #[cfg(test)]
@@ -158,6 +158,16 @@ mod tests {
         let red = Spectrum::from_list(&[400.0, 0.04, 550.0, 0.06, 580.0, 0.1, 620.0, 0.5, 700.0, 0.64]).unwrap();
         let expected = Vec3::new(0.46464, 0.05450, 0.03796);
         assert!((red.reflectance() / expected - 1.0).abs().max_element() < 1e-2, "{}", red.reflectance());
+    }
+
+    /// Sodium's light lies outside Rec.709: with its blue cut off it was too bright, and lasers' by a third and more.
+    #[test]
+    fn light_of_one_wavelength_keeps_its_luminance() {
+        for nm in [460.0, 500.0, 520.0, 589.0, 640.0] {
+            let line = Spectrum::from_pairs([[nm - 5.0, 0.0], [nm, 1.0], [nm + 5.0, 0.0]]).unwrap();
+            let (found, meant) = (luminance(line.emission()), line.xyz(|_| 1.0).y as f32);
+            assert!((found / meant - 1.0).abs() < 1e-3, "{nm} nm: {found} for {meant}");
+        }
     }
 
     #[test]

@@ -5,7 +5,7 @@
 //! CRDC-CR-85034 (1985); all read from refractiveindex.info (CC0). Glasses: n at 587.6 nm from Schott's catalogue.
 //! Illuminants: chromaticities of CIE 15:2004, tables T.3 and T.8, and of ACES's D60.
 
-use super::{Spectrum, clip, xyz_to_rgb};
+use super::{Spectrum, within_rec709, xyz_to_rgb};
 use crate::scene::load::metals::Metal;
 use glam::{DVec3, Vec3};
 
@@ -197,7 +197,7 @@ pub(in crate::scene::load) fn glass(name: &str) -> Option<f32> {
 /// Colour of luminance 1 of a CIE illuminant.
 pub(in crate::scene::load) fn illuminant(name: &str) -> Option<Vec3> {
     let [x, y] = find(ILLUMINANTS, name)?;
-    Some(clip(xyz_to_rgb(DVec3::new(x / y, 1.0, (1.0 - x - y) / y))))
+    Some(within_rec709(xyz_to_rgb(DVec3::new(x / y, 1.0, (1.0 - x - y) / y))))
 }
 
 #[cfg(test)]

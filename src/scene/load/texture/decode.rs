@@ -2,11 +2,13 @@
 //! (4 a texel), all others become linear floats (16 a texel).
 
 use super::Picture;
+use crate::exr_read::layers::colour_layer;
 use crate::exr_read::{self, ExrImage, Replaced, Window, layer_and_part};
 use crate::hdr_read::{HdrHeader, with_known_header};
 use crate::jpeg_read;
 use crate::scene::load::{LoadError, files};
 use crate::scene::{Encoding, Texels, texture};
+use fechner_perception::tone::gamut;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 use std::io::Cursor;
 use std::path::Path;
@@ -37,8 +39,10 @@ impl Decoded {
 /// What a picture's values are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::scene::load) enum Values {
-    /// Of the primaries that the file names, to be brought to Rec.709.
+    /// Of the primaries that the file names, to be brought into Rec.709: light and reflectances, which are never negative.
     Colours,
+    /// Of the primaries that the file names, to be weighed as Rec.709's: heights among them, which may be negative.
+    Luminances,
     /// As they stand: normals, roughness, coverage.
     Numbers,
 }
@@ -118,7 +122,11 @@ pub(in crate::scene::load) fn decode_bytes(
         true => Texels::Bytes(Arc::new(image.into_rgba8().into_raw().as_chunks::<4>().0.to_vec()), encoding),
         false => {
             let header = (format == ImageFormat::Hdr).then(|| HdrHeader::of(bytes));
-            Texels::Floats(Arc::new(linear_floats(image, encoding, header, &mut notes)))
+            let mut texels = linear_floats(image, encoding, header, &mut notes);
+            if values == Values::Colours {
+                texels.iter_mut().for_each(|[rgb @ .., _]| *rgb = gamut::light(*rgb));
+            }
+            Texels::Floats(Arc::new(texels))
         }
     };
     Ok(Decoded { width, height, texels, notes })
@@ -179,12 +187,13 @@ fn decode_exr(bytes: &[u8], name: &Path, values: Values) -> Result<Decoded, Load
     image.display_window = Window { origin: image.data_window_origin, width, height };
     image.is_display_window_left_out = false;
     let mut notes = Vec::new();
+    notes.extend(colour_layer(&image.names()).and_then(|layer| layer.guess()));
     let mut channels: Vec<&mut [f32]> = image.channels.iter_mut().map(|(_, values)| values.as_mut_slice()).collect();
     make_finite(&mut channels, &mut notes);
     add_missing_primaries(&mut image, &mut notes);
 
-    let coloured = if values == Values::Colours { image.scene_picture(channel) } else { None };
-    let rgb = match coloured {
+    let coloured = if values == Values::Numbers { None } else { image.scene_picture(channel) };
+    let mut rgb = match coloured {
         Some(picture) => {
             notes.extend(picture.notes);
             picture.rgb
@@ -192,28 +201,42 @@ fn decode_exr(bytes: &[u8], name: &Path, values: Values) -> Result<Decoded, Load
         None => plain_rgb(&image)
             .ok_or_else(|| LoadError::unsupported(name, "the picture has neither a channel R nor a channel Y"))?,
     };
+    if values == Values::Colours {
+        rgb.iter_mut().for_each(|rgb| *rgb = gamut::light(*rgb));
+    }
     let alpha = channel(&image, "A");
     let texel = |(i, [r, g, b]): (usize, [f32; 3])| [r, g, b, alpha.map_or(1.0, |alpha| alpha[i])];
     let texels = Texels::Floats(Arc::new(rgb.into_iter().enumerate().map(texel).collect()));
     Ok(Decoded { width, height, texels, notes })
 }
 
-/// The channels of an EXR file that a texture is made of: R, G, B and A of any layer, else luminance, chroma and CIE XYZ.
+/// The channels of an EXR file that a texture is made of: R, G, B and A of the picture's layer; where no layer has all colours, of any; else
+/// luminance, chroma and CIE XYZ.
 fn used_channels(all: &[String]) -> Vec<String> {
-    let of_any_layer = |parts: &[&str]| -> Vec<String> {
-        all.iter().filter(|name| parts.contains(&layer_and_part(name).1)).cloned().collect()
+    let names: Vec<&str> = all.iter().map(String::as_str).collect();
+    let layer = colour_layer(&names).map(|layer| layer.name);
+    let chosen = |parts: &[&str]| -> Vec<String> {
+        let is_chosen = |name: &&String| {
+            let (own_layer, own_part) = layer_and_part(name);
+            layer.is_none_or(|layer| layer == own_layer) && parts.iter().any(|part| own_part.eq_ignore_ascii_case(part))
+        };
+        all.iter().filter(is_chosen).cloned().collect()
     };
-    match all.iter().any(|name| layer_and_part(name).1 == "R") {
-        true => of_any_layer(&["R", "G", "B", "A"]),
-        false => of_any_layer(&["Y", "RY", "BY", "X", "Z", "A"]),
+    match all.iter().any(|name| layer_and_part(name).1.eq_ignore_ascii_case("R")) {
+        true => chosen(&["R", "G", "B", "A"]),
+        false => chosen(&["Y", "RY", "BY", "X", "Z", "A"]),
     }
 }
 
-/// A channel by its last name, that of the layer without a name before others.
+/// A channel of the picture's layer by its last name; where no layer has all colours, that of the layer without a name before others.
 fn channel<'a>(image: &'a ExrImage, wanted: &str) -> Option<&'a [f32]> {
-    image.channel(wanted).or_else(|| {
-        image.channels.iter().find(|(name, _)| layer_and_part(name).1 == wanted).map(|(_, values)| values.as_slice())
-    })
+    match colour_layer(&image.names()) {
+        Some(layer) => image.part(layer.name, wanted),
+        None => image.part("", wanted).or_else(|| {
+            let is_wanted = |name: &str| layer_and_part(name).1.eq_ignore_ascii_case(wanted);
+            image.channels.iter().find(|(name, _)| is_wanted(name)).map(|(_, values)| values.as_slice())
+        }),
+    }
 }
 
 /// A picture of R and one of G and B has none of the third; R alone is grey.

@@ -1,0 +1,123 @@
+//! Which layer of another program's EXR file is its picture.
+
+use super::{ExrImage, layer_and_part};
+use std::collections::BTreeSet;
+
+/// Channels of a colour.
+const RGB: [&str; 3] = ["R", "G", "B"];
+
+/// Layers that hold colour, but not the picture's.
+const NOT_THE_PICTURE: [&str; 14] = [
+    "albedo", "normal", "depth", "position", "variance", "velocity", "vector", "motion", "forward", "backward",
+    "crypto", "shadow", "mask", "diffuse",
+];
+/// What renderers call the finished picture; R, G and B without a layer come first.
+const THE_PICTURE: [&str; 5] = ["combined", "beauty", "rgba", "color", "image"];
+
+/// What Blender calls passes of light and of colour.
+const BLENDER_PASSES: [&str; 14] = [
+    "diffcol",
+    "diffdir",
+    "diffind",
+    "glosscol",
+    "glossdir",
+    "glossind",
+    "transcol",
+    "transdir",
+    "transind",
+    "volumedir",
+    "volumeind",
+    "emit",
+    "env",
+    "ao",
+];
+
+/// The layer that is taken for the picture.
+pub struct PictureLayer<'a> {
+    /// Its name; empty of the root.
+    pub name: &'a str,
+    /// Those that could be meant as well, it among them; empty where its name says that it is the picture, or no other is one.
+    of: Vec<&'a str>,
+}
+
+impl PictureLayer<'_> {
+    /// What to say of one that had to be guessed.
+    #[must_use]
+    pub fn guess(&self) -> Option<String> {
+        let of = self.of.join(", ");
+        (!of.is_empty()).then(|| format!("the layer {} is taken for the picture, of {of}", self.name))
+    }
+}
+
+impl ExrImage {
+    /// Names of all channels of the file, in its order but those last that were not asked for.
+    #[must_use]
+    pub fn names(&self) -> Vec<&str> {
+        self.channels.iter().map(|(name, _)| name).chain(&self.unread).map(String::as_str).collect()
+    }
+
+    /// The values of a layer's channel by its last name, whatever its case.
+    #[must_use]
+    pub fn part(&self, layer: &str, part: &str) -> Option<&[f32]> {
+        let is_it = |name: &str| {
+            let (own_layer, own_part) = layer_and_part(name);
+            own_layer == layer && own_part.eq_ignore_ascii_case(part)
+        };
+        self.channels.iter().find(|(name, _)| is_it(name)).map(|(_, values)| values.as_slice())
+    }
+}
+
+/// The root if it has `R`, `G` and `B`, else a layer a part of whose name, between dots, is what a finished picture is
+/// called (`RenderLayer.Combined.R`), else the first layer; auxiliaries only where a part of their name says picture and nothing
+/// else is there.
+#[must_use]
+pub fn picture_layer<'a>(names: &[&'a str]) -> Option<PictureLayer<'a>> {
+    let layers = layers_with(names, &RGB);
+    let is_auxiliary = |layer: &str| {
+        NOT_THE_PICTURE.iter().any(|name| layer.to_ascii_lowercase().contains(*name))
+            || BLENDER_PASSES.iter().any(|name| is_called(layer, name))
+    };
+    let (auxiliary, others): (Vec<&str>, Vec<&str>) = layers.into_iter().partition(|layer| is_auxiliary(layer));
+    let called = |layers: &[&'a str]| {
+        THE_PICTURE.iter().find_map(|name| layers.iter().copied().find(|layer| is_called(layer, name)))
+    };
+    let named = others.iter().copied().find(|layer| layer.is_empty()).or_else(|| called(&others));
+    let sure = |name| PictureLayer { name, of: Vec::new() };
+    match (named, &others[..]) {
+        (Some(name), _) | (None, &[name]) => Some(sure(name)),
+        (None, []) => called(&auxiliary).map(sure),
+        (None, &[name, ..]) => Some(PictureLayer { name, of: others }),
+    }
+}
+
+/// The same for a texture, which may be one layer of a file that has auxiliaries alone: the first of them then.
+#[must_use]
+pub fn colour_layer<'a>(names: &[&'a str]) -> Option<PictureLayer<'a>> {
+    picture_layer(names).or_else(|| {
+        let layers = layers_with(names, &RGB);
+        let name = *layers.first()?;
+        Some(PictureLayer { name, of: if layers.len() > 1 { layers } else { Vec::new() } })
+    })
+}
+
+/// Whether a part of the layer's name, between dots, is this.
+#[must_use]
+pub fn is_called(layer: &str, name: &str) -> bool {
+    layer.split('.').any(|part| part.eq_ignore_ascii_case(name))
+}
+
+/// Layers (what stands before the last dot, perhaps nothing) that have all of `parts`, in the order of `names`.
+#[must_use]
+pub fn layers_with<'a>(names: &[&'a str], parts: &[&str]) -> Vec<&'a str> {
+    let all: BTreeSet<(&str, String)> =
+        names.iter().map(|name| layer_and_part(name)).map(|(layer, part)| (layer, part.to_ascii_lowercase())).collect();
+    let has_all = |layer: &str| parts.iter().all(|part| all.contains(&(layer, part.to_ascii_lowercase())));
+    let mut known = BTreeSet::new();
+    names
+        .iter()
+        .map(|name| layer_and_part(name))
+        .filter(|(_, part)| parts.first().is_some_and(|first| part.eq_ignore_ascii_case(first)))
+        .map(|(layer, _)| layer)
+        .filter(|layer| has_all(layer) && known.insert(*layer))
+        .collect()
+}
