@@ -268,8 +268,13 @@ pub(super) fn direction_at(mu: f32) -> Vec3 {
 
 /// Mean of `f` over the facet normals visible from `wo`.
 pub(super) fn average_over_visible_normals(facets: &Microfacets, wo: Vec3, f: impl Fn(Vec3) -> f32) -> f32 {
+    visible_normals_and_weights(facets, wo).map(|(weight, m)| weight * f(m)).sum()
+}
+
+/// Facet normals visible from `wo`, and weights whose sum is 1.
+pub(super) fn visible_normals_and_weights(facets: &Microfacets, wo: Vec3) -> impl Iterator<Item = (f32, Vec3)> {
     let visible = facets.visible_normals(wo);
-    QUADRATURE.iter().map(|point| point.weight * f(visible.normal(point.u))).sum()
+    QUADRATURE.iter().map(move |point| (point.weight, visible.normal(point.u)))
 }
 
 /// 2∫curve(μ)μ dμ, by three-point Gauss–Legendre quadrature on every interval of the table.

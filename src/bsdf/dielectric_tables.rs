@@ -125,7 +125,7 @@ fn missing(facets: &Microfacets, wo: Vec3, eta: f32) -> f32 {
 }
 
 /// Share of light that leaves on the other side after being refracted by facet `m`.
-fn transmitted(facets: &Microfacets, wo: Vec3, m: Vec3, eta: f32, cos_transmitted: f32) -> f32 {
+pub(super) fn transmitted(facets: &Microfacets, wo: Vec3, m: Vec3, eta: f32, cos_transmitted: f32) -> f32 {
     let wi = m * (wo.dot(m) / eta - cos_transmitted) - wo / eta;
     if wi.z < 0.0 { facets.unshadowed(wo, super::turn(wi)) } else { 0.0 }
 }

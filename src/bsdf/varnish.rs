@@ -127,7 +127,7 @@ impl Sheen {
         let roughness = roughness.clamp(0.0, 1.0);
         let curve = SHEEN.curve(roughness);
         // Least where light grazes most, which is where fibres reflect most; a hair more for quadrature.
-        let most = curve.at(f32::MIN_POSITIVE).max(1.0) * 1.02;
+        let most = curve.at(f32::MIN_POSITIVE) * 1.02;
         let scale = 1.0 / most.max(1.0);
         let passes = 1.0 - color.max_element() * scale * curve.at(1.0);
         Self { color, roughness, inverse_alpha: inverse_alpha(roughness * roughness), scale, passes }
@@ -288,5 +288,19 @@ impl<'a> Varnish<'a> {
             Some(sheen) => (sheen.color * sheen.albedo(up), sheen.passed(up)),
         };
         Vec3::splat(1.0 - passed) + passed * (sheen + left * self.base.albedo(up))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// All were scaled down by 1.02, which is for those that reflect more than comes in.
+    #[test]
+    fn fibres_are_scaled_down_only_where_they_reflect_more_than_comes_in() {
+        for (roughness, is_scaled) in [(0.2, true), (0.3, true), (0.7, false), (1.0, false)] {
+            let scale = Sheen::new(Vec3::ONE, roughness).scale;
+            assert_eq!(scale < 1.0, is_scaled, "roughness {roughness}: {scale}");
+        }
     }
 }

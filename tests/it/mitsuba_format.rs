@@ -214,6 +214,16 @@ fn metals_have_the_versions_defaults() {
     assert!(matches!(old.materials[0].surface, Surface::Conductor { .. }));
 }
 
+/// Oren and Nayar's B/A for slopes of α/√2 radians, not α.
+#[test]
+fn rough_diffuse_is_as_rough_as_in_mitsuba() {
+    for (alpha, ratio) in [("0", 0.0), ("0.2", 0.0842), ("0.7", 0.4182)] {
+        let bsdf = format!(r#"<bsdf type="roughdiffuse"><float name="alpha" value="{alpha}"/></bsdf>"#);
+        let Surface::OrenNayar { roughness, .. } = material(&bsdf).surface else { panic!("clay") };
+        assert!((roughness.factor - ratio).abs() < 1e-4, "alpha {alpha}: {}", roughness.factor);
+    }
+}
+
 #[test]
 fn principled_glass_refracts_and_thin_does_not() {
     for (kind, refracts) in [("principled", true), ("principledthin", false)] {

@@ -1,7 +1,7 @@
 //! Our own format: what lamps of a luminous power emit, keys that change nothing, and files that are found from the scene's folder.
 
-use fechner::scene::Scene;
 use fechner::scene::load::{LoadOptions, load};
+use fechner::scene::{Alpha, Scene};
 
 /// A scene in a folder of its own, at a time in seconds.
 fn at(text: &str, seconds: f64) -> Result<Scene, String> {
@@ -42,6 +42,27 @@ fn a_lamp_gives_its_power_through_what_alpha_leaves() {
     let picture = "[textures.t]\nfile = \"t.png\"\n";
     let refused = read(&format!("{picture}{}", lamp("alpha = { texture = \"t\" }"))).unwrap_err();
     assert!(refused.starts_with("s.toml:10") && refused.contains("use emission_cd_m2"), "{refused}");
+}
+
+/// A leaf whose red is 0 was invisible where its alpha is 1.
+#[test]
+fn coverage_is_the_alpha_of_a_picture_that_has_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("s.toml");
+    image::RgbaImage::from_pixel(1, 1, image::Rgba([0, 128, 0, 255])).save(folder.path().join("leaf.png")).unwrap();
+    image::RgbImage::from_pixel(1, 1, image::Rgb([64, 128, 0])).save(folder.path().join("mask.png")).unwrap();
+    for (file, channel, read) in [
+        ("leaf.png", "", 3),
+        ("leaf.png", ", channel = \"r\"", 0),
+        ("leaf.png", ", channel = \"g\"", 1),
+        ("mask.png", "", 0),
+    ] {
+        let leaf = square(&format!("type = \"diffuse\"\nreflectance = 0.5\nalpha = {{ texture = \"t\"{channel} }}"));
+        std::fs::write(&path, format!("{LIT}[textures.t]\nfile = \"{file}\"\n{leaf}")).unwrap();
+        let scene = load(&path, &LoadOptions::default()).unwrap();
+        let Alpha::Blend { value } = scene.materials[0].alpha else { panic!("{:?}", scene.materials[0].alpha) };
+        assert_eq!(value.texture.unwrap().1, read, "{file}{channel}");
+    }
 }
 
 /// A lamp that grows from nothing is dark while it is flat; one that never has an area is a slip.

@@ -7,6 +7,7 @@ mod cases;
 mod chi_square;
 mod conventions;
 mod energy_balance;
+mod layers;
 mod reciprocity;
 mod robustness;
 mod sphere;

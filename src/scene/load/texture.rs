@@ -127,6 +127,11 @@ impl Requests {
         self.add(request)
     }
 
+    /// Whether a texture is a file with an alpha channel, by its header.
+    pub(super) fn has_alpha(&self, texture: TextureId) -> bool {
+        matches!(&self.requests[texture.0 as usize].picture, Picture::File(path) if has_alpha(path))
+    }
+
     /// Mean linear colour of a texture, for what has no place for a picture: which is decoded for it.
     pub(super) fn mean_color(&self, texture: TextureId) -> Result<Vec3, LoadError> {
         let request = &self.requests[texture.0 as usize];

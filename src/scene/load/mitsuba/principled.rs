@@ -29,6 +29,12 @@ impl Reader {
             transmission,
             ..MetalRoughness::default()
         };
+        if is_thin && model.transmission.factor > 0.0 && model.roughness.factor > 0.0 {
+            self.builder.note(format!(
+                "{}: what \"spec_trans\" lets through is blurred as much as the reflection, not by 0.65 eta - 0.35 of its roughness.",
+                bsdf.place()
+            ));
+        }
         Ok(if has_volume { self.glass(bsdf, model) } else { Surface::MetalRoughness(model) })
     }
 

@@ -5,9 +5,10 @@ use super::light::unit_luminance;
 use super::{Context, surface};
 use crate::scene::load::LoadError;
 use crate::scene::load::error::suggestion;
+use crate::scene::load::texture::Requests;
 use crate::scene::{
     Alpha, ColorInput, Encoding, HeightMap, HeightUnit, Material, MaterialId, Relief, ScalarInput, StretchDirection,
-    Surface, TextureLookup,
+    Surface, TextureId, TextureLookup,
 };
 use glam::{Vec2, Vec3};
 use std::collections::HashMap;
@@ -157,10 +158,16 @@ fn alpha<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Alpha, Lo
         (None, None) => Ok(Alpha::Opaque),
         (None, Some(_)) => Err(fields.error("\"alpha_cutoff\" needs \"alpha\"")),
         (Some(_), cutoff) => {
-            let value = scalar(context, fields, "alpha", 1.0)?;
+            let value = coverage(context, fields)?;
             Ok(cutoff.map_or(Alpha::Blend { value }, |cutoff| Alpha::Mask { value, cutoff: cutoff as f32 }))
         }
     }
+}
+
+/// `alpha`: of a picture that has an alpha channel, and where no channel is named, that.
+fn coverage<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<ScalarInput, LoadError> {
+    let alpha_or_red = |textures: &Requests, texture| if textures.has_alpha(texture) { 3 } else { 0 };
+    scalar_of_channel(context, fields, "alpha", 1.0, alpha_or_red)
 }
 
 /// A number, a colour, or a texture table.
@@ -192,12 +199,23 @@ pub(super) fn share_or_white<'a>(
     fields.get_or(key, ColorInput::constant(Vec3::ONE), |value| share(context, value))
 }
 
-/// A number in [0, 1], or a channel of a texture.
+/// A number in [0, 1], or a channel of a texture, red unless told.
 pub(super) fn scalar<'a>(
     context: &mut Context<'a>,
     fields: &Fields<'a>,
     key: &str,
     default: f32,
+) -> Result<ScalarInput, LoadError> {
+    scalar_of_channel(context, fields, key, default, |_, _| 0)
+}
+
+/// A number in [0, 1], or a channel of a texture: `usual` says which, unless the file does.
+fn scalar_of_channel<'a>(
+    context: &mut Context<'a>,
+    fields: &Fields<'a>,
+    key: &str,
+    default: f32,
+    usual: impl Fn(&Requests, TextureId) -> u8,
 ) -> Result<ScalarInput, LoadError> {
     let Some(value) = fields.get(key) else {
         return Ok(ScalarInput::constant(default));
@@ -206,14 +224,16 @@ pub(super) fn scalar<'a>(
         return Ok(ScalarInput::constant(value.within(0.0, 1.0)? as f32));
     }
     let fields = value.fields(&["texture", "channel", "factor", "scale", "offset", "rotation_deg"])?;
+    let lookup = lookup(context, &fields, Encoding::Linear)?;
+    let channel = channel(&fields)?.unwrap_or_else(|| usual(&context.builder.textures, lookup.texture));
     Ok(ScalarInput {
         factor: fields.get_or("factor", 1.0, |value| value.within(0.0, 1.0))? as f32,
-        texture: Some((lookup(context, &fields, Encoding::Linear)?, channel(&fields)?)),
+        texture: Some((lookup, channel)),
     })
 }
 
-fn channel(fields: &Fields<'_>) -> Result<u8, LoadError> {
-    fields.get_or("channel", 0, |value| value.choice(&[("r", 0), ("g", 1), ("b", 2), ("a", 3)]))
+fn channel(fields: &Fields<'_>) -> Result<Option<u8>, LoadError> {
+    fields.get_some("channel", |value| value.choice(&[("r", 0), ("g", 1), ("b", 2), ("a", 3)]))
 }
 
 fn relief<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Option<Relief>, LoadError> {
@@ -227,7 +247,7 @@ fn relief<'a>(context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Option<R
         (None, Some(value)) => {
             let fields = value.fields(&["texture", "channel", "height", "scale", "offset", "rotation_deg"])?;
             let height = fields.require("height")?.number()? as f32;
-            let texture = Some((lookup(context, &fields, Encoding::Linear)?, channel(&fields)?));
+            let texture = Some((lookup(context, &fields, Encoding::Linear)?, channel(&fields)?.unwrap_or(0)));
             let height = ScalarInput { factor: height, texture };
             Ok(Some(Relief::Heights(HeightMap { height, unit: HeightUnit::Scene })))
         }
