@@ -123,7 +123,7 @@ fn tiles(dark: f32, side: usize) -> Picture {
     let mut state = 4;
     let pixels = || (0..HEIGHT).flat_map(|y| (0..WIDTH).map(move |x| (x, y)));
     let albedo: Vec<[f32; 3]> =
-        pixels().map(|(x, y)| if (x / side + y / side) % 2 == 0 { [dark; 3] } else { [0.8; 3] }).collect();
+        pixels().map(|(x, y)| if (x / side + y / side).is_multiple_of(2) { [dark; 3] } else { [0.8; 3] }).collect();
     let truth: Vec<[f32; 3]> = albedo.iter().map(|albedo| albedo.map(|channel| 50.0 * (channel + 0.02))).collect();
     let noisy = truth
         .iter()
