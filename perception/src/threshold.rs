@@ -49,9 +49,11 @@ pub struct ThresholdMap {
 /// Finds adaptation, masking and thresholds of a picture.
 ///
 /// Adaptation is the arithmetic mean over a Gaussian of σ 0.25° (the variance of a disc of 1°), after pixels that
-/// outshine all their neighbours, or all but one, have been brought down to the second brightest: a firefly must not raise its
-/// own threshold.
-/// Masking is each octave band's own, see [`crate::masking`].
+/// outshine all their neighbours, or all but one, have been brought down to the second brightest: a firefly must not raise what the
+/// eye adapts to.
+/// Masking is each octave band's own, see [`crate::masking`]. There lone bright pixels count as what they look like, glitter or
+/// stars, which do hide error: a single one of 100 times its grey raises the allowed error beside it up to 1.8 times. Where such
+/// pixels may be fireflies, give a guide without them, as [`crate::guide::denoise`] makes it.
 ///
 /// # Errors
 /// [`Error::Empty`] and [`Error::BadPixel`] for pictures that are none, [`Error::SizeMismatch`] for a variance of
@@ -226,7 +228,8 @@ impl ThresholdMap {
     }
 
     /// How many times masking raises the allowed standard error of white noise at each pixel, 1 to 3. On a map
-    /// [`with_motion`](Self::with_motion) what motion raises or lowers is in it, too.
+    /// [`with_motion`](Self::with_motion) what motion raises or lowers is in it, too. So is, with [`Glare`], what keeps thresholds
+    /// from falling under a veil that is brighter than the picture: beside very bright lamps hundreds of times.
     #[must_use]
     pub fn masking_elevation(&self) -> Plane {
         let unmasked = noise_gain(&self.tables, &self.adaptation_cd_m2, &[]);

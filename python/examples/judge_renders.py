@@ -6,8 +6,9 @@ of their mean; `ThresholdMap.measured_visibility` says how visible it is, in thr
     python python/examples/judge_renders.py a.npy b.npy --exposure 1000 -o map.png
     python python/examples/judge_renders.py a.pfm b.pfm --display laptop -o map.npy
 
-Files: .npy ((height, width, 3), linear Rec. 709), .pfm, and with `pip install mitsuba` .exr and .hdr.
-Exit status 0 when at least 99 % of the picture is below threshold, else 1.
+Files: .npy ((height, width, 3), linear Rec. 709), .pfm, and with `pip install mitsuba` .exr (of several layers the one called
+Combined, as Blender writes them) and .hdr.
+Exit status 0 when at least 99 % of the picture is below threshold, 1 when it is not, 2 when that cannot be said.
 """
 
 import argparse
@@ -27,16 +28,31 @@ def read(path):
     elif kind == ".pfm":
         picture = read_pfm(path)
     elif kind in (".exr", ".hdr"):
-        import mitsuba
-
-        mitsuba.set_variant("scalar_rgb")
-        bitmap = mitsuba.Bitmap(str(path)).convert(mitsuba.Bitmap.PixelFormat.RGB, mitsuba.Struct.Type.Float32, False)
-        picture = np.array(bitmap)
+        picture = read_by_mitsuba(path)
     else:
         raise ValueError(f"{path}: {kind or 'no ending'}; a picture is .npy, .pfm, .hdr or .exr")
     if picture.ndim != 3 or picture.shape[2] < 3:
         raise ValueError(f"{path} has the shape {picture.shape}; a picture has (height, width, 3)")
     return np.ascontiguousarray(picture[..., :3], np.float32)
+
+
+def read_by_mitsuba(path):
+    """An OpenEXR or Radiance picture."""
+    import mitsuba
+
+    mitsuba.set_variant("scalar_rgb")
+    try:
+        bitmap = mitsuba.Bitmap(str(path))
+        if bitmap.pixel_format() == mitsuba.Bitmap.PixelFormat.MultiChannel:
+            layers = dict(bitmap.split())
+            # Mitsuba calls the layer without a name <root>.
+            combined = [name for name in layers if name == "<root>" or name.split(".")[-1] == "Combined"]
+            if len(combined) != 1:
+                raise ValueError(f"{path} has the layers {', '.join(layers)}; one and no more must be called Combined")
+            bitmap = layers[combined[0]]
+        return np.array(bitmap.convert(mitsuba.Bitmap.PixelFormat.RGB, mitsuba.Struct.Type.Float32, False))
+    except RuntimeError as error:
+        raise ValueError(f"{path}: {' '.join(str(error).split())}") from error
 
 
 def read_pfm(path):
@@ -111,6 +127,8 @@ def main():
     arguments.add_argument("--tone", default="ward94", help=", ".join(fechner.tone_operators()))
     arguments.add_argument("-o", "--output", type=Path, help="the map of v: .npy, or .png with matplotlib (white is 2)")
     options = arguments.parse_args()
+    if not 0 < options.exposure < np.inf:
+        arguments.error(f"--exposure is {options.exposure}; it must be finite and above 0")
     try:
         first, second = (options.exposure * read(path) for path in (options.first, options.second))
         if first.shape != second.shape:

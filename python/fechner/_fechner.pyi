@@ -1,4 +1,4 @@
-from typing import Literal, final
+from typing import Literal, SupportsFloat, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,6 +23,7 @@ __all__ = [
 ]
 
 _Array = NDArray[np.float32]
+_Number = SupportsFloat
 _Csf = Literal[
     "castle", "stela", "barten99", "barten89", "daly93", "daly98", "laird06", "hdrvdp2", "mannos-sakrison"
 ]
@@ -33,17 +34,17 @@ class Display:
         cls,
         preset: str = "desktop",
         *,
-        pixels_per_degree: float | None = None,
-        pixel_aspect_ratio: float | None = None,
-        white_cd_m2: float | None = None,
-        black_cd_m2: float | None = None,
-        ambient_cd_m2: float | None = None,
-        distance_m: float | None = None,
-        csf_area_deg2: float | None = None,
+        pixels_per_degree: _Number | None = None,
+        pixel_aspect_ratio: _Number | None = None,
+        white_cd_m2: _Number | None = None,
+        black_cd_m2: _Number | None = None,
+        ambient_cd_m2: _Number | None = None,
+        distance_m: _Number | None = None,
+        csf_area_deg2: _Number | None = None,
     ) -> Display: ...
     @staticmethod
     def presets() -> list[str]: ...
-    def luminance_cd_m2(self, relative: float) -> float: ...
+    def luminance_cd_m2(self, relative: _Number) -> float: ...
     @property
     def name(self) -> str: ...
     @property
@@ -60,11 +61,12 @@ class Display:
     def distance_m(self) -> float | None: ...
     @property
     def csf_area_deg2(self) -> float | None: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[str], dict[str, float | None]]: ...
 
 @final
 class Observer:
     def __new__(
-        cls, sensitivity: float = 1.0, csf_area_deg2: float | None = None, glare_age_years: float | None = None
+        cls, sensitivity: _Number = 1.0, csf_area_deg2: _Number | None = None, glare_age_years: _Number | None = None
     ) -> Observer: ...
     @staticmethod
     def keen() -> Observer: ...
@@ -74,6 +76,7 @@ class Observer:
     def csf_area_deg2(self) -> float | None: ...
     @property
     def glare_age_years(self) -> float | None: ...
+    def __getnewargs__(self) -> tuple[float, float | None, float | None]: ...
 
 @final
 class Viewing:
@@ -82,13 +85,14 @@ class Viewing:
     def display(self) -> Display: ...
     @property
     def observer(self) -> Observer: ...
+    def __getnewargs__(self) -> tuple[Display, Observer]: ...
 
 @final
 class ThresholdMap:
     @property
     def shape(self) -> tuple[int, int]: ...
     def adaptation(self) -> _Array: ...
-    def allowed_standard_error(self, visibility: float = 1.0) -> _Array: ...
+    def allowed_standard_error(self, visibility: _Number = 1.0) -> _Array: ...
     def masking_elevation(self) -> _Array: ...
     def predicted_visibility(self, variance_of_mean: ArrayLike) -> _Array: ...
     def measured_visibility(self, half_difference: ArrayLike) -> _Array: ...
@@ -98,10 +102,10 @@ class ThresholdMap:
         *,
         cost: ArrayLike | None = None,
         tolerance: ArrayLike | None = None,
-        visibility: float = 1.0,
-        min_samples: float = 1.0,
-        max_samples: float = 1e6,
-        budget: float | None = None,
+        visibility: _Number = 1.0,
+        min_samples: _Number = 1.0,
+        max_samples: _Number = 1e6,
+        budget: _Number | None = None,
     ) -> Allocation: ...
 
 @final
@@ -149,7 +153,7 @@ def threshold_map(
 ) -> ThresholdMap: ...
 def contrast_sensitivity_functions() -> list[_Csf]: ...
 def contrast_sensitivity(
-    frequency_cpd: float, luminance_cd_m2: float, viewing: Viewing | None = None, csf: _Csf = "castle"
+    frequency_cpd: _Number, luminance_cd_m2: _Number, viewing: Viewing | None = None, csf: _Csf = "castle"
 ) -> float: ...
 def tone_operators() -> list[str]: ...
 def fit_tone(
@@ -157,7 +161,7 @@ def fit_tone(
     name: str,
     viewing: Viewing | None = None,
     *,
-    exposure_stops: float = 0.0,
+    exposure_stops: _Number = 0.0,
     local: bool = False,
     gaze: tuple[int, int] | None = None,
 ) -> Tone: ...
@@ -166,7 +170,7 @@ def tone_map(
     name: str,
     viewing: Viewing | None = None,
     *,
-    exposure_stops: float = 0.0,
+    exposure_stops: _Number = 0.0,
     local: bool = False,
 ) -> _Array: ...
 def difference(

@@ -98,7 +98,10 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=1, help="threads of each unit")
     parser.add_argument("--program", default="fechner", help="the program, if it is not in PATH")
     words = parser.parse_args()
-    from distributed import Client, LocalCluster
+    try:
+        from distributed import Client, LocalCluster
+    except ImportError as error:
+        parser.exit(2, f'fechner.farm: {error}; it needs: pip install "dask[distributed]"\n')
 
     if words.scheduler:
         with Client(words.scheduler) as client:

@@ -90,7 +90,7 @@ impl Difference {
 
 /// A denoised guide, (height, width, 3), for thresholds and tone; never to be shown.
 ///
-/// rgb: mean of the samples, linear, any unit, (height, width, 3). variance: of the mean's luminance in that unit squared,
+/// rgb: mean of the samples, linear, in a unit in which light lies between 1e-5 and 1e9, (height, width, 3). variance: of the mean's luminance in that unit squared,
 /// (height, width). albedo and normal: of the first surface, (height, width, 3), 0 where there is none. depth: (height, width), not
 /// finite where there is none.
 #[pyfunction]

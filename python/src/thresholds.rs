@@ -94,7 +94,8 @@ impl ThresholdMap {
         plane_to_array(py, work(py, || self.0.allowed_standard_error_cd_m2(visibility))?)
     }
 
-    /// How many times masking raises the allowed standard error, 1 to 3; (height, width).
+    /// How many times masking raises the allowed standard error, 1 to 3; (height, width). With glare_age_years it holds what keeps
+    /// thresholds from falling under a veil, too, beside very bright lamps hundreds of times.
     fn masking_elevation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         plane_to_array(py, work(py, || self.0.masking_elevation())?)
     }
@@ -125,7 +126,8 @@ impl ThresholdMap {
     ///
     /// variance_per_sample: (height, width), (cd/m²)² on the display. cost: of one sample, any unit, above 0; None is 1 everywhere.
     /// tolerance: multiplies the visibility allowed. With a budget (Σ cost · samples) the lowest visibility that it pays for is
-    /// found instead, and `visibility` is where the search begins.
+    /// found instead, and `visibility` is where the search begins. min_samples everywhere are paid for even where they cost more than
+    /// the budget: compare `cost`.
     #[pyo3(signature = (
         variance_per_sample, *, cost = None, tolerance = None, visibility = 1.0, min_samples = 1.0, max_samples = 1e6, budget = None
     ))]
@@ -177,7 +179,8 @@ pub(crate) struct Allocation {
     lower_bound: f64,
     /// cost / lower_bound − 1.
     gap: f64,
-    /// The visibility asked for or, for a budget, found.
+    /// The visibility asked for or, for a budget, the greatest that the counts leave anywhere, over what is tolerated there, be it
+    /// because max_samples does not reach further.
     visibility: f64,
     /// Pixels that stay above it even with max_samples everywhere.
     unreachable_pixels: usize,

@@ -4,6 +4,7 @@ use fechner_perception::display::Glare;
 use fechner_perception::{Error, display};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::errors::value_error;
 
@@ -113,6 +114,24 @@ impl Display {
         self.0.csf_area_deg2
     }
 
+    /// What `pickle` and `copy` make it again from: the preset, and every field by its name.
+    fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<((&str,), Bound<'py, PyDict>)> {
+        let display = &self.0;
+        let fields = PyDict::new(py);
+        for (name, value) in [
+            ("pixels_per_degree", Some(display.pixels_per_degree)),
+            ("pixel_aspect_ratio", Some(display.pixel_aspect_ratio)),
+            ("white_cd_m2", Some(display.white_cd_m2)),
+            ("black_cd_m2", Some(display.black_cd_m2)),
+            ("ambient_cd_m2", Some(display.ambient_cd_m2)),
+            ("distance_m", display.distance_m),
+            ("csf_area_deg2", display.csf_area_deg2),
+        ] {
+            fields.set_item(name, value)?;
+        }
+        Ok(((&display.name,), fields))
+    }
+
     fn __repr__(&self) -> String {
         let display = &self.0;
         let mut text = format!(
@@ -201,6 +220,11 @@ impl Observer {
         }
     }
 
+    /// What `pickle` and `copy` make it again from.
+    fn __getnewargs__(&self) -> (f64, Option<f64>, Option<f64>) {
+        (self.observer.sensitivity, self.csf_area_deg2, self.glare_age_years())
+    }
+
     fn __repr__(&self) -> String {
         let or_none = |value: Option<f64>| value.map_or_else(|| "None".to_owned(), |value| value.to_string());
         format!(
@@ -240,6 +264,11 @@ impl Viewing {
     #[getter]
     fn observer(&self) -> Observer {
         Observer { observer: self.0.observer.clone(), csf_area_deg2: Some(self.0.observer.csf_area_deg2) }
+    }
+
+    /// What `pickle` and `copy` make it again from.
+    fn __getnewargs__(&self) -> (Display, Observer) {
+        (self.display(), self.observer())
     }
 
     fn __repr__(&self) -> String {

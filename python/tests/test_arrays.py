@@ -1,6 +1,8 @@
 """What goes in and out: memory, kinds of array, errors, threads."""
 
+import copy
 import multiprocessing
+import pickle
 import threading
 import time
 
@@ -171,6 +173,24 @@ def test_an_observer_and_a_display_both_have_their_say():
     assert keen == pytest.approx(1.75 * fechner.contrast_sensitivity(4, 100))
     with pytest.raises(TypeError, match="display is 5; it must be a Display or a preset's name"):
         fechner.Viewing(5)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        fechner.Display("phone"),
+        fechner.Display("strict", pixels_per_degree=41.7, distance_m=0.7, black_cd_m2=0),
+        fechner.Observer.keen(),
+        fechner.Observer(0.5, csf_area_deg2=3, glare_age_years=60),
+        fechner.Viewing("strict"),
+        fechner.Viewing(fechner.Display("laptop", white_cd_m2=500), fechner.Observer.keen()),
+    ],
+    ids=repr,
+)
+def test_settings_go_to_other_processes(settings):
+    for protocol in range(2, pickle.HIGHEST_PROTOCOL + 1):
+        assert repr(pickle.loads(pickle.dumps(settings, protocol))) == repr(settings)
+    assert repr(copy.copy(settings)) == repr(copy.deepcopy(settings)) == repr(settings)
 
 
 def test_broken_error_is_counted_as_the_crate_says():

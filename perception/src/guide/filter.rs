@@ -1,6 +1,6 @@
 //! The edge-avoiding passes.
 
-use super::surfaces::{DEPTH, NO_DEPTH, NORMAL_X, NORMAL_Y, NORMAL_Z, SLOPE, SURFACE_CHANNELS};
+use super::surfaces::{DEPTH, KIND, NORMAL_X, NORMAL_Y, NORMAL_Z, SLOPE, SURFACE_CHANNELS};
 use super::{BLUE, GREEN, LIGHT_CHANNELS, LUMINANCE, RED, VARIANCE};
 use crate::photometry::luminance;
 use crate::rows::{BORDER, Rows, TILE, Window};
@@ -134,6 +134,7 @@ struct Centers {
     /// [`NORMAL_SHARPNESS`], 0 where there is no normal.
     sharpness: Vec4,
     depth: Vec4,
+    kind: Vec4,
     luminance_scale: Vec4,
     depth_scale: Vec4,
 }
@@ -149,6 +150,7 @@ impl Centers {
             normal,
             sharpness: Vec4::select(is_known, Vec4::splat(NORMAL_SHARPNESS), Vec4::ZERO),
             depth: own.surface(DEPTH, at),
+            kind: own.surface(KIND, at),
             luminance_scale: Vec4::from_slice(&scales.luminance[column..]),
             depth_scale: Vec4::from_slice(&scales.depth[column..]),
         }
@@ -162,10 +164,8 @@ impl Centers {
             + self.normal[2] * row.surface(NORMAL_Z, at);
         let turned = self.sharpness * (1.0 - cosine).max(Vec4::ZERO);
         let other_depth = row.surface(DEPTH, at);
-        // A surface and the emptiness beside it are far apart on any scale.
-        let void = Vec4::splat(NO_DEPTH);
-        let differs = self.depth.cmpge(void) ^ other_depth.cmpge(void);
-        let apart_in_kind = Vec4::select(differs, Vec4::splat(GONE), Vec4::ZERO);
+        // What is of another kind is no neighbour on any scale.
+        let apart_in_kind = GONE * (self.kind - row.surface(KIND, at)).abs();
         let depth_apart = (self.depth - other_depth).abs() * self.depth_scale;
         let light_apart = (self.light[LUMINANCE] - row.light(LUMINANCE, at)).abs() * self.luminance_scale;
         falling(turned + light_apart + depth_apart + apart_in_kind)

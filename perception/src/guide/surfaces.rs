@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::GuideInputs;
+use super::{GuideInputs, is_divided};
 use crate::rows::Rows;
 
 /// Stands for the depth where there is no surface.
@@ -13,12 +13,15 @@ const FARTHEST: f32 = 1e14;
 const BEYOND: f32 = 1e30;
 
 // Channels of a row of surfaces.
-pub(super) const SURFACE_CHANNELS: usize = 5;
+pub(super) const SURFACE_CHANNELS: usize = 6;
 pub(super) const NORMAL_X: usize = 0;
 pub(super) const NORMAL_Y: usize = 1;
 pub(super) const NORMAL_Z: usize = 2;
 pub(super) const DEPTH: usize = 3;
 pub(super) const SLOPE: usize = 4;
+/// A number for each kind of pixel: a surface whose light is divided by its albedo, one whose light is not, and emptiness, likewise.
+/// Those of one kind alone are neighbours.
+pub(super) const KIND: usize = 5;
 
 /// What is known of each pixel's surface, with values that need no checks: an infinite depth is [`NO_DEPTH`], a broken
 /// normal 0.
@@ -26,7 +29,7 @@ pub(super) fn surfaces(inputs: &GuideInputs<'_>) -> Rows<SURFACE_CHANNELS> {
     let width = inputs.width;
     let slopes = depth_slopes(inputs.depth, width);
     let mut surfaces = Rows::new(width, inputs.height);
-    surfaces.for_each_row(|y, [normal_x, normal_y, normal_z, depth, slope]| {
+    surfaces.for_each_row(|y, [normal_x, normal_y, normal_z, depth, slope, kind]| {
         for x in 0..width {
             let index = y * width + x;
             let normal = inputs.normal[index];
@@ -35,6 +38,7 @@ pub(super) fn surfaces(inputs: &GuideInputs<'_>) -> Rows<SURFACE_CHANNELS> {
             let own = inputs.depth[index];
             depth[x] = if own.is_finite() { own.clamp(-FARTHEST, FARTHEST) } else { NO_DEPTH };
             slope[x] = slopes[index].min(FARTHEST);
+            kind[x] = f32::from(2 * u8::from(!own.is_finite()) + u8::from(!is_divided(inputs.albedo[index])));
         }
     });
     surfaces.fill_border(DEPTH, BEYOND);

@@ -9,6 +9,7 @@ use super::saved::{Fit, SavedTone};
 use super::screen::finite;
 use super::time::AdaptationState;
 use super::tint::tint_slope;
+use super::words::Shown;
 use super::{FittedTone, ToneOperator};
 use crate::display::Viewing;
 use crate::photometry::luminance;
@@ -162,7 +163,7 @@ impl FittedTone for FittedAgx {
     }
 
     fn describe(&self) -> String {
-        format!("agx: middle grey at {:.4} cd/m² of the scene", MIDDLE_GREY / self.relative_per_cd_m2)
+        format!("agx: middle grey at {} cd/m² of the scene", Shown(MIDDLE_GREY / self.relative_per_cd_m2))
     }
 
     fn save(&self) -> SavedTone {

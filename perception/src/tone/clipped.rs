@@ -8,6 +8,7 @@ use super::guide::{Pixel, SceneGuide};
 use super::saved::{Fit, SavedTone};
 use super::screen::finite;
 use super::time::AdaptationState;
+use super::words::Shown;
 use super::{FittedTone, ToneOperator};
 use crate::display::Viewing;
 
@@ -71,7 +72,7 @@ impl FittedTone for FittedClip {
     }
 
     fn describe(&self) -> String {
-        format!("{}: clips at {:.4} cd/m² of the scene", self.operator, self.relative_per_cd_m2.recip())
+        format!("{}: clips at {} cd/m² of the scene", self.operator, Shown(self.relative_per_cd_m2.recip()))
     }
 
     fn save(&self) -> SavedTone {

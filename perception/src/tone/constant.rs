@@ -97,6 +97,34 @@ mod tests {
         }
     }
 
+    /// Of 100×100 pixels the first `lit` ones have from 20 to 100 cd/m², all others `background`.
+    fn lit_before(background: f32, lit: usize) -> Plane {
+        let value = |index: usize| if index < lit { 20.0 + 80.0 * index as f32 / lit as f32 } else { background };
+        Plane::from_fn(100, 100, |x, y| value(y * 100 + x))
+    }
+
+    /// A background that holds next to no light is empty, however much of the picture it is.
+    #[test]
+    fn an_empty_background_is_no_reason_to_expose_longer() {
+        for time in [Exposure::Automatic, Exposure::Long, Exposure::Short] {
+            for lit in [20, 100, 400, 484, 529, 2000] {
+                let of = |background| exposure_of(&lit_before(background, lit), time);
+                for background in [1e-12, 1e-6, 2e-5] {
+                    let ratio = of(background) / of(0.0);
+                    assert!((ratio - 1.0).abs() < 1e-6, "{time:?}, {lit} pixels lit before {background}: {ratio}");
+                }
+            }
+        }
+    }
+
+    /// Nor does a single pixel make a picture empty, in a small picture either.
+    #[test]
+    fn a_firefly_empties_no_small_picture() {
+        let mut small = Plane::filled(20, 20, 10.0);
+        small.values_mut()[150] = 1e9;
+        assert!((relative_of_ten(&small) - 0.18).abs() < 1e-6);
+    }
+
     #[test]
     fn a_lamp_and_fireflies_do_not_darken_the_picture() {
         let mut lamp = Plane::filled(100, 100, 10.0);
@@ -110,6 +138,12 @@ mod tests {
         let mut night = Plane::filled(100, 100, 0.01);
         night.values_mut()[..1000].fill(100.0);
         assert!((fitted(&night, Exposure::Automatic).relative_luminance(100.0) - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn what_is_said_of_darkness_is_not_nothing() {
+        let said = fitted(&Plane::filled(8, 8, 2e-7), Exposure::Short).describe();
+        assert_eq!(said, "constant-short: white at 2.000e-7 cd/m² of the scene");
     }
 
     #[test]

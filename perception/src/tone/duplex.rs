@@ -10,6 +10,7 @@ use super::guide::{Pixel, SceneGuide};
 use super::saved::{Fit, SavedTone};
 use super::screen::finite;
 use super::time::{AdaptationState, Goal};
+use super::words::Shown;
 use crate::display::PixelDensity;
 use crate::photometry::scotopic_luminance;
 use crate::tvi;
@@ -115,13 +116,13 @@ impl FittedTone for FittedDuplex {
 
     fn describe(&self) -> String {
         format!(
-            "{}: cones × {:.4}, rods × {:.4} × {:.3}, for an adaptation of {:.4} and {:.4} cd/m²",
+            "{}: cones × {}, rods × {} × {:.3}, for an adaptation of {} and {} cd/m²",
             self.operator,
-            self.law.cone_scale,
-            self.law.rod_scale,
+            Shown(self.law.cone_scale),
+            Shown(self.law.rod_scale),
             self.law.rod_weight,
-            self.world.cones_cd_m2,
-            self.world.rods_cd_m2
+            Shown(self.world.cones_cd_m2),
+            Shown(self.world.rods_cd_m2)
         )
     }
 

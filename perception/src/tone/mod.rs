@@ -48,6 +48,7 @@ mod tumblin_rushmeier;
 mod veil;
 mod ward94;
 mod ward_larson97;
+mod words;
 
 pub use absolute::Absolute;
 pub use agx::Agx;

@@ -11,6 +11,7 @@ use super::guide::{Pixel, SceneGuide};
 use super::saved::{Fit, SavedTone};
 use super::screen::Screen;
 use super::time::{AdaptationState, Goal, Kinetics, ReceptorState};
+use super::words::Shown;
 use super::{FittedTone, LEAST_GREY_CD_M2, ToneOperator};
 use crate::display::Viewing;
 use crate::photometry::{luminance, scotopic_luminance};
@@ -288,11 +289,11 @@ impl FittedTone for FittedPattanaik00 {
 
     fn describe(&self) -> String {
         format!(
-            "pattanaik00: cones adapted to {:.4} cd/m² with {:.3} of their pigment, rods to {:.4} with {:.4}",
-            self.state.cones.neural_cd_m2,
+            "pattanaik00: cones adapted to {} cd/m² with {:.3} of their pigment, rods to {} with {}",
+            Shown(self.state.cones.neural_cd_m2),
             self.state.cones.pigment,
-            self.state.rods.neural_cd_m2,
-            self.state.rods.pigment
+            Shown(self.state.rods.neural_cd_m2),
+            Shown(self.state.rods.pigment)
         )
     }
 

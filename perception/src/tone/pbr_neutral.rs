@@ -9,6 +9,7 @@ use super::saved::{Fit, SavedTone};
 use super::screen::finite;
 use super::time::AdaptationState;
 use super::tint::tint_slope;
+use super::words::Shown;
 use super::{FittedTone, ToneOperator};
 use crate::display::Viewing;
 use crate::photometry::luminance;
@@ -74,7 +75,7 @@ impl FittedTone for FittedPbrNeutral {
     }
 
     fn describe(&self) -> String {
-        format!("pbr-neutral: 1 at {:.4} cd/m² of the scene", self.relative_per_cd_m2.recip())
+        format!("pbr-neutral: 1 at {} cd/m² of the scene", Shown(self.relative_per_cd_m2.recip()))
     }
 
     fn save(&self) -> SavedTone {

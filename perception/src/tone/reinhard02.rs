@@ -9,6 +9,7 @@ use super::saved::{Fit, SavedTone};
 use super::screen::finite;
 use super::statistics::log_average_of_lit;
 use super::time::AdaptationState;
+use super::words::Shown;
 use super::{FittedTone, ToneOperator};
 use crate::display::Viewing;
 use crate::filter::gaussian_blur;
@@ -92,8 +93,8 @@ impl FittedTone for FittedReinhard02 {
     }
 
     fn describe(&self) -> String {
-        let white = self.white / self.scale;
-        format!("reinhard02: middle grey at {:.4}, white at {white:.4} cd/m² of the scene", KEY / self.scale)
+        let [grey, white] = [KEY, self.white].map(|relative| Shown(relative / self.scale));
+        format!("reinhard02: middle grey at {grey}, white at {white} cd/m² of the scene")
     }
 
     fn save(&self) -> SavedTone {

@@ -6,6 +6,7 @@ use super::FittedTone;
 use super::guide::Pixel;
 use super::saved::{Fit, SavedTone};
 use super::screen::finite;
+use super::words::Shown;
 
 /// A fit that multiplies scene luminance by one number.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -21,7 +22,7 @@ impl FittedTone for Scale {
     }
 
     fn describe(&self) -> String {
-        format!("{}: white at {:.4} cd/m² of the scene", self.operator, self.relative_per_cd_m2.recip())
+        format!("{}: white at {} cd/m² of the scene", self.operator, Shown(self.relative_per_cd_m2.recip()))
     }
 
     fn save(&self) -> SavedTone {

@@ -7,6 +7,7 @@ use super::guide::{Pixel, SceneGuide};
 use super::saved::{Fit, SavedTone};
 use super::screen::Screen;
 use super::time::{AdaptationState, Goal};
+use super::words::Shown;
 use super::{FittedTone, ToneOperator};
 use crate::display::Viewing;
 
@@ -108,8 +109,9 @@ impl FittedTone for FittedTumblinRushmeier {
 
     fn describe(&self) -> String {
         format!(
-            "tumblin-rushmeier: exponent {:.4} for a scene adaptation of {:.4} cd/m²",
-            self.law.exponent, self.scene_adaptation_cd_m2
+            "tumblin-rushmeier: exponent {:.4} for a scene adaptation of {} cd/m²",
+            self.law.exponent,
+            Shown(self.scene_adaptation_cd_m2)
         )
     }
 

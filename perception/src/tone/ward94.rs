@@ -7,6 +7,7 @@ use super::guide::{Pixel, SceneGuide};
 use super::saved::{Fit, SavedTone};
 use super::screen::finite;
 use super::time::{AdaptationState, Goal};
+use super::words::Shown;
 use super::{FittedTone, ToneOperator};
 use crate::display::Viewing;
 
@@ -71,8 +72,8 @@ impl FittedTone for FittedWard94 {
     }
 
     fn describe(&self) -> String {
-        let white = self.relative_per_cd_m2(self.adaptation_cd_m2).recip();
-        format!("ward94: white at {white:.4} cd/m² of the scene")
+        let white = Shown(self.relative_per_cd_m2(self.adaptation_cd_m2).recip());
+        format!("ward94: white at {white} cd/m² of the scene")
     }
 
     fn save(&self) -> SavedTone {

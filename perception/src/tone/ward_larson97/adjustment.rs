@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::super::words::Shown;
 use crate::display::Display;
 use crate::tvi;
 
@@ -238,13 +239,13 @@ impl std::fmt::Display for Adjustment {
         match self {
             Self::Curve(curve) => write!(
                 f,
-                "a histogram from {:.4} to {:.4} cd/m² trimmed in {} passes",
-                curve.least.exp(),
-                (curve.least + curve.step * BINS as f64).exp(),
+                "a histogram from {} to {} cd/m² trimmed in {} passes",
+                Shown(curve.least.exp()),
+                Shown((curve.least + curve.step * BINS as f64).exp()),
                 curve.passes
             ),
             Self::Linear { scale, adaptation_cd_m2 } => {
-                write!(f, "a scale of {scale:.4} for an adaptation of {adaptation_cd_m2:.4} cd/m²")
+                write!(f, "a scale of {} for an adaptation of {} cd/m²", Shown(*scale), Shown(*adaptation_cd_m2))
             }
         }
     }
