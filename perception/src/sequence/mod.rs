@@ -31,6 +31,9 @@ use rayon::prelude::*;
 const LOOKS_AT_ONCE: usize = 5;
 /// Of so many looks one is at colours, which are seen to flicker half as fast: it saves a quarter of the time.
 const LOOKS_A_COLOUR: usize = 2;
+/// Frames with fewer looks than this are looked at for colours in all of them, as which of them is the right one depends on where the
+/// light changes.
+const FEW_LOOKS: usize = 5;
 
 /// A frame of two sequences that show the same, and how it moves.
 pub struct SequenceFrame {
@@ -169,10 +172,11 @@ impl SequenceObserver {
         let thresholds = self.thresholds(&self.light(frames, now), width, height)?;
         let mut filters = Filters::new(&thresholds);
         let mut greatest = Plane::filled(width, height, 0.0);
+        let count = self.responses.looks.len();
         for (chunk, looks) in self.responses.looks.chunks(LOOKS_AT_ONCE).enumerate() {
             for (look, seen) in self.seen(frames, now, looks, &adaptation).iter().enumerate() {
                 filters.add_achromatic(&mut greatest, seen);
-                if (chunk * LOOKS_AT_ONCE + look).is_multiple_of(LOOKS_A_COLOUR) {
+                if is_at_colours(chunk * LOOKS_AT_ONCE + look, count) {
                     filters.add_chromatic(&mut greatest, seen);
                 }
             }
@@ -329,6 +333,12 @@ impl<'a> Filters<'a> {
         }
         self.sustained.visibility_of(&energy)
     }
+}
+
+/// Whether a look, of so many a frame, is at colours: the outermost ones are, and the others in turn from them to the middle, so that a
+/// frame before a change and one after it are seen alike.
+fn is_at_colours(look: usize, count: usize) -> bool {
+    count < FEW_LOOKS || look.min(count - 1 - look).is_multiple_of(LOOKS_A_COLOUR)
 }
 
 fn raise(greatest: &mut Plane, other: &Plane) {
