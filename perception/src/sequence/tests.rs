@@ -216,6 +216,31 @@ fn an_eye_that_follows_smears_noise() {
     }
 }
 
+/// A sequence is cut out of something that goes on: noise of its first and last frames is no more visible than of those between.
+#[test]
+fn ends_of_a_sequence_are_seen_as_its_middle() {
+    for (frames_per_second, right_px) in [(24.0, 0.0), (24.0, 10.0), (60.0, 0.0), (60.0, 4.0)] {
+        let observer = SequenceObserver::new(&viewing(frames_per_second)).unwrap();
+        let reach = observer.reach();
+        let still = grey(|_, _| 100.0);
+        let mut state = 17;
+        let frames: Vec<SequenceFrame> = (0..=2 * reach)
+            .map(|_| {
+                let test: Vec<[f32; 3]> = still.iter().map(|_| [100.0 + 4.0 * normal(&mut state); 3]).collect();
+                observer.held(SequenceFrame::new(&still, &test, SIDE, SIDE, Some(motion(right_px))).unwrap())
+            })
+            .collect();
+        let frames: Vec<&SequenceFrame> = frames.iter().collect();
+        let seen = |frames: &[&SequenceFrame], now| {
+            observer.difference(frames, now).unwrap().visibility.map(|v| v * v).mean().sqrt()
+        };
+        let middle = seen(&frames, reach);
+        let ends = [seen(&frames[..=reach], 0), seen(&frames[..=reach], reach)].map(|end| end / middle);
+        println!("{frames_per_second} a second, {right_px} pixels a frame: first and last over inner {ends:.3?}");
+        assert!(ends.iter().all(|ratio| (ratio - 1.0).abs() < 0.1), "{frames_per_second}, {right_px}: {ends:?}");
+    }
+}
+
 /// One coloured frame among grey ones is as visible just before it as just after, and the same flash on displays of any rate.
 #[test]
 fn colours_are_seen_alike_before_and_after() {
