@@ -3,6 +3,7 @@
 use super::super::console::duration_in_words;
 use super::super::report::sampling_name;
 use super::super::words::rounded;
+use fechner::adaptive::settings::Limits;
 use fechner::checkpoint::{Checkpoint, tracing_in_words};
 use std::fmt::Write as _;
 
@@ -36,7 +37,8 @@ pub(super) fn describe(checkpoint: &Checkpoint) -> String {
     row("sampling", sampling_name(settings.sampling).to_owned());
     row("visibility", {
         let reached = state.finished_rung.map_or_else(|| "none".to_owned(), rounded);
-        format!("{} aimed at, {reached} reached; variance × {}", rounded(header.visibility), rounded(state.inflation))
+        let aimed_at = Limits::visibility_of_last_rung(header.visibility).map_or_else(|| "none".to_owned(), rounded);
+        format!("{aimed_at} aimed at, {reached} reached; variance × {}", rounded(state.inflation))
     });
     row("model", settings.model.clone());
     row("display", {
