@@ -274,6 +274,7 @@ fn bad_arguments_are_refused_in_one_line() {
     assert_refused(&["render", cornell, "-o", "a.gif"], at, &["a.gif", ".exr"]);
     assert_refused(&["render", cornell, "-o", "no/such/a.png"], at, &["no/such"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--size", "0x10"], at, &["0x10", "WIDTHxHEIGHT"]);
+    assert_refused(&["render", cornell, "-o", "a.png", "--size", "-3x4"], at, &["\"-3x4\" is not a size"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--size", "400000x400000"], at, &["memory", "--size"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--visibility", "-1"], at, &["above 0"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--sampling", "budget"], at, &["--spp"]);
@@ -295,6 +296,7 @@ fn bad_arguments_are_refused_in_one_line() {
     }
     render(&["--sampling", "budget", "--noise-threshold", "0.1", "--spp", "16"], &["--noise-threshold"]);
     render(&["--seed", "-1"], &["invalid value '-1' for '--seed <N>'"]);
+    render(&["--crop", "-1,0,4,4"], &["\"-1,0,4,4\" is not a crop"]);
     render(&["--no-such-thing"], &["unexpected argument '--no-such-thing' found\n"]);
     render(&["--sampling", "uniform", "--allocation", "local"], &["--allocation", "--sampling adaptive"]);
     render(&["--json", "a.png"], &["a.png: -o and --json name the same file"]);
