@@ -1,5 +1,6 @@
 //! What was rendered and for whom: small, at the start of the film's file.
 
+use super::tracing::only_in;
 use crate::adaptive::settings::{AllocationRule, Limits, LoopSettings, Sampling};
 use crate::denoise::{Denoiser, DenoiserKind, OidnError};
 use crate::integrator::{Crop, TraceSettings};
@@ -168,12 +169,6 @@ impl Origin {
     }
 }
 
-/// The settings of one list that another has not.
-fn only_in(settings: &str, others: &str) -> String {
-    let is_new = |setting: &&str| !others.split(", ").any(|other| other == *setting);
-    settings.split(", ").filter(is_new).collect::<Vec<_>>().join(", ")
-}
-
 /// Every setting that changes a sample, also those to come, less the seed.
 fn in_words(settings: &TraceSettings) -> String {
     let text = format!("{settings:?}");
@@ -253,11 +248,79 @@ impl SettingsRecord {
         let Self { sampling, allocation, importance, .. } = *self;
         *self == Self { sampling, allocation, importance, ..other.clone() }
     }
+
+    /// Why pictures made by both are not seen alike: all that is so here and not there.
+    pub(super) fn seen_otherwise_than(&self, other: &Self) -> String {
+        // Without dots, so that a new field has to be thought of.
+        let Self {
+            sampling: _,
+            allocation: _,
+            importance: _,
+            model,
+            viewing,
+            nits_per_unit,
+            operator,
+            exposure_stops,
+            fitted,
+            denoiser,
+        } = self;
+        let said = [
+            fields_only_in(&viewing.display, &other.viewing.display),
+            fields_only_in(&viewing.observer, &other.viewing.observer),
+            (*model != other.model).then(|| format!("model {model}")),
+            (*nits_per_unit != other.nits_per_unit).then(|| format!("{nits_per_unit} cd/m² for RGB (1, 1, 1)")),
+            (*operator != other.operator).then(|| format!("operator {operator}")),
+            (*exposure_stops != other.exposure_stops)
+                .then(|| exposure_stops.map_or("no exposure".to_owned(), |stops| format!("exposure {stops}"))),
+            (*fitted != other.fitted).then(|| match fitted {
+                None => "the operator fitted to the film".to_owned(),
+                Some(_) => "the operator fitted to a whole of which it is a part".to_owned(),
+            }),
+            (*denoiser != other.denoiser)
+                .then(|| denoiser.map_or("no denoiser".to_owned(), |denoiser| format!("denoiser {}", denoiser.name()))),
+        ];
+        said.into_iter().flatten().collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// What a structure has and another of its kind has not, as [`only_in`] says it.
+fn fields_only_in<T: std::fmt::Debug>(own: &T, other: &T) -> Option<String> {
+    let [own, other] = [own, other].map(|all| format!("{all:?}"));
+    let inner =
+        |text: &'_ str| text.split_once(" { ").map_or("", |(_, fields)| fields.trim_end_matches(" }")).to_owned();
+    Some(only_in(&inner(&own), &inner(&other))).filter(|said| !said.is_empty())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn films_say_what_is_seen_otherwise_in_them() {
+        let own = SettingsRecord {
+            sampling: Sampling::Adaptive,
+            allocation: AllocationRule::Convex,
+            model: model::DEFAULT.to_owned(),
+            viewing: Viewing::default(),
+            nits_per_unit: 100.0,
+            operator: "constant".to_owned(),
+            exposure_stops: None,
+            fitted: None,
+            importance: None,
+            denoiser: None,
+        };
+        let mut other = SettingsRecord { sampling: Sampling::Uniform, ..own.clone() };
+        assert!(own.is_seen_like(&other));
+        other.denoiser = Some(DenoiserKind::Builtin);
+        other.exposure_stops = Some(1.5);
+        assert!(!own.is_seen_like(&other));
+        assert_eq!(own.seen_otherwise_than(&other), "no exposure, no denoiser");
+        assert_eq!(other.seen_otherwise_than(&own), "exposure 1.5, denoiser builtin");
+        let mut other = own.clone();
+        other.viewing.display.pixels_per_degree = 60.5;
+        other.viewing.observer.sensitivity = 1.75;
+        assert_eq!(other.seen_otherwise_than(&own), "pixels per degree 60.5, sensitivity 1.75");
+    }
 
     #[test]
     fn a_film_knows_its_filter() {

@@ -72,10 +72,13 @@ fn add(
     if let Some(problem) = header.origin.difference(&first.0.origin) {
         return Err(different(format!("{problem}, as in {}", first.1.display())));
     }
-    if !header.settings.is_seen_like(&first.0.settings) {
+    let [own, others] = [&header.settings, &first.0.settings];
+    if !own.is_seen_like(others) {
         return Err(different(format!(
-            "it was rendered for another display, observer, operator, model or unit than {}",
-            first.1.display()
+            "it was rendered with {}, and {} with {}",
+            own.seen_otherwise_than(others),
+            first.1.display(),
+            others.seen_otherwise_than(own)
         )));
     }
     sum.state.film.add(&next.state.film).map_err(|problem| different(problem.to_owned()))?;

@@ -44,17 +44,17 @@ pub(super) struct AnimateArguments {
     #[arg(short, long, value_name = "FILE")]
     output: String,
     /// Frames a second.
-    #[arg(long, value_name = "N", value_parser = parse_rate, default_value_t = 24.0)]
+    #[arg(long, value_name = "N", value_parser = parse_rate, allow_negative_numbers = true, default_value_t = 24.0)]
     fps: f64,
     /// Picture size.
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    #[arg(long, value_name = "WxH", value_parser = parse_size, allow_hyphen_values = true)]
     size: Option<Size>,
     #[command(flatten)]
     staging: super::staging::Staging,
 
     /// A frame is done when its remaining noise is at most this visible in motion: 1 is at threshold [default: the scene's, else
     /// 1; none for uniform sampling with --spp or --time].
-    #[arg(long, value_name = "V", value_parser = parse_positive, help_heading = "Until")]
+    #[arg(long, value_name = "V", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Until")]
     visibility: Option<f64>,
     /// The same, by name.
     #[arg(long, value_enum, conflicts_with = "visibility", help_heading = "Until")]
@@ -63,7 +63,7 @@ pub(super) struct AnimateArguments {
     #[arg(long, value_name = "N", value_parser = whole(1..=u32::MAX), allow_negative_numbers = true, help_heading = "Until")]
     spp: Option<u32>,
     /// A budget of this many seconds for all frames that are rendered, spent on those that need it most.
-    #[arg(long, value_name = "S", value_parser = parse_seconds, conflicts_with = "spp", help_heading = "Until")]
+    #[arg(long, value_name = "S", value_parser = parse_seconds, allow_negative_numbers = true, conflicts_with = "spp", help_heading = "Until")]
     time: Option<Duration>,
     /// Most samples of one pixel.
     #[arg(long, value_name = "N", value_parser = whole(16..=u32::MAX), allow_negative_numbers = true, default_value_t = DEFAULT_MAX_SAMPLES, help_heading = "Until")]
@@ -83,10 +83,10 @@ pub(super) struct AnimateArguments {
     #[arg(long, value_name = "NAME|FILE", help_heading = "Seeing")]
     display: Option<String>,
     /// Luminance in cd/m² of RGB (1, 1, 1), in place of the scene's.
-    #[arg(long, value_name = "CD_M2", value_parser = parse_unit, help_heading = "Seeing")]
+    #[arg(long, value_name = "CD_M2", value_parser = parse_unit, allow_negative_numbers = true, help_heading = "Seeing")]
     nits_per_unit: Option<f64>,
     /// What the eye is adapted to before the first frame; without it, to the first frame.
-    #[arg(long, value_name = "CD_M2", value_parser = parse_positive, help_heading = "Seeing")]
+    #[arg(long, value_name = "CD_M2", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Seeing")]
     adapted_to: Option<f64>,
     /// Where viewers look: lines of frame,x,y in pixels. What is far from all gazes of a frame may stay noisier; in frames without a
     /// line everything may be looked at.

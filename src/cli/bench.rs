@@ -32,7 +32,7 @@ pub(super) struct BenchArguments {
     #[arg(long, value_name = "N", value_parser = whole(32..=4096), allow_negative_numbers = true)]
     size: Option<u32>,
     /// Visibility that every arm has to reach, in place of the suite's.
-    #[arg(long, value_name = "V", value_parser = parse_positive)]
+    #[arg(long, value_name = "V", value_parser = parse_positive, allow_negative_numbers = true)]
     visibility: Option<f64>,
     /// Renders of each arm, in place of the suite's.
     #[arg(long, value_name = "N", value_parser = whole(1..=64), allow_negative_numbers = true)]
@@ -42,10 +42,10 @@ pub(super) struct BenchArguments {
     display: String,
     /// Samples of the reference, as a multiple of what uniform sampling needs (at least 512, at most 16384 a pixel); in the
     /// suite animation, of 64 a pixel.
-    #[arg(long, value_name = "X", value_parser = parse_positive, default_value_t = 16.0)]
+    #[arg(long, value_name = "X", value_parser = parse_positive, allow_negative_numbers = true, default_value_t = 16.0)]
     reference_factor: f64,
     /// Frames a second of the suite animation, in place of 24 and 60.
-    #[arg(long, value_name = "N", value_parser = parse_rate)]
+    #[arg(long, value_name = "N", value_parser = parse_rate, allow_negative_numbers = true)]
     fps: Option<f64>,
     /// Only say what uniform sampling and the optimum need by converged variances, with one sample in every pixel at least: what
     /// no rule can beat.

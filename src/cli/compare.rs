@@ -33,9 +33,9 @@ pub(super) struct CompareArguments {
     /// one was shown when it was rendered, if its file says so and the display is as bright and dark, else constant].
     #[arg(long, value_name = "NAME", value_parser = operator_values())]
     operator: Option<String>,
-    /// Frames a second, of sequences. Beyond its ends a sequence stands still, so that noise in the first and the last fifth
-    /// of a second is seen more as in a still.
-    #[arg(long, value_name = "N", value_parser = parse_rate)]
+    /// Frames a second, of sequences. Beyond its ends a sequence is expected to go on as it is within a fifth of a second of
+    /// them.
+    #[arg(long, value_name = "N", value_parser = parse_rate, allow_negative_numbers = true)]
     fps: Option<f64>,
     /// Motion of what a sequence shows, in pixels a frame, which the eye follows, smearing what is held; without it, it rests. Frames of
     /// `animate` have it.

@@ -37,10 +37,10 @@ pub(super) struct JobArguments {
     /// Scene: .toml, .gltf, .glb, .obj, .ply, .pbrt or .xml (Mitsuba).
     scene: PathBuf,
     /// Picture size.
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    #[arg(long, value_name = "WxH", value_parser = parse_size, allow_hyphen_values = true)]
     size: Option<Size>,
     /// Trace only this part of the picture, with the samples and the exposure it has in the whole. An EXR says where it lies.
-    #[arg(long, value_name = "X,Y,W,H", value_parser = parse_crop)]
+    #[arg(long, value_name = "X,Y,W,H", value_parser = parse_crop, allow_hyphen_values = true)]
     crop: Option<Crop>,
     #[command(flatten)]
     staging: super::staging::Staging,
@@ -85,7 +85,7 @@ pub(super) struct JobArguments {
     #[arg(long, value_enum, value_name = "BY", help_heading = "Sampling")]
     prune: Option<PruneChoice>,
     /// Most scattering events of a path.
-    #[arg(long, value_name = "N", default_value_t = DEFAULT_MAX_DEPTH, help_heading = "Sampling")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = DEFAULT_MAX_DEPTH, help_heading = "Sampling")]
     max_depth: u32,
     /// Pixel filter.
     #[arg(long, value_enum, default_value = "gaussian", help_heading = "Sampling")]

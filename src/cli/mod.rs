@@ -119,3 +119,66 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
     }
     Ok(ExitCode::SUCCESS)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    /// What values are called that are no numbers.
+    const NO_NUMBERS: [&str; 17] = [
+        "A",
+        "ARM,…",
+        "BY",
+        "DIR",
+        "FILE",
+        "FILE.csv",
+        "FILE.exr",
+        "FILE.json",
+        "FILE.png",
+        "HOST:PORT",
+        "IP",
+        "LAYER=FILE.png",
+        "LIST",
+        "MAP",
+        "NAME",
+        "NAME|FILE",
+        "NAME|all",
+    ];
+
+    fn is_number(argument: &clap::Arg) -> bool {
+        let names = argument.get_value_names().unwrap_or_default();
+        let is_word = names.first().is_some_and(|name| NO_NUMBERS.contains(&name.as_str()));
+        argument.get_action().takes_values() && argument.get_possible_values().is_empty() && !is_word
+    }
+
+    /// Calls `visit` with each command that has no others, and the words that lead to it.
+    fn walk(command: &clap::Command, words: &[String], visit: &mut impl FnMut(&clap::Command, &[String])) {
+        let words = [words, &[command.get_name().to_owned()]].concat();
+        if command.get_subcommands().next().is_none() {
+            visit(command, &words);
+        }
+        command.get_subcommands().for_each(|sub| walk(sub, &words, visit));
+    }
+
+    /// A number below 0 is told what would be right, and is not taken for the name of an option.
+    #[test]
+    fn options_that_take_numbers_read_negative_ones() {
+        let mut wrong = Vec::new();
+        let mut count = 0;
+        walk(&CommandLine::command(), &[], &mut |command, words| {
+            for argument in command.get_arguments().filter(|argument| is_number(argument)) {
+                let Some(long) = argument.get_long() else { continue };
+                let option = format!("--{long}");
+                let value = if argument.is_allow_hyphen_values_set() { "-1,0x-2" } else { "-1" };
+                let error = CommandLine::try_parse_from(words.iter().chain([&option, &value.to_owned()]));
+                count += 1;
+                if error.is_err_and(|error| error.kind() == ErrorKind::UnknownArgument) {
+                    wrong.push(format!("{} {option}", words.join(" ")));
+                }
+            }
+        });
+        assert!(wrong.is_empty(), "without allow_negative_numbers: {wrong:?}");
+        assert!(count > 70, "{count} options take numbers");
+    }
+}

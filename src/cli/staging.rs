@@ -19,7 +19,7 @@ pub(super) struct Staging {
     camera: Option<String>,
     /// Surroundings instead of the scene's: a lat-long picture (.hdr, .exr, .png), sky:ELEVATION[,AZIMUTH[,TURBIDITY]] in
     /// degrees, or constant:CD_M2.
-    #[arg(long, value_name = "FILE|sky:...", value_parser = parse_surroundings)]
+    #[arg(long, value_name = "FILE|sky:...", value_parser = parse_surroundings, allow_negative_numbers = true)]
     environment: Option<Surroundings>,
     /// Look from one point to another: X,Y,Z,X,Y,Z, and the vertical field of view in degrees if wanted.
     #[arg(long, value_name = "FROM,TO[,FOV]", value_parser = parse_look_at, allow_hyphen_values = true, conflicts_with = "camera")]

@@ -38,14 +38,14 @@ pub(super) struct ThresholdArguments {
     velocity: Option<PathBuf>,
     /// Frames a second of --velocity. Without it as its file says (frames of `animate` do), else the display's, which is 60 unless its
     /// own file says otherwise.
-    #[arg(long, value_name = "N", value_parser = parse_rate, requires = "velocity")]
+    #[arg(long, value_name = "N", value_parser = parse_rate, allow_negative_numbers = true, requires = "velocity")]
     fps: Option<f64>,
     /// Let the eye follow only what stands out in the picture and in its motion (Itti 1998, Yee 2001): what moves elsewhere is
     /// seen less well. Without it, it follows everything.
     #[arg(long, requires = "velocity")]
     saliency: bool,
     /// Add the veil that bright things cast inside the eye (CIE), for an observer of this age (25 if none is given).
-    #[arg(long, value_name = "AGE", num_args = 0..=1, default_missing_value = "25")]
+    #[arg(long, value_name = "AGE", num_args = 0..=1, default_missing_value = "25", allow_negative_numbers = true)]
     glare: Option<f64>,
     /// Threshold model.
     #[arg(long, value_name = "NAME", value_parser = model_values(), default_value = model::DEFAULT)]

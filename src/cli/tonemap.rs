@@ -54,16 +54,16 @@ pub(super) struct TonemapArguments {
     effects: Option<Vec<Effect>>,
 
     /// Frames a second of a sequence; numbers that are missing take their time [default: 24].
-    #[arg(long, value_name = "N", value_parser = parse_positive, help_heading = "Over time")]
+    #[arg(long, value_name = "N", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Over time")]
     fps: Option<f64>,
     /// What the eye is adapted to before the first frame; without it, to the first frame.
-    #[arg(long, value_name = "CD_M2", value_parser = parse_positive, help_heading = "Over time")]
+    #[arg(long, value_name = "CD_M2", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Over time")]
     adapted_to: Option<f64>,
     /// The eye's state, continued from this file if it is there and left in it.
     #[arg(long, value_name = "FILE.json", conflicts_with = "adapted_to", help_heading = "Over time")]
     state: Option<PathBuf>,
     /// The pixel that the eye looks at; without it, all of the view counts.
-    #[arg(long, value_name = "X,Y", value_parser = parse_pixel, help_heading = "Over time")]
+    #[arg(long, value_name = "X,Y", value_parser = parse_pixel, allow_hyphen_values = true, help_heading = "Over time")]
     gaze: Option<Gaze>,
 }
 

@@ -26,7 +26,7 @@ pub(super) struct ViewArguments {
     #[command(flatten)]
     job: JobArguments,
     /// Port to listen on; 0 takes a free one.
-    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Serving")]
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true, help_heading = "Serving")]
     port: u16,
     /// Address to listen on. Others than this machine's own let everybody in who has the printed address.
     #[arg(long, value_name = "IP", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST), help_heading = "Serving")]

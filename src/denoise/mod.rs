@@ -23,6 +23,16 @@ pub enum DenoiserKind {
     Oidn,
 }
 
+impl DenoiserKind {
+    /// As `--denoise` has it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Builtin => "builtin",
+            Self::Oidn => "oidn",
+        }
+    }
+}
+
 /// A denoiser, ready.
 #[derive(Clone, Debug)]
 pub enum Denoiser {

@@ -1,6 +1,7 @@
 //! Files that are complete or not there: written beside the target under another name, flushed to the disk, renamed.
 
 use super::OutputError;
+use crate::scene::hash::ContentHash;
 use std::ffi::{OsStr, OsString};
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -120,8 +121,25 @@ const PART_SUFFIX: &str = ".part";
 /// Random letters and digits before that.
 const PART_LETTERS: usize = 6;
 
+/// Bytes of the longest name that file systems take.
+const LONGEST_NAME: usize = 255;
+/// Bytes of a name that the temporary one can hold beside its dots, letters and ending.
+const LONGEST_KEPT: usize = LONGEST_NAME - "..".len() - PART_LETTERS - PART_SUFFIX.len();
+
+/// How the names of new files begin that will be called `name`. Of one that is too long to be kept the end gives way to a hash of all of
+/// it: names of a sequence's frames differ in their ends.
 fn part_prefix(name: &OsStr) -> OsString {
-    [OsStr::new("."), name, OsStr::new(".")].into_iter().collect()
+    let mut prefix = OsString::from(".");
+    if name.len() <= LONGEST_KEPT {
+        prefix.push(name);
+    } else {
+        let hash = ContentHash::of_bytes(name.as_encoded_bytes()).to_string();
+        let text = name.to_string_lossy();
+        prefix.push(&text[..text.floor_char_boundary(LONGEST_KEPT - hash.len())]);
+        prefix.push(hash);
+    }
+    prefix.push(".");
+    prefix
 }
 
 /// Removes new files beside `path` that a killed program could not complete. Call it only where no other program can be
@@ -229,6 +247,21 @@ mod tests {
         file.keep().unwrap();
         remove_leftovers(&folder.path().join("b.film")).unwrap();
         assert_eq!(names(folder.path()), [of_others[0], of_others[1], "a.film"]);
+    }
+
+    #[test]
+    fn the_longest_names_can_be_written() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a".repeat(255), "a".repeat(242), "a".repeat(243), "ä".repeat(127)] {
+            let [path, other] = [&name, &format!("{}b", &name[..name.len() - 2])].map(|name| folder.path().join(name));
+            write_beside(&path, |file| file.write_all(b"x")).unwrap();
+            let parts = [&path, &other].map(|path| create_beside(path).unwrap().0.keep().unwrap().1);
+            remove_leftovers(&path).unwrap();
+            assert_eq!(parts.each_ref().map(|part| part.exists()), [false, true], "{name}");
+            remove_leftovers(&other).unwrap();
+            assert_eq!(names(folder.path()), [name]);
+            std::fs::remove_file(path).unwrap();
+        }
     }
 
     #[test]

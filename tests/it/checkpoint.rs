@@ -424,7 +424,7 @@ fn films_of_another_origin_are_refused() {
                 &cornell_box(),
                 &fechner::integrator::TraceSettings { clamp: Some(3.0), ..trace_settings(SIZE, SIZE, 1) },
             ),
-            "clamp: Some(3.0)",
+            "with clamp 3.0, and these are with no clamp",
         ),
     ];
     for (other, fragment) in others {

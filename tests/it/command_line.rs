@@ -232,6 +232,31 @@ fn a_render_of_few_samples_makes_no_claim() {
     }
 }
 
+/// Rules that do not look at what is seen aim at no visibility, whatever the scene says (cornell-box.toml: 2).
+#[test]
+fn rivals_aim_at_no_visibility() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = scene("cornell-box.toml");
+    for rule in ["relative", "variance", "budget"] {
+        let film = format!("{rule}.film");
+        let arguments = ["--size", "24x24", "--spp", "18", "--sampling", rule, "--json", "a.json", "-o", "a.exr"];
+        let mut command = fechner();
+        command.arg("render").arg(&scene).args(arguments).args(["--checkpoint", &film]);
+        let run = command.current_dir(folder.path()).output().expect("runs");
+        let said = String::from_utf8_lossy(&run.stderr);
+        assert!(run.status.success() && said.contains("is above visibility 1"), "{said}");
+        assert!(!said.contains("target"), "{said}");
+        let json = std::fs::read(folder.path().join("a.json")).expect("written");
+        let json: serde_json::Value = serde_json::from_slice(&json).expect("JSON");
+        assert!(json["visibility_target"].is_null() && json["fraction_visible"].is_number(), "{json}");
+        for (file, fragment, is_there) in [("a.exr", "visibility_target", false), (&film, "none aimed at", true)] {
+            let info = fechner().args(["info", file]).current_dir(folder.path()).output().expect("runs");
+            let info = String::from_utf8_lossy(&info.stdout);
+            assert_eq!(info.contains(fragment), is_there, "{info}");
+        }
+    }
+}
+
 #[test]
 fn bad_arguments_are_refused_in_one_line() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -249,6 +274,7 @@ fn bad_arguments_are_refused_in_one_line() {
     assert_refused(&["render", cornell, "-o", "a.gif"], at, &["a.gif", ".exr"]);
     assert_refused(&["render", cornell, "-o", "no/such/a.png"], at, &["no/such"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--size", "0x10"], at, &["0x10", "WIDTHxHEIGHT"]);
+    assert_refused(&["render", cornell, "-o", "a.png", "--size", "-3x4"], at, &["\"-3x4\" is not a size"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--size", "400000x400000"], at, &["memory", "--size"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--visibility", "-1"], at, &["above 0"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--sampling", "budget"], at, &["--spp"]);
@@ -270,6 +296,7 @@ fn bad_arguments_are_refused_in_one_line() {
     }
     render(&["--sampling", "budget", "--noise-threshold", "0.1", "--spp", "16"], &["--noise-threshold"]);
     render(&["--seed", "-1"], &["invalid value '-1' for '--seed <N>'"]);
+    render(&["--crop", "-1,0,4,4"], &["\"-1,0,4,4\" is not a crop"]);
     render(&["--no-such-thing"], &["unexpected argument '--no-such-thing' found\n"]);
     render(&["--sampling", "uniform", "--allocation", "local"], &["--allocation", "--sampling adaptive"]);
     render(&["--json", "a.png"], &["a.png: -o and --json name the same file"]);

@@ -2,7 +2,7 @@
 
 use assert_cmd::Command;
 use fechner::exr_read::{ExrImage, read_exr};
-use fechner::output::{Picture, write_exr};
+use fechner::output::{Attribute, NITS_PER_UNIT, Picture, write_exr};
 use std::path::Path;
 use std::process::Output;
 
@@ -58,6 +58,16 @@ fn samples_go_where_the_map_sends_them() {
     // A map of ones changes no bit of the picture.
     let one = rendered(at, "one-everywhere.exr", &["--importance", "one.exr"]);
     assert_eq!(one.channels, plain.channels);
+
+    // Nor does one whose file says a unit, of which there is nothing to tell.
+    let mut map = Picture::new(8, 8);
+    map.push_f32("Y", vec![1.0; 64]);
+    map.push_attribute(NITS_PER_UNIT, Attribute::Float(100.0));
+    write_exr(&at.join("unit.exr"), &map).expect("written");
+    let output = run(at, &["-o", "with-unit.exr", "--importance", "unit.exr"]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && !said.contains("unit.exr"), "{said}");
+    assert_eq!(read_exr(&at.join("with-unit.exr")).expect("readable").channels, plain.channels);
 }
 
 /// Another map, or none, begins the ladder anew over the samples there are; the same one goes on.

@@ -168,7 +168,7 @@ fn a_film_that_was_traced_otherwise_says_how() {
     run(with("3", &[]));
     let output = with("5", &["--resume"]).output().expect("runs");
     let said = text(&output);
-    assert!(said.contains("traced with max_depth: 3, and these are with max_depth: 5"), "{said}");
+    assert!(said.contains("traced with max depth 3, and these are with max depth 5"), "{said}");
     assert!(!said.contains("clamp"), "{said}");
 }
 

@@ -336,9 +336,15 @@ fn spectra_of_mitsuba_3_are_read() {
         );
         spectrum("regular", &inside)
     };
-    let irregular = |values: &str| {
-        let wavelengths = r#"<string name="wavelengths" value="400, 500, 600, 700"/>"#;
+    let irregular_at = |wavelengths: &str, values: &str| {
+        let wavelengths = format!(r#"<string name="wavelengths" value="{wavelengths}"/>"#);
         spectrum("irregular", &format!(r#"{wavelengths}<string name="values" value="{values}"/>"#))
+    };
+    let irregular = |values: &str| irregular_at("400, 500, 600, 700", values);
+    let between = |ends: &[(&str, f32)]| {
+        let ends: String =
+            ends.iter().map(|(end, nm)| format!(r#"<float name="wavelength_{end}" value="{nm}"/>"#)).collect();
+        spectrum("blackbody", &format!(r#"<float name="temperature" value="5000"/>{ends}"#))
     };
     let warm = spectrum("blackbody", r#"<float name="temperature" value="3000"/>"#);
     for (spectrum, expected) in [
@@ -349,6 +355,14 @@ fn spectra_of_mitsuba_3_are_read() {
         let found = radiance(&spectrum).unwrap();
         assert!((found / expected - 1.0).abs().max_element() < 0.003, "{spectrum}: {found} {expected}");
     }
+    // Mitsuba 3.7's scalar_spectral has -1095 for blue, which no light of ours has.
+    let green = radiance(&between(&[("min", 500.0), ("max", 600.0)])).unwrap();
+    assert!((green - Vec3::new(3547.0, 12459.0, 0.0)).abs().max_element() < 40.0, "{green}");
+    let luminance = |ends: &[(&str, f32)]| radiance(&between(ends)).unwrap().dot(Vec3::new(0.2126, 0.7152, 0.0722));
+    let parts = [("max", 500.0), ("min", 600.0)].map(|end| luminance(&[end]));
+    let all = luminance(&[]);
+    println!("below 500 nm and above 600 nm: {parts:?} of {all}");
+    assert!(parts.iter().all(|part| *part > 0.0 && *part < 0.3 * all), "{parts:?} of {all}");
     // As `scalar_rgb` has it.
     assert_eq!(
         radiance(&spectrum("srgb", r#"<rgb name="color" value="0.3, 0.2, 0.1"/>"#)),
@@ -357,6 +371,9 @@ fn spectra_of_mitsuba_3_are_read() {
     for (spectrum, problem) in [
         (regular(300.0), "wavelength_min below wavelength_max"),
         (irregular("1, 2"), "as many values; found 4 and 2"),
+        (irregular_at("650, 500, 450", "1, 2, 3"), "wavelengths have to rise; found 500 after 650"),
+        (irregular_at("400, 500, 500, 700", "1, 1, 0, 0"), "wavelengths have to rise; found 500 after 500"),
+        (between(&[("min", 600.0), ("max", 500.0)]), "wavelength_min below its wavelength_max"),
         (spectrum("irregular", ""), "the string \"wavelengths\" is missing"),
         (spectrum("blackbody", ""), "a temperature in kelvin above 0"),
         (spectrum("srgb", ""), "needs a \"color\""),

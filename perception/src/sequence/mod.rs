@@ -15,7 +15,7 @@ pub use gaze::FrameMotion;
 use crate::adaptation::adapted;
 use crate::colour::Channels;
 use crate::csf::{
-    CastleChromatic, CastleCsf, CastleTransient, ChromaticChannel, FrameResponses, FrameTiming, Level, Look,
+    CastleChromatic, CastleCsf, CastleTransient, ChromaticChannel, FrameResponses, FrameTiming, Level, Look, Sustained,
 };
 use crate::difference::{Difference, HeldAtLowFrequencies, masked_by_both};
 use crate::display::Viewing;
@@ -31,6 +31,9 @@ use rayon::prelude::*;
 const LOOKS_AT_ONCE: usize = 5;
 /// Of so many looks one is at colours, which are seen to flicker half as fast: it saves a quarter of the time.
 const LOOKS_A_COLOUR: usize = 2;
+/// Frames with fewer looks than this are looked at for colours in all of them, as which of them is the right one depends on where the
+/// light changes.
+const FEW_LOOKS: usize = 5;
 
 /// A frame of two sequences that show the same, and how it moves.
 pub struct SequenceFrame {
@@ -127,7 +130,7 @@ impl SequenceObserver {
     }
 
     /// A frame between others as it falls on the retina: an eye that follows smears it while it is held. Without motion nothing is
-    /// smeared. The first frame and the last are better left as they are, since beyond them all rests.
+    /// smeared.
     #[must_use]
     pub fn held(&self, frame: SequenceFrame) -> SequenceFrame {
         let Some(motion) = &frame.motion else { return frame };
@@ -140,8 +143,9 @@ impl SequenceObserver {
         SequenceFrame { reference: held(&frame.reference), test: held(&frame.test), ..frame }
     }
 
-    /// What is seen of the difference while frame `now` of these is shown, at the worst moment for each pixel. Frames that would
-    /// stand before the first or after the last are like these.
+    /// What is seen of the difference while frame `now` of these is shown, at the worst moment for each pixel. Frames within
+    /// [`Self::reach`] that would stand before the first or after the last are expected to be as those within it are in the mean,
+    /// where the eye's way leads over them: what stands still is seen as in a still, and noise as amid other frames.
     ///
     /// # Errors
     /// [`Error::SizeMismatch`] for frames of several sizes, [`Error::Empty`] unless there is a frame `now`.
@@ -166,13 +170,15 @@ impl SequenceObserver {
             frame.reference.achromatic.check_size("frame", width, height)?;
         }
         let adaptation = adapted(&shown.reference.achromatic, &self.viewing);
-        let thresholds = self.thresholds(&self.light(frames, now), width, height)?;
+        let responses = self.responses.within(now, frames.len() - 1 - now);
+        let thresholds = self.thresholds(&self.light(&responses.middle, frames, now), width, height)?;
         let mut filters = Filters::new(&thresholds);
         let mut greatest = Plane::filled(width, height, 0.0);
-        for (chunk, looks) in self.responses.looks.chunks(LOOKS_AT_ONCE).enumerate() {
+        let count = responses.looks.len();
+        for (chunk, looks) in responses.looks.chunks(LOOKS_AT_ONCE).enumerate() {
             for (look, seen) in self.seen(frames, now, looks, &adaptation).iter().enumerate() {
                 filters.add_achromatic(&mut greatest, seen);
-                if (chunk * LOOKS_AT_ONCE + look).is_multiple_of(LOOKS_A_COLOUR) {
+                if is_at_colours(chunk * LOOKS_AT_ONCE + look, count) {
                     filters.add_chromatic(&mut greatest, seen);
                 }
             }
@@ -190,34 +196,31 @@ impl SequenceObserver {
         mut visit: impl FnMut(usize, &'f SequenceFrame, usize),
     ) {
         let (width, height) = frames[now].size();
-        let (reach, last) = (self.reach(), frames.len() - 1);
+        let reach = self.reach();
         visit(reach, frames[now], pixel);
-        for towards in [Towards::Earlier, Towards::Later] {
+        for (towards, count) in [(Towards::Earlier, now), (Towards::Later, frames.len() - 1 - now)] {
             let mut place = Place::center_of(pixel % width, pixel / width);
             let mut index = now;
-            for distance in 1..=reach {
-                let (next, weight) = match towards {
-                    Towards::Earlier => (index.saturating_sub(1), reach - distance),
-                    Towards::Later => ((index + 1).min(last), reach + distance),
+            for distance in 1..=count.min(reach) {
+                place = place.followed(frames[index].motion.as_ref(), towards, &self.viewing.display);
+                let weight = match towards {
+                    Towards::Earlier => reach - distance,
+                    Towards::Later => reach + distance,
                 };
-                // Beyond the ends the picture rests, and the eye with it.
-                if next != index {
-                    place = place.followed(frames[index].motion.as_ref(), towards, &self.viewing.display);
-                    index = next;
-                }
+                index = now + weight - reach;
                 visit(weight, frames[index], place.pixel(width, height));
             }
         }
     }
 
     /// What is held of both pictures in the middle of a frame.
-    fn light(&self, frames: &[&SequenceFrame], now: usize) -> Vec<Light> {
+    fn light(&self, middle: &Sustained, frames: &[&SequenceFrame], now: usize) -> Vec<Light> {
         let (width, height) = frames[now].size();
         let of = |pixel: usize| {
             let mut light = Light::default();
             self.along_the_eyes_way(frames, now, pixel, |weight, frame, pixel| {
                 let (reference, test) = (at(&frame.reference, pixel), at(&frame.test, pixel));
-                for (channel, weights) in self.responses.middle.iter().enumerate() {
+                for (channel, weights) in middle.iter().enumerate() {
                     light.reference[channel] += weights[weight] * reference[channel];
                     light.test[channel] += weights[weight] * test[channel];
                 }
@@ -329,6 +332,12 @@ impl<'a> Filters<'a> {
         }
         self.sustained.visibility_of(&energy)
     }
+}
+
+/// Whether a look, of so many a frame, is at colours: the outermost ones are, and the others in turn from them to the middle, so that a
+/// frame before a change and one after it are seen alike.
+fn is_at_colours(look: usize, count: usize) -> bool {
+    count < FEW_LOOKS || look.min(count - 1 - look).is_multiple_of(LOOKS_A_COLOUR)
 }
 
 fn raise(greatest: &mut Plane, other: &Plane) {

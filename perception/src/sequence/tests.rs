@@ -216,6 +216,62 @@ fn an_eye_that_follows_smears_noise() {
     }
 }
 
+/// A sequence is cut out of something that goes on: noise of its first and last frames is no more visible than of those between.
+#[test]
+fn ends_of_a_sequence_are_seen_as_its_middle() {
+    for (frames_per_second, right_px) in [(24.0, 0.0), (24.0, 10.0), (60.0, 0.0), (60.0, 4.0)] {
+        let observer = SequenceObserver::new(&viewing(frames_per_second)).unwrap();
+        let reach = observer.reach();
+        let still = grey(|_, _| 100.0);
+        let mut state = 17;
+        let frames: Vec<SequenceFrame> = (0..=2 * reach)
+            .map(|_| {
+                let test: Vec<[f32; 3]> = still.iter().map(|_| [100.0 + 4.0 * normal(&mut state); 3]).collect();
+                observer.held(SequenceFrame::new(&still, &test, SIDE, SIDE, Some(motion(right_px))).unwrap())
+            })
+            .collect();
+        let frames: Vec<&SequenceFrame> = frames.iter().collect();
+        let seen = |frames: &[&SequenceFrame], now| {
+            observer.difference(frames, now).unwrap().visibility.map(|v| v * v).mean().sqrt()
+        };
+        let middle = seen(&frames, reach);
+        let ends = [seen(&frames[..=reach], 0), seen(&frames[..=reach], reach)].map(|end| end / middle);
+        println!("{frames_per_second} a second, {right_px} pixels a frame: first and last over inner {ends:.3?}");
+        assert!(ends.iter().all(|ratio| (ratio - 1.0).abs() < 0.1), "{frames_per_second}, {right_px}: {ends:?}");
+    }
+}
+
+/// One coloured frame among grey ones is as visible just before it as just after, and the same flash on displays of any rate.
+#[test]
+fn colours_are_seen_alike_before_and_after() {
+    let side = 16;
+    let [grey, red] = [[100.0; 3], [130.0, 91.08, 100.0]].map(|rgb: [f32; 3]| vec![rgb; side * side]);
+    let around = |frames_per_second: f64, flash: usize| {
+        let observer = SequenceObserver::new(&viewing(frames_per_second)).unwrap();
+        let reach = observer.reach() + 1;
+        let frames: Vec<SequenceFrame> = (0..2 * reach + flash)
+            .map(|frame| {
+                let test = if (reach..reach + flash).contains(&frame) { &red } else { &grey };
+                SequenceFrame::new(&grey, test, side, side, None).unwrap()
+            })
+            .collect();
+        let frames: Vec<&SequenceFrame> = frames.iter().collect();
+        let seen = |now| observer.difference(&frames, now).unwrap().worst_visibility;
+        let during = (reach..reach + flash).map(seen).fold(0.0, f64::max);
+        (seen(reach - 1), during, seen(reach + flash))
+    };
+    for frames_per_second in [12.0, 20.0, 24.0, 30.0, 48.0, 60.0, 90.0, 120.0] {
+        let (before, _, after) = around(frames_per_second, 1);
+        assert!((before / after - 1.0).abs() < 1e-3, "{frames_per_second}: {before} before, {after} after");
+    }
+    for (rates, hz) in [([30.0, 60.0, 120.0], 30.0), ([60.0, 120.0, 240.0], 60.0)] {
+        let flashes = rates.map(|rate| around(rate, (rate / hz) as usize).1);
+        println!("1/{hz} s at {rates:?}: {flashes:.3?}");
+        // Above 120 frames a second there are more looks.
+        assert!(flashes.iter().all(|flash| (flash / flashes[0] - 1.0).abs() < 0.04), "1/{hz} s: {flashes:?}");
+    }
+}
+
 #[test]
 fn what_does_not_fit_is_an_error() {
     let picture = grey(|_, _| 1.0);

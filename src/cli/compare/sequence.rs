@@ -79,10 +79,7 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
     for frame in first..=last {
         let middle = u64::from(frame);
         while next <= u64::from(last).min(middle + reach) {
-            let shown = sequences.frame(next as u32)?;
-            // Beyond the ends all rests, and so does an eye that comes there.
-            let is_between = next > u64::from(first) && next < u64::from(last);
-            window.push_back(if is_between { observer.held(shown) } else { shown });
+            window.push_back(observer.held(sequences.frame(next as u32)?));
             next += 1;
         }
         while next - (window.len() as u64) < middle.saturating_sub(reach).max(u64::from(first)) {

@@ -21,7 +21,7 @@ pub(super) struct MergeArguments {
     /// The farm's folder.
     folder: PathBuf,
     /// Only these frames; several processes may merge a frame each.
-    #[arg(long = "frame", value_name = "N")]
+    #[arg(long = "frame", value_name = "N", allow_negative_numbers = true)]
     frames: Vec<u32>,
     #[command(flatten)]
     keeping: KeepingArguments,

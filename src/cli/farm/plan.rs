@@ -18,14 +18,14 @@ pub(super) struct PlanArguments {
     /// Scene, as for render and animate.
     scene: String,
     /// Frames of a scene that moves, first..last, both included; without them a still.
-    #[arg(long, value_name = "A..B")]
+    #[arg(long, value_name = "A..B", allow_hyphen_values = true)]
     frames: Option<String>,
     /// Most units that a round of a frame is cut into: about as many processes as should work on one frame.
     #[arg(long, value_name = "P", default_value_t = 16, value_parser = whole(1..=100_000), allow_negative_numbers = true)]
     passes: u32,
     /// Fewest samples of a unit. A unit should last ten seconds or more; a round with fewer samples is traced by the merge
     /// that planned it.
-    #[arg(long, value_name = "N", default_value_t = 4_000_000)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, default_value_t = 4_000_000)]
     unit_samples: u64,
     /// Folder to make.
     #[arg(short, long, value_name = "DIR")]

@@ -19,10 +19,10 @@ pub(super) struct SlurmArguments {
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = whole(1..=1023), allow_negative_numbers = true)]
     cpus: u32,
     /// Memory of a unit or merge, as Slurm writes it.
-    #[arg(long, value_name = "SIZE", default_value = "4G", value_parser = parse_memory)]
+    #[arg(long, value_name = "SIZE", default_value = "4G", value_parser = parse_memory, allow_hyphen_values = true)]
     memory: String,
     /// Time limit of a unit or merge, as Slurm writes it; a unit that does not make it goes on from its checkpoint.
-    #[arg(long, value_name = "TIME", default_value = "01:00:00", value_parser = parse_time)]
+    #[arg(long, value_name = "TIME", default_value = "01:00:00", value_parser = parse_time, allow_hyphen_values = true)]
     time: String,
     /// Most units at once.
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = whole(1..=u32::MAX), allow_negative_numbers = true)]

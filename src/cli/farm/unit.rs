@@ -24,7 +24,7 @@ pub(super) struct UnitArguments {
     /// The farm's folder.
     folder: PathBuf,
     /// Numbers of the units.
-    #[arg(required = true, value_name = "N")]
+    #[arg(required = true, value_name = "N", allow_negative_numbers = true)]
     units: Vec<u64>,
     #[command(flatten)]
     keeping: KeepingArguments,
@@ -36,7 +36,7 @@ pub(super) struct UnitArguments {
 #[derive(Debug, Args)]
 pub(super) struct KeepingArguments {
     /// Seconds of work that a kill may cost.
-    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, default_value = "60")]
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, allow_negative_numbers = true, default_value = "60")]
     checkpoint_every: Duration,
 }
 

@@ -3,7 +3,8 @@
 use super::super::console::duration_in_words;
 use super::super::report::sampling_name;
 use super::super::words::rounded;
-use fechner::checkpoint::Checkpoint;
+use fechner::adaptive::settings::Limits;
+use fechner::checkpoint::{Checkpoint, tracing_in_words};
 use std::fmt::Write as _;
 
 /// The text that `info` prints of a film.
@@ -36,7 +37,8 @@ pub(super) fn describe(checkpoint: &Checkpoint) -> String {
     row("sampling", sampling_name(settings.sampling).to_owned());
     row("visibility", {
         let reached = state.finished_rung.map_or_else(|| "none".to_owned(), rounded);
-        format!("{} aimed at, {reached} reached; variance × {}", rounded(header.visibility), rounded(state.inflation))
+        let aimed_at = Limits::visibility_of_last_rung(header.visibility).map_or_else(|| "none".to_owned(), rounded);
+        format!("{aimed_at} aimed at, {reached} reached; variance × {}", rounded(state.inflation))
     });
     row("model", settings.model.clone());
     row("display", {
@@ -67,56 +69,4 @@ pub(super) fn describe(checkpoint: &Checkpoint) -> String {
         );
     }
     text
-}
-
-/// How a film was traced: "max depth 1000, filter gaussian". Fields that ask for nothing, and its size, are left out.
-fn tracing_in_words(tracing: &str) -> String {
-    let mut depth = 0;
-    let at_top = |letter: char| {
-        depth += i32::from("({[".contains(letter)) - i32::from(")}]".contains(letter));
-        letter == ',' && depth == 0
-    };
-    let fields = tracing.split(at_top).filter_map(|field| field.trim().split_once(": "));
-    let said =
-        fields.filter(|&(name, value)| !["width", "height"].contains(&name) && value != "None" && value != "false");
-    let words = said.map(|(name, value)| {
-        let value = value.strip_prefix("Some(").and_then(|value| value.strip_suffix(')')).unwrap_or(value);
-        let text = match value.strip_prefix("Crop {") {
-            _ if value == "true" => name.to_owned(),
-            Some(corners) => format!("{name} {}", numbers(corners).join(",")),
-            None => format!("{name} {value}"),
-        };
-        text.replace('_', " ")
-    });
-    apart(&words.collect::<Vec<_>>().join(", "))
-}
-
-/// The numbers in a text, as `--crop` has them.
-fn numbers(text: &str) -> Vec<&str> {
-    text.split(|letter: char| !letter.is_ascii_digit()).filter(|number| !number.is_empty()).collect()
-}
-
-/// "blackman harris" of "BlackmanHarris".
-fn apart(text: &str) -> String {
-    let mut apart = String::new();
-    for letter in text.chars() {
-        if letter.is_uppercase() && apart.ends_with(char::is_lowercase) {
-            apart.push(' ');
-        }
-        apart.extend(letter.to_lowercase());
-    }
-    apart
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn tracing_is_said_without_what_it_does_not_do() {
-        let tracing = "width: 64, max_depth: 1000, filter: BlackmanHarris, clamp: Some(9.0), crop: Some(Crop { x: 1, y: 2, width: 3, height: 4 }), \
-                       transparent: true, prune: None";
-        let words = "max depth 1000, filter blackman harris, clamp 9.0, crop 1,2,3,4, transparent";
-        assert_eq!(tracing_in_words(tracing), words);
-    }
 }

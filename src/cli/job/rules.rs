@@ -67,7 +67,7 @@ pub(super) fn limits(arguments: &JobArguments, scene: &Scene, sampling: Sampling
     }
 }
 
-/// The visibility to stop at: command line before scene before threshold.
+/// The visibility to stop at: command line before scene before threshold. `None` where only other limits or rules end it.
 pub(in crate::cli) fn visibility_limit(
     asked: Option<f64>,
     scene: &Scene,
@@ -77,7 +77,9 @@ pub(in crate::cli) fn visibility_limit(
     match sampling {
         // A uniform render of so many samples, seconds or plans is what was asked for, not an early end.
         Sampling::Uniform if has_other_limit => asked,
-        _ => asked.or(scene.viewing.visibility).or(Some(THRESHOLD)),
+        // They do not look at what is seen.
+        Sampling::Rival(_) => None,
+        Sampling::Uniform | Sampling::Adaptive => asked.or(scene.viewing.visibility).or(Some(THRESHOLD)),
     }
 }
 

@@ -43,6 +43,9 @@ fn stopped(report: &Report, settings: &LoopSettings, rendered: &Rendered) -> Str
         }
         StopReason::Time => "Stopped because the time was up",
         StopReason::Samples => "Stopped because the samples were spent",
+        StopReason::MaxSamples if report.visibility_target.is_none() => {
+            "Stopped because all pixels that would get more have the most samples allowed"
+        }
         StopReason::MaxSamples => {
             "Stopped although some pixels are above the target: they have the most samples allowed"
         }

@@ -351,6 +351,9 @@ fn irregular(child: &Element) -> Result<Spectrum, LoadError> {
         );
         return Err(child.error(problem));
     }
+    if let Some(pair) = wavelengths_nm.windows(2).find(|pair| pair[0] >= pair[1]) {
+        return Err(child.error(format_args!("wavelengths have to rise; found {} after {}", pair[1], pair[0])));
+    }
     let pairs = wavelengths_nm.iter().zip(&values).map(|(&nm, &value)| [f64::from(nm), f64::from(value)]);
     Spectrum::from_pairs(pairs).ok_or_else(|| child.error("expected finite wavelengths and values"))
 }
@@ -366,18 +369,30 @@ fn blackbody_of_attributes(child: &Element) -> Result<Vec3, LoadError> {
     let text = child.attribute("temperature").unwrap_or("").trim().trim_end_matches(['K', 'k']);
     let kelvin = child.numbers(text)?.first().copied().map(f64::from).unwrap_or(0.0);
     let scale = if child.attribute("scale").is_some() { child.number_attribute("scale")? } else { 1.0 };
-    blackbody(child, kelvin, scale)
+    blackbody(child, kelvin, scale, None)
 }
 
-/// `<spectrum type="blackbody">` as Mitsuba 3 writes it.
+/// `<spectrum type="blackbody">` as Mitsuba 3 writes it, dark outside its wavelengths.
 fn blackbody_of_children(child: &Element) -> Result<Vec3, LoadError> {
-    blackbody(child, f64::from(child.float_or("temperature", 0.0)?), child.float_or("scale", 1.0)?)
+    let nanometres = |name: &str| child.float(name).map(|nm| nm.map(f64::from));
+    let (from_nm, to_nm) = (nanometres("wavelengthmin")?, nanometres("wavelengthmax")?);
+    let range_nm = match (from_nm, to_nm) {
+        (None, None) => None,
+        _ => Some([from_nm.unwrap_or(f64::NEG_INFINITY), to_nm.unwrap_or(f64::INFINITY)]),
+    };
+    if range_nm.is_some_and(|[from_nm, to_nm]| from_nm >= to_nm) {
+        return Err(child.error("a blackbody needs its wavelength_min below its wavelength_max"));
+    }
+    blackbody(child, f64::from(child.float_or("temperature", 0.0)?), child.float_or("scale", 1.0)?, range_nm)
 }
 
-/// Planck's law in W m⁻² sr⁻¹ nm⁻¹, as Mitsuba's spectra are, times `scale`.
-fn blackbody(child: &Element, kelvin: f64, scale: f32) -> Result<Vec3, LoadError> {
-    let spectrum =
-        Spectrum::blackbody(kelvin).ok_or_else(|| child.error("expected a temperature in kelvin above 0"))?;
+/// Planck's law in W m⁻² sr⁻¹ nm⁻¹, as Mitsuba's spectra are, times `scale`; 0 outside a range of wavelengths.
+fn blackbody(child: &Element, kelvin: f64, scale: f32, range_nm: Option<[f64; 2]>) -> Result<Vec3, LoadError> {
+    let all = Spectrum::blackbody(kelvin).ok_or_else(|| child.error("expected a temperature in kelvin above 0"))?;
+    let spectrum = match range_nm {
+        Some([from_nm, to_nm]) => all.within(from_nm, to_nm),
+        None => all,
+    };
     // Radiance at the peak: 4.0957e-15 W m⁻² sr⁻¹ nm⁻¹ K⁻⁵ · T⁵.
     let color = spectrum.emission() * (4.0957e-15 * kelvin.powi(5)) as f32 * scale;
     if color.is_finite() { Ok(color) } else { Err(child.error("the temperature is too high")) }

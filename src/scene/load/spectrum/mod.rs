@@ -11,6 +11,11 @@ use super::luminance;
 use cie::{D65, FIRST_NM, OBSERVER, ROWS, STEP_NM};
 use glam::{DMat3, DVec3, Vec3};
 
+/// Parts that a step of the observer's tables is integrated in: those of files may be finer.
+const SUBSTEPS: usize = 5;
+/// 1 nm.
+const INTEGRATION_NM: f64 = STEP_NM / SUBSTEPS as f64;
+
 /// A spectrum given at some wavelengths, linear between them.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Spectrum {
@@ -67,6 +72,20 @@ impl Spectrum {
         Self::from_pairs(rows().map(|nm| [nm, planck(nm) / peak]))
     }
 
+    /// The same between two wavelengths in nanometres, 0 beyond them. Its ends are ramps of one step of the integration, so that no more
+    /// and no less than what lies between counts wherever they fall: 5000 K from 500 to 600 nm had 3.5 % too much red with steep ones.
+    pub(super) fn within(&self, from_nm: f64, to_nm: f64) -> Self {
+        let half_nm = (0.5 * INTEGRATION_NM).min(0.5 * (to_nm - from_nm));
+        let outer_nm = (from_nm - half_nm)..=(to_nm + half_nm);
+        let inner_nm = (from_nm + half_nm)..=(to_nm - half_nm);
+        let inner = self.samples.iter().copied().filter(|[nm, _]| inner_nm.contains(nm));
+        let edges = [inner_nm.start(), inner_nm.end()].map(|&nm| [nm, self.at(nm)]);
+        let dark = [outer_nm.start(), outer_nm.end()].map(|&nm| [nm, 0.0]);
+        let mut samples: Vec<[f64; 2]> = inner.chain(edges).chain(dark).filter(|[nm, _]| nm.is_finite()).collect();
+        samples.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        Self { samples, holds_beyond: false }
+    }
+
     fn at(&self, nm: f64) -> f64 {
         let after = self.samples.partition_point(|sample| sample[0] <= nm);
         let (before, next) = (after.checked_sub(1).map(|i| self.samples[i]), self.samples.get(after));
@@ -80,8 +99,6 @@ impl Spectrum {
 
     /// Σ spectrum · weight · observer over Σ weight · ȳ.
     fn xyz(&self, weight: impl Fn(f64) -> f64) -> DVec3 {
-        // 1 nm: tables of files may be finer than the observer's.
-        const SUBSTEPS: usize = 5;
         let (mut sum, mut norm) = (DVec3::ZERO, 0.0);
         for step in 0..=(ROWS - 1) * SUBSTEPS {
             let row = step as f64 / SUBSTEPS as f64;
