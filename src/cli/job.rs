@@ -39,7 +39,7 @@ pub(super) struct JobArguments {
     /// Picture size.
     #[arg(long, value_name = "WxH", value_parser = parse_size, allow_hyphen_values = true)]
     size: Option<Size>,
-    /// Trace only this part of the picture, with the samples and the exposure it has in the whole. An EXR says where it lies.
+    /// Trace only this part of the picture, with the samples and, to a few per cent, the exposure it has in the whole. An EXR says where it lies.
     #[arg(long, value_name = "X,Y,W,H", value_parser = parse_crop, allow_hyphen_values = true)]
     crop: Option<Crop>,
     #[command(flatten)]
