@@ -148,6 +148,7 @@ mod tests {
         let of_film = |film: &Film| levels(&guide_rgb(film, &film.estimate(scene.nits_per_unit)))[1];
         let (right, few) = (of_film(&film), of_film(&pilot(&tracer)));
         let steady = levels(&steady_rgb(&tracer, scene.nits_per_unit))[1];
+        // Of six seeds with the 64 samples that it ends with white scatters by 2.6 %: three deviations from one with 128.
         assert!((steady / right - 1.0).abs() < 0.1, "{steady} cd/m² at a twentieth, in the whole {right}");
         assert!(few < 0.5 * right, "{few} cd/m² by a pilot: the scene shows nothing");
     }

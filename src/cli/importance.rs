@@ -12,8 +12,7 @@ const SAME_SHAPE: f64 = 0.02;
 /// Reads a map for a picture of `size` pixels, of which `area` is rendered: luminance of an EXR or HDR file as it stands, or a
 /// PNG's or JPEG's code values from 0 to 1. A map of another size and the same shape is interpolated bilinearly.
 pub(super) fn read(path: &Path, size: (usize, usize), area: Crop) -> Result<Plane> {
-    // A map has no unit. One is asked for where its file says none, and only there, since nobody asks for one in place of its own.
-    let map = InputPicture::read(path, None).or_else(|_| InputPicture::read(path, Some(1.0)))?.values();
+    let map = InputPicture::read_values(path)?;
     let (width, height) = (map.width(), map.height());
     if let Some(index) = map.values().iter().position(|value| !(value.is_finite() && *value > 0.0)) {
         let (x, y, value) = (index % width, index / width, map.values()[index]);

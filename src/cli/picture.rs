@@ -51,6 +51,30 @@ enum Content {
     Display(Codes),
 }
 
+/// Where the luminance of RGB (1, 1, 1) comes from.
+#[derive(Clone, Copy)]
+enum Unit {
+    /// The file, or else what is asked for.
+    OfLight(Option<f64>),
+    /// Nowhere: the values are no light.
+    Meaningless,
+}
+
+impl Unit {
+    /// In cd/m², for a file that says this.
+    fn in_cd_m2(self, path: &Path, own: impl FnOnce() -> Option<f64>) -> Result<f64> {
+        let Self::OfLight(asked) = self else { return Ok(1.0) };
+        let own = own();
+        if let (Some(own), Some(asked)) = (own, asked) {
+            note(
+                path,
+                &format!("its own unit of {own} cd/m² stands; --nits-per-unit {asked} is for files that do not say it"),
+            );
+        }
+        own.or(asked).with_context(|| no_unit(path))
+    }
+}
+
 /// What code values mean.
 #[derive(Clone, Copy, PartialEq)]
 enum Codes {
@@ -68,27 +92,26 @@ enum Codes {
 impl InputPicture {
     /// Reads an EXR, HDR, PNG or JPEG file. `nits_per_unit` is needed for scene-linear files that do not say it.
     pub(super) fn read(path: &Path, nits_per_unit: Option<f64>) -> Result<Self> {
+        Self::read_in(path, Unit::OfLight(nits_per_unit))
+    }
+
+    /// Luminance of the values as the file has them, which may be no light and have no unit.
+    pub(super) fn read_values(path: &Path) -> Result<Plane> {
+        Ok(Self::read_in(path, Unit::Meaningless)?.values())
+    }
+
+    fn read_in(path: &Path, unit: Unit) -> Result<Self> {
         let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
         match ending.as_deref() {
-            Some("exr") => Self::from_exr(path, &channels::read_picture(path)?, nits_per_unit),
-            Some("hdr") => {
-                let nits_per_unit = nits_per_unit.with_context(|| no_unit(path))?;
-                Self::from_hdr(path, nits_per_unit)
-            }
+            Some("exr") => Self::from_exr(path, &channels::read_picture(path)?, unit),
+            Some("hdr") => Self::from_hdr(path, unit.in_cd_m2(path, || None)?),
             Some("png" | "jpg" | "jpeg") => Self::from_codes(path),
             _ => bail!("{}: not a picture that can be judged: .exr, .hdr, .png and .jpg are read", path.display()),
         }
     }
 
-    fn from_exr(path: &Path, exr: &ExrImage, nits_per_unit: Option<f64>) -> Result<Self> {
-        let own_unit = unit_in_file(path, exr);
-        if let (Some(own), Some(asked)) = (own_unit, nits_per_unit) {
-            note(
-                path,
-                &format!("its own unit of {own} cd/m² stands; --nits-per-unit {asked} is for files that do not say it"),
-            );
-        }
-        let nits_per_unit = own_unit.or(nits_per_unit).with_context(|| no_unit(path))?;
+    fn from_exr(path: &Path, exr: &ExrImage, unit: Unit) -> Result<Self> {
+        let nits_per_unit = unit.in_cd_m2(path, || unit_in_file(path, exr))?;
         let Some(picture) = exr.scene_picture(picture_channel) else {
             bail!("{}: there are no channels R, G and B, nor Y; `fechner info` lists what there is", path.display());
         };
@@ -193,8 +216,7 @@ impl InputPicture {
         self.part_of
     }
 
-    /// Luminance of the values as the file has them.
-    pub(super) fn values(&self) -> Plane {
+    fn values(&self) -> Plane {
         Plane::from_fn(self.width, self.height, |x, y| luminance(self.rgb[y * self.width + x]))
     }
 
