@@ -5,15 +5,15 @@
 
 use crate::output::{Attribute, CROP, FRAMES_PER_SECOND, PartOf};
 use ::exr::image::read::any_channels::ReadAnyChannels;
-use ::exr::meta::attribute::{AttributeValue, Text};
+use ::exr::meta::attribute::Text;
 use ::exr::meta::header::Header;
-use ::exr::meta::{BlockDescription, MetaData};
 use ::exr::prelude::{FlatSamples, ReadChannels, ReadLayers, Vec2};
 use fechner_perception::primaries::Primaries;
 use std::io::Cursor;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
+mod attributes;
+mod checks;
 mod colour;
 mod dwa;
 pub mod layers;
@@ -21,6 +21,8 @@ mod subsampled;
 mod wanted;
 mod window;
 
+use attributes::{add_missing, attributes, part_of};
+use checks::{check_memory, guarded, read_headers};
 pub use colour::ScenePicture;
 pub(crate) use colour::{Replaced, make_finite};
 use wanted::Wanted;
@@ -244,16 +246,6 @@ fn layout(headers: &[Header]) -> &Header {
     headers.iter().rev().max_by_key(|header| rank(header)).unwrap_or(&headers[0])
 }
 
-/// Adds the attributes that other parts have and the picture's has not, such as a unit.
-fn add_missing(list: &mut Vec<(String, Attribute)>, headers: &[Header]) {
-    for (name, value) in headers.iter().flat_map(attributes) {
-        if list.iter().all(|(own, _)| *own != name) {
-            list.push((name, value));
-        }
-    }
-    list.sort_by(|a, b| a.0.cmp(&b.0));
-}
-
 fn image_without_channels(first: &Header) -> ExrImage {
     let window = first.shared_attributes.display_window;
     // A display window that no memory could hold is no reason to refuse the data.
@@ -296,150 +288,12 @@ fn image_without_channels(first: &Header) -> ExrImage {
     }
 }
 
-/// The place of a part in a whole that begins at (0, 0); `None` where it does not lie within it.
-fn part_of(header: &Header) -> Option<PartOf> {
-    let window = header.shared_attributes.display_window;
-    let Vec2(x, y) = header.own_attributes.layer_position;
-    let origin = [u32::try_from(x).ok()?, u32::try_from(y).ok()?];
-    let whole = [u32::try_from(window.size.0).ok()?, u32::try_from(window.size.1).ok()?];
-    let size = [header.layer_size.0, header.layer_size.1];
-    let is_within = (0..2).all(|side| origin[side] as usize + size[side] <= whole[side] as usize);
-    (window.position == Vec2(0, 0) && is_within).then_some(PartOf { origin, whole })
-}
-
 /// Width and height of the picture of a file that is in memory.
 pub fn size(path: &Path, file: &[u8]) -> Result<[u32; 2], ExrReadError> {
     let headers = read_headers(path, file)?;
     // Its sides were checked against the limit of memory.
     let Vec2(width, height) = layout(&headers).layer_size;
     Ok([width as u32, height as u32])
-}
-
-/// Reads the headers of all parts and refuses those of which no channel could be read within [`MEMORY_LIMIT_BYTES`].
-fn read_headers(path: &Path, file: &[u8]) -> Result<Vec<Header>, ExrReadError> {
-    let damaged = |problem: String| ExrReadError::Damaged { path: path.to_owned(), problem };
-    let unsupported = |feature: &str| ExrReadError::Unsupported { path: path.to_owned(), feature: feature.to_owned() };
-
-    if file.is_empty() {
-        return Err(damaged("it is empty".to_owned()));
-    }
-    let headers = guarded(path, || MetaData::read_from_buffered(Cursor::new(file), false))?.headers;
-    if headers.is_empty() {
-        return Err(damaged("it has no part".to_owned()));
-    }
-
-    let mut chunks: u64 = 0;
-    check_memory_of(path, std::slice::from_ref(layout(&headers)), |_| 1)?;
-    for header in &headers {
-        if header.deep {
-            return Err(unsupported("deep pixels are not read; flatten the picture first"));
-        }
-        if header.channels.list.iter().any(|channel| channel.sampling != Vec2(1, 1)) {
-            return Err(unsupported("subsampled channels are not read; write the picture as RGB"));
-        }
-        let Vec2(width, height) = header.layer_size;
-        if width == 0 || height == 0 {
-            return Err(damaged("it has no pixels".to_owned()));
-        }
-        let channels = header.channels.list.len() as u64;
-        // A single block is unpacked at once, and tiles may be larger than the picture.
-        if let BlockDescription::Tiles(tiles) = header.blocks {
-            let tile_pixels = (tiles.tile_size.0 as u64).saturating_mul(tiles.tile_size.1 as u64);
-            if tile_pixels.saturating_mul(channels * 4) > MEMORY_LIMIT_BYTES / 4 {
-                return Err(damaged(format!("tiles of {}×{} pixels", tiles.tile_size.0, tiles.tile_size.1)));
-            }
-        }
-        chunks = chunks.saturating_add(header.chunk_count as u64);
-    }
-    // Each chunk takes 8 bytes in the table of offsets, and a place and a length of 4 bytes each where it stands.
-    if chunks.saturating_mul(16) > file.len() as u64 {
-        return Err(damaged(format!("it is too short for the {chunks} blocks that its header tells of")));
-    }
-    Ok(headers.into_vec())
-}
-
-/// Refuses channels that would take more than [`MEMORY_LIMIT_BYTES`].
-fn check_memory(path: &Path, headers: &[Header], wanted: &Wanted) -> Result<(), ExrReadError> {
-    check_memory_of(path, headers, |header| wanted.channels_of(header))
-}
-
-fn check_memory_of(path: &Path, headers: &[Header], channels_of: impl Fn(&Header) -> u64) -> Result<(), ExrReadError> {
-    let area = |header: &Header| (header.layer_size.0 as u64).saturating_mul(header.layer_size.1 as u64);
-    let laid_out = area(layout(headers));
-    let of_part = |header: &Header| area(header).max(laid_out).saturating_mul(channels_of(header).saturating_mul(4));
-    let bytes = headers.iter().map(of_part).fold(0_u64, u64::saturating_add);
-    if bytes > MEMORY_LIMIT_BYTES {
-        return Err(ExrReadError::TooLarge {
-            path: path.to_owned(),
-            width: layout(headers).layer_size.0 as u64,
-            height: layout(headers).layer_size.1 as u64,
-            channels: headers.iter().map(channels_of).sum(),
-            bytes,
-        });
-    }
-    Ok(())
-}
-
-/// Runs the library, and turns its errors, and panics on damaged data, into ours.
-fn guarded<T>(path: &Path, run: impl FnOnce() -> ::exr::error::Result<T>) -> Result<T, ExrReadError> {
-    use ::exr::error::Error;
-    let path = path.to_owned();
-    match catch_unwind(AssertUnwindSafe(run)) {
-        Ok(Ok(value)) => Ok(value),
-        Ok(Err(Error::Io(error))) => Err(ExrReadError::Io { path, error }),
-        Ok(Err(Error::NotSupported(what))) => Err(ExrReadError::Unsupported {
-            path,
-            feature: format!("{what} is not read; convert the file to ZIP first"),
-        }),
-        Ok(Err(Error::Invalid(problem))) => Err(ExrReadError::Damaged { path, problem: problem.into_owned() }),
-        Ok(Err(Error::Aborted)) => Err(ExrReadError::Damaged { path, problem: "reading ended early".to_owned() }),
-        Err(_) => Err(ExrReadError::Damaged { path, problem: "its blocks contradict its header".to_owned() }),
-    }
-}
-
-/// What the header says besides the pixels' layout, sorted by name.
-fn attributes(header: &Header) -> Vec<(String, Attribute)> {
-    let own = &header.own_attributes;
-    let mut list: Vec<(String, Attribute)> = own
-        .other
-        .iter()
-        .chain(&header.shared_attributes.other)
-        .map(|(name, value)| (name.to_string(), attribute(value)))
-        .collect();
-    let mut text = |name: &str, value: &Option<Text>| {
-        if let Some(value) = value {
-            list.push((name.to_owned(), Attribute::Text(value.to_string())));
-        }
-    };
-    text("name", &own.layer_name);
-    text("owner", &own.owner);
-    text("comments", &own.comments);
-    text("capDate", &own.capture_date);
-    text("software", &own.software_name);
-    if let Some((frames, seconds)) = own.frames_per_second {
-        list.push((FRAMES_PER_SECOND.to_owned(), Attribute::Float(frames as f32 / seconds as f32)));
-    }
-    if let Some(nits) = own.white_luminance {
-        list.push(("whiteLuminance".to_owned(), Attribute::Float(nits)));
-    }
-    if let Some(c) = header.shared_attributes.chromaticities {
-        let [r, g, b, w] = [c.red, c.green, c.blue, c.white].map(|Vec2(x, y)| format!("{x} {y}"));
-        let text = format!("red {r}, green {g}, blue {b}, white {w}");
-        list.push(("chromaticities".to_owned(), Attribute::Text(text)));
-    }
-    list.sort_by(|a, b| a.0.cmp(&b.0));
-    list
-}
-
-fn attribute(value: &AttributeValue) -> Attribute {
-    match value {
-        AttributeValue::Text(text) => Attribute::Text(text.to_string()),
-        AttributeValue::F32(number) => Attribute::Float(*number),
-        AttributeValue::F64(number) => Attribute::Text(number.to_string()),
-        AttributeValue::I32(number) => Attribute::Integer(*number),
-        AttributeValue::Bytes { type_hint, bytes } => Attribute::Text(format!("{} bytes of {type_hint}", bytes.len())),
-        other => Attribute::Text(format!("{other:?}")),
-    }
 }
 
 #[cfg(test)]

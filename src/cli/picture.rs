@@ -1,23 +1,16 @@
 //! Pictures of any renderer as the input of `compare` and `threshold`.
 
-use super::channels::{self, Colour};
-use super::kept_tone::{self, KeptTone};
-use anyhow::{Context, Result, bail};
-use fechner::exr_read::ExrImage;
-use fechner::hdr_read::{HdrHeader, with_known_header};
-use fechner::jpeg_read;
-use fechner::output::{self, Attribute, NITS_PER_UNIT, PartOf, PngTransfer};
-use fechner::scene;
+mod from_file;
+
+pub(super) use self::from_file::note;
+use super::kept_tone::KeptTone;
+use anyhow::{Context, Result};
+use fechner::output::{self, PartOf};
 use fechner_perception::Plane;
 use fechner_perception::display::{Display, Eotf, Viewing};
 use fechner_perception::photometry::luminance;
 use fechner_perception::primaries::{Primaries, apply};
 use fechner_perception::tone::{FittedTone, SceneLight, ToneOperator, gamut, map_picture, map_pixels};
-use image::GenericImageView as _;
-use image::{DynamicImage, ImageFormat};
-use std::collections::BTreeSet;
-use std::path::Path;
-use std::sync::{Mutex, PoisonError};
 
 /// A picture from a file.
 pub(super) struct InputPicture {
@@ -51,30 +44,6 @@ enum Content {
     Display(Codes),
 }
 
-/// Where the luminance of RGB (1, 1, 1) comes from.
-#[derive(Clone, Copy)]
-enum Unit {
-    /// The file, or else what is asked for.
-    OfLight(Option<f64>),
-    /// Nowhere: the values are no light.
-    Meaningless,
-}
-
-impl Unit {
-    /// In cd/m², for a file that says this.
-    fn in_cd_m2(self, path: &Path, own: impl FnOnce() -> Option<f64>) -> Result<f64> {
-        let Self::OfLight(asked) = self else { return Ok(1.0) };
-        let own = own();
-        if let (Some(own), Some(asked)) = (own, asked) {
-            note(
-                path,
-                &format!("its own unit of {own} cd/m² stands; --nits-per-unit {asked} is for files that do not say it"),
-            );
-        }
-        own.or(asked).with_context(|| no_unit(path))
-    }
-}
-
 /// What code values mean.
 #[derive(Clone, Copy, PartialEq)]
 enum Codes {
@@ -90,107 +59,6 @@ enum Codes {
 }
 
 impl InputPicture {
-    /// Reads an EXR, HDR, PNG or JPEG file. `nits_per_unit` is needed for scene-linear files that do not say it.
-    pub(super) fn read(path: &Path, nits_per_unit: Option<f64>) -> Result<Self> {
-        Self::read_in(path, Unit::OfLight(nits_per_unit))
-    }
-
-    /// Luminance of the values as the file has them, which may be no light and have no unit.
-    pub(super) fn read_values(path: &Path) -> Result<Plane> {
-        Ok(Self::read_in(path, Unit::Meaningless)?.values())
-    }
-
-    fn read_in(path: &Path, unit: Unit) -> Result<Self> {
-        let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
-        match ending.as_deref() {
-            Some("exr") => Self::from_exr(path, &channels::read_picture(path)?, unit),
-            Some("hdr") => Self::from_hdr(path, unit.in_cd_m2(path, || None)?),
-            Some("png" | "jpg" | "jpeg") => Self::from_codes(path),
-            _ => bail!("{}: not a picture that can be judged: .exr, .hdr, .png and .jpg are read", path.display()),
-        }
-    }
-
-    fn from_exr(path: &Path, exr: &ExrImage, unit: Unit) -> Result<Self> {
-        let nits_per_unit = unit.in_cd_m2(path, || unit_in_file(path, exr))?;
-        let Some(picture) = exr.scene_picture(picture_channel) else {
-            bail!("{}: there are no channels R, G and B, nor Y; `fechner info` lists what there is", path.display());
-        };
-        for text in channels::guess(exr).iter().chain(&picture.notes) {
-            note(path, text);
-        }
-        let kept_tone = KeptTone::of(exr);
-        let content = match kept_tone {
-            Some(KeptTone::Displayed) => Content::Emitted { nits_per_unit },
-            _ => Content::Scene { nits_per_unit },
-        };
-        let (width, height) = (picture.width as usize, picture.height as usize);
-        Ok(Self {
-            width,
-            height,
-            rgb: picture.rgb,
-            content,
-            pixel_aspect_ratio: exr.pixel_aspect_ratio,
-            made_for: kept_tone::display_in(exr),
-            kept_tone,
-            alpha: alpha(path, exr),
-            part_of: exr.part_of,
-        })
-    }
-
-    fn from_hdr(path: &Path, nits_per_unit: f64) -> Result<Self> {
-        let bytes = std::fs::read(path).with_context(|| format!("{}", path.display()))?;
-        let header = HdrHeader::of(&with_known_header(&bytes));
-        let mut picture = Self::from_image(decoded_image(path, &bytes)?, Content::Scene { nits_per_unit });
-        picture.rgb.iter_mut().for_each(|rgb| *rgb = header.light(*rgb));
-        picture.pixel_aspect_ratio = header.pixel_aspect_ratio;
-        Ok(picture)
-    }
-
-    fn from_codes(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).with_context(|| format!("{}", path.display()))?;
-        let mut image = decoded_image(path, &bytes)?;
-        let colour = output::png_colour(&bytes);
-        for text in colour.notes.iter().chain(&jpeg_read::notes(&bytes)) {
-            note(path, text);
-        }
-        let of = |primaries: Primaries| colour.primaries.unwrap_or(primaries);
-        let codes = match colour.transfer {
-            PngTransfer::Pq => Codes::Pq(of(Primaries::REC2020)),
-            PngTransfer::HybridLogGamma => bail!("{}: hybrid log-gamma is not read", path.display()),
-            PngTransfer::Linear => Codes::Linear(of(Primaries::REC709)),
-            PngTransfer::Untagged if bytes_a_channel(&image) > 1 => Codes::Display,
-            PngTransfer::Srgb | PngTransfer::Untagged => Codes::Srgb(of(Primaries::REC709)),
-        };
-        if image.color().has_alpha() && image.pixels().any(|(_, _, pixel)| pixel.0[3] < u8::MAX) {
-            if matches!(codes, Codes::Srgb(_)) {
-                note(path, "what is transparent lies before black");
-                image = before_black(image);
-            } else {
-                note(path, "alpha is not looked at: each pixel is seen in the colour that it has");
-            }
-        }
-        Ok(Self::from_image(image, Content::Display(codes)))
-    }
-
-    fn from_image(image: DynamicImage, content: Content) -> Self {
-        let picture = image.into_rgb32f();
-        let (width, height) = (picture.width() as usize, picture.height() as usize);
-        let rgb = picture.pixels().map(|p| p.0).collect();
-        let is_pq = matches!(content, Content::Display(Codes::Pq(_)));
-        let made_for = if is_pq { Display::preset("hdr-1000") } else { None };
-        Self {
-            width,
-            height,
-            rgb,
-            content,
-            pixel_aspect_ratio: 1.0,
-            made_for,
-            kept_tone: None,
-            alpha: None,
-            part_of: None,
-        }
-    }
-
     /// The viewing of this picture, whose pixels may be oblong: its lines are as dense as the display's and its columns closer
     /// together or wider apart, as players stretch them.
     pub(super) fn viewed(&self, viewing: &Viewing) -> Result<Viewing> {
@@ -339,106 +207,6 @@ fn in_rec709(light: Vec<[f32; 3]>, primaries: &Primaries) -> Vec<[f32; 3]> {
     let Some(matrix) = primaries.to_other(&Primaries::REC709) else { return light };
     let inside = |rgb: [f32; 3]| gamut::fit_into_display(apply(&matrix, rgb.map(f64::from)).map(|value| value as f32));
     light.into_iter().map(inside).collect()
-}
-
-fn bytes_a_channel(image: &DynamicImage) -> u8 {
-    let color = image.color();
-    color.bytes_per_pixel() / color.channel_count()
-}
-
-/// Straight alpha of sRGB codes laid before black, as the premultiplied channels of an EXR file are seen.
-fn before_black(image: DynamicImage) -> DynamicImage {
-    let mut picture = image.into_rgba32f();
-    for pixel in picture.pixels_mut() {
-        let [colour @ .., alpha] = &mut pixel.0;
-        for code in colour {
-            let light = Eotf::Srgb.decode(f64::from(*code), 1.0) * f64::from(*alpha);
-            *code = Eotf::Srgb.encode(light, 1.0) as f32;
-        }
-    }
-    DynamicImage::ImageRgba32F(picture)
-}
-
-/// A picture of a limited size. What its values mean goes by its name, so that its bytes must be what that says.
-fn decoded_image(path: &Path, bytes: &[u8]) -> Result<DynamicImage> {
-    let bytes = &*with_known_header(bytes);
-    let named = ImageFormat::from_path(path).with_context(|| format!("{}", path.display()))?;
-    let found = image::guess_format(bytes).with_context(|| format!("{}: not a readable picture", path.display()))?;
-    if found != named {
-        bail!("{}: its bytes are those of a file of another kind ({}): name it so", path.display(), words_of(found));
-    }
-    if found == ImageFormat::Jpeg && !jpeg_read::has_end(bytes) {
-        bail!("{}: {}", path.display(), jpeg_read::CUT_OFF);
-    }
-    let mut reader = image::ImageReader::with_format(std::io::Cursor::new(bytes), found);
-    let mut limits = image::Limits::default();
-    limits.max_image_width = Some(1 << 15);
-    limits.max_image_height = Some(1 << 15);
-    limits.max_alloc = Some(1 << 30);
-    reader.limits(limits);
-    reader.decode().with_context(|| format!("{}: not a readable picture", path.display()))
-}
-
-/// What files of a format are called.
-fn words_of(format: ImageFormat) -> String {
-    let endings = format.extensions_str().first();
-    endings.map_or_else(|| format!("{format:?}"), |ending| format!(".{ending}"))
-}
-
-/// How much of each pixel an EXR picture covers; `None` where that is all of all of them.
-fn alpha(path: &Path, exr: &ExrImage) -> Option<Vec<f32>> {
-    let covered = |&alpha: &f32| if alpha.is_nan() { 0.0 } else { alpha.clamp(0.0, 1.0) };
-    let alpha = exr.in_display_window(channels::alpha(exr)?.iter().map(covered).collect());
-    if alpha.iter().all(|&a| a == 0.0) {
-        note(path, "its alpha is 0 all over, and is not looked at");
-        return None;
-    }
-    alpha.iter().any(|&a| a < 1.0).then_some(alpha)
-}
-
-/// A channel of the file's picture by its last name, all three from one layer.
-fn picture_channel<'a>(exr: &'a ExrImage, name: &str) -> Option<&'a [f32]> {
-    let Some(Colour::Rgb([r, g, b])) = channels::colour(exr) else { return None };
-    match name {
-        "R" => Some(r),
-        "G" => Some(g),
-        "B" => Some(b),
-        _ => None,
-    }
-}
-
-/// Luminance of RGB (1, 1, 1) as the file says it, where it is one that a picture can have: `whiteLuminance` is written by many and read
-/// by few.
-fn unit_in_file(path: &Path, exr: &ExrImage) -> Option<f64> {
-    let said = [NITS_PER_UNIT, "whiteLuminance"].into_iter().find_map(|name| match exr.attribute(name) {
-        Some(Attribute::Float(nits)) if *nits > 0.0 => Some((name, *nits)),
-        _ => None,
-    });
-    let (name, nits) = said?;
-    // As files round it.
-    let (least, most) = (*scene::NITS_PER_UNIT.start() as f32, *scene::NITS_PER_UNIT.end() as f32);
-    if (least..=most).contains(&nits) {
-        return Some(f64::from(nits));
-    }
-    note(path, &format!("{name} {nits:e} is not a luminance from {least:e} to {most:e} cd/m², and is not looked at"));
-    None
-}
-
-/// Says something of a file, once of all the frames of a sequence, whose names differ by digits.
-pub(super) fn note(path: &Path, text: &str) {
-    static SAID: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
-    let of_sequence = format!("{}: {text}", path.display()).replace(|c: char| c.is_ascii_digit(), "#");
-    if SAID.lock().unwrap_or_else(PoisonError::into_inner).insert(of_sequence) {
-        say!("note: {}: {text}", path.display());
-    }
-}
-
-fn no_unit(path: &Path) -> String {
-    format!(
-        "{}: the file does not say how bright RGB (1, 1, 1) is, and nothing can be seen in a picture without a unit: give \
-         --nits-per-unit in cd/m²",
-        path.display()
-    )
 }
 
 #[cfg(test)]

@@ -1,18 +1,20 @@
 //! `fechner tonemap`: HDR pictures as a display shows them to an eye, one by one or as a sequence in time.
 
 mod covered;
+mod names;
 mod sheet;
+mod write;
 
 use self::covered::Covered;
+use self::names::{frame_numbers, frames_since_last, targets};
+use self::write::write;
 use super::json::write_json;
-use super::kept_tone::{LIGHT, OF_DISPLAY};
 use super::numbers::{parse_positive, parse_stops, parse_unit};
-use super::picture::{InputPicture, note};
+use super::picture::InputPicture;
 use super::seeing::{self, DEFAULT_DISPLAY, operator_values_or_all};
-use super::targets::{check_kept, display_file};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
-use fechner::output::{self, Attribute, Format, PartOf, Picture};
+use fechner::output::{self, Format, PartOf};
 use fechner_perception::tone::{
     self, AdaptationScope, AdaptationState, Effects, FittedTone, Goal, Pixel, SceneGuide, SceneLight, ToneOperator,
     ToneSettings, map_picture,
@@ -358,126 +360,4 @@ impl Eye {
         self.state = Some(state);
         state
     }
-}
-
-/// One file name for each input. None of the files that are written is one that is read, nor another's.
-fn targets(arguments: &TonemapArguments) -> Result<Vec<PathBuf>> {
-    let targets = named_targets(arguments)?;
-    let pictures = arguments.input.iter().map(|path| ("a picture", Some(path.as_path())));
-    let read: Vec<_> = pictures.chain([display_file(arguments.display.as_deref())]).collect();
-    let state = ("--state", arguments.state.as_deref());
-    let written: Vec<_> = targets.iter().map(|path| ("-o", Some(path.as_path()))).chain([state]).collect();
-    check_kept(&read, &written)?;
-    Ok(targets)
-}
-
-fn named_targets(arguments: &TonemapArguments) -> Result<Vec<PathBuf>> {
-    let output = &arguments.output;
-    let name = output.file_name().unwrap_or_default();
-    let digits = name.as_encoded_bytes().iter().filter(|&&byte| byte == b'#').count();
-    if arguments.input.len() == 1 && digits == 0 {
-        return Ok(vec![output.clone()]);
-    }
-    let name = name.to_str().with_context(|| {
-        format!("{}: the name of a sequence must be UTF-8, for numbers to be put into it", output.display())
-    })?;
-    let hashes = "#".repeat(digits);
-    if digits == 0 || !name.contains(&hashes) {
-        bail!(
-            "{}: the name of a sequence needs one run of # for the digits of the frame's number, such as night.####.png",
-            output.display()
-        );
-    }
-    let target = |frame: u64| output.with_file_name(name.replace(&hashes, &format!("{frame:0digits$}")));
-    let numbers = frame_numbers(&arguments.input).unwrap_or_else(|| (1..=arguments.input.len() as u64).collect());
-    Ok(numbers.into_iter().map(target).collect())
-}
-
-/// How many frames after the one before each is: by their numbers in order of time, else one.
-fn frames_since_last(numbers: Option<Vec<u64>>, count: usize) -> Vec<u64> {
-    let steps = numbers.map(|numbers| numbers.windows(2).map(|pair| pair[1].saturating_sub(pair[0])).collect());
-    let steps: Vec<u64> = steps.unwrap_or_else(|| vec![1; count.saturating_sub(1)]);
-    std::iter::once(1).chain(steps).collect()
-}
-
-/// The numbers at the end of the files' names, before what follows the last dot; `None` unless all have different ones.
-fn frame_numbers(files: &[PathBuf]) -> Option<Vec<u64>> {
-    let number = |file: &PathBuf| {
-        let stem = file.file_stem()?.to_str()?;
-        stem[stem.trim_end_matches(|c: char| c.is_ascii_digit()).len()..].parse().ok()
-    };
-    let numbers: Vec<u64> = files.iter().map(number).collect::<Option<_>>()?;
-    let different: std::collections::BTreeSet<u64> = numbers.iter().copied().collect();
-    (different.len() == numbers.len()).then_some(numbers)
-}
-
-fn write(
-    target: &Path,
-    format: Format,
-    frame: &SceneFrame,
-    fitted: &dyn FittedTone,
-    state: Option<&AdaptationState>,
-) -> Result<()> {
-    match format {
-        Format::Png => write_png(target, frame, fitted),
-        Format::Exr => write_exr(target, frame, fitted, state),
-    }
-}
-
-/// With straight alpha where it does not cover all, as a render of a transparent background; light that covers nothing raises it.
-fn write_png(target: &Path, frame: &SceneFrame, fitted: &dyn FittedTone) -> Result<()> {
-    let (width, height, display) = (frame.width as u32, frame.height() as u32, &frame.viewing.display);
-    match frame.covered(fitted) {
-        Some(covered) => {
-            if covered.has_light_in_front() {
-                note(
-                    target,
-                    "light that covers nothing (flames, glows) is kept, and covers what lies behind as far as a PNG's alpha must to hold it",
-                );
-            }
-            let (shown, alpha) = covered.straight();
-            output::write_png_with_alpha_for(target, width, height, &shown, &alpha, display)?;
-        }
-        None => output::write_png_for(target, width, height, &frame.shown(fitted), display)?,
-    }
-    Ok(())
-}
-
-/// In units of white what the display emits, its black with it and the room's light without: value × unit is cd/m².
-fn write_exr(
-    target: &Path,
-    frame: &SceneFrame,
-    fitted: &dyn FittedTone,
-    state: Option<&AdaptationState>,
-) -> Result<()> {
-    let display = &frame.viewing.display;
-    let mut picture = Picture::new(frame.width as u32, frame.height() as u32);
-    picture.part_of = frame.part_of;
-    let emitted = |relative: f32| (display.emitted_cd_m2(f64::from(relative)) / display.white_cd_m2) as f32;
-    let shown = match frame.covered(fitted) {
-        Some(covered) => {
-            // Multiplied by alpha, as the format has it; the display's black is there before whatever lies behind.
-            picture.push_f32("A", covered.alpha().to_vec());
-            covered.premultiplied()
-        }
-        None => frame.shown(fitted),
-    };
-    for (channel, name) in ["R", "G", "B"].into_iter().enumerate() {
-        picture.push_f32(name, shown.iter().map(|pixel| emitted(pixel[channel])).collect::<Vec<_>>());
-    }
-    picture.push_attribute(output::NITS_PER_UNIT, Attribute::Float(display.white_cd_m2 as f32));
-    // Readers take text for UTF-8, the writer has Latin-1: only what both have in common is safe.
-    let operator = fitted.describe().replace('²', "2").replace('×', "x");
-    picture.push_attribute("fechner.operator", Attribute::Text(operator));
-    picture.push_attribute(LIGHT, Attribute::Text(OF_DISPLAY.to_owned()));
-    picture.push_attribute("fechner.observer.display", Attribute::Text(display.name.clone()));
-    picture.push_attribute(output::PIXEL_ASPECT_RATIO, Attribute::Float(frame.pixel_aspect_ratio as f32));
-    picture.attributes.extend(output::display_attribute(&frame.display));
-    picture.attributes.extend(output::tone_attribute(fitted));
-    if let Some(state) = state {
-        let text = serde_json::to_string(state).context("the eye's state could not be put into words")?;
-        picture.push_attribute("fechner.adaptation", Attribute::Text(text));
-    }
-    output::write_exr(target, &picture)?;
-    Ok(())
 }

@@ -3,7 +3,8 @@
 //! The `exr` crate takes the memory that such a block asks for in its first words, whatever that is, and a system that has not so much
 //! ends the program.
 
-use super::{ExrReadError, guarded};
+use super::ExrReadError;
+use super::checks::guarded;
 use ::exr::block::chunk::{Chunk, CompressedBlock};
 use ::exr::compression::Compression;
 use ::exr::meta::header::Header;

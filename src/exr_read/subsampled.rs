@@ -3,8 +3,9 @@
 //! The `exr` crate refuses them, though its decompression knows them. So its header reader is shown a copy whose channels
 //! all have full resolution, and the blocks are found and unpacked one by one here.
 
+use super::checks::{check_memory, guarded, read_headers};
 use super::wanted::Wanted;
-use super::{ExrImage, ExrReadError, SampleType, check_memory, guarded, image_without_channels, read_headers};
+use super::{ExrImage, ExrReadError, SampleType, image_without_channels};
 use ::exr::meta::attribute::{ChannelDescription, IntegerBounds, SampleType as FileType};
 use ::exr::meta::header::Header;
 use ::exr::prelude::{Vec2, f16};

@@ -1,0 +1,80 @@
+//! A mapped picture as a file.
+
+use super::SceneFrame;
+use crate::cli::kept_tone::{LIGHT, OF_DISPLAY};
+use crate::cli::picture::note;
+use anyhow::{Context, Result};
+use fechner::output::{self, Attribute, Format, Picture};
+use fechner_perception::tone::{AdaptationState, FittedTone};
+use std::path::Path;
+
+pub(super) fn write(
+    target: &Path,
+    format: Format,
+    frame: &SceneFrame,
+    fitted: &dyn FittedTone,
+    state: Option<&AdaptationState>,
+) -> Result<()> {
+    match format {
+        Format::Png => write_png(target, frame, fitted),
+        Format::Exr => write_exr(target, frame, fitted, state),
+    }
+}
+
+/// With straight alpha where it does not cover all, as a render of a transparent background; light that covers nothing raises it.
+fn write_png(target: &Path, frame: &SceneFrame, fitted: &dyn FittedTone) -> Result<()> {
+    let (width, height, display) = (frame.width as u32, frame.height() as u32, &frame.viewing.display);
+    match frame.covered(fitted) {
+        Some(covered) => {
+            if covered.has_light_in_front() {
+                note(
+                    target,
+                    "light that covers nothing (flames, glows) is kept, and covers what lies behind as far as a PNG's alpha must to hold it",
+                );
+            }
+            let (shown, alpha) = covered.straight();
+            output::write_png_with_alpha_for(target, width, height, &shown, &alpha, display)?;
+        }
+        None => output::write_png_for(target, width, height, &frame.shown(fitted), display)?,
+    }
+    Ok(())
+}
+
+/// In units of white what the display emits, its black with it and the room's light without: value × unit is cd/m².
+fn write_exr(
+    target: &Path,
+    frame: &SceneFrame,
+    fitted: &dyn FittedTone,
+    state: Option<&AdaptationState>,
+) -> Result<()> {
+    let display = &frame.viewing.display;
+    let mut picture = Picture::new(frame.width as u32, frame.height() as u32);
+    picture.part_of = frame.part_of;
+    let emitted = |relative: f32| (display.emitted_cd_m2(f64::from(relative)) / display.white_cd_m2) as f32;
+    let shown = match frame.covered(fitted) {
+        Some(covered) => {
+            // Multiplied by alpha, as the format has it; the display's black is there before whatever lies behind.
+            picture.push_f32("A", covered.alpha().to_vec());
+            covered.premultiplied()
+        }
+        None => frame.shown(fitted),
+    };
+    for (channel, name) in ["R", "G", "B"].into_iter().enumerate() {
+        picture.push_f32(name, shown.iter().map(|pixel| emitted(pixel[channel])).collect::<Vec<_>>());
+    }
+    picture.push_attribute(output::NITS_PER_UNIT, Attribute::Float(display.white_cd_m2 as f32));
+    // Readers take text for UTF-8, the writer has Latin-1: only what both have in common is safe.
+    let operator = fitted.describe().replace('²', "2").replace('×', "x");
+    picture.push_attribute("fechner.operator", Attribute::Text(operator));
+    picture.push_attribute(LIGHT, Attribute::Text(OF_DISPLAY.to_owned()));
+    picture.push_attribute("fechner.observer.display", Attribute::Text(display.name.clone()));
+    picture.push_attribute(output::PIXEL_ASPECT_RATIO, Attribute::Float(frame.pixel_aspect_ratio as f32));
+    picture.attributes.extend(output::display_attribute(&frame.display));
+    picture.attributes.extend(output::tone_attribute(fitted));
+    if let Some(state) = state {
+        let text = serde_json::to_string(state).context("the eye's state could not be put into words")?;
+        picture.push_attribute("fechner.adaptation", Attribute::Text(text));
+    }
+    output::write_exr(target, &picture)?;
+    Ok(())
+}
