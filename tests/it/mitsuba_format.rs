@@ -114,6 +114,30 @@ fn a_checkerboards_first_colour_is_its_first_square() {
     }
 }
 
+/// Where a number is asked for, Mitsuba exchanges them since version 2.
+#[test]
+fn a_checkerboard_of_numbers_begins_with_its_second() {
+    let squares = r#"<texture name="opacity" type="checkerboard"><float name="color0" value="1"/><float name="color1" value="0"/></texture>"#;
+    let shape = format!(r#"<shape type="rectangle"><bsdf type="mask">{squares}<bsdf type="diffuse"/></bsdf></shape>"#);
+    for (version, expected) in [("3.0.0", 0.0), ("0.6.0", 1.0)] {
+        let scene = try_load(folder().path(), version, &format!("{LIGHT}{shape}")).unwrap();
+        assert_eq!(scene.textures[0].sample_rgba(Vec2::splat(0.2)).x, expected, "{version}");
+    }
+}
+
+#[test]
+fn what_lies_beyond_a_picture_is_told_where_it_is_not_rendered() {
+    let of_mode = |mode: &str| {
+        scene(&format!(
+            r#"<shape type="rectangle"><bsdf type="diffuse"><texture name="reflectance" type="bitmap">
+<string name="filename" value="green.png"/><string name="wrap_mode" value="{mode}"/></texture></bsdf></shape>"#
+        ))
+    };
+    for (mode, told) in [("clamp", false), ("zero", true), ("one", true)] {
+        assert_eq!(has_note(&of_mode(mode), "this wrap mode is not rendered"), told, "{mode}");
+    }
+}
+
 #[test]
 fn bsdfs_inside_others_keep_their_order() {
     let dark = r#"<bsdf type="diffuse"><rgb name="reflectance" value="0.1"/></bsdf>"#;

@@ -38,6 +38,17 @@ fn inner_attributes_win_and_wrong_ones_are_refused() {
     assert!(wrong.contains(r#"scene.pbrt:2: Attribute "shapes"; did you mean "shape"?"#), "{wrong}");
 }
 
+/// pbrt knows four colour spaces; of those that are not ours a note tells.
+#[test]
+fn colour_spaces_are_told_and_unknown_ones_refused() {
+    for (name, told) in [("srgb", false), ("rec2020", true), ("dci-p3", true), ("aces2065-1", true)] {
+        let scene = scene("", &format!("ColorSpace \"{name}\" {SQUARE}"));
+        assert_eq!(scene.notes.iter().any(|note| note.contains("are taken for Rec.709")), told, "{name}");
+    }
+    let wrong = try_load(folder().path(), "", &format!("ColorSpace \"foo\" {SQUARE}")).unwrap_err();
+    assert!(wrong.contains("scene.pbrt:2: unknown colour space \"foo\": srgb, rec2020"), "{wrong}");
+}
+
 #[test]
 fn imports_keep_their_state_to_themselves() {
     let folder = folder();

@@ -94,9 +94,9 @@ impl Reader {
         let to_model = if self.since_2 { Mat3::from_rotation_x(-FRAC_PI_2) } else { Mat3::IDENTITY };
         let from_world = to_model * rotation(to_world).transpose();
         let towards_sun = match emitter.vector("sundirection")? {
+            // In the world's space, whatever the emitter's transform (Mitsuba 0.6, `sunsky.cpp`; 3, `sunsky.h`).
             Some(direction) => {
-                let local = direction.try_normalize().ok_or_else(|| emitter.error("a sun's direction of no length"))?;
-                to_model * local
+                from_world * direction.try_normalize().ok_or_else(|| emitter.error("a sun's direction of no length"))?
             }
             None => {
                 self.builder.note(format!(
@@ -237,13 +237,17 @@ mod tests {
     #[test]
     fn a_sky_has_its_sun_where_the_file_says() {
         let direction = Vec3::new(0.5, 0.6, 0.4).normalize();
-        for (version, name) in [("3.0.0", "sun_direction"), ("0.5.0", "sunDirection")] {
+        let dialects = [("3.0.0", "sun_direction", "to_world", Vec3::Z), ("0.5.0", "sunDirection", "toWorld", Vec3::Y)];
+        for ((version, name, transform, up), turn_deg) in dialects.into_iter().flat_map(|d| [(d, 0.0), (d, 30.0)]) {
             let [x, y, z] = direction.to_array();
-            let emitter =
-                format!("<emitter type=\"sunsky\"><vector name=\"{name}\" x=\"{x}\" y=\"{y}\" z=\"{z}\"/></emitter>");
+            let emitter = format!(
+                "<emitter type=\"sunsky\"><transform name=\"{transform}\"><rotate x=\"1\" angle=\"{turn_deg}\"/></transform>\
+                 <vector name=\"{name}\" x=\"{x}\" y=\"{y}\" z=\"{z}\"/></emitter>"
+            );
             let (travels, sky) = sun_of(version, &emitter);
-            assert!(travels.abs_diff_eq(-direction, 1e-5), "{version}: {travels}");
-            let up = if version.starts_with('3') { Vec3::Z } else { Vec3::Y };
+            // The sun is where it is said to be in the world; what the transform turns is the sky around it.
+            assert!(travels.abs_diff_eq(-direction, 1e-5), "{version}, {turn_deg}°: {travels}");
+            let up = Mat3::from_rotation_x(f32::to_radians(turn_deg)) * up;
             let (near, ground) = (sky.radiance(direction), sky.radiance(-up));
             let opposite = 2.0 * up.dot(direction) * up - direction;
             assert!(near.min_element() > 2.0 * sky.radiance(opposite).max_element(), "{version}: {near}");

@@ -10,6 +10,7 @@ use super::transform;
 use crate::scene::texture::srgb_to_linear;
 use crate::scene::{ColorInput, Encoding, ScalarInput, TextureId, TextureLookup, Wrap};
 use glam::{Vec2, Vec3};
+use std::cell::Cell;
 use std::rc::Rc;
 
 /// What a colour stands for.
@@ -233,10 +234,15 @@ impl Reader {
     fn bitmap(&mut self, texture: &Element, meaning: Meaning) -> Result<ColorInput, LoadError> {
         let Some(name) = texture.string("filename")? else { return Err(texture.error("a bitmap needs a filename")) };
         let file = self.file(texture, name)?;
+        let beyond = Cell::new(None);
         let wrap = |name: &str| match texture.string(name)?.map(canonical).as_deref() {
             None | Some("repeat") => Ok(Wrap::Repeat),
             Some("mirror") => Ok(Wrap::Mirror),
-            Some("clamp" | "zero" | "one") => Ok(Wrap::Clamp),
+            Some("clamp") => Ok(Wrap::Clamp),
+            Some(mode @ ("zero" | "one")) => {
+                beyond.set(Some(if mode == "zero" { "black" } else { "white" }));
+                Ok(Wrap::Clamp)
+            }
             Some(other) => Err(texture.error(format_args!("unknown wrap mode \"{other}\""))),
         };
         let both = wrap("wrapmode")?;
@@ -249,13 +255,20 @@ impl Reader {
             } else {
                 Encoding::Srgb
             };
+        let (wrap_u, wrap_v) = (one("wrapmodeu")?, one("wrapmodev")?);
+        if let Some(beyond) = beyond.get() {
+            self.builder.note(format!(
+                "{}: the picture's edge goes on beyond it, where the file says {beyond}: this wrap mode is not rendered.",
+                texture.place()
+            ));
+        }
         let to_number = (meaning == Meaning::Number && !is_grey(&file)).then_some(Number::Luminance);
         let mut lookup = self.mapping(texture)?;
         lookup.texture = self.builder.textures.add(Request {
             picture: Picture::File(file),
             encoding,
-            wrap_u: one("wrapmodeu")?,
-            wrap_v: one("wrapmodev")?,
+            wrap_u,
+            wrap_v,
             nearest: filter.as_deref() == Some("nearest"),
             if_missing: IfMissing::Fail(texture.place()),
             adjust: Adjust { to_number, ..Adjust::NONE },
@@ -270,7 +283,11 @@ impl Reader {
             let color = if meaning == Meaning::Number { Vec3::splat(luminance(color)) } else { color };
             Ok(color.extend(1.0).to_array())
         };
-        let (first, second) = (color("color0", 0.4)?, color("color1", 0.2)?);
+        let (mut first, mut second) = (color("color0", 0.4)?, color("color1", 0.2)?);
+        // Since version 2 the squares are exchanged where a number is asked for (`Checkerboard::eval_1`).
+        if self.since_2 && meaning == Meaning::Number {
+            (first, second) = (second, first);
+        }
         let request =
             Request { nearest: true, ..Request::texels("checkerboard", [2, 2], &[first, second, second, first]) };
         let mut lookup = self.mapping(texture)?;

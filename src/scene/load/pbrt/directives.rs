@@ -134,6 +134,12 @@ impl Reader<'_> {
             }
             "ColorSpace" => {
                 let name = string(lexer, line)?;
+                if !["srgb", "rec2020", "dci-p3", "aces2065-1"].contains(&name.as_str()) {
+                    return Err(LoadError::invalid_at(
+                        lexer.place(line),
+                        format_args!("unknown colour space \"{name}\": srgb, rec2020, dci-p3 and aces2065-1 are"),
+                    ));
+                }
                 if name != "srgb" {
                     self.builder.note(format!("Colours of the space \"{name}\" are taken for Rec.709."));
                 }
