@@ -275,14 +275,14 @@ pub(super) fn doubling_plan(film: &Film, max_samples: u32, doublings: impl Fn(us
     SamplePlan { blocks }
 }
 
-/// The blocks that double a half of a pixel again and again, while it has at most its half of `max_samples`.
+/// The blocks that double a half of a pixel again and again, the last of them up to its half of `max_samples`.
 fn doubled_blocks(pixel: u32, half: Half, mut taken: u32, max_samples: u32) -> impl Iterator<Item = BlockWork> {
     std::iter::from_fn(move || {
         let rest = BlockWork::rest(pixel, half, taken);
         // A pilot may have been a part of the first block.
-        let block = BlockWork { samples: rest.samples.min(taken.max(1)), ..rest };
-        taken += block.samples;
-        (taken <= max_samples / 2).then_some(block)
+        let samples = rest.samples.min(taken.max(1)).min((max_samples / 2).saturating_sub(taken));
+        taken += samples;
+        (samples > 0).then_some(BlockWork { samples, ..rest })
     })
 }
 

@@ -66,13 +66,14 @@ fn push_samples(plan: &mut SamplePlan, film: &Film, pixel: usize, samples: u32) 
     }
 }
 
-/// A step for each pixel that is active and may have it; what is left goes evenly where it is too little for whole ones.
+/// A step for each pixel that is active, or as much of one as it may have; what is left goes evenly where it is too little for whole ones.
 fn step_where(film: &Film, max_samples: u32, left: u64, active: &[bool]) -> SamplePlan {
-    let may_have = |&pixel: &usize| active[pixel] && film.samples(pixel) + STEP <= max_samples;
+    let allowed = |pixel: usize| max_samples.saturating_sub(film.samples(pixel));
+    let may_have = |&pixel: &usize| active[pixel] && allowed(pixel) > 0;
     let pixels: Vec<usize> = (0..active.len()).filter(may_have).collect();
     let step = (left / pixels.len().max(1) as u64).clamp(1, u64::from(STEP)) as u32;
     let mut plan = SamplePlan::default();
-    pixels.into_iter().for_each(|pixel| push_samples(&mut plan, film, pixel, step));
+    pixels.into_iter().for_each(|pixel| push_samples(&mut plan, film, pixel, step.min(allowed(pixel))));
     plan
 }
 

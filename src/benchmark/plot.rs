@@ -43,8 +43,11 @@ impl Scale {
         (least <= greatest).then_some(Self { axis, least, greatest })
     }
 
-    /// 0 at the least and 1 at the greatest.
+    /// 0 at the least and 1 at the greatest; 0 for nothing on a logarithmic axis, which has no place for it.
     fn place(&self, value: f64) -> f64 {
+        if self.axis.is_logarithmic && value <= 0.0 {
+            return 0.0;
+        }
         let by = |v: f64| if self.axis.is_logarithmic { v.ln() } else { v };
         let span = by(self.greatest) - by(self.least);
         if span > 0.0 { ((by(value) - by(self.least)) / span).clamp(0.0, 1.0) } else { 0.5 }
@@ -216,5 +219,9 @@ mod tests {
             assert!(text.contains(&line), "{text}");
         }
         assert_eq!(plots(&[&curve], 1.0).matches("v*</text>").count(), 2);
+        let nothing = CurvePoint { visibility: 0.0, ..point(16.0) };
+        let flat = Curve { scene: "s".into(), arm: "uniform", points: vec![nothing] };
+        let text = plot(&[&flat], SAMPLES, VISIBILITY, Some(4.0)).expect("a plot");
+        assert!(text.contains("cy=\"190.0\""), "nothing lies below v*: {text}");
     }
 }

@@ -65,7 +65,12 @@ fn handfuls_are_not_looked_at_after_each_doubling() {
     assert_eq!(added(1 << 16, 1, f64::INFINITY), 15, "four at most");
     assert_eq!(added(1 << 16, 20, 100.0), 20 * 3, "two: three would be more than a 32nd of the film");
     assert_eq!(added(1 << 16, 64 * 64, 100.0), 64 * 64, "one");
-    assert_eq!(added(40, 1, 100.0), 1, "no pixel may have more");
+    let up_to = |most: u32| doubling_of(&film, most, |pixel| if pixel == 0 { 100.0 } else { 1.0 }).samples();
+    assert_eq!(
+        [16, 17, 18, 40, 41, 48].map(up_to),
+        [0, 0, 2, 24, 24, 32],
+        "no pixel may have more, nor is it left short"
+    );
     assert_eq!(added(1 << 16, 1, f64::NAN) + added(1 << 16, 64 * 64, 1.0), 0, "nothing shows");
 }
 
