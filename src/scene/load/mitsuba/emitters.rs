@@ -237,8 +237,9 @@ mod tests {
     #[test]
     fn a_sky_has_its_sun_where_the_file_says() {
         let direction = Vec3::new(0.5, 0.6, 0.4).normalize();
-        let dialects = [("3.0.0", "sun_direction", "to_world", Vec3::Z), ("0.5.0", "sunDirection", "toWorld", Vec3::Y)];
-        for ((version, name, transform, up), turn_deg) in dialects.into_iter().flat_map(|d| [(d, 0.0), (d, 30.0)]) {
+        let old = ("0.5.0", "sunDirection", "toWorld", Vec3::Y);
+        let new = ("3.0.0", "sun_direction", "to_world", Vec3::Z);
+        for ((version, name, transform, up), turn_deg) in [(old, 0.0), (old, 30.0), (new, 0.0), (new, -30.0)] {
             let [x, y, z] = direction.to_array();
             let emitter = format!(
                 "<emitter type=\"sunsky\"><transform name=\"{transform}\"><rotate x=\"1\" angle=\"{turn_deg}\"/></transform>\
