@@ -1,5 +1,6 @@
 use super::*;
 use crate::output::{Picture, write_exr};
+use ::exr::meta::MetaData;
 use ::exr::prelude::{
     AnyChannel, AnyChannels, Blocks, Compression, Encoding, Image, ImageAttributes, IntegerBounds, Layer,
     LayerAttributes, LineOrder, WritableImage, f16,
