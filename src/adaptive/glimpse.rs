@@ -19,24 +19,44 @@ const LONGEST_SIDE: u32 = 256;
 const SAMPLES: u32 = 1 << 17;
 /// Most samples of one that goes on until it is steady: 2.5 s of a box on two cores.
 const MOST_SAMPLES: u64 = 1 << 20;
+/// Longest side in pixels of a coarse glimpse, and its most samples: with 512 a pixel of a picture of 64×36 eyes in `scenes/theatre-door.toml`
+/// adapt as with 512 a pixel of one of 128×72, to 3 %.
+const COARSE_SIDE: u32 = 64;
+const MOST_COARSE_SAMPLES: u64 = 1 << 21;
 /// Change of light by a doubling of the samples below which it is.
 const STEADY: f32 = 0.01;
 
-/// Looks at all of the picture, whatever part of it the settings ask for: a pure function of scene and settings. Light is what
-/// `operator` asks for; without one, what any may ask for.
-pub fn glimpse(
+/// Looks at all of the picture, whatever part of it the settings ask for, with as many samples as it takes until twice as many change little:
+/// noise spreads light, and with 8 samples `scenes/many-lights.toml` at 128×96 has its white at 140 cd/m², with 32 and 128 at 409 and 391. A pure
+/// function of scene and settings.
+pub fn steady_glimpse(scene: Arc<Scene>, trace: &TraceSettings, nits_per_unit: f64) -> SceneLight {
+    steady_light(&PathTracer::new(scene, small(trace)), nits_per_unit)
+}
+
+/// A steady glimpse of what one operator asks for, until what it makes of it is steady as well, and by what share that changed when the
+/// samples were doubled last.
+pub fn steady_glimpse_for(
+    operator: &dyn ToneOperator,
     scene: Arc<Scene>,
     trace: &TraceSettings,
     nits_per_unit: f64,
-    operator: Option<&dyn ToneOperator>,
-) -> SceneLight {
-    light_seen_by(&PathTracer::new(scene, small(trace)), nits_per_unit, operator)
+    made_of_it: &dyn Fn(&SceneLight) -> Vec<f32>,
+) -> (SceneLight, f32) {
+    let tracer = PathTracer::new(scene, small(trace));
+    steady_light_for(operator, &tracer, nits_per_unit, MOST_SAMPLES, made_of_it)
 }
 
-/// The same with as many samples as it takes until twice as many change little, for a part that is to be shown as it is in the whole: noise
-/// spreads light, and with 8 samples `scenes/many-lights.toml` at 128×96 has its white at 140 cd/m², with 32 and 128 at 409 and 391.
-pub fn steady_glimpse(scene: Arc<Scene>, trace: &TraceSettings, nits_per_unit: f64) -> SceneLight {
-    steady_light(&PathTracer::new(scene, small(trace)), nits_per_unit)
+/// The same with fewer pixels and up to thirty times as many samples in each, for views that are lit by what few samples find: most pixels of
+/// a glimpse have none of it then, and their geometric mean is that of another scene.
+pub fn coarse_glimpse_for(
+    operator: &dyn ToneOperator,
+    scene: Arc<Scene>,
+    trace: &TraceSettings,
+    nits_per_unit: f64,
+    made_of_it: &dyn Fn(&SceneLight) -> Vec<f32>,
+) -> SceneLight {
+    let tracer = PathTracer::new(scene, no_longer_than(COARSE_SIDE, trace));
+    steady_light_for(operator, &tracer, nits_per_unit, MOST_COARSE_SAMPLES, made_of_it).0
 }
 
 /// The same from where a camera is now, by a tracer that is there and works by the same settings again in the end.
@@ -55,17 +75,12 @@ pub fn steady_glimpse_from(
 
 /// Settings of a small picture of the whole.
 fn small(trace: &TraceSettings) -> TraceSettings {
-    let (width, height) = glimpse_size(trace.width, trace.height);
-    TraceSettings { width, height, crop: None, ..*trace }
+    no_longer_than(LONGEST_SIDE, trace)
 }
 
-fn light_seen_by(tracer: &PathTracer, nits_per_unit: f64, operator: Option<&dyn ToneOperator>) -> SceneLight {
-    let film = pilot(tracer);
-    let (width, rgb_cd_m2) = (film.width() as usize, guide_rgb(&film, &film.estimate(nits_per_unit)));
-    match operator {
-        Some(operator) => SceneLight::of(operator, width, &rgb_cd_m2),
-        None => SceneLight::with_rods(width, &rgb_cd_m2),
-    }
+fn no_longer_than(side: u32, trace: &TraceSettings) -> TraceSettings {
+    let (width, height) = glimpse_size(side, trace.width, trace.height);
+    TraceSettings { width, height, crop: None, ..*trace }
 }
 
 /// A film with a glimpse's samples.
@@ -77,26 +92,61 @@ fn pilot(tracer: &PathTracer) -> Film {
 }
 
 fn steady_light(tracer: &PathTracer, nits_per_unit: f64) -> SceneLight {
-    SceneLight::with_rods(tracer.settings().width as usize, &steady_rgb(tracer, nits_per_unit))
+    let steady = Steady::of(tracer, nits_per_unit, MOST_SAMPLES, &|_| Vec::new());
+    SceneLight::with_rods(tracer.settings().width as usize, &steady.rgb_cd_m2)
 }
 
-/// Linear RGB in cd/m² of all pixels, once that hardly changes.
-fn steady_rgb(tracer: &PathTracer, nits_per_unit: f64) -> Vec<[f32; 3]> {
-    let mut film = pilot(tracer);
-    let light_of = |film: &Film| guide_rgb(film, &film.estimate(nits_per_unit));
-    let mut rgb_cd_m2 = light_of(&film);
-    while 2 * film.total_samples() <= MOST_SAMPLES {
-        let pixels = u64::from(film.width()) * u64::from(film.height());
-        let twice = uniform_plan(&film, (2 * film.total_samples() / pixels) as u32);
-        tracer.trace(&twice, &mut film, &|_| {});
-        let before = levels(&rgb_cd_m2);
-        rgb_cd_m2 = light_of(&film);
-        let is_steady = |(before, now): (f32, f32)| (now - before).abs() <= STEADY * now;
-        if before.into_iter().zip(levels(&rgb_cd_m2)).all(is_steady) {
-            break;
+fn steady_light_for(
+    operator: &dyn ToneOperator,
+    tracer: &PathTracer,
+    nits_per_unit: f64,
+    most_samples: u64,
+    made_of_it: &dyn Fn(&SceneLight) -> Vec<f32>,
+) -> (SceneLight, f32) {
+    let light_of = |rgb_cd_m2: &[[f32; 3]]| SceneLight::of(operator, tracer.settings().width as usize, rgb_cd_m2);
+    let steady = Steady::of(tracer, nits_per_unit, most_samples, &|rgb_cd_m2| made_of_it(&light_of(rgb_cd_m2)));
+    (light_of(&steady.rgb_cd_m2), steady.last_change)
+}
+
+/// A picture that hardly changes, unless it has as many samples as it may.
+struct Steady {
+    /// Linear RGB in cd/m² of all pixels.
+    rgb_cd_m2: Vec<[f32; 3]>,
+    /// By what share what is made of it changed last, at the most.
+    last_change: f32,
+}
+
+impl Steady {
+    /// Once its [`levels`] and what else is made of it change little.
+    fn of(
+        tracer: &PathTracer,
+        nits_per_unit: f64,
+        most_samples: u64,
+        made_of_it: &dyn Fn(&[[f32; 3]]) -> Vec<f32>,
+    ) -> Self {
+        let mut film = pilot(tracer);
+        let light_of = |film: &Film| guide_rgb(film, &film.estimate(nits_per_unit));
+        let mut steady = Self { rgb_cd_m2: light_of(&film), last_change: f32::INFINITY };
+        while 2 * film.total_samples() <= most_samples {
+            let pixels = u64::from(film.width()) * u64::from(film.height());
+            let twice = uniform_plan(&film, (2 * film.total_samples() / pixels) as u32);
+            tracer.trace(&twice, &mut film, &|_| {});
+            let now = light_of(&film);
+            steady.last_change = largest_change(&made_of_it(&steady.rgb_cd_m2), &made_of_it(&now));
+            let change = largest_change(&levels(&steady.rgb_cd_m2), &levels(&now)).max(steady.last_change);
+            steady.rgb_cd_m2 = now;
+            if change <= STEADY {
+                break;
+            }
         }
+        steady
     }
-    rgb_cd_m2
+}
+
+/// The largest share by which a value changed; none did where all are 0.
+fn largest_change(before: &[f32], now: &[f32]) -> f32 {
+    let change = |(before, now): (&f32, &f32)| if before == now { 0.0 } else { ((now - before) / now).abs() };
+    before.iter().zip(now).map(change).fold(0.0, f32::max)
 }
 
 /// Luminance that half, a twentieth and a hundredth of the picture exceed: what operators are mostly fitted to.
@@ -113,13 +163,13 @@ fn samples_per_pixel(width: u32, height: u32) -> u32 {
     1 << afforded.clamp(4, 16).ilog2()
 }
 
-fn glimpse_size(width: u32, height: u32) -> (u32, u32) {
+fn glimpse_size(longest_side: u32, width: u32, height: u32) -> (u32, u32) {
     let longest = width.max(height);
     let scaled = |side: u32| {
-        if longest <= LONGEST_SIDE {
+        if longest <= longest_side {
             side
         } else {
-            (u64::from(side) * u64::from(LONGEST_SIDE) / u64::from(longest)).max(1) as u32
+            (u64::from(side) * u64::from(longest_side) / u64::from(longest)).max(1) as u32
         }
     };
     (scaled(width), scaled(height))
@@ -147,7 +197,8 @@ mod tests {
         }
         let of_film = |film: &Film| levels(&guide_rgb(film, &film.estimate(scene.nits_per_unit)))[1];
         let (right, few) = (of_film(&film), of_film(&pilot(&tracer)));
-        let steady = levels(&steady_rgb(&tracer, scene.nits_per_unit))[1];
+        let steady = Steady::of(&tracer, scene.nits_per_unit, MOST_SAMPLES, &|_| Vec::new());
+        let steady = levels(&steady.rgb_cd_m2)[1];
         // Of six seeds with the 64 samples that it ends with white scatters by 2.6 %: three deviations from one with 128.
         assert!((steady / right - 1.0).abs() < 0.1, "{steady} cd/m² at a twentieth, in the whole {right}");
         assert!(few < 0.5 * right, "{few} cd/m² by a pilot: the scene shows nothing");
@@ -155,9 +206,10 @@ mod tests {
 
     #[test]
     fn glimpses_keep_the_shape() {
-        assert_eq!(glimpse_size(1920, 1080), (256, 144));
-        assert_eq!(glimpse_size(32, 18), (32, 18));
-        assert_eq!(glimpse_size(4000, 2), (256, 1));
+        assert_eq!(glimpse_size(LONGEST_SIDE, 1920, 1080), (256, 144));
+        assert_eq!(glimpse_size(COARSE_SIDE, 480, 270), (64, 36));
+        assert_eq!(glimpse_size(LONGEST_SIDE, 32, 18), (32, 18));
+        assert_eq!(glimpse_size(LONGEST_SIDE, 4000, 2), (256, 1));
         assert_eq!([(256, 256), (256, 144), (128, 96), (64, 36)].map(|(w, h)| samples_per_pixel(w, h)), [4, 4, 8, 16]);
     }
 }

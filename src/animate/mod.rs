@@ -3,7 +3,7 @@
 //! A frame is a pure function of the scene, its number and the shot's settings, so frames can be made in any order and on any
 //! machine. What they share is the [`track`]: how light the view is over the shot, by which the tone operator is fitted
 //! once (or, for operators with eyes that adapt, frame by frame), so that exposure does not flicker with the noise. It is
-//! made from pilots of fixed seed, and made again to the same bytes wherever it is missing.
+//! made from small pictures of fixed seed, and made again to the same bytes wherever it is missing.
 //!
 //! A [`budget`] of samples for the whole shot is spread by the track as well.
 //!

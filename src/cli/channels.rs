@@ -1,7 +1,7 @@
 //! Which channels of another program's EXR file hold its colour and its motion.
 
 use anyhow::{Result, bail};
-use fechner::exr_read::layers::{is_called, layers_with, picture_layer};
+use fechner::exr_read::layers::{PictureLayer, colour_layer, is_called, layers_with, picture_layer};
 use fechner::exr_read::{ExrImage, layer_and_part, read_exr_channels};
 use fechner_perception::Plane;
 use std::path::Path;
@@ -36,7 +36,7 @@ pub(super) fn motion_plane(exr: &ExrImage, values: Vec<f32>) -> Result<Plane> {
 pub(super) fn read_picture(path: &Path) -> Result<ExrImage> {
     Ok(read_exr_channels(path, |all| {
         let names: Vec<&str> = all.iter().map(String::as_str).collect();
-        let picture = picture_layer(&names);
+        let picture = layer_of_picture(&names);
         let may_be = |name: &&String| {
             let (layer, part) = layer_and_part(name);
             if picture.as_ref().is_some_and(|picture| picture.name == layer) {
@@ -49,14 +49,23 @@ pub(super) fn read_picture(path: &Path) -> Result<ExrImage> {
     })?)
 }
 
+/// The layer that is shown: a pass only where neither a picture nor luminance is there.
+fn layer_of_picture<'a>(names: &[&'a str]) -> Option<PictureLayer<'a>> {
+    if names.contains(&"Y") { picture_layer(names) } else { colour_layer(names) }
+}
+
 /// What to say of a picture whose layer had to be guessed.
 pub(super) fn guess(exr: &ExrImage) -> Option<String> {
-    picture_layer(&exr.names())?.guess()
+    let names = exr.names();
+    let layer = layer_of_picture(&names)?;
+    let is_pass = picture_layer(&names).is_none();
+    let of_pass = || format!("the layer {} is taken for the picture: no other has R, G and B", layer.name);
+    layer.guess().or_else(|| is_pass.then(of_pass))
 }
 
 /// The picture: `R`, `G` and `B` of one layer, else `Y`.
 pub(super) fn colour<'a>(exr: &'a ExrImage) -> Option<Colour<'a>> {
-    let Some(layer) = picture_layer(&exr.names()) else { return exr.channel("Y").map(Colour::Grey) };
+    let Some(layer) = layer_of_picture(&exr.names()) else { return exr.channel("Y").map(Colour::Grey) };
     let [Some(r), Some(g), Some(b)] = ["R", "G", "B"].map(|part| exr.part(layer.name, part)) else {
         return None;
     };
@@ -65,7 +74,7 @@ pub(super) fn colour<'a>(exr: &'a ExrImage) -> Option<Colour<'a>> {
 
 /// How much of each pixel the picture covers: `A` of its layer.
 pub(super) fn alpha(exr: &ExrImage) -> Option<&[f32]> {
-    let layer = picture_layer(&exr.names()).map_or("", |layer| layer.name);
+    let layer = layer_of_picture(&exr.names()).map_or("", |layer| layer.name);
     exr.part(layer, "A")
 }
 
@@ -185,7 +194,6 @@ mod tests {
         ];
         assert_eq!(rgb_of(&blender), Some([6.0, 5.0, 4.0]));
         assert_eq!(rgb_of(&["albedo.B", "albedo.G", "albedo.R", "main.b", "main.g", "main.r"]), Some([5.0, 4.0, 3.0]));
-        assert_eq!(rgb_of(&["albedo.B", "albedo.G", "albedo.R"]), None);
         // A pass that has a picture's name in its own is still a pass.
         let passes = ["diffuse_color.B", "diffuse_color.G", "diffuse_color.R", "main.B", "main.G", "main.R"];
         assert_eq!(rgb_of(&passes), Some([5.0, 4.0, 3.0]));
@@ -202,6 +210,54 @@ mod tests {
         assert_eq!(guess(&exr(&two)).as_deref(), Some("the layer a is taken for the picture, of a, b"));
         assert_eq!(colour(&exr(&["Y"])), Some(Colour::Grey(&[0.0])));
         assert_eq!(colour(&exr(&["Z"])), None);
+    }
+
+    /// A painted map is called mask, and there is nothing else that could be meant.
+    #[test]
+    fn passes_are_shown_where_nothing_else_is_there() {
+        let mask = ["mask.B", "mask.G", "mask.R"];
+        assert_eq!(rgb_of(&mask), Some([2.0, 1.0, 0.0]));
+        assert_eq!(
+            guess(&exr(&mask)).as_deref(),
+            Some("the layer mask is taken for the picture: no other has R, G and B")
+        );
+        let two = ["albedo.B", "albedo.G", "albedo.R", "mask.A", "mask.B", "mask.G", "mask.R"];
+        assert_eq!((rgb_of(&two), alpha(&exr(&two))), (Some([2.0, 1.0, 0.0]), None));
+        assert_eq!(guess(&exr(&two)).as_deref(), Some("the layer albedo is taken for the picture, of albedo, mask"));
+        let beside_luminance = ["Y", "vector.B", "vector.G", "vector.R"];
+        assert_eq!(colour(&exr(&beside_luminance)), Some(Colour::Grey(&[0.0])));
+        assert_eq!(guess(&exr(&beside_luminance)), None);
+    }
+
+    /// Passes are known by whole words.
+    #[test]
+    fn a_part_of_a_word_is_no_pass() {
+        let beside = |pass: &str, picture: &str| {
+            let names: Vec<String> = [pass, picture]
+                .iter()
+                .flat_map(|layer| ["B", "G", "R"].map(|part| format!("{layer}.{part}")))
+                .collect();
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            assert_eq!((rgb_of(&names), guess(&exr(&names))), (Some([5.0, 4.0, 3.0]), None), "{pass} {picture}");
+        };
+        for pass in [
+            "mask",
+            "cut_mask",
+            "Mask1",
+            "cutMask",
+            "AOVMask",
+            "masks.left",
+            "VRayDiffuseFilter",
+            "CryptoAsset00",
+            "cryptomatte",
+            "motionvector",
+            "MotionVectors",
+            "Denoising Shadowing",
+            "tiefe_é.Normals",
+        ] {
+            beside(pass, "Unmasked");
+        }
+        beside("diffuse", "Emotions");
     }
 
     #[test]

@@ -6,10 +6,25 @@ use std::collections::BTreeSet;
 /// Channels of a colour.
 const RGB: [&str; 3] = ["R", "G", "B"];
 
-/// Layers that hold colour, but not the picture's.
-const NOT_THE_PICTURE: [&str; 14] = [
-    "albedo", "normal", "depth", "position", "variance", "velocity", "vector", "motion", "forward", "backward",
-    "crypto", "shadow", "mask", "diffuse",
+/// Words in the names of layers that hold colour, but not the picture's.
+const NOT_THE_PICTURE: [&str; 17] = [
+    "albedo",
+    "normal",
+    "depth",
+    "position",
+    "variance",
+    "velocity",
+    "vector",
+    "motion",
+    "motionvector",
+    "forward",
+    "backward",
+    "crypto",
+    "cryptomatte",
+    "shadow",
+    "shadowing",
+    "mask",
+    "diffuse",
 ];
 /// What renderers call the finished picture; R, G and B without a layer come first.
 const THE_PICTURE: [&str; 5] = ["combined", "beauty", "rgba", "color", "image"];
@@ -74,7 +89,7 @@ impl ExrImage {
 pub fn picture_layer<'a>(names: &[&'a str]) -> Option<PictureLayer<'a>> {
     let layers = layers_with(names, &RGB);
     let is_auxiliary = |layer: &str| {
-        NOT_THE_PICTURE.iter().any(|name| layer.to_ascii_lowercase().contains(*name))
+        words(layer).iter().any(|word| is_not_the_pictures(word))
             || BLENDER_PASSES.iter().any(|name| is_called(layer, name))
     };
     let (auxiliary, others): (Vec<&str>, Vec<&str>) = layers.into_iter().partition(|layer| is_auxiliary(layer));
@@ -90,7 +105,33 @@ pub fn picture_layer<'a>(names: &[&'a str]) -> Option<PictureLayer<'a>> {
     }
 }
 
-/// The same for a texture, which may be one layer of a file that has auxiliaries alone: the first of them then.
+/// Words of a name, which dots, underscores, spaces, digits and capitals part: `VRayDiffuse_filter2` has `V`, `Ray`, `Diffuse`, `filter`.
+fn words(name: &str) -> Vec<&str> {
+    let bytes = name.as_bytes();
+    let begins = |i: usize| {
+        let is_lower = |at: usize| bytes.get(at).is_some_and(u8::is_ascii_lowercase);
+        i > 0 && bytes[i].is_ascii_uppercase() && (is_lower(i - 1) || is_lower(i + 1))
+    };
+    let mut words = Vec::new();
+    let mut start = 0;
+    for (i, byte) in bytes.iter().enumerate() {
+        let parts = byte.is_ascii() && !byte.is_ascii_alphabetic();
+        if parts || begins(i) {
+            words.push(&name[start..i]);
+            start = if parts { i + 1 } else { i };
+        }
+    }
+    words.push(&name[start..]);
+    words
+}
+
+/// Whether a word, or what it is the plural of, is of layers that are not the picture.
+fn is_not_the_pictures(word: &str) -> bool {
+    let word = word.to_ascii_lowercase();
+    NOT_THE_PICTURE.iter().any(|name| word.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest == "s"))
+}
+
+/// The same for a file that may have auxiliaries alone, as of a texture or of a painted mask: the first of them then.
 #[must_use]
 pub fn colour_layer<'a>(names: &[&'a str]) -> Option<PictureLayer<'a>> {
     picture_layer(names).or_else(|| {

@@ -185,7 +185,7 @@ impl<'a> Shot<'a> {
             track.spread(&self.needs(&track)?, mean_samples);
         }
         self.make_folder()?;
-        say!("looked at {count} frames in {}", duration_in_words(started.elapsed().as_secs_f64()));
+        say!("found the light of {count} frames in {}", duration_in_words(started.elapsed().as_secs_f64()));
         let text = serde_json::to_string(&track).context("the track could not be put into words")?;
         output::write_beside(&file, |file| file.write_all(text.as_bytes()))?;
         Ok(track)

@@ -1,8 +1,9 @@
 //! Pictures with alpha through an operator, each pixel before whatever lies behind it.
 //!
 //! Light that is multiplied by its alpha may be more than what covers the pixel could send: flames, glows and flares add light and cover little or
-//! nothing. What covers a pixel is taken to be no brighter, channel by channel, than what is shown as white or than the brightest pixel that is
-//! covered whole, since the soft edge of a lamp is no flame; the rest is light in front of it, and adds what it adds before black.
+//! nothing. What covers a pixel is taken to be no brighter than what is shown as white or than the brightest pixel nearby that is covered whole,
+//! since the soft edge of a lamp is no flame. Of light beyond that what covers the pixel sends white, channel by channel; the rest is in front
+//! of it, and adds what it adds before black.
 
 use fechner::output::rendered::shown_where_covered;
 use fechner_perception::tone::{FittedTone, Pixel, map_picture};
@@ -13,6 +14,11 @@ const NEARLY_WHITE: f32 = 0.98;
 const HALVINGS: u32 = 23;
 /// Least light, of the display's white, that is a gain.
 const LEAST_GAIN: f32 = 1e-5;
+/// Around the pixel nearest to a soft edge that is covered whole its lamp is looked for so many pixels far: our widest filter, of radius 2, mixes
+/// what is up to 4 apart, so that between a lamp and what stands beside it the nearest may be of either.
+const EDGE_PIXELS: usize = 4;
+/// Above the lamp's light an edge becomes a flame over so many stops: at once, noise and rounding would put specks of white on soft edges.
+const STOPS_FROM_EDGE_TO_FLAME: f32 = 1.0;
 
 /// What is shown of a picture with alpha.
 pub(super) struct Covered<'a> {
@@ -71,19 +77,20 @@ fn beyond(
     straight: &[[f32; 3]],
 ) -> Vec<(usize, [f32; 3])> {
     let width = width.max(1);
-    let opaque = rgb_cd_m2.iter().zip(alpha).filter(|(_, alpha)| **alpha >= 1.0);
-    let brightest_cd_m2 = opaque.map(|(rgb, _)| largest(*rgb)).fold(0.0, f32::max);
+    let brightest_cd_m2 = brightest_whole_nearby(width, rgb_cd_m2, alpha);
     let mut covering_cd_m2 = rgb_cd_m2.to_vec();
     let mut pixels = Vec::new();
     for (i, (rgb, &alpha)) in covering_cd_m2.iter_mut().zip(alpha).enumerate() {
-        let most_cd_m2 = alpha * brightest_cd_m2;
-        if largest(*rgb) <= most_cd_m2 {
+        let lamp_cd_m2 = brightest_cd_m2[i];
+        if largest(*rgb) <= alpha * lamp_cd_m2 {
             continue;
         }
         let pixel = Pixel { x: i % width, y: i / width };
-        let white_cd_m2 = if alpha > 0.0 { white_cd_m2(fitted, pixel, largest(*rgb) / alpha) } else { Some(0.0) };
+        let straight_cd_m2 = largest(*rgb) / alpha;
+        let white_cd_m2 = if alpha > 0.0 { white_cd_m2(fitted, pixel, straight_cd_m2) } else { Some(0.0) };
         let Some(white_cd_m2) = white_cd_m2 else { continue };
-        *rgb = rgb.map(|channel| channel.min(most_cd_m2.max(alpha * white_cd_m2)));
+        let covering_cd_m2 = covering_light(white_cd_m2, lamp_cd_m2, straight_cd_m2);
+        *rgb = rgb.map(|channel| channel.min(alpha * covering_cd_m2));
         pixels.push(i);
     }
     if pixels.is_empty() {
@@ -99,6 +106,64 @@ fn beyond(
         light.iter().zip(straight[*i]).any(|(light, straight)| light - alpha[*i] * straight > LEAST_GAIN)
     };
     pixels.into_iter().map(light).filter(is_gain).collect()
+}
+
+/// Light of what covers a pixel that is brighter than white and than the lamp nearby: white, but the lamp's own where that is hardly darker.
+fn covering_light(white_cd_m2: f32, lamp_cd_m2: f32, straight_cd_m2: f32) -> f32 {
+    if lamp_cd_m2 <= white_cd_m2 {
+        return white_cd_m2;
+    }
+    let as_flame = ((straight_cd_m2 / lamp_cd_m2).log2() / STOPS_FROM_EDGE_TO_FLAME).min(1.0);
+    lamp_cd_m2 * (white_cd_m2 / lamp_cd_m2).powf(as_flame)
+}
+
+/// Of each pixel the largest channel, cd/m², of what is covered whole within [`EDGE_PIXELS`] of the nearest such pixels, all distances as a
+/// king goes: a soft edge ends at its lamp, however wide it is. 0 where nothing is covered whole.
+fn brightest_whole_nearby(width: usize, rgb_cd_m2: &[[f32; 3]], alpha: &[f32]) -> Vec<f32> {
+    const FAR: u32 = u32::MAX;
+    let own = |(rgb, alpha): (&[f32; 3], &f32)| if *alpha >= 1.0 { largest(*rgb) } else { 0.0 };
+    let mut brightest = widened(width, &rgb_cd_m2.iter().zip(alpha).map(own).collect::<Vec<f32>>());
+    let mut distance: Vec<u32> = alpha.iter().map(|alpha| if *alpha >= 1.0 { 0 } else { FAR }).collect();
+    let mut ring: Vec<usize> = (0..alpha.len()).filter(|&i| distance[i] == 0).collect();
+    for next_distance in 1.. {
+        let mut next = Vec::new();
+        for &from in &ring {
+            for to in around(width, alpha.len(), from) {
+                if distance[to] == FAR {
+                    (distance[to], brightest[to]) = (next_distance, brightest[from]);
+                    next.push(to);
+                } else if distance[to] == next_distance {
+                    brightest[to] = brightest[to].max(brightest[from]);
+                }
+            }
+        }
+        if next.is_empty() {
+            break;
+        }
+        ring = next;
+    }
+    brightest
+}
+
+/// The pixels that touch one, and itself.
+fn around(width: usize, pixels: usize, pixel: usize) -> impl Iterator<Item = usize> {
+    let (x, y) = (pixel % width, pixel / width);
+    let (columns, rows) = (x.saturating_sub(1)..(x + 2).min(width), y.saturating_sub(1)..y + 2);
+    rows.flat_map(move |y| columns.clone().map(move |x| y * width + x)).filter(move |&i| i < pixels)
+}
+
+/// The largest value within [`EDGE_PIXELS`] of each pixel, along rows and then along columns.
+fn widened(width: usize, values: &[f32]) -> Vec<f32> {
+    let largest_along = |values: &[f32], step: usize, line: &dyn Fn(usize) -> (usize, usize)| -> Vec<f32> {
+        let largest_around = |i: usize| {
+            let (before, after) = line(i);
+            let near = i - step * before.min(EDGE_PIXELS)..=i + step * after.min(EDGE_PIXELS);
+            near.step_by(step).map(|i| values[i]).fold(0.0, f32::max)
+        };
+        (0..values.len()).map(largest_around).collect()
+    };
+    let rows = largest_along(values, 1, &|i| (i % width, (width - 1 - i % width).min(values.len() - 1 - i)));
+    largest_along(&rows, width, &|i| (i / width, (values.len() - 1 - i) / width))
 }
 
 /// The least grey that is shown as white at a pixel; `None` where `bright_cd_m2` is not.
@@ -183,6 +248,58 @@ mod tests {
                 assert!(raised[i] >= alpha[i] && straight[i].iter().all(|light| *light <= 1.0 + 1e-6), "{name}");
             }
             assert_eq!((raised[0], raised[3], covered.alpha()), (1.0, 0.0, &alpha[..]));
+        }
+    }
+
+    /// A lamp elsewhere is no reason to show a flame darker, nor one beside it that is not as bright: neither is its soft edge.
+    #[test]
+    fn bright_things_leave_flames_alone() {
+        const SIDE: usize = 16;
+        let is_flame = |i: usize| i % SIDE >= SIDE / 2;
+        let alpha: Vec<f32> = (0..SIDE * SIDE).map(|i| if is_flame(i) { 0.05 } else { 1.0 }).collect();
+        let without: Vec<[f32; 3]> =
+            (0..SIDE * SIDE).map(|i| if is_flame(i) { [400.0, 300.0, 200.0] } else { [50.0; 3] }).collect();
+        for name in tone::operator_names() {
+            let fitted = fitted(name);
+            let shown = |rgb: &[[f32; 3]]| Covered::of(fitted.as_ref(), SIDE, rgb, &alpha).premultiplied();
+            let (right, black) = (shown(&without), map_picture(fitted.as_ref(), SIDE, &without));
+            // Far away whatever it is; beside the flame what is a stop darker than light of 8,000 cd/m² behind its alpha.
+            for (lamp, lamp_cd_m2) in [(2 * SIDE + 2, 1e6), (2 * SIDE + 7, 3500.0)] {
+                let mut rgb = without.clone();
+                rgb[lamp] = [lamp_cd_m2; 3];
+                let shown = shown(&rgb);
+                for i in (0..SIDE * SIDE).filter(|&i| is_flame(i)) {
+                    assert_eq!(shown[i], right[i], "{name}: pixel {i}, a lamp of {lamp_cd_m2} cd/m²");
+                    let lost = (0..3).map(|channel| black[i][channel] - shown[i][channel]).fold(0.0, f32::max);
+                    let is_linear = ["absolute", "srgb"].contains(name);
+                    assert!(!is_linear || lost < 2e-3, "{name}: {:?} before black {:?}", shown[i], black[i]);
+                }
+            }
+        }
+    }
+
+    /// However wide: as out of focus, as ours is between two things that are covered whole, and a little brighter than the lamp's whole part.
+    #[test]
+    fn wide_soft_edges_of_lamps_stay_as_they_are() {
+        const WIDTH: usize = 64;
+        let alpha: Vec<f32> = (0..3 * WIDTH).map(|i| ((i % WIDTH) as f32 / 40.0).min(1.0)).collect();
+        let dim = |i: usize| i % WIDTH >= 44;
+        let light = |i: usize| if dim(i) { 20.0 } else { 5000.0 };
+        for name in tone::operator_names() {
+            let fitted = fitted(name);
+            let straight = |brighter: f32| -> Vec<[f32; 3]> {
+                alpha
+                    .iter()
+                    .enumerate()
+                    .map(|(i, &a)| [light(i) * a * if a < 1.0 { brighter } else { 1.0 }; 3])
+                    .collect()
+            };
+            let covered = Covered::of(fitted.as_ref(), WIDTH, &straight(1.0), &alpha);
+            assert!(!covered.has_light_in_front(), "{name}: {:?}", covered.beyond);
+            let noisy = Covered::of(fitted.as_ref(), WIDTH, &straight(1.02), &alpha).premultiplied();
+            for (shown, alpha) in noisy.iter().zip(&alpha) {
+                assert!(shown[0] - alpha < 0.1, "{name}: {shown:?} at an alpha of {alpha}");
+            }
         }
     }
 
