@@ -12,8 +12,8 @@ use std::fmt;
 
 /// Columns: cosines, spaced as those of the isotropic table.
 const COSINES: usize = 32;
-/// Rows: azimuths, equally spaced in |y|/(|x| + |y|).
-const AZIMUTHS: usize = 9;
+/// Rows: azimuths, as [`Azimuths`] places them.
+pub(super) const AZIMUTHS: usize = 13;
 /// Widths along each axis for which a texture's range is tabulated.
 const WIDTHS: usize = 9;
 
@@ -46,11 +46,47 @@ pub(crate) fn place_between(alpha: f32, nodes: usize) -> (usize, usize, f32) {
     (low, low + 1, scaled - low as f32)
 }
 
+/// The azimuths of a table's rows, from x to y: equally spaced in w/(1 + w), where w = |y|√α_y/(|x|√α_x).
+///
+/// That lies between equal steps of azimuth and those after stretching by the widths. What is seen along the narrow axis changes
+/// within an azimuth of α_x/α_y: with steps of the first kind a coat of 0.01 by 1 gave back 1.04 there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Azimuths {
+    /// √α along x and y.
+    roots: [f32; 2],
+}
+
+impl Azimuths {
+    /// For slope widths above 0.
+    pub(super) fn new(alphas: [f32; 2]) -> Self {
+        Self { roots: alphas.map(f32::sqrt) }
+    }
+
+    /// The direction of cosine `mu` in a row.
+    pub(super) fn direction(&self, row: usize, mu: f32) -> Vec3 {
+        let share = row as f32 / (AZIMUTHS - 1) as f32;
+        let (x, y) = ((1.0 - share) / self.roots[0], share / self.roots[1]);
+        let radius = (1.0 - mu * mu).max(0.0).sqrt() / x.hypot(y);
+        Vec3::new(radius * x, radius * y, mu)
+    }
+
+    /// The row before a direction and how far it lies towards the next.
+    pub(super) fn place(&self, w: Vec3) -> (usize, f32) {
+        let (x, y) = (w.x.abs() * self.roots[0], w.y.abs() * self.roots[1]);
+        // Along the normal all rows are one.
+        let share = if x + y > 0.0 { y / (x + y) } else { 0.5 };
+        let scaled = share * (AZIMUTHS - 1) as f32;
+        let row = (scaled as usize).min(AZIMUTHS - 2);
+        (row, scaled - row as f32)
+    }
+}
+
 /// Albedos of one pair of widths.
 #[derive(Clone)]
 struct Cell {
     /// Mean width, by which cosines are spaced.
     alpha: f32,
+    azimuths: Azimuths,
     rows: [[f32; COSINES]; AZIMUTHS],
     average: f32,
 }
@@ -75,7 +111,8 @@ impl AnisotropicTable {
     /// The light that one reflection off facets of such widths loses, if they reflect everything.
     pub fn missing(ranges: [WidthRange; 2], distribution: Distribution) -> Self {
         Self::new(ranges, distribution, |facets, wo| {
-            average_over_visible_normals(facets, wo, |m| 1.0 - super::energy::reflected(facets, wo, m))
+            // Rounding makes less than nothing of it where facets are almost smooth.
+            average_over_visible_normals(facets, wo, |m| 1.0 - super::energy::reflected(facets, wo, m)).max(0.0)
         })
     }
 
@@ -111,16 +148,14 @@ impl AnisotropicTable {
 impl Cell {
     fn new(facets: &Microfacets, albedo: &impl Fn(&Microfacets, Vec3) -> f32) -> Self {
         let alpha = facets.mean_alpha();
+        let azimuths = Azimuths::new(facets.alphas());
         let rows = std::array::from_fn(|row| {
-            let share = row as f32 / (AZIMUTHS - 1) as f32;
-            let (x, y) = ((1.0 - share) / share.hypot(1.0 - share), share / share.hypot(1.0 - share));
             std::array::from_fn(|column| {
                 let mu = cosine_of_column(column as f32 / (COSINES - 1) as f32, alpha);
-                let radius = (1.0 - mu * mu).max(0.0).sqrt();
-                albedo(facets, Vec3::new(radius * x, radius * y, mu))
+                albedo(facets, azimuths.direction(row, mu))
             })
         });
-        let mut cell = Self { alpha, rows, average: 0.0 };
+        let mut cell = Self { alpha, azimuths, rows, average: 0.0 };
         cell.average = cell.integral();
         cell
     }
@@ -143,15 +178,12 @@ impl Cell {
     }
 
     fn at(&self, w: Vec3) -> f32 {
-        let (x, y) = (w.x.abs(), w.y.abs());
-        let share = if x + y > 0.0 { y / (x + y) } else { 0.5 };
-        let row = share * (AZIMUTHS - 1) as f32;
-        let low = (row as usize).min(AZIMUTHS - 2);
+        let (low, towards) = self.azimuths.place(w);
         let column = column_of_cosine(w.z.max(f32::MIN_POSITIVE), self.alpha).clamp(0.0, 1.0) * (COSINES - 1) as f32;
         let left = (column as usize).min(COSINES - 2);
         let along = |row: &[f32; COSINES]| row[left] + (row[left + 1] - row[left]) * (column - left as f32);
         let (below, above) = (along(&self.rows[low]), along(&self.rows[low + 1]));
-        below + (above - below) * (row - low as f32)
+        below + (above - below) * towards
     }
 }
 

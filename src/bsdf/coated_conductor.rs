@@ -63,7 +63,7 @@ impl<'a> CoatedConductor<'a> {
         let coat = tables.coat.coat(coat_facets.rough().as_ref());
         let (eta, k) = (eta / coat.eta, k / coat.eta);
         let rough = seen_through(base, &coat).map(|seen| {
-            let curve = tables.curve(coat_facets.mean_alpha(), base.mean_alpha());
+            let curve = tables.curve(&coat_facets, &base);
             let fresnel = fresnel::conductor_average(eta, k);
             let second = fresnel * fresnel;
             let escape = curve.later_escape;
@@ -79,7 +79,7 @@ impl<'a> CoatedConductor<'a> {
 
     /// Reflectance of what met the metal once, where light comes from `wo`, and of what met it more often.
     fn beneath(&self, rough: &Rough<'_>, wo: Vec3) -> [Vec3; 2] {
-        let layers = rough.curve.at(wo.z);
+        let layers = rough.curve.at(wo);
         let cos = inside(wo, self.coat.eta).z * layers.steeper;
         let single = fresnel::conductor(cos, self.eta, self.k) * (1.0 - layers.second - layers.later);
         [single, rough.second * layers.second + rough.later * layers.later]
@@ -100,7 +100,7 @@ impl<'a> CoatedConductor<'a> {
     fn evaluate_front(&self, rough: &Rough<'_>, shares: &Shares, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
         let eta = self.coat.eta;
         let passed = self.coat.passed(wo) * self.coat.passed(wi);
-        let (from, to) = (rough.curve.at(wo.z), rough.curve.at(wi.z));
+        let (from, to) = (rough.curve.at(wo), rough.curve.at(wi));
         let mut value = rough.multiple_lobes(&from, &to) * (passed * wi.z * FRAC_1_PI);
         let mut pdf = shares.multiple * warp::cosine_hemisphere_pdf(wi.z);
 

@@ -7,21 +7,26 @@
 //! of both directions, until it brings out what the walk does. What it leaves is split as in the walk into light that meets
 //! the metal twice and light that meets it more often.
 //!
+//! That walk knows no azimuth. Where facets are wider along one axis than along the other, walk and scale are means over
+//! azimuths, but what the scaled lobe brings out is tabulated by azimuth, so that what it leaves is right whichever way light
+//! comes.
+//!
 //! Own work; the split of what is missing is Kulla and Conty's.
 
 use super::albedo_table::{direction_at, visible_normals_and_weights};
-use super::anisotropic_table::{WidthRange, place_between};
+use super::anisotropic_table::{AZIMUTHS, Azimuths};
 use super::coat::{Coat, CoatTables};
-use super::layer_walk::{Entering, LeavingByReflections, Metal, Nodes, Underside, follow};
+use super::layer_walk::{Entering, LeavingByReflections, Metal, Nodes, Underside, directions, follow};
+use super::layer_widths::{LayerWidths, WidthNodes};
 use super::microfacets::Microfacets;
 use crate::scene::Distribution;
 use glam::Vec3;
+use rayon::prelude::*;
+use std::f32::consts::FRAC_PI_2;
 use std::fmt;
 
 /// Columns of the table, equally spaced in √μ: steep where light grazes.
 pub(super) const COLUMNS: usize = 32;
-/// Roughnesses at which a texture's range is tabulated.
-const NODES: usize = 12;
 /// Rounds of scaling. Each halves the error, which of what has entered is up to 6 % after the first and 0.5 % after four.
 const ROUNDS: usize = 4;
 /// Averages divide, and are never 0.
@@ -43,7 +48,9 @@ pub(super) struct LayerPoint {
 /// The table of one pair of widths.
 #[derive(Clone)]
 struct Cell {
-    points: [LayerPoint; COLUMNS],
+    /// One where facets are isotropic, else [`AZIMUTHS`] from x to y.
+    rows: Vec<[LayerPoint; COLUMNS]>,
+    azimuths: Azimuths,
     /// Cosine-weighted averages of what enters and leaves after two reflections, or more.
     average_second: f32,
     average_later: f32,
@@ -55,8 +62,8 @@ struct Cell {
 #[derive(Clone)]
 pub struct LayerTables {
     pub(super) coat: CoatTables,
-    coat_nodes: usize,
-    base_nodes: usize,
+    coat_nodes: WidthNodes,
+    base_nodes: WidthNodes,
     /// By the coat's node, then the metal's.
     cells: Vec<Cell>,
 }
@@ -69,43 +76,52 @@ impl fmt::Debug for LayerTables {
 
 impl LayerTables {
     /// Computes the tables for a coat of relative index `eta`, at least 1, the distributions of coat and metal, and the
-    /// mean slope widths that they may take.
-    pub fn new(
-        eta: f32,
-        [coat_distribution, base_distribution]: [Distribution; 2],
-        [coat_range, base_range]: [WidthRange; 2],
-    ) -> Self {
-        let coat = CoatTables::new(eta, coat_distribution);
-        let (coat_alphas, base_alphas) = (coat_range.nodes(NODES), base_range.nodes(NODES));
+    /// slope widths that they may take.
+    pub fn new(eta: f32, distributions: [Distribution; 2], widths: [LayerWidths; 2]) -> Self {
+        let coat = CoatTables::new(eta, distributions[0]);
+        let coat = match widths[0] {
+            LayerWidths::Isotropic(_) => coat,
+            LayerWidths::Anisotropic(ranges) => coat.with_anisotropy(ranges),
+        };
+        let [coat_nodes, base_nodes] = WidthNodes::of_layers(widths);
         let nodes = Nodes::new(eta);
-        let bases = base_alphas.iter().map(|&alpha| Microfacets::isotropic(alpha, base_distribution));
-        let bases: Vec<(Microfacets, Metal)> =
-            bases.map(|facets| (facets, Metal::new(&nodes, facets.rough().as_ref()))).collect();
+        let bases: Vec<(Microfacets, Metal)> = base_nodes
+            .facets(distributions[1])
+            .map(|facets| (facets, Metal::new(&nodes, facets.rough().as_ref())))
+            .collect();
         let mut cells = Vec::new();
-        for &coat_alpha in &coat_alphas {
-            let over = coat.coat(Microfacets::isotropic(coat_alpha, coat_distribution).rough().as_ref());
-            let coat = CoatOver::new(over, &nodes);
-            cells.extend(bases.iter().map(|(base, metal)| coat.cell(*base, metal)));
+        for facets in coat_nodes.facets(distributions[0]) {
+            let over = CoatOver::new(coat.coat(facets.rough().as_ref()), &nodes);
+            let cell = |(base, metal): &(Microfacets, Metal)| over.cell(*base, metal);
+            cells.par_extend(bases.par_iter().map(cell));
         }
-        Self { coat, coat_nodes: coat_alphas.len(), base_nodes: base_alphas.len(), cells }
+        Self { coat, coat_nodes, base_nodes, cells }
     }
 
-    /// The tables at such mean slope widths.
-    pub(super) fn curve(&self, coat_alpha: f32, base_alpha: f32) -> LayerCurve<'_> {
-        let (coat_low, coat_high, c) = place_between(coat_alpha, self.coat_nodes);
-        let (base_low, base_high, b) = place_between(base_alpha, self.base_nodes);
-        let at = |coat: usize, base: usize| &self.cells[coat * self.base_nodes + base];
-        let cells =
-            [at(coat_low, base_low), at(coat_low, base_high), at(coat_high, base_low), at(coat_high, base_high)];
-        let weights = [(1.0 - c) * (1.0 - b), (1.0 - c) * b, c * (1.0 - b), c * b];
-        let sum = |value: fn(&Cell) -> f32| (0..4).map(|i| weights[i] * value(cells[i])).sum::<f32>();
-        LayerCurve {
-            cells,
-            weights,
-            average_second: sum(|cell| cell.average_second).max(SMALLEST_AVERAGE),
-            average_later: sum(|cell| cell.average_later).max(SMALLEST_AVERAGE),
-            later_escape: sum(|cell| cell.later_escape),
+    /// The tables for such facets of coat and metal.
+    pub(super) fn curve(&self, coat: &Microfacets, base: &Microfacets) -> LayerCurve<'_> {
+        let mut curve = LayerCurve {
+            cells: [&self.cells[0]; MOST_CELLS],
+            weights: [0.0; MOST_CELLS],
+            average_second: 0.0,
+            average_later: 0.0,
+            later_escape: 0.0,
+        };
+        let bases = self.base_nodes.place(base);
+        let mut count = 0;
+        for (coat_node, coat_weight) in self.coat_nodes.place(coat) {
+            for (base_node, base_weight) in bases {
+                let weight = coat_weight * base_weight;
+                if weight > 0.0 && count < MOST_CELLS {
+                    let cell = &self.cells[coat_node * self.base_nodes.count() + base_node];
+                    curve.add(count, cell, weight);
+                    count += 1;
+                }
+            }
         }
+        curve.average_second = curve.average_second.max(SMALLEST_AVERAGE);
+        curve.average_later = curve.average_later.max(SMALLEST_AVERAGE);
+        curve
     }
 }
 
@@ -119,7 +135,8 @@ pub(super) fn cosine(column: usize) -> f32 {
 /// The direction inside the coat that is refracted to or from `w` outside.
 pub(super) fn inside(w: Vec3, eta: f32) -> Vec3 {
     let (x, y) = (w.x / eta, w.y / eta);
-    Vec3::new(x, y, (1.0 - x * x - y * y).max(0.0).sqrt())
+    // Never flatter than outside, which rounding would have it be where the coat's index is 1.
+    Vec3::new(x, y, (1.0 - x * x - y * y).max(0.0).sqrt().max(w.z))
 }
 
 /// The direction outside that is refracted to or from `w` inside, `None` under total internal reflection.
@@ -166,8 +183,7 @@ struct CoatOver<'a> {
 impl<'a> CoatOver<'a> {
     fn new(coat: Coat<'a>, nodes: &Nodes) -> Self {
         let facets = coat.facets.as_ref();
-        let entering: [Entering; COLUMNS] =
-            std::array::from_fn(|column| nodes.entering(facets, direction_at(cosine(column))));
+        let entering: [Entering; COLUMNS] = std::array::from_fn(|column| nodes.entering(facets, cosine(column)));
         let column_weights = column_weights(&coat);
         let mut entering_evenly = Entering::default();
         for (column, weight) in entering.iter().zip(column_weights) {
@@ -179,11 +195,13 @@ impl<'a> CoatOver<'a> {
 
     fn cell(&self, base: Microfacets, metal: &Metal) -> Cell {
         let leaving = follow(metal, &self.underside);
-        let mut points = self.scaled_lobe(seen_through(base, &self.coat).as_ref(), &leaving);
+        let seen = seen_through(base, &self.coat);
+        let mut points = self.scaled_lobe(seen.as_ref(), &leaving);
+        if let Some(seen) = seen.filter(|seen| !self.is_isotropic(seen)) {
+            return self.by_azimuth(&seen, &points, &leaving);
+        }
         for (point, entering) in points.iter_mut().zip(&self.entering) {
-            let kept = point.second + point.later;
-            point.second = kept * leaving.second_share(entering);
-            point.later = kept - point.second;
+            point.split(leaving.second_share(entering));
         }
         let average = |value: fn(&LayerPoint) -> f32| {
             points.iter().zip(self.column_weights).map(|(point, weight)| weight * value(point)).sum()
@@ -192,8 +210,38 @@ impl<'a> CoatOver<'a> {
             average_second: average(|point| point.second),
             average_later: average(|point| point.later),
             later_escape: leaving.later_escape(&self.entering_evenly),
-            points,
+            rows: vec![points],
+            azimuths: Azimuths::new([1.0; 2]),
         }
+    }
+
+    /// Whether all azimuths are alike.
+    fn is_isotropic(&self, seen: &Microfacets) -> bool {
+        seen.is_isotropic() && self.coat.facets.is_none_or(|facets| facets.is_isotropic())
+    }
+
+    /// The table of anisotropic facets, whose lobe is scaled as `points` say.
+    fn by_azimuth(&self, seen: &Microfacets, points: &[LayerPoint; COLUMNS], leaving: &LeavingByReflections) -> Cell {
+        let azimuths = Azimuths::new(seen.alphas());
+        let row = |row: usize| {
+            let mut along = *points;
+            for (column, point) in along.iter_mut().enumerate() {
+                let lobe = reflected_once(seen, &self.coat, azimuths.direction(row, cosine(column)), 1.0);
+                let gone: f32 = leaving_by_lobe(&lobe.collect::<Vec<_>>(), points, point.brought_out);
+                point.later = (1.0 - gone).clamp(0.0, 1.0);
+                point.split(leaving.second_share(&self.entering[column]));
+            }
+            along
+        };
+        let mut cell = Cell {
+            rows: (0..AZIMUTHS).map(row).collect(),
+            azimuths,
+            average_second: 0.0,
+            average_later: 0.0,
+            later_escape: leaving.later_escape(&self.entering_evenly),
+        };
+        [cell.average_second, cell.average_later] = cell.averages(&self.coat);
+        cell
     }
 
     /// Scales the lobe of one reflection until it brings out what the walk does. All that it leaves is put into `later`.
@@ -210,7 +258,12 @@ impl<'a> CoatOver<'a> {
             }
             return points;
         };
-        let lobe: [Vec<Reflected>; COLUMNS] = std::array::from_fn(|column| self.reflected_once(seen, cosine(column)));
+        let is_isotropic = self.is_isotropic(seen);
+        let lobe: [Vec<Reflected>; COLUMNS] = std::array::from_fn(|column| {
+            directions(cosine(column), is_isotropic)
+                .flat_map(|(share, wo)| reflected_once(seen, &self.coat, wo, share))
+                .collect()
+        });
         for _ in 0..ROUNDS {
             let last = points;
             for (column, point) in points.iter_mut().enumerate() {
@@ -225,18 +278,67 @@ impl<'a> CoatOver<'a> {
         }
         points
     }
+}
 
-    /// Where the lobe of one reflection off a lossless metal brings light that has entered at cosine `mu`.
-    fn reflected_once(&self, seen: &Microfacets, mu: f32) -> Vec<Reflected> {
-        let view = inside(direction_at(mu), self.coat.eta);
-        let reflected = |(weight, m): (f32, Vec3)| {
-            let light = 2.0 * view.dot(m) * m - view;
-            let wi = outside(light, self.coat.eta).filter(|_| light.z > 0.0)?;
-            let share = weight * seen.unshadowed(view, light) * self.coat.passed(wi);
-            let (column, fraction) = place(wi.z);
-            Some(Reflected { share, column, fraction })
-        };
-        visible_normals_and_weights(seen, view).filter_map(reflected).collect()
+/// Where the lobe of one reflection off a lossless metal brings so much light that has entered from `wo`.
+fn reflected_once<'a>(
+    seen: &'a Microfacets,
+    coat: &'a Coat<'_>,
+    wo: Vec3,
+    entered: f32,
+) -> impl Iterator<Item = Reflected> + 'a {
+    let view = inside(wo, coat.eta);
+    let reflected = move |(weight, m): (f32, Vec3)| {
+        let light = 2.0 * view.dot(m) * m - view;
+        let wi = outside(light, coat.eta).filter(|_| light.z > 0.0)?;
+        let share = entered * weight * seen.unshadowed(view, light) * coat.passed(wi);
+        let (column, fraction) = place(wi.z);
+        Some(Reflected { share, column, fraction })
+    };
+    visible_normals_and_weights(seen, view).filter_map(reflected)
+}
+
+impl Cell {
+    /// The rows beside a direction outside and how much each counts.
+    fn rows_beside(&self, w: Vec3) -> [(usize, f32); 2] {
+        if self.rows.len() == 1 {
+            return [(0, 1.0), (0, 0.0)];
+        }
+        let (row, fraction) = self.azimuths.place(w);
+        [(row, 1.0 - fraction), (row + 1, fraction)]
+    }
+
+    /// Adds what is tabulated for a direction outside that lies so far between two columns.
+    fn add_to(&self, sum: &mut LayerPoint, w: Vec3, (column, fraction): (usize, f32), weight: f32) {
+        for (row, share) in self.rows_beside(w) {
+            if share > 0.0 {
+                sum.add(&self.rows[row][column], weight * share * (1.0 - fraction));
+                sum.add(&self.rows[row][column + 1], weight * share * fraction);
+            }
+        }
+    }
+
+    /// 1/π times the integrals over the hemisphere of what enters and leaves after two reflections, or more, weighted by the
+    /// cosine; by the midpoint rule in √μ and in azimuth.
+    fn averages(&self, coat: &Coat<'_>) -> [f32; 2] {
+        const AZIMUTH_STEPS: usize = 48;
+        const COSINE_STEPS: usize = 128;
+        let mut sums = [0.0f64; 2];
+        for azimuth in 0..AZIMUTH_STEPS {
+            let (sin, cos) = (FRAC_PI_2 * (azimuth as f32 + 0.5) / AZIMUTH_STEPS as f32).sin_cos();
+            for step in 0..COSINE_STEPS {
+                let root = (step as f32 + 0.5) / COSINE_STEPS as f32;
+                let mu = root * root;
+                let radius = (1.0 - mu * mu).max(0.0).sqrt();
+                let w = Vec3::new(radius * cos, radius * sin, mu);
+                let weight = f64::from(4.0 * root * mu * coat.passed(w));
+                let mut point = LayerPoint::default();
+                self.add_to(&mut point, w, place(mu), 1.0);
+                sums[0] += weight * f64::from(point.second);
+                sums[1] += weight * f64::from(point.later);
+            }
+        }
+        sums.map(|sum| (sum / (AZIMUTH_STEPS * COSINE_STEPS) as f64) as f32)
     }
 }
 
@@ -260,11 +362,13 @@ fn leaving_by_lobe(lobe: &[Reflected], points: &[LayerPoint; COLUMNS], brought_o
 /// See [`CoatOver::column_weights`]; by the midpoint rule in √μ.
 fn column_weights(coat: &Coat<'_>) -> [f32; COLUMNS] {
     const STEPS: usize = 512;
+    let is_isotropic = coat.facets.is_none_or(|facets| facets.is_isotropic());
     let mut weights = [0.0; COLUMNS];
     for step in 0..STEPS {
         let root = (step as f32 + 0.5) / STEPS as f32;
         let mu = root * root;
-        let weight = 4.0 * root * mu * coat.passed(direction_at(mu)) / STEPS as f32;
+        let passed: f32 = directions(mu, is_isotropic).map(|(share, w)| share * coat.passed(w)).sum();
+        let weight = 4.0 * root * mu * passed / STEPS as f32;
         let (column, fraction) = place(mu);
         weights[column] += weight * (1.0 - fraction);
         weights[column + 1] += weight * fraction;
@@ -272,11 +376,14 @@ fn column_weights(coat: &Coat<'_>) -> [f32; COLUMNS] {
     weights
 }
 
-/// The table at one pair of widths: up to four cells and their weights.
+/// Cells between which widths may lie: two for each width that a texture gives, of which [`WidthNodes`] has three at most.
+const MOST_CELLS: usize = 8;
+
+/// The table at the widths of coat and metal: the cells beside them and their weights.
 #[derive(Clone, Copy)]
 pub(super) struct LayerCurve<'a> {
-    cells: [&'a Cell; 4],
-    weights: [f32; 4],
+    cells: [&'a Cell; MOST_CELLS],
+    weights: [f32; MOST_CELLS],
     /// Cosine-weighted averages of what enters and leaves after two reflections, or more; above 0.
     pub(super) average_second: f32,
     pub(super) average_later: f32,
@@ -290,22 +397,38 @@ impl fmt::Debug for LayerCurve<'_> {
     }
 }
 
-impl LayerCurve<'_> {
-    /// The table at a cosine outside.
-    pub(super) fn at(&self, mu: f32) -> LayerPoint {
-        let (column, fraction) = place(mu);
+impl<'a> LayerCurve<'a> {
+    fn add(&mut self, index: usize, cell: &'a Cell, weight: f32) {
+        self.cells[index] = cell;
+        self.weights[index] = weight;
+        self.average_second += weight * cell.average_second;
+        self.average_later += weight * cell.average_later;
+        self.later_escape += weight * cell.later_escape;
+    }
+
+    /// The table for a direction outside, of the upper half.
+    pub(super) fn at(&self, w: Vec3) -> LayerPoint {
+        let column = place(w.z);
         let mut sum = LayerPoint::default();
         for (cell, weight) in self.cells.iter().zip(self.weights) {
-            if weight > 0.0 {
-                sum.add(&cell.points[column], weight * (1.0 - fraction));
-                sum.add(&cell.points[column + 1], weight * fraction);
+            // Those after the last have none.
+            if weight == 0.0 {
+                break;
             }
+            cell.add_to(&mut sum, w, column, weight);
         }
         sum
     }
 }
 
 impl LayerPoint {
+    /// Splits what the lobe of one reflection leaves, which is all in `later` so far.
+    fn split(&mut self, second_share: f32) {
+        let kept = self.second + self.later;
+        self.second = kept * second_share;
+        self.later = kept - self.second;
+    }
+
     fn add(&mut self, other: &Self, weight: f32) {
         self.second += weight * other.second;
         self.later += weight * other.later;

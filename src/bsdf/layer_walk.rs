@@ -1,7 +1,8 @@
 //! Light that goes to and fro between a coat and the metal beneath, by cosine alone.
 //!
-//! Facets are isotropic here, so that where light goes depends on the cosine at which it comes: what a layer does to light
-//! is a matrix over a few cosines, and a function of the cosine (such as the share that leaves) is straight between them.
+//! Where light goes depends on the cosine at which it comes: what a layer does to light is a matrix over a few cosines, and a
+//! function of the cosine (such as the share that leaves) is straight between them. Anisotropic facets do what they do on the
+//! average over azimuths: that light between the layers favours some of these is left out.
 //! Own work, in the manner of adding layers; the light between the facets of one layer is spread as by Kulla & Conty (2017).
 
 use super::albedo_table::{direction_at, visible_normals_and_weights};
@@ -11,6 +12,7 @@ use super::fresnel;
 use super::layer_tables::{COLUMNS, cosine, inside, outside};
 use super::microfacets::Microfacets;
 use glam::Vec3;
+use std::f32::consts::FRAC_PI_2;
 
 /// Nodes beyond the critical angle, equally spaced in the cosine.
 const TRAPPED: usize = 16;
@@ -20,6 +22,30 @@ const CROSSINGS: usize = TRAPPED + COLUMNS;
 /// Reflections off the metal that are followed. What has entered and is left then is 0.6 % at widths of 0.03 over 0, and less
 /// where layers are rougher; between smooth ones it never leaves.
 const REFLECTIONS: usize = 64;
+
+/// Azimuths of a quadrant over which what anisotropic facets do is averaged.
+const AZIMUTHS: usize = 8;
+
+/// Directions of cosine `mu` and how much each counts: one where all azimuths are alike, else the middles of equal parts of a
+/// quadrant.
+pub(super) fn directions(mu: f32, is_isotropic: bool) -> impl Iterator<Item = (f32, Vec3)> {
+    let count = if is_isotropic { 1 } else { AZIMUTHS };
+    let along_x = direction_at(mu);
+    (0..count).map(move |index| {
+        if is_isotropic {
+            return (1.0, along_x);
+        }
+        let (sin, cos) = (FRAC_PI_2 * (index as f32 + 0.5) / AZIMUTHS as f32).sin_cos();
+        (1.0 / AZIMUTHS as f32, Vec3::new(along_x.x * cos, along_x.x * sin, along_x.z))
+    })
+}
+
+/// Directions of cosine `mu`, facet normals visible from there, and weights before both, whose sum is 1.
+fn seen_facets(facets: &Microfacets, mu: f32) -> impl Iterator<Item = (f32, Vec3, Vec3)> {
+    directions(mu, facets.is_isotropic()).flat_map(move |(share, w)| {
+        visible_normals_and_weights(facets, w).map(move |(weight, m)| (share * weight, w, m))
+    })
+}
 
 /// A function of the cosine inside at the nodes, or a measure: what of a function counts at each node.
 #[derive(Clone, Copy, Debug)]
@@ -101,10 +127,6 @@ impl Nodes {
         diffuse
     }
 
-    fn direction(&self, node: usize) -> Vec3 {
-        direction_at(self.cosines.0[node])
-    }
-
     /// Adds the value at a cosine, `weight` times, to a measure.
     fn spread(&self, measure: &mut Row, mu: f32, weight: f32) {
         let scaled = match outside(direction_at(mu), self.eta) {
@@ -117,13 +139,13 @@ impl Nodes {
         measure.0[node + 1] += weight * fraction;
     }
 
-    /// Directions of light that comes from `wo` outside and has been refracted into the coat.
-    pub(super) fn entering(&self, facets: Option<&Microfacets>, wo: Vec3) -> Entering {
+    /// Directions of light that comes at cosine `mu` outside and has been refracted into the coat.
+    pub(super) fn entering(&self, facets: Option<&Microfacets>, mu: f32) -> Entering {
         let mut measure = Row::default();
         match facets {
-            None => self.spread(&mut measure, inside(wo, self.eta).z, 1.0),
+            None => self.spread(&mut measure, inside(direction_at(mu), self.eta).z, 1.0),
             Some(facets) => {
-                for (weight, m) in visible_normals_and_weights(facets, wo) {
+                for (weight, wo, m) in seen_facets(facets, mu) {
                     let cos = wo.dot(m);
                     let boundary = fresnel::dielectric(cos, self.eta);
                     let cosine = wo.z / self.eta - m.z * (cos / self.eta - boundary.cos_transmitted);
@@ -179,12 +201,12 @@ impl Metal {
 
 /// Where light at a node goes that a layer's facets reflect once, by `reflectance` of the cosine to the facet.
 fn mirrored(nodes: &Nodes, facets: Option<&Microfacets>, node: usize, reflectance: impl Fn(f32) -> f32) -> Row {
-    let w = nodes.direction(node);
+    let mu = nodes.cosines.0[node];
     let mut row = Row::default();
     match facets {
-        None => row.0[node] = reflectance(w.z),
+        None => row.0[node] = reflectance(mu),
         Some(facets) => {
-            for (weight, m) in visible_normals_and_weights(facets, w) {
+            for (weight, w, m) in seen_facets(facets, mu) {
                 let cos = w.dot(m);
                 let turned = 2.0 * cos * m.z - w.z;
                 nodes.spread(&mut row, turned.max(0.0), weight * reflectance(cos) * reflected(facets, w, m));
@@ -212,13 +234,13 @@ impl Underside {
         let reflectance = |cos: f32| fresnel::dielectric(cos, out).reflectance;
         let mut rows: Vec<Row> = (0..CROSSINGS).map(|node| mirrored(nodes, facets, node, reflectance)).collect();
         let single = Row(std::array::from_fn(|node| {
-            let w = nodes.direction(node);
-            let Some(facets) = facets else { return 1.0 - reflectance(w.z) };
-            let through = |(weight, m): (f32, Vec3)| {
+            let mu = nodes.cosines.0[node];
+            let Some(facets) = facets else { return 1.0 - reflectance(mu) };
+            let through = |(weight, w, m): (f32, Vec3, Vec3)| {
                 let boundary = fresnel::dielectric(w.dot(m), out);
                 weight * (1.0 - boundary.reflectance) * transmitted(facets, w, m, out, boundary.cos_transmitted)
             };
-            visible_normals_and_weights(facets, w).map(through).sum()
+            seen_facets(facets, mu).map(through).sum()
         }));
         let lost = Row(std::array::from_fn(|node| (1.0 - single.0[node] - rows[node].total()).max(0.0)));
         let lost_evenly = nodes.diffuse.dot(&lost);

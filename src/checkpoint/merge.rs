@@ -2,7 +2,7 @@
 
 use super::file::read_header;
 use super::{Checkpoint, CheckpointError, Header, Seeds, read_checkpoint};
-use crate::adaptive::settings::DEFAULT_MAX_SAMPLES;
+use crate::adaptive::settings::{DEFAULT_MAX_SAMPLES, Limits};
 use crate::adaptive::state::RenderState;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -89,9 +89,18 @@ fn add(
     sum.state.seconds_allocation += next.state.seconds_allocation;
     sum.state.seconds_denoising += next.state.seconds_denoising;
     sum.header.settings.importance = sum.header.settings.importance.or(header.settings.importance);
-    sum.header.visibility = sum.header.visibility.min(next.header.visibility);
+    sum.header.visibility = stricter(sum.header.visibility, next.header.visibility);
     sum.header.seeds.all.extend(next.header.seeds.all);
     Ok(())
+}
+
+/// The lower of two aims as [`Header::visibility`] states them, 0 being none.
+fn stricter(one: f64, other: f64) -> f64 {
+    match [one, other].map(Limits::visibility_of_last_rung) {
+        [Some(one), Some(other)] => one.min(other),
+        [Some(only), None] | [None, Some(only)] => only,
+        [None, None] => 0.0,
+    }
 }
 
 /// The film of a state and what it took, without what was decided about it.

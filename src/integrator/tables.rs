@@ -1,6 +1,6 @@
 //! Tables that materials need, computed once before tracing and shared where parameters are equal.
 
-use crate::bsdf::{AnisotropicTable, CoatTables, DielectricTables, LayerTables, WidthRange};
+use crate::bsdf::{AnisotropicTable, CoatTables, DielectricTables, LayerTables, LayerWidths, WidthRange};
 use crate::scene::{Distribution, Material, Roughness, RoughnessScale, ScalarInput, Surface};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -71,8 +71,8 @@ impl Maker {
             Surface::CoatedDiffuse { ior, roughness, .. } => SurfaceTables::Coat(self.coat(*ior, roughness)),
             Surface::CoatedConductor { coat_ior, roughness, coat_roughness, .. } => {
                 let distributions = [coat_roughness.distribution, roughness.distribution];
-                let ranges = [mean_width(coat_roughness), mean_width(roughness)];
-                SurfaceTables::Layers(Arc::new(LayerTables::new(*coat_ior, distributions, ranges)))
+                let widths = [layer_widths(coat_roughness), layer_widths(roughness)];
+                SurfaceTables::Layers(Arc::new(LayerTables::new(*coat_ior, distributions, widths)))
             }
             Surface::Mix { first, second, .. } => {
                 SurfaceTables::Mix(Box::new([self.tables_of(first), self.tables_of(second)]))
@@ -104,19 +104,24 @@ impl Maker {
 
 /// The slope widths that an anisotropic roughness may take along each axis.
 fn widths(roughness: &Roughness) -> Option<[WidthRange; 2]> {
-    let range = |input: &ScalarInput| match input.texture {
-        None => WidthRange::Constant(slope_width(roughness.scale, input.factor)),
-        Some(_) => WidthRange::Textured,
-    };
-    roughness.v.as_ref().map(|v| [range(&roughness.u), range(v)])
+    roughness.v.as_ref().map(|v| [width(roughness, &roughness.u), width(roughness, v)])
 }
 
-/// The geometric mean of both slope widths that a roughness may take.
-fn mean_width(roughness: &Roughness) -> WidthRange {
-    let constant = |input: &ScalarInput| input.texture.is_none().then(|| slope_width(roughness.scale, input.factor));
-    match (constant(&roughness.u), constant(roughness.v.as_ref().unwrap_or(&roughness.u))) {
-        (Some(u), Some(v)) => WidthRange::Constant((u * v).sqrt()),
-        _ => WidthRange::Textured,
+fn width(roughness: &Roughness, input: &ScalarInput) -> WidthRange {
+    match input.texture {
+        None => WidthRange::Constant(slope_width(roughness.scale, input.factor)),
+        Some(_) => WidthRange::Textured,
+    }
+}
+
+/// The slope widths that a layer of such roughness may take.
+fn layer_widths(roughness: &Roughness) -> LayerWidths {
+    match widths(roughness) {
+        None => LayerWidths::Isotropic(width(roughness, &roughness.u)),
+        Some([WidthRange::Constant(u), WidthRange::Constant(v)]) if u == v => {
+            LayerWidths::Isotropic(WidthRange::Constant(u))
+        }
+        Some(ranges) => LayerWidths::Anisotropic(ranges),
     }
 }
 

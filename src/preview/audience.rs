@@ -66,8 +66,7 @@ impl<'a> Audience<'a> {
         let of_server = Arc::clone(&shared);
         let server =
             std::thread::Builder::new().name("viewers".to_owned()).spawn(move || serve(listener, door, of_server))?;
-        let camera = Held::at_home(&scene.camera).to_toml();
-        let blank = blank_status(scene, settings, &record.operator, camera);
+        let blank = blank_status(scene, settings, &record.operator, &Held::at_home(&scene.camera));
         let status = Status { phase: Phase::Rendering, exposure: record.exposure_stops, is_driven: false, ..blank };
         let moving =
             Moving { screen: Screen::new(Vec::new()), pace: Pace::new(), progress: None, status, refused: None };

@@ -189,8 +189,8 @@ impl Held {
         self.camera.focus_distance = if focus > 1e-3 * self.pivot_distance { focus } else { self.pivot_distance };
     }
 
-    /// The camera as a scene file has it.
-    pub(super) fn to_toml(&self) -> String {
+    /// The camera as a scene file has it, with a shutter that stays open for so many seconds.
+    pub(super) fn to_toml(&self, shutter_s: f64) -> String {
         let camera = &self.camera;
         let numbers = |v: Vec3| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
         let mut text = format!(
@@ -213,6 +213,9 @@ impl Held {
         if camera.aperture_radius > 0.0 {
             let _ = writeln!(text, "aperture_radius = {:?}", camera.aperture_radius);
             let _ = writeln!(text, "focus_distance = {:?}", camera.focus_distance);
+        }
+        if shutter_s > 0.0 {
+            let _ = writeln!(text, "shutter_s = {shutter_s:?}");
         }
         text
     }
@@ -260,7 +263,14 @@ mod tests {
         let (a, b) = (plain.camera.position, mirrored.camera.position);
         // The picture's middle column is the plane x = 0 at first.
         assert!(b.distance(Vec3::new(-a.x, a.y, a.z)) < 1e-5, "{a} {b}");
-        assert!(mirrored.to_toml().contains("\nmirrored = true\n") && !plain.to_toml().contains("mirrored"));
+        assert!(mirrored.to_toml(0.0).contains("\nmirrored = true\n") && !plain.to_toml(0.0).contains("mirrored"));
+    }
+
+    /// What moves in the scene blurs before a camera that was copied as it did before the one that it was copied from.
+    #[test]
+    fn the_shutter_is_written_down_where_it_is_open() {
+        assert!(held().to_toml(0.0208).ends_with("\nshutter_s = 0.0208\n"));
+        assert!(!held().to_toml(0.0).contains("shutter"));
     }
 
     /// Zooms and dollies without end stay at heights that can be rendered, and come back.

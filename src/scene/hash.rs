@@ -61,7 +61,8 @@ impl ContentHash {
     }
 }
 
-/// Hashes a scene, less what no sample depends on: its name and notes, and what it asks for when the command line does not.
+/// Hashes a scene, less what no sample depends on: its name and notes, the seconds of a shutter that motions hold already,
+/// and what it asks for when the command line does not.
 ///
 /// Large arrays are hashed as bytes, and all else as its `Debug` text, which is exact for floats and holds every field:
 /// one that is added to a type is covered without a word here. Takes a copy of the scene's arrays while it runs.
@@ -69,6 +70,7 @@ pub fn content_hash(scene: &Scene) -> ContentHash {
     let mut rest = scene.clone();
     rest.name.clear();
     rest.notes.clear();
+    rest.shutter_s = 0.0;
     rest.film = FilmDefaults { width: 0, height: 0 };
     rest.viewing = ViewingDefaults::default();
 

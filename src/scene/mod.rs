@@ -53,6 +53,8 @@ pub struct Scene {
     pub nits_per_unit: f64,
     /// The camera.
     pub camera: Camera,
+    /// Seconds for which its shutter stays open, of which motions hold what they do; for who writes the camera down.
+    pub shutter_s: f64,
     /// Picture size when the command line names none.
     pub film: FilmDefaults,
     /// Display, quality and operator when the command line names none.
@@ -85,6 +87,7 @@ impl Default for Scene {
             name: String::new(),
             nits_per_unit: 1.0,
             camera: Camera::pinhole(Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 40.0),
+            shutter_s: 0.0,
             film: FilmDefaults { width: 1, height: 1 },
             viewing: ViewingDefaults::default(),
             meshes: Vec::new(),

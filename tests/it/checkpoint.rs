@@ -296,6 +296,24 @@ fn films_of_different_seeds_add_up() {
     assert!(message.contains("seed 2") && message.contains("sum.film") && message.contains("2.film"), "{message}");
 }
 
+/// The strictest aim stays, and a film that aimed at none takes none away: 0, by which it says so, was taken for the strictest.
+#[test]
+fn merged_films_aim_at_what_the_strictest_aimed_at() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let film = |seed: u64, visibility: f64| {
+        let setup = Setup::new(seed);
+        let header = Header { visibility, ..setup.header.clone() };
+        let path = folder.path().join(format!("{seed}.film"));
+        write_checkpoint(&path, &header, &uniform_film(&setup, 2)).expect("written");
+        path
+    };
+    let films = [film(1, 4.0), film(2, 0.0), film(3, 2.0), film(4, 0.0)];
+    for (merged, aim) in [([0, 1], 4.0), ([1, 2], 2.0), ([0, 2], 2.0), ([1, 3], 0.0)] {
+        let sum = merge_files(&merged.map(|i| films[i].clone())).expect("they fit");
+        assert_eq!(sum.header.visibility, aim, "films {merged:?}");
+    }
+}
+
 /// A merged film goes on by a new seed, and by none that it has.
 #[test]
 fn a_merged_film_goes_on_by_another_seed() {

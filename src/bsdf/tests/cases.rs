@@ -2,8 +2,8 @@
 
 use super::sphere::Peak;
 use crate::bsdf::{
-    AnisotropicTable, Bsdf, CoatTables, Conductor, DielectricTables, HeTorrance, LayerTables, MetalRoughness,
-    MetalRoughnessParameters, Microfacets, Phong, Varnish, Varnished, Ward, WidthRange,
+    AnisotropicTable, Bsdf, CoatTables, Conductor, DielectricTables, HeTorrance, LayerTables, LayerWidths,
+    MetalRoughness, MetalRoughnessParameters, Microfacets, Phong, Varnish, Varnished, Ward, WidthRange,
 };
 use crate::scene::Distribution;
 use glam::Vec3;
@@ -82,7 +82,7 @@ pub(super) static BECKMANN_GLASS: LazyLock<DielectricTables> =
 pub(super) static COAT: LazyLock<CoatTables> = LazyLock::new(|| CoatTables::new(1.5, Distribution::Ggx));
 /// Layers of any roughness, as with textures.
 pub(super) static LAYERS: LazyLock<LayerTables> =
-    LazyLock::new(|| LayerTables::new(1.5, [Distribution::Ggx; 2], [WidthRange::Textured; 2]));
+    LazyLock::new(|| LayerTables::new(1.5, [Distribution::Ggx; 2], [LayerWidths::Isotropic(WidthRange::Textured); 2]));
 
 /// Facets twice as wide along one axis as the mean, half as wide along the other.
 fn brushed(distribution: Distribution, roughness: f32) -> Microfacets {
@@ -136,6 +136,46 @@ fn facet_cases(cases: &mut Vec<Case>) {
         let brushed_glass = DielectricTables::new(1.5, Ggx).with_anisotropy(widths);
         glass("brushed", brushed(Ggx, roughness), Box::leak(Box::new(brushed_glass)), 0.5 * width);
     }
+}
+
+/// Coats over metals of which at least one is brushed, by slope widths along x and y.
+fn brushed_layer_cases(cases: &mut Vec<Case>) {
+    let lossless = (Vec3::splat(1.0), Vec3::splat(1e5));
+    let facets = |[x, y]: [f32; 2]| Microfacets::new(x, y, Distribution::Ggx);
+    let mut add = |name: String, ior, coat: [f32; 2], base: [f32; 2], widths, budget| {
+        let tables = Box::leak(Box::new(LayerTables::new(ior, [Distribution::Ggx; 2], widths)));
+        // The coat's facets widen the metal's to 0.17 of their own.
+        let seen = f64::from((0.17 * coat[0]).hypot(base[0]).min((0.17 * coat[1]).hypot(base[1])));
+        let of_coat = coat[0].min(coat[1]);
+        let width = if of_coat > 0.0 { seen.min(f64::from(of_coat)) } else { seen };
+        let bsdf = |(eta, k)| Bsdf::coated_conductor(eta, k, facets(base), facets(coat), tables);
+        cases.push(Case::new(format!("coated lossless {name}"), bsdf(lossless), budget, width));
+        cases.push(Case::new(format!("coated gold {name}"), bsdf((GOLD_ETA, GOLD_K)), Budget::AtMost, width));
+    };
+    let constant = |[x, y]: [f32; 2]| LayerWidths::Anisotropic([x, y].map(WidthRange::Constant));
+    for (ior, coat, base) in [
+        (1.5, [0.0; 2], [0.04, 0.64]),
+        (1.5, [0.0; 2], [0.64, 0.04]),
+        (1.5, [0.0; 2], [0.05, 0.2]),
+        (1.0, [0.0; 2], [0.04, 0.64]),
+        (1.5, [0.04, 0.64], [0.0; 2]),
+        (1.5, [0.04, 0.64], [0.64, 0.04]),
+        (1.5, [0.04, 0.64], [0.2, 0.2]),
+        (1.5, [0.04, 0.16], [0.04, 0.16]),
+    ] {
+        let name = format!("brushed metal, index {ior}, {coat:?} over {base:?}");
+        add(name, ior, coat, base, [coat, base].map(constant), Budget::Lossless);
+    }
+    let extreme = [[0.01, 1.0]; 2];
+    let widths = extreme.map(constant);
+    add("metal brushed to the utmost".to_owned(), 1.5, extreme[0], extreme[1], widths, Budget::NearlyLossless);
+    let (coat, base) = ([0.0; 2], [0.05, 0.3]);
+    let widths =
+        [LayerWidths::Isotropic(WidthRange::Constant(0.0)), LayerWidths::Anisotropic([WidthRange::Textured; 2])];
+    add("textured brushed metal".to_owned(), 1.5, coat, base, widths, Budget::NearlyLossless);
+    let widths = [WidthRange::Textured; 2];
+    let widths = [LayerWidths::Isotropic(WidthRange::Textured), LayerWidths::Anisotropic(widths)];
+    add("textured brushed metal under a textured coat".to_owned(), 1.5, [0.1; 2], base, widths, Budget::NearlyLossless);
 }
 
 /// Coats over other models, and mixes.
@@ -343,6 +383,7 @@ fn all_smooth_cases() -> Vec<Case> {
     }
     facet_cases(&mut cases);
     layered_cases(&mut cases);
+    brushed_layer_cases(&mut cases);
     gltf_cases(&mut cases);
     empirical_cases(&mut cases);
     cases

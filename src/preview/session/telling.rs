@@ -5,6 +5,7 @@ use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::state::{RenderState, pilot_samples};
 use crate::adaptive::{Progress, StopReason, visible_share};
 use crate::preview::command::{Phase, Status};
+use crate::preview::orbit::Held;
 use crate::preview::shared::Shared;
 use crate::scene::Scene;
 use fechner_perception::display::Display;
@@ -37,7 +38,7 @@ impl Session<'_> {
             error: self.problems.told(),
             note: self.note.clone(),
             is_foveated: self.gaze.is_some(),
-            ..blank_status(&self.job.scene, &self.settings, operator, self.held.to_toml())
+            ..blank_status(&self.job.scene, &self.settings, operator, &self.held)
         };
         count(&mut status, state, self.screen.total_samples, self.progress.as_ref());
         // What was seen at rest is later than what the loop saw.
@@ -50,12 +51,7 @@ impl Session<'_> {
 }
 
 /// Of a render that has not begun.
-pub(in crate::preview) fn blank_status(
-    scene: &Scene,
-    settings: &LoopSettings,
-    operator: &str,
-    camera: String,
-) -> Status {
+pub(in crate::preview) fn blank_status(scene: &Scene, settings: &LoopSettings, operator: &str, held: &Held) -> Status {
     Status {
         kind: "status",
         scene: scene.name.clone(),
@@ -79,7 +75,7 @@ pub(in crate::preview) fn blank_status(
         displays: displays_with(&settings.viewing.display.name),
         distance: 1.0,
         pixels_per_degree: settings.viewing.display.pixels_per_degree,
-        camera,
+        camera: held.to_toml(if scene.moves() { scene.shutter_s } else { 0.0 }),
         error: None,
         note: None,
         is_foveated: false,
@@ -148,7 +144,8 @@ mod tests {
     fn the_first_look_says_when_it_comes() {
         let viewing = Viewing::of(Display::preset("desktop").expect("a preset"));
         let settings = LoopSettings::new(viewing, 100.0, operator("constant", None).expect("an operator"));
-        let mut status = blank_status(&Scene::default(), &settings, "constant", String::new());
+        let mut status =
+            blank_status(&Scene::default(), &settings, "constant", &Held::at_home(&Scene::default().camera));
         (status.width, status.height) = (10, 10);
         let mut state = RenderState::new(10, 10, &settings.limits);
         state.seconds_total = 2.0;

@@ -163,6 +163,7 @@ impl Builder {
             name: self.name,
             nits_per_unit: self.nits_per_unit,
             camera,
+            shutter_s: self.shutter_s,
             film: self.film,
             viewing: self.viewing,
             meshes: self.meshes,
@@ -183,7 +184,7 @@ impl Builder {
             let aimed_by = start.and_then(|mut start| start.choose_camera(path, options).ok());
             add_studio(&mut scene, aimed_by.map(|camera| camera.forward));
         }
-        note_long_shutter(&mut scene, self.shutter_s, options);
+        note_long_shutter(&mut scene, options);
         Ok(scene)
     }
 
@@ -237,7 +238,8 @@ impl Builder {
 }
 
 /// Names a shutter that blurs what moves into the frames after it, as pbrt's does for a second where its file says nothing.
-fn note_long_shutter(scene: &mut Scene, shutter_s: f64, options: &LoadOptions) {
+fn note_long_shutter(scene: &mut Scene, options: &LoadOptions) {
+    let shutter_s = scene.shutter_s;
     let is_longer = |frame_s: &f64| shutter_s > 1.001 * frame_s;
     if let Some(frame_s) = options.frame_s.filter(is_longer).filter(|_| scene.moves()) {
         let frames = shutter_s / frame_s;

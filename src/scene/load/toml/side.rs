@@ -66,6 +66,9 @@ pub(in crate::scene::load) fn apply(path: &Path, options: &LoadOptions, scene: &
         {
             let stays_open = value.entries()?.get_or("shutter_s", 0.0, Value::non_negative)?;
             scene.camera = camera::read(&value, Shutter { opens: options.frame_time, stays_open })?;
+            if stays_open > 0.0 {
+                scene.shutter_s = stays_open;
+            }
         }
         if let Some(value) = root.get("environment") {
             let surroundings = surroundings::read(&value, folder, scene.nits_per_unit, &mut scene.notes)?;
