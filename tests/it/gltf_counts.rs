@@ -165,6 +165,21 @@ fn a_texture_of_an_extension_alone_is_named_as_such() {
     assert!(scene.notes.iter().any(|note| note == expected), "{:?}", scene.notes);
 }
 
+/// Files written by hand forget to say what their materials use: a specular-glossiness material was white without a word.
+#[test]
+fn extensions_of_materials_are_named_though_the_file_declares_none() {
+    for declared in [json!([]), json!(["KHR_materials_dispersion"])] {
+        let mut file = File::new();
+        file.document["materials"] = json!([{"extensions": {"KHR_materials_dispersion": {"dispersion": 1}}}]);
+        file.document["meshes"][0]["primitives"][0]["material"] = json!(0);
+        file.document["extensionsUsed"] = declared;
+        let scene = file.load().unwrap();
+        let named =
+            scene.notes.iter().filter(|note| note.contains("KHR_materials_dispersion is not supported")).count();
+        assert_eq!(named, 1, "{:?}", scene.notes);
+    }
+}
+
 /// Only the first of them was named.
 #[test]
 fn every_hidden_node_is_named_where_nothing_is_left() {

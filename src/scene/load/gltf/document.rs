@@ -6,6 +6,7 @@ use ::gltf::json::Root;
 use ::gltf::json::validation::{Checked, Validate};
 use ::gltf::mesh::Semantic;
 use serde_json::Value;
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Some editors put it before JSON.
@@ -46,8 +47,12 @@ pub(super) fn parse(path: &Path, json: &[u8], builder: &mut Builder) -> Result<:
             format_args!("needs the extension {refused}, which is not read{advice}"),
         ));
     }
-    for name in root.extensions_used.iter().filter(|name| !KNOWN.contains(&name.as_str())) {
-        let instead = match name.as_str() {
+    // Those of materials are named whether the file declares them or not.
+    let of_materials = root.materials.iter().filter_map(|material| material.extensions.as_ref());
+    let of_materials = of_materials.flat_map(|extensions| extensions.others.keys());
+    let used: BTreeSet<&str> = root.extensions_used.iter().chain(of_materials).map(String::as_str).collect();
+    for name in used.into_iter().filter(|name| !KNOWN.contains(name)) {
+        let instead = match name {
             "KHR_materials_variants" => "the default variant is rendered",
             _ => "it is left out",
         };

@@ -239,7 +239,7 @@ mod tests {
         let direction = Vec3::new(0.5, 0.6, 0.4).normalize();
         let old = ("0.5.0", "sunDirection", "toWorld", Vec3::Y);
         let new = ("3.0.0", "sun_direction", "to_world", Vec3::Z);
-        for ((version, name, transform, up), turn_deg) in [(old, 0.0), (old, 30.0), (new, 0.0), (new, -30.0)] {
+        for ((version, name, transform, up), turn_deg) in [(old, 0.0), (old, -15.0), (new, 0.0), (new, -15.0)] {
             let [x, y, z] = direction.to_array();
             let emitter = format!(
                 "<emitter type=\"sunsky\"><transform name=\"{transform}\"><rotate x=\"1\" angle=\"{turn_deg}\"/></transform>\
