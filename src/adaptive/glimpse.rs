@@ -127,17 +127,18 @@ impl Steady {
         let mut film = pilot(tracer);
         let light_of = |film: &Film| guide_rgb(film, &film.estimate(nits_per_unit));
         let mut steady = Self { rgb_cd_m2: light_of(&film), last_change: f32::INFINITY };
+        let mut before = (levels(&steady.rgb_cd_m2), made_of_it(&steady.rgb_cd_m2));
         while 2 * film.total_samples() <= most_samples {
             let pixels = u64::from(film.width()) * u64::from(film.height());
             let twice = uniform_plan(&film, (2 * film.total_samples() / pixels) as u32);
             tracer.trace(&twice, &mut film, &|_| {});
-            let now = light_of(&film);
-            steady.last_change = largest_change(&made_of_it(&steady.rgb_cd_m2), &made_of_it(&now));
-            let change = largest_change(&levels(&steady.rgb_cd_m2), &levels(&now)).max(steady.last_change);
-            steady.rgb_cd_m2 = now;
-            if change <= STEADY {
+            steady.rgb_cd_m2 = light_of(&film);
+            let now = (levels(&steady.rgb_cd_m2), made_of_it(&steady.rgb_cd_m2));
+            steady.last_change = largest_change(&before.1, &now.1);
+            if largest_change(&before.0, &now.0).max(steady.last_change) <= STEADY {
                 break;
             }
+            before = now;
         }
         steady
     }

@@ -272,6 +272,16 @@ mod tests {
         assert_eq!(rival_stop(RivalRule::Budget, &film, 1.0, 511), StopReason::Samples, "less than a sample a pixel");
     }
 
+    /// The last step goes as far as a pixel may.
+    #[test]
+    fn a_step_beyond_the_most_samples_is_cut() {
+        let film = film(0.3);
+        for (most, added) in [(16, 0), (17, 1), (23, 7), (32, 16), (1 << 16, 16)] {
+            let plan = rival_plan(RivalRule::Relative { threshold: 1e-9 }, &film, 1.0, u64::MAX, most);
+            assert_eq!(plan.samples(), added * 512, "16 samples a pixel, {most} at the most");
+        }
+    }
+
     /// What a budget leaves is less than a step: all active pixels have some of it, and it is not exceeded.
     #[test]
     fn a_step_beyond_the_budget_is_cut() {

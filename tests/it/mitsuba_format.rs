@@ -134,7 +134,7 @@ fn what_lies_beyond_a_picture_is_told_where_it_is_not_rendered() {
         ))
     };
     for (mode, told) in [("clamp", false), ("zero", true), ("one", true)] {
-        assert_eq!(has_note(&of_mode(mode), "this wrap mode is not rendered"), told, "{mode}");
+        assert_eq!(has_note(&of_mode(mode), "wrap modes zero and one are not rendered"), told, "{mode}");
     }
 }
 

@@ -10,7 +10,6 @@ use super::transform;
 use crate::scene::texture::srgb_to_linear;
 use crate::scene::{ColorInput, Encoding, ScalarInput, TextureId, TextureLookup, Wrap};
 use glam::{Vec2, Vec3};
-use std::cell::Cell;
 use std::rc::Rc;
 
 /// What a colour stands for.
@@ -234,19 +233,19 @@ impl Reader {
     fn bitmap(&mut self, texture: &Element, meaning: Meaning) -> Result<ColorInput, LoadError> {
         let Some(name) = texture.string("filename")? else { return Err(texture.error("a bitmap needs a filename")) };
         let file = self.file(texture, name)?;
-        let beyond = Cell::new(None);
-        let wrap = |name: &str| match texture.string(name)?.map(canonical).as_deref() {
+        let mut is_bounded = false;
+        let mut wrap = |name: &str| match texture.string(name)?.map(canonical).as_deref() {
             None | Some("repeat") => Ok(Wrap::Repeat),
             Some("mirror") => Ok(Wrap::Mirror),
             Some("clamp") => Ok(Wrap::Clamp),
-            Some(mode @ ("zero" | "one")) => {
-                beyond.set(Some(if mode == "zero" { "black" } else { "white" }));
+            Some("zero" | "one") => {
+                is_bounded = true;
                 Ok(Wrap::Clamp)
             }
             Some(other) => Err(texture.error(format_args!("unknown wrap mode \"{other}\""))),
         };
         let both = wrap("wrapmode")?;
-        let one = |name: &str| if texture.child(name).is_some() { wrap(name) } else { Ok(both) };
+        let mut one = |name: &str| if texture.child(name).is_some() { wrap(name) } else { Ok(both) };
         let raw = texture.boolean_or("raw", false)? || texture.float("gamma")?.is_some_and(|gamma| gamma == 1.0);
         let filter = texture.string("filtertype")?.map(canonical);
         let encoding =
@@ -256,9 +255,9 @@ impl Reader {
                 Encoding::Srgb
             };
         let (wrap_u, wrap_v) = (one("wrapmodeu")?, one("wrapmodev")?);
-        if let Some(beyond) = beyond.get() {
+        if is_bounded {
             self.builder.note(format!(
-                "{}: the picture's edge goes on beyond it, where the file says {beyond}: this wrap mode is not rendered.",
+                "{}: wrap modes zero and one are not rendered: the picture's edge goes on beyond it.",
                 texture.place()
             ));
         }
