@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use fechner_perception::allocation::{AllocationProblem, FINE_GAP, allocate};
 use fechner_perception::guide::{GuideInputs, denoise};
-use fechner_perception::{CastleCsf, Plane, ThresholdInputs, Viewing, threshold_map};
+use fechner_perception::{CastleCsf, GuideNoise, Plane, ThresholdInputs, Viewing, threshold_map};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex32;
 
@@ -45,7 +45,7 @@ fn memory(figure: &str) -> Option<f64> {
 fn report_memory() {
     let (width, height) = (1920, 1080);
     let picture = Plane::from_fn(width, height, |x, y| 50.0 + ((x * 31 + y * 17) % 13) as f32);
-    let inputs = ThresholdInputs { display_luminance_cd_m2: &picture, guide_variance: None };
+    let inputs = ThresholdInputs::clean(&picture);
     let before = memory("VmRSS");
     std::hint::black_box(threshold_map(&inputs, &Viewing::default(), &CastleCsf::default()).is_ok());
     match (before, memory("VmHWM")) {
@@ -97,7 +97,7 @@ fn main() {
         let cost = Plane::filled(width, height, 1.0);
         let viewing = Viewing::default();
         let csf = CastleCsf::default();
-        let inputs = ThresholdInputs { display_luminance_cd_m2: &picture, guide_variance: None };
+        let inputs = ThresholdInputs::clean(&picture);
         let map = threshold_map(&inputs, &viewing, &csf).expect("a good picture");
         let unit = fastest(7, fourier_transform(width, height));
         let report = |what: &str, seconds: f64| {
@@ -109,7 +109,7 @@ fn main() {
             );
         };
         report("threshold map", fastest(5, || drop(threshold_map(&inputs, &viewing, &csf))));
-        let noisy = ThresholdInputs { guide_variance: Some(&variance), ..inputs };
+        let noisy = ThresholdInputs { guide_noise: GuideNoise::BeforeDenoising(&variance), ..inputs };
         report("threshold map of a guide", fastest(5, || drop(threshold_map(&noisy, &viewing, &csf))));
         report("predicted visibility", fastest(5, || drop(map.predicted_visibility(&variance))));
         report("measured visibility", fastest(3, || drop(map.measured_visibility(&variance))));

@@ -3,12 +3,12 @@
 //!
 //! A wall with three parts (flat; texture in the albedo, which the guide's filter is told of; texture in the light, which it is
 //! not), log-normal noise whose standard deviation for one sample is the pixel's own luminance, and 4 to 1024 samples. Printed are
-//! the median over each part of m from the denoised guide, its variance before denoising taken out (what a render uses); from the
-//! noisy mean, its variance taken out; and from the noisy mean as if it were clean.
+//! the median over each part of m from the denoised guide, given its variance before denoising (what a render uses), with all of that
+//! taken out, and as if it were clean; and from the noisy mean, its variance taken out, and as if it were clean.
 
 use fechner_perception::guide::{GuideInputs, denoise};
 use fechner_perception::photometry::luminance;
-use fechner_perception::{CastleCsf, Plane, ThresholdInputs, Viewing, threshold_map};
+use fechner_perception::{CastleCsf, GuideNoise, Plane, ThresholdInputs, Viewing, threshold_map};
 
 const WIDTH: usize = 480;
 const HEIGHT: usize = 240;
@@ -36,7 +36,7 @@ fn light(x: usize, y: usize) -> f32 {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let truth = Plane::from_fn(WIDTH, HEIGHT, |x, y| albedo(x, y) * light(x, y));
-    let reference = elevation(&truth, None)?;
+    let reference = elevation(&truth, GuideNoise::Clean)?;
     println!("median elevation without noise: {}", medians(&reference).map(|m| format!("{m:.3}")).join(", "));
     println!("m / m(reference), samples: {}", PARTS.join(", "));
     for samples in [4, 16, 64, 256, 1024] {
@@ -47,15 +47,21 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let ratio = Plane::from_fn(WIDTH, HEIGHT, |x, y| map.get(x, y) / reference.get(x, y));
             medians(&ratio).map(|m| format!("{m:.3}")).join(", ")
         };
-        println!("{samples:5}  guide, variance known    {}", ratios(&elevation(&guide, Some(&variance))?));
-        println!("       noisy, variance known    {}", ratios(&elevation(&noisy, Some(&variance))?));
-        println!("       noisy, taken as clean    {}", ratios(&elevation(&noisy, None)?));
+        for (what, picture, noise) in [
+            ("guide, variance before", &guide, GuideNoise::BeforeDenoising(&variance)),
+            ("guide, all taken out", &guide, GuideNoise::White(&variance)),
+            ("guide, taken as clean", &guide, GuideNoise::Clean),
+            ("noisy, variance known", &noisy, GuideNoise::White(&variance)),
+            ("noisy, taken as clean", &noisy, GuideNoise::Clean),
+        ] {
+            println!("{samples:5}  {what:22}  {}", ratios(&elevation(picture, noise)?));
+        }
     }
     Ok(())
 }
 
-fn elevation(picture: &Plane, guide_variance: Option<&Plane>) -> Result<Plane, fechner_perception::Error> {
-    let inputs = ThresholdInputs { display_luminance_cd_m2: picture, guide_variance };
+fn elevation(picture: &Plane, guide_noise: GuideNoise<&Plane>) -> Result<Plane, fechner_perception::Error> {
+    let inputs = ThresholdInputs { display_luminance_cd_m2: picture, guide_noise };
     Ok(threshold_map(&inputs, &Viewing::default(), &CastleCsf::default())?.masking_elevation())
 }
 

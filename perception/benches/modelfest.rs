@@ -35,7 +35,7 @@ fn run(folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
     let stimuli = stimuli::all(folder)?;
     let display = Display { pixels_per_degree: PIXELS_PER_DEGREE, ..Display::default() };
     let grey = Plane::filled(SIDE, SIDE, BACKGROUND_CD_M2);
-    let inputs = ThresholdInputs { display_luminance_cd_m2: &grey, guide_variance: None };
+    let inputs = ThresholdInputs::clean(&grey);
     let map = threshold_map(&inputs, &Viewing::of(display), &CastleCsf::default())?;
     let mut decibels = Vec::new();
     for (index, (stimulus, log_sensitivity)) in stimuli.iter().zip(&thresholds).enumerate() {

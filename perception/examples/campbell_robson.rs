@@ -40,7 +40,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let grey = Plane::filled(wave.width(), HEIGHT, GREY_CD_M2 as f32);
     let csf = CastleCsf::default();
     // On plain grey: the chart is the signal here and must not mask itself.
-    let inputs = ThresholdInputs { display_luminance_cd_m2: &grey, guide_variance: None };
+    let inputs = ThresholdInputs::clean(&grey);
     let visibility = threshold_map(&inputs, &viewing, &csf)?.measured_visibility(&wave);
     let row_of_threshold = |x: usize| {
         let threshold = 1.0 / csf.sensitivity(freq_cpd(x as f64), GREY_CD_M2);

@@ -73,7 +73,7 @@ pub struct Allocation {
 /// use fechner_perception::{CastleCsf, Plane, ThresholdInputs, Viewing, threshold_map};
 /// use fechner_perception::allocation::{AllocationProblem, FINE_GAP, allocate};
 /// let grey = Plane::filled(64, 64, 50.0);
-/// let inputs = ThresholdInputs { display_luminance_cd_m2: &grey, guide_variance: None };
+/// let inputs = ThresholdInputs::clean(&grey);
 /// let thresholds = threshold_map(&inputs, &Viewing::default(), &CastleCsf::default())?;
 /// let allocation = allocate(&AllocationProblem {
 ///     variance_per_sample: &Plane::from_fn(64, 64, |x, _| if x < 32 { 400.0 } else { 25.0 }),

@@ -49,11 +49,7 @@ pub fn colour_thresholds(
         chromatic_threshold_map(signal, &luminance, viewing, &CastleChromatic::new(channel, area_deg2)?)
     };
     Ok(ColourThresholds {
-        achromatic: threshold_map(
-            &ThresholdInputs { display_luminance_cd_m2: &luminance, guide_variance: None },
-            viewing,
-            &CastleCsf::new(area_deg2)?,
-        )?,
+        achromatic: threshold_map(&ThresholdInputs::clean(&luminance), viewing, &CastleCsf::new(area_deg2)?)?,
         red_green: chromatic(&picture.red_green, ChromaticChannel::RedGreen)?,
         yellow_violet: chromatic(&picture.yellow_violet, ChromaticChannel::YellowViolet)?,
     })

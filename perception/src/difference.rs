@@ -81,9 +81,7 @@ pub fn difference(
     reference_cd_m2.check_non_negative("reference picture")?;
     test_cd_m2.check_non_negative("test picture")?;
     let csf = HeldAtLowFrequencies { base: csf };
-    let map_of = |picture| {
-        threshold_map(&ThresholdInputs { display_luminance_cd_m2: picture, guide_variance: None }, viewing, &csf)
-    };
+    let map_of = |picture| threshold_map(&ThresholdInputs::clean(picture), viewing, &csf);
     let seen = mutual_visibility(map_of(reference_cd_m2)?, &map_of(test_cd_m2)?, reference_cd_m2, test_cd_m2);
     Ok(Difference::of(seen))
 }

@@ -211,7 +211,7 @@ mod tests {
         let viewing =
             Viewing { display: Display { pixels_per_degree: 20.0, ..Display::default() }, ..Viewing::default() };
         let grey = Plane::filled(512, 256, 50.0);
-        let inputs = ThresholdInputs { display_luminance_cd_m2: &grey, guide_variance: None };
+        let inputs = ThresholdInputs::clean(&grey);
         let map = threshold_map(&inputs, &viewing, &CastleCsf::default()).unwrap();
         let turned = map.with_gazes(&[Gaze { x_px: 40.0, y_px: 128.0 }]);
         assert_eq!(map.with_gazes(&[]).noise_gain(), map.noise_gain());
@@ -249,7 +249,7 @@ mod tests {
     #[test]
     fn colour_fades_by_its_own_law() {
         let grey = Plane::filled(256, 64, 50.0);
-        let inputs = ThresholdInputs { display_luminance_cd_m2: &grey, guide_variance: None };
+        let inputs = ThresholdInputs::clean(&grey);
         let viewing =
             Viewing { display: Display { pixels_per_degree: 10.0, ..Display::default() }, ..Viewing::default() };
         let map = threshold_map(&inputs, &viewing, &CastleCsf::default()).unwrap();

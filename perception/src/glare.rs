@@ -196,7 +196,7 @@ mod tests {
     }
 
     fn thresholds(picture: &Plane, glare: Glare) -> Plane {
-        let inputs = ThresholdInputs { display_luminance_cd_m2: picture, guide_variance: None };
+        let inputs = ThresholdInputs::clean(picture);
         threshold_map(&inputs, &viewing(glare), &CastleCsf::default()).unwrap().allowed_standard_error_cd_m2(1.0)
     }
 

@@ -26,7 +26,7 @@
 //! let fitted = operator.fit(&tone::SceneGuide::of(&scene), &viewing, None);
 //! let shown = seen::display_luminance(&*fitted, &viewing.display, &scene);
 //!
-//! let inputs = ThresholdInputs { display_luminance_cd_m2: &shown, guide_variance: None };
+//! let inputs = ThresholdInputs::clean(&shown);
 //! let map = threshold_map(&inputs, &viewing, &CastleCsf::default())?;
 //!
 //! // A path tracer's variance of the mean: how visible will its noise be?
@@ -37,8 +37,8 @@
 //! # Ok::<(), fechner_perception::Error>(())
 //! ```
 //!
-//! A picture that is noisy itself is first denoised into a [`guide`], whose variance is given along, so that noise does not hide
-//! noise. Colour noise is judged by [`colour`], error that moves by [`motion`], and what draws the eye by [`saliency`].
+//! A picture that is noisy itself is first denoised into a [`guide`], whose variance is given along ([`GuideNoise`]), so that noise does
+//! not hide noise. Colour noise is judged by [`colour`], error that moves by [`motion`], and what draws the eye by [`saliency`].
 //!
 //! # A denoised picture
 //!
@@ -74,7 +74,7 @@
 //! ```
 //! use fechner_perception::display::{Glare, Observer};
 //! use fechner_perception::model::{self, ModelInputs};
-//! use fechner_perception::{Plane, Viewing, csf};
+//! use fechner_perception::{GuideNoise, Plane, Viewing, csf};
 //!
 //! let keen = Observer { glare: Glare::Cie { age_years: 30.0 }, ..Observer::keen() };
 //! let viewing = Viewing { observer: keen, ..Viewing::default() };
@@ -82,7 +82,7 @@
 //! let picture = Plane::from_fn(48, 48, |x, y| if x > 24 && y > 24 { 180.0 } else { 2.0 });
 //! let allowed = model::by_name("csf-bands").unwrap().allowed_standard_error_cd_m2(&ModelInputs {
 //!     display_luminance_cd_m2: &picture,
-//!     guide_variance: None,
+//!     guide_noise: GuideNoise::Clean,
 //!     image_velocity_deg_s: None,
 //!     attention: None,
 //!     viewing: &viewing,
@@ -139,4 +139,4 @@ pub use csf::{CastleCsf, ContrastSensitivity};
 pub use display::{Display, Eotf, Observer, Viewing};
 pub use error::Error;
 pub use plane::Plane;
-pub use threshold::{ThresholdInputs, ThresholdMap, threshold_map};
+pub use threshold::{GuideNoise, ThresholdInputs, ThresholdMap, threshold_map};

@@ -7,6 +7,7 @@ use crate::plane::Plane;
 use crate::reduced::ReducedPlane;
 use crate::sensitivity::BandTables;
 use crate::taps::{eroded, smoothed};
+use crate::threshold::GuideNoise;
 
 /// The threshold elevation is never taken to exceed this, whatever the contrast.
 pub const ELEVATION_CAP: f64 = 3.0;
@@ -52,9 +53,9 @@ pub(crate) struct MaskSource<'a> {
     pub(crate) contrast: &'a Spectrum,
     /// The eye's sensitivity under the middle one of the picture's adaptation levels.
     pub(crate) sensitivity: Option<&'a RadialTable>,
-    /// Variance of the guide's noise over the adaptation luminance squared, if any is known: at every second pixel, every
+    /// Variance of the guide's noise over the adaptation luminance squared, as far as it is known: at every second pixel, every
     /// fourth and so on, framed like any [`ReducedPlane`].
-    pub(crate) noise: Vec<Plane>,
+    pub(crate) noise: GuideNoise<Vec<Plane>>,
     /// Coordinates of the adaptation luminance in the tables, at every second pixel.
     pub(crate) coordinates: &'a Plane,
     pub(crate) density: PixelDensity,
@@ -80,9 +81,9 @@ const SURROUND_WAVELENGTHS: f64 = 2.0;
 /// Threshold elevation, 1 to 3, of one band, on a grid as fine as the band needs.
 ///
 /// The band's local contrast amplitude is √2 times its RMS over a Gaussian of a third of a wavelength (the band's
-/// signal itself crosses zero twice a wavelength), less the energy that the guide's own noise has there. It is then
-/// eroded over more than one wavelength around: an edge, whose contrast lives within a wavelength, masks nothing beside
-/// it; texture, which goes on, does. Where it does ends softly, well within what the erosion has left.
+/// signal itself crosses zero twice a wavelength), less the energy that the guide's own noise has there, as far as [`GuideNoise`]
+/// tells. It is then eroded over more than one wavelength around: an edge, whose contrast lives within a wavelength, masks nothing
+/// beside it; texture, which goes on, does. Where it does ends softly, well within what the erosion has left.
 pub(crate) fn band_elevation(
     source: &MaskSource<'_>,
     workspace: &mut Workspace,
@@ -113,7 +114,8 @@ pub(crate) fn band_elevation(
     let mut energy = halved(&amplitude, size, |value| value * value);
     drop(amplitude);
     let columns = frame.columns(source.width);
-    if let Some(noise) = source.noise.get(amplitude_factor.ilog2() as usize) {
+    let take_out = |energy: &mut Plane, noise: &[Plane]| {
+        let Some(noise) = noise.get(amplitude_factor.ilog2() as usize) else { return };
         // Of white pixel noise's variance, what stands in the guide's band.
         let mut share = 0.0;
         for_each_ring(density, RINGS, |freq, weight| share += weight as f32 * gain.at(freq as f32).powi(2));
@@ -122,19 +124,34 @@ pub(crate) fn band_elevation(
             let noise = noise.row(sample_at(frame.row(y, source.height)));
             row.iter_mut().zip(&columns).for_each(|(value, x)| *value -= share * noise[sample_at(*x)]);
         });
-    }
+    };
     // Less the variance of the window that halved.
     let variance = |wavelength: f64| ((0.35 * wavelength).powi(2) - HALVING_VARIANCE / 4.0).max(0.0);
-    let mut mask = smoothed(&energy, variance(wavelength_x), variance(wavelength_y));
-    drop(energy);
-    mask.for_each_row_mut(|y, row| {
-        let coordinates = source.coordinates.row(frame.row(y, source.height) / 2 + 1);
-        for (value, x) in row.iter_mut().zip(&columns) {
-            *value = 2.0 * value.max(0.0) * tables.center_sensitivity_squared.at(coordinates[x / 2 + 1]);
+    let elevated_by = |energy: &Plane| {
+        let mut mask = smoothed(energy, variance(wavelength_x), variance(wavelength_y));
+        mask.for_each_row_mut(|y, row| {
+            let coordinates = source.coordinates.row(frame.row(y, source.height) / 2 + 1);
+            for (value, x) in row.iter_mut().zip(&columns) {
+                let sensitivity_squared = tables.center_sensitivity_squared.at(coordinates[x / 2 + 1]);
+                *value = elevation.at(2.0 * value.max(0.0) * sensitivity_squared);
+            }
+        });
+        mask
+    };
+    let elevated = match &source.noise {
+        GuideNoise::Clean => elevated_by(&energy),
+        GuideNoise::White(noise) => {
+            take_out(&mut energy, noise);
+            elevated_by(&energy)
         }
-    });
-    let mut elevated = eroded(&mask, REACH_WAVELENGTHS * wavelength_x, REACH_WAVELENGTHS * wavelength_y);
-    elevated.for_each_row_mut(|_, row| row.iter_mut().for_each(|value| *value = elevation.at(*value)));
+        GuideNoise::BeforeDenoising(noise) => {
+            let at_most = elevated_by(&energy);
+            take_out(&mut energy, noise);
+            elevated_by(&energy).combined(&at_most, |at_least, at_most| (at_least * at_most).sqrt())
+        }
+    };
+    drop(energy);
+    let elevated = eroded(&elevated, REACH_WAVELENGTHS * wavelength_x, REACH_WAVELENGTHS * wavelength_y);
     let soft = |wavelength: f64| (EDGE_WAVELENGTHS * wavelength).powi(2);
     let elevated = smoothed(&elevated, soft(wavelength_x), soft(wavelength_y));
     let (across, down) = (reduced_size(source.width, factor), reduced_size(source.height, factor));

@@ -203,7 +203,7 @@ mod tests {
         let timing = FrameTiming { frames_per_second: 24.0, persistence: 1.0 };
         let csf = FreshNoise::new(1.0, timing).unwrap();
         let grey = Plane::filled(64, 64, 100.0);
-        let inputs = ThresholdInputs { display_luminance_cd_m2: &grey, guide_variance: None };
+        let inputs = ThresholdInputs::clean(&grey);
         let rest = threshold_map(&inputs, &Viewing::default(), &csf).unwrap();
         let gain = |velocity: f32, timing| {
             let followed = rest.with_pursuit(&Plane::filled(64, 64, velocity), timing).unwrap();

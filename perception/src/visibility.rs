@@ -366,7 +366,7 @@ mod tests {
 
     fn map_of(picture: &Plane, pixels_per_degree: f64) -> ThresholdMap {
         let viewing = Viewing { display: Display { pixels_per_degree, ..Display::default() }, ..Viewing::default() };
-        let inputs = ThresholdInputs { display_luminance_cd_m2: picture, guide_variance: None };
+        let inputs = ThresholdInputs::clean(picture);
         threshold_map(&inputs, &viewing, &CastleCsf::default()).unwrap()
     }
 

@@ -2,7 +2,7 @@
 
 use fechner_perception::difference::difference;
 use fechner_perception::{
-    CastleCsf, Display, Plane, ThresholdInputs, ThresholdMap, Viewing, csf, model, threshold_map,
+    CastleCsf, Display, GuideNoise, Plane, ThresholdInputs, ThresholdMap, Viewing, csf, model, threshold_map,
 };
 use proptest::prelude::*;
 
@@ -17,7 +17,7 @@ fn pictures() -> impl Strategy<Value = Plane> {
 
 fn map_of(picture: &Plane, pixels_per_degree: f64) -> ThresholdMap {
     let viewing = Viewing { display: Display { pixels_per_degree, ..Display::default() }, ..Viewing::default() };
-    let inputs = ThresholdInputs { display_luminance_cd_m2: picture, guide_variance: None };
+    let inputs = ThresholdInputs::clean(picture);
     threshold_map(&inputs, &viewing, &CastleCsf::default()).expect("a good picture")
 }
 
@@ -93,7 +93,7 @@ proptest! {
         let model = model::by_name(model::names()[which / csf::names().len()]).expect("a known name");
         let inputs = model::ModelInputs {
             display_luminance_cd_m2: &picture,
-            guide_variance: Some(&picture),
+            guide_noise: GuideNoise::BeforeDenoising(&picture),
             image_velocity_deg_s: Some(&picture),
             attention: None,
             viewing: &viewing,

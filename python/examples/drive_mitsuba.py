@@ -160,8 +160,7 @@ def adaptive(tracer, options, exposure):
         tone = fechner.fit_tone(dim, options.tone)
         # As displayed, where a lamp's edge is bounded by white, before pixels lean on each other.
         shown = steadied(samples * tone.display_variance(dim, variance / samples), samples) / samples
-        # Before the picture is denoised its noise bounds what is left of it in every band.
-        thresholds = fechner.threshold_map(tone.display_luminance(dim), shown)
+        thresholds = fechner.threshold_map(tone.display_luminance(dim), shown, denoised=True)
         predicted = thresholds.predicted_visibility(shown)
         a, b = (exposure * film.mean().reshape(*shape, 3) @ LUMINANCE for film in halves)
         measured = thresholds.measured_visibility(tone.display_half_difference(0.5 * (a + b), 0.5 * (a - b)))

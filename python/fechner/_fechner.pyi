@@ -150,6 +150,8 @@ def threshold_map(
     guide_variance: ArrayLike | None = None,
     viewing: Viewing | None = None,
     csf: _Csf = "castle",
+    *,
+    denoised: bool = False,
 ) -> ThresholdMap: ...
 def contrast_sensitivity_functions() -> list[_Csf]: ...
 def contrast_sensitivity(

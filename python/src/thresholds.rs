@@ -1,7 +1,7 @@
 //! The threshold map, what it says of noise, and where samples should go.
 
 use fechner_perception::allocation::{self, AllocationProblem, FINE_GAP};
-use fechner_perception::{Plane, ThresholdInputs, csf, threshold};
+use fechner_perception::{GuideNoise, Plane, ThresholdInputs, csf, threshold};
 use numpy::PyArray2;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -17,22 +17,29 @@ pub(crate) struct ThresholdMap(threshold::ThresholdMap);
 /// Finds adaptation, masking and thresholds of a picture.
 ///
 /// display_luminance: (height, width), cd/m² as the display shows them, denoised. guide_variance: (height, width), (cd/m²)², the
-/// variance of the noise left in it, so that noise does not hide noise; None takes it as clean. csf: a name of
-/// contrast_sensitivity_functions(). ValueError for pictures that are none, sizes that differ, values below 0 or not finite.
+/// variance of the noise in it, so that noise does not hide noise; None takes it as clean. denoised: whether display_luminance is
+/// denoised, and guide_variance that of before. csf: a name of contrast_sensitivity_functions(). ValueError for pictures that are
+/// none, sizes that differ, values below 0 or not finite.
 #[pyfunction]
-#[pyo3(signature = (display_luminance, guide_variance = None, viewing = None, csf = "castle"))]
+#[pyo3(signature = (display_luminance, guide_variance = None, viewing = None, csf = "castle", *, denoised = false))]
 pub(crate) fn threshold_map(
     py: Python<'_>,
     display_luminance: &Bound<'_, PyAny>,
     guide_variance: Option<&Bound<'_, PyAny>>,
     viewing: Option<&Viewing>,
     csf: &str,
+    denoised: bool,
 ) -> PyResult<ThresholdMap> {
     let luminance = plane("display_luminance", display_luminance)?;
     let variance = optional_plane("guide_variance", guide_variance)?;
     let viewing = or_default(viewing);
     let csf = csf::by_name(csf, &viewing).map_err(value_error)?;
-    let inputs = ThresholdInputs { display_luminance_cd_m2: &luminance, guide_variance: variance.as_ref() };
+    let guide_noise = match &variance {
+        None => GuideNoise::Clean,
+        Some(variance) if denoised => GuideNoise::BeforeDenoising(variance),
+        Some(variance) => GuideNoise::White(variance),
+    };
+    let inputs = ThresholdInputs { display_luminance_cd_m2: &luminance, guide_noise };
     Ok(ThresholdMap(try_work(py, || threshold::threshold_map(&inputs, &viewing, &*csf))?))
 }
 

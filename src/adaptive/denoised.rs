@@ -220,7 +220,7 @@ mod tests {
         let viewing = Viewing::of(Display::preset("strict").unwrap());
         let white = viewing.display.white_cd_m2 as f32;
         let shown = Plane::from_fn(SIDE, SIDE, |x, _| if lamp_covers(x) { white } else { WALL_CD_M2 });
-        let inputs = ThresholdInputs { display_luminance_cd_m2: &shown, guide_variance: None };
+        let inputs = ThresholdInputs::clean(&shown);
         let thresholds = threshold_map(&inputs, &viewing, &CastleCsf::default()).unwrap();
         let picture = |lamp: f32| -> Vec<[f32; 3]> {
             (0..SIDE * SIDE).map(|pixel| [if lamp_covers(pixel % SIDE) { lamp } else { WALL_CD_M2 }; 3]).collect()
@@ -239,7 +239,7 @@ mod tests {
     fn what_moves_towards_the_raw_mean_stays_within_it() {
         let viewing = Viewing::of(Display::preset("strict").unwrap());
         let grey = Plane::filled(SIDE, SIDE, WALL_CD_M2);
-        let inputs = ThresholdInputs { display_luminance_cd_m2: &grey, guide_variance: None };
+        let inputs = ThresholdInputs::clean(&grey);
         let thresholds = threshold_map(&inputs, &viewing, &CastleCsf::default()).unwrap();
         let mut error = DenoisedError::unknown(SIDE, SIDE);
         error.raw_shares = (0..5).map(|band| Plane::filled(SIDE, SIDE, if band < 3 { 0.0 } else { 1.0 })).collect();

@@ -51,7 +51,7 @@ impl FlickerJudge {
         let reference: Vec<Plane> = reference.iter().map(|light| luminance_of(light, size)).collect();
         let csf = CastleCsf::new(viewing.observer.csf_area_deg2)?;
         let of = |picture: &Plane| {
-            let inputs = ThresholdInputs { display_luminance_cd_m2: picture, guide_variance: None };
+            let inputs = ThresholdInputs::clean(picture);
             threshold_map(&inputs, viewing, &csf)
         };
         let thresholds = reference.iter().map(of).collect::<Result<Vec<_>, _>>()?;

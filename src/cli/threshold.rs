@@ -17,7 +17,7 @@ use fechner_perception::motion::image_velocity_deg_s;
 use fechner_perception::saliency::saliency_of_displayed;
 use fechner_perception::tone::FittedTone;
 use fechner_perception::tone::acuity::BehindAcuity;
-use fechner_perception::{ContrastSensitivity, Plane, ThresholdInputs, Viewing, csf, threshold_map};
+use fechner_perception::{ContrastSensitivity, GuideNoise, Plane, ThresholdInputs, Viewing, csf, threshold_map};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `threshold`.
@@ -113,15 +113,14 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     };
     let inputs = ModelInputs {
         display_luminance_cd_m2: &shown,
-        guide_variance: None,
+        guide_noise: GuideNoise::Clean,
         image_velocity_deg_s: motion.as_ref().map(|motion| &motion.image_velocity_deg_s),
         attention: motion.as_ref().and_then(|motion| motion.attention.as_ref()),
         viewing: &viewing,
         csf: &csf,
     };
     let threshold = model.allowed_standard_error_cd_m2(&inputs)?;
-    let map =
-        threshold_map(&ThresholdInputs { display_luminance_cd_m2: &shown, guide_variance: None }, &viewing, &csf)?;
+    let map = threshold_map(&ThresholdInputs::clean(&shown), &viewing, &csf)?;
     let mut picture = Picture::new(shown.width() as u32, shown.height() as u32);
     picture.push_f32("threshold.Y", threshold.values());
     picture.push_f32("adaptation.Y", map.adaptation_cd_m2().values());

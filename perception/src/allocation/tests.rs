@@ -29,7 +29,7 @@ impl Case {
             }
         }
         let viewing = Viewing { display: Display { pixels_per_degree, ..Display::default() }, ..Viewing::default() };
-        let inputs = ThresholdInputs { display_luminance_cd_m2: &picture, guide_variance: None };
+        let inputs = ThresholdInputs::clean(&picture);
         Self { thresholds: threshold_map(&inputs, &viewing, &CastleCsf::default()).unwrap(), variance, cost }
     }
 
@@ -60,7 +60,7 @@ impl Case {
 fn an_even_picture_needs_its_closed_form() {
     let viewing = Viewing::default();
     let grey = Plane::filled(40, 30, 80.0);
-    let inputs = ThresholdInputs { display_luminance_cd_m2: &grey, guide_variance: None };
+    let inputs = ThresholdInputs::clean(&grey);
     let thresholds = threshold_map(&inputs, &viewing, &CastleCsf::default()).unwrap();
     let variance = Plane::filled(40, 30, 900.0);
     let cost = Plane::filled(40, 30, 3.0);
@@ -98,7 +98,7 @@ fn the_gap_closes_and_every_constraint_holds() {
 #[test]
 fn what_is_out_of_reach_leaves_the_gap_closed() {
     let grey = Plane::filled(256, 256, 60.0);
-    let inputs = ThresholdInputs { display_luminance_cd_m2: &grey, guide_variance: None };
+    let inputs = ThresholdInputs::clean(&grey);
     let case = Case {
         thresholds: threshold_map(&inputs, &Viewing::default(), &CastleCsf::default()).unwrap(),
         variance: Plane::from_fn(256, 256, |x, _| if x < 128 { 4000.0 } else { 100.0 }),

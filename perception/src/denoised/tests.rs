@@ -11,7 +11,7 @@ const GREY: f32 = 100.0;
 /// 30 pixels a degree, so that the picture is 8.5° wide.
 fn map_of(picture: &Plane) -> ThresholdMap {
     let viewing = Viewing::of(Display::preset("strict").unwrap());
-    let inputs = ThresholdInputs { display_luminance_cd_m2: picture, guide_variance: None };
+    let inputs = ThresholdInputs::clean(picture);
     threshold_map(&inputs, &viewing, &CastleCsf::default()).unwrap()
 }
 

@@ -169,9 +169,8 @@ mod tests {
         const SIDE: usize = 64;
         const BAND: usize = 3;
         let viewing = Viewing::of(Display::preset("strict").expect("a preset"));
-        let inputs =
-            ThresholdInputs { display_luminance_cd_m2: &Plane::filled(SIDE, SIDE, 100.0), guide_variance: None };
-        let map = threshold_map(&inputs, &viewing, &CastleCsf::default()).unwrap();
+        let grey = Plane::filled(SIDE, SIDE, 100.0);
+        let map = threshold_map(&ThresholdInputs::clean(&grey), &viewing, &CastleCsf::default()).unwrap();
         let mut filters = ErrorFilters::new(&map);
         let last = SIDE - 1;
         let middle: Vec<(usize, usize)> = [20, 32, 43].iter().flat_map(|&x| [20, 32, 43].map(|y| (x, y))).collect();

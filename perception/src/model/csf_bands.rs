@@ -36,10 +36,8 @@ impl ThresholdModel for CsfBands {
 /// The threshold map of a still, or of what moves where a velocity is given.
 pub(super) fn still_or_moving(inputs: &ModelInputs<'_>) -> Result<ThresholdMap, Error> {
     inputs.check()?;
-    let guide = ThresholdInputs {
-        display_luminance_cd_m2: inputs.display_luminance_cd_m2,
-        guide_variance: inputs.guide_variance,
-    };
+    let guide =
+        ThresholdInputs { display_luminance_cd_m2: inputs.display_luminance_cd_m2, guide_noise: inputs.guide_noise };
     let map = threshold_map(&guide, inputs.viewing, inputs.csf)?;
     match inputs.retinal_velocity_deg_s() {
         Some(velocity) => map.with_motion(&velocity),

@@ -23,15 +23,15 @@ use crate::display::Viewing;
 use crate::error::Error;
 use crate::filter::gaussian_blur_xy;
 use crate::plane::Plane;
-use crate::threshold::POOLING_SIGMA_DEG;
+use crate::threshold::{GuideNoise, POOLING_SIGMA_DEG};
 
 /// What a model may look at. All planes have one size.
 #[derive(Clone, Copy)]
 pub struct ModelInputs<'a> {
     /// Luminance of the denoised guide as the display shows it, cd/m².
     pub display_luminance_cd_m2: &'a Plane,
-    /// Variance of the noise left in the guide, (cd/m²)²; `None` takes it as clean.
-    pub guide_variance: Option<&'a Plane>,
+    /// What is known of the noise in the guide, variances in (cd/m²)².
+    pub guide_noise: GuideNoise<&'a Plane>,
     /// Speed over the picture, deg/s, of what each pixel shows (see [`crate::motion::image_velocity_deg_s`]); `None` for a
     /// still. Only for error that travels with the object.
     pub image_velocity_deg_s: Option<&'a Plane>,
@@ -49,7 +49,7 @@ impl ModelInputs<'_> {
         let guide = self.display_luminance_cd_m2;
         guide.check_non_negative("display luminance")?;
         for (what, plane) in [
-            ("guide variance", self.guide_variance),
+            ("guide variance", self.guide_noise.variance()),
             ("image velocity", self.image_velocity_deg_s),
             ("attention", self.attention),
         ] {
@@ -194,7 +194,7 @@ mod tests {
         let viewing = Viewing::default();
         let inputs = ModelInputs {
             display_luminance_cd_m2: guide,
-            guide_variance: None,
+            guide_noise: GuideNoise::Clean,
             image_velocity_deg_s: velocity,
             attention: None,
             viewing: &viewing,
@@ -211,7 +211,7 @@ mod tests {
             let by = |csf: &dyn ContrastSensitivity| {
                 let inputs = ModelInputs {
                     display_luminance_cd_m2: &guide,
-                    guide_variance: None,
+                    guide_noise: GuideNoise::Clean,
                     image_velocity_deg_s: None,
                     attention: None,
                     viewing: &viewing,
@@ -278,7 +278,7 @@ mod tests {
             let visibility = |guide: &Plane, velocity: Option<&Plane>| {
                 let inputs = ModelInputs {
                     display_luminance_cd_m2: guide,
-                    guide_variance: None,
+                    guide_noise: GuideNoise::Clean,
                     image_velocity_deg_s: velocity,
                     attention: None,
                     viewing: &Viewing::default(),
@@ -310,7 +310,7 @@ mod tests {
         for name in names() {
             let inputs = ModelInputs {
                 display_luminance_cd_m2: &guide,
-                guide_variance: None,
+                guide_noise: GuideNoise::Clean,
                 image_velocity_deg_s: Some(&small),
                 attention: None,
                 viewing: &viewing,

@@ -269,7 +269,7 @@ impl SequenceObserver {
         let csf = CastleCsf::new(area_deg2)?;
         let csf = HeldAtLowFrequencies { base: &csf };
         let map_of = |picture: &Plane| {
-            let inputs = ThresholdInputs { display_luminance_cd_m2: picture, guide_variance: None };
+            let inputs = ThresholdInputs::clean(picture);
             threshold_map(&inputs, &self.viewing, &csf)
         };
         let achromatic = masked_by_both(map_of(&reference)?, &map_of(&test)?);

@@ -69,7 +69,7 @@ fn fresh_noise_is_seen_as_predicted() {
         let timing = FrameTiming { frames_per_second, persistence: 1.0 };
         let csf = FreshNoise::new(1.0, timing).unwrap();
         let picture = Plane::filled(SIDE, SIDE, 100.0);
-        let inputs = ThresholdInputs { display_luminance_cd_m2: &picture, guide_variance: None };
+        let inputs = ThresholdInputs::clean(&picture);
         let map = threshold_map(&inputs, &viewing(frames_per_second), &csf).unwrap();
         let predicted = f64::from(map.predicted_visibility(&picture.map(|_| 9.0)).get(SIDE / 2, SIDE / 2));
         let squares: f64 = (0..4)

@@ -7,7 +7,7 @@ fn viewing(pixels_per_degree: f64) -> Viewing {
 }
 
 fn map_of(picture: &Plane, viewing: &Viewing) -> ThresholdMap {
-    let inputs = ThresholdInputs { display_luminance_cd_m2: picture, guide_variance: None };
+    let inputs = ThresholdInputs::clean(picture);
     threshold_map(&inputs, viewing, &CastleCsf::default()).unwrap()
 }
 
@@ -58,10 +58,31 @@ fn texture_masks_and_its_own_noise_does_not() {
     let noisy = Plane::from_values(192, 192, (0..192 * 192).map(|_| 100.0 + 10.0 * normal(&mut state)).collect());
     let noisy = noisy.unwrap();
     let variance = Plane::filled(192, 192, 100.0);
-    let known = ThresholdInputs { display_luminance_cd_m2: &noisy, guide_variance: Some(&variance) };
+    let known = ThresholdInputs { display_luminance_cd_m2: &noisy, guide_noise: GuideNoise::White(&variance) };
     let known = threshold_map(&known, &viewing(60.0), &CastleCsf::default()).unwrap().masking_elevation();
     let unknown = map_of(&noisy, &viewing(60.0)).masking_elevation();
     assert!(known.mean() < 1.01 && unknown.mean() > 1.2, "known {} unknown {}", known.mean(), unknown.mean());
+}
+
+/// A denoised guide's texture is masked by less than if it were clean and by more than if all noise were left in it: by the mean of
+/// both, on a logarithmic scale.
+#[test]
+fn masks_of_a_denoised_guide_lie_between_two_bounds() {
+    let texture = Plane::from_fn(192, 192, |x, y| 100.0 * (1.0 + 0.5 * hashed(x / 4, y / 4)));
+    // Of a standard deviation beyond the texture's, 14 cd/m², on the left.
+    let before = Plane::from_fn(192, 192, |x, _| if x < 96 { 1e4 } else { 0.0 });
+    let elevation = |guide_noise| {
+        let inputs = ThresholdInputs { display_luminance_cd_m2: &texture, guide_noise };
+        threshold_map(&inputs, &viewing(60.0), &CastleCsf::default()).unwrap().masking_elevation()
+    };
+    let (at_most, at_least) = (elevation(GuideNoise::Clean), elevation(GuideNoise::White(&before)));
+    let found = elevation(GuideNoise::BeforeDenoising(&before));
+    let at = |map: &Plane, x| map.get(x, 96);
+    assert!(at(&at_least, 48) < 1.001 && at(&at_most, 48) > 1.2, "{} {}", at(&at_least, 48), at(&at_most, 48));
+    let mean = (at(&at_least, 48) * at(&at_most, 48)).sqrt();
+    // Bands have each their own mean, whose sum is never less.
+    assert!((1.0..1.05).contains(&(at(&found, 48) / mean)), "{} for {mean}", at(&found, 48));
+    assert!((at(&found, 144) / at(&at_most, 144) - 1.0).abs() < 0.02, "{} {}", at(&found, 144), at(&at_most, 144));
 }
 
 /// Stripes of a pixel at 100 cpd and a tenth of their threshold hide nothing.
@@ -225,13 +246,13 @@ fn bad_inputs_are_errors() {
     let bad = Plane::filled(4, 4, f32::NAN);
     let good = Plane::filled(4, 4, 1.0);
     let small = Plane::filled(2, 2, 1.0);
-    let ask = |display_luminance_cd_m2, guide_variance, viewing: &Viewing| {
-        threshold_map(&ThresholdInputs { display_luminance_cd_m2, guide_variance }, viewing, &csf).err()
+    let ask = |display_luminance_cd_m2, guide_noise, viewing: &Viewing| {
+        threshold_map(&ThresholdInputs { display_luminance_cd_m2, guide_noise }, viewing, &csf).err()
     };
-    assert!(matches!(ask(&bad, None, &Viewing::default()), Some(Error::BadPixel { .. })));
-    assert!(matches!(ask(&good, Some(&small), &Viewing::default()), Some(Error::SizeMismatch { .. })));
-    assert!(matches!(ask(&good, None, &viewing(0.0)), Some(Error::OutOfRange { .. })));
-    assert!(matches!(ask(&good, None, &viewing(f64::NAN)), Some(Error::OutOfRange { .. })));
+    assert!(matches!(ask(&bad, GuideNoise::Clean, &Viewing::default()), Some(Error::BadPixel { .. })));
+    assert!(matches!(ask(&good, GuideNoise::White(&small), &Viewing::default()), Some(Error::SizeMismatch { .. })));
+    assert!(matches!(ask(&good, GuideNoise::Clean, &viewing(0.0)), Some(Error::OutOfRange { .. })));
+    assert!(matches!(ask(&good, GuideNoise::Clean, &viewing(f64::NAN)), Some(Error::OutOfRange { .. })));
 }
 
 fn normal(state: &mut u64) -> f32 {

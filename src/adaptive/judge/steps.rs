@@ -11,7 +11,7 @@ use fechner_perception::colour::ChromaticGains;
 use fechner_perception::csf::{CastleCsf, ContrastSensitivity, FreshNoise};
 use fechner_perception::model::{ModelInputs, ThresholdModel};
 use fechner_perception::seen;
-use fechner_perception::threshold::{ThresholdInputs, ThresholdMap, threshold_map};
+use fechner_perception::threshold::{GuideNoise, ThresholdInputs, ThresholdMap, threshold_map};
 use fechner_perception::tone::acuity::BehindAcuity;
 use fechner_perception::tone::{FittedTone, SceneLight};
 use std::borrow::Cow;
@@ -114,7 +114,7 @@ fn most_visible(
 }
 
 /// [`super::Judgement::thresholds`] and [`super::Judgement::pixel_thresholds`]. `noise`: variance of the mean's luminance on the display, before
-/// denoising. It bounds what is left of it in the guide, so masking fades in as samples come.
+/// denoising.
 pub(super) fn found_thresholds(
     guide: &Guide<'_>,
     tone: &dyn FittedTone,
@@ -124,14 +124,15 @@ pub(super) fn found_thresholds(
     let displayed_guide = seen::display_luminance(tone, &settings.viewing.display, guide.luminance_cd_m2());
     // Noise goes through the loss of acuity that the operator shows, as the picture does.
     let csf = BehindAcuity { csf: contrast_sensitivity(settings)?, acuity: tone.acuity() };
-    let inputs = ThresholdInputs { display_luminance_cd_m2: &displayed_guide, guide_variance: Some(noise) };
+    let guide_noise = GuideNoise::BeforeDenoising(noise);
+    let inputs = ThresholdInputs { display_luminance_cd_m2: &displayed_guide, guide_noise };
     let at_rest = threshold_map(&inputs, &settings.viewing, &csf)?;
     let thresholds = under_eye_movements(at_rest, guide, tone, settings)?;
     still_wanted(settings)?;
     let of_model = |model: &dyn ThresholdModel| {
         model.allowed_standard_error_cd_m2(&ModelInputs {
             display_luminance_cd_m2: &displayed_guide,
-            guide_variance: Some(noise),
+            guide_noise,
             image_velocity_deg_s: None,
             attention: None,
             viewing: &settings.viewing,
