@@ -85,6 +85,22 @@ fn masks_of_a_denoised_guide_lie_between_two_bounds() {
     assert!((at(&found, 144) / at(&at_most, 144) - 1.0).abs() < 0.02, "{} {}", at(&found, 144), at(&at_most, 144));
 }
 
+/// A grating beyond the centre of the last band of 8 cpd, at half its threshold, raises thresholds there by what Daly's formula says
+/// of any mask of half a threshold.
+#[test]
+fn a_mask_counts_by_how_well_it_is_seen() {
+    let (ppd, freq_cpd, luminance) = (38.0, 13.0, 10.0);
+    let csf = CastleCsf::default();
+    let contrast = 0.5 / csf.sensitivity(freq_cpd, luminance);
+    let grating = Plane::from_fn(192, 192, |x, _| {
+        (luminance * (1.0 + contrast * (std::f64::consts::TAU * freq_cpd * x as f64 / ppd).cos())) as f32
+    });
+    let map = map_of(&grating, &viewing(ppd));
+    let last = map.elevations.last().unwrap().enlarged().get(96, 96);
+    let expected = crate::masking::threshold_elevation(0.5) as f32;
+    assert!((last / expected - 1.0).abs() < 0.02, "{last}, not {expected}");
+}
+
 /// Stripes of a pixel at 100 cpd and a tenth of their threshold hide nothing.
 #[test]
 fn an_invisible_pattern_masks_nothing() {
@@ -272,7 +288,7 @@ fn hashed(x: usize, y: usize) -> f32 {
 /// not. Pixels of an even number of columns are on the grid in one of the two pictures and off it in the other.
 #[test]
 fn a_mirrored_picture_has_the_mirrored_thresholds() {
-    for (width, height, textured, tolerance) in [(96, 96, 96, 0.02), (255, 253, 120, 0.015)] {
+    for (width, height, textured, tolerance) in [(96, 96, 96, 0.03), (255, 253, 120, 0.015)] {
         let at = |x: usize, y: usize| 50.0 * (1.0 + if x < textured { 0.6 * hashed(x, y) } else { 0.0 });
         let allowed = |value_at: &(dyn Fn(usize, usize) -> f32 + Sync)| {
             map_of(&Plane::from_fn(width, height, value_at), &viewing(60.0)).allowed_standard_error_cd_m2(1.0)
