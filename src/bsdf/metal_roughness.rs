@@ -359,6 +359,13 @@ impl MetalRoughness {
         }
     }
 
+    pub(super) fn straight_through(&self, wo: Vec3) -> Vec3 {
+        match self.facets {
+            Some(_) => Vec3::ZERO,
+            None => self.transmitted * self.albedos(to_front(wo, wo).0).through_single,
+        }
+    }
+
     pub(super) fn albedo(&self, wo: Vec3) -> Vec3 {
         let (up, _) = to_front(wo, wo);
         let near = self.albedos(up);

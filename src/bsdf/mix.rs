@@ -48,6 +48,10 @@ impl<'a> Mix<'a> {
         (evaluation.pdf > 0.0 && weight.is_finite()).then_some(BsdfSample { weight, pdf: evaluation.pdf, ..sample })
     }
 
+    pub(super) fn straight_through(&self, wo: Vec3) -> Vec3 {
+        self.first.straight_through(wo).lerp(self.second.straight_through(wo), self.amount)
+    }
+
     pub(super) fn albedo(&self, wo: Vec3) -> Vec3 {
         self.first.albedo(wo).lerp(self.second.albedo(wo), self.amount)
     }

@@ -334,6 +334,16 @@ impl<'a> Bsdf<'a> {
         }
     }
 
+    /// Share of light from `wo` that a delta lobe lets through straight on, as smooth thin sheets without a varnish do; 0 of all others.
+    pub fn straight_through(&self, wo: Vec3) -> Vec3 {
+        match self {
+            Self::ThinDielectric(model) => model.straight_through(wo),
+            Self::MetalRoughness(model) => model.straight_through(wo),
+            Self::Mix(model) => model.straight_through(wo),
+            _ => Vec3::ZERO,
+        }
+    }
+
     /// Approximate share of light that is scattered, reflected and transmitted together, for AOVs and guides.
     pub fn albedo(&self, wo: Vec3) -> Vec3 {
         match self {

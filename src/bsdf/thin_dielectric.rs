@@ -34,7 +34,7 @@ impl ThinDielectric {
             return None;
         }
         let reflectance = self.reflectance(wo.z.abs());
-        let transmitted = (1.0 - reflectance) * self.transmittance;
+        let transmitted = self.straight_through(wo);
         let probability = reflectance / (reflectance + transmitted.max_element());
         if u[2] < probability {
             Some(BsdfSample {
@@ -54,6 +54,10 @@ impl ThinDielectric {
                 crossed_index: None,
             })
         }
+    }
+
+    pub(super) fn straight_through(&self, wo: Vec3) -> Vec3 {
+        (1.0 - self.reflectance(wo.z.abs())) * self.transmittance
     }
 
     pub(super) fn albedo(&self, wo: Vec3) -> Vec3 {

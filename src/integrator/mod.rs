@@ -2,7 +2,7 @@
 //!
 //! `path` holds the life of one sample, `abreast` how several are followed at once, `camera` where they start, `shading` what a
 //! surface point scatters like, `relief` how maps turn its normal, `tables` what materials compute beforehand, `media` what a
-//! ray travels in, `prune` which light is left to chance, `specular` what mirrors and glass show.
+//! ray travels in, `prune` which light is left to chance, `sheets` what clear panes let through, `specular` what mirrors and glass show.
 
 mod abreast;
 mod around_camera;
@@ -12,6 +12,7 @@ mod path;
 mod prune;
 mod relief;
 mod shading;
+mod sheets;
 mod specular;
 mod tables;
 
@@ -175,6 +176,8 @@ pub struct PathTracer {
     absorbs: bool,
     /// The volumes that camera rays begin in; none where none absorbs.
     around_camera: AroundCamera,
+    /// Whether any material may be a clear sheet, which lets lights without extent through.
+    has_sheets: bool,
     /// By material.
     surface_tables: Vec<SurfaceTables>,
     /// Where light is left to chance.
@@ -188,14 +191,25 @@ impl PathTracer {
         let absorbs = scene.materials.iter().any(|material| {
             material.surface.interior_absorption().is_some_and(|absorption| absorption.max_element() > 0.0)
         });
+        let has_sheets = sheets::any_of(&scene.materials);
         let surface_tables = tables::of_materials(&scene.materials);
         let thresholds = settings.prune.map(ThresholdTable::new);
         let moves = scene.moves();
         let world = World::new(scene);
         let lights = Lights::new(&world);
         let around_camera = AroundCamera::Everywhere(Media::default());
-        let mut tracer =
-            Self { world, lights, camera, moves, settings, absorbs, around_camera, surface_tables, thresholds };
+        let mut tracer = Self {
+            world,
+            lights,
+            camera,
+            moves,
+            settings,
+            absorbs,
+            around_camera,
+            has_sheets,
+            surface_tables,
+            thresholds,
+        };
         tracer.look_around();
         tracer
     }

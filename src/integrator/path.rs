@@ -80,6 +80,8 @@ struct DirectLight {
     shadow_ray: Ray,
     /// Up to the light, in scene units; may be infinite.
     distance: f32,
+    /// Whether clear sheets let it through, since no path could find it behind them.
+    passes_sheets: bool,
     /// By the path's throughput.
     radiance: Vec3,
 }
@@ -175,6 +177,10 @@ impl PathTracer {
         let is_hidden = light.distance > 0.0 && self.world.occluded(&light.shadow_ray, light.distance);
         if !is_hidden {
             path.radiance += light.radiance;
+        } else if light.passes_sheets {
+            let (share, rays) = self.through_sheets(&light.shadow_ray, light.distance);
+            path.radiance += share * light.radiance;
+            path.rays += rays;
         }
     }
 
@@ -241,7 +247,8 @@ impl PathTracer {
             }
         };
         let (shadow_ray, distance) = self.shadow_ray(point, &light, path.ray.time);
-        path.direct = Some(DirectLight { shadow_ray, distance, radiance: unshadowed * left / survival });
+        let passes_sheets = light.is_delta && self.has_sheets;
+        path.direct = Some(DirectLight { shadow_ray, distance, passes_sheets, radiance: unshadowed * left / survival });
     }
 
     /// The ray from a point to a light and how far that is. Both ends are lifted off their surfaces; where that leaves no way

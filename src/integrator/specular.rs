@@ -107,11 +107,15 @@ impl PathTracer {
     }
 }
 
+/// Whether a perceptual roughness may be so small somewhere that it counts as none.
+pub(super) fn may_be_smooth(roughness: &ScalarInput) -> bool {
+    const SMOOTH: f32 = 0.05;
+    roughness.texture.is_some() || roughness.factor < SMOOTH
+}
+
 /// Whether some place of a surface may be perfectly smooth. What it says of none need not be asked at a point.
 fn may_be_specular(surface: &Surface) -> bool {
-    /// Below it a perceptual roughness counts as none.
-    const SMOOTH: f32 = 0.05;
-    let is_smooth = |input: &ScalarInput| input.texture.is_some() || input.factor < SMOOTH;
+    let is_smooth = may_be_smooth;
     match surface {
         Surface::Mirror { .. } | Surface::ThinDielectric { .. } | Surface::HeTorrance { .. } => true,
         Surface::Conductor { roughness, .. } | Surface::Dielectric { roughness, .. } => is_smooth(&roughness.u),

@@ -201,6 +201,43 @@ fn lights_without_area_follow_their_laws() {
     assert_irradiance(sun, 0.0, 1.6, "directional");
 }
 
+/// Panes between a floor and lights that no path can meet: what each lets through, at its own angle, and nothing through a board.
+#[test]
+fn lights_without_area_shine_through_panes() {
+    let behind = |surfaces: &[Surface], light: Light| {
+        let mut scene = floor();
+        for (height, surface) in (1..).zip(surfaces) {
+            let material = add_material(&mut scene, surface.clone(), Vec3::ZERO);
+            let corner = Vec3::new(-50.0, 0.25 * height as f32, -50.0);
+            add_rectangle(&mut scene, corner, Vec3::Z * 100.0, Vec3::X * 100.0, material);
+        }
+        scene.lights.push(light);
+        scene
+    };
+    let white = ColorInput::constant(Vec3::ONE);
+    let pane = Surface::ThinDielectric { ior: 1.5, transmittance: white };
+    let tinted = Surface::ThinDielectric { ior: 1.5, transmittance: ColorInput::constant(Vec3::splat(0.5)) };
+    // Fresnel at a cosine of 0.8: sine 0.4 inside, cosine 0.9165.
+    let (outside, inside) = (0.8f32, 0.84f32.sqrt());
+    let parallel = ((1.5 * outside - inside) / (1.5 * outside + inside)).powi(2);
+    let perpendicular = ((outside - 1.5 * inside) / (outside + 1.5 * inside)).powi(2);
+    let face = 0.5 * (parallel + perpendicular);
+    let through = (1.0 - face) / (1.0 + face);
+    let point = Light::Point { position: Vec3::new(0.0, 2.0, 0.0), intensity: Vec3::splat(8.0) };
+    let sun = Light::Directional {
+        direction: Vec3::new(0.6, -0.8, 0.0),
+        irradiance: Vec3::splat(2.0),
+        angular_radius: 0.0,
+        is_of_sky: false,
+    };
+    assert_irradiance(behind(&[pane.clone()], point.clone()), 1.5, through * 8.0 / 6.25 * 0.8, "point");
+    assert_irradiance(behind(&[pane.clone(), tinted], sun), 0.0, 0.5 * through * through * 1.6, "directional");
+    let boarded = behind(&[pane, diffuse(0.5)], point);
+    let tracer = PathTracer::new(Arc::new(boarded), TraceSettings { max_depth: 1, ..trace_settings(16, 16, 0) });
+    let ray = Ray::new(vec3a(1.4, 0.2, 0.0), vec3a(0.1, -0.2, 0.0).normalize());
+    assert_eq!(radiance_along(&tracer, ray, 16, 64).0, Vec3::ZERO);
+}
+
 #[test]
 fn a_constant_sky_gives_pi() {
     let mut scene = floor();

@@ -297,6 +297,29 @@ fn masks_and_blends_cover_what_they_should() {
         )),
         0.75
     );
+    let mask = |opacity: f32, inner: &str| {
+        format!(r#"<bsdf type="mask"><float name="opacity" value="{opacity}"/>{inner}</bsdf>"#)
+    };
+    assert_eq!(covers(&mask(0.25, &mask(0.5, plain))), 0.125);
+    let half_there =
+        format!(r#"<bsdf type="blendbsdf"><float name="weight" value="0.5"/><bsdf type="null"/>{plain}</bsdf>"#);
+    assert_eq!(covers(&mask(0.25, &half_there)), 0.125);
+}
+
+/// What a masked emitter sends out on average is what Mitsuba says, whatever its opacity.
+#[test]
+fn a_masked_emitter_shines_in_full() {
+    let emission = |bsdf: &str| {
+        let body = format!(
+            r#"<shape type="rectangle">{bsdf}<emitter type="area"><rgb name="radiance" value="1,2,3"/></emitter></shape>"#
+        );
+        let scene = try_load(folder().path(), "3.0.0", &body).unwrap_or_else(|error| panic!("{error}"));
+        let material = &scene.materials[0];
+        material.emission.factor * material.alpha.coverage(&scene.textures, Vec2::ZERO)
+    };
+    let whole = emission(r#"<bsdf type="diffuse"/>"#);
+    let masked = emission(r#"<bsdf type="mask"><float name="opacity" value="0.25"/><bsdf type="diffuse"/></bsdf>"#);
+    assert!(whole.x > 0.0 && masked.abs_diff_eq(whole, 1e-6 * whole.x), "{masked}, not {whole}");
 }
 
 #[test]

@@ -48,6 +48,30 @@ fn only_models_of_delta_lobes_say_so() {
     }
 }
 
+/// Shadow rays pass sheets by what paths carry through them.
+#[test]
+fn what_goes_straight_on_is_what_samples_carry() {
+    const LOBES: usize = 1 << 14;
+    let wo = Vec3::new(0.48, 0.64, 0.6);
+    let tint = Vec3::new(0.2, 0.6, 0.9);
+    let (pane, wall) = (Bsdf::thin_dielectric(1.5, tint), Bsdf::lambert(Vec3::splat(0.5)));
+    for (bsdf, is_clear) in [
+        (pane, true),
+        (Bsdf::metal_roughness(tint, 0.3, 0.0, 1.5, 0.7), true),
+        (Bsdf::mix(&pane, &wall, 0.25), true),
+        (Bsdf::metal_roughness(tint, 0.0, 0.3, 1.5, 1.0), false),
+        (Bsdf::dielectric(1.5, 0.0, Vec3::ONE, None), false),
+        (wall, false),
+    ] {
+        let lobes = (0..LOBES).map(|i| (i as f32 + 0.5) / LOBES as f32);
+        let carried = lobes.filter_map(|lobe| bsdf.sample(wo, [0.3, 0.6, lobe])).filter(|sample| sample.wi == -wo);
+        let carried: Vec3 = carried.map(|sample| sample.weight / LOBES as f32).sum();
+        let told = bsdf.straight_through(wo);
+        assert!(told.abs_diff_eq(carried, 2e-4) && (told != Vec3::ZERO) == is_clear, "{told} for {carried}, {bsdf:?}");
+        assert!(bsdf.straight_through(turn(wo)).abs_diff_eq(told, 1e-6), "{bsdf:?}");
+    }
+}
+
 /// The pane's reflectance at normal incidence: 2R/(1 + R) with R = 4 %.
 #[test]
 fn reflectance_matches_known_values() {

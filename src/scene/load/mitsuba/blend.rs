@@ -18,6 +18,11 @@ impl Look {
     fn covering(&self, coverage: ScalarInput) -> Self {
         Self { surface: self.surface.clone(), relief: self.relief, alpha: alpha_of(coverage) }
     }
+
+    /// With an opacity over what is there of it already; `None` where it takes two pictures.
+    pub(super) fn masked(&self, opacity: ScalarInput) -> Option<Self> {
+        product(self.coverage(), opacity).map(|coverage| self.covering(coverage))
+    }
 }
 
 fn alpha_of(coverage: ScalarInput) -> Alpha {

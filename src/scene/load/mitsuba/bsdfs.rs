@@ -51,10 +51,13 @@ impl Reader {
             }
             "mask" => {
                 let inner = self.inner(bsdf)?;
-                let mut look = self.bsdf(&inner[0], depth + 1)?;
-                let value = self.opacity(bsdf)?.unwrap_or(ScalarInput::constant(0.5));
-                look.alpha = Alpha::Blend { value };
-                look
+                let look = self.bsdf(&inner[0], depth + 1)?;
+                let opacity = self.opacity(bsdf)?.unwrap_or(ScalarInput::constant(0.5));
+                look.masked(opacity).unwrap_or_else(|| {
+                    self.builder
+                        .note(format!("{}: the picture of opacity inside another is not rendered.", bsdf.place()));
+                    Look { alpha: Alpha::Blend { value: opacity }, ..look }
+                })
             }
             "bumpmap" | "bump" => {
                 let inner = self.inner(bsdf)?;

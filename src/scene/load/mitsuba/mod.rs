@@ -19,7 +19,7 @@ mod transform;
 use super::LoadOptions;
 use super::builder::{ASSUMED_NITS_PER_UNIT, Builder, IfDark};
 use super::error::{LoadError, Place, suggestion};
-use crate::scene::{Material, MaterialId, MeshId, Scene, Surface};
+use crate::scene::{Alpha, Material, MaterialId, MeshId, ScalarInput, Scene, Surface};
 use element::{Element, Given};
 use glam::{Affine3A, Vec3};
 use std::collections::HashMap;
@@ -183,6 +183,7 @@ impl Reader {
         };
         if let Some(emitter) = &emitter {
             material.emission = self.area_radiance(emitter)?;
+            self.shine_through_holes(&mut material, emitter);
         }
         for medium in &media {
             self.fill(&mut material, medium)?;
@@ -192,6 +193,20 @@ impl Reader {
             self.materials.insert(key, Some(id));
         }
         Ok(Some(id))
+    }
+
+    /// In Mitsuba opacity takes nothing from what a surface sends out; here a surface shines where it is.
+    fn shine_through_holes(&mut self, material: &mut Material, emitter: &Element) {
+        match material.alpha {
+            Alpha::Blend { value: ScalarInput { factor, texture: None } } if factor > 0.0 => {
+                material.emission.factor /= factor;
+            }
+            Alpha::Opaque => {}
+            _ => {
+                self.builder
+                    .note(format!("{}: it shines where its opacity leaves it, not everywhere.", emitter.place()));
+            }
+        }
     }
 
     /// Puts the absorption of a medium behind a surface.
