@@ -188,9 +188,11 @@ impl InputPicture {
         self.luminance_of(&self.relative_rgb(tone, &viewing.display, map_picture), &viewing.display)
     }
 
-    /// The same without the operator's loss of acuity: for noise that is judged by an eye behind it.
-    pub(super) fn displayed_sharp(&self, tone: Option<&dyn FittedTone>, viewing: &Viewing) -> Plane {
-        self.luminance_of(&self.relative_rgb(tone, &viewing.display, map_pixels), &viewing.display)
+    /// Linear RGB in cd/m² of the same colours without the operator's loss of acuity: for noise that is judged by an eye behind it.
+    pub(super) fn displayed_rgb_sharp(&self, tone: Option<&dyn FittedTone>, viewing: &Viewing) -> Vec<[f32; 3]> {
+        let display = &viewing.display;
+        let cd_m2 = |relative: f32| display.luminance_cd_m2(f64::from(relative)) as f32;
+        self.relative_rgb(tone, display, map_pixels).into_iter().map(|rgb| rgb.map(cd_m2)).collect()
     }
 
     fn luminance_of(&self, relative: &[[f32; 3]], display: &Display) -> Plane {

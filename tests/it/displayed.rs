@@ -70,6 +70,29 @@ fn noise_beside_a_clipped_channel_is_seen() {
     }
 }
 
+/// Noise of red against green has no luminance: two such halves were 0.12 visible, while `compare` tells their mean from the truth at 3.0.
+#[test]
+fn noise_of_colour_is_seen_in_halves() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let noise = |key| {
+        move |pixel| {
+            let red = 69.0 * random(pixel, key);
+            [100.0 + red, 100.0 - red * 0.2126 / 0.7152, 100.0]
+        }
+    };
+    write(folder.path(), "g.exr", |_| [100.0; 3]);
+    write(folder.path(), "a.exr", noise(1));
+    write(folder.path(), "b.exr", noise(2));
+    let seen = |model: &str| {
+        let halves = ["threshold", "g.exr", "--halves", "a.exr", "b.exr", "-o", "t.exr"];
+        let how = ["--operator", "absolute", "--display", "hdr-1000", "--model", model];
+        run(folder.path(), &[&halves[..], &how[..]].concat());
+        mean(folder.path(), "t.exr", "visibility.Y")
+    };
+    assert!(seen("csf-bands") > 1.5, "{}", seen("csf-bands"));
+    assert!(seen("tvi") < 0.1, "of a model of luminance {}", seen("tvi"));
+}
+
 /// Halves in scene light are shown by the operator even where the guide is ready for the display.
 #[test]
 fn halves_of_a_scene_are_fitted_where_the_guide_is_none() {
