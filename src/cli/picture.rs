@@ -20,7 +20,7 @@ pub(super) struct InputPicture {
     content: Content,
     /// Width of a pixel over its height.
     pixel_aspect_ratio: f64,
-    /// The display that it was made for, where that is known.
+    /// The display that it was made for, where its file says so.
     made_for: Option<Display>,
     /// How it was shown when it was rendered, where its file says so.
     kept_tone: Option<KeptTone>,
@@ -93,9 +93,14 @@ impl InputPicture {
         (self.width, self.height)
     }
 
-    /// The display that it was made for, where its file says so; one that shows PQ, of pictures in PQ.
+    /// The display that it was made for, where its file says so.
     pub(super) fn made_for(&self) -> Option<&Display> {
         self.made_for.as_ref()
+    }
+
+    /// A display that its codes are likely for, where no file says more: one that shows PQ, of pictures in PQ.
+    pub(super) fn likely_display(&self) -> Option<Display> {
+        matches!(self.content, Content::Display(Codes::Pq(_))).then(|| Display::preset("hdr-1000")).flatten()
     }
 
     /// How it was shown when it was rendered, where its file says so.

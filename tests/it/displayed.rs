@@ -194,6 +194,24 @@ fn transparent_pictures_are_seen_alike() {
     assert!(visibility(&said) < 1.5 && said.contains("before black"), "{said}");
 }
 
+/// What a file says of its display goes before what another's curve suggests, whichever is named first: it was 0.4 and 25.
+#[test]
+fn a_display_that_is_told_goes_before_a_guess() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let display =
+        "name = 'mine'\npixels_per_degree = 110\nwhite_cd_m2 = 600\nblack_cd_m2 = 0.4\nambient_cd_m2 = 30\neotf = 'pq'";
+    std::fs::write(folder.path().join("my.toml"), display).expect("written");
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box.toml");
+    for name in ["a.exr", "a.png"] {
+        let common = ["render", scene, "--size", "32x32", "--spp", "16", "--display", "my.toml", "-o", name];
+        run(folder.path(), &common);
+    }
+    for [reference, test] in [["a.exr", "a.png"], ["a.png", "a.exr"]] {
+        let (_, said) = fechner(folder.path(), &["compare", reference, test]);
+        assert!(visibility(&said) < 1.0 && said.contains("on \"mine\""), "{reference} first: {said}");
+    }
+}
+
 /// Who names no display sees a render on the one that it was made for.
 #[test]
 fn a_render_is_seen_on_its_own_display() {

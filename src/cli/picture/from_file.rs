@@ -129,15 +129,13 @@ impl InputPicture {
         let picture = image.into_rgb32f();
         let (width, height) = (picture.width() as usize, picture.height() as usize);
         let rgb = picture.pixels().map(|p| p.0).collect();
-        let is_pq = matches!(content, Content::Display(Codes::Pq(_)));
-        let made_for = if is_pq { Display::preset("hdr-1000") } else { None };
         Self {
             width,
             height,
             rgb,
             content,
             pixel_aspect_ratio: 1.0,
-            made_for,
+            made_for: None,
             kept_tone: None,
             alpha: None,
             part_of: None,
