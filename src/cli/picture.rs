@@ -3,6 +3,7 @@
 mod from_file;
 
 pub(super) use self::from_file::note;
+use super::covered::{Covered, Mapping};
 use super::kept_tone::KeptTone;
 use anyhow::{Context, Result};
 use fechner::output::{self, PartOf};
@@ -26,12 +27,11 @@ pub(super) struct InputPicture {
     kept_tone: Option<KeptTone>,
     /// How much of each pixel it covers, 0 to 1, where an EXR file leaves some of any uncovered. Its values are multiplied by it.
     alpha: Option<Vec<f32>>,
+    /// The same of a file of codes, whose light is not multiplied by it.
+    straight_alpha: Option<Vec<f32>>,
     /// Where it lies, if it is a part of a larger picture.
     part_of: Option<PartOf>,
 }
-
-/// Brings scene light, cd/m², of a picture this wide to linear display RGB.
-type Mapping = fn(&dyn FittedTone, usize, &[[f32; 3]]) -> Vec<[f32; 3]>;
 
 /// What the values mean.
 #[derive(Clone, Copy, PartialEq)]
@@ -85,7 +85,9 @@ impl InputPicture {
     }
 
     fn values(&self) -> Plane {
-        Plane::from_fn(self.width, self.height, |x, y| luminance(self.rgb[y * self.width + x]))
+        let alpha = |pixel: usize| self.straight_alpha.as_ref().map_or(1.0, |alpha| alpha[pixel]);
+        let value = |pixel: usize| luminance(self.rgb[pixel]) * alpha(pixel);
+        Plane::from_fn(self.width, self.height, |x, y| value(y * self.width + x))
     }
 
     /// Width and height in pixels.
@@ -133,10 +135,20 @@ impl InputPicture {
 
     /// Linear display RGB, 0 the display's black and 1 its white; `map` brings a scene there.
     fn relative_rgb(&self, tone: Option<&dyn FittedTone>, display: &Display, map: Mapping) -> Vec<[f32; 3]> {
-        match (self.scene_rgb_cd_m2(), tone) {
-            (Some(scene), Some(tone)) => map(tone, self.width, &scene),
-            _ => self.decoded(display),
+        match (self.scene_rgb_cd_m2(), tone, &self.alpha) {
+            // An operator shows what covers a pixel, as in the PNG of a render: of light times alpha it would make another thing.
+            (Some(scene), Some(tone), Some(alpha)) => Covered::of(tone, map, self.width, &scene, alpha).premultiplied(),
+            (Some(scene), Some(tone), None) => map(tone, self.width, &scene),
+            _ => self.before_black(self.decoded(display)),
         }
+    }
+
+    /// Light of codes before the display's black, where they have an alpha.
+    fn before_black(&self, mut light: Vec<[f32; 3]>) -> Vec<[f32; 3]> {
+        for (rgb, alpha) in light.iter_mut().zip(self.straight_alpha.iter().flatten()) {
+            *rgb = rgb.map(|channel| channel * alpha);
+        }
+        light
     }
 
     /// The same of codes that are ready for the display.
@@ -254,5 +266,24 @@ mod tests {
         }
         let displayed = picture.displayed(None, &viewing);
         light.iter().enumerate().for_each(|(x, rgb)| close(displayed.get(x, 0), cd_m2(luminance(*rgb))));
+    }
+
+    /// Codes of 16 bits without a tag have an alpha as those of sRGB, and lie before black: with black they were seen in full light.
+    #[test]
+    fn codes_of_any_curve_lie_before_black() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("a.png");
+        let pixels = [[65_535, 32_768, 0, 16_384], [65_535, 65_535, 65_535, 0], [20_000, 20_000, 20_000, 65_535_u16]];
+        let image = image::ImageBuffer::<image::Rgba<u16>, _>::from_raw(3, 1, pixels.concat()).expect("three pixels");
+        image.save(&file).expect("written");
+        let viewing = Viewing::of(Display { eotf: Eotf::Linear, ..Display::default() });
+        let shown = InputPicture::read(&file, None).expect("read").displayed_rgb(None, &viewing);
+        for (shown, [codes @ .., alpha]) in shown.iter().zip(pixels) {
+            for (shown, code) in shown.iter().zip(codes) {
+                let light = f64::from(code) / 65_535.0 * f64::from(alpha) / 65_535.0;
+                let meant = viewing.display.luminance_cd_m2(light) as f32;
+                assert!((shown - meant).abs() < 1e-3 * meant, "{shown}, not {meant}");
+            }
+        }
     }
 }

@@ -1,13 +1,12 @@
 //! `fechner tonemap`: HDR pictures as a display shows them to an eye, one by one or as a sequence in time.
 
-mod covered;
 mod names;
 mod sheet;
 mod write;
 
-use self::covered::Covered;
 use self::names::{frame_numbers, frames_since_last, targets};
 use self::write::write;
+use super::covered::Covered;
 use super::json::write_json;
 use super::numbers::{parse_positive, parse_stops, parse_unit};
 use super::picture::InputPicture;
@@ -145,12 +144,15 @@ impl SceneFrame {
 
     /// As it is seen before black.
     fn shown(&self, fitted: &dyn FittedTone) -> Vec<[f32; 3]> {
-        map_picture(fitted, self.width, &self.rgb_cd_m2)
+        match self.covered(fitted) {
+            Some(covered) => covered.premultiplied(),
+            None => map_picture(fitted, self.width, &self.rgb_cd_m2),
+        }
     }
 
     /// The same before whatever lies behind a picture with alpha.
     fn covered(&self, fitted: &dyn FittedTone) -> Option<Covered<'_>> {
-        Some(Covered::of(fitted, self.width, &self.rgb_cd_m2, self.alpha.as_deref()?))
+        Some(Covered::of(fitted, map_picture, self.width, &self.rgb_cd_m2, self.alpha.as_deref()?))
     }
 }
 

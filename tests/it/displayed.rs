@@ -179,19 +179,29 @@ fn a_render_is_seen_as_it_was_judged() {
     }
 }
 
-/// Premultiplied in the EXR file and straight in the PNG, a transparent picture is one.
+/// Premultiplied in the EXR file and straight in the PNG, a transparent picture is one: by operators that scale light and by those that
+/// do not, which made another picture of light times alpha (50 by ferwerda96), in sRGB and in PQ.
 #[test]
 fn transparent_pictures_are_seen_alike() {
     let folder = tempfile::tempdir().expect("a folder");
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/meshes/chess-pawn.obj");
     let sky = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/skies/studio.hdr");
-    for name in ["a.exr", "a.png"] {
-        let common =
-            ["render", scene, "--environment", sky, "--transparent", "--size", "48x48", "--plans", "1", "-o", name];
-        run(folder.path(), &common);
+    for how in [
+        &["--operator", "constant"][..],
+        &["--operator", "constant", "--display", "hdr-1000"],
+        &["--operator", "ferwerda96"],
+        &["--operator", "pattanaik00"],
+        &["--operator", "durand-dorsey00"],
+        &["--operator", "ward94"],
+    ] {
+        for name in ["a.exr", "a.png"] {
+            let common =
+                ["render", scene, "--environment", sky, "--transparent", "--size", "48x48", "--plans", "1", "-o", name];
+            run(folder.path(), &[&common[..], how].concat());
+        }
+        let (_, said) = fechner(folder.path(), &["compare", "a.exr", "a.png"]);
+        assert!(visibility(&said) < 1.5 && said.contains("before black"), "{how:?}: {said}");
     }
-    let (_, said) = fechner(folder.path(), &["compare", "a.exr", "a.png"]);
-    assert!(visibility(&said) < 1.5 && said.contains("before black"), "{said}");
 }
 
 /// What a file says of its display goes before what another's curve suggests, whichever is named first: it was 0.4 and 25.
