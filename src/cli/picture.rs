@@ -153,17 +153,18 @@ impl InputPicture {
 
     /// The same of codes that are ready for the display.
     fn decoded(&self, display: &Display) -> Vec<[f32; 3]> {
-        let linear = |eotf: Eotf| {
-            let light = |code: f32| eotf.decode(f64::from(code), display.white_cd_m2) as f32;
-            self.rgb.iter().map(|rgb| rgb.map(light)).collect()
+        let linear = |decode: &dyn Fn(f64) -> f64| -> Vec<[f32; 3]> {
+            self.rgb.iter().map(|rgb| rgb.map(|code| decode(f64::from(code)) as f32)).collect()
         };
         match self.content {
             Content::Display(Codes::Pq(primaries)) => output::decode_pq(&self.rgb, &primaries, display),
             Content::Display(Codes::Display) if display.eotf == Eotf::Pq => {
                 output::decode_pq(&self.rgb, &Primaries::REC2020, display)
             }
-            Content::Display(Codes::Display) => linear(display.eotf),
-            Content::Display(Codes::Srgb(primaries)) => in_rec709(linear(Eotf::Srgb), &primaries),
+            Content::Display(Codes::Display) => linear(&|code| display.light_of_code(code)),
+            Content::Display(Codes::Srgb(primaries)) => {
+                in_rec709(linear(&|code| Eotf::Srgb.decode(code, display.white_cd_m2)), &primaries)
+            }
             Content::Display(Codes::Linear(primaries)) => in_rec709(self.rgb.clone(), &primaries),
             Content::Scene { nits_per_unit } | Content::Emitted { nits_per_unit } => {
                 self.emitted(nits_per_unit, display)
