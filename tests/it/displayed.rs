@@ -3,7 +3,7 @@
 
 use assert_cmd::Command;
 use fechner::exr_read::read_exr;
-use fechner::output::{Attribute, NITS_PER_UNIT, Picture, write_exr, write_png};
+use fechner::output::{Attribute, NITS_PER_UNIT, PIXEL_ASPECT_RATIO, Picture, write_exr, write_png};
 use fechner_perception::display::Eotf;
 use fechner_perception::primaries::{Primaries, apply};
 use std::path::Path;
@@ -219,6 +219,25 @@ fn a_display_that_is_told_goes_before_a_guess() {
     for [reference, test] in [["a.exr", "a.png"], ["a.png", "a.exr"]] {
         let (_, said) = fechner(folder.path(), &["compare", reference, test]);
         assert!(visibility(&said) < 1.0 && said.contains("on \"mine\""), "{reference} first: {said}");
+    }
+}
+
+/// Pixels twice as wide as high are so in the PNG too, which was judged as if they were square, or refused.
+#[test]
+fn the_shape_of_pixels_is_kept_in_a_png() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut picture = Picture::new(SIDE as u32, SIDE as u32);
+    for letter in ["R", "G", "B"] {
+        picture.push_f32(letter, (0..SIDE * SIDE).map(|pixel| 50.0 + 20.0 * random(pixel, 4)).collect::<Vec<_>>());
+    }
+    picture.push_attribute(NITS_PER_UNIT, Attribute::Float(1.0));
+    picture.push_attribute(PIXEL_ASPECT_RATIO, Attribute::Float(2.0));
+    write_exr(&folder.path().join("a.exr"), &picture).expect("written");
+    for display in ["desktop", "hdr-1000"] {
+        let how = ["--operator", "absolute", "--display", display];
+        run(folder.path(), &[&["tonemap", "a.exr", "-o", "a.png"][..], &how[..]].concat());
+        let said = run(folder.path(), &[&["compare", "a.exr", "a.png"][..], &how[..]].concat());
+        assert!(visibility(&said) < 1.0 && said.contains("at 30 pixels"), "{said}");
     }
 }
 

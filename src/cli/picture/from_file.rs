@@ -117,7 +117,8 @@ impl InputPicture {
         if straight_alpha.is_some() {
             note(path, "what is transparent lies before black");
         }
-        Ok(Self { straight_alpha, ..Self::from_image(image, Content::Display(codes)) })
+        let pixel_aspect_ratio = output::png_pixel_aspect_ratio(&bytes);
+        Ok(Self { straight_alpha, pixel_aspect_ratio, ..Self::from_image(image, Content::Display(codes)) })
     }
 
     fn from_image(image: DynamicImage, content: Content) -> Self {
