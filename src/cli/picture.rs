@@ -122,8 +122,16 @@ impl InputPicture {
 
     /// The operator fitted to this picture; `None` for one that is ready for the display.
     pub(super) fn fit(&self, operator: &dyn ToneOperator, viewing: &Viewing) -> Option<Box<dyn FittedTone>> {
+        Some(operator.fit(&self.scene_light(operator)?.guide_for(operator), viewing, None))
+    }
+
+    /// What an operator is fitted to, which is what the picture covers; `None` for one that is ready for the display.
+    pub(super) fn scene_light(&self, operator: &dyn ToneOperator) -> Option<SceneLight> {
         let light = SceneLight::of(operator, self.width, &self.scene_rgb_cd_m2()?);
-        Some(operator.fit(&light.guide(), viewing, None))
+        Some(match &self.alpha {
+            Some(alpha) => light.where_covered(alpha),
+            None => light,
+        })
     }
 
     /// Linear RGB in cd/m² that the display sends to the eye.

@@ -222,6 +222,30 @@ fn a_display_that_is_told_goes_before_a_guess() {
     }
 }
 
+/// What alpha says is not there is no night: eyes that took it for one showed a figure in daylight flat white. By a render and by `tonemap`.
+#[test]
+fn eyes_adapt_to_what_is_there() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/meshes/chess-pawn.obj");
+    for operator in ["pattanaik00", "ferwerda96", "ward94", "durand-dorsey00", "scheel00", "ward-larson97"] {
+        let how = ["--size", "32x32", "--sampling", "uniform", "--spp", "16", "--operator", operator, "-o"];
+        for name in ["a.png", "a.exr"] {
+            let common = ["render", scene, "--environment", "sky:30,60", "--transparent"];
+            run(folder.path(), &[&common[..], &how[..], &[name]].concat());
+        }
+        run(folder.path(), &["tonemap", "a.exr", "-o", "b.png", "--operator", operator]);
+        for name in ["a.png", "b.png"] {
+            let picture = image::open(folder.path().join(name)).expect("a picture").into_rgba8();
+            let whole: Vec<u8> = picture.pixels().filter(|pixel| pixel.0[3] == 255).map(|pixel| pixel.0[1]).collect();
+            let white = whole.iter().filter(|&&code| code == 255).count();
+            // Sunlit sides are white to some.
+            assert!(!whole.is_empty() && 4 * white < 3 * whole.len(), "{operator}, {name}: {white} of {}", whole.len());
+        }
+        let (_, said) = fechner(folder.path(), &["compare", "a.exr", "a.png"]);
+        assert!(visibility(&said) < 1.5, "{operator}: {said}");
+    }
+}
+
 /// Pixels twice as wide as high are so in the PNG too, which was judged as if they were square, or refused.
 #[test]
 fn the_shape_of_pixels_is_kept_in_a_png() {
