@@ -21,7 +21,7 @@ mod subsampled;
 mod wanted;
 mod window;
 
-use attributes::{add_missing, attributes, part_of};
+use attributes::{add_missing, attributes, part_of, primaries};
 use checks::{check_memory, guarded, read_headers};
 pub use colour::ScenePicture;
 pub(crate) use colour::{Replaced, make_finite};
@@ -66,7 +66,7 @@ pub struct ExrImage {
     pub is_display_window_left_out: bool,
     /// Width of a pixel over its height; 1 where the file's is none that a pixel can have (0.01 to 100).
     pub pixel_aspect_ratio: f64,
-    /// Primaries and white of R, G and B, where the file says them. Channels are as in the file: see
+    /// Primaries and white of R, G and B, where the file says them: as chromaticities, by a `colorInteropID`, or as an ACES container. Channels are as in the file: see
     /// [`ExrImage::scene_picture`].
     pub chromaticities: Option<Primaries>,
 }
@@ -257,7 +257,6 @@ fn image_without_channels(first: &Header) -> ExrImage {
     let is_part = first.own_attributes.other.keys().any(|name| *name == *CROP);
     let origin = (first.own_attributes.layer_position.0, first.own_attributes.layer_position.1);
     let (width, height) = (first.layer_size.0 as u32, first.layer_size.1 as u32);
-    let point = |Vec2(x, y): Vec2<f32>| [f64::from(x), f64::from(y)];
     ExrImage {
         width,
         height,
@@ -279,12 +278,7 @@ fn image_without_channels(first: &Header) -> ExrImage {
         pixel_aspect_ratio: Some(f64::from(first.shared_attributes.pixel_aspect))
             .filter(|ratio| (0.01..=100.0).contains(ratio))
             .unwrap_or(1.0),
-        chromaticities: first.shared_attributes.chromaticities.map(|c| Primaries {
-            red: point(c.red),
-            green: point(c.green),
-            blue: point(c.blue),
-            white: point(c.white),
-        }),
+        chromaticities: primaries(first),
     }
 }
 

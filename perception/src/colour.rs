@@ -8,6 +8,7 @@ use crate::opponent::{Opponent, opponent};
 use crate::plane::Plane;
 use crate::sensitivity::{LuminanceSpan, SensitivityTables};
 use crate::threshold::{ThresholdInputs, ThresholdMap, chromatic_threshold_map, threshold_map};
+use crate::tone::acuity::{AcuityFilter, BehindAcuity};
 
 /// Thresholds of one picture in each of the eye's three channels.
 #[derive(Clone, Debug)]
@@ -53,6 +54,32 @@ pub fn colour_thresholds(
         red_green: chromatic(&picture.red_green, ChromaticChannel::RedGreen)?,
         yellow_violet: chromatic(&picture.yellow_violet, ChromaticChannel::YellowViolet)?,
     })
+}
+
+/// Visibility at each pixel of the colour alone of the error that two halves of a picture show, half their difference in linear Rec. 709 RGB
+/// on the display, cd/m²: the greater of castleCSF's red–green and yellow–violet, for the observer's area. `acuity` is what
+/// an operator takes away of the picture, and of this error with it. For error at rest: no motion hides it.
+///
+/// # Errors
+/// [`Error::ValueCount`] unless picture and error have `width * height` pixels; else as [`chromatic_threshold_map`].
+pub fn chromatic_visibility(
+    display_rgb_cd_m2: &[[f32; 3]],
+    half_difference_rgb: &[[f32; 3]],
+    (width, height): (usize, usize),
+    viewing: &Viewing,
+    acuity: Option<AcuityFilter>,
+) -> Result<Plane, Error> {
+    viewing.check()?;
+    let picture = Channels::new(display_rgb_cd_m2, width, height)?;
+    let error = Channels::new(half_difference_rgb, width, height)?;
+    let luminance = picture.achromatic.map(|value| if value < 0.0 { 0.0 } else { value });
+    let seen = |signal: &Plane, error: &Plane, channel: ChromaticChannel| {
+        let csf = BehindAcuity { csf: CastleChromatic::new(channel, viewing.observer.csf_area_deg2)?, acuity };
+        Ok::<_, Error>(chromatic_threshold_map(signal, &luminance, viewing, &csf)?.measured_visibility(error))
+    };
+    let red_green = seen(&picture.red_green, &error.red_green, ChromaticChannel::RedGreen)?;
+    let yellow_violet = seen(&picture.yellow_violet, &error.yellow_violet, ChromaticChannel::YellowViolet)?;
+    Ok(red_green.combined(&yellow_violet, f32::max))
 }
 
 impl ColourThresholds {
@@ -189,6 +216,14 @@ mod tests {
         let missed = thresholds.achromatic.measured_visibility(&luminance).get(64, 64);
         let seen = thresholds.measured_visibility(&error).unwrap().get(64, 64);
         assert!(missed < 1e-3 && seen > 1.0, "luminance {missed}, all channels {seen}");
+        let of_colour = |acuity| {
+            let found = chromatic_visibility(&grey, &error, (SIDE, SIDE), &Viewing::default(), acuity);
+            found.unwrap().get(64, 64)
+        };
+        assert_eq!(of_colour(None), seen);
+        // What is blurred away is not seen.
+        let night = AcuityFilter::for_adaptation(0.01, &Viewing::default());
+        assert!(night.is_some() && of_colour(night) < 0.9 * seen, "{} of {seen}", of_colour(night));
     }
 
     #[test]

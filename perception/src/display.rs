@@ -218,6 +218,34 @@ impl Display {
         self.black_cd_m2 + (self.white_cd_m2 - self.black_cd_m2) * light
     }
 
+    /// Linear display RGB, 0 the display's black and 1 its white, of a code value (clamped to 0..1; NaN counts as 0) that the display gets as
+    /// it is. With [`Eotf::Bt1886`] a code V is emitted as a (V + b)^2.4, where white and black decide a and b (Recommendation ITU-R
+    /// BT.1886, annex 1); with [`Eotf::Pq`] as the luminance that it means, as far as the display reaches; with others the curve
+    /// lies between black and white.
+    ///
+    /// ```
+    /// use fechner_perception::Display;
+    /// let tv = Display::preset("uhd-tv").unwrap();
+    /// // Of a white of 300 and a black of 0.05 cd/m².
+    /// assert!((tv.emitted_cd_m2(tv.light_of_code(0.05)) - 0.605).abs() < 1e-3);
+    /// ```
+    #[must_use]
+    pub fn light_of_code(&self, code: f64) -> f64 {
+        let code = if code.is_nan() { 0.0 } else { code.clamp(0.0, 1.0) };
+        match self.eotf {
+            Eotf::Bt1886 => {
+                let [white, black] = [self.white_cd_m2, self.black_cd_m2].map(|cd_m2| cd_m2.powf(1.0 / 2.4));
+                // a (V + b)^2.4 with the root of a taken into the bracket.
+                self.relative_of_emitted((code * (white - black) + black).powf(2.4)).clamp(0.0, 1.0)
+            }
+            Eotf::Pq => {
+                let cd_m2 = Eotf::Pq.decode(code, PQ_PEAK_CD_M2) * PQ_PEAK_CD_M2;
+                self.relative_of_emitted(cd_m2).clamp(0.0, 1.0)
+            }
+            Eotf::Srgb | Eotf::Linear => self.eotf.decode(code, self.white_cd_m2),
+        }
+    }
+
     /// The inverse of [`Display::emitted_cd_m2`]: what linear display RGB is emitted as so many cd/m², 0 at black and 1 at white, beyond
     /// them where the display cannot reach it.
     #[must_use]
@@ -400,6 +428,32 @@ mod tests {
         assert_eq!(display.luminance_cd_m2(-1.0), 1.2);
         assert_eq!(display.luminance_cd_m2(f64::NAN), 1.2);
         assert!((display.luminance_cd_m2(7.0) - 201.0).abs() < 1e-9);
+    }
+
+    /// BT.1886 lifts its curve by the display's black: code 0.05 was 0.28 cd/m² on a television that has 0.61.
+    #[test]
+    fn codes_are_shown_from_black_to_white() {
+        for name in Display::preset_names() {
+            let display = Display::preset(name).unwrap();
+            assert!(display.light_of_code(f64::NAN).abs() < 1e-9 && (display.light_of_code(7.0) - 1.0).abs() < 1e-9);
+            let steps: Vec<f64> = (0..=100).map(|step| display.light_of_code(f64::from(step) / 100.0)).collect();
+            assert!(steps.windows(2).all(|pair| pair[1] >= pair[0]), "{name}: {steps:?}");
+        }
+        let emitted = |name: &str, code: f64| {
+            let display = Display::preset(name).unwrap();
+            display.emitted_cd_m2(display.light_of_code(code))
+        };
+        // a (V + b)^2.4 of the recommendation, by its own two formulas for a and b.
+        for (name, white, black) in [("uhd-tv", 300.0_f64, 0.05_f64), ("cinema", 48.0, 0.02)] {
+            let [white_root, black_root] = [white, black].map(|cd_m2| cd_m2.powf(1.0 / 2.4));
+            let (a, b) = ((white_root - black_root).powf(2.4), black_root / (white_root - black_root));
+            for code in [0.0, 0.05, 0.1, 0.5, 1.0] {
+                let meant = a * (code + b).powf(2.4);
+                assert!((emitted(name, code) / meant - 1.0).abs() < 1e-9, "{name}, {code}: not {meant}");
+            }
+        }
+        // ST 2084: code 0.508 is 100 cd/m².
+        assert!((emitted("hdr-1000", 0.508_078) - 100.0).abs() < 0.01);
     }
 
     #[test]

@@ -27,6 +27,15 @@ impl Primaries {
     /// Display P3: DCI-P3 with the white of Rec.709.
     pub const DISPLAY_P3: Self =
         Self { red: [0.680, 0.320], green: [0.265, 0.690], blue: [0.150, 0.060], white: [0.3127, 0.3290] };
+    /// AP0 of SMPTE ST 2065-1, ACES 2065-1.
+    pub const ACES_AP0: Self =
+        Self { red: [0.7347, 0.2653], green: [0.0, 1.0], blue: [0.0001, -0.077], white: [0.32168, 0.33767] };
+    /// AP1 of ACEScg (S-2014-004).
+    pub const ACES_AP1: Self =
+        Self { red: [0.713, 0.293], green: [0.165, 0.830], blue: [0.128, 0.044], white: [0.32168, 0.33767] };
+    /// Adobe RGB (1998).
+    pub const ADOBE_RGB: Self =
+        Self { red: [0.64, 0.33], green: [0.21, 0.71], blue: [0.15, 0.06], white: [0.3127, 0.3290] };
     /// CIE XYZ itself, whose white is that of equal energy.
     pub const XYZ: Self = Self { red: [1.0, 0.0], green: [0.0, 1.0], blue: [0.0, 0.0], white: [1.0 / 3.0, 1.0 / 3.0] };
 

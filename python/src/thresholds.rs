@@ -118,8 +118,8 @@ impl ThresholdMap {
         plane_to_array(py, work(py, || self.0.predicted_visibility(&variance))?)
     }
 
-    /// Visibility, in threshold units, of the error that two independent halves of a picture show: half_difference is (A − B)/2 in
-    /// display cd/m², (height, width). Pixels that are not finite get infinity and count as 0 for the others.
+    /// Visibility, in threshold units, of the error that two independent halves of a picture show: half_difference is (A − B)/2 of their
+    /// luminance in display cd/m², (height, width). Noise of colour alone has none, and is not seen here. Pixels that are not finite get infinity and count as 0 for the others.
     fn measured_visibility<'py>(
         &self,
         py: Python<'py>,

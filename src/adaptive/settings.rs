@@ -162,7 +162,7 @@ impl LoopSettings {
 
     /// Shows pictures as the whole is shown of which they are a part.
     pub fn fit_to(&mut self, whole: &SceneLight) {
-        self.fitted = Some(self.operator.fit(&whole.guide(), &self.viewing, None).save());
+        self.fitted = Some(self.operator.fit(&whole.guide_for(self.operator.as_ref()), &self.viewing, None).save());
     }
 
     /// Whether a render that stopped at a visibility is the beginning of this one, so that going on from it gives the same bytes.

@@ -201,7 +201,7 @@ fn coarse_goal(scene: Arc<Scene>, shot: &ShotSettings, operator: &dyn ToneOperat
 
 fn goal_of(light: &SceneLight, shot: &ShotSettings, operator: &dyn ToneOperator) -> Goal {
     let scale = light.luminance_cd_m2().width() as f64 / f64::from(shot.trace.width);
-    operator.goal(&light.guide(), shot.viewing.display.pixel_density().times(scale))
+    operator.goal(&light.guide_for(operator), shot.viewing.display.pixel_density().times(scale))
 }
 
 fn receptors(goal: Goal) -> Vec<f32> {

@@ -274,7 +274,7 @@ impl SettingsRecord {
                 .then(|| exposure_stops.map_or("no exposure".to_owned(), |stops| format!("exposure {stops}"))),
             (*fitted != other.fitted).then(|| match fitted {
                 None => "the operator fitted to the film".to_owned(),
-                Some(_) => "the operator fitted to a whole of which it is a part".to_owned(),
+                Some(_) => "the operator fitted to a glimpse of the whole".to_owned(),
             }),
             (*denoiser != other.denoiser)
                 .then(|| denoiser.map_or("no denoiser".to_owned(), |denoiser| format!("denoiser {}", denoiser.name()))),

@@ -141,7 +141,7 @@ pub(super) struct Prepared {
     pub(super) trace: TraceSettings,
     pub(super) record: SettingsRecord,
     pub(super) settings: LoopSettings,
-    /// How light the whole is that the picture is cut out of.
+    /// How light the whole is, where the picture is cut out of it or leaves out what surrounds the scene.
     pub(super) whole: Option<SceneLight>,
 }
 
@@ -207,11 +207,14 @@ impl JobArguments {
         Ok(scene)
     }
 
-    /// Loads the scene and reads everything else that is named. A part is shown as the whole is.
+    /// Loads the scene and reads everything else that is named. A part is shown as the whole is; and of a picture with alpha a glimpse knows
+    /// what is there, where eyes would take the rest of a film for darkness.
     pub(super) fn prepare(&self) -> anyhow::Result<Prepared> {
         let mut prepared = self.prepare_samples()?;
         let Prepared { scene, trace, record, settings, whole } = &mut prepared;
-        *whole = trace.crop.and_then(|_| whole_light(scene, trace));
+        if trace.crop.is_some() || (trace.transparent && settings.operator.counts_darkness()) {
+            *whole = whole_light(scene, trace);
+        }
         if let Some(whole) = whole {
             settings.fit_to(whole);
             record.fitted.clone_from(&settings.fitted);
@@ -266,7 +269,7 @@ fn whole_light(scene: &Arc<Scene>, trace: &TraceSettings) -> Option<SceneLight> 
     /// 8192×4096, for which a third of a gigabyte is taken.
     const MOST_PIXELS: u64 = 1 << 25;
     if u64::from(trace.width) * u64::from(trace.height) > MOST_PIXELS {
-        say!("note: tone is fitted to the crop alone: {}x{} pixels are too many", trace.width, trace.height);
+        say!("note: tone is fitted to the film alone: {}x{} pixels are too many", trace.width, trace.height);
         return None;
     }
     // Films of other seeds must be shown alike, to be merged.

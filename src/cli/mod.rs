@@ -6,6 +6,7 @@ mod channels;
 mod claim;
 mod compare;
 mod console;
+mod covered;
 mod denoise;
 mod farm;
 mod importance;

@@ -3,6 +3,7 @@
 mod from_file;
 
 pub(super) use self::from_file::note;
+use super::covered::{Covered, Mapping};
 use super::kept_tone::KeptTone;
 use anyhow::{Context, Result};
 use fechner::output::{self, PartOf};
@@ -20,18 +21,17 @@ pub(super) struct InputPicture {
     content: Content,
     /// Width of a pixel over its height.
     pixel_aspect_ratio: f64,
-    /// The display that it was made for, where that is known.
+    /// The display that it was made for, where its file says so.
     made_for: Option<Display>,
     /// How it was shown when it was rendered, where its file says so.
     kept_tone: Option<KeptTone>,
     /// How much of each pixel it covers, 0 to 1, where an EXR file leaves some of any uncovered. Its values are multiplied by it.
     alpha: Option<Vec<f32>>,
+    /// The same of a file of codes, whose light is not multiplied by it.
+    straight_alpha: Option<Vec<f32>>,
     /// Where it lies, if it is a part of a larger picture.
     part_of: Option<PartOf>,
 }
-
-/// Brings scene light, cd/m², of a picture this wide to linear display RGB.
-type Mapping = fn(&dyn FittedTone, usize, &[[f32; 3]]) -> Vec<[f32; 3]>;
 
 /// What the values mean.
 #[derive(Clone, Copy, PartialEq)]
@@ -85,7 +85,9 @@ impl InputPicture {
     }
 
     fn values(&self) -> Plane {
-        Plane::from_fn(self.width, self.height, |x, y| luminance(self.rgb[y * self.width + x]))
+        let alpha = |pixel: usize| self.straight_alpha.as_ref().map_or(1.0, |alpha| alpha[pixel]);
+        let value = |pixel: usize| luminance(self.rgb[pixel]) * alpha(pixel);
+        Plane::from_fn(self.width, self.height, |x, y| value(y * self.width + x))
     }
 
     /// Width and height in pixels.
@@ -93,9 +95,14 @@ impl InputPicture {
         (self.width, self.height)
     }
 
-    /// The display that it was made for, where its file says so; one that shows PQ, of pictures in PQ.
+    /// The display that it was made for, where its file says so.
     pub(super) fn made_for(&self) -> Option<&Display> {
         self.made_for.as_ref()
+    }
+
+    /// A display that its codes are likely for, where no file says more: one that shows PQ, of pictures in PQ.
+    pub(super) fn likely_display(&self) -> Option<Display> {
+        matches!(self.content, Content::Display(Codes::Pq(_))).then(|| Display::preset("hdr-1000")).flatten()
     }
 
     /// How it was shown when it was rendered, where its file says so.
@@ -115,8 +122,16 @@ impl InputPicture {
 
     /// The operator fitted to this picture; `None` for one that is ready for the display.
     pub(super) fn fit(&self, operator: &dyn ToneOperator, viewing: &Viewing) -> Option<Box<dyn FittedTone>> {
+        Some(operator.fit(&self.scene_light(operator)?.guide_for(operator), viewing, None))
+    }
+
+    /// What an operator is fitted to, which is what the picture covers; `None` for one that is ready for the display.
+    pub(super) fn scene_light(&self, operator: &dyn ToneOperator) -> Option<SceneLight> {
         let light = SceneLight::of(operator, self.width, &self.scene_rgb_cd_m2()?);
-        Some(operator.fit(&light.guide(), viewing, None))
+        Some(match &self.alpha {
+            Some(alpha) => light.where_covered(alpha),
+            None => light,
+        })
     }
 
     /// Linear RGB in cd/m² that the display sends to the eye.
@@ -128,25 +143,36 @@ impl InputPicture {
 
     /// Linear display RGB, 0 the display's black and 1 its white; `map` brings a scene there.
     fn relative_rgb(&self, tone: Option<&dyn FittedTone>, display: &Display, map: Mapping) -> Vec<[f32; 3]> {
-        match (self.scene_rgb_cd_m2(), tone) {
-            (Some(scene), Some(tone)) => map(tone, self.width, &scene),
-            _ => self.decoded(display),
+        match (self.scene_rgb_cd_m2(), tone, &self.alpha) {
+            // An operator shows what covers a pixel, as in the PNG of a render: of light times alpha it would make another thing.
+            (Some(scene), Some(tone), Some(alpha)) => Covered::of(tone, map, self.width, &scene, alpha).premultiplied(),
+            (Some(scene), Some(tone), None) => map(tone, self.width, &scene),
+            _ => self.before_black(self.decoded(display)),
         }
+    }
+
+    /// Light of codes before the display's black, where they have an alpha.
+    fn before_black(&self, mut light: Vec<[f32; 3]>) -> Vec<[f32; 3]> {
+        for (rgb, alpha) in light.iter_mut().zip(self.straight_alpha.iter().flatten()) {
+            *rgb = rgb.map(|channel| channel * alpha);
+        }
+        light
     }
 
     /// The same of codes that are ready for the display.
     fn decoded(&self, display: &Display) -> Vec<[f32; 3]> {
-        let linear = |eotf: Eotf| {
-            let light = |code: f32| eotf.decode(f64::from(code), display.white_cd_m2) as f32;
-            self.rgb.iter().map(|rgb| rgb.map(light)).collect()
+        let linear = |decode: &dyn Fn(f64) -> f64| -> Vec<[f32; 3]> {
+            self.rgb.iter().map(|rgb| rgb.map(|code| decode(f64::from(code)) as f32)).collect()
         };
         match self.content {
             Content::Display(Codes::Pq(primaries)) => output::decode_pq(&self.rgb, &primaries, display),
             Content::Display(Codes::Display) if display.eotf == Eotf::Pq => {
                 output::decode_pq(&self.rgb, &Primaries::REC2020, display)
             }
-            Content::Display(Codes::Display) => linear(display.eotf),
-            Content::Display(Codes::Srgb(primaries)) => in_rec709(linear(Eotf::Srgb), &primaries),
+            Content::Display(Codes::Display) => linear(&|code| display.light_of_code(code)),
+            Content::Display(Codes::Srgb(primaries)) => {
+                in_rec709(linear(&|code| Eotf::Srgb.decode(code, display.white_cd_m2)), &primaries)
+            }
             Content::Display(Codes::Linear(primaries)) => in_rec709(self.rgb.clone(), &primaries),
             Content::Scene { nits_per_unit } | Content::Emitted { nits_per_unit } => {
                 self.emitted(nits_per_unit, display)
@@ -188,9 +214,11 @@ impl InputPicture {
         self.luminance_of(&self.relative_rgb(tone, &viewing.display, map_picture), &viewing.display)
     }
 
-    /// The same without the operator's loss of acuity: for noise that is judged by an eye behind it.
-    pub(super) fn displayed_sharp(&self, tone: Option<&dyn FittedTone>, viewing: &Viewing) -> Plane {
-        self.luminance_of(&self.relative_rgb(tone, &viewing.display, map_pixels), &viewing.display)
+    /// Linear RGB in cd/m² of the same colours without the operator's loss of acuity: for noise that is judged by an eye behind it.
+    pub(super) fn displayed_rgb_sharp(&self, tone: Option<&dyn FittedTone>, viewing: &Viewing) -> Vec<[f32; 3]> {
+        let display = &viewing.display;
+        let cd_m2 = |relative: f32| display.luminance_cd_m2(f64::from(relative)) as f32;
+        self.relative_rgb(tone, display, map_pixels).into_iter().map(|rgb| rgb.map(cd_m2)).collect()
     }
 
     fn luminance_of(&self, relative: &[[f32; 3]], display: &Display) -> Plane {
@@ -247,5 +275,24 @@ mod tests {
         }
         let displayed = picture.displayed(None, &viewing);
         light.iter().enumerate().for_each(|(x, rgb)| close(displayed.get(x, 0), cd_m2(luminance(*rgb))));
+    }
+
+    /// Codes of 16 bits without a tag have an alpha as those of sRGB, and lie before black: with black they were seen in full light.
+    #[test]
+    fn codes_of_any_curve_lie_before_black() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("a.png");
+        let pixels = [[65_535, 32_768, 0, 16_384], [65_535, 65_535, 65_535, 0], [20_000, 20_000, 20_000, 65_535_u16]];
+        let image = image::ImageBuffer::<image::Rgba<u16>, _>::from_raw(3, 1, pixels.concat()).expect("three pixels");
+        image.save(&file).expect("written");
+        let viewing = Viewing::of(Display { eotf: Eotf::Linear, ..Display::default() });
+        let shown = InputPicture::read(&file, None).expect("read").displayed_rgb(None, &viewing);
+        for (shown, [codes @ .., alpha]) in shown.iter().zip(pixels) {
+            for (shown, code) in shown.iter().zip(codes) {
+                let light = f64::from(code) / 65_535.0 * f64::from(alpha) / 65_535.0;
+                let meant = viewing.display.luminance_cd_m2(light) as f32;
+                assert!((shown - meant).abs() < 1e-3 * meant, "{shown}, not {meant}");
+            }
+        }
     }
 }

@@ -53,7 +53,7 @@ impl<'a> AskedPresentation<'a> {
 #[derive(Debug, Args)]
 pub(super) struct SeeingArguments {
     /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file [default: the one that the
-    /// picture was made for, if its file says so; hdr-1000 for PQ; else desktop].
+    /// first picture whose file says so was made for; else hdr-1000, if one is in PQ; else desktop].
     #[arg(long, value_name = "NAME|FILE")]
     display: Option<String>,
     /// Contrast sensitivity function.
@@ -111,12 +111,15 @@ pub(super) fn viewing(display: &str, csf_area_deg2: Option<f64>) -> Result<Viewi
     viewing_on(find_display(display)?, csf_area_deg2)
 }
 
-/// The display that was asked for, else the one that the first of the pictures that says so was made for.
+/// The display that was asked for, else the one that the first of the pictures that says so was made for, else a likely one: what a file
+/// says goes before what another's codes only suggest, whichever is named first.
 pub(super) fn display_of(asked: Option<&str>, pictures: &[(&Path, &InputPicture)]) -> Result<Display> {
-    match asked {
-        Some(name) => find_display(name),
-        None => Ok(pictures.iter().find_map(|(_, picture)| picture.made_for()).cloned().unwrap_or_default()),
+    if let Some(name) = asked {
+        return find_display(name);
     }
+    let said = pictures.iter().find_map(|(_, picture)| picture.made_for()).cloned();
+    let likely = || pictures.iter().find_map(|(_, picture)| picture.likely_display());
+    Ok(said.or_else(likely).unwrap_or_default())
 }
 
 /// The viewing on a display.

@@ -11,12 +11,14 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::exr_read::ExrImage;
 use fechner::output::{self, Attribute, Format, PIXEL_ASPECT_RATIO, Picture};
+use fechner_perception::colour::chromatic_visibility;
 use fechner_perception::display::Glare;
-use fechner_perception::model::{self, ModelInputs};
+use fechner_perception::model::{self, ModelInputs, ThresholdModel};
 use fechner_perception::motion::image_velocity_deg_s;
+use fechner_perception::photometry::luminance;
 use fechner_perception::saliency::saliency_of_displayed;
 use fechner_perception::tone::FittedTone;
-use fechner_perception::tone::acuity::BehindAcuity;
+use fechner_perception::tone::acuity::{AcuityFilter, BehindAcuity};
 use fechner_perception::{ContrastSensitivity, GuideNoise, Plane, ThresholdInputs, Viewing, csf, threshold_map};
 use std::path::{Path, PathBuf};
 
@@ -26,10 +28,11 @@ pub(super) struct ThresholdArguments {
     /// Picture of any renderer, best without noise.
     input: PathBuf,
     /// EXR file to write: threshold.Y (standard error in display cd/m² at visibility 1), adaptation.Y and, with
-    /// --halves, visibility.Y by the model's thresholds.
+    /// --halves, visibility.Y by the model's thresholds, and by those of colour where the model is csf-bands.
     #[arg(short, long, value_name = "FILE.exr")]
     output: PathBuf,
-    /// Two renders with independent samples: half of their difference is the noise that is judged.
+    /// Two renders with independent samples: half of their difference is the noise that is judged, by csf-bands in luminance and in colour
+    /// (by castleCSF's, as at rest), of which the more visible counts; by any other model in luminance alone.
     #[arg(long, num_args = 2, value_names = ["A", "B"])]
     halves: Option<Vec<PathBuf>>,
     /// Motion in pixels a frame, for error that travels with what is shown. For the models csf-bands, yee and tvi-masked; the
@@ -126,7 +129,9 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     picture.push_f32("adaptation.Y", map.adaptation_cd_m2().values());
     let visibility = match &halves {
         Some(halves) => {
-            Some(model.measured_visibility(&inputs, &half_difference(halves, fitted.as_deref(), &viewing))?)
+            let difference = half_difference(halves, fitted.as_deref(), &viewing);
+            let guide = guide.displayed_rgb(fitted.as_deref(), &viewing);
+            Some(noise_visibility(model.as_ref(), &inputs, &guide, &difference, acuity)?)
         }
         None => None,
     };
@@ -176,10 +181,30 @@ fn read_halves(arguments: &ThresholdArguments, guide: &InputPicture) -> Result<O
     Ok(Some(halves))
 }
 
-/// (A − B)/2 as the display shows their colours.
-fn half_difference(halves: &[InputPicture; 2], fitted: Option<&dyn FittedTone>, viewing: &Viewing) -> Plane {
-    let [a, b] = halves.each_ref().map(|half| half.displayed_sharp(fitted, viewing));
-    a.combined(&b, |a, b| 0.5 * (a - b))
+/// (A − B)/2 as the display shows their colours, linear RGB in cd/m².
+fn half_difference(halves: &[InputPicture; 2], fitted: Option<&dyn FittedTone>, viewing: &Viewing) -> Vec<[f32; 3]> {
+    let [a, b] = halves.each_ref().map(|half| half.displayed_rgb_sharp(fitted, viewing));
+    a.iter().zip(&b).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] - b[c]))).collect()
+}
+
+/// How visible the noise of two halves is: by the model's own thresholds of luminance, and by those of colour where it is the default,
+/// which is the only one that is made for them. `guide_rgb` and `half_difference_rgb` are linear RGB of the display in cd/m².
+fn noise_visibility(
+    model: &dyn ThresholdModel,
+    inputs: &ModelInputs<'_>,
+    guide_rgb: &[[f32; 3]],
+    half_difference_rgb: &[[f32; 3]],
+    acuity: Option<AcuityFilter>,
+) -> Result<Plane> {
+    let shown = inputs.display_luminance_cd_m2;
+    let (width, height) = (shown.width(), shown.height());
+    let luminance = Plane::from_fn(width, height, |x, y| luminance(half_difference_rgb[y * width + x]));
+    let of_luminance = model.measured_visibility(inputs, &luminance)?;
+    if model.name() != model::DEFAULT {
+        return Ok(of_luminance);
+    }
+    let of_colour = chromatic_visibility(guide_rgb, half_difference_rgb, (width, height), inputs.viewing, acuity)?;
+    Ok(of_luminance.combined(&of_colour, f32::max))
 }
 
 /// How what a picture shows moves.

@@ -1,13 +1,12 @@
 //! `fechner tonemap`: HDR pictures as a display shows them to an eye, one by one or as a sequence in time.
 
-mod covered;
 mod names;
 mod sheet;
 mod write;
 
-use self::covered::Covered;
 use self::names::{frame_numbers, frames_since_last, targets};
 use self::write::write;
+use super::covered::Covered;
 use super::json::write_json;
 use super::numbers::{parse_positive, parse_stops, parse_unit};
 use super::picture::InputPicture;
@@ -131,12 +130,16 @@ impl SceneFrame {
             bail!("--gaze {x},{y} is outside {}, which has {width}x{height} pixels", path.display());
         }
         let light = SceneLight::with_rods(width, &rgb_cd_m2);
+        let light = match &alpha {
+            Some(alpha) => light.where_covered(alpha),
+            None => light,
+        };
         let gaze = arguments.gaze.map(|gaze| gaze.0);
         Ok(Self { width, rgb_cd_m2, light, gaze, viewing, display, pixel_aspect_ratio, alpha, part_of })
     }
 
-    fn guide(&self) -> SceneGuide<'_> {
-        self.light.guide().with_gaze(self.gaze)
+    fn guide_for(&self, operator: &dyn ToneOperator) -> SceneGuide<'_> {
+        self.light.guide_for(operator).with_gaze(self.gaze)
     }
 
     fn height(&self) -> usize {
@@ -145,12 +148,15 @@ impl SceneFrame {
 
     /// As it is seen before black.
     fn shown(&self, fitted: &dyn FittedTone) -> Vec<[f32; 3]> {
-        map_picture(fitted, self.width, &self.rgb_cd_m2)
+        match self.covered(fitted) {
+            Some(covered) => covered.premultiplied(),
+            None => map_picture(fitted, self.width, &self.rgb_cd_m2),
+        }
     }
 
     /// The same before whatever lies behind a picture with alpha.
     fn covered(&self, fitted: &dyn FittedTone) -> Option<Covered<'_>> {
-        Some(Covered::of(fitted, self.width, &self.rgb_cd_m2, self.alpha.as_deref()?))
+        Some(Covered::of(fitted, map_picture, self.width, &self.rgb_cd_m2, self.alpha.as_deref()?))
     }
 }
 
@@ -189,9 +195,9 @@ pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
     for ((input, target), frames) in arguments.input.iter().zip(&targets).zip(steps) {
         let frame = SceneFrame::read(input, arguments, &viewing)?;
         let viewing = &frame.viewing;
-        let goal = operator.goal(&frame.guide(), viewing.display.pixel_density());
+        let goal = operator.goal(&frame.guide_for(operator.as_ref()), viewing.display.pixel_density());
         let state = eye.as_mut().map(|eye| eye.look_at(goal, frames));
-        let fitted = operator.fit(&frame.guide(), viewing, state.as_ref());
+        let fitted = operator.fit(&frame.guide_for(operator.as_ref()), viewing, state.as_ref());
         write(target, format, &frame, fitted.as_ref(), state.as_ref())?;
         answer!("{}: {}", target.display(), fitted.describe());
     }

@@ -4,6 +4,45 @@ use crate::output::{Attribute, FRAMES_PER_SECOND, PartOf};
 use ::exr::meta::attribute::{AttributeValue, Text};
 use ::exr::meta::header::Header;
 use ::exr::prelude::Vec2;
+use fechner_perception::primaries::Primaries;
+
+/// The attribute that names a colour space (OpenEXR's standard attributes, by the registry of the Color Interop Forum).
+pub(super) const COLOR_INTEROP_ID: &str = "colorInteropID";
+/// The flag of SMPTE ST 2065-4, whose files hold ACES 2065-1.
+const ACES_CONTAINER: &str = "acesImageContainerFlag";
+
+/// Primaries and white of R, G and B: as chromaticities, else by the name of a linear colour space, else as those of an ACES container.
+pub(super) fn primaries(header: &Header) -> Option<Primaries> {
+    let point = |Vec2(x, y): Vec2<f32>| [f64::from(x), f64::from(y)];
+    let said = header.shared_attributes.chromaticities.map(|c| Primaries {
+        red: point(c.red),
+        green: point(c.green),
+        blue: point(c.blue),
+        white: point(c.white),
+    });
+    let all = attributes(header);
+    let of = |name: &str| all.iter().find(|(own, _)| own == name).map(|(_, value)| value);
+    let named = || match of(COLOR_INTEROP_ID) {
+        Some(Attribute::Text(id)) => linear_primaries(id),
+        _ => None,
+    };
+    let of_container = || (of(ACES_CONTAINER) == Some(&Attribute::Integer(1))).then_some(Primaries::ACES_AP0);
+    said.or_else(named).or_else(of_container)
+}
+
+/// Primaries of a linear colour space by its ID; `None` for curves, displays, data, and what is not known.
+pub(super) fn linear_primaries(id: &str) -> Option<Primaries> {
+    match id {
+        "lin_ap0_scene" => Some(Primaries::ACES_AP0),
+        "lin_ap1_scene" => Some(Primaries::ACES_AP1),
+        "lin_rec709_scene" => Some(Primaries::REC709),
+        "lin_p3d65_scene" => Some(Primaries::DISPLAY_P3),
+        "lin_rec2020_scene" => Some(Primaries::REC2020),
+        "lin_adobergb_scene" => Some(Primaries::ADOBE_RGB),
+        "lin_ciexyzd65_scene" => Some(Primaries::XYZ),
+        _ => None,
+    }
+}
 
 /// What the header says besides the pixels' layout, sorted by name.
 pub(super) fn attributes(header: &Header) -> Vec<(String, Attribute)> {

@@ -1,6 +1,8 @@
 //! The colours that an EXR file means: its own primaries, luminance and chroma, the window that is to be shown.
 
+use super::attributes::{COLOR_INTEROP_ID, linear_primaries};
 use super::{ExrImage, Window};
+use crate::output::Attribute;
 use fechner_perception::primaries::{Primaries, apply};
 
 /// The picture that a file is meant to show.
@@ -52,6 +54,7 @@ impl ExrImage {
             }
             make_finite(&mut [rgb.as_flattened_mut()]);
         }
+        notes.extend(self.colour_space_not_heeded());
         if self.lines_left_out > 0 {
             notes.push(format!("the last {} lines could not be read", self.lines_left_out));
         }
@@ -65,6 +68,19 @@ impl ExrImage {
             notes.push("its display window cannot be shown: all of the data is".to_owned());
         }
         Some(ScenePicture { width, height, rgb, notes })
+    }
+
+    /// What to say of a named colour space that is not linear light of known primaries. Data has no colours, and other parts of a file may be
+    /// some.
+    fn colour_space_not_heeded(&self) -> Option<String> {
+        let Some(Attribute::Text(id)) = self.attribute(COLOR_INTEROP_ID) else { return None };
+        let is_heeded = linear_primaries(id).is_some() || ["data", "unknown"].contains(&id.as_str());
+        let taken_for = if self.chromaticities.is_some() { "its chromaticities" } else { "Rec.709" };
+        (!is_heeded).then(|| {
+            format!(
+                "its {COLOR_INTEROP_ID} \"{id}\" is not heeded: its colours are taken for linear light of {taken_for}"
+            )
+        })
     }
 
     pub(super) fn data_window(&self) -> Window {

@@ -1,6 +1,7 @@
 use super::*;
 use crate::output::{Picture, write_exr};
 use ::exr::meta::MetaData;
+use ::exr::meta::attribute::AttributeValue;
 use ::exr::prelude::{
     AnyChannel, AnyChannels, Blocks, Compression, Encoding, Image, ImageAttributes, IntegerBounds, Layer,
     LayerAttributes, LineOrder, WritableImage, f16,
@@ -254,4 +255,48 @@ fn only_channels_that_are_asked_for_are_read() {
     assert_eq!(refused(depth_alone), None);
     let message = refused(|all| all.to_vec()).unwrap();
     assert!(message.contains("8192×24000 pixels of 2 channels need 1500 MiB"), "{message}");
+}
+
+/// The named linear spaces of the Color Interop Forum, and the flag of an ACES container, say what chromaticities would: AP1's red was taken
+/// for Rec.709's.
+#[test]
+fn colour_spaces_are_known_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.exr");
+    let read = |name: &str, value: AttributeValue| {
+        let channel = |name: &str, value: f32| AnyChannel::new(name, FlatSamples::F32(vec![value; 4]));
+        let channels = [channel("R", 0.5), channel("G", 0.25), channel("B", 0.125)];
+        let mut attributes = LayerAttributes::default();
+        attributes.other.insert(Text::new_or_none(name).unwrap(), value);
+        let channels = AnyChannels::sort(channels.into_iter().collect());
+        Image::from_layer(Layer::new((2, 2), attributes, Encoding::FAST_LOSSLESS, channels))
+            .write()
+            .to_file(&path)
+            .unwrap();
+        let shown = read_exr(&path).unwrap().scene_picture(|image, name| image.channel(name)).unwrap();
+        (shown.rgb[0], shown.notes)
+    };
+    let named = |id: &str| read("colorInteropID", AttributeValue::Text(Text::new_or_none(id).unwrap()));
+    let meant = |primaries: Primaries| {
+        let matrix = primaries.to(&Primaries::REC709).unwrap();
+        fechner_perception::primaries::apply(&matrix, [0.5, 0.25, 0.125]).map(|channel| channel as f32)
+    };
+    for (id, primaries) in [
+        ("lin_ap0_scene", Primaries::ACES_AP0),
+        ("lin_ap1_scene", Primaries::ACES_AP1),
+        ("lin_rec709_scene", Primaries::REC709),
+        ("lin_p3d65_scene", Primaries::DISPLAY_P3),
+        ("lin_rec2020_scene", Primaries::REC2020),
+        ("lin_adobergb_scene", Primaries::ADOBE_RGB),
+        ("lin_ciexyzd65_scene", Primaries::XYZ),
+    ] {
+        let (found, notes) = named(id);
+        assert!(found.iter().zip(meant(primaries)).all(|(a, b)| (a - b).abs() < 1e-6), "{id}: {found:?}");
+        assert_eq!(notes.len(), usize::from(primaries != Primaries::REC709), "{id}: {notes:?}");
+    }
+    let (container, _) = read("acesImageContainerFlag", AttributeValue::I32(1));
+    assert_eq!(container, named("lin_ap0_scene").0);
+    let (taken, notes) = named("srgb_rec709_scene");
+    assert!(taken == [0.5, 0.25, 0.125] && notes[0].contains("\"srgb_rec709_scene\" is not heeded"), "{notes:?}");
+    assert!(named("data").1.is_empty());
 }

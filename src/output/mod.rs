@@ -21,8 +21,8 @@ pub use frame_rate::FRAMES_PER_SECOND;
 pub(crate) use frame_rate::fraction;
 pub(crate) use png_file::{PROFILE_NOT_READ, names_srgb};
 pub use png_file::{
-    PngColour, PngTransfer, decode_pq, encode_srgb8, png_colour, write_codes_png, write_png, write_png_for,
-    write_png_with_alpha_for, write_pq_png,
+    PngColour, PngTransfer, Shown, decode_pq, encode_srgb8, png_colour, png_pixel_aspect_ratio, write_codes_png,
+    write_png, write_png_for, write_png_with_alpha_for, write_pq_png, write_shown_png,
 };
 
 use crate::integrator::{Crop, TraceSettings};

@@ -51,14 +51,14 @@ pub fn write_pq_png(
     display: &Display,
 ) -> Result<(), OutputError> {
     check_size(path, width, height, &[("the picture", rgb_linear_display.len())])?;
-    write_pq_bytes(path, width, height, png::ColorType::Rgb, &encode_pq16(rgb_linear_display, display))
+    write_pq_bytes(path, (width, height), 1.0, png::ColorType::Rgb, &encode_pq16(rgb_linear_display, display))
 }
 
 /// Writes 16-bit samples, tagged as PQ.
 fn write_pq_bytes(
     path: &Path,
-    width: u32,
-    height: u32,
+    (width, height): (u32, u32),
+    pixel_aspect_ratio: f64,
     color: png::ColorType,
     bytes: &[u8],
 ) -> Result<(), OutputError> {
@@ -68,6 +68,7 @@ fn write_pq_bytes(
         encoder.set_color(color);
         encoder.set_depth(png::BitDepth::Sixteen);
         encoder.set_compression(COMPRESSION);
+        encoder.set_pixel_dims(pixel_shape(pixel_aspect_ratio));
         let mut writer = encoder.write_header()?;
         writer.write_chunk(png::chunk::ChunkType(*b"cICP"), &CICP_BT2020_PQ)?;
         writer.write_image_data(bytes)?;
@@ -213,13 +214,26 @@ fn coded_primaries(number: u8) -> Option<Primaries> {
 /// channels so that greys stay grey, by a hash of the pixel's place so that equal pixels give equal files.
 pub fn write_png(path: &Path, width: u32, height: u32, rgb_linear_display: &[[f32; 3]]) -> Result<(), OutputError> {
     check_size(path, width, height, &[("the picture", rgb_linear_display.len())])?;
-    write_bytes(path, width, height, png::ColorType::Rgb, &encode_srgb8(width, rgb_linear_display))
+    write_bytes(path, (width, height), 1.0, png::ColorType::Rgb, &encode_srgb8(width, rgb_linear_display))
 }
 
 /// Writes 8-bit sRGB codes, RGB after RGB, as they are.
 pub fn write_codes_png(path: &Path, width: u32, height: u32, rgb8: &[u8]) -> Result<(), OutputError> {
     check_size(path, width, height, &[("the picture", rgb8.len() / 3)])?;
-    write_bytes(path, width, height, png::ColorType::Rgb, rgb8)
+    write_bytes(path, (width, height), 1.0, png::ColorType::Rgb, rgb8)
+}
+
+/// A picture that is a PNG's in all but its bytes.
+#[derive(Clone, Copy, Debug)]
+pub struct Shown<'a> {
+    /// Columns and rows.
+    pub size: (u32, u32),
+    /// Linear display RGB, row by row: 0 is the display's black and 1 its white.
+    pub rgb_linear_display: &'a [[f32; 3]],
+    /// How much of each pixel is covered, 0 to 1, by which the colours are not multiplied.
+    pub alpha: Option<&'a [f32]>,
+    /// Width of a pixel over its height.
+    pub pixel_aspect_ratio: f64,
 }
 
 /// [`write_png_for`] with an alpha in [0, 1] a pixel, by which the colours are not multiplied.
@@ -231,32 +245,57 @@ pub fn write_png_with_alpha_for(
     alpha: &[f32],
     display: &Display,
 ) -> Result<(), OutputError> {
-    check_size(path, width, height, &[("the picture", rgb_linear_display.len()), ("alpha", alpha.len())])?;
+    let size = (width, height);
+    write_shown_png(path, &Shown { size, rgb_linear_display, alpha: Some(alpha), pixel_aspect_ratio: 1.0 }, display)
+}
+
+/// [`write_png_for`] of a picture that may have an alpha, and pixels that are not square, which its chunk pHYs says.
+pub fn write_shown_png(path: &Path, picture: &Shown<'_>, display: &Display) -> Result<(), OutputError> {
+    let Shown { size: (width, height), rgb_linear_display, alpha, pixel_aspect_ratio } = *picture;
+    let counts = [Some(("the picture", rgb_linear_display.len())), alpha.map(|alpha| ("alpha", alpha.len()))];
+    check_size(path, width, height, &counts.into_iter().flatten().collect::<Vec<_>>())?;
+    let color = if alpha.is_some() { png::ColorType::Rgba } else { png::ColorType::Rgb };
     if display.eotf == Eotf::Pq {
-        let colors = encode_pq16(rgb_linear_display, display);
-        let alphas = alpha.iter().map(|a| (a.clamp(0.0, 1.0) * 65_535.0 + 0.5) as u16);
-        let bytes: Vec<u8> = colors
-            .chunks_exact(6)
-            .zip(alphas)
-            .flat_map(|(rgb, a)| rgb.iter().copied().chain(a.to_be_bytes()))
-            .collect();
-        return write_pq_bytes(path, width, height, png::ColorType::Rgba, &bytes);
+        let code = |alpha: f32, bytes: &mut Vec<u8>| bytes.extend(((alpha * 65_535.0 + 0.5) as u16).to_be_bytes());
+        let bytes = with_alpha(encode_pq16(rgb_linear_display, display), 6, alpha, code);
+        return write_pq_bytes(path, (width, height), pixel_aspect_ratio, color, &bytes);
     }
-    let colors = encode_srgb8(width, rgb_linear_display);
-    let alphas = alpha.iter().map(|a| (a.clamp(0.0, 1.0) * 255.0 + 0.5) as u8);
-    let bytes: Vec<u8> =
-        colors.as_chunks::<3>().0.iter().zip(alphas).flat_map(|(&[r, g, b], a)| [r, g, b, a]).collect();
-    write_bytes(path, width, height, png::ColorType::Rgba, &bytes)
+    let code = |alpha: f32, bytes: &mut Vec<u8>| bytes.push((alpha * 255.0 + 0.5) as u8);
+    let bytes = with_alpha(encode_srgb8(width, rgb_linear_display), 3, alpha, code);
+    write_bytes(path, (width, height), pixel_aspect_ratio, color, &bytes)
+}
+
+/// Samples of `bytes_a_pixel` with those of an alpha behind each.
+fn with_alpha(
+    colors: Vec<u8>,
+    bytes_a_pixel: usize,
+    alpha: Option<&[f32]>,
+    code: impl Fn(f32, &mut Vec<u8>),
+) -> Vec<u8> {
+    let Some(alpha) = alpha else { return colors };
+    let mut bytes = Vec::with_capacity(colors.len() / 3 * 4);
+    for (rgb, &alpha) in colors.chunks_exact(bytes_a_pixel).zip(alpha) {
+        bytes.extend_from_slice(rgb);
+        code(alpha.clamp(0.0, 1.0), &mut bytes);
+    }
+    bytes
 }
 
 /// Writes 8-bit samples, tagged as sRGB.
-fn write_bytes(path: &Path, width: u32, height: u32, color: png::ColorType, bytes: &[u8]) -> Result<(), OutputError> {
+fn write_bytes(
+    path: &Path,
+    (width, height): (u32, u32),
+    pixel_aspect_ratio: f64,
+    color: png::ColorType,
+    bytes: &[u8],
+) -> Result<(), OutputError> {
     write_beside(path, |file| {
         let mut buffered = BufWriter::new(file);
         let mut encoder = png::Encoder::new(&mut buffered, width, height);
         encoder.set_color(color);
         encoder.set_depth(png::BitDepth::Eight);
         encoder.set_compression(COMPRESSION);
+        encoder.set_pixel_dims(pixel_shape(pixel_aspect_ratio));
         encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
         // For readers that know only these; the values are those that the format's standard names beside sRGB.
         encoder.set_source_gamma(png::ScaledFloat::from_scaled(45_455));
@@ -271,6 +310,32 @@ fn write_bytes(path: &Path, width: u32, height: u32, color: png::ColorType, byte
         writer.finish()?;
         buffered.flush()
     })
+}
+
+/// A pHYs chunk that says the shape of pixels and not their size; none for square ones.
+fn pixel_shape(pixel_aspect_ratio: f64) -> Option<png::PixelDimensions> {
+    /// Columns in a unit, so that the rows have five digits.
+    const COLUMNS: f64 = 1e5;
+    let yppu = (COLUMNS * pixel_aspect_ratio).round() as u32;
+    let is_square = (pixel_aspect_ratio - 1.0).abs() < SQUARE_WITHIN;
+    (!is_square && yppu > 0).then_some(png::PixelDimensions {
+        xppu: COLUMNS as u32,
+        yppu,
+        unit: png::Unit::Unspecified,
+    })
+}
+
+/// Pixels that are square but for this are square: whole pixels a metre are rounded.
+const SQUARE_WITHIN: f64 = 1e-3;
+/// Width over height that a pixel can have, as in an EXR file.
+const PIXEL_ASPECT_RATIOS: std::ops::RangeInclusive<f64> = 0.01..=100.0;
+
+/// Width of a pixel over its height by a PNG's chunk pHYs, in whatever unit; 1 for what says nothing or nothing that a pixel can have.
+pub fn png_pixel_aspect_ratio(bytes: &[u8]) -> f64 {
+    let Ok(reader) = png::Decoder::new(std::io::Cursor::new(bytes)).read_info() else { return 1.0 };
+    let Some(shape) = reader.info().pixel_dims else { return 1.0 };
+    let ratio = f64::from(shape.yppu) / f64::from(shape.xppu);
+    if PIXEL_ASPECT_RATIOS.contains(&ratio) && (ratio - 1.0).abs() >= SQUARE_WITHIN { ratio } else { 1.0 }
 }
 
 /// The bytes of [`write_png`]: sRGB-encoded, dithered, RGB after RGB, row after row.
@@ -431,6 +496,41 @@ mod tests {
         assert_eq!((tag, bytes.len()), (Some(16), 16));
         assert_eq!((&bytes[..6], &bytes[6..8]), (&opaque[..6], &[255, 255][..]));
         assert_eq!((&bytes[8..14], &bytes[14..]), (&opaque[6..], &[0, 0][..]));
+    }
+
+    /// Pixels twice as wide as high stay so, in sRGB and in PQ, with alpha and without; whole pixels a metre that differ by rounding are square.
+    #[test]
+    fn the_shape_of_pixels_is_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        let read = |display: &str, alpha: Option<&[f32]>, pixel_aspect_ratio: f64| {
+            let shown = Shown { size: (1, 1), rgb_linear_display: &[[0.5; 3]], alpha, pixel_aspect_ratio };
+            write_shown_png(&path, &shown, &Display::preset(display).unwrap()).unwrap();
+            png_pixel_aspect_ratio(&std::fs::read(&path).unwrap())
+        };
+        for display in ["desktop", "hdr-1000"] {
+            for alpha in [None, Some(&[0.5][..])] {
+                for ratio in [1.0, 2.0, 0.5, 1.422_22] {
+                    assert!((read(display, alpha, ratio) - ratio).abs() < 1e-5, "{display}, {alpha:?}, {ratio}");
+                }
+            }
+        }
+        read("desktop", None, 1.0);
+        assert!(!chunk_names(&std::fs::read(&path).unwrap()).iter().any(|name| name == "pHYs"));
+        let of_metres = |xppu: u32, yppu: u32| {
+            let mut bytes = Vec::new();
+            let mut encoder = png::Encoder::new(&mut bytes, 1, 1);
+            encoder.set_pixel_dims(Some(png::PixelDimensions { xppu, yppu, unit: png::Unit::Meter }));
+            let mut writer = encoder.write_header().unwrap();
+            writer.write_image_data(&[7]).unwrap();
+            writer.finish().unwrap();
+            png_pixel_aspect_ratio(&bytes)
+        };
+        for ((x, y), meant) in
+            [((2835, 2835), 1.0), ((2835, 2834), 1.0), ((2000, 4000), 2.0), ((0, 4000), 1.0), ((1, 5000), 1.0)]
+        {
+            assert_eq!(of_metres(x, y), meant, "{x} and {y} a metre");
+        }
     }
 
     #[test]

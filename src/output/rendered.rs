@@ -9,7 +9,7 @@ use crate::adaptive::statistics::picture_variance;
 use crate::film::{Film, PixelGuide};
 use crate::sampler::Half;
 use fechner_perception::display::Display;
-use fechner_perception::tone::{FittedTone, map_picture};
+use fechner_perception::tone::map_picture;
 use std::path::Path;
 
 /// What is where no surface covers the picture.
@@ -39,23 +39,17 @@ pub fn write_display_png(
         }
         Background::Transparent => {
             let coverage = rendered.film.coverage();
-            let shown = shown_where_covered(judgement.tone.as_ref(), width as usize, picture, &coverage);
+            let covering = light_of_what_covers(picture, &coverage);
+            let shown = map_picture(judgement.tone.as_ref(), width as usize, &covering);
             write_png_with_alpha_for(path, width, height, &shown, &coverage, display)
         }
     }
 }
 
-/// Display light of what covers each pixel, for a picture in cd/m² that is multiplied by its alpha.
-pub fn shown_where_covered(
-    fitted: &dyn FittedTone,
-    width: usize,
-    rgb_cd_m2: &[[f32; 3]],
-    alpha: &[f32],
-) -> Vec<[f32; 3]> {
+/// Light of what covers each pixel, for a picture that is multiplied by its alpha: none where nothing does.
+pub fn light_of_what_covers(rgb: &[[f32; 3]], alpha: &[f32]) -> Vec<[f32; 3]> {
     let scale = |alpha: f32| if alpha > 0.0 { 1.0 / alpha } else { 0.0 };
-    let covering: Vec<[f32; 3]> =
-        rgb_cd_m2.iter().zip(alpha).map(|(rgb, &alpha)| rgb.map(|value| value * scale(alpha))).collect();
-    map_picture(fitted, width, &covering)
+    rgb.iter().zip(alpha).map(|(rgb, &alpha)| rgb.map(|value| value * scale(alpha))).collect()
 }
 
 /// Writes the picture in scene units with its layers: alpha (premultiplied) where the background is transparent, albedo,

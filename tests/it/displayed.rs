@@ -3,7 +3,7 @@
 
 use assert_cmd::Command;
 use fechner::exr_read::read_exr;
-use fechner::output::{Attribute, NITS_PER_UNIT, Picture, write_exr, write_png};
+use fechner::output::{Attribute, NITS_PER_UNIT, PIXEL_ASPECT_RATIO, Picture, write_exr, write_png};
 use fechner_perception::display::Eotf;
 use fechner_perception::primaries::{Primaries, apply};
 use std::path::Path;
@@ -68,6 +68,29 @@ fn noise_beside_a_clipped_channel_is_seen() {
             (mean(folder.path(), "t.exr", "adaptation.Y"), mean(folder.path(), "t.exr", "visibility.Y"));
         assert!(adaptation < 60.0 && seen > 1.0, "{operator}: adapted to {adaptation} cd/m², visibility {seen}");
     }
+}
+
+/// Noise of red against green has no luminance: two such halves were 0.12 visible, while `compare` tells their mean from the truth at 3.0.
+#[test]
+fn noise_of_colour_is_seen_in_halves() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let noise = |key| {
+        move |pixel| {
+            let red = 69.0 * random(pixel, key);
+            [100.0 + red, 100.0 - red * 0.2126 / 0.7152, 100.0]
+        }
+    };
+    write(folder.path(), "g.exr", |_| [100.0; 3]);
+    write(folder.path(), "a.exr", noise(1));
+    write(folder.path(), "b.exr", noise(2));
+    let seen = |model: &str| {
+        let halves = ["threshold", "g.exr", "--halves", "a.exr", "b.exr", "-o", "t.exr"];
+        let how = ["--operator", "absolute", "--display", "hdr-1000", "--model", model];
+        run(folder.path(), &[&halves[..], &how[..]].concat());
+        mean(folder.path(), "t.exr", "visibility.Y")
+    };
+    assert!(seen("csf-bands") > 1.5, "{}", seen("csf-bands"));
+    assert!(seen("tvi") < 0.1, "of a model of luminance {}", seen("tvi"));
 }
 
 /// Halves in scene light are shown by the operator even where the guide is ready for the display.
@@ -156,19 +179,90 @@ fn a_render_is_seen_as_it_was_judged() {
     }
 }
 
-/// Premultiplied in the EXR file and straight in the PNG, a transparent picture is one.
+/// Premultiplied in the EXR file and straight in the PNG, a transparent picture is one: by operators that scale light and by those that
+/// do not, which made another picture of light times alpha (50 by ferwerda96), in sRGB and in PQ.
 #[test]
 fn transparent_pictures_are_seen_alike() {
     let folder = tempfile::tempdir().expect("a folder");
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/meshes/chess-pawn.obj");
     let sky = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/skies/studio.hdr");
+    for how in [
+        &["--operator", "constant"][..],
+        &["--operator", "constant", "--display", "hdr-1000"],
+        &["--operator", "ferwerda96"],
+        &["--operator", "pattanaik00"],
+        &["--operator", "durand-dorsey00"],
+        &["--operator", "ward94"],
+    ] {
+        for name in ["a.exr", "a.png"] {
+            let common =
+                ["render", scene, "--environment", sky, "--transparent", "--size", "48x48", "--plans", "1", "-o", name];
+            run(folder.path(), &[&common[..], how].concat());
+        }
+        let (_, said) = fechner(folder.path(), &["compare", "a.exr", "a.png"]);
+        assert!(visibility(&said) < 1.5 && said.contains("before black"), "{how:?}: {said}");
+    }
+}
+
+/// What a file says of its display goes before what another's curve suggests, whichever is named first: it was 0.4 and 25.
+#[test]
+fn a_display_that_is_told_goes_before_a_guess() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let display =
+        "name = 'mine'\npixels_per_degree = 110\nwhite_cd_m2 = 600\nblack_cd_m2 = 0.4\nambient_cd_m2 = 30\neotf = 'pq'";
+    std::fs::write(folder.path().join("my.toml"), display).expect("written");
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box.toml");
     for name in ["a.exr", "a.png"] {
-        let common =
-            ["render", scene, "--environment", sky, "--transparent", "--size", "48x48", "--plans", "1", "-o", name];
+        let common = ["render", scene, "--size", "32x32", "--spp", "16", "--display", "my.toml", "-o", name];
         run(folder.path(), &common);
     }
-    let (_, said) = fechner(folder.path(), &["compare", "a.exr", "a.png"]);
-    assert!(visibility(&said) < 1.5 && said.contains("before black"), "{said}");
+    for [reference, test] in [["a.exr", "a.png"], ["a.png", "a.exr"]] {
+        let (_, said) = fechner(folder.path(), &["compare", reference, test]);
+        assert!(visibility(&said) < 1.0 && said.contains("on \"mine\""), "{reference} first: {said}");
+    }
+}
+
+/// What alpha says is not there is no night: eyes that took it for one showed a figure in daylight flat white. By a render and by `tonemap`.
+#[test]
+fn eyes_adapt_to_what_is_there() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/meshes/chess-pawn.obj");
+    for operator in ["pattanaik00", "ferwerda96", "ward94", "durand-dorsey00", "scheel00", "ward-larson97"] {
+        let how = ["--size", "32x32", "--sampling", "uniform", "--spp", "16", "--operator", operator, "-o"];
+        for name in ["a.png", "a.exr"] {
+            let common = ["render", scene, "--environment", "sky:30,60", "--transparent"];
+            run(folder.path(), &[&common[..], &how[..], &[name]].concat());
+        }
+        run(folder.path(), &["tonemap", "a.exr", "-o", "b.png", "--operator", operator]);
+        for name in ["a.png", "b.png"] {
+            let picture = image::open(folder.path().join(name)).expect("a picture").into_rgba8();
+            let whole: Vec<u8> = picture.pixels().filter(|pixel| pixel.0[3] == 255).map(|pixel| pixel.0[1]).collect();
+            let white = whole.iter().filter(|&&code| code == 255).count();
+            // Sunlit sides are white to some.
+            assert!(!whole.is_empty() && 4 * white < 3 * whole.len(), "{operator}, {name}: {white} of {}", whole.len());
+        }
+        let (_, said) = fechner(folder.path(), &["compare", "a.exr", "a.png"]);
+        assert!(visibility(&said) < 1.5, "{operator}: {said}");
+    }
+}
+
+/// Pixels twice as wide as high are so in the PNG too, which was judged as if they were square, or refused.
+#[test]
+fn the_shape_of_pixels_is_kept_in_a_png() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut picture = Picture::new(SIDE as u32, SIDE as u32);
+    for letter in ["R", "G", "B"] {
+        picture.push_f32(letter, (0..SIDE * SIDE).map(|pixel| 50.0 + 20.0 * random(pixel, 4)).collect::<Vec<_>>());
+    }
+    picture.push_attribute(NITS_PER_UNIT, Attribute::Float(1.0));
+    picture.push_attribute(PIXEL_ASPECT_RATIO, Attribute::Float(2.0));
+    write_exr(&folder.path().join("a.exr"), &picture).expect("written");
+    for display in ["desktop", "hdr-1000"] {
+        let how = ["--operator", "absolute", "--display", display];
+        run(folder.path(), &[&["tonemap", "a.exr", "-o", "a.png"][..], &how[..]].concat());
+        let said = run(folder.path(), &[&["compare", "a.exr", "a.png"][..], &how[..]].concat());
+        assert!(visibility(&said) < 1.0 && said.contains("at 30 pixels"), "{said}");
+    }
 }
 
 /// Who names no display sees a render on the one that it was made for.

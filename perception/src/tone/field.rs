@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::guide::{Pixel, SceneGuide};
+use super::statistics::filled;
 use crate::adaptation::{Mean, local_adaptation_cd_m2};
 use crate::display::Display;
 use crate::plane::Plane;
@@ -67,10 +68,8 @@ impl LocalAdaptation {
         if scope == AdaptationScope::World {
             return Self::default();
         }
-        let local = |plane: &Plane| {
-            let clean = plane.map(|value| if value.is_finite() { value.max(0.0) } else { 0.0 });
-            local_adaptation_cd_m2(&clean, display, Mean::Geometric).ok().map(FrozenPlane::of)
-        };
+        let local =
+            |plane: &Plane| local_adaptation_cd_m2(&filled(plane), display, Mean::Geometric).ok().map(FrozenPlane::of);
         let rods = guide.scotopic_cd_m2.is_some().then(|| local(guide.rods())).flatten();
         Self { cones: local(guide.luminance_cd_m2), rods }
     }

@@ -19,7 +19,7 @@ impl Pixel {
 /// What an operator may look at when it is fitted.
 #[derive(Clone, Copy, Debug)]
 pub struct SceneGuide<'a> {
-    /// Scene luminance of the denoised guide, cd/m².
+    /// Scene luminance of the denoised guide, cd/m²; NaN where nothing is, neither light nor darkness.
     pub luminance_cd_m2: &'a Plane,
     /// The same as the rods see it ([`scotopic_luminance`](crate::photometry::scotopic_luminance)); the photopic luminance stands in where it is not given or
     /// has another size.

@@ -97,6 +97,11 @@ pub trait ToneOperator: Send + Sync + Debug {
         false
     }
 
+    /// Whether darkness in the guide changes what it shows, as it does to eyes. Cameras leave it out.
+    fn counts_darkness(&self) -> bool {
+        self.sees_adaptation()
+    }
+
     /// Whether it looks at what the rods see of the guide ([`SceneGuide::scotopic_cd_m2`]).
     fn sees_rods(&self) -> bool {
         false

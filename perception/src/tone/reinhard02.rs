@@ -52,7 +52,12 @@ fn surround(luminance_cd_m2: &Plane, scale: f64) -> Plane {
     const SCALES: i32 = 8;
     const PHI: f32 = 8.0;
     const EPSILON: f32 = 0.05;
-    let scaled = luminance_cd_m2.map(|value| finite(scale * f64::from(if value.is_finite() { value } else { 0.0 })));
+    let scaled = luminance_cd_m2.map(|value| match value {
+        value if value.is_finite() => finite(scale * f64::from(value)),
+        // Where nothing is, the surround is the average.
+        value if value.is_nan() => KEY as f32,
+        _ => 0.0,
+    });
     // A profile of exp(−r² / (0.35 s)²) has σ = 0.35 s / √2.
     let at = |step: i32| gaussian_blur(&scaled, 0.35 * 1.6_f64.powi(step) / 2.0_f64.sqrt());
     let mut center = at(0);

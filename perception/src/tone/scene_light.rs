@@ -9,6 +9,15 @@ use crate::plane::Plane;
 pub struct SceneLight {
     photopic_cd_m2: Plane,
     scotopic_cd_m2: Option<Plane>,
+    /// The same of what covers each pixel, where that is not all of all.
+    covering: Option<Covering>,
+}
+
+/// Light of what covers each pixel; NaN where nothing does.
+#[derive(Clone, Debug)]
+struct Covering {
+    photopic_cd_m2: Plane,
+    scotopic_cd_m2: Option<Plane>,
 }
 
 impl SceneLight {
@@ -24,14 +33,46 @@ impl SceneLight {
     #[must_use]
     pub fn of(operator: &dyn ToneOperator, width: usize, rgb_cd_m2: &[[f32; 3]]) -> Self {
         let scotopic_cd_m2 = operator.sees_rods().then(|| plane(width, rgb_cd_m2, scotopic_luminance));
-        Self { photopic_cd_m2: plane(width, rgb_cd_m2, luminance), scotopic_cd_m2 }
+        Self { photopic_cd_m2: plane(width, rgb_cd_m2, luminance), scotopic_cd_m2, covering: None }
     }
 
     /// The same for whatever operator may come.
     #[must_use]
     pub fn with_rods(width: usize, rgb_cd_m2: &[[f32; 3]]) -> Self {
         let scotopic_cd_m2 = Some(plane(width, rgb_cd_m2, scotopic_luminance));
-        Self { photopic_cd_m2: plane(width, rgb_cd_m2, luminance), scotopic_cd_m2 }
+        Self { photopic_cd_m2: plane(width, rgb_cd_m2, luminance), scotopic_cd_m2, covering: None }
+    }
+
+    /// The same of a picture that covers of each pixel this share, 0 to 1, and whose light is multiplied by it. What is not there is no
+    /// darkness to adapt to. An alpha of another size is not looked at.
+    ///
+    /// ```
+    /// use fechner_perception::tone::{SceneLight, operator};
+    /// let half_there = SceneLight::with_rods(2, &[[80.0; 3], [0.0; 3]]).where_covered(&[1.0, 0.0]);
+    /// let eye = operator("ward94", None).unwrap();
+    /// assert!(half_there.guide_for(eye.as_ref()).luminance_cd_m2.get(1, 0).is_nan());
+    /// ```
+    #[must_use]
+    pub fn where_covered(mut self, alpha: &[f32]) -> Self {
+        let is_partly = alpha.len() == self.photopic_cd_m2.values().len() && alpha.iter().any(|&alpha| alpha < 1.0);
+        self.covering = is_partly.then(|| Covering {
+            photopic_cd_m2: light_of_what_covers(&self.photopic_cd_m2, alpha),
+            scotopic_cd_m2: self.scotopic_cd_m2.as_ref().map(|plane| light_of_what_covers(plane, alpha)),
+        });
+        self
+    }
+
+    /// The light of the picture as it is.
+    fn all(&self) -> (&Plane, Option<&Plane>) {
+        (&self.photopic_cd_m2, self.scotopic_cd_m2.as_ref())
+    }
+
+    /// What eyes look at.
+    fn there(&self) -> (&Plane, Option<&Plane>) {
+        match &self.covering {
+            Some(covering) => (&covering.photopic_cd_m2, covering.scotopic_cd_m2.as_ref()),
+            None => self.all(),
+        }
     }
 
     /// Pictures one below the other, each enlarged to `width` × `height` by repeating its pixels: a guide to all of them, for operators
@@ -44,20 +85,32 @@ impl SceneLight {
                 plane.get(x * plane.width() / width, y % height * plane.height() / height)
             })
         };
-        let scotopic: Option<Vec<&Plane>> = pictures.iter().map(|picture| picture.scotopic_cd_m2.as_ref()).collect();
-        Self {
-            photopic_cd_m2: stacked(pictures.iter().map(|picture| &picture.photopic_cd_m2).collect()),
-            scotopic_cd_m2: scotopic.map(stacked),
-        }
+        let both = |planes: Vec<(&Plane, Option<&Plane>)>| {
+            let scotopic: Option<Vec<&Plane>> = planes.iter().map(|(_, scotopic)| *scotopic).collect();
+            (stacked(planes.iter().map(|(photopic, _)| *photopic).collect()), scotopic.map(stacked))
+        };
+        let (photopic_cd_m2, scotopic_cd_m2) = both(pictures.iter().map(|picture| picture.all()).collect());
+        let is_partly = pictures.iter().any(|picture| picture.covering.is_some());
+        let covering = is_partly.then(|| {
+            let (photopic_cd_m2, scotopic_cd_m2) = both(pictures.iter().map(|picture| picture.there()).collect());
+            Covering { photopic_cd_m2, scotopic_cd_m2 }
+        });
+        Self { photopic_cd_m2, scotopic_cd_m2, covering }
     }
 
-    /// For [`ToneOperator::fit`].
+    /// For [`ToneOperator::fit`], all of it.
     #[must_use]
     pub fn guide(&self) -> SceneGuide<'_> {
-        SceneGuide { scotopic_cd_m2: self.scotopic_cd_m2.as_ref(), ..SceneGuide::of(&self.photopic_cd_m2) }
+        guide_of(self.all())
     }
 
-    /// Luminance, cd/m².
+    /// The same for one operator: what the picture does not cover is left out where it would be taken for darkness.
+    #[must_use]
+    pub fn guide_for(&self, operator: &dyn ToneOperator) -> SceneGuide<'_> {
+        guide_of(if operator.counts_darkness() { self.there() } else { self.all() })
+    }
+
+    /// Luminance, cd/m², of the picture as it is, before black.
     #[must_use]
     pub fn luminance_cd_m2(&self) -> &Plane {
         &self.photopic_cd_m2
@@ -72,9 +125,56 @@ fn plane(width: usize, rgb_cd_m2: &[[f32; 3]], of: fn([f32; 3]) -> f32) -> Plane
     })
 }
 
+fn guide_of<'a>((luminance_cd_m2, scotopic_cd_m2): (&'a Plane, Option<&'a Plane>)) -> SceneGuide<'a> {
+    SceneGuide { scotopic_cd_m2, ..SceneGuide::of(luminance_cd_m2) }
+}
+
+/// A pixel of which less is covered is an edge of its neighbours, and what few samples of it found is mostly noise.
+const HALF_COVERED: f32 = 0.5;
+
+/// Light that is divided by its alpha, no brighter than the brightest that is covered whole; as it stands where it is more than that,
+/// as flames and glows are, which cover little and are no lamps. NaN where nothing is, or little.
+fn light_of_what_covers(plane: &Plane, alpha: &[f32]) -> Plane {
+    let covered = plane.values().iter().zip(alpha);
+    let whole = |(light, alpha): (&f32, &f32)| if *alpha >= 1.0 { *light } else { 0.0 };
+    let brightest_whole = covered.map(whole).fold(0.0, f32::max);
+    let width = plane.width();
+    Plane::from_fn(width, plane.height(), |x, y| {
+        let (light, alpha) = (plane.get(x, y), alpha[y * width + x]);
+        if alpha >= HALF_COVERED {
+            light.max((light / alpha).min(brightest_whole))
+        } else if light > alpha.max(0.0) * brightest_whole {
+            light
+        } else {
+            f32::NAN
+        }
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Eyes see what covers each pixel: edges are as bright as what they are edges of, flames as they are.
+    #[test]
+    fn what_is_not_there_is_no_darkness() {
+        let eye = crate::tone::operator("ward94", None).unwrap();
+        let camera = crate::tone::operator("constant", None).unwrap();
+        let rgb = [60.0, 30.0, 0.0, 40.0, 5.0, 0.0, 10.0, 0.0].map(|light| [light; 3]);
+        let light = SceneLight::with_rods(4, &rgb).where_covered(&[1.0, 0.5, 0.0, 0.01, 0.0, 1.0, 0.4, 0.4]);
+        let guide = light.guide_for(eye.as_ref());
+        let found = guide.luminance_cd_m2.values();
+        for (found, meant) in found.iter().zip([60.0, 60.0, f32::NAN, 40.0, 5.0, 0.0, f32::NAN, f32::NAN]) {
+            assert!((found - meant).abs() < 1e-4 || found.is_nan() && meant.is_nan(), "{found}, not {meant}");
+        }
+        assert!(guide.scotopic_cd_m2.is_some_and(|rods| rods.get(2, 0).is_nan()));
+        assert_eq!(light.guide_for(camera.as_ref()).luminance_cd_m2, light.luminance_cd_m2());
+        let whole = SceneLight::with_rods(4, &rgb).where_covered(&[1.0; 8]);
+        assert_eq!(whole.guide_for(eye.as_ref()).luminance_cd_m2, whole.luminance_cd_m2());
+        let both = SceneLight::stacked(&[&light, &whole], 4, 2);
+        let both = both.guide_for(eye.as_ref()).luminance_cd_m2;
+        assert!(both.get(2, 0).is_nan() && both.get(2, 2) == 0.0);
+    }
 
     #[test]
     fn stacked_pictures_lie_below_one_another() {

@@ -1,7 +1,7 @@
 //! Scheel, Stamminger and Seidel's operator for walkthroughs.
 
 use super::scale::Scale;
-use super::statistics::as_eyes_see;
+use super::statistics::{as_eyes_see, log_average_to_eyes};
 use super::time::{AdaptationState, Goal};
 use super::ward94::scale_factor;
 use super::{FittedTone, Pixel, SceneGuide, ToneOperator};
@@ -45,13 +45,18 @@ impl ToneOperator for Scheel00 {
     fn fit(&self, guide: &SceneGuide<'_>, viewing: &Viewing, state: Option<&AdaptationState>) -> Box<dyn FittedTone> {
         let display_adaptation = viewing.display.white_cd_m2 / 2.0;
         let adaptation =
-            state.map(|state| state.cones.neural_cd_m2).or_else(|| sampled(guide)).unwrap_or(display_adaptation);
+            state.map(|state| state.cones.neural_cd_m2).or_else(|| seen(guide)).unwrap_or(display_adaptation);
         Box::new(Scale {
             operator: self.name().to_owned(),
             relative_per_cd_m2: self.exposure * scale_factor(adaptation, display_adaptation)
                 / viewing.display.white_cd_m2.max(f64::MIN_POSITIVE),
         })
     }
+}
+
+/// Geometric mean of what eyes see at the points, or where nothing is at any of them, of all, cd/m².
+fn seen(guide: &SceneGuide<'_>) -> Option<f64> {
+    sampled(guide).or_else(|| log_average_to_eyes(guide.luminance_cd_m2))
 }
 
 /// Geometric mean of what eyes see at the points, cd/m².

@@ -32,7 +32,19 @@ pub(super) fn log_average_to_eyes(luminance_cd_m2: &Plane) -> Option<f64> {
     log_average(luminance_cd_m2, as_eyes_see)
 }
 
-/// The same with a weight for each pixel, `weight_at(x, y)`.
+/// Light for what blurs a picture: where nothing is (NaN) the geometric mean of the rest, which the view as a whole is adapted to;
+/// infinite light is none.
+pub(super) fn filled(plane: &Plane) -> Plane {
+    let has_holes = plane.values().iter().any(|value| value.is_nan());
+    let average = if has_holes { log_average_to_eyes(plane) } else { None }.unwrap_or(0.0) as f32;
+    plane.map(|value| match value {
+        value if value.is_finite() => value.max(0.0),
+        value if value.is_nan() => average,
+        _ => 0.0,
+    })
+}
+
+/// [`log_average_to_eyes`] with a weight for each pixel, `weight_at(x, y)`.
 pub(super) fn weighted_log_average_to_eyes(
     plane: &Plane,
     weight_at: impl Fn(usize, usize) -> f64 + Sync,

@@ -236,3 +236,32 @@ fn a_picture_is_mapped_as_its_pixels_are_with_any_number_of_threads() {
         assert_eq!(run(1), run(2), "{name}");
     }
 }
+
+/// What a picture does not cover changes nothing of what is shown, whatever an operator makes of darkness; and those that make something
+/// of it say so. Eyes took it for night: a daylit figure of which 85 % were nothing came out flat white.
+#[test]
+fn what_is_not_there_is_not_adapted_to() {
+    let lit = |x: usize, y: usize| if (x + y).is_multiple_of(2) { 800.0 } else { 4000.0 };
+    let is_there = |x: usize, _: usize| x < 48;
+    for name in operator_names() {
+        for settings in settings() {
+            let operator = operator_with(name, &settings).unwrap();
+            let shown = |width: usize, beyond: f32| {
+                let guide = Plane::from_fn(width, 48, |x, y| if is_there(x, y) { lit(x, y) } else { beyond });
+                let fitted = operator.fit(&SceneGuide::of(&guide), &Viewing::default(), None);
+                [15.0, 150.0, 1500.0].map(|cd_m2| fitted.relative_luminance_at(Pixel { x: 24, y: 24 }, cd_m2))
+            };
+            let alone = shown(48, 0.0);
+            let change = |other: [f32; 3]| {
+                other.iter().zip(alone).map(|(other, alone)| (other / alone - 1.0).abs()).fold(0.0, f32::max)
+            };
+            let (nothing, darkness) = (change(shown(384, f32::NAN)), change(shown(384, 0.0)));
+            assert!(nothing < 0.12, "{name}, {settings:?}: another by {nothing} beside nothing");
+            let is_plain = settings.scope == AdaptationScope::World && settings.effects.is_none();
+            assert!(
+                !is_plain || (darkness > 0.02) == operator.counts_darkness(),
+                "{name}: another by {darkness} beside darkness"
+            );
+        }
+    }
+}

@@ -8,6 +8,7 @@ use super::guide::{Pixel, SceneGuide};
 use super::names::Effects;
 use super::saved::{Fit, SavedTone};
 use super::screen::{Screen, finite};
+use super::statistics::filled;
 use super::time::{AdaptationState, Goal};
 use super::veil::Veil;
 use super::{FittedTone, LEAST_GREY_CD_M2, ToneOperator};
@@ -50,11 +51,18 @@ impl ToneOperator for WardLarson97 {
         "ward-larson97"
     }
 
+    fn counts_darkness(&self) -> bool {
+        true
+    }
+
     fn fit(&self, guide: &SceneGuide<'_>, viewing: &Viewing, _state: Option<&AdaptationState>) -> Box<dyn FittedTone> {
         let density = viewing.display.pixel_density();
         let clean = guide.luminance_cd_m2.map(|value| if value.is_finite() { value.max(0.0) } else { 0.0 });
         let veil = if self.effects.glare { Veil::of(&clean, density) } else { None };
         let retinal = veil.as_ref().map_or(clean.clone(), |veil| veil.over(&clean));
+        // The eye does not look where nothing is.
+        let retinal =
+            retinal.combined(guide.luminance_cd_m2, |light, there| if there.is_nan() { f32::NAN } else { light });
         let range = DisplayRange::of(&viewing.display);
         let adjustment = Histogram::of(foveal_samples(&retinal, &viewing.display)).map_or_else(
             || Adjustment::Linear { scale: 1.0, adaptation_cd_m2: range.middle_cd_m2() },
@@ -73,15 +81,21 @@ impl ToneOperator for WardLarson97 {
 }
 
 fn foveal_samples(luminance_cd_m2: &Plane, display: &Display) -> Vec<f64> {
-    let Ok(foveal) = local_adaptation_cd_m2(luminance_cd_m2, display, Mean::Arithmetic) else { return Vec::new() };
+    let Ok(foveal) = local_adaptation_cd_m2(&filled(luminance_cd_m2), display, Mean::Arithmetic) else {
+        return Vec::new();
+    };
     let density = display.pixel_density();
     // From the middle of the first cell, so that no border is preferred.
     let places = |length: usize, pixels_per_degree: f64| {
         let stride = ((pixels_per_degree / SAMPLES_PER_DEGREE).round() as usize).max(1);
         (stride.min(length) / 2..length).step_by(stride)
     };
-    let rows = places(foveal.height(), density.vertical).map(|y| foveal.row(y));
-    rows.flat_map(|row| places(row.len(), density.horizontal).map(|x| f64::from(row[x]))).collect()
+    let rows = || places(foveal.height(), density.vertical);
+    let columns = || places(foveal.width(), density.horizontal);
+    let all = || rows().flat_map(|y| columns().map(move |x| (x, y)));
+    let of = |(x, y): (usize, usize)| f64::from(foveal.get(x, y));
+    let there: Vec<f64> = all().filter(|&(x, y)| !luminance_cd_m2.get(x, y).is_nan()).map(of).collect();
+    if there.is_empty() { all().map(of).collect() } else { there }
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

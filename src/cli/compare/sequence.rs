@@ -161,18 +161,18 @@ fn fit(
     for index in 0..count {
         let path = name.of(numbers[index * numbers.len() / count]);
         let picture = InputPicture::read(&path, nits_per_unit)?;
-        let Some(rgb) = picture.scene_rgb_cd_m2() else { return Ok(None) };
+        let Some(light) = picture.scene_light(operator) else { return Ok(None) };
         if *size.get_or_insert(picture.size()) != picture.size() {
             bail!("{}: it has another size than {}", path.display(), name.of(numbers[0]).display());
         }
-        lights.push(SceneLight::of(operator, picture.size().0, &rgb));
+        lights.push(light);
     }
     let goals: Vec<Goal> =
-        lights.iter().map(|light| operator.goal(&light.guide(), viewing.display.pixel_density())).collect();
+        lights.iter().map(|light| operator.goal(&light.guide_for(operator), viewing.display.pixel_density())).collect();
     let eye = AdaptationState::adapted_to(Goal::mean(&goals), &operator.kinetics());
     let (width, height) = size.unwrap_or_default();
     let all = SceneLight::stacked(&lights.iter().collect::<Vec<_>>(), width, height);
-    Ok(Some(operator.fit(&all.guide(), viewing, Some(&eye))))
+    Ok(Some(operator.fit(&all.guide_for(operator), viewing, Some(&eye))))
 }
 
 impl<'a> Sequences<'a> {

@@ -10,9 +10,7 @@ use fechner::jpeg_read;
 use fechner::output::{self, Attribute, NITS_PER_UNIT, PngTransfer};
 use fechner::scene;
 use fechner_perception::Plane;
-use fechner_perception::display::{Display, Eotf};
 use fechner_perception::primaries::Primaries;
-use image::GenericImageView as _;
 use image::{DynamicImage, ImageFormat};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -86,6 +84,7 @@ impl InputPicture {
             made_for: kept_tone::display_in(exr),
             kept_tone,
             alpha: alpha(path, exr),
+            straight_alpha: None,
             part_of: exr.part_of,
         })
     }
@@ -101,7 +100,7 @@ impl InputPicture {
 
     fn from_codes(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).with_context(|| format!("{}", path.display()))?;
-        let mut image = decoded_image(path, &bytes)?;
+        let image = decoded_image(path, &bytes)?;
         let colour = output::png_colour(&bytes);
         for text in colour.notes.iter().chain(&jpeg_read::notes(&bytes)) {
             note(path, text);
@@ -114,32 +113,28 @@ impl InputPicture {
             PngTransfer::Untagged if bytes_a_channel(&image) > 1 => Codes::Display,
             PngTransfer::Srgb | PngTransfer::Untagged => Codes::Srgb(of(Primaries::REC709)),
         };
-        if image.color().has_alpha() && image.pixels().any(|(_, _, pixel)| pixel.0[3] < u8::MAX) {
-            if matches!(codes, Codes::Srgb(_)) {
-                note(path, "what is transparent lies before black");
-                image = before_black(image);
-            } else {
-                note(path, "alpha is not looked at: each pixel is seen in the colour that it has");
-            }
+        let straight_alpha = straight_alpha(&image);
+        if straight_alpha.is_some() {
+            note(path, "what is transparent lies before black");
         }
-        Ok(Self::from_image(image, Content::Display(codes)))
+        let pixel_aspect_ratio = output::png_pixel_aspect_ratio(&bytes);
+        Ok(Self { straight_alpha, pixel_aspect_ratio, ..Self::from_image(image, Content::Display(codes)) })
     }
 
     fn from_image(image: DynamicImage, content: Content) -> Self {
         let picture = image.into_rgb32f();
         let (width, height) = (picture.width() as usize, picture.height() as usize);
         let rgb = picture.pixels().map(|p| p.0).collect();
-        let is_pq = matches!(content, Content::Display(Codes::Pq(_)));
-        let made_for = if is_pq { Display::preset("hdr-1000") } else { None };
         Self {
             width,
             height,
             rgb,
             content,
             pixel_aspect_ratio: 1.0,
-            made_for,
+            made_for: None,
             kept_tone: None,
             alpha: None,
+            straight_alpha: None,
             part_of: None,
         }
     }
@@ -150,17 +145,13 @@ fn bytes_a_channel(image: &DynamicImage) -> u8 {
     color.bytes_per_pixel() / color.channel_count()
 }
 
-/// Straight alpha of sRGB codes laid before black, as the premultiplied channels of an EXR file are seen.
-fn before_black(image: DynamicImage) -> DynamicImage {
-    let mut picture = image.into_rgba32f();
-    for pixel in picture.pixels_mut() {
-        let [colour @ .., alpha] = &mut pixel.0;
-        for code in colour {
-            let light = Eotf::Srgb.decode(f64::from(*code), 1.0) * f64::from(*alpha);
-            *code = Eotf::Srgb.encode(light, 1.0) as f32;
-        }
+/// How much of each pixel an image covers, 0 to 1; `None` where that is all of all of them.
+fn straight_alpha(image: &DynamicImage) -> Option<Vec<f32>> {
+    if !image.color().has_alpha() {
+        return None;
     }
-    DynamicImage::ImageRgba32F(picture)
+    let alpha: Vec<f32> = image.to_rgba32f().pixels().map(|pixel| pixel.0[3]).collect();
+    alpha.iter().any(|&alpha| alpha < 1.0).then_some(alpha)
 }
 
 /// A picture of a limited size. What its values mean goes by its name, so that its bytes must be what that says.

@@ -33,7 +33,7 @@ pub(super) fn of_all_operators(frame: &SceneFrame, viewing: &Viewing, settings: 
     let mut sheet = Sheet::empty(COLUMNS * cell.0 + GAP_PX, names.len().div_ceil(COLUMNS) * cell.1 + GAP_PX);
     for (index, name) in names.iter().enumerate() {
         let Some(operator) = tone::operator_with(name, settings) else { continue };
-        let fitted = operator.fit(&frame.guide(), viewing, None);
+        let fitted = operator.fit(&frame.guide_for(operator.as_ref()), viewing, None);
         let small = reduced(&frame.shown(fitted.as_ref()), frame.width, step);
         let (left, top) = (GAP_PX + index % COLUMNS * cell.0, GAP_PX + index / COLUMNS * cell.1);
         sheet.paste(&small, width, left, top);

@@ -4,7 +4,7 @@ use super::SceneFrame;
 use crate::cli::kept_tone::{LIGHT, OF_DISPLAY};
 use crate::cli::picture::note;
 use anyhow::{Context, Result};
-use fechner::output::{self, Attribute, Format, Picture};
+use fechner::output::{self, Attribute, Format, Picture, Shown};
 use fechner_perception::tone::{AdaptationState, FittedTone};
 use std::path::Path;
 
@@ -23,8 +23,7 @@ pub(super) fn write(
 
 /// With straight alpha where it does not cover all, as a render of a transparent background; light that covers nothing raises it.
 fn write_png(target: &Path, frame: &SceneFrame, fitted: &dyn FittedTone) -> Result<()> {
-    let (width, height, display) = (frame.width as u32, frame.height() as u32, &frame.viewing.display);
-    match frame.covered(fitted) {
+    let (rgb, alpha) = match frame.covered(fitted) {
         Some(covered) => {
             if covered.has_light_in_front() {
                 note(
@@ -33,10 +32,17 @@ fn write_png(target: &Path, frame: &SceneFrame, fitted: &dyn FittedTone) -> Resu
                 );
             }
             let (shown, alpha) = covered.straight();
-            output::write_png_with_alpha_for(target, width, height, &shown, &alpha, display)?;
+            (shown, Some(alpha))
         }
-        None => output::write_png_for(target, width, height, &frame.shown(fitted), display)?,
-    }
+        None => (frame.shown(fitted), None),
+    };
+    let picture = Shown {
+        size: (frame.width as u32, frame.height() as u32),
+        rgb_linear_display: &rgb,
+        alpha: alpha.as_deref(),
+        pixel_aspect_ratio: frame.pixel_aspect_ratio,
+    };
+    output::write_shown_png(target, &picture, &frame.viewing.display)?;
     Ok(())
 }
 
