@@ -226,6 +226,7 @@ impl JobArguments {
             say!("note: {note}");
         }
         let size = self.size.unwrap_or(Size { width: scene.film.width, height: scene.film.height });
+        settings.is_transparent = trace.transparent;
         let trace = trace_settings(self, size, scene.nits_per_unit)?;
         let Crop { width, height, .. } = trace.film_area();
         check_memory(Size { width, height })?;
