@@ -297,6 +297,29 @@ fn films_of_different_seeds_add_up() {
 }
 
 /// The strictest aim stays, and a film that aimed at none takes none away: 0, by which it says so, was taken for the strictest.
+/// Of films of one sample a pixel, or any odd number, the sum has both halves, whatever order and groups they come in.
+#[test]
+fn films_of_one_sample_make_two_halves() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let films: Vec<PathBuf> = (1..=4)
+        .map(|seed| {
+            let setup = Setup::new(seed);
+            let path = folder.path().join(format!("{seed}.film"));
+            write_checkpoint(&path, &setup.header, &uniform_film(&setup, 1)).expect("written");
+            path
+        })
+        .collect();
+    let sum = merge_files(&films).expect("they fit");
+    assert!(sum.state.film.has_both_halves());
+    assert!(Half::BOTH.iter().all(|&half| sum.state.film.half(half).iter().all(|pixel| pixel.taken == 2)));
+    let part = folder.path().join("part.film");
+    let of_three = merge_files(&films[..3]).expect("they fit");
+    write_checkpoint(&part, &of_three.header, &of_three.state).expect("written");
+    assert_eq!(merge_files(&[films[3].clone(), part]).expect("they fit").state.film, sum.state.film);
+    let alone = merge_files(&films[..1]).expect("a film");
+    assert_eq!(alone.state.film, read_checkpoint(&films[0]).expect("readable").state.film);
+}
+
 #[test]
 fn merged_films_aim_at_what_the_strictest_aimed_at() {
     let folder = tempfile::tempdir().expect("a folder");
