@@ -62,6 +62,7 @@ pub fn merge_files(paths: &[PathBuf]) -> Result<Checkpoint, MergeError> {
     if is_sum {
         sum.header.seeds.all.sort_unstable();
         sum.header.seeds.current = None;
+        sum.header.earlier_visibilities.clear();
         sum.state = undecided(sum.state);
     }
     Ok(sum)
@@ -74,8 +75,8 @@ fn balanced(Checkpoint { header, state }: Checkpoint) -> Checkpoint {
     Checkpoint { header, state: RenderState { film, ..state } }
 }
 
-fn add(
 /// Adds what was read of a file to the sum that began with the first.
+fn add(
     sum: &mut Checkpoint,
     first: &(Header, &Path),
     (header, path): &(Header, &Path),

@@ -25,7 +25,7 @@ use fechner::output::rendered::Background;
 use fechner::scene::hash::ContentHash;
 use fechner::scene::{Scene, load};
 use fechner_perception::model;
-use fechner_perception::tone::SceneLight;
+use fechner_perception::tone::{SavedTone, SceneLight};
 use rules::{check_filter, check_rule, limits, settings_record};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -210,28 +210,23 @@ impl JobArguments {
     /// Loads the scene and reads everything else that is named. A part is shown as the whole is.
     pub(super) fn prepare(&self) -> anyhow::Result<Prepared> {
         let mut prepared = self.prepare_samples()?;
-        let Prepared { scene, trace, record, settings, whole } = &mut prepared;
-        *whole = trace.crop.and_then(|_| whole_light(scene, trace));
-        if let Some(whole) = whole {
-            settings.fit_to(whole);
-            record.fitted.clone_from(&settings.fitted);
-        }
+        prepared.fit_to_whole(None);
         Ok(prepared)
     }
 
-    /// The same for who takes samples alone, and does not ask how they are shown.
+    /// The same before a part is shown as the whole is: for who takes samples alone, and who may know how the whole is shown.
     pub(super) fn prepare_samples(&self) -> anyhow::Result<Prepared> {
         let scene = self.load_at(self.at, Some(console::texture_decoded))?;
         for note in &scene.notes {
             say!("note: {note}");
         }
         let size = self.size.unwrap_or(Size { width: scene.film.width, height: scene.film.height });
-        settings.is_transparent = trace.transparent;
         let trace = trace_settings(self, size, scene.nits_per_unit)?;
         let Crop { width, height, .. } = trace.film_area();
         check_memory(Size { width, height })?;
         let mut record = settings_record(self, &scene)?;
         let mut settings = record.loop_settings(limits(self, &scene, record.sampling), trace.filter)?;
+        settings.is_transparent = trace.transparent;
         if let Some(path) = &self.importance {
             if matches!(settings.sampling, Sampling::Rival(_)) {
                 bail!("--importance multiplies thresholds, and this --sampling has none: use adaptive or uniform");
@@ -243,6 +238,20 @@ impl JobArguments {
         check_rule(self)?;
         check_filter(self, trace.filter, settings.sampling)?;
         Ok(Prepared { scene: Arc::new(scene), trace, record, settings, whole: None })
+    }
+}
+
+impl Prepared {
+    /// Shows a part as the whole is shown: as it was before where that is known, or by a glimpse of the whole.
+    pub(super) fn fit_to_whole(&mut self, known: Option<SavedTone>) {
+        let Self { scene, trace, record, settings, whole } = self;
+        if trace.crop.is_some() && known.is_some() {
+            settings.fitted = known;
+        } else if let Some(light) = trace.crop.and_then(|_| whole_light(scene, trace)) {
+            settings.fit_to(&light);
+            *whole = Some(light);
+        }
+        record.fitted.clone_from(&settings.fitted);
     }
 }
 

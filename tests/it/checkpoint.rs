@@ -51,6 +51,7 @@ impl Setup {
                 denoiser: None,
             },
             visibility: 4.0,
+            earlier_visibilities: Vec::new(),
         };
         Self { tracer: PathTracer::new(Arc::new(scene), settings), header }
     }
@@ -296,7 +297,6 @@ fn films_of_different_seeds_add_up() {
     assert!(message.contains("seed 2") && message.contains("sum.film") && message.contains("2.film"), "{message}");
 }
 
-/// The strictest aim stays, and a film that aimed at none takes none away: 0, by which it says so, was taken for the strictest.
 /// Of films of one sample a pixel, or any odd number, the sum has both halves, whatever order and groups they come in.
 #[test]
 fn films_of_one_sample_make_two_halves() {
@@ -320,6 +320,7 @@ fn films_of_one_sample_make_two_halves() {
     assert_eq!(alone.state.film, read_checkpoint(&films[0]).expect("readable").state.film);
 }
 
+/// The strictest aim stays, and a film that aimed at none takes none away: 0, by which it says so, was taken for the strictest.
 #[test]
 fn merged_films_aim_at_what_the_strictest_aimed_at() {
     let folder = tempfile::tempdir().expect("a folder");
