@@ -149,7 +149,6 @@ fn noise_of_alpha_is_seen_over_white() {
             .map(|visibility| f64::from(visibility.get(32, 32)));
         assert!(predicted > 2.0, "{predicted} at the border");
         assert!((0.6..1.6).contains(&(measured / predicted)), "{measured} by the halves, {predicted} by variance");
-        assert!(judgement.predicted.get(2, 32) < 0.1 * judgement.predicted.get(32, 32), "where nothing is let through");
         // What the plan goes by shows before black what there is to see before white.
         let per_sample = judgement.pooled_variance_per_sample.get(32, 32);
         let rough = judgement.energy_of(&judgement.pooled_variance_per_sample).get(32, 32) / 16.0;
