@@ -1,7 +1,9 @@
 //! The film as it will be seen: thresholds, remaining visibility, and how each pixel's samples scatter on the display.
 
+mod over_white;
 mod steps;
 
+use self::over_white::OverWhite;
 use self::steps::{Guide, Scatter, chromatic_gains, found_thresholds};
 use super::denoised::{DenoisedPicture, TimedDenoising};
 use super::settings::LoopSettings;
@@ -50,6 +52,10 @@ pub struct Judgement {
     pub pooled_variance_per_sample: Plane,
     /// The same as each half decides by it; `None` where the look was for no plan.
     pub variance_per_sample: Option<[Plane; 2]>,
+    /// The first of these variances before black, where the picture is transparent and both are the worse of that and over white.
+    over_black_per_sample: Option<Plane>,
+    /// What can be seen of a transparent picture over white.
+    over_white: Option<OverWhite>,
     /// What the halves' difference shows, once somebody asked.
     measured: OnceLock<MeasuredError>,
 }
@@ -124,13 +130,21 @@ fn judge_by(
     let tone = guide.tone(settings);
     let scatter = Scatter::of(film, guide.luminance_cd_m2(), tone.as_ref(), settings, raw_inflation);
     still_wanted(settings)?;
-    let (thresholds, pixel_thresholds) =
-        found_thresholds(&guide, tone.as_ref(), &scatter.luminance_variance_of_mean(), settings)?;
+    let displayed_guide = guide.displayed(tone.as_ref(), settings);
+    let noise = scatter.luminance_variance_of_mean();
+    let (thresholds, pixel_thresholds) = found_thresholds(&guide, &displayed_guide, tone.as_ref(), &noise, settings)?;
     let gains = chromatic_gains(&thresholds, settings)?;
     still_wanted(settings)?;
     let pooled_variance_per_sample = scatter.pooled_per_sample(&thresholds, gains.as_ref());
     let variance_per_sample =
         (purpose == Purpose::Plan).then(|| scatter.per_sample_of_halves(film, &thresholds, gains.as_ref()));
+    still_wanted(settings)?;
+    let over_white = if settings.is_transparent {
+        let colour_scale = denoised.is_none().then(|| scatter.luminance_scale());
+        Some(OverWhite::of(film, &guide, &displayed_guide, colour_scale, tone.as_ref(), settings, purpose)?)
+    } else {
+        None
+    };
     still_wanted(settings)?;
     let denoised = match denoised {
         Some(found) => {
@@ -140,6 +154,10 @@ fn judge_by(
                 let of_mean = scatter.of_mean(&pooled_variance_per_sample);
                 let raw = visibility_under(&thresholds, pixel_thresholds.as_ref(), &of_mean);
                 picture.error = picture.error.with_noise_of_at_least(&raw);
+            }
+            if let Some(over_white) = &over_white {
+                // Alpha is not denoised.
+                picture.error = picture.error.with_noise_of_at_least(over_white.visibility());
             }
             Some(picture)
         }
@@ -156,7 +174,20 @@ fn judge_by(
     } else {
         let of_mean = scatter.of_mean(&pooled_variance_per_sample);
         let visibility = visibility_under(&thresholds, pixel_thresholds.as_ref(), &of_mean);
+        let visibility = match &over_white {
+            Some(over_white) => visibility.combined(over_white.visibility(), f32::max),
+            None => visibility,
+        };
         told(per_importance(visibility, settings.importance.as_ref()))
+    };
+    let (pooled_variance_per_sample, over_black_per_sample, variance_per_sample) = match &over_white {
+        None => (pooled_variance_per_sample, None, variance_per_sample),
+        Some(over_white) => {
+            let own = visibility_limits(&thresholds, pixel_thresholds.as_ref());
+            let (worse, of_halves) =
+                over_white.worse_per_sample(&own, &pooled_variance_per_sample, variance_per_sample);
+            (worse, Some(pooled_variance_per_sample), of_halves)
+        }
     };
     Ok(Judgement {
         estimate,
@@ -171,6 +202,8 @@ fn judge_by(
         predicted,
         pooled_variance_per_sample,
         variance_per_sample,
+        over_black_per_sample,
+        over_white,
         measured: OnceLock::new(),
     })
 }
@@ -182,6 +215,14 @@ fn visibility_under(thresholds: &ThresholdMap, pixel_thresholds: Option<&Plane>,
         Some(allowed) => Plane::from_fn(allowed.width(), allowed.height(), |x, y| {
             display_variance.get(x, y).sqrt() / allowed.get(x, y)
         }),
+    }
+}
+
+/// Standard error that a pixel may have at visibility 1, cd/m² on the display, without importance.
+fn visibility_limits(thresholds: &ThresholdMap, pixel_thresholds: Option<&Plane>) -> Plane {
+    match pixel_thresholds {
+        None => thresholds.allowed_standard_error_cd_m2(1.0),
+        Some(allowed) => allowed.clone(),
     }
 }
 
@@ -233,14 +274,16 @@ impl Judgement {
 
     /// Standard error of a pixel, cd/m² on the display, that is at visibility 1 by the model that drives the loop.
     pub fn allowed_standard_error_cd_m2(&self) -> Plane {
-        let allowed = match &self.pixel_thresholds {
-            None => self.thresholds.allowed_standard_error_cd_m2(1.0),
-            Some(allowed) => allowed.clone(),
-        };
+        let allowed = visibility_limits(&self.thresholds, self.pixel_thresholds.as_ref());
         match &self.importance {
             None => allowed,
             Some(map) => allowed.combined(map, |allowed, factor| allowed * factor),
         }
+    }
+
+    /// [`Self::pooled_variance_per_sample`] before black, as an opaque picture is seen.
+    pub(super) fn over_black_per_sample(&self) -> &Plane {
+        self.over_black_per_sample.as_ref().unwrap_or(&self.pooled_variance_per_sample)
     }
 
     fn per_importance(&self, visibility: Plane) -> Plane {
@@ -260,7 +303,10 @@ impl Judgement {
                 )
             };
             let displayed = self.denoised.as_ref().map_or_else(raw, |denoised| denoised.half_difference.clone());
-            let MeasuredError { visibility, amplitude } = self.thresholds.measured_error(&displayed);
+            let MeasuredError { visibility, amplitude } = match &self.over_white {
+                Some(over_white) => over_white.worse_error(self.thresholds.measured_error(&displayed), &displayed),
+                None => self.thresholds.measured_error(&displayed),
+            };
             MeasuredError { visibility: self.per_importance(visibility), amplitude: self.per_importance(amplitude) }
         })
     }

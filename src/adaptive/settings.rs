@@ -134,6 +134,8 @@ pub struct LoopSettings {
     pub filter: PixelFilter,
     /// What makes the output picture out of the mean; `None` leaves it raw.
     pub denoiser: Option<Denoiser>,
+    /// Whether the picture has alpha and is laid over other pictures, so that noise of what it covers must be invisible over black and over white.
+    pub is_transparent: bool,
     /// Asked during a look: whether it is of no use any more, as somebody wants another picture. `None` never interrupts.
     pub is_outdated: Option<Box<dyn Fn() -> bool + Send + Sync>>,
 }
@@ -156,6 +158,7 @@ impl LoopSettings {
             pursuit: None,
             filter: PixelFilter::default(),
             denoiser: None,
+            is_transparent: false,
             is_outdated: None,
         }
     }

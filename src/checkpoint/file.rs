@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 static FILM: Kind = Kind {
     magic: *b"fech film\r\n\x1a",
-    version: 7,
+    version: 8,
     what: "a film's file, such as fechner render --checkpoint FILE writes",
     remedy: "take another copy of it, or render anew",
 };
@@ -58,7 +58,10 @@ pub fn read_checkpoint(path: &Path) -> Result<Checkpoint, CheckpointError> {
 }
 
 /// Reads only what was rendered and for whom. Damage further on goes unnoticed.
-pub(super) fn read_header(path: &Path) -> Result<Header, CheckpointError> {
+///
+/// # Errors
+/// [`CheckpointError`] for what is no film of this version.
+pub fn read_header(path: &Path) -> Result<Header, CheckpointError> {
     Ok(FILM.read_beginning(path, HEADER_LIMIT)?)
 }
 
@@ -96,6 +99,7 @@ impl Checkpoint {
         let seconds =
             [state.seconds_total, state.seconds_perception, state.seconds_allocation, state.seconds_denoising];
         if !is_rung(header.visibility)
+            || !header.earlier_visibilities.iter().all(|&visibility| is_rung(visibility))
             || !state.finished_rung.is_none_or(is_rung)
             || !state.left_rung.is_none_or(is_rung)
             || !(1.0..=1e6).contains(&state.inflation)

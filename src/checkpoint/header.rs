@@ -32,6 +32,8 @@ pub struct Header {
     pub settings: SettingsRecord,
     /// Visibility that was aimed at.
     pub visibility: f64,
+    /// And before, in renders that this one goes on from, first to last.
+    pub earlier_visibilities: Vec<f64>,
 }
 
 /// Everything that a sample is a function of, besides its place in the picture and the seed: only films of equal origin

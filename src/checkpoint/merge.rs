@@ -32,7 +32,8 @@ pub enum MergeError {
 }
 
 /// Adds the films of several files: half A to half A and B to B, in the order of their seeds, so that the order of
-/// `paths` does not matter. What was decided for the single films (plans, rungs, audits) is left behind; the largest
+/// `paths` does not matter. Of a render whose halves are uneven, as with 1 sample a pixel, an odd seed's are added the other way round, so that the
+/// sum of many is even: eight films of one sample had 8 samples in half A, none in B, and told nothing of their noise. What was decided for the single films (plans, rungs, audits) is left behind; the largest
 /// inflation stays.
 ///
 /// Beside the sum, as many films are in memory as there are threads, at most 8.
@@ -48,17 +49,30 @@ pub fn merge_files(paths: &[PathBuf]) -> Result<Checkpoint, MergeError> {
     files.sort_by(|a, b| a.0.seeds.all.cmp(&b.0.seeds.all));
     check_seeds(&files)?;
     let (first, rest) = files.split_first().expect("at least one film");
+    let is_sum = !rest.is_empty();
+    let read_same = |file: &(Header, &Path)| {
+        let film = read_same(file)?;
+        Ok::<_, CheckpointError>(if is_sum { balanced(film) } else { film })
+    };
     let mut sum = read_same(first)?;
     for batch in rest.chunks(rayon::current_num_threads().clamp(1, MOST_READ_AT_ONCE)) {
-        let read: Vec<_> = batch.par_iter().map(read_same).collect();
+        let read: Vec<_> = batch.par_iter().map(&read_same).collect();
         batch.iter().zip(read).try_for_each(|(file, film)| add(&mut sum, first, file, film?))?;
     }
-    if !rest.is_empty() {
+    if is_sum {
         sum.header.seeds.all.sort_unstable();
         sum.header.seeds.current = None;
+        sum.header.earlier_visibilities.clear();
         sum.state = undecided(sum.state);
     }
     Ok(sum)
+}
+
+/// A render's film as it goes into a sum. By its own seed alone, so that neither order nor grouping changes a sum; sums stay as they are.
+fn balanced(Checkpoint { header, state }: Checkpoint) -> Checkpoint {
+    let is_odd = matches!((&header.seeds.all[..], header.seeds.current), ([seed], Some(_)) if seed % 2 == 1);
+    let film = if is_odd && state.film.has_uneven_halves() { state.film.with_halves_swapped() } else { state.film };
+    Checkpoint { header, state: RenderState { film, ..state } }
 }
 
 /// Adds what was read of a file to the sum that began with the first.

@@ -8,7 +8,9 @@ mod header;
 mod merge;
 mod tracing;
 
-pub use file::{CheckpointError, decode_checkpoint, is_checkpoint, read_checkpoint, seal, write_checkpoint};
+pub use file::{
+    CheckpointError, decode_checkpoint, is_checkpoint, read_checkpoint, read_header, seal, write_checkpoint,
+};
 pub use header::{Header, Origin, PROGRAM, Seeds, SettingsError, SettingsRecord, UnknownName};
 pub use merge::{MergeError, merge_files};
 pub use tracing::tracing_in_words;

@@ -25,7 +25,7 @@ use fechner::output::rendered::Background;
 use fechner::scene::hash::ContentHash;
 use fechner::scene::{Scene, load};
 use fechner_perception::model;
-use fechner_perception::tone::SceneLight;
+use fechner_perception::tone::{SavedTone, SceneLight};
 use rules::{check_filter, check_rule, limits, settings_record};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -211,18 +211,11 @@ impl JobArguments {
     /// what is there, where eyes would take the rest of a film for darkness.
     pub(super) fn prepare(&self) -> anyhow::Result<Prepared> {
         let mut prepared = self.prepare_samples()?;
-        let Prepared { scene, trace, record, settings, whole } = &mut prepared;
-        if trace.crop.is_some() || (trace.transparent && settings.operator.counts_darkness()) {
-            *whole = whole_light(scene, trace);
-        }
-        if let Some(whole) = whole {
-            settings.fit_to(whole);
-            record.fitted.clone_from(&settings.fitted);
-        }
+        prepared.fit_to_whole(None);
         Ok(prepared)
     }
 
-    /// The same for who takes samples alone, and does not ask how they are shown.
+    /// The same before a part is shown as the whole is: for who takes samples alone, and who may know how the whole is shown.
     pub(super) fn prepare_samples(&self) -> anyhow::Result<Prepared> {
         let scene = self.load_at(self.at, Some(console::texture_decoded))?;
         for note in &scene.notes {
@@ -234,6 +227,7 @@ impl JobArguments {
         check_memory(Size { width, height })?;
         let mut record = settings_record(self, &scene)?;
         let mut settings = record.loop_settings(limits(self, &scene, record.sampling), trace.filter)?;
+        settings.is_transparent = trace.transparent;
         if let Some(path) = &self.importance {
             if matches!(settings.sampling, Sampling::Rival(_)) {
                 bail!("--importance multiplies thresholds, and this --sampling has none: use adaptive or uniform");
@@ -245,6 +239,24 @@ impl JobArguments {
         check_rule(self)?;
         check_filter(self, trace.filter, settings.sampling)?;
         Ok(Prepared { scene: Arc::new(scene), trace, record, settings, whole: None })
+    }
+}
+
+impl Prepared {
+    /// Shows a part as the whole is shown, and what there is of a picture with alpha to eyes that would take the rest for darkness: as it
+    /// was before where that is known, or by a glimpse of the whole.
+    pub(super) fn fit_to_whole(&mut self, known: Option<SavedTone>) {
+        let Self { scene, trace, record, settings, whole } = self;
+        if trace.crop.is_some() || (trace.transparent && settings.operator.counts_darkness()) {
+            match known {
+                Some(known) => settings.fitted = Some(known),
+                None => *whole = whole_light(scene, trace),
+            }
+            if let Some(light) = whole {
+                settings.fit_to(light);
+            }
+        }
+        record.fitted.clone_from(&settings.fitted);
     }
 }
 

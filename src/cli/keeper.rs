@@ -3,7 +3,6 @@
 use super::claim::Claim;
 use super::console::Console;
 use super::numbers::parse_seconds;
-use super::signals::listen;
 use super::tev::Showing;
 use super::words::rounded;
 use anyhow::bail;
@@ -12,9 +11,13 @@ use fechner::adaptive::judge::Judgement;
 use fechner::adaptive::settings::LoopSettings;
 use fechner::adaptive::state::RenderState;
 use fechner::adaptive::{Directive, Monitor, Progress};
-use fechner::checkpoint::{Checkpoint, CheckpointError, Header, read_checkpoint, write_checkpoint};
+use fechner::checkpoint::{
+    Checkpoint, CheckpointError, Header, Origin, Seeds, SettingsRecord, read_checkpoint, read_header, write_checkpoint,
+};
+use fechner::film::Film;
 use fechner::output::{self, OutputError};
 use fechner::preview::Audience;
+use fechner_perception::tone::SavedTone;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -38,6 +41,28 @@ pub(super) struct CheckpointArguments {
 pub(super) struct Start {
     pub(super) header: Header,
     pub(super) state: RenderState,
+    /// Of the film as it is, before anything is added to it.
+    pub(super) seeds: SeedsSoFar,
+}
+
+/// Whose samples a film holds: those of the render's own seed once there is one.
+#[derive(Clone)]
+pub(super) struct SeedsSoFar {
+    before: Seeds,
+    rays_before: u64,
+    own: Seeds,
+}
+
+impl SeedsSoFar {
+    /// Of a render that begins with nothing.
+    pub(super) fn of_one(seed: u64) -> Self {
+        Self { before: Seeds::one(seed), rays_before: 0, own: Seeds::one(seed) }
+    }
+
+    /// The seeds of the film as it is now.
+    pub(super) fn of(&self, film: &Film) -> &Seeds {
+        if film.rays == self.rays_before { &self.before } else { &self.own }
+    }
 }
 
 impl CheckpointArguments {
@@ -66,14 +91,21 @@ impl CheckpointArguments {
         Ok(Some(claim))
     }
 
+    /// How the operator was fitted to the whole in the film that a render of this origin goes on from, seen as this one is: finding it anew takes
+    /// seconds.
+    pub(super) fn kept_fit(&self, origin: &Origin, record: &SettingsRecord) -> Option<SavedTone> {
+        let path = self.checkpoint.as_ref().filter(|_| self.resume)?;
+        fit_in(path, origin, record)
+    }
+
     /// The state to start from: `fresh`, or what the file holds if it fits `header`.
     pub(super) fn start(&self, header: Header, fresh: RenderState, settings: &LoopSettings) -> anyhow::Result<Start> {
         let Some(path) = self.checkpoint.as_ref().filter(|_| self.resume) else {
-            return Ok(Start { header, state: fresh });
+            return Ok(begun(header, fresh));
         };
         if !path.exists() {
             say!("note: {} is not there yet: starting from the beginning", path.display());
-            return Ok(Start { header, state: fresh });
+            return Ok(begun(header, fresh));
         }
         output::remove_leftovers(path)?;
         let Checkpoint { header: found, state } = read_checkpoint(path)?;
@@ -82,7 +114,8 @@ impl CheckpointArguments {
             return Err(different(problem).into());
         }
         let [seed] = header.seeds.all[..] else { bail!("a render has one seed") };
-        let seeds = found.seeds.continued_by(seed).map_err(different)?;
+        let own = found.seeds.continued_by(seed).map_err(different)?;
+        let mut earlier_visibilities = Vec::new();
         let state = if found.settings != header.settings {
             say!("note: the film was sampled by other settings: its samples are kept, its ladder begins anew");
             // Other eyes: what audits found of these samples' visible energy does not hold for them.
@@ -90,23 +123,46 @@ impl CheckpointArguments {
         } else if found.seeds.current.is_none() {
             state.begun_anew(&settings.limits)
         } else {
-            note_other_way(found.visibility, settings);
+            earlier_visibilities = with_aim(found.earlier_visibilities, found.visibility);
+            if let Some(&aside) = earlier_visibilities.iter().find(|&&aim| !settings.passes(aim)) {
+                note_other_way(aside, settings);
+            }
             state
         };
-        Ok(Start { header: Header { seeds, ..header }, state })
+        let seeds = SeedsSoFar { before: found.seeds, rays_before: state.film.rays, own: own.clone() };
+        Ok(Start { header: Header { seeds: own, earlier_visibilities, ..header }, state, seeds })
     }
+}
+
+/// How the operator is fitted in a film of this origin that is seen as `record` says. What is wrong with the file is for others to say.
+pub(super) fn fit_in(film: &Path, origin: &Origin, record: &SettingsRecord) -> Option<SavedTone> {
+    let found = read_header(film).ok()?;
+    let of_same = SettingsRecord { fitted: None, ..found.settings.clone() };
+    let is_same = found.origin.difference(origin).is_none() && of_same.is_seen_like(record);
+    found.settings.fitted.filter(|_| is_same)
+}
+
+/// From the beginning.
+fn begun(header: Header, state: RenderState) -> Start {
+    let seeds = SeedsSoFar { before: header.seeds.clone(), rays_before: state.film.rays, own: header.seeds.clone() };
+    Start { header, state, seeds }
+}
+
+/// All aims of a film, each once: one that left the ladder stays beside it, wherever it goes from there.
+fn with_aim(mut earlier: Vec<f64>, last: f64) -> Vec<f64> {
+    if !earlier.contains(&last) {
+        earlier.push(last);
+    }
+    earlier
 }
 
 /// Says where going on may not give what one go would: rungs that only one of the two passes leave other counts.
 fn note_other_way(aimed_at: f64, settings: &LoopSettings) {
-    if !settings.passes(aimed_at) {
-        say!(
-            "note: the film aimed at visibility {}, which a render to {} does not pass: the picture may not have the bytes of one in \
-             one go",
-            rounded(aimed_at),
-            rounded(settings.limits.last_rung())
-        );
-    }
+    say!(
+        "note: the film aimed at visibility {}, which a render to {} does not pass: the picture may not have the bytes of one in one go",
+        rounded(aimed_at),
+        rounded(settings.limits.last_rung())
+    );
 }
 
 /// Writes the film's file so often that a kill never costs more than was agreed.
@@ -114,6 +170,7 @@ pub(super) struct Keeper {
     path: PathBuf,
     every: Duration,
     header: Header,
+    seeds: SeedsSoFar,
     history: Mutex<History>,
 }
 
@@ -130,12 +187,13 @@ struct History {
 }
 
 impl Keeper {
-    pub(super) fn new(arguments: &CheckpointArguments, header: Header) -> Self {
+    pub(super) fn new(arguments: &CheckpointArguments, header: Header, seeds: SeedsSoFar) -> Self {
         let now = Instant::now();
         Self {
             path: arguments.checkpoint.clone().unwrap_or_default(),
             every: arguments.checkpoint_every.unwrap_or(Duration::from_secs(60)),
             header,
+            seeds,
             history: Mutex::new(History {
                 last_snapshot: now,
                 last_chance: now,
@@ -168,7 +226,8 @@ impl Keeper {
     /// A file that cannot be written must not end a render of hours: it is told at once and again at the end.
     fn write(&self, state: &RenderState, history: &mut History) {
         let snapshot = Instant::now();
-        match write_checkpoint(&self.path, &self.header, state) {
+        let header = Header { seeds: self.seeds.of(&state.film).clone(), ..self.header.clone() };
+        match write_checkpoint(&self.path, &header, state) {
             Ok(bytes) => {
                 history.failure = None;
                 history.last_snapshot = snapshot;
@@ -193,15 +252,15 @@ pub(super) struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    /// From here on SIGINT, SIGTERM and SIGHUP end the render with the picture so far; one that comes seconds later ends the program.
+    /// `stop`: what signals set, of [`super::signals::listen`].
     pub(super) fn new(
+        stop: Arc<AtomicBool>,
         console: Console,
         keeper: Option<Keeper>,
         audience: Option<Audience<'a>>,
         tev: Option<Showing>,
-    ) -> anyhow::Result<Self> {
-        let stop = listen(|| {})?;
-        Ok(Self { console, keeper, audience, tev, stop, started: Instant::now() })
+    ) -> Self {
+        Self { console, keeper, audience, tev, stop, started: Instant::now() }
     }
 
     /// Whether a signal asked for the end.

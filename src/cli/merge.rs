@@ -58,7 +58,9 @@ pub(super) fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
     }
     let background = if merged.header.origin.is_transparent() { Background::Transparent } else { Background::Shown };
     let limits = Limits { visibility: Limits::visibility_of_last_rung(visibility), ..Limits::of_visibility(THRESHOLD) };
-    let settings = merged.header.settings.loop_settings(limits, merged.header.origin.filter())?;
+    let origin = &merged.header.origin;
+    let mut settings = merged.header.settings.loop_settings(limits, origin.filter())?;
+    settings.is_transparent = origin.is_transparent();
     if format.is_none() {
         write_checkpoint(&arguments.output, &merged.header, &merged.state)?;
     }

@@ -10,10 +10,8 @@ pub(super) fn whole(
 ) -> impl Fn(&str) -> Result<u32, String> + Clone + Send + Sync + 'static {
     move |text| {
         let number = text.parse().ok().filter(|number| range.contains(number));
-        number.ok_or_else(|| match (*range.start(), *range.end()) {
-            (least, u32::MAX) => format!("\"{text}\" is not a whole number from {least} on"),
-            (least, most) => format!("\"{text}\" is not a whole number from {least} to {most}"),
-        })
+        let (least, most) = (*range.start(), *range.end());
+        number.ok_or_else(|| format!("\"{text}\" is not a whole number from {least} to {most}"))
     }
 }
 
@@ -90,7 +88,7 @@ mod tests {
         assert_eq!((samples("1"), whole(1..=1023)("1023")), (Ok(1), Ok(1023)));
         for refused in ["0", "-3", "0.5", "8,5", "many", "4294967296"] {
             let told = samples(refused).expect_err(refused);
-            assert_eq!(told, format!("\"{refused}\" is not a whole number from 1 on"));
+            assert_eq!(told, format!("\"{refused}\" is not a whole number from 1 to 4294967295"));
         }
         assert_eq!(whole(1..=1023)("1024").expect_err("above"), "\"1024\" is not a whole number from 1 to 1023");
         assert_eq!((parse_seed("7"), parse_seed("-1").is_err()), (Ok(7), true));

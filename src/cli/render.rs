@@ -4,9 +4,10 @@ use super::CALL_AGAIN;
 use super::console::Console;
 use super::job::{JobArguments, Prepared};
 use super::json::write_json;
-use super::keeper::{CheckpointArguments, Keeper, Watch};
+use super::keeper::{CheckpointArguments, Keeper, SeedsSoFar, Start, Watch};
 use super::maps::MapTarget;
 use super::report::{Report, summary};
+use super::signals::listen;
 use super::targets::{Named, check_kept, check_scene_kept};
 use super::tev::{Showing, TevArguments};
 use super::view::audience;
@@ -23,6 +24,7 @@ use fechner::output::{self, PartOf};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Instant;
 
 /// Arguments of `render`.
 #[derive(Debug, Args)]
@@ -71,31 +73,49 @@ fn written(arguments: &RenderArguments) -> Vec<Named<'_>> {
 }
 
 fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyhow::Result<ExitCode> {
-    let Prepared { scene, trace, record, settings, .. } = arguments.job.prepare()?;
+    let mut prepared = arguments.job.prepare_samples()?;
     check_scene_kept(&written(arguments))?;
+    // A film's picture tells the same of its scene, whether it is written now or by `merge`.
+    let Prepared { scene, trace, record, .. } = &prepared;
+    let origin = || Origin { scene_name: arguments.job.scene_name(), ..Origin::of(scene, trace) };
+    let origin = arguments.checkpoint.is_wanted().then(origin);
+    // From here on SIGINT, SIGTERM and SIGHUP end the render with the picture so far; one that comes seconds later ends the program.
+    let stop = listen(|| {})?;
+    let fitting = Instant::now();
+    let kept_fit = origin.as_ref().and_then(|origin| arguments.checkpoint.kept_fit(origin, record));
+    prepared.fit_to_whole(kept_fit);
+    let seconds_fitting = fitting.elapsed().as_secs_f64();
+    let Prepared { scene, trace, record, settings, .. } = prepared;
     let Crop { width, height, .. } = trace.film_area();
     let fresh = RenderState::new(width, height, &settings.limits);
     let audience = arguments.view.then(|| audience(&scene, &settings, &record)).transpose()?;
-    let (state, seeds, keeper) = if arguments.checkpoint.is_wanted() {
-        // A film's picture tells the same of its scene, whether it is written now or by `merge`.
-        let origin = Origin { scene_name: arguments.job.scene_name(), ..Origin::of(&scene, &trace) };
-        let seeds = Seeds::one(trace.seed);
-        let header = Header { origin, seeds, settings: record, visibility: settings.limits.last_rung() };
-        let start = arguments.checkpoint.start(header, fresh, &settings)?;
-        (start.state, start.header.seeds.all.clone(), Some(Keeper::new(&arguments.checkpoint, start.header)))
+    let (mut state, seeds, keeper) = if let Some(origin) = origin {
+        let header = Header {
+            origin,
+            seeds: Seeds::one(trace.seed),
+            settings: record,
+            visibility: settings.limits.last_rung(),
+            earlier_visibilities: Vec::new(),
+        };
+        let Start { header, state, seeds } = arguments.checkpoint.start(header, fresh, &settings)?;
+        (state, seeds.clone(), Some(Keeper::new(&arguments.checkpoint, header, seeds)))
     } else {
-        (fresh, vec![trace.seed], None)
+        (fresh, SeedsSoFar::of_one(trace.seed), None)
     };
+    // A glimpse of the whole is a look, and may take longer than a part.
+    state.seconds_total += seconds_fitting;
+    state.seconds_perception += seconds_fitting;
     let tracer = PathTracer::new(scene, trace);
     let degenerate = tracer.world().degenerate_triangles();
     if degenerate > 0 {
         say!("note: {degenerate} triangles without area were left out");
     }
     let tev = arguments.tev.open(&arguments.job.scene_name())?.map(|tev| Showing::new(tev, settings.nits_per_unit));
-    let watch = Watch::new(Console::new(settings.limits.time), keeper, audience, tev)?;
+    let watch = Watch::new(stop, Console::new(settings.limits.time), keeper, audience, tev);
     let rendered = adaptive::resume(&tracer, &settings, state, &watch)?;
     watch.finish();
-    let report = Report::new(&arguments.job.scene_name(), &seeds, &settings, &rendered);
+    let seeds = &seeds.of(&rendered.film).all;
+    let report = Report::new(&arguments.job.scene_name(), seeds, &settings, &rendered);
     let background = arguments.job.background();
     let part_of = PartOf::of(&trace);
     let write = |path: &Path| write_picture(path, format, background, &rendered, &settings, &report, part_of);

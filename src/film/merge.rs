@@ -1,6 +1,7 @@
 //! Adding films of the same picture, and checking one that was in a file.
 
 use super::{Film, HalfPixel, PixelGuide, opponent};
+use crate::sampler::Half;
 use rayon::prelude::*;
 
 /// Most samples of a pixel's half that a film may hold: sums of a few films stay far from where counts wrap around.
@@ -35,6 +36,21 @@ impl Film {
         self.nonfinite_samples = self.nonfinite_samples.saturating_add(other.nonfinite_samples);
         self.rays = self.rays.saturating_add(other.rays);
         Ok(())
+    }
+
+    /// The same film with its halves in each other's place.
+    #[must_use]
+    pub fn with_halves_swapped(mut self) -> Self {
+        let of_b: Vec<PixelGuide> = (0..self.guides.len()).map(|pixel| self.guide_of_half(Half::B, pixel)).collect();
+        self.guides_of_a = of_b;
+        self.halves.swap(0, 1);
+        self
+    }
+
+    /// Whether one half has more samples than the other.
+    pub fn has_uneven_halves(&self) -> bool {
+        let [a, b] = self.halves.each_ref().map(|half| half.iter().map(|pixel| u64::from(pixel.taken)).sum::<u64>());
+        a != b
     }
 
     /// Finds what no render leaves in a film.
@@ -112,7 +128,6 @@ mod tests {
     use super::*;
     use crate::film::BlockSum;
     use crate::integrator::{BlockWork, FirstHit, PathSample};
-    use crate::sampler::Half;
     use glam::Vec3;
 
     /// Samples of more than this have met a bright sky.

@@ -5,6 +5,7 @@
 
 mod estimate;
 mod merge;
+mod over;
 
 pub use estimate::Estimate;
 

@@ -51,6 +51,7 @@ impl Setup {
                 denoiser: None,
             },
             visibility: 4.0,
+            earlier_visibilities: Vec::new(),
         };
         Self { tracer: PathTracer::new(Arc::new(scene), settings), header }
     }
@@ -296,6 +297,29 @@ fn films_of_different_seeds_add_up() {
     assert!(message.contains("seed 2") && message.contains("sum.film") && message.contains("2.film"), "{message}");
 }
 
+/// Of films of one sample a pixel, or any odd number, the sum has both halves, whatever order and groups they come in.
+#[test]
+fn films_of_one_sample_make_two_halves() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let films: Vec<PathBuf> = (1..=4)
+        .map(|seed| {
+            let setup = Setup::new(seed);
+            let path = folder.path().join(format!("{seed}.film"));
+            write_checkpoint(&path, &setup.header, &uniform_film(&setup, 1)).expect("written");
+            path
+        })
+        .collect();
+    let sum = merge_files(&films).expect("they fit");
+    assert!(sum.state.film.has_both_halves());
+    assert!(Half::BOTH.iter().all(|&half| sum.state.film.half(half).iter().all(|pixel| pixel.taken == 2)));
+    let part = folder.path().join("part.film");
+    let of_three = merge_files(&films[..3]).expect("they fit");
+    write_checkpoint(&part, &of_three.header, &of_three.state).expect("written");
+    assert_eq!(merge_files(&[films[3].clone(), part]).expect("they fit").state.film, sum.state.film);
+    let alone = merge_files(&films[..1]).expect("a film");
+    assert_eq!(alone.state.film, read_checkpoint(&films[0]).expect("readable").state.film);
+}
+
 /// The strictest aim stays, and a film that aimed at none takes none away: 0, by which it says so, was taken for the strictest.
 #[test]
 fn merged_films_aim_at_what_the_strictest_aimed_at() {
@@ -422,7 +446,7 @@ fn foreign_files_and_versions_are_named() {
     assert!(message(b"\x76\x2f\x31\x01 an EXR file, say").contains("not a film's file"));
     let mut later = sound.clone();
     later[12] += 1;
-    assert!(message(&later).contains("this program reads version 7"), "{}", message(&later));
+    assert!(message(&later).contains("this program reads version 8"), "{}", message(&later));
     assert!(message(&sound[..sound.len() / 2]).contains("damaged"));
     assert!(read_checkpoint(folder.path()).expect_err("a folder").to_string().contains("folder"));
 }

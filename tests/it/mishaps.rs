@@ -241,4 +241,29 @@ fn a_film_beside_the_ladder_is_told() {
     assert!(resumed("4", "0.5", "a.film", "builtin").contains(note));
     assert!(!resumed("2", "0.5", "b.film", "builtin").contains("does not pass"));
     assert!(!resumed("4", "2", "c.film", "none").contains("does not pass"));
+    // What was left once is not forgotten: 5 is beside the way to 4 and to all below.
+    assert!(resumed("5", "4", "d.film", "none").contains("aimed at visibility 5, which a render to 4 does not pass"));
+    let others = ["--checkpoint", "d.film", "--resume"];
+    assert!(render("2", &others).contains("aimed at visibility 5, which a render to 2 does not pass"));
+}
+
+/// A merged film has a seed once it has a sample of it, and not before.
+#[test]
+fn a_seed_is_entered_with_its_first_sample() {
+    let folder = folder();
+    let run = |arguments: &[&str]| fechner(folder.path()).args(arguments).output().expect("runs");
+    let of = |seed: &str, spp: &str, film: &str, more: &[&str]| {
+        let arguments =
+            ["render", "s.toml", "--size", "16x16", "-o", "a.png", "--sampling", "uniform", "--json", "a.json"];
+        let own = ["--seed", seed, "--spp", spp, "--checkpoint", film];
+        let output = run(&[&arguments[..], &own, more].concat());
+        assert!(output.status.success(), "{}", words(&output));
+        let figures = std::fs::read(folder.path().join("a.json")).expect("written");
+        serde_json::from_slice::<serde_json::Value>(&figures).expect("JSON")["seeds"].clone()
+    };
+    of("1", "16", "a.film", &[]);
+    of("2", "16", "b.film", &[]);
+    assert!(run(&["merge", "a.film", "b.film", "-o", "sum.film"]).status.success());
+    assert_eq!(of("9", "16", "sum.film", &["--resume"]), serde_json::json!([1, 2]));
+    assert_eq!(of("7", "64", "sum.film", &["--resume"]), serde_json::json!([1, 2, 7]));
 }

@@ -2,7 +2,7 @@
 
 use super::super::denoised::TimedDenoising;
 use super::super::settings::LoopSettings;
-use super::super::statistics::{SampleStatistics, by_channel};
+use super::super::statistics::{SampleStatistics, by_channel, scene_units};
 use super::{JudgeError, display_scale, guide_rgb, still_wanted, variance_shares};
 use crate::film::{CHANNELS, Estimate, Film};
 use crate::sampler::Half;
@@ -41,6 +41,11 @@ impl<'a> Guide<'a> {
         self.light.luminance_cd_m2()
     }
 
+    /// Its luminance on the display, cd/m².
+    pub(super) fn displayed(&self, tone: &dyn FittedTone, settings: &LoopSettings) -> Plane {
+        seen::display_luminance(tone, &settings.viewing.display, self.luminance_cd_m2())
+    }
+
     /// The operator's fit: one that was made elsewhere, or to this.
     pub(super) fn tone(&self, settings: &LoopSettings) -> Box<dyn FittedTone> {
         match &settings.fitted {
@@ -69,8 +74,22 @@ impl Scatter {
     ) -> Self {
         let shares = variance_shares(film);
         let scale = display_scale(film, &shares, guide, tone, settings, inflation);
+        Self::scaled(film, shares, scale)
+    }
+
+    /// Of a film that holds what is displayed.
+    pub(super) fn of_displayed(film: &Film) -> Self {
+        Self::scaled(film, variance_shares(film), scene_units(film))
+    }
+
+    fn scaled(film: &Film, shares: Plane, scale: [Plane; CHANNELS]) -> Self {
         let statistics = SampleStatistics::of(film, &scale);
         Self { shares, scale, statistics }
+    }
+
+    /// Displayed over scene variance of luminance.
+    pub(super) fn luminance_scale(&self) -> &Plane {
+        &self.scale[0]
     }
 
     /// Variance of each pixel's mean of which this is one sample's.
@@ -113,25 +132,25 @@ fn most_visible(
     }
 }
 
-/// [`super::Judgement::thresholds`] and [`super::Judgement::pixel_thresholds`]. `noise`: variance of the mean's luminance on the display, before
-/// denoising.
+/// [`super::Judgement::thresholds`] and [`super::Judgement::pixel_thresholds`]. `displayed_guide`: the guide's luminance on the display. `noise`:
+/// variance of the mean's, before denoising.
 pub(super) fn found_thresholds(
     guide: &Guide<'_>,
+    displayed_guide: &Plane,
     tone: &dyn FittedTone,
     noise: &Plane,
     settings: &LoopSettings,
 ) -> Result<(ThresholdMap, Option<Plane>), JudgeError> {
-    let displayed_guide = seen::display_luminance(tone, &settings.viewing.display, guide.luminance_cd_m2());
     // Noise goes through the loss of acuity that the operator shows, as the picture does.
     let csf = BehindAcuity { csf: contrast_sensitivity(settings)?, acuity: tone.acuity() };
     let guide_noise = GuideNoise::BeforeDenoising(noise);
-    let inputs = ThresholdInputs { display_luminance_cd_m2: &displayed_guide, guide_noise };
+    let inputs = ThresholdInputs { display_luminance_cd_m2: displayed_guide, guide_noise };
     let at_rest = threshold_map(&inputs, &settings.viewing, &csf)?;
     let thresholds = under_eye_movements(at_rest, guide, tone, settings)?;
     still_wanted(settings)?;
     let of_model = |model: &dyn ThresholdModel| {
         model.allowed_standard_error_cd_m2(&ModelInputs {
-            display_luminance_cd_m2: &displayed_guide,
+            display_luminance_cd_m2: displayed_guide,
             guide_noise,
             image_velocity_deg_s: None,
             attention: None,

@@ -122,3 +122,37 @@ fn light_beyond_all_numbers_is_seen() {
         assert!(judgement.predicted.values().iter().all(|v| !v.is_nan()), "{unit:e}");
     }
 }
+
+/// A black disc's border, half of whose samples meet nothing: before black there is nothing to see, and before white a lot.
+#[test]
+fn noise_of_alpha_is_seen_over_white() {
+    let mut film = Film::new(64, 64);
+    for pixel in 0..64 * 64u32 {
+        for half in Half::BOTH {
+            let mut sum = BlockSum::default();
+            for index in 0..8 {
+                let key = u64::from(pixel) << 8 | index;
+                let is_border = (24..40).contains(&(pixel % 64));
+                let object_id = u32::from(!is_border || hash_words(key, half.index() as u64) >> 63 == 0);
+                let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id, shines: false };
+                sum.add(&PathSample { radiance: Vec3::ZERO, first_hit, rays: 1 });
+            }
+            film.merge_block(BlockWork { samples: 8, ..BlockWork::whole(pixel, half, 0) }, &sum);
+        }
+    }
+    let opaque = judge(&film, &settings(), 1.0).expect("judges");
+    assert_eq!(opaque.predicted.quantile(1.0), 0.0);
+    for denoiser in [None, Some(Denoiser::Builtin)] {
+        let transparent = LoopSettings { is_transparent: true, denoiser, ..settings() };
+        let judgement = judge_to_plan(&film, &transparent, 1.0).expect("judges");
+        let [predicted, measured] = [&judgement.predicted, &judgement.measured_error().visibility]
+            .map(|visibility| f64::from(visibility.get(32, 32)));
+        assert!(predicted > 2.0, "{predicted} at the border");
+        assert!((0.6..1.6).contains(&(measured / predicted)), "{measured} by the halves, {predicted} by variance");
+        // What the plan goes by shows before black what there is to see before white.
+        let per_sample = judgement.pooled_variance_per_sample.get(32, 32);
+        let rough = judgement.energy_of(&judgement.pooled_variance_per_sample).get(32, 32) / 16.0;
+        assert!(per_sample > 0.0 && rough.sqrt() > 0.5 * judgement.predicted.get(32, 32), "{rough}");
+        assert!(judgement.variance_per_sample.is_some_and(|[a, b]| a.get(32, 32) > 0.0 && b.get(32, 32) > 0.0));
+    }
+}

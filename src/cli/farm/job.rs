@@ -2,6 +2,7 @@
 
 use crate::cli::animate::{AnimateArguments, FrameJob as ShotFrame, Shot};
 use crate::cli::job::{JobArguments, Prepared};
+use crate::cli::keeper::fit_in;
 use crate::cli::render::write_picture;
 use crate::cli::report::Report;
 use crate::cli::words::in_a_line_of_arguments;
@@ -133,15 +134,26 @@ impl JobOptions {
 impl Job<'_> {
     /// Everything about a frame as it is now.
     pub(super) fn frame(&self, number: u32) -> Result<Frame> {
+        self.frame_beside(number, None)
+    }
+
+    /// The same. A part is shown as it was in a film of it that may be there: to find out how the whole is shown takes seconds.
+    fn frame_beside(&self, number: u32, film: Option<&Path>) -> Result<Frame> {
         match self {
             Self::Still(arguments) => {
-                let Prepared { scene, trace, record, settings, .. } = arguments.prepare()?;
+                let mut prepared = arguments.prepare_samples()?;
+                let Prepared { scene, trace, record, .. } = &prepared;
+                let origin = Origin { scene_name: arguments.scene_name(), ..Origin::of(scene, trace) };
+                let known = film.and_then(|film| fit_in(film, &origin, record));
+                prepared.fit_to_whole(known);
+                let Prepared { scene, trace, record, settings, .. } = prepared;
                 let judged_by = ContentHash::of_bytes(format!("{record:?}|{:?}", settings.limits).as_bytes());
                 let header = Header {
-                    origin: Origin { scene_name: arguments.scene_name(), ..Origin::of(&scene, &trace) },
+                    origin,
                     seeds: Seeds::one(trace.seed),
                     settings: record,
                     visibility: settings.limits.last_rung(),
+                    earlier_visibilities: Vec::new(),
                 };
                 let kind = FrameKind::Still(Box::new(settings));
                 Ok(Frame { scene, trace, header, judged_by, kind })
@@ -154,6 +166,7 @@ impl Job<'_> {
                     seeds: Seeds::one(trace.seed),
                     settings: shot.settings_record(),
                     visibility: of_shot.settings.limits.last_rung(),
+                    earlier_visibilities: Vec::new(),
                 };
                 let judged_by = ContentHash::of_bytes(of_shot.key.as_bytes());
                 let scene = Arc::clone(&of_shot.scenes.now);
@@ -165,7 +178,7 @@ impl Job<'_> {
     /// A frame of a farm, if it still is the one that was planned.
     pub(super) fn planned_frame(&self, farm: &Farm, frame_index: usize) -> Result<Frame> {
         let entry = farm.frame(frame_index);
-        let frame = self.frame(entry.frame)?;
+        let frame = self.frame_beside(entry.frame, Some(&farm.film(frame_index)))?;
         check_origin(farm, entry, &frame.header.origin)?;
         if frame.judged_by != entry.judged_by {
             bail!(

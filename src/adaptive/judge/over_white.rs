@@ -1,0 +1,134 @@
+//! A picture with alpha over white: what covers a pixel hides light there, and noise of how much it hides is noise of light.
+//!
+//! Before black a dark object has no noise at its edges whatever its alpha is: a black ball out of focus was called invisible noise at 16 samples
+//! a pixel, and showed 4.1 times its threshold over white, or over grey, by which thresholds rise and fall as the noise does. To visibility 1 it takes 222, and
+//! shows 0.7 of it over any ground between.
+
+use super::super::settings::LoopSettings;
+use super::steps::{Guide, Scatter, found_thresholds};
+use super::{JudgeError, Purpose, variance_share, visibility_limits, visibility_under};
+use crate::film::Film;
+use crate::sampler::Half;
+use fechner_perception::Plane;
+use fechner_perception::guide::{GuideInputs, denoise};
+use fechner_perception::threshold::ThresholdMap;
+use fechner_perception::tone::FittedTone;
+use fechner_perception::visibility::MeasuredError;
+
+/// What can be seen over white, without importance.
+#[derive(Debug)]
+pub(super) struct OverWhite {
+    thresholds: ThresholdMap,
+    visibility: Plane,
+    /// [`super::visibility_limits`] over white.
+    allowed_cd_m2: Plane,
+    /// Luminance variance of one sample, (cd/m²)²: pooled.
+    pooled_per_sample: Plane,
+    /// And as each half decides by it; `None` where the look is for no plan.
+    per_sample_of_halves: Option<[Plane; 2]>,
+    /// Half of what the halves' coverage differs by, as light of the ground, cd/m².
+    ground_half_difference: Plane,
+}
+
+impl OverWhite {
+    /// `guide_before_black`: the guide's luminance on the display, cd/m². `colour_scale`: displayed over scene variance of luminance; `None` where the
+    /// colours are denoised, and alpha alone is noisy.
+    pub(super) fn of(
+        film: &Film,
+        guide: &Guide<'_>,
+        guide_before_black: &Plane,
+        colour_scale: Option<&Plane>,
+        tone: &dyn FittedTone,
+        settings: &LoopSettings,
+        purpose: Purpose,
+    ) -> Result<Self, JudgeError> {
+        let display = &settings.viewing.display;
+        let white_cd_m2 = display.luminance_cd_m2(1.0);
+        let ground_cd_m2 = white_cd_m2 - display.luminance_cd_m2(0.0);
+        let no_colour = Plane::filled(guide_before_black.width(), guide_before_black.height(), 0.0);
+        let over = film.over_ground(colour_scale.unwrap_or(&no_colour).values(), ground_cd_m2);
+        let scatter = Scatter::of_displayed(&over);
+        let displayed_guide = guide_before_black.combined(&guide_coverage(film), |light, coverage| {
+            (light + (1.0 - coverage) * ground_cd_m2 as f32).min((white_cd_m2 as f32).max(light))
+        });
+        let noise = scatter.luminance_variance_of_mean();
+        let (thresholds, pixel_thresholds) = found_thresholds(guide, &displayed_guide, tone, &noise, settings)?;
+        let pooled_per_sample = scatter.pooled_per_sample(&thresholds, None);
+        let of_mean = scatter.of_mean(&pooled_per_sample);
+        let visibility = visibility_under(&thresholds, pixel_thresholds.as_ref(), &of_mean);
+        let allowed_cd_m2 = visibility_limits(&thresholds, pixel_thresholds.as_ref());
+        let per_sample_of_halves =
+            (purpose == Purpose::Plan).then(|| scatter.per_sample_of_halves(&over, &thresholds, None));
+        let ground_half_difference = ground_half_difference(film, ground_cd_m2);
+        Ok(Self {
+            thresholds,
+            visibility,
+            allowed_cd_m2,
+            pooled_per_sample,
+            per_sample_of_halves,
+            ground_half_difference,
+        })
+    }
+
+    /// Visibility that the variance predicts.
+    pub(super) fn visibility(&self) -> &Plane {
+        &self.visibility
+    }
+
+    /// Variance of one sample that shows before black, where thresholds are `own_allowed_cd_m2`, as much as the worse of that which is given and
+    /// that over white: pooled, and of the halves.
+    pub(super) fn worse_per_sample(
+        &self,
+        own_allowed_cd_m2: &Plane,
+        own: &Plane,
+        own_of_halves: Option<[Plane; 2]>,
+    ) -> (Plane, Option<[Plane; 2]>) {
+        let ratio = own_allowed_cd_m2.combined(&self.allowed_cd_m2, |own, white| (own / white) * (own / white));
+        let worse = |own: &Plane, white: &Plane| own.combined(&white.combined(&ratio, |v, ratio| v * ratio), f32::max);
+        let both = own_of_halves.zip(self.per_sample_of_halves.as_ref());
+        let of_halves = both.map(|([a, b], [white_a, white_b])| [worse(&a, white_a), worse(&b, white_b)]);
+        (worse(own, &self.pooled_per_sample), of_halves)
+    }
+
+    /// What the halves' difference shows, before black or over white. `displayed`: half the difference before black, cd/m².
+    pub(super) fn worse_error(&self, own: MeasuredError, displayed: &Plane) -> MeasuredError {
+        let over_white = displayed.combined(&self.ground_half_difference, |light, ground| light + ground);
+        let white = self.thresholds.measured_error(&over_white);
+        MeasuredError {
+            visibility: own.visibility.combined(&white.visibility, f32::max),
+            amplitude: own.amplitude.combined(&white.amplitude, f32::max),
+        }
+    }
+}
+
+fn ground_half_difference(film: &Film, ground_cd_m2: f64) -> Plane {
+    let width = film.width() as usize;
+    Plane::from_fn(width, film.height() as usize, |x, y| {
+        let [a, b] = Half::BOTH.map(|half| film.half_or_other(half, y * width + x).coverage());
+        // Less coverage is more light.
+        0.5 * (b - a) * ground_cd_m2 as f32
+    })
+}
+
+/// Coverage without its noise, which would mask itself.
+fn guide_coverage(film: &Film) -> Plane {
+    let (width, height) = (film.width() as usize, film.height() as usize);
+    let coverage = film.coverage();
+    let variance = Plane::from_fn(width, height, |x, y| {
+        let (pixel, covered) = (y * width + x, f64::from(coverage[y * width + x]));
+        (covered * (1.0 - covered) * variance_share(film, pixel)) as f32
+    });
+    let guides = film.guides();
+    let rgb: Vec<[f32; 3]> = coverage.iter().map(|&covered| [covered; 3]).collect();
+    let found = denoise(&GuideInputs {
+        rgb: &rgb,
+        variance: &variance,
+        // Coverage is no light that falls on a surface.
+        albedo: &vec![[1.0; 3]; width * height],
+        normal: &guides.iter().map(|guide| guide.normal).collect::<Vec<_>>(),
+        depth: &guides.iter().map(|guide| guide.depth).collect::<Vec<_>>(),
+        width,
+        height,
+    });
+    Plane::from_fn(width, height, |x, y| found[y * width + x][0].clamp(0.0, 1.0))
+}
