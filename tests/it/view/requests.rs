@@ -238,7 +238,7 @@ fn another_target_is_another_reason() {
     assert!(before["reason"].as_str().is_some_and(|reason| reason.starts_with("nothing more")), "{before}");
     viewer.send(&json!({ "do": "exposure", "stops": 0.0 }));
     let brighter = viewer.status("the exposure", |status| status["exposure"] == 0.0 && is_stopped(status));
-    assert!(brighter["visible_share"].as_f64() > Some(0.5), "{brighter}");
+    assert!(brighter["visible_share"].as_f64() > Some(0.2), "{brighter}");
     assert_eq!(brighter["reason"], "Resume goes on");
     viewer.send(&json!({ "do": "exposure", "stops": -6.0 }));
     let again = viewer.status("as before", |status| status["exposure"] == -6.0 && is_stopped(status));
