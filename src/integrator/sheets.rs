@@ -9,7 +9,7 @@ use super::shading::Components;
 use super::specular::may_be_smooth;
 use crate::geometry::Ray;
 use crate::scene::{Material, Surface};
-use glam::{Vec3, Vec3A};
+use glam::Vec3;
 
 /// Sheets that a shadow ray passes at most; more of them let next to nothing through.
 const MOST_SHEETS: usize = 32;
@@ -47,7 +47,7 @@ impl PathTracer {
             if share == Vec3::ZERO {
                 return (share, rays);
             }
-            ray.origin = Vec3A::from(point.spawn(-wo));
+            ray.origin = point.spawn(-wo);
         }
         (Vec3::ZERO, MOST_SHEETS as u32)
     }

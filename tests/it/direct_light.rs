@@ -230,7 +230,7 @@ fn lights_without_area_shine_through_panes() {
         angular_radius: 0.0,
         is_of_sky: false,
     };
-    assert_irradiance(behind(&[pane.clone()], point.clone()), 1.5, through * 8.0 / 6.25 * 0.8, "point");
+    assert_irradiance(behind(std::slice::from_ref(&pane), point.clone()), 1.5, through * 8.0 / 6.25 * 0.8, "point");
     assert_irradiance(behind(&[pane.clone(), tinted], sun), 0.0, 0.5 * through * through * 1.6, "directional");
     let boarded = behind(&[pane, diffuse(0.5)], point);
     let tracer = PathTracer::new(Arc::new(boarded), TraceSettings { max_depth: 1, ..trace_settings(16, 16, 0) });
