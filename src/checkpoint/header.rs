@@ -36,6 +36,14 @@ pub struct Header {
     pub earlier_visibilities: Vec<f64>,
 }
 
+impl Header {
+    /// Of a render from the beginning with one seed.
+    #[must_use]
+    pub fn begun(origin: Origin, seed: u64, settings: SettingsRecord, visibility: f64) -> Self {
+        Self { origin, seeds: Seeds::one(seed), settings, visibility, earlier_visibilities: Vec::new() }
+    }
+}
+
 /// Everything that a sample is a function of, besides its place in the picture and the seed: only films of equal origin
 /// may be added or continued.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

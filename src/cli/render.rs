@@ -17,7 +17,7 @@ use clap::Args;
 use fechner::adaptive::settings::LoopSettings;
 use fechner::adaptive::state::RenderState;
 use fechner::adaptive::{self, Rendered, StopReason};
-use fechner::checkpoint::{Header, Origin, Seeds};
+use fechner::checkpoint::{Header, Origin};
 use fechner::integrator::{Crop, PathTracer};
 use fechner::output::rendered::Background;
 use fechner::output::{self, PartOf};
@@ -90,13 +90,7 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     let fresh = RenderState::new(width, height, &settings.limits);
     let audience = arguments.view.then(|| audience(&scene, &settings, &record)).transpose()?;
     let (mut state, seeds, keeper) = if let Some(origin) = origin {
-        let header = Header {
-            origin,
-            seeds: Seeds::one(trace.seed),
-            settings: record,
-            visibility: settings.limits.last_rung(),
-            earlier_visibilities: Vec::new(),
-        };
+        let header = Header::begun(origin, trace.seed, record, settings.limits.last_rung());
         let Start { header, state, seeds } = arguments.checkpoint.start(header, fresh, &settings)?;
         (state, seeds.clone(), Some(Keeper::new(&arguments.checkpoint, header, seeds)))
     } else {

@@ -115,18 +115,17 @@ pub(super) fn may_be_smooth(roughness: &ScalarInput) -> bool {
 
 /// Whether some place of a surface may be perfectly smooth. What it says of none need not be asked at a point.
 fn may_be_specular(surface: &Surface) -> bool {
-    let is_smooth = may_be_smooth;
     match surface {
         Surface::Mirror { .. } | Surface::ThinDielectric { .. } | Surface::HeTorrance { .. } => true,
-        Surface::Conductor { roughness, .. } | Surface::Dielectric { roughness, .. } => is_smooth(&roughness.u),
+        Surface::Conductor { roughness, .. } | Surface::Dielectric { roughness, .. } => may_be_smooth(&roughness.u),
         Surface::CoatedDiffuse { reflectance, roughness, .. } => {
-            is_smooth(&roughness.u) && (reflectance.factor == Vec3::ZERO || reflectance.texture.is_some())
+            may_be_smooth(&roughness.u) && (reflectance.factor == Vec3::ZERO || reflectance.texture.is_some())
         }
         Surface::CoatedConductor { roughness, coat_roughness, .. } => {
-            is_smooth(&roughness.u) && is_smooth(&coat_roughness.u)
+            may_be_smooth(&roughness.u) && may_be_smooth(&coat_roughness.u)
         }
         Surface::MetalRoughness(model) => {
-            is_smooth(&model.roughness) && (model.metallic.factor > 0.0 || model.transmission.factor > 0.0)
+            may_be_smooth(&model.roughness) && (model.metallic.factor > 0.0 || model.transmission.factor > 0.0)
         }
         Surface::Mix { first, second, .. } => may_be_specular(first) || may_be_specular(second),
         Surface::Diffuse { .. }

