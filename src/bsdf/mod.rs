@@ -131,6 +131,11 @@ impl BsdfSample {
         Self { wi, weight, pdf, lobe: Lobe::Delta, crossed_index: None }
     }
 
+    /// Whether the path goes on through a thin sheet as if it were not there.
+    pub fn goes_straight_on(&self) -> bool {
+        self.lobe == Lobe::DeltaTransmission && self.crossed_index.is_none()
+    }
+
     /// Turns the direction over if `wo` lies below the surface (the model having worked above it).
     fn turned_like(mut self, wo: Vec3) -> Self {
         if wo.z < 0.0 {

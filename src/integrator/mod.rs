@@ -176,7 +176,7 @@ pub struct PathTracer {
     absorbs: bool,
     /// The volumes that camera rays begin in; none where none absorbs.
     around_camera: AroundCamera,
-    /// Whether any material may be a clear sheet, which lets lights without extent through.
+    /// Whether any material may be a clear sheet, through which shadow rays go on.
     has_sheets: bool,
     /// By material.
     surface_tables: Vec<SurfaceTables>,

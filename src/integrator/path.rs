@@ -6,6 +6,7 @@
 use super::PathTracer;
 use super::media::Media;
 use super::shading::{Components, Shading};
+use super::sheets::MOST_SHEETS;
 use crate::geometry::{Hit, Ray, SurfacePoint};
 use crate::light::{LightFromAfar, LightReceiver, LightSample};
 use crate::sampler::Sample;
@@ -48,8 +49,10 @@ pub(super) struct PathState {
     pub(super) ray: Ray,
     /// Its numbers.
     pub(super) sample: Sample,
-    /// Where the ray left a surface.
+    /// Where the ray's direction was scattered: the last surface but for clear sheets.
     from: LightReceiver,
+    /// What lies between there and the ray's origin.
+    behind: Behind,
     throughput: Vec3,
     radiance: Vec3,
     /// Solid-angle density with which the ray's direction was scattered; `None` if light sampling could not have found
@@ -67,6 +70,14 @@ pub(super) struct PathState {
     direct: Option<DirectLight>,
 }
 
+/// What a path has gone straight through since its direction was scattered.
+#[derive(Clone, Copy, Debug, Default)]
+struct Behind {
+    /// Scene units.
+    distance: f32,
+    sheets: u32,
+}
+
 /// What a path draws at a bounce.
 pub(super) struct BounceNumbers {
     /// Point on a light (x, y), which light (z) and survival of what it gives (w).
@@ -80,8 +91,8 @@ struct DirectLight {
     shadow_ray: Ray,
     /// Up to the light, in scene units; may be infinite.
     distance: f32,
-    /// Whether clear sheets let it through, since no path could find it behind them.
-    passes_sheets: bool,
+    /// How many clear sheets it may pass.
+    most_sheets: u32,
     /// By the path's throughput.
     radiance: Vec3,
 }
@@ -93,6 +104,7 @@ impl PathState {
             ray: camera_ray,
             sample,
             from: LightReceiver { position: camera_ray.origin.into(), normal: Vec3::ZERO },
+            behind: Behind::default(),
             throughput: Vec3::ONE,
             radiance: Vec3::ZERO,
             scatter_pdf: None,
@@ -163,24 +175,26 @@ impl PathTracer {
             return false;
         }
         if shading.bsdf.has_smooth_lobe() {
-            self.sample_light(path, point, &shading, wo, numbers.light);
+            self.sample_light(path, point, &shading, wo, bounce, numbers.light);
         }
         let [u0, u1, lobe, roulette] = numbers.scatter;
-        scatter(path, point, &shading, wo, [u0, u1, lobe]) && survives(path, bounce, roulette)
+        scatter(path, hit, point, &shading, wo, [u0, u1, lobe]) && survives(path, bounce, roulette)
     }
 
     /// Adds the light that was waiting for its shadow ray.
     #[inline]
     pub(super) fn add_direct_light(&self, path: &mut PathState) {
         let Some(light) = path.direct.take() else { return };
+        if light.most_sheets > 0 {
+            let (share, rays) = self.through_sheets(&light.shadow_ray, light.distance, light.most_sheets);
+            path.radiance += share * light.radiance;
+            path.rays += rays;
+            return;
+        }
         path.rays += 1;
         let is_hidden = light.distance > 0.0 && self.world.occluded(&light.shadow_ray, light.distance);
         if !is_hidden {
             path.radiance += light.radiance;
-        } else if light.passes_sheets {
-            let (share, rays) = self.through_sheets(&light.shadow_ray, light.distance);
-            path.radiance += share * light.radiance;
-            path.rays += rays;
         }
     }
 
@@ -204,16 +218,25 @@ impl PathTracer {
             return false;
         }
         let radiance = material.emission.evaluate(&scene.textures, point.uv);
-        let weight = path
-            .scatter_pdf
-            .map_or(1.0, |pdf| power_heuristic(pdf, self.lights.pdf_of_hit(&self.world, &path.from, &path.ray, hit)));
+        let weight = path.scatter_pdf.map_or(1.0, |pdf| {
+            let distance = path.behind.distance + hit.distance;
+            power_heuristic(pdf, self.lights.pdf_of_hit(&self.world, &path.from, &path.ray, hit, distance))
+        });
         path.radiance += path.throughput * radiance * weight;
         radiance != Vec3::ZERO
     }
 
     /// Next-event estimation: light that arrives straight from a sampled light unless something hides it. It is made in its place:
     /// handing it back took 3 % of the Cornell box.
-    fn sample_light(&self, path: &mut PathState, point: &SurfacePoint, shading: &Shading, wo: Vec3, u: [f32; 4]) {
+    fn sample_light(
+        &self,
+        path: &mut PathState,
+        point: &SurfacePoint,
+        shading: &Shading,
+        wo: Vec3,
+        bounce: u32,
+        u: [f32; 4],
+    ) {
         let [u0, u1, choice, roulette] = u;
         let receiver = shading.receiver(point, wo);
         let Some(light) = self.lights.sample(&self.world, &receiver, path.ray.time, [u0, u1, choice]) else {
@@ -247,8 +270,8 @@ impl PathTracer {
             }
         };
         let (shadow_ray, distance) = self.shadow_ray(point, &light, path.ray.time);
-        let passes_sheets = light.is_delta && self.has_sheets;
-        path.direct = Some(DirectLight { shadow_ray, distance, passes_sheets, radiance: unshadowed * left / survival });
+        let most_sheets = if self.has_sheets { MOST_SHEETS.min(self.settings.max_depth - bounce - 1) } else { 0 };
+        path.direct = Some(DirectLight { shadow_ray, distance, most_sheets, radiance: unshadowed * left / survival });
     }
 
     /// The ray from a point to a light and how far that is. Both ends are lifted off their surfaces; where that leaves no way
@@ -267,10 +290,13 @@ impl PathTracer {
 
 /// Chooses the next direction; false where the path ends.
 #[inline(always)]
-fn scatter(path: &mut PathState, point: &SurfacePoint, shading: &Shading, wo: Vec3, u: [f32; 3]) -> bool {
+fn scatter(path: &mut PathState, hit: &Hit, point: &SurfacePoint, shading: &Shading, wo: Vec3, u: [f32; 3]) -> bool {
     let Some(scattered) = shading.bsdf.sample(shading.frame.to_local(wo), u) else {
         return false;
     };
+    if scattered.goes_straight_on() && shading.medium.is_none() {
+        return pass_sheet(path, hit, point, scattered.weight);
+    }
     let wi = shading.frame.to_world_direction(scattered.wi);
     if !shading.sides_agree(wo, wi) {
         return false;
@@ -286,7 +312,21 @@ fn scatter(path: &mut PathState, point: &SurfacePoint, shading: &Shading, wo: Ve
     }
     path.scatter_pdf = (!scattered.lobe.is_delta()).then_some(scattered.pdf);
     path.from = shading.receiver(point, wo);
+    path.behind = Behind::default();
     path.ray = Ray { origin: point.spawn(wi), direction: wi.into(), ..path.ray };
+    path.throughput.max_element() > 0.0 && path.throughput.is_finite()
+}
+
+/// Goes on behind a clear sheet. A lamp that is met there is weighed as seen from where the direction was scattered, since a shadow
+/// ray from there might have found it as well: see [`super::sheets`].
+fn pass_sheet(path: &mut PathState, hit: &Hit, point: &SurfacePoint, share: Vec3) -> bool {
+    path.throughput *= share;
+    path.behind.distance += hit.distance;
+    path.behind.sheets += 1;
+    if path.behind.sheets > MOST_SHEETS {
+        path.scatter_pdf = None;
+    }
+    path.ray = Ray { origin: point.spawn(path.ray.direction.into()), ..path.ray };
     path.throughput.max_element() > 0.0 && path.throughput.is_finite()
 }
 

@@ -196,6 +196,11 @@ impl Shading<'_> {
         (from_front != to_front).then_some((medium, from_front))
     }
 
+    /// Share of light from behind that goes straight on in the direction `wo`: 0 at the boundary of a volume.
+    pub(super) fn straight_through(&self, wo: Vec3) -> Vec3 {
+        if self.medium.is_some() { Vec3::ZERO } else { self.bsdf.straight_through(self.frame.to_local(wo)) }
+    }
+
     /// Whether two world directions are on the same side of the surface by both normals, or on opposite sides by both.
     /// Where shading and geometric normal disagree, light would leak through: such pairs scatter nothing.
     pub(super) fn sides_agree(&self, a: Vec3, b: Vec3) -> bool {

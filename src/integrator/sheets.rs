@@ -1,8 +1,10 @@
-//! Clear sheets before lights without extent: window panes let the sun of a directional light in.
+//! Clear sheets before lamps: window panes let the sun in.
 //!
-//! No path ever meets such a light, so that a pane in a shadow ray's way would keep all of it out. What goes straight on through
-//! smooth thin sheets is therefore let through here. Not for lights of some extent, which paths find behind panes by themselves: their
-//! light would count twice. Not for boundaries of volumes either, which refract it.
+//! A pane in a shadow ray's way would keep the light out of it; only paths that happen to scatter towards the lamp would find it, and
+//! none would find a light without extent. What goes straight on through smooth thin sheets is therefore let through here. A path that
+//! has gone straight on through sheets and meets a lamp counts as scattered where its direction was, so that both ways of finding the
+//! lamp are weighed against each other as if the sheets were not there. Whether a path takes a sheet's other lobe does not enter the
+//! weights: they need only add up to 1. Not for boundaries of volumes, which refract.
 
 use super::PathTracer;
 use super::shading::Components;
@@ -12,7 +14,7 @@ use crate::scene::{Material, Surface};
 use glam::Vec3;
 
 /// Sheets that a shadow ray passes at most; more of them let next to nothing through.
-const MOST_SHEETS: usize = 32;
+pub(super) const MOST_SHEETS: u32 = 32;
 
 /// Whether any of these may be a clear sheet.
 pub(super) fn any_of(materials: &[Material]) -> bool {
@@ -31,24 +33,29 @@ fn may_be_a_sheet(surface: &Surface) -> bool {
 }
 
 impl PathTracer {
-    /// Share of light that comes along a shadow ray from a `distance` (scene units, may be infinite) through clear sheets, and how
-    /// many rays it took to find out: 0 where anything else is in the way.
-    pub(super) fn through_sheets(&self, shadow_ray: &Ray, distance: f32) -> (Vec3, u32) {
-        let (mut ray, mut share) = (*shadow_ray, Vec3::ONE);
-        let wo = -Vec3::from(ray.direction);
-        for rays in 1..=MOST_SHEETS as u32 {
-            let left = distance - (ray.origin - shadow_ray.origin).length();
+    /// Share of light that comes along a shadow ray from a `distance` (scene units, may be infinite) through at most so many clear
+    /// sheets, and how many rays it took to find out: 0 where anything else is in the way.
+    pub(super) fn through_sheets(&self, shadow_ray: &Ray, distance: f32, most_sheets: u32) -> (Vec3, u32) {
+        let end = distance.is_finite().then(|| shadow_ray.origin + distance * shadow_ray.direction);
+        let (mut ray, mut left, mut share) = (*shadow_ray, distance, Vec3::ONE);
+        for rays in 1..=most_sheets + 1 {
             let Some(hit) = self.world.closest(&ray).filter(|hit| hit.distance < left) else { return (share, rays) };
+            let wo = -Vec3::from(ray.direction);
             let point = self.world.surface(&ray, &hit);
             let components = Components::new();
             let bsdf = self.bsdf(&point, &components);
             let shading = self.shading(&bsdf, &point, wo, ray.time);
-            share *= shading.bsdf.straight_through(shading.frame.to_local(wo));
+            share *= shading.straight_through(wo);
             if share == Vec3::ZERO {
                 return (share, rays);
             }
             ray.origin = point.spawn(-wo);
+            // Lifting the origin off the sheet moves the ray aside, and the lamp itself would be in its way: it is aimed anew.
+            if let Some(end) = end {
+                left = (end - ray.origin).length();
+                ray = Ray { time: ray.time, ..Ray::new(ray.origin, (end - ray.origin) / left) };
+            }
         }
-        (Vec3::ZERO, MOST_SHEETS as u32)
+        (Vec3::ZERO, most_sheets + 1)
     }
 }

@@ -157,8 +157,8 @@ impl Lights {
     }
 
     /// Probability per steradian that [`Lights::sample`] for this receiver would have chosen the direction of a ray from
-    /// it that hit an emitting surface.
-    pub fn pdf_of_hit(&self, world: &World, receiver: &LightReceiver, ray: &Ray, hit: &Hit) -> f32 {
+    /// it that hit an emitting surface, at a distance from the receiver in scene units: the hit's, where the ray begins there.
+    pub fn pdf_of_hit(&self, world: &World, receiver: &LightReceiver, ray: &Ray, hit: &Hit, distance: f32) -> f32 {
         let (Some(of_triangle), Some(tree)) = (&self.emitter_of[hit.object as usize], &self.tree) else {
             return 0.0;
         };
@@ -170,13 +170,13 @@ impl Lights {
         let (from, direction) = (receiver.position, Vec3::from(ray.direction));
         chosen
             * match &self.emitters[index] {
-                Emitter::Flat(emitter) => emitter.pdf(receiver, direction, hit.distance),
-                Emitter::Sphere(emitter) => emitter.pdf(from, direction, hit.distance),
+                Emitter::Flat(emitter) => emitter.pdf(receiver, direction, distance),
+                Emitter::Sphere(emitter) => emitter.pdf(from, direction, distance),
                 Emitter::MovingTriangle { object, triangle } => {
-                    collect::triangle_at(world, *object, *triangle, ray.time).pdf(receiver, direction, hit.distance)
+                    collect::triangle_at(world, *object, *triangle, ray.time).pdf(receiver, direction, distance)
                 }
                 Emitter::MovingSphere { object } => {
-                    SphereEmitter::new(world, *object, ray.time).pdf(from, direction, hit.distance)
+                    SphereEmitter::new(world, *object, ray.time).pdf(from, direction, distance)
                 }
                 Emitter::Point(_) => 0.0,
             }

@@ -143,7 +143,7 @@ fn pdf(world: &World, lights: &Lights, receiver: &LightReceiver, direction: Vec3
     let ray = Ray::new(Vec3A::from(receiver.position), direction.into());
     // Lights from afar are sampled whether something stands before them or not.
     pdf_from_afar(lights, direction)
-        + world.closest(&ray).map_or(0.0, |hit| lights.pdf_of_hit(world, receiver, &ray, &hit))
+        + world.closest(&ray).map_or(0.0, |hit| lights.pdf_of_hit(world, receiver, &ray, &hit, hit.distance))
 }
 
 const BINS: usize = 20 * 40;

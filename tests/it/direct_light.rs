@@ -26,8 +26,13 @@ fn floor() -> Scene {
 
 /// Reflected radiance at (x, 0, 0) must be albedo·irradiance/π.
 fn assert_irradiance(scene: Scene, x: f32, expected_irradiance: f32, what: &str) {
-    // One scattering event: direct light only.
-    let settings = TraceSettings { max_depth: 1, ..trace_settings(16, 16, 0) };
+    assert_irradiance_behind(0, scene, x, expected_irradiance, what);
+}
+
+/// The same behind so many sheets.
+fn assert_irradiance_behind(sheets: u32, scene: Scene, x: f32, expected_irradiance: f32, what: &str) {
+    // One scattering event but for the sheets': direct light only.
+    let settings = TraceSettings { max_depth: 1 + sheets, ..trace_settings(16, 16, 0) };
     let tracer = PathTracer::new(Arc::new(scene), settings);
     let ray = Ray::new(vec3a(x - 0.1, 0.2, 0.0), vec3a(0.1, -0.2, 0.0).normalize());
     let (mean, error) = radiance_along(&tracer, ray, 16, 16384);
@@ -201,28 +206,41 @@ fn lights_without_area_follow_their_laws() {
     assert_irradiance(sun, 0.0, 1.6, "directional");
 }
 
-/// Panes between a floor and lights that no path can meet: what each lets through, at its own angle, and nothing through a board.
-#[test]
-fn lights_without_area_shine_through_panes() {
-    let behind = |surfaces: &[Surface], light: Light| {
-        let mut scene = floor();
-        for (height, surface) in (1..).zip(surfaces) {
-            let material = add_material(&mut scene, surface.clone(), Vec3::ZERO);
-            let corner = Vec3::new(-50.0, 0.25 * height as f32, -50.0);
-            add_rectangle(&mut scene, corner, Vec3::Z * 100.0, Vec3::X * 100.0, material);
-        }
-        scene.lights.push(light);
-        scene
-    };
-    let white = ColorInput::constant(Vec3::ONE);
-    let pane = Surface::ThinDielectric { ior: 1.5, transmittance: white };
-    let tinted = Surface::ThinDielectric { ior: 1.5, transmittance: ColorInput::constant(Vec3::splat(0.5)) };
-    // Fresnel at a cosine of 0.8: sine 0.4 inside, cosine 0.9165.
-    let (outside, inside) = (0.8f32, 0.84f32.sqrt());
+/// A floor under sheets at heights of 0.25, 0.5, …
+fn floor_under(sheets: &[Surface]) -> Scene {
+    let mut scene = floor();
+    for (height, surface) in (1..).zip(sheets) {
+        let material = add_material(&mut scene, surface.clone(), Vec3::ZERO);
+        let corner = Vec3::new(-50.0, 0.25 * height as f32, -50.0);
+        add_rectangle(&mut scene, corner, Vec3::Z * 100.0, Vec3::X * 100.0, material);
+    }
+    scene
+}
+
+/// Glass of index 1.5.
+fn pane(transmittance: f32) -> Surface {
+    Surface::ThinDielectric { ior: 1.5, transmittance: ColorInput::constant(Vec3::splat(transmittance)) }
+}
+
+/// Share that passes a clear pane of index 1.5 at a cosine, by Fresnel and all reflections between its faces.
+fn share_through_pane(outside: f32) -> f32 {
+    let inside = (1.0 - (1.0 - outside * outside) / 2.25).sqrt();
     let parallel = ((1.5 * outside - inside) / (1.5 * outside + inside)).powi(2);
     let perpendicular = ((outside - 1.5 * inside) / (outside + 1.5 * inside)).powi(2);
     let face = 0.5 * (parallel + perpendicular);
-    let through = (1.0 - face) / (1.0 + face);
+    (1.0 - face) / (1.0 + face)
+}
+
+/// Panes between a floor and lights that no path can meet: what each lets through, at its own angle, and nothing through a board
+/// nor through more panes than a path may have surfaces.
+#[test]
+fn lights_without_area_shine_through_panes() {
+    let behind = |surfaces: &[Surface], light: &Light| {
+        let mut scene = floor_under(surfaces);
+        scene.lights.push(light.clone());
+        scene
+    };
+    let through = share_through_pane(0.8);
     let point = Light::Point { position: Vec3::new(0.0, 2.0, 0.0), intensity: Vec3::splat(8.0) };
     let sun = Light::Directional {
         direction: Vec3::new(0.6, -0.8, 0.0),
@@ -230,12 +248,70 @@ fn lights_without_area_shine_through_panes() {
         angular_radius: 0.0,
         is_of_sky: false,
     };
-    assert_irradiance(behind(std::slice::from_ref(&pane), point.clone()), 1.5, through * 8.0 / 6.25 * 0.8, "point");
-    assert_irradiance(behind(&[pane.clone(), tinted], sun), 0.0, 0.5 * through * through * 1.6, "directional");
-    let boarded = behind(&[pane, diffuse(0.5)], point);
-    let tracer = PathTracer::new(Arc::new(boarded), TraceSettings { max_depth: 1, ..trace_settings(16, 16, 0) });
-    let ray = Ray::new(vec3a(1.4, 0.2, 0.0), vec3a(0.1, -0.2, 0.0).normalize());
-    assert_eq!(radiance_along(&tracer, ray, 16, 64).0, Vec3::ZERO);
+    assert_irradiance_behind(1, behind(&[pane(1.0)], &point), 1.5, through * 8.0 / 6.25 * 0.8, "point");
+    assert_irradiance_behind(
+        2,
+        behind(&[pane(1.0), pane(0.5)], &sun),
+        0.0,
+        0.5 * through * through * 1.6,
+        "directional",
+    );
+    for (surfaces, sheets) in [([pane(1.0), diffuse(0.5)], 2), ([pane(1.0), pane(1.0)], 1)] {
+        let settings = TraceSettings { max_depth: 1 + sheets, ..trace_settings(16, 16, 0) };
+        let tracer = PathTracer::new(Arc::new(behind(&surfaces, &point)), settings);
+        let ray = Ray::new(vec3a(1.4, 0.2, 0.0), vec3a(0.1, -0.2, 0.0).normalize());
+        assert_eq!(radiance_along(&tracer, ray, 16, 64).0, Vec3::ZERO);
+    }
+}
+
+/// Lamps that paths meet behind panes by themselves, too, shine through them once: a sun of the sun's size, which nearly only shadow
+/// rays find, a sun of 30°, a sky, and a ball near the floor, which both find.
+#[test]
+fn lights_of_some_extent_shine_through_panes_once() {
+    let panes = [pane(1.0), pane(0.5)];
+    let through = |cosine: f32| 0.5 * share_through_pane(cosine).powi(2);
+    let sun = |radius: f32| Light::Directional {
+        direction: Vec3::new(0.6, -0.8, 0.0),
+        irradiance: Vec3::splat(2.0),
+        angular_radius: radius.to_radians(),
+        is_of_sky: false,
+    };
+    for (radius, expected) in [(0.27, 1.6 * through(0.8)), (15.0, 2.0 * mean_over_disc(15f32.to_radians(), through))] {
+        let mut scene = floor_under(&panes);
+        scene.lights.push(sun(radius));
+        assert_irradiance_behind(2, scene, 0.0, expected, &format!("a sun of {radius}°"));
+    }
+    let mut scene = floor_under(&panes);
+    scene.environment = constant_environment(1.0);
+    let cosines = (0..10_000).map(|i| (i as f32 + 0.5) / 10_000.0);
+    let sky = cosines.map(|cosine| 2.0 * PI * cosine * through(cosine) / 10_000.0).sum();
+    assert_irradiance_behind(2, scene, 0.0, sky, "sky");
+    let mut scene = floor_under(&panes);
+    let lamp = add_material(&mut scene, diffuse(0.0), Vec3::splat(3.0));
+    add_sphere(&mut scene, Vec3::new(0.0, 1.0, 0.0), 0.4, lamp);
+    let edge = 0.84f32.sqrt();
+    let cosines = (0..10_000).map(|i| edge + (1.0 - edge) * (i as f32 + 0.5) / 10_000.0);
+    let ball = cosines.map(|cosine| 3.0 * 2.0 * PI * (1.0 - edge) * cosine * through(cosine) / 10_000.0).sum();
+    assert_irradiance_behind(2, scene, 0.0, ball, "ball");
+}
+
+/// Mean over directions of a disc around a cosine of 0.8 of cosine times transmittance, over the mean cosine's part of it: what a sun
+/// of irradiance 1, square to its middle, gives a floor.
+fn mean_over_disc(radius: f32, through: impl Fn(f32) -> f32) -> f32 {
+    let (mut sum, mut total) = (0.0f64, 0.0f64);
+    let axis = Vec3::new(-0.6, 0.8, 0.0);
+    let (side, up) = (Vec3::Z, axis.cross(Vec3::Z));
+    for i in 0..400 {
+        let cosine = 1.0 - (1.0 - radius.cos()) * (i as f32 + 0.5) / 400.0;
+        let sine = (1.0 - cosine * cosine).sqrt();
+        for j in 0..400 {
+            let (s, c) = (2.0 * PI * (j as f32 + 0.5) / 400.0).sin_cos();
+            let height = (axis * cosine + (side * c + up * s) * sine).y;
+            sum += f64::from(height * through(height));
+            total += f64::from(cosine);
+        }
+    }
+    (sum / total) as f32
 }
 
 #[test]
