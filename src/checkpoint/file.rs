@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 static FILM: Kind = Kind {
     magic: *b"fech film\r\n\x1a",
-    version: 8,
+    version: 9,
     what: "a film's file, such as fechner render --checkpoint FILE writes",
     remedy: "take another copy of it, or render anew",
 };

@@ -1,6 +1,6 @@
 //! What was rendered and for whom: small, at the start of the film's file.
 
-use super::tracing::only_in;
+use super::tracing::Tracing;
 use crate::adaptive::settings::{AllocationRule, Limits, LoopSettings, Sampling};
 use crate::denoise::{Denoiser, DenoiserKind, OidnError};
 use crate::integrator::{Crop, TraceSettings};
@@ -12,6 +12,7 @@ use fechner_perception::display::Viewing;
 use fechner_perception::model::{self, ThresholdModel};
 use fechner_perception::tone::{self, SavedTone};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 /// This program, its version and what of its build changes the last bits of a sample: where the target has fused multiply-add
 /// (`-C target-cpu=native` without `-C target-feature=-fma`), glam's `Vec3A::cross` and `lerp` use it.
@@ -58,8 +59,8 @@ pub struct Origin {
     pub width: u32,
     /// Height of the film in pixels.
     pub height: u32,
-    /// How it was traced, in words.
-    pub tracing: String,
+    /// How it was traced.
+    pub tracing: Tracing,
 }
 
 /// Seeds of a film's samples.
@@ -126,31 +127,13 @@ impl Origin {
             scene: content_hash(scene),
             width,
             height,
-            tracing: in_words(settings),
+            tracing: Tracing::of(settings),
         }
-    }
-
-    /// The pixel filter of its samples, as [`Self::tracing`] names it; the default where it names none.
-    pub fn filter(&self) -> PixelFilter {
-        let is_named =
-            |filter: &PixelFilter| self.tracing.split(", ").any(|field| field == format!("filter: {filter:?}"));
-        PixelFilter::ALL.into_iter().find(is_named).unwrap_or_default()
-    }
-
-    /// Whether what surrounds the scene was left out, so that pictures of the film have alpha.
-    pub fn is_transparent(&self) -> bool {
-        self.tracing.split(", ").any(|setting| setting == "transparent: true")
     }
 
     /// Where the film lies in the whole picture, if it is a crop of it.
     pub fn part_of(&self) -> Option<PartOf> {
-        let number = |text: &str, name: &str| {
-            let value = text.split(", ").find_map(|field| field.strip_prefix(name)?.strip_prefix(": "));
-            value.and_then(|value| value.parse().ok())
-        };
-        let (_, crop) = self.tracing.split_once("crop: Some(Crop { ")?;
-        let origin = [number(crop, "x")?, number(crop, "y")?];
-        Some(PartOf { origin, whole: [number(&self.tracing, "width")?, number(&self.tracing, "height")?] })
+        PartOf::of(self.tracing.settings())
     }
 
     /// What keeps a film from standing beside one of `own` origin; `None` if nothing does.
@@ -172,18 +155,10 @@ impl Origin {
             ));
         }
         (self.tracing != own.tracing).then(|| {
-            let [its, this] =
-                [(&self.tracing, &own.tracing), (&own.tracing, &self.tracing)].map(|(a, b)| only_in(a, b));
+            let [its, this] = [self.tracing.otherwise_than(&own.tracing), own.tracing.otherwise_than(&self.tracing)];
             format!("its samples were traced with {its}, and these are with {this}")
         })
     }
-}
-
-/// Every setting that changes a sample, also those to come, less the seed.
-fn in_words(settings: &TraceSettings) -> String {
-    let text = format!("{settings:?}");
-    let fields = text.trim_start_matches("TraceSettings { ").trim_end_matches(" }").split(", ");
-    fields.filter(|field| !field.starts_with("seed: ")).collect::<Vec<_>>().join(", ")
 }
 
 impl Seeds {
@@ -293,17 +268,38 @@ impl SettingsRecord {
     }
 }
 
-/// What a structure has and another of its kind has not, as [`only_in`] says it.
-fn fields_only_in<T: std::fmt::Debug>(own: &T, other: &T) -> Option<String> {
-    let [own, other] = [own, other].map(|all| format!("{all:?}"));
-    let inner =
-        |text: &'_ str| text.split_once(" { ").map_or("", |(_, fields)| fields.trim_end_matches(" }")).to_owned();
-    Some(only_in(&inner(&own), &inner(&other))).filter(|said| !said.is_empty())
+/// "pixels per degree 60.5, white cd m2 250.0": the fields of a structure that are others in another of its kind.
+fn fields_only_in<T: Serialize>(own: &T, other: &T) -> Option<String> {
+    let [Ok(Value::Object(own)), Ok(Value::Object(other))] = [own, other].map(serde_json::to_value) else {
+        return None;
+    };
+    let changed = own.iter().filter(|(name, value)| other.get(*name) != Some(value));
+    let said: Vec<String> =
+        changed.map(|(name, value)| format!("{} {}", in_words(name), value_in_words(value))).collect();
+    (!said.is_empty()).then(|| said.join(", "))
+}
+
+fn value_in_words(value: &Value) -> String {
+    let all = |values: &mut dyn Iterator<Item = String>| values.collect::<Vec<_>>().join(" ");
+    match value {
+        Value::Null => "none".to_owned(),
+        Value::String(text) => in_words(text),
+        Value::Array(values) => all(&mut values.iter().map(value_in_words)),
+        Value::Object(fields) => {
+            all(&mut fields.iter().map(|(name, value)| format!("{} {}", in_words(name), value_in_words(value))))
+        }
+        Value::Bool(_) | Value::Number(_) => value.to_string(),
+    }
+}
+
+fn in_words(name: &str) -> String {
+    name.replace(['_', '-'], " ")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use fechner_perception::display::Glare;
 
     #[test]
     fn films_say_what_is_seen_otherwise_in_them() {
@@ -329,23 +325,11 @@ mod tests {
         let mut other = own.clone();
         other.viewing.display.pixels_per_degree = 60.5;
         other.viewing.observer.sensitivity = 1.75;
-        assert_eq!(other.seen_otherwise_than(&own), "pixels per degree 60.5, sensitivity 1.75");
-    }
-
-    #[test]
-    fn a_film_knows_its_filter() {
-        for filter in PixelFilter::ALL {
-            let trace = TraceSettings { filter, ..TraceSettings::new(64, 48, 7) };
-            assert_eq!(Origin::of(&Scene::default(), &trace).filter(), filter);
-        }
-    }
-
-    #[test]
-    fn a_film_knows_its_place_in_the_whole() {
-        let crop = Some(Crop { x: 20, y: 11, width: 3, height: 2 });
-        for crop in [None, crop] {
-            let trace = TraceSettings { crop, ..TraceSettings::new(64, 48, 7) };
-            assert_eq!(Origin::of(&Scene::default(), &trace).part_of(), PartOf::of(&trace));
-        }
+        other.viewing.observer.glare = Glare::Cie { age_years: 40.0 };
+        assert_eq!(
+            other.seen_otherwise_than(&own),
+            "pixels per degree 60.5, glare cie age years 40.0, sensitivity 1.75"
+        );
+        assert_eq!(own.seen_otherwise_than(&other), "pixels per degree 60.0, glare none, sensitivity 1.0");
     }
 }

@@ -13,7 +13,7 @@ pub use file::{
 };
 pub use header::{Header, Origin, PROGRAM, Seeds, SettingsError, SettingsRecord, UnknownName};
 pub use merge::{MergeError, merge_files};
-pub use tracing::tracing_in_words;
+pub use tracing::Tracing;
 
 use crate::adaptive::state::RenderState;
 

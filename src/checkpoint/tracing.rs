@@ -1,82 +1,109 @@
-//! How a film was traced, for people: [`Origin::tracing`](super::Origin::tracing) is what the compiler prints of the settings.
+//! How a film was traced: all settings that change its samples but the seed, to be kept, compared and said.
 
-/// How a film was traced: "max depth 1000, filter gaussian, crop 8,0,32,16". Settings that ask for nothing, and the picture's size, are
-/// left out.
-pub fn tracing_in_words(tracing: &str) -> String {
-    let asks =
-        |&(name, value): &(&str, &str)| !["width", "height"].contains(&name) && value != "None" && value != "false";
-    joined(fields(tracing).filter(asks))
-}
+use crate::integrator::{Crop, Pruning, TraceSettings};
+use serde::{Deserialize, Serialize};
 
-/// The settings of a film that are others in another one, those that ask for nothing too.
-pub(super) fn only_in(tracing: &str, other: &str) -> String {
-    let is_new = |field: &(&str, &str)| !fields(other).any(|other| other == *field);
-    joined(fields(tracing).filter(is_new))
-}
+/// Settings whose seed counts for nothing: a film has its own list of seeds.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Tracing(TraceSettings);
 
-fn joined<'t>(fields: impl Iterator<Item = (&'t str, &'t str)>) -> String {
-    fields.map(|(name, value)| said(name, value)).collect::<Vec<_>>().join(", ")
-}
+impl Tracing {
+    /// Of a render.
+    pub fn of(settings: &TraceSettings) -> Self {
+        Self(TraceSettings { seed: 0, ..*settings })
+    }
 
-/// Names and values of the fields of a structure.
-fn fields(structure: &str) -> impl Iterator<Item = (&str, &str)> {
-    let mut depth = 0;
-    let at_top = move |letter: char| {
-        depth += i32::from("({[".contains(letter)) - i32::from(")}]".contains(letter));
-        letter == ',' && depth == 0
-    };
-    structure.split(at_top).filter_map(|field| field.trim().split_once(": "))
-}
+    /// The settings, with a seed that says nothing.
+    pub fn settings(&self) -> &TraceSettings {
+        &self.0
+    }
 
-/// "no crop", "crop 1,2,3,4" as `--crop` has it, "transparent".
-fn said(name: &str, value: &str) -> String {
-    let name = name.replace('_', " ");
-    let value = value.strip_prefix("Some(").and_then(|value| value.strip_suffix(')')).unwrap_or(value);
-    match (value, value.split_once(" { ")) {
-        ("None", _) => format!("no {name}"),
-        ("false", _) => format!("not {name}"),
-        ("true", _) => name,
-        (_, Some((_, inner))) => {
-            let numbers: Vec<&str> = fields(inner.trim_end_matches(" }")).map(|(_, number)| number).collect();
-            format!("{name} {}", numbers.join(","))
-        }
-        _ => format!("{name} {}", apart(value)),
+    /// "max depth 1000, filter gaussian, crop 8,0,32,16". Settings that ask for nothing, and the picture's size, are left out.
+    pub fn in_words(&self) -> String {
+        joined(self.said().into_iter().filter(|setting| setting.asks))
+    }
+
+    /// The settings that are others elsewhere, those that ask for nothing too.
+    pub(super) fn otherwise_than(&self, other: &Self) -> String {
+        let pairs = self.said().into_iter().zip(other.said());
+        joined(pairs.filter(|(own, other)| own.words != other.words).map(|(own, _)| own))
+    }
+
+    fn said(&self) -> [Setting; 9] {
+        // Without dots, so that a new setting has to be thought of.
+        let TraceSettings { width, height, seed: _, max_depth, filter, clamp, sequence, crop, transparent, prune } =
+            self.0;
+        [
+            Setting { words: format!("width {width}"), asks: false },
+            Setting { words: format!("height {height}"), asks: false },
+            Setting { words: format!("max depth {max_depth}"), asks: true },
+            Setting { words: format!("filter {}", filter.in_words()), asks: true },
+            Setting::where_any("clamp", clamp.map(|clamp| format!("{clamp:?}"))),
+            Setting { words: format!("sequence {}", sequence.in_words()), asks: true },
+            Setting::where_any("crop", crop.map(|Crop { x, y, width, height }| format!("{x},{y},{width},{height}"))),
+            Setting { words: if transparent { "transparent" } else { "not transparent" }.into(), asks: transparent },
+            Setting::where_any("prune", prune.map(|Pruning { nits_per_unit }| format!("{nits_per_unit:?}"))),
+        ]
     }
 }
 
-/// "blackman harris" of "BlackmanHarris".
-fn apart(text: &str) -> String {
-    let mut apart = String::new();
-    for letter in text.chars() {
-        if letter.is_uppercase() && apart.ends_with(char::is_lowercase) {
-            apart.push(' ');
-        }
-        apart.extend(letter.to_lowercase());
+/// A setting for people.
+struct Setting {
+    words: String,
+    /// Whether it does anything.
+    asks: bool,
+}
+
+impl Setting {
+    /// "crop 1,2,3,4", "no crop".
+    fn where_any(name: &str, value: Option<String>) -> Self {
+        let asks = value.is_some();
+        Self { words: value.map_or_else(|| format!("no {name}"), |value| format!("{name} {value}")), asks }
     }
-    apart
+}
+
+fn joined(settings: impl Iterator<Item = Setting>) -> String {
+    settings.map(|setting| setting.words).collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sampler::{PixelFilter, Sequence};
+
+    fn plain() -> TraceSettings {
+        TraceSettings::new(64, 48, 7)
+    }
 
     #[test]
     fn tracing_is_said_without_what_it_does_not_do() {
-        let tracing = "width: 64, max_depth: 1000, filter: BlackmanHarris, clamp: Some(9.0), crop: Some(Crop { x: 1, y: 2, width: 3, height: 4 }), \
-                       transparent: true, prune: None";
-        let words = "max depth 1000, filter blackman harris, clamp 9.0, crop 1,2,3,4, transparent";
-        assert_eq!(tracing_in_words(tracing), words);
+        let words = |settings: TraceSettings| Tracing::of(&settings).in_words();
+        assert_eq!(words(plain()), "max depth 1000, filter gaussian, sequence per pixel");
+        let settings = TraceSettings {
+            filter: PixelFilter::BlackmanHarris,
+            clamp: Some(9.0),
+            sequence: Sequence::ZOrder,
+            crop: Some(Crop { x: 1, y: 2, width: 3, height: 4 }),
+            transparent: true,
+            ..plain()
+        };
+        let all = "max depth 1000, filter blackman harris, clamp 9.0, sequence z order, crop 1,2,3,4, transparent";
+        assert_eq!(words(settings), all);
     }
 
-    /// Parts of a crop are no settings of their own.
     #[test]
-    fn a_crop_is_named_as_a_whole() {
-        let whole =
-            "width: 32, height: 32, crop: None, transparent: false, prune: Some(Pruning { nits_per_unit: 100.0 })";
-        let part = "width: 32, height: 32, crop: Some(Crop { x: 0, y: 0, width: 32, height: 32 }), transparent: true, prune: None";
-        assert_eq!(only_in(whole, part), "no crop, not transparent, prune 100.0");
-        assert_eq!(only_in(part, whole), "crop 0,0,32,32, transparent, no prune");
-        let other = part.replace("y: 0", "y: 4");
-        assert_eq!([only_in(part, &other), only_in(&other, part)], ["crop 0,0,32,32", "crop 0,4,32,32"]);
+    fn what_differs_is_said_from_both_sides() {
+        let from_both = |a: TraceSettings, b: TraceSettings| {
+            let [a, b] = [a, b].map(|settings| Tracing::of(&settings));
+            [a.otherwise_than(&b), b.otherwise_than(&a)]
+        };
+        let whole = TraceSettings { prune: Some(Pruning { nits_per_unit: 100.0 }), ..plain() };
+        let crop = Crop { x: 0, y: 0, width: 32, height: 32 };
+        let part = TraceSettings { crop: Some(crop), transparent: true, ..plain() };
+        let said = ["no crop, not transparent, prune 100.0", "crop 0,0,32,32, transparent, no prune"];
+        assert_eq!(from_both(whole, part), said);
+        let other = TraceSettings { crop: Some(Crop { y: 4, ..crop }), ..part };
+        assert_eq!(from_both(part, other), ["crop 0,0,32,32", "crop 0,4,32,32"]);
+        assert_eq!(from_both(plain(), TraceSettings { width: 80, seed: 8, ..plain() }), ["width 64", "width 80"]);
     }
 }

@@ -56,11 +56,11 @@ pub(super) fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
             "note: sampled under an importance map (content {map}), which films do not keep: what can be seen is told without it"
         );
     }
-    let background = if merged.header.origin.is_transparent() { Background::Transparent } else { Background::Shown };
+    let tracing = *merged.header.origin.tracing.settings();
+    let background = if tracing.transparent { Background::Transparent } else { Background::Shown };
     let limits = Limits { visibility: Limits::visibility_of_last_rung(visibility), ..Limits::of_visibility(THRESHOLD) };
-    let origin = &merged.header.origin;
-    let mut settings = merged.header.settings.loop_settings(limits, origin.filter())?;
-    settings.is_transparent = origin.is_transparent();
+    let mut settings = merged.header.settings.loop_settings(limits, tracing.filter)?;
+    settings.is_transparent = tracing.transparent;
     if format.is_none() {
         write_checkpoint(&arguments.output, &merged.header, &merged.state)?;
     }

@@ -152,8 +152,9 @@ impl Farm {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::checkpoint::Origin;
+    use crate::checkpoint::{Origin, Tracing};
     use crate::farm::{FrameEntry, Work};
+    use crate::integrator::TraceSettings;
 
     #[test]
     fn numbers_and_places_are_one_to_one() {
@@ -164,7 +165,7 @@ mod tests {
             scene: hash,
             width: 1,
             height: 1,
-            tracing: String::new(),
+            tracing: Tracing::of(&TraceSettings::new(1, 1, 0)),
         };
         let entry = |frame| FrameEntry { frame, seed: 0, origin: origin.clone(), judged_by: hash };
         let manifest = Manifest {

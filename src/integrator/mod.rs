@@ -36,7 +36,7 @@ use std::sync::Arc;
 use tables::SurfaceTables;
 
 /// What does not change during a render.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TraceSettings {
     /// Width of the full picture in pixels.
     pub width: u32,
@@ -63,7 +63,7 @@ pub struct TraceSettings {
 }
 
 /// A rectangle of the picture in pixels, inside it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Crop {
     /// Leftmost column.
     pub x: u32,

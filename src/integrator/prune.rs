@@ -8,9 +8,10 @@
 //! Not for speed: see `benches/results/transport.md`.
 
 use fechner_perception::tvi::combined_monotone;
+use serde::{Deserialize, Serialize};
 
 /// Which light is left to chance. A path's samples stay a pure function of their key.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pruning {
     /// Luminance in cd/m² of RGB (1, 1, 1), at which scene units are seen.
     pub nits_per_unit: f64,

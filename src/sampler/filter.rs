@@ -5,11 +5,12 @@
 //! that of the signs, too, which no perception model should judge: adaptive sampling refuses such filters.
 
 use glam::Vec2;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 use std::sync::LazyLock;
 
 /// A pixel reconstruction filter.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum PixelFilter {
     /// One pixel wide; what most references use.
     Box,
@@ -39,8 +40,15 @@ static BLACKMAN_HARRIS: LazyLock<Profile> = LazyLock::new(|| Profile::new(1.5, b
 static MITCHELL: LazyLock<Profile> = LazyLock::new(|| Profile::new(2.0, mitchell));
 
 impl PixelFilter {
-    /// All of them.
-    pub const ALL: [Self; 4] = [Self::Box, Self::Gaussian, Self::BlackmanHarris, Self::Mitchell];
+    /// Its name for people.
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Self::Box => "box",
+            Self::Gaussian => "gaussian",
+            Self::BlackmanHarris => "blackman harris",
+            Self::Mitchell => "mitchell",
+        }
+    }
 
     /// Whether it has negative lobes.
     pub fn is_signed(self) -> bool {

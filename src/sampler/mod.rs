@@ -13,7 +13,7 @@ mod sobol;
 pub use filter::{FilterSample, PixelFilter};
 
 /// How the samples of neighbouring pixels relate.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Sequence {
     /// Owen-scrambled Sobol points, every block of every pixel scrambled by itself: neighbours are independent.
     #[default]
@@ -25,6 +25,17 @@ pub enum Sequence {
     ZOrder,
     /// Independent random numbers: for tests that need variances to be what textbooks say.
     Independent,
+}
+
+impl Sequence {
+    /// Its name for people.
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Self::PerPixel => "per pixel",
+            Self::ZOrder => "z order",
+            Self::Independent => "independent",
+        }
+    }
 }
 
 use crate::geometry::{VectorWork, with_vectors};

@@ -4,7 +4,7 @@ use super::super::console::duration_in_words;
 use super::super::report::sampling_name;
 use super::super::words::rounded;
 use fechner::adaptive::settings::Limits;
-use fechner::checkpoint::{Checkpoint, tracing_in_words};
+use fechner::checkpoint::Checkpoint;
 use std::fmt::Write as _;
 
 /// The text that `info` prints of a film.
@@ -20,7 +20,7 @@ pub(super) fn describe(checkpoint: &Checkpoint) -> String {
         let _ = writeln!(text, "  {name:11}  {value}");
     };
     row("scene", format!("\"{}\", content {}", origin.scene_name, origin.scene));
-    row("traced by", tracing_in_words(&origin.tracing));
+    row("traced by", origin.tracing.in_words());
     row(
         "seeds",
         match header.seeds.current {
