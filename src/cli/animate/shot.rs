@@ -1,39 +1,36 @@
-//! A shot on its way into files: its track, its frames and what only the whole of it has.
+//! A shot on its way into files: its frames, in `track` what is known of all of them beforehand, in `conclude` what only the whole of it has.
 
-use super::contact::{ContactSheet, on_sheet};
+mod conclude;
+mod key;
+mod track;
+
 use super::frames::Frames;
 use super::motion::push_velocity;
-use super::record::{self, FrameRecord, read_json};
+use super::record::{self, FrameRecord};
 use super::settings::shot_settings;
 use super::source::FileSource;
-use super::video::shown_rgb8;
-use super::{AnimateArguments, AovNames, EyeChoice, VelocityChoice, video};
-use crate::cli::console::{Console, Counter, duration_in_words};
+use super::{AnimateArguments, AovNames, EyeChoice, VelocityChoice};
+use crate::cli::console::Console;
 use crate::cli::json::write_json;
 use crate::cli::report::Report;
 use crate::cli::seeing::{Presentation, tone_operator};
 use crate::cli::targets::check_scene_kept;
-use crate::cli::words::listed;
 use anyhow::{Context, Result, bail};
-use fechner::adaptive::settings::{AllocationRule, LoopSettings, Sampling};
-use fechner::animate::budget::Needs;
-use fechner::animate::eye::Eye;
+use fechner::adaptive::settings::{AllocationRule, LoopSettings};
 use fechner::animate::name::FrameName;
-use fechner::animate::track::{Track, TrackFrame};
+use fechner::animate::track::Track;
 use fechner::animate::{FrameScenes, RenderedFrame, SceneSource as _, ShotSettings, render_frame};
-use fechner::checkpoint::{PROGRAM, SettingsRecord};
+use fechner::checkpoint::SettingsRecord;
 use fechner::denoise::Denoiser;
 use fechner::output::rendered::{Background, layers, write_display_png};
 use fechner::output::{self, Attribute, Format};
 use fechner::scene::Scene;
-use fechner::scene::hash::content_hash;
 use fechner_perception::model;
 use fechner_perception::tone::{ToneOperator, ToneSettings};
 use std::io::Write as _;
-use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// What a frame is made from and judged by.
 pub(in crate::cli) struct FrameJob {
@@ -161,63 +158,6 @@ impl<'a> Shot<'a> {
         tone_operator(&self.operator_name, &ToneSettings { exposure_stops, ..ToneSettings::default() })
     }
 
-    /// The track that lies beside the frames, if it is of this shot and the scenes of all `wanted` frames are still those that
-    /// it was made from; else a new one.
-    pub(in crate::cli) fn track(&self, wanted: RangeInclusive<u32>) -> Result<Track> {
-        let file = self.name.of_shot("track.json");
-        let operator = self.operator()?;
-        if let Some(track) = read_json::<Track>(&file) {
-            if self.is_up_to_date(&track, operator.as_ref(), wanted)? {
-                self.make_folder()?;
-                return Ok(track);
-            }
-            say!("{}: of other settings or another scene, made anew", file.display());
-        }
-        self.check_ends()?;
-        if folder_of(&self.file(self.settings.first)).is_none_or(Path::exists) {
-            self.make_folder()?;
-        }
-        let count = self.settings.last - self.settings.first + 1;
-        let started = Instant::now();
-        let looking = Counter::new("looking at frames", count as usize);
-        let mut track = Track::make(&self.source, &self.settings, operator.as_ref(), &|done| looking.count(done))?;
-        if let (Some(mean_samples), Sampling::Adaptive) = (self.settings.limits.mean_samples, self.settings.sampling) {
-            track.spread(&self.needs(&track)?, mean_samples);
-        }
-        self.make_folder()?;
-        say!("found the light of {count} frames in {}", duration_in_words(started.elapsed().as_secs_f64()));
-        let text = serde_json::to_string(&track).context("the track could not be put into words")?;
-        output::write_beside(&file, |file| file.write_all(text.as_bytes()))?;
-        Ok(track)
-    }
-
-    /// Reads the scenes beyond both ends, which the first and the last frame alone need: else a shot would fail at its last frame, when
-    /// all others are rendered.
-    fn check_ends(&self) -> Result<()> {
-        let [first, last] = [self.settings.first, self.settings.last].map(f64::from);
-        for (beyond, end) in [(first - 1.0, "first"), (last + 1.0, "last")] {
-            let scene = self.source.at(self.settings.seconds(beyond));
-            scene.with_context(|| format!("the frame beyond the {end} one, by which its motion is told"))?;
-        }
-        Ok(())
-    }
-
-    fn is_up_to_date(&self, track: &Track, operator: &dyn ToneOperator, wanted: RangeInclusive<u32>) -> Result<bool> {
-        for frame in wanted {
-            if track.of_frame(&self.settings, operator, frame, &*self.scene(frame)?).is_none() {
-                return Ok(false);
-            }
-        }
-        Ok(true)
-    }
-
-    /// What each frame of the shot needs.
-    pub(super) fn needs(&self, track: &Track) -> Result<Needs> {
-        self.operator()?;
-        let operator = || self.operator().expect("there was one before");
-        Ok(Needs::of(&self.source, &self.settings, &operator, track)?)
-    }
-
     /// Those of the frames to render that are not there as this run would make them. Reads all their scenes.
     pub(super) fn missing_frames(&self, track: &Track) -> Result<Vec<u32>> {
         let mut missing = Vec::new();
@@ -310,44 +250,6 @@ impl<'a> Shot<'a> {
         Ok(report)
     }
 
-    /// Writes what only the whole shot has, if all its frames are there as this run would make them; whether they are.
-    pub(in crate::cli) fn conclude(&self, track: &Track) -> Result<bool> {
-        let FoundFrames { records, missing } = self.find_frames(track)?;
-        if !missing.is_empty() {
-            let (frames, are) = if missing.len() == 1 { ("frame", "is") } else { ("frames", "are") };
-            say!("{frames} {} of the shot {are} not there yet, or changed.", listed(&missing));
-            self.note_outdated()?;
-            return Ok(false);
-        }
-        write_json(&self.name.of_shot("json"), &records)?;
-        let fits = |frame: usize| track.frames[frame].fitted.clone().restore();
-        let count = records.len();
-        let size = (self.settings.trace.width as usize, self.settings.trace.height as usize);
-        let mut sheet = ContactSheet::new(on_sheet(count).count(), size);
-        for frame in on_sheet(count) {
-            let file = self.file(self.settings.first + frame as u32);
-            sheet.add(&shown_rgb8(&file, || fits(frame), &self.settings)?);
-        }
-        sheet.write(&self.name.of_shot("contact.png"))?;
-        if let Some((path, format)) = self.arguments.video()? {
-            let files = (self.settings.first..=self.settings.last).map(|frame| self.file(frame));
-            video::write(path, format, files, &fits, &self.settings)?;
-        }
-        Ok(true)
-    }
-
-    /// Names what there is of the shot as it was before, whose frames are no longer those.
-    fn note_outdated(&self) -> Result<()> {
-        let video = self.arguments.video()?.map(|(path, _)| path.to_owned());
-        let files = [Some(self.name.of_shot("json")), Some(self.name.of_shot("contact.png")), video];
-        let outdated: Vec<String> =
-            files.into_iter().flatten().filter(|file| file.is_file()).map(|file| file.display().to_string()).collect();
-        if !outdated.is_empty() {
-            say!("note: still of the shot as it was before, until all its frames are there: {}", outdated.join(", "));
-        }
-        Ok(())
-    }
-
     fn write(&self, file: &Path, made: &RenderedFrame, settings: &LoopSettings, report: &Report) -> Result<()> {
         match self.format {
             Format::Png => write_display_png(file, &made.rendered, &settings.viewing.display, Background::Shown)?,
@@ -363,54 +265,10 @@ impl<'a> Shot<'a> {
         Ok(())
     }
 
-    /// All that a frame's file depends on, as a name.
-    fn key(&self, settings: &LoopSettings, track: &TrackFrame, scenes: &FrameScenes) -> String {
-        let follows_gaze = self.settings.eye == Eye::FollowsGaze;
-        let gaze_velocity_deg_s = follows_gaze.then(|| self.settings.gaze_velocity_deg_s(track.frame));
-        let text = format!(
-            "{}|{:?}|{track:?}|{}|{}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}|{:?}",
-            PROGRAM,
-            self.format,
-            content_hash(&scenes.previous),
-            content_hash(&scenes.next),
-            self.settings.trace,
-            settings.sampling,
-            settings.denoiser.as_ref().map(Denoiser::name),
-            settings.limits,
-            settings.viewing,
-            settings.frames,
-            settings.gazes,
-            self.arguments.aov_names,
-            self.settings.velocity_of,
-            (self.settings.eye, gaze_velocity_deg_s),
-            self.arguments.time
-        );
-        blake3::hash(text.as_bytes()).to_hex()[..32].to_owned()
-    }
-
     /// The record of a frame that is there, made from all that a key names.
     fn record(&self, frame: u32, key: &str) -> Option<FrameRecord> {
         let file = self.file(frame);
         FrameRecord::of_picture(&file).filter(|record| record.holds(key, &file))
-    }
-
-    /// Looks for all frames of the shot. One of another scene, other settings or another format is not there.
-    fn find_frames(&self, track: &Track) -> Result<FoundFrames> {
-        let frames = || self.settings.first..=self.settings.last;
-        // Keys take reading every scene: not for each run that makes a part of a shot.
-        let missing = frames().filter(|&frame| FrameRecord::of_picture(&self.file(frame)).is_none()).collect();
-        let mut found = FoundFrames { records: Vec::new(), missing };
-        if !found.missing.is_empty() {
-            return Ok(found);
-        }
-        for frame in frames() {
-            let job = self.frame_of_track(frame, track)?;
-            match job.and_then(|job| self.record(frame, &job.key)) {
-                Some(record) => found.records.push(record),
-                None => found.missing.push(frame),
-            }
-        }
-        Ok(found)
     }
 }
 
@@ -428,12 +286,4 @@ pub(super) enum Made {
     New,
     /// There was one of other settings or another scene.
     Anew,
-}
-
-/// What there is of a shot.
-struct FoundFrames {
-    /// Of the frames that are there, in order, if their files all are.
-    records: Vec<FrameRecord>,
-    /// Those that are not.
-    missing: Vec<u32>,
 }

@@ -1,0 +1,78 @@
+//! What only a whole shot has, made when its last frame is there: its JSON, its contact sheet, its video.
+
+use super::Shot;
+use crate::cli::animate::contact::{ContactSheet, on_sheet};
+use crate::cli::animate::record::FrameRecord;
+use crate::cli::animate::video;
+use crate::cli::animate::video::shown_rgb8;
+use crate::cli::json::write_json;
+use crate::cli::words::listed;
+use anyhow::Result;
+use fechner::animate::track::Track;
+
+/// What there is of a shot.
+struct FoundFrames {
+    /// Of the frames that are there, in order, if their files all are.
+    records: Vec<FrameRecord>,
+    /// Those that are not.
+    missing: Vec<u32>,
+}
+
+impl Shot<'_> {
+    /// Writes what only the whole shot has, if all its frames are there as this run would make them; whether they are.
+    pub(in crate::cli) fn conclude(&self, track: &Track) -> Result<bool> {
+        let FoundFrames { records, missing } = self.find_frames(track)?;
+        if !missing.is_empty() {
+            let (frames, are) = if missing.len() == 1 { ("frame", "is") } else { ("frames", "are") };
+            say!("{frames} {} of the shot {are} not there yet, or changed.", listed(&missing));
+            self.note_outdated()?;
+            return Ok(false);
+        }
+        write_json(&self.name.of_shot("json"), &records)?;
+        let fits = |frame: usize| track.frames[frame].fitted.clone().restore();
+        let count = records.len();
+        let size = (self.settings.trace.width as usize, self.settings.trace.height as usize);
+        let mut sheet = ContactSheet::new(on_sheet(count).count(), size);
+        for frame in on_sheet(count) {
+            let file = self.file(self.settings.first + frame as u32);
+            sheet.add(&shown_rgb8(&file, || fits(frame), &self.settings)?);
+        }
+        sheet.write(&self.name.of_shot("contact.png"))?;
+        if let Some((path, format)) = self.arguments.video()? {
+            let files = (self.settings.first..=self.settings.last).map(|frame| self.file(frame));
+            video::write(path, format, files, &fits, &self.settings)?;
+        }
+        Ok(true)
+    }
+
+    /// Names what there is of the shot as it was before, whose frames are no longer those.
+    fn note_outdated(&self) -> Result<()> {
+        let video = self.arguments.video()?.map(|(path, _)| path.to_owned());
+        let files = [Some(self.name.of_shot("json")), Some(self.name.of_shot("contact.png")), video];
+        let outdated: Vec<String> =
+            files.into_iter().flatten().filter(|file| file.is_file()).map(|file| file.display().to_string()).collect();
+        if !outdated.is_empty() {
+            say!("note: still of the shot as it was before, until all its frames are there: {}", outdated.join(", "));
+        }
+        Ok(())
+    }
+
+    /// Looks for all frames of the shot. One of another scene, other settings or another format is not there.
+    fn find_frames(&self, track: &Track) -> Result<FoundFrames> {
+        let frames = || self.settings.first..=self.settings.last;
+        // Keys take reading every scene: not for each run that makes a part of a shot.
+        let missing = frames().filter(|&frame| FrameRecord::of_picture(&self.file(frame)).is_none()).collect();
+        let mut found = FoundFrames { records: Vec::new(), missing };
+        if !found.missing.is_empty() {
+            return Ok(found);
+        }
+        for frame in frames() {
+            let job = self.frame_of_track(frame, track)?;
+            match job.and_then(|job| self.record(frame, &job.key)) {
+                Some(record) => found.records.push(record),
+                None => found.missing.push(frame),
+            }
+        }
+        Ok(found)
+    }
+}
