@@ -27,7 +27,6 @@ use fechner::output::{self, Attribute, Format};
 use fechner::scene::Scene;
 use fechner_perception::model;
 use fechner_perception::tone::{ToneOperator, ToneSettings};
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
