@@ -6,6 +6,7 @@
 //! constraint is violated and fade where it is slack; by weak duality any of them bounds the cheapest cost from below,
 //! which is the certificate every [`Allocation`] carries.
 
+mod block_grid;
 mod solver;
 
 use crate::error::{Error, check_range};

@@ -1,7 +1,8 @@
-//! The dual updates, and the certificate at full resolution.
+//! The dual updates on a grid of blocks, and the certificate at full resolution.
 
 use rayon::prelude::*;
 
+use super::block_grid::BlockGrid;
 use super::{Allocation, AllocationProblem};
 use crate::error::{Error, check_range};
 use crate::filter::{dilate_xy, gaussian_blur_xy};
@@ -31,10 +32,8 @@ pub(super) struct Solver<'a> {
     root: Vec<f32>,
     /// Standard deviation of the pooling window along x and y.
     sigma_px: [f64; 2],
-    /// Side of the blocks that share a multiplier.
-    block: usize,
-    blocks_x: usize,
-    blocks_y: usize,
+    /// The blocks that share a multiplier.
+    grid: BlockGrid,
     /// What the pixels of each block come to.
     blocks: Vec<BlockStatistics>,
     /// Share of its block's constraint that each pixel has, over that of an even one; `None` is 1 everywhere.
@@ -89,9 +88,7 @@ impl<'a> Solver<'a> {
             weight,
             root,
             sigma_px,
-            block,
-            blocks_x: width.div_ceil(block),
-            blocks_y: height.div_ceil(block),
+            grid: BlockGrid { width, height, side: block },
             floor,
             cheapest: total_cost * problem.min_samples,
             blocks: Vec::new(),
@@ -161,7 +158,7 @@ impl<'a> Solver<'a> {
     pub(super) fn solve(&self, visibility: f64, multipliers: &mut [f32]) -> Allocation {
         let (bounds, unreachable_pixels) = self.bounds(visibility);
         let coarse_bounds = self.constraint_means(bounds.values());
-        let sigma_blocks = self.sigma_px.map(|sigma| sigma / self.block as f64);
+        let sigma_blocks = self.sigma_px.map(|sigma| sigma / self.grid.side as f64);
         let mut iterations = 0;
         let mut best_bound = f64::NEG_INFINITY;
         let mut best_multipliers = multipliers.to_vec();
@@ -172,8 +169,8 @@ impl<'a> Solver<'a> {
         };
         for iteration in 1..=most_iterations {
             iterations = iteration;
-            let price = self.blur_blocks(multipliers, sigma_blocks);
-            let noise = self.blur_blocks(&self.block_noise(&price), sigma_blocks);
+            let price = self.grid.blurred(multipliers, sigma_blocks);
+            let noise = self.grid.blurred(&self.block_noise(&price), sigma_blocks);
             if iteration % CHECK_EVERY == 0 {
                 let dual = self.coarse_dual(&price, multipliers, &coarse_bounds);
                 if dual.value > best_bound {
@@ -274,13 +271,13 @@ impl<'a> Solver<'a> {
 
     /// Mean of w/n over each block, with the counts that `price` asks for.
     fn block_noise(&self, price: &[f32]) -> Vec<f32> {
-        self.over_blocks(|block| {
+        self.grid.each(|block| {
             let root_price = price[block].sqrt();
             let statistics = &self.blocks[block];
             match self.limit_of(block, root_price) {
                 Limits::None => statistics.root_weight_cost / root_price,
                 Limits::All(count) => statistics.weight / count,
-                Limits::Some => self.block_mean(block, |index| self.weight[index] / self.count(index, root_price)),
+                Limits::Some => self.grid.mean(block, |index| self.weight[index] / self.count(index, root_price)),
             }
         })
     }
@@ -288,20 +285,20 @@ impl<'a> Solver<'a> {
     fn coarse_dual(&self, price: &[f32], multipliers: &[f32], bounds: &[f32]) -> CoarseDual {
         // Cost and noise of each block, in the order of the blocks: the sum is the same on any number of threads.
         let noise = self.block_noise(price);
-        let costs = self.over_blocks(|block| {
+        let costs = self.grid.each(|block| {
             let root_price = price[block].sqrt();
             let statistics = &self.blocks[block];
             match self.limit_of(block, root_price) {
                 Limits::None => statistics.root_weight_cost * root_price,
                 Limits::All(count) => statistics.cost * count,
                 Limits::Some => {
-                    self.block_mean(block, |index| self.problem.cost.values()[index] * self.count(index, root_price))
+                    self.grid.mean(block, |index| self.problem.cost.values()[index] * self.count(index, root_price))
                 }
             }
         });
         let mut dual = CoarseDual { value: 0.0, cost: 0.0 };
         for (block, (cost, noise)) in costs.iter().zip(&noise).enumerate() {
-            let pixels = self.pixels_in(block) as f64;
+            let pixels = self.grid.pixels_in(block) as f64;
             let lagrangian = f64::from(*cost) + f64::from(price[block]) * f64::from(*noise)
                 - f64::from(multipliers[block]) * f64::from(bounds[block]);
             dual.value += pixels * lagrangian;
@@ -331,46 +328,17 @@ impl<'a> Solver<'a> {
         }
     }
 
-    fn pixels_in(&self, block: usize) -> usize {
-        let (bx, by) = (block % self.blocks_x, block / self.blocks_x);
-        (self.width() - bx * self.block).min(self.block) * (self.height() - by * self.block).min(self.block)
-    }
-
-    /// `value_of(block index)` for every block.
-    fn over_blocks<T: Send>(&self, value_of: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
-        let least = (4096 / (self.block * self.block)).max(1);
-        (0..self.blocks_x * self.blocks_y).into_par_iter().with_min_len(least).map(value_of).collect()
-    }
-
-    /// Calls `visit(pixel index)` for every pixel of a block.
-    fn for_each_in(&self, block: usize, mut visit: impl FnMut(usize)) {
-        let (bx, by) = (block % self.blocks_x, block / self.blocks_x);
-        let columns = bx * self.block..((bx + 1) * self.block).min(self.width());
-        for y in by * self.block..((by + 1) * self.block).min(self.height()) {
-            for x in columns.clone() {
-                visit(y * self.width() + x);
-            }
-        }
-    }
-
-    /// Mean of `value_at(pixel index)` over a block.
-    fn block_mean(&self, block: usize, value_at: impl Fn(usize) -> f32) -> f32 {
-        let mut sum = 0.0;
-        self.for_each_in(block, |index| sum += value_at(index));
-        sum / self.pixels_in(block) as f32
-    }
-
     fn block_statistics(&self) -> Vec<BlockStatistics> {
-        self.over_blocks(|block| {
+        self.grid.each(|block| {
             let mut statistics = BlockStatistics {
-                weight: self.block_mean(block, |index| self.weight[index]),
-                cost: self.block_mean(block, |index| self.problem.cost.values()[index]),
+                weight: self.grid.mean(block, |index| self.weight[index]),
+                cost: self.grid.mean(block, |index| self.problem.cost.values()[index]),
                 // √(w/c) · c
-                root_weight_cost: self.block_mean(block, |index| self.root[index] * self.problem.cost.values()[index]),
+                root_weight_cost: self.grid.mean(block, |index| self.root[index] * self.problem.cost.values()[index]),
                 least_root: f32::INFINITY,
                 greatest_root: 0.0,
             };
-            self.for_each_in(block, |index| {
+            self.grid.for_each_in(block, |index| {
                 statistics.least_root = statistics.least_root.min(self.root[index]);
                 statistics.greatest_root = statistics.greatest_root.max(self.root[index]);
             });
@@ -384,40 +352,34 @@ impl<'a> Solver<'a> {
     fn shares_by(&self, tolerance: &[f32]) -> Vec<f32> {
         const AS_TIGHT: f32 = 1.001;
         let mut shares = vec![0.0; tolerance.len()];
-        for block in 0..self.blocks_x * self.blocks_y {
+        for block in 0..self.grid.count() {
             let mut least = f32::INFINITY;
-            self.for_each_in(block, |index| least = least.min(tolerance[index]));
+            self.grid.for_each_in(block, |index| least = least.min(tolerance[index]));
             let is_tight = |index: usize| tolerance[index] <= least * AS_TIGHT;
             let mut tight = 0;
-            self.for_each_in(block, |index| tight += usize::from(is_tight(index)));
-            let share = self.pixels_in(block) as f32 / tight as f32;
-            self.for_each_in(block, |index| shares[index] = if is_tight(index) { share } else { 0.0 });
+            self.grid.for_each_in(block, |index| tight += usize::from(is_tight(index)));
+            let share = self.grid.pixels_in(block) as f32 / tight as f32;
+            self.grid.for_each_in(block, |index| shares[index] = if is_tight(index) { share } else { 0.0 });
         }
         shares
     }
 
     /// Mean of `values` over the constrained pixels of each block.
     fn constraint_means(&self, values: &[f32]) -> Vec<f32> {
-        self.over_blocks(|block| match &self.shares {
-            None => self.block_mean(block, |index| values[index]),
+        self.grid.each(|block| match &self.shares {
+            None => self.grid.mean(block, |index| values[index]),
             // Not share times value, which may be infinite where the share is 0.
-            Some(shares) => self.block_mean(block, |index| match shares[index] {
+            Some(shares) => self.grid.mean(block, |index| match shares[index] {
                 0.0 => 0.0,
                 share => share * values[index],
             }),
         })
     }
 
-    fn blur_blocks(&self, values: &[f32], sigma_blocks: [f64; 2]) -> Vec<f32> {
-        match Plane::from_values(self.blocks_x, self.blocks_y, values.to_vec()) {
-            Ok(plane) => gaussian_blur_xy(&plane, sigma_blocks[0], sigma_blocks[1]).into_values(),
-            Err(_) => values.to_vec(),
-        }
-    }
-
+    /// Each pixel's share of its block's value.
     fn spread_over_blocks(&self, values: &[f32]) -> Plane {
         Plane::from_fn(self.width(), self.height(), |x, y| {
-            let value = values[(y / self.block) * self.blocks_x + x / self.block];
+            let value = values[self.grid.block_of(x, y)];
             self.shares.as_ref().map_or(value, |shares| value * shares[y * self.width() + x])
         })
     }
