@@ -66,10 +66,15 @@ impl EnvironmentSampler {
                 self.environment.parametrisation.to_direction(Vec2::new(s, (row as f32 + within) / height))
             }
             Parametrisation::LatLong => {
-                let cosine = |row: f32| (PI * row / height).cos();
-                let (top, bottom) = (cosine(row as f32), cosine(row as f32 + 1.0));
-                let cos_theta = (top + (bottom - top) * within).clamp(-1.0, 1.0);
-                let sin_theta = (1.0 - cos_theta * cos_theta).max(0.0).sqrt();
+                // 1 − cos of the angle from the nearer pole, which keeps its digits there.
+                let (pole, to_top, to_bottom) = match row as f32 {
+                    row if 2.0 * row < height => (1.0, row, row + 1.0),
+                    row => (-1.0, height - row, height - row - 1.0),
+                };
+                let versine = |rows: f32| 2.0 * (0.5 * PI * rows / height).sin().powi(2);
+                let (top, bottom) = (versine(to_top), versine(to_bottom));
+                let versine = top + (bottom - top) * within;
+                let (sin_theta, cos_theta) = ((versine * (2.0 - versine)).max(0.0).sqrt(), pole * (1.0 - versine));
                 let (sin_phi, cos_phi) = ((s - 0.5) * TAU).sin_cos();
                 Vec3::new(sin_theta * sin_phi, cos_theta, -sin_theta * cos_phi)
             }
@@ -114,5 +119,34 @@ impl Cells {
             rows: Distribution1d::new(&row_weights)?,
             columns: excess.chunks_exact(width).map(Distribution1d::new).collect(),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Where rows are narrow, too, at the poles of a picture of 4096×2048: what is drawn from a row is found in it, evenly.
+    #[test]
+    fn samples_of_a_row_lie_in_it() {
+        let height = 2048;
+        let black =
+            Environment { texels: Environment::constant(Vec3::ZERO).texels, ..Environment::constant(Vec3::ONE) };
+        let environment = Environment { width: 1, height, ..black };
+        let sampler = EnvironmentSampler { environment, cells: None };
+        for row in [0, 1, 2, 700, 1023, 1024, 2045, 2046, 2047] {
+            let solid_angle = sampler.environment.row_solid_angle(row);
+            for step in 0..64 {
+                let within = (step as f32 + 0.5) / 64.0;
+                let direction = sampler.in_row(row as usize, 0.3, within);
+                assert!((direction.length() - 1.0).abs() < 1e-6);
+                let v = sampler.environment.parametrisation.to_uv(direction).y * height as f32;
+                assert_eq!(v as u32, row, "{v} of row {row}");
+                // The solid angle of the part of the row that lies above.
+                let angle = |rows: f64| (std::f64::consts::PI * rows / f64::from(height)).cos();
+                let above = 2.0 * std::f64::consts::PI * (angle(f64::from(row)) - angle(f64::from(v)));
+                assert!((above / solid_angle - f64::from(within)).abs() < 2e-3, "{above} of {solid_angle} at {within}");
+            }
+        }
     }
 }

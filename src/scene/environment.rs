@@ -36,7 +36,9 @@ impl Parametrisation {
     pub fn to_uv(self, direction: Vec3) -> Vec2 {
         match self {
             Self::LatLong => {
-                Vec2::new(0.5 + direction.x.atan2(-direction.z) / TAU, direction.y.clamp(-1.0, 1.0).acos() / PI)
+                // Not the arc cosine of y: near the poles one step of y is a quarter of a row of a picture of 2048.
+                let theta = (direction.x * direction.x + direction.z * direction.z).sqrt().atan2(direction.y);
+                Vec2::new(0.5 + direction.x.atan2(-direction.z) / TAU, theta / PI)
             }
             Self::EqualArea => {
                 let Vec3 { x, y, z } = direction.abs();
