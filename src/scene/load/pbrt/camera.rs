@@ -147,7 +147,7 @@ impl Reader<'_> {
         };
         let full = FilmDefaults { width: side("xresolution", 1280)?, height: side("yresolution", 720)? };
         let size = Vec2::new(full.width as f32, full.height as f32);
-        // Corners in pixels. Bounds stay what they are: 273 / 1920 × 1920 is above 273, and would be 274.
+        // Corners in pixels. Bounds stay what they are: in f32 241 / 1920 × 1920 is above 241, and would be 242.
         let corners = match (film.numbers(&["float"], "cropwindow")?, film.numbers(&["integer"], "pixelbounds")?) {
             (Some(&[x0, x1, y0, y1]), None) => {
                 let [x0, x1, y0, y1] = [x0, x1, y0, y1].map(|share| (share as f32).clamp(0.0, 1.0));
