@@ -92,7 +92,7 @@ impl Difference {
 ///
 /// rgb: mean of the samples, linear, in a unit in which light lies between 1e-5 and 1e9, (height, width, 3). variance: of the mean's luminance in that unit squared,
 /// (height, width). albedo and normal: of the first surface, (height, width, 3), 0 where there is none. depth: (height, width), not
-/// finite where there is none.
+/// finite where there is none; a mean over samples of which some met nothing, counted as 0, is fine as well.
 #[pyfunction]
 pub(crate) fn denoise_guide<'py>(
     py: Python<'py>,

@@ -350,23 +350,15 @@ pub fn cut_to_budget(plan: SamplePlan, urgency: &Plane, samples: u64) -> SampleP
     order.sort_unstable();
     let mut left = samples;
     let mut fits = vec![false; blocks.len()];
-    for (.., place) in order {
-        let cost = u64::from(blocks[place as usize].samples);
-        if cost <= left {
+    for place in order.into_iter().map(|(.., place)| place as usize) {
+        let cost = u64::from(blocks[place].samples);
+        if cost <= left && (is_first_of_half(&blocks, place) || fits[place - 1]) {
             left -= cost;
-            fits[place as usize] = true;
+            fits[place] = true;
         }
     }
-    let mut kept: Vec<BlockWork> = Vec::with_capacity(blocks.len());
-    for (block, _) in blocks.into_iter().zip(fits).filter(|(_, fits)| *fits) {
-        let follows =
-            kept.last().is_some_and(|k| k.pixel == block.pixel && k.half == block.half && k.level + 1 == block.level);
-        let is_first = plan_first_level(&kept, &block);
-        if follows || is_first {
-            kept.push(block);
-        }
-    }
-    SamplePlan { blocks: kept }
+    let kept = blocks.into_iter().zip(fits).filter(|(_, fits)| *fits);
+    SamplePlan { blocks: kept.map(|(block, _)| block).collect() }
 }
 
 /// A number that orders as `value` does in [`f32::total_cmp`].
@@ -375,9 +367,10 @@ fn rank(value: f32) -> u32 {
     if bits >> 31 == 0 { bits | 1 << 31 } else { !bits }
 }
 
-/// Whether no earlier block of the same pixel and half stands before this one.
-fn plan_first_level(kept: &[BlockWork], block: &BlockWork) -> bool {
-    kept.last().is_none_or(|k| (k.pixel, k.half) != (block.pixel, block.half))
+/// Whether no other block of the same pixel and half stands before this one.
+fn is_first_of_half(blocks: &[BlockWork], place: usize) -> bool {
+    let of_half = |block: &BlockWork| (block.pixel, block.half);
+    place == 0 || of_half(&blocks[place - 1]) != of_half(&blocks[place])
 }
 
 #[cfg(test)]

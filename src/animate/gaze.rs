@@ -24,7 +24,7 @@ pub struct GazeError {
 }
 
 impl GazeTrack {
-    /// Reads a table. A first line of names, empty lines and what follows # are passed over.
+    /// Reads a table. Empty lines, what follows # and names in the first line that has anything else are passed over.
     ///
     /// # Errors
     /// [`GazeError`] for the first line that cannot be understood.
@@ -32,10 +32,15 @@ impl GazeTrack {
         let mut track = Self::default();
         // Spreadsheets begin UTF-8 with a mark of its byte order, which no trim takes for space.
         let table = table.strip_prefix('\u{feff}').unwrap_or(table);
+        let mut may_be_head = true;
         for (index, whole) in table.lines().enumerate() {
             let text = whole.split('#').next().unwrap_or_default().trim();
-            let is_head = index == 0 && text.replace(' ', "").eq_ignore_ascii_case("frame,x,y");
-            if text.is_empty() || is_head {
+            if text.is_empty() {
+                continue;
+            }
+            let is_head = may_be_head && text.replace(' ', "").eq_ignore_ascii_case("frame,x,y");
+            may_be_head = false;
+            if is_head {
                 continue;
             }
             let wrong = || GazeError { line: index + 1, text: whole.chars().take(80).collect() };
@@ -74,6 +79,10 @@ mod tests {
         assert_eq!(track.of_frame(3, 640, 480), [gaze(10.0, 20.5), gaze(600.0, 20.0)]);
         assert!(track.of_frame(4, 640, 480).is_empty(), "who looks elsewhere may look back at any time");
         assert!(track.of_frame(5, 640, 480).is_empty());
+        let commented =
+            GazeTrack::parse("# tracker\n\nframe,x,y # in pixels\n3,10,20\n").expect("a table with a comment first");
+        assert_eq!(commented.of_frame(3, 640, 480), [gaze(10.0, 20.0)]);
+        assert!(GazeTrack::parse("3,10,20\nframe,x,y\n").is_err(), "names come first");
         let marked = GazeTrack::parse("\u{feff}frame,x,y\r\n3,10,20\r\n").expect("a table of a spreadsheet");
         assert_eq!(marked.of_frame(3, 640, 480), [gaze(10.0, 20.0)]);
     }

@@ -19,7 +19,7 @@ pub struct GeometricMean {
     pub low: Option<f64>,
     /// Upper end.
     pub high: Option<f64>,
-    /// The worst scene.
+    /// Ratio of the worst scene.
     pub least: f64,
 }
 

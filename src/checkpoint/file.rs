@@ -34,8 +34,9 @@ pub enum CheckpointError {
 /// Writes beside `path` and renames, so that a kill at any moment leaves the old file or the new one. Returns its length.
 ///
 /// # Errors
-/// As [`crate::output::write_beside`].
+/// As [`crate::output::write_beside`], and for what [`read_checkpoint`] would refuse: who reads it would begin anew, again and again.
 pub fn write_checkpoint(path: &Path, header: &Header, state: &RenderState) -> Result<u64, OutputError> {
+    check(header, state).map_err(|problem| OutputError::Unreadable { path: path.to_owned(), problem })?;
     FILM.write(path, &(header, state))
 }
 
@@ -71,52 +72,47 @@ pub fn read_header(path: &Path) -> Result<Header, CheckpointError> {
 /// [`CheckpointError`] for everything that is not a whole film.
 pub fn decode_checkpoint(path: &Path, file: &[u8]) -> Result<Checkpoint, CheckpointError> {
     let (header, state) = FILM.decode::<(Header, RenderState)>(path, file)?;
-    let checkpoint = Checkpoint { header, state };
-    checkpoint.check().map_err(|problem| FILM.damaged(path, problem))?;
-    Ok(checkpoint)
+    check(&header, &state).map_err(|problem| FILM.damaged(path, problem))?;
+    Ok(Checkpoint { header, state })
 }
 
-impl Checkpoint {
-    /// Finds what no render writes: what is read must be safe to go on from, whoever made the file.
-    fn check(&self) -> Result<(), &'static str> {
-        let Self { header, state } = self;
-        state.film.check()?;
-        if (header.origin.width, header.origin.height) != (state.film.width(), state.film.height()) {
-            return Err("its film is not of its size");
-        }
-        let seeds = &header.seeds;
-        let is_ascending = seeds.all.windows(2).all(|pair| pair[0] < pair[1]);
-        if seeds.all.is_empty() || !is_ascending || seeds.current.is_some_and(|seed| !seeds.all.contains(&seed)) {
-            return Err("its seeds make no sense");
-        }
-        let settings = &header.settings;
-        let stops = settings.exposure_stops.unwrap_or(0.0);
-        if settings.viewing.check().is_err() || !is_positive(settings.nits_per_unit) || !stops.is_finite() {
-            return Err("nobody can see by its settings");
-        }
-        let is_rung = |visibility: f64| visibility >= 0.0;
-        let exposure = state.exposure.map_or(0.0, |exposure| exposure.scene_unit_over_white);
-        let seconds =
-            [state.seconds_total, state.seconds_perception, state.seconds_allocation, state.seconds_denoising];
-        if !is_rung(header.visibility)
-            || !header.earlier_visibilities.iter().all(|&visibility| is_rung(visibility))
-            || !state.finished_rung.is_none_or(is_rung)
-            || !state.left_rung.is_none_or(is_rung)
-            || !(1.0..=1e6).contains(&state.inflation)
-            || !exposure.is_finite()
-            || !seconds.iter().all(|s| (0.0..1e12).contains(s))
-        {
-            return Err("its figures make no sense");
-        }
-        let pixels = state.film.width() * state.film.height();
-        if state.traced_blocks > state.pending.front().map_or(0, |plan| plan.blocks.len())
-            || !state.pending.iter().flat_map(|plan| &plan.blocks).all(|block| block.is_sound(pixels))
-            || !state.until_look.as_ref().is_none_or(|until_look| until_look.is_sound(pixels))
-        {
-            return Err("its plans make no sense");
-        }
-        Ok(())
+/// Finds what no render writes: what is read must be safe to go on from, whoever made the file.
+fn check(header: &Header, state: &RenderState) -> Result<(), &'static str> {
+    state.film.check()?;
+    if (header.origin.width, header.origin.height) != (state.film.width(), state.film.height()) {
+        return Err("its film is not of its size");
     }
+    let seeds = &header.seeds;
+    let is_ascending = seeds.all.windows(2).all(|pair| pair[0] < pair[1]);
+    if seeds.all.is_empty() || !is_ascending || seeds.current.is_some_and(|seed| !seeds.all.contains(&seed)) {
+        return Err("its seeds make no sense");
+    }
+    let settings = &header.settings;
+    let stops = settings.exposure_stops.unwrap_or(0.0);
+    if settings.viewing.check().is_err() || !is_positive(settings.nits_per_unit) || !stops.is_finite() {
+        return Err("nobody can see by its settings");
+    }
+    let is_rung = |visibility: f64| visibility >= 0.0;
+    let exposure = state.exposure.map_or(0.0, |exposure| exposure.scene_unit_over_white);
+    let seconds = [state.seconds_total, state.seconds_perception, state.seconds_allocation, state.seconds_denoising];
+    if !is_rung(header.visibility)
+        || !header.earlier_visibilities.iter().all(|&visibility| is_rung(visibility))
+        || !state.finished_rung.is_none_or(is_rung)
+        || !state.left_rung.is_none_or(is_rung)
+        || !(1.0..=1e6).contains(&state.inflation)
+        || !exposure.is_finite()
+        || !seconds.iter().all(|s| (0.0..1e12).contains(s))
+    {
+        return Err("its figures make no sense");
+    }
+    let pixels = state.film.width() * state.film.height();
+    if state.traced_blocks > state.pending.front().map_or(0, |plan| plan.blocks.len())
+        || !state.pending.iter().flat_map(|plan| &plan.blocks).all(|block| block.is_sound(pixels))
+        || !state.until_look.as_ref().is_none_or(|until_look| until_look.is_sound(pixels))
+    {
+        return Err("its plans make no sense");
+    }
+    Ok(())
 }
 
 fn is_positive(value: f64) -> bool {

@@ -11,7 +11,9 @@ pub(super) use rules::visibility_limit;
 use super::console;
 use super::denoise::DenoiseChoice;
 use super::importance;
-use super::numbers::{parse_finite, parse_positive, parse_seconds, parse_seed, parse_stops, parse_unit, whole};
+use super::numbers::{
+    parse_finite, parse_positive, parse_radiance, parse_seconds, parse_seed, parse_stops, parse_unit, whole,
+};
 use super::seeing::{model_values, operator_values};
 use super::targets::{Named, display_file};
 use anyhow::{Context, bail};
@@ -79,8 +81,8 @@ pub(super) struct JobArguments {
     #[arg(long, value_enum, help_heading = "Sampling")]
     allocation: Option<AllocationChoice>,
     /// Scale samples whose largest channel is above X scene units down to it. Darkens the picture where light is rare.
-    #[arg(long, value_name = "X", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Sampling")]
-    clamp: Option<f64>,
+    #[arg(long, value_name = "X", value_parser = parse_radiance, allow_negative_numbers = true, help_heading = "Sampling")]
+    clamp: Option<f32>,
     /// Leave to chance what light could not be seen beside what its path has found: fewer rays, more noise, no bias.
     #[arg(long, value_enum, value_name = "BY", help_heading = "Sampling")]
     prune: Option<PruneChoice>,
@@ -266,7 +268,7 @@ fn trace_settings(arguments: &JobArguments, size: Size, nits_per_unit: f64) -> a
         height: size.height,
         seed: arguments.seed,
         max_depth: arguments.max_depth,
-        clamp: arguments.clamp.map(|clamp| clamp as f32),
+        clamp: arguments.clamp,
         filter: arguments.filter.filter(),
         sequence: arguments.sequence.sequence(),
         crop: arguments.crop.map(|crop| check_crop(crop, size)).transpose()?,

@@ -227,10 +227,11 @@ impl Keeper {
     fn write(&self, state: &RenderState, history: &mut History) {
         let snapshot = Instant::now();
         let header = Header { seeds: self.seeds.of(&state.film).clone(), ..self.header.clone() };
+        // Tried again when it is time to, written or not: a folder that is gone is gone for the next batch as well.
+        history.last_snapshot = snapshot;
         match write_checkpoint(&self.path, &header, state) {
             Ok(bytes) => {
                 history.failure = None;
-                history.last_snapshot = snapshot;
                 history.bytes = bytes;
                 history.writes += 1;
             }
@@ -346,5 +347,62 @@ impl Monitor for Watch<'_> {
         if let Some(keeper) = &self.keeper {
             keeper.write(state, &mut keeper.history.lock().unwrap_or_else(PoisonError::into_inner));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fechner::adaptive::settings::{AllocationRule, Limits, Sampling};
+    use fechner::scene::hash::ContentHash;
+    use fechner_perception::display::Viewing;
+
+    const EVERY: Duration = Duration::from_secs(60);
+
+    fn header() -> Header {
+        let origin = Origin {
+            program: String::new(),
+            scene_name: String::new(),
+            scene: ContentHash::of_bytes(b""),
+            width: 1,
+            height: 1,
+            tracing: String::new(),
+        };
+        let settings = SettingsRecord {
+            sampling: Sampling::Uniform,
+            allocation: AllocationRule::default(),
+            model: String::new(),
+            viewing: Viewing::default(),
+            nits_per_unit: 1.0,
+            operator: String::new(),
+            exposure_stops: None,
+            fitted: None,
+            importance: None,
+            denoiser: None,
+        };
+        Header::begun(origin, 0, settings, 1.0)
+    }
+
+    /// What cannot be written is tried again as often as it would have been written, and not at every batch.
+    #[test]
+    fn a_failure_is_no_reason_to_hurry() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let arguments = CheckpointArguments {
+            checkpoint: Some(folder.path().join("gone/film")),
+            checkpoint_every: Some(EVERY),
+            resume: false,
+        };
+        let keeper = Keeper::new(&arguments, header(), SeedsSoFar::of_one(0));
+        let state = RenderState::new(1, 1, &Limits::of_visibility(1.0));
+        // Whether it was tried.
+        let fails = || {
+            keeper.chance(&state);
+            keeper.history.lock().expect("one thread").failure.take().is_some()
+        };
+        assert!(!fails(), "it is not time to");
+        keeper.history.lock().expect("one thread").last_snapshot =
+            Instant::now().checked_sub(EVERY).expect("a minute ago");
+        assert!(fails(), "a minute is over, and the folder is not there");
+        assert!(!fails(), "it is tried again at once");
     }
 }

@@ -34,6 +34,13 @@ pub(super) fn parse_positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// The most that a sample may have in scene units: above 0 as the tracer has it, in f32.
+pub(super) fn parse_radiance(text: &str) -> Result<f32, String> {
+    let least = f32::from_bits(1);
+    let number = text.parse::<f64>().ok().map(|value| value as f32).filter(|value| *value > 0.0 && value.is_finite());
+    number.ok_or_else(|| format!("\"{text}\" is not a radiance from {least:e} to {:e} scene units", f32::MAX))
+}
+
 /// A luminance of RGB (1, 1, 1) that pictures can have.
 pub(super) fn parse_unit(text: &str) -> Result<f64, String> {
     let (least, most) = (NITS_PER_UNIT.start(), NITS_PER_UNIT.end());
@@ -80,6 +87,15 @@ mod tests {
             assert!(parse_unit(refused).is_err(), "{refused}");
         }
         assert!(parse_finite("nan").is_err() && parse_finite("inf").is_err());
+    }
+
+    #[test]
+    fn a_radiance_is_above_nothing_in_f32() {
+        assert_eq!((parse_radiance("3"), parse_radiance("1e-40")), (Ok(3.0), Ok(1e-40)));
+        for refused in ["0", "-1", "1e-50", "1e39", "inf", "nan", "bright"] {
+            let told = parse_radiance(refused).expect_err(refused);
+            assert_eq!(told, format!("\"{refused}\" is not a radiance from 1e-45 to 3.4028235e38 scene units"));
+        }
     }
 
     #[test]

@@ -318,7 +318,8 @@ fn energy(visibility: &Plane) -> f64 {
 
 /// 1° × 1° patches in the picture.
 fn patch_count(visibility: &Plane, display: &Display) -> f64 {
-    visibility.values().len() as f64 / (display.pixels_per_degree * display.pixels_per_degree)
+    let density = display.pixel_density();
+    visibility.values().len() as f64 / (density.horizontal * density.vertical)
 }
 
 fn patches_noticed(visibility: &Plane, display: &Display) -> f64 {
@@ -332,4 +333,18 @@ fn peak_memory_bytes() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = text.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
     line.trim().trim_end_matches("kB").trim().parse::<u64>().ok().map(|kib| kib * 1024)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two degrees by one: pixels twice as wide as high.
+    #[test]
+    fn patches_are_square_degrees_whatever_the_pixels_are() {
+        let oblong = Display { pixels_per_degree: 60.0, pixel_aspect_ratio: 2.0, ..Display::default() };
+        let unseen = Plane::filled(120, 120, 0.0);
+        assert_eq!(patch_count(&unseen, &oblong), 2.0);
+        assert_eq!(patch_count(&unseen, &Display { pixel_aspect_ratio: 1.0, ..oblong }), 4.0);
+    }
 }

@@ -114,7 +114,7 @@ pub(super) struct SceneFrame {
 
 impl SceneFrame {
     fn read(path: &Path, arguments: &TonemapArguments, viewing: &Viewing) -> Result<Self> {
-        Self::of(InputPicture::read(path, arguments.nits_per_unit)?, path, arguments, viewing)
+        Self::of(InputPicture::read_frame(path, arguments.nits_per_unit)?, path, arguments, viewing)
     }
 
     fn of(picture: InputPicture, path: &Path, arguments: &TonemapArguments, viewing: &Viewing) -> Result<Self> {
@@ -237,7 +237,7 @@ fn run_as_rendered(arguments: &TonemapArguments, format: Format, targets: &[Path
         bail!("exposure, adaptation, effects, eyes and their time are an operator's: name it by --operator");
     }
     for (input, target) in arguments.input.iter().zip(targets) {
-        let picture = InputPicture::read(input, arguments.nits_per_unit)?;
+        let picture = InputPicture::read_frame(input, arguments.nits_per_unit)?;
         let viewing =
             seeing::viewing_on(seeing::display_of(arguments.display.as_deref(), &[(input, &picture)])?, None)?;
         let Some(fitted) = picture.kept_tone().and_then(|kept| kept.on(&viewing)) else {

@@ -53,7 +53,7 @@ pub struct SurfaceGuides {
     pub albedo: Vec<[f32; 3]>,
     /// Its normal; 0 where there is none.
     pub normal: Vec<[f32; 3]>,
-    /// Its distance.
+    /// Its distance, scene units; what is not there counts as 0 in a film's mean, and is infinitely far where it is not finite.
     pub depth: Vec<f32>,
     /// Whether something that is seen there shines by itself.
     pub shines: Vec<bool>,

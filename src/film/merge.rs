@@ -1,6 +1,6 @@
 //! Adding films of the same picture, and checking one that was in a file.
 
-use super::{Film, HalfPixel, PixelGuide, opponent};
+use super::{Film, HalfPixel, PixelGuide, kept_m2, opponent};
 use crate::sampler::Half;
 use rayon::prelude::*;
 
@@ -97,7 +97,7 @@ impl HalfPixel {
         for (c, m2) in self.m2.iter_mut().enumerate() {
             let difference = new[c] - old[c];
             let between = difference * difference * own * others / (own + others);
-            *m2 = (f64::from(*m2) + f64::from(other.m2[c]) + between) as f32;
+            *m2 = kept_m2(f64::from(*m2) + f64::from(other.m2[c]) + between);
         }
         for (mean, other) in self.mean.iter_mut().zip(other.mean) {
             *mean += (other - *mean) * others / (own + others);

@@ -38,6 +38,11 @@ pub fn opponent(rgb: [f64; 3]) -> [f64; CHANNELS] {
     OPPONENT_OF_RGB.map(|row| row[0] * rgb[0] + row[1] * rgb[1] + row[2] * rgb[2])
 }
 
+/// A sum of squared deviations as the film keeps it: what is beyond f32 stays at its end, which is finite, and can be read again.
+fn kept_m2(m2: f64) -> f32 {
+    m2.min(f64::from(f32::MAX)) as f32
+}
+
 /// Sum of one block of samples.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BlockSum {
@@ -128,7 +133,7 @@ impl HalfPixel {
         for c in 0..CHANNELS {
             let block_m2 = (block.squares[c] - new * block_opponent[c] * block_opponent[c]).max(0.0);
             let between = difference[c] * difference[c] * old * new / (old + new);
-            self.m2[c] = (f64::from(self.m2[c]) + block_m2 + between) as f32;
+            self.m2[c] = kept_m2(f64::from(self.m2[c]) + block_m2 + between);
         }
         for (mean, block) in self.mean.iter_mut().zip(block_mean) {
             *mean += (block - *mean) * new / (old + new);
@@ -155,7 +160,7 @@ pub struct PixelGuide {
     pub albedo: [f32; 3],
     /// Mean shading normal, not unit length at edges.
     pub normal: [f32; 3],
-    /// Mean distance.
+    /// Mean distance from the camera, scene units; samples that met nothing count as 0.
     pub depth: f32,
     /// What is there.
     pub seen: Seen,
@@ -440,6 +445,25 @@ mod tests {
         assert!((b.albedo[0] - 0.625).abs() < 1e-6 && (b.depth - 2.75).abs() < 1e-6, "{b:?}");
         add(&mut film, Half::A, 1, &sum(1.0, f32::INFINITY, 2));
         assert_eq!(film.guide_of_half(Half::B, 0).depth, f32::INFINITY, "where the whole is infinite");
+    }
+
+    /// Squares of light that is far above all others' are beyond f32: what the film keeps of them can still be read back and added to.
+    #[test]
+    fn no_finite_light_makes_a_film_that_cannot_be_read() {
+        let film_of = |values: [&[f32]; 2]| {
+            let mut film = Film::new(1, 1);
+            for (level, values) in values.into_iter().enumerate() {
+                for half in Half::BOTH {
+                    film.merge_block(BlockWork { half, ..BlockWork::whole(0, half, level as u8) }, &sum_of(values));
+                }
+            }
+            film
+        };
+        let mut film = film_of([&[0.0, 1e22, 3e22], &[f32::MAX; 2]]);
+        film.check().expect("sound");
+        film.add(&film_of([&[1e22, 0.0], &[1.0]])).expect("few samples");
+        film.check().expect("sound after adding");
+        assert_eq!(film.half(Half::B)[0].m2[0], f32::MAX);
     }
 
     #[test]

@@ -2,8 +2,8 @@
 //! for work elsewhere that the compiler turns into vectors.
 //!
 //! Both have the same operations in the same order and no fused multiply-add, so their results are equal to the bit;
-//! minimum and maximum are x86's: the second operand where one is NaN. The only `unsafe` of the crate is here: calling
-//! a function that was compiled for AVX2, after asking the machine whether it has it.
+//! minimum and maximum are x86's: the second operand where one is NaN. The only `unsafe` besides that of `denoise/oidn/library.rs`
+//! is here: calling a function that was compiled for AVX2, after asking the machine whether it has it, and prefetching.
 
 #![allow(
     unsafe_code,

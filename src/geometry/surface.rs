@@ -24,7 +24,7 @@ pub struct SurfacePoint {
     pub object: u32,
     /// Triangle of the mesh, 0 for a sphere.
     pub triangle: u32,
-    /// How far new rays start off the surface, to clear its rounding error.
+    /// How far new rays start off the surface, to clear its rounding error, in scene units.
     pub offset: f32,
 }
 

@@ -26,7 +26,7 @@ const NEAR: f32 = 1.0 / 128.0;
 /// Where a triangle is hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TriangleHit {
-    /// Ray parameter.
+    /// Distance along the ray, in lengths of its direction.
     pub t: f32,
     /// Barycentric weight of the second vertex.
     pub b1: f32,

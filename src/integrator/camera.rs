@@ -197,10 +197,10 @@ mod tests {
                     let place = rays.project(origin + direction * distance).expect("before the lens");
                     assert!(place.distance(Vec2::new(x, y)) < 2e-3, "{x} {y}: {place}");
                 }
-                if let Some(place) = rays.project_direction(direction) {
-                    assert!(place.distance(Vec2::new(x, y)) < 2e-3, "{x} {y}: {place}");
-                    assert_eq!(rays.project_direction(-direction), None);
-                }
+                let place = rays.project_direction(direction);
+                assert_eq!(place.is_none(), rays.is_parallel(), "{x} {y}");
+                assert!(place.is_none_or(|place| place.distance(Vec2::new(x, y)) < 2e-3), "{x} {y}: {place:?}");
+                assert_eq!(rays.project_direction(-direction), None);
             }
         }
     }

@@ -218,6 +218,14 @@ pub enum OutputError {
         /// What the system said.
         error: std::io::Error,
     },
+    /// Nobody could read it again; a mistake of the caller.
+    #[error("cannot write {}: {problem}, and it would be refused as damaged", .path.display())]
+    Unreadable {
+        /// The file asked for.
+        path: PathBuf,
+        /// What is wrong with what it would hold.
+        problem: &'static str,
+    },
     /// The picture itself makes no sense; a mistake of the caller.
     #[error("cannot write {}: {problem}", .path.display())]
     BadPicture {

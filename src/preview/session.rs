@@ -124,7 +124,7 @@ impl<'a> Session<'a> {
         Ok(Self {
             host,
             shared,
-            gaze: options.is_foveated.then(|| Follower::new(settings.viewing.display.pixels_per_degree)),
+            gaze: options.is_foveated.then(|| Follower::new(settings.viewing.display.pixel_density())),
             held: Held::at_home(&job.scene.camera),
             // The first picture begins as one after a movement does.
             has_moved: true,

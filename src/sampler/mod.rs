@@ -18,8 +18,8 @@ pub enum Sequence {
     /// Owen-scrambled Sobol points, every block of every pixel scrambled by itself: neighbours are independent.
     #[default]
     PerPixel,
-    /// Owen-scrambled Sobol points, one sequence for the blocks of a level in 128 × 128 pixels, handed out along a
-    /// shuffled Z-curve: blocks of neighbours together are well spread too, which moves the error to high frequencies
+    /// Owen-scrambled Sobol points, one sequence for the blocks of a level in 128 × 128 pixels (fewer where a block has more than
+    /// 2¹⁸ samples), handed out along a shuffled Z-curve: blocks of neighbours together are well spread too, which moves the error to high frequencies
     /// (Ahmed and Wonka, "Screen-Space Blue-Noise Diffusion of Monte Carlo Sampling Error via Hierarchical Ordering of
     /// Pixels", 2020).
     ZOrder,
@@ -92,7 +92,7 @@ pub struct BlockKey {
     pub half: Half,
     /// Which doubling: 0 is the pilot.
     pub level: u8,
-    /// log₂ of the samples in the whole block, at most 18.
+    /// log₂ of the samples in the whole block, at most 30.
     pub log2_samples: u8,
     /// How neighbours relate.
     pub sequence: Sequence,
@@ -138,14 +138,14 @@ pub struct Sample {
 }
 
 /// log₂ of the side of the squares of pixels that share a sequence in Z-order: 14 bits of an index, 18 for the samples.
-const TILE_BITS: u32 = 7;
+const MOST_TILE_BITS: u32 = 7;
 
 impl BlockKey {
     /// Hash of what the block's scrambling depends on.
     fn hash(self) -> u32 {
         let pixel = match self.sequence {
             Sequence::PerPixel | Sequence::Independent => self.pixel,
-            Sequence::ZOrder => Pixel { x: self.pixel.x >> TILE_BITS, y: self.pixel.y >> TILE_BITS },
+            Sequence::ZOrder => Pixel { x: self.pixel.x >> self.tile_bits(), y: self.pixel.y >> self.tile_bits() },
         };
         let mut h = sobol::mix64(self.seed ^ 0x9e37_79b9_7f4a_7c15);
         h = sobol::mix64(h ^ (u64::from(pixel.y) << 32 | u64::from(pixel.x)));
@@ -158,8 +158,14 @@ impl BlockKey {
     fn first_index(self) -> u32 {
         match self.sequence {
             Sequence::PerPixel | Sequence::Independent => 0,
-            Sequence::ZOrder => z_curve(self.pixel) << self.log2_samples,
+            Sequence::ZOrder => z_curve(self.pixel, self.tile_bits()) << self.log2_samples,
         }
+    }
+
+    /// log₂ of the side of the squares of pixels that share this block's sequence: smaller where its samples leave less room in an
+    /// index, or pixels 64 apart would share the samples of a block of 2¹⁹.
+    fn tile_bits(self) -> u32 {
+        MOST_TILE_BITS.min((u32::BITS - u32::from(self.log2_samples)) / 2)
     }
 
     /// The sample with this index in the block.
@@ -179,8 +185,8 @@ impl BlockKey {
 }
 
 /// Place of a pixel on the Z-curve through its tile.
-fn z_curve(pixel: Pixel) -> u32 {
-    (0..TILE_BITS).fold(0, |z, bit| z | (pixel.x >> bit & 1) << (2 * bit) | (pixel.y >> bit & 1) << (2 * bit + 1))
+fn z_curve(pixel: Pixel, tile_bits: u32) -> u32 {
+    (0..tile_bits).fold(0, |z, bit| z | (pixel.x >> bit & 1) << (2 * bit) | (pixel.y >> bit & 1) << (2 * bit + 1))
 }
 
 impl Sample {
@@ -354,6 +360,28 @@ mod tests {
                     counts[(p[1] * rows as f32) as usize * columns + (p[0] * columns as f32) as usize] += 1;
                 }
                 assert!(counts.iter().all(|&c| c == 1), "{side}² pixels, {columns} columns");
+            }
+        }
+    }
+
+    /// In blocks so large that fewer pixels' samples have room in one sequence, no two pixels share any.
+    #[test]
+    fn large_blocks_in_z_order_share_no_samples() {
+        for log2_samples in [18, 19, 23, 30] {
+            let key = |x: u32, y: u32| BlockKey {
+                pixel: Pixel { x, y },
+                log2_samples,
+                sequence: Sequence::ZOrder,
+                ..block(20, 0)
+            };
+            let last = (1 << log2_samples) - 1;
+            let mut seen = std::collections::BTreeSet::new();
+            for (x, y) in (0..128).flat_map(|y| (0..128).map(move |x| (x, y))) {
+                let [first, last] = [0, last].map(|index| key(x, y).sample(index));
+                assert_eq!(first.block_hash, last.block_hash);
+                let new = seen.insert((first.block_hash, first.reversed_index))
+                    & seen.insert((last.block_hash, last.reversed_index));
+                assert!(new, "2^{log2_samples} samples of ({x}, {y}) are another pixel's");
             }
         }
     }

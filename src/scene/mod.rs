@@ -197,7 +197,7 @@ pub struct Sphere {
     pub name: String,
     /// Centre.
     pub center: Vec3,
-    /// Radius, above 0.
+    /// Radius in scene units, above 0.
     pub radius: f32,
     /// Its own axes in the world: orthonormal, mirrored where its transform mirrors. Pictures lie around its own y.
     pub axes: Mat3A,
@@ -212,7 +212,7 @@ pub struct Sphere {
 pub struct SpherePlace {
     /// Centre.
     pub center: Vec3A,
-    /// Radius, above 0.
+    /// Radius in scene units, above 0.
     pub radius: f32,
     /// Its own axes, orthonormal.
     pub axes: Mat3A,

@@ -425,12 +425,25 @@ fn what_a_look_decided_belongs_to_its_picture() {
     let (state, smaller) = (after_a_look(SIZE), after_a_look(8));
     assert!(state.until_look.is_some());
     setup.through_a_file(&state);
+    let mixed = RenderState { until_look: smaller.until_look, ..state };
+    let payload = postcard::to_stdvec(&(&setup.header, &mixed)).expect("numbers alone, in memory");
+    let message = decode_checkpoint(Path::new("a.film"), &seal(&payload)).expect_err("of another picture").to_string();
+    assert!(message.contains("plans make no sense"), "{message}");
+}
+
+/// A film that nobody could go on from would be refused as damaged by who comes next.
+#[test]
+fn what_could_not_be_read_is_not_written() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.film");
-    let mixed = RenderState { until_look: smaller.until_look, ..state };
-    write_checkpoint(&path, &setup.header, &mixed).expect("written");
-    let message = read_checkpoint(&path).expect_err("of another picture").to_string();
-    assert!(message.contains("plans make no sense"), "{message}");
+    let setup = Setup::new(1);
+    let state = RenderState::new(SIZE, SIZE, &setup.settings(Sampling::Adaptive, 4.0).limits);
+    write_checkpoint(&path, &setup.header, &state).expect("sound");
+    let sound = std::fs::read(&path).expect("written");
+    let broken = RenderState { inflation: f64::NAN, ..state };
+    let error = write_checkpoint(&path, &setup.header, &broken).expect_err("unsound").to_string();
+    assert!(error.contains("its figures make no sense, and it would be refused as damaged"), "{error}");
+    assert!(std::fs::read(&path).expect("as before") == sound);
 }
 
 #[test]

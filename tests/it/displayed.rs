@@ -540,6 +540,20 @@ fn a_map_is_a_png() {
 }
 
 /// What changes nothing of pictures that are ready for the display is told, and what shows a scene's light is not.
+/// Two pictures are two, whatever their names: only frames of a sequence share a note.
+#[test]
+fn a_note_is_said_of_each_picture() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in ["v1.png", "v2.png", "shot-01.png", "shot-02.png"] {
+        image::RgbaImage::from_pixel(8, 8, image::Rgba([90, 90, 90, 128]))
+            .save(folder.path().join(name))
+            .expect("written");
+    }
+    let notes = |arguments: &[&str]| run(folder.path(), arguments).matches("what is transparent").count();
+    assert_eq!(notes(&["compare", "v1.png", "v2.png"]), 2);
+    assert_eq!(notes(&["compare", "shot-##.png", "shot-##.png", "--fps", "30"]), 1);
+}
+
 #[test]
 fn idle_arguments_are_told() {
     let folder = tempfile::tempdir().expect("a folder");

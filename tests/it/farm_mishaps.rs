@@ -53,6 +53,25 @@ fn a_film_that_is_lost_or_damaged_is_made_anew() {
     assert!(picture(&damaged) == whole, "the picture differs from one process's");
 }
 
+/// Squares of such light are beyond f32, and what the film keeps of them must be read again: by a farm, and by a render that goes on.
+#[test]
+fn extreme_light_comes_to_an_end() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let lit = std::fs::read_to_string(scene()).expect("the scene");
+    let lines =
+        lit.lines().map(|line| if line.starts_with("emission") { "emission = [1e22, 1e22, 1e22]" } else { line });
+    std::fs::write(folder.path().join("lit.toml"), lines.collect::<Vec<_>>().join("\n")).expect("written");
+    let uniform = ["--size", "16x16", "--sampling", "uniform", "--spp"];
+    let plan = ["farm", "plan", "lit.toml", "-o", "farm", "--unit-samples", "1000", "--passes", "2", "--"];
+    run(folder.path(), 0, &[&plan, &uniform[..], &["64"]].concat());
+    let said = work(&folder.path().join("farm"));
+    assert!(!said.contains("begins anew"), "{said}");
+    for spp in ["16", "32"] {
+        let film = ["--checkpoint", "lit.film", "--resume", "-o", "lit.exr"];
+        run(folder.path(), 0, &[&["render", "lit.toml"], &uniform[..], &[spp], &film].concat());
+    }
+}
+
 /// Rounds that come without a look have numbers of their own: nothing of an earlier one is found in their folder.
 #[test]
 fn rounds_without_a_look_are_rounds() {

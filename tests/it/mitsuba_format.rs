@@ -354,6 +354,31 @@ fn numbers_from_colours_are_luminances() {
     assert!((value.evaluate(&scene.textures, Vec2::splat(0.5)) - 0.7152).abs() < 1e-4);
 }
 
+/// Space around a value is none of it.
+#[test]
+fn colours_in_hexadecimal_digits_are_decoded_once() {
+    for value in ["#808080", " #808080", "#808080\t"] {
+        let colour = format!(r#"<bsdf type="diffuse"><srgb name="reflectance" value="{value}"/></bsdf>"#);
+        let Surface::Diffuse { reflectance } = material(&colour).surface else { panic!("diffuse") };
+        let reflectance = reflectance.evaluate(&[], Vec2::ZERO).x;
+        assert!((reflectance - 0.21586).abs() < 1e-5, "{value:?}: {reflectance}");
+    }
+}
+
+#[test]
+fn a_mesh_of_a_file_has_a_whole_number() {
+    let load = |number: &str| {
+        let index = format!(r#"<integer name="shape_index" value="{number}"/>"#);
+        let shape = format!(r#"<shape type="obj"><string name="filename" value="square.obj"/>{index}</shape>"#);
+        try_load(folder().path(), "3.0.0", &format!("{LIGHT}{shape}"))
+    };
+    assert!(load("0").is_ok());
+    for wrong in ["-1", "1.5"] {
+        let error = load(wrong).unwrap_err();
+        assert!(error.contains(&format!("must be a whole number from 0 on, not {wrong}")), "{error}");
+    }
+}
+
 #[test]
 fn flat_light_is_the_equal_energy_white() {
     let radiance = |version: &str, spectrum: &str| {

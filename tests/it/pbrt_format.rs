@@ -92,6 +92,21 @@ fn pictures_of_another_size_have_square_pixels() {
     assert_eq!(window(stated, "", 16, 32), [-1.0, 2.0, -1.0, 1.0]);
 }
 
+/// Bounds in pixels are as many pixels as they say, at every place.
+#[test]
+fn pixel_bounds_are_exact() {
+    let folder = folder();
+    let path = folder.path().join("scene.pbrt");
+    for (bounds, width, height) in
+        [("241 273 69 101", 32, 32), ("0 5000 0 1080", 1920, 1080), ("-7 1 -1 2", 1, 2), ("1919 1920 1079 1080", 1, 1)]
+    {
+        let film = r#"Film "rgb" "integer xresolution" 1920 "integer yresolution" 1080 "integer pixelbounds""#;
+        std::fs::write(&path, format!("{film} [{bounds}] WorldBegin LightSource \"infinite\" {SQUARE}")).unwrap();
+        let scene = load(&path, &LoadOptions::default()).unwrap();
+        assert_eq!(scene.film, FilmDefaults { width, height }, "{bounds}");
+    }
+}
+
 #[test]
 fn frames_and_scales_change_what_the_camera_sees() {
     let camera = |head: &str| scene(head, SQUARE).camera;

@@ -26,7 +26,8 @@ pub struct GuideInputs<'a> {
     pub albedo: &'a [[f32; 3]],
     /// Its normal, unit length, or 0 where there is none.
     pub normal: &'a [[f32; 3]],
-    /// Its distance, in any unit; not finite where there is none.
+    /// Its distance, in any unit. Not finite where there is none, which is a neighbour of nothing else. A mean over samples of which some
+    /// met nothing, counted as 0, is fine as well: such pixels are told apart as surfaces that are nearer.
     pub depth: &'a [f32],
     /// Columns.
     pub width: usize,

@@ -1,5 +1,5 @@
-//! The listings of the founding paper's appendix, faults and all: the proof that each fault is real. What is right instead
-//! is in the operators.
+//! The listings of the founding paper's appendix, faults and all: the proof that each fault is real, beside what the operators do
+//! instead. Constants of ours are held to reference values in the operators' own tests.
 
 use super::*;
 use crate::display::Display;
@@ -117,7 +117,6 @@ impl SeedHistogram {
 /// Table 4.
 struct SeedModel {
     sigma_cone: f64,
-    sigma_rod: f64,
     shown: f64,
     colour_strength: f64,
 }
@@ -145,7 +144,6 @@ fn pattanaik(luminance: f64, adaptation: f64) -> SeedModel {
     let power = luminance.powf(N);
     SeedModel {
         sigma_cone: cone,
-        sigma_rod: rod,
         shown: display_sigma * (shown / (1.0 - shown)).powf(1.0 / N) / white,
         colour_strength: cone.powf(N) * N * power / (power + cone.powf(N)).powi(2) / slope,
     }
@@ -191,20 +189,6 @@ fn seed_clipping_shifts_hue() {
     assert!(shown[0] > 1.2 * shown[1], "{shown:?}");
 }
 
-/// G2: radiance against an adaptation in cd/m²; a scene of 1 W/(sr m²) is 179 cd/m², and the picture changes with the unit.
-#[test]
-fn seed_units_change_the_picture() {
-    let radiance = tumblin_rushmeier([1.0; 3], 179.0)[0];
-    let luminance = tumblin_rushmeier([179.0; 3], 179.0)[0];
-    assert!(luminance > 100.0 * radiance, "{luminance} {radiance}");
-}
-
-/// T1: 3.18 for 10/π shifts the exponent.
-#[test]
-fn seed_lambert_is_rounded() {
-    close(MAX_DISPLAY_LUMINANCE * tumblin_rushmeier([100.0; 3], 100.0)[0], 31.280_944, 1e-6);
-}
-
 /// T3: in starlight the picture becomes its negative.
 #[test]
 fn seed_starlight_is_a_negative() {
@@ -212,13 +196,6 @@ fn seed_starlight_is_a_negative() {
     assert!(at(2e-4) < at(1e-4));
     let fit = ours("tr", &Plane::filled(4, 4, 1.1e-4));
     assert!(fit.relative_luminance(2e-4) >= fit.relative_luminance(1e-4));
-}
-
-/// T5, F6: adaptation of each pixel to itself reverses contrast where adaptation rises faster than light.
-#[test]
-fn seed_local_adaptation_reverses_contrast() {
-    let (shadow, edge) = (ferwerda([1.0; 3], 1.0)[0], ferwerda([2.0; 3], 10.0)[0]);
-    assert!(edge < shadow, "{edge} {shadow}");
 }
 
 /// F2, F3, F4: one scale from one curve, for a display adaptation of 25, with a rounded constant; red is as bright by night
@@ -276,6 +253,10 @@ fn seed_histogram_runs_away_outside() {
     let samples: Vec<f64> = (0..1000).map(|i| 0.01 * f64::from(i)).collect();
     let seed = SeedHistogram::of(&samples);
     assert!(seed.shown(1000.0) > 1e6, "{}", seed.shown(1000.0));
+    // Ours, from 200 samples of a degree each: a hundred times the light is never shown as more than that.
+    let fit = ours("wrp", &Plane::from_fn(1200, 600, |x, y| 0.05 * (10 * (x / 60) + y / 60) as f32));
+    let [brightest, beyond] = [10.0, 1000.0].map(|light| fit.relative_luminance(light));
+    assert!(brightest > 0.0 && (brightest..=100.1 * brightest).contains(&beyond), "{brightest} {beyond}");
 }
 
 /// W8, W10: ceilings are whole numbers plus 1, so that ten samples are never trimmed.
@@ -286,6 +267,10 @@ fn seed_ceilings_never_reach_zero() {
     // One sample a bin is at its ceiling of 1: the whole display for a hundredth of a cd/m².
     let contrast = seed.shown(9e-3) / seed.shown(0.0);
     assert!(contrast > 0.6 * SeedHistogram::RANGE, "{contrast}");
+    // Ours, from ten samples of a degree each: next to nothing of the display, since an eye in such light sees next to nothing.
+    let fit = ours("wrp", &Plane::from_fn(600, 60, |x, _| 1e-3 * (x / 60) as f32));
+    let brightest = fit.relative_luminance(9e-3);
+    assert!(brightest < 0.05, "{brightest}");
 }
 
 /// P1: white of a bright scene is shown at 906.7 and not at 125 cd/m².
@@ -310,14 +295,6 @@ fn seed_model_loses_colour() {
     close(pattanaik(25.0, 25.0).colour_strength, 0.411, 2e-3);
     let shown = ours("ptyg", &Plane::filled(4, 4, 25.0)).map_rgb([50.0, 20.0, 10.0]);
     assert!(shown[0] / shown[2] > 3.5, "{shown:?}");
-}
-
-/// P7: five times the published half-saturation of rods.
-#[test]
-fn seed_rods_are_too_dull() {
-    for (adaptation, expected) in [(1e-4, 0.022_674_973), (0.01, 1.064_44), (1.0, 49.409_99), (25.0, 722.3786)] {
-        close(pattanaik(1.0, adaptation).sigma_rod, expected, 1e-5);
-    }
 }
 
 /// P8, P10: rods and cones add up to more than 1 in the dark, which inverts to a luminance of millions.

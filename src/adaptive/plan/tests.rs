@@ -74,6 +74,21 @@ fn handfuls_are_not_looked_at_after_each_doubling() {
     assert_eq!(added(1 << 16, 1, f64::NAN) + added(1 << 16, 64 * 64, 1.0), 0, "nothing shows");
 }
 
+/// What does not fit takes what would follow it along, and leaves its place to others.
+#[test]
+fn a_budget_leaves_no_gap_in_a_sequence() {
+    let block = |pixel, level, samples| BlockWork { samples, ..BlockWork::whole(pixel, Half::A, level) };
+    let plan = SamplePlan { blocks: vec![block(0, 1, 8), block(0, 2, 4), block(1, 1, 5), block(1, 2, 2)] };
+    let urgency = Plane::from_fn(2, 1, |x, _| if x == 0 { 2.0 } else { 1.0 });
+    let kept = |samples: u64| -> Vec<(u32, u8)> {
+        cut_to_budget(plan.clone(), &urgency, samples).blocks.iter().map(|block| (block.pixel, block.level)).collect()
+    };
+    assert_eq!(kept(3), []);
+    assert_eq!(kept(7), [(1, 1), (1, 2)], "4 would fit, and would be the second half of nothing");
+    assert_eq!(kept(14), [(0, 1), (0, 2)], "so would 2");
+    assert_eq!(kept(19).len(), 4);
+}
+
 #[test]
 fn a_uniform_plan_takes_exactly_what_is_asked() {
     for spp in [1u32, 2, 7, 16, 17, 100, 256] {

@@ -108,7 +108,7 @@ pub(super) fn shown_rgb8(
     fitted: impl Fn() -> Box<dyn FittedTone>,
     shot: &ShotSettings,
 ) -> Result<Vec<u8>> {
-    let picture = InputPicture::read(file, None)?;
+    let picture = InputPicture::read_frame(file, None)?;
     let (width, height) = (shot.trace.width, shot.trace.height);
     if picture.size() != (width as usize, height as usize) {
         bail!("{}: not of {width}x{height} pixels as the shot's frames are", file.display());

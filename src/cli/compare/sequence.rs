@@ -160,7 +160,7 @@ fn fit(
     let (mut lights, mut size): (Vec<SceneLight>, _) = (Vec::new(), None);
     for index in 0..count {
         let path = name.of(numbers[index * numbers.len() / count]);
-        let picture = InputPicture::read(&path, nits_per_unit)?;
+        let picture = InputPicture::read_frame(&path, nits_per_unit)?;
         let Some(light) = picture.scene_light(operator) else { return Ok(None) };
         if *size.get_or_insert(picture.size()) != picture.size() {
             bail!("{}: it has another size than {}", path.display(), name.of(numbers[0]).display());
@@ -210,7 +210,7 @@ impl<'a> Sequences<'a> {
         check_frames_kept(arguments, [Some(&reference), Some(&test), velocity.as_ref()], map.as_ref(), numbers)?;
         let nits_per_unit = arguments.seeing.nits_per_unit;
         let files = [&reference, &test].map(|name| name.of(numbers[0]));
-        let [first, first_test] = files.each_ref().map(|file| InputPicture::read(file, nits_per_unit));
+        let [first, first_test] = files.each_ref().map(|file| InputPicture::read_frame(file, nits_per_unit));
         let (first, first_test) = (first?, first_test?);
         let firsts = [(files[0].as_path(), &first), (files[1].as_path(), &first_test)];
         arguments.seeing.note_what_is_ready(arguments.operator.as_deref(), &firsts);
@@ -237,7 +237,7 @@ impl<'a> Sequences<'a> {
     fn frame(&self, frame: u32) -> Result<SequenceFrame> {
         let nits_per_unit = self.arguments.seeing.nits_per_unit;
         let files = [self.reference.of(frame), self.test.of(frame)];
-        let [reference, test] = files.each_ref().map(|file| InputPicture::read(file, nits_per_unit));
+        let [reference, test] = files.each_ref().map(|file| InputPicture::read_frame(file, nits_per_unit));
         let (reference, test) = (reference?, test?);
         check_alike((&files[0], &reference), (&files[1], &test))?;
         let (width, height) = reference.size();

@@ -27,47 +27,55 @@ enum Unit {
 
 impl Unit {
     /// In cd/m², for a file that says this.
-    fn in_cd_m2(self, path: &Path, own: impl FnOnce() -> Option<f64>) -> Result<f64> {
+    fn in_cd_m2(self, source: Source<'_>, own: impl FnOnce() -> Option<f64>) -> Result<f64> {
         let Self::OfLight(asked) = self else { return Ok(1.0) };
         let own = own();
         if let (Some(own), Some(asked)) = (own, asked) {
-            note(
-                path,
-                &format!("its own unit of {own} cd/m² stands; --nits-per-unit {asked} is for files that do not say it"),
-            );
+            source.note(&format!(
+                "its own unit of {own} cd/m² stands; --nits-per-unit {asked} is for files that do not say it"
+            ));
         }
-        own.or(asked).with_context(|| no_unit(path))
+        own.or(asked).with_context(|| no_unit(source.path))
     }
 }
 
 impl InputPicture {
     /// Reads an EXR, HDR, PNG or JPEG file. `nits_per_unit` is needed for scene-linear files that do not say it.
     pub(in crate::cli) fn read(path: &Path, nits_per_unit: Option<f64>) -> Result<Self> {
-        Self::read_in(path, Unit::OfLight(nits_per_unit))
+        Self::read_in(Source { path, kind: SourceKind::Single }, Unit::OfLight(nits_per_unit))
+    }
+
+    /// The same of one of many frames, of all of which a note is said once.
+    pub(in crate::cli) fn read_frame(path: &Path, nits_per_unit: Option<f64>) -> Result<Self> {
+        Self::read_in(Source { path, kind: SourceKind::Frame }, Unit::OfLight(nits_per_unit))
     }
 
     /// Luminance of the values as the file has them, which may be no light and have no unit.
     pub(in crate::cli) fn read_values(path: &Path) -> Result<Plane> {
-        Ok(Self::read_in(path, Unit::Meaningless)?.values())
+        Ok(Self::read_in(Source { path, kind: SourceKind::Single }, Unit::Meaningless)?.values())
     }
 
-    fn read_in(path: &Path, unit: Unit) -> Result<Self> {
+    fn read_in(source: Source<'_>, unit: Unit) -> Result<Self> {
+        let path = source.path;
         let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
         match ending.as_deref() {
-            Some("exr") => Self::from_exr(path, &channels::read_picture(path)?, unit),
-            Some("hdr") => Self::from_hdr(path, unit.in_cd_m2(path, || None)?),
-            Some("png" | "jpg" | "jpeg") => Self::from_codes(path),
+            Some("exr") => Self::from_exr(source, &channels::read_picture(path)?, unit),
+            Some("hdr") => Self::from_hdr(path, unit.in_cd_m2(source, || None)?),
+            Some("png" | "jpg" | "jpeg") => Self::from_codes(source),
             _ => bail!("{}: not a picture that can be judged: .exr, .hdr, .png and .jpg are read", path.display()),
         }
     }
 
-    fn from_exr(path: &Path, exr: &ExrImage, unit: Unit) -> Result<Self> {
-        let nits_per_unit = unit.in_cd_m2(path, || unit_in_file(path, exr))?;
+    fn from_exr(source: Source<'_>, exr: &ExrImage, unit: Unit) -> Result<Self> {
+        let nits_per_unit = unit.in_cd_m2(source, || unit_in_file(source, exr))?;
         let Some(picture) = exr.scene_picture(picture_channel) else {
-            bail!("{}: there are no channels R, G and B, nor Y; `fechner info` lists what there is", path.display());
+            bail!(
+                "{}: there are no channels R, G and B, nor Y; `fechner info` lists what there is",
+                source.path.display()
+            );
         };
         for text in channels::guess(exr).iter().chain(&picture.notes) {
-            note(path, text);
+            source.note(text);
         }
         let kept_tone = KeptTone::of(exr);
         let content = match kept_tone {
@@ -83,7 +91,7 @@ impl InputPicture {
             pixel_aspect_ratio: exr.pixel_aspect_ratio,
             made_for: kept_tone::display_in(exr),
             kept_tone,
-            alpha: alpha(path, exr),
+            alpha: alpha(source, exr),
             straight_alpha: None,
             part_of: exr.part_of,
         })
@@ -98,12 +106,13 @@ impl InputPicture {
         Ok(picture)
     }
 
-    fn from_codes(path: &Path) -> Result<Self> {
+    fn from_codes(source: Source<'_>) -> Result<Self> {
+        let path = source.path;
         let bytes = std::fs::read(path).with_context(|| format!("{}", path.display()))?;
         let image = decoded_image(path, &bytes)?;
         let colour = output::png_colour(&bytes);
         for text in colour.notes.iter().chain(&jpeg_read::notes(&bytes)) {
-            note(path, text);
+            source.note(text);
         }
         let of = |primaries: Primaries| colour.primaries.unwrap_or(primaries);
         let codes = match colour.transfer {
@@ -115,7 +124,7 @@ impl InputPicture {
         };
         let straight_alpha = straight_alpha(&image);
         if straight_alpha.is_some() {
-            note(path, "what is transparent lies before black");
+            source.note("what is transparent lies before black");
         }
         let pixel_aspect_ratio = output::png_pixel_aspect_ratio(&bytes);
         Ok(Self { straight_alpha, pixel_aspect_ratio, ..Self::from_image(image, Content::Display(codes)) })
@@ -181,11 +190,11 @@ fn words_of(format: ImageFormat) -> String {
 }
 
 /// How much of each pixel an EXR picture covers; `None` where that is all of all of them.
-fn alpha(path: &Path, exr: &ExrImage) -> Option<Vec<f32>> {
+fn alpha(source: Source<'_>, exr: &ExrImage) -> Option<Vec<f32>> {
     let covered = |&alpha: &f32| if alpha.is_nan() { 0.0 } else { alpha.clamp(0.0, 1.0) };
     let alpha = exr.in_display_window(channels::alpha(exr)?.iter().map(covered).collect());
     if alpha.iter().all(|&a| a == 0.0) {
-        note(path, "its alpha is 0 all over, and is not looked at");
+        source.note("its alpha is 0 all over, and is not looked at");
         return None;
     }
     alpha.iter().any(|&a| a < 1.0).then_some(alpha)
@@ -204,7 +213,7 @@ fn picture_channel<'a>(exr: &'a ExrImage, name: &str) -> Option<&'a [f32]> {
 
 /// Luminance of RGB (1, 1, 1) as the file says it, where it is one that a picture can have: `whiteLuminance` is written by many and read
 /// by few.
-fn unit_in_file(path: &Path, exr: &ExrImage) -> Option<f64> {
+fn unit_in_file(source: Source<'_>, exr: &ExrImage) -> Option<f64> {
     let said = [NITS_PER_UNIT, "whiteLuminance"].into_iter().find_map(|name| match exr.attribute(name) {
         Some(Attribute::Float(nits)) if *nits > 0.0 => Some((name, *nits)),
         _ => None,
@@ -215,15 +224,45 @@ fn unit_in_file(path: &Path, exr: &ExrImage) -> Option<f64> {
     if (least..=most).contains(&nits) {
         return Some(f64::from(nits));
     }
-    note(path, &format!("{name} {nits:e} is not a luminance from {least:e} to {most:e} cd/m², and is not looked at"));
+    source.note(&format!("{name} {nits:e} is not a luminance from {least:e} to {most:e} cd/m², and is not looked at"));
     None
+}
+
+/// A file, as notes name it.
+#[derive(Clone, Copy)]
+struct Source<'a> {
+    path: &'a Path,
+    kind: SourceKind,
+}
+
+#[derive(Clone, Copy)]
+enum SourceKind {
+    /// A picture by itself.
+    Single,
+    /// One of many, whose names differ by digits.
+    Frame,
+}
+
+impl Source<'_> {
+    /// Says something of a picture once, or once of all frames.
+    fn note(self, text: &str) {
+        match self.kind {
+            SourceKind::Single => note_once(self.path, text, format!("{}: {text}", self.path.display())),
+            SourceKind::Frame => note(self.path, text),
+        }
+    }
 }
 
 /// Says something of a file, once of all the frames of a sequence, whose names differ by digits.
 pub(in crate::cli) fn note(path: &Path, text: &str) {
-    static SAID: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
     let of_sequence = format!("{}: {text}", path.display()).replace(|c: char| c.is_ascii_digit(), "#");
-    if SAID.lock().unwrap_or_else(PoisonError::into_inner).insert(of_sequence) {
+    note_once(path, text, of_sequence);
+}
+
+/// Says something of a file, unless something under the same key was said before.
+fn note_once(path: &Path, text: &str, key: String) {
+    static SAID: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+    if SAID.lock().unwrap_or_else(PoisonError::into_inner).insert(key) {
         say!("note: {}: {text}", path.display());
     }
 }

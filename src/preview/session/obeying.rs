@@ -75,7 +75,7 @@ impl Session<'_> {
         let Some(follower) = self.gaze.as_mut().filter(|follower| !is_waiting && follower.is_due(self.shared)) else {
             return;
         };
-        let gaze = follower.follow(self.shared, self.settings.viewing.display.pixels_per_degree);
+        let gaze = follower.follow(self.shared, self.settings.viewing.display.pixel_density());
         let rests_by_itself = matches!(self.reason_of_rest(), Some(StopReason::Visibility | StopReason::MaxSamples));
         self.change(|live| live.gaze = gaze, Changed::Gaze);
         // Whom a viewer or a limit stopped, no pointer wakes.

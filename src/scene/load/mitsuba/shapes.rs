@@ -146,7 +146,7 @@ impl Reader {
         shape.ignore(&["maxsmoothangle", "srgb", "collapse"]);
         let key = MeshKey {
             file: self.file(shape, name)?,
-            number: shape.float_or("shapeindex", 0.0)?.max(0.0) as usize,
+            number: whole_number(shape, "shapeindex")?,
             faces: shape.boolean_or("facenormals", false)?,
             flip,
             flip_v: shape.boolean_or("fliptexcoords", kind == "obj")?,
@@ -243,6 +243,14 @@ impl Reader {
 fn positive(shape: &Element, name: &str) -> Result<f32, LoadError> {
     let value = shape.float_or(name, 1.0)?;
     if value > 0.0 { Ok(value) } else { Err(shape.error(format_args!("\"{name}\" must be above 0, not {value}"))) }
+}
+
+/// 0 where nothing is said.
+fn whole_number(shape: &Element, name: &str) -> Result<usize, LoadError> {
+    match shape.float_or(name, 0.0)? {
+        number if number >= 0.0 && number.fract() == 0.0 => Ok(number as usize),
+        other => Err(shape.error(format_args!("\"{name}\" must be a whole number from 0 on, not {other}"))),
+    }
 }
 
 /// Whether a transform exchanges left and right.

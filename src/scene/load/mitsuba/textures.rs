@@ -76,7 +76,7 @@ impl Reader {
         check_depth(owner, depth)?;
         let Some(child) = owner.child(name).cloned() else { return Ok(None) };
         let child = if child.tag == "ref" { self.resolve(&child)? } else { child };
-        let value = || child.attribute("value").unwrap_or("");
+        let value = || child.attribute("value").unwrap_or("").trim();
         let color = match child.tag.as_str() {
             "texture" => return self.texture(&child, meaning, depth).map(Some),
             "float" | "integer" => Vec3::splat(child.numbers(value())?.first().copied().unwrap_or(0.0)),
@@ -326,7 +326,7 @@ fn turn_and_stretch(along_u: Vec2, along_v: Vec2) -> Option<(f32, Vec2)> {
 
 /// Three numbers, one for all, or #rrggbb under the sRGB curve.
 fn rgb(child: &Element, value: &str) -> Result<Vec3, LoadError> {
-    if let Some(hex) = value.trim().strip_prefix('#') {
+    if let Some(hex) = value.strip_prefix('#') {
         let number = u32::from_str_radix(hex, 16).ok().filter(|_| hex.len() == 6);
         let number = number.ok_or_else(|| child.error(format_args!("\"{value}\" is not #rrggbb")))?;
         let channel = |shift: u32| srgb_to_linear((number >> shift & 0xff) as f32 / 255.0);

@@ -147,20 +147,23 @@ impl Reader<'_> {
         };
         let full = FilmDefaults { width: side("xresolution", 1280)?, height: side("yresolution", 720)? };
         let size = Vec2::new(full.width as f32, full.height as f32);
-        let shares = match (film.numbers(&["float"], "cropwindow")?, film.numbers(&["integer"], "pixelbounds")?) {
-            (Some(&[x0, x1, y0, y1]), None) => Some([x0, x1, y0, y1].map(|share| share as f32)),
+        // Corners in pixels. Bounds stay what they are: in f32 241 / 1920 × 1920 is above 241, and would be 242.
+        let corners = match (film.numbers(&["float"], "cropwindow")?, film.numbers(&["integer"], "pixelbounds")?) {
+            (Some(&[x0, x1, y0, y1]), None) => {
+                let [x0, x1, y0, y1] = [x0, x1, y0, y1].map(|share| (share as f32).clamp(0.0, 1.0));
+                Some([Vec2::new(x0, y0) * size, Vec2::new(x1, y1) * size])
+            }
             (None, Some(&[x0, x1, y0, y1])) => {
-                let [x0, x1, y0, y1] = [x0, x1, y0, y1].map(|pixel| pixel as f32);
-                Some([x0 / size.x, x1 / size.x, y0 / size.y, y1 / size.y])
+                let corner = |x: f64, y: f64| Vec2::new(x as f32, y as f32).clamp(Vec2::ZERO, size);
+                Some([corner(x0, y0), corner(x1, y1)])
             }
             (None, None) => None,
             _ => return Err(film.error("expected four numbers in either \"cropwindow\" or \"pixelbounds\"")),
         };
-        let Some([x0, x1, y0, y1]) = shares.map(|shares| shares.map(|share| share.clamp(0.0, 1.0))) else {
+        let Some([first, last]) = corners.map(|corners| corners.map(Vec2::ceil)) else {
             self.builder.film = full;
             return Ok((full, None));
         };
-        let (first, last) = ((Vec2::new(x0, y0) * size).ceil(), (Vec2::new(x1, y1) * size).ceil());
         let pixels = last - first;
         if pixels.min_element() < 1.0 {
             return Err(film.error("the crop leaves no pixel"));
