@@ -354,6 +354,8 @@ impl Monitor for Watch<'_> {
 mod tests {
     use super::*;
     use fechner::adaptive::settings::{AllocationRule, Limits, Sampling};
+    use fechner::checkpoint::Tracing;
+    use fechner::integrator::TraceSettings;
     use fechner::scene::hash::ContentHash;
     use fechner_perception::display::Viewing;
 
@@ -366,7 +368,7 @@ mod tests {
             scene: ContentHash::of_bytes(b""),
             width: 1,
             height: 1,
-            tracing: String::new(),
+            tracing: Tracing::of(&TraceSettings::new(1, 1, 0)),
         };
         let settings = SettingsRecord {
             sampling: Sampling::Uniform,
