@@ -107,22 +107,6 @@ impl HalfPixel {
     }
 }
 
-impl PixelGuide {
-    /// Blends in another guide by the samples that both stand for.
-    fn add(&mut self, other: &PixelGuide, own_samples: u32, other_samples: u32) {
-        if own_samples == 0 {
-            *self = *other;
-        } else if other_samples > 0 {
-            let share = other_samples as f32 / (own_samples as f32 + other_samples as f32);
-            let blend = |old: &mut f32, new: f32| *old += (new - *old) * share;
-            self.albedo.iter_mut().zip(other.albedo).for_each(|(old, new)| blend(old, new));
-            self.normal.iter_mut().zip(other.normal).for_each(|(old, new)| blend(old, new));
-            blend(&mut self.depth, other.depth);
-            self.seen = self.seen.with(other.seen.shines());
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,16 +3,19 @@
 //! The picture is the plain average of the halves' means: weighting by counts would let the data that chose the counts
 //! bias the picture. 160 bytes a pixel.
 
+mod block_sum;
 mod estimate;
+mod guide;
 mod merge;
 mod over;
 
+pub use block_sum::BlockSum;
 pub use estimate::Estimate;
+pub use guide::{PixelGuide, Seen};
 
-use crate::integrator::{BlockWork, PathSample};
+use crate::integrator::BlockWork;
 use crate::sampler::Half;
 use fechner_perception::opponent::OPPONENT_OF_RGB;
-use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 /// Statistics of one pixel in one half.
@@ -41,79 +44,6 @@ pub fn opponent(rgb: [f64; 3]) -> [f64; CHANNELS] {
 /// A sum of squared deviations as the film keeps it: what is beyond f32 stays at its end, which is finite, and can be read again.
 fn kept_m2(m2: f64) -> f32 {
     m2.min(f64::from(f32::MAX)) as f32
-}
-
-/// Sum of one block of samples.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct BlockSum {
-    samples: u32,
-    missed: u32,
-    nonfinite: u32,
-    rays: u64,
-    rgb: [f64; 3],
-    squares: [f64; CHANNELS],
-    albedo: Vec3,
-    normal: Vec3,
-    depth: f32,
-    first_object_id: Option<u32>,
-    shines: bool,
-}
-
-impl Default for BlockSum {
-    fn default() -> Self {
-        Self {
-            samples: 0,
-            missed: 0,
-            nonfinite: 0,
-            rays: 0,
-            rgb: [0.0; 3],
-            squares: [0.0; CHANNELS],
-            albedo: Vec3::ZERO,
-            normal: Vec3::ZERO,
-            depth: 0.0,
-            first_object_id: None,
-            shines: false,
-        }
-    }
-}
-
-impl BlockSum {
-    /// Adds a sample; one that is not finite is counted and left out.
-    pub fn add(&mut self, sample: &PathSample) {
-        self.rays += u64::from(sample.rays);
-        self.first_object_id.get_or_insert(sample.first_hit.object_id);
-        if !sample.radiance.is_finite() {
-            self.nonfinite += 1;
-            return;
-        }
-        self.samples += 1;
-        self.shines |= sample.first_hit.shines;
-        self.missed += u32::from(sample.first_hit.object_id == 0);
-        let rgb = sample.radiance.as_dvec3().to_array();
-        for (sum, value) in self.rgb.iter_mut().zip(rgb) {
-            *sum += value;
-        }
-        // The sum of squares in f64 keeps 9 digits of a variance at a coefficient of variation of 1e-3.
-        for (sum, value) in self.squares.iter_mut().zip(opponent(rgb)) {
-            *sum += value * value;
-        }
-        self.albedo += sample.first_hit.albedo;
-        self.normal += sample.first_hit.normal;
-        self.depth += sample.first_hit.depth;
-    }
-}
-
-impl BlockSum {
-    /// Whether it can be the sum of a block of so many samples.
-    pub fn is_of(&self, samples: u32) -> bool {
-        self.samples.checked_add(self.nonfinite) == Some(samples)
-            && self.missed <= self.samples
-            && self.rgb.iter().all(|sum| sum.is_finite())
-            && self.squares.iter().all(|sum| sum.is_finite() && *sum >= 0.0)
-            && self.albedo.is_finite()
-            && self.normal.is_finite()
-            && !self.depth.is_nan()
-    }
 }
 
 impl HalfPixel {
@@ -150,78 +80,6 @@ impl HalfPixel {
     /// Unbiased variance of one sample in an opponent channel; 0 below two samples.
     pub fn sample_variance(&self, channel: usize) -> f64 {
         if self.samples < 2 { 0.0 } else { f64::from(self.m2[channel]) / f64::from(self.samples - 1) }
-    }
-}
-
-/// Mean of what the first surfaces of a pixel are.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct PixelGuide {
-    /// Mean albedo.
-    pub albedo: [f32; 3],
-    /// Mean shading normal, not unit length at edges.
-    pub normal: [f32; 3],
-    /// Mean distance from the camera, scene units; samples that met nothing count as 0.
-    pub depth: f32,
-    /// What is there.
-    pub seen: Seen,
-}
-
-impl PixelGuide {
-    /// Adds a block to what `before` samples have seen.
-    fn add_block(&mut self, block: &BlockSum, before: u32) {
-        if let (0, Some(id)) = (before, block.first_object_id) {
-            self.seen = self.seen.with_object(id);
-        }
-        self.seen = self.seen.with(block.shines);
-        if block.samples > 0 {
-            let share = block.samples as f32 / (before + block.samples) as f32;
-            let scale = 1.0 / block.samples as f32;
-            let blend = |old: &mut [f32; 3], sum: Vec3| {
-                *old = Vec3::from_array(*old).lerp(sum * scale, share).to_array();
-            };
-            blend(&mut self.albedo, block.albedo);
-            blend(&mut self.normal, block.normal);
-            self.depth += (block.depth * scale - self.depth) * share;
-        }
-    }
-
-    /// What is left without a part that has this share, less than all, of the samples. Where that is no number, the whole.
-    fn without(&self, part: &Self, share: f32) -> Self {
-        let left = |whole: f32, part: f32| {
-            let left = whole + (whole - part) * (share / (1.0 - share));
-            if left.is_finite() { left } else { whole }
-        };
-        let lefts = |whole: [f32; 3], part: [f32; 3]| std::array::from_fn(|c| left(whole[c], part[c]));
-        let albedo: [f32; 3] = lefts(self.albedo, part.albedo);
-        // Rounding must not make the albedo of black less than that.
-        let albedo = albedo.map(|albedo| albedo.max(0.0));
-        Self { albedo, normal: lefts(self.normal, part.normal), depth: left(self.depth, part.depth), seen: self.seen }
-    }
-}
-
-/// The number of an object, and whether anything shines in the same pixel.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Seen(u32);
-
-impl Seen {
-    const SHINES: u32 = 1 << 31;
-
-    /// Object number + 1 of the first sample; 0 where it met nothing.
-    pub fn object_id(self) -> u32 {
-        self.0 & !Self::SHINES
-    }
-
-    /// Whether any sample first met what sends light to the camera by itself: a lamp, a screen, the environment.
-    pub fn shines(self) -> bool {
-        self.0 & Self::SHINES != 0
-    }
-
-    fn with_object(self, id: u32) -> Self {
-        Self(self.0 & Self::SHINES | id & !Self::SHINES)
-    }
-
-    fn with(self, shines: bool) -> Self {
-        if shines { Self(self.0 | Self::SHINES) } else { self }
     }
 }
 
@@ -354,7 +212,8 @@ impl Film {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::integrator::FirstHit;
+    use crate::integrator::{FirstHit, PathSample};
+    use glam::Vec3;
 
     fn sample(radiance: f32) -> PathSample {
         let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 2.0, object_id: 1, shines: false };
