@@ -266,6 +266,19 @@ mod tests {
         }
     }
 
+    /// What rounding leaves of a uniform picture is no contrast: the greys of codes 103 and 104 differ by 2 %.
+    #[test]
+    fn greys_side_by_side_have_thresholds_side_by_side() {
+        for name in names() {
+            let [darker, brighter] = [103, 104].map(|code: i32| {
+                let light = crate::eotf::Eotf::Srgb.decode(f64::from(code) / 255.0, 200.0);
+                let grey = Plane::filled(160, 120, (0.2 + 199.8 * light) as f32);
+                ask(name, &grey, None).get(80, 60)
+            });
+            assert!((brighter / darker - 1.0).abs() < 0.03, "{name}: {darker} and {brighter} cd/m²");
+        }
+    }
+
     /// White noise of what a model allows is at threshold by it; what moves hides noise from the models that know motion.
     #[test]
     fn noise_is_measured_by_the_models_own_thresholds() {
