@@ -39,10 +39,13 @@ pub(crate) fn gaussian_blur_xy(plane: &Plane, sigma_x_px: f64, sigma_y_px: f64) 
     })
 }
 
+/// Below, a pixel is wider than what would be sampled; above are hundreds of taps, and no eye's loss of acuity: the dimmest has 0.6°.
+const SAMPLED_SIGMAS_PX: std::ops::RangeInclusive<f64> = 0.5..=500.0;
+
 /// [`gaussian_blur_xy`] by the Gaussian's own samples, for where what is left of a grating matters and not the width alone: of one
-/// of which a Gaussian leaves 0.0096 three boxes leave 0.0001. From half a pixel on; below, samples are narrower than what they are of.
+/// of which a Gaussian leaves 0.0096 three boxes leave 0.0001. It has boxes outside [`SAMPLED_SIGMAS_PX`].
 pub(crate) fn sampled_gaussian_blur_xy(plane: &Plane, sigma_x_px: f64, sigma_y_px: f64) -> Plane {
-    if sigma_x_px.min(sigma_y_px) < 0.5 {
+    if ![sigma_x_px, sigma_y_px].iter().all(|sigma_px| SAMPLED_SIGMAS_PX.contains(sigma_px)) {
         return gaussian_blur_xy(plane, sigma_x_px, sigma_y_px);
     }
     blurred_by(plane, sigma_x_px, sigma_y_px, |sigma_px| {
