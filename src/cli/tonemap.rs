@@ -211,7 +211,7 @@ pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
 fn in_time(mut arguments: TonemapArguments) -> TonemapArguments {
     let numbers = frame_numbers(&arguments.input).filter(|numbers| !numbers.is_sorted());
     if let Some(numbers) = numbers {
-        let mut numbered: Vec<(u64, PathBuf)> = numbers.into_iter().zip(std::mem::take(&mut arguments.input)).collect();
+        let mut numbered: Vec<(i64, PathBuf)> = numbers.into_iter().zip(std::mem::take(&mut arguments.input)).collect();
         numbered.sort_unstable();
         arguments.input = numbered.into_iter().map(|(_, path)| path).collect();
         say!("note: frames are taken in the order of their numbers, from {}", arguments.input[0].display());
