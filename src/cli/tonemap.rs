@@ -13,7 +13,7 @@ use super::picture::InputPicture;
 use super::seeing::{self, DEFAULT_DISPLAY, operator_values_or_all};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
-use fechner::output::{self, Format, PartOf};
+use fechner::output::{self, Format, PartOf, Shown};
 use fechner_perception::tone::{
     self, AdaptationScope, AdaptationState, Effects, FittedTone, Goal, Pixel, SceneGuide, SceneLight, ToneOperator,
     ToneSettings, map_picture,
@@ -271,7 +271,13 @@ fn run_all(
     }
     let frame = SceneFrame::read(&arguments.input[0], arguments, viewing)?;
     let sheet = sheet::of_all_operators(&frame, &frame.viewing, settings);
-    output::write_png_for(&targets[0], sheet.width as u32, sheet.height as u32, &sheet.rgb, &viewing.display)?;
+    let picture = Shown {
+        size: (sheet.width as u32, sheet.height as u32),
+        rgb_linear_display: &sheet.rgb,
+        alpha: None,
+        pixel_aspect_ratio: frame.pixel_aspect_ratio,
+    };
+    output::write_shown_png(&targets[0], &picture, &viewing.display)?;
     Ok(())
 }
 
