@@ -247,7 +247,7 @@ fn velocity_in(path: &Path, exr: &ExrImage, frames_per_second: f64) -> Result<[[
     };
     answer!("motion from the channels of {layer} at {frames_per_second} frames a second");
     let planes = |[x, y]: [Vec<f32>; 2]| -> Result<[Plane; 2]> {
-        Ok([channels::motion_plane(exr, x)?, channels::motion_plane(exr, y)?])
+        Ok([channels::motion_plane(path, exr, x)?, channels::motion_plane(path, exr, y)?])
     };
     Ok([planes(motions.to_next)?, planes(motions.to_previous)?])
 }

@@ -332,7 +332,7 @@ fn read_motion(path: &Path, size: (usize, usize)) -> Result<FrameMotion> {
         );
     };
     let planes = |[x, y]: [Vec<f32>; 2]| -> Result<[Plane; 2]> {
-        Ok([channels::motion_plane(&exr, x)?, channels::motion_plane(&exr, y)?])
+        Ok([channels::motion_plane(path, &exr, x)?, channels::motion_plane(path, &exr, y)?])
     };
     Ok(FrameMotion { to_next: planes(motions.to_next)?, to_previous: planes(motions.to_previous)? })
 }
