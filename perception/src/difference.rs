@@ -159,6 +159,10 @@ impl ContrastSensitivity for HeldAtLowFrequencies<'_> {
 mod tests {
     use super::*;
     use crate::csf::CastleCsf;
+
+    fn transfer(&self, freq_cpd: f64) -> f64 {
+        self.base.transfer(freq_cpd.max(0.5))
+    }
     use crate::test_noise::normal;
 
     fn compare(reference: &Plane, test: &Plane) -> Difference {

@@ -216,6 +216,7 @@ fn masked(
         transform: &transform,
         contrast: &contrast,
         sensitivity: levels.get(levels.len() / 2).map(|level| &level.sensitivity),
+        csf,
         noise: noise.map(|variance| {
             halvings(&variance.combined(&adaptation_cd_m2, |value, adaptation| value / adaptation / adaptation))
         }),

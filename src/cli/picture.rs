@@ -209,16 +209,15 @@ impl InputPicture {
         self.rgb.iter().flat_map(|rgb| rgb.map(byte)).collect()
     }
 
-    /// Luminance in cd/m² that the display sends to the eye, of the colours that it shows: those that it clips too.
-    pub(super) fn displayed(&self, tone: Option<&dyn FittedTone>, viewing: &Viewing) -> Plane {
-        self.luminance_of(&self.relative_rgb(tone, &viewing.display, map_picture), &viewing.display)
+    /// Luminance in cd/m² that the display sends to the eye, of the colours that it shows: those that it clips too. Without the operator's
+    /// loss of acuity: for an eye behind it.
+    pub(super) fn displayed_sharp(&self, tone: Option<&dyn FittedTone>, viewing: &Viewing) -> Plane {
+        self.luminance_of(&self.relative_rgb(tone, &viewing.display, map_pixels), &viewing.display)
     }
 
-    /// Linear RGB in cd/m² of the same colours without the operator's loss of acuity: for noise that is judged by an eye behind it.
+    /// Linear RGB in cd/m² of the same colours.
     pub(super) fn displayed_rgb_sharp(&self, tone: Option<&dyn FittedTone>, viewing: &Viewing) -> Vec<[f32; 3]> {
-        let display = &viewing.display;
-        let cd_m2 = |relative: f32| display.luminance_cd_m2(f64::from(relative)) as f32;
-        self.relative_rgb(tone, display, map_pixels).into_iter().map(|rgb| rgb.map(cd_m2)).collect()
+        in_cd_m2(self.relative_rgb(tone, &viewing.display, map_pixels), &viewing.display)
     }
 
     fn luminance_of(&self, relative: &[[f32; 3]], display: &Display) -> Plane {
@@ -273,7 +272,7 @@ mod tests {
                 close(*found, cd_m2(*meant));
             }
         }
-        let displayed = picture.displayed(None, &viewing);
+        let displayed = picture.displayed_sharp(None, &viewing);
         light.iter().enumerate().for_each(|(x, rgb)| close(displayed.get(x, 0), cd_m2(luminance(*rgb))));
     }
 
@@ -283,6 +282,11 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("a.png");
         let pixels = [[65_535, 32_768, 0, 16_384], [65_535, 65_535, 65_535, 0], [20_000, 20_000, 20_000, 65_535_u16]];
+fn in_cd_m2(relative: Vec<[f32; 3]>, display: &Display) -> Vec<[f32; 3]> {
+    let cd_m2 = |light: f32| display.luminance_cd_m2(f64::from(light)) as f32;
+    relative.into_iter().map(|rgb| rgb.map(cd_m2)).collect()
+}
+
         let image = image::ImageBuffer::<image::Rgba<u16>, _>::from_raw(3, 1, pixels.concat()).expect("three pixels");
         image.save(&file).expect("written");
         let viewing = Viewing::of(Display { eotf: Eotf::Linear, ..Display::default() });

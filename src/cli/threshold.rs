@@ -98,10 +98,11 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     })?;
     arguments.seeing.note_what_is_idle(model.as_ref());
     let fitted = shown_by(arguments.operator.as_deref(), &named, &viewing)?;
-    // Noise goes through the loss of acuity that the operator shows.
+    // Noise goes through the loss of acuity that the operator shows, and so does what masks it: neither the guide nor the halves have it
+    // already.
     let acuity = fitted.as_ref().and_then(|fitted| fitted.acuity());
     let csf = BehindAcuity { csf: csf::by_name(&arguments.seeing.csf, &viewing)?, acuity };
-    let shown = guide.displayed(fitted.as_deref(), &viewing);
+    let shown = guide.displayed_sharp(fitted.as_deref(), &viewing);
     let motion = match &motion {
         Some(_) if !model.knows_motion() => {
             let knows = |name: &&&str| model::by_name(name).is_some_and(|model| model.knows_motion());
@@ -130,7 +131,7 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     let visibility = match &halves {
         Some(halves) => {
             let difference = half_difference(halves, fitted.as_deref(), &viewing);
-            let guide = guide.displayed_rgb(fitted.as_deref(), &viewing);
+            let guide = guide.displayed_rgb_sharp(fitted.as_deref(), &viewing);
             Some(noise_visibility(model.as_ref(), &inputs, &guide, &difference, acuity)?)
         }
         None => None,

@@ -70,7 +70,7 @@ impl AcuityFilter {
 }
 
 /// A contrast sensitivity function behind a loss of acuity: how scene noise is seen that the operator blurs. Thresholds
-/// built with it hold for the noise as it is rendered.
+/// built with it hold for the noise as it is rendered, and of the picture as it is rendered: what masks is blurred, too.
 pub struct BehindAcuity<C> {
     /// The eye in front of the display.
     pub csf: C,
@@ -85,6 +85,10 @@ impl<C: ContrastSensitivity> ContrastSensitivity for BehindAcuity<C> {
 
     fn sensitivity(&self, freq_cpd: f64, luminance_cd_m2: f64) -> f64 {
         self.acuity.map_or(1.0, |acuity| acuity.transfer(freq_cpd)) * self.csf.sensitivity(freq_cpd, luminance_cd_m2)
+    }
+
+    fn transfer(&self, freq_cpd: f64) -> f64 {
+        self.acuity.map_or(1.0, |acuity| acuity.transfer(freq_cpd)) * self.csf.transfer(freq_cpd)
     }
 }
 
@@ -138,6 +142,29 @@ mod tests {
                     "{pixels_per_degree} pixels a degree, {freq_cpd} cpd: {left}, not {expected}"
                 );
                 assert!((blurred.mean() - 1.0).abs() < 1e-5);
+            }
+        }
+    }
+
+    /// Noise behind the loss of acuity, on texture as it is rendered, is as visible as both through the filter to the eye itself.
+    #[test]
+    fn masks_are_blurred_as_they_are_shown() {
+        use crate::threshold::{ThresholdInputs, threshold_map};
+        let viewing = Viewing::default();
+        let filter = AcuityFilter::for_adaptation(0.02, &viewing).unwrap();
+        for freq_cpd in [2.0, 3.0, 4.0, 5.0] {
+            let wave = |at: usize| (std::f64::consts::TAU * freq_cpd * (at as f64 + 0.5) / 60.0).cos() as f32;
+            let noise = Plane::from_fn(240, 240, |_, y| wave(y));
+            for contrast in [0.05, 0.2, 0.8] {
+                let texture = Plane::from_fn(240, 240, |x, _| 20.0 * (1.0 + contrast * wave(x)));
+                let seen = |texture: &Plane, noise: &Plane, acuity| {
+                    let csf = BehindAcuity { csf: CastleCsf::default(), acuity };
+                    let map = threshold_map(&ThresholdInputs::clean(texture), &viewing, &csf).unwrap();
+                    f64::from(map.measured_visibility(noise).get(120, 120))
+                };
+                let rendered = seen(&texture, &noise, Some(filter));
+                let shown = seen(&filter.blur_plane(&texture), &filter.blur_plane(&noise), None);
+                assert!((rendered / shown - 1.0).abs() < 0.02, "{freq_cpd} cpd, {contrast}: {rendered}, not {shown}");
             }
         }
     }
