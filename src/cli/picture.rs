@@ -2,7 +2,7 @@
 
 mod from_file;
 
-pub(super) use self::from_file::note;
+pub(super) use self::from_file::{BEFORE_BLACK, note};
 use super::covered::{Covered, Mapping};
 use super::kept_tone::KeptTone;
 use anyhow::{Context, Result};
@@ -12,6 +12,7 @@ use fechner_perception::display::{Display, Eotf, Viewing};
 use fechner_perception::photometry::luminance;
 use fechner_perception::primaries::{Primaries, apply};
 use fechner_perception::tone::{FittedTone, SceneLight, ToneOperator, gamut, map_picture, map_pixels};
+use std::path::Path;
 
 /// A picture from a file.
 pub(super) struct InputPicture {
@@ -31,6 +32,22 @@ pub(super) struct InputPicture {
     straight_alpha: Option<Vec<f32>>,
     /// Where it lies, if it is a part of a larger picture.
     part_of: Option<PartOf>,
+}
+
+/// What lies behind a picture that does not cover all.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Ground {
+    Black,
+    White,
+}
+
+/// What pictures must have in common to be compared.
+#[derive(Clone, Copy)]
+pub(super) struct Shape {
+    /// Width and height in pixels.
+    pub(super) size: (usize, usize),
+    /// Width of a pixel over its height.
+    pub(super) pixel_aspect_ratio: f64,
 }
 
 /// What the values mean.
@@ -95,6 +112,28 @@ impl InputPicture {
         (self.width, self.height)
     }
 
+    /// Size and shape of pixels.
+    pub(super) fn shape(&self) -> Shape {
+        Shape { size: self.size(), pixel_aspect_ratio: self.pixel_aspect_ratio }
+    }
+
+    /// How much of each pixel it covers, whether or not its values are multiplied by it.
+    fn coverage(&self) -> Option<&[f32]> {
+        self.alpha.as_deref().or(self.straight_alpha.as_deref())
+    }
+
+    /// Whether what lies behind it is seen.
+    pub(super) fn is_transparent(&self) -> bool {
+        self.coverage().is_some()
+    }
+
+    /// Says where a picture lies that does not cover all.
+    pub(super) fn note_if_transparent(&self, path: &Path, lies: &str) {
+        if self.is_transparent() {
+            note(path, &format!("what is transparent {lies}"));
+        }
+    }
+
     /// The display that it was made for, where its file says so.
     pub(super) fn made_for(&self) -> Option<&Display> {
         self.made_for.as_ref()
@@ -136,9 +175,23 @@ impl InputPicture {
 
     /// Linear RGB in cd/m² that the display sends to the eye.
     pub(super) fn displayed_rgb(&self, tone: Option<&dyn FittedTone>, viewing: &Viewing) -> Vec<[f32; 3]> {
-        let display = &viewing.display;
-        let cd_m2 = |relative: f32| display.luminance_cd_m2(f64::from(relative)) as f32;
-        self.relative_rgb(tone, display, map_picture).into_iter().map(|rgb| rgb.map(cd_m2)).collect()
+        self.displayed_rgb_over(Ground::Black, tone, viewing)
+    }
+
+    /// The same with the display's black or white behind it.
+    pub(super) fn displayed_rgb_over(
+        &self,
+        ground: Ground,
+        tone: Option<&dyn FittedTone>,
+        viewing: &Viewing,
+    ) -> Vec<[f32; 3]> {
+        let mut shown = self.relative_rgb(tone, &viewing.display, map_picture);
+        if ground == Ground::White {
+            for (rgb, coverage) in shown.iter_mut().zip(self.coverage().into_iter().flatten()) {
+                *rgb = rgb.map(|light| light + (1.0 - coverage));
+            }
+        }
+        in_cd_m2(shown, &viewing.display)
     }
 
     /// Linear display RGB, 0 the display's black and 1 its white; `map` brings a scene there.
@@ -229,6 +282,11 @@ impl InputPicture {
     }
 }
 
+fn in_cd_m2(relative: Vec<[f32; 3]>, display: &Display) -> Vec<[f32; 3]> {
+    let cd_m2 = |light: f32| display.luminance_cd_m2(f64::from(light)) as f32;
+    relative.into_iter().map(|rgb| rgb.map(cd_m2)).collect()
+}
+
 /// Light of other primaries, 0 to 1, in those of Rec.709: what they do not reach is brought in at the luminance that it has.
 fn in_rec709(light: Vec<[f32; 3]>, primaries: &Primaries) -> Vec<[f32; 3]> {
     let Some(matrix) = primaries.to_other(&Primaries::REC709) else { return light };
@@ -282,11 +340,6 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("a.png");
         let pixels = [[65_535, 32_768, 0, 16_384], [65_535, 65_535, 65_535, 0], [20_000, 20_000, 20_000, 65_535_u16]];
-fn in_cd_m2(relative: Vec<[f32; 3]>, display: &Display) -> Vec<[f32; 3]> {
-    let cd_m2 = |light: f32| display.luminance_cd_m2(f64::from(light)) as f32;
-    relative.into_iter().map(|rgb| rgb.map(cd_m2)).collect()
-}
-
         let image = image::ImageBuffer::<image::Rgba<u16>, _>::from_raw(3, 1, pixels.concat()).expect("three pixels");
         image.save(&file).expect("written");
         let viewing = Viewing::of(Display { eotf: Eotf::Linear, ..Display::default() });

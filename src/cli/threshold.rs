@@ -4,7 +4,7 @@ use super::animate::parse_rate;
 use super::channels;
 use super::compare::check_alike;
 use super::kept_tone::shown_by;
-use super::picture::InputPicture;
+use super::picture::{BEFORE_BLACK, InputPicture};
 use super::seeing::{SeeingArguments, model_values, operator_values};
 use super::targets::check_kept;
 use anyhow::{Context, Result, bail};
@@ -78,6 +78,7 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     let names = std::iter::once(&arguments.input).chain(arguments.halves.iter().flatten());
     let pictures = std::iter::once(&guide).chain(halves.iter().flatten());
     let named: Vec<_> = names.map(PathBuf::as_path).zip(pictures).collect();
+    named.iter().for_each(|(path, picture)| picture.note_if_transparent(path, BEFORE_BLACK));
     arguments.seeing.note_what_is_ready(arguments.operator.as_deref(), &named);
     let mut viewing = arguments.seeing.viewing(&named)?;
     if let Some(age_years) = arguments.glare {
@@ -177,7 +178,7 @@ fn read_halves(arguments: &ThresholdArguments, guide: &InputPicture) -> Result<O
         );
     }
     for (path, half) in arguments.halves.iter().flatten().zip(&halves) {
-        check_alike((&arguments.input, guide), (path, half))?;
+        check_alike((&arguments.input, guide.shape()), (path, half.shape()))?;
     }
     Ok(Some(halves))
 }

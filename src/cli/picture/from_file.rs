@@ -16,6 +16,9 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
+/// Where what does not cover all lies, if nothing else is said.
+pub(in crate::cli) const BEFORE_BLACK: &str = "lies before black";
+
 /// Where the luminance of RGB (1, 1, 1) comes from.
 #[derive(Clone, Copy)]
 enum Unit {
@@ -48,7 +51,9 @@ impl InputPicture {
 
     /// Luminance of the values as the file has them, which may be no light and have no unit.
     pub(in crate::cli) fn read_values(path: &Path) -> Result<Plane> {
-        Ok(Self::read_in(path, Unit::Meaningless)?.values())
+        let picture = Self::read_in(path, Unit::Meaningless)?;
+        picture.note_if_transparent(path, BEFORE_BLACK);
+        Ok(picture.values())
     }
 
     fn read_in(path: &Path, unit: Unit) -> Result<Self> {
@@ -114,9 +119,6 @@ impl InputPicture {
             PngTransfer::Srgb | PngTransfer::Untagged => Codes::Srgb(of(Primaries::REC709)),
         };
         let straight_alpha = straight_alpha(&image);
-        if straight_alpha.is_some() {
-            note(path, "what is transparent lies before black");
-        }
         let pixel_aspect_ratio = output::png_pixel_aspect_ratio(&bytes);
         Ok(Self { straight_alpha, pixel_aspect_ratio, ..Self::from_image(image, Content::Display(codes)) })
     }
