@@ -30,6 +30,12 @@ impl Difference {
         }
     }
 
+    /// At each pixel the more visible of this difference and another one of the same pictures, shown otherwise.
+    #[must_use]
+    pub fn or_worse(&self, other: &Self) -> Self {
+        Self::of(self.visibility.combined(&other.visibility, f32::max))
+    }
+
     /// Probability of seeing the difference in the 1° patch around each pixel: 1 − exp(−v^3.5).
     #[must_use]
     pub fn detection(&self) -> Plane {
@@ -152,6 +158,10 @@ impl ContrastSensitivity for HeldAtLowFrequencies<'_> {
 
     fn sensitivity(&self, freq_cpd: f64, luminance_cd_m2: f64) -> f64 {
         self.base.sensitivity(freq_cpd.max(0.5), luminance_cd_m2)
+    }
+
+    fn transfer(&self, freq_cpd: f64) -> f64 {
+        self.base.transfer(freq_cpd.max(0.5))
     }
 }
 

@@ -1,6 +1,7 @@
 //! Masking: how much a band's own contrast raises its threshold.
 
 use crate::bands::{OctaveBands, RINGS, RadialTable, for_each_ring};
+use crate::csf::ContrastSensitivity;
 use crate::display::PixelDensity;
 use crate::fft::{Frame, MOST_REDUCTION, PictureTransform, Spectrum, Workspace, reduced_size, reduction};
 use crate::plane::Plane;
@@ -53,6 +54,8 @@ pub(crate) struct MaskSource<'a> {
     pub(crate) contrast: &'a Spectrum,
     /// The eye's sensitivity under the middle one of the picture's adaptation levels.
     pub(crate) sensitivity: Option<&'a RadialTable>,
+    /// [`ContrastSensitivity::transfer`]: what takes detail away before the eye takes it from masks, and from the guide's noise in them.
+    pub(crate) csf: &'a dyn ContrastSensitivity,
     /// Variance of the guide's noise over the adaptation luminance squared, as far as it is known: at every second pixel, every
     /// fourth and so on, framed like any [`ReducedPlane`].
     pub(crate) noise: GuideNoise<Vec<Plane>>,
@@ -93,8 +96,11 @@ pub(crate) fn band_elevation(
     elevation: &ElevationTable,
 ) -> ReducedPlane {
     let density = source.density;
-    let sensitivity = |freq: f64| source.sensitivity.map_or(1.0, |table| f64::from(table.at(freq as f32)));
-    let gain = RadialTable::new(density, |freq| bands.mask_gain(band, freq, sensitivity));
+    let transfer = |freq: f64| source.csf.transfer(freq);
+    let sensitivity_behind = |freq: f64| {
+        source.sensitivity.map_or(1.0, |table| f64::from(table.at(freq as f32)) / transfer(freq).max(1e-100))
+    };
+    let gain = RadialTable::new(density, |freq| transfer(freq) * bands.mask_gain(band, freq, sensitivity_behind));
     let limit_cpd = bands.limit_cpd(band);
     // A quarter more densely than the band needs: its energy is blurred next.
     let amplitude_factor = reduction(density, 1.25 * limit_cpd);

@@ -39,6 +39,11 @@ impl ReducedPlane {
         }
     }
 
+    /// Makes every sample 1.
+    pub(crate) fn flatten(&mut self) {
+        self.samples.values_mut().fill(1.0);
+    }
+
     /// Every how many-th pixel has a sample.
     pub(crate) fn factor(&self) -> usize {
         self.factor

@@ -106,7 +106,7 @@ pub(crate) struct BandTables {
     /// Mean of S² B² over the Nyquist rectangle: the energy, in squared threshold units, that white pixel noise of unit
     /// relative variance has in the band, against adaptation luminance.
     pub(crate) noise_energy: LuminanceTable,
-    /// S² at the band's centre, against adaptation luminance.
+    /// S² at the band's centre to what has got to the eye, against adaptation luminance.
     pub(crate) center_sensitivity_squared: LuminanceTable,
     /// Standard deviation, in degrees, of the band's squared impulse response: how far it smears noise energy.
     pub(crate) spread_deg: f64,
@@ -133,19 +133,20 @@ impl SensitivityTables {
         let shares: Vec<Vec<f64>> = (0..count)
             .map(|band| rings.iter().map(|ring| ring.weight * bands.gain(band, ring.freq_cpd).powi(2)).collect())
             .collect();
-        // [sample][band]; noise energy and the square at the centre.
+        // [sample][band]; noise energy, and the square at the centre to what has got to the eye, which masks are.
         let samples: Vec<Vec<BandSample>> = span
             .luminances()
             .collect::<Vec<_>>()
             .into_par_iter()
             .map(|luminance| {
-                let square = |freq_cpd| (gain * csf.sensitivity(freq_cpd, luminance)).powi(2);
-                let squares: Vec<f64> = rings.iter().map(|ring| square(ring.freq_cpd)).collect();
+                let squares: Vec<f64> =
+                    rings.iter().map(|ring| (gain * csf.sensitivity(ring.freq_cpd, luminance)).powi(2)).collect();
+                let center = |band| (gain * csf.sensitivity_behind(bands.center_cpd(band), luminance)).powi(2);
                 let noise = |shares: &[f64]| shares.iter().zip(&squares).map(|(share, square)| share * square).sum();
                 shares
                     .iter()
                     .enumerate()
-                    .map(|(band, shares)| BandSample { noise: noise(shares), center: square(bands.center_cpd(band)) })
+                    .map(|(band, shares)| BandSample { noise: noise(shares), center: center(band) })
                     .collect()
             })
             .collect();

@@ -216,6 +216,7 @@ fn masked(
         transform: &transform,
         contrast: &contrast,
         sensitivity: levels.get(levels.len() / 2).map(|level| &level.sensitivity),
+        csf,
         noise: noise.map(|variance| {
             halvings(&variance.combined(&adaptation_cd_m2, |value, adaptation| value / adaptation / adaptation))
         }),
@@ -272,8 +273,19 @@ impl ThresholdMap {
     /// from falling under a veil that is brighter than the picture: beside very bright lamps hundreds of times.
     #[must_use]
     pub fn masking_elevation(&self) -> Plane {
-        let unmasked = noise_gain(&self.tables, &self.adaptation_cd_m2, &[]);
-        unmasked.combined(&self.noise_gain, |unmasked, masked| (unmasked / masked).sqrt())
+        self.unmasked_noise_gain().combined(&self.noise_gain, |unmasked, masked| (unmasked / masked).sqrt())
+    }
+
+    fn unmasked_noise_gain(&self) -> Plane {
+        noise_gain(&self.tables, &self.adaptation_cd_m2, &[])
+    }
+
+    /// The same map with [`masking_elevation`](Self::masking_elevation) 1 everywhere: nothing hides error.
+    #[must_use]
+    pub fn without_masking(mut self) -> Self {
+        self.noise_gain = self.unmasked_noise_gain();
+        self.elevations.iter_mut().for_each(ReducedPlane::flatten);
+        self
     }
 
     /// The same thresholds for error that moves over the retina at `retinal_velocity_deg_s` (see [`crate::motion`]).

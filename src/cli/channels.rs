@@ -1,5 +1,6 @@
 //! Which channels of another program's EXR file hold its colour and its motion.
 
+use super::picture::note;
 use anyhow::{Result, bail};
 use fechner::exr_read::layers::{PictureLayer, colour_layer, is_called, layers_with, picture_layer};
 use fechner::exr_read::{ExrImage, layer_and_part, read_exr_channels};
@@ -25,8 +26,11 @@ pub(super) fn read_motion(path: &Path, (width, height): (usize, usize)) -> Resul
     Ok(exr)
 }
 
-/// One component of motion over the display window. What is not finite, and what has no pixels, rests.
-pub(super) fn motion_plane(exr: &ExrImage, values: Vec<f32>) -> Result<Plane> {
+/// One component of motion over the display window. What is not finite, which a note says, and what has no pixels, rests.
+pub(super) fn motion_plane(path: &Path, exr: &ExrImage, values: Vec<f32>) -> Result<Plane> {
+    if values.iter().any(|value| !value.is_finite()) {
+        note(path, "motion that is not finite was replaced: it rests there");
+    }
     let finite = values.into_iter().map(|value| if value.is_finite() { value } else { 0.0 }).collect();
     let shown = exr.display_window;
     Ok(Plane::from_values(shown.width as usize, shown.height as usize, exr.in_display_window(finite))?)

@@ -5,7 +5,7 @@ mod sequence;
 use super::animate::parse_rate;
 use super::json::write_json;
 use super::kept_tone::shown_by;
-use super::picture::InputPicture;
+use super::picture::{Ground, InputPicture, Shape, Source};
 use super::seeing::{SeeingArguments, operator_values};
 use super::targets::check_kept;
 use anyhow::{Context, Result, bail};
@@ -109,8 +109,11 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
     let nits_per_unit = arguments.seeing.nits_per_unit;
     let reference = InputPicture::read(&arguments.reference, nits_per_unit)?;
     let test = InputPicture::read(&arguments.test, nits_per_unit)?;
-    check_alike((&arguments.reference, &reference), (&arguments.test, &test))?;
+    check_alike((&arguments.reference, reference.shape()), (&arguments.test, test.shape()))?;
     let pictures = [(arguments.reference.as_path(), &reference), (arguments.test.as_path(), &test)];
+    for (path, picture) in pictures {
+        picture.note_if_transparent(Source::single(path), "is judged before black and over white");
+    }
     arguments.seeing.note_what_is_ready(arguments.operator.as_deref(), &pictures);
     let viewing = reference
         .viewed(&arguments.seeing.viewing(&pictures)?)
@@ -118,14 +121,16 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
     let csf = csf::by_name(&arguments.seeing.csf, &viewing)?;
     let fitted = shown_by(arguments.operator.as_deref(), &pictures, &viewing)?;
     let (width, height) = reference.size();
-    let difference = colour_difference(
-        &reference.displayed_rgb(fitted.as_deref(), &viewing),
-        &test.displayed_rgb(fitted.as_deref(), &viewing),
-        width,
-        height,
-        &viewing,
-        csf.as_ref(),
-    )?;
+    let over = |ground: Ground| {
+        let [reference, test] =
+            [&reference, &test].map(|picture| picture.displayed_rgb_over(ground, fitted.as_deref(), &viewing));
+        colour_difference(&reference, &test, width, height, &viewing, csf.as_ref())
+    };
+    let mut difference = over(Ground::Black)?;
+    // What is dark hides its edges before black.
+    if reference.is_transparent() || test.is_transparent() {
+        difference = difference.or_worse(&over(Ground::White)?);
+    }
     let figures = Figures {
         reference: arguments.reference.display().to_string(),
         test: arguments.test.display().to_string(),
@@ -164,15 +169,15 @@ fn check_map(path: &Path) -> Result<()> {
 
 /// Only pictures of one size and shape can be compared.
 pub(super) fn check_alike(
-    (reference_file, reference): (&Path, &InputPicture),
-    (test_file, test): (&Path, &InputPicture),
+    (reference_file, reference): (&Path, Shape),
+    (test_file, test): (&Path, Shape),
 ) -> Result<()> {
     let (a, b) = (reference_file.display(), test_file.display());
-    if reference.size() != test.size() {
-        let ((w, h), (x, y)) = (reference.size(), test.size());
+    if reference.size != test.size {
+        let ((w, h), (x, y)) = (reference.size, test.size);
         bail!("{a} has {w}x{h} pixels and {b} has {x}x{y}: only pictures of one size can be compared");
     }
-    let [wide, wide_too] = [reference, test].map(InputPicture::pixel_aspect_ratio);
+    let [wide, wide_too] = [reference, test].map(|shape| shape.pixel_aspect_ratio);
     if (wide / wide_too - 1.0).abs() > 1e-3 {
         bail!(
             "{a} has pixels {wide} times as wide as high and {b} {wide_too} times: only pictures of one shape can be compared"

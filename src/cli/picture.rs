@@ -2,7 +2,7 @@
 
 mod from_file;
 
-pub(super) use self::from_file::note;
+pub(super) use self::from_file::{BEFORE_BLACK, Source, note};
 use super::covered::{Covered, Mapping};
 use super::kept_tone::KeptTone;
 use anyhow::{Context, Result};
@@ -31,6 +31,22 @@ pub(super) struct InputPicture {
     straight_alpha: Option<Vec<f32>>,
     /// Where it lies, if it is a part of a larger picture.
     part_of: Option<PartOf>,
+}
+
+/// What lies behind a picture that does not cover all.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Ground {
+    Black,
+    White,
+}
+
+/// What pictures must have in common to be compared.
+#[derive(Clone, Copy)]
+pub(super) struct Shape {
+    /// Width and height in pixels.
+    pub(super) size: (usize, usize),
+    /// Width of a pixel over its height.
+    pub(super) pixel_aspect_ratio: f64,
 }
 
 /// What the values mean.
@@ -95,6 +111,28 @@ impl InputPicture {
         (self.width, self.height)
     }
 
+    /// Size and shape of pixels.
+    pub(super) fn shape(&self) -> Shape {
+        Shape { size: self.size(), pixel_aspect_ratio: self.pixel_aspect_ratio }
+    }
+
+    /// How much of each pixel it covers, whether or not its values are multiplied by it.
+    fn coverage(&self) -> Option<&[f32]> {
+        self.alpha.as_deref().or(self.straight_alpha.as_deref())
+    }
+
+    /// Whether what lies behind it is seen.
+    pub(super) fn is_transparent(&self) -> bool {
+        self.coverage().is_some()
+    }
+
+    /// Says where a picture lies that does not cover all.
+    pub(super) fn note_if_transparent(&self, source: Source<'_>, lies: &str) {
+        if self.is_transparent() {
+            source.note(&format!("what is transparent {lies}"));
+        }
+    }
+
     /// The display that it was made for, where its file says so.
     pub(super) fn made_for(&self) -> Option<&Display> {
         self.made_for.as_ref()
@@ -136,9 +174,23 @@ impl InputPicture {
 
     /// Linear RGB in cd/m² that the display sends to the eye.
     pub(super) fn displayed_rgb(&self, tone: Option<&dyn FittedTone>, viewing: &Viewing) -> Vec<[f32; 3]> {
-        let display = &viewing.display;
-        let cd_m2 = |relative: f32| display.luminance_cd_m2(f64::from(relative)) as f32;
-        self.relative_rgb(tone, display, map_picture).into_iter().map(|rgb| rgb.map(cd_m2)).collect()
+        self.displayed_rgb_over(Ground::Black, tone, viewing)
+    }
+
+    /// The same with the display's black or white behind it.
+    pub(super) fn displayed_rgb_over(
+        &self,
+        ground: Ground,
+        tone: Option<&dyn FittedTone>,
+        viewing: &Viewing,
+    ) -> Vec<[f32; 3]> {
+        let mut shown = self.relative_rgb(tone, &viewing.display, map_picture);
+        if ground == Ground::White {
+            for (rgb, coverage) in shown.iter_mut().zip(self.coverage().into_iter().flatten()) {
+                *rgb = rgb.map(|light| light + (1.0 - coverage));
+            }
+        }
+        in_cd_m2(shown, &viewing.display)
     }
 
     /// Linear display RGB, 0 the display's black and 1 its white; `map` brings a scene there.
@@ -209,16 +261,15 @@ impl InputPicture {
         self.rgb.iter().flat_map(|rgb| rgb.map(byte)).collect()
     }
 
-    /// Luminance in cd/m² that the display sends to the eye, of the colours that it shows: those that it clips too.
-    pub(super) fn displayed(&self, tone: Option<&dyn FittedTone>, viewing: &Viewing) -> Plane {
-        self.luminance_of(&self.relative_rgb(tone, &viewing.display, map_picture), &viewing.display)
+    /// Luminance in cd/m² that the display sends to the eye, of the colours that it shows: those that it clips too. Without the operator's
+    /// loss of acuity: for an eye behind it.
+    pub(super) fn displayed_sharp(&self, tone: Option<&dyn FittedTone>, viewing: &Viewing) -> Plane {
+        self.luminance_of(&self.relative_rgb(tone, &viewing.display, map_pixels), &viewing.display)
     }
 
-    /// Linear RGB in cd/m² of the same colours without the operator's loss of acuity: for noise that is judged by an eye behind it.
+    /// Linear RGB in cd/m² of the same colours.
     pub(super) fn displayed_rgb_sharp(&self, tone: Option<&dyn FittedTone>, viewing: &Viewing) -> Vec<[f32; 3]> {
-        let display = &viewing.display;
-        let cd_m2 = |relative: f32| display.luminance_cd_m2(f64::from(relative)) as f32;
-        self.relative_rgb(tone, display, map_pixels).into_iter().map(|rgb| rgb.map(cd_m2)).collect()
+        in_cd_m2(self.relative_rgb(tone, &viewing.display, map_pixels), &viewing.display)
     }
 
     fn luminance_of(&self, relative: &[[f32; 3]], display: &Display) -> Plane {
@@ -228,6 +279,11 @@ impl InputPicture {
             display.luminance_cd_m2(f64::from(luminance(shown))) as f32
         })
     }
+}
+
+fn in_cd_m2(relative: Vec<[f32; 3]>, display: &Display) -> Vec<[f32; 3]> {
+    let cd_m2 = |light: f32| display.luminance_cd_m2(f64::from(light)) as f32;
+    relative.into_iter().map(|rgb| rgb.map(cd_m2)).collect()
 }
 
 /// Light of other primaries, 0 to 1, in those of Rec.709: what they do not reach is brought in at the luminance that it has.
@@ -273,7 +329,7 @@ mod tests {
                 close(*found, cd_m2(*meant));
             }
         }
-        let displayed = picture.displayed(None, &viewing);
+        let displayed = picture.displayed_sharp(None, &viewing);
         light.iter().enumerate().for_each(|(x, rgb)| close(displayed.get(x, 0), cd_m2(luminance(*rgb))));
     }
 

@@ -4,7 +4,7 @@ use super::animate::parse_rate;
 use super::channels;
 use super::compare::check_alike;
 use super::kept_tone::shown_by;
-use super::picture::InputPicture;
+use super::picture::{BEFORE_BLACK, InputPicture, Source};
 use super::seeing::{SeeingArguments, model_values, operator_values};
 use super::targets::check_kept;
 use anyhow::{Context, Result, bail};
@@ -78,6 +78,7 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     let names = std::iter::once(&arguments.input).chain(arguments.halves.iter().flatten());
     let pictures = std::iter::once(&guide).chain(halves.iter().flatten());
     let named: Vec<_> = names.map(PathBuf::as_path).zip(pictures).collect();
+    named.iter().for_each(|(path, picture)| picture.note_if_transparent(Source::single(path), BEFORE_BLACK));
     arguments.seeing.note_what_is_ready(arguments.operator.as_deref(), &named);
     let mut viewing = arguments.seeing.viewing(&named)?;
     if let Some(age_years) = arguments.glare {
@@ -98,10 +99,11 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     })?;
     arguments.seeing.note_what_is_idle(model.as_ref());
     let fitted = shown_by(arguments.operator.as_deref(), &named, &viewing)?;
-    // Noise goes through the loss of acuity that the operator shows.
+    // Noise goes through the loss of acuity that the operator shows, and so does what masks it: neither the guide nor the halves have it
+    // already.
     let acuity = fitted.as_ref().and_then(|fitted| fitted.acuity());
     let csf = BehindAcuity { csf: csf::by_name(&arguments.seeing.csf, &viewing)?, acuity };
-    let shown = guide.displayed(fitted.as_deref(), &viewing);
+    let shown = guide.displayed_sharp(fitted.as_deref(), &viewing);
     let motion = match &motion {
         Some(_) if !model.knows_motion() => {
             let knows = |name: &&&str| model::by_name(name).is_some_and(|model| model.knows_motion());
@@ -130,7 +132,7 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     let visibility = match &halves {
         Some(halves) => {
             let difference = half_difference(halves, fitted.as_deref(), &viewing);
-            let guide = guide.displayed_rgb(fitted.as_deref(), &viewing);
+            let guide = guide.displayed_rgb_sharp(fitted.as_deref(), &viewing);
             Some(noise_visibility(model.as_ref(), &inputs, &guide, &difference, acuity)?)
         }
         None => None,
@@ -176,7 +178,7 @@ fn read_halves(arguments: &ThresholdArguments, guide: &InputPicture) -> Result<O
         );
     }
     for (path, half) in arguments.halves.iter().flatten().zip(&halves) {
-        check_alike((&arguments.input, guide), (path, half))?;
+        check_alike((&arguments.input, guide.shape()), (path, half.shape()))?;
     }
     Ok(Some(halves))
 }
@@ -247,7 +249,7 @@ fn velocity_in(path: &Path, exr: &ExrImage, frames_per_second: f64) -> Result<[[
     };
     answer!("motion from the channels of {layer} at {frames_per_second} frames a second");
     let planes = |[x, y]: [Vec<f32>; 2]| -> Result<[Plane; 2]> {
-        Ok([channels::motion_plane(exr, x)?, channels::motion_plane(exr, y)?])
+        Ok([channels::motion_plane(path, exr, x)?, channels::motion_plane(path, exr, y)?])
     };
     Ok([planes(motions.to_next)?, planes(motions.to_previous)?])
 }

@@ -13,7 +13,7 @@ use super::picture::InputPicture;
 use super::seeing::{self, DEFAULT_DISPLAY, operator_values_or_all};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
-use fechner::output::{self, Format, PartOf};
+use fechner::output::{self, Format, PartOf, Shown};
 use fechner_perception::tone::{
     self, AdaptationScope, AdaptationState, Effects, FittedTone, Goal, Pixel, SceneGuide, SceneLight, ToneOperator,
     ToneSettings, map_picture,
@@ -211,7 +211,7 @@ pub(super) fn run(arguments: &TonemapArguments) -> Result<()> {
 fn in_time(mut arguments: TonemapArguments) -> TonemapArguments {
     let numbers = frame_numbers(&arguments.input).filter(|numbers| !numbers.is_sorted());
     if let Some(numbers) = numbers {
-        let mut numbered: Vec<(u64, PathBuf)> = numbers.into_iter().zip(std::mem::take(&mut arguments.input)).collect();
+        let mut numbered: Vec<(i64, PathBuf)> = numbers.into_iter().zip(std::mem::take(&mut arguments.input)).collect();
         numbered.sort_unstable();
         arguments.input = numbered.into_iter().map(|(_, path)| path).collect();
         say!("note: frames are taken in the order of their numbers, from {}", arguments.input[0].display());
@@ -271,7 +271,13 @@ fn run_all(
     }
     let frame = SceneFrame::read(&arguments.input[0], arguments, viewing)?;
     let sheet = sheet::of_all_operators(&frame, &frame.viewing, settings);
-    output::write_png_for(&targets[0], sheet.width as u32, sheet.height as u32, &sheet.rgb, &viewing.display)?;
+    let picture = Shown {
+        size: (sheet.width as u32, sheet.height as u32),
+        rgb_linear_display: &sheet.rgb,
+        alpha: None,
+        pixel_aspect_ratio: frame.pixel_aspect_ratio,
+    };
+    output::write_shown_png(&targets[0], &picture, &viewing.display)?;
     Ok(())
 }
 

@@ -2,6 +2,7 @@
 //! room's light.
 
 use assert_cmd::Command;
+use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Image, WritableImage as _};
 use fechner::exr_read::read_exr;
 use fechner::output::{Attribute, NITS_PER_UNIT, PIXEL_ASPECT_RATIO, Picture, write_exr, write_png};
 use fechner_perception::display::Eotf;
@@ -104,6 +105,92 @@ fn halves_of_a_scene_are_fitted_where_the_guide_is_none() {
     run(folder.path(), &["threshold", "g.png", "--halves", "a.exr", "b.exr", "-o", "t.exr"]);
     let seen = mean(folder.path(), "t.exr", "visibility.Y");
     assert!(seen > 1.0, "{seen}");
+}
+
+/// Texture loses what the operator blurs once, as noise does: lost twice, it hid little, and noise was up to 4 times as visible as on
+/// the display that shows it.
+#[test]
+fn texture_behind_a_loss_of_acuity_hides_what_it_hides_on_the_display() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let wave = |cpd: f32, at: usize| (std::f32::consts::TAU * cpd * (at as f32 + 0.5) / 60.0).cos();
+    for (name, noise) in [("u", 0.0), ("a", 0.02), ("b", -0.02)] {
+        let light = |pixel: usize| 0.02 * (1.0 + 0.8 * wave(3.75, pixel % SIDE) + noise * wave(3.75, pixel / SIDE));
+        write(folder.path(), &format!("{name}.exr"), |pixel| [light(pixel); 3]);
+        let shown = format!("{name}-shown.exr");
+        run(folder.path(), &["tonemap", &format!("{name}.exr"), "-o", &shown, "--operator", "ferwerda96"]);
+    }
+    let seen = |files: [&str; 3], how: &[&str]| {
+        let [guide, a, b] = files;
+        let arguments = ["threshold", guide, "--halves", a, b, "--model", "csf-bands", "-o", "t.exr"];
+        run(folder.path(), &[&arguments[..], how].concat());
+        mean(folder.path(), "t.exr", "visibility.Y")
+    };
+    let of_scene = seen(["u.exr", "a.exr", "b.exr"], &["--operator", "ferwerda96"]);
+    let on_display = seen(["u-shown.exr", "a-shown.exr", "b-shown.exr"], &[]);
+    assert!((of_scene / on_display - 1.0).abs() < 0.1, "{of_scene}, and on the display {on_display}");
+}
+
+/// Black before black is all one; over white it is not.
+#[test]
+fn coverage_alone_is_seen_over_white() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let inside = |pixel: usize| (pixel % SIDE).abs_diff(SIDE / 2) < 12 && (pixel / SIDE).abs_diff(SIDE / 2) < 12;
+    for (name, outside) in [("whole", 1.0), ("disc", 0.0)] {
+        let alpha: Vec<f32> = (0..SIDE * SIDE).map(|pixel| if inside(pixel) { 1.0 } else { outside }).collect();
+        let mut picture = Picture::new(SIDE as u32, SIDE as u32);
+        ["R", "G", "B"].into_iter().for_each(|letter| picture.push_f32(letter, vec![0.0; SIDE * SIDE]));
+        picture.push_f32("A", alpha.clone());
+        picture.push_attribute(NITS_PER_UNIT, Attribute::Float(1.0));
+        write_exr(&folder.path().join(format!("{name}.exr")), &picture).expect("written");
+        let codes = alpha.iter().flat_map(|alpha| [0, 0, 0, (255.0 * alpha) as u8]).collect();
+        let image = image::RgbaImage::from_raw(SIDE as u32, SIDE as u32, codes).expect("pixels");
+        image.save(folder.path().join(format!("{name}.png"))).expect("written");
+    }
+    for ending in ["exr", "png"] {
+        let [whole, disc] = ["whole", "disc"].map(|name| format!("{name}.{ending}"));
+        let (code, said) = fechner(folder.path(), &["compare", &whole, &disc, "--operator", "absolute"]);
+        assert!(code == 1 && visibility(&said) > 10.0 && said.contains("over white"), "{ending}: {said}");
+        let (code, said) = fechner(folder.path(), &["compare", &disc, &disc, "--operator", "absolute"]);
+        assert!(code == 0 && visibility(&said) == 0.0, "{ending}: {said}");
+    }
+    let (code, said) = fechner(folder.path(), &["compare", "disc.exr", "disc.png", "--operator", "absolute"]);
+    assert_eq!(code, 0, "{said}");
+}
+
+/// Motion that is no number rests, as before, and is told.
+#[test]
+fn motion_that_is_no_number_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), "a.exr", |_| [50.0; 3]);
+    for (name, bad, is_told) in [("still.exr", 0.0, false), ("bad.exr", f32::NAN, true)] {
+        // Our own writer would put a number in its place.
+        let across: Vec<f32> = (0..SIDE * SIDE).map(|pixel| if pixel == 0 { bad } else { 1.0 }).collect();
+        let channel = |name: &str, values: Vec<f32>| AnyChannel::new(name, FlatSamples::F32(values));
+        let channels = [channel("velocity.X", across), channel("velocity.Y", vec![0.0; SIDE * SIDE])];
+        let motion = Image::from_channels((SIDE, SIDE), AnyChannels::sort(channels.into_iter().collect()));
+        motion.write().to_file(folder.path().join(name)).expect("written");
+        let said = run(folder.path(), &["threshold", "a.exr", "-o", "t.exr", "--velocity", name]);
+        assert_eq!(said.contains("motion that is not finite"), is_told, "{said}");
+    }
+}
+
+/// Frames of one sequence have one shape.
+#[test]
+fn pixels_that_change_their_shape_are_no_sequence() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, wide: f32| {
+        let mut picture = Picture::new(16, 16);
+        ["R", "G", "B"].into_iter().for_each(|letter| picture.push_f32(letter, vec![20.0; 256]));
+        picture.push_attribute(NITS_PER_UNIT, Attribute::Float(1.0));
+        picture.push_attribute(PIXEL_ASPECT_RATIO, Attribute::Float(wide));
+        write_exr(&folder.path().join(name), &picture).expect("written");
+    };
+    for (frame, wide) in [(1, 1.0), (2, 1.0), (3, 2.0)] {
+        write(&format!("a.{frame}.exr"), wide);
+        write(&format!("b.{frame}.exr"), wide);
+    }
+    let (code, said) = fechner(folder.path(), &["compare", "a.#.exr", "b.#.exr", "--fps", "24"]);
+    assert!(code == 2 && said.contains("a.3.exr 2 times"), "{said}");
 }
 
 /// Detail in the dark is there whatever the room adds, in PQ as in sRGB.

@@ -2,7 +2,9 @@
 
 use assert_cmd::Command;
 use fechner::exr_read::read_exr;
-use fechner::output::{Attribute, NITS_PER_UNIT, PartOf, Picture, write_exr};
+use fechner::output::{
+    Attribute, NITS_PER_UNIT, PIXEL_ASPECT_RATIO, PartOf, Picture, png_pixel_aspect_ratio, write_exr,
+};
 use std::path::Path;
 
 fn tonemap(folder: &Path, arguments: &[&str]) -> std::process::Output {
@@ -39,6 +41,36 @@ fn all_operators_make_one_sheet() {
     run(folder.path(), &["a.exr", "-o", "all.png", "--operator", "all", "--adaptation", "local"]);
     let sheet = image::open(folder.path().join("all.png")).expect("a picture");
     assert!(sheet.width() > 4 * 64 && sheet.height() > 4 * 36);
+}
+
+/// Small pictures have the shape of the large one.
+#[test]
+fn a_sheet_keeps_the_shape_of_pixels() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut picture = Picture::new(16, 9);
+    ["R", "G", "B"].into_iter().for_each(|channel| picture.push_f32(channel, vec![40.0; 16 * 9]));
+    picture.push_attribute(NITS_PER_UNIT, Attribute::Float(1.0));
+    picture.push_attribute(PIXEL_ASPECT_RATIO, Attribute::Float(2.0));
+    write_exr(&folder.path().join("a.exr"), &picture).expect("written");
+    run(folder.path(), &["a.exr", "-o", "all.png", "--operator", "all"]);
+    let sheet = std::fs::read(folder.path().join("all.png")).expect("written");
+    assert!((png_pixel_aspect_ratio(&sheet) - 2.0).abs() < 1e-3, "{}", png_pixel_aspect_ratio(&sheet));
+}
+
+/// Numbers of frames are what names differ by, wherever they stand.
+#[test]
+fn frames_keep_their_numbers() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in ["s.0010.left.exr", "s.0009.left.exr", "n.-0001.exr", "n.0001.exr"] {
+        write_step(folder.path(), name, 1.0, 10.0);
+    }
+    let how = ["--operator", "pattanaik00"];
+    let written = |inputs: [&str; 2]| {
+        let said = run(folder.path(), &[&inputs[..], &["-o", "o.####.exr"], &how].concat());
+        said.lines().filter_map(|line| Some(line.split_once(':')?.0.to_owned())).collect::<Vec<_>>()
+    };
+    assert_eq!(written(["s.0010.left.exr", "s.0009.left.exr"]), ["o.0009.exr", "o.0010.exr"]);
+    assert_eq!(written(["n.-0001.exr", "n.0001.exr"]), ["o.-001.exr", "o.0001.exr"]);
 }
 
 /// A crop of a transparent render: alpha as in the render's own files, and the place in the whole.

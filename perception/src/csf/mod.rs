@@ -48,6 +48,18 @@ pub trait ContrastSensitivity: Send + Sync {
     /// Finite and not negative for every finite frequency ≥ 0 and luminance ≥ 0; a luminance outside the model's
     /// domain is moved to its edge.
     fn sensitivity(&self, freq_cpd: f64, luminance_cd_m2: f64) -> f64;
+
+    /// Share of a grating's amplitude that gets to the eye, where something before it takes detail away, as an operator's loss of acuity
+    /// does; it is in [`sensitivity`](Self::sensitivity) already.
+    fn transfer(&self, _freq_cpd: f64) -> f64 {
+        1.0
+    }
+
+    /// Sensitivity of the eye to what gets there.
+    fn sensitivity_behind(&self, freq_cpd: f64, luminance_cd_m2: f64) -> f64 {
+        // What gets through by less than that is as good as lost.
+        self.sensitivity(freq_cpd, luminance_cd_m2) / self.transfer(freq_cpd).max(1e-100)
+    }
 }
 
 impl ContrastSensitivity for Box<dyn ContrastSensitivity> {
@@ -57,6 +69,10 @@ impl ContrastSensitivity for Box<dyn ContrastSensitivity> {
 
     fn sensitivity(&self, freq_cpd: f64, luminance_cd_m2: f64) -> f64 {
         (**self).sensitivity(freq_cpd, luminance_cd_m2)
+    }
+
+    fn transfer(&self, freq_cpd: f64) -> f64 {
+        (**self).transfer(freq_cpd)
     }
 }
 

@@ -23,6 +23,10 @@ impl ContrastSensitivity for Moving<'_> {
         let ratio = (moving.ln_sensitivity(freq_cpd) - Daly98::default().ln_sensitivity(freq_cpd)).exp().min(10.0);
         self.base.sensitivity(freq_cpd, luminance_cd_m2) * ratio
     }
+
+    fn transfer(&self, freq_cpd: f64) -> f64 {
+        self.base.transfer(freq_cpd)
+    }
 }
 
 #[cfg(test)]

@@ -15,9 +15,13 @@ impl ThresholdModel for Unmasked {
     }
 
     fn allowed_standard_error_cd_m2(&self, inputs: &ModelInputs<'_>) -> Result<Plane, Error> {
-        let map = still_or_moving(inputs)?;
-        let allowed = map.allowed_standard_error_cd_m2(1.0);
-        Ok(allowed.combined(&map.masking_elevation(), |allowed, elevation| allowed / elevation))
+        Ok(still_or_moving(inputs)?.without_masking().allowed_standard_error_cd_m2(1.0))
+    }
+
+    fn measured_visibility(&self, inputs: &ModelInputs<'_>, half_difference: &Plane) -> Result<Plane, Error> {
+        let map = still_or_moving(inputs)?.without_masking();
+        half_difference.check_size("half difference", map.width(), map.height())?;
+        Ok(map.measured_visibility(half_difference))
     }
 }
 

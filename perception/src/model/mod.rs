@@ -95,7 +95,8 @@ pub trait ThresholdModel: Send + Sync {
     /// Visibility of the noise in half of the difference of two independent pictures, cd/m² on the display: 1 where noise of
     /// what the model allows is expected to be.
     ///
-    /// A model that knows only pixels gets the noise's energy pooled over a Gaussian of σ 0.25°, as the default's is.
+    /// A model that knows only pixels gets the noise's energy pooled over a Gaussian of σ 0.25°, as the default's is; one that knows
+    /// bands measures in them.
     ///
     /// # Errors
     /// As for [`ThresholdModel::allowed_standard_error_cd_m2`], and [`Error::SizeMismatch`] for a difference of another size.
@@ -106,10 +107,14 @@ pub trait ThresholdModel: Send + Sync {
             let relative = if difference.is_finite() { difference / allowed } else { 0.0 };
             relative * relative
         });
-        let density = inputs.viewing.display.pixel_density();
-        let (sigma_x, sigma_y) = (POOLING_SIGMA_DEG * density.horizontal, POOLING_SIGMA_DEG * density.vertical);
-        Ok(gaussian_blur_xy(&energy, sigma_x, sigma_y).map(f32::sqrt))
+        Ok(pooled(&energy, inputs.viewing).map(f32::sqrt))
     }
+}
+
+/// Energy over a Gaussian of σ 0.25°.
+fn pooled(energy: &Plane, viewing: &Viewing) -> Plane {
+    let density = viewing.display.pixel_density();
+    gaussian_blur_xy(energy, POOLING_SIGMA_DEG * density.horizontal, POOLING_SIGMA_DEG * density.vertical)
 }
 
 /// Two-sided 95 % of a normal distribution: models that stop on a confidence interval ask z σ ≤ T.
@@ -264,6 +269,45 @@ mod tests {
             assert_eq!(moved > 1.2 * textured, knows_motion, "{name}: still {textured}, moving {moved}");
             assert_eq!(by_name(name).unwrap().knows_motion(), knows_motion, "{name} says otherwise");
         }
+    }
+
+    /// What rounding leaves of a uniform picture is no contrast: the greys of codes 103 and 104 differ by 2 %.
+    #[test]
+    fn greys_side_by_side_have_thresholds_side_by_side() {
+        for name in names() {
+            let [darker, brighter] = [103, 104].map(|code: i32| {
+                let light = crate::eotf::Eotf::Srgb.decode(f64::from(code) / 255.0, 200.0);
+                let grey = Plane::filled(160, 120, (0.2 + 199.8 * light) as f32);
+                ask(name, &grey, None).get(80, 60)
+            });
+            assert!((brighter / darker - 1.0).abs() < 0.03, "{name}: {darker} and {brighter} cd/m²");
+        }
+    }
+
+    /// The eye sees little of fine noise: models that know bands measure it by them.
+    #[test]
+    fn models_of_bands_measure_noise_by_their_bands() {
+        let grey = Plane::filled(160, 160, 50.0);
+        let visibility = |name: &str, freq_cpd: f32| {
+            let grating =
+                Plane::from_fn(160, 160, |x, _| (std::f32::consts::TAU * freq_cpd * (x as f32 + 0.5) / 60.0).cos());
+            let inputs = ModelInputs {
+                display_luminance_cd_m2: &grey,
+                guide_noise: GuideNoise::Clean,
+                image_velocity_deg_s: None,
+                attention: None,
+                viewing: &Viewing::default(),
+                csf: &CastleCsf::default(),
+            };
+            by_name(name).unwrap().measured_visibility(&inputs, &grating).unwrap().get(80, 80)
+        };
+        for freq_cpd in [4.0, 24.0] {
+            let (full, unmasked) = (visibility(DEFAULT, freq_cpd), visibility("csf-unmasked", freq_cpd));
+            assert!((unmasked / full - 1.0).abs() < 1e-3, "{freq_cpd} cpd: {unmasked}, not {full}");
+        }
+        let coarse_to_fine = |name| visibility(name, 4.0) / visibility(name, 24.0);
+        assert!(coarse_to_fine("bolin-meyer") > 2.0, "{}", coarse_to_fine("bolin-meyer"));
+        assert!((coarse_to_fine("tvi") - 1.0).abs() < 0.01);
     }
 
     /// White noise of what a model allows is at threshold by it; what moves hides noise from the models that know motion.

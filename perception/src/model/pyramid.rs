@@ -8,6 +8,9 @@ use crate::tvi::{ThresholdBase, base_threshold_cd_m2};
 
 /// Contrast bands of the published models.
 pub(crate) const BANDS: usize = 6;
+/// Contrast of all bands together below which there is none: what the kernel's rounding leaves of a uniform picture is 20 times less,
+/// the least that eyes see 100 times more.
+const LEAST_CONTRAST: f32 = 1e-5;
 /// Below this luminance, cd/m², a band's contrast is taken over it instead.
 const LEAST_LUMINANCE_CD_M2: f32 = 1e-4;
 
@@ -67,7 +70,7 @@ pub(crate) fn contrast_weighted(
                 elevation += contrast * elevation_at(x, y, adaptation, band, contrast);
                 total += contrast;
             }
-            *value = thresholds.at(adaptation) * if total > 0.0 { factor(elevation / total) } else { 1.0 };
+            *value = thresholds.at(adaptation) * if total > LEAST_CONTRAST { factor(elevation / total) } else { 1.0 };
         }
     });
     allowed

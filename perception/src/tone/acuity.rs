@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::csf::{CastleCsf, ContrastSensitivity};
 use crate::display::{PixelDensity, Viewing};
-use crate::filter::gaussian_blur_xy;
+use crate::filter::sampled_gaussian_blur_xy;
 use crate::plane::Plane;
 use crate::tvi::acuity_cpd;
 
@@ -50,7 +50,7 @@ impl AcuityFilter {
     #[must_use]
     pub fn blur_plane(&self, plane: &Plane) -> Plane {
         let PixelDensity { horizontal, vertical } = self.pixel_density;
-        gaussian_blur_xy(plane, self.sigma_deg * horizontal, self.sigma_deg * vertical)
+        sampled_gaussian_blur_xy(plane, self.sigma_deg * horizontal, self.sigma_deg * vertical)
     }
 
     /// A picture `width` pixels wide through the filter; pixels that are not finite count as black.
@@ -70,7 +70,7 @@ impl AcuityFilter {
 }
 
 /// A contrast sensitivity function behind a loss of acuity: how scene noise is seen that the operator blurs. Thresholds
-/// built with it hold for the noise as it is rendered.
+/// built with it hold for the noise as it is rendered, and of the picture as it is rendered: what masks is blurred, too.
 pub struct BehindAcuity<C> {
     /// The eye in front of the display.
     pub csf: C,
@@ -85,6 +85,10 @@ impl<C: ContrastSensitivity> ContrastSensitivity for BehindAcuity<C> {
 
     fn sensitivity(&self, freq_cpd: f64, luminance_cd_m2: f64) -> f64 {
         self.acuity.map_or(1.0, |acuity| acuity.transfer(freq_cpd)) * self.csf.sensitivity(freq_cpd, luminance_cd_m2)
+    }
+
+    fn transfer(&self, freq_cpd: f64) -> f64 {
+        self.acuity.map_or(1.0, |acuity| acuity.transfer(freq_cpd)) * self.csf.transfer(freq_cpd)
     }
 }
 
@@ -117,6 +121,54 @@ mod tests {
         // 32 pixels a period are 2 cycles a degree.
         assert!((amplitude / filter.transfer(2.0) - 1.0).abs() < 0.02, "{amplitude} {}", filter.transfer(2.0));
     }
+
+    /// A night of 0.02 cd/m², whose limit is 6.1 cpd: up to it the blur is the Gaussian, on displays of any density.
+    #[test]
+    fn the_blur_is_a_gaussian_up_to_the_limit() {
+        for pixels_per_degree in [60.0, 96.0, 240.0] {
+            let viewing = Viewing::of(Display { pixels_per_degree, ..Display::default() });
+            let filter = AcuityFilter::for_adaptation(0.02, &viewing).unwrap();
+            // Two degrees, mirrored: every whole number of cycles goes on beyond the border.
+            let width = (2.0 * pixels_per_degree) as usize;
+            for freq_cpd in [0.5, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0] {
+                let cycles = |x: usize| freq_cpd * (x as f64 + 0.5) / pixels_per_degree;
+                let wave = |x: usize| (std::f64::consts::TAU * cycles(x)).cos();
+                let grating = Plane::from_fn(width, 8, |x, _| 1.0 + wave(x) as f32);
+                let blurred = filter.blur_plane(&grating);
+                let left = (0..width).map(|x| 2.0 * f64::from(blurred.get(x, 4)) * wave(x)).sum::<f64>() / width as f64;
+                let expected = filter.transfer(freq_cpd);
+                assert!(
+                    (left - expected).abs() < 2e-4 + 2e-3 * expected,
+                    "{pixels_per_degree} pixels a degree, {freq_cpd} cpd: {left}, not {expected}"
+                );
+                assert!((blurred.mean() - 1.0).abs() < 1e-5);
+            }
+        }
+    }
+
+    /// Noise behind the loss of acuity, on texture as it is rendered, is as visible as both through the filter to the eye itself.
+    #[test]
+    fn masks_are_blurred_as_they_are_shown() {
+        use crate::threshold::{ThresholdInputs, threshold_map};
+        let viewing = Viewing::default();
+        let filter = AcuityFilter::for_adaptation(0.02, &viewing).unwrap();
+        for freq_cpd in [2.0, 3.0, 4.0, 5.0] {
+            let wave = |at: usize| (std::f64::consts::TAU * freq_cpd * (at as f64 + 0.5) / 60.0).cos() as f32;
+            let noise = Plane::from_fn(240, 240, |_, y| wave(y));
+            for contrast in [0.05, 0.2, 0.8] {
+                let texture = Plane::from_fn(240, 240, |x, _| 20.0 * (1.0 + contrast * wave(x)));
+                let seen = |texture: &Plane, noise: &Plane, acuity| {
+                    let csf = BehindAcuity { csf: CastleCsf::default(), acuity };
+                    let map = threshold_map(&ThresholdInputs::clean(texture), &viewing, &csf).unwrap();
+                    f64::from(map.measured_visibility(noise).get(120, 120))
+                };
+                let rendered = seen(&texture, &noise, Some(filter));
+                let shown = seen(&filter.blur_plane(&texture), &filter.blur_plane(&noise), None);
+                assert!((rendered / shown - 1.0).abs() < 0.02, "{freq_cpd} cpd, {contrast}: {rendered}, not {shown}");
+            }
+        }
+    }
+
     #[test]
     fn the_blur_is_round_to_the_eye_where_pixels_are_oblong() {
         // A dot on a display whose pixels are twice as wide as high.

@@ -20,7 +20,7 @@ use crate::plane::Plane;
 /// "Photographic tone reproduction for digital images", SIGGRAPH 2002: key 0.18, equation 4. With
 /// [`AdaptationScope::Local`] equation 9, dodging and burning: each pixel is divided by the mean of the largest surround of
 /// even luminance (eight scales in steps of 1.6, φ = 8, ε = 0.05). It knows no unit: only ratios count, and pixels below
-/// 1e-10 of the brightest are no part of the mean.
+/// 1e-10 of the brightest, fireflies aside, are no part of the mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reinhard02 {
     /// Multiplies the scene: 2^stops.
@@ -37,7 +37,7 @@ impl ToneOperator for Reinhard02 {
     fn fit(&self, guide: &SceneGuide<'_>, _viewing: &Viewing, _state: Option<&AdaptationState>) -> Box<dyn FittedTone> {
         let plane = guide.luminance_cd_m2;
         let greatest = plane.values().iter().copied().filter(|value| value.is_finite()).fold(0.0, f32::max);
-        let scale = self.exposure * log_average_of_lit(plane, greatest).map_or(1.0, |average| KEY / average);
+        let scale = self.exposure * log_average_of_lit(plane).map_or(1.0, |average| KEY / average);
         let surround = match self.scope {
             AdaptationScope::World => None,
             AdaptationScope::Local => Some(FrozenPlane::of(surround(plane, scale))),
@@ -136,6 +136,28 @@ mod tests {
         for unit in [1e-6, 1e-4, 1e5] {
             let found = shown(unit);
             assert!(found.iter().zip(expected).all(|(a, b)| (a / b - 1.0).abs() < 1e-3), "{unit}: {found:?}");
+        }
+    }
+
+    /// A spike is no reason to take the rest for darkness, and neither are a few.
+    #[test]
+    fn a_huge_pixel_leaves_the_others_as_they_are() {
+        let scene = |spikes: usize, spike: f32| {
+            let mut guide = Plane::from_fn(64, 64, |x, y| 1.0 + ((x + y) % 50) as f32);
+            guide.values_mut()[200..200 + spikes].fill(spike);
+            guide
+        };
+        for scope in [AdaptationScope::World, AdaptationScope::Local] {
+            let shown = |guide: &Plane| fit(guide, scope).relative_luminance_at(Pixel { x: 60, y: 60 }, 20.0);
+            // White is far away already.
+            let expected = shown(&scene(1, 1e5));
+            for spikes in [1, 4] {
+                for spike in [1e9, 1e12, 1e30] {
+                    let found = shown(&scene(spikes, spike));
+                    // They are part of the geometric mean.
+                    assert!((found / expected - 1.0).abs() < 0.07, "{spikes} of {spike}: {found}, not {expected}");
+                }
+            }
         }
     }
 

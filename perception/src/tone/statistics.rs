@@ -59,10 +59,21 @@ pub(super) fn weighted_log_average_to_eyes(
     LogSum::mean(&sums)
 }
 
-/// Geometric mean of the pixels that are lit, whatever the unit; `None` for a black picture. `greatest` is the brightest one.
-pub(super) fn log_average_of_lit(luminance: &Plane, greatest: f32) -> Option<f64> {
-    let faintest = FAINTEST_SHARE * greatest;
+/// Geometric mean of the pixels that are lit, whatever the unit; `None` for a black picture. Pixels too few to count
+/// ([`TOO_FEW`]) make no others darkness: one of 1e12 took all the rest for it.
+pub(super) fn log_average_of_lit(luminance: &Plane) -> Option<f64> {
+    let sorted = sorted_lit(luminance);
+    let brightest = enough_of_the_brightest(&sorted, luminance.values().len()).last();
+    let faintest = brightest.map_or(0.0, |brightest| FAINTEST_SHARE * brightest);
     log_average(luminance, |value| (value.is_finite() && value > faintest).then_some(value))
+}
+
+/// What is finite and not black, in rising order.
+fn sorted_lit(luminance: &Plane) -> Vec<f32> {
+    let mut sorted: Vec<f32> =
+        luminance.values().iter().copied().filter(|&value| value.is_finite() && value > 0.0).collect();
+    sorted.par_sort_unstable_by(f32::total_cmp);
+    sorted
 }
 
 fn log_average(plane: &Plane, counted: impl Fn(f32) -> Option<f32> + Sync) -> Option<f64> {
@@ -104,9 +115,7 @@ pub(super) struct SceneStatistics {
 
 impl SceneStatistics {
     pub(super) fn of(luminance_cd_m2: &Plane) -> Self {
-        let mut sorted_cd_m2: Vec<f32> =
-            luminance_cd_m2.values().iter().copied().filter(|&value| value.is_finite() && value > 0.0).collect();
-        sorted_cd_m2.par_sort_unstable_by(f32::total_cmp);
+        let mut sorted_cd_m2 = sorted_lit(luminance_cd_m2);
         let floor_cd_m2 = floor_cd_m2(&sorted_cd_m2, luminance_cd_m2.values().len());
         sorted_cd_m2.drain(..count_up_to(&sorted_cd_m2, floor_cd_m2));
         Self { sorted_cd_m2 }
@@ -134,16 +143,22 @@ impl SceneStatistics {
 /// below them. A quantile of all that is lit would not do: it is leaked light itself wherever a leaking background is
 /// most of the picture, and 4.8 % of it at 20 to 100 cd/m² before 1e-6 were exposed 4e7 times as long as 5.3 %.
 fn floor_cd_m2(sorted_cd_m2: &[f32], pixel_count: usize) -> f32 {
+    DARKEST_SHARE * quantile(enough_of_the_brightest(sorted_cd_m2, pixel_count), ORDINARY).unwrap_or(0.0)
+}
+
+/// Of the lit pixels of a picture of `pixel_count`, in rising order, those within 20 stops of the brightest one, or where these are
+/// [`TOO_FEW`], of the brightest below them; empty where all are too few.
+fn enough_of_the_brightest(sorted: &[f32], pixel_count: usize) -> &[f32] {
     let too_few = TOO_FEW_PIXELS.max((TOO_FEW * pixel_count as f64) as usize);
-    let mut left = sorted_cd_m2;
+    let mut left = sorted;
     while let Some(brightest) = left.last() {
         let (below, within) = left.split_at(count_up_to(left, DARKEST_SHARE * brightest));
         if within.len() > too_few {
-            return DARKEST_SHARE * quantile(within, ORDINARY).unwrap_or(0.0);
+            return within;
         }
         left = below;
     }
-    0.0
+    &[]
 }
 
 /// How many values, in rising order, are at most `limit`.
@@ -171,7 +186,7 @@ mod tests {
         assert!((statistics.log_average(0.03, 0.97).unwrap() - 3.0).abs() < 1e-9);
         assert_eq!(statistics.quantile(0.5), Some(3.0));
         assert!(SceneStatistics::of(&Plane::filled(4, 4, 0.0)).quantile(0.5).is_none());
-        assert!(log_average_of_lit(&Plane::filled(4, 4, 0.0), 0.0).is_none());
+        assert!(log_average_of_lit(&Plane::filled(4, 4, 0.0)).is_none());
     }
 
     /// Leaked light of a background is left out, whatever a few fireflies do.

@@ -4,7 +4,7 @@ use super::{CompareArguments, Figures, Seen, check_alike, check_map, write_map};
 use crate::cli::channels::{self, both_motions};
 use crate::cli::json::write_json;
 use crate::cli::kept_tone::{as_rendered, first_scene};
-use crate::cli::picture::InputPicture;
+use crate::cli::picture::{BEFORE_BLACK, InputPicture, Shape, Source};
 use crate::cli::seeing::tone_operator;
 use crate::cli::targets::check_kept;
 use anyhow::{Context, Result, bail};
@@ -48,6 +48,10 @@ struct Sequences<'a> {
     test: FrameName,
     velocity: Option<FrameName>,
     map: Option<FrameName>,
+    /// Number of the first frame.
+    first: u32,
+    /// Of the first frame, and so of all.
+    shape: Shape,
     viewing: Viewing,
     showing: Showing,
 }
@@ -230,7 +234,17 @@ impl<'a> Sequences<'a> {
                 None => fit_to(&test)?,
             })
         };
-        Ok(Self { arguments, reference, test, velocity, map, viewing, showing })
+        Ok(Self {
+            arguments,
+            reference,
+            test,
+            velocity,
+            map,
+            first: numbers[0],
+            shape: first.shape(),
+            viewing,
+            showing,
+        })
     }
 
     /// Reads one frame of both.
@@ -239,7 +253,11 @@ impl<'a> Sequences<'a> {
         let files = [self.reference.of(frame), self.test.of(frame)];
         let [reference, test] = files.each_ref().map(|file| InputPicture::read_frame(file, nits_per_unit));
         let (reference, test) = (reference?, test?);
-        check_alike((&files[0], &reference), (&files[1], &test))?;
+        let first = self.reference.of(self.first);
+        for (file, picture) in files.iter().zip([&reference, &test]) {
+            check_alike((&first, self.shape), (file, picture.shape()))?;
+            picture.note_if_transparent(Source::frame(file), BEFORE_BLACK);
+        }
         let (width, height) = reference.size();
         let motion = match &self.velocity {
             Some(name) => Some(read_motion(&name.of(frame), (width, height))?),
@@ -332,7 +350,7 @@ fn read_motion(path: &Path, size: (usize, usize)) -> Result<FrameMotion> {
         );
     };
     let planes = |[x, y]: [Vec<f32>; 2]| -> Result<[Plane; 2]> {
-        Ok([channels::motion_plane(&exr, x)?, channels::motion_plane(&exr, y)?])
+        Ok([channels::motion_plane(path, &exr, x)?, channels::motion_plane(path, &exr, y)?])
     };
     Ok(FrameMotion { to_next: planes(motions.to_next)?, to_previous: planes(motions.to_previous)? })
 }

@@ -16,6 +16,9 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
+/// Where what does not cover all lies, if nothing else is said.
+pub(in crate::cli) const BEFORE_BLACK: &str = "lies before black";
+
 /// Where the luminance of RGB (1, 1, 1) comes from.
 #[derive(Clone, Copy)]
 enum Unit {
@@ -42,17 +45,20 @@ impl Unit {
 impl InputPicture {
     /// Reads an EXR, HDR, PNG or JPEG file. `nits_per_unit` is needed for scene-linear files that do not say it.
     pub(in crate::cli) fn read(path: &Path, nits_per_unit: Option<f64>) -> Result<Self> {
-        Self::read_in(Source { path, kind: SourceKind::Single }, Unit::OfLight(nits_per_unit))
+        Self::read_in(Source::single(path), Unit::OfLight(nits_per_unit))
     }
 
     /// The same of one of many frames, of all of which a note is said once.
     pub(in crate::cli) fn read_frame(path: &Path, nits_per_unit: Option<f64>) -> Result<Self> {
-        Self::read_in(Source { path, kind: SourceKind::Frame }, Unit::OfLight(nits_per_unit))
+        Self::read_in(Source::frame(path), Unit::OfLight(nits_per_unit))
     }
 
     /// Luminance of the values as the file has them, which may be no light and have no unit.
     pub(in crate::cli) fn read_values(path: &Path) -> Result<Plane> {
-        Ok(Self::read_in(Source { path, kind: SourceKind::Single }, Unit::Meaningless)?.values())
+        let source = Source::single(path);
+        let picture = Self::read_in(source, Unit::Meaningless)?;
+        picture.note_if_transparent(source, BEFORE_BLACK);
+        Ok(picture.values())
     }
 
     fn read_in(source: Source<'_>, unit: Unit) -> Result<Self> {
@@ -123,9 +129,6 @@ impl InputPicture {
             PngTransfer::Srgb | PngTransfer::Untagged => Codes::Srgb(of(Primaries::REC709)),
         };
         let straight_alpha = straight_alpha(&image);
-        if straight_alpha.is_some() {
-            source.note("what is transparent lies before black");
-        }
         let pixel_aspect_ratio = output::png_pixel_aspect_ratio(&bytes);
         Ok(Self { straight_alpha, pixel_aspect_ratio, ..Self::from_image(image, Content::Display(codes)) })
     }
@@ -230,7 +233,7 @@ fn unit_in_file(source: Source<'_>, exr: &ExrImage) -> Option<f64> {
 
 /// A file, as notes name it.
 #[derive(Clone, Copy)]
-struct Source<'a> {
+pub(in crate::cli) struct Source<'a> {
     path: &'a Path,
     kind: SourceKind,
 }
@@ -243,9 +246,19 @@ enum SourceKind {
     Frame,
 }
 
-impl Source<'_> {
+impl<'a> Source<'a> {
+    /// A picture by itself.
+    pub(in crate::cli) fn single(path: &'a Path) -> Self {
+        Self { path, kind: SourceKind::Single }
+    }
+
+    /// One of many, of all of which a note is said once.
+    pub(in crate::cli) fn frame(path: &'a Path) -> Self {
+        Self { path, kind: SourceKind::Frame }
+    }
+
     /// Says something of a picture once, or once of all frames.
-    fn note(self, text: &str) {
+    pub(in crate::cli) fn note(self, text: &str) {
         match self.kind {
             SourceKind::Single => note_once(self.path, text, format!("{}: {text}", self.path.display())),
             SourceKind::Frame => note(self.path, text),

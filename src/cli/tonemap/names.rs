@@ -3,6 +3,7 @@
 use super::TonemapArguments;
 use crate::cli::targets::{check_kept, display_file};
 use anyhow::{Context, Result, bail};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// One file name for each input. None of the files that are written is one that is read, nor another's.
@@ -33,25 +34,62 @@ fn named_targets(arguments: &TonemapArguments) -> Result<Vec<PathBuf>> {
             output.display()
         );
     }
-    let target = |frame: u64| output.with_file_name(name.replace(&hashes, &format!("{frame:0digits$}")));
-    let numbers = frame_numbers(&arguments.input).unwrap_or_else(|| (1..=arguments.input.len() as u64).collect());
+    let target = |frame: i64| output.with_file_name(name.replace(&hashes, &format!("{frame:0digits$}")));
+    let numbers = frame_numbers(&arguments.input).unwrap_or_else(|| (1..=arguments.input.len() as i64).collect());
     Ok(numbers.into_iter().map(target).collect())
 }
 
 /// How many frames after the one before each is: by their numbers in order of time, else one.
-pub(super) fn frames_since_last(numbers: Option<Vec<u64>>, count: usize) -> Vec<u64> {
-    let steps = numbers.map(|numbers| numbers.windows(2).map(|pair| pair[1].saturating_sub(pair[0])).collect());
+pub(super) fn frames_since_last(numbers: Option<Vec<i64>>, count: usize) -> Vec<u64> {
+    let steps = numbers.map(|numbers| numbers.windows(2).map(|pair| pair[1].abs_diff(pair[0])).collect());
     let steps: Vec<u64> = steps.unwrap_or_else(|| vec![1; count.saturating_sub(1)]);
     std::iter::once(1).chain(steps).collect()
 }
 
-/// The numbers at the end of the files' names, before what follows the last dot; `None` unless all have different ones.
-pub(super) fn frame_numbers(files: &[PathBuf]) -> Option<Vec<u64>> {
-    let number = |file: &PathBuf| {
-        let stem = file.file_stem()?.to_str()?;
-        stem[stem.trim_end_matches(|c: char| c.is_ascii_digit()).len()..].parse().ok()
-    };
-    let numbers: Vec<u64> = files.iter().map(number).collect::<Option<_>>()?;
-    let different: std::collections::BTreeSet<u64> = numbers.iter().copied().collect();
-    (different.len() == numbers.len()).then_some(numbers)
+/// The numbers by which the files' names differ, before what follows the last dot: the last ones of which all names have different ones;
+/// `None` where there are no such.
+pub(super) fn frame_numbers(files: &[PathBuf]) -> Option<Vec<i64>> {
+    let all: Vec<Vec<Option<i64>>> =
+        files.iter().map(|file| Some(numbers_from_end(file.file_stem()?.to_str()?))).collect::<Option<_>>()?;
+    let fewest = all.iter().map(Vec::len).min().unwrap_or(0);
+    (0..fewest).find_map(|place| {
+        let numbers: Vec<i64> = all.iter().map(|numbers| numbers[place]).collect::<Option<_>>()?;
+        let different: BTreeSet<i64> = numbers.iter().copied().collect();
+        (different.len() == numbers.len()).then_some(numbers)
+    })
+}
+
+/// All runs of digits in a name as numbers, the last first; `None` for those that are too long for one. Below 0 are those with a minus
+/// that stands at the name's start, or after a dot or an underscore: between words it is a hyphen.
+fn numbers_from_end(stem: &str) -> Vec<Option<i64>> {
+    let (mut numbers, mut left) = (Vec::new(), stem);
+    while let Some(last) = left.rfind(|c: char| c.is_ascii_digit()) {
+        let before = left[..=last].trim_end_matches(|c: char| c.is_ascii_digit());
+        let is_negative =
+            before.strip_suffix('-').is_some_and(|before| before.is_empty() || before.ends_with(['.', '_']));
+        let number = left[before.len()..=last].parse::<i64>().ok();
+        numbers.push(number.map(|number| if is_negative { -number } else { number }));
+        left = before;
+    }
+    numbers
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_those_by_which_names_differ() {
+        let of = |names: &[&str]| frame_numbers(&names.iter().map(PathBuf::from).collect::<Vec<_>>());
+        assert_eq!(of(&["s.0001.left.exr", "s.0011.left.exr"]), Some(vec![1, 11]));
+        assert_eq!(of(&["s.10.v2.exr", "s.9.v2.exr"]), Some(vec![10, 9]));
+        assert_eq!(of(&["v2/s.0001.exr", "v3/s.0002.exr"]), Some(vec![1, 2]));
+        assert_eq!(of(&["s.-0001.exr", "s.0000.exr", "s.0001.exr"]), Some(vec![-1, 0, 1]));
+        assert_eq!(of(&["s-0002.exr", "s-0001.exr"]), Some(vec![2, 1]));
+        // Where no place has different ones, none has.
+        assert_eq!(of(&["a1.exr", "b1.exr"]), None);
+        assert_eq!(of(&["a.exr", "a2.exr"]), None);
+        assert_eq!(of(&["é7.99999999999999999999.exr", "é8.99999999999999999998.exr"]), Some(vec![7, 8]));
+        assert_eq!(frames_since_last(of(&["s.-2.exr", "s.0.exr", "s.1.exr"]), 3), [1, 2, 1]);
+    }
 }
