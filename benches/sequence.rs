@@ -104,7 +104,7 @@ fn visible_error(
     let display = Display::preset("desktop").context("a preset")?;
     let shown =
         seen::display_half_difference(judgement.tone.as_ref(), &display, &judgement.estimate.luminance_cd_m2, &error);
-    let visibility = judgement.thresholds.measured_visibility(&shown);
+    let visibility = judgement.thresholds.in_bands.measured_visibility(&shown);
     let energy: f64 = visibility.values().iter().map(|&v| f64::from(v) * f64::from(v)).sum();
     let samples = 0.5 * (a.film.total_samples() + b.film.total_samples()) as f64 / f64::from(SIZE * SIZE);
     Ok(Outcome { error: (energy / f64::from(SIZE * SIZE)).sqrt(), samples })

@@ -111,8 +111,8 @@ pub fn audit(
         &judgement.estimate.luminance_cd_m2,
         &difference,
     );
-    let found = judgement.thresholds.measured_visibility(&displayed);
-    let predicted = judgement.thresholds.predicted_visibility(&variance);
+    let found = judgement.thresholds.in_bands.measured_visibility(&displayed);
+    let predicted = judgement.thresholds.in_bands.predicted_visibility(&variance);
     let energies = tiles.iter().map(|tile| (tile.energy(&found), tile.energy(&predicted))).collect::<Vec<_>>();
     let (ratio, standard_error) = ratio_of_sums(&energies);
     Ok(Some(Audit { tiles: tiles.len(), samples: fresh.samples, ratio, standard_error }))

@@ -4,6 +4,7 @@ mod over_white;
 mod steps;
 
 use self::over_white::OverWhite;
+pub use self::steps::Thresholds;
 use self::steps::{Guide, Scatter, chromatic_gains, found_thresholds};
 use super::denoised::{DenoisedPicture, TimedDenoising};
 use super::settings::LoopSettings;
@@ -15,7 +16,6 @@ use fechner_perception::Plane;
 use fechner_perception::denoised::DenoisedError;
 use fechner_perception::guide::{GuideInputs, denoise};
 use fechner_perception::seen;
-use fechner_perception::threshold::ThresholdMap;
 use fechner_perception::tone::FittedTone;
 use fechner_perception::visibility::MeasuredError;
 use std::borrow::Cow;
@@ -35,13 +35,10 @@ pub struct Judgement {
     pub seconds_denoising: f64,
     /// The tone operator as fitted to the guide.
     pub tone: Box<dyn FittedTone>,
-    /// Thresholds from the guide, by contrast sensitivity in bands.
-    pub thresholds: ThresholdMap,
-    /// Standard error that a pixel may have at visibility 1 by the model that drives the loop, where that is another one:
-    /// a rule of its own for each pixel.
-    pub pixel_thresholds: Option<Plane>,
-    /// What [`LoopSettings::importance`] multiplies thresholds by. `thresholds` and `pixel_thresholds` are without it; what
-    /// a judgement's methods say, and `predicted`, is with it.
+    /// What can be seen where.
+    pub thresholds: Thresholds,
+    /// What [`LoopSettings::importance`] multiplies thresholds by. `thresholds` are without it; what a judgement's methods say, and
+    /// `predicted`, is with it.
     pub importance: Option<Plane>,
     /// Whether the film has samples enough to tell what can be seen: [`Film::has_both_halves`].
     pub is_known: bool,
@@ -132,12 +129,12 @@ fn judge_by(
     still_wanted(settings)?;
     let displayed_guide = guide.displayed(tone.as_ref(), settings);
     let noise = scatter.luminance_variance_of_mean();
-    let (thresholds, pixel_thresholds) = found_thresholds(&guide, &displayed_guide, tone.as_ref(), &noise, settings)?;
-    let gains = chromatic_gains(&thresholds, settings)?;
+    let thresholds = found_thresholds(&guide, &displayed_guide, tone.as_ref(), &noise, settings)?;
+    let gains = chromatic_gains(&thresholds.in_bands, settings)?;
     still_wanted(settings)?;
-    let pooled_variance_per_sample = scatter.pooled_per_sample(&thresholds, gains.as_ref());
+    let pooled_variance_per_sample = scatter.pooled_per_sample(&thresholds.in_bands, gains.as_ref());
     let variance_per_sample =
-        (purpose == Purpose::Plan).then(|| scatter.per_sample_of_halves(film, &thresholds, gains.as_ref()));
+        (purpose == Purpose::Plan).then(|| scatter.per_sample_of_halves(film, &thresholds.in_bands, gains.as_ref()));
     still_wanted(settings)?;
     let over_white = if settings.is_transparent {
         let colour_scale = denoised.is_none().then(|| scatter.luminance_scale());
@@ -148,11 +145,10 @@ fn judge_by(
     still_wanted(settings)?;
     let denoised = match denoised {
         Some(found) => {
-            let mut picture = found.judged(film, settings, tone.as_ref(), &thresholds, &estimate)?;
+            let mut picture = found.judged(film, settings, tone.as_ref(), &thresholds.in_bands, &estimate)?;
             picture.error.raise_inferred(inflation.sqrt());
             if film.width().min(film.height()) < LEAST_SIDE_OF_HALVES {
-                let of_mean = scatter.of_mean(&pooled_variance_per_sample);
-                let raw = visibility_under(&thresholds, pixel_thresholds.as_ref(), &of_mean);
+                let raw = thresholds.visibility(&scatter.of_mean(&pooled_variance_per_sample));
                 picture.error = picture.error.with_noise_of_at_least(&raw);
             }
             if let Some(over_white) = &over_white {
@@ -165,27 +161,25 @@ fn judge_by(
     };
     still_wanted(settings)?;
     let is_known = film.has_both_halves();
-    // An infinite variance, pooled with others, is NaN.
-    let told = |visibility: Plane| visibility.map(|v| if v.is_nan() { f32::INFINITY } else { v });
     let predicted = if !is_known {
         Plane::filled(film.width() as usize, film.height() as usize, f32::INFINITY)
-    } else if let Some(denoised) = &denoised {
-        told(per_importance(denoised.error.visibility.clone(), settings.importance.as_ref()))
     } else {
-        let of_mean = scatter.of_mean(&pooled_variance_per_sample);
-        let visibility = visibility_under(&thresholds, pixel_thresholds.as_ref(), &of_mean);
-        let visibility = match &over_white {
-            Some(over_white) => visibility.combined(over_white.visibility(), f32::max),
-            None => visibility,
+        let of_error = match &denoised {
+            Some(denoised) => denoised.error.visibility.clone(),
+            None => {
+                let before_black = thresholds.visibility(&scatter.of_mean(&pooled_variance_per_sample));
+                worse_of(before_black, over_white.as_ref().map(OverWhite::visibility))
+            }
         };
-        told(per_importance(visibility, settings.importance.as_ref()))
+        // An infinite variance, pooled with others, is NaN.
+        let of_error = of_error.map(|v| if v.is_nan() { f32::INFINITY } else { v });
+        per_importance(of_error, settings.importance.as_ref())
     };
     let (pooled_variance_per_sample, over_black_per_sample, variance_per_sample) = match &over_white {
         None => (pooled_variance_per_sample, None, variance_per_sample),
         Some(over_white) => {
-            let own = visibility_limits(&thresholds, pixel_thresholds.as_ref());
             let (worse, of_halves) =
-                over_white.worse_per_sample(&own, &pooled_variance_per_sample, variance_per_sample);
+                over_white.worse_per_sample(&thresholds.limits(), &pooled_variance_per_sample, variance_per_sample);
             (worse, Some(pooled_variance_per_sample), of_halves)
         }
     };
@@ -196,7 +190,6 @@ fn judge_by(
         seconds_denoising,
         tone,
         thresholds,
-        pixel_thresholds,
         importance: settings.importance.clone(),
         is_known,
         predicted,
@@ -208,21 +201,11 @@ fn judge_by(
     })
 }
 
-/// Visibility, without importance, of a picture whose displayed luminance has this variance, (cd/m²)².
-fn visibility_under(thresholds: &ThresholdMap, pixel_thresholds: Option<&Plane>, display_variance: &Plane) -> Plane {
-    match pixel_thresholds {
-        None => thresholds.predicted_visibility(display_variance),
-        Some(allowed) => Plane::from_fn(allowed.width(), allowed.height(), |x, y| {
-            display_variance.get(x, y).sqrt() / allowed.get(x, y)
-        }),
-    }
-}
-
-/// Standard error that a pixel may have at visibility 1, cd/m² on the display, without importance.
-fn visibility_limits(thresholds: &ThresholdMap, pixel_thresholds: Option<&Plane>) -> Plane {
-    match pixel_thresholds {
-        None => thresholds.allowed_standard_error_cd_m2(1.0),
-        Some(allowed) => allowed.clone(),
+/// The greater of both, where there are two.
+fn worse_of(visibility: Plane, other: Option<&Plane>) -> Plane {
+    match other {
+        None => visibility,
+        Some(other) => visibility.combined(other, f32::max),
     }
 }
 
@@ -257,13 +240,13 @@ impl Judgement {
 
     /// Visibility of a picture whose displayed luminance has this variance, (cd/m²)².
     pub fn visibility_of(&self, display_variance: &Plane) -> Plane {
-        self.per_importance(visibility_under(&self.thresholds, self.pixel_thresholds.as_ref(), display_variance))
+        self.per_importance(self.thresholds.visibility(display_variance))
     }
 
     /// The same with each pixel's noise judged where it is, before the bands smear it: what the allocation's constraints say. One
     /// blur in the place of twenty.
     pub fn rough_visibility_of(&self, display_variance: &Plane) -> Plane {
-        self.thresholds.pooled(&self.energy_of(display_variance)).map(f32::sqrt)
+        self.thresholds.in_bands.pooled(&self.energy_of(display_variance)).map(f32::sqrt)
     }
 
     /// Squared visibility of each pixel's noise for itself, as if nothing around it had any.
@@ -274,7 +257,7 @@ impl Judgement {
 
     /// Standard error of a pixel, cd/m² on the display, that is at visibility 1 by the model that drives the loop.
     pub fn allowed_standard_error_cd_m2(&self) -> Plane {
-        let allowed = visibility_limits(&self.thresholds, self.pixel_thresholds.as_ref());
+        let allowed = self.thresholds.limits();
         match &self.importance {
             None => allowed,
             Some(map) => allowed.combined(map, |allowed, factor| allowed * factor),
@@ -297,15 +280,17 @@ impl Judgement {
             let raw = || {
                 seen::display_half_difference(
                     self.tone.as_ref(),
-                    &self.thresholds.viewing().display,
+                    &self.thresholds.in_bands.viewing().display,
                     &self.estimate.luminance_cd_m2,
                     &self.estimate.half_difference,
                 )
             };
             let displayed = self.denoised.as_ref().map_or_else(raw, |denoised| denoised.half_difference.clone());
             let MeasuredError { visibility, amplitude } = match &self.over_white {
-                Some(over_white) => over_white.worse_error(self.thresholds.measured_error(&displayed), &displayed),
-                None => self.thresholds.measured_error(&displayed),
+                Some(over_white) => {
+                    over_white.worse_error(self.thresholds.in_bands.measured_error(&displayed), &displayed)
+                }
+                None => self.thresholds.in_bands.measured_error(&displayed),
             };
             MeasuredError { visibility: self.per_importance(visibility), amplitude: self.per_importance(amplitude) }
         })

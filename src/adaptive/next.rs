@@ -201,7 +201,7 @@ impl Loop<'_> {
     /// Audits a rung that is reached. Where the variance proves too low it is raised from here on, and the plan for it is
     /// returned.
     fn audited(&mut self, rung: f64, judgement: &mut Judgement, left: u64) -> Result<Option<SamplePlan>, JudgeError> {
-        if judgement.pixel_thresholds.is_some() || self.state.inflation >= MOST_INFLATION {
+        if judgement.thresholds.per_pixel.is_some() || self.state.inflation >= MOST_INFLATION {
             return Ok(None);
         }
         let (film, round) = (&self.state.film, self.state.audits);

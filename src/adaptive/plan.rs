@@ -131,10 +131,10 @@ pub(super) fn wanted_samples(
     let least = f64::from(limits.pilot_samples);
     let most = f64::from(limits.max_samples).max(least);
     let variance = &judgement.pooled_variance_per_sample;
-    if rule == AllocationRule::Convex && judgement.pixel_thresholds.is_none() {
+    if rule == AllocationRule::Convex && judgement.thresholds.per_pixel.is_none() {
         let allocation = allocate(&AllocationProblem {
             variance_per_sample: variance,
-            thresholds: &judgement.thresholds,
+            thresholds: &judgement.thresholds.in_bands,
             cost: &Plane::filled(variance.width(), variance.height(), 1.0),
             tolerance: Some(&forecast.tolerance()),
             visibility,

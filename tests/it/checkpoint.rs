@@ -459,7 +459,7 @@ fn foreign_files_and_versions_are_named() {
     assert!(message(b"\x76\x2f\x31\x01 an EXR file, say").contains("not a film's file"));
     let mut later = sound.clone();
     later[12] += 1;
-    assert!(message(&later).contains("this program reads version 8"), "{}", message(&later));
+    assert!(message(&later).contains("this program reads version 9"), "{}", message(&later));
     assert!(message(&sound[..sound.len() / 2]).contains("damaged"));
     assert!(read_checkpoint(folder.path()).expect_err("a folder").to_string().contains("folder"));
 }

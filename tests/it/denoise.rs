@@ -331,7 +331,9 @@ fn audits_of_unproven_tiles_agree_with_a_reference() {
             denoised.luminance_cd_m2.combined(&reference, |denoised, truth| denoised - truth),
             a.combined(&b, |a, b| 0.5 * (a - b)),
         ]
-        .map(|error| judgement.thresholds.measured_visibility(&error.combined(&slope, |error, slope| error * slope)));
+        .map(|error| {
+            judgement.thresholds.in_bands.measured_visibility(&error.combined(&slope, |error, slope| error * slope))
+        });
         let unproven = denoised.error.unproven(target);
         let energy = |visibility: &Plane| {
             let values = visibility.values().iter().zip(unproven.values());

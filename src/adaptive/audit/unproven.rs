@@ -63,7 +63,8 @@ pub fn audit_unproven(
         predicted.values_mut()[pixel] = window * denoised.error.visibility.values()[pixel];
     }
     // Not pooled over the eye's window, which would carry a third of it out of the tile's reach.
-    let [difference, noise] = [difference, noise].map(|shown| judgement.thresholds.measured_error(&shown).amplitude);
+    let [difference, noise] =
+        [difference, noise].map(|shown| judgement.thresholds.in_bands.measured_error(&shown).amplitude);
     let energies = tiles.iter().map(|tile| {
         // v² is twice the amplitude's square.
         let found = 2.0 * (tile.energy(&difference) - tile.energy(&noise));

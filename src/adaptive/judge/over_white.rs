@@ -5,23 +5,20 @@
 //! shows 0.7 of it over any ground between.
 
 use super::super::settings::LoopSettings;
-use super::steps::{Guide, Scatter, found_thresholds};
-use super::{JudgeError, Purpose, variance_share, visibility_limits, visibility_under};
+use super::steps::{Guide, Scatter, Thresholds, found_thresholds};
+use super::{JudgeError, Purpose, variance_share};
 use crate::film::Film;
 use crate::sampler::Half;
 use fechner_perception::Plane;
 use fechner_perception::guide::{GuideInputs, denoise};
-use fechner_perception::threshold::ThresholdMap;
 use fechner_perception::tone::FittedTone;
 use fechner_perception::visibility::MeasuredError;
 
 /// What can be seen over white, without importance.
 #[derive(Debug)]
 pub(super) struct OverWhite {
-    thresholds: ThresholdMap,
+    thresholds: Thresholds,
     visibility: Plane,
-    /// [`super::visibility_limits`] over white.
-    allowed_cd_m2: Plane,
     /// Luminance variance of one sample, (cd/m²)²: pooled.
     pooled_per_sample: Plane,
     /// And as each half decides by it; `None` where the look is for no plan.
@@ -52,22 +49,14 @@ impl OverWhite {
             (light + (1.0 - coverage) * ground_cd_m2 as f32).min((white_cd_m2 as f32).max(light))
         });
         let noise = scatter.luminance_variance_of_mean();
-        let (thresholds, pixel_thresholds) = found_thresholds(guide, &displayed_guide, tone, &noise, settings)?;
-        let pooled_per_sample = scatter.pooled_per_sample(&thresholds, None);
+        let thresholds = found_thresholds(guide, &displayed_guide, tone, &noise, settings)?;
+        let pooled_per_sample = scatter.pooled_per_sample(&thresholds.in_bands, None);
         let of_mean = scatter.of_mean(&pooled_per_sample);
-        let visibility = visibility_under(&thresholds, pixel_thresholds.as_ref(), &of_mean);
-        let allowed_cd_m2 = visibility_limits(&thresholds, pixel_thresholds.as_ref());
+        let visibility = thresholds.visibility(&of_mean);
         let per_sample_of_halves =
-            (purpose == Purpose::Plan).then(|| scatter.per_sample_of_halves(&over, &thresholds, None));
+            (purpose == Purpose::Plan).then(|| scatter.per_sample_of_halves(&over, &thresholds.in_bands, None));
         let ground_half_difference = ground_half_difference(film, ground_cd_m2);
-        Ok(Self {
-            thresholds,
-            visibility,
-            allowed_cd_m2,
-            pooled_per_sample,
-            per_sample_of_halves,
-            ground_half_difference,
-        })
+        Ok(Self { thresholds, visibility, pooled_per_sample, per_sample_of_halves, ground_half_difference })
     }
 
     /// Visibility that the variance predicts.
@@ -83,7 +72,7 @@ impl OverWhite {
         own: &Plane,
         own_of_halves: Option<[Plane; 2]>,
     ) -> (Plane, Option<[Plane; 2]>) {
-        let ratio = own_allowed_cd_m2.combined(&self.allowed_cd_m2, |own, white| (own / white) * (own / white));
+        let ratio = own_allowed_cd_m2.combined(&self.thresholds.limits(), |own, white| (own / white) * (own / white));
         let worse = |own: &Plane, white: &Plane| own.combined(&white.combined(&ratio, |v, ratio| v * ratio), f32::max);
         let both = own_of_halves.zip(self.per_sample_of_halves.as_ref());
         let of_halves = both.map(|([a, b], [white_a, white_b])| [worse(&a, white_a), worse(&b, white_b)]);
@@ -93,7 +82,7 @@ impl OverWhite {
     /// What the halves' difference shows, before black or over white. `displayed`: half the difference before black, cd/m².
     pub(super) fn worse_error(&self, own: MeasuredError, displayed: &Plane) -> MeasuredError {
         let over_white = displayed.combined(&self.ground_half_difference, |light, ground| light + ground);
-        let white = self.thresholds.measured_error(&over_white);
+        let white = self.thresholds.in_bands.measured_error(&over_white);
         MeasuredError {
             visibility: own.visibility.combined(&white.visibility, f32::max),
             amplitude: own.amplitude.combined(&white.amplitude, f32::max),

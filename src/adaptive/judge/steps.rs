@@ -132,7 +132,35 @@ fn most_visible(
     }
 }
 
-/// [`super::Judgement::thresholds`] and [`super::Judgement::pixel_thresholds`]. `displayed_guide`: the guide's luminance on the display. `noise`:
+/// What a picture hides, cd/m² on the display, without importance.
+#[derive(Debug)]
+pub struct Thresholds {
+    /// From the guide, by contrast sensitivity in bands.
+    pub in_bands: ThresholdMap,
+    /// Standard error that a pixel may have at visibility 1 by the model that drives the loop, where that is another one: a rule of its
+    /// own for each pixel.
+    pub per_pixel: Option<Plane>,
+}
+
+impl Thresholds {
+    /// Visibility of a picture whose displayed luminance has this variance, (cd/m²)².
+    pub(super) fn visibility(&self, display_variance: &Plane) -> Plane {
+        match &self.per_pixel {
+            None => self.in_bands.predicted_visibility(display_variance),
+            Some(allowed) => display_variance.combined(allowed, |variance, allowed| variance.sqrt() / allowed),
+        }
+    }
+
+    /// Standard error that a pixel may have at visibility 1, cd/m².
+    pub(super) fn limits(&self) -> Plane {
+        match &self.per_pixel {
+            None => self.in_bands.allowed_standard_error_cd_m2(1.0),
+            Some(allowed) => allowed.clone(),
+        }
+    }
+}
+
+/// [`super::Judgement::thresholds`]. `displayed_guide`: the guide's luminance on the display. `noise`:
 /// variance of the mean's, before denoising.
 pub(super) fn found_thresholds(
     guide: &Guide<'_>,
@@ -140,13 +168,13 @@ pub(super) fn found_thresholds(
     tone: &dyn FittedTone,
     noise: &Plane,
     settings: &LoopSettings,
-) -> Result<(ThresholdMap, Option<Plane>), JudgeError> {
+) -> Result<Thresholds, JudgeError> {
     // Noise goes through the loss of acuity that the operator shows, as the picture does.
     let csf = BehindAcuity { csf: contrast_sensitivity(settings)?, acuity: tone.acuity() };
     let guide_noise = GuideNoise::BeforeDenoising(noise);
     let inputs = ThresholdInputs { display_luminance_cd_m2: displayed_guide, guide_noise };
     let at_rest = threshold_map(&inputs, &settings.viewing, &csf)?;
-    let thresholds = under_eye_movements(at_rest, guide, tone, settings)?;
+    let in_bands = under_eye_movements(at_rest, guide, tone, settings)?;
     still_wanted(settings)?;
     let of_model = |model: &dyn ThresholdModel| {
         model.allowed_standard_error_cd_m2(&ModelInputs {
@@ -158,8 +186,8 @@ pub(super) fn found_thresholds(
             csf: &csf,
         })
     };
-    let pixel_thresholds = settings.model.as_deref().map(of_model).transpose()?;
-    Ok((thresholds, pixel_thresholds))
+    let per_pixel = settings.model.as_deref().map(of_model).transpose()?;
+    Ok(Thresholds { in_bands, per_pixel })
 }
 
 /// Thresholds away from where one looks, and on what the eye does not follow.
