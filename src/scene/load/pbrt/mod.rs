@@ -15,13 +15,14 @@ mod parameters;
 mod shapes;
 mod state;
 mod textures;
+mod transforms;
 
 use super::LoadOptions;
 use super::builder::{ASSUMED_NITS_PER_UNIT, Builder, IfDark};
 use super::error::{LoadError, suggestion};
 use crate::scene::{Alpha, Material, MaterialId, MeshId, ScalarInput, Scene, Surface};
 use parameters::Parameters;
-use state::{State, Transforms};
+use state::{Opening, State, Transforms};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -84,7 +85,7 @@ struct Reader<'a> {
     builder: Builder,
     state: State,
     /// Saved states, and what opened them.
-    stack: Vec<(State, &'static str)>,
+    stack: Vec<(State, Opening)>,
     coordinate_systems: HashMap<String, Transforms>,
     textures: HashMap<(&'static str, String), Rc<textures::Definition>>,
     named_materials: HashMap<String, Rc<materials::Definition>>,
@@ -215,7 +216,7 @@ impl Reader<'_> {
 
     fn into_builder(mut self, path: &Path) -> Result<Builder, LoadError> {
         if let Some((_, opened)) = self.stack.last() {
-            return Err(LoadError::invalid(path, format_args!("{opened} is never closed")));
+            return Err(LoadError::invalid(path, format_args!("{} is never closed", opened.begin())));
         }
         if !self.in_world {
             return Err(LoadError::invalid(path, "the file has no WorldBegin"));

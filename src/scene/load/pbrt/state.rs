@@ -45,6 +45,32 @@ impl Transforms {
     }
 }
 
+/// What a saved state was opened by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Opening {
+    Attribute,
+    Transform,
+    Object,
+}
+
+impl Opening {
+    pub(super) fn begin(self) -> &'static str {
+        match self {
+            Self::Attribute => "AttributeBegin",
+            Self::Transform => "TransformBegin",
+            Self::Object => "ObjectBegin",
+        }
+    }
+
+    pub(super) fn end(self) -> &'static str {
+        match self {
+            Self::Attribute => "AttributeEnd",
+            Self::Transform => "TransformEnd",
+            Self::Object => "ObjectEnd",
+        }
+    }
+}
+
 /// What a directive works in.
 #[derive(Clone)]
 pub(super) struct State {
