@@ -59,6 +59,23 @@ fn imports_keep_their_state_to_themselves() {
     }
 }
 
+/// Version 4 reads `TransformBegin` as `AttributeBegin`: material, light, orientation and active transforms ended with the file.
+#[test]
+fn transform_blocks_keep_their_whole_state_to_themselves() {
+    for block in ["Attribute", "Transform"] {
+        let inside = r#"Translate 5 0 0 ReverseOrientation Material "diffuse" "rgb reflectance" [1 0 0]
+AreaLightSource "diffuse" "rgb L" [9 9 9] ActiveTransform EndTime"#;
+        let scene = scene("", &format!(r#"{block}Begin {inside} {block}End Translate 1 0 0 Shape "sphere""#));
+        let ball = &scene.spheres[0];
+        let material = &scene.materials[ball.material.0 as usize];
+        let Surface::Diffuse { reflectance } = &material.surface else { panic!("diffuse") };
+        assert_eq!((ball.center, ball.motion.is_none()), (Vec3::X, true), "{block}");
+        assert_eq!((reflectance.factor, material.emission.factor), (Vec3::splat(0.5), Vec3::ZERO), "{block}");
+    }
+    let wrong = try_load(folder().path(), "", "TransformEnd").unwrap_err();
+    assert!(wrong.contains("scene.pbrt:2: TransformEnd without AttributeBegin"), "{wrong}");
+}
+
 #[test]
 fn files_of_version_3_are_told_what_to_do() {
     let old = try_load(folder().path(), "", &format!(r#"Material "matte" {SQUARE}"#)).unwrap_err();

@@ -86,8 +86,9 @@ const DIRECTIVES: [(&str, Directive); 41] = [
     ("MediumInterface", Directive::State(StateDirective::MediumInterface)),
     ("AttributeBegin", Directive::Open(Opening::Attribute)),
     ("AttributeEnd", Directive::Close(Opening::Attribute)),
-    ("TransformBegin", Directive::Open(Opening::Transform)),
-    ("TransformEnd", Directive::Close(Opening::Transform)),
+    // Another name of the same in version 4.
+    ("TransformBegin", Directive::Open(Opening::Attribute)),
+    ("TransformEnd", Directive::Close(Opening::Attribute)),
     ("ObjectBegin", Directive::Open(Opening::Object)),
     ("ObjectEnd", Directive::Close(Opening::Object)),
     ("ObjectInstance", Directive::ObjectInstance),
@@ -156,7 +157,7 @@ impl Reader<'_> {
             Directive::State(directive) => self.change_state(directive, lexer, line)?,
             Directive::Open(Opening::Object) => self.begin_object(lexer, line)?,
             Directive::Open(opening) => self.push(opening, lexer.place(line))?,
-            Directive::Close(opening) => self.pop(opening, lexer.place(line))?,
+            Directive::Close(opening) => self.pop(opening, word, lexer.place(line))?,
             Directive::ObjectInstance => self.place_object(&string(lexer, line)?, lexer.place(line))?,
             Directive::WorldBegin => self.begin_world()?,
             Directive::WorldEnd => {}
@@ -329,21 +330,16 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn pop(&mut self, opening: Opening, place: Place) -> Result<(), LoadError> {
-        let (begin, end) = (opening.begin(), opening.end());
+    fn pop(&mut self, opening: Opening, word: &str, place: Place) -> Result<(), LoadError> {
         let Some((state, opened)) = self.stack.pop() else {
-            return Err(LoadError::invalid_at(place, format_args!("{end} without {begin}")));
+            return Err(LoadError::invalid_at(place, format_args!("{word} without {}", opening.begin())));
         };
         if opened != opening {
-            return Err(LoadError::invalid_at(place, format_args!("{end} closes what {} opened", opened.begin())));
+            return Err(LoadError::invalid_at(place, format_args!("{word} closes what {} opened", opened.begin())));
         }
-        match opening {
-            Opening::Transform => self.state.transforms = state.transforms,
-            Opening::Attribute => self.state = state,
-            Opening::Object => {
-                self.state = state;
-                self.current_object = None;
-            }
+        self.state = state;
+        if opening == Opening::Object {
+            self.current_object = None;
         }
         Ok(())
     }

@@ -49,7 +49,6 @@ impl Transforms {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Opening {
     Attribute,
-    Transform,
     Object,
 }
 
@@ -57,16 +56,7 @@ impl Opening {
     pub(super) fn begin(self) -> &'static str {
         match self {
             Self::Attribute => "AttributeBegin",
-            Self::Transform => "TransformBegin",
             Self::Object => "ObjectBegin",
-        }
-    }
-
-    pub(super) fn end(self) -> &'static str {
-        match self {
-            Self::Attribute => "AttributeEnd",
-            Self::Transform => "TransformEnd",
-            Self::Object => "ObjectEnd",
         }
     }
 }
