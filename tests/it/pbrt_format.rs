@@ -49,6 +49,23 @@ fn colour_spaces_are_told_and_unknown_ones_refused() {
     assert!(wrong.contains("scene.pbrt:2: unknown colour space \"foo\": srgb, rec2020"), "{wrong}");
 }
 
+/// pbrt-v4 has a name and one value; a list of parameters was all that was read.
+#[test]
+fn options_are_a_name_and_a_value() {
+    for (option, told) in [
+        (r#""seed" 0"#, "\"seed\""),
+        (r#""disablepixeljitter" true"#, "\"disablepixeljitter\""),
+        (r#""rendercoordsys" "world""#, "\"rendercoordsys\""),
+        (r#""bool disablepixeljitter" true"#, "\"bool disablepixeljitter\""),
+    ] {
+        let scene = scene(&format!("Option {option}"), SQUARE);
+        let is_told = |note: &String| note.ends_with(&format!("scene.pbrt:1: Option: not used: {told}."));
+        assert!(scene.notes.iter().any(is_told), "{option}: {:?}", scene.notes);
+    }
+    let wrong = try_load(folder().path(), "Option \"seed\"", SQUARE).unwrap_err();
+    assert!(wrong.contains("scene.pbrt:1: expected a value, found Film"), "{wrong}");
+}
+
 #[test]
 fn imports_keep_their_state_to_themselves() {
     let folder = folder();

@@ -3,7 +3,7 @@
 use super::super::error::{LoadError, Place, suggestion};
 use super::super::files;
 use super::lexer::{Lexer, Token};
-use super::parameters::Parameters;
+use super::parameters::{self, Parameters};
 use super::state::{DEEPEST_STACK, Opening, Transforms};
 use super::transforms::TransformDirective;
 use super::{MOST_INSTANCES, Reader, materials, shapes, textures};
@@ -169,10 +169,7 @@ impl Reader<'_> {
             }
             Directive::Texture => self.texture(lexer, line)?,
             Directive::Entity(entity) => self.entity(entity, lexer, line)?,
-            Directive::Option => {
-                let user = Parameters::read(lexer, line)?;
-                self.note_unread("Option", &user);
-            }
+            Directive::Option => self.option(lexer, line)?,
             Directive::Method(method) => self.method(method, lexer, line)?,
         }
         Ok(())
@@ -256,6 +253,22 @@ impl Reader<'_> {
         };
         let parameters = self.parameters(lexer, line, Some("texture"))?;
         self.textures.insert((class, name), Rc::new(textures::Definition::new(&kind, parameters)));
+        Ok(())
+    }
+
+    /// A name and one value, as pbrt-v4 has it, or a list of parameters.
+    fn option(&mut self, lexer: &mut Lexer, line: usize) -> Result<(), LoadError> {
+        let name = match lexer.peek()? {
+            Some(Token::Quoted(name)) if !name.contains(char::is_whitespace) => name.to_string(),
+            _ => {
+                let user = Parameters::read(lexer, line)?;
+                self.note_unread("Option", &user);
+                return Ok(());
+            }
+        };
+        lexer.next()?;
+        parameters::read_values(lexer, line)?;
+        self.builder.note(format!("{}: Option: not used: \"{name}\".", lexer.place(line)));
         Ok(())
     }
 
