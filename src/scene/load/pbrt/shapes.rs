@@ -7,6 +7,7 @@ use super::super::error::LoadError;
 use super::super::{ply, shapes};
 use super::Reader;
 use super::parameters::Parameters;
+use super::state::{Carried, Transforms};
 use crate::scene::{Instance, Mesh, MeshId, Sphere};
 use glam::{Affine3A, Vec2, Vec3};
 use std::f32::consts::{PI, TAU};
@@ -351,17 +352,10 @@ pub(super) fn orient(mesh: &mut Mesh, reverse: bool) {
     }
 }
 
-/// An instance of each part of an object.
-pub(super) fn place_part(reader: &Reader, part: &super::Part, transforms: &super::state::Transforms) -> Instance {
-    let total = transforms.then(&part.transforms);
-    let to_world: Affine3A = reader.here(&total);
-    Instance {
-        name: part.name.clone(),
-        mesh: part.mesh,
-        material: part.material,
-        to_world,
-        motion: reader.motion(&total),
-    }
+/// An instance of a part of an object.
+pub(super) fn place_part(reader: &Reader, part: &super::Part, instance: &Transforms) -> Instance {
+    let (to_world, motion) = reader.carried(&Carried { instance: *instance, part: part.transforms });
+    Instance { name: part.name.clone(), mesh: part.mesh, material: part.material, to_world, motion }
 }
 
 #[cfg(test)]
