@@ -278,6 +278,30 @@ fn principled_glass_is_tinted_by_the_root_of_its_colour() {
     assert_eq!(glass(&format!("{all}{picture}")), (1.0, Vec3::splat(0.5)));
 }
 
+/// What ends at 1 is a picture times its scale: the scale was cut to 1 first.
+#[test]
+fn pictures_may_be_scaled_by_more_than_1() {
+    let doubled = |name: &str| {
+        let picture = r#"<texture type="bitmap"><string name="filename" value="green.png"/></texture>"#;
+        format!(r#"<texture name="{name}" type="scale"><float name="scale" value="2"/>{picture}</texture>"#)
+    };
+    let surface = |kind: &str, name: &str| {
+        let shape = format!(r#"<shape type="rectangle"><bsdf type="{kind}">{}</bsdf></shape>"#, doubled(name));
+        try_load(folder().path(), "0.6.0", &format!("{LIGHT}{shape}")).unwrap().materials.remove(0).surface
+    };
+    let Surface::Conductor { roughness, .. } = surface("roughconductor", "alpha") else { panic!("a metal") };
+    assert!(roughness.u.texture.is_some() && (roughness.u.factor - 2.0).abs() < 1e-5, "{roughness:?}");
+    for name in ["baseColor", "metallic", "roughness"] {
+        let Surface::MetalRoughness(model) = surface("principled", name) else { panic!("principled") };
+        let factor = match name {
+            "baseColor" => model.base_color.factor.x,
+            "metallic" => model.metallic.factor,
+            _ => model.roughness.factor,
+        };
+        assert!((factor - 2.0).abs() < 1e-5, "{name}: {factor}");
+    }
+}
+
 #[test]
 fn masks_and_blends_cover_what_they_should() {
     let plain = r#"<bsdf type="diffuse"/>"#;

@@ -202,6 +202,23 @@ fn pictures_inside_others_count_by_their_mean() {
     assert!(note(&scene, "its amount's texture: its mean"), "{:?}", scene.notes);
 }
 
+/// What ends at 1 is a picture times its scale: the scale was cut to 1 first.
+#[test]
+fn pictures_may_be_scaled_by_more_than_1() {
+    let picture =
+        r#"Texture "dark" "float" "imagemap" "string filename" "grey.png" "string encoding" "linear" "float scale" "#;
+    let doubled = r#"Texture "t" "float" "scale" "texture tex" "dark" "float scale" 1.5 "#;
+    for (textures, name) in [(format!("{picture} 1.5"), "dark"), (format!("{picture} 1 {doubled}"), "t")] {
+        let scene = scene("", &format!("{textures} Material \"conductor\" \"texture roughness\" \"{name}\" {SQUARE}"));
+        let Surface::Conductor { roughness, .. } = &scene.materials[0].surface else { panic!("a metal") };
+        let seen = roughness.u.evaluate(&scene.textures, Vec2::splat(0.5));
+        assert!((seen - 1.5 * 128.0 / 255.0).abs() < 1e-6, "{seen}");
+    }
+    let sheet = r#"Material "diffusetransmission" "rgb reflectance" [0.2 0.2 0.2] "float scale" 2"#;
+    let sheet = scene("", &format!("{sheet} {SQUARE}")).materials.remove(0).surface;
+    assert!(matches!(sheet, Surface::DiffuseTransmission { reflectance, .. } if reflectance.factor.x == 0.4));
+}
+
 #[test]
 fn a_whole_disk_has_pbrts_coordinates() {
     let mesh = &scene("", r#"Shape "disk" "float radius" 2 "float height" 1"#).meshes[0];

@@ -1,6 +1,7 @@
 //! `Material` and its named kin, and the media behind their surfaces.
 
 use super::super::error::{LoadError, suggestion};
+use super::super::share;
 use super::super::spectrum::named;
 use super::Reader;
 use super::inputs::Meaning;
@@ -161,7 +162,7 @@ impl Reader<'_> {
                 transmittance: ColorInput::constant(Vec3::ONE),
             },
             "diffusetransmission" => {
-                let scale = parameters.float_or("scale", 1.0)?.clamp(0.0, 1.0);
+                let scale = parameters.float_or("scale", 1.0)?.max(0.0);
                 let scaled = |color: ColorInput| ColorInput { factor: color.factor * scale, ..color };
                 let transmittance = self.color_input(parameters, "transmittance", Meaning::Reflectance)?;
                 Surface::DiffuseTransmission {
@@ -268,10 +269,9 @@ impl Reader<'_> {
         let u = self.scalar_input(parameters, &format!("{prefix}uroughness"))?.unwrap_or(both);
         let v = self.scalar_input(parameters, &format!("{prefix}vroughness"))?.unwrap_or(both);
         let remap = parameters.boolean_or("remaproughness", true)?;
-        let clamped = |input: ScalarInput| ScalarInput { factor: input.factor.clamp(0.0, 1.0), ..input };
         Ok(Roughness {
-            u: clamped(u),
-            v: (u != v).then_some(clamped(v)),
+            u: share(u),
+            v: (u != v).then_some(share(v)),
             scale: if remap { RoughnessScale::SquareRoot } else { RoughnessScale::Alpha },
             distribution: Distribution::Ggx,
         })
