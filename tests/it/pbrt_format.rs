@@ -219,6 +219,25 @@ fn pictures_may_be_scaled_by_more_than_1() {
     assert!(matches!(sheet, Surface::DiffuseTransmission { reflectance, .. } if reflectance.factor.x == 0.4));
 }
 
+/// A metal's picture was ignored, and its factor of 1 a perfect mirror.
+#[test]
+fn a_metals_picture_is_what_it_reflects() {
+    let dark = r#"Texture "t" "spectrum" "imagemap" "string filename" "grey.png" "string encoding" "linear" "#;
+    let board = r#"Texture "t" "spectrum" "checkerboard" "rgb tex1" [0.2 0.4 0.6] "rgb tex2" [0.1 0.2 0.3] "#;
+    // 2 sqrt(r) / sqrt(1 - r) of the brightest texel.
+    let face_on = |k: f32| k * k / (4.0 + k * k);
+    for (texture, expected) in [(dark, Vec3::splat(128.0 / 255.0)), (board, Vec3::new(0.2, 0.4, 0.6))] {
+        let scene = scene("", &format!("{texture} Material \"conductor\" \"texture reflectance\" \"t\" {SQUARE}"));
+        let Surface::Conductor { eta, k, tint, .. } = &scene.materials[0].surface else { panic!("a metal") };
+        let seen = tint.evaluate(&scene.textures, Vec2::splat(0.25)) * k.map(face_on);
+        assert!(*eta == Vec3::ONE && seen.abs_diff_eq(expected, 1e-5), "{seen}, not {expected}");
+        assert!(scene.notes.iter().any(|note| note.contains("textured reflectance")), "{:?}", scene.notes);
+    }
+    let coated = scene("", &format!("{board} Material \"coatedconductor\" \"texture reflectance\" \"t\" {SQUARE}"));
+    let Surface::CoatedConductor { k, .. } = &coated.materials[0].surface else { panic!("a coated metal") };
+    assert!(k.map(face_on).abs_diff_eq(Vec3::new(0.15, 0.3, 0.45), 1e-5), "{k}");
+}
+
 #[test]
 fn a_whole_disk_has_pbrts_coordinates() {
     let mesh = &scene("", r#"Shape "disk" "float radius" 2 "float height" 1"#).meshes[0];

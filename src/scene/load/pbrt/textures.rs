@@ -172,7 +172,7 @@ impl Reader<'_> {
     }
 
     /// What stands for a texture where only a colour has a place.
-    fn mean_of_color(&self, input: &ColorInput) -> Result<Vec3, LoadError> {
+    pub(super) fn mean_of_color(&self, input: &ColorInput) -> Result<Vec3, LoadError> {
         let Some(lookup) = input.texture else { return Ok(input.factor) };
         Ok(input.factor * self.builder.textures.mean_color(lookup.texture)?)
     }
