@@ -254,6 +254,30 @@ fn triangles_without_coordinates_have_pbrts() {
     assert!(scene("", SQUARE).meshes[0].uvs.is_empty());
 }
 
+/// pbrt looks names up once it has read the file, and what that includes.
+#[test]
+fn names_may_be_used_before_they_are_defined() {
+    let folder = folder();
+    let color = |world: &str| {
+        let scene = try_load(folder.path(), "", world).unwrap_or_else(|error| panic!("{error}"));
+        let Surface::Diffuse { reflectance } = &scene.materials[0].surface else { panic!("diffuse") };
+        reflectance.factor
+    };
+    let expected = Vec3::new(0.2, 0.4, 0.6);
+    let made = r#"MakeNamedMaterial "later" "string type" "diffuse" "rgb reflectance" [0.2 0.4 0.6]"#;
+    let texture = r#"Texture "t" "spectrum" "constant" "rgb value" [0.2 0.4 0.6]"#;
+    std::fs::write(folder.path().join("made.pbrt"), format!("AttributeBegin {made} AttributeEnd")).unwrap();
+    for rest in [made, r#"Include "made.pbrt""#] {
+        assert_eq!(color(&format!(r#"NamedMaterial "later" {rest} {SQUARE}"#)), expected);
+        assert_eq!(color(&format!(r#"NamedMaterial "later" {SQUARE} {rest}"#)), expected);
+    }
+    assert_eq!(color(&format!(r#"Material "diffuse" "texture reflectance" "t" {SQUARE} {texture}"#)), expected);
+    let medium = r#"MakeNamedMedium "wine" "rgb sigma_a" [1 2 3] "rgb sigma_s" [0 0 0]"#;
+    let glass = r#"MediumInterface "wine" "" Material "dielectric""#;
+    let wine = try_load(folder.path(), "", &format!("{glass} {SQUARE} {medium}")).unwrap();
+    assert_eq!(wine.materials[0].surface.interior_absorption(), Some(Vec3::new(1.0, 2.0, 3.0)));
+}
+
 /// Each level names the one before twice: 2^30 look-ups if each were followed.
 #[test]
 fn textures_are_followed_once_each() {

@@ -6,7 +6,7 @@ use super::lexer::{Lexer, Token};
 use super::parameters::{self, Parameters};
 use super::state::{DEEPEST_STACK, Opening, Transforms};
 use super::transforms::TransformDirective;
-use super::{MOST_INSTANCES, Reader, materials, shapes, textures};
+use super::{MOST_INSTANCES, Reader, Scope, materials, shapes, textures};
 use std::path::Path;
 use std::rc::Rc;
 
@@ -119,6 +119,11 @@ impl Directive {
 }
 
 impl Entity {
+    /// Whether others refer to it by its name.
+    fn is_named(self) -> bool {
+        matches!(self, Self::MakeNamedMaterial | Self::MakeNamedMedium)
+    }
+
     /// What `Attribute` calls it, if that may set defaults for it.
     fn attribute_target(self) -> Option<&'static str> {
         match self {
@@ -158,7 +163,12 @@ impl Reader<'_> {
             Directive::Open(Opening::Object) => self.begin_object(lexer, line)?,
             Directive::Open(opening) => self.push(opening, lexer.place(line))?,
             Directive::Close(opening) => self.pop(opening, word, lexer.place(line))?,
-            Directive::ObjectInstance => self.place_object(&string(lexer, line)?, lexer.place(line))?,
+            Directive::ObjectInstance => {
+                let name = string(lexer, line)?;
+                if self.scope != Scope::Definitions {
+                    self.place_object(&name, lexer.place(line))?;
+                }
+            }
             Directive::WorldBegin => self.begin_world()?,
             Directive::WorldEnd => {}
             Directive::Include => self.include(&string(lexer, line)?, lexer.place(line))?,
@@ -182,8 +192,10 @@ impl Reader<'_> {
             StateDirective::ColorSpace => self.color_space(&string(lexer, line)?, lexer.place(line))?,
             StateDirective::NamedMaterial => {
                 let name = string(lexer, line)?;
-                let user = Parameters::none(lexer.place(line));
-                self.state.material = Some(self.named_material(&user, &name)?);
+                if self.scope != Scope::Definitions {
+                    let user = Parameters::none(lexer.place(line));
+                    self.state.material = Some(self.named_material(&user, &name)?);
+                }
             }
             StateDirective::MediumInterface => {
                 let inside = string(lexer, line)?;
@@ -285,6 +297,9 @@ impl Reader<'_> {
     fn entity(&mut self, entity: Entity, lexer: &mut Lexer, line: usize) -> Result<(), LoadError> {
         let name = string(lexer, line)?;
         let parameters = self.parameters(lexer, line, entity.attribute_target())?;
+        if self.scope == Scope::Definitions && !entity.is_named() {
+            return Ok(());
+        }
         match entity {
             Entity::Material => {
                 let definition = materials::Definition { name: name.clone(), kind: name, parameters };

@@ -92,7 +92,10 @@ impl Reader<'_> {
     }
 
     /// The material of a name.
-    pub(super) fn named_material(&self, user: &Parameters, name: &str) -> Result<Rc<Definition>, LoadError> {
+    pub(super) fn named_material(&mut self, user: &Parameters, name: &str) -> Result<Rc<Definition>, LoadError> {
+        if !self.named_materials.contains_key(name) {
+            self.look_ahead()?;
+        }
         self.named_materials.get(name).cloned().ok_or_else(|| {
             let mut known: Vec<&str> = self.named_materials.keys().map(String::as_str).collect();
             known.sort_unstable();

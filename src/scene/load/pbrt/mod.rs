@@ -36,34 +36,19 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
 }
 
 fn read(path: &Path, options: &LoadOptions) -> Result<Builder, LoadError> {
-    let mut reader = Reader {
-        main: path.to_owned(),
-        file: path.to_owned(),
-        options,
-        builder: Builder::new(path, options),
-        state: State::new(),
-        stack: Vec::new(),
-        coordinate_systems: HashMap::new(),
-        textures: HashMap::new(),
-        named_materials: HashMap::new(),
-        media: HashMap::new(),
-        objects: HashMap::new(),
-        current_object: None,
-        converted: HashMap::new(),
-        keep_alive: Vec::new(),
-        ply_files: HashMap::new(),
-        camera: None,
-        film: None,
-        times: [0.0, 1.0],
-        shutter: [0.0, 0.0],
-        exposure: 1.0,
-        in_world: false,
-        is_photometric: false,
-        includes: 0,
-        made_vertices: 0,
-    };
+    let mut reader = Reader::new(path, options, Scope::All);
     reader.read_file(path)?;
     reader.into_builder(path)
+}
+
+/// What of a file is taken in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Scope {
+    All,
+    /// All, and what is defined further on is known.
+    AllKnownAhead,
+    /// Named textures, materials and media alone.
+    Definitions,
 }
 
 /// A shape of an object that may be placed many times.
@@ -82,6 +67,7 @@ struct Reader<'a> {
     main: PathBuf,
     file: PathBuf,
     options: &'a LoadOptions,
+    scope: Scope,
     builder: Builder,
     state: State,
     /// Saved states, and what opened them.
@@ -110,6 +96,58 @@ struct Reader<'a> {
     includes: usize,
     /// Of meshes that stand for spheres and their like.
     made_vertices: usize,
+}
+
+impl<'a> Reader<'a> {
+    fn new(path: &Path, options: &'a LoadOptions, scope: Scope) -> Self {
+        Self {
+            main: path.to_owned(),
+            file: path.to_owned(),
+            options,
+            scope,
+            builder: Builder::new(path, options),
+            state: State::new(),
+            stack: Vec::new(),
+            coordinate_systems: HashMap::new(),
+            textures: HashMap::new(),
+            named_materials: HashMap::new(),
+            media: HashMap::new(),
+            objects: HashMap::new(),
+            current_object: None,
+            converted: HashMap::new(),
+            keep_alive: Vec::new(),
+            ply_files: HashMap::new(),
+            camera: None,
+            film: None,
+            times: [0.0, 1.0],
+            shutter: [0.0, 0.0],
+            exposure: 1.0,
+            in_world: false,
+            is_photometric: false,
+            includes: 0,
+            made_vertices: 0,
+        }
+    }
+
+    /// Finds what the file defines further on, once: pbrt looks names up when it has read everything.
+    fn look_ahead(&mut self) -> Result<(), LoadError> {
+        if self.scope != Scope::All {
+            return Ok(());
+        }
+        self.scope = Scope::AllKnownAhead;
+        let mut ahead = Reader::new(&self.main, self.options, Scope::Definitions);
+        ahead.read_file(&self.main)?;
+        for (name, texture) in ahead.textures {
+            self.textures.entry(name).or_insert(texture);
+        }
+        for (name, material) in ahead.named_materials {
+            self.named_materials.entry(name).or_insert(material);
+        }
+        for (name, medium) in ahead.media {
+            self.media.entry(name).or_insert(medium);
+        }
+        Ok(())
+    }
 }
 
 impl Reader<'_> {
@@ -195,6 +233,9 @@ impl Reader<'_> {
 
     /// Puts the absorption of a medium behind a surface.
     fn fill(&mut self, material: &mut Material, name: &str, shape: &Parameters) -> Result<(), LoadError> {
+        if !self.media.contains_key(name) {
+            self.look_ahead()?;
+        }
         let Some(medium) = self.media.get(name) else {
             let mut known: Vec<&str> = self.media.keys().map(String::as_str).collect();
             known.sort_unstable();

@@ -188,7 +188,7 @@ impl Reader<'_> {
     }
 
     fn find_texture(
-        &self,
+        &mut self,
         user: &Parameters,
         class: &'static str,
         name: &str,
@@ -197,7 +197,11 @@ impl Reader<'_> {
         if depth > DEEPEST {
             return Err(user.error(format_args!("texture \"{name}\" uses itself, or {DEEPEST} others in a chain")));
         }
-        if let Some(definition) = self.textures.get(&(class, name.to_owned())) {
+        let key = (class, name.to_owned());
+        if !self.textures.contains_key(&key) {
+            self.look_ahead()?;
+        }
+        if let Some(definition) = self.textures.get(&key) {
             return Ok(Rc::clone(definition));
         }
         let mut known: Vec<&str> =
