@@ -160,6 +160,16 @@ fn reflectance(textures: &str, at: Vec2) -> (Vec3, Scene) {
 const PICTURES: &str = r#"Texture "cyan" "spectrum" "imagemap" "string filename" "cyan.png"
 Texture "share" "float" "imagemap" "string filename" "cyan.png" "#;
 
+/// pbrt-v4 warns and goes on without the light.
+#[test]
+fn what_is_not_there_does_not_shine() {
+    let light = r#"AreaLightSource "diffuse" "rgb L" [9 9 9]"#;
+    let scene = scene("", &format!("{SQUARE} {light} Material \"interface\" {SQUARE}"));
+    assert_eq!(scene.instances.len(), 1);
+    assert!(scene.materials.iter().all(|material| material.emission.factor == Vec3::ZERO));
+    assert!(scene.notes.iter().any(|note| note.contains("\"interface\" do not shine")), "{:?}", scene.notes);
+}
+
 /// pbrt's `MIPMap::Bilerp<Float>`: alpha, or the mean of three channels. It was the red one.
 #[test]
 fn a_number_of_a_picture_is_its_alpha_or_its_mean() {

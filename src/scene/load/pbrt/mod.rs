@@ -188,20 +188,17 @@ impl Reader<'_> {
             return Ok(*id);
         }
         let id = match self.convert_material(&definition)? {
-            None if light.is_none() => {
-                if medium.is_some() {
-                    return Err(
-                        shape.unsupported("a volume without a surface is not rendered; absorption behind glass is")
-                    );
+            None if medium.is_some() => {
+                return Err(shape.unsupported("a volume without a surface is not rendered; absorption behind glass is"));
+            }
+            None => {
+                if light.is_some() {
+                    self.builder.note("Area lights of material \"interface\" do not shine, as in pbrt.");
                 }
                 self.builder.note("Shapes of material \"interface\" are not there.");
                 None
             }
-            converted => {
-                let black = crate::scene::ColorInput::constant(glam::Vec3::ZERO);
-                let mut material = converted.unwrap_or_else(|| {
-                    Material::plain(definition.name.clone(), Surface::Diffuse { reflectance: black })
-                });
+            Some(mut material) => {
                 if let Some(light) = &light {
                     let emission = self.emission(light)?;
                     material.emission = emission.radiance;
