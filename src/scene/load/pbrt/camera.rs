@@ -2,7 +2,7 @@
 
 use super::super::builder::NamedCamera;
 use super::super::error::LoadError;
-use super::super::framing::{Framing, half_size};
+use super::super::framing::{FilmAxis, Framing};
 use super::Reader;
 use super::state::{Carried, Path, Transforms};
 use crate::scene::{Camera, FilmDefaults, Motion, MotionKey, Pose, Projection, ScreenWindow};
@@ -46,14 +46,17 @@ impl Reader<'_> {
         let framing = match (stated_aspect, stated_window) {
             (None, None) => {
                 let FilmDefaults { width, height } = self.builder.film;
-                Framing::ShorterSide { film: width as f32 / height as f32, whole: film_aspect }
+                Framing::Spanning { axis: FilmAxis::Smaller, film: width as f32 / height as f32, whole: film_aspect }
             }
             // pbrt stretches what the file states.
             _ => Framing::Fixed,
         };
         let mut window = match stated_window {
             // The shorter side spans [−1, 1].
-            None => ScreenWindow { min: -half_size(aspect), max: half_size(aspect) },
+            None => {
+                let half_size = FilmAxis::Smaller.half_size(aspect);
+                ScreenWindow { min: -half_size, max: half_size }
+            }
             Some(&[left, right, bottom, top]) if left < right && bottom < top => {
                 ScreenWindow { min: Vec2::new(left as f32, bottom as f32), max: Vec2::new(right as f32, top as f32) }
             }
