@@ -210,20 +210,48 @@ fn cameras_without_an_up_stand_as_mitsubas_do() {
     assert!(up.abs_diff_eq(Vec3::new(0.82193, -0.11872, -0.55709), 1e-4), "{up}");
 }
 
-/// As far off the principal point as the file says, in shares of the picture, whatever its size.
-#[test]
-fn shifted_cameras_have_square_pixels_at_every_size() {
+/// The view that a film of 32 × 32 has at another size: what it shows at a distance of 1, where the film's own half height is 1.
+fn window_at(sensor: &str, [width, height]: [u32; 2]) -> ScreenWindow {
     let folder = folder();
     let path = folder.path().join("scene.xml");
     let film = r#"<film type="hdrfilm"><integer name="width" value="32"/><integer name="height" value="32"/></film>"#;
-    let shift = r#"<float name="principal_point_offset_x" value="0.25"/>"#;
-    let body = format!(r#"{LIGHT}<shape type="rectangle"/><sensor type="perspective">{film}{shift}</sensor>"#);
+    let body = format!(r#"{LIGHT}<shape type="rectangle"/><sensor type="perspective">{film}{sensor}</sensor>"#);
     std::fs::write(&path, format!("<scene version=\"3.0.0\">{body}</scene>")).unwrap();
+    let options = LoadOptions { film: Some(FilmDefaults { width, height }), ..LoadOptions::default() };
+    let window = load(&path, &options).unwrap().camera.screen_window;
+    window.unwrap_or(ScreenWindow::centered(width as f32 / height as f32))
+}
+
+/// As far off the principal point as the file says, in shares of the picture, whatever its size.
+#[test]
+fn shifted_cameras_have_square_pixels_at_every_size() {
+    let shift = r#"<float name="principal_point_offset_x" value="0.25"/><string name="fov_axis" value="y"/><float name="fov" value="40"/>"#;
     for (width, half_width) in [(32, 1.0), (64, 2.0), (16, 0.5)] {
-        let options = LoadOptions { film: Some(FilmDefaults { width, height: 32 }), ..LoadOptions::default() };
-        let window = load(&path, &options).unwrap().camera.screen_window.unwrap();
         let expected = ScreenWindow { min: Vec2::new(-0.5 * half_width, -1.0), max: Vec2::new(1.5 * half_width, 1.0) };
-        assert_eq!(window, expected, "{width}");
+        assert_eq!(window_at(shift, [width, 32]), expected, "{width}");
+    }
+}
+
+/// The axis that `fov_axis` names keeps its angle at every size; the vertical one did.
+#[test]
+fn fields_of_view_stay_on_their_axis_at_every_size() {
+    let half_size = |axis: &str, size: [u32; 2]| {
+        let view = format!(r#"<float name="fov" value="40"/>{axis}"#);
+        window_at(&view, size).max
+    };
+    let named = |axis: &str| format!(r#"<string name="fov_axis" value="{axis}"/>"#);
+    for (axis, wide, high) in [
+        (String::new(), [1.0, 0.5], [1.0, 2.0]),
+        (named("x"), [1.0, 0.5], [1.0, 2.0]),
+        (named("y"), [2.0, 1.0], [0.5, 1.0]),
+        (named("smaller"), [2.0, 1.0], [1.0, 2.0]),
+        (named("larger"), [1.0, 0.5], [0.5, 1.0]),
+        (named("diagonal"), [1.264_911, 0.632_455_5], [0.632_455_5, 1.264_911]),
+    ] {
+        for (size, expected) in [([64, 32], wide), ([32, 64], high), ([16, 16], [1.0, 1.0])] {
+            let found = half_size(&axis, size);
+            assert!(found.abs_diff_eq(expected.into(), 1e-6), "{axis} at {size:?}: {found}");
+        }
     }
 }
 
@@ -276,6 +304,30 @@ fn principled_glass_is_tinted_by_the_root_of_its_colour() {
     let picture = r#"<texture name="base_color" type="checkerboard"><rgb name="color0" value="0.25"/>
 <rgb name="color1" value="0.25"/></texture>"#;
     assert_eq!(glass(&format!("{all}{picture}")), (1.0, Vec3::splat(0.5)));
+}
+
+/// What ends at 1 is a picture times its scale: the scale was cut to 1 first.
+#[test]
+fn pictures_may_be_scaled_by_more_than_1() {
+    let doubled = |name: &str| {
+        let picture = r#"<texture type="bitmap"><string name="filename" value="green.png"/></texture>"#;
+        format!(r#"<texture name="{name}" type="scale"><float name="scale" value="2"/>{picture}</texture>"#)
+    };
+    let surface = |kind: &str, name: &str| {
+        let shape = format!(r#"<shape type="rectangle"><bsdf type="{kind}">{}</bsdf></shape>"#, doubled(name));
+        try_load(folder().path(), "0.6.0", &format!("{LIGHT}{shape}")).unwrap().materials.remove(0).surface
+    };
+    let Surface::Conductor { roughness, .. } = surface("roughconductor", "alpha") else { panic!("a metal") };
+    assert!(roughness.u.texture.is_some() && (roughness.u.factor - 2.0).abs() < 1e-5, "{roughness:?}");
+    for name in ["baseColor", "metallic", "roughness"] {
+        let Surface::MetalRoughness(model) = surface("principled", name) else { panic!("principled") };
+        let factor = match name {
+            "baseColor" => model.base_color.factor.x,
+            "metallic" => model.metallic.factor,
+            _ => model.roughness.factor,
+        };
+        assert!((factor - 2.0).abs() < 1e-5, "{name}: {factor}");
+    }
 }
 
 #[test]

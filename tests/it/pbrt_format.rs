@@ -49,6 +49,23 @@ fn colour_spaces_are_told_and_unknown_ones_refused() {
     assert!(wrong.contains("scene.pbrt:2: unknown colour space \"foo\": srgb, rec2020"), "{wrong}");
 }
 
+/// pbrt-v4 has a name and one value; a list of parameters was all that was read.
+#[test]
+fn options_are_a_name_and_a_value() {
+    for (option, told) in [
+        (r#""seed" 0"#, "\"seed\""),
+        (r#""disablepixeljitter" true"#, "\"disablepixeljitter\""),
+        (r#""rendercoordsys" "world""#, "\"rendercoordsys\""),
+        (r#""bool disablepixeljitter" true"#, "\"bool disablepixeljitter\""),
+    ] {
+        let scene = scene(&format!("Option {option}"), SQUARE);
+        let is_told = |note: &String| note.ends_with(&format!("scene.pbrt:1: Option: not used: {told}."));
+        assert!(scene.notes.iter().any(is_told), "{option}: {:?}", scene.notes);
+    }
+    let wrong = try_load(folder().path(), "Option \"seed\"", SQUARE).unwrap_err();
+    assert!(wrong.contains("scene.pbrt:1: expected a value, found Film"), "{wrong}");
+}
+
 #[test]
 fn imports_keep_their_state_to_themselves() {
     let folder = folder();
@@ -57,6 +74,23 @@ fn imports_keep_their_state_to_themselves() {
         let scene = try_load(folder.path(), "", &format!(r#"{directive} "part.pbrt" Shape "sphere""#)).unwrap();
         assert_eq!(scene.spheres[0].center.x, x, "{directive}");
     }
+}
+
+/// Version 4 reads `TransformBegin` as `AttributeBegin`: material, light, orientation and active transforms ended with the file.
+#[test]
+fn transform_blocks_keep_their_whole_state_to_themselves() {
+    for block in ["Attribute", "Transform"] {
+        let inside = r#"Translate 5 0 0 ReverseOrientation Material "diffuse" "rgb reflectance" [1 0 0]
+AreaLightSource "diffuse" "rgb L" [9 9 9] ActiveTransform EndTime"#;
+        let scene = scene("", &format!(r#"{block}Begin {inside} {block}End Translate 1 0 0 Shape "sphere""#));
+        let ball = &scene.spheres[0];
+        let material = &scene.materials[ball.material.0 as usize];
+        let Surface::Diffuse { reflectance } = &material.surface else { panic!("diffuse") };
+        assert_eq!((ball.center, ball.motion.is_none()), (Vec3::X, true), "{block}");
+        assert_eq!((reflectance.factor, material.emission.factor), (Vec3::splat(0.5), Vec3::ZERO), "{block}");
+    }
+    let wrong = try_load(folder().path(), "", "TransformEnd").unwrap_err();
+    assert!(wrong.contains("scene.pbrt:2: TransformEnd without AttributeBegin"), "{wrong}");
 }
 
 #[test]
@@ -141,6 +175,16 @@ fn reflectance(textures: &str, at: Vec2) -> (Vec3, Scene) {
 const PICTURES: &str = r#"Texture "cyan" "spectrum" "imagemap" "string filename" "cyan.png"
 Texture "share" "float" "imagemap" "string filename" "cyan.png" "#;
 
+/// pbrt-v4 warns and goes on without the light.
+#[test]
+fn what_is_not_there_does_not_shine() {
+    let light = r#"AreaLightSource "diffuse" "rgb L" [9 9 9]"#;
+    let scene = scene("", &format!("{SQUARE} {light} Material \"interface\" {SQUARE}"));
+    assert_eq!(scene.instances.len(), 1);
+    assert!(scene.materials.iter().all(|material| material.emission.factor == Vec3::ZERO));
+    assert!(scene.notes.iter().any(|note| note.contains("\"interface\" do not shine")), "{:?}", scene.notes);
+}
+
 /// pbrt's `MIPMap::Bilerp<Float>`: alpha, or the mean of three channels. It was the red one.
 #[test]
 fn a_number_of_a_picture_is_its_alpha_or_its_mean() {
@@ -183,6 +227,42 @@ fn pictures_inside_others_count_by_their_mean() {
     assert!(note(&scene, "its amount's texture: its mean"), "{:?}", scene.notes);
 }
 
+/// What ends at 1 is a picture times its scale: the scale was cut to 1 first.
+#[test]
+fn pictures_may_be_scaled_by_more_than_1() {
+    let picture =
+        r#"Texture "dark" "float" "imagemap" "string filename" "grey.png" "string encoding" "linear" "float scale" "#;
+    let doubled = r#"Texture "t" "float" "scale" "texture tex" "dark" "float scale" 1.5 "#;
+    for (textures, name) in [(format!("{picture} 1.5"), "dark"), (format!("{picture} 1 {doubled}"), "t")] {
+        let scene = scene("", &format!("{textures} Material \"conductor\" \"texture roughness\" \"{name}\" {SQUARE}"));
+        let Surface::Conductor { roughness, .. } = &scene.materials[0].surface else { panic!("a metal") };
+        let seen = roughness.u.evaluate(&scene.textures, Vec2::splat(0.5));
+        assert!((seen - 1.5 * 128.0 / 255.0).abs() < 1e-6, "{seen}");
+    }
+    let sheet = r#"Material "diffusetransmission" "rgb reflectance" [0.2 0.2 0.2] "float scale" 2"#;
+    let sheet = scene("", &format!("{sheet} {SQUARE}")).materials.remove(0).surface;
+    assert!(matches!(sheet, Surface::DiffuseTransmission { reflectance, .. } if reflectance.factor.x == 0.4));
+}
+
+/// A metal's picture was ignored, and its factor of 1 a perfect mirror.
+#[test]
+fn a_metals_picture_is_what_it_reflects() {
+    let dark = r#"Texture "t" "spectrum" "imagemap" "string filename" "grey.png" "string encoding" "linear" "#;
+    let board = r#"Texture "t" "spectrum" "checkerboard" "rgb tex1" [0.2 0.4 0.6] "rgb tex2" [0.1 0.2 0.3] "#;
+    // 2 sqrt(r) / sqrt(1 - r) of the brightest texel.
+    let face_on = |k: f32| k * k / (4.0 + k * k);
+    for (texture, expected) in [(dark, Vec3::splat(128.0 / 255.0)), (board, Vec3::new(0.2, 0.4, 0.6))] {
+        let scene = scene("", &format!("{texture} Material \"conductor\" \"texture reflectance\" \"t\" {SQUARE}"));
+        let Surface::Conductor { eta, k, tint, .. } = &scene.materials[0].surface else { panic!("a metal") };
+        let seen = tint.evaluate(&scene.textures, Vec2::splat(0.25)) * k.map(face_on);
+        assert!(*eta == Vec3::ONE && seen.abs_diff_eq(expected, 1e-5), "{seen}, not {expected}");
+        assert!(scene.notes.iter().any(|note| note.contains("textured reflectance")), "{:?}", scene.notes);
+    }
+    let coated = scene("", &format!("{board} Material \"coatedconductor\" \"texture reflectance\" \"t\" {SQUARE}"));
+    let Surface::CoatedConductor { k, .. } = &coated.materials[0].surface else { panic!("a coated metal") };
+    assert!(k.map(face_on).abs_diff_eq(Vec3::new(0.15, 0.3, 0.45), 1e-5), "{k}");
+}
+
 #[test]
 fn a_whole_disk_has_pbrts_coordinates() {
     let mesh = &scene("", r#"Shape "disk" "float radius" 2 "float height" 1"#).meshes[0];
@@ -197,6 +277,30 @@ fn triangles_without_coordinates_have_pbrts() {
     let textured = scene("", &format!("{texture}{SQUARE}"));
     assert_eq!(textured.meshes[0].uvs[..3], [Vec2::Y, Vec2::ONE, Vec2::X]);
     assert!(scene("", SQUARE).meshes[0].uvs.is_empty());
+}
+
+/// pbrt looks names up once it has read the file, and what that includes.
+#[test]
+fn names_may_be_used_before_they_are_defined() {
+    let folder = folder();
+    let color = |world: &str| {
+        let scene = try_load(folder.path(), "", world).unwrap_or_else(|error| panic!("{error}"));
+        let Surface::Diffuse { reflectance } = &scene.materials[0].surface else { panic!("diffuse") };
+        reflectance.factor
+    };
+    let expected = Vec3::new(0.2, 0.4, 0.6);
+    let made = r#"MakeNamedMaterial "later" "string type" "diffuse" "rgb reflectance" [0.2 0.4 0.6]"#;
+    let texture = r#"Texture "t" "spectrum" "constant" "rgb value" [0.2 0.4 0.6]"#;
+    std::fs::write(folder.path().join("made.pbrt"), format!("AttributeBegin {made} AttributeEnd")).unwrap();
+    for rest in [made, r#"Include "made.pbrt""#] {
+        assert_eq!(color(&format!(r#"NamedMaterial "later" {rest} {SQUARE}"#)), expected);
+        assert_eq!(color(&format!(r#"NamedMaterial "later" {SQUARE} {rest}"#)), expected);
+    }
+    assert_eq!(color(&format!(r#"Material "diffuse" "texture reflectance" "t" {SQUARE} {texture}"#)), expected);
+    let medium = r#"MakeNamedMedium "wine" "rgb sigma_a" [1 2 3] "rgb sigma_s" [0 0 0]"#;
+    let glass = r#"MediumInterface "wine" "" Material "dielectric""#;
+    let wine = try_load(folder.path(), "", &format!("{glass} {SQUARE} {medium}")).unwrap();
+    assert_eq!(wine.materials[0].surface.interior_absorption(), Some(Vec3::new(1.0, 2.0, 3.0)));
 }
 
 /// Each level names the one before twice: 2^30 look-ups if each were followed.

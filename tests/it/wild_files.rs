@@ -67,6 +67,11 @@ fn highlights_are_as_strong_as_ks_says() {
     assert!(mapped.specular.texture.is_some());
     let halved = of_mtl("illum 1\nKd 0.5 0.5 0.5\nmap_Kd -mm 0 0.5 missing.png").1.surface;
     assert!(matches!(halved, Surface::Diffuse { reflectance } if reflectance.factor.x == 0.25));
+    // What ends at 1 is the picture times its gain.
+    let doubled = metal_roughness("Kd 1 1 1\nPr 1\nmap_Kd -mm 0 2 missing.png\nmap_Pr -mm 0 2 missing.png");
+    assert_eq!((doubled.base_color.factor.x, doubled.roughness.factor), (2.0, 2.0));
+    let plain = metal_roughness("Kd 2 2 2\nPr 2");
+    assert_eq!((plain.base_color.factor.x, plain.roughness.factor), (1.0, 1.0));
 }
 
 #[test]

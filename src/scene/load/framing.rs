@@ -11,11 +11,37 @@ pub(super) enum Framing {
     /// As the file states: a film of no other aspect takes it, and a narrower one shows more above and below, so that nothing at its
     /// sides is lost.
     Stated(f32),
-    /// Its window was made for a film of this aspect, and widens with the picture about the principal point.
-    Widening { film: f32 },
-    /// Its window was made by pbrt's rule that the shorter side of the film spans [−1, 1], for a picture of aspect `film` that is a
-    /// part of one of aspect `whole`.
-    ShorterSide { film: f32, whole: f32 },
+    /// Its window was made for a picture of aspect `film` that is a part of one of aspect `whole`. The axis of the whole keeps what it
+    /// spans, and the window changes with it about the principal point.
+    Spanning { axis: FilmAxis, film: f32, whole: f32 },
+}
+
+/// What of a film a field of view is given for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum FilmAxis {
+    X,
+    Y,
+    Smaller,
+    Larger,
+    Diagonal,
+}
+
+impl FilmAxis {
+    /// Its length in heights of a film of this aspect.
+    pub(super) fn length(self, aspect: f32) -> f32 {
+        match self {
+            Self::X => aspect,
+            Self::Y => 1.0,
+            Self::Smaller => aspect.min(1.0),
+            Self::Larger => aspect.max(1.0),
+            Self::Diagonal => aspect.hypot(1.0),
+        }
+    }
+
+    /// Half of what a film of this aspect spans on the image plane where the axis spans [−1, 1].
+    pub(super) fn half_size(self, aspect: f32) -> Vec2 {
+        Vec2::new(aspect, 1.0) / self.length(aspect)
+    }
 }
 
 impl Framing {
@@ -33,17 +59,11 @@ impl Framing {
         match self {
             Self::Fixed => camera,
             Self::Stated(stated) => camera.heightened(stated / aspect),
-            Self::Widening { film } => stretched(camera, film, Vec2::new(aspect / film, 1.0)),
-            Self::ShorterSide { film, whole } => {
-                stretched(camera, film, half_size(whole * aspect / film) / half_size(whole))
+            Self::Spanning { axis, film, whole } => {
+                stretched(camera, film, axis.half_size(whole * aspect / film) / axis.half_size(whole))
             }
         }
     }
-}
-
-/// Half of what pbrt's films of an aspect span on the image plane.
-pub(super) fn half_size(aspect: f32) -> Vec2 {
-    Vec2::new(aspect.max(1.0), (1.0 / aspect).max(1.0))
 }
 
 /// The window, else the one that a film of this aspect has, times so much about the principal point.

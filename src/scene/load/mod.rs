@@ -52,7 +52,7 @@ pub use default_view::{Bounds, bounds, framed};
 pub use error::{LoadError, Place};
 pub use files::{count_as_read, was_read};
 
-use crate::scene::{FilmDefaults, Instance, Scene};
+use crate::scene::{FilmDefaults, Instance, ScalarInput, Scene};
 use std::path::Path;
 
 /// What the caller chooses about loading.
@@ -178,6 +178,12 @@ fn load_ply(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
 /// Luminance of linear Rec.709 RGB relative to RGB (1, 1, 1).
 fn luminance(color: glam::Vec3) -> f32 {
     color.dot(glam::Vec3::new(0.2126, 0.7152, 0.0722))
+}
+
+/// A number that ends at 0 and 1. A picture times its factor ends there once both are multiplied, so that its factor may be any.
+fn share(input: ScalarInput) -> ScalarInput {
+    let most = if input.texture.is_some() { f32::MAX } else { 1.0 };
+    ScalarInput { factor: input.factor.clamp(0.0, most), ..input }
 }
 
 /// Linear Rec.709 RGB without negative channels: a colour outside it is mixed with the grey of its own luminance. What is not finite is left to

@@ -9,6 +9,7 @@ use super::builder::Builder;
 use super::bump::Bump;
 use super::error::{LoadError, Place};
 use super::files;
+use super::share;
 use super::texture::{Adjust, IfMissing, Picture, Request};
 use crate::scene::{
     Alpha, ColorInput, Encoding, HeightMap, HeightUnit, Material, MaterialId, Relief, ScalarInput, Surface,
@@ -214,16 +215,18 @@ impl Written {
         }
     }
 
-    /// A share of light in [0, 1].
+    /// A share of light in [0, 1], at which a picture ends once its factor has multiplied it.
     fn share_input(&self, builder: &mut Builder, key: &str) -> ColorInput {
-        let mut input = self.color_input(builder, key, Vec3::splat(0.7));
-        input.factor = input.factor.min(Vec3::ONE);
-        input
+        let input = self.color_input(builder, key, Vec3::splat(0.7));
+        match input.texture {
+            None => ColorInput::constant(input.factor.min(Vec3::ONE)),
+            Some(_) => input,
+        }
     }
 
     fn scalar_input(&self, builder: &mut Builder, key: &str, default: f32) -> ScalarInput {
-        let factor = self.number(key).map(|factor| factor.clamp(0.0, 1.0));
-        match self.map(&[&format!("map_{key}")]) {
+        let factor = self.number(key);
+        share(match self.map(&[&format!("map_{key}")]) {
             None => ScalarInput::constant(factor.unwrap_or(default)),
             Some(map) => {
                 let channel = map.channel.unwrap_or(0).min(2);
@@ -231,7 +234,7 @@ impl Written {
                 let factor = factor.filter(|&factor| factor > 0.0).unwrap_or(1.0);
                 ScalarInput { factor: factor * map.gain.max(0.0), texture: Some((lookup, channel)) }
             }
-        }
+        })
     }
 
     /// Our material for it.

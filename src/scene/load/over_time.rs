@@ -239,6 +239,40 @@ fn a_sphere_of_pbrt_that_is_squashed_is_a_mesh() {
     assert_eq!(pbrt("", "0 1", "Scale 4 4 4", sphere).at(0.0).spheres.len(), 1);
 }
 
+/// pbrt turns instance and part each by itself: a part beside the axis of a quarter turn went along the chord, 0.92 from the axis half
+/// way instead of 1.3, and one that turned inside a stretched instance was bent.
+#[test]
+fn parts_of_pbrts_objects_go_with_their_instances() {
+    /// Where a point of the part is at a share of the way.
+    type Way<'a> = &'a dyn Fn(f32, Vec3) -> Vec3;
+    let quarter = "ActiveTransform EndTime Rotate 90 0 0 1 ActiveTransform All";
+    let turned = |share: f32, point: Vec3| Quat::from_rotation_z(share * std::f32::consts::FRAC_PI_2) * point;
+    let beside = Vec3::X * 1.3;
+    // The pose of a part that moves as a whole has its place on the chord.
+    let own_pose = |share: f32, point: Vec3| beside.lerp(Vec3::Y * 1.3, share) + turned(share, point);
+    let turning_beside = format!("{quarter} Translate 1.3 0 0");
+    let beside_turning = format!("Translate 1.3 0 0 {quarter}");
+    let cases: [(&str, &str, Way); 4] = [
+        ("Translate 1.3 0 0", quarter, &|share, point| turned(share, beside + point)),
+        (&turning_beside, "Scale -2 2 2", &|share, point| Vec3::new(-2.0, 2.0, 2.0) * own_pose(share, point)),
+        (&turning_beside, "Scale 2 .6 1", &|share, point| Vec3::new(2.0, 0.6, 1.0) * own_pose(share, point)),
+        (&beside_turning, quarter, &|share, point| turned(share, beside + turned(share, point))),
+    ];
+    for (part, instance, expected) in cases {
+        let triangle = "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0]";
+        let object = format!("ObjectBegin \"o\" {part} {triangle} ObjectEnd {instance} ObjectInstance \"o\"");
+        let placed = pbrt("", "0 1", "", &object).at(0.0).instances.remove(0);
+        for point in [Vec3::ZERO, Vec3::X, Vec3::Y] {
+            let opens = placed.to_world.transform_point3(point);
+            assert!(opens.distance(expected(0.0, point)) < 1e-5, "{part} in {instance}: {opens}");
+            for share in [0.0, 0.13, 0.5, 0.77, 1.0] {
+                let found = placed.transform_at(share).transform_point3(point);
+                assert!(found.distance(expected(share, point)) < 1e-3, "{part} in {instance} at {share}: {found}");
+            }
+        }
+    }
+}
+
 /// The shutter may open before and close after `TransformTimes`, beyond which everything rests.
 #[test]
 fn motion_of_pbrt_ends_where_its_times_do() {

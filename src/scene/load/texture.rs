@@ -134,11 +134,20 @@ impl Requests {
 
     /// Mean linear colour of a texture, for what has no place for a picture: which is decoded for it.
     pub(super) fn mean_color(&self, texture: TextureId) -> Result<Vec3, LoadError> {
+        Ok(self.decoded(texture)?.mean_color())
+    }
+
+    /// The largest linear colour value of a texture, which is decoded for it.
+    pub(super) fn brightest(&self, texture: TextureId) -> Result<f32, LoadError> {
+        Ok(self.decoded(texture)?.brightest())
+    }
+
+    fn decoded(&self, texture: TextureId) -> Result<Texture, LoadError> {
         let request = &self.requests[texture.0 as usize];
         let decoded = decode::decode(&request.picture, request.encoding, request.adjust.values(request.encoding));
         let mut slot = Slot::from(decoded.map(|picture| request.adjust.apply(picture)));
         // That a picture is not there is said where all are decoded.
-        Ok(request.texture(slot.take_for(request, &mut Vec::new())?).mean_color())
+        Ok(request.texture(slot.take_for(request, &mut Vec::new())?))
     }
 
     /// Decodes everything. `notes` gets a sentence for each missing file that was replaced, and one of what was made smaller.

@@ -1,6 +1,7 @@
 //! `principled` and `principledthin`: Burley's model, by ours of metal and roughness.
 
 use super::super::error::LoadError;
+use super::super::share;
 use super::Reader;
 use super::element::Element;
 use crate::scene::{ColorInput, MetalRoughness, Roughness, ScalarInput, Surface};
@@ -8,8 +9,7 @@ use glam::Vec3;
 
 impl Reader {
     pub(super) fn principled(&mut self, bsdf: &Element, is_thin: bool) -> Result<Surface, LoadError> {
-        let mut base_color = self.reflectance(bsdf, "basecolor", 0.5)?;
-        base_color.factor = base_color.factor.min(Vec3::ONE);
+        let base_color = self.reflectance(bsdf, "basecolor", 0.5)?;
         let specular = bsdf.float("specular")?.unwrap_or(0.5).clamp(0.0, 0.99);
         let transmission = self.share(bsdf, "spectrans", 0.0)?;
         let has_volume = !is_thin && transmission.factor > 0.0;
@@ -39,8 +39,7 @@ impl Reader {
     }
 
     fn share(&mut self, bsdf: &Element, name: &str, default: f32) -> Result<ScalarInput, LoadError> {
-        let input = self.scalar_input(bsdf, name)?.unwrap_or(ScalarInput::constant(default));
-        Ok(ScalarInput { factor: input.factor.clamp(0.0, 1.0), ..input })
+        Ok(share(self.scalar_input(bsdf, name)?.unwrap_or(ScalarInput::constant(default))))
     }
 
     /// What goes through is tinted by √base_color at each crossing, so by base_color through a whole body: glTF's model tints each

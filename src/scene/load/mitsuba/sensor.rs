@@ -3,7 +3,7 @@
 use super::super::builder::NamedCamera;
 use super::super::default_view;
 use super::super::error::LoadError;
-use super::super::framing::Framing;
+use super::super::framing::{FilmAxis, Framing};
 use super::Reader;
 use super::element::{Element, canonical};
 use super::transform;
@@ -26,16 +26,19 @@ impl Reader {
         let aspect = film.width as f32 / film.height as f32;
         let to_world = transform::of(sensor, "toworld")?;
         let kind = sensor.kind();
-        let axis = |vector| to_world.transform_vector3(vector).try_normalize();
-        let (Some(left), Some(up), Some(forward)) = (axis(Vec3::X), axis(Vec3::Y), axis(Vec3::Z)) else {
+        let direction = |vector| to_world.transform_vector3(vector).try_normalize();
+        let (Some(left), Some(up), Some(forward)) = (direction(Vec3::X), direction(Vec3::Y), direction(Vec3::Z)) else {
             return Err(sensor.error("its transform cannot be undone"));
         };
         if forward.cross(up).length() < 1e-5 {
             return Err(sensor.error("its transform cannot be undone"));
         }
         let mut screen_window = ScreenWindow::centered(aspect);
-        let projection = match kind.as_str() {
-            "perspective" | "thinlens" => Projection::Perspective { vertical_fov_deg: vertical_fov(sensor, aspect)? },
+        let (projection, axis) = match kind.as_str() {
+            "perspective" | "thinlens" => {
+                let view = FieldOfView::of(sensor)?;
+                (Projection::Perspective { vertical_fov_deg: view.vertical_deg(aspect) }, view.axis)
+            }
             "orthographic" | "telecentric" => {
                 // The picture's width spans [−1, 1] of the camera's own x, its pixels are square in the camera's coordinates.
                 let [x, y] = [to_world.matrix3.x_axis, to_world.matrix3.y_axis].map(|axis| axis.length());
@@ -43,7 +46,7 @@ impl Reader {
                     let across = Vec2::new(x / y, 1.0);
                     screen_window = ScreenWindow { min: screen_window.min * across, max: screen_window.max * across };
                 }
-                Projection::Orthographic { height: 2.0 * y / aspect }
+                (Projection::Orthographic { height: 2.0 * y / aspect }, FilmAxis::X)
             }
             other => {
                 return Err(sensor.unsupported(format_args!(
@@ -64,7 +67,10 @@ impl Reader {
         sensor.tagged("sampler").count();
         self.note_unused(&format!("sensor \"{kind}\""), sensor);
         let screen_window = (screen_window != ScreenWindow::centered(aspect)).then_some(screen_window);
-        let framing = screen_window.map_or(Framing::Fixed, |_| Framing::Widening { film: aspect });
+        let framing = match (screen_window, axis) {
+            (None, FilmAxis::Y) => Framing::Fixed,
+            _ => Framing::Spanning { axis, film: aspect, whole: aspect },
+        };
         let camera = Camera {
             projection,
             screen_window,
@@ -126,41 +132,42 @@ impl Reader {
     }
 }
 
-/// `fov` belongs to the x axis unless `fov_axis` says otherwise; without it a focal length on 35 mm film counts.
-fn vertical_fov(sensor: &Element, aspect: f32) -> Result<f32, LoadError> {
-    let axis = sensor.string("fovaxis")?.map(canonical);
-    let half_tangent = |degrees: f32| (0.5 * degrees).to_radians().tan();
-    let (tangent, axis) = match sensor.float("fov")? {
-        Some(fov) if (0.001..=179.0).contains(&fov) => (half_tangent(fov), axis.as_deref().unwrap_or("x")),
-        Some(fov) => return Err(sensor.error(format_args!("\"fov\" must lie in [0.001, 179] degrees, not {fov}"))),
-        None => {
-            let text = sensor.string("focallength")?.unwrap_or("50mm");
-            let millimetres: Option<f32> = text.trim().trim_end_matches("mm").trim().parse().ok();
-            let millimetres = millimetres.filter(|length| *length > 0.0 && length.is_finite());
-            let length = millimetres.ok_or_else(|| sensor.error(format_args!("\"{text}\" is not a focal length")))?;
-            // Half the diagonal of 36 mm × 24 mm.
-            (0.5 * 36.0_f32.hypot(24.0) / length, "diagonal")
-        }
-    };
-    let vertical = match axis {
-        "y" => tangent,
-        "x" => tangent / aspect,
-        "smaller" => {
-            if aspect > 1.0 {
-                tangent
-            } else {
-                tangent / aspect
+/// Half the tangent of a field of view, and what it is for.
+struct FieldOfView {
+    half_tangent: f32,
+    axis: FilmAxis,
+}
+
+impl FieldOfView {
+    /// `fov` belongs to the x axis unless `fov_axis` says otherwise; without it a focal length on 35 mm film counts.
+    fn of(sensor: &Element) -> Result<Self, LoadError> {
+        let axis = match sensor.string("fovaxis")?.map(canonical).as_deref() {
+            None | Some("x") => FilmAxis::X,
+            Some("y") => FilmAxis::Y,
+            Some("smaller") => FilmAxis::Smaller,
+            Some("larger") => FilmAxis::Larger,
+            Some("diagonal") => FilmAxis::Diagonal,
+            Some(other) => return Err(sensor.error(format_args!("unknown fov axis \"{other}\""))),
+        };
+        match sensor.float("fov")? {
+            Some(fov) if (0.001..=179.0).contains(&fov) => {
+                Ok(Self { half_tangent: (0.5 * fov).to_radians().tan(), axis })
+            }
+            Some(fov) => Err(sensor.error(format_args!("\"fov\" must lie in [0.001, 179] degrees, not {fov}"))),
+            None => {
+                let text = sensor.string("focallength")?.unwrap_or("50mm");
+                let millimetres: Option<f32> = text.trim().trim_end_matches("mm").trim().parse().ok();
+                let millimetres = millimetres.filter(|length| *length > 0.0 && length.is_finite());
+                let length =
+                    millimetres.ok_or_else(|| sensor.error(format_args!("\"{text}\" is not a focal length")))?;
+                // Half the diagonal of 36 mm × 24 mm.
+                Ok(Self { half_tangent: 0.5 * 36.0_f32.hypot(24.0) / length, axis: FilmAxis::Diagonal })
             }
         }
-        "larger" => {
-            if aspect > 1.0 {
-                tangent / aspect
-            } else {
-                tangent
-            }
-        }
-        "diagonal" => tangent / aspect.hypot(1.0),
-        other => return Err(sensor.error(format_args!("unknown fov axis \"{other}\""))),
-    };
-    Ok((2.0 * vertical.atan().to_degrees()).clamp(0.001, 179.0))
+    }
+
+    fn vertical_deg(&self, aspect: f32) -> f32 {
+        let vertical = self.half_tangent / self.axis.length(aspect);
+        (2.0 * vertical.atan().to_degrees()).clamp(0.001, 179.0)
+    }
 }

@@ -1,8 +1,8 @@
 //! BSDFs that wrap no other: what each comes to here.
 
 use super::super::error::LoadError;
-use super::super::luminance;
 use super::super::spectrum::named;
+use super::super::{luminance, share};
 use super::Reader;
 use super::element::Element;
 use super::textures::Meaning;
@@ -170,8 +170,7 @@ impl Reader {
                 Distribution::Beckmann
             }
         };
-        let clamped = |input: ScalarInput| ScalarInput { factor: input.factor.clamp(0.0, 1.0), ..input };
-        Ok(Roughness { u: clamped(u), v: (u != v).then_some(clamped(v)), scale: RoughnessScale::Alpha, distribution })
+        Ok(Roughness { u: share(u), v: (u != v).then_some(share(v)), scale: RoughnessScale::Alpha, distribution })
     }
 }
 

@@ -2,9 +2,9 @@
 
 use super::super::builder::NamedCamera;
 use super::super::error::LoadError;
-use super::super::framing::{Framing, half_size};
+use super::super::framing::{FilmAxis, Framing};
 use super::Reader;
-use super::state::Transforms;
+use super::state::{Carried, Path, Transforms};
 use crate::scene::{Camera, FilmDefaults, Motion, MotionKey, Pose, Projection, ScreenWindow};
 use glam::{Affine3A, Vec2, Vec3};
 
@@ -46,14 +46,17 @@ impl Reader<'_> {
         let framing = match (stated_aspect, stated_window) {
             (None, None) => {
                 let FilmDefaults { width, height } = self.builder.film;
-                Framing::ShorterSide { film: width as f32 / height as f32, whole: film_aspect }
+                Framing::Spanning { axis: FilmAxis::Smaller, film: width as f32 / height as f32, whole: film_aspect }
             }
             // pbrt stretches what the file states.
             _ => Framing::Fixed,
         };
         let mut window = match stated_window {
             // The shorter side spans [−1, 1].
-            None => ScreenWindow { min: -half_size(aspect), max: half_size(aspect) },
+            None => {
+                let half_size = FilmAxis::Smaller.half_size(aspect);
+                ScreenWindow { min: -half_size, max: half_size }
+            }
             Some(&[left, right, bottom, top]) if left < right && bottom < top => {
                 ScreenWindow { min: Vec2::new(left as f32, bottom as f32), max: Vec2::new(right as f32, top as f32) }
             }
@@ -102,28 +105,60 @@ impl Reader<'_> {
 
     /// Where a transform is when the shutter opens.
     pub(super) fn here(&self, transforms: &Transforms) -> Affine3A {
-        transforms.at(self.share_of(f64::from(self.shutter[0])))
+        transforms.at(self.share_when_open())
     }
 
     /// The motion while the shutter is open; `None` where nothing moves.
     pub(super) fn motion(&self, transforms: &Transforms) -> Option<Motion> {
-        if !transforms.moves() || self.shutter[1] <= self.shutter[0] {
+        if !transforms.moves() {
+            return None;
+        }
+        self.motion_after(Affine3A::IDENTITY, 1, |share| transforms.at(share))
+    }
+
+    /// Where a part is when the shutter opens, and how it moves from there.
+    pub(super) fn carried(&self, part: &Carried) -> (Affine3A, Option<Motion>) {
+        // Steps of a quarter turn leave its arc by 3e-4 of the radius.
+        const STEPS: u16 = 32;
+        match part.path() {
+            Path::Whole(transforms) => (self.here(&transforms), self.motion(&transforms)),
+            Path::After { inner, outer } => {
+                (self.here(&outer) * inner, self.motion_after(inner, 1, |share| outer.at(share)))
+            }
+            Path::Apart => {
+                let identity = Affine3A::IDENTITY;
+                (part.at(self.share_when_open()), self.motion_after(identity, STEPS, |share| part.at(share)))
+            }
+        }
+    }
+
+    /// The motion of what `before` places at rest: along `at` from start to end of `TransformTimes`, with keys at so many steps.
+    fn motion_after(&self, before: Affine3A, steps: u16, at: impl Fn(f32) -> Affine3A) -> Option<Motion> {
+        if self.shutter[1] <= self.shutter[0] {
             return None;
         }
         let (opens, stays_open) = (f64::from(self.shutter[0]), f64::from(self.shutter[1] - self.shutter[0]));
         let frame_time = self.options.frame_time;
         // Before and after `TransformTimes` everything rests: where the shutter reaches beyond, the motion does not fill it.
-        let ends = self.times.map(|time| ((time - frame_time - opens) / stays_open) as f32);
-        let mut shares: Vec<f32> = [0.0, 1.0].into_iter().chain(ends).filter(|s| (0.0..=1.0).contains(s)).collect();
+        let [start, end] = self.times;
+        let times =
+            (0..=steps).map(|step| f64::from(step) / f64::from(steps)).map(|way| start * (1.0 - way) + end * way);
+        let steps = times.map(|time| ((time - frame_time - opens) / stays_open) as f32);
+        let mut shares: Vec<f32> = [0.0, 1.0].into_iter().chain(steps).filter(|s| (0.0..=1.0).contains(s)).collect();
         shares.sort_by(f32::total_cmp);
         shares.dedup();
-        let at = |share: f32| transforms.at(self.share_of(opens + f64::from(share) * stays_open));
-        let places: Vec<Affine3A> = shares.iter().map(|&share| at(share)).collect();
-        if !places.iter().all(|place| place.is_finite() && place.matrix3.determinant() != 0.0) {
+        let at_share = |share: f32| at(self.share_of(opens + f64::from(share) * stays_open));
+        let places: Vec<Affine3A> = shares.iter().map(|&share| at_share(share)).collect();
+        let can_be_undone = |place: &Affine3A| place.is_finite() && place.matrix3.determinant() != 0.0;
+        if !places.iter().all(|place| can_be_undone(&(*place * before))) {
             return None;
         }
         let keys = shares.into_iter().zip(places).map(|(time, place)| MotionKey { time, pose: Pose::decompose(place) });
-        Motion::new(Affine3A::IDENTITY, keys.collect()).filter(|motion| !motion.rests())
+        Motion::new(before, keys.collect()).filter(|motion| !motion.rests())
+    }
+
+    fn share_when_open(&self) -> f32 {
+        self.share_of(f64::from(self.shutter[0]))
     }
 
     /// How far a time lies between those of `TransformTimes`. Subtracted before it is narrowed: a shot's later hours have f32 times

@@ -3,10 +3,10 @@
 use super::super::error::{LoadError, Place, suggestion};
 use super::super::files;
 use super::lexer::{Lexer, Token};
-use super::parameters::Parameters;
-use super::state::{self, DEEPEST_STACK, Transforms};
-use super::{MOST_INSTANCES, Reader, materials, shapes, textures};
-use glam::{DMat4, DQuat, DVec3};
+use super::parameters::{self, Parameters};
+use super::state::{DEEPEST_STACK, Opening, Transforms};
+use super::transforms::TransformDirective;
+use super::{MOST_INSTANCES, Reader, Scope, materials, shapes, textures};
 use std::path::Path;
 use std::rc::Rc;
 
@@ -17,139 +17,187 @@ const ATTRIBUTE_TARGETS: [&str; 5] = ["shape", "light", "material", "medium", "t
 /// Scatterings of pbrt's paths where the file does not say.
 const DEFAULT_DEPTH: i64 = 5;
 
+/// What a statement is for, by its first word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Directive {
+    Transform(TransformDirective),
+    State(StateDirective),
+    Open(Opening),
+    Close(Opening),
+    ObjectInstance,
+    WorldBegin,
+    WorldEnd,
+    Include,
+    Import,
+    Texture,
+    Entity(Entity),
+    Option,
+    Method(Method),
+}
+
+/// What changes the graphics state but for its transform.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum StateDirective {
+    ReverseOrientation,
+    Attribute,
+    ColorSpace,
+    NamedMaterial,
+    MediumInterface,
+}
+
+/// What has a type or a name, then parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Entity {
+    Material,
+    MakeNamedMaterial,
+    MakeNamedMedium,
+    LightSource,
+    AreaLightSource,
+    Shape,
+    Camera,
+    Film,
+}
+
+/// How pbrt would render, which is fechner's own here.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Method {
+    Integrator,
+    Sampler,
+    PixelFilter,
+    Accelerator,
+}
+
+const DIRECTIVES: [(&str, Directive); 41] = [
+    ("Identity", Directive::Transform(TransformDirective::Identity)),
+    ("Translate", Directive::Transform(TransformDirective::Translate)),
+    ("Scale", Directive::Transform(TransformDirective::Scale)),
+    ("Rotate", Directive::Transform(TransformDirective::Rotate)),
+    ("LookAt", Directive::Transform(TransformDirective::LookAt)),
+    ("Transform", Directive::Transform(TransformDirective::Replace)),
+    ("ConcatTransform", Directive::Transform(TransformDirective::Concat)),
+    ("TransformTimes", Directive::Transform(TransformDirective::Times)),
+    ("ActiveTransform", Directive::Transform(TransformDirective::Activate)),
+    ("CoordinateSystem", Directive::Transform(TransformDirective::NameSystem)),
+    ("CoordSysTransform", Directive::Transform(TransformDirective::UseSystem)),
+    ("ReverseOrientation", Directive::State(StateDirective::ReverseOrientation)),
+    ("Attribute", Directive::State(StateDirective::Attribute)),
+    ("ColorSpace", Directive::State(StateDirective::ColorSpace)),
+    ("NamedMaterial", Directive::State(StateDirective::NamedMaterial)),
+    ("MediumInterface", Directive::State(StateDirective::MediumInterface)),
+    ("AttributeBegin", Directive::Open(Opening::Attribute)),
+    ("AttributeEnd", Directive::Close(Opening::Attribute)),
+    // Another name of the same in version 4.
+    ("TransformBegin", Directive::Open(Opening::Attribute)),
+    ("TransformEnd", Directive::Close(Opening::Attribute)),
+    ("ObjectBegin", Directive::Open(Opening::Object)),
+    ("ObjectEnd", Directive::Close(Opening::Object)),
+    ("ObjectInstance", Directive::ObjectInstance),
+    ("WorldBegin", Directive::WorldBegin),
+    ("WorldEnd", Directive::WorldEnd),
+    ("Include", Directive::Include),
+    ("Import", Directive::Import),
+    ("Texture", Directive::Texture),
+    ("Material", Directive::Entity(Entity::Material)),
+    ("MakeNamedMaterial", Directive::Entity(Entity::MakeNamedMaterial)),
+    ("MakeNamedMedium", Directive::Entity(Entity::MakeNamedMedium)),
+    ("LightSource", Directive::Entity(Entity::LightSource)),
+    ("AreaLightSource", Directive::Entity(Entity::AreaLightSource)),
+    ("Shape", Directive::Entity(Entity::Shape)),
+    ("Camera", Directive::Entity(Entity::Camera)),
+    ("Film", Directive::Entity(Entity::Film)),
+    ("Option", Directive::Option),
+    ("Integrator", Directive::Method(Method::Integrator)),
+    ("Sampler", Directive::Method(Method::Sampler)),
+    ("PixelFilter", Directive::Method(Method::PixelFilter)),
+    ("Accelerator", Directive::Method(Method::Accelerator)),
+];
+
+impl Directive {
+    fn named(word: &str) -> Option<Self> {
+        DIRECTIVES.iter().find(|(name, _)| *name == word).map(|&(_, directive)| directive)
+    }
+}
+
+impl Entity {
+    /// Whether others refer to it by its name.
+    fn is_named(self) -> bool {
+        matches!(self, Self::MakeNamedMaterial | Self::MakeNamedMedium)
+    }
+
+    /// What `Attribute` calls it, if that may set defaults for it.
+    fn attribute_target(self) -> Option<&'static str> {
+        match self {
+            Self::Material | Self::MakeNamedMaterial => Some("material"),
+            Self::MakeNamedMedium => Some("medium"),
+            Self::LightSource | Self::AreaLightSource => Some("light"),
+            Self::Shape => Some("shape"),
+            Self::Camera | Self::Film => None,
+        }
+    }
+}
+
 impl Reader<'_> {
     pub(super) fn read_file(&mut self, path: &Path) -> Result<(), LoadError> {
         let text = files::decode_text(path, files::read_unpacked(path)?)?;
         let outer = std::mem::replace(&mut self.file, path.to_owned());
         let mut lexer = Lexer::new(path, &text);
         while let Some((token, line)) = lexer.next()? {
-            let Token::Word(directive) = token else {
+            let Token::Word(word) = token else {
                 return Err(LoadError::invalid_at(lexer.place(line), "expected a directive"));
             };
-            self.directive(directive, &mut lexer, line)?;
+            self.directive(word, &mut lexer, line)?;
         }
         self.file = outer;
         Ok(())
     }
 
-    fn directive(&mut self, directive: &str, lexer: &mut Lexer, line: usize) -> Result<(), LoadError> {
+    fn directive(&mut self, word: &str, lexer: &mut Lexer, line: usize) -> Result<(), LoadError> {
+        let Some(directive) = Directive::named(word) else {
+            let known = DIRECTIVES.iter().map(|(name, _)| *name);
+            let problem = format!("unknown directive {word}{}", suggestion(word, known));
+            return Err(LoadError::invalid_at(lexer.place(line), problem));
+        };
         match directive {
-            "Identity" => self.state.change(|_| DMat4::IDENTITY),
-            "Translate" => {
-                let [x, y, z] = numbers(lexer, line)?;
-                self.state.change(|m| m * DMat4::from_translation(DVec3::new(x, y, z)));
-            }
-            "Scale" => {
-                let [x, y, z] = numbers(lexer, line)?;
-                self.state.change(|m| m * DMat4::from_scale(DVec3::new(x, y, z)));
-            }
-            "Rotate" => {
-                let [angle, x, y, z] = numbers(lexer, line)?;
-                let Some(axis) = DVec3::new(x, y, z).try_normalize() else {
-                    return Err(LoadError::invalid_at(lexer.place(line), "Rotate about an axis of no length"));
-                };
-                self.state.change(|m| m * DMat4::from_quat(DQuat::from_axis_angle(axis, angle.to_radians())));
-            }
-            "LookAt" => {
-                let [ex, ey, ez, tx, ty, tz, ux, uy, uz] = numbers(lexer, line)?;
-                let [eye, target, up] = [[ex, ey, ez], [tx, ty, tz], [ux, uy, uz]].map(DVec3::from_array);
-                let Some(look) = state::look_at(eye, target, up) else {
-                    let problem = "LookAt needs two different points and an up vector that is not along their line";
-                    return Err(LoadError::invalid_at(lexer.place(line), problem));
-                };
-                self.state.change(|m| m * look);
-            }
-            "Transform" | "ConcatTransform" => {
-                let matrix = DMat4::from_cols_array(&numbers(lexer, line)?);
-                let replace = directive == "Transform";
-                self.state.change(|m| if replace { matrix } else { m * matrix });
-            }
-            "TransformTimes" => {
-                let [start, end] = numbers(lexer, line)?;
-                self.times = [start, end];
-            }
-            "ActiveTransform" => {
-                self.builder.at_another_time = Some(super::read);
-                self.state.active = match lexer.next()? {
-                    Some((Token::Word("StartTime"), _)) => [true, false],
-                    Some((Token::Word("EndTime"), _)) => [false, true],
-                    Some((Token::Word("All"), _)) => [true, true],
-                    _ => {
-                        let problem = "ActiveTransform: expected StartTime, EndTime or All";
-                        return Err(LoadError::invalid_at(lexer.place(line), problem));
-                    }
-                };
-            }
-            "CoordinateSystem" => {
-                self.coordinate_systems.insert(string(lexer, line)?, self.state.transforms);
-            }
-            "CoordSysTransform" => {
+            Directive::Transform(directive) => self.transform(directive, lexer, line)?,
+            Directive::State(directive) => self.change_state(directive, lexer, line)?,
+            Directive::Open(Opening::Object) => self.begin_object(lexer, line)?,
+            Directive::Open(opening) => self.push(opening, lexer.place(line))?,
+            Directive::Close(opening) => self.pop(opening, word, lexer.place(line))?,
+            Directive::ObjectInstance => {
                 let name = string(lexer, line)?;
-                match self.coordinate_systems.get(&name) {
-                    Some(transforms) => self.state.transforms = *transforms,
-                    None => self.builder.note(format!("{}: no coordinate system \"{name}\".", lexer.place(line))),
+                if self.scope != Scope::Definitions {
+                    self.place_object(&name, lexer.place(line))?;
                 }
             }
-            "ReverseOrientation" => self.state.reverse_orientation ^= true,
-            "AttributeBegin" => self.push("AttributeBegin", lexer.place(line))?,
-            "TransformBegin" => self.push("TransformBegin", lexer.place(line))?,
-            "AttributeEnd" => self.pop("AttributeBegin", directive, lexer.place(line))?,
-            "TransformEnd" => self.pop("TransformBegin", directive, lexer.place(line))?,
-            "Attribute" => {
-                let target = string(lexer, line)?;
-                if !ATTRIBUTE_TARGETS.contains(&target.as_str()) {
-                    let problem = format!("Attribute \"{target}\"{}", suggestion(&target, ATTRIBUTE_TARGETS));
-                    return Err(LoadError::invalid_at(lexer.place(line), problem));
-                }
-                let parameters = Parameters::read(lexer, line)?;
-                self.state.attributes.entry(target).or_default().extend(parameters.into_list());
-            }
-            "ObjectBegin" => {
-                let name = string(lexer, line)?;
-                if self.current_object.is_some() {
-                    return Err(LoadError::invalid_at(lexer.place(line), "ObjectBegin inside an object"));
-                }
-                self.push("ObjectBegin", lexer.place(line))?;
-                self.objects.insert(name.clone(), Vec::new());
-                self.current_object = Some(name);
-            }
-            "ObjectEnd" => {
-                self.pop("ObjectBegin", directive, lexer.place(line))?;
-                self.current_object = None;
-            }
-            "ObjectInstance" => self.place_object(&string(lexer, line)?, lexer.place(line))?,
-            "WorldBegin" => {
-                self.coordinate_systems.insert("world".to_owned(), Transforms::IDENTITY);
-                self.place_camera()?;
-                self.state.transforms = Transforms::IDENTITY;
-                self.state.active = [true; 2];
-                self.in_world = true;
-            }
-            "WorldEnd" => {}
-            "Include" => self.include(&string(lexer, line)?, lexer.place(line))?,
-            "Import" => {
+            Directive::WorldBegin => self.begin_world()?,
+            Directive::WorldEnd => {}
+            Directive::Include => self.include(&string(lexer, line)?, lexer.place(line))?,
+            Directive::Import => {
                 let state = self.state.clone();
                 self.include(&string(lexer, line)?, lexer.place(line))?;
                 self.state = state;
             }
-            "ColorSpace" => {
+            Directive::Texture => self.texture(lexer, line)?,
+            Directive::Entity(entity) => self.entity(entity, lexer, line)?,
+            Directive::Option => self.option(lexer, line)?,
+            Directive::Method(method) => self.method(method, lexer, line)?,
+        }
+        Ok(())
+    }
+
+    fn change_state(&mut self, directive: StateDirective, lexer: &mut Lexer, line: usize) -> Result<(), LoadError> {
+        match directive {
+            StateDirective::ReverseOrientation => self.state.reverse_orientation ^= true,
+            StateDirective::Attribute => self.attribute(lexer, line)?,
+            StateDirective::ColorSpace => self.color_space(&string(lexer, line)?, lexer.place(line))?,
+            StateDirective::NamedMaterial => {
                 let name = string(lexer, line)?;
-                if !["srgb", "rec2020", "dci-p3", "aces2065-1"].contains(&name.as_str()) {
-                    return Err(LoadError::invalid_at(
-                        lexer.place(line),
-                        format_args!("unknown colour space \"{name}\": srgb, rec2020, dci-p3 and aces2065-1 are"),
-                    ));
-                }
-                if name != "srgb" {
-                    self.builder.note(format!("Colours of the space \"{name}\" are taken for Rec.709."));
+                if self.scope != Scope::Definitions {
+                    let user = Parameters::none(lexer.place(line));
+                    self.state.material = Some(self.named_material(&user, &name)?);
                 }
             }
-            "NamedMaterial" => {
-                let name = string(lexer, line)?;
-                let user = Parameters::none(lexer.place(line));
-                self.state.material = Some(self.named_material(&user, &name)?);
-            }
-            "MediumInterface" => {
+            StateDirective::MediumInterface => {
                 let inside = string(lexer, line)?;
                 let outside = match lexer.peek()? {
                     Some(Token::Quoted(_)) => string(lexer, line)?,
@@ -158,87 +206,114 @@ impl Reader<'_> {
                 let named = |name: String| Some(name).filter(|name| !name.is_empty());
                 (self.state.inside_medium, self.state.outside_medium) = (named(inside), named(outside));
             }
-            "Texture" => {
-                let (name, class, kind) = (string(lexer, line)?, string(lexer, line)?, string(lexer, line)?);
-                let class = match class.as_str() {
-                    "spectrum" => "spectrum",
-                    "float" => "float",
-                    other => {
-                        let meant = if other == "color" { materials::UPGRADE } else { ": expected spectrum or float" };
-                        let problem = format!("texture \"{name}\" is of \"{other}\"{meant}");
-                        return Err(LoadError::invalid_at(lexer.place(line), problem));
-                    }
-                };
-                let parameters = self.parameters(lexer, line, "texture")?;
-                self.textures.insert((class, name), Rc::new(textures::Definition::new(&kind, parameters)));
-            }
-            "Option" => {
-                let user = Parameters::read(lexer, line)?;
-                self.note_unread("Option", &user);
-            }
-            "Material" | "MakeNamedMaterial" | "MakeNamedMedium" | "LightSource" | "AreaLightSource" | "Shape"
-            | "Camera" | "Film" => {
-                let name = string(lexer, line)?;
-                self.typed(directive, name, lexer, line)?;
-            }
-            "Integrator" | "Sampler" | "PixelFilter" | "Accelerator" => {
-                string(lexer, line)?;
-                let user = Parameters::read(lexer, line)?;
-                if directive == "Integrator" {
-                    self.builder.note_depth(user.integer("maxdepth")?.unwrap_or(DEFAULT_DEPTH));
-                }
-                self.builder.note("Integrator, sampler, filter and accelerator are fechner's own, not the file's.");
-            }
-            other => {
-                let known = [
-                    "Shape",
-                    "Texture",
-                    "Material",
-                    "NamedMaterial",
-                    "AttributeBegin",
-                    "AttributeEnd",
-                    "LightSource",
-                    "AreaLightSource",
-                    "Transform",
-                    "Translate",
-                    "Rotate",
-                    "Scale",
-                    "WorldBegin",
-                    "Include",
-                    "Camera",
-                    "Film",
-                ];
-                let problem = format!("unknown directive {other}{}", suggestion(other, known));
-                return Err(LoadError::invalid_at(lexer.place(line), problem));
-            }
         }
         Ok(())
     }
 
-    /// Directives with a type or name and parameters.
-    fn typed(&mut self, directive: &str, name: String, lexer: &mut Lexer, line: usize) -> Result<(), LoadError> {
-        let class = match directive {
-            "Material" | "MakeNamedMaterial" => "material",
-            "MakeNamedMedium" => "medium",
-            "LightSource" | "AreaLightSource" => "light",
-            "Shape" => "shape",
-            _ => "",
+    fn attribute(&mut self, lexer: &mut Lexer, line: usize) -> Result<(), LoadError> {
+        let target = string(lexer, line)?;
+        if !ATTRIBUTE_TARGETS.contains(&target.as_str()) {
+            let problem = format!("Attribute \"{target}\"{}", suggestion(&target, ATTRIBUTE_TARGETS));
+            return Err(LoadError::invalid_at(lexer.place(line), problem));
+        }
+        let parameters = Parameters::read(lexer, line)?;
+        self.state.attributes.entry(target).or_default().extend(parameters.into_list());
+        Ok(())
+    }
+
+    fn color_space(&mut self, name: &str, place: Place) -> Result<(), LoadError> {
+        if !["srgb", "rec2020", "dci-p3", "aces2065-1"].contains(&name) {
+            let problem = format_args!("unknown colour space \"{name}\": srgb, rec2020, dci-p3 and aces2065-1 are");
+            return Err(LoadError::invalid_at(place, problem));
+        }
+        if name != "srgb" {
+            self.builder.note(format!("Colours of the space \"{name}\" are taken for Rec.709."));
+        }
+        Ok(())
+    }
+
+    fn begin_object(&mut self, lexer: &mut Lexer, line: usize) -> Result<(), LoadError> {
+        let name = string(lexer, line)?;
+        if self.current_object.is_some() {
+            return Err(LoadError::invalid_at(lexer.place(line), "ObjectBegin inside an object"));
+        }
+        self.push(Opening::Object, lexer.place(line))?;
+        self.objects.insert(name.clone(), Vec::new());
+        self.current_object = Some(name);
+        Ok(())
+    }
+
+    fn begin_world(&mut self) -> Result<(), LoadError> {
+        self.coordinate_systems.insert("world".to_owned(), Transforms::IDENTITY);
+        self.place_camera()?;
+        self.state.transforms = Transforms::IDENTITY;
+        self.state.active = [true; 2];
+        self.in_world = true;
+        Ok(())
+    }
+
+    fn texture(&mut self, lexer: &mut Lexer, line: usize) -> Result<(), LoadError> {
+        let (name, class, kind) = (string(lexer, line)?, string(lexer, line)?, string(lexer, line)?);
+        let class = match class.as_str() {
+            "spectrum" => "spectrum",
+            "float" => "float",
+            other => {
+                let meant = if other == "color" { materials::UPGRADE } else { ": expected spectrum or float" };
+                let problem = format!("texture \"{name}\" is of \"{other}\"{meant}");
+                return Err(LoadError::invalid_at(lexer.place(line), problem));
+            }
         };
-        let parameters = self.parameters(lexer, line, class)?;
-        match directive {
-            "Material" => {
+        let parameters = self.parameters(lexer, line, Some("texture"))?;
+        self.textures.insert((class, name), Rc::new(textures::Definition::new(&kind, parameters)));
+        Ok(())
+    }
+
+    /// A name and one value, as pbrt-v4 has it, or a list of parameters.
+    fn option(&mut self, lexer: &mut Lexer, line: usize) -> Result<(), LoadError> {
+        let name = match lexer.peek()? {
+            Some(Token::Quoted(name)) if !name.contains(char::is_whitespace) => name.to_string(),
+            _ => {
+                let user = Parameters::read(lexer, line)?;
+                self.note_unread("Option", &user);
+                return Ok(());
+            }
+        };
+        lexer.next()?;
+        parameters::read_values(lexer, line)?;
+        self.builder.note(format!("{}: Option: not used: \"{name}\".", lexer.place(line)));
+        Ok(())
+    }
+
+    fn method(&mut self, method: Method, lexer: &mut Lexer, line: usize) -> Result<(), LoadError> {
+        string(lexer, line)?;
+        let user = Parameters::read(lexer, line)?;
+        if method == Method::Integrator {
+            self.builder.note_depth(user.integer("maxdepth")?.unwrap_or(DEFAULT_DEPTH));
+        }
+        self.builder.note("Integrator, sampler, filter and accelerator are fechner's own, not the file's.");
+        Ok(())
+    }
+
+    fn entity(&mut self, entity: Entity, lexer: &mut Lexer, line: usize) -> Result<(), LoadError> {
+        let name = string(lexer, line)?;
+        let parameters = self.parameters(lexer, line, entity.attribute_target())?;
+        if self.scope == Scope::Definitions && !entity.is_named() {
+            return Ok(());
+        }
+        match entity {
+            Entity::Material => {
                 let definition = materials::Definition { name: name.clone(), kind: name, parameters };
                 self.state.material = Some(Rc::new(definition));
             }
-            "MakeNamedMaterial" => {
+            Entity::MakeNamedMaterial => {
                 let kind = parameters.string("type")?.map(str::to_owned);
                 let kind = kind.ok_or_else(|| parameters.error("a named material needs a \"string type\""))?;
                 let definition = materials::Definition { name: name.clone(), kind, parameters };
                 self.named_materials.insert(name, Rc::new(definition));
             }
-            "MakeNamedMedium" => self.medium(&name, &parameters)?,
-            "LightSource" => self.light(&name, &parameters)?,
-            "AreaLightSource" => {
+            Entity::MakeNamedMedium => self.medium(&name, &parameters)?,
+            Entity::LightSource => self.light(&name, &parameters)?,
+            Entity::AreaLightSource => {
                 if name != "diffuse" {
                     return Err(
                         parameters.error(format_args!("unknown area light \"{name}\"; \"diffuse\" is the only one"))
@@ -246,13 +321,13 @@ impl Reader<'_> {
                 }
                 self.state.area_light = Some(Rc::new(parameters));
             }
-            "Shape" => {
+            Entity::Shape => {
                 if self.builder.instances.len() >= MOST_INSTANCES {
                     return Err(LoadError::too_large(&self.main, format_args!("more than {MOST_INSTANCES} shapes")));
                 }
                 self.shape(&name, &parameters)?;
             }
-            "Camera" => {
+            Entity::Camera => {
                 if let Some(medium) = &self.state.outside_medium {
                     return Err(parameters.unsupported(format_args!(
                         "the camera stands in the medium \"{medium}\": a medium that fills the view is not rendered"
@@ -261,42 +336,40 @@ impl Reader<'_> {
                 self.coordinate_systems.insert("camera".to_owned(), self.state.transforms.inverse());
                 self.camera = Some((name, parameters, self.state.transforms));
             }
-            _ => self.film = Some((name, parameters)),
+            Entity::Film => self.film = Some((name, parameters)),
         }
         Ok(())
     }
 
-    fn parameters(&self, lexer: &mut Lexer, line: usize, class: &str) -> Result<Parameters, LoadError> {
+    /// What follows a directive, with the defaults that `Attribute` has set for its target.
+    fn parameters(&self, lexer: &mut Lexer, line: usize, target: Option<&str>) -> Result<Parameters, LoadError> {
         let parameters = Parameters::read(lexer, line)?;
-        Ok(match self.state.attributes.get(class) {
+        Ok(match target.and_then(|target| self.state.attributes.get(target)) {
             Some(defaults) => parameters.with_defaults(defaults),
             None => parameters,
         })
     }
 
-    fn push(&mut self, opened_by: &'static str, place: Place) -> Result<(), LoadError> {
+    fn push(&mut self, opening: Opening, place: Place) -> Result<(), LoadError> {
         if self.stack.len() >= DEEPEST_STACK {
             return Err(LoadError::invalid_at(place, format_args!("attributes nested deeper than {DEEPEST_STACK}")));
         }
-        self.stack.push((self.state.clone(), opened_by));
+        self.stack.push((self.state.clone(), opening));
         Ok(())
     }
 
-    fn pop(&mut self, opened_by: &str, directive: &str, place: Place) -> Result<(), LoadError> {
-        match self.stack.pop() {
-            Some((state, opened)) if opened == opened_by => {
-                if opened == "TransformBegin" {
-                    self.state.transforms = state.transforms;
-                } else {
-                    self.state = state;
-                }
-                Ok(())
-            }
-            Some((_, opened)) => {
-                Err(LoadError::invalid_at(place, format_args!("{directive} closes what {opened} opened")))
-            }
-            None => Err(LoadError::invalid_at(place, format_args!("{directive} without {opened_by}"))),
+    fn pop(&mut self, opening: Opening, word: &str, place: Place) -> Result<(), LoadError> {
+        let Some((state, opened)) = self.stack.pop() else {
+            return Err(LoadError::invalid_at(place, format_args!("{word} without {}", opening.begin())));
+        };
+        if opened != opening {
+            return Err(LoadError::invalid_at(place, format_args!("{word} closes what {} opened", opened.begin())));
         }
+        self.state = state;
+        if opening == Opening::Object {
+            self.current_object = None;
+        }
+        Ok(())
     }
 
     fn include(&mut self, name: &str, place: Place) -> Result<(), LoadError> {
@@ -331,29 +404,8 @@ impl Reader<'_> {
     }
 }
 
-/// Numbers behind a directive, with or without brackets.
-fn numbers<const N: usize>(lexer: &mut Lexer, line: usize) -> Result<[f64; N], LoadError> {
-    let mut values = [0.0; N];
-    let bracket = matches!(lexer.peek()?, Some(Token::Open));
-    if bracket {
-        lexer.next()?;
-    }
-    let wrong = |lexer: &Lexer| LoadError::invalid_at(lexer.place(line), format_args!("expected {N} finite numbers"));
-    for value in &mut values {
-        *value = match lexer.next()? {
-            Some((Token::Word(word), _)) => word.parse().ok().filter(|n: &f64| (*n as f32).is_finite()),
-            _ => None,
-        }
-        .ok_or_else(|| wrong(lexer))?;
-    }
-    if bracket && !matches!(lexer.next()?, Some((Token::Close, _))) {
-        return Err(wrong(lexer));
-    }
-    Ok(values)
-}
-
 /// A string behind a directive.
-fn string(lexer: &mut Lexer, line: usize) -> Result<String, LoadError> {
+pub(super) fn string(lexer: &mut Lexer, line: usize) -> Result<String, LoadError> {
     match lexer.next()? {
         Some((Token::Quoted(text), _)) => Ok(text.into_owned()),
         _ => Err(LoadError::invalid_at(lexer.place(line), "expected a string in quotes")),

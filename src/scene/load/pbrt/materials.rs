@@ -1,6 +1,7 @@
 //! `Material` and its named kin, and the media behind their surfaces.
 
 use super::super::error::{LoadError, suggestion};
+use super::super::share;
 use super::super::spectrum::named;
 use super::Reader;
 use super::inputs::Meaning;
@@ -14,6 +15,9 @@ use std::rc::Rc;
 
 /// Deepest nesting of mixes.
 const DEEPEST: usize = 16;
+
+/// What a metal may reflect face on: for all light k would be infinite.
+const MOST_REFLECTED: Vec3 = Vec3::splat(0.9999);
 
 /// The materials that are read, for messages.
 const KNOWN: [&str; 9] = [
@@ -88,7 +92,10 @@ impl Reader<'_> {
     }
 
     /// The material of a name.
-    pub(super) fn named_material(&self, user: &Parameters, name: &str) -> Result<Rc<Definition>, LoadError> {
+    pub(super) fn named_material(&mut self, user: &Parameters, name: &str) -> Result<Rc<Definition>, LoadError> {
+        if !self.named_materials.contains_key(name) {
+            self.look_ahead()?;
+        }
         self.named_materials.get(name).cloned().ok_or_else(|| {
             let mut known: Vec<&str> = self.named_materials.keys().map(String::as_str).collect();
             known.sort_unstable();
@@ -137,7 +144,7 @@ impl Reader<'_> {
             }
             "coatedconductor" => {
                 self.note_coat(parameters);
-                let (eta, k) = self.metal(parameters, "conductor.")?;
+                let (eta, k) = self.coated_metal(parameters)?;
                 Surface::CoatedConductor {
                     eta,
                     k,
@@ -146,10 +153,7 @@ impl Reader<'_> {
                     coat_roughness: self.roughness(parameters, "interface.")?,
                 }
             }
-            "conductor" => {
-                let (eta, k) = self.metal(parameters, "")?;
-                Surface::conductor(eta, k, self.roughness(parameters, "")?)
-            }
+            "conductor" => self.conductor(parameters)?,
             "dielectric" => Surface::Dielectric {
                 ior: self.ior(parameters, "eta", 1.5)?,
                 roughness: self.roughness(parameters, "")?,
@@ -161,7 +165,7 @@ impl Reader<'_> {
                 transmittance: ColorInput::constant(Vec3::ONE),
             },
             "diffusetransmission" => {
-                let scale = parameters.float_or("scale", 1.0)?.clamp(0.0, 1.0);
+                let scale = parameters.float_or("scale", 1.0)?.max(0.0);
                 let scaled = |color: ColorInput| ColorInput { factor: color.factor * scale, ..color };
                 let transmittance = self.color_input(parameters, "transmittance", Meaning::Reflectance)?;
                 Surface::DiffuseTransmission {
@@ -242,18 +246,51 @@ impl Reader<'_> {
         Ok(color.unwrap_or(ColorInput::constant(Vec3::splat(default))))
     }
 
-    /// η and k, or those that reflect a colour at normal incidence as pbrt makes them: η = 1, k = 2√r / √(1 − r).
-    fn metal(&mut self, parameters: &Parameters, prefix: &str) -> Result<(Vec3, Vec3), LoadError> {
+    /// A picture of reflectances darkens the metal of its brightest texel: as in pbrt face on, and no brighter at grazing angles.
+    fn conductor(&mut self, parameters: &Parameters) -> Result<Surface, LoadError> {
+        let Some(color) = self.metal_color(parameters, "")? else {
+            let (eta, k) = self.metal(parameters, "")?;
+            return Ok(Surface::conductor(eta, k, self.roughness(parameters, "")?));
+        };
+        let Some(lookup) = color.texture else {
+            let (eta, k) = metal_that_reflects(color.factor);
+            return Ok(Surface::conductor(eta, k, self.roughness(parameters, "")?));
+        };
+        self.builder.note(format!(
+            "{}: a metal's textured reflectance darkens one metal: what is dark stays dark at grazing angles.",
+            parameters.place()
+        ));
+        let brightest =
+            (color.factor * self.builder.textures.brightest(lookup.texture)?).clamp(Vec3::ZERO, MOST_REFLECTED);
+        let (eta, k) = metal_that_reflects(brightest);
+        let factor = color.factor / brightest.max(Vec3::splat(f32::MIN_POSITIVE));
+        let tint = ColorInput { factor: factor.min(Vec3::MAX), texture: color.texture };
+        Ok(Surface::Conductor { eta, k, tint, roughness: self.roughness(parameters, "")? })
+    }
+
+    /// The metal of a coated conductor, which has no place for a picture.
+    fn coated_metal(&mut self, parameters: &Parameters) -> Result<(Vec3, Vec3), LoadError> {
+        let Some(color) = self.metal_color(parameters, "conductor.")? else {
+            return self.metal(parameters, "conductor.");
+        };
+        if color.texture.is_some() {
+            let note = format!("{}: a metal's textured reflectance is its mean under a coat.", parameters.place());
+            self.builder.note(note);
+        }
+        Ok(metal_that_reflects(self.mean_of_color(&color)?))
+    }
+
+    fn metal_color(&mut self, parameters: &Parameters, prefix: &str) -> Result<Option<ColorInput>, LoadError> {
         for name in [format!("{prefix}reflectance"), "reflectance".to_owned()] {
             if let Some(color) = self.color_input(parameters, &name, Meaning::Reflectance)? {
-                if color.texture.is_some() {
-                    let note = format!("{}: a metal's textured reflectance is its factor.", parameters.place());
-                    self.builder.note(note);
-                }
-                let r = color.factor.clamp(Vec3::ZERO, Vec3::splat(0.9999));
-                return Ok((Vec3::ONE, 2.0 * (r / (Vec3::ONE - r)).powf(0.5)));
+                return Ok(Some(color));
             }
         }
+        Ok(None)
+    }
+
+    /// η and k.
+    fn metal(&mut self, parameters: &Parameters, prefix: &str) -> Result<(Vec3, Vec3), LoadError> {
         let copper = named::metal("Cu").map_or((Vec3::ONE, Vec3::ONE), |metal| (metal.eta, metal.k));
         let eta = self.color(parameters, &format!("{prefix}eta"), Meaning::Coefficient)?.unwrap_or(copper.0);
         let k = self.color(parameters, &format!("{prefix}k"), Meaning::Coefficient)?.unwrap_or(copper.1);
@@ -268,12 +305,17 @@ impl Reader<'_> {
         let u = self.scalar_input(parameters, &format!("{prefix}uroughness"))?.unwrap_or(both);
         let v = self.scalar_input(parameters, &format!("{prefix}vroughness"))?.unwrap_or(both);
         let remap = parameters.boolean_or("remaproughness", true)?;
-        let clamped = |input: ScalarInput| ScalarInput { factor: input.factor.clamp(0.0, 1.0), ..input };
         Ok(Roughness {
-            u: clamped(u),
-            v: (u != v).then_some(clamped(v)),
+            u: share(u),
+            v: (u != v).then_some(share(v)),
             scale: if remap { RoughnessScale::SquareRoot } else { RoughnessScale::Alpha },
             distribution: Distribution::Ggx,
         })
     }
+}
+
+/// The η and k that reflect a colour at normal incidence as pbrt makes them: η = 1, k = 2√r / √(1 − r).
+fn metal_that_reflects(color: Vec3) -> (Vec3, Vec3) {
+    let r = color.clamp(Vec3::ZERO, MOST_REFLECTED);
+    (Vec3::ONE, 2.0 * (r / (Vec3::ONE - r)).powf(0.5))
 }

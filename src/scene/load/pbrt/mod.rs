@@ -15,13 +15,14 @@ mod parameters;
 mod shapes;
 mod state;
 mod textures;
+mod transforms;
 
 use super::LoadOptions;
 use super::builder::{ASSUMED_NITS_PER_UNIT, Builder, IfDark};
 use super::error::{LoadError, suggestion};
 use crate::scene::{Alpha, Material, MaterialId, MeshId, ScalarInput, Scene, Surface};
 use parameters::Parameters;
-use state::{State, Transforms};
+use state::{Opening, State, Transforms};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -35,34 +36,19 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
 }
 
 fn read(path: &Path, options: &LoadOptions) -> Result<Builder, LoadError> {
-    let mut reader = Reader {
-        main: path.to_owned(),
-        file: path.to_owned(),
-        options,
-        builder: Builder::new(path, options),
-        state: State::new(),
-        stack: Vec::new(),
-        coordinate_systems: HashMap::new(),
-        textures: HashMap::new(),
-        named_materials: HashMap::new(),
-        media: HashMap::new(),
-        objects: HashMap::new(),
-        current_object: None,
-        converted: HashMap::new(),
-        keep_alive: Vec::new(),
-        ply_files: HashMap::new(),
-        camera: None,
-        film: None,
-        times: [0.0, 1.0],
-        shutter: [0.0, 0.0],
-        exposure: 1.0,
-        in_world: false,
-        is_photometric: false,
-        includes: 0,
-        made_vertices: 0,
-    };
+    let mut reader = Reader::new(path, options, Scope::All);
     reader.read_file(path)?;
     reader.into_builder(path)
+}
+
+/// What of a file is taken in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Scope {
+    All,
+    /// All, and what is defined further on is known.
+    AllKnownAhead,
+    /// Named textures, materials and media alone.
+    Definitions,
 }
 
 /// A shape of an object that may be placed many times.
@@ -81,10 +67,11 @@ struct Reader<'a> {
     main: PathBuf,
     file: PathBuf,
     options: &'a LoadOptions,
+    scope: Scope,
     builder: Builder,
     state: State,
     /// Saved states, and what opened them.
-    stack: Vec<(State, &'static str)>,
+    stack: Vec<(State, Opening)>,
     coordinate_systems: HashMap<String, Transforms>,
     textures: HashMap<(&'static str, String), Rc<textures::Definition>>,
     named_materials: HashMap<String, Rc<materials::Definition>>,
@@ -109,6 +96,58 @@ struct Reader<'a> {
     includes: usize,
     /// Of meshes that stand for spheres and their like.
     made_vertices: usize,
+}
+
+impl<'a> Reader<'a> {
+    fn new(path: &Path, options: &'a LoadOptions, scope: Scope) -> Self {
+        Self {
+            main: path.to_owned(),
+            file: path.to_owned(),
+            options,
+            scope,
+            builder: Builder::new(path, options),
+            state: State::new(),
+            stack: Vec::new(),
+            coordinate_systems: HashMap::new(),
+            textures: HashMap::new(),
+            named_materials: HashMap::new(),
+            media: HashMap::new(),
+            objects: HashMap::new(),
+            current_object: None,
+            converted: HashMap::new(),
+            keep_alive: Vec::new(),
+            ply_files: HashMap::new(),
+            camera: None,
+            film: None,
+            times: [0.0, 1.0],
+            shutter: [0.0, 0.0],
+            exposure: 1.0,
+            in_world: false,
+            is_photometric: false,
+            includes: 0,
+            made_vertices: 0,
+        }
+    }
+
+    /// Finds what the file defines further on, once: pbrt looks names up when it has read everything.
+    fn look_ahead(&mut self) -> Result<(), LoadError> {
+        if self.scope != Scope::All {
+            return Ok(());
+        }
+        self.scope = Scope::AllKnownAhead;
+        let mut ahead = Reader::new(&self.main, self.options, Scope::Definitions);
+        ahead.read_file(&self.main)?;
+        for (name, texture) in ahead.textures {
+            self.textures.entry(name).or_insert(texture);
+        }
+        for (name, material) in ahead.named_materials {
+            self.named_materials.entry(name).or_insert(material);
+        }
+        for (name, medium) in ahead.media {
+            self.media.entry(name).or_insert(medium);
+        }
+        Ok(())
+    }
 }
 
 impl Reader<'_> {
@@ -149,20 +188,17 @@ impl Reader<'_> {
             return Ok(*id);
         }
         let id = match self.convert_material(&definition)? {
-            None if light.is_none() => {
-                if medium.is_some() {
-                    return Err(
-                        shape.unsupported("a volume without a surface is not rendered; absorption behind glass is")
-                    );
+            None if medium.is_some() => {
+                return Err(shape.unsupported("a volume without a surface is not rendered; absorption behind glass is"));
+            }
+            None => {
+                if light.is_some() {
+                    self.builder.note("Area lights of material \"interface\" do not shine, as in pbrt.");
                 }
                 self.builder.note("Shapes of material \"interface\" are not there.");
                 None
             }
-            converted => {
-                let black = crate::scene::ColorInput::constant(glam::Vec3::ZERO);
-                let mut material = converted.unwrap_or_else(|| {
-                    Material::plain(definition.name.clone(), Surface::Diffuse { reflectance: black })
-                });
+            Some(mut material) => {
                 if let Some(light) = &light {
                     let emission = self.emission(light)?;
                     material.emission = emission.radiance;
@@ -194,6 +230,9 @@ impl Reader<'_> {
 
     /// Puts the absorption of a medium behind a surface.
     fn fill(&mut self, material: &mut Material, name: &str, shape: &Parameters) -> Result<(), LoadError> {
+        if !self.media.contains_key(name) {
+            self.look_ahead()?;
+        }
         let Some(medium) = self.media.get(name) else {
             let mut known: Vec<&str> = self.media.keys().map(String::as_str).collect();
             known.sort_unstable();
@@ -215,7 +254,7 @@ impl Reader<'_> {
 
     fn into_builder(mut self, path: &Path) -> Result<Builder, LoadError> {
         if let Some((_, opened)) = self.stack.last() {
-            return Err(LoadError::invalid(path, format_args!("{opened} is never closed")));
+            return Err(LoadError::invalid(path, format_args!("{} is never closed", opened.begin())));
         }
         if !self.in_world {
             return Err(LoadError::invalid(path, "the file has no WorldBegin"));

@@ -246,7 +246,7 @@ impl Parameters {
 }
 
 /// One value, or values in brackets.
-fn read_values(lexer: &mut Lexer, line: usize) -> Result<Values, LoadError> {
+pub(super) fn read_values(lexer: &mut Lexer, line: usize) -> Result<Values, LoadError> {
     let missing = |lexer: &Lexer| LoadError::invalid_at(lexer.place(line), "a parameter without a value");
     let Some((first, first_line)) = lexer.next()? else { return Err(missing(lexer)) };
     let mut numbers = Vec::new();

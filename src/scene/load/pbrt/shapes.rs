@@ -7,6 +7,7 @@ use super::super::error::LoadError;
 use super::super::{ply, shapes};
 use super::Reader;
 use super::parameters::Parameters;
+use super::state::{Carried, Transforms};
 use crate::scene::{Instance, Mesh, MeshId, Sphere};
 use glam::{Affine3A, Vec2, Vec3};
 use std::f32::consts::{PI, TAU};
@@ -25,12 +26,27 @@ enum Shape {
     Sphere(f32),
 }
 
+/// A sphere in the world.
+struct Ball {
+    radius: f32,
+    placed: Affine3A,
+}
+
 impl Reader<'_> {
     /// Adds a shape to the scene, or to the object that is being defined.
     pub(super) fn shape(&mut self, kind: &str, parameters: &Parameters) -> Result<(), LoadError> {
-        let reverse = self.state.reverse_orientation;
-        let to_world = self.state.transforms;
-        let shape = match kind {
+        match self.read_shape(kind, parameters)? {
+            Shape::Mesh(mesh) => self.add_made(kind, mesh, parameters),
+            Shape::File(mesh) => self.place_mesh(kind, mesh, parameters),
+            Shape::Sphere(radius) => match self.ball(radius) {
+                Some(ball) => self.add_ball(&ball, parameters),
+                None => self.add_made(kind, whole_sphere(radius), parameters),
+            },
+        }
+    }
+
+    fn read_shape(&mut self, kind: &str, parameters: &Parameters) -> Result<Shape, LoadError> {
+        Ok(match kind {
             "trianglemesh" => Shape::Mesh(triangle_mesh(parameters, "indices")?),
             "loopsubdiv" => {
                 let note = format!("{}: \"loopsubdiv\" is rendered as its control mesh.", parameters.place());
@@ -40,8 +56,8 @@ impl Reader<'_> {
                 Shape::Mesh(triangle_mesh(parameters, "indices")?)
             }
             "bilinearmesh" => Shape::Mesh(bilinear_mesh(parameters)?),
-            "plymesh" => self.ply_mesh(parameters)?,
-            "sphere" => self.sphere(parameters)?,
+            "plymesh" => Shape::File(self.ply_mesh(parameters)?),
+            "sphere" => sphere(parameters)?,
             "disk" => Shape::Mesh(disk(parameters)?),
             "cylinder" => Shape::Mesh(cylinder(parameters)?),
             "curve" => return Err(parameters.unsupported("shapes of type \"curve\" (hair, fur) are not rendered")),
@@ -49,64 +65,67 @@ impl Reader<'_> {
                 let known = "trianglemesh, plymesh, sphere, disk, cylinder, bilinearmesh, loopsubdiv are read";
                 return Err(parameters.error(format_args!("unknown shape \"{other}\"; {known}")));
             }
-        };
-        let placed = self.here(&to_world);
-        let motion = self.motion(&to_world);
-        let area = |mesh: &Mesh| shapes::area(mesh, &placed);
-        let shape = match shape {
-            // A sphere stays analytic if its transforms leave it one at all times and nothing asks for pbrt's own coordinates.
-            Shape::Sphere(radius) => {
-                let scale = shapes::similarity_scale(&placed).filter(|_| to_world.leave_spheres());
-                let scale = scale.filter(|_| !reverse && self.current_object.is_none() && !self.uses_textures());
-                match scale.map(|scale| radius * scale).filter(|radius| *radius > 0.0 && radius.is_finite()) {
-                    Some(radius) if placed.translation.is_finite() => {
-                        let area = 4.0 * f64::from(PI) * f64::from(radius) * f64::from(radius);
-                        let Some(material) = self.current_material(parameters, area)? else { return Ok(()) };
-                        self.note_unread("sphere", parameters);
-                        let motion = motion.map(|motion| motion.since_open());
-                        let center = Vec3::from(placed.translation);
-                        self.builder.spheres.push(Sphere {
-                            name: "sphere".to_owned(),
-                            center,
-                            radius,
-                            axes: Sphere::axes_with_poles_on_z(&placed),
-                            material,
-                            motion,
-                        });
-                        return Ok(());
-                    }
-                    _ => Shape::Mesh(whole_sphere(radius)),
-                }
-            }
-            other => other,
-        };
-        let (mesh, area) = match shape {
-            Shape::File(id) => (id, area(&self.builder.meshes[id.0 as usize])),
-            Shape::Mesh(mut mesh) => {
-                kind.clone_into(&mut mesh.name);
-                orient(&mut mesh, reverse);
-                let area = area(&mesh);
-                if kind != "trianglemesh" {
-                    self.made_vertices += mesh.positions.len();
-                    super::super::check_made_vertices(&self.main, self.made_vertices)?;
-                }
-                (self.builder.add_mesh(mesh), area)
-            }
-            Shape::Sphere(_) => return Ok(()),
-        };
+        })
+    }
+
+    /// A sphere that stays analytic: its transforms leave it one at all times and nothing asks for pbrt's own coordinates.
+    fn ball(&self, radius: f32) -> Option<Ball> {
+        let transforms = &self.state.transforms;
+        let placed = self.here(transforms);
+        let radius = radius * shapes::similarity_scale(&placed)?;
+        let stays_one = transforms.leave_spheres() && radius > 0.0 && radius.is_finite();
+        let is_plain = !self.state.reverse_orientation && self.current_object.is_none() && !self.uses_textures();
+        (stays_one && is_plain && placed.translation.is_finite()).then_some(Ball { radius, placed })
+    }
+
+    fn add_ball(&mut self, ball: &Ball, parameters: &Parameters) -> Result<(), LoadError> {
+        let &Ball { radius, placed } = ball;
+        let area = 4.0 * f64::from(PI) * f64::from(radius) * f64::from(radius);
+        let Some(material) = self.current_material(parameters, area)? else { return Ok(()) };
+        self.note_unread("sphere", parameters);
+        let motion = self.motion(&self.state.transforms).map(|motion| motion.since_open());
+        self.builder.spheres.push(Sphere {
+            name: "sphere".to_owned(),
+            center: placed.translation.into(),
+            radius,
+            axes: Sphere::axes_with_poles_on_z(&placed),
+            material,
+            motion,
+        });
+        Ok(())
+    }
+
+    fn add_made(&mut self, kind: &str, mut mesh: Mesh, parameters: &Parameters) -> Result<(), LoadError> {
+        kind.clone_into(&mut mesh.name);
+        orient(&mut mesh, self.state.reverse_orientation);
+        if kind != "trianglemesh" {
+            self.made_vertices += mesh.positions.len();
+            super::super::check_made_vertices(&self.main, self.made_vertices)?;
+        }
+        let mesh = self.builder.add_mesh(mesh);
+        self.place_mesh(kind, mesh, parameters)
+    }
+
+    fn place_mesh(&mut self, kind: &str, mesh: MeshId, parameters: &Parameters) -> Result<(), LoadError> {
+        let transforms = self.state.transforms;
+        let to_world = self.here(&transforms);
+        let area = shapes::area(&self.builder.meshes[mesh.0 as usize], &to_world);
         let Some(material) = self.current_material(parameters, area)? else { return Ok(()) };
         let shared = &mut self.builder.meshes[mesh.0 as usize];
         if shared.uvs.is_empty() && self.builder.materials[material.0 as usize].reads_pictures() {
             shapes::give_each_triangle(shared, UVS_OF_TRIANGLE);
         }
+        let name = shared.name.clone();
         self.note_unread(&format!("shape \"{kind}\""), parameters);
-        let name = self.builder.meshes[mesh.0 as usize].name.clone();
         match &self.current_object {
             Some(object) => {
                 let parts = self.objects.entry(object.clone()).or_default();
-                parts.push(super::Part { name, mesh, material, transforms: to_world });
+                parts.push(super::Part { name, mesh, material, transforms });
             }
-            None => self.builder.instances.push(Instance { name, mesh, material, to_world: placed, motion }),
+            None => {
+                let motion = self.motion(&transforms);
+                self.builder.instances.push(Instance { name, mesh, material, to_world, motion });
+            }
         }
         Ok(())
     }
@@ -119,7 +138,7 @@ impl Reader<'_> {
     }
 
     /// Each file is read once for each orientation.
-    fn ply_mesh(&mut self, parameters: &Parameters) -> Result<Shape, LoadError> {
+    fn ply_mesh(&mut self, parameters: &Parameters) -> Result<MeshId, LoadError> {
         let Some(file) = parameters.string("filename")? else {
             return Err(parameters.error("a plymesh needs a \"string filename\""));
         };
@@ -130,7 +149,7 @@ impl Reader<'_> {
             }
         }
         if let Some(id) = self.ply_files.get(&key) {
-            return Ok(Shape::File(*id));
+            return Ok(*id);
         }
         let mut loaded = ply::read(&key.0).map_err(|error| error.referenced_from(parameters.place()))?;
         orient(&mut loaded.mesh, key.1);
@@ -139,26 +158,26 @@ impl Reader<'_> {
         }
         let id = self.builder.add_mesh(loaded.mesh);
         self.ply_files.insert(key, id);
-        Ok(Shape::File(id))
+        Ok(id)
     }
+}
 
-    fn sphere(&mut self, parameters: &Parameters) -> Result<Shape, LoadError> {
-        let radius = radius(parameters)?;
-        let low = parameters.float_or("zmin", -radius)?;
-        let high = parameters.float_or("zmax", radius)?;
-        let turn = full_turn(parameters)?;
-        if low <= -radius && high >= radius && turn >= TAU {
-            return Ok(Shape::Sphere(radius));
-        }
-        let angle = |z: f32| (z / radius).clamp(-1.0, 1.0).acos();
-        let (first, last) = (angle(low.min(high)), angle(low.max(high)));
-        Ok(Shape::Mesh(grid(|u, v| {
-            let (sin_phi, cos_phi) = (turn * u).sin_cos();
-            let (sin_theta, cos_theta) = (first + (last - first) * v).sin_cos();
-            let normal = Vec3::new(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta);
-            (radius * normal, normal)
-        })))
+fn sphere(parameters: &Parameters) -> Result<Shape, LoadError> {
+    let radius = radius(parameters)?;
+    let low = parameters.float_or("zmin", -radius)?;
+    let high = parameters.float_or("zmax", radius)?;
+    let turn = full_turn(parameters)?;
+    if low <= -radius && high >= radius && turn >= TAU {
+        return Ok(Shape::Sphere(radius));
     }
+    let angle = |z: f32| (z / radius).clamp(-1.0, 1.0).acos();
+    let (first, last) = (angle(low.min(high)), angle(low.max(high)));
+    Ok(Shape::Mesh(grid(|u, v| {
+        let (sin_phi, cos_phi) = (turn * u).sin_cos();
+        let (sin_theta, cos_theta) = (first + (last - first) * v).sin_cos();
+        let normal = Vec3::new(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta);
+        (radius * normal, normal)
+    })))
 }
 
 fn radius(parameters: &Parameters) -> Result<f32, LoadError> {
@@ -333,17 +352,10 @@ pub(super) fn orient(mesh: &mut Mesh, reverse: bool) {
     }
 }
 
-/// An instance of each part of an object.
-pub(super) fn place_part(reader: &Reader, part: &super::Part, transforms: &super::state::Transforms) -> Instance {
-    let total = transforms.then(&part.transforms);
-    let to_world: Affine3A = reader.here(&total);
-    Instance {
-        name: part.name.clone(),
-        mesh: part.mesh,
-        material: part.material,
-        to_world,
-        motion: reader.motion(&total),
-    }
+/// An instance of a part of an object.
+pub(super) fn place_part(reader: &Reader, part: &super::Part, instance: &Transforms) -> Instance {
+    let (to_world, motion) = reader.carried(&Carried { instance: *instance, part: part.transforms });
+    Instance { name: part.name.clone(), mesh: part.mesh, material: part.material, to_world, motion }
 }
 
 #[cfg(test)]

@@ -45,6 +45,55 @@ impl Transforms {
     }
 }
 
+/// A part of an object and the instance that carries it. pbrt interpolates the transforms of each apart.
+pub(super) struct Carried {
+    pub(super) instance: Transforms,
+    pub(super) part: Transforms,
+}
+
+/// How a carried part goes.
+pub(super) enum Path {
+    /// As with one pair of transforms.
+    Whole(Transforms),
+    /// At rest in what moves.
+    After { inner: Affine3A, outer: Transforms },
+    /// As neither its own poses nor those of its instance go.
+    Apart,
+}
+
+impl Carried {
+    pub(super) fn at(&self, share: f32) -> Affine3A {
+        self.instance.at(share) * self.part.at(share)
+    }
+
+    pub(super) fn path(&self) -> Path {
+        let whole = Path::Whole(self.instance.then(&self.part));
+        match (self.instance.moves(), self.part.moves()) {
+            (false, false) => whole,
+            (true, false) => Path::After { inner: self.part.at(0.0), outer: self.instance },
+            // What leaves angles as they are leaves poses what they are.
+            (false, true) if shapes::similarity_scale(&self.instance.at(0.0)).is_some() => whole,
+            _ => Path::Apart,
+        }
+    }
+}
+
+/// What a saved state was opened by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Opening {
+    Attribute,
+    Object,
+}
+
+impl Opening {
+    pub(super) fn begin(self) -> &'static str {
+        match self {
+            Self::Attribute => "AttributeBegin",
+            Self::Object => "ObjectBegin",
+        }
+    }
+}
+
 /// What a directive works in.
 #[derive(Clone)]
 pub(super) struct State {

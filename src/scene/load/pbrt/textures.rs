@@ -172,7 +172,7 @@ impl Reader<'_> {
     }
 
     /// What stands for a texture where only a colour has a place.
-    fn mean_of_color(&self, input: &ColorInput) -> Result<Vec3, LoadError> {
+    pub(super) fn mean_of_color(&self, input: &ColorInput) -> Result<Vec3, LoadError> {
         let Some(lookup) = input.texture else { return Ok(input.factor) };
         Ok(input.factor * self.builder.textures.mean_color(lookup.texture)?)
     }
@@ -188,7 +188,7 @@ impl Reader<'_> {
     }
 
     fn find_texture(
-        &self,
+        &mut self,
         user: &Parameters,
         class: &'static str,
         name: &str,
@@ -197,7 +197,11 @@ impl Reader<'_> {
         if depth > DEEPEST {
             return Err(user.error(format_args!("texture \"{name}\" uses itself, or {DEEPEST} others in a chain")));
         }
-        if let Some(definition) = self.textures.get(&(class, name.to_owned())) {
+        let key = (class, name.to_owned());
+        if !self.textures.contains_key(&key) {
+            self.look_ahead()?;
+        }
+        if let Some(definition) = self.textures.get(&key) {
             return Ok(Rc::clone(definition));
         }
         let mut known: Vec<&str> =
