@@ -39,7 +39,7 @@ pub(crate) fn gaussian_blur_xy(plane: &Plane, sigma_x_px: f64, sigma_y_px: f64) 
     })
 }
 
-/// Below, a pixel is wider than what would be sampled; above are hundreds of taps, and no eye's loss of acuity: the dimmest has 0.6°.
+/// Below, a pixel is wider than what would be sampled; above are thousands of taps, and no eye's loss of acuity: the dimmest has 0.6°.
 const SAMPLED_SIGMAS_PX: std::ops::RangeInclusive<f64> = 0.5..=500.0;
 
 /// [`gaussian_blur_xy`] by the Gaussian's own samples, for where what is left of a grating matters and not the width alone: of one

@@ -339,11 +339,12 @@ impl<'a> Bsdf<'a> {
         }
     }
 
-    /// Share of light from `wo` that a delta lobe lets through straight on, as smooth thin sheets without a varnish do; 0 of all others.
+    /// Share of light from `wo` that a delta lobe lets through straight on, as smooth thin sheets do; 0 of all others.
     pub fn straight_through(&self, wo: Vec3) -> Vec3 {
         match self {
             Self::ThinDielectric(model) => model.straight_through(wo),
             Self::MetalRoughness(model) => model.straight_through(wo),
+            Self::Varnish(model) => model.straight_through(wo),
             Self::Mix(model) => model.straight_through(wo),
             _ => Vec3::ZERO,
         }

@@ -277,6 +277,16 @@ impl<'a> Varnish<'a> {
         self.evaluate_front(shares, front, wi).sample_turned(wi, wo)
     }
 
+    pub(super) fn straight_through(&self, wo: Vec3) -> Vec3 {
+        match &self.base {
+            Varnished::Sheet(base) => {
+                let front = if wo.z < 0.0 { turn(wo) } else { wo };
+                base.straight_through(front) * self.passed(front, -front)
+            }
+            Varnished::Boundary(_) => Vec3::ZERO,
+        }
+    }
+
     pub(super) fn albedo(&self, wo: Vec3) -> Vec3 {
         if self.is_inside(wo) {
             return self.base.albedo(wo);

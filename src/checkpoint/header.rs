@@ -275,7 +275,7 @@ fn fields_only_in<T: Serialize>(own: &T, other: &T) -> Option<String> {
     };
     let changed = own.iter().filter(|(name, value)| other.get(*name) != Some(value));
     let said: Vec<String> =
-        changed.map(|(name, value)| format!("{} {}", in_words(name), value_in_words(value))).collect();
+        changed.map(|(name, value)| format!("{} {}", words_of_field(name), value_in_words(value))).collect();
     (!said.is_empty()).then(|| said.join(", "))
 }
 
@@ -283,16 +283,16 @@ fn value_in_words(value: &Value) -> String {
     let all = |values: &mut dyn Iterator<Item = String>| values.collect::<Vec<_>>().join(" ");
     match value {
         Value::Null => "none".to_owned(),
-        Value::String(text) => in_words(text),
+        Value::String(text) => text.clone(),
         Value::Array(values) => all(&mut values.iter().map(value_in_words)),
         Value::Object(fields) => {
-            all(&mut fields.iter().map(|(name, value)| format!("{} {}", in_words(name), value_in_words(value))))
+            all(&mut fields.iter().map(|(name, value)| format!("{} {}", words_of_field(name), value_in_words(value))))
         }
         Value::Bool(_) | Value::Number(_) => value.to_string(),
     }
 }
 
-fn in_words(name: &str) -> String {
+fn words_of_field(name: &str) -> String {
     name.replace(['_', '-'], " ")
 }
 

@@ -11,7 +11,7 @@ use fechner_perception::Plane;
 use fechner_perception::display::{Display, Eotf, Viewing};
 use fechner_perception::photometry::luminance;
 use fechner_perception::primaries::{Primaries, apply};
-use fechner_perception::tone::{FittedTone, SceneLight, ToneOperator, gamut, map_picture, map_pixels};
+use fechner_perception::tone::{FittedTone, SceneLight, ToneOperator, gamut, map_picture};
 
 /// A picture from a file.
 pub(super) struct InputPicture {
@@ -261,15 +261,20 @@ impl InputPicture {
         self.rgb.iter().flat_map(|rgb| rgb.map(byte)).collect()
     }
 
-    /// Luminance in cd/m² that the display sends to the eye, of the colours that it shows: those that it clips too. Without the operator's
-    /// loss of acuity: for an eye behind it.
-    pub(super) fn displayed_sharp(&self, tone: Option<&dyn FittedTone>, viewing: &Viewing) -> Plane {
-        self.luminance_of(&self.relative_rgb(tone, &viewing.display, map_pixels), &viewing.display)
+    /// Luminance in cd/m² that the display sends to the eye, of the colours that it shows: those that it clips too. Scenes are brought there
+    /// with the operator's loss of acuity, or by `map_pixels` without it: for an eye behind it.
+    pub(super) fn displayed(&self, tone: Option<&dyn FittedTone>, viewing: &Viewing, map: Mapping) -> Plane {
+        self.luminance_of(&self.relative_rgb(tone, &viewing.display, map), &viewing.display)
     }
 
     /// Linear RGB in cd/m² of the same colours.
-    pub(super) fn displayed_rgb_sharp(&self, tone: Option<&dyn FittedTone>, viewing: &Viewing) -> Vec<[f32; 3]> {
-        in_cd_m2(self.relative_rgb(tone, &viewing.display, map_pixels), &viewing.display)
+    pub(super) fn displayed_rgb_by(
+        &self,
+        tone: Option<&dyn FittedTone>,
+        viewing: &Viewing,
+        map: Mapping,
+    ) -> Vec<[f32; 3]> {
+        in_cd_m2(self.relative_rgb(tone, &viewing.display, map), &viewing.display)
     }
 
     fn luminance_of(&self, relative: &[[f32; 3]], display: &Display) -> Plane {
@@ -296,6 +301,7 @@ fn in_rec709(light: Vec<[f32; 3]>, primaries: &Primaries) -> Vec<[f32; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use fechner_perception::tone::map_pixels;
 
     /// P3's and Rec.2020's primaries under the curve of sRGB: with their negative channels cut off they were 14 to 35 % too bright.
     #[test]
@@ -329,7 +335,7 @@ mod tests {
                 close(*found, cd_m2(*meant));
             }
         }
-        let displayed = picture.displayed_sharp(None, &viewing);
+        let displayed = picture.displayed(None, &viewing, map_pixels);
         light.iter().enumerate().for_each(|(x, rgb)| close(displayed.get(x, 0), cd_m2(luminance(*rgb))));
     }
 

@@ -3,6 +3,7 @@
 use super::animate::parse_rate;
 use super::channels;
 use super::compare::check_alike;
+use super::covered::Mapping;
 use super::kept_tone::shown_by;
 use super::picture::{BEFORE_BLACK, InputPicture, Source};
 use super::seeing::{SeeingArguments, model_values, operator_values};
@@ -17,8 +18,8 @@ use fechner_perception::model::{self, ModelInputs, ThresholdModel};
 use fechner_perception::motion::image_velocity_deg_s;
 use fechner_perception::photometry::luminance;
 use fechner_perception::saliency::saliency_of_displayed;
-use fechner_perception::tone::FittedTone;
 use fechner_perception::tone::acuity::{AcuityFilter, BehindAcuity};
+use fechner_perception::tone::{FittedTone, map_picture, map_pixels};
 use fechner_perception::{ContrastSensitivity, GuideNoise, Plane, ThresholdInputs, Viewing, csf, threshold_map};
 use std::path::{Path, PathBuf};
 
@@ -99,11 +100,12 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     })?;
     arguments.seeing.note_what_is_idle(model.as_ref());
     let fitted = shown_by(arguments.operator.as_deref(), &named, &viewing)?;
-    // Noise goes through the loss of acuity that the operator shows, and so does what masks it: neither the guide nor the halves have it
-    // already.
+    // Noise goes through the loss of acuity that the operator shows, and so does what masks it: by the contrast sensitivity, so that neither
+    // the guide nor the halves have it already, or, where the model asks for none, by the pictures.
+    let mapping: Mapping = if model.knows_csf() { map_pixels } else { map_picture };
     let acuity = fitted.as_ref().and_then(|fitted| fitted.acuity());
     let csf = BehindAcuity { csf: csf::by_name(&arguments.seeing.csf, &viewing)?, acuity };
-    let shown = guide.displayed_sharp(fitted.as_deref(), &viewing);
+    let shown = guide.displayed(fitted.as_deref(), &viewing, mapping);
     let motion = match &motion {
         Some(_) if !model.knows_motion() => {
             let knows = |name: &&&str| model::by_name(name).is_some_and(|model| model.knows_motion());
@@ -131,8 +133,8 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     picture.push_f32("adaptation.Y", map.adaptation_cd_m2().values());
     let visibility = match &halves {
         Some(halves) => {
-            let difference = half_difference(halves, fitted.as_deref(), &viewing);
-            let guide = guide.displayed_rgb_sharp(fitted.as_deref(), &viewing);
+            let difference = half_difference(halves, fitted.as_deref(), &viewing, mapping);
+            let guide = guide.displayed_rgb_by(fitted.as_deref(), &viewing, mapping);
             Some(noise_visibility(model.as_ref(), &inputs, &guide, &difference, acuity)?)
         }
         None => None,
@@ -184,8 +186,13 @@ fn read_halves(arguments: &ThresholdArguments, guide: &InputPicture) -> Result<O
 }
 
 /// (A − B)/2 as the display shows their colours, linear RGB in cd/m².
-fn half_difference(halves: &[InputPicture; 2], fitted: Option<&dyn FittedTone>, viewing: &Viewing) -> Vec<[f32; 3]> {
-    let [a, b] = halves.each_ref().map(|half| half.displayed_rgb_sharp(fitted, viewing));
+fn half_difference(
+    halves: &[InputPicture; 2],
+    fitted: Option<&dyn FittedTone>,
+    viewing: &Viewing,
+    mapping: Mapping,
+) -> Vec<[f32; 3]> {
+    let [a, b] = halves.each_ref().map(|half| half.displayed_rgb_by(fitted, viewing, mapping));
     a.iter().zip(&b).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] - b[c]))).collect()
 }
 

@@ -294,7 +294,8 @@ fn scatter(path: &mut PathState, hit: &Hit, point: &SurfacePoint, shading: &Shad
     let Some(scattered) = shading.bsdf.sample(shading.frame.to_local(wo), u) else {
         return false;
     };
-    if scattered.goes_straight_on() && shading.medium.is_none() {
+    // As shadow rays see it: a lobe that they do not know keeps all of its light.
+    if scattered.goes_straight_on() && shading.straight_through(wo) != Vec3::ZERO {
         return pass_sheet(path, hit, point, scattered.weight);
     }
     let wi = shading.frame.to_world_direction(scattered.wi);

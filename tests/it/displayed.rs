@@ -626,7 +626,6 @@ fn a_map_is_a_png() {
     assert!(code == 2 && said.contains("end the name in .png"), "{code}: {said}");
 }
 
-/// What changes nothing of pictures that are ready for the display is told, and what shows a scene's light is not.
 /// Two pictures are two, whatever their names: only frames of a sequence share a note.
 #[test]
 fn a_note_is_said_of_each_picture() {
@@ -639,8 +638,18 @@ fn a_note_is_said_of_each_picture() {
     let notes = |arguments: &[&str]| run(folder.path(), arguments).matches("what is transparent").count();
     assert_eq!(notes(&["compare", "v1.png", "v2.png"]), 2);
     assert_eq!(notes(&["compare", "shot-##.png", "shot-##.png", "--fps", "30"]), 1);
+    for (own, other) in [("v1/f.##.png", "v2/f.##.png"), ("f1.##.png", "f2.##.png")] {
+        for frame in ["01", "02"] {
+            for name in [own, other].map(|name| folder.path().join(name.replace("##", frame))) {
+                std::fs::create_dir_all(name.parent().expect("a folder")).expect("made");
+                std::fs::copy(folder.path().join("v1.png"), name).expect("copied");
+            }
+        }
+        assert_eq!(notes(&["compare", own, other, "--fps", "30"]), 2, "{own}");
+    }
 }
 
+/// What changes nothing of pictures that are ready for the display is told, and what shows a scene's light is not.
 #[test]
 fn idle_arguments_are_told() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -160,8 +160,8 @@ impl Thresholds {
     }
 }
 
-/// [`super::Judgement::thresholds`]. `displayed_guide`: the guide's luminance on the display. `noise`:
-/// variance of the mean's, before denoising.
+/// [`super::Judgement::thresholds`]. `displayed_guide`: the guide's luminance on the display. `noise`: variance of the mean's, before
+/// denoising.
 pub(super) fn found_thresholds(
     guide: &Guide<'_>,
     displayed_guide: &Plane,

@@ -1,7 +1,7 @@
 //! What the module promises about sides and about radiance across boundaries.
 
 use super::cases::{delta_cases, smooth_cases};
-use crate::bsdf::{Bsdf, BsdfSample, Lobe, turn};
+use crate::bsdf::{Bsdf, BsdfSample, Lobe, Varnish, Varnished, turn};
 use glam::Vec3;
 
 fn refracted(bsdf: &Bsdf<'_>, wo: Vec3) -> BsdfSample {
@@ -55,12 +55,22 @@ fn what_goes_straight_on_is_what_samples_carry() {
     let wo = Vec3::new(0.48, 0.64, 0.6);
     let tint = Vec3::new(0.2, 0.6, 0.9);
     let (pane, wall) = (Bsdf::thin_dielectric(1.5, tint), Bsdf::lambert(Vec3::splat(0.5)));
+    let glass = Bsdf::dielectric(1.5, 0.0, Vec3::ONE, None);
+    let clear = |roughness: f32| match Bsdf::metal_roughness(tint, 0.3, roughness, 1.5, 0.7) {
+        Bsdf::MetalRoughness(model) => Varnished::Sheet(model),
+        other => panic!("{other:?}"),
+    };
+    let varnished = |base, sheen: Vec3| Bsdf::Varnish(Varnish::new(base, 0.8, 0.4, sheen, 0.5));
     for (bsdf, is_clear) in [
         (pane, true),
+        (varnished(clear(0.0), Vec3::ZERO), true),
+        (varnished(clear(0.0), Vec3::new(0.5, 0.3, 0.1)), true),
+        (varnished(clear(0.3), Vec3::ZERO), false),
+        (varnished(Varnished::Boundary(&glass), Vec3::ZERO), false),
         (Bsdf::metal_roughness(tint, 0.3, 0.0, 1.5, 0.7), true),
         (Bsdf::mix(&pane, &wall, 0.25), true),
         (Bsdf::metal_roughness(tint, 0.0, 0.3, 1.5, 1.0), false),
-        (Bsdf::dielectric(1.5, 0.0, Vec3::ONE, None), false),
+        (glass, false),
         (wall, false),
     ] {
         let lobes = (0..LOBES).map(|i| (i as f32 + 0.5) / LOBES as f32);

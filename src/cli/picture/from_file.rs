@@ -266,10 +266,14 @@ impl<'a> Source<'a> {
     }
 }
 
-/// Says something of a file, once of all the frames of a sequence, whose names differ by digits.
+/// Says something of a file, once of all the frames of a sequence, whose names differ by their longest number.
 pub(in crate::cli) fn note(path: &Path, text: &str) {
-    let of_sequence = format!("{}: {text}", path.display()).replace(|c: char| c.is_ascii_digit(), "#");
-    note_once(path, text, of_sequence);
+    let name = path.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
+    let numbers = name.split(|c: char| !c.is_ascii_digit());
+    let frame = numbers.max_by_key(|digits| digits.len()).filter(|digits| !digits.is_empty());
+    let of_sequence = frame.map_or_else(|| name.to_string(), |digits| name.replacen(digits, "#", 1));
+    let folder = path.parent().unwrap_or(path).display();
+    note_once(path, text, format!("{folder}/{of_sequence}: {}", text.replace(|c: char| c.is_ascii_digit(), "#")));
 }
 
 /// Says something of a file, unless something under the same key was said before.

@@ -46,17 +46,20 @@ pub(super) fn frames_since_last(numbers: Option<Vec<i64>>, count: usize) -> Vec<
     std::iter::once(1).chain(steps).collect()
 }
 
-/// The numbers by which the files' names differ, before what follows the last dot: the last ones of which all names have different ones;
-/// `None` where there are no such.
+/// The numbers by which the files' names differ, before what follows the last dot: of those of which all names have different ones the
+/// last that ascend as the files are given, else the last; `None` where there are none.
 pub(super) fn frame_numbers(files: &[PathBuf]) -> Option<Vec<i64>> {
     let all: Vec<Vec<Option<i64>>> =
         files.iter().map(|file| Some(numbers_from_end(file.file_stem()?.to_str()?))).collect::<Option<_>>()?;
     let fewest = all.iter().map(Vec::len).min().unwrap_or(0);
-    (0..fewest).find_map(|place| {
+    let at_place = |place: usize| {
         let numbers: Vec<i64> = all.iter().map(|numbers| numbers[place]).collect::<Option<_>>()?;
         let different: BTreeSet<i64> = numbers.iter().copied().collect();
         (different.len() == numbers.len()).then_some(numbers)
-    })
+    };
+    let different: Vec<Vec<i64>> = (0..fewest).filter_map(at_place).collect();
+    let last = different.first().cloned();
+    different.into_iter().find(|numbers| numbers.is_sorted()).or(last)
 }
 
 /// All runs of digits in a name as numbers, the last first; `None` for those that are too long for one. Below 0 are those with a minus
@@ -86,6 +89,7 @@ mod tests {
         assert_eq!(of(&["v2/s.0001.exr", "v3/s.0002.exr"]), Some(vec![1, 2]));
         assert_eq!(of(&["s.-0001.exr", "s.0000.exr", "s.0001.exr"]), Some(vec![-1, 0, 1]));
         assert_eq!(of(&["s-0002.exr", "s-0001.exr"]), Some(vec![2, 1]));
+        assert_eq!(of(&["r.0001_64spp.exr", "r.0002_16spp.exr", "r.0003_32spp.exr"]), Some(vec![1, 2, 3]));
         // Where no place has different ones, none has.
         assert_eq!(of(&["a1.exr", "b1.exr"]), None);
         assert_eq!(of(&["a.exr", "a2.exr"]), None);

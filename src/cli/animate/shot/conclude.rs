@@ -3,8 +3,7 @@
 use super::Shot;
 use crate::cli::animate::contact::{ContactSheet, on_sheet};
 use crate::cli::animate::record::FrameRecord;
-use crate::cli::animate::video;
-use crate::cli::animate::video::shown_rgb8;
+use crate::cli::animate::video::{self, shown_rgb8};
 use crate::cli::json::write_json;
 use crate::cli::words::listed;
 use anyhow::Result;

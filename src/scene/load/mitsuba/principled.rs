@@ -47,7 +47,7 @@ impl Reader {
     fn glass(&mut self, bsdf: &Element, model: MetalRoughness) -> Surface {
         let Some(amount) = share_of_glass(model.transmission, model.metallic) else {
             self.builder.note(format!(
-                "{}: where \"metallic\" is a picture, what \"spec_trans\" lets through is tinted at each crossing by all of \
+                "{}: where \"metallic\" is a picture, or \"spec_trans\" one that is multiplied by more than 1, what \"spec_trans\" lets through is tinted at each crossing by all of \
                  \"base_color\", not by its square root.",
                 bsdf.place()
             ));
@@ -75,9 +75,10 @@ impl Reader {
     }
 }
 
-/// `transmission` · (1 − `metallic`), where one picture is enough for it.
+/// `transmission` · (1 − `metallic`), where one picture is enough for it and is nowhere cut at 1 before metal takes its share.
 fn share_of_glass(transmission: ScalarInput, metallic: ScalarInput) -> Option<ScalarInput> {
-    if metallic.texture.is_some() && metallic.factor > 0.0 {
+    let is_cut = transmission.texture.is_some() && transmission.factor > 1.0;
+    if metallic.factor > 0.0 && (metallic.texture.is_some() || is_cut) {
         return None;
     }
     Some(ScalarInput { factor: transmission.factor * (1.0 - metallic.factor), ..transmission })

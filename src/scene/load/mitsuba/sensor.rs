@@ -132,9 +132,9 @@ impl Reader {
     }
 }
 
-/// Half the tangent of a field of view, and what it is for.
+/// Tangent of half a field of view, and what it is for.
 struct FieldOfView {
-    half_tangent: f32,
+    tangent_of_half: f32,
     axis: FilmAxis,
 }
 
@@ -151,7 +151,7 @@ impl FieldOfView {
         };
         match sensor.float("fov")? {
             Some(fov) if (0.001..=179.0).contains(&fov) => {
-                Ok(Self { half_tangent: (0.5 * fov).to_radians().tan(), axis })
+                Ok(Self { tangent_of_half: (0.5 * fov).to_radians().tan(), axis })
             }
             Some(fov) => Err(sensor.error(format_args!("\"fov\" must lie in [0.001, 179] degrees, not {fov}"))),
             None => {
@@ -161,13 +161,13 @@ impl FieldOfView {
                 let length =
                     millimetres.ok_or_else(|| sensor.error(format_args!("\"{text}\" is not a focal length")))?;
                 // Half the diagonal of 36 mm × 24 mm.
-                Ok(Self { half_tangent: 0.5 * 36.0_f32.hypot(24.0) / length, axis: FilmAxis::Diagonal })
+                Ok(Self { tangent_of_half: 0.5 * 36.0_f32.hypot(24.0) / length, axis: FilmAxis::Diagonal })
             }
         }
     }
 
     fn vertical_deg(&self, aspect: f32) -> f32 {
-        let vertical = self.half_tangent / self.axis.length(aspect);
+        let vertical = self.tangent_of_half / self.axis.length(aspect);
         (2.0 * vertical.atan().to_degrees()).clamp(0.001, 179.0)
     }
 }
