@@ -83,3 +83,22 @@ fn share_of_glass(transmission: ScalarInput, metallic: ScalarInput) -> Option<Sc
     }
     Some(ScalarInput { factor: transmission.factor * (1.0 - metallic.factor), ..transmission })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{TextureId, TextureLookup};
+    use glam::Vec2;
+
+    /// min(1, 2 · picture) · (1 − 0.5) is no picture times a factor.
+    #[test]
+    fn metal_takes_its_share_of_what_a_picture_comes_to() {
+        let lookup = TextureLookup { texture: TextureId(0), offset: Vec2::ZERO, rotation: 0.0, scale: Vec2::ONE };
+        let picture_times = |factor: f32| ScalarInput { factor, texture: Some((lookup, 0)) };
+        let [none, half] = [0.0, 0.5].map(ScalarInput::constant);
+        assert_eq!(share_of_glass(picture_times(2.0), half), None);
+        assert_eq!(share_of_glass(picture_times(2.0), none), Some(picture_times(2.0)));
+        assert_eq!(share_of_glass(picture_times(0.8), half), Some(picture_times(0.4)));
+        assert_eq!(share_of_glass(half, picture_times(1.0)), None);
+    }
+}
