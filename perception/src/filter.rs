@@ -1,7 +1,7 @@
 //! Windows that slide over a picture: Gaussian blur and erosion, reflected at the borders.
 //!
-//! Both cost the same whatever the window's size (but for the Gaussian by its own samples), and neither subtracts: a running sum that takes a firefly of 1e20
-//! back out would leave its rounding error all along the row.
+//! All cost the same whatever the window's size, but for the Gaussian by its own samples, and none subtracts: a running sum that takes a
+//! firefly of 1e20 back out would leave its rounding error all along the row.
 
 use rayon::prelude::*;
 

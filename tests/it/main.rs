@@ -11,7 +11,7 @@
 //! - `formats`: the same scene from several formats
 //! - `gltf_counts`: attributes of glTF that do not fit their meshes
 //! - `gltf_motion`: jumps, hidden things and morphing nodes of glTF while the shutter is open
-//! - `mitsuba_format`, `pbrt_format`: what their files mean where readers go wrong easily
+//! - `mitsuba_format`, `mitsuba_cameras`, `pbrt_format`: what their files mean where readers go wrong easily
 //! - `animate_mishaps`: shots that are refused before anything is rendered, or named
 //! - `bad_input`: bad scene files, and our own ones
 //! - `own_format`: lamps of a luminous power, keys that change nothing, files beside the scene
@@ -35,7 +35,7 @@
 //! - `wild_files`: files as other programs write them
 //! - `texture_memory`: textures within a limit
 //! - `texture_values`: colours, numbers and infinities of EXR pictures as textures and surroundings
-//! - `displayed`: pictures compared as the display shows them
+//! - `displayed`, `told`: pictures compared as the display shows them, and what is said of those that are not
 //! - `tonemap`: HDR pictures for displays, one by one and over time
 //! - `units_and_views`: what the caller's unit and picture size change of a scene
 
@@ -62,6 +62,7 @@ mod kill;
 mod load_assets;
 mod maps;
 mod mishaps;
+mod mitsuba_cameras;
 mod mitsuba_format;
 mod mutations;
 mod no_allocation;
@@ -75,6 +76,7 @@ mod scene_table;
 mod support;
 mod texture_memory;
 mod texture_values;
+mod told;
 mod tonemap;
 mod units_and_views;
 mod view;

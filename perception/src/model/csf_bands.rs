@@ -33,12 +33,17 @@ impl ThresholdModel for CsfBands {
     }
 }
 
-/// The threshold map of a still, or of what moves where a velocity is given.
-pub(super) fn still_or_moving(inputs: &ModelInputs<'_>) -> Result<ThresholdMap, Error> {
+/// The threshold map of a still.
+pub(super) fn still(inputs: &ModelInputs<'_>) -> Result<ThresholdMap, Error> {
     inputs.check()?;
     let guide =
         ThresholdInputs { display_luminance_cd_m2: inputs.display_luminance_cd_m2, guide_noise: inputs.guide_noise };
-    let map = threshold_map(&guide, inputs.viewing, inputs.csf)?;
+    threshold_map(&guide, inputs.viewing, inputs.csf)
+}
+
+/// The same, or that of what moves where a velocity is given.
+pub(super) fn still_or_moving(inputs: &ModelInputs<'_>) -> Result<ThresholdMap, Error> {
+    let map = still(inputs)?;
     match inputs.retinal_velocity_deg_s() {
         Some(velocity) => map.with_motion(&velocity),
         None => Ok(map),

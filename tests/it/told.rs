@@ -1,0 +1,138 @@
+//! What `fechner compare` and `threshold` say of pictures that they refuse, or heed in part.
+
+use crate::displayed::{SIDE, fechner, run, write};
+use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Image, WritableImage as _};
+use fechner::exr_read::read_exr;
+use fechner::output::{Attribute, NITS_PER_UNIT, PIXEL_ASPECT_RATIO, Picture, write_exr, write_png};
+
+/// Motion that is no number rests, as before, and is told.
+#[test]
+fn motion_that_is_no_number_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), "a.exr", |_| [50.0; 3]);
+    for (name, bad, is_told) in [("still.exr", 0.0, false), ("bad.exr", f32::NAN, true)] {
+        // Our own writer would put a number in its place.
+        let across: Vec<f32> = (0..SIDE * SIDE).map(|pixel| if pixel == 0 { bad } else { 1.0 }).collect();
+        let channel = |name: &str, values: Vec<f32>| AnyChannel::new(name, FlatSamples::F32(values));
+        let channels = [channel("velocity.X", across), channel("velocity.Y", vec![0.0; SIDE * SIDE])];
+        let motion = Image::from_channels((SIDE, SIDE), AnyChannels::sort(channels.into_iter().collect()));
+        motion.write().to_file(folder.path().join(name)).expect("written");
+        let said = run(folder.path(), &["threshold", "a.exr", "-o", "t.exr", "--velocity", name]);
+        assert_eq!(said.contains("motion that is not finite"), is_told, "{said}");
+    }
+}
+
+/// Frames of one sequence have one shape.
+#[test]
+fn pixels_that_change_their_shape_are_no_sequence() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, wide: f32| {
+        let mut picture = Picture::new(16, 16);
+        ["R", "G", "B"].into_iter().for_each(|letter| picture.push_f32(letter, vec![20.0; 256]));
+        picture.push_attribute(NITS_PER_UNIT, Attribute::Float(1.0));
+        picture.push_attribute(PIXEL_ASPECT_RATIO, Attribute::Float(wide));
+        write_exr(&folder.path().join(name), &picture).expect("written");
+    };
+    for (frame, wide) in [(1, 1.0), (2, 1.0), (3, 2.0)] {
+        write(&format!("a.{frame}.exr"), wide);
+        write(&format!("b.{frame}.exr"), wide);
+    }
+    let (code, said) = fechner(folder.path(), &["compare", "a.#.exr", "b.#.exr", "--fps", "24"]);
+    assert!(code == 2 && said.contains("a.3.exr 2 times"), "{said}");
+}
+
+/// What tells nothing of noise is not taken for its absence: halves of one seed, one sample, a denoised crop of one pixel.
+#[test]
+fn what_tells_nothing_of_noise_is_said() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box.toml");
+    let render = |more: &[&str]| {
+        let common = ["render", scene, "--sampling", "uniform", "--json", "j.json"];
+        run(folder.path(), &[&common[..], more].concat());
+        let text = std::fs::read_to_string(folder.path().join("j.json")).expect("written");
+        serde_json::from_str::<serde_json::Value>(&text).expect("JSON")
+    };
+    render(&["--size", "16x16", "--spp", "1", "-o", "one.exr"]);
+    let variance = read_exr(&folder.path().join("one.exr")).expect("an EXR file");
+    assert!(variance.channel("variance.Y").expect("the channel").iter().all(|&variance| variance == f32::MAX));
+    let (code, said) =
+        fechner(folder.path(), &["threshold", "one.exr", "--halves", "one.exr", "one.exr", "-o", "t.exr"]);
+    assert!(code == 2 && said.contains("one seed") && !folder.path().join("t.exr").exists(), "{said}");
+    let crop = ["--size", "256x256", "--crop", "20,20,1,1", "--spp", "4", "-o", "a.png"];
+    let seen = |figures: serde_json::Value| figures["visibility_p99"].as_f64().expect("known");
+    let (raw, denoised) = (seen(render(&crop)), seen(render(&[&crop[..], &["--denoise", "builtin"]].concat())));
+    assert!(denoised >= 0.99 * raw && raw > 1.0, "{denoised} denoised, {raw} raw");
+}
+
+/// What values mean goes by a file's ending, so that its bytes must be of that kind, and whole.
+#[test]
+fn files_of_another_kind_and_cut_off_ones_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let refused = |name: &str, expected: &str| {
+        let (code, said) = fechner(folder.path(), &["compare", name, name, "--nits-per-unit", "100"]);
+        assert!(code == 2 && said.contains(name) && said.contains(expected), "{name}: {said}");
+    };
+    let png = folder.path().join("a.png");
+    write_png(&png, SIDE as u32, SIDE as u32, &[[0.18; 3]; SIDE * SIDE]).expect("written");
+    std::fs::copy(&png, folder.path().join("b.hdr")).expect("copied");
+    refused("b.hdr", "of another kind (.png)");
+    let photo = folder.path().join("c.jpg");
+    image::open(&png).expect("read").into_rgb8().save(&photo).expect("written");
+    let (code, said) = fechner(folder.path(), &["compare", "c.jpg", "c.jpg"]);
+    assert_eq!(code, 0, "{said}");
+    let bytes = std::fs::read(&photo).expect("read");
+    std::fs::write(&photo, &bytes[..bytes.len() * 9 / 10]).expect("written");
+    refused("c.jpg", "is cut off");
+}
+
+/// What is no picture to look at is refused.
+#[test]
+fn a_map_is_a_png() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), "a.exr", |_| [1.0; 3]);
+    let (code, said) = fechner(folder.path(), &["compare", "a.exr", "a.exr", "--map", "map.exr"]);
+    assert!(code == 2 && said.contains("end the name in .png"), "{code}: {said}");
+}
+
+/// Two pictures are two, whatever their names: only frames of a sequence share a note.
+#[test]
+fn a_note_is_said_of_each_picture() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in ["v1.png", "v2.png", "shot-01.png", "shot-02.png"] {
+        image::RgbaImage::from_pixel(8, 8, image::Rgba([90, 90, 90, 128]))
+            .save(folder.path().join(name))
+            .expect("written");
+    }
+    let notes = |arguments: &[&str]| run(folder.path(), arguments).matches("what is transparent").count();
+    assert_eq!(notes(&["compare", "v1.png", "v2.png"]), 2);
+    assert_eq!(notes(&["compare", "shot-##.png", "shot-##.png", "--fps", "30"]), 1);
+    for (own, other) in [("v1/f.##.png", "v2/f.##.png"), ("f1.##.png", "f2.##.png")] {
+        for frame in ["01", "02"] {
+            for name in [own, other].map(|name| folder.path().join(name.replace("##", frame))) {
+                std::fs::create_dir_all(name.parent().expect("a folder")).expect("made");
+                std::fs::copy(folder.path().join("v1.png"), name).expect("copied");
+            }
+        }
+        assert_eq!(notes(&["compare", own, other, "--fps", "30"]), 2, "{own}");
+    }
+}
+
+/// What changes nothing of pictures that are ready for the display is told, and what shows a scene's light is not.
+#[test]
+fn idle_arguments_are_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in ["1.png", "2.png"] {
+        write_png(&folder.path().join(name), SIDE as u32, SIDE as u32, &[[0.18; 3]; SIDE * SIDE]).expect("written");
+    }
+    write(folder.path(), "1.exr", |_| [10.0; 3]);
+    let more = ["--operator", "agx", "--nits-per-unit", "3"];
+    let (code, told) = fechner(folder.path(), &[&["compare", "1.png", "2.png"], &more[..]].concat());
+    assert_eq!(code, 0, "{told}");
+    for argument in ["--operator", "--nits-per-unit"] {
+        assert!(told.contains(&format!("note: {argument} changes nothing: 1.png")), "{told}");
+    }
+    for pictures in [["compare", "1.exr", "1.exr"], ["compare", "1.png", "1.exr"]] {
+        let (_, told) = fechner(folder.path(), &[&pictures[..], &more].concat());
+        assert!(!told.contains("changes nothing"), "{told}");
+    }
+}
