@@ -2,11 +2,12 @@
 //!
 //! `path` holds the life of one sample, `abreast` how several are followed at once, `camera` where they start, `shading` what a
 //! surface point scatters like, `relief` how maps turn its normal, `tables` what materials compute beforehand, `media` what a
-//! ray travels in, `prune` which light is left to chance, `sheets` what clear panes let through, `specular` what mirrors and glass show.
+//! ray travels in, `lookouts` what light comes where, `prune` which light is left to chance, `sheets` what clear panes let through, `specular` what mirrors and glass show.
 
 mod abreast;
 mod around_camera;
 mod camera;
+mod lookouts;
 mod media;
 mod path;
 mod prune;
@@ -211,6 +212,7 @@ impl PathTracer {
             thresholds,
         };
         tracer.look_around();
+        tracer.look_about();
         tracer
     }
 
@@ -227,6 +229,7 @@ impl PathTracer {
         self.camera = CameraRays::new(camera, self.settings.width, self.settings.height);
         self.moves |= camera.motion.is_some();
         self.look_around();
+        self.look_about();
     }
 
     /// The same by other settings, such as for a picture of another size.

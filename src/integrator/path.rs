@@ -200,9 +200,10 @@ impl PathTracer {
 
     /// Radiance of the environment along a ray that hit nothing.
     fn add_environment(&self, path: &mut PathState) {
-        let weighed = self.lights.from_afar(path.ray.direction.into()).map(|LightFromAfar { radiance, pdf }| {
-            radiance * path.scatter_pdf.map_or(1.0, |scatter_pdf| power_heuristic(scatter_pdf, pdf))
-        });
+        let weighed =
+            self.lights.from_afar(&path.from, path.ray.direction.into()).map(|LightFromAfar { radiance, pdf }| {
+                radiance * path.scatter_pdf.map_or(1.0, |scatter_pdf| power_heuristic(scatter_pdf, pdf))
+            });
         let radiance: Vec3 = weighed.into_iter().sum();
         if radiance != Vec3::ZERO {
             path.radiance += path.throughput * path.media.transmittance(f32::INFINITY) * radiance;
@@ -276,7 +277,7 @@ impl PathTracer {
 
     /// The ray from a point to a light and how far that is. Both ends are lifted off their surfaces; where that leaves no way
     /// between them, the distance is 0.
-    fn shadow_ray(&self, point: &SurfacePoint, light: &LightSample, time: f32) -> (Ray, f32) {
+    pub(super) fn shadow_ray(&self, point: &SurfacePoint, light: &LightSample, time: f32) -> (Ray, f32) {
         let origin = point.spawn(light.direction);
         let Some(place) = light.place else {
             return (Ray { time, ..Ray::new(origin, light.direction.into()) }, f32::INFINITY);

@@ -6,9 +6,8 @@
 
 use super::LightSample;
 use super::distribution::Distribution1d;
-use crate::scene::{Environment, Parametrisation};
-use glam::{Vec2, Vec3};
-use std::f32::consts::{PI, TAU};
+use crate::scene::Environment;
+use glam::Vec3;
 
 #[derive(Debug)]
 pub(super) struct EnvironmentSampler {
@@ -42,13 +41,7 @@ impl EnvironmentSampler {
     }
 
     pub(super) fn sample(&self, u: [f32; 2]) -> Option<LightSample> {
-        let cells = self.cells.as_ref()?;
-        let (row, probability) = cells.rows.sample_discrete(u[1]);
-        let within = ((u[1] - cells.rows.cumulative_before(row)) / probability).clamp(0.0, 1.0);
-        let (s, density) = cells.columns[row].as_ref()?.sample_continuous(u[0]);
-        let local = self.in_row(row, s, within);
-        let direction = self.environment.from_world.transpose() * local;
-        let pdf = probability * density / self.environment.row_solid_angle(row as u32) as f32;
+        let (direction, pdf) = self.cells.as_ref()?.sample(&self.environment, u)?;
         (pdf > 0.0 && pdf.is_finite()).then(|| LightSample {
             direction,
             place: None,
@@ -58,55 +51,28 @@ impl EnvironmentSampler {
         })
     }
 
-    /// A direction in a row of texels, uniform in solid angle for `s` along the row and `within` across it.
-    fn in_row(&self, row: usize, s: f32, within: f32) -> Vec3 {
-        let height = self.environment.height as f32;
-        match self.environment.parametrisation {
-            Parametrisation::EqualArea => {
-                self.environment.parametrisation.to_direction(Vec2::new(s, (row as f32 + within) / height))
-            }
-            Parametrisation::LatLong => {
-                // 1 − cos of the angle from the nearer pole, which keeps its digits there.
-                let (pole, to_top, to_bottom) = match row as f32 {
-                    row if 2.0 * row < height => (1.0, row, row + 1.0),
-                    row => (-1.0, height - row, height - row - 1.0),
-                };
-                let versine = |rows: f32| 2.0 * (0.5 * PI * rows / height).sin().powi(2);
-                let (top, bottom) = (versine(to_top), versine(to_bottom));
-                let versine = top + (bottom - top) * within;
-                let (sin_theta, cos_theta) = ((versine * (2.0 - versine)).max(0.0).sqrt(), pole * (1.0 - versine));
-                let (sin_phi, cos_phi) = ((s - 0.5) * TAU).sin_cos();
-                Vec3::new(sin_theta * sin_phi, cos_theta, -sin_theta * cos_phi)
-            }
-        }
-    }
-
+    /// Probability per steradian that a direction is sampled.
     pub(super) fn pdf(&self, direction: Vec3) -> f32 {
-        let Some(cells) = &self.cells else { return 0.0 };
-        let e = &self.environment;
-        let uv = e.parametrisation.to_uv(e.from_world * direction);
-        let row = ((uv.y * e.height as f32) as usize).min(e.height as usize - 1);
-        let Some(columns) = &cells.columns[row] else { return 0.0 };
-        let column = ((uv.x * e.width as f32) as usize).min(e.width as usize - 1);
-        let density = columns.probability(column) * e.width as f32;
-        cells.rows.probability(row) * density / e.row_solid_angle(row as u32) as f32
+        self.cells.as_ref().map_or(0.0, |cells| cells.pdf(&self.environment, direction))
     }
+}
+
+/// The largest channel of what is seen around each texel, row-major: look-ups are bilinear, so each texel's weight covers its
+/// neighbours too.
+fn texel_weights(environment: &Environment) -> Vec<f64> {
+    let (width, height) = (i64::from(environment.width), i64::from(environment.height));
+    let brightness = |x: i64, y: i64| f64::from(environment.texels[environment.texel_index(x, y)].max_element());
+    let in_row = |x: i64, y: i64| brightness(x - 1, y) + 2.0 * brightness(x, y) + brightness(x + 1, y);
+    let weight = |x: i64, y: i64| (in_row(x, y - 1) + 2.0 * in_row(x, y) + in_row(x, y + 1)) / 16.0;
+    (0..width * height).map(|i| weight(i % width, i / width)).collect()
 }
 
 impl Cells {
     /// `None` where no texel exceeds the mean by more than 1 % of it.
     fn new(environment: &Environment) -> Option<Self> {
-        let (width, height) = (environment.width as usize, environment.height as usize);
-        // Look-ups are bilinear, so each cell's weight covers its neighbours too.
-        let brightness = |x: i64, y: i64| f64::from(environment.texels[environment.texel_index(x, y)].max_element());
-        let weight = |x: usize, y: usize| {
-            let (x, y) = (x as i64, y as i64);
-            let row = |y: i64| brightness(x - 1, y) + 2.0 * brightness(x, y) + brightness(x + 1, y);
-            (row(y - 1) + 2.0 * row(y) + row(y + 1)) / 16.0
-        };
-        let weights: Vec<f64> = (0..width * height).map(|i| weight(i % width, i / width)).collect();
-        let solid_angles: Vec<f64> =
-            (0..height).map(|row| environment.row_solid_angle(row as u32) / width as f64).collect();
+        let (width, height) = (environment.width as usize, environment.height);
+        let weights = texel_weights(environment);
+        let solid_angles: Vec<f64> = (0..height).map(|row| row_solid_angle(environment, row) / width as f64).collect();
         let mean = weights.iter().enumerate().map(|(i, w)| w * solid_angles[i / width]).sum::<f64>()
             / (2.0 * std::f64::consts::TAU);
         let excess: Vec<f64> = weights.iter().map(|w| if *w > 1.01 * mean { w - mean } else { 0.0 }).collect();
@@ -120,33 +86,29 @@ impl Cells {
             columns: excess.chunks_exact(width).map(Distribution1d::new).collect(),
         })
     }
+
+    /// A direction and its probability per steradian.
+    fn sample(&self, environment: &Environment, u: [f32; 2]) -> Option<(Vec3, f32)> {
+        let (row, probability) = self.rows.sample_discrete(u[1]);
+        let within = ((u[1] - self.rows.cumulative_before(row)) / probability).clamp(0.0, 1.0);
+        let (along, density) = self.columns[row].as_ref()?.sample_continuous(u[0]);
+        let row = row as u32;
+        let local = environment.parametrisation.direction_in_row(row, environment.height, along, within);
+        let pdf = probability * density / row_solid_angle(environment, row) as f32;
+        Some((environment.from_world.transpose() * local, pdf))
+    }
+
+    /// Probability per steradian of a direction.
+    fn pdf(&self, environment: &Environment, direction: Vec3) -> f32 {
+        let uv = environment.parametrisation.to_uv(environment.from_world * direction);
+        let row = ((uv.y * environment.height as f32) as u32).min(environment.height - 1);
+        let Some(columns) = &self.columns[row as usize] else { return 0.0 };
+        let column = ((uv.x * environment.width as f32) as usize).min(environment.width as usize - 1);
+        let density = columns.probability(column) * environment.width as f32;
+        self.rows.probability(row as usize) * density / row_solid_angle(environment, row) as f32
+    }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Where rows are narrow, too, at the poles of a picture of 4096×2048: what is drawn from a row is found in it, evenly.
-    #[test]
-    fn samples_of_a_row_lie_in_it() {
-        let height = 2048;
-        let black =
-            Environment { texels: Environment::constant(Vec3::ZERO).texels, ..Environment::constant(Vec3::ONE) };
-        let environment = Environment { width: 1, height, ..black };
-        let sampler = EnvironmentSampler { environment, cells: None };
-        for row in [0, 1, 2, 700, 1023, 1024, 2045, 2046, 2047] {
-            let solid_angle = sampler.environment.row_solid_angle(row);
-            for step in 0..64 {
-                let within = (step as f32 + 0.5) / 64.0;
-                let direction = sampler.in_row(row as usize, 0.3, within);
-                assert!((direction.length() - 1.0).abs() < 1e-6);
-                let v = sampler.environment.parametrisation.to_uv(direction).y * height as f32;
-                assert_eq!(v as u32, row, "{v} of row {row}");
-                // The solid angle of the part of the row that lies above.
-                let angle = |rows: f64| (std::f64::consts::PI * rows / f64::from(height)).cos();
-                let above = 2.0 * std::f64::consts::PI * (angle(f64::from(row)) - angle(f64::from(v)));
-                assert!((above / solid_angle - f64::from(within)).abs() < 2e-3, "{above} of {solid_angle} at {within}");
-            }
-        }
-    }
+fn row_solid_angle(environment: &Environment, row: u32) -> f64 {
+    environment.parametrisation.row_solid_angle(row, environment.height)
 }

@@ -1,7 +1,7 @@
 //! Where light comes from, one file a kind, and how one is chosen.
 //!
-//! First a group is chosen with fixed probabilities (the environment, lights from afar, emitters that have a place), then
-//! one of the group: by irradiance from afar, by a tree over what each can give to this point among the placed. Then a
+//! First a kind is chosen (the environment, lights from afar, emitters that have a place), by what each gives to that part of the scene, then
+//! one of the kind: by irradiance from afar, by a tree over what each can give to this point among the placed. Then a
 //! direction by the light's own rule. All pdfs are per steradian at the receiver and include the choices, so they can be
 //! weighed against those of BSDFs.
 
@@ -13,6 +13,7 @@ mod environment;
 mod flat;
 mod givers;
 mod lanes;
+mod outlook;
 mod punctual;
 mod solid_angle;
 mod sphere;
@@ -20,6 +21,7 @@ mod sphere;
 mod tests;
 mod tree;
 
+pub use outlook::{Arrival, Lookout};
 pub use tree::LightReceiver;
 
 use crate::geometry::{Hit, Ray, World};
@@ -29,6 +31,7 @@ use distant::DistantLights;
 use environment::EnvironmentSampler;
 use flat::FlatEmitter;
 use glam::Vec3;
+use outlook::Outlooks;
 use sphere::SphereEmitter;
 use tree::LightTree;
 
@@ -84,7 +87,7 @@ enum Emitter {
 }
 
 /// All lights of a world, ready to be sampled.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Lights {
     emitters: Vec<Emitter>,
     /// Per object: the emitter of each triangle, for objects that emit.
@@ -93,14 +96,67 @@ pub struct Lights {
     distant: Option<DistantLights>,
     environment: Option<EnvironmentSampler>,
     shares: Shares,
+    /// How kinds are chosen where; `None` where it is the same everywhere, or nobody has looked.
+    outlooks: Option<Outlooks>,
 }
 
-/// Probabilities of the groups.
+/// What lights are chosen from one by one.
 #[derive(Clone, Copy, Debug)]
-struct Shares {
-    environment: f32,
-    distant: f32,
-    placed: f32,
+enum Kind {
+    Environment,
+    /// Lights from afar.
+    Distant,
+    /// Emitters that have a place.
+    Placed,
+}
+
+impl Kind {
+    const ALL: [Self; 3] = [Self::Environment, Self::Distant, Self::Placed];
+}
+
+/// What is left to a kind of light of the share that it has among equals, however weak it seems.
+const LEAST_SHARE: f32 = 0.3;
+
+/// Probabilities of the kinds.
+#[derive(Clone, Copy, Debug, Default)]
+struct Shares([f32; Kind::ALL.len()]);
+
+impl Shares {
+    /// The same for all that are there.
+    fn even(there: [bool; Kind::ALL.len()]) -> Self {
+        let weights = there.map(|there| if there { 1.0 } else { 0.0 });
+        let total = weights.iter().sum::<f32>().max(1.0);
+        Self(weights.map(|weight| weight / total))
+    }
+
+    /// In proportion to how strong samples of the kinds are, but that each keeps a part of what it has here. The same where all are 0.
+    fn toward(self, strengths: [f32; Kind::ALL.len()]) -> Self {
+        let total: f32 = strengths.iter().sum();
+        if !(total > 0.0 && total.is_finite()) {
+            return self;
+        }
+        let shares: [f32; Kind::ALL.len()] =
+            std::array::from_fn(|kind| (strengths[kind] / total).max(LEAST_SHARE * self.0[kind]));
+        let sum: f32 = shares.iter().sum();
+        Self(shares.map(|share| share / sum))
+    }
+
+    fn of(&self, kind: Kind) -> f32 {
+        self.0[kind as usize]
+    }
+
+    /// A kind, its probability, and where in [0, 1) its part the number lies that chose it.
+    fn choose(&self, u: f32) -> (Kind, f32, f32) {
+        let Self([environment, distant, placed]) = *self;
+        if u < environment {
+            return (Kind::Environment, environment, u / environment);
+        }
+        if u < environment + distant {
+            return (Kind::Distant, distant, (u - environment) / distant);
+        }
+        let within = ((u - environment - distant) / placed).clamp(0.0, 1.0 - f32::EPSILON / 2.0);
+        (Kind::Placed, placed, within)
+    }
 }
 
 impl Lights {
@@ -112,27 +168,48 @@ impl Lights {
         let distant = DistantLights::new(&scene.lights);
         let environment = scene.environment.as_ref().and_then(EnvironmentSampler::new);
         let sampled = environment.as_ref().is_some_and(EnvironmentSampler::is_sampled);
-        let weights = [sampled, distant.is_some(), tree.is_some()].map(|there| if there { 1.0f32 } else { 0.0 });
-        let total = weights.iter().sum::<f32>().max(1.0);
-        let [environment_share, distant_share, placed] = weights.map(|weight| weight / total);
-        let shares = Shares { environment: environment_share, distant: distant_share, placed };
-        Self { emitters, emitter_of, tree, distant, environment, shares }
+        let shares = Shares::even([sampled, distant.is_some(), tree.is_some()]);
+        Self { emitters, emitter_of, tree, distant, environment, shares, outlooks: None }
+    }
+
+    /// Whether there is more than one kind of light to sample.
+    pub fn have_a_choice(&self) -> bool {
+        self.shares.0.iter().filter(|share| **share > 0.0).count() > 1
+    }
+
+    /// Has kinds of light chosen by what comes to where paths get to.
+    pub fn look_about(&mut self, world: &World, lookouts: &[Lookout], arrival: &Arrival) {
+        self.outlooks = Outlooks::new(self, world, lookouts, arrival);
+    }
+
+    fn shares_at(&self, position: Vec3) -> &Shares {
+        self.outlooks.as_ref().map_or(&self.shares, |outlooks| outlooks.at(position))
     }
 
     /// A direction from a receiver towards a light, for three numbers in [0, 1): two for the place, one for the choice.
     pub fn sample(&self, world: &World, receiver: &LightReceiver, time: f32, u: [f32; 3]) -> Option<LightSample> {
         let [u0, u1, select] = u;
-        let Shares { environment, distant, placed } = self.shares;
-        if select < environment {
-            return chosen_by(self.environment.as_ref()?.sample([u0, u1]), environment);
+        let (kind, chosen, within) = self.shares_at(receiver.position).choose(select);
+        chosen_by(self.sample_kind(kind, world, receiver, time, [u0, u1, within]), chosen)
+    }
+
+    /// The same for a kind of light.
+    fn sample_kind(
+        &self,
+        kind: Kind,
+        world: &World,
+        receiver: &LightReceiver,
+        time: f32,
+        [u0, u1, select]: [f32; 3],
+    ) -> Option<LightSample> {
+        match kind {
+            Kind::Environment => self.environment.as_ref()?.sample([u0, u1]),
+            Kind::Distant => Some(self.distant.as_ref()?.sample([u0, u1, select])),
+            Kind::Placed => {
+                let (index, chosen) = self.tree.as_ref()?.sample(receiver, select)?;
+                chosen_by(self.sample_emitter(world, index, receiver, time, [u0, u1]), chosen)
+            }
         }
-        if select < environment + distant {
-            let within = (select - environment) / distant;
-            return chosen_by(Some(self.distant.as_ref()?.sample([u0, u1, within])), distant);
-        }
-        let within = ((select - environment - distant) / placed).clamp(0.0, 1.0 - f32::EPSILON / 2.0);
-        let (index, chosen) = self.tree.as_ref()?.sample(receiver, within)?;
-        chosen_by(self.sample_emitter(world, index, receiver, time, [u0, u1]), placed * chosen)
     }
 
     #[inline]
@@ -163,7 +240,7 @@ impl Lights {
             return 0.0;
         };
         let index = of_triangle[hit.triangle as usize] as usize;
-        let chosen = tree.probability(receiver, index) * self.shares.placed;
+        let chosen = tree.probability(receiver, index) * self.shares_at(receiver.position).of(Kind::Placed);
         if chosen == 0.0 {
             return 0.0;
         }
@@ -184,15 +261,16 @@ impl Lights {
 
     /// What a ray which meets no surface sees of the environment and of the discs of lights from afar, apart: [`Lights::sample`] gives
     /// light of the one it has chosen, so each is weighed against its own density.
-    pub fn from_afar(&self, direction: Vec3) -> [LightFromAfar; 2] {
+    pub fn from_afar(&self, receiver: &LightReceiver, direction: Vec3) -> [LightFromAfar; 2] {
+        let shares = self.shares_at(receiver.position);
         let environment = self.environment.as_ref().map(|e| LightFromAfar {
             radiance: e.radiance(direction),
-            pdf: e.pdf(direction) * self.shares.environment,
+            pdf: e.pdf(direction) * shares.of(Kind::Environment),
         });
-        let discs = self
-            .distant
-            .as_ref()
-            .map(|d| LightFromAfar { radiance: d.radiance(direction), pdf: d.pdf(direction) * self.shares.distant });
+        let discs = self.distant.as_ref().map(|d| LightFromAfar {
+            radiance: d.radiance(direction),
+            pdf: d.pdf(direction) * shares.of(Kind::Distant),
+        });
         [environment.unwrap_or_default(), discs.unwrap_or_default()]
     }
 }

@@ -1,6 +1,6 @@
 //! Every way of sampling a light against its own pdf, and the tree against lights in plenty.
 
-use super::{LightReceiver, Lights};
+use super::{LightReceiver, Lights, Lookout};
 use crate::geometry::{Ray, World};
 use crate::scene::{
     Alpha, ColorInput, Environment, Instance, Light, Material, MaterialId, Mesh, MeshId, Parametrisation, Scene,
@@ -134,15 +134,15 @@ fn scenes() -> Vec<(&'static str, Scene)> {
     all
 }
 
-fn pdf_from_afar(lights: &Lights, direction: Vec3) -> f32 {
-    lights.from_afar(direction).map(|light| light.pdf).into_iter().sum()
+fn pdf_from_afar(lights: &Lights, receiver: &LightReceiver, direction: Vec3) -> f32 {
+    lights.from_afar(receiver, direction).map(|light| light.pdf).into_iter().sum()
 }
 
 /// Density of a direction, from whatever a ray that way meets.
 fn pdf(world: &World, lights: &Lights, receiver: &LightReceiver, direction: Vec3) -> f32 {
     let ray = Ray::new(Vec3A::from(receiver.position), direction.into());
     // Lights from afar are sampled whether something stands before them or not.
-    pdf_from_afar(lights, direction)
+    pdf_from_afar(lights, receiver, direction)
         + world.closest(&ray).map_or(0.0, |hit| lights.pdf_of_hit(world, receiver, &ray, &hit, hit.distance))
 }
 
@@ -229,8 +229,11 @@ fn both_sides_of_mis_state_the_same_density() {
             let Some(sample) = lights.sample(&world, &receiver, 0.0, u) else { continue };
             // What stands before lights from afar has a density of its own.
             let stated = match sample.place {
-                None => pdf_from_afar(&lights, sample.direction),
-                Some(_) => pdf(&world, &lights, &receiver, sample.direction) - pdf_from_afar(&lights, sample.direction),
+                None => pdf_from_afar(&lights, &receiver, sample.direction),
+                Some(_) => {
+                    pdf(&world, &lights, &receiver, sample.direction)
+                        - pdf_from_afar(&lights, &receiver, sample.direction)
+                }
             };
             differ += u32::from((stated / sample.pdf - 1.0).abs() > 2e-3);
         }
@@ -342,4 +345,55 @@ fn hundreds_of_lamps_hardly_raise_noise() {
     println!("relative variance: {few:.4} under 9 lamps, {many:.4} under 576, {by_power:.2} if chosen by power");
     assert!(few < 0.02 && many < 0.1, "relative variance: {few} under 9 lamps, {many} under 576");
     assert!(many < 0.1 * by_power, "{many} {by_power}");
+}
+
+/// A sun that shines on one side of the scene only is asked for there, and everywhere else a little; what samples say of the light stays
+/// the same.
+#[test]
+fn kinds_of_light_are_chosen_by_what_arrives() {
+    let mut scene = Scene { environment: Some(Environment::from_directions(48, 24, uneven)), ..Scene::default() };
+    let sun = Light::Directional {
+        is_of_sky: false,
+        direction: Vec3::NEG_Y,
+        irradiance: Vec3::splat(100.0),
+        angular_radius: 0.0,
+    };
+    scene.lights.push(sun);
+    let world = World::new(Arc::new(scene));
+    let even = Lights::new(&world);
+    let mut lights = Lights::new(&world);
+    let lookouts: Vec<Lookout> = (0..256)
+        .map(|i| {
+            let position = Vec3::new(random(i, 0) - 0.5, 0.0, random(i, 1));
+            Lookout { receiver: LightReceiver { position, normal: Vec3::Y }, time: 0.0 }
+        })
+        .collect();
+    let is_sunny = |position: Vec3| position.x > 0.0;
+    lights.look_about(&world, &lookouts, &|number, sample| {
+        let arrives = !sample.is_delta || is_sunny(lookouts[number].receiver.position);
+        if arrives { 1.0 } else { 0.0 }
+    });
+    for (x, least, most) in [(-0.4, 0.12, 0.14), (0.4, 0.85, 0.88)] {
+        let receiver = LightReceiver { position: Vec3::new(x, 0.0, 0.5), normal: Vec3::Y };
+        let count = 20_000;
+        let (mut suns, mut sums) = ([0u32; 2], [[0.0f64; 2]; 2]);
+        for i in 0..count {
+            let u = [random(i, 1), random(i, 2), random(i, 3)];
+            for (lights, [sum, squares]) in [&lights, &even].into_iter().zip(&mut sums) {
+                let Some(sample) = lights.sample(&world, &receiver, 0.0, u) else { continue };
+                suns[usize::from(std::ptr::eq(lights, &even))] += u32::from(sample.is_delta);
+                let value = f64::from(sample.radiance.x * sample.direction.y.max(0.0) / sample.pdf);
+                *sum += value;
+                *squares += value * value;
+            }
+        }
+        let share = f64::from(suns[0]) / count as f64;
+        assert!(share > least && share < most, "at {x} the sun is asked for by {share} of the samples");
+        let [[chosen, chosen_squares], [evenly, evenly_squares]] = sums;
+        // Both estimates' variances together, four deviations.
+        let variance = |sum: f64, squares: f64| (squares - sum * sum / count as f64) / (count as f64).powi(2);
+        let bound = 4.0 * (variance(chosen, chosen_squares) + variance(evenly, evenly_squares)).sqrt();
+        let (chosen, evenly) = (chosen / count as f64, evenly / count as f64);
+        assert!((chosen - evenly).abs() < bound, "at {x}: {chosen} for {evenly} ± {bound}");
+    }
 }

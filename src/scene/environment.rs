@@ -81,6 +81,41 @@ impl Parametrisation {
     }
 }
 
+impl Parametrisation {
+    /// Solid angle in steradian of one row of a picture of so many.
+    pub fn row_solid_angle(self, row: u32, rows: u32) -> f64 {
+        let rows = f64::from(rows);
+        match self {
+            Self::LatLong => {
+                let cosine = |row: f64| (std::f64::consts::PI * row / rows).cos();
+                std::f64::consts::TAU * (cosine(f64::from(row)) - cosine(f64::from(row) + 1.0))
+            }
+            Self::EqualArea => 2.0 * std::f64::consts::TAU / rows,
+        }
+    }
+
+    /// A unit direction in one row of a picture of so many, uniform in solid angle for `along` the row and `across` it in [0, 1].
+    pub fn direction_in_row(self, row: u32, rows: u32, along: f32, across: f32) -> Vec3 {
+        let (row, rows) = (row as f32, rows as f32);
+        match self {
+            Self::EqualArea => self.to_direction(Vec2::new(along, (row + across) / rows)),
+            Self::LatLong => {
+                // 1 − cos of the angle from the nearer pole, which keeps its digits there.
+                let (pole, to_top, to_bottom) = match row {
+                    row if 2.0 * row < rows => (1.0, row, row + 1.0),
+                    row => (-1.0, rows - row, rows - row - 1.0),
+                };
+                let versine = |from_pole: f32| 2.0 * (0.5 * PI * from_pole / rows).sin().powi(2);
+                let (top, bottom) = (versine(to_top), versine(to_bottom));
+                let versine = top + (bottom - top) * across;
+                let (sin_theta, cos_theta) = ((versine * (2.0 - versine)).max(0.0).sqrt(), pole * (1.0 - versine));
+                let (sin_phi, cos_phi) = ((along - 0.5) * TAU).sin_cos();
+                Vec3::new(sin_theta * sin_phi, cos_theta, -sin_theta * cos_phi)
+            }
+        }
+    }
+}
+
 impl Environment {
     /// The same radiance from everywhere, in scene units.
     pub fn constant(radiance: Vec3) -> Self {
@@ -141,24 +176,12 @@ impl Environment {
         row as usize * self.width as usize + column as usize
     }
 
-    /// Solid angle of a row's texels together, in steradian.
-    pub fn row_solid_angle(&self, row: u32) -> f64 {
-        let height = f64::from(self.height);
-        match self.parametrisation {
-            Parametrisation::LatLong => {
-                let cosine = |row: f64| (std::f64::consts::PI * row / height).cos();
-                std::f64::consts::TAU * (cosine(f64::from(row)) - cosine(f64::from(row) + 1.0))
-            }
-            Parametrisation::EqualArea => 2.0 * std::f64::consts::TAU / height,
-        }
-    }
-
     /// Irradiance on a surface that faces along the world direction `normal`, from texel centres: what formats that give
     /// an illuminance scale by.
     pub fn irradiance(&self, normal: Vec3) -> Vec3 {
         let mut sum = glam::DVec3::ZERO;
         for row in 0..self.height {
-            let solid_angle = self.row_solid_angle(row) / f64::from(self.width);
+            let solid_angle = self.parametrisation.row_solid_angle(row, self.height) / f64::from(self.width);
             for column in 0..self.width {
                 let uv = Vec2::new((column as f32 + 0.5) / self.width as f32, (row as f32 + 0.5) / self.height as f32);
                 let direction = self.from_world.transpose() * self.parametrisation.to_direction(uv);
@@ -247,6 +270,27 @@ mod tests {
         for environment in [&equal_area, &lat_long] {
             let irradiance = environment.irradiance(Vec3::Y).y;
             assert!((irradiance / expected - 1.0).abs() < 2e-3, "{irradiance} {expected}");
+        }
+    }
+
+    /// Where rows are narrow, too, at the poles of a picture of 4096×2048: what is drawn from a row is found in it, evenly.
+    #[test]
+    fn samples_of_a_row_lie_in_it() {
+        let height = 2048;
+        let map = Parametrisation::LatLong;
+        for row in [0, 1, 2, 700, 1023, 1024, 2045, 2046, 2047] {
+            let solid_angle = map.row_solid_angle(row, height);
+            for step in 0..64 {
+                let within = (step as f32 + 0.5) / 64.0;
+                let direction = map.direction_in_row(row, height, 0.3, within);
+                assert!((direction.length() - 1.0).abs() < 1e-6);
+                let v = map.to_uv(direction).y * height as f32;
+                assert_eq!(v as u32, row, "{v} of row {row}");
+                // The solid angle of the part of the row that lies above.
+                let angle = |rows: f64| (std::f64::consts::PI * rows / f64::from(height)).cos();
+                let above = 2.0 * std::f64::consts::PI * (angle(f64::from(row)) - angle(f64::from(v)));
+                assert!((above / solid_angle - f64::from(within)).abs() < 2e-3, "{above} of {solid_angle} at {within}");
+            }
         }
     }
 }
