@@ -129,6 +129,8 @@ mod sensitivity;
 pub mod sequence;
 mod taps;
 #[cfg(test)]
+mod test_golden;
+#[cfg(test)]
 mod test_noise;
 pub mod threshold;
 pub mod tone;
