@@ -17,6 +17,8 @@ const SMALL_GRID: usize = 4096;
 const LEAST_GAP_OF_LARGE_GRIDS: f64 = 5e-3;
 /// How often the gap is looked at.
 const CHECK_EVERY: usize = 5;
+/// Rounds that raise counts to what constraints need after the last update.
+const MOST_REPAIRS: usize = 12;
 /// Slack given to constraints that cannot be met.
 const UNREACHABLE_SLACK: f32 = 1.01;
 
@@ -228,12 +230,12 @@ impl<'a> Solver<'a> {
         Allocation { samples, cost, lower_bound, gap, visibility: 0.0, unreachable_pixels: 0, iterations }
     }
 
-    /// Raises counts around violated constraints until none is left.
+    /// Raises counts around violated constraints until none is left, for at most [`MOST_REPAIRS`] rounds.
     fn repair(&self, samples: &mut Plane, bounds: &Plane) {
         let most = self.problem.max_samples as f32;
         let least = self.problem.min_samples as f32;
         let reach = self.sigma_px.map(|sigma| (2.0 * sigma).ceil() as usize);
-        for _ in 0..12 {
+        for _ in 0..MOST_REPAIRS {
             let excess = self.excess(samples, bounds);
             let worst = excess.values().iter().copied().fold(0.0, f32::max);
             if worst <= 1.0 {

@@ -61,7 +61,7 @@ impl ModelInputs<'_> {
         Ok(())
     }
 
-    /// Velocity over the retina, deg/s, at each pixel: the eye's drift alone for a still.
+    /// Velocity over the retina, deg/s, at each pixel; `None` for a still.
     fn retinal_velocity_deg_s(&self) -> Option<Plane> {
         let velocity = self.image_velocity_deg_s?;
         Some(Plane::from_fn(velocity.width(), velocity.height(), |x, y| {
