@@ -24,6 +24,17 @@ impl PixelDensity {
         Self { horizontal: scale * self.horizontal, vertical: scale * self.vertical }
     }
 
+    /// Pixels along a row and along a column for this many degrees.
+    ///
+    /// ```
+    /// use fechner_perception::display::PixelDensity;
+    /// assert_eq!(PixelDensity { horizontal: 60.0, vertical: 30.0 }.pixels(0.5), [30.0, 15.0]);
+    /// ```
+    #[must_use]
+    pub fn pixels(self, degrees: f64) -> [f64; 2] {
+        [degrees * self.horizontal, degrees * self.vertical]
+    }
+
     /// Along the finer axis.
     #[must_use]
     pub fn finest(self) -> f64 {

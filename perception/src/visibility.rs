@@ -125,8 +125,7 @@ impl ThresholdMap {
     }
 
     pub(crate) fn blurred(&self, plane: &Plane, sigma_deg: f64) -> Plane {
-        let density = self.viewing.display.pixel_density();
-        gaussian_blur_xy(plane, sigma_deg * density.horizontal, sigma_deg * density.vertical)
+        gaussian_blur_xy(plane, self.viewing.display.pixel_density().pixels(sigma_deg))
     }
 
     pub(crate) fn band_count(&self) -> usize {

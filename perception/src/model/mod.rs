@@ -113,8 +113,7 @@ pub trait ThresholdModel: Send + Sync {
 
 /// Energy over a Gaussian of σ 0.25°.
 fn pooled(energy: &Plane, viewing: &Viewing) -> Plane {
-    let density = viewing.display.pixel_density();
-    gaussian_blur_xy(energy, POOLING_SIGMA_DEG * density.horizontal, POOLING_SIGMA_DEG * density.vertical)
+    gaussian_blur_xy(energy, viewing.display.pixel_density().pixels(POOLING_SIGMA_DEG))
 }
 
 /// Two-sided 95 % of a normal distribution: models that stop on a confidence interval ask z σ ≤ T.
