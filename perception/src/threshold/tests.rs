@@ -230,14 +230,9 @@ fn no_motion_changes_nothing() {
 fn isoluminant_noise_is_not_missed() {
     use crate::csf::{CastleChromatic, ChromaticChannel};
     use crate::opponent::opponent;
+    use crate::test_noise::red_for_green;
     let mut state = 9;
-    let noise: Vec<_> = (0..128 * 128)
-        .map(|_| {
-            // Red up and green down by the same luminance.
-            let red = 40.0 * normal(&mut state);
-            opponent([red, -red * 0.2126 / 0.7152, 0.0])
-        })
-        .collect();
+    let noise: Vec<_> = (0..128 * 128).map(|_| opponent(red_for_green(40.0 * normal(&mut state)))).collect();
     let plane = |value: fn(&crate::opponent::Opponent) -> f32| {
         Plane::from_values(128, 128, noise.iter().map(value).collect()).unwrap()
     };

@@ -211,7 +211,7 @@ fn a_tint_is_shown_as_strong_as_the_slope_says() {
 /// Red–green signal of the picture for a red tint, over the scene's.
 fn chroma_slope_of_picture(fitted: &dyn FittedTone, pixel: Pixel, scene: f32) -> f32 {
     let red_green = |sign: f32| {
-        let tint = [1.0, -0.2126 / 0.7152, 0.0].map(|part| scene * (1.0 + sign * 0.02 * part));
+        let tint = crate::test_noise::red_for_green(1.0).map(|part| scene * (1.0 + sign * 0.02 * part));
         let red_green = |rgb| crate::opponent::opponent(rgb).red_green;
         (red_green(fitted.map_rgb_at(pixel, tint)), red_green(tint))
     };
