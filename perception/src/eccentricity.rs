@@ -14,6 +14,7 @@ use crate::display::PixelDensity;
 use crate::noise_gain::noise_gain;
 use crate::plane::Plane;
 use crate::sensitivity::AdaptationLevel;
+use crate::table::UniformTable;
 use crate::threshold::ThresholdMap;
 
 /// A place in the picture that is looked at, pixels from its upper left corner.
@@ -93,9 +94,7 @@ pub fn eccentricity_deg(width: usize, height: usize, gaze: Gaze, density: PixelD
 }
 
 /// What is left of the energy of noise against eccentricity.
-struct EnergyTable {
-    entries: Vec<f32>,
-}
+struct EnergyTable(UniformTable);
 
 impl EnergyTable {
     /// For noise of which `energy_at(freq_cpd)` of its visible energy lies at each frequency of the pixel grid.
@@ -108,14 +107,11 @@ impl EnergyTable {
             if whole > 0.0 { rings.iter().map(at).sum::<f64>() / whole } else { 1.0 }
         };
         let steps = (FARTHEST_DEG * STEPS_A_DEGREE) as u32;
-        Self { entries: (0..=steps).map(|step| left(f64::from(step) / STEPS_A_DEGREE) as f32).collect() }
+        Self(UniformTable::new((0..=steps).map(|step| left(f64::from(step) / STEPS_A_DEGREE) as f32)))
     }
 
     fn at(&self, eccentricity_deg: f32) -> f32 {
-        let position = eccentricity_deg.max(0.0) * STEPS_A_DEGREE as f32;
-        let index = (position as usize).min(self.entries.len() - 2);
-        let fraction = (position - index as f32).min(1.0);
-        self.entries[index] + fraction * (self.entries[index + 1] - self.entries[index])
+        self.0.at(eccentricity_deg * STEPS_A_DEGREE as f32)
     }
 }
 

@@ -127,6 +127,7 @@ pub mod saliency;
 pub mod seen;
 mod sensitivity;
 pub mod sequence;
+mod table;
 mod taps;
 #[cfg(test)]
 mod test_golden;

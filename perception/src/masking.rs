@@ -7,6 +7,7 @@ use crate::fft::{Frame, MOST_REDUCTION, PictureTransform, Spectrum, Workspace, r
 use crate::plane::Plane;
 use crate::reduced::ReducedPlane;
 use crate::sensitivity::BandTables;
+use crate::table::UniformTable;
 use crate::taps::{eroded, smoothed};
 use crate::threshold::GuideNoise;
 
@@ -24,7 +25,7 @@ pub fn threshold_elevation(mask: f64) -> f64 {
 
 /// [`threshold_elevation`], capped, against the mask's squared contrast.
 pub(crate) struct ElevationTable {
-    entries: Vec<f32>,
+    entries: UniformTable,
     entries_per_square: f32,
 }
 
@@ -34,16 +35,16 @@ impl ElevationTable {
     pub(crate) fn new() -> Self {
         // Contrast at which the elevation reaches its cap.
         let last = (ELEVATION_CAP.powi(4) - 1.0).powf(2.0 / 2.8);
-        let entries = (0..=ENTRIES)
-            .map(|entry| threshold_elevation((last * entry as f64 / ENTRIES as f64).sqrt()).min(ELEVATION_CAP) as f32)
-            .collect();
-        Self { entries, entries_per_square: (ENTRIES as f64 / last) as f32 }
+        let entry_at =
+            |entry| threshold_elevation((last * entry as f64 / ENTRIES as f64).sqrt()).min(ELEVATION_CAP) as f32;
+        Self {
+            entries: UniformTable::new((0..=ENTRIES).map(entry_at)),
+            entries_per_square: (ENTRIES as f64 / last) as f32,
+        }
     }
 
     fn at(&self, mask_squared: f32) -> f32 {
-        let position = (mask_squared * self.entries_per_square).min(ENTRIES as f32 - 1e-3);
-        let index = position as usize;
-        self.entries[index] + (position - index as f32) * (self.entries[index + 1] - self.entries[index])
+        self.entries.at((mask_squared * self.entries_per_square).min(ENTRIES as f32 - 1e-3))
     }
 }
 
