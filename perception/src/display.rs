@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::csf::check_area_deg2;
 pub use crate::eotf::Eotf;
 use crate::eotf::PQ_PEAK_CD_M2;
 use crate::error::{Error, check_range};
@@ -280,7 +281,7 @@ impl Display {
             check_range("distance_m", distance_m, 0.01, 1000.0, "between 0.01 and 1000 m")?;
         }
         if let Some(area) = self.csf_area_deg2 {
-            check_range("csf_area_deg2", area, 1e-3, 1e4, "between 0.001 and 10000 deg²")?;
+            check_area_deg2("csf_area_deg2", area)?;
         }
         Ok(())
     }
@@ -386,7 +387,7 @@ impl Viewing {
             check_range("observer.glare.age_years", age_years, 1.0, 120.0, "between 1 and 120 years")?;
         }
         check_range("observer.sensitivity", self.observer.sensitivity, 1e-3, 1e3, "between 0.001 and 1000")?;
-        check_range("observer.csf_area_deg2", self.observer.csf_area_deg2, 1e-3, 1e4, "between 0.001 and 10000 deg²")
+        check_area_deg2("observer.csf_area_deg2", self.observer.csf_area_deg2)
     }
 }
 

@@ -104,6 +104,11 @@ impl FrameTiming {
     }
 }
 
+/// Rejects an area of a grating that no contrast sensitivity function is asked for.
+pub(crate) fn check_area_deg2(what: &'static str, area_deg2: f64) -> Result<(), Error> {
+    check_range(what, area_deg2, 1e-3, 1e4, "between 0.001 and 10000 deg²")
+}
+
 const NAMES: [&str; 9] =
     ["castle", "stela", "barten99", "barten89", "daly93", "daly98", "laird06", "hdrvdp2", "mannos-sakrison"];
 
