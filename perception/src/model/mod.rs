@@ -117,7 +117,8 @@ fn pooled(energy: &Plane, viewing: &Viewing) -> Plane {
     gaussian_blur_xy(energy, viewing.display.pixel_density().pixels(POOLING_SIGMA_DEG))
 }
 
-/// Two-sided 95 % of a normal distribution: models that stop on a confidence interval ask z σ ≤ T.
+/// Two-sided 95 % of a normal distribution, its quantile of 0.975 (1.959 96) as tables round it: models that stop on a confidence
+/// interval ask z σ ≤ T.
 const Z_95: f64 = 1.96;
 
 /// Name of the model that is meant where none is named, and the only one that knows denoised pictures and where one looks.
