@@ -195,10 +195,10 @@ fn a_tint_is_shown_as_strong_as_the_slope_says() {
             let fitted =
                 operator_with(name, &settings).unwrap().fit(&SceneGuide::of(&guide), &Viewing::default(), None);
             let pixel = Pixel { x: 32, y: 32 };
-            for scene in [0.1, 0.5, 1.0, 3.0].map(|share| share * level) {
-                if fitted.relative_luminance_at(pixel, 1.1 * scene) >= 0.9 {
-                    continue;
-                }
+            let scenes = [0.1, 0.5, 1.0, 3.0].map(|share| share * level);
+            let is_unclipped = |scene: &f32| fitted.relative_luminance_at(pixel, 1.1 * scene) < 0.9;
+            assert!(scenes.iter().any(is_unclipped), "{name} {settings:?} clips all of {scenes:?}");
+            for scene in scenes.into_iter().filter(is_unclipped) {
                 let found = fitted.chromatic_slope_at(pixel, scene);
                 let shown = chroma_slope_of_picture(fitted.as_ref(), pixel, scene);
                 let close = (found - shown).abs() <= 0.03 * shown + 1e-3 / level;
