@@ -109,6 +109,7 @@ pub mod eotf;
 mod error;
 mod fft;
 mod filter;
+mod frame;
 pub mod glare;
 pub mod guide;
 pub mod masking;

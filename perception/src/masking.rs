@@ -3,7 +3,8 @@
 use crate::bands::{OctaveBands, RINGS, RadialTable, for_each_ring};
 use crate::csf::ContrastSensitivity;
 use crate::display::PixelDensity;
-use crate::fft::{Frame, MOST_REDUCTION, PictureTransform, Spectrum, Workspace, reduced_size, reduction};
+use crate::fft::{PictureTransform, Spectrum, Workspace};
+use crate::frame::{Frame, MOST_REDUCTION, reduced_size, reduction};
 use crate::plane::Plane;
 use crate::reduced::ReducedPlane;
 use crate::sensitivity::BandTables;

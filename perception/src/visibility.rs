@@ -5,8 +5,9 @@
 //! grating at its threshold has v = 1: the √2 turns its RMS into its amplitude.
 
 use crate::bands::RadialTable;
-use crate::fft::{Frame, PictureTransform, Spectrum, Workspace, enlarged, reduction};
+use crate::fft::{PictureTransform, Spectrum, Workspace};
 use crate::filter::gaussian_blur_xy;
+use crate::frame::{Frame, enlarged, reduction};
 use crate::plane::Plane;
 use crate::sensitivity::luminance_coordinate;
 use crate::threshold::{POOLING_SIGMA_DEG, ThresholdMap};
