@@ -107,6 +107,7 @@ pub mod display;
 pub mod eccentricity;
 pub mod eotf;
 mod error;
+mod error_filters;
 mod fft;
 mod filter;
 mod frame;
