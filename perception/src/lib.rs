@@ -138,6 +138,7 @@ mod test_noise;
 pub mod threshold;
 pub mod tone;
 pub mod tvi;
+mod viewing;
 pub mod visibility;
 
 pub use csf::{CastleCsf, ContrastSensitivity};
