@@ -88,8 +88,7 @@ fn local_adaptation(luminance_cd_m2: &Plane, display: &Display) -> Plane {
 }
 
 fn blurred(plane: &Plane, display: &Display) -> Plane {
-    let density = display.pixel_density();
-    gaussian_blur_xy(plane, POOLING_SIGMA_DEG * density.horizontal, POOLING_SIGMA_DEG * density.vertical)
+    gaussian_blur_xy(plane, display.pixel_density().pixels(POOLING_SIGMA_DEG))
 }
 
 /// Every pixel lowered to the second brightest of its eight neighbours where it exceeds that: fireflies, alone and in pairs.

@@ -1,6 +1,7 @@
 //! Octave bands in cycles per degree, whose energies add up to the whole.
 
 use crate::display::PixelDensity;
+use crate::table::UniformTable;
 
 /// A set of octave bands: cosines over log frequency with Σ_b B_b(f)² = 1 at every frequency.
 ///
@@ -78,7 +79,7 @@ fn cosine_flank(octaves: f64) -> f64 {
 /// A function of frequency, tabulated at equal steps from 0 to the corner of the Nyquist rectangle.
 #[derive(Clone, Debug)]
 pub(crate) struct RadialTable {
-    values: Vec<f32>,
+    values: UniformTable,
     steps_per_cpd: f32,
 }
 
@@ -92,21 +93,17 @@ impl RadialTable {
         let highest_cpd = 0.5 * density.horizontal.hypot(density.vertical);
         let steps = RADIAL_STEPS.max((highest_cpd / WIDEST_STEP_CPD).ceil() as usize + 2);
         let step = highest_cpd / (steps - 2) as f64;
-        let values = (0..steps).map(|index| value_at(index as f64 * step) as f32).collect();
+        let values = UniformTable::new((0..steps).map(|index| value_at(index as f64 * step) as f32));
         Self { values, steps_per_cpd: step.recip() as f32 }
     }
 
     pub(crate) fn at(&self, freq_cpd: f32) -> f32 {
-        let position = freq_cpd * self.steps_per_cpd;
-        let index = (position as usize).min(self.values.len() - 2);
-        let fraction = (position - index as f32).min(1.0);
-        self.values[index] + fraction * (self.values[index + 1] - self.values[index])
+        self.values.at(freq_cpd * self.steps_per_cpd)
     }
 
     /// The product of two tables of one grid.
     pub(crate) fn times(&self, other: &Self) -> Self {
-        let values = self.values.iter().zip(&other.values).map(|(a, b)| a * b).collect();
-        Self { values, steps_per_cpd: self.steps_per_cpd }
+        Self { values: self.values.times(&other.values), steps_per_cpd: self.steps_per_cpd }
     }
 }
 

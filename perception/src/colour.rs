@@ -197,7 +197,7 @@ impl Channels {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_noise::normal;
+    use crate::test_noise::{normal, red_for_green};
 
     const SIDE: usize = 128;
 
@@ -210,8 +210,7 @@ mod tests {
     fn noise_of_constant_luminance_is_seen() {
         let grey = vec![[100.0; 3]; SIDE * SIDE];
         let thresholds = colour_thresholds(&grey, SIDE, SIDE, &Viewing::default()).unwrap();
-        // Red up and green down by the same luminance.
-        let error = noise(|value| [40.0 * value, -40.0 * value * 0.2126 / 0.7152, 0.0]);
+        let error = noise(|value| red_for_green(40.0 * value));
         let luminance = Plane::from_fn(SIDE, SIDE, |x, y| opponent(error[y * SIDE + x]).achromatic);
         let missed = thresholds.achromatic.measured_visibility(&luminance).get(64, 64);
         let seen = thresholds.measured_visibility(&error).unwrap().get(64, 64);

@@ -169,7 +169,7 @@ impl ContrastSensitivity for HeldAtLowFrequencies<'_> {
 mod tests {
     use super::*;
     use crate::csf::CastleCsf;
-    use crate::test_noise::normal;
+    use crate::test_noise::{normal, red_for_green};
 
     fn compare(reference: &Plane, test: &Plane) -> Difference {
         difference(reference, test, &Viewing::default(), &CastleCsf::default()).unwrap()
@@ -276,9 +276,9 @@ mod tests {
         let of = |test: &[[f32; 3]]| {
             colour_difference(&grey, test, 64, 64, &Viewing::default(), &CastleCsf::default()).unwrap()
         };
-        let tinted = [115.0, 100.0 - 15.0 * 0.2126 / 0.7152, 100.0];
-        assert!(of(&vec![tinted; 64 * 64]).is_visible());
-        assert!(!of(&vec![[100.1, 100.0 - 0.1 * 0.2126 / 0.7152, 100.0]; 64 * 64]).is_visible());
+        let tinted = |red: f32| vec![red_for_green(red).map(|tint| 100.0 + tint); 64 * 64];
+        assert!(of(&tinted(15.0)).is_visible());
+        assert!(!of(&tinted(0.1)).is_visible());
         let brighter = of(&vec![[104.0; 3]; 64 * 64]).worst_visibility;
         let alone = compare(&Plane::filled(64, 64, 100.0), &Plane::filled(64, 64, 104.0)).worst_visibility;
         assert!((brighter / alone - 1.0).abs() < 1e-3, "{brighter} {alone}");

@@ -1,11 +1,15 @@
 //! The display, and who looks at it from where.
 
+mod file;
+
 use serde::{Deserialize, Serialize};
 
+use crate::csf::check_area_deg2;
 pub use crate::eotf::Eotf;
 use crate::eotf::PQ_PEAK_CD_M2;
 use crate::error::{Error, check_range};
 pub use crate::pixel_density::PixelDensity;
+pub use crate::viewing::{Glare, Observer, Viewing};
 
 /// A display at its viewing distance.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -116,81 +120,6 @@ impl Display {
         }
     }
 
-    /// Reads a display file: a TOML table whose keys are the fields of [`Display`], all optional.
-    ///
-    /// `preset` names the display that fills what is left out (`desktop` if absent). Instead of `pixels_per_degree`
-    /// a file may give `width_px`, `width_m` and `distance_m`.
-    ///
-    /// ```
-    /// use fechner_perception::Display;
-    /// let mine = Display::from_toml("name = 'mine'\nwidth_px = 1920\nwidth_m = 0.531\ndistance_m = 0.6").unwrap();
-    /// assert!((mine.pixels_per_degree - 37.9).abs() < 0.1);
-    /// ```
-    ///
-    /// # Errors
-    /// [`Error::Parse`] for what is no TOML or has unknown keys, [`Error::UnknownName`] for an unknown preset and
-    /// [`Error::OutOfRange`] for values that no display has.
-    pub fn from_toml(text: &str) -> Result<Self, Error> {
-        let file: DisplayFile =
-            toml::from_str(text).map_err(|error| Error::Parse { what: "display file", reason: error.to_string() })?;
-        let base = file.preset.as_deref().unwrap_or("desktop");
-        let mut display = Self::preset(base).ok_or_else(|| Error::UnknownName {
-            kind: "display preset",
-            name: base.to_owned(),
-            known: PRESET_NAMES.join(", "),
-        })?;
-        if file.preset.is_none() {
-            "file".clone_into(&mut display.name);
-        }
-        let set = |field: &mut f64, value: Option<f64>| {
-            if let Some(value) = value {
-                *field = value;
-            }
-        };
-        set(&mut display.pixels_per_degree, file.pixels_per_degree);
-        set(&mut display.pixel_aspect_ratio, file.pixel_aspect_ratio);
-        set(&mut display.white_cd_m2, file.white_cd_m2);
-        set(&mut display.black_cd_m2, file.black_cd_m2);
-        set(&mut display.ambient_cd_m2, file.ambient_cd_m2);
-        set(&mut display.frames_per_second, file.frames_per_second);
-        set(&mut display.persistence, file.persistence);
-        display.name = file.name.unwrap_or(display.name);
-        display.eotf = file.eotf.unwrap_or(display.eotf);
-        display.distance_m = file.distance_m.or(display.distance_m);
-        display.csf_area_deg2 = file.csf_area_deg2.or(display.csf_area_deg2);
-        match (file.pixels_per_degree, file.width_px, file.width_m, display.distance_m) {
-            (Some(_), None, None, _) | (None, None, None, None) => {}
-            (Some(_), ..) => {
-                return Err(Error::Parse {
-                    what: "display file",
-                    reason: "`pixels_per_degree` follows from `width_px`, `width_m` and `distance_m`: give it or the widths, not both"
-                        .to_owned(),
-                });
-            }
-            (None, None, None, Some(_)) => {
-                return Err(Error::Parse {
-                    what: "display file",
-                    reason: "`distance_m` alone does not say how many pixels a degree has: give `pixels_per_degree` beside it, or \
-                             `width_px` and `width_m`"
-                        .to_owned(),
-                });
-            }
-            (None, Some(width_px), Some(width_m), Some(distance_m)) => {
-                display.pixels_per_degree = pixels_per_degree(width_px, width_m, distance_m)?;
-            }
-            _ => {
-                return Err(Error::Parse {
-                    what: "display file",
-                    reason: "pixels a degree follow from `width_px`, `width_m` and `distance_m` together: give all three, or \
-                             `pixels_per_degree`"
-                        .to_owned(),
-                });
-            }
-        }
-        display.check()?;
-        Ok(display)
-    }
-
     /// Pixels a degree along both axes.
     ///
     /// ```
@@ -280,7 +209,7 @@ impl Display {
             check_range("distance_m", distance_m, 0.01, 1000.0, "between 0.01 and 1000 m")?;
         }
         if let Some(area) = self.csf_area_deg2 {
-            check_range("csf_area_deg2", area, 1e-3, 1e4, "between 0.001 and 10000 deg²")?;
+            check_area_deg2("csf_area_deg2", area)?;
         }
         Ok(())
     }
@@ -298,98 +227,6 @@ pub fn pixels_per_degree(width_px: f64, width_m: f64, distance_m: f64) -> Result
     Ok(2.0 * distance_m * 0.5_f64.to_radians().tan() * width_px / width_m)
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct DisplayFile {
-    name: Option<String>,
-    preset: Option<String>,
-    pixels_per_degree: Option<f64>,
-    pixel_aspect_ratio: Option<f64>,
-    width_px: Option<f64>,
-    width_m: Option<f64>,
-    white_cd_m2: Option<f64>,
-    black_cd_m2: Option<f64>,
-    ambient_cd_m2: Option<f64>,
-    eotf: Option<Eotf>,
-    distance_m: Option<f64>,
-    csf_area_deg2: Option<f64>,
-    frames_per_second: Option<f64>,
-    persistence: Option<f64>,
-}
-
-/// The eye.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Observer {
-    /// Multiplies contrast sensitivity: 1 is the median observer of the model's data, 1.75 a keen one.
-    pub sensitivity: f64,
-    /// Area of the grating whose threshold is meant, deg². 1 is a foveal patch.
-    pub csf_area_deg2: f64,
-    /// Light scattered in the eye; [`Glare::None`] unless asked for.
-    #[serde(default)]
-    pub glare: Glare,
-}
-
-/// What the eye's own media do to bright light (see [`crate::glare`]).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Glare {
-    /// Nothing: thresholds beside lamps come out lower than they are, never higher.
-    #[default]
-    None,
-    /// A veil by the CIE's general disability glare equation for an eye of this age.
-    Cie {
-        /// Years.
-        age_years: f64,
-    },
-}
-
-impl Observer {
-    /// A keen observer: 1.75 times the median sensitivity.
-    #[must_use]
-    pub fn keen() -> Self {
-        Self { sensitivity: 1.75, ..Self::default() }
-    }
-}
-
-impl Default for Observer {
-    /// The median observer, 1 deg².
-    fn default() -> Self {
-        Self { sensitivity: 1.0, csf_area_deg2: 1.0, glare: Glare::None }
-    }
-}
-
-/// Who looks at what.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Viewing {
-    /// The display at its distance.
-    pub display: Display,
-    /// The eye in front of it.
-    pub observer: Observer,
-}
-
-impl Viewing {
-    /// A display with the observer it asks for (the preset `strict` asks for 7 deg²).
-    #[must_use]
-    pub fn of(display: Display) -> Self {
-        let mut observer = Observer::default();
-        observer.csf_area_deg2 = display.csf_area_deg2.unwrap_or(observer.csf_area_deg2);
-        Self { display, observer }
-    }
-
-    /// Rejects a viewing that cannot be.
-    ///
-    /// # Errors
-    /// [`Error::OutOfRange`], naming the field.
-    pub fn check(&self) -> Result<(), Error> {
-        self.display.check()?;
-        if let Glare::Cie { age_years } = self.observer.glare {
-            check_range("observer.glare.age_years", age_years, 1.0, 120.0, "between 1 and 120 years")?;
-        }
-        check_range("observer.sensitivity", self.observer.sensitivity, 1e-3, 1e3, "between 0.001 and 1000")?;
-        check_range("observer.csf_area_deg2", self.observer.csf_area_deg2, 1e-3, 1e4, "between 0.001 and 10000 deg²")
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -401,17 +238,6 @@ mod tests {
             assert_eq!(&display.name, name);
             display.check().unwrap();
         }
-    }
-
-    #[test]
-    fn display_files_say_what_would_be_right() {
-        let error = |text: &str| Display::from_toml(text).unwrap_err().to_string();
-        assert!(error("distance_m = 0.6").contains("`distance_m` alone"));
-        assert!(error("pixels_per_degree = 60.0\nwidth_px = 1920").contains("not both"));
-        assert!(error("width_px = 1920").contains("give all three"));
-        let bright = error("eotf = 'pq'\nwhite_cd_m2 = 20000.0");
-        assert!(bright.contains("white_cd_m2") && bright.contains("10000"), "{bright}");
-        assert!(Display::from_toml("eotf = 'pq'\nwhite_cd_m2 = 10000.0").is_ok());
     }
 
     #[test]
@@ -454,18 +280,5 @@ mod tests {
         }
         // ST 2084: code 0.508 is 100 cd/m².
         assert!((emitted("hdr-1000", 0.508_078) - 100.0).abs() < 0.01);
-    }
-
-    #[test]
-    fn bad_files_say_why() {
-        assert!(matches!(Display::from_toml("white_cd_m2 = -5"), Err(Error::OutOfRange { .. })));
-        let even = Display::from_toml("white_cd_m2 = 100\nblack_cd_m2 = 100");
-        assert!(even.unwrap_err().to_string().contains("below white_cd_m2"));
-        assert!(matches!(Display::from_toml("colour = 'red'"), Err(Error::Parse { .. })));
-        assert!(matches!(Display::from_toml("preset = 'wall'"), Err(Error::UnknownName { .. })));
-        assert!(matches!(Display::from_toml("width_px = 1920"), Err(Error::Parse { .. })));
-        assert!(matches!(Display::from_toml("preset = 'desktop'\ndistance_m = 1.2"), Err(Error::Parse { .. })));
-        let phone = Display::from_toml("preset = 'phone'\nwhite_cd_m2 = 700").unwrap();
-        assert_eq!((phone.white_cd_m2, phone.pixels_per_degree), (700.0, 90.0));
     }
 }

@@ -14,6 +14,7 @@ use crate::display::PixelDensity;
 use crate::noise_gain::noise_gain;
 use crate::plane::Plane;
 use crate::sensitivity::AdaptationLevel;
+use crate::table::UniformTable;
 use crate::threshold::ThresholdMap;
 
 /// A place in the picture that is looked at, pixels from its upper left corner.
@@ -42,20 +43,22 @@ const FARTHEST_DEG: f64 = 60.0;
 const STEPS_A_DEGREE: f64 = 4.0;
 
 /// e₀ in 1/deg and e₁ in 1/(deg cpd), decades of sensitivity.
-struct Drop {
+struct Decline {
     e0: f64,
     e1: f64,
 }
 
 /// Temporal, then nasal.
-const fn drops(channel: Channel) -> [Drop; 2] {
+const fn declines(channel: Channel) -> [Decline; 2] {
     match channel {
-        Channel::Achromatic => [Drop { e0: 0.023_985_3, e1: 0.018_903_8 }, Drop { e0: 0.040_066_2, e1: 0.008_136_19 }],
+        Channel::Achromatic => {
+            [Decline { e0: 0.023_985_3, e1: 0.018_903_8 }, Decline { e0: 0.040_066_2, e1: 0.008_136_19 }]
+        }
         Channel::Chromatic(ChromaticChannel::RedGreen) => {
-            [Drop { e0: 0.059_140_2, e1: 2.049_86e-69 }, Drop { e0: 2.896_15e-5, e1: 0.181_08 }]
+            [Decline { e0: 0.059_140_2, e1: 2.049_86e-69 }, Decline { e0: 2.896_15e-5, e1: 0.181_08 }]
         }
         Channel::Chromatic(ChromaticChannel::YellowViolet) => {
-            [Drop { e0: 0.003_568_65, e1: 0.008_066_31 }, Drop { e0: 5.858_04e-141, e1: 0.011_066_2 }]
+            [Decline { e0: 0.003_568_65, e1: 0.008_066_31 }, Decline { e0: 5.858_04e-141, e1: 0.011_066_2 }]
         }
     }
 }
@@ -71,7 +74,7 @@ const fn drops(channel: Channel) -> [Drop; 2] {
 #[must_use]
 pub fn sensitivity_left(channel: Channel, freq_cpd: f64, eccentricity_deg: f64) -> f64 {
     let eccentricity = eccentricity_deg.abs().min(FARTHEST_DEG);
-    let decades = drops(channel).map(|Drop { e0, e1 }| (e0 + e1 * freq_cpd.max(0.0)) * eccentricity);
+    let decades = declines(channel).map(|Decline { e0, e1 }| (e0 + e1 * freq_cpd.max(0.0)) * eccentricity);
     10.0_f64.powf(-decades[0].min(decades[1]))
 }
 
@@ -93,9 +96,7 @@ pub fn eccentricity_deg(width: usize, height: usize, gaze: Gaze, density: PixelD
 }
 
 /// What is left of the energy of noise against eccentricity.
-struct EnergyTable {
-    entries: Vec<f32>,
-}
+struct EnergyTable(UniformTable);
 
 impl EnergyTable {
     /// For noise of which `energy_at(freq_cpd)` of its visible energy lies at each frequency of the pixel grid.
@@ -108,14 +109,11 @@ impl EnergyTable {
             if whole > 0.0 { rings.iter().map(at).sum::<f64>() / whole } else { 1.0 }
         };
         let steps = (FARTHEST_DEG * STEPS_A_DEGREE) as u32;
-        Self { entries: (0..=steps).map(|step| left(f64::from(step) / STEPS_A_DEGREE) as f32).collect() }
+        Self(UniformTable::new((0..=steps).map(|step| left(f64::from(step) / STEPS_A_DEGREE) as f32)))
     }
 
     fn at(&self, eccentricity_deg: f32) -> f32 {
-        let position = eccentricity_deg.max(0.0) * STEPS_A_DEGREE as f32;
-        let index = (position as usize).min(self.entries.len() - 2);
-        let fraction = (position - index as f32).min(1.0);
-        self.entries[index] + fraction * (self.entries[index + 1] - self.entries[index])
+        self.0.at(eccentricity_deg * STEPS_A_DEGREE as f32)
     }
 }
 

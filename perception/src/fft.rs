@@ -9,10 +9,8 @@ use rustfft::{Fft, FftPlanner};
 
 use crate::display::PixelDensity;
 use crate::filter::reflect;
+use crate::frame::{Frame, MOST_REDUCTION};
 use crate::plane::Plane;
-
-/// The largest factor of [`PictureTransform::filtered_reduced`].
-pub(crate) const MOST_REDUCTION: usize = 16;
 
 /// Mirror on each side of a picture, degrees. The transform is periodic, so that a border's error reaches the opposite border across
 /// twice this. 512×512 pixels at 60 a degree, 2 cd/m² but for an error to 200 in the last degree, of which 0.8 is seen at the
@@ -262,46 +260,6 @@ impl PictureTransform {
     }
 }
 
-/// Where the samples of a reduced picture stand: at every `factor`-th pixel, from one sample before the picture on until at least
-/// one past it, and so many more on each side as `beside` and `above` say.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Frame {
-    pub(crate) factor: usize,
-    pub(crate) beside: usize,
-    pub(crate) above: usize,
-}
-
-impl Frame {
-    /// Sample j stands at pixel (j − 1) · `factor`.
-    pub(crate) fn narrow(factor: usize) -> Self {
-        Self { factor, beside: 0, above: 0 }
-    }
-
-    /// Samples of a row of `width` pixels.
-    pub(crate) fn samples_across(self, width: usize) -> usize {
-        reduced_size(width, self.factor) + 2 * self.beside
-    }
-
-    /// Samples of a column of `height` pixels.
-    pub(crate) fn samples_down(self, height: usize) -> usize {
-        reduced_size(height, self.factor) + 2 * self.above
-    }
-
-    /// The pixel of a row of `width` whose mirror image, or itself, each sample stands at.
-    pub(crate) fn columns(self, width: usize) -> Vec<usize> {
-        (0..self.samples_across(width)).map(|index| self.pixel(index, self.beside, width)).collect()
-    }
-
-    /// The row of a picture of `height` rows that row `index` of the samples stands at, or whose mirror image.
-    pub(crate) fn row(self, index: usize, height: usize) -> usize {
-        self.pixel(index, self.above, height)
-    }
-
-    fn pixel(self, index: usize, more: usize, len: usize) -> usize {
-        reflect((index as isize - 1 - more as isize) * self.factor as isize, len)
-    }
-}
-
 /// Pixels of mirror at both ends of a line of `len`: a multiple of the largest reduction, so that reduced transforms sample the
 /// same pixels.
 fn mirror_px(len: usize, pixels_per_degree: f64) -> usize {
@@ -337,50 +295,6 @@ impl BackTransform {
     }
 }
 
-/// Samples of a row of `len` pixels at every `factor`-th pixel, one before the first and one past the last included.
-pub(crate) fn reduced_size(len: usize, factor: usize) -> usize {
-    (len - 1) / factor + 3
-}
-
-/// The pixel at which reduced sample `index` stands, or the nearest one of a picture `len` pixels long.
-pub(crate) fn reduced_pixel(index: usize, factor: usize, len: usize) -> usize {
-    (index * factor).saturating_sub(factor).min(len - 1)
-}
-
-/// The largest reduction that still samples frequencies up to `limit_cpd` along both axes.
-pub(crate) fn reduction(density: PixelDensity, limit_cpd: f64) -> usize {
-    let mut factor = 1;
-    while factor < MOST_REDUCTION && density.coarsest() / (4 * factor) as f64 >= limit_cpd {
-        factor *= 2;
-    }
-    factor
-}
-
-/// A plane of `width` × `height` pixels, interpolated linearly from one at every `factor`-th pixel (see
-/// [`PictureTransform::filtered_reduced`]).
-pub(crate) fn enlarged(reduced: &Plane, factor: usize, width: usize, height: usize) -> Plane {
-    let step = (factor as f32).recip();
-    let mut plane = Plane::filled(width, height, 0.0);
-    let mut across = Plane::filled(width, reduced.height(), 0.0);
-    across.for_each_row_mut(|y, row| {
-        let source = reduced.row(y);
-        for (block, values) in row.chunks_mut(factor).enumerate() {
-            let (from, to) = (source[block + 1], source[block + 2]);
-            for (offset, value) in values.iter_mut().enumerate() {
-                *value = from + (to - from) * (offset as f32 * step);
-            }
-        }
-    });
-    plane.for_each_row_mut(|y, row| {
-        let (above, below) = (across.row(y / factor + 1), across.row(y / factor + 2));
-        let fraction = (y % factor) as f32 * step;
-        for (value, (above, below)) in row.iter_mut().zip(above.iter().zip(below)) {
-            *value = above + (below - above) * fraction;
-        }
-    });
-    plane
-}
-
 /// `source` has rows of `width` bins; `target` gets them as columns.
 fn transpose(source: &[Complex32], target: &mut [Complex32], width: usize, height: usize) {
     const STRIP: usize = 8;
@@ -397,6 +311,7 @@ fn transpose(source: &[Complex32], target: &mut [Complex32], width: usize, heigh
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frame::enlarged;
 
     /// At every pixel.
     fn filtered(

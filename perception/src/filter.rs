@@ -28,12 +28,12 @@ type Lanes = [f32; LANES];
 /// "Theoretical foundations of Gaussian convolution by extended box filtering", 2011). Positive stays positive and the
 /// mean is kept. A wide window slides over a reduced row, see [`Tent`].
 pub(crate) fn gaussian_blur(plane: &Plane, sigma_px: f64) -> Plane {
-    gaussian_blur_xy(plane, sigma_px, sigma_px)
+    gaussian_blur_xy(plane, [sigma_px; 2])
 }
 
 /// [`gaussian_blur`] with a standard deviation of its own along each axis.
-pub(crate) fn gaussian_blur_xy(plane: &Plane, sigma_x_px: f64, sigma_y_px: f64) -> Plane {
-    blurred_by(plane, sigma_x_px, sigma_y_px, |sigma_px| {
+pub(crate) fn gaussian_blur_xy(plane: &Plane, sigma_px: [f64; 2]) -> Plane {
+    blurred_by(plane, sigma_px, |sigma_px| {
         let kernel = BoxKernel::third_of_variance(sigma_px);
         move |strip: &mut Strip| (0..3).for_each(|_| kernel.apply(strip))
     })
@@ -44,11 +44,11 @@ const SAMPLED_SIGMAS_PX: std::ops::RangeInclusive<f64> = 0.5..=500.0;
 
 /// [`gaussian_blur_xy`] by the Gaussian's own samples, for where what is left of a grating matters and not the width alone: of one
 /// of which a Gaussian leaves 0.0096 three boxes leave 0.0001. It has boxes outside [`SAMPLED_SIGMAS_PX`].
-pub(crate) fn sampled_gaussian_blur_xy(plane: &Plane, sigma_x_px: f64, sigma_y_px: f64) -> Plane {
-    if ![sigma_x_px, sigma_y_px].iter().all(|sigma_px| SAMPLED_SIGMAS_PX.contains(sigma_px)) {
-        return gaussian_blur_xy(plane, sigma_x_px, sigma_y_px);
+pub(crate) fn sampled_gaussian_blur_xy(plane: &Plane, sigma_px: [f64; 2]) -> Plane {
+    if !sigma_px.iter().all(|sigma_px| SAMPLED_SIGMAS_PX.contains(sigma_px)) {
+        return gaussian_blur_xy(plane, sigma_px);
     }
-    blurred_by(plane, sigma_x_px, sigma_y_px, |sigma_px| {
+    blurred_by(plane, sigma_px, |sigma_px| {
         let kernel = SampledKernel::of_sigma(sigma_px);
         move |strip: &mut Strip| kernel.apply(strip)
     })
@@ -57,8 +57,7 @@ pub(crate) fn sampled_gaussian_blur_xy(plane: &Plane, sigma_x_px: f64, sigma_y_p
 /// Blurs along both axes, over reduced rows where the window is wide: `window_for` a standard deviation, of the row as it then is.
 fn blurred_by<Window: Fn(&mut Strip) + Sync>(
     plane: &Plane,
-    sigma_x_px: f64,
-    sigma_y_px: f64,
+    [sigma_x_px, sigma_y_px]: [f64; 2],
     window_for: impl Fn(f64) -> Window,
 ) -> Plane {
     let blurred = |sigma_px: f64, len: usize| {

@@ -15,6 +15,7 @@ use crate::fft::{complex_plans, smooth_size};
 use crate::noise_gain::noise_gain;
 use crate::plane::Plane;
 use crate::sensitivity::luminance_coordinate;
+use crate::table::Between;
 use crate::threshold::ThresholdMap;
 
 /// Angles the formula holds for, degrees: closer in, scatter is part of the eye's point spread and of its contrast sensitivity.
@@ -128,16 +129,15 @@ impl Veil {
     /// Adds the veil to row `y` of a plane of the picture's size.
     pub(crate) fn add_to_row(&self, y: usize, row: &mut [f32]) {
         let place = |pixel: usize, cell: usize, len: usize| {
-            let position = ((pixel as f32 + 0.5) / cell as f32 - 0.5).clamp(0.0, (len - 1) as f32);
-            let below = (position as usize).min(len.saturating_sub(2));
-            (below, (below + 1).min(len - 1), position - below as f32)
+            Between::of(f64::from((pixel as f32 + 0.5) / cell as f32 - 0.5), len)
         };
-        let (above, below, down) = place(y, self.cell[1], self.cells.height());
-        let (above, below) = (self.cells.row(above), self.cells.row(below));
+        let rows = place(y, self.cell[1], self.cells.height());
+        let (upper, lower) = (self.cells.row(rows.below), self.cells.row(rows.above));
         for (x, value) in row.iter_mut().enumerate() {
-            let (left, right, across) = place(x, self.cell[0], self.cells.width());
-            let line = |cells: &[f32]| cells[left] + (cells[right] - cells[left]) * across;
-            *value += line(above) + (line(below) - line(above)) * down;
+            let columns = place(x, self.cell[0], self.cells.width());
+            let mixed = |low: f32, high: f32, place: Between| low + (high - low) * place.share as f32;
+            let line = |cells: &[f32]| mixed(cells[columns.below], cells[columns.above], columns);
+            *value += mixed(line(upper), line(lower), rows);
         }
     }
 }

@@ -107,8 +107,10 @@ pub mod display;
 pub mod eccentricity;
 pub mod eotf;
 mod error;
+mod error_filters;
 mod fft;
 mod filter;
+mod frame;
 pub mod glare;
 pub mod guide;
 pub mod masking;
@@ -127,12 +129,16 @@ pub mod saliency;
 pub mod seen;
 mod sensitivity;
 pub mod sequence;
+mod table;
 mod taps;
+#[cfg(test)]
+mod test_golden;
 #[cfg(test)]
 mod test_noise;
 pub mod threshold;
 pub mod tone;
 pub mod tvi;
+mod viewing;
 pub mod visibility;
 
 pub use csf::{CastleCsf, ContrastSensitivity};

@@ -3,10 +3,12 @@
 use crate::bands::{OctaveBands, RINGS, RadialTable, for_each_ring};
 use crate::csf::ContrastSensitivity;
 use crate::display::PixelDensity;
-use crate::fft::{Frame, MOST_REDUCTION, PictureTransform, Spectrum, Workspace, reduced_size, reduction};
+use crate::fft::{PictureTransform, Spectrum, Workspace};
+use crate::frame::{Frame, MOST_REDUCTION, reduced_size, reduction};
 use crate::plane::Plane;
 use crate::reduced::ReducedPlane;
 use crate::sensitivity::BandTables;
+use crate::table::UniformTable;
 use crate::taps::{eroded, smoothed};
 use crate::threshold::GuideNoise;
 
@@ -24,7 +26,7 @@ pub fn threshold_elevation(mask: f64) -> f64 {
 
 /// [`threshold_elevation`], capped, against the mask's squared contrast.
 pub(crate) struct ElevationTable {
-    entries: Vec<f32>,
+    entries: UniformTable,
     entries_per_square: f32,
 }
 
@@ -34,16 +36,16 @@ impl ElevationTable {
     pub(crate) fn new() -> Self {
         // Contrast at which the elevation reaches its cap.
         let last = (ELEVATION_CAP.powi(4) - 1.0).powf(2.0 / 2.8);
-        let entries = (0..=ENTRIES)
-            .map(|entry| threshold_elevation((last * entry as f64 / ENTRIES as f64).sqrt()).min(ELEVATION_CAP) as f32)
-            .collect();
-        Self { entries, entries_per_square: (ENTRIES as f64 / last) as f32 }
+        let entry_at =
+            |entry| threshold_elevation((last * entry as f64 / ENTRIES as f64).sqrt()).min(ELEVATION_CAP) as f32;
+        Self {
+            entries: UniformTable::new((0..=ENTRIES).map(entry_at)),
+            entries_per_square: (ENTRIES as f64 / last) as f32,
+        }
     }
 
     fn at(&self, mask_squared: f32) -> f32 {
-        let position = (mask_squared * self.entries_per_square).min(ENTRIES as f32 - 1e-3);
-        let index = position as usize;
-        self.entries[index] + (position - index as f32) * (self.entries[index + 1] - self.entries[index])
+        self.entries.at((mask_squared * self.entries_per_square).min(ENTRIES as f32 - 1e-3))
     }
 }
 
@@ -95,74 +97,128 @@ pub(crate) fn band_elevation(
     tables: &BandTables,
     elevation: &ElevationTable,
 ) -> ReducedPlane {
-    let density = source.density;
+    let grid = BandGrid::of(source, bands, band);
+    let masks = BandMasks { source, grid, gain: mask_gain(source, bands, band), tables, elevation };
+    let mut energy = masks.energy(workspace, bands.limit_cpd(band));
+    let elevated = match &source.noise {
+        GuideNoise::Clean => masks.elevated_by(&energy),
+        GuideNoise::White(noise) => {
+            masks.take_out(noise, &mut energy);
+            masks.elevated_by(&energy)
+        }
+        GuideNoise::BeforeDenoising(noise) => {
+            let at_most = masks.elevated_by(&energy);
+            masks.take_out(noise, &mut energy);
+            masks.elevated_by(&energy).combined(&at_most, |at_least, at_most| (at_least * at_most).sqrt())
+        }
+    };
+    drop(energy);
+    masks.where_it_goes_on(&elevated)
+}
+
+/// Amplitude gain of a band for masks, behind what takes detail away before the eye.
+fn mask_gain(source: &MaskSource<'_>, bands: &OctaveBands, band: usize) -> RadialTable {
     let transfer = |freq: f64| source.csf.transfer(freq);
     let sensitivity_behind = |freq: f64| {
         source.sensitivity.map_or(1.0, |table| f64::from(table.at(freq as f32)) / transfer(freq).max(1e-100))
     };
-    let gain = RadialTable::new(density, |freq| transfer(freq) * bands.mask_gain(band, freq, sensitivity_behind));
-    let limit_cpd = bands.limit_cpd(band);
-    // A quarter more densely than the band needs: its energy is blurred next.
-    let amplitude_factor = reduction(density, 1.25 * limit_cpd);
-    let factor = 2 * amplitude_factor;
-    // In samples.
-    let wavelength = |pixels_per_degree: f64| pixels_per_degree / bands.center_cpd(band) / factor as f64;
-    let (wavelength_x, wavelength_y) = (wavelength(density.horizontal), wavelength(density.vertical));
-    let frame = source.transform.mirrored_frame(
-        factor,
-        SURROUND_WAVELENGTHS * wavelength_x,
-        SURROUND_WAVELENGTHS * wavelength_y,
-    );
-    let halves = Frame { factor: amplitude_factor, beside: 2 * frame.beside + 2, above: 2 * frame.above + 2 };
-    let amplitude =
-        source.transform.filtered_reduced(workspace, source.contrast, limit_cpd, halves, |freq| gain.at(freq));
-    let size = (frame.samples_across(source.width), frame.samples_down(source.height));
-    let mut energy = halved(&amplitude, size, |value| value * value);
-    drop(amplitude);
-    let columns = frame.columns(source.width);
-    let take_out = |energy: &mut Plane, noise: &[Plane]| {
+    RadialTable::new(source.density, |freq| transfer(freq) * bands.mask_gain(band, freq, sensitivity_behind))
+}
+
+/// Where a band's masks are known.
+struct BandGrid {
+    /// Of the energy and what comes of it.
+    frame: Frame,
+    /// Of the amplitude, twice as densely.
+    amplitude_frame: Frame,
+    /// The wavelength of the band's centre along x and y, in samples of `frame`.
+    wavelengths: [f64; 2],
+}
+
+impl BandGrid {
+    fn of(source: &MaskSource<'_>, bands: &OctaveBands, band: usize) -> Self {
+        let density = source.density;
+        // A quarter more densely than the band needs: its energy is blurred next.
+        let amplitude_factor = reduction(density, 1.25 * bands.limit_cpd(band));
+        let factor = 2 * amplitude_factor;
+        let wavelengths = [density.horizontal, density.vertical]
+            .map(|pixels_per_degree| pixels_per_degree / bands.center_cpd(band) / factor as f64);
+        let [beside, above] = wavelengths.map(|wavelength| SURROUND_WAVELENGTHS * wavelength);
+        let frame = source.transform.mirrored_frame(factor, beside, above);
+        let amplitude_frame =
+            Frame { factor: amplitude_factor, beside: 2 * frame.beside + 2, above: 2 * frame.above + 2 };
+        Self { frame, amplitude_frame, wavelengths }
+    }
+}
+
+/// What the masks of one band are made with.
+struct BandMasks<'a> {
+    source: &'a MaskSource<'a>,
+    grid: BandGrid,
+    gain: RadialTable,
+    tables: &'a BandTables,
+    elevation: &'a ElevationTable,
+}
+
+impl BandMasks<'_> {
+    /// Squared contrast of the guide in the band.
+    fn energy(&self, workspace: &mut Workspace, limit_cpd: f64) -> Plane {
+        let (source, frame) = (self.source, self.grid.frame);
+        let amplitude = source.transform.filtered_reduced(
+            workspace,
+            source.contrast,
+            limit_cpd,
+            self.grid.amplitude_frame,
+            |freq| self.gain.at(freq),
+        );
+        let size = (frame.samples_across(source.width), frame.samples_down(source.height));
+        halved(&amplitude, size, |value| value * value)
+    }
+
+    /// Takes the energy of the guide's noise out of the band's.
+    fn take_out(&self, noise: &[Plane], energy: &mut Plane) {
+        let (source, frame, amplitude_factor) = (self.source, self.grid.frame, self.grid.amplitude_frame.factor);
         let Some(noise) = noise.get(amplitude_factor.ilog2() as usize) else { return };
         // Of white pixel noise's variance, what stands in the guide's band.
         let mut share = 0.0;
-        for_each_ring(density, RINGS, |freq, weight| share += weight as f32 * gain.at(freq as f32).powi(2));
-        let sample_at = |pixel: usize| (pixel + amplitude_factor) / factor + 1;
+        for_each_ring(source.density, RINGS, |freq, weight| share += weight as f32 * self.gain.at(freq as f32).powi(2));
+        let columns = frame.columns(source.width);
+        let sample_at = |pixel: usize| (pixel + amplitude_factor) / frame.factor + 1;
         energy.for_each_row_mut(|y, row| {
             let noise = noise.row(sample_at(frame.row(y, source.height)));
             row.iter_mut().zip(&columns).for_each(|(value, x)| *value -= share * noise[sample_at(*x)]);
         });
-    };
-    // Less the variance of the window that halved.
-    let variance = |wavelength: f64| ((0.35 * wavelength).powi(2) - HALVING_VARIANCE / 4.0).max(0.0);
-    let elevated_by = |energy: &Plane| {
-        let mut mask = smoothed(energy, variance(wavelength_x), variance(wavelength_y));
+    }
+
+    /// The elevation by masks of this energy, each at its own place.
+    fn elevated_by(&self, energy: &Plane) -> Plane {
+        let (source, frame) = (self.source, self.grid.frame);
+        // Less the variance of the window that halved.
+        let [variance_x, variance_y] =
+            self.grid.wavelengths.map(|wavelength| ((0.35 * wavelength).powi(2) - HALVING_VARIANCE / 4.0).max(0.0));
+        let mut mask = smoothed(energy, variance_x, variance_y);
+        let columns = frame.columns(source.width);
         mask.for_each_row_mut(|y, row| {
             let coordinates = source.coordinates.row(frame.row(y, source.height) / 2 + 1);
             for (value, x) in row.iter_mut().zip(&columns) {
-                let sensitivity_squared = tables.center_sensitivity_squared.at(coordinates[x / 2 + 1]);
-                *value = elevation.at(2.0 * value.max(0.0) * sensitivity_squared);
+                let sensitivity_squared = self.tables.center_sensitivity_squared.at(coordinates[x / 2 + 1]);
+                *value = self.elevation.at(2.0 * value.max(0.0) * sensitivity_squared);
             }
         });
         mask
-    };
-    let elevated = match &source.noise {
-        GuideNoise::Clean => elevated_by(&energy),
-        GuideNoise::White(noise) => {
-            take_out(&mut energy, noise);
-            elevated_by(&energy)
-        }
-        GuideNoise::BeforeDenoising(noise) => {
-            let at_most = elevated_by(&energy);
-            take_out(&mut energy, noise);
-            elevated_by(&energy).combined(&at_most, |at_least, at_most| (at_least * at_most).sqrt())
-        }
-    };
-    drop(energy);
-    let elevated = eroded(&elevated, REACH_WAVELENGTHS * wavelength_x, REACH_WAVELENGTHS * wavelength_y);
-    let soft = |wavelength: f64| (EDGE_WAVELENGTHS * wavelength).powi(2);
-    let elevated = smoothed(&elevated, soft(wavelength_x), soft(wavelength_y));
-    let (across, down) = (reduced_size(source.width, factor), reduced_size(source.height, factor));
-    let elevated = Plane::from_fn(across, down, |x, y| elevated.get(x + frame.beside, y + frame.above));
-    ReducedPlane::new(elevated, factor, source.width, source.height)
+    }
+
+    /// What of an elevation goes on for a wavelength around, over the picture.
+    fn where_it_goes_on(&self, elevated: &Plane) -> ReducedPlane {
+        let (source, frame) = (self.source, self.grid.frame);
+        let [reach_x, reach_y] = self.grid.wavelengths.map(|wavelength| REACH_WAVELENGTHS * wavelength);
+        let elevated = eroded(elevated, reach_x, reach_y);
+        let [variance_x, variance_y] = self.grid.wavelengths.map(|wavelength| (EDGE_WAVELENGTHS * wavelength).powi(2));
+        let elevated = smoothed(&elevated, variance_x, variance_y);
+        let (across, down) = (reduced_size(source.width, frame.factor), reduced_size(source.height, frame.factor));
+        let elevated = Plane::from_fn(across, down, |x, y| elevated.get(x + frame.beside, y + frame.above));
+        ReducedPlane::new(elevated, frame.factor, source.width, source.height)
+    }
 }
 
 /// `plane` at every second pixel, every fourth and so on, up to what [`MaskSource`] can be asked for.

@@ -6,6 +6,7 @@ use crate::display::Display;
 use crate::error::Error;
 use crate::noise_gain::noise_gain;
 use crate::plane::Plane;
+use crate::table::UniformTable;
 use crate::threshold::ThresholdMap;
 
 /// How the error of a moving picture moves; each class is seen differently.
@@ -86,9 +87,7 @@ pub fn image_velocity_deg_s(motion_x_px: &Plane, motion_y_px: &Plane, display: &
 }
 
 /// What changes with a velocity, against its logarithm from the eye's drift on.
-pub(crate) struct VelocityTable {
-    entries: Vec<f32>,
-}
+pub(crate) struct VelocityTable(UniformTable);
 
 impl VelocityTable {
     /// Steps a factor of 2 in velocity.
@@ -96,7 +95,7 @@ impl VelocityTable {
 
     fn new(at_deg_s: impl Fn(f64) -> f64) -> Self {
         let velocity_deg_s = |step: u32| DRIFT_DEG_S * (f64::from(step) / f64::from(Self::STEPS_AN_OCTAVE)).exp2();
-        Self { entries: (0..=96).map(|step| at_deg_s(velocity_deg_s(step)) as f32).collect() }
+        Self(UniformTable::new((0..=96).map(|step| at_deg_s(velocity_deg_s(step)) as f32)))
     }
 
     /// Threshold elevation by motion over the retina of one frequency.
@@ -109,10 +108,7 @@ impl VelocityTable {
     }
 
     pub(crate) fn at(&self, velocity_deg_s: f32) -> f32 {
-        let position = (velocity_deg_s / DRIFT_DEG_S as f32).max(1.0).log2() * Self::STEPS_AN_OCTAVE;
-        let index = (position as usize).min(self.entries.len() - 2);
-        let fraction = (position - index as f32).min(1.0);
-        self.entries[index] + fraction * (self.entries[index + 1] - self.entries[index])
+        self.0.at((velocity_deg_s / DRIFT_DEG_S as f32).max(1.0).log2() * Self::STEPS_AN_OCTAVE)
     }
 }
 

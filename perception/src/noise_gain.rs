@@ -1,6 +1,6 @@
 //! The noise gain of a map: how visible white pixel noise of unit variance is at each pixel.
 
-use crate::fft::{reduced_pixel, reduced_size};
+use crate::frame::{reduced_pixel, reduced_size};
 use crate::plane::Plane;
 use crate::reduced::ReducedPlane;
 use crate::sensitivity::{SensitivityTables, luminance_coordinate};

@@ -3,6 +3,9 @@
 /// A 3×3 matrix, row by row.
 pub type Matrix = [[f64; 3]; 3];
 
+/// Leaves colours as they are.
+pub const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
 /// CIE 1931 chromaticities of an additive colour space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Primaries {
@@ -140,7 +143,7 @@ mod tests {
         let wide = Primaries::REC709.to(&Primaries::REC2020).unwrap();
         close(&wide, &[[0.6274, 0.3293, 0.0433], [0.0691, 0.9195, 0.0114], [0.0164, 0.0880, 0.8956]]);
         let back = product(&Primaries::REC2020.to(&Primaries::REC709).unwrap(), &wide);
-        close(&back, &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+        close(&back, &IDENTITY);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! A smooth map kept at a fraction of the picture's resolution.
 
-use crate::fft::{enlarged, reduced_pixel};
+use crate::frame::{enlarged, reduced_pixel};
 use crate::plane::Plane;
 
 /// Values at every `factor`-th pixel, one before the picture and at least one past it included, and straight lines between
@@ -97,7 +97,7 @@ impl ReducedPlane {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fft::reduced_size;
+    use crate::frame::reduced_size;
 
     #[test]
     fn rows_are_those_of_the_enlarged_plane() {

@@ -8,6 +8,7 @@ use crate::display::Display;
 use crate::error::Error;
 use crate::filter::reflect;
 use crate::plane::Plane;
+use crate::table::Between;
 
 /// The picture that somebody looks at. All planes have one size.
 #[derive(Clone, Copy, Debug)]
@@ -283,16 +284,11 @@ fn resized(plane: &Plane, octave: usize, (to_octave, width, height): (usize, usi
     let ratio = (to_octave as f32 - octave as f32).exp2();
     let middle = |len: usize| 0.5 * (len - 1) as f32;
     let place = |index: usize, to: usize, from: usize| {
-        let position = ((index as f32 - middle(to)) * ratio + middle(from)).clamp(0.0, (from - 1) as f32);
-        let below = position as usize;
-        (below, (below + 1).min(from - 1), position - below as f32)
+        Between::of(f64::from((index as f32 - middle(to)) * ratio + middle(from)), from)
     };
     Plane::from_fn(width, height, |x, y| {
-        let (x0, x1, fx) = place(x, width, plane.width());
-        let (y0, y1, fy) = place(y, height, plane.height());
-        let top = plane.get(x0, y0) * (1.0 - fx) + plane.get(x1, y0) * fx;
-        let bottom = plane.get(x0, y1) * (1.0 - fx) + plane.get(x1, y1) * fx;
-        top * (1.0 - fy) + bottom * fy
+        let (columns, rows) = (place(x, width, plane.width()), place(y, height, plane.height()));
+        columns.bilinear(rows, |column, row| plane.get(column, row))
     })
 }
 

@@ -4,6 +4,7 @@ use crate::bands::{OctaveBands, RINGS, RadialTable, for_each_ring};
 use crate::csf::ContrastSensitivity;
 use crate::display::Viewing;
 use crate::plane::Plane;
+use crate::table::UniformTable;
 use rayon::prelude::*;
 
 /// Luminances below this, cd/m², adapt the eye no further (the floor of vision).
@@ -18,9 +19,7 @@ const SAMPLES_A_DECADE: usize = 4;
 
 /// A quantity against adaptation luminance.
 #[derive(Clone, Debug)]
-pub(crate) struct LuminanceTable {
-    entries: Vec<f32>,
-}
+pub(crate) struct LuminanceTable(UniformTable);
 
 impl LuminanceTable {
     /// `value_at(index)` gives the value at sample `index` of the grid; beyond the span the table is flat.
@@ -34,15 +33,13 @@ impl LuminanceTable {
         let [first, last] = [span.first, span.last].map(|sample| sample * ENTRIES_A_DECADE / SAMPLES_A_DECADE);
         let known: Vec<f32> = (first..=last).map(entry_at).collect();
         let decades = (HIGHEST_DECADE - LOWEST_DECADE) as usize;
-        let entries = (0..=decades * ENTRIES_A_DECADE).map(|entry| known[entry.clamp(first, last) - first]).collect();
-        Self { entries }
+        let entries = (0..=decades * ENTRIES_A_DECADE).map(|entry| known[entry.clamp(first, last) - first]);
+        Self(UniformTable::new(entries))
     }
 
     /// Looks up at a [`luminance_coordinate`].
     pub(crate) fn at(&self, coordinate: f32) -> f32 {
-        let index = (coordinate as usize).min(self.entries.len() - 2);
-        let fraction = (coordinate - index as f32).clamp(0.0, 1.0);
-        self.entries[index] + fraction * (self.entries[index + 1] - self.entries[index])
+        self.0.at(coordinate)
     }
 }
 

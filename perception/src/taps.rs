@@ -10,7 +10,7 @@ const MOST_VARIANCE: f64 = 3.0;
 /// `plane` through a window of the given variances along x and y, in squared samples, mirrored at the borders.
 pub(crate) fn smoothed(plane: &Plane, variance_x: f64, variance_y: f64) -> Plane {
     if variance_x.max(variance_y) > MOST_VARIANCE {
-        return filter::gaussian_blur_xy(plane, variance_x.max(0.0).sqrt(), variance_y.max(0.0).sqrt());
+        return filter::gaussian_blur_xy(plane, [variance_x, variance_y].map(|variance| variance.max(0.0).sqrt()));
     }
     let (across, down) = (kernel(variance_x), kernel(variance_y));
     over_rows(plane, across.len() / 2, down.len() / 2, |rows, extended, result| {
@@ -155,7 +155,7 @@ mod tests {
     fn small_and_large_windows_agree() {
         let plane = Plane::from_fn(41, 27, |x, y| ((x * 31 + y * 17) % 101) as f32);
         let (taps, boxes) =
-            (smoothed(&plane, 2.0, 2.5), filter::gaussian_blur_xy(&plane, 2.0_f64.sqrt(), 2.5_f64.sqrt()));
+            (smoothed(&plane, 2.0, 2.5), filter::gaussian_blur_xy(&plane, [2.0_f64.sqrt(), 2.5_f64.sqrt()]));
         for (a, b) in taps.values().iter().zip(boxes.values()) {
             assert!((a - b).abs() < 1.5, "{a} {b}");
         }

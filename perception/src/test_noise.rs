@@ -1,9 +1,16 @@
 //! Repeatable noise for tests.
 
+use crate::photometry::REC709_WEIGHTS;
+
 /// A standard normal number from SplitMix64 and Box–Muller.
 pub(crate) fn normal(state: &mut u64) -> f32 {
     let (a, b) = (uniform(state), uniform(state));
     ((-2.0 * (1.0 - a).ln()).sqrt() * (std::f64::consts::TAU * b).cos()) as f32
+}
+
+/// This much red, and as much less green as keeps the luminance.
+pub(crate) fn red_for_green(red: f32) -> [f32; 3] {
+    [red, -red * REC709_WEIGHTS[0] / REC709_WEIGHTS[1], 0.0]
 }
 
 /// A number in [0, 1).

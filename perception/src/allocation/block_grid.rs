@@ -63,7 +63,7 @@ impl BlockGrid {
     /// Values of blocks, blurred over their neighbours; `sigma_blocks` along x and y.
     pub(super) fn blurred(&self, values: &[f32], sigma_blocks: [f64; 2]) -> Vec<f32> {
         match Plane::from_values(self.columns(), self.rows(), values.to_vec()) {
-            Ok(plane) => gaussian_blur_xy(&plane, sigma_blocks[0], sigma_blocks[1]).into_values(),
+            Ok(plane) => gaussian_blur_xy(&plane, sigma_blocks).into_values(),
             Err(_) => values.to_vec(),
         }
     }

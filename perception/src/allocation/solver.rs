@@ -17,6 +17,8 @@ const SMALL_GRID: usize = 4096;
 const LEAST_GAP_OF_LARGE_GRIDS: f64 = 5e-3;
 /// How often the gap is looked at.
 const CHECK_EVERY: usize = 5;
+/// Rounds that raise counts to what constraints need after the last update.
+const MOST_REPAIRS: usize = 12;
 /// Slack given to constraints that cannot be met.
 const UNREACHABLE_SLACK: f32 = 1.01;
 
@@ -77,11 +79,11 @@ impl<'a> Solver<'a> {
             .collect();
         let root = weight.par_iter().zip(problem.cost.values()).map(|(weight, cost)| (weight / cost).sqrt()).collect();
         let density = problem.thresholds.viewing().display.pixel_density();
-        let sigma_px = [density.horizontal, density.vertical].map(|density| POOLING_SIGMA_DEG * density);
+        let sigma_px = density.pixels(POOLING_SIGMA_DEG);
         let block = ((POOLING_SIGMA_DEG * density.coarsest() / 4.0) as usize).clamp(1, 8);
         let most = problem.max_samples as f32;
         let at_most: Vec<f32> = weight.par_iter().map(|weight| weight / most).collect();
-        let floor = gaussian_blur_xy(&Plane::from_values(width, height, at_most)?, sigma_px[0], sigma_px[1]);
+        let floor = gaussian_blur_xy(&Plane::from_values(width, height, at_most)?, sigma_px);
         let total_cost: f64 = problem.cost.values().iter().map(|&cost| f64::from(cost)).sum();
         let mut solver = Self {
             problem,
@@ -202,7 +204,7 @@ impl<'a> Solver<'a> {
     /// Counts at full resolution that meet every constraint, and the lower bound that the multipliers prove there.
     fn certified(&self, multipliers: &[f32], bounds: &Plane, iterations: usize) -> Allocation {
         let lambda = self.spread_over_blocks(multipliers);
-        let price = gaussian_blur_xy(&lambda, self.sigma_px[0], self.sigma_px[1]);
+        let price = gaussian_blur_xy(&lambda, self.sigma_px);
         let (least, most) = (self.problem.min_samples as f32, self.problem.max_samples as f32);
         let mut samples = Plane::from_fn(self.width(), self.height(), |x, y| {
             let index = y * self.width() + x;
@@ -228,12 +230,12 @@ impl<'a> Solver<'a> {
         Allocation { samples, cost, lower_bound, gap, visibility: 0.0, unreachable_pixels: 0, iterations }
     }
 
-    /// Raises counts around violated constraints until none is left.
+    /// Raises counts around violated constraints until none is left, for at most [`MOST_REPAIRS`] rounds.
     fn repair(&self, samples: &mut Plane, bounds: &Plane) {
         let most = self.problem.max_samples as f32;
         let least = self.problem.min_samples as f32;
         let reach = self.sigma_px.map(|sigma| (2.0 * sigma).ceil() as usize);
-        for _ in 0..12 {
+        for _ in 0..MOST_REPAIRS {
             let excess = self.excess(samples, bounds);
             let worst = excess.values().iter().copied().fold(0.0, f32::max);
             if worst <= 1.0 {
@@ -257,7 +259,7 @@ impl<'a> Solver<'a> {
             self.weight.par_iter().zip(samples.values()).map(|(weight, count)| weight / count).collect();
         let noise = Plane::from_values(self.width(), self.height(), noise)
             .unwrap_or_else(|_| Plane::filled(self.width(), self.height(), f32::INFINITY));
-        gaussian_blur_xy(&noise, self.sigma_px[0], self.sigma_px[1])
+        gaussian_blur_xy(&noise, self.sigma_px)
     }
 
     /// v² over its bound at every pixel.

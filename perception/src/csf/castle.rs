@@ -1,7 +1,7 @@
 //! castleCSF.
 
-use super::ContrastSensitivity;
-use crate::error::{Error, check_range};
+use super::{ContrastSensitivity, check_area_deg2};
+use crate::error::Error;
 
 /// castleCSF: achromatic, sustained channel, foveal and static.
 ///
@@ -22,7 +22,7 @@ impl CastleCsf {
     /// # Errors
     /// [`Error::OutOfRange`] unless the area lies between 0.001 and 10 000 deg².
     pub fn new(area_deg2: f64) -> Result<Self, Error> {
-        check_range("csf_area_deg2", area_deg2, 1e-3, 1e4, "between 0.001 and 10000 deg²")?;
+        check_area_deg2("csf_area_deg2", area_deg2)?;
         Ok(Self { area_deg2 })
     }
 
@@ -40,8 +40,30 @@ impl Default for CastleCsf {
     }
 }
 
-const MIN_LUMINANCE_CD_M2: f64 = 1e-3;
-const MAX_LUMINANCE_CD_M2: f64 = 1e4;
+/// Luminances that castleCSF is declared between, and their decades.
+const DOMAIN_CD_M2: [f64; 2] = [1e-3, 1e4];
+pub(super) const DOMAIN_DECADES: [i32; 2] = [-3, 4];
+
+/// The luminance, or the edge of castleCSF's domain that it lies beyond.
+pub(super) fn in_domain(luminance_cd_m2: f64) -> f64 {
+    luminance_cd_m2.clamp(DOMAIN_CD_M2[0], DOMAIN_CD_M2[1])
+}
+
+/// Spatial summation (Rovamo et al. 1993): area counts up to a critical area that shrinks with frequency.
+pub(super) struct Summation {
+    /// The critical area of coarse gratings.
+    pub(super) area_0_deg2: f64,
+    /// Above it the critical area shrinks.
+    pub(super) freq_0_cpd: f64,
+}
+
+impl Summation {
+    /// Root of the area that counts, in degrees: sensitivity to so many cycles a degree grows by it.
+    pub(super) fn extent_deg(&self, freq_cpd: f64, area_deg2: f64) -> f64 {
+        let critical_area_deg2 = self.area_0_deg2 / (1.0 + (freq_cpd / self.freq_0_cpd).powi(2));
+        (critical_area_deg2 / (1.0 + critical_area_deg2 / area_deg2)).sqrt()
+    }
+}
 
 impl ContrastSensitivity for CastleCsf {
     fn name(&self) -> &'static str {
@@ -58,8 +80,7 @@ const SUSTAINED: Sustained = Sustained {
     peak_freq: [1.781_19, 91.571_8, 0.256_682],
     log2_bandwidth: 0.000_213_047,
     truncation: 0.100_207,
-    area_0_deg2: 157.103,
-    freq_0_cpd: 0.702_338,
+    summation: Summation { area_0_deg2: 157.103, freq_0_cpd: 0.702_338 },
 };
 
 /// Constants of the sustained achromatic channel that stelaCSF and castleCSF share the form of.
@@ -71,8 +92,7 @@ pub(super) struct Sustained {
     pub(super) log2_bandwidth: f64,
     /// How far sensitivity falls at most below the peak's frequency, before area counts.
     pub(super) truncation: f64,
-    pub(super) area_0_deg2: f64,
-    pub(super) freq_0_cpd: f64,
+    pub(super) summation: Summation,
 }
 
 impl Sustained {
@@ -80,7 +100,7 @@ impl Sustained {
         if freq_cpd <= 0.0 {
             return 0.0;
         }
-        let luminance = luminance_cd_m2.clamp(MIN_LUMINANCE_CD_M2, MAX_LUMINANCE_CD_M2);
+        let luminance = in_domain(luminance_cd_m2);
         let [p1, p2, p3, p4, p5] = self.peak;
         let rise = p1 * (1.0 + p2 / luminance).powf(-p3);
         // (1 + p₄/L)^−p₅ with p₄ ≈ 6e-7 and p₅ ≈ 1e10: a plain power would lose p₄/L beside 1.
@@ -92,10 +112,8 @@ impl Sustained {
         if freq_cpd < peak_freq_cpd {
             log_parabola = log_parabola.max(1.0 - self.truncation);
         }
-        // Spatial summation (Rovamo et al. 1993): area counts up to a critical area that shrinks with frequency.
-        let critical_area_deg2 = self.area_0_deg2 / (1.0 + (freq_cpd / self.freq_0_cpd).powi(2));
-        let summation = (critical_area_deg2 / (1.0 + critical_area_deg2 / area_deg2)).sqrt() * freq_cpd;
-        rise * -fall.exp_m1() * log_parabola * summation
+        let cycles_summed = self.summation.extent_deg(freq_cpd, area_deg2) * freq_cpd;
+        rise * -fall.exp_m1() * log_parabola * cycles_summed
     }
 }
 

@@ -1,7 +1,8 @@
 //! castleCSF's two chromatic mechanisms.
 
-use super::ContrastSensitivity;
-use crate::error::{Error, check_range};
+use super::castle::{Summation, in_domain};
+use super::{ContrastSensitivity, check_area_deg2};
+use crate::error::Error;
 
 /// Which opponent channel of castleCSF.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,23 +27,20 @@ struct Parameters {
     peak: [f64; 3],
     peak_cpd: f64,
     log2_bandwidth: f64,
-    area_0: f64,
-    freq_0: f64,
+    summation: Summation,
 }
 
 const RED_GREEN: Parameters = Parameters {
     peak: [681.434, 38.0038, 0.480_386],
     peak_cpd: 0.017_836_4,
     log2_bandwidth: 2.421_04,
-    area_0: 2816.44,
-    freq_0: 0.071_105_8,
+    summation: Summation { area_0_deg2: 2816.44, freq_0_cpd: 0.071_105_8 },
 };
 const YELLOW_VIOLET: Parameters = Parameters {
     peak: [166.683, 62.8974, 0.411_93],
     peak_cpd: 0.004_257_53,
     log2_bandwidth: 2.681_97,
-    area_0: 2.827_89e7,
-    freq_0: 0.000_635_093,
+    summation: Summation { area_0_deg2: 2.827_89e7, freq_0_cpd: 0.000_635_093 },
 };
 
 impl CastleChromatic {
@@ -51,7 +49,7 @@ impl CastleChromatic {
     /// # Errors
     /// [`Error::OutOfRange`] unless the area lies between 0.001 and 10 000 deg².
     pub fn new(channel: ChromaticChannel, area_deg2: f64) -> Result<Self, Error> {
-        check_range("csf_area_deg2", area_deg2, 1e-3, 1e4, "between 0.001 and 10000 deg²")?;
+        check_area_deg2("csf_area_deg2", area_deg2)?;
         Ok(Self { channel, area_deg2 })
     }
 }
@@ -72,12 +70,11 @@ impl ContrastSensitivity for CastleChromatic {
             ChromaticChannel::RedGreen => &RED_GREEN,
             ChromaticChannel::YellowViolet => &YELLOW_VIOLET,
         };
-        let luminance = luminance_cd_m2.clamp(1e-3, 1e4);
+        let luminance = in_domain(luminance_cd_m2);
         let peak = parameters.peak[0] * (1.0 + parameters.peak[1] / luminance).powf(-parameters.peak[2]);
         let decades_above = (freq_cpd / parameters.peak_cpd).log10().max(0.0);
         let log_parabola = 10.0_f64.powf(-decades_above * decades_above / parameters.log2_bandwidth.exp2());
-        let critical_area_deg2 = parameters.area_0 / (1.0 + (freq_cpd / parameters.freq_0).powi(2));
-        peak * log_parabola * (critical_area_deg2 / (1.0 + critical_area_deg2 / self.area_deg2)).sqrt() * freq_cpd
+        peak * log_parabola * parameters.summation.extent_deg(freq_cpd, self.area_deg2) * freq_cpd
     }
 }
 

@@ -1,7 +1,8 @@
 //! castleCSF for gratings that flicker or drift.
 
 use super::ContrastSensitivity;
-use super::castle::CastleCsf;
+use super::castle::{CastleCsf, DOMAIN_DECADES, Summation, in_domain};
+use crate::table::Between;
 
 /// castleCSF's achromatic mechanism at a temporal frequency: its sustained channel, which fades with it, and its
 /// transient channel, which peaks at w₀ = 2.41 log₁₀ L + 4.70 Hz; they add.
@@ -46,17 +47,46 @@ pub(super) fn transient_response(flicker_hz: f64, luminance_cd_m2: f64) -> f64 {
     (-detuning * detuning / 0.084_483_6).exp()
 }
 
-fn in_domain(luminance_cd_m2: f64) -> f64 {
-    luminance_cd_m2.clamp(1e-3, 1e4)
-}
-
 /// Spatial sensitivity of the transient channel at its best flicker: low-pass, growing slowly with luminance.
 pub(super) fn transient(freq_cpd: f64, luminance_cd_m2: f64, area_deg2: f64) -> f64 {
     let peak = 2748.09 * in_domain(luminance_cd_m2).powf(0.193_434);
     let decades_above = (freq_cpd / 0.000_316_696).log10().max(0.0);
     let log_parabola = 10.0_f64.powf(-decades_above * decades_above / 2.6761_f64.exp2());
-    let critical_area_deg2 = 3.816_11 / (1.0 + (freq_cpd / 3.013_89).powi(2));
-    peak * log_parabola * (critical_area_deg2 / (1.0 + critical_area_deg2 / area_deg2)).sqrt() * freq_cpd
+    let summation = Summation { area_0_deg2: 3.816_11, freq_0_cpd: 3.013_89 };
+    peak * log_parabola * summation.extent_deg(freq_cpd, area_deg2) * freq_cpd
+}
+
+/// Energies that the eye receives of the product of two channels' responses.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Energies {
+    pub(super) sustained: f64,
+    pub(super) mixed: f64,
+    pub(super) transient: f64,
+}
+
+impl Energies {
+    /// Of channels of these spatial sensitivities, together.
+    pub(super) fn seen_by(self, sustained: f64, transient: f64) -> f64 {
+        self.sustained * sustained * sustained
+            + 2.0 * self.mixed * sustained * transient
+            + self.transient * transient * transient
+    }
+}
+
+/// Levels a decade at which what changes with luminance in time is tabulated.
+const LEVELS_A_DECADE: usize = 4;
+/// Levels over castleCSF's domain.
+const LEVELS: usize = (DOMAIN_DECADES[1] - DOMAIN_DECADES[0]) as usize * LEVELS_A_DECADE + 1;
+
+/// Luminances of the levels, cd/m².
+pub(super) fn levels_cd_m2() -> impl Iterator<Item = f64> {
+    (0..LEVELS).map(|level| 10.0_f64.powf(f64::from(DOMAIN_DECADES[0]) + level as f64 / LEVELS_A_DECADE as f64))
+}
+
+/// Between which levels a luminance stands.
+pub(super) fn between_levels(luminance_cd_m2: f64) -> Between {
+    let decades = luminance_cd_m2.max(1e-12).log10() - f64::from(DOMAIN_DECADES[0]);
+    Between::of(decades * LEVELS_A_DECADE as f64, LEVELS)
 }
 
 #[cfg(test)]

@@ -1,19 +1,16 @@
 //! What a frame of a moving picture leaves in the eye's temporal channels, a frame and several frames away.
 
 use super::castle_chromatic::ChromaticChannel;
-use super::castle_temporal::{sustained_response, transient_response};
+use super::castle_temporal::{between_levels, levels_cd_m2, sustained_response, transient_response};
 use super::fresh_noise::{HIGHEST_HZ, chromatic_response};
 use super::{ContrastSensitivity, FrameTiming};
 use crate::error::Error;
+use crate::table::Between;
 use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 
 /// Seconds before and after a moment whose frames it is seen with: the sustained channel's response has fallen to 1 % by then.
 const REACH_S: f64 = 0.2;
-/// Transient responses are tabulated from this decade of luminance on, in steps of a quarter.
-const LOWEST_DECADE: f64 = -3.0;
-const DECADE_STEPS: usize = 4;
-const LEVELS: usize = 7 * DECADE_STEPS + 1;
 
 /// Looks at a display in a second, at the least. A step of light is seen most some 20 ms before and after it, and flicker of 12 Hz at
 /// its peak: from one look in the middle of each of 24 frames, ±3 % at 12 Hz had 0.80 of the contrast over threshold that it has.
@@ -47,7 +44,7 @@ pub(crate) type Sustained = [Weights; 3];
 #[derive(Clone, Debug)]
 pub(crate) struct Look {
     pub(crate) sustained: Sustained,
-    /// By luminance.
+    /// At the luminances of [`levels_cd_m2`].
     transient: Vec<Weights>,
 }
 
@@ -55,22 +52,21 @@ pub(crate) struct Look {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Level {
     below: usize,
+    above: usize,
     share: f32,
 }
 
 impl Level {
     pub(crate) fn of(adaptation_cd_m2: f32) -> Self {
-        let decades = f64::from(adaptation_cd_m2.max(1e-6)).log10() - LOWEST_DECADE;
-        let position = (decades * DECADE_STEPS as f64).clamp(0.0, (LEVELS - 1) as f64);
-        let below = (position as usize).min(LEVELS - 2);
-        Self { below, share: (position - below as f64) as f32 }
+        let Between { below, above, share } = between_levels(f64::from(adaptation_cd_m2));
+        Self { below, above, share: share as f32 }
     }
 }
 
 impl Look {
     /// The transient channel's weight of a frame, for an eye adapted to a luminance.
     pub(crate) fn transient(&self, frame: usize, level: Level) -> f32 {
-        let [low, high] = [level.below, level.below + 1].map(|level| self.transient[level][frame]);
+        let [low, high] = [level.below, level.above].map(|level| self.transient[level][frame]);
         low + level.share * (high - low)
     }
 }
@@ -138,7 +134,7 @@ struct Moment {
 impl Moment {
     /// So long after the middle of the frame that is shown.
     fn new(timing: FrameTiming, moment_s: f64) -> Self {
-        let hz_step = 0.25f64.min(timing.frames_per_second / 16.0);
+        let hz_step = timing.hz_step();
         let hz: Vec<f64> = (0..(HIGHEST_HZ / hz_step) as usize).map(|step| (step as f64 + 0.5) * hz_step).collect();
         let reach = timing.reach() as f64;
         let of_frame = |frame: usize| {
@@ -190,8 +186,7 @@ impl Moment {
 
     fn look(&self) -> Look {
         let held = self.held(sustained_response);
-        let transient = (0..LEVELS).map(|level| {
-            let luminance_cd_m2 = 10f64.powf(LOWEST_DECADE + level as f64 / DECADE_STEPS as f64);
+        let transient = levels_cd_m2().map(|luminance_cd_m2| {
             let response = |hz: f64| transient_response(hz, luminance_cd_m2);
             self.with_sum(response, 0.0, &held)
         });

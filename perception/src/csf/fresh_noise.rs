@@ -5,7 +5,9 @@
 
 use super::castle::CastleCsf;
 use super::castle_chromatic::ChromaticChannel;
-use super::castle_temporal::{sustained_response, transient, transient_response};
+use super::castle_temporal::{
+    Energies, between_levels, levels_cd_m2, sustained_response, transient, transient_response,
+};
 use super::{ContrastSensitivity, FrameTiming};
 use crate::error::Error;
 
@@ -20,21 +22,10 @@ use crate::error::Error;
 #[derive(Clone, Debug)]
 pub struct FreshNoise {
     still: CastleCsf,
-    /// By luminance, in steps of [`DECADE_STEPS`] a decade from [`LOWEST_DECADE`] on.
-    by_luminance: Vec<Integrals>,
+    /// At the luminances of [`levels_cd_m2`].
+    by_luminance: Vec<Energies>,
 }
 
-/// What is left of the product of two channels' responses.
-#[derive(Clone, Copy, Debug)]
-struct Integrals {
-    sustained: f64,
-    mixed: f64,
-    transient: f64,
-}
-
-const LOWEST_DECADE: f64 = -3.0;
-const HIGHEST_DECADE: f64 = 4.0;
-const DECADE_STEPS: usize = 4;
 /// Beyond this nothing flickers for the eye: the sustained channel is at e⁻⁴³, the transient at 4 %, both times sinc².
 pub(super) const HIGHEST_HZ: f64 = 120.0;
 /// Steps of the integrals: at most this, and a sixteenth of the frame rate.
@@ -57,12 +48,10 @@ impl FreshNoise {
     /// ```
     pub fn new(area_deg2: f64, timing: FrameTiming) -> Result<Self, Error> {
         timing.check()?;
-        let steps = ((HIGHEST_DECADE - LOWEST_DECADE) as usize) * DECADE_STEPS;
-        let by_luminance = (0..=steps)
-            .map(|step| {
-                let luminance_cd_m2 = 10f64.powf(LOWEST_DECADE + step as f64 / DECADE_STEPS as f64);
+        let by_luminance = levels_cd_m2()
+            .map(|luminance_cd_m2| {
                 let transient = |hz: f64| transient_response(hz, luminance_cd_m2);
-                Integrals {
+                Energies {
                     sustained: timing.seen_energy(|hz| sustained_response(hz).powi(2)),
                     mixed: timing.seen_energy(|hz| sustained_response(hz) * transient(hz)),
                     transient: timing.seen_energy(|hz| transient(hz).powi(2)),
@@ -72,16 +61,13 @@ impl FreshNoise {
         Ok(Self { still: CastleCsf::new(area_deg2)?, by_luminance })
     }
 
-    fn integrals(&self, luminance_cd_m2: f64) -> Integrals {
-        let decades = luminance_cd_m2.max(1e-12).log10().clamp(LOWEST_DECADE, HIGHEST_DECADE) - LOWEST_DECADE;
-        let position = decades * DECADE_STEPS as f64;
-        let below = (position as usize).min(self.by_luminance.len() - 2);
-        let (share, [low, high]) = (position - below as f64, [self.by_luminance[below], self.by_luminance[below + 1]]);
-        let between = |of: fn(&Integrals) -> f64| of(&low) + share * (of(&high) - of(&low));
-        Integrals {
-            sustained: between(|i| i.sustained),
-            mixed: between(|i| i.mixed),
-            transient: between(|i| i.transient),
+    fn energies(&self, luminance_cd_m2: f64) -> Energies {
+        let levels = between_levels(luminance_cd_m2);
+        let [low, high] = [levels.below, levels.above].map(|level| self.by_luminance[level]);
+        Energies {
+            sustained: levels.value(low.sustained, high.sustained),
+            mixed: levels.value(low.mixed, high.mixed),
+            transient: levels.value(low.transient, high.transient),
         }
     }
 }
@@ -94,8 +80,7 @@ impl ContrastSensitivity for FreshNoise {
     fn sensitivity(&self, freq_cpd: f64, luminance_cd_m2: f64) -> f64 {
         let sustained = self.still.sensitivity(freq_cpd, luminance_cd_m2);
         let transient = if freq_cpd > 0.0 { transient(freq_cpd, luminance_cd_m2, self.still.area_deg2()) } else { 0.0 };
-        let Integrals { sustained: a, mixed: b, transient: c } = self.integrals(luminance_cd_m2);
-        (a * sustained * sustained + 2.0 * b * sustained * transient + c * transient * transient).sqrt()
+        self.energies(luminance_cd_m2).seen_by(sustained, transient).sqrt()
     }
 }
 
@@ -110,11 +95,16 @@ impl FrameTiming {
         Ok(self.seen_energy(|hz| chromatic_response(channel, hz).powi(2)))
     }
 
+    /// Steps of integrals over frequency.
+    pub(super) fn hz_step(self) -> f64 {
+        HZ_STEP.min(self.frames_per_second / 16.0)
+    }
+
     /// ∫ 2T sinc²(f T p) r(f) df over what flickers for the eye, r being a squared response.
     pub(super) fn seen_energy(self, squared_response: impl Fn(f64) -> f64) -> f64 {
         let frame_s = 1.0 / self.frames_per_second;
         let density = |hz: f64| 2.0 * frame_s * self.held(hz).powi(2);
-        let hz_step = HZ_STEP.min(self.frames_per_second / 16.0);
+        let hz_step = self.hz_step();
         let steps = (HIGHEST_HZ / hz_step) as usize;
         let middle = |step: usize| (step as f64 + 0.5) * hz_step;
         let energy: f64 = (0..steps).map(|step| density(middle(step)) * squared_response(middle(step))).sum();

@@ -4,7 +4,8 @@ use super::ContrastSensitivity;
 
 /// Mantiuk, Kim, Rempel and Heidrich, "HDR-VDP-2: a calibrated visual metric for visibility and quality predictions in all
 /// luminance conditions", 2011: neural sensitivity, the eye's optics and the sensitivity of rods and cones together, with the
-/// constants of its release 2.2. It has no absolute scale (31 at best at 20 cd/m²) and knows no area.
+/// constants of its release 2.2 (`csf_params`, `csf_lums`, `csf_sa` and `mtf_params_a` and `_b` of `hdrvdp_parse_options.m`). It has no
+/// absolute scale (31 at best at 20 cd/m²) and knows no area.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HdrVdp2 {
     /// Multiplies the published function.
@@ -12,14 +13,16 @@ pub struct HdrVdp2 {
 }
 
 impl Default for HdrVdp2 {
-    /// 8.6 times: a scale for gratings in circulation, not the authors'.
+    /// 8.6 times: not the metric's own scale, but the `sensitivity` that a published script has beside `csf_hdrvdp`
+    /// (`generate_G_threshold.m` of aidensryu/SmartLocalDimming).
     fn default() -> Self {
         Self { gain: 8.6 }
     }
 }
 
+/// `csf_lums`.
 const LUMINANCES_CD_M2: [f64; 6] = [0.002, 0.02, 0.2, 2.0, 20.0, 150.0];
-/// p₁ to p₄ at each of those luminances; between them straight in log luminance.
+/// p₁ to p₄, the last four columns of `csf_params`, at each of those luminances; between them straight in log luminance.
 const PARAMETERS: [[f64; 4]; 6] = [
     [0.991_265, 3.740_38, 0.507_22, 4.460_44],
     [0.800_889, 3.541_04, 0.682_505, 4.949_58],
@@ -41,6 +44,7 @@ impl ContrastSensitivity for HdrVdp2 {
         let [p1, p2, p3, p4] = parameters(luminance_cd_m2);
         let low_cut = -(-(freq_cpd / 7.0).powi(2)).exp_m1();
         let neural = p4 / ((1.0 + (p1 * freq_cpd).powf(p2)) / low_cut.powf(p3)).sqrt();
+        // `csf_sa`.
         let receptors = 30.162 * ((4.0627 / luminance_cd_m2.max(1e-6)).powf(1.6596) + 1.0).powf(-0.2712);
         self.gain * neural * optics(freq_cpd) * receptors
     }
@@ -57,7 +61,7 @@ fn parameters(luminance_cd_m2: f64) -> [f64; 4] {
     [at(0), at(1), at(2), at(3)]
 }
 
-/// Modulation transfer of the eye's media: a sum of four exponentials.
+/// Modulation transfer of the eye's media: a sum of four exponentials, `mtf_params_a` their weights and `mtf_params_b` their decays.
 fn optics(freq_cpd: f64) -> f64 {
     const SHARP: f64 = 0.997_273_700_237_770_7;
     const MIDDLE: f64 = 0.061_466_549_455_263;

@@ -104,6 +104,11 @@ impl FrameTiming {
     }
 }
 
+/// Rejects an area of a grating that no contrast sensitivity function is asked for.
+pub(crate) fn check_area_deg2(what: &'static str, area_deg2: f64) -> Result<(), Error> {
+    check_range(what, area_deg2, 1e-3, 1e4, "between 0.001 and 10000 deg²")
+}
+
 const NAMES: [&str; 9] =
     ["castle", "stela", "barten99", "barten89", "daly93", "daly98", "laird06", "hdrvdp2", "mannos-sakrison"];
 
@@ -172,7 +177,7 @@ pub fn peak_sensitivity(csf: &dyn ContrastSensitivity, luminance_cd_m2: f64) -> 
     let best = (0..=64)
         .map(|index| first + f64::from(index) * step)
         .fold(first, |best, log_freq| if at(log_freq) > at(best) { log_freq } else { best });
-    let (mut low, mut high) = (best - step, best + step);
+    let (mut low, mut high) = ((best - step).max(first), (best + step).min(last));
     for _ in 0..60 {
         let (left, right) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
         if at(left) < at(right) {
@@ -182,4 +187,27 @@ pub fn peak_sensitivity(csf: &dyn ContrastSensitivity, luminance_cd_m2: f64) -> 
         }
     }
     at(0.5 * (low + high)).max(at(best))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Beyond what is asked for nothing counts, where the greatest sensitivity is at an end: the search went on to 0.0448 and 67 cpd.
+    #[test]
+    fn peaks_are_looked_for_where_it_is_said() {
+        struct Slope(f64);
+        impl ContrastSensitivity for Slope {
+            fn name(&self) -> &'static str {
+                "slope"
+            }
+            fn sensitivity(&self, freq_cpd: f64, _luminance_cd_m2: f64) -> f64 {
+                freq_cpd.powf(self.0)
+            }
+        }
+        for (exponent, expected) in [(-1.0, 20.0), (1.0, 60.0)] {
+            let found = peak_sensitivity(&Slope(exponent), 100.0);
+            assert!((found / expected - 1.0).abs() < 1e-9, "{exponent}: {found}");
+        }
+    }
 }

@@ -4,10 +4,11 @@
 //! lit for an instant.
 
 use super::castle::CastleCsf;
-use super::castle_temporal::{sustained_response, transient, transient_response};
+use super::castle_temporal::{Energies, sustained_response, transient, transient_response};
 use super::fresh_noise::HIGHEST_HZ;
 use super::{ContrastSensitivity, FrameTiming};
 use crate::error::Error;
+use crate::table::Between;
 use std::f64::consts::FRAC_PI_2;
 
 /// How much less of noise that is new in every frame an eye sees that follows something.
@@ -23,14 +24,6 @@ pub(crate) struct PursuedNoise {
     /// Energies by s in steps of [`Self::step_hz`].
     by_shift: Vec<Energies>,
     step_hz: f64,
-}
-
-/// Of what the product of two channels' responses lets through.
-#[derive(Clone, Copy, Debug, Default)]
-struct Energies {
-    sustained: f64,
-    mixed: f64,
-    transient: f64,
 }
 
 /// Steps for each lobe of the noise's spectrum, which is 1 / (T p) wide.
@@ -83,15 +76,9 @@ impl PursuedNoise {
     }
 
     fn energy(&self, [sustained, transient]: [f64; 2], shift_hz: f64) -> f64 {
-        let position = (shift_hz / self.step_hz).min((self.by_shift.len() - 1) as f64);
-        let below = (position as usize).min(self.by_shift.len() - 2);
-        let share = position - below as f64;
-        let at = |energies: &Energies| {
-            energies.sustained * sustained * sustained
-                + 2.0 * energies.mixed * sustained * transient
-                + energies.transient * transient * transient
-        };
-        (1.0 - share) * at(&self.by_shift[below]) + share * at(&self.by_shift[below + 1])
+        let Between { below, above, share } = Between::of(shift_hz / self.step_hz, self.by_shift.len());
+        let [low, high] = [below, above].map(|step| self.by_shift[step].seen_by(sustained, transient));
+        (1.0 - share) * low + share * high
     }
 }
 

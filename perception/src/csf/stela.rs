@@ -1,7 +1,7 @@
 //! stelaCSF.
 
 use super::ContrastSensitivity;
-use super::castle::Sustained;
+use super::castle::{Summation, Sustained};
 
 /// Mantiuk, Ashraf and Chapiro, "stelaCSF: a unified model of contrast sensitivity as the function of spatio-temporal frequency,
 /// eccentricity, luminance and area", 2022: the achromatic predecessor of [`super::CastleCsf`], sustained channel, foveal and static.
@@ -25,8 +25,7 @@ const SUSTAINED: Sustained = Sustained {
     peak_freq: [1.559_09, 103.604, 0.251_815],
     log2_bandwidth: 0.177_674,
     truncation: 0.0,
-    area_0_deg2: 270.0,
-    freq_0_cpd: 0.65,
+    summation: Summation { area_0_deg2: 270.0, freq_0_cpd: 0.65 },
 };
 
 impl ContrastSensitivity for StelaCsf {

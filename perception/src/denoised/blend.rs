@@ -2,9 +2,9 @@
 
 use super::DenoisedError;
 use super::witness::{BandBias, BandEvidence};
+use crate::error_filters::ErrorFilters;
 use crate::plane::Plane;
 use crate::threshold::ThresholdMap;
-use crate::visibility::ErrorFilters;
 
 /// The least share that is worth the transforms.
 const LEAST_SHARE: f32 = 0.01;

@@ -23,9 +23,10 @@ use blend::BandError;
 pub use blend::step_towards_raw;
 pub use chromatic::{ChromaticPicture, chromatic_error};
 
+use crate::error_filters::ErrorFilters;
 use crate::plane::Plane;
 use crate::threshold::ThresholdMap;
-use crate::visibility::{ErrorFilters, infinite_where_unknown};
+use crate::visibility::infinite_where_unknown;
 use witness::{BandEvidence, bias_energy};
 
 /// Errors of one channel of a denoised picture, display cd/m². Planes of the threshold map's size.

@@ -1,10 +1,10 @@
 //! What the raw halves tell of a denoised picture's bias in one band.
 
 use crate::bands::{RINGS, for_each_ring};
+use crate::error_filters::ErrorFilters;
 use crate::fft::Spectrum;
 use crate::plane::Plane;
 use crate::threshold::{POOLING_SIGMA_DEG, ThresholdMap};
-use crate::visibility::ErrorFilters;
 
 /// Squared bias over squared variance before anything is known of a picture: true error was 1.00 to 1.18 times what the
 /// halves' difference shows from 16 samples a pixel on (`fechner bench --suite denoise`, benches/results/denoising.md).

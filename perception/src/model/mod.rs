@@ -23,6 +23,7 @@ use crate::display::Viewing;
 use crate::error::Error;
 use crate::filter::gaussian_blur_xy;
 use crate::plane::Plane;
+use crate::table::UniformTable;
 use crate::threshold::{GuideNoise, POOLING_SIGMA_DEG};
 
 /// What a model may look at. All planes have one size.
@@ -61,7 +62,7 @@ impl ModelInputs<'_> {
         Ok(())
     }
 
-    /// Velocity over the retina, deg/s, at each pixel: the eye's drift alone for a still.
+    /// Velocity over the retina, deg/s, at each pixel; `None` for a still.
     fn retinal_velocity_deg_s(&self) -> Option<Plane> {
         let velocity = self.image_velocity_deg_s?;
         Some(Plane::from_fn(velocity.width(), velocity.height(), |x, y| {
@@ -113,11 +114,11 @@ pub trait ThresholdModel: Send + Sync {
 
 /// Energy over a Gaussian of σ 0.25°.
 fn pooled(energy: &Plane, viewing: &Viewing) -> Plane {
-    let density = viewing.display.pixel_density();
-    gaussian_blur_xy(energy, POOLING_SIGMA_DEG * density.horizontal, POOLING_SIGMA_DEG * density.vertical)
+    gaussian_blur_xy(energy, viewing.display.pixel_density().pixels(POOLING_SIGMA_DEG))
 }
 
-/// Two-sided 95 % of a normal distribution: models that stop on a confidence interval ask z σ ≤ T.
+/// Two-sided 95 % of a normal distribution, its quantile of 0.975 (1.959 96) as tables round it: models that stop on a confidence
+/// interval ask z σ ≤ T.
 const Z_95: f64 = 1.96;
 
 /// Name of the model that is meant where none is named, and the only one that knows denoised pictures and where one looks.
@@ -153,9 +154,7 @@ pub fn by_name(name: &str) -> Option<Box<dyn ThresholdModel>> {
 }
 
 /// A function of adaptation luminance, asked once on a fine grid instead of once a pixel.
-struct PerLuminance {
-    entries: Vec<f32>,
-}
+struct PerLuminance(UniformTable);
 
 impl PerLuminance {
     const LOWEST_DECADE: f32 = -4.0;
@@ -165,20 +164,14 @@ impl PerLuminance {
     /// `value_at(luminance in cd/m²)` must be positive.
     fn new(value_at: impl Fn(f64) -> f64) -> Self {
         let last = (Self::DECADES * Self::ENTRIES_A_DECADE) as usize;
-        let entries = (0..=last)
-            .map(|index| {
-                let decade = Self::LOWEST_DECADE + index as f32 / Self::ENTRIES_A_DECADE;
-                value_at(10.0_f64.powf(f64::from(decade))).max(1e-30).ln() as f32
-            })
-            .collect();
-        Self { entries }
+        Self(UniformTable::new((0..=last).map(|index| {
+            let decade = Self::LOWEST_DECADE + index as f32 / Self::ENTRIES_A_DECADE;
+            value_at(10.0_f64.powf(f64::from(decade))).max(1e-30).ln() as f32
+        })))
     }
 
     fn at(&self, luminance_cd_m2: f32) -> f32 {
-        let position = (luminance_cd_m2.max(1e-4).log10() - Self::LOWEST_DECADE) * Self::ENTRIES_A_DECADE;
-        let index = (position.max(0.0) as usize).min(self.entries.len() - 2);
-        let fraction = (position - index as f32).clamp(0.0, 1.0);
-        (self.entries[index] + fraction * (self.entries[index + 1] - self.entries[index])).exp()
+        self.0.at((luminance_cd_m2.max(1e-4).log10() - Self::LOWEST_DECADE) * Self::ENTRIES_A_DECADE).exp()
     }
 }
 

@@ -20,10 +20,10 @@ use crate::csf::{
 use crate::difference::{Difference, HeldAtLowFrequencies, masked_by_both};
 use crate::display::Viewing;
 use crate::error::Error;
+use crate::error_filters::ErrorFilters;
 use crate::plane::Plane;
 use crate::sensitivity::adaptation_levels;
 use crate::threshold::{ThresholdInputs, ThresholdMap, chromatic_threshold_map, threshold_map};
-use crate::visibility::ErrorFilters;
 use gaze::{Place, Smears, Towards};
 use rayon::prelude::*;
 

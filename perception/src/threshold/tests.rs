@@ -1,6 +1,7 @@
 use super::*;
-use crate::csf::CastleCsf;
+use crate::csf::{CastleCsf, peak_sensitivity};
 use crate::display::Display;
+use crate::test_golden::check;
 
 fn viewing(pixels_per_degree: f64) -> Viewing {
     Viewing { display: Display { pixels_per_degree, ..Display::default() }, ..Viewing::default() }
@@ -11,23 +12,15 @@ fn map_of(picture: &Plane, viewing: &Viewing) -> ThresholdMap {
     threshold_map(&inputs, viewing, &CastleCsf::default()).unwrap()
 }
 
-/// Standard error at v = 1 is σ/L = 1 / (S_peak G √2) with the specification's S_peak and G of white noise.
+/// Standard error at v = 1 is σ/L = 1 / (S_peak G √2), G being the specification's gain of white noise.
 #[test]
 fn uniform_pictures_have_the_tabulated_thresholds() {
-    for (luminance, ppd, expected) in [
-        (1.0, 30.0, 1.0 / (40.160_55 * 0.295_844)),
-        (1.0, 60.0, 1.0 / (40.160_55 * 0.149_091)),
-        (10.0, 20.0, 1.0 / (86.063_1 * 0.616_258)),
-        (10.0, 60.0, 1.0 / (86.063_1 * 0.227_654)),
-        (100.0, 20.0, 1.0 / (134.296_3 * 0.748_92)),
-        (100.0, 30.0, 1.0 / (134.296_3 * 0.567_412)),
-        (100.0, 60.0, 1.0 / (134.296_3 * 0.304_307)),
-    ] {
-        let map = map_of(&Plane::filled(32, 24, luminance), &viewing(ppd));
-        let allowed = f64::from(map.allowed_standard_error_cd_m2(1.0).get(16, 12)) / f64::from(luminance);
-        let expected = expected / std::f64::consts::SQRT_2;
-        assert!((allowed / expected - 1.0).abs() < 2e-3, "{luminance} cd/m², {ppd} ppd: {allowed}, not {expected}");
-    }
+    check("fft_white_noise_gain_castle_N256", 2e-3, |row| {
+        let (luminance, ppd) = (row[0], row[1]);
+        let map = map_of(&Plane::filled(32, 24, luminance as f32), &viewing(ppd));
+        let allowed = f64::from(map.allowed_standard_error_cd_m2(1.0).get(16, 12)) / luminance;
+        1.0 / (allowed * peak_sensitivity(&CastleCsf::default(), luminance) * std::f64::consts::SQRT_2)
+    });
 }
 
 #[test]
@@ -237,14 +230,9 @@ fn no_motion_changes_nothing() {
 fn isoluminant_noise_is_not_missed() {
     use crate::csf::{CastleChromatic, ChromaticChannel};
     use crate::opponent::opponent;
+    use crate::test_noise::red_for_green;
     let mut state = 9;
-    let noise: Vec<_> = (0..128 * 128)
-        .map(|_| {
-            // Red up and green down by the same luminance.
-            let red = 40.0 * normal(&mut state);
-            opponent([red, -red * 0.2126 / 0.7152, 0.0])
-        })
-        .collect();
+    let noise: Vec<_> = (0..128 * 128).map(|_| opponent(red_for_green(40.0 * normal(&mut state)))).collect();
     let plane = |value: fn(&crate::opponent::Opponent) -> f32| {
         Plane::from_values(128, 128, noise.iter().map(value).collect()).unwrap()
     };

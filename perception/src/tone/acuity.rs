@@ -49,8 +49,7 @@ impl AcuityFilter {
     /// One channel through the filter.
     #[must_use]
     pub fn blur_plane(&self, plane: &Plane) -> Plane {
-        let PixelDensity { horizontal, vertical } = self.pixel_density;
-        sampled_gaussian_blur_xy(plane, self.sigma_deg * horizontal, self.sigma_deg * vertical)
+        sampled_gaussian_blur_xy(plane, self.pixel_density.pixels(self.sigma_deg))
     }
 
     /// A picture `width` pixels wide through the filter; pixels that are not finite count as black.

@@ -13,7 +13,7 @@ use super::words::Shown;
 use super::{FittedTone, ToneOperator};
 use crate::display::Viewing;
 use crate::photometry::luminance;
-use crate::primaries::{Matrix, Primaries, apply, inverse, product};
+use crate::primaries::{IDENTITY, Matrix, Primaries, apply, inverse, product};
 
 /// Film-like: colours move towards white as they brighten, over 16.5 stops, after the exposure of [`Constant`](super::Constant).
 ///
@@ -92,7 +92,6 @@ pub(super) struct FittedAgx {
 
 impl FittedAgx {
     fn new(relative_per_cd_m2: f64) -> Self {
-        const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let wide = Primaries::REC709.to(&Primaries::REC2020).unwrap_or(IDENTITY);
         let narrow = inverse(&wide).unwrap_or(IDENTITY);
         let outset = inverse(&OUTSET_INVERSE).unwrap_or(IDENTITY);

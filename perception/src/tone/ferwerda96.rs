@@ -67,6 +67,7 @@ mod tests {
     use super::*;
     use crate::display::Display;
     use crate::plane::Plane;
+    use crate::test_golden::check;
     use crate::tvi;
 
     fn law(adaptation: f64) -> DuplexLaw {
@@ -76,13 +77,8 @@ mod tests {
 
     #[test]
     fn golden_scales_and_weights() {
-        let cones = [(0.01, 15.976_803_8), (1.0, 7.891_475_377), (100.0, 0.555_481_690_6), (1000.0, 0.055_548_169_06)];
-        for (adaptation, expected) in cones {
-            assert!((law(adaptation).cone_scale / expected - 1.0).abs() < 1e-6, "{adaptation}");
-        }
-        for (adaptation, expected) in [(0.001, 1_678.200_86), (0.01, 564.282_264_3), (1.0, 7.667_781_849)] {
-            assert!((law(adaptation).rod_scale / expected - 1.0).abs() < 1e-6, "{adaptation}");
-        }
+        check("fpsg_mp_Lda50", 1e-6, |row| law(row[0]).cone_scale);
+        check("fpsg_ms_TpLda50_over_Ts", 1e-6, |row| law(row[0]).rod_scale);
         for (adaptation, expected) in [(0.01, 0.848_485), (0.1, 0.545_455), (1.0, 0.242_424), (5.0, 0.030_615)] {
             assert!((law(adaptation).rod_weight - expected).abs() < 1e-6, "{adaptation}");
         }

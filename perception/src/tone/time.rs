@@ -91,8 +91,8 @@ impl Kinetics {
         cones: ReceptorKinetics { neural_s: 0.080, pigment_s: 110.0, half_bleach_cd_m2: 2e6 },
         rods: ReceptorKinetics { neural_s: 0.150, pigment_s: 400.0, half_bleach_cd_m2: 0.04 },
     };
-    /// Durand and Dorsey 2000: neural time constants of about 0.1 s and 0.4 s. From memory of the paper, whose text could
-    /// not be had; the pigment is [`Kinetics::PATTANAIK_2000`]'s.
+    /// What stands in for Durand and Dorsey 2000, whose text could not be had: neural time constants of 0.1 s and 0.4 s, which no source
+    /// at hand confirms. The pigment is [`Kinetics::PATTANAIK_2000`]'s.
     pub const DURAND_DORSEY_2000: Self = Self {
         cones: ReceptorKinetics { neural_s: 0.1, ..Self::PATTANAIK_2000.cones },
         rods: ReceptorKinetics { neural_s: 0.4, ..Self::PATTANAIK_2000.rods },

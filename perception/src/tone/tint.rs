@@ -3,9 +3,11 @@
 use super::FittedTone;
 use super::guide::Pixel;
 use crate::opponent::opponent;
+use crate::photometry::REC709_WEIGHTS;
 
 /// Two tints without luminance: red for green, and blue for green.
-const TINTS: [[f32; 3]; 2] = [[1.0, -0.2126 / 0.7152, 0.0], [0.0, -0.0722 / 0.7152, 1.0]];
+const TINTS: [[f32; 3]; 2] =
+    [[1.0, -REC709_WEIGHTS[0] / REC709_WEIGHTS[1], 0.0], [0.0, -REC709_WEIGHTS[2] / REC709_WEIGHTS[1], 1.0]];
 /// Of the grey that is tinted.
 const STRENGTH: f32 = 0.02;
 

@@ -123,28 +123,14 @@ impl FittedTone for FittedTumblinRushmeier {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_golden::check;
 
     #[test]
     fn golden_values() {
-        for (adaptation, scene, expected) in [
-            (1.0, 0.1, 2.760_540_998),
-            (1.0, 1.0, 14.856_123_34),
-            (1.0, 5.0, 48.171_544_1),
-            (10.0, 1.0, 2.571_555_426),
-            (25.0, 25.0, 25.0),
-            (25.0, 125.0, 125.0),
-            (100.0, 100.0, 31.281_514_72),
-            (100.0, 500.0, 188.478_384_4),
-            (1000.0, 1000.0, 45.391_957_66),
-            (1000.0, 5000.0, 372.818_145_6),
-        ] {
-            let found = BrightnessMatch::between(adaptation, 25.0).display_cd_m2(scene);
-            assert!((found / expected - 1.0_f64).abs() < 1e-6, "{adaptation} {scene}: {found}");
-        }
-        for (adaptation, expected) in [(0.01, 0.345_932_392_7), (1000.0, 1.308_379_648), (10_000.0, 1.500_869_1)] {
-            let found = BrightnessMatch::between(adaptation, 25.0).exponent;
-            assert!((found / expected - 1.0_f64).abs() < 1e-6, "{adaptation}: {found}");
-        }
+        let before_25_cd_m2 = |row: &[f64]| BrightnessMatch::between(row[0], 25.0);
+        check("tr_Lda25", 1e-6, |row| before_25_cd_m2(row).display_cd_m2(row[1]));
+        check("tr_exponent_Lda25", 1e-6, |row| before_25_cd_m2(row).exponent);
+        check("lambert_cd_m2", 1e-6, |_| LAMBERT_CD_M2);
     }
 
     #[test]

@@ -6,6 +6,7 @@ use super::field::FrozenPlane;
 use super::guide::Pixel;
 use crate::display::PixelDensity;
 use crate::plane::Plane;
+use crate::table::Between;
 
 /// Share of what a place on the retina gets that comes from elsewhere in view (`pcond` of Radiance; Ward Larson,
 /// Rushmeier and Piatko 1997).
@@ -93,15 +94,10 @@ impl Veil {
         if !is_inside(pixel.x, width_px, columns) || !is_inside(pixel.y, height_px, rows) {
             return self.mean_cd_m2;
         }
-        let place = |index: usize, cell_px: f64, count: usize| {
-            let at = ((index as f64 + 0.5) / cell_px - 0.5).clamp(0.0, (count - 1) as f64);
-            (at as usize, (at as usize + 1).min(count - 1), at.fract() as f32)
-        };
-        let (left, right, x) = place(pixel.x, width_px, columns);
-        let (top, bottom, y) = place(pixel.y, height_px, rows);
-        let cell = |x, y| self.cells_cd_m2.at(Pixel { x, y }).map_or(self.mean_cd_m2, |light| light as f32);
-        let line = |row| cell(left, row) * (1.0 - x) + cell(right, row) * x;
-        line(top) * (1.0 - y) + line(bottom) * y
+        let place = |index: usize, cell_px: f64, count: usize| Between::of((index as f64 + 0.5) / cell_px - 0.5, count);
+        place(pixel.x, width_px, columns).bilinear(place(pixel.y, height_px, rows), |x, y| {
+            self.cells_cd_m2.at(Pixel { x, y }).map_or(self.mean_cd_m2, |light| light as f32)
+        })
     }
 
     /// The picture as it falls on the retina.

@@ -86,21 +86,12 @@ mod tests {
     use super::*;
     use crate::display::Display;
     use crate::plane::Plane;
+    use crate::test_golden::check;
 
     #[test]
     fn golden_scale_factors() {
-        for (scene, expected) in [
-            (0.01, 39.609_147_54),
-            (0.1, 26.525_836_53),
-            (1.0, 12.026_045_44),
-            (10.0, 3.280_847_339),
-            (50.0, 1.0),
-            (100.0, 0.567_197_577_4),
-            (1000.0, 0.073_293_226_57),
-            (1e4, 0.008_180_311),
-        ] {
-            assert!((scale_factor(scene, 50.0) / expected - 1.0).abs() < 1e-6, "{scene}");
-        }
+        check("ward94_m_Lda50", 1e-6, |row| scale_factor(row[0], 50.0));
+        assert!((scale_factor(1e4, 50.0) / 0.008_180_311 - 1.0).abs() < 1e-6);
     }
 
     #[test]

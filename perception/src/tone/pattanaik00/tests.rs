@@ -1,6 +1,7 @@
 use super::*;
 use crate::display::Display;
 use crate::plane::Plane;
+use crate::test_golden::check;
 
 fn close(found: f64, expected: f64, relative: f64) {
     assert!((found / expected - 1.0).abs() < relative, "{found} for {expected}");
@@ -18,24 +19,13 @@ fn fitted(adaptation: f64) -> FittedPattanaik00 {
 
 #[test]
 fn golden_half_saturations() {
-    let cones =
-        [(1e-4, 12.944_056_5), (0.01, 13.768_960_7), (1.0, 75.345_253_42), (25.0, 646.105_788_5), (1e4, 35_076.025_37)];
-    for (adaptation, expected) in cones {
-        close(sigma_cone(adaptation), expected, 1e-6);
-    }
-    for (adaptation, expected) in
-        [(1e-4, 0.004_540_703_145), (0.01, 0.213_156_265_1), (1.0, 9.894_452_191), (100.0, 459.259_920_9)]
-    {
-        close(sigma_rod(adaptation), expected, 1e-6);
-    }
+    check("ptyg_sigma_cone", 1e-6, |row| sigma_cone(row[0]));
+    check("ptyg_sigma_rod_paper", 1e-6, |row| sigma_rod(row[0]));
     close(sigma_cone(0.0), 12.92, 1e-3);
     assert!(sigma_rod(0.0).is_finite() && sigma_rod(0.0) > 0.0);
-    for (light, expected) in [(1.0, 0.999_999_5), (1e4, 0.995_024_875_6), (2e6, 0.5)] {
-        close(Kinetics::PATTANAIK_2000.cones.steady_pigment(light), expected, 1e-9);
-    }
-    for (light, expected) in [(0.01, 0.8), (0.04, 0.5), (25.0, 0.001_597_444_089)] {
-        close(Kinetics::PATTANAIK_2000.rods.steady_pigment(light), expected, 1e-9);
-    }
+    let Kinetics { cones, rods } = Kinetics::PATTANAIK_2000;
+    check("ptyg_bleach_cone", 1e-9, |row| cones.steady_pigment(row[0]));
+    check("ptyg_bleach_rod", 1e-9, |row| rods.steady_pigment(row[0]));
 }
 
 #[test]

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::super::words::Shown;
 use crate::display::Display;
+use crate::table::Between;
 use crate::tvi;
 
 /// What bounds the displayed contrast of a bin.
@@ -216,12 +217,10 @@ pub(super) struct Curve {
 
 impl Curve {
     fn display_cd_m2(&self, scene_cd_m2: f64) -> f64 {
-        let bins = self.cumulative.len().saturating_sub(1);
-        let place = ((scene_cd_m2.max(LEAST_CD_M2).ln() - self.least) / self.step).clamp(0.0, bins as f64);
-        let bin = (place as usize).min(bins.saturating_sub(1));
-        let share = |edge: usize| self.cumulative.get(edge).copied().unwrap_or(0.0);
-        let (low, high) = (share(bin), share((bin + 1).min(bins)));
-        (self.range_least + self.range * (low + (place - bin as f64) * (high - low))).exp()
+        let place = (scene_cd_m2.max(LEAST_CD_M2).ln() - self.least) / self.step;
+        let edges = Between::of(place, self.cumulative.len());
+        let [low, high] = [edges.below, edges.above].map(|edge| self.cumulative.get(edge).copied().unwrap_or(0.0));
+        (self.range_least + self.range * edges.value(low, high)).exp()
     }
 }
 
