@@ -157,6 +157,15 @@ fn check_made_vertices(path: &Path, vertices: usize) -> Result<(), LoadError> {
     ))
 }
 
+/// Refuses files that place meshes without end: few words can place a large group often.
+fn check_placed(path: &Path, meshes: usize) -> Result<(), LoadError> {
+    const MOST_MESHES: usize = 4_000_000;
+    if meshes <= MOST_MESHES {
+        return Ok(());
+    }
+    Err(LoadError::too_large(path, format_args!("more than {MOST_MESHES} placed meshes")))
+}
+
 fn stem_ends_with(path: &Path, extension: &str) -> bool {
     Path::new(path.file_stem().unwrap_or_default())
         .extension()

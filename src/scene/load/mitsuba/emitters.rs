@@ -155,7 +155,7 @@ impl Reader {
     }
 
     fn light_color(&mut self, emitter: &Element, name: &str) -> Result<Vec3, LoadError> {
-        let scale = if emitter.kind() == "envmap" { 1.0 } else { emitter.float_or("scale", 1.0)?.max(0.0) };
+        let scale = emitter.float_or("scale", 1.0)?.max(0.0);
         Ok(self.color(emitter, name, Meaning::Light)?.unwrap_or(Vec3::ONE) * scale)
     }
 
