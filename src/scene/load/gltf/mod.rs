@@ -338,6 +338,9 @@ impl<'a> Reader<'a> {
             return;
         }
         let strength = strength.max(Vec3::ZERO);
+        if light.range().is_some() && !matches!(light.kind(), Kind::Directional) {
+            self.builder.note("The range of lights is not rendered: they go on by the inverse square of the distance.");
+        }
         self.builder.lights.push(match light.kind() {
             Kind::Directional => {
                 Light::Directional { direction, irradiance: strength, angular_radius: 0.0, is_of_sky: false }
