@@ -6,6 +6,7 @@ mod write;
 
 use self::names::{frame_numbers, frames_since_last, targets};
 use self::write::write;
+use super::animate::parse_rate;
 use super::covered::Covered;
 use super::json::write_json;
 use super::numbers::{parse_positive, parse_stops, parse_unit};
@@ -55,7 +56,7 @@ pub(super) struct TonemapArguments {
     effects: Option<Vec<Effect>>,
 
     /// Frames a second of a sequence; numbers that are missing take their time [default: 24].
-    #[arg(long, value_name = "N", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Over time")]
+    #[arg(long, value_name = "N", value_parser = parse_rate, allow_negative_numbers = true, help_heading = "Over time")]
     fps: Option<f64>,
     /// What the eye is adapted to before the first frame; without it, to the first frame.
     #[arg(long, value_name = "CD_M2", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Over time")]
