@@ -15,7 +15,7 @@ mod png_file;
 pub mod rendered;
 mod srgb_codes;
 
-pub use beside::{abandon_unfinished, remove_leftovers, target_of, write_beside, write_beside_by_name};
+pub use beside::{abandon_unfinished, hidden_name, remove_leftovers, target_of, write_beside, write_beside_by_name};
 pub use exr_file::write_exr;
 pub use frame_rate::FRAMES_PER_SECOND;
 pub(crate) use frame_rate::fraction;
