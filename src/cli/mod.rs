@@ -71,7 +71,7 @@ enum Command {
     Farm(Box<farm::FarmArguments>),
     /// Say what is in a picture's or film's file.
     Info {
-        /// EXR, PNG or HDR file, or a film kept by render --checkpoint.
+        /// EXR, PNG, HDR or JPEG file, or a film kept by render --checkpoint.
         file: PathBuf,
     },
 }
