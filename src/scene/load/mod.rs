@@ -48,6 +48,7 @@ mod texture_memory;
 mod toml;
 mod validate;
 
+pub use builder::NO_CAMERA;
 pub use default_view::{Bounds, bounds, framed};
 pub use error::{LoadError, Place};
 pub use files::{count_as_read, was_read};
@@ -186,7 +187,7 @@ fn load_ply(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
 
 /// Luminance of linear Rec.709 RGB relative to RGB (1, 1, 1).
 fn luminance(color: glam::Vec3) -> f32 {
-    color.dot(glam::Vec3::new(0.2126, 0.7152, 0.0722))
+    fechner_perception::photometry::luminance(color.to_array())
 }
 
 /// A number that ends at 0 and 1. A picture times its factor ends there once both are multiplied, so that its factor may be any.
