@@ -26,6 +26,7 @@ mod signals;
 mod staging;
 mod targets;
 mod tev;
+mod threads;
 mod threshold;
 mod tonemap;
 mod view;

@@ -11,7 +11,7 @@ use super::covered::Covered;
 use super::json::write_json;
 use super::numbers::{parse_positive, parse_stops, parse_unit};
 use super::picture::InputPicture;
-use super::seeing::{self, DEFAULT_DISPLAY, operator_values_or_all};
+use super::seeing::{self, DEFAULT_DISPLAY, display_help, operator_values_or_all};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use fechner::output::{self, Format, PartOf, Shown};
@@ -43,9 +43,9 @@ pub(super) struct TonemapArguments {
     /// Luminance in cd/m² of RGB (1, 1, 1), for files that do not say it.
     #[arg(long, value_name = "CD_M2", value_parser = parse_unit, allow_negative_numbers = true)]
     nits_per_unit: Option<f64>,
-    /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file [default: desktop; without
-    /// --operator the one that the picture was made for].
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, value_name = "NAME|FILE", help = display_help(
+        "desktop; without --operator the one that the picture was made for",
+    ))]
     display: Option<String>,
     /// What the eye is adapted to: the view as a whole, or, for the operators that know it, each place of it.
     #[arg(long, value_enum, default_value = "world")]
