@@ -3,6 +3,9 @@
 /// A 3×3 matrix, row by row.
 pub type Matrix = [[f64; 3]; 3];
 
+/// Leaves colours as they are.
+pub const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
 /// CIE 1931 chromaticities of an additive colour space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Primaries {

@@ -3,7 +3,7 @@
 use super::srgb_codes::SrgbCodes;
 use super::{OutputError, beside::write_beside, check_size};
 use fechner_perception::display::{Display, Eotf};
-use fechner_perception::primaries::{Matrix, Primaries, apply};
+use fechner_perception::primaries::{IDENTITY, Primaries, apply};
 use fechner_perception::tone::gamut;
 use rayon::prelude::*;
 use std::io::{BufWriter, Write};
@@ -32,11 +32,6 @@ const CICP_BT2020_PQ: [u8; 4] = [9, 16, 0, 1];
 
 /// Transfer of sRGB (IEC 61966-2-1) in the same tables.
 const SRGB_TRANSFER: u8 = 13;
-
-/// Luminance of the highest PQ code.
-const PEAK_CD_M2: f64 = 10_000.0;
-/// Of primaries that cannot be brought into others, which ours can.
-const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// Writes what the display emits as a 16-bit PNG in PQ code values and Rec.2020 primaries, with the cICP chunk (PNG, third
 /// edition) that says so.
@@ -100,12 +95,9 @@ fn tag_as_srgb<W: Write>(encoder: &mut png::Encoder<'_, W>) {
     encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
     // For readers that know only these; the values are those that the format's standard names beside sRGB.
     encoder.set_source_gamma(png::ScaledFloat::from_scaled(45_455));
-    encoder.set_source_chromaticities(png::SourceChromaticities::new(
-        (0.3127, 0.3290),
-        (0.64, 0.33),
-        (0.30, 0.60),
-        (0.15, 0.06),
-    ));
+    let Primaries { red, green, blue, white } = Primaries::REC709;
+    let [red, green, blue, white] = [red, green, blue, white].map(|[x, y]| (x as f32, y as f32));
+    encoder.set_source_chromaticities(png::SourceChromaticities::new(white, red, green, blue));
 }
 
 /// The bytes of [`write_pq_png`]: big-endian, RGB after RGB.
@@ -115,7 +107,7 @@ fn encode_pq16(rgb_linear_display: &[[f32; 3]], display: &Display) -> Vec<u8> {
     bytes.par_chunks_mut(6).zip(rgb_linear_display).with_min_len(4096).for_each(|(bytes, rgb)| {
         let shown = apply(&wide, rgb.map(|c| if c.is_nan() { 0.0 } else { f64::from(c) }));
         for (bytes, relative) in bytes.chunks_exact_mut(2).zip(shown) {
-            let code = Eotf::Pq.encode(display.emitted_cd_m2(relative) / PEAK_CD_M2, PEAK_CD_M2);
+            let code = Eotf::pq_code(display.emitted_cd_m2(relative));
             bytes.copy_from_slice(&((code * 65_535.0).round() as u16).to_be_bytes());
         }
     });
@@ -127,7 +119,7 @@ fn encode_pq16(rgb_linear_display: &[[f32; 3]], display: &Display) -> Vec<u8> {
 /// it has.
 pub fn decode_pq(codes: &[[f32; 3]], primaries: &Primaries, display: &Display) -> Vec<[f32; 3]> {
     let narrow = primaries.to(&Primaries::REC709).unwrap_or(IDENTITY);
-    let relative = |code: f32| display.relative_of_emitted(Eotf::Pq.decode(f64::from(code), PEAK_CD_M2) * PEAK_CD_M2);
+    let relative = |code: f32| display.relative_of_emitted(Eotf::pq_cd_m2(f64::from(code)));
     let shown = |codes: &[f32; 3]| {
         let clipped = codes.map(|code| relative(code).clamp(0.0, 1.0));
         gamut::fit_into_display(apply(&narrow, clipped).map(|light| light as f32))
@@ -367,6 +359,7 @@ fn dither(x: u32, y: u32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use fechner_perception::eotf::srgb_to_linear;
 
     fn chunk_names(bytes: &[u8]) -> Vec<String> {
         let mut names = Vec::new();
@@ -420,7 +413,7 @@ mod tests {
     #[test]
     fn pq_colours_outside_rec_709_keep_their_luminance() {
         let display = Display::preset("hdr-1000").unwrap();
-        let code = |cd_m2: f64| Eotf::Pq.encode(cd_m2 / PEAK_CD_M2, PEAK_CD_M2) as f32;
+        let code = |cd_m2: f64| Eotf::pq_code(cd_m2) as f32;
         let weights = Primaries::REC2020.to_xyz().unwrap()[1];
         for rgb in [[0.0, 300.0, 0.0], [900.0, 0.0, 20.0], [0.0, 0.0, 1000.0], [4000.0, 50.0, 0.0]] {
             let shown = decode_pq(&[rgb.map(code)], &Primaries::REC2020, &display)[0];
@@ -549,8 +542,7 @@ mod tests {
         let (width, height) = (128, 128);
         for step in [10.25_f32, 100.5, 200.8] {
             let code = step / 255.0;
-            let linear = if code <= 0.040_45 { code / 12.92 } else { ((code + 0.055) / 1.055).powf(2.4) };
-            let bytes = encode_srgb8(width, &vec![[linear; 3]; (width * height) as usize]);
+            let bytes = encode_srgb8(width, &vec![[srgb_to_linear(code); 3]; (width * height) as usize]);
             assert!(bytes.chunks(3).all(|p| p[0] == p[1] && p[1] == p[2]));
             let mean = bytes.iter().map(|&b| f64::from(b)).sum::<f64>() / bytes.len() as f64;
             // 16384 draws of a step with a spread of at most 0.5: 4 sigma is 0.016.
