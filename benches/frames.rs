@@ -6,7 +6,7 @@
 
 use anyhow::{Context, Result};
 use fechner::output::encode_srgb8;
-use fechner::scene::texture::{srgb_from_linear, srgb_to_linear};
+use fechner_perception::eotf::{srgb_from_linear, srgb_to_linear};
 use image::{ExtendedColorType, ImageEncoder, RgbImage};
 use std::time::Instant;
 

@@ -19,6 +19,16 @@ pub enum Eotf {
 /// The luminance of a PQ code of 1, cd/m² (SMPTE ST 2084).
 pub const PQ_PEAK_CD_M2: f64 = 10_000.0;
 
+/// Slope of the sRGB curve near black, where it is straight (IEC 61966-2-1).
+pub const SRGB_SLOPE: f64 = 12.92;
+/// Where that part ends, in linear light and in codes.
+const SRGB_STRAIGHT_LIGHT: f64 = 0.003_130_8;
+const SRGB_STRAIGHT_CODE: f64 = 0.040_45;
+/// The rest is a power of linear light, scaled and lowered.
+const SRGB_SCALE: f64 = 1.055;
+const SRGB_LOWERED_BY: f64 = 0.055;
+const SRGB_ROOT: f64 = 2.4;
+
 const PQ_M1: f64 = 2610.0 / 16_384.0;
 const PQ_M2: f64 = 2523.0 / 4096.0 * 128.0;
 const PQ_C1: f64 = 3424.0 / 4096.0;
@@ -36,8 +46,8 @@ impl Eotf {
         let light = if relative.is_nan() { 0.0 } else { relative.clamp(0.0, 1.0) };
         let code = match self {
             Self::Linear => light,
-            Self::Srgb if light <= 0.003_130_8 => 12.92 * light,
-            Self::Srgb => 1.055 * light.powf(1.0 / 2.4) - 0.055,
+            Self::Srgb if light <= SRGB_STRAIGHT_LIGHT => SRGB_SLOPE * light,
+            Self::Srgb => SRGB_SCALE * light.powf(1.0 / SRGB_ROOT) - SRGB_LOWERED_BY,
             Self::Bt1886 => light.powf(1.0 / 2.4),
             Self::Pq => {
                 let power = (light * white_cd_m2 / PQ_PEAK_CD_M2).clamp(0.0, 1.0).powf(PQ_M1);
@@ -47,14 +57,26 @@ impl Eotf {
         code.clamp(0.0, 1.0)
     }
 
+    /// The PQ code of a luminance, whatever the display.
+    #[must_use]
+    pub fn pq_code(cd_m2: f64) -> f64 {
+        Self::Pq.encode(cd_m2 / PQ_PEAK_CD_M2, PQ_PEAK_CD_M2)
+    }
+
+    /// The luminance in cd/m² of a PQ code: the inverse of [`Eotf::pq_code`].
+    #[must_use]
+    pub fn pq_cd_m2(code: f64) -> f64 {
+        Self::Pq.decode(code, PQ_PEAK_CD_M2) * PQ_PEAK_CD_M2
+    }
+
     /// Linear light (1 = display white) of a code value (clamped to 0..1): the inverse of [`Eotf::encode`].
     #[must_use]
     pub fn decode(self, code: f64, white_cd_m2: f64) -> f64 {
         let code = if code.is_nan() { 0.0 } else { code.clamp(0.0, 1.0) };
         match self {
             Self::Linear => code,
-            Self::Srgb if code <= 0.040_45 => code / 12.92,
-            Self::Srgb => ((code + 0.055) / 1.055).powf(2.4),
+            Self::Srgb if code <= SRGB_STRAIGHT_CODE => code / SRGB_SLOPE,
+            Self::Srgb => ((code + SRGB_LOWERED_BY) / SRGB_SCALE).powf(SRGB_ROOT),
             Self::Bt1886 => code.powf(2.4),
             Self::Pq => {
                 let power = code.powf(1.0 / PQ_M2);
@@ -62,6 +84,29 @@ impl Eotf {
                 (light * PQ_PEAK_CD_M2 / white_cd_m2.max(f64::MIN_POSITIVE)).min(1.0)
             }
         }
+    }
+}
+
+/// Linear value of a colour value in [0, 1] under the sRGB curve: [`Eotf::Srgb`] in single precision.
+#[must_use]
+pub fn srgb_to_linear(code: f32) -> f32 {
+    if code <= SRGB_STRAIGHT_CODE as f32 {
+        code / SRGB_SLOPE as f32
+    } else {
+        ((code + SRGB_LOWERED_BY as f32) / SRGB_SCALE as f32).powf(SRGB_ROOT as f32)
+    }
+}
+
+/// The sRGB curve of a linear value clamped to [0, 1]: [`Eotf::Srgb`] in single precision. NaN stays.
+#[must_use]
+pub fn srgb_from_linear(light: f32) -> f32 {
+    let light = light.clamp(0.0, 1.0);
+    if light >= 1.0 {
+        1.0 // the formula gives a little less, which dither would show as specks in a white area
+    } else if light > SRGB_STRAIGHT_LIGHT as f32 {
+        SRGB_SCALE as f32 * light.powf(1.0 / SRGB_ROOT as f32) - SRGB_LOWERED_BY as f32
+    } else {
+        SRGB_SLOPE as f32 * light
     }
 }
 

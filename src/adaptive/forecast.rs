@@ -2,7 +2,7 @@
 
 use super::judge::{Judgement, variance_share};
 use super::stop::TOLERATED_SHARE;
-use crate::film::Film;
+use crate::film::{Film, share_of_mean};
 use crate::integrator::SamplePlan;
 use crate::sampler::Half;
 use fechner_perception::Plane;
@@ -48,10 +48,7 @@ impl<'a> Forecast<'a> {
         for block in &plan.blocks {
             counts[block.pixel as usize][block.half.index()] += block.samples;
         }
-        let share = |pixel: usize| {
-            let inverse = |half: Half| 1.0 / f64::from(counts[pixel][half.index()].max(1));
-            0.25 * (inverse(Half::A) + inverse(Half::B))
-        };
+        let share = |pixel: usize| share_of_mean(counts[pixel]);
         let rough = self.judgement.rough_visibility_of(&variance(self.film, self.judgement, share));
         let above = rough.values().iter().zip(self.smear.values());
         let above = above.filter(|&(rough, smear)| f64::from(rough / smear) > AIM * visibility).count();

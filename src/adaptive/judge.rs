@@ -10,7 +10,7 @@ use super::denoised::{DenoisedPicture, TimedDenoising};
 use super::settings::LoopSettings;
 use super::statistics::by_channel;
 use crate::denoise::{Denoiser, OidnError};
-use crate::film::{CHANNELS, Estimate, Film};
+use crate::film::{CHANNELS, Estimate, Film, share_of_mean};
 use crate::sampler::Half;
 use fechner_perception::Plane;
 use fechner_perception::denoised::DenoisedError;
@@ -352,8 +352,7 @@ pub(crate) fn guide_rgb(film: &Film, estimate: &Estimate) -> Vec<[f32; 3]> {
 
 /// Variance of a pixel's mean over that of one sample, (1/n_A + 1/n_B) / 4.
 pub fn variance_share(film: &Film, pixel: usize) -> f64 {
-    let inverse = |half: Half| 1.0 / f64::from(film.half(half)[pixel].samples.max(1));
-    0.25 * (inverse(Half::A) + inverse(Half::B))
+    share_of_mean(Half::BOTH.map(|half| film.half(half)[pixel].samples))
 }
 
 /// The same of every pixel.

@@ -6,7 +6,7 @@
 use super::StopReason;
 use super::plan::cut_to_budget;
 use super::settings::RivalRule;
-use crate::film::{Film, HalfPixel, opponent};
+use crate::film::{Film, opponent, variance_of_mean};
 use crate::integrator::{BlockWork, SamplePlan};
 use crate::sampler::{Half, hash_words};
 use fechner_perception::Plane;
@@ -104,10 +104,11 @@ fn dilated(mask: &[bool], width: usize) -> Vec<bool> {
 /// Relative standard error of the pixel by its own samples.
 fn variance_active(film: &Film, threshold: f64, exposure: f64) -> Vec<bool> {
     let (a, b) = (film.half(Half::A), film.half(Half::B));
-    let variance_of_mean = |half: &HalfPixel| half.sample_variance(0) / f64::from(half.samples.max(1));
     (0..a.len())
         .map(|i| {
-            let standard_error = (0.25 * (variance_of_mean(&a[i]) + variance_of_mean(&b[i]))).sqrt();
+            let halves = [&a[i], &b[i]];
+            let variances = halves.map(|half| half.sample_variance(0));
+            let standard_error = variance_of_mean(variances, halves.map(|half| half.samples)).sqrt();
             let mean = 0.5 * (opponent(a[i].mean)[0] + opponent(b[i].mean)[0]);
             standard_error > threshold * mean.max(1e-3 / exposure)
         })

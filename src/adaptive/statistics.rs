@@ -7,7 +7,7 @@
 
 mod pooling;
 
-use crate::film::{CHANNELS, Film, HalfPixel, opponent};
+use crate::film::{CHANNELS, Film, HalfPixel, opponent, share_of_mean};
 use crate::sampler::Half;
 use fechner_perception::Plane;
 use pooling::{Pooled, pooled_by_neighbours};
@@ -181,8 +181,8 @@ pub fn find_outliers(film: &Film) -> Outliers {
         let means = [opponent(a.mean)[0], opponent(b.mean)[0]];
         energy += 0.5 * (means[0] + means[1]);
         let half_difference = 0.5 * (means[0] - means[1]).abs();
-        let inverse = |h: &HalfPixel| 1.0 / f64::from(h.samples.max(1));
-        let of_neighbours = f64::from(statistics.luminance().pooled.values()[i]) * 0.25 * (inverse(a) + inverse(b));
+        let per_sample = f64::from(statistics.luminance().pooled.values()[i]);
+        let of_neighbours = per_sample * share_of_mean([a.samples, b.samples]);
         if half_difference > STANDARD_ERRORS * of_neighbours.sqrt() && half_difference > 0.0 {
             pixels += 1;
             excess += half_difference;

@@ -23,7 +23,8 @@ impl FrameName {
     }
 
     /// The file of a frame.
-    pub fn of(&self, frame: u32) -> PathBuf {
+    pub fn of(&self, frame: impl Into<i64>) -> PathBuf {
+        let frame = frame.into();
         PathBuf::from(format!("{}{frame:0digits$}{}", self.before, self.after, digits = self.digits))
     }
 
@@ -78,6 +79,7 @@ mod tests {
     fn names_have_their_number() {
         let name = FrameName::parse("out/shot.####.exr").expect("a pattern");
         assert_eq!(name.of(7), Path::new("out/shot.0007.exr"));
+        assert_eq!(name.of(-1), Path::new("out/shot.-001.exr"));
         assert_eq!(name.of(123_456), Path::new("out/shot.123456.exr"));
         assert_eq!(name.of_shot("json"), Path::new("out/shot.json"));
         assert_eq!(FrameName::parse("##.png").expect("a pattern").of_shot("json"), Path::new("shot.json"));

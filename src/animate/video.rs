@@ -4,6 +4,7 @@
 //! three bytes a pixel and frame.
 
 use crate::output::fraction;
+use fechner_perception::photometry::luminance;
 use std::io::{self, Write};
 
 /// Writes frames of one size.
@@ -53,9 +54,9 @@ impl<W: Write> Y4mWriter<W> {
 
 /// ITU-R BT.709, limited range.
 fn ycbcr709(rgb: [u8; 3]) -> [u8; 3] {
-    let [r, g, b] = rgb.map(|value| f32::from(value) / 255.0);
-    let luma = 0.2126 * r + 0.7152 * g + 0.0722 * b;
-    let (blue, red) = ((b - luma) / 1.8556, (r - luma) / 1.5748);
+    let [red, green, blue] = rgb.map(|value| f32::from(value) / 255.0);
+    let luma = luminance([red, green, blue]);
+    let (blue, red) = ((blue - luma) / 1.8556, (red - luma) / 1.5748);
     [16.0 + 219.0 * luma, 128.0 + 224.0 * blue, 128.0 + 224.0 * red].map(|value| value.round().clamp(0.0, 255.0) as u8)
 }
 

@@ -63,6 +63,13 @@ pub struct Origin {
     pub tracing: Tracing,
 }
 
+impl Origin {
+    /// Pixels of the film; `None` where a file says that it has more than can be numbered.
+    pub fn pixels(&self) -> Option<u32> {
+        self.width.checked_mul(self.height)
+    }
+}
+
 /// Seeds of a film's samples.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Seeds {

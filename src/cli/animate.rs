@@ -14,9 +14,9 @@ use super::console::duration_in_words;
 use super::denoise::DenoiseChoice;
 use super::job::{Quality, Size, parse_size};
 use super::numbers::{parse_positive, parse_seconds, parse_seed, parse_stops, parse_unit, whole};
-use super::seeing::{AskedPresentation, operator_values};
-use super::signals;
-use anyhow::{Context, Result};
+use super::seeing::{AskedPresentation, display_help, operator_values};
+use super::{signals, threads};
+use anyhow::Result;
 use clap::{Args, ValueEnum};
 use fechner::adaptive::settings::DEFAULT_MAX_SAMPLES;
 use frames::{Frames, parse_frames};
@@ -78,9 +78,7 @@ pub(super) struct AnimateArguments {
     /// Frames may be paused and looked at: each is held to what a still is.
     #[arg(long, help_heading = "Seeing")]
     pausable: bool,
-    /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file
-    /// [default: the scene's, else desktop].
-    #[arg(long, value_name = "NAME|FILE", help_heading = "Seeing")]
+    #[arg(long, value_name = "NAME|FILE", help = display_help("the scene's, else desktop"), help_heading = "Seeing")]
     display: Option<String>,
     /// Luminance in cd/m² of RGB (1, 1, 1), in place of the scene's.
     #[arg(long, value_name = "CD_M2", value_parser = parse_unit, allow_negative_numbers = true, help_heading = "Seeing")]
@@ -159,11 +157,7 @@ enum AovNames {
 
 /// Renders what is not there yet, and writes it.
 pub(super) fn run(arguments: &AnimateArguments) -> Result<()> {
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(arguments.threads.unwrap_or(0) as usize)
-        .thread_name(|i| format!("render-{i}"))
-        .build()
-        .context("the threads could not be started")?;
+    let pool = threads::pool(arguments.threads, "render")?;
     // Frames are written whole or not at all, so that there is nothing to wait for.
     signals::listen(|| {
         say!("stopped by a signal: finished frames are there, and the same command makes the others");

@@ -4,7 +4,8 @@
 use super::targets::location;
 use anyhow::{Context, Result, bail};
 use fechner::lock::{Lock, try_lock};
-use std::ffi::{OsStr, OsString};
+use fechner::output::hidden_name;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 /// Held until it is dropped or the process ends, however it ends.
@@ -47,10 +48,7 @@ impl Drop for Claim {
 
 fn lock_beside(film: &Path) -> PathBuf {
     let film = location(film);
-    let mut name = OsString::from(".");
-    name.push(film.file_name().unwrap_or(OsStr::new("film")));
-    name.push(".lock");
-    film.with_file_name(name)
+    film.with_file_name(hidden_name(film.file_name().unwrap_or(OsStr::new("film")), ".lock"))
 }
 
 #[cfg(test)]
@@ -67,6 +65,7 @@ mod tests {
         assert!(Claim::on(&folder.path().join("b.film")).is_ok());
         drop(claim);
         assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 0, "nothing is left");
+        assert!(Claim::on(&folder.path().join("a".repeat(255))).is_ok(), "the longest name");
         // As a killed process leaves it.
         std::fs::write(lock_beside(&film), "1").expect("written");
         assert!(Claim::on(&film).is_ok());

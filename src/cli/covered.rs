@@ -5,7 +5,7 @@
 //! since the soft edge of a lamp is no flame. Of light beyond that what covers the pixel sends white, channel by channel; the rest is in front
 //! of it, and adds what it adds before black.
 
-use fechner::output::rendered::light_of_what_covers;
+use fechner::output::rendered::divided_by_alpha;
 use fechner_perception::tone::{FittedTone, Pixel};
 
 /// Brings scene light, cd/m², of a picture this wide to linear display RGB.
@@ -42,7 +42,7 @@ impl<'a> Covered<'a> {
         rgb_cd_m2: &[[f32; 3]],
         alpha: &'a [f32],
     ) -> Self {
-        let straight = map(fitted, width, &light_of_what_covers(rgb_cd_m2, alpha));
+        let straight = map(fitted, width, &divided_by_alpha(rgb_cd_m2, alpha));
         let beyond = beyond(fitted, map, width, rgb_cd_m2, alpha, &straight);
         Self { straight, alpha, beyond }
     }
@@ -107,7 +107,7 @@ fn beyond(
     if pixels.is_empty() {
         return Vec::new();
     }
-    let covering = map(fitted, width, &light_of_what_covers(&covering_cd_m2, alpha));
+    let covering = map(fitted, width, &divided_by_alpha(&covering_cd_m2, alpha));
     let (all, covered) = (map(fitted, width, rgb_cd_m2), map(fitted, width, &covering_cd_m2));
     let light = |i: usize| {
         let in_front = |c: usize| (all[i][c] - covered[i][c]).max(0.0);
@@ -234,7 +234,7 @@ mod tests {
             };
             for (rgb, alpha) in [(of(straight, alpha), alpha), (of([10.0; 8], hair), hair)] {
                 let covered = Covered::of(fitted.as_ref(), map_picture, 8, &rgb, &alpha);
-                let before = map_picture(fitted.as_ref(), 8, &light_of_what_covers(&rgb, &alpha));
+                let before = map_picture(fitted.as_ref(), 8, &divided_by_alpha(&rgb, &alpha));
                 assert!(!covered.has_light_in_front(), "{name}: {:?}", covered.beyond);
                 assert_eq!(covered.straight(), (before, alpha.to_vec()), "{name}");
             }

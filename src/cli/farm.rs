@@ -9,8 +9,8 @@ mod status;
 mod unit;
 mod work;
 
-use super::CALL_AGAIN;
 use super::numbers::whole;
+use super::{CALL_AGAIN, threads};
 use anyhow::{Context, Result};
 use clap::{Args, Subcommand};
 use fechner::farm::Farm;
@@ -53,11 +53,7 @@ struct Threads {
 
 impl Threads {
     fn pool(&self) -> Result<rayon::ThreadPool> {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(self.threads.unwrap_or(0) as usize)
-            .thread_name(|i| format!("farm-{i}"))
-            .build()
-            .context("the threads could not be started")
+        threads::pool(self.threads, "farm")
     }
 }
 

@@ -14,9 +14,10 @@ use super::importance;
 use super::numbers::{
     parse_finite, parse_positive, parse_radiance, parse_seconds, parse_seed, parse_stops, parse_unit, whole,
 };
-use super::seeing::{model_values, operator_values};
+use super::seeing::{display_help, model_values, operator_values};
 use super::targets::{Named, display_file};
-use anyhow::{Context, bail};
+use super::threads;
+use anyhow::bail;
 use choices::{AllocationChoice, FilterChoice, PruneChoice, SamplingChoice, SequenceChoice, check_crop, parse_crop};
 use clap::Args;
 use fechner::adaptive::glimpse::steady_glimpse;
@@ -103,9 +104,7 @@ pub(super) struct JobArguments {
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = parse_seed, allow_negative_numbers = true, help_heading = "Sampling")]
     seed: u64,
 
-    /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file
-    /// [default: the scene's, else desktop].
-    #[arg(long, value_name = "NAME|FILE", help_heading = "Seeing")]
+    #[arg(long, value_name = "NAME|FILE", help = display_help("the scene's, else desktop"), help_heading = "Seeing")]
     display: Option<String>,
     /// Threshold model that drives the sampling; csf-unmasked and tvi-masked show what a part of csf-bands is worth. Only
     /// csf-bands can judge denoised pictures.
@@ -189,11 +188,7 @@ impl JobArguments {
 
     /// Threads of the render's own.
     pub(super) fn thread_pool(&self) -> anyhow::Result<rayon::ThreadPool> {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(self.threads.unwrap_or(0) as usize)
-            .thread_name(|i| format!("render-{i}"))
-            .build()
-            .context("the threads could not be started")
+        threads::pool(self.threads, "render")
     }
 
     /// The scene as it is so many seconds after the time that is asked for.

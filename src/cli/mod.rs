@@ -26,6 +26,7 @@ mod signals;
 mod staging;
 mod targets;
 mod tev;
+mod threads;
 mod threshold;
 mod tonemap;
 mod view;
@@ -71,7 +72,7 @@ enum Command {
     Farm(Box<farm::FarmArguments>),
     /// Say what is in a picture's or film's file.
     Info {
-        /// EXR, PNG or HDR file, or a film kept by render --checkpoint.
+        /// EXR, PNG, HDR or JPEG file, or a film kept by render --checkpoint.
         file: PathBuf,
     },
 }

@@ -12,6 +12,7 @@ use fechner::adaptive::statistics::find_outliers;
 use fechner::adaptive::{Rendered, StopReason, visible_share};
 use fechner::output::{self, Attribute};
 use fechner_perception::Plane;
+use fechner_perception::csf;
 use fechner_perception::display::{Display, Viewing};
 use fechner_perception::model;
 use fechner_perception::psychometric::detection_probability;
@@ -179,7 +180,7 @@ impl Report {
             seeds: seeds.to_vec(),
             sampling: sampling_name(settings.sampling),
             model: settings.model.as_ref().map_or(model::DEFAULT, |model| model.name()),
-            csf: if settings.frames.is_some() { "castle-fresh-noise" } else { "castle" },
+            csf: if settings.frames.is_some() { "castle-fresh-noise" } else { csf::DEFAULT },
             operator: judgement.tone.describe(),
             nits_per_unit: settings.nits_per_unit,
             observer: ObserverReport::of(&settings.viewing),

@@ -52,12 +52,12 @@ impl<'a> AskedPresentation<'a> {
 /// Display, observer and units, for commands that judge pictures.
 #[derive(Debug, Args)]
 pub(super) struct SeeingArguments {
-    /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file [default: the one that the
-    /// first picture whose file says so was made for; else hdr-1000, if one is in PQ; else desktop].
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, value_name = "NAME|FILE", help = display_help(
+        "the one that the first picture whose file says so was made for; else hdr-1000, if one is in PQ; else desktop",
+    ))]
     display: Option<String>,
     /// Contrast sensitivity function.
-    #[arg(long, value_name = "NAME", default_value = "castle", value_parser = PossibleValuesParser::new(csf::names()))]
+    #[arg(long, value_name = "NAME", default_value = csf::DEFAULT, value_parser = PossibleValuesParser::new(csf::names()))]
     pub(super) csf: String,
     /// Area in deg² over which the eye sums contrast [default: the display's, else 1].
     #[arg(long, value_name = "DEG2", value_parser = parse_positive, allow_negative_numbers = true)]
@@ -91,7 +91,7 @@ impl SeeingArguments {
     /// Says which of what was asked for the model does not look at.
     pub(super) fn note_what_is_idle(&self, model: &dyn ThresholdModel) {
         if !model.knows_csf() {
-            let is_asked = [("--csf", self.csf != "castle"), ("--csf-area", self.csf_area.is_some())];
+            let is_asked = [("--csf", self.csf != csf::DEFAULT), ("--csf-area", self.csf_area.is_some())];
             for (argument, _) in is_asked.iter().filter(|(_, is_asked)| *is_asked) {
                 say!("note: {argument} changes nothing: the model {} does not ask for it", model.name());
             }
@@ -130,6 +130,11 @@ pub(super) fn viewing_on(display: Display, csf_area_deg2: Option<f64>) -> Result
     }
     viewing.check().context("--display and --csf-area")?;
     Ok(viewing)
+}
+
+/// What `--display` takes, for help.
+pub(super) fn display_help(default: &str) -> String {
+    format!("Display: a preset ({}) or a TOML file [default: {default}]", Display::preset_names().join(", "))
 }
 
 fn find_display(name: &str) -> Result<Display> {

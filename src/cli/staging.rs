@@ -6,7 +6,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use fechner::scene::load::environment;
 use fechner::scene::load::sky::{self, Sky};
-use fechner::scene::load::{LoadOptions, megabytes};
+use fechner::scene::load::{LoadOptions, NO_CAMERA, megabytes};
 use fechner::scene::{Camera, Environment, FilmDefaults, Projection, Scene};
 use glam::Vec3;
 use std::path::PathBuf;
@@ -148,7 +148,7 @@ impl Staging {
                 bail!("--look-at: the points must be finite");
             }
             scene.camera = look.camera(&scene.camera, forward);
-            scene.notes.retain(|note| !note.starts_with("No camera in the file"));
+            scene.notes.retain(|note| note != NO_CAMERA);
         }
         Ok(())
     }

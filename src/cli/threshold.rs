@@ -18,7 +18,7 @@ use fechner_perception::model::{self, ModelInputs, ThresholdModel};
 use fechner_perception::motion::image_velocity_deg_s;
 use fechner_perception::photometry::luminance;
 use fechner_perception::saliency::saliency_of_displayed;
-use fechner_perception::tone::acuity::{AcuityFilter, BehindAcuity};
+use fechner_perception::tone::acuity::BehindAcuity;
 use fechner_perception::tone::{FittedTone, map_picture, map_pixels};
 use fechner_perception::{ContrastSensitivity, GuideNoise, Plane, ThresholdInputs, Viewing, csf, threshold_map};
 use std::path::{Path, PathBuf};
@@ -64,6 +64,21 @@ pub(super) struct ThresholdArguments {
 
 /// Writes the maps.
 pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
+    check_targets(arguments)?;
+    let asked = Asked::read(arguments)?;
+    let found = asked.judge()?;
+    output::write_exr(&arguments.output, &asked.picture_of(&found))?;
+    answer!(
+        "median threshold {:.3} cd/m² of standard error at visibility 1 (model-predicted; calibrated on gratings, not on renderings)",
+        median(&found.threshold_cd_m2)
+    );
+    if let Some(visibility) = &found.visibility {
+        answer!("median visibility of the noise {:.2}", median(visibility));
+    }
+    Ok(())
+}
+
+fn check_targets(arguments: &ThresholdArguments) -> Result<()> {
     let halves = arguments.halves.iter().flatten().map(|half| ("a half", Some(half.as_path())));
     let others = [
         ("the picture", Some(arguments.input.as_path())),
@@ -74,97 +89,159 @@ pub(super) fn run(arguments: &ThresholdArguments) -> Result<()> {
     if output::check_target(&arguments.output)? != Format::Exr {
         bail!("{}: threshold maps are data; end the name in .exr", arguments.output.display());
     }
-    let guide = InputPicture::read(&arguments.input, arguments.seeing.nits_per_unit)?;
-    let halves = read_halves(arguments, &guide)?;
-    let names = std::iter::once(&arguments.input).chain(arguments.halves.iter().flatten());
-    let pictures = std::iter::once(&guide).chain(halves.iter().flatten());
-    let named: Vec<_> = names.map(PathBuf::as_path).zip(pictures).collect();
-    named.iter().for_each(|(path, picture)| picture.note_if_transparent(Source::single(path), BEFORE_BLACK));
-    arguments.seeing.note_what_is_ready(arguments.operator.as_deref(), &named);
-    let mut viewing = arguments.seeing.viewing(&named)?;
+    Ok(())
+}
+
+/// A picture, and who looks at it in which way.
+struct Asked {
+    guide: InputPicture,
+    halves: Option<[InputPicture; 2]>,
+    /// The display by its own pixels, for the file.
+    display: Option<(String, Attribute)>,
+    /// By the guide's pixels.
+    viewing: Viewing,
+    model: Box<dyn ThresholdModel>,
+    csf: BehindAcuity<Box<dyn ContrastSensitivity>>,
+    /// `None` where the guide is ready for the display.
+    fitted: Option<Box<dyn FittedTone>>,
+    motion: Option<Motion>,
+}
+
+/// What is seen of the noise in it.
+struct Found {
+    threshold_cd_m2: Plane,
+    adaptation_cd_m2: Plane,
+    /// Of the halves' noise.
+    visibility: Option<Plane>,
+}
+
+impl Asked {
+    fn read(arguments: &ThresholdArguments) -> Result<Self> {
+        let guide = InputPicture::read(&arguments.input, arguments.seeing.nits_per_unit)?;
+        let halves = read_halves(arguments, &guide)?;
+        let names = std::iter::once(&arguments.input).chain(arguments.halves.iter().flatten());
+        let pictures = std::iter::once(&guide).chain(halves.iter().flatten());
+        let named: Vec<_> = names.map(PathBuf::as_path).zip(pictures).collect();
+        named.iter().for_each(|(path, picture)| picture.note_if_transparent(Source::single(path), BEFORE_BLACK));
+        arguments.seeing.note_what_is_ready(arguments.operator.as_deref(), &named);
+        let velocity = arguments.velocity.as_deref();
+        let velocity = velocity
+            .map(|path| Ok::<_, anyhow::Error>((path, channels::read_motion(path, guide.size())?)))
+            .transpose()?;
+        let viewing = viewing(arguments, &named, velocity.as_ref().map(|(_, exr)| exr))?;
+        let display = output::display_attribute(&viewing.display);
+        let viewing = guide.viewed(&viewing).with_context(|| arguments.input.display().to_string())?;
+        let model = model::by_name(&arguments.model).with_context(|| {
+            format!("there is no threshold model \"{}\"; known: {}", arguments.model, model::names().join(", "))
+        })?;
+        arguments.seeing.note_what_is_idle(model.as_ref());
+        let fitted = shown_by(arguments.operator.as_deref(), &named, &viewing)?;
+        let acuity = fitted.as_ref().and_then(|fitted| fitted.acuity());
+        let csf = BehindAcuity { csf: csf::by_name(&arguments.seeing.csf, &viewing)?, acuity };
+        let motion = match &velocity {
+            None => None,
+            Some((path, exr)) => {
+                check_knows_motion(model.as_ref())?;
+                let motions = velocity_in(path, exr, viewing.display.frames_per_second)?;
+                Some(Motion::of(&motions, arguments.saliency, &guide, fitted.as_deref(), &viewing)?)
+            }
+        };
+        Ok(Self { guide, halves, display, viewing, model, csf, fitted, motion })
+    }
+
+    /// Noise goes through the loss of acuity that the operator shows, and so does what masks it: by the contrast sensitivity, so that
+    /// neither the guide nor the halves have it already, or, where the model asks for none, by the pictures.
+    fn mapping(&self) -> Mapping {
+        if self.model.knows_csf() { map_pixels } else { map_picture }
+    }
+
+    fn judge(&self) -> Result<Found> {
+        let shown = self.guide.displayed(self.fitted.as_deref(), &self.viewing, self.mapping());
+        let inputs = ModelInputs {
+            display_luminance_cd_m2: &shown,
+            guide_noise: GuideNoise::Clean,
+            image_velocity_deg_s: self.motion.as_ref().map(|motion| &motion.image_velocity_deg_s),
+            attention: self.motion.as_ref().and_then(|motion| motion.attention.as_ref()),
+            viewing: &self.viewing,
+            csf: &self.csf,
+        };
+        let map = threshold_map(&ThresholdInputs::clean(&shown), &self.viewing, &self.csf)?;
+        Ok(Found {
+            threshold_cd_m2: self.model.allowed_standard_error_cd_m2(&inputs)?,
+            adaptation_cd_m2: map.adaptation_cd_m2().clone(),
+            visibility: self.halves.as_ref().map(|halves| self.noise_visibility(halves, &inputs)).transpose()?,
+        })
+    }
+
+    /// How visible the noise of two halves is: by the model's own thresholds of luminance, and by those of colour where it is the default,
+    /// which is the only one that is made for them.
+    fn noise_visibility(&self, halves: &[InputPicture; 2], inputs: &ModelInputs<'_>) -> Result<Plane> {
+        let displayed =
+            |picture: &InputPicture| picture.displayed_rgb_by(self.fitted.as_deref(), &self.viewing, self.mapping());
+        let half_difference = half_difference(&halves.each_ref().map(displayed));
+        let shown = inputs.display_luminance_cd_m2;
+        let (width, height) = (shown.width(), shown.height());
+        let luminance = Plane::from_fn(width, height, |x, y| luminance(half_difference[y * width + x]));
+        let of_luminance = self.model.measured_visibility(inputs, &luminance)?;
+        if self.model.name() != model::DEFAULT {
+            return Ok(of_luminance);
+        }
+        let (size, guide) = ((width, height), displayed(&self.guide));
+        let of_colour = chromatic_visibility(&guide, &half_difference, size, &self.viewing, self.csf.acuity)?;
+        Ok(of_luminance.combined(&of_colour, f32::max))
+    }
+
+    fn picture_of<'a>(&self, found: &'a Found) -> Picture<'a> {
+        let (width, height) = self.guide.size();
+        let mut picture = Picture::new(width as u32, height as u32);
+        picture.push_f32("threshold.Y", found.threshold_cd_m2.values());
+        picture.push_f32("adaptation.Y", found.adaptation_cd_m2.values());
+        if let Some(visibility) = &found.visibility {
+            picture.push_f32("visibility.Y", visibility.values());
+        }
+        let text = |s: &str| Attribute::Text(s.to_owned());
+        picture.push_attribute("fechner.model", text(self.model.name()));
+        if self.model.knows_csf() {
+            picture.push_attribute("fechner.csf", text(self.csf.name()));
+        }
+        let display = &self.viewing.display;
+        picture.push_attribute("fechner.observer.display", text(&display.name));
+        picture.attributes.extend(self.display.clone());
+        let ppd = display.pixels_per_degree as f32;
+        picture.push_attribute("fechner.observer.pixels_per_degree", Attribute::Float(ppd));
+        if self.motion.is_some() {
+            let rate = display.frames_per_second as f32;
+            picture.push_attribute("fechner.observer.frames_per_second", Attribute::Float(rate));
+        }
+        picture.push_attribute(PIXEL_ASPECT_RATIO, Attribute::Float(self.guide.pixel_aspect_ratio() as f32));
+        picture
+    }
+}
+
+/// With the glare and the rate of frames that are asked for or recorded.
+fn viewing(
+    arguments: &ThresholdArguments,
+    named: &[(&Path, &InputPicture)],
+    velocity: Option<&ExrImage>,
+) -> Result<Viewing> {
+    let mut viewing = arguments.seeing.viewing(named)?;
     if let Some(age_years) = arguments.glare {
         viewing.observer.glare = Glare::Cie { age_years };
         viewing.check().context("--glare")?;
     }
-    let motion = arguments.velocity.as_deref();
-    let motion =
-        motion.map(|path| Ok::<_, anyhow::Error>((path, channels::read_motion(path, guide.size())?))).transpose()?;
-    let told = motion.as_ref().and_then(|(_, exr)| exr.frames_per_second());
-    if let Some(frames_per_second) = arguments.fps.or(told) {
-        viewing.display.frames_per_second = frames_per_second;
+    if let Some(rate) = arguments.fps.or(velocity.and_then(ExrImage::frames_per_second)) {
+        viewing.display.frames_per_second = rate;
     }
-    let made_for = output::display_attribute(&viewing.display);
-    let viewing = guide.viewed(&viewing).with_context(|| arguments.input.display().to_string())?;
-    let model = model::by_name(&arguments.model).with_context(|| {
-        format!("there is no threshold model \"{}\"; known: {}", arguments.model, model::names().join(", "))
-    })?;
-    arguments.seeing.note_what_is_idle(model.as_ref());
-    let fitted = shown_by(arguments.operator.as_deref(), &named, &viewing)?;
-    // Noise goes through the loss of acuity that the operator shows, and so does what masks it: by the contrast sensitivity, so that neither
-    // the guide nor the halves have it already, or, where the model asks for none, by the pictures.
-    let mapping: Mapping = if model.knows_csf() { map_pixels } else { map_picture };
-    let acuity = fitted.as_ref().and_then(|fitted| fitted.acuity());
-    let csf = BehindAcuity { csf: csf::by_name(&arguments.seeing.csf, &viewing)?, acuity };
-    let shown = guide.displayed(fitted.as_deref(), &viewing, mapping);
-    let motion = match &motion {
-        Some(_) if !model.knows_motion() => {
-            let knows = |name: &&&str| model::by_name(name).is_some_and(|model| model.knows_motion());
-            let known: Vec<&str> = model::names().iter().filter(knows).copied().collect();
-            bail!("--velocity: the model {} knows no motion; {} do", model.name(), known.join(", "))
-        }
-        Some((path, exr)) => {
-            let motions = velocity_in(path, exr, viewing.display.frames_per_second)?;
-            Some(Motion::of(&motions, arguments.saliency, &guide, fitted.as_deref(), &viewing)?)
-        }
-        None => None,
-    };
-    let inputs = ModelInputs {
-        display_luminance_cd_m2: &shown,
-        guide_noise: GuideNoise::Clean,
-        image_velocity_deg_s: motion.as_ref().map(|motion| &motion.image_velocity_deg_s),
-        attention: motion.as_ref().and_then(|motion| motion.attention.as_ref()),
-        viewing: &viewing,
-        csf: &csf,
-    };
-    let threshold = model.allowed_standard_error_cd_m2(&inputs)?;
-    let map = threshold_map(&ThresholdInputs::clean(&shown), &viewing, &csf)?;
-    let mut picture = Picture::new(shown.width() as u32, shown.height() as u32);
-    picture.push_f32("threshold.Y", threshold.values());
-    picture.push_f32("adaptation.Y", map.adaptation_cd_m2().values());
-    let visibility = match &halves {
-        Some(halves) => {
-            let difference = half_difference(halves, fitted.as_deref(), &viewing, mapping);
-            let guide = guide.displayed_rgb_by(fitted.as_deref(), &viewing, mapping);
-            Some(noise_visibility(model.as_ref(), &inputs, &guide, &difference, acuity)?)
-        }
-        None => None,
-    };
-    if let Some(visibility) = &visibility {
-        picture.push_f32("visibility.Y", visibility.values());
+    Ok(viewing)
+}
+
+fn check_knows_motion(model: &dyn ThresholdModel) -> Result<()> {
+    if model.knows_motion() {
+        return Ok(());
     }
-    let text = |s: &str| Attribute::Text(s.to_owned());
-    picture.push_attribute("fechner.model", text(model.name()));
-    if model.knows_csf() {
-        picture.push_attribute("fechner.csf", text(csf.name()));
-    }
-    picture.push_attribute("fechner.observer.display", text(&viewing.display.name));
-    picture.attributes.extend(made_for);
-    let ppd = viewing.display.pixels_per_degree as f32;
-    picture.push_attribute("fechner.observer.pixels_per_degree", Attribute::Float(ppd));
-    if motion.is_some() {
-        let rate = viewing.display.frames_per_second as f32;
-        picture.push_attribute("fechner.observer.frames_per_second", Attribute::Float(rate));
-    }
-    picture.push_attribute(PIXEL_ASPECT_RATIO, Attribute::Float(guide.pixel_aspect_ratio() as f32));
-    output::write_exr(&arguments.output, &picture)?;
-    answer!(
-        "median threshold {:.3} cd/m² of standard error at visibility 1 (model-predicted; calibrated on gratings, not on renderings)",
-        median(&threshold)
-    );
-    if let Some(visibility) = &visibility {
-        answer!("median visibility of the noise {:.2}", median(visibility));
-    }
-    Ok(())
+    let knows = |name: &&&str| model::by_name(name).is_some_and(|model| model.knows_motion());
+    let known: Vec<&str> = model::names().iter().filter(knows).copied().collect();
+    bail!("--velocity: the model {} knows no motion; {} do", model.name(), known.join(", "))
 }
 
 /// The two renders, of the guide's size.
@@ -185,35 +262,9 @@ fn read_halves(arguments: &ThresholdArguments, guide: &InputPicture) -> Result<O
     Ok(Some(halves))
 }
 
-/// (A − B)/2 as the display shows their colours, linear RGB in cd/m².
-fn half_difference(
-    halves: &[InputPicture; 2],
-    fitted: Option<&dyn FittedTone>,
-    viewing: &Viewing,
-    mapping: Mapping,
-) -> Vec<[f32; 3]> {
-    let [a, b] = halves.each_ref().map(|half| half.displayed_rgb_by(fitted, viewing, mapping));
-    a.iter().zip(&b).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] - b[c]))).collect()
-}
-
-/// How visible the noise of two halves is: by the model's own thresholds of luminance, and by those of colour where it is the default,
-/// which is the only one that is made for them. `guide_rgb` and `half_difference_rgb` are linear RGB of the display in cd/m².
-fn noise_visibility(
-    model: &dyn ThresholdModel,
-    inputs: &ModelInputs<'_>,
-    guide_rgb: &[[f32; 3]],
-    half_difference_rgb: &[[f32; 3]],
-    acuity: Option<AcuityFilter>,
-) -> Result<Plane> {
-    let shown = inputs.display_luminance_cd_m2;
-    let (width, height) = (shown.width(), shown.height());
-    let luminance = Plane::from_fn(width, height, |x, y| luminance(half_difference_rgb[y * width + x]));
-    let of_luminance = model.measured_visibility(inputs, &luminance)?;
-    if model.name() != model::DEFAULT {
-        return Ok(of_luminance);
-    }
-    let of_colour = chromatic_visibility(guide_rgb, half_difference_rgb, (width, height), inputs.viewing, acuity)?;
-    Ok(of_luminance.combined(&of_colour, f32::max))
+/// (A − B)/2 of what the display shows, linear RGB in cd/m².
+fn half_difference([a, b]: &[Vec<[f32; 3]>; 2]) -> Vec<[f32; 3]> {
+    a.iter().zip(b).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] - b[c]))).collect()
 }
 
 /// How what a picture shows moves.

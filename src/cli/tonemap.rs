@@ -6,11 +6,12 @@ mod write;
 
 use self::names::{frame_numbers, frames_since_last, targets};
 use self::write::write;
+use super::animate::parse_rate;
 use super::covered::Covered;
 use super::json::write_json;
 use super::numbers::{parse_positive, parse_stops, parse_unit};
 use super::picture::InputPicture;
-use super::seeing::{self, DEFAULT_DISPLAY, operator_values_or_all};
+use super::seeing::{self, DEFAULT_DISPLAY, display_help, operator_values_or_all};
 use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
 use fechner::output::{self, Format, PartOf, Shown};
@@ -42,9 +43,9 @@ pub(super) struct TonemapArguments {
     /// Luminance in cd/m² of RGB (1, 1, 1), for files that do not say it.
     #[arg(long, value_name = "CD_M2", value_parser = parse_unit, allow_negative_numbers = true)]
     nits_per_unit: Option<f64>,
-    /// Display: a preset (desktop, fullhd, laptop, uhd-tv, phone, cinema, hdr-1000, strict) or a TOML file [default: desktop; without
-    /// --operator the one that the picture was made for].
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, value_name = "NAME|FILE", help = display_help(
+        "desktop; without --operator the one that the picture was made for",
+    ))]
     display: Option<String>,
     /// What the eye is adapted to: the view as a whole, or, for the operators that know it, each place of it.
     #[arg(long, value_enum, default_value = "world")]
@@ -55,7 +56,7 @@ pub(super) struct TonemapArguments {
     effects: Option<Vec<Effect>>,
 
     /// Frames a second of a sequence; numbers that are missing take their time [default: 24].
-    #[arg(long, value_name = "N", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Over time")]
+    #[arg(long, value_name = "N", value_parser = parse_rate, allow_negative_numbers = true, help_heading = "Over time")]
     fps: Option<f64>,
     /// What the eye is adapted to before the first frame; without it, to the first frame.
     #[arg(long, value_name = "CD_M2", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Over time")]

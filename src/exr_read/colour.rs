@@ -3,6 +3,7 @@
 use super::attributes::{COLOR_INTEROP_ID, linear_primaries};
 use super::{ExrImage, Window};
 use crate::output::Attribute;
+use fechner_perception::photometry::REC709_WEIGHTS;
 use fechner_perception::primaries::{Primaries, apply};
 
 /// The picture that a file is meant to show.
@@ -100,7 +101,7 @@ fn all<T>([first, second, third]: [Option<T>; 3]) -> Option<[T; 3]> {
 
 /// RY = (R − Y) / Y and BY = (B − Y) / Y, with Y the luminance by the file's own primaries.
 fn from_chroma(luminance: &[f32], red: &[f32], blue: &[f32], primaries: &Primaries) -> Vec<[f32; 3]> {
-    let weights = primaries.to_xyz().map_or([0.2126, 0.7152, 0.0722], |matrix| matrix[1]);
+    let weights = primaries.to_xyz().map_or(REC709_WEIGHTS.map(f64::from), |matrix| matrix[1]);
     let [wr, wg, wb] = weights.map(|weight| weight as f32);
     let pixels = luminance.iter().zip(red.iter().zip(blue));
     pixels

@@ -125,6 +125,8 @@ impl Manifest {
             Some(format!("it was planned by {}, and this is {own}: finish it with that, or plan anew", self.program))
         } else if self.frames.is_empty() || !is_ascending {
             Some("its frames must ascend, and there must be one".to_owned())
+        } else if self.frames.iter().any(|entry| entry.origin.pixels().is_none()) {
+            Some("a film's width and height make more pixels than can be numbered".to_owned())
         } else if self.passes == 0 {
             Some("passes must be at least 1".to_owned())
         } else {

@@ -123,8 +123,8 @@ impl NamedOrder {
         if (order.farm, order.unit, order.frame, order.seed) != (farm.id(), unit, entry.frame, entry.seed) {
             return Err(UnitError::Different { path, problem: "it is the order of another unit or farm" });
         }
-        let pixels = entry.origin.width * entry.origin.height;
-        let is_sound = |block: &BlockWork| block.is_sound(pixels);
+        let pixels = entry.origin.pixels();
+        let is_sound = |block: &BlockWork| pixels.is_some_and(|pixels| block.is_sound(pixels));
         if !order.blocks.iter().all(is_sound) {
             return Err(ORDER.damaged(&path, "its blocks make no sense").into());
         }

@@ -1,6 +1,6 @@
 //! What the film says so far, in cd/m².
 
-use super::{Film, HalfPixel, opponent};
+use super::{Film, HalfPixel, opponent, variance_of_mean};
 use crate::sampler::Half;
 use fechner_perception::Plane;
 
@@ -51,16 +51,15 @@ impl Film {
         };
         let nits = nits_per_unit;
         let y = |half: &HalfPixel| opponent(half.mean)[0];
-        let variance_of_mean = |x: usize, y: usize| {
+        let variance = |x: usize, y: usize| {
             let pixel = y * width + x;
-            let [of_a, of_b] = self.sample_variances(pixel, 0);
-            let count = |half: &HalfPixel| f64::from(half.samples.max(1));
-            (0.25 * nits * nits * (of_a / count(&a[pixel]) + of_b / count(&b[pixel]))) as f32
+            let samples = [a[pixel].samples, b[pixel].samples];
+            (nits * nits * variance_of_mean(self.sample_variances(pixel, 0), samples)) as f32
         };
         Estimate {
             rgb_cd_m2: (0..a.len()).map(|pixel| self.rgb_cd_m2(pixel, nits)).collect(),
             luminance_cd_m2: plane(&|a, b| nits * average(y(a), y(b), a, b)),
-            variance_of_mean: Plane::from_fn(width, height, variance_of_mean),
+            variance_of_mean: Plane::from_fn(width, height, variance),
             half_difference: plane(&|a, b| 0.5 * nits * (y(a) - y(b))),
         }
     }

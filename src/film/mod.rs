@@ -41,6 +41,17 @@ pub fn opponent(rgb: [f64; 3]) -> [f64; CHANNELS] {
     OPPONENT_OF_RGB.map(|row| row[0] * rgb[0] + row[1] * rgb[1] + row[2] * rgb[2])
 }
 
+/// Variance of a pixel's mean by that of a sample in each half: the mean is the plain average of the halves'.
+pub fn variance_of_mean(of_sample: [f64; 2], samples: [u32; 2]) -> f64 {
+    let of_half = |half: usize| of_sample[half] / f64::from(samples[half].max(1));
+    0.25 * (of_half(0) + of_half(1))
+}
+
+/// Variance of a pixel's mean over that of one sample, (1/n_A + 1/n_B) / 4.
+pub fn share_of_mean(samples: [u32; 2]) -> f64 {
+    variance_of_mean([1.0; 2], samples)
+}
+
 /// A sum of squared deviations as the film keeps it: what is beyond f32 stays at its end, which is finite, and can be read again.
 fn kept_m2(m2: f64) -> f32 {
     m2.min(f64::from(f32::MAX)) as f32

@@ -123,23 +123,35 @@ const PART_LETTERS: usize = 6;
 
 /// Bytes of the longest name that file systems take.
 const LONGEST_NAME: usize = 255;
-/// Bytes of a name that the temporary one can hold beside its dots, letters and ending.
-const LONGEST_KEPT: usize = LONGEST_NAME - "..".len() - PART_LETTERS - PART_SUFFIX.len();
 
-/// How the names of new files begin that will be called `name`. Of one that is too long to be kept the end gives way to a hash of all of
-/// it: names of a sequence's frames differ in their ends.
+/// How the names of new files begin that will be called `name`.
 fn part_prefix(name: &OsStr) -> OsString {
-    let mut prefix = OsString::from(".");
-    if name.len() <= LONGEST_KEPT {
-        prefix.push(name);
+    let mut prefix = hidden_within(LONGEST_NAME - ".".len() - PART_LETTERS - PART_SUFFIX.len(), name);
+    prefix.push(".");
+    prefix
+}
+
+/// The name of a hidden file that stands beside the one called `name`.
+pub fn hidden_name(name: &OsStr, ending: &str) -> OsString {
+    let mut hidden = hidden_within(LONGEST_NAME - ending.len(), name);
+    hidden.push(ending);
+    hidden
+}
+
+/// A dot and a name, in no more than so many bytes. Of one that is too long the end gives way to a hash of all of it: names of a
+/// sequence's frames differ in their ends.
+fn hidden_within(most_bytes: usize, name: &OsStr) -> OsString {
+    let mut hidden = OsString::from(".");
+    let most_kept = most_bytes - hidden.len();
+    if name.len() <= most_kept {
+        hidden.push(name);
     } else {
         let hash = ContentHash::of_bytes(name.as_encoded_bytes()).to_string();
         let text = name.to_string_lossy();
-        prefix.push(&text[..text.floor_char_boundary(LONGEST_KEPT - hash.len())]);
-        prefix.push(hash);
+        hidden.push(&text[..text.floor_char_boundary(most_kept - hash.len())]);
+        hidden.push(hash);
     }
-    prefix.push(".");
-    prefix
+    hidden
 }
 
 /// Removes new files beside `path` that a killed program could not complete. Call it only where no other program can be

@@ -11,6 +11,7 @@ use ::exr::prelude::{
     AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds, Layer,
     LayerAttributes, LineOrder, Text, Vec2, WritableImage, f16,
 };
+use fechner_perception::primaries::Primaries;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
@@ -66,12 +67,9 @@ pub fn write_exr(path: &Path, picture: &Picture<'_>) -> Result<(), OutputError> 
         Encoding { compression: Compression::ZIP16, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
     let mut image_attributes = ImageAttributes::new(shown);
     image_attributes.pixel_aspect = pixel_aspect;
-    image_attributes.chromaticities = Some(Chromaticities {
-        red: Vec2(0.64, 0.33),
-        green: Vec2(0.30, 0.60),
-        blue: Vec2(0.15, 0.06),
-        white: Vec2(0.3127, 0.3290),
-    });
+    let Primaries { red, green, blue, white } = Primaries::REC709;
+    let [red, green, blue, white] = [red, green, blue, white].map(|[x, y]| Vec2(x as f32, y as f32));
+    image_attributes.chromaticities = Some(Chromaticities { red, green, blue, white });
     let image = Image::empty(image_attributes).with_layer(Layer::new(
         size,
         layer_attributes,

@@ -12,18 +12,20 @@ mod exr_header;
 pub mod false_colour;
 mod frame_rate;
 mod png_file;
+mod png_read;
 pub mod rendered;
 mod srgb_codes;
 
-pub use beside::{abandon_unfinished, remove_leftovers, target_of, write_beside, write_beside_by_name};
+pub use beside::{abandon_unfinished, hidden_name, remove_leftovers, target_of, write_beside, write_beside_by_name};
 pub use exr_file::write_exr;
 pub use frame_rate::FRAMES_PER_SECOND;
 pub(crate) use frame_rate::fraction;
-pub(crate) use png_file::{PROFILE_NOT_READ, names_srgb};
 pub use png_file::{
-    PngColour, PngTransfer, Shown, decode_pq, encode_srgb8, png_colour, png_pixel_aspect_ratio, write_codes_png,
-    write_png, write_png_for, write_png_with_alpha_for, write_pq_png, write_shown_png,
+    Shown, encode_srgb8, write_codes_png, write_png, write_png_for, write_png_with_alpha_for, write_pq_png,
+    write_shown_png,
 };
+pub(crate) use png_read::{PROFILE_NOT_READ, names_srgb};
+pub use png_read::{PngColour, PngTransfer, decode_pq, png_colour, png_pixel_aspect_ratio};
 
 use crate::integrator::{Crop, TraceSettings};
 use fechner_perception::Display;

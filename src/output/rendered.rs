@@ -39,7 +39,7 @@ pub fn write_display_png(
         }
         Background::Transparent => {
             let coverage = rendered.film.coverage();
-            let covering = light_of_what_covers(picture, &coverage);
+            let covering = divided_by_alpha(picture, &coverage);
             let shown = map_picture(judgement.tone.as_ref(), width as usize, &covering);
             write_png_with_alpha_for(path, width, height, &shown, &coverage, display)
         }
@@ -47,7 +47,7 @@ pub fn write_display_png(
 }
 
 /// Light of what covers each pixel, for a picture that is multiplied by its alpha: none where nothing does.
-pub fn light_of_what_covers(rgb: &[[f32; 3]], alpha: &[f32]) -> Vec<[f32; 3]> {
+pub fn divided_by_alpha(rgb: &[[f32; 3]], alpha: &[f32]) -> Vec<[f32; 3]> {
     let scale = |alpha: f32| if alpha > 0.0 { 1.0 / alpha } else { 0.0 };
     rgb.iter().zip(alpha).map(|(rgb, &alpha)| rgb.map(|value| value * scale(alpha))).collect()
 }

@@ -3,7 +3,7 @@
 //! Every frame of a preview and every PNG passes here. `powf` for each channel took as much of a frame as its JPEG (`cargo bench
 //! --bench frames`). Between 512 places an octave a line is off by at most 5e-5 of a step of 8 bits.
 
-use crate::scene::texture::srgb_from_linear;
+use fechner_perception::eotf::{SRGB_SLOPE, srgb_from_linear};
 use std::sync::LazyLock;
 
 /// Places of an octave, a power of two.
@@ -34,7 +34,7 @@ impl SrgbCodes {
     #[inline]
     pub(super) fn code(self, linear: f32, dither: f32) -> u8 {
         let steps = if linear < LOWEST {
-            255.0 * 12.92 * linear
+            255.0 * SRGB_SLOPE as f32 * linear
         } else if linear < 1.0 {
             let above = linear.to_bits() - LOWEST.to_bits();
             let place = (above >> REST_BITS) as usize;

@@ -1,25 +1,9 @@
 //! Looking up textures: wrapping, bilinear interpolation, the sRGB curve. Nothing here allocates.
 
 use super::{ColorInput, Encoding, ScalarInput, Texels, Texture, TextureLookup, Wrap};
+use fechner_perception::eotf::srgb_to_linear;
 use glam::{Vec2, Vec3, Vec4};
 use std::sync::LazyLock;
-
-/// Linear value of a colour value in [0, 1] under the sRGB curve (IEC 61966-2-1).
-pub fn srgb_to_linear(value: f32) -> f32 {
-    if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
-}
-
-/// The sRGB curve (IEC 61966-2-1) of a linear value clamped to [0, 1]; NaN stays.
-pub fn srgb_from_linear(value: f32) -> f32 {
-    let value = value.clamp(0.0, 1.0);
-    if value >= 1.0 {
-        1.0 // the formula gives a little less, which dither would show as specks in a white area
-    } else if value > 0.003_130_8 {
-        1.055 * value.powf(1.0 / 2.4) - 0.055
-    } else {
-        12.92 * value
-    }
-}
 
 /// The curve at all 256 byte values: `powf` for 12 values of every bilinear lookup would dominate it.
 static SRGB_TO_LINEAR: LazyLock<[f32; 256]> =

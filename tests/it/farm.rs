@@ -272,6 +272,7 @@ fn what_cannot_be_farmed_is_refused() {
         ("\"farm_format\": 1", "\"farm_format\": 7", "version 7"),
         ("\"passes\": 16", "\"passes\": 0", "passes"),
         ("\"frames\"", "\"framez\"", "frames"),
+        ("\"width\": ", "\"width\": 42949672", "more pixels"),
         ("\"directory\": \"", "\"directory\": \"/nowhere", "mount"),
     ] {
         assert!(text.contains(from), "{from} is not in {text}");

@@ -27,14 +27,41 @@ fn has_extension(path: &Path, extensions: &[&str]) -> bool {
     path.extension().is_some_and(|extension| extensions.iter().any(|known| extension.eq_ignore_ascii_case(known)))
 }
 
+const SCENES: [&str; 5] = ["gltf", "glb", "obj", "pbrt", "xml"];
+
+/// Sound files of points, lines or nothing at all.
+const NOTHING_TO_RENDER: [&str; 15] = [
+    "Mesh_PrimitiveMode_00.gltf",
+    "Mesh_PrimitiveMode_01.gltf",
+    "Mesh_PrimitiveMode_02.gltf",
+    "Mesh_PrimitiveMode_03.gltf",
+    "Mesh_PrimitiveMode_07.gltf",
+    "Mesh_PrimitiveMode_08.gltf",
+    "Mesh_PrimitiveMode_09.gltf",
+    "Mesh_PrimitiveMode_10.gltf",
+    "assimp-OBJ/point_cloud.obj",
+    "assimp-OBJ/testline.obj",
+    "assimp-OBJ/testpoints.obj",
+    "tinyobjloader-models/issue-356-leading-spaces-newmtl.obj",
+    "tinyobjloader-models/line-prim.obj",
+    "tinyobjloader-models/points-prim.obj",
+    "trimesh-models/face_in_group_name.obj",
+];
+
+/// Whether a sound file is known to end in this error.
+fn is_expected(path: &Path, error: &str) -> bool {
+    // "3.1+e2" is no number in any reader's book but its author's.
+    let is_odd = path.ends_with("number_formats.obj") && error.contains("number_formats.obj:11: expected");
+    let is_empty = error.contains("nothing to render") && NOTHING_TO_RENDER.iter().any(|name| path.ends_with(name));
+    is_odd || is_empty
+}
+
 #[test]
 fn every_sound_scene_loads() {
     let Some(folder) = assets() else { return };
     let mut files = Vec::new();
     files_below(&folder, &mut files);
-    files.retain(|path| {
-        has_extension(path, &["gltf", "glb", "obj", "pbrt", "xml"]) && !path.starts_with(folder.join("faults"))
-    });
+    files.retain(|path| has_extension(path, &SCENES) && !path.starts_with(folder.join("faults")));
     let mut failures = Vec::new();
     for path in &files {
         let start = Instant::now();
@@ -46,15 +73,17 @@ fn every_sound_scene_loads() {
                     scene.notes.iter().for_each(|note| println!("    {note}"));
                 }
             }
-            Err(error) => failures.push(error.to_string()),
+            Err(error) => {
+                let error = error.to_string();
+                println!("    {error}");
+                if !is_expected(path, &error) {
+                    failures.push(error);
+                }
+            }
         }
     }
     println!("{} files, {} failures", files.len(), failures.len());
-    failures.iter().for_each(|failure| println!("    {failure}"));
-    // Points and lines alone are sound files without anything to render.
-    failures.retain(|failure| !failure.contains("nothing to render"));
-    // "3.1+e2" is no number in any reader's book but its author's.
-    failures.retain(|failure| !failure.contains("number_formats.obj:11: expected"));
+    assert!(files.len() >= 190, "{} files", files.len());
     assert!(failures.is_empty(), "{failures:#?}");
 }
 
@@ -63,14 +92,19 @@ fn damaged_scenes_end_in_one_line() {
     let Some(folder) = assets() else { return };
     let mut files = Vec::new();
     files_below(&folder.join("faults"), &mut files);
+    // What no reader takes by its name is refused unread.
+    files.retain(|path| has_extension(path, &SCENES));
+    let mut refused = 0;
     for path in files {
         match load(&path, &LoadOptions::default()) {
             Ok(scene) => println!("loads: {} ({} notes)", path.display(), scene.notes.len()),
             Err(error) => {
+                refused += 1;
                 let message = error.to_string();
                 println!("{message}");
                 assert!(!message.contains('\n'), "{message}");
             }
         }
     }
+    assert!(refused >= 9, "{refused} refused");
 }

@@ -534,6 +534,48 @@ fn groups_inside_their_instance_are_placed() {
     assert_eq!(scene(group).instances.len(), 1);
 }
 
+/// As in Mitsuba, in whichever order they stand.
+#[test]
+fn groups_inside_groups_are_refused() {
+    let inner = r#"<shape type="shapegroup" id="inner"><shape type="rectangle"/></shape>"#;
+    let outer = r#"<shape type="shapegroup" id="outer"><shape type="instance"><ref id="inner"/></shape></shape>"#;
+    for body in [format!("{inner}{outer}"), format!("{outer}{inner}")] {
+        let error = try_load(folder().path(), "3.0.0", &format!("{LIGHT}{body}")).unwrap_err();
+        assert!(error.contains("a group inside a group is not rendered"), "{error}");
+    }
+}
+
+#[test]
+fn instances_place_groups_and_nothing_else() {
+    let of_others = r#"<shape type="sphere" id="ball"/><bsdf type="diffuse" id="red"/>"#;
+    for inside in ["", r#"<ref id="ball"/>"#, r#"<ref id="red"/>"#, r#"<shape type="sphere"/>"#] {
+        let body = format!(r#"{LIGHT}{of_others}<shape type="instance">{inside}</shape>"#);
+        let error = try_load(folder().path(), "3.0.0", &body).unwrap_err();
+        assert!(error.contains("an instance places a shapegroup and nothing else"), "{inside}: {error}");
+    }
+}
+
+#[test]
+fn what_groups_and_instances_do_not_use_is_named() {
+    let nonsense = r#"<float name="nonsense" value="3"/>"#;
+    let group = format!(r#"<shape type="shapegroup" id="g">{nonsense}<shape type="rectangle"/></shape>"#);
+    let scene = scene(&format!(r#"{group}<shape type="instance"><ref id="g"/>{nonsense}</shape>"#));
+    for kind in ["shapegroup", "instance"] {
+        let note = format!("shape \"{kind}\": not used: nonsense.");
+        assert!(has_note(&scene, &note), "{kind}: {:?}", scene.notes);
+    }
+}
+
+/// 4,002,000 meshes out of 140 kB.
+#[test]
+fn groups_that_are_placed_many_times_are_counted() {
+    let group = r#"<shape type="rectangle"/>"#.repeat(2001);
+    let instances = r#"<shape type="instance"><ref id="g"/></shape>"#.repeat(2000);
+    let body = format!(r#"{LIGHT}<shape type="shapegroup" id="g">{group}</shape>{instances}"#);
+    let error = try_load(folder().path(), "3.0.0", &body).map(|scene| scene.instances.len()).unwrap_err();
+    assert!(error.contains("more than 4000000 placed meshes"), "{error}");
+}
+
 #[test]
 fn triangles_without_coordinates_have_barycentric_ones() {
     let picture = r#"<texture name="reflectance" type="bitmap"><string name="filename" value="green.png"/></texture>"#;

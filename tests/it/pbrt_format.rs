@@ -1,8 +1,8 @@
 //! What pbrt's files mean.
 
 use fechner::scene::load::{LoadOptions, load};
-use fechner::scene::texture::srgb_to_linear;
 use fechner::scene::{Alpha, FilmDefaults, Projection, Scene, ScreenWindow, Surface};
+use fechner_perception::eotf::srgb_to_linear;
 use glam::{Vec2, Vec3};
 use std::path::Path;
 

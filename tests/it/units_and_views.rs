@@ -122,6 +122,18 @@ const GLTF_LAMP: &str = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"node
 "bufferViews":[{"buffer":0,"byteLength":36}],
 "buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]}"#;
 
+/// What is left out of a light is said where a file asks for it.
+#[test]
+fn the_range_of_a_gltf_light_is_named() {
+    let plain = GLTF_LAMP.replace("ASPECT", "1");
+    let cut = plain.replace(r#""intensity":100"#, r#""intensity":100,"range":1"#);
+    for (text, is_named) in [(plain, false), (cut, true)] {
+        let scene = read(&[("lamp.gltf", &text)], &LoadOptions::default());
+        let names = scene.notes.iter().any(|note| note.contains("range of lights is not rendered"));
+        assert_eq!(names, is_named, "{:?}", scene.notes);
+    }
+}
+
 /// The surroundings of a side file take the sun away with the sky that they replace.
 #[test]
 fn a_side_files_surroundings_replace_the_sun() {

@@ -109,10 +109,13 @@ pub(crate) fn check_area_deg2(what: &'static str, area_deg2: f64) -> Result<(), 
     check_range(what, area_deg2, 1e-3, 1e4, "between 0.001 and 10000 deg²")
 }
 
-const NAMES: [&str; 9] =
-    ["castle", "stela", "barten99", "barten89", "daly93", "daly98", "laird06", "hdrvdp2", "mannos-sakrison"];
+/// The name of the function that everything uses unless told otherwise.
+pub const DEFAULT: &str = "castle";
 
-/// The names that [`by_name`] knows.
+const NAMES: [&str; 9] =
+    [DEFAULT, "stela", "barten99", "barten89", "daly93", "daly98", "laird06", "hdrvdp2", "mannos-sakrison"];
+
+/// The names that [`by_name`] knows; the first is [`DEFAULT`].
 #[must_use]
 pub fn names() -> &'static [&'static str] {
     &NAMES
@@ -139,7 +142,7 @@ pub fn by_name(name: &str, viewing: &Viewing) -> Result<Box<dyn ContrastSensitiv
     viewing.check()?;
     let area_deg2 = viewing.observer.csf_area_deg2;
     Ok(match name {
-        "castle" => Box::new(CastleCsf::new(area_deg2)?),
+        DEFAULT => Box::new(CastleCsf::new(area_deg2)?),
         "barten99" => Box::new(Barten99 { field_deg: area_deg2.sqrt() }),
         "daly93" => Box::new(Daly93 {
             area_deg2,

@@ -11,6 +11,7 @@ use anyhow::{Context, Result, bail};
 use fechner::animate::name::FrameName;
 use fechner::output;
 use fechner_perception::Plane;
+use fechner_perception::csf;
 use fechner_perception::display::Viewing;
 use fechner_perception::sequence::{FrameMotion, SequenceFrame, SequenceObserver};
 use fechner_perception::tone::{
@@ -66,8 +67,8 @@ enum Showing {
 
 /// Exit status 0: the same to the eye; 1: told apart.
 pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
-    if arguments.seeing.csf != "castle" {
-        bail!("--csf {}: only castle knows how the eye sees what changes in time", arguments.seeing.csf);
+    if arguments.seeing.csf != csf::DEFAULT {
+        bail!("--csf {}: only {} knows how the eye sees what changes in time", arguments.seeing.csf, csf::DEFAULT);
     }
     if let Some(target) = &arguments.json {
         output::check_writable(target)?;
@@ -305,7 +306,7 @@ impl<'a> Sequences<'a> {
                 test: self.arguments.test.display().to_string(),
                 display: self.viewing.display.name.clone(),
                 pixels_per_degree: self.viewing.display.pixels_per_degree,
-                csf: "castle",
+                csf: csf::DEFAULT,
                 operator: match &self.showing {
                     Showing::AsRendered => Some("of each frame, as it was rendered".to_owned()),
                     Showing::By(fitted) => fitted.as_ref().map(|fitted| fitted.describe()),

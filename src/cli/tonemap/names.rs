@@ -2,7 +2,8 @@
 
 use super::TonemapArguments;
 use crate::cli::targets::{check_kept, display_file};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
+use fechner::animate::name::FrameName;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
@@ -20,21 +21,19 @@ pub(super) fn targets(arguments: &TonemapArguments) -> Result<Vec<PathBuf>> {
 fn named_targets(arguments: &TonemapArguments) -> Result<Vec<PathBuf>> {
     let output = &arguments.output;
     let name = output.file_name().unwrap_or_default();
-    let digits = name.as_encoded_bytes().iter().filter(|&&byte| byte == b'#').count();
-    if arguments.input.len() == 1 && digits == 0 {
+    if arguments.input.len() == 1 && !name.as_encoded_bytes().contains(&b'#') {
         return Ok(vec![output.clone()]);
     }
     let name = name.to_str().with_context(|| {
         format!("{}: the name of a sequence must be UTF-8, for numbers to be put into it", output.display())
     })?;
-    let hashes = "#".repeat(digits);
-    if digits == 0 || !name.contains(&hashes) {
-        bail!(
+    let pattern = FrameName::parse(name).with_context(|| {
+        format!(
             "{}: the name of a sequence needs one run of # for the digits of the frame's number, such as night.####.png",
             output.display()
-        );
-    }
-    let target = |frame: i64| output.with_file_name(name.replace(&hashes, &format!("{frame:0digits$}")));
+        )
+    })?;
+    let target = |frame: i64| output.with_file_name(pattern.of(frame));
     let numbers = frame_numbers(&arguments.input).unwrap_or_else(|| (1..=arguments.input.len() as i64).collect());
     Ok(numbers.into_iter().map(target).collect())
 }

@@ -43,6 +43,9 @@ const WEAK_EMITTER_CD_M2: f32 = 10.0;
 /// Luminance of RGB (1, 1, 1) in formats without a unit.
 pub(super) const ASSUMED_NITS_PER_UNIT: f64 = 100.0;
 
+/// The note of a scene whose file has no camera, which holds until it is given one.
+pub const NO_CAMERA: &str = "No camera in the file: a three-quarter view of the whole scene is used.";
+
 /// Reads a file up to [`Builder::finish`].
 pub(super) type Read = fn(&Path, &LoadOptions) -> Result<Builder, LoadError>;
 
@@ -191,7 +194,7 @@ impl Builder {
     fn choose_camera(&mut self, path: &Path, options: &LoadOptions) -> Result<Camera, LoadError> {
         let Some(wanted) = &options.camera else {
             let Some(first) = self.cameras.first().cloned() else {
-                self.notes.push("No camera in the file: a three-quarter view of the whole scene is used.".to_owned());
+                self.notes.push(NO_CAMERA.to_owned());
                 let FilmDefaults { width, height } = options.film.unwrap_or(self.film);
                 // Where everything is hidden at first, what is there now is framed, and then any place will do.
                 let start = at_start(self.at_another_time, path, options)?;

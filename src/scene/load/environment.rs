@@ -3,7 +3,7 @@
 use super::error::LoadError;
 use super::texture::{self, Values};
 use crate::scene::{Encoding, Environment, Parametrisation, Texels};
-use glam::{Mat3, Vec3};
+use glam::{Affine3A, Mat3, Vec3};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -48,6 +48,16 @@ pub fn read(path: &Path, parametrisation: Parametrisation, notes: &mut Vec<Strin
         texels: Arc::new(texels),
         ..Environment::constant(Vec3::ZERO)
     })
+}
+
+/// The rotation (or reflection) of a transform, without its scale.
+pub(super) fn rotation_of(transform: &Affine3A) -> Mat3 {
+    let [x, y, z] = [transform.matrix3.x_axis, transform.matrix3.y_axis, transform.matrix3.z_axis].map(Vec3::from);
+    let x = x.normalize_or(Vec3::X);
+    let across = y - y.dot(x) * x;
+    let y = across.try_normalize().unwrap_or_else(|| x.any_orthonormal_vector());
+    let upright = x.cross(y);
+    Mat3::from_cols(x, y, if upright.dot(z) < 0.0 { -upright } else { upright })
 }
 
 /// A soft studio: a bright ceiling that fades to a darker floor, one large warm key area up and to the left of a camera

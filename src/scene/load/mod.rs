@@ -48,6 +48,7 @@ mod texture_memory;
 mod toml;
 mod validate;
 
+pub use builder::NO_CAMERA;
 pub use default_view::{Bounds, bounds, framed};
 pub use error::{LoadError, Place};
 pub use files::{count_as_read, was_read};
@@ -157,6 +158,15 @@ fn check_made_vertices(path: &Path, vertices: usize) -> Result<(), LoadError> {
     ))
 }
 
+/// Refuses files that place meshes without end: few words can place a large group often.
+fn check_placed(path: &Path, meshes: usize) -> Result<(), LoadError> {
+    const MOST_MESHES: usize = 4_000_000;
+    if meshes <= MOST_MESHES {
+        return Ok(());
+    }
+    Err(LoadError::too_large(path, format_args!("more than {MOST_MESHES} placed meshes")))
+}
+
 fn stem_ends_with(path: &Path, extension: &str) -> bool {
     Path::new(path.file_stem().unwrap_or_default())
         .extension()
@@ -177,7 +187,7 @@ fn load_ply(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
 
 /// Luminance of linear Rec.709 RGB relative to RGB (1, 1, 1).
 fn luminance(color: glam::Vec3) -> f32 {
-    color.dot(glam::Vec3::new(0.2126, 0.7152, 0.0722))
+    fechner_perception::photometry::luminance(color.to_array())
 }
 
 /// A number that ends at 0 and 1. A picture times its factor ends there once both are multiplied, so that its factor may be any.

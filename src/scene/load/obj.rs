@@ -327,7 +327,7 @@ fn convert_mesh(model: &tobj::Model, path: &Path) -> Result<(Mesh, usize), LoadE
         Vec::new()
     };
     let colors = if of_all(&from.vertex_color, 3) {
-        let linear = |srgb: &f32| crate::scene::texture::srgb_to_linear(srgb.clamp(0.0, 1.0));
+        let linear = |srgb: &f32| fechner_perception::eotf::srgb_to_linear(srgb.clamp(0.0, 1.0));
         from.vertex_color.as_chunks::<3>().0.iter().map(|rgb| Vec3::from_array(rgb.each_ref().map(linear))).collect()
     } else {
         Vec::new()

@@ -80,6 +80,15 @@ pub(super) fn polar_disk(radius: f32, uv: impl Fn(f32, f32) -> Vec2) -> Mesh {
     mesh
 }
 
+/// The triangles of a grid of so many cells, columns by rows, whose corners stand row by row from `first` on.
+pub(super) fn grid_triangles(first: u32, [columns, rows]: [u32; 2]) -> impl Iterator<Item = [u32; 3]> {
+    (0..rows * columns).flat_map(move |cell| {
+        let low = first + cell / columns * (columns + 1) + cell % columns;
+        let high = low + columns + 1;
+        [[low, low + 1, high], [low + 1, high + 1, high]]
+    })
+}
+
 /// Gives every triangle of a mesh without texture coordinates the same ones, and so corners of its own.
 pub(super) fn give_each_triangle(mesh: &mut Mesh, uvs: [Vec2; 3]) {
     set_apart(mesh);

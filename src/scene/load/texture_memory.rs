@@ -5,8 +5,8 @@
 //! differ: shading makes them unit length after its own interpolation, in which disagreeing texels should count less.
 
 use super::texture::Decoded;
-use crate::scene::texture::srgb_from_linear;
 use crate::scene::{Encoding, Texels};
+use fechner_perception::eotf::srgb_from_linear;
 use std::sync::Arc;
 
 /// What a decoded picture takes.

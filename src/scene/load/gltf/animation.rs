@@ -5,8 +5,8 @@
 
 use super::super::error::LoadError;
 use super::buffers::Buffers;
-use glam::{Mat4, Quat, Vec3, Vec4};
-use gltf::animation::{Interpolation, Property};
+use glam::{Mat4, Quat, Vec3};
+use gltf::animation::{Channel, Interpolation, Property};
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -47,69 +47,110 @@ pub(super) fn pose(path: &Path, document: &gltf::Document, buffers: &Buffers, se
     let mut pose = Pose::new();
     let Some(animation) = document.animations().next() else { return Ok(pose) };
     for channel in animation.channels() {
-        let sampler = channel.sampler();
         let wrong =
             |problem: &str| LoadError::invalid(path, format_args!("animation {}: {problem}", animation.index()));
+        let sampler = channel.sampler();
         let times: Vec<f32> = buffers.floats::<1>(&sampler.input())?.into_iter().map(|[time]| time).collect();
         if times.is_empty() || !times.is_sorted() || times.iter().any(|time| !time.is_finite()) {
             return Err(wrong("its times are missing or do not increase"));
         }
-        let cubic = sampler.interpolation() == Interpolation::CubicSpline;
-        let per_key = if cubic { 3 } else { 1 };
-        let at = Place::of(&times, seconds);
-        let target = channel.target();
-        let property = target.property();
-        let width = match property {
-            Property::Translation | Property::Scale => 3,
-            Property::Rotation => 4,
-            Property::MorphTargetWeights => 0,
-        };
-        let mut numbers: Vec<f32> = match width {
-            3 => buffers.floats::<3>(&sampler.output())?.into_flattened(),
-            4 => buffers.floats::<4>(&sampler.output())?.into_flattened(),
-            _ => buffers.floats::<1>(&sampler.output())?.into_flattened(),
-        };
-        let width = if width == 0 { numbers.len() / (times.len() * per_key) } else { width };
-        if numbers.len() < times.len() * per_key * width || width == 0 {
-            return Err(wrong("it has fewer values than times"));
-        }
-        numbers.iter_mut().filter(|number| !number.is_finite()).for_each(|number| *number = 0.0);
-        let key = |index: usize, part: usize| &numbers[(index * per_key + part) * width..][..width];
-        let values: Vec<f32> = match sampler.interpolation() {
-            Interpolation::Step => key(at.before, 0).to_vec(),
-            Interpolation::Linear if property == Property::Rotation => {
-                let quaternion = |index| Quat::from_vec4(Vec4::from_slice(key(index, 0))).normalize();
-                quaternion(at.before).slerp(quaternion(at.after), at.share).to_array().to_vec()
-            }
-            Interpolation::Linear => {
-                let (from, to) = (key(at.before, 0), key(at.after, 0));
-                from.iter().zip(to).map(|(a, b)| a + (b - a) * at.share).collect()
-            }
-            Interpolation::CubicSpline => {
-                // In-tangent, value, out-tangent; Hermite over the span.
-                let (t, t2, t3) = (at.share, at.share * at.share, at.share.powi(3));
-                (0..width)
-                    .map(|i| {
-                        (2.0 * t3 - 3.0 * t2 + 1.0) * key(at.before, 1)[i]
-                            + at.span * (t3 - 2.0 * t2 + t) * key(at.before, 2)[i]
-                            + (3.0 * t2 - 2.0 * t3) * key(at.after, 1)[i]
-                            + at.span * (t3 - t2) * key(at.after, 0)[i]
-                    })
-                    .collect()
-            }
-        };
-        let posed = pose.entry(target.node().index()).or_default();
-        match property {
-            Property::Translation => posed.translation = Some(Vec3::from_slice(&values)),
-            Property::Scale => posed.scale = Some(Vec3::from_slice(&values)),
-            Property::Rotation => {
-                let length = Vec4::from_slice(&values).length();
-                posed.rotation = (length > 1e-6).then(|| Quat::from_slice(&values).normalize());
-            }
-            Property::MorphTargetWeights => posed.weights = Some(values),
+        let keys = Keys::read(&channel, buffers, times.len())?;
+        let keys = keys.ok_or_else(|| wrong("it has fewer values than times"))?;
+        let place = Place::of(&times, seconds);
+        let posed = pose.entry(channel.target().node().index()).or_default();
+        match channel.target().property() {
+            Property::Translation => posed.translation = Some(Vec3::from_slice(&keys.at(&place))),
+            Property::Scale => posed.scale = Some(Vec3::from_slice(&keys.at(&place))),
+            Property::Rotation => posed.rotation = keys.rotation_at(&place),
+            Property::MorphTargetWeights => posed.weights = Some(keys.at(&place)),
         }
     }
     Ok(pose)
+}
+
+/// What a channel says at its times.
+struct Keys {
+    interpolation: Interpolation,
+    /// Numbers of a value.
+    width: usize,
+    /// Value after value; of splines each stands between its two tangents.
+    numbers: Vec<f32>,
+}
+
+impl Keys {
+    /// `None` where there are fewer than times.
+    fn read(channel: &Channel, buffers: &Buffers, times: usize) -> Result<Option<Self>, LoadError> {
+        let sampler = channel.sampler();
+        let interpolation = sampler.interpolation();
+        let values = times * per_key(interpolation);
+        let output = sampler.output();
+        let (width, mut numbers) = match channel.target().property() {
+            Property::Translation | Property::Scale => (3, buffers.floats::<3>(&output)?.into_flattened()),
+            Property::Rotation => (4, buffers.floats::<4>(&output)?.into_flattened()),
+            Property::MorphTargetWeights => {
+                let numbers = buffers.floats::<1>(&output)?.into_flattened();
+                (numbers.len() / values, numbers)
+            }
+        };
+        numbers.iter_mut().filter(|number| !number.is_finite()).for_each(|number| *number = 0.0);
+        let is_whole = width > 0 && numbers.len() >= values * width;
+        Ok(is_whole.then_some(Self { interpolation, width, numbers }))
+    }
+
+    fn part(&self, key: usize, part: usize) -> &[f32] {
+        &self.numbers[(key * per_key(self.interpolation) + part) * self.width..][..self.width]
+    }
+
+    fn in_tangent(&self, key: usize) -> &[f32] {
+        self.part(key, 0)
+    }
+
+    fn value(&self, key: usize) -> &[f32] {
+        self.part(key, if self.interpolation == Interpolation::CubicSpline { 1 } else { 0 })
+    }
+
+    fn out_tangent(&self, key: usize) -> &[f32] {
+        self.part(key, 2)
+    }
+
+    /// Number by number.
+    fn at(&self, place: &Place) -> Vec<f32> {
+        let (from, to) = (self.value(place.before), self.value(place.after));
+        match self.interpolation {
+            Interpolation::Step => from.to_vec(),
+            Interpolation::Linear => from.iter().zip(to).map(|(a, b)| a + (b - a) * place.share).collect(),
+            Interpolation::CubicSpline => {
+                // Hermite over the span.
+                let (t, t2, t3) = (place.share, place.share * place.share, place.share.powi(3));
+                let (leaving, arriving) = (self.out_tangent(place.before), self.in_tangent(place.after));
+                (0..self.width)
+                    .map(|i| {
+                        (2.0 * t3 - 3.0 * t2 + 1.0) * from[i]
+                            + place.span * (t3 - 2.0 * t2 + t) * leaving[i]
+                            + (3.0 * t2 - 2.0 * t3) * to[i]
+                            + place.span * (t3 - t2) * arriving[i]
+                    })
+                    .collect()
+            }
+        }
+    }
+
+    /// `None` for what is no turn.
+    fn rotation_at(&self, place: &Place) -> Option<Quat> {
+        let quaternion = match self.interpolation {
+            Interpolation::Linear => {
+                let turn = |key: usize| Quat::from_slice(self.value(key)).normalize();
+                turn(place.before).slerp(turn(place.after), place.share)
+            }
+            Interpolation::Step | Interpolation::CubicSpline => Quat::from_slice(&self.at(place)),
+        };
+        (quaternion.length() > 1e-6).then(|| quaternion.normalize())
+    }
+}
+
+/// Values of a key: splines have a tangent on either side.
+fn per_key(interpolation: Interpolation) -> usize {
+    if interpolation == Interpolation::CubicSpline { 3 } else { 1 }
 }
 
 /// The keys around a time.

@@ -9,6 +9,7 @@ use crate::scene::{
     TextureLookup, Wrap,
 };
 use glam::{Vec2, Vec3};
+use gltf::material::AlphaMode;
 use gltf::texture::{MagFilter, WrappingMode};
 use std::collections::HashMap;
 use std::path::Path;
@@ -41,92 +42,81 @@ impl<'a> Materials<'a> {
 
     fn convert(&mut self, builder: &mut Builder, from: &gltf::Material) -> Result<Material, LoadError> {
         let name = from.name().map_or_else(|| format!("material {}", from.index().unwrap_or(0)), str::to_owned);
-        let pbr = from.pbr_metallic_roughness();
-        let [red, green, blue, opacity] = pbr.base_color_factor();
-        let base_texture = pbr.base_color_texture();
-        let base_lookup = self.optional(builder, base_texture.as_ref(), Encoding::Srgb)?;
-        let rough_lookup = self.optional(builder, pbr.metallic_roughness_texture().as_ref(), Encoding::Linear)?;
-        let share = |value: f32| {
-            if value.is_finite() { value.clamp(0.0, 1.0) } else { 0.0 }
-        };
-        let base_color = ColorInput { factor: Vec3::new(share(red), share(green), share(blue)), texture: base_lookup };
-        let transmission = match from.transmission() {
-            None => ScalarInput::constant(0.0),
-            Some(transmission) => ScalarInput {
-                factor: share(transmission.transmission_factor()),
-                texture: self
-                    .optional(builder, transmission.transmission_texture().as_ref(), Encoding::Linear)?
-                    .map(|lookup| (lookup, 0)),
-            },
-        };
-        let surface = if from.unlit() {
-            builder.note("KHR_materials_unlit: rendered as a diffuse surface.");
-            Surface::Diffuse { reflectance: base_color }
-        } else {
-            let model = MetalRoughness {
-                base_color,
-                metallic: ScalarInput {
-                    factor: share(pbr.metallic_factor()),
-                    texture: rough_lookup.map(|lookup| (lookup, 2)),
-                },
-                roughness: ScalarInput {
-                    factor: share(pbr.roughness_factor()),
-                    texture: rough_lookup.map(|lookup| (lookup, 1)),
-                },
-                ior: index_of_refraction(builder, from, &name),
-                transmission,
-                volume: from.volume().filter(|volume| volume.thickness_factor() > 0.0).map(|volume| {
-                    let distance = volume.attenuation_distance();
-                    let left = Vec3::from_array(volume.attenuation_color()).clamp(Vec3::splat(1e-4), Vec3::ONE);
-                    if distance.is_finite() && distance > 0.0 {
-                        Surface::absorption_of(left, distance)
-                    } else {
-                        Vec3::ZERO
-                    }
-                }),
-                ..self.extensions(builder, from)?
-            };
-            if has_plain_boundary(&model) {
-                builder.note(format!(
-                    "\"{name}\": its volume's boundary is not stretched by its anisotropy, and reflects by its index alone."
-                ));
-            }
-            Surface::MetalRoughness(model)
-        };
+        let base_texture = from.pbr_metallic_roughness().base_color_texture();
+        let base = self.optional(builder, base_texture.as_ref(), Encoding::Srgb)?;
+        Ok(Material {
+            surface: self.surface(builder, from, base, &name)?,
+            emission: self.emission(builder, from)?,
+            emits_both_sides: from.double_sided(),
+            relief: self.relief(builder, from)?,
+            stretch: self.stretch(builder, from)?,
+            alpha: alpha(from, base),
+            name,
+        })
+    }
 
-        // The file's unit is cd/m².
+    /// `base` is the picture of its base colour.
+    fn surface(
+        &mut self,
+        builder: &mut Builder,
+        from: &gltf::Material,
+        base: Option<TextureLookup>,
+        name: &str,
+    ) -> Result<Surface, LoadError> {
+        let pbr = from.pbr_metallic_roughness();
+        let [red, green, blue, _] = pbr.base_color_factor();
+        let base_color = ColorInput { factor: Vec3::new(share(red), share(green), share(blue)), texture: base };
+        if from.unlit() {
+            builder.note("KHR_materials_unlit: rendered as a diffuse surface.");
+            return Ok(Surface::Diffuse { reflectance: base_color });
+        }
+        let map = self.optional(builder, pbr.metallic_roughness_texture().as_ref(), Encoding::Linear)?;
+        let scalar = |factor: f32, channel: u8| ScalarInput {
+            factor: share(factor),
+            texture: map.map(|lookup| (lookup, channel)),
+        };
+        let model = MetalRoughness {
+            base_color,
+            metallic: scalar(pbr.metallic_factor(), 2),
+            roughness: scalar(pbr.roughness_factor(), 1),
+            transmission: self.transmission(builder, from)?,
+            ior: index_of_refraction(builder, from, name),
+            volume: from.volume().filter(|volume| volume.thickness_factor() > 0.0).map(|volume| absorption(&volume)),
+            ..self.extensions(builder, from)?
+        };
+        if has_plain_boundary(&model) {
+            builder.note(format!(
+                "\"{name}\": its volume's boundary is not stretched by its anisotropy, and reflects by its index alone."
+            ));
+        }
+        Ok(Surface::MetalRoughness(model))
+    }
+
+    fn transmission(&mut self, builder: &mut Builder, from: &gltf::Material) -> Result<ScalarInput, LoadError> {
+        let Some(transmission) = from.transmission() else { return Ok(ScalarInput::constant(0.0)) };
+        let lookup = self.optional(builder, transmission.transmission_texture().as_ref(), Encoding::Linear)?;
+        Ok(ScalarInput { factor: share(transmission.transmission_factor()), texture: lookup.map(|lookup| (lookup, 0)) })
+    }
+
+    /// The file's unit is cd/m².
+    fn emission(&mut self, builder: &mut Builder, from: &gltf::Material) -> Result<ColorInput, LoadError> {
         let strength = from.emissive_strength().unwrap_or(1.0) / builder.nits_per_unit as f32;
         let factor = Vec3::from_array(from.emissive_factor()) * strength;
         let factor = if factor.is_finite() { factor.max(Vec3::ZERO) } else { Vec3::ZERO };
-        let emission = if factor == Vec3::ZERO {
-            ColorInput::constant(Vec3::ZERO)
-        } else {
-            ColorInput { factor, texture: self.optional(builder, from.emissive_texture().as_ref(), Encoding::Srgb)? }
-        };
-        let relief = match from.normal_texture() {
-            None => None,
-            Some(normal) => {
-                let transform = normal.extension_value("KHR_texture_transform");
-                note_coordinates(builder, Some(u64::from(normal.tex_coord())), transform);
-                let transform = transform.map(read_transform);
-                let lookup =
-                    self.lookup(builder, &normal.texture(), Encoding::Linear, transform, [128, 128, 255, 255])?;
-                let strength = if normal.scale().is_finite() { normal.scale() } else { 1.0 };
-                lookup.map(|map| Relief::Normals { map, strength })
-            }
-        };
+        if factor == Vec3::ZERO {
+            return Ok(ColorInput::constant(Vec3::ZERO));
+        }
+        Ok(ColorInput { factor, texture: self.optional(builder, from.emissive_texture().as_ref(), Encoding::Srgb)? })
+    }
 
-        let stretch = self.stretch(builder, from)?;
-        let coverage = ScalarInput { factor: share(opacity), texture: base_lookup.map(|lookup| (lookup, 3)) };
-        let alpha = match from.alpha_mode() {
-            gltf::material::AlphaMode::Opaque => Alpha::Opaque,
-            gltf::material::AlphaMode::Mask => {
-                let cutoff = from.alpha_cutoff().filter(|cutoff| cutoff.is_finite()).unwrap_or(0.5);
-                Alpha::Mask { value: coverage, cutoff: cutoff.max(0.0) }
-            }
-            gltf::material::AlphaMode::Blend => Alpha::Blend { value: coverage },
-        };
-        Ok(Material { name, surface, emission, emits_both_sides: from.double_sided(), relief, stretch, alpha })
+    fn relief(&mut self, builder: &mut Builder, from: &gltf::Material) -> Result<Option<Relief>, LoadError> {
+        let Some(normal) = from.normal_texture() else { return Ok(None) };
+        let transform = normal.extension_value("KHR_texture_transform");
+        note_coordinates(builder, Some(u64::from(normal.tex_coord())), transform);
+        let transform = transform.map(read_transform);
+        let lookup = self.lookup(builder, &normal.texture(), Encoding::Linear, transform, [128, 128, 255, 255])?;
+        let strength = if normal.scale().is_finite() { normal.scale() } else { 1.0 };
+        Ok(lookup.map(|map| Relief::Normals { map, strength }))
     }
 
     /// What extensions say about the surface beyond the core's parameters.
@@ -314,6 +304,32 @@ impl<'a> Materials<'a> {
         let bytes = self.embedded.entry(index).or_insert(Arc::new(bytes)).clone();
         Ok(Some(Picture::Memory { name, bytes }))
     }
+}
+
+/// Cut to 0 to 1.
+fn share(value: f32) -> f32 {
+    if value.is_finite() { value.clamp(0.0, 1.0) } else { 0.0 }
+}
+
+/// How much of what is there counts: by the base colour's factor and the alpha of its picture.
+fn alpha(from: &gltf::Material, base: Option<TextureLookup>) -> Alpha {
+    let [.., opacity] = from.pbr_metallic_roughness().base_color_factor();
+    let value = ScalarInput { factor: share(opacity), texture: base.map(|lookup| (lookup, 3)) };
+    match from.alpha_mode() {
+        AlphaMode::Opaque => Alpha::Opaque,
+        AlphaMode::Mask => {
+            let cutoff = from.alpha_cutoff().filter(|cutoff| cutoff.is_finite()).unwrap_or(0.5);
+            Alpha::Mask { value, cutoff: cutoff.max(0.0) }
+        }
+        AlphaMode::Blend => Alpha::Blend { value },
+    }
+}
+
+/// Per unit of length.
+fn absorption(volume: &gltf::material::Volume) -> Vec3 {
+    let distance = volume.attenuation_distance();
+    let left = Vec3::from_array(volume.attenuation_color()).clamp(Vec3::splat(1e-4), Vec3::ONE);
+    if distance.is_finite() && distance > 0.0 { Surface::absorption_of(left, distance) } else { Vec3::ZERO }
 }
 
 /// What is told where it can be used, else 1.5.

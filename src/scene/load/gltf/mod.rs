@@ -25,8 +25,8 @@ use std::path::Path;
 
 /// Deepest chain of nodes; the recursion would otherwise end at the stack's size.
 const DEEPEST_NODE: usize = 256;
-/// Most placed meshes: a node below many parents is placed once for each.
-const MOST_INSTANCES: usize = 4_000_000;
+/// Most placed nodes: one below many parents is placed once for each.
+const MOST_NODES: usize = 4_000_000;
 
 /// Width over height, or the inverse, beyond which a camera's aspect is taken for a slip.
 const MOST_OBLONG: f32 = 100.0;
@@ -113,8 +113,8 @@ impl<'a> Reader<'a> {
         if self.ancestors.len() >= DEEPEST_NODE {
             return Err(LoadError::invalid(self.path, format_args!("nodes nested deeper than {DEEPEST_NODE}")));
         }
-        if self.placed.len() >= MOST_INSTANCES {
-            return Err(LoadError::too_large(self.path, format_args!("more than {MOST_INSTANCES} placed nodes")));
+        if self.placed.len() >= MOST_NODES {
+            return Err(LoadError::too_large(self.path, format_args!("more than {MOST_NODES} placed nodes")));
         }
         let posed = self.moments.iter().zip(parents);
         let matrices: Vec<Mat4> =
@@ -220,9 +220,7 @@ impl<'a> Reader<'a> {
         to_world: Affine3A,
         motion: Option<Motion>,
     ) -> Result<(), LoadError> {
-        if self.builder.instances.len() + parts.len() > MOST_INSTANCES {
-            return Err(LoadError::too_large(self.path, format_args!("more than {MOST_INSTANCES} placed meshes")));
-        }
+        super::check_placed(self.path, self.builder.instances.len() + parts.len())?;
         self.builder.instances.extend(parts.iter().map(|&(mesh, material)| Instance {
             name: name.to_owned(),
             mesh,
@@ -340,6 +338,9 @@ impl<'a> Reader<'a> {
             return;
         }
         let strength = strength.max(Vec3::ZERO);
+        if light.range().is_some() && !matches!(light.kind(), Kind::Directional) {
+            self.builder.note("The range of lights is not rendered: they go on by the inverse square of the distance.");
+        }
         self.builder.lights.push(match light.kind() {
             Kind::Directional => {
                 Light::Directional { direction, irradiance: strength, angular_radius: 0.0, is_of_sky: false }

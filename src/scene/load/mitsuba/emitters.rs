@@ -71,7 +71,7 @@ impl Reader {
                     .map_err(|error| error.referenced_from(emitter.place()))?;
                 environment.scale = emitter.float_or("scale", 1.0)?.max(0.0);
                 // Mitsuba's picture has +z in its middle, ours −z; both turn the same way round.
-                environment.from_world = Mat3::from_rotation_y(PI) * rotation(&to_world).transpose();
+                environment.from_world = Mat3::from_rotation_y(PI) * environment::rotation_of(&to_world).transpose();
                 emitter.ignore(&["gamma", "cache", "miscompensation"]);
                 self.surround(environment);
             }
@@ -92,7 +92,7 @@ impl Reader {
     fn sky(&mut self, emitter: &Element, kind: &str, to_world: &Affine3A) -> Result<(), LoadError> {
         // Version 3 has its zenith along +z, the dialects before it along +y; our model's is +y.
         let to_model = if self.since_2 { Mat3::from_rotation_x(-FRAC_PI_2) } else { Mat3::IDENTITY };
-        let from_world = to_model * rotation(to_world).transpose();
+        let from_world = to_model * environment::rotation_of(to_world).transpose();
         let towards_sun = match emitter.vector("sundirection")? {
             // In the world's space, whatever the emitter's transform (Mitsuba 0.6, `sunsky.cpp`; 3, `sunsky.h`).
             Some(direction) => {
@@ -155,7 +155,7 @@ impl Reader {
     }
 
     fn light_color(&mut self, emitter: &Element, name: &str) -> Result<Vec3, LoadError> {
-        let scale = if emitter.kind() == "envmap" { 1.0 } else { emitter.float_or("scale", 1.0)?.max(0.0) };
+        let scale = emitter.float_or("scale", 1.0)?.max(0.0);
         Ok(self.color(emitter, name, Meaning::Light)?.unwrap_or(Vec3::ONE) * scale)
     }
 
@@ -172,15 +172,6 @@ impl Reader {
         self.note_unused("emitter \"area\"", emitter);
         Ok(radiance)
     }
-}
-
-/// The rotation of a transform without its scale.
-fn rotation(transform: &Affine3A) -> Mat3 {
-    let [x, y, z] = [transform.matrix3.x_axis, transform.matrix3.y_axis, transform.matrix3.z_axis].map(Vec3::from);
-    let x = x.normalize_or(Vec3::X);
-    let y = (y - y.dot(x) * x).try_normalize().unwrap_or_else(|| x.any_orthonormal_vector());
-    let upright = x.cross(y);
-    Mat3::from_cols(x, y, if upright.dot(z) < 0.0 { -upright } else { upright })
 }
 
 #[cfg(test)]

@@ -87,7 +87,7 @@ struct Reader {
     materials: HashMap<(usize, usize), Option<MaterialId>>,
     mesh_files: HashMap<shapes::MeshKey, Vec<MeshId>>,
     /// Parts of groups, by address.
-    groups: HashMap<usize, Vec<(MeshId, MaterialId, Affine3A)>>,
+    groups: HashMap<*const Element, Vec<(MeshId, MaterialId, Affine3A)>>,
     current_group: Option<Vec<(MeshId, MaterialId, Affine3A)>>,
     /// Of meshes that stand for disks and their like.
     made_vertices: usize,

@@ -50,53 +50,59 @@ impl Reader {
             if mesh.uvs.is_empty() && self.builder.materials[material.0 as usize].reads_pictures() {
                 shapes::give_each_triangle(mesh, BARYCENTRIC);
             }
-            self.place(id, material, to_world);
+            self.place(id, material, to_world)?;
         }
         Ok(())
     }
 
-    fn place(&mut self, mesh: MeshId, material: MaterialId, to_world: Affine3A) {
-        let name = self.builder.meshes[mesh.0 as usize].name.clone();
-        match &mut self.current_group {
-            Some(parts) => parts.push((mesh, material, to_world)),
-            None => self.builder.instances.push(Instance { name, mesh, material, to_world, motion: None }),
+    fn place(&mut self, mesh: MeshId, material: MaterialId, to_world: Affine3A) -> Result<(), LoadError> {
+        if let Some(parts) = &mut self.current_group {
+            parts.push((mesh, material, to_world));
+            return Ok(());
         }
+        super::super::check_placed(&self.main, self.builder.instances.len() + 1)?;
+        let name = self.builder.meshes[mesh.0 as usize].name.clone();
+        self.builder.instances.push(Instance { name, mesh, material, to_world, motion: None });
+        Ok(())
     }
 
     /// `shapegroup` defines, `instance` places.
     fn group(&mut self, shape: &Rc<Element>, kind: &str) -> Result<(), LoadError> {
-        if kind == "shapegroup" {
-            self.collect_group(shape)?;
-            return Ok(());
+        if self.current_group.is_some() {
+            return Err(shape.unsupported("a group inside a group is not rendered"));
         }
-        let to_world = transform::of(shape, "toworld")?;
-        let mut groups: Vec<Rc<Element>> = shape.tagged("shape").cloned().collect();
-        for reference in shape.tagged("ref").cloned().collect::<Vec<_>>() {
-            groups.push(self.resolve(&reference)?);
+        if kind == "shapegroup" { self.collect_group(shape) } else { self.place_group(shape) }
+    }
+
+    fn place_group(&mut self, instance: &Element) -> Result<(), LoadError> {
+        let to_world = transform::of(instance, "toworld")?;
+        let mut groups: Vec<Rc<Element>> = instance.tagged("shape").cloned().collect();
+        for reference in instance.tagged("ref") {
+            groups.push(self.resolve(reference)?);
         }
+        if groups.is_empty() || groups.iter().any(|group| group.kind() != "shapegroup") {
+            return Err(instance.error("an instance places a shapegroup and nothing else"));
+        }
+        self.note_unused("shape \"instance\"", instance);
         for group in groups {
-            let key = Rc::as_ptr(&group) as usize;
-            if !self.groups.contains_key(&key) {
-                self.collect_group(&group)?;
-            }
-            let parts = self.groups.get(&key).cloned().unwrap_or_default();
+            self.collect_group(&group)?;
+            let parts = self.groups.get(&Rc::as_ptr(&group)).cloned().unwrap_or_default();
             for (mesh, material, inner) in parts {
-                self.place(mesh, material, to_world * inner);
+                self.place(mesh, material, to_world * inner)?;
             }
         }
         Ok(())
     }
 
+    /// Keeps the parts of a group, once.
     fn collect_group(&mut self, group: &Rc<Element>) -> Result<(), LoadError> {
-        let key = Rc::as_ptr(group) as usize;
-        if self.current_group.is_some() {
-            return Err(group.unsupported("a group inside a group is not rendered"));
-        }
+        let key = Rc::as_ptr(group);
         if self.groups.contains_key(&key) {
             return Ok(());
         }
         self.current_group = Some(Vec::new());
         let inner: Vec<Rc<Element>> = group.tagged("shape").cloned().collect();
+        self.note_unused("shape \"shapegroup\"", group);
         for shape in &inner {
             self.shape(shape)?;
         }
@@ -227,7 +233,7 @@ impl Reader {
                 let mesh = self.builder.add_mesh(mesh);
                 let poles_on_z = Sphere::axes_with_poles_on_z(&Affine3A::IDENTITY);
                 let place = Affine3A { matrix3: poles_on_z, translation: center.into() };
-                self.place(mesh, material, *to_world * place);
+                self.place(mesh, material, *to_world * place)?;
             }
         }
         Ok(())

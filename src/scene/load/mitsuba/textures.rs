@@ -7,8 +7,8 @@ use super::super::{files, luminance};
 use super::Reader;
 use super::element::{Element, canonical};
 use super::transform;
-use crate::scene::texture::srgb_to_linear;
 use crate::scene::{ColorInput, Encoding, ScalarInput, TextureId, TextureLookup, Wrap};
+use fechner_perception::eotf::srgb_to_linear;
 use glam::{Vec2, Vec3};
 use std::rc::Rc;
 

@@ -6,7 +6,7 @@ use super::lexer::{Lexer, Token};
 use super::parameters::{self, Parameters};
 use super::state::{DEEPEST_STACK, Opening, Transforms};
 use super::transforms::TransformDirective;
-use super::{MOST_INSTANCES, Reader, Scope, materials, shapes, textures};
+use super::{Reader, Scope, materials, shapes, textures};
 use std::path::Path;
 use std::rc::Rc;
 
@@ -322,9 +322,7 @@ impl Reader<'_> {
                 self.state.area_light = Some(Rc::new(parameters));
             }
             Entity::Shape => {
-                if self.builder.instances.len() >= MOST_INSTANCES {
-                    return Err(LoadError::too_large(&self.main, format_args!("more than {MOST_INSTANCES} shapes")));
-                }
+                super::super::check_placed(&self.main, self.builder.instances.len() + 1)?;
                 self.shape(&name, &parameters)?;
             }
             Entity::Camera => {
@@ -394,9 +392,7 @@ impl Reader<'_> {
         if self.current_object.is_some() {
             return Err(LoadError::invalid_at(place, "an object cannot hold an instance of another"));
         }
-        if self.builder.instances.len() + parts.len() > MOST_INSTANCES {
-            return Err(LoadError::too_large(&self.main, format_args!("more than {MOST_INSTANCES} placed shapes")));
-        }
+        super::super::check_placed(&self.main, self.builder.instances.len() + parts.len())?;
         let transforms = self.state.transforms;
         let placed: Vec<_> = parts.iter().map(|part| shapes::place_part(self, part, &transforms)).collect();
         self.builder.instances.extend(placed);

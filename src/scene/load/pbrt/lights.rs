@@ -9,7 +9,7 @@ use super::Reader;
 use super::inputs::Meaning;
 use super::parameters::Parameters;
 use crate::scene::{ColorInput, Encoding, Environment, Light, Parametrisation, SpotFalloff, Wrap};
-use glam::{Affine3A, Mat3, Vec3};
+use glam::{Affine3A, Vec3};
 use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
 
@@ -123,7 +123,7 @@ impl Reader<'_> {
         let file = self.file(file);
         let mut environment = environment::read(&file, Parametrisation::EqualArea, &mut self.builder.notes)
             .map_err(|error| error.referenced_from(parameters.place()))?;
-        environment.from_world = rotation(to_world).transpose();
+        environment.from_world = environment::rotation_of(to_world).transpose();
         environment.scale = scale;
         if let Some(lux) = illuminance {
             let up = environment.from_world.transpose() * Vec3::Z;
@@ -175,14 +175,4 @@ impl Reader<'_> {
         self.note_unread("area light", parameters);
         Ok(Emission { radiance, both_sides, lumen })
     }
-}
-
-/// The rotation (or reflection) of a transform, without its scale.
-pub(super) fn rotation(transform: &Affine3A) -> Mat3 {
-    let [x, y, z] = [transform.matrix3.x_axis, transform.matrix3.y_axis, transform.matrix3.z_axis].map(Vec3::from);
-    let x = x.normalize_or(Vec3::X);
-    let across = y - y.dot(x) * x;
-    let y = across.try_normalize().unwrap_or_else(|| x.any_orthonormal_vector());
-    let upright = x.cross(y);
-    Mat3::from_cols(x, y, if upright.dot(z) < 0.0 { -upright } else { upright })
 }

@@ -27,9 +27,6 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-/// Most placed shapes.
-const MOST_INSTANCES: usize = 4_000_000;
-
 /// Reads a pbrt file.
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
     read(path, options)?.finish(path, IfDark::StudioWithoutLight, options)

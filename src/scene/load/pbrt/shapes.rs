@@ -205,14 +205,7 @@ fn grid(surface: impl Fn(f32, f32) -> (Vec3, Vec3)) -> Mesh {
             mesh.uvs.push(Vec2::new(u, 1.0 - v));
         }
     }
-    for row in 0..ALONG {
-        for column in 0..AROUND {
-            let low = row * (AROUND + 1) + column;
-            let high = low + AROUND + 1;
-            mesh.triangles.push([low, low + 1, high]);
-            mesh.triangles.push([low + 1, high + 1, high]);
-        }
-    }
+    mesh.triangles.extend(shapes::grid_triangles(0, [AROUND, ALONG]));
     mesh
 }
 
@@ -331,14 +324,7 @@ fn bilinear_mesh(parameters: &Parameters) -> Result<Mesh, LoadError> {
                 });
             }
         }
-        for row in 0..STEPS {
-            for column in 0..STEPS {
-                let low = base + row * (STEPS + 1) + column;
-                let high = low + STEPS + 1;
-                mesh.triangles.push([low, low + 1, high]);
-                mesh.triangles.push([low + 1, high + 1, high]);
-            }
-        }
+        mesh.triangles.extend(shapes::grid_triangles(base, [STEPS, STEPS]));
     }
     Ok(mesh)
 }

@@ -7,7 +7,8 @@ use crate::exr_read::{self, ExrImage, Replaced, Window, layer_and_part};
 use crate::hdr_read::{HdrHeader, with_known_header};
 use crate::jpeg_read;
 use crate::scene::load::{LoadError, files};
-use crate::scene::{Encoding, Texels, texture};
+use crate::scene::{Encoding, Texels};
+use fechner_perception::eotf::srgb_to_linear;
 use fechner_perception::tone::gamut;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 use std::io::Cursor;
@@ -156,7 +157,7 @@ fn linear_floats(
     for [r, g, b, _] in &mut texels {
         [*r, *g, *b] = header.map_or([*r, *g, *b], |header| header.light([*r, *g, *b]));
         if unfold {
-            [*r, *g, *b] = [*r, *g, *b].map(texture::srgb_to_linear);
+            [*r, *g, *b] = [*r, *g, *b].map(srgb_to_linear);
         }
     }
     make_finite(&mut [texels.as_flattened_mut()], notes);

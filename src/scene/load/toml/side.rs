@@ -7,7 +7,7 @@
 use super::fields::{Fields, Source, Value};
 use super::{animated, camera, light, read_film, read_unit, read_view, surroundings};
 use crate::scene::load::error::LoadError;
-use crate::scene::load::{LoadOptions, Shutter, files};
+use crate::scene::load::{LoadOptions, NO_CAMERA, Shutter, files};
 use crate::scene::{Scene, ViewingDefaults};
 use std::path::{Path, PathBuf};
 
@@ -81,7 +81,7 @@ pub(in crate::scene::load) fn apply(path: &Path, options: &LoadOptions, scene: &
         }
         // What was assumed is no longer true.
         if brings_camera {
-            scene.notes.retain(|note| !note.starts_with("No camera in the file"));
+            scene.notes.retain(|note| note != NO_CAMERA);
         }
         Ok(())
     })
