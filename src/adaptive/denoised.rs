@@ -1,9 +1,7 @@
 //! The film's denoised picture as it will be seen, and what the perception crate says of its noise and of its bias.
 
-mod missed;
-
-use self::missed::{EdgeProfile, expected_darkness, missed_light};
 use super::judge::JudgeError;
+use super::missed::{Darkness, EdgeProfile, missed_light};
 use super::settings::LoopSettings;
 use crate::denoise::{DenoisedFilm, Denoiser, denoise_film, leave_the_void_dark};
 use crate::film::{Estimate, Film, opponent};
@@ -94,13 +92,13 @@ impl TimedDenoising {
         let error = match EdgeProfile::of(settings.filter) {
             Some(profile) => {
                 let missed = missed_light(&profile, film, &estimate.luminance_cd_m2, lamps_from_cd_m2);
-                let dark = expected_darkness(&missed, |light| {
+                let dark = Darkness::of(&missed, |light| {
                     // A denoiser may have guessed some of it.
                     let whole = estimate.luminance_cd_m2.combined(light, |sampled, missed| sampled + missed);
                     let whole = whole.combined(&luminance_cd_m2, f32::max);
                     seen::display_luminance(tone, display, &whole)
                 });
-                error.with_missed_light(&thresholds.measured_visibility(&dark))
+                error.with_missed_light(&thresholds.measured_visibility(&dark.mean))
             }
             None => error,
         };

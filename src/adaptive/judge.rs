@@ -132,9 +132,15 @@ fn judge_by(
     let thresholds = found_thresholds(&guide, &displayed_guide, tone.as_ref(), &noise, settings)?;
     let gains = chromatic_gains(&thresholds.in_bands, settings)?;
     still_wanted(settings)?;
-    let pooled_variance_per_sample = scatter.pooled_per_sample(&thresholds.in_bands, gains.as_ref());
-    let variance_per_sample =
+    let mut pooled_variance_per_sample = scatter.pooled_per_sample(&thresholds.in_bands, gains.as_ref());
+    let mut variance_per_sample =
         (purpose == Purpose::Plan).then(|| scatter.per_sample_of_halves(film, &thresholds.in_bands, gains.as_ref()));
+    if denoised.is_none()
+        && let Some(missed) = scatter.missed_per_sample(film, &estimate, tone.as_ref(), settings)
+    {
+        let of_all = std::iter::once(&mut pooled_variance_per_sample).chain(variance_per_sample.iter_mut().flatten());
+        of_all.for_each(|variance| *variance = variance.combined(&missed, f32::max));
+    }
     still_wanted(settings)?;
     let over_white = if settings.is_transparent {
         let colour_scale = denoised.is_none().then(|| scatter.luminance_scale());

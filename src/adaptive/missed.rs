@@ -59,6 +59,9 @@ pub(super) fn missed_light(profile: &EdgeProfile, film: &Film, sampled_cd_m2: &P
     let is_lamp = |at: (usize, usize)| shines(at) && light(at) > lamps_from_cd_m2;
     let mut missed = Plane::filled(width, height, 0.0);
     for lamp in (0..width * height).map(|pixel| (pixel % width, pixel / width)).filter(|&at| is_lamp(at)) {
+        if around(lamp, 1).all(shines) {
+            continue;
+        }
         let full = around(lamp, RADIUS).filter(|&at| is_lamp(at)).map(light).fold(0.0, f32::max);
         for (x, y) in around(lamp, 1).filter(|&at| !shines(at)) {
             let step_px = ((x.abs_diff(lamp.0) + y.abs_diff(lamp.1)) as f32).sqrt();
@@ -72,20 +75,34 @@ pub(super) fn missed_light(profile: &EdgeProfile, film: &Film, sampled_cd_m2: &P
     missed
 }
 
-/// How much brighter a picture is expected to be seen with light that may be missing, display cd/m², where that scatters exponentially about
-/// its mean. `shown`: the picture as displayed with so much more light.
-pub(super) fn expected_darkness(missed: &Plane, shown: impl Fn(&Plane) -> Plane) -> Plane {
-    /// Means of the fifths of an exponential variable of mean 1.
-    const FIFTHS: [f32; 5] = [0.107, 0.360, 0.700, 1.223, 2.610];
-    if missed.values().iter().all(|&light| light == 0.0) {
-        return missed.clone();
+/// How much brighter a picture is expected to be seen with light that may be missing, where that scatters exponentially about its mean.
+pub(super) struct Darkness {
+    /// Display cd/m².
+    pub(super) mean: Plane,
+    /// Of its square, (cd/m²)².
+    pub(super) mean_square: Plane,
+}
+
+impl Darkness {
+    /// `shown`: the picture as displayed with so much more light.
+    pub(super) fn of(missed: &Plane, shown: impl Fn(&Plane) -> Plane) -> Self {
+        /// Means of the fifths of an exponential variable of mean 1.
+        const FIFTHS: [f32; 5] = [0.107, 0.360, 0.700, 1.223, 2.610];
+        let none = missed.map(|_| 0.0);
+        let mut darkness = Self { mean: none.clone(), mean_square: none.clone() };
+        if missed.values().iter().all(|&light| light == 0.0) {
+            return darkness;
+        }
+        let without = shown(&none);
+        for times in FIFTHS {
+            let brighter = shown(&missed.map(|light| times * light)).combined(&without, |with, without| with - without);
+            let share = 1.0 / FIFTHS.len() as f32;
+            darkness.mean = darkness.mean.combined(&brighter, |sum, brighter| sum + share * brighter);
+            darkness.mean_square =
+                darkness.mean_square.combined(&brighter, |sum, brighter| sum + share * brighter * brighter);
+        }
+        darkness
     }
-    let without = shown(&missed.map(|_| 0.0));
-    FIFTHS.iter().fold(missed.map(|_| 0.0), |sum, times| {
-        let with = shown(&missed.map(|light| times * light));
-        let brighter = with.combined(&without, |with, without| (with - without) / FIFTHS.len() as f32);
-        sum.combined(&brighter, |sum, brighter| sum + brighter)
-    })
 }
 
 #[cfg(test)]
@@ -156,9 +173,9 @@ mod tests {
     #[test]
     fn no_more_than_white_is_missing() {
         let missed = Plane::from_fn(3, 1, |x, _| [0.0, 1.0, 1e6][x]);
-        let dark = expected_darkness(&missed, |light| light.map(|light| (50.0 + light).min(200.0)));
-        assert_eq!(dark.get(0, 0), 0.0);
-        assert!((dark.get(1, 0) - 1.0).abs() < 0.01, "{}", dark.get(1, 0));
-        assert!((dark.get(2, 0) - 150.0).abs() < 0.01, "{}", dark.get(2, 0));
+        let dark = Darkness::of(&missed, |light| light.map(|light| (50.0 + light).min(200.0)));
+        assert_eq!(dark.mean.get(0, 0), 0.0);
+        assert!((dark.mean.get(1, 0) - 1.0).abs() < 0.01, "{}", dark.mean.get(1, 0));
+        assert!((dark.mean.get(2, 0) - 150.0).abs() < 0.01, "{}", dark.mean.get(2, 0));
     }
 }

@@ -13,6 +13,7 @@ mod gain;
 pub mod glimpse;
 pub mod judge;
 mod limits;
+mod missed;
 mod monitor;
 mod next;
 pub mod plan;

@@ -17,13 +17,19 @@ pub(super) fn settings() -> LoopSettings {
 
 /// A pilot at 64×64 of `color(pixel, random in −1..1)`.
 pub(super) fn film_of(color: impl Fn(u32, f32) -> Vec3) -> Film {
+    film_of_lamps(color, |_| false)
+}
+
+/// The same of pixels of which some shine.
+pub(super) fn film_of_lamps(color: impl Fn(u32, f32) -> Vec3, shines: impl Fn(u32) -> bool) -> Film {
     let mut film = Film::new(64, 64);
     for block in pilot_plan(&film, 16).blocks {
         let mut sum = BlockSum::default();
+        let shines = shines(block.pixel);
+        let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines };
         for index in block.first..block.first + block.samples {
             let key = u64::from(block.pixel) << 8 | u64::from(index);
             let random = (hash_words(key, block.half.index() as u64) >> 40) as f32 / 8_388_608.0 - 1.0;
-            let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: false };
             sum.add(&PathSample { radiance: color(block.pixel, random), first_hit, rays: 1 });
         }
         film.merge_block(block, &sum);

@@ -1,6 +1,7 @@
 //! The steps of a look, each of what was found before it: guide and tone, scatter, thresholds, and what chromatic noise shows.
 
 use super::super::denoised::TimedDenoising;
+use super::super::missed::{Darkness, EdgeProfile, missed_light};
 use super::super::settings::LoopSettings;
 use super::super::statistics::{SampleStatistics, by_channel, scene_units};
 use super::{JudgeError, display_scale, guide_rgb, still_wanted, variance_shares};
@@ -95,6 +96,25 @@ impl Scatter {
     /// Variance of each pixel's mean of which this is one sample's.
     pub(super) fn of_mean(&self, per_sample: &Plane) -> Plane {
         per_sample.combined(&self.shares, |sample, share| sample * share)
+    }
+
+    /// Variance of one sample that shows as much as light of lamps beside a pixel that none of its samples has met; `None` where the pixel
+    /// filter tells of no neighbour. Pixels that lamps cover by a hundredth said that they had no variance, among neighbours that are
+    /// unlike them: globes on black were called done at 5 times the visibility that was asked for.
+    pub(super) fn missed_per_sample(
+        &self,
+        film: &Film,
+        estimate: &Estimate,
+        tone: &dyn FittedTone,
+        settings: &LoopSettings,
+    ) -> Option<Plane> {
+        let sampled = &estimate.luminance_cd_m2;
+        let missed = missed_light(&EdgeProfile::of(settings.filter)?, film, sampled, 0.0);
+        let darkness = Darkness::of(&missed, |light| {
+            let whole = sampled.combined(light, |sampled, missed| sampled + missed);
+            seen::display_luminance(tone, &settings.viewing.display, &whole)
+        });
+        Some(darkness.mean_square.combined(&self.shares, |square, share| square / share))
     }
 
     pub(super) fn luminance_variance_of_mean(&self) -> Plane {

@@ -1,6 +1,6 @@
 use super::*;
 use crate::adaptive::is_reached;
-use crate::adaptive::test_films::{film_of, settings};
+use crate::adaptive::test_films::{film_of, film_of_lamps, settings};
 use crate::denoise::Denoiser;
 use crate::film::BlockSum;
 use crate::integrator::{BlockWork, FirstHit, PathSample};
@@ -90,6 +90,26 @@ fn a_clipped_lamp_does_not_trouble_its_neighbours() {
     let beside = |film: &Film| judge(film, &settings(), 1.0).expect("judges").pooled_variance_per_sample.get(37, 32);
     let (before, after) = (beside(&film), beside(&lit));
     assert!(after < 4.0 * before, "variance beside the lamp went from {before} to {after}");
+}
+
+/// A lamp's rim that none of sixteen samples has met leaves no scatter, and yet is not done: the pixel beside it says that a hundredth of
+/// the filter's light comes from the lamp.
+#[test]
+fn a_rim_that_no_sample_met_is_seen() {
+    let column = |pixel: u32| pixel % 64;
+    let radiance = |pixel: u32| match column(pixel) {
+        0..=31 => 40.0,
+        32 => 20.0,
+        _ => 0.01,
+    };
+    let film = film_of_lamps(|pixel, _| Vec3::splat(radiance(pixel)), |pixel| column(pixel) <= 32);
+    let judgement = judge_to_plan(&film, &settings(), 1.0).expect("judges");
+    // 1.3 % of 4,000 cd/m², less for sixteen samples without it: 43 cd/m² on 1.
+    let displayed = (judgement.pooled_variance_per_sample.get(33, 32) / 16.0).sqrt();
+    assert!((20.0..80.0).contains(&displayed), "{displayed} cd/m²");
+    assert!(!is_reached(&judgement, 4.0), "v = {}", judgement.predicted.get(33, 32));
+    assert!(judgement.variance_per_sample.is_some_and(|halves| halves.iter().all(|half| half.get(33, 32) > 1000.0)));
+    assert_eq!(judgement.pooled_variance_per_sample.get(40, 32), 0.0, "not where the filter does not reach");
 }
 
 /// An operator that sees rods is fitted to what they see: of blue, more than cones do.
