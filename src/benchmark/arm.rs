@@ -95,16 +95,24 @@ impl Arm {
 
     /// Where the search of the arm's knob begins; `None` for arms without one. Every knob is like an error: what is left
     /// goes as the knob does.
+    ///
+    /// Uniform sampling takes the power of two that is nearest, as the loop's pixels do: between them the sequence's points lie less evenly, and
+    /// 14 samples of `complementary-lamps` had 1.19 times the squared error of 16, times the samples.
     pub(super) fn first_knob(self, subject: &Subject, uniform_spp: f64) -> Option<f64> {
         match self {
             Arm::Relative => Some(0.01 * subject.visibility),
             Arm::Variance => Some(0.02 * subject.visibility),
             // A mean count n, as 1/√n.
-            Arm::Uniform => Some(uniform_spp.sqrt().recip()),
+            Arm::Uniform => Some(uniform_spp.max(4.0).log2().round().exp2().sqrt().recip()),
             Arm::Budget => Some((0.5 * uniform_spp).sqrt().recip()),
             Arm::AsAsked | Arm::UniformEqualTime | Arm::ToThreshold => None,
             _ => Some(subject.visibility),
         }
+    }
+
+    /// Whether the knob is turned until the picture is at v\*. What uniform sampling is off by is scaled away: its error is that of its count.
+    pub(super) fn is_searched(self) -> bool {
+        self != Arm::Uniform
     }
 
     pub(super) fn settings(self, subject: &Subject, knob: f64, uniform_spp: f64) -> Result<LoopSettings> {
@@ -159,12 +167,21 @@ fn most_samples(uniform_spp: f64, pilot_samples: u32) -> u32 {
 
 /// Samples a pixel of a knob that stands for a mean count.
 fn samples_of(knob: f64) -> u32 {
-    (1.0 / (knob * knob)).ceil().clamp(4.0, 1e9) as u32
+    // Nearly whole: the knob of a count comes back from a root.
+    (1.0 / (knob * knob) - 1e-6).ceil().clamp(4.0, 1e9) as u32
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_count_comes_back_from_its_knob() {
+        for exponent in 2..20 {
+            let count = f64::from(1 << exponent);
+            assert_eq!(f64::from(samples_of(count.sqrt().recip())), count);
+        }
+    }
 
     #[test]
     fn an_arm_may_take_its_pilot_however_little_uniform_sampling_needs() {

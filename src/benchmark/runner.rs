@@ -142,6 +142,7 @@ impl<'a> ArmRunner<'a> {
         };
         let judged = match arm.first_knob(self.subject, uniform_spp) {
             None => self.judged(arm, 0, None)?,
+            Some(knob) if !arm.is_searched() => self.judged(arm, 0, Some(knob))?,
             Some(first) => nearest(first, |knob| {
                 let judged = self.judged(arm, 0, Some(knob))?;
                 let energy = judged.run.squared_visibility.as_ref().context("a fresh run")?;
