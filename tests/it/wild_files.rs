@@ -182,7 +182,8 @@ const TRIANGLE: &str = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes
 "meshes":[{"name":"piece","primitives":[{"attributes":{"POSITION":0ATTRIBUTES}MORE}]}],
 "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]},
 {"componentType":5126,"count":3,"type":"VEC3"},{"componentType":5126,"count":3,"type":"VEC4"},
-{"bufferView":0,"componentType":5126,"count":2,"type":"SCALAR","min":[0],"max":[0]}],
+{"bufferView":0,"componentType":5126,"count":2,"type":"SCALAR","min":[0],"max":[0]},
+{"bufferView":0,"componentType":5126,"count":3,"type":"VEC2"}],
 "bufferViews":[{"buffer":0,"byteLength":36}],
 "buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]}"#;
 
@@ -269,4 +270,32 @@ fn nothing_of_our_own_format_is_dropped() {
         let refused = of(&format!("{part}[materials.m]\ntype = \"mix\"\nmaterials = [\"a\", \"b\"]")).unwrap_err();
         assert!(refused.contains(&format!("\"a\" has {what}")) && refused.contains("s.toml:12"), "{refused}");
     }
+}
+
+fn with_material(extensions: &str) -> Result<Scene, String> {
+    let top = format!(r#""materials":[{{"name":"lacquer","extensions":{{{extensions}}}}}],"#);
+    read(&[("t.gltf", triangle("", ",\"material\":0", &top).as_bytes())])
+}
+
+/// As those of the core are, which the crate reads.
+#[test]
+fn values_of_gltf_extensions_are_of_their_type() {
+    for (extensions, key) in [
+        (r#""KHR_materials_clearcoat":{"clearcoatFactor":"1"}"#, "clearcoatFactor"),
+        (r#""KHR_materials_clearcoat":{"clearcoatRoughnessFactor":[1]}"#, "clearcoatRoughnessFactor"),
+        (r#""KHR_materials_clearcoat":{"clearcoatTexture":{"index":"0"}}"#, "clearcoatTexture"),
+        (r#""KHR_materials_sheen":{"sheenColorFactor":1}"#, "sheenColorFactor"),
+        (r#""KHR_materials_sheen":{"sheenColorFactor":[1,1]}"#, "sheenColorFactor"),
+        (r#""KHR_materials_sheen":{"sheenColorFactor":[1,1,"1"]}"#, "sheenColorFactor"),
+        (r#""KHR_materials_anisotropy":{"anisotropyStrength":true}"#, "anisotropyStrength"),
+        (r#""KHR_materials_anisotropy":{"anisotropyRotation":"1"}"#, "anisotropyRotation"),
+        (r#""KHR_materials_sheen":3"#, "KHR_materials_sheen"),
+    ] {
+        let error = with_material(extensions).expect_err(extensions);
+        assert!(error.contains(key) && error.contains("lacquer"), "{error}");
+    }
+    let scene = with_material(r#""KHR_materials_clearcoat":{"clearcoatFacter":1,"extras":{}}"#).unwrap();
+    let expected = "\"lacquer\": KHR_materials_clearcoat has no \"clearcoatFacter\"; did you mean \"clearcoatFactor\"?";
+    assert!(has_note(&scene, expected) && !has_note(&scene, "extras"), "{:?}", scene.notes);
+    assert!(with_material(r#""KHR_materials_sheen":{"sheenColorFactor":[1,0.5,0]}"#).is_ok());
 }

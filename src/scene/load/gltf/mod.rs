@@ -8,6 +8,7 @@ mod animation;
 mod buffers;
 mod deform;
 mod document;
+mod extension;
 mod material;
 mod motion;
 
