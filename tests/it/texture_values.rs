@@ -181,3 +181,35 @@ fn the_colours_of_a_card_are_not_multiplied_by_alpha_twice() {
     std::fs::write(folder.path().join("m.mtl"), "newmtl m\nillum 1\nmap_Kd p.exr\nmap_d p.exr\n").unwrap();
     assert_eq!(colors("card.obj", quad)[0], 0.4);
 }
+
+/// A Radiance picture of 2 × 1 pixels.
+fn radiance(format: &str, resolution: &str, pixels: [[u8; 4]; 2]) -> Vec<u8> {
+    let header = format!("#?RADIANCE\nFORMAT={format}\n\n{resolution}\n");
+    [header.as_bytes(), pixels.as_flattened()].concat()
+}
+
+fn environment(bytes: &[u8]) -> Result<Scene, String> {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("p.hdr"), bytes).unwrap();
+    let path = folder.path().join("s.toml");
+    let text = "[environment]\nimage = \"p.hdr\"\n[[objects]]\nsphere = { center = [0, 0, 0], radius = 1 }\nmaterial = \"m\"\n\
+                [materials.m]\ntype = \"diffuse\"\nreflectance = 0.5\n";
+    std::fs::write(&path, text).unwrap();
+    load(&path, &LoadOptions::default()).map_err(|error| error.to_string())
+}
+
+/// Radiance writes CIE XYZ as well, in its own primaries' white of equal energy, and rows in any order. What is not read is said to be
+/// not read, not to be damaged.
+#[test]
+fn radiance_pictures_of_other_kinds_are_told_apart() {
+    let grey = [[128, 128, 128, 128], [64, 64, 64, 128]];
+    let plain = environment(&radiance("32-bit_rle_rgbe", "-Y 1 +X 2", grey)).expect("read").environment.unwrap();
+    let xyz = environment(&radiance("32-bit_rle_xyze", "-Y 1 +X 2", grey)).expect("read").environment.unwrap();
+    for (plain, xyz) in plain.texels.iter().zip(xyz.texels.iter()) {
+        assert!(plain.abs_diff_eq(*xyz, 1e-3), "{plain} and {xyz}: equal energy is white");
+    }
+    for (resolution, what) in [("+Y 1 +X 2", "+Y +X"), ("-Y 1 -X 2", "-Y -X"), ("+X 2 -Y 1", "+X -Y")] {
+        let error = environment(&radiance("32-bit_rle_rgbe", resolution, grey)).unwrap_err();
+        assert!(error.contains(&format!("Orientation {what}")) && error.contains("not read"), "{error}");
+    }
+}

@@ -118,6 +118,9 @@ pub(in crate::scene::load) fn decode_bytes(
     let bytes = &*with_known_header(bytes);
     let wrong = |error: image::ImageError| match error {
         image::ImageError::Limits(_) => LoadError::too_large(name, format_args!("the picture is too large: {error}")),
+        image::ImageError::Unsupported(_) => {
+            LoadError::unsupported(name, format_args!("a picture of a kind that is not read: {error}"))
+        }
         _ => LoadError::invalid(name, format_args!("not a readable picture: {error}")),
     };
     let Some(format) = format_of(bytes, name) else {
