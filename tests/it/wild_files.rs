@@ -272,6 +272,29 @@ fn nothing_of_our_own_format_is_dropped() {
     }
 }
 
+/// Nodes that share a camera are two cameras.
+#[test]
+fn every_camera_of_gltf_has_a_name() {
+    let top = r#""cameras":[{"name":"Cam","type":"perspective","perspective":{"yfov":1,"znear":0.1}}],"#;
+    let text = triangle("", "", top).replace(r#""nodes":[0]"#, r#""nodes":[0,1,2,3]"#).replace(
+        r#"{"mesh":0}]"#,
+        r#"{"mesh":0},{"name":"left","camera":0,"translation":[-1,0,4]},
+            {"name":"right","camera":0,"translation":[1,0,4]},{"camera":0,"translation":[2,0,4]}]"#,
+    );
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("t.gltf");
+    std::fs::write(&path, text).unwrap();
+    let chosen = |name: &str| {
+        let options = LoadOptions { camera: Some(name.to_owned()), ..LoadOptions::default() };
+        load(&path, &options).map(|scene| scene.camera.position.x).map_err(|error| error.to_string())
+    };
+    for (name, x) in [("Cam", -1.0), ("left", -1.0), ("right", 1.0), ("node 3", 2.0)] {
+        assert_eq!(chosen(name), Ok(x), "{name}");
+    }
+    let error = chosen("nowhere to be seen").unwrap_err();
+    assert!(error.contains("left, right, node 3"), "{error}");
+}
+
 fn with_material(extensions: &str) -> Result<Scene, String> {
     let top = format!(r#""materials":[{{"name":"lacquer","extensions":{{{extensions}}}}}],"#);
     read(&[("t.gltf", triangle("", ",\"material\":0", &top).as_bytes())])

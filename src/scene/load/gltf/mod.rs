@@ -298,7 +298,10 @@ impl<'a> Reader<'a> {
     }
 
     fn camera(&mut self, camera: &::gltf::Camera, node: &str, to_world: &Affine3A, motion: Option<Motion>) {
-        let name = camera.name().unwrap_or(node).to_owned();
+        let (name, holder) = match camera.name() {
+            Some(name) => (name.to_owned(), Some(node.to_owned())),
+            None => (node.to_owned(), None),
+        };
         let position = Vec3::from(to_world.translation);
         let forward = to_world.transform_vector3(Vec3::NEG_Z).try_normalize();
         let up = to_world.transform_vector3(Vec3::Y).try_normalize();
@@ -324,7 +327,7 @@ impl<'a> Reader<'a> {
         }
         let framing = aspect.map_or(Framing::Fixed, Framing::Stated);
         let camera = Camera { projection, motion, ..Camera::pinhole(position, forward, up, 40.0) };
-        self.builder.cameras.push(NamedCamera { name, camera, framing });
+        self.builder.cameras.push(NamedCamera { name, holder, camera, framing });
     }
 
     fn light(&mut self, light: &::gltf::khr_lights_punctual::Light, to_world: &Affine3A) {

@@ -95,7 +95,7 @@ fn read(path: &Path, options: &LoadOptions) -> Result<(Builder, IfDark), LoadErr
         shutter.stays_open = camera.entries()?.get_or("shutter_s", 0.0, Value::non_negative)?;
         builder.shutter_s = shutter.stays_open;
         let camera = camera::read(&camera, shutter)?;
-        builder.cameras.push(NamedCamera { name: "camera".to_owned(), camera, framing: Framing::Fixed });
+        builder.cameras.push(NamedCamera { name: "camera".to_owned(), holder: None, camera, framing: Framing::Fixed });
     }
 
     let mut context =
