@@ -272,6 +272,18 @@ fn nothing_of_our_own_format_is_dropped() {
     }
 }
 
+/// `d 0` is no slip about the meaning of `Tr`, which `Tr 1` may be.
+#[test]
+fn an_opacity_of_nothing_is_one() {
+    let (_, unseen) = of_mtl("Kd 1 1 1\nd 0");
+    assert!(matches!(unseen.alpha, Alpha::Blend { value } if value.factor == 0.0), "{:?}", unseen.alpha);
+    let (scene, slip) = of_mtl("Kd 1 1 1\nTr 1");
+    assert!(slip.alpha == Alpha::Opaque && has_note(&scene, "Tr 1 is taken for opaque"), "{:?}", scene.notes);
+    let (scene, mapped) = of_mtl("Kd 0 0 0\nmap_Kd x.png\nPr 0\nmap_Pr x.png");
+    assert!(has_note(&scene, "Material \"m\": Kd 0, Pr 0 beside a picture"), "{:?}, {mapped:?}", scene.notes);
+    assert!(!has_note(&of_mtl("Kd 0.5 0 0\nmap_Kd x.png").0, "beside a picture"));
+}
+
 /// Nodes that share a camera are two cameras.
 #[test]
 fn every_camera_of_gltf_has_a_name() {
