@@ -284,6 +284,18 @@ fn an_opacity_of_nothing_is_one() {
     assert!(!has_note(&of_mtl("Kd 0.5 0 0\nmap_Kd x.png").0, "beside a picture"));
 }
 
+#[test]
+fn lines_may_end_as_on_old_macs() {
+    let obj = format!("mtllib m.mtl\n{QUAD}usemtl m\nf 1/1/1 2/2/1 3/3/1 4/4/1\n");
+    let mtl = "newmtl m\nKd 1 0 0\nillum 1\n";
+    for (obj, mtl) in [(obj.replace('\n', "\r"), mtl.to_owned()), (obj.clone(), mtl.replace('\n', "\r"))] {
+        let scene = scene(&[("q.obj", obj.as_bytes()), ("m.mtl", mtl.as_bytes())]);
+        assert_eq!(scene.materials[scene.instances[0].material.0 as usize].name, "m", "{:?}", scene.notes);
+    }
+    let error = read(&[("q.obj", obj.replace("f 1", "f 9").replace('\n', "\r").as_bytes())]).unwrap_err();
+    assert!(error.contains("q.obj:12:"), "{error}");
+}
+
 /// Nodes that share a camera are two cameras.
 #[test]
 fn every_camera_of_gltf_has_a_name() {
