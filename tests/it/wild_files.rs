@@ -346,3 +346,23 @@ fn values_of_gltf_extensions_are_of_their_type() {
     assert!(has_note(&scene, expected) && !has_note(&scene, "extras"), "{:?}", scene.notes);
     assert!(with_material(r#""KHR_materials_sheen":{"sheenColorFactor":[1,0.5,0]}"#).is_ok());
 }
+
+/// A picture that is not there ends no render, whatever names it.
+#[test]
+fn gltf_may_name_local_files_by_their_scheme() {
+    let of = |uri: &str| {
+        let top = format!(
+            r#""images":[{{"uri":"{uri}"}}],"textures":[{{"source":0}}],"materials":[{{"normalTexture":{{"index":0}}}}],"#
+        );
+        read(&[("t.gltf", triangle(",\"TEXCOORD_0\":4", ",\"material\":0", &top).as_bytes())])
+    };
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("a b.png");
+    image::RgbImage::from_pixel(1, 1, image::Rgb([10, 20, 30])).save(&path).unwrap();
+    for host in ["", "localhost"] {
+        let named = format!("file://{host}{}", path.to_str().unwrap().replace(' ', "%20").replace('\\', "/"));
+        assert_eq!(of(&named).unwrap().textures[0].sample_rgba(glam::Vec2::ZERO).x, 10.0 / 255.0, "{named}");
+    }
+    let remote = of("https://example.org/a.png").unwrap();
+    assert!(has_note(&remote, "https://example.org/a.png"), "{:?}", remote.notes);
+}

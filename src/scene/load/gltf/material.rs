@@ -244,7 +244,14 @@ impl<'a> Materials<'a> {
         let webp =
             others().find(|(name, _)| *name == "EXT_texture_webp").and_then(|(_, webp)| webp.get("source")?.as_u64());
         let index = webp.map_or(json.source.value(), |index| index as usize);
-        let Some(picture) = self.picture(index)? else {
+        let picture = match self.picture(index) {
+            Err(error) if error.is_unsupported() => {
+                builder.note(format!("Texture {}: {error}; left out.", texture.index()));
+                return Ok(None);
+            }
+            other => other?,
+        };
+        let Some(picture) = picture else {
             let extensions: Vec<&str> = others().map(|(name, _)| name.as_str()).collect();
             let why = if index < self.document.as_json().images.len() {
                 "its image has neither a file nor a buffer view".to_owned()
