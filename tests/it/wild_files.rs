@@ -296,6 +296,16 @@ fn lines_may_end_as_on_old_macs() {
     assert!(error.contains("q.obj:12:"), "{error}");
 }
 
+#[test]
+fn a_missing_material_file_is_told_as_what_it_costs() {
+    let obj = format!("mtllib none.mtl\nmtllib m.mtl\n{QUAD}usemtl m\nf 1/1/1 2/2/1 3/3/1\n");
+    let scene = scene(&[("q.obj", obj.as_bytes()), ("m.mtl", b"newmtl m\nKd 1 0 0\n")]);
+    assert!(has_note(&scene, "Material file \"none.mtl\" not found"), "{:?}", scene.notes);
+    assert!(!has_note(&scene, "grey stands in"), "{:?}", scene.notes);
+    let error = read(&[("q.obj", b"v 0 0 0\nv 1 0 0\n\nv nan 1 0\nf 1 2 3\n")]).unwrap_err();
+    assert!(error.contains("q.obj:4:"), "{error}");
+}
+
 /// Nodes that share a camera are two cameras.
 #[test]
 fn every_camera_of_gltf_has_a_name() {
