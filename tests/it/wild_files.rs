@@ -376,3 +376,22 @@ fn gltf_may_name_local_files_by_their_scheme() {
     let remote = of("https://example.org/a.png").unwrap();
     assert!(has_note(&remote, "https://example.org/a.png"), "{:?}", remote.notes);
 }
+
+#[test]
+fn what_gltf_cannot_show_is_told() {
+    let top = r#""images":[{"uri":"x.png"}],"textures":[{"source":0}],"materials":[{"pbrMetallicRoughness":
+        {"baseColorTexture":{"index":0}}}],"#;
+    let scene = scene(&[("t.gltf", triangle("", ",\"material\":0", top).as_bytes())]);
+    assert!(has_note(&scene, "\"piece\" has no texture coordinates"), "{:?}", scene.notes);
+    let plain = scene_of_light(r#"{"type":"point","intensity":10}"#);
+    assert!(!has_note(&plain, "negative"), "{:?}", plain.notes);
+    let negative = scene_of_light(r#"{"type":"point","intensity":-10}"#);
+    assert!(has_note(&negative, "negative"), "{:?}", negative.notes);
+}
+
+fn scene_of_light(light: &str) -> Scene {
+    let top = format!(r#""extensions":{{"KHR_lights_punctual":{{"lights":[{light}]}}}},"#);
+    let text = triangle("", "", &top)
+        .replace(r#"{"mesh":0}]"#, r#"{"mesh":0,"extensions":{"KHR_lights_punctual":{"light":0}}}]"#);
+    scene(&[("t.gltf", text.as_bytes())])
+}
