@@ -225,3 +225,12 @@ fn slips_in_operators_and_displays_have_their_place() {
     write("q.fechner.toml", "[view]\noperator = \"agx\"\ndisplay = \"own.toml\"\n");
     load(&folder.path().join("q.obj"), &LoadOptions::default()).unwrap();
 }
+
+/// A file that somebody has only begun says nothing.
+#[test]
+fn an_empty_side_file_adds_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("q.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    std::fs::write(folder.path().join("q.fechner.toml"), "").unwrap();
+    load(&folder.path().join("q.obj"), &LoadOptions::default()).unwrap();
+}
