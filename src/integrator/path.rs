@@ -152,8 +152,9 @@ impl PathTracer {
     ) -> bool {
         let wo = -Vec3::from(path.ray.direction);
         let components = Components::new();
-        let bsdf = self.bsdf(point, &components);
-        let shading = self.shading(&bsdf, point, wo, path.ray.time);
+        let frames = self.frames(point, wo, path.ray.time);
+        let bsdf = self.bsdf(point, &frames, &components);
+        let shading = self.shading(&bsdf, point, &frames);
         path.throughput *= match shading.medium {
             Some(medium) if wo.dot(point.geometric_normal) < 0.0 => {
                 path.media.transmittance_to_back_of(medium, hit.distance)
@@ -165,7 +166,7 @@ impl PathTracer {
             let albedo = shading.bsdf.albedo(shading.frame.to_local(wo)).clamp(Vec3::ZERO, Vec3::ONE);
             path.first_hit = FirstHit {
                 albedo: if emitted { Vec3::ONE } else { albedo },
-                normal: shading.frame.normal(),
+                normal: shading.normal,
                 depth: hit.distance,
                 object_id: hit.object + 1,
                 shines: emitted,

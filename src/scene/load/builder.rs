@@ -268,7 +268,7 @@ fn add_tangents(scene: &mut Scene, follow_maps: bool) {
     for instance in &scene.instances {
         let material = &scene.materials[instance.material.0 as usize];
         if material.needs_tangent() {
-            let map = material.relief.as_ref().filter(|_| follow_maps).and_then(Relief::texture).copied();
+            let map = material.reliefs().filter(|_| follow_maps).find_map(Relief::texture).copied();
             asked[instance.mesh.0 as usize].get_or_insert(map);
         }
     }

@@ -6,7 +6,7 @@ use super::super::texture::{Adjust, IfMissing, Picture, Request};
 use super::buffers::{Buffers, Uri, resolve};
 use super::extension::{ANISOTROPY, CLEARCOAT, Extension, SHEEN, name_of, share};
 use crate::scene::{
-    Alpha, ColorInput, Encoding, Material, MaterialId, MetalRoughness, Relief, ScalarInput,
+    Alpha, CoatRelief, ColorInput, Encoding, Material, MaterialId, MetalRoughness, Relief, ScalarInput,
     StretchDirection, Surface, TextureLookup, Wrap,
 };
 use glam::{Vec2, Vec3};
@@ -128,9 +128,7 @@ impl<'a> Materials<'a> {
             model.clearcoat = self.scalar(builder, &coat, ["clearcoatFactor", "clearcoatTexture"], 0)?;
             let keys = ["clearcoatRoughnessFactor", "clearcoatRoughnessTexture"];
             model.clearcoat_roughness = self.scalar(builder, &coat, keys, 1)?;
-            if coat.values.contains_key("clearcoatNormalTexture") {
-                builder.note("KHR_materials_clearcoat: the coat takes the base's normal map, not its own.");
-            }
+            model.coat_relief = CoatRelief::Own(self.coat_normals(builder, &coat)?);
         }
         if let Some(sheen) = Extension::of(self.path, builder, from, &SHEEN)? {
             let texture = self.picture_of(builder, &sheen, "sheenColorTexture", Encoding::Srgb, [255; 4])?;
@@ -160,6 +158,17 @@ impl<'a> Materials<'a> {
             };
         }
         Ok(model)
+    }
+
+    /// The normal map of KHR_materials_clearcoat; without one the coat is smooth, whatever lies beneath it.
+    fn coat_normals(&mut self, builder: &mut Builder, coat: &Extension) -> Result<Option<Relief>, LoadError> {
+        let key = "clearcoatNormalTexture";
+        let map = self.picture_of(builder, coat, key, Encoding::Linear, [128, 128, 255, 255])?;
+        let strength = match coat.values.get(key).and_then(|info| info.get("scale")) {
+            None => 1.0,
+            Some(scale) => scale.as_f64().ok_or_else(|| coat.wrong(key, "its scale is no number"))? as f32,
+        };
+        Ok(map.map(|map| Relief::Normals { map, strength: if strength.is_finite() { strength } else { 1.0 } }))
     }
 
     /// The direction of KHR_materials_anisotropy: red and green of its texture, whose blue is the strength, and its rotation.
