@@ -153,6 +153,11 @@ fn coat_of(roughness: f32) -> Coat<'static> {
     COAT.coat(Microfacets::from(roughness.clamp(0.0, 1.0)).rough().as_ref())
 }
 
+/// What a clear coat of such coverage and roughness leaves of light that comes from beneath it and goes on at this cosine, in [0, 1].
+pub fn passed_by_clearcoat(clearcoat: f32, roughness: f32, cosine: f32) -> f32 {
+    1.0 - clearcoat.clamp(0.0, 1.0) * coat_of(roughness).reflectance(direction_at(cosine.clamp(0.0, 1.0)))
+}
+
 /// A direction in the frame of the coat and in that of what lies beneath.
 #[derive(Clone, Copy, Debug)]
 struct Seen {

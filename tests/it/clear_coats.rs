@@ -1,4 +1,4 @@
-//! Clear coats of glTF: smooth over a bumpy base unless they have bumps of their own.
+//! Clear coats of glTF: smooth over a bumpy base unless they have bumps of their own, and darkening what shines beneath them.
 
 use crate::support::{radiance_along, trace_settings};
 use fechner::geometry::Ray;
@@ -113,4 +113,32 @@ fn what_lies_beneath_a_smooth_coat_keeps_its_bumps() {
     let (bare, covered) = (light(0.0), light(1.0));
     // E at 0.3 rad is 0.0400: (1 − E)² / (1 − E).
     assert!((covered / bare - 0.96).abs() < 5e-3, "{bare} bare, {covered} under the coat");
+}
+
+/// `coated_emission = emission * (1 - clearcoat * fresnel)`; seen directly and as it lights others.
+#[test]
+fn what_shines_beneath_a_coat_is_darkened_by_it() {
+    let shining = |strength: f32| {
+        let mut material = coated(json!({"clearcoatFactor": 1}), &json!({"emissiveFactor": [1, 1, 1]}));
+        material["extensions"]["KHR_materials_emissive_strength"] = json!({"emissiveStrength": strength});
+        material
+    };
+    // Fresnel's equations at index 1.5.
+    for (angle_deg, passed) in [(0.0_f32, 0.96), (60.0, 0.9108), (75.0, 0.7469)] {
+        let tracer = tracer(&json!([shining(1000.0)]), &[json!({"mesh": 0})]);
+        let found = seen_from(&tracer, angle_deg.to_radians()) / 1000.0;
+        assert!((found - passed).abs() < 2e-4, "{angle_deg}°: {found}, expected {passed}");
+    }
+    // A lamp that is turned by 75° away from the floor below it, with and without the coat.
+    let floor = json!({"pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 1], "metallicFactor": 0}, "extensions":
+        {"KHR_materials_specular": {"specularFactor": 0}}});
+    let half = 0.5 * (180.0_f32 - 75.0).to_radians();
+    let aside = json!({"mesh": 1, "translation": [0, 0, 50], "rotation": [0.0, half.sin(), 0.0, half.cos()]});
+    let lit = |lamp: Value| {
+        let tracer = tracer(&json!([floor, lamp]), &[json!({"mesh": 0}), aside.clone()]);
+        seen_from(&tracer, 0.5)
+    };
+    let (bare, covered) = (lit(lamp(1e6)), lit(shining(1e6)));
+    assert!((covered / bare - 0.7469).abs() < 5e-3, "{bare} bare, {covered} under the coat");
+    assert!(Vec3::splat(bare).is_finite() && bare > 0.0);
 }
