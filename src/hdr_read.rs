@@ -62,22 +62,39 @@ fn primaries(metadata: &HdrMetadata) -> Option<Primaries> {
     (!own.is_like(&Primaries::REC709)).then_some(own)
 }
 
-/// The file as decoders know it: with the signature that they look for, where some programs write `#?RGBE`, and without the header's
-/// indented lines. Those are the headers of the pictures that it was made from, as `pcomb` and `pcompos` keep them; what they say was
-/// done to other pixels. Radiance takes variables at a line's start alone, the decoder's trims what stands before them.
+/// Primaries whose red, green and blue are CIE's X, Y and Z.
+const XYZ: &[u8] = b"PRIMARIES=1 0 0 1 0 0 0.3333333333 0.3333333333\n";
+
+/// Whether a line says that pixels are CIE XYZ.
+fn is_format_of_xyz(line: &[u8]) -> bool {
+    line.strip_prefix(b"FORMAT=").is_some_and(|format| format.trim_ascii() == b"32-bit_rle_xyze")
+}
+
+/// Whether a picture's pixels are CIE XYZ by its header.
+pub fn is_xyze(bytes: &[u8]) -> bool {
+    header_bytes(bytes).is_some_and(|end| bytes[..end].split(|&byte| byte == b'\n').any(is_format_of_xyz))
+}
+
+/// The file as decoders know it: with the signature that they look for, where some programs write `#?RGBE`, with CIE XYZ as colours of
+/// such primaries, and without the header's indented lines. Those are the headers of the pictures that it was made from, as `pcomb` and
+/// `pcompos` keep them; what they say was done to other pixels. Radiance takes variables at a line's start alone, the decoder's trims what
+/// stands before them.
 pub fn with_known_header(bytes: &[u8]) -> Cow<'_, [u8]> {
     let Some(header_bytes) = header_bytes(bytes) else { return Cow::Borrowed(bytes) };
     let (header, pixels) = bytes.split_at(header_bytes);
     let is_own = |line: &&[u8]| !matches!(line, [b' ' | b'\t', ..]);
     let is_rgbe = header.strip_prefix(b"#?RGBE").is_some_and(|rest| rest.first().is_some_and(u8::is_ascii_whitespace));
     let lines = || header.split_inclusive(|&byte| byte == b'\n');
-    if !is_rgbe && lines().all(|line| is_own(&line)) {
+    let is_xyz = lines().any(is_format_of_xyz);
+    if !is_rgbe && !is_xyz && lines().all(|line| is_own(&line)) {
         return Cow::Borrowed(bytes);
     }
     let mut known = Vec::with_capacity(bytes.len() + 4);
     for line in lines().filter(is_own) {
         match line.strip_prefix(b"#?RGBE") {
             Some(rest) if is_rgbe && known.is_empty() => known.extend([b"#?RADIANCE", rest].concat()),
+            _ if is_format_of_xyz(line) => known.extend([b"FORMAT=32-bit_rle_rgbe\n", XYZ].concat()),
+            _ if is_xyz && line.starts_with(b"PRIMARIES=") => {}
             _ => known.extend_from_slice(line),
         }
     }

@@ -67,7 +67,7 @@ pub use mix::Mix;
 pub use oren_nayar::OrenNayar;
 pub use phong::Phong;
 pub use thin_dielectric::ThinDielectric;
-pub use varnish::{Varnish, Varnished};
+pub use varnish::{Varnish, Varnished, passed_by_clearcoat};
 pub use ward::Ward;
 
 /// Slope width α below which a microfacet surface counts as perfectly smooth. Its lobe would be 0.06° wide: less than a

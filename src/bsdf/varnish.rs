@@ -8,6 +8,9 @@
 //! what the layer turns back inside is not followed. What goes through a volume's boundary passes the layer once, by
 //! 1 − E of the direction outside; light that stays inside does not meet it.
 //!
+//! A coat may be smooth over bumps: then it has a frame of its own, and what is on the one side of it and on the other of what lies
+//! beneath passes nothing.
+//!
 //! Sources: Khronos Group, KHR_materials_clearcoat and KHR_materials_sheen; A. Estevez & C. Kulla, *Production friendly
 //! microfacet sheen BRDF* (2017), eq. 2, for the fibres' distribution; D. Neubelt & M. Pettineo (2013) for their visibility
 //! 1/(4(cos θo + cos θi − cos θo cos θi)), with which fibres of roughness below 0.5 reflect more than comes in at grazing
@@ -16,10 +19,11 @@
 use super::albedo_table::{AlbedoTable, direction_at};
 use super::coat::{Coat, CoatTables};
 use super::metal_roughness::MetalRoughness;
+use super::microfacets::Microfacets;
 use super::mirror::reflect_about_normal;
-use super::{Bsdf, BsdfEvaluation, BsdfSample, fresnel, to_front, turn, warp};
+use super::{Bsdf, BsdfEvaluation, BsdfSample, fresnel, turn, warp};
 use crate::scene::Distribution;
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 use std::f32::consts::TAU;
 use std::sync::LazyLock;
 
@@ -68,6 +72,8 @@ impl Varnished<'_> {
 #[derive(Clone, Copy, Debug)]
 pub struct Varnish<'a> {
     base: Varnished<'a>,
+    /// From the frame of the coat; `None` where both have the same.
+    to_base: Option<Mat3>,
     coat: Coat<'static>,
     clearcoat: f32,
     /// What the coat passes face on.
@@ -142,6 +148,40 @@ impl Sheen {
     }
 }
 
+/// A coat of index 1.5.
+fn coat_of(roughness: f32) -> Coat<'static> {
+    COAT.coat(Microfacets::from(roughness.clamp(0.0, 1.0)).rough().as_ref())
+}
+
+/// What a clear coat of such coverage and roughness leaves of light that comes from beneath it and goes on at this cosine, in [0, 1].
+pub fn passed_by_clearcoat(clearcoat: f32, roughness: f32, cosine: f32) -> f32 {
+    1.0 - clearcoat.clamp(0.0, 1.0) * coat_of(roughness).reflectance(direction_at(cosine.clamp(0.0, 1.0)))
+}
+
+/// A direction in the frame of the coat and in that of what lies beneath.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    by_coat: Vec3,
+    by_base: Vec3,
+}
+
+impl Seen {
+    /// Whether it is on the same side of both. What is not would leak light.
+    fn sides_agree(&self) -> bool {
+        let [coat, base] = [self.by_coat.z, self.by_base.z];
+        coat > 0.0 && base > 0.0 || coat < 0.0 && base < 0.0
+    }
+
+    /// The direction mirrored in the plane of each.
+    fn turned(self) -> Self {
+        Self { by_coat: turn(self.by_coat), by_base: turn(self.by_base) }
+    }
+
+    fn turned_if(self, is_turned: bool) -> Self {
+        if is_turned { self.turned() } else { self }
+    }
+}
+
 impl<'a> Varnish<'a> {
     /// Layers as in the file's head over a base.
     pub fn new(
@@ -151,11 +191,12 @@ impl<'a> Varnish<'a> {
         sheen_color: Vec3,
         sheen_roughness: f32,
     ) -> Self {
-        let coat = COAT.coat(super::Microfacets::from(clearcoat_roughness.clamp(0.0, 1.0)).rough().as_ref());
+        let coat = coat_of(clearcoat_roughness);
         let clearcoat = clearcoat.clamp(0.0, 1.0);
         let color = sheen_color.clamp(Vec3::ZERO, Vec3::ONE);
         Self {
             base,
+            to_base: None,
             coat,
             clearcoat,
             coat_passes: 1.0 - clearcoat * coat.reflectance(Vec3::Z),
@@ -163,76 +204,106 @@ impl<'a> Varnish<'a> {
         }
     }
 
+    /// The same where what lies beneath the coat has another normal. Directions are then in the frame of the coat, and the rotation
+    /// takes them to that of the fibres and the base.
+    pub fn over_relief(self, to_base: Option<Mat3>) -> Self {
+        Self { to_base, ..self }
+    }
+
+    fn seen(&self, w: Vec3) -> Seen {
+        Seen { by_coat: w, by_base: self.to_base.map_or(w, |to_base| to_base * w) }
+    }
+
     pub(super) fn has_smooth_lobe(&self) -> bool {
         self.base.has_smooth_lobe() || self.sheen.is_some() || self.clearcoat > 0.0 && self.coat.facets.is_some()
     }
 
-    fn coat_passed(&self, w: Vec3) -> f32 {
-        1.0 - self.clearcoat * self.coat.reflectance(w)
+    fn coat_passed(&self, w: &Seen) -> f32 {
+        1.0 - self.clearcoat * self.coat.reflectance(w.by_coat)
     }
 
     /// What the coat and the sheen leave of what passes both ways; directions of the upper half.
-    fn passed_to_base(&self, wo: Vec3, wi: Vec3) -> f32 {
+    fn passed_to_base(&self, wo: &Seen, wi: &Seen) -> f32 {
         let coat = self.coat_passed(wo) * self.coat_passed(wi) / self.coat_passes;
-        let sheen = self.sheen.as_ref().map_or(1.0, |sheen| sheen.passed(wo) * sheen.passed(wi) / sheen.passes);
+        let sheen =
+            self.sheen.as_ref().map_or(1.0, |sheen| sheen.passed(wo.by_base) * sheen.passed(wi.by_base) / sheen.passes);
         coat * sheen
     }
 
     /// What the layers leave of light that comes from `wo` above and goes to `wi` through the base, on either side.
-    fn passed(&self, wo: Vec3, wi: Vec3) -> f32 {
+    fn passed(&self, wo: &Seen, wi: &Seen) -> f32 {
         match self.base {
-            _ if wi.z > 0.0 => self.passed_to_base(wo, wi),
-            Varnished::Sheet(_) => self.passed_to_base(wo, turn(wi)),
+            _ if wi.by_coat.z > 0.0 => self.passed_to_base(wo, wi),
+            Varnished::Sheet(_) => self.passed_to_base(wo, &wi.turned()),
             Varnished::Boundary(_) => self.passed_once(wo),
         }
     }
 
     /// What the coat and the sheen leave of what passes them once, to or from `w` above.
-    fn passed_once(&self, w: Vec3) -> f32 {
-        self.coat_passed(w) * self.sheen.as_ref().map_or(1.0, |sheen| sheen.passed(w))
+    fn passed_once(&self, w: &Seen) -> f32 {
+        self.coat_passed(w) * self.sheen.as_ref().map_or(1.0, |sheen| sheen.passed(w.by_base))
     }
 
     /// Whether a direction is in the volume.
-    fn is_inside(&self, w: Vec3) -> bool {
-        matches!(self.base, Varnished::Boundary(_)) && w.z < 0.0
+    fn is_inside(&self, w: &Seen) -> bool {
+        matches!(self.base, Varnished::Boundary(_)) && w.by_coat.z < 0.0
     }
 
     /// What the layers leave of light that meets the boundary from inside and goes to `wi`.
-    fn passed_from_inside(&self, wi: Vec3) -> f32 {
-        if wi.z > 0.0 { self.passed_once(wi) } else { 1.0 }
+    fn passed_from_inside(&self, wi: &Seen) -> f32 {
+        if wi.by_coat.z > 0.0 { self.passed_once(wi) } else { 1.0 }
     }
 
     /// Probabilities of coat and sheen; the rest is the base's.
-    fn shares(&self, wo: Vec3) -> [f32; 2] {
+    fn shares(&self, wo: &Seen) -> [f32; 2] {
+        if !wo.sides_agree() {
+            return [1.0, 0.0];
+        }
         let passed = self.coat_passed(wo);
-        let sheen = self.sheen.as_ref().map_or(0.0, |sheen| passed * sheen.color.max_element() * sheen.albedo(wo));
+        let sheen =
+            self.sheen.as_ref().map_or(0.0, |sheen| passed * sheen.color.max_element() * sheen.albedo(wo.by_base));
         let left = passed - sheen;
-        let base = (left * self.base.albedo(wo).max_element()).max(0.05 * left);
+        let base = (left * self.base.albedo(wo.by_base).max_element()).max(0.05 * left);
         let total = 1.0 - passed + sheen + base;
         [(1.0 - passed) / total, sheen / total]
     }
 
     pub(super) fn evaluate(&self, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
-        if self.is_inside(wo) {
-            let BsdfEvaluation { value, pdf } = self.base.evaluate(wo, wi);
-            return BsdfEvaluation { value: value * self.passed_from_inside(wi), pdf };
+        let (wo, wi) = (self.seen(wo), self.seen(wi));
+        if self.is_inside(&wo) {
+            let BsdfEvaluation { value, pdf } = self.evaluate_base(&wo, &wi);
+            return BsdfEvaluation { value: value * self.passed_from_inside(&wi), pdf };
         }
-        let (wo, wi) = to_front(wo, wi);
-        if wo.z > 0.0 && wi.z != 0.0 { self.evaluate_front(self.shares(wo), wo, wi) } else { BsdfEvaluation::BLACK }
+        if wo.by_coat.z == 0.0 || wi.by_coat.z == 0.0 {
+            return BsdfEvaluation::BLACK;
+        }
+        let shares = self.shares(&wo.turned_if(wo.by_coat.z < 0.0));
+        self.evaluate_layers(shares, wo, wi)
     }
 
-    fn evaluate_front(&self, [coat_share, sheen_share]: [f32; 2], wo: Vec3, wi: Vec3) -> BsdfEvaluation {
-        let base = self.base.evaluate(wo, wi);
-        let mut value = base.value * self.passed(wo, wi);
+    fn evaluate_base(&self, wo: &Seen, wi: &Seen) -> BsdfEvaluation {
+        match wo.sides_agree() && wi.sides_agree() {
+            true => self.base.evaluate(wo.by_base, wi.by_base),
+            false => BsdfEvaluation::BLACK,
+        }
+    }
+
+    /// For a `wo` that is not in a volume.
+    fn evaluate_layers(&self, [coat_share, sheen_share]: [f32; 2], wo: Seen, wi: Seen) -> BsdfEvaluation {
+        let base = self.evaluate_base(&wo, &wi);
+        let is_turned = wo.by_coat.z < 0.0;
+        let (wo, wi) = (wo.turned_if(is_turned), wi.turned_if(is_turned));
+        let reaches_base = wo.sides_agree() && wi.sides_agree();
+        let mut value = if reaches_base { base.value * self.passed(&wo, &wi) } else { Vec3::ZERO };
         let mut pdf = base.pdf * (1.0 - coat_share - sheen_share).max(0.0);
-        if wi.z > 0.0 {
-            if let Some(sheen) = &self.sheen {
-                let coat = self.coat_passed(wo) * self.coat_passed(wi) / self.coat_passes;
-                value += sheen.color * (sheen.scale * coat * fibres(wo, wi, sheen.inverse_alpha));
-                pdf += sheen_share * warp::cosine_hemisphere_pdf(wi.z);
+        if wi.by_coat.z > 0.0 {
+            if let Some(sheen) = self.sheen.as_ref().filter(|_| reaches_base) {
+                let coat = self.coat_passed(&wo) * self.coat_passed(&wi) / self.coat_passes;
+                value += sheen.color * (sheen.scale * coat * fibres(wo.by_base, wi.by_base, sheen.inverse_alpha));
+                pdf += sheen_share * warp::cosine_hemisphere_pdf(wi.by_base.z);
             }
             if let Some(facets) = &self.coat.facets {
-                let facet = facets.reflect(wo, wi);
+                let facet = facets.reflect(wo.by_coat, wi.by_coat);
                 let reflectance = fresnel::dielectric(facet.cos_half, self.coat.eta).reflectance;
                 value += Vec3::splat(self.clearcoat * reflectance * facet.value);
                 pdf += coat_share * facet.pdf;
@@ -245,59 +316,86 @@ impl<'a> Varnish<'a> {
         if wo.z == 0.0 {
             return None;
         }
-        if self.is_inside(wo) {
-            let sample = self.base.sample(wo, u)?;
-            return Some(BsdfSample { weight: sample.weight * self.passed_from_inside(sample.wi), ..sample });
+        let seen = self.seen(wo);
+        if self.is_inside(&seen) {
+            let sample = self.sample_base(&seen, u)?;
+            let passed = self.passed_from_inside(&self.seen(sample.wi));
+            return Some(BsdfSample { weight: sample.weight * passed, ..sample });
         }
-        let front = if wo.z < 0.0 { turn(wo) } else { wo };
-        let shares = self.shares(front);
+        let is_turned = wo.z < 0.0;
+        let front = seen.turned_if(is_turned);
+        let shares = self.shares(&front);
         let [coat_share, sheen_share] = shares;
         let point = [u[0], u[1]];
-        let wi = if u[2] < coat_share {
-            match &self.coat.facets {
-                Some(facets) => facets.sample_reflection(front, point)?,
-                None => {
-                    let weight = Vec3::splat(self.clearcoat * self.coat.reflectance(front) / coat_share);
-                    return Some(BsdfSample::reflected_delta(reflect_about_normal(wo), weight, coat_share));
-                }
-            }
-        } else if u[2] < coat_share + sheen_share {
-            warp::cosine_hemisphere(point)
-        } else {
-            let base_share = (1.0 - coat_share - sheen_share).max(1e-6);
-            let (_, rest) = warp::choose(u[2], coat_share + sheen_share);
-            let sample = self.base.sample(front, [u[0], u[1], rest])?;
-            if sample.lobe.is_delta() {
-                let weight = sample.weight * (self.passed(front, sample.wi) / base_share);
-                return Some(BsdfSample { weight, pdf: base_share * sample.pdf, ..sample }.turned_like(wo));
-            }
-            let whole = self.evaluate_front(shares, front, sample.wi).sample_turned(sample.wi, wo)?;
-            return Some(BsdfSample { crossed_index: sample.crossed_index, ..whole });
-        };
-        self.evaluate_front(shares, front, wi).sample_turned(wi, wo)
+        if u[2] < coat_share {
+            let Some(facets) = &self.coat.facets else {
+                let weight = Vec3::splat(self.clearcoat * self.coat.reflectance(front.by_coat) / coat_share);
+                return Some(BsdfSample::reflected_delta(reflect_about_normal(wo), weight, coat_share));
+            };
+            let wi = facets.sample_reflection(front.by_coat, point)?;
+            return self.sampled(shares, seen, if is_turned { turn(wi) } else { wi });
+        }
+        if u[2] < coat_share + sheen_share {
+            let wi = warp::cosine_hemisphere(point);
+            return self.sampled(shares, seen, self.above_base(if is_turned { turn(wi) } else { wi })?);
+        }
+        let base_share = (1.0 - coat_share - sheen_share).max(1e-6);
+        let (_, rest) = warp::choose(u[2], coat_share + sheen_share);
+        let sample = self.sample_base(&seen, [u[0], u[1], rest])?;
+        if sample.lobe.is_delta() {
+            let wi = self.seen(sample.wi).turned_if(is_turned);
+            let weight = sample.weight * (self.passed(&front, &wi) / base_share);
+            return Some(BsdfSample { weight, pdf: base_share * sample.pdf, ..sample });
+        }
+        let whole = self.sampled(shares, seen, sample.wi)?;
+        Some(BsdfSample { crossed_index: sample.crossed_index, ..whole })
+    }
+
+    /// The sample of a smooth lobe that chose `wi`.
+    fn sampled(&self, shares: [f32; 2], wo: Seen, wi: Vec3) -> Option<BsdfSample> {
+        let front = if wo.by_coat.z < 0.0 { turn(wi) } else { wi };
+        self.evaluate_layers(shares, wo, self.seen(wi)).sample_turned(front, wo.by_coat)
+    }
+
+    /// A sample of the base in the frame of the coat.
+    fn sample_base(&self, wo: &Seen, u: [f32; 3]) -> Option<BsdfSample> {
+        let sample = self.base.sample(Some(wo).filter(|wo| wo.sides_agree())?.by_base, u)?;
+        Some(BsdfSample { wi: self.above_base(sample.wi)?, ..sample })
+    }
+
+    /// A direction of the base's frame in that of the coat; `None` where it is on the other side there.
+    fn above_base(&self, w: Vec3) -> Option<Vec3> {
+        let Some(to_base) = &self.to_base else { return Some(w) };
+        let by_coat = (to_base.transpose() * w).normalize_or(w);
+        (Seen { by_coat, by_base: w }).sides_agree().then_some(by_coat)
     }
 
     pub(super) fn straight_through(&self, wo: Vec3) -> Vec3 {
         match &self.base {
             Varnished::Sheet(base) => {
-                let front = if wo.z < 0.0 { turn(wo) } else { wo };
-                base.straight_through(front) * self.passed(front, -front)
+                let front = self.seen(wo).turned_if(wo.z < 0.0);
+                let back = Seen { by_coat: -front.by_coat, by_base: -front.by_base };
+                base.straight_through(front.by_base) * self.passed(&front, &back)
             }
             Varnished::Boundary(_) => Vec3::ZERO,
         }
     }
 
     pub(super) fn albedo(&self, wo: Vec3) -> Vec3 {
-        if self.is_inside(wo) {
-            return self.base.albedo(wo);
+        let wo = self.seen(wo);
+        if self.is_inside(&wo) {
+            return self.base.albedo(wo.by_base);
         }
-        let (up, _) = to_front(wo, wo);
-        let passed = self.coat_passed(up);
+        let up = wo.turned_if(wo.by_coat.z < 0.0);
+        let passed = self.coat_passed(&up);
+        if !up.sides_agree() {
+            return Vec3::splat(1.0 - passed);
+        }
         let (sheen, left) = match &self.sheen {
             None => (Vec3::ZERO, 1.0),
-            Some(sheen) => (sheen.color * sheen.albedo(up), sheen.passed(up)),
+            Some(sheen) => (sheen.color * sheen.albedo(up.by_base), sheen.passed(up.by_base)),
         };
-        Vec3::splat(1.0 - passed) + passed * (sheen + left * self.base.albedo(up))
+        Vec3::splat(1.0 - passed) + passed * (sheen + left * self.base.albedo(up.by_base))
     }
 }
 

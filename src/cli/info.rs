@@ -2,10 +2,10 @@
 
 mod film;
 
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, bail};
 use fechner::checkpoint::{is_checkpoint, read_checkpoint};
 use fechner::exr_read::{ExrImage, MEMORY_LIMIT_BYTES, SampleType, read_exr_channels};
-use fechner::hdr_read::with_known_header;
+use fechner::hdr_read::{is_xyze, with_known_header};
 use fechner::jpeg_read;
 use image::ImageDecoder;
 use std::fmt::Write as _;
@@ -246,7 +246,12 @@ fn describe_hdr(path: &Path) -> anyhow::Result<String> {
     let problem = || format!("cannot read {}: damaged or no Radiance file", path.display());
     let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     let mut decoder =
-        image::codecs::hdr::HdrDecoder::new(Cursor::new(with_known_header(&bytes))).with_context(problem)?;
+        image::codecs::hdr::HdrDecoder::new(Cursor::new(with_known_header(&bytes))).map_err(|error| match error {
+            image::ImageError::Unsupported(_) => {
+                anyhow!("{}: a Radiance file of a kind that is not read: {error}", path.display())
+            }
+            _ => anyhow::Error::new(error).context(problem()),
+        })?;
     let mut limits = image::Limits::default();
     limits.max_alloc = Some(1 << 30);
     decoder.set_limits(limits).with_context(problem)?;
@@ -260,8 +265,9 @@ fn describe_hdr(path: &Path) -> anyhow::Result<String> {
     }
     text.push('\n');
     heading(&mut text, "channel", 7);
-    for (c, name) in ["R", "G", "B"].iter().enumerate() {
-        Range::of(pixels.pixels().map(|pixel| pixel.0[c])).row(&mut text, name, "rgbe", 7);
+    let (names, kind) = if is_xyze(&bytes) { (["X", "Y", "Z"], "xyze") } else { (["R", "G", "B"], "rgbe") };
+    for (c, name) in names.iter().enumerate() {
+        Range::of(pixels.pixels().map(|pixel| pixel.0[c])).row(&mut text, name, kind, 7);
     }
     Ok(text)
 }

@@ -61,8 +61,9 @@ impl PathTracer {
         let point = self.world.surface(ray, &hit);
         let wo = -Vec3::from(ray.direction);
         let components = Components::new();
-        let bsdf = self.bsdf(&point, &components);
-        let shading = self.shading(&bsdf, &point, wo, ray.time);
+        let frames = self.frames(&point, wo, ray.time);
+        let bsdf = self.bsdf(&point, &frames, &components);
+        let shading = self.shading(&bsdf, &point, &frames);
         let [u, v, lobe, _] = sample.draw(Purpose::Scatter { bounce });
         let scattered = bsdf.sample(shading.frame.to_local(wo), [u, v, lobe]);
         let wi = scattered.map(|scattered| shading.frame.to_world_direction(scattered.wi));

@@ -8,7 +8,7 @@ use super::media::Media;
 use super::shading::{Components, Shading};
 use super::sheets::MOST_SHEETS;
 use crate::geometry::{Hit, Ray, SurfacePoint};
-use crate::light::{LightFromAfar, LightReceiver, LightSample};
+use crate::light::{LightFromAfar, LightReceiver, LightSample, emitted};
 use crate::sampler::Sample;
 use fechner_perception::photometry::luminance;
 use glam::{Vec3, Vec3A};
@@ -152,8 +152,9 @@ impl PathTracer {
     ) -> bool {
         let wo = -Vec3::from(path.ray.direction);
         let components = Components::new();
-        let bsdf = self.bsdf(point, &components);
-        let shading = self.shading(&bsdf, point, wo, path.ray.time);
+        let frames = self.frames(point, wo, path.ray.time);
+        let bsdf = self.bsdf(point, &frames, &components);
+        let shading = self.shading(&bsdf, point, &frames);
         path.throughput *= match shading.medium {
             Some(medium) if wo.dot(point.geometric_normal) < 0.0 => {
                 path.media.transmittance_to_back_of(medium, hit.distance)
@@ -165,7 +166,7 @@ impl PathTracer {
             let albedo = shading.bsdf.albedo(shading.frame.to_local(wo)).clamp(Vec3::ZERO, Vec3::ONE);
             path.first_hit = FirstHit {
                 albedo: if emitted { Vec3::ONE } else { albedo },
-                normal: shading.frame.normal(),
+                normal: shading.normal,
                 depth: hit.distance,
                 object_id: hit.object + 1,
                 shines: emitted,
@@ -214,11 +215,11 @@ impl PathTracer {
     fn add_emission(&self, path: &mut PathState, hit: &Hit, point: &SurfacePoint) -> bool {
         let scene = self.world.scene();
         let material = &scene.materials[self.world.material_of(hit.object).0 as usize];
-        let from_front = Vec3::from(path.ray.direction).dot(point.geometric_normal) < 0.0;
-        if material.emission.factor == Vec3::ZERO || !(from_front || material.emits_both_sides) {
+        let cosine = -Vec3::from(path.ray.direction).dot(point.geometric_normal);
+        if material.emission.factor == Vec3::ZERO || !(cosine > 0.0 || material.emits_both_sides) {
             return false;
         }
-        let radiance = material.emission.evaluate(&scene.textures, point.uv);
+        let radiance = emitted(material, &scene.textures, point.uv, cosine.abs());
         let weight = path.scatter_pdf.map_or(1.0, |pdf| {
             let distance = path.behind.distance + hit.distance;
             power_heuristic(pdf, self.lights.pdf_of_hit(&self.world, &path.from, &path.ray, hit, distance))

@@ -2,13 +2,13 @@
 
 use crate::geometry::surface::{Frame, SurfaceDerivatives};
 use crate::geometry::{SurfacePoint, World};
-use crate::scene::{HeightMap, HeightUnit, Material, Relief, Texture, TextureLookup};
+use crate::scene::{HeightMap, HeightUnit, Relief, Texture, TextureLookup};
 use glam::{Vec2, Vec3};
 
-/// The shading normal of a material at a point at a share of the open shutter: unit, on the mesh's shading normal's side.
-pub(super) fn shading_normal(world: &World, material: &Material, point: &SurfacePoint, time: f32) -> Vec3 {
+/// The shading normal under a relief at a point at a share of the open shutter: unit, on the mesh's shading normal's side.
+pub(super) fn shading_normal(world: &World, relief: Option<&Relief>, point: &SurfacePoint, time: f32) -> Vec3 {
     let textures = &world.scene().textures;
-    match &material.relief {
+    match relief {
         None => point.shading_normal,
         Some(Relief::Normals { map, strength }) => mapped(textures, map, *strength, point),
         Some(Relief::Heights(heights)) => {

@@ -43,8 +43,9 @@ impl PathTracer {
             let wo = -Vec3::from(ray.direction);
             let point = self.world.surface(&ray, &hit);
             let components = Components::new();
-            let bsdf = self.bsdf(&point, &components);
-            let shading = self.shading(&bsdf, &point, wo, ray.time);
+            let frames = self.frames(&point, wo, ray.time);
+            let bsdf = self.bsdf(&point, &frames, &components);
+            let shading = self.shading(&bsdf, &point, &frames);
             share *= shading.straight_through(wo);
             if share == Vec3::ZERO {
                 return (share, rays);

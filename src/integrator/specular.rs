@@ -89,11 +89,12 @@ impl PathTracer {
         let point = self.world.surface(ray, hit);
         let wo = -Vec3::from(ray.direction);
         let components = Components::new();
-        let bsdf = self.bsdf(&point, &components);
+        let frames = self.frames(&point, wo, ray.time);
+        let bsdf = self.bsdf(&point, &frames, &components);
         if bsdf.has_smooth_lobe() {
             return None;
         }
-        let shading = self.shading(&bsdf, &point, wo, ray.time);
+        let shading = self.shading(&bsdf, &point, &frames);
         // Of two lobes that share [0, 1), the likelier one has the middle; each end belongs to one of them.
         [0.5, 0.0, 1.0 - f32::EPSILON].into_iter().find_map(|lobe| {
             let scattered = shading.bsdf.sample(shading.frame.to_local(wo), [0.5, 0.5, lobe])?;

@@ -2,6 +2,7 @@
 //! are no specks, by what their corners give.
 
 use super::bilinear::{BilinearDensity, parallelogram_corners};
+use super::emission::{emitted, even_radiance};
 use super::lanes::FourVectors;
 use super::solid_angle::{LEAST, SphericalRectangle, SphericalTriangle};
 use super::{LightPlace, LightReceiver, LightSample};
@@ -112,9 +113,10 @@ impl FlatEmitter {
             && self.both_sides == next.both_sides
             && self.normal.dot(next.normal) > 0.999_99;
         let material = &scene.materials[scene.instances[self.object as usize].material.0 as usize];
-        if !is_one || material.emission.texture.is_some() || !matches!(material.alpha, Alpha::Opaque | Alpha::Unseen) {
+        if !is_one {
             return None;
         }
+        let even_radiance = Some(even_radiance(material)?);
         let (edge_1, edge_2) = (self.edge_1, next.edge_2);
         let cosine = edge_1.normalize_or_zero().dot(edge_2.normalize_or_zero());
         let corners = parallelogram_corners(self.corner, edge_1, edge_2);
@@ -122,7 +124,6 @@ impl FlatEmitter {
             true => Outline::Rectangle(corners, Edges::new([edge_1, edge_2])),
             false => Outline::Parallelogram(corners),
         };
-        let even_radiance = Some(material.emission.factor);
         let center = self.corner + 0.5 * (edge_1 + edge_2);
         let radius = 0.5 * (edge_1 + edge_2).length().max((edge_1 - edge_2).length());
         let area = self.area + next.area;
@@ -168,7 +169,7 @@ impl FlatEmitter {
         (pdf > 0.0 && pdf.is_finite()).then(|| LightSample {
             direction,
             place: Some(LightPlace { position, normal: self.normal * facing.signum(), offset: self.offset }),
-            radiance: self.even_radiance.unwrap_or_else(|| self.radiance(scene, shares)),
+            radiance: self.even_radiance.unwrap_or_else(|| self.radiance(scene, shares, facing.abs())),
             pdf,
             is_delta: self.is_unseen,
         })
@@ -188,8 +189,8 @@ impl FlatEmitter {
         [share(across_1, self.edge_1), share(across_2, self.edge_2)]
     }
 
-    /// What a triangle emits at a place.
-    fn radiance(&self, scene: &Scene, [s1, s2]: Shares) -> Vec3 {
+    /// What a triangle emits at a place at this cosine to its normal.
+    fn radiance(&self, scene: &Scene, [s1, s2]: Shares, cosine: f32) -> Vec3 {
         let instance = &scene.instances[self.object as usize];
         let material = &scene.materials[instance.material.0 as usize];
         let mesh = &scene.meshes[instance.mesh.0 as usize];
@@ -199,7 +200,7 @@ impl FlatEmitter {
             let [a, b, c] = mesh.triangles[self.triangle as usize].map(|i| mesh.uvs[i as usize]);
             a * (1.0 - s1 - s2) + b * s1 + c * s2
         };
-        material.emission.evaluate(&scene.textures, uv) * material.alpha.coverage(&scene.textures, uv)
+        emitted(material, &scene.textures, uv, cosine) * material.alpha.coverage(&scene.textures, uv)
     }
 
     fn view(&self, receiver: &LightReceiver) -> View {

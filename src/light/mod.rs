@@ -9,6 +9,7 @@ mod bilinear;
 mod collect;
 mod distant;
 mod distribution;
+mod emission;
 mod environment;
 mod flat;
 mod givers;
@@ -21,6 +22,7 @@ mod sphere;
 mod tests;
 mod tree;
 
+pub use emission::emitted;
 pub use outlook::{Arrival, Lookout};
 pub use tree::LightReceiver;
 

@@ -1,5 +1,6 @@
 //! Spheres that emit: sampled uniformly in the cone that they fill. From inside they are left to the BSDF.
 
+use super::emission::{emitted, even_radiance};
 use super::{LightPlace, LightSample};
 use crate::geometry::{World, offset};
 use crate::scene::{Alpha, Material, SpherePlace};
@@ -23,24 +24,23 @@ impl SphereEmitter {
     pub(super) fn new(world: &World, object: u32, time: f32) -> Self {
         let SpherePlace { center, radius, axes } = world.sphere_at(object, time);
         let material = material_of(world, object);
-        let is_even = material.emission.texture.is_none() && matches!(material.alpha, Alpha::Opaque | Alpha::Unseen);
         Self {
             object,
             center: center.into(),
             radius,
             axes,
-            even_radiance: is_even.then_some(material.emission.factor),
+            even_radiance: even_radiance(material),
             is_unseen: material.alpha == Alpha::Unseen,
         }
     }
 
-    /// What it emits where its unit normal is `normal`.
-    fn radiance(&self, world: &World, normal: Vec3) -> Vec3 {
+    /// What it emits into the opposite of `direction` where its unit normal is `normal`.
+    fn radiance(&self, world: &World, normal: Vec3, direction: Vec3) -> Vec3 {
         self.even_radiance.unwrap_or_else(|| {
             let place = SpherePlace { center: self.center.into(), radius: self.radius, axes: self.axes };
             let (textures, uv) = (&world.scene().textures, place.uv(normal.into()));
             let material = material_of(world, self.object);
-            material.emission.evaluate(textures, uv) * material.alpha.coverage(textures, uv)
+            emitted(material, textures, uv, direction.dot(normal).abs()) * material.alpha.coverage(textures, uv)
         })
     }
 
@@ -72,7 +72,7 @@ impl SphereEmitter {
         Some(LightSample {
             direction,
             place: Some(LightPlace { position, normal, offset: offset::of_sphere(position, self.radius) }),
-            radiance: self.radiance(world, normal),
+            radiance: self.radiance(world, normal, direction),
             pdf: in_cone.pdf(),
             is_delta: self.is_unseen,
         })

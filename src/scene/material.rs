@@ -80,14 +80,23 @@ impl Material {
         }
     }
 
+    /// Its relief and that of its coat.
+    pub fn reliefs(&self) -> impl Iterator<Item = &Relief> {
+        let of_coat = match &self.surface {
+            Surface::MetalRoughness(model) => model.own_coat_relief(),
+            _ => None,
+        };
+        self.relief.iter().chain(of_coat)
+    }
+
     /// Whether shading needs to know along which way texture coordinates grow.
     pub fn needs_tangent(&self) -> bool {
-        matches!(self.relief, Some(Relief::Normals { .. })) || self.surface.is_anisotropic()
+        self.reliefs().any(|relief| matches!(relief, Relief::Normals { .. })) || self.surface.is_anisotropic()
     }
 
     /// Whether one place of the surface may look unlike another, or one direction along it unlike another.
     pub fn has_places(&self) -> bool {
-        self.reads_pictures() || self.relief.is_some() || self.surface.is_anisotropic()
+        self.reads_pictures() || self.reliefs().next().is_some() || self.surface.is_anisotropic()
     }
 
     /// Whether anything about it comes from a picture.
@@ -99,7 +108,7 @@ impl Material {
         };
         covers
             || reads_color(&self.emission)
-            || self.relief.as_ref().is_some_and(|relief| relief.texture().is_some())
+            || self.reliefs().any(|relief| relief.texture().is_some())
             || self.surface.colors().into_iter().any(reads_color)
             || self.surface.scalars().into_iter().any(|scalar| scalar.texture.is_some())
     }

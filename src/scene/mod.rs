@@ -21,7 +21,7 @@ pub use light::{Light, SpotFalloff};
 pub use material::{Alpha, Material, StretchDirection};
 pub use motion::{Motion, MotionKey, Pose};
 pub use relief::{HeightMap, HeightUnit, Relief};
-pub use surface::{Distribution, MetalRoughness, Roughness, RoughnessScale, Surface};
+pub use surface::{CoatRelief, Distribution, MetalRoughness, Roughness, RoughnessScale, Surface};
 
 use glam::{Affine3A, Mat3A, Vec2, Vec3, Vec3A, Vec4};
 use std::f32::consts::{PI, TAU};

@@ -1,6 +1,6 @@
 //! How surfaces scatter light, as scene files tell it: one variant a model of `crate::bsdf`.
 
-use super::{ColorInput, ScalarInput};
+use super::{ColorInput, Relief, ScalarInput};
 use glam::Vec3;
 
 /// Shape of the distribution of microfacet slopes.
@@ -193,6 +193,15 @@ pub enum Surface {
     },
 }
 
+/// Which normal a clear coat has.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum CoatRelief {
+    /// That of what it covers.
+    OfBase,
+    /// The mesh's, or that of a relief of its own: lacquer is smooth over bumps.
+    Own(Option<Relief>),
+}
+
 /// Parameters of glTF's metal-roughness model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MetalRoughness {
@@ -219,6 +228,8 @@ pub struct MetalRoughness {
     pub clearcoat: ScalarInput,
     /// Its perceptual roughness in [0, 1].
     pub clearcoat_roughness: ScalarInput,
+    /// Its normal.
+    pub coat_relief: CoatRelief,
     /// Albedo of fibres that stand on the surface, in [0, 1].
     pub sheen_color: ColorInput,
     /// Their perceptual roughness in [0, 1].
@@ -240,6 +251,7 @@ impl Default for MetalRoughness {
             anisotropy: ScalarInput::constant(0.0),
             clearcoat: ScalarInput::constant(0.0),
             clearcoat_roughness: ScalarInput::constant(0.0),
+            coat_relief: CoatRelief::OfBase,
             sheen_color: ColorInput::constant(Vec3::ZERO),
             sheen_roughness: ScalarInput::constant(0.0),
         }
@@ -254,6 +266,14 @@ impl MetalRoughness {
             false if ior == 0.0 => None,
             false => Some("an index of refraction is at least 1, or 0 for a surface that reflects everything"),
             true => Some("an index of refraction is at least 1 where light enters a volume"),
+        }
+    }
+
+    /// The relief of its coat where that has one of its own.
+    pub fn own_coat_relief(&self) -> Option<&Relief> {
+        match &self.coat_relief {
+            CoatRelief::Own(Some(relief)) if self.clearcoat.factor > 0.0 => Some(relief),
+            _ => None,
         }
     }
 

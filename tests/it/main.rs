@@ -46,6 +46,7 @@ mod bad_input;
 mod bench;
 mod camera_and_time;
 mod checkpoint;
+mod clear_coats;
 mod command_line;
 mod coverage;
 mod denoise;

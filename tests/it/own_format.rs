@@ -207,3 +207,30 @@ fn the_example_of_the_format_loads() {
         assert_eq!(scene.instances.len(), 4, "{:?}", scene.notes);
     }
 }
+
+/// As any other value, and in a side file too.
+#[test]
+fn slips_in_operators_and_displays_have_their_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("q.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    for (line, key, guess) in
+        [("operator = \"agz\"", "view.operator", "agx"), ("display = \"deskop\"", "view.display", "desktop")]
+    {
+        write("q.fechner.toml", &format!("[view]\n{line}\n"));
+        let error = load(&folder.path().join("q.obj"), &LoadOptions::default()).unwrap_err().to_string();
+        let expected = format!("\"{guess}\"");
+        assert!(error.contains("q.fechner.toml:2:") && error.contains(key) && error.contains(&expected), "{error}");
+    }
+    write("q.fechner.toml", "[view]\noperator = \"agx\"\ndisplay = \"own.toml\"\n");
+    load(&folder.path().join("q.obj"), &LoadOptions::default()).unwrap();
+}
+
+/// A file that somebody has only begun says nothing.
+#[test]
+fn an_empty_side_file_adds_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("q.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    std::fs::write(folder.path().join("q.fechner.toml"), "").unwrap();
+    load(&folder.path().join("q.obj"), &LoadOptions::default()).unwrap();
+}

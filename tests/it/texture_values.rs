@@ -152,3 +152,64 @@ fn a_picture_without_blue_has_none() {
     assert_eq!(notes(&yellow, "no channel B"), 2, "{:?}", yellow.notes);
     assert_eq!(seen(&scene(&even(&[("R", 0.1)]), None)).0, Vec3::splat(0.1));
 }
+
+/// The colours of an EXR file are multiplied by its alpha, those of a PNG file are not. As a card, whose alpha says where it is, both are
+/// what is there; as a colour alone they are as they stand.
+#[test]
+fn the_colours_of_a_card_are_not_multiplied_by_alpha_twice() {
+    let folder = tempfile::tempdir().unwrap();
+    // Covered by half, by nothing with a glow, by nothing, in full.
+    let (alpha, light) = ([0.5, 0.0, 0.0, 1.0], [0.2, 0.3, 0.0, 0.4]);
+    let channels = [("R", light), ("G", light), ("B", light), ("A", alpha)];
+    write(&folder.path().join("p.exr"), &channels, None);
+    let colors = |file: &str, text: &str| -> Vec<f32> {
+        std::fs::write(folder.path().join(file), text).unwrap();
+        let scene = load(&folder.path().join(file), &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        let color = scene.materials[0].surface.base_color().expect("a colour");
+        let at = |[x, y]: [f32; 2]| color.evaluate(&scene.textures, Vec2::new(x, y)).x;
+        [[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]].map(at).to_vec()
+    };
+    let toml = |alpha: &str| {
+        format!(
+            "[environment]\nluminance_cd_m2 = 1\n[textures.p]\nfile = \"p.exr\"\nnearest = true\n[materials.m]\ntype = \"diffuse\"\n\
+             reflectance = {{ texture = \"p\" }}\n{alpha}[[objects]]\nsphere = {{ center = [0, 0, 0], radius = 1 }}\nmaterial = \"m\"\n"
+        )
+    };
+    assert_eq!(colors("card.toml", &toml("alpha = { texture = \"p\", channel = \"a\" }\n")), [0.4, 0.3, 0.0, 0.4]);
+    assert_eq!(colors("plain.toml", &toml("")), light);
+    let quad = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3\n";
+    std::fs::write(folder.path().join("m.mtl"), "newmtl m\nillum 1\nmap_Kd p.exr\nmap_d p.exr\n").unwrap();
+    assert_eq!(colors("card.obj", quad)[0], 0.4);
+}
+
+/// A Radiance picture of 2 × 1 pixels.
+fn radiance(format: &str, resolution: &str, pixels: [[u8; 4]; 2]) -> Vec<u8> {
+    let header = format!("#?RADIANCE\nFORMAT={format}\n\n{resolution}\n");
+    [header.as_bytes(), pixels.as_flattened()].concat()
+}
+
+fn environment(bytes: &[u8]) -> Result<Scene, String> {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("p.hdr"), bytes).unwrap();
+    let path = folder.path().join("s.toml");
+    let text = "[environment]\nimage = \"p.hdr\"\n[[objects]]\nsphere = { center = [0, 0, 0], radius = 1 }\nmaterial = \"m\"\n\
+                [materials.m]\ntype = \"diffuse\"\nreflectance = 0.5\n";
+    std::fs::write(&path, text).unwrap();
+    load(&path, &LoadOptions::default()).map_err(|error| error.to_string())
+}
+
+/// Radiance writes CIE XYZ as well, in its own primaries' white of equal energy, and rows in any order. What is not read is said to be
+/// not read, not to be damaged.
+#[test]
+fn radiance_pictures_of_other_kinds_are_told_apart() {
+    let grey = [[128, 128, 128, 128], [64, 64, 64, 128]];
+    let plain = environment(&radiance("32-bit_rle_rgbe", "-Y 1 +X 2", grey)).expect("read").environment.unwrap();
+    let xyz = environment(&radiance("32-bit_rle_xyze", "-Y 1 +X 2", grey)).expect("read").environment.unwrap();
+    for (plain, xyz) in plain.texels.iter().zip(xyz.texels.iter()) {
+        assert!(plain.abs_diff_eq(*xyz, 1e-3), "{plain} and {xyz}: equal energy is white");
+    }
+    for (resolution, what) in [("+Y 1 +X 2", "+Y +X"), ("-Y 1 -X 2", "-Y -X"), ("+X 2 -Y 1", "+X -Y")] {
+        let error = environment(&radiance("32-bit_rle_rgbe", resolution, grey)).unwrap_err();
+        assert!(error.contains(&format!("Orientation {what}")) && error.contains("not read"), "{error}");
+    }
+}

@@ -182,7 +182,8 @@ const TRIANGLE: &str = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes
 "meshes":[{"name":"piece","primitives":[{"attributes":{"POSITION":0ATTRIBUTES}MORE}]}],
 "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]},
 {"componentType":5126,"count":3,"type":"VEC3"},{"componentType":5126,"count":3,"type":"VEC4"},
-{"bufferView":0,"componentType":5126,"count":2,"type":"SCALAR","min":[0],"max":[0]}],
+{"bufferView":0,"componentType":5126,"count":2,"type":"SCALAR","min":[0],"max":[0]},
+{"bufferView":0,"componentType":5126,"count":3,"type":"VEC2"}],
 "bufferViews":[{"buffer":0,"byteLength":36}],
 "buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]}"#;
 
@@ -269,4 +270,128 @@ fn nothing_of_our_own_format_is_dropped() {
         let refused = of(&format!("{part}[materials.m]\ntype = \"mix\"\nmaterials = [\"a\", \"b\"]")).unwrap_err();
         assert!(refused.contains(&format!("\"a\" has {what}")) && refused.contains("s.toml:12"), "{refused}");
     }
+}
+
+/// `d 0` is no slip about the meaning of `Tr`, which `Tr 1` may be.
+#[test]
+fn an_opacity_of_nothing_is_one() {
+    let (_, unseen) = of_mtl("Kd 1 1 1\nd 0");
+    assert!(matches!(unseen.alpha, Alpha::Blend { value } if value.factor == 0.0), "{:?}", unseen.alpha);
+    let (scene, slip) = of_mtl("Kd 1 1 1\nTr 1");
+    assert!(slip.alpha == Alpha::Opaque && has_note(&scene, "Tr 1 is taken for opaque"), "{:?}", scene.notes);
+    let (scene, mapped) = of_mtl("Kd 0 0 0\nmap_Kd x.png\nPr 0\nmap_Pr x.png");
+    assert!(has_note(&scene, "Material \"m\": Kd 0, Pr 0 beside a picture"), "{:?}, {mapped:?}", scene.notes);
+    assert!(!has_note(&of_mtl("Kd 0.5 0 0\nmap_Kd x.png").0, "beside a picture"));
+}
+
+#[test]
+fn lines_may_end_as_on_old_macs() {
+    let obj = format!("mtllib m.mtl\n{QUAD}usemtl m\nf 1/1/1 2/2/1 3/3/1 4/4/1\n");
+    let mtl = "newmtl m\nKd 1 0 0\nillum 1\n";
+    for (obj, mtl) in [(obj.replace('\n', "\r"), mtl.to_owned()), (obj.clone(), mtl.replace('\n', "\r"))] {
+        let scene = scene(&[("q.obj", obj.as_bytes()), ("m.mtl", mtl.as_bytes())]);
+        assert_eq!(scene.materials[scene.instances[0].material.0 as usize].name, "m", "{:?}", scene.notes);
+    }
+    let error = read(&[("q.obj", obj.replace("f 1", "f 9").replace('\n', "\r").as_bytes())]).unwrap_err();
+    assert!(error.contains("q.obj:12:"), "{error}");
+}
+
+#[test]
+fn a_missing_material_file_is_told_as_what_it_costs() {
+    let obj = format!("mtllib none.mtl\nmtllib m.mtl\n{QUAD}usemtl m\nf 1/1/1 2/2/1 3/3/1\n");
+    let scene = scene(&[("q.obj", obj.as_bytes()), ("m.mtl", b"newmtl m\nKd 1 0 0\n")]);
+    assert!(has_note(&scene, "Material file \"none.mtl\" not found"), "{:?}", scene.notes);
+    assert!(!has_note(&scene, "grey stands in"), "{:?}", scene.notes);
+    let error = read(&[("q.obj", b"v 0 0 0\nv 1 0 0\n\nv nan 1 0\nf 1 2 3\n")]).unwrap_err();
+    assert!(error.contains("q.obj:4:"), "{error}");
+}
+
+/// Nodes that share a camera are two cameras.
+#[test]
+fn every_camera_of_gltf_has_a_name() {
+    let top = r#""cameras":[{"name":"Cam","type":"perspective","perspective":{"yfov":1,"znear":0.1}}],"#;
+    let text = triangle("", "", top).replace(r#""nodes":[0]"#, r#""nodes":[0,1,2,3]"#).replace(
+        r#"{"mesh":0}]"#,
+        r#"{"mesh":0},{"name":"left","camera":0,"translation":[-1,0,4]},
+            {"name":"right","camera":0,"translation":[1,0,4]},{"camera":0,"translation":[2,0,4]}]"#,
+    );
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("t.gltf");
+    std::fs::write(&path, text).unwrap();
+    let chosen = |name: &str| {
+        let options = LoadOptions { camera: Some(name.to_owned()), ..LoadOptions::default() };
+        load(&path, &options).map(|scene| scene.camera.position.x).map_err(|error| error.to_string())
+    };
+    for (name, x) in [("Cam", -1.0), ("left", -1.0), ("right", 1.0), ("node 3", 2.0)] {
+        assert_eq!(chosen(name), Ok(x), "{name}");
+    }
+    let error = chosen("nowhere to be seen").unwrap_err();
+    assert!(error.contains("left, right, node 3"), "{error}");
+}
+
+fn with_material(extensions: &str) -> Result<Scene, String> {
+    let top = format!(r#""materials":[{{"name":"lacquer","extensions":{{{extensions}}}}}],"#);
+    read(&[("t.gltf", triangle("", ",\"material\":0", &top).as_bytes())])
+}
+
+/// As those of the core are, which the crate reads.
+#[test]
+fn values_of_gltf_extensions_are_of_their_type() {
+    for (extensions, key) in [
+        (r#""KHR_materials_clearcoat":{"clearcoatFactor":"1"}"#, "clearcoatFactor"),
+        (r#""KHR_materials_clearcoat":{"clearcoatRoughnessFactor":[1]}"#, "clearcoatRoughnessFactor"),
+        (r#""KHR_materials_clearcoat":{"clearcoatTexture":{"index":"0"}}"#, "clearcoatTexture"),
+        (r#""KHR_materials_sheen":{"sheenColorFactor":1}"#, "sheenColorFactor"),
+        (r#""KHR_materials_sheen":{"sheenColorFactor":[1,1]}"#, "sheenColorFactor"),
+        (r#""KHR_materials_sheen":{"sheenColorFactor":[1,1,"1"]}"#, "sheenColorFactor"),
+        (r#""KHR_materials_anisotropy":{"anisotropyStrength":true}"#, "anisotropyStrength"),
+        (r#""KHR_materials_anisotropy":{"anisotropyRotation":"1"}"#, "anisotropyRotation"),
+        (r#""KHR_materials_sheen":3"#, "KHR_materials_sheen"),
+    ] {
+        let error = with_material(extensions).expect_err(extensions);
+        assert!(error.contains(key) && error.contains("lacquer"), "{error}");
+    }
+    let scene = with_material(r#""KHR_materials_clearcoat":{"clearcoatFacter":1,"extras":{}}"#).unwrap();
+    let expected = "\"lacquer\": KHR_materials_clearcoat has no \"clearcoatFacter\"; did you mean \"clearcoatFactor\"?";
+    assert!(has_note(&scene, expected) && !has_note(&scene, "extras"), "{:?}", scene.notes);
+    assert!(with_material(r#""KHR_materials_sheen":{"sheenColorFactor":[1,0.5,0]}"#).is_ok());
+}
+
+/// A picture that is not there ends no render, whatever names it.
+#[test]
+fn gltf_may_name_local_files_by_their_scheme() {
+    let of = |uri: &str| {
+        let top = format!(
+            r#""images":[{{"uri":"{uri}"}}],"textures":[{{"source":0}}],"materials":[{{"normalTexture":{{"index":0}}}}],"#
+        );
+        read(&[("t.gltf", triangle(",\"TEXCOORD_0\":4", ",\"material\":0", &top).as_bytes())])
+    };
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("a b.png");
+    image::RgbImage::from_pixel(1, 1, image::Rgb([10, 20, 30])).save(&path).unwrap();
+    for host in ["", "localhost"] {
+        let named = format!("file://{host}{}", path.to_str().unwrap().replace(' ', "%20").replace('\\', "/"));
+        assert_eq!(of(&named).unwrap().textures[0].sample_rgba(glam::Vec2::ZERO).x, 10.0 / 255.0, "{named}");
+    }
+    let remote = of("https://example.org/a.png").unwrap();
+    assert!(has_note(&remote, "https://example.org/a.png"), "{:?}", remote.notes);
+}
+
+#[test]
+fn what_gltf_cannot_show_is_told() {
+    let top = r#""images":[{"uri":"x.png"}],"textures":[{"source":0}],"materials":[{"pbrMetallicRoughness":
+        {"baseColorTexture":{"index":0}}}],"#;
+    let scene = scene(&[("t.gltf", triangle("", ",\"material\":0", top).as_bytes())]);
+    assert!(has_note(&scene, "\"piece\" has no texture coordinates"), "{:?}", scene.notes);
+    let plain = scene_of_light(r#"{"type":"point","intensity":10}"#);
+    assert!(!has_note(&plain, "negative"), "{:?}", plain.notes);
+    let negative = scene_of_light(r#"{"type":"point","intensity":-10}"#);
+    assert!(has_note(&negative, "negative"), "{:?}", negative.notes);
+}
+
+fn scene_of_light(light: &str) -> Scene {
+    let top = format!(r#""extensions":{{"KHR_lights_punctual":{{"lights":[{light}]}}}},"#);
+    let text = triangle("", "", &top)
+        .replace(r#"{"mesh":0}]"#, r#"{"mesh":0,"extensions":{"KHR_lights_punctual":{"light":0}}}]"#);
+    scene(&[("t.gltf", text.as_bytes())])
 }

@@ -6,7 +6,7 @@ use crate::bsdf::{
     MetalRoughness, MetalRoughnessParameters, Microfacets, Phong, Varnish, Varnished, Ward, WidthRange,
 };
 use crate::scene::Distribution;
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 use std::sync::LazyLock;
 
 /// What a model must give back of the light that falls on it.
@@ -257,6 +257,26 @@ fn gltf_cases(cases: &mut Vec<Case>) {
             cases.push(Case { eta: 1.5, ..case });
         }
     }
+}
+
+/// Coats over a base whose normal is another. Not reciprocal by the cosines of the coat, and sampled in a frame of the base's, so that
+/// the last bits of a sample and an evaluation may differ.
+pub(super) fn bumpy_cases() -> Vec<Case> {
+    static FROSTED: LazyLock<Bsdf<'static>> = LazyLock::new(|| Bsdf::dielectric(1.5, 0.4, Vec3::ONE, Some(&*GLASS)));
+    let white = MetalRoughness::new(&MetalRoughnessParameters::default());
+    let mut cases = Vec::new();
+    let bumps = Some(Mat3::from_rotation_x(0.3) * Mat3::from_rotation_z(1.0));
+    for (roughness, sheen) in [(0.0, 0.0), (0.3, 0.5)] {
+        let over = |base: Varnished<'static>| {
+            Bsdf::Varnish(Varnish::new(base, 0.8, roughness, Vec3::splat(sheen), 0.5).over_relief(bumps))
+        };
+        let name = format!("varnish {roughness}, sheen {sheen} over bumps");
+        cases.push(Case::new(name.as_str(), over(Varnished::Sheet(white)), Budget::AtMost, 0.09));
+        let bsdf = over(Varnished::Boundary(&FROSTED));
+        let case = Case::new(format!("{name} of frosted glass"), bsdf, Budget::AtMost, 0.3 * 0.09);
+        cases.push(Case { eta: 1.5, ..case });
+    }
+    cases
 }
 
 /// Models without microfacets.

@@ -1,6 +1,6 @@
 //! Sampling matches the pdf, and the pdf integrates to 1 less what is discarded.
 
-use super::cases::{Case, delta_cases, smooth_cases, views};
+use super::cases::{Case, bumpy_cases, delta_cases, smooth_cases, views};
 use super::sphere::{Bins, integrate};
 use super::statistics::{Random, chi_square_p, normal_p, sidak};
 use glam::Vec3;
@@ -86,7 +86,7 @@ impl Histogram {
 /// Significance 1e-3 over all models and views, once for the chi-square and once for the discarded share.
 #[test]
 fn samples_follow_their_pdf() {
-    let cases: Vec<Case> = smooth_cases().into_iter().chain(delta_cases()).collect();
+    let cases: Vec<Case> = smooth_cases().into_iter().chain(delta_cases()).chain(bumpy_cases()).collect();
     let views = views();
     let significance = sidak(1e-3, cases.len() * views.len());
     let mut failures = Vec::new();

@@ -1,6 +1,6 @@
 //! White furnaces: what a model gives back of uniform light from everywhere.
 
-use super::cases::{Budget, Case, delta_cases, smooth_cases, views};
+use super::cases::{Budget, Case, bumpy_cases, delta_cases, smooth_cases, views};
 use super::sphere::{Bins, integrate};
 use super::statistics::{Mean, Random, normal_p, sidak};
 use glam::Vec3;
@@ -59,7 +59,7 @@ fn delta_energy(case: &Case, wo: Vec3) -> f64 {
 }
 
 fn all_cases() -> Vec<Case> {
-    smooth_cases().into_iter().chain(delta_cases()).collect()
+    smooth_cases().into_iter().chain(delta_cases()).chain(bumpy_cases()).collect()
 }
 
 /// Significance 1e-3 over all models and views for the agreement of sampling and quadrature.

@@ -105,7 +105,7 @@ mod tests {
     fn a_number_of_pbrts_is_alpha_and_the_mean_where_that_is_1_throughout() {
         let adjust = Adjust { to_number: Some(Number::AlphaOrMean), ..Adjust::NONE };
         let numbers = |texels| {
-            let picture = Decoded { width: 2, height: 1, texels, notes: Vec::new() };
+            let picture = Decoded::of_texels([2, 1], texels);
             let Texels::Floats(floats) = adjust.apply(picture).texels else { return Vec::new() };
             floats.iter().map(|texel| texel[0]).collect::<Vec<f32>>()
         };

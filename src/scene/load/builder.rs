@@ -19,6 +19,8 @@ use std::path::Path;
 #[derive(Clone, Debug)]
 pub(super) struct NamedCamera {
     pub(super) name: String,
+    /// The name of what holds it, which is another one where several hold one camera.
+    pub(super) holder: Option<String>,
     pub(super) camera: Camera,
     pub(super) framing: Framing,
 }
@@ -208,10 +210,13 @@ impl Builder {
             }
             return Ok(self.fitted(first, options));
         };
-        if let Some(camera) = self.cameras.iter().find(|camera| camera.name == *wanted).cloned() {
+        let is_called = |camera: &&NamedCamera| camera.name == *wanted;
+        let is_held = |camera: &&NamedCamera| camera.holder.as_ref() == Some(wanted);
+        let named = self.cameras.iter().find(is_called).or_else(|| self.cameras.iter().find(is_held));
+        if let Some(camera) = named.cloned() {
             return Ok(self.fitted(camera, options));
         }
-        let names = || self.cameras.iter().map(|camera| camera.name.as_str());
+        let names = || self.cameras.iter().map(|camera| self.best_name(camera));
         let problem = match names().count() {
             0 => format!("no camera \"{wanted}\": the scene has no named camera"),
             _ => format!("no camera \"{wanted}\"{}", {
@@ -223,6 +228,12 @@ impl Builder {
             }),
         };
         Err(LoadError::Option { problem })
+    }
+
+    /// The name by which a camera alone is chosen, if it has any.
+    fn best_name<'a>(&self, camera: &'a NamedCamera) -> &'a str {
+        let is_shared = self.cameras.iter().filter(|other| other.name == camera.name).nth(1).is_some();
+        camera.holder.as_deref().filter(|_| is_shared).unwrap_or(&camera.name)
     }
 
     /// The bounds of what is rendered, if anything is.
@@ -257,7 +268,7 @@ fn add_tangents(scene: &mut Scene, follow_maps: bool) {
     for instance in &scene.instances {
         let material = &scene.materials[instance.material.0 as usize];
         if material.needs_tangent() {
-            let map = material.relief.as_ref().filter(|_| follow_maps).and_then(Relief::texture).copied();
+            let map = material.reliefs().filter(|_| follow_maps).find_map(Relief::texture).copied();
             asked[instance.mesh.0 as usize].get_or_insert(map);
         }
     }

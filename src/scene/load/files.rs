@@ -78,13 +78,16 @@ pub(crate) fn read_text(path: &Path) -> Result<String, LoadError> {
 }
 
 /// Text from bytes, with a placeholder for each byte that is not UTF-8: old exporters write names and comments in other
-/// encodings, and only those are lost.
+/// encodings, and only those are lost. Lines that end as on old Macs end as everywhere.
 pub(crate) fn decode_loosely(path: &Path, bytes: Vec<u8>) -> Result<String, LoadError> {
-    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
-        return decode_text(path, bytes);
-    }
-    let text = bytes.strip_prefix(&[0xef, 0xbb, 0xbf]).unwrap_or(&bytes);
-    Ok(String::from_utf8_lossy(text).into_owned())
+    let text = if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+        decode_text(path, bytes)?
+    } else {
+        let text = bytes.strip_prefix(&[0xef, 0xbb, 0xbf]).unwrap_or(&bytes);
+        String::from_utf8_lossy(text).into_owned()
+    };
+    let has_only_returns = text.contains('\r') && !text.contains('\n');
+    Ok(if has_only_returns { text.replace('\r', "\n") } else { text })
 }
 
 /// Text from bytes.

@@ -249,8 +249,23 @@ impl Written {
         if !matches!(material.surface, Surface::Dielectric { .. }) {
             material.alpha = self.alpha(builder);
         }
+        self.note_zeros_beside_maps(builder);
         self.note_unread(builder);
         material
+    }
+
+    /// Names factors of 0 that stand for 1.
+    fn note_zeros_beside_maps(&self, builder: &mut Builder) {
+        let is_idle = |key: &&str| {
+            let key = key.to_ascii_lowercase();
+            let is_zero = self.numbers.get(&key).is_some_and(|numbers| numbers.iter().all(|&number| number <= 0.0));
+            is_zero && self.maps.contains_key(&format!("map_{key}"))
+        };
+        let factors = ["Kd", "Ks", "Ke", "d", "Pr", "Pm", "Pc", "Pcr", "Ps"].into_iter();
+        let idle: Vec<String> = factors.filter(is_idle).map(|key| format!("{key} 0")).collect();
+        if !idle.is_empty() {
+            builder.note(format!("Material \"{}\": {} beside a picture is taken as 1.", self.name, idle.join(", ")));
+        }
     }
 
     /// Names what was left out in one sentence.
@@ -296,11 +311,14 @@ impl Written {
     fn alpha(&self, builder: &mut Builder) -> Alpha {
         let opacity = self.opacity();
         let Some(map) = self.map(&["map_d"]) else {
-            // Fully transparent materials are a common slip about the meaning of Tr.
-            return if opacity > 0.0 && opacity < 1.0 {
-                Alpha::Blend { value: ScalarInput::constant(opacity) }
-            } else {
-                Alpha::Opaque
+            if opacity == 0.0 && self.number("d").is_none() {
+                // A common slip about the meaning of Tr; that of d is known to all.
+                builder.note(format!("Material \"{}\": Tr 1 is taken for opaque; d 0 is transparent.", self.name));
+                return Alpha::Opaque;
+            }
+            return match opacity < 1.0 {
+                true => Alpha::Blend { value: ScalarInput::constant(opacity) },
+                false => Alpha::Opaque,
             };
         };
         // The colour's own file named again means its alpha channel; any other file is a grey picture.

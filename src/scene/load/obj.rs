@@ -62,7 +62,7 @@ pub(super) fn read_into(
         models.extend(parse(path, &part, added_lines, with_materials.then_some(&libraries))?);
     }
     let libraries = libraries.into_inner();
-    for note in libraries.notes {
+    for note in libraries.notes() {
         builder.note(note);
     }
     if with_materials {
@@ -74,7 +74,14 @@ pub(super) fn read_into(
     let mut placed = Vec::new();
     let mut sparse_faces = points_and_lines;
     for model in &models {
-        let (mesh, skipped) = convert_mesh(model, path)?;
+        let (mesh, skipped) = convert_mesh(model, path).map_err(|bad| {
+            let place = match line_of_vertex(&text, bad.position) {
+                Some(line) => Place::line(path, line.saturating_sub(added_lines)),
+                None => Place::file(path),
+            };
+            let problem = format!("a vertex of \"{}\" is not finite: {}", model.name, bad.position);
+            LoadError::invalid_at(place, problem)
+        })?;
         sparse_faces += skipped;
         if mesh.triangles.is_empty() {
             continue;
@@ -140,10 +147,19 @@ struct Libraries {
     /// How many materials there are after each of the `mtllib` statements that were read.
     ends: Vec<usize>,
     notes: Vec<String>,
+    /// Those that are not there, as they are named.
+    missing: Vec<String>,
     error: Option<LoadError>,
 }
 
 impl Libraries {
+    /// What is to be said of them. Where others are there, materials that none of them has are named one by one.
+    fn notes(&self) -> impl Iterator<Item = String> {
+        let instead = if self.materials.is_empty() { ": a plain grey stands in" } else { "" };
+        let missing = self.missing.iter().map(move |name| format!("Material file \"{name}\" not found{instead}."));
+        missing.chain(self.notes.iter().cloned())
+    }
+
     /// `mtllib` names one file that may hold spaces, or several files apart by spaces.
     fn open(&mut self, obj: &Path, named: &str) {
         let folder = obj.parent().unwrap_or(Path::new(""));
@@ -159,7 +175,7 @@ impl Libraries {
             kept.split_whitespace().map(|word| mtl::find_file(folder, &name(word))).filter(|f| f.is_file()).collect()
         };
         if found.is_empty() {
-            self.notes.push(format!("Material file \"{whole}\" not found: a plain grey stands in."));
+            self.missing.push(whole);
         }
         for file in found {
             match mtl::read(&file, &mut self.notes) {
@@ -307,12 +323,28 @@ fn report_unknown_materials(
     }
 }
 
+/// A vertex that is not finite.
+struct BadVertex {
+    position: Vec3,
+}
+
+/// The first line that gives a vertex this position, which is not finite.
+fn line_of_vertex(text: &str, position: Vec3) -> Option<usize> {
+    let is_same =
+        |(own, written): (f32, &str)| written.parse().is_ok_and(|written: f32| own.total_cmp(&written).is_eq());
+    let is_it = |line: &str| {
+        let words = line.strip_prefix("v ").map(str::split_whitespace);
+        words.is_some_and(|words| position.to_array().into_iter().zip(words).all(is_same))
+    };
+    text.lines().position(is_it).map(|place| place + 1)
+}
+
 /// Our mesh, and how many faces of fewer than three corners were skipped.
-fn convert_mesh(model: &tobj::Model, path: &Path) -> Result<(Mesh, usize), LoadError> {
+fn convert_mesh(model: &tobj::Model, path: &Path) -> Result<(Mesh, usize), BadVertex> {
     let from = &model.mesh;
     let positions: Vec<Vec3> = from.positions.as_chunks::<3>().0.iter().copied().map(Vec3::from_array).collect();
-    if let Some(bad) = positions.iter().find(|position| !position.is_finite()) {
-        return Err(LoadError::invalid(path, format_args!("a vertex of \"{}\" is not finite: {bad}", model.name)));
+    if let Some(&position) = positions.iter().find(|position| !position.is_finite()) {
+        return Err(BadVertex { position });
     }
     // The same for all faces (`patterns`), so that there is one a position or none.
     let of_all = |values: &[f32], width: usize| values.len() == positions.len() * width;

@@ -216,8 +216,11 @@ fn decode_all(
         if let Some(tell) = on_texture {
             tell(done.fetch_add(1, Ordering::Relaxed) + 1, wanted.len());
         }
-        let alpha = if covering.contains(picture) { Alpha::Coverage } else { Alpha::Independent };
-        Ok(texture_memory::shrunk(adjust.apply(decoded?), *halvings, alpha))
+        let (alpha, decoded) = match covering.contains(picture) {
+            true => (Alpha::Coverage, decoded?.without_alpha_in_colours()),
+            false => (Alpha::Independent, decoded?),
+        };
+        Ok(texture_memory::shrunk(adjust.apply(decoded), *halvings, alpha))
     };
     wanted.par_iter().zip(halvings).map(decode_one).collect()
 }

@@ -97,7 +97,7 @@ pub(super) fn shrunk(picture: Decoded, halvings: u32, alpha: Alpha) -> Decoded {
             Texels::Bytes(Arc::new(encoded.collect()), *encoding)
         }
     };
-    Decoded { width, height, texels, notes: picture.notes }
+    Decoded { width, height, texels, ..picture }
 }
 
 /// The part of a line of texels that one new texel covers.
@@ -172,7 +172,7 @@ mod tests {
     }
 
     fn floats(width: u32, height: u32, texels: Vec<[f32; 4]>) -> Decoded {
-        Decoded { width, height, texels: Texels::Floats(Arc::new(texels)), notes: Vec::new() }
+        Decoded::of_texels([width, height], Texels::Floats(Arc::new(texels)))
     }
 
     fn values(picture: &Decoded) -> &[[f32; 4]] {
@@ -216,7 +216,7 @@ mod tests {
     fn bytes_are_averaged_in_linear_light() {
         for (encoding, expected) in [(Encoding::Srgb, 188), (Encoding::Linear, 128)] {
             let texels = Texels::Bytes(Arc::new(vec![[0, 0, 0, 255], [255, 255, 255, 255]]), encoding);
-            let small = shrunk(Decoded { width: 2, height: 1, texels, notes: Vec::new() }, 1, Alpha::Independent);
+            let small = shrunk(Decoded::of_texels([2, 1], texels), 1, Alpha::Independent);
             let Texels::Bytes(bytes, kept) = small.texels else { panic!("floats") };
             assert_eq!((bytes[0], kept), ([expected, expected, expected, 255], encoding));
         }

@@ -209,7 +209,7 @@ pub(super) fn check(scene: &Scene, path: &Path) -> Result<(), LoadError> {
         if textures_of(&material.surface)
             .into_iter()
             .chain([material.emission.texture.map(|lookup| lookup.texture.0)])
-            .chain([material.relief.and_then(|relief| relief.texture().map(|lookup| lookup.texture.0))])
+            .chain(material.reliefs().map(|relief| relief.texture().map(|lookup| lookup.texture.0)))
             .chain([material.stretch.and_then(|stretch| stretch.map.map(|lookup| lookup.texture.0))])
             .chain([match material.alpha {
                 Alpha::Opaque | Alpha::Unseen => None,

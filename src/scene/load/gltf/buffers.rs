@@ -64,7 +64,7 @@ pub(super) enum Uri {
     Data(Vec<u8>),
 }
 
-/// A relative path (percent-encoded) or base64 data.
+/// A relative path (percent-encoded), the `file:` URI of an absolute one, or base64 data.
 pub(super) fn resolve(path: &Path, uri: &str) -> Result<Uri, LoadError> {
     if let Some(data) = uri.strip_prefix("data:") {
         let encoded = data.split_once(";base64,").map(|(_, encoded)| encoded);
@@ -72,11 +72,13 @@ pub(super) fn resolve(path: &Path, uri: &str) -> Result<Uri, LoadError> {
         let bytes = LENIENT_BASE64.decode(encoded.trim());
         return bytes.map(Uri::Data).map_err(|error| LoadError::invalid(path, format_args!("a data: URI: {error}")));
     }
-    if uri.contains("://") {
+    let absolute = uri.strip_prefix("file://").map(|rest| rest.strip_prefix("localhost").unwrap_or(rest));
+    let local = absolute.filter(|absolute| absolute.starts_with('/')).unwrap_or(uri);
+    if local.contains("://") {
         return Err(LoadError::unsupported(path, format_args!("\"{uri}\": only local files are read")));
     }
     let mut decoded = Vec::new();
-    let mut rest = uri.as_bytes();
+    let mut rest = local.as_bytes();
     while let Some((&byte, behind)) = rest.split_first() {
         let hex = |digit: Option<&u8>| digit.and_then(|&digit| char::from(digit).to_digit(16));
         match (byte, hex(behind.first()), hex(behind.get(1))) {

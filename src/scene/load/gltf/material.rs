@@ -4,13 +4,15 @@ use super::super::builder::Builder;
 use super::super::error::{LoadError, Place};
 use super::super::texture::{Adjust, IfMissing, Picture, Request};
 use super::buffers::{Buffers, Uri, resolve};
+use super::extension::{ANISOTROPY, CLEARCOAT, Extension, SHEEN, name_of, share};
 use crate::scene::{
-    Alpha, ColorInput, Encoding, Material, MaterialId, MetalRoughness, Relief, ScalarInput, StretchDirection, Surface,
-    TextureLookup, Wrap,
+    Alpha, CoatRelief, ColorInput, Encoding, Material, MaterialId, MetalRoughness, Relief, ScalarInput,
+    StretchDirection, Surface, TextureLookup, Wrap,
 };
 use glam::{Vec2, Vec3};
 use gltf::material::AlphaMode;
 use gltf::texture::{MagFilter, WrappingMode};
+use serde_json::Value;
 use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -41,7 +43,7 @@ impl<'a> Materials<'a> {
     }
 
     fn convert(&mut self, builder: &mut Builder, from: &gltf::Material) -> Result<Material, LoadError> {
-        let name = from.name().map_or_else(|| format!("material {}", from.index().unwrap_or(0)), str::to_owned);
+        let name = name_of(from);
         let base_texture = from.pbr_metallic_roughness().base_color_texture();
         let base = self.optional(builder, base_texture.as_ref(), Encoding::Srgb)?;
         Ok(Material {
@@ -122,26 +124,24 @@ impl<'a> Materials<'a> {
     /// What extensions say about the surface beyond the core's parameters.
     fn extensions(&mut self, builder: &mut Builder, from: &gltf::Material) -> Result<MetalRoughness, LoadError> {
         let mut model = MetalRoughness::default();
-        if let Some(json) = from.extension_value("KHR_materials_clearcoat") {
-            model.clearcoat = self.json_scalar(builder, json, ["clearcoatFactor", "clearcoatTexture"], 0)?;
+        if let Some(coat) = Extension::of(self.path, builder, from, &CLEARCOAT)? {
+            model.clearcoat = self.scalar(builder, &coat, ["clearcoatFactor", "clearcoatTexture"], 0)?;
             let keys = ["clearcoatRoughnessFactor", "clearcoatRoughnessTexture"];
-            model.clearcoat_roughness = self.json_scalar(builder, json, keys, 1)?;
-            if json.get("clearcoatNormalTexture").is_some() {
-                builder.note("KHR_materials_clearcoat: the coat takes the base's normal map, not its own.");
-            }
+            model.clearcoat_roughness = self.scalar(builder, &coat, keys, 1)?;
+            model.coat_relief = CoatRelief::Own(self.coat_normals(builder, &coat)?);
         }
-        if let Some(json) = from.extension_value("KHR_materials_sheen") {
-            let factor = json_color(json, "sheenColorFactor", 0.0).min(Vec3::ONE);
-            let texture = self.json_lookup(builder, json, "sheenColorTexture", Encoding::Srgb, [255; 4])?;
-            model.sheen_color = ColorInput { factor, texture };
+        if let Some(sheen) = Extension::of(self.path, builder, from, &SHEEN)? {
+            let texture = self.picture_of(builder, &sheen, "sheenColorTexture", Encoding::Srgb, [255; 4])?;
+            model.sheen_color = ColorInput { factor: sheen.color("sheenColorFactor")?, texture };
             let keys = ["sheenRoughnessFactor", "sheenRoughnessTexture"];
-            model.sheen_roughness = self.json_scalar(builder, json, keys, 3)?;
+            model.sheen_roughness = self.scalar(builder, &sheen, keys, 3)?;
         }
-        if let Some(json) = from.extension_value("KHR_materials_anisotropy") {
-            let strength = json.get("anisotropyStrength").and_then(serde_json::Value::as_f64).unwrap_or(0.0) as f32;
-            let lookup = self.anisotropy_texture(builder, json)?;
-            model.anisotropy =
-                ScalarInput { factor: strength.clamp(0.0, 1.0), texture: lookup.map(|lookup| (lookup, 2)) };
+        if let Some(anisotropy) = Extension::of(self.path, builder, from, &ANISOTROPY)? {
+            let lookup = self.anisotropy_texture(builder, &anisotropy)?;
+            model.anisotropy = ScalarInput {
+                factor: share(anisotropy.number("anisotropyStrength")?),
+                texture: lookup.map(|lookup| (lookup, 2)),
+            };
         }
         if let Some(specular) = from.specular() {
             let factor = specular.specular_factor();
@@ -160,12 +160,23 @@ impl<'a> Materials<'a> {
         Ok(model)
     }
 
+    /// The normal map of KHR_materials_clearcoat; without one the coat is smooth, whatever lies beneath it.
+    fn coat_normals(&mut self, builder: &mut Builder, coat: &Extension) -> Result<Option<Relief>, LoadError> {
+        let key = "clearcoatNormalTexture";
+        let map = self.picture_of(builder, coat, key, Encoding::Linear, [128, 128, 255, 255])?;
+        let strength = match coat.values.get(key).and_then(|info| info.get("scale")) {
+            None => 1.0,
+            Some(scale) => scale.as_f64().ok_or_else(|| coat.wrong(key, "its scale is no number"))? as f32,
+        };
+        Ok(map.map(|map| Relief::Normals { map, strength: if strength.is_finite() { strength } else { 1.0 } }))
+    }
+
     /// The direction of KHR_materials_anisotropy: red and green of its texture, whose blue is the strength, and its rotation.
     fn stretch(&mut self, builder: &mut Builder, from: &gltf::Material) -> Result<Option<StretchDirection>, LoadError> {
-        let Some(json) = from.extension_value("KHR_materials_anisotropy") else { return Ok(None) };
-        let rotation = json.get("anisotropyRotation").and_then(serde_json::Value::as_f64).unwrap_or(0.0) as f32;
+        let Some(anisotropy) = Extension::of(self.path, builder, from, &ANISOTROPY)? else { return Ok(None) };
+        let rotation = anisotropy.number("anisotropyRotation")?;
         let rotation = if rotation.is_finite() { rotation } else { 0.0 };
-        let map = self.anisotropy_texture(builder, json)?;
+        let map = self.anisotropy_texture(builder, &anisotropy)?;
         Ok((rotation != 0.0 || map.is_some()).then_some(StretchDirection { rotation, map }))
     }
 
@@ -173,39 +184,39 @@ impl<'a> Materials<'a> {
     fn anisotropy_texture(
         &mut self,
         builder: &mut Builder,
-        json: &serde_json::Value,
+        anisotropy: &Extension,
     ) -> Result<Option<TextureLookup>, LoadError> {
-        self.json_lookup(builder, json, "anisotropyTexture", Encoding::Linear, [255, 128, 255, 255])
+        self.picture_of(builder, anisotropy, "anisotropyTexture", Encoding::Linear, [255, 128, 255, 255])
     }
 
-    /// A factor in [0, 1], 0 unless told, and a channel of a texture, of an extension that the crate leaves as JSON.
-    fn json_scalar(
+    /// A factor in [0, 1], 0 unless told, and a channel of a texture.
+    fn scalar(
         &mut self,
         builder: &mut Builder,
-        json: &serde_json::Value,
+        extension: &Extension,
         [factor, texture]: [&str; 2],
         channel: u8,
     ) -> Result<ScalarInput, LoadError> {
-        let number = json.get(factor).and_then(serde_json::Value::as_f64).unwrap_or(0.0) as f32;
-        let lookup = self.json_lookup(builder, json, texture, Encoding::Linear, [255; 4])?;
-        Ok(ScalarInput { factor: number.clamp(0.0, 1.0), texture: lookup.map(|lookup| (lookup, channel)) })
+        let lookup = self.picture_of(builder, extension, texture, Encoding::Linear, [255; 4])?;
+        let factor = share(extension.number(factor)?);
+        Ok(ScalarInput { factor, texture: lookup.map(|lookup| (lookup, channel)) })
     }
 
-    fn json_lookup(
+    fn picture_of(
         &mut self,
         builder: &mut Builder,
-        json: &serde_json::Value,
+        extension: &Extension,
         key: &str,
         encoding: Encoding,
         if_missing: [u8; 4],
     ) -> Result<Option<TextureLookup>, LoadError> {
-        let Some(info) = json.get(key) else { return Ok(None) };
-        let index = info.get("index").and_then(serde_json::Value::as_u64);
+        let Some(info) = extension.values.get(key) else { return Ok(None) };
+        let index = info.get("index").and_then(Value::as_u64);
         let Some(texture) = index.and_then(|index| self.document.textures().nth(index as usize)) else {
-            return Err(LoadError::invalid(self.path, format_args!("{key}: there is no texture of this index")));
+            return Err(extension.wrong(key, "there is no texture of this index"));
         };
         let transform = info.pointer("/extensions/KHR_texture_transform");
-        note_coordinates(builder, info.get("texCoord").map_or(Some(0), serde_json::Value::as_u64), transform);
+        note_coordinates(builder, info.get("texCoord").map_or(Some(0), Value::as_u64), transform);
         let transform = transform.map(read_transform);
         self.lookup(builder, &texture, encoding, transform, if_missing)
     }
@@ -242,7 +253,14 @@ impl<'a> Materials<'a> {
         let webp =
             others().find(|(name, _)| *name == "EXT_texture_webp").and_then(|(_, webp)| webp.get("source")?.as_u64());
         let index = webp.map_or(json.source.value(), |index| index as usize);
-        let Some(picture) = self.picture(index)? else {
+        let picture = match self.picture(index) {
+            Err(error) if error.is_unsupported() => {
+                builder.note(format!("Texture {}: {error}; left out.", texture.index()));
+                return Ok(None);
+            }
+            other => other?,
+        };
+        let Some(picture) = picture else {
             let extensions: Vec<&str> = others().map(|(name, _)| name.as_str()).collect();
             let why = if index < self.document.as_json().images.len() {
                 "its image has neither a file nor a buffer view".to_owned()
@@ -306,11 +324,6 @@ impl<'a> Materials<'a> {
     }
 }
 
-/// Cut to 0 to 1.
-fn share(value: f32) -> f32 {
-    if value.is_finite() { value.clamp(0.0, 1.0) } else { 0.0 }
-}
-
 /// How much of what is there counts: by the base colour's factor and the alpha of its picture.
 fn alpha(from: &gltf::Material, base: Option<TextureLookup>) -> Alpha {
     let [.., opacity] = from.pbr_metallic_roughness().base_color_factor();
@@ -355,20 +368,11 @@ fn has_plain_boundary(model: &MetalRoughness) -> bool {
 }
 
 /// Says so where a texture asks for coordinates beyond the first set; a transform's own set stands over the texture's.
-fn note_coordinates(builder: &mut Builder, set: Option<u64>, transform: Option<&serde_json::Value>) {
+fn note_coordinates(builder: &mut Builder, set: Option<u64>, transform: Option<&Value>) {
     let own = transform.and_then(|transform| transform.get("texCoord"));
-    if own.map_or(set, serde_json::Value::as_u64) != Some(0) {
+    if own.map_or(set, Value::as_u64) != Some(0) {
         builder.note("Texture coordinate sets beyond the first are not used.");
     }
-}
-
-/// A colour of an extension that the crate leaves as JSON; none below 0.
-fn json_color(json: &serde_json::Value, key: &str, default: f32) -> Vec3 {
-    let channel = |place: usize| {
-        let number = json.get(key).and_then(|color| color.get(place)).and_then(serde_json::Value::as_f64);
-        number.map_or(default, |number| number as f32).max(0.0)
-    };
-    Vec3::new(channel(0), channel(1), channel(2))
 }
 
 /// KHR_texture_transform.
@@ -380,10 +384,9 @@ struct Transform {
 }
 
 /// The extension where the crate leaves it as JSON (normal maps).
-fn read_transform(value: &serde_json::Value) -> Transform {
-    let number = |value: Option<&serde_json::Value>, default: f32| {
-        value.and_then(serde_json::Value::as_f64).map_or(default, |number| number as f32)
-    };
+fn read_transform(value: &Value) -> Transform {
+    let number =
+        |value: Option<&Value>, default: f32| value.and_then(Value::as_f64).map_or(default, |number| number as f32);
     let pair = |key: &str, default: f32| {
         let part = |place: usize| number(value.get(key).and_then(|pair| pair.get(place)), default);
         Vec2::new(part(0), part(1))

@@ -8,6 +8,7 @@ mod animation;
 mod buffers;
 mod deform;
 mod document;
+mod extension;
 mod material;
 mod motion;
 
@@ -174,6 +175,7 @@ impl<'a> Reader<'a> {
             for primitive in mesh.primitives() {
                 if let Some(converted) = self.primitive(mesh, &primitive)? {
                     let material = self.materials.get(self.builder, &primitive.material())?;
+                    self.note_missing_coordinates(&converted, material);
                     let mesh = self.builder.add_mesh(converted);
                     if primitive.morph_targets().next().is_some() {
                         self.builder.deforming.insert(mesh);
@@ -206,11 +208,19 @@ impl<'a> Reader<'a> {
                 deform::skin(self.buffers, &primitive, joints, &mut converted)?;
             }
             let material = self.materials.get(self.builder, &primitive.material())?;
+            self.note_missing_coordinates(&converted, material);
             let mesh = self.builder.add_mesh(converted);
             self.builder.deforming.insert(mesh);
             parts.push((mesh, material));
         }
         self.place_parts(&parts, name, to_world, motion)
+    }
+
+    fn note_missing_coordinates(&mut self, mesh: &Mesh, material: MaterialId) {
+        if mesh.uvs.is_empty() && self.builder.materials[material.0 as usize].reads_pictures() {
+            let note = format!("\"{}\" has no texture coordinates: of its pictures it has one point alone.", mesh.name);
+            self.builder.note(note);
+        }
     }
 
     fn place_parts(
@@ -297,7 +307,10 @@ impl<'a> Reader<'a> {
     }
 
     fn camera(&mut self, camera: &::gltf::Camera, node: &str, to_world: &Affine3A, motion: Option<Motion>) {
-        let name = camera.name().unwrap_or(node).to_owned();
+        let (name, holder) = match camera.name() {
+            Some(name) => (name.to_owned(), Some(node.to_owned())),
+            None => (node.to_owned(), None),
+        };
         let position = Vec3::from(to_world.translation);
         let forward = to_world.transform_vector3(Vec3::NEG_Z).try_normalize();
         let up = to_world.transform_vector3(Vec3::Y).try_normalize();
@@ -323,7 +336,7 @@ impl<'a> Reader<'a> {
         }
         let framing = aspect.map_or(Framing::Fixed, Framing::Stated);
         let camera = Camera { projection, motion, ..Camera::pinhole(position, forward, up, 40.0) };
-        self.builder.cameras.push(NamedCamera { name, camera, framing });
+        self.builder.cameras.push(NamedCamera { name, holder, camera, framing });
     }
 
     fn light(&mut self, light: &::gltf::khr_lights_punctual::Light, to_world: &Affine3A) {
@@ -336,6 +349,9 @@ impl<'a> Reader<'a> {
         if !strength.is_finite() || !position.is_finite() {
             self.builder.note("A light that is not finite is left out.");
             return;
+        }
+        if strength.min_element() < 0.0 {
+            self.builder.note("Light below 0 is taken as 0: a light has a negative intensity or colour.");
         }
         let strength = strength.max(Vec3::ZERO);
         if light.range().is_some() && !matches!(light.kind(), Kind::Directional) {

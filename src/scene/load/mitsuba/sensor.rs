@@ -83,7 +83,7 @@ impl Reader {
         if is_first {
             self.clips = Some((sensor.place(), clips));
         }
-        self.builder.cameras.push(NamedCamera { name: sensor.name(), camera, framing });
+        self.builder.cameras.push(NamedCamera { name: sensor.name(), holder: None, camera, framing });
         Ok(())
     }
 

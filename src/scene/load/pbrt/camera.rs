@@ -99,7 +99,7 @@ impl Reader<'_> {
             ..Camera::pinhole(position, forward, up, 40.0)
         };
         self.note_unread("camera", &parameters);
-        self.builder.cameras.push(NamedCamera { name: kind, camera, framing });
+        self.builder.cameras.push(NamedCamera { name: kind, holder: None, camera, framing });
         Ok(())
     }
 

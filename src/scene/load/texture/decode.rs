@@ -26,6 +26,8 @@ pub(in crate::scene::load) struct Decoded {
     pub(in crate::scene::load) width: u32,
     pub(in crate::scene::load) height: u32,
     pub(in crate::scene::load) texels: Texels,
+    /// Whether its colours are multiplied by its alpha, as those of EXR files are.
+    pub(in crate::scene::load) is_premultiplied: bool,
     /// What was done to its values, a line each without a full stop, for whoever should know.
     pub(in crate::scene::load) notes: Vec<String>,
 }
@@ -33,7 +35,24 @@ pub(in crate::scene::load) struct Decoded {
 impl Decoded {
     pub(super) fn plain(texel: [u8; 4], encoding: Encoding) -> Self {
         let texels = Texels::Bytes(Arc::new(vec![texel]), encoding);
-        Self { width: 1, height: 1, texels, notes: Vec::new() }
+        Self::of_texels([1, 1], texels)
+    }
+
+    /// A picture of `size` whose colours are as they stand.
+    pub(in crate::scene::load) fn of_texels([width, height]: [u32; 2], texels: Texels) -> Self {
+        Self { width, height, texels, is_premultiplied: false, notes: Vec::new() }
+    }
+
+    /// The colours of what its alpha says is there: the alpha will multiply them. Light without coverage, as a glow has, stays.
+    pub(super) fn without_alpha_in_colours(mut self) -> Self {
+        if let (true, Texels::Floats(texels)) = (self.is_premultiplied, &mut self.texels) {
+            for [rgb @ .., alpha] in Arc::make_mut(texels).iter_mut().filter(|[.., alpha]| *alpha > 0.0 && *alpha < 1.0)
+            {
+                *rgb = rgb.map(|value| (value / *alpha).min(f32::MAX));
+            }
+        }
+        self.is_premultiplied = false;
+        self
     }
 }
 
@@ -81,7 +100,7 @@ pub(super) fn decode(picture: &Picture, encoding: Encoding, values: Values) -> R
         Picture::Texels { size: [width, height], bits, .. } => {
             let texels = bits.iter().map(|texel| texel.map(f32::from_bits)).collect();
             let texels = Texels::Floats(Arc::new(texels));
-            Ok(Decoded { width: *width, height: *height, texels, notes: Vec::new() })
+            Ok(Decoded::of_texels([*width, *height], texels))
         }
     }
 }
@@ -99,6 +118,9 @@ pub(in crate::scene::load) fn decode_bytes(
     let bytes = &*with_known_header(bytes);
     let wrong = |error: image::ImageError| match error {
         image::ImageError::Limits(_) => LoadError::too_large(name, format_args!("the picture is too large: {error}")),
+        image::ImageError::Unsupported(_) => {
+            LoadError::unsupported(name, format_args!("a picture of a kind that is not read: {error}"))
+        }
         _ => LoadError::invalid(name, format_args!("not a readable picture: {error}")),
     };
     let Some(format) = format_of(bytes, name) else {
@@ -130,7 +152,7 @@ pub(in crate::scene::load) fn decode_bytes(
             Texels::Floats(Arc::new(texels))
         }
     };
-    Ok(Decoded { width, height, texels, notes })
+    Ok(Decoded { notes, ..Decoded::of_texels([width, height], texels) })
 }
 
 /// The reader with the limits that hold for textures.
@@ -208,7 +230,7 @@ fn decode_exr(bytes: &[u8], name: &Path, values: Values) -> Result<Decoded, Load
     let alpha = channel(&image, "A");
     let texel = |(i, [r, g, b]): (usize, [f32; 3])| [r, g, b, alpha.map_or(1.0, |alpha| alpha[i])];
     let texels = Texels::Floats(Arc::new(rgb.into_iter().enumerate().map(texel).collect()));
-    Ok(Decoded { width, height, texels, notes })
+    Ok(Decoded { is_premultiplied: alpha.is_some(), notes, ..Decoded::of_texels([width, height], texels) })
 }
 
 /// The channels of an EXR file that a texture is made of: R, G, B and A of the picture's layer; where no layer has all colours, of any; else

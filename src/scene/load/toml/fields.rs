@@ -153,10 +153,24 @@ impl<'a> Value<'a> {
     /// One of some words.
     pub(super) fn choice<T: Copy>(&self, words: &[(&'static str, T)]) -> Result<T, LoadError> {
         let written = self.string()?;
-        words.iter().find(|(word, _)| *word == written).map(|&(_, choice)| choice).ok_or_else(|| {
-            let known = words.iter().map(|&(word, _)| word).collect::<Vec<_>>();
-            self.error(format_args!("unknown value \"{written}\"{}", suggestion(written, known)))
-        })
+        words
+            .iter()
+            .find(|(word, _)| *word == written)
+            .map(|&(_, choice)| choice)
+            .ok_or_else(|| self.unknown_value(written, words.iter().map(|&(word, _)| word)))
+    }
+
+    /// One of these words.
+    pub(super) fn word_of(&self, words: impl Iterator<Item = &'static str> + Clone) -> Result<String, LoadError> {
+        let written = self.string()?;
+        match words.clone().any(|word| word == written) {
+            true => Ok(written.to_owned()),
+            false => Err(self.unknown_value(written, words)),
+        }
+    }
+
+    fn unknown_value(&self, written: &str, known: impl Iterator<Item = &'static str> + Clone) -> LoadError {
+        self.error(format_args!("unknown value \"{written}\"{}", suggestion(written, known)))
     }
 
     /// The elements of a list.

@@ -19,6 +19,8 @@ use super::framing::Framing;
 use super::texture::{Adjust, IfMissing, Picture, Request};
 use super::{LoadOptions, Shutter, files};
 use crate::scene::{Encoding, FilmDefaults, MOST_EXPOSURE_STOPS, NITS_PER_UNIT, Scene, ViewingDefaults, Wrap};
+use fechner_perception::display::Display;
+use fechner_perception::tone;
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -95,7 +97,7 @@ fn read(path: &Path, options: &LoadOptions) -> Result<(Builder, IfDark), LoadErr
         shutter.stays_open = camera.entries()?.get_or("shutter_s", 0.0, Value::non_negative)?;
         builder.shutter_s = shutter.stays_open;
         let camera = camera::read(&camera, shutter)?;
-        builder.cameras.push(NamedCamera { name: "camera".to_owned(), camera, framing: Framing::Fixed });
+        builder.cameras.push(NamedCamera { name: "camera".to_owned(), holder: None, camera, framing: Framing::Fixed });
     }
 
     let mut context =
@@ -159,14 +161,17 @@ fn read_unit(value: &Value) -> Result<f64, LoadError> {
 /// The file of a display is found from `folder`, like every file that a scene names.
 fn read_view(value: &Value, folder: &Path) -> Result<ViewingDefaults, LoadError> {
     let fields = value.fields(&["display", "visibility", "operator", "exposure_stops"])?;
-    let text = |key| fields.get_some(key, |value| value.string().map(str::to_owned));
+    let operators = || {
+        let initials = tone::operator_initials().iter().map(|&(initials, _)| initials);
+        tone::operator_names().iter().copied().chain(initials)
+    };
     Ok(ViewingDefaults {
-        display: text("display")?.map(|display| match display.ends_with(".toml") {
-            true => folder.join(display).to_string_lossy().into_owned(),
-            false => display,
-        }),
+        display: fields.get_some("display", |value| match value.string()? {
+            file if file.ends_with(".toml") => Ok(folder.join(file).to_string_lossy().into_owned()),
+            _ => value.word_of(Display::preset_names().iter().copied()),
+        })?,
         visibility: fields.get_some("visibility", Value::positive)?,
-        operator: text("operator")?,
+        operator: fields.get_some("operator", |value| value.word_of(operators()))?,
         exposure_stops: fields
             .get_some("exposure_stops", |stops| stops.within(-MOST_EXPOSURE_STOPS, MOST_EXPOSURE_STOPS))?,
     })

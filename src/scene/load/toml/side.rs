@@ -13,10 +13,10 @@ use std::path::{Path, PathBuf};
 
 const KNOWN: [&str; 6] = ["nits_per_unit", "film", "view", "camera", "environment", "lights"];
 
-/// The side file of a scene, if there is one.
+/// The side file of a scene, if there is one with something in it.
 pub(in crate::scene::load) fn of(scene: &Path) -> Option<PathBuf> {
     let beside = scene.with_extension("fechner.toml");
-    beside.is_file().then_some(beside)
+    std::fs::metadata(&beside).is_ok_and(|file| file.is_file() && file.len() > 0).then_some(beside)
 }
 
 /// The options with what the side file says of how its scene is read: its unit and size where the caller names none, whether light

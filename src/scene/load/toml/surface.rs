@@ -5,7 +5,9 @@ use super::super::metals::METALS;
 use super::Context;
 use super::fields::{Fields, Value};
 use super::material::{Entry, Materials, scalar, share, share_or_white};
-use crate::scene::{Alpha, ColorInput, Distribution, Material, MetalRoughness, Roughness, ScalarInput, Surface};
+use crate::scene::{
+    Alpha, CoatRelief, ColorInput, Distribution, Material, MetalRoughness, Roughness, ScalarInput, Surface,
+};
 use glam::Vec3;
 
 /// Reads the keys of one kind of surface.
@@ -258,6 +260,7 @@ fn metal_roughness<'a>(
         anisotropy: scalar(context, fields, "anisotropy", 0.0)?,
         clearcoat: scalar(context, fields, "clearcoat", 0.0)?,
         clearcoat_roughness: scalar(context, fields, "clearcoat_roughness", 0.0)?,
+        coat_relief: CoatRelief::OfBase,
         sheen_color: fields.get_or("sheen_color", ColorInput::constant(Vec3::ZERO), |value| share(context, value))?,
         sheen_roughness: scalar(context, fields, "sheen_roughness", 0.0)?,
     }))
