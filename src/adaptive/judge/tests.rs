@@ -107,7 +107,8 @@ fn a_rim_that_no_sample_met_is_seen() {
     // 1.3 % of 4,000 cd/m², less for sixteen samples without it: 43 cd/m² on 1.
     let displayed = (judgement.pooled_variance_per_sample.get(33, 32) / 16.0).sqrt();
     assert!((20.0..80.0).contains(&displayed), "{displayed} cd/m²");
-    assert!(!is_reached(&judgement, 4.0), "v = {}", judgement.predicted.get(33, 32));
+    let visibility = judgement.predicted.get(33, 32);
+    assert!(visibility > 2.0 && !is_reached(&judgement, 1.0), "v = {visibility}");
     assert!(judgement.variance_per_sample.is_some_and(|halves| halves.iter().all(|half| half.get(33, 32) > 1000.0)));
     assert_eq!(judgement.pooled_variance_per_sample.get(40, 32), 0.0, "not where the filter does not reach");
 }
