@@ -379,6 +379,8 @@ mod tests {
             operator: String::new(),
             exposure_stops: None,
             fitted: None,
+            frames: None,
+            gazes: Vec::new(),
             importance: None,
             denoiser: None,
         };
