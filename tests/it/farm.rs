@@ -150,6 +150,8 @@ fn order_repetition_and_bad_files_change_nothing() {
     }
     run(&farm, 0, &["farm", "merge", "."]);
     assert!(unit("1").contains("is merged"));
+    let message = run(&farm, 2, &["farm", "unit", ".", "3999"]);
+    assert!(message.contains("unit 3999 is not planned: frame 0 is done, after "), "{message}");
     assert!(picture(&farm) == whole, "the picture differs from one process's");
 }
 
