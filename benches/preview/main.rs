@@ -134,6 +134,8 @@ impl Subject {
             operator: "constant".to_owned(),
             exposure_stops: None,
             fitted: None,
+            frames: None,
+            gazes: Vec::new(),
             importance: None,
             denoiser: None,
         };

@@ -16,14 +16,23 @@ use crate::plane::Plane;
 use crate::sensitivity::AdaptationLevel;
 use crate::table::UniformTable;
 use crate::threshold::ThresholdMap;
+use serde::{Deserialize, Serialize};
 
 /// A place in the picture that is looked at, pixels from its upper left corner.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Gaze {
     /// To the right.
     pub x_px: f64,
     /// Down.
     pub y_px: f64,
+}
+
+impl Gaze {
+    /// Whether it is at a place in a picture of this size, or at its edge.
+    #[must_use]
+    pub fn is_within(&self, width: u32, height: u32) -> bool {
+        (0.0..=f64::from(width)).contains(&self.x_px) && (0.0..=f64::from(height)).contains(&self.y_px)
+    }
 }
 
 /// The eye's three channels.

@@ -47,6 +47,11 @@ impl Loop<'_> {
         // Less than a sample a pixel is as good as spent.
         let pixels = u64::from(self.state.film.width()) * u64::from(self.state.film.height());
         let mut is_spent = left < pixels;
+        let target = limits.last_rung();
+        if self.rungs.is_empty() && !is_reached(judgement, target) {
+            // A film that came to the end of its ladder, and does not look like it.
+            self.rungs.push_back(target);
+        }
         while let Some(&rung) = self.rungs.front() {
             if let Some(plan) = self.plan_towards(rung, judgement, left)? {
                 if let Some(plan) = some(cut(plan, &self.state.film, judgement, left)) {
@@ -60,7 +65,7 @@ impl Loop<'_> {
                 self.state.finished_rung = Some(rung);
             }
         }
-        Ok(Step::Stop(if is_reached(judgement, limits.last_rung()) {
+        Ok(Step::Stop(if is_reached(judgement, target) {
             StopReason::Visibility
         } else if is_spent {
             StopReason::Samples

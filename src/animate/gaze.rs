@@ -53,10 +53,7 @@ impl GazeTrack {
     /// Where a frame of this size is looked at; none where that is not known.
     pub fn of_frame(&self, frame: u32, width: u32, height: u32) -> &[Gaze] {
         let gazes = self.frames.get(&frame).map_or(&[][..], Vec::as_slice);
-        let is_inside = |gaze: &Gaze| {
-            (0.0..=f64::from(width)).contains(&gaze.x_px) && (0.0..=f64::from(height)).contains(&gaze.y_px)
-        };
-        if gazes.iter().all(is_inside) { gazes } else { &[] }
+        if gazes.iter().all(|gaze| gaze.is_within(width, height)) { gazes } else { &[] }
     }
 }
 

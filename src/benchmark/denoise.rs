@@ -10,7 +10,7 @@ use super::name::distinct_names;
 use super::race::{RULES, Race, RaceMean, UNIFORM, compare_with_uniform, means};
 use super::reference::Reference;
 use super::truth::Truth;
-use super::{BenchSettings, Subject, check_later_scenes, make_folders};
+use super::{BenchSettings, Subject, check_inputs, make_folders};
 use crate::adaptive::settings::{DENOISED_PILOT_SAMPLES, LoopSettings, RivalRule, Sampling};
 use crate::adaptive::{Quiet, render};
 use crate::denoise::{Denoiser, DenoiserKind, denoise_film};
@@ -101,7 +101,7 @@ pub struct DenoisingResults {
 pub fn denoising(settings: &DenoisingSettings, say: &dyn Fn(&str)) -> Result<DenoisingResults> {
     let names = distinct_names(&settings.bench.scenes)?;
     let denoisers = settings.denoisers.iter().map(|&kind| Denoiser::open(kind)).collect::<Result<Vec<_>, _>>()?;
-    check_later_scenes(&settings.bench.scenes)?;
+    check_inputs(&settings.bench.scenes, &settings.bench.display)?;
     make_folders(&settings.bench)?;
     let mut results = DenoisingResults::default();
     for (path, name) in settings.bench.scenes.iter().zip(names) {

@@ -154,7 +154,7 @@ pub struct Bound {
 /// As [`run`].
 pub fn bounds(settings: &BenchSettings, say: &dyn Fn(&str)) -> Result<Vec<Bound>> {
     let names = distinct_names(&settings.scenes)?;
-    check_later_scenes(&settings.scenes)?;
+    check_inputs(&settings.scenes, &settings.display)?;
     make_folders(settings)?;
     let mut bounds = Vec::new();
     for (path, name) in settings.scenes.iter().zip(names) {
@@ -174,13 +174,14 @@ pub fn bounds(settings: &BenchSettings, say: &dyn Fn(&str)) -> Result<Vec<Bound>
     Ok(bounds)
 }
 
-/// Loads every scene but the first, which is about to be loaded anyway: what is missing or broken late in a list is told of before
-/// hours are spent on those before it. [`animation()`] leaves this to its caller, who may call it once a denoiser.
+/// Loads every scene, and finds the display: what is missing or broken is told of before anything is written, and before hours are spent
+/// on what comes before it. [`animation()`] leaves this to its caller, who may call it once a denoiser.
 ///
 /// # Errors
-/// Scenes that do not load, or ask for a tone operator that there is not.
-pub fn check_later_scenes(scenes: &[PathBuf]) -> Result<()> {
-    for path in scenes.iter().skip(1) {
+/// Scenes that do not load, or ask for a tone operator that there is not, and displays that there are not.
+pub fn check_inputs(scenes: &[PathBuf], display: &str) -> Result<()> {
+    viewing(display)?;
+    for path in scenes {
         tone_operator(&load(path, &LoadOptions::default())?).with_context(|| path.display().to_string())?;
     }
     Ok(())
@@ -200,7 +201,7 @@ fn make_folders(settings: &BenchSettings) -> Result<()> {
 /// Scenes that do not load, and folders that cannot be written.
 pub fn run(settings: &BenchSettings, say: &dyn Fn(&str)) -> Result<Results> {
     let names = distinct_names(&settings.scenes)?;
-    check_later_scenes(&settings.scenes)?;
+    check_inputs(&settings.scenes, &settings.display)?;
     make_folders(settings)?;
     let mut results = Results::new(settings);
     for (path, name) in settings.scenes.iter().zip(names) {

@@ -52,6 +52,11 @@ pub(crate) fn write_pictures(
     Ok(())
 }
 
+/// Whether all pictures are beside a record.
+pub(super) fn are_there(record: &Path) -> bool {
+    KINDS.iter().all(|kind| file(record, kind.ending).is_file())
+}
+
 /// The pictures beside a record; empty if they are not there.
 pub(super) fn read_pictures(record: &Path) -> Vec<ShownPicture> {
     let read = |&kind: &Kind| Some(ShownPicture { kind, png: std::fs::read(file(record, kind.ending)).ok()? });

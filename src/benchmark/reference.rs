@@ -1,5 +1,6 @@
 //! The reference of a scene: a long uniform render with its halves and converged variances, kept by content.
 
+use super::keep::{keep_pixels, kept_pixels};
 use super::{BenchSettings, Subject};
 use crate::adaptive::judge::{display_scale, judge, variance_shares};
 use crate::adaptive::plan::uniform_plan;
@@ -9,10 +10,9 @@ use crate::integrator::PathTracer;
 use crate::sampler::Half;
 use crate::scene::ViewingDefaults;
 use crate::scene::hash::content_hash;
-use anyhow::{Context, Result};
+use anyhow::Result;
 use fechner_perception::Plane;
 use fechner_perception::tone::{FittedTone, SceneLight};
-use std::path::Path;
 use std::sync::OnceLock;
 
 /// Seed of references, far from those of arms.
@@ -41,9 +41,8 @@ impl Reference {
     pub(crate) fn cached(subject: &Subject, settings: &BenchSettings, say: &dyn Fn(&str)) -> Result<Self> {
         let key = subject.key(settings.reference_factor);
         let file = settings.output.join("references").join(format!("{}-{key}.f32", subject.file_name()));
-        if let Ok(bytes) = std::fs::read(&file) {
-            return Self::from_bytes(&bytes, subject)
-                .with_context(|| format!("{} is no reference of this version: delete it", file.display()));
+        if let Some(values) = kept_pixels(&file, values_of(subject), say) {
+            return Ok(Self::from_values(&values, subject));
         }
         let started = std::time::Instant::now();
         let reference = Self::render(subject, settings.reference_factor)?;
@@ -54,8 +53,7 @@ impl Reference {
             started.elapsed().as_secs_f64(),
             reference.uniform_spp
         ));
-        let bytes = reference.to_bytes();
-        crate::output::write_beside(&file, |file| std::io::Write::write_all(file, &bytes))?;
+        keep_pixels(&file, &reference.to_values())?;
         Ok(reference)
     }
 
@@ -132,27 +130,25 @@ impl Reference {
         Ok(settings.operator.fit(&light.guide(), &subject.viewing, None))
     }
 
-    fn to_bytes(&self) -> Vec<u8> {
+    fn to_values(&self) -> Vec<f32> {
         let header = [self.spp as f32, self.uniform_spp as f32];
         let planes = self.sample_variance.iter().chain(&self.low_discrepancy_factor);
-        let values = header
+        header
             .into_iter()
             .chain(self.halves.iter().flatten().flatten().copied())
-            .chain(planes.flat_map(|plane| plane.values().iter().copied()));
-        values.flat_map(f32::to_le_bytes).collect()
+            .chain(planes.flat_map(|plane| plane.values().iter().copied()))
+            .collect()
     }
 
-    fn from_bytes(bytes: &[u8], subject: &Subject) -> Result<Self> {
+    /// Of [`values_of`] a subject.
+    fn from_values(values: &[f32], subject: &Subject) -> Self {
         let (width, height) = (subject.size.0 as usize, subject.size.1 as usize);
         let pixels = width * height;
-        let expected = 4 * (2 + pixels * (6 + 2 * CHANNELS));
-        anyhow::ensure!(bytes.len() == expected, "it has {} bytes, not {expected}", bytes.len());
-        let values: Vec<f32> = bytes.chunks_exact(4).map(|c| f32::from_le_bytes([c[0], c[1], c[2], c[3]])).collect();
         let (header, rest) = values.split_at(2);
         let (halves, planes) = rest.split_at(6 * pixels);
         let half = |h: usize| halves[3 * pixels * h..3 * pixels * (h + 1)].chunks_exact(3).map(|c| [c[0], c[1], c[2]]);
         let plane = |index: usize| Plane::from_fn(width, height, |x, y| planes[index * pixels + y * width + x]);
-        Ok(Self {
+        Self {
             width,
             height,
             spp: header[0] as u32,
@@ -160,8 +156,13 @@ impl Reference {
             halves: [half(0).collect(), half(1).collect()],
             sample_variance: std::array::from_fn(plane),
             low_discrepancy_factor: std::array::from_fn(|c| plane(CHANNELS + c)),
-        })
+        }
     }
+}
+
+/// Values of a reference's file: two counts, colours of both halves, two planes a channel.
+fn values_of(subject: &Subject) -> usize {
+    2 + subject.size.0 as usize * subject.size.1 as usize * (6 + 2 * CHANNELS)
 }
 
 /// Takes what a film lacks of `spp` samples in every pixel.
@@ -197,18 +198,4 @@ fn program() -> &'static str {
         let bytes = std::env::current_exe().and_then(std::fs::read);
         bytes.map_or_else(|_| env!("CARGO_PKG_VERSION").to_owned(), |bytes| blake3::hash(&bytes).to_hex().to_string())
     })
-}
-
-/// Writes a plane beside its record.
-pub(crate) fn write_plane(path: &Path, plane: &Plane) -> Result<()> {
-    let bytes: Vec<u8> = plane.values().iter().flat_map(|v| v.to_le_bytes()).collect();
-    crate::output::write_beside(path, |file| std::io::Write::write_all(file, &bytes))?;
-    Ok(())
-}
-
-/// Reads what [`write_plane`] wrote; `None` unless it has this size.
-pub(crate) fn read_plane(path: &Path, width: usize, height: usize) -> Option<Plane> {
-    let bytes = std::fs::read(path).ok()?;
-    let values = bytes.chunks_exact(4).map(|c| f32::from_le_bytes([c[0], c[1], c[2], c[3]])).collect();
-    Plane::from_values(width, height, values).ok()
 }

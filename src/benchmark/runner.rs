@@ -2,13 +2,13 @@
 
 use super::arm::Arm;
 use super::curve::{Curve, course};
-use super::keep::{keep, kept, kept_or_made};
+use super::keep::{keep, keep_pixels, kept, kept_or_made, kept_pixels};
 use super::knob::nearest;
 use super::metrics::Metrics;
 use super::oracle::{displayed_variance, least_samples, trace_counts, uniform_samples};
-use super::pictures::{read_pictures, write_pictures};
+use super::pictures::{are_there, read_pictures, write_pictures};
 use super::record::ScenePictures;
-use super::reference::{Reference, read_plane, write_plane};
+use super::reference::Reference;
 use super::truth::Truth;
 use super::{BenchSettings, Subject};
 use crate::adaptive::statistics::picture_variance;
@@ -115,7 +115,9 @@ impl<'a> ArmRunner<'a> {
         let mut knob = None;
         for seed in 0..u64::from(self.settings.seeds) {
             let file = self.file(arm, seed);
-            let run = match self.read(&file) {
+            let shows_pictures = seed == 0 && PICTURED.contains(&arm);
+            let kept = self.read(&file, say).filter(|_| !shows_pictures || are_there(&file));
+            let run = match kept {
                 Some(run) => run,
                 None => {
                     let run = if seed == 0 { self.first_run(arm)? } else { self.judged(arm, seed, knob)?.run };
@@ -267,16 +269,17 @@ impl<'a> ArmRunner<'a> {
         self.settings.output.join("runs").join(name)
     }
 
-    fn read(&self, file: &Path) -> Option<Run> {
+    fn read(&self, file: &Path, say: &dyn Fn(&str)) -> Option<Run> {
         let mut run: Run = kept(file)?;
-        let plane = read_plane(&file.with_extension("f32"), self.reference.width, self.reference.height)?;
-        run.squared_visibility = Some(plane);
+        let Reference { width, height, .. } = *self.reference;
+        let values = kept_pixels(&file.with_extension("f32"), width * height, say)?;
+        run.squared_visibility = Plane::from_values(width, height, values).ok();
         Some(run)
     }
 
     fn write(&self, file: &Path, run: &Run) -> Result<()> {
         if let Some(plane) = &run.squared_visibility {
-            write_plane(&file.with_extension("f32"), plane)?;
+            keep_pixels(&file.with_extension("f32"), plane.values())?;
         }
         keep(file, run)
     }

@@ -55,7 +55,8 @@ impl Truth {
         measure(&self.display, self.width, &self.picture, picture)
     }
 
-    /// v² of a displayed picture's error, without the reference's part in the difference: the channel that shows most.
+    /// v² of a displayed picture's error, without the reference's part in the difference: the channel that shows most. As of noise, which goes
+    /// on beyond the border: an error that is the same all over the picture is not in it, but in the bias of its energy.
     pub(crate) fn squared_visibility(&self, picture: &[[f32; 3]]) -> Plane {
         let shown = signals(&displayed_rgb(&self.display, picture), self.width, self.height);
         let mut most = Plane::filled(self.width, self.height, 0.0);

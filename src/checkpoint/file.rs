@@ -4,11 +4,12 @@ use super::{Checkpoint, Header};
 use crate::adaptive::state::RenderState;
 use crate::output::OutputError;
 use crate::sealed::{Kind, SealedError};
+use fechner_perception::csf::FrameTiming;
 use std::path::{Path, PathBuf};
 
 static FILM: Kind = Kind {
     magic: *b"fech film\r\n\x1a",
-    version: 9,
+    version: 10,
     what: "a film's file, such as fechner render --checkpoint FILE writes",
     remedy: "take another copy of it, or render anew",
 };
@@ -91,6 +92,12 @@ fn check(header: &Header, state: &RenderState) -> Result<(), &'static str> {
     let stops = settings.exposure_stops.unwrap_or(0.0);
     if settings.viewing.check().is_err() || !is_positive(settings.nits_per_unit) || !stops.is_finite() {
         return Err("nobody can see by its settings");
+    }
+    let is_sound = |timing: FrameTiming| FrameTiming::nearest(timing.frames_per_second, timing.persistence) == timing;
+    if !settings.frames.is_none_or(is_sound)
+        || !settings.gazes.iter().all(|gaze| gaze.is_within(state.film.width(), state.film.height()))
+    {
+        return Err("nobody can see a shot by its settings");
     }
     let is_rung = |visibility: f64| visibility >= 0.0;
     let exposure = state.exposure.map_or(0.0, |exposure| exposure.scene_unit_over_white);

@@ -8,7 +8,9 @@ use crate::output::PartOf;
 use crate::sampler::PixelFilter;
 use crate::scene::Scene;
 use crate::scene::hash::{ContentHash, content_hash};
+use fechner_perception::csf::FrameTiming;
 use fechner_perception::display::Viewing;
+use fechner_perception::eccentricity::Gaze;
 use fechner_perception::model::{self, ThresholdModel};
 use fechner_perception::tone::{self, SavedTone};
 use serde::{Deserialize, Serialize};
@@ -96,8 +98,12 @@ pub struct SettingsRecord {
     pub operator: String,
     /// Exposure correction, where the operator was given one.
     pub exposure_stops: Option<f64>,
-    /// The operator as fitted to something else than the picture: to the whole of which it is a part.
+    /// The operator as fitted to something else than the picture: to the whole or the shot of which it is a part.
     pub fitted: Option<SavedTone>,
+    /// Of a frame of a moving picture, whose noise is gone in the next: how frames follow.
+    pub frames: Option<FrameTiming>,
+    /// Where one looks, in pixels of the film; none where anybody may look anywhere.
+    pub gazes: Vec<Gaze>,
     /// Importance map, where one was given.
     pub importance: Option<ContentHash>,
     /// What makes the output picture out of the mean.
@@ -221,6 +227,8 @@ impl SettingsRecord {
             limits,
             filter,
             fitted: self.fitted.clone(),
+            frames: self.frames,
+            gazes: self.gazes.clone(),
             ..LoopSettings::new(self.viewing.clone(), self.nits_per_unit, operator)
         })
     }
@@ -254,6 +262,8 @@ impl SettingsRecord {
             operator,
             exposure_stops,
             fitted,
+            frames,
+            gazes,
             denoiser,
         } = self;
         let said = [
@@ -266,13 +276,26 @@ impl SettingsRecord {
                 .then(|| exposure_stops.map_or("no exposure".to_owned(), |stops| format!("exposure {stops}"))),
             (*fitted != other.fitted).then(|| match fitted {
                 None => "the operator fitted to the film".to_owned(),
-                Some(_) => "the operator fitted to a glimpse of the whole".to_owned(),
+                Some(_) => "the operator fitted to the whole or the shot of which it is a part".to_owned(),
+            }),
+            (*frames != other.frames).then(|| match frames {
+                None => "noise that stands still".to_owned(),
+                Some(timing) => format!("noise that is new {} times a second", timing.frames_per_second),
+            }),
+            (*gazes != other.gazes).then(|| match &gazes[..] {
+                [] => "eyes that look anywhere".to_owned(),
+                gazes => format!("eyes that look at {}", listed(gazes)),
             }),
             (*denoiser != other.denoiser)
                 .then(|| denoiser.map_or("no denoiser".to_owned(), |denoiser| format!("denoiser {}", denoiser.name()))),
         ];
         said.into_iter().flatten().collect::<Vec<_>>().join(", ")
     }
+}
+
+/// "pixel 3,4; pixel 30.5,4".
+fn listed(gazes: &[Gaze]) -> String {
+    gazes.iter().map(|gaze| format!("pixel {},{}", gaze.x_px, gaze.y_px)).collect::<Vec<_>>().join("; ")
 }
 
 /// "pixels per degree 60.5, white cd m2 250.0": the fields of a structure that are others in another of its kind.
@@ -319,6 +342,8 @@ mod tests {
             operator: "constant".to_owned(),
             exposure_stops: None,
             fitted: None,
+            frames: None,
+            gazes: Vec::new(),
             importance: None,
             denoiser: None,
         };
@@ -329,6 +354,15 @@ mod tests {
         assert!(!own.is_seen_like(&other));
         assert_eq!(own.seen_otherwise_than(&other), "no exposure, no denoiser");
         assert_eq!(other.seen_otherwise_than(&own), "exposure 1.5, denoiser builtin");
+        let mut other = own.clone();
+        other.frames = Some(FrameTiming { frames_per_second: 24.0, persistence: 1.0 });
+        other.gazes = vec![Gaze { x_px: 3.0, y_px: 4.0 }, Gaze { x_px: 30.5, y_px: 4.0 }];
+        assert!(!own.is_seen_like(&other));
+        assert_eq!(own.seen_otherwise_than(&other), "noise that stands still, eyes that look anywhere");
+        assert_eq!(
+            other.seen_otherwise_than(&own),
+            "noise that is new 24 times a second, eyes that look at pixel 3,4; pixel 30.5,4"
+        );
         let mut other = own.clone();
         other.viewing.display.pixels_per_degree = 60.5;
         other.viewing.observer.sensitivity = 1.75;

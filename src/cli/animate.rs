@@ -123,7 +123,7 @@ pub(super) struct AnimateArguments {
 enum SamplingChoice {
     /// Where the remaining error can be seen.
     Adaptive,
-    /// The same everywhere.
+    /// The same everywhere in a frame. Where --time ends it on the way from one count to the next, some pixels have the next already.
     Uniform,
 }
 

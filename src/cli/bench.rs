@@ -11,7 +11,7 @@ use clap::builder::PossibleValuesParser;
 use clap::{Args, ValueEnum};
 use fechner::benchmark::{
     AnimationResults, AnimationRow, AnimationSettings, Arm, BenchSettings, DenoisingSettings, animation, bounds,
-    check_later_scenes, denoising, run as run_bench,
+    check_inputs, denoising, run as run_bench,
 };
 use fechner::denoise::{Denoiser, DenoiserKind};
 use std::path::{Path, PathBuf};
@@ -192,7 +192,7 @@ fn run_animations(arguments: &BenchArguments) -> Result<()> {
     let open =
         |kind: Option<DenoiserKind>| Ok((kind, kind.map(Denoiser::open).transpose()?.map(|opened| opened.name())));
     let denoisers = denoisers_or(&[DenoiseChoice::None], arguments).map(open).collect::<Result<Vec<_>>>()?;
-    check_later_scenes(&scenes_or(&SHOTS, arguments)?)?;
+    check_inputs(&scenes_or(&SHOTS, arguments)?, &arguments.display)?;
     let file = AnimationResults::file(&arguments.output)?;
     let mut results = Vec::new();
     for (kind, denoiser) in denoisers {

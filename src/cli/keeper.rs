@@ -107,7 +107,6 @@ impl CheckpointArguments {
             say!("note: {} is not there yet: starting from the beginning", path.display());
             return Ok(begun(header, fresh));
         }
-        output::remove_leftovers(path)?;
         let Checkpoint { header: found, state } = read_checkpoint(path)?;
         let different = |problem| CheckpointError::Different { path: path.clone(), problem };
         if let Some(problem) = found.origin.difference(&header.origin) {
@@ -379,6 +378,8 @@ mod tests {
             operator: String::new(),
             exposure_stops: None,
             fitted: None,
+            frames: None,
+            gazes: Vec::new(),
             importance: None,
             denoiser: None,
         };

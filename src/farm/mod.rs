@@ -25,5 +25,5 @@ mod manifest;
 pub mod round;
 pub mod unit;
 
-pub use folder::Farm;
+pub use folder::{Farm, UnitPlace};
 pub use manifest::{FrameEntry, Manifest, ManifestError, PictureFormat, Work};

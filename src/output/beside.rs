@@ -3,7 +3,7 @@
 use super::OutputError;
 use crate::scene::hash::ContentHash;
 use std::ffi::{OsStr, OsString};
-use std::fs::File;
+use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use tempfile::NamedTempFile;
@@ -78,6 +78,10 @@ pub(super) fn create_beside(path: &Path) -> Result<(NamedTempFile, PathBuf), Out
         // The error's own text names the temporary file, which the user never asked for.
         io(std::io::Error::new(error.kind(), format!("cannot make a file in {}: {}", folder.display(), plain(&error))))
     })?;
+    // Freed when it is renamed or its process ends, however it ends: by this others see that it is no leftover. Elsewhere locks keep what
+    // is written by name from being written.
+    #[cfg(unix)]
+    let _ = file.as_file().try_lock();
     let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
     // Under that name until they are renamed or dropped.
     unfinished.retain(|path| path.exists());
@@ -154,8 +158,11 @@ fn hidden_within(most_bytes: usize, name: &OsStr) -> OsString {
     hidden
 }
 
-/// Removes new files beside `path` that a killed program could not complete. Call it only where no other program can be
-/// writing `path`.
+/// Removes new files beside `path` that a killed program could not complete. Those that another program is writing stay where the file
+/// system has locks; where it may have none, call it only where no other can be writing `path`.
+///
+/// # Errors
+/// If the folder cannot be read, or one of them not removed.
 pub fn remove_leftovers(path: &Path) -> Result<(), OutputError> {
     let io = |error| OutputError::Io { path: path.to_owned(), error };
     let target = target_of(path).map_err(io)?;
@@ -170,11 +177,22 @@ pub fn remove_leftovers(path: &Path) -> Result<(), OutputError> {
     };
     for entry in folder.read_dir().map_err(io)? {
         let found = entry.map_err(io)?.file_name();
-        if is_leftover(found.as_encoded_bytes()) {
-            std::fs::remove_file(folder.join(&found)).map_err(io)?;
+        let part = folder.join(&found);
+        if is_leftover(found.as_encoded_bytes()) && is_nobodys(&part) {
+            match std::fs::remove_file(part) {
+                // Renamed or removed by another meanwhile.
+                Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+                removed => removed.map_err(io)?,
+            }
         }
     }
     Ok(())
+}
+
+/// Whether no program is writing a new file; one that cannot be opened is somebody else's.
+fn is_nobodys(part: &Path) -> bool {
+    let file = File::options().write(true).open(part);
+    file.is_ok_and(|file| !matches!(file.try_lock(), Err(TryLockError::WouldBlock)))
 }
 
 /// The system's words without the path that `tempfile` adds.
@@ -259,6 +277,20 @@ mod tests {
         file.keep().unwrap();
         remove_leftovers(&folder.path().join("b.film")).unwrap();
         assert_eq!(names(folder.path()), [of_others[0], of_others[1], "a.film"]);
+    }
+
+    /// As where two programs make frames of one shot.
+    #[cfg(unix)]
+    #[test]
+    fn what_another_program_is_writing_is_no_leftover() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        write_beside(&path, |file| {
+            remove_leftovers(&path).unwrap();
+            file.write_all(b"whole")
+        })
+        .unwrap();
+        assert_eq!(names(folder.path()), ["a.png"]);
     }
 
     #[test]

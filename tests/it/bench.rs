@@ -67,6 +67,42 @@ fn results_are_complete_and_a_second_run_goes_on() {
     assert_eq!(found, results());
 }
 
+/// What was changed, cut or lost is made again, and is told of; before, a reference of zeros took for ever.
+#[test]
+fn damaged_files_are_made_anew() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let output = folder.path();
+    let arms = ["--seeds", "1", "--arms", "uniform"];
+    let run = || {
+        let run = bench(output, &arms);
+        let said = String::from_utf8_lossy(&run.stderr).into_owned();
+        assert!(run.status.success(), "{said}");
+        said
+    };
+    run();
+    let found = |folder: &str, ending: &str| -> PathBuf {
+        let mut entries = std::fs::read_dir(output.join(folder)).expect("a folder").flatten().map(|entry| entry.path());
+        entries.find(|path| path.to_string_lossy().ends_with(ending)).expect("such a file")
+    };
+    for kept in [found("references", ".f32"), found("runs", ".f32")] {
+        let sound = std::fs::read(&kept).expect("a file");
+        let mut changed = sound.clone();
+        changed[sound.len() / 2] ^= 1;
+        for damaged in [&changed[..], &sound[..sound.len() - 4], &vec![0; sound.len()], &[7; 4099]] {
+            std::fs::write(&kept, damaged).expect("written");
+            let said = run();
+            let name = kept.file_name().expect("a name").to_string_lossy();
+            assert!(said.contains("refused") && said.contains(&*name) && said.contains("it is made anew"), "{said}");
+            assert!(std::fs::read(&kept).expect("made anew") == sound, "{name} is another");
+        }
+    }
+    let picture = found("runs", ".picture.png");
+    std::fs::remove_file(&picture).expect("was there");
+    run();
+    assert!(picture.is_file(), "a picture of the report is lost for ever");
+    assert!(!run().contains("refused"));
+}
+
 /// Scenes of one file name in two folders are two scenes: each has its own figures, compared with its own uniform render.
 #[test]
 fn scenes_of_one_name_are_told_apart() {
@@ -262,9 +298,10 @@ fn what_cannot_be_run_is_refused() {
     let again = scene.with_file_name("../scenes/cornell-box.toml").display().to_string();
     for (arguments, why) in [
         (
-            &["--suite", "denoise", "--denoise", "none"][..],
-            "--denoise none: the suite denoise judges denoised pictures",
+            &["--suite", "denoise", "--denoise", "builtin", "--display", "wall"][..],
+            "there is no display \"wall\"; known: ",
         ),
+        (&["--suite", "denoise", "--denoise", "none"], "--denoise none: the suite denoise judges denoised pictures"),
         (&[&again], "named twice, here and as "),
         (&["--display", "wall"], "there is no display \"wall\"; known: "),
         (&["--suite", "animation", "--display", "wall"], "there is no display \"wall\"; known: "),
@@ -273,5 +310,14 @@ fn what_cannot_be_run_is_refused() {
         let said = String::from_utf8_lossy(&refused.stderr).into_owned();
         assert_eq!(refused.status.code(), Some(2), "{said}");
         assert!(said.contains(why) && said.trim().lines().count() == 1, "{said}");
+        assert!(!folder.path().join("out").exists(), "{arguments:?}: something was written");
+    }
+    for suite in [&["quick"][..], &["denoise", "--denoise", "builtin"], &["animation"]] {
+        let mut command = Command::cargo_bin("fechner").expect("the binary is built");
+        command.args(["bench", "nosuch.toml", "-o", "out", "--suite"]).args(suite).current_dir(folder.path());
+        let refused = command.output().expect("runs");
+        let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert!(refused.status.code() == Some(2) && said.contains("nosuch.toml"), "{suite:?}: {said}");
+        assert!(!folder.path().join("out").exists(), "{suite:?}: something was written");
     }
 }

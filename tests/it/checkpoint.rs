@@ -11,9 +11,11 @@ use fechner::checkpoint::{
 use fechner::denoise::{Denoiser, DenoiserKind};
 use fechner::film::Film;
 use fechner::integrator::{PathTracer, SamplePlan};
-use fechner::sampler::Half;
+use fechner::sampler::{Half, PixelFilter};
 use fechner::scene::Scene;
 use fechner::scene::load::{LoadOptions, load};
+use fechner_perception::csf::FrameTiming;
+use fechner_perception::eccentricity::Gaze;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex};
@@ -47,6 +49,8 @@ impl Setup {
                 operator: "constant".to_owned(),
                 exposure_stops: None,
                 fitted: None,
+                frames: None,
+                gazes: Vec::new(),
                 importance: None,
                 denoiser: None,
             },
@@ -446,6 +450,46 @@ fn what_could_not_be_read_is_not_written() {
     assert!(std::fs::read(&path).expect("as before") == sound);
 }
 
+/// How frames follow and where they are looked at comes back from a file; what no shot has is refused.
+#[test]
+fn a_film_keeps_how_its_frame_is_seen() {
+    let mut setup = Setup::new(1);
+    let state = RenderState::new(SIZE, SIZE, &setup.settings(Sampling::Adaptive, 4.0).limits);
+    let timing = FrameTiming { frames_per_second: 24.0, persistence: 0.5 };
+    let gaze = Gaze { x_px: 3.0, y_px: f64::from(SIZE) };
+    setup.header.settings.frames = Some(timing);
+    setup.header.settings.gazes = vec![gaze];
+    setup.through_a_file(&state);
+    let record = &setup.header.settings;
+    let seen = record.loop_settings(Limits::of_visibility(1.0), PixelFilter::Box).expect("names that are known");
+    assert_eq!((seen.frames, seen.gazes), (Some(timing), vec![gaze]));
+
+    for (frames, gaze) in [
+        (FrameTiming { frames_per_second: f64::NAN, ..timing }, gaze),
+        (FrameTiming { persistence: 0.0, ..timing }, gaze),
+        (timing, Gaze { x_px: f64::NAN, ..gaze }),
+        (timing, Gaze { y_px: f64::from(SIZE) + 1.0, ..gaze }),
+    ] {
+        let settings = SettingsRecord { frames: Some(frames), gazes: vec![gaze], ..setup.header.settings.clone() };
+        let header = Header { settings, ..setup.header.clone() };
+        let payload = postcard::to_stdvec(&(&header, &state)).expect("numbers alone, in memory");
+        let message = decode_checkpoint(Path::new("a.film"), &seal(&payload)).expect_err("of no shot").to_string();
+        assert!(message.contains("nobody can see a shot by its settings"), "{message}");
+    }
+}
+
+/// One that came to the end of its ladder and does not look like it, as of a frame that was judged in motion, goes on.
+#[test]
+fn a_film_that_is_not_as_good_as_it_says_goes_on() {
+    let setup = Setup::new(1);
+    let settings = setup.settings(Sampling::Adaptive, 4.0);
+    let mut state = uniform_film(&setup, 16);
+    state.finished_rung = Some(4.0);
+    let rendered = resume(&setup.tracer, &settings, state, &Quiet).expect("renders");
+    let samples = rendered.film.total_samples();
+    assert!(rendered.stop_reason == StopReason::Visibility, "{:?} after {samples} samples", rendered.stop_reason);
+}
+
 #[test]
 fn foreign_files_and_versions_are_named() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -459,7 +503,7 @@ fn foreign_files_and_versions_are_named() {
     assert!(message(b"\x76\x2f\x31\x01 an EXR file, say").contains("not a film's file"));
     let mut later = sound.clone();
     later[12] += 1;
-    assert!(message(&later).contains("this program reads version 9"), "{}", message(&later));
+    assert!(message(&later).contains("this program reads version 10"), "{}", message(&later));
     assert!(message(&sound[..sound.len() / 2]).contains("damaged"));
     assert!(read_checkpoint(folder.path()).expect_err("a folder").to_string().contains("folder"));
 }

@@ -53,6 +53,27 @@ fn the_raw_mean_stays_beside_the_denoised_picture() {
     assert!(parts.zip(channel("visibility.Y")).all(|((a, b), v)| *v <= 1.001 * a.hypot(*b)), "both parts and no more");
 }
 
+/// Of a picture in which nothing is called fine, nothing of that is unproven.
+#[test]
+fn the_summary_says_nothing_of_what_is_not_there() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut command = Command::cargo_bin("fechner").expect("the program");
+    command.args([
+        "render",
+        "scenes/cornell-glass.toml",
+        "--size",
+        "32x32",
+        "--spp",
+        "2",
+        "--denoise",
+        "builtin",
+        "-o",
+    ]);
+    let output = command.arg(folder.path().join("a.png")).current_dir(env!("CARGO_MANIFEST_DIR")).output();
+    let said = String::from_utf8_lossy(&output.expect("runs").stderr).into_owned();
+    assert!(said.contains("100.00 % of the picture is above") && !said.contains("Unproven"), "{said}");
+}
+
 /// A part of the error is not more than the whole: both are of the picture that is written, after it was moved towards the raw mean. What
 /// the denoiser changed was up to 1.18 times the whole here.
 #[test]

@@ -150,6 +150,8 @@ fn order_repetition_and_bad_files_change_nothing() {
     }
     run(&farm, 0, &["farm", "merge", "."]);
     assert!(unit("1").contains("is merged"));
+    let message = run(&farm, 2, &["farm", "unit", ".", "3999"]);
+    assert!(message.contains("unit 3999 is not planned: frame 0 is done, after "), "{message}");
     assert!(picture(&farm) == whole, "the picture differs from one process's");
 }
 
@@ -225,6 +227,43 @@ fn frames_are_those_of_animate() {
     let again = ["animate", &scene, "--frames", "4..6", "-o", "farm/pictures/frame.####.exr"];
     let message = run(at, 0, &[&again[..], &options].concat());
     assert_eq!(message.matches("is there").count(), 3, "{message}");
+}
+
+/// A film that was kept makes its frame's picture again, and is a beginning for `render`, to whom it is a still.
+#[test]
+fn kept_films_are_those_of_their_frames() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    std::fs::write(at.join("gaze.csv"), "6,10,20\n").expect("written");
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/light-switch.toml").display().to_string();
+    let plan = ["farm", "plan", &scene, "--frames", "5..6", "--keep-films", "--format", "png", "-o", "farm", "--"];
+    let how = ["--size", "48x27", "--visibility", "4"];
+    run(at, 0, &[&plan[..], &how, &["--shot", "5..10", "--gaze", "gaze.csv"]].concat());
+    run(at, 0, &["farm", "work", "farm", "--threads", "1"]);
+    let json = |name: &str| -> serde_json::Value { serde_json::from_slice(&file(&at.join(name))).expect("JSON") };
+    for frame in ["0005", "0006"] {
+        let film = format!("farm/frame-{frame}/finished.film");
+        run(at, 0, &["merge", &film, "-o", "again.png", "--json", "again.json"]);
+        let picture = at.join(format!("farm/pictures/frame.{frame}.png"));
+        assert!(file(&at.join("again.png")) == file(&picture), "the film of frame {frame} shows another picture");
+        let (again, of_frame) = (json("again.json"), json(&format!("farm/pictures/frame.{frame}.json")));
+        for figure in ["scene", "seed", "seeds", "csf", "eye", "operator", "visibility_max", "stop_reason"] {
+            assert_eq!(again[figure], of_frame["report"][figure], "{figure} of frame {frame}");
+        }
+    }
+    let film = "farm/frame-0006/finished.film";
+    let said = run(at, 0, &["merge", film, "-o", "again.exr"]);
+    assert!(said.contains("films keep no motion"), "{said}");
+
+    // At rest its noise is seen better than in motion: it takes more samples.
+    let before = json("again.json");
+    let (seed, seconds) = (before["seed"].to_string(), (6.0 / 24.0).to_string());
+    let still = ["render", &scene, "--at", &seconds, "--seed", &seed, "-o", "still.png", "--json", "still.json"];
+    let said = run(at, 0, &[&still[..], &how, &["--checkpoint", film, "--resume"]].concat());
+    assert!(said.contains("its samples are kept, its ladder begins anew"), "{said}");
+    let after = json("still.json");
+    assert_eq!(after["stop_reason"], "visibility", "{said}");
+    assert!(after["samples_total"].as_u64() > before["samples_total"].as_u64(), "{said}");
 }
 
 #[test]

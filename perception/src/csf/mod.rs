@@ -36,6 +36,7 @@ pub use stela::StelaCsf;
 
 use crate::display::Viewing;
 use crate::error::{Error, check_range};
+use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// A contrast sensitivity function for static, achromatic gratings seen foveally.
@@ -77,7 +78,7 @@ impl ContrastSensitivity for Box<dyn ContrastSensitivity> {
 }
 
 /// How the frames of a moving picture follow each other on a display.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FrameTiming {
     /// New pictures a second, 1 to 1000.
     pub frames_per_second: f64,

@@ -119,8 +119,8 @@ impl<'a> Shot<'a> {
         }
     }
 
-    /// For whose eyes its frames are, as their films say it.
-    pub(in crate::cli) fn settings_record(&self) -> SettingsRecord {
+    /// For whose eyes a frame is that is judged by these settings, as its film says it.
+    pub(in crate::cli) fn settings_record(&self, of_frame: &LoopSettings) -> SettingsRecord {
         SettingsRecord {
             sampling: self.settings.sampling,
             allocation: AllocationRule::default(),
@@ -129,7 +129,9 @@ impl<'a> Shot<'a> {
             nits_per_unit: self.settings.nits_per_unit,
             operator: self.operator_name.clone(),
             exposure_stops: self.exposure_stops,
-            fitted: None,
+            fitted: of_frame.fitted.clone(),
+            frames: of_frame.frames,
+            gazes: of_frame.gazes.clone(),
             importance: None,
             denoiser: self.settings.denoiser.as_ref().map(Denoiser::kind),
         }
@@ -180,6 +182,7 @@ impl<'a> Shot<'a> {
         let file = self.file(frame);
         if self.record(frame, &job.key).is_some() {
             say!("{}: is there", file.display());
+            remove_leftovers_of_frame(&file)?;
             return Ok(Made::Kept);
         }
         let outdated = self.has_record(frame);
@@ -224,6 +227,11 @@ impl<'a> Shot<'a> {
         Ok(Some(FrameJob { scenes, settings, key }))
     }
 
+    /// The scene's name in reports.
+    pub(in crate::cli) fn scene_name(&self) -> String {
+        self.arguments.scene.display().to_string()
+    }
+
     /// The picture's file of a frame.
     pub(in crate::cli) fn file(&self, frame: u32) -> PathBuf {
         self.name.of(frame)
@@ -232,9 +240,10 @@ impl<'a> Shot<'a> {
     /// Writes a frame and its record.
     pub(in crate::cli) fn keep(&self, frame: u32, job: &FrameJob, made: &RenderedFrame) -> Result<Report> {
         let file = self.file(frame);
-        let scene_name = self.arguments.scene.display().to_string();
-        let report = Report::new(&scene_name, &[self.settings.trace.seed], &job.settings, &made.rendered);
+        let seed = self.settings.trace_settings(frame).seed;
+        let report = Report::new(&self.scene_name(), &[seed], &job.settings, &made.rendered);
         FrameRecord::remove(&file)?;
+        remove_leftovers_of_frame(&file)?;
         self.write(&file, made, &job.settings, &report)?;
         let record = FrameRecord {
             key: job.key.clone(),
@@ -269,6 +278,13 @@ impl<'a> Shot<'a> {
         let file = self.file(frame);
         FrameRecord::of_picture(&file).filter(|record| record.holds(key, &file))
     }
+}
+
+/// Removes what runs that were killed left of a frame's picture and record as they wrote them.
+fn remove_leftovers_of_frame(picture: &Path) -> Result<()> {
+    output::remove_leftovers(picture)?;
+    output::remove_leftovers(&FrameRecord::file(picture))?;
+    Ok(())
 }
 
 /// A file's folder, where its name has one.

@@ -155,9 +155,9 @@ impl Job<'_> {
             Self::Shot { shot, .. } => {
                 let of_shot = shot.frame(number, self.track(number)?)?;
                 let trace = shot.settings.trace_settings(number);
-                let origin = Origin::of(&of_shot.scenes.now, &trace);
+                let origin = Origin { scene_name: shot.scene_name(), ..Origin::of(&of_shot.scenes.now, &trace) };
                 let aim = of_shot.settings.limits.last_rung();
-                let header = Header::begun(origin, trace.seed, shot.settings_record(), aim);
+                let header = Header::begun(origin, trace.seed, shot.settings_record(&of_shot.settings), aim);
                 let judged_by = ContentHash::of_bytes(of_shot.key.as_bytes());
                 let scene = Arc::clone(&of_shot.scenes.now);
                 Ok(Frame { scene, trace, header, judged_by, kind: FrameKind::OfShot(Box::new(of_shot)) })

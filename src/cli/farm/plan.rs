@@ -33,7 +33,7 @@ pub(super) struct PlanArguments {
     /// What finished frames become: exr with all layers, or png as the display shows it.
     #[arg(long, value_enum, default_value = "exr")]
     format: Format,
-    /// Keep the films of finished frames, for merge and for render --resume.
+    /// Keep the films of finished frames, for merge and for render --resume, which goes on with a frame of a shot as with a still.
     #[arg(long)]
     keep_films: bool,
     /// After --: options of render or, with --frames, of animate, such as --size 480x270 --visibility 2.

@@ -10,7 +10,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::farm::frame::{Progress, progress};
 use fechner::farm::unit::{Keeping, NamedOrder, Outcome, UnitError, UnitSums, render_unit};
-use fechner::farm::{Farm, frame};
+use fechner::farm::{Farm, UnitPlace, frame};
 use fechner::integrator::PathTracer;
 use fechner::lock::{Lock, try_lock, wait_for_lock};
 use std::io;
@@ -93,6 +93,12 @@ pub(super) fn run(arguments: &UnitArguments) -> Result<ExitCode> {
     })
 }
 
+/// Plans that a finished frame took, by its figures: rounds are numbered by the plans before them.
+fn plans_of_finished(farm: &Farm, frame_index: usize) -> Option<u32> {
+    let figures: serde_json::Value = serde_json::from_slice(&std::fs::read(farm.result(frame_index)).ok()?).ok()?;
+    figures["plans"].as_u64()?.try_into().ok()
+}
+
 impl<'a> Bench<'a> {
     /// Does work of the farm in a folder, in a pool of so many threads.
     pub(super) fn with(
@@ -156,7 +162,7 @@ impl<'a> Bench<'a> {
         let place = self.farm.place(unit);
         let number = self.farm.frame(place.frame_index).frame;
         let round = match progress(self.farm, place.frame_index) {
-            Progress::Done => return Standing::Merged,
+            Progress::Done => return self.standing_when_done(place),
             Progress::Open { round, .. } => Some(round),
             Progress::ToMerge { round } => round,
         };
@@ -171,6 +177,17 @@ impl<'a> Bench<'a> {
             let planned: Vec<u64> = round.units.iter().map(|planned| planned.unit).collect();
             let (round, planned) = (round.round, listed(&planned));
             Standing::Unknown(format!("frame {number} is in round {round}, whose units are {planned}"))
+        }
+    }
+
+    /// Where a round of a finished frame is: merged, if the frame came so far.
+    fn standing_when_done(&self, place: UnitPlace) -> Standing {
+        match plans_of_finished(self.farm, place.frame_index) {
+            Some(plans) if place.round >= plans => {
+                let number = self.farm.frame(place.frame_index).frame;
+                Standing::Unknown(format!("frame {number} is done, after {plans} plans"))
+            }
+            _ => Standing::Merged,
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::super::console::duration_in_words;
 use super::super::report::sampling_name;
-use super::super::words::rounded;
+use super::super::words::{count, rounded};
 use fechner::adaptive::settings::Limits;
 use fechner::checkpoint::Checkpoint;
 use std::fmt::Write as _;
@@ -46,6 +46,12 @@ pub(super) fn describe(checkpoint: &Checkpoint) -> String {
         let [ppd, white, black] = [display.pixels_per_degree, display.white_cd_m2, display.black_cd_m2].map(rounded);
         format!("{}: {ppd} pixels a degree, white {white} and black {black} cd/m²", display.name)
     });
+    if let Some(timing) = settings.frames {
+        row("in motion", format!("noise is new {} times a second", rounded(timing.frames_per_second)));
+    }
+    if !settings.gazes.is_empty() {
+        row("gaze", count(settings.gazes.len(), "place"));
+    }
     row("operator", {
         let stops = settings.exposure_stops.map_or_else(String::new, |stops| format!(", {stops:+.2} stops"));
         format!("{}{stops}; RGB (1, 1, 1) is {} cd/m²", settings.operator, rounded(settings.nits_per_unit))

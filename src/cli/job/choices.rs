@@ -29,7 +29,7 @@ pub(in crate::cli) enum Quality {
 pub(super) enum SamplingChoice {
     /// Where the remaining error can be seen.
     Adaptive,
-    /// The same everywhere.
+    /// The same everywhere. Where --time or --plans end it on the way from one count to the next, some pixels have the next already.
     Uniform,
     /// Another renderer's rule, for comparison: difference of two estimates over the square root of brightness (Cycles).
     Relative,

@@ -49,6 +49,8 @@ pub(super) fn settings_record(arguments: &JobArguments, scene: &Scene) -> anyhow
         operator: operator.to_owned(),
         exposure_stops,
         fitted: None,
+        frames: None,
+        gazes: Vec::new(),
         importance: None,
         denoiser: arguments.denoise.kind(),
     })

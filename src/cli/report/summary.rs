@@ -96,6 +96,9 @@ fn importance(report: &Report) -> Option<String> {
 /// Change of a picture's light by its denoiser that is worth a line.
 const NOTABLE_ENERGY_CHANGE: f64 = 0.005;
 
+/// Less of the picture is 0.0 % in words.
+const LEAST_TOLD_SHARE: f64 = 0.0005;
+
 fn denoised(report: &Report) -> Vec<String> {
     let Some(denoised) = &report.denoised else { return Vec::new() };
     let by = format!(
@@ -111,7 +114,7 @@ fn denoised(report: &Report) -> Vec<String> {
         ),
         _ => format!("{by}."),
     };
-    let unproven = denoised.unproven_fraction.map(|share| {
+    let unproven = denoised.unproven_fraction.filter(|&share| share >= LEAST_TOLD_SHARE).map(|share| {
         format!(
             "Unproven: in {:.1} % of the picture, which is called fine, raw noise is too strong to show that the \
              denoiser changed nothing visible; there its error is inferred from the rest of the picture.",

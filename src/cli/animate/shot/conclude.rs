@@ -8,6 +8,8 @@ use crate::cli::json::write_json;
 use crate::cli::words::listed;
 use anyhow::Result;
 use fechner::animate::track::Track;
+use fechner::output;
+use std::path::PathBuf;
 
 /// What there is of a shot.
 struct FoundFrames {
@@ -26,6 +28,9 @@ impl Shot<'_> {
             say!("{frames} {} of the shot {are} not there yet, or changed.", listed(&missing));
             self.note_outdated()?;
             return Ok(false);
+        }
+        for file in self.files_of_whole()? {
+            output::remove_leftovers(&file)?;
         }
         write_json(&self.name.of_shot("json"), &records)?;
         let fits = |frame: usize| track.frames[frame].fitted.clone().restore();
@@ -46,14 +51,19 @@ impl Shot<'_> {
 
     /// Names what there is of the shot as it was before, whose frames are no longer those.
     fn note_outdated(&self) -> Result<()> {
-        let video = self.arguments.video()?.map(|(path, _)| path.to_owned());
-        let files = [Some(self.name.of_shot("json")), Some(self.name.of_shot("contact.png")), video];
+        let files = self.files_of_whole()?;
         let outdated: Vec<String> =
-            files.into_iter().flatten().filter(|file| file.is_file()).map(|file| file.display().to_string()).collect();
+            files.filter(|file| file.is_file()).map(|file| file.display().to_string()).collect();
         if !outdated.is_empty() {
             say!("note: still of the shot as it was before, until all its frames are there: {}", outdated.join(", "));
         }
         Ok(())
+    }
+
+    /// The files of what only the whole shot has.
+    fn files_of_whole(&self) -> Result<impl Iterator<Item = PathBuf>> {
+        let video = self.arguments.video()?.map(|(path, _)| path.to_owned());
+        Ok([Some(self.name.of_shot("json")), Some(self.name.of_shot("contact.png")), video].into_iter().flatten())
     }
 
     /// Looks for all frames of the shot. One of another scene, other settings or another format is not there.
