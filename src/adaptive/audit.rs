@@ -102,7 +102,7 @@ pub fn audit(
         let again: f64 = halves.iter().map(|half| 0.5 * opponent(half.mean)[0]).sum();
         // Fresh less kept has twice the variance of one of them.
         difference.values_mut()[pixel] = (nits * (again - kept) / std::f64::consts::SQRT_2) as f32;
-        let per_sample = f64::from(judgement.over_black_per_sample().values()[pixel]);
+        let per_sample = f64::from(judgement.met_per_sample.values()[pixel]);
         variance.values_mut()[pixel] = (per_sample * variance_share(film, pixel)) as f32;
     }
     let displayed = seen::display_half_difference(

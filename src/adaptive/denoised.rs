@@ -1,7 +1,7 @@
 //! The film's denoised picture as it will be seen, and what the perception crate says of its noise and of its bias.
 
 use super::judge::JudgeError;
-use super::missed::{Darkness, EdgeProfile, missed_light};
+use super::missed::{Darkness, EdgeProfile, LampEdges};
 use super::settings::LoopSettings;
 use crate::denoise::{DenoisedFilm, Denoiser, denoise_film, leave_the_void_dark};
 use crate::film::{Estimate, Film, opponent};
@@ -91,7 +91,8 @@ impl TimedDenoising {
         let error = chromatic.iter().fold(error, DenoisedError::with_channel);
         let error = match EdgeProfile::of(settings.filter) {
             Some(profile) => {
-                let missed = missed_light(&profile, film, &estimate.luminance_cd_m2, lamps_from_cd_m2);
+                let sampled_cd_m2 = &estimate.luminance_cd_m2;
+                let missed = LampEdges { profile, film, sampled_cd_m2, lamps_from_cd_m2 }.missed();
                 let dark = Darkness::of(&missed, |light| {
                     // A denoiser may have guessed some of it.
                     let whole = estimate.luminance_cd_m2.combined(light, |sampled, missed| sampled + missed);

@@ -5,7 +5,7 @@ mod steps;
 
 use self::over_white::OverWhite;
 pub use self::steps::Thresholds;
-use self::steps::{Guide, Scatter, chromatic_gains, found_thresholds};
+use self::steps::{Guide, MissedNoise, Scatter, chromatic_gains, found_thresholds};
 use super::denoised::{DenoisedPicture, TimedDenoising};
 use super::settings::LoopSettings;
 use super::statistics::by_channel;
@@ -49,8 +49,8 @@ pub struct Judgement {
     pub pooled_variance_per_sample: Plane,
     /// The same as each half decides by it; `None` where the look was for no plan.
     pub variance_per_sample: Option<[Plane; 2]>,
-    /// The first of these variances before black, where the picture is transparent and both are the worse of that and over white.
-    over_black_per_sample: Option<Plane>,
+    /// The first of these variances by what samples have met, before black where the picture is transparent: what audits compare with.
+    pub met_per_sample: Plane,
     /// What can be seen of a transparent picture over white.
     over_white: Option<OverWhite>,
     /// What the halves' difference shows, once somebody asked.
@@ -132,15 +132,20 @@ fn judge_by(
     let thresholds = found_thresholds(&guide, &displayed_guide, tone.as_ref(), &noise, settings)?;
     let gains = chromatic_gains(&thresholds.in_bands, settings)?;
     still_wanted(settings)?;
-    let mut pooled_variance_per_sample = scatter.pooled_per_sample(&thresholds.in_bands, gains.as_ref());
-    let mut variance_per_sample =
+    let met_per_sample = scatter.pooled_per_sample(&thresholds.in_bands, gains.as_ref());
+    let of_halves =
         (purpose == Purpose::Plan).then(|| scatter.per_sample_of_halves(film, &thresholds.in_bands, gains.as_ref()));
-    if denoised.is_none()
-        && let Some(missed) = scatter.missed_per_sample(film, &estimate, tone.as_ref(), settings)
-    {
-        let of_all = std::iter::once(&mut pooled_variance_per_sample).chain(variance_per_sample.iter_mut().flatten());
-        of_all.for_each(|variance| *variance = variance.combined(&missed, f32::max));
-    }
+    let missed = match denoised {
+        None => MissedNoise::of(film, &estimate, tone.as_ref(), settings),
+        Some(_) => None,
+    };
+    let (pooled_variance_per_sample, variance_per_sample) = match missed {
+        None => (met_per_sample.clone(), of_halves),
+        Some(missed) => {
+            let of_halves = of_halves.map(|halves| halves.each_ref().map(|half| missed.or_scatter(half)));
+            (missed.or_scatter(&met_per_sample), of_halves)
+        }
+    };
     still_wanted(settings)?;
     let over_white = if settings.is_transparent {
         let colour_scale = denoised.is_none().then(|| scatter.luminance_scale());
@@ -181,12 +186,10 @@ fn judge_by(
         let of_error = of_error.map(|v| if v.is_nan() { f32::INFINITY } else { v });
         per_importance(of_error, settings.importance.as_ref())
     };
-    let (pooled_variance_per_sample, over_black_per_sample, variance_per_sample) = match &over_white {
-        None => (pooled_variance_per_sample, None, variance_per_sample),
+    let (pooled_variance_per_sample, variance_per_sample) = match &over_white {
+        None => (pooled_variance_per_sample, variance_per_sample),
         Some(over_white) => {
-            let (worse, of_halves) =
-                over_white.worse_per_sample(&thresholds.limits(), &pooled_variance_per_sample, variance_per_sample);
-            (worse, Some(pooled_variance_per_sample), of_halves)
+            over_white.worse_per_sample(&thresholds.limits(), &pooled_variance_per_sample, variance_per_sample)
         }
     };
     Ok(Judgement {
@@ -201,7 +204,7 @@ fn judge_by(
         predicted,
         pooled_variance_per_sample,
         variance_per_sample,
-        over_black_per_sample,
+        met_per_sample,
         over_white,
         measured: OnceLock::new(),
     })
@@ -268,11 +271,6 @@ impl Judgement {
             None => allowed,
             Some(map) => allowed.combined(map, |allowed, factor| allowed * factor),
         }
-    }
-
-    /// [`Self::pooled_variance_per_sample`] before black, as an opaque picture is seen.
-    pub(super) fn over_black_per_sample(&self) -> &Plane {
-        self.over_black_per_sample.as_ref().unwrap_or(&self.pooled_variance_per_sample)
     }
 
     fn per_importance(&self, visibility: Plane) -> Plane {

@@ -45,34 +45,58 @@ impl EdgeProfile {
     }
 }
 
-/// Luminance of lamps, cd/m², that is expected in each pixel beyond what its samples have found. `sampled_cd_m2`: the film's mean; what shines
-/// counts as a lamp from a luminance on.
-pub(super) fn missed_light(profile: &EdgeProfile, film: &Film, sampled_cd_m2: &Plane, lamps_from_cd_m2: f32) -> Plane {
-    let (width, height) = (sampled_cd_m2.width(), sampled_cd_m2.height());
-    let around = |(x, y): (usize, usize), radius: usize| {
-        let columns = x.saturating_sub(radius)..width.min(x + radius + 1);
-        let rows = y.saturating_sub(radius)..height.min(y + radius + 1);
-        rows.flat_map(move |y| columns.clone().map(move |x| (x, y)))
-    };
-    let shines = |(x, y): (usize, usize)| film.guides()[y * width + x].seen.shines();
-    let light = |(x, y): (usize, usize)| sampled_cd_m2.get(x, y);
-    let is_lamp = |at: (usize, usize)| shines(at) && light(at) > lamps_from_cd_m2;
-    let mut missed = Plane::filled(width, height, 0.0);
-    for lamp in (0..width * height).map(|pixel| (pixel % width, pixel / width)).filter(|&at| is_lamp(at)) {
-        if around(lamp, 1).all(shines) {
-            continue;
-        }
-        let full = around(lamp, RADIUS).filter(|&at| is_lamp(at)).map(light).fold(0.0, f32::max);
-        for (x, y) in around(lamp, 1).filter(|&at| !shines(at)) {
-            let step_px = ((x.abs_diff(lamp.0) + y.abs_diff(lamp.1)) as f32).sqrt();
-            let coverage = profile.farther_out(light(lamp) / full, step_px);
-            let pixel = y * width + x;
-            // Of a coverage that scatters about this by as much, after so many samples without a hit.
-            let found = full * coverage / (1.0 + film.samples(pixel) as f32 * coverage);
-            missed.values_mut()[pixel] = found.max(missed.get(x, y));
-        }
+/// Where lamps' edges are looked for.
+pub(super) struct LampEdges<'a> {
+    pub(super) profile: EdgeProfile,
+    pub(super) film: &'a Film,
+    /// The film's mean.
+    pub(super) sampled_cd_m2: &'a Plane,
+    /// What shines counts as a lamp from this luminance on.
+    pub(super) lamps_from_cd_m2: f32,
+}
+
+impl LampEdges<'_> {
+    /// Luminance of lamps, cd/m², that is expected in each pixel beyond what its samples have found.
+    pub(super) fn missed(&self) -> Plane {
+        self.missed_where(|pixel| {
+            let is_met = self.film.guides()[pixel].seen.shines();
+            (!is_met).then(|| (self.sampled_cd_m2.values()[pixel], self.film.samples(pixel) as f32))
+        })
     }
-    missed
+
+    /// The same, whether samples have met it or not: counts that went by that would end where a rim was lucky, and make rims bright by 0.2 %
+    /// of the whole picture's light.
+    pub(super) fn expected(&self) -> Plane {
+        self.missed_where(|pixel| Some((self.sampled_cd_m2.values()[pixel], self.film.samples(pixel) as f32)))
+    }
+
+    /// `unmet`: luminance, cd/m², and samples of a pixel that may have missed light.
+    fn missed_where(&self, unmet: impl Fn(usize) -> Option<(f32, f32)>) -> Plane {
+        let (width, height) = (self.sampled_cd_m2.width(), self.sampled_cd_m2.height());
+        let around = |(x, y): (usize, usize), radius: usize| {
+            let columns = x.saturating_sub(radius)..width.min(x + radius + 1);
+            let rows = y.saturating_sub(radius)..height.min(y + radius + 1);
+            rows.flat_map(move |y| columns.clone().map(move |x| (x, y)))
+        };
+        let light = |(x, y): (usize, usize)| self.sampled_cd_m2.get(x, y);
+        let is_lamp = |(x, y): (usize, usize)| {
+            self.film.guides()[y * width + x].seen.shines() && light((x, y)) > self.lamps_from_cd_m2
+        };
+        let mut missed = Plane::filled(width, height, 0.0);
+        for lamp in (0..width * height).map(|pixel| (pixel % width, pixel / width)).filter(|&at| is_lamp(at)) {
+            let full = around(lamp, RADIUS).filter(|&at| is_lamp(at)).map(light).fold(0.0, f32::max);
+            for (x, y) in around(lamp, 1) {
+                let pixel = y * width + x;
+                let Some((own, samples)) = unmet(pixel) else { continue };
+                let step_px = ((x.abs_diff(lamp.0) + y.abs_diff(lamp.1)) as f32).sqrt();
+                let coverage = self.profile.farther_out(light(lamp) / full, step_px);
+                // In the place of the pixel's own light; of a coverage that scatters about this by as much, after so many samples without a hit.
+                let expected = (full - own).max(0.0) * coverage / (1.0 + samples * coverage);
+                missed.values_mut()[pixel] = expected.max(missed.get(x, y));
+            }
+        }
+        missed
+    }
 }
 
 /// How much brighter a picture is expected to be seen with light that may be missing, where that scatters exponentially about its mean.
@@ -158,15 +182,22 @@ mod tests {
             }
         });
         let sampled = film.estimate(1.0).luminance_cd_m2;
-        let profile = EdgeProfile::of(PixelFilter::Gaussian).expect("is smooth");
-        let missed = missed_light(&profile, &film, &sampled, 100.0);
+        let edges = |lamps_from_cd_m2| LampEdges {
+            profile: EdgeProfile::of(PixelFilter::Gaussian).expect("is smooth"),
+            film: &film,
+            sampled_cd_m2: &sampled,
+            lamps_from_cd_m2,
+        };
+        let missed = edges(100.0).missed();
+        assert_eq!(edges(100.0).expected().get(4, 4), missed.get(4, 4));
+        assert!(edges(100.0).expected().get(3, 4) > 0.0, "where samples have met the lamp, too");
         let samples = film.samples(0) as f32;
         let expected = 1e4 * 0.013 / (1.0 + 0.013 * samples);
         for y in 0..SIDE {
             assert!((missed.get(4, y) / expected - 1.0).abs() < 0.2, "{} for {expected}", missed.get(4, y));
             assert!((0..SIDE).filter(|&x| x != 4).all(|x| missed.get(x, y) == 0.0));
         }
-        assert!(missed_light(&profile, &film, &sampled, 1e6).values().iter().all(|&light| light == 0.0));
+        assert!(edges(1e6).missed().values().iter().all(|&light| light == 0.0));
     }
 
     /// Far below white as much is seen as is missing; far above it, white.
@@ -176,6 +207,8 @@ mod tests {
         let dark = Darkness::of(&missed, |light| light.map(|light| (50.0 + light).min(200.0)));
         assert_eq!(dark.mean.get(0, 0), 0.0);
         assert!((dark.mean.get(1, 0) - 1.0).abs() < 0.01, "{}", dark.mean.get(1, 0));
+        // An exponential variable's is 2; fifths have nine tenths of that.
+        assert!((dark.mean_square.get(1, 0) - 1.79).abs() < 0.03, "{}", dark.mean_square.get(1, 0));
         assert!((dark.mean.get(2, 0) - 150.0).abs() < 0.01, "{}", dark.mean.get(2, 0));
     }
 }

@@ -8,7 +8,7 @@ use fechner_perception::model;
 /// A way to spend samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arm {
-    /// The same everywhere; begun from what converged variances ask for.
+    /// The same everywhere: the power of two nearest to what converged variances ask for.
     Uniform,
     /// The same everywhere, in the time that the loop took as asked.
     UniformEqualTime,

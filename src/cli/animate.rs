@@ -26,7 +26,7 @@ use std::time::{Duration, Instant};
 use time::{Progress, ShotClock};
 use video::VideoFormat;
 
-pub(super) use frames::parse_rate;
+pub(super) use frames::{parse_lapse_rate, parse_rate};
 pub(super) use shot::{FrameJob, Shot};
 
 /// Arguments of `animate`.

@@ -6,7 +6,7 @@ mod write;
 
 use self::names::{frame_numbers, frames_since_last, targets};
 use self::write::write;
-use super::animate::parse_rate;
+use super::animate::parse_lapse_rate;
 use super::covered::Covered;
 use super::json::write_json;
 use super::numbers::{parse_positive, parse_stops, parse_unit};
@@ -55,8 +55,8 @@ pub(super) struct TonemapArguments {
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST")]
     effects: Option<Vec<Effect>>,
 
-    /// Frames a second of a sequence; numbers that are missing take their time [default: 24].
-    #[arg(long, value_name = "N", value_parser = parse_rate, allow_negative_numbers = true, help_heading = "Over time")]
+    /// Frames a second of a sequence, 0.001 to 1000; numbers that are missing take their time [default: 24].
+    #[arg(long, value_name = "N", value_parser = parse_lapse_rate, allow_negative_numbers = true, help_heading = "Over time")]
     fps: Option<f64>,
     /// What the eye is adapted to before the first frame; without it, to the first frame.
     #[arg(long, value_name = "CD_M2", value_parser = parse_positive, allow_negative_numbers = true, help_heading = "Over time")]

@@ -22,16 +22,16 @@ struct Place {
 
 impl PathTracer {
     /// Finds out what light comes to where the camera's paths get to, if that may help.
-    pub(super) fn look_about(&mut self) {
+    pub(super) fn choose_lights_by_arrival(&mut self) {
         if !self.lights.have_a_choice() {
             return;
         }
         let places: Vec<Place> =
             (0..SCOUTS * SCOUTS).into_par_iter().flat_map_iter(|scout| self.places_of(scout)).collect();
         let lookouts: Vec<Lookout> = places.iter().map(|place| place.lookout).collect();
-        let mut lights = std::mem::take(&mut self.lights);
-        lights.look_about(&self.world, &lookouts, &|number, sample| self.arrival(&places[number], sample));
-        self.lights = lights;
+        let arrival = |number: usize, sample: &LightSample| self.arrival(&places[number], sample);
+        let outlooks = self.lights.outlooks(&self.world, &lookouts, &arrival);
+        self.lights.set_outlooks(outlooks);
     }
 
     /// Surfaces that one scout comes to. It walks like a path, whatever light it would carry.

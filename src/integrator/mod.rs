@@ -2,7 +2,8 @@
 //!
 //! `path` holds the life of one sample, `abreast` how several are followed at once, `camera` where they start, `shading` what a
 //! surface point scatters like, `relief` how maps turn its normal, `tables` what materials compute beforehand, `media` what a
-//! ray travels in, `lookouts` what light comes where, `prune` which light is left to chance, `sheets` what clear panes let through, `specular` what mirrors and glass show.
+//! ray travels in, `lookouts` what light comes where, `prune` which light is left to chance, `sheets` what clear panes let
+//! through, `specular` what mirrors and glass show.
 
 mod abreast;
 mod around_camera;
@@ -212,7 +213,7 @@ impl PathTracer {
             thresholds,
         };
         tracer.look_around();
-        tracer.look_about();
+        tracer.choose_lights_by_arrival();
         tracer
     }
 
@@ -229,7 +230,7 @@ impl PathTracer {
         self.camera = CameraRays::new(camera, self.settings.width, self.settings.height);
         self.moves |= camera.motion.is_some();
         self.look_around();
-        self.look_about();
+        self.choose_lights_by_arrival();
     }
 
     /// The same by other settings, such as for a picture of another size.

@@ -23,7 +23,7 @@ mod tests;
 mod tree;
 
 pub use emission::emitted;
-pub use outlook::{Arrival, Lookout};
+pub use outlook::{Arrival, Lookout, Outlooks};
 pub use tree::LightReceiver;
 
 use crate::geometry::{Hit, Ray, World};
@@ -33,7 +33,6 @@ use distant::DistantLights;
 use environment::EnvironmentSampler;
 use flat::FlatEmitter;
 use glam::Vec3;
-use outlook::Outlooks;
 use sphere::SphereEmitter;
 use tree::LightTree;
 
@@ -89,7 +88,7 @@ enum Emitter {
 }
 
 /// All lights of a world, ready to be sampled.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Lights {
     emitters: Vec<Emitter>,
     /// Per object: the emitter of each triangle, for objects that emit.
@@ -116,7 +115,7 @@ impl Kind {
     const ALL: [Self; 3] = [Self::Environment, Self::Distant, Self::Placed];
 }
 
-/// What is left to a kind of light of the share that it has among equals, however weak it seems.
+/// What is left to a kind of light of the share that it has among equals, however weak it seems; a little less, since all shares add up to 1.
 const LEAST_SHARE: f32 = 0.3;
 
 /// Probabilities of the kinds.
@@ -147,18 +146,25 @@ impl Shares {
         self.0[kind as usize]
     }
 
-    /// A kind, its probability, and where in [0, 1) its part the number lies that chose it.
-    fn choose(&self, u: f32) -> (Kind, f32, f32) {
+    fn choose(&self, u: f32) -> Choice {
         let Self([environment, distant, placed]) = *self;
         if u < environment {
-            return (Kind::Environment, environment, u / environment);
+            return Choice { kind: Kind::Environment, probability: environment, within: u / environment };
         }
         if u < environment + distant {
-            return (Kind::Distant, distant, (u - environment) / distant);
+            return Choice { kind: Kind::Distant, probability: distant, within: (u - environment) / distant };
         }
         let within = ((u - environment - distant) / placed).clamp(0.0, 1.0 - f32::EPSILON / 2.0);
-        (Kind::Placed, placed, within)
+        Choice { kind: Kind::Placed, probability: placed, within }
     }
+}
+
+/// A kind of light, chosen by a number.
+struct Choice {
+    kind: Kind,
+    probability: f32,
+    /// Where in [0, 1) of its part the number lies.
+    within: f32,
 }
 
 impl Lights {
@@ -179,9 +185,14 @@ impl Lights {
         self.shares.0.iter().filter(|share| **share > 0.0).count() > 1
     }
 
-    /// Has kinds of light chosen by what comes to where paths get to.
-    pub fn look_about(&mut self, world: &World, lookouts: &[Lookout], arrival: &Arrival) {
-        self.outlooks = Outlooks::new(self, world, lookouts, arrival);
+    /// How kinds are best chosen where paths get to, by what arrives at lookouts there; `None` where it is best the same everywhere.
+    pub fn outlooks(&self, world: &World, lookouts: &[Lookout], arrival: &Arrival) -> Option<Outlooks> {
+        Outlooks::new(self, world, lookouts, arrival)
+    }
+
+    /// Chooses kinds of light by these from now on.
+    pub fn set_outlooks(&mut self, outlooks: Option<Outlooks>) {
+        self.outlooks = outlooks;
     }
 
     fn shares_at(&self, position: Vec3) -> &Shares {
@@ -191,8 +202,8 @@ impl Lights {
     /// A direction from a receiver towards a light, for three numbers in [0, 1): two for the place, one for the choice.
     pub fn sample(&self, world: &World, receiver: &LightReceiver, time: f32, u: [f32; 3]) -> Option<LightSample> {
         let [u0, u1, select] = u;
-        let (kind, chosen, within) = self.shares_at(receiver.position).choose(select);
-        chosen_by(self.sample_kind(kind, world, receiver, time, [u0, u1, within]), chosen)
+        let Choice { kind, probability, within } = self.shares_at(receiver.position).choose(select);
+        chosen_by(self.sample_kind(kind, world, receiver, time, [u0, u1, within]), probability)
     }
 
     /// The same for a kind of light.

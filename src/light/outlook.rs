@@ -30,18 +30,15 @@ pub type Arrival<'a> = dyn Fn(usize, &LightSample) -> f32 + Sync + 'a;
 
 /// How kinds of light are chosen in all parts of a scene.
 #[derive(Debug)]
-pub(super) struct Outlooks {
+pub struct Outlooks {
     groups: Groups,
     /// By group.
     shares: Vec<Shares>,
 }
 
 impl Outlooks {
-    /// By what arrives at lookouts. `None` of too few, and where there is nothing to choose from.
+    /// By what arrives at lookouts. `None` of too few.
     pub(super) fn new(lights: &Lights, world: &World, lookouts: &[Lookout], arrival: &Arrival) -> Option<Self> {
-        if !lights.have_a_choice() {
-            return None;
-        }
         let groups = Groups::new(lookouts)?;
         let strength = |kind: Kind, number: usize| -> f32 {
             let Lookout { receiver, time } = &lookouts[number];

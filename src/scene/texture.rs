@@ -1,4 +1,4 @@
-//! Looking up textures: wrapping, bilinear interpolation, the sRGB curve. Nothing here allocates.
+//! Looking up textures: wrapping, bilinear interpolation. Nothing here allocates.
 
 use super::{ColorInput, Encoding, ScalarInput, Texels, Texture, TextureLookup, Wrap};
 use fechner_perception::eotf::srgb_to_linear;

@@ -328,7 +328,7 @@ fn an_audit_finds_variance_that_is_too_low() {
     println!("honest {honest:?}");
     assert!(!honest.disagrees(), "{honest:?}");
     assert!((honest.ratio - 1.0).abs() < 0.4, "{honest:?}");
-    let variance = &mut rendered.judgement.pooled_variance_per_sample;
+    let variance = &mut rendered.judgement.met_per_sample;
     *variance = variance.map(|v| 0.25 * v);
     let low = audited(&rendered);
     assert!(low.disagrees(), "{low:?}");

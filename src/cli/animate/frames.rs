@@ -38,11 +38,20 @@ pub(super) fn parse_frames(text: &str) -> Result<Frames, String> {
 }
 
 pub(in crate::cli) fn parse_rate(text: &str) -> Result<f64, String> {
+    parse_rate_from(1.0, text)
+}
+
+/// The same down to a frame in a thousand seconds, for time lapses that eyes adapt along.
+pub(in crate::cli) fn parse_lapse_rate(text: &str) -> Result<f64, String> {
+    parse_rate_from(0.001, text)
+}
+
+fn parse_rate_from(least: f64, text: &str) -> Result<f64, String> {
     parse_positive(text).and_then(|rate| {
-        if (1.0..=1000.0).contains(&rate) {
+        if (least..=1000.0).contains(&rate) {
             Ok(rate)
         } else {
-            Err(format!("\"{text}\": between 1 and 1000 frames a second"))
+            Err(format!("\"{text}\": between {least} and 1000 frames a second"))
         }
     })
 }

@@ -80,6 +80,10 @@ impl Reader {
         for reference in instance.tagged("ref") {
             groups.push(self.resolve(reference)?);
         }
+        if !self.since_2 {
+            // Whatever else is in an instance, its group's materials are those that count.
+            groups.retain(|group| group.kind() == "shapegroup");
+        }
         if groups.is_empty() || groups.iter().any(|group| group.kind() != "shapegroup") {
             return Err(instance.error("an instance places a shapegroup and nothing else"));
         }
