@@ -79,11 +79,14 @@ impl LampEdges<'_> {
             rows.flat_map(move |y| columns.clone().map(move |x| (x, y)))
         };
         let light = |(x, y): (usize, usize)| self.sampled_cd_m2.get(x, y);
-        let is_lamp = |(x, y): (usize, usize)| {
-            self.film.guides()[y * width + x].seen.shines() && light((x, y)) > self.lamps_from_cd_m2
-        };
+        let shines = |(x, y): (usize, usize)| self.film.guides()[y * width + x].seen.shines();
+        let is_lamp = |at: (usize, usize)| shines(at) && light(at) > self.lamps_from_cd_m2;
         let mut missed = Plane::filled(width, height, 0.0);
         for lamp in (0..width * height).map(|pixel| (pixel % width, pixel / width)).filter(|&at| is_lamp(at)) {
+            // Far from any rim what shines is known as all else is: a picture, a screen or a sky has brighter places, too.
+            if around(lamp, RADIUS).all(shines) {
+                continue;
+            }
             let full = around(lamp, RADIUS).filter(|&at| is_lamp(at)).map(light).fold(0.0, f32::max);
             for (x, y) in around(lamp, 1) {
                 let pixel = y * width + x;
@@ -198,6 +201,16 @@ mod tests {
             assert!((0..SIDE).filter(|&x| x != 4).all(|x| missed.get(x, y) == 0.0));
         }
         assert!(edges(1e6).missed().values().iter().all(|&light| light == 0.0));
+    }
+
+    /// A picture that shines from edge to edge has no rim, however uneven it is.
+    #[test]
+    fn a_screen_has_no_rim() {
+        let film = film_of_columns(8, |x| 1.0 + 100.0 * (x % 2) as f32);
+        let sampled = film.estimate(1.0).luminance_cd_m2;
+        let profile = EdgeProfile::of(PixelFilter::Gaussian).expect("is smooth");
+        let edges = LampEdges { profile, film: &film, sampled_cd_m2: &sampled, lamps_from_cd_m2: 0.0 };
+        assert!(edges.expected().values().iter().all(|&light| light == 0.0));
     }
 
     /// Far below white as much is seen as is missing; far above it, white.

@@ -76,7 +76,7 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     let mut prepared = arguments.job.prepare_samples()?;
     check_scene_kept(&written(arguments))?;
     // Of renders that were killed as they wrote.
-    written(arguments).into_iter().filter_map(|(_, path)| path).try_for_each(output::remove_leftovers)?;
+    written(arguments).into_iter().filter_map(|(_, path)| path).for_each(output::remove_leftovers);
     // A film's picture tells the same of its scene, whether it is written now or by `merge`.
     let Prepared { scene, trace, record, .. } = &prepared;
     let origin = || Origin { scene_name: arguments.job.scene_name(), ..Origin::of(scene, trace) };

@@ -3,7 +3,7 @@
 use super::OutputError;
 use crate::scene::hash::ContentHash;
 use std::ffi::{OsStr, OsString};
-use std::fs::{File, TryLockError};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use tempfile::NamedTempFile;
@@ -158,15 +158,11 @@ fn hidden_within(most_bytes: usize, name: &OsStr) -> OsString {
     hidden
 }
 
-/// Removes new files beside `path` that a killed program could not complete. Those that another program is writing stay where the file
-/// system has locks; where it may have none, call it only where no other can be writing `path`.
-///
-/// # Errors
-/// If the folder cannot be read, or one of them not removed.
-pub fn remove_leftovers(path: &Path) -> Result<(), OutputError> {
-    let io = |error| OutputError::Io { path: path.to_owned(), error };
-    let target = target_of(path).map_err(io)?;
-    let Some(name) = target.file_name() else { return Ok(()) };
+/// Removes new files beside `path` that a killed program could not complete, as far as the folder can be read and they can be removed: no
+/// work is lost for the sake of tidiness. Those that another program is writing stay, as does everything where the file system has no locks.
+pub fn remove_leftovers(path: &Path) {
+    let Ok(target) = target_of(path) else { return };
+    let Some(name) = target.file_name() else { return };
     let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let prefix = part_prefix(name);
     // No more than the random letters: `.a.film.png.x1Y2z3.part` is of a.film.png, which another program may be writing.
@@ -175,24 +171,20 @@ pub fn remove_leftovers(path: &Path) -> Result<(), OutputError> {
         let letters = rest.and_then(|rest| rest.strip_suffix(PART_SUFFIX.as_bytes()));
         letters.is_some_and(|letters| letters.len() == PART_LETTERS && letters.iter().all(u8::is_ascii_alphanumeric))
     };
-    for entry in folder.read_dir().map_err(io)? {
-        let found = entry.map_err(io)?.file_name();
+    for entry in folder.read_dir().into_iter().flatten().flatten() {
+        let found = entry.file_name();
         let part = folder.join(&found);
         if is_leftover(found.as_encoded_bytes()) && is_nobodys(&part) {
-            match std::fs::remove_file(part) {
-                // Renamed or removed by another meanwhile.
-                Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
-                removed => removed.map_err(io)?,
-            }
+            // It may be gone: renamed or removed by another meanwhile.
+            let _ = std::fs::remove_file(part);
         }
     }
-    Ok(())
 }
 
-/// Whether no program is writing a new file; one that cannot be opened is somebody else's.
+/// Whether no program is writing a new file; one that cannot be opened or locked may be somebody else's.
 fn is_nobodys(part: &Path) -> bool {
     let file = File::options().write(true).open(part);
-    file.is_ok_and(|file| !matches!(file.try_lock(), Err(TryLockError::WouldBlock)))
+    file.is_ok_and(|file| file.try_lock().is_ok())
 }
 
 /// The system's words without the path that `tempfile` adds.
@@ -271,11 +263,11 @@ mod tests {
         for name in of_others.into_iter().chain(["a.film", ".a.film.x1Y2z3.part", ".b.film.x1Y2z3.part"]) {
             std::fs::write(folder.path().join(name), "").unwrap();
         }
-        remove_leftovers(&folder.path().join("a.film")).unwrap();
+        remove_leftovers(&folder.path().join("a.film"));
         assert_eq!(names(folder.path()), [of_others[0], of_others[1], ".b.film.x1Y2z3.part", "a.film"]);
         let (file, _) = create_beside(&folder.path().join("b.film")).unwrap();
         file.keep().unwrap();
-        remove_leftovers(&folder.path().join("b.film")).unwrap();
+        remove_leftovers(&folder.path().join("b.film"));
         assert_eq!(names(folder.path()), [of_others[0], of_others[1], "a.film"]);
     }
 
@@ -286,7 +278,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
         write_beside(&path, |file| {
-            remove_leftovers(&path).unwrap();
+            remove_leftovers(&path);
             file.write_all(b"whole")
         })
         .unwrap();
@@ -300,9 +292,9 @@ mod tests {
             let [path, other] = [&name, &format!("{}b", &name[..name.len() - 2])].map(|name| folder.path().join(name));
             write_beside(&path, |file| file.write_all(b"x")).unwrap();
             let parts = [&path, &other].map(|path| create_beside(path).unwrap().0.keep().unwrap().1);
-            remove_leftovers(&path).unwrap();
+            remove_leftovers(&path);
             assert_eq!(parts.each_ref().map(|part| part.exists()), [false, true], "{name}");
-            remove_leftovers(&other).unwrap();
+            remove_leftovers(&other);
             assert_eq!(names(folder.path()), [name]);
             std::fs::remove_file(path).unwrap();
         }

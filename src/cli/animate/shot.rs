@@ -182,7 +182,7 @@ impl<'a> Shot<'a> {
         let file = self.file(frame);
         if self.record(frame, &job.key).is_some() {
             say!("{}: is there", file.display());
-            remove_leftovers_of_frame(&file)?;
+            remove_leftovers_of_frame(&file);
             return Ok(Made::Kept);
         }
         let outdated = self.has_record(frame);
@@ -243,7 +243,7 @@ impl<'a> Shot<'a> {
         let seed = self.settings.trace_settings(frame).seed;
         let report = Report::new(&self.scene_name(), &[seed], &job.settings, &made.rendered);
         FrameRecord::remove(&file)?;
-        remove_leftovers_of_frame(&file)?;
+        remove_leftovers_of_frame(&file);
         self.write(&file, made, &job.settings, &report)?;
         let record = FrameRecord {
             key: job.key.clone(),
@@ -281,10 +281,9 @@ impl<'a> Shot<'a> {
 }
 
 /// Removes what runs that were killed left of a frame's picture and record as they wrote them.
-fn remove_leftovers_of_frame(picture: &Path) -> Result<()> {
-    output::remove_leftovers(picture)?;
-    output::remove_leftovers(&FrameRecord::file(picture))?;
-    Ok(())
+fn remove_leftovers_of_frame(picture: &Path) {
+    output::remove_leftovers(picture);
+    output::remove_leftovers(&FrameRecord::file(picture));
 }
 
 /// A file's folder, where its name has one.

@@ -94,7 +94,7 @@ pub(super) fn merge(bench: &Bench<'_>, frame_index: usize, lock: &Lock) -> Resul
     if lock.is_sole() {
         // Of merges that were killed as they wrote.
         for path in [farm.film(frame_index), farm.finished_film(frame_index), job.picture(farm, number)] {
-            output::remove_leftovers(&path)?;
+            output::remove_leftovers(&path);
         }
     }
     let frame = job.planned_frame(farm, frame_index)?;

@@ -30,7 +30,7 @@ impl Shot<'_> {
             return Ok(false);
         }
         for file in self.files_of_whole()? {
-            output::remove_leftovers(&file)?;
+            output::remove_leftovers(&file);
         }
         write_json(&self.name.of_shot("json"), &records)?;
         let fits = |frame: usize| track.frames[frame].fitted.clone().restore();

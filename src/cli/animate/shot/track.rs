@@ -42,7 +42,7 @@ impl Shot<'_> {
         self.make_folder()?;
         say!("found the light of {count} frames in {}", duration_in_words(started.elapsed().as_secs_f64()));
         let text = serde_json::to_string(&track).context("the track could not be put into words")?;
-        output::remove_leftovers(&file)?;
+        output::remove_leftovers(&file);
         output::write_beside(&file, |file| file.write_all(text.as_bytes()))?;
         Ok(track)
     }

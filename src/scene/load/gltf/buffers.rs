@@ -72,7 +72,9 @@ pub(super) fn resolve(path: &Path, uri: &str) -> Result<Uri, LoadError> {
         let bytes = LENIENT_BASE64.decode(encoded.trim());
         return bytes.map(Uri::Data).map_err(|error| LoadError::invalid(path, format_args!("a data: URI: {error}")));
     }
-    let absolute = uri.strip_prefix("file://").map(|rest| rest.strip_prefix("localhost").unwrap_or(rest));
+    // `file:///tmp/a.png`, with the host's name, or `file:/tmp/a.png` (RFC 8089).
+    let with_host = uri.strip_prefix("file://").map(|rest| rest.strip_prefix("localhost").unwrap_or(rest));
+    let absolute = with_host.or(uri.strip_prefix("file:"));
     let local = absolute.filter(|absolute| absolute.starts_with('/')).unwrap_or(uri);
     if local.contains("://") {
         return Err(LoadError::unsupported(path, format_args!("\"{uri}\": only local files are read")));
