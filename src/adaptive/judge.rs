@@ -5,7 +5,7 @@ mod steps;
 
 use self::over_white::OverWhite;
 pub use self::steps::Thresholds;
-use self::steps::{Guide, MissedNoise, Scatter, chromatic_gains, found_thresholds};
+use self::steps::{Guide, Scatter, chromatic_gains, found_thresholds};
 use super::denoised::{DenoisedPicture, TimedDenoising};
 use super::settings::LoopSettings;
 use super::statistics::by_channel;
@@ -136,7 +136,7 @@ fn judge_by(
     let of_halves =
         (purpose == Purpose::Plan).then(|| scatter.per_sample_of_halves(film, &thresholds.in_bands, gains.as_ref()));
     let missed = match denoised {
-        None => MissedNoise::of(film, &estimate, tone.as_ref(), settings),
+        None => scatter.missed_noise(film, &estimate, tone.as_ref(), settings),
         Some(_) => None,
     };
     let (pooled_variance_per_sample, variance_per_sample) = match missed {

@@ -282,6 +282,10 @@ fn an_opacity_of_nothing_is_one() {
     let (scene, mapped) = of_mtl("Kd 0 0 0\nmap_Kd x.png\nPr 0\nmap_Pr x.png");
     assert!(has_note(&scene, "Material \"m\": Kd 0, Pr 0 beside a picture"), "{:?}, {mapped:?}", scene.notes);
     assert!(!has_note(&of_mtl("Kd 0.5 0 0\nmap_Kd x.png").0, "beside a picture"));
+    for nothing in ["d 0", "Tr 1"] {
+        let scene = of_mtl(&format!("Kd 0.5 0.5 0.5\n{nothing}\nmap_d x.png")).0;
+        assert!(has_note(&scene, &format!("{nothing} beside a picture")), "{:?}", scene.notes);
+    }
 }
 
 #[test]

@@ -98,6 +98,24 @@ impl Scatter {
         per_sample.combined(&self.shares, |sample, share| sample * share)
     }
 
+    /// What lamps' rims may hide; `None` where the pixel filter tells of no neighbour.
+    pub(super) fn missed_noise(
+        &self,
+        film: &Film,
+        estimate: &Estimate,
+        tone: &dyn FittedTone,
+        settings: &LoopSettings,
+    ) -> Option<MissedNoise> {
+        let sampled_cd_m2 = &estimate.luminance_cd_m2;
+        let profile = EdgeProfile::of(settings.filter)?;
+        let edges = LampEdges { profile, film, sampled_cd_m2, lamps_from_cd_m2: 0.0 };
+        let darkness = Darkness::of(&edges.expected(), |light| {
+            let whole = sampled_cd_m2.combined(light, |sampled, missed| sampled + missed);
+            seen::display_luminance(tone, &settings.viewing.display, &whole)
+        });
+        Some(MissedNoise(darkness.mean_square.combined(&self.shares, |square, share| square / share)))
+    }
+
     pub(super) fn luminance_variance_of_mean(&self) -> Plane {
         self.of_mean(&self.statistics.luminance().stratified_variance())
     }
@@ -121,24 +139,12 @@ impl Scatter {
     }
 }
 
-/// Variances of one sample that show as much as light of lamps beside pixels that have not met it, (cd/m²)² on the display. Pixels that
+/// Variances of one sample that show as much as light of lamps that is expected beside them, (cd/m²)² on the display. Pixels that
 /// lamps cover by a hundredth said that they had no variance, among neighbours that are unlike them: globes on black were called done at 5
-/// times the visibility that was asked for. No audit raises them: it has found no variance to be wrong.
+/// times the visibility that was asked for. No audit raises them, since no variance was found to be wrong.
 pub(super) struct MissedNoise(Plane);
 
 impl MissedNoise {
-    /// `None` where the pixel filter tells of no neighbour.
-    pub(super) fn of(film: &Film, estimate: &Estimate, tone: &dyn FittedTone, settings: &LoopSettings) -> Option<Self> {
-        let sampled_cd_m2 = &estimate.luminance_cd_m2;
-        let profile = EdgeProfile::of(settings.filter)?;
-        let edges = LampEdges { profile, film, sampled_cd_m2, lamps_from_cd_m2: 0.0 };
-        let darkness = Darkness::of(&edges.expected(), |light| {
-            let whole = sampled_cd_m2.combined(light, |sampled, missed| sampled + missed);
-            seen::display_luminance(tone, &settings.viewing.display, &whole)
-        });
-        Some(Self(darkness.mean_square.combined(&variance_shares(film), |square, share| square / share)))
-    }
-
     /// The larger of a scatter and this.
     pub(super) fn or_scatter(&self, per_sample: &Plane) -> Plane {
         per_sample.combined(&self.0, f32::max)

@@ -261,7 +261,7 @@ impl Written {
             let is_zero = self.numbers.get(&key).is_some_and(|numbers| numbers.iter().all(|&number| number <= 0.0));
             is_zero && self.maps.contains_key(&format!("map_{key}"))
         };
-        let factors = ["Kd", "Ks", "Ke", "d", "Pr", "Pm", "Pc", "Pcr", "Ps"].into_iter();
+        let factors = ["Kd", "Ks", "Ke", "Pr", "Pm", "Pc", "Pcr", "Ps"].into_iter();
         let idle: Vec<String> = factors.filter(is_idle).map(|key| format!("{key} 0")).collect();
         if !idle.is_empty() {
             builder.note(format!("Material \"{}\": {} beside a picture is taken as 1.", self.name, idle.join(", ")));
@@ -325,8 +325,22 @@ impl Written {
         let same_file = self.map(&["map_kd"]).is_some_and(|color| color.file == map.file);
         let channel = map.channel.unwrap_or(if same_file { 3 } else { 0 });
         let lookup = self.lookup(builder, map, Encoding::Linear, [255; 4]);
-        let factor = if opacity > 0.0 { opacity } else { 1.0 };
+        let factor = if opacity > 0.0 {
+            opacity
+        } else {
+            builder.note(format!(
+                "Material \"{}\": {} beside a picture is taken as 1.",
+                self.name,
+                self.transparency()
+            ));
+            1.0
+        };
         Alpha::Blend { value: ScalarInput { factor: factor * map.gain.max(0.0), texture: Some((lookup, channel)) } }
+    }
+
+    /// How the file says that nothing is there.
+    fn transparency(&self) -> &'static str {
+        if self.number("d").is_some() { "d 0" } else { "Tr 1" }
     }
 
     /// `d`, or 1 − `Tr`.
