@@ -16,6 +16,12 @@ pub fn display_luminance(fitted: &dyn FittedTone, display: &Display, scene_lumin
     })
 }
 
+/// The same for one pixel.
+#[must_use]
+pub fn display_luminance_at(fitted: &dyn FittedTone, display: &Display, pixel: Pixel, scene_cd_m2: f32) -> f32 {
+    Shown { fitted, display }.cd_m2(pixel, scene_cd_m2)
+}
+
 /// How much the displayed luminance changes with scene luminance around `scene_luminance` (cd/m²): the slope of the chord
 /// from 5 % below to 5 % above. Noise that is to stay without bias may not go through the operator itself, which is bent.
 /// Finite everywhere: luminance counts as at least 1e-4 and at most 1e30 cd/m², NaN as the least.

@@ -1,6 +1,6 @@
 //! The film's denoised picture as it will be seen, and what the perception crate says of its noise and of its bias.
 
-use super::judge::JudgeError;
+use super::judge::{JudgeError, half_luminance};
 use super::missed::{Darkness, EdgeProfile, LampEdges};
 use super::settings::LoopSettings;
 use crate::denoise::{DenoisedFilm, Denoiser, denoise_film, leave_the_void_dark};
@@ -58,7 +58,7 @@ impl TimedDenoising {
         let width = film.width() as usize;
         let display = &settings.viewing.display;
         let [a, b] = self.film.halves_rgb_cd_m2.each_ref().map(|half| luminance_plane(half, width));
-        let [raw_a, raw_b] = Half::BOTH.map(|half| raw_luminance(film, half, settings.nits_per_unit));
+        let [raw_a, raw_b] = Half::BOTH.map(|half| half_luminance(film, half, settings.nits_per_unit));
         let half_of = |a: &Plane, b: &Plane| a.combined(b, |a, b| 0.5 * (a - b));
         let half_difference = half_of(&a, &b);
         let displayed = seen::display_half_difference(tone, display, &self.luminance, &half_difference);
@@ -93,11 +93,11 @@ impl TimedDenoising {
             Some(profile) => {
                 let sampled_cd_m2 = &estimate.luminance_cd_m2;
                 let missed = LampEdges { profile, film, sampled_cd_m2, lamps_from_cd_m2 }.missed();
-                let dark = Darkness::of(&missed, |light| {
+                let dark = Darkness::of(&missed, |pixel, light| {
+                    let whole = sampled_cd_m2.get(pixel.x, pixel.y) + light;
                     // A denoiser may have guessed some of it.
-                    let whole = estimate.luminance_cd_m2.combined(light, |sampled, missed| sampled + missed);
-                    let whole = whole.combined(&luminance_cd_m2, f32::max);
-                    seen::display_luminance(tone, display, &whole)
+                    let whole = whole.max(luminance_cd_m2.get(pixel.x, pixel.y));
+                    seen::display_luminance_at(tone, display, pixel, whole)
                 });
                 error.with_missed_light(&thresholds.measured_visibility(&dark.mean))
             }
@@ -187,14 +187,6 @@ fn raw_range(raw: &Plane, x: usize, y: usize) -> (f32, f32) {
 
 fn luminance_plane(rgb: &[[f32; 3]], width: usize) -> Plane {
     Plane::from_fn(width, rgb.len() / width.max(1), |x, y| luminance(rgb[y * width + x]).max(0.0))
-}
-
-/// Luminance of a half, cd/m²; the other half's where it has no samples.
-fn raw_luminance(film: &Film, half: Half, nits_per_unit: f64) -> Plane {
-    let width = film.width() as usize;
-    Plane::from_fn(width, film.height() as usize, |x, y| {
-        (nits_per_unit * opponent(film.half_or_other(half, y * width + x).mean)[0]) as f32
-    })
 }
 
 #[cfg(test)]

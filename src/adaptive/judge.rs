@@ -10,7 +10,7 @@ use super::denoised::{DenoisedPicture, TimedDenoising};
 use super::settings::LoopSettings;
 use super::statistics::by_channel;
 use crate::denoise::{Denoiser, OidnError};
-use crate::film::{CHANNELS, Estimate, Film, share_of_mean};
+use crate::film::{CHANNELS, Estimate, Film, opponent, share_of_mean};
 use crate::sampler::Half;
 use fechner_perception::Plane;
 use fechner_perception::denoised::DenoisedError;
@@ -133,19 +133,27 @@ fn judge_by(
     let gains = chromatic_gains(&thresholds.in_bands, settings)?;
     still_wanted(settings)?;
     let met_per_sample = scatter.pooled_per_sample(&thresholds.in_bands, gains.as_ref());
-    let of_halves =
-        (purpose == Purpose::Plan).then(|| scatter.per_sample_of_halves(film, &thresholds.in_bands, gains.as_ref()));
-    let missed = match denoised {
-        None => scatter.missed_noise(film, &estimate, tone.as_ref(), settings),
+    let of_halves = (purpose == Purpose::Plan).then(|| {
+        let scales = scatter.luminance_scales_of_halves(film, tone.as_ref(), settings, raw_inflation);
+        scatter.per_sample_of_halves(film, scales.each_ref(), &thresholds.in_bands, gains.as_ref())
+    });
+    let missed_by = |light: &Plane| match denoised {
+        None => scatter.missed_noise(film, light, tone.as_ref(), settings),
         Some(_) => None,
     };
-    let (pooled_variance_per_sample, variance_per_sample) = match missed {
-        None => (met_per_sample.clone(), of_halves),
-        Some(missed) => {
-            let of_halves = of_halves.map(|halves| halves.each_ref().map(|half| missed.or_scatter(half)));
-            (missed.or_scatter(&met_per_sample), of_halves)
-        }
+    let or_missed = |per_sample: &Plane, light: &Plane| match missed_by(light) {
+        None => per_sample.clone(),
+        Some(missed) => missed.or_scatter(per_sample),
     };
+    let pooled_variance_per_sample = or_missed(&met_per_sample, &estimate.luminance_cd_m2);
+    let variance_per_sample = of_halves.map(|halves| {
+        // As the other half sees it: see `luminance_scales_of_halves`.
+        let of = |half: Half| {
+            let light = half_luminance(film, half.other(), settings.nits_per_unit);
+            or_missed(&halves[half.index()], &light)
+        };
+        Half::BOTH.map(of)
+    });
     still_wanted(settings)?;
     let over_white = if settings.is_transparent {
         let colour_scale = denoised.is_none().then(|| scatter.luminance_scale());
@@ -311,18 +319,40 @@ pub fn display_scale(
     settings: &LoopSettings,
     inflation: f64,
 ) -> [Plane; CHANNELS] {
-    let nits_squared = settings.nits_per_unit * settings.nits_per_unit * inflation;
-    let display = &settings.viewing.display;
-    by_channel(|c| {
-        let scene = Plane::from_fn(guide.width(), guide.height(), |x, y| {
-            let i = y * guide.width() + x;
-            let own = 0.5 * film.sample_variances(i, c).iter().sum::<f64>() * f64::from(shares.get(x, y));
-            (own * nits_squared) as f32
+    let noise = NoiseOnDisplay { shares, tone, settings, inflation };
+    by_channel(|c| noise.scale(c, guide, |pixel| 0.5 * film.sample_variances(pixel, c).iter().sum::<f64>()))
+}
+
+/// Luminance of a half, cd/m²; of the other one where it has no samples.
+pub(super) fn half_luminance(film: &Film, half: Half, nits_per_unit: f64) -> Plane {
+    let width = film.width() as usize;
+    Plane::from_fn(width, film.height() as usize, |x, y| {
+        (nits_per_unit * opponent(film.half_or_other(half, y * width + x).mean)[0]) as f32
+    })
+}
+
+/// What the display makes of noise.
+struct NoiseOnDisplay<'a> {
+    /// [`variance_shares`].
+    shares: &'a Plane,
+    tone: &'a dyn FittedTone,
+    settings: &'a LoopSettings,
+    inflation: f64,
+}
+
+impl NoiseOnDisplay<'_> {
+    /// Displayed over scene variance in a channel about a luminance, cd/m². `variance`: of one sample of a pixel, in scene units.
+    fn scale(&self, channel: usize, light: &Plane, variance: impl Fn(usize) -> f64 + Sync) -> Plane {
+        let nits_squared = self.settings.nits_per_unit * self.settings.nits_per_unit * self.inflation;
+        let display = &self.settings.viewing.display;
+        let scene = Plane::from_fn(light.width(), light.height(), |x, y| {
+            let of_mean = variance(y * light.width() + x) * f64::from(self.shares.get(x, y));
+            (of_mean * nits_squared) as f32
         });
-        let displayed = if c == 0 {
-            seen::display_variance(tone, display, guide, &scene)
+        let displayed = if channel == 0 {
+            seen::display_variance(self.tone, display, light, &scene)
         } else {
-            seen::display_chromatic_variance(tone, display, guide, &scene)
+            seen::display_chromatic_variance(self.tone, display, light, &scene)
         };
         scene.combined(&displayed, |scene, displayed| {
             let (scene, displayed) = (f64::from(scene), f64::from(displayed));
@@ -333,7 +363,7 @@ pub fn display_scale(
                 _ => f32::INFINITY,
             }
         })
-    })
+    }
 }
 
 /// The denoised picture, cd/m²: what adaptation, masking and the operator are made from, so that noise neither

@@ -7,6 +7,7 @@
 use crate::film::Film;
 use crate::sampler::PixelFilter;
 use fechner_perception::Plane;
+use fechner_perception::tone::Pixel;
 
 /// Pixels to each side in which a lamp's full light is looked for.
 const RADIUS: usize = 3;
@@ -49,7 +50,7 @@ impl EdgeProfile {
 pub(super) struct LampEdges<'a> {
     pub(super) profile: EdgeProfile,
     pub(super) film: &'a Film,
-    /// The film's mean.
+    /// The film's mean, or that of one of its halves.
     pub(super) sampled_cd_m2: &'a Plane,
     /// What shines counts as a lamp from this luminance on.
     pub(super) lamps_from_cd_m2: f32,
@@ -111,22 +112,21 @@ pub(super) struct Darkness {
 }
 
 impl Darkness {
-    /// `shown`: the picture as displayed with so much more light.
-    pub(super) fn of(missed: &Plane, shown: impl Fn(&Plane) -> Plane) -> Self {
+    /// `shown`: what is displayed of a pixel with so much more light, cd/m².
+    pub(super) fn of(missed: &Plane, shown: impl Fn(Pixel, f32) -> f32) -> Self {
         /// Means of the fifths of an exponential variable of mean 1.
         const FIFTHS: [f32; 5] = [0.107, 0.360, 0.700, 1.223, 2.610];
         let none = missed.map(|_| 0.0);
-        let mut darkness = Self { mean: none.clone(), mean_square: none.clone() };
-        if missed.values().iter().all(|&light| light == 0.0) {
-            return darkness;
-        }
-        let without = shown(&none);
-        for times in FIFTHS {
-            let brighter = shown(&missed.map(|light| times * light)).combined(&without, |with, without| with - without);
-            let share = 1.0 / FIFTHS.len() as f32;
-            darkness.mean = darkness.mean.combined(&brighter, |sum, brighter| sum + share * brighter);
-            darkness.mean_square =
-                darkness.mean_square.combined(&brighter, |sum, brighter| sum + share * brighter * brighter);
+        let mut darkness = Self { mean: none.clone(), mean_square: none };
+        for (index, &light) in missed.values().iter().enumerate().filter(|&(_, &light)| light > 0.0) {
+            let pixel = Pixel { x: index % missed.width(), y: index / missed.width() };
+            let without = shown(pixel, 0.0);
+            for times in FIFTHS {
+                let brighter = shown(pixel, times * light) - without;
+                let share = 1.0 / FIFTHS.len() as f32;
+                darkness.mean.values_mut()[index] += share * brighter;
+                darkness.mean_square.values_mut()[index] += share * brighter * brighter;
+            }
         }
         darkness
     }
@@ -217,7 +217,7 @@ mod tests {
     #[test]
     fn no_more_than_white_is_missing() {
         let missed = Plane::from_fn(3, 1, |x, _| [0.0, 1.0, 1e6][x]);
-        let dark = Darkness::of(&missed, |light| light.map(|light| (50.0 + light).min(200.0)));
+        let dark = Darkness::of(&missed, |_, light| (50.0 + light).min(200.0));
         assert_eq!(dark.mean.get(0, 0), 0.0);
         assert!((dark.mean.get(1, 0) - 1.0).abs() < 0.01, "{}", dark.mean.get(1, 0));
         // An exponential variable's is 2; fifths have nine tenths of that.

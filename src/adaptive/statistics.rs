@@ -62,9 +62,9 @@ impl SampleStatistics {
 
     /// Variance of one sample that a half of the film decides by: pooled, or the pixel's own variance seen by the other half where
     /// that is larger. `scale` as in [`Self::of`].
-    pub fn for_half(&self, film: &Film, scale: &[Plane; CHANNELS], half: Half, channel: usize) -> Plane {
+    pub fn for_half(&self, film: &Film, scale: &Plane, half: Half, channel: usize) -> Plane {
         let pooled = &self.channels[channel].pooled;
-        let (other, scale) = (film.half(half.other()), &scale[channel]);
+        let other = film.half(half.other());
         Plane::from_fn(pooled.width(), pooled.height(), |x, y| {
             let own = cautious_variance(&other[y * pooled.width() + x], channel) * f64::from(scale.get(x, y));
             pooled.get(x, y).max(own as f32)
@@ -72,13 +72,7 @@ impl SampleStatistics {
     }
 
     /// The same with what stratification makes of it.
-    pub(super) fn stratified_variance_for_half(
-        &self,
-        film: &Film,
-        scale: &[Plane; CHANNELS],
-        half: Half,
-        channel: usize,
-    ) -> Plane {
+    pub(super) fn stratified_variance_for_half(&self, film: &Film, scale: &Plane, half: Half, channel: usize) -> Plane {
         let factor = &self.channels[channel].low_discrepancy_factor;
         self.for_half(film, scale, half, channel).combined(factor, |variance, factor| variance * factor)
     }
@@ -232,7 +226,7 @@ mod tests {
     /// Luminance variance that a half decides by, in scene units.
     fn for_half(film: &Film, half: Half) -> Plane {
         let scale = scene_units(film);
-        SampleStatistics::of(film, &scale).for_half(film, &scale, half, 0)
+        SampleStatistics::of(film, &scale).for_half(film, &scale[0], half, 0)
     }
 
     /// Uniform noise has variance 1/12, and independent halves differ as expected: factor 1.

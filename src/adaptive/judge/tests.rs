@@ -36,21 +36,50 @@ fn isoluminant_noise_is_seen_in_denoised_pictures() {
 
 /// A film of so many samples of grey noise in half A of each pixel, and so many in half B.
 fn noisy(samples: [u32; 2]) -> Film {
+    grey_film(samples, |_| false, |_, _, random| 0.8 + 0.5 * random)
+}
+
+/// The same of any grey, by pixel, half, and random in −1..1.
+fn grey_film(samples: [u32; 2], shines: impl Fn(u32) -> bool, grey: impl Fn(u32, Half, f32) -> f32) -> Film {
     let mut film = Film::new(64, 64);
     for pixel in 0..64 * 64 {
+        let shines = shines(pixel);
         for (half, samples) in Half::BOTH.into_iter().zip(samples) {
             let mut sum = BlockSum::default();
             for index in 0..samples {
                 let key = u64::from(pixel) << 8 | u64::from(index);
                 let random = (hash_words(key, half.index() as u64) >> 40) as f32 / 8_388_608.0 - 1.0;
-                let first_hit =
-                    FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: false };
-                sum.add(&PathSample { radiance: Vec3::splat(0.8 + 0.5 * random), first_hit, rays: 1 });
+                let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines };
+                sum.add(&PathSample { radiance: Vec3::splat(grey(pixel, half, random)), first_hit, rays: 1 });
             }
             film.merge_block(BlockWork { samples, ..BlockWork::whole(pixel, half, 0) }, &sum);
         }
     }
     film
+}
+
+/// Whether a half was lucky and went beyond white is no matter to what it decides by, or it would stop because of its luck; the other half
+/// goes by it. On a lamp's rim, where light is expected, as elsewhere.
+#[test]
+fn a_half_does_not_go_by_its_own_luck() {
+    const RIM: u32 = 32 * 64 + 32;
+    const LAMP: u32 = RIM + 1;
+    for shines in [false, true] {
+        let of_halves = |lucky: f32| {
+            let grey = |pixel, half, random| match (pixel, half) {
+                (RIM, Half::A) => lucky + 0.5 * random,
+                (RIM, Half::B) => 1.0 + random,
+                (LAMP, _) => 5.0,
+                _ => 0.1 + 0.01 * random,
+            };
+            let film = grey_film([8, 8], |pixel| shines && [RIM, LAMP].contains(&pixel), grey);
+            let judgement = judge_to_plan(&film, &settings(), 1.0).expect("judges");
+            judgement.variance_per_sample.expect("is to plan by").map(|half| half.values()[RIM as usize])
+        };
+        let ([a, b], [lucky_a, lucky_b]) = (of_halves(1.0), of_halves(20.0));
+        assert!((lucky_a / a - 1.0).abs() < 0.01, "half A decides by {a} and, when lucky, by {lucky_a}");
+        assert!(lucky_b < 0.5 * b, "half B decides by {b}, and by {lucky_b} where A saw nothing but white");
+    }
 }
 
 /// Two single samples show √8 times the noise of eight each, about; of one alone nothing is claimed, denoised or not.

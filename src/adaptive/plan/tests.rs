@@ -154,7 +154,7 @@ fn stopped_film(size: u32, draw: fn(f64, f64) -> f64, variance_of_mean: f64) -> 
         let scale = scene_units(&film);
         let statistics = SampleStatistics::of(&film, &scale);
         let luminance = statistics.luminance();
-        let halves = Half::BOTH.map(|half| statistics.for_half(&film, &scale, half, 0));
+        let halves = Half::BOTH.map(|half| statistics.for_half(&film, &scale[0], half, 0));
         plan = doubling_plan(&film, 1 << 16, |i| {
             let factor = luminance.low_discrepancy_factor.values()[i];
             let pooled = luminance.pooled.values()[i] * factor;
