@@ -1,7 +1,7 @@
 //! What one file holds at different times: the same things under the same numbers, seen and lit in the same way, where nothing in
 //! the file changes that.
 
-use super::{LoadError, LoadOptions, load};
+use crate::scene::load::{LoadError, LoadOptions, load};
 use crate::scene::{Light, Scene};
 use glam::{Quat, Vec3};
 use std::path::PathBuf;
