@@ -87,23 +87,25 @@ impl Keyframes<ObjectKey> {
         if shutter.stays_open == 0.0 {
             return None;
         }
+        // 256 turns of an open shutter are a blur in which nobody can tell more.
+        const MOST_CUTS: f64 = 1023.0;
         let ends = self.times(shutter, 0);
+        let cuts: Vec<f64> = ends.windows(2).map(|pair| self.cuts(pair[0], pair[1])).collect();
+        let kept = (MOST_CUTS / cuts.iter().sum::<f64>()).min(1.0);
         let mut times = vec![shutter.opens];
-        for pair in ends.windows(2) {
-            let pieces = self.pieces(pair[0], pair[1]);
+        for (pair, cuts) in ends.windows(2).zip(cuts) {
+            let pieces = (cuts * kept).round() as u32 + 1;
             times.extend((1..=pieces).map(|i| pair[0] + (pair[1] - pair[0]) * f64::from(i) / f64::from(pieces)));
         }
         moving(times, shutter, |time| self.pose(time), before)
     }
 
-    /// Into how many pieces a time without a keyframe inside is cut, so that the short way between two of them is the way. 256
-    /// turns of an open shutter are a blur in which nobody can tell more.
-    fn pieces(&self, opens: f64, closes: f64) -> u32 {
-        const MOST: f64 = 1024.0;
+    /// How often a time without a keyframe inside must be cut, so that the short way from cut to cut is the way.
+    fn cuts(&self, opens: f64, closes: f64) -> f64 {
         const LONGEST_DEG: f64 = 90.0;
         let (from, to) = (self.around(opens), self.around(0.5 * (opens + closes)));
-        let Some((_, [start, end])) = to.before.common_axis(to.after) else { return 1 };
+        let Some((_, [start, end])) = to.before.common_axis(to.after) else { return 0.0 };
         let share = 2.0 * f64::from((to.share - from.share).abs());
-        ((end - start).abs() * share / LONGEST_DEG).ceil().clamp(1.0, MOST) as u32
+        (((end - start).abs() * share / LONGEST_DEG).ceil() - 1.0).max(0.0)
     }
 }
