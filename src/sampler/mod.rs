@@ -108,7 +108,7 @@ pub enum Purpose {
         /// 0 at the first surface.
         bounce: u32,
     },
-    /// Point on a light (x, y) and which light (z) at a bounce.
+    /// Point on a light (x, y), which light (z), and whether faint light is asked for (w) at a bounce.
     Light {
         /// 0 at the first surface.
         bounce: u32,
