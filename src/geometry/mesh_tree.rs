@@ -142,7 +142,7 @@ fn exact_center(bounds: &Bounds) -> Vec3A {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::tree::{BinaryTree, PrimitiveTree};
+    use crate::geometry::tree::BinaryTree;
     use crate::geometry::triangle::ShearedRay;
     use glam::{Vec3, vec3a};
 
@@ -285,11 +285,12 @@ mod tests {
                 .map(|h| h.t)
                 .fold(f32::INFINITY, f32::min);
             let wide = tree.closest(origin, direction, f32::INFINITY, |_| true).map_or(f32::INFINITY, |h| h.t);
-            let two = binary
-                .closest(origin, direction, f32::INFINITY, |k, t_max| {
-                    sheared.intersect(&flat(binary.order()[k] as usize), t_max).map_or(f32::INFINITY, |h| h.t)
-                })
-                .map_or(f32::INFINITY, |(_, t)| t);
+            let mut two = f32::INFINITY;
+            binary.closest(origin, direction, f32::INFINITY, |k, t_max| {
+                let hit = sheared.intersect(&flat(binary.order()[k] as usize), t_max);
+                two = hit.map_or(two, |hit| hit.t);
+                hit.map_or(f32::INFINITY, |hit| hit.t)
+            });
             assert_eq!(two, brute, "ray {i}");
             assert!(wide == brute || (wide - brute).abs() < 1e-5, "ray {i}: {wide} {brute}");
             hits += u32::from(brute.is_finite());

@@ -9,7 +9,7 @@ mod build;
 mod tests;
 
 use super::mesh_tree::{MeshHit, MeshTree};
-use super::tree::{BinaryTree, Bounds, PrimitiveTree};
+use super::tree::{BinaryTree, Bounds};
 use super::wide_tree::TriangleRef;
 use super::{Coverage, Ray, sphere};
 use crate::scene::{Alpha, Instance, MaterialId, ScalarInput, Scene, SpherePlace};
