@@ -144,6 +144,7 @@ mod tests {
     use super::*;
     use crate::geometry::tree::BinaryTree;
     use crate::geometry::triangle::ShearedRay;
+    use crate::sampler::{hash_words, unit_of_hash};
     use glam::{Vec3, vec3a};
 
     /// A closed sphere of 20·4^`subdivisions` triangles.
@@ -274,9 +275,7 @@ mod tests {
         let flat = |i: usize| triangles[i].map(|p| p.to_array());
         let mut hits = 0;
         for i in 0..3000u32 {
-            let unit = |k: u32| {
-                (crate::sampler::hash_words(u64::from(i), u64::from(k)) >> 40) as f32 / 16_777_216.0 * 2.0 - 1.0
-            };
+            let unit = |k: u32| unit_of_hash(hash_words(u64::from(i), u64::from(k))) * 2.0 - 1.0;
             let origin = vec3a(unit(0), unit(1), unit(2)) * 2.0;
             let direction = vec3a(unit(3), unit(4), unit(5)).normalize();
             let sheared = ShearedRay::new(origin, direction);

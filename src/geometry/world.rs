@@ -12,6 +12,7 @@ use super::mesh_tree::{MeshHit, MeshTree};
 use super::tree::{BinaryTree, Bounds};
 use super::wide_tree::TriangleRef;
 use super::{Coverage, Ray, sphere};
+use crate::sampler::{hash_words, unit_of_hash};
 use crate::scene::{Alpha, Instance, MaterialId, ScalarInput, Scene, SpherePlace};
 use at_hit::{Placement, interpolate_uv};
 use build::{Around, MOST_VERTICES, fixed_triangles, own_triangles, placed_bounds, swept_bounds};
@@ -391,8 +392,8 @@ impl Part {
     fn chance(self, ray: &Ray) -> f32 {
         let mut h = u64::from(self.object) << 32 | u64::from(self.number);
         for value in ray.origin.to_array().into_iter().chain(ray.direction.to_array()) {
-            h = crate::sampler::hash_words(h, u64::from(value.to_bits()));
+            h = hash_words(h, u64::from(value.to_bits()));
         }
-        (h >> 40) as f32 * (1.0 / 16_777_216.0)
+        unit_of_hash(h)
     }
 }
