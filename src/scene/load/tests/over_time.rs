@@ -361,9 +361,20 @@ fn keyframes_may_stand_anywhere_in_a_long_file() {
     assert!(wrong.to_string().contains(":6010: materials.late.reflectance: "), "{wrong}");
 }
 
-/// Keyframes are cut into pieces of a quarter turn: 46 kB of them were 116 MB, 1024 pieces from each to the next one.
+/// Keyframes are cut into pieces of a quarter turn: 46 kB of them were 116 MB, 1024 pieces from each to the next one, and so were 113 kB
+/// of objects.
 #[test]
 fn keyframes_of_many_turns_are_few_poses() {
+    let turning = |keyframes: &str| {
+        format!(
+            "[[objects]]\nbox = {{ min = [0, 0, 0], max = [1, 1, 1] }}\nmaterial = \"white\"\nkeyframes = [{keyframes}]\n"
+        )
+    };
+    let poses = |objects: &str| -> usize {
+        let open = TOML.replace("look_at = [0, 0, 0]", "look_at = [0, 0, 0]\nshutter_s = 1");
+        let scene = File::new("a.toml", &format!("{open}{LIT}{objects}")).at(0.0);
+        scene.instances.iter().map(|instance| instance.motion.as_ref().expect("it turns").keys().len()).sum()
+    };
     let keyframe = |number: u32| {
         format!(
             "{{ time = {}, rotate_deg = {}, axis = [0, 1, 0] }}",
@@ -371,12 +382,10 @@ fn keyframes_of_many_turns_are_few_poses() {
             number % 2 * 1_000_000
         )
     };
-    let keyframes = (0..=1000).map(keyframe).collect::<Vec<_>>().join(", ");
-    let text = format!(
-        "{}{LIT}[[objects]]\nbox = {{ min = [0, 0, 0], max = [1, 1, 1] }}\nmaterial = \"white\"\nkeyframes = [{keyframes}]\n",
-        TOML.replace("look_at = [0, 0, 0]", "look_at = [0, 0, 0]\nshutter_s = 1")
-    );
-    let scene = File::new("a.toml", &text).at(0.0);
-    let poses = scene.instances[0].motion.as_ref().expect("it turns").keys().len();
-    assert!((1001..=2100).contains(&poses), "{poses}");
+    let of_one = poses(&turning(&(0..=1000).map(keyframe).collect::<Vec<_>>().join(", ")));
+    assert!((1001..=2100).contains(&of_one), "{of_one}");
+    let fast = turning("{ time = 0 }, { time = 1, rotate_deg = 1e6, axis = [0, 1, 0] }");
+    assert_eq!(poses(&fast), 1025);
+    let of_many = poses(&fast.repeat(1000));
+    assert!((200_000..=270_000).contains(&of_many), "{of_many}");
 }

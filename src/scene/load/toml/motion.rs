@@ -3,7 +3,7 @@
 
 mod turns;
 
-pub(super) use turns::object_keyframes;
+pub(super) use turns::{most_cuts, object_keyframes};
 
 use super::fields::{Fields, Value};
 use crate::scene::load::{LoadError, Shutter};
