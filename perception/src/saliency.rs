@@ -75,7 +75,7 @@ pub fn saliency(inputs: &SaliencyInputs<'_>) -> Result<Plane, Error> {
         return Ok(Plane::filled(width, height, 1.0));
     }
     let small = sum.map(|value| value / largest);
-    Ok(resized(&small, pyramid.octave(COMMON), (0, width, height)))
+    Ok(resized(&small, pyramid.octave(COMMON), Level { octave: 0, width, height }))
 }
 
 /// Gaze at one point instead of a saliency map: 1 at (`x_px`, `y_px`), falling as a Gaussian of `sigma_px`.
@@ -118,14 +118,18 @@ impl Pyramid {
         octave.min(self.levels.len() - 1)
     }
 
-    fn level(&self, octave: usize) -> &Plane {
+    fn plane(&self, octave: usize) -> &Plane {
         &self.levels[self.octave(octave)]
+    }
+
+    fn level(&self, octave: usize) -> Level {
+        let plane = self.plane(octave);
+        Level { octave: self.octave(octave), width: plane.width(), height: plane.height() }
     }
 
     /// One scale interpolated to the pixels of another.
     fn level_at(&self, octave: usize, to_octave: usize) -> Plane {
-        let to = self.level(to_octave);
-        resized(self.level(octave), self.octave(octave), (self.octave(to_octave), to.width(), to.height()))
+        resized(self.plane(octave), self.octave(octave), self.level(to_octave))
     }
 
     /// Magnitude of the response to a Gabor patch at `turn` · 45° on every level.
@@ -158,15 +162,14 @@ fn conspicuity<'a>(pyramids: impl Iterator<Item = &'a Pyramid>) -> Plane {
     let mut sum: Option<Plane> = None;
     for pyramid in pyramids {
         let common = pyramid.level(COMMON);
-        let to = (pyramid.octave(COMMON), common.width(), common.height());
         for center in CENTERS {
             for delta in DELTAS {
                 let surround = pyramid.level_at(center + delta, center);
-                let mut difference = pyramid.level(center).clone();
+                let mut difference = pyramid.plane(center).clone();
                 difference.for_each_row_mut(|y, row| {
                     row.iter_mut().zip(surround.row(y)).for_each(|(value, other)| *value = (*value - other).abs());
                 });
-                let map = promoted(&resized(&difference, pyramid.octave(center), to));
+                let map = promoted(&resized(&difference, pyramid.octave(center), common));
                 match &mut sum {
                     Some(sum) => add(sum, &map),
                     None => sum = Some(map),
@@ -277,17 +280,25 @@ fn halved(plane: &Plane) -> Plane {
     Plane::from_fn(across.width(), height.div_ceil(2), |x, y| sum(y, height, &|y| across.get(x, y)))
 }
 
-/// Bilinear interpolation of the scale `octave` to another one's size: (octave, width, height). A pixel of either is as wide as 2 to the
-/// power of its octave and the middles lie over one another; sides in proportion would move the levels of pictures that 256
-/// does not divide against each other.
-fn resized(plane: &Plane, octave: usize, (to_octave, width, height): (usize, usize, usize)) -> Plane {
-    let ratio = (to_octave as f32 - octave as f32).exp2();
+/// Which pixels a scale has.
+#[derive(Clone, Copy)]
+struct Level {
+    /// Log₂ of a pixel's width.
+    octave: usize,
+    width: usize,
+    height: usize,
+}
+
+/// Bilinear interpolation of the scale `octave` to the pixels of another one, whose middles lie over one another; sides in proportion
+/// would move the levels of pictures that 256 does not divide against each other.
+fn resized(plane: &Plane, octave: usize, to: Level) -> Plane {
+    let ratio = (to.octave as f32 - octave as f32).exp2();
     let middle = |len: usize| 0.5 * (len - 1) as f32;
     let place = |index: usize, to: usize, from: usize| {
         Between::of(f64::from((index as f32 - middle(to)) * ratio + middle(from)), from)
     };
-    Plane::from_fn(width, height, |x, y| {
-        let (columns, rows) = (place(x, width, plane.width()), place(y, height, plane.height()));
+    Plane::from_fn(to.width, to.height, |x, y| {
+        let (columns, rows) = (place(x, to.width, plane.width()), place(y, to.height, plane.height()));
         columns.bilinear(rows, |column, row| plane.get(column, row))
     })
 }

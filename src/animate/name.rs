@@ -25,7 +25,10 @@ impl FrameName {
     /// The file of a frame.
     pub fn of(&self, frame: impl Into<i64>) -> PathBuf {
         let frame = frame.into();
-        PathBuf::from(format!("{}{frame:0digits$}{}", self.before, self.after, digits = self.digits))
+        let (sign, number) = (if frame < 0 { "-" } else { "" }, frame.unsigned_abs().to_string());
+        // Not by a width of a format, which ends at 65,535 in a panic.
+        let zeros = "0".repeat(self.digits.saturating_sub(sign.len() + number.len()));
+        PathBuf::from(format!("{}{sign}{zeros}{number}{}", self.before, self.after))
     }
 
     /// Numbers of the frames whose files are there, ascending.
@@ -94,6 +97,9 @@ mod tests {
         {
             assert_eq!(FrameName::parse(pattern).expect("a pattern").of_shot("json"), Path::new(expected));
         }
+        let long = FrameName::parse(&"#".repeat(70_000)).expect("a pattern").of(-7);
+        assert_eq!(long.as_os_str().len(), 70_000);
+        assert!(long.to_string_lossy().starts_with("-00") && long.to_string_lossy().ends_with("07"));
         for bad in ["shot.exr", "a#b#.png", "out##/shot.png", ""] {
             assert_eq!(FrameName::parse(bad), None, "{bad}");
         }

@@ -69,29 +69,14 @@ impl Track {
             looks.push(is_looked_at.then(|| Look::at(scene, shot, operator)));
             say(hashes.len());
         }
-        let mut goals: Vec<Option<Goal>> = looks.iter().map(|look| look.as_ref().map(|look| look.goal)).collect();
-        let mut looks: Vec<Look> = looks.into_iter().flatten().collect();
-        let fits: Vec<(Option<AdaptationState>, SavedTone)> = if operator.sees_adaptation() {
-            // In all frames or none: light would jump where the way of looking changed.
-            if looks.iter().any(|look| !look.is_settled) {
-                for (index, (frame, look)) in (shot.first..=shot.last).zip(&mut looks).enumerate() {
-                    look.goal = coarse_goal(source.at(shot.seconds(f64::from(frame)))?, shot, operator);
-                    say(index + 1);
-                }
-                goals = looks.iter().map(|look| Some(look.goal)).collect();
-            }
-            let fit = |look: &Look, eye: AdaptationState| {
-                operator.fit(&enlarged(std::slice::from_ref(look), shot).guide(), &shot.viewing, Some(&eye)).save()
-            };
-            let eyes = eyes(shot, operator, &looks.iter().map(|look| look.goal).collect::<Vec<Goal>>());
-            looks.iter().zip(eyes).map(|(look, eye)| (Some(eye), fit(look, eye))).collect()
+        let fits = if operator.sees_adaptation() {
+            fits_of_adapting_eyes(source, shot, operator, looks.into_iter().flatten().collect(), say)?
         } else {
-            let fitted = operator.fit(&enlarged(&looks, shot).guide(), &shot.viewing, None).save();
-            vec![(None, fitted); count]
+            one_fit_for_all(shot, operator, looks)
         };
         let frames = (shot.first..=shot.last)
-            .zip(hashes.into_iter().zip(goals).zip(fits))
-            .map(|(frame, ((scene, goal), (eye, fitted)))| TrackFrame {
+            .zip(hashes.into_iter().zip(fits))
+            .map(|(frame, (scene, FrameFit { goal, eye, fitted }))| TrackFrame {
                 frame,
                 scene,
                 goal,
@@ -149,6 +134,45 @@ fn made_for(shot: &ShotSettings, operator: &dyn ToneOperator) -> String {
 
 fn gaze_hash(shot: &ShotSettings) -> Option<ContentHash> {
     shot.gaze.as_ref().map(|gaze| ContentHash::of_bytes(format!("{gaze:?}").as_bytes()))
+}
+
+/// How the operator is set for a frame.
+struct FrameFit {
+    goal: Option<Goal>,
+    eye: Option<AdaptationState>,
+    fitted: SavedTone,
+}
+
+/// The same for all frames, by those that were looked at.
+fn one_fit_for_all(shot: &ShotSettings, operator: &dyn ToneOperator, looks: Vec<Option<Look>>) -> Vec<FrameFit> {
+    let goals: Vec<Option<Goal>> = looks.iter().map(|look| look.as_ref().map(|look| look.goal)).collect();
+    let looks: Vec<Look> = looks.into_iter().flatten().collect();
+    let fitted = operator.fit(&enlarged(&looks, shot).guide(), &shot.viewing, None).save();
+    goals.into_iter().map(|goal| FrameFit { goal, eye: None, fitted: fitted.clone() }).collect()
+}
+
+/// Frame by frame, by looks at all of them.
+fn fits_of_adapting_eyes(
+    source: &dyn SceneSource,
+    shot: &ShotSettings,
+    operator: &dyn ToneOperator,
+    mut looks: Vec<Look>,
+    say: &dyn Fn(usize),
+) -> Result<Vec<FrameFit>, LoadError> {
+    // In all frames or none: light would jump where the way of looking changed.
+    if looks.iter().any(|look| !look.is_settled) {
+        for (index, (frame, look)) in (shot.first..=shot.last).zip(&mut looks).enumerate() {
+            look.goal = coarse_goal(source.at(shot.seconds(f64::from(frame)))?, shot, operator);
+            say(index + 1);
+        }
+    }
+    let eyes = eyes(shot, operator, &looks.iter().map(|look| look.goal).collect::<Vec<Goal>>());
+    let fit = |(look, eye): (&Look, AdaptationState)| {
+        let light = enlarged(std::slice::from_ref(look), shot);
+        let fitted = operator.fit(&light.guide(), &shot.viewing, Some(&eye)).save();
+        FrameFit { goal: Some(look.goal), eye: Some(eye), fitted }
+    };
+    Ok(looks.iter().zip(eyes).map(fit).collect())
 }
 
 /// The eye in every frame.

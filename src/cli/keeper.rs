@@ -395,17 +395,20 @@ mod tests {
             checkpoint_every: Some(EVERY),
             resume: false,
         };
-        let keeper = Keeper::new(&arguments, header(), SeedsSoFar::of_one(0));
+        let mut keeper = Keeper::new(&arguments, header(), SeedsSoFar::of_one(0));
         let state = RenderState::new(1, 1, &Limits::of_visibility(1.0));
+        let tried_at = |keeper: &Keeper| keeper.history.lock().expect("one thread").last_snapshot;
         // Whether it was tried.
-        let fails = || {
+        let fails = |keeper: &Keeper| {
             keeper.chance(&state);
             keeper.history.lock().expect("one thread").failure.take().is_some()
         };
-        assert!(!fails(), "it is not time to");
-        let Some(a_minute_ago) = Instant::now().checked_sub(EVERY) else { return };
-        keeper.history.lock().expect("one thread").last_snapshot = a_minute_ago;
-        assert!(fails(), "a minute is over, and the folder is not there");
-        assert!(!fails(), "it is tried again at once");
+        let began = tried_at(&keeper);
+        assert!(!fails(&keeper), "it is not time to");
+        keeper.every = Duration::ZERO;
+        assert!(fails(&keeper), "it is time to, and the folder is not there");
+        keeper.every = EVERY;
+        assert!(tried_at(&keeper) > began, "a minute begins anew");
+        assert!(!fails(&keeper), "it is tried again at once");
     }
 }

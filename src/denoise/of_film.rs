@@ -113,7 +113,7 @@ mod tests {
     use crate::denoise::DenoiserKind;
     use crate::film::BlockSum;
     use crate::integrator::{BlockWork, FirstHit, PathSample};
-    use crate::sampler::hash_words;
+    use crate::sampler::{hash_words, unit_of_hash};
 
     const SIDE: u32 = 48;
 
@@ -136,17 +136,13 @@ mod tests {
         PathSample { radiance, first_hit, rays: 1 }
     }
 
-    fn unit(word: u64) -> f32 {
-        (word >> 40) as f32 / 16_777_216.0
-    }
-
     /// A wall of radiance 1 with noise, and before it a lamp two pixels wide that is 10000 times as bright, whose edges cover pixels
     /// by half.
     fn wall_and_lamp() -> Film {
         let mut drawn = 0;
         let mut random = || {
             drawn += 1;
-            unit(hash_words(drawn, 3))
+            unit_of_hash(hash_words(drawn, 3))
         };
         film_of(4, |pixel, _, _| {
             let coverage = if (23..25).contains(&(pixel % SIDE)) { 0.5 } else { 0.0 };
@@ -161,7 +157,7 @@ mod tests {
     fn wall_before_nothing() -> Film {
         film_of(4, |pixel, half, index| {
             if pixel % SIDE < SIDE / 2 {
-                let light = unit(hash_words(u64::from(16 * pixel + 4 * half.index() as u32 + index), 5));
+                let light = unit_of_hash(hash_words(u64::from(16 * pixel + 4 * half.index() as u32 + index), 5));
                 of_wall(Vec3::ONE, Vec3::splat(2.0 * light))
             } else {
                 PathSample { radiance: Vec3::ZERO, first_hit: FirstHit::NOTHING, rays: 1 }

@@ -138,18 +138,10 @@ pub(crate) fn make_finite(channels: &mut [&mut [f32]]) -> Option<Replaced> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::asset;
     use super::super::{decode_exr, read_exr};
     use super::*;
-    use std::path::{Path, PathBuf};
-
-    fn asset(name: &str) -> Option<PathBuf> {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets/hdr/openexr-images").join(name);
-        if !path.exists() {
-            println!("skipped: {} is not there", path.display());
-            return None;
-        }
-        Some(path)
-    }
+    use std::path::Path;
 
     fn picture(path: &Path) -> ScenePicture {
         read_exr(path).unwrap().scene_picture(|image, name| image.channel(name)).unwrap()
@@ -171,7 +163,7 @@ mod tests {
     /// One photograph as Rec.709, XYZ, and both as luminance and chroma.
     #[test]
     fn one_picture_in_four_forms_is_one_picture() {
-        let Some(path) = asset("Chromaticities/Rec709.exr") else { return };
+        let Some(path) = asset("hdr/openexr-images/Chromaticities/Rec709.exr") else { return };
         let reference = picture(&path);
         for (name, tolerance) in [("XYZ", 0.01), ("Rec709_YC", 0.06), ("XYZ_YC", 0.06)] {
             let other = picture(&path.with_file_name(format!("{name}.exr")));
@@ -184,7 +176,7 @@ mod tests {
 
     #[test]
     fn luminance_alone_is_a_grey_picture() {
-        let Some(path) = asset("LuminanceChroma/Garden.exr") else { return };
+        let Some(path) = asset("hdr/openexr-images/LuminanceChroma/Garden.exr") else { return };
         let garden = picture(&path);
         assert_eq!((garden.width, garden.height), (874, 493));
         assert!(garden.rgb.iter().all(|[r, g, b]| r == g && g == b));
@@ -192,7 +184,7 @@ mod tests {
 
     #[test]
     fn what_is_not_finite_is_replaced_and_said() {
-        let Some(path) = asset("TestImages/BrightRingsNanInf.exr") else { return };
+        let Some(path) = asset("hdr/openexr-images/TestImages/BrightRingsNanInf.exr") else { return };
         let rings = picture(&path);
         assert!(rings.rgb.iter().flatten().all(|value| value.is_finite()));
         assert!(rings.notes.iter().any(|note| note.contains("not finite")), "{:?}", rings.notes);

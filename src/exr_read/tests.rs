@@ -14,23 +14,25 @@ fn peak_memory_kib() -> Option<u64> {
     line.split_whitespace().nth(1)?.parse().ok()
 }
 
-/// Damaged files of others: in the folder FECHNER_ASSETS, else beside the project.
-fn damaged_files() -> PathBuf {
-    let assets = std::env::var_os("FECHNER_ASSETS")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets"), PathBuf::from);
-    assets.join("faults/exr-damaged")
+/// A file or folder among those of others: in the folder FECHNER_ASSETS, where it must be, else beside the project.
+pub(super) fn asset(name: &str) -> Option<PathBuf> {
+    let named = std::env::var_os("FECHNER_ASSETS").map(PathBuf::from);
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets");
+    let path = named.clone().unwrap_or_else(beside).join(name);
+    if path.exists() {
+        return Some(path);
+    }
+    assert!(named.is_none(), "{} is not there", path.display());
+    println!("skipped: {} is not there", path.display());
+    None
 }
 
 #[test]
 fn damaged_files_end_in_an_error_or_a_picture_and_in_little_memory() {
-    let folder = damaged_files();
-    let Ok(files) = std::fs::read_dir(&folder) else {
-        println!("skipped: {} is not there", folder.display());
-        return;
-    };
+    let Some(folder) = asset("faults/exr-damaged") else { return };
     let mut readable = 0;
     let mut refused = 0;
-    for file in files {
+    for file in std::fs::read_dir(folder).unwrap() {
         let path = file.unwrap().path();
         match read_exr(&path) {
             Ok(image) => {

@@ -62,6 +62,7 @@ fn scale_to_one(magnitude: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sampler::{hash_words, unit_of_hash};
     use glam::vec3a;
 
     const EDGES: [Vec3A; 2] = [vec3a(3.0, 0.25, -1.0), vec3a(-0.5, 2.0, 1.5)];
@@ -82,7 +83,7 @@ mod tests {
     #[test]
     fn ordinary_triangles_keep_the_bits_of_the_plain_formula() {
         let random = |index: u64, dimension: u64| {
-            let unit = (crate::sampler::hash_words(index, dimension) >> 40) as f32 / 16_777_216.0;
+            let unit = unit_of_hash(hash_words(index, dimension));
             (unit - 0.5) * 10f32.powi((index % 9) as i32 - 4)
         };
         for index in 0..10_000 {

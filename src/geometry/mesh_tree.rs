@@ -142,8 +142,9 @@ fn exact_center(bounds: &Bounds) -> Vec3A {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::tree::{BinaryTree, PrimitiveTree};
+    use crate::geometry::tree::BinaryTree;
     use crate::geometry::triangle::ShearedRay;
+    use crate::sampler::{hash_words, unit_of_hash};
     use glam::{Vec3, vec3a};
 
     /// A closed sphere of 20·4^`subdivisions` triangles.
@@ -274,9 +275,7 @@ mod tests {
         let flat = |i: usize| triangles[i].map(|p| p.to_array());
         let mut hits = 0;
         for i in 0..3000u32 {
-            let unit = |k: u32| {
-                (crate::sampler::hash_words(u64::from(i), u64::from(k)) >> 40) as f32 / 16_777_216.0 * 2.0 - 1.0
-            };
+            let unit = |k: u32| unit_of_hash(hash_words(u64::from(i), u64::from(k))) * 2.0 - 1.0;
             let origin = vec3a(unit(0), unit(1), unit(2)) * 2.0;
             let direction = vec3a(unit(3), unit(4), unit(5)).normalize();
             let sheared = ShearedRay::new(origin, direction);
@@ -285,11 +284,12 @@ mod tests {
                 .map(|h| h.t)
                 .fold(f32::INFINITY, f32::min);
             let wide = tree.closest(origin, direction, f32::INFINITY, |_| true).map_or(f32::INFINITY, |h| h.t);
-            let two = binary
-                .closest(origin, direction, f32::INFINITY, |k, t_max| {
-                    sheared.intersect(&flat(binary.order()[k] as usize), t_max).map_or(f32::INFINITY, |h| h.t)
-                })
-                .map_or(f32::INFINITY, |(_, t)| t);
+            let mut two = f32::INFINITY;
+            binary.closest(origin, direction, f32::INFINITY, |k, t_max| {
+                let hit = sheared.intersect(&flat(binary.order()[k] as usize), t_max);
+                two = hit.map_or(two, |hit| hit.t);
+                hit.map_or(f32::INFINITY, |hit| hit.t)
+            });
             assert_eq!(two, brute, "ray {i}");
             assert!(wide == brute || (wide - brute).abs() < 1e-5, "ray {i}: {wide} {brute}");
             hits += u32::from(brute.is_finite());

@@ -1,8 +1,8 @@
 //! Rays, triangles, spheres and the two-level tree that finds what a ray hits.
 //!
 //! [`World`] is what the rest of the program sees: `closest` and `occluded`, and [`World::surface`] for what is there.
-//! The trees are obvhs's, behind [`tree::PrimitiveTree`]; the triangle test is ours, because a leak at a shared edge is a
-//! firefly that an adaptive sampler would chase for ever.
+//! Triangles are in eight-wide trees of our own (`wide_tree`), many things in a binary one of obvhs, which builds both ([`tree`]). The
+//! triangle test is ours, because a leak at a shared edge is a firefly that an adaptive sampler would chase for ever.
 
 mod collapse;
 mod face;

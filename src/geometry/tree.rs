@@ -1,4 +1,4 @@
-//! obvhs behind one small trait, fenced: the builder of every tree, and the walk of the binary ones.
+//! obvhs, fenced: the builder of every tree, and the walk of the binary ones.
 //!
 //! Triangles are walked in an eight-wide tree of our own (`wide_tree`), cut from what `build_binary` makes.
 //!
@@ -67,27 +67,8 @@ impl Boundable for Boxed {
     }
 }
 
-/// A tree over numbered primitives. Callers reorder their primitives by [`PrimitiveTree::order`] once and are then
-/// called back with positions in that order.
-pub trait PrimitiveTree: Sized {
-    /// Builds over the boxes of primitives 0, 1, …; primitives whose box is not finite are left out.
-    fn build(bounds: &[Bounds]) -> Self;
-    /// Primitive numbers in tree order.
-    fn order(&self) -> &[u32];
-    /// Calls `test(position in tree order, current t_max)` for candidates along the ray; what it returns below the
-    /// current `t_max` becomes the new one. Returns the position and parameter of the closest.
-    fn closest(
-        &self,
-        origin: Vec3A,
-        direction: Vec3A,
-        t_max: f32,
-        test: impl FnMut(usize, f32) -> f32,
-    ) -> Option<(usize, f32)>;
-    /// Whether any `test` returns less than `t_max`; stops at the first.
-    fn any(&self, origin: Vec3A, direction: Vec3A, t_max: f32, test: impl FnMut(usize, f32) -> f32) -> bool;
-}
-
-/// obvhs's binary tree, walked by obvhs: for few large things such as instances, in any coordinates.
+/// obvhs's binary tree over numbered primitives, walked by obvhs: for few large things such as instances, in any coordinates. Callers
+/// reorder their primitives by [`BinaryTree::order`] once and are then called back with positions in that order.
 pub struct BinaryTree {
     tree: Bvh2,
     order: Vec<u32>,
@@ -147,34 +128,30 @@ fn most_coinciding_centroids(boxes: &[Boxed]) -> usize {
     keys.chunk_by(|a, b| a == b).map(<[_]>::len).max().unwrap_or(0)
 }
 
-impl PrimitiveTree for BinaryTree {
-    fn build(bounds: &[Bounds]) -> Self {
+impl BinaryTree {
+    /// Builds over the boxes of primitives 0, 1, …; primitives whose box is not finite are left out.
+    pub fn build(bounds: &[Bounds]) -> Self {
         let BuiltTree { tree, numbers } = build_binary(bounds);
         let order = tree.primitive_indices.iter().map(|&i| numbers[i as usize]).collect();
         Self { tree, order }
     }
 
-    fn order(&self) -> &[u32] {
+    /// Primitive numbers in tree order.
+    pub fn order(&self) -> &[u32] {
         &self.order
     }
 
+    /// Calls `test(position in tree order, current t_max)` for candidates along the ray; what it returns below the
+    /// current `t_max` becomes the new one.
     #[inline]
-    fn closest(
-        &self,
-        origin: Vec3A,
-        direction: Vec3A,
-        t_max: f32,
-        mut test: impl FnMut(usize, f32) -> f32,
-    ) -> Option<(usize, f32)> {
-        let mut hit = RayHit::none();
+    pub fn closest(&self, origin: Vec3A, direction: Vec3A, t_max: f32, mut test: impl FnMut(usize, f32) -> f32) {
         let ray = TreeRay::new(origin, direction, 0.0, t_max);
-        self.tree
-            .ray_traverse(ray, &mut hit, |ray, id| test(id, ray.tmax))
-            .then_some((hit.primitive_id as usize, hit.t))
+        self.tree.ray_traverse(ray, &mut RayHit::none(), |ray, id| test(id, ray.tmax));
     }
 
+    /// Whether any `test` returns less than `t_max`; stops at the first.
     #[inline]
-    fn any(&self, origin: Vec3A, direction: Vec3A, t_max: f32, mut test: impl FnMut(usize, f32) -> f32) -> bool {
+    pub fn any(&self, origin: Vec3A, direction: Vec3A, t_max: f32, mut test: impl FnMut(usize, f32) -> f32) -> bool {
         let ray = TreeRay::new(origin, direction, 0.0, t_max);
         !self.tree.ray_traverse_miss(ray, |ray, id| test(id, ray.tmax))
     }

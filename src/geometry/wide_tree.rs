@@ -419,10 +419,11 @@ fn place(block: usize, lane: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sampler::{hash_words, unit_of_hash};
     use glam::vec3a;
 
     fn unit(ray: u64, k: u64) -> f32 {
-        (crate::sampler::hash_words(ray, k) >> 40) as f32 / 16_777_216.0 * 2.0 - 1.0
+        unit_of_hash(hash_words(ray, k)) * 2.0 - 1.0
     }
 
     fn build(triangles: &[[Vec3A; 3]]) -> WideTree {

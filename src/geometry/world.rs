@@ -9,12 +9,13 @@ mod build;
 mod tests;
 
 use super::mesh_tree::{MeshHit, MeshTree};
-use super::tree::{BinaryTree, Bounds, PrimitiveTree};
+use super::tree::{BinaryTree, Bounds};
 use super::wide_tree::TriangleRef;
 use super::{Coverage, Ray, sphere};
+use crate::sampler::{hash_words, unit_of_hash};
 use crate::scene::{Alpha, Instance, MaterialId, ScalarInput, Scene, SpherePlace};
 use at_hit::{Placement, interpolate_uv};
-use build::{MOST_VERTICES, fixed_triangles, own_triangles, placed_bounds, swept_bounds};
+use build::{Around, MOST_VERTICES, fixed_triangles, own_triangles, placed_bounds, swept_bounds};
 use glam::{Affine3A, Vec2, Vec3, Vec3A};
 use std::sync::Arc;
 
@@ -103,7 +104,8 @@ impl World {
         }
         let is_placed = |instance: &&Instance| uses[instance.mesh.0 as usize] >= 2 && instance.motion.is_none();
         let vertices = |instance: &Instance| scene.meshes[instance.mesh.0 as usize].positions.len();
-        let tightly = scene.instances.iter().filter(is_placed).map(vertices).sum::<usize>() <= MOST_VERTICES;
+        let all_vertices = scene.instances.iter().filter(is_placed).map(vertices).sum::<usize>();
+        let around = if all_vertices <= MOST_VERTICES { Around::Vertices } else { Around::OwnBox };
         let mut shared: Vec<MeshTree> = Vec::new();
         let mut tree_of_mesh = vec![None; scene.meshes.len()];
         for (number, instance) in scene.instances.iter().enumerate() {
@@ -125,7 +127,7 @@ impl World {
             });
             item_bounds.push(match &instance.motion {
                 Some(motion) => swept_bounds(motion, shared[tree].bounds()),
-                None => placed_bounds(&scene, instance, shared[tree].bounds(), tightly),
+                None => placed_bounds(&scene, instance, shared[tree].bounds(), around),
             });
         }
         for (number, s) in scene.spheres.iter().enumerate() {
@@ -390,8 +392,8 @@ impl Part {
     fn chance(self, ray: &Ray) -> f32 {
         let mut h = u64::from(self.object) << 32 | u64::from(self.number);
         for value in ray.origin.to_array().into_iter().chain(ray.direction.to_array()) {
-            h = crate::sampler::hash_words(h, u64::from(value.to_bits()));
+            h = hash_words(h, u64::from(value.to_bits()));
         }
-        (h >> 40) as f32 * (1.0 / 16_777_216.0)
+        unit_of_hash(h)
     }
 }

@@ -101,7 +101,7 @@ impl PathTracer {
 mod tests {
     use super::*;
     use crate::integrator::TraceSettings;
-    use crate::sampler::hash_words;
+    use crate::sampler::{hash_words, unit_of_hash};
     use crate::scene::Light;
     use crate::scene::load::{LoadOptions, load};
     use std::path::Path;
@@ -116,7 +116,7 @@ mod tests {
     /// How often a place asks for the sun.
     fn share_of_sun(tracer: &PathTracer, place: &Place, to_sun: Vec3) -> f64 {
         let asks = |index: u64| {
-            let u = [0, 1, 2].map(|dimension| (hash_words(index, dimension) >> 40) as f32 / 16_777_216.0);
+            let u = [0, 1, 2].map(|dimension| unit_of_hash(hash_words(index, dimension)));
             let sample = tracer.lights.sample(&tracer.world, &place.lookout.receiver, 0.0, u);
             sample.is_some_and(|sample| sample.direction.dot(to_sun) > 0.999)
         };

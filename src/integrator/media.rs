@@ -51,20 +51,31 @@ pub(super) struct Media {
     count: usize,
 }
 
+/// Which way a path crosses a boundary.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Crossing {
+    /// From its front.
+    In,
+    /// From its back.
+    Out,
+}
+
 impl Media {
-    /// Crosses a boundary: into `medium` from its front, else out of it.
-    pub(super) fn cross(&mut self, medium: Medium, enters: bool) {
-        if enters {
-            if self.count < DEEPEST {
+    /// Crosses the boundary of a volume.
+    pub(super) fn cross(&mut self, medium: Medium, crossing: Crossing) {
+        match crossing {
+            Crossing::In if self.count < DEEPEST => {
                 self.entered[self.count] = Some(medium);
                 self.count += 1;
             }
-            return;
-        }
-        let is_it = |entered: &Option<Medium>| entered.is_some_and(|entered| entered.material == medium.material);
-        if let Some(place) = self.entered[..self.count].iter().rposition(is_it) {
-            self.entered.copy_within(place + 1..self.count, place);
-            self.count -= 1;
+            Crossing::In => {}
+            Crossing::Out => {
+                let is_it = |entered: &Option<Medium>| entered.is_some_and(|it| it.material == medium.material);
+                if let Some(place) = self.entered[..self.count].iter().rposition(is_it) {
+                    self.entered.copy_within(place + 1..self.count, place);
+                    self.count -= 1;
+                }
+            }
         }
     }
 
@@ -89,7 +100,7 @@ impl Media {
         // Of equals the ray that was given stands.
         let most = said.iter().rev().max_by_key(|media| agreeing(media));
         let mut media = Self::default();
-        most.into_iter().flatten().for_each(|medium| media.cross(*medium, true));
+        most.into_iter().flatten().for_each(|medium| media.cross(*medium, Crossing::In));
         media
     }
 
@@ -148,13 +159,13 @@ mod tests {
         let (glass, wine) = (medium(0, 1.0), medium(1, 3.0));
         let mut media = Media::default();
         assert_eq!(media.transmittance(f32::INFINITY), Vec3::ONE);
-        media.cross(glass, true);
-        media.cross(wine, true);
+        media.cross(glass, Crossing::In);
+        media.cross(wine, Crossing::In);
         assert_eq!(media.transmittance(1.0), Vec3::splat((-3.0f32).exp()));
         // Out of the outer one first, as where two volumes overlap.
-        media.cross(glass, false);
+        media.cross(glass, Crossing::Out);
         assert_eq!(media.transmittance(1.0), Vec3::splat((-3.0f32).exp()));
-        media.cross(wine, false);
+        media.cross(wine, Crossing::Out);
         assert_eq!(media.transmittance(1.0), Vec3::ONE);
     }
 
@@ -163,7 +174,7 @@ mod tests {
         let water = medium(4, 2.0);
         let mut media = Media::default();
         assert_eq!(media.transmittance_to_back_of(water, 0.5), Vec3::splat((-1.0f32).exp()));
-        media.cross(water, false);
+        media.cross(water, Crossing::Out);
         assert_eq!(media.transmittance(0.5), Vec3::ONE);
     }
 
@@ -195,10 +206,10 @@ mod tests {
     fn more_volumes_than_are_told_apart_do_no_harm() {
         let mut media = Media::default();
         for number in 0..20 {
-            media.cross(medium(number, 1.0), true);
+            media.cross(medium(number, 1.0), Crossing::In);
         }
         for number in 0..20 {
-            media.cross(medium(number, 1.0), false);
+            media.cross(medium(number, 1.0), Crossing::Out);
         }
         assert_eq!(media.count, 0);
     }

@@ -1,6 +1,7 @@
 //! The path tracer: [`PathTracer::trace`] turns a [`SamplePlan`] into film.
 //!
-//! `path` holds the life of one sample, `abreast` how several are followed at once, `camera` where they start, `shading` what a
+//! `path` holds the life of one sample, `abreast` how several are followed at once, `camera` where they start, `around_camera` in which
+//! volumes, `shading` what a
 //! surface point scatters like, `relief` how maps turn its normal, `tables` what materials compute beforehand, `media` what a
 //! ray travels in, `lookouts` what light comes where, `prune` which light is left to chance, `sheets` what clear panes let
 //! through, `specular` what mirrors and glass show.

@@ -265,9 +265,9 @@ impl PathTracer {
         let distance = light.place.map_or(f32::INFINITY, |place| place.position.distance(point.position));
         let left = match shading.crossed_medium(wo, wi) {
             None => path.media.transmittance(distance),
-            Some((medium, enters)) => {
+            Some((medium, crossing)) => {
                 let mut media = path.media;
-                media.cross(medium, enters);
+                media.cross(medium, crossing);
                 media.transmittance(distance)
             }
         };
@@ -310,8 +310,8 @@ fn scatter(path: &mut PathState, hit: &Hit, point: &SurfacePoint, shading: &Shad
     }
     // Whatever the lobe: what a mix lets through diffusely comes into the volume behind it like what it refracts, and a light
     // sample cannot tell the two apart.
-    if let Some((medium, enters)) = shading.crossed_medium(wo, wi) {
-        path.media.cross(medium, enters);
+    if let Some((medium, crossing)) = shading.crossed_medium(wo, wi) {
+        path.media.cross(medium, crossing);
     }
     path.scatter_pdf = (!scattered.lobe.is_delta()).then_some(scattered.pdf);
     path.from = shading.receiver(point, wo);

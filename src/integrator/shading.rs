@@ -1,7 +1,7 @@
 //! From a material and a surface point to a BSDF in a frame.
 
 use super::PathTracer;
-use super::media::Medium;
+use super::media::{Crossing, Medium};
 use super::relief;
 use super::tables::{SurfaceTables, slope_width};
 use crate::bsdf::{
@@ -205,12 +205,13 @@ impl Shading<'_> {
         LightReceiver { position: point.position, normal }
     }
 
-    /// The volume whose boundary a path crosses that came along `wo` and goes on along `wi`, and whether it enters; `None` where
+    /// The volume whose boundary a path crosses that came along `wo` and goes on along `wi`, and which way; `None` where
     /// it stays on its side, or no volume absorbs.
-    pub(super) fn crossed_medium(&self, wo: Vec3, wi: Vec3) -> Option<(Medium, bool)> {
+    pub(super) fn crossed_medium(&self, wo: Vec3, wi: Vec3) -> Option<(Medium, Crossing)> {
         let medium = self.medium?;
         let (from_front, to_front) = (wo.dot(self.geometric_normal) > 0.0, wi.dot(self.geometric_normal) > 0.0);
-        (from_front != to_front).then_some((medium, from_front))
+        let crossing = if from_front { Crossing::In } else { Crossing::Out };
+        (from_front != to_front).then_some((medium, crossing))
     }
 
     /// Share of light from behind that goes straight on in the direction `wo`: 0 at the boundary of a volume.

@@ -1,5 +1,6 @@
-//! Triangles and parallelograms that emit: sampled by solid angle where they look large, else by area, evenly or, parallelograms that
-//! are no specks, by what their corners give.
+//! Triangles and parallelograms that emit. Triangles, and rectangles that may look larger than 1 sr, are sampled by solid angle; smaller
+//! rectangles and oblique parallelograms by area and what their corners give; specks of all three, and oblique parallelograms that may
+//! look larger, evenly by area.
 
 use super::bilinear::{BilinearDensity, parallelogram_corners};
 use super::emission::{emitted, even_radiance};

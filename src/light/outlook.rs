@@ -7,7 +7,7 @@
 
 use super::{Kind, LightReceiver, LightSample, Lights, Shares};
 use crate::geometry::World;
-use crate::sampler::hash_words;
+use crate::sampler::{hash_words, unit_of_hash};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -43,8 +43,7 @@ impl Outlooks {
         let strength = |kind: Kind, number: usize| -> f32 {
             let Lookout { receiver, time } = &lookouts[number];
             let squared = |index| {
-                let bits = |dimension| hash_words(number as u64 * SAMPLES + index, dimension) >> 40;
-                let u = [0, 1, 2].map(|dimension| bits(dimension) as f32 / 16_777_216.0);
+                let u = [0, 1, 2].map(|dimension| unit_of_hash(hash_words(number as u64 * SAMPLES + index, dimension)));
                 let sample = lights.sample_kind(kind, world, receiver, *time, u);
                 sample.map_or(0.0, |sample| squared_strength(receiver, &sample, || arrival(number, &sample)))
             };

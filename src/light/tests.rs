@@ -2,6 +2,7 @@
 
 use super::{LightReceiver, Lights, Lookout};
 use crate::geometry::{Ray, World};
+use crate::sampler::{hash_words, unit_of_hash};
 use crate::scene::{
     Alpha, ColorInput, Environment, Instance, Light, Material, MaterialId, Mesh, MeshId, Parametrisation, Scene,
     Sphere, SpotFalloff, Surface,
@@ -12,7 +13,7 @@ use std::f32::consts::TAU;
 use std::sync::Arc;
 
 fn random(index: u64, dimension: u64) -> f32 {
-    (crate::sampler::hash_words(index, dimension) >> 40) as f32 / 16_777_216.0
+    unit_of_hash(hash_words(index, dimension))
 }
 
 fn add_emitter(scene: &mut Scene, radiance: f32, emits_both_sides: bool) -> MaterialId {

@@ -108,7 +108,7 @@ pub enum Purpose {
         /// 0 at the first surface.
         bounce: u32,
     },
-    /// Point on a light (x, y) and which light (z) at a bounce.
+    /// Point on a light (x, y), which light (z), and whether faint light is asked for (w) at a bounce.
     Light {
         /// 0 at the first surface.
         bounce: u32,
@@ -196,7 +196,7 @@ impl Sample {
         let group_hash = group_hash(self.block_hash, purpose);
         if self.is_independent {
             let key = u64::from(group_hash) << 32 | u64::from(self.reversed_index.reverse_bits());
-            from_fn(|dimension| (hash_words(key, dimension as u64) >> 40) as f32 * (1.0 / 16_777_216.0))
+            from_fn(|dimension| unit_of_hash(hash_words(key, dimension as u64)))
         } else {
             sobol::scrambled_points([self.reversed_index], [group_hash]).map(|[number]| number)
         }
@@ -249,6 +249,12 @@ impl VectorWork for DrawEach<'_> {
 /// Mixes a word into a hash; for decisions that need a random number without a sample of their own.
 pub(crate) fn hash_words(hash: u64, word: u64) -> u64 {
     sobol::mix64(hash.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ word)
+}
+
+/// To [0, 1) with the 24 bits that f32 holds.
+#[inline(always)]
+pub(crate) fn unit_of_hash(hash: u64) -> f32 {
+    (hash >> 40) as f32 * (1.0 / 16_777_216.0)
 }
 
 #[cfg(test)]

@@ -62,11 +62,16 @@ pub struct CameraAxes {
     pub up: Vec3,
 }
 
+/// To the right of who looks along `forward`; any right where `up` is parallel to it.
+pub(crate) fn right_of(forward: Vec3, up: Vec3) -> Vec3 {
+    forward.cross(up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector())
+}
+
 impl Camera {
     /// Where it looks and how the picture lies; any right and up where `up` is parallel to `forward`.
     pub fn axes(&self) -> CameraAxes {
         let forward = self.forward.normalize_or(Vec3::NEG_Z);
-        let right = forward.cross(self.up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector());
+        let right = right_of(forward, self.up);
         let up = right.cross(forward);
         CameraAxes { forward, right: if self.mirrored { -right } else { right }, up }
     }

@@ -197,6 +197,7 @@ impl Environment {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sampler::{hash_words, unit_of_hash};
 
     /// Directions over the whole sphere, poles, axes and seams among them.
     fn directions() -> impl Iterator<Item = Vec3> {
@@ -228,7 +229,7 @@ mod tests {
         let n = 100_000u32;
         let mut counts = [0u32; 256];
         for i in 0..n {
-            let unit = |k: u64| (crate::sampler::hash_words(u64::from(i), k) >> 40) as f32 / 16_777_216.0;
+            let unit = |k: u64| unit_of_hash(hash_words(u64::from(i), k));
             let z = 1.0 - 2.0 * unit(1);
             let (sin, cos) = (TAU * unit(2)).sin_cos();
             let r = (1.0 - z * z).max(0.0).sqrt();

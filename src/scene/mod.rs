@@ -8,6 +8,7 @@ mod environment;
 mod light;
 mod material;
 mod motion;
+pub(crate) mod pictured_edges;
 mod relief;
 mod surface;
 
@@ -15,6 +16,7 @@ pub mod hash;
 pub mod load;
 pub mod texture;
 
+pub(crate) use camera::right_of;
 pub use camera::{Camera, CameraAxes, Projection, ScreenWindow};
 pub use environment::{Environment, Parametrisation};
 pub use light::{Light, SpotFalloff};

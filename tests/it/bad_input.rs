@@ -53,8 +53,8 @@ fn our_own_scenes_load_and_survive_every_cut() {
     }
 }
 
-/// Writes every 61st cut of a good file, and every byte of its first 400 overwritten, in place of it, and loads the scene:
-/// a scene or one line, never a panic.
+/// Writes cuts of a good file, and the file with single bytes overwritten, in its place, and loads the scene: a scene or one line,
+/// never a panic. 61 cuts, every third of the first 400 bytes, and one in 61 of all.
 fn survive_damage(scene: &Path, damaged: &Path, good: &[u8]) {
     let load_scene = || {
         if let Err(error) = load(scene, &LoadOptions::default()) {
@@ -66,7 +66,8 @@ fn survive_damage(scene: &Path, damaged: &Path, good: &[u8]) {
         load_scene();
     }
     let mut bytes = good.to_vec();
-    for i in (0..good.len().min(400)).step_by(3) {
+    let beginning = (0..good.len().min(400)).step_by(3);
+    for i in beginning.chain((400..good.len()).step_by(good.len() / 61 + 1)) {
         for wrong in [0x00, 0x7f, 0xff] {
             bytes[i] = wrong;
             std::fs::write(damaged, &bytes).unwrap();
@@ -121,6 +122,26 @@ fn damaged_scenes_of_other_renderers_never_panic() {
         let path = place.path().join(format!("scene.{ending}"));
         survive_damage(&path, &path, &good);
     }
+}
+
+/// A file of more than 64 KiB, beyond which some widths and offsets do not count.
+#[test]
+fn long_damaged_scenes_never_panic() {
+    let lamp = |number: u32| {
+        format!(
+            "[[lights]]\ntype = \"point\"\nposition = [{number}, 3, 2]\n\
+             keyframes = [{{ time = 0, intensity_cd = 0 }}, {{ time = 1, intensity_cd = 50 }}]\n"
+        )
+    };
+    let thing = "[camera]\nposition = [0, 0, 5]\nlook_at = [0, 0, 0]\n[materials.white]\ntype = \"diffuse\"\nreflectance = 0.5\n\
+                 [[objects]]\nsphere = { center = [0, 0, 0], radius = 1 }\nmaterial = \"white\"\n";
+    let good = [thing.to_owned()].into_iter().chain((0..600).map(lamp)).collect::<String>();
+    assert!(good.len() > 1 << 16, "{}", good.len());
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("long.toml");
+    std::fs::write(&path, &good).unwrap();
+    assert_eq!(load(&path, &LoadOptions::default()).unwrap().lights.len(), 600);
+    survive_damage(&path, &path, good.as_bytes());
 }
 
 #[test]

@@ -4,13 +4,15 @@ use fechner::scene::load::{LoadOptions, load};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// The folder of other people's scenes: FECHNER_ASSETS, else beside the project.
+/// The folder of other people's scenes: FECHNER_ASSETS, where it must be, else beside the project.
 pub(crate) fn assets() -> Option<PathBuf> {
-    let folder = std::env::var_os("FECHNER_ASSETS")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets"), PathBuf::from);
+    let named = std::env::var_os("FECHNER_ASSETS").map(PathBuf::from);
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/assets");
+    let folder = named.clone().unwrap_or_else(beside);
     if folder.is_dir() {
         return Some(folder);
     }
+    assert!(named.is_none(), "{} is not there", folder.display());
     println!("skipped: {} is not there", folder.display());
     None
 }

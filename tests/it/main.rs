@@ -3,6 +3,7 @@
 //! - `support`: scenes made in code, and rendering them
 //! - `furnace`: energy: closed and open white furnaces with known answers
 //! - `direct_light`: irradiance from a rectangle, a disk, a sphere, a point and environments against closed forms; radiosity
+//! - `clear_coats`: clear coats of glTF over bumps and lamps
 //! - `coverage`: alpha: stacks, spheres, lamps that no ray meets
 //! - `adaptive_render`: adaptive and uniform renders against a reference: bias, calibration, determinism
 //! - `bench`: the benchmark from end to end, small

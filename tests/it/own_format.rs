@@ -1,5 +1,6 @@
 //! Our own format: what lamps of a luminous power emit, keys that change nothing, and files that are found from the scene's folder.
 
+use fechner::scene::hash::content_hash;
 use fechner::scene::load::{LoadOptions, load};
 use fechner::scene::{Alpha, Scene};
 
@@ -231,6 +232,10 @@ fn slips_in_operators_and_displays_have_their_place() {
 fn an_empty_side_file_adds_nothing() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("q.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let hash = || content_hash(&load(&folder.path().join("q.obj"), &LoadOptions::default()).unwrap());
+    let alone = hash();
     std::fs::write(folder.path().join("q.fechner.toml"), "").unwrap();
-    load(&folder.path().join("q.obj"), &LoadOptions::default()).unwrap();
+    assert_eq!(hash(), alone);
+    std::fs::write(folder.path().join("q.fechner.toml"), "[environment]\nluminance_cd_m2 = 7\n").unwrap();
+    assert_ne!(hash(), alone);
 }

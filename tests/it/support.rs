@@ -2,7 +2,7 @@
 
 use fechner::adaptive::settings::{Limits, LoopSettings, Sampling, THRESHOLD};
 use fechner::integrator::{PathTracer, TraceSettings};
-use fechner::sampler::{BlockKey, Half, Pixel, PixelFilter, Purpose, Sequence};
+use fechner::sampler::{BlockKey, Half, Pixel, PixelFilter, Sequence};
 use fechner::scene::{
     Alpha, Camera, ColorInput, Environment, FilmDefaults, Instance, Material, MaterialId, Mesh, MeshId, Scene, Sphere,
     Surface,
@@ -119,14 +119,6 @@ pub(crate) fn loop_settings(
     let operator = tone::operator("constant", None).expect("an operator");
     let limits = Limits { visibility: visibility.into(), mean_samples: spp, ..Limits::of_visibility(THRESHOLD) };
     LoopSettings { sampling, limits, ..LoopSettings::new(viewing, nits_per_unit, operator) }
-}
-
-/// Keeps the purposes in the API honest: a sample's camera numbers are what the tracer uses for the pixel.
-#[test]
-fn camera_numbers_fill_the_pixel() {
-    let key = block_key(3);
-    let mean: f32 = key.samples(64).map(|s| s.draw(Purpose::Camera)[0]).sum::<f32>() / 64.0;
-    assert!((mean - 0.5).abs() < 0.02, "{mean}");
 }
 
 /// Until a file is there that a program under way makes.

@@ -7,6 +7,7 @@ use crate::geometry::offset;
 use crate::geometry::simd::prefetch;
 use crate::geometry::surface::SurfaceDerivatives;
 use crate::geometry::{Ray, SurfacePoint};
+use crate::scene::pictured_edges::PicturedEdges;
 use crate::scene::{Instance, Mesh, Scene, SpherePlace};
 use glam::{Affine3A, Mat3A, Vec2, Vec3, Vec3A};
 use std::f32::consts::{PI, TAU};
@@ -83,11 +84,11 @@ impl World {
                 }
                 let corners = self.triangle_corners(point.object, point.triangle, time);
                 let edges = [corners[1] - corners[0], corners[2] - corners[0]];
-                let uv_edges = edges_on_picture(mesh, point.triangle);
-                let inverse_area = 1.0 / uv_edges[0].perp_dot(uv_edges[1]);
+                let edges = pictured_edges(mesh, point.triangle, edges);
+                let inverse_area = 1.0 / edges.doubled_area();
                 SurfaceDerivatives {
-                    along_u: along_u_times_area(edges, uv_edges) * inverse_area,
-                    along_v: (edges[1] * uv_edges[0].x - edges[0] * uv_edges[1].x) * inverse_area,
+                    along_u: edges.along_u_times_area() * inverse_area,
+                    along_v: edges.along_v_times_area() * inverse_area,
                 }
             }
         };
@@ -244,15 +245,10 @@ fn interpolate_color(mesh: &Mesh, triangle: u32, b1: f32, b2: f32) -> Vec3 {
     i * (1.0 - b1 - b2) + j * b1 + k * b2
 }
 
-/// The two edges that leave a triangle's first corner, on the picture. The mesh must have texture coordinates.
-fn edges_on_picture(mesh: &Mesh, triangle: u32) -> [Vec2; 2] {
+/// How the picture lies on a triangle with these edges. The mesh must have texture coordinates.
+fn pictured_edges(mesh: &Mesh, triangle: u32, in_space: [Vec3; 2]) -> PicturedEdges {
     let [a, b, c] = mesh.triangles[triangle as usize].map(|i| mesh.uvs[i as usize]);
-    [b - a, c - a]
-}
-
-/// Way along growing u, times twice the triangle's signed area on the picture.
-fn along_u_times_area(edges: [Vec3; 2], uv_edges: [Vec2; 2]) -> Vec3 {
-    edges[0] * uv_edges[1].y - edges[1] * uv_edges[0].y
+    PicturedEdges { in_space, on_picture: [b - a, c - a] }
 }
 
 /// Direction of growing u on a triangle and the handedness of (u, v), from its texture coordinates.
@@ -261,9 +257,6 @@ fn tangent_from_uv(mesh: &Mesh, triangle: u32, edges: [Vec3; 2]) -> (Vec3, f32) 
     if mesh.uvs.is_empty() {
         return (along_edge, 1.0);
     }
-    let uv_edges = edges_on_picture(mesh, triangle);
-    let area = uv_edges[0].perp_dot(uv_edges[1]);
-    let tangent = along_u_times_area(edges, uv_edges) * area.signum();
-    // v runs down the picture, so a texture that is not mirrored has a negative uv area.
-    (tangent.try_normalize().unwrap_or(along_edge), if area > 0.0 { -1.0 } else { 1.0 })
+    let edges = pictured_edges(mesh, triangle, edges);
+    (edges.along_u().unwrap_or(along_edge), if edges.is_mirrored() { -1.0 } else { 1.0 })
 }

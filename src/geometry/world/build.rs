@@ -36,14 +36,25 @@ pub(super) fn fixed_triangles(scene: &Scene, uses: &[u32]) -> Vec<([Vec3A; 3], T
 /// Vertices of all placed instances up to which boxes are made around each; of more, around the corners of the meshes' boxes.
 pub(super) const MOST_VERTICES: usize = 30_000_000;
 
+/// What a box is made around.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Around {
+    /// As tightly as can be.
+    Vertices,
+    /// The corners of the mesh's own box.
+    OwnBox,
+}
+
 /// Bounds of an instance whose mesh has these bounds of its own.
-pub(super) fn placed_bounds(scene: &Scene, instance: &Instance, own: Bounds, tightly: bool) -> Bounds {
+pub(super) fn placed_bounds(scene: &Scene, instance: &Instance, own: Bounds, around: Around) -> Bounds {
     let place = |point| instance.to_world.transform_point3a(point);
-    if tightly {
-        let mesh = &scene.meshes[instance.mesh.0 as usize];
-        return Bounds::of_points(mesh.positions.iter().map(|&point| place(point.into())));
+    match around {
+        Around::Vertices => {
+            let mesh = &scene.meshes[instance.mesh.0 as usize];
+            Bounds::of_points(mesh.positions.iter().map(|&point| place(point.into())))
+        }
+        Around::OwnBox => Bounds::of_points(own.corners().map(place)),
     }
-    Bounds::of_points(own.corners().map(place))
 }
 
 /// Where things with these bounds in their own space can be while the shutter is open.

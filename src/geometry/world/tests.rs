@@ -66,7 +66,7 @@ fn two_levels_equal_one() {
     assert_eq!((two.shared.len(), one.shared.len()), (1, 0));
     let mut hits = [0; 5];
     for i in 0..4000u64 {
-        let unit = |k: u64| (crate::sampler::hash_words(i, k) >> 40) as f32 / 16_777_216.0 * 2.0 - 1.0;
+        let unit = |k: u64| unit_of_hash(hash_words(i, k)) * 2.0 - 1.0;
         let origin = vec3a(unit(0), unit(1), unit(2)) * 6.0;
         let target = [Vec3A::ZERO, vec3a(2.2, 0.2, 0.2), Vec3A::Y, Vec3A::splat(-3.0)][i as usize % 4];
         let spread = if i % 4 == 2 { 1e-3 } else { 1.0 };
@@ -98,7 +98,7 @@ fn mirrored_instances_keep_their_outside() {
 
 /// How many of the rays that leave convex bodies where they are hit meet the body again.
 fn self_hits(world: &World, aims: &[(Vec3A, f32)]) -> usize {
-    let unit = |i: u64, k: u64| (crate::sampler::hash_words(i, k) >> 40) as f32 / 16_777_216.0 * 2.0 - 1.0;
+    let unit = |i: u64, k: u64| unit_of_hash(hash_words(i, k)) * 2.0 - 1.0;
     let direction = |i: u64, k: u64| vec3a(unit(i, k), unit(i, k + 1), unit(i, k + 2)).normalize_or(Vec3A::X);
     let mut met_again = 0;
     let mut hits = 0;
@@ -179,7 +179,7 @@ fn long_thin_triangles_do_not_meet_their_own_rays() {
             let world = World::new(Arc::new(scene));
             let (mut left, mut met, mut hidden) = (0, 0, 0);
             for i in 0..20_000u64 {
-                let unit = |k: u64| (crate::sampler::hash_words(i, k) >> 40) as f32 / 16_777_216.0 * 2.0 - 1.0;
+                let unit = |k: u64| unit_of_hash(hash_words(i, k)) * 2.0 - 1.0;
                 let aim = turned.transform_point3a(vec3a(1.99 * unit(0), 0.0, 0.0));
                 let direction = vec3a(unit(1), unit(2), unit(3)).normalize_or(Vec3A::Y);
                 let ray = Ray::new(aim - 3.0 * direction, direction);

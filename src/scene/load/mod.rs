@@ -34,8 +34,6 @@ mod mitsuba;
 mod mtl;
 mod notes;
 mod obj;
-#[cfg(test)]
-mod over_time;
 mod pbrt;
 mod ply;
 mod polygon;
@@ -43,6 +41,8 @@ pub mod shapes;
 pub mod sky;
 mod spectrum;
 mod tangents;
+#[cfg(test)]
+mod tests;
 mod texture;
 mod texture_memory;
 mod toml;

@@ -6,6 +6,7 @@
 //! triangle says of itself is all there is.
 
 use super::shapes;
+use crate::scene::pictured_edges::PicturedEdges;
 use crate::scene::{Mesh, TextureLookup};
 use glam::{Vec2, Vec3, Vec4};
 use std::collections::HashMap;
@@ -36,12 +37,13 @@ fn add_along(mesh: &mut Mesh, on_picture: impl Fn(Vec2) -> Vec2) {
     if mesh.uvs.is_empty() || !mesh.tangents.is_empty() {
         return;
     }
-    let mirrored: Vec<bool> = mesh.triangles.iter().map(|triangle| is_mirrored(mesh, triangle, &on_picture)).collect();
+    let is_mirrored = |triangle| edges(mesh, triangle, &on_picture).is_mirrored();
+    let mirrored: Vec<bool> = mesh.triangles.iter().map(is_mirrored).collect();
     split_mirrored(mesh, &mirrored);
     let (group_of, groups) = groups(mesh, &mirrored);
     let mut sums = vec![Vec3::ZERO; groups];
     for triangle in &mesh.triangles {
-        let Some(along) = along_u(mesh, triangle, &on_picture) else { continue };
+        let Some(along) = along_u(edges(mesh, triangle, &on_picture)) else { continue };
         for place in 0..3 {
             let vertex = triangle[place] as usize;
             let normal = mesh.normals[vertex];
@@ -83,24 +85,15 @@ fn key(mesh: &Mesh, vertex: usize, mirrored: bool) -> Key {
     ([a, b, c, d, e, f, u, v].map(|number| (number + 0.0).to_bits()), mirrored)
 }
 
-/// The two edges that leave a triangle's first corner, in space and on the picture.
-fn edges(mesh: &Mesh, triangle: &[u32; 3], on_picture: impl Fn(Vec2) -> Vec2) -> ([Vec3; 2], [Vec2; 2]) {
+fn edges(mesh: &Mesh, triangle: &[u32; 3], on_picture: impl Fn(Vec2) -> Vec2) -> PicturedEdges {
     let [a, b, c] = triangle.map(|vertex| mesh.positions[vertex as usize]);
     let [p, q, r] = triangle.map(|vertex| on_picture(mesh.uvs[vertex as usize]));
-    ([b - a, c - a], [q - p, r - p])
-}
-
-/// v runs down the picture, so one that is not mirrored has a negative area.
-fn is_mirrored(mesh: &Mesh, triangle: &[u32; 3], on_picture: impl Fn(Vec2) -> Vec2) -> bool {
-    let (_, [first, second]) = edges(mesh, triangle, on_picture);
-    first.perp_dot(second) > 0.0
+    PicturedEdges { in_space: [b - a, c - a], on_picture: [q - p, r - p] }
 }
 
 /// The direction of growing u; `None` where the triangle has no area on the picture.
-fn along_u(mesh: &Mesh, triangle: &[u32; 3], on_picture: impl Fn(Vec2) -> Vec2) -> Option<Vec3> {
-    let ([first, second], on_picture) = edges(mesh, triangle, on_picture);
-    let area = on_picture[0].perp_dot(on_picture[1]);
-    ((first * on_picture[1].y - second * on_picture[0].y) * area.signum()).try_normalize().filter(|_| area != 0.0)
+fn along_u(edges: PicturedEdges) -> Option<Vec3> {
+    edges.along_u().filter(|_| edges.doubled_area() != 0.0)
 }
 
 /// The faces' own normals, at corners of their own.

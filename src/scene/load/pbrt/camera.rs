@@ -4,6 +4,7 @@ use super::super::builder::NamedCamera;
 use super::super::error::LoadError;
 use super::super::framing::{FilmAxis, Framing};
 use super::Reader;
+use super::parameters::Parameters;
 use super::state::{Carried, Path, Transforms};
 use crate::scene::{Camera, FilmDefaults, Motion, MotionKey, Pose, Projection, ScreenWindow};
 use glam::{Affine3A, Vec2, Vec3};
@@ -17,6 +18,25 @@ struct Crop {
     max: Vec2,
 }
 
+/// Where a camera is, and its axes, of unit length.
+struct PlacedAxes {
+    position: Vec3,
+    forward: Vec3,
+    up: Vec3,
+    right: Vec3,
+}
+
+impl PlacedAxes {
+    /// `None` where the transform cannot be undone.
+    fn of(placed: &Affine3A) -> Option<Self> {
+        let axis = |vector| placed.transform_vector3(vector).try_normalize();
+        let (forward, up, right) = (axis(Vec3::Z)?, axis(Vec3::Y)?, axis(Vec3::X)?);
+        let position = Vec3::from(placed.translation);
+        let spans = position.is_finite() && forward.cross(up).length() >= 1e-5;
+        spans.then_some(Self { position, forward, up, right })
+    }
+}
+
 impl Reader<'_> {
     /// Puts the camera together once `WorldBegin` is reached.
     pub(super) fn place_camera(&mut self) -> Result<(), LoadError> {
@@ -24,70 +44,21 @@ impl Reader<'_> {
         let Some((kind, parameters, world_to_camera)) = self.camera.take() else {
             return Ok(());
         };
-        let opens = parameters.float_or("shutteropen", 0.0)?;
-        let closes = parameters.float_or("shutterclose", 1.0)?;
-        self.shutter = [opens, closes.max(opens)];
-        self.builder.shutter_s = f64::from(self.shutter[1] - opens);
-        self.exposure = self.sensor(closes - opens)?;
+        self.open_shutter(&parameters)?;
         let to_world = world_to_camera.inverse();
         let placed = self.here(&to_world);
-        let axis = |vector| placed.transform_vector3(vector).try_normalize();
-        let (Some(forward), Some(up), Some(right)) = (axis(Vec3::Z), axis(Vec3::Y), axis(Vec3::X)) else {
-            return Err(parameters.error("the camera's transform cannot be undone"));
-        };
-        let position = Vec3::from(placed.translation);
-        if !position.is_finite() || forward.cross(up).length() < 1e-5 {
-            return Err(parameters.error("the camera's transform cannot be undone"));
-        }
+        let PlacedAxes { position, forward, up, right } =
+            PlacedAxes::of(&placed).ok_or_else(|| parameters.error("the camera's transform cannot be undone"))?;
         let film_aspect = full.width as f32 / full.height as f32;
-        let stated_aspect = parameters.float("frameaspectratio")?.filter(|&aspect| aspect > 0.0);
-        let aspect = stated_aspect.unwrap_or(film_aspect);
-        let stated_window = parameters.numbers(&["float"], "screenwindow")?;
-        let framing = match (stated_aspect, stated_window) {
-            (None, None) => {
-                let FilmDefaults { width, height } = self.builder.film;
-                Framing::Spanning { axis: FilmAxis::Smaller, film: width as f32 / height as f32, whole: film_aspect }
-            }
-            // pbrt stretches what the file states.
-            _ => Framing::Fixed,
-        };
-        let mut window = match stated_window {
-            // The shorter side spans [−1, 1].
-            None => {
-                let half_size = FilmAxis::Smaller.half_size(aspect);
-                ScreenWindow { min: -half_size, max: half_size }
-            }
-            Some(&[left, right, bottom, top]) if left < right && bottom < top => {
-                ScreenWindow { min: Vec2::new(left as f32, bottom as f32), max: Vec2::new(right as f32, top as f32) }
-            }
-            Some(_) => return Err(parameters.error("\"screenwindow\": expected [ left right bottom top ]")),
-        };
+        let (window, framing) = self.window(&parameters, film_aspect)?;
+        let projection = self.projection(&kind, &parameters)?;
         let stretch = stretch_of(&placed);
-        let across = match kind.as_str() {
-            "orthographic" => stretch.truncate(),
-            _ => stretch.truncate() / stretch.z,
+        let across = match projection {
+            Projection::Orthographic { .. } => stretch.truncate(),
+            Projection::Perspective { .. } => stretch.truncate() / stretch.z,
         };
-        window = ScreenWindow { min: window.min * across, max: window.max * across };
+        let window = ScreenWindow { min: window.min * across, max: window.max * across };
         let is_usual = window == ScreenWindow::centered(film_aspect);
-        let projection = match kind.as_str() {
-            "perspective" | "realistic" => {
-                if kind == "realistic" {
-                    self.builder
-                        .note("The lens system of a \"realistic\" camera is not traced: a pinhole of 45 degrees.");
-                }
-                let fov = parameters.float_or("fov", if kind == "realistic" { 45.0 } else { 90.0 })?;
-                if !(0.001..=179.0).contains(&fov) {
-                    return Err(parameters.error(format_args!("\"fov\" must lie in [0.001, 179] degrees, not {fov}")));
-                }
-                Projection::Perspective { vertical_fov_deg: fov }
-            }
-            "orthographic" => Projection::Orthographic { height: 2.0 },
-            other => {
-                return Err(parameters.unsupported(format_args!(
-                    "cameras of type \"{other}\" are not rendered; perspective and orthographic are"
-                )));
-            }
-        };
         let camera = Camera {
             projection,
             screen_window: (!is_usual || crop.is_some()).then(|| cropped(window, crop)),
@@ -101,6 +72,63 @@ impl Reader<'_> {
         self.note_unread("camera", &parameters);
         self.builder.cameras.push(NamedCamera { name: kind, holder: None, camera, framing });
         Ok(())
+    }
+
+    /// When it is open, and what the sensor makes of that.
+    fn open_shutter(&mut self, camera: &Parameters) -> Result<(), LoadError> {
+        let opens = camera.float_or("shutteropen", 0.0)?;
+        let closes = camera.float_or("shutterclose", 1.0)?;
+        self.shutter = [opens, closes.max(opens)];
+        self.builder.shutter_s = f64::from(self.shutter[1] - opens);
+        self.exposure = self.sensor(closes - opens)?;
+        Ok(())
+    }
+
+    /// The window of a camera that nothing stretches, and what it shows of another film.
+    fn window(&self, camera: &Parameters, film_aspect: f32) -> Result<(ScreenWindow, Framing), LoadError> {
+        let stated_aspect = camera.float("frameaspectratio")?.filter(|&aspect| aspect > 0.0);
+        let stated_window = camera.numbers(&["float"], "screenwindow")?;
+        let framing = match (stated_aspect, stated_window) {
+            (None, None) => {
+                let FilmDefaults { width, height } = self.builder.film;
+                Framing::Spanning { axis: FilmAxis::Smaller, film: width as f32 / height as f32, whole: film_aspect }
+            }
+            // pbrt stretches what the file states.
+            _ => Framing::Fixed,
+        };
+        let window = match stated_window {
+            // The shorter side spans [−1, 1].
+            None => {
+                let half_size = FilmAxis::Smaller.half_size(stated_aspect.unwrap_or(film_aspect));
+                ScreenWindow { min: -half_size, max: half_size }
+            }
+            Some(&[left, right, bottom, top]) if left < right && bottom < top => {
+                ScreenWindow { min: Vec2::new(left as f32, bottom as f32), max: Vec2::new(right as f32, top as f32) }
+            }
+            Some(_) => return Err(camera.error("\"screenwindow\": expected [ left right bottom top ]")),
+        };
+        Ok((window, framing))
+    }
+
+    fn projection(&mut self, kind: &str, camera: &Parameters) -> Result<Projection, LoadError> {
+        let usual_fov_deg = match kind {
+            "perspective" => 90.0,
+            "realistic" => {
+                self.builder.note("The lens system of a \"realistic\" camera is not traced: a pinhole of 45 degrees.");
+                45.0
+            }
+            "orthographic" => return Ok(Projection::Orthographic { height: 2.0 }),
+            other => {
+                return Err(camera.unsupported(format_args!(
+                    "cameras of type \"{other}\" are not rendered; perspective and orthographic are"
+                )));
+            }
+        };
+        let fov_deg = camera.float_or("fov", usual_fov_deg)?;
+        if !(0.001..=179.0).contains(&fov_deg) {
+            return Err(camera.error(format_args!("\"fov\" must lie in [0.001, 179] degrees, not {fov_deg}")));
+        }
+        Ok(Projection::Perspective { vertical_fov_deg: fov_deg })
     }
 
     /// Where a transform is when the shutter opens.

@@ -95,16 +95,15 @@ impl Reader<'_> {
             return Err(parameters.error("\"coneangle\" must lie in [0, 180], \"conedeltaangle\" must not be negative"));
         }
         let (outer_angle, inner_angle) = (outer.to_radians(), (outer - delta).max(0.0).to_radians());
-        let (inner_cos, outer_cos) = (inner_angle.cos(), outer_angle.cos());
-        let full = TAU * ((1.0 - inner_cos) + (inner_cos - outer_cos) / 2.0);
-        let intensity = self.light_color(parameters, "I", full)?;
+        let falloff = SpotFalloff::Smoothstep;
+        let intensity = self.light_color(parameters, "I", falloff.solid_angle(inner_angle, outer_angle))?;
         self.builder.lights.push(Light::Spot {
             position: to_world.transform_point3(from),
             direction,
             intensity,
             inner_angle,
             outer_angle,
-            falloff: SpotFalloff::Smoothstep,
+            falloff,
         });
         Ok(())
     }

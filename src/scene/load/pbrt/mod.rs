@@ -24,6 +24,7 @@ use crate::scene::{Alpha, Material, MaterialId, MeshId, ScalarInput, Scene, Surf
 use parameters::Parameters;
 use state::{Opening, State, Transforms};
 use std::collections::HashMap;
+use std::hash::{Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
@@ -56,8 +57,40 @@ struct Part {
     transforms: Transforms,
 }
 
+/// A statement of the file: two that say the same are two.
+struct Statement<T>(Rc<T>);
+
+impl<T> PartialEq for Statement<T> {
+    fn eq(&self, other: &Self) -> bool {
+        Rc::ptr_eq(&self.0, &other.0)
+    }
+}
+
+impl<T> Eq for Statement<T> {}
+
+impl<T> Hash for Statement<T> {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        Rc::as_ptr(&self.0).hash(state);
+    }
+}
+
 /// What makes a material of its own out of a definition.
-type MaterialKey = (usize, usize, Option<String>, Option<String>);
+#[derive(PartialEq, Eq, Hash)]
+struct MaterialKey {
+    material: Statement<materials::Definition>,
+    light: Option<Statement<Parameters>>,
+    alpha: AlphaKey,
+    medium: Option<String>,
+}
+
+#[derive(PartialEq, Eq, Hash)]
+enum AlphaKey {
+    None,
+    /// By its name.
+    Texture(String),
+    /// By its bits.
+    Number(u32),
+}
 
 struct Reader<'a> {
     /// The file that was asked for, and the one that is being read.
@@ -75,10 +108,7 @@ struct Reader<'a> {
     media: HashMap<String, materials::Medium>,
     objects: HashMap<String, Vec<Part>>,
     current_object: Option<String>,
-    /// By addresses of material and area light, alpha, and medium.
     converted: HashMap<MaterialKey, Option<MaterialId>>,
-    /// Whatever has an address in `converted`.
-    keep_alive: Vec<(Rc<materials::Definition>, Option<Rc<Parameters>>)>,
     ply_files: HashMap<(PathBuf, bool), MeshId>,
     camera: Option<(String, Parameters, Transforms)>,
     film: Option<(String, Parameters)>,
@@ -112,7 +142,6 @@ impl<'a> Reader<'a> {
             objects: HashMap::new(),
             current_object: None,
             converted: HashMap::new(),
-            keep_alive: Vec::new(),
             ply_files: HashMap::new(),
             camera: None,
             film: None,
@@ -174,13 +203,16 @@ impl Reader<'_> {
         let medium = self.state.inside_medium.clone();
         // Luminous power is shared out over each shape's own area: such materials are never the same.
         let has_power = light.as_ref().is_some_and(|light| light.float("power").is_ok_and(|power| power.is_some()));
-        let address = |pointer: *const ()| pointer as usize;
-        let key = (
-            address(Rc::as_ptr(&definition).cast()),
-            light.as_ref().map_or(0, |light| address(Rc::as_ptr(light).cast())),
-            alpha.clone().or(alpha_number.map(|number| format!("= {number}"))),
-            medium.clone(),
-        );
+        let key = MaterialKey {
+            material: Statement(Rc::clone(&definition)),
+            light: light.clone().map(Statement),
+            alpha: match (&alpha, alpha_number) {
+                (Some(texture), _) => AlphaKey::Texture(texture.clone()),
+                (None, Some(number)) => AlphaKey::Number(number.to_bits()),
+                (None, None) => AlphaKey::None,
+            },
+            medium: medium.clone(),
+        };
         if !has_power && let Some(id) = self.converted.get(&key) {
             return Ok(*id);
         }
@@ -220,7 +252,6 @@ impl Reader<'_> {
                 Some(self.builder.add_material(material))
             }
         };
-        self.keep_alive.push((definition, light));
         self.converted.insert(key, id);
         Ok(id)
     }

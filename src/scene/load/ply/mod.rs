@@ -66,13 +66,13 @@ struct Polygons {
     /// Corners of each face.
     sizes: Vec<u32>,
     indices: Vec<u32>,
-    /// Whether every face so far is a triangle.
-    others: bool,
+    /// Whether a face so far is no triangle.
+    has_other_polygons: bool,
 }
 
 impl Polygons {
     fn triangulate(&self, positions: &[Vec3], triangles: &mut Vec<[u32; 3]>) {
-        if !self.others {
+        if !self.has_other_polygons {
             triangles.extend_from_slice(self.indices.as_chunks::<3>().0);
             return;
         }
@@ -169,7 +169,7 @@ fn read_faces<'h>(
                 continue;
             }
             let size = values.list(count_kind, property.kind, &mut polygons.indices)?;
-            polygons.others |= size != 3;
+            polygons.has_other_polygons |= size != 3;
             polygons.sizes.push(size);
         }
     }

@@ -9,6 +9,8 @@
 use super::fields::{Fields, Source, Value};
 use super::motion::{Between, Keyframes};
 use crate::scene::load::LoadError;
+use std::borrow::Cow;
+use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -21,14 +23,21 @@ enum Owner {
     Light(usize),
 }
 
-/// A table's keyframes, as the TOML that they amount to.
+/// What a table's keyframes amount to.
 #[derive(Debug)]
 pub(super) struct Snapshot {
     owner: Owner,
-    /// Entries of the table, each as a document with its value where the keyframes begin.
-    entries: Vec<String>,
+    entries: Vec<Entry>,
     /// Whether it is of a light, or of what a material emits.
     changes_light: bool,
+}
+
+/// What they amount to for one key of the table.
+#[derive(Debug)]
+struct Entry {
+    key: String,
+    /// In TOML, since numbers of a document come from its parser alone.
+    value: String,
 }
 
 impl Snapshot {
@@ -61,15 +70,23 @@ pub(super) fn parse<'a>(source: &Source<'a>, snapshots: &'a [Snapshot]) -> Resul
     let mut document = DeTable::parse(source.text).map_err(|error| source.syntax_error(&error))?;
     for Snapshot { owner, entries, .. } in snapshots {
         let Some(table) = table_of(document.get_mut(), owner) else { continue };
-        table.remove(KEYFRAMES);
-        for entry in entries {
-            let entry = DeTable::parse(entry).map_err(|error| source.syntax_error(&error))?;
-            for (key, value) in entry.into_inner() {
-                table.insert(key, value);
-            }
+        let Some(keyframes) = table.remove(KEYFRAMES) else { continue };
+        for Entry { key, value } in entries {
+            let value = DeValue::parse(value).map_err(|error| source.syntax_error(&error))?;
+            let key = Spanned::new(keyframes.span(), Cow::Borrowed(key.as_str()));
+            table.insert(key, placed(value, &keyframes.span()));
         }
     }
     Ok(document)
+}
+
+/// A number or a list of them as if it stood there, whose line errors about it will name.
+fn placed<'a>(value: Spanned<DeValue<'a>>, there: &Range<usize>) -> Spanned<DeValue<'a>> {
+    let value = match value.into_inner() {
+        DeValue::Array(numbers) => DeValue::Array(numbers.into_iter().map(|number| placed(number, there)).collect()),
+        number => number,
+    };
+    Spanned::new(there.clone(), value)
 }
 
 fn table_of<'d, 'a>(document: &'d mut DeTable<'a>, owner: &Owner) -> Option<&'d mut DeTable<'a>> {
@@ -119,11 +136,7 @@ fn snapshot(value: &Value, owner: Owner, seconds: f64) -> Result<Option<Snapshot
             .map(|(before, after)| format!("{:?}", before + share * (after - before)))
             .collect();
         let value = if values.len() == 1 { values[0].clone() } else { format!("[{}]", values.join(", ")) };
-        let key = format!("\"{}\" = ", key.escape_default());
-        // Spaces bring key and value to the keyframes' place in the file, whose line errors about them will name: a list that
-        // names the key is longer than it.
-        let before_key = list.start();
-        entries.push(format!("{:before_key$}{key}{value}", ""));
+        entries.push(Entry { key: key.clone(), value });
     }
     let is_emission = |key: &String| key.starts_with("emission") || key == "power_lm";
     let changes_light = matches!(owner, Owner::Light(_)) || keys.iter().any(is_emission);

@@ -42,7 +42,6 @@ pub(super) struct Value<'a> {
     source: &'a Source<'a>,
     pub(super) path: String,
     line: usize,
-    start: usize,
     value: &'a DeValue<'a>,
 }
 
@@ -59,11 +58,6 @@ impl<'a> Value<'a> {
     /// Where the value stands.
     pub(super) fn place(&self) -> Place {
         Place::line(self.source.file, self.line)
-    }
-
-    /// The byte at which it begins.
-    pub(super) fn start(&self) -> usize {
-        self.start
     }
 
     /// An error about this value.
@@ -180,7 +174,6 @@ impl<'a> Value<'a> {
             source: self.source,
             path: format!("{}[{index}]", self.path),
             line: self.source.line_of(value.span().start),
-            start: value.span().start,
             value: value.get_ref(),
         };
         Ok(array.iter().enumerate().map(element).collect())
@@ -286,8 +279,8 @@ impl<'a> Fields<'a> {
 
     fn value(&self, key: &str, value: &'a Spanned<DeValue<'a>>) -> Value<'a> {
         let path = if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) };
-        let start = value.span().start;
-        Value { source: self.source, path, line: self.source.line_of(start), start, value: value.get_ref() }
+        let line = self.source.line_of(value.span().start);
+        Value { source: self.source, path, line, value: value.get_ref() }
     }
 
     pub(super) fn get(&self, key: &str) -> Option<Value<'a>> {

@@ -120,11 +120,10 @@ fn read(path: &Path, options: &LoadOptions) -> Result<(Builder, IfDark), LoadErr
             materials.read(&mut context, name, &value)?;
         }
     }
-    let mut objects = object::Objects::new(&materials);
-    if let Some(list) = root.get("objects") {
-        for value in list.array()? {
-            objects.read(&mut context, &value)?;
-        }
+    let list = root.get_or("objects", Vec::new(), Value::array)?;
+    let mut objects = object::Objects::new(&materials, list.len());
+    for value in &list {
+        objects.read(&mut context, value)?;
     }
     if let Some(list) = root.get("lights") {
         for value in list.array()? {

@@ -3,11 +3,11 @@
 
 mod turns;
 
-pub(super) use turns::object_keyframes;
+pub(super) use turns::{most_cuts, object_keyframes};
 
 use super::fields::{Fields, Value};
 use crate::scene::load::{LoadError, Shutter};
-use crate::scene::{Camera, Motion, MotionKey, Pose};
+use crate::scene::{Camera, Motion, MotionKey, Pose, right_of};
 use glam::{Affine3A, Mat3A, Quat, Vec3, Vec3A};
 
 /// Values at increasing times.
@@ -92,7 +92,7 @@ impl Keyframes<(Vec3, Vec3)> {
         let pose = |time: f64| {
             let (position, look_at) = self.at(time);
             let forward = (look_at - position).normalize_or(camera.forward);
-            let right = forward.cross(camera.up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector());
+            let right = right_of(forward, camera.up);
             let axes = Mat3A::from_cols(right.into(), right.cross(forward).into(), (-forward).into());
             let rotation = Quat::from_mat3a(&axes).normalize();
             Pose { translation: Vec3A::from(position), rotation, stretch: Mat3A::IDENTITY }

@@ -18,6 +18,8 @@ pub(super) struct Objects<'m, 'a> {
     files: HashMap<(PathBuf, bool), Vec<(MeshId, MaterialId)>>,
     read: usize,
     any_moves: bool,
+    /// Of each object's motion.
+    most_cuts: u32,
 }
 
 /// What every object has.
@@ -33,8 +35,8 @@ struct Placement {
 }
 
 impl<'m, 'a> Objects<'m, 'a> {
-    pub(super) fn new(materials: &'m Materials<'a>) -> Self {
-        Self { materials, files: HashMap::new(), read: 0, any_moves: false }
+    pub(super) fn new(materials: &'m Materials<'a>, count: usize) -> Self {
+        Self { materials, files: HashMap::new(), read: 0, any_moves: false, most_cuts: motion::most_cuts(count) }
     }
 
     /// Whether an object that was read has keyframes.
@@ -64,7 +66,7 @@ impl<'m, 'a> Objects<'m, 'a> {
         if let Some(keyframes) = fields.get_some("keyframes", motion::object_keyframes)? {
             self.any_moves = true;
             stays_round = keyframes.leave_spheres(to_world);
-            moves = keyframes.motion(to_world, context.shutter);
+            moves = keyframes.motion(to_world, context.shutter, self.most_cuts);
             to_world = keyframes.at(context.shutter.opens) * to_world;
         }
         let placement = Placement {

@@ -63,6 +63,17 @@ impl ObjectKey {
     }
 }
 
+/// How often the motion of each of so many objects is cut at most: a pose takes about as much memory as all that a file says of a
+/// small object.
+pub(in crate::scene::load::toml) fn most_cuts(objects: usize) -> u32 {
+    // 256 turns of an open shutter are a blur in which nobody can tell more.
+    const OF_ONE: usize = 1023;
+    const OF_ALL: usize = 1 << 18;
+    // Four turns of an open shutter are left to any object.
+    const LEAST: usize = 15;
+    (OF_ALL / objects.max(1)).clamp(LEAST, OF_ONE) as u32
+}
+
 impl Keyframes<ObjectKey> {
     fn pose(&self, time: f64) -> Pose {
         let Between { before, after, share } = self.around(time);
@@ -82,28 +93,34 @@ impl Keyframes<ObjectKey> {
         self.pose(time).to_affine()
     }
 
-    /// The motion of something placed by `before` while the shutter is open; `None` where it rests.
-    pub(in crate::scene::load::toml) fn motion(&self, before: Affine3A, shutter: Shutter) -> Option<Motion> {
+    /// The motion of something placed by `before` while the shutter is open, cut at most so often between keyframes ([`most_cuts`]);
+    /// `None` where it rests.
+    pub(in crate::scene::load::toml) fn motion(
+        &self,
+        before: Affine3A,
+        shutter: Shutter,
+        most_cuts: u32,
+    ) -> Option<Motion> {
         if shutter.stays_open == 0.0 {
             return None;
         }
         let ends = self.times(shutter, 0);
+        let cuts: Vec<f64> = ends.windows(2).map(|pair| self.cuts(pair[0], pair[1])).collect();
+        let kept = (f64::from(most_cuts) / cuts.iter().sum::<f64>()).min(1.0);
         let mut times = vec![shutter.opens];
-        for pair in ends.windows(2) {
-            let pieces = self.pieces(pair[0], pair[1]);
+        for (pair, cuts) in ends.windows(2).zip(cuts) {
+            let pieces = (cuts * kept).round() as u32 + 1;
             times.extend((1..=pieces).map(|i| pair[0] + (pair[1] - pair[0]) * f64::from(i) / f64::from(pieces)));
         }
         moving(times, shutter, |time| self.pose(time), before)
     }
 
-    /// Into how many pieces a time without a keyframe inside is cut, so that the short way between two of them is the way. 256
-    /// turns of an open shutter are a blur in which nobody can tell more.
-    fn pieces(&self, opens: f64, closes: f64) -> u32 {
-        const MOST: f64 = 1024.0;
+    /// How often a time without a keyframe inside must be cut, so that the short way from cut to cut is the way.
+    fn cuts(&self, opens: f64, closes: f64) -> f64 {
         const LONGEST_DEG: f64 = 90.0;
         let (from, to) = (self.around(opens), self.around(0.5 * (opens + closes)));
-        let Some((_, [start, end])) = to.before.common_axis(to.after) else { return 1 };
+        let Some((_, [start, end])) = to.before.common_axis(to.after) else { return 0.0 };
         let share = 2.0 * f64::from((to.share - from.share).abs());
-        ((end - start).abs() * share / LONGEST_DEG).ceil().clamp(1.0, MOST) as u32
+        (((end - start).abs() * share / LONGEST_DEG).ceil() - 1.0).max(0.0)
     }
 }

@@ -1,7 +1,8 @@
 //! What one file holds at different times: the same things under the same numbers, seen and lit in the same way, where nothing in
 //! the file changes that.
 
-use super::{LoadError, LoadOptions, load};
+use crate::scene::hash::content_hash;
+use crate::scene::load::{LoadError, LoadOptions, load};
 use crate::scene::{Light, Scene};
 use glam::{Quat, Vec3};
 use std::path::PathBuf;
@@ -333,4 +334,58 @@ fn turns_go_as_far_as_they_are_written() {
     turning(&two_axes(90.0), 0.0).at(0.5);
     let said = turning(&two_axes(200.0), 0.0).try_at(0.5).expect_err("either way is as good").to_string();
     assert!(said.contains("half a turn"), "{said}");
+}
+
+/// Beyond 65,535 bytes reading them ended in a panic: blanks, as many as a format's width, brought them to their place.
+#[test]
+fn keyframes_may_stand_anywhere_in_a_long_file() {
+    let object = "[[objects]]\nsphere = { center = [0, 0, 0], radius = 1 }\nmaterial = \"late\"\n";
+    let long = |material: &str, light: &str| {
+        let comments = "# a comment\n".repeat(6_000);
+        let material = format!("[materials.late]\ntype = \"diffuse\"\n{material}\n");
+        let light = format!("[[lights]]\ntype = \"point\"\nposition = [0, 3, 0]\n{light}\n");
+        File::new("a.toml", &format!("{TOML}{comments}{material}{object}{light}"))
+    };
+    let moving = long(
+        "keyframes = [ { time = 0, reflectance = [0.5, 0, 0] }, { time = 2, reflectance = [0, 0.5, 0] } ]",
+        "keyframes = [ { time = 0, intensity_cd = 10 }, { time = 2, intensity_cd = 30 } ]",
+    );
+    let fixed = long("reflectance = [0.375, 0.125, 0]", "intensity_cd = 15");
+    assert_eq!(content_hash(&moving.at(0.5)), content_hash(&fixed.at(0.5)));
+    let lit = "intensity_cd = 15";
+    let wrong = long("keyframes = [ { time = 0, \"réflectance\" = 0.5 } ]", lit).try_at(0.0).expect_err("no such key");
+    let expected = ":6010: unknown key \"réflectance\" in materials.late; did you mean \"reflectance\"?";
+    assert!(wrong.to_string().ends_with(expected), "{wrong}");
+    let wrong =
+        long("keyframes = [ { time = 0, reflectance = [0.5, -1, 0] } ]", lit).try_at(0.0).expect_err("negative");
+    assert!(wrong.to_string().contains(":6010: materials.late.reflectance: "), "{wrong}");
+}
+
+/// Keyframes are cut into pieces of a quarter turn: 46 kB of them were 116 MB, 1024 pieces from each to the next one, and so were 113 kB
+/// of objects.
+#[test]
+fn keyframes_of_many_turns_are_few_poses() {
+    let turning = |keyframes: &str| {
+        format!(
+            "[[objects]]\nbox = {{ min = [0, 0, 0], max = [1, 1, 1] }}\nmaterial = \"white\"\nkeyframes = [{keyframes}]\n"
+        )
+    };
+    let poses = |objects: &str| -> usize {
+        let open = TOML.replace("look_at = [0, 0, 0]", "look_at = [0, 0, 0]\nshutter_s = 1");
+        let scene = File::new("a.toml", &format!("{open}{LIT}{objects}")).at(0.0);
+        scene.instances.iter().map(|instance| instance.motion.as_ref().expect("it turns").keys().len()).sum()
+    };
+    let keyframe = |number: u32| {
+        format!(
+            "{{ time = {}, rotate_deg = {}, axis = [0, 1, 0] }}",
+            f64::from(number) / 1000.0,
+            number % 2 * 1_000_000
+        )
+    };
+    let of_one = poses(&turning(&(0..=1000).map(keyframe).collect::<Vec<_>>().join(", ")));
+    assert!((1001..=2100).contains(&of_one), "{of_one}");
+    let fast = turning("{ time = 0 }, { time = 1, rotate_deg = 1e6, axis = [0, 1, 0] }");
+    assert_eq!(poses(&fast), 1025);
+    let of_many = poses(&fast.repeat(1000));
+    assert!((200_000..=270_000).contains(&of_many), "{of_many}");
 }

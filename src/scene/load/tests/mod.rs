@@ -1,0 +1,3 @@
+//! What readers of several formats promise alike.
+
+mod over_time;
