@@ -66,7 +66,8 @@ impl Node {
             [f32::INFINITY; LANES],
             [f32::NEG_INFINITY; LANES],
         ],
-        children: [Child(0); LANES],
+        // A leaf, not the root: a ray that is not a number is in every box, and must come to an end all the same.
+        children: [Child(Child::LEAF); LANES],
     };
 
     pub(super) fn set(&mut self, slot: usize, min: Vec3A, max: Vec3A, child: Child) {
@@ -458,6 +459,20 @@ mod tests {
 
     fn bits(hit: &TriangleHit) -> [u32; 3] {
         [hit.t, hit.b1, hit.b2].map(f32::to_bits)
+    }
+
+    /// A ray that is not a number is in every box, those of empty slots among them, which led back to the root: it took all memory.
+    #[test]
+    fn rays_without_numbers_end_and_hit_nothing() {
+        let mut tree = build(&clutter());
+        let nan = Vec3A::splat(f32::NAN);
+        for kernels in [Kernels::best(), Kernels::PORTABLE] {
+            tree.kernels = kernels;
+            for (origin, direction) in [(nan, Vec3A::X), (Vec3A::ZERO, nan), (nan, nan)] {
+                assert!(tree.closest(origin, direction, f32::INFINITY, |_| true).is_none());
+                assert!(!tree.any(origin, direction, f32::INFINITY, |_| true));
+            }
+        }
     }
 
     /// Every set of instructions gives the same bytes as testing all triangles one by one does, of two equal hits the one

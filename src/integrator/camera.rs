@@ -34,6 +34,10 @@ pub struct CameraSample {
     pub time: f32,
 }
 
+/// Radii of lenses and distances of focus beyond this count as this, in scene units: their squares would be no numbers, and no ray would have
+/// a direction. The rays through a pixel are parallel to the last bit long before.
+const FARTHEST: f32 = 1e15;
+
 impl CameraRays {
     /// For a picture of `width` × `height` pixels.
     pub fn new(camera: &Camera, width: u32, height: u32) -> Self {
@@ -51,9 +55,9 @@ impl CameraRays {
             pixel_right: right * (pixel.x * half_height),
             pixel_down: -up * (pixel.y * half_height),
             center: Vec2::new(-window.min.x, window.max.y) / pixel,
-            lens_right: right * camera.aperture_radius,
-            lens_up: up * camera.aperture_radius,
-            focus_distance: camera.focus_distance,
+            lens_right: right * camera.aperture_radius.min(FARTHEST),
+            lens_up: up * camera.aperture_radius.min(FARTHEST),
+            focus_distance: camera.focus_distance.min(FARTHEST),
             parallel,
             motion: camera.motion.clone(),
         }
@@ -167,6 +171,22 @@ mod tests {
         let mirrored = CameraRays::new(&Camera { mirrored: true, ..camera(0.0) }, 200, 100);
         let left = ray(&mirrored, 200.0, 50.0, [0.5; 2], 0.0).1;
         assert!(left.distance(Vec3::new(-2.0, 0.0, -1.0).normalize()) < 1e-6);
+    }
+
+    /// A distance whose square is no number, as old files have for "never", left all rays without a direction; so did such a lens.
+    #[test]
+    fn rays_have_directions_however_far_the_focus_is() {
+        for (aperture_radius, focus_distance) in [(0.0, 1e30), (0.1, f32::MAX), (1e37, 4.0), (f32::MAX, f32::MAX)] {
+            let projections = [camera(0.0).projection, Projection::Orthographic { height: 6.0 }];
+            for projection in projections {
+                let rays =
+                    CameraRays::new(&Camera { projection, aperture_radius, focus_distance, ..camera(0.0) }, 200, 100);
+                let direction = ray(&rays, 100.0, 50.0, [0.3, 0.8], 0.0).1;
+                assert!((direction.length() - 1.0).abs() < 1e-5, "{aperture_radius} {focus_distance}: {direction}");
+                let is_forward = aperture_radius > 1.0 || direction.distance(Vec3::NEG_Z) < 1e-5;
+                assert!(is_forward, "{aperture_radius} {focus_distance}: {direction}");
+            }
+        }
     }
 
     #[test]

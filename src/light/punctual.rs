@@ -15,7 +15,7 @@ pub(super) fn sample(light: &Light, from: Vec3) -> Option<LightSample> {
     let direction = to_light / distance;
     let share = match *light {
         Light::Spot { direction: axis, inner_angle, outer_angle, falloff, .. } => {
-            falloff.at(-direction.dot(axis), inner_angle, outer_angle)
+            falloff.at(-direction, axis, inner_angle, outer_angle)
         }
         _ => 1.0,
     };

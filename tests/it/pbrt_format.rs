@@ -66,6 +66,37 @@ fn options_are_a_name_and_a_value() {
     assert!(wrong.contains("scene.pbrt:1: expected a value, found Film"), "{wrong}");
 }
 
+/// What is read but not rendered is told, of textures, media and lights as well: `power` made distant lights as many times as bright.
+#[test]
+fn what_is_not_rendered_is_told() {
+    let texture = r#"Texture "t" "spectrum" "constant" "float valu" 1 Material "diffuse" "texture reflectance" "t""#;
+    for (directives, told) in [
+        (texture, r#"texture "t": not used: "float valu"."#),
+        (r#"MakeNamedMedium "m" "rgb sigma_s" [0 0 0] "rgb Le" [5 5 5]"#, r#"medium "m": not used: "rgb Le"."#),
+        (r#"LightSource "distant" "float power" 10"#, r#"light "distant": not used: "float power"."#),
+        (
+            r#"MakeNamedMedium "m" "rgb sigma_s" [0 0 0] MediumInterface "" "m" ReverseOrientation"#,
+            "the medium outside of a reversed shape is not rendered.",
+        ),
+    ] {
+        let scene = scene("", &format!("{directives} {SQUARE}"));
+        assert!(scene.notes.iter().any(|note| note.ends_with(told)), "{directives}: {:?}", scene.notes);
+    }
+}
+
+/// pbrt's "glass-F5" is Schott's SF5, of 1.6727 and not of 1.6034.
+#[test]
+fn glasses_go_by_pbrts_names() {
+    for (name, ior) in [("BK7", 1.5168), ("F5", 1.6727), ("F10", 1.7283), ("F11", 1.7847)] {
+        let scene = scene("", &format!(r#"Material "dielectric" "spectrum eta" "glass-{name}" {SQUARE}"#));
+        let found = scene.materials.iter().find_map(|material| match material.surface {
+            Surface::Dielectric { ior, .. } => Some(ior),
+            _ => None,
+        });
+        assert!(found.is_some_and(|found| (found - ior).abs() < 1e-4), "{name}: {found:?}");
+    }
+}
+
 #[test]
 fn imports_keep_their_state_to_themselves() {
     let folder = folder();

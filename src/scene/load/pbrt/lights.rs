@@ -41,7 +41,7 @@ impl Reader<'_> {
                 let direction = to_world.transform_vector3(travels).try_normalize();
                 let direction = direction.ok_or_else(|| parameters.error("\"from\" and \"to\" are the same point"))?;
                 let illuminance = self.positive(parameters, "illuminance")?;
-                let irradiance = self.light_color(parameters, "L", 1.0)? * illuminance.unwrap_or(1.0);
+                let irradiance = self.scaled_color(parameters, "L")? * illuminance.unwrap_or(1.0);
                 self.builder.lights.push(Light::Directional {
                     direction,
                     irradiance,
@@ -76,12 +76,17 @@ impl Reader<'_> {
         Ok(value)
     }
 
-    /// The light's colour times its scale, the sensor's and, where `power` is given, that over `full` steradian.
-    fn light_color(&mut self, parameters: &Parameters, name: &str, full: f32) -> Result<Vec3, LoadError> {
+    /// The light's colour times its scale and the sensor's.
+    fn scaled_color(&mut self, parameters: &Parameters, name: &str) -> Result<Vec3, LoadError> {
         let color = self.color(parameters, name, Meaning::Light)?.unwrap_or(Vec3::ONE);
         let scale = parameters.float_or("scale", 1.0)?.max(0.0);
+        Ok(color * scale * self.exposure)
+    }
+
+    /// The same times `power` over `full` steradian, where that is given.
+    fn light_color(&mut self, parameters: &Parameters, name: &str, full: f32) -> Result<Vec3, LoadError> {
         let power = self.positive(parameters, "power")?.map_or(1.0, |lumen| lumen / full);
-        Ok(color * scale * power * self.exposure)
+        Ok(self.scaled_color(parameters, name)? * power)
     }
 
     fn spot(&mut self, parameters: &Parameters, to_world: &Affine3A) -> Result<(), LoadError> {
@@ -94,7 +99,8 @@ impl Reader<'_> {
         if !(0.0..=180.0).contains(&outer) || delta < 0.0 {
             return Err(parameters.error("\"coneangle\" must lie in [0, 180], \"conedeltaangle\" must not be negative"));
         }
-        let (outer_angle, inner_angle) = (outer.to_radians(), (outer - delta).max(0.0).to_radians());
+        // pbrt takes the cosine of the difference, whatever its sign.
+        let (outer_angle, inner_angle) = (outer.to_radians(), (outer - delta).abs().min(outer).to_radians());
         let falloff = SpotFalloff::Smoothstep;
         let intensity = self.light_color(parameters, "I", falloff.solid_angle(inner_angle, outer_angle))?;
         self.builder.lights.push(Light::Spot {
@@ -126,7 +132,8 @@ impl Reader<'_> {
         environment.scale = scale;
         if let Some(lux) = illuminance {
             let up = environment.from_world.transpose() * Vec3::Z;
-            let present = luminance(environment.irradiance(up)) / scale.max(f32::MIN_POSITIVE);
+            // pbrt sums its texels as if they covered half a sphere: its pictures are twice as bright as their lux say.
+            let present = 0.5 * luminance(environment.irradiance(up)) / scale.max(f32::MIN_POSITIVE);
             if present > 0.0 {
                 environment.scale *= lux / present;
             }

@@ -86,7 +86,6 @@ impl Reader<'_> {
         let absorption = absorption.unwrap_or(Vec3::new(0.0011, 0.0024, 0.014)) * scale;
         self.media.insert(name.to_owned(), Medium { absorption: absorption.max(Vec3::ZERO) });
         parameters.find(&["float"], "g");
-        parameters.find(&["rgb", "spectrum", "blackbody"], "Le");
         self.note_unread(&format!("medium \"{name}\""), parameters);
         Ok(())
     }

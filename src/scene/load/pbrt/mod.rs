@@ -201,6 +201,9 @@ impl Reader<'_> {
         let alpha = shape.word(&["texture"], "alpha")?.map(str::to_owned);
         let alpha_number = shape.float("alpha")?;
         let medium = self.state.inside_medium.clone();
+        if self.state.reverse_orientation && medium.is_none() && self.state.outside_medium.is_some() {
+            self.builder.note(format!("{}: the medium outside of a reversed shape is not rendered.", shape.place()));
+        }
         // Luminous power is shared out over each shape's own area: such materials are never the same.
         let has_power = light.as_ref().is_some_and(|light| light.float("power").is_ok_and(|power| power.is_some()));
         let key = MaterialKey {

@@ -8,6 +8,7 @@ use super::parameters::Parameters;
 use crate::scene::{ColorInput, Encoding, ScalarInput, TextureLookup, Wrap};
 use glam::{Vec2, Vec3};
 use std::cell::OnceCell;
+use std::path::Path;
 use std::rc::Rc;
 
 /// Deepest chain of textures that use textures.
@@ -30,6 +31,12 @@ impl Definition {
     }
 }
 
+/// Whether a picture's numbers are light, by its name.
+fn holds_light(file: &Path) -> bool {
+    let ending = file.extension().map(|ending| ending.to_ascii_lowercase());
+    ending.is_some_and(|ending| ["exr", "hdr", "pfm"].iter().any(|light| ending == *light))
+}
+
 impl Reader<'_> {
     /// A colour texture by name.
     pub(super) fn color_texture(
@@ -43,6 +50,7 @@ impl Reader<'_> {
             return Ok(*color);
         }
         let color = self.color_of(&definition, name, depth)?;
+        self.note_unread(&format!("texture \"{name}\""), &definition.parameters);
         Ok(*definition.color.get_or_init(|| color))
     }
 
@@ -112,6 +120,7 @@ impl Reader<'_> {
             return Ok(*scalar);
         }
         let scalar = self.scalar_of(&definition, name, depth)?;
+        self.note_unread(&format!("texture \"{name}\""), &definition.parameters);
         Ok(*definition.scalar.get_or_init(|| scalar))
     }
 
@@ -253,6 +262,8 @@ impl Reader<'_> {
             None | Some("sRGB") => (Encoding::Srgb, 1.0),
             Some("linear") => (Encoding::Linear, 1.0),
             Some(other) => match other.strip_prefix("gamma ").and_then(|gamma| gamma.trim().parse::<f32>().ok()) {
+                // What holds light itself is not encoded.
+                Some(gamma) if gamma > 0.0 && gamma.is_finite() && holds_light(&file) => (Encoding::Linear, 1.0),
                 Some(gamma) if gamma > 0.0 && gamma.is_finite() => (Encoding::Linear, gamma),
                 _ => {
                     return Err(

@@ -137,13 +137,15 @@ const BRASS: &[Row] = &[
 const METALS: &[(&str, &[Row])] =
     &[("Ag", SILVER), ("Au", GOLD), ("Cu", COPPER), ("Al", ALUMINIUM), ("Cr", CHROMIUM), ("Fe", IRON), ("CuZn", BRASS)];
 
-/// Index of refraction at the yellow helium line.
+/// Index of refraction at the yellow helium line, by pbrt's names: its F5, F10 and F11 are Schott's SF5, SF10 and SF11.
 const GLASSES: &[(&str, f32)] = &[
     ("BK7", 1.5168),
     ("BAF10", 1.6700),
     ("FK51A", 1.4866),
     ("LASF9", 1.8503),
-    ("F5", 1.6034),
+    ("F5", 1.6727),
+    ("F10", 1.7283),
+    ("F11", 1.7847),
     ("SF5", 1.6727),
     ("SF10", 1.7283),
     ("SF11", 1.7847),
@@ -189,7 +191,7 @@ pub(in crate::scene::load) fn metal_symbols() -> Vec<&'static str> {
     METALS.iter().map(|&(symbol, _)| symbol).collect()
 }
 
-/// Index of refraction of a glass by its catalogue name.
+/// Index of refraction of a glass by pbrt's name for it.
 pub(in crate::scene::load) fn glass(name: &str) -> Option<f32> {
     find(GLASSES, name)
 }
