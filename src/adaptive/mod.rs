@@ -158,11 +158,14 @@ pub fn resume(
     state: RenderState,
     monitor: &dyn Monitor,
 ) -> Result<Rendered, JudgeError> {
-    let Ended { state, last_look } = run(tracer, settings, state, monitor)?;
+    let Ended { mut state, last_look } = run(tracer, settings, state, monitor)?;
     let LastLook { judgement, stop_reason } = match last_look {
         Some(last_look) => last_look,
         None => {
             let judgement = judge(&state.film, settings, state.inflation)?;
+            state.seconds_total += judgement.seconds;
+            state.seconds_perception += judgement.seconds;
+            state.seconds_denoising += judgement.seconds_denoising;
             LastLook { judgement, stop_reason: StopReason::Interrupted }
         }
     };
@@ -339,7 +342,11 @@ impl<'a> Loop<'a> {
     /// Tells the last state, and looks once more where the rule did not need to.
     fn finish(mut self, judgement: Judgement, reason: StopReason, monitor: &dyn Monitor) -> Result<Ended, JudgeError> {
         let judgement = match self.settings.sampling {
-            Sampling::Rival(_) if !self.is_looked_at() => self.look(judge)?,
+            Sampling::Rival(_) if !self.is_looked_at() => {
+                let last = self.look(judge)?;
+                self.state.seconds_perception += last.seconds;
+                last
+            }
             _ => judgement,
         };
         self.state.seconds_total = self.seconds();
