@@ -13,7 +13,7 @@ use super::beginning;
 use super::judge::{JudgeError, Judgement, still_wanted, variance_share};
 use super::plan::blocks_between;
 use super::settings::LoopSettings;
-use crate::film::{BlockSum, Film, HalfPixel, opponent};
+use crate::film::{BlockSum, Film, HalfPixel, Halves, opponent};
 use crate::integrator::{BlockWork, PathTracer, SamplePlan};
 use crate::sampler::{Half, hash_words};
 use fechner_perception::{Plane, seen};
@@ -98,8 +98,9 @@ pub fn audit(
     let mut difference = Plane::filled(width, film.height() as usize, 0.0);
     let mut variance = Plane::filled(width, film.height() as usize, 0.0);
     for (&pixel, halves) in pixels.iter().zip(&fresh.halves) {
-        let kept: f64 = Half::BOTH.iter().map(|&h| 0.5 * opponent(film.half(h)[pixel].mean)[0]).sum();
-        let again: f64 = halves.iter().map(|half| 0.5 * opponent(half.mean)[0]).sum();
+        let luminance = |half: &HalfPixel| opponent(half.mean)[0];
+        let kept = film.halves(pixel).mean(luminance);
+        let again = Halves::of(halves.each_ref()).mean(luminance);
         // Fresh less kept has twice the variance of one of them.
         difference.values_mut()[pixel] = (nits * (again - kept) / std::f64::consts::SQRT_2) as f32;
         let per_sample = f64::from(judgement.met_per_sample.values()[pixel]);

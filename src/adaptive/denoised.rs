@@ -128,7 +128,7 @@ impl TimedDenoising {
             };
             let of_rgb = |rgb: &[[f32; 3]]| shown(&|pixel| opponent(rgb[pixel].map(f64::from))[c]);
             let of_raw_half =
-                |half: Half| shown(&|pixel| settings.nits_per_unit * opponent(film.half_or_other(half, pixel).mean)[c]);
+                |half: Half| shown(&|pixel| settings.nits_per_unit * opponent(film.halves(pixel).half_or_other(half).mean)[c]);
             let picture = of_rgb(&self.film.rgb_cd_m2);
             let half_difference = half_of(self.film.halves_rgb_cd_m2.each_ref().map(|half| of_rgb(half)));
             let raw_half_difference = half_of(Half::BOTH.map(of_raw_half));
@@ -193,7 +193,7 @@ fn luminance_plane(rgb: &[[f32; 3]], width: usize) -> Plane {
 fn raw_luminance(film: &Film, half: Half, nits_per_unit: f64) -> Plane {
     let width = film.width() as usize;
     Plane::from_fn(width, film.height() as usize, |x, y| {
-        (nits_per_unit * opponent(film.half_or_other(half, y * width + x).mean)[0]) as f32
+        (nits_per_unit * opponent(film.halves(y * width + x).half_or_other(half).mean)[0]) as f32
     })
 }
 

@@ -316,7 +316,7 @@ pub fn display_scale(
     by_channel(|c| {
         let scene = Plane::from_fn(guide.width(), guide.height(), |x, y| {
             let i = y * guide.width() + x;
-            let own = 0.5 * film.sample_variances(i, c).iter().sum::<f64>() * f64::from(shares.get(x, y));
+            let own = film.halves(i).sample_variance(c) * f64::from(shares.get(x, y));
             (own * nits_squared) as f32
         });
         let displayed = if c == 0 {
@@ -354,7 +354,7 @@ pub(crate) fn guide_rgb(film: &Film, estimate: &Estimate) -> Vec<[f32; 3]> {
     })
 }
 
-/// Variance of a pixel's mean over that of one sample, (1/n_A + 1/n_B) / 4.
+/// Variance of a pixel's mean over that of one sample: [`share_of_mean`].
 pub fn variance_share(film: &Film, pixel: usize) -> f64 {
     share_of_mean(Half::BOTH.map(|half| film.half(half)[pixel].samples))
 }

@@ -6,7 +6,7 @@
 use super::StopReason;
 use super::plan::cut_to_budget;
 use super::settings::RivalRule;
-use crate::film::{Film, opponent, variance_of_mean};
+use crate::film::{Film, opponent};
 use crate::integrator::{BlockWork, SamplePlan};
 use crate::sampler::{Half, hash_words};
 use fechner_perception::Plane;
@@ -103,16 +103,12 @@ fn dilated(mask: &[bool], width: usize) -> Vec<bool> {
 
 /// Relative standard error of the pixel by its own samples.
 fn variance_active(film: &Film, threshold: f64, exposure: f64) -> Vec<bool> {
-    let (a, b) = (film.half(Half::A), film.half(Half::B));
-    (0..a.len())
-        .map(|i| {
-            let halves = [&a[i], &b[i]];
-            let variances = halves.map(|half| half.sample_variance(0));
-            let standard_error = variance_of_mean(variances, halves.map(|half| half.samples)).sqrt();
-            let mean = 0.5 * (opponent(a[i].mean)[0] + opponent(b[i].mean)[0]);
-            standard_error > threshold * mean.max(1e-3 / exposure)
-        })
-        .collect()
+    let is_active = |pixel: usize| {
+        let halves = film.halves(pixel);
+        let mean = halves.mean(|half| opponent(half.mean)[0]);
+        halves.variance_of_mean(0).sqrt() > threshold * mean.max(1e-3 / exposure)
+    };
+    (0..film.guides().len()).map(is_active).collect()
 }
 
 /// One pass of Tungsten's: as many samples as 16 a pixel, one everywhere and the others in proportion to each record's
