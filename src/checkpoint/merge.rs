@@ -34,7 +34,7 @@ pub enum MergeError {
 /// Adds the films of several files: half A to half A and B to B, in the order of their seeds, so that the order of
 /// `paths` does not matter. Of a render whose halves are uneven, as with 1 sample a pixel, an odd seed's are added the other way round, so that the
 /// sum of many is even: eight films of one sample had 8 samples in half A, none in B, and told nothing of their noise. What was decided for the single films (plans, rungs, audits) is left behind; the largest
-/// inflation stays.
+/// inflation stays. Sums of sums hold the same samples, and may differ in the last bits of variances and first surfaces.
 ///
 /// Beside the sum, as many films are in memory as there are threads, at most 8.
 ///
@@ -68,7 +68,8 @@ pub fn merge_files(paths: &[PathBuf]) -> Result<Checkpoint, MergeError> {
     Ok(sum)
 }
 
-/// A render's film as it goes into a sum. By its own seed alone, so that neither order nor grouping changes a sum; sums stay as they are.
+/// A render's film as it goes into a sum. By its own seed alone, so that neither order nor grouping changes which samples a half has; sums
+/// stay as they are.
 fn balanced(Checkpoint { header, state }: Checkpoint) -> Checkpoint {
     let is_odd = matches!((&header.seeds.all[..], header.seeds.current), ([seed], Some(_)) if seed % 2 == 1);
     let film = if is_odd && state.film.has_uneven_halves() { state.film.with_halves_swapped() } else { state.film };
