@@ -102,7 +102,8 @@ pub fn content_hash(scene: &Scene) -> ContentHash {
 /// What the parts of a scene are called, for messages: in the file, or by a file's name.
 fn names_of_parts(scene: &mut Scene) -> impl Iterator<Item = &mut String> {
     let Scene { meshes, instances, spheres, materials, textures, .. } = scene;
-    let of_shapes = meshes.iter_mut().map(|mesh| &mut mesh.name).chain(spheres.iter_mut().map(|sphere| &mut sphere.name));
+    let of_shapes =
+        meshes.iter_mut().map(|mesh| &mut mesh.name).chain(spheres.iter_mut().map(|sphere| &mut sphere.name));
     let of_instances = instances.iter_mut().map(|instance| &mut instance.name);
     let of_surfaces = materials.iter_mut().map(|material| &mut material.name);
     of_shapes.chain(of_instances).chain(of_surfaces).chain(textures.iter_mut().map(|texture| &mut texture.name))
