@@ -4,10 +4,10 @@
 //! told. Not for use: each has a knob without a unit, and stops dark regions and fireflies early.
 
 use super::StopReason;
-use super::plan::cut_to_budget;
+use super::plan::{blocks_between, cut_to_budget, share_of_half};
 use super::settings::RivalRule;
 use crate::film::{Film, opponent};
-use crate::integrator::{BlockWork, SamplePlan};
+use crate::integrator::SamplePlan;
 use crate::sampler::{Half, hash_words};
 use fechner_perception::Plane;
 
@@ -54,15 +54,9 @@ pub fn rival_stop(rule: RivalRule, film: &Film, exposure: f64, left: u64) -> Sto
 /// Takes `samples` of a pixel, half of them in each half, through as many doublings as they reach.
 fn push_samples(plan: &mut SamplePlan, film: &Film, pixel: usize, samples: u32) {
     for half in Half::BOTH {
-        let mut left = (samples + 1 - half.index() as u32) / 2;
-        let mut taken = film.half(half)[pixel].taken;
-        while left > 0 {
-            let rest = BlockWork::rest(pixel as u32, half, taken);
-            let block = BlockWork { samples: rest.samples.min(left), ..rest };
-            plan.blocks.push(block);
-            taken += block.samples;
-            left -= block.samples;
-        }
+        let taken = film.half(half)[pixel].taken;
+        let wanted = taken.saturating_add(share_of_half(samples, half));
+        plan.blocks.extend(blocks_between(pixel as u32, half, taken, wanted));
     }
 }
 
@@ -183,7 +177,7 @@ mod tests {
     use super::*;
     use crate::adaptive::plan::pilot_plan;
     use crate::film::BlockSum;
-    use crate::integrator::{FirstHit, PathSample};
+    use crate::integrator::{BlockWork, FirstHit, PathSample};
     use glam::Vec3;
 
     /// A film whose left half is noise of standard deviation `noise` about 0.5, and whose right half is flat.
