@@ -98,12 +98,12 @@ impl Loop<'_> {
         } else {
             let raw = judge_raw(film, self.settings)?;
             if may_look && until_look.must_look(film, &raw, rung) {
-                self.state.seconds_perception += started.elapsed().as_secs_f64();
+                self.state.seconds.perception += started.elapsed().as_secs_f64();
                 return Ok(false);
             }
             cut(until_look.plan(film, &raw, self.settings.limits.max_samples, left), film, &raw, left)
         };
-        self.state.seconds_perception += started.elapsed().as_secs_f64();
+        self.state.seconds.perception += started.elapsed().as_secs_f64();
         if plan.blocks.is_empty() {
             return Ok(false);
         }
@@ -183,7 +183,7 @@ impl Loop<'_> {
         let started = Instant::now();
         let forecast = Forecast::of(film, judgement);
         let wanted = wanted_samples(judgement, &forecast, self.settings.allocation, rung, limits)?;
-        self.state.seconds_allocation += started.elapsed().as_secs_f64();
+        self.state.seconds.allocation += started.elapsed().as_secs_f64();
         if predicted_saving(film, judgement, &wanted.samples, rung) < LEAST_SAVING {
             return Ok(None);
         }

@@ -63,7 +63,7 @@ pub fn merge_files(paths: &[PathBuf]) -> Result<Checkpoint, MergeError> {
         sum.header.seeds.all.sort_unstable();
         sum.header.seeds.current = None;
         sum.header.earlier_visibilities.clear();
-        sum.state = undecided(sum.state);
+        sum.state = sum.state.undecided(DEFAULT_MAX_SAMPLES);
     }
     Ok(sum)
 }
@@ -99,10 +99,8 @@ fn add(
     sum.state.film.add(&next.state.film).map_err(|problem| different(problem.to_owned()))?;
     sum.state.inflation = sum.state.inflation.max(next.state.inflation);
     sum.state.plans = sum.state.plans.saturating_add(next.state.plans);
-    sum.state.seconds_total += next.state.seconds_total;
-    sum.state.seconds_perception += next.state.seconds_perception;
-    sum.state.seconds_allocation += next.state.seconds_allocation;
-    sum.state.seconds_denoising += next.state.seconds_denoising;
+    sum.state.looks = sum.state.looks.saturating_add(next.state.looks);
+    sum.state.seconds += next.state.seconds;
     sum.header.settings.importance = sum.header.settings.importance.or(header.settings.importance);
     sum.header.visibility = stricter(sum.header.visibility, next.header.visibility);
     sum.header.seeds.all.extend(next.header.seeds.all);
@@ -115,21 +113,6 @@ fn stricter(one: f64, other: f64) -> f64 {
         [Some(one), Some(other)] => one.min(other),
         [Some(only), None] | [None, Some(only)] => only,
         [None, None] => 0.0,
-    }
-}
-
-/// The film of a state and what it took, without what was decided about it.
-fn undecided(state: RenderState) -> RenderState {
-    let RenderState { film, inflation, plans, seconds_total, seconds_perception, .. } = state;
-    let (seconds_allocation, seconds_denoising) = (state.seconds_allocation, state.seconds_denoising);
-    RenderState {
-        inflation,
-        plans,
-        seconds_total,
-        seconds_perception,
-        seconds_allocation,
-        seconds_denoising,
-        ..RenderState::of_film(film, DEFAULT_MAX_SAMPLES)
     }
 }
 

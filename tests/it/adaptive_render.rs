@@ -301,7 +301,7 @@ fn every_look_is_in_the_seconds() {
         }));
         let rendered = render(&tracer, &settings, monitor).expect("renders");
         let asleep = ASLEEP.as_secs_f64() * f64::from(asked.load(Ordering::Relaxed));
-        let (looks, all) = (rendered.seconds_perception, rendered.seconds_total);
+        let (looks, all) = (rendered.seconds.perception, rendered.seconds.total);
         assert!(asleep > 0.0 && looks >= asleep && all >= looks, "{sampling:?}: asleep {asleep} s of {looks} of {all}");
     }
 }
