@@ -64,7 +64,7 @@ pub struct Limits {
     pub max_samples: u32,
     /// Number of plans, to repeat a render that ended by time.
     pub plans: Option<u32>,
-    /// Samples of every pixel before the first look, at least 2.
+    /// Samples of every pixel before the first look, or as many as the other limits allow where these are fewer.
     pub pilot_samples: u32,
 }
 
