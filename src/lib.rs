@@ -35,3 +35,4 @@ pub mod sampler;
 pub mod say;
 pub mod scene;
 pub mod sealed;
+mod student;

@@ -127,8 +127,9 @@ impl TimedDenoising {
                 Plane::from_fn(width, slope.height(), |x, y| (signal(y * width + x) as f32) * slope.get(x, y))
             };
             let of_rgb = |rgb: &[[f32; 3]]| shown(&|pixel| opponent(rgb[pixel].map(f64::from))[c]);
-            let of_raw_half =
-                |half: Half| shown(&|pixel| settings.nits_per_unit * opponent(film.half_or_other(half, pixel).mean)[c]);
+            let of_raw_half = |half: Half| {
+                shown(&|pixel| settings.nits_per_unit * opponent(film.halves(pixel).half_or_other(half).mean)[c])
+            };
             let picture = of_rgb(&self.film.rgb_cd_m2);
             let half_difference = half_of(self.film.halves_rgb_cd_m2.each_ref().map(|half| of_rgb(half)));
             let raw_half_difference = half_of(Half::BOTH.map(of_raw_half));

@@ -1,9 +1,11 @@
 //! The film as it will be seen: thresholds, remaining visibility, and how each pixel's samples scatter on the display.
 
 mod over_white;
+mod per_sample;
 mod steps;
 
 use self::over_white::OverWhite;
+use self::per_sample::PerSample;
 pub use self::steps::Thresholds;
 use self::steps::{Guide, Scatter, chromatic_gains, found_thresholds};
 use super::denoised::{DenoisedPicture, TimedDenoising};
@@ -132,28 +134,17 @@ fn judge_by(
     let thresholds = found_thresholds(&guide, &displayed_guide, tone.as_ref(), &noise, settings)?;
     let gains = chromatic_gains(&thresholds.in_bands, settings)?;
     still_wanted(settings)?;
-    let met_per_sample = scatter.pooled_per_sample(&thresholds.in_bands, gains.as_ref());
-    let of_halves = (purpose == Purpose::Plan).then(|| {
-        let scales = scatter.luminance_scales_of_halves(film, tone.as_ref(), settings, raw_inflation);
-        scatter.per_sample_of_halves(film, scales.each_ref(), &thresholds.in_bands, gains.as_ref())
-    });
-    let missed_by = |light: &Plane| match denoised {
-        None => scatter.missed_noise(film, light, tone.as_ref(), settings),
-        Some(_) => None,
+    let scales = (purpose == Purpose::Plan)
+        .then(|| scatter.luminance_scales_of_halves(film, tone.as_ref(), settings, raw_inflation));
+    let met = PerSample::met(&scatter, film, scales.as_ref(), &thresholds.in_bands, gains.as_ref());
+    let per_sample = match denoised {
+        None => {
+            let missed_beside = |light: &Plane| scatter.missed_noise(film, light, tone.as_ref(), settings);
+            let light_of = |half: Half| half_luminance(film, half, settings.nits_per_unit);
+            met.or_missed(&estimate.luminance_cd_m2, light_of, missed_beside)
+        }
+        Some(_) => met,
     };
-    let or_missed = |per_sample: &Plane, light: &Plane| match missed_by(light) {
-        None => per_sample.clone(),
-        Some(missed) => missed.or_scatter(per_sample),
-    };
-    let pooled_variance_per_sample = or_missed(&met_per_sample, &estimate.luminance_cd_m2);
-    let variance_per_sample = of_halves.map(|halves| {
-        // As the other half sees it: see `luminance_scales_of_halves`.
-        let of = |half: Half| {
-            let light = half_luminance(film, half.other(), settings.nits_per_unit);
-            or_missed(&halves[half.index()], &light)
-        };
-        Half::BOTH.map(of)
-    });
     still_wanted(settings)?;
     let over_white = if settings.is_transparent {
         let colour_scale = denoised.is_none().then(|| scatter.luminance_scale());
@@ -162,44 +153,20 @@ fn judge_by(
         None
     };
     still_wanted(settings)?;
-    let denoised = match denoised {
-        Some(found) => {
-            let mut picture = found.judged(film, settings, tone.as_ref(), &thresholds.in_bands, &estimate)?;
-            picture.error.raise_inferred(inflation.sqrt());
-            if film.width().min(film.height()) < LEAST_SIDE_OF_HALVES {
-                let raw = thresholds.visibility(&scatter.of_mean(&pooled_variance_per_sample));
-                picture.error = picture.error.with_noise_of_at_least(&raw);
-            }
-            if let Some(over_white) = &over_white {
-                // Alpha is not denoised.
-                picture.error = picture.error.with_noise_of_at_least(over_white.visibility());
-            }
-            Some(picture)
-        }
-        None => None,
+    let raw_noise = || thresholds.visibility(&scatter.of_mean(&per_sample.pooled));
+    let look = Look {
+        film,
+        settings,
+        estimate: &estimate,
+        tone: tone.as_ref(),
+        thresholds: &thresholds,
+        raw_noise: &raw_noise,
+        over_white: over_white.as_ref(),
     };
+    let denoised = denoised.map(|found| look.judged_picture(found, inflation)).transpose()?;
     still_wanted(settings)?;
-    let is_known = film.has_both_halves();
-    let predicted = if !is_known {
-        Plane::filled(film.width() as usize, film.height() as usize, f32::INFINITY)
-    } else {
-        let of_error = match &denoised {
-            Some(denoised) => denoised.error.visibility.clone(),
-            None => {
-                let before_black = thresholds.visibility(&scatter.of_mean(&pooled_variance_per_sample));
-                worse_of(before_black, over_white.as_ref().map(OverWhite::visibility))
-            }
-        };
-        // An infinite variance, pooled with others, is NaN.
-        let of_error = of_error.map(|v| if v.is_nan() { f32::INFINITY } else { v });
-        per_importance(of_error, settings.importance.as_ref())
-    };
-    let (pooled_variance_per_sample, variance_per_sample) = match &over_white {
-        None => (pooled_variance_per_sample, variance_per_sample),
-        Some(over_white) => {
-            over_white.worse_per_sample(&thresholds.limits(), &pooled_variance_per_sample, variance_per_sample)
-        }
-    };
+    let predicted = look.predicted(denoised.as_ref());
+    let PerSample { met, pooled, of_halves } = per_sample.or_over_white(over_white.as_ref(), &thresholds);
     Ok(Judgement {
         estimate,
         denoised,
@@ -208,14 +175,58 @@ fn judge_by(
         tone,
         thresholds,
         importance: settings.importance.clone(),
-        is_known,
+        is_known: film.has_both_halves(),
         predicted,
-        pooled_variance_per_sample,
-        variance_per_sample,
-        met_per_sample,
+        pooled_variance_per_sample: pooled,
+        variance_per_sample: of_halves,
+        met_per_sample: met,
         over_white,
         measured: OnceLock::new(),
     })
+}
+
+/// What is found on the way to a picture's noise.
+struct Look<'a> {
+    film: &'a Film,
+    settings: &'a LoopSettings,
+    estimate: &'a Estimate,
+    tone: &'a dyn FittedTone,
+    thresholds: &'a Thresholds,
+    /// Visibility of the raw mean's noise before black, which costs as much as the thresholds.
+    raw_noise: &'a dyn Fn() -> Plane,
+    over_white: Option<&'a OverWhite>,
+}
+
+impl Look<'_> {
+    /// The denoised picture and its error, of which what is inferred is multiplied by the root of `inflation`.
+    fn judged_picture(&self, found: TimedDenoising, inflation: f64) -> Result<DenoisedPicture, JudgeError> {
+        let mut picture =
+            found.judged(self.film, self.settings, self.tone, &self.thresholds.in_bands, self.estimate)?;
+        picture.error.raise_inferred(inflation.sqrt());
+        if self.film.width().min(self.film.height()) < LEAST_SIDE_OF_HALVES {
+            picture.error = picture.error.with_noise_of_at_least(&(self.raw_noise)());
+        }
+        if let Some(over_white) = self.over_white {
+            // Alpha is not denoised.
+            picture.error = picture.error.with_noise_of_at_least(over_white.visibility());
+        }
+        Ok(picture)
+    }
+
+    /// [`Judgement::predicted`].
+    fn predicted(&self, denoised: Option<&DenoisedPicture>) -> Plane {
+        let (width, height) = (self.film.width() as usize, self.film.height() as usize);
+        if !self.film.has_both_halves() {
+            return Plane::filled(width, height, f32::INFINITY);
+        }
+        let of_error = match denoised {
+            Some(denoised) => denoised.error.visibility.clone(),
+            None => worse_of((self.raw_noise)(), self.over_white.map(OverWhite::visibility)),
+        };
+        // An infinite variance, pooled with others, is NaN.
+        let of_error = of_error.map(|v| if v.is_nan() { f32::INFINITY } else { v });
+        per_importance(of_error, self.settings.importance.as_ref())
+    }
 }
 
 /// The greater of both, where there are two.
@@ -320,14 +331,14 @@ pub fn display_scale(
     inflation: f64,
 ) -> [Plane; CHANNELS] {
     let noise = NoiseOnDisplay { shares, tone, settings, inflation };
-    by_channel(|c| noise.scale(c, guide, |pixel| 0.5 * film.sample_variances(pixel, c).iter().sum::<f64>()))
+    by_channel(|c| noise.scale(c, guide, |pixel| film.halves(pixel).sample_variance(c)))
 }
 
 /// Luminance of a half, cd/m²; of the other one where it has no samples.
 pub(super) fn half_luminance(film: &Film, half: Half, nits_per_unit: f64) -> Plane {
     let width = film.width() as usize;
     Plane::from_fn(width, film.height() as usize, |x, y| {
-        (nits_per_unit * opponent(film.half_or_other(half, y * width + x).mean)[0]) as f32
+        (nits_per_unit * opponent(film.halves(y * width + x).half_or_other(half).mean)[0]) as f32
     })
 }
 
@@ -384,7 +395,7 @@ pub(crate) fn guide_rgb(film: &Film, estimate: &Estimate) -> Vec<[f32; 3]> {
     })
 }
 
-/// Variance of a pixel's mean over that of one sample, (1/n_A + 1/n_B) / 4.
+/// Variance of a pixel's mean over that of one sample: [`share_of_mean`].
 pub fn variance_share(film: &Film, pixel: usize) -> f64 {
     share_of_mean(Half::BOTH.map(|half| film.half(half)[pixel].samples))
 }

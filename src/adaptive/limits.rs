@@ -15,7 +15,7 @@ impl Loop<'_> {
         }
         let traced = film.total_samples().max(1);
         let elapsed = self.seconds();
-        let seconds_per_sample = (elapsed - self.state.seconds_perception).max(0.0) / traced as f64;
+        let seconds_per_sample = (elapsed - self.state.seconds.perception).max(0.0) / traced as f64;
         let next = pending.front().map_or(0, SamplePlan::samples) as f64 * seconds_per_sample;
         let look = self.looked.map_or_else(|| self.expected_look(seconds_per_sample), |looked| looked.seconds);
         let done_now = elapsed + if self.is_looked_at() { 0.0 } else { look };

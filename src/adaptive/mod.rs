@@ -37,7 +37,7 @@ use awake::with_threads_awake;
 use judge::{JudgeError, Judgement, judge, judge_to_plan};
 use plan::slices;
 use settings::{LoopSettings, Sampling};
-use state::RenderState;
+use state::{RenderState, Seconds};
 use std::collections::VecDeque;
 use std::time::Instant;
 use until_look::UntilLook;
@@ -57,14 +57,8 @@ pub struct Rendered {
     pub audit: Option<Audit>,
     /// What audits multiplied the variance by.
     pub inflation: f64,
-    /// Time from the first sample to the end, less what a resumed render lay idle.
-    pub seconds_total: f64,
-    /// Of which in the perception model, planning and audits.
-    pub seconds_perception: f64,
-    /// Of which in finding counts.
-    pub seconds_allocation: f64,
-    /// And in denoising.
-    pub seconds_denoising: f64,
+    /// What it took to its end.
+    pub seconds: Seconds,
 }
 
 impl Rendered {
@@ -77,10 +71,7 @@ impl Rendered {
             plans: state.plans,
             audit: state.audit,
             inflation: state.inflation,
-            seconds_total: state.seconds_total,
-            seconds_perception: state.seconds_perception,
-            seconds_allocation: state.seconds_allocation,
-            seconds_denoising: state.seconds_denoising,
+            seconds: state.seconds,
         }
     }
 }
@@ -158,11 +149,13 @@ pub fn resume(
     state: RenderState,
     monitor: &dyn Monitor,
 ) -> Result<Rendered, JudgeError> {
-    let Ended { state, last_look } = run(tracer, settings, state, monitor)?;
+    let Ended { mut state, last_look } = run(tracer, settings, state, monitor)?;
     let LastLook { judgement, stop_reason } = match last_look {
         Some(last_look) => last_look,
         None => {
             let judgement = judge(&state.film, settings, state.inflation)?;
+            let Judgement { seconds, seconds_denoising: denoising, .. } = judgement;
+            state.seconds += Seconds { total: seconds, perception: seconds, allocation: 0.0, denoising };
             LastLook { judgement, stop_reason: StopReason::Interrupted }
         }
     };
@@ -217,7 +210,7 @@ pub fn decide(
             return Ok(Next::Ended(Box::new(render.finish(judgement, reason, monitor)?)));
         }
     }
-    render.state.seconds_total = render.seconds();
+    render.state.seconds.total = render.seconds();
     Ok(Next::Planned(Box::new(render.state)))
 }
 
@@ -226,7 +219,7 @@ impl<'a> Loop<'a> {
         let is_below = |rung: f64, bound: Option<f64>| bound.is_none_or(|bound| rung < bound);
         let is_left = |&rung: &f64| is_below(rung, state.finished_rung) && is_below(rung, state.left_rung);
         let rungs = settings.rungs().into_iter().filter(is_left).collect();
-        let seconds_before = state.seconds_total;
+        let seconds_before = state.seconds.total;
         let state = state.kept_to(&settings.limits);
         Self { tracer, settings, rungs, state, resumed_at: Instant::now(), seconds_before, looked: None }
     }
@@ -255,8 +248,8 @@ impl<'a> Loop<'a> {
 
     /// Tells what was seen and enters the plan that came of it, or says why there is none.
     fn take(&mut self, step: Step, judgement: &Judgement, look: Instant, monitor: &dyn Monitor) -> Option<StopReason> {
-        self.state.seconds_perception += look.elapsed().as_secs_f64();
-        self.state.passes += 1;
+        self.state.seconds.perception += look.elapsed().as_secs_f64();
+        self.state.looks += 1;
         monitor.looked(&progress(self, judgement, &step));
         monitor.judged(&self.state, judgement);
         match step {
@@ -282,7 +275,7 @@ impl<'a> Loop<'a> {
     fn look(&mut self, judge: Judge) -> Result<Judgement, JudgeError> {
         let started = Instant::now();
         let judgement = judge(&self.state.film, self.settings, self.state.inflation)?;
-        self.state.seconds_denoising += judgement.seconds_denoising;
+        self.state.seconds.denoising += judgement.seconds_denoising;
         let at_samples = self.state.film.total_samples();
         self.looked = Some(Looked { at_samples, seconds: started.elapsed().as_secs_f64() });
         Ok(judgement)
@@ -320,7 +313,7 @@ impl<'a> Loop<'a> {
                 let batch = beginning(rest, monitor.most_samples_a_batch());
                 let progress = |samples| monitor.samples_done(samples);
                 self.state.traced_blocks += self.tracer.trace_batch(batch, &mut self.state.film, &progress);
-                self.state.seconds_total = self.seconds();
+                self.state.seconds.total = self.seconds();
                 match monitor.between_batches(&self.state) {
                     Directive::GoOn => {}
                     Directive::Stop => return Traced::UntilLimit(StopReason::Interrupted),
@@ -339,10 +332,14 @@ impl<'a> Loop<'a> {
     /// Tells the last state, and looks once more where the rule did not need to.
     fn finish(mut self, judgement: Judgement, reason: StopReason, monitor: &dyn Monitor) -> Result<Ended, JudgeError> {
         let judgement = match self.settings.sampling {
-            Sampling::Rival(_) if !self.is_looked_at() => self.look(judge)?,
+            Sampling::Rival(_) if !self.is_looked_at() => {
+                let last = self.look(judge)?;
+                self.state.seconds.perception += last.seconds;
+                last
+            }
             _ => judgement,
         };
-        self.state.seconds_total = self.seconds();
+        self.state.seconds.total = self.seconds();
         self.state.tone = Some(judgement.tone.save());
         // With other limits they may be reached.
         self.state.left_rung = None;
@@ -367,7 +364,7 @@ pub(crate) fn beginning(blocks: &[BlockWork], most_samples: u64) -> &[BlockWork]
 }
 
 fn progress(render: &Loop<'_>, judgement: &Judgement, step: &Step) -> Progress {
-    let Loop { state: RenderState { film, passes, .. }, settings, rungs, .. } = render;
+    let Loop { state: RenderState { film, looks, .. }, settings, rungs, .. } = render;
     let pixels = f64::from(film.width()) * f64::from(film.height());
     let target = settings.limits.last_rung();
     let by_budget = settings
@@ -382,7 +379,7 @@ fn progress(render: &Loop<'_>, judgement: &Judgement, step: &Step) -> Progress {
         .sum();
     let remaining = by_budget.min(by_visibility);
     Progress {
-        pass: *passes,
+        look: *looks,
         seconds: render.seconds(),
         rung: rungs.front().copied().unwrap_or(target),
         pixels,

@@ -7,7 +7,7 @@ use super::state::RenderState;
 #[derive(Clone, Copy, Debug)]
 pub struct Progress {
     /// Looks taken, from 1.
-    pub pass: u32,
+    pub look: u32,
     /// Time from the first sample, less what a resumed render lay idle.
     pub seconds: f64,
     /// Visibility that is being worked towards.

@@ -27,6 +27,14 @@ const FAR: f64 = 3.0;
 /// Share of the picture where it may be nearer.
 const ELSEWHERE: f64 = 0.1;
 
+/// What an audit makes of a rung that is reached.
+enum AuditOutcome {
+    /// It is.
+    Holds,
+    /// The variance was too low: what is seen by one that is raised from here on.
+    Stricter(Box<Judgement>),
+}
+
 impl Loop<'_> {
     /// Decides what comes next, leaving rungs of the ladder that are reached. An audit may make `judgement` stricter.
     pub(super) fn next_step(&mut self, judgement: &mut Judgement) -> Result<Step, JudgeError> {
@@ -98,12 +106,12 @@ impl Loop<'_> {
         } else {
             let raw = judge_raw(film, self.settings)?;
             if may_look && until_look.must_look(film, &raw, rung) {
-                self.state.seconds_perception += started.elapsed().as_secs_f64();
+                self.state.seconds.perception += started.elapsed().as_secs_f64();
                 return Ok(false);
             }
             cut(until_look.plan(film, &raw, self.settings.limits.max_samples, left), film, &raw, left)
         };
-        self.state.seconds_perception += started.elapsed().as_secs_f64();
+        self.state.seconds.perception += started.elapsed().as_secs_f64();
         if plan.blocks.is_empty() {
             return Ok(false);
         }
@@ -134,28 +142,31 @@ impl Loop<'_> {
         (2 * (film.total_samples() / pixels).max(u64::from(limits.pilot_samples) / 2) as u32).min(most)
     }
 
-    /// More samples for a rung; `None` when it is reached or no pixel may have more. `left`: of the budget.
+    /// More samples for a rung; `None` when it is reached or no pixel may have more. `left`: of the budget. An audit may make
+    /// `judgement` stricter.
     fn plan_towards(
         &mut self,
         rung: f64,
         judgement: &mut Judgement,
         left: u64,
     ) -> Result<Option<SamplePlan>, JudgeError> {
-        if !is_reached(judgement, rung) {
+        loop {
+            if !is_reached(judgement, rung) {
+                still_wanted(self.settings)?;
+                return Ok(some(self.unreached(rung, judgement, left)?));
+            }
+            if self.settings.sampling == Sampling::Uniform || rung > HIGHEST_AUDITED_RUNG {
+                return Ok(None);
+            }
             still_wanted(self.settings)?;
-            return Ok(some(self.unreached(rung, judgement, left)?));
+            if let Some(plan) = some(self.peaks(rung, judgement)) {
+                return Ok(Some(plan));
+            }
+            match self.audited(rung, judgement)? {
+                AuditOutcome::Holds => return Ok(None),
+                AuditOutcome::Stricter(stricter) => *judgement = *stricter,
+            }
         }
-        if self.settings.sampling == Sampling::Uniform {
-            return Ok(None);
-        }
-        if rung > HIGHEST_AUDITED_RUNG {
-            return Ok(None);
-        }
-        still_wanted(self.settings)?;
-        if let Some(plan) = some(self.peaks(rung, judgement)) {
-            return Ok(Some(plan));
-        }
-        Ok(self.audited(rung, judgement, left)?.and_then(some))
     }
 
     /// More samples for a rung that is not reached.
@@ -183,7 +194,7 @@ impl Loop<'_> {
         let started = Instant::now();
         let forecast = Forecast::of(film, judgement);
         let wanted = wanted_samples(judgement, &forecast, self.settings.allocation, rung, limits)?;
-        self.state.seconds_allocation += started.elapsed().as_secs_f64();
+        self.state.seconds.allocation += started.elapsed().as_secs_f64();
         if predicted_saving(film, judgement, &wanted.samples, rung) < LEAST_SAVING {
             return Ok(None);
         }
@@ -203,11 +214,10 @@ impl Loop<'_> {
         doubling_of(&self.state.film, self.settings.limits.max_samples, |i| f64::from(amplitude.values()[i]) / limit)
     }
 
-    /// Audits a rung that is reached. Where the variance proves too low it is raised from here on, and the plan for it is
-    /// returned.
-    fn audited(&mut self, rung: f64, judgement: &mut Judgement, left: u64) -> Result<Option<SamplePlan>, JudgeError> {
+    /// Audits a rung that is reached, as long as the variance may still be raised.
+    fn audited(&mut self, rung: f64, judgement: &Judgement) -> Result<AuditOutcome, JudgeError> {
         if judgement.thresholds.per_pixel.is_some() || self.state.inflation >= MOST_INFLATION {
-            return Ok(None);
+            return Ok(AuditOutcome::Holds);
         }
         let (film, round) = (&self.state.film, self.state.audits);
         let found = match judgement.denoised {
@@ -216,10 +226,9 @@ impl Loop<'_> {
         };
         self.state.audits += 1;
         self.state.audit = found.or(self.state.audit);
-        let Some(found) = found.filter(Audit::disagrees) else { return Ok(None) };
+        let Some(found) = found.filter(Audit::disagrees) else { return Ok(AuditOutcome::Holds) };
         self.state.inflation = (self.state.inflation * found.ratio).min(MOST_INFLATION);
-        *judgement = self.look(judge_to_plan)?;
-        self.plan_towards(rung, judgement, left)
+        Ok(AuditOutcome::Stricter(Box::new(self.look(judge_to_plan)?)))
     }
 
     /// The exposure that rules without sight are told: measured anew at each doubling of the samples.

@@ -1,8 +1,13 @@
-//! Which pixels get how many more samples. Decisions only: nothing here traces.
+//! Which pixels get how many more samples. Decisions only: nothing here traces. How plans are made of blocks, and cut, is in `blocks`.
 //!
 //! Counts double, because trickles would be decided by luck. Where the need of a pixel lies between two doublings, the
 //! two are mixed over 2×2 quads so that the mean of 1/n, which is what the eye's pooling sees, is right: rounding up
 //! alone would cost 1.44 times the samples.
+
+mod blocks;
+
+pub(super) use blocks::{blocks_between, share_of_half};
+pub use blocks::{cut_to_budget, slices};
 
 use super::forecast::Forecast;
 use super::judge::Judgement;
@@ -10,6 +15,7 @@ use super::settings::{AllocationRule, Limits};
 use crate::film::Film;
 use crate::integrator::{BlockWork, PILOT_SAMPLES, SamplePlan};
 use crate::sampler::Half;
+use blocks::doubled_blocks;
 use fechner_perception::Plane;
 use fechner_perception::allocation::{AllocationProblem, allocate};
 use rayon::prelude::*;
@@ -76,7 +82,7 @@ pub(super) fn even_plan(film: &Film, samples: u64) -> SamplePlan {
     for pixel in 0..pixels {
         for half in Half::BOTH {
             let taken = film.half(half)[pixel as usize].taken;
-            plan.blocks.extend(blocks_between(pixel, half, taken, taken + share_of_half(more, half)));
+            plan.blocks.extend(blocks_between(pixel, half, taken, taken.saturating_add(share_of_half(more, half))));
         }
     }
     let any_first = Plane::filled(film.width() as usize, film.height() as usize, 0.0);
@@ -94,21 +100,6 @@ pub(super) fn plan_up_to(film: &Film, wanted_samples: impl Fn(usize) -> u32) -> 
         }
     }
     plan
-}
-
-/// The blocks that take a half of a pixel from so many samples to so many.
-pub(super) fn blocks_between(pixel: u32, half: Half, mut from: u32, to: u32) -> impl Iterator<Item = BlockWork> {
-    std::iter::from_fn(move || {
-        let rest = (from < to).then(|| BlockWork::rest(pixel, half, from))?;
-        let block = BlockWork { samples: rest.samples.min(to - from), ..rest };
-        from += block.samples;
-        Some(block)
-    })
-}
-
-/// A half's part of a pixel's samples: the first has the odd one.
-fn share_of_half(samples: u32, half: Half) -> u32 {
-    (samples + 1 - half.index() as u32) / 2
 }
 
 /// How many samples each pixel should have in all, and for which visibility.
@@ -275,17 +266,6 @@ pub(super) fn doubling_plan(film: &Film, max_samples: u32, doublings: impl Fn(us
     SamplePlan { blocks }
 }
 
-/// The blocks that double a half of a pixel again and again, the last of them up to its half of `max_samples`.
-fn doubled_blocks(pixel: u32, half: Half, mut taken: u32, max_samples: u32) -> impl Iterator<Item = BlockWork> {
-    std::iter::from_fn(move || {
-        let rest = BlockWork::rest(pixel, half, taken);
-        // A pilot may have been a part of the first block.
-        let samples = rest.samples.min(taken.max(1)).min((max_samples / 2).saturating_sub(taken));
-        taken += samples;
-        (samples > 0).then_some(BlockWork { samples, ..rest })
-    })
-}
-
 /// How much more than the estimated need is asked for, against estimates that are low by chance. Pooling leaves few per
 /// cent of scatter on well-behaved noise; what is left is for tails, and fades as samples come in.
 fn confidence_margin(samples: f64) -> f64 {
@@ -312,65 +292,6 @@ fn doublings_for(ratio: f64, dither: f64, most: u32) -> u32 {
 fn dither(width: u32, pixel: usize) -> f64 {
     let (x, y) = (pixel % width as usize, pixel / width as usize);
     [[0.125, 0.625], [0.875, 0.375]][y % 2][x % 2]
-}
-
-/// Cuts a plan into up to 16 that each hold one pixel of every 4×4 block (or of every quad, for 4), so that a limit of
-/// time can end between them and still leave an even picture. A slice is at most about an eighth of what was traced
-/// before: how much depends on counts alone, never on a clock.
-pub fn slices(plan: SamplePlan, width: u32, traced_samples: u64) -> Vec<SamplePlan> {
-    /// Order in which the pixels of a 4×4 block are visited: neighbours far apart in time (Bayer 1973).
-    const BAYER: [[usize; 4]; 4] = [[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]];
-    let eighths = plan.samples() / (traced_samples / 8).max(1);
-    let count = match eighths {
-        0..=1 => return vec![plan],
-        2..=4 => 4,
-        _ => 16,
-    };
-    let mut slices = vec![SamplePlan::default(); count];
-    for block in plan.blocks {
-        let (x, y) = (block.pixel % width, block.pixel / width);
-        let place = BAYER[y as usize % 4][x as usize % 4];
-        slices[place * count / 16].blocks.push(block);
-    }
-    slices.retain(|s| !s.blocks.is_empty());
-    slices
-}
-
-/// Cuts a plan to a budget: the blocks of pixels with the largest `urgency` first.
-pub fn cut_to_budget(plan: SamplePlan, urgency: &Plane, samples: u64) -> SamplePlan {
-    if plan.samples() <= samples {
-        return plan;
-    }
-    let mut blocks = plan.blocks;
-    // A block of a later level must not come without the one before it. Mostly plans are in order already.
-    blocks.sort_by_key(|b| (b.pixel, b.half, b.level));
-    let by_urgency = |block: &BlockWork| !rank(urgency.values()[block.pixel as usize]);
-    let mut order: Vec<(u32, u32, u8, u32)> =
-        (0..).zip(&blocks).map(|(place, block)| (by_urgency(block), block.pixel, block.level, place)).collect();
-    order.sort_unstable();
-    let mut left = samples;
-    let mut fits = vec![false; blocks.len()];
-    for place in order.into_iter().map(|(.., place)| place as usize) {
-        let cost = u64::from(blocks[place].samples);
-        if cost <= left && (is_first_of_half(&blocks, place) || fits[place - 1]) {
-            left -= cost;
-            fits[place] = true;
-        }
-    }
-    let kept = blocks.into_iter().zip(fits).filter(|(_, fits)| *fits);
-    SamplePlan { blocks: kept.map(|(block, _)| block).collect() }
-}
-
-/// A number that orders as `value` does in [`f32::total_cmp`].
-fn rank(value: f32) -> u32 {
-    let bits = value.to_bits();
-    if bits >> 31 == 0 { bits | 1 << 31 } else { !bits }
-}
-
-/// Whether no other block of the same pixel and half stands before this one.
-fn is_first_of_half(blocks: &[BlockWork], place: usize) -> bool {
-    let of_half = |block: &BlockWork| (block.pixel, block.half);
-    place == 0 || of_half(&blocks[place - 1]) != of_half(&blocks[place])
 }
 
 #[cfg(test)]

@@ -4,10 +4,10 @@
 //! told. Not for use: each has a knob without a unit, and stops dark regions and fireflies early.
 
 use super::StopReason;
-use super::plan::cut_to_budget;
+use super::plan::{blocks_between, cut_to_budget, share_of_half};
 use super::settings::RivalRule;
-use crate::film::{Film, opponent, variance_of_mean};
-use crate::integrator::{BlockWork, SamplePlan};
+use crate::film::{Film, opponent};
+use crate::integrator::SamplePlan;
 use crate::sampler::{Half, hash_words};
 use fechner_perception::Plane;
 
@@ -54,15 +54,9 @@ pub fn rival_stop(rule: RivalRule, film: &Film, exposure: f64, left: u64) -> Sto
 /// Takes `samples` of a pixel, half of them in each half, through as many doublings as they reach.
 fn push_samples(plan: &mut SamplePlan, film: &Film, pixel: usize, samples: u32) {
     for half in Half::BOTH {
-        let mut left = (samples + 1 - half.index() as u32) / 2;
-        let mut taken = film.half(half)[pixel].taken;
-        while left > 0 {
-            let rest = BlockWork::rest(pixel as u32, half, taken);
-            let block = BlockWork { samples: rest.samples.min(left), ..rest };
-            plan.blocks.push(block);
-            taken += block.samples;
-            left -= block.samples;
-        }
+        let taken = film.half(half)[pixel].taken;
+        let wanted = taken.saturating_add(share_of_half(samples, half));
+        plan.blocks.extend(blocks_between(pixel as u32, half, taken, wanted));
     }
 }
 
@@ -103,16 +97,12 @@ fn dilated(mask: &[bool], width: usize) -> Vec<bool> {
 
 /// Relative standard error of the pixel by its own samples.
 fn variance_active(film: &Film, threshold: f64, exposure: f64) -> Vec<bool> {
-    let (a, b) = (film.half(Half::A), film.half(Half::B));
-    (0..a.len())
-        .map(|i| {
-            let halves = [&a[i], &b[i]];
-            let variances = halves.map(|half| half.sample_variance(0));
-            let standard_error = variance_of_mean(variances, halves.map(|half| half.samples)).sqrt();
-            let mean = 0.5 * (opponent(a[i].mean)[0] + opponent(b[i].mean)[0]);
-            standard_error > threshold * mean.max(1e-3 / exposure)
-        })
-        .collect()
+    let is_active = |pixel: usize| {
+        let halves = film.halves(pixel);
+        let mean = halves.mean(|half| opponent(half.mean)[0]);
+        halves.variance_of_mean(0).sqrt() > threshold * mean.max(1e-3 / exposure)
+    };
+    (0..film.guides().len()).map(is_active).collect()
 }
 
 /// One pass of Tungsten's: as many samples as 16 a pixel, one everywhere and the others in proportion to each record's
@@ -187,7 +177,7 @@ mod tests {
     use super::*;
     use crate::adaptive::plan::pilot_plan;
     use crate::film::BlockSum;
-    use crate::integrator::{FirstHit, PathSample};
+    use crate::integrator::{BlockWork, FirstHit, PathSample};
     use glam::Vec3;
 
     /// A film whose left half is noise of standard deviation `noise` about 0.5, and whose right half is flat.

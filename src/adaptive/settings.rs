@@ -64,7 +64,7 @@ pub struct Limits {
     pub max_samples: u32,
     /// Number of plans, to repeat a render that ended by time.
     pub plans: Option<u32>,
-    /// Samples of every pixel before the first look, at least 2.
+    /// Samples of every pixel before the first look, or as many as the other limits allow where these are fewer.
     pub pilot_samples: u32,
 }
 
@@ -169,7 +169,7 @@ impl LoopSettings {
     }
 
     /// Whether a render that stopped at a visibility is the beginning of this one, so that going on from it gives the same bytes.
-    pub fn passes(&self, visibility: f64) -> bool {
+    pub fn ladder_passes_through(&self, visibility: f64) -> bool {
         self.sampling != Sampling::Adaptive || self.rungs().contains(&visibility)
     }
 
@@ -234,6 +234,7 @@ mod tests {
         assert_eq!(rungs(builtin(), Some(4.0)), [4.0]);
         assert_eq!(rungs(builtin(), Some(0.5)), [2.0, 1.0, 0.5]);
         settings.limits.visibility = Some(0.5);
-        assert!(settings.passes(2.0) && settings.passes(0.5) && !settings.passes(4.0) && !settings.passes(0.7));
+        let passed = [2.0, 0.5, 4.0, 0.7].map(|visibility| settings.ladder_passes_through(visibility));
+        assert_eq!(passed, [true, true, false, false]);
     }
 }

@@ -10,6 +10,7 @@ use crate::sampler::Half;
 use fechner_perception::tone::SavedTone;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
+use std::ops::AddAssign;
 
 /// A render between two batches of samples.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -37,17 +38,33 @@ pub struct RenderState {
     /// Plans traced.
     pub plans: u32,
     /// Looks taken.
-    pub passes: u32,
-    /// Time from the first sample, less the time between an end and its resumption.
-    pub seconds_total: f64,
-    /// Of which in the perception model, planning and audits.
-    pub seconds_perception: f64,
-    /// Of which in finding counts.
-    pub seconds_allocation: f64,
-    /// And in denoising.
-    pub seconds_denoising: f64,
+    pub looks: u32,
+    /// What it took so far.
+    pub seconds: Seconds,
     /// The tone operator as fitted at the last look.
     pub tone: Option<SavedTone>,
+}
+
+/// Time that a render took, in seconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Seconds {
+    /// From the first sample, less the time between an end and its resumption.
+    pub total: f64,
+    /// Of which in the perception model, planning and audits.
+    pub perception: f64,
+    /// Of which in finding counts.
+    pub allocation: f64,
+    /// And in denoising.
+    pub denoising: f64,
+}
+
+impl AddAssign for Seconds {
+    fn add_assign(&mut self, other: Self) {
+        self.total += other.total;
+        self.perception += other.perception;
+        self.allocation += other.allocation;
+        self.denoising += other.denoising;
+    }
 }
 
 /// Exposure of the display as measured at a number of samples.
@@ -65,22 +82,17 @@ impl RenderState {
         Self::of_film(Film::new(width, height), pilot_samples(limits))
     }
 
-    /// Its samples, the time that they took and what audits found, less what was decided: for other settings.
+    /// To go on under other settings.
     #[must_use]
     pub fn begun_anew(self, limits: &Limits) -> Self {
-        let Self { film, inflation, plans, passes, seconds_total, seconds_perception, .. } = self;
-        let (seconds_allocation, seconds_denoising) = (self.seconds_allocation, self.seconds_denoising);
-        let fresh = Self::of_film(film, pilot_samples(limits));
-        Self {
-            inflation,
-            plans,
-            passes,
-            seconds_total,
-            seconds_perception,
-            seconds_allocation,
-            seconds_denoising,
-            ..fresh
-        }
+        self.undecided(pilot_samples(limits))
+    }
+
+    /// Its samples, what they took and what audits found, less what was decided. Planned is as in [`Self::of_film`].
+    #[must_use]
+    pub fn undecided(self, most_samples: u32) -> Self {
+        let Self { film, inflation, plans, looks, seconds, .. } = self;
+        Self { inflation, plans, looks, seconds, ..Self::of_film(film, most_samples) }
     }
 
     /// A film about which nothing has been decided: empty, merged from others, or made for other eyes. Planned is what it
@@ -99,11 +111,8 @@ impl RenderState {
             exposure: None,
             until_look: None,
             plans: 0,
-            passes: 0,
-            seconds_total: 0.0,
-            seconds_perception: 0.0,
-            seconds_allocation: 0.0,
-            seconds_denoising: 0.0,
+            looks: 0,
+            seconds: Seconds::default(),
             tone: None,
         }
     }

@@ -7,7 +7,7 @@
 
 mod pooling;
 
-use crate::film::{CHANNELS, Film, HalfPixel, opponent, share_of_mean};
+use crate::film::{CHANNELS, Film, HalfPixel, Halves, opponent, share_of_mean};
 use crate::sampler::Half;
 use fechner_perception::Plane;
 use pooling::{Pooled, pooled_by_neighbours};
@@ -169,9 +169,9 @@ pub struct Outliers {
 pub fn find_outliers(film: &Film) -> Outliers {
     const STANDARD_ERRORS: f64 = 5.0;
     let statistics = SampleStatistics::of(film, &scene_units(film));
-    let (a, b) = (film.half(Half::A), film.half(Half::B));
     let (mut pixels, mut excess, mut energy) = (0, 0.0, 0.0);
-    for (i, (a, b)) in a.iter().zip(b).enumerate().filter(|(_, (a, b))| a.samples > 0 && b.samples > 0) {
+    for i in 0..film.guides().len() {
+        let Halves::Both([a, b]) = film.halves(i) else { continue };
         let means = [opponent(a.mean)[0], opponent(b.mean)[0]];
         energy += 0.5 * (means[0] + means[1]);
         let half_difference = 0.5 * (means[0] - means[1]).abs();

@@ -15,9 +15,13 @@ use serde::{Deserialize, Serialize};
 /// Samples for every pixel that a plan adds at least, while its pixels may have so many: variances of four samples are not worth
 /// being asked more often.
 const LEAST_PLAN: f64 = 6.0;
-/// Samples for every pixel between two looks at the least, about what a look costs ([`samples_of_a_look`]). Before the first look too it
-/// is better spent on more of them.
-const SAMPLES_OF_A_DENOISED_LOOK: f64 = 10.0;
+/// What a look costs with Open Image Denoise, in samples for every pixel, about: 5 to 15 (`benches/results/denoising.md`).
+const SAMPLES_OF_AN_OIDN_LOOK: f64 = 10.0;
+/// With the built-in filter: 2 to 4.
+const SAMPLES_OF_A_BUILTIN_LOOK: f64 = 3.0;
+/// Samples for every pixel between two looks at the least, and before the first one: spent on more of them, what the dearer look costs is
+/// spent better. The same with the built-in filter; whether more of its looks would pay was not measured.
+const LEAST_SAMPLES_BETWEEN_LOOKS: f64 = SAMPLES_OF_AN_OIDN_LOOK;
 /// Most that comes between two looks, as a share of what is there.
 const MOST_GROWTH: f64 = 3.0;
 /// What raw noise may be above the visibility asked for, so that a look is worth its cost: denoising made ten scenes 0.8 to 2.9 times
@@ -29,12 +33,11 @@ const MOST_DOUBLINGS: u32 = 2;
 /// its noise counts.
 const LEAST_BLAME: f32 = 0.1;
 
-/// What a look at a denoised picture costs, in samples for every pixel, about: 5 to 15 with Open Image Denoise, 2 to 4 with the built-in
-/// filter (`benches/results/denoising.md`).
+/// What a look at a denoised picture costs, in samples for every pixel, about.
 pub(super) fn samples_of_a_look(denoiser: &Denoiser) -> f64 {
     match denoiser.kind() {
-        DenoiserKind::Builtin => 3.0,
-        DenoiserKind::Oidn => 10.0,
+        DenoiserKind::Builtin => SAMPLES_OF_A_BUILTIN_LOOK,
+        DenoiserKind::Oidn => SAMPLES_OF_AN_OIDN_LOOK,
     }
 }
 
@@ -53,7 +56,7 @@ impl UntilLook {
     /// Before the first look.
     pub(super) fn first(film: &Film) -> Self {
         let pixels = (film.width() * film.height()) as usize;
-        let earliest = SAMPLES_OF_A_DENOISED_LOOK * pixels as f64;
+        let earliest = LEAST_SAMPLES_BETWEEN_LOOKS * pixels as f64;
         let latest = (1.0 + MOST_GROWTH) * earliest;
         Self { to_blame: vec![true; pixels], earliest: earliest as u64, latest: latest as u64 }
     }
@@ -70,7 +73,7 @@ impl UntilLook {
         let to_blame = to_blame(judgement, visibility);
         let present: f64 = wanted(&to_blame).map(|pixel| f64::from(film.samples(pixel))).sum();
         let growth = judgement.predicted.quantile(1.0 - TOLERATED_SHARE) / visibility - 1.0;
-        let least = SAMPLES_OF_A_DENOISED_LOOK * to_blame.len() as f64;
+        let least = LEAST_SAMPLES_BETWEEN_LOOKS * to_blame.len() as f64;
         // The order of `max` turns NaN, of 0 / 0, into the least.
         let most = MOST_GROWTH * present;
         let added = (growth.max(GROWTH) * present).max(least).min(most);

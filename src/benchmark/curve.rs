@@ -60,7 +60,7 @@ impl Course<'_> {
         let metrics = self.truth.measure(&picture)?;
         Ok(CurvePoint {
             samples: state.film.total_samples() as f64 / self.subject.pixels(),
-            seconds: state.seconds_total - measuring.as_secs_f64(),
+            seconds: state.seconds.total - measuring.as_secs_f64(),
             visibility: self.truth.squared_visibility(&picture).quantile(0.99).sqrt(),
             flip_mean: metrics.flip_mean,
             jod: metrics.jod,

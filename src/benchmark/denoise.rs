@@ -174,7 +174,7 @@ impl SceneBench<'_> {
         let mean_square = |plane: &Plane| plane.map(|v| v * v).mean();
         let over_true = |energy: f64| Some((energy / true_energy.mean()).sqrt()).filter(|ratio| ratio.is_finite());
         let (raw, denoised) = (self.measured(&found.estimate.rgb_cd_m2)?, self.measured(&picture.rgb_cd_m2)?);
-        let tracing = rendered.seconds_total - rendered.seconds_perception;
+        let tracing = rendered.seconds.total - rendered.seconds.perception;
         let started = Instant::now();
         denoise_film(denoiser, &rendered.film, settings.nits_per_unit)?;
         Ok(Calibration {
@@ -234,7 +234,7 @@ impl SceneBench<'_> {
         let rendered = render(&self.subject.tracer(seed), &settings, &Quiet)?;
         let metrics = self.measured(rendered.judgement.picture())?;
         let spent = rendered.film.total_samples() as f64 / self.subject.pixels();
-        Ok([spent, metrics.jod, metrics.flip_mean, rendered.seconds_total])
+        Ok([spent, metrics.jod, metrics.flip_mean, rendered.seconds.total])
     }
 
     /// Where a render is kept, by all that it depends on.

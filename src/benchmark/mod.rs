@@ -26,7 +26,6 @@ mod record;
 mod reference;
 mod report;
 mod runner;
-mod student;
 mod summary;
 mod table;
 mod truth;

@@ -80,8 +80,8 @@ impl From<Rendered> for Made {
     fn from(rendered: Rendered) -> Self {
         Self {
             film: rendered.film,
-            seconds: rendered.seconds_total,
-            seconds_perception: rendered.seconds_perception,
+            seconds: rendered.seconds.total,
+            seconds_perception: rendered.seconds.perception,
             seconds_last_look: rendered.judgement.seconds,
             audit_ratio: rendered.audit.map(|audit| audit.ratio),
         }

@@ -1,6 +1,6 @@
 //! Geometric means over scenes, and how sure they are.
 
-use super::student::t_half_width;
+use crate::student::t_half_width;
 use serde::Serialize;
 
 /// Level of every interval of a [`GeometricMean`].

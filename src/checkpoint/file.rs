@@ -1,7 +1,7 @@
 //! The format: header and state as a sealed file.
 
 use super::{Checkpoint, Header};
-use crate::adaptive::state::RenderState;
+use crate::adaptive::state::{RenderState, Seconds};
 use crate::output::OutputError;
 use crate::sealed::{Kind, SealedError};
 use fechner_perception::csf::FrameTiming;
@@ -101,14 +101,14 @@ fn check(header: &Header, state: &RenderState) -> Result<(), &'static str> {
     }
     let is_rung = |visibility: f64| visibility >= 0.0;
     let exposure = state.exposure.map_or(0.0, |exposure| exposure.scene_unit_over_white);
-    let seconds = [state.seconds_total, state.seconds_perception, state.seconds_allocation, state.seconds_denoising];
+    let Seconds { total, perception, allocation, denoising } = state.seconds;
     if !is_rung(header.visibility)
         || !header.earlier_visibilities.iter().all(|&visibility| is_rung(visibility))
         || !state.finished_rung.is_none_or(is_rung)
         || !state.left_rung.is_none_or(is_rung)
         || !(1.0..=1e6).contains(&state.inflation)
         || !exposure.is_finite()
-        || !seconds.iter().all(|s| (0.0..1e12).contains(s))
+        || ![total, perception, allocation, denoising].iter().all(|s| (0.0..1e12).contains(s))
     {
         return Err("its figures make no sense");
     }

@@ -34,7 +34,7 @@ pub enum MergeError {
 /// Adds the films of several files: half A to half A and B to B, in the order of their seeds, so that the order of
 /// `paths` does not matter. Of a render whose halves are uneven, as with 1 sample a pixel, an odd seed's are added the other way round, so that the
 /// sum of many is even: eight films of one sample had 8 samples in half A, none in B, and told nothing of their noise. What was decided for the single films (plans, rungs, audits) is left behind; the largest
-/// inflation stays.
+/// inflation stays. Sums of sums hold the same samples, and may differ in the last bits of variances and first surfaces.
 ///
 /// Beside the sum, as many films are in memory as there are threads, at most 8.
 ///
@@ -63,12 +63,13 @@ pub fn merge_files(paths: &[PathBuf]) -> Result<Checkpoint, MergeError> {
         sum.header.seeds.all.sort_unstable();
         sum.header.seeds.current = None;
         sum.header.earlier_visibilities.clear();
-        sum.state = undecided(sum.state);
+        sum.state = sum.state.undecided(DEFAULT_MAX_SAMPLES);
     }
     Ok(sum)
 }
 
-/// A render's film as it goes into a sum. By its own seed alone, so that neither order nor grouping changes a sum; sums stay as they are.
+/// A render's film as it goes into a sum. By its own seed alone, so that neither order nor grouping changes which samples a half has; sums
+/// stay as they are.
 fn balanced(Checkpoint { header, state }: Checkpoint) -> Checkpoint {
     let is_odd = matches!((&header.seeds.all[..], header.seeds.current), ([seed], Some(_)) if seed % 2 == 1);
     let film = if is_odd && state.film.has_uneven_halves() { state.film.with_halves_swapped() } else { state.film };
@@ -98,10 +99,8 @@ fn add(
     sum.state.film.add(&next.state.film).map_err(|problem| different(problem.to_owned()))?;
     sum.state.inflation = sum.state.inflation.max(next.state.inflation);
     sum.state.plans = sum.state.plans.saturating_add(next.state.plans);
-    sum.state.seconds_total += next.state.seconds_total;
-    sum.state.seconds_perception += next.state.seconds_perception;
-    sum.state.seconds_allocation += next.state.seconds_allocation;
-    sum.state.seconds_denoising += next.state.seconds_denoising;
+    sum.state.looks = sum.state.looks.saturating_add(next.state.looks);
+    sum.state.seconds += next.state.seconds;
     sum.header.settings.importance = sum.header.settings.importance.or(header.settings.importance);
     sum.header.visibility = stricter(sum.header.visibility, next.header.visibility);
     sum.header.seeds.all.extend(next.header.seeds.all);
@@ -114,21 +113,6 @@ fn stricter(one: f64, other: f64) -> f64 {
         [Some(one), Some(other)] => one.min(other),
         [Some(only), None] | [None, Some(only)] => only,
         [None, None] => 0.0,
-    }
-}
-
-/// The film of a state and what it took, without what was decided about it.
-fn undecided(state: RenderState) -> RenderState {
-    let RenderState { film, inflation, plans, seconds_total, seconds_perception, .. } = state;
-    let (seconds_allocation, seconds_denoising) = (state.seconds_allocation, state.seconds_denoising);
-    RenderState {
-        inflation,
-        plans,
-        seconds_total,
-        seconds_perception,
-        seconds_allocation,
-        seconds_denoising,
-        ..RenderState::of_film(film, DEFAULT_MAX_SAMPLES)
     }
 }
 

@@ -51,7 +51,7 @@ impl Monitor for Console {
         );
         let message = format!(
             "pass {}  {:.1} spp  {visible}  {}",
-            progress.pass,
+            progress.look,
             progress.mean_samples,
             self.time_left(progress, progress.pixels),
         );

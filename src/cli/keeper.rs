@@ -123,7 +123,7 @@ impl CheckpointArguments {
             state.begun_anew(&settings.limits)
         } else {
             earlier_visibilities = with_aim(found.earlier_visibilities, found.visibility);
-            if let Some(&aside) = earlier_visibilities.iter().find(|&&aim| !settings.passes(aim)) {
+            if let Some(&aside) = earlier_visibilities.iter().find(|&&aim| !settings.ladder_passes_through(aim)) {
                 note_other_way(aside, settings);
             }
             state

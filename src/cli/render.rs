@@ -99,8 +99,8 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
         (fresh, SeedsSoFar::of_one(trace.seed), None)
     };
     // A glimpse of the whole is a look, and may take longer than a part.
-    state.seconds_total += seconds_fitting;
-    state.seconds_perception += seconds_fitting;
+    state.seconds.total += seconds_fitting;
+    state.seconds.perception += seconds_fitting;
     let tracer = PathTracer::new(scene, trace);
     let degenerate = tracer.world().degenerate_triangles();
     if degenerate > 0 {

@@ -4,7 +4,7 @@
 //! each half: beside light that is a hundred times as strong a denoiser draws halos.
 
 use super::{Denoiser, NoisyPicture, OidnError, SurfaceGuides};
-use crate::film::{Film, HalfPixel, PixelGuide};
+use crate::film::{Estimate, Film, HalfPixel, Halves, PixelGuide};
 use crate::sampler::Half;
 use fechner_perception::Plane;
 use fechner_perception::photometry::luminance;
@@ -42,12 +42,11 @@ pub fn denoise_film(denoiser: &Denoiser, film: &Film, nits_per_unit: f64) -> Res
         leave_the_void_dark(film, &mut denoised);
         Ok::<_, OidnError>(denoised)
     };
-    // What two samples of a half say of their scatter is worth little: beside it stands what the halves differ by.
-    let variance = estimate.variance_of_mean.combined(&estimate.half_difference, |own, half| 0.5 * (own + half * half));
+    let variance = told_variance(film, &estimate);
     let of_half = |half: Half| {
         let pixels = 0..width * height;
         let rgb: Vec<[f32; 3]> =
-            pixels.map(|pixel| mean_cd_m2(film.half_or_other(half, pixel), nits_per_unit)).collect();
+            pixels.map(|pixel| mean_cd_m2(film.halves(pixel).half_or_other(half), nits_per_unit)).collect();
         let guides = surface_guides(film, 0.5, |pixel| film.guide_of_half(half, pixel));
         denoised(&rgb, &variance.map(|variance| 2.0 * variance), guides)
     };
@@ -58,6 +57,22 @@ pub fn denoise_film(denoiser: &Denoiser, film: &Film, nits_per_unit: f64) -> Res
         false => [rgb_cd_m2.clone(), rgb_cd_m2.clone()],
     };
     Ok(DenoisedFilm { rgb_cd_m2, halves_rgb_cd_m2, lamps_from_cd_m2: most })
+}
+
+/// Variance of a lone sample over its squared light, which nothing tells: enough to be taken for what is around it.
+const VARIANCE_OF_A_LONE_SAMPLE: f32 = 0.125;
+
+/// What the denoiser is told of the variance of the picture, (cd/m²)².
+fn told_variance(film: &Film, estimate: &Estimate) -> Plane {
+    Plane::from_fn(film.width() as usize, film.height() as usize, |x, y| {
+        let own = estimate.variance_of_mean.get(x, y);
+        match film.halves(y * film.width() as usize + x) {
+            // What two samples of a half say of their scatter is worth little: beside it stands what the halves differ by.
+            Halves::Both(_) => 0.5 * (own + estimate.half_difference.get(x, y).powi(2)),
+            Halves::Only(only) if only.samples > 1 => own,
+            Halves::Only(_) => VARIANCE_OF_A_LONE_SAMPLE * estimate.luminance_cd_m2.get(x, y).powi(2),
+        }
+    })
 }
 
 /// What this share of the samples have met.
@@ -188,6 +203,21 @@ mod tests {
             let (error, told) = (rms(&|i| rgb_cd_m2[i][1] - 0.5), rms(&|i| 0.5 * (a[i][1] - b[i][1])));
             assert!((0.8..1.6).contains(&(told / error)), "{kind:?}: {told}, not {error}");
         }
+    }
+
+    /// In a render of one sample no pixel tells its scatter, and all the same they are taken for what is around them.
+    #[test]
+    fn lone_samples_are_denoised() {
+        let mut film = Film::new(SIDE, SIDE);
+        for pixel in 0..SIDE * SIDE {
+            let mut sum = BlockSum::default();
+            sum.add(&of_wall(Vec3::ONE, Vec3::splat(2.0 * unit_of_hash(hash_words(u64::from(pixel), 9)))));
+            film.merge_block(BlockWork::whole(pixel, Half::A, 0), &sum);
+        }
+        let scatter = |rgb: &[[f32; 3]]| rgb.iter().map(|rgb| (rgb[1] - 1.0).powi(2)).sum::<f32>() / rgb.len() as f32;
+        let denoised = denoise_film(&Denoiser::Builtin, &film, 1.0).expect("denoises").rgb_cd_m2;
+        let left = scatter(&denoised) / scatter(&film.estimate(1.0).rgb_cd_m2);
+        assert!(left < 0.1, "{left} of the variance is left");
     }
 
     /// Nothing is made of nothing.

@@ -216,7 +216,7 @@ fn enter(farm: &Farm, units: &[(NamedOrder, Vec<u8>)], state: &mut RenderState) 
                 for (block, sum) in named.order.blocks.iter().zip(&sums.sums) {
                     state.film.merge_block(*block, sum);
                 }
-                state.seconds_total += sums.seconds;
+                state.seconds.total += sums.seconds;
             }
             Some(Err(error)) => {
                 set_aside(path);
@@ -254,7 +254,7 @@ fn trace_here(
     keeping: &Keeping<'_>,
     state: &mut RenderState,
 ) -> Result<Outcome, FrameError> {
-    let (started, seconds_before) = (Instant::now(), state.seconds_total);
+    let (started, seconds_before) = (Instant::now(), state.seconds.total);
     let write = |state: &RenderState| write_checkpoint(&farm.film(frame_index), &job.header, state);
     let mut last_kept = started;
     while let Some(plan) = state.pending.front() {
@@ -265,7 +265,7 @@ fn trace_here(
         }
         let batch = beginning(rest, most_samples_a_batch());
         state.traced_blocks += job.tracer.trace_batch(batch, &mut state.film, &|_| {});
-        state.seconds_total = seconds_before + started.elapsed().as_secs_f64();
+        state.seconds.total = seconds_before + started.elapsed().as_secs_f64();
         if let ControlFlow::Break(outcome) = keeping.after_batch(&mut last_kept, || write(state))? {
             return Ok(outcome);
         }

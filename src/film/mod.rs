@@ -6,12 +6,14 @@
 mod block_sum;
 mod estimate;
 mod guide;
+mod halves;
 mod merge;
 mod over;
 
 pub use block_sum::BlockSum;
 pub use estimate::Estimate;
 pub use guide::{PixelGuide, Seen};
+pub use halves::{Halves, share_of_mean};
 
 use crate::integrator::BlockWork;
 use crate::sampler::Half;
@@ -39,17 +41,6 @@ pub const CHANNELS: usize = 3;
 /// Scene-linear luminance and two opponent channels (red–green, yellow–violet) of an RGB value.
 pub fn opponent(rgb: [f64; 3]) -> [f64; CHANNELS] {
     OPPONENT_OF_RGB.map(|row| row[0] * rgb[0] + row[1] * rgb[1] + row[2] * rgb[2])
-}
-
-/// Variance of a pixel's mean by that of a sample in each half: the mean is the plain average of the halves'.
-pub fn variance_of_mean(of_sample: [f64; 2], samples: [u32; 2]) -> f64 {
-    let of_half = |half: usize| of_sample[half] / f64::from(samples[half].max(1));
-    0.25 * (of_half(0) + of_half(1))
-}
-
-/// Variance of a pixel's mean over that of one sample, (1/n_A + 1/n_B) / 4.
-pub fn share_of_mean(samples: [u32; 2]) -> f64 {
-    variance_of_mean([1.0; 2], samples)
 }
 
 /// A sum of squared deviations as the film keeps it: what is beyond f32 stays at its end, which is finite, and can be read again.
@@ -140,10 +131,9 @@ impl Film {
         &self.halves[half.index()]
     }
 
-    /// A pixel of a half, or of the other where this one has no samples, as in a render of one sample.
-    pub fn half_or_other(&self, half: Half, pixel: usize) -> &HalfPixel {
-        let own = &self.half(half)[pixel];
-        if own.samples > 0 { own } else { &self.half(half.other())[pixel] }
+    /// A pixel's halves that have samples.
+    pub fn halves(&self, pixel: usize) -> Halves<'_> {
+        Halves::of(self.halves.each_ref().map(|half| &half[pixel]))
     }
 
     /// First surfaces, row-major.
@@ -175,18 +165,6 @@ impl Film {
         }
     }
 
-    /// Unbiased variance of one sample of a pixel in an opponent channel, as each half has it. A half of fewer than two samples takes
-    /// the other's; where both have one, what they differ by tells, and both have that. 0 where nothing does.
-    pub fn sample_variances(&self, pixel: usize, channel: usize) -> [f64; 2] {
-        let [a, b] = Half::BOTH.map(|half| &self.half(half)[pixel]);
-        match (a.samples, b.samples) {
-            (1, 1) => [0.5 * (opponent(a.mean)[channel] - opponent(b.mean)[channel]).powi(2); 2],
-            (1, 2..) => [b.sample_variance(channel); 2],
-            (2.., 1) => [a.sample_variance(channel); 2],
-            _ => [a.sample_variance(channel), b.sample_variance(channel)],
-        }
-    }
-
     /// Whether every pixel was sampled in both halves. Otherwise nothing is known of its noise: in a render of one sample a pixel, or one
     /// that was interrupted in its first pass.
     pub fn has_both_halves(&self) -> bool {
@@ -195,13 +173,8 @@ impl Film {
 
     /// Share of each pixel that something covers, weighed as the picture is: the mean of the halves.
     pub fn coverage(&self) -> Vec<f32> {
-        let [a, b] = &self.halves;
-        let mean = |(a, b): (&HalfPixel, &HalfPixel)| match (a.samples, b.samples) {
-            (_, 0) => a.coverage(),
-            (0, _) => b.coverage(),
-            _ => 0.5 * (a.coverage() + b.coverage()),
-        };
-        a.iter().zip(b).map(mean).collect()
+        let of = |half: &HalfPixel| f64::from(half.coverage());
+        (0..self.guides.len()).map(|pixel| self.halves(pixel).mean(of) as f32).collect()
     }
 
     /// Whether no sample of a pixel met anything or brought any light: there is nothing in it.
@@ -280,14 +253,30 @@ mod tests {
             }
         }
         assert!(film.has_both_halves());
-        let mean = (0..64 * 64).map(|pixel| film.sample_variances(pixel, 0)[0]).sum::<f64>() / 4096.0;
+        let mean = (0..64 * 64).map(|pixel| film.halves(pixel).sample_variance(0)).sum::<f64>() / 4096.0;
         assert!((12.0 * mean - 1.0).abs() < 0.06, "{} times the truth", 12.0 * mean);
         let own = film.estimate(1.0).variance_of_mean;
         assert!((24.0 * own.mean() - 1.0).abs() < 0.06, "{} times the truth", 24.0 * own.mean());
         let more = BlockWork { first: 1, samples: 1, ..BlockWork::whole(0, Half::A, 0) };
         film.merge_block(more, &sum_of(&[random(0, Half::A) + 1.0]));
-        let [a, b] = film.sample_variances(0, 0);
-        assert!((a - 0.5).abs() < 1e-6 && a == b, "a half of one sample takes the other's: {a} and {b}");
+        let found = film.halves(0).sample_variance(0);
+        assert!((found - 0.5).abs() < 1e-6, "a half of one sample takes the other's: {found}");
+    }
+
+    /// Where one half has all samples, as in a sum of renders of one sample with even seeds, it alone is the picture, and the variance is
+    /// that of its mean: a quarter of it was told.
+    #[test]
+    fn a_half_without_samples_has_no_say() {
+        for half in Half::BOTH {
+            let mut film = Film::new(1, 1);
+            let work = BlockWork { samples: 3, ..BlockWork::whole(0, half, 0) };
+            film.merge_block(work, &sum_of(&[1.0, 2.0, 6.0]));
+            assert_eq!((film.halves(0).sample_variance(0), film.halves(0).variance_of_mean(0)), (7.0, 7.0 / 3.0));
+            assert_eq!(share_of_mean(Half::BOTH.map(|half| film.half(half)[0].samples)), 1.0 / 3.0);
+            let Estimate { luminance_cd_m2, variance_of_mean, half_difference, .. } = film.estimate(2.0);
+            let told = [luminance_cd_m2, variance_of_mean, half_difference].map(|plane| plane.get(0, 0));
+            assert_eq!(told, [6.0, 28.0 / 3.0, 0.0], "luminance, its variance, and what halves differ by");
+        }
     }
 
     /// Each half knows what its own samples have met, after blocks in any order; a surface at infinity leaves no number that is none.

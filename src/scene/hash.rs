@@ -1,4 +1,4 @@
-//! What a scene is, in 32 bytes: equal content gives equal hashes, whatever its files are called.
+//! What a scene is, in 32 bytes: equal content gives equal hashes, whatever its files, objects and materials are called.
 //!
 //! Not for comparing machines of different byte order: large arrays are hashed as they stand in memory.
 
@@ -61,14 +61,15 @@ impl ContentHash {
     }
 }
 
-/// Hashes a scene, less what no sample depends on: its name and notes, the seconds of a shutter that motions hold already,
-/// and what it asks for when the command line does not.
+/// Hashes a scene, less what no sample depends on: its name, its parts' names and its notes, the seconds of a shutter that motions
+/// hold already, and what it asks for when the command line does not. Objects are numbered by their order, not by name.
 ///
 /// Large arrays are hashed as bytes, and all else as its `Debug` text, which is exact for floats and holds every field:
 /// one that is added to a type is covered without a word here. Takes a copy of the scene's arrays while it runs.
 pub fn content_hash(scene: &Scene) -> ContentHash {
     let mut rest = scene.clone();
     rest.name.clear();
+    names_of_parts(&mut rest).for_each(String::clear);
     rest.notes.clear();
     rest.shutter_s = 0.0;
     rest.film = FilmDefaults { width: 0, height: 0 };
@@ -84,7 +85,6 @@ pub fn content_hash(scene: &Scene) -> ContentHash {
         hash_array(&mut hasher, &take(&mut mesh.triangles));
     }
     for texture in &mut rest.textures {
-        texture.name.clear();
         match &mut texture.texels {
             Texels::Bytes(texels, _) => hash_array(&mut hasher, &take(texels)),
             Texels::Floats(texels) => hash_array(&mut hasher, &take(texels)),
@@ -97,6 +97,16 @@ pub fn content_hash(scene: &Scene) -> ContentHash {
     write!(text, "{rest:?}").and_then(|()| text.flush()).expect("a hasher takes all bytes");
     drop(text);
     ContentHash(*hasher.finalize().as_bytes())
+}
+
+/// What the parts of a scene are called, for messages: in the file, or by a file's name.
+fn names_of_parts(scene: &mut Scene) -> impl Iterator<Item = &mut String> {
+    let Scene { meshes, instances, spheres, materials, textures, .. } = scene;
+    let of_shapes =
+        meshes.iter_mut().map(|mesh| &mut mesh.name).chain(spheres.iter_mut().map(|sphere| &mut sphere.name));
+    let of_instances = instances.iter_mut().map(|instance| &mut instance.name);
+    let of_surfaces = materials.iter_mut().map(|material| &mut material.name);
+    of_shapes.chain(of_instances).chain(of_surfaces).chain(textures.iter_mut().map(|texture| &mut texture.name))
 }
 
 fn hash_array<T: NoUninit>(hasher: &mut blake3::Hasher, values: &[T]) {
@@ -122,6 +132,7 @@ mod tests {
         renamed.name = "another".to_owned();
         renamed.notes.push("a note".to_owned());
         renamed.film.width += 1;
+        names_of_parts(&mut renamed).for_each(|name| name.push_str(" under another name"));
         assert_eq!(content_hash(&renamed), content_hash(&scene("still-life.toml")));
     }
 

@@ -2,16 +2,17 @@
 
 use crate::support::{loop_settings, trace_settings};
 use fechner::adaptive::audit::audit;
-use fechner::adaptive::settings::{LoopSettings, Sampling};
+use fechner::adaptive::settings::{LoopSettings, RivalRule, Sampling};
 use fechner::adaptive::state::RenderState;
 use fechner::adaptive::statistics::picture_variance;
-use fechner::adaptive::{Monitor, Progress, Quiet, Rendered, StopReason, render, run};
+use fechner::adaptive::{Directive, Monitor, Progress, Quiet, Rendered, StopReason, render, run};
 use fechner::integrator::PathTracer;
 use fechner::scene::Scene;
 use fechner::scene::load::{LoadOptions, load};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::Duration;
 
 /// What the scene file says.
 const NITS_PER_UNIT: f64 = 120.0;
@@ -263,6 +264,46 @@ impl Monitor for Looks {
         self.0.fetch_add(1, Ordering::Relaxed);
     }
     fn samples_done(&self, _: u64) {}
+}
+
+/// Leaves a render at the first batch, of no more than a sample a pixel.
+struct Leaver;
+
+impl Monitor for Leaver {
+    fn looked(&self, _: &Progress) {}
+    fn samples_done(&self, _: u64) {}
+    fn most_samples_a_batch(&self) -> u64 {
+        256
+    }
+    fn between_batches(&self, _: &RenderState) -> Directive {
+        Directive::Leave
+    }
+}
+
+/// Every look is in a render's seconds: the last one of a rule that knows no sight was not, nor that at a render that was left.
+#[test]
+fn every_look_is_in_the_seconds() {
+    const ASLEEP: Duration = Duration::from_millis(20);
+    let scene = Arc::new(cornell_box());
+    let tracer = PathTracer::new(Arc::clone(&scene), trace_settings(16, 16, 1));
+    let renders: [(Sampling, &dyn Monitor); 2] =
+        [(Sampling::Rival(RivalRule::Budget), &Quiet), (Sampling::Uniform, &Leaver)];
+    for (sampling, monitor) in renders {
+        let asked = Arc::new(AtomicU32::new(0));
+        let mut settings = loop_settings(scene.nits_per_unit, sampling, None, Some(24));
+        settings.is_outdated = Some(Box::new({
+            let asked = Arc::clone(&asked);
+            move || {
+                std::thread::sleep(ASLEEP);
+                asked.fetch_add(1, Ordering::Relaxed);
+                false
+            }
+        }));
+        let rendered = render(&tracer, &settings, monitor).expect("renders");
+        let asleep = ASLEEP.as_secs_f64() * f64::from(asked.load(Ordering::Relaxed));
+        let (looks, all) = (rendered.seconds.perception, rendered.seconds.total);
+        assert!(asleep > 0.0 && looks >= asleep && all >= looks, "{sampling:?}: asleep {asleep} s of {looks} of {all}");
+    }
 }
 
 /// The few samples that a cut leaves of a budget, since it ends within a block, are not looked for.

@@ -251,7 +251,7 @@ fn films_of_different_seeds_add_up() {
     for (seed, spp) in [(1, 32), (2, 64), (9, 32)] {
         let setup = Setup::new(seed);
         let mut state = uniform_film(&setup, spp);
-        state.seconds_denoising = 0.5;
+        state.seconds.denoising = 0.5;
         let path = folder.path().join(format!("{seed}.film"));
         write_checkpoint(&path, &setup.header, &state).expect("written");
         films.push((path, state.film));
@@ -267,7 +267,7 @@ fn films_of_different_seeds_add_up() {
         assert!(merged(order).1 == bytes, "another order gives other bytes");
     }
     assert_eq!(sum.header.seeds, Seeds { all: vec![1, 2, 9], current: None });
-    assert_eq!(sum.state.seconds_denoising, 1.5);
+    assert_eq!(sum.state.seconds.denoising, 1.5);
     for half in Half::BOTH {
         for (i, pixel) in sum.state.film.half(half).iter().enumerate() {
             let parts: Vec<_> = films.iter().map(|(_, film)| film.half(half)[i]).collect();

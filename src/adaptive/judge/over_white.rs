@@ -8,7 +8,6 @@ use super::super::settings::LoopSettings;
 use super::steps::{Guide, Scatter, Thresholds, found_thresholds};
 use super::{JudgeError, Purpose, variance_share};
 use crate::film::Film;
-use crate::sampler::Half;
 use fechner_perception::Plane;
 use fechner_perception::guide::{GuideInputs, denoise};
 use fechner_perception::tone::FittedTone;
@@ -93,9 +92,9 @@ impl OverWhite {
 fn ground_half_difference(film: &Film, ground_cd_m2: f64) -> Plane {
     let width = film.width() as usize;
     Plane::from_fn(width, film.height() as usize, |x, y| {
-        let [a, b] = Half::BOTH.map(|half| film.half_or_other(half, y * width + x).coverage());
         // Less coverage is more light.
-        0.5 * (b - a) * ground_cd_m2 as f32
+        let uncovered = film.halves(y * width + x).half_difference(|half| -f64::from(half.coverage()));
+        uncovered as f32 * ground_cd_m2 as f32
     })
 }
 

@@ -33,7 +33,7 @@ pub(super) fn describe(checkpoint: &Checkpoint) -> String {
         format!("{}: {mean:.1} a pixel, {least} to {most}; {} not finite", film.total_samples(), film.nonfinite_samples)
     });
     row("planned", format!("{pending} samples after {} plans", state.plans));
-    row("time", duration_in_words(state.seconds_total));
+    row("time", duration_in_words(state.seconds.total));
     row("sampling", sampling_name(settings.sampling).to_owned());
     row("visibility", {
         let reached = state.finished_rung.map_or_else(|| "none".to_owned(), rounded);

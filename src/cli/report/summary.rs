@@ -38,7 +38,7 @@ fn spent(report: &Report) -> String {
 fn stopped(report: &Report, settings: &LoopSettings, rendered: &Rendered) -> String {
     let why = match rendered.stop_reason {
         StopReason::Visibility => "Stopped because the target is reached",
-        StopReason::Time if settings.limits.time.is_some_and(|limit| rendered.seconds_total < limit.as_secs_f64()) => {
+        StopReason::Time if settings.limits.time.is_some_and(|limit| rendered.seconds.total < limit.as_secs_f64()) => {
             "Stopped because the next plan would not fit into the time"
         }
         StopReason::Time => "Stopped because the time was up",

@@ -100,8 +100,8 @@ pub(in crate::preview) fn count(
     let pixels = f64::from(status.width) * f64::from(status.height);
     status.total_samples = total_samples;
     status.mean_samples = status.total_samples as f64 / pixels.max(1.0);
-    status.seconds = state.seconds_total;
-    status.samples_a_second = status.total_samples as f64 / state.seconds_total.max(1e-3);
+    status.seconds = state.seconds.total;
+    status.samples_a_second = status.total_samples as f64 / state.seconds.total.max(1e-3);
     let left_after = |samples: f64| Some(samples.max(0.0) / status.samples_a_second.max(1.0));
     if progress.is_none() && state.plans == 0 && status.total_samples > 0 {
         status.seconds_left = left_after(pixels * f64::from(status.pilot_samples) - status.total_samples as f64);
@@ -148,7 +148,7 @@ mod tests {
             blank_status(&Scene::default(), &settings, "constant", &Held::at_home(&Scene::default().camera));
         (status.width, status.height) = (10, 10);
         let mut state = RenderState::new(10, 10, &settings.limits);
-        state.seconds_total = 2.0;
+        state.seconds.total = 2.0;
         count(&mut status, &state, 400, None);
         assert_eq!(status.seconds_left, Some(6.0), "1200 of 1600 samples at 200 a second");
     }
