@@ -325,7 +325,10 @@ def steps_of_a_render(page):
     page.page.wait_for_timeout(500)
     assert page.text("error") == "", page.text("error")
     page.page.click("#stop")
-    page.until("the end", "document.getElementById('phase').textContent === 'Not connected'")
+    page.until("the end", "socket.readyState === 3")
+    page.page.wait_for_timeout(1500)
+    assert page.text("phase") == "Ended: stopped from this page", page.text("phase")
+    assert page.page.evaluate("socket.readyState") == 3, "the page still asks for a render that has ended"
 
 
 def main():

@@ -5,6 +5,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tungstenite::client::IntoClientRequest;
 use tungstenite::http::HeaderValue;
@@ -24,6 +25,8 @@ struct View {
     child: Child,
     address: String,
     token: String,
+    /// What else it says.
+    said: Option<JoinHandle<String>>,
 }
 
 impl View {
@@ -56,8 +59,16 @@ impl View {
         let (address, token) = rest.split_once("/?token=").expect("a token");
         let (address, token) = (address.to_owned(), token.to_owned());
         // What else it says must not fill the pipe.
-        std::thread::spawn(move || std::io::copy(&mut said, &mut std::io::sink()));
-        Self { child, address, token }
+        let said = std::thread::spawn(move || {
+            let mut text = String::new();
+            said.read_to_string(&mut text).map(|_| text).expect("UTF-8")
+        });
+        Self { child, address, token, said: Some(said) }
+    }
+
+    /// What it said once it has ended.
+    fn said(&mut self) -> String {
+        self.said.take().map(|said| said.join().expect("read")).expect("asked once")
     }
 
     /// The answer to a GET, from its status line on.
@@ -369,8 +380,15 @@ fn a_render_shows_itself_and_is_not_driven() {
     assert_eq!(refused["is_driven"], false);
     viewer.status("no more of it", |status| status["error"].is_null());
     viewer.send(&json!({ "do": "stop" }));
+    viewer.status("why it ended", |status| status["reason"] == "stopped from this page");
     assert!(view.child.wait().expect("ended").success());
     assert!(image::open(at.join("stopped.png")).is_ok());
+    let said = view.said();
+    assert!(said.contains("Stopped from the page of --view, after"), "{said}");
+
+    let mut view = View::of_render(at, &["--visibility", "0.01", "--spp", "512", "-o", "spent.png"]);
+    view.viewer().status("why it ended", |status| status["reason"] == "the samples are spent");
+    assert!(view.child.wait().expect("ended").success());
 }
 
 /// A render whose tev is not there says so once and writes the same bytes; one whose tev is there sends it something.
