@@ -90,7 +90,7 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     let Prepared { scene, trace, record, settings, .. } = prepared;
     let Crop { width, height, .. } = trace.film_area();
     let fresh = RenderState::new(width, height, &settings.limits);
-    let audience = arguments.view.then(|| audience(&scene, &settings, &record)).transpose()?;
+    let audience = arguments.view.then(|| audience(&scene, &trace, &settings, &record)).transpose()?;
     let (mut state, seeds, keeper) = if let Some(origin) = origin {
         let header = Header::begun(origin, trace.seed, record, settings.limits.last_rung());
         let Start { header, state, seeds } = arguments.checkpoint.start(header, fresh, &settings)?;
