@@ -32,6 +32,10 @@ impl Host for Nowhere {
     fn scene_file(&self) -> &Path {
         &self.0
     }
+
+    fn watched_files(&self) -> Vec<PathBuf> {
+        Vec::new()
+    }
 }
 
 /// What a preview's time is measured by.

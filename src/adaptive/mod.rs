@@ -347,7 +347,7 @@ impl<'a> Loop<'a> {
         if is_by_a_look && self.state.until_look.is_some() {
             self.state.until_look = Some(UntilLook::at_once(&self.state.film));
         }
-        monitor.ended(&self.state);
+        monitor.ended(&self.state, reason);
         Ok(Ended { state: self.state, last_look: Some(LastLook { judgement, stop_reason: reason }) })
     }
 }

@@ -1,5 +1,6 @@
 //! How a render tells what it does, and is told to stop.
 
+use super::StopReason;
 use super::judge::Judgement;
 use super::state::RenderState;
 
@@ -52,7 +53,7 @@ pub trait Monitor: Sync {
         Directive::GoOn
     }
     /// At the end, with what a render to another limit would go on from.
-    fn ended(&self, _state: &RenderState) {}
+    fn ended(&self, _state: &RenderState, _reason: StopReason) {}
 }
 
 /// Tells nobody.

@@ -10,7 +10,8 @@ use super::seeing::{SeeingArguments, operator_values};
 use super::targets::check_kept;
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use fechner::output::{self, Format};
+use fechner::adaptive::settings::THRESHOLD;
+use fechner::output::{self, Format, false_colour};
 use fechner_perception::csf;
 use fechner_perception::difference::{Difference, colour_difference};
 use fechner_perception::psychometric::detection_probability;
@@ -41,7 +42,8 @@ pub(super) struct CompareArguments {
     /// `animate` have it.
     #[arg(long, value_name = "FILE.exr")]
     velocity: Option<PathBuf>,
-    /// Write where the difference is seen: grey below threshold, yellow to red above; for a sequence with # in the name.
+    /// Write where the difference is seen, in the colours of render's map of visibility: blue below threshold, red to yellow above; for a
+    /// sequence with # in the name.
     #[arg(long, value_name = "FILE.png")]
     map: Option<PathBuf>,
     /// Write the figures here.
@@ -141,7 +143,7 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
         seen: Seen::of(&difference),
     };
     if let Some(path) = &arguments.map {
-        write_map(path, &difference)?;
+        say!("{}: {}", path.display(), write_map(path, &difference)?);
     }
     if let Some(path) = &arguments.json {
         write_json(path, &figures)?;
@@ -186,18 +188,10 @@ pub(super) fn check_alike(
     Ok(())
 }
 
-/// Grey up to threshold, then yellow at v = 1 to red at v = 4 and above.
-fn write_map(path: &Path, seen: &Difference) -> Result<()> {
-    let color = |v: f32| {
-        if v <= 1.0 {
-            [0.25 * v; 3]
-        } else {
-            let heat = (v.log2() / 2.0).min(1.0);
-            [1.0, 0.8 * (1.0 - heat), 0.05]
-        }
-    };
+/// Writes a map of visibility on the scale that a render's has, and returns what its colours mean.
+fn write_map(path: &Path, seen: &Difference) -> Result<String> {
     let map = &seen.visibility;
-    let pixels: Vec<[f32; 3]> = map.values().iter().map(|&v| color(v)).collect();
-    output::write_png(path, map.width() as u32, map.height() as u32, &pixels)?;
-    Ok(())
+    let colours = false_colour::visibility(map, THRESHOLD);
+    output::write_codes_png(path, map.width() as u32, map.height() as u32, &colours.rgb8)?;
+    Ok(colours.legend)
 }

@@ -52,11 +52,6 @@ impl<'a> Covered<'a> {
         !self.beyond.is_empty()
     }
 
-    /// How much of each pixel is covered.
-    pub(super) fn alpha(&self) -> &[f32] {
-        self.alpha
-    }
-
     /// Display RGB multiplied by alpha.
     pub(super) fn premultiplied(&self) -> Vec<[f32; 3]> {
         let mut shown: Vec<[f32; 3]> =
@@ -269,7 +264,7 @@ mod tests {
                 );
                 assert!(raised[i] >= alpha[i] && straight[i].iter().all(|light| *light <= 1.0 + 1e-6), "{name}");
             }
-            assert_eq!((raised[0], raised[3], covered.alpha()), (1.0, 0.0, &alpha[..]));
+            assert_eq!((raised[0], raised[3], covered.alpha), (1.0, 0.0, &alpha[..]));
         }
     }
 

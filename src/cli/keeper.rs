@@ -3,6 +3,7 @@
 use super::claim::Claim;
 use super::console::Console;
 use super::numbers::parse_seconds;
+use super::report::Interrupter;
 use super::tev::Showing;
 use super::words::rounded;
 use anyhow::bail;
@@ -10,7 +11,7 @@ use clap::Args;
 use fechner::adaptive::judge::Judgement;
 use fechner::adaptive::settings::LoopSettings;
 use fechner::adaptive::state::RenderState;
-use fechner::adaptive::{Directive, Monitor, Progress};
+use fechner::adaptive::{Directive, Monitor, Progress, StopReason};
 use fechner::checkpoint::{
     Checkpoint, CheckpointError, Header, Origin, Seeds, SettingsRecord, read_checkpoint, read_header, write_checkpoint,
 };
@@ -264,8 +265,13 @@ impl<'a> Watch<'a> {
     }
 
     /// Whether a signal asked for the end.
-    pub(super) fn is_asked_to_end(&self) -> bool {
+    fn is_asked_to_end(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
+    }
+
+    /// Who ended a render that was interrupted.
+    pub(super) fn interrupter(&self) -> Interrupter {
+        if self.is_asked_to_end() { Interrupter::Signal } else { Interrupter::Viewer }
     }
 
     /// Removes the progress bar.
@@ -336,9 +342,9 @@ impl Monitor for Watch<'_> {
         self.audience.as_ref().map_or(Directive::GoOn, |audience| audience.between_batches(state))
     }
 
-    fn ended(&self, state: &RenderState) {
+    fn ended(&self, state: &RenderState, reason: StopReason) {
         if let Some(audience) = &self.audience {
-            audience.ended(state);
+            audience.ended(state, reason);
         }
         if let Some(tev) = &self.tev {
             tev.ended(state);

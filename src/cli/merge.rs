@@ -4,7 +4,7 @@ use super::claim::Claim;
 use super::json::write_json;
 use super::numbers::parse_positive;
 use super::render::write_picture;
-use super::report::{Report, summary};
+use super::report::{Interrupter, Report, summary};
 use super::targets::check_distinct;
 use clap::Args;
 use fechner::adaptive::judge::judge;
@@ -79,7 +79,7 @@ pub(super) fn run(arguments: &MergeArguments) -> anyhow::Result<()> {
         write_json(path, &report)?;
     }
     say!("Films of the seeds {}:", merged.header.seeds.in_words());
-    say!("{}", summary(&report, &settings, &rendered));
+    say!("{}", summary(&report, &settings, &rendered, Interrupter::Signal));
     Ok(())
 }
 

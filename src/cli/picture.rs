@@ -234,8 +234,13 @@ impl InputPicture {
 
     /// The same of what a display emits in such a unit.
     fn emitted(&self, nits_per_unit: f64, display: &Display) -> Vec<[f32; 3]> {
-        let relative = |value: f32| display.relative_of_emitted(f64::from(value) * nits_per_unit) as f32;
-        self.rgb.iter().map(|rgb| rgb.map(relative)).collect()
+        let relative = |(pixel, rgb): (usize, &[f32; 3])| {
+            // What lies behind a picture with alpha adds the rest of the display's black.
+            let uncovered = self.alpha.as_ref().map_or(0.0, |alpha| 1.0 - f64::from(alpha[pixel]));
+            let behind_cd_m2 = uncovered * display.black_cd_m2;
+            rgb.map(|value| display.relative_of_emitted(f64::from(value) * nits_per_unit + behind_cd_m2) as f32)
+        };
+        self.rgb.iter().enumerate().map(relative).collect()
     }
 
     /// Linear RGB in cd/m² of the scene; `None` for a picture that is ready for the display.

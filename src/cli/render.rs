@@ -6,7 +6,7 @@ use super::job::{JobArguments, Prepared};
 use super::json::write_json;
 use super::keeper::{CheckpointArguments, Keeper, SeedsSoFar, Start, Watch};
 use super::maps::MapTarget;
-use super::report::{Report, summary};
+use super::report::{Interrupter, Report, summary};
 use super::signals::listen;
 use super::targets::{Named, check_kept, check_scene_kept};
 use super::tev::{Showing, TevArguments};
@@ -90,7 +90,7 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     let Prepared { scene, trace, record, settings, .. } = prepared;
     let Crop { width, height, .. } = trace.film_area();
     let fresh = RenderState::new(width, height, &settings.limits);
-    let audience = arguments.view.then(|| audience(&scene, &settings, &record)).transpose()?;
+    let audience = arguments.view.then(|| audience(&scene, &trace, &settings, &record)).transpose()?;
     let (mut state, seeds, keeper) = if let Some(origin) = origin {
         let header = Header::begun(origin, trace.seed, record, settings.limits.last_rung());
         let Start { header, state, seeds } = arguments.checkpoint.start(header, fresh, &settings)?;
@@ -121,8 +121,9 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
         Ok(())
     });
     let figures = arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, &report));
-    say!("{}", summary(&report, &settings, &rendered));
-    let is_unfinished = rendered.stop_reason == StopReason::Interrupted && watch.is_asked_to_end();
+    let interrupter = watch.interrupter();
+    say!("{}", summary(&report, &settings, &rendered, interrupter));
+    let is_unfinished = rendered.stop_reason == StopReason::Interrupted && interrupter == Interrupter::Signal;
     if picture.is_ok() && (maps.is_err() || figures.is_err()) {
         say!("note: the picture is in {}", arguments.output.display());
     }

@@ -2,7 +2,7 @@
 
 mod summary;
 
-pub(super) use summary::summary;
+pub(super) use summary::{Interrupter, summary};
 
 use super::console::duration_in_words;
 use fechner::adaptive::judge::Judgement;

@@ -111,6 +111,19 @@ pub(super) fn viewing(display: &str, csf_area_deg2: Option<f64>) -> Result<Viewi
     viewing_on(find_display(display)?, csf_area_deg2)
 }
 
+/// The viewing of a picture that is to be rendered: of square pixels, as cameras draw them and files are tagged.
+pub(super) fn viewing_of_render(display: &str, csf_area_deg2: Option<f64>) -> Result<Viewing> {
+    let viewing = viewing(display, csf_area_deg2)?;
+    let Display { name, pixel_aspect_ratio, .. } = &viewing.display;
+    if (pixel_aspect_ratio - 1.0).abs() > 1e-6 {
+        bail!(
+            "the display \"{name}\" has pixels {pixel_aspect_ratio} times as wide as high, and what is rendered has square ones: render for \
+             a display of square pixels (pixel_aspect_ratio = 1); compare, threshold and tonemap take any"
+        );
+    }
+    Ok(viewing)
+}
+
 /// The display that was asked for, else the one that the first of the pictures that says so was made for, else a likely one: what a file
 /// says goes before what another's codes only suggest, whichever is named first.
 pub(super) fn display_of(asked: Option<&str>, pictures: &[(&Path, &InputPicture)]) -> Result<Display> {

@@ -11,12 +11,13 @@ use clap::Args;
 use fechner::adaptive::Rendered;
 use fechner::adaptive::settings::LoopSettings;
 use fechner::checkpoint::SettingsRecord;
+use fechner::integrator::{Crop, TraceSettings};
 use fechner::output::{self, PartOf};
-use fechner::preview::{self, Audience, Door, Host, Job, Options, Spectator};
-use fechner::scene::Scene;
+use fechner::preview::{self, Audience, Door, Host, Job, MOST_SIDE_PIXELS, Options, Spectator};
+use fechner::scene::{Scene, load};
 use fechner_perception::model;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, UdpSocket};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -50,7 +51,7 @@ struct FileHost {
 
 impl Host for FileHost {
     fn load(&self) -> Result<Job, String> {
-        let prepared = self.job.prepare().map_err(|error| in_a_line(&error))?;
+        let prepared = self.job.prepare().and_then(shown_in_browsers).map_err(|error| in_a_line(&error))?;
         *self.part_of.lock().unwrap_or_else(PoisonError::into_inner) = PartOf::of(&prepared.trace);
         Ok(job_of(prepared, &self.job))
     }
@@ -74,6 +75,11 @@ impl Host for FileHost {
     fn scene_file(&self) -> &Path {
         self.job.scene_file()
     }
+
+    fn watched_files(&self) -> Vec<PathBuf> {
+        let named = self.job.files().into_iter().filter_map(|(_, path)| path.map(Path::to_owned));
+        named.chain([load::side_file(self.job.scene_file())]).chain(load::files_read()).collect()
+    }
 }
 
 fn job_of(prepared: Prepared, arguments: &JobArguments) -> Job {
@@ -82,12 +88,31 @@ fn job_of(prepared: Prepared, arguments: &JobArguments) -> Job {
     Job { scene, trace, record, csf_area_deg2, limits, importance: settings.importance, whole }
 }
 
+/// Refuses a picture that no browser shows.
+fn shown_in_browsers(prepared: Prepared) -> anyhow::Result<Prepared> {
+    check_shown(&prepared.trace)?;
+    Ok(prepared)
+}
+
+fn check_shown(trace: &TraceSettings) -> anyhow::Result<()> {
+    let Crop { width, height, .. } = trace.film_area();
+    if width.max(height) > MOST_SIDE_PIXELS {
+        bail!(
+            "a browser shows pictures of at most {MOST_SIDE_PIXELS} pixels a side, and this one has {width}x{height}: choose a smaller \
+             --size, or a --crop of it"
+        );
+    }
+    Ok(())
+}
+
 /// A running render, open to viewers on this machine at a free port; says where.
 pub(super) fn audience<'a>(
     scene: &Scene,
+    trace: &TraceSettings,
     settings: &'a LoopSettings,
     record: &SettingsRecord,
 ) -> anyhow::Result<Audience<'a>> {
+    check_shown(trace)?;
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).context("no port to show the render at")?;
     let (address, token) = door_of(&listener)?;
     say!("Watch it at http://{address}/?token={token}");
@@ -126,7 +151,7 @@ pub(super) fn run(arguments: &ViewArguments) -> anyhow::Result<()> {
     let listener = TcpListener::bind(asked)
         .with_context(|| format!("cannot listen on {asked}: choose another --port, or an address of this machine"))?;
     let (address, token) = door_of(&listener)?;
-    let prepared = pool.install(|| arguments.job.prepare())?;
+    let prepared = pool.install(|| arguments.job.prepare().and_then(shown_in_browsers))?;
     let host = Arc::new(FileHost {
         job: arguments.job.clone(),
         part_of: Mutex::new(PartOf::of(&prepared.trace)),

@@ -7,12 +7,12 @@ use super::command::{Command, Phase, Status};
 use super::orbit::Held;
 use super::screen::{Looked, Scenery, Screen};
 use super::server::{Door, serve};
-use super::session::{Pace, blank_status, count, publish};
+use super::session::{Pace, blank_status, count, in_words, publish};
 use super::shared::Shared;
 use crate::adaptive::judge::Judgement;
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::state::RenderState;
-use crate::adaptive::{Directive, Progress};
+use crate::adaptive::{Directive, Progress, StopReason};
 use crate::checkpoint::SettingsRecord;
 use crate::scene::Scene;
 use std::net::TcpListener;
@@ -38,6 +38,8 @@ struct Moving {
     status: Status,
     /// When somebody asked for what is not to be had, while that is told.
     refused: Option<Instant>,
+    /// Whether somebody here asked for the end.
+    is_stopped_here: bool,
 }
 
 impl Moving {
@@ -68,8 +70,14 @@ impl<'a> Audience<'a> {
             std::thread::Builder::new().name("viewers".to_owned()).spawn(move || serve(listener, door, of_server))?;
         let blank = blank_status(scene, settings, &record.operator, &Held::at_home(&scene.camera));
         let status = Status { phase: Phase::Rendering, exposure: record.exposure_stops, is_driven: false, ..blank };
-        let moving =
-            Moving { screen: Screen::new(Vec::new()), pace: Pace::new(), progress: None, status, refused: None };
+        let moving = Moving {
+            screen: Screen::new(Vec::new()),
+            pace: Pace::new(),
+            progress: None,
+            status,
+            refused: None,
+            is_stopped_here: false,
+        };
         Ok(Self { shared, settings, moving: Mutex::new(moving), server: Mutex::new(Some(server)) })
     }
 
@@ -120,7 +128,10 @@ impl<'a> Audience<'a> {
         let mut wants_a_frame = moving.screen.is_due(between_frames);
         for command in self.shared.take_commands() {
             match command {
-                Command::Stop => directive = Directive::Stop,
+                Command::Stop => {
+                    directive = Directive::Stop;
+                    moving.is_stopped_here = true;
+                }
                 Command::Redraw => wants_a_frame = true,
                 _ => moving.refuse(Some(Instant::now()), &self.shared),
             }
@@ -135,11 +146,16 @@ impl<'a> Audience<'a> {
         directive
     }
 
-    /// The render is at an end: shows its last frame and sends everybody away, so that no connection takes a file from what is written
-    /// next.
-    pub fn ended(&self, state: &RenderState) {
+    /// The render is at an end: shows its last frame, says why, and sends everybody away, so that no connection takes a file from what is
+    /// written next.
+    pub fn ended(&self, state: &RenderState, reason: StopReason) {
         let mut moving = self.moving();
         moving.status.phase = Phase::Stopped;
+        moving.status.reason = Some(match reason {
+            StopReason::Interrupted if moving.is_stopped_here => "stopped from this page",
+            StopReason::Interrupted => "stopped by a signal",
+            reason => in_words(reason),
+        });
         self.show(&mut moving, state);
         self.close();
     }

@@ -3,7 +3,7 @@
 use super::coarse::stand_in;
 use crate::film::{Film, PixelGuide};
 use crate::output::encode_srgb8;
-use crate::output::false_colour::{Colours, figure, range};
+use crate::output::false_colour::{Colours, Range, figure, range, share_of};
 use fechner_perception::Plane;
 use glam::Vec2;
 use serde::{Deserialize, Serialize};
@@ -62,10 +62,9 @@ pub(super) fn depth(film: &Film) -> Colours {
     let depths: Vec<f32> = surfaces(film).map(|surface| surface.depth).collect();
     let plane = Plane::from_values(film.width() as usize, film.height() as usize, depths);
     let Ok(plane) = plane else { return nothing_yet(film) };
-    let (low, high) = range(&plane);
-    let scale = 1.0 / (high / low).ln().max(1e-3);
+    let Some(Range { low, high, .. }) = range(&plane) else { return unknown(film, "there is no surface here") };
     let grey = |&d: &f32| {
-        let share = if d > 0.0 { 1.0 - (f64::from(d) / low).ln() * scale } else { 0.0 };
+        let share = if d > 0.0 { 1.0 - share_of(d.into(), low, high) } else { 0.0 };
         [(255.0 * share.clamp(0.0, 1.0)) as u8; 3]
     };
     let rgb8 = plane.values().iter().flat_map(grey).collect();

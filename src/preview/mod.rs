@@ -15,6 +15,7 @@
 mod audience;
 mod coarse;
 mod command;
+mod files;
 mod frame;
 mod glimpse;
 mod layer;
@@ -43,8 +44,11 @@ use fechner_perception::Plane;
 use fechner_perception::tone::SceneLight;
 use shared::Shared;
 use std::net::TcpListener;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+/// Most pixels a side of a picture that is shown: a JPEG has 16 bits for them, as canvases of browsers do.
+pub const MOST_SIDE_PIXELS: u32 = u16::MAX as u32;
 
 /// A loaded scene and how to render it.
 pub struct Job {
@@ -84,8 +88,11 @@ pub trait Host: Send + Sync {
     /// In words for the user.
     fn save(&self, path: &Path, rendered: &Rendered, settings: &LoopSettings) -> Result<(), String>;
 
-    /// The file whose changes make the scene load again.
+    /// The scene's file, by whose name pictures are called.
     fn scene_file(&self) -> &Path;
+
+    /// The files whose changes make the scene load again, whether or not they are there.
+    fn watched_files(&self) -> Vec<PathBuf>;
 }
 
 /// What a preview does beside showing the picture to browsers.
@@ -114,17 +121,17 @@ impl Closer {
     }
 }
 
-/// Renders `job` in `pool` on a thread of its own, and watches the scene file from another.
+/// Renders `job` in `pool` on a thread of its own, and watches the scene's files from another.
 ///
 /// # Errors
 /// If the system gives no thread.
 pub fn start(job: Job, host: Arc<dyn Host>, options: Options, pool: rayon::ThreadPool) -> std::io::Result<Preview> {
     let shared = Arc::new(Shared::new());
-    let scene_file = host.scene_file().to_owned();
+    let host_of_watch = Arc::clone(&host);
     let thread = |name: &str| std::thread::Builder::new().name(name.to_owned());
     let (of_render, of_watch) = (Arc::clone(&shared), Arc::clone(&shared));
     let render = thread("preview").spawn(move || pool.install(|| session::run(job, &host, options, &of_render)))?;
-    let watch = thread("scene-file").spawn(move || session::watch_file(&scene_file, &of_watch))?;
+    let watch = thread("scene-files").spawn(move || files::watch(host_of_watch.as_ref(), &of_watch))?;
     Ok(Preview { shared, threads: vec![render, watch] })
 }
 

@@ -34,10 +34,9 @@ pub(super) use pace::Pace;
 use problems::{Cause, Problems};
 use rest::Unlooked;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::Path;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
-pub(super) use telling::{blank_status, count, publish};
+pub(super) use telling::{blank_status, count, in_words, publish};
 use watch::{Moving, Watch};
 
 /// Renders and obeys until the preview closes. A defect that panics ends the picture, not the preview: a saved scene file
@@ -60,20 +59,6 @@ pub(super) fn run(job: Job, host: &Arc<dyn Host>, mut options: Options, shared: 
             Err(_) => "the program has a defect here; its message stands where fechner view was started".to_owned(),
         };
         shared.publish_status(serde_json::json!({ "kind": "status", "phase": "failed", "error": problem }).to_string());
-    }
-}
-
-/// Tells when the scene file changes.
-pub(super) fn watch_file(path: &Path, shared: &Shared) {
-    let stamp = || std::fs::metadata(path).ok().and_then(|file| Some((file.modified().ok()?, file.len())));
-    let mut last = stamp();
-    while !shared.is_closing() {
-        std::thread::sleep(Duration::from_millis(200));
-        // Between a save's removal and its renaming there may be no file.
-        if let Some(now) = stamp().filter(|now| last != Some(*now)) {
-            last = Some(now);
-            shared.send(Command::Reload);
-        }
     }
 }
 

@@ -163,6 +163,11 @@ def steps(page, folder):
     page.page.mouse.up()
     split = float(page.page.evaluate("document.getElementById('frame').style.getPropertyValue('--split')").rstrip("%"))
     assert abs(split - 25) < 2, split
+    page.page.locator("#divider").focus()
+    for key, value in [("ArrowRight", 27), ("PageUp", 37), ("End", 100), ("Home", 0), ("ArrowLeft", 0)]:
+        page.page.keyboard.press(key)
+        told = page.page.evaluate("Number(document.getElementById('divider').getAttribute('aria-valuenow'))")
+        assert abs(told - value) <= 2, (key, told)
     page.page.keyboard.press("x")
     assert not page.page.is_visible("#second") and not page.page.is_visible("#divider")
 
@@ -175,6 +180,14 @@ def steps(page, folder):
     page.page.keyboard.press("x")
     assert page.text("legend-second").startswith("kept at"), page.text("legend-second")
     assert page.pixels("second") == before and page.pixels() != before
+    page.page.keyboard.press("x")
+    page.page.keyboard.press("4")
+    page.until("what can be seen", "document.getElementById('legend').textContent.startsWith('blue')")
+    page.page.keyboard.press("k")
+    page.page.keyboard.press("1")
+    page.page.keyboard.press("x")
+    kept = page.page.evaluate("document.getElementById('beside').selectedOptions[0].textContent")
+    assert kept == "Kept: Visibility" and "blue: at most the target" in page.text("legend-second"), (kept, page.text("legend-second"))
     page.page.keyboard.press("x")
     page.page.evaluate("send({ do: 'exposure', stops: 0 })")
     page.until("the first exposure", "told.exposure === 0")
@@ -245,6 +258,16 @@ def steps(page, folder):
     pan, dolly, orbit = page.page.evaluate(script)
     assert (pan["by"], dolly["by"], orbit["by"]) == ("pan", "dolly", "orbit"), (pan, dolly, orbit)
     assert pan["right"] < 0 and abs(0.9 ** dolly["steps"] - 0.5) < 1e-6, (pan, dolly)
+
+    yield "orbits, pans and comes nearer by keys"
+    script = """() => { window.asked = []; const before = move; move = movement => asked.push(movement);
+        for (const [key, shiftKey] of [["ArrowRight", false], ["ArrowUp", true], ["PageUp", false]])
+            stage.dispatchEvent(new KeyboardEvent("keydown", { key, shiftKey, bubbles: true }));
+        document.getElementById("png").dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowUp", bubbles: true }));
+        move = before; return [stage.getAttribute("aria-label") !== null, ...asked]; }"""
+    is_named, orbit, pan, *dolly = page.page.evaluate(script)
+    assert is_named and (orbit["by"], pan["by"], [step["by"] for step in dolly]) == ("orbit", "pan", ["dolly"]), (orbit, pan, dolly)
+    assert orbit["right"] > 0 and pan["up"] > 0 and dolly[0]["steps"] > 0, (orbit, pan, dolly)
 
     yield "keeps its keys after a slider and a list, and with caps lock"
     page.page.locator("#target").focus()
@@ -325,7 +348,10 @@ def steps_of_a_render(page):
     page.page.wait_for_timeout(500)
     assert page.text("error") == "", page.text("error")
     page.page.click("#stop")
-    page.until("the end", "document.getElementById('phase').textContent === 'Not connected'")
+    page.until("the end", "socket.readyState === 3")
+    page.page.wait_for_timeout(1500)
+    assert page.text("phase") == "Ended: stopped from this page", page.text("phase")
+    assert page.page.evaluate("socket.readyState") == 3, "the page still asks for a render that has ended"
 
 
 def main():

@@ -99,7 +99,7 @@ impl Monitor for Interrupter {
     fn between_batches(&self, _: &RenderState) -> Directive {
         if self.batches_left.fetch_sub(1, Ordering::Relaxed) == 1 { Directive::Stop } else { Directive::GoOn }
     }
-    fn ended(&self, state: &RenderState) {
+    fn ended(&self, state: &RenderState, _: StopReason) {
         *self.last.lock().expect("no panic") = Some(state.clone());
     }
 }

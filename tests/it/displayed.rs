@@ -318,6 +318,22 @@ fn the_shape_of_pixels_is_kept_in_a_png() {
     }
 }
 
+/// A render's pixels are square: for a display whose own are not it drew and tagged square ones, which that display stretched.
+#[test]
+fn nothing_is_rendered_for_pixels_that_are_not_square() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box.toml");
+    std::fs::write(folder.path().join("wide.toml"), "name = 'wide'\npixel_aspect_ratio = 2.0").expect("written");
+    let (code, said) =
+        fechner(folder.path(), &["render", scene, "-o", "a.png", "--size", "8x8", "--display", "wide.toml"]);
+    assert!(code == 2 && said.contains("\"wide\"") && said.contains("square"), "{said}");
+    let shot = ["animate", scene, "--frames", "0..1", "-o", "a.##.png", "--size", "8x8", "--display", "wide.toml"];
+    let (code, said) = fechner(folder.path(), &shot);
+    assert!(code == 2 && said.contains("square"), "{said}");
+    write(folder.path(), "a.exr", |_| [50.0; 3]);
+    run(folder.path(), &["tonemap", "a.exr", "-o", "a.png", "--operator", "absolute", "--display", "wide.toml"]);
+}
+
 /// Who names no display sees a render on the one that it was made for.
 #[test]
 fn a_render_is_seen_on_its_own_display() {

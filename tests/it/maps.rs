@@ -30,6 +30,17 @@ fn maps_show_counts_and_what_can_be_seen() {
     map("threshold", &["--spp", "16"]);
 }
 
+/// Of one sample a pixel nothing is known, which was shown as the most visible noise.
+#[test]
+fn what_is_not_known_is_grey() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let asked = ["-o", "a.png", "--sampling", "uniform", "--spp", "1", "--map", "visibility=map.png"];
+    let said = String::from_utf8_lossy(&render(&asked, folder.path()).stderr).into_owned();
+    assert!(said.contains("map.png: grey: not known"), "{said}");
+    let map = image::open(folder.path().join("map.png")).expect("a picture").into_rgb8();
+    assert!(map.pixels().all(|image::Rgb([r, g, b])| r == g && g == b), "{:?}", map.get_pixel(0, 0));
+}
+
 #[test]
 fn maps_that_cannot_be_are_refused_before_the_picture() {
     let folder = tempfile::tempdir().expect("a folder");

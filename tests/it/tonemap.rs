@@ -123,6 +123,40 @@ fn light_that_covers_nothing_is_kept() {
     assert!(flame[3].abs_diff(159) <= 1 && flame[1] == 255, "{flame:?}");
 }
 
+/// An alpha multiplies the display's black too: what is not covered holds none, and the file shows what its PNG does. On a display whose
+/// black is not dark it was 133 codes off, with a note about flames that are not there.
+#[test]
+fn a_transparent_exr_is_shown_as_its_png() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("lit.toml"), "name = 'lit'\nwhite_cd_m2 = 200.0\nblack_cd_m2 = 5.0")
+        .expect("written");
+    let alpha = [1.0, 0.7, 0.4, 0.1, 0.02, 0.0];
+    let mut picture = Picture::new(6, 1);
+    for (channel, light) in [("R", 90.0), ("G", 30.0), ("B", 0.5)] {
+        picture.push_f32(channel, alpha.map(|alpha| light * alpha).to_vec());
+    }
+    picture.push_f32("A", alpha.to_vec());
+    picture.push_attribute(NITS_PER_UNIT, Attribute::Float(1.0));
+    write_exr(&folder.path().join("a.exr"), &picture).expect("written");
+    for display in ["desktop", "lit.toml"] {
+        for name in ["direct.png", "via.exr"] {
+            run(folder.path(), &["a.exr", "-o", name, "--operator", "absolute", "--display", display]);
+        }
+        let exr = read_exr(&folder.path().join("via.exr")).expect("an EXR file");
+        let last = ["R", "G", "B"].map(|channel| exr.channel(channel).expect("a channel")[5]);
+        assert_eq!(last, [0.0; 3], "{display}: light where nothing is");
+        let said = tonemap(folder.path(), &["via.exr", "-o", "via.png"]);
+        assert!(said.stderr.is_empty(), "{}", String::from_utf8_lossy(&said.stderr));
+        let [direct, via] = ["direct.png", "via.png"]
+            .map(|name| image::open(folder.path().join(name)).expect("a picture").into_rgba8());
+        assert_eq!(direct, via, "{display}");
+        let mut compare = Command::cargo_bin("fechner").expect("the binary is built");
+        let said =
+            compare.args(["compare", "via.exr", "direct.png"]).current_dir(folder.path()).output().expect("runs");
+        assert!(said.status.success(), "{}", String::from_utf8_lossy(&said.stdout));
+    }
+}
+
 /// Over time the same eye sees the same part of the view.
 #[test]
 fn equal_frames_are_seen_as_the_still_of_one() {

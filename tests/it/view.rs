@@ -5,6 +5,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tungstenite::client::IntoClientRequest;
 use tungstenite::http::HeaderValue;
@@ -24,6 +25,8 @@ struct View {
     child: Child,
     address: String,
     token: String,
+    /// What else it says.
+    said: Option<JoinHandle<String>>,
 }
 
 impl View {
@@ -56,8 +59,16 @@ impl View {
         let (address, token) = rest.split_once("/?token=").expect("a token");
         let (address, token) = (address.to_owned(), token.to_owned());
         // What else it says must not fill the pipe.
-        std::thread::spawn(move || std::io::copy(&mut said, &mut std::io::sink()));
-        Self { child, address, token }
+        let said = std::thread::spawn(move || {
+            let mut text = String::new();
+            said.read_to_string(&mut text).map(|_| text).expect("UTF-8")
+        });
+        Self { child, address, token, said: Some(said) }
+    }
+
+    /// What it said once it has ended.
+    fn said(&mut self) -> String {
+        self.said.take().map(|said| said.join().expect("read")).expect("asked once")
     }
 
     /// The answer to a GET, from its status line on.
@@ -369,8 +380,71 @@ fn a_render_shows_itself_and_is_not_driven() {
     assert_eq!(refused["is_driven"], false);
     viewer.status("no more of it", |status| status["error"].is_null());
     viewer.send(&json!({ "do": "stop" }));
+    viewer.status("why it ended", |status| status["reason"] == "stopped from this page");
     assert!(view.child.wait().expect("ended").success());
     assert!(image::open(at.join("stopped.png")).is_ok());
+    let said = view.said();
+    assert!(said.contains("Stopped from the page of --view, after"), "{said}");
+
+    let mut view = View::of_render(at, &["--visibility", "0.01", "--spp", "512", "-o", "spent.png"]);
+    view.viewer().status("why it ended", |status| status["reason"] == "the samples are spent");
+    assert!(view.child.wait().expect("ended").success());
+}
+
+/// A browser shows no picture of more pixels a side, and would stay empty.
+#[test]
+fn a_picture_too_wide_for_a_browser_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for command in [&["view"][..], &["render", "--view", "-o", "a.png", "--spp", "1", "--sampling", "uniform"]] {
+        let mut fechner = Command::new(env!("CARGO_BIN_EXE_fechner"));
+        let scene = cornell_box();
+        fechner.args(command).arg(&scene).args(["--size", "65536x1"]).current_dir(folder.path());
+        let mut child = fechner.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("runs");
+        let mut said = child.stderr.take().expect("piped");
+        let started = Instant::now();
+        let status = loop {
+            if let Some(status) = child.try_wait().expect("a child") {
+                break status;
+            }
+            if started.elapsed() > Duration::from_secs(20) {
+                let _ = child.kill();
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        };
+        let mut text = String::new();
+        said.read_to_string(&mut text).expect("UTF-8");
+        assert!(status.code() == Some(2) && text.contains("65535"), "{command:?}: {text}");
+    }
+}
+
+/// A side file that comes to be or changes, and what a scene is made of, is the scene's edit too.
+#[test]
+fn all_files_of_a_scene_are_watched() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    let object = |material: &str| format!("mtllib a.mtl\nusemtl {material}\nv -1 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    std::fs::write(at.join("a.mtl"), "newmtl red\nKd 0.8 0.1 0.1\n").expect("written");
+    std::fs::write(at.join("a.obj"), object("red")).expect("written");
+    std::fs::write(at.join("near.toml"), "name = 'near'\npixels_per_degree = 20.0").expect("written");
+    let view = View::of(&at.join("a.obj"), at, &["--sampling", "uniform", "--spp", "1", "--display", "near.toml"]);
+    let mut viewer = view.viewer();
+    let home = viewer.status("the end", is_stopped);
+    let side = |field_of_view: u32| {
+        let text = format!("[camera]\nposition = [0, 0, 5]\nlook_at = [0, 0, 0]\nvertical_fov_deg = {field_of_view}\n");
+        std::fs::write(at.join("a.fechner.toml"), text).expect("written");
+    };
+    side(40);
+    let with_side = viewer.status("a side file", |status| status["camera"] != home["camera"] && is_stopped(status));
+    side(7);
+    viewer.status("its edit", |status| status["camera"] != with_side["camera"] && is_stopped(status));
+    std::fs::write(at.join("near.toml"), "name = 'near'\npixels_per_degree = 33.0").expect("written");
+    viewer.status("another display", |status| status["pixels_per_degree"] == 33.0 && is_stopped(status));
+    std::fs::write(at.join("a.mtl"), "newmtl red\nKd 0.02 0.02 0.8\n").expect("written");
+    let is_blue =
+        |picture: &image::RgbImage| picture.pixels().any(|image::Rgb([red, _, blue])| *blue > red.saturating_add(60));
+    viewer.frame(0, "another material", is_blue);
+    std::fs::remove_file(at.join("a.fechner.toml")).expect("removed");
+    viewer.status("no side file", |status| status["camera"] == home["camera"] && is_stopped(status));
 }
 
 /// A render whose tev is not there says so once and writes the same bytes; one whose tev is there sends it something.

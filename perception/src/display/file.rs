@@ -81,7 +81,8 @@ fn wrong(reason: impl Into<String>) -> Error {
 impl Display {
     /// Reads a display file: a TOML table whose keys are the fields of [`Display`], all optional.
     ///
-    /// `preset` names the display that fills what is left out (`desktop` if absent). Instead of `pixels_per_degree`
+    /// `preset` names the display that fills what is left out (`desktop` if absent). A file without a `name` is called as its
+    /// preset, "desktop, changed" where it differs from that, and "file" without one. Instead of `pixels_per_degree`
     /// a file may give `width_px`, `width_m` and `distance_m`.
     ///
     /// ```
@@ -97,13 +98,13 @@ impl Display {
         let file = DisplayFile::read(text)?;
         let base = file.base()?;
         let distance_m = file.distance_m.or(base.distance_m);
-        let display = Self {
+        let mut display = Self {
             pixels_per_degree: match file.density(distance_m)? {
                 Density::Preset => base.pixels_per_degree,
                 Density::Stated(stated) => stated,
                 Density::Follows { width_px, width_m, distance_m } => pixels_per_degree(width_px, width_m, distance_m)?,
             },
-            name: file.name.unwrap_or(base.name),
+            name: base.name.clone(),
             pixel_aspect_ratio: file.pixel_aspect_ratio.unwrap_or(base.pixel_aspect_ratio),
             white_cd_m2: file.white_cd_m2.unwrap_or(base.white_cd_m2),
             black_cd_m2: file.black_cd_m2.unwrap_or(base.black_cd_m2),
@@ -115,6 +116,12 @@ impl Display {
             persistence: file.persistence.unwrap_or(base.persistence),
         };
         display.check()?;
+        display.name = match file.name {
+            Some(name) => name,
+            // Beside the preset itself two displays of one name would be told apart by nobody.
+            None if file.preset.is_some() && display != base => format!("{}, changed", base.name),
+            None => base.name,
+        };
         Ok(display)
     }
 }
@@ -145,5 +152,16 @@ mod tests {
         assert!(matches!(Display::from_toml("preset = 'desktop'\ndistance_m = 1.2"), Err(Error::Parse { .. })));
         let phone = Display::from_toml("preset = 'phone'\nwhite_cd_m2 = 700").unwrap();
         assert_eq!((phone.white_cd_m2, phone.pixels_per_degree), (700.0, 90.0));
+    }
+
+    /// What is not the preset has not its name: messages said that "desktop" is not as bright as "desktop".
+    #[test]
+    fn a_changed_preset_is_called_so() {
+        let name = |text: &str| Display::from_toml(text).unwrap().name;
+        assert_eq!(name("preset = 'phone'\nwhite_cd_m2 = 700"), "phone, changed");
+        assert_eq!(name("preset = 'phone'"), "phone");
+        assert_eq!(name("preset = 'phone'\nwhite_cd_m2 = 500"), "phone");
+        assert_eq!(name("preset = 'phone'\nname = 'mine'\nwhite_cd_m2 = 700"), "mine");
+        assert_eq!(name("white_cd_m2 = 100"), "file");
     }
 }

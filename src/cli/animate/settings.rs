@@ -40,7 +40,7 @@ pub(super) fn shot_settings(arguments: &AnimateArguments, scene: &Scene, shot: F
             plans: None,
             pilot_samples: arguments.denoise.pilot_samples(),
         },
-        viewing: seeing::viewing(display, None)?,
+        viewing: seeing::viewing_of_render(display, None)?,
         nits_per_unit: scene.nits_per_unit,
         adapted_to_cd_m2: arguments.adapted_to,
         gaze: gaze(arguments, size, shot)?,

@@ -93,7 +93,12 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
         let now = (middle + window.len() as u64 - next) as usize;
         let difference = observer.difference(&window.iter().collect::<Vec<_>>(), now)?;
         if let Some(map) = &sequences.map {
-            write_map(&map.of(frame), &difference)?;
+            let file = map.of(frame);
+            let legend = write_map(&file, &difference)?;
+            // One scale for all frames.
+            if frame == first {
+                say!("{} and on: {legend}", file.display());
+            }
         }
         frames.push(FrameFigures { frame, seen: Seen::of(&difference) });
     }

@@ -18,7 +18,7 @@ pub(super) fn settings_record(arguments: &JobArguments, scene: &Scene) -> anyhow
         exposure_stops: arguments.exposure,
     };
     let Presentation { display, operator, exposure_stops } = asked.of_scene(scene);
-    let viewing = seeing::viewing(display, arguments.csf_area)?;
+    let viewing = seeing::viewing_of_render(display, arguments.csf_area)?;
     if arguments.denoise.kind().is_some() && arguments.model != model::DEFAULT {
         bail!(
             "--denoise is for --model {}: {} cannot say what is seen of a denoised picture",

@@ -10,9 +10,23 @@ use fechner_perception::Plane;
 use fechner_perception::display::Display;
 use fechner_perception::psychometric::detection_probability;
 
-/// The end of a render in plain words.
-pub(in crate::cli) fn summary(report: &Report, settings: &LoopSettings, rendered: &Rendered) -> String {
-    let mut lines = vec![spent(report), stopped(report, settings, rendered)];
+/// Who ends a render before it is done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::cli) enum Interrupter {
+    /// The system or a terminal.
+    Signal,
+    /// Somebody at the page of `--view`.
+    Viewer,
+}
+
+/// The end of a render in plain words; `interrupter` has ended it if anybody has.
+pub(in crate::cli) fn summary(
+    report: &Report,
+    settings: &LoopSettings,
+    rendered: &Rendered,
+    interrupter: Interrupter,
+) -> String {
+    let mut lines = vec![spent(report), stopped(report, settings, rendered, interrupter)];
     lines.extend(noticed(report, &settings.viewing.display, &rendered.judgement.predicted));
     lines.extend(importance(report));
     lines.extend(denoised(report));
@@ -35,7 +49,7 @@ fn spent(report: &Report) -> String {
     )
 }
 
-fn stopped(report: &Report, settings: &LoopSettings, rendered: &Rendered) -> String {
+fn stopped(report: &Report, settings: &LoopSettings, rendered: &Rendered, interrupter: Interrupter) -> String {
     let why = match rendered.stop_reason {
         StopReason::Visibility => "Stopped because the target is reached",
         StopReason::Time if settings.limits.time.is_some_and(|limit| rendered.seconds.total < limit.as_secs_f64()) => {
@@ -51,7 +65,10 @@ fn stopped(report: &Report, settings: &LoopSettings, rendered: &Rendered) -> Str
         }
         StopReason::Plans => "Stopped after the plans asked for",
         StopReason::Rule => "Stopped because the rule asked for is satisfied",
-        StopReason::Interrupted => "Stopped by a signal",
+        StopReason::Interrupted => match interrupter {
+            Interrupter::Signal => "Stopped by a signal",
+            Interrupter::Viewer => "Stopped from the page of --view",
+        },
         StopReason::Merged => "Merged",
     };
     let target = match (report.fraction_visible, report.visibility_target) {

@@ -56,17 +56,19 @@ fn write_exr(
     let display = &frame.viewing.display;
     let mut picture = Picture::new(frame.width as u32, frame.height() as u32);
     picture.part_of = frame.part_of;
-    let emitted = |relative: f32| (display.emitted_cd_m2(f64::from(relative)) / display.white_cd_m2) as f32;
-    let shown = match frame.covered(fitted) {
-        Some(covered) => {
-            // Multiplied by alpha, as the format has it; the display's black is there before whatever lies behind.
-            picture.push_f32("A", covered.alpha().to_vec());
-            covered.premultiplied()
-        }
-        None => frame.shown(fitted),
+    let shown = frame.shown(fitted);
+    // Multiplied by alpha, as the format has it, the display's black too: what lies behind brings its own.
+    let alpha = |pixel: usize| frame.alpha.as_ref().map_or(1.0, |alpha| f64::from(alpha[pixel]));
+    let emitted = |(pixel, relative): (usize, f32)| {
+        let behind_cd_m2 = (1.0 - alpha(pixel)) * display.black_cd_m2;
+        ((display.emitted_cd_m2(f64::from(relative)) - behind_cd_m2) / display.white_cd_m2) as f32
     };
     for (channel, name) in ["R", "G", "B"].into_iter().enumerate() {
-        picture.push_f32(name, shown.iter().map(|pixel| emitted(pixel[channel])).collect::<Vec<_>>());
+        let relative = shown.iter().map(|rgb| rgb[channel]).enumerate();
+        picture.push_f32(name, relative.map(emitted).collect::<Vec<_>>());
+    }
+    if let Some(alpha) = &frame.alpha {
+        picture.push_f32("A", alpha.clone());
     }
     picture.push_attribute(output::NITS_PER_UNIT, Attribute::Float(display.white_cd_m2 as f32));
     // Readers take text for UTF-8, the writer has Latin-1: only what both have in common is safe.

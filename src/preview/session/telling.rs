@@ -120,7 +120,8 @@ pub(in crate::preview) fn publish(status: &Status, shared: &Shared) {
     }
 }
 
-fn in_words(reason: StopReason) -> &'static str {
+/// Why a picture is at rest, for the page.
+pub(in crate::preview) fn in_words(reason: StopReason) -> &'static str {
     match reason {
         StopReason::Visibility => "nothing more can be seen at this target",
         StopReason::Time => "the time is up",

@@ -21,6 +21,11 @@ pub fn was_read(path: &Path) -> bool {
     path.canonicalize().is_ok_and(|path| read.contains(&path))
 }
 
+/// All files of which [`was_read`] says so.
+pub fn files_read() -> Vec<PathBuf> {
+    READ.lock().unwrap_or_else(std::sync::PoisonError::into_inner).iter().cloned().collect()
+}
+
 /// Has [`was_read`] count a file that belongs to a scene and is read elsewhere: the display that it names.
 pub fn count_as_read(path: &Path) {
     if let Ok(path) = path.canonicalize() {

@@ -51,7 +51,8 @@ mod validate;
 pub use builder::NO_CAMERA;
 pub use default_view::{Bounds, bounds, framed};
 pub use error::{LoadError, Place};
-pub use files::{count_as_read, was_read};
+pub use files::{count_as_read, files_read, was_read};
+pub use toml::side::side_file;
 
 use crate::scene::{FilmDefaults, Instance, ScalarInput, Scene};
 use std::path::Path;

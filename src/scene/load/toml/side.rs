@@ -15,8 +15,13 @@ const KNOWN: [&str; 6] = ["nits_per_unit", "film", "view", "camera", "environmen
 
 /// The side file of a scene, if there is one with something in it.
 pub(in crate::scene::load) fn of(scene: &Path) -> Option<PathBuf> {
-    let beside = scene.with_extension("fechner.toml");
+    let beside = side_file(scene);
     std::fs::metadata(&beside).is_ok_and(|file| file.is_file() && file.len() > 0).then_some(beside)
+}
+
+/// Where the side file of a scene is, or would be.
+pub fn side_file(scene: &Path) -> PathBuf {
+    scene.with_extension("fechner.toml")
 }
 
 /// The options with what the side file says of how its scene is read: its unit and size where the caller names none, whether light
