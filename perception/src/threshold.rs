@@ -97,7 +97,7 @@ pub struct ThresholdMap {
 ///
 /// # Errors
 /// [`Error::Empty`] and [`Error::BadPixel`] for pictures that are none, [`Error::SizeMismatch`] for a variance of
-/// another size, [`Error::OutOfRange`] for an impossible viewing.
+/// another size, [`Error::OutOfRange`] for an impossible viewing and for luminance above 1e30 cd/m².
 ///
 /// ```
 /// use fechner_perception::{CastleCsf, Plane, ThresholdInputs, Viewing, threshold_map};
@@ -116,7 +116,7 @@ pub fn threshold_map(
 ) -> Result<ThresholdMap, Error> {
     viewing.check()?;
     let guide = inputs.display_luminance_cd_m2;
-    guide.check_non_negative("display luminance")?;
+    guide.check_luminance("display luminance")?;
     if let Some(variance) = inputs.guide_noise.variance() {
         variance.check_size("guide variance", guide.width(), guide.height())?;
         variance.check_non_negative("guide variance")?;
