@@ -138,11 +138,22 @@ pub fn chromatic_threshold_map(
     viewing: &Viewing,
     csf: &dyn ContrastSensitivity,
 ) -> Result<ThresholdMap, Error> {
+    noisy_chromatic_threshold_map(channel_cd_m2, display_luminance_cd_m2, GuideNoise::Clean, viewing, csf)
+}
+
+/// [`chromatic_threshold_map`] of a guide with noise, whose variance in the channel is finite and not negative.
+pub(crate) fn noisy_chromatic_threshold_map(
+    channel_cd_m2: &Plane,
+    display_luminance_cd_m2: &Plane,
+    noise: GuideNoise<&Plane>,
+    viewing: &Viewing,
+    csf: &dyn ContrastSensitivity,
+) -> Result<ThresholdMap, Error> {
     viewing.check()?;
-    display_luminance_cd_m2.check_non_negative("display luminance")?;
+    display_luminance_cd_m2.check_luminance("display luminance")?;
     channel_cd_m2.check_size("chromatic signal", display_luminance_cd_m2.width(), display_luminance_cd_m2.height())?;
     channel_cd_m2.map(f32::abs).check_non_negative("chromatic signal")?;
-    Ok(assemble(channel_cd_m2, display_luminance_cd_m2, 0.0, GuideNoise::Clean, viewing, csf))
+    Ok(assemble(channel_cd_m2, display_luminance_cd_m2, 0.0, noise, viewing, csf))
 }
 
 /// Adaptation to a luminance, cd/m², and the masks and noise gain of a signal under it, with the observer's glare.
