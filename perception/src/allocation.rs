@@ -24,7 +24,9 @@ pub struct AllocationProblem<'a> {
     /// Cost of one sample, in any unit (rays and node visits, not seconds); positive.
     pub cost: &'a Plane,
     /// Multiplies the visibility allowed at each pixel (a user's importance map: below 1 where it matters more);
-    /// `None` is 1 everywhere.
+    /// `None` is 1 everywhere. Beside a steep step noise comes over that bands smear further than the pooling window that counts are found
+    /// by: behind one from 4 to 0.25 [`ThresholdMap::predicted_visibility`] is up to 1.13 times what is asked for at 4 pixels a degree, 1.04
+    /// at 10 to 38, 1.02 from 60 on, though every constraint here is met; behind one from 2 to 0.5 1.03 and 1.01.
     pub tolerance: Option<&'a Plane>,
     /// Visibility v\* that may remain.
     pub visibility: f64,

@@ -2,12 +2,15 @@
 
 use crate::csf::{CastleChromatic, CastleCsf, ChromaticChannel, ContrastSensitivity, FrameTiming};
 use crate::display::Viewing;
-use crate::error::Error;
+use crate::error::{Error, check_range};
+use crate::model::finite_error;
 use crate::noise_gain::noise_gain;
 use crate::opponent::{Opponent, opponent};
 use crate::plane::Plane;
 use crate::sensitivity::{LuminanceSpan, SensitivityTables};
-use crate::threshold::{ThresholdInputs, ThresholdMap, chromatic_threshold_map, threshold_map};
+use crate::threshold::{
+    GuideNoise, ThresholdInputs, ThresholdMap, chromatic_threshold_map, noisy_chromatic_threshold_map, threshold_map,
+};
 use crate::tone::acuity::{AcuityFilter, BehindAcuity};
 
 /// Thresholds of one picture in each of the eye's three channels.
@@ -60,22 +63,32 @@ pub fn colour_thresholds(
 /// on the display, cd/m²: the greater of castleCSF's red–green and yellow–violet, for the observer's area. `acuity` is what
 /// an operator takes away of the picture, and of this error with it. For error at rest: no motion hides it.
 ///
+/// `noise_of_picture` is the variance of the noise that the picture itself has, over that of this error: 0 of a picture without noise, 1 of the
+/// mean of the two halves. Such noise hides none of the error.
+///
 /// # Errors
-/// [`Error::ValueCount`] unless picture and error have `width * height` pixels; else as [`chromatic_threshold_map`].
+/// [`Error::ValueCount`] unless picture and error have `width * height` pixels; [`Error::OutOfRange`] for a variance that is negative; else
+/// as [`chromatic_threshold_map`].
 pub fn chromatic_visibility(
     display_rgb_cd_m2: &[[f32; 3]],
     half_difference_rgb: &[[f32; 3]],
     (width, height): (usize, usize),
+    noise_of_picture: f32,
     viewing: &Viewing,
     acuity: Option<AcuityFilter>,
 ) -> Result<Plane, Error> {
     viewing.check()?;
+    check_range("noise_of_picture", f64::from(noise_of_picture), 0.0, 1e6, "between 0 and 1e6")?;
     let picture = Channels::new(display_rgb_cd_m2, width, height)?;
     let error = Channels::new(half_difference_rgb, width, height)?;
     let luminance = picture.achromatic.map(|value| if value < 0.0 { 0.0 } else { value });
     let seen = |signal: &Plane, error: &Plane, channel: ChromaticChannel| {
         let csf = BehindAcuity { csf: CastleChromatic::new(channel, viewing.observer.csf_area_deg2)?, acuity };
-        Ok::<_, Error>(chromatic_threshold_map(signal, &luminance, viewing, &csf)?.measured_visibility(error))
+        let variance = error.map(|error| noise_of_picture * finite_error(error).powi(2));
+        let noise = if noise_of_picture > 0.0 { GuideNoise::White(&variance) } else { GuideNoise::Clean };
+        Ok::<_, Error>(
+            noisy_chromatic_threshold_map(signal, &luminance, noise, viewing, &csf)?.measured_visibility(error),
+        )
     };
     let red_green = seen(&picture.red_green, &error.red_green, ChromaticChannel::RedGreen)?;
     let yellow_violet = seen(&picture.yellow_violet, &error.yellow_violet, ChromaticChannel::YellowViolet)?;
@@ -216,13 +229,29 @@ mod tests {
         let seen = thresholds.measured_visibility(&error).unwrap().get(64, 64);
         assert!(missed < 1e-3 && seen > 1.0, "luminance {missed}, all channels {seen}");
         let of_colour = |acuity| {
-            let found = chromatic_visibility(&grey, &error, (SIDE, SIDE), &Viewing::default(), acuity);
+            let found = chromatic_visibility(&grey, &error, (SIDE, SIDE), 0.0, &Viewing::default(), acuity);
             found.unwrap().get(64, 64)
         };
         assert_eq!(of_colour(None), seen);
         // What is blurred away is not seen.
         let night = AcuityFilter::for_adaptation(0.01, &Viewing::default());
         assert!(night.is_some() && of_colour(night) < 0.9 * seen, "{} of {seen}", of_colour(night));
+    }
+
+    /// The mean of two halves: its own noise hid most of what it was judged by.
+    #[test]
+    fn noise_of_colour_does_not_hide_itself() {
+        let error = noise(|value| red_for_green(40.0 * value));
+        let mut state = 5;
+        let grey = vec![[100.0; 3]; SIDE * SIDE];
+        let noisy: Vec<[f32; 3]> =
+            (0..SIDE * SIDE).map(|_| red_for_green(40.0 * normal(&mut state)).map(|light| 100.0 + light)).collect();
+        let seen = |picture: &[[f32; 3]], noise_of_picture| {
+            let viewing = Viewing::default();
+            chromatic_visibility(picture, &error, (SIDE, SIDE), noise_of_picture, &viewing, None).unwrap().mean()
+        };
+        let (clean, hidden, known) = (seen(&grey, 0.0), seen(&noisy, 0.0), seen(&noisy, 1.0));
+        assert!(hidden < 0.8 * clean && (known / clean - 1.0).abs() < 0.08, "{clean}, {hidden}, {known}");
     }
 
     #[test]

@@ -31,6 +31,9 @@ impl Difference {
     }
 
     /// At each pixel the more visible of this difference and another one of the same pictures, shown otherwise.
+    ///
+    /// # Panics
+    /// Unless the other one has as many columns and rows.
     #[must_use]
     pub fn or_worse(&self, other: &Self) -> Self {
         Self::of(self.visibility.combined(&other.visibility, f32::max))

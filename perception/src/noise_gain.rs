@@ -32,9 +32,9 @@ pub(crate) fn noise_gain(tables: &SensitivityTables, adaptation_cd_m2: &Plane, e
     let mut gain = Plane::filled(width, height, 0.0);
     gain.for_each_row_mut(|y, row| {
         energy.row_into(y, &mut Vec::new(), row);
-        // Divided twice: the square of 1e-4 cd/m² and of 1e20 must both stay within f32.
+        // Divided twice: the square of 1e-4 cd/m² and of 1e20 must both stay within f32. Beyond, thresholds are the largest finite ones.
         for (value, adaptation) in row.iter_mut().zip(adaptation_cd_m2.row(y)) {
-            *value = *value / adaptation / adaptation;
+            *value = (*value / adaptation / adaptation).max(f32::MIN_POSITIVE);
         }
     });
     gain

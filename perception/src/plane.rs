@@ -15,11 +15,17 @@ pub struct Plane {
     values: Vec<f32>,
 }
 
+/// Luminance above which nothing is answered: sums over windows must stay within `f32`.
+const LARGEST_LUMINANCE_CD_M2: f32 = 1e30;
+
 /// Pixels that are worth handing to another thread: 16,384 left a second core idle at 128×128.
 pub(crate) const PIXELS_A_TASK: usize = 1 << 12;
 
 impl Plane {
     /// A plane whose every pixel is `value`.
+    ///
+    /// # Panics
+    /// Where there are more pixels than a `Vec` can hold.
     ///
     /// ```
     /// use fechner_perception::Plane;
@@ -27,7 +33,7 @@ impl Plane {
     /// ```
     #[must_use]
     pub fn filled(width: usize, height: usize, value: f32) -> Self {
-        Self { width, height, values: vec![value; width * height] }
+        Self { width, height, values: vec![value; width.saturating_mul(height)] }
     }
 
     /// Takes row-major values.
@@ -193,10 +199,19 @@ impl Plane {
 
     /// Rejects an empty plane and any value that is not finite or is negative.
     pub(crate) fn check_non_negative(&self, what: &'static str) -> Result<(), Error> {
+        self.check_at_most(f32::MAX, what)
+    }
+
+    /// Rejects the same, and luminance in cd/m² whose means would not be finite.
+    pub(crate) fn check_luminance(&self, what: &'static str) -> Result<(), Error> {
+        self.check_at_most(LARGEST_LUMINANCE_CD_M2, what)
+    }
+
+    fn check_at_most(&self, largest: f32, what: &'static str) -> Result<(), Error> {
         if self.values.is_empty() {
             return Err(Error::Empty { what });
         }
-        let is_bad = |value: &f32| !(value.is_finite() && *value >= 0.0);
+        let is_bad = |value: &f32| !(*value >= 0.0 && *value <= largest);
         // Whole chunks without an early exit run on vector registers.
         let has_bad = |chunk: &[f32]| chunk.iter().fold(false, |bad, value| bad | is_bad(value));
         if !self.values.par_chunks(1 << 14).any(has_bad) {
@@ -205,8 +220,11 @@ impl Plane {
         match self.values.iter().position(is_bad) {
             None => Ok(()),
             Some(index) => {
-                let (x, y) = (index % self.width, index / self.width);
-                Err(Error::BadPixel { what, value: self.values[index], x, y })
+                let (x, y, value) = (index % self.width, index / self.width, self.values[index]);
+                if value > largest && value.is_finite() {
+                    return Err(Error::OutOfRange { what, value: f64::from(value), expected: "at most 1e30 cd/m²" });
+                }
+                Err(Error::BadPixel { what, value, x, y })
             }
         }
     }
@@ -221,6 +239,13 @@ mod tests {
         let plane = Plane::from_fn(3, 2, |x, y| (10 * y + x) as f32);
         assert_eq!(plane.values(), [0.0, 1.0, 2.0, 10.0, 11.0, 12.0]);
         assert_eq!(plane.get(2, 1), 12.0);
+    }
+
+    /// The number of pixels went round: this plane had two values.
+    #[test]
+    #[should_panic(expected = "capacity overflow")]
+    fn more_pixels_than_can_be_counted_are_refused() {
+        let _ = Plane::filled(usize::MAX / 2 + 2, 2, 0.0);
     }
 
     #[test]

@@ -97,7 +97,7 @@ pub struct ThresholdMap {
 ///
 /// # Errors
 /// [`Error::Empty`] and [`Error::BadPixel`] for pictures that are none, [`Error::SizeMismatch`] for a variance of
-/// another size, [`Error::OutOfRange`] for an impossible viewing.
+/// another size, [`Error::OutOfRange`] for an impossible viewing and for luminance above 1e30 cd/m².
 ///
 /// ```
 /// use fechner_perception::{CastleCsf, Plane, ThresholdInputs, Viewing, threshold_map};
@@ -116,7 +116,7 @@ pub fn threshold_map(
 ) -> Result<ThresholdMap, Error> {
     viewing.check()?;
     let guide = inputs.display_luminance_cd_m2;
-    guide.check_non_negative("display luminance")?;
+    guide.check_luminance("display luminance")?;
     if let Some(variance) = inputs.guide_noise.variance() {
         variance.check_size("guide variance", guide.width(), guide.height())?;
         variance.check_non_negative("guide variance")?;
@@ -138,11 +138,22 @@ pub fn chromatic_threshold_map(
     viewing: &Viewing,
     csf: &dyn ContrastSensitivity,
 ) -> Result<ThresholdMap, Error> {
+    noisy_chromatic_threshold_map(channel_cd_m2, display_luminance_cd_m2, GuideNoise::Clean, viewing, csf)
+}
+
+/// [`chromatic_threshold_map`] of a guide with noise, whose variance in the channel is finite and not negative.
+pub(crate) fn noisy_chromatic_threshold_map(
+    channel_cd_m2: &Plane,
+    display_luminance_cd_m2: &Plane,
+    noise: GuideNoise<&Plane>,
+    viewing: &Viewing,
+    csf: &dyn ContrastSensitivity,
+) -> Result<ThresholdMap, Error> {
     viewing.check()?;
-    display_luminance_cd_m2.check_non_negative("display luminance")?;
+    display_luminance_cd_m2.check_luminance("display luminance")?;
     channel_cd_m2.check_size("chromatic signal", display_luminance_cd_m2.width(), display_luminance_cd_m2.height())?;
     channel_cd_m2.map(f32::abs).check_non_negative("chromatic signal")?;
-    Ok(assemble(channel_cd_m2, display_luminance_cd_m2, 0.0, GuideNoise::Clean, viewing, csf))
+    Ok(assemble(channel_cd_m2, display_luminance_cd_m2, 0.0, noise, viewing, csf))
 }
 
 /// Adaptation to a luminance, cd/m², and the masks and noise gain of a signal under it, with the observer's glare.

@@ -239,6 +239,16 @@ mod tests {
         }
     }
 
+    /// On black: however strong it is, a texture stays one.
+    #[test]
+    fn a_stronger_error_is_not_less_visible() {
+        let map = map_of(&Plane::filled(64, 64, 0.005), 60.0);
+        let texture = |scale: f32| Plane::from_fn(64, 64, |x, y| scale * (0.5 + ((x * 7 + y * 13) % 11) as f32 * 0.05));
+        let seen = [0.5, 5.0, 50.0, 200.0, 1e4, 1e8, 1e37].map(|scale| map.measured_visibility(&texture(scale)).mean());
+        let falls = |pair: &[f64]| pair[1] < 0.99 * pair[0];
+        assert!(!seen.windows(2).any(falls) && seen[2] > seen[1], "{seen:?}");
+    }
+
     #[test]
     fn broken_input_never_gives_nan() {
         let map = map_of(&Plane::filled(16, 16, 50.0), 30.0);

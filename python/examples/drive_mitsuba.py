@@ -30,6 +30,8 @@ import fechner
 mi.set_variant("llvm_ad_rgb")
 
 PATHS_AT_ONCE = 1 << 20
+# Of one pass of the reference, a pixel.
+PASS_SAMPLES = 256
 COVERAGE = 0.99
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
@@ -43,6 +45,8 @@ def load(path, width, height):
         return mi.load_dict(scene)
     tree = ElementTree.parse(path)
     film = tree.getroot().find("sensor/film")
+    if film is None:
+        raise ValueError("no sensor with a film, whose size could be set")
     for name, value in (("width", width), ("height", height)):
         for old in film.findall(f"integer[@name='{name}']"):
             film.remove(old)
@@ -228,21 +232,32 @@ def main():
     arguments.add_argument("--width", type=int, default=128)
     arguments.add_argument("--height", type=int, default=128)
     arguments.add_argument("--visibility", type=float, default=2.0, help="that may remain, in threshold units")
-    arguments.add_argument("--pilot", type=int, default=8, help="samples everywhere, even")
-    arguments.add_argument("--reference", type=int, default=4096, help="samples a pixel")
-    arguments.add_argument("--tone", default="ward94")
+    arguments.add_argument("--pilot", type=int, default=8, help="samples everywhere, even, at least 4")
+    arguments.add_argument("--reference", type=int, default=4096, help=f"samples a pixel, at least {4 * PASS_SAMPLES}")
+    arguments.add_argument("--tone", default="ward94", choices=fechner.tone_operators())
     arguments.add_argument("--seeds", type=int, default=1)
     options = arguments.parse_args()
+    # Each half of the pilot needs two samples, and the reference passes, to know their variance.
+    at_least = {"width": 1, "height": 1, "pilot": 4, "reference": 4 * PASS_SAMPLES, "seeds": 1}
+    for name, least in at_least.items():
+        if getattr(options, name) < least:
+            arguments.error(f"--{name} is {getattr(options, name)}; it must be at least {least}")
+    if not 0 < options.visibility < np.inf:
+        arguments.error(f"--visibility is {options.visibility}; it must be finite and above 0")
 
     start = time.time()
-    scene = load(options.scene, options.width, options.height)
-    count = max(options.reference // 256, 4)
-    passes = np.stack([np.array(mi.render(scene, spp=256, seed=10_000 + i))[..., :3] for i in range(count)]).astype(float)
+    try:
+        scene = load(options.scene, options.width, options.height)
+    except (OSError, ValueError, ElementTree.ParseError, RuntimeError) as error:
+        arguments.error(f"{options.scene}: {error}")
+    count = options.reference // PASS_SAMPLES
+    renders = (mi.render(scene, spp=PASS_SAMPLES, seed=10_000 + i) for i in range(count))
+    passes = np.stack([np.array(render)[..., :3] for render in renders]).astype(float)
     # Arbitrary units become cd/m²: the middle of the picture, in logarithms, is 30.
     exposure = 30 / np.exp(np.mean(np.log(np.maximum(fechner.luminance(passes.mean(axis=0)), 1e-4))))
     judge = Judge(exposure * passes, options.tone)
     print(
-        f"reference: {256 * count} samples a pixel, {time.time() - start:.0f} s, "
+        f"reference: {PASS_SAMPLES * count} samples a pixel, {time.time() - start:.0f} s, "
         f"its own noise on 99 % below {np.quantile(judge.own, COVERAGE):.2f}"
     )
     rows = []

@@ -6,12 +6,13 @@ of their mean; `ThresholdMap.measured_visibility` says how visible it is, in thr
     python python/examples/judge_renders.py a.npy b.npy --exposure 1000 -o map.png
     python python/examples/judge_renders.py a.pfm b.pfm --display laptop -o map.npy
 
-Files: .npy ((height, width, 3), linear Rec. 709), .pfm, and with `pip install mitsuba` .exr (of several layers the one called
+Files: .npy ((height, width, 3), linear Rec. 709), .pfm, and with `pip install mitsuba` .exr (of several layers the one without a name or called
 Combined, as Blender writes them) and .hdr.
 Exit status 0 when at least 99 % of the picture is below threshold, 1 when it is not, 2 when that cannot be said.
 """
 
 import argparse
+import importlib.util
 import sys
 from pathlib import Path
 
@@ -44,15 +45,31 @@ def read_by_mitsuba(path):
     try:
         bitmap = mitsuba.Bitmap(str(path))
         if bitmap.pixel_format() == mitsuba.Bitmap.PixelFormat.MultiChannel:
-            layers = dict(bitmap.split())
-            # Mitsuba calls the layer without a name <root>.
-            combined = [name for name in layers if name == "<root>" or name.split(".")[-1] == "Combined"]
-            if len(combined) != 1:
-                raise ValueError(f"{path} has the layers {', '.join(layers)}; one and no more must be called Combined")
-            bitmap = layers[combined[0]]
+            bitmap = finished_layer(path, bitmap)
         return np.array(bitmap.convert(mitsuba.Bitmap.PixelFormat.RGB, mitsuba.Struct.Type.Float32, False))
     except RuntimeError as error:
         raise ValueError(f"{path}: {' '.join(str(error).split())}") from error
+
+
+def finished_layer(path, bitmap):
+    """The layer without a name, or the one called Combined. `Bitmap.split` refuses files in which two layers have an alpha, as those of the
+    aov integrator over a film of rgba."""
+    import mitsuba
+
+    names = [field.name for field in bitmap.struct_()]
+    layers = dict.fromkeys(name.rpartition(".")[0] for name in names)
+    found = []
+    for layer in layers:
+        channels_of = {kind: [f"{layer}.{part}" if layer else part for part in kind] for kind in ("RGB", "XYZ", "Y")}
+        kind = next((kind for kind, channels in channels_of.items() if set(channels) <= set(names)), None)
+        if kind and layer.split(".")[-1] in ("", "Combined"):
+            found.append((kind, channels_of[kind]))
+    if len(found) != 1:
+        known = ", ".join(layer or "without a name" for layer in layers)
+        raise ValueError(f"{path} has the layers {known}; one picture and no more must be without a name or called Combined")
+    kind, channels = found[0]
+    values = np.array(bitmap)[..., [names.index(channel) for channel in channels]]
+    return mitsuba.Bitmap(np.ascontiguousarray(values, np.float32), getattr(mitsuba.Bitmap.PixelFormat, kind))
 
 
 def read_pfm(path):
@@ -109,6 +126,16 @@ def report(visibility, columns=6, rows=4):
         print(f"  {corners}: v = {mean:.2f} on average, above threshold on {100 * share:.1f} % of it")
 
 
+def check_output(path):
+    """Before the work: whether the map can be written."""
+    if path.suffix not in (".npy", ".png"):
+        raise ValueError(f"{path}: {path.suffix or 'no ending'}; the map is .npy or .png")
+    if path.suffix == ".png" and importlib.util.find_spec("matplotlib") is None:
+        raise ValueError(f"{path} needs matplotlib; end the name in .npy without it")
+    if not path.parent.is_dir():
+        raise ValueError(f"{path}: there is no folder {path.parent}")
+
+
 def write_map(path, visibility):
     if path.suffix == ".npy":
         np.save(path, visibility)
@@ -130,15 +157,19 @@ def main():
     if not 0 < options.exposure < np.inf:
         arguments.error(f"--exposure is {options.exposure}; it must be finite and above 0")
     try:
+        if options.output:
+            check_output(options.output)
         first, second = (options.exposure * read(path) for path in (options.first, options.second))
         if first.shape != second.shape:
             raise ValueError(f"{options.second} has the shape {second.shape}, but {options.first} {first.shape}")
+        if np.array_equal(first, second):
+            raise ValueError("one picture twice, or two renders by one seed, which tell nothing of noise (mi.render has seed 0 unless told)")
         visibility = judge(first, second, fechner.Viewing(options.display), options.tone)
         report(visibility)
         if options.output:
             write_map(options.output, visibility)
-    except (OSError, ValueError, ImportError) as error:
-        print(f"judge_renders: {error}", file=sys.stderr)
+    except Exception as error:  # Whatever it is: Python's own status, 1, would say that noise shows.
+        print(f"judge_renders: {error or type(error).__name__}", file=sys.stderr)
         return 2
     return 0 if np.mean(visibility <= 1) >= 0.99 else 1
 

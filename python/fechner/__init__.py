@@ -8,6 +8,8 @@ just seen. What cannot be answered raises ``ValueError`` with what would be righ
 Other Python threads run while a call works. Do not write to an array while a call reads it.
 """
 
+from importlib.metadata import version
+
 from ._fechner import (
     Allocation,
     Difference,
@@ -26,6 +28,8 @@ from ._fechner import (
     tone_map,
     tone_operators,
 )
+
+__version__ = version("fechner")
 
 __all__ = [
     "Allocation",

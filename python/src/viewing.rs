@@ -14,7 +14,8 @@ use crate::errors::value_error;
 /// black_cd_m2, ambient_cd_m2 (room light off the screen), distance_m (what the eye focuses on, for the function "daly93";
 /// changes pixels_per_degree, so it must be given beside it), csf_area_deg2 (area of the grating whose threshold is meant, for
 /// observers that do not say it). ValueError for an unknown preset and for values that no display has.
-#[pyclass(frozen, module = "fechner")]
+#[pyclass(frozen, eq, module = "fechner")]
+#[derive(PartialEq)]
 pub(crate) struct Display(pub(crate) display::Display);
 
 #[pymethods]
@@ -114,6 +115,11 @@ impl Display {
         self.0.csf_area_deg2
     }
 
+    /// Equal for equal displays.
+    fn __hash__(&self) -> u64 {
+        self.0.pixels_per_degree.to_bits()
+    }
+
     /// What `pickle` and `copy` make it again from: the preset, and every field by its name.
     fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<((&str,), Bound<'py, PyDict>)> {
         let display = &self.0;
@@ -174,7 +180,8 @@ pub(crate) fn unknown(kind: &'static str, name: &str, known: &[&str]) -> PyErr {
 
 /// The eye: sensitivity (1 is the median observer, 1.75 a keen one), csf_area_deg2 (area of the grating whose threshold is
 /// meant, deg²; None takes the display's, or 1), glare_age_years (light scattered in an eye of this age; None scatters none).
-#[pyclass(frozen, module = "fechner")]
+#[pyclass(frozen, eq, module = "fechner")]
+#[derive(PartialEq)]
 pub(crate) struct Observer {
     observer: display::Observer,
     /// What was asked for, before a display has its say.
@@ -220,6 +227,11 @@ impl Observer {
         }
     }
 
+    /// Equal for equal observers.
+    fn __hash__(&self) -> u64 {
+        self.observer.sensitivity.to_bits()
+    }
+
     /// What `pickle` and `copy` make it again from.
     fn __getnewargs__(&self) -> (f64, Option<f64>, Option<f64>) {
         (self.observer.sensitivity, self.csf_area_deg2, self.glare_age_years())
@@ -237,7 +249,8 @@ impl Observer {
 }
 
 /// Who looks at what. `display` is a Display or a preset's name; without an observer it is the one the display asks for.
-#[pyclass(frozen, module = "fechner")]
+#[pyclass(frozen, eq, module = "fechner")]
+#[derive(PartialEq)]
 pub(crate) struct Viewing(pub(crate) display::Viewing);
 
 #[pymethods]
@@ -264,6 +277,11 @@ impl Viewing {
     #[getter]
     fn observer(&self) -> Observer {
         Observer { observer: self.0.observer.clone(), csf_area_deg2: Some(self.0.observer.csf_area_deg2) }
+    }
+
+    /// Equal for equal viewings.
+    fn __hash__(&self) -> u64 {
+        self.display().__hash__() ^ self.observer().__hash__()
     }
 
     /// What `pickle` and `copy` make it again from.

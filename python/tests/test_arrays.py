@@ -189,8 +189,21 @@ def test_an_observer_and_a_display_both_have_their_say():
 )
 def test_settings_go_to_other_processes(settings):
     for protocol in range(2, pickle.HIGHEST_PROTOCOL + 1):
-        assert repr(pickle.loads(pickle.dumps(settings, protocol))) == repr(settings)
+        again = pickle.loads(pickle.dumps(settings, protocol))
+        assert repr(again) == repr(settings) and again == settings and hash(again) == hash(settings)
     assert repr(copy.copy(settings)) == repr(copy.deepcopy(settings)) == repr(settings)
+
+
+def test_settings_are_equal_by_what_they_say():
+    assert fechner.Display() == fechner.Display("desktop") != fechner.Display("laptop")
+    assert fechner.Observer() == fechner.Observer(1.0) != fechner.Observer.keen()
+    assert fechner.Viewing("laptop") == fechner.Viewing(fechner.Display("laptop")) != fechner.Viewing()
+    assert fechner.Display() != "desktop"
+    assert len({fechner.Viewing("laptop"), fechner.Viewing("laptop"), fechner.Viewing()}) == 2
+
+
+def test_the_package_says_its_version():
+    assert fechner.__version__.count(".") == 2
 
 
 def test_broken_error_is_counted_as_the_crate_says():

@@ -2,7 +2,7 @@
 
 use super::picture::note;
 use anyhow::{Result, bail};
-use fechner::exr_read::layers::{PictureLayer, colour_layer, is_called, layers_with, picture_layer};
+use fechner::exr_read::layers::{PictureLayer, colour_layer, is_called, layers_with, luminance_layer, picture_layer};
 use fechner::exr_read::{ExrImage, layer_and_part, read_exr_channels};
 use fechner_perception::Plane;
 use std::path::Path;
@@ -40,36 +40,43 @@ pub(super) fn motion_plane(path: &Path, exr: &ExrImage, values: Vec<f32>) -> Res
 pub(super) fn read_picture(path: &Path) -> Result<ExrImage> {
     Ok(read_exr_channels(path, |all| {
         let names: Vec<&str> = all.iter().map(String::as_str).collect();
-        let picture = layer_of_picture(&names);
+        let (picture, luminance) = (layer_of_colours(&names), luminance_layer(&names));
         let may_be = |name: &&String| {
             let (layer, part) = layer_and_part(name);
-            if picture.as_ref().is_some_and(|picture| picture.name == layer) {
-                ["R", "G", "B", "A"].iter().any(|own| part.eq_ignore_ascii_case(own))
-            } else {
-                layer.is_empty() && ["X", "Y", "Z", "RY", "BY", "A"].contains(&part)
-            }
+            let is_of = |of: &Option<PictureLayer<'_>>, parts: &[&str]| {
+                of.as_ref().is_some_and(|of| of.name == layer) && parts.iter().any(|own| part.eq_ignore_ascii_case(own))
+            };
+            is_of(&picture, &["R", "G", "B", "A"]) || is_of(&luminance, &["X", "Y", "Z", "RY", "BY", "A"])
         };
         all.iter().filter(may_be).cloned().collect()
     })?)
 }
 
-/// The layer that is shown: a pass only where neither a picture nor luminance is there.
+/// The layer whose R, G and B are shown: a pass only where neither a picture nor luminance is there.
+fn layer_of_colours<'a>(names: &[&'a str]) -> Option<PictureLayer<'a>> {
+    if luminance_layer(names).is_some() { picture_layer(names) } else { colour_layer(names) }
+}
+
+/// The layer that is shown: of colours, else of luminance.
 fn layer_of_picture<'a>(names: &[&'a str]) -> Option<PictureLayer<'a>> {
-    if names.contains(&"Y") { picture_layer(names) } else { colour_layer(names) }
+    layer_of_colours(names).or_else(|| luminance_layer(names))
 }
 
 /// What to say of a picture whose layer had to be guessed.
 pub(super) fn guess(exr: &ExrImage) -> Option<String> {
     let names = exr.names();
     let layer = layer_of_picture(&names)?;
-    let is_pass = picture_layer(&names).is_none();
+    let is_pass = picture_layer(&names).is_none() && luminance_layer(&names).is_none();
     let of_pass = || format!("the layer {} is taken for the picture: no other has R, G and B", layer.name);
     layer.guess().or_else(|| is_pass.then(of_pass))
 }
 
 /// The picture: `R`, `G` and `B` of one layer, else `Y`.
 pub(super) fn colour<'a>(exr: &'a ExrImage) -> Option<Colour<'a>> {
-    let Some(layer) = layer_of_picture(&exr.names()) else { return exr.channel("Y").map(Colour::Grey) };
+    let names = exr.names();
+    let Some(layer) = layer_of_colours(&names) else {
+        return exr.part(luminance_layer(&names)?.name, "Y").map(Colour::Grey);
+    };
     let [Some(r), Some(g), Some(b)] = ["R", "G", "B"].map(|part| exr.part(layer.name, part)) else {
         return None;
     };
@@ -231,6 +238,47 @@ mod tests {
         let beside_luminance = ["Y", "vector.B", "vector.G", "vector.R"];
         assert_eq!(colour(&exr(&beside_luminance)), Some(Colour::Grey(&[0.0])));
         assert_eq!(guess(&exr(&beside_luminance)), None);
+    }
+
+    /// Views and render layers of one file: pictures that differed in the second alone were the same to `compare`, without a word.
+    #[test]
+    fn of_several_pictures_all_are_named() {
+        let of = |layers: [&str; 3]| {
+            let names: Vec<String> =
+                layers.iter().flat_map(|layer| ["B", "G", "R"].map(|part| format!("{layer}.{part}"))).collect();
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            (rgb_of(&names), guess(&exr(&names)))
+        };
+        let said = "the layer Back.Combined is taken for the picture, of Back.Combined, Front.Combined";
+        let (rgb, note) = of(["Back.Combined", "Back.AO", "Front.Combined"]);
+        assert_eq!((rgb, note.as_deref()), (Some([2.0, 1.0, 0.0]), Some(said)));
+        let said = "the layer left.beauty is taken for the picture, of left.beauty, right.beauty";
+        assert_eq!(of(["left.beauty", "right.beauty", "right.image"]).1.as_deref(), Some(said));
+        assert_eq!(of(["a", "b", "b.beauty"]), (Some([8.0, 7.0, 6.0]), None));
+    }
+
+    /// Luminance of any case, at the root or in a layer or part that is called as pictures are.
+    #[test]
+    fn luminance_may_stand_in_a_layer() {
+        let shown = |names: &[&str]| {
+            let exr = exr(names);
+            exr.scene_picture(|_, _| None).map(|picture| picture.rgb[0])
+        };
+        assert_eq!(shown(&["A", "y"]), Some([1.0; 3]));
+        assert_eq!(shown(&["depth.Z", "image.Y"]), Some([1.0; 3]));
+        assert_eq!(shown(&["beauty.A", "beauty.Y", "id.Y"]), Some([1.0; 3]));
+        assert_eq!(shown(&["x", "y", "z"]), shown(&["X", "Y", "Z"]));
+        assert_eq!(shown(&["image.X", "image.Y", "image.Z"]), shown(&["X", "Y", "Z"]));
+        // A direction's, an identity's or a shadow's is no light.
+        for no_light in [&["nn.X", "nn.Y", "nn.Z"][..], &["id.Y"], &["shadow.image.Y"]] {
+            assert_eq!((shown(no_light), colour(&exr(no_light))), (None, None), "{no_light:?}");
+        }
+        let two = ["left.image.Y", "right.image.Y"];
+        assert_eq!(colour(&exr(&two)), Some(Colour::Grey(&[0.0])));
+        let said = "the layer left.image is taken for the picture, of left.image, right.image";
+        assert_eq!(guess(&exr(&two)).as_deref(), Some(said));
+        assert_eq!(alpha(&exr(&["beauty.A", "beauty.Y"])), Some(&[0.0][..]));
+        assert_eq!(rgb_of(&["image.Y", "vector.B", "vector.G", "vector.R"]), None);
     }
 
     /// Passes are known by whole words.

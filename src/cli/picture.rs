@@ -153,6 +153,16 @@ impl InputPicture {
         matches!(self.content, Content::Scene { .. })
     }
 
+    /// Whether its values mean what those of another picture of as many pixels mean.
+    pub(super) fn has_values_like(&self, other: &Self) -> bool {
+        self.content == other.content && self.rgb.len() == other.rgb.len()
+    }
+
+    /// Whether it holds what is sent to a display, from 0 to 1.
+    pub(super) fn holds_codes(&self) -> bool {
+        matches!(self.content, Content::Display(_))
+    }
+
     /// Whether it holds the light of a display, and not its codes.
     pub(super) fn holds_emitted_light(&self) -> bool {
         matches!(self.content, Content::Emitted { .. })

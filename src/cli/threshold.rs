@@ -5,7 +5,7 @@ use super::channels;
 use super::compare::check_alike;
 use super::covered::Mapping;
 use super::kept_tone::shown_by;
-use super::picture::{BEFORE_BLACK, InputPicture, Source};
+use super::picture::{BEFORE_BLACK, InputPicture, Source, note};
 use super::seeing::{SeeingArguments, model_values, operator_values};
 use super::targets::check_kept;
 use anyhow::{Context, Result, bail};
@@ -26,7 +26,8 @@ use std::path::{Path, PathBuf};
 /// Arguments of `threshold`.
 #[derive(Debug, Args)]
 pub(super) struct ThresholdArguments {
-    /// Picture of any renderer, best without noise.
+    /// Picture of any renderer, taken to be without noise unless it is one of the halves or a mean of them, however weighted: the
+    /// noise of such a one is known by them, and csf-bands does not take it for detail that hides noise.
     input: PathBuf,
     /// EXR file to write: threshold.Y (standard error in display cd/m² at visibility 1), adaptation.Y and, with
     /// --halves, visibility.Y by the model's thresholds, and by those of colour where the model is csf-bands.
@@ -96,6 +97,8 @@ fn check_targets(arguments: &ThresholdArguments) -> Result<()> {
 struct Asked {
     guide: InputPicture,
     halves: Option<[InputPicture; 2]>,
+    /// Where the guide is made of the halves: variance of its noise over that of half their difference.
+    own_noise: Option<f32>,
     /// The display by its own pixels, for the file.
     display: Option<(String, Attribute)>,
     /// By the guide's pixels.
@@ -135,6 +138,12 @@ impl Asked {
             format!("there is no threshold model \"{}\"; known: {}", arguments.model, model::names().join(", "))
         })?;
         arguments.seeing.note_what_is_idle(model.as_ref());
+        let share = halves.as_ref().and_then(|halves| share_of_first(&guide, halves));
+        if let Some(share) = share.filter(|_| model.name() == model::DEFAULT) {
+            let text = "it is made of the halves, of the first by";
+            let hides = "what noise it has by them is not taken for detail that hides noise";
+            note(&arguments.input, &format!("{text} {:.0} %: {hides}", 100.0 * share));
+        }
         let fitted = shown_by(arguments.operator.as_deref(), &named, &viewing)?;
         let acuity = fitted.as_ref().and_then(|fitted| fitted.acuity());
         let csf = BehindAcuity { csf: csf::by_name(&arguments.seeing.csf, &viewing)?, acuity };
@@ -146,7 +155,8 @@ impl Asked {
                 Some(Motion::of(&motions, arguments.saliency, &guide, fitted.as_deref(), &viewing)?)
             }
         };
-        Ok(Self { guide, halves, display, viewing, model, csf, fitted, motion })
+        let own_noise = share.map(noise_of_mean);
+        Ok(Self { guide, halves, own_noise, display, viewing, model, csf, fitted, motion })
     }
 
     /// Noise goes through the loss of acuity that the operator shows, and so does what masks it: by the contrast sensitivity, so that
@@ -157,9 +167,14 @@ impl Asked {
 
     fn judge(&self) -> Result<Found> {
         let shown = self.guide.displayed(self.fitted.as_deref(), &self.viewing, self.mapping());
+        let noise = self.halves.as_ref().map(|halves| self.noise_of(halves));
+        let own_variance = noise.as_ref().zip(self.own_noise).map(|(noise, own)| {
+            let squared = |light: f32| own * light * light;
+            noise.luminance.map(squared)
+        });
         let inputs = ModelInputs {
             display_luminance_cd_m2: &shown,
-            guide_noise: GuideNoise::Clean,
+            guide_noise: own_variance.as_ref().map_or(GuideNoise::Clean, GuideNoise::White),
             image_velocity_deg_s: self.motion.as_ref().map(|motion| &motion.image_velocity_deg_s),
             attention: self.motion.as_ref().and_then(|motion| motion.attention.as_ref()),
             viewing: &self.viewing,
@@ -169,25 +184,30 @@ impl Asked {
         Ok(Found {
             threshold_cd_m2: self.model.allowed_standard_error_cd_m2(&inputs)?,
             adaptation_cd_m2: map.adaptation_cd_m2().clone(),
-            visibility: self.halves.as_ref().map(|halves| self.noise_visibility(halves, &inputs)).transpose()?,
+            visibility: noise.map(|noise| self.noise_visibility(&noise, &inputs)).transpose()?,
         })
+    }
+
+    fn noise_of(&self, halves: &[InputPicture; 2]) -> HalfDifference {
+        let rgb = half_difference(&halves.each_ref().map(|half| self.displayed_rgb(half)));
+        let (width, height) = self.guide.size();
+        let luminance = Plane::from_fn(width, height, |x, y| luminance(rgb[y * width + x]));
+        HalfDifference { rgb, luminance }
+    }
+
+    fn displayed_rgb(&self, picture: &InputPicture) -> Vec<[f32; 3]> {
+        picture.displayed_rgb_by(self.fitted.as_deref(), &self.viewing, self.mapping())
     }
 
     /// How visible the noise of two halves is: by the model's own thresholds of luminance, and by those of colour where it is the default,
     /// which is the only one that is made for them.
-    fn noise_visibility(&self, halves: &[InputPicture; 2], inputs: &ModelInputs<'_>) -> Result<Plane> {
-        let displayed =
-            |picture: &InputPicture| picture.displayed_rgb_by(self.fitted.as_deref(), &self.viewing, self.mapping());
-        let half_difference = half_difference(&halves.each_ref().map(displayed));
-        let shown = inputs.display_luminance_cd_m2;
-        let (width, height) = (shown.width(), shown.height());
-        let luminance = Plane::from_fn(width, height, |x, y| luminance(half_difference[y * width + x]));
-        let of_luminance = self.model.measured_visibility(inputs, &luminance)?;
+    fn noise_visibility(&self, noise: &HalfDifference, inputs: &ModelInputs<'_>) -> Result<Plane> {
+        let of_luminance = self.model.measured_visibility(inputs, &noise.luminance)?;
         if self.model.name() != model::DEFAULT {
             return Ok(of_luminance);
         }
-        let (size, guide) = ((width, height), displayed(&self.guide));
-        let of_colour = chromatic_visibility(&guide, &half_difference, size, &self.viewing, self.csf.acuity)?;
+        let (size, guide, own) = (self.guide.size(), self.displayed_rgb(&self.guide), self.own_noise.unwrap_or(0.0));
+        let of_colour = chromatic_visibility(&guide, &noise.rgb, size, own, &self.viewing, self.csf.acuity)?;
         Ok(of_luminance.combined(&of_colour, f32::max))
     }
 
@@ -260,6 +280,42 @@ fn read_halves(arguments: &ThresholdArguments, guide: &InputPicture) -> Result<O
         check_alike((&arguments.input, guide.shape()), (path, half.shape()))?;
     }
     Ok(Some(halves))
+}
+
+/// Half the difference that two halves make on the display, cd/m².
+struct HalfDifference {
+    rgb: Vec<[f32; 3]>,
+    luminance: Plane,
+}
+
+/// The share of the first half in a guide that is, in every pixel, as near as files round, a mean of the two with these weights, or one of
+/// them.
+fn share_of_first(guide: &InputPicture, [a, b]: &[InputPicture; 2]) -> Option<f64> {
+    /// Of halves, with 11 bits: the guide's own rounding, and that of what it is made of.
+    const ROUNDING: f64 = 1.0 / 1024.0;
+    if !(guide.has_values_like(a) && guide.has_values_like(b)) {
+        return None;
+    }
+    // What files hold between black and white has 8 bits, perhaps.
+    let step = if guide.holds_codes() { 1.0 / 255.0 } else { 1e-6 };
+    let values = || {
+        let [guide, a, b] = [guide, a, b].map(|picture| picture.codes().as_flattened().iter().map(|&v| f64::from(v)));
+        guide.zip(a.zip(b))
+    };
+    let (along, squared) = values().fold((0.0, 0.0), |(along, squared), (guide, (a, b))| {
+        (along + (guide - b) * (a - b), squared + (a - b).powi(2))
+    });
+    let share = along / squared;
+    let is_mean = |(guide, (a, b)): (f64, (f64, f64))| {
+        (guide - (share * a + (1.0 - share) * b)).abs() <= ROUNDING * (a.abs() + b.abs()) + step
+    };
+    ((-0.01..=1.01).contains(&share) && values().all(is_mean)).then_some(share.clamp(0.0, 1.0))
+}
+
+/// Variance of the noise of a mean of two halves over that of half their difference, where both are equally noisy: 1 of equal shares, 2 of
+/// one half alone.
+fn noise_of_mean(share_of_first: f64) -> f32 {
+    (2.0 * (share_of_first.powi(2) + (1.0 - share_of_first).powi(2))) as f32
 }
 
 /// (A − B)/2 of what the display shows, linear RGB in cd/m².

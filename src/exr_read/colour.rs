@@ -1,6 +1,7 @@
 //! The colours that an EXR file means: its own primaries, luminance and chroma, the window that is to be shown.
 
 use super::attributes::{COLOR_INTEROP_ID, linear_primaries};
+use super::layers::luminance_layer;
 use super::{ExrImage, Window};
 use crate::output::Attribute;
 use fechner_perception::photometry::REC709_WEIGHTS;
@@ -23,8 +24,8 @@ pub struct ScenePicture {
 impl ExrImage {
     /// The picture in linear Rec.709 RGB over the display window; `None` where there is neither R, G and B nor luminance.
     ///
-    /// `find` finds a channel R, G or B by its last name (renderers prefix layers). Without them X, Y and Z are CIE XYZ. Chromaticities are honoured: colours stay what they
-    /// are, white included. Not finite values become 0 (NaN, −∞) or (∞) the largest finite value of the picture, at least 65504: what
+    /// `find` finds a channel R, G or B by its last name (renderers prefix layers). Without them X, Y and Z of the layer that has luminance
+    /// ([`luminance_layer`]) are CIE XYZ. Chromaticities are honoured: colours stay what they are, white included. Not finite values become 0 (NaN, −∞) or (∞) the largest finite value of the picture, at least 65504: what
     /// overflows a half is a lamp or the sun, brighter than all else.
     pub fn scene_picture<'a>(&'a self, find: impl Fn(&'a Self, &str) -> Option<&'a [f32]>) -> Option<ScenePicture> {
         let mut notes = Vec::new();
@@ -32,18 +33,19 @@ impl ExrImage {
         let of_three = |[red, green, blue]: [&[f32]; 3]| -> Vec<[f32; 3]> {
             red.iter().zip(green).zip(blue).map(|((&r, &g), &b)| [r, g, b]).collect()
         };
-        let own = |names: [&str; 3]| all(names.map(|name| self.channel(name)));
+        let luminance = luminance_layer(&self.names()).map(|layer| layer.name);
+        let own = |part: &str| self.part(luminance?, part);
         let mut rgb: Vec<[f32; 3]> = if let Some(channels) = all(["R", "G", "B"].map(|name| find(self, name))) {
             of_three(channels)
-        } else if let Some(channels) = own(["X", "Y", "Z"]) {
+        } else if let Some(channels) = all(["X", "Y", "Z"].map(own)) {
             notes.push("channels X, Y and Z taken for CIE XYZ".to_owned());
             primaries = Primaries::XYZ;
             of_three(channels)
-        } else if let Some([luminance, red, blue]) = own(["Y", "RY", "BY"]) {
+        } else if let Some([luminance, red, blue]) = all(["Y", "RY", "BY"].map(own)) {
             notes.push("luminance and chroma made RGB again".to_owned());
             from_chroma(luminance, red, blue, &primaries)
         } else {
-            self.channel("Y")?.iter().map(|&y| [y; 3]).collect()
+            own("Y")?.iter().map(|&y| [y; 3]).collect()
         };
         if let Some(replaced) = make_finite(&mut [rgb.as_flattened_mut()]) {
             notes.push(format!("{} values that are not finite were replaced", replaced.count));

@@ -51,11 +51,24 @@ const BLENDER_PASSES: [&str; 14] = [
 pub struct PictureLayer<'a> {
     /// Its name; empty of the root.
     pub name: &'a str,
-    /// Those that could be meant as well, it among them; empty where its name says that it is the picture, or no other is one.
+    /// Those that could be meant as well, it among them; empty where its name alone says that it is the picture, or no other is one.
     of: Vec<&'a str>,
 }
 
-impl PictureLayer<'_> {
+impl<'a> PictureLayer<'a> {
+    /// The first of those that could be meant.
+    fn among(of: Vec<&'a str>) -> Option<Self> {
+        let name = *of.first()?;
+        Some(Self { name, of: if of.len() > 1 { of } else { Vec::new() } })
+    }
+
+    /// The root, if it is among these layers, else those that have the likeliest of a finished picture's names.
+    fn named(layers: &[&'a str]) -> Option<Self> {
+        let called =
+            |name: &&str| PictureLayer::among(layers.iter().copied().filter(|layer| is_called(layer, name)).collect());
+        if layers.contains(&"") { Self::among(vec![""]) } else { THE_PICTURE.iter().find_map(called) }
+    }
+
     /// What to say of one that had to be guessed.
     #[must_use]
     pub fn guess(&self) -> Option<String> {
@@ -87,22 +100,22 @@ impl ExrImage {
 /// else is there.
 #[must_use]
 pub fn picture_layer<'a>(names: &[&'a str]) -> Option<PictureLayer<'a>> {
-    let layers = layers_with(names, &RGB);
-    let is_auxiliary = |layer: &str| {
-        words(layer).iter().any(|word| is_not_the_pictures(word))
-            || BLENDER_PASSES.iter().any(|name| is_called(layer, name))
-    };
-    let (auxiliary, others): (Vec<&str>, Vec<&str>) = layers.into_iter().partition(|layer| is_auxiliary(layer));
-    let called = |layers: &[&'a str]| {
-        THE_PICTURE.iter().find_map(|name| layers.iter().copied().find(|layer| is_called(layer, name)))
-    };
-    let named = others.iter().copied().find(|layer| layer.is_empty()).or_else(|| called(&others));
-    let sure = |name| PictureLayer { name, of: Vec::new() };
-    match (named, &others[..]) {
-        (Some(name), _) | (None, &[name]) => Some(sure(name)),
-        (None, []) => called(&auxiliary).map(sure),
-        (None, &[name, ..]) => Some(PictureLayer { name, of: others }),
-    }
+    let (auxiliary, others): (Vec<&str>, Vec<&str>) =
+        layers_with(names, &RGB).into_iter().partition(|layer| is_auxiliary(layer));
+    PictureLayer::named(&others).or_else(|| PictureLayer::among(others)).or_else(|| PictureLayer::named(&auxiliary))
+}
+
+/// The layer of a picture of luminance, with chroma or as CIE XYZ or alone: the root if it has `Y`, else a layer that is called as a
+/// finished picture is. Any other layer may have a `Y` that is no light, as a direction's is.
+#[must_use]
+pub fn luminance_layer<'a>(names: &[&'a str]) -> Option<PictureLayer<'a>> {
+    let layers: Vec<&str> = layers_with(names, &["Y"]).into_iter().filter(|layer| !is_auxiliary(layer)).collect();
+    PictureLayer::named(&layers)
+}
+
+fn is_auxiliary(layer: &str) -> bool {
+    words(layer).iter().any(|word| is_not_the_pictures(word))
+        || BLENDER_PASSES.iter().any(|name| is_called(layer, name))
 }
 
 /// Words of a name, which dots, underscores, spaces, digits and capitals part: `VRayDiffuse_filter2` has `V`, `Ray`, `Diffuse`, `filter`.
@@ -134,11 +147,7 @@ fn is_not_the_pictures(word: &str) -> bool {
 /// The same for a file that may have auxiliaries alone, as of a texture or of a painted mask: the first of them then.
 #[must_use]
 pub fn colour_layer<'a>(names: &[&'a str]) -> Option<PictureLayer<'a>> {
-    picture_layer(names).or_else(|| {
-        let layers = layers_with(names, &RGB);
-        let name = *layers.first()?;
-        Some(PictureLayer { name, of: if layers.len() > 1 { layers } else { Vec::new() } })
-    })
+    picture_layer(names).or_else(|| PictureLayer::among(layers_with(names, &RGB)))
 }
 
 /// Whether a part of the layer's name, between dots, is this.

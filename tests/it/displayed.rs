@@ -106,6 +106,38 @@ fn halves_of_a_scene_are_fitted_where_the_guide_is_none() {
     assert!(seen > 1.0, "{seen}");
 }
 
+/// Noise of the picture itself, where the halves tell it: in the mean of them, or in one of them, it hid more than half of itself.
+#[test]
+fn noise_in_a_mean_of_the_halves_does_not_hide_itself() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let white = |pixel, key: u64| (0..12).map(|term| random(pixel, 100 * key + term)).sum::<f32>() / 2.0;
+    write(folder.path(), "clean.exr", |_| [40.0; 3]);
+    for relative in [0.05, 0.2, 0.6] {
+        let half = |key| move |pixel| 40.0 * (1.0 + std::f32::consts::SQRT_2 * relative * white(pixel, key)).max(0.0);
+        let (a, b) = (half(1), half(2));
+        write(folder.path(), "a.exr", |pixel| [a(pixel); 3]);
+        write(folder.path(), "b.exr", |pixel| [b(pixel); 3]);
+        write(folder.path(), "mean.exr", |pixel| [0.5 * (a(pixel) + b(pixel)); 3]);
+        write(folder.path(), "more.exr", |pixel| [0.75 * a(pixel) + 0.25 * b(pixel); 3]);
+        let ask = |guide: &str| {
+            let arguments = ["threshold", guide, "--halves", "a.exr", "b.exr", "--operator", "absolute", "-o", "t.exr"];
+            let said = run(folder.path(), &arguments);
+            let [allowed, seen] = ["threshold.Y", "visibility.Y"].map(|layer| mean(folder.path(), "t.exr", layer));
+            (allowed, seen, said.contains("made of the halves"))
+        };
+        let (allowed, seen, is_mixed) = ask("clean.exr");
+        println!("{relative}: {seen} by grey alone, {allowed} cd/m² allowed");
+        assert!(!is_mixed);
+        for guide in ["mean.exr", "more.exr", "a.exr", "b.exr"] {
+            let (its_allowed, its_seen, is_mixed) = ask(guide);
+            println!("{relative}, {guide}: {its_seen}, {its_allowed} cd/m²");
+            assert!(is_mixed, "{relative}, {guide}");
+            assert!((its_seen / seen - 1.0).abs() < 0.1, "{relative}, {guide}: {its_seen}, not {seen}");
+            assert!((its_allowed / allowed - 1.0).abs() < 0.1, "{relative}, {guide}: {its_allowed}, not {allowed}");
+        }
+    }
+}
+
 /// Texture loses what the operator blurs once, as noise does: lost twice, it hid little, and noise was up to 4 times as visible as on
 /// the display that shows it.
 #[test]

@@ -1,6 +1,6 @@
 //! Barten's short formula.
 
-use super::ContrastSensitivity;
+use super::{ContrastSensitivity, HIGHEST_CPD};
 
 /// Barten, "The square root integral (SQRI)", 1989, in the form that perceptualdiff and OpenImageIO use: a u exp(−b u)
 /// √(1 + 0.06 exp(b u)) with a = 440 (1 + 0.7/L)^−0.2 and b = 0.3 (1 + 100/L)^0.15.
@@ -18,6 +18,7 @@ impl ContrastSensitivity for Barten89 {
         if freq_cpd <= 0.0 {
             return 0.0;
         }
+        let freq_cpd = freq_cpd.min(HIGHEST_CPD);
         let luminance = luminance_cd_m2.clamp(1e-4, 1e6);
         let a = 440.0 * (1.0 + 0.7 / luminance).powf(-0.2);
         let decay = 0.3 * (1.0 + 100.0 / luminance).powf(0.15) * freq_cpd;

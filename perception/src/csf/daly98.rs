@@ -1,6 +1,6 @@
 //! Daly's spatiovelocity contrast sensitivity.
 
-use super::ContrastSensitivity;
+use super::{ContrastSensitivity, HIGHEST_CPD};
 
 /// Kelly's stabilised CSF as Daly fitted it to natural viewing, for gratings that move over the retina.
 ///
@@ -34,7 +34,7 @@ impl Spatiovelocity {
     pub(super) fn ln_sensitivity(&self, freq_cpd: f64, velocity_deg_s: f64) -> f64 {
         let scaled = self.c2 * velocity_deg_s;
         let k = 6.1 + 7.3 * (scaled / 3.0).log10().abs().powi(3);
-        let radians = std::f64::consts::TAU * freq_cpd.max(1e-12) * self.c1;
+        let radians = std::f64::consts::TAU * freq_cpd.clamp(1e-12, HIGHEST_CPD) * self.c1;
         (k * self.gain * scaled).ln() + 2.0 * radians.ln() - 2.0 * radians / self.highest_cpd(velocity_deg_s)
     }
 

@@ -1,6 +1,6 @@
 //! The first contrast sensitivity function of image coding.
 
-use super::ContrastSensitivity;
+use super::{ContrastSensitivity, HIGHEST_CPD};
 
 /// Mannos and Sakrison, "The effects of a visual fidelity criterion on the encoding of images", IEEE Trans. IT 20, 1974:
 /// 2.6 (0.0192 + 0.114 f) exp(−(0.114 f)^1.1), times a gain.
@@ -26,7 +26,7 @@ impl ContrastSensitivity for MannosSakrison {
     }
 
     fn sensitivity(&self, freq_cpd: f64, _luminance_cd_m2: f64) -> f64 {
-        let scaled = 0.114 * freq_cpd.max(0.0);
+        let scaled = 0.114 * freq_cpd.clamp(0.0, HIGHEST_CPD);
         self.gain * 2.6 * (0.0192 + scaled) * (-scaled.powf(1.1)).exp()
     }
 }

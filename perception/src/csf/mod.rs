@@ -63,6 +63,9 @@ pub trait ContrastSensitivity: Send + Sync {
     }
 }
 
+/// Far above what any function sees; products of higher frequencies would not stay finite, as logarithms of no sensitivity must.
+const HIGHEST_CPD: f64 = 1e9;
+
 impl ContrastSensitivity for Box<dyn ContrastSensitivity> {
     fn name(&self) -> &'static str {
         (**self).name()
@@ -196,6 +199,21 @@ pub fn peak_sensitivity(csf: &dyn ContrastSensitivity, luminance_cd_m2: f64) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Products that overflowed made NaN of four functions.
+    #[test]
+    fn every_frequency_has_a_sensitivity() {
+        for name in names() {
+            let csf = by_name(name, &Viewing::default()).unwrap();
+            for freq_cpd in [0.0, f64::MIN_POSITIVE, 1e10, 1e155, f64::MAX] {
+                for luminance in [0.0, 1e-4, 100.0, f64::MAX] {
+                    let found = csf.sensitivity(freq_cpd, luminance);
+                    assert!(found.is_finite() && found >= 0.0, "{name}: {found} at {freq_cpd} cpd, {luminance} cd/m²");
+                }
+            }
+        }
+        assert!(Daly98::default().ln_sensitivity(f64::MAX).is_finite());
+    }
 
     /// Beyond what is asked for nothing counts, where the greatest sensitivity is at an end: the search went on to 0.0448 and 67 cpd.
     #[test]

@@ -1,6 +1,6 @@
 //! Bolin and Meyer.
 
-use super::{ModelInputs, PerLuminance, ThresholdModel, pooled};
+use super::{ModelInputs, PerLuminance, ThresholdModel, finite_error, pooled};
 use crate::adaptation::adapted;
 use crate::error::Error;
 use crate::filter::{gaussian_blur, reflect};
@@ -40,7 +40,7 @@ impl ThresholdModel for BolinMeyer {
         let guide = inputs.display_luminance_cd_m2;
         half_difference.check_size("half difference", guide.width(), guide.height())?;
         let mut energy = nothing_of(inputs);
-        let mut finer = half_difference.map(|value| if value.is_finite() { value } else { 0.0 });
+        let mut finer = half_difference.map(finite_error);
         visible_of_levels(inputs, |level, visible| {
             let blocks = HaarBlocks::of(&finer, level);
             let coarser = Plane::from_fn(guide.width(), guide.height(), |x, y| blocks.mean(x, y));

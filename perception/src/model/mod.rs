@@ -48,7 +48,7 @@ impl ModelInputs<'_> {
     fn check(&self) -> Result<(), Error> {
         self.viewing.check()?;
         let guide = self.display_luminance_cd_m2;
-        guide.check_non_negative("display luminance")?;
+        guide.check_luminance("display luminance")?;
         for (what, plane) in [
             ("guide variance", self.guide_noise.variance()),
             ("image velocity", self.image_velocity_deg_s),
@@ -105,11 +105,18 @@ pub trait ThresholdModel: Send + Sync {
         let allowed = self.allowed_standard_error_cd_m2(inputs)?;
         half_difference.check_size("half difference", allowed.width(), allowed.height())?;
         let energy = half_difference.combined(&allowed, |difference, allowed| {
-            let relative = if difference.is_finite() { difference / allowed } else { 0.0 };
+            let difference = finite_error(difference);
+            let relative = difference / allowed;
             relative * relative
         });
         Ok(pooled(&energy, inputs.viewing).map(f32::sqrt))
     }
+}
+
+/// An error, 0 where it is no number, and no greater than that its energy, in threshold units, stays within `f32`.
+pub(crate) fn finite_error(error_cd_m2: f32) -> f32 {
+    const HOPELESS_CD_M2: f32 = 1e9;
+    if error_cd_m2.is_finite() { error_cd_m2.clamp(-HOPELESS_CD_M2, HOPELESS_CD_M2) } else { 0.0 }
 }
 
 /// Energy over a Gaussian of σ 0.25°.
@@ -338,6 +345,26 @@ mod tests {
         let at = |name| ask(name, &grey, None).get(32, 32) * Z_95 as f32;
         assert!((at("ramasubramanian") - 0.409_201).abs() < 1e-3, "{}", at("ramasubramanian"));
         assert!((at("tvi") - 3.087_946).abs() < 1e-2, "{}", at("tvi"));
+    }
+
+    /// The largest errors that a pixel can hold are seen, beside it too.
+    #[test]
+    fn no_error_is_beyond_the_models() {
+        let (grey, viewing) = (Plane::filled(64, 64, 0.0), Viewing::default());
+        let mut error = Plane::filled(64, 64, 1.0);
+        error.values_mut()[..2].copy_from_slice(&[f32::MAX, f32::MIN]);
+        for name in names() {
+            let inputs = ModelInputs {
+                display_luminance_cd_m2: &grey,
+                guide_noise: GuideNoise::Clean,
+                image_velocity_deg_s: None,
+                attention: None,
+                viewing: &viewing,
+                csf: &CastleCsf::default(),
+            };
+            let seen = by_name(name).unwrap().measured_visibility(&inputs, &error).unwrap();
+            assert!(seen.values().iter().all(|v| v.is_finite() && *v > 1.0), "{name}: {:?}", &seen.values()[..9]);
+        }
     }
 
     #[test]

@@ -198,6 +198,21 @@ fn any_size_and_luminance_gives_finite_thresholds() {
     }
 }
 
+/// Thresholds that no number holds were infinite.
+#[test]
+fn luminance_without_an_answer_is_an_error() {
+    let ask = |luminance: f32| {
+        let picture = Plane::filled(32, 32, luminance);
+        let inputs = ThresholdInputs::clean(&picture);
+        threshold_map(&inputs, &Viewing::default(), &CastleCsf::default())
+    };
+    assert!(matches!(ask(3e38), Err(Error::OutOfRange { .. })));
+    for luminance in [1e12, 1e20, 1e30] {
+        let allowed = ask(luminance).unwrap().allowed_standard_error_cd_m2(1.0);
+        assert!(allowed.values().iter().all(|value| value.is_finite()), "{luminance}: {:?}", allowed.get(9, 9));
+    }
+}
+
 #[test]
 fn error_that_moves_fast_may_be_larger() {
     let map = map_of(&Plane::filled(32, 32, 50.0), &viewing(60.0));

@@ -74,6 +74,8 @@ pub use ward94::Ward94;
 use acuity::AcuityFilter;
 
 /// A way to bring scene light onto a display. Its `Debug` form tells operators of different settings apart.
+///
+/// One of your own can choose among this crate's fits, by what it sees of the guide; fits of another kind cannot be made ([`FittedTone`]).
 pub trait ToneOperator: Send + Sync + Debug {
     /// What the command line calls it.
     fn name(&self) -> &'static str;
@@ -112,6 +114,8 @@ pub trait ToneOperator: Send + Sync + Debug {
 const LEAST_GREY_CD_M2: f32 = 1e-6;
 
 /// A tone operator with every parameter decided.
+///
+/// There are those of this crate and no others: each can be kept with a picture, as one of the kinds that a [`SavedTone`] holds.
 pub trait FittedTone: Send + Sync + Debug {
     /// Linear display light for a grey of scene luminance `scene_cd_m2` at `pixel`: 0 is the display's black, 1 its white.
     ///

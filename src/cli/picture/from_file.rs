@@ -76,7 +76,8 @@ impl InputPicture {
         let nits_per_unit = unit.in_cd_m2(source, || unit_in_file(source, exr))?;
         let Some(picture) = exr.scene_picture(picture_channel) else {
             bail!(
-                "{}: there are no channels R, G and B, nor Y; `fechner info` lists what there is",
+                "{}: there are no channels R, G and B of one layer, nor Y of the root or of a layer that is called as pictures are; \
+                 `fechner info` lists what there is",
                 source.path.display()
             );
         };
