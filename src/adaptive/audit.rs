@@ -40,13 +40,19 @@ pub struct Audit {
     pub tiles: usize,
     /// Samples that it took.
     pub samples: u64,
-    /// Visible energy of fresh less kept, over what was predicted.
+    /// Visible energy of fresh less kept, over what was predicted; 1 where nothing was.
     pub ratio: f64,
-    /// Standard error of the ratio, from the scatter between tiles; infinite where nothing was predicted.
+    /// Standard error of the ratio, from the scatter between tiles; infinite of a single tile, and where nothing was predicted.
     pub standard_error: f64,
 }
 
 impl Audit {
+    /// Whether nothing was predicted to show in its tiles, so that there is nothing to compare fresh samples with. Of one tile that is not
+    /// known.
+    pub fn had_nothing_to_find(&self) -> bool {
+        self.tiles > 1 && self.standard_error.is_infinite()
+    }
+
     /// Whether the variance is too low, at one-sided 95 %, by more than a tenth. By Student's t, since a few tiles' scatter is surer to be
     /// too small than a normal's is: 2.015 standard errors for six tiles, 1.645 for many. One tile has no scatter.
     pub fn disagrees(&self) -> bool {
@@ -203,7 +209,7 @@ fn repetition(film: &Film, pixels: &[usize], times: u32) -> SamplePlan {
     plan
 }
 
-/// Σ found / Σ predicted and its standard error (the usual ratio estimator's).
+/// Σ found / Σ predicted and its standard error (the usual ratio estimator's): see [`Audit`].
 fn ratio_of_sums(energies: &[(f64, f64)]) -> (f64, f64) {
     let found: f64 = energies.iter().map(|e| e.0).sum();
     let predicted: f64 = energies.iter().map(|e| e.1).sum();

@@ -202,7 +202,7 @@ impl Report {
             patches_noticed: predicted.map(|predicted| patches_noticed(predicted, &settings.viewing.display)),
             measured_over_predicted: predicted
                 .map(|predicted| energy(&judgement.measured_error().visibility) / energy(predicted)),
-            audit_ratio: rendered.audit.map(|audit| audit.ratio),
+            audit_ratio: rendered.audit.filter(|audit| !audit.had_nothing_to_find()).map(|audit| audit.ratio),
             audit_standard_error: rendered.audit.map(|audit| audit.standard_error),
             audit_tiles: rendered.audit.map_or(0, |audit| audit.tiles),
             variance_inflation: rendered.inflation,

@@ -41,6 +41,18 @@ fn pixels_that_change_their_shape_are_no_sequence() {
     assert!(code == 2 && said.contains("a.3.exr 2 times"), "{said}");
 }
 
+/// Where no noise is predicted an audit has nothing to compare with: it said "1.00 ± inf times".
+#[test]
+fn an_audit_of_no_noise_says_so() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let sky = "[film]\nsize = [208, 208]\n[camera]\nposition = [0, 0, 5]\nlook_at = [0, 0, 0]\n[environment]\nluminance_cd_m2 = 100\n";
+    std::fs::write(folder.path().join("sky.toml"), sky).expect("written");
+    let said = run(folder.path(), &["render", "sky.toml", "-o", "sky.png", "--json", "sky.json"]);
+    assert!(said.contains("Audit: nothing is predicted to show in ") && !said.contains("inf"), "{said}");
+    let told = std::fs::read_to_string(folder.path().join("sky.json")).expect("written");
+    assert!(told.contains("\"audit_ratio\": null"), "{told}");
+}
+
 /// What tells nothing of noise is not taken for its absence: halves of one seed, one sample, a denoised crop of one pixel.
 #[test]
 fn what_tells_nothing_of_noise_is_said() {

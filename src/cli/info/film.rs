@@ -66,13 +66,12 @@ pub(super) fn describe(checkpoint: &Checkpoint) -> String {
         row("importance", format!("map of content {importance}"));
     }
     if let Some(audit) = state.audit {
-        row(
-            "audit",
-            format!(
-                "{} tiles, ratio {:.2} ± {:.2}, the last of {}",
-                audit.tiles, audit.ratio, audit.standard_error, state.audits
-            ),
-        );
+        let found = if audit.had_nothing_to_find() {
+            "nothing predicted".to_owned()
+        } else {
+            format!("ratio {:.2} ± {:.2}", audit.ratio, audit.standard_error)
+        };
+        row("audit", format!("{} tiles, {found}, the last of {}", audit.tiles, state.audits));
     }
     text
 }

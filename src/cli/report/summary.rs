@@ -152,6 +152,9 @@ fn denoised(report: &Report) -> Vec<String> {
 fn audited(report: &Report, rendered: &Rendered) -> Option<String> {
     let audit = rendered.audit?;
     let whose = if report.denoised.is_some() { " unproven" } else { "" };
+    if audit.had_nothing_to_find() {
+        return Some(format!("Audit: nothing is predicted to show in {}{whose} tiles.", audit.tiles));
+    }
     let times = rendered.inflation;
     let since = if times >= MOST_INFLATION {
         format!("; {times:.1} times as much is predicted since, the most that is believed: it may still be too little")
