@@ -45,11 +45,25 @@ fn pixels_that_change_their_shape_are_no_sequence() {
 #[test]
 fn an_audit_of_no_noise_says_so() {
     let folder = tempfile::tempdir().expect("a folder");
-    let sky = "[film]\nsize = [208, 208]\n[camera]\nposition = [0, 0, 5]\nlook_at = [0, 0, 0]\n[environment]\nluminance_cd_m2 = 100\n";
-    std::fs::write(folder.path().join("sky.toml"), sky).expect("written");
-    let said = run(folder.path(), &["render", "sky.toml", "-o", "sky.png", "--json", "sky.json"]);
+    let wall = r#"
+        [film]
+        size = [208, 208]
+        [camera]
+        position = [0, 0, 5]
+        look_at = [0, 0, 0]
+        [environment]
+        luminance_cd_m2 = 100
+        [materials.white]
+        type = "diffuse"
+        reflectance = [0.73, 0.73, 0.73]
+        [[objects]]
+        rectangle = { corner = [-5, -5, -1], edge_u = [10, 0, 0], edge_v = [0, 10, 0] }
+        material = "white"
+    "#;
+    std::fs::write(folder.path().join("wall.toml"), wall).expect("written");
+    let said = run(folder.path(), &["render", "wall.toml", "-o", "wall.png", "--json", "wall.json"]);
     assert!(said.contains("Audit: nothing is predicted to show in ") && !said.contains("inf"), "{said}");
-    let told = std::fs::read_to_string(folder.path().join("sky.json")).expect("written");
+    let told = std::fs::read_to_string(folder.path().join("wall.json")).expect("written");
     assert!(told.contains("\"audit_ratio\": null"), "{told}");
 }
 
