@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 /// Arguments of `threshold`.
 #[derive(Debug, Args)]
 pub(super) struct ThresholdArguments {
-    /// Picture of any renderer, taken to be without noise unless it is one of the halves or a mean of them, however weighted: the
+    /// Picture of any renderer, taken to be without noise unless it is one of the halves or a mean of their values, however weighted: the
     /// noise of such a one is known by them, and csf-bands does not take it for detail that hides noise.
     input: PathBuf,
     /// EXR file to write: threshold.Y (standard error in display cd/m² at visibility 1), adaptation.Y and, with
@@ -293,6 +293,8 @@ struct HalfDifference {
 fn share_of_first(guide: &InputPicture, [a, b]: &[InputPicture; 2]) -> Option<f64> {
     /// Of halves, with 11 bits: the guide's own rounding, and that of what it is made of.
     const ROUNDING: f64 = 1.0 / 1024.0;
+    /// Of the halves' squared difference, which a mean's rounding is far below, and a clean picture's distance from their means is not: 0.25.
+    const LEFT: f64 = 0.04;
     if !(guide.has_values_like(a) && guide.has_values_like(b)) {
         return None;
     }
@@ -306,10 +308,13 @@ fn share_of_first(guide: &InputPicture, [a, b]: &[InputPicture; 2]) -> Option<f6
         (along + (guide - b) * (a - b), squared + (a - b).powi(2))
     });
     let share = along / squared;
-    let is_mean = |(guide, (a, b)): (f64, (f64, f64))| {
-        (guide - (share * a + (1.0 - share) * b)).abs() <= ROUNDING * (a.abs() + b.abs()) + step
-    };
-    ((-0.01..=1.01).contains(&share) && values().all(is_mean)).then_some(share.clamp(0.0, 1.0))
+    let residual = |(guide, (a, b)): (f64, (f64, f64))| guide - (share * a + (1.0 - share) * b);
+    let rounds =
+        |value: (f64, (f64, f64))| residual(value).abs() <= ROUNDING * (value.1.0.abs() + value.1.1.abs()) + step;
+    // Where halves hardly differ, any clean picture is a mean of them to within rounding.
+    let residuals: f64 = values().map(|value| residual(value).powi(2)).sum();
+    let is_mean = residuals <= LEFT * squared && values().all(rounds);
+    (is_mean && (-0.01..=1.01).contains(&share)).then_some(share.clamp(0.0, 1.0))
 }
 
 /// Variance of the noise of a mean of two halves over that of half their difference, where both are equally noisy: 1 of equal shares, 2 of

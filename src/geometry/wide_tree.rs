@@ -51,7 +51,7 @@ impl Child {
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub(super) struct Node {
-    /// Low x, high x, low y, high y, low z, high z. Children that are not there have boxes that nothing meets.
+    /// Low x, high x, low y, high y, low z, high z. Children that are not there have boxes that no ray of numbers meets.
     pub(super) planes: [[f32; LANES]; 6],
     pub(super) children: [Child; LANES],
 }

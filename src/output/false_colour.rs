@@ -57,8 +57,7 @@ pub fn visibility(values: &Plane, target: f64) -> Colours {
         }
     });
     let (at_most, most) = (figure(target), figure(4.0 * target));
-    let scale =
-        format!("blue: at most the target, {at_most}; above it red through orange to pale yellow at {most} and above");
+    let scale = format!("blue: at most {at_most}; above it red through orange to pale yellow at {most} and above");
     Colours { rgb8, legend: legend(values, scale) }
 }
 
@@ -155,7 +154,7 @@ mod tests {
             116.0 * luminance(rgb).cbrt() - 16.0
         };
         assert!(lightness(2) - lightness(1) > 38.0, "{} over {}", lightness(2), lightness(1));
-        assert_eq!(legend, "blue: at most the target, 2; above it red through orange to pale yellow at 8 and above");
+        assert_eq!(legend, "blue: at most 2; above it red through orange to pale yellow at 8 and above");
     }
 
     /// Neither the most nor the least of what is known.

@@ -47,7 +47,7 @@ use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Most pixels a side of a picture that is shown: a JPEG has 16 bits for them, as canvases of browsers do.
+/// Most pixels a side of a picture that is shown: a JPEG has 16 bits for them, and Chromium's canvas ends there, other browsers' earlier.
 pub const MOST_SIDE_PIXELS: u32 = u16::MAX as u32;
 
 /// A loaded scene and how to render it.

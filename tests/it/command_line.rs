@@ -350,7 +350,7 @@ fn pictures_are_compared_and_thresholds_mapped() {
     assert_eq!((map.width(), map.height()), (64, 48));
     // On the scale of a render's map of visibility, which is told.
     let said = String::from_utf8_lossy(&differ.stderr);
-    assert!(said.contains("map.png: blue: at most the target, 1; "), "{said}");
+    assert!(said.contains("map.png: blue: at most 1; "), "{said}");
     let figures: serde_json::Value =
         serde_json::from_slice(&std::fs::read(at.join("figures.json")).expect("written")).expect("JSON");
     assert!(figures["worst_visibility"].as_f64().expect("a number") > 1.0);

@@ -98,9 +98,10 @@ impl Scatter {
         per_sample.combined(&self.shares, |sample, share| sample * share)
     }
 
-    /// Displayed over scene variance of luminance for what each half decides by: its own samples have no part in it. Where both
-    /// had, pixels that were lucky went beyond white, showed no noise and stopped, and the others went on until they were lucky, too: a thin
-    /// tube of light came out 4.8 ± 0.8 % too bright at visibility 8.
+    /// Displayed over scene variance of luminance for what each half decides by: of the other half's light and noise. Where both halves' went
+    /// in, pixels that were lucky went beyond white, showed no noise and stopped, and the others went on until they were lucky, too: a thin
+    /// tube of light made a picture 2.75 % too bright (`benches/results/sampling.md`, lamps on black). Of both are still which pixels shine, how
+    /// many samples there are, and the scales of colour, which the display does not clip.
     pub(super) fn luminance_scales_of_halves(
         &self,
         film: &Film,

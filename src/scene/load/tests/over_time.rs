@@ -3,7 +3,7 @@
 
 use crate::scene::hash::content_hash;
 use crate::scene::load::{LoadError, LoadOptions, load};
-use crate::scene::{Light, Scene};
+use crate::scene::{Light, Motion, Scene};
 use glam::{Quat, Vec3};
 use std::path::PathBuf;
 
@@ -370,11 +370,12 @@ fn keyframes_of_many_turns_are_few_poses() {
             "[[objects]]\nbox = {{ min = [0, 0, 0], max = [1, 1, 1] }}\nmaterial = \"white\"\nkeyframes = [{keyframes}]\n"
         )
     };
-    let poses = |objects: &str| -> usize {
+    let motions = |objects: &str| -> Vec<Motion> {
         let open = TOML.replace("look_at = [0, 0, 0]", "look_at = [0, 0, 0]\nshutter_s = 1");
         let scene = File::new("a.toml", &format!("{open}{LIT}{objects}")).at(0.0);
-        scene.instances.iter().map(|instance| instance.motion.as_ref().expect("it turns").keys().len()).sum()
+        scene.instances.into_iter().filter_map(|instance| instance.motion).collect()
     };
+    let poses = |objects: &str| -> usize { motions(objects).iter().map(|motion| motion.keys().len()).sum() };
     let keyframe = |number: u32| {
         format!(
             "{{ time = {}, rotate_deg = {}, axis = [0, 1, 0] }}",
@@ -388,4 +389,14 @@ fn keyframes_of_many_turns_are_few_poses() {
     assert_eq!(poses(&fast), 1025);
     let of_many = poses(&fast.repeat(1000));
     assert!((200_000..=270_000).contains(&of_many), "{of_many}");
+    let still = "[[objects]]\nsphere = { center = [0, 0, 0], radius = 1 }\nmaterial = \"white\"\n".repeat(1000);
+    assert_eq!(poses(&format!("{still}{fast}")), 1025, "what has no keyframes takes no share");
+    // 2000 turns, then three quarters of one: the short way of those would be back.
+    let slowing = "{ time = 0, axis = [0, 1, 0], rotate_deg = 0 }, { time = 0.01, axis = [0, 1, 0], rotate_deg = 720000 }, \
+                   { time = 1, axis = [0, 1, 0], rotate_deg = 720270 }";
+    let motion = &motions(&turning(slowing))[0];
+    assert!(motion.keys().len() <= 1026, "{}", motion.keys().len());
+    let x = motion.at(0.505).transform_vector3(Vec3::X);
+    let expected = Vec3::new(135_f32.to_radians().cos(), 0.0, -135_f32.to_radians().sin());
+    assert!(x.distance(expected) < 0.02, "{x} for {expected}");
 }

@@ -121,7 +121,8 @@ fn read(path: &Path, options: &LoadOptions) -> Result<(Builder, IfDark), LoadErr
         }
     }
     let list = root.get_or("objects", Vec::new(), Value::array)?;
-    let mut objects = object::Objects::new(&materials, list.len());
+    let moves = |object: &&Value| object.entries().is_ok_and(|fields| fields.get("keyframes").is_some());
+    let mut objects = object::Objects::new(&materials, list.iter().filter(moves).count());
     for value in &list {
         objects.read(&mut context, value)?;
     }

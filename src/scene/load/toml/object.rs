@@ -35,8 +35,9 @@ struct Placement {
 }
 
 impl<'m, 'a> Objects<'m, 'a> {
-    pub(super) fn new(materials: &'m Materials<'a>, count: usize) -> Self {
-        Self { materials, files: HashMap::new(), read: 0, any_moves: false, most_cuts: motion::most_cuts(count) }
+    /// For a file of which so many objects have keyframes.
+    pub(super) fn new(materials: &'m Materials<'a>, moving: usize) -> Self {
+        Self { materials, files: HashMap::new(), read: 0, any_moves: false, most_cuts: motion::most_cuts(moving) }
     }
 
     /// Whether an object that was read has keyframes.

@@ -63,15 +63,15 @@ impl ObjectKey {
     }
 }
 
-/// How often the motion of each of so many objects is cut at most: a pose takes about as much memory as all that a file says of a
-/// small object.
-pub(in crate::scene::load::toml) fn most_cuts(objects: usize) -> u32 {
+/// How often the motion of each of so many objects with keyframes is cut at most: a pose takes about as much memory as all that a file
+/// says of a small object.
+pub(in crate::scene::load::toml) fn most_cuts(moving: usize) -> u32 {
     // 256 turns of an open shutter are a blur in which nobody can tell more.
     const OF_ONE: usize = 1023;
     const OF_ALL: usize = 1 << 18;
     // Four turns of an open shutter are left to any object.
     const LEAST: usize = 15;
-    (OF_ALL / objects.max(1)).clamp(LEAST, OF_ONE) as u32
+    (OF_ALL / moving.max(1)).clamp(LEAST, OF_ONE) as u32
 }
 
 impl Keyframes<ObjectKey> {
@@ -93,7 +93,8 @@ impl Keyframes<ObjectKey> {
         self.pose(time).to_affine()
     }
 
-    /// The motion of something placed by `before` while the shutter is open, cut at most so often between keyframes ([`most_cuts`]);
+    /// The motion of something placed by `before` while the shutter is open, cut at most so often between keyframes ([`most_cuts`]):
+    /// fast turns have fewer cuts then, slow ones keep theirs, or they would go the wrong way.
     /// `None` where it rests.
     pub(in crate::scene::load::toml) fn motion(
         &self,
@@ -106,10 +107,10 @@ impl Keyframes<ObjectKey> {
         }
         let ends = self.times(shutter, 0);
         let cuts: Vec<f64> = ends.windows(2).map(|pair| self.cuts(pair[0], pair[1])).collect();
-        let kept = (f64::from(most_cuts) / cuts.iter().sum::<f64>()).min(1.0);
+        let most = level_of(&cuts, f64::from(most_cuts));
         let mut times = vec![shutter.opens];
         for (pair, cuts) in ends.windows(2).zip(cuts) {
-            let pieces = (cuts * kept).round() as u32 + 1;
+            let pieces = cuts.min(most) as u32 + 1;
             times.extend((1..=pieces).map(|i| pair[0] + (pair[1] - pair[0]) * f64::from(i) / f64::from(pieces)));
         }
         moving(times, shutter, |time| self.pose(time), before)
@@ -123,4 +124,19 @@ impl Keyframes<ObjectKey> {
         let share = 2.0 * f64::from((to.share - from.share).abs());
         (((end - start).abs() * share / LONGEST_DEG).ceil() - 1.0).max(0.0)
     }
+}
+
+/// What no need may get more of, so that all of them together get at most so much.
+fn level_of(needs: &[f64], most: f64) -> f64 {
+    let mut needs = needs.to_vec();
+    needs.sort_unstable_by(f64::total_cmp);
+    let mut left = most;
+    for (index, need) in needs.iter().enumerate() {
+        let share = left / (needs.len() - index) as f64;
+        if *need > share {
+            return share.floor();
+        }
+        left -= need;
+    }
+    f64::INFINITY
 }
