@@ -26,8 +26,8 @@ use std::path::{Path, PathBuf};
 /// Arguments of `threshold`.
 #[derive(Debug, Args)]
 pub(super) struct ThresholdArguments {
-    /// Picture of any renderer, taken to be without noise unless it is one of the halves or a mean of their values, however weighted: the
-    /// noise of such a one is known by them, and csf-bands does not take it for detail that hides noise.
+    /// Picture of any renderer, taken to be without noise unless it is the mean of the halves' values: the noise of that is known by them,
+    /// and csf-bands does not take it for detail that hides noise.
     input: PathBuf,
     /// EXR file to write: threshold.Y (standard error in display cd/m² at visibility 1), adaptation.Y and, with
     /// --halves, visibility.Y by the model's thresholds, and by those of colour where the model is csf-bands.
@@ -97,8 +97,8 @@ fn check_targets(arguments: &ThresholdArguments) -> Result<()> {
 struct Asked {
     guide: InputPicture,
     halves: Option<[InputPicture; 2]>,
-    /// Where the guide is made of the halves: variance of its noise over that of half their difference.
-    own_noise: Option<f32>,
+    /// What the guide has of the halves.
+    made_of: MadeOf,
     /// The display by its own pixels, for the file.
     display: Option<(String, Attribute)>,
     /// By the guide's pixels.
@@ -138,11 +138,9 @@ impl Asked {
             format!("there is no threshold model \"{}\"; known: {}", arguments.model, model::names().join(", "))
         })?;
         arguments.seeing.note_what_is_idle(model.as_ref());
-        let share = halves.as_ref().and_then(|halves| share_of_first(&guide, halves));
-        if let Some(share) = share.filter(|_| model.name() == model::DEFAULT) {
-            let text = "it is made of the halves, of the first by";
-            let hides = "what noise it has by them is not taken for detail that hides noise";
-            note(&arguments.input, &format!("{text} {:.0} %: {hides}", 100.0 * share));
+        let made_of = halves.as_ref().map_or(MadeOf::Else, |halves| MadeOf::of(&guide, halves));
+        if let Some(told) = made_of.told().filter(|_| model.name() == model::DEFAULT) {
+            note(&arguments.input, told);
         }
         let fitted = shown_by(arguments.operator.as_deref(), &named, &viewing)?;
         let acuity = fitted.as_ref().and_then(|fitted| fitted.acuity());
@@ -155,8 +153,7 @@ impl Asked {
                 Some(Motion::of(&motions, arguments.saliency, &guide, fitted.as_deref(), &viewing)?)
             }
         };
-        let own_noise = share.map(noise_of_mean);
-        Ok(Self { guide, halves, own_noise, display, viewing, model, csf, fitted, motion })
+        Ok(Self { guide, halves, made_of, display, viewing, model, csf, fitted, motion })
     }
 
     /// Noise goes through the loss of acuity that the operator shows, and so does what masks it: by the contrast sensitivity, so that
@@ -168,10 +165,9 @@ impl Asked {
     fn judge(&self) -> Result<Found> {
         let shown = self.guide.displayed(self.fitted.as_deref(), &self.viewing, self.mapping());
         let noise = self.halves.as_ref().map(|halves| self.noise_of(halves));
-        let own_variance = noise.as_ref().zip(self.own_noise).map(|(noise, own)| {
-            let squared = |light: f32| own * light * light;
-            noise.luminance.map(squared)
-        });
+        // Of the mean of two, the variance is that of half their difference, however noisy each is.
+        let of_mean = noise.as_ref().filter(|_| self.made_of == MadeOf::TheirMean);
+        let own_variance = of_mean.map(|noise| noise.luminance.map(|light| light * light));
         let inputs = ModelInputs {
             display_luminance_cd_m2: &shown,
             guide_noise: own_variance.as_ref().map_or(GuideNoise::Clean, GuideNoise::White),
@@ -206,7 +202,8 @@ impl Asked {
         if self.model.name() != model::DEFAULT {
             return Ok(of_luminance);
         }
-        let (size, guide, own) = (self.guide.size(), self.displayed_rgb(&self.guide), self.own_noise.unwrap_or(0.0));
+        let (size, guide) = (self.guide.size(), self.displayed_rgb(&self.guide));
+        let own = if self.made_of == MadeOf::TheirMean { 1.0 } else { 0.0 };
         let of_colour = chromatic_visibility(&guide, &noise.rgb, size, own, &self.viewing, self.csf.acuity)?;
         Ok(of_luminance.combined(&of_colour, f32::max))
     }
@@ -288,39 +285,65 @@ struct HalfDifference {
     luminance: Plane,
 }
 
-/// The share of the first half in a guide that is, in every pixel, as near as files round, a mean of the two with these weights, or one of
-/// them.
-fn share_of_first(guide: &InputPicture, [a, b]: &[InputPicture; 2]) -> Option<f64> {
-    /// Of halves, with 11 bits: the guide's own rounding, and that of what it is made of.
-    const ROUNDING: f64 = 1.0 / 1024.0;
-    /// Of the halves' squared difference, which a mean's rounding is far below, and a clean picture's distance from their means is not: 0.25.
-    const LEFT: f64 = 0.04;
-    if !(guide.has_values_like(a) && guide.has_values_like(b)) {
-        return None;
-    }
-    // What files hold between black and white has 8 bits, perhaps.
-    let step = if guide.holds_codes() { 1.0 / 255.0 } else { 1e-6 };
-    let values = || {
-        let [guide, a, b] = [guide, a, b].map(|picture| picture.codes().as_flattened().iter().map(|&v| f64::from(v)));
-        guide.zip(a.zip(b))
-    };
-    let (along, squared) = values().fold((0.0, 0.0), |(along, squared), (guide, (a, b))| {
-        (along + (guide - b) * (a - b), squared + (a - b).powi(2))
-    });
-    let share = along / squared;
-    let residual = |(guide, (a, b)): (f64, (f64, f64))| guide - (share * a + (1.0 - share) * b);
-    let rounds =
-        |value: (f64, (f64, f64))| residual(value).abs() <= ROUNDING * (value.1.0.abs() + value.1.1.abs()) + step;
-    // Where halves hardly differ, any clean picture is a mean of them to within rounding.
-    let residuals: f64 = values().map(|value| residual(value).powi(2)).sum();
-    let is_mean = residuals <= LEFT * squared && values().all(rounds);
-    (is_mean && (-0.01..=1.01).contains(&share)).then_some(share.clamp(0.0, 1.0))
+/// What a guide has of the halves.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum MadeOf {
+    /// It is the mean of their values in every pixel.
+    TheirMean,
+    /// One of them, or a mean with other weights: its noise depends on how noisy each of them is, which two pictures do not tell. A reference
+    /// beside a render was taken to be as noisy as that, and noise to be 1.6 times as visible as it is.
+    OneMoreThanTheOther,
+    /// Neither, as far as is known.
+    Else,
 }
 
-/// Variance of the noise of a mean of two halves over that of half their difference, where both are equally noisy: 1 of equal shares, 2 of
-/// one half alone.
-fn noise_of_mean(share_of_first: f64) -> f32 {
-    (2.0 * (share_of_first.powi(2) + (1.0 - share_of_first).powi(2))) as f32
+impl MadeOf {
+    /// By values in every pixel, as near as files round.
+    fn of(guide: &InputPicture, [a, b]: &[InputPicture; 2]) -> Self {
+        /// Of halves, with 11 bits: the guide's own rounding, and that of what it is made of.
+        const ROUNDING: f64 = 1.0 / 1024.0;
+        /// Of the halves' squared difference, which a mean's rounding is far below, and a clean picture's distance from their means is not:
+        /// 0.25.
+        const LEFT: f64 = 0.04;
+        if !(guide.has_values_like(a) && guide.has_values_like(b)) {
+            return Self::Else;
+        }
+        // What files hold between black and white has 8 bits, perhaps.
+        let step = if guide.holds_codes() { 1.0 / 255.0 } else { 1e-6 };
+        let values = || {
+            let [guide, a, b] =
+                [guide, a, b].map(|picture| picture.codes().as_flattened().iter().map(|&v| f64::from(v)));
+            guide.zip(a.zip(b))
+        };
+        let (along, squared) = values().fold((0.0, 0.0), |(along, squared), (guide, (a, b))| {
+            (along + (guide - b) * (a - b), squared + (a - b).powi(2))
+        });
+        let share = along / squared;
+        let residual = |(guide, (a, b)): (f64, (f64, f64))| guide - (share * a + (1.0 - share) * b);
+        let rounds =
+            |value @ (_, (a, b)): (f64, (f64, f64))| residual(value).abs() <= ROUNDING * (a.abs() + b.abs()) + step;
+        // Where halves hardly differ, any clean picture is a mean of them to within rounding.
+        let residuals: f64 = values().map(|value| residual(value).powi(2)).sum();
+        let is_mean = residuals <= LEFT * squared && values().all(rounds);
+        match share {
+            0.49..=0.51 if is_mean => Self::TheirMean,
+            -0.01..=1.01 if is_mean => Self::OneMoreThanTheOther,
+            _ => Self::Else,
+        }
+    }
+
+    fn told(self) -> Option<&'static str> {
+        match self {
+            Self::TheirMean => {
+                Some("it is the mean of the halves: what noise it has by them is not taken for detail that hides noise")
+            }
+            Self::OneMoreThanTheOther => Some(
+                "it is one of the halves, or has more of one: how noisy it is cannot be told, and what noise it has counts as detail that \
+                 hides noise; their mean, or a picture without noise, is better",
+            ),
+            Self::Else => None,
+        }
+    }
 }
 
 /// (A − B)/2 of what the display shows, linear RGB in cd/m².
