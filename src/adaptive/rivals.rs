@@ -178,6 +178,7 @@ mod tests {
     use crate::adaptive::plan::pilot_plan;
     use crate::film::BlockSum;
     use crate::integrator::{BlockWork, FirstHit, PathSample};
+    use crate::sampler::unit_of_hash;
     use glam::Vec3;
 
     /// A film whose left half is noise of standard deviation `noise` about 0.5, and whose right half is flat.
@@ -194,7 +195,7 @@ mod tests {
         let mut sum = BlockSum::default();
         for index in block.first..block.first + block.samples {
             let key = u64::from(block.pixel) << 32 | u64::from(block.level) << 24 | u64::from(index);
-            let u = (hash_words(key, block.half.index() as u64) >> 40) as f32 / 16_777_216.0 - 0.5;
+            let u = unit_of_hash(hash_words(key, block.half.index() as u64)) - 0.5;
             let value = if block.pixel % 32 < 16 { 0.5 + noise * u * 12f32.sqrt() } else { 0.5 };
             sum.add(&PathSample { radiance: Vec3::splat(value), first_hit, rays: 1 });
         }

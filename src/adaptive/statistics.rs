@@ -203,7 +203,7 @@ mod tests {
                     let mut sum = BlockSum::default();
                     for _ in 0..work.samples {
                         counter += 1;
-                        let u = (crate::sampler::hash_words(counter, 99) >> 40) as f32 / 16_777_216.0;
+                        let u = crate::sampler::unit_of_hash(crate::sampler::hash_words(counter, 99));
                         sum.add(&PathSample {
                             radiance: Vec3::splat(value(pixel, u)),
                             first_hit: FirstHit {

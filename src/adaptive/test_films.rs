@@ -4,7 +4,7 @@ use super::plan::pilot_plan;
 use super::settings::LoopSettings;
 use crate::film::{BlockSum, Film};
 use crate::integrator::{FirstHit, PathSample};
-use crate::sampler::hash_words;
+use crate::sampler::{hash_words, unit_of_hash};
 use fechner_perception::display::{Display, Viewing};
 use fechner_perception::tone::operator;
 use glam::Vec3;
@@ -29,7 +29,7 @@ pub(super) fn film_of_lamps(color: impl Fn(u32, f32) -> Vec3, shines: impl Fn(u3
         let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines };
         for index in block.first..block.first + block.samples {
             let key = u64::from(block.pixel) << 8 | u64::from(index);
-            let random = (hash_words(key, block.half.index() as u64) >> 40) as f32 / 8_388_608.0 - 1.0;
+            let random = 2.0 * unit_of_hash(hash_words(key, block.half.index() as u64)) - 1.0;
             sum.add(&PathSample { radiance: color(block.pixel, random), first_hit, rays: 1 });
         }
         film.merge_block(block, &sum);

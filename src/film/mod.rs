@@ -242,7 +242,7 @@ mod tests {
     #[test]
     fn two_single_samples_have_a_variance() {
         let random = |i: u32, half: Half| {
-            (crate::sampler::hash_words(u64::from(i), half.index() as u64) >> 40) as f32 / 16_777_216.0
+            crate::sampler::unit_of_hash(crate::sampler::hash_words(u64::from(i), half.index() as u64))
         };
         let mut film = Film::new(64, 64);
         for pixel in 0..64 * 64 {

@@ -33,21 +33,21 @@ impl PerSample {
         Self { pooled: met.clone(), met, of_halves }
     }
 
-    /// Or by what lamps' rims may hide, where that is more. `picture` is its luminance, cd/m², `light_of` that of a half; what a half
-    /// decides by is missed beside the other's.
+    /// Or by what lamps' rims may hide, where that is more. `picture` and `lights` are luminances, cd/m², of the whole and of its halves; what
+    /// a half decides by is missed beside the other's.
     pub(super) fn or_missed(
         self,
         picture: &Plane,
-        light_of: impl Fn(Half) -> Plane,
+        lights: Option<&[Plane; 2]>,
         missed_beside: impl Fn(&Plane) -> Option<MissedNoise>,
     ) -> Self {
         let or_missed = |per_sample: &Plane, light: &Plane| match missed_beside(light) {
             None => per_sample.clone(),
             Some(missed) => missed.or_scatter(per_sample),
         };
-        let of_halves = self
-            .of_halves
-            .map(|halves| Half::BOTH.map(|half| or_missed(&halves[half.index()], &light_of(half.other()))));
+        let of_halves = self.of_halves.zip(lights).map(|(halves, lights)| {
+            Half::BOTH.map(|half| or_missed(&halves[half.index()], &lights[half.other().index()]))
+        });
         Self { pooled: or_missed(&self.met, picture), of_halves, ..self }
     }
 

@@ -4,7 +4,7 @@ use super::super::denoised::TimedDenoising;
 use super::super::missed::{Darkness, EdgeProfile, LampEdges};
 use super::super::settings::LoopSettings;
 use super::super::statistics::{SampleStatistics, by_channel, scene_units};
-use super::{JudgeError, NoiseOnDisplay, display_scale, guide_rgb, half_luminance, still_wanted, variance_shares};
+use super::{JudgeError, NoiseOnDisplay, display_scale, guide_rgb, still_wanted, variance_shares};
 use crate::film::{CHANNELS, Estimate, Film};
 use crate::sampler::Half;
 use fechner_perception::Plane;
@@ -101,10 +101,11 @@ impl Scatter {
     /// Displayed over scene variance of luminance for what each half decides by: of the other half's light and noise. Where both halves' went
     /// in, pixels that were lucky went beyond white, showed no noise and stopped, and the others went on until they were lucky, too: a thin
     /// tube of light made a picture 2.75 % too bright (`benches/results/sampling.md`, lamps on black). Of both are still which pixels shine, how
-    /// many samples there are, and the scales of colour, which the display does not clip.
+    /// many samples there are, the scales of colour, which the display does not clip, and what is seen over white. `lights`: of the halves, cd/m².
     pub(super) fn luminance_scales_of_halves(
         &self,
         film: &Film,
+        lights: &[Plane; 2],
         tone: &dyn FittedTone,
         settings: &LoopSettings,
         inflation: f64,
@@ -113,7 +114,7 @@ impl Scatter {
         Half::BOTH.map(|half| {
             let other = half.other();
             let variance = |pixel: usize| film.half(other)[pixel].sample_variance(0);
-            noise.scale(0, &half_luminance(film, other, settings.nits_per_unit), variance)
+            noise.scale(0, &lights[other.index()], variance)
         })
     }
 

@@ -4,7 +4,7 @@ use crate::adaptive::test_films::{film_of, film_of_lamps, settings};
 use crate::denoise::Denoiser;
 use crate::film::BlockSum;
 use crate::integrator::{BlockWork, FirstHit, PathSample};
-use crate::sampler::hash_words;
+use crate::sampler::{hash_words, unit_of_hash};
 use fechner_perception::tone::SceneLight;
 use glam::Vec3;
 
@@ -48,7 +48,7 @@ fn grey_film(samples: [u32; 2], shines: impl Fn(u32) -> bool, grey: impl Fn(u32,
             let mut sum = BlockSum::default();
             for index in 0..samples {
                 let key = u64::from(pixel) << 8 | u64::from(index);
-                let random = (hash_words(key, half.index() as u64) >> 40) as f32 / 8_388_608.0 - 1.0;
+                let random = 2.0 * unit_of_hash(hash_words(key, half.index() as u64)) - 1.0;
                 let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines };
                 sum.add(&PathSample { radiance: Vec3::splat(grey(pixel, half, random)), first_hit, rays: 1 });
             }

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::denoise::Denoiser;
-use crate::sampler::hash_words;
+use crate::sampler::{hash_words, unit_of_hash};
 use fechner_perception::Plane;
 
 const SIDE: usize = 48;
@@ -12,7 +12,7 @@ fn denoised(picture: &NoisyPicture<'_>) -> Vec<[f32; 3]> {
 }
 
 fn random(x: usize, y: usize) -> f32 {
-    (hash_words(x as u64, y as u64) >> 40) as f32 / 8_388_608.0 - 1.0
+    2.0 * unit_of_hash(hash_words(x as u64, y as u64)) - 1.0
 }
 
 fn pixels() -> impl Iterator<Item = (usize, usize)> {
