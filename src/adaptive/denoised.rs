@@ -1,7 +1,7 @@
 //! The film's denoised picture as it will be seen, and what the perception crate says of its noise and of its bias.
 
 use super::judge::{JudgeError, half_luminance};
-use super::missed::{Darkness, EdgeProfile, LampEdges};
+use super::missed::{Darkness, EdgeProfile, FoundLight, LampEdges};
 use super::settings::LoopSettings;
 use crate::denoise::{DenoisedFilm, Denoiser, denoise_film, leave_the_void_dark};
 use crate::film::{Estimate, Film, opponent};
@@ -91,10 +91,10 @@ impl TimedDenoising {
         let error = chromatic.iter().fold(error, DenoisedError::with_channel);
         let error = match EdgeProfile::of(settings.filter) {
             Some(profile) => {
-                let sampled_cd_m2 = &estimate.luminance_cd_m2;
-                let missed = LampEdges { profile, film, sampled_cd_m2, lamps_from_cd_m2 }.missed();
+                let found = FoundLight::of_film(film, settings.nits_per_unit);
+                let missed = LampEdges { profile, film, found: &found, lamps_from_cd_m2 }.missed();
                 let dark = Darkness::of(&missed, |pixel, light| {
-                    let whole = sampled_cd_m2.get(pixel.x, pixel.y) + light;
+                    let whole = found.mean_cd_m2.get(pixel.x, pixel.y) + light;
                     // A denoiser may have guessed some of it.
                     let whole = whole.max(luminance_cd_m2.get(pixel.x, pixel.y));
                     seen::display_luminance_at(tone, display, pixel, whole)

@@ -2,10 +2,11 @@
 //!
 //! A pixel of which a bright lamp covers two per cent is white in truth, and dark in both halves until one sample in fifty meets the lamp:
 //! neither the halves' difference nor the raw mean tells of it. Its neighbour does, of which the lamp covers more. How coverage falls from
-//! a pixel to the next across an edge is known: it is the pixel filter's own shape.
+//! a pixel to the next across an edge is known: it is the pixel filter's own shape. Of a lamp thinner than a pixel nothing tells which way
+//! it goes on: any neighbour may have as much of it.
 
-use crate::film::Film;
-use crate::sampler::PixelFilter;
+use crate::film::{Film, HalfPixel, Halves, opponent};
+use crate::sampler::{Half, PixelFilter};
 use fechner_perception::Plane;
 use fechner_perception::tone::Pixel;
 
@@ -46,12 +47,54 @@ impl EdgeProfile {
     }
 }
 
+/// What the samples of each pixel have found, cd/m².
+pub(super) struct FoundLight {
+    /// Their mean luminance.
+    pub(super) mean_cd_m2: Plane,
+    /// That of a lamp before black which some of them have met: the mean square over the mean. Of a pixel that it covers by a twentieth,
+    /// the mean is a twentieth of this.
+    lamp_cd_m2: Plane,
+}
+
+impl FoundLight {
+    /// Of a film, both halves together.
+    pub(super) fn of_film(film: &Film, nits_per_unit: f64) -> Self {
+        Self::of(film, nits_per_unit, |pixel| film.halves(pixel))
+    }
+
+    /// Of a half; of the other one where it has no samples.
+    pub(super) fn of_half(film: &Film, half: Half, nits_per_unit: f64) -> Self {
+        Self::of(film, nits_per_unit, |pixel| Halves::Only(film.halves(pixel).half_or_other(half)))
+    }
+
+    fn of<'a>(film: &Film, nits_per_unit: f64, halves: impl Fn(usize) -> Halves<'a> + Sync) -> Self {
+        let width = film.width() as usize;
+        let plane = |value: &(dyn Fn(Halves<'a>) -> f64 + Sync)| {
+            Plane::from_fn(width, film.height() as usize, |x, y| (nits_per_unit * value(halves(y * width + x))) as f32)
+        };
+        let mean = |halves: Halves<'a>| halves.mean(luminance);
+        let lamp = |halves: Halves<'a>| {
+            let mean = mean(halves);
+            if mean > 0.0 { halves.mean(mean_square_luminance) / mean } else { 0.0 }
+        };
+        Self { mean_cd_m2: plane(&mean), lamp_cd_m2: plane(&lamp) }
+    }
+}
+
+fn luminance(half: &HalfPixel) -> f64 {
+    opponent(half.mean)[0]
+}
+
+fn mean_square_luminance(half: &HalfPixel) -> f64 {
+    luminance(half).powi(2) + f64::from(half.m2[0]) / f64::from(half.samples.max(1))
+}
+
 /// Where lamps' edges are looked for.
 pub(super) struct LampEdges<'a> {
     pub(super) profile: EdgeProfile,
     pub(super) film: &'a Film,
-    /// The film's mean, or that of one of its halves.
-    pub(super) sampled_cd_m2: &'a Plane,
+    /// In the film, or in one of its halves.
+    pub(super) found: &'a FoundLight,
     /// What shines counts as a lamp from this luminance on.
     pub(super) lamps_from_cd_m2: f32,
 }
@@ -61,25 +104,26 @@ impl LampEdges<'_> {
     pub(super) fn missed(&self) -> Plane {
         self.missed_where(|pixel| {
             let is_met = self.film.guides()[pixel].seen.shines();
-            (!is_met).then(|| (self.sampled_cd_m2.values()[pixel], self.film.samples(pixel) as f32))
+            (!is_met).then(|| (self.found.mean_cd_m2.values()[pixel], self.film.samples(pixel) as f32))
         })
     }
 
     /// The same, whether samples have met it or not: counts that went by that would end where a rim was lucky, and make rims bright by 0.2 %
     /// of the whole picture's light.
     pub(super) fn expected(&self) -> Plane {
-        self.missed_where(|pixel| Some((self.sampled_cd_m2.values()[pixel], self.film.samples(pixel) as f32)))
+        self.missed_where(|pixel| Some((self.found.mean_cd_m2.values()[pixel], self.film.samples(pixel) as f32)))
     }
 
     /// `unmet`: luminance, cd/m², and samples of a pixel that may have missed light.
     fn missed_where(&self, unmet: impl Fn(usize) -> Option<(f32, f32)>) -> Plane {
-        let (width, height) = (self.sampled_cd_m2.width(), self.sampled_cd_m2.height());
+        let FoundLight { mean_cd_m2, lamp_cd_m2 } = self.found;
+        let (width, height) = (mean_cd_m2.width(), mean_cd_m2.height());
         let around = |(x, y): (usize, usize), radius: usize| {
             let columns = x.saturating_sub(radius)..width.min(x + radius + 1);
             let rows = y.saturating_sub(radius)..height.min(y + radius + 1);
             rows.flat_map(move |y| columns.clone().map(move |x| (x, y)))
         };
-        let light = |(x, y): (usize, usize)| self.sampled_cd_m2.get(x, y);
+        let light = |(x, y): (usize, usize)| mean_cd_m2.get(x, y);
         let shines = |(x, y): (usize, usize)| self.film.guides()[y * width + x].seen.shines();
         let is_lamp = |at: (usize, usize)| shines(at) && light(at) > self.lamps_from_cd_m2;
         let mut missed = Plane::filled(width, height, 0.0);
@@ -88,12 +132,15 @@ impl LampEdges<'_> {
             if around(lamp, RADIUS).all(shines) {
                 continue;
             }
-            let full = around(lamp, RADIUS).filter(|&at| is_lamp(at)).map(light).fold(0.0, f32::max);
+            let lamps = || around(lamp, RADIUS).filter(|&at| is_lamp(at));
+            let full = lamps().map(|(x, y)| lamp_cd_m2.get(x, y)).fold(0.0, f32::max);
+            let is_thin = lamps().all(|at| light(at) < 0.5 * full);
             for (x, y) in around(lamp, 1) {
                 let pixel = y * width + x;
                 let Some((own, samples)) = unmet(pixel) else { continue };
+                let coverage = light(lamp) / full;
                 let step_px = ((x.abs_diff(lamp.0) + y.abs_diff(lamp.1)) as f32).sqrt();
-                let coverage = self.profile.farther_out(light(lamp) / full, step_px);
+                let coverage = if is_thin { coverage } else { self.profile.farther_out(coverage, step_px) };
                 // In the place of the pixel's own light; of a coverage that scatters about this by as much, after so many samples without a hit.
                 let expected = (full - own).max(0.0) * coverage / (1.0 + samples * coverage);
                 missed.values_mut()[pixel] = expected.max(missed.get(x, y));
@@ -142,13 +189,19 @@ mod tests {
 
     /// A pilot of columns that shine as told.
     fn film_of_columns(side: u32, radiance: impl Fn(u32) -> f32) -> Film {
+        film_of(side, |Pixel { x, .. }, _| radiance(x as u32))
+    }
+
+    /// A pilot whose samples, of an index in their half, are as told.
+    fn film_of(side: u32, radiance: impl Fn(Pixel, u32) -> f32) -> Film {
         let mut film = Film::new(side, side);
         for block in pilot_plan(&film, 16).blocks {
-            let value = radiance(block.pixel % side);
-            let first_hit =
-                FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: value > 0.0 };
+            let pixel = Pixel { x: (block.pixel % side) as usize, y: (block.pixel / side) as usize };
             let mut sum = BlockSum::default();
-            for _ in 0..block.samples {
+            for index in block.first..block.first + block.samples {
+                let value = radiance(pixel, index);
+                let first_hit =
+                    FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: value > 0.0 };
                 sum.add(&PathSample { radiance: Vec3::splat(value), first_hit, rays: 1 });
             }
             film.merge_block(block, &sum);
@@ -184,11 +237,11 @@ mod tests {
                 0.0
             }
         });
-        let sampled = film.estimate(1.0).luminance_cd_m2;
+        let found = FoundLight::of_film(&film, 1.0);
         let edges = |lamps_from_cd_m2| LampEdges {
             profile: EdgeProfile::of(PixelFilter::Gaussian).expect("is smooth"),
             film: &film,
-            sampled_cd_m2: &sampled,
+            found: &found,
             lamps_from_cd_m2,
         };
         let missed = edges(100.0).missed();
@@ -203,13 +256,41 @@ mod tests {
         assert!(edges(1e6).missed().values().iter().all(|&light| light == 0.0));
     }
 
+    /// A tube that covers an eighth of its pixels is met by one sample of each half in the upper rows, and by none below: the first of these may
+    /// have as much of it, and so may pixels to the side, but none farther away.
+    #[test]
+    fn thin_lamps_may_go_on_either_way() {
+        const SIDE: usize = 8;
+        let film = film_of(SIDE as u32, |Pixel { x, y }, index| if x == 3 && y < 4 && index == 5 { 1e4 } else { 0.0 });
+        let of_one_in_eight = FoundLight::of_half(&film, Half::B, 1.0);
+        assert!((of_one_in_eight.mean_cd_m2.get(3, 0) / (1e4 / 8.0) - 1.0).abs() < 1e-4);
+        assert!(
+            (of_one_in_eight.lamp_cd_m2.get(3, 0) / 1e4 - 1.0).abs() < 1e-4,
+            "{}",
+            of_one_in_eight.lamp_cd_m2.get(3, 0)
+        );
+        let found = FoundLight::of_film(&film, 1.0);
+        let profile = EdgeProfile::of(PixelFilter::Gaussian).expect("is smooth");
+        let missed = LampEdges { profile, film: &film, found: &found, lamps_from_cd_m2: 0.0 }.missed();
+        let coverage = 1.0 / 8.0;
+        let expected = 1e4 * coverage / (1.0 + 16.0 * coverage);
+        for (x, y) in [(3, 4), (4, 2), (2, 4)] {
+            assert!((missed.get(x, y) / expected - 1.0).abs() < 1e-3, "{x}, {y}: {} for {expected}", missed.get(x, y));
+        }
+        assert_eq!(
+            [missed.get(3, 5), missed.get(5, 2), missed.get(3, 2)],
+            [0.0; 3],
+            "what has met the lamp has missed none"
+        );
+    }
+
     /// A picture that shines from edge to edge has no rim, however uneven it is.
     #[test]
     fn a_screen_has_no_rim() {
         let film = film_of_columns(8, |x| 1.0 + 100.0 * (x % 2) as f32);
-        let sampled = film.estimate(1.0).luminance_cd_m2;
+        let found = FoundLight::of_film(&film, 1.0);
         let profile = EdgeProfile::of(PixelFilter::Gaussian).expect("is smooth");
-        let edges = LampEdges { profile, film: &film, sampled_cd_m2: &sampled, lamps_from_cd_m2: 0.0 };
+        let edges = LampEdges { profile, film: &film, found: &found, lamps_from_cd_m2: 0.0 };
         assert!(edges.expected().values().iter().all(|&light| light == 0.0));
     }
 

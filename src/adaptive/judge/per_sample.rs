@@ -1,5 +1,6 @@
 //! Variance of one sample, from which the counts of a plan are found.
 
+use super::super::missed::FoundLight;
 use super::over_white::OverWhite;
 use super::steps::{MissedNoise, Scatter, Thresholds};
 use crate::film::Film;
@@ -33,15 +34,15 @@ impl PerSample {
         Self { pooled: met.clone(), met, of_halves }
     }
 
-    /// Or by what lamps' rims may hide, where that is more. `picture` and `lights` are luminances, cd/m², of the whole and of its halves; what
+    /// Or by what lamps' rims may hide, where that is more. `picture` and `lights` are what the whole and its halves have found; what
     /// a half decides by is missed beside the other's.
     pub(super) fn or_missed(
         self,
-        picture: &Plane,
-        lights: Option<&[Plane; 2]>,
-        missed_beside: impl Fn(&Plane) -> Option<MissedNoise>,
+        picture: &FoundLight,
+        lights: Option<&[FoundLight; 2]>,
+        missed_beside: impl Fn(&FoundLight) -> Option<MissedNoise>,
     ) -> Self {
-        let or_missed = |per_sample: &Plane, light: &Plane| match missed_beside(light) {
+        let or_missed = |per_sample: &Plane, light: &FoundLight| match missed_beside(light) {
             None => per_sample.clone(),
             Some(missed) => missed.or_scatter(per_sample),
         };

@@ -1,7 +1,7 @@
 //! The steps of a look, each of what was found before it: guide and tone, scatter, thresholds, and what chromatic noise shows.
 
 use super::super::denoised::TimedDenoising;
-use super::super::missed::{Darkness, EdgeProfile, LampEdges};
+use super::super::missed::{Darkness, EdgeProfile, FoundLight, LampEdges};
 use super::super::settings::LoopSettings;
 use super::super::statistics::{SampleStatistics, by_channel, scene_units};
 use super::{JudgeError, NoiseOnDisplay, display_scale, guide_rgb, still_wanted, variance_shares};
@@ -101,11 +101,11 @@ impl Scatter {
     /// Displayed over scene variance of luminance for what each half decides by: of the other half's light and noise. Where both halves' went
     /// in, pixels that were lucky went beyond white, showed no noise and stopped, and the others went on until they were lucky, too: a thin
     /// tube of light made a picture 2.75 % too bright (`benches/results/sampling.md`, lamps on black). Of both are still which pixels shine, how
-    /// many samples there are, the scales of colour, which the display does not clip, and what is seen over white. `lights`: of the halves, cd/m².
+    /// many samples there are, the scales of colour, which the display does not clip, and what is seen over white. `lights`: of the halves.
     pub(super) fn luminance_scales_of_halves(
         &self,
         film: &Film,
-        lights: &[Plane; 2],
+        lights: &[FoundLight; 2],
         tone: &dyn FittedTone,
         settings: &LoopSettings,
         inflation: f64,
@@ -114,22 +114,22 @@ impl Scatter {
         Half::BOTH.map(|half| {
             let other = half.other();
             let variance = |pixel: usize| film.half(other)[pixel].sample_variance(0);
-            noise.scale(0, &lights[other.index()], variance)
+            noise.scale(0, &lights[other.index()].mean_cd_m2, variance)
         })
     }
 
-    /// What lamps' rims may hide where so much light was sampled, cd/m²; `None` where the pixel filter tells of no neighbour.
+    /// What lamps' rims may hide where so much light was found; `None` where the pixel filter tells of no neighbour.
     pub(super) fn missed_noise(
         &self,
         film: &Film,
-        sampled_cd_m2: &Plane,
+        found: &FoundLight,
         tone: &dyn FittedTone,
         settings: &LoopSettings,
     ) -> Option<MissedNoise> {
         let profile = EdgeProfile::of(settings.filter)?;
-        let edges = LampEdges { profile, film, sampled_cd_m2, lamps_from_cd_m2: 0.0 };
+        let edges = LampEdges { profile, film, found, lamps_from_cd_m2: 0.0 };
         let darkness = Darkness::of(&edges.expected(), |pixel, light| {
-            let whole = sampled_cd_m2.get(pixel.x, pixel.y) + light;
+            let whole = found.mean_cd_m2.get(pixel.x, pixel.y) + light;
             seen::display_luminance_at(tone, &settings.viewing.display, pixel, whole)
         });
         Some(MissedNoise(darkness.mean_square.combined(&self.shares, |square, share| square / share)))
