@@ -21,6 +21,11 @@ import OpenEXR
 BLOCK = 8
 
 
+def percent(part, whole):
+    """0 where there is nothing."""
+    return 100 * np.divide(part, whole, out=np.zeros_like(part), where=whole != 0)
+
+
 def luminance(path):
     pixels = OpenEXR.File(str(path), separate_channels=True).channels()
     red, green, blue = (pixels[name].pixels.astype(np.float64) for name in "RGB")
@@ -69,7 +74,7 @@ def main():
         def offset(of):
             values, true = np.array([of(one) for one in renders]), of(reference)
             error = np.sqrt(values.var(axis=0, ddof=1) / len(values) + spread(of))
-            return 100 * (values.mean(axis=0) - true) / true, 100 * error / true
+            return percent(values.mean(axis=0) - true, true), percent(error, true)
 
         whole, whole_error = offset(np.mean)
         local, local_error = offset(blocks)

@@ -20,6 +20,7 @@ pub mod plan;
 pub mod pursuit;
 pub mod rivals;
 pub mod settings;
+mod small_lamps;
 pub mod state;
 pub mod statistics;
 mod stop;
@@ -38,6 +39,7 @@ use judge::{JudgeError, Judgement, judge, judge_to_plan};
 use plan::slices;
 use settings::{LoopSettings, Sampling};
 use state::{RenderState, Seconds};
+use std::cell::OnceCell;
 use std::collections::VecDeque;
 use std::time::Instant;
 use until_look::UntilLook;
@@ -118,6 +120,8 @@ struct Loop<'a> {
     resumed_at: Instant,
     seconds_before: f64,
     looked: Option<Looked>,
+    /// [`PathTracer::share_of_small_lamps`], once it was asked for.
+    share_of_small_lamps: OnceCell<Option<Vec<f32>>>,
 }
 
 /// [`judge`] or [`judge_to_plan`].
@@ -221,7 +225,16 @@ impl<'a> Loop<'a> {
         let rungs = settings.rungs().into_iter().filter(is_left).collect();
         let seconds_before = state.seconds.total;
         let state = state.kept_to(&settings.limits);
-        Self { tracer, settings, rungs, state, resumed_at: Instant::now(), seconds_before, looked: None }
+        Self {
+            tracer,
+            settings,
+            rungs,
+            state,
+            resumed_at: Instant::now(),
+            seconds_before,
+            looked: None,
+            share_of_small_lamps: OnceCell::new(),
+        }
     }
 
     /// Traces, looks and plans in turn; `None` if the monitor leaves the render.

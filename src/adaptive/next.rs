@@ -8,6 +8,7 @@ use super::judge::{JudgeError, Judgement, judge_raw, judge_to_plan, still_wanted
 use super::plan::{SAMPLES_OF_A_RAW_LOOK, adaptive_plan, doubling_of, even_plan, uniform_plan, wanted_samples};
 use super::rivals::{rival_plan, rival_stop};
 use super::settings::{LoopSettings, Sampling, THRESHOLD};
+use super::small_lamps::plan_to_meet;
 use super::state::Exposure;
 use super::stop::{LEAST_SAVING, predicted_saving};
 use super::until_look::UntilLook;
@@ -82,12 +83,16 @@ impl Loop<'_> {
         }))
     }
 
-    /// Without a look: enters a plan for what is left of a budget where that is hardly more than a look costs, and between two looks at a
+    /// Without a look: enters a plan for lamps that are known to be there, for what is left of a budget where that is hardly more than a look costs, and between two looks at a
     /// picture that is denoised a plan by raw noise alone; false when it is time for a look.
     pub(super) fn plans_without_a_look(&mut self) -> Result<bool, JudgeError> {
         let left = self.left_of_budget();
         if self.is_hardly_more_than_pilot(left) {
             self.enter(even_plan(&self.state.film, left));
+            return Ok(true);
+        }
+        if let Some(plan) = self.plan_to_meet_small_lamps(left) {
+            self.enter(plan);
             return Ok(true);
         }
         if self.settings.denoiser.is_none() || matches!(self.settings.sampling, Sampling::Rival(_)) || left == 0 {
@@ -117,6 +122,15 @@ impl Loop<'_> {
         }
         self.enter(plan);
         Ok(true)
+    }
+
+    /// What is lacking where lamps smaller than a pixel are known to be, for sampling by sight.
+    fn plan_to_meet_small_lamps(&self, left: u64) -> Option<SamplePlan> {
+        if self.settings.sampling != Sampling::Adaptive {
+            return None;
+        }
+        let shares = self.share_of_small_lamps.get_or_init(|| self.tracer.share_of_small_lamps());
+        some(plan_to_meet(&self.state.film, shares.as_deref()?, self.settings.limits.max_samples, left))
     }
 
     /// Whether the pilot of a raw picture on the way to threshold is done, and the budget has so little left that a look would cost more

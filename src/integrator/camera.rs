@@ -94,6 +94,21 @@ impl CameraRays {
         self.parallel
     }
 
+    /// Whether it moves while the shutter is open.
+    pub(super) fn moves(&self) -> bool {
+        self.motion.is_some()
+    }
+
+    /// From where rays begin that pass a world position, to there, for a camera that stands still; of any length.
+    pub(super) fn way_to(&self, position: Vec3) -> Vec3 {
+        if self.parallel { self.forward } else { position - self.position }
+    }
+
+    /// The ray through a place in the picture and the middle of the lens, as the shutter opens.
+    pub(super) fn ray_through(&self, position_px: Vec2) -> Ray {
+        self.ray(&CameraSample { position_px, lens: [0.5; 2], time: 0.0 })
+    }
+
     /// Whether rays begin all over a lens.
     pub(super) fn has_lens(&self) -> bool {
         self.lens_right != Vec3::ZERO

@@ -16,6 +16,7 @@ mod prune;
 mod relief;
 mod shading;
 mod sheets;
+mod small_lamps;
 mod specular;
 mod tables;
 

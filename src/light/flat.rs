@@ -34,7 +34,7 @@ pub(super) struct FlatEmitter {
     offset: f32,
     pub(super) both_sides: bool,
     /// No ray meets it.
-    is_unseen: bool,
+    pub(super) is_unseen: bool,
     /// What it emits where that is the same everywhere; `None` where a picture says.
     even_radiance: Option<Vec3>,
 }

@@ -15,6 +15,7 @@ mod flat;
 mod givers;
 mod lanes;
 mod outlook;
+mod parts;
 mod punctual;
 mod solid_angle;
 mod sphere;
@@ -24,6 +25,7 @@ mod tree;
 
 pub use emission::emitted;
 pub use outlook::{Arrival, Lookout, Outlooks};
+pub use parts::LampPart;
 pub use tree::LightReceiver;
 
 use crate::geometry::{Hit, Ray, World};

@@ -16,7 +16,7 @@ pub(super) struct SphereEmitter {
     /// What it emits where that is the same everywhere; `None` where a picture says.
     even_radiance: Option<Vec3>,
     /// No ray meets it.
-    is_unseen: bool,
+    pub(super) is_unseen: bool,
 }
 
 impl SphereEmitter {

@@ -33,11 +33,29 @@ pub struct FilterSample {
     pub weight: f32,
 }
 
+/// Where the samples of a filter fall that is nowhere negative.
+#[derive(Clone, Copy, Debug)]
+pub struct FilterDensity {
+    filter: PixelFilter,
+    /// The integral of its height along an axis.
+    height_px: f32,
+}
+
+impl FilterDensity {
+    /// The share of samples in a square pixel, if it were everywhere as at this offset from the pixel's centre.
+    pub fn at(&self, offset_px: Vec2) -> f32 {
+        let along = |offset_px: f32| self.filter.height(offset_px) / self.height_px;
+        along(offset_px.x) * along(offset_px.y)
+    }
+}
+
+/// Of any filter.
+const WIDEST_RADIUS_PX: f32 = 2.0;
 const GAUSSIAN_SIGMA_PX: f32 = 0.45;
 const GAUSSIAN_RADIUS_PX: f32 = 1.5;
 
 static BLACKMAN_HARRIS: LazyLock<Profile> = LazyLock::new(|| Profile::new(1.5, blackman_harris));
-static MITCHELL: LazyLock<Profile> = LazyLock::new(|| Profile::new(2.0, mitchell));
+static MITCHELL: LazyLock<Profile> = LazyLock::new(|| Profile::new(WIDEST_RADIUS_PX, mitchell));
 
 impl PixelFilter {
     /// Its name for people.
@@ -78,6 +96,14 @@ impl PixelFilter {
                 within(MITCHELL.radius_px, mitchell(f64::from(offset_px / MITCHELL.radius_px)) as f32)
             }
         }
+    }
+
+    /// Where its samples fall.
+    pub fn density(self) -> FilterDensity {
+        const CELLS: usize = 1024;
+        const CELL_PX: f32 = 2.0 * WIDEST_RADIUS_PX / CELLS as f32;
+        let height = |cell: usize| self.height((cell as f32 + 0.5) * CELL_PX - WIDEST_RADIUS_PX);
+        FilterDensity { filter: self, height_px: CELL_PX * (0..CELLS).map(height).sum::<f32>() }
     }
 
     /// The sample for two numbers in [0, 1).

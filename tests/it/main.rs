@@ -75,6 +75,7 @@ mod references;
 mod relief;
 mod reprojection;
 mod scene_table;
+mod small_lamps;
 mod support;
 mod texture_memory;
 mod texture_values;
