@@ -120,8 +120,8 @@ struct Loop<'a> {
     resumed_at: Instant,
     seconds_before: f64,
     looked: Option<Looked>,
-    /// [`PathTracer::share_of_small_lamps`], once it was asked for.
-    share_of_small_lamps: OnceCell<Option<Vec<f32>>>,
+    /// [`small_lamps::samples_to_meet`] lamps smaller than a pixel, once it was asked for.
+    samples_to_meet_lamps: OnceCell<Option<Vec<u32>>>,
 }
 
 /// [`judge`] or [`judge_to_plan`].
@@ -233,7 +233,7 @@ impl<'a> Loop<'a> {
             resumed_at: Instant::now(),
             seconds_before,
             looked: None,
-            share_of_small_lamps: OnceCell::new(),
+            samples_to_meet_lamps: OnceCell::new(),
         }
     }
 

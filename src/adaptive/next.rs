@@ -5,10 +5,12 @@ use super::audit::{Audit, MOST_INFLATION, audit, audit_unproven};
 use super::forecast::Forecast;
 use super::gain::{cut, most_worthwhile, while_far};
 use super::judge::{JudgeError, Judgement, judge_raw, judge_to_plan, still_wanted};
-use super::plan::{SAMPLES_OF_A_RAW_LOOK, adaptive_plan, doubling_of, even_plan, uniform_plan, wanted_samples};
+use super::plan::{
+    SAMPLES_OF_A_RAW_LOOK, adaptive_plan, doubling_of, even_plan, plan_up_to, uniform_plan, wanted_samples,
+};
 use super::rivals::{rival_plan, rival_stop};
-use super::settings::{LoopSettings, Sampling, THRESHOLD};
-use super::small_lamps::plan_to_meet;
+use super::settings::{Limits, LoopSettings, Sampling, THRESHOLD};
+use super::small_lamps::samples_to_meet;
 use super::state::Exposure;
 use super::stop::{LEAST_SAVING, predicted_saving};
 use super::until_look::UntilLook;
@@ -129,8 +131,11 @@ impl Loop<'_> {
         if self.settings.sampling != Sampling::Adaptive {
             return None;
         }
-        let shares = self.share_of_small_lamps.get_or_init(|| self.tracer.share_of_small_lamps());
-        some(plan_to_meet(&self.state.film, shares.as_deref()?, self.settings.limits.max_samples, left))
+        let Limits { pilot_samples, max_samples, .. } = self.settings.limits;
+        let of_lamps = || samples_to_meet(&self.tracer.share_of_small_lamps()?, pilot_samples);
+        let wanted = self.samples_to_meet_lamps.get_or_init(of_lamps).as_deref()?;
+        let plan = plan_up_to(&self.state.film, |pixel| wanted[pixel].min(max_samples));
+        some(plan).filter(|plan| plan.samples() <= left)
     }
 
     /// Whether the pilot of a raw picture on the way to threshold is done, and the budget has so little left that a look would cost more
