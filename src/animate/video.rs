@@ -1,6 +1,6 @@
 //! Moving pictures as YUV4MPEG2 (.y4m): raw frames that every encoder and player of free software reads.
 //!
-//! 8 bits, no chroma subsampling, ITU-R BT.709 in the limited range (16 to 235), which the header says. Not for keeping:
+//! 8 bits, no chroma subsampling, ITU-R BT.709 in the limited range (16 to 235); of these the header says the range, and has no word for the matrix. Not for keeping:
 //! three bytes a pixel and frame.
 
 use crate::output::fraction;
