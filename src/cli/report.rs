@@ -164,7 +164,7 @@ impl Report {
     /// `seeds`: all whose samples are in the film, at least one.
     pub(super) fn new(scene: &str, seeds: &[u64], settings: &LoopSettings, rendered: &Rendered) -> Self {
         let film = &rendered.film;
-        let pixels = u64::from(film.width()) * u64::from(film.height());
+        let pixels = film.pixel_count() as u64;
         let judgement = &rendered.judgement;
         let target = settings.limits.visibility;
         let predicted = judgement.is_known.then_some(&judgement.predicted);
