@@ -499,6 +499,9 @@ fn impossible_pictures_are_refused() {
         let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
         assert_refused(&arguments, folder.path(), fragments);
     }
+    // More pixels than memory can be counted for: "17179863584.0 GiB".
+    let endless = ["render", scene, "-o", "out.png", "--size", "4294967295x4294967295"];
+    assert_refused(&endless, folder.path(), &["more than the 2147483647 pixels", "smaller --size"]);
     let run = fechner()
         .args(with(&["--filter", "mitchell", "--sampling", "uniform", "--spp", "4", "--crop", "4,4,8,8"]))
         .current_dir(folder.path())
