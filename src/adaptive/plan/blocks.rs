@@ -28,7 +28,7 @@ pub(in crate::adaptive) fn share_of_half(samples: u32, half: Half) -> u32 {
     }
 }
 
-/// The blocks that double a half of a pixel again and again, the last of them up to its half of `max_samples`.
+/// The blocks that double a half of a pixel again and again, the last of them up to its share of `max_samples`.
 pub(super) fn doubled_blocks(
     pixel: u32,
     half: Half,
@@ -38,7 +38,7 @@ pub(super) fn doubled_blocks(
     std::iter::from_fn(move || {
         let rest = BlockWork::rest(pixel, half, taken);
         // A pilot may have been a part of the first block.
-        let samples = rest.samples.min(taken.max(1)).min((max_samples / 2).saturating_sub(taken));
+        let samples = rest.samples.min(taken.max(1)).min(share_of_half(max_samples, half).saturating_sub(taken));
         taken += samples;
         (samples > 0).then_some(BlockWork { samples, ..rest })
     })
