@@ -9,9 +9,11 @@ use fechner::adaptive::{Directive, Monitor, Progress, Quiet, Rendered, StopReaso
 use fechner::integrator::PathTracer;
 use fechner::scene::Scene;
 use fechner::scene::load::{LoadOptions, load};
+use fechner_perception::model::{ModelInputs, ThresholdModel};
+use fechner_perception::{Error, Plane};
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 /// What the scene file says.
@@ -253,6 +255,53 @@ fn limits_end_a_render() {
         settings.sampling = sampling;
         let capped = render(&tracer, &settings, &Quiet).expect("renders");
         assert_eq!(capped.stop_reason, fechner::adaptive::StopReason::MaxSamples, "{sampling:?}");
+    }
+}
+
+/// Sees nothing.
+struct Blind;
+
+impl ThresholdModel for Blind {
+    fn name(&self) -> &'static str {
+        "blind"
+    }
+
+    fn allowed_standard_error_cd_m2(&self, _: &ModelInputs<'_>) -> Result<Plane, Error> {
+        Err(Error::Empty { what: "the eye" })
+    }
+}
+
+/// Keeps what a render that failed could go on from, or leaves it at once.
+#[derive(Default)]
+struct Failures {
+    kept: Mutex<Option<RenderState>>,
+    leaves: bool,
+}
+
+impl Monitor for Failures {
+    fn looked(&self, _: &Progress) {}
+    fn samples_done(&self, _: u64) {}
+    fn between_batches(&self, _: &RenderState) -> Directive {
+        if self.leaves { Directive::Leave } else { Directive::GoOn }
+    }
+    fn failed(&self, state: &RenderState) {
+        *self.kept.lock().expect("one thread") = Some(state.clone());
+    }
+}
+
+/// A look that fails, as by a denoiser, costs no sample: the state is told before it is dropped.
+#[test]
+fn a_look_that_fails_leaves_the_samples() {
+    let scene = Arc::new(cornell_box());
+    let tracer = PathTracer::new(Arc::clone(&scene), trace_settings(16, 16, 1));
+    let mut settings = loop_settings(scene.nits_per_unit, Sampling::Adaptive, 1.0, None);
+    settings.model = Some(Box::new(Blind));
+    for leaves in [false, true] {
+        let monitor = Failures { leaves, ..Failures::default() };
+        let error = render(&tracer, &settings, &monitor).expect_err("nobody sees").to_string();
+        assert!(error.contains("the eye"), "{error}");
+        let kept = monitor.kept.into_inner().expect("one thread").expect("told");
+        assert_eq!(kept.film.total_samples(), 16 * 16 * 16);
     }
 }
 
