@@ -17,6 +17,7 @@ mod missed;
 mod monitor;
 mod next;
 pub mod plan;
+mod progress;
 pub mod pursuit;
 pub mod rivals;
 pub mod settings;
@@ -36,6 +37,7 @@ use audit::Audit;
 use awake::with_threads_awake;
 use judge::{JudgeError, Judgement, judge, judge_to_plan};
 use plan::slices;
+use progress::progress;
 use settings::{LoopSettings, Sampling};
 use state::{RenderState, Seconds};
 use std::collections::VecDeque;
@@ -370,34 +372,4 @@ pub(crate) fn beginning(blocks: &[BlockWork], most_samples: u64) -> &[BlockWork]
     };
     let count = if most_samples == u64::MAX { blocks.len() } else { blocks.iter().take_while(within).count() };
     &blocks[..count.max(1).min(blocks.len())]
-}
-
-fn progress(render: &Loop<'_>, judgement: &Judgement, step: &Step) -> Progress {
-    let Loop { state: RenderState { film, looks, .. }, settings, rungs, .. } = render;
-    let pixels = f64::from(film.width()) * f64::from(film.height());
-    let target = settings.limits.last_rung();
-    let by_budget = settings
-        .limits
-        .mean_samples
-        .map_or(f64::INFINITY, |mean| f64::from(mean) * pixels - film.total_samples() as f64);
-    let by_visibility: f64 = (0..judgement.predicted.values().len())
-        .map(|i| {
-            let excess = f64::from(judgement.predicted.values()[i]) / target;
-            f64::from(film.samples(i)) * (excess * excess - 1.0).max(0.0)
-        })
-        .sum();
-    let remaining = by_budget.min(by_visibility);
-    Progress {
-        look: *looks,
-        seconds: render.seconds(),
-        rung: rungs.front().copied().unwrap_or(target),
-        pixels,
-        mean_samples: film.total_samples() as f64 / pixels,
-        visible_share: judgement.is_known.then(|| visible_share(judgement, settings.limits.visibility_or_threshold())),
-        next_samples: match step {
-            Step::Trace(plan) => plan.samples(),
-            Step::Stop(_) => 0,
-        },
-        remaining_samples: remaining,
-    }
 }

@@ -6,7 +6,7 @@
 
 mod blocks;
 
-pub(super) use blocks::{blocks_between, share_of_half};
+pub(super) use blocks::{blocks_between, share_of_half, slice_count};
 pub use blocks::{cut_to_budget, slices};
 
 use super::forecast::Forecast;

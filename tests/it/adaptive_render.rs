@@ -258,6 +258,44 @@ fn limits_end_a_render() {
     }
 }
 
+/// Notes how many samples each look says are left, for how many pixels.
+#[derive(Default)]
+struct Left(Mutex<Vec<f64>>);
+
+impl Monitor for Left {
+    fn looked(&self, progress: &Progress) {
+        self.0.lock().expect("one thread").push(progress.remaining_samples / progress.pixels);
+    }
+    fn samples_done(&self, _: u64) {}
+}
+
+/// What is left goes by the limit that comes first, and is nothing at the end: with 17 samples at most "about 6 h 35 min left" was said
+/// of a render that had ended. An odd limit is taken whole: adaptive sampling ended at 16.
+#[test]
+fn nothing_is_left_of_a_render_that_ends() {
+    let scene = Arc::new(cornell_box());
+    let tracer = PathTracer::new(Arc::clone(&scene), trace_settings(16, 16, 1));
+    for (sampling, max_samples, plans, most_left) in [
+        (Sampling::Adaptive, 17, None, 1.0),
+        (Sampling::Uniform, 17, None, 1.0),
+        (Sampling::Uniform, 1 << 18, Some(1), 0.0),
+        (Sampling::Uniform, 1 << 18, Some(3), 2.0),
+    ] {
+        let mut settings = loop_settings(scene.nits_per_unit, sampling, 0.01, None);
+        (settings.limits.max_samples, settings.limits.plans) = (max_samples, plans);
+        let left = Left::default();
+        let film = render(&tracer, &settings, &left).expect("renders").film;
+        let left = left.0.into_inner().expect("one thread");
+        assert!(
+            left[0] <= most_left && left[left.len() - 1] == 0.0,
+            "{sampling:?} to {max_samples}, {plans:?}: {left:?}"
+        );
+        if max_samples == 17 {
+            assert!((0..16 * 16).all(|pixel| film.samples(pixel) == 17), "{sampling:?}");
+        }
+    }
+}
+
 /// Sees nothing.
 struct Blind;
 
