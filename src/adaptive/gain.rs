@@ -28,7 +28,7 @@ pub(super) fn most_worthwhile(plan: SamplePlan, film: &Film, judgement: &Judgeme
 
 /// Samples of a plan before the next look.
 fn most_at_once(film: &Film) -> u64 {
-    let pixels = f64::from(film.width()) * f64::from(film.height());
+    let pixels = film.pixel_count() as f64;
     (GROWTH * film.total_samples() as f64).max(LEAST_UNCUT * pixels) as u64
 }
 

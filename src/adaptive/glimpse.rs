@@ -150,7 +150,7 @@ impl Steady {
         let mut steady = Self { seen: Seen::of(&film, tracer, nits_per_unit), last_change: f32::INFINITY };
         let mut before = (levels(&steady.seen.rgb_cd_m2), made_of_it(&steady.seen));
         while 2 * film.total_samples() <= most_samples {
-            let pixels = u64::from(film.width()) * u64::from(film.height());
+            let pixels = film.pixel_count() as u64;
             let twice = uniform_plan(&film, (2 * film.total_samples() / pixels) as u32);
             tracer.trace(&twice, &mut film, &|_| {});
             steady.seen = Seen::of(&film, tracer, nits_per_unit);

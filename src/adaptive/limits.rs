@@ -32,7 +32,7 @@ impl Loop<'_> {
 
     /// Seconds of the first look: next to none at a raw picture.
     fn expected_look(&self, seconds_per_sample: f64) -> f64 {
-        let pixels = f64::from(self.state.film.width()) * f64::from(self.state.film.height());
+        let pixels = self.state.film.pixel_count() as f64;
         let samples = self.settings.denoiser.as_ref().map_or(0.0, samples_of_a_look);
         samples * pixels * seconds_per_sample
     }
@@ -43,7 +43,7 @@ impl Loop<'_> {
         /// One sample for so many pixels.
         const PIXELS_WORTH_A_LOOK: u64 = 16;
         let film = &self.state.film;
-        let pixels = u64::from(film.width()) * u64::from(film.height());
+        let pixels = film.pixel_count() as u64;
         let budget = self.settings.limits.mean_samples.map(|mean| u64::from(mean) * pixels);
         let left = budget.map_or(u64::MAX, |budget| budget.saturating_sub(film.total_samples()));
         if left < pixels / PIXELS_WORTH_A_LOOK { 0 } else { left }

@@ -17,6 +17,7 @@ mod missed;
 mod monitor;
 mod next;
 pub mod plan;
+mod progress;
 pub mod pursuit;
 pub mod rivals;
 pub mod settings;
@@ -37,6 +38,7 @@ use audit::Audit;
 use awake::with_threads_awake;
 use judge::{JudgeError, Judgement, judge, judge_to_plan};
 use plan::slices;
+use progress::progress;
 use settings::{LoopSettings, Sampling};
 use state::{RenderState, Seconds};
 use std::cell::OnceCell;
@@ -137,7 +139,8 @@ struct Looked {
 /// Renders until a limit is reached.
 ///
 /// # Errors
-/// If the denoiser fails, or the perception model refuses the picture, which would be a defect of ours.
+/// If the denoiser fails, or the perception model refuses the picture, which would be a defect of ours; and
+/// [`JudgeError::Outdated`] where [`LoopSettings::is_outdated`] ends the last look.
 pub fn render(tracer: &PathTracer, settings: &LoopSettings, monitor: &dyn Monitor) -> Result<Rendered, JudgeError> {
     let Crop { width, height, .. } = tracer.settings().film_area();
     resume(tracer, settings, RenderState::new(width, height, &settings.limits), monitor)
@@ -146,7 +149,7 @@ pub fn render(tracer: &PathTracer, settings: &LoopSettings, monitor: &dyn Monito
 /// Goes on with a render of the same scene, size and seed until a limit is reached. Limits count from the first start.
 ///
 /// # Errors
-/// If the denoiser fails, or the perception model refuses the picture, which would be a defect of ours.
+/// As of [`render`].
 pub fn resume(
     tracer: &PathTracer,
     settings: &LoopSettings,
@@ -157,7 +160,7 @@ pub fn resume(
     let LastLook { judgement, stop_reason } = match last_look {
         Some(last_look) => last_look,
         None => {
-            let judgement = judge(&state.film, settings, state.inflation)?;
+            let judgement = judge(&state.film, settings, state.inflation).inspect_err(|_| monitor.failed(&state))?;
             let Judgement { seconds, seconds_denoising: denoising, .. } = judgement;
             state.seconds += Seconds { total: seconds, perception: seconds, allocation: 0.0, denoising };
             LastLook { judgement, stop_reason: StopReason::Interrupted }
@@ -178,10 +181,13 @@ pub fn run(
     monitor: &dyn Monitor,
 ) -> Result<Ended, JudgeError> {
     let mut render = Loop::new(tracer, settings, state);
-    match render.until_end(monitor) {
-        Ok(Some(LastLook { judgement, stop_reason })) => render.finish(judgement, stop_reason, monitor),
+    match render.until_last_look(monitor) {
+        Ok(Some(LastLook { judgement, stop_reason })) => Ok(render.end(judgement, stop_reason, monitor)),
         Ok(None) | Err(JudgeError::Outdated) => Ok(Ended { state: render.state, last_look: None }),
-        Err(error) => Err(error),
+        Err(error) => {
+            monitor.failed(&render.state);
+            Err(error)
+        }
     }
 }
 
@@ -194,11 +200,11 @@ pub enum Next {
     Ended(Box<Ended>),
 }
 
-/// One look of [`run`]'s loop at a state all of whose plans are traced, for somebody who traces elsewhere. Limits of time
-/// and plans are not looked at.
+/// One look of [`run`]'s loop at a state all of whose plans are traced, for somebody who traces elsewhere and has the state's file.
+/// Limits of time and plans are not looked at.
 ///
 /// # Errors
-/// If the denoiser fails, or the perception model refuses the picture, which would be a defect of ours.
+/// As of [`render`].
 pub fn decide(
     tracer: &PathTracer,
     settings: &LoopSettings,
@@ -211,7 +217,8 @@ pub fn decide(
         let mut judgement = render.look(judge_to_plan)?;
         let step = render.next_step(&mut judgement)?;
         if let Some(reason) = render.take(step, &judgement, look, monitor) {
-            return Ok(Next::Ended(Box::new(render.finish(judgement, reason, monitor)?)));
+            let judgement = render.last_judgement(judgement)?;
+            return Ok(Next::Ended(Box::new(render.end(judgement, reason, monitor))));
         }
     }
     render.state.seconds.total = render.seconds();
@@ -238,7 +245,7 @@ impl<'a> Loop<'a> {
     }
 
     /// Traces, looks and plans in turn; `None` if the monitor leaves the render.
-    fn until_end(&mut self, monitor: &dyn Monitor) -> Result<Option<LastLook>, JudgeError> {
+    fn until_last_look(&mut self, monitor: &dyn Monitor) -> Result<Option<LastLook>, JudgeError> {
         let mut last_look: Option<Judgement> = None;
         loop {
             let ended = match self.trace_pending(monitor) {
@@ -254,7 +261,9 @@ impl<'a> Loop<'a> {
             let (judgement, step) = with_threads_awake(|| self.look_and_decide(earlier, ended))?;
             match self.take(step, &judgement, look, monitor) {
                 None => last_look = Some(judgement),
-                Some(stop_reason) => return Ok(Some(LastLook { judgement, stop_reason })),
+                Some(stop_reason) => {
+                    return Ok(Some(LastLook { judgement: self.last_judgement(judgement)?, stop_reason }));
+                }
             }
         }
     }
@@ -342,16 +351,18 @@ impl<'a> Loop<'a> {
         self.looked.is_some_and(|looked| looked.at_samples == self.state.film.total_samples())
     }
 
-    /// Tells the last state, and looks once more where the rule did not need to.
-    fn finish(mut self, judgement: Judgement, reason: StopReason, monitor: &dyn Monitor) -> Result<Ended, JudgeError> {
-        let judgement = match self.settings.sampling {
-            Sampling::Rival(_) if !self.is_looked_at() => {
-                let last = self.look(judge)?;
-                self.state.seconds.perception += last.seconds;
-                last
-            }
-            _ => judgement,
-        };
+    /// Looks once more where the rule did not need to.
+    fn last_judgement(&mut self, judgement: Judgement) -> Result<Judgement, JudgeError> {
+        if !matches!(self.settings.sampling, Sampling::Rival(_)) || self.is_looked_at() {
+            return Ok(judgement);
+        }
+        let last = self.look(judge)?;
+        self.state.seconds.perception += last.seconds;
+        Ok(last)
+    }
+
+    /// Tells the last state.
+    fn end(mut self, judgement: Judgement, reason: StopReason, monitor: &dyn Monitor) -> Ended {
         self.state.seconds.total = self.seconds();
         self.state.tone = Some(judgement.tone.save());
         // With other limits they may be reached.
@@ -361,7 +372,7 @@ impl<'a> Loop<'a> {
             self.state.until_look = Some(UntilLook::at_once(&self.state.film));
         }
         monitor.ended(&self.state, reason);
-        Ok(Ended { state: self.state, last_look: Some(LastLook { judgement, stop_reason: reason }) })
+        Ended { state: self.state, last_look: Some(LastLook { judgement, stop_reason: reason }) }
     }
 }
 
@@ -374,34 +385,4 @@ pub(crate) fn beginning(blocks: &[BlockWork], most_samples: u64) -> &[BlockWork]
     };
     let count = if most_samples == u64::MAX { blocks.len() } else { blocks.iter().take_while(within).count() };
     &blocks[..count.max(1).min(blocks.len())]
-}
-
-fn progress(render: &Loop<'_>, judgement: &Judgement, step: &Step) -> Progress {
-    let Loop { state: RenderState { film, looks, .. }, settings, rungs, .. } = render;
-    let pixels = f64::from(film.width()) * f64::from(film.height());
-    let target = settings.limits.last_rung();
-    let by_budget = settings
-        .limits
-        .mean_samples
-        .map_or(f64::INFINITY, |mean| f64::from(mean) * pixels - film.total_samples() as f64);
-    let by_visibility: f64 = (0..judgement.predicted.values().len())
-        .map(|i| {
-            let excess = f64::from(judgement.predicted.values()[i]) / target;
-            f64::from(film.samples(i)) * (excess * excess - 1.0).max(0.0)
-        })
-        .sum();
-    let remaining = by_budget.min(by_visibility);
-    Progress {
-        look: *looks,
-        seconds: render.seconds(),
-        rung: rungs.front().copied().unwrap_or(target),
-        pixels,
-        mean_samples: film.total_samples() as f64 / pixels,
-        visible_share: judgement.is_known.then(|| visible_share(judgement, settings.limits.visibility_or_threshold())),
-        next_samples: match step {
-            Step::Trace(plan) => plan.samples(),
-            Step::Stop(_) => 0,
-        },
-        remaining_samples: remaining,
-    }
 }

@@ -54,6 +54,8 @@ pub trait Monitor: Sync {
     }
     /// At the end, with what a render to another limit would go on from.
     fn ended(&self, _state: &RenderState, _reason: StopReason) {}
+    /// When a look of [`super::run`] fails, with what a render could go on from: who called it does not get the state.
+    fn failed(&self, _state: &RenderState) {}
 }
 
 /// Tells nobody.

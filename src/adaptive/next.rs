@@ -56,7 +56,7 @@ impl Loop<'_> {
             });
         }
         // Less than a sample a pixel is as good as spent.
-        let pixels = u64::from(self.state.film.width()) * u64::from(self.state.film.height());
+        let pixels = self.state.film.pixel_count() as u64;
         let mut is_spent = left < pixels;
         let target = limits.last_rung();
         if self.rungs.is_empty() && !is_reached(judgement, target) {
@@ -143,7 +143,7 @@ impl Loop<'_> {
     fn is_hardly_more_than_pilot(&self, left: u64) -> bool {
         const WORTH_A_LOOK: f64 = 4.0 * SAMPLES_OF_A_RAW_LOOK;
         let (film, limits) = (&self.state.film, &self.settings.limits);
-        let pixels = u64::from(film.width()) * u64::from(film.height());
+        let pixels = film.pixel_count() as u64;
         let is_by_sight = self.settings.denoiser.is_none() && !matches!(self.settings.sampling, Sampling::Rival(_));
         is_by_sight
             && left > 0
@@ -157,7 +157,7 @@ impl Loop<'_> {
     fn doubled(&self) -> u32 {
         let (film, limits) = (&self.state.film, &self.settings.limits);
         let most = limits.mean_samples.unwrap_or(limits.max_samples).min(limits.max_samples);
-        let pixels = u64::from(film.width()) * u64::from(film.height());
+        let pixels = film.pixel_count() as u64;
         (2 * (film.total_samples() / pixels).max(u64::from(limits.pilot_samples) / 2) as u32).min(most)
     }
 

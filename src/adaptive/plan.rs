@@ -6,7 +6,7 @@
 
 mod blocks;
 
-pub(super) use blocks::{blocks_between, share_of_half};
+pub(super) use blocks::{blocks_between, share_of_half, slice_count};
 pub use blocks::{cut_to_budget, slices};
 
 use super::forecast::Forecast;
@@ -51,7 +51,7 @@ pub fn pilot_plan(film: &Film, most_samples: u32) -> SamplePlan {
     for [from, to] in [[0, FIRST_PASS_SAMPLES], [FIRST_PASS_SAMPLES, PILOT_SAMPLES]] {
         for half in Half::BOTH {
             let to = to.min(share_of_half(samples, half));
-            for pixel in 0..film.width() * film.height() {
+            for pixel in 0..film.pixel_count() as u32 {
                 let first = film.half(half)[pixel as usize].taken.max(from);
                 if first < to {
                     plan.blocks.push(BlockWork { first, samples: to - first, ..BlockWork::whole(pixel, half, 0) });
@@ -65,7 +65,7 @@ pub fn pilot_plan(film: &Film, most_samples: u32) -> SamplePlan {
 /// Doubles every pixel, up to `mean_samples` a pixel in all. Empty when they are there.
 pub fn uniform_plan(film: &Film, mean_samples: u32) -> SamplePlan {
     let mut plan = SamplePlan::default();
-    for pixel in 0..film.width() * film.height() {
+    for pixel in 0..film.pixel_count() as u32 {
         for half in Half::BOTH {
             let taken = film.half(half)[pixel as usize].taken;
             plan.blocks.extend(blocks_between(pixel, half, taken, share_of_half(mean_samples, half)).next());
@@ -76,10 +76,9 @@ pub fn uniform_plan(film: &Film, mean_samples: u32) -> SamplePlan {
 
 /// As many more samples for every pixel, `samples` in all.
 pub(super) fn even_plan(film: &Film, samples: u64) -> SamplePlan {
-    let pixels = film.width() * film.height();
-    let more = samples.div_ceil(u64::from(pixels).max(1)) as u32;
+    let more = samples.div_ceil(film.pixel_count().max(1) as u64) as u32;
     let mut plan = SamplePlan::default();
-    for pixel in 0..pixels {
+    for pixel in 0..film.pixel_count() as u32 {
         for half in Half::BOTH {
             let taken = film.half(half)[pixel as usize].taken;
             plan.blocks.extend(blocks_between(pixel, half, taken, taken.saturating_add(share_of_half(more, half))));
@@ -92,7 +91,7 @@ pub(super) fn even_plan(film: &Film, samples: u64) -> SamplePlan {
 /// What a film lacks of so many samples of each pixel, as many blocks as that takes.
 pub(super) fn plan_up_to(film: &Film, wanted_samples: impl Fn(usize) -> u32) -> SamplePlan {
     let mut plan = SamplePlan::default();
-    for pixel in 0..(film.width() * film.height()) as usize {
+    for pixel in 0..film.pixel_count() {
         let wanted_samples = wanted_samples(pixel);
         for half in Half::BOTH {
             let taken = film.half(half)[pixel].taken;
@@ -181,7 +180,7 @@ pub(super) fn adaptive_plan(
             doublings_of_halves(film, pixel, wanted.samples.values()[pixel], pooled, own, haste)
         })
     };
-    let pixels = f64::from(film.width()) * f64::from(film.height());
+    let pixels = film.pixel_count() as f64;
     let is_cheap = |plan: &SamplePlan| plan.samples() as f64 <= SAMPLES_OF_A_RAW_LOOK * pixels;
     let mut best = plan_of(Haste::NONE);
     // What comes in haste holds all of it.
@@ -242,7 +241,7 @@ pub fn doubling_of(film: &Film, max_samples: u32, excess: impl Fn(usize) -> f64 
         let needed = (2.0 * excess.log2()).ceil() + 1.0;
         if excess > 1.0 { needed.min(f64::from(most)) as u32 } else { 0 }
     };
-    let pixels = (film.width() * film.height()) as usize;
+    let pixels = film.pixel_count();
     // Counted before it is made: four doublings of a whole picture would be hundreds of megabytes.
     let cost = |most: u32| -> u64 {
         (0..pixels).map(|pixel| ((1 << doublings(pixel, most)) - 1) * u64::from(film.samples(pixel))).sum()
@@ -261,7 +260,7 @@ pub(super) fn doubling_plan(film: &Film, max_samples: u32, doublings: impl Fn(us
             doubled_blocks(pixel as u32, half, taken, max_samples).take(doublings[half.index()] as usize)
         })
     };
-    let pixels = (film.width() * film.height()) as usize;
+    let pixels = film.pixel_count();
     let blocks = (0..pixels).into_par_iter().with_min_len(PIXELS_A_TASK).flat_map_iter(of_pixel).collect();
     SamplePlan { blocks }
 }

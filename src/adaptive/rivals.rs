@@ -43,7 +43,7 @@ pub fn rival_plan(rule: RivalRule, film: &Film, exposure: f64, left: u64, max_sa
 
 /// Why [`rival_plan`] has none: with the same arguments it was empty.
 pub fn rival_stop(rule: RivalRule, film: &Film, exposure: f64, left: u64) -> StopReason {
-    let pixels = u64::from(film.width()) * u64::from(film.height());
+    let pixels = film.pixel_count() as u64;
     if rule == RivalRule::Budget && left < pixels {
         return StopReason::Samples;
     }
@@ -108,7 +108,7 @@ fn variance_active(film: &Film, threshold: f64, exposure: f64) -> Vec<bool> {
 /// One pass of Tungsten's: as many samples as 16 a pixel, one everywhere and the others in proportion to each record's
 /// error, which is clamped at its 95th percentile and dilated; fractions are rounded by chance.
 fn budget_pass(film: &Film, exposure: f64, left: u64, max_samples: u32) -> SamplePlan {
-    let pixels = film.width() as usize * film.height() as usize;
+    let pixels = film.pixel_count();
     let pass = left.min(u64::from(STEP) * pixels as u64);
     let mut plan = SamplePlan::default();
     if pass < pixels as u64 {

@@ -55,7 +55,7 @@ pub struct UntilLook {
 impl UntilLook {
     /// Before the first look.
     pub(super) fn first(film: &Film) -> Self {
-        let pixels = (film.width() * film.height()) as usize;
+        let pixels = film.pixel_count();
         let earliest = LEAST_SAMPLES_BETWEEN_LOOKS * pixels as f64;
         let latest = (1.0 + MOST_GROWTH) * earliest;
         Self { to_blame: vec![true; pixels], earliest: earliest as u64, latest: latest as u64 }
@@ -64,7 +64,7 @@ impl UntilLook {
     /// A look before anything more is traced: whoever goes on from a film that a look has ended must see what that one saw.
     pub(super) fn at_once(film: &Film) -> Self {
         let now = film.total_samples();
-        Self { to_blame: vec![true; (film.width() * film.height()) as usize], earliest: now, latest: now }
+        Self { to_blame: vec![true; film.pixel_count()], earliest: now, latest: now }
     }
 
     /// After a look, while some of the picture is above `visibility`: until that may be reached, if errors fell as 1/n (measured

@@ -112,7 +112,7 @@ fn check(header: &Header, state: &RenderState) -> Result<(), &'static str> {
     {
         return Err("its figures make no sense");
     }
-    let pixels = state.film.width() * state.film.height();
+    let pixels = state.film.pixel_count() as u32;
     if state.traced_blocks > state.pending.front().map_or(0, |plan| plan.blocks.len())
         || !state.pending.iter().flat_map(|plan| &plan.blocks).all(|block| block.is_sound(pixels))
         || !state.until_look.as_ref().is_none_or(|until_look| until_look.is_sound(pixels))

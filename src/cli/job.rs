@@ -234,7 +234,7 @@ impl JobArguments {
             settings.importance = Some(map);
         }
         check_rule(self)?;
-        check_filter(self, trace.filter, settings.sampling)?;
+        check_filter(trace.filter, &settings)?;
         Ok(Prepared { scene: Arc::new(scene), trace, record, settings, whole: None })
     }
 }

@@ -223,6 +223,11 @@ impl Keeper {
         history.last_chance = Instant::now();
     }
 
+    /// Writes the last state.
+    fn ended(&self, state: &RenderState) {
+        self.write(state, &mut self.history.lock().unwrap_or_else(PoisonError::into_inner));
+    }
+
     /// A file that cannot be written must not end a render of hours: it is told at once and again at the end.
     fn write(&self, state: &RenderState, history: &mut History) {
         let snapshot = Instant::now();
@@ -350,7 +355,13 @@ impl Monitor for Watch<'_> {
             tev.ended(state);
         }
         if let Some(keeper) = &self.keeper {
-            keeper.write(state, &mut keeper.history.lock().unwrap_or_else(PoisonError::into_inner));
+            keeper.ended(state);
+        }
+    }
+
+    fn failed(&self, state: &RenderState) {
+        if let Some(keeper) = &self.keeper {
+            keeper.ended(state);
         }
     }
 }
@@ -390,6 +401,19 @@ mod tests {
             denoiser: None,
         };
         Header::begun(origin, 0, settings, 1.0)
+    }
+
+    /// Samples outlive a look that fails.
+    #[test]
+    fn what_fails_is_kept() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let film = folder.path().join("film");
+        let arguments =
+            CheckpointArguments { checkpoint: Some(film.clone()), checkpoint_every: Some(EVERY), resume: false };
+        let keeper = Keeper::new(&arguments, header(), SeedsSoFar::of_one(0));
+        let watch = Watch::new(Arc::default(), Console::new(None), Some(keeper), None, None);
+        watch.failed(&RenderState::new(1, 1, &Limits::of_visibility(1.0)));
+        read_checkpoint(&film).expect("kept");
     }
 
     /// What cannot be written is tried again as often as it would have been written, and not at every batch.

@@ -24,6 +24,7 @@ mod report;
 mod seeing;
 mod signals;
 mod staging;
+mod system_memory;
 mod targets;
 mod tev;
 mod threads;

@@ -12,8 +12,9 @@ use super::targets::{Named, check_kept, check_scene_kept};
 use super::tev::{Showing, TevArguments};
 use super::view::audience;
 use super::words::in_a_line;
-use anyhow::bail;
+use anyhow::{anyhow, bail};
 use clap::Args;
+use fechner::adaptive::judge::JudgeError;
 use fechner::adaptive::settings::LoopSettings;
 use fechner::adaptive::state::RenderState;
 use fechner::adaptive::{self, Rendered, StopReason};
@@ -108,8 +109,12 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     }
     let tev = arguments.tev.open(&arguments.job.scene_name())?.map(|tev| Showing::new(tev, settings.nits_per_unit));
     let watch = Watch::new(stop, Console::new(settings.limits.time), keeper, audience, tev);
-    let rendered = adaptive::resume(&tracer, &settings, state, &watch)?;
+    let rendered = adaptive::resume(&tracer, &settings, state, &watch);
     watch.finish();
+    let rendered = match rendered {
+        Ok(rendered) => rendered,
+        Err(error) => return Err(failed(&error, watch)),
+    };
     let seeds = &seeds.of(&rendered.film).all;
     let report = Report::new(&arguments.job.scene_name(), seeds, &settings, &rendered);
     let background = arguments.job.background();
@@ -129,6 +134,14 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     }
     all_written([picture, maps, figures, watch.report()])?;
     Ok(if is_unfinished { ExitCode::from(CALL_AGAIN) } else { ExitCode::SUCCESS })
+}
+
+/// What ended a render without a picture; its film is kept, or that it is not is said as well.
+fn failed(error: &JudgeError, watch: Watch<'_>) -> anyhow::Error {
+    match watch.report() {
+        Ok(()) => anyhow!("{error}"),
+        Err(lost) => anyhow!("{error}; {}", in_a_line(&lost)),
+    }
 }
 
 /// All that could not be written, in one error: each file is tried, whatever became of the others.

@@ -5,6 +5,7 @@ mod summary;
 pub(super) use summary::{Interrupter, summary};
 
 use super::console::duration_in_words;
+use super::system_memory;
 use fechner::adaptive::judge::Judgement;
 use fechner::adaptive::pursuit::Pursuit;
 use fechner::adaptive::settings::{LoopSettings, RivalRule, Sampling};
@@ -164,7 +165,7 @@ impl Report {
     /// `seeds`: all whose samples are in the film, at least one.
     pub(super) fn new(scene: &str, seeds: &[u64], settings: &LoopSettings, rendered: &Rendered) -> Self {
         let film = &rendered.film;
-        let pixels = u64::from(film.width()) * u64::from(film.height());
+        let pixels = film.pixel_count() as u64;
         let judgement = &rendered.judgement;
         let target = settings.limits.visibility;
         let predicted = judgement.is_known.then_some(&judgement.predicted);
@@ -213,7 +214,7 @@ impl Report {
             display: output::display_attribute(&settings.viewing.display),
             tone: output::tone_attribute(judgement.tone.as_ref()),
             nonfinite_samples: film.nonfinite_samples,
-            peak_memory_bytes: peak_memory_bytes(),
+            peak_memory_bytes: system_memory::peak_bytes(),
             plans: rendered.plans,
             stop_reason: stop_reason_name(rendered.stop_reason),
         }
@@ -327,13 +328,6 @@ fn patches_noticed(visibility: &Plane, display: &Display) -> f64 {
     let mean = visibility.values().iter().map(|&v| detection_probability(f64::from(v))).sum::<f64>()
         / visibility.values().len() as f64;
     mean * patch_count(visibility, display)
-}
-
-/// Peak resident memory as Linux states it; `None` elsewhere.
-fn peak_memory_bytes() -> Option<u64> {
-    let text = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = text.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
-    line.trim().trim_end_matches("kB").trim().parse::<u64>().ok().map(|kib| kib * 1024)
 }
 
 #[cfg(test)]

@@ -84,7 +84,7 @@ impl Showing {
         let Moving { tev, looked } = moving;
         let (film, nits_per_unit) = (&state.film, self.nits_per_unit);
         let raw = || {
-            let pixels = film.width() as usize * film.height() as usize;
+            let pixels = film.pixel_count();
             (0..pixels).map(|pixel| film.rgb_cd_m2(pixel, nits_per_unit)).collect()
         };
         // Denoised pictures are made by looks; between two the last one stays.

@@ -126,6 +126,11 @@ impl Film {
         self.height
     }
 
+    /// Its pixels.
+    pub fn pixel_count(&self) -> usize {
+        self.guides.len()
+    }
+
     /// One half, row-major.
     pub fn half(&self, half: Half) -> &[HalfPixel] {
         &self.halves[half.index()]

@@ -9,9 +9,11 @@ use fechner::adaptive::{Directive, Monitor, Progress, Quiet, Rendered, StopReaso
 use fechner::integrator::PathTracer;
 use fechner::scene::Scene;
 use fechner::scene::load::{LoadOptions, load};
+use fechner_perception::model::{ModelInputs, ThresholdModel};
+use fechner_perception::{Error, Plane};
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 /// What the scene file says.
@@ -253,6 +255,91 @@ fn limits_end_a_render() {
         settings.sampling = sampling;
         let capped = render(&tracer, &settings, &Quiet).expect("renders");
         assert_eq!(capped.stop_reason, fechner::adaptive::StopReason::MaxSamples, "{sampling:?}");
+    }
+}
+
+/// Notes how many samples each look says are left, for how many pixels.
+#[derive(Default)]
+struct Left(Mutex<Vec<f64>>);
+
+impl Monitor for Left {
+    fn looked(&self, progress: &Progress) {
+        self.0.lock().expect("one thread").push(progress.remaining_samples / progress.pixels);
+    }
+    fn samples_done(&self, _: u64) {}
+}
+
+/// What is left goes by the limit that comes first, and is nothing at the end: with 17 samples at most "about 6 h 35 min left" was said
+/// of a render that had ended. An odd limit is taken whole: adaptive sampling ended at 16.
+#[test]
+fn nothing_is_left_of_a_render_that_ends() {
+    let scene = Arc::new(cornell_box());
+    let tracer = PathTracer::new(Arc::clone(&scene), trace_settings(16, 16, 1));
+    for (sampling, max_samples, plans, most_left) in [
+        (Sampling::Adaptive, 17, None, 1.0),
+        (Sampling::Uniform, 17, None, 1.0),
+        (Sampling::Uniform, 1 << 18, Some(1), 0.0),
+        (Sampling::Uniform, 1 << 18, Some(3), 2.0),
+    ] {
+        let mut settings = loop_settings(scene.nits_per_unit, sampling, 0.01, None);
+        (settings.limits.max_samples, settings.limits.plans) = (max_samples, plans);
+        let left = Left::default();
+        let film = render(&tracer, &settings, &left).expect("renders").film;
+        let left = left.0.into_inner().expect("one thread");
+        assert!(
+            left[0] <= most_left && left[left.len() - 1] == 0.0,
+            "{sampling:?} to {max_samples}, {plans:?}: {left:?}"
+        );
+        if max_samples == 17 {
+            assert!((0..16 * 16).all(|pixel| film.samples(pixel) == 17), "{sampling:?}");
+        }
+    }
+}
+
+/// Sees nothing.
+struct Blind;
+
+impl ThresholdModel for Blind {
+    fn name(&self) -> &'static str {
+        "blind"
+    }
+
+    fn allowed_standard_error_cd_m2(&self, _: &ModelInputs<'_>) -> Result<Plane, Error> {
+        Err(Error::Empty { what: "the eye" })
+    }
+}
+
+/// Keeps what a render that failed could go on from, or leaves it at once.
+#[derive(Default)]
+struct Failures {
+    kept: Mutex<Option<RenderState>>,
+    leaves: bool,
+}
+
+impl Monitor for Failures {
+    fn looked(&self, _: &Progress) {}
+    fn samples_done(&self, _: u64) {}
+    fn between_batches(&self, _: &RenderState) -> Directive {
+        if self.leaves { Directive::Leave } else { Directive::GoOn }
+    }
+    fn failed(&self, state: &RenderState) {
+        *self.kept.lock().expect("one thread") = Some(state.clone());
+    }
+}
+
+/// A look that fails, as by a denoiser, costs no sample: the state is told before it is dropped.
+#[test]
+fn a_look_that_fails_leaves_the_samples() {
+    let scene = Arc::new(cornell_box());
+    let tracer = PathTracer::new(Arc::clone(&scene), trace_settings(16, 16, 1));
+    let mut settings = loop_settings(scene.nits_per_unit, Sampling::Adaptive, 1.0, None);
+    settings.model = Some(Box::new(Blind));
+    for leaves in [false, true] {
+        let monitor = Failures { leaves, ..Failures::default() };
+        let error = render(&tracer, &settings, &monitor).expect_err("nobody sees").to_string();
+        assert!(error.contains("the eye"), "{error}");
+        let kept = monitor.kept.into_inner().expect("one thread").expect("told");
+        assert_eq!(kept.film.total_samples(), 16 * 16 * 16);
     }
 }
 

@@ -482,9 +482,14 @@ fn impossible_pictures_are_refused() {
         arguments.extend(extra);
         arguments.iter().map(|a| (*a).to_owned()).collect::<Vec<_>>()
     };
-    let cases: [(&[&'static str], &[&str]); 5] = [
+    let cases: [(&[&'static str], &[&str]); 6] = [
         (&["--filter", "mitchell"], &["negative lobes", "--sampling uniform", "blackman-harris"]),
-        (&["--filter", "mitchell", "--sampling", "uniform", "--quality", "draft"], &["no visibility can be asked for"]),
+        (
+            &["--filter", "mitchell", "--sampling", "uniform", "--quality", "draft"],
+            &["no visibility can end it", "--spp"],
+        ),
+        // The scene's was obeyed.
+        (&["--filter", "mitchell", "--sampling", "uniform"], &["no visibility can end it", "--spp"]),
         (&["--filter", "mitchell", "--sampling", "uniform", "--transparent"], &["alpha knows nothing of"]),
         (&["--crop", "20,0,20,10"], &["--crop 20,0,20,10 reaches beyond the picture of 32x32 pixels"]),
         (&["--crop", "1,2,3"], &["expected X,Y,WIDTH,HEIGHT"]),
@@ -494,6 +499,9 @@ fn impossible_pictures_are_refused() {
         let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
         assert_refused(&arguments, folder.path(), fragments);
     }
+    // More pixels than memory can be counted for: "17179863584.0 GiB".
+    let endless = ["render", scene, "-o", "out.png", "--size", "4294967295x4294967295"];
+    assert_refused(&endless, folder.path(), &["more than the 2147483647 pixels", "smaller --size"]);
     let run = fechner()
         .args(with(&["--filter", "mitchell", "--sampling", "uniform", "--spp", "4", "--crop", "4,4,8,8"]))
         .current_dir(folder.path())

@@ -28,7 +28,7 @@ pub(in crate::adaptive) fn share_of_half(samples: u32, half: Half) -> u32 {
     }
 }
 
-/// The blocks that double a half of a pixel again and again, the last of them up to its half of `max_samples`.
+/// The blocks that double a half of a pixel again and again, the last of them up to its share of `max_samples`.
 pub(super) fn doubled_blocks(
     pixel: u32,
     half: Half,
@@ -38,7 +38,7 @@ pub(super) fn doubled_blocks(
     std::iter::from_fn(move || {
         let rest = BlockWork::rest(pixel, half, taken);
         // A pilot may have been a part of the first block.
-        let samples = rest.samples.min(taken.max(1)).min((max_samples / 2).saturating_sub(taken));
+        let samples = rest.samples.min(taken.max(1)).min(share_of_half(max_samples, half).saturating_sub(taken));
         taken += samples;
         (samples > 0).then_some(BlockWork { samples, ..rest })
     })
@@ -50,12 +50,10 @@ pub(super) fn doubled_blocks(
 pub fn slices(plan: SamplePlan, width: u32, traced_samples: u64) -> Vec<SamplePlan> {
     /// Order in which the pixels of a 4×4 block are visited: neighbours far apart in time (Bayer 1973).
     const BAYER: [[usize; 4]; 4] = [[0, 8, 2, 10], [12, 4, 14, 6], [3, 11, 1, 9], [15, 7, 13, 5]];
-    let eighths = plan.samples() / (traced_samples / 8).max(1);
-    let count = match eighths {
-        0..=1 => return vec![plan],
-        2..=4 => 4,
-        _ => 16,
-    };
+    let count = slice_count(plan.samples(), traced_samples);
+    if count == 1 {
+        return vec![plan];
+    }
     let mut slices = vec![SamplePlan::default(); count];
     for block in plan.blocks {
         let (x, y) = (block.pixel % width, block.pixel / width);
@@ -64,6 +62,16 @@ pub fn slices(plan: SamplePlan, width: u32, traced_samples: u64) -> Vec<SamplePl
     }
     slices.retain(|s| !s.blocks.is_empty());
     slices
+}
+
+/// How many [`slices`] a plan of so many samples is cut into, where no slice is empty.
+pub(in crate::adaptive) fn slice_count(samples: u64, traced_samples: u64) -> usize {
+    let eighths = samples / (traced_samples / 8).max(1);
+    match eighths {
+        0..=1 => 1,
+        2..=4 => 4,
+        _ => 16,
+    }
 }
 
 /// Cuts a plan to a budget: the blocks of pixels with the largest `urgency` first.

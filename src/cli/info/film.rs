@@ -11,7 +11,7 @@ use std::fmt::Write as _;
 pub(super) fn describe(checkpoint: &Checkpoint) -> String {
     let Checkpoint { header, state } = checkpoint;
     let (origin, settings, film) = (&header.origin, &header.settings, &state.film);
-    let pixels = film.width() as usize * film.height() as usize;
+    let pixels = film.pixel_count();
     let counts = || (0..pixels).map(|pixel| film.samples(pixel));
     let (least, most) = (counts().min().unwrap_or(0), counts().max().unwrap_or(0));
     let pending: u64 = state.untraced_blocks().map(|block| u64::from(block.samples)).sum();

@@ -4,7 +4,7 @@ use super::JobArguments;
 use super::choices::{AllocationChoice, Quality, SamplingChoice};
 use crate::cli::seeing::{self, AskedPresentation, Presentation};
 use anyhow::bail;
-use fechner::adaptive::settings::{AllocationRule, Limits, RivalRule, Sampling, THRESHOLD};
+use fechner::adaptive::settings::{AllocationRule, Limits, LoopSettings, RivalRule, Sampling, THRESHOLD};
 use fechner::checkpoint::SettingsRecord;
 use fechner::sampler::PixelFilter;
 use fechner::scene::Scene;
@@ -109,26 +109,26 @@ pub(super) fn check_rule(arguments: &JobArguments) -> anyhow::Result<()> {
 }
 
 /// Refuses what a filter with negative lobes cannot go with.
-pub(super) fn check_filter(arguments: &JobArguments, filter: PixelFilter, sampling: Sampling) -> anyhow::Result<()> {
+pub(super) fn check_filter(filter: PixelFilter, settings: &LoopSettings) -> anyhow::Result<()> {
     if !filter.is_signed() {
         return Ok(());
     }
-    if sampling != Sampling::Uniform {
+    if settings.sampling != Sampling::Uniform {
         bail!(
             "--filter mitchell has negative lobes, whose scatter is not the picture's noise: adaptive sampling cannot \
              judge it; use --sampling uniform, or the filter blackman-harris"
         );
     }
-    if arguments.transparent {
+    if settings.is_transparent {
         bail!(
             "--filter mitchell has negative lobes, which alpha knows nothing of: a transparent picture would have fringes; use the \
              filter blackman-harris"
         );
     }
-    if arguments.visibility.is_some() || arguments.quality.is_some() {
+    if settings.limits.visibility.is_some() {
         bail!(
-            "--filter mitchell has negative lobes, whose scatter is not the picture's noise: no visibility can be asked \
-             for; say --spp, --time or --plans, or use the filter blackman-harris"
+            "--filter mitchell has negative lobes, whose scatter is not the picture's noise: no visibility can end it, asked \
+             for or the scene's; say --spp, --time or --plans instead, or use the filter blackman-harris"
         );
     }
     say!(
