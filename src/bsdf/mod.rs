@@ -346,7 +346,17 @@ impl<'a> Bsdf<'a> {
             Self::MetalRoughness(model) => model.straight_through(wo),
             Self::Varnish(model) => model.straight_through(wo),
             Self::Mix(model) => model.straight_through(wo),
-            _ => Vec3::ZERO,
+            Self::Lambert(_)
+            | Self::Mirror(_)
+            | Self::Conductor(_)
+            | Self::Dielectric(_)
+            | Self::OrenNayar(_)
+            | Self::DiffuseTransmission(_)
+            | Self::CoatedDiffuse(_)
+            | Self::CoatedConductor(_)
+            | Self::Phong(_)
+            | Self::Ward(_)
+            | Self::HeTorrance(_) => Vec3::ZERO,
         }
     }
 

@@ -374,6 +374,9 @@ impl<'a> Varnish<'a> {
         match &self.base {
             Varnished::Sheet(base) => {
                 let front = self.seen(wo).turned_if(wo.z < 0.0);
+                if !front.sides_agree() {
+                    return Vec3::ZERO;
+                }
                 let back = Seen { by_coat: -front.by_coat, by_base: -front.by_base };
                 base.straight_through(front.by_base) * self.passed(&front, &back)
             }

@@ -273,20 +273,12 @@ impl PathTracer {
         let scene = self.world.scene();
         let material_id = self.world.material_of(point.object).0 as usize;
         let material = &scene.materials[material_id];
-        let transmits = match &material.surface {
-            Surface::MetalRoughness(model) => model.transmission.factor > 0.0,
-            Surface::DiffuseTransmission { .. }
-            | Surface::Dielectric { .. }
-            | Surface::ThinDielectric { .. }
-            | Surface::Mix { .. } => true,
-            _ => false,
-        };
         Shading {
             bsdf,
             frame: frames.frame,
             normal: frames.normal,
             geometric_normal: point.geometric_normal,
-            transmits,
+            transmits: material.surface.transmits(),
             medium: if self.absorbs { Medium::behind(MaterialId(material_id as u32), &material.surface) } else { None },
         }
     }

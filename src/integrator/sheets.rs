@@ -28,7 +28,17 @@ fn may_be_a_sheet(surface: &Surface) -> bool {
             model.volume.is_none() && model.transmission.factor > 0.0 && may_be_smooth(&model.roughness)
         }
         Surface::Mix { first, second, .. } => may_be_a_sheet(first) || may_be_a_sheet(second),
-        _ => false,
+        Surface::Diffuse { .. }
+        | Surface::OrenNayar { .. }
+        | Surface::DiffuseTransmission { .. }
+        | Surface::Mirror { .. }
+        | Surface::Conductor { .. }
+        | Surface::Dielectric { .. }
+        | Surface::CoatedDiffuse { .. }
+        | Surface::CoatedConductor { .. }
+        | Surface::Phong { .. }
+        | Surface::Ward { .. }
+        | Surface::HeTorrance { .. } => false,
     }
 }
 

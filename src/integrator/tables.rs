@@ -77,7 +77,16 @@ impl Maker {
             Surface::Mix { first, second, .. } => {
                 SurfaceTables::Mix(Box::new([self.tables_of(first), self.tables_of(second)]))
             }
-            _ => SurfaceTables::None,
+            Surface::Dielectric { .. }
+            | Surface::MetalRoughness(_)
+            | Surface::Diffuse { .. }
+            | Surface::OrenNayar { .. }
+            | Surface::DiffuseTransmission { .. }
+            | Surface::Mirror { .. }
+            | Surface::ThinDielectric { .. }
+            | Surface::Phong { .. }
+            | Surface::Ward { .. }
+            | Surface::HeTorrance { .. } => SurfaceTables::None,
         }
     }
 

@@ -8,7 +8,7 @@ use glam::{Vec2, Vec3};
 /// it stays (KHR_materials_clearcoat). Not by the shading normal, which light sampling does not know.
 pub fn emitted(material: &Material, textures: &[Texture], uv: Vec2, cosine: f32) -> Vec3 {
     let radiance = material.emission.evaluate(textures, uv);
-    match has_coat(&material.surface) {
+    match material.surface.has_clearcoat() {
         true => radiance * passed_by_coat(&material.surface, textures, uv, cosine),
         false => radiance,
     }
@@ -18,16 +18,8 @@ pub fn emitted(material: &Material, textures: &[Texture], uv: Vec2, cosine: f32)
 pub(super) fn even_radiance(material: &Material) -> Option<Vec3> {
     let is_even = material.emission.texture.is_none()
         && matches!(material.alpha, Alpha::Opaque | Alpha::Unseen)
-        && !has_coat(&material.surface);
+        && !material.surface.has_clearcoat();
     is_even.then_some(material.emission.factor)
-}
-
-fn has_coat(surface: &Surface) -> bool {
-    match surface {
-        Surface::MetalRoughness(model) => model.clearcoat.factor > 0.0,
-        Surface::Mix { first, second, .. } => has_coat(first) || has_coat(second),
-        _ => false,
-    }
 }
 
 fn passed_by_coat(surface: &Surface, textures: &[Texture], uv: Vec2, cosine: f32) -> f32 {
@@ -40,6 +32,17 @@ fn passed_by_coat(surface: &Surface, textures: &[Texture], uv: Vec2, cosine: f32
             let [first, second] = [first, second].map(|part| passed_by_coat(part, textures, uv, cosine));
             first + (second - first) * amount.evaluate(textures, uv).clamp(0.0, 1.0)
         }
-        _ => 1.0,
+        Surface::Diffuse { .. }
+        | Surface::OrenNayar { .. }
+        | Surface::DiffuseTransmission { .. }
+        | Surface::Mirror { .. }
+        | Surface::Conductor { .. }
+        | Surface::Dielectric { .. }
+        | Surface::ThinDielectric { .. }
+        | Surface::CoatedDiffuse { .. }
+        | Surface::CoatedConductor { .. }
+        | Surface::Phong { .. }
+        | Surface::Ward { .. }
+        | Surface::HeTorrance { .. } => 1.0,
     }
 }

@@ -313,7 +313,57 @@ impl Surface {
             Self::Dielectric { absorption, .. } => Some(*absorption),
             Self::MetalRoughness(model) => model.volume,
             Self::Mix { first, second, .. } => first.interior_absorption().or_else(|| second.interior_absorption()),
-            _ => None,
+            Self::Diffuse { .. }
+            | Self::OrenNayar { .. }
+            | Self::DiffuseTransmission { .. }
+            | Self::Mirror { .. }
+            | Self::Conductor { .. }
+            | Self::ThinDielectric { .. }
+            | Self::CoatedDiffuse { .. }
+            | Self::CoatedConductor { .. }
+            | Self::Phong { .. }
+            | Self::Ward { .. }
+            | Self::HeTorrance { .. } => None,
+        }
+    }
+
+    /// Whether light from behind may come through.
+    pub fn transmits(&self) -> bool {
+        match self {
+            Self::DiffuseTransmission { .. }
+            | Self::Dielectric { .. }
+            | Self::ThinDielectric { .. }
+            | Self::Mix { .. } => true,
+            Self::MetalRoughness(model) => model.transmission.factor > 0.0,
+            Self::Diffuse { .. }
+            | Self::OrenNayar { .. }
+            | Self::Mirror { .. }
+            | Self::Conductor { .. }
+            | Self::CoatedDiffuse { .. }
+            | Self::CoatedConductor { .. }
+            | Self::Phong { .. }
+            | Self::Ward { .. }
+            | Self::HeTorrance { .. } => false,
+        }
+    }
+
+    /// Whether a clear coat, which keeps back some of what the surface emits, lies over any of it.
+    pub fn has_clearcoat(&self) -> bool {
+        match self {
+            Self::MetalRoughness(model) => model.clearcoat.factor > 0.0,
+            Self::Mix { first, second, .. } => first.has_clearcoat() || second.has_clearcoat(),
+            Self::Diffuse { .. }
+            | Self::OrenNayar { .. }
+            | Self::DiffuseTransmission { .. }
+            | Self::Mirror { .. }
+            | Self::Conductor { .. }
+            | Self::Dielectric { .. }
+            | Self::ThinDielectric { .. }
+            | Self::CoatedDiffuse { .. }
+            | Self::CoatedConductor { .. }
+            | Self::Phong { .. }
+            | Self::Ward { .. }
+            | Self::HeTorrance { .. } => false,
         }
     }
 
@@ -321,14 +371,23 @@ impl Surface {
     pub fn components(&self) -> usize {
         match self {
             Self::Mix { first, second, .. } => first.components() + second.components(),
-            Self::MetalRoughness(model) if model.volume.is_some() => {
-                if model.is_varnished() {
-                    3
-                } else {
-                    2
-                }
-            }
-            _ => 1,
+            Self::MetalRoughness(model) => match (model.volume.is_some(), model.is_varnished()) {
+                (false, _) => 1,
+                (true, false) => 2,
+                (true, true) => 3,
+            },
+            Self::Diffuse { .. }
+            | Self::OrenNayar { .. }
+            | Self::DiffuseTransmission { .. }
+            | Self::Mirror { .. }
+            | Self::Conductor { .. }
+            | Self::Dielectric { .. }
+            | Self::ThinDielectric { .. }
+            | Self::CoatedDiffuse { .. }
+            | Self::CoatedConductor { .. }
+            | Self::Phong { .. }
+            | Self::Ward { .. }
+            | Self::HeTorrance { .. } => 1,
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::cases::{delta_cases, smooth_cases};
 use crate::bsdf::{Bsdf, BsdfSample, Lobe, Varnish, Varnished, turn};
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 
 fn refracted(bsdf: &Bsdf<'_>, wo: Vec3) -> BsdfSample {
     let sample = bsdf.sample(wo, [0.5, 0.5, 0.999]).expect("transmission");
@@ -79,6 +79,23 @@ fn what_goes_straight_on_is_what_samples_carry() {
         let told = bsdf.straight_through(wo);
         assert!(told.abs_diff_eq(carried, 2e-4) && (told != Vec3::ZERO) == is_clear, "{told} for {carried}, {bsdf:?}");
         assert!(bsdf.straight_through(turn(wo)).abs_diff_eq(told, 1e-6), "{bsdf:?}");
+    }
+}
+
+/// A coat's normal and its base's may put a direction on different sides: no path goes on through such a sheet, and no shadow ray may.
+#[test]
+fn nothing_goes_straight_through_where_the_normals_of_coat_and_base_disagree() {
+    let Bsdf::MetalRoughness(clear) = Bsdf::metal_roughness(Vec3::ONE, 0.0, 0.0, 1.5, 1.0) else { panic!("a sheet") };
+    let tilted = Some(Mat3::from_rotation_x(0.6));
+    let sheet = Bsdf::Varnish(Varnish::new(Varnished::Sheet(clear), 0.5, 0.0, Vec3::ZERO, 0.5).over_relief(tilted));
+    // 0.6 rad are 34 degrees: of these two, one is below the base's plane.
+    for (wo, is_clear) in [(Vec3::new(0.0, 0.6, 0.8), true), (Vec3::new(0.0, -0.98, 0.2).normalize(), false)] {
+        for wo in [wo, -wo] {
+            assert_eq!(sheet.straight_through(wo) != Vec3::ZERO, is_clear, "{wo}");
+            let mut samples = (0..100).filter_map(|lobe| sheet.sample(wo, [0.3, 0.6, (lobe as f32 + 0.5) / 100.0]));
+            let passes = samples.any(|sample| sample.wi.abs_diff_eq(-wo, 1e-5));
+            assert_eq!(passes, is_clear, "{wo}");
+        }
     }
 }
 

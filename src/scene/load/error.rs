@@ -172,6 +172,11 @@ pub(crate) fn suggestion<'a>(written: &str, candidates: impl IntoIterator<Item =
     if known.is_empty() { String::new() } else { format!("; known: {}", known.join(", ")) }
 }
 
+/// The names of a table of kinds, as messages list them.
+pub(crate) fn names_of<T>(kinds: &[(&str, T)]) -> String {
+    kinds.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ")
+}
+
 /// Levenshtein's distance with adjacent swaps counted once (the commonest slip of the fingers).
 fn edit_distance(a: &str, b: &str) -> usize {
     // Keys are short; what is longer is no slip of a key, and the table below is quadratic.

@@ -69,40 +69,52 @@ pub(super) fn read_into(
         report_unknown_materials(builder, path, &text, added_lines, &libraries.materials);
     }
 
-    // Materials are converted when a face uses them: libraries are often shared by many files.
-    let mut converted: HashMap<Option<usize>, MaterialId> = HashMap::new();
+    let not_finite = |model: &tobj::Model, bad: BadVertex| {
+        let place = match line_of_vertex(&text, bad.position) {
+            Some(line) => Place::line(path, line.saturating_sub(added_lines)),
+            None => Place::file(path),
+        };
+        LoadError::invalid_at(place, format!("a vertex of \"{}\" is not finite: {}", model.name, bad.position))
+    };
+    let mut materials = UsedMaterials { written: &libraries.materials, converted: HashMap::new() };
     let mut placed = Vec::new();
     let mut sparse_faces = points_and_lines;
     for model in &models {
-        let (mesh, skipped) = convert_mesh(model, path).map_err(|bad| {
-            let place = match line_of_vertex(&text, bad.position) {
-                Some(line) => Place::line(path, line.saturating_sub(added_lines)),
-                None => Place::file(path),
-            };
-            let problem = format!("a vertex of \"{}\" is not finite: {}", model.name, bad.position);
-            LoadError::invalid_at(place, problem)
-        })?;
+        let (mesh, skipped) = convert_mesh(model, path).map_err(|bad| not_finite(model, bad))?;
         sparse_faces += skipped;
-        if mesh.triangles.is_empty() {
-            continue;
+        if !mesh.triangles.is_empty() {
+            let material = materials.of(model, builder);
+            placed.push((builder.add_mesh(mesh), material));
         }
-        let wanted = model.mesh.material_id.filter(|&id| id < libraries.materials.len());
-        let material = match converted.get(&wanted) {
-            Some(id) => *id,
-            None => {
-                let id = match wanted {
-                    Some(index) => {
-                        let material = libraries.materials[index].convert(builder);
-                        builder.add_material(material)
-                    }
-                    None => mtl::default_material(builder),
-                };
-                converted.insert(wanted, id);
-                id
-            }
-        };
-        placed.push((builder.add_mesh(mesh), material));
     }
+    note_leftovers(builder, path, sparse_faces, colors);
+    if placed.is_empty() {
+        return Err(LoadError::invalid(path, "nothing to render: no face with three corners"));
+    }
+    Ok(placed)
+}
+
+/// Materials are converted when a face uses them: libraries are often shared by many files.
+struct UsedMaterials<'a> {
+    written: &'a [mtl::Written],
+    converted: HashMap<Option<usize>, MaterialId>,
+}
+
+impl UsedMaterials<'_> {
+    fn of(&mut self, model: &tobj::Model, builder: &mut Builder) -> MaterialId {
+        let wanted = model.mesh.material_id.filter(|&id| id < self.written.len());
+        *self.converted.entry(wanted).or_insert_with(|| match wanted {
+            Some(index) => {
+                let material = self.written[index].convert(builder);
+                builder.add_material(material)
+            }
+            None => mtl::default_material(builder),
+        })
+    }
+}
+
+/// Notes what a file holds and the scene does not.
+fn note_leftovers(builder: &mut Builder, path: &Path, sparse_faces: usize, colors: VertexColors) {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     if sparse_faces > 0 {
         builder.note(format!("{name}: {sparse_faces} points and lines are not rendered."));
@@ -112,10 +124,6 @@ pub(super) fn read_into(
         VertexColors::All => builder.note(format!("{name}: the colours of its vertices are taken as sRGB.")),
         VertexColors::Some => builder.note(format!("{name}: only some vertices have colours; none is used.")),
     }
-    if placed.is_empty() {
-        return Err(LoadError::invalid(path, "nothing to render: no face with three corners"));
-    }
-    Ok(placed)
 }
 
 /// The objects of a text; the materials that it names are added to the libraries, if there are any.

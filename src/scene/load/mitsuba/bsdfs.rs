@@ -1,16 +1,34 @@
 //! `<bsdf>` and its wrappers.
 
-use super::super::error::LoadError;
+use super::super::error::{LoadError, names_of};
 use super::super::luminance;
 use super::element::Element;
+use super::surfaces::PLAIN;
 use super::textures::Meaning;
 use super::{Reader, blend};
-use crate::scene::{Alpha, ColorInput, HeightMap, HeightUnit, Material, Relief, Roughness, ScalarInput, Surface};
+use crate::scene::{Alpha, ColorInput, HeightMap, HeightUnit, Material, Relief, ScalarInput, Surface};
 use glam::Vec3;
 use std::rc::Rc;
 
 /// Deepest nesting of wrappers.
 const DEEPEST: usize = 16;
+
+/// Reads a BSDF that stands for others, at a depth of nesting.
+type Wrapper = fn(&mut Reader, &Element, usize) -> Result<Look, LoadError>;
+
+/// The BSDFs that wrap others, and the one that is nothing.
+const WRAPPERS: &[(&str, Wrapper)] = &[
+    ("twosided", Reader::two_sided),
+    ("mask", Reader::mask),
+    ("bumpmap", Reader::bump_map),
+    ("bump", Reader::bump_map),
+    ("normalmap", Reader::normal_map),
+    ("blendbsdf", Reader::mix),
+    ("mixturebsdf", Reader::mix),
+    ("coating", Reader::coating),
+    ("roughcoating", Reader::coating),
+    ("null", |_, _, _| Ok(Look { surface: None, alpha: Alpha::Opaque, relief: None })),
+];
 
 /// What a BSDF comes to: the surface, and what its wrappers add.
 pub(super) struct Look {
@@ -41,50 +59,64 @@ impl Reader {
         if depth > DEEPEST {
             return Err(bsdf.error("BSDFs are nested too deeply, or one uses itself"));
         }
-        let look = match bsdf.kind().as_str() {
-            "twosided" => {
-                let inner = self.inner(bsdf)?;
-                if inner.len() > 1 {
-                    self.builder.note(format!("{}: both sides look like the first.", bsdf.place()));
-                }
-                self.bsdf(&inner[0], depth + 1)?
-            }
-            "mask" => {
-                let inner = self.inner(bsdf)?;
-                let look = self.bsdf(&inner[0], depth + 1)?;
-                let opacity = self.opacity(bsdf)?.unwrap_or(ScalarInput::constant(0.5));
-                look.masked(opacity).unwrap_or_else(|| {
-                    self.builder
-                        .note(format!("{}: the picture of opacity inside another is not rendered.", bsdf.place()));
-                    Look { alpha: Alpha::Blend { value: opacity }, ..look }
-                })
-            }
-            "bumpmap" | "bump" => {
-                let inner = self.inner(bsdf)?;
-                let mut look = self.bsdf(&inner[0], depth + 1)?;
-                let relief = self.heights(bsdf)?;
-                self.add_relief(bsdf, &mut look, relief);
-                look
-            }
-            "normalmap" => {
-                let inner = self.inner(bsdf)?;
-                let mut look = self.bsdf(&inner[0], depth + 1)?;
-                // In 0.x the picture has no name.
-                let named = self.color_input(bsdf, "normalmap", Meaning::Coefficient)?;
-                let map = named.and_then(|input| input.texture);
-                if map.is_none() {
-                    self.builder.note(format!("{}: its normal map is not rendered.", bsdf.place()));
-                }
-                self.add_relief(bsdf, &mut look, map.map(|map| Relief::Normals { map, strength: 1.0 }));
-                look
-            }
-            "blendbsdf" | "mixturebsdf" => self.mix(bsdf, depth)?,
-            "coating" | "roughcoating" => self.coating(bsdf, depth)?,
-            "null" => Look { surface: None, alpha: Alpha::Opaque, relief: None },
-            kind => self.plain_surface(bsdf, kind)?.into(),
+        let kind = bsdf.kind();
+        let look = match WRAPPERS.iter().find(|(name, _)| *name == kind) {
+            Some((_, read)) => read(self, bsdf, depth)?,
+            None => self.plain_surface(bsdf, &kind)?.into(),
         };
         bsdf.ignore(&["sampleweight", "specularsamplingweight"]);
         self.note_unused(&format!("bsdf \"{}\"", bsdf.name()), bsdf);
+        Ok(look)
+    }
+
+    /// A BSDF that wraps no other.
+    fn plain_surface(&mut self, bsdf: &Element, kind: &str) -> Result<Surface, LoadError> {
+        let Some((_, read)) = PLAIN.iter().find(|(name, _)| *name == kind) else {
+            return Err(bsdf.unsupported(format_args!(
+                "BSDF \"{kind}\" is not rendered; {}, {} are",
+                names_of(PLAIN),
+                names_of(WRAPPERS)
+            )));
+        };
+        read(self, bsdf)
+    }
+
+    fn two_sided(&mut self, bsdf: &Element, depth: usize) -> Result<Look, LoadError> {
+        let inner = self.inner(bsdf)?;
+        if inner.len() > 1 {
+            self.builder.note(format!("{}: both sides look like the first.", bsdf.place()));
+        }
+        self.bsdf(&inner[0], depth + 1)
+    }
+
+    fn mask(&mut self, bsdf: &Element, depth: usize) -> Result<Look, LoadError> {
+        let inner = self.inner(bsdf)?;
+        let look = self.bsdf(&inner[0], depth + 1)?;
+        let opacity = self.opacity(bsdf)?.unwrap_or(ScalarInput::constant(0.5));
+        Ok(look.masked(opacity).unwrap_or_else(|| {
+            self.builder.note(format!("{}: the picture of opacity inside another is not rendered.", bsdf.place()));
+            Look { alpha: Alpha::Blend { value: opacity }, ..look }
+        }))
+    }
+
+    fn bump_map(&mut self, bsdf: &Element, depth: usize) -> Result<Look, LoadError> {
+        let inner = self.inner(bsdf)?;
+        let mut look = self.bsdf(&inner[0], depth + 1)?;
+        let relief = self.heights(bsdf)?;
+        self.add_relief(bsdf, &mut look, relief);
+        Ok(look)
+    }
+
+    fn normal_map(&mut self, bsdf: &Element, depth: usize) -> Result<Look, LoadError> {
+        let inner = self.inner(bsdf)?;
+        let mut look = self.bsdf(&inner[0], depth + 1)?;
+        // In 0.x the picture has no name.
+        let named = self.color_input(bsdf, "normalmap", Meaning::Coefficient)?;
+        let map = named.and_then(|input| input.texture);
+        if map.is_none() {
+            self.builder.note(format!("{}: its normal map is not rendered.", bsdf.place()));
+        }
+        self.add_relief(bsdf, &mut look, map.map(|map| Relief::Normals { map, strength: 1.0 }));
         Ok(look)
     }
 
@@ -168,7 +200,7 @@ impl Reader {
         let inner = self.inner(bsdf)?;
         let mut look = self.bsdf(&inner[0], depth + 1)?;
         let ior = self.relative_ior(bsdf, "bk7")?.max(1.0);
-        let coat = if bsdf.kind() == "coating" { Roughness::SMOOTH } else { self.roughness(bsdf)? };
+        let coat = self.roughness_of_kind(bsdf)?;
         if self.color(bsdf, "sigmaa", Meaning::Coefficient)?.is_some_and(|s| s.max_element() > 0.0) {
             self.builder.note(format!("{}: absorption inside the coat is not rendered.", bsdf.place()));
         }

@@ -91,6 +91,9 @@ pub(super) fn read(path: &Path, given: &mut Given, depth: usize) -> Result<Rc<El
     builder.element(root, 0)
 }
 
+/// Elements that say how the file is read, and are no part of what it holds.
+pub(super) const OF_READING: [&str; 3] = ["default", "path", "include"];
+
 struct TreeBuilder<'a> {
     lines: LineStarts,
     file: Rc<PathBuf>,

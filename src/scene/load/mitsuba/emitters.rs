@@ -1,7 +1,7 @@
 //! `<emitter>`: lights, surroundings, and the radiance of surfaces.
 
 use super::super::environment;
-use super::super::error::LoadError;
+use super::super::error::{LoadError, names_of};
 use super::super::sky::{self, Sky};
 use super::Reader;
 use super::element::Element;
@@ -11,85 +11,96 @@ use crate::scene::{ColorInput, Environment, Light, Parametrisation, SpotFalloff}
 use glam::{Affine3A, Mat3, Vec3};
 use std::f32::consts::{FRAC_PI_2, PI};
 
+/// Reads an emitter, which a transform places.
+type Kind = fn(&mut Reader, &Element, &Affine3A) -> Result<(), LoadError>;
+
+/// The emitters that are not a surface's.
+const KINDS: &[(&str, Kind)] = &[
+    ("point", Reader::point),
+    ("spot", Reader::spot),
+    ("directional", Reader::directional),
+    ("constant", Reader::constant),
+    ("envmap", Reader::environment_map),
+    ("sky", Reader::sky),
+    ("sun", Reader::sky),
+    ("sunsky", Reader::sky),
+];
+
 impl Reader {
     /// An emitter that is not a surface's.
     pub(super) fn emitter(&mut self, emitter: &Element) -> Result<(), LoadError> {
         let to_world = transform::of(emitter, "toworld")?;
         let kind = emitter.kind();
-        let ahead = || {
-            let axis = to_world.transform_vector3(Vec3::Z).try_normalize();
-            axis.ok_or_else(|| emitter.error("its transform has no direction"))
+        let Some((_, read)) = KINDS.iter().find(|(name, _)| *name == kind) else {
+            let known = names_of(KINDS);
+            return Err(emitter
+                .unsupported(format_args!("emitter \"{kind}\" is not rendered; {known} are, and area on a shape")));
         };
-        match kind.as_str() {
-            "point" => {
-                let at = emitter.vector("position")?.unwrap_or(to_world.translation.into());
-                let intensity = self.light_color(emitter, "intensity")?;
-                self.builder.lights.push(Light::Point { position: at, intensity });
-            }
-            "spot" => {
-                let outer = emitter.float_or("cutoffangle", 20.0)?.clamp(0.01, 180.0);
-                let inner = emitter.float_or("beamwidth", 0.75 * outer)?.clamp(0.0, outer);
-                let intensity = self.light_color(emitter, "intensity")?;
-                if emitter.child("texture").is_some() {
-                    self.builder.note(format!("{}: a spot's texture is not rendered.", emitter.place()));
-                }
-                let direction = ahead()?;
-                self.builder.lights.push(Light::Spot {
-                    position: to_world.translation.into(),
-                    direction,
-                    intensity,
-                    inner_angle: inner.to_radians(),
-                    outer_angle: outer.to_radians(),
-                    falloff: SpotFalloff::LinearInAngle,
-                });
-            }
-            "directional" => {
-                let direction = match emitter.vector("direction")? {
-                    Some(direction) => {
-                        direction.try_normalize().ok_or_else(|| emitter.error("a direction of no length"))?
-                    }
-                    None => ahead()?,
-                };
-                let irradiance = self.light_color(emitter, "irradiance")?;
-                self.builder.lights.push(Light::Directional {
-                    direction,
-                    irradiance,
-                    angular_radius: 0.0,
-                    is_of_sky: false,
-                });
-            }
-            "constant" => {
-                let radiance = self.light_color(emitter, "radiance")?;
-                self.surround(Environment::constant(radiance));
-            }
-            "envmap" => {
-                let Some(name) = emitter.string("filename")? else {
-                    return Err(emitter.error("an envmap needs a filename"));
-                };
-                let file = self.file(emitter, name)?;
-                let mut environment = environment::read(&file, Parametrisation::LatLong, &mut self.builder.notes)
-                    .map_err(|error| error.referenced_from(emitter.place()))?;
-                environment.scale = emitter.float_or("scale", 1.0)?.max(0.0);
-                // Mitsuba's picture has +z in its middle, ours −z; both turn the same way round.
-                environment.from_world = Mat3::from_rotation_y(PI) * environment::rotation_of(&to_world).transpose();
-                emitter.ignore(&["gamma", "cache", "miscompensation"]);
-                self.surround(environment);
-            }
-            "sky" | "sun" | "sunsky" => self.sky(emitter, &kind, &to_world)?,
-            other => {
-                return Err(emitter.unsupported(format_args!(
-                    "emitter \"{other}\" is not rendered; area, point, spot, directional, constant, envmap, sky, sun and \
-                     sunsky are"
-                )));
-            }
-        }
+        read(self, emitter, &to_world)?;
         emitter.ignore(&["samplingweight"]);
         self.note_unused(&format!("emitter \"{kind}\""), emitter);
         Ok(())
     }
 
+    fn point(&mut self, emitter: &Element, to_world: &Affine3A) -> Result<(), LoadError> {
+        let position = emitter.vector("position")?.unwrap_or(to_world.translation.into());
+        let intensity = self.light_color(emitter, "intensity")?;
+        self.builder.lights.push(Light::Point { position, intensity });
+        Ok(())
+    }
+
+    fn spot(&mut self, emitter: &Element, to_world: &Affine3A) -> Result<(), LoadError> {
+        let outer = emitter.float_or("cutoffangle", 20.0)?.clamp(0.01, 180.0);
+        let inner = emitter.float_or("beamwidth", 0.75 * outer)?.clamp(0.0, outer);
+        let intensity = self.light_color(emitter, "intensity")?;
+        if emitter.child("texture").is_some() {
+            self.builder.note(format!("{}: a spot's texture is not rendered.", emitter.place()));
+        }
+        self.builder.lights.push(Light::Spot {
+            position: to_world.translation.into(),
+            direction: ahead(emitter, to_world)?,
+            intensity,
+            inner_angle: inner.to_radians(),
+            outer_angle: outer.to_radians(),
+            falloff: SpotFalloff::LinearInAngle,
+        });
+        Ok(())
+    }
+
+    fn directional(&mut self, emitter: &Element, to_world: &Affine3A) -> Result<(), LoadError> {
+        let direction = match emitter.vector("direction")? {
+            Some(direction) => direction.try_normalize().ok_or_else(|| emitter.error("a direction of no length"))?,
+            None => ahead(emitter, to_world)?,
+        };
+        let irradiance = self.light_color(emitter, "irradiance")?;
+        self.builder.lights.push(Light::Directional { direction, irradiance, angular_radius: 0.0, is_of_sky: false });
+        Ok(())
+    }
+
+    fn constant(&mut self, emitter: &Element, _: &Affine3A) -> Result<(), LoadError> {
+        let radiance = self.light_color(emitter, "radiance")?;
+        self.surround(Environment::constant(radiance));
+        Ok(())
+    }
+
+    fn environment_map(&mut self, emitter: &Element, to_world: &Affine3A) -> Result<(), LoadError> {
+        let Some(name) = emitter.string("filename")? else {
+            return Err(emitter.error("an envmap needs a filename"));
+        };
+        let file = self.file(emitter, name)?;
+        let mut environment = environment::read(&file, Parametrisation::LatLong, &mut self.builder.notes)
+            .map_err(|error| error.referenced_from(emitter.place()))?;
+        environment.scale = emitter.float_or("scale", 1.0)?.max(0.0);
+        // Mitsuba's picture has +z in its middle, ours −z; both turn the same way round.
+        environment.from_world = Mat3::from_rotation_y(PI) * environment::rotation_of(to_world).transpose();
+        emitter.ignore(&["gamma", "cache", "miscompensation"]);
+        self.surround(environment);
+        Ok(())
+    }
+
     /// Sky, sun or both, by our own model of a clear day in cd/m² ([`sky`]).
-    fn sky(&mut self, emitter: &Element, kind: &str, to_world: &Affine3A) -> Result<(), LoadError> {
+    fn sky(&mut self, emitter: &Element, to_world: &Affine3A) -> Result<(), LoadError> {
+        let kind = emitter.kind();
         // Version 3 has its zenith along +z, the dialects before it along +y; our model's is +y.
         let to_model = if self.since_2 { Mat3::from_rotation_x(-FRAC_PI_2) } else { Mat3::IDENTITY };
         let from_world = to_model * environment::rotation_of(to_world).transpose();
@@ -172,6 +183,12 @@ impl Reader {
         self.note_unused("emitter \"area\"", emitter);
         Ok(radiance)
     }
+}
+
+/// Where an emitter's own z points.
+fn ahead(emitter: &Element, to_world: &Affine3A) -> Result<Vec3, LoadError> {
+    let axis = to_world.transform_vector3(Vec3::Z).try_normalize();
+    axis.ok_or_else(|| emitter.error("its transform has no direction"))
 }
 
 #[cfg(test)]

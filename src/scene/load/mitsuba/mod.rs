@@ -19,12 +19,29 @@ mod transform;
 use super::LoadOptions;
 use super::builder::{ASSUMED_NITS_PER_UNIT, Builder, IfDark};
 use super::error::{LoadError, Place, suggestion};
-use crate::scene::{Alpha, Material, MaterialId, MeshId, ScalarInput, Scene, Surface};
+use crate::scene::{Alpha, ColorInput, Material, MaterialId, MeshId, ScalarInput, Scene, Surface};
 use element::{Element, Given};
 use glam::{Affine3A, Vec3};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
+
+/// Takes an element of the scene in.
+type TakeIn = fn(&mut Reader, &Rc<Element>) -> Result<(), LoadError>;
+
+/// Elements that are something in the scene.
+const ELEMENTS: &[(&str, TakeIn)] = &[
+    ("shape", Reader::shape),
+    ("emitter", |reader, emitter| reader.emitter(emitter)),
+    ("luminaire", |reader, emitter| reader.emitter(emitter)),
+    ("sensor", |reader, sensor| reader.sensor(sensor)),
+    ("camera", |reader, sensor| reader.sensor(sensor)),
+    ("integrator", Reader::integrator),
+    ("sampler", Reader::integrator),
+];
+
+/// Elements that are defined here and used by reference.
+const DEFINITIONS: [&str; 7] = ["bsdf", "texture", "ref", "alias", "medium", "spectrum", "rgb"];
 
 /// Reads a Mitsuba file.
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
@@ -50,27 +67,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
     reader.builder.set_nits_per_unit(ASSUMED_NITS_PER_UNIT);
     reader.name_all(&root);
     for child in &root.children {
-        match child.tag.as_str() {
-            "shape" => reader.shape(child)?,
-            "emitter" | "luminaire" => reader.emitter(child)?,
-            "sensor" | "camera" => reader.sensor(child)?,
-            "integrator" | "sampler" => {
-                // Edges, so one more than scatterings; −1 is no end.
-                if let Some(edges) = child.float("maxdepth")?.filter(|&edges| edges >= 1.0) {
-                    reader.builder.note_depth(edges as i64 - 1);
-                }
-                if child.boolean_or("hideemitters", false)? {
-                    reader.builder.note(format!("{}: hide_emitters is not rendered: lights are seen.", child.place()));
-                }
-                reader.builder.note("Integrator, sampler and filter are fechner's own, not the file's.");
-            }
-            // Defined here, used by reference.
-            "bsdf" | "texture" | "ref" | "alias" | "medium" | "spectrum" | "rgb" => {}
-            other => {
-                let known = ["shape", "emitter", "sensor", "bsdf", "texture", "integrator", "include", "default"];
-                return Err(child.error(format_args!("unknown element{}", suggestion(other, known))));
-            }
-        }
+        reader.element(child)?;
     }
     reader.note_clips();
     reader.builder.note_assumed_unit();
@@ -83,7 +80,7 @@ struct Reader {
     given: Given,
     builder: Builder,
     named: HashMap<String, Rc<Element>>,
-    /// By addresses of BSDF and emitter; 0 for none.
+    /// By [`Attached::key`].
     materials: HashMap<(usize, usize), Option<MaterialId>>,
     mesh_files: HashMap<shapes::MeshKey, Vec<MeshId>>,
     /// Parts of groups, by address.
@@ -97,7 +94,46 @@ struct Reader {
     clips: Option<(Place, [f32; 2])>,
 }
 
+/// What a shape has on it, of its own or by reference.
+struct Attached {
+    bsdf: Option<Rc<Element>>,
+    emitter: Option<Rc<Element>>,
+    media: Vec<Rc<Element>>,
+}
+
+impl Attached {
+    /// Addresses of BSDF and emitter; 0 for none.
+    fn key(&self) -> (usize, usize) {
+        let address = |element: &Option<Rc<Element>>| element.as_ref().map_or(0, |rc| Rc::as_ptr(rc) as usize);
+        (address(&self.bsdf), address(&self.emitter))
+    }
+}
+
 impl Reader {
+    fn element(&mut self, element: &Rc<Element>) -> Result<(), LoadError> {
+        let tag = element.tag.as_str();
+        if let Some((_, take_in)) = ELEMENTS.iter().find(|(name, _)| *name == tag) {
+            return take_in(self, element);
+        }
+        if DEFINITIONS.contains(&tag) {
+            return Ok(());
+        }
+        let known = ELEMENTS.iter().map(|(name, _)| *name).chain(DEFINITIONS).chain(element::OF_READING);
+        Err(element.error(format_args!("unknown element{}", suggestion(tag, known))))
+    }
+
+    fn integrator(&mut self, integrator: &Rc<Element>) -> Result<(), LoadError> {
+        // Edges, so one more than scatterings; −1 is no end.
+        if let Some(edges) = integrator.float("maxdepth")?.filter(|&edges| edges >= 1.0) {
+            self.builder.note_depth(edges as i64 - 1);
+        }
+        if integrator.boolean_or("hideemitters", false)? {
+            self.builder.note(format!("{}: hide_emitters is not rendered: lights are seen.", integrator.place()));
+        }
+        self.builder.note("Integrator, sampler and filter are fechner's own, not the file's.");
+        Ok(())
+    }
+
     /// Finds everything that has an id, wherever it stands.
     fn name_all(&mut self, element: &Rc<Element>) {
         for child in &element.children {
@@ -133,66 +169,77 @@ impl Reader {
 
     /// The material of a shape; `None` where the surface is not there.
     fn material_of(&mut self, shape: &Element) -> Result<Option<MaterialId>, LoadError> {
-        let mut bsdf = shape.tagged("bsdf").next().cloned();
-        let mut emitter = shape.tagged("emitter").chain(shape.tagged("luminaire")).next().cloned();
-        let mut media: Vec<Rc<Element>> = shape.tagged("medium").cloned().collect();
-        for reference in shape.tagged("ref").cloned().collect::<Vec<_>>() {
-            let found = self.resolve(&reference)?;
-            match found.tag.as_str() {
-                "bsdf" => bsdf = Some(found),
-                "emitter" | "luminaire" => emitter = Some(found),
-                "medium" if reference.attribute("name") == Some("interior") => media.push(found),
-                "medium" => self.builder.note(format!("{}: the medium outside is not rendered.", reference.place())),
-                other => return Err(reference.error(format_args!("a shape cannot use a <{other}>"))),
-            }
-        }
+        let attached = self.attached(shape)?;
         if shape.tagged("subsurface").next().is_some() {
             self.builder.note(format!("{}: light below the surface is not rendered.", shape.place()));
         }
-        let address = |element: &Option<Rc<Element>>| element.as_ref().map_or(0, |rc| Rc::as_ptr(rc) as usize);
-        let key = (address(&bsdf), address(&emitter));
-        if media.is_empty()
+        let key = attached.key();
+        if attached.media.is_empty()
             && let Some(id) = self.materials.get(&key)
         {
             return Ok(*id);
         }
-        let converted = match &bsdf {
-            Some(bsdf) => self.bsdf(bsdf, 0)?.into_material(bsdf.name()),
-            // Mitsuba's own: what shines by itself is black.
-            None => {
-                let albedo = if emitter.is_some() { 0.0 } else { 0.5 };
-                let reflectance = crate::scene::ColorInput::constant(Vec3::splat(albedo));
-                Some(Material::plain("default", Surface::Diffuse { reflectance }))
-            }
+        let Some(mut material) = self.unlit_material(shape, &attached)? else {
+            self.materials.insert(key, None);
+            return Ok(None);
         };
-        let mut material = match (converted, &emitter) {
-            (Some(material), _) => material,
-            // A sheet of air: light goes through as if nothing were there.
-            (None, Some(_)) => {
-                let transmittance = crate::scene::ColorInput::constant(Vec3::ONE);
-                Material::plain("null", Surface::ThinDielectric { ior: 1.0, transmittance })
-            }
-            (None, None) if media.is_empty() => {
-                self.builder.note("Shapes with the BSDF \"null\" are not there.");
-                self.materials.insert(key, None);
-                return Ok(None);
-            }
-            (None, None) => {
-                return Err(shape.unsupported("a volume without a surface is not rendered; absorption behind glass is"));
-            }
-        };
-        if let Some(emitter) = &emitter {
+        if let Some(emitter) = &attached.emitter {
             material.emission = self.area_radiance(emitter)?;
             self.shine_through_holes(&mut material, emitter);
         }
-        for medium in &media {
+        for medium in &attached.media {
             self.fill(&mut material, medium)?;
         }
         let id = self.builder.add_material(material);
-        if media.is_empty() {
+        if attached.media.is_empty() {
             self.materials.insert(key, Some(id));
         }
         Ok(Some(id))
+    }
+
+    fn attached(&mut self, shape: &Element) -> Result<Attached, LoadError> {
+        let mut attached = Attached {
+            bsdf: shape.tagged("bsdf").next().cloned(),
+            emitter: shape.tagged("emitter").chain(shape.tagged("luminaire")).next().cloned(),
+            media: shape.tagged("medium").cloned().collect(),
+        };
+        for reference in shape.tagged("ref") {
+            let found = self.resolve(reference)?;
+            match found.tag.as_str() {
+                "bsdf" => attached.bsdf = Some(found),
+                "emitter" | "luminaire" => attached.emitter = Some(found),
+                "medium" if reference.attribute("name") == Some("interior") => attached.media.push(found),
+                "medium" => self.builder.note(format!("{}: the medium outside is not rendered.", reference.place())),
+                other => return Err(reference.error(format_args!("a shape cannot use a <{other}>"))),
+            }
+        }
+        Ok(attached)
+    }
+
+    /// The material without its light and what is behind it; `None` where the surface is not there.
+    fn unlit_material(&mut self, shape: &Element, attached: &Attached) -> Result<Option<Material>, LoadError> {
+        let converted = match &attached.bsdf {
+            Some(bsdf) => self.bsdf(bsdf, 0)?.into_material(bsdf.name()),
+            // Mitsuba's own: what shines by itself is black.
+            None => {
+                let albedo = if attached.emitter.is_some() { 0.0 } else { 0.5 };
+                let reflectance = ColorInput::constant(Vec3::splat(albedo));
+                Some(Material::plain("default", Surface::Diffuse { reflectance }))
+            }
+        };
+        if converted.is_some() {
+            return Ok(converted);
+        }
+        if attached.emitter.is_some() {
+            // A sheet of air: light goes through as if nothing were there.
+            let transmittance = ColorInput::constant(Vec3::ONE);
+            return Ok(Some(Material::plain("null", Surface::ThinDielectric { ior: 1.0, transmittance })));
+        }
+        if !attached.media.is_empty() {
+            return Err(shape.unsupported("a volume without a surface is not rendered; absorption behind glass is"));
+        }
+        self.builder.note("Shapes with the BSDF \"null\" are not there.");
+        Ok(None)
     }
 
     /// In Mitsuba opacity takes nothing from what a surface sends out; here a surface shines where it is.

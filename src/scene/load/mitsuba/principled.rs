@@ -7,12 +7,19 @@ use super::element::Element;
 use crate::scene::{ColorInput, MetalRoughness, Roughness, ScalarInput, Surface};
 use glam::Vec3;
 
+/// What the surface bounds.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Body {
+    Solid,
+    Sheet,
+}
+
 impl Reader {
-    pub(super) fn principled(&mut self, bsdf: &Element, is_thin: bool) -> Result<Surface, LoadError> {
+    pub(super) fn principled(&mut self, bsdf: &Element, body: Body) -> Result<Surface, LoadError> {
         let base_color = self.reflectance(bsdf, "basecolor", 0.5)?;
         let specular = bsdf.float("specular")?.unwrap_or(0.5).clamp(0.0, 0.99);
         let transmission = self.share(bsdf, "spectrans", 0.0)?;
-        let has_volume = !is_thin && transmission.factor > 0.0;
+        let has_volume = body == Body::Solid && transmission.factor > 0.0;
         let eta = bsdf.float("eta")?;
         if let Some((eta, problem)) = eta.and_then(|e| Some((e, MetalRoughness::problem_with_ior(e, has_volume)?))) {
             return Err(bsdf.error(format_args!("eta {eta}: {problem}")));
@@ -29,7 +36,7 @@ impl Reader {
             transmission,
             ..MetalRoughness::default()
         };
-        if is_thin && model.transmission.factor > 0.0 && model.roughness.factor > 0.0 {
+        if body == Body::Sheet && model.transmission.factor > 0.0 && model.roughness.factor > 0.0 {
             self.builder.note(format!(
                 "{}: what \"spec_trans\" lets through is blurred as much as the reflection, not by 0.65 eta - 0.35 of its roughness.",
                 bsdf.place()

@@ -2,18 +2,40 @@
 
 use super::super::builder::NamedCamera;
 use super::super::default_view;
-use super::super::error::LoadError;
+use super::super::error::{LoadError, names_of};
 use super::super::framing::{FilmAxis, Framing};
 use super::Reader;
 use super::element::{Element, canonical};
 use super::transform;
 use crate::scene::{Camera, FilmDefaults, Projection, ScreenWindow};
-use glam::{Vec2, Vec3};
+use glam::{Affine3A, Vec2, Vec3};
 
 /// Mitsuba's default.
 const FAR_CLIP: f32 = 1e4;
 /// Widest and highest picture that a file may ask for.
 const LONGEST_SIDE: f32 = 32_768.0;
+
+/// How a sensor's rays run.
+#[derive(Clone, Copy)]
+enum Rays {
+    FromPoint,
+    Parallel,
+}
+
+/// What lets the rays in.
+#[derive(Clone, Copy)]
+enum Aperture {
+    Pinhole,
+    Lens,
+}
+
+/// The sensors that are rendered.
+const KINDS: &[(&str, (Rays, Aperture))] = &[
+    ("perspective", (Rays::FromPoint, Aperture::Pinhole)),
+    ("thinlens", (Rays::FromPoint, Aperture::Lens)),
+    ("orthographic", (Rays::Parallel, Aperture::Pinhole)),
+    ("telecentric", (Rays::Parallel, Aperture::Lens)),
+];
 
 impl Reader {
     /// Adds a camera; the first one's film is the picture's size.
@@ -25,60 +47,39 @@ impl Reader {
         }
         let aspect = film.width as f32 / film.height as f32;
         let to_world = transform::of(sensor, "toworld")?;
+        let axes = Axes::of(sensor, &to_world)?;
         let kind = sensor.kind();
-        let direction = |vector| to_world.transform_vector3(vector).try_normalize();
-        let (Some(left), Some(up), Some(forward)) = (direction(Vec3::X), direction(Vec3::Y), direction(Vec3::Z)) else {
-            return Err(sensor.error("its transform cannot be undone"));
+        let Some((_, (rays, aperture))) = KINDS.iter().find(|(name, _)| *name == kind) else {
+            let known = names_of(KINDS);
+            return Err(sensor.unsupported(format_args!("sensor \"{kind}\" is not rendered; {known} are")));
         };
-        if forward.cross(up).length() < 1e-5 {
-            return Err(sensor.error("its transform cannot be undone"));
-        }
-        let mut screen_window = ScreenWindow::centered(aspect);
-        let (projection, axis) = match kind.as_str() {
-            "perspective" | "thinlens" => {
-                let view = FieldOfView::of(sensor)?;
-                (Projection::Perspective { vertical_fov_deg: view.vertical_deg(aspect) }, view.axis)
-            }
-            "orthographic" | "telecentric" => {
-                // The picture's width spans [−1, 1] of the camera's own x, its pixels are square in the camera's coordinates.
-                let [x, y] = [to_world.matrix3.x_axis, to_world.matrix3.y_axis].map(|axis| axis.length());
-                if (x - y).abs() > 1e-5 * x {
-                    let across = Vec2::new(x / y, 1.0);
-                    screen_window = ScreenWindow { min: screen_window.min * across, max: screen_window.max * across };
-                }
-                (Projection::Orthographic { height: 2.0 * y / aspect }, FilmAxis::X)
-            }
-            other => {
-                return Err(sensor.unsupported(format_args!(
-                    "sensor \"{other}\" is not rendered; perspective, thinlens, orthographic are"
-                )));
-            }
+        let mut view = match rays {
+            Rays::FromPoint => View::from_point(sensor, aspect)?,
+            Rays::Parallel => View::along_parallels(&to_world, aspect),
         };
-        let shift =
-            Vec2::new(sensor.float_or("principalpointoffsetx", 0.0)?, sensor.float_or("principalpointoffsety", 0.0)?);
-        let moved = Vec2::new(shift.x, -shift.y) * (screen_window.max - screen_window.min);
-        screen_window.min += moved;
-        screen_window.max += moved;
-        let has_lens = matches!(kind.as_str(), "thinlens" | "telecentric");
-        let aperture_radius = if has_lens { sensor.float_or("apertureradius", 0.0)?.max(0.0) } else { 0.0 };
+        view.shift(sensor)?;
+        let aperture_radius = match aperture {
+            Aperture::Pinhole => 0.0,
+            Aperture::Lens => sensor.float_or("apertureradius", 0.0)?.max(0.0),
+        };
         let clips = [sensor.float_or("nearclip", 0.01)?, sensor.float_or("farclip", FAR_CLIP)?];
         let focus_distance = sensor.float_or("focusdistance", clips[1])?.max(1e-6);
         sensor.ignore(&["shutteropen", "shutterclose"]);
         sensor.tagged("sampler").count();
         self.note_unused(&format!("sensor \"{kind}\""), sensor);
-        let screen_window = (screen_window != ScreenWindow::centered(aspect)).then_some(screen_window);
-        let framing = match (screen_window, axis) {
+        let screen_window = (view.window != ScreenWindow::centered(aspect)).then_some(view.window);
+        let framing = match (screen_window, view.axis) {
             (None, FilmAxis::Y) => Framing::Fixed,
-            _ => Framing::Spanning { axis, film: aspect, whole: aspect },
+            (_, axis) => Framing::Spanning { axis, film: aspect, whole: aspect },
         };
         let camera = Camera {
-            projection,
+            projection: view.projection,
             screen_window,
             // Mitsuba's x points to the left of the picture.
-            mirrored: forward.cross(up).dot(left) > 0.0,
+            mirrored: axes.forward.cross(axes.up).dot(axes.left) > 0.0,
             aperture_radius,
             focus_distance,
-            ..Camera::pinhole(to_world.translation.into(), forward, up, 40.0)
+            ..Camera::pinhole(to_world.translation.into(), axes.forward, axes.up, 40.0)
         };
         if is_first {
             self.clips = Some((sensor.place(), clips));
@@ -129,6 +130,62 @@ impl Reader {
             self.builder.note(format!("{}: the film's crop is not used: the whole picture is rendered.", film.place()));
         }
         Ok(size)
+    }
+}
+
+/// A camera's own axes in the world, of length 1.
+struct Axes {
+    left: Vec3,
+    up: Vec3,
+    forward: Vec3,
+}
+
+impl Axes {
+    fn of(sensor: &Element, to_world: &Affine3A) -> Result<Self, LoadError> {
+        let direction = |vector| to_world.transform_vector3(vector).try_normalize();
+        match (direction(Vec3::X), direction(Vec3::Y), direction(Vec3::Z)) {
+            (Some(left), Some(up), Some(forward)) if forward.cross(up).length() >= 1e-5 => {
+                Ok(Self { left, up, forward })
+            }
+            _ => Err(sensor.error("its transform cannot be undone")),
+        }
+    }
+}
+
+/// What of the scene the film shows.
+struct View {
+    projection: Projection,
+    window: ScreenWindow,
+    /// The axis whose extent stays in a picture of another aspect.
+    axis: FilmAxis,
+}
+
+impl View {
+    fn from_point(sensor: &Element, aspect: f32) -> Result<Self, LoadError> {
+        let field = FieldOfView::of(sensor)?;
+        let projection = Projection::Perspective { vertical_fov_deg: field.vertical_deg(aspect) };
+        Ok(Self { projection, window: ScreenWindow::centered(aspect), axis: field.axis })
+    }
+
+    /// The picture's width spans [−1, 1] of the camera's own x, its pixels are square in the camera's coordinates.
+    fn along_parallels(to_world: &Affine3A, aspect: f32) -> Self {
+        let mut window = ScreenWindow::centered(aspect);
+        let [x, y] = [to_world.matrix3.x_axis, to_world.matrix3.y_axis].map(|axis| axis.length());
+        if (x - y).abs() > 1e-5 * x {
+            let across = Vec2::new(x / y, 1.0);
+            window = ScreenWindow { min: window.min * across, max: window.max * across };
+        }
+        Self { projection: Projection::Orthographic { height: 2.0 * y / aspect }, window, axis: FilmAxis::X }
+    }
+
+    /// Moves the window by the offset of the principal point, which is in shares of the picture.
+    fn shift(&mut self, sensor: &Element) -> Result<(), LoadError> {
+        let offset = |name| sensor.float_or(name, 0.0);
+        let shift = Vec2::new(offset("principalpointoffsetx")?, -offset("principalpointoffsety")?);
+        let moved = shift * (self.window.max - self.window.min);
+        self.window.min += moved;
+        self.window.max += moved;
+        Ok(())
     }
 }
 

@@ -10,6 +10,19 @@ use glam::{Affine3A, Vec2, Vec3};
 use std::path::PathBuf;
 use std::rc::Rc;
 
+/// Where triangles and normals face.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+enum Facing {
+    AsMade,
+    TurnedOver,
+}
+
+impl Facing {
+    fn turned_over_if(self, turns: bool) -> Self {
+        if turns == (self == Self::AsMade) { Self::TurnedOver } else { Self::AsMade }
+    }
+}
+
 /// A mesh file as it is used.
 #[derive(Clone, PartialEq, Eq, Hash)]
 pub(super) struct MeshKey {
@@ -18,8 +31,7 @@ pub(super) struct MeshKey {
     number: usize,
     /// Without normals of vertices.
     faces: bool,
-    /// Turned over.
-    flip: bool,
+    facing: Facing,
     /// Pictures upside down against what stands in the file.
     flip_v: bool,
     /// Placed by a transform that mirrors.
@@ -37,11 +49,11 @@ impl Reader {
             return self.group(shape, &kind);
         }
         let to_world = transform::of(shape, "toworld")?;
-        let flip = shape.boolean_or("flipnormals", false)?;
+        let facing = Facing::AsMade.turned_over_if(shape.boolean_or("flipnormals", false)?);
         if kind == "sphere" {
-            return self.sphere(shape, &to_world, flip);
+            return self.sphere(shape, &to_world, facing);
         }
-        let meshes = self.meshes(shape, &kind, flip, &to_world)?;
+        let meshes = self.meshes(shape, &kind, facing, &to_world)?;
         let material = self.material_of(shape)?;
         self.note_unused(&format!("shape \"{kind}\""), shape);
         let Some(material) = material else { return Ok(()) };
@@ -119,11 +131,11 @@ impl Reader {
         &mut self,
         shape: &Element,
         kind: &str,
-        flip: bool,
+        facing: Facing,
         to_world: &Affine3A,
     ) -> Result<Vec<MeshId>, LoadError> {
         let mut mesh = match kind {
-            "obj" | "ply" | "serialized" => return self.mesh_file(shape, kind, flip, mirrors(to_world)),
+            "obj" | "ply" | "serialized" => return self.mesh_file(shape, kind, facing, to_world),
             "rectangle" => primitives::rectangle(),
             "cube" => primitives::cube(),
             "disk" => primitives::disk(),
@@ -138,9 +150,7 @@ impl Reader {
                 return Err(shape.unsupported(format_args!("shapes of type \"{other}\" are not rendered; {known}")));
             }
         };
-        if flip {
-            turn_over(&mut mesh);
-        }
+        turn(&mut mesh, facing);
         self.count(shape, &mesh)?;
         Ok(vec![self.builder.add_mesh(mesh)])
     }
@@ -151,16 +161,22 @@ impl Reader {
     }
 
     /// Each file is read once for each way of using it.
-    fn mesh_file(&mut self, shape: &Element, kind: &str, flip: bool, mirrored: bool) -> Result<Vec<MeshId>, LoadError> {
+    fn mesh_file(
+        &mut self,
+        shape: &Element,
+        kind: &str,
+        facing: Facing,
+        to_world: &Affine3A,
+    ) -> Result<Vec<MeshId>, LoadError> {
         let Some(name) = shape.string("filename")? else { return Err(shape.error("a mesh needs a filename")) };
         shape.ignore(&["maxsmoothangle", "srgb", "collapse"]);
         let key = MeshKey {
             file: self.file(shape, name)?,
             number: whole_number(shape, "shapeindex")?,
             faces: shape.boolean_or("facenormals", false)?,
-            flip,
+            facing,
             flip_v: shape.boolean_or("fliptexcoords", kind == "obj")?,
-            mirrored,
+            mirrored: mirrors(to_world),
         };
         if let Some(ids) = self.mesh_files.get(&key) {
             return Ok(ids.clone());
@@ -196,9 +212,7 @@ impl Reader {
                 smooth(mesh);
             }
             shapes::face_along_normals(mesh);
-            if flip != (key.mirrored && goes_by_corners) {
-                turn_over(mesh);
-            }
+            turn(mesh, facing.turned_over_if(key.mirrored && goes_by_corners));
             if flip_v {
                 primitives::flip_v(mesh);
             }
@@ -207,18 +221,18 @@ impl Reader {
         Ok(ids)
     }
 
-    fn sphere(&mut self, shape: &Element, to_world: &Affine3A, flip: bool) -> Result<(), LoadError> {
+    fn sphere(&mut self, shape: &Element, to_world: &Affine3A, facing: Facing) -> Result<(), LoadError> {
         let center = shape.vector("center")?.unwrap_or(Vec3::ZERO);
         let radius = positive(shape, "radius")?;
         let material = self.material_of(shape)?;
         self.note_unused("shape \"sphere\"", shape);
         let Some(material) = material else { return Ok(()) };
         // Mitsuba turns mirrored spheres inside out; only light and volumes show it here.
-        let flip = flip != (mirrors(to_world) && self.has_front(material));
+        let facing = facing.turned_over_if(mirrors(to_world) && self.has_front(material));
         let placed = to_world.transform_point3(center);
         let scaled = shapes::similarity_scale(to_world).map(|scale| radius * scale);
         match scaled.filter(|radius| *radius > 0.0 && radius.is_finite() && placed.is_finite()) {
-            Some(radius) if !flip && self.current_group.is_none() => {
+            Some(radius) if facing == Facing::AsMade && self.current_group.is_none() => {
                 self.builder.spheres.push(Sphere {
                     name: "sphere".to_owned(),
                     center: placed,
@@ -230,9 +244,7 @@ impl Reader {
             }
             _ => {
                 let mut mesh = shapes::sphere(Vec3::ZERO, radius);
-                if flip {
-                    turn_over(&mut mesh);
-                }
+                turn(&mut mesh, facing);
                 self.count(shape, &mesh)?;
                 let mesh = self.builder.add_mesh(mesh);
                 let poles_on_z = Sphere::axes_with_poles_on_z(&Affine3A::IDENTITY);
@@ -268,7 +280,10 @@ fn mirrors(transform: &Affine3A) -> bool {
     transform.matrix3.determinant() < 0.0
 }
 
-fn turn_over(mesh: &mut Mesh) {
+fn turn(mesh: &mut Mesh, facing: Facing) {
+    if facing == Facing::AsMade {
+        return;
+    }
     mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
     mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
 }

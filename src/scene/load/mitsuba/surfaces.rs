@@ -5,6 +5,7 @@ use super::super::spectrum::named;
 use super::super::{luminance, share};
 use super::Reader;
 use super::element::Element;
+use super::principled::Body;
 use super::textures::Meaning;
 use crate::scene::{ColorInput, Distribution, Roughness, RoughnessScale, ScalarInput, Surface};
 use glam::Vec3;
@@ -36,70 +37,92 @@ const INDICES: &[(&str, f32)] = &[
     ("diamond", 2.419),
 ];
 
+/// Reads a BSDF that wraps no other.
+type Plain = fn(&mut Reader, &Element) -> Result<Surface, LoadError>;
+
+/// The BSDFs that wrap no other.
+pub(super) const PLAIN: &[(&str, Plain)] = &[
+    ("diffuse", Reader::diffuse),
+    ("lambertian", Reader::diffuse),
+    ("roughdiffuse", Reader::rough_diffuse),
+    ("difftrans", Reader::diffuse_transmission),
+    ("dielectric", Reader::dielectric),
+    ("roughdielectric", Reader::dielectric),
+    ("thindielectric", Reader::thin_dielectric),
+    ("conductor", Reader::conductor),
+    ("roughconductor", Reader::conductor),
+    ("plastic", Reader::plastic),
+    ("roughplastic", Reader::plastic),
+    ("principled", |reader, bsdf| reader.principled(bsdf, Body::Solid)),
+    ("principledthin", |reader, bsdf| reader.principled(bsdf, Body::Sheet)),
+    ("disney", |reader, bsdf| reader.principled(bsdf, Body::Solid)),
+    ("phong", Reader::highlight),
+    ("ward", Reader::highlight),
+];
+
 impl Reader {
-    /// A BSDF that wraps no other.
-    pub(super) fn plain_surface(&mut self, bsdf: &Element, kind: &str) -> Result<Surface, LoadError> {
-        Ok(match kind {
-            "diffuse" | "lambertian" => Surface::Diffuse { reflectance: self.reflectance(bsdf, "reflectance", 0.5)? },
-            "roughdiffuse" => {
-                bsdf.ignore(&["usefastapprox"]);
-                Surface::OrenNayar {
-                    reflectance: self.reflectance(bsdf, "reflectance", 0.5)?,
-                    roughness: grooves(self.scalar_input(bsdf, "alpha")?.unwrap_or(ScalarInput::constant(0.2))),
-                }
-            }
-            "difftrans" => Surface::DiffuseTransmission {
-                reflectance: ColorInput::constant(Vec3::ZERO),
-                transmittance: self.reflectance(bsdf, "transmittance", 0.5)?,
-            },
-            "dielectric" | "roughdielectric" => {
-                self.note_tint(bsdf, "specularreflectance")?;
-                Surface::Dielectric {
-                    ior: self.relative_ior(bsdf, "bk7")?,
-                    roughness: if kind == "dielectric" { Roughness::SMOOTH } else { self.roughness(bsdf)? },
-                    transmittance: self.reflectance(bsdf, "speculartransmittance", 1.0)?,
-                    absorption: Vec3::ZERO,
-                }
-            }
-            "thindielectric" => {
-                self.note_tint(bsdf, "specularreflectance")?;
-                Surface::ThinDielectric {
-                    ior: self.relative_ior(bsdf, "bk7")?,
-                    transmittance: self.reflectance(bsdf, "speculartransmittance", 1.0)?,
-                }
-            }
-            "conductor" | "roughconductor" => self.conductor(bsdf, kind == "roughconductor")?,
-            "plastic" | "roughplastic" => {
-                self.note_tint(bsdf, "specularreflectance")?;
-                Surface::CoatedDiffuse {
-                    reflectance: self.reflectance(bsdf, "diffusereflectance", 0.5)?,
-                    ior: self.relative_ior(bsdf, "polypropylene")?.max(1.0),
-                    roughness: if kind == "plastic" { Roughness::SMOOTH } else { self.roughness(bsdf)? },
-                    saturates: bsdf.boolean_or("nonlinear", false)?,
-                }
-            }
-            "principled" | "principledthin" | "disney" => self.principled(bsdf, kind == "principledthin")?,
-            "phong" | "ward" => {
-                self.builder.note(format!(
-                    "{}: \"{kind}\" is rendered as plastic with the microfacet width of its highlight.",
-                    bsdf.place()
-                ));
-                bsdf.ignore(&["specularreflectance", "variant", "alphau", "alphav"]);
-                let exponent = bsdf.float_or("exponent", 30.0)?.max(0.0);
-                let alpha = (2.0 / (exponent + 2.0)).sqrt();
-                Surface::CoatedDiffuse {
-                    reflectance: self.reflectance(bsdf, "diffusereflectance", 0.5)?,
-                    ior: 1.5,
-                    roughness: Roughness { scale: RoughnessScale::Alpha, ..Roughness::constant(alpha.min(1.0)) },
-                    saturates: false,
-                }
-            }
-            other => {
-                return Err(bsdf.unsupported(format_args!(
-                    "BSDF \"{other}\" is not rendered; diffuse, roughdiffuse, dielectric, thindielectric, conductor, \
-                     plastic, their rough forms, principled, mask, twosided, blendbsdf, coating, bumpmap and normalmap are"
-                )));
-            }
+    fn diffuse(&mut self, bsdf: &Element) -> Result<Surface, LoadError> {
+        Ok(Surface::Diffuse { reflectance: self.reflectance(bsdf, "reflectance", 0.5)? })
+    }
+
+    fn rough_diffuse(&mut self, bsdf: &Element) -> Result<Surface, LoadError> {
+        bsdf.ignore(&["usefastapprox"]);
+        Ok(Surface::OrenNayar {
+            reflectance: self.reflectance(bsdf, "reflectance", 0.5)?,
+            roughness: grooves(self.scalar_input(bsdf, "alpha")?.unwrap_or(ScalarInput::constant(0.2))),
+        })
+    }
+
+    fn diffuse_transmission(&mut self, bsdf: &Element) -> Result<Surface, LoadError> {
+        Ok(Surface::DiffuseTransmission {
+            reflectance: ColorInput::constant(Vec3::ZERO),
+            transmittance: self.reflectance(bsdf, "transmittance", 0.5)?,
+        })
+    }
+
+    fn dielectric(&mut self, bsdf: &Element) -> Result<Surface, LoadError> {
+        self.note_tint(bsdf, "specularreflectance")?;
+        Ok(Surface::Dielectric {
+            ior: self.relative_ior(bsdf, "bk7")?,
+            roughness: self.roughness_of_kind(bsdf)?,
+            transmittance: self.reflectance(bsdf, "speculartransmittance", 1.0)?,
+            absorption: Vec3::ZERO,
+        })
+    }
+
+    fn thin_dielectric(&mut self, bsdf: &Element) -> Result<Surface, LoadError> {
+        self.note_tint(bsdf, "specularreflectance")?;
+        Ok(Surface::ThinDielectric {
+            ior: self.relative_ior(bsdf, "bk7")?,
+            transmittance: self.reflectance(bsdf, "speculartransmittance", 1.0)?,
+        })
+    }
+
+    fn plastic(&mut self, bsdf: &Element) -> Result<Surface, LoadError> {
+        self.note_tint(bsdf, "specularreflectance")?;
+        Ok(Surface::CoatedDiffuse {
+            reflectance: self.reflectance(bsdf, "diffusereflectance", 0.5)?,
+            ior: self.relative_ior(bsdf, "polypropylene")?.max(1.0),
+            roughness: self.roughness_of_kind(bsdf)?,
+            saturates: bsdf.boolean_or("nonlinear", false)?,
+        })
+    }
+
+    /// Phong's and Ward's models.
+    fn highlight(&mut self, bsdf: &Element) -> Result<Surface, LoadError> {
+        self.builder.note(format!(
+            "{}: \"{}\" is rendered as plastic with the microfacet width of its highlight.",
+            bsdf.place(),
+            bsdf.kind()
+        ));
+        bsdf.ignore(&["specularreflectance", "variant", "alphau", "alphav"]);
+        let exponent = bsdf.float_or("exponent", 30.0)?.max(0.0);
+        let alpha = (2.0 / (exponent + 2.0)).sqrt();
+        Ok(Surface::CoatedDiffuse {
+            reflectance: self.reflectance(bsdf, "diffusereflectance", 0.5)?,
+            ior: 1.5,
+            roughness: Roughness { scale: RoughnessScale::Alpha, ..Roughness::constant(alpha.min(1.0)) },
+            saturates: false,
         })
     }
 
@@ -123,9 +146,9 @@ impl Reader {
         Ok(inside / outside)
     }
 
-    fn conductor(&mut self, bsdf: &Element, is_rough: bool) -> Result<Surface, LoadError> {
+    fn conductor(&mut self, bsdf: &Element) -> Result<Surface, LoadError> {
         let tint = self.reflectance(bsdf, "specularreflectance", 1.0)?;
-        let roughness = if is_rough { self.roughness(bsdf)? } else { Roughness::SMOOTH };
+        let roughness = self.roughness_of_kind(bsdf)?;
         let eta = self.color(bsdf, "eta", Meaning::Coefficient)?;
         let k = self.color(bsdf, "k", Meaning::Coefficient)?;
         let outside = match bsdf.child("exteta").is_some() {
@@ -140,7 +163,7 @@ impl Reader {
             (Some(_), None, _) => return Err(bsdf.error("eta and k belong together")),
             (None, Some(_), None) if !self.since_2 => return Err(bsdf.error("eta and k belong together")),
             (None, _, material) => match material.unwrap_or(usual) {
-                "none" if is_rough => (Vec3::splat(1e-3), Vec3::splat(1e3)),
+                "none" if is_rough(bsdf) => (Vec3::splat(1e-3), Vec3::splat(1e3)),
                 "none" => return Ok(Surface::Mirror { reflectance: tint }),
                 symbol => {
                     // Variants of a metal ("Cu_palik") stand for the metal.
@@ -157,7 +180,12 @@ impl Reader {
         Ok(Surface::Conductor { eta: (eta / outside).max(Vec3::splat(1e-4)), k: k / outside, tint, roughness })
     }
 
-    pub(super) fn roughness(&mut self, bsdf: &Element) -> Result<Roughness, LoadError> {
+    /// Of a BSDF that comes smooth and, as "rough...", rough.
+    pub(super) fn roughness_of_kind(&mut self, bsdf: &Element) -> Result<Roughness, LoadError> {
+        if is_rough(bsdf) { self.roughness(bsdf) } else { Ok(Roughness::SMOOTH) }
+    }
+
+    fn roughness(&mut self, bsdf: &Element) -> Result<Roughness, LoadError> {
         let both = self.scalar_input(bsdf, "alpha")?.unwrap_or(ScalarInput::constant(0.1));
         let u = self.scalar_input(bsdf, "alphau")?.unwrap_or(both);
         let v = self.scalar_input(bsdf, "alphav")?.unwrap_or(both);
@@ -172,6 +200,10 @@ impl Reader {
         };
         Ok(Roughness { u: share(u), v: (u != v).then_some(share(v)), scale: RoughnessScale::Alpha, distribution })
     }
+}
+
+fn is_rough(bsdf: &Element) -> bool {
+    bsdf.kind().starts_with("rough")
 }
 
 /// Our roughness for the `alpha` of `roughdiffuse`: the ratio B/A of Oren and Nayar's lobes for slopes of a standard deviation

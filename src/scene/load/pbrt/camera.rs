@@ -120,7 +120,7 @@ impl Reader<'_> {
             "orthographic" => return Ok(Projection::Orthographic { height: 2.0 }),
             other => {
                 return Err(camera.unsupported(format_args!(
-                    "cameras of type \"{other}\" are not rendered; perspective and orthographic are"
+                    "cameras of type \"{other}\" are not rendered; perspective, orthographic and, as a pinhole, realistic are"
                 )));
             }
         };

@@ -19,18 +19,25 @@ const DEEPEST: usize = 16;
 /// What a metal may reflect face on: for all light k would be infinite.
 const MOST_REFLECTED: Vec3 = Vec3::splat(0.9999);
 
-/// The materials that are read, for messages.
-const KNOWN: [&str; 9] = [
-    "diffuse",
-    "coateddiffuse",
-    "coatedconductor",
-    "conductor",
-    "dielectric",
-    "thindielectric",
-    "diffusetransmission",
-    "mix",
-    "interface",
-];
+/// Reads a material that wraps no other.
+type Plain<'a> = fn(&mut Reader<'a>, &Parameters) -> Result<Surface, LoadError>;
+
+/// The materials that wrap no other.
+const fn plain_kinds<'a>() -> [(&'static str, Plain<'a>); 8] {
+    [
+        ("diffuse", Reader::diffuse),
+        ("coateddiffuse", Reader::coated_diffuse),
+        ("coatedconductor", Reader::coated_conductor),
+        ("conductor", Reader::conductor),
+        ("dielectric", Reader::dielectric),
+        ("thindielectric", Reader::thin_dielectric),
+        ("diffusetransmission", Reader::diffuse_transmission),
+        ("subsurface", Reader::subsurface),
+    ]
+}
+
+/// Materials of version 4 that are not rendered.
+const NOT_RENDERED: [&str; 2] = ["hair", "measured"];
 
 /// What to do with a word that version 4 has no more.
 pub(super) const UPGRADE: &str = " of pbrt-v3: `pbrt --upgrade` writes the file for version 4, which is read";
@@ -130,75 +137,79 @@ impl Reader<'_> {
 
     fn surface(&mut self, definition: &Definition, depth: usize) -> Result<Option<Surface>, LoadError> {
         let parameters = &definition.parameters;
-        let surface = match definition.kind.as_str() {
-            "diffuse" => Surface::Diffuse { reflectance: self.reflectance(parameters, 0.5)? },
-            "coateddiffuse" => {
-                self.note_coat(parameters);
-                Surface::CoatedDiffuse {
-                    reflectance: self.reflectance(parameters, 0.5)?,
-                    ior: self.ior(parameters, "eta", 1.5)?.max(1.0),
-                    roughness: self.roughness(parameters, "")?,
-                    saturates: true,
-                }
-            }
-            "coatedconductor" => {
-                self.note_coat(parameters);
-                let (eta, k) = self.coated_metal(parameters)?;
-                Surface::CoatedConductor {
-                    eta,
-                    k,
-                    roughness: self.roughness(parameters, "conductor.")?,
-                    coat_ior: self.ior(parameters, "interface.eta", 1.5)?.max(1.0),
-                    coat_roughness: self.roughness(parameters, "interface.")?,
-                }
-            }
-            "conductor" => self.conductor(parameters)?,
-            "dielectric" => Surface::Dielectric {
-                ior: self.ior(parameters, "eta", 1.5)?,
-                roughness: self.roughness(parameters, "")?,
-                transmittance: ColorInput::constant(Vec3::ONE),
-                absorption: Vec3::ZERO,
+        match definition.kind.as_str() {
+            "mix" => self.mix(parameters, depth),
+            "interface" | "none" | "" => Ok(None),
+            kind => match plain_kinds().iter().find(|(name, _)| *name == kind) {
+                Some((_, read)) => read(self, parameters).map(Some),
+                None => Err(not_read(parameters, kind)),
             },
-            "thindielectric" => Surface::ThinDielectric {
-                ior: self.ior(parameters, "eta", 1.5)?,
-                transmittance: ColorInput::constant(Vec3::ONE),
-            },
-            "diffusetransmission" => {
-                let scale = parameters.float_or("scale", 1.0)?.max(0.0);
-                let scaled = |color: ColorInput| ColorInput { factor: color.factor * scale, ..color };
-                let transmittance = self.color_input(parameters, "transmittance", Meaning::Reflectance)?;
-                Surface::DiffuseTransmission {
-                    reflectance: scaled(self.reflectance(parameters, 0.25)?),
-                    transmittance: scaled(transmittance.unwrap_or(ColorInput::constant(Vec3::splat(0.25)))),
-                }
-            }
-            "mix" => return self.mix(parameters, depth),
-            "interface" | "none" | "" => return Ok(None),
-            "subsurface" => {
-                self.builder.note(format!(
-                    "{}: light below the surface is not rendered: \"subsurface\" is a coated diffuse surface.",
-                    parameters.place()
-                ));
-                Surface::CoatedDiffuse {
-                    reflectance: self.reflectance(parameters, 0.5)?,
-                    ior: self.ior(parameters, "eta", 1.33)?.max(1.0),
-                    roughness: self.roughness(parameters, "")?,
-                    saturates: true,
-                }
-            }
-            other @ ("hair" | "measured") => {
-                return Err(parameters
-                    .unsupported(format_args!("material \"{other}\" is not rendered; {} are", KNOWN.join(", "))));
-            }
-            other => {
-                let meant = match OF_VERSION_3.contains(&other) {
-                    true => UPGRADE.to_owned(),
-                    false => suggestion(other, KNOWN),
-                };
-                return Err(parameters.error(format_args!("unknown material \"{other}\"{meant}")));
-            }
-        };
-        Ok(Some(surface))
+        }
+    }
+
+    fn diffuse(&mut self, parameters: &Parameters) -> Result<Surface, LoadError> {
+        Ok(Surface::Diffuse { reflectance: self.reflectance(parameters, 0.5)? })
+    }
+
+    fn coated_diffuse(&mut self, parameters: &Parameters) -> Result<Surface, LoadError> {
+        self.note_coat(parameters);
+        self.under_coat(parameters, 1.5)
+    }
+
+    fn subsurface(&mut self, parameters: &Parameters) -> Result<Surface, LoadError> {
+        self.builder.note(format!(
+            "{}: light below the surface is not rendered: \"subsurface\" is a coated diffuse surface.",
+            parameters.place()
+        ));
+        self.under_coat(parameters, 1.33)
+    }
+
+    /// A diffuse base under a coat of the index that is told, or of a usual one.
+    fn under_coat(&mut self, parameters: &Parameters, usual_ior: f32) -> Result<Surface, LoadError> {
+        Ok(Surface::CoatedDiffuse {
+            reflectance: self.reflectance(parameters, 0.5)?,
+            ior: self.ior(parameters, "eta", usual_ior)?.max(1.0),
+            roughness: self.roughness(parameters, "")?,
+            saturates: true,
+        })
+    }
+
+    fn coated_conductor(&mut self, parameters: &Parameters) -> Result<Surface, LoadError> {
+        self.note_coat(parameters);
+        let (eta, k) = self.coated_metal(parameters)?;
+        Ok(Surface::CoatedConductor {
+            eta,
+            k,
+            roughness: self.roughness(parameters, "conductor.")?,
+            coat_ior: self.ior(parameters, "interface.eta", 1.5)?.max(1.0),
+            coat_roughness: self.roughness(parameters, "interface.")?,
+        })
+    }
+
+    fn dielectric(&mut self, parameters: &Parameters) -> Result<Surface, LoadError> {
+        Ok(Surface::Dielectric {
+            ior: self.ior(parameters, "eta", 1.5)?,
+            roughness: self.roughness(parameters, "")?,
+            transmittance: ColorInput::constant(Vec3::ONE),
+            absorption: Vec3::ZERO,
+        })
+    }
+
+    fn thin_dielectric(&mut self, parameters: &Parameters) -> Result<Surface, LoadError> {
+        Ok(Surface::ThinDielectric {
+            ior: self.ior(parameters, "eta", 1.5)?,
+            transmittance: ColorInput::constant(Vec3::ONE),
+        })
+    }
+
+    fn diffuse_transmission(&mut self, parameters: &Parameters) -> Result<Surface, LoadError> {
+        let scale = parameters.float_or("scale", 1.0)?.max(0.0);
+        let scaled = |color: ColorInput| ColorInput { factor: color.factor * scale, ..color };
+        let transmittance = self.color_input(parameters, "transmittance", Meaning::Reflectance)?;
+        Ok(Surface::DiffuseTransmission {
+            reflectance: scaled(self.reflectance(parameters, 0.25)?),
+            transmittance: scaled(transmittance.unwrap_or(ColorInput::constant(Vec3::splat(0.25)))),
+        })
     }
 
     fn note_coat(&mut self, parameters: &Parameters) {
@@ -311,6 +322,20 @@ impl Reader<'_> {
             distribution: Distribution::Ggx,
         })
     }
+}
+
+/// The error about a material that is none of ours.
+fn not_read(parameters: &Parameters, kind: &str) -> LoadError {
+    let read = plain_kinds().map(|(name, _)| name).into_iter().chain(["mix", "interface"]);
+    if NOT_RENDERED.contains(&kind) {
+        let read: Vec<&str> = read.collect();
+        return parameters.unsupported(format_args!("material \"{kind}\" is not rendered; {} are", read.join(", ")));
+    }
+    let meant = match OF_VERSION_3.contains(&kind) {
+        true => UPGRADE.to_owned(),
+        false => suggestion(kind, read),
+    };
+    parameters.error(format_args!("unknown material \"{kind}\"{meant}"))
 }
 
 /// The η and k that reflect a colour at normal incidence as pbrt makes them: η = 1, k = 2√r / √(1 − r).

@@ -92,6 +92,18 @@ enum AlphaKey {
     Number(u32),
 }
 
+impl AlphaKey {
+    fn of(shape: &Parameters) -> Result<Self, LoadError> {
+        let texture = shape.word(&["texture"], "alpha")?.map(str::to_owned);
+        let number = shape.float("alpha")?;
+        Ok(match (texture, number) {
+            (Some(texture), _) => Self::Texture(texture),
+            (None, Some(number)) => Self::Number(number.to_bits()),
+            (None, None) => Self::None,
+        })
+    }
+}
+
 struct Reader<'a> {
     /// The file that was asked for, and the one that is being read.
     main: PathBuf,
@@ -193,13 +205,8 @@ impl Reader<'_> {
                 parameters: Parameters::none(shape.place()),
             })
         });
-        let mut light = self.state.area_light.clone();
-        if light.is_some() && self.current_object.is_some() {
-            self.builder.note("Area lights inside objects do not shine, as in pbrt.");
-            light = None;
-        }
-        let alpha = shape.word(&["texture"], "alpha")?.map(str::to_owned);
-        let alpha_number = shape.float("alpha")?;
+        let light = self.current_light();
+        let alpha = AlphaKey::of(shape)?;
         let medium = self.state.inside_medium.clone();
         if self.state.reverse_orientation && medium.is_none() && self.state.outside_medium.is_some() {
             self.builder.note(format!("{}: the medium outside of a reversed shape is not rendered.", shape.place()));
@@ -209,54 +216,84 @@ impl Reader<'_> {
         let key = MaterialKey {
             material: Statement(Rc::clone(&definition)),
             light: light.clone().map(Statement),
-            alpha: match (&alpha, alpha_number) {
-                (Some(texture), _) => AlphaKey::Texture(texture.clone()),
-                (None, Some(number)) => AlphaKey::Number(number.to_bits()),
-                (None, None) => AlphaKey::None,
-            },
-            medium: medium.clone(),
+            alpha,
+            medium,
         };
         if !has_power && let Some(id) = self.converted.get(&key) {
             return Ok(*id);
         }
         let id = match self.convert_material(&definition)? {
-            None if medium.is_some() => {
-                return Err(shape.unsupported("a volume without a surface is not rendered; absorption behind glass is"));
-            }
             None => {
-                if light.is_some() {
-                    self.builder.note("Area lights of material \"interface\" do not shine, as in pbrt.");
-                }
-                self.builder.note("Shapes of material \"interface\" are not there.");
+                self.note_absent(shape, &key)?;
                 None
             }
             Some(mut material) => {
                 if let Some(light) = &light {
-                    let emission = self.emission(light)?;
-                    material.emission = emission.radiance;
-                    material.emits_both_sides = emission.both_sides;
-                    if let Some(lumen) = emission.lumen {
-                        let sides = if emission.both_sides { 2.0 } else { 1.0 };
-                        let radiance = f64::from(lumen) / (std::f64::consts::PI * area.max(f64::MIN_POSITIVE) * sides);
-                        material.emission.factor *= radiance.min(1e30) as f32;
-                    }
+                    self.shine(&mut material, light, area)?;
                 }
-                if let Some(texture) = alpha {
-                    material.alpha = Alpha::Blend { value: self.scalar_texture(shape, &texture, 0)? };
-                } else if let Some(number) = alpha_number.filter(|&number| number < 1.0) {
-                    material.alpha = match light {
-                        Some(_) if number <= 0.0 => Alpha::Unseen,
-                        _ => Alpha::Blend { value: ScalarInput::constant(number.max(0.0)) },
-                    };
-                }
-                if let Some(name) = medium {
-                    self.fill(&mut material, &name, shape)?;
+                self.cover(&mut material, shape, &key)?;
+                if let Some(name) = &key.medium {
+                    self.fill(&mut material, name, shape)?;
                 }
                 Some(self.builder.add_material(material))
             }
         };
         self.converted.insert(key, id);
         Ok(id)
+    }
+
+    fn current_light(&mut self) -> Option<Rc<Parameters>> {
+        let light = self.state.area_light.clone()?;
+        if self.current_object.is_some() {
+            self.builder.note("Area lights inside objects do not shine, as in pbrt.");
+            return None;
+        }
+        Some(light)
+    }
+
+    /// Says what of a shape without a surface is lost; an error where that is all there is to see of it.
+    fn note_absent(&mut self, shape: &Parameters, key: &MaterialKey) -> Result<(), LoadError> {
+        if key.medium.is_some() {
+            return Err(shape.unsupported("a volume without a surface is not rendered; absorption behind glass is"));
+        }
+        if key.light.is_some() {
+            self.builder.note("Area lights of material \"interface\" do not shine, as in pbrt.");
+        }
+        self.builder.note("Shapes of material \"interface\" are not there.");
+        Ok(())
+    }
+
+    /// Gives a material the light of a shape of such an area.
+    fn shine(&mut self, material: &mut Material, light: &Parameters, area: f64) -> Result<(), LoadError> {
+        let emission = self.emission(light)?;
+        material.emission = emission.radiance;
+        material.emits_both_sides = emission.both_sides;
+        if let Some(lumen) = emission.lumen {
+            let sides = if emission.both_sides { 2.0 } else { 1.0 };
+            let radiance = f64::from(lumen) / (std::f64::consts::PI * area.max(f64::MIN_POSITIVE) * sides);
+            material.emission.factor *= radiance.min(1e30) as f32;
+        }
+        Ok(())
+    }
+
+    /// Gives a material the alpha of a shape.
+    fn cover(&mut self, material: &mut Material, shape: &Parameters, key: &MaterialKey) -> Result<(), LoadError> {
+        match &key.alpha {
+            AlphaKey::Texture(texture) => {
+                material.alpha = Alpha::Blend { value: self.scalar_texture(shape, texture, 0)? };
+            }
+            AlphaKey::Number(bits) => {
+                let number = f32::from_bits(*bits);
+                if number < 1.0 {
+                    material.alpha = match key.light {
+                        Some(_) if number <= 0.0 => Alpha::Unseen,
+                        _ => Alpha::Blend { value: ScalarInput::constant(number.max(0.0)) },
+                    };
+                }
+            }
+            AlphaKey::None => {}
+        }
+        Ok(())
     }
 
     /// Puts the absorption of a medium behind a surface.

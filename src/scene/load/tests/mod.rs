@@ -1,3 +1,4 @@
 //! What readers of several formats promise alike.
 
+mod kinds;
 mod over_time;

@@ -56,91 +56,123 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadErro
     builder.finish(path, if_dark, options)
 }
 
+/// What a file may have at its top.
+const KEYS: &[&str] =
+    &["name", "nits_per_unit", "film", "view", "camera", "environment", "textures", "materials", "objects", "lights"];
+
 /// Everything in a scene file, and what to do if that is dark.
 fn read(path: &Path, options: &LoadOptions) -> Result<(Builder, IfDark), LoadError> {
     let text = files::read_text(path)?;
     let source = Source::new(path, &text);
     let snapshots = animated::snapshots(&source, options.frame_time)?;
     let document = animated::parse(&source, &snapshots)?;
-    let root = Fields::root(
-        &source,
-        document.get_ref(),
-        &[
-            "name",
-            "nits_per_unit",
-            "film",
-            "view",
-            "camera",
-            "environment",
-            "textures",
-            "materials",
-            "objects",
-            "lights",
-        ],
-    )?;
-
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let mut builder = Builder::new(path, options);
-    if let Some(name) = root.get_some("name", |value| value.string())? {
-        builder.name = name.to_owned();
-    }
-    let own_unit = root.get_or("nits_per_unit", 1.0, read_unit)?;
-    builder.set_nits_per_unit(own_unit);
-    if let Some(film) = root.get("film") {
-        builder.film = read_film(&film)?;
-    }
-    if let Some(view) = root.get("view") {
-        builder.viewing = read_view(&view, folder)?;
-    }
-    let mut shutter = Shutter { opens: options.frame_time, stays_open: 0.0 };
-    if let Some(camera) = root.get("camera") {
-        shutter.stays_open = camera.entries()?.get_or("shutter_s", 0.0, Value::non_negative)?;
-        builder.shutter_s = shutter.stays_open;
-        let camera = camera::read(&camera, shutter)?;
-        builder.cameras.push(NamedCamera { name: "camera".to_owned(), holder: None, camera, framing: Framing::Fixed });
-    }
-
-    let mut context =
-        Context { folder, textures: HashMap::new(), texture_names: Vec::new(), shutter, builder, has_flat_lamp: false };
-    if let Some(surroundings) = root.get("environment") {
-        let surroundings =
-            surroundings::read(&surroundings, folder, context.builder.nits_per_unit, &mut context.builder.notes)?;
-        context.builder.environment = Some(surroundings.environment);
-        context.builder.lights.extend(surroundings.sun);
-    }
-    if let Some(textures) = root.get("textures") {
-        for (name, value) in textures.entries()?.all() {
-            context.textures.insert(name, read_texture(&value, folder)?);
-            context.texture_names.push(name);
-        }
-    }
-    let mut materials = material::Materials::default();
-    if let Some(entries) = root.get("materials") {
-        for (name, value) in entries.entries()?.all() {
-            materials.read(&mut context, name, &value)?;
-        }
-    }
-    let list = root.get_or("objects", Vec::new(), Value::array)?;
-    let moves = |object: &&Value| object.entries().is_ok_and(|fields| fields.get("keyframes").is_some());
-    let mut objects = object::Objects::new(&materials, list.iter().filter(moves).count());
-    for value in &list {
-        objects.read(&mut context, value)?;
-    }
-    if let Some(list) = root.get("lights") {
-        for value in list.array()? {
-            context.builder.lights.push(light::read(&value, context.builder.nits_per_unit)?);
-        }
-    }
-    for name in &context.texture_names {
-        if let Some(entry) = context.textures.get(name).filter(|entry| !entry.is_used) {
-            context.builder.note(entry.note_if_idle.as_str());
-        }
-    }
-    if objects.any_moves() {
+    let root = Fields::root(&source, document.get_ref(), KEYS)?;
+    let mut context = Context {
+        folder: path.parent().unwrap_or(Path::new("")),
+        textures: HashMap::new(),
+        texture_names: Vec::new(),
+        shutter: Shutter { opens: options.frame_time, stays_open: 0.0 },
+        builder: Builder::new(path, options),
+        has_flat_lamp: false,
+    };
+    context.read_head(&root)?;
+    context.read_camera(&root)?;
+    context.read_surroundings(&root)?;
+    context.read_textures(&root)?;
+    let materials = context.read_materials(&root)?;
+    let moves = context.read_objects(&root, &materials)?;
+    context.read_lights(&root)?;
+    context.note_idle_textures();
+    if moves {
         context.builder.at_another_time = Some(|path, options| Ok(read(path, options)?.0));
     }
     let is_lit_later = context.has_flat_lamp || snapshots.iter().any(Snapshot::changes_light);
     Ok((context.builder, if is_lit_later { IfDark::Stay } else { IfDark::Fail }))
+}
+
+impl<'a> Context<'a> {
+    /// What the whole scene is called, measured in, drawn on and seen on.
+    fn read_head(&mut self, root: &Fields<'a>) -> Result<(), LoadError> {
+        if let Some(name) = root.get_some("name", |value| value.string())? {
+            self.builder.name = name.to_owned();
+        }
+        self.builder.set_nits_per_unit(root.get_or("nits_per_unit", 1.0, read_unit)?);
+        if let Some(film) = root.get("film") {
+            self.builder.film = read_film(&film)?;
+        }
+        if let Some(view) = root.get("view") {
+            self.builder.viewing = read_view(&view, self.folder)?;
+        }
+        Ok(())
+    }
+
+    fn read_camera(&mut self, root: &Fields<'a>) -> Result<(), LoadError> {
+        let Some(camera) = root.get("camera") else { return Ok(()) };
+        self.shutter.stays_open = camera.entries()?.get_or("shutter_s", 0.0, Value::non_negative)?;
+        self.builder.shutter_s = self.shutter.stays_open;
+        let camera = camera::read(&camera, self.shutter)?;
+        self.builder.cameras.push(NamedCamera {
+            name: "camera".to_owned(),
+            holder: None,
+            camera,
+            framing: Framing::Fixed,
+        });
+        Ok(())
+    }
+
+    fn read_surroundings(&mut self, root: &Fields<'a>) -> Result<(), LoadError> {
+        let Some(surroundings) = root.get("environment") else { return Ok(()) };
+        let surroundings =
+            surroundings::read(&surroundings, self.folder, self.builder.nits_per_unit, &mut self.builder.notes)?;
+        self.builder.environment = Some(surroundings.environment);
+        self.builder.lights.extend(surroundings.sun);
+        Ok(())
+    }
+
+    fn read_textures(&mut self, root: &Fields<'a>) -> Result<(), LoadError> {
+        let Some(textures) = root.get("textures") else { return Ok(()) };
+        for (name, value) in textures.entries()?.all() {
+            self.textures.insert(name, read_texture(&value, self.folder)?);
+            self.texture_names.push(name);
+        }
+        Ok(())
+    }
+
+    fn read_materials(&mut self, root: &Fields<'a>) -> Result<material::Materials<'a>, LoadError> {
+        let mut materials = material::Materials::default();
+        if let Some(entries) = root.get("materials") {
+            for (name, value) in entries.entries()?.all() {
+                materials.read(self, name, &value)?;
+            }
+        }
+        Ok(materials)
+    }
+
+    /// Whether any of them moves.
+    fn read_objects(&mut self, root: &Fields<'a>, materials: &material::Materials<'a>) -> Result<bool, LoadError> {
+        let list = root.get_or("objects", Vec::new(), Value::array)?;
+        let moves = |object: &&Value| object.entries().is_ok_and(|fields| fields.get("keyframes").is_some());
+        let mut objects = object::Objects::new(materials, list.iter().filter(moves).count());
+        for value in &list {
+            objects.read(self, value)?;
+        }
+        Ok(objects.any_moves())
+    }
+
+    fn read_lights(&mut self, root: &Fields<'a>) -> Result<(), LoadError> {
+        for value in root.get_or("lights", Vec::new(), Value::array)? {
+            self.builder.lights.push(light::read(&value, self.builder.nits_per_unit)?);
+        }
+        Ok(())
+    }
+
+    fn note_idle_textures(&mut self) {
+        for name in &self.texture_names {
+            if let Some(entry) = self.textures.get(name).filter(|entry| !entry.is_used) {
+                self.builder.note(entry.note_if_idle.as_str());
+            }
+        }
+    }
 }
 
 fn read_film(value: &Value) -> Result<FilmDefaults, LoadError> {

@@ -23,70 +23,71 @@ pub(super) const fn kinds<'a>() -> [Kind<'a>; 14] {
         ("oren-nayar", oren_nayar, &["reflectance", "roughness"]),
         ("diffuse-transmission", diffuse_transmission, &["reflectance", "transmittance"]),
         ("mirror", mirror, &["reflectance"]),
-        ("conductor", conductor, &["metal", "eta", "k", "tint", "roughness", "roughness_v", "distribution"]),
-        (
-            "dielectric",
-            dielectric,
-            &[
-                "ior",
-                "roughness",
-                "roughness_v",
-                "distribution",
-                "transmittance",
-                "absorption",
-                "attenuation_color",
-                "attenuation_distance",
-            ],
-        ),
+        ("conductor", conductor, CONDUCTOR),
+        ("dielectric", dielectric, DIELECTRIC),
         ("thin-dielectric", thin_dielectric, &["ior", "transmittance"]),
-        (
-            "coated-diffuse",
-            coated_diffuse,
-            &["reflectance", "ior", "roughness", "roughness_v", "distribution", "saturates"],
-        ),
-        (
-            "coated-conductor",
-            coated_conductor,
-            &[
-                "metal",
-                "eta",
-                "k",
-                "roughness",
-                "roughness_v",
-                "distribution",
-                "coat_ior",
-                "coat_roughness",
-                "coat_roughness_v",
-                "coat_distribution",
-            ],
-        ),
-        (
-            "metal-roughness",
-            metal_roughness,
-            &[
-                "base_color",
-                "metallic",
-                "roughness",
-                "ior",
-                "transmission",
-                "specular",
-                "specular_color",
-                "anisotropy",
-                "clearcoat",
-                "clearcoat_roughness",
-                "sheen_color",
-                "sheen_roughness",
-                "absorption",
-                "attenuation_color",
-                "attenuation_distance",
-            ],
-        ),
+        ("coated-diffuse", coated_diffuse, COATED_DIFFUSE),
+        ("coated-conductor", coated_conductor, COATED_CONDUCTOR),
+        ("metal-roughness", metal_roughness, METAL_ROUGHNESS),
         ("phong", phong, &["diffuse", "specular", "exponent"]),
         ("ward", ward, &["diffuse", "specular", "roughness", "roughness_v"]),
         ("he-torrance", he_torrance, &["metal", "eta", "k", "height_nm", "correlation_nm", "diffuse"]),
         ("mix", mix, &["materials", "amount"]),
     ]
 }
+
+const CONDUCTOR: &[&str] = &["metal", "eta", "k", "tint", "roughness", "roughness_v", "distribution"];
+
+const DIELECTRIC: &[&str] = &[
+    "ior",
+    "roughness",
+    "roughness_v",
+    "distribution",
+    "transmittance",
+    "absorption",
+    "attenuation_color",
+    "attenuation_distance",
+];
+
+const COATED_DIFFUSE: &[&str] = &["reflectance", "ior", "roughness", "roughness_v", "distribution", "saturates"];
+
+const COATED_CONDUCTOR: &[&str] = &[
+    "metal",
+    "eta",
+    "k",
+    "roughness",
+    "roughness_v",
+    "distribution",
+    "coat_ior",
+    "coat_roughness",
+    "coat_roughness_v",
+    "coat_distribution",
+];
+
+const METAL_ROUGHNESS: &[&str] = &[
+    "base_color",
+    "metallic",
+    "roughness",
+    "ior",
+    "transmission",
+    "specular",
+    "specular_color",
+    "anisotropy",
+    "clearcoat",
+    "clearcoat_roughness",
+    "sheen_color",
+    "sheen_roughness",
+    "absorption",
+    "attenuation_color",
+    "attenuation_distance",
+];
+
+/// The keys of one roughness: along u, along v, the distribution.
+const ROUGHNESS_KEYS: [&str; 3] = ["roughness", "roughness_v", "distribution"];
+const COAT_ROUGHNESS_KEYS: [&str; 3] = ["coat_roughness", "coat_roughness_v", "coat_distribution"];
+
+/// The keys that say what an inside absorbs.
+const ABSORPTION_KEYS: [&str; 3] = ["absorption", "attenuation_color", "attenuation_distance"];
 
 fn diffuse<'a>(_: &Materials<'a>, context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
     Ok(Surface::Diffuse { reflectance: share(context, &fields.require("reflectance")?)? })
@@ -153,22 +154,20 @@ fn roughness<'a>(
     })
 }
 
-const ROUGHNESS: [&str; 3] = ["roughness", "roughness_v", "distribution"];
-
 fn conductor<'a>(_: &Materials<'a>, context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
     let (eta, k) = metal(fields)?;
     Ok(Surface::Conductor {
         eta,
         k,
         tint: share_or_white(context, fields, "tint")?,
-        roughness: roughness(context, fields, ROUGHNESS)?,
+        roughness: roughness(context, fields, ROUGHNESS_KEYS)?,
     })
 }
 
 fn dielectric<'a>(_: &Materials<'a>, context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
     Ok(Surface::Dielectric {
         ior: fields.get_or("ior", 1.5, Value::positive)? as f32,
-        roughness: roughness(context, fields, ROUGHNESS)?,
+        roughness: roughness(context, fields, ROUGHNESS_KEYS)?,
         transmittance: share_or_white(context, fields, "transmittance")?,
         absorption: absorption(fields)?,
     })
@@ -176,12 +175,10 @@ fn dielectric<'a>(_: &Materials<'a>, context: &mut Context<'a>, fields: &Fields<
 
 /// Absorption of an inside per scene unit: as a coefficient, or as the colour that is left after a distance.
 fn absorption(fields: &Fields<'_>) -> Result<Vec3, LoadError> {
-    let color = fields.get("attenuation_color");
-    let distance = fields.get("attenuation_distance");
-    match (fields.get("absorption"), color, distance) {
-        (None, None, None) => Ok(Vec3::ZERO),
-        (Some(value), None, None) => value.color(),
-        (None, Some(color), Some(distance)) => {
+    match ABSORPTION_KEYS.map(|key| fields.get(key)) {
+        [None, None, None] => Ok(Vec3::ZERO),
+        [Some(value), None, None] => value.color(),
+        [None, Some(color), Some(distance)] => {
             let left = color.color()?;
             if left.max_element() > 1.0 || left.min_element() <= 0.0 {
                 return Err(color.error(format_args!("must lie above 0 and not exceed 1 in any channel: {left}")));
@@ -214,7 +211,7 @@ fn coated_diffuse<'a>(_: &Materials<'a>, context: &mut Context<'a>, fields: &Fie
     Ok(Surface::CoatedDiffuse {
         reflectance: share(context, &fields.require("reflectance")?)?,
         ior: coat_ior(fields, "ior")?,
-        roughness: roughness(context, fields, ROUGHNESS)?,
+        roughness: roughness(context, fields, ROUGHNESS_KEYS)?,
         saturates: fields.get_or("saturates", true, Value::boolean)?,
     })
 }
@@ -228,9 +225,9 @@ fn coated_conductor<'a>(
     Ok(Surface::CoatedConductor {
         eta,
         k,
-        roughness: roughness(context, fields, ROUGHNESS)?,
+        roughness: roughness(context, fields, ROUGHNESS_KEYS)?,
         coat_ior: coat_ior(fields, "coat_ior")?,
-        coat_roughness: roughness(context, fields, ["coat_roughness", "coat_roughness_v", "coat_distribution"])?,
+        coat_roughness: roughness(context, fields, COAT_ROUGHNESS_KEYS)?,
     })
 }
 
@@ -239,11 +236,10 @@ fn metal_roughness<'a>(
     context: &mut Context<'a>,
     fields: &Fields<'a>,
 ) -> Result<Surface, LoadError> {
-    let volume =
-        match ["absorption", "attenuation_color", "attenuation_distance"].iter().any(|key| fields.get(key).is_some()) {
-            true => Some(absorption(fields)?),
-            false => None,
-        };
+    let volume = match ABSORPTION_KEYS.iter().any(|key| fields.get(key).is_some()) {
+        true => Some(absorption(fields)?),
+        false => None,
+    };
     Ok(Surface::MetalRoughness(MetalRoughness {
         base_color: share_or_white(context, fields, "base_color")?,
         metallic: scalar(context, fields, "metallic", 0.0)?,
@@ -287,7 +283,7 @@ fn phong<'a>(_: &Materials<'a>, context: &mut Context<'a>, fields: &Fields<'a>) 
 
 fn ward<'a>(_: &Materials<'a>, context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
     let [diffuse, specular] = base_and_lobe(context, fields)?;
-    Ok(Surface::Ward { diffuse, specular, roughness: roughness(context, fields, ROUGHNESS)? })
+    Ok(Surface::Ward { diffuse, specular, roughness: roughness(context, fields, ROUGHNESS_KEYS)? })
 }
 
 fn he_torrance<'a>(_: &Materials<'a>, context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
