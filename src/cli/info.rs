@@ -341,7 +341,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
         assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
-        assert!(format!("{:#}", describe(&path).unwrap_err()).contains("not an ordinary file"));
+        assert!(format!("{:#}", describe(&path).unwrap_err()).contains("not a regular file"));
     }
 
     #[test]
