@@ -4,6 +4,7 @@
 //! pixels read. The `exr` crate alone believes the header and asks for as much memory as it says, which ends the program.
 
 use crate::output::{Attribute, CROP, FRAMES_PER_SECOND, PartOf};
+use crate::read_file;
 use ::exr::image::read::any_channels::ReadAnyChannels;
 use ::exr::meta::attribute::Text;
 use ::exr::meta::header::Header;
@@ -164,10 +165,7 @@ pub fn read_exr(path: &Path) -> Result<ExrImage, ExrReadError> {
 /// Reads those channels of a file's parts that `choose` chooses among the names of all. Only they take memory.
 pub fn read_exr_channels(path: &Path, choose: impl FnOnce(&[String]) -> Vec<String>) -> Result<ExrImage, ExrReadError> {
     let io = |error| ExrReadError::Io { path: path.to_owned(), error };
-    if path.metadata().map_err(io)?.is_dir() {
-        return Err(io(std::io::Error::new(std::io::ErrorKind::IsADirectory, "it is a folder, not an EXR file")));
-    }
-    decode_exr_channels(path, &std::fs::read(path).map_err(io)?, choose)
+    decode_exr_channels(path, &read_file::bytes(path).map_err(io)?, choose)
 }
 
 /// The layer and the last part of a channel's name, which a dot parts: `beauty.R` is R of beauty, `R` is R of the layer without a name.

@@ -32,14 +32,16 @@ impl HdrHeader {
     fn from_metadata(metadata: &HdrMetadata) -> Self {
         let exposure = metadata.exposure.unwrap_or(1.0);
         let (red, green, blue) = metadata.color_correction.unwrap_or((1.0, 1.0, 1.0));
-        let divisor = |factor: f32| if factor.is_finite() && factor > 0.0 { factor } else { 1.0 };
+        let divisor = |factor: f32| if is_divisor(factor) { factor } else { 1.0 };
         // PIXASPECT is height over width.
-        let height_over_width = f64::from(metadata.pixel_aspect_ratio.unwrap_or(1.0));
+        let height_over_width = metadata.pixel_aspect_ratio.unwrap_or(1.0);
         Self {
             to_light: [red, green, blue].map(|correction| (divisor(exposure) * divisor(correction)).recip()),
-            to_rec709: primaries(metadata).and_then(|own| own.to_adapted(&Primaries::REC709)),
-            pixel_aspect_ratio: if (0.01..=100.0).contains(&height_over_width) {
-                height_over_width.recip()
+            to_rec709: primaries(metadata)
+                .filter(|own| !own.is_like(&Primaries::REC709))
+                .and_then(|own| own.to_adapted(&Primaries::REC709)),
+            pixel_aspect_ratio: if PIXASPECTS.contains(&height_over_width) {
+                f64::from(height_over_width).recip()
             } else {
                 1.0
             },
@@ -53,13 +55,39 @@ impl HdrHeader {
     }
 }
 
-/// The last line of primaries, where it holds eight coordinates of others than Rec.709's.
+/// Heights over widths that a pixel can have.
+const PIXASPECTS: std::ops::RangeInclusive<f32> = 0.01..=100.0;
+
+/// Whether values can have been multiplied by a factor.
+fn is_divisor(factor: f32) -> bool {
+    factor.is_finite() && factor > 0.0
+}
+
+/// The lines of a header that say what cannot be and are not looked at; none of what is no Radiance picture. `bytes` are those of
+/// [`with_known_header`].
+pub fn notes(bytes: &[u8]) -> Vec<String> {
+    let Ok(decoder) = HdrDecoder::new(bytes) else { return Vec::new() };
+    let metadata = decoder.metadata();
+    let exposure = metadata.exposure.is_some_and(|factor| !is_divisor(factor));
+    let correction =
+        metadata.color_correction.is_some_and(|(red, green, blue)| [red, green, blue].map(is_divisor).contains(&false));
+    let aspect = metadata.pixel_aspect_ratio.is_some_and(|aspect| !PIXASPECTS.contains(&aspect));
+    let said = metadata.custom_attributes.iter().any(|(key, _)| key.trim() == PRIMARIES);
+    let colours = said && primaries(&metadata).is_none_or(|own| own.to_adapted(&Primaries::REC709).is_none());
+    let not_read = [("EXPOSURE", exposure), ("COLORCORR", correction), ("PIXASPECT", aspect), (PRIMARIES, colours)];
+    let of = |name: &str| format!("its {name} says what cannot be, and is not looked at");
+    not_read.iter().filter(|(_, is_wrong)| *is_wrong).map(|(name, _)| of(name)).collect()
+}
+
+/// The variable that names the colours of a picture.
+const PRIMARIES: &str = "PRIMARIES";
+
+/// The last line of primaries, where it holds eight coordinates.
 fn primaries(metadata: &HdrMetadata) -> Option<Primaries> {
-    let (_, text) = metadata.custom_attributes.iter().rfind(|(key, _)| key.trim() == "PRIMARIES")?;
+    let (_, text) = metadata.custom_attributes.iter().rfind(|(key, _)| key.trim() == PRIMARIES)?;
     let numbers: Vec<f64> = text.split_whitespace().map(|word| word.parse().ok()).collect::<Option<_>>()?;
     let &[rx, ry, gx, gy, bx, by, wx, wy] = &numbers[..] else { return None };
-    let own = Primaries { red: [rx, ry], green: [gx, gy], blue: [bx, by], white: [wx, wy] };
-    (!own.is_like(&Primaries::REC709)).then_some(own)
+    Some(Primaries { red: [rx, ry], green: [gx, gy], blue: [bx, by], white: [wx, wy] })
 }
 
 /// Primaries whose red, green and blue are CIE's X, Y and Z.
@@ -151,5 +179,27 @@ mod tests {
             assert_eq!(picture(useless).pixel_aspect_ratio, 1.0, "{useless}");
         }
         assert_eq!(HdrHeader::of(b"words").light([3.0; 3]), [3.0; 3]);
+    }
+
+    #[test]
+    fn lines_that_say_what_cannot_be_are_told() {
+        let said = |lines: &str| {
+            notes(format!("#?RADIANCE\n{lines}FORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n\x01\x01\x01\x01").as_bytes())
+                .join("; ")
+        };
+        for (name, values) in [
+            ("EXPOSURE", &["nan", "inf", "0", "-4"][..]),
+            ("COLORCORR", &["nan 1 1", "1 0 1"]),
+            ("PIXASPECT", &["0", "-1", "nan"]),
+            ("PRIMARIES", &["0 0 0 0 0 0 0 0", "1 2 3", "nan 0 0 1 0 0 0.3 0.3"]),
+        ] {
+            for value in values {
+                let expected = format!("its {name} says what cannot be, and is not looked at");
+                assert_eq!(said(&format!("{name}={value}\n")), expected, "{value}");
+            }
+        }
+        let sound =
+            "EXPOSURE=4\nCOLORCORR=1 2 1\nPIXASPECT=2\nPRIMARIES=0.640 0.330 0.290 0.600 0.150 0.060 0.333 0.333\n";
+        assert_eq!((said(sound), notes(b"words")), (String::new(), Vec::new()));
     }
 }

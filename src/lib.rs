@@ -31,6 +31,7 @@ pub mod light;
 pub mod lock;
 pub mod output;
 pub mod preview;
+pub mod read_file;
 pub mod sampler;
 pub mod say;
 pub mod scene;

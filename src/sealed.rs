@@ -5,6 +5,7 @@
 //! Not for files that people or other programs read.
 
 use crate::output::{OutputError, write_beside};
+use crate::read_file;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::fs::File;
@@ -202,9 +203,5 @@ impl Write for Sealing<'_> {
 }
 
 fn open(path: &Path) -> Result<File, SealedError> {
-    let file = File::open(path).and_then(|file| match file.metadata()?.is_dir() {
-        true => Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder")),
-        false => Ok(file),
-    });
-    file.map_err(|error| SealedError::Io { path: path.to_owned(), error })
+    read_file::open(path).map_err(|error| SealedError::Io { path: path.to_owned(), error })
 }

@@ -51,7 +51,7 @@ pub enum Error {
         y: usize,
     },
     /// A parameter outside its range.
-    #[error("{what} is {value}; it must be {expected}")]
+    #[error("{what} is {}; it must be {expected}", brief(*.value))]
     OutOfRange {
         /// Which parameter.
         what: &'static str,
@@ -78,6 +78,11 @@ pub enum Error {
         /// What is wrong with it, with line and column where known.
         reason: String,
     },
+}
+
+/// A number in words, of few digits however large it is.
+fn brief(value: f64) -> String {
+    if value == 0.0 || (1e-5..1e15).contains(&value.abs()) { value.to_string() } else { format!("{value:e}") }
 }
 
 /// `Ok` when `value` lies in `[low, high]`; NaN never does.

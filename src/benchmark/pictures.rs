@@ -52,9 +52,11 @@ pub(crate) fn write_pictures(
     Ok(())
 }
 
-/// Whether all pictures are beside a record.
+/// Whether all pictures are beside a record, with something in them.
 pub(super) fn are_there(record: &Path) -> bool {
-    KINDS.iter().all(|kind| file(record, kind.ending).is_file())
+    let is_there =
+        |kind: &Kind| file(record, kind.ending).metadata().is_ok_and(|file| file.is_file() && file.len() > 0);
+    KINDS.iter().all(is_there)
 }
 
 /// The pictures beside a record; empty if they are not there.

@@ -15,6 +15,7 @@ use super::denoise::DenoiseChoice;
 use super::job::{Quality, Size, parse_size};
 use super::numbers::{parse_positive, parse_seconds, parse_seed, parse_stops, parse_unit, whole};
 use super::seeing::{AskedPresentation, display_help, operator_values};
+use super::targets::{Named, display_file};
 use super::{signals, threads};
 use anyhow::Result;
 use clap::{Args, ValueEnum};
@@ -219,6 +220,11 @@ impl AnimateArguments {
             operator: self.operator.as_deref(),
             exposure_stops: self.exposure,
         }
+    }
+
+    /// The files that it reads; what the scene is made of is known once that is loaded.
+    fn files(&self) -> [Named<'_>; 3] {
+        [("the scene", Some(&self.scene)), ("the gaze", self.gaze.as_deref()), display_file(self.display.as_deref())]
     }
 
     /// Whether eyes are to follow what moves.

@@ -7,6 +7,7 @@ use fechner::checkpoint::{is_checkpoint, read_checkpoint};
 use fechner::exr_read::{ExrImage, MEMORY_LIMIT_BYTES, SampleType, read_exr_channels};
 use fechner::hdr_read::{is_xyze, with_known_header};
 use fechner::jpeg_read;
+use fechner::read_file;
 use image::ImageDecoder;
 use std::fmt::Write as _;
 use std::io::{Cursor, Read as _};
@@ -36,12 +37,8 @@ fn describe(path: &Path) -> anyhow::Result<String> {
 /// A film's file may have any name.
 fn is_film(path: &Path) -> anyhow::Result<bool> {
     let cannot_read = || format!("cannot read {}", path.display());
-    let found = path.metadata().with_context(cannot_read)?;
-    if !found.is_file() {
-        bail!("{}: {}", cannot_read(), if found.is_dir() { "it is a folder" } else { "it is not an ordinary file" });
-    }
     let mut start = Vec::new();
-    std::fs::File::open(path).and_then(|file| file.take(16).read_to_end(&mut start)).with_context(cannot_read)?;
+    read_file::open(path).and_then(|file| file.take(16).read_to_end(&mut start)).with_context(cannot_read)?;
     Ok(is_checkpoint(&start))
 }
 
@@ -344,7 +341,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
         assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
-        assert!(format!("{:#}", describe(&path).unwrap_err()).contains("not an ordinary file"));
+        assert!(format!("{:#}", describe(&path).unwrap_err()).contains("not a regular file"));
     }
 
     #[test]

@@ -82,11 +82,23 @@ fn number(exr: &ExrImage, name: &str) -> Option<f32> {
     }
 }
 
-/// The display that a file was made for: as the file has it, else, of an older one, the preset that it names, where that is still the
-/// same.
+/// The display of a description, where it is one that can be.
+fn described(description: &str) -> Option<Display> {
+    serde_json::from_str(description).ok().filter(|display: &Display| display.check().is_ok())
+}
+
+/// What to say of a file whose description of its display is damaged.
+pub(super) fn display_not_read(exr: &ExrImage) -> Option<String> {
+    let description = text(exr, DISPLAY)?;
+    let is_damaged = described(description).is_none();
+    is_damaged.then(|| format!("its {DISPLAY} cannot be read, and is not looked at"))
+}
+
+/// The display that a file was made for: as the file has it, else, of an older or a damaged one, the preset that it names, where that is
+/// still the same.
 pub(super) fn display_in(exr: &ExrImage) -> Option<Display> {
-    if let Some(said) = text(exr, DISPLAY) {
-        return serde_json::from_str(said).ok().filter(|display: &Display| display.check().is_ok());
+    if let Some(display) = text(exr, DISPLAY).and_then(described) {
+        return Some(display);
     }
     let preset = Display::preset(text(exr, "fechner.observer.display")?)?;
     let values = [

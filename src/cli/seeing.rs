@@ -7,6 +7,7 @@ use super::targets::{Named, display_file};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
+use fechner::read_file;
 use fechner::scene::Scene;
 use fechner::scene::load::count_as_read;
 use fechner_perception::csf;
@@ -157,7 +158,7 @@ fn find_display(name: &str) -> Result<Display> {
     if !name.ends_with(".toml") {
         bail!("there is no display \"{name}\"; known: {}, or a .toml file", Display::preset_names().join(", "));
     }
-    let text = std::fs::read_to_string(Path::new(name)).with_context(|| format!("display file {name}"))?;
+    let text = read_file::text(Path::new(name)).with_context(|| format!("display file {name}"))?;
     count_as_read(Path::new(name));
     Display::from_toml(&text).with_context(|| format!("display file {name}"))
 }

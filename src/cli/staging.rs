@@ -143,10 +143,11 @@ impl Staging {
             }
         }
         if let Some(look) = self.look_at {
-            let forward = (look.to - look.from).try_normalize().context("--look-at: the points are too close")?;
-            if !look.from.is_finite() {
-                bail!("--look-at: the points must be finite");
+            let way = look.to - look.from;
+            if !way.length().is_finite() {
+                bail!("--look-at: the points are too far apart");
             }
+            let forward = way.try_normalize().context("--look-at: the points are too close")?;
             scene.camera = look.camera(&scene.camera, forward);
             scene.notes.retain(|note| note != NO_CAMERA);
         }

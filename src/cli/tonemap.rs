@@ -351,7 +351,7 @@ impl Eye {
         let mut state = arguments.adapted_to.map(|cd_m2| AdaptationState::adapted_to(Goal::both(cd_m2), &kinetics));
         let mut is_between_frames = false;
         if let Some(path) = arguments.state.as_ref().filter(|path| path.exists()) {
-            let text = std::fs::read_to_string(path).with_context(|| format!("{}", path.display()))?;
+            let text = fechner::read_file::text(path).with_context(|| format!("{}", path.display()))?;
             let read = serde_json::from_str(&text).ok().filter(AdaptationState::is_possible);
             state = Some(read.with_context(|| format!("{}: not an eye's state as tonemap leaves it", path.display()))?);
             is_between_frames = true;

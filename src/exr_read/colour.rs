@@ -57,6 +57,9 @@ impl ExrImage {
             }
             make_finite(&mut [rgb.as_flattened_mut()]);
         }
+        if self.chromaticities.is_some_and(|own| own.to(&Primaries::REC709).is_none()) {
+            notes.push("its chromaticities span no colours, and are not looked at".to_owned());
+        }
         notes.extend(self.colour_space_not_heeded());
         if self.lines_left_out > 0 {
             notes.push(format!("the last {} lines could not be read", self.lines_left_out));

@@ -111,7 +111,7 @@ fn a_picture_too_large_for_memory_is_refused_by_its_size() {
 fn what_is_no_exr_file_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let message = |path: &Path| read_exr(path).unwrap_err().to_string();
-    assert!(message(folder.path()).contains("it is a folder"));
+    assert!(message(folder.path()).contains("is a directory, not a file"));
     assert!(message(&folder.path().join("none.exr")).contains("none.exr"));
     let path = folder.path().join("text.exr");
     std::fs::write(&path, "").unwrap();

@@ -1,7 +1,9 @@
 //! Where a farm's files are, and how units are numbered.
 
-use super::manifest::{FrameEntry, Manifest, ManifestError};
+use super::manifest::{FrameEntry, Manifest, ManifestError, PictureFormat, Work};
+use crate::animate::name::FrameName;
 use crate::output::{OutputError, write_beside};
+use crate::read_file;
 use crate::scene::hash::ContentHash;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -55,7 +57,7 @@ impl Farm {
     /// If there is none that this program can work on.
     pub fn open(folder: &Path) -> Result<Self, ManifestError> {
         let path = Self::manifest_file(folder);
-        let text = std::fs::read(&path).map_err(|error| ManifestError::Io { path: path.clone(), error })?;
+        let text = read_file::bytes(&path).map_err(|error| ManifestError::Io { path: path.clone(), error })?;
         let manifest = Manifest::parse(&path, &text)?;
         Ok(Self { folder: folder.to_owned(), manifest, id: ContentHash::of_bytes(&text) })
     }
@@ -93,6 +95,27 @@ impl Farm {
     /// Finished pictures.
     pub fn pictures(&self) -> PathBuf {
         self.folder.join("pictures")
+    }
+
+    /// The name of the pictures of a shot that are of a format.
+    pub fn frame_pattern(format: PictureFormat) -> String {
+        format!("frame.####.{}", format.ending())
+    }
+
+    /// The picture of a finished frame.
+    pub fn picture(&self, frame_index: usize) -> PathBuf {
+        let (format, number) = (self.manifest.picture_format, self.frame(frame_index).frame);
+        let of_shot = || FrameName::parse(&Self::frame_pattern(format)).map(|name| name.of(number));
+        let name = match self.manifest.work {
+            Work::Render => None,
+            Work::Animate => of_shot(),
+        };
+        self.pictures().join(name.unwrap_or_else(|| PathBuf::from(format!("picture.{}", format.ending()))))
+    }
+
+    /// Whether the picture of a finished frame is there, with something in it.
+    pub fn has_picture(&self, frame_index: usize) -> bool {
+        self.picture(frame_index).metadata().is_ok_and(|file| file.is_file() && file.len() > 0)
     }
 
     /// A frame's own folder.
@@ -153,7 +176,7 @@ impl Farm {
 mod tests {
     use super::*;
     use crate::checkpoint::{Origin, Tracing};
-    use crate::farm::{FrameEntry, Work};
+    use crate::farm::FrameEntry;
     use crate::integrator::TraceSettings;
 
     #[test]

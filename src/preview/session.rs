@@ -46,9 +46,9 @@ pub(super) fn run(job: Job, host: &Arc<dyn Host>, mut options: Options, shared: 
     while !shared.is_closing() {
         let Some(job) = next.take() else {
             let is_asked = shared.take_commands().iter().any(|c| matches!(c, Command::Reload | Command::Restart));
-            match host.load() {
-                Ok(job) if is_asked => next = Some(job),
-                _ => shared.wait(Duration::from_millis(250)),
+            next = if is_asked { host.load().ok() } else { None };
+            if next.is_none() {
+                shared.wait(Duration::from_millis(250));
             }
             continue;
         };

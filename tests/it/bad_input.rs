@@ -163,6 +163,49 @@ fn a_side_file_adds_what_the_scene_lacks() {
     assert!(message.contains("quad.fechner.toml:1: unknown key \"camra\"; did you mean \"camera\"?"), "{message}");
 }
 
+/// A link that leads nowhere and a folder were passed over in silence, with the lights that they were to bring.
+#[cfg(unix)]
+#[test]
+fn a_side_file_that_is_no_file_is_refused() {
+    let place = tempfile::tempdir().unwrap();
+    let scene = place.path().join("quad.obj");
+    std::fs::write(&scene, "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n").unwrap();
+    let side = place.path().join("quad.fechner.toml");
+    let refused = |expected: &str| {
+        let message = load(&scene, &LoadOptions::default()).unwrap_err().to_string();
+        assert!(message.contains("quad.fechner.toml: ") && message.contains(expected), "{message}");
+    };
+    std::os::unix::fs::symlink("nowhere", &side).unwrap();
+    refused("no such file");
+    std::fs::remove_file(&side).unwrap();
+    std::os::unix::fs::symlink("/dev/zero", &side).unwrap();
+    refused("is not a regular file");
+    std::fs::remove_file(&side).unwrap();
+    std::fs::create_dir(&side).unwrap();
+    refused("is a directory");
+}
+
+/// Eight files of ten includes each ask for a hundred million spheres, which ended in an abort for want of memory.
+#[test]
+fn files_that_include_each_other_often_are_refused() {
+    let place = tempfile::tempdir().unwrap();
+    let refused = |first: &str, include: fn(usize) -> String, last: &str, head: &str, foot: &str| {
+        for level in 0..8 {
+            let inner = if level < 7 { include(level + 1) } else { last.to_owned() };
+            let (head, foot) = if level == 0 || !foot.is_empty() { (head, foot) } else { ("", "") };
+            let file = place.path().join(include(level).split('"').nth(1).unwrap());
+            std::fs::write(file, format!("{head}{}{foot}", inner.repeat(10))).unwrap();
+        }
+        let message = load(&place.path().join(first), &LoadOptions::default()).unwrap_err().to_string();
+        assert!(message.contains("more than 4000000"), "{message}");
+    };
+    let include = |level: usize| format!("Include \"{level}.pbrt\"\n");
+    refused("0.pbrt", include, "Shape \"sphere\"\n", "Camera \"perspective\"\nWorldBegin\n", "");
+    refused("0.pbrt", include, "LightSource \"point\"\n", "Camera \"perspective\"\nWorldBegin\n", "");
+    let include = |level: usize| format!("<include filename=\"{level}.xml\"/>\n");
+    refused("0.xml", include, "<shape type=\"sphere\"/>\n", "<scene version=\"3.0.0\">\n", "</scene>\n");
+}
+
 #[test]
 fn damaged_gltf_never_panics() {
     let place = tempfile::tempdir().unwrap();

@@ -161,9 +161,15 @@ fn a_shot_is_whole_with_its_video_and_its_pictures() {
 
     let lost = farm.join("pictures/frame.0005.exr");
     let before = file(&lost);
-    std::fs::remove_file(&lost).expect("was there");
+    assert!(run(&farm, 0, &["farm", "status", "."]).contains("frame 5: done\n"));
+    std::fs::write(&lost, "").expect("emptied");
+    let message = run(&farm, 0, &["farm", "status", "."]);
+    assert!(message.contains("frame 5: done, but its picture is gone or empty") && !is_done(&farm), "{message}");
     let message = run(&farm, 2, &["farm", "work", "."]);
-    assert!(message.contains("frame.0005.exr is gone") && message.contains("frame-0005/result.json"), "{message}");
+    assert!(
+        message.contains("frame.0005.exr is gone or empty") && message.contains("frame-0005/result.json"),
+        "{message}"
+    );
     std::fs::remove_file(farm.join("frame-0005/result.json")).expect("was there");
     work(&farm);
     assert!(file(&lost) == before, "the picture made again differs");

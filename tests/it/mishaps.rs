@@ -124,18 +124,26 @@ fn outputs_replace_no_texture() {
     let textured = format!(
         "{scene}\n[textures.t]\nfile = \"t.1.png\"\n[materials.textured]\ntype = \"diffuse\"\nreflectance = {{ texture = \"t\" }}\n"
     );
+    std::fs::write(folder.path().join("c.toml"), textured.replace("t.1.png", "c.contact.png")).expect("written");
     std::fs::write(folder.path().join("t.toml"), textured).expect("written");
-    image::RgbImage::from_pixel(2, 2, image::Rgb([9, 99, 200])).save(folder.path().join("t.1.png")).expect("written");
-    let before = std::fs::read(folder.path().join("t.1.png")).expect("there");
+    let textures = ["t.1.png", "c.contact.png"].map(|name| folder.path().join(name));
+    for texture in &textures {
+        image::RgbImage::from_pixel(2, 2, image::Rgb([9, 99, 200])).save(texture).expect("written");
+    }
+    let before = std::fs::read(&textures[0]).expect("there");
     for arguments in [
         &["render", "t.toml", "--size", "8x8", "--spp", "4", "-o", "t.1.png"][..],
         &["render", "t.toml", "--size", "8x8", "--spp", "4", "-o", "a.png", "--json", "t.1.png"],
         &["animate", "t.toml", "--size", "8x8", "--spp", "4", "--frames", "0..2", "-o", "t.#.png"],
+        // The contact sheet's name.
+        &["animate", "c.toml", "--size", "8x8", "--spp", "4", "--frames", "0..1", "-o", "c.#.png"],
     ] {
         let output = fechner(folder.path()).args(arguments).output().expect("runs");
         let said = words(&output);
         assert!(output.status.code() == Some(2) && said.contains("that the scene is made of"), "{arguments:?}: {said}");
-        assert_eq!(std::fs::read(folder.path().join("t.1.png")).expect("there"), before, "{arguments:?}");
+        for texture in &textures {
+            assert_eq!(std::fs::read(texture).expect("there"), before, "{arguments:?}");
+        }
     }
 }
 
@@ -147,7 +155,15 @@ fn outputs_replace_no_inputs() {
         fechner(folder.path()).args(RENDER).args(["-o", name]).output().expect("runs");
     }
     let sequence = ["compare", "f.##.exr", "f.##.exr", "--fps", "24"];
-    let cases: [(&[&str], &str); 9] = [
+    for name in ["g.json", "g.y4m", "g.0.json", "g.track.json"] {
+        std::fs::write(folder.path().join(name), "frame,x,y\n0,4,4\n").expect("written");
+    }
+    let shot = ["animate", "s.toml", "--size", "8x8", "--spp", "4", "--frames", "0..1", "-o", "g.#.png", "--gaze"];
+    let cases: [(&[&str], &str); 13] = [
+        (&[&shot[..], &["g.json"]].concat(), "the shot's record would replace the gaze"),
+        (&[&shot[..], &["g.0.json"]].concat(), "a frame's record would replace the gaze"),
+        (&[&shot[..], &["g.track.json"]].concat(), "the track would replace the gaze"),
+        (&[&shot[..], &["g.y4m", "--video", "g.y4m"]].concat(), "--video would replace the gaze"),
         (&[&RENDER[..], &["-o", "c.png", "--json", "s.toml"]].concat(), "--json would replace the scene"),
         (&[&RENDER[..], &["-o", "b.exr", "--importance", "b.exr"]].concat(), "-o would replace the importance map"),
         (&["compare", "a.exr", "b.exr", "--json", "./a.exr"], "--json would replace the reference"),
@@ -164,7 +180,8 @@ fn outputs_replace_no_inputs() {
             "-o and --state name the same",
         ),
     ];
-    let read = ["s.toml", "a.exr", "b.exr", "f.02.exr"].map(|name| folder.path().join(name));
+    let read = ["s.toml", "a.exr", "b.exr", "f.02.exr", "g.json", "g.y4m", "g.0.json", "g.track.json"]
+        .map(|name| folder.path().join(name));
     let before = read.each_ref().map(|path| std::fs::read(path).expect("there"));
     for (arguments, refusal) in cases {
         let output = fechner(folder.path()).args(arguments).output().expect("runs");

@@ -111,6 +111,60 @@ fn files_of_another_kind_and_cut_off_ones_are_refused() {
     refused("c.jpg", "is cut off");
 }
 
+/// What has no end was read until memory ended, and a pipe for ever.
+#[cfg(unix)]
+#[test]
+fn what_has_no_end_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), "a.exr", |_| [50.0; 3]);
+    std::fs::write(folder.path().join("s.obj"), "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n").expect("written");
+    std::fs::create_dir(folder.path().join("farm")).expect("made");
+    for name in ["z.exr", "z.hdr", "z.png", "z.jpg", "z.csv", "z.toml", "z.film", "farm/manifest.json"] {
+        std::os::unix::fs::symlink("/dev/zero", folder.path().join(name)).expect("a link");
+    }
+    let shot = ["animate", "s.obj", "--frames", "0..1", "--size", "8x8", "-o", "f.#.exr"];
+    let render = ["render", "s.obj", "--size", "8x8", "-o", "o.exr"];
+    for arguments in [
+        &["compare", "a.exr", "z.exr"][..],
+        &["compare", "a.exr", "z.hdr", "--nits-per-unit", "1"],
+        &["compare", "a.exr", "z.png"],
+        &["compare", "a.exr", "z.jpg"],
+        &["threshold", "a.exr", "-o", "t.exr", "--velocity", "z.exr"],
+        &["tonemap", "a.exr", "-o", "t.png", "--display", "z.toml"],
+        &["merge", "z.film", "z.film", "-o", "m.film"],
+        &["info", "z.film"],
+        &["farm", "status", "farm"],
+        &[&render[..], &["--importance", "z.png"]].concat(),
+        &[&shot[..], &["--gaze", "z.csv"]].concat(),
+    ] {
+        let (code, said) = fechner(folder.path(), arguments);
+        assert!(code == 2 && said.contains("is not a regular file"), "{arguments:?}: {said}");
+    }
+}
+
+/// What headers say and cannot be is told, and is as if it were not there.
+#[test]
+fn headers_that_say_what_cannot_be_are_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let hdr = b"#?RADIANCE\nEXPOSURE=nan\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n\x80\x80\x80\x80";
+    std::fs::write(folder.path().join("a.hdr"), hdr).expect("written");
+    let (_, said) = fechner(folder.path(), &["compare", "a.hdr", "a.hdr", "--nits-per-unit", "1"]);
+    assert!(said.contains("its EXPOSURE says what cannot be, and is not looked at"), "{said}");
+    for (name, attribute, expected) in [
+        ("n.exr", (NITS_PER_UNIT, Attribute::Float(-5.0)), "nits_per_unit -5e0 is not a luminance"),
+        ("d.exr", ("fechner.display", Attribute::Text("{".to_owned())), "its fechner.display cannot be read"),
+    ] {
+        let mut picture = Picture::new(16, 16);
+        for channel in ["R", "G", "B"] {
+            picture.push_f32(channel, vec![0.5; 256]);
+        }
+        picture.push_attribute(attribute.0, attribute.1);
+        write_exr(&folder.path().join(name), &picture).expect("written");
+        let (code, said) = fechner(folder.path(), &["compare", name, name, "--nits-per-unit", "100"]);
+        assert!(code == 0 && said.contains(expected), "{name}: {said}");
+    }
+}
+
 /// What is no picture to look at is refused.
 #[test]
 fn a_map_is_a_png() {

@@ -1,6 +1,7 @@
 //! What is written beside a frame's picture: its figures, and by what a later run knows that it need not be made again.
 
 use anyhow::{Context, Result};
+use fechner::read_file;
 use fechner::scene::hash::ContentHash;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -61,11 +62,11 @@ pub(super) fn name(file: &Path) -> String {
 
 /// Of all bytes of a file.
 pub(super) fn hash_of_file(file: &Path) -> Result<ContentHash> {
-    let bytes = std::fs::read(file).with_context(|| format!("{}", file.display()))?;
+    let bytes = read_file::bytes(file).with_context(|| format!("{}", file.display()))?;
     Ok(ContentHash::of_bytes(&bytes))
 }
 
 /// What is in a file, or nothing if it is not there or not whole.
 pub(super) fn read_json<T: serde::de::DeserializeOwned>(file: &Path) -> Option<T> {
-    serde_json::from_slice(&std::fs::read(file).ok()?).ok()
+    serde_json::from_slice(&read_file::bytes(file).ok()?).ok()
 }

@@ -12,6 +12,7 @@ use fechner::animate::gaze::GazeTrack;
 use fechner::animate::velocity::VelocityOf;
 use fechner::denoise::Denoiser;
 use fechner::integrator::TraceSettings;
+use fechner::read_file;
 use fechner::scene::Scene;
 
 /// Command line before scene before default.
@@ -73,7 +74,7 @@ fn eye(arguments: &AnimateArguments) -> Result<Eye> {
 /// Where the shot is looked at. A table of another shot's frames, or of places outside the picture, is a slip.
 fn gaze(arguments: &AnimateArguments, size: Size, shot: Frames) -> Result<Option<GazeTrack>> {
     let Some(path) = &arguments.gaze else { return Ok(None) };
-    let table = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
+    let table = read_file::text(path).with_context(|| path.display().to_string())?;
     let track = GazeTrack::parse(&table).with_context(|| path.display().to_string())?;
     let says = |frame: &u32| !track.of_frame(*frame, size.width, size.height).is_empty();
     let count = shot.last - shot.first + 1;

@@ -14,7 +14,7 @@ use crate::cli::console::Console;
 use crate::cli::json::write_json;
 use crate::cli::report::Report;
 use crate::cli::seeing::{Presentation, tone_operator};
-use crate::cli::targets::check_scene_kept;
+use crate::cli::targets::{Named, check_kept, check_scene_kept};
 use anyhow::{Context, Result, bail};
 use fechner::adaptive::settings::{AllocationRule, LoopSettings};
 use fechner::animate::name::FrameName;
@@ -76,17 +76,35 @@ impl<'a> Shot<'a> {
         for note in &scene.notes {
             say!("note: {note}");
         }
-        let files: Vec<PathBuf> = arguments.frame_numbers().map(|frame| name.of(frame)).collect();
-        check_scene_kept(&files.iter().map(|file| ("-o", Some(file.as_path()))).collect::<Vec<_>>())?;
         let settings = shot_settings(arguments, &scene, whole)?;
         let Presentation { operator, exposure_stops, .. } = arguments.asked_presentation().of_scene(&scene);
         let operator_name = operator.to_owned();
         let shot = Self { arguments, source, settings, operator_name, exposure_stops, name, format };
+        shot.check_inputs_kept()?;
         let operator = shot.operator()?;
         if arguments.adapted_to.is_some() && !operator.sees_adaptation() {
             bail!("--adapted-to: {} does not know an eye that adapts over time", operator.name());
         }
         Ok(shot)
+    }
+
+    /// Refuses to write in the place of what is read, which is known once the scene and the display are loaded.
+    fn check_inputs_kept(&self) -> Result<()> {
+        let frames: Vec<PathBuf> = self.arguments.frame_numbers().map(|frame| self.file(frame)).collect();
+        let records: Vec<PathBuf> = frames.iter().map(|frame| FrameRecord::file(frame)).collect();
+        let (track, of_whole) = (self.track_file(), self.files_of_whole()?);
+        let of_frames = frames.iter().map(|frame| ("-o", Some(frame.as_path())));
+        let of_records = records.iter().map(|record| ("a frame's record", Some(record.as_path())));
+        let of_shot = of_whole.iter().map(|(what, file)| (*what, Some(file.as_path())));
+        let written: Vec<Named> =
+            of_frames.chain(of_records).chain([("the track", Some(track.as_path()))]).chain(of_shot).collect();
+        check_kept(&self.arguments.files(), &written)?;
+        check_scene_kept(&written)
+    }
+
+    /// What is known of the shot's frames beforehand.
+    fn track_file(&self) -> PathBuf {
+        self.name.of_shot("track.json")
     }
 
     /// Makes the folder of the frames, once all that can be refused has been, and checks that they can be written.
@@ -210,7 +228,7 @@ impl<'a> Shot<'a> {
         self.frame_of_track(frame, track)?.with_context(|| {
             format!(
                 "frame {frame}: its scene has changed since {} was made: call again; a farm must be planned anew",
-                self.name.of_shot("track.json").display()
+                self.track_file().display()
             )
         })
     }

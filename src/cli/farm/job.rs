@@ -19,7 +19,7 @@ use fechner::output;
 use fechner::scene::Scene;
 use fechner::scene::hash::ContentHash;
 use std::cell::OnceCell;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 /// `render`'s options less its files.
@@ -75,7 +75,7 @@ impl JobOptions {
                 Ok(Self::Still(Box::new(options.job)))
             }
             Work::Animate => {
-                let name = pictures.join(format!("frame.####.{}", format.ending()));
+                let name = pictures.join(Farm::frame_pattern(format));
                 let name = name.to_str().context("the folder's name must be Unicode")?.to_owned();
                 let arguments = arguments.iter().cloned().chain(["--output".to_owned(), name]);
                 let options = ShotOptions::try_parse_from(arguments).map_err(wrong)?;
@@ -214,11 +214,11 @@ impl Job<'_> {
     }
 
     /// Writes the pictures of a finished frame, and says its figures.
-    pub(super) fn write(&self, farm: &Farm, number: u32, frame: &Frame, rendered: Rendered) -> Result<Report> {
+    pub(super) fn write(&self, farm: &Farm, frame_index: usize, frame: &Frame, rendered: Rendered) -> Result<Report> {
         match (self, &frame.kind) {
             (Self::Still(arguments), FrameKind::Still(settings)) => {
                 let report = Report::new(&arguments.scene_name(), &frame.header.seeds.all, settings, &rendered);
-                let path = self.picture(farm, number);
+                let path = farm.picture(frame_index);
                 let format = output::check_target(&path)?;
                 let part_of = frame.header.origin.part_of();
                 write_picture(&path, format, arguments.background(), &rendered, settings, &report, part_of)?;
@@ -227,17 +227,9 @@ impl Job<'_> {
             }
             (Self::Shot { shot, .. }, FrameKind::OfShot(of_shot)) => {
                 let velocity = of_shot.scenes.velocity(&frame.tracer(), shot.settings.velocity_of);
-                shot.keep(number, of_shot, &RenderedFrame { rendered, velocity })
+                shot.keep(farm.frame(frame_index).frame, of_shot, &RenderedFrame { rendered, velocity })
             }
             _ => bail!("a frame of another farm"),
-        }
-    }
-
-    /// The picture's file of a frame.
-    pub(super) fn picture(&self, farm: &Farm, number: u32) -> PathBuf {
-        match self {
-            Self::Still(_) => farm.pictures().join(format!("picture.{}", farm.manifest().picture_format.ending())),
-            Self::Shot { shot, .. } => shot.file(number),
         }
     }
 

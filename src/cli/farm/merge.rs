@@ -93,7 +93,7 @@ pub(super) fn merge(bench: &Bench<'_>, frame_index: usize, lock: &Lock) -> Resul
     let number = farm.frame(frame_index).frame;
     if lock.is_sole() {
         // Of merges that were killed as they wrote.
-        for path in [farm.film(frame_index), farm.finished_film(frame_index), job.picture(farm, number)] {
+        for path in [farm.film(frame_index), farm.finished_film(frame_index), farm.picture(frame_index)] {
             output::remove_leftovers(&path);
         }
     }
@@ -127,7 +127,7 @@ pub(super) fn merge(bench: &Bench<'_>, frame_index: usize, lock: &Lock) -> Resul
             let Some(look) = last_look else { bail!("frame {number} ended without a look") };
             let kept = farm.manifest().keeps_films.then(|| state.clone());
             let rendered = Rendered::new(state, look.judgement, look.stop_reason);
-            let report = job.write(farm, number, &frame, rendered)?;
+            let report = job.write(farm, frame_index, &frame, rendered)?;
             let text = serde_json::to_vec_pretty(&report).context("the report could not be put into words")?;
             finish(farm, frame_index, kept.as_ref().map(|state| (frame.header(), state)), &text)?;
             Ok(MergeWent::On)
@@ -142,11 +142,10 @@ pub(super) fn conclude(farm: &Farm, job: &Job<'_>) -> Result<()> {
         return Ok(());
     }
     for frame_index in indices {
-        let picture = job.picture(farm, farm.frame(frame_index).frame);
-        if !picture.exists() {
-            let result = farm.result(frame_index);
+        if !farm.has_picture(frame_index) {
+            let (picture, result) = (farm.picture(frame_index), farm.result(frame_index));
             bail!(
-                "{} is gone, though its frame is done: remove {}, and it is rendered again",
+                "{} is gone or empty, though its frame is done: remove {}, and it is rendered again",
                 picture.display(),
                 result.display()
             );

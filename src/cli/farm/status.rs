@@ -45,6 +45,8 @@ struct FrameStatus {
     missing: Vec<u64>,
     /// Of these, how many a process has now.
     running: usize,
+    /// Whether its picture is there: that of a frame that is done may have been lost.
+    has_picture: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -69,7 +71,7 @@ pub(super) fn run(arguments: &StatusArguments) -> Result<ExitCode> {
     let farm = Farm::open(&absolute(&arguments.folder)?)?;
     let frames: Vec<FrameStatus> =
         (0..farm.manifest().frames.len()).map(|frame_index| of_frame(&farm, frame_index)).collect();
-    let are_done = frames.iter().all(|frame| frame.state == State::Done);
+    let are_done = frames.iter().all(|frame| frame.state == State::Done && frame.has_picture);
     let status = Status { done: are_done && farm.concluded().exists(), frames };
     if arguments.json {
         answer!("{}", serde_json::to_string_pretty(&status).context("the status could not be put into words")?);
@@ -102,6 +104,7 @@ fn of_frame(farm: &Farm, frame_index: usize) -> FrameStatus {
         samples: round.as_ref().map_or(0, |round| round.samples),
         round: round.map(|round| round.round),
         running: missing.iter().filter(is_running).count(),
+        has_picture: farm.has_picture(frame_index),
         missing,
     }
 }
@@ -110,7 +113,10 @@ fn say(status: &Status) {
     for frame in &status.frames {
         let number = frame.frame;
         match (frame.state, frame.round) {
-            (State::Done, _) => answer!("frame {number}: done"),
+            (State::Done, _) if frame.has_picture => answer!("frame {number}: done"),
+            (State::Done, _) => {
+                answer!("frame {number}: done, but its picture is gone or empty: fechner farm work says what to do")
+            }
             (State::Merge, None) => answer!("frame {number}: to be merged"),
             (State::Merge, Some(round)) => answer!("frame {number}: round {round} is to be merged"),
             (State::Open, _) => answer!(
@@ -125,7 +131,8 @@ fn say(status: &Status) {
     }
     let done = status.frames.iter().filter(|frame| frame.state == State::Done).count();
     answer!("{done} of {} done", count(status.frames.len(), "frame"));
-    if done == status.frames.len() && !status.done {
+    let have_pictures = status.frames.iter().all(|frame| frame.has_picture);
+    if done == status.frames.len() && have_pictures && !status.done {
         answer!("what needs all frames is not made yet: fechner farm merge makes it");
     }
 }

@@ -5,9 +5,10 @@ use crate::cli::channels::{self, Colour};
 use crate::cli::kept_tone::{self, KeptTone};
 use anyhow::{Context, Result, bail};
 use fechner::exr_read::ExrImage;
-use fechner::hdr_read::{HdrHeader, with_known_header};
+use fechner::hdr_read::{self, HdrHeader, with_known_header};
 use fechner::jpeg_read;
 use fechner::output::{self, Attribute, NITS_PER_UNIT, PngTransfer};
+use fechner::read_file;
 use fechner::scene;
 use fechner_perception::Plane;
 use fechner_perception::primaries::Primaries;
@@ -66,7 +67,7 @@ impl InputPicture {
         let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
         match ending.as_deref() {
             Some("exr") => Self::from_exr(source, &channels::read_picture(path)?, unit),
-            Some("hdr") => Self::from_hdr(path, unit.in_cd_m2(source, || None)?),
+            Some("hdr") => Self::from_hdr(source, unit.in_cd_m2(source, || None)?),
             Some("png" | "jpg" | "jpeg") => Self::from_codes(source),
             _ => bail!("{}: not a picture that can be judged: .exr, .hdr, .png and .jpg are read", path.display()),
         }
@@ -81,7 +82,7 @@ impl InputPicture {
                 source.path.display()
             );
         };
-        for text in channels::guess(exr).iter().chain(&picture.notes) {
+        for text in channels::guess(exr).iter().chain(&picture.notes).chain(&kept_tone::display_not_read(exr)) {
             source.note(text);
         }
         let kept_tone = KeptTone::of(exr);
@@ -104,10 +105,13 @@ impl InputPicture {
         })
     }
 
-    fn from_hdr(path: &Path, nits_per_unit: f64) -> Result<Self> {
-        let bytes = std::fs::read(path).with_context(|| format!("{}", path.display()))?;
-        let header = HdrHeader::of(&with_known_header(&bytes));
+    fn from_hdr(source: Source<'_>, nits_per_unit: f64) -> Result<Self> {
+        let path = source.path;
+        let bytes = read_file::bytes(path).with_context(|| format!("{}", path.display()))?;
         let mut picture = Self::from_image(decoded_image(path, &bytes)?, Content::Scene { nits_per_unit });
+        let known = with_known_header(&bytes);
+        hdr_read::notes(&known).iter().for_each(|text| source.note(text));
+        let header = HdrHeader::of(&known);
         picture.rgb.iter_mut().for_each(|rgb| *rgb = header.light(*rgb));
         picture.pixel_aspect_ratio = header.pixel_aspect_ratio;
         Ok(picture)
@@ -115,7 +119,7 @@ impl InputPicture {
 
     fn from_codes(source: Source<'_>) -> Result<Self> {
         let path = source.path;
-        let bytes = std::fs::read(path).with_context(|| format!("{}", path.display()))?;
+        let bytes = read_file::bytes(path).with_context(|| format!("{}", path.display()))?;
         let image = decoded_image(path, &bytes)?;
         let colour = output::png_colour(&bytes);
         for text in colour.notes.iter().chain(&jpeg_read::notes(&bytes)) {
@@ -184,7 +188,11 @@ fn decoded_image(path: &Path, bytes: &[u8]) -> Result<DynamicImage> {
     limits.max_image_height = Some(1 << 15);
     limits.max_alloc = Some(1 << 30);
     reader.limits(limits);
-    reader.decode().with_context(|| format!("{}: not a readable picture", path.display()))
+    let image = reader.decode().with_context(|| format!("{}: not a readable picture", path.display()))?;
+    if found == ImageFormat::Jpeg && !jpeg_read::is_complete(bytes, &image) {
+        bail!("{}: {}", path.display(), jpeg_read::INCOMPLETE);
+    }
+    Ok(image)
 }
 
 /// What files of a format are called.
@@ -219,7 +227,7 @@ fn picture_channel<'a>(exr: &'a ExrImage, name: &str) -> Option<&'a [f32]> {
 /// by few.
 fn unit_in_file(source: Source<'_>, exr: &ExrImage) -> Option<f64> {
     let said = [NITS_PER_UNIT, "whiteLuminance"].into_iter().find_map(|name| match exr.attribute(name) {
-        Some(Attribute::Float(nits)) if *nits > 0.0 => Some((name, *nits)),
+        Some(Attribute::Float(nits)) => Some((name, *nits)),
         _ => None,
     });
     let (name, nits) = said?;

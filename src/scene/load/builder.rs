@@ -66,6 +66,8 @@ pub(super) struct Builder {
     pub(super) deforming: HashSet<MeshId>,
     pub(super) instances: Vec<Instance>,
     pub(super) spheres: Vec<Sphere>,
+    /// Things that wait in groups to be placed.
+    pub(super) parts_of_groups: usize,
     pub(super) materials: Vec<Material>,
     pub(super) textures: Requests,
     /// As [`Scene::bitangent_ignores_v`].
@@ -98,6 +100,7 @@ impl Builder {
             deforming: HashSet::new(),
             instances: Vec::new(),
             spheres: Vec::new(),
+            parts_of_groups: 0,
             materials: Vec::new(),
             textures: Requests::default(),
             bitangent_ignores_v: false,
@@ -136,6 +139,11 @@ impl Builder {
     pub(super) fn add_material(&mut self, material: Material) -> MaterialId {
         self.materials.push(material);
         MaterialId(self.materials.len() as u32 - 1)
+    }
+
+    /// How many things are placed so far: see [`super::check_placed`].
+    pub(super) fn placed(&self) -> usize {
+        self.instances.len() + self.spheres.len() + self.lights.len() + self.parts_of_groups
     }
 
     /// Adds a sentence, once; those that differ in their line alone are counted.

@@ -1,6 +1,7 @@
 //! Reading whole files, with a limit and with errors that say what the path is when it is no file.
 
 use super::error::LoadError;
+use crate::read_file;
 use std::collections::BTreeSet;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -35,14 +36,7 @@ pub fn count_as_read(path: &Path) {
 
 /// The whole file.
 pub(crate) fn read(path: &Path) -> Result<Vec<u8>, LoadError> {
-    // Opened only after the look at its kind: opening a pipe would wait for a writer for ever.
-    let metadata = std::fs::metadata(path).map_err(|error| LoadError::unreadable(path, &error))?;
-    if metadata.is_dir() {
-        return Err(LoadError::Unreadable { file: path.to_owned(), problem: "is a directory, not a file".to_owned() });
-    }
-    if !metadata.is_file() {
-        return Err(LoadError::Unreadable { file: path.to_owned(), problem: "is not a regular file".to_owned() });
-    }
+    let metadata = read_file::check(path).map_err(|error| LoadError::unreadable(path, &error))?;
     if metadata.len() > LARGEST_FILE_BYTES {
         let problem = format!("{} MiB, at most {} MiB are read", metadata.len() >> 20, LARGEST_FILE_BYTES >> 20);
         return Err(LoadError::too_large(path, problem));

@@ -114,7 +114,8 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
 }
 
 fn load_at_time(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
-    let side = toml::side::of(path).filter(|side| side != path && path.extension().is_some_and(|e| e != "toml"));
+    let is_foreign = path.extension().is_some_and(|extension| extension != "toml");
+    let side = if is_foreign { toml::side::of(path)? } else { None };
     let Some(side) = side else { return load_alone(path, options) };
     let options = &toml::side::before(&side, options)?;
     let mut scene = load_alone(path, options)?;
@@ -159,13 +160,13 @@ fn check_made_vertices(path: &Path, vertices: usize) -> Result<(), LoadError> {
     ))
 }
 
-/// Refuses files that place meshes without end: few words can place a large group often.
-fn check_placed(path: &Path, meshes: usize) -> Result<(), LoadError> {
-    const MOST_MESHES: usize = 4_000_000;
-    if meshes <= MOST_MESHES {
+/// Refuses files that place things without end: few words can place a large group often, and include a file that includes others.
+fn check_placed(path: &Path, things: usize) -> Result<(), LoadError> {
+    const MOST_THINGS: usize = 4_000_000;
+    if things <= MOST_THINGS {
         return Ok(());
     }
-    Err(LoadError::too_large(path, format_args!("more than {MOST_MESHES} placed meshes")))
+    Err(LoadError::too_large(path, format_args!("more than {MOST_THINGS} placed meshes, spheres and lights")))
 }
 
 fn stem_ends_with(path: &Path, extension: &str) -> bool {

@@ -29,7 +29,7 @@ impl Shot<'_> {
             self.note_outdated()?;
             return Ok(false);
         }
-        for file in self.files_of_whole()? {
+        for (_, file) in self.files_of_whole()? {
             output::remove_leftovers(&file);
         }
         write_json(&self.name.of_shot("json"), &records)?;
@@ -52,18 +52,20 @@ impl Shot<'_> {
     /// Names what there is of the shot as it was before, whose frames are no longer those.
     fn note_outdated(&self) -> Result<()> {
         let files = self.files_of_whole()?;
-        let outdated: Vec<String> =
-            files.filter(|file| file.is_file()).map(|file| file.display().to_string()).collect();
+        let files = files.iter().filter(|(_, file)| file.is_file());
+        let outdated: Vec<String> = files.map(|(_, file)| file.display().to_string()).collect();
         if !outdated.is_empty() {
             say!("note: still of the shot as it was before, until all its frames are there: {}", outdated.join(", "));
         }
         Ok(())
     }
 
-    /// The files of what only the whole shot has.
-    fn files_of_whole(&self) -> Result<impl Iterator<Item = PathBuf>> {
-        let video = self.arguments.video()?.map(|(path, _)| path.to_owned());
-        Ok([Some(self.name.of_shot("json")), Some(self.name.of_shot("contact.png")), video].into_iter().flatten())
+    /// The files of what only the whole shot has, each with the option or words that name it.
+    pub(super) fn files_of_whole(&self) -> Result<Vec<(&'static str, PathBuf)>> {
+        let video = self.arguments.video()?.map(|(path, _)| ("--video", path.to_owned()));
+        let always =
+            [("the shot's record", self.name.of_shot("json")), ("the contact sheet", self.name.of_shot("contact.png"))];
+        Ok(always.into_iter().chain(video).collect())
     }
 
     /// Looks for all frames of the shot. One of another scene, other settings or another format is not there.

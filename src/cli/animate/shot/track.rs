@@ -19,7 +19,7 @@ impl Shot<'_> {
     /// The track that lies beside the frames, if it is of this shot and the scenes of all `wanted` frames are still those that
     /// it was made from; else a new one.
     pub(in crate::cli) fn track(&self, wanted: RangeInclusive<u32>) -> Result<Track> {
-        let file = self.name.of_shot("track.json");
+        let file = self.track_file();
         let operator = self.operator()?;
         if let Some(track) = read_json::<Track>(&file) {
             if self.is_up_to_date(&track, operator.as_ref(), wanted)? {

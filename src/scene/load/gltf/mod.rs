@@ -230,7 +230,7 @@ impl<'a> Reader<'a> {
         to_world: Affine3A,
         motion: Option<Motion>,
     ) -> Result<(), LoadError> {
-        super::check_placed(self.path, self.builder.instances.len() + parts.len())?;
+        super::check_placed(self.path, self.builder.placed() + parts.len())?;
         self.builder.instances.extend(parts.iter().map(|&(mesh, material)| Instance {
             name: name.to_owned(),
             mesh,

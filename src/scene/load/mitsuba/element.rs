@@ -14,7 +14,7 @@ use std::rc::Rc;
 
 /// Deepest nesting of elements and of includes.
 const DEEPEST: usize = 64;
-/// Most elements of a document.
+/// Most elements of a document, and of all that it includes.
 const MOST_NODES: u32 = 4_000_000;
 
 /// Most bytes of a text after its `$name` were replaced: values that hold values grow without bounds.
@@ -43,6 +43,8 @@ pub(super) struct Given {
     defaults: HashMap<String, String>,
     /// Folders of `<path>`, the last one first.
     folders: Vec<PathBuf>,
+    /// How many elements were read.
+    elements: u32,
 }
 
 impl Given {
@@ -107,6 +109,13 @@ impl TreeBuilder<'_> {
         let place = Place::line(&self.file, line);
         if depth > DEEPEST {
             return Err(LoadError::invalid_at(place, format_args!("elements nested deeper than {DEEPEST}")));
+        }
+        self.given.elements += 1;
+        if self.given.elements > MOST_NODES {
+            return Err(LoadError::too_large(
+                &self.file,
+                format_args!("more than {MOST_NODES} elements with those included"),
+            ));
         }
         let mut attributes = Vec::new();
         for attribute in node.attributes() {

@@ -70,9 +70,10 @@ impl Reader {
     fn place(&mut self, mesh: MeshId, material: MaterialId, to_world: Affine3A) -> Result<(), LoadError> {
         if let Some(parts) = &mut self.current_group {
             parts.push((mesh, material, to_world));
+            self.builder.parts_of_groups += 1;
             return Ok(());
         }
-        super::super::check_placed(&self.main, self.builder.instances.len() + 1)?;
+        super::super::check_placed(&self.main, self.builder.placed() + 1)?;
         let name = self.builder.meshes[mesh.0 as usize].name.clone();
         self.builder.instances.push(Instance { name, mesh, material, to_world, motion: None });
         Ok(())

@@ -312,7 +312,10 @@ impl Reader<'_> {
                 self.named_materials.insert(name, Rc::new(definition));
             }
             Entity::MakeNamedMedium => self.medium(&name, &parameters)?,
-            Entity::LightSource => self.light(&name, &parameters)?,
+            Entity::LightSource => {
+                super::super::check_placed(&self.main, self.builder.placed() + 1)?;
+                self.light(&name, &parameters)?;
+            }
             Entity::AreaLightSource => {
                 if name != "diffuse" {
                     return Err(
@@ -322,7 +325,7 @@ impl Reader<'_> {
                 self.state.area_light = Some(Rc::new(parameters));
             }
             Entity::Shape => {
-                super::super::check_placed(&self.main, self.builder.instances.len() + 1)?;
+                super::super::check_placed(&self.main, self.builder.placed() + 1)?;
                 self.shape(&name, &parameters)?;
             }
             Entity::Camera => {
@@ -392,7 +395,7 @@ impl Reader<'_> {
         if self.current_object.is_some() {
             return Err(LoadError::invalid_at(place, "an object cannot hold an instance of another"));
         }
-        super::super::check_placed(&self.main, self.builder.instances.len() + parts.len())?;
+        super::super::check_placed(&self.main, self.builder.placed() + parts.len())?;
         let transforms = self.state.transforms;
         let placed: Vec<_> = parts.iter().map(|part| shapes::place_part(self, part, &transforms)).collect();
         self.builder.instances.extend(placed);

@@ -121,6 +121,7 @@ impl Reader<'_> {
             Some(object) => {
                 let parts = self.objects.entry(object.clone()).or_default();
                 parts.push(super::Part { name, mesh, material, transforms });
+                self.builder.parts_of_groups += 1;
             }
             None => {
                 let motion = self.motion(&transforms);

@@ -1,6 +1,6 @@
 //! The body: numbers in text or bytes, never more of them than there are bytes for.
 
-use super::super::error::LoadError;
+use super::super::error::{LoadError, Place};
 use super::header::{Element, Encoding, Header, Kind};
 use std::path::Path;
 
@@ -13,12 +13,16 @@ pub(super) struct Values<'a> {
 }
 
 impl<'a> Values<'a> {
+    /// Those of a file.
     pub(super) fn new(path: &'a Path, bytes: &'a [u8], header: &Header) -> Self {
-        Self { path, bytes, at: 0, encoding: header.encoding }
+        Self { path, bytes, at: header.body, encoding: header.encoding }
     }
 
+    /// An error at the number that was read last, with its line where there are lines.
     pub(super) fn error(&self, problem: impl std::fmt::Display) -> LoadError {
-        LoadError::invalid(self.path, problem)
+        let ends = || self.bytes[..self.at].iter().filter(|&&byte| byte == b'\n').count();
+        let line = (self.encoding == Encoding::Ascii).then(|| ends() + 1);
+        LoadError::invalid_at(Place { file: self.path.to_owned(), line }, problem)
     }
 
     pub(super) fn bytes_left(&self) -> usize {

@@ -26,7 +26,7 @@ pub(super) struct Loaded {
 pub(super) fn read(path: &Path) -> Result<Loaded, LoadError> {
     let bytes = files::read_unpacked(path)?;
     let header = header::parse(path, &bytes)?;
-    let mut values = Values::new(path, &bytes[header.body..], &header);
+    let mut values = Values::new(path, &bytes, &header);
     let mut mesh =
         Mesh { name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(), ..Mesh::default() };
     let mut notes = Vec::new();

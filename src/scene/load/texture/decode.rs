@@ -4,7 +4,7 @@
 use super::Picture;
 use crate::exr_read::layers::colour_layer;
 use crate::exr_read::{self, ExrImage, Replaced, Window, layer_and_part};
-use crate::hdr_read::{HdrHeader, with_known_header};
+use crate::hdr_read::{self, HdrHeader, with_known_header};
 use crate::jpeg_read;
 use crate::scene::load::{LoadError, files};
 use crate::scene::{Encoding, Texels};
@@ -140,11 +140,15 @@ pub(in crate::scene::load) fn decode_bytes(
         return Err(LoadError::invalid(name, jpeg_read::CUT_OFF));
     }
     let image = DynamicImage::from_decoder(decoder).map_err(wrong)?;
+    if format == ImageFormat::Jpeg && !jpeg_read::is_complete(bytes, &image) {
+        return Err(LoadError::invalid(name, jpeg_read::INCOMPLETE));
+    }
     let mut notes = Vec::new();
     let texels = match eight_bit {
         true => Texels::Bytes(Arc::new(image.into_rgba8().into_raw().as_chunks::<4>().0.to_vec()), encoding),
         false => {
             let header = (format == ImageFormat::Hdr).then(|| HdrHeader::of(bytes));
+            notes.extend(hdr_read::notes(bytes));
             let mut texels = linear_floats(image, encoding, header, &mut notes);
             if values == Values::Colours {
                 texels.iter_mut().for_each(|[rgb @ .., _]| *rgb = gamut::light(*rgb));

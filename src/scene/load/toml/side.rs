@@ -6,6 +6,7 @@
 
 use super::fields::{Fields, Source, Value};
 use super::{animated, camera, light, read_film, read_unit, read_view, surroundings};
+use crate::read_file;
 use crate::scene::load::error::LoadError;
 use crate::scene::load::{LoadOptions, NO_CAMERA, Shutter, files};
 use crate::scene::{Scene, ViewingDefaults};
@@ -13,10 +14,15 @@ use std::path::{Path, PathBuf};
 
 const KNOWN: [&str; 6] = ["nits_per_unit", "film", "view", "camera", "environment", "lights"];
 
-/// The side file of a scene, if there is one with something in it.
-pub(in crate::scene::load) fn of(scene: &Path) -> Option<PathBuf> {
+/// The side file of a scene, if there is one with something in it. What has its name and is no file is refused: a link that leads nowhere
+/// was to bring lights and a camera.
+pub(in crate::scene::load) fn of(scene: &Path) -> Result<Option<PathBuf>, LoadError> {
     let beside = side_file(scene);
-    std::fs::metadata(&beside).is_ok_and(|file| file.is_file() && file.len() > 0).then_some(beside)
+    if std::fs::symlink_metadata(&beside).is_err() {
+        return Ok(None);
+    }
+    let file = read_file::check(&beside).map_err(|error| LoadError::unreadable(&beside, &error))?;
+    Ok((file.len() > 0).then_some(beside))
 }
 
 /// Where the side file of a scene is, or would be.
