@@ -9,7 +9,7 @@
 //! and shadowing of both kinds of light by the height-correlated G2 of Pharr, Jakob & Humphreys (2023), section 9.7;
 //! Kulla & Conty (2017) for the compensation. Not for sheets without an inside: see the thin dielectric.
 
-use super::dielectric_tables::{DielectricCompensation, DielectricTables};
+use super::dielectric_tables::{DielectricCompensation, DielectricTables, Side};
 use super::energy::{self, LARGEST_SINGLE_SHARE};
 use super::microfacets::Microfacets;
 use super::mirror::reflect_about_normal;
@@ -85,9 +85,8 @@ impl<'a> Dielectric<'a> {
     }
 
     fn near(&self, facets: &Facets<'a>, wo: Vec3) -> Near<'a> {
-        let outside = wo.z > 0.0;
-        let up = if outside { wo } else { turn(wo) };
-        let compensation = facets.tables.map(|tables| tables.compensation(&facets.microfacets, outside));
+        let (side, up) = if wo.z > 0.0 { (Side::Outside, wo) } else { (Side::Inside, turn(wo)) };
+        let compensation = facets.tables.map(|tables| tables.compensation(&facets.microfacets, side));
         let single_share = compensation.map_or(1.0, |c| (1.0 - c.near.at(up)).clamp(0.05, LARGEST_SINGLE_SHARE));
         let compensation_reflects = compensation.map_or(0.0, |c| {
             let reflected = 1.0 - c.transmitted_share;
@@ -160,8 +159,8 @@ impl<'a> Dielectric<'a> {
 impl Near<'_> {
     /// A direction by one of the lobes, `None` where the facet sends it to a side that it cannot reach.
     fn choose(&self, u: [f32; 3]) -> Option<Vec3> {
-        let (single, rest) = warp::choose(u[2], self.single_share);
-        if !single {
+        let warp::Choice { is_taken: scatters_once, rest } = warp::choose(u[2], self.single_share);
+        if !scatters_once {
             let wi = self.grazing.sample([u[0], u[1]]);
             return Some(if rest < self.compensation_reflects { wi } else { turn(wi) });
         }

@@ -12,6 +12,13 @@ use crate::scene::Distribution;
 use glam::Vec3;
 use std::fmt;
 
+/// On which side of a boundary a path is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Side {
+    Outside,
+    Inside,
+}
+
 /// What a rough dielectric boundary of one index keeps after one facet, for both sides, and how what it loses is split
 /// between reflection and transmission. Make one per index of refraction and share it.
 #[derive(Clone)]
@@ -84,15 +91,18 @@ impl DielectricTables {
         self.distribution
     }
 
-    /// The compensation of a boundary of such `facets` for a path that is outside or inside.
+    /// The compensation of a boundary of such `facets` for a path on one side of it.
     ///
     /// Reciprocity asks that b·(1 − E_avg)·η² be the same for both sides, b being the transmitted share. Kulla and Conty
     /// leave one number free; it is set so that b is the smooth boundary's average transmittance on the side that loses
     /// less, which keeps b in [0, 1] on both.
-    pub(crate) fn compensation(&self, facets: &Microfacets, outside: bool) -> DielectricCompensation<'_> {
+    pub(crate) fn compensation(&self, facets: &Microfacets, side: Side) -> DielectricCompensation<'_> {
         let outer = self.outside.along(facets, self.anisotropic.as_ref().map(|sides| &sides.outside));
         let inner = self.inside.along(facets, self.anisotropic.as_ref().map(|sides| &sides.inside));
-        let (near, far, index) = if outside { (outer, inner, 1.0) } else { (inner, outer, self.eta) };
+        let (near, far, index) = match side {
+            Side::Outside => (outer, inner, 1.0),
+            Side::Inside => (inner, outer, self.eta),
+        };
         let transmittance = self.throughput / (index * index);
         DielectricCompensation {
             near,

@@ -136,7 +136,7 @@ struct Albedos {
 
 /// Probabilities of the lobes; they sum to 1.
 #[derive(Clone, Copy, Debug)]
-struct Shares {
+struct LobeProbabilities {
     specular: f32,
     multiple: f32,
     diffuse: f32,
@@ -159,7 +159,16 @@ enum Choice {
     ThroughMultiple,
 }
 
-impl Shares {
+impl Choice {
+    fn goes_through(self) -> bool {
+        match self {
+            Self::ThroughSingle | Self::ThroughMultiple => true,
+            Self::Specular | Self::Multiple | Self::Diffuse => false,
+        }
+    }
+}
+
+impl LobeProbabilities {
     fn choose(&self, u: f32) -> Choice {
         let choices = [
             (self.specular, Choice::Specular),
@@ -248,7 +257,7 @@ impl MetalRoughness {
         }
     }
 
-    fn shares(&self, albedos: &Albedos) -> Option<Shares> {
+    fn shares(&self, albedos: &Albedos) -> Option<LobeProbabilities> {
         let through = self.transmitted.max_element();
         let specular = albedos.specular.max_element();
         let multiple = albedos.multiple.max_element();
@@ -256,7 +265,7 @@ impl MetalRoughness {
         let through_single = through * albedos.through_single;
         let through_multiple = through * albedos.through_multiple;
         let total = specular + multiple + diffuse + through_single + through_multiple;
-        (total > 0.0).then(|| Shares {
+        (total > 0.0).then(|| LobeProbabilities {
             specular: specular / total,
             multiple: multiple / total,
             diffuse: diffuse / total,
@@ -277,7 +286,7 @@ impl MetalRoughness {
         }
     }
 
-    fn evaluate_front(&self, near: &Albedos, shares: &Shares, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
+    fn evaluate_front(&self, near: &Albedos, shares: &LobeProbabilities, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
         if wi.z > 0.0 {
             self.evaluate_reflection(near, shares, wo, wi)
         } else if wi.z < 0.0 {
@@ -287,7 +296,7 @@ impl MetalRoughness {
         }
     }
 
-    fn evaluate_reflection(&self, near: &Albedos, shares: &Shares, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
+    fn evaluate_reflection(&self, near: &Albedos, shares: &LobeProbabilities, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
         let far = self.albedos(wi);
         let base = (1.0 - near.coat) * (1.0 - far.coat) * wi.z * FRAC_1_PI / self.base_average;
         let mut value = self.diffuse * base;
@@ -303,7 +312,7 @@ impl MetalRoughness {
 
     /// Light that goes through, with `wi` already mirrored to the upper side: the facets' reflection lobe, upside down,
     /// with what they do not reflect.
-    fn evaluate_transmission(&self, near: &Albedos, shares: &Shares, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
+    fn evaluate_transmission(&self, near: &Albedos, shares: &LobeProbabilities, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
         let Some(facets) = &self.facets else {
             return BsdfEvaluation::BLACK;
         };
@@ -325,22 +334,21 @@ impl MetalRoughness {
         let near = self.albedos(front);
         let shares = self.shares(&near)?;
         let choice = shares.choose(u[2]);
-        let through = matches!(choice, Choice::ThroughSingle | Choice::ThroughMultiple);
         let up = match (choice, &self.facets) {
             (Choice::Diffuse, _) => warp::cosine_hemisphere([u[0], u[1]]),
-            (_, None) => return Some(self.sample_smooth(&near, &shares, wo, through)),
+            (_, None) => return Some(self.sample_smooth(&near, &shares, wo, choice)),
             (Choice::Multiple | Choice::ThroughMultiple, Some(facets)) => facets.grazing.sample([u[0], u[1]]),
             (Choice::Specular | Choice::ThroughSingle, Some(facets)) => {
                 facets.microfacets.sample_reflection(front, [u[0], u[1]])?
             }
         };
-        let wi = if through { turn(up) } else { up };
+        let wi = if choice.goes_through() { turn(up) } else { up };
         self.evaluate_front(&near, &shares, front, wi).sample_turned(wi, wo)
     }
 
     /// The delta lobes of a perfectly smooth coat.
-    fn sample_smooth(&self, near: &Albedos, shares: &Shares, wo: Vec3, through: bool) -> BsdfSample {
-        if through {
+    fn sample_smooth(&self, near: &Albedos, shares: &LobeProbabilities, wo: Vec3, choice: Choice) -> BsdfSample {
+        if choice.goes_through() {
             BsdfSample {
                 wi: -wo,
                 weight: self.transmitted * (near.through_single / shares.through_single),

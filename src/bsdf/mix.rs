@@ -37,7 +37,7 @@ impl<'a> Mix<'a> {
     }
 
     pub(super) fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
-        let (takes_second, rest) = warp::choose(u[2], self.amount);
+        let warp::Choice { is_taken: takes_second, rest } = warp::choose(u[2], self.amount);
         let (model, share) = if takes_second { (self.second, self.amount) } else { (self.first, 1.0 - self.amount) };
         let sample = model.sample(wo, [u[0], u[1], rest])?;
         if sample.lobe.is_delta() {

@@ -160,12 +160,12 @@ pub fn passed_by_clearcoat(clearcoat: f32, roughness: f32, cosine: f32) -> f32 {
 
 /// A direction in the frame of the coat and in that of what lies beneath.
 #[derive(Clone, Copy, Debug)]
-struct Seen {
+struct CoatAndBaseDirections {
     by_coat: Vec3,
     by_base: Vec3,
 }
 
-impl Seen {
+impl CoatAndBaseDirections {
     /// Whether it is on the same side of both. What is not would leak light.
     fn sides_agree(&self) -> bool {
         let [coat, base] = [self.by_coat.z, self.by_base.z];
@@ -177,8 +177,9 @@ impl Seen {
         Self { by_coat: turn(self.by_coat), by_base: turn(self.by_base) }
     }
 
-    fn turned_if(self, is_turned: bool) -> Self {
-        if is_turned { self.turned() } else { self }
+    /// As seen from the side of the coat that `wo` is on.
+    fn seen_from(self, wo: &Self) -> Self {
+        if wo.by_coat.z < 0.0 { self.turned() } else { self }
     }
 }
 
@@ -210,20 +211,20 @@ impl<'a> Varnish<'a> {
         Self { to_base, ..self }
     }
 
-    fn seen(&self, w: Vec3) -> Seen {
-        Seen { by_coat: w, by_base: self.to_base.map_or(w, |to_base| to_base * w) }
+    fn in_both_frames(&self, w: Vec3) -> CoatAndBaseDirections {
+        CoatAndBaseDirections { by_coat: w, by_base: self.to_base.map_or(w, |to_base| to_base * w) }
     }
 
     pub(super) fn has_smooth_lobe(&self) -> bool {
         self.base.has_smooth_lobe() || self.sheen.is_some() || self.clearcoat > 0.0 && self.coat.facets.is_some()
     }
 
-    fn coat_passed(&self, w: &Seen) -> f32 {
+    fn coat_passed(&self, w: &CoatAndBaseDirections) -> f32 {
         1.0 - self.clearcoat * self.coat.reflectance(w.by_coat)
     }
 
     /// What the coat and the sheen leave of what passes both ways; directions of the upper half.
-    fn passed_to_base(&self, wo: &Seen, wi: &Seen) -> f32 {
+    fn passed_to_base(&self, wo: &CoatAndBaseDirections, wi: &CoatAndBaseDirections) -> f32 {
         let coat = self.coat_passed(wo) * self.coat_passed(wi) / self.coat_passes;
         let sheen =
             self.sheen.as_ref().map_or(1.0, |sheen| sheen.passed(wo.by_base) * sheen.passed(wi.by_base) / sheen.passes);
@@ -231,7 +232,7 @@ impl<'a> Varnish<'a> {
     }
 
     /// What the layers leave of light that comes from `wo` above and goes to `wi` through the base, on either side.
-    fn passed(&self, wo: &Seen, wi: &Seen) -> f32 {
+    fn passed(&self, wo: &CoatAndBaseDirections, wi: &CoatAndBaseDirections) -> f32 {
         match self.base {
             _ if wi.by_coat.z > 0.0 => self.passed_to_base(wo, wi),
             Varnished::Sheet(_) => self.passed_to_base(wo, &wi.turned()),
@@ -240,22 +241,22 @@ impl<'a> Varnish<'a> {
     }
 
     /// What the coat and the sheen leave of what passes them once, to or from `w` above.
-    fn passed_once(&self, w: &Seen) -> f32 {
+    fn passed_once(&self, w: &CoatAndBaseDirections) -> f32 {
         self.coat_passed(w) * self.sheen.as_ref().map_or(1.0, |sheen| sheen.passed(w.by_base))
     }
 
     /// Whether a direction is in the volume.
-    fn is_inside(&self, w: &Seen) -> bool {
+    fn is_inside(&self, w: &CoatAndBaseDirections) -> bool {
         matches!(self.base, Varnished::Boundary(_)) && w.by_coat.z < 0.0
     }
 
     /// What the layers leave of light that meets the boundary from inside and goes to `wi`.
-    fn passed_from_inside(&self, wi: &Seen) -> f32 {
+    fn passed_from_inside(&self, wi: &CoatAndBaseDirections) -> f32 {
         if wi.by_coat.z > 0.0 { self.passed_once(wi) } else { 1.0 }
     }
 
     /// Probabilities of coat and sheen; the rest is the base's.
-    fn shares(&self, wo: &Seen) -> [f32; 2] {
+    fn shares(&self, wo: &CoatAndBaseDirections) -> [f32; 2] {
         if !wo.sides_agree() {
             return [1.0, 0.0];
         }
@@ -269,7 +270,7 @@ impl<'a> Varnish<'a> {
     }
 
     pub(super) fn evaluate(&self, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
-        let (wo, wi) = (self.seen(wo), self.seen(wi));
+        let (wo, wi) = (self.in_both_frames(wo), self.in_both_frames(wi));
         if self.is_inside(&wo) {
             let BsdfEvaluation { value, pdf } = self.evaluate_base(&wo, &wi);
             return BsdfEvaluation { value: value * self.passed_from_inside(&wi), pdf };
@@ -277,11 +278,11 @@ impl<'a> Varnish<'a> {
         if wo.by_coat.z == 0.0 || wi.by_coat.z == 0.0 {
             return BsdfEvaluation::BLACK;
         }
-        let shares = self.shares(&wo.turned_if(wo.by_coat.z < 0.0));
+        let shares = self.shares(&wo.seen_from(&wo));
         self.evaluate_layers(shares, wo, wi)
     }
 
-    fn evaluate_base(&self, wo: &Seen, wi: &Seen) -> BsdfEvaluation {
+    fn evaluate_base(&self, wo: &CoatAndBaseDirections, wi: &CoatAndBaseDirections) -> BsdfEvaluation {
         match wo.sides_agree() && wi.sides_agree() {
             true => self.base.evaluate(wo.by_base, wi.by_base),
             false => BsdfEvaluation::BLACK,
@@ -289,10 +290,14 @@ impl<'a> Varnish<'a> {
     }
 
     /// For a `wo` that is not in a volume.
-    fn evaluate_layers(&self, [coat_share, sheen_share]: [f32; 2], wo: Seen, wi: Seen) -> BsdfEvaluation {
+    fn evaluate_layers(
+        &self,
+        [coat_share, sheen_share]: [f32; 2],
+        wo: CoatAndBaseDirections,
+        wi: CoatAndBaseDirections,
+    ) -> BsdfEvaluation {
         let base = self.evaluate_base(&wo, &wi);
-        let is_turned = wo.by_coat.z < 0.0;
-        let (wo, wi) = (wo.turned_if(is_turned), wi.turned_if(is_turned));
+        let (wo, wi) = (wo.seen_from(&wo), wi.seen_from(&wo));
         let reaches_base = wo.sides_agree() && wi.sides_agree();
         let mut value = if reaches_base { base.value * self.passed(&wo, &wi) } else { Vec3::ZERO };
         let mut pdf = base.pdf * (1.0 - coat_share - sheen_share).max(0.0);
@@ -316,14 +321,14 @@ impl<'a> Varnish<'a> {
         if wo.z == 0.0 {
             return None;
         }
-        let seen = self.seen(wo);
+        let seen = self.in_both_frames(wo);
         if self.is_inside(&seen) {
             let sample = self.sample_base(&seen, u)?;
-            let passed = self.passed_from_inside(&self.seen(sample.wi));
+            let passed = self.passed_from_inside(&self.in_both_frames(sample.wi));
             return Some(BsdfSample { weight: sample.weight * passed, ..sample });
         }
         let is_turned = wo.z < 0.0;
-        let front = seen.turned_if(is_turned);
+        let front = seen.seen_from(&seen);
         let shares = self.shares(&front);
         let [coat_share, sheen_share] = shares;
         let point = [u[0], u[1]];
@@ -340,10 +345,10 @@ impl<'a> Varnish<'a> {
             return self.sampled(shares, seen, self.above_base(if is_turned { turn(wi) } else { wi })?);
         }
         let base_share = (1.0 - coat_share - sheen_share).max(1e-6);
-        let (_, rest) = warp::choose(u[2], coat_share + sheen_share);
-        let sample = self.sample_base(&seen, [u[0], u[1], rest])?;
+        let of_base = warp::choose(u[2], coat_share + sheen_share);
+        let sample = self.sample_base(&seen, [u[0], u[1], of_base.rest])?;
         if sample.lobe.is_delta() {
-            let wi = self.seen(sample.wi).turned_if(is_turned);
+            let wi = self.in_both_frames(sample.wi).seen_from(&seen);
             let weight = sample.weight * (self.passed(&front, &wi) / base_share);
             return Some(BsdfSample { weight, pdf: base_share * sample.pdf, ..sample });
         }
@@ -352,13 +357,13 @@ impl<'a> Varnish<'a> {
     }
 
     /// The sample of a smooth lobe that chose `wi`.
-    fn sampled(&self, shares: [f32; 2], wo: Seen, wi: Vec3) -> Option<BsdfSample> {
+    fn sampled(&self, shares: [f32; 2], wo: CoatAndBaseDirections, wi: Vec3) -> Option<BsdfSample> {
         let front = if wo.by_coat.z < 0.0 { turn(wi) } else { wi };
-        self.evaluate_layers(shares, wo, self.seen(wi)).sample_turned(front, wo.by_coat)
+        self.evaluate_layers(shares, wo, self.in_both_frames(wi)).sample_turned(front, wo.by_coat)
     }
 
     /// A sample of the base in the frame of the coat.
-    fn sample_base(&self, wo: &Seen, u: [f32; 3]) -> Option<BsdfSample> {
+    fn sample_base(&self, wo: &CoatAndBaseDirections, u: [f32; 3]) -> Option<BsdfSample> {
         let sample = self.base.sample(Some(wo).filter(|wo| wo.sides_agree())?.by_base, u)?;
         Some(BsdfSample { wi: self.above_base(sample.wi)?, ..sample })
     }
@@ -367,17 +372,18 @@ impl<'a> Varnish<'a> {
     fn above_base(&self, w: Vec3) -> Option<Vec3> {
         let Some(to_base) = &self.to_base else { return Some(w) };
         let by_coat = (to_base.transpose() * w).normalize_or(w);
-        (Seen { by_coat, by_base: w }).sides_agree().then_some(by_coat)
+        (CoatAndBaseDirections { by_coat, by_base: w }).sides_agree().then_some(by_coat)
     }
 
     pub(super) fn straight_through(&self, wo: Vec3) -> Vec3 {
         match &self.base {
             Varnished::Sheet(base) => {
-                let front = self.seen(wo).turned_if(wo.z < 0.0);
+                let wo = self.in_both_frames(wo);
+                let front = wo.seen_from(&wo);
                 if !front.sides_agree() {
                     return Vec3::ZERO;
                 }
-                let back = Seen { by_coat: -front.by_coat, by_base: -front.by_base };
+                let back = CoatAndBaseDirections { by_coat: -front.by_coat, by_base: -front.by_base };
                 base.straight_through(front.by_base) * self.passed(&front, &back)
             }
             Varnished::Boundary(_) => Vec3::ZERO,
@@ -385,11 +391,11 @@ impl<'a> Varnish<'a> {
     }
 
     pub(super) fn albedo(&self, wo: Vec3) -> Vec3 {
-        let wo = self.seen(wo);
+        let wo = self.in_both_frames(wo);
         if self.is_inside(&wo) {
             return self.base.albedo(wo.by_base);
         }
-        let up = wo.turned_if(wo.by_coat.z < 0.0);
+        let up = wo.seen_from(&wo);
         let passed = self.coat_passed(&up);
         if !up.sides_agree() {
             return Vec3::splat(1.0 - passed);

@@ -68,15 +68,24 @@ impl GrazingHemisphere {
     }
 }
 
-/// Takes a choice with probability `probability` by `u` and stretches what is left of `u` over [0, 1) again.
-pub(crate) fn choose(u: f32, probability: f32) -> (bool, f32) {
+/// A choice of two by a number.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Choice {
+    /// Whether the one whose probability was told is taken.
+    pub(crate) is_taken: bool,
+    /// What is left of the number, stretched over [0, 1) again.
+    pub(crate) rest: f32,
+}
+
+/// Takes a choice with probability `probability` by `u`.
+pub(crate) fn choose(u: f32, probability: f32) -> Choice {
     const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
     if u < probability {
-        (true, (u / probability).min(BELOW_ONE))
+        Choice { is_taken: true, rest: (u / probability).min(BELOW_ONE) }
     } else {
         // With a probability of 1 and u < 1 this branch is never reached; max() only guards against rounding.
-        let rest = (1.0 - probability).max(f32::MIN_POSITIVE);
-        (false, ((u - probability) / rest).min(BELOW_ONE))
+        let left = (1.0 - probability).max(f32::MIN_POSITIVE);
+        Choice { is_taken: false, rest: ((u - probability) / left).min(BELOW_ONE) }
     }
 }
 

@@ -7,12 +7,13 @@
 //!
 //! Not for primitives other than triangles, nor for a handful of them: the binary tree ([`super::tree`]) serves those.
 
+mod walk;
+
 use super::collapse;
 use super::simd::{self, Kernels};
 use super::tree::Bounds;
 use super::triangle::{ShearedRay, TriangleHit};
 use glam::Vec3A;
-use smallvec::SmallVec;
 
 /// Children of a node, and triangles of a block.
 pub(super) const LANES: usize = 8;
@@ -164,10 +165,6 @@ pub(super) struct WideHit {
     pub(super) hit: TriangleHit,
 }
 
-/// Children that wait while a walk is below their siblings: on the heap only where there are more than any tree of ours had, and never
-/// cleared, which took 3 % of the Cornell box.
-type Stack = SmallVec<[u64; 96]>;
-
 /// See the module.
 pub(super) struct WideTree {
     nodes: Vec<Node>,
@@ -245,176 +242,6 @@ impl WideTree {
         let sheared = ShearedRay::with_inverse(origin, direction, boxes.inverse);
         simd::any(self.kernels, self, &boxes, &sheared, t_max, accept)
     }
-
-    /// The walk of [`Self::closest`], over any pair of kernels: `meet` gives the children of a node, `hits` the triangles
-    /// of a block that the ray meets before a distance.
-    #[inline(always)]
-    pub(super) fn walk_closest(
-        &self,
-        sheared: &ShearedRay,
-        t_max: f32,
-        meet: impl Fn(&Node, f32) -> Met,
-        hits: impl Fn(&Block, f32) -> Candidates,
-        accept: impl Fn(&WideHit) -> bool,
-    ) -> Option<WideHit> {
-        let mut current = self.root?;
-        let mut best: Option<WideHit> = None;
-        let mut t_max = t_max;
-        let mut stack = Stack::new();
-        loop {
-            if current.0 & Child::LEAF == 0 {
-                let node = &self.nodes[current.0 as usize];
-                let Met { slots: mut met, distances } = meet(node, t_max);
-                if met != 0 {
-                    // Distances are not negative, so their bits sort as they do.
-                    let key = |slot: u32| {
-                        let child = node.children[slot as usize & (LANES - 1)];
-                        self.prefetch(child);
-                        u64::from(distances.get(slot).to_bits()) << 32 | u64::from(child.0)
-                    };
-                    let mut nearest = key(met.trailing_zeros());
-                    met &= met - 1;
-                    let base = stack.len();
-                    while met != 0 {
-                        let next = key(met.trailing_zeros());
-                        met &= met - 1;
-                        let far = nearest.max(next);
-                        nearest = nearest.min(next);
-                        stack.push(far);
-                        // Insertion: the farthest lies deepest.
-                        let siblings = &mut stack[base..];
-                        let mut place = siblings.len() - 1;
-                        while place > 0 && siblings[place - 1] < far {
-                            siblings[place] = siblings[place - 1];
-                            place -= 1;
-                        }
-                        siblings[place] = far;
-                    }
-                    current = Child(nearest as u32);
-                    continue;
-                }
-            } else {
-                let index = (current.0 & !Child::LEAF) as usize;
-                let block = &self.blocks[index];
-                let found = hits(block, t_max);
-                let mut lanes = found.lanes;
-                while lanes != 0 {
-                    let lane = lanes.trailing_zeros();
-                    lanes &= lanes - 1;
-                    let Some(hit) = self.hit_of_lane(block, &found, lane, sheared, t_max) else { continue };
-                    let found = WideHit { place: place(index, lane), hit };
-                    let stands = match &best {
-                        Some(best) => hit.t < best.hit.t || self.reference(found.place) < self.reference(best.place),
-                        None => hit.t < t_max,
-                    };
-                    if stands && hit.t <= t_max && accept(&found) {
-                        simd::prefetch(&self.references[found.place as usize]);
-                        t_max = hit.t;
-                        best = Some(found);
-                    }
-                }
-            }
-            current = loop {
-                let Some(key) = stack.pop() else { return best };
-                if f32::from_bits((key >> 32) as u32) <= t_max {
-                    break Child(key as u32);
-                }
-            };
-        }
-    }
-
-    /// The walk of [`Self::any`]: as above, but the first hit ends it and children are entered as they come.
-    #[inline(always)]
-    pub(super) fn walk_any(
-        &self,
-        sheared: &ShearedRay,
-        t_max: f32,
-        meet: impl Fn(&Node, f32) -> Met,
-        hits: impl Fn(&Block, f32) -> Candidates,
-        accept: impl Fn(&WideHit) -> bool,
-    ) -> bool {
-        let Some(mut current) = self.root else { return false };
-        let mut stack = Stack::new();
-        loop {
-            if current.0 & Child::LEAF == 0 {
-                let node = &self.nodes[current.0 as usize];
-                let Met { slots: mut met, .. } = meet(node, t_max);
-                if met != 0 {
-                    let child = |slot: u32| {
-                        let child = node.children[slot as usize & (LANES - 1)];
-                        self.prefetch(child);
-                        child
-                    };
-                    current = child(met.trailing_zeros());
-                    met &= met - 1;
-                    while met != 0 {
-                        stack.push(u64::from(child(met.trailing_zeros()).0));
-                        met &= met - 1;
-                    }
-                    continue;
-                }
-            } else {
-                let index = (current.0 & !Child::LEAF) as usize;
-                let block = &self.blocks[index];
-                let found = hits(block, t_max);
-                let mut lanes = found.lanes;
-                while lanes != 0 {
-                    let lane = lanes.trailing_zeros();
-                    lanes &= lanes - 1;
-                    if let Some(hit) = self.hit_of_lane(block, &found, lane, sheared, t_max)
-                        && is_before(&hit, t_max, || sheared.distance_to_plane(&block.triangle(lane as usize)))
-                        && accept(&WideHit { place: place(index, lane), hit })
-                    {
-                        return true;
-                    }
-                }
-            }
-            let Some(waiting) = stack.pop() else { return false };
-            current = Child(waiting as u32);
-        }
-    }
-
-    #[inline(always)]
-    fn hit_of_lane(
-        &self,
-        block: &Block,
-        found: &Candidates,
-        lane: u32,
-        sheared: &ShearedRay,
-        t_max: f32,
-    ) -> Option<TriangleHit> {
-        let is = |lanes: u32| lanes >> lane & 1 == 1;
-        if is(found.doubtful) {
-            return sheared.intersect(&block.triangle(lane as usize), t_max);
-        }
-        let t =
-            if is(found.near) { sheared.distance_to_plane(&block.triangle(lane as usize))? } else { found.t.get(lane) };
-        Some(TriangleHit { t, b1: found.b1.get(lane), b2: found.b2.get(lane) })
-    }
-
-    /// Asks for the cache lines of a child that is about to be entered.
-    #[inline(always)]
-    fn prefetch(&self, child: Child) {
-        let index = (child.0 & !Child::LEAF) as usize;
-        if child.0 & Child::LEAF == 0 {
-            simd::prefetch(&self.nodes[index]);
-        } else {
-            simd::prefetch(&self.blocks[index]);
-        }
-    }
-}
-
-/// Whether a hit is before the end of a ray, which may lie just before the same triangle: where it is close, by its plane, too.
-#[inline(always)]
-fn is_before(hit: &TriangleHit, t_max: f32, to_plane: impl Fn() -> Option<f32>) -> bool {
-    const CLOSE: f32 = 0.99;
-    hit.t < t_max && (hit.t <= CLOSE * t_max || to_plane().is_some_and(|t| t < t_max))
-}
-
-/// The place of a triangle by block and lane.
-#[inline(always)]
-fn place(block: usize, lane: u32) -> u32 {
-    (block * LANES) as u32 + lane
 }
 
 #[cfg(test)]

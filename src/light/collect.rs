@@ -1,7 +1,7 @@
 //! Gathering the emitters of a world that have a place, with what the light tree needs to know of each.
 
 use super::Emitter;
-use super::flat::FlatEmitter;
+use super::flat::{FlatEmitter, Winding};
 use super::sphere::SphereEmitter;
 use super::tree::LightBounds;
 use crate::geometry::World;
@@ -96,10 +96,10 @@ fn sphere(world: &World, number: usize, collected: &mut Collected) -> Option<u32
 pub(super) fn triangle_at(world: &World, object: u32, triangle: u32, time: f32) -> FlatEmitter {
     let scene = world.scene();
     let to_world = world.transform_at(object, time);
-    let mirrored = to_world.matrix3.determinant() < 0.0;
+    let winding = Winding::after(&to_world);
     let material = &scene.materials[scene.instances[object as usize].material.0 as usize];
     let corners = world.placed_corners(object, triangle, &to_world);
-    FlatEmitter::triangle(object, triangle, corners, world.translation_of_tree(object, &to_world), mirrored, material)
+    FlatEmitter::triangle(object, triangle, corners, world.translation_of_tree(object, &to_world), winding, material)
 }
 
 fn flat_bounds(emitter: &FlatEmitter, radiance: f32) -> LightBounds {

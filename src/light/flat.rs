@@ -9,7 +9,7 @@ use super::solid_angle::{LEAST, SphericalRectangle, SphericalTriangle};
 use super::{LightPlace, LightReceiver, LightSample};
 use crate::geometry::{Face, offset};
 use crate::scene::{Alpha, Material, Scene};
-use glam::{DVec3, Vec2, Vec3, Vec3A};
+use glam::{Affine3A, DVec3, Vec2, Vec3, Vec3A};
 
 /// A flat emitter.
 #[derive(Clone, Debug)]
@@ -65,18 +65,31 @@ impl Edges {
     }
 }
 
+/// How the corners of a triangle run, seen from its front.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Winding {
+    CounterClockwise,
+    Clockwise,
+}
+
+impl Winding {
+    /// That of a mesh's triangles where a transform has put them, which may mirror.
+    pub(super) fn after(to_world: &Affine3A) -> Self {
+        if to_world.matrix3.determinant() < 0.0 { Self::Clockwise } else { Self::CounterClockwise }
+    }
+}
+
 /// A point of the emitter: shares of the two edges.
 type Shares = [f32; 2];
 
 impl FlatEmitter {
-    /// A triangle with these world corners, put there by a transform with this translation; `mirrored` if its front is where the
-    /// winding is clockwise.
+    /// A triangle with these world corners, put there by a transform with this translation.
     pub(super) fn triangle(
         object: u32,
         triangle: u32,
         corners: [Vec3; 3],
         translation: Vec3A,
-        mirrored: bool,
+        winding: Winding,
         material: &Material,
     ) -> Self {
         let (edge_1, edge_2) = (corners[1] - corners[0], corners[2] - corners[0]);
@@ -94,7 +107,10 @@ impl FlatEmitter {
             center: corners[0] + (edge_1 + edge_2) / 3.0,
             speck_beyond_squared: squared_distance_at(LEAST as f32, area, radius),
             bilinear_beyond_squared: squared_distance_at(MOST_BILINEAR, area, radius),
-            normal: normal * if mirrored { -1.0 } else { 1.0 },
+            normal: match winding {
+                Winding::CounterClockwise => normal,
+                Winding::Clockwise => -normal,
+            },
             area,
             offset: offset::of_triangle(corners[0].into(), [edge_1.into(), edge_2.into()], translation),
             both_sides: material.emits_both_sides,

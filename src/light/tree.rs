@@ -37,6 +37,10 @@ impl LightBounds {
         0.5 * (self.min + self.max)
     }
 
+    fn normals(&self) -> Cone {
+        Cone { axis: self.axis, half_angle: self.normal_angle }
+    }
+
     fn union(&self, other: &Self) -> Self {
         if self.intensity == 0.0 {
             return *other;
@@ -44,13 +48,13 @@ impl LightBounds {
         if other.intensity == 0.0 {
             return *self;
         }
-        let (axis, normal_angle) = cone_union((self.axis, self.normal_angle), (other.axis, other.normal_angle));
+        let normals = self.normals().union(other.normals());
         Self {
             min: self.min.min(other.min),
             max: self.max.max(other.max),
             intensity: self.intensity + other.intensity,
-            axis,
-            normal_angle,
+            axis: normals.axis,
+            normal_angle: normals.half_angle,
             emission_angle: self.emission_angle.max(other.emission_angle),
         }
     }
@@ -61,20 +65,30 @@ fn angle(a: Vec3, b: Vec3) -> f32 {
     a.dot(b).clamp(-1.0, 1.0).acos()
 }
 
-/// The smallest cone around two cones of (axis, half angle).
-fn cone_union(a: (Vec3, f32), b: (Vec3, f32)) -> (Vec3, f32) {
-    let (wide, narrow) = if a.1 >= b.1 { (a, b) } else { (b, a) };
-    let between = angle(wide.0, narrow.0);
-    if (between + narrow.1).min(PI) <= wide.1 {
-        return wide;
+/// Directions around a unit axis.
+#[derive(Clone, Copy)]
+struct Cone {
+    axis: Vec3,
+    /// In [0, π].
+    half_angle: f32,
+}
+
+impl Cone {
+    /// The smallest cone around both.
+    fn union(self, other: Self) -> Self {
+        let (wide, narrow) = if self.half_angle >= other.half_angle { (self, other) } else { (other, self) };
+        let between = angle(wide.axis, narrow.axis);
+        if (between + narrow.half_angle).min(PI) <= wide.half_angle {
+            return wide;
+        }
+        let half_angle = 0.5 * (wide.half_angle + between + narrow.half_angle);
+        let turn_axis = wide.axis.cross(narrow.axis);
+        if half_angle >= PI || turn_axis.length_squared() < 1e-12 {
+            return Self { axis: wide.axis, half_angle: PI };
+        }
+        let rotation = glam::Quat::from_axis_angle(turn_axis.normalize(), half_angle - wide.half_angle);
+        Self { axis: (rotation * wide.axis).normalize(), half_angle }
     }
-    let half_angle = 0.5 * (wide.1 + between + narrow.1);
-    let turn_axis = wide.0.cross(narrow.0);
-    if half_angle >= PI || turn_axis.length_squared() < 1e-12 {
-        return (wide.0, PI);
-    }
-    let rotation = glam::Quat::from_axis_angle(turn_axis.normalize(), half_angle - wide.1);
-    ((rotation * wide.0).normalize(), half_angle)
 }
 
 /// Measure of the directions into which a cone of emitters shines (Conty Estévez and Kulla 2018, eq. 1).
