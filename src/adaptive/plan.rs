@@ -13,7 +13,7 @@ use super::forecast::Forecast;
 use super::judge::Judgement;
 use super::settings::{AllocationRule, Limits};
 use crate::film::Film;
-use crate::integrator::{BlockWork, PILOT_SAMPLES, SamplePlan};
+use crate::integrator::{BlockWork, PILOT_SAMPLES_A_HALF, PILOT_SAMPLES_A_PIXEL, SamplePlan};
 use crate::sampler::Half;
 use blocks::doubled_blocks;
 use fechner_perception::Plane;
@@ -42,13 +42,13 @@ const ENOUGH_GAP: f64 = 0.01;
 
 /// Samples of each half that every pixel has before any has the rest of its pilot: who watches has a picture of 2 + 2 early, and
 /// one that is about even on the way to 8 + 8. Single samples at first would be as many sums again in a farm's files.
-const FIRST_PASS_SAMPLES: u32 = 2;
+const FIRST_PASS_SAMPLES_A_HALF: u32 = 2;
 
 /// What a film lacks of the first samples of every pixel: 8 + 8, or `most_samples` in all where they are fewer.
 pub fn pilot_plan(film: &Film, most_samples: u32) -> SamplePlan {
     let mut plan = SamplePlan::default();
-    let samples = most_samples.min(2 * PILOT_SAMPLES);
-    for [from, to] in [[0, FIRST_PASS_SAMPLES], [FIRST_PASS_SAMPLES, PILOT_SAMPLES]] {
+    let samples = most_samples.min(PILOT_SAMPLES_A_PIXEL);
+    for [from, to] in [[0, FIRST_PASS_SAMPLES_A_HALF], [FIRST_PASS_SAMPLES_A_HALF, PILOT_SAMPLES_A_HALF]] {
         for half in Half::BOTH {
             let to = to.min(share_of_half(samples, half));
             for pixel in 0..film.pixel_count() as u32 {

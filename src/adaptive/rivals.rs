@@ -8,7 +8,7 @@ use super::plan::{blocks_between, cut_to_budget, share_of_half};
 use super::settings::RivalRule;
 use crate::film::{Film, opponent};
 use crate::integrator::SamplePlan;
-use crate::sampler::{Half, hash_words};
+use crate::sampler::{Half, hash_words, unit_f64_of_hash};
 use fechner_perception::Plane;
 
 /// Samples between two looks, both halves together.
@@ -119,7 +119,7 @@ fn budget_pass(film: &Film, exposure: f64, left: u64, max_samples: u32) -> Sampl
     let spread = (pass - pixels as u64) as f64;
     for (pixel, error) in errors.iter().enumerate() {
         let share = if total > 0.0 { error / total } else { 1.0 / pixels as f64 };
-        let random = (hash_words(film.total_samples(), pixel as u64) >> 11) as f64 / (1u64 << 53) as f64;
+        let random = unit_f64_of_hash(hash_words(film.total_samples(), pixel as u64));
         let samples = 1 + (spread * share + random) as u32;
         push_samples(&mut plan, film, pixel, samples.min(max_samples.saturating_sub(film.samples(pixel))));
     }

@@ -2,7 +2,7 @@
 
 use super::pursuit::Pursuit;
 use crate::denoise::Denoiser;
-use crate::integrator::PILOT_SAMPLES;
+use crate::integrator::PILOT_SAMPLES_A_PIXEL;
 use crate::sampler::PixelFilter;
 use fechner_perception::Plane;
 use fechner_perception::csf::FrameTiming;
@@ -69,7 +69,7 @@ pub struct Limits {
 }
 
 /// Pilot of a picture that is denoised: the denoiser reads neighbours where raw variance needs samples of the pixel's own.
-pub const DENOISED_PILOT_SAMPLES: u32 = 4;
+pub const DENOISED_PILOT_SAMPLES_A_PIXEL: u32 = 4;
 
 impl Limits {
     /// The visibility that is aimed at; 1, which is at threshold, where only other limits count.
@@ -96,7 +96,7 @@ impl Limits {
             mean_samples: None,
             max_samples: DEFAULT_MAX_SAMPLES,
             plans: None,
-            pilot_samples: 2 * PILOT_SAMPLES,
+            pilot_samples: PILOT_SAMPLES_A_PIXEL,
         }
     }
 }

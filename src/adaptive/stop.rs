@@ -6,15 +6,16 @@ use fechner_perception::Plane;
 
 /// Share of pixels that may remain above the target when the loop stops.
 pub const TOLERATED_SHARE: f64 = 0.001;
-/// No 1° patch may stay above this many times the target.
-const TOLERATED_PATCH: f64 = 2.0;
+/// No pixel of the predicted map, which holds what the eye pools around each, may stay above this many times the target.
+const TOLERATED_WORST: f64 = 2.0;
 /// Below this predicted saving the loop samples uniformly: its estimates err by more.
 pub(super) const LEAST_SAVING: f64 = 0.05;
 
 /// Why a render ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StopReason {
-    /// Predicted visibility is at most the target on 99.9 % of the picture.
+    /// Predicted visibility is at most the target on 99.9 % of the picture and nowhere above twice the target; of adaptive sampling, after
+    /// an audit has agreed where one is made.
     Visibility,
     /// The time was up.
     Time,
@@ -32,7 +33,7 @@ pub enum StopReason {
     Merged,
 }
 
-/// Whether a rung's stop is met: the tolerated share of pixels is below it, and no patch is far above. Never where too few samples tell,
+/// Whether a rung's stop is met: no more than the tolerated share of pixels is above it, and none is far above. Never where too few samples tell,
 /// and never for 0, where only other limits count: a lamp that 16 samples of a pixel have missed leaves no noise at all, and an even
 /// render of 4096 ended there, black, with 11 seeds of 12.
 pub fn is_reached(judgement: &Judgement, rung: f64) -> bool {
@@ -42,7 +43,7 @@ pub fn is_reached(judgement: &Judgement, rung: f64) -> bool {
     let worst = judgement.predicted.values().iter().fold(0.0, |a: f32, &v| a.max(v));
     judgement.is_known
         && visible_share(judgement, rung) <= TOLERATED_SHARE
-        && f64::from(worst) <= TOLERATED_PATCH * rung
+        && f64::from(worst) <= TOLERATED_WORST * rung
 }
 
 /// Share of samples that the wanted counts save against as many everywhere as the hardest tolerated pixel needs.

@@ -11,15 +11,13 @@ use crate::adaptive::judge::{JudgeError, judge};
 use crate::adaptive::plan::{needed_samples, pilot_plan};
 use crate::adaptive::settings::Limits;
 use crate::film::Film;
-use crate::integrator::{PILOT_SAMPLES, PathTracer};
+use crate::integrator::{PILOT_SAMPLES_A_PIXEL, PathTracer};
 use crate::scene::load::LoadError;
 use fechner_perception::tone::ToneOperator;
 use std::time::Instant;
 
 /// Most frames that are piloted; those between lie between their neighbours.
 const PILOTED_FRAMES: u32 = 9;
-/// Samples a pixel of a pilot.
-const PILOT: u32 = 2 * PILOT_SAMPLES;
 /// Visibilities at which needs are asked; between them, and beyond, they go as a power.
 const ASKED: [f64; 3] = [8.0, 2.0, 0.5];
 
@@ -67,11 +65,11 @@ impl Needs {
             let area = tracer.settings().film_area();
             let mut film = Film::new(area.width, area.height);
             let started = Instant::now();
-            tracer.trace(&pilot_plan(&film, PILOT), &mut film, &|_| {});
+            tracer.trace(&pilot_plan(&film, PILOT_SAMPLES_A_PIXEL), &mut film, &|_| {});
             seconds += started.elapsed().as_secs_f64();
             samples += film.total_samples();
             let judgement = judge(&film, &settings, 1.0)?;
-            let limits = Limits { pilot_samples: PILOT, ..shot.limits };
+            let limits = Limits { pilot_samples: PILOT_SAMPLES_A_PIXEL, ..shot.limits };
             let mut ln_samples = [0.0; ASKED.len()];
             for (ln_samples, visibility) in ln_samples.iter_mut().zip(ASKED) {
                 let needed = needed_samples(&film, &judgement, visibility, &limits);
@@ -102,7 +100,7 @@ impl Needs {
                 // Beyond the last one the law of large numbers holds.
                 let (from, slope) = if beyond { (2, 2.0 * std::f64::consts::LN_2) } else { (at, slope) };
                 let ln = ln_samples[from] + slope * (ASKED[from] / visibility).log2();
-                ln.exp().max(f64::from(PILOT))
+                ln.exp().max(f64::from(PILOT_SAMPLES_A_PIXEL))
             })
             .collect()
     }
@@ -121,7 +119,7 @@ impl Needs {
     /// Whole samples a pixel for each frame, which add up to the budget of `mean_samples` for each.
     pub fn shares(&self, mean_samples: u32) -> Vec<u32> {
         let count = self.ln_samples.len();
-        if mean_samples <= PILOT {
+        if mean_samples <= PILOT_SAMPLES_A_PIXEL {
             return vec![mean_samples; count];
         }
         let needs = self.samples(self.visibility_for(f64::from(mean_samples)));

@@ -1,5 +1,6 @@
 //! Names of a sequence's files: `shot.####.exr`, one `#` for each digit of the frame's number at the least.
 
+use crate::output::folder_of;
 use std::path::{Path, PathBuf};
 
 /// A file name with a place for the frame's number.
@@ -37,9 +38,8 @@ impl FrameName {
     /// If the folder cannot be read.
     pub fn numbers(&self) -> std::io::Result<Vec<u32>> {
         let example = self.of(0);
-        let folder = example.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let mut numbers = Vec::new();
-        for entry in std::fs::read_dir(folder)? {
+        for entry in std::fs::read_dir(folder_of(&example))? {
             let name = entry?.file_name();
             let is_digit = |letter: char| letter.is_ascii_digit();
             // Digits are all that stands between the name's two ends; any of them leads back to the file.

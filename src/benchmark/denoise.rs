@@ -11,7 +11,7 @@ use super::race::{RULES, Race, RaceMean, UNIFORM, compare_with_uniform, means};
 use super::reference::Reference;
 use super::truth::Truth;
 use super::{BenchSettings, Subject, check_inputs, make_folders};
-use crate::adaptive::settings::{DENOISED_PILOT_SAMPLES, LoopSettings, RivalRule, Sampling};
+use crate::adaptive::settings::{DENOISED_PILOT_SAMPLES_A_PIXEL, LoopSettings, RivalRule, Sampling};
 use crate::adaptive::{Quiet, render};
 use crate::denoise::{Denoiser, DenoiserKind, denoise_film};
 use anyhow::Result;
@@ -143,7 +143,7 @@ impl SceneBench<'_> {
         let mut settings = self.subject.loop_settings()?;
         settings.limits.visibility = Some(self.settings.target);
         settings.limits.mean_samples = Some(spp);
-        settings.limits.pilot_samples = DENOISED_PILOT_SAMPLES;
+        settings.limits.pilot_samples = DENOISED_PILOT_SAMPLES_A_PIXEL;
         settings.denoiser = Some(denoiser.clone());
         Ok(settings)
     }

@@ -5,8 +5,8 @@ use super::reference::Reference;
 use super::truth::Truth;
 use crate::adaptive::settings::DEFAULT_MAX_SAMPLES;
 use crate::film::{CHANNELS, Film};
-use crate::integrator::{BlockWork, PILOT_SAMPLES, SamplePlan};
-use crate::sampler::{Half, hash_words};
+use crate::integrator::{BlockWork, PILOT_SAMPLES_A_HALF, PILOT_SAMPLES_A_PIXEL, SamplePlan};
+use crate::sampler::{Half, hash_words, unit_f64_of_hash};
 use anyhow::Result;
 use fechner_perception::allocation::{Allocation, AllocationProblem, FINE_GAP, allocate};
 use fechner_perception::{Plane, seen};
@@ -48,7 +48,7 @@ pub(crate) fn uniform_samples(subject: &Subject, truth: &Truth, variance: &Plane
 /// The samples that the oracle takes for a visibility on this share of the picture, in every pixel the pilot of our own loop at least:
 /// it is there to be compared with, and is traced as the loop traces.
 pub(crate) fn least_samples(truth: &Truth, variance: &Plane, visibility: f64, coverage: f64) -> Result<Plane> {
-    Ok(optimum(truth, variance, visibility, coverage, f64::from(2 * PILOT_SAMPLES))?.samples)
+    Ok(optimum(truth, variance, visibility, coverage, f64::from(PILOT_SAMPLES_A_PIXEL))?.samples)
 }
 
 /// The fewest mean samples a pixel that any rule could take for a visibility on this share of the picture, with [`FEWEST`] in every
@@ -83,11 +83,11 @@ pub(crate) fn trace_counts(subject: &Subject, counts: &Plane, seed: u64) -> Film
     let mut plan = SamplePlan::default();
     for (pixel, &count) in counts.values().iter().enumerate() {
         for half in Half::BOTH {
-            let random = hash_words(hash_words(seed, pixel as u64), half.index() as u64) >> 11;
-            let pilots = (0.5 * f64::from(count) / f64::from(PILOT_SAMPLES)).max(1.0);
+            let random = unit_f64_of_hash(hash_words(hash_words(seed, pixel as u64), half.index() as u64));
+            let pilots = (0.5 * f64::from(count) / f64::from(PILOT_SAMPLES_A_HALF)).max(1.0);
             let doublings = pilots.log2().floor();
             let share = 2.0 * (1.0 - doublings.exp2() / pilots);
-            let is_next = (random as f64 / (1u64 << 53) as f64) < share;
+            let is_next = random < share;
             for level in 0..=doublings as u8 + u8::from(is_next) {
                 plan.blocks.push(BlockWork::whole(pixel as u32, half, level));
             }

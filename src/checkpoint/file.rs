@@ -1,6 +1,7 @@
 //! The format: header and state as a sealed file.
 
 use super::{Checkpoint, Header};
+use crate::adaptive::audit::MOST_INFLATION;
 use crate::adaptive::state::{RenderState, Seconds};
 use crate::output::OutputError;
 use crate::sealed::{Kind, SealedError};
@@ -106,7 +107,7 @@ fn check(header: &Header, state: &RenderState) -> Result<(), &'static str> {
         || !header.earlier_visibilities.iter().all(|&visibility| is_rung(visibility))
         || !state.finished_rung.is_none_or(is_rung)
         || !state.left_rung.is_none_or(is_rung)
-        || !(1.0..=1e6).contains(&state.inflation)
+        || !(1.0..=MOST_INFLATION).contains(&state.inflation)
         || !exposure.is_finite()
         || ![total, perception, allocation, denoising].iter().all(|s| (0.0..1e12).contains(s))
     {

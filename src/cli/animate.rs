@@ -66,7 +66,7 @@ pub(super) struct AnimateArguments {
     /// A budget of this many seconds for all frames that are rendered, spent on those that need it most.
     #[arg(long, value_name = "S", value_parser = parse_seconds, allow_negative_numbers = true, conflicts_with = "spp", help_heading = "Until")]
     time: Option<Duration>,
-    /// Most samples of one pixel.
+    /// Most samples of one pixel, at least 16.
     #[arg(long, value_name = "N", value_parser = whole(16..=u32::MAX), allow_negative_numbers = true, default_value_t = DEFAULT_MAX_SAMPLES, help_heading = "Until")]
     max_spp: u32,
     /// How samples are spread.
@@ -115,7 +115,7 @@ pub(super) struct AnimateArguments {
     #[arg(long, value_name = "FILE", help_heading = "Picture")]
     video: Option<PathBuf>,
 
-    /// Threads; the pictures do not depend on it.
+    /// Threads, 1 to 1023; the pictures do not depend on it.
     #[arg(long, value_name = "N", value_parser = whole(1..=1023), allow_negative_numbers = true, help_heading = "Running")]
     threads: Option<u32>,
 }

@@ -1,9 +1,9 @@
 //! The option `--denoise`.
 
 use clap::ValueEnum;
-use fechner::adaptive::settings::DENOISED_PILOT_SAMPLES;
+use fechner::adaptive::settings::DENOISED_PILOT_SAMPLES_A_PIXEL;
 use fechner::denoise::DenoiserKind;
-use fechner::integrator::PILOT_SAMPLES;
+use fechner::integrator::PILOT_SAMPLES_A_PIXEL;
 
 /// What makes the output picture out of the mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -29,6 +29,6 @@ impl DenoiseChoice {
 
     /// Samples of every pixel before the first look.
     pub(super) fn pilot_samples(self) -> u32 {
-        if self == Self::None { 2 * PILOT_SAMPLES } else { DENOISED_PILOT_SAMPLES }
+        if self == Self::None { PILOT_SAMPLES_A_PIXEL } else { DENOISED_PILOT_SAMPLES_A_PIXEL }
     }
 }

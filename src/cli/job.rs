@@ -65,7 +65,7 @@ pub(super) struct JobArguments {
     /// Stop at this mean number of samples a pixel.
     #[arg(long, value_name = "N", value_parser = whole(1..=u32::MAX), allow_negative_numbers = true, help_heading = "Until")]
     spp: Option<u32>,
-    /// Most samples of one pixel.
+    /// Most samples of one pixel, at least 16.
     #[arg(long, value_name = "N", value_parser = whole(16..=u32::MAX), allow_negative_numbers = true, default_value_t = DEFAULT_MAX_SAMPLES, help_heading = "Until")]
     max_spp: u32,
     /// Stop after this many plans: repeats a render that ended by --time.
@@ -131,7 +131,7 @@ pub(super) struct JobArguments {
     #[arg(long, value_name = "STOPS", value_parser = parse_stops, allow_negative_numbers = true, help_heading = "Picture")]
     exposure: Option<f64>,
 
-    /// Threads; the picture does not depend on it.
+    /// Threads, 1 to 1023; the picture does not depend on it.
     #[arg(long, value_name = "N", value_parser = whole(1..=1023), allow_negative_numbers = true, help_heading = "Running")]
     threads: Option<u32>,
 }

@@ -111,6 +111,8 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     let watch = Watch::new(stop, Console::new(settings.limits.time), keeper, audience, tev);
     let rendered = adaptive::resume(&tracer, &settings, state, &watch);
     watch.finish();
+    // A signal that comes while files are written ended nothing.
+    let interrupter = watch.interrupter();
     let rendered = match rendered {
         Ok(rendered) => rendered,
         Err(error) => return Err(failed(&error, watch)),
@@ -126,7 +128,6 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
         Ok(())
     });
     let figures = arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, &report));
-    let interrupter = watch.interrupter();
     say!("{}", summary(&report, &settings, &rendered, interrupter));
     let is_unfinished = rendered.stop_reason == StopReason::Interrupted && interrupter == Interrupter::Signal;
     if picture.is_ok() && (maps.is_err() || figures.is_err()) {

@@ -1,7 +1,7 @@
 //! The files that a command reads and writes.
 
 use anyhow::bail;
-use fechner::output::target_of;
+use fechner::output::{folder_of, target_of};
 use fechner::scene::load::was_read;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -53,10 +53,7 @@ pub(super) fn check_distinct(files: &[Named]) -> anyhow::Result<()> {
 /// Where a file is or will be, whichever way its folder is spelled and whatever links lead there.
 pub(super) fn location(path: &Path) -> PathBuf {
     let target = target_of(path).unwrap_or_else(|_| path.to_owned());
-    let in_its_folder = || {
-        let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        Some(folder.canonicalize().ok()?.join(target.file_name()?))
-    };
+    let in_its_folder = || Some(folder_of(&target).canonicalize().ok()?.join(target.file_name()?));
     target.canonicalize().ok().or_else(in_its_folder).unwrap_or(target)
 }
 

@@ -48,10 +48,7 @@ pub(super) fn create_beside(path: &Path) -> Result<(NamedTempFile, PathBuf), Out
     let Some(name) = target.file_name() else {
         return Err(not_a_file("a folder"));
     };
-    let folder = match target.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
+    let folder = folder_of(&target);
     match folder.metadata() {
         Ok(found) if found.is_dir() => {}
         Ok(_) => {
@@ -106,6 +103,11 @@ pub fn abandon_unfinished() {
 /// If links lead in a circle.
 pub fn target_of(path: &Path) -> std::io::Result<PathBuf> {
     path.canonicalize().or_else(|_| end_of_links(path))
+}
+
+/// The folder that a file is in, as it can be opened: the current one for a mere name.
+pub fn folder_of(file: &Path) -> &Path {
+    file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Where links lead from a path at whose end nothing is.
@@ -163,7 +165,7 @@ fn hidden_within(most_bytes: usize, name: &OsStr) -> OsString {
 pub fn remove_leftovers(path: &Path) {
     let Ok(target) = target_of(path) else { return };
     let Some(name) = target.file_name() else { return };
-    let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = folder_of(&target);
     let prefix = part_prefix(name);
     // No more than the random letters: `.a.film.png.x1Y2z3.part` is of a.film.png, which another program may be writing.
     let is_leftover = |bytes: &[u8]| {

@@ -16,7 +16,9 @@ mod png_read;
 pub mod rendered;
 mod srgb_codes;
 
-pub use beside::{abandon_unfinished, hidden_name, remove_leftovers, target_of, write_beside, write_beside_by_name};
+pub use beside::{
+    abandon_unfinished, folder_of, hidden_name, remove_leftovers, target_of, write_beside, write_beside_by_name,
+};
 pub use exr_file::write_exr;
 pub use frame_rate::FRAMES_PER_SECOND;
 pub(crate) use frame_rate::fraction;

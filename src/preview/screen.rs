@@ -9,7 +9,7 @@ use crate::adaptive::judge::Judgement;
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::statistics::picture_variance;
 use crate::film::Film;
-use crate::integrator::PILOT_SAMPLES;
+use crate::integrator::PILOT_SAMPLES_A_HALF;
 use crate::output::encode_srgb8;
 use crate::output::false_colour::{self, Colours};
 use crate::sampler::Half;
@@ -307,7 +307,8 @@ fn pixels(film: &Film) -> usize {
 /// many times as large as a picture.
 fn composed(film: &Film, nits_per_unit: f64, is_at_rest: bool) -> (Vec<[f32; 3]>, Vec<u32>) {
     // While a pixel's pilot is traced one half is ahead of the other, and their samples count alike.
-    let is_in_pilot = |pixel: usize| Half::BOTH.iter().all(|&half| film.half(half)[pixel].taken <= PILOT_SAMPLES);
+    let is_in_pilot =
+        |pixel: usize| Half::BOTH.iter().all(|&half| film.half(half)[pixel].taken <= PILOT_SAMPLES_A_HALF);
     let light = |pixel: usize| {
         let light = if !is_at_rest && is_in_pilot(pixel) { Film::mean_of_samples_cd_m2 } else { Film::rgb_cd_m2 };
         light(film, pixel, nits_per_unit)

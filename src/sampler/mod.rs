@@ -257,6 +257,11 @@ pub(crate) fn unit_of_hash(hash: u64) -> f32 {
     (hash >> 40) as f32 * (1.0 / 16_777_216.0)
 }
 
+/// To [0, 1) with the 53 bits that f64 holds.
+pub(crate) fn unit_f64_of_hash(hash: u64) -> f64 {
+    (hash >> 11) as f64 / (1_u64 << 53) as f64
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

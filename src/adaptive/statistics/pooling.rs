@@ -280,13 +280,13 @@ impl ChannelSums {
 mod tests {
     use super::*;
     use crate::film::Seen;
-    use crate::sampler::hash_words;
+    use crate::sampler::{hash_words, unit_f64_of_hash};
 
     /// Of three tiles in a row.
     const SIZE: [usize; 2] = [69, 6];
 
     fn random(pixel: usize, what: u64) -> f64 {
-        (hash_words(pixel as u64, what) >> 11) as f64 / (1_u64 << 53) as f64
+        unit_f64_of_hash(hash_words(pixel as u64, what))
     }
 
     fn picture() -> (Vec<[PixelEvidence; CHANNELS]>, Vec<PixelGuide>) {

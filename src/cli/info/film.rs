@@ -60,7 +60,7 @@ pub(super) fn describe(checkpoint: &Checkpoint) -> String {
         row("fit", tone.clone().restore().describe());
     }
     if let Some(denoiser) = settings.denoiser {
-        row("denoiser", format!("{denoiser:?}").to_lowercase());
+        row("denoiser", denoiser.name().to_owned());
     }
     if let Some(importance) = settings.importance {
         row("importance", format!("map of content {importance}"));
