@@ -101,8 +101,8 @@ fn sphere(camera: &CameraRays, center: Vec3, radius: f32) -> Option<Piece> {
     let place_px = camera.project(center)?;
     let away = camera.way_to(center).try_normalize()?;
     let radius_px = (camera.project(center + radius * away.any_orthonormal_vector())? - place_px).length();
-    let middle = center - radius * away;
-    (2.0 * radius_px <= 1.0).then(|| Piece { middle, place_px, area_px2: PI * radius_px * radius_px })
+    let piece = Piece { middle: center - radius * away, place_px, area_px2: PI * radius_px * radius_px };
+    (2.0 * radius_px <= 1.0).then_some(piece)
 }
 
 /// All three, or none.

@@ -67,7 +67,8 @@ fn lamps_that_are_large_or_hidden_or_turned_away_are_not_looked_for() {
         scene.materials[0].emits_both_sides = false;
         add_rectangle(scene, far, 0.004 * Vec3::Y, 0.004 * Vec3::X, LAMP);
     };
-    let cases: [(&str, &dyn Fn(&mut Scene)); 5] = [
+    type Adding<'a> = &'a dyn Fn(&mut Scene);
+    let cases: [(&str, Adding<'_>); 5] = [
         ("none", &|_| ()),
         ("a large ball", &|scene| add_sphere(scene, Vec3::ZERO, 0.3, LAMP)),
         ("a large screen", &|scene| add_rectangle(scene, -Vec3::ONE, 2.0 * Vec3::X, 2.0 * Vec3::Y, LAMP)),
