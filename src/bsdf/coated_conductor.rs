@@ -43,7 +43,7 @@ struct Rough<'a> {
 }
 
 /// Probabilities of the coat's face, one reflection off the metal, and the rest.
-struct Shares {
+struct LobeProbabilities {
     coat: f32,
     single: f32,
     multiple: f32,
@@ -85,19 +85,19 @@ impl<'a> CoatedConductor<'a> {
         [single, rough.second * layers.second + rough.later * layers.later]
     }
 
-    fn shares(&self, rough: &Rough<'_>, wo: Vec3) -> Shares {
+    fn shares(&self, rough: &Rough<'_>, wo: Vec3) -> LobeProbabilities {
         let passed = self.coat.passed(wo);
         let [single, multiple] = self.beneath(rough, wo).map(|part| passed * part.max_element());
         let coat = 1.0 - passed;
         let total = coat + single + multiple;
         if total > 0.0 {
-            Shares { coat: coat / total, single: single / total, multiple: multiple / total }
+            LobeProbabilities { coat: coat / total, single: single / total, multiple: multiple / total }
         } else {
-            Shares { coat: 1.0, single: 0.0, multiple: 0.0 }
+            LobeProbabilities { coat: 1.0, single: 0.0, multiple: 0.0 }
         }
     }
 
-    fn evaluate_front(&self, rough: &Rough<'_>, shares: &Shares, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
+    fn evaluate_front(&self, rough: &Rough<'_>, shares: &LobeProbabilities, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
         let eta = self.coat.eta;
         let passed = self.coat.passed(wo) * self.coat.passed(wi);
         let (from, to) = (rough.curve.at(wo), rough.curve.at(wi));

@@ -42,7 +42,7 @@ pub struct HeTorrance {
 }
 
 /// Probabilities of the ways to sample.
-struct Shares {
+struct LobeProbabilities {
     mirror: f32,
     /// The first term of the series: a Gaussian of direction cosines.
     diffraction: f32,
@@ -125,12 +125,12 @@ impl HeTorrance {
         fresnel::conductor(cos, self.eta, self.k) * coherent * (seen * seen)
     }
 
-    fn shares(&self, wo: Vec3) -> Shares {
+    fn shares(&self, wo: Vec3) -> LobeProbabilities {
         let fresnel = fresnel::conductor(wo.z, self.eta, self.k);
         let mirror = self.mirror_reflectance(wo.z).max_element();
         let cosine_only = |mirror: f32, cosine: f32| {
             let total = (mirror + cosine).max(1e-20);
-            Shares { mirror: mirror / total, diffraction: 0.0, facets: 0.0, cosine: cosine / total }
+            LobeProbabilities { mirror: mirror / total, diffraction: 0.0, facets: 0.0, cosine: cosine / total }
         };
         let diffuse = self.diffuse.max_element();
         if self.is_mirror() {
@@ -141,7 +141,7 @@ impl HeTorrance {
         let coarse = phase2 / (1.0 + phase2);
         let cosine = 0.2 * scattered + diffuse;
         let total = mirror + scattered + cosine;
-        Shares {
+        LobeProbabilities {
             mirror: mirror / total,
             diffraction: scattered * (1.0 - 0.7 * coarse) / total,
             facets: scattered * 0.7 * coarse / total,
@@ -154,7 +154,7 @@ impl HeTorrance {
         WAVELENGTHS_NM[1] / (PI * std::f32::consts::SQRT_2 * self.correlation_nm)
     }
 
-    fn evaluate_front(&self, shares: &Shares, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
+    fn evaluate_front(&self, shares: &LobeProbabilities, wo: Vec3, wi: Vec3) -> BsdfEvaluation {
         let passed = |cos: f32| Vec3::ONE - fresnel::conductor(cos, self.eta, self.k);
         let mut value = self.diffuse * passed(wo.z) * passed(wi.z) / self.average_passed * (FRAC_1_PI * wi.z);
         let mut pdf = shares.cosine * warp::cosine_hemisphere_pdf(wi.z);

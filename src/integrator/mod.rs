@@ -1,24 +1,24 @@
 //! The path tracer: [`PathTracer::trace`] turns a [`SamplePlan`] into film.
 //!
-//! `path` holds the life of one sample, `abreast` how several are followed at once, `camera` where they start, `around_camera` in which
+//! `path` holds the life of one sample, `path_packet` how several are followed at once, `camera` where they start, `around_camera` in which
 //! volumes, `shading` what a
 //! surface point scatters like, `relief` how maps turn its normal, `tables` what materials compute beforehand, `media` what a
-//! ray travels in, `lookouts` what light comes where, `prune` which light is left to chance, `sheets` what clear panes let
+//! ray travels in, `light_probes` what light comes where, `prune` which light is left to chance, `thin_sheets` what clear panes let
 //! through, `specular` what mirrors and glass show.
 
-mod abreast;
 mod around_camera;
 mod camera;
-mod lookouts;
+mod light_probes;
 mod media;
 mod path;
+mod path_packet;
 mod prune;
 mod relief;
 mod shading;
-mod sheets;
 mod small_lamps;
 mod specular;
 mod tables;
+mod thin_sheets;
 
 pub use camera::{CameraRays, CameraSample};
 pub use path::{FirstHit, PathSample};
@@ -198,7 +198,7 @@ impl PathTracer {
         let absorbs = scene.materials.iter().any(|material| {
             material.surface.interior_absorption().is_some_and(|absorption| absorption.max_element() > 0.0)
         });
-        let has_sheets = sheets::any_of(&scene.materials);
+        let has_sheets = thin_sheets::any_of(&scene.materials);
         let surface_tables = tables::of_materials(&scene.materials);
         let thresholds = settings.prune.map(ThresholdTable::new);
         let moves = scene.moves();

@@ -6,7 +6,7 @@
 use super::PathTracer;
 use super::media::Media;
 use super::shading::{Components, Shading};
-use super::sheets::MOST_SHEETS;
+use super::thin_sheets::MOST_SHEETS;
 use crate::geometry::{Hit, Ray, SurfacePoint};
 use crate::light::{LightFromAfar, LightReceiver, LightSample, emitted};
 use crate::sampler::Sample;
@@ -126,7 +126,7 @@ impl PathTracer {
     /// Follows one path.
     pub fn trace_path(&self, camera_ray: Ray, sample: Sample) -> PathSample {
         let mut path = [PathState::new(camera_ray, sample, self.around_camera.at(&self.world, &camera_ray))];
-        self.follow_abreast(&mut path);
+        self.follow_packet(&mut path);
         path[0].found()
     }
 

@@ -13,8 +13,8 @@ mod emission;
 mod environment;
 mod flat;
 mod givers;
+mod kind_choice;
 mod lanes;
-mod outlook;
 mod parts;
 mod punctual;
 mod solid_angle;
@@ -24,7 +24,7 @@ mod tests;
 mod tree;
 
 pub use emission::emitted;
-pub use outlook::{Arrival, Lookout, Outlooks};
+pub use kind_choice::{Arrival, KindsByPlace, LightProbe};
 pub use parts::LampPart;
 pub use tree::LightReceiver;
 
@@ -98,9 +98,9 @@ pub struct Lights {
     tree: Option<LightTree>,
     distant: Option<DistantLights>,
     environment: Option<EnvironmentSampler>,
-    shares: Shares,
+    shares: LightKindProbabilities,
     /// How kinds are chosen where; `None` where it is the same everywhere, or nobody has looked.
-    outlooks: Option<Outlooks>,
+    kinds_by_place: Option<KindsByPlace>,
 }
 
 /// What lights are chosen from one by one.
@@ -122,9 +122,9 @@ const LEAST_SHARE: f32 = 0.3;
 
 /// Probabilities of the kinds.
 #[derive(Clone, Copy, Debug, Default)]
-struct Shares([f32; Kind::ALL.len()]);
+struct LightKindProbabilities([f32; Kind::ALL.len()]);
 
-impl Shares {
+impl LightKindProbabilities {
     /// The same for all that are there.
     fn even(there: [bool; Kind::ALL.len()]) -> Self {
         let weights = there.map(|there| if there { 1.0 } else { 0.0 });
@@ -178,8 +178,8 @@ impl Lights {
         let distant = DistantLights::new(&scene.lights);
         let environment = scene.environment.as_ref().and_then(EnvironmentSampler::new);
         let sampled = environment.as_ref().is_some_and(EnvironmentSampler::is_sampled);
-        let shares = Shares::even([sampled, distant.is_some(), tree.is_some()]);
-        Self { emitters, emitter_of, tree, distant, environment, shares, outlooks: None }
+        let shares = LightKindProbabilities::even([sampled, distant.is_some(), tree.is_some()]);
+        Self { emitters, emitter_of, tree, distant, environment, shares, kinds_by_place: None }
     }
 
     /// Whether there is more than one kind of light to sample.
@@ -187,18 +187,18 @@ impl Lights {
         self.shares.0.iter().filter(|share| **share > 0.0).count() > 1
     }
 
-    /// How kinds are best chosen where paths get to, by what arrives at lookouts there; `None` where it is best the same everywhere.
-    pub fn outlooks(&self, world: &World, lookouts: &[Lookout], arrival: &Arrival) -> Option<Outlooks> {
-        Outlooks::new(self, world, lookouts, arrival)
+    /// How kinds are best chosen where paths get to, by what arrives at probes there; `None` where it is best the same everywhere.
+    pub fn kinds_by_place(&self, world: &World, probes: &[LightProbe], arrival: &Arrival) -> Option<KindsByPlace> {
+        KindsByPlace::new(self, world, probes, arrival)
     }
 
     /// Chooses kinds of light by these from now on.
-    pub fn set_outlooks(&mut self, outlooks: Option<Outlooks>) {
-        self.outlooks = outlooks;
+    pub fn set_kinds_by_place(&mut self, kinds_by_place: Option<KindsByPlace>) {
+        self.kinds_by_place = kinds_by_place;
     }
 
-    fn shares_at(&self, position: Vec3) -> &Shares {
-        self.outlooks.as_ref().map_or(&self.shares, |outlooks| outlooks.at(position))
+    fn shares_at(&self, position: Vec3) -> &LightKindProbabilities {
+        self.kinds_by_place.as_ref().map_or(&self.shares, |kinds_by_place| kinds_by_place.at(position))
     }
 
     /// A direction from a receiver towards a light, for three numbers in [0, 1): two for the place, one for the choice.

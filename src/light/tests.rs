@@ -1,6 +1,6 @@
 //! Every way of sampling a light against its own pdf, and the tree against lights in plenty.
 
-use super::{LightReceiver, Lights, Lookout};
+use super::{LightProbe, LightReceiver, Lights};
 use crate::geometry::{Ray, World};
 use crate::sampler::{hash_words, unit_of_hash};
 use crate::scene::{
@@ -135,10 +135,10 @@ fn scenes() -> Vec<(&'static str, Scene)> {
     all
 }
 
-/// Lookouts that face up.
-fn lookouts(position: impl Fn(u64) -> Vec3) -> Vec<Lookout> {
+/// Probes that face up.
+fn probes(position: impl Fn(u64) -> Vec3) -> Vec<LightProbe> {
     let receiver = |i| LightReceiver { position: position(i), normal: Vec3::Y };
-    (0..256).map(|i| Lookout { receiver: receiver(i), time: 0.0 }).collect()
+    (0..256).map(|i| LightProbe { receiver: receiver(i), time: 0.0 }).collect()
 }
 
 fn pdf_from_afar(lights: &Lights, receiver: &LightReceiver, direction: Vec3) -> f32 {
@@ -229,11 +229,11 @@ fn both_sides_of_mis_state_the_same_density() {
     for (name, scene) in scenes() {
         let world = World::new(Arc::new(scene));
         let mut lights = Lights::new(&world);
-        let lookouts = lookouts(|i| Vec3::splat(0.1 * random(i, 5)));
-        let outlooks = lights.outlooks(&world, &lookouts, &|number, sample| {
-            if sample.place.is_none() && lookouts[number].receiver.position.x < 0.05 { 0.01 } else { 1.0 }
+        let probes = probes(|i| Vec3::splat(0.1 * random(i, 5)));
+        let kinds_by_place = lights.kinds_by_place(&world, &probes, &|number, sample| {
+            if sample.place.is_none() && probes[number].receiver.position.x < 0.05 { 0.01 } else { 1.0 }
         });
-        lights.set_outlooks(outlooks);
+        lights.set_kinds_by_place(kinds_by_place);
         let mut differ = 0;
         for i in 0..4000 {
             let normal = Vec3::new(random(i, 7) - 0.5, random(i, 8) - 0.5, random(i, 9) - 0.5).normalize_or(Vec3::Y);
@@ -375,13 +375,13 @@ fn kinds_of_light_are_chosen_by_what_arrives() {
     let world = World::new(Arc::new(scene));
     let even = Lights::new(&world);
     let mut lights = Lights::new(&world);
-    let lookouts = lookouts(|i| Vec3::new(random(i, 0) - 0.5, 0.0, random(i, 1)));
+    let probes = probes(|i| Vec3::new(random(i, 0) - 0.5, 0.0, random(i, 1)));
     let is_sunny = |position: Vec3| position.x > 0.0;
-    let outlooks = lights.outlooks(&world, &lookouts, &|number, sample| {
-        let arrives = !sample.is_delta || is_sunny(lookouts[number].receiver.position);
+    let kinds_by_place = lights.kinds_by_place(&world, &probes, &|number, sample| {
+        let arrives = !sample.is_delta || is_sunny(probes[number].receiver.position);
         if arrives { 1.0 } else { 0.0 }
     });
-    lights.set_outlooks(outlooks);
+    lights.set_kinds_by_place(kinds_by_place);
     for (x, least, most) in [(-0.4, 0.12, 0.14), (0.4, 0.85, 0.88)] {
         let receiver = LightReceiver { position: Vec3::new(x, 0.0, 0.5), normal: Vec3::Y };
         let count = 20_000;

@@ -1,6 +1,7 @@
 //! `Material` and its named kin, and the media behind their surfaces.
 
 use super::super::error::{LoadError, suggestion};
+use super::super::metals::Metal;
 use super::super::share;
 use super::super::spectrum::named;
 use super::Reader;
@@ -176,7 +177,7 @@ impl Reader<'_> {
 
     fn coated_conductor(&mut self, parameters: &Parameters) -> Result<Surface, LoadError> {
         self.note_coat(parameters);
-        let (eta, k) = self.coated_metal(parameters)?;
+        let Metal { eta, k } = self.coated_metal(parameters)?;
         Ok(Surface::CoatedConductor {
             eta,
             k,
@@ -259,11 +260,11 @@ impl Reader<'_> {
     /// A picture of reflectances darkens the metal of its brightest texel: as in pbrt face on, and no brighter at grazing angles.
     fn conductor(&mut self, parameters: &Parameters) -> Result<Surface, LoadError> {
         let Some(color) = self.metal_color(parameters, "")? else {
-            let (eta, k) = self.metal(parameters, "")?;
+            let Metal { eta, k } = self.metal(parameters, "")?;
             return Ok(Surface::conductor(eta, k, self.roughness(parameters, "")?));
         };
         let Some(lookup) = color.texture else {
-            let (eta, k) = metal_that_reflects(color.factor);
+            let Metal { eta, k } = metal_that_reflects(color.factor);
             return Ok(Surface::conductor(eta, k, self.roughness(parameters, "")?));
         };
         self.builder.note(format!(
@@ -272,14 +273,14 @@ impl Reader<'_> {
         ));
         let brightest =
             (color.factor * self.builder.textures.brightest(lookup.texture)?).clamp(Vec3::ZERO, MOST_REFLECTED);
-        let (eta, k) = metal_that_reflects(brightest);
+        let Metal { eta, k } = metal_that_reflects(brightest);
         let factor = color.factor / brightest.max(Vec3::splat(f32::MIN_POSITIVE));
         let tint = ColorInput { factor: factor.min(Vec3::MAX), texture: color.texture };
         Ok(Surface::Conductor { eta, k, tint, roughness: self.roughness(parameters, "")? })
     }
 
     /// The metal of a coated conductor, which has no place for a picture.
-    fn coated_metal(&mut self, parameters: &Parameters) -> Result<(Vec3, Vec3), LoadError> {
+    fn coated_metal(&mut self, parameters: &Parameters) -> Result<Metal, LoadError> {
         let Some(color) = self.metal_color(parameters, "conductor.")? else {
             return self.metal(parameters, "conductor.");
         };
@@ -299,15 +300,14 @@ impl Reader<'_> {
         Ok(None)
     }
 
-    /// η and k.
-    fn metal(&mut self, parameters: &Parameters, prefix: &str) -> Result<(Vec3, Vec3), LoadError> {
-        let copper = named::metal("Cu").map_or((Vec3::ONE, Vec3::ONE), |metal| (metal.eta, metal.k));
-        let eta = self.color(parameters, &format!("{prefix}eta"), Meaning::Coefficient)?.unwrap_or(copper.0);
-        let k = self.color(parameters, &format!("{prefix}k"), Meaning::Coefficient)?.unwrap_or(copper.1);
+    fn metal(&mut self, parameters: &Parameters, prefix: &str) -> Result<Metal, LoadError> {
+        let copper = named::metal("Cu").unwrap_or(Metal { eta: Vec3::ONE, k: Vec3::ONE });
+        let eta = self.color(parameters, &format!("{prefix}eta"), Meaning::Coefficient)?.unwrap_or(copper.eta);
+        let k = self.color(parameters, &format!("{prefix}k"), Meaning::Coefficient)?.unwrap_or(copper.k);
         if eta.min_element() <= 0.0 {
             return Err(parameters.error(format_args!("a metal's eta must be above 0 in every channel: {eta}")));
         }
-        Ok((eta, k))
+        Ok(Metal { eta, k })
     }
 
     fn roughness(&mut self, parameters: &Parameters, prefix: &str) -> Result<Roughness, LoadError> {
@@ -339,7 +339,7 @@ fn not_read(parameters: &Parameters, kind: &str) -> LoadError {
 }
 
 /// The η and k that reflect a colour at normal incidence as pbrt makes them: η = 1, k = 2√r / √(1 − r).
-fn metal_that_reflects(color: Vec3) -> (Vec3, Vec3) {
+fn metal_that_reflects(color: Vec3) -> Metal {
     let r = color.clamp(Vec3::ZERO, MOST_REFLECTED);
-    (Vec3::ONE, 2.0 * (r / (Vec3::ONE - r)).powf(0.5))
+    Metal { eta: Vec3::ONE, k: 2.0 * (r / (Vec3::ONE - r)).powf(0.5) }
 }

@@ -1,7 +1,7 @@
 //! The `type` of a `[materials.*]` and the keys that belong to it.
 
 use super::super::error::LoadError;
-use super::super::metals::METALS;
+use super::super::metals::{METALS, Metal};
 use super::Context;
 use super::fields::{Fields, Value};
 use super::material::{Entry, Materials, scalar, share, share_or_white};
@@ -120,18 +120,15 @@ fn mirror<'a>(_: &Materials<'a>, context: &mut Context<'a>, fields: &Fields<'a>)
 }
 
 /// `metal`, or `eta` and `k`.
-fn metal(fields: &Fields<'_>) -> Result<(Vec3, Vec3), LoadError> {
+fn metal(fields: &Fields<'_>) -> Result<Metal, LoadError> {
     match (fields.get("metal"), fields.get("eta"), fields.get("k")) {
-        (Some(metal), None, None) => {
-            let metal = metal.choice(METALS)?;
-            Ok((metal.eta, metal.k))
-        }
+        (Some(metal), None, None) => metal.choice(METALS),
         (None, Some(eta), Some(k)) => {
             let real = eta.color()?;
             if real.min_element() <= 0.0 {
                 return Err(eta.error("the index of refraction must be above 0"));
             }
-            Ok((real, k.color()?))
+            Ok(Metal { eta: real, k: k.color()? })
         }
         _ => Err(fields.error("needs either \"metal\", or both \"eta\" and \"k\"")),
     }
@@ -155,7 +152,7 @@ fn roughness<'a>(
 }
 
 fn conductor<'a>(_: &Materials<'a>, context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
-    let (eta, k) = metal(fields)?;
+    let Metal { eta, k } = metal(fields)?;
     Ok(Surface::Conductor {
         eta,
         k,
@@ -221,7 +218,7 @@ fn coated_conductor<'a>(
     context: &mut Context<'a>,
     fields: &Fields<'a>,
 ) -> Result<Surface, LoadError> {
-    let (eta, k) = metal(fields)?;
+    let Metal { eta, k } = metal(fields)?;
     Ok(Surface::CoatedConductor {
         eta,
         k,
@@ -287,7 +284,7 @@ fn ward<'a>(_: &Materials<'a>, context: &mut Context<'a>, fields: &Fields<'a>) -
 }
 
 fn he_torrance<'a>(_: &Materials<'a>, context: &mut Context<'a>, fields: &Fields<'a>) -> Result<Surface, LoadError> {
-    let (eta, k) = metal(fields)?;
+    let Metal { eta, k } = metal(fields)?;
     let black = ColorInput::constant(Vec3::ZERO);
     Ok(Surface::HeTorrance {
         eta,

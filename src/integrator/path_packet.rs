@@ -1,4 +1,4 @@
-//! Paths followed abreast: one stage of several paths before the next stage of any.
+//! A packet of paths, followed abreast: one stage of all of them before the next stage of any.
 //!
 //! Corners and texels of what a path hits are in no cache where a scene is large. So each stage asks for what the next one reads,
 //! and the memory answers while the other paths' part of the stage is done. Which paths go abreast changes no byte of any, and
@@ -14,10 +14,10 @@ use smallvec::SmallVec;
 
 /// Paths abreast: the cave of `benches/paths.rs` has 0.307 M samples a second with 16, 0.309 with 32 and 64, 0.306 with the 8
 /// of one block at a time.
-const ABREAST: usize = 16;
+const PATHS: usize = 16;
 
-/// Samples of the paths of a row.
-type Samples = SmallVec<[Sample; ABREAST]>;
+/// Samples of the paths of a packet.
+type Samples = SmallVec<[Sample; PATHS]>;
 
 /// A sample whose path is to be followed, and where its light goes.
 #[derive(Clone, Copy)]
@@ -29,7 +29,7 @@ struct Start {
 }
 
 /// Samples that wait for their paths, and the places where these are followed.
-struct Row {
+struct PathPacket {
     starts: Vec<Start>,
     paths: Vec<PathState>,
     filter_weights: Vec<f32>,
@@ -39,10 +39,10 @@ impl PathTracer {
     /// Sums of blocks of samples.
     pub(super) fn sum_blocks(&self, blocks: &[BlockWork], seed: u64) -> Vec<BlockSum> {
         let mut sums = vec![BlockSum::default(); blocks.len()];
-        let mut row = Row {
-            starts: Vec::with_capacity(ABREAST),
-            paths: Vec::with_capacity(ABREAST),
-            filter_weights: Vec::with_capacity(ABREAST),
+        let mut packet = PathPacket {
+            starts: Vec::with_capacity(PATHS),
+            paths: Vec::with_capacity(PATHS),
+            filter_weights: Vec::with_capacity(PATHS),
         };
         for (sum, block) in blocks.iter().enumerate() {
             let area = self.settings.film_area();
@@ -56,21 +56,21 @@ impl PathTracer {
                 sequence: self.settings.sequence,
             };
             for sample in key.samples(block.first + block.samples).skip(block.first as usize) {
-                row.starts.push(Start { pixel, sample, sum });
-                if row.starts.len() == ABREAST {
-                    self.finish(&mut row, &mut sums);
+                packet.starts.push(Start { pixel, sample, sum });
+                if packet.starts.len() == PATHS {
+                    self.finish(&mut packet, &mut sums);
                 }
             }
         }
-        self.finish(&mut row, &mut sums);
+        self.finish(&mut packet, &mut sums);
         sums
     }
 
-    /// Follows the paths of the row to their ends, adds what they found to the sums, and leaves the row empty.
-    fn finish(&self, row: &mut Row, sums: &mut [BlockSum]) {
-        self.start(row);
-        self.follow_abreast(&mut row.paths);
-        for ((path, start), filter_weight) in row.paths.iter().zip(&row.starts).zip(&row.filter_weights) {
+    /// Follows the paths of the packet to their ends, adds what they found to the sums, and leaves the packet empty.
+    fn finish(&self, packet: &mut PathPacket, sums: &mut [BlockSum]) {
+        self.start(packet);
+        self.follow_packet(&mut packet.paths);
+        for ((path, start), filter_weight) in packet.paths.iter().zip(&packet.starts).zip(&packet.filter_weights) {
             let mut found = path.found();
             if let Some(clamp) = self.settings.clamp {
                 found.radiance *= (clamp / found.radiance.max_element().max(clamp)).min(1.0);
@@ -78,34 +78,34 @@ impl PathTracer {
             found.radiance *= filter_weight;
             sums[start.sum].add(&found);
         }
-        row.starts.clear();
-        row.paths.clear();
-        row.filter_weights.clear();
+        packet.starts.clear();
+        packet.paths.clear();
+        packet.filter_weights.clear();
     }
 
-    /// Makes the paths of the row's samples, at the lens.
-    fn start(&self, row: &mut Row) {
-        let samples: Samples = row.starts.iter().map(|start| start.sample).collect();
-        let mut numbers = [[0.0; 4]; ABREAST];
+    /// Makes the paths of the packet's samples, at the lens.
+    fn start(&self, packet: &mut PathPacket) {
+        let samples: Samples = packet.starts.iter().map(|start| start.sample).collect();
+        let mut numbers = [[0.0; 4]; PATHS];
         Sample::draw_each(&samples, Purpose::Camera, &mut numbers);
-        for (Start { pixel, sample, .. }, [x, y, lens_u, lens_v]) in row.starts.iter().zip(numbers) {
+        for (Start { pixel, sample, .. }, [x, y, lens_u, lens_v]) in packet.starts.iter().zip(numbers) {
             let filtered = self.settings.filter.sample(x, y);
             let ray = self.camera.ray(&CameraSample {
                 position_px: Vec2::new(pixel.x as f32, pixel.y as f32) + 0.5 + filtered.offset,
                 lens: [lens_u, lens_v],
                 time: if self.moves { sample.draw(Purpose::Time)[0] } else { 0.0 },
             });
-            row.paths.push(PathState::new(ray, *sample, self.around_camera.at(&self.world, &ray)));
-            row.filter_weights.push(filtered.weight);
+            packet.paths.push(PathState::new(ray, *sample, self.around_camera.at(&self.world, &ray)));
+            packet.filter_weights.push(filtered.weight);
         }
     }
 
-    /// Follows paths, at most [`ABREAST`], to their ends.
-    pub(super) fn follow_abreast(&self, paths: &mut [PathState]) {
-        let mut alive: SmallVec<[usize; ABREAST]> = (0..paths.len()).collect();
+    /// Follows paths, at most [`PATHS`], to their ends.
+    pub(super) fn follow_packet(&self, paths: &mut [PathState]) {
+        let mut alive: SmallVec<[usize; PATHS]> = (0..paths.len()).collect();
         // Apart from the paths: what a stage hands to the next is read where it was written.
-        let mut hits: [Option<Hit>; ABREAST] = [None; ABREAST];
-        let mut points: [Option<SurfacePoint>; ABREAST] = [const { None }; ABREAST];
+        let mut hits: [Option<Hit>; PATHS] = [None; PATHS];
+        let mut points: [Option<SurfacePoint>; PATHS] = [const { None }; PATHS];
         for bounce in 0.. {
             for &i in &alive {
                 paths[i].rays += 1;
@@ -130,7 +130,7 @@ impl PathTracer {
                 self.prefetch_base_color(point);
             }
             let samples: Samples = alive.iter().map(|&i| paths[i].sample).collect();
-            let (mut light, mut scatter) = ([[0.0; 4]; ABREAST], [[0.0; 4]; ABREAST]);
+            let (mut light, mut scatter) = ([[0.0; 4]; PATHS], [[0.0; 4]; PATHS]);
             Sample::draw_each(&samples, Purpose::Light { bounce }, &mut light);
             Sample::draw_each(&samples, Purpose::Scatter { bounce }, &mut scatter);
             let mut left = SmallVec::new();

@@ -1,10 +1,10 @@
 //! Places that paths get to, and what light comes there: asked before any sample is taken, so that samples choose lights by it.
 
 use super::shading::Components;
-use super::sheets::MOST_SHEETS;
+use super::thin_sheets::MOST_SHEETS;
 use super::{CameraSample, PathTracer};
 use crate::geometry::{Ray, SurfacePoint};
-use crate::light::{LightSample, Lookout};
+use crate::light::{LightProbe, LightSample};
 use crate::sampler::{BlockKey, Half, Pixel, Purpose, Sample, Sequence};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -19,7 +19,7 @@ const BOUNCES: u32 = 4;
 /// A surface that scatters light which is sampled.
 struct Place {
     point: SurfacePoint,
-    lookout: Lookout,
+    probe: LightProbe,
 }
 
 impl PathTracer {
@@ -30,10 +30,10 @@ impl PathTracer {
         }
         let places: Vec<Place> =
             (0..SCOUTS * SCOUTS).into_par_iter().flat_map_iter(|scout| self.places_of(scout)).collect();
-        let lookouts: Vec<Lookout> = places.iter().map(|place| place.lookout).collect();
+        let probes: Vec<LightProbe> = places.iter().map(|place| place.probe).collect();
         let arrival = |number: usize, sample: &LightSample| self.arrival(&places[number], sample);
-        let outlooks = self.lights.outlooks(&self.world, &lookouts, &arrival);
-        self.lights.set_outlooks(outlooks);
+        let kinds_by_place = self.lights.kinds_by_place(&self.world, &probes, &arrival);
+        self.lights.set_kinds_by_place(kinds_by_place);
     }
 
     /// Surfaces that one scout comes to. It walks like a path, whatever light it would carry.
@@ -81,15 +81,15 @@ impl PathTracer {
             ..*ray
         });
         if bsdf.has_smooth_lobe() {
-            let lookout = Lookout { receiver: shading.receiver(&point, wo), time: ray.time };
-            places.push(Place { point, lookout });
+            let probe = LightProbe { receiver: shading.receiver(&point, wo), time: ray.time };
+            places.push(Place { point, probe });
         }
         on
     }
 
     /// Share of a light's sample that gets to a place.
     fn arrival(&self, place: &Place, sample: &LightSample) -> f32 {
-        let (ray, distance) = self.shadow_ray(&place.point, sample, place.lookout.time);
+        let (ray, distance) = self.shadow_ray(&place.point, sample, place.probe.time);
         if self.has_sheets {
             return self.through_sheets(&ray, distance, MOST_SHEETS).0.max_element().min(1.0);
         }
@@ -117,7 +117,7 @@ mod tests {
     fn share_of_sun(tracer: &PathTracer, place: &Place, to_sun: Vec3) -> f64 {
         let asks = |index: u64| {
             let u = [0, 1, 2].map(|dimension| unit_of_hash(hash_words(index, dimension)));
-            let sample = tracer.lights.sample(&tracer.world, &place.lookout.receiver, 0.0, u);
+            let sample = tracer.lights.sample(&tracer.world, &place.probe.receiver, 0.0, u);
             sample.is_some_and(|sample| sample.direction.dot(to_sun) > 0.999)
         };
         (0..256).filter(|&index| asks(index)).count() as f64 / 256.0
@@ -135,7 +135,7 @@ mod tests {
         let sun = LightSample { direction: to_sun, place: None, radiance: Vec3::ONE, pdf: 1.0, is_delta: true };
         let (mut lit, mut dark) = (Vec::new(), Vec::new());
         for place in (0..SCOUTS * SCOUTS).flat_map(|scout| tracer.places_of(scout)) {
-            let faces = place.lookout.receiver.normal.dot(to_sun) > 0.1;
+            let faces = place.probe.receiver.normal.dot(to_sun) > 0.1;
             let list = if faces && tracer.arrival(&place, &sun) > 0.0 { &mut lit } else { &mut dark };
             list.push(share_of_sun(&tracer, &place, to_sun));
         }
@@ -152,7 +152,7 @@ mod tests {
         let place = &once.places_of(500)[0];
         for direction in [Vec3::Y, Vec3::X, Vec3::new(0.6, 0.5, 0.1).normalize()] {
             let pdfs = [&once, &twice]
-                .map(|tracer| tracer.lights.from_afar(&place.lookout.receiver, direction).map(|light| light.pdf));
+                .map(|tracer| tracer.lights.from_afar(&place.probe.receiver, direction).map(|light| light.pdf));
             assert_eq!(pdfs[0], pdfs[1]);
         }
     }

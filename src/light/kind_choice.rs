@@ -3,45 +3,45 @@
 //! Places that paths get to are gathered in groups by where they are, and samples of each kind of light, taken with their shadows, say how
 //! strong it is there. With one sample of a choice among kinds the variance is least where each is chosen in proportion to the root of its
 //! samples' mean square. It is done once, before any picture's sample is taken, so that a sample still depends on nothing but its own
-//! numbers. Each kind keeps a share, since what no lookout has found may be there.
+//! numbers. Each kind keeps a share, since what no probe has found may be there.
 
-use super::{Kind, LightReceiver, LightSample, Lights, Shares};
+use super::{Kind, LightKindProbabilities, LightReceiver, LightSample, Lights};
 use crate::geometry::World;
 use crate::sampler::{hash_words, unit_of_hash};
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Lookouts in a group, at least.
-const LOOKOUTS: usize = 32;
-/// Samples of each kind of light by which a lookout asks for it.
+/// Probes in a group, at least.
+const PROBES: usize = 32;
+/// Samples of each kind of light by which a probe asks for it.
 const SAMPLES: u64 = 4;
 
 /// A place that paths get to, from which light is looked out for.
 #[derive(Clone, Copy, Debug)]
-pub struct Lookout {
+pub struct LightProbe {
     /// Where it is.
     pub receiver: LightReceiver,
     /// Share of the open shutter, in [0, 1).
     pub time: f32,
 }
 
-/// What share (0 to 1) of a light's sample gets to a lookout, by its number.
+/// What share (0 to 1) of a light's sample gets to a probe, by its number.
 pub type Arrival<'a> = dyn Fn(usize, &LightSample) -> f32 + Sync + 'a;
 
 /// How kinds of light are chosen in all parts of a scene.
 #[derive(Debug)]
-pub struct Outlooks {
+pub struct KindsByPlace {
     groups: Groups,
     /// By group.
-    shares: Vec<Shares>,
+    shares: Vec<LightKindProbabilities>,
 }
 
-impl Outlooks {
-    /// By what arrives at lookouts. `None` of too few.
-    pub(super) fn new(lights: &Lights, world: &World, lookouts: &[Lookout], arrival: &Arrival) -> Option<Self> {
-        let groups = Groups::new(lookouts)?;
+impl KindsByPlace {
+    /// By what arrives at probes. `None` of too few.
+    pub(super) fn new(lights: &Lights, world: &World, probes: &[LightProbe], arrival: &Arrival) -> Option<Self> {
+        let groups = Groups::new(probes)?;
         let strength = |kind: Kind, number: usize| -> f32 {
-            let Lookout { receiver, time } = &lookouts[number];
+            let LightProbe { receiver, time } = &probes[number];
             let squared = |index| {
                 let u = [0, 1, 2].map(|dimension| unit_of_hash(hash_words(number as u64 * SAMPLES + index, dimension)));
                 let sample = lights.sample_kind(kind, world, receiver, *time, u);
@@ -57,7 +57,7 @@ impl Outlooks {
     }
 
     /// How kinds are chosen at a position.
-    pub(super) fn at(&self, position: Vec3) -> &Shares {
+    pub(super) fn at(&self, position: Vec3) -> &LightKindProbabilities {
         &self.shares[self.groups.find(position)]
     }
 }
@@ -75,7 +75,7 @@ fn squared_strength(receiver: &LightReceiver, sample: &LightSample, arrives: imp
 struct Groups {
     /// A full binary tree: the children of i are 2 i + 1 and 2 i + 2.
     halvings: Vec<Halving>,
-    /// By leaf of the tree: numbers of the lookouts.
+    /// By leaf of the tree: numbers of the probes.
     members: Vec<Vec<usize>>,
 }
 
@@ -88,25 +88,25 @@ struct Halving {
 
 impl Groups {
     /// `None` of too few places.
-    fn new(lookouts: &[Lookout]) -> Option<Self> {
-        let levels = (lookouts.len() / LOOKOUTS).checked_ilog2()?;
+    fn new(probes: &[LightProbe]) -> Option<Self> {
+        let levels = (probes.len() / PROBES).checked_ilog2()?;
         let mut groups =
             Self { halvings: vec![Halving::default(); (1 << levels) - 1], members: vec![Vec::new(); 1 << levels] };
-        let mut numbers: Vec<usize> = (0..lookouts.len()).collect();
-        groups.halve(lookouts, &mut numbers, 0);
-        for (number, lookout) in lookouts.iter().enumerate() {
-            let of = groups.find(lookout.receiver.position);
+        let mut numbers: Vec<usize> = (0..probes.len()).collect();
+        groups.halve(probes, &mut numbers, 0);
+        for (number, probe) in probes.iter().enumerate() {
+            let of = groups.find(probe.receiver.position);
             groups.members[of].push(number);
         }
         Some(groups)
     }
 
     /// Halves the places below a node by the axis along which they lie widest, down to the leaves.
-    fn halve(&mut self, lookouts: &[Lookout], numbers: &mut [usize], node: usize) {
+    fn halve(&mut self, probes: &[LightProbe], numbers: &mut [usize], node: usize) {
         if node >= self.halvings.len() {
             return;
         }
-        let position = |&number: &usize| lookouts[number].receiver.position;
+        let position = |&number: &usize| probes[number].receiver.position;
         let least = numbers.iter().map(position).fold(Vec3::INFINITY, Vec3::min);
         let most = numbers.iter().map(position).fold(Vec3::NEG_INFINITY, Vec3::max);
         let axis = (most - least).max_position();
@@ -114,8 +114,8 @@ impl Groups {
         numbers.select_nth_unstable_by(middle, |a, b| position(a)[axis].total_cmp(&position(b)[axis]));
         self.halvings[node] = Halving { axis, at: position(&numbers[middle])[axis] };
         let (below, above) = numbers.split_at_mut(middle);
-        self.halve(lookouts, below, 2 * node + 1);
-        self.halve(lookouts, above, 2 * node + 2);
+        self.halve(probes, below, 2 * node + 1);
+        self.halve(probes, above, 2 * node + 2);
     }
 
     /// The group that a position is in.
