@@ -1,169 +1,17 @@
-//! Keeping the film of a render safe: checkpoints while it runs, and a clean end when a signal asks for it.
+//! Keeping the film of a render safe: checkpoints while it runs, where it starts from in `start`, and who else watches it in `watch`.
 
-use super::claim::Claim;
-use super::console::Console;
-use super::numbers::parse_seconds;
-use super::report::Interrupter;
-use super::tev::Showing;
-use super::words::rounded;
-use anyhow::bail;
-use clap::Args;
-use fechner::adaptive::judge::Judgement;
-use fechner::adaptive::settings::LoopSettings;
+mod start;
+mod watch;
+
+pub(super) use start::{CheckpointArguments, SeedsSoFar, Start, fit_in};
+pub(super) use watch::Watch;
+
 use fechner::adaptive::state::RenderState;
-use fechner::adaptive::{Directive, Monitor, Progress, StopReason};
-use fechner::checkpoint::{
-    Checkpoint, CheckpointError, Header, Origin, Seeds, SettingsRecord, read_checkpoint, read_header, write_checkpoint,
-};
-use fechner::film::Film;
-use fechner::output::{self, OutputError};
-use fechner::preview::Audience;
-use fechner_perception::tone::SavedTone;
-use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use fechner::checkpoint::{Header, write_checkpoint};
+use fechner::output::OutputError;
+use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
-
-/// Arguments of `render` about its film's file.
-#[derive(Debug, Args)]
-pub(super) struct CheckpointArguments {
-    /// Keep all samples in this file while rendering, for --resume and `fechner merge`.
-    #[arg(long, value_name = "FILE", help_heading = "Running")]
-    checkpoint: Option<PathBuf>,
-    /// Seconds of work that a kill may cost at most [default: 60].
-    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds, requires = "checkpoint", allow_negative_numbers = true, help_heading = "Running")]
-    checkpoint_every: Option<Duration>,
-    /// Go on from the checkpoint, if it is there; limits count from the first start.
-    #[arg(long, requires = "checkpoint", help_heading = "Running")]
-    resume: bool,
-}
-
-/// Where a render starts or goes on.
-pub(super) struct Start {
-    pub(super) header: Header,
-    pub(super) state: RenderState,
-    /// Of the film as it is, before anything is added to it.
-    pub(super) seeds: SeedsSoFar,
-}
-
-/// Whose samples a film holds: those of the render's own seed once there is one.
-#[derive(Clone)]
-pub(super) struct SeedsSoFar {
-    before: Seeds,
-    rays_before: u64,
-    own: Seeds,
-}
-
-impl SeedsSoFar {
-    /// Of a render that begins with nothing.
-    pub(super) fn of_one(seed: u64) -> Self {
-        Self { before: Seeds::one(seed), rays_before: 0, own: Seeds::one(seed) }
-    }
-
-    /// The seeds of the film as it is now.
-    pub(super) fn of(&self, film: &Film) -> &Seeds {
-        if film.rays == self.rays_before { &self.before } else { &self.own }
-    }
-}
-
-impl CheckpointArguments {
-    /// The file that is asked for.
-    pub(super) fn file(&self) -> Option<&Path> {
-        self.checkpoint.as_deref()
-    }
-
-    /// Whether there is to be a file.
-    pub(super) fn is_wanted(&self) -> bool {
-        self.checkpoint.is_some()
-    }
-
-    /// Finds out whether the file can be written before the work is done, and refuses to write over the work of others, done or under
-    /// way. The claim lasts as long as the file is written.
-    pub(super) fn claim(&self) -> anyhow::Result<Option<Claim>> {
-        let Some(path) = &self.checkpoint else { return Ok(None) };
-        output::check_writable(path)?;
-        let claim = Claim::on(path)?;
-        if path.exists() && !self.resume {
-            bail!(
-                "{} is there already: go on with it by --resume, name another --checkpoint, or remove it",
-                path.display()
-            );
-        }
-        Ok(Some(claim))
-    }
-
-    /// How the operator was fitted to the whole in the film that a render of this origin goes on from, seen as this one is: finding it anew takes
-    /// seconds.
-    pub(super) fn kept_fit(&self, origin: &Origin, record: &SettingsRecord) -> Option<SavedTone> {
-        let path = self.checkpoint.as_ref().filter(|_| self.resume)?;
-        fit_in(path, origin, record)
-    }
-
-    /// The state to start from: `fresh`, or what the file holds if it fits `header`.
-    pub(super) fn start(&self, header: Header, fresh: RenderState, settings: &LoopSettings) -> anyhow::Result<Start> {
-        let Some(path) = self.checkpoint.as_ref().filter(|_| self.resume) else {
-            return Ok(begun(header, fresh));
-        };
-        if !path.exists() {
-            say!("note: {} is not there yet: starting from the beginning", path.display());
-            return Ok(begun(header, fresh));
-        }
-        let Checkpoint { header: found, state } = read_checkpoint(path)?;
-        let different = |problem| CheckpointError::Different { path: path.clone(), problem };
-        if let Some(problem) = found.origin.difference(&header.origin) {
-            return Err(different(problem).into());
-        }
-        let [seed] = header.seeds.all[..] else { bail!("a render has one seed") };
-        let own = found.seeds.continued_by(seed).map_err(different)?;
-        let mut earlier_visibilities = Vec::new();
-        let state = if found.settings != header.settings {
-            say!("note: the film was sampled by other settings: its samples are kept, its ladder begins anew");
-            // Other eyes: what audits found of these samples' visible energy does not hold for them.
-            RenderState { inflation: 1.0, ..state.begun_anew(&settings.limits) }
-        } else if found.seeds.current.is_none() {
-            state.begun_anew(&settings.limits)
-        } else {
-            earlier_visibilities = with_aim(found.earlier_visibilities, found.visibility);
-            if let Some(&aside) = earlier_visibilities.iter().find(|&&aim| !settings.ladder_passes_through(aim)) {
-                note_other_way(aside, settings);
-            }
-            state
-        };
-        let seeds = SeedsSoFar { before: found.seeds, rays_before: state.film.rays, own: own.clone() };
-        Ok(Start { header: Header { seeds: own, earlier_visibilities, ..header }, state, seeds })
-    }
-}
-
-/// How the operator is fitted in a film of this origin that is seen as `record` says. What is wrong with the file is for others to say.
-pub(super) fn fit_in(film: &Path, origin: &Origin, record: &SettingsRecord) -> Option<SavedTone> {
-    let found = read_header(film).ok()?;
-    let of_same = SettingsRecord { fitted: None, ..found.settings.clone() };
-    let is_same = found.origin.difference(origin).is_none() && of_same.is_seen_like(record);
-    found.settings.fitted.filter(|_| is_same)
-}
-
-/// From the beginning.
-fn begun(header: Header, state: RenderState) -> Start {
-    let seeds = SeedsSoFar { before: header.seeds.clone(), rays_before: state.film.rays, own: header.seeds.clone() };
-    Start { header, state, seeds }
-}
-
-/// All aims of a film, each once: one that left the ladder stays beside it, wherever it goes from there.
-fn with_aim(mut earlier: Vec<f64>, last: f64) -> Vec<f64> {
-    if !earlier.contains(&last) {
-        earlier.push(last);
-    }
-    earlier
-}
-
-/// Says where going on may not give what one go would: rungs that only one of the two passes leave other counts.
-fn note_other_way(aimed_at: f64, settings: &LoopSettings) {
-    say!(
-        "note: the film aimed at visibility {}, which a render to {} does not pass: the picture may not have the bytes of one in one go",
-        rounded(aimed_at),
-        rounded(settings.limits.last_rung())
-    );
-}
 
 /// Writes the film's file so often that a kill never costs more than was agreed.
 pub(super) struct Keeper {
@@ -245,135 +93,38 @@ impl Keeper {
         history.longest_write = history.longest_write.max(snapshot.elapsed());
         history.writing += snapshot.elapsed();
     }
-}
-
-/// Console, keeper, viewers, tev and signals together.
-pub(super) struct Watch<'a> {
-    console: Console,
-    keeper: Option<Keeper>,
-    audience: Option<Audience<'a>>,
-    tev: Option<Showing>,
-    stop: Arc<AtomicBool>,
-    started: Instant,
-}
-
-impl<'a> Watch<'a> {
-    /// `stop`: what signals set, of [`super::signals::listen`].
-    pub(super) fn new(
-        stop: Arc<AtomicBool>,
-        console: Console,
-        keeper: Option<Keeper>,
-        audience: Option<Audience<'a>>,
-        tev: Option<Showing>,
-    ) -> Self {
-        Self { console, keeper, audience, tev, stop, started: Instant::now() }
-    }
-
-    /// Whether a signal asked for the end.
-    fn is_asked_to_end(&self) -> bool {
-        self.stop.load(Ordering::Relaxed)
-    }
-
-    /// Who ended a render that was interrupted.
-    pub(super) fn interrupter(&self) -> Interrupter {
-        if self.is_asked_to_end() { Interrupter::Signal } else { Interrupter::Viewer }
-    }
-
-    /// Removes the progress bar.
-    pub(super) fn finish(&self) {
-        self.console.finish();
-    }
-
-    /// Says what keeping the film took.
+    /// Says what keeping the film took of the `whole` time.
     ///
     /// # Errors
     /// If its last state could not be written.
-    pub(super) fn report(self) -> anyhow::Result<()> {
-        let Some(Keeper { path, history, .. }) = self.keeper else { return Ok(()) };
-        let history = history.into_inner().unwrap_or_else(PoisonError::into_inner);
+    fn report(self, whole: Duration) -> anyhow::Result<()> {
+        let history = self.history.into_inner().unwrap_or_else(PoisonError::into_inner);
         if let Some(error) = history.failure {
             return Err(error.into());
         }
         say!(
             "Checkpoint {}: {:.1} MB, written {} times in {:.2} s, {:.1} % of the time.",
-            path.display(),
+            self.path.display(),
             history.bytes as f64 / 1e6,
             history.writes,
             history.writing.as_secs_f64(),
-            100.0 * history.writing.as_secs_f64() / self.started.elapsed().as_secs_f64()
+            100.0 * history.writing.as_secs_f64() / whole.as_secs_f64()
         );
         Ok(())
-    }
-}
-
-impl Monitor for Watch<'_> {
-    fn looked(&self, progress: &Progress) {
-        self.console.looked(progress);
-        if let Some(audience) = &self.audience {
-            audience.looked(progress);
-        }
-    }
-
-    fn judged(&self, state: &RenderState, judgement: &Judgement) {
-        if let Some(audience) = &self.audience {
-            audience.judged(state, judgement);
-        }
-        if let Some(tev) = &self.tev {
-            tev.judged(judgement);
-        }
-    }
-
-    fn samples_done(&self, samples: u64) {
-        self.console.samples_done(samples);
-        if let Some(audience) = &self.audience {
-            audience.samples_done(samples);
-        }
-    }
-
-    fn most_samples_a_batch(&self) -> u64 {
-        self.audience.as_ref().map_or(u64::MAX, Audience::most_samples_a_batch)
-    }
-
-    fn between_batches(&self, state: &RenderState) -> Directive {
-        if self.is_asked_to_end() {
-            return Directive::Stop;
-        }
-        if let Some(keeper) = &self.keeper {
-            keeper.chance(state);
-        }
-        if let Some(tev) = &self.tev {
-            tev.between_batches(state);
-        }
-        self.audience.as_ref().map_or(Directive::GoOn, |audience| audience.between_batches(state))
-    }
-
-    fn ended(&self, state: &RenderState, reason: StopReason) {
-        if let Some(audience) = &self.audience {
-            audience.ended(state, reason);
-        }
-        if let Some(tev) = &self.tev {
-            tev.ended(state);
-        }
-        if let Some(keeper) = &self.keeper {
-            keeper.ended(state);
-        }
-    }
-
-    fn failed(&self, state: &RenderState) {
-        if let Some(keeper) = &self.keeper {
-            keeper.ended(state);
-        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cli::console::Console;
+    use fechner::adaptive::Monitor as _;
     use fechner::adaptive::settings::{AllocationRule, Limits, Sampling};
-    use fechner::checkpoint::Tracing;
+    use fechner::checkpoint::{Origin, SettingsRecord, Tracing, read_checkpoint};
     use fechner::integrator::TraceSettings;
     use fechner::scene::hash::ContentHash;
     use fechner_perception::display::Viewing;
+    use std::sync::Arc;
 
     const EVERY: Duration = Duration::from_secs(60);
 

@@ -275,7 +275,7 @@ fn bad_arguments_are_refused_in_one_line() {
     assert_refused(&["render", cornell, "-o", "no/such/a.png"], at, &["no/such"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--size", "0x10"], at, &["0x10", "WIDTHxHEIGHT"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--size", "-3x4"], at, &["\"-3x4\" is not a size"]);
-    assert_refused(&["render", cornell, "-o", "a.png", "--size", "400000x400000"], at, &["memory", "--size"]);
+    assert_refused(&["render", cornell, "-o", "a.png", "--size", "40000x40000"], at, &["memory", "--size"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--visibility", "-1"], at, &["above 0"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--sampling", "budget"], at, &["--spp"]);
     assert_refused(&["render", cornell, "-o", "a.png", "--model", "guess"], at, &["guess", "csf-bands"]);
