@@ -4,8 +4,8 @@
 //! Not for what is found without it: lamps that cover a pixel whole, of which the neighbours tell. Nor are lamps looked for that move, or that
 //! are seen by a moving camera, through a lens, by mirrors or through glass.
 
-use super::PathTracer;
 use super::camera::CameraRays;
+use super::{Crop, PathTracer};
 use crate::light::LampPart;
 use glam::{Vec2, Vec3, Vec3A};
 use std::f32::consts::PI;
@@ -32,38 +32,26 @@ impl PathTracer {
         if self.camera.moves() || self.camera.has_lens() {
             return None;
         }
-        let mut pieces = Vec::new();
+        let area = self.settings.film_area();
+        let mut pieces = Pieces { camera: &self.camera, area, found: Vec::new() };
         for part in self.lights.still_parts() {
-            self.cut(part, &mut pieces);
-            if pieces.len() > MOST_PIECES {
+            pieces.add(part);
+            if pieces.are_too_many() {
                 return None;
             }
         }
-        let area = self.settings.film_area();
         let density = self.settings.filter.density();
         let mut shares = vec![0.0; area.width as usize * area.height as usize];
-        for piece in pieces {
+        for piece in pieces.found {
             let pixel = piece.place_px.floor();
             let (x, y) = (pixel.x - area.x as f32, pixel.y - area.y as f32);
-            if x < 0.0 || y < 0.0 || x >= area.width as f32 || y >= area.height as f32 || self.is_hidden(&piece) {
-                continue;
+            let is_inside = (0.0..area.width as f32).contains(&x) && (0.0..area.height as f32).contains(&y);
+            if is_inside && !self.is_hidden(&piece) {
+                let offset_px = piece.place_px - pixel - 0.5;
+                shares[y as usize * area.width as usize + x as usize] += piece.area_px2 * density.at(offset_px);
             }
-            let offset_px = piece.place_px - pixel - 0.5;
-            shares[y as usize * area.width as usize + x as usize] += piece.area_px2 * density.at(offset_px);
         }
         shares.iter().any(|&share| share > 0.0).then_some(shares)
-    }
-
-    fn cut(&self, part: LampPart, pieces: &mut Vec<Piece>) {
-        match part {
-            LampPart::Triangle { corners, front } => {
-                let middle = corners.iter().sum::<Vec3>() / 3.0;
-                if front.is_none_or(|front| front.dot(self.camera.way_to(middle)) < 0.0) {
-                    cut_triangle(&self.camera, corners, pieces);
-                }
-            }
-            LampPart::Sphere { center, radius } => pieces.extend(sphere(&self.camera, center, radius)),
-        }
     }
 
     /// Whether something stands before a piece.
@@ -76,24 +64,67 @@ impl PathTracer {
     }
 }
 
-/// Halves a triangle's longest side until none is long. Nothing of one that is thick, or not wholly before the camera.
-fn cut_triangle(camera: &CameraRays, corners: [Vec3; 3], pieces: &mut Vec<Piece>) {
-    let Some(places) = each(corners, |corner| camera.project(corner)) else { return };
-    let side = |i: usize| places[(i + 1) % 3] - places[i];
-    let longest = (0..3).max_by(|&a, &b| side(a).length_squared().total_cmp(&side(b).length_squared())).unwrap_or(0);
-    let (length_px, area_px2) = (side(longest).length(), 0.5 * side(0).perp_dot(side(1)).abs());
-    if !length_px.is_finite() || 2.0 * area_px2 > THICK_PX * length_px || pieces.len() > MOST_PIECES {
-        return;
+/// Lamps cut into pieces.
+struct Pieces<'a> {
+    camera: &'a CameraRays,
+    /// Outside of which nothing is looked for.
+    area: Crop,
+    found: Vec<Piece>,
+}
+
+impl Pieces<'_> {
+    fn add(&mut self, part: LampPart) {
+        match part {
+            LampPart::Triangle { corners, front } => {
+                let way = self.camera.way_to(middle_of(corners));
+                if front.is_none_or(|front| front.dot(way) < 0.0) {
+                    self.add_triangle(corners);
+                }
+            }
+            LampPart::Sphere { center, radius } => self.found.extend(sphere(self.camera, center, radius)),
+        }
     }
-    if length_px <= LONGEST_PIECE_PX {
-        let middle = corners.iter().sum::<Vec3>() / 3.0;
-        pieces.push(Piece { middle, place_px: places.iter().sum::<Vec2>() / 3.0, area_px2 });
-        return;
+
+    fn are_too_many(&self) -> bool {
+        self.found.len() > MOST_PIECES
     }
-    let [a, b, c] = [0, 1, 2].map(|i| corners[(longest + i) % 3]);
-    let between = 0.5 * (a + b);
-    cut_triangle(camera, [a, between, c], pieces);
-    cut_triangle(camera, [between, b, c], pieces);
+
+    /// Halves a triangle's longest side until none is long. Nothing of one that is thick, or not wholly before the camera.
+    fn add_triangle(&mut self, corners: [Vec3; 3]) {
+        let Some(places) = each(corners, |corner| self.camera.project(corner)) else { return };
+        let side = |i: usize| places[(i + 1) % 3] - places[i];
+        let longer = |&a: &usize, &b: &usize| side(a).length_squared().total_cmp(&side(b).length_squared());
+        let longest = (0..3).max_by(longer).unwrap_or(0);
+        let (length_px, area_px2) = (side(longest).length(), 0.5 * side(0).perp_dot(side(1)).abs());
+        let is_thick = 2.0 * area_px2 > THICK_PX * length_px;
+        if !length_px.is_finite() || is_thick || self.is_outside(places) || self.are_too_many() {
+            return;
+        }
+        if length_px <= LONGEST_PIECE_PX {
+            let place_px = places.iter().sum::<Vec2>() / 3.0;
+            self.found.push(Piece { middle: middle_of(corners), place_px, area_px2 });
+            return;
+        }
+        let [a, b, c] = [0, 1, 2].map(|i| corners[(longest + i) % 3]);
+        let between = 0.5 * (a + b);
+        // As near as numbers can be, a side has no middle.
+        if between != a && between != b {
+            self.add_triangle([a, between, c]);
+            self.add_triangle([between, b, c]);
+        }
+    }
+
+    fn is_outside(&self, places_px: [Vec2; 3]) -> bool {
+        let first = Vec2::new(self.area.x as f32, self.area.y as f32);
+        let end = first + Vec2::new(self.area.width as f32, self.area.height as f32);
+        let [a, b, c] = places_px;
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        low.cmpgt(end).any() || high.cmplt(first).any()
+    }
+}
+
+fn middle_of(corners: [Vec3; 3]) -> Vec3 {
+    corners.iter().sum::<Vec3>() / 3.0
 }
 
 /// A sphere that is smaller than a pixel, as one piece.

@@ -339,7 +339,8 @@ fn a_look_that_fails_leaves_the_samples() {
         let error = render(&tracer, &settings, &monitor).expect_err("nobody sees").to_string();
         assert!(error.contains("the eye"), "{error}");
         let kept = monitor.kept.into_inner().expect("one thread").expect("told");
-        assert_eq!(kept.film.total_samples(), 16 * 16 * 16);
+        // And what it takes to meet the lamp, which is thinner than a pixel at this size.
+        assert!((16 * 16 * 16..16 * 16 * 24).contains(&kept.film.total_samples()), "{}", kept.film.total_samples());
     }
 }
 

@@ -505,7 +505,7 @@ fn foreign_files_and_versions_are_named() {
     later[12] += 1;
     assert!(message(&later).contains("this program reads version 10"), "{}", message(&later));
     assert!(message(&sound[..sound.len() / 2]).contains("damaged"));
-    assert!(read_checkpoint(folder.path()).expect_err("a folder").to_string().contains("folder"));
+    assert!(read_checkpoint(folder.path()).expect_err("a folder").to_string().contains("directory"));
 }
 
 /// Another scene, size, version or way of tracing is no film to go on with.
