@@ -134,7 +134,8 @@ impl LampEdges<'_> {
             }
             let lamps = || around(lamp, RADIUS).filter(|&at| is_lamp(at));
             let full = lamps().map(|(x, y)| lamp_cd_m2.get(x, y)).fold(0.0, f32::max);
-            let is_thin = lamps().all(|at| light(at) < 0.5 * full);
+            // By each one's own light: a dim lamp's rim beside a bright lamp is a rim.
+            let is_thin = lamps().all(|at| light(at) < 0.5 * lamp_cd_m2.get(at.0, at.1));
             for (x, y) in around(lamp, 1) {
                 let pixel = y * width + x;
                 let Some((own, samples)) = unmet(pixel) else { continue };

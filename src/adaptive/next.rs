@@ -9,7 +9,7 @@ use super::plan::{
     SAMPLES_OF_A_RAW_LOOK, adaptive_plan, doubling_of, even_plan, plan_up_to, uniform_plan, wanted_samples,
 };
 use super::rivals::{rival_plan, rival_stop};
-use super::settings::{Limits, LoopSettings, Sampling, THRESHOLD};
+use super::settings::{LoopSettings, Sampling, THRESHOLD};
 use super::small_lamps::samples_to_meet;
 use super::state::Exposure;
 use super::stop::{LEAST_SAVING, predicted_saving};
@@ -85,16 +85,17 @@ impl Loop<'_> {
         }))
     }
 
-    /// Without a look: enters a plan for lamps that are known to be there, for what is left of a budget where that is hardly more than a look costs, and between two looks at a
-    /// picture that is denoised a plan by raw noise alone; false when it is time for a look.
+    /// Enters a plan that takes no look, where there is one; false when it is time for a look. Such plans are for lamps that are known to be
+    /// there, for what is left of a budget where that is hardly more than a look costs, and, by raw noise alone, between two looks at a picture
+    /// that is denoised.
     pub(super) fn plans_without_a_look(&mut self) -> Result<bool, JudgeError> {
         let left = self.left_of_budget();
-        if self.is_hardly_more_than_pilot(left) {
-            self.enter(even_plan(&self.state.film, left));
-            return Ok(true);
-        }
         if let Some(plan) = self.plan_to_meet_small_lamps(left) {
             self.enter(plan);
+            return Ok(true);
+        }
+        if self.has_little_left_after_its_first_samples(left) {
+            self.enter(even_plan(&self.state.film, left));
             return Ok(true);
         }
         if self.settings.denoiser.is_none() || matches!(self.settings.sampling, Sampling::Rival(_)) || left == 0 {
@@ -126,21 +127,33 @@ impl Loop<'_> {
         Ok(true)
     }
 
-    /// What is lacking where lamps smaller than a pixel are known to be, for sampling by sight.
-    fn plan_to_meet_small_lamps(&self, left: u64) -> Option<SamplePlan> {
+    /// Samples that pixels should have to meet lamps smaller than they, for sampling by sight.
+    fn samples_to_meet_lamps(&self) -> Option<&[u32]> {
         if self.settings.sampling != Sampling::Adaptive {
             return None;
         }
-        let Limits { pilot_samples, max_samples, .. } = self.settings.limits;
-        let of_lamps = || samples_to_meet(&self.tracer.share_of_small_lamps()?, pilot_samples);
-        let wanted = self.samples_to_meet_lamps.get_or_init(of_lamps).as_deref()?;
-        let plan = plan_up_to(&self.state.film, |pixel| wanted[pixel].min(max_samples));
-        some(plan).filter(|plan| plan.samples() <= left)
+        let of_lamps = || samples_to_meet(&self.tracer.share_of_small_lamps()?, &self.settings.limits);
+        self.samples_to_meet_lamps.get_or_init(of_lamps).as_deref()
     }
 
-    /// Whether the pilot of a raw picture on the way to threshold is done, and the budget has so little left that a look would cost more
-    /// than knowing where it goes is worth: that is a few per cent of it.
-    fn is_hardly_more_than_pilot(&self, left: u64) -> bool {
+    fn plan_to_meet_small_lamps(&self, left: u64) -> Option<SamplePlan> {
+        let wanted = self.samples_to_meet_lamps()?;
+        some(plan_up_to(&self.state.film, |pixel| wanted[pixel])).filter(|plan| plan.samples() <= left)
+    }
+
+    /// Samples before the first look: the pilot's, and those for lamps smaller than a pixel.
+    fn first_samples(&self) -> u64 {
+        let pilot = u64::from(self.settings.limits.pilot_samples);
+        match self.samples_to_meet_lamps() {
+            Some(wanted) => wanted.iter().map(|&wanted| u64::from(wanted).max(pilot)).sum(),
+            None => pilot * self.state.film.pixel_count() as u64,
+        }
+    }
+
+    /// Whether a raw picture on the way to threshold has its first samples and no more, and the budget so little left that a look would cost
+    /// more than knowing where it goes is worth: that is a few per cent of it. Nor would it be right: what a look gives to pixels that have
+    /// met no light of a lamp beside them makes stars too bright, by 13 % at 24 samples a pixel.
+    fn has_little_left_after_its_first_samples(&self, left: u64) -> bool {
         const WORTH_A_LOOK: f64 = 4.0 * SAMPLES_OF_A_RAW_LOOK;
         let (film, limits) = (&self.state.film, &self.settings.limits);
         let pixels = film.pixel_count() as u64;
@@ -148,7 +161,7 @@ impl Loop<'_> {
         is_by_sight
             && left > 0
             && left as f64 <= WORTH_A_LOOK * pixels as f64
-            && film.total_samples() == u64::from(limits.pilot_samples) * pixels
+            && film.total_samples() == self.first_samples()
             && film.total_samples() + left <= u64::from(limits.max_samples) * pixels
             && self.rungs.front().is_some_and(|&rung| rung <= THRESHOLD)
     }

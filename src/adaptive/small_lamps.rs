@@ -3,27 +3,31 @@
 //! Of a lamp that covers a thirtieth of a pixel the first sixteen samples find nothing in six pixels of ten, and their halves agree that it is black.
 //! Where it is, and how much it covers, is known before the first sample, so the count is no matter of luck.
 
+use super::settings::Limits;
+
 /// Samples that should meet the lamp: so many pass by all of them in one pixel of 3000.
 const MEETINGS: f64 = 8.0;
 /// Fewer are not worth having.
 const FEWEST_MEETINGS: f64 = 1.0;
 /// A lamp that covers so much of a pixel is found by its first samples.
 const FOUND_ANYWAY: f32 = 0.5;
-/// Samples of a pixel beyond which a lamp is left to chance.
+/// A pixel gets no more samples than this, and none for a lamp that these would not meet once.
 const MOST_SAMPLES: f64 = 4096.0;
 /// Of the pilot's samples, what this may take.
 const MOST_OF_PILOT: f64 = 0.5;
 
-/// Samples that each pixel should have to meet lamps that cover such shares of them, for as many meetings as half of a pilot's samples allow.
-/// `None` where they do not allow any.
+/// Samples that each pixel should have to meet lamps that cover such shares of them, for as many meetings as half of a pilot's samples and the
+/// budget of `mean_samples` a pixel allow. `None` where they do not allow any.
 ///
-/// By the scene alone: a render that goes on asks for what it has.
-pub(super) fn samples_to_meet(shares: &[f32], pilot_samples: u32) -> Option<Vec<u32>> {
-    let affordable = MOST_OF_PILOT * f64::from(pilot_samples) * shares.len() as f64;
+/// By the scene and the limits alone: a render that goes on asks for what it has.
+pub(super) fn samples_to_meet(shares: &[f32], limits: &Limits) -> Option<Vec<u32>> {
+    let pilot = f64::from(limits.pilot_samples);
+    let budget = limits.mean_samples.map_or(f64::INFINITY, |mean| f64::from(mean) - pilot);
+    let affordable = budget.min(MOST_OF_PILOT * pilot) * shares.len() as f64;
     let mut meetings = MEETINGS;
     while meetings >= FEWEST_MEETINGS {
-        let wanted: Vec<u32> = shares.iter().map(|&share| wanted(share, meetings)).collect();
-        let cost: f64 = wanted.iter().map(|&samples| f64::from(samples.saturating_sub(pilot_samples))).sum();
+        let wanted: Vec<u32> = shares.iter().map(|&share| wanted(share, meetings).min(limits.max_samples)).collect();
+        let cost: f64 = wanted.iter().map(|&samples| (f64::from(samples) - pilot).max(0.0)).sum();
         if cost <= affordable {
             return Some(wanted);
         }
@@ -34,23 +38,31 @@ pub(super) fn samples_to_meet(shares: &[f32], pilot_samples: u32) -> Option<Vec<
 
 /// Samples of a pixel of which the lamp covers such a share, for so many meetings.
 fn wanted(share: f32, meetings: f64) -> u32 {
-    let is_small = share > 0.0 && share < FOUND_ANYWAY;
-    let samples = meetings / f64::from(share);
-    if is_small && samples <= MOST_SAMPLES { samples.ceil() as u32 } else { 0 }
+    let of_most = f64::from(share) * MOST_SAMPLES;
+    let is_small = of_most >= FEWEST_MEETINGS && share < FOUND_ANYWAY;
+    if is_small { (meetings / f64::from(share)).min(MOST_SAMPLES).ceil() as u32 } else { 0 }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Lamps that cover 3 %, half or nothing of a pixel, and next to nothing; with more of them fewer meetings, then none.
+    /// Lamps that cover 3 % of a pixel, with more of them fewer meetings, then none.
     #[test]
     fn lamps_are_met_as_often_as_a_pilot_affords() {
-        let of = |lamps: usize| {
+        let of = |lamps: usize, mean_samples: Option<u32>| {
             let shares: Vec<f32> = (0..1000).map(|pixel| if pixel < lamps { 0.03 } else { 0.0 }).collect();
-            samples_to_meet(&shares, 16).map(|wanted| wanted[0])
+            samples_to_meet(&shares, &Limits { mean_samples, ..Limits::of_visibility(1.0) }).map(|wanted| wanted[0])
         };
-        assert_eq!([of(10), of(40), of(100), of(300), of(1000)], [Some(267), Some(134), Some(67), Some(34), None]);
-        assert_eq!(samples_to_meet(&[0.0, 0.5, 0.9, 1e-4, f32::NAN], 16), Some(vec![0; 5]));
+        let found = [10, 40, 100, 300, 1000].map(|lamps| of(lamps, None));
+        assert_eq!(found, [Some(267), Some(134), Some(67), Some(34), None]);
+        assert_eq!([16, 17, 18, 24].map(|spp| of(10, Some(spp))), [None, Some(67), Some(134), Some(267)]);
+    }
+
+    /// Half of a pixel is found anyway; of what is less, down to what 4096 samples meet once, as many as allowed.
+    #[test]
+    fn tiny_lamps_are_met_as_often_as_a_pixel_may() {
+        let samples = [0.0, 0.5, 0.1, 0.001, 3e-4, 2e-4, f32::NAN].map(|share| wanted(share, MEETINGS));
+        assert_eq!(samples, [0, 0, 80, 4096, 4096, 0, 0]);
     }
 }

@@ -32,17 +32,7 @@ fn passed_by_coat(surface: &Surface, textures: &[Texture], uv: Vec2, cosine: f32
             let [first, second] = [first, second].map(|part| passed_by_coat(part, textures, uv, cosine));
             first + (second - first) * amount.evaluate(textures, uv).clamp(0.0, 1.0)
         }
-        Surface::Diffuse { .. }
-        | Surface::OrenNayar { .. }
-        | Surface::DiffuseTransmission { .. }
-        | Surface::Mirror { .. }
-        | Surface::Conductor { .. }
-        | Surface::Dielectric { .. }
-        | Surface::ThinDielectric { .. }
-        | Surface::CoatedDiffuse { .. }
-        | Surface::CoatedConductor { .. }
-        | Surface::Phong { .. }
-        | Surface::Ward { .. }
-        | Surface::HeTorrance { .. } => 1.0,
+        // As `Surface::has_clearcoat` has it.
+        _ => 1.0,
     }
 }

@@ -14,7 +14,7 @@ use glam::{Affine3A, DVec3, Vec2, Vec3, Vec3A};
 /// A flat emitter.
 #[derive(Clone, Debug)]
 pub(super) struct FlatEmitter {
-    object: u32,
+    pub(super) object: u32,
     /// Of a parallelogram, the first of its two triangles.
     triangle: u32,
     outline: Outline,
@@ -34,7 +34,7 @@ pub(super) struct FlatEmitter {
     offset: f32,
     pub(super) both_sides: bool,
     /// No ray meets it.
-    pub(super) is_unseen: bool,
+    is_unseen: bool,
     /// What it emits where that is the same everywhere; `None` where a picture says.
     even_radiance: Option<Vec3>,
 }
@@ -164,6 +164,15 @@ impl FlatEmitter {
             _ => Some(self.corner + self.edge_1 + self.edge_2),
         };
         [self.corner, self.corner + self.edge_1, self.corner + self.edge_2].into_iter().chain(last)
+    }
+
+    /// What it is made of.
+    pub(super) fn triangles(&self) -> [Option<[Vec3; 3]>; 2] {
+        let [a, b, c] = [self.corner, self.corner + self.edge_1, self.corner + self.edge_2];
+        match self.outline {
+            Outline::Triangle => [Some([a, b, c]), None],
+            _ => [Some([a, b, c]), Some([b, b + self.edge_2, c])],
+        }
     }
 
     /// A direction from a receiver to the emitter.

@@ -1,6 +1,8 @@
 //! What a camera may see of lamps that stand still: triangles and spheres.
 
 use super::{Emitter, Lights};
+use crate::geometry::World;
+use crate::scene::Alpha;
 use glam::Vec3;
 
 /// A part of a lamp, in the world.
@@ -23,26 +25,29 @@ pub enum LampPart {
 }
 
 impl Lights {
-    /// The parts of all lamps that have a surface and do not move while the shutter is open.
-    pub fn still_parts(&self) -> impl Iterator<Item = LampPart> {
-        self.emitters.iter().flat_map(|emitter| {
-            let [first, second] = match emitter {
-                Emitter::Flat(flat) if !flat.is_unseen => {
+    /// The parts of all lamps that have a surface and do not move while the shutter is open. Not those of lamps whose emission is a picture or
+    /// that alpha covers: they may be black anywhere.
+    pub fn still_parts(&self, world: &World) -> impl Iterator<Item = LampPart> {
+        let shines_all_over = |object: u32| {
+            let material = &world.scene().materials[world.material_of(object).0 as usize];
+            material.emission.texture.is_none() && material.alpha == Alpha::Opaque
+        };
+        self.emitters.iter().flat_map(move |emitter| {
+            let parts = match emitter {
+                Emitter::Flat(flat) if shines_all_over(flat.object) => {
                     let front = (!flat.both_sides).then_some(flat.normal);
-                    let corners: Vec<Vec3> = flat.corners().collect();
-                    let triangle = |corners| LampPart::Triangle { corners, front };
-                    match corners[..] {
-                        [a, b, c, d] => [Some(triangle([a, b, c])), Some(triangle([b, d, c]))],
-                        [a, b, c] => [Some(triangle([a, b, c])), None],
-                        _ => [None; 2],
-                    }
+                    flat.triangles().map(|corners| Some(LampPart::Triangle { corners: corners?, front }))
                 }
-                Emitter::Sphere(sphere) if !sphere.is_unseen => {
+                Emitter::Sphere(sphere) if shines_all_over(sphere.object) => {
                     [Some(LampPart::Sphere { center: sphere.center, radius: sphere.radius }), None]
                 }
-                _ => [None; 2],
+                Emitter::Flat(_)
+                | Emitter::Sphere(_)
+                | Emitter::Point(_)
+                | Emitter::MovingTriangle { .. }
+                | Emitter::MovingSphere { .. } => [None; 2],
             };
-            first.into_iter().chain(second)
+            parts.into_iter().flatten()
         })
     }
 }

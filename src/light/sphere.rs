@@ -9,14 +9,14 @@ use std::f32::consts::{PI, TAU};
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SphereEmitter {
-    object: u32,
+    pub(super) object: u32,
     pub(super) center: Vec3,
     pub(super) radius: f32,
     axes: Mat3A,
     /// What it emits where that is the same everywhere; `None` where a picture says.
     even_radiance: Option<Vec3>,
     /// No ray meets it.
-    pub(super) is_unseen: bool,
+    is_unseen: bool,
 }
 
 impl SphereEmitter {

@@ -10,7 +10,7 @@
 mod filter;
 mod sobol;
 
-pub use filter::{FilterSample, PixelFilter};
+pub use filter::{FilterDensity, FilterSample, PixelFilter};
 
 /// How the samples of neighbouring pixels relate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -352,18 +352,8 @@ impl Surface {
         match self {
             Self::MetalRoughness(model) => model.clearcoat.factor > 0.0,
             Self::Mix { first, second, .. } => first.has_clearcoat() || second.has_clearcoat(),
-            Self::Diffuse { .. }
-            | Self::OrenNayar { .. }
-            | Self::DiffuseTransmission { .. }
-            | Self::Mirror { .. }
-            | Self::Conductor { .. }
-            | Self::Dielectric { .. }
-            | Self::ThinDielectric { .. }
-            | Self::CoatedDiffuse { .. }
-            | Self::CoatedConductor { .. }
-            | Self::Phong { .. }
-            | Self::Ward { .. }
-            | Self::HeTorrance { .. } => false,
+            // Coats of other kinds are parts of their models, which are not said to lie over what emits.
+            _ => false,
         }
     }
 
@@ -376,18 +366,7 @@ impl Surface {
                 (true, false) => 2,
                 (true, true) => 3,
             },
-            Self::Diffuse { .. }
-            | Self::OrenNayar { .. }
-            | Self::DiffuseTransmission { .. }
-            | Self::Mirror { .. }
-            | Self::Conductor { .. }
-            | Self::Dielectric { .. }
-            | Self::ThinDielectric { .. }
-            | Self::CoatedDiffuse { .. }
-            | Self::CoatedConductor { .. }
-            | Self::Phong { .. }
-            | Self::Ward { .. }
-            | Self::HeTorrance { .. } => 1,
+            _ => 1,
         }
     }
 

@@ -7,7 +7,7 @@ use fechner::adaptive::settings::Sampling;
 use fechner::film::Film;
 use fechner::integrator::{BlockWork, PathTracer, SamplePlan, TraceSettings};
 use fechner::sampler::{Half, PixelFilter};
-use fechner::scene::Scene;
+use fechner::scene::{Alpha, ScalarInput, Scene};
 use glam::Vec3;
 use std::sync::Arc;
 
@@ -32,25 +32,28 @@ fn found(tracer: &PathTracer) -> Vec<f32> {
     film.estimate(1.0).luminance_cd_m2.values().to_vec()
 }
 
-/// A ball of a fifth of a pixel and a needle of a twentieth, by each filter, within what samples find: scatter of 8192 and pieces that
-/// also shine into the pixel beside theirs.
+/// A ball of a fifth of a pixel, one on a corner of four pixels, and a needle of a twentieth, by each filter: what is looked for in a pixel is
+/// what its samples find, of which 8192 leave four per cent to chance.
 #[test]
 fn shares_are_what_samples_find() {
-    let ball = |scene: &mut Scene| add_sphere(scene, Vec3::new(0.03, 0.02, 0.0), 0.012, LAMP);
+    let ball = |scene: &mut Scene| add_sphere(scene, Vec3::new(0.05, 0.04, 0.0), 0.012, LAMP);
+    let on_a_corner = |scene: &mut Scene| add_sphere(scene, Vec3::new(0.001, 0.001, 0.0), 0.012, LAMP);
     let needle = |scene: &mut Scene| {
         add_rectangle(scene, Vec3::new(-0.3, 0.05, 0.0), 0.005 * Vec3::Y, Vec3::new(0.6, 0.02, 0.0), LAMP);
     };
-    for filter in [PixelFilter::Box, PixelFilter::Gaussian, PixelFilter::BlackmanHarris] {
-        for (name, add) in [("ball", &ball as &dyn Fn(&mut Scene)), ("needle", &needle)] {
+    type Adding<'a> = &'a dyn Fn(&mut Scene);
+    let lamps: [(&str, Adding<'_>, usize); 3] =
+        [("ball", &ball, 1), ("corner", &on_a_corner, 4), ("needle", &needle, 6)];
+    for filter in [PixelFilter::Gaussian, PixelFilter::BlackmanHarris] {
+        for (name, add, pixels) in lamps {
             let tracer = tracer_of(filter, 1.0, add);
             let shares = tracer.share_of_small_lamps().expect("a small lamp");
             let found = found(&tracer);
-            let held: Vec<usize> = (0..shares.len()).filter(|&pixel| shares[pixel] > 0.01).collect();
-            assert!(!held.is_empty(), "{name}");
+            let held: Vec<usize> = (0..shares.len()).filter(|&pixel| shares[pixel] > 0.0).collect();
             let total = |of: &[f32]| held.iter().map(|&pixel| of[pixel]).sum::<f32>();
             let ratio = total(&shares) / total(&found);
             println!("{name} {filter:?}: {} pixels, {ratio}", held.len());
-            assert!((0.7..1.1).contains(&ratio), "{name} by {filter:?}: {ratio}");
+            assert!(held.len() >= pixels && (ratio - 1.0).abs() < 0.12, "{name} by {filter:?}: {held:?}, {ratio}");
         }
     }
 }
@@ -67,13 +70,18 @@ fn lamps_that_are_large_or_hidden_or_turned_away_are_not_looked_for() {
         scene.materials[0].emits_both_sides = false;
         add_rectangle(scene, far, 0.004 * Vec3::Y, 0.004 * Vec3::X, LAMP);
     };
+    let covered = |scene: &mut Scene| {
+        scene.materials[0].alpha = Alpha::Blend { value: ScalarInput::constant(0.5) };
+        add_sphere(scene, far, 0.006, LAMP);
+    };
     type Adding<'a> = &'a dyn Fn(&mut Scene);
-    let cases: [(&str, Adding<'_>); 5] = [
+    let cases: [(&str, Adding<'_>); 6] = [
         ("none", &|_| ()),
         ("a large ball", &|scene| add_sphere(scene, Vec3::ZERO, 0.3, LAMP)),
         ("a large screen", &|scene| add_rectangle(scene, -Vec3::ONE, 2.0 * Vec3::X, 2.0 * Vec3::Y, LAMP)),
         ("hidden", &hidden),
         ("turned away", &turned),
+        ("covered in part", &covered),
     ];
     for (name, add) in cases {
         assert!(tracer_of(PixelFilter::Gaussian, 1.0, add).share_of_small_lamps().is_none(), "{name}");
@@ -92,4 +100,41 @@ fn stars_are_not_missed() {
     let (sum, even) = (rendered.film.estimate(1.0).luminance_cd_m2.mean(), found(&tracer));
     let even = even.iter().map(|&light| f64::from(light)).sum::<f64>() / even.len() as f64;
     assert!((sum / even - 1.0).abs() < 0.1, "{sum} for {even}");
+}
+
+/// A tube that goes on far beyond the picture, and one in numbers so large that neighbours are a pixel apart, have their samples as others do.
+#[test]
+fn long_and_far_lamps_come_to_an_end() {
+    let long = |scene: &mut Scene| {
+        add_rectangle(scene, Vec3::new(-1e4, 0.05, 0.0), 0.005 * Vec3::Y, 2e4 * Vec3::X, LAMP);
+        add_sphere(scene, Vec3::new(0.05, -0.3, 0.0), 0.012, LAMP);
+    };
+    let shares = tracer_of(PixelFilter::Gaussian, 1.0, long).share_of_small_lamps().expect("small lamps");
+    let held = shares.iter().filter(|&&share| share > 0.0).count();
+    assert!((SIDE as usize + 1..3 * SIDE as usize).contains(&held), "{held} pixels");
+
+    let far_away = Vec3::new(4e6, 0.0, 5.4e6);
+    let far = |scene: &mut Scene| {
+        scene.camera.position += far_away;
+        add_rectangle(scene, far_away - 0.5 * Vec3::X, 0.5 * Vec3::Y, Vec3::X, LAMP);
+    };
+    let tracer = tracer_of(PixelFilter::Gaussian, 1.0, far);
+    assert!(tracer.share_of_small_lamps().is_none_or(|shares| shares.iter().all(|share| share.is_finite())));
+}
+
+/// What is left of a budget after the samples for stars goes everywhere: given to pixels that had met none, it made them 13 % too bright.
+#[test]
+fn the_rest_of_a_budget_is_no_matter_of_luck() {
+    let mut scene = empty_scene();
+    add_material(&mut scene, diffuse(0.0), Vec3::splat(200.0));
+    let star = |i: u32| Vec3::new(-0.7 + 0.3 * (i % 5) as f32 + 0.013 * i as f32, -0.3 + 0.5 * (i / 5) as f32, 0.0);
+    (0..10).for_each(|i| add_sphere(&mut scene, star(i), 0.011, LAMP));
+    let tracer = PathTracer::new(Arc::new(scene), TraceSettings::new(SIDE, SIDE, 1));
+    let rendered =
+        adaptive::render(&tracer, &loop_settings(100.0, Sampling::Adaptive, None, Some(24)), &Quiet).expect("renders");
+    let counts: Vec<u32> = (0..(SIDE * SIDE) as usize).map(|pixel| rendered.film.samples(pixel)).collect();
+    assert!(counts.iter().any(|&count| count > 100), "for stars that are known");
+    // Others differ by one sample in each half at the most.
+    let lucky: Vec<u32> = counts.into_iter().filter(|count| !(16..=18).contains(count) && *count < 60).collect();
+    assert!(lucky.is_empty(), "{lucky:?}");
 }
