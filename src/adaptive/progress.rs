@@ -2,7 +2,7 @@
 
 use super::judge::Judgement;
 use super::plan::slice_count;
-use super::settings::Limits;
+use super::settings::{DEFAULT_MAX_SAMPLES, Limits};
 use super::state::RenderState;
 use super::{Loop, Progress, Step, visible_share};
 use crate::film::Film;
@@ -40,9 +40,10 @@ fn remaining_samples(state: &RenderState, limits: &Limits, judgement: &Judgement
 }
 
 /// Samples until nothing is more visible than it may be, where the noise behaves as it did and no pixel takes more than it may have.
+/// Infinite where nothing may be visible at all and nobody has said how many a pixel may have.
 fn samples_to_target(film: &Film, limits: &Limits, judgement: &Judgement) -> f64 {
     let target = limits.last_rung();
-    if target <= 0.0 {
+    if target <= 0.0 && limits.max_samples == DEFAULT_MAX_SAMPLES {
         return f64::INFINITY;
     }
     let of_pixel = |(pixel, &predicted): (usize, &f32)| {

@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 
 /// Strips are cut into slices no longer than this, in pixels.
 const LONGEST_SLICE_PX: f64 = 0.5;
-/// Of a triangle that is higher than this over its longest side, in pixels, some pixels are covered nearly whole.
+/// Triangles that are higher than this over their longest side, in pixels, are not looked for: they cover some pixels nearly whole.
 const THICK_PX: f64 = 1.5;
 /// Farther outside the film nothing shines into it, in pixels: strips are no higher, and pixel filters no wider.
 const BORDER_PX: f64 = 3.5;

@@ -324,9 +324,14 @@ mod tests {
                 println!(
                     "{frames_per_second} a second, {frames_a_period} frames a period: {at_end:.4} for {within:.4}"
                 );
-                if frames_a_period == 2.0 {
-                    assert!((at_end / within - 1.0).abs() < 0.01, "{frames_per_second}: {at_end} for {within}");
-                }
+                let ratio = at_end / within;
+                let is_alike = match frames_a_period {
+                    2.0 => (ratio - 1.0).abs() < 0.01,
+                    // Of flicker at 40 and 30 Hz, at 120 frames a second, nearly nothing is seen within and little at an end.
+                    3.0 | 4.0 if frames_per_second == 120.0 => at_end < 0.35,
+                    _ => (0.72..1.2).contains(&ratio),
+                };
+                assert!(is_alike, "{frames_per_second}, {frames_a_period} frames a period: {at_end} for {within}");
             }
         }
     }
