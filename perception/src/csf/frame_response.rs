@@ -33,6 +33,8 @@ pub(crate) struct FrameResponses {
     reach: usize,
     /// What the sustained channels hold in the middle of a frame.
     pub(crate) middle: Sustained,
+    /// How much of what each frame shows any channel holds at any look, as shares of 1.
+    pub(crate) most: Weights,
     /// Spread evenly over the time of a frame.
     pub(crate) looks: Vec<Look>,
 }
@@ -77,11 +79,9 @@ impl FrameResponses {
         let count = (LOOKS_A_SECOND / timing.frames_per_second).ceil() as usize;
         let frame_s = 1.0 / timing.frames_per_second;
         let moment_s = |look: usize| ((look as f64 + 0.5) / count as f64 - 0.5) * frame_s;
-        Ok(Self {
-            reach: timing.reach(),
-            middle: Moment::new(timing, 0.0).sustained(),
-            looks: (0..count).map(|look| Moment::new(timing, moment_s(look)).look()).collect(),
-        })
+        let looks: Vec<Look> = (0..count).map(|look| Moment::new(timing, moment_s(look)).look()).collect();
+        let middle = Moment::new(timing, 0.0).sustained();
+        Ok(Self { reach: timing.reach(), middle, most: most_held(&looks), looks })
     }
 
     /// Frames to each side that have a weight.
@@ -103,8 +103,18 @@ impl FrameResponses {
             sustained: sustained(&look.sustained),
             transient: look.transient.iter().map(of).collect(),
         };
-        Self { middle: sustained(&self.middle), looks: self.looks.iter().map(look).collect(), ..*self }
+        let looks: Vec<Look> = self.looks.iter().map(look).collect();
+        Self { reach: self.reach, middle: sustained(&self.middle), most: most_held(&looks), looks }
     }
+}
+
+/// [`FrameResponses::most`].
+fn most_held(looks: &[Look]) -> Weights {
+    let channels = || looks.iter().flat_map(|look| look.transient.iter().chain(&look.sustained[..1]));
+    let most_of = |frame: usize| channels().map(|weights| weights[frame].abs()).fold(0.0, f32::max);
+    let most: Vec<f32> = (0..looks[0].sustained[0].len()).map(most_of).collect();
+    let sum: f32 = most.iter().sum();
+    most.into_iter().map(|weight| weight / sum).collect()
 }
 
 /// Weights of the frames that are there, which take those of the others: what they add to light that stands still, and to light that changes

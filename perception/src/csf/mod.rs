@@ -26,7 +26,7 @@ pub use castle_chromatic::{CastleChromatic, ChromaticChannel};
 pub use castle_temporal::CastleTemporal;
 pub use daly93::Daly93;
 pub use daly98::{DRIFT_DEG_S, Daly98, FASTEST_PURSUIT_DEG_S, PURSUIT_GAIN};
-pub(crate) use frame_response::{CastleTransient, FrameResponses, Level, Look, Sustained};
+pub(crate) use frame_response::{CastleTransient, FrameResponses, Level, Look};
 pub use fresh_noise::FreshNoise;
 pub use hdrvdp2::HdrVdp2;
 pub use laird06::Laird06;

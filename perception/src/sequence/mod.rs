@@ -15,7 +15,7 @@ pub use gaze::FrameMotion;
 use crate::adaptation::adapted;
 use crate::colour::Channels;
 use crate::csf::{
-    CastleChromatic, CastleCsf, CastleTransient, ChromaticChannel, FrameResponses, FrameTiming, Level, Look, Sustained,
+    CastleChromatic, CastleCsf, CastleTransient, ChromaticChannel, FrameResponses, FrameTiming, Level, Look,
 };
 use crate::difference::{Difference, HeldAtLowFrequencies, masked_by_both};
 use crate::display::Viewing;
@@ -84,6 +84,13 @@ pub struct SequenceObserver {
 struct Light {
     reference: [f32; 3],
     test: [f32; 3],
+}
+
+/// Luminance of both pictures that a channel may hold, cd/m².
+#[derive(Clone, Copy, Default)]
+struct Bright {
+    reference: f32,
+    test: f32,
 }
 
 /// What the eye's channels hold of the difference at one moment, cd/m².
@@ -171,7 +178,7 @@ impl SequenceObserver {
         }
         let adaptation = adapted(&shown.reference.achromatic, &self.viewing);
         let responses = self.responses.within(now, frames.len() - 1 - now);
-        let thresholds = self.thresholds(&self.light(&responses.middle, frames, now), width, height)?;
+        let thresholds = self.thresholds(&self.light(&responses, frames, now), width, height)?;
         let mut filters = Filters::new(&thresholds);
         let mut greatest = Plane::filled(width, height, 0.0);
         let count = responses.looks.len();
@@ -213,18 +220,24 @@ impl SequenceObserver {
         }
     }
 
-    /// What is held of both pictures in the middle of a frame.
-    fn light(&self, middle: &Sustained, frames: &[&SequenceFrame], now: usize) -> Vec<Light> {
+    /// Of both pictures, the light that a frame is seen by: what is held in its middle, or of luminance what channels hold at any look where
+    /// that is more. What an eye adapted to a dark shot holds of a bright one is not seen against the dark alone: an error of 2 % on 950 cd/m² had
+    /// 3.5 in dark frames up to 0.2 s before the cut, 0.9 in its own.
+    fn light(&self, responses: &FrameResponses, frames: &[&SequenceFrame], now: usize) -> Vec<Light> {
         let (width, height) = frames[now].size();
         let of = |pixel: usize| {
-            let mut light = Light::default();
+            let (mut light, mut most) = (Light::default(), Bright::default());
             self.along_the_eyes_way(frames, now, pixel, |weight, frame, pixel| {
                 let (reference, test) = (at(&frame.reference, pixel), at(&frame.test, pixel));
-                for (channel, weights) in middle.iter().enumerate() {
+                for (channel, weights) in responses.middle.iter().enumerate() {
                     light.reference[channel] += weights[weight] * reference[channel];
                     light.test[channel] += weights[weight] * test[channel];
                 }
+                most.reference += responses.most[weight] * reference[0];
+                most.test += responses.most[weight] * test[0];
             });
+            light.reference[0] = light.reference[0].max(most.reference);
+            light.test[0] = light.test[0].max(most.test);
             light
         };
         (0..width * height).into_par_iter().map(of).collect()

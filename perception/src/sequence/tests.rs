@@ -2,6 +2,7 @@ use super::*;
 use crate::csf::{CastleTemporal, ContrastSensitivity, FreshNoise};
 use crate::difference::colour_difference;
 use crate::test_noise::normal;
+use std::ops::Range;
 
 const SIDE: usize = 96;
 
@@ -269,6 +270,33 @@ fn colours_are_seen_alike_before_and_after() {
         println!("1/{hz} s at {rates:?}: {flashes:.3?}");
         // Above 120 frames a second there are more looks.
         assert!(flashes.iter().all(|flash| (flash / flashes[0] - 1.0).abs() < 0.04), "1/{hz} s: {flashes:?}");
+    }
+}
+
+/// An error of a bright shot is not seen much better in the dark one before it than in its own frames: against the dark shot's light it
+/// had 4 times the visibility there.
+#[test]
+fn the_dark_beside_a_bright_shot_is_seen_by_its_light() {
+    let blob = |x: usize, y: usize| (-((x as f32 - 48.0).powi(2) + (y as f32 - 48.0).powi(2)) / 32.0).exp();
+    for frames_per_second in [24.0, 60.0] {
+        let observer = SequenceObserver::new(&viewing(frames_per_second)).unwrap();
+        for dark_cd_m2 in [0.02, 1.0] {
+            let frame = |value: f32, error: f32| {
+                let [reference, test] = [grey(|_, _| value), grey(|x, y| value * (1.0 + error * blob(x, y)))];
+                SequenceFrame::new(&reference, &test, SIDE, SIDE, None).unwrap()
+            };
+            let (dark, bright) = (frame(dark_cd_m2, 0.0), frame(950.0, 0.02));
+            let reach = observer.reach();
+            let shots: Vec<&SequenceFrame> =
+                (0..4 * reach).map(|i| if i < 2 * reach { &dark } else { &bright }).collect();
+            let worst = |frames: &[&SequenceFrame], range: Range<usize>| {
+                let seen = |now: usize| f64::from(observer.difference(frames, now).unwrap().worst_visibility);
+                range.map(seen).fold(0.0, f64::max)
+            };
+            let [before, within] = [reach..2 * reach, 2 * reach..3 * reach].map(|range| worst(&shots, range));
+            println!("{frames_per_second} a second, {dark_cd_m2} cd/m²: {before} before the cut, {within} after it");
+            assert!(before < 1.2 * within, "{before} before the cut, {within} after it");
+        }
     }
 }
 
