@@ -35,7 +35,7 @@ pub(super) struct CompareArguments {
     #[arg(long, value_name = "NAME", value_parser = operator_values())]
     operator: Option<String>,
     /// Frames a second, of sequences. Beyond its ends a sequence is expected to go on as it is within a fifth of a second of
-    /// them.
+    /// them; flicker of three frames and more a period may be seen too well there.
     #[arg(long, value_name = "N", value_parser = parse_rate, allow_negative_numbers = true)]
     fps: Option<f64>,
     /// Motion of what a sequence shows, in pixels a frame, which the eye follows, smearing what is held; without it, it rests. Frames of
@@ -117,6 +117,7 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
         picture.note_if_transparent(Source::single(path), "is judged before black and over white");
     }
     arguments.seeing.note_what_is_ready(arguments.operator.as_deref(), &pictures);
+    arguments.seeing.note_area_of_colours();
     let viewing = reference
         .viewed(&arguments.seeing.viewing(&pictures)?)
         .with_context(|| arguments.reference.display().to_string())?;

@@ -101,6 +101,13 @@ impl SeeingArguments {
         }
     }
 
+    /// Says of what is judged by three channels that the CSF asked for has no area.
+    pub(super) fn note_area_of_colours(&self) {
+        if self.csf_area.is_some() && !csf::knows_area(&self.csf) {
+            say!("note: --csf-area changes only what is seen of colours: {} is of no area", self.csf);
+        }
+    }
+
     /// The viewing of pictures that they mean.
     pub(super) fn viewing(&self, pictures: &[(&Path, &InputPicture)]) -> Result<Viewing> {
         viewing_on(display_of(self.display.as_deref(), pictures)?, self.csf_area)

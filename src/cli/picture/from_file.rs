@@ -130,7 +130,14 @@ impl InputPicture {
             PngTransfer::Pq => Codes::Pq(of(Primaries::REC2020)),
             PngTransfer::HybridLogGamma => bail!("{}: hybrid log-gamma is not read", path.display()),
             PngTransfer::Linear => Codes::Linear(of(Primaries::REC709)),
-            PngTransfer::Untagged if bytes_a_channel(&image) > 1 => Codes::Display,
+            PngTransfer::Untagged if bytes_a_channel(&image) > 1 => {
+                if colour.primaries.is_some() {
+                    source.note(
+                        "its chromaticities are not heeded: 16 bits without a transfer are the display's own codes",
+                    );
+                }
+                Codes::Display
+            }
             PngTransfer::Srgb | PngTransfer::Untagged => Codes::Srgb(of(Primaries::REC709)),
         };
         let straight_alpha = straight_alpha(&image);
