@@ -578,8 +578,13 @@ fn a_png_is_seen_in_its_own_curve_and_primaries() {
     save("gamma.png", &light, b"gAMA\x00\x01\x86\xa0");
     for name in ["p3.png", "linear.png", "gamma.png"] {
         let (_, said) = fechner(folder.path(), &["compare", "srgb.png", name]);
-        assert!(visibility(&said) < 0.1, "{name}: {said}");
+        assert!(visibility(&said) < 0.1 && !said.contains("not heeded"), "{name}: {said}");
     }
+    // White and primaries of Rec.709, in 1/100,000.
+    let places = [31_270_u32, 32_900, 64_000, 33_000, 30_000, 60_000, 15_000, 6_000].map(u32::to_be_bytes).concat();
+    save("display.png", &plain, &[&b"cHRM"[..], &places].concat());
+    let (_, said) = fechner(folder.path(), &["compare", "display.png", "display.png"]);
+    assert!(said.contains("display.png: its chromaticities are not heeded"), "{said}");
 }
 
 /// A Radiance picture that was brightened says by how much.

@@ -211,6 +211,10 @@ fn idle_arguments_are_told() {
     for argument in ["--operator", "--nits-per-unit"] {
         assert!(told.contains(&format!("note: {argument} changes nothing: 1.png")), "{told}");
     }
+    for (csf, is_told) in [("castle", false), ("laird06", true)] {
+        let (_, told) = fechner(folder.path(), &["compare", "1.png", "2.png", "--csf", csf, "--csf-area", "7"]);
+        assert_eq!(told.contains("note: --csf-area changes only what is seen of colours"), is_told, "{told}");
+    }
     for pictures in [["compare", "1.exr", "1.exr"], ["compare", "1.png", "1.exr"]] {
         let (_, told) = fechner(folder.path(), &[&pictures[..], &more].concat());
         assert!(!told.contains("changes nothing"), "{told}");
