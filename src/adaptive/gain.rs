@@ -5,8 +5,8 @@
 use super::judge::Judgement;
 use super::plan::{cut_to_budget, doubling_plan};
 use crate::film::Film;
-use crate::integrator::SamplePlan;
-use fechner_perception::Plane;
+use crate::integrator::{BlockWork, SamplePlan};
+use crate::sampler::Half;
 
 /// What comes before the next plan is this share of what is there: counts adapt while variances become known. More, as far as the
 /// visibility is from the rung, was no gain (`benches/results/denoising.md`).
@@ -42,9 +42,9 @@ pub(super) fn while_far(film: &Film, judgement: &Judgement, rung: f64, max_sampl
     if share_of_even(&energies) > EVEN_ENOUGH_WHILE_FAR {
         return None;
     }
-    let shows = |pixel: usize| f64::from(own.values()[pixel]) > rung * rung * f64::from(film.samples(pixel));
-    let plan = doubling_plan(film, max_samples, |pixel| [u32::from(shows(pixel)); 2]);
-    Some(cut_to_budget(plan, &gains(film, &energies), most_at_once(film)))
+    let shows = |pixel: usize, half: Half| f64::from(own.values()[pixel]) > rung * rung * twice_taken(film, pixel, half);
+    let plan = doubling_plan(film, max_samples, |pixel| Half::BOTH.map(|half| u32::from(shows(pixel, half))));
+    Some(cut_to_budget(plan, gains(film, &energies), most_at_once(film)))
 }
 
 /// A plan cut to so many samples: where these do most for the picture.
@@ -53,20 +53,26 @@ pub(super) fn cut(plan: SamplePlan, film: &Film, judgement: &Judgement, most: u6
         return plan;
     }
     let energies = defended(judgement.energy_of(&judgement.pooled_variance_per_sample).values());
-    cut_to_budget(plan, &gains(film, &energies), most)
+    cut_to_budget(plan, gains(film, &energies), most)
 }
 
-/// What one more sample takes away of each pixel's visible energy e/n.
+/// What one more sample takes away of a half's share of its pixel's visible energy, e/n: by its own count n, not the pixel's. The other half's
+/// count was decided by this one's samples, and by both a half that was lucky stayed as it was, while the other one grew: the sun
+/// through blinds made a room 0.7 % too bright, and its darker half 4 % (`benches/results/sampling.md`, energy).
 ///
 /// Samples that go where it is most make counts that go as √e and leave the least mean energy (Neyman 1934) of known variances.
 /// Counts for equal visibility go as e: at 96 samples a pixel of the Cornell box their FLIP was 1.09 times that of even counts, with
 /// these it is 1.015 (`benches/results/sampling.md`).
-fn gains(film: &Film, energies: &[f64]) -> Plane {
-    let width = film.width() as usize;
-    Plane::from_fn(width, film.height() as usize, |x, y| {
-        let pixel = y * width + x;
-        gain(energies[pixel], f64::from(film.samples(pixel).max(1))) as f32
-    })
+fn gains(film: &Film, energies: &[f64]) -> impl Fn(&BlockWork) -> f32 {
+    |block| {
+        let pixel = block.pixel as usize;
+        gain(energies[pixel], twice_taken(film, pixel, block.half).max(1.0)) as f32
+    }
+}
+
+/// Samples of a pixel if its other half had as many as this one.
+fn twice_taken(film: &Film, pixel: usize, half: Half) -> f64 {
+    2.0 * f64::from(film.half(half)[pixel].taken)
 }
 
 /// What one sample more than `samples` takes away of `energy` / `samples`, about.

@@ -84,8 +84,7 @@ pub(super) fn even_plan(film: &Film, samples: u64) -> SamplePlan {
             plan.blocks.extend(blocks_between(pixel, half, taken, taken.saturating_add(share_of_half(more, half))));
         }
     }
-    let any_first = Plane::filled(film.width() as usize, film.height() as usize, 0.0);
-    cut_to_budget(plan, &any_first, samples)
+    cut_to_budget(plan, |_| 0.0, samples)
 }
 
 /// What a film lacks of so many samples of each pixel, as many blocks as that takes.

@@ -7,9 +7,8 @@ use super::StopReason;
 use super::plan::{blocks_between, cut_to_budget, share_of_half};
 use super::settings::RivalRule;
 use crate::film::{Film, opponent};
-use crate::integrator::SamplePlan;
+use crate::integrator::{BlockWork, SamplePlan};
 use crate::sampler::{Half, hash_words, unit_f64_of_hash};
-use fechner_perception::Plane;
 
 /// Samples between two looks, both halves together.
 const STEP: u32 = 16;
@@ -36,9 +35,8 @@ pub fn rival_plan(rule: RivalRule, film: &Film, exposure: f64, left: u64, max_sa
         return plan;
     }
     // None of the rules says who should have the last samples: chance does.
-    let by_chance =
-        |x: usize, y: usize| (hash_words(film.total_samples(), (y * film.width() as usize + x) as u64) >> 40) as f32;
-    cut_to_budget(plan, &Plane::from_fn(film.width() as usize, film.height() as usize, by_chance), left)
+    let by_chance = |block: &BlockWork| (hash_words(film.total_samples(), block.pixel.into()) >> 40) as f32;
+    cut_to_budget(plan, by_chance, left)
 }
 
 /// Why [`rival_plan`] has none: with the same arguments it was empty.

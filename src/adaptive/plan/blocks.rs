@@ -2,7 +2,6 @@
 
 use crate::integrator::{BlockWork, SamplePlan};
 use crate::sampler::Half;
-use fechner_perception::Plane;
 use std::cmp::Reverse;
 
 /// The blocks that take a half of a pixel from so many samples to so many.
@@ -74,18 +73,18 @@ pub(in crate::adaptive) fn slice_count(samples: u64, traced_samples: u64) -> usi
     }
 }
 
-/// Cuts a plan to a budget: the blocks of pixels with the largest `urgency` first.
-pub fn cut_to_budget(plan: SamplePlan, urgency: &Plane, samples: u64) -> SamplePlan {
+/// Cuts a plan to a budget: the blocks with the largest `urgency` first.
+pub fn cut_to_budget(plan: SamplePlan, urgency: impl Fn(&BlockWork) -> f32, samples: u64) -> SamplePlan {
     if plan.samples() <= samples {
         return plan;
     }
     let mut blocks = plan.blocks;
     // A block of a later level must not come without the one before it. Mostly plans are in order already.
     blocks.sort_by_key(|b| (b.pixel, b.half, b.level));
-    let turn = |(place, &BlockWork { pixel, level, .. }): (u32, &BlockWork)| Turn {
-        urgency: Reverse(rank(urgency.values()[pixel as usize])),
-        pixel,
-        level,
+    let turn = |(place, block): (u32, &BlockWork)| Turn {
+        urgency: Reverse(rank(urgency(block))),
+        pixel: block.pixel,
+        level: block.level,
         place,
     };
     let mut turns: Vec<Turn> = (0..).zip(&blocks).map(turn).collect();

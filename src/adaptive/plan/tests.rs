@@ -79,9 +79,9 @@ fn handfuls_are_not_looked_at_after_each_doubling() {
 fn a_budget_leaves_no_gap_in_a_sequence() {
     let block = |pixel, level, samples| BlockWork { samples, ..BlockWork::whole(pixel, Half::A, level) };
     let plan = SamplePlan { blocks: vec![block(0, 1, 8), block(0, 2, 4), block(1, 1, 5), block(1, 2, 2)] };
-    let urgency = Plane::from_fn(2, 1, |x, _| if x == 0 { 2.0 } else { 1.0 });
+    let urgency = |block: &BlockWork| if block.pixel == 0 { 2.0 } else { 1.0 };
     let kept = |samples: u64| -> Vec<(u32, u8)> {
-        cut_to_budget(plan.clone(), &urgency, samples).blocks.iter().map(|block| (block.pixel, block.level)).collect()
+        cut_to_budget(plan.clone(), urgency, samples).blocks.iter().map(|block| (block.pixel, block.level)).collect()
     };
     assert_eq!(kept(3), []);
     assert_eq!(kept(7), [(1, 1), (1, 2)], "4 would fit, and would be the second half of nothing");
