@@ -42,7 +42,8 @@ pub(super) fn while_far(film: &Film, judgement: &Judgement, rung: f64, max_sampl
     if share_of_even(&energies) > EVEN_ENOUGH_WHILE_FAR {
         return None;
     }
-    let shows = |pixel: usize, half: Half| f64::from(own.values()[pixel]) > rung * rung * twice_taken(film, pixel, half);
+    let shows =
+        |pixel: usize, half: Half| f64::from(own.values()[pixel]) > rung * rung * twice_taken(film, pixel, half);
     let plan = doubling_plan(film, max_samples, |pixel| Half::BOTH.map(|half| u32::from(shows(pixel, half))));
     Some(cut_to_budget(plan, gains(film, &energies), most_at_once(film)))
 }

@@ -7,7 +7,7 @@ use super::PathTracer;
 use super::media::Media;
 use super::shading::{Components, Shading};
 use super::thin_sheets::MOST_SHEETS;
-use crate::geometry::{Hit, Ray, SurfacePoint};
+use crate::geometry::{Hit, Ray, SurfacePoint, offset};
 use crate::light::{LightFromAfar, LightReceiver, LightSample, emitted};
 use crate::sampler::Sample;
 use fechner_perception::photometry::luminance;
@@ -283,8 +283,9 @@ impl PathTracer {
         let Some(place) = light.place else {
             return (Ray { time, ..Ray::new(origin, light.direction.into()) }, f32::INFINITY);
         };
-        let end = place.position + place.normal * place.offset;
-        let way = Vec3A::from(end) - origin;
+        let position = Vec3A::from(place.position);
+        let offset = place.offset + offset::of_way(origin, position - origin);
+        let way = position + Vec3A::from(place.normal) * offset - origin;
         let distance = way.length();
         (Ray { time, ..Ray::new(origin, way / distance) }, distance)
     }

@@ -69,7 +69,7 @@ pub struct LightPlace {
     pub position: Vec3,
     /// Unit normal on the side that shines on the shaded point; zero for lights without a surface.
     pub normal: Vec3,
-    /// How far before the surface a ray must end, to clear its rounding error.
+    /// How far before the surface a ray must end, to clear the rounding error of the surface alone.
     pub offset: f32,
 }
 

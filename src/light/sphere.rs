@@ -67,8 +67,8 @@ impl SphereEmitter {
         let along = axis_length * (1.0 - one_minus_cos);
         let miss_squared = axis_length * axis_length * one_minus_cos * (2.0 - one_minus_cos);
         let distance = along - (self.radius * self.radius - miss_squared).max(0.0).sqrt();
-        let position = from + direction * distance;
-        let normal = (position - self.center).normalize_or(-direction);
+        let normal = (from + direction * distance - self.center).normalize_or(-direction);
+        let position = self.center + self.radius * normal;
         Some(LightSample {
             direction,
             place: Some(LightPlace { position, normal, offset: offset::of_sphere(position, self.radius) }),

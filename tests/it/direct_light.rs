@@ -7,10 +7,10 @@ use fechner::geometry::Ray;
 use fechner::integrator::{PathTracer, TraceSettings};
 use fechner::scene::load::shapes;
 use fechner::scene::{
-    Alpha, ColorInput, Environment, Instance, Light, MeshId, Parametrisation, Roughness, ScalarInput, Scene,
-    SpotFalloff, Surface, Texels, Texture, TextureId, TextureLookup, Wrap,
+    Alpha, ColorInput, Environment, Instance, Light, MaterialId, MeshId, Parametrisation, Roughness, ScalarInput,
+    Scene, SpotFalloff, Surface, Texels, Texture, TextureId, TextureLookup, Wrap,
 };
-use glam::{Mat3, Mat3A, Vec2, Vec3, vec3a};
+use glam::{Affine3A, Mat3, Mat3A, Vec2, Vec3, vec3a};
 use std::f32::consts::{FRAC_1_PI, PI};
 use std::sync::Arc;
 
@@ -94,6 +94,56 @@ fn a_disk_gives_its_closed_form() {
         scene.instances.push(Instance { mesh, material: lamp, ..scene.instances[0].clone() });
         let irradiance = 3.0 * PI * radius * radius / (radius * radius + height * height);
         assert_irradiance(scene, 0.0, irradiance, &format!("disk of radius {radius}"));
+    }
+}
+
+/// Where a scene has its origin is no matter: lamps that stood there lost up to two thirds of their light to what is far away, since shadow
+/// rays ended by the rounding of the lamp's own coordinates and not by that of their length.
+#[test]
+fn lamps_at_the_origin_light_what_is_far() {
+    const RADIUS: f32 = 0.1;
+    let tilted = [Vec3::new(0.2, 0.1, 0.0), Vec3::new(0.0, 0.05, 0.2)];
+    let level = [0.2 * Vec3::X, 0.2 * Vec3::Z];
+    type Adding<'a> = &'a dyn Fn(&mut Scene, Vec3, MaterialId);
+    let disk = |scene: &mut Scene, center: Vec3, lamp: MaterialId| {
+        scene.meshes.push(shapes::disk(Vec3::ZERO, Vec3::NEG_Y, RADIUS));
+        let (mesh, to_world) = (MeshId(scene.meshes.len() as u32 - 1), Affine3A::from_translation(center));
+        scene.instances.push(Instance { mesh, to_world, material: lamp, ..scene.instances[0].clone() });
+    };
+    let sheet = |edges: [Vec3; 2]| {
+        move |scene: &mut Scene, center: Vec3, lamp: MaterialId| {
+            add_rectangle(scene, center - 0.5 * (edges[0] + edges[1]), edges[0], edges[1], lamp);
+        }
+    };
+    let of_sheet = |edges: [Vec3; 2], height: f32| {
+        let [u, v] = edges.map(|edge| 0.5 * edge);
+        polygon_irradiance(&[-u - v, u - v, u + v, v - u].map(|corner| corner + height * Vec3::Y))
+    };
+    let lamps: [(&str, Adding<'_>, &dyn Fn(f32) -> f32); 4] = [
+        ("sphere", &|scene, center, lamp| add_sphere(scene, center, RADIUS, lamp), &|height| {
+            PI * (RADIUS / height).powi(2)
+        }),
+        ("disk", &disk, &|height| PI * RADIUS.powi(2) / (RADIUS.powi(2) + height.powi(2))),
+        ("rectangle", &sheet(level), &|height| of_sheet(level, height)),
+        ("tilted rectangle", &sheet(tilted), &|height| of_sheet(tilted, height)),
+    ];
+    for (name, add, irradiance) in lamps {
+        for (height, lamp_at) in
+            [1.0, 3.0, 10.0, 50.0, 1000.0].into_iter().flat_map(|h| [(h, 0.0), (h, 1.0), (h, 20.0)])
+        {
+            let mut scene = empty_scene();
+            let material = add_material(&mut scene, diffuse(ALBEDO), Vec3::ZERO);
+            let center = lamp_at * Vec3::new(0.3, 1.0, -0.6);
+            let below = center - height * Vec3::Y;
+            add_rectangle(&mut scene, below - Vec3::new(1.0, 0.0, 1.0), 2.0 * Vec3::Z, 2.0 * Vec3::X, material);
+            let lamp = add_material(&mut scene, diffuse(0.0), Vec3::splat(3.0));
+            add(&mut scene, center, lamp);
+            let tracer = PathTracer::new(Arc::new(scene), TraceSettings { max_depth: 1, ..trace_settings(16, 16, 0) });
+            let from = below + Vec3::new(-0.2, 0.4, 0.0);
+            let (mean, _) = radiance_along(&tracer, Ray::new(from.into(), (below - from).normalize().into()), 16, 256);
+            let ratio = mean.x / (ALBEDO * FRAC_1_PI * 3.0 * irradiance(height));
+            assert!((ratio - 1.0).abs() < 2e-3, "{name} at {center}, {height} above the floor: {ratio}");
+        }
     }
 }
 
