@@ -10,6 +10,7 @@ mod tests;
 use super::spectator::{Shown, Spectator};
 use crate::adaptive::statistics::picture_variance;
 use crate::film::{Film, PixelGuide};
+use crate::output::channel;
 use packet::Layer;
 use std::io::Write;
 use std::net::{SocketAddr, TcpStream};
@@ -176,30 +177,30 @@ fn next(post: &Post) -> Option<Message> {
     }
 }
 
-/// The picture in scene units and its layers, named as in our EXR files.
+/// The picture in scene units and its layers.
 fn message(shown: &Shown<'_>) -> Message {
     let Shown { film, rgb_cd_m2, looked, nits_per_unit, .. } = *shown;
     let to_units = (1.0 / nits_per_unit) as f32;
-    let picture = |channel: usize| rgb_cd_m2.iter().map(move |rgb| rgb[channel] * to_units);
+    let picture = |c: usize| rgb_cd_m2.iter().map(move |rgb| rgb[c] * to_units);
     let guide = |of: fn(&PixelGuide) -> f32| film.guides().iter().map(of);
     let layer = |names: &[&'static str], values: Vec<f32>| Layer { names: names.to_vec(), values };
     let mut layers = vec![
-        layer(&["R", "G", "B"], (0..3).flat_map(picture).collect()),
+        layer(&channel::RGB, (0..3).flat_map(picture).collect()),
         layer(
-            &["albedo.R", "albedo.G", "albedo.B"],
+            &channel::ALBEDO,
             guide(|g| g.albedo[0]).chain(guide(|g| g.albedo[1])).chain(guide(|g| g.albedo[2])).collect(),
         ),
         layer(
-            &["normal.X", "normal.Y", "normal.Z"],
+            &channel::NORMAL,
             guide(|g| g.normal[0]).chain(guide(|g| g.normal[1])).chain(guide(|g| g.normal[2])).collect(),
         ),
-        layer(&["depth.Z"], guide(|g| g.depth).collect()),
-        layer(&["samples.Y"], counts(film)),
-        layer(&["variance.Y"], picture_variance(film, nits_per_unit).into_values()),
+        layer(&[channel::DEPTH], guide(|g| g.depth).collect()),
+        layer(&[channel::SAMPLES], counts(film)),
+        layer(&[channel::VARIANCE], picture_variance(film, nits_per_unit).into_values()),
     ];
     if let Some(looked) = looked {
-        layers.push(layer(&["threshold.Y"], looked.threshold.values().to_vec()));
-        layers.push(layer(&["visibility.Y"], looked.visibility.values().to_vec()));
+        layers.push(layer(&[channel::THRESHOLD], looked.threshold.values().to_vec()));
+        layers.push(layer(&[channel::VISIBILITY], looked.visibility.values().to_vec()));
     }
     Message { width: film.width(), height: film.height(), layers }
 }
