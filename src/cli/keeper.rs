@@ -119,7 +119,7 @@ mod tests {
     use super::*;
     use crate::cli::console::Console;
     use fechner::adaptive::Monitor as _;
-    use fechner::adaptive::settings::{AllocationRule, Limits, Sampling};
+    use fechner::adaptive::settings::Limits;
     use fechner::checkpoint::{Origin, SettingsRecord, Tracing, read_checkpoint};
     use fechner::integrator::TraceSettings;
     use fechner::scene::hash::ContentHash;
@@ -137,21 +137,7 @@ mod tests {
             height: 1,
             tracing: Tracing::of(&TraceSettings::new(1, 1, 0)),
         };
-        let settings = SettingsRecord {
-            sampling: Sampling::Uniform,
-            allocation: AllocationRule::default(),
-            model: String::new(),
-            viewing: Viewing::default(),
-            nits_per_unit: 1.0,
-            operator: String::new(),
-            exposure_stops: None,
-            fitted: None,
-            frames: None,
-            gazes: Vec::new(),
-            importance: None,
-            denoiser: None,
-        };
-        Header::begun(origin, 0, settings, 1.0)
+        Header::begun(origin, 0, SettingsRecord::new(Viewing::default(), 1.0, ""), 1.0)
     }
 
     /// Samples outlive a look that fails.
