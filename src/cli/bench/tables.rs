@@ -73,7 +73,7 @@ pub(super) fn print_races(results: &DenoisingResults) {
     answer!("| --- | --- | --- |{}", " --- |".repeat(QUALITIES.len()));
     for race in &results.races {
         let cells: Vec<String> = race.needs.iter().map(need_in_words).collect();
-        answer!("| {} | {} | {} | {} |", race.scene, race.denoiser, race.rule, cells.join(" | "));
+        answer!("| {} | {} | {} | {} |", race.scene, race.denoiser, race.rule.name(), cells.join(" | "));
     }
     answer!(
         "\nUniform sampling's samples over the rule's, geometric means of the pairs in which neither is a bound (≤, >):\n"
@@ -92,6 +92,7 @@ fn need_in_words(need: &Need) -> String {
 fn race_mean_in_words(mean: &RaceMean) -> String {
     let ratio = mean.uniform_over.map_or_else(|| "–".to_owned(), |ratio| format!("{ratio:.2}"));
     let RaceMean { rule, quality, pairs, pairs_left_out, .. } = mean;
+    let rule = rule.name();
     format!("{rule}, to {quality}: {ratio}, pairs {pairs}, left out {pairs_left_out}")
 }
 
