@@ -1,6 +1,7 @@
 //! How a picture comes to be good: metrics that no arm optimises after each look of a render.
 
 use super::Subject;
+use super::arm::Arm;
 use super::truth::Truth;
 use crate::adaptive::judge::Judgement;
 use crate::adaptive::settings::LoopSettings;
@@ -34,7 +35,7 @@ pub struct Curve {
     /// Scene.
     pub scene: String,
     /// Arm.
-    pub arm: &'static str,
+    pub arm: Arm,
     /// In the order of the render.
     pub points: Vec<CurvePoint>,
 }

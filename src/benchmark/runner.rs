@@ -247,13 +247,13 @@ impl<'a> ArmRunner<'a> {
             let settings = arm.settings(self.subject, knob, self.reference.uniform_spp)?;
             course(self.subject, self.truth, &settings, first.seed + 1)
         })?;
-        Ok(Some(Curve { scene: self.subject.name.clone(), arm: arm.name(), points }))
+        Ok(Some(Curve { scene: self.subject.name.clone(), arm, points }))
     }
 
     /// What the report shows of the arm.
     pub(crate) fn pictures(&self, arm: Arm) -> ScenePictures {
         let pictures = read_pictures(&self.file(arm, 0));
-        ScenePictures { scene: self.subject.name.clone(), arm: arm.name(), pictures }
+        ScenePictures { scene: self.subject.name.clone(), arm, pictures }
     }
 
     fn variance(&mut self) -> Result<&Plane> {

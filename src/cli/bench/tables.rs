@@ -14,7 +14,7 @@ pub(super) fn print_summary(summary: &[ArmSummary]) {
         let speedup = s.speedup_samples.map_or_else(unknown, |mean| mean.in_words());
         let least = s.speedup_samples.map_or_else(unknown, |mean| format!("{:.2}", mean.least));
         let efficiency = s.efficiency.map_or_else(String::new, |e| format!("{:.2} (least {:.2})", e.value, e.least));
-        answer!("| {} | {} % | {speedup} | {least} | {efficiency} |", s.arm, 100.0 * s.coverage);
+        answer!("| {} | {} % | {speedup} | {least} | {efficiency} |", s.arm.name(), 100.0 * s.coverage);
     }
     if summary.iter().any(|s| s.speedup_samples.is_some_and(|mean| mean.low.is_some())) {
         answer!("\n{}", intervals_in_words());
