@@ -1,8 +1,8 @@
 //! How a picture comes to be good: metrics that no arm optimises after each look of a render.
 
-use super::Subject;
 use super::arm::Arm;
 use super::truth::Truth;
+use super::{MAIN_COVERAGE, Subject};
 use crate::adaptive::judge::Judgement;
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::state::RenderState;
@@ -62,7 +62,7 @@ impl Course<'_> {
         Ok(CurvePoint {
             samples: state.film.total_samples() as f64 / self.subject.pixels(),
             seconds: state.seconds.total - measuring.as_secs_f64(),
-            visibility: self.truth.squared_visibility(&picture).quantile(0.99).sqrt(),
+            visibility: self.truth.squared_visibility(&picture).quantile(MAIN_COVERAGE).sqrt(),
             flip_mean: metrics.flip_mean,
             jod: metrics.jod,
             relmse: metrics.relmse,

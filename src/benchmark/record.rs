@@ -7,7 +7,7 @@ use super::report::html;
 use super::runner::{EnergyBias, Run};
 use super::summary::{GeometricMean, INTERVAL_LEVEL, geometric_mean};
 use super::table::csv;
-use super::{BenchSettings, COVERAGES};
+use super::{BenchSettings, COVERAGES, MAIN_COVERAGE};
 use anyhow::Result;
 use fechner_perception::Plane;
 use serde::Serialize;
@@ -243,10 +243,15 @@ impl Results {
         (!pooled.is_empty()).then(|| geometric_mean(&pooled, &by_seed))
     }
 
-    /// The pooled figures of a scene at 99 %, one line an arm.
+    /// Records of a scene, all seeds pooled, at [`MAIN_COVERAGE`].
+    pub(super) fn pooled(&self, scene: &str) -> impl Iterator<Item = &Record> {
+        self.records.iter().filter(move |r| r.scene == scene && r.seed.is_none() && r.coverage == MAIN_COVERAGE)
+    }
+
+    /// The pooled figures of a scene, one line an arm.
     pub(crate) fn scene_lines(&self, scene: &str) -> String {
         let mut text = String::new();
-        for r in self.records.iter().filter(|r| r.scene == scene && r.seed.is_none() && r.coverage == 0.99) {
+        for r in self.pooled(scene) {
             let _ = writeln!(
                 text,
                 "{scene}: {:<20} {:>8.1} spp for v* on 99 % (rendered at {:.2} v*), JOD {:.2}, FLIP {:.4}, bias {}",

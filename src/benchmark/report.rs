@@ -40,7 +40,7 @@ fn introduction(results: &Results) -> String {
 }
 
 fn section(results: &Results, scene: &str) -> String {
-    let records: Vec<&Record> = pooled(results, scene).collect();
+    let records: Vec<&Record> = results.pooled(scene).collect();
     let curves: Vec<&Curve> = results.curves.iter().filter(|curve| curve.scene == scene).collect();
     let pictures: String = results.pictures.iter().filter(|shown| shown.scene == scene).map(pictures).collect();
     let title = html_text(scene);
@@ -56,11 +56,6 @@ fn scenes(results: &Results) -> Vec<&str> {
         }
     }
     scenes
-}
-
-/// Pooled records of a scene at 99 %.
-fn pooled<'a>(results: &'a Results, scene: &'a str) -> impl Iterator<Item = &'a Record> {
-    results.records.iter().filter(move |r| r.scene == scene && r.seed.is_none() && r.coverage == 0.99)
 }
 
 /// What a cell says of a figure that is not known.
