@@ -7,9 +7,10 @@ use crate::adaptive::judge::Judgement;
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::state::RenderState;
 use crate::adaptive::{Monitor, Progress, render};
+use crate::poison::Unpoisoned as _;
 use anyhow::Result;
 use serde::{Deserialize, Serialize};
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 /// A render's picture after a look.
@@ -75,7 +76,7 @@ impl Monitor for Course<'_> {
 
     fn judged(&self, state: &RenderState, _: &Judgement) {
         let begun = Instant::now();
-        let mut found = self.found.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut found = self.found.lock().unpoisoned();
         // Steps that nobody could see in a plot are left out.
         let samples = state.film.total_samples() as f64 / self.subject.pixels();
         let is_new = found.points.last().is_none_or(|last| 1.01 * last.samples < samples);
@@ -95,6 +96,6 @@ impl Monitor for Course<'_> {
 pub(super) fn course(subject: &Subject, truth: &Truth, settings: &LoopSettings, seed: u64) -> Result<Vec<CurvePoint>> {
     let course = Course { subject, truth, found: Mutex::default() };
     render(&subject.tracer(seed), settings, &course)?;
-    let found = course.found.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let found = course.found.into_inner().unpoisoned();
     found.failure.map_or(Ok(found.points), Err)
 }

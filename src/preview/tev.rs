@@ -11,10 +11,11 @@ use super::spectator::{Shown, Spectator};
 use crate::adaptive::statistics::picture_variance;
 use crate::film::{Film, PixelGuide};
 use crate::output::channel;
+use crate::poison::Unpoisoned as _;
 use packet::Layer;
 use std::io::Write;
 use std::net::{SocketAddr, TcpStream};
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -76,7 +77,7 @@ impl Tev {
             if let Err(problem) = sent {
                 warn(&problem);
             }
-            of_sender.mailbox.lock().unwrap_or_else(PoisonError::into_inner).has_ended = true;
+            of_sender.mailbox.lock().unpoisoned().has_ended = true;
             of_sender.changed.notify_all();
         };
         let sender = std::thread::Builder::new().name("tev".to_owned()).spawn(work)?;
@@ -90,7 +91,7 @@ impl Tev {
     }
 
     fn has_ended(&self) -> bool {
-        self.post.mailbox.lock().unwrap_or_else(PoisonError::into_inner).has_ended
+        self.post.mailbox.lock().unpoisoned().has_ended
     }
 
     /// Hands a state over if one is due.
@@ -102,7 +103,7 @@ impl Tev {
         }
         let begun = Instant::now();
         let message = message(shown);
-        self.post.mailbox.lock().unwrap_or_else(PoisonError::into_inner).latest = Some(message);
+        self.post.mailbox.lock().unpoisoned().latest = Some(message);
         self.post.changed.notify_all();
         self.sent = Some(Instant::now());
         self.cost = begun.elapsed();
@@ -117,13 +118,13 @@ impl Spectator for Tev {
 
 impl Drop for Tev {
     fn drop(&mut self) {
-        let mut mailbox = self.post.mailbox.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut mailbox = self.post.mailbox.lock().unpoisoned();
         mailbox.is_closed = true;
         self.post.changed.notify_all();
         let until = Instant::now() + FAREWELL;
         while !mailbox.has_ended {
             let Some(left) = until.checked_duration_since(Instant::now()) else { return };
-            mailbox = self.post.changed.wait_timeout(mailbox, left).unwrap_or_else(PoisonError::into_inner).0;
+            mailbox = self.post.changed.wait_timeout(mailbox, left).unpoisoned().0;
         }
         drop(mailbox);
         if let Some(sender) = self.sender.take() {
@@ -165,7 +166,7 @@ fn connect(addresses: &[SocketAddr]) -> std::io::Result<TcpStream> {
 
 /// The latest state, once there is one that was not sent.
 fn next(post: &Post) -> Option<Message> {
-    let mut mailbox = post.mailbox.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut mailbox = post.mailbox.lock().unpoisoned();
     loop {
         if let Some(message) = mailbox.latest.take() {
             return Some(message);
@@ -173,7 +174,7 @@ fn next(post: &Post) -> Option<Message> {
         if mailbox.is_closed {
             return None;
         }
-        mailbox = post.changed.wait(mailbox).unwrap_or_else(PoisonError::into_inner);
+        mailbox = post.changed.wait(mailbox).unpoisoned();
     }
 }
 
