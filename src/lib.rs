@@ -30,6 +30,7 @@ pub mod jpeg_read;
 pub mod light;
 pub mod lock;
 pub mod output;
+pub mod poison;
 pub mod preview;
 pub mod read_file;
 pub mod sampler;

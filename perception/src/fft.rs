@@ -1,6 +1,6 @@
 //! Real 2-D Fourier transforms of pictures mirrored at their borders.
 
-use std::sync::{Arc, LazyLock, Mutex};
+use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
 
 use rayon::prelude::*;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
@@ -54,6 +54,11 @@ struct Planners {
 static PLANNERS: LazyLock<Mutex<Planners>> =
     LazyLock::new(|| Mutex::new(Planners { real: RealFftPlanner::new(), complex: FftPlanner::new() }));
 
+/// A poisoned lock only means that another thread died while planning; the plans made so far are whole.
+fn planners() -> MutexGuard<'static, Planners> {
+    PLANNERS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// Complex transforms of one length, there and back (not scaled).
 pub(crate) struct ComplexPlans {
     pub(crate) forward: Arc<dyn Fft<f32>>,
@@ -61,7 +66,7 @@ pub(crate) struct ComplexPlans {
 }
 
 pub(crate) fn complex_plans(len: usize) -> ComplexPlans {
-    let planner = &mut PLANNERS.lock().unwrap_or_else(std::sync::PoisonError::into_inner).complex;
+    let planner = &mut planners().complex;
     ComplexPlans { forward: planner.plan_fft_forward(len), back: planner.plan_fft_inverse(len) }
 }
 
@@ -87,8 +92,7 @@ impl PictureTransform {
         let padded = |len: usize, pad: usize| MOST_REDUCTION * smooth_size((len + 2 * pad).div_ceil(MOST_REDUCTION));
         let (pad_x, pad_y) = (mirror_px(width, density.horizontal), mirror_px(height, density.vertical));
         let (padded_width, padded_height) = (padded(width, pad_x), padded(height, pad_y));
-        // A poisoned lock only means that another thread died while planning; the plans made so far are whole.
-        let mut planners = PLANNERS.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut planners = planners();
         Self {
             width,
             height,
@@ -177,7 +181,7 @@ impl PictureTransform {
         gain: impl Fn(f32) -> f32 + Sync,
     ) -> Plane {
         let factor = frame.factor;
-        let mut planners = PLANNERS.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut planners = planners();
         let back = BackTransform {
             columns: planners.complex.plan_fft_inverse(self.padded_height / factor),
             rows: planners.real.plan_fft_inverse(self.padded_width / factor),

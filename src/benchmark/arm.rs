@@ -4,9 +4,11 @@ use super::Subject;
 use crate::adaptive::settings::{AllocationRule, LoopSettings, RivalRule, Sampling, THRESHOLD};
 use anyhow::{Context, Result};
 use fechner_perception::model;
+use serde::Serialize;
 
 /// A way to spend samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(into = "&'static str")]
 pub enum Arm {
     /// The same everywhere: the power of two nearest to what converged variances ask for.
     Uniform,
@@ -156,6 +158,12 @@ impl Arm {
             settings.limits.max_samples = most.saturating_mul(64);
         }
         Ok(settings)
+    }
+}
+
+impl From<Arm> for &'static str {
+    fn from(arm: Arm) -> Self {
+        arm.name()
     }
 }
 

@@ -1,14 +1,16 @@
 //! How a picture comes to be good: metrics that no arm optimises after each look of a render.
 
-use super::Subject;
+use super::arm::Arm;
 use super::truth::Truth;
+use super::{MAIN_COVERAGE, Subject};
 use crate::adaptive::judge::Judgement;
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::state::RenderState;
 use crate::adaptive::{Monitor, Progress, render};
+use crate::poison::Unpoisoned as _;
 use anyhow::Result;
 use serde::{Deserialize, Serialize};
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 /// A render's picture after a look.
@@ -34,7 +36,7 @@ pub struct Curve {
     /// Scene.
     pub scene: String,
     /// Arm.
-    pub arm: &'static str,
+    pub arm: Arm,
     /// In the order of the render.
     pub points: Vec<CurvePoint>,
 }
@@ -61,7 +63,7 @@ impl Course<'_> {
         Ok(CurvePoint {
             samples: state.film.total_samples() as f64 / self.subject.pixels(),
             seconds: state.seconds.total - measuring.as_secs_f64(),
-            visibility: self.truth.squared_visibility(&picture).quantile(0.99).sqrt(),
+            visibility: self.truth.squared_visibility(&picture).quantile(MAIN_COVERAGE).sqrt(),
             flip_mean: metrics.flip_mean,
             jod: metrics.jod,
             relmse: metrics.relmse,
@@ -74,7 +76,7 @@ impl Monitor for Course<'_> {
 
     fn judged(&self, state: &RenderState, _: &Judgement) {
         let begun = Instant::now();
-        let mut found = self.found.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut found = self.found.lock().unpoisoned();
         // Steps that nobody could see in a plot are left out.
         let samples = state.film.total_samples() as f64 / self.subject.pixels();
         let is_new = found.points.last().is_none_or(|last| 1.01 * last.samples < samples);
@@ -94,6 +96,6 @@ impl Monitor for Course<'_> {
 pub(super) fn course(subject: &Subject, truth: &Truth, settings: &LoopSettings, seed: u64) -> Result<Vec<CurvePoint>> {
     let course = Course { subject, truth, found: Mutex::default() };
     render(&subject.tracer(seed), settings, &course)?;
-    let found = course.found.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let found = course.found.into_inner().unpoisoned();
     found.failure.map_or(Ok(found.points), Err)
 }

@@ -7,7 +7,7 @@
 use super::keep::{keep, kept_or_made};
 use super::metrics::Metrics;
 use super::name::distinct_names;
-use super::race::{RULES, Race, RaceMean, UNIFORM, compare_with_uniform, means};
+use super::race::{Race, RaceMean, RacePoint, RaceRule, compare_with_uniform, means};
 use super::reference::Reference;
 use super::truth::Truth;
 use super::{BenchSettings, Subject, check_inputs, make_folders};
@@ -117,7 +117,8 @@ pub fn denoising(settings: &DenoisingSettings, say: &dyn Fn(&str)) -> Result<Den
                 }
             }
             if settings.with_races {
-                let mut races = RULES.into_iter().map(|rule| scene.race(denoiser, rule)).collect::<Result<Vec<_>>>()?;
+                let mut races =
+                    RaceRule::ALL.into_iter().map(|rule| scene.race(denoiser, rule)).collect::<Result<Vec<_>>>()?;
                 compare_with_uniform(&mut races);
                 results.races.extend(races);
             }
@@ -199,42 +200,45 @@ impl SceneBench<'_> {
         })
     }
 
-    fn race(&self, denoiser: &Denoiser, rule: &'static str) -> Result<Race> {
-        let mut points: Vec<[f64; 4]> = Vec::new();
+    fn race(&self, denoiser: &Denoiser, rule: RaceRule) -> Result<Race> {
+        let mut points = Vec::new();
         for spp in BUDGETS {
-            let mut sums = [0.0; 4];
-            for seed in 0..u64::from(self.settings.bench.seeds) {
-                let file = self.file(denoiser, rule, spp, seed);
-                let values = kept_or_made(&file, || self.lap(denoiser, rule, spp, seed))?;
-                sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
-            }
-            points.push(sums.map(|sum| sum / f64::from(self.settings.bench.seeds)));
+            let lap = |seed: u64| {
+                let file = self.file(denoiser, rule.name(), spp, seed);
+                kept_or_made(&file, || self.lap(denoiser, rule, spp, seed))
+            };
+            let laps = (0..u64::from(self.settings.bench.seeds)).map(lap).collect::<Result<Vec<_>>>()?;
+            points.push(RacePoint::mean(&laps));
         }
         Ok(Race { scene: self.subject.name.clone(), denoiser: denoiser.name(), rule, points, needs: Vec::new() })
     }
 
-    /// One render of a race: what a point holds.
-    fn lap(&self, denoiser: &Denoiser, rule: &str, spp: u32, seed: u64) -> Result<[f64; 4]> {
+    /// One render of a race.
+    fn lap(&self, denoiser: &Denoiser, rule: RaceRule, spp: u32, seed: u64) -> Result<RacePoint> {
         let mut settings = self.loop_settings(denoiser, spp)?;
         match rule {
-            UNIFORM => {
+            RaceRule::Uniform => {
                 settings.sampling = Sampling::Uniform;
                 settings.limits.visibility = None;
                 settings.limits.pilot_samples = spp;
             }
-            "relative" => {
+            RaceRule::Relative => {
                 // Its noise falls as the root of the count; what 16 samples a pixel leave is about 0.1.
                 let threshold = 0.4 / f64::from(spp).sqrt();
                 settings.sampling = Sampling::Rival(RivalRule::Relative { threshold });
                 settings.limits.mean_samples = Some(8 * spp);
                 settings.limits.pilot_samples = 16;
             }
-            _ => settings.limits.visibility = Some(0.01),
+            RaceRule::Visible => settings.limits.visibility = Some(0.01),
         }
         let rendered = render(&self.subject.tracer(seed), &settings, &Quiet)?;
         let metrics = self.measured(rendered.judgement.picture())?;
-        let spent = rendered.film.total_samples() as f64 / self.subject.pixels();
-        Ok([spent, metrics.jod, metrics.flip_mean, rendered.seconds.total])
+        Ok(RacePoint {
+            samples: rendered.film.total_samples() as f64 / self.subject.pixels(),
+            jod: metrics.jod,
+            flip_mean: metrics.flip_mean,
+            seconds: rendered.seconds.total,
+        })
     }
 
     /// Where a render is kept, by all that it depends on.

@@ -5,6 +5,7 @@
 //! frame would show here. Luminance only. Not a prediction of what is seen in motion: see
 //! [`fechner_perception::sequence`].
 
+use super::MAIN_COVERAGE;
 use crate::animate::velocity::VelocityMap;
 use crate::integrator::PathTracer;
 use crate::scene::Scene;
@@ -71,7 +72,7 @@ impl FlickerJudge {
             .zip(&self.reference)
             .map(|(light, reference)| luminance_of(light, self.size).combined(reference, |test, truth| test - truth))
             .collect();
-        let of_frame = |(error, map): (&Plane, &ThresholdMap)| map.measured_visibility(error).quantile(0.99);
+        let of_frame = |(error, map): (&Plane, &ThresholdMap)| map.measured_visibility(error).quantile(MAIN_COVERAGE);
         let visibility = errors.iter().zip(&self.thresholds).map(of_frame).sum::<f64>() / errors.len() as f64;
         let mut energy = 0.0;
         for (index, before) in self.before.iter().enumerate() {

@@ -1,5 +1,6 @@
 //! Curves of the report, as SVG.
 
+use super::arm::Arm;
 use super::curve::{Curve, CurvePoint};
 use std::fmt::Write as _;
 
@@ -65,10 +66,10 @@ impl Scale {
 }
 
 /// The style's name for an arm's colour.
-fn class(arm: &str) -> &'static str {
+fn class(arm: Arm) -> &'static str {
     match arm {
-        "as-asked" => "ours",
-        "relative" => "relative",
+        Arm::AsAsked => "ours",
+        Arm::Relative => "relative",
         _ => "other",
     }
 }
@@ -172,7 +173,7 @@ fn plot(curves: &[&Curve], x: Axis, y: Axis, mark: Option<f64>) -> Option<String
     );
     for (place, curve) in curves.iter().enumerate() {
         let (class, left) = (class(curve.arm), LEFT + 110.0 * place as f64);
-        let (line, name) = (frame.curve(curve), curve.arm);
+        let (line, name) = (frame.curve(curve), curve.arm.name());
         let _ = write!(text, "<g class=\"{class}\">{line}<text x=\"{left}\" y=\"{}\">{name}</text></g>", HEIGHT - 6.0);
     }
     text.push_str("</svg>\n");
@@ -193,7 +194,7 @@ mod tests {
             jod,
             relmse: f64::NAN,
         };
-        let curve = Curve { scene: "s".into(), arm: "uniform", points: vec![point(16.0, 8.0), point(64.0, 9.0)] };
+        let curve = Curve { scene: "s".into(), arm: Arm::Uniform, points: vec![point(16.0, 8.0), point(64.0, 9.0)] };
         let text = plot(&[&curve], SAMPLES, JOD, None).expect("a plot");
         assert!(text.contains("points=\"58.0,190.0 378.0,26.0\""), "{text}");
         assert!(plot(&[&curve], SAMPLES, RELMSE, None).is_none());
@@ -212,7 +213,7 @@ mod tests {
             jod: 9.0,
             relmse: 0.1,
         };
-        let curve = Curve { scene: "s".into(), arm: "uniform", points: vec![point(16.0), point(64.0)] };
+        let curve = Curve { scene: "s".into(), arm: Arm::Uniform, points: vec![point(16.0), point(64.0)] };
         for (target, y) in [(1.0, "26.0"), (1.0 / 32.0, "108.0")] {
             let text = plot(&[&curve], SAMPLES, VISIBILITY, Some(target)).expect("a plot");
             let line = format!("<line class=\"target\" x1=\"58\" x2=\"378\" y1=\"{y}\" y2=\"{y}\"/>");
@@ -220,7 +221,7 @@ mod tests {
         }
         assert_eq!(plots(&[&curve], 1.0).matches("v*</text>").count(), 2);
         let nothing = CurvePoint { visibility: 0.0, ..point(16.0) };
-        let flat = Curve { scene: "s".into(), arm: "uniform", points: vec![nothing] };
+        let flat = Curve { scene: "s".into(), arm: Arm::Uniform, points: vec![nothing] };
         let text = plot(&[&flat], SAMPLES, VISIBILITY, Some(4.0)).expect("a plot");
         assert!(text.contains("cy=\"190.0\""), "nothing lies below v*: {text}");
     }

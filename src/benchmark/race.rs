@@ -2,14 +2,80 @@
 
 use super::reached::Reached;
 use super::summary::mean_ratio;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-/// The rule that others are compared with.
-pub(super) const UNIFORM: &str = "uniform";
-/// Rules that race.
-pub(super) const RULES: [&str; 3] = [UNIFORM, "relative", "visible"];
+/// A rule that races.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(into = "&'static str")]
+pub enum RaceRule {
+    /// The same everywhere: what others are compared with.
+    Uniform,
+    /// Cycles' rule.
+    Relative,
+    /// Where noise can be seen.
+    Visible,
+}
+
+impl RaceRule {
+    pub(super) const ALL: [Self; 3] = [Self::Uniform, Self::Relative, Self::Visible];
+
+    /// What files and tables call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Uniform => "uniform",
+            Self::Relative => "relative",
+            Self::Visible => "visible",
+        }
+    }
+}
+
+impl From<RaceRule> for &'static str {
+    fn from(rule: RaceRule) -> Self {
+        rule.name()
+    }
+}
+
 /// What the race is to.
 pub const QUALITIES: [&str; 3] = ["JOD 9.8", "JOD 9.9", "FLIP of uniform at 64"];
+
+/// The denoised picture of a rule with a budget. Files have it as a list in this order.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(from = "[f64; 4]", into = "[f64; 4]")]
+pub struct RacePoint {
+    /// Mean samples a pixel.
+    pub samples: f64,
+    /// ColorVideoVDP.
+    pub jod: f64,
+    /// Mean LDR-FLIP.
+    pub flip_mean: f64,
+    /// Seconds of the whole render.
+    pub seconds: f64,
+}
+
+impl RacePoint {
+    /// Of several seeds with one budget.
+    pub(super) fn mean(laps: &[Self]) -> Self {
+        let mean = |of: fn(&Self) -> f64| laps.iter().map(of).sum::<f64>() / laps.len() as f64;
+        Self {
+            samples: mean(|lap| lap.samples),
+            jod: mean(|lap| lap.jod),
+            flip_mean: mean(|lap| lap.flip_mean),
+            seconds: mean(|lap| lap.seconds),
+        }
+    }
+}
+
+impl From<[f64; 4]> for RacePoint {
+    fn from([samples, jod, flip_mean, seconds]: [f64; 4]) -> Self {
+        Self { samples, jod, flip_mean, seconds }
+    }
+}
+
+impl From<RacePoint> for [f64; 4] {
+    fn from(point: RacePoint) -> Self {
+        [point.samples, point.jod, point.flip_mean, point.seconds]
+    }
+}
 
 /// How one rule's pictures get better with samples.
 #[derive(Clone, Debug, Serialize)]
@@ -18,10 +84,10 @@ pub struct Race {
     pub scene: String,
     /// Denoiser.
     pub denoiser: String,
-    /// `uniform`, `relative` or `visible`.
-    pub rule: &'static str,
-    /// Mean samples a pixel, ColorVideoVDP, FLIP, seconds.
-    pub points: Vec<[f64; 4]>,
+    /// Rule.
+    pub rule: RaceRule,
+    /// One a budget, ascending.
+    pub points: Vec<RacePoint>,
     /// What it needs for each of [`QUALITIES`].
     pub needs: Vec<Need>,
 }
@@ -41,7 +107,7 @@ pub struct Need {
 #[derive(Clone, Debug, Serialize)]
 pub struct RaceMean {
     /// The rule.
-    pub rule: &'static str,
+    pub rule: RaceRule,
     /// One of [`QUALITIES`].
     pub quality: &'static str,
     /// The mean; `None` where no pair has a ratio.
@@ -54,8 +120,8 @@ pub struct RaceMean {
 
 /// Fills in what each rule needs, of the races of one scene with one denoiser.
 pub(super) fn compare_with_uniform(races: &mut [Race]) {
-    let Some(uniform) = races.iter().find(|race| race.rule == UNIFORM).cloned() else { return };
-    let flip = uniform.points.iter().find(|point| point[0] >= 64.0).map_or(0.0, |point| point[2]);
+    let Some(uniform) = races.iter().find(|race| race.rule == RaceRule::Uniform).cloned() else { return };
+    let flip = uniform.points.iter().find(|point| point.samples >= 64.0).map_or(0.0, |point| point.flip_mean);
     let needs = |race: &Race| [race.to_jod(9.8), race.to_jod(9.9), race.to_flip(flip)];
     let of_uniform = needs(&uniform);
     for race in races {
@@ -70,7 +136,7 @@ pub(super) fn compare_with_uniform(races: &mut [Race]) {
 
 /// Means of every rule but uniform sampling.
 pub(super) fn means(races: &[Race]) -> Vec<RaceMean> {
-    let rules = RULES.into_iter().filter(|&rule| rule != UNIFORM);
+    let rules = RaceRule::ALL.into_iter().filter(|&rule| rule != RaceRule::Uniform);
     let each = rules.flat_map(|rule| QUALITIES.into_iter().map(move |quality| (rule, quality)));
     each.map(|(rule, quality)| {
         let of_rule = races.iter().filter(|race| race.rule == rule).flat_map(|race| &race.needs);
@@ -85,13 +151,13 @@ pub(super) fn means(races: &[Race]) -> Vec<RaceMean> {
 impl Race {
     /// Where the denoised picture first has this ColorVideoVDP.
     fn to_jod(&self, jod: f64) -> Reached {
-        let curve: Vec<(f64, f64)> = self.points.iter().map(|point| (point[0], point[1])).collect();
+        let curve: Vec<(f64, f64)> = self.points.iter().map(|point| (point.samples, point.jod)).collect();
         Reached::by(&curve, jod)
     }
 
     /// Where it first has a FLIP at most this large.
     fn to_flip(&self, flip: f64) -> Reached {
-        let curve: Vec<(f64, f64)> = self.points.iter().map(|point| (point[0], -point[2])).collect();
+        let curve: Vec<(f64, f64)> = self.points.iter().map(|point| (point.samples, -point.flip_mean)).collect();
         Reached::by(&curve, -flip)
     }
 }
@@ -100,19 +166,29 @@ impl Race {
 mod tests {
     use super::*;
 
-    fn race(scene: &str, rule: &'static str, points: &[[f64; 3]]) -> Race {
-        let points = points.iter().map(|&[spp, jod, flip]| [spp, jod, flip, 1.0]).collect();
+    fn race(scene: &str, rule: RaceRule, points: &[[f64; 3]]) -> Race {
+        let points = points.iter().map(|&[samples, jod, flip]| [samples, jod, flip, 1.0].into()).collect();
         Race { scene: scene.to_owned(), denoiser: "none".to_owned(), rule, points, needs: Vec::new() }
+    }
+
+    /// As runs that are kept have them.
+    #[test]
+    fn points_are_lists_in_files() {
+        let point = RacePoint { samples: 16.5, jod: 9.75, flip_mean: 0.125, seconds: 2.0 };
+        let text = serde_json::to_string(&point).expect("JSON");
+        assert_eq!(text, "[16.5,9.75,0.125,2.0]");
+        assert_eq!(serde_json::from_str::<RacePoint>(&text).expect("a point"), point);
     }
 
     /// A rule that begins beyond the goal has no ratio, and the mean says that it leaves the pair out.
     #[test]
     fn bounds_have_no_ratios() {
         let uniform = [[16.0, 9.7, 0.2], [32.0, 9.8, 0.1], [64.0, 9.85, 0.05]];
-        let mut easy =
-            [race("easy", "uniform", &uniform), race("easy", "relative", &[[32.0, 9.82, 0.1], [64.0, 9.9, 0.02]])];
-        let mut hard =
-            [race("hard", "uniform", &uniform), race("hard", "relative", &[[8.0, 9.6, 0.3], [16.0, 9.8, 0.05]])];
+        let pair = |scene: &str, relative: &[[f64; 3]]| {
+            [race(scene, RaceRule::Uniform, &uniform), race(scene, RaceRule::Relative, relative)]
+        };
+        let mut easy = pair("easy", &[[32.0, 9.82, 0.1], [64.0, 9.9, 0.02]]);
+        let mut hard = pair("hard", &[[8.0, 9.6, 0.3], [16.0, 9.8, 0.05]]);
         compare_with_uniform(&mut easy);
         compare_with_uniform(&mut hard);
         let need = &easy[1].needs[0];
@@ -121,7 +197,8 @@ mod tests {
         assert_eq!((easy[0].needs[1].samples, easy[1].needs[1].uniform_over), (Reached::MoreThan(64.0), None));
         let means = means(&[easy, hard].concat());
         let of = |quality: &str| {
-            let mean = means.iter().find(|mean| mean.rule == "relative" && mean.quality == quality).expect("there");
+            let mean =
+                means.iter().find(|mean| mean.rule == RaceRule::Relative && mean.quality == quality).expect("there");
             (mean.uniform_over.map(|ratio| (100.0 * ratio).round()), mean.pairs, mean.pairs_left_out)
         };
         assert_eq!(of("JOD 9.8"), (Some(200.0), 1, 1));

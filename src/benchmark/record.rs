@@ -7,7 +7,7 @@ use super::report::html;
 use super::runner::{EnergyBias, Run};
 use super::summary::{GeometricMean, INTERVAL_LEVEL, geometric_mean};
 use super::table::csv;
-use super::{BenchSettings, COVERAGES};
+use super::{BenchSettings, COVERAGES, MAIN_COVERAGE};
 use anyhow::Result;
 use fechner_perception::Plane;
 use serde::Serialize;
@@ -21,7 +21,7 @@ pub struct Record {
     /// Scene.
     pub scene: String,
     /// Arm.
-    pub arm: &'static str,
+    pub arm: Arm,
     /// Seed; `None` for all seeds pooled (mean over them of v², and of what each pixel's v² needs).
     pub seed: Option<u64>,
     /// Share of the picture that has to be at v\*.
@@ -71,7 +71,7 @@ impl Record {
 #[derive(Clone, Debug, Serialize)]
 pub struct ArmSummary {
     /// Arm.
-    pub arm: &'static str,
+    pub arm: Arm,
     /// Coverage.
     pub coverage: f64,
     /// Uniform's samples over the arm's; `None`, as in the next two, where no scene has such a ratio.
@@ -109,7 +109,7 @@ pub struct Results {
     /// Seeds of each arm.
     pub seeds: u32,
     /// Arms, in the order in which they ran.
-    pub arms: Vec<&'static str>,
+    pub arms: Vec<Arm>,
     /// Samples of the references that were asked for, as a multiple of what uniform sampling needs.
     pub reference_factor: f64,
     /// References, one a scene.
@@ -130,7 +130,7 @@ pub struct Results {
 #[derive(Clone, Debug)]
 pub(crate) struct ScenePictures {
     pub(crate) scene: String,
-    pub(crate) arm: &'static str,
+    pub(crate) arm: Arm,
     pub(crate) pictures: Vec<ShownPicture>,
 }
 
@@ -143,7 +143,7 @@ impl Results {
             visibility: settings.visibility,
             display: settings.display.clone(),
             seeds: settings.seeds,
-            arms: settings.arms.iter().map(|arm| arm.name()).collect(),
+            arms: settings.arms.clone(),
             reference_factor: settings.reference_factor,
             references: Vec::new(),
             interval_level: INTERVAL_LEVEL,
@@ -179,7 +179,7 @@ impl Results {
         let bias = pooled_bias(runs);
         self.records.extend(COVERAGES.map(|coverage| Record {
             scene: scene.to_owned(),
-            arm: arm.name(),
+            arm,
             seed,
             coverage,
             samples: by_samples.quantile(coverage) / target,
@@ -201,9 +201,7 @@ impl Results {
     }
 
     fn find(&self, scene: &str, arm: Arm, seed: Option<u64>, coverage: f64) -> Option<&Record> {
-        self.records
-            .iter()
-            .find(|r| r.scene == scene && r.arm == arm.name() && r.seed == seed && r.coverage == coverage)
+        self.records.iter().find(|r| r.scene == scene && r.arm == arm && r.seed == seed && r.coverage == coverage)
     }
 
     /// Ratios to uniform sampling and to the oracle, and their means over scenes.
@@ -217,7 +215,7 @@ impl Results {
             let efficiency = oracle.and_then(|oracle| ratio(oracle.samples, r.samples));
             self.records[i] = Record { speedup_samples, speedup_seconds, efficiency, ..r.clone() };
         }
-        let mut arms: Vec<&'static str> = Vec::new();
+        let mut arms: Vec<Arm> = Vec::new();
         for record in &self.records {
             if !arms.contains(&record.arm) {
                 arms.push(record.arm);
@@ -237,7 +235,7 @@ impl Results {
     }
 
     /// Mean over the scenes that have such a figure.
-    fn mean_of(&self, arm: &str, coverage: f64, of: fn(&Record) -> Option<f64>) -> Option<GeometricMean> {
+    fn mean_of(&self, arm: Arm, coverage: f64, of: fn(&Record) -> Option<f64>) -> Option<GeometricMean> {
         let mine = || self.records.iter().filter(|r| r.arm == arm && r.coverage == coverage);
         let of_seeds = |scene: &str| mine().filter(|r| r.seed.is_some() && r.scene == scene).filter_map(of).collect();
         let by_scene = mine().filter(|r| r.seed.is_none()).filter_map(|r| Some((of(r)?, of_seeds(&r.scene))));
@@ -245,14 +243,19 @@ impl Results {
         (!pooled.is_empty()).then(|| geometric_mean(&pooled, &by_seed))
     }
 
-    /// The pooled figures of a scene at 99 %, one line an arm.
+    /// Records of a scene, all seeds pooled, at [`MAIN_COVERAGE`].
+    pub(super) fn pooled(&self, scene: &str) -> impl Iterator<Item = &Record> {
+        self.records.iter().filter(move |r| r.scene == scene && r.seed.is_none() && r.coverage == MAIN_COVERAGE)
+    }
+
+    /// The pooled figures of a scene, one line an arm.
     pub(crate) fn scene_lines(&self, scene: &str) -> String {
         let mut text = String::new();
-        for r in self.records.iter().filter(|r| r.scene == scene && r.seed.is_none() && r.coverage == 0.99) {
+        for r in self.pooled(scene) {
             let _ = writeln!(
                 text,
                 "{scene}: {:<20} {:>8.1} spp for v* on 99 % (rendered at {:.2} v*), JOD {:.2}, FLIP {:.4}, bias {}",
-                r.arm,
+                r.arm.name(),
                 r.samples,
                 r.reached,
                 r.jod,

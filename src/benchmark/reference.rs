@@ -1,7 +1,7 @@
 //! The reference of a scene: a long uniform render with its halves and converged variances, kept by content.
 
 use super::keep::{keep_pixels, kept_pixels};
-use super::{BenchSettings, Subject};
+use super::{BenchSettings, MAIN_COVERAGE, Subject};
 use crate::adaptive::judge::{display_scale, judge, variance_shares};
 use crate::adaptive::plan::uniform_plan;
 use crate::adaptive::statistics::SampleStatistics;
@@ -65,7 +65,7 @@ impl Reference {
         // Stratification pays more the more samples there are: its factor is taken where uniform sampling would end.
         let uniform_spp = loop {
             trace_up_to(&tracer, &mut film, spp);
-            let reached = judge(&film, &settings, 1.0)?.predicted.quantile(0.99) / subject.visibility;
+            let reached = judge(&film, &settings, 1.0)?.predicted.quantile(MAIN_COVERAGE) / subject.visibility;
             let needed = f64::from(spp) * reached * reached;
             if needed <= f64::from(spp) || f64::from(spp) >= MOST_SAMPLES {
                 // A picture without noise needs none; no render takes fewer than one. As it is kept: a run that goes on has the same.

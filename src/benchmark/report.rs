@@ -1,5 +1,6 @@
 //! `report.html`: one file that needs nothing else.
 
+use super::arm::Arm;
 use super::curve::Curve;
 use super::pictures::{ShownPicture, heat_codes};
 use super::plot::plots;
@@ -39,7 +40,7 @@ fn introduction(results: &Results) -> String {
 }
 
 fn section(results: &Results, scene: &str) -> String {
-    let records: Vec<&Record> = pooled(results, scene).collect();
+    let records: Vec<&Record> = results.pooled(scene).collect();
     let curves: Vec<&Curve> = results.curves.iter().filter(|curve| curve.scene == scene).collect();
     let pictures: String = results.pictures.iter().filter(|shown| shown.scene == scene).map(pictures).collect();
     let title = html_text(scene);
@@ -55,11 +56,6 @@ fn scenes(results: &Results) -> Vec<&str> {
         }
     }
     scenes
-}
-
-/// Pooled records of a scene at 99 %.
-fn pooled<'a>(results: &'a Results, scene: &'a str) -> impl Iterator<Item = &'a Record> {
-    results.records.iter().filter(move |r| r.scene == scene && r.seed.is_none() && r.coverage == 0.99)
 }
 
 /// What a cell says of a figure that is not known.
@@ -86,7 +82,7 @@ fn summary_table(summary: &[ArmSummary]) -> String {
         let _ = writeln!(
             text,
             "<tr{group}><td>{}</td><td>{} %</td><td{}>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
-            s.arm,
+            s.arm.name(),
             100.0 * s.coverage,
             loss(samples.map(|mean| mean.value)),
             if_known(samples, |mean| mean.in_words()),
@@ -105,14 +101,14 @@ fn bars(records: &[&Record]) -> String {
     let mut text = String::from("<dl class=\"bars\" aria-label=\"samples a pixel by arm\">\n");
     for record in records {
         let class = match record.arm {
-            "default" | "as-asked" => "ours",
-            "oracle" => "oracle",
+            Arm::Default | Arm::AsAsked => "ours",
+            Arm::Oracle => "oracle",
             _ => "other",
         };
         let _ = writeln!(
             text,
             "<dt>{}</dt><dd><i class=\"{class}\" style=\"--share:{:.4}\"></i>{:.0} spp</dd>",
-            record.arm,
+            record.arm.name(),
             record.samples / most,
             record.samples
         );
@@ -133,7 +129,7 @@ fn scene_table(records: &[&Record]) -> String {
             text,
             "<tr><td>{}</td><td>{:.0}</td><td{}>{}</td><td>{}</td><td>{:.2}</td><td>{:.2} %</td><td>{:.4}</td>\
              <td>{:.3}</td><td>{:.2e}</td><td>{}</td><td>{:.1} %</td></tr>",
-            r.arm,
+            r.arm.name(),
             r.samples,
             loss(r.speedup_samples),
             ratio(r.speedup_samples),
@@ -160,7 +156,7 @@ fn pictures(shown: &ScenePictures) -> String {
 
 /// A picture with what its colours mean.
 fn figure(shown: &ScenePictures, picture: &ShownPicture) -> String {
-    let (arm, title) = (shown.arm, picture.kind.title);
+    let (arm, title) = (shown.arm.name(), picture.kind.title);
     format!(
         "<figure><div class=\"map\"><img alt=\"{}, arm {arm}: {title}\" src=\"data:image/png;base64,{}\">{}</div>\
          <figcaption>{arm}: {title}</figcaption></figure>\n",

@@ -10,7 +10,7 @@ use super::pictures::{are_there, read_pictures, write_pictures};
 use super::record::ScenePictures;
 use super::reference::Reference;
 use super::truth::Truth;
-use super::{BenchSettings, Subject};
+use super::{BenchSettings, MAIN_COVERAGE, Subject};
 use crate::adaptive::statistics::picture_variance;
 use crate::adaptive::{Quiet, Rendered, render};
 use crate::film::Film;
@@ -139,7 +139,7 @@ impl<'a> ArmRunner<'a> {
     /// of the picture at v\*.
     fn first_run(&mut self, arm: Arm) -> Result<Run> {
         let uniform_spp = match arm {
-            Arm::Uniform => uniform_samples(self.subject, self.truth, &self.variance()?.clone(), 0.99),
+            Arm::Uniform => uniform_samples(self.subject, self.truth, &self.variance()?.clone(), MAIN_COVERAGE),
             _ => self.reference.uniform_spp,
         };
         let judged = match arm.first_knob(self.subject, uniform_spp) {
@@ -148,7 +148,7 @@ impl<'a> ArmRunner<'a> {
             Some(first) => nearest(first, |knob| {
                 let judged = self.judged(arm, 0, Some(knob))?;
                 let energy = judged.run.squared_visibility.as_ref().context("a fresh run")?;
-                let reached = energy.quantile(0.99).sqrt() / self.subject.visibility;
+                let reached = energy.quantile(MAIN_COVERAGE).sqrt() / self.subject.visibility;
                 Ok((judged, reached))
             })?,
         };
@@ -214,7 +214,7 @@ impl<'a> ArmRunner<'a> {
 
     fn make_oracle(&mut self, seed: u64, visibility: f64) -> Result<Made> {
         let variance = self.variance()?.clone();
-        let counts = least_samples(self.truth, &variance, visibility, 0.99)?;
+        let counts = least_samples(self.truth, &variance, visibility, MAIN_COVERAGE)?;
         let started = Instant::now();
         let film = trace_counts(self.subject, &counts, seed + 1);
         let seconds = started.elapsed().as_secs_f64();
@@ -247,13 +247,13 @@ impl<'a> ArmRunner<'a> {
             let settings = arm.settings(self.subject, knob, self.reference.uniform_spp)?;
             course(self.subject, self.truth, &settings, first.seed + 1)
         })?;
-        Ok(Some(Curve { scene: self.subject.name.clone(), arm: arm.name(), points }))
+        Ok(Some(Curve { scene: self.subject.name.clone(), arm, points }))
     }
 
     /// What the report shows of the arm.
     pub(crate) fn pictures(&self, arm: Arm) -> ScenePictures {
         let pictures = read_pictures(&self.file(arm, 0));
-        ScenePictures { scene: self.subject.name.clone(), arm: arm.name(), pictures }
+        ScenePictures { scene: self.subject.name.clone(), arm, pictures }
     }
 
     fn variance(&mut self) -> Result<&Plane> {

@@ -8,7 +8,7 @@ type Cell = fn(&Record) -> String;
 
 const COLUMNS: [(&str, Cell); 19] = [
     ("scene", |r| csv_field(&r.scene).into_owned()),
-    ("arm", |r| r.arm.to_owned()),
+    ("arm", |r| r.arm.name().to_owned()),
     ("seed", |r| r.seed.map_or_else(|| "all".to_owned(), |seed| seed.to_string())),
     ("coverage", |r| r.coverage.to_string()),
     ("samples", |r| r.samples.to_string()),

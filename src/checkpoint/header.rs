@@ -208,6 +208,24 @@ impl Seeds {
 }
 
 impl SettingsRecord {
+    /// Of the default loop, as [`LoopSettings::new`] has it.
+    pub fn new(viewing: Viewing, nits_per_unit: f64, operator: impl Into<String>) -> Self {
+        Self {
+            sampling: Sampling::Adaptive,
+            allocation: AllocationRule::default(),
+            model: model::DEFAULT.to_owned(),
+            viewing,
+            nits_per_unit,
+            operator: operator.into(),
+            exposure_stops: None,
+            fitted: None,
+            frames: None,
+            gazes: Vec::new(),
+            importance: None,
+            denoiser: None,
+        }
+    }
+
     /// Settings for the loop over samples that were traced by a filter, less the importance map, of which only the hash is here; the
     /// denoiser is opened.
     ///
@@ -333,20 +351,7 @@ mod tests {
 
     #[test]
     fn films_say_what_is_seen_otherwise_in_them() {
-        let own = SettingsRecord {
-            sampling: Sampling::Adaptive,
-            allocation: AllocationRule::Convex,
-            model: model::DEFAULT.to_owned(),
-            viewing: Viewing::default(),
-            nits_per_unit: 100.0,
-            operator: "constant".to_owned(),
-            exposure_stops: None,
-            fitted: None,
-            frames: None,
-            gazes: Vec::new(),
-            importance: None,
-            denoiser: None,
-        };
+        let own = SettingsRecord::new(Viewing::default(), 100.0, "constant");
         let mut other = SettingsRecord { sampling: Sampling::Uniform, ..own.clone() };
         assert!(own.is_seen_like(&other));
         other.denoiser = Some(DenoiserKind::Builtin);

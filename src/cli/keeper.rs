@@ -9,8 +9,9 @@ pub(super) use watch::Watch;
 use fechner::adaptive::state::RenderState;
 use fechner::checkpoint::{Header, write_checkpoint};
 use fechner::output::OutputError;
+use fechner::poison::Unpoisoned as _;
 use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 /// Writes the film's file so often that a kill never costs more than was agreed.
@@ -59,7 +60,7 @@ impl Keeper {
     /// counted in, since a kill in the middle of writing leaves the file before. They count for half the interval at
     /// most: a look or an audit that once took longer must not make every batch write.
     fn chance(&self, state: &RenderState) {
-        let mut history = self.history.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut history = self.history.lock().unpoisoned();
         history.longest_wait = history.longest_wait.max(history.last_chance.elapsed());
         let reserve = (history.longest_wait + history.longest_write).min(self.every / 2);
         if history.last_snapshot.elapsed() + reserve >= self.every {
@@ -73,7 +74,7 @@ impl Keeper {
 
     /// Writes the last state.
     fn ended(&self, state: &RenderState) {
-        self.write(state, &mut self.history.lock().unwrap_or_else(PoisonError::into_inner));
+        self.write(state, &mut self.history.lock().unpoisoned());
     }
 
     /// A file that cannot be written must not end a render of hours: it is told at once and again at the end.
@@ -98,7 +99,7 @@ impl Keeper {
     /// # Errors
     /// If its last state could not be written.
     fn report(self, whole: Duration) -> anyhow::Result<()> {
-        let history = self.history.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let history = self.history.into_inner().unpoisoned();
         if let Some(error) = history.failure {
             return Err(error.into());
         }
@@ -119,7 +120,7 @@ mod tests {
     use super::*;
     use crate::cli::console::Console;
     use fechner::adaptive::Monitor as _;
-    use fechner::adaptive::settings::{AllocationRule, Limits, Sampling};
+    use fechner::adaptive::settings::Limits;
     use fechner::checkpoint::{Origin, SettingsRecord, Tracing, read_checkpoint};
     use fechner::integrator::TraceSettings;
     use fechner::scene::hash::ContentHash;
@@ -137,21 +138,7 @@ mod tests {
             height: 1,
             tracing: Tracing::of(&TraceSettings::new(1, 1, 0)),
         };
-        let settings = SettingsRecord {
-            sampling: Sampling::Uniform,
-            allocation: AllocationRule::default(),
-            model: String::new(),
-            viewing: Viewing::default(),
-            nits_per_unit: 1.0,
-            operator: String::new(),
-            exposure_stops: None,
-            fitted: None,
-            frames: None,
-            gazes: Vec::new(),
-            importance: None,
-            denoiser: None,
-        };
-        Header::begun(origin, 0, settings, 1.0)
+        Header::begun(origin, 0, SettingsRecord::new(Viewing::default(), 1.0, ""), 1.0)
     }
 
     /// Samples outlive a look that fails.

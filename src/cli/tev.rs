@@ -4,9 +4,10 @@ use anyhow::Context;
 use clap::Args;
 use fechner::adaptive::judge::Judgement;
 use fechner::adaptive::state::RenderState;
+use fechner::poison::Unpoisoned as _;
 use fechner::preview::{Looked, Shown, TEV_PORT, Tev};
 use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard};
 
 /// Where tev listens.
 #[derive(Clone, Debug, Args)]
@@ -59,7 +60,7 @@ impl Showing {
     }
 
     fn moving(&self) -> MutexGuard<'_, Moving> {
-        self.moving.lock().unwrap_or_else(PoisonError::into_inner)
+        self.moving.lock().unpoisoned()
     }
 
     /// After each look.

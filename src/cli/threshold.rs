@@ -11,7 +11,7 @@ use super::targets::check_kept;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::exr_read::ExrImage;
-use fechner::output::{self, Attribute, Format, PIXEL_ASPECT_RATIO, Picture};
+use fechner::output::{self, Attribute, Format, PIXEL_ASPECT_RATIO, Picture, channel};
 use fechner_perception::colour::chromatic_visibility;
 use fechner_perception::display::Glare;
 use fechner_perception::model::{self, ModelInputs, ThresholdModel};
@@ -211,10 +211,10 @@ impl Asked {
     fn picture_of<'a>(&self, found: &'a Found) -> Picture<'a> {
         let (width, height) = self.guide.size();
         let mut picture = Picture::new(width as u32, height as u32);
-        picture.push_f32("threshold.Y", found.threshold_cd_m2.values());
-        picture.push_f32("adaptation.Y", found.adaptation_cd_m2.values());
+        picture.push_f32(channel::THRESHOLD, found.threshold_cd_m2.values());
+        picture.push_f32(channel::ADAPTATION, found.adaptation_cd_m2.values());
         if let Some(visibility) = &found.visibility {
-            picture.push_f32("visibility.Y", visibility.values());
+            picture.push_f32(channel::VISIBILITY, visibility.values());
         }
         let text = |s: &str| Attribute::Text(s.to_owned());
         picture.push_attribute("fechner.model", text(self.model.name()));

@@ -13,13 +13,14 @@ use fechner::adaptive::settings::LoopSettings;
 use fechner::checkpoint::SettingsRecord;
 use fechner::integrator::{Crop, TraceSettings};
 use fechner::output::{self, PartOf};
+use fechner::poison::Unpoisoned as _;
 use fechner::preview::{self, Audience, Door, Host, Job, MOST_SIDE_PIXELS, Options, Spectator};
 use fechner::scene::{Scene, load};
 use fechner_perception::model;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, UdpSocket};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 /// Arguments of `view`.
 #[derive(Debug, Args)]
@@ -52,7 +53,7 @@ struct FileHost {
 impl Host for FileHost {
     fn load(&self) -> Result<Job, String> {
         let prepared = self.job.prepare().and_then(shown_in_browsers).map_err(|error| in_a_line(&error))?;
-        *self.part_of.lock().unwrap_or_else(PoisonError::into_inner) = PartOf::of(&prepared.trace);
+        *self.part_of.lock().unpoisoned() = PartOf::of(&prepared.trace);
         Ok(job_of(prepared, &self.job))
     }
 
@@ -64,7 +65,7 @@ impl Host for FileHost {
         let write = || {
             let format = output::check_target(path)?;
             let report = Report::new(&self.job.scene_name(), &[self.job.seed()], settings, rendered);
-            let part_of = *self.part_of.lock().unwrap_or_else(PoisonError::into_inner);
+            let part_of = *self.part_of.lock().unpoisoned();
             write_picture(path, format, self.job.background(), rendered, settings, &report, part_of)
         };
         write().map_err(|error| in_a_line(&error))?;

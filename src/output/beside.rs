@@ -1,11 +1,12 @@
 //! Files that are complete or not there: written beside the target under another name, flushed to the disk, renamed.
 
 use super::OutputError;
+use crate::poison::Unpoisoned as _;
 use crate::scene::hash::ContentHash;
 use std::ffi::{OsStr, OsString};
 use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 use tempfile::NamedTempFile;
 
 /// Writes `path` by letting `write` fill a new file in the same folder, which then takes the target's place at once.
@@ -79,7 +80,7 @@ pub(super) fn create_beside(path: &Path) -> Result<(NamedTempFile, PathBuf), Out
     // is written by name from being written.
     #[cfg(unix)]
     let _ = file.as_file().try_lock();
-    let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut unfinished = UNFINISHED.lock().unpoisoned();
     // Under that name until they are renamed or dropped.
     unfinished.retain(|path| path.exists());
     unfinished.push(file.path().to_owned());
@@ -91,7 +92,7 @@ static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// Removes the new files that this process is writing. For one that is about to end by `exit`, which drops nothing.
 pub fn abandon_unfinished() {
-    for path in UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).drain(..) {
+    for path in UNFINISHED.lock().unpoisoned().drain(..) {
         // Nothing is there of those that are finished, and nobody is left to hear of another failure.
         let _ = std::fs::remove_file(path);
     }

@@ -7,6 +7,7 @@
 //! Call [`check_target`] before a long render: it finds out whether the file can be written at all.
 
 mod beside;
+pub mod channel;
 mod exr_file;
 mod exr_header;
 pub mod false_colour;

@@ -1,7 +1,7 @@
 //! The files a render leaves: what the display shows, or every layer of it.
 
 use super::{
-    Attribute, NITS_PER_UNIT, OutputError, PartOf, Picture, write_exr, write_png_for, write_png_with_alpha_for,
+    Attribute, NITS_PER_UNIT, OutputError, PartOf, Picture, channel, write_exr, write_png_for, write_png_with_alpha_for,
 };
 use crate::adaptive::Rendered;
 use crate::adaptive::settings::LoopSettings;
@@ -79,37 +79,37 @@ pub fn layers<'a>(
     let (nits_per_unit, target) = (settings.nits_per_unit, settings.limits.visibility_or_threshold());
     let mut picture = Picture::new(film.width(), film.height());
     let to_units = (1.0 / nits_per_unit) as f32;
-    for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
+    for (c, name) in channel::RGB.into_iter().enumerate() {
         let values: Vec<f32> = judgement.picture().iter().map(|rgb| rgb[c] * to_units).collect();
         picture.push_f32(name, values);
     }
     if let Some(error) = judgement.denoised_error() {
-        for (c, name) in ["raw.R", "raw.G", "raw.B"].into_iter().enumerate() {
+        for (c, name) in channel::RAW.into_iter().enumerate() {
             let values: Vec<f32> = judgement.estimate.rgb_cd_m2.iter().map(|rgb| rgb[c] * to_units).collect();
             picture.push_f32(name, values);
         }
-        picture.push_f32("visibility_variance.Y", error.variance.values().to_vec());
-        picture.push_f32("visibility_bias.Y", error.bias.values().to_vec());
-        picture.push_f32("unproven.Y", error.unproven(target).into_values());
+        picture.push_f32(channel::VISIBILITY_OF_VARIANCE, error.variance.values().to_vec());
+        picture.push_f32(channel::VISIBILITY_OF_BIAS, error.bias.values().to_vec());
+        picture.push_f32(channel::UNPROVEN, error.unproven(target).into_values());
     }
     if background == Background::Transparent {
-        picture.push_f32("A", film.coverage());
+        picture.push_f32(channel::ALPHA, film.coverage());
     }
     let guide = |value: &dyn Fn(&PixelGuide) -> f32| film.guides().iter().map(value).collect::<Vec<f32>>();
-    for (c, name) in ["albedo.R", "albedo.G", "albedo.B"].into_iter().enumerate() {
+    for (c, name) in channel::ALBEDO.into_iter().enumerate() {
         picture.push_f16(name, guide(&|g| g.albedo[c]));
     }
-    for (c, name) in ["normal.X", "normal.Y", "normal.Z"].into_iter().enumerate() {
+    for (c, name) in channel::NORMAL.into_iter().enumerate() {
         picture.push_f16(name, guide(&|g| g.normal[c]));
     }
-    picture.push_f32("depth.Z", guide(&|g| g.depth));
-    picture.push_u32("id.Y", film.guides().iter().map(|g| g.seen.object_id()).collect::<Vec<u32>>());
-    picture.push_u32("samples.Y", sample_counts(film));
+    picture.push_f32(channel::DEPTH, guide(&|g| g.depth));
+    picture.push_u32(channel::OBJECT_ID, film.guides().iter().map(|g| g.seen.object_id()).collect::<Vec<u32>>());
+    picture.push_u32(channel::SAMPLES, sample_counts(film));
     let variance = picture_variance(film, nits_per_unit);
-    picture.push_f32("variance.Y", variance.into_values());
+    picture.push_f32(channel::VARIANCE, variance.into_values());
     let threshold = judgement.allowed_standard_error_cd_m2();
-    picture.push_f32("threshold.Y", threshold.into_values());
-    picture.push_f32("visibility.Y", judgement.predicted.values());
+    picture.push_f32(channel::THRESHOLD, threshold.into_values());
+    picture.push_f32(channel::VISIBILITY, judgement.predicted.values());
     picture.push_attribute(NITS_PER_UNIT, Attribute::Float(nits_per_unit as f32));
     for (name, value) in attributes {
         picture.push_attribute(name, value.clone());

@@ -14,9 +14,10 @@ use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::state::RenderState;
 use crate::adaptive::{Directive, Progress, StopReason};
 use crate::checkpoint::SettingsRecord;
+use crate::poison::Unpoisoned as _;
 use crate::scene::Scene;
 use std::net::TcpListener;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -82,7 +83,7 @@ impl<'a> Audience<'a> {
     }
 
     fn moving(&self) -> MutexGuard<'_, Moving> {
-        self.moving.lock().unwrap_or_else(PoisonError::into_inner)
+        self.moving.lock().unpoisoned()
     }
 
     fn show(&self, moving: &mut Moving, state: &RenderState) {
@@ -162,7 +163,7 @@ impl<'a> Audience<'a> {
 
     fn close(&self) {
         self.shared.close();
-        if let Some(server) = self.server.lock().unwrap_or_else(PoisonError::into_inner).take() {
+        if let Some(server) = self.server.lock().unpoisoned().take() {
             // A thread that panicked has said so.
             let _ = server.join();
         }

@@ -3,13 +3,14 @@
 //! Anybody who reaches the port can open connections, token or not, and each takes one of the files that the process may have open.
 //! What a render keeps must never lack one for that.
 
+use crate::poison::Unpoisoned as _;
 use axum::extract::connect_info::Connected;
 use axum::serve::{IncomingStream, Listener};
 use std::future::Future;
 use std::io;
 use std::net::SocketAddr;
 use std::pin::Pin;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll};
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
@@ -65,11 +66,11 @@ pub(super) struct Stranger(Arc<Mutex<Option<Waiting>>>);
 impl Stranger {
     /// From here on the connection is a viewer's: it may stay, and its place is free.
     pub(super) fn let_in(&self) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = None;
+        *self.0.lock().unpoisoned() = None;
     }
 
     fn is_too_late(&self, context: &mut Context<'_>) -> bool {
-        let mut waiting = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut waiting = self.0.lock().unpoisoned();
         waiting.as_mut().is_some_and(|waiting| waiting.until.as_mut().poll(context).is_ready())
     }
 }

@@ -3,11 +3,12 @@
 use super::command::Command;
 use super::layer::{LAYERS, Layer};
 use super::screen::Snapshot;
+use crate::poison::Unpoisoned as _;
 use axum::body::Bytes;
 use fechner_perception::eccentricity::Gaze;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex};
 use std::time::Duration;
 use tokio::sync::watch;
 
@@ -61,7 +62,7 @@ impl Shared {
     }
 
     pub(super) fn send(&self, command: Command) {
-        let mut commands = self.commands.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut commands = self.commands.lock().unpoisoned();
         if let Some(earlier) = commands.back_mut().filter(|earlier| command.replaces(earlier)) {
             *earlier = command;
         } else if commands.len() < MOST_COMMANDS {
@@ -73,12 +74,12 @@ impl Shared {
 
     /// Whether the render should look up.
     pub(super) fn has_news(&self) -> bool {
-        self.is_closing() || !self.commands.lock().unwrap_or_else(PoisonError::into_inner).is_empty()
+        self.is_closing() || !self.commands.lock().unpoisoned().is_empty()
     }
 
     /// All commands that have come.
     pub(super) fn take_commands(&self) -> VecDeque<Command> {
-        let mut commands = self.commands.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut commands = self.commands.lock().unpoisoned();
         self.is_outdated.store(false, Ordering::SeqCst);
         std::mem::take(&mut *commands)
     }
@@ -90,7 +91,7 @@ impl Shared {
 
     /// Until a command comes, the preview closes or the time is up.
     pub(super) fn wait(&self, most: Duration) {
-        let commands = self.commands.lock().unwrap_or_else(PoisonError::into_inner);
+        let commands = self.commands.lock().unpoisoned();
         if commands.is_empty() && !self.is_closing() {
             drop(self.arrived.wait_timeout(commands, most));
         }
@@ -100,7 +101,7 @@ impl Shared {
         self.is_closing.store(true, Ordering::SeqCst);
         self.closing.send_replace(true);
         // With the lock held, so that nobody is between looking and waiting.
-        let _commands = self.commands.lock().unwrap_or_else(PoisonError::into_inner);
+        let _commands = self.commands.lock().unpoisoned();
         self.arrived.notify_all();
     }
 
@@ -146,21 +147,21 @@ impl Shared {
 
     /// Somebody looks elsewhere.
     fn change_gaze(&self, change: impl FnOnce(&mut Option<(u64, Gaze)>)) {
-        change(&mut self.gaze.lock().unwrap_or_else(PoisonError::into_inner));
-        let _commands = self.commands.lock().unwrap_or_else(PoisonError::into_inner);
+        change(&mut self.gaze.lock().unpoisoned());
+        let _commands = self.commands.lock().unpoisoned();
         self.arrived.notify_all();
     }
 
     pub(super) fn gaze(&self) -> Option<Gaze> {
-        self.gaze.lock().unwrap_or_else(PoisonError::into_inner).map(|(_, gaze)| gaze)
+        self.gaze.lock().unpoisoned().map(|(_, gaze)| gaze)
     }
 
     pub(super) fn publish_snapshot(&self, snapshot: Snapshot) {
-        *self.snapshot.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::new(snapshot));
+        *self.snapshot.lock().unpoisoned() = Some(Arc::new(snapshot));
     }
 
     pub(super) fn snapshot(&self) -> Option<Arc<Snapshot>> {
-        self.snapshot.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        self.snapshot.lock().unpoisoned().clone()
     }
 }
 

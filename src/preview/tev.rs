@@ -10,10 +10,12 @@ mod tests;
 use super::spectator::{Shown, Spectator};
 use crate::adaptive::statistics::picture_variance;
 use crate::film::{Film, PixelGuide};
+use crate::output::channel;
+use crate::poison::Unpoisoned as _;
 use packet::Layer;
 use std::io::Write;
 use std::net::{SocketAddr, TcpStream};
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -75,7 +77,7 @@ impl Tev {
             if let Err(problem) = sent {
                 warn(&problem);
             }
-            of_sender.mailbox.lock().unwrap_or_else(PoisonError::into_inner).has_ended = true;
+            of_sender.mailbox.lock().unpoisoned().has_ended = true;
             of_sender.changed.notify_all();
         };
         let sender = std::thread::Builder::new().name("tev".to_owned()).spawn(work)?;
@@ -89,7 +91,7 @@ impl Tev {
     }
 
     fn has_ended(&self) -> bool {
-        self.post.mailbox.lock().unwrap_or_else(PoisonError::into_inner).has_ended
+        self.post.mailbox.lock().unpoisoned().has_ended
     }
 
     /// Hands a state over if one is due.
@@ -101,7 +103,7 @@ impl Tev {
         }
         let begun = Instant::now();
         let message = message(shown);
-        self.post.mailbox.lock().unwrap_or_else(PoisonError::into_inner).latest = Some(message);
+        self.post.mailbox.lock().unpoisoned().latest = Some(message);
         self.post.changed.notify_all();
         self.sent = Some(Instant::now());
         self.cost = begun.elapsed();
@@ -116,13 +118,13 @@ impl Spectator for Tev {
 
 impl Drop for Tev {
     fn drop(&mut self) {
-        let mut mailbox = self.post.mailbox.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut mailbox = self.post.mailbox.lock().unpoisoned();
         mailbox.is_closed = true;
         self.post.changed.notify_all();
         let until = Instant::now() + FAREWELL;
         while !mailbox.has_ended {
             let Some(left) = until.checked_duration_since(Instant::now()) else { return };
-            mailbox = self.post.changed.wait_timeout(mailbox, left).unwrap_or_else(PoisonError::into_inner).0;
+            mailbox = self.post.changed.wait_timeout(mailbox, left).unpoisoned().0;
         }
         drop(mailbox);
         if let Some(sender) = self.sender.take() {
@@ -164,7 +166,7 @@ fn connect(addresses: &[SocketAddr]) -> std::io::Result<TcpStream> {
 
 /// The latest state, once there is one that was not sent.
 fn next(post: &Post) -> Option<Message> {
-    let mut mailbox = post.mailbox.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut mailbox = post.mailbox.lock().unpoisoned();
     loop {
         if let Some(message) = mailbox.latest.take() {
             return Some(message);
@@ -172,34 +174,34 @@ fn next(post: &Post) -> Option<Message> {
         if mailbox.is_closed {
             return None;
         }
-        mailbox = post.changed.wait(mailbox).unwrap_or_else(PoisonError::into_inner);
+        mailbox = post.changed.wait(mailbox).unpoisoned();
     }
 }
 
-/// The picture in scene units and its layers, named as in our EXR files.
+/// The picture in scene units and its layers.
 fn message(shown: &Shown<'_>) -> Message {
     let Shown { film, rgb_cd_m2, looked, nits_per_unit, .. } = *shown;
     let to_units = (1.0 / nits_per_unit) as f32;
-    let picture = |channel: usize| rgb_cd_m2.iter().map(move |rgb| rgb[channel] * to_units);
+    let picture = |c: usize| rgb_cd_m2.iter().map(move |rgb| rgb[c] * to_units);
     let guide = |of: fn(&PixelGuide) -> f32| film.guides().iter().map(of);
     let layer = |names: &[&'static str], values: Vec<f32>| Layer { names: names.to_vec(), values };
     let mut layers = vec![
-        layer(&["R", "G", "B"], (0..3).flat_map(picture).collect()),
+        layer(&channel::RGB, (0..3).flat_map(picture).collect()),
         layer(
-            &["albedo.R", "albedo.G", "albedo.B"],
+            &channel::ALBEDO,
             guide(|g| g.albedo[0]).chain(guide(|g| g.albedo[1])).chain(guide(|g| g.albedo[2])).collect(),
         ),
         layer(
-            &["normal.X", "normal.Y", "normal.Z"],
+            &channel::NORMAL,
             guide(|g| g.normal[0]).chain(guide(|g| g.normal[1])).chain(guide(|g| g.normal[2])).collect(),
         ),
-        layer(&["depth.Z"], guide(|g| g.depth).collect()),
-        layer(&["samples.Y"], counts(film)),
-        layer(&["variance.Y"], picture_variance(film, nits_per_unit).into_values()),
+        layer(&[channel::DEPTH], guide(|g| g.depth).collect()),
+        layer(&[channel::SAMPLES], counts(film)),
+        layer(&[channel::VARIANCE], picture_variance(film, nits_per_unit).into_values()),
     ];
     if let Some(looked) = looked {
-        layers.push(layer(&["threshold.Y"], looked.threshold.values().to_vec()));
-        layers.push(layer(&["visibility.Y"], looked.visibility.values().to_vec()));
+        layers.push(layer(&[channel::THRESHOLD], looked.threshold.values().to_vec()));
+        layers.push(layer(&[channel::VISIBILITY], looked.visibility.values().to_vec()));
     }
     Message { width: film.width(), height: film.height(), layers }
 }

@@ -40,20 +40,7 @@ impl Setup {
         let header = Header {
             origin: Origin::of(&scene, &settings),
             seeds: Seeds::one(seed),
-            settings: SettingsRecord {
-                sampling: Sampling::Adaptive,
-                allocation: like.allocation,
-                model: "csf-bands".to_owned(),
-                viewing: like.viewing,
-                nits_per_unit: like.nits_per_unit,
-                operator: "constant".to_owned(),
-                exposure_stops: None,
-                fitted: None,
-                frames: None,
-                gazes: Vec::new(),
-                importance: None,
-                denoiser: None,
-            },
+            settings: SettingsRecord::new(like.viewing, like.nits_per_unit, "constant"),
             visibility: 4.0,
             earlier_visibilities: Vec::new(),
         };

@@ -16,7 +16,7 @@ use crate::cli::report::Report;
 use crate::cli::seeing::{Presentation, tone_operator};
 use crate::cli::targets::{Named, check_kept, check_scene_kept};
 use anyhow::{Context, Result, bail};
-use fechner::adaptive::settings::{AllocationRule, LoopSettings};
+use fechner::adaptive::settings::LoopSettings;
 use fechner::animate::name::FrameName;
 use fechner::animate::track::Track;
 use fechner::animate::{FrameScenes, RenderedFrame, SceneSource as _, ShotSettings, render_frame};
@@ -25,7 +25,6 @@ use fechner::denoise::Denoiser;
 use fechner::output::rendered::{Background, layers, write_display_png};
 use fechner::output::{self, Attribute, Format};
 use fechner::scene::Scene;
-use fechner_perception::model;
 use fechner_perception::tone::{ToneOperator, ToneSettings};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -141,17 +140,16 @@ impl<'a> Shot<'a> {
     pub(in crate::cli) fn settings_record(&self, of_frame: &LoopSettings) -> SettingsRecord {
         SettingsRecord {
             sampling: self.settings.sampling,
-            allocation: AllocationRule::default(),
-            model: model::DEFAULT.to_owned(),
-            viewing: self.settings.viewing.clone(),
-            nits_per_unit: self.settings.nits_per_unit,
-            operator: self.operator_name.clone(),
             exposure_stops: self.exposure_stops,
             fitted: of_frame.fitted.clone(),
             frames: of_frame.frames,
             gazes: of_frame.gazes.clone(),
-            importance: None,
             denoiser: self.settings.denoiser.as_ref().map(Denoiser::kind),
+            ..SettingsRecord::new(
+                self.settings.viewing.clone(),
+                self.settings.nits_per_unit,
+                self.operator_name.as_str(),
+            )
         }
     }
 

@@ -2,10 +2,11 @@
 
 use super::AnimateArguments;
 use fechner::animate::SceneSource;
+use fechner::poison::Unpoisoned as _;
 use fechner::scene::Scene;
 use fechner::scene::load::{LoadError, LoadOptions, load};
 use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 /// Scenes that are kept: a frame and both its neighbours, of which the next frame needs two.
 const KEPT: usize = 3;
@@ -33,7 +34,7 @@ impl<'a> FileSource<'a> {
 
 impl SceneSource for FileSource<'_> {
     fn at(&self, seconds: f64) -> Result<Arc<Scene>, LoadError> {
-        let kept = || self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let kept = || self.kept.lock().unpoisoned();
         if let Some((_, scene)) = kept().iter().find(|(time, _)| *time == seconds) {
             return Ok(Arc::clone(scene));
         }

@@ -14,7 +14,7 @@ pub(super) fn print_summary(summary: &[ArmSummary]) {
         let speedup = s.speedup_samples.map_or_else(unknown, |mean| mean.in_words());
         let least = s.speedup_samples.map_or_else(unknown, |mean| format!("{:.2}", mean.least));
         let efficiency = s.efficiency.map_or_else(String::new, |e| format!("{:.2} (least {:.2})", e.value, e.least));
-        answer!("| {} | {} % | {speedup} | {least} | {efficiency} |", s.arm, 100.0 * s.coverage);
+        answer!("| {} | {} % | {speedup} | {least} | {efficiency} |", s.arm.name(), 100.0 * s.coverage);
     }
     if summary.iter().any(|s| s.speedup_samples.is_some_and(|mean| mean.low.is_some())) {
         answer!("\n{}", intervals_in_words());
@@ -73,7 +73,7 @@ pub(super) fn print_races(results: &DenoisingResults) {
     answer!("| --- | --- | --- |{}", " --- |".repeat(QUALITIES.len()));
     for race in &results.races {
         let cells: Vec<String> = race.needs.iter().map(need_in_words).collect();
-        answer!("| {} | {} | {} | {} |", race.scene, race.denoiser, race.rule, cells.join(" | "));
+        answer!("| {} | {} | {} | {} |", race.scene, race.denoiser, race.rule.name(), cells.join(" | "));
     }
     answer!(
         "\nUniform sampling's samples over the rule's, geometric means of the pairs in which neither is a bound (≤, >):\n"
@@ -92,6 +92,7 @@ fn need_in_words(need: &Need) -> String {
 fn race_mean_in_words(mean: &RaceMean) -> String {
     let ratio = mean.uniform_over.map_or_else(|| "–".to_owned(), |ratio| format!("{ratio:.2}"));
     let RaceMean { rule, quality, pairs, pairs_left_out, .. } = mean;
+    let rule = rule.name();
     format!("{rule}, to {quality}: {ratio}, pairs {pairs}, left out {pairs_left_out}")
 }
 

@@ -44,15 +44,9 @@ pub(super) fn settings_record(arguments: &JobArguments, scene: &Scene) -> anyhow
             Some(AllocationChoice::Local) => AllocationRule::Local,
         },
         model: arguments.model.clone(),
-        viewing,
-        nits_per_unit: scene.nits_per_unit,
-        operator: operator.to_owned(),
         exposure_stops,
-        fitted: None,
-        frames: None,
-        gazes: Vec::new(),
-        importance: None,
         denoiser: arguments.denoise.kind(),
+        ..SettingsRecord::new(viewing, scene.nits_per_unit, operator)
     })
 }
 

@@ -8,6 +8,7 @@ use fechner::exr_read::ExrImage;
 use fechner::hdr_read::{self, HdrHeader, with_known_header};
 use fechner::jpeg_read;
 use fechner::output::{self, Attribute, NITS_PER_UNIT, PngTransfer};
+use fechner::poison::Unpoisoned as _;
 use fechner::read_file;
 use fechner::scene;
 use fechner_perception::Plane;
@@ -15,7 +16,7 @@ use fechner_perception::primaries::Primaries;
 use image::{DynamicImage, ImageFormat};
 use std::collections::BTreeSet;
 use std::path::Path;
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 
 /// Where what does not cover all lies, if nothing else is said.
 pub(in crate::cli) const BEFORE_BLACK: &str = "lies before black";
@@ -295,7 +296,7 @@ pub(in crate::cli) fn note(path: &Path, text: &str) {
 /// Says something of a file, unless something under the same key was said before.
 fn note_once(path: &Path, text: &str, key: String) {
     static SAID: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
-    if SAID.lock().unwrap_or_else(PoisonError::into_inner).insert(key) {
+    if SAID.lock().unpoisoned().insert(key) {
         say!("note: {}: {text}", path.display());
     }
 }

@@ -4,7 +4,7 @@ use super::SceneFrame;
 use crate::cli::kept_tone::{LIGHT, OF_DISPLAY};
 use crate::cli::picture::note;
 use anyhow::{Context, Result};
-use fechner::output::{self, Attribute, Format, Picture, Shown};
+use fechner::output::{self, Attribute, Format, Picture, Shown, channel};
 use fechner_perception::tone::{AdaptationState, FittedTone};
 use std::path::Path;
 
@@ -63,12 +63,12 @@ fn write_exr(
         let behind_cd_m2 = (1.0 - alpha(pixel)) * display.black_cd_m2;
         ((display.emitted_cd_m2(f64::from(relative)) - behind_cd_m2) / display.white_cd_m2) as f32
     };
-    for (channel, name) in ["R", "G", "B"].into_iter().enumerate() {
-        let relative = shown.iter().map(|rgb| rgb[channel]).enumerate();
+    for (c, name) in channel::RGB.into_iter().enumerate() {
+        let relative = shown.iter().map(|rgb| rgb[c]).enumerate();
         picture.push_f32(name, relative.map(emitted).collect::<Vec<_>>());
     }
     if let Some(alpha) = &frame.alpha {
-        picture.push_f32("A", alpha.clone());
+        picture.push_f32(channel::ALPHA, alpha.clone());
     }
     picture.push_attribute(output::NITS_PER_UNIT, Attribute::Float(display.white_cd_m2 as f32));
     // Readers take text for UTF-8, the writer has Latin-1: only what both have in common is safe.

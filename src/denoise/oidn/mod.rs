@@ -7,11 +7,12 @@ mod find;
 mod library;
 
 use super::{NoisyPicture, SurfaceGuides};
+use crate::poison::Unpoisoned as _;
 use find::{Environment, candidates};
 use library::{Device, Guide, Size};
 use std::fmt;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 /// Why Open Image Denoise cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -67,7 +68,7 @@ impl Oidn {
     /// # Errors
     /// As [`Oidn::open`].
     pub fn opened() -> Result<Self, OidnError> {
-        let mut opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut opened = OPENED.lock().unpoisoned();
         if opened.is_none() {
             *opened = Some(Self::open(0)?);
         }
@@ -127,7 +128,7 @@ impl Oidn {
 
     fn device(&self) -> MutexGuard<'_, Device> {
         // A lock is poisoned by a panic of another thread between two calls; the device is whole.
-        self.device.lock().unwrap_or_else(PoisonError::into_inner)
+        self.device.lock().unpoisoned()
     }
 }
 

@@ -8,11 +8,12 @@ use crate::adaptive::judge::Judgement;
 use crate::adaptive::settings::LoopSettings;
 use crate::adaptive::state::RenderState;
 use crate::adaptive::{Directive, Monitor, Progress};
+use crate::poison::Unpoisoned as _;
 use crate::preview::command::Status;
 use crate::preview::glimpse::Glimpse;
 use crate::preview::screen::{Looked, Scenery, Screen};
 use crate::preview::shared::Shared;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 /// Figures are told so often, also where frames are dear and seldom.
@@ -77,28 +78,28 @@ impl Watch<'_> {
 
 impl Monitor for Watch<'_> {
     fn looked(&self, progress: &Progress) {
-        *self.moving.lock().unwrap_or_else(PoisonError::into_inner).progress = Some(*progress);
+        *self.moving.lock().unpoisoned().progress = Some(*progress);
     }
 
     fn judged(&self, state: &RenderState, judgement: &Judgement) {
-        let mut moving = self.moving.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut moving = self.moving.lock().unpoisoned();
         moving.screen.looked = Some(Arc::new(Looked::of(judgement)));
         self.show(&mut moving, state);
         moving.pace.begin();
     }
 
     fn samples_done(&self, samples: u64) {
-        let mut moving = self.moving.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut moving = self.moving.lock().unpoisoned();
         moving.pace.count(samples);
         moving.samples_since += samples;
     }
 
     fn most_samples_a_batch(&self) -> u64 {
-        self.moving.lock().unwrap_or_else(PoisonError::into_inner).pace.samples()
+        self.moving.lock().unpoisoned().pace.samples()
     }
 
     fn between_batches(&self, state: &RenderState) -> Directive {
-        let mut moving = self.moving.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut moving = self.moving.lock().unpoisoned();
         let between_frames = moving.screen.between_frames(self.shared);
         moving.pace.counted(between_frames);
         if moving.shows_more_than_glimpsed(state) && moving.screen.is_due(between_frames) {

@@ -172,6 +172,18 @@ pub(crate) fn suggestion<'a>(written: &str, candidates: impl IntoIterator<Item =
     if known.is_empty() { String::new() } else { format!("; known: {}", known.join(", ")) }
 }
 
+/// `unknown texture "wod"; did you mean "wood"?`: of what is written in place of one of these.
+pub(crate) fn unknown<'a>(kind: &str, written: &str, candidates: impl IntoIterator<Item = &'a str> + Clone) -> String {
+    format!("unknown {kind} \"{written}\"{}", suggestion(written, candidates))
+}
+
+/// `there is no medium "fgo"; did you mean "fog"?`: of names that the file itself gives, in whatever order they are held.
+pub(crate) fn no_such<'a>(kind: impl fmt::Display, name: &str, given: impl Iterator<Item = &'a String>) -> String {
+    let mut given: Vec<&str> = given.map(String::as_str).collect();
+    given.sort_unstable();
+    format!("there is no {kind} \"{name}\"{}", suggestion(name, given))
+}
+
 /// The names of a table of kinds, as messages list them.
 pub(crate) fn names_of<T>(kinds: &[(&str, T)]) -> String {
     kinds.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ")

@@ -1,6 +1,7 @@
 //! Reading whole files, with a limit and with errors that say what the path is when it is no file.
 
 use super::error::LoadError;
+use crate::poison::Unpoisoned as _;
 use crate::read_file;
 use std::collections::BTreeSet;
 use std::io::Read;
@@ -18,19 +19,19 @@ static READ: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 /// Whether this process has read a file as a scene or a part of one: a mesh, a texture, an included file. Writing in its place would lose it.
 pub fn was_read(path: &Path) -> bool {
-    let read = READ.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let read = READ.lock().unpoisoned();
     path.canonicalize().is_ok_and(|path| read.contains(&path))
 }
 
 /// All files of which [`was_read`] says so.
 pub fn files_read() -> Vec<PathBuf> {
-    READ.lock().unwrap_or_else(std::sync::PoisonError::into_inner).iter().cloned().collect()
+    READ.lock().unpoisoned().iter().cloned().collect()
 }
 
 /// Has [`was_read`] count a file that belongs to a scene and is read elsewhere: the display that it names.
 pub fn count_as_read(path: &Path) {
     if let Ok(path) = path.canonicalize() {
-        READ.lock().unwrap_or_else(std::sync::PoisonError::into_inner).insert(path);
+        READ.lock().unpoisoned().insert(path);
     }
 }
 

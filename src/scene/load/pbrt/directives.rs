@@ -1,6 +1,6 @@
 //! Directives: what each does to the state, and which file is read next.
 
-use super::super::error::{LoadError, Place, suggestion};
+use super::super::error::{LoadError, Place, no_such, suggestion};
 use super::super::files;
 use super::lexer::{Lexer, Token};
 use super::parameters::{self, Parameters};
@@ -387,10 +387,7 @@ impl Reader<'_> {
 
     fn place_object(&mut self, name: &str, place: Place) -> Result<(), LoadError> {
         let Some(parts) = self.objects.get(name) else {
-            let mut known: Vec<&str> = self.objects.keys().map(String::as_str).collect();
-            known.sort_unstable();
-            let problem = format!("there is no object \"{name}\"{}", suggestion(name, known));
-            return Err(LoadError::invalid_at(place, problem));
+            return Err(LoadError::invalid_at(place, no_such("object", name, self.objects.keys())));
         };
         if self.current_object.is_some() {
             return Err(LoadError::invalid_at(place, "an object cannot hold an instance of another"));

@@ -1,6 +1,6 @@
 //! `Material` and its named kin, and the media behind their surfaces.
 
-use super::super::error::{LoadError, suggestion};
+use super::super::error::{LoadError, no_such, suggestion};
 use super::super::metals::Metal;
 use super::super::share;
 use super::super::spectrum::named;
@@ -103,11 +103,8 @@ impl Reader<'_> {
         if !self.named_materials.contains_key(name) {
             self.look_ahead()?;
         }
-        self.named_materials.get(name).cloned().ok_or_else(|| {
-            let mut known: Vec<&str> = self.named_materials.keys().map(String::as_str).collect();
-            known.sort_unstable();
-            user.error(format_args!("there is no material \"{name}\"{}", suggestion(name, known)))
-        })
+        let found = self.named_materials.get(name).cloned();
+        found.ok_or_else(|| user.error(no_such("material", name, self.named_materials.keys())))
     }
 
     /// Our material; `None` for one that is not there ("interface").

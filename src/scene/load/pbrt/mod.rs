@@ -19,7 +19,7 @@ mod transforms;
 
 use super::LoadOptions;
 use super::builder::{ASSUMED_NITS_PER_UNIT, Builder, IfDark};
-use super::error::{LoadError, suggestion};
+use super::error::{LoadError, no_such};
 use crate::scene::{Alpha, Material, MaterialId, MeshId, ScalarInput, Scene, Surface};
 use parameters::Parameters;
 use state::{Opening, State, Transforms};
@@ -302,9 +302,7 @@ impl Reader<'_> {
             self.look_ahead()?;
         }
         let Some(medium) = self.media.get(name) else {
-            let mut known: Vec<&str> = self.media.keys().map(String::as_str).collect();
-            known.sort_unstable();
-            return Err(shape.error(format_args!("there is no medium \"{name}\"{}", suggestion(name, known))));
+            return Err(shape.error(no_such("medium", name, self.media.keys())));
         };
         match &mut material.surface {
             Surface::Dielectric { absorption, .. } => *absorption = medium.absorption,

@@ -1,6 +1,6 @@
 //! Parameter lists: `"float fov" [ 40 ]`, read by name and type, and what was left unread.
 
-use super::super::error::{LoadError, Place, suggestion};
+use super::super::error::{LoadError, Place, unknown};
 use super::lexer::{Lexer, Token};
 use glam::{Vec2, Vec3};
 use std::cell::Cell;
@@ -61,10 +61,7 @@ impl Parameters {
             };
             if !KINDS.contains(&kind) && !["string", "texture"].contains(&kind) {
                 let known = KINDS.iter().copied().chain(["string", "texture"]);
-                return wrong(format!(
-                    "unknown parameter type \"{kind}\"{}",
-                    suggestion(kind, known.collect::<Vec<_>>())
-                ));
+                return wrong(unknown("parameter type", kind, known));
             }
             let values = read_values(lexer, line)?;
             let fits = match (kind, &values) {

@@ -1,6 +1,6 @@
 //! `Texture`: image maps, constants, products, checkerboards. What else pbrt can compute is named and averaged.
 
-use super::super::error::{LoadError, suggestion};
+use super::super::error::{LoadError, no_such};
 use super::super::texture::{Adjust, IfMissing, Number, Picture, Request, is_grey};
 use super::Reader;
 use super::inputs::Meaning;
@@ -213,10 +213,8 @@ impl Reader<'_> {
         if let Some(definition) = self.textures.get(&key) {
             return Ok(Rc::clone(definition));
         }
-        let mut known: Vec<&str> =
-            self.textures.keys().filter(|(of, _)| *of == class).map(|(_, name)| name.as_str()).collect();
-        known.sort_unstable();
-        Err(user.error(format_args!("there is no {class} texture \"{name}\"{}", suggestion(name, known))))
+        let of_class = self.textures.keys().filter(|(of, _)| *of == class).map(|(_, name)| name);
+        Err(user.error(no_such(format_args!("{class} texture"), name, of_class)))
     }
 
     /// A colour, or another texture.

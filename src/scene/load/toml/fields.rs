@@ -3,7 +3,7 @@
 //! Serde's derive would say "data did not match any variant" for a colour that is neither number, list nor table, and
 //! loses the line inside tagged tables; this reader keeps both for a few lines a field.
 
-use super::super::error::{LoadError, Place, one_line, suggestion};
+use super::super::error::{LoadError, Place, one_line, suggestion, unknown};
 use super::super::lines::LineStarts;
 use glam::{Vec2, Vec3};
 use std::path::Path;
@@ -164,7 +164,7 @@ impl<'a> Value<'a> {
     }
 
     fn unknown_value(&self, written: &str, known: impl Iterator<Item = &'static str> + Clone) -> LoadError {
-        self.error(format_args!("unknown value \"{written}\"{}", suggestion(written, known)))
+        self.error(unknown("value", written, known))
     }
 
     /// The elements of a list.

@@ -4,7 +4,7 @@ use super::fields::{Fields, Value};
 use super::light::unit_luminance;
 use super::{Context, surface};
 use crate::scene::load::LoadError;
-use crate::scene::load::error::suggestion;
+use crate::scene::load::error::{suggestion, unknown};
 use crate::scene::load::texture::Requests;
 use crate::scene::{
     Alpha, ColorInput, Encoding, HeightMap, HeightUnit, Material, MaterialId, Relief, ScalarInput, StretchDirection,
@@ -54,12 +54,8 @@ impl<'a> Materials<'a> {
     /// The material of this name.
     pub(super) fn find(&self, name: &Value) -> Result<Entry, LoadError> {
         let written = name.string()?;
-        self.by_name.get(written).copied().ok_or_else(|| {
-            name.error(format_args!(
-                "unknown material \"{written}\"{}",
-                suggestion(written, self.names.iter().copied())
-            ))
-        })
+        let found = self.by_name.get(written).copied();
+        found.ok_or_else(|| name.error(unknown("material", written, self.names.iter().copied())))
     }
 
     /// The material of this name, where a later material refers to it.
@@ -260,8 +256,7 @@ fn lookup<'a>(context: &mut Context<'a>, fields: &Fields<'a>, usual: Encoding) -
     let name = fields.require("texture")?;
     let written = name.string()?;
     let Some(entry) = context.textures.get_mut(written) else {
-        let known = context.texture_names.iter().copied();
-        return Err(name.error(format_args!("unknown texture \"{written}\"{}", suggestion(written, known))));
+        return Err(name.error(unknown("texture", written, context.texture_names.iter().copied())));
     };
     entry.is_used = true;
     let mut request = entry.request.clone();
