@@ -106,6 +106,8 @@ mod tests {
     use super::super::plan::plan_up_to;
     use super::super::test_films::{film_of, settings};
     use super::*;
+    use crate::film::BlockSum;
+    use crate::integrator::{FirstHit, PathSample};
     use glam::Vec3;
 
     /// Of more than can be had at once, noisy pixels have theirs first; what is little is not cut.
@@ -133,6 +135,29 @@ mod tests {
         assert!(plan.blocks.iter().all(|block| block.pixel % 64 < 23));
         let even = film_of(|_, random| Vec3::splat(1.0 + 0.5 * random));
         assert_eq!(while_far(&even, &judged(&even), 0.5, 1 << 16), None);
+    }
+
+    /// Of two halves the one that has fewer samples comes first, whatever the pixel has in all.
+    #[test]
+    fn halves_are_cut_by_what_they_have_themselves() {
+        let mut film = film_of(|_, random| Vec3::splat(1.0 + 0.5 * random));
+        let ahead = plan_up_to(&film, |pixel| if pixel % 2 == 0 { 64 } else { 16 });
+        for block in ahead.blocks.into_iter().filter(|block| block.half == Half::B) {
+            let mut sum = BlockSum::default();
+            let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: false };
+            (0..block.samples).for_each(|index| {
+                let radiance = Vec3::splat(if index % 2 == 0 { 0.5 } else { 1.5 });
+                sum.add(&PathSample { radiance, first_hit, rays: 1 });
+            });
+            film.merge_block(block, &sum);
+        }
+        let judgement = judge(&film, &settings(), 1.0).expect("judges");
+        let more = doubling_plan(&film, 1 << 16, |_| [1; 2]);
+        // What the halves that are behind would have, and no more.
+        let kept = cut(more, &film, &judgement, 3 * 64 * 64 / 2 * 8);
+        let is_ahead = |block: &BlockWork| block.half == Half::B && block.pixel.is_multiple_of(2);
+        assert_eq!(kept.blocks.iter().filter(|block| is_ahead(block)).count(), 0);
+        assert_eq!(kept.samples(), 3 * 64 * 64 / 2 * 8);
     }
 
     /// Nobody starves beside one whose variance is enormous, or no number.

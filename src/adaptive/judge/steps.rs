@@ -168,6 +168,11 @@ impl Scatter {
 pub(super) struct MissedNoise(Plane);
 
 impl MissedNoise {
+    /// The mean of both.
+    pub(super) fn mean(&self, other: &Self) -> Self {
+        Self(self.0.combined(&other.0, |a, b| 0.5 * (a + b)))
+    }
+
     /// The larger of a scatter and this.
     pub(super) fn or_scatter(&self, per_sample: &Plane) -> Plane {
         per_sample.combined(&self.0, f32::max)

@@ -142,6 +142,29 @@ fn a_rim_that_no_sample_met_is_seen() {
     assert_eq!(judgement.pooled_variance_per_sample.get(40, 32), 0.0, "not where the filter does not reach");
 }
 
+/// One that a sample of one half has met is beyond white by its mean, and no better known for that: counts that ended there made a small
+/// lamp that moves 10 % too bright.
+#[test]
+fn a_rim_that_was_lucky_is_not_done() {
+    let place = 21 * 64 + 33;
+    let noise_beside_a_lamp = |luck: f32| {
+        let radiance = |pixel: u32, random: f32| match pixel % 64 {
+            0..=31 => 40.0,
+            32 => 20.0,
+            _ if pixel == place && random > luck => 40.0,
+            _ => 0.01,
+        };
+        let film = film_of_lamps(|pixel, random| Vec3::splat(radiance(pixel, random)), |pixel| pixel % 64 <= 32);
+        let lucky_halves = Half::BOTH.map(|half| film.half(half)[place as usize].mean[0] > 1.0);
+        let judgement = judge_to_plan(&film, &settings(), 1.0).expect("judges");
+        (lucky_halves, judgement.pooled_variance_per_sample.values()[place as usize])
+    };
+    let (none, unmet) = noise_beside_a_lamp(2.0);
+    let (one, met) = noise_beside_a_lamp(0.85);
+    assert_eq!((none, one.iter().filter(|&&is_lucky| is_lucky).count()), ([false; 2], 1), "{one:?}");
+    assert!(met > 0.4 * unmet, "{met} where it was met, {unmet} where not");
+}
+
 /// An operator that sees rods is fitted to what they see: of blue, more than cones do.
 #[test]
 fn rods_see_the_colours_of_the_guide() {
