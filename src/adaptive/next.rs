@@ -95,7 +95,7 @@ impl Loop<'_> {
             return Ok(true);
         }
         if self.has_little_left_after_its_first_samples(left) {
-            self.enter(even_plan(&self.state.film, left));
+            self.enter(even_plan(&self.state.film, left, self.settings.limits.max_samples));
             return Ok(true);
         }
         if self.settings.denoiser.is_none() || matches!(self.settings.sampling, Sampling::Rival(_)) || left == 0 {

@@ -74,14 +74,15 @@ pub fn uniform_plan(film: &Film, mean_samples: u32) -> SamplePlan {
     plan
 }
 
-/// As many more samples for every pixel, `samples` in all.
-pub(super) fn even_plan(film: &Film, samples: u64) -> SamplePlan {
+/// As many more samples for every pixel, `samples` in all, where it may have them.
+pub(super) fn even_plan(film: &Film, samples: u64, max_samples: u32) -> SamplePlan {
     let more = samples.div_ceil(film.pixel_count().max(1) as u64) as u32;
     let mut plan = SamplePlan::default();
     for pixel in 0..film.pixel_count() as u32 {
         for half in Half::BOTH {
             let taken = film.half(half)[pixel as usize].taken;
-            plan.blocks.extend(blocks_between(pixel, half, taken, taken.saturating_add(share_of_half(more, half))));
+            let to = taken.saturating_add(share_of_half(more, half)).min(share_of_half(max_samples, half));
+            plan.blocks.extend(blocks_between(pixel, half, taken, to));
         }
     }
     cut_to_budget(plan, |_| 0.0, samples)

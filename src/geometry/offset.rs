@@ -18,7 +18,7 @@ pub(crate) fn of_triangle(corner: Vec3A, edges: [Vec3A; 2], translation: Vec3A) 
     ROUNDING * (reach + 0.5 * extent).max_element()
 }
 
-/// Of the end of a ray that leads so far from its origin, on top of what is hit there: the test of what is far away adds numbers of both.
+/// Of the end of a ray that leads so far from its origin, if that is more than what is hit there has: the test of what is far away adds numbers of both.
 #[inline]
 pub(crate) fn of_way(origin: Vec3A, way: Vec3A) -> f32 {
     ROUNDING * origin.abs().max(way.abs()).max_element()

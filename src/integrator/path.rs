@@ -284,8 +284,11 @@ impl PathTracer {
             return (Ray { time, ..Ray::new(origin, light.direction.into()) }, f32::INFINITY);
         };
         let position = Vec3A::from(place.position);
-        let offset = place.offset + offset::of_way(origin, position - origin);
+        let offset = place.offset.max(offset::of_way(origin, position - origin));
         let way = position + Vec3A::from(place.normal) * offset - origin;
+        if way.dot(light.direction.into()) <= 0.0 {
+            return (Ray { time, ..Ray::new(origin, light.direction.into()) }, 0.0);
+        }
         let distance = way.length();
         (Ray { time, ..Ray::new(origin, way / distance) }, distance)
     }

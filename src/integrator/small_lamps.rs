@@ -124,8 +124,8 @@ impl Pieces<'_> {
         let radius_px = (self.camera.project(center + to_side)? - place_px).length();
         let origin = Vec3::from(self.camera.ray_through(place_px).origin);
         let area_px2 = PI as f32 * radius_px * radius_px;
-        let piece = Piece { place_px, area_px2, distance: (center - origin).length() - radius };
-        (2.0 * radius_px <= 1.0).then_some(piece)
+        let distance = (center - origin).dot(Vec3::from(self.camera.ray_through(place_px).direction)) - radius;
+        (2.0 * radius_px <= 1.0 && distance > 0.0).then_some(Piece { place_px, area_px2, distance })
     }
 
     /// Slices of a triangle across its longest side. Nothing of one that is thick, or not wholly before the camera.

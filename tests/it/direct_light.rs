@@ -119,7 +119,8 @@ fn lamps_at_the_origin_light_what_is_far() {
         let [u, v] = edges.map(|edge| 0.5 * edge);
         polygon_irradiance(&[-u - v, u - v, u + v, v - u].map(|corner| corner + height * Vec3::Y))
     };
-    let lamps: [(&str, Adding<'_>, &dyn Fn(f32) -> f32); 4] = [
+    type Irradiance<'a> = &'a dyn Fn(f32) -> f32;
+    let lamps: [(&str, Adding<'_>, Irradiance<'_>); 4] = [
         ("sphere", &|scene, center, lamp| add_sphere(scene, center, RADIUS, lamp), &|height| {
             PI * (RADIUS / height).powi(2)
         }),

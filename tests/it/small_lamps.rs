@@ -137,4 +137,9 @@ fn the_rest_of_a_budget_is_no_matter_of_luck() {
     // Others differ by one sample in each half at the most.
     let lucky: Vec<u32> = counts.into_iter().filter(|count| !(16..=18).contains(count) && *count < 60).collect();
     assert!(lucky.is_empty(), "{lucky:?}");
+
+    let mut settings = loop_settings(100.0, Sampling::Adaptive, None, Some(20));
+    settings.limits.max_samples = 64;
+    let film = adaptive::render(&tracer, &settings, &Quiet).expect("renders").film;
+    assert_eq!((0..(SIDE * SIDE) as usize).map(|pixel| film.samples(pixel)).max(), Some(64), "and no pixel has more");
 }

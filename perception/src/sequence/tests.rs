@@ -290,12 +290,22 @@ fn the_dark_beside_a_bright_shot_is_seen_by_its_light() {
             let shots: Vec<&SequenceFrame> =
                 (0..4 * reach).map(|i| if i < 2 * reach { &dark } else { &bright }).collect();
             let worst = |frames: &[&SequenceFrame], range: Range<usize>| {
-                let seen = |now: usize| f64::from(observer.difference(frames, now).unwrap().worst_visibility);
+                let seen = |now: usize| observer.difference(frames, now).unwrap().worst_visibility;
                 range.map(seen).fold(0.0, f64::max)
             };
             let [before, within] = [reach..2 * reach, 2 * reach..3 * reach].map(|range| worst(&shots, range));
             println!("{frames_per_second} a second, {dark_cd_m2} cd/m²: {before} before the cut, {within} after it");
             assert!(before < 1.2 * within, "{before} before the cut, {within} after it");
+            // And what is wrong with the dark frames themselves is still seen beside the bright ones.
+            let (wrong, clean) = (frame(dark_cd_m2, 0.8), frame(950.0, 0.0));
+            let flash: Vec<&SequenceFrame> =
+                (0..4 * reach + 1).map(|i| if i == 2 * reach { &clean } else { &wrong }).collect();
+            let still = worst(&[&wrong], 0..1);
+            let [before, after] = [reach, 3 * reach].map(|now| worst(&flash, now..now + 1));
+            println!("{still} in a still, {before} and {after} before and after a flash");
+            if dark_cd_m2 == 1.0 {
+                assert!(before > 1.5 && after > 1.5, "{still} in a still, {before} and {after}");
+            }
         }
     }
 }
