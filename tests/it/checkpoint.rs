@@ -413,10 +413,10 @@ fn what_a_look_decided_belongs_to_its_picture() {
         let state = RenderState::new(size, size, &settings.limits);
         run(&tracer, &settings, state, &Quiet).expect("renders").state
     };
-    let (state, smaller) = (after_a_look(SIZE), after_a_look(8));
+    let (state, larger) = (after_a_look(SIZE), after_a_look(SIZE + 8));
     assert!(state.until_look.is_some());
     setup.through_a_file(&state);
-    let mixed = RenderState { until_look: smaller.until_look, ..state };
+    let mixed = RenderState { until_look: larger.until_look, ..state };
     let payload = postcard::to_stdvec(&(&setup.header, &mixed)).expect("numbers alone, in memory");
     let message = decode_checkpoint(Path::new("a.film"), &seal(&payload)).expect_err("of another picture").to_string();
     assert!(message.contains("plans make no sense"), "{message}");
