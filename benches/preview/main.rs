@@ -13,7 +13,7 @@ mod support;
 mod watched;
 
 use anyhow::{Context, Result};
-use fechner::adaptive::settings::{AllocationRule, Limits, LoopSettings, Sampling};
+use fechner::adaptive::settings::{Limits, LoopSettings, Sampling};
 use fechner::checkpoint::SettingsRecord;
 use fechner::film::Film;
 use fechner::integrator::{BlockWork, PathTracer, SamplePlan, TraceSettings};
@@ -125,20 +125,8 @@ impl Subject {
     }
 
     fn job(&self, seed: u64, limits: Limits, sampling: Sampling) -> Job {
-        let record = SettingsRecord {
-            sampling,
-            allocation: AllocationRule::Convex,
-            model: "csf-bands".to_owned(),
-            viewing: self.viewing.clone(),
-            nits_per_unit: self.scene.nits_per_unit,
-            operator: "constant".to_owned(),
-            exposure_stops: None,
-            fitted: None,
-            frames: None,
-            gazes: Vec::new(),
-            importance: None,
-            denoiser: None,
-        };
+        let defaults = SettingsRecord::new(self.viewing.clone(), self.scene.nits_per_unit, "constant");
+        let record = SettingsRecord { sampling, ..defaults };
         Job {
             scene: Arc::clone(&self.scene),
             trace: self.trace_settings(seed),

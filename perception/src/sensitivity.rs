@@ -204,8 +204,8 @@ pub(crate) struct AdaptationLevel {
 
 /// Half-decade adaptation levels that enclose `least..=greatest` cd/m².
 ///
-/// Between levels amplitudes are interpolated linearly in luminance: from 7 % too little up to 30 cpd to 10 % too much for castleCSF, against 24 % for
-/// decades and 124 % for decades interpolated in log luminance.
+/// Between levels amplitudes are interpolated linearly in luminance: of castleCSF up to 30 cpd that is from 7 % too little to 10 % too much,
+/// against 24 % for decades and 124 % for decades interpolated in log luminance.
 pub(crate) fn adaptation_levels(
     viewing: &Viewing,
     csf: &dyn ContrastSensitivity,

@@ -59,7 +59,7 @@ pub(super) fn cut(plan: SamplePlan, film: &Film, judgement: &Judgement, most: u6
 
 /// What one more sample takes away of a half's share of its pixel's visible energy, e/n: by its own count n, not the pixel's. The other half's
 /// count was decided by this one's samples, and by both a half that was lucky stayed as it was, while the other one grew: the sun
-/// through blinds made a room 0.7 % too bright, and its darker half 4 % (`benches/results/sampling.md`, energy).
+/// through blinds made a room 0.8 % too bright (`benches/results/sampling.md`, energy).
 ///
 /// Samples that go where it is most make counts that go as √e and leave the least mean energy (Neyman 1934) of known variances.
 /// Counts for equal visibility go as e: at 96 samples a pixel of the Cornell box their FLIP was 1.09 times that of even counts, with

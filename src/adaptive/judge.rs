@@ -135,16 +135,19 @@ fn judge_by(
     let thresholds = found_thresholds(&guide, &displayed_guide, tone.as_ref(), &noise, settings)?;
     let gains = chromatic_gains(&thresholds.in_bands, settings)?;
     still_wanted(settings)?;
-    let lights = Half::BOTH.map(|half| FoundLight::of_half(film, half, settings.nits_per_unit));
-    let scales = (purpose == Purpose::Plan)
-        .then(|| scatter.luminance_scales_of_halves(film, &lights, tone.as_ref(), settings, raw_inflation));
+    let lights = (denoised.is_none() || purpose == Purpose::Plan)
+        .then(|| Half::BOTH.map(|half| FoundLight::of_half(film, half, settings.nits_per_unit)));
+    let scales = lights
+        .as_ref()
+        .filter(|_| purpose == Purpose::Plan)
+        .map(|lights| scatter.luminance_scales_of_halves(film, lights, tone.as_ref(), settings, raw_inflation));
     let met = PerSample::met(&scatter, film, scales.as_ref(), &thresholds.in_bands, gains.as_ref());
-    let per_sample = match denoised {
-        None => {
+    let per_sample = match &lights {
+        Some(lights) if denoised.is_none() => {
             let missed_beside = |light: &FoundLight| scatter.missed_noise(film, light, tone.as_ref(), settings);
-            met.or_missed(&lights, missed_beside)
+            met.or_missed(lights, missed_beside)
         }
-        Some(_) => met,
+        _ => met,
     };
     still_wanted(settings)?;
     let over_white = if settings.is_transparent {

@@ -40,7 +40,7 @@ fn remaining_samples(state: &RenderState, limits: &Limits, judgement: &Judgement
 }
 
 /// Samples until nothing is more visible than it may be, where the noise behaves as it did and no pixel takes more than it may have.
-/// Infinite where nothing may be visible at all and nobody has said how many a pixel may have.
+/// Infinite where no visibility is asked for and pixels may have as many as by default, which no render comes to.
 fn samples_to_target(film: &Film, limits: &Limits, judgement: &Judgement) -> f64 {
     let target = limits.last_rung();
     if target <= 0.0 && limits.max_samples == DEFAULT_MAX_SAMPLES {

@@ -1,8 +1,9 @@
 //! How much of each pixel lamps cover that the camera sees smaller, or thinner, than a pixel.
 //!
 //! The first samples of a pixel may all pass them by, and then nothing in the picture tells of them; but where lamps are is known.
-//! Not for what is found without it: lamps that cover a pixel whole, of which the neighbours tell. Nor are lamps looked for that move, whose
-//! emission is a picture, or that are seen by a moving camera, through a lens, by mirrors or through glass.
+//! Not for what is found without it: lamps that cover a pixel whole, of which the neighbours tell; but each triangle is judged by itself, so that
+//! the rim of a large lamp of small triangles has these samples, too. Nor are lamps looked for that move, whose emission is a picture, or that
+//! are seen by a moving camera, through a lens, by mirrors or through glass.
 
 use super::camera::CameraRays;
 use super::{Crop, PathTracer};
@@ -201,10 +202,12 @@ impl Strip {
     /// The integral of its width, in heights, from its beginning on.
     fn width_until(&self, px: f64) -> f64 {
         let Self { length_px, peak_px, .. } = *self;
+        // The last slice may end a rounding beyond.
+        let px = px.min(length_px);
         if px <= peak_px && peak_px > 0.0 {
             0.5 * px * px / peak_px
         } else {
-            0.5 * (length_px - (length_px - px).max(0.0).powi(2) / (length_px - peak_px))
+            0.5 * (length_px - (length_px - px).powi(2) / (length_px - peak_px))
         }
     }
 

@@ -157,13 +157,9 @@ impl FlatEmitter {
         })
     }
 
-    /// Corners of its outline, for bounds.
+    /// Its corners, for bounds: some come twice.
     pub(super) fn corners(&self) -> impl Iterator<Item = Vec3> {
-        let last = match self.outline {
-            Outline::Triangle => None,
-            _ => Some(self.corner + self.edge_1 + self.edge_2),
-        };
-        [self.corner, self.corner + self.edge_1, self.corner + self.edge_2].into_iter().chain(last)
+        self.triangles().into_iter().flatten().flatten()
     }
 
     /// What it is made of.

@@ -16,17 +16,17 @@ pub const UNPROVEN: &str = "unproven.Y";
 pub const ALBEDO: [&str; 3] = ["albedo.R", "albedo.G", "albedo.B"];
 /// Where the first surface faces.
 pub const NORMAL: [&str; 3] = ["normal.X", "normal.Y", "normal.Z"];
-/// How far the first surface is.
+/// How far the first surface is from the camera, scene units.
 pub const DEPTH: &str = "depth.Z";
 /// Which object is seen.
 pub const OBJECT_ID: &str = "id.Y";
 /// How many samples the pixel has.
 pub const SAMPLES: &str = "samples.Y";
-/// Variance of the picture's luminance.
+/// Variance of the mean's luminance, (cd/m²)² of the scene.
 pub const VARIANCE: &str = "variance.Y";
-/// Standard error that is just at visibility 1.
+/// Standard error that is just at visibility 1, cd/m² on the display.
 pub const THRESHOLD: &str = "threshold.Y";
-/// What the eye is adapted to.
+/// What the eye is adapted to, cd/m².
 pub const ADAPTATION: &str = "adaptation.Y";
 /// How visible the noise is.
 pub const VISIBILITY: &str = "visibility.Y";

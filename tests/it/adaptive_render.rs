@@ -276,11 +276,11 @@ fn nothing_is_left_of_a_render_that_ends() {
     let scene = Arc::new(cornell_box());
     let tracer = PathTracer::new(Arc::clone(&scene), trace_settings(16, 16, 1));
     for (sampling, visibility, max_samples, plans, most_left) in [
-        (Sampling::Adaptive, 0.01, 17, None, 1.0),
-        (Sampling::Uniform, 0.01, 17, None, 1.0),
-        (Sampling::Uniform, 0.0, 17, None, 1.0),
-        (Sampling::Uniform, 0.01, 1 << 18, Some(1), 0.0),
-        (Sampling::Uniform, 0.01, 1 << 18, Some(3), 2.0),
+        (Sampling::Adaptive, Some(0.01), 17, None, 1.0),
+        (Sampling::Uniform, Some(0.01), 17, None, 1.0),
+        (Sampling::Uniform, None, 17, None, 1.0),
+        (Sampling::Uniform, Some(0.01), 1 << 18, Some(1), 0.0),
+        (Sampling::Uniform, Some(0.01), 1 << 18, Some(3), 2.0),
     ] {
         let mut settings = loop_settings(scene.nits_per_unit, sampling, visibility, None);
         (settings.limits.max_samples, settings.limits.plans) = (max_samples, plans);

@@ -38,6 +38,7 @@
 //! - `texture_values`: colours, numbers and infinities of EXR pictures as textures and surroundings
 //! - `displayed`, `told`: pictures compared as the display shows them, and what is said of those that are not
 //! - `tonemap`: HDR pictures for displays, one by one and over time
+//! - `units_and_colours`: what a picture's file says of its unit, its curve and its colours
 //! - `units_and_views`: what the caller's unit and picture size change of a scene
 
 mod adaptive_render;
@@ -81,6 +82,7 @@ mod texture_memory;
 mod texture_values;
 mod told;
 mod tonemap;
+mod units_and_colours;
 mod units_and_views;
 mod view;
 mod wild_files;

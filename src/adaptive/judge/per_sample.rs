@@ -34,8 +34,8 @@ impl PerSample {
     }
 
     /// Or by what lamps' rims may hide, where that is more: of what a half decides by, beside the light that the other one has found; of the
-    /// whole, beside that of either, since a pixel that was lucky would be called beyond white and done, and the others not. A small lamp
-    /// that moved made a picture 10 % too bright (`benches/results/sampling.md`, lamps on black).
+    /// whole, the mean of what each says. By the light of both a pixel that was lucky was called beyond white and done, and the others not: a
+    /// small lamp that moves made a picture 19 % too bright (`benches/results/sampling.md`, energy).
     pub(super) fn or_missed(
         self,
         lights: &[FoundLight; 2],

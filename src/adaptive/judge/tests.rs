@@ -143,7 +143,7 @@ fn a_rim_that_no_sample_met_is_seen() {
 }
 
 /// One that a sample of one half has met is beyond white by its mean, and no better known for that: counts that ended there made a small
-/// lamp that moves 10 % too bright.
+/// lamp that moves 19 % too bright.
 #[test]
 fn a_rim_that_was_lucky_is_not_done() {
     let place = 21 * 64 + 33;
