@@ -50,7 +50,10 @@ pub struct Judgement {
     /// Displayed variance of one sample as the neighbours tell it, as the luminance variance that shows as much as the
     /// most visible of the eye's three channels: the variance of the mean is this over the count.
     pub pooled_variance_per_sample: Plane,
-    /// The same as each half decides by it; `None` where the look was for no plan.
+    /// The same as each half may go by it, whose own luck is not in what it may have missed; `None` where the look was for no plan, or
+    /// nothing may be missed.
+    pub pooled_of_halves: Option<[Plane; 2]>,
+    /// The larger of that and what the other half knows of the pixel itself; `None` where the look was for no plan.
     pub variance_per_sample: Option<[Plane; 2]>,
     /// The first of these variances by what samples have met, before black where the picture is transparent: what audits compare with.
     pub met_per_sample: Plane,
@@ -170,7 +173,8 @@ fn judge_by(
     let denoised = denoised.map(|found| look.judged_picture(found, inflation)).transpose()?;
     still_wanted(settings)?;
     let predicted = look.predicted(denoised.as_ref());
-    let PerSample { met, pooled, of_halves } = per_sample.or_over_white(over_white.as_ref(), &thresholds);
+    let PerSample { met, pooled, pooled_of_halves, of_halves } =
+        per_sample.or_over_white(over_white.as_ref(), &thresholds);
     Ok(Judgement {
         estimate,
         denoised,
@@ -182,6 +186,7 @@ fn judge_by(
         is_known: film.has_both_halves(),
         predicted,
         pooled_variance_per_sample: pooled,
+        pooled_of_halves,
         variance_per_sample: of_halves,
         met_per_sample: met,
         over_white,
@@ -283,8 +288,14 @@ impl Judgement {
 
     /// Squared visibility of each pixel's noise for itself, as if nothing around it had any.
     pub fn energy_of(&self, display_variance: &Plane) -> Plane {
+        let [energy] = self.energies_of([display_variance]);
+        energy
+    }
+
+    /// The same of several.
+    pub(super) fn energies_of<const N: usize>(&self, display_variances: [&Plane; N]) -> [Plane; N] {
         let allowed = self.allowed_standard_error_cd_m2();
-        display_variance.combined(&allowed, |variance, allowed| variance / (allowed * allowed))
+        display_variances.map(|plane| plane.combined(&allowed, |variance, allowed| variance / (allowed * allowed)))
     }
 
     /// Standard error of a pixel, cd/m² on the display, that is at visibility 1 by the model that drives the loop.

@@ -1,10 +1,9 @@
 //! Films of known noise, for tests.
 
-use super::plan::pilot_plan;
 use super::settings::LoopSettings;
 use crate::film::{BlockSum, Film};
-use crate::integrator::{FirstHit, PathSample};
-use crate::sampler::{hash_words, unit_of_hash};
+use crate::integrator::{BlockWork, FirstHit, PILOT_SAMPLES_A_HALF, PathSample};
+use crate::sampler::{Half, hash_words, unit_of_hash};
 use fechner_perception::display::{Display, Viewing};
 use fechner_perception::tone::operator;
 use glam::Vec3;
@@ -22,17 +21,28 @@ pub(super) fn film_of(color: impl Fn(u32, f32) -> Vec3) -> Film {
 
 /// The same of pixels of which some shine.
 pub(super) fn film_of_lamps(color: impl Fn(u32, f32) -> Vec3, shines: impl Fn(u32) -> bool) -> Film {
+    film_of_halves([PILOT_SAMPLES_A_HALF; 2], shines, |pixel, _, random| color(pixel, random))
+}
+
+/// The same of so many samples of each half of every pixel.
+pub(super) fn film_of_halves(
+    samples: [u32; 2],
+    shines: impl Fn(u32) -> bool,
+    color: impl Fn(u32, Half, f32) -> Vec3,
+) -> Film {
     let mut film = Film::new(64, 64);
-    for block in pilot_plan(&film, 16).blocks {
-        let mut sum = BlockSum::default();
-        let shines = shines(block.pixel);
-        let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines };
-        for index in block.first..block.first + block.samples {
-            let key = u64::from(block.pixel) << 8 | u64::from(index);
-            let random = 2.0 * unit_of_hash(hash_words(key, block.half.index() as u64)) - 1.0;
-            sum.add(&PathSample { radiance: color(block.pixel, random), first_hit, rays: 1 });
+    for pixel in 0..64 * 64 {
+        let first_hit =
+            FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: shines(pixel) };
+        for (half, samples) in Half::BOTH.into_iter().zip(samples) {
+            let mut sum = BlockSum::default();
+            for index in 0..samples {
+                let key = u64::from(pixel) << 8 | u64::from(index);
+                let random = 2.0 * unit_of_hash(hash_words(key, half.index() as u64)) - 1.0;
+                sum.add(&PathSample { radiance: color(pixel, half, random), first_hit, rays: 1 });
+            }
+            film.merge_block(BlockWork { samples, ..BlockWork::whole(pixel, half, 0) }, &sum);
         }
-        film.merge_block(block, &sum);
     }
     film
 }

@@ -63,19 +63,11 @@ impl OverWhite {
         &self.visibility
     }
 
-    /// Variance of one sample that shows before black, where thresholds are `own_allowed_cd_m2`, as much as the worse of that which is given and
-    /// that over white: pooled, and of the halves.
-    pub(super) fn worse_per_sample(
-        &self,
-        own_allowed_cd_m2: &Plane,
-        own: &Plane,
-        own_of_halves: Option<[Plane; 2]>,
-    ) -> (Plane, Option<[Plane; 2]>) {
-        let ratio = own_allowed_cd_m2.combined(&self.thresholds.limits(), |own, white| (own / white) * (own / white));
-        let worse = |own: &Plane, white: &Plane| own.combined(&white.combined(&ratio, |v, ratio| v * ratio), f32::max);
-        let both = own_of_halves.zip(self.per_sample_of_halves.as_ref());
-        let of_halves = both.map(|([a, b], [white_a, white_b])| [worse(&a, white_a), worse(&b, white_b)]);
-        (worse(own, &self.pooled_per_sample), of_halves)
+    /// For variances of one sample that show before black, where thresholds are `own_allowed_cd_m2`, as much as the worse of one that is given
+    /// and that over white.
+    pub(super) fn worse_per_sample(&self, own_allowed_cd_m2: &Plane) -> WorsePerSample<'_> {
+        let ratio = |own: f32, white: f32| (own / white) * (own / white);
+        WorsePerSample { over_white: self, ratio: own_allowed_cd_m2.combined(&self.thresholds.limits(), ratio) }
     }
 
     /// What the halves' difference shows, before black or over white. `displayed`: half the difference before black, cd/m².
@@ -86,6 +78,30 @@ impl OverWhite {
             visibility: own.visibility.combined(&white.visibility, f32::max),
             amplitude: own.amplitude.combined(&white.amplitude, f32::max),
         }
+    }
+}
+
+/// [`OverWhite::worse_per_sample`].
+pub(super) struct WorsePerSample<'a> {
+    over_white: &'a OverWhite,
+    /// Of squared thresholds, before black over white.
+    ratio: Plane,
+}
+
+impl WorsePerSample<'_> {
+    /// Of a pooled variance.
+    pub(super) fn pooled(&self, own: &Plane) -> Plane {
+        self.worse(own, &self.over_white.pooled_per_sample)
+    }
+
+    /// Of what the halves decide by; `None` where the look was for no plan.
+    pub(super) fn of_halves(&self, [own_a, own_b]: [Plane; 2]) -> Option<[Plane; 2]> {
+        let [white_a, white_b] = self.over_white.per_sample_of_halves.as_ref()?;
+        Some([self.worse(&own_a, white_a), self.worse(&own_b, white_b)])
+    }
+
+    fn worse(&self, own: &Plane, white: &Plane) -> Plane {
+        own.combined(&white.combined(&self.ratio, |variance, ratio| variance * ratio), f32::max)
     }
 }
 

@@ -14,6 +14,8 @@ pub(super) struct PerSample {
     pub(super) met: Plane,
     /// [`super::Judgement::pooled_variance_per_sample`].
     pub(super) pooled: Plane,
+    /// [`super::Judgement::pooled_of_halves`].
+    pub(super) pooled_of_halves: Option<[Plane; 2]>,
     /// [`super::Judgement::variance_per_sample`].
     pub(super) of_halves: Option<[Plane; 2]>,
 }
@@ -30,7 +32,7 @@ impl PerSample {
         let met = scatter.pooled_per_sample(thresholds, gains);
         let of_halves =
             luminance_scales.map(|scales| scatter.per_sample_of_halves(film, scales.each_ref(), thresholds, gains));
-        Self { pooled: met.clone(), met, of_halves }
+        Self { pooled: met.clone(), pooled_of_halves: None, met, of_halves }
     }
 
     /// Or by what lamps' rims may hide, where that is more: of what a half decides by, beside the light that the other one has found; of the
@@ -43,13 +45,19 @@ impl PerSample {
     ) -> Self {
         let [Some(a), Some(b)] = lights.each_ref().map(missed_beside) else { return self };
         let of_halves = self.of_halves.map(|[of_a, of_b]| [b.or_scatter(&of_a), a.or_scatter(&of_b)]);
-        Self { pooled: a.mean(&b).or_scatter(&self.met), of_halves, ..self }
+        let pooled_of_halves = of_halves.is_some().then(|| [&b, &a].map(|beside| beside.or_scatter(&self.met)));
+        Self { pooled: a.mean(&b).or_scatter(&self.met), pooled_of_halves, of_halves, ..self }
     }
 
     /// Or by what shows over white, where that is more.
     pub(super) fn or_over_white(self, over_white: Option<&OverWhite>, thresholds: &Thresholds) -> Self {
         let Some(over_white) = over_white else { return self };
-        let (pooled, of_halves) = over_white.worse_per_sample(&thresholds.limits(), &self.pooled, self.of_halves);
-        Self { pooled, of_halves, ..self }
+        let worse = over_white.worse_per_sample(&thresholds.limits());
+        Self {
+            pooled: worse.pooled(&self.pooled),
+            pooled_of_halves: self.pooled_of_halves.map(|halves| halves.map(|half| worse.pooled(&half))),
+            of_halves: self.of_halves.and_then(|halves| worse.of_halves(halves)),
+            ..self
+        }
     }
 }

@@ -1,10 +1,10 @@
 use super::*;
 use crate::adaptive::is_reached;
-use crate::adaptive::test_films::{film_of, film_of_lamps, settings};
+use crate::adaptive::test_films::{film_of, film_of_halves, film_of_lamps, settings};
 use crate::denoise::Denoiser;
 use crate::film::BlockSum;
 use crate::integrator::{BlockWork, FirstHit, PathSample};
-use crate::sampler::{hash_words, unit_of_hash};
+use crate::sampler::hash_words;
 use fechner_perception::tone::SceneLight;
 use glam::Vec3;
 
@@ -36,26 +36,7 @@ fn isoluminant_noise_is_seen_in_denoised_pictures() {
 
 /// A film of so many samples of grey noise in half A of each pixel, and so many in half B.
 fn noisy(samples: [u32; 2]) -> Film {
-    grey_film(samples, |_| false, |_, _, random| 0.8 + 0.5 * random)
-}
-
-/// The same of any grey, by pixel, half, and random in −1..1.
-fn grey_film(samples: [u32; 2], shines: impl Fn(u32) -> bool, grey: impl Fn(u32, Half, f32) -> f32) -> Film {
-    let mut film = Film::new(64, 64);
-    for pixel in 0..64 * 64 {
-        let shines = shines(pixel);
-        for (half, samples) in Half::BOTH.into_iter().zip(samples) {
-            let mut sum = BlockSum::default();
-            for index in 0..samples {
-                let key = u64::from(pixel) << 8 | u64::from(index);
-                let random = 2.0 * unit_of_hash(hash_words(key, half.index() as u64)) - 1.0;
-                let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines };
-                sum.add(&PathSample { radiance: Vec3::splat(grey(pixel, half, random)), first_hit, rays: 1 });
-            }
-            film.merge_block(BlockWork { samples, ..BlockWork::whole(pixel, half, 0) }, &sum);
-        }
-    }
-    film
+    film_of_halves(samples, |_| false, |_, _, random| Vec3::splat(0.8 + 0.5 * random))
 }
 
 /// Whether a half was lucky and went beyond white is no matter to what it decides by, or it would stop because of its luck; the other half
@@ -72,7 +53,8 @@ fn a_half_does_not_go_by_its_own_luck() {
                 (LAMP, _) => 5.0,
                 _ => 0.1 + 0.01 * random,
             };
-            let film = grey_film([8, 8], |pixel| shines && [RIM, LAMP].contains(&pixel), grey);
+            let is_lamp = |pixel| shines && [RIM, LAMP].contains(&pixel);
+            let film = film_of_halves([8, 8], is_lamp, |pixel, half, random| Vec3::splat(grey(pixel, half, random)));
             let judgement = judge_to_plan(&film, &settings(), 1.0).expect("judges");
             judgement.variance_per_sample.expect("is to plan by").map(|half| half.values()[RIM as usize])
         };
