@@ -231,7 +231,10 @@ impl<'a> Loop<'a> {
         let is_left = |&rung: &f64| is_below(rung, state.finished_rung) && is_below(rung, state.left_rung);
         let rungs = settings.rungs().into_iter().filter(is_left).collect();
         let seconds_before = state.seconds.total;
-        let state = state.kept_to(&settings.limits);
+        let mut state = state.kept_to(&settings.limits);
+        if state.film.known_lamps.is_none() {
+            state.film.known_lamps = tracer.known_lamps();
+        }
         Self {
             tracer,
             settings,

@@ -132,7 +132,10 @@ impl Loop<'_> {
         if self.settings.sampling != Sampling::Adaptive {
             return None;
         }
-        let of_lamps = || samples_to_meet(&self.tracer.share_of_small_lamps()?, &self.settings.limits);
+        let of_lamps = || {
+            let shares: Vec<f32> = self.state.film.known_lamps.as_ref()?.main_shares().collect();
+            samples_to_meet(&shares, &self.settings.limits)
+        };
         self.samples_to_meet_lamps.get_or_init(of_lamps).as_deref()
     }
 

@@ -7,6 +7,7 @@ mod block_sum;
 mod estimate;
 mod guide;
 mod halves;
+mod known_lamps;
 mod merge;
 mod over;
 
@@ -14,6 +15,7 @@ pub use block_sum::BlockSum;
 pub use estimate::Estimate;
 pub use guide::{PixelGuide, Seen};
 pub use halves::{Halves, share_of_mean};
+pub use known_lamps::KnownLamps;
 
 use crate::integrator::BlockWork;
 use crate::sampler::Half;
@@ -99,6 +101,9 @@ pub struct Film {
     pub nonfinite_samples: u64,
     /// Rays traced.
     pub rays: u64,
+    /// What is known of lamps that its samples may pass by, once somebody who knows the scene has said so. Not kept in files.
+    #[serde(skip)]
+    pub known_lamps: Option<KnownLamps>,
 }
 
 impl Film {
@@ -113,6 +118,7 @@ impl Film {
             guides_of_a: vec![PixelGuide::default(); pixels],
             nonfinite_samples: 0,
             rays: 0,
+            known_lamps: None,
         }
     }
 

@@ -114,7 +114,33 @@ impl CameraRays {
         self.lens_right != Vec3::ZERO
     }
 
-    /// Place in the picture, in pixels, of a world position as the shutter opens; `None` at and behind the lens.
+    /// How far to the side and up, in pixels, the rays are spread through which the lens sees a world position: the half axes of its circle
+    /// of confusion. For a camera that stands still.
+    pub(super) fn blur_px(&self, position: Vec3) -> Vec2 {
+        let spread = self.spread(self.depth_of(position)).abs();
+        let along = |lens: Vec3, pixel: Vec3| spread * lens.length() / pixel.length();
+        Vec2::new(along(self.lens_right, self.pixel_right), along(self.lens_up, self.pixel_down))
+    }
+
+    /// Place in the picture, in pixels, at which a point of the lens, by its [`CameraSample::lens`], sees a world position, for a camera that
+    /// stands still; `None` at and behind the lens.
+    pub(super) fn project_through(&self, lens: [f32; 2], position: Vec3) -> Option<Vec2> {
+        let middle = self.project(position)?;
+        let disc = concentric_disc(lens);
+        let on_lens = self.lens_right * disc.x + self.lens_up * disc.y;
+        Some(middle + self.to_pixels(-self.spread(self.depth_of(position)) * on_lens) - self.center)
+    }
+
+    fn depth_of(&self, position: Vec3) -> f32 {
+        (position - self.position).dot(self.forward)
+    }
+
+    /// What the rays through a point at this depth are spread by, on the plane that [`Self::pixel_right`] is on, over their spread on the lens.
+    fn spread(&self, depth: f32) -> f32 {
+        if self.parallel { 1.0 - depth / self.focus_distance } else { 1.0 / depth - 1.0 / self.focus_distance }
+    }
+
+    /// Place in the picture, in pixels, of a world position seen from the middle of the lens as the shutter opens; `None` at and behind the lens.
     pub fn project(&self, position: Vec3) -> Option<Vec2> {
         let position = match &self.motion {
             None => position,
@@ -236,6 +262,29 @@ mod tests {
                 assert_eq!(place.is_none(), rays.is_parallel(), "{x} {y}");
                 assert!(place.is_none_or(|place| place.distance(Vec2::new(x, y)) < 2e-3), "{x} {y}: {place:?}");
                 assert_eq!(rays.project_direction(-direction), None);
+            }
+        }
+    }
+
+    /// Whichever point of the lens a ray comes through, what it meets is projected to where it came from, as far from the middle as
+    /// the circle of confusion is wide for that point.
+    #[test]
+    fn projection_undoes_rays_through_the_lens() {
+        let parallel = Camera { projection: Projection::Orthographic { height: 2.0 }, ..camera(0.5) };
+        let window = ScreenWindow { min: Vec2::new(-1.0, -1.0), max: Vec2::new(1.0, 1.0) };
+        let oblong = Camera { screen_window: Some(window), ..camera(0.5) };
+        for of in [camera(0.5), parallel, oblong] {
+            let rays = CameraRays::new(&of, 200, 100);
+            for lens in [[0.5, 0.5], [0.0, 0.5], [0.5, 1.0], [0.9, 0.2]] {
+                let (origin, direction) = ray(&rays, 120.0, 30.0, lens, 0.0);
+                for distance in [2.0, 4.0, 30.0] {
+                    let position = origin + distance * direction;
+                    let place = rays.project_through(lens, position).expect("before the lens");
+                    assert!(place.distance(Vec2::new(120.0, 30.0)) < 2e-3, "{lens:?} {distance}: {place}");
+                    let from_middle = place - rays.project(position).expect("before the lens");
+                    let expected = concentric_disc(lens).abs() * rays.blur_px(position);
+                    assert!(from_middle.abs().distance(expected) < 4e-3, "{lens:?} {distance}: {from_middle}");
+                }
             }
         }
     }

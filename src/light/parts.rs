@@ -7,7 +7,16 @@ use glam::Vec3;
 
 /// A part of a lamp, in the world.
 #[derive(Clone, Copy, Debug)]
-pub enum LampPart {
+pub struct LampPart {
+    /// Where it is.
+    pub shape: LampShape,
+    /// What it emits, without what a clear coat keeps.
+    pub radiance: Vec3,
+}
+
+/// What a part of a lamp is.
+#[derive(Clone, Copy, Debug)]
+pub enum LampShape {
     /// A triangle that shines to the side of its normal, or to both.
     Triangle {
         /// Its corners.
@@ -28,26 +37,25 @@ impl Lights {
     /// The parts of all lamps that have a surface and do not move while the shutter is open. Not those of lamps whose emission is a picture or
     /// that alpha covers: they may be black anywhere.
     pub fn still_parts(&self, world: &World) -> impl Iterator<Item = LampPart> {
-        let shines_all_over = |object: u32| {
+        let radiance_all_over = |object: u32| {
             let material = &world.scene().materials[world.material_of(object).0 as usize];
-            material.emission.texture.is_none() && material.alpha == Alpha::Opaque
+            (material.emission.texture.is_none() && material.alpha == Alpha::Opaque).then_some(material.emission.factor)
         };
         self.emitters.iter().flat_map(move |emitter| {
-            let parts = match emitter {
-                Emitter::Flat(flat) if shines_all_over(flat.object) => {
+            let (object, shapes) = match emitter {
+                Emitter::Flat(flat) => {
                     let front = (!flat.both_sides).then_some(flat.normal);
-                    flat.triangles().map(|corners| Some(LampPart::Triangle { corners: corners?, front }))
+                    let shapes = flat.triangles().map(|corners| Some(LampShape::Triangle { corners: corners?, front }));
+                    (Some(flat.object), shapes)
                 }
-                Emitter::Sphere(sphere) if shines_all_over(sphere.object) => {
-                    [Some(LampPart::Sphere { center: sphere.center, radius: sphere.radius }), None]
+                Emitter::Sphere(sphere) => {
+                    let shape = LampShape::Sphere { center: sphere.center, radius: sphere.radius };
+                    (Some(sphere.object), [Some(shape), None])
                 }
-                Emitter::Flat(_)
-                | Emitter::Sphere(_)
-                | Emitter::Point(_)
-                | Emitter::MovingTriangle { .. }
-                | Emitter::MovingSphere { .. } => [None; 2],
+                Emitter::Point(_) | Emitter::MovingTriangle { .. } | Emitter::MovingSphere { .. } => (None, [None; 2]),
             };
-            parts.into_iter().flatten()
+            let radiance = object.and_then(radiance_all_over);
+            shapes.into_iter().flatten().filter_map(move |shape| Some(LampPart { shape, radiance: radiance? }))
         })
     }
 }

@@ -3,6 +3,7 @@
 use super::super::denoised::TimedDenoising;
 use super::super::missed::{Darkness, EdgeProfile, FoundLight, LampEdges};
 use super::super::settings::LoopSettings;
+use super::super::small_lamps::unmet_noise;
 use super::super::statistics::{SampleStatistics, by_channel, scene_units};
 use super::{JudgeError, NoiseOnDisplay, display_scale, guide_rgb, still_wanted, variance_shares};
 use crate::film::{CHANNELS, Estimate, Film};
@@ -14,7 +15,7 @@ use fechner_perception::model::{ModelInputs, ThresholdModel};
 use fechner_perception::seen;
 use fechner_perception::threshold::{GuideNoise, ThresholdInputs, ThresholdMap, threshold_map};
 use fechner_perception::tone::acuity::BehindAcuity;
-use fechner_perception::tone::{FittedTone, SceneLight};
+use fechner_perception::tone::{FittedTone, Pixel, SceneLight};
 use std::borrow::Cow;
 
 /// The picture without its noise, from which the rest of a look is made: denoised for output where it is, else for this.
@@ -118,7 +119,8 @@ impl Scatter {
         })
     }
 
-    /// What lamps' rims may hide where so much light was found; `None` where the pixel filter tells of no neighbour.
+    /// What lamps' rims, and known lamps that few samples met, may hide where so much light was found; `None` where no lamps are known, and the
+    /// pixel filter tells of no neighbour.
     pub(super) fn missed_noise(
         &self,
         film: &Film,
@@ -126,13 +128,19 @@ impl Scatter {
         tone: &dyn FittedTone,
         settings: &LoopSettings,
     ) -> Option<MissedNoise> {
-        let profile = EdgeProfile::of(settings.filter)?;
-        let edges = LampEdges { profile, film, found, lamps_from_cd_m2: 0.0 };
-        let darkness = Darkness::of(&edges.expected(), |pixel, light| {
-            let whole = found.mean_cd_m2.get(pixel.x, pixel.y) + light;
-            seen::display_luminance_at(tone, &settings.viewing.display, pixel, whole)
+        let shown =
+            |pixel: Pixel, light: f32| seen::display_luminance_at(tone, &settings.viewing.display, pixel, light);
+        let at_rims = EdgeProfile::of(settings.filter).map(|profile| {
+            let edges = LampEdges { profile, film, found, lamps_from_cd_m2: 0.0 };
+            let whole = |pixel: Pixel, light: f32| shown(pixel, found.mean_cd_m2.get(pixel.x, pixel.y) + light);
+            Darkness::of(&edges.expected(), whole).mean_square
         });
-        Some(MissedNoise(darkness.mean_square.combined(&self.shares, |square, share| square / share)))
+        let of_known = unmet_noise(film, found, settings.nits_per_unit, shown);
+        let mean_square = match (at_rims, of_known) {
+            (Some(at_rims), Some(of_known)) => at_rims.combined(&of_known, f32::max),
+            (one, other) => one.or(other)?,
+        };
+        Some(MissedNoise(mean_square.combined(&self.shares, |square, share| square / share)))
     }
 
     pub(super) fn luminance_variance_of_mean(&self) -> Plane {
