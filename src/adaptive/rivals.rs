@@ -4,10 +4,10 @@
 //! told. Not for use: each has a knob without a unit, and stops dark regions and fireflies early.
 
 use super::StopReason;
-use super::plan::{blocks_between, cut_to_budget, share_of_half};
+use super::plan::{blocks_between, by_chance, cut_to_budget, share_of_half};
 use super::settings::RivalRule;
 use crate::film::{Film, opponent};
-use crate::integrator::{BlockWork, SamplePlan};
+use crate::integrator::SamplePlan;
 use crate::sampler::{Half, hash_words, unit_f64_of_hash};
 
 /// Samples between two looks, both halves together.
@@ -34,9 +34,7 @@ pub fn rival_plan(rule: RivalRule, film: &Film, exposure: f64, left: u64, max_sa
     if plan.samples() <= left {
         return plan;
     }
-    // None of the rules says who should have the last samples: chance does.
-    let by_chance = |block: &BlockWork| (hash_words(film.total_samples(), block.pixel.into()) >> 40) as f32;
-    cut_to_budget(plan, by_chance, left)
+    cut_to_budget(plan, by_chance(film), left)
 }
 
 /// Why [`rival_plan`] has none: with the same arguments it was empty.
