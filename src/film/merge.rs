@@ -67,7 +67,8 @@ impl Film {
             return Err("its pixels are not as many as its size says");
         }
         let is_sound = |pixel: &HalfPixel| {
-            pixel.samples <= pixel.taken
+            pixel.missed <= pixel.samples
+                && pixel.samples <= pixel.taken
                 && pixel.taken <= MOST_TAKEN
                 && pixel.mean.iter().all(|mean| mean.is_finite())
                 && pixel.m2.iter().all(|m2| m2.is_finite() && *m2 >= 0.0)
@@ -193,6 +194,7 @@ mod tests {
         assert!(changed(&|film| film.halves[1][0].mean[2] = f64::NAN));
         assert!(changed(&|film| film.halves[0][0].m2[1] = -1.0));
         assert!(changed(&|film| film.halves[0][0].samples = 9));
+        assert!(changed(&|film| film.halves[1][0].missed = 2), "alpha would be below 0");
         assert!(changed(&|film| film.halves[0][0].taken = u32::MAX));
         assert!(changed(&|film| film.guides[0].albedo[0] = f32::INFINITY));
         assert!(changed(&|film| film.guides.clear()));
