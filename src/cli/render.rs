@@ -11,7 +11,7 @@ use super::signals::listen;
 use super::targets::{Named, check_kept, check_scene_kept};
 use super::tev::{Showing, TevArguments};
 use super::view::audience;
-use super::words::in_a_line;
+use super::words::{count, in_a_line};
 use anyhow::{anyhow, bail};
 use clap::Args;
 use fechner::adaptive::judge::JudgeError;
@@ -105,7 +105,7 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     let tracer = PathTracer::new(scene, trace);
     let degenerate = tracer.world().degenerate_triangles();
     if degenerate > 0 {
-        say!("note: {degenerate} triangles without area were left out");
+        say!("note: {} without area left out", count(degenerate, "triangle"));
     }
     let tev = arguments.tev.open(&arguments.job.scene_name())?.map(|tev| Showing::new(tev, settings.nits_per_unit));
     let watch = Watch::new(stop, Console::new(settings.limits.time), keeper, audience, tev);
