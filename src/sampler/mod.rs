@@ -12,6 +12,10 @@ mod sobol;
 
 pub use filter::{FilterDensity, FilterSample, PixelFilter};
 
+use crate::geometry::{VectorWork, with_vectors};
+use serde::{Deserialize, Serialize};
+use std::array::from_fn;
+
 /// How the samples of neighbouring pixels relate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Sequence {
@@ -37,10 +41,6 @@ impl Sequence {
         }
     }
 }
-
-use crate::geometry::{VectorWork, with_vectors};
-use serde::{Deserialize, Serialize};
-use std::array::from_fn;
 
 /// Which of the two independent estimates of a pixel a sample belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
