@@ -32,7 +32,7 @@ impl PlacedAxes {
         let axis = |vector| placed.transform_vector3(vector).try_normalize();
         let (forward, up, right) = (axis(Vec3::Z)?, axis(Vec3::Y)?, axis(Vec3::X)?);
         let position = Vec3::from(placed.translation);
-        let spans = position.is_finite() && forward.cross(up).length() >= 1e-5;
+        let spans = position.is_finite() && Camera::axes_span(forward, up);
         spans.then_some(Self { position, forward, up, right })
     }
 }
@@ -60,14 +60,13 @@ impl Reader<'_> {
         let window = ScreenWindow { min: window.min * across, max: window.max * across };
         let is_usual = window == ScreenWindow::centered(film_aspect);
         let camera = Camera {
-            projection,
             screen_window: (!is_usual || crop.is_some()).then(|| cropped(window, crop)),
             mirrored: forward.cross(up).dot(right) < 0.0,
             // A lens that a transform made oval is as large as the oval.
             aperture_radius: parameters.float_or("lensradius", 0.0)?.max(0.0) * (stretch.x * stretch.y).sqrt(),
             focus_distance: (parameters.float_or("focaldistance", 1e6)? * stretch.z).max(1e-6),
             motion: self.motion(&to_world).map(|m| m.since_open()),
-            ..Camera::pinhole(position, forward, up, 40.0)
+            ..Camera::placed(position, forward, up, projection)
         };
         self.note_unread("camera", &parameters);
         self.builder.cameras.push(NamedCamera { name: kind, holder: None, camera, framing });
@@ -125,8 +124,9 @@ impl Reader<'_> {
             }
         };
         let fov_deg = camera.float_or("fov", usual_fov_deg)?;
-        if !(0.001..=179.0).contains(&fov_deg) {
-            return Err(camera.error(format_args!("\"fov\" must lie in [0.001, 179] degrees, not {fov_deg}")));
+        if !Camera::FOV_DEG.contains(&f64::from(fov_deg)) {
+            let (least, most) = Camera::FOV_DEG.into_inner();
+            return Err(camera.error(format_args!("\"fov\" must lie in [{least}, {most}] degrees, not {fov_deg}")));
         }
         Ok(Projection::Perspective { vertical_fov_deg: fov_deg })
     }
