@@ -159,8 +159,7 @@ impl FirstRounds {
             let record = hand_out(farm, frame_index, &state)?;
             rounds.units += record.units.len();
             rounds.samples += record.samples;
-            let of_frame = state.untraced_blocks().map(|block| u64::from(block.samples)).sum();
-            rounds.most_samples_a_frame = rounds.most_samples_a_frame.max(of_frame);
+            rounds.most_samples_a_frame = rounds.most_samples_a_frame.max(state.untraced_samples());
         }
         Ok(rounds)
     }

@@ -217,7 +217,6 @@ impl<'a> Bench<'a> {
                 None
             }
         };
-        let samples: u64 = order.order.blocks.iter().map(|block| u64::from(block.samples)).sum();
         let there = begun.as_ref().map_or(0, |begun| begun.sums.len());
         if there > 0 {
             say!("unit {unit}: goes on from its checkpoint, {there} of {}", count(order.order.blocks.len(), "block"));
@@ -236,7 +235,7 @@ impl<'a> Bench<'a> {
                 say!(
                     "unit {unit}: frame {}, {} in {}, {} of it to load the scene",
                     order.order.frame,
-                    samples_in_words(samples),
+                    samples_in_words(order.order.samples()),
                     duration_in_words(started.elapsed().as_secs_f64()),
                     duration_in_words(loaded.as_secs_f64())
                 );

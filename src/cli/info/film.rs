@@ -14,7 +14,6 @@ pub(super) fn describe(checkpoint: &Checkpoint) -> String {
     let pixels = film.pixel_count();
     let counts = || (0..pixels).map(|pixel| film.samples(pixel));
     let (least, most) = (counts().min().unwrap_or(0), counts().max().unwrap_or(0));
-    let pending: u64 = state.untraced_blocks().map(|block| u64::from(block.samples)).sum();
     let mut text = format!("film of {}, {}×{} pixels\n\n", origin.program, film.width(), film.height());
     let mut row = |name: &str, value: String| {
         let _ = writeln!(text, "  {name:11}  {value}");
@@ -32,7 +31,10 @@ pub(super) fn describe(checkpoint: &Checkpoint) -> String {
         let mean = film.total_samples() as f64 / pixels as f64;
         format!("{}: {mean:.1} a pixel, {least} to {most}; {} not finite", film.total_samples(), film.nonfinite_samples)
     });
-    row("planned", format!("{} after {}", count(pending as usize, "sample"), count(state.plans as usize, "plan")));
+    row(
+        "planned",
+        format!("{} after {}", count(state.untraced_samples() as usize, "sample"), count(state.plans as usize, "plan")),
+    );
     row("time", duration_in_words(state.seconds.total));
     row("sampling", sampling_name(settings.sampling).to_owned());
     row("visibility", {

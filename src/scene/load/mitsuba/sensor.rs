@@ -3,7 +3,7 @@
 use super::super::builder::NamedCamera;
 use super::super::default_view;
 use super::super::error::{LoadError, names_of};
-use super::super::framing::{FilmAxis, Framing};
+use super::super::framing::{FilmAxis, Framing, LONGEST_SIDE};
 use super::Reader;
 use super::element::{Element, canonical};
 use super::transform;
@@ -12,8 +12,6 @@ use glam::{Affine3A, Vec2, Vec3};
 
 /// Mitsuba's default.
 const FAR_CLIP: f32 = 1e4;
-/// Widest and highest picture that a file may ask for.
-const LONGEST_SIDE: f32 = 32_768.0;
 
 /// How a sensor's rays run.
 #[derive(Clone, Copy)]
@@ -118,7 +116,7 @@ impl Reader {
         };
         let side = |name: &str, default: f32| {
             let side = film.float_or(name, default)?;
-            if (1.0..=LONGEST_SIDE).contains(&side) && side.fract() == 0.0 {
+            if (1.0..=LONGEST_SIDE as f32).contains(&side) && side.fract() == 0.0 {
                 Ok(side as u32)
             } else {
                 Err(film.error(format_args!("\"{name}\" must be a whole number from 1 to {LONGEST_SIDE}, not {side}")))

@@ -2,15 +2,12 @@
 
 use super::super::builder::NamedCamera;
 use super::super::error::LoadError;
-use super::super::framing::{FilmAxis, Framing};
+use super::super::framing::{FilmAxis, Framing, LONGEST_SIDE};
 use super::Reader;
 use super::parameters::Parameters;
 use super::state::{Carried, Path, Transforms};
 use crate::scene::{Camera, FilmDefaults, Motion, MotionKey, Pose, Projection, ScreenWindow};
 use glam::{Affine3A, Vec2, Vec3};
-
-/// Widest and highest picture that a file may ask for.
-const LONGEST_SIDE: i64 = 32_768;
 
 /// A rectangle of the film in shares of it, from the upper left corner.
 struct Crop {
@@ -205,7 +202,7 @@ impl Reader<'_> {
             return Ok((default, None));
         };
         let side = |name: &str, default: i64| match film.integer(name)?.unwrap_or(default) {
-            side @ 1..=LONGEST_SIDE => Ok(side as u32),
+            side if (1..=i64::from(LONGEST_SIDE)).contains(&side) => Ok(side as u32),
             other => Err(film.error(format_args!("\"{name}\" must lie in [1, {LONGEST_SIDE}], not {other}"))),
         };
         let full = FilmDefaults { width: side("xresolution", 1280)?, height: side("yresolution", 720)? };
