@@ -158,11 +158,17 @@ pub enum ExrReadError {
 }
 
 /// Reads every channel of a file's parts.
+///
+/// # Errors
+/// Where the file cannot be read, is damaged or needs too much memory.
 pub fn read_exr(path: &Path) -> Result<ExrImage, ExrReadError> {
     read_exr_channels(path, |all| all.to_vec())
 }
 
 /// Reads those channels of a file's parts that `choose` chooses among the names of all. Only they take memory.
+///
+/// # Errors
+/// As of [`read_exr`].
 pub fn read_exr_channels(path: &Path, choose: impl FnOnce(&[String]) -> Vec<String>) -> Result<ExrImage, ExrReadError> {
     let io = |error| ExrReadError::Io { path: path.to_owned(), error };
     decode_exr_channels(path, &read_file::bytes(path).map_err(io)?, choose)
@@ -179,11 +185,17 @@ pub fn is_exr(bytes: &[u8]) -> bool {
 }
 
 /// Reads every channel of the parts of a file that is in memory; `path` is for messages.
+///
+/// # Errors
+/// As of [`read_exr`].
 pub fn decode_exr(path: &Path, file: &[u8]) -> Result<ExrImage, ExrReadError> {
     decode_exr_channels(path, file, |all| all.to_vec())
 }
 
 /// [`read_exr_channels`] of a file that is in memory; `path` is for messages.
+///
+/// # Errors
+/// As of [`read_exr`].
 pub fn decode_exr_channels(
     path: &Path,
     file: &[u8],
@@ -281,6 +293,9 @@ fn image_without_channels(first: &Header) -> ExrImage {
 }
 
 /// Width and height of the picture of a file that is in memory.
+///
+/// # Errors
+/// Where its headers are damaged, or it would need too much memory.
 pub fn size(path: &Path, file: &[u8]) -> Result<[u32; 2], ExrReadError> {
     let headers = read_headers(path, file)?;
     // Its sides were checked against the limit of memory.

@@ -26,10 +26,6 @@ pub fn scotopic_luminance(rgb: [f32; 3]) -> f32 {
     rgb[0] * 0.062 + rgb[1] * 0.608 + rgb[2] * 0.330
 }
 
-/// Luminance in cd/m² of a white whose radiance is 1 W/(sr m²) over the visible band (equal-energy white, 380 to 780 nm;
-/// Radiance's convention), per unit of RGB.
-pub const WHITE_EFFICACY_LM_W: f64 = 179.0;
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -123,6 +123,15 @@ impl Plane {
         result
     }
 
+    /// Half of what it differs by from another of the same shape: of two halves of a picture, as strong as the noise of their mean.
+    ///
+    /// # Panics
+    /// Unless the other plane has as many columns and rows.
+    #[must_use]
+    pub fn half_difference(&self, other: &Self) -> Self {
+        self.combined(other, |own, others| 0.5 * (own - others))
+    }
+
     /// Arithmetic mean, summed in `f64`; 0 for a plane without pixels.
     #[must_use]
     pub fn mean(&self) -> f64 {

@@ -13,7 +13,7 @@ use super::beginning;
 use super::judge::{JudgeError, Judgement, still_wanted, variance_share};
 use super::plan::blocks_between;
 use super::settings::LoopSettings;
-use crate::film::{BlockSum, Film, HalfPixel, Halves, opponent};
+use crate::film::{BlockSum, Film, HalfPixel, Halves};
 use crate::integrator::{BlockWork, PathTracer, SamplePlan};
 use crate::sampler::{Half, hash_words};
 use crate::student::t_half_width;
@@ -92,9 +92,8 @@ pub fn audit(
     let mut difference = Plane::filled(width, film.height() as usize, 0.0);
     let mut variance = Plane::filled(width, film.height() as usize, 0.0);
     for (&pixel, halves) in pixels.iter().zip(&fresh.halves) {
-        let luminance = |half: &HalfPixel| opponent(half.mean)[0];
-        let kept = film.halves(pixel).mean(luminance);
-        let again = Halves::of(halves.each_ref()).mean(luminance);
+        let kept = film.halves(pixel).mean(HalfPixel::luminance);
+        let again = Halves::of(halves.each_ref()).mean(HalfPixel::luminance);
         // Fresh less kept has twice the variance of one of them.
         difference.values_mut()[pixel] = (nits * (again - kept) / std::f64::consts::SQRT_2) as f32;
         let per_sample = f64::from(judgement.met_per_sample.values()[pixel]);

@@ -59,14 +59,13 @@ impl TimedDenoising {
         let display = &settings.viewing.display;
         let [a, b] = self.film.halves_rgb_cd_m2.each_ref().map(|half| luminance_plane(half, width));
         let [raw_a, raw_b] = Half::BOTH.map(|half| half_luminance(film, half, settings.nits_per_unit));
-        let half_of = |a: &Plane, b: &Plane| a.combined(b, |a, b| 0.5 * (a - b));
-        let half_difference = half_of(&a, &b);
+        let half_difference = a.half_difference(&b);
         let displayed = seen::display_half_difference(tone, display, &self.luminance, &half_difference);
         // Through the operator itself the raw noise would be bent and bear false witness.
         let slope = seen::display_slope(tone, display, &self.luminance);
         let shown = |scene: &Plane| scene.combined(&slope, |scene, slope| scene * slope);
         let residual = self.luminance.combined(&estimate.luminance_cd_m2, |denoised, raw| denoised - raw);
-        let raw_half_difference = half_of(&raw_a, &raw_b);
+        let raw_half_difference = raw_a.half_difference(&raw_b);
         let residual_half_difference = half_difference.combined(&raw_half_difference, |denoised, raw| denoised - raw);
         if !film.has_both_halves() {
             // The halves are one picture: they would bear witness that it has no noise.
@@ -121,7 +120,7 @@ impl TimedDenoising {
         let displayed = seen::display_luminance(tone, display, &self.luminance);
         let slope = seen::display_chromatic_slope(tone, display, &self.luminance);
         let width = film.width() as usize;
-        let half_of = |[a, b]: [Plane; 2]| a.combined(&b, |a, b| 0.5 * (a - b));
+        let half_of = |[a, b]: [Plane; 2]| a.half_difference(&b);
         let of_channel = |(c, channel)| {
             let shown = |signal: &(dyn Fn(usize) -> f64 + Sync)| {
                 Plane::from_fn(width, slope.height(), |x, y| (signal(y * width + x) as f32) * slope.get(x, y))

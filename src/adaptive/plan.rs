@@ -6,7 +6,7 @@
 
 mod blocks;
 
-pub(super) use blocks::{blocks_between, share_of_half, slice_count};
+pub(super) use blocks::{blocks_between, by_chance, share_of_half, slice_count};
 pub use blocks::{cut_to_budget, slices};
 
 use super::forecast::Forecast;
@@ -19,6 +19,7 @@ use blocks::doubled_blocks;
 use fechner_perception::Plane;
 use fechner_perception::allocation::{AllocationProblem, allocate};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Doublings that one plan gives a pixel at most where that costs no more than a look. Otherwise there is one: the pixel's
 /// variance, and what stratification makes of it, are looked at again in between, since stratification pays more the more
@@ -74,18 +75,24 @@ pub fn uniform_plan(film: &Film, mean_samples: u32) -> SamplePlan {
     plan
 }
 
-/// As many more samples for every pixel, `samples` in all, where it may have them.
+/// As many more samples for every pixel, `samples` in all, where it may have them. Those that are too few for one more each go by chance.
 pub(super) fn even_plan(film: &Film, samples: u64, max_samples: u32) -> SamplePlan {
-    let more = samples.div_ceil(film.pixel_count().max(1) as u64) as u32;
-    let mut plan = SamplePlan::default();
-    for pixel in 0..film.pixel_count() as u32 {
-        for half in Half::BOTH {
-            let taken = film.half(half)[pixel as usize].taken;
-            let to = taken.saturating_add(share_of_half(more, half)).min(share_of_half(max_samples, half));
-            plan.blocks.extend(blocks_between(pixel, half, taken, to));
+    let each = (samples / film.pixel_count().max(1) as u64) as u32;
+    let more = |range: Range<u32>| {
+        let mut plan = SamplePlan::default();
+        for pixel in 0..film.pixel_count() as u32 {
+            for half in Half::BOTH {
+                let taken = film.half(half)[pixel as usize].taken;
+                let [from, to] = [range.start, range.end].map(|more| taken.saturating_add(share_of_half(more, half)));
+                plan.blocks.extend(blocks_between(pixel, half, from, to.min(share_of_half(max_samples, half))));
+            }
         }
-    }
-    cut_to_budget(plan, |_| 0.0, samples)
+        plan
+    };
+    let mut plan = more(0..each);
+    let left = samples - plan.samples();
+    plan.blocks.extend(cut_to_budget(more(each..each.saturating_add(1)), by_chance(film), left).blocks);
+    plan
 }
 
 /// What a film lacks of so many samples of each pixel, as many blocks as that takes.

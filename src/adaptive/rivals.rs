@@ -4,10 +4,10 @@
 //! told. Not for use: each has a knob without a unit, and stops dark regions and fireflies early.
 
 use super::StopReason;
-use super::plan::{blocks_between, cut_to_budget, share_of_half};
+use super::plan::{blocks_between, by_chance, cut_to_budget, share_of_half};
 use super::settings::RivalRule;
-use crate::film::{Film, opponent};
-use crate::integrator::{BlockWork, SamplePlan};
+use crate::film::{Film, HalfPixel};
+use crate::integrator::SamplePlan;
 use crate::sampler::{Half, hash_words, unit_f64_of_hash};
 
 /// Samples between two looks, both halves together.
@@ -34,9 +34,7 @@ pub fn rival_plan(rule: RivalRule, film: &Film, exposure: f64, left: u64, max_sa
     if plan.samples() <= left {
         return plan;
     }
-    // None of the rules says who should have the last samples: chance does.
-    let by_chance = |block: &BlockWork| (hash_words(film.total_samples(), block.pixel.into()) >> 40) as f32;
-    cut_to_budget(plan, by_chance, left)
+    cut_to_budget(plan, by_chance(film), left)
 }
 
 /// Why [`rival_plan`] has none: with the same arguments it was empty.
@@ -97,10 +95,10 @@ fn dilated(mask: &[bool], width: usize) -> Vec<bool> {
 fn variance_active(film: &Film, threshold: f64, exposure: f64) -> Vec<bool> {
     let is_active = |pixel: usize| {
         let halves = film.halves(pixel);
-        let mean = halves.mean(|half| opponent(half.mean)[0]);
+        let mean = halves.mean(HalfPixel::luminance);
         halves.variance_of_mean(0).sqrt() > threshold * mean.max(1e-3 / exposure)
     };
-    (0..film.guides().len()).map(is_active).collect()
+    (0..film.pixel_count()).map(is_active).collect()
 }
 
 /// One pass of Tungsten's: as many samples as 16 a pixel, one everywhere and the others in proportion to each record's
@@ -156,7 +154,7 @@ fn record_error(film: &Film, pixels: impl Iterator<Item = usize>, exposure: f64)
     for pixel in pixels {
         for half in Half::BOTH {
             let of_half = &film.half(half)[pixel];
-            let (n, mean) = (f64::from(of_half.samples), opponent(of_half.mean)[0] * exposure);
+            let (n, mean) = (f64::from(of_half.samples), of_half.luminance() * exposure);
             count += n;
             sum += n * mean;
             squares += f64::from(of_half.m2[0]) * exposure * exposure + n * mean * mean;

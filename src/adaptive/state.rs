@@ -58,6 +58,11 @@ pub struct Seconds {
     pub denoising: f64,
 }
 
+/// Whether anything can have taken so many seconds: 30,000 years are damage.
+pub(crate) fn can_be_seconds(seconds: f64) -> bool {
+    (0.0..1e12).contains(&seconds)
+}
+
 impl AddAssign for Seconds {
     fn add_assign(&mut self, other: Self) {
         self.total += other.total;
@@ -160,6 +165,11 @@ impl RenderState {
     /// Blocks that are planned and not yet traced, in order.
     pub fn untraced_blocks(&self) -> impl Iterator<Item = &BlockWork> {
         self.pending.iter().flat_map(|plan| &plan.blocks).skip(self.traced_blocks)
+    }
+
+    /// Samples of these.
+    pub fn untraced_samples(&self) -> u64 {
+        self.untraced_blocks().map(|block| u64::from(block.samples)).sum()
     }
 }
 

@@ -170,9 +170,9 @@ pub fn find_outliers(film: &Film) -> Outliers {
     const STANDARD_ERRORS: f64 = 5.0;
     let statistics = SampleStatistics::of(film, &scene_units(film));
     let (mut pixels, mut excess, mut energy) = (0, 0.0, 0.0);
-    for i in 0..film.guides().len() {
+    for i in 0..film.pixel_count() {
         let Halves::Both([a, b]) = film.halves(i) else { continue };
-        let means = [opponent(a.mean)[0], opponent(b.mean)[0]];
+        let means = [a.luminance(), b.luminance()];
         energy += 0.5 * (means[0] + means[1]);
         let half_difference = 0.5 * (means[0] - means[1]).abs();
         let per_sample = f64::from(statistics.luminance().pooled.values()[i]);

@@ -9,6 +9,7 @@ use super::{SceneSource, ShotSettings};
 use crate::adaptive::glimpse::{coarse_glimpse_for, steady_glimpse_for};
 use crate::checkpoint::PROGRAM;
 use crate::denoise::Denoiser;
+use crate::integrator::TraceSettings;
 use crate::scene::Scene;
 use crate::scene::hash::{ContentHash, content_hash};
 use crate::scene::load::LoadError;
@@ -110,15 +111,14 @@ impl Track {
 
 fn made_for(shot: &ShotSettings, operator: &dyn ToneOperator) -> String {
     format!(
-        "{}, steady looks, frames {} to {} at {} a second, {}x{}, seed {}, {} cd/m² a unit, {} ({operator:?}), eye {:?}, \
-         budget {:?}, {:?}, {:?}",
+        "{}, steady looks, frames {} to {} at {} a second, {:?}, {} cd/m² a unit, {} ({operator:?}), eye {:?}, budget {:?}, \
+         {:?}, {:?}",
         PROGRAM,
         shot.first,
         shot.last,
         shot.frames_per_second,
-        shot.trace.width,
-        shot.trace.height,
-        shot.trace.seed,
+        // Looks are at the whole, whatever part of it the frames are.
+        TraceSettings { crop: None, ..shot.trace },
         shot.nits_per_unit,
         operator.name(),
         shot.adapted_to_cd_m2,
@@ -244,7 +244,7 @@ mod tests {
     use crate::adaptive::settings::{Limits, Sampling};
     use crate::animate::eye::Eye;
     use crate::animate::velocity::VelocityOf;
-    use crate::integrator::TraceSettings;
+    use crate::integrator::Crop;
     use crate::scene::load::{LoadOptions, load};
     use fechner_perception::display::Viewing;
     use fechner_perception::tone::{ToneSettings, operator_with};
@@ -258,10 +258,8 @@ mod tests {
         }
     }
 
-    /// The first frame of one of our scenes.
-    fn first_frame(name: &str, operator: &str, (width, height): (u32, u32)) -> TrackFrame {
-        let source = Ours(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name));
-        let shot = ShotSettings {
+    fn shot_of_a_frame((width, height): (u32, u32)) -> ShotSettings {
+        ShotSettings {
             first: 0,
             last: 0,
             frames_per_second: 24.0,
@@ -270,13 +268,41 @@ mod tests {
             sampling: Sampling::Adaptive,
             limits: Limits::of_visibility(1.0),
             viewing: Viewing::default(),
-            nits_per_unit: source.at(0.0).expect("our own scene").nits_per_unit,
+            nits_per_unit: 1.0,
             adapted_to_cd_m2: None,
             gaze: None,
             eye: Eye::Rests,
             denoiser: None,
             velocity_of: VelocityOf::Surface,
+        }
+    }
+
+    /// Looks are traced as frames are: a track of other light would be another one. A part has the track of the whole.
+    #[test]
+    fn a_track_is_of_one_way_to_trace() {
+        let operator = operator_with("constant", &ToneSettings::default()).expect("an operator");
+        let shot = shot_of_a_frame((64, 48));
+        let traced_by = |change: fn(&mut TraceSettings)| {
+            let mut trace = shot.trace;
+            change(&mut trace);
+            made_for(&ShotSettings { trace, ..shot_of_a_frame((64, 48)) }, operator.as_ref())
         };
+        let own = traced_by(|_| {});
+        let changes: [fn(&mut TraceSettings); 4] = [
+            |trace| trace.seed = 7,
+            |trace| trace.max_depth = 2,
+            |trace| trace.clamp = Some(1.0),
+            |trace| trace.transparent = true,
+        ];
+        assert!(changes.into_iter().all(|change| traced_by(change) != own));
+        assert_eq!(traced_by(|trace| trace.crop = Some(Crop { x: 0, y: 0, width: 8, height: 8 })), own);
+    }
+
+    /// The first frame of one of our scenes.
+    fn first_frame(name: &str, operator: &str, (width, height): (u32, u32)) -> TrackFrame {
+        let source = Ours(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name));
+        let nits_per_unit = source.at(0.0).expect("our own scene").nits_per_unit;
+        let shot = ShotSettings { nits_per_unit, ..shot_of_a_frame((width, height)) };
         let operator = operator_with(operator, &ToneSettings::default()).expect("an operator");
         let track = Track::make(&source, &shot, operator.as_ref(), &|_| {}).expect("our own scene");
         track.frames.into_iter().next().expect("a frame")

@@ -35,7 +35,7 @@ pub use arm::Arm;
 pub use curve::{Curve, CurvePoint};
 pub use denoise::{Calibration, DenoisingResults, DenoisingSettings, denoising};
 pub use metrics::{Metrics, measure};
-pub use race::{Need, QUALITIES, Race, RaceMean, RacePoint, RaceRule};
+pub use race::{Need, Quality, Race, RaceMean, RacePoint, RaceRule};
 pub use reached::Reached;
 pub use record::{ArmSummary, Record, ReferenceOf, Results};
 pub use reference::trace_up_to;

@@ -36,7 +36,44 @@ impl From<RaceRule> for &'static str {
 }
 
 /// What the race is to.
-pub const QUALITIES: [&str; 3] = ["JOD 9.8", "JOD 9.9", "FLIP of uniform at 64"];
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(into = "String")]
+pub enum Quality {
+    /// At least so much by ColorVideoVDP.
+    Jod(f64),
+    /// At most the FLIP that uniform sampling first has from so many samples a pixel on.
+    FlipOfUniformAt(f64),
+}
+
+impl Quality {
+    /// In the order of files and tables.
+    pub const ALL: [Self; 3] = [Self::Jod(9.8), Self::Jod(9.9), Self::FlipOfUniformAt(64.0)];
+
+    /// What files and tables call it.
+    pub fn name(self) -> String {
+        match self {
+            Self::Jod(jod) => format!("JOD {jod}"),
+            Self::FlipOfUniformAt(samples) => format!("FLIP of uniform at {samples}"),
+        }
+    }
+
+    /// Where a race first comes to it.
+    fn need(self, race: &Race, uniform: &Race) -> Reached {
+        match self {
+            Self::Jod(jod) => race.to_jod(jod),
+            Self::FlipOfUniformAt(samples) => {
+                let point = uniform.points.iter().find(|point| point.samples >= samples);
+                race.to_flip(point.map_or(0.0, |point| point.flip_mean))
+            }
+        }
+    }
+}
+
+impl From<Quality> for String {
+    fn from(quality: Quality) -> Self {
+        quality.name()
+    }
+}
 
 /// The denoised picture of a rule with a budget. Files have it as a list in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -88,15 +125,15 @@ pub struct Race {
     pub rule: RaceRule,
     /// One a budget, ascending.
     pub points: Vec<RacePoint>,
-    /// What it needs for each of [`QUALITIES`].
+    /// What it needs for each of [`Quality::ALL`].
     pub needs: Vec<Need>,
 }
 
 /// What a rule needs for a quality.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Need {
-    /// One of [`QUALITIES`].
-    pub quality: &'static str,
+    /// For what.
+    pub quality: Quality,
     /// Mean samples a pixel.
     pub samples: Reached,
     /// Uniform sampling's over these; `None` where one of the two is a bound.
@@ -108,8 +145,8 @@ pub struct Need {
 pub struct RaceMean {
     /// The rule.
     pub rule: RaceRule,
-    /// One of [`QUALITIES`].
-    pub quality: &'static str,
+    /// For what.
+    pub quality: Quality,
     /// The mean; `None` where no pair has a ratio.
     pub uniform_over: Option<f64>,
     /// Pairs of races that it is the mean of.
@@ -121,23 +158,20 @@ pub struct RaceMean {
 /// Fills in what each rule needs, of the races of one scene with one denoiser.
 pub(super) fn compare_with_uniform(races: &mut [Race]) {
     let Some(uniform) = races.iter().find(|race| race.rule == RaceRule::Uniform).cloned() else { return };
-    let flip = uniform.points.iter().find(|point| point.samples >= 64.0).map_or(0.0, |point| point.flip_mean);
-    let needs = |race: &Race| [race.to_jod(9.8), race.to_jod(9.9), race.to_flip(flip)];
-    let of_uniform = needs(&uniform);
     for race in races {
-        let compared = QUALITIES.into_iter().zip(needs(race)).zip(of_uniform);
-        let need = |((quality, samples), uniform): ((&'static str, Reached), Reached)| {
-            let uniform_over = uniform.known().zip(samples.known()).map(|(uniform, own)| uniform / own);
+        let need = |quality: Quality| {
+            let [samples, of_uniform] = [&*race, &uniform].map(|race| quality.need(race, &uniform));
+            let uniform_over = of_uniform.known().zip(samples.known()).map(|(uniform, own)| uniform / own);
             Need { quality, samples, uniform_over }
         };
-        race.needs = compared.map(need).collect();
+        race.needs = Quality::ALL.map(need).to_vec();
     }
 }
 
 /// Means of every rule but uniform sampling.
 pub(super) fn means(races: &[Race]) -> Vec<RaceMean> {
     let rules = RaceRule::ALL.into_iter().filter(|&rule| rule != RaceRule::Uniform);
-    let each = rules.flat_map(|rule| QUALITIES.into_iter().map(move |quality| (rule, quality)));
+    let each = rules.flat_map(|rule| Quality::ALL.into_iter().map(move |quality| (rule, quality)));
     each.map(|(rule, quality)| {
         let of_rule = races.iter().filter(|race| race.rule == rule).flat_map(|race| &race.needs);
         let needs: Vec<&Need> = of_rule.filter(|need| need.quality == quality).collect();
@@ -171,6 +205,12 @@ mod tests {
         Race { scene: scene.to_owned(), denoiser: "none".to_owned(), rule, points, needs: Vec::new() }
     }
 
+    #[test]
+    fn qualities_have_their_names_in_files() {
+        let text = serde_json::to_string(&Quality::ALL).expect("JSON");
+        assert_eq!(text, r#"["JOD 9.8","JOD 9.9","FLIP of uniform at 64"]"#);
+    }
+
     /// As runs that are kept have them.
     #[test]
     fn points_are_lists_in_files() {
@@ -196,13 +236,13 @@ mod tests {
         // Uniform sampling does not come to JOD 9.9.
         assert_eq!((easy[0].needs[1].samples, easy[1].needs[1].uniform_over), (Reached::MoreThan(64.0), None));
         let means = means(&[easy, hard].concat());
-        let of = |quality: &str| {
+        let of = |quality: Quality| {
             let mean =
                 means.iter().find(|mean| mean.rule == RaceRule::Relative && mean.quality == quality).expect("there");
             (mean.uniform_over.map(|ratio| (100.0 * ratio).round()), mean.pairs, mean.pairs_left_out)
         };
-        assert_eq!(of("JOD 9.8"), (Some(200.0), 1, 1));
-        assert_eq!(of("JOD 9.9"), (None, 0, 2));
-        assert_eq!(of("FLIP of uniform at 64").1, 2);
+        assert_eq!(of(Quality::Jod(9.8)), (Some(200.0), 1, 1));
+        assert_eq!(of(Quality::Jod(9.9)), (None, 0, 2));
+        assert_eq!(of(Quality::FlipOfUniformAt(64.0)).1, 2);
     }
 }

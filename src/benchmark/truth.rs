@@ -38,7 +38,7 @@ impl Truth {
             signals(&displayed_rgb(&display, &mapped), width, height)
         });
         let own_energy = std::array::from_fn(|c| {
-            let half_difference = halves[0][c].combined(&halves[1][c], |a, b| 0.5 * (a - b));
+            let half_difference = halves[0][c].half_difference(&halves[1][c]);
             squared_visibility(channel(&thresholds, c), &half_difference)
         });
         let shown = signals(&displayed, width, height);

@@ -2,7 +2,7 @@
 
 use super::{Checkpoint, Header};
 use crate::adaptive::audit::MOST_INFLATION;
-use crate::adaptive::state::{RenderState, Seconds};
+use crate::adaptive::state::{RenderState, Seconds, can_be_seconds};
 use crate::output::OutputError;
 use crate::sealed::{Kind, SealedError};
 use fechner_perception::csf::FrameTiming;
@@ -109,7 +109,7 @@ fn check(header: &Header, state: &RenderState) -> Result<(), &'static str> {
         || !state.left_rung.is_none_or(is_rung)
         || !(1.0..=MOST_INFLATION).contains(&state.inflation)
         || !exposure.is_finite()
-        || ![total, perception, allocation, denoising].iter().all(|s| (0.0..1e12).contains(s))
+        || ![total, perception, allocation, denoising].into_iter().all(can_be_seconds)
     {
         return Err("its figures make no sense");
     }

@@ -13,6 +13,9 @@ const MOST_READ_AT_ONCE: usize = 8;
 /// Why films could not be merged.
 #[derive(Debug, thiserror::Error)]
 pub enum MergeError {
+    /// There are none.
+    #[error("there are no films to merge")]
+    NoFilms,
     /// One of them could not be used.
     #[error(transparent)]
     File(#[from] CheckpointError),
@@ -39,7 +42,7 @@ pub enum MergeError {
 /// Beside the sum, as many films are in memory as there are threads, at most 8.
 ///
 /// # Errors
-/// [`MergeError`] for a file that cannot be read, films of other scenes, sizes, versions or viewings than the first, and
+/// [`MergeError`] for no file at all, a file that cannot be read, films of other scenes, sizes, versions or viewings than the first, and
 /// films that share a seed.
 pub fn merge_files(paths: &[PathBuf]) -> Result<Checkpoint, MergeError> {
     let mut files = Vec::with_capacity(paths.len());
@@ -48,7 +51,7 @@ pub fn merge_files(paths: &[PathBuf]) -> Result<Checkpoint, MergeError> {
     }
     files.sort_by(|a, b| a.0.seeds.all.cmp(&b.0.seeds.all));
     check_seeds(&files)?;
-    let (first, rest) = files.split_first().expect("at least one film");
+    let (first, rest) = files.split_first().ok_or(MergeError::NoFilms)?;
     let is_sum = !rest.is_empty();
     let read_same = |file: &(Header, &Path)| {
         let film = read_same(file)?;

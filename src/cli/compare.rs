@@ -12,9 +12,10 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::adaptive::settings::THRESHOLD;
 use fechner::output::{self, Format, false_colour};
-use fechner_perception::csf;
 use fechner_perception::difference::{Difference, colour_difference};
 use fechner_perception::psychometric::detection_probability;
+use fechner_perception::tone::FittedTone;
+use fechner_perception::{ContrastSensitivity, Viewing, csf};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -96,6 +97,21 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
     if arguments.fps.is_some() || arguments.velocity.is_some() {
         bail!("--fps and --velocity are for sequences, whose names have # for each digit of the frame's number");
     }
+    check_targets(arguments)?;
+    let compared = Compared::read(arguments)?;
+    let difference = compared.difference()?;
+    let figures = compared.figures(&difference);
+    if let Some(path) = &arguments.map {
+        say!("{}: {}", path.display(), write_map(path, &difference)?);
+    }
+    if let Some(path) = &arguments.json {
+        write_json(path, &figures)?;
+    }
+    tell(&figures);
+    Ok(ExitCode::from(u8::from(figures.seen.is_visible)))
+}
+
+fn check_targets(arguments: &CompareArguments) -> Result<()> {
     let read = [
         ("the reference", Some(arguments.reference.as_path())),
         ("the test", Some(&arguments.test)),
@@ -108,47 +124,72 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
     if let Some(json) = &arguments.json {
         output::check_writable(json)?;
     }
-    let nits_per_unit = arguments.seeing.nits_per_unit;
-    let reference = InputPicture::read(&arguments.reference, nits_per_unit)?;
-    let test = InputPicture::read(&arguments.test, nits_per_unit)?;
-    check_alike((&arguments.reference, reference.shape()), (&arguments.test, test.shape()))?;
-    let pictures = [(arguments.reference.as_path(), &reference), (arguments.test.as_path(), &test)];
-    for (path, picture) in pictures {
-        picture.note_if_transparent(Source::single(path), "is judged before black and over white");
+    Ok(())
+}
+
+/// Two pictures, and who looks at them in which way.
+struct Compared<'a> {
+    arguments: &'a CompareArguments,
+    reference: InputPicture,
+    test: InputPicture,
+    viewing: Viewing,
+    csf: Box<dyn ContrastSensitivity>,
+    /// `None` where both are ready for the display.
+    fitted: Option<Box<dyn FittedTone>>,
+}
+
+impl<'a> Compared<'a> {
+    fn read(arguments: &'a CompareArguments) -> Result<Self> {
+        let nits_per_unit = arguments.seeing.nits_per_unit;
+        let reference = InputPicture::read(&arguments.reference, nits_per_unit)?;
+        let test = InputPicture::read(&arguments.test, nits_per_unit)?;
+        check_alike((&arguments.reference, reference.shape()), (&arguments.test, test.shape()))?;
+        let pictures = [(arguments.reference.as_path(), &reference), (arguments.test.as_path(), &test)];
+        for (path, picture) in pictures {
+            picture.note_if_transparent(Source::single(path), "is judged before black and over white");
+        }
+        arguments.seeing.note_what_is_ready(arguments.operator.as_deref(), &pictures);
+        arguments.seeing.note_area_of_colours();
+        let viewing = reference
+            .viewed(&arguments.seeing.viewing(&pictures)?)
+            .with_context(|| arguments.reference.display().to_string())?;
+        let csf = csf::by_name(&arguments.seeing.csf, &viewing)?;
+        let fitted = shown_by(arguments.operator.as_deref(), &pictures, &viewing)?;
+        Ok(Self { arguments, reference, test, viewing, csf, fitted })
     }
-    arguments.seeing.note_what_is_ready(arguments.operator.as_deref(), &pictures);
-    arguments.seeing.note_area_of_colours();
-    let viewing = reference
-        .viewed(&arguments.seeing.viewing(&pictures)?)
-        .with_context(|| arguments.reference.display().to_string())?;
-    let csf = csf::by_name(&arguments.seeing.csf, &viewing)?;
-    let fitted = shown_by(arguments.operator.as_deref(), &pictures, &viewing)?;
-    let (width, height) = reference.size();
-    let over = |ground: Ground| {
-        let [reference, test] =
-            [&reference, &test].map(|picture| picture.displayed_rgb_over(ground, fitted.as_deref(), &viewing));
-        colour_difference(&reference, &test, width, height, &viewing, csf.as_ref())
-    };
-    let mut difference = over(Ground::Black)?;
-    // What is dark hides its edges before black.
-    if reference.is_transparent() || test.is_transparent() {
-        difference = difference.or_worse(&over(Ground::White)?);
+
+    fn difference(&self) -> Result<Difference> {
+        let Self { reference, test, .. } = self;
+        let difference = self.difference_over(Ground::Black)?;
+        // What is dark hides its edges before black.
+        if reference.is_transparent() || test.is_transparent() {
+            return Ok(difference.or_worse(&self.difference_over(Ground::White)?));
+        }
+        Ok(difference)
     }
-    let figures = Figures {
-        reference: arguments.reference.display().to_string(),
-        test: arguments.test.display().to_string(),
-        display: viewing.display.name.clone(),
-        pixels_per_degree: viewing.display.pixels_per_degree,
-        csf: csf.name(),
-        operator: fitted.as_ref().map(|fitted| fitted.describe()),
-        seen: Seen::of(&difference),
-    };
-    if let Some(path) = &arguments.map {
-        say!("{}: {}", path.display(), write_map(path, &difference)?);
+
+    fn difference_over(&self, ground: Ground) -> Result<Difference> {
+        let (width, height) = self.reference.size();
+        let [reference, test] = [&self.reference, &self.test]
+            .map(|picture| picture.displayed_rgb_over(ground, self.fitted.as_deref(), &self.viewing));
+        Ok(colour_difference(&reference, &test, width, height, &self.viewing, self.csf.as_ref())?)
     }
-    if let Some(path) = &arguments.json {
-        write_json(path, &figures)?;
+
+    fn figures(&self, difference: &Difference) -> Figures {
+        let Self { arguments, viewing, .. } = self;
+        Figures {
+            reference: arguments.reference.display().to_string(),
+            test: arguments.test.display().to_string(),
+            display: viewing.display.name.clone(),
+            pixels_per_degree: viewing.display.pixels_per_degree,
+            csf: self.csf.name(),
+            operator: self.fitted.as_ref().map(|fitted| fitted.describe()),
+            seen: Seen::of(difference),
+        }
     }
+}
+
+fn tell(figures: &Figures) {
     answer!(
         "{}: worst visibility {:.2} (seen in a 1° patch with {:.1} %), {:.2} % of the picture above threshold, on \
          \"{}\" at {} pixels a degree (model-predicted; calibrated on gratings, not on renderings)",
@@ -159,7 +200,6 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<ExitCode> {
         figures.display,
         figures.pixels_per_degree
     );
-    Ok(ExitCode::from(u8::from(figures.seen.is_visible)))
 }
 
 /// Maps are pictures to look at.

@@ -6,6 +6,7 @@ mod watch;
 pub(super) use start::{CheckpointArguments, SeedsSoFar, Start, fit_in};
 pub(super) use watch::Watch;
 
+use super::words::count;
 use fechner::adaptive::state::RenderState;
 use fechner::checkpoint::{Header, write_checkpoint};
 use fechner::output::OutputError;
@@ -104,10 +105,10 @@ impl Keeper {
             return Err(error.into());
         }
         say!(
-            "Checkpoint {}: {:.1} MB, written {} times in {:.2} s, {:.1} % of the time.",
+            "Checkpoint {}: {:.1} MB, written {} in {:.2} s, {:.1} % of the time.",
             self.path.display(),
             history.bytes as f64 / 1e6,
-            history.writes,
+            count(history.writes as usize, "time"),
             history.writing.as_secs_f64(),
             100.0 * history.writing.as_secs_f64() / whole.as_secs_f64()
         );

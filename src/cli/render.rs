@@ -11,15 +11,15 @@ use super::signals::listen;
 use super::targets::{Named, check_kept, check_scene_kept};
 use super::tev::{Showing, TevArguments};
 use super::view::audience;
-use super::words::in_a_line;
+use super::words::{count, in_a_line};
 use anyhow::{anyhow, bail};
 use clap::Args;
 use fechner::adaptive::judge::JudgeError;
 use fechner::adaptive::settings::LoopSettings;
 use fechner::adaptive::state::RenderState;
 use fechner::adaptive::{self, Rendered, StopReason};
-use fechner::checkpoint::{Header, Origin};
-use fechner::integrator::{Crop, PathTracer};
+use fechner::checkpoint::{Header, Origin, SettingsRecord};
+use fechner::integrator::{Crop, PathTracer, TraceSettings};
 use fechner::output::rendered::Background;
 use fechner::output::{self, PartOf};
 use std::ffi::OsStr;
@@ -89,23 +89,15 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     prepared.fit_to_whole(kept_fit);
     let seconds_fitting = fitting.elapsed().as_secs_f64();
     let Prepared { scene, trace, record, settings, .. } = prepared;
-    let Crop { width, height, .. } = trace.film_area();
-    let fresh = RenderState::new(width, height, &settings.limits);
     let audience = arguments.view.then(|| audience(&scene, &trace, &settings, &record)).transpose()?;
-    let (mut state, seeds, keeper) = if let Some(origin) = origin {
-        let header = Header::begun(origin, trace.seed, record, settings.limits.last_rung());
-        let Start { header, state, seeds } = arguments.checkpoint.start(header, fresh, &settings)?;
-        (state, seeds.clone(), Some(Keeper::new(&arguments.checkpoint, header, seeds)))
-    } else {
-        (fresh, SeedsSoFar::of_one(trace.seed), None)
-    };
+    let Begun { mut state, seeds, keeper } = begin(arguments, origin, &trace, record, &settings)?;
     // A glimpse of the whole is a look, and may take longer than a part.
     state.seconds.total += seconds_fitting;
     state.seconds.perception += seconds_fitting;
     let tracer = PathTracer::new(scene, trace);
     let degenerate = tracer.world().degenerate_triangles();
     if degenerate > 0 {
-        say!("note: {degenerate} triangles without area were left out");
+        say!("note: {} without area left out", count(degenerate, "triangle"));
     }
     let tev = arguments.tev.open(&arguments.job.scene_name())?.map(|tev| Showing::new(tev, settings.nits_per_unit));
     let watch = Watch::new(stop, Console::new(settings.limits.time), keeper, audience, tev);
@@ -119,22 +111,71 @@ fn render_and_write(arguments: &RenderArguments, format: output::Format) -> anyh
     };
     let seeds = &seeds.of(&rendered.film).all;
     let report = Report::new(&arguments.job.scene_name(), seeds, &settings, &rendered);
-    let background = arguments.job.background();
-    let part_of = PartOf::of(&trace);
-    let write = |path: &Path| write_picture(path, format, background, &rendered, &settings, &report, part_of);
-    let picture = write(&arguments.output).map_err(|error| kept_elsewhere(&arguments.output, write, error));
-    let maps = arguments.maps.iter().try_for_each(|map| {
-        say!("{}", map.write(&rendered, settings.limits.visibility_or_threshold())?);
-        Ok(())
-    });
-    let figures = arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, &report));
+    let files = FilesWritten::try_all(arguments, format, &rendered, &settings, &report, PartOf::of(&trace));
     say!("{}", summary(&report, &settings, &rendered, interrupter));
     let is_unfinished = rendered.stop_reason == StopReason::Interrupted && interrupter == Interrupter::Signal;
+    let FilesWritten { picture, maps, figures } = files;
     if picture.is_ok() && (maps.is_err() || figures.is_err()) {
         say!("note: the picture is in {}", arguments.output.display());
     }
     all_written([picture, maps, figures, watch.report()])?;
     Ok(if is_unfinished { ExitCode::from(CALL_AGAIN) } else { ExitCode::SUCCESS })
+}
+
+/// What a render begins with.
+struct Begun {
+    state: RenderState,
+    seeds: SeedsSoFar,
+    /// Where there is a film to keep.
+    keeper: Option<Keeper>,
+}
+
+/// Begins anew, or with the film that is kept: `origin` is its own where one is wanted.
+fn begin(
+    arguments: &RenderArguments,
+    origin: Option<Origin>,
+    trace: &TraceSettings,
+    record: SettingsRecord,
+    settings: &LoopSettings,
+) -> anyhow::Result<Begun> {
+    let Crop { width, height, .. } = trace.film_area();
+    let fresh = RenderState::new(width, height, &settings.limits);
+    let Some(origin) = origin else {
+        return Ok(Begun { state: fresh, seeds: SeedsSoFar::of_one(trace.seed), keeper: None });
+    };
+    let header = Header::begun(origin, trace.seed, record, settings.limits.last_rung());
+    let Start { header, state, seeds } = arguments.checkpoint.start(header, fresh, settings)?;
+    let keeper = Keeper::new(&arguments.checkpoint, header, seeds.clone());
+    Ok(Begun { state, seeds, keeper: Some(keeper) })
+}
+
+/// What became of the files of a render.
+struct FilesWritten {
+    picture: anyhow::Result<()>,
+    maps: anyhow::Result<()>,
+    figures: anyhow::Result<()>,
+}
+
+impl FilesWritten {
+    /// Each is tried, whatever became of the others.
+    fn try_all(
+        arguments: &RenderArguments,
+        format: output::Format,
+        rendered: &Rendered,
+        settings: &LoopSettings,
+        report: &Report,
+        part_of: Option<PartOf>,
+    ) -> Self {
+        let background = arguments.job.background();
+        let write = |path: &Path| write_picture(path, format, background, rendered, settings, report, part_of);
+        let picture = write(&arguments.output).map_err(|error| kept_elsewhere(&arguments.output, write, error));
+        let maps = arguments.maps.iter().try_for_each(|map| {
+            say!("{}", map.write(rendered, settings.limits.visibility_or_threshold())?);
+            Ok(())
+        });
+        let figures = arguments.json.as_ref().map_or(Ok(()), |path| write_json(path, report));
+        Self { picture, maps, figures }
+    }
 }
 
 /// What ended a render without a picture; its film is kept, or that it is not is said as well.
@@ -145,7 +186,7 @@ fn failed(error: &JudgeError, watch: Watch<'_>) -> anyhow::Error {
     }
 }
 
-/// All that could not be written, in one error: each file is tried, whatever became of the others.
+/// All that could not be written, in one error.
 fn all_written(files: impl IntoIterator<Item = anyhow::Result<()>>) -> anyhow::Result<()> {
     let failures: Vec<String> = files.into_iter().filter_map(Result::err).map(|error| in_a_line(&error)).collect();
     if failures.is_empty() { Ok(()) } else { bail!(failures.join("; ")) }

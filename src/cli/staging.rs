@@ -82,10 +82,13 @@ fn parse_look_at(text: &str) -> Result<LookAt, String> {
     };
     let look = match numbers(text).as_deref() {
         Some(values @ [_, _, _, _, _, _]) => look(values, None),
-        Some(values @ [_, _, _, _, _, _, fov]) if (0.001..=179.0).contains(fov) => look(values, Some(*fov)),
+        Some(values @ [_, _, _, _, _, _, fov]) if Camera::FOV_DEG.contains(&f64::from(*fov)) => {
+            look(values, Some(*fov))
+        }
         _ => {
+            let (least, most) = Camera::FOV_DEG.into_inner();
             return Err(format!(
-                "\"{text}\": expected X,Y,Z,X,Y,Z and perhaps a field of view in [0.001, 179] degrees"
+                "\"{text}\": expected X,Y,Z,X,Y,Z and perhaps a field of view in [{least}, {most}] degrees"
             ));
         }
     };

@@ -1,4 +1,8 @@
-//! `fechner threshold`: how much noise may stay in a picture, and how visible the noise is that it has.
+//! `fechner threshold`: how much noise may stay in a picture, and how visible the noise is that it has; in `made_of` what a picture has of its
+//! halves, in `motion` how what it shows moves.
+
+mod made_of;
+mod motion;
 
 use super::animate::parse_rate;
 use super::channels;
@@ -15,12 +19,12 @@ use fechner::output::{self, Attribute, Format, PIXEL_ASPECT_RATIO, Picture, chan
 use fechner_perception::colour::chromatic_visibility;
 use fechner_perception::display::Glare;
 use fechner_perception::model::{self, ModelInputs, ThresholdModel};
-use fechner_perception::motion::image_velocity_deg_s;
 use fechner_perception::photometry::luminance;
-use fechner_perception::saliency::saliency_of_displayed;
 use fechner_perception::tone::acuity::BehindAcuity;
 use fechner_perception::tone::{FittedTone, map_picture, map_pixels};
 use fechner_perception::{ContrastSensitivity, GuideNoise, Plane, ThresholdInputs, Viewing, csf, threshold_map};
+use made_of::MadeOf;
+use motion::{Motion, check_knows_motion, velocity_in};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `threshold`.
@@ -252,15 +256,6 @@ fn viewing(
     Ok(viewing)
 }
 
-fn check_knows_motion(model: &dyn ThresholdModel) -> Result<()> {
-    if model.knows_motion() {
-        return Ok(());
-    }
-    let knows = |name: &&&str| model::by_name(name).is_some_and(|model| model.knows_motion());
-    let known: Vec<&str> = model::names().iter().filter(knows).copied().collect();
-    bail!("--velocity: the model {} knows no motion; {} do", model.name(), known.join(", "))
-}
-
 /// The two renders, of the guide's size.
 fn read_halves(arguments: &ThresholdArguments, guide: &InputPicture) -> Result<Option<[InputPicture; 2]>> {
     let Some([a_path, b_path]) = arguments.halves.as_deref() else { return Ok(None) };
@@ -285,115 +280,9 @@ struct HalfDifference {
     luminance: Plane,
 }
 
-/// What a guide has of the halves.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum MadeOf {
-    /// It is the mean of their values in every pixel.
-    TheirMean,
-    /// One of them, or a mean with other weights: its noise depends on how noisy each of them is, which two pictures do not tell. A reference
-    /// beside a render was taken to be as noisy as that, and noise to be 1.6 times as visible as it is.
-    OneMoreThanTheOther,
-    /// Neither, as far as is known.
-    Else,
-}
-
-impl MadeOf {
-    /// By values in every pixel, as near as files round.
-    fn of(guide: &InputPicture, [a, b]: &[InputPicture; 2]) -> Self {
-        /// Of halves, with 11 bits: the guide's own rounding, and that of what it is made of.
-        const ROUNDING: f64 = 1.0 / 1024.0;
-        /// Of the halves' squared difference, which a mean's rounding is far below, and a clean picture's distance from their means is not:
-        /// 0.25.
-        const LEFT: f64 = 0.04;
-        if !(guide.has_values_like(a) && guide.has_values_like(b)) {
-            return Self::Else;
-        }
-        // What files hold between black and white has 8 bits, perhaps.
-        let step = if guide.holds_codes() { 1.0 / 255.0 } else { 1e-6 };
-        let values = || {
-            let [guide, a, b] =
-                [guide, a, b].map(|picture| picture.codes().as_flattened().iter().map(|&v| f64::from(v)));
-            guide.zip(a.zip(b))
-        };
-        let (along, squared) = values().fold((0.0, 0.0), |(along, squared), (guide, (a, b))| {
-            (along + (guide - b) * (a - b), squared + (a - b).powi(2))
-        });
-        let share = along / squared;
-        let residual = |(guide, (a, b)): (f64, (f64, f64))| guide - (share * a + (1.0 - share) * b);
-        let rounds =
-            |value @ (_, (a, b)): (f64, (f64, f64))| residual(value).abs() <= ROUNDING * (a.abs() + b.abs()) + step;
-        // Where halves hardly differ, any clean picture is a mean of them to within rounding.
-        let residuals: f64 = values().map(|value| residual(value).powi(2)).sum();
-        let is_mean = residuals <= LEFT * squared && values().all(rounds);
-        match share {
-            0.49..=0.51 if is_mean => Self::TheirMean,
-            -0.01..=1.01 if is_mean => Self::OneMoreThanTheOther,
-            _ => Self::Else,
-        }
-    }
-
-    fn told(self) -> Option<&'static str> {
-        match self {
-            Self::TheirMean => {
-                Some("it is the mean of the halves: what noise it has by them is not taken for detail that hides noise")
-            }
-            Self::OneMoreThanTheOther => Some(
-                "it is one of the halves, or has more of one: how noisy it is cannot be told, and what noise it has counts as detail that \
-                 hides noise; their mean, or a picture without noise, is better",
-            ),
-            Self::Else => None,
-        }
-    }
-}
-
 /// (A − B)/2 of what the display shows, linear RGB in cd/m².
 fn half_difference([a, b]: &[Vec<[f32; 3]>; 2]) -> Vec<[f32; 3]> {
     a.iter().zip(b).map(|(a, b)| std::array::from_fn(|c| 0.5 * (a[c] - b[c]))).collect()
-}
-
-/// How what a picture shows moves.
-struct Motion {
-    /// Speed over the picture, of the motions to the next frame and to the previous one the slower.
-    image_velocity_deg_s: Plane,
-    /// How much each pixel attracts the gaze, 0 to 1; `None`: everything is followed.
-    attention: Option<Plane>,
-}
-
-impl Motion {
-    fn of(
-        motions: &[[Plane; 2]; 2],
-        by_saliency: bool,
-        guide: &InputPicture,
-        fitted: Option<&dyn FittedTone>,
-        viewing: &Viewing,
-    ) -> Result<Self> {
-        let speed = |[x, y]: &[Plane; 2]| image_velocity_deg_s(x, y, &viewing.display);
-        let [to_next, to_previous] = motions.each_ref().map(speed);
-        let image_velocity_deg_s = to_next?.combined(&to_previous?, f32::min);
-        let attention = if by_saliency {
-            let rgb = guide.displayed_rgb(fitted, viewing);
-            Some(saliency_of_displayed(guide.size().0, &rgb, &image_velocity_deg_s, &viewing.display)?)
-        } else {
-            None
-        };
-        Ok(Self { image_velocity_deg_s, attention })
-    }
-}
-
-/// Motion in pixels to the next frame and to the previous one, under the names that renderers give it.
-fn velocity_in(path: &Path, exr: &ExrImage, frames_per_second: f64) -> Result<[[Plane; 2]; 2]> {
-    let (Some((layer, _)), Some(motions)) = (channels::motion(exr), channels::both_motions(exr)) else {
-        bail!(
-            "{}: no motion channels; velocity.X/Y, Vector.X/Y, motion.X/Y and forward.u/v are known, with or without a layer \
-             before them",
-            path.display()
-        );
-    };
-    answer!("motion from the channels of {layer} at {frames_per_second} frames a second");
-    let planes = |[x, y]: [Vec<f32>; 2]| -> Result<[Plane; 2]> {
-        Ok([channels::motion_plane(path, exr, x)?, channels::motion_plane(path, exr, y)?])
-    };
-    Ok([planes(motions.to_next)?, planes(motions.to_previous)?])
 }
 
 fn median(plane: &Plane) -> f32 {

@@ -106,6 +106,22 @@ pub enum ManifestError {
 }
 
 impl Manifest {
+    /// One of this program and format.
+    pub fn new(work: Work, directory: PathBuf, arguments: Vec<String>, frames: Vec<FrameEntry>) -> Self {
+        Self {
+            farm_format: FORMAT,
+            program: PROGRAM.to_owned(),
+            work,
+            directory,
+            arguments,
+            picture_format: PictureFormat::Exr,
+            passes: 1,
+            unit_samples: 0,
+            keeps_films: false,
+            frames,
+        }
+    }
+
     /// Reads and checks one; `path` is for messages.
     pub(super) fn parse(path: &Path, text: &[u8]) -> Result<Self, ManifestError> {
         let manifest: Self =
@@ -131,24 +147,6 @@ impl Manifest {
             Some("passes must be at least 1".to_owned())
         } else {
             None
-        }
-    }
-}
-
-impl Manifest {
-    /// One of this program and format.
-    pub fn new(work: Work, directory: PathBuf, arguments: Vec<String>, frames: Vec<FrameEntry>) -> Self {
-        Self {
-            farm_format: FORMAT,
-            program: PROGRAM.to_owned(),
-            work,
-            directory,
-            arguments,
-            picture_format: PictureFormat::Exr,
-            passes: 1,
-            unit_samples: 0,
-            keeps_films: false,
-            frames,
         }
     }
 }

@@ -16,6 +16,8 @@
 //! concluded                              what needs all frames is made
 //! ```
 //!
+//! [`folder`] knows where each of them is.
+//!
 //! Every file is complete or not there; locks spare work and protect nothing. Schedulers are outside: they run commands.
 //! Not for one machine alone: there [`crate::adaptive::render`] does the same without files.
 

@@ -91,7 +91,7 @@ pub fn hand_out(farm: &Farm, frame_index: usize, state: &RenderState) -> Result<
             seed: order.seed,
             first_block,
             blocks: order.blocks.len(),
-            samples: order.blocks.iter().map(|block| u64::from(block.samples)).sum(),
+            samples: order.samples(),
         });
         first_block += order.blocks.len();
     }

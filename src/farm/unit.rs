@@ -2,6 +2,7 @@
 
 use super::folder::Farm;
 use crate::adaptive::beginning;
+use crate::adaptive::state::can_be_seconds;
 use crate::film::BlockSum;
 use crate::integrator::{BlockWork, PathTracer};
 use crate::output::OutputError;
@@ -38,6 +39,13 @@ pub struct Order {
     pub seed: u64,
     /// What to sample, in order.
     pub blocks: Vec<BlockWork>,
+}
+
+impl Order {
+    /// Samples of all its blocks.
+    pub fn samples(&self) -> u64 {
+        self.blocks.iter().map(|block| u64::from(block.samples)).sum()
+    }
 }
 
 /// An order with the hash of its file, by which its sums are known.
@@ -156,7 +164,7 @@ impl UnitSums {
         }
         let blocks = &order.order.blocks;
         let are_sound = sums.sums.iter().zip(blocks).all(|(sum, block)| sum.is_of(block.samples));
-        if sums.sums.len() > blocks.len() || !are_sound || !(0.0..1e12).contains(&sums.seconds) {
+        if sums.sums.len() > blocks.len() || !are_sound || !can_be_seconds(sums.seconds) {
             return Err(SUMS.damaged(path, "its figures make no sense").into());
         }
         Ok(sums)

@@ -1,6 +1,6 @@
 //! What the film says so far, in cd/m².
 
-use super::{Film, HalfPixel, Halves, opponent};
+use super::{Film, HalfPixel, Halves};
 use crate::sampler::Half;
 use fechner_perception::Plane;
 
@@ -40,12 +40,11 @@ impl Film {
             Plane::from_fn(width, height, |x, y| value(self.halves(y * width + x)) as f32)
         };
         let nits = nits_per_unit;
-        let luminance = |half: &HalfPixel| opponent(half.mean)[0];
         Estimate {
             rgb_cd_m2: (0..width * height).map(|pixel| self.rgb_cd_m2(pixel, nits)).collect(),
-            luminance_cd_m2: plane(&|halves| nits * halves.mean(luminance)),
+            luminance_cd_m2: plane(&|halves| nits * halves.mean(HalfPixel::luminance)),
             variance_of_mean: plane(&|halves| nits * nits * halves.variance_of_mean(0)),
-            half_difference: plane(&|halves| nits * halves.half_difference(luminance)),
+            half_difference: plane(&|halves| nits * halves.half_difference(HalfPixel::luminance)),
         }
     }
 }

@@ -26,6 +26,13 @@ fn variance_of_mean_of_both(of_sample: [f64; 2], samples: [u32; 2]) -> f64 {
     0.25 * (of_half(0) + of_half(1))
 }
 
+impl HalfPixel {
+    /// Of the mean, scene units.
+    pub fn luminance(&self) -> f64 {
+        opponent(self.mean)[0]
+    }
+}
+
 impl<'a> Halves<'a> {
     /// Of A and B.
     pub fn of([a, b]: [&'a HalfPixel; 2]) -> Self {

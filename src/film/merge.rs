@@ -14,25 +14,28 @@ impl Film {
     /// of other random numbers.
     ///
     /// # Errors
-    /// Where a pixel would hold more samples than can be counted.
+    /// Where a pixel would hold more samples than can be counted; nothing is added then.
+    ///
+    /// # Panics
+    /// For a film of another size.
     pub fn add(&mut self, other: &Film) -> Result<(), &'static str> {
         assert_eq!((self.width, self.height), (other.width, other.height), "films of one size");
+        let overflows = |(own, others): (&HalfPixel, &HalfPixel)| own.taken.saturating_add(others.taken) > MOST_TAKEN;
+        if self.halves.iter().zip(&other.halves).any(|(own, others)| own.iter().zip(others).any(overflows)) {
+            return Err("a pixel would have more samples than can be counted");
+        }
         let [a, b] = &mut self.halves;
         let [other_a, other_b] = &other.halves;
         let pixels = (&mut self.guides, &mut self.guides_of_a, a, b).into_par_iter();
         let others = (&other.guides, &other.guides_of_a, other_a, other_b).into_par_iter();
-        let fits = pixels.zip(others).with_min_len(PIXELS_A_TASK).map(
+        pixels.zip(others).with_min_len(PIXELS_A_TASK).for_each(
             |((guide, guide_of_a, a, b), (other_guide, other_guide_of_a, other_a, other_b))| {
                 guide.add(other_guide, a.samples + b.samples, other_a.samples + other_b.samples);
                 guide_of_a.add(other_guide_of_a, a.samples, other_a.samples);
                 a.add(other_a);
                 b.add(other_b);
-                a.taken.max(b.taken) <= MOST_TAKEN
             },
         );
-        if !fits.reduce(|| true, |one, two| one && two) {
-            return Err("a pixel would have more samples than can be counted");
-        }
         self.nonfinite_samples = self.nonfinite_samples.saturating_add(other.nonfinite_samples);
         self.rays = self.rays.saturating_add(other.rays);
         Ok(())
@@ -67,7 +70,8 @@ impl Film {
             return Err("its pixels are not as many as its size says");
         }
         let is_sound = |pixel: &HalfPixel| {
-            pixel.samples <= pixel.taken
+            pixel.missed <= pixel.samples
+                && pixel.samples <= pixel.taken
                 && pixel.taken <= MOST_TAKEN
                 && pixel.mean.iter().all(|mean| mean.is_finite())
                 && pixel.m2.iter().all(|m2| m2.is_finite() && *m2 >= 0.0)
@@ -180,6 +184,16 @@ mod tests {
     }
 
     #[test]
+    fn a_sum_that_cannot_be_counted_is_not_begun() {
+        let film = film_of(&[1.0, 2.0]);
+        let mut full = film.clone();
+        full.halves[1][0].taken = MOST_TAKEN;
+        let mut sum = film.clone();
+        sum.add(&full).expect_err("too many");
+        assert_eq!(sum, film);
+    }
+
+    #[test]
     fn what_no_render_leaves_is_found() {
         let changed = |change: &dyn Fn(&mut Film)| {
             let mut film = film_of(&[1.0, 2.0]);
@@ -193,6 +207,7 @@ mod tests {
         assert!(changed(&|film| film.halves[1][0].mean[2] = f64::NAN));
         assert!(changed(&|film| film.halves[0][0].m2[1] = -1.0));
         assert!(changed(&|film| film.halves[0][0].samples = 9));
+        assert!(changed(&|film| film.halves[1][0].missed = 2), "alpha would be below 0");
         assert!(changed(&|film| film.halves[0][0].taken = u32::MAX));
         assert!(changed(&|film| film.guides[0].albedo[0] = f32::INFINITY));
         assert!(changed(&|film| film.guides.clear()));

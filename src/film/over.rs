@@ -1,6 +1,6 @@
 //! A film whose uncovered parts let an even ground through.
 
-use super::{CHANNELS, Film, HalfPixel, opponent};
+use super::{CHANNELS, Film, HalfPixel};
 
 impl Film {
     /// The film as shown before a ground that is `ground_cd_m2` brighter than black: luminance alone, in cd/m². `scale`: displayed variance over
@@ -30,7 +30,7 @@ impl HalfPixel {
             over.m2[0] = f32::INFINITY;
             return over;
         }
-        let light = scale.sqrt() * opponent(self.mean)[0];
+        let light = scale.sqrt() * self.luminance();
         let of_light = scale * f64::from(self.m2[0]);
         let of_ground = ground_cd_m2 * ground_cd_m2 * missed * (1.0 - missed_share);
         let of_both = -2.0 * ground_cd_m2 * missed * light;

@@ -325,7 +325,7 @@ fn scatter(path: &mut PathState, hit: &Hit, point: &SurfacePoint, shading: &Shad
 }
 
 /// Goes on behind a clear sheet. A lamp that is met there is weighed as seen from where the direction was scattered, since a shadow
-/// ray from there might have found it as well: see [`super::sheets`].
+/// ray from there might have found it as well: see [`super::thin_sheets`].
 fn pass_sheet(path: &mut PathState, hit: &Hit, point: &SurfacePoint, share: Vec3) -> bool {
     path.throughput *= share;
     path.behind.distance += hit.distance;

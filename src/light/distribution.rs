@@ -3,7 +3,7 @@
 /// Over a row of cells in proportion to their weights.
 #[derive(Clone, Debug)]
 pub(super) struct Distribution1d {
-    /// cumulative[i] is the probability of the cells before i; one more entry than cells, the last is 1.
+    /// `cumulative[i]` is the probability of the cells before i; one more entry than cells, the last is 1.
     cumulative: Vec<f32>,
 }
 
@@ -50,7 +50,7 @@ impl Distribution1d {
         self.cumulative[index]
     }
 
-    /// The cell with cumulative[i] ≤ u < cumulative[i + 1]: never one of probability 0.
+    /// The cell with `cumulative[i] ≤ u < cumulative[i + 1]`: never one of probability 0.
     fn cell_of(&self, u: f32) -> usize {
         let u = u.clamp(0.0, 1.0 - f32::EPSILON / 2.0);
         self.cumulative.partition_point(|&c| c <= u) - 1

@@ -13,6 +13,9 @@ use tempfile::NamedTempFile;
 ///
 /// If `write` fails, the new file is removed and the target stays as it was. A symbolic link is followed: the file that it
 /// points to is replaced or made, not the link.
+///
+/// # Errors
+/// That of `write`, or if the file cannot be made or put in its place.
 pub fn write_beside(path: &Path, write: impl FnOnce(&mut File) -> std::io::Result<()>) -> Result<(), OutputError> {
     let (mut file, target) = create_beside(path)?;
     let io = |error| OutputError::Io { path: path.to_owned(), error };

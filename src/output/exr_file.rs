@@ -23,6 +23,9 @@ const F16_MAX: f32 = 65504.0;
 ///
 /// Values that a file should not hold are replaced rather than refused, since a picture may be hours of work: NaN by 0,
 /// infinities and halves out of range by the largest finite value. The attribute [`REPLACED_VALUES`] then counts them.
+///
+/// # Errors
+/// If the file cannot be written.
 pub fn write_exr(path: &Path, picture: &Picture<'_>) -> Result<(), OutputError> {
     check(path, picture)?;
     let mut replaced = 0;

@@ -259,6 +259,9 @@ pub enum Format {
 
 impl Format {
     /// The format that a file's name asks for, by its ending, upper or lower case.
+    ///
+    /// # Errors
+    /// For any other ending.
     pub fn of(path: &Path) -> Result<Self, OutputError> {
         match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
             Some("png") => Ok(Self::Png),
@@ -270,6 +273,9 @@ impl Format {
 
 /// Tells whether `path` can be written, before the work is done: known ending, existing folder that lets files be made,
 /// and nothing but a file in its place. Leaves nothing behind.
+///
+/// # Errors
+/// Says why not.
 pub fn check_target(path: &Path) -> Result<Format, OutputError> {
     let format = Format::of(path)?;
     beside::create_beside(path)?;
@@ -277,6 +283,9 @@ pub fn check_target(path: &Path) -> Result<Format, OutputError> {
 }
 
 /// Tells whether any file can be written at `path`, whatever its ending. Leaves nothing behind.
+///
+/// # Errors
+/// Says why not.
 pub fn check_writable(path: &Path) -> Result<(), OutputError> {
     beside::create_beside(path).map(|_| ())
 }

@@ -11,6 +11,9 @@ use std::path::Path;
 
 /// Writes linear display RGB, where 0 is the display's black and 1 its white, as the display wants it: [`write_pq_png`] for
 /// one of SMPTE ST 2084, [`write_png`] for all others, which colour management brings to them.
+///
+/// # Errors
+/// If the file cannot be written.
 pub fn write_png_for(
     path: &Path,
     width: u32,
@@ -35,6 +38,9 @@ const CICP_BT2020_PQ: [u8; 4] = [9, 16, 0, 1];
 ///
 /// Values are absolute: `rgb_linear_display` of 0 is the display's black, 1 its white, both in cd/m². What the screen reflects
 /// of the room is not in the codes, since it adds that by itself. NaN becomes black.
+///
+/// # Errors
+/// If the file cannot be written.
 pub fn write_pq_png(
     path: &Path,
     width: u32,
@@ -115,6 +121,9 @@ fn encode_pq16(rgb_linear_display: &[[f32; 3]], display: &Display) -> Vec<u8> {
 ///
 /// Values are clamped to [0, 1] and NaN becomes black. Rounding is dithered by up to one step, the same in all three
 /// channels so that greys stay grey, by a hash of the pixel's place so that equal pixels give equal files.
+///
+/// # Errors
+/// If the file cannot be written.
 pub fn write_png(path: &Path, width: u32, height: u32, rgb_linear_display: &[[f32; 3]]) -> Result<(), OutputError> {
     check_size(path, width, height, &[("the picture", rgb_linear_display.len())])?;
     let bytes = encode_srgb8(width, rgb_linear_display);
@@ -122,6 +131,9 @@ pub fn write_png(path: &Path, width: u32, height: u32, rgb_linear_display: &[[f3
 }
 
 /// Writes 8-bit sRGB codes, RGB after RGB, as they are.
+///
+/// # Errors
+/// If the file cannot be written.
 pub fn write_codes_png(path: &Path, width: u32, height: u32, rgb8: &[u8]) -> Result<(), OutputError> {
     check_size(path, width, height, &[("the picture", rgb8.len() / 3)])?;
     write_samples(path, (width, height), 1.0, png::ColorType::Rgb, Codes::Srgb8, rgb8)
@@ -141,6 +153,9 @@ pub struct Shown<'a> {
 }
 
 /// [`write_png_for`] with an alpha in [0, 1] a pixel, by which the colours are not multiplied.
+///
+/// # Errors
+/// If the file cannot be written.
 pub fn write_png_with_alpha_for(
     path: &Path,
     width: u32,
@@ -154,6 +169,9 @@ pub fn write_png_with_alpha_for(
 }
 
 /// [`write_png_for`] of a picture that may have an alpha, and pixels that are not square, which its chunk pHYs says.
+///
+/// # Errors
+/// If the file cannot be written.
 pub fn write_shown_png(path: &Path, picture: &Shown<'_>, display: &Display) -> Result<(), OutputError> {
     let Shown { size: (width, height), rgb_linear_display, alpha, pixel_aspect_ratio } = *picture;
     let counts = [Some(("the picture", rgb_linear_display.len())), alpha.map(|alpha| ("alpha", alpha.len()))];

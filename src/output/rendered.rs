@@ -23,6 +23,9 @@ pub enum Background {
 
 /// Writes the picture through its tone operator, coded for the display. A transparent background gives straight alpha, the
 /// colours being those of what covers the pixel.
+///
+/// # Errors
+/// If the file cannot be written.
 pub fn write_display_png(
     path: &Path,
     rendered: &Rendered,
@@ -57,6 +60,9 @@ pub fn divided_by_alpha(rgb: &[[f32; 3]], alpha: &[f32]) -> Vec<[f32; 3]> {
 /// error in display cd/m² that is at visibility 1) and predicted visibility. A picture that is denoised has the raw mean in
 /// `raw` beside it, the visible parts of its noise and of its bias, and 1 in `unproven` where no witness shows that bias
 /// stays below one and a half times `target`. A crop is a part of the whole picture.
+///
+/// # Errors
+/// If the file cannot be written.
 pub fn write_layers_exr(
     path: &Path,
     rendered: &Rendered,

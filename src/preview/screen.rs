@@ -180,7 +180,7 @@ impl Screen {
 
     /// Shows a film to all viewers.
     pub(super) fn publish(&mut self, scenery: Scenery<'_>, shared: &Arc<Shared>) {
-        if pixels(scenery.film) == 0 {
+        if scenery.film.pixel_count() == 0 {
             return;
         }
         let nits_per_unit = scenery.settings.nits_per_unit;
@@ -228,7 +228,7 @@ impl Screen {
 
     fn provisional_tone(&mut self, scenery: Scenery<'_>, rgb_cd_m2: &[[f32; 3]]) -> &dyn FittedTone {
         let Scenery { film, settings, is_at_rest, step, .. } = scenery;
-        let (pixels, samples) = (pixels(film), self.total_samples);
+        let (pixels, samples) = (film.pixel_count(), self.total_samples);
         // What rests is shown by a fit of its own.
         self.provisional = self.provisional.take().filter(|tone| !is_at_rest && tone.holds(pixels, samples));
         let tone = self.provisional.get_or_insert_with(|| ProvisionalTone {
@@ -263,7 +263,7 @@ impl Screen {
             (Layer::Normal, _) => layer::normal(film),
             (Layer::Depth, _) => layer::depth(film),
             (Layer::Velocity, _) => match &self.motion {
-                Motion::Known { to_next_px, frames_per_second } if to_next_px.len() == pixels(film) => {
+                Motion::Known { to_next_px, frames_per_second } if to_next_px.len() == film.pixel_count() => {
                     layer::velocity(to_next_px, *frames_per_second)
                 }
                 Motion::Known { .. } => layer::unknown(film, "known when the camera rests"),
@@ -299,10 +299,6 @@ const ALL: [Layer; layer::LAYERS] = [
     Layer::Velocity,
 ];
 
-fn pixels(film: &Film) -> usize {
-    film.width() as usize * film.height() as usize
-}
-
 /// The film's picture, cd/m², and its samples of each pixel; where it has none, another pixel's picture. In one walk: a film is
 /// many times as large as a picture.
 fn composed(film: &Film, nits_per_unit: f64, is_at_rest: bool) -> (Vec<[f32; 3]>, Vec<u32>) {
@@ -318,7 +314,7 @@ fn composed(film: &Film, nits_per_unit: f64, is_at_rest: bool) -> (Vec<[f32; 3]>
         samples => (light(pixel), samples),
     };
     let (mut rgb, mut samples) = (Vec::new(), Vec::new());
-    (0..pixels(film)).into_par_iter().map(of_pixel).unzip_into_vecs(&mut rgb, &mut samples);
+    (0..film.pixel_count()).into_par_iter().map(of_pixel).unzip_into_vecs(&mut rgb, &mut samples);
     (rgb, samples)
 }
 

@@ -207,6 +207,5 @@ fn message(shown: &Shown<'_>) -> Message {
 }
 
 fn counts(film: &Film) -> Vec<f32> {
-    let pixels = film.width() as usize * film.height() as usize;
-    (0..pixels).map(|pixel| film.samples(pixel) as f32).collect()
+    (0..film.pixel_count()).map(|pixel| film.samples(pixel) as f32).collect()
 }

@@ -145,7 +145,7 @@ fn mitchell(x: f64) -> f64 {
 /// One axis of a separable filter as a staircase: cells of equal width, sampled in proportion to their mean height.
 struct Profile {
     radius_px: f32,
-    /// cumulative[i] is the probability of the cells before i.
+    /// `cumulative[i]` is the probability of the cells before i.
     cumulative: Vec<f32>,
     /// Sign of a cell's height times ∫|f| / ∫f.
     weight: Vec<f32>,

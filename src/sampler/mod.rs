@@ -12,6 +12,10 @@ mod sobol;
 
 pub use filter::{FilterDensity, FilterSample, PixelFilter};
 
+use crate::geometry::{VectorWork, with_vectors};
+use serde::{Deserialize, Serialize};
+use std::array::from_fn;
+
 /// How the samples of neighbouring pixels relate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Sequence {
@@ -37,10 +41,6 @@ impl Sequence {
         }
     }
 }
-
-use crate::geometry::{VectorWork, with_vectors};
-use serde::{Deserialize, Serialize};
-use std::array::from_fn;
 
 /// Which of the two independent estimates of a pixel a sample belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -251,10 +251,13 @@ pub(crate) fn hash_words(hash: u64, word: u64) -> u64 {
     sobol::mix64(hash.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ word)
 }
 
+/// Between two neighbours of the 2^24 numbers in [0, 1) that f32 has evenly spread.
+const STEP_OF_24_BITS: f32 = 1.0 / 16_777_216.0;
+
 /// To [0, 1) with the 24 bits that f32 holds.
 #[inline(always)]
 pub(crate) fn unit_of_hash(hash: u64) -> f32 {
-    (hash >> 40) as f32 * (1.0 / 16_777_216.0)
+    (hash >> 40) as f32 * STEP_OF_24_BITS
 }
 
 /// To [0, 1) with the 53 bits that f64 holds.

@@ -3,6 +3,7 @@
 //! Sobol 1967 with the direction numbers of Joe and Kuo 2008; scrambling and index shuffling by a hash on reversed bits
 //! (Laine and Karras 2011, Burley 2020, with the stronger hash that Vegdahl published in 2021).
 
+use super::STEP_OF_24_BITS;
 use std::array::from_fn;
 
 /// Mixes 32 bits (the finaliser of MurmurHash3 with better constants, found by search: Wellons 2018).
@@ -92,7 +93,7 @@ fn reversed_points<const N: usize>(reversed_indices: [u32; N]) -> Points<u32, N>
 /// To [0, 1) with the 24 bits that f32 holds.
 #[inline(always)]
 fn to_unit(reversed: u32) -> f32 {
-    (reversed.reverse_bits() >> 8) as i32 as f32 * (1.0 / 16_777_216.0)
+    (reversed.reverse_bits() >> 8) as i32 as f32 * STEP_OF_24_BITS
 }
 
 /// The four numbers in [0, 1) of each of `N` samples, at bit-reversed indices of the Sobol sequence, its order and digits scrambled

@@ -2,6 +2,7 @@
 
 use super::Motion;
 use glam::{Vec2, Vec3};
+use std::ops::RangeInclusive;
 
 /// A camera that looks along `forward` with `up` towards the top of the picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,7 +32,7 @@ pub struct Camera {
 pub enum Projection {
     /// Central.
     Perspective {
-        /// Full vertical field of view in degrees, in (0, 180).
+        /// Full vertical field of view in degrees, in (0, 180); loaders keep to [`Camera::FOV_DEG`].
         vertical_fov_deg: f32,
     },
     /// Parallel.
@@ -68,6 +69,14 @@ pub(crate) fn right_of(forward: Vec3, up: Vec3) -> Vec3 {
 }
 
 impl Camera {
+    /// Full fields of view in degrees that a file or a command may ask for.
+    pub const FOV_DEG: RangeInclusive<f64> = 0.001..=179.0;
+
+    /// Whether two unit vectors are far enough from parallel to say how a picture lies.
+    pub fn axes_span(forward: Vec3, up: Vec3) -> bool {
+        forward.cross(up).length() >= 1e-5
+    }
+
     /// Where it looks and how the picture lies; any right and up where `up` is parallel to `forward`.
     pub fn axes(&self) -> CameraAxes {
         let forward = self.forward.normalize_or(Vec3::NEG_Z);
@@ -76,13 +85,18 @@ impl Camera {
         CameraAxes { forward, right: if self.mirrored { -right } else { right }, up }
     }
 
-    /// A pinhole at rest, focused (should it get a lens) at distance 1.
+    /// A pinhole of central projection at rest, focused (should it get a lens) at distance 1.
     pub fn pinhole(position: Vec3, forward: Vec3, up: Vec3, vertical_fov_deg: f32) -> Self {
+        Self::placed(position, forward, up, Projection::Perspective { vertical_fov_deg })
+    }
+
+    /// A pinhole at rest, focused as [`Self::pinhole`].
+    pub fn placed(position: Vec3, forward: Vec3, up: Vec3, projection: Projection) -> Self {
         Self {
             position,
             forward,
             up,
-            projection: Projection::Perspective { vertical_fov_deg },
+            projection,
             screen_window: None,
             mirrored: false,
             aperture_radius: 0.0,

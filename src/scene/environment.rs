@@ -79,9 +79,7 @@ impl Parametrisation {
             }
         }
     }
-}
 
-impl Parametrisation {
     /// Solid angle in steradian of one row of a picture of so many.
     pub fn row_solid_angle(self, row: u32, rows: u32) -> f64 {
         let rows = f64::from(rows);

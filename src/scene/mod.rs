@@ -7,9 +7,11 @@ mod camera;
 mod environment;
 mod light;
 mod material;
+mod metal_roughness;
 mod motion;
 pub(crate) mod pictured_edges;
 mod relief;
+mod roughness;
 mod surface;
 
 pub mod hash;
@@ -21,9 +23,11 @@ pub use camera::{Camera, CameraAxes, Projection, ScreenWindow};
 pub use environment::{Environment, Parametrisation};
 pub use light::{Light, SpotFalloff};
 pub use material::{Alpha, Material, StretchDirection};
+pub use metal_roughness::{CoatRelief, MetalRoughness};
 pub use motion::{Motion, MotionKey, Pose};
 pub use relief::{HeightMap, HeightUnit, Relief};
-pub use surface::{CoatRelief, Distribution, MetalRoughness, Roughness, RoughnessScale, Surface};
+pub use roughness::{Distribution, Roughness, RoughnessScale};
+pub use surface::Surface;
 
 use glam::{Affine3A, Mat3A, Vec2, Vec3, Vec3A, Vec4};
 use std::f32::consts::{PI, TAU};

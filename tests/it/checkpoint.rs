@@ -284,6 +284,7 @@ fn films_of_different_seeds_add_up() {
 
     // Merged films are merged again, but never with a part of themselves.
     let path = folder.path().join("sum.film");
+    assert_eq!(merge_files(&[]).expect_err("no film").to_string(), "there are no films to merge");
     let message = merge_files(&[path, films[1].0.clone()]).expect_err("seed 2 would count twice").to_string();
     assert!(message.contains("seed 2") && message.contains("sum.film") && message.contains("2.film"), "{message}");
 }

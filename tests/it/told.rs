@@ -67,6 +67,22 @@ fn an_audit_of_no_noise_says_so() {
     assert!(told.contains("\"audit_ratio\": null"), "{told}");
 }
 
+/// "after 1 plans", it said.
+#[test]
+fn one_is_told_as_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/cornell-box.toml");
+    let film = ["--checkpoint", "a.film"];
+    let one = ["render", scene, "-o", "a.png", "--size", "1x1", "--sampling", "uniform", "--spp", "1"];
+    for arguments in [&[&one[..], &film].concat()[..], &["info", "a.film"]] {
+        let said = run(folder.path(), arguments);
+        let words: Vec<&str> = said.split_whitespace().map(|word| word.trim_matches(['.', ',', ';', ':'])).collect();
+        let of_one = |what: &str| words.windows(2).any(|pair| pair == ["1", what]);
+        assert!(of_one("plan"), "{said}");
+        assert!(!["plans", "samples", "times", "pixels"].into_iter().any(of_one), "{said}");
+    }
+}
+
 /// What tells nothing of noise is not taken for its absence: halves of one seed, one sample, a denoised crop of one pixel.
 #[test]
 fn what_tells_nothing_of_noise_is_said() {

@@ -11,7 +11,7 @@
 use super::{Audit, FreshSamples, LEAST_TILES, STRATUM, Tile, choose_tiles, is_large_enough, ratio_of_sums};
 use crate::adaptive::judge::{JudgeError, Judgement};
 use crate::adaptive::settings::LoopSettings;
-use crate::film::{Film, HalfPixel, opponent};
+use crate::film::{Film, HalfPixel, Halves};
 use crate::integrator::PathTracer;
 use fechner_perception::{Plane, seen};
 use std::f64::consts::PI;
@@ -77,14 +77,16 @@ pub fn audit_unproven(
 /// What fresh samples say of a pixel, in scene units.
 struct Mean {
     luminance_cd_m2: f32,
-    /// Half the halves' difference: as strong as the mean's own noise.
+    /// Half the halves' difference: as strong as the mean's own noise; 0 where only one half has samples that are finite.
     noise_cd_m2: f32,
 }
 
 impl Mean {
     fn of(halves: &[HalfPixel; 2], nits_per_unit: f64) -> Self {
-        let [a, b] = halves.each_ref().map(|half| nits_per_unit * opponent(half.mean)[0]);
-        Self { luminance_cd_m2: (0.5 * (a + b)) as f32, noise_cd_m2: (0.5 * (a - b)) as f32 }
+        let halves = Halves::of(halves.each_ref());
+        let luminance = |half: &HalfPixel| nits_per_unit * half.luminance();
+        let (mean, difference) = (halves.mean(luminance), halves.half_difference(luminance));
+        Self { luminance_cd_m2: mean as f32, noise_cd_m2: difference as f32 }
     }
 }
 
@@ -92,4 +94,21 @@ impl Mean {
 fn window(place: usize) -> f32 {
     let along = |at: usize| (PI * (at as f64 + 0.5) / TILE as f64).sin();
     (along(place % TILE) * along(place / TILE)) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// It was taken for black, and the mean for half as light as it is.
+    #[test]
+    fn a_half_without_finite_samples_has_no_say() {
+        let half = |light: f64, samples| HalfPixel { mean: [light; 3], samples, taken: 8, ..HalfPixel::default() };
+        let told = |halves: [HalfPixel; 2]| {
+            let mean = Mean::of(&halves, 10.0);
+            [mean.luminance_cd_m2, mean.noise_cd_m2]
+        };
+        assert_eq!(told([half(0.0, 0), half(4.0, 8)]), [40.0, 0.0]);
+        assert_eq!(told([half(6.0, 8), half(4.0, 8)]), [50.0, 10.0]);
+    }
 }

@@ -1,7 +1,8 @@
 //! How plans are made of blocks: what doubles a pixel, in which slices it is traced, and what fits a budget.
 
+use crate::film::Film;
 use crate::integrator::{BlockWork, SamplePlan};
-use crate::sampler::Half;
+use crate::sampler::{Half, hash_words};
 use std::cmp::Reverse;
 
 /// The blocks that take a half of a pixel from so many samples to so many.
@@ -100,6 +101,13 @@ pub fn cut_to_budget(plan: SamplePlan, urgency: impl Fn(&BlockWork) -> f32, samp
     }
     let kept = blocks.into_iter().zip(fits).filter(|(_, fits)| *fits);
     SamplePlan { blocks: kept.map(|(block, _)| block).collect() }
+}
+
+/// An urgency for [`cut_to_budget`] where nothing says who should have the last samples: chance does, not the order of the pixels, by
+/// which the top of the picture had them all.
+pub(in crate::adaptive) fn by_chance(film: &Film) -> impl Fn(&BlockWork) -> f32 {
+    let taken = film.total_samples();
+    move |block| (hash_words(taken, block.pixel.into()) >> 40) as f32
 }
 
 /// When a block's turn comes: the most urgent first.

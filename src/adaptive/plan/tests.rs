@@ -89,6 +89,31 @@ fn a_budget_leaves_no_gap_in_a_sequence() {
     assert_eq!(kept(19).len(), 4);
 }
 
+/// What is no multiple of the pixels is spread by chance, whatever single pixels had before: the last rows of stars had 16 samples a pixel where
+/// all others had 19.
+#[test]
+fn an_even_plan_leaves_no_rows_out() {
+    const SIDE: u32 = 32;
+    let mut film = Film::new(SIDE, SIDE);
+    for block in pilot_plan(&film, 16).blocks {
+        film.merge_block(block, &constant_block(block.samples));
+    }
+    for (samples, most) in [(0, 0), (1, 1), (500, 1), (1024, 1), (4000, 4), (4096, 4), (5119, 5)] {
+        let plan = even_plan(&film, samples, 1 << 16);
+        assert_eq!(plan.samples(), samples);
+        let mut of_pixels = vec![0; film.pixel_count()];
+        plan.blocks.iter().for_each(|block| of_pixels[block.pixel as usize] += block.samples);
+        let least = (samples / 1024) as u32;
+        assert!(of_pixels.iter().all(|pixel| (least..=most).contains(pixel)), "{samples} samples");
+        let mean = samples as f64 / 1024.0;
+        for row in of_pixels.chunks(SIDE as usize) {
+            let of_row = f64::from(row.iter().sum::<u32>()) / f64::from(SIDE);
+            assert!((of_row - mean).abs() < 0.35, "{samples} samples: {of_row} a pixel in a row");
+        }
+    }
+    assert_eq!(even_plan(&film, 4000, 17).samples(), 1024, "up to the most that a pixel may have");
+}
+
 #[test]
 fn a_uniform_plan_takes_exactly_what_is_asked() {
     for spp in [1u32, 2, 7, 16, 17, 100, 256] {

@@ -1,4 +1,5 @@
-//! A shot on its way into files: its frames, in `track` what is known of all of them beforehand, in `conclude` what only the whole of it has.
+//! A shot on its way into files: its frames, in `track` what is known of all of them beforehand, in `key` what each
+//! depends on, in `conclude` what only the whole of it has.
 
 mod conclude;
 mod key;

@@ -1,7 +1,7 @@
 //! What `bench` prints: tables in Markdown, for documents.
 
 use fechner::benchmark::{
-    AnimationRow, ArmSummary, Bound, Calibration, DenoisingResults, Need, QUALITIES, RaceMean, intervals_in_words,
+    AnimationRow, ArmSummary, Bound, Calibration, DenoisingResults, Need, Quality, RaceMean, intervals_in_words,
     mean_ratio,
 };
 
@@ -69,8 +69,8 @@ pub(super) fn print_races(results: &DenoisingResults) {
     if results.races.is_empty() {
         return;
     }
-    answer!("\n| scene | denoiser | rule | spp to {} |", QUALITIES.join(" | to "));
-    answer!("| --- | --- | --- |{}", " --- |".repeat(QUALITIES.len()));
+    answer!("\n| scene | denoiser | rule | spp to {} |", Quality::ALL.map(Quality::name).join(" | to "));
+    answer!("| --- | --- | --- |{}", " --- |".repeat(Quality::ALL.len()));
     for race in &results.races {
         let cells: Vec<String> = race.needs.iter().map(need_in_words).collect();
         answer!("| {} | {} | {} | {} |", race.scene, race.denoiser, race.rule.name(), cells.join(" | "));
@@ -92,7 +92,7 @@ fn need_in_words(need: &Need) -> String {
 fn race_mean_in_words(mean: &RaceMean) -> String {
     let ratio = mean.uniform_over.map_or_else(|| "–".to_owned(), |ratio| format!("{ratio:.2}"));
     let RaceMean { rule, quality, pairs, pairs_left_out, .. } = mean;
-    let rule = rule.name();
+    let (rule, quality) = (rule.name(), quality.name());
     format!("{rule}, to {quality}: {ratio}, pairs {pairs}, left out {pairs_left_out}")
 }
 
@@ -155,7 +155,7 @@ mod tests {
 
     #[test]
     fn bounds_are_not_printed_as_measurements() {
-        let need = |samples, uniform_over| need_in_words(&Need { quality: QUALITIES[0], samples, uniform_over });
+        let need = |samples, uniform_over| need_in_words(&Need { quality: Quality::ALL[0], samples, uniform_over });
         assert_eq!(need(Reached::AtMost(32.0), None), "≤ 32.0");
         assert_eq!(need(Reached::MoreThan(256.0), None), "> 256.0");
         assert_eq!(need(Reached::About(41.0), Some(1.12)), "41.0 (1.12)");

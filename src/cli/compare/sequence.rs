@@ -7,6 +7,7 @@ use crate::cli::kept_tone::{as_rendered, first_scene};
 use crate::cli::picture::{BEFORE_BLACK, InputPicture, Shape, Source};
 use crate::cli::seeing::tone_operator;
 use crate::cli::targets::check_kept;
+use crate::cli::words::count;
 use anyhow::{Context, Result, bail};
 use fechner::animate::name::FrameName;
 use fechner::output;
@@ -327,7 +328,7 @@ impl<'a> Sequences<'a> {
             write_json(path, &figures)?;
         }
         answer!(
-            "{}: worst visibility {:.2} in frame {} (seen in a 1° patch with {:.1} %), {:.2} % of {} frames above threshold, \
+            "{}: worst visibility {:.2} in frame {} (seen in a 1° patch with {:.1} %), {:.2} % of {} above threshold, \
              on \"{}\" at {} pixels a degree and {} frames a second, by an eye that {} (model-predicted; calibrated on \
              gratings, not on renderings)",
             if seen.is_visible { "visible in motion" } else { "the same to the eye in motion" },
@@ -335,7 +336,7 @@ impl<'a> Sequences<'a> {
             figures.worst_frame,
             100.0 * seen.detection_probability_worst,
             100.0 * seen.visible_fraction,
-            figures.frames.len(),
+            count(figures.frames.len(), "frame"),
             figures.all.display,
             figures.all.pixels_per_degree,
             figures.frames_per_second,

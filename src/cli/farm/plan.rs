@@ -114,13 +114,15 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode> {
     let job = options.job()?;
     job.check_video()?;
     job.check_whole_video(options.frames().len())?;
-    let (mut entries, mut limits) = (Vec::new(), None);
+    let (mut entries, mut limits) = (Vec::new(), Vec::new());
     for number in options.frames() {
         let frame = job.frame(number)?;
         entries.push(frame.entry(number));
-        limits = Some(frame.settings().limits);
+        limits.push(frame.settings().limits);
     }
-    let limits = limits.context("there are no frames")?;
+    if entries.is_empty() {
+        bail!("there are no frames");
+    }
     let farm = Farm::create(
         &folder,
         Manifest {
@@ -148,15 +150,16 @@ struct FirstRounds {
 }
 
 impl FirstRounds {
-    fn hand_out(farm: &Farm, limits: &Limits) -> Result<Self> {
+    /// By each frame's own limits: of a budget frames have different shares.
+    fn hand_out(farm: &Farm, limits: &[Limits]) -> Result<Self> {
         let mut rounds = Self { units: 0, samples: 0, most_samples_a_frame: 0 };
-        for (frame_index, FrameEntry { origin, .. }) in farm.manifest().frames.iter().enumerate() {
+        for (frame_index, (FrameEntry { origin, .. }, limits)) in farm.manifest().frames.iter().zip(limits).enumerate()
+        {
             let state = RenderState::new(origin.width, origin.height, limits);
             let record = hand_out(farm, frame_index, &state)?;
             rounds.units += record.units.len();
             rounds.samples += record.samples;
-            let of_frame = state.untraced_blocks().map(|block| u64::from(block.samples)).sum();
-            rounds.most_samples_a_frame = rounds.most_samples_a_frame.max(of_frame);
+            rounds.most_samples_a_frame = rounds.most_samples_a_frame.max(state.untraced_samples());
         }
         Ok(rounds)
     }

@@ -5,7 +5,7 @@ use super::signals::Signals;
 use super::{CALL_AGAIN, Threads, open_for_work};
 use crate::cli::console::duration_in_words;
 use crate::cli::numbers::parse_seconds;
-use crate::cli::words::{listed, samples_in_words};
+use crate::cli::words::{count, listed, samples_in_words};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use fechner::farm::frame::{Progress, progress};
@@ -185,7 +185,7 @@ impl<'a> Bench<'a> {
         match plans_of_finished(self.farm, place.frame_index) {
             Some(plans) if place.round >= plans => {
                 let number = self.farm.frame(place.frame_index).frame;
-                Standing::Unknown(format!("frame {number} is done, after {plans} plans"))
+                Standing::Unknown(format!("frame {number} is done, after {}", count(plans as usize, "plan")))
             }
             _ => Standing::Merged,
         }
@@ -217,10 +217,9 @@ impl<'a> Bench<'a> {
                 None
             }
         };
-        let samples: u64 = order.order.blocks.iter().map(|block| u64::from(block.samples)).sum();
         let there = begun.as_ref().map_or(0, |begun| begun.sums.len());
         if there > 0 {
-            say!("unit {unit}: goes on from its checkpoint, {there} of {} blocks", order.order.blocks.len());
+            say!("unit {unit}: goes on from its checkpoint, {there} of {}", count(order.order.blocks.len(), "block"));
         }
         let started = Instant::now();
         let Self { farm, signals, every, .. } = *self;
@@ -236,7 +235,7 @@ impl<'a> Bench<'a> {
                 say!(
                     "unit {unit}: frame {}, {} in {}, {} of it to load the scene",
                     order.order.frame,
-                    samples_in_words(samples),
+                    samples_in_words(order.order.samples()),
                     duration_in_words(started.elapsed().as_secs_f64()),
                     duration_in_words(loaded.as_secs_f64())
                 );

@@ -14,7 +14,6 @@ pub(super) fn describe(checkpoint: &Checkpoint) -> String {
     let pixels = film.pixel_count();
     let counts = || (0..pixels).map(|pixel| film.samples(pixel));
     let (least, most) = (counts().min().unwrap_or(0), counts().max().unwrap_or(0));
-    let pending: u64 = state.untraced_blocks().map(|block| u64::from(block.samples)).sum();
     let mut text = format!("film of {}, {}×{} pixels\n\n", origin.program, film.width(), film.height());
     let mut row = |name: &str, value: String| {
         let _ = writeln!(text, "  {name:11}  {value}");
@@ -32,7 +31,10 @@ pub(super) fn describe(checkpoint: &Checkpoint) -> String {
         let mean = film.total_samples() as f64 / pixels as f64;
         format!("{}: {mean:.1} a pixel, {least} to {most}; {} not finite", film.total_samples(), film.nonfinite_samples)
     });
-    row("planned", format!("{pending} samples after {} plans", state.plans));
+    row(
+        "planned",
+        format!("{} after {}", count(state.untraced_samples() as usize, "sample"), count(state.plans as usize, "plan")),
+    );
     row("time", duration_in_words(state.seconds.total));
     row("sampling", sampling_name(settings.sampling).to_owned());
     row("visibility", {
@@ -71,7 +73,7 @@ pub(super) fn describe(checkpoint: &Checkpoint) -> String {
         } else {
             format!("ratio {:.2} ± {:.2}", audit.ratio, audit.standard_error)
         };
-        row("audit", format!("{} tiles, {found}, the last of {}", audit.tiles, state.audits));
+        row("audit", format!("{}, {found}, the last of {}", count(audit.tiles, "tile"), state.audits));
     }
     text
 }

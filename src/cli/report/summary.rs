@@ -2,7 +2,7 @@
 
 use super::{Report, TOO_FEW, patch_count};
 use crate::cli::console::duration_in_words;
-use crate::cli::words::rounded;
+use crate::cli::words::{count, rounded};
 use fechner::adaptive::audit::MOST_INFLATION;
 use fechner::adaptive::settings::{LoopSettings, Sampling};
 use fechner::adaptive::{Rendered, StopReason};
@@ -38,9 +38,9 @@ pub(in crate::cli) fn summary(
 
 fn spent(report: &Report) -> String {
     format!(
-        "{} samples ({:.1} a pixel on average, {} at most) in {}, of which {:.1} % in the perception model ({:.1} % in \
+        "{} ({:.1} a pixel on average, {} at most) in {}, of which {:.1} % in the perception model ({:.1} % in \
          finding counts).",
-        report.samples_total,
+        count(report.samples_total as usize, "sample"),
         report.spp_mean,
         report.spp_max,
         duration_in_words(report.seconds_total),
@@ -81,7 +81,7 @@ fn stopped(report: &Report, settings: &LoopSettings, rendered: &Rendered, interr
     // That many --plans make the same picture.
     let plans = match rendered.stop_reason {
         StopReason::Plans | StopReason::Merged => String::new(),
-        _ => format!(", after {} plans", rendered.plans),
+        _ => format!(", after {}", count(rendered.plans as usize, "plan")),
     };
     format!("{why}{plans}; {target}.")
 }
@@ -151,9 +151,9 @@ fn denoised(report: &Report) -> Vec<String> {
 
 fn audited(report: &Report, rendered: &Rendered) -> Option<String> {
     let audit = rendered.audit?;
-    let whose = if report.denoised.is_some() { " unproven" } else { "" };
+    let tile = if report.denoised.is_some() { "unproven tile" } else { "tile" };
     if audit.had_nothing_to_find() {
-        return Some(format!("Audit: nothing is predicted to show in {}{whose} tiles.", audit.tiles));
+        return Some(format!("Audit: nothing is predicted to show in {}.", count(audit.tiles, tile)));
     }
     let times = rendered.inflation;
     let since = if times >= MOST_INFLATION {
@@ -164,19 +164,22 @@ fn audited(report: &Report, rendered: &Rendered) -> Option<String> {
         String::new()
     };
     Some(format!(
-        "Audit: fresh samples in {}{whose} tiles differ from the picture by {:.2} ± {:.2} times the predicted visible energy{since}.",
-        audit.tiles, audit.ratio, audit.standard_error
+        "Audit: fresh samples in {} differ from the picture by {:.2} ± {:.2} times the predicted visible energy{since}.",
+        count(audit.tiles, tile),
+        audit.ratio,
+        audit.standard_error
     ))
 }
 
 fn fireflies(report: &Report, sampling: Sampling) -> Option<String> {
     // By 2 % in a block of `cornell-glass` (`benches/local_energy.py`).
-    let darker = if sampling == Sampling::Adaptive { "; around them it may be a few per cent too dark" } else { "" };
+    let darker =
+        if sampling == Sampling::Adaptive { "; around it the picture may be a few per cent too dark" } else { "" };
     let kept = if report.denoised.is_some() { "kept in the raw mean" } else { "kept" };
     (report.outlier_pixels > 0).then(|| {
         format!(
-            "{} pixels hold light that few samples find (fireflies): {:.2} % of the picture's energy. They are {kept}{darker}.",
-            report.outlier_pixels,
+            "Light that few samples find (fireflies) is in {}: {:.2} % of the picture's energy. It is {kept}{darker}.",
+            count(report.outlier_pixels, "pixel"),
             100.0 * report.outlier_energy_share,
         )
     })
@@ -184,5 +187,5 @@ fn fireflies(report: &Report, sampling: Sampling) -> Option<String> {
 
 fn nonfinite(report: &Report) -> Option<String> {
     let samples = report.nonfinite_samples;
-    (samples > 0).then(|| format!("{samples} samples were not finite and are left out."))
+    (samples > 0).then(|| format!("Left out since not finite: {}.", count(samples as usize, "sample")))
 }

@@ -52,7 +52,7 @@ pub(super) struct Moving<'a> {
 impl Moving<'_> {
     /// A grid coarser than the last glimpse would be a step back.
     fn shows_more_than_glimpsed(&self, state: &RenderState) -> bool {
-        let glimpsed = self.glimpse.as_ref().map_or(0, |glimpse| glimpse.film.guides().len());
+        let glimpsed = self.glimpse.as_ref().map_or(0, |glimpse| glimpse.film.pixel_count());
         state.plans > 0 || state.traced_blocks >= glimpsed
     }
 }

@@ -12,6 +12,9 @@ const STUDIO_SIZE: [u32; 2] = [256, 128];
 
 /// A lat-long picture (.hdr, .exr, .png, ...), times `scale`, turned by `rotation_deg` about +y (counter-clockwise seen
 /// from above). `notes` gets a sentence for whatever was done to its values.
+///
+/// # Errors
+/// As of [`read`].
 pub fn from_file(
     path: &Path,
     scale: f32,
@@ -24,6 +27,9 @@ pub fn from_file(
 
 /// A picture in a parametrisation, of scale 1 and not turned. An equal-area picture must be square. `notes` gets a sentence for
 /// whatever was done to its values.
+///
+/// # Errors
+/// Where the file cannot be read, or an equal-area picture is not square.
 pub fn read(path: &Path, parametrisation: Parametrisation, notes: &mut Vec<String>) -> Result<Environment, LoadError> {
     let picture = texture::decode_bytes(&super::files::read(path)?, path, Encoding::Srgb, Values::Colours)?;
     notes.extend(picture.notes.iter().map(|note| format!("Environment {}: {note}.", path.display())));

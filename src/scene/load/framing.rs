@@ -3,6 +3,9 @@
 use crate::scene::{Camera, FilmDefaults, ScreenWindow};
 use glam::Vec2;
 
+/// Widest and highest picture that a file may ask for.
+pub(super) const LONGEST_SIDE: u32 = 32_768;
+
 /// How a camera's view follows the picture's aspect, which is width over height throughout.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Framing {

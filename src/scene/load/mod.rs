@@ -99,6 +99,9 @@ const FORMATS: &str = ".toml, .obj, .ply, .gltf, .glb, .pbrt and .xml (Mitsuba) 
 
 /// Reads a scene; the format is told by the file's name. A file `NAME.fechner.toml` beside `NAME.gltf` (or any other
 /// foreign scene) adds display, units, lights, camera and keyframes to it.
+///
+/// # Errors
+/// Where the scene or a file that it names cannot be read, or says what cannot be rendered.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, LoadError> {
     if !options.frame_time.is_finite() {
         return Err(LoadError::Option { problem: format!("frame time must be finite, not {}", options.frame_time) });

@@ -19,6 +19,9 @@ use glam::{Vec2, Vec3};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+/// Diffuse albedo of a material that tells none, and of faces without a material.
+const DEFAULT_KD: f32 = 0.7;
+
 /// One `newmtl` as it was written.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Written {
@@ -163,7 +166,7 @@ fn parse_map(text: &str) -> Map {
 
 /// The material of faces that name none, or one that no file defines.
 pub(super) fn default_material(builder: &mut Builder) -> MaterialId {
-    let surface = Surface::Diffuse { reflectance: ColorInput::constant(Vec3::splat(0.7)) };
+    let surface = Surface::Diffuse { reflectance: ColorInput::constant(Vec3::splat(DEFAULT_KD)) };
     builder.add_material(Material::plain("default", surface))
 }
 
@@ -217,7 +220,7 @@ impl Written {
 
     /// A share of light in [0, 1], at which a picture ends once its factor has multiplied it.
     fn share_input(&self, builder: &mut Builder, key: &str) -> ColorInput {
-        let input = self.color_input(builder, key, Vec3::splat(0.7));
+        let input = self.color_input(builder, key, Vec3::splat(DEFAULT_KD));
         match input.texture {
             None => ColorInput::constant(input.factor.min(Vec3::ONE)),
             Some(_) => input,

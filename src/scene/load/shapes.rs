@@ -159,6 +159,12 @@ pub fn face_along_normals(mesh: &mut Mesh) {
     }
 }
 
+/// Makes its back its front.
+pub(super) fn turn_over(mesh: &mut Mesh) {
+    mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+    mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
+}
+
 /// Area of a mesh after a transform.
 pub fn area(mesh: &Mesh, to_world: &Affine3A) -> f64 {
     let corner = |index: u32| to_world.transform_point3(mesh.positions[index as usize]).as_dvec3();

@@ -3,6 +3,7 @@
 use super::{Shot, folder_of};
 use crate::cli::animate::record::read_json;
 use crate::cli::console::{Counter, duration_in_words};
+use crate::cli::words::count;
 use anyhow::{Context as _, Result};
 use fechner::adaptive::settings::Sampling;
 use fechner::animate::SceneSource as _;
@@ -32,15 +33,16 @@ impl Shot<'_> {
         if folder_of(&self.file(self.settings.first)).is_none_or(Path::exists) {
             self.make_folder()?;
         }
-        let count = self.settings.last - self.settings.first + 1;
+        let frames = (self.settings.last - self.settings.first + 1) as usize;
         let started = Instant::now();
-        let looking = Counter::new("looking at frames", count as usize);
+        let looking = Counter::new("looking at frames", frames);
         let mut track = Track::make(&self.source, &self.settings, operator.as_ref(), &|done| looking.count(done))?;
         if let (Some(mean_samples), Sampling::Adaptive) = (self.settings.limits.mean_samples, self.settings.sampling) {
             track.spread(&self.needs(&track)?, mean_samples);
         }
         self.make_folder()?;
-        say!("found the light of {count} frames in {}", duration_in_words(started.elapsed().as_secs_f64()));
+        let seconds = started.elapsed().as_secs_f64();
+        say!("found the light of {} in {}", count(frames, "frame"), duration_in_words(seconds));
         let text = serde_json::to_string(&track).context("the track could not be put into words")?;
         output::remove_leftovers(&file);
         output::write_beside(&file, |file| file.write_all(text.as_bytes()))?;

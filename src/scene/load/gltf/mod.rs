@@ -317,7 +317,7 @@ impl<'a> Reader<'a> {
         let (projection, aspect, usable) = match camera.projection() {
             ::gltf::camera::Projection::Perspective(perspective) => {
                 let vertical_fov_deg = perspective.yfov().to_degrees();
-                let usable = (0.001..=179.0).contains(&vertical_fov_deg);
+                let usable = Camera::FOV_DEG.contains(&f64::from(vertical_fov_deg));
                 (Projection::Perspective { vertical_fov_deg }, perspective.aspect_ratio(), usable)
             }
             ::gltf::camera::Projection::Orthographic(parallel) => {
@@ -330,12 +330,12 @@ impl<'a> Reader<'a> {
         let (Some(forward), Some(up)) = (forward, up) else {
             return;
         };
-        if !position.is_finite() || !usable || forward.cross(up).length() < 1e-5 {
+        if !position.is_finite() || !usable || !Camera::axes_span(forward, up) {
             self.builder.note(format!("Camera \"{name}\" is left out: its transform, angle or height is not usable."));
             return;
         }
         let framing = aspect.map_or(Framing::Fixed, Framing::Stated);
-        let camera = Camera { projection, motion, ..Camera::pinhole(position, forward, up, 40.0) };
+        let camera = Camera { motion, ..Camera::placed(position, forward, up, projection) };
         self.builder.cameras.push(NamedCamera { name, holder, camera, framing });
     }
 

@@ -3,7 +3,7 @@
 use super::super::builder::NamedCamera;
 use super::super::default_view;
 use super::super::error::{LoadError, names_of};
-use super::super::framing::{FilmAxis, Framing};
+use super::super::framing::{FilmAxis, Framing, LONGEST_SIDE};
 use super::Reader;
 use super::element::{Element, canonical};
 use super::transform;
@@ -12,8 +12,6 @@ use glam::{Affine3A, Vec2, Vec3};
 
 /// Mitsuba's default.
 const FAR_CLIP: f32 = 1e4;
-/// Widest and highest picture that a file may ask for.
-const LONGEST_SIDE: f32 = 32_768.0;
 
 /// How a sensor's rays run.
 #[derive(Clone, Copy)]
@@ -73,13 +71,12 @@ impl Reader {
             (_, axis) => Framing::Spanning { axis, film: aspect, whole: aspect },
         };
         let camera = Camera {
-            projection: view.projection,
             screen_window,
             // Mitsuba's x points to the left of the picture.
             mirrored: axes.forward.cross(axes.up).dot(axes.left) > 0.0,
             aperture_radius,
             focus_distance,
-            ..Camera::pinhole(to_world.translation.into(), axes.forward, axes.up, 40.0)
+            ..Camera::placed(to_world.translation.into(), axes.forward, axes.up, view.projection)
         };
         if is_first {
             self.clips = Some((sensor.place(), clips));
@@ -119,7 +116,7 @@ impl Reader {
         };
         let side = |name: &str, default: f32| {
             let side = film.float_or(name, default)?;
-            if (1.0..=LONGEST_SIDE).contains(&side) && side.fract() == 0.0 {
+            if (1.0..=LONGEST_SIDE as f32).contains(&side) && side.fract() == 0.0 {
                 Ok(side as u32)
             } else {
                 Err(film.error(format_args!("\"{name}\" must be a whole number from 1 to {LONGEST_SIDE}, not {side}")))
@@ -144,9 +141,7 @@ impl Axes {
     fn of(sensor: &Element, to_world: &Affine3A) -> Result<Self, LoadError> {
         let direction = |vector| to_world.transform_vector3(vector).try_normalize();
         match (direction(Vec3::X), direction(Vec3::Y), direction(Vec3::Z)) {
-            (Some(left), Some(up), Some(forward)) if forward.cross(up).length() >= 1e-5 => {
-                Ok(Self { left, up, forward })
-            }
+            (Some(left), Some(up), Some(forward)) if Camera::axes_span(forward, up) => Ok(Self { left, up, forward }),
             _ => Err(sensor.error("its transform cannot be undone")),
         }
     }
@@ -207,10 +202,13 @@ impl FieldOfView {
             Some(other) => return Err(sensor.error(format_args!("unknown fov axis \"{other}\""))),
         };
         match sensor.float("fov")? {
-            Some(fov) if (0.001..=179.0).contains(&fov) => {
+            Some(fov) if Camera::FOV_DEG.contains(&f64::from(fov)) => {
                 Ok(Self { tangent_of_half: (0.5 * fov).to_radians().tan(), axis })
             }
-            Some(fov) => Err(sensor.error(format_args!("\"fov\" must lie in [0.001, 179] degrees, not {fov}"))),
+            Some(fov) => {
+                let (least, most) = Camera::FOV_DEG.into_inner();
+                Err(sensor.error(format_args!("\"fov\" must lie in [{least}, {most}] degrees, not {fov}")))
+            }
             None => {
                 let text = sensor.string("focallength")?.unwrap_or("50mm");
                 let millimetres: Option<f32> = text.trim().trim_end_matches("mm").trim().parse().ok();
@@ -225,6 +223,7 @@ impl FieldOfView {
 
     fn vertical_deg(&self, aspect: f32) -> f32 {
         let vertical = self.tangent_of_half / self.axis.length(aspect);
-        (2.0 * vertical.atan().to_degrees()).clamp(0.001, 179.0)
+        let (least, most) = Camera::FOV_DEG.into_inner();
+        (2.0 * vertical.atan().to_degrees()).clamp(least as f32, most as f32)
     }
 }

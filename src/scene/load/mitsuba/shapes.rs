@@ -282,11 +282,10 @@ fn mirrors(transform: &Affine3A) -> bool {
 }
 
 fn turn(mesh: &mut Mesh, facing: Facing) {
-    if facing == Facing::AsMade {
-        return;
+    match facing {
+        Facing::AsMade => {}
+        Facing::TurnedOver => shapes::turn_over(mesh),
     }
-    mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
-    mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
 }
 
 /// Normals of vertices: the faces' around them, weighted by their angle (Thürmer and Wüthrich 1998).

@@ -1,7 +1,7 @@
 //! How an MTL material scatters: which of our models stands for what its numbers and its `illum` say.
 
 use super::super::builder::Builder;
-use super::Written;
+use super::{DEFAULT_KD, Written};
 use crate::scene::{ColorInput, Encoding, MetalRoughness, Roughness, ScalarInput, StretchDirection, Surface};
 use glam::Vec3;
 
@@ -63,7 +63,7 @@ impl Written {
 
     /// Whether nothing is reflected diffusely, or hardly more than `most`.
     fn is_black(&self, most: f32) -> bool {
-        let diffuse = self.color("kd").unwrap_or(Vec3::splat(0.7));
+        let diffuse = self.color("kd").unwrap_or(Vec3::splat(DEFAULT_KD));
         diffuse.max_element() <= most && !self.maps.contains_key("map_kd")
     }
 

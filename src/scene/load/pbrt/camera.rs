@@ -2,15 +2,12 @@
 
 use super::super::builder::NamedCamera;
 use super::super::error::LoadError;
-use super::super::framing::{FilmAxis, Framing};
+use super::super::framing::{FilmAxis, Framing, LONGEST_SIDE};
 use super::Reader;
 use super::parameters::Parameters;
 use super::state::{Carried, Path, Transforms};
 use crate::scene::{Camera, FilmDefaults, Motion, MotionKey, Pose, Projection, ScreenWindow};
 use glam::{Affine3A, Vec2, Vec3};
-
-/// Widest and highest picture that a file may ask for.
-const LONGEST_SIDE: i64 = 32_768;
 
 /// A rectangle of the film in shares of it, from the upper left corner.
 struct Crop {
@@ -32,7 +29,7 @@ impl PlacedAxes {
         let axis = |vector| placed.transform_vector3(vector).try_normalize();
         let (forward, up, right) = (axis(Vec3::Z)?, axis(Vec3::Y)?, axis(Vec3::X)?);
         let position = Vec3::from(placed.translation);
-        let spans = position.is_finite() && forward.cross(up).length() >= 1e-5;
+        let spans = position.is_finite() && Camera::axes_span(forward, up);
         spans.then_some(Self { position, forward, up, right })
     }
 }
@@ -60,14 +57,13 @@ impl Reader<'_> {
         let window = ScreenWindow { min: window.min * across, max: window.max * across };
         let is_usual = window == ScreenWindow::centered(film_aspect);
         let camera = Camera {
-            projection,
             screen_window: (!is_usual || crop.is_some()).then(|| cropped(window, crop)),
             mirrored: forward.cross(up).dot(right) < 0.0,
             // A lens that a transform made oval is as large as the oval.
             aperture_radius: parameters.float_or("lensradius", 0.0)?.max(0.0) * (stretch.x * stretch.y).sqrt(),
             focus_distance: (parameters.float_or("focaldistance", 1e6)? * stretch.z).max(1e-6),
             motion: self.motion(&to_world).map(|m| m.since_open()),
-            ..Camera::pinhole(position, forward, up, 40.0)
+            ..Camera::placed(position, forward, up, projection)
         };
         self.note_unread("camera", &parameters);
         self.builder.cameras.push(NamedCamera { name: kind, holder: None, camera, framing });
@@ -125,8 +121,9 @@ impl Reader<'_> {
             }
         };
         let fov_deg = camera.float_or("fov", usual_fov_deg)?;
-        if !(0.001..=179.0).contains(&fov_deg) {
-            return Err(camera.error(format_args!("\"fov\" must lie in [0.001, 179] degrees, not {fov_deg}")));
+        if !Camera::FOV_DEG.contains(&f64::from(fov_deg)) {
+            let (least, most) = Camera::FOV_DEG.into_inner();
+            return Err(camera.error(format_args!("\"fov\" must lie in [{least}, {most}] degrees, not {fov_deg}")));
         }
         Ok(Projection::Perspective { vertical_fov_deg: fov_deg })
     }
@@ -205,7 +202,7 @@ impl Reader<'_> {
             return Ok((default, None));
         };
         let side = |name: &str, default: i64| match film.integer(name)?.unwrap_or(default) {
-            side @ 1..=LONGEST_SIDE => Ok(side as u32),
+            side if (1..=i64::from(LONGEST_SIDE)).contains(&side) => Ok(side as u32),
             other => Err(film.error(format_args!("\"{name}\" must lie in [1, {LONGEST_SIDE}], not {other}"))),
         };
         let full = FilmDefaults { width: side("xresolution", 1280)?, height: side("yresolution", 720)? };

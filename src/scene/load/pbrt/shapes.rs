@@ -334,8 +334,7 @@ fn bilinear_mesh(parameters: &Parameters) -> Result<Mesh, LoadError> {
 pub(super) fn orient(mesh: &mut Mesh, reverse: bool) {
     shapes::face_along_normals(mesh);
     if reverse {
-        mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
-        mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
+        shapes::turn_over(mesh);
     }
 }
 

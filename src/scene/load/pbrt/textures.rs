@@ -1,4 +1,6 @@
-//! `Texture`: image maps, constants, products, checkerboards. What else pbrt can compute is named and averaged.
+//! `Texture`: image maps and constants here, products, mixes and checkerboards in `combined`. What else pbrt can compute is named and averaged.
+
+mod combined;
 
 use super::super::error::{LoadError, no_such};
 use super::super::texture::{Adjust, IfMissing, Number, Picture, Request, is_grey};
@@ -13,8 +15,6 @@ use std::rc::Rc;
 
 /// Deepest chain of textures that use textures.
 const DEEPEST: usize = 32;
-/// What is done to textures that a checkerboard is made of.
-const INSIDE_A_CHECKERBOARD: &str = "textures inside a checkerboard: their mean colours";
 
 /// A texture as it was written.
 pub(super) struct Definition {
@@ -65,42 +65,9 @@ impl Reader<'_> {
                 let (lookup, scale) = self.image(parameters, None)?;
                 Ok(ColorInput { factor: Vec3::splat(scale), texture: Some(lookup) })
             }
-            "scale" => {
-                let base = self.color_operand(parameters, "tex", Vec3::ONE, depth)?;
-                let scale = self.scalar_operand(parameters, "scale", 1.0, depth)?;
-                // The three colours of a number's texture are that number.
-                let (rest, texture) = match (base.texture, scale.texture) {
-                    (None, texture) => (scale.factor, texture.map(|(lookup, _)| lookup)),
-                    (texture, None) => (scale.factor, texture),
-                    (texture, Some(_)) => {
-                        self.average(parameters, name, "its scale's texture: its mean");
-                        (self.mean_of_number(&scale)?, texture)
-                    }
-                };
-                Ok(ColorInput { factor: base.factor * rest, texture })
-            }
-            "mix" => {
-                let amount = self.amount(parameters, name, depth)?;
-                let first = self.color_operand(parameters, "tex1", Vec3::ZERO, depth)?;
-                let second = self.color_operand(parameters, "tex2", Vec3::ONE, depth)?;
-                if first.texture.is_none() && second.texture.is_none() {
-                    return Ok(ColorInput::constant(first.factor.lerp(second.factor, amount)));
-                }
-                self.average(parameters, name, "the mix of textures: the heavier one");
-                Ok(if amount < 0.5 { first } else { second })
-            }
-            "checkerboard" => {
-                let colors = [
-                    self.color_operand(parameters, "tex1", Vec3::ONE, depth)?,
-                    self.color_operand(parameters, "tex2", Vec3::ZERO, depth)?,
-                ];
-                if colors.iter().any(|color| color.texture.is_some()) {
-                    self.average(parameters, name, INSIDE_A_CHECKERBOARD);
-                }
-                let [even, odd] = [self.mean_of_color(&colors[0])?, self.mean_of_color(&colors[1])?];
-                let lookup = self.checkerboard(parameters, [even, odd])?;
-                Ok(ColorInput { factor: Vec3::ONE, texture: Some(lookup) })
-            }
+            "scale" => self.scaled(parameters, name, depth),
+            "mix" => self.mixed(parameters, name, depth),
+            "checkerboard" => self.checkered(parameters, name, depth),
             other => {
                 self.average(parameters, name, &format!("a texture of type \"{other}\": grey 0.5"));
                 Ok(ColorInput::constant(Vec3::splat(0.5)))
@@ -132,52 +99,14 @@ impl Reader<'_> {
                 let (lookup, factor) = self.image(parameters, Some(Number::AlphaOrMean))?;
                 Ok(ScalarInput { factor, texture: Some((lookup, 0)) })
             }
-            "scale" => {
-                let base = self.scalar_operand(parameters, "tex", 1.0, depth)?;
-                let scale = self.scalar_operand(parameters, "scale", 1.0, depth)?;
-                if base.texture.is_some() && scale.texture.is_some() {
-                    self.average(parameters, name, "its scale's texture: its mean");
-                    let factor = base.factor * self.mean_of_number(&scale)?;
-                    return Ok(ScalarInput { factor, texture: base.texture });
-                }
-                Ok(ScalarInput { factor: base.factor * scale.factor, texture: base.texture.or(scale.texture) })
-            }
-            "mix" => {
-                let amount = self.amount(parameters, name, depth)?;
-                let first = self.scalar_operand(parameters, "tex1", 0.0, depth)?;
-                let second = self.scalar_operand(parameters, "tex2", 1.0, depth)?;
-                if first.texture.is_none() && second.texture.is_none() {
-                    return Ok(ScalarInput::constant(first.factor + (second.factor - first.factor) * amount));
-                }
-                self.average(parameters, name, "the mix of textures: the heavier one");
-                Ok(if amount < 0.5 { first } else { second })
-            }
-            "checkerboard" => {
-                let values = [
-                    self.scalar_operand(parameters, "tex1", 1.0, depth)?,
-                    self.scalar_operand(parameters, "tex2", 0.0, depth)?,
-                ];
-                if values.iter().any(|value| value.texture.is_some()) {
-                    self.average(parameters, name, INSIDE_A_CHECKERBOARD);
-                }
-                let [even, odd] = [self.mean_of_number(&values[0])?, self.mean_of_number(&values[1])?];
-                let lookup = self.checkerboard(parameters, [even, odd].map(Vec3::splat))?;
-                Ok(ScalarInput { factor: 1.0, texture: Some((lookup, 0)) })
-            }
+            "scale" => self.scaled(parameters, name, depth),
+            "mix" => self.mixed(parameters, name, depth),
+            "checkerboard" => self.checkered(parameters, name, depth),
             other => {
                 self.average(parameters, name, &format!("a texture of type \"{other}\": 0.5"));
                 Ok(ScalarInput::constant(0.5))
             }
         }
-    }
-
-    /// The share of a mix's second part, which is one number here.
-    fn amount(&mut self, parameters: &Parameters, name: &str, depth: usize) -> Result<f32, LoadError> {
-        let amount = self.scalar_operand(parameters, "amount", 0.5, depth)?;
-        if amount.texture.is_some() {
-            self.average(parameters, name, "its amount's texture: its mean");
-        }
-        self.mean_of_number(&amount)
     }
 
     /// What stands for a texture where only a colour has a place.
@@ -339,24 +268,5 @@ impl Reader<'_> {
             rotation: 0.0,
             scale,
         })
-    }
-
-    /// Two colours that alternate over unit squares: four texels, repeated.
-    fn checkerboard(&mut self, parameters: &Parameters, [even, odd]: [Vec3; 2]) -> Result<TextureLookup, LoadError> {
-        if parameters.integer("dimension")?.is_some_and(|dimension| dimension != 2) {
-            return Err(parameters.unsupported("a checkerboard in three dimensions is not rendered"));
-        }
-        let lookup = self.mapping(parameters)?;
-        let [even, odd] = [even, odd].map(|color| color.extend(1.0).to_array());
-        let texture = self.builder.textures.add(Request {
-            wrap_u: Wrap::Repeat,
-            wrap_v: Wrap::Repeat,
-            nearest: true,
-            // pbrt's t runs up: the upper row holds t in [1, 2).
-            ..Request::texels("checkerboard", [2, 2], &[odd, even, even, odd])
-        });
-        // Two squares a picture; our v of the picture is 1 − t/2.
-        let (scale, offset) = (0.5 * lookup.scale, 0.5 * lookup.offset);
-        Ok(TextureLookup { texture, scale, offset: Vec2::new(offset.x, offset.y + 0.5), ..lookup })
     }
 }

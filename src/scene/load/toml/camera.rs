@@ -35,11 +35,11 @@ pub(super) fn read(value: &Value, shutter: Shutter) -> Result<Camera, LoadError>
         return Err(fields.error("position and look_at are the same point"));
     };
     let up = fields.get_or("up", Vec3::Y, Value::direction)?;
-    if forward.cross(up).length() < 1e-5 {
+    if !Camera::axes_span(forward, up) {
         return Err(fields.error(format_args!("looks along its own up vector {up}; set another \"up\"")));
     }
+    let projection = projection(&fields)?;
     let mut camera = Camera {
-        projection: projection(&fields)?,
         screen_window: fields.get_some("screen_window", screen_window)?,
         mirrored: fields.get_or("mirrored", false, Value::boolean)?,
         aperture_radius: fields.get_or("aperture_radius", 0.0, Value::non_negative)? as f32,
@@ -47,7 +47,7 @@ pub(super) fn read(value: &Value, shutter: Shutter) -> Result<Camera, LoadError>
             Some(distance) => distance.positive()? as f32,
             None => position.distance(look_at),
         },
-        ..Camera::pinhole(position, forward, up, 40.0)
+        ..Camera::placed(position, forward, up, projection)
     };
     camera.motion = keyframes.and_then(|keyframes| keyframes.motion(&camera, shutter));
     Ok(camera)
@@ -56,7 +56,8 @@ pub(super) fn read(value: &Value, shutter: Shutter) -> Result<Camera, LoadError>
 fn projection(fields: &Fields) -> Result<Projection, LoadError> {
     let angle = fields.get("vertical_fov_deg");
     let Some(height) = fields.get("orthographic_height") else {
-        let vertical_fov_deg = angle.map_or(Ok(40.0), |angle| angle.within(0.001, 179.0))? as f32;
+        let (least, most) = Camera::FOV_DEG.into_inner();
+        let vertical_fov_deg = angle.map_or(Ok(40.0), |angle| angle.within(least, most))? as f32;
         return Ok(Projection::Perspective { vertical_fov_deg });
     };
     match angle {
