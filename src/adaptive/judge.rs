@@ -1,19 +1,19 @@
 //! The film as it will be seen: thresholds, remaining visibility, and how each pixel's samples scatter on the display.
 
+mod noise_on_display;
 mod over_white;
 mod per_sample;
 mod steps;
 
+pub use self::noise_on_display::{display_scale, variance_share, variance_shares};
 use self::over_white::OverWhite;
-use self::per_sample::PerSample;
+use self::per_sample::{PerSample, Sources};
 pub use self::steps::Thresholds;
-use self::steps::{Guide, Scatter, chromatic_gains, found_thresholds};
+use self::steps::{Guide, Scatter, found_thresholds};
 use super::denoised::{DenoisedPicture, TimedDenoising};
-use super::missed::FoundLight;
 use super::settings::LoopSettings;
-use super::statistics::by_channel;
 use crate::denoise::{Denoiser, OidnError};
-use crate::film::{CHANNELS, Estimate, Film, opponent, share_of_mean};
+use crate::film::{Estimate, Film};
 use crate::sampler::Half;
 use fechner_perception::Plane;
 use fechner_perception::denoised::DenoisedError;
@@ -136,21 +136,17 @@ fn judge_by(
     let displayed_guide = guide.displayed(tone.as_ref(), settings);
     let noise = scatter.luminance_variance_of_mean();
     let thresholds = found_thresholds(&guide, &displayed_guide, tone.as_ref(), &noise, settings)?;
-    let gains = chromatic_gains(&thresholds.in_bands, settings)?;
-    still_wanted(settings)?;
-    let lights = (denoised.is_none() || purpose == Purpose::Plan)
-        .then(|| Half::BOTH.map(|half| FoundLight::of_half(film, half, settings.nits_per_unit)));
-    let scales = lights
-        .as_ref()
-        .filter(|_| purpose == Purpose::Plan)
-        .map(|lights| scatter.luminance_scales_of_halves(film, lights, tone.as_ref(), settings, raw_inflation));
-    let met = PerSample::met(&scatter, film, scales.as_ref(), &thresholds.in_bands, gains.as_ref());
-    let per_sample = match &lights {
-        Some(lights) if denoised.is_none() => {
-            let missed_beside = |light: &FoundLight| scatter.missed_noise(film, light, tone.as_ref(), settings);
-            met.or_missed(lights, missed_beside)
-        }
-        _ => met,
+    let sources = Sources {
+        film,
+        scatter: &scatter,
+        tone: tone.as_ref(),
+        thresholds: &thresholds.in_bands,
+        settings,
+        inflation: raw_inflation,
+    };
+    let per_sample = match &denoised {
+        None => PerSample::of_raw(&sources, purpose)?,
+        Some(_) => PerSample::of_denoised(&sources, purpose)?,
     };
     still_wanted(settings)?;
     let over_white = if settings.is_transparent {
@@ -335,61 +331,12 @@ impl Judgement {
     }
 }
 
-/// Displayed variance over scene variance of each pixel, by channel, at the size that its variance has now: what the display
-/// makes of a pixel's own noise, before any pooling. From scene units; inflation included. `shares`: [`variance_shares`].
-pub fn display_scale(
-    film: &Film,
-    shares: &Plane,
-    guide: &Plane,
-    tone: &dyn FittedTone,
-    settings: &LoopSettings,
-    inflation: f64,
-) -> [Plane; CHANNELS] {
-    let noise = NoiseOnDisplay { shares, tone, settings, inflation };
-    by_channel(|c| noise.scale(c, guide, |pixel| film.halves(pixel).sample_variance(c)))
-}
-
 /// Luminance of a half, cd/m²; of the other one where it has no samples.
 pub(super) fn half_luminance(film: &Film, half: Half, nits_per_unit: f64) -> Plane {
     let width = film.width() as usize;
     Plane::from_fn(width, film.height() as usize, |x, y| {
-        (nits_per_unit * opponent(film.halves(y * width + x).half_or_other(half).mean)[0]) as f32
+        (nits_per_unit * film.halves(y * width + x).half_or_other(half).luminance()) as f32
     })
-}
-
-/// What the display makes of noise.
-struct NoiseOnDisplay<'a> {
-    /// [`variance_shares`].
-    shares: &'a Plane,
-    tone: &'a dyn FittedTone,
-    settings: &'a LoopSettings,
-    inflation: f64,
-}
-
-impl NoiseOnDisplay<'_> {
-    /// Displayed over scene variance in a channel about a luminance, cd/m². `variance`: of one sample of a pixel, in scene units.
-    fn scale(&self, channel: usize, light: &Plane, variance: impl Fn(usize) -> f64 + Sync) -> Plane {
-        let nits_squared = self.settings.nits_per_unit * self.settings.nits_per_unit * self.inflation;
-        let display = &self.settings.viewing.display;
-        let scene = Plane::from_fn(light.width(), light.height(), |x, y| {
-            let of_mean = variance(y * light.width() + x) * f64::from(self.shares.get(x, y));
-            (of_mean * nits_squared) as f32
-        });
-        let displayed = if channel == 0 {
-            seen::display_variance(self.tone, display, light, &scene)
-        } else {
-            seen::display_chromatic_variance(self.tone, display, light, &scene)
-        };
-        scene.combined(&displayed, |scene, displayed| {
-            let (scene, displayed) = (f64::from(scene), f64::from(displayed));
-            match displayed / scene * nits_squared {
-                _ if scene == 0.0 => 0.0,
-                scale if scale.is_finite() => scale as f32,
-                // Nobody can say how it looks, least of all that it cannot be seen.
-                _ => f32::INFINITY,
-            }
-        })
-    }
 }
 
 /// The denoised picture, cd/m²: what adaptation, masking and the operator are made from, so that noise neither
@@ -408,17 +355,6 @@ pub(crate) fn guide_rgb(film: &Film, estimate: &Estimate) -> Vec<[f32; 3]> {
         width,
         height,
     })
-}
-
-/// Variance of a pixel's mean over that of one sample: [`share_of_mean`].
-pub fn variance_share(film: &Film, pixel: usize) -> f64 {
-    share_of_mean(Half::BOTH.map(|half| film.half(half)[pixel].samples))
-}
-
-/// The same of every pixel.
-pub fn variance_shares(film: &Film) -> Plane {
-    let width = film.width() as usize;
-    Plane::from_fn(width, film.height() as usize, |x, y| variance_share(film, y * width + x) as f32)
 }
 
 #[cfg(test)]

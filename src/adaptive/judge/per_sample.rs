@@ -1,12 +1,15 @@
 //! Variance of one sample, from which the counts of a plan are found.
 
 use super::super::missed::FoundLight;
+use super::super::settings::LoopSettings;
 use super::over_white::OverWhite;
-use super::steps::{MissedNoise, Scatter, Thresholds};
+use super::steps::{MissedNoise, Scatter, Thresholds, chromatic_gains};
+use super::{JudgeError, Purpose, still_wanted};
 use crate::film::Film;
+use crate::sampler::Half;
 use fechner_perception::Plane;
-use fechner_perception::colour::ChromaticGains;
 use fechner_perception::threshold::ThresholdMap;
+use fechner_perception::tone::FittedTone;
 
 /// Luminance variance of one sample, (cd/m²)² on the display, that shows as much as the most visible of the eye's channels.
 pub(super) struct PerSample {
@@ -20,29 +23,48 @@ pub(super) struct PerSample {
     pub(super) of_halves: Option<[Plane; 2]>,
 }
 
+/// What it is found from.
+pub(super) struct Sources<'a> {
+    pub(super) film: &'a Film,
+    pub(super) scatter: &'a Scatter,
+    pub(super) tone: &'a dyn FittedTone,
+    pub(super) thresholds: &'a ThresholdMap,
+    pub(super) settings: &'a LoopSettings,
+    /// Multiplies every variance.
+    pub(super) inflation: f64,
+}
+
 impl PerSample {
-    /// By what samples have met. `luminance_scales` are what the halves decide by ([`Scatter::luminance_scales_of_halves`]), where they do.
-    pub(super) fn met(
-        scatter: &Scatter,
-        film: &Film,
-        luminance_scales: Option<&[Plane; 2]>,
-        thresholds: &ThresholdMap,
-        gains: Option<&ChromaticGains>,
-    ) -> Self {
-        let met = scatter.pooled_per_sample(thresholds, gains);
-        let of_halves =
-            luminance_scales.map(|scales| scatter.per_sample_of_halves(film, scales.each_ref(), thresholds, gains));
-        Self { pooled: met.clone(), pooled_of_halves: None, met, of_halves }
+    /// Of a picture that stays raw: by what samples have met, and may have missed.
+    pub(super) fn of_raw(sources: &Sources<'_>, purpose: Purpose) -> Result<Self, JudgeError> {
+        let &Sources { film, scatter, tone, settings, .. } = sources;
+        let lights = sources.lights();
+        let met = Self::met(sources, (purpose == Purpose::Plan).then_some(&lights))?;
+        Ok(met.or_missed(&lights, |light| scatter.missed_noise(film, light, tone, settings)))
+    }
+
+    /// Of a picture that is denoised, in whose own error is what lamps' rims hide: by what samples have met.
+    pub(super) fn of_denoised(sources: &Sources<'_>, purpose: Purpose) -> Result<Self, JudgeError> {
+        Self::met(sources, (purpose == Purpose::Plan).then(|| sources.lights()).as_ref())
+    }
+
+    /// By what samples have met; and of the halves, where these are to decide by the light that they have found.
+    fn met(sources: &Sources<'_>, lights: Option<&[FoundLight; 2]>) -> Result<Self, JudgeError> {
+        let &Sources { film, scatter, tone, thresholds, settings, inflation } = sources;
+        let gains = chromatic_gains(thresholds, settings)?;
+        still_wanted(settings)?;
+        let of_halves = lights.map(|lights| {
+            let scales = scatter.luminance_scales_of_halves(film, lights, tone, settings, inflation);
+            scatter.per_sample_of_halves(film, scales.each_ref(), thresholds, gains.as_ref())
+        });
+        let met = scatter.pooled_per_sample(thresholds, gains.as_ref());
+        Ok(Self { pooled: met.clone(), pooled_of_halves: None, met, of_halves })
     }
 
     /// Or by what lamps' rims may hide, where that is more: of what a half decides by, beside the light that the other one has found; of the
     /// whole, the mean of what each says. By the light of both a pixel that was lucky was called beyond white and done, and the others not: a
     /// small lamp that moves made a picture 19 % too bright (`benches/results/sampling.md`, energy).
-    pub(super) fn or_missed(
-        self,
-        lights: &[FoundLight; 2],
-        missed_beside: impl Fn(&FoundLight) -> Option<MissedNoise>,
-    ) -> Self {
+    fn or_missed(self, lights: &[FoundLight; 2], missed_beside: impl Fn(&FoundLight) -> Option<MissedNoise>) -> Self {
         let [Some(a), Some(b)] = lights.each_ref().map(missed_beside) else { return self };
         let of_halves = self.of_halves.map(|[of_a, of_b]| [b.or_scatter(&of_a), a.or_scatter(&of_b)]);
         let pooled_of_halves = of_halves.is_some().then(|| [&b, &a].map(|beside| beside.or_scatter(&self.met)));
@@ -59,5 +81,12 @@ impl PerSample {
             of_halves: self.of_halves.and_then(|halves| worse.of_halves(halves)),
             ..self
         }
+    }
+}
+
+impl Sources<'_> {
+    /// What each half has found.
+    fn lights(&self) -> [FoundLight; 2] {
+        Half::BOTH.map(|half| FoundLight::of_half(self.film, half, self.settings.nits_per_unit))
     }
 }
