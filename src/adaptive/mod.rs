@@ -126,7 +126,7 @@ struct Loop<'a> {
     samples_to_meet_lamps: OnceCell<Option<Vec<u32>>>,
 }
 
-/// [`judge`] or [`judge_to_plan`].
+/// [`judge()`] or [`judge_to_plan`].
 type Judge = fn(&Film, &LoopSettings, f64) -> Result<Judgement, JudgeError>;
 
 /// The last look of this run.
