@@ -60,10 +60,12 @@ pub(super) struct AnimateArguments {
     /// The same, by name.
     #[arg(long, value_enum, conflicts_with = "visibility", help_heading = "Until")]
     quality: Option<Quality>,
-    /// A budget of this mean number of samples a pixel over the whole shot, spent on the frames that need it most.
+    /// A budget of this mean number of samples a pixel over the whole shot, spent on the frames that need it most; for uniform
+    /// sampling as many in each.
     #[arg(long, value_name = "N", value_parser = whole(1..=u32::MAX), allow_negative_numbers = true, help_heading = "Until")]
     spp: Option<u32>,
-    /// A budget of this many seconds for all frames that are rendered, spent on those that need it most.
+    /// A budget of this many seconds for all frames that are rendered, spent on those that need it most; for uniform sampling as
+    /// many on each.
     #[arg(long, value_name = "S", value_parser = parse_seconds, allow_negative_numbers = true, conflicts_with = "spp", help_heading = "Until")]
     time: Option<Duration>,
     /// Most samples of one pixel, at least 16.
