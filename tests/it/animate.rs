@@ -506,6 +506,19 @@ fn a_flash_has_its_share_of_a_budget() {
     assert!(shares[7] > 2 * dark.max().expect("frames"), "{shares:?}");
 }
 
+/// Where the first look takes most of a budget of time, that is said, and what helps.
+#[test]
+fn little_time_that_is_left_for_the_frames_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let said = |time: &str| {
+        animate(folder.path(), &["--frames", "0..1", "--visibility", "16", "--time", time, "-o", "a.##.png"])
+    };
+    let little = said("0.001");
+    assert!(little.contains("It is kept: stop and call again, or give more --time."), "{little}");
+    let enough = said("20");
+    assert!(!enough.contains("are left for the frames"), "{enough}");
+}
+
 /// A budget of the shot adds up, whoever renders which of its frames; a whole shot has a contact sheet.
 #[test]
 fn a_budget_is_the_whole_shots() {

@@ -48,9 +48,14 @@ impl ShotClock {
         Ok(Some(Self { started, budget, needs }))
     }
 
+    /// What is left.
+    pub(super) fn left(&self) -> Duration {
+        self.budget.saturating_sub(self.started.elapsed())
+    }
+
     /// The time for a frame: its part of what is left, if all those before it are done; none for a frame that is there.
     pub(super) fn share(&self, frame: u32) -> Duration {
-        self.budget.saturating_sub(self.started.elapsed()).mul_f64(part_of(&self.needs, frame))
+        self.left().mul_f64(part_of(&self.needs, frame))
     }
 }
 
