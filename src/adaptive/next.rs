@@ -44,7 +44,9 @@ impl Loop<'_> {
         let limits = &self.settings.limits;
         let left = self.left_of_budget();
         if left == 0 {
-            return Ok(Step::Stop(StopReason::Samples));
+            let is_by_sight = !matches!(self.settings.sampling, Sampling::Rival(_));
+            let is_there = is_by_sight && is_reached(judgement, limits.last_rung());
+            return Ok(Step::Stop(if is_there { StopReason::Visibility } else { StopReason::Samples }));
         }
         if let Sampling::Rival(rule) = self.settings.sampling {
             let exposure = self.exposure(judgement);

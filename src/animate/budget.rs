@@ -1,10 +1,12 @@
 //! A budget of samples for a whole shot, spent where most would be seen.
 //!
-//! Pilots of fixed seed, of frames spread over the shot, say how many samples a pixel a frame needs for a visibility. One
-//! visibility for all frames fits the budget; what a frame needs for it is its share. Frames stay independent of each
-//! other: they know their share from the track. Not for shots that only have a visibility to reach: their frames know by
-//! themselves when they are done.
+//! Pilots of fixed seed, of frames where the light changes and of others spread over the shot, say how many samples a pixel a
+//! frame needs for a visibility. One visibility for all frames fits the budget, none below the one that is asked for; what a
+//! frame needs for it is its share, and what is left over goes where pilots may be wrong by most. Frames stay
+//! independent of each other: they know their share from the track. Not for shots that only have a visibility to reach: their
+//! frames know by themselves when they are done.
 
+use super::pilots::{Neighbours, piloted_frames};
 use super::track::Track;
 use super::{SceneSource, ShotSettings};
 use crate::adaptive::judge::{JudgeError, judge};
@@ -16,10 +18,15 @@ use crate::scene::load::LoadError;
 use fechner_perception::tone::ToneOperator;
 use std::time::Instant;
 
-/// Most frames that are piloted; those between lie between their neighbours.
-const PILOTED_FRAMES: u32 = 9;
-/// Visibilities at which needs are asked; between them, and beyond, they go as a power.
-const ASKED: [f64; 3] = [8.0, 2.0, 0.5];
+/// Visibilities at which needs are asked; between them, and beyond, they go as a power. At higher ones most pixels have what they
+/// need from the pilot on, which says little of lower ones.
+const ASKED: [f64; 5] = [8.0, 2.0, 0.5, 0.125, 0.03125];
+const LAST_ASKED: usize = ASKED.len() - 1;
+/// Times the need that a frame may take at first of what is left over: within [`KNOWN_SAMPLES`] frames of two shots took 0.85 to
+/// 1.22 times what their pilots said, and twice as many at twice that, where pilots have not met what is rare.
+const MARGIN: f64 = 1.3;
+/// Needs up to here pilots know; beyond it their error goes as the need.
+const KNOWN_SAMPLES: f64 = 2.0 * PILOT_SAMPLES_A_PIXEL as f64;
 
 /// Why a budget could not be spread.
 #[derive(Debug, thiserror::Error)]
@@ -37,6 +44,8 @@ pub enum BudgetError {
 pub struct Needs {
     /// Logarithms of mean samples a pixel at [`ASKED`], by frame.
     ln_samples: Vec<[f64; ASKED.len()]>,
+    /// Most samples that a pixel may have.
+    max_samples: u32,
     /// What a sample of the pilots took, seconds. Differs from run to run.
     pub seconds_per_sample: f64,
 }
@@ -52,15 +61,13 @@ impl Needs {
         operator: &dyn Fn() -> Box<dyn ToneOperator>,
         track: &Track,
     ) -> Result<Self, BudgetError> {
-        let count = shot.last - shot.first + 1;
-        let steps = count.clamp(2, PILOTED_FRAMES) - 1;
-        let mut piloted: Vec<u32> = (0..=steps).map(|step| step * (count - 1) / steps).collect();
-        piloted.dedup();
+        let piloted = piloted_frames(source, shot, operator().as_ref(), track)?;
         let (mut seconds, mut samples) = (0.0, 0);
         let mut needs = Vec::new();
         for &offset in &piloted {
-            let scene = source.at(shot.seconds(f64::from(shot.first + offset)))?;
-            let settings = shot.frame_settings(operator(), &track.frames[offset as usize]);
+            let frame = &track.frames[offset];
+            let scene = source.at(shot.seconds(f64::from(frame.frame)))?;
+            let settings = shot.frame_settings(operator(), frame);
             let tracer = PathTracer::new(scene, shot.trace);
             let area = tracer.settings().film_area();
             let mut film = Film::new(area.width, area.height);
@@ -77,36 +84,38 @@ impl Needs {
             }
             needs.push(ln_samples);
         }
-        let between = |frame: u32| {
-            let after = piloted.partition_point(|&offset| offset < frame);
-            let (low, high) = (piloted[after.saturating_sub(1)], piloted[after]);
-            let share = if high > low { f64::from(frame - low) / f64::from(high - low) } else { 0.0 };
-            let (low, high) = (needs[after.saturating_sub(1)], needs[after]);
-            std::array::from_fn(|asked| low[asked] + share * (high[asked] - low[asked]))
+        let between = |frame: usize| {
+            let Neighbours { before, after, share } = Neighbours::of(frame, &piloted);
+            let (before, after) = (needs[before], needs[after]);
+            std::array::from_fn(|asked| before[asked] + share * (after[asked] - before[asked]))
         };
-        let seconds_per_sample = seconds / samples.max(1) as f64;
-        Ok(Self { ln_samples: (0..count).map(between).collect(), seconds_per_sample })
+        Ok(Self {
+            ln_samples: (0..track.frames.len()).map(between).collect(),
+            max_samples: shot.limits.max_samples,
+            seconds_per_sample: seconds / samples.max(1) as f64,
+        })
     }
 
-    /// Samples a pixel that each frame needs for a visibility: at least a pilot's.
-    pub fn samples(&self, visibility: f64) -> Vec<f64> {
+    /// Samples a pixel that each frame needs for a visibility: at least a pilot's, at most what it may have.
+    fn samples(&self, visibility: f64) -> Vec<f64> {
         let octaves = |at: usize, other: usize| (ASKED[at] / ASKED[other]).log2();
+        let [least, most] = [PILOT_SAMPLES_A_PIXEL, self.max_samples].map(f64::from);
         self.ln_samples
             .iter()
             .map(|ln_samples| {
-                let at = usize::from(visibility < ASKED[1]);
+                let at = ASKED[1..LAST_ASKED].partition_point(|&asked| visibility < asked);
                 let slope = (ln_samples[at + 1] - ln_samples[at]) / octaves(at, at + 1);
-                let beyond = visibility < ASKED[2];
+                let beyond = visibility < ASKED[LAST_ASKED];
                 // Beyond the last one the law of large numbers holds.
-                let (from, slope) = if beyond { (2, 2.0 * std::f64::consts::LN_2) } else { (at, slope) };
+                let (from, slope) = if beyond { (LAST_ASKED, 2.0 * std::f64::consts::LN_2) } else { (at, slope) };
                 let ln = ln_samples[from] + slope * (ASKED[from] / visibility).log2();
-                ln.exp().max(f64::from(PILOT_SAMPLES_A_PIXEL))
+                ln.exp().clamp(least, most.max(least))
             })
             .collect()
     }
 
     /// The visibility that all frames reach with so many samples a pixel on average.
-    pub fn visibility_for(&self, mean_samples: f64) -> f64 {
+    fn visibility_for(&self, mean_samples: f64) -> f64 {
         let mean = |visibility: f64| self.samples(visibility).iter().sum::<f64>() / self.ln_samples.len() as f64;
         let (mut low, mut high) = (-16.0f64, 8.0f64);
         for _ in 0..60 {
@@ -116,27 +125,58 @@ impl Needs {
         high.exp2()
     }
 
-    /// Whole samples a pixel for each frame, which add up to the budget of `mean_samples` for each.
-    pub fn shares(&self, mean_samples: u32) -> Vec<u32> {
+    /// Samples a pixel that each frame needs for the visibility that fits so many on average, or for `asked`, below which none goes on.
+    pub fn for_budget(&self, mean_samples: f64, asked: f64) -> Vec<f64> {
+        self.samples(self.visibility_for(mean_samples).max(asked))
+    }
+
+    /// Whole samples a pixel for each frame, by what it needs on the way to the visibility `asked`; what is left over is for what
+    /// pilots err by. They add up to the budget of `mean_samples` for each, unless that is more than pixels may have.
+    pub fn shares(&self, mean_samples: u32, asked: f64) -> Vec<u32> {
         let count = self.ln_samples.len();
         if mean_samples <= PILOT_SAMPLES_A_PIXEL {
             return vec![mean_samples; count];
         }
-        let needs = self.samples(self.visibility_for(f64::from(mean_samples)));
-        let scale = f64::from(mean_samples) * count as f64 / needs.iter().sum::<f64>();
-        let mut given = 0.0;
-        let mut spent = 0;
-        needs
-            .iter()
-            .map(|need| {
-                // What rounding left goes on to the next frame.
-                given += need * scale;
-                let share = (given.round() as u64).saturating_sub(spent).max(1);
-                spent += share;
-                share as u32
-            })
-            .collect()
+        let budget = f64::from(mean_samples) * count as f64;
+        let needs = self.for_budget(f64::from(mean_samples), asked);
+        let most = vec![f64::from(self.max_samples); count];
+        let with_margin: Vec<f64> = needs.iter().zip(&most).map(|(need, most)| with_margin(*need).min(*most)).collect();
+        let shares = if with_margin.iter().sum::<f64>() < budget {
+            scaled_to(budget, &with_margin, &most)
+        } else {
+            scaled_to(budget, &needs, &with_margin)
+        };
+        rounded(&shares)
     }
+}
+
+/// What a frame may take at most of which pilots say that it needs so much.
+fn with_margin(need: f64) -> f64 {
+    MARGIN * need * (need / KNOWN_SAMPLES).max(1.0)
+}
+
+/// The shares times a factor that makes them add up to a sum, none above its most.
+fn scaled_to(sum: f64, shares: &[f64], most: &[f64]) -> Vec<f64> {
+    let scaled = |factor: f64| shares.iter().zip(most).map(move |(share, most)| (factor * share).min(*most));
+    let (mut low, mut high) = (0.0, most.iter().fold(1.0, |a: f64, &most| a.max(most)));
+    for _ in 0..100 {
+        let middle = 0.5 * (low + high);
+        if scaled(middle).sum::<f64>() < sum { low = middle } else { high = middle }
+    }
+    scaled(high).collect()
+}
+
+/// Whole samples; what rounding left goes on to the next frame.
+fn rounded(shares: &[f64]) -> Vec<u32> {
+    let mut given = 0.0;
+    let mut spent = 0;
+    let whole = |share: &f64| {
+        given += share;
+        let share = (given.round() as u64).saturating_sub(spent).max(1);
+        spent += share;
+        share as u32
+    };
+    shares.iter().map(whole).collect()
 }
 
 #[cfg(test)]
@@ -145,8 +185,12 @@ mod tests {
 
     /// Frames that need 1, 4 and 16 times a sample count that goes as 1/v².
     fn needs() -> Needs {
-        let frame = |at_2: f64| ASKED.map(|visibility| (at_2 * 4.0 / visibility / visibility).ln());
-        Needs { ln_samples: [100.0, 400.0, 1600.0].map(frame).to_vec(), seconds_per_sample: 1e-6 }
+        needs_at_2(&[100.0, 400.0, 1600.0])
+    }
+
+    fn needs_at_2(samples: &[f64]) -> Needs {
+        let frame = |at_2: &f64| ASKED.map(|visibility| (at_2 * 4.0 / visibility / visibility).ln());
+        Needs { ln_samples: samples.iter().map(frame).collect(), max_samples: u32::MAX, seconds_per_sample: 1e-6 }
     }
 
     #[test]
@@ -163,11 +207,31 @@ mod tests {
     fn shares_add_up_and_go_by_need() {
         let needs = needs();
         for mean in [17, 50, 700, 12_345] {
-            let shares = needs.shares(mean);
+            let shares = needs.shares(mean, 0.0);
             assert_eq!(shares.iter().sum::<u32>(), 3 * mean, "{shares:?}");
             assert!(shares[0] <= shares[1] && shares[1] < shares[2], "{shares:?}");
         }
-        assert_eq!(needs.shares(700), [100, 400, 1600]);
-        assert_eq!(needs.shares(8), [8, 8, 8]);
+        assert_eq!(needs.shares(700, 0.0), [100, 400, 1600]);
+        assert_eq!(needs.shares(8, 0.0), [8, 8, 8]);
+    }
+
+    /// What pixels may not have goes to frames whose pixels may.
+    #[test]
+    fn shares_stay_within_what_pixels_may_have() {
+        let needs = Needs { max_samples: 1000, ..needs() };
+        assert_eq!(needs.shares(700, 0.0), [220, 880, 1000]);
+        assert_eq!(needs.shares(1000, 0.0), [1000; 3]);
+        assert_eq!(needs.shares(5000, 0.0), [1000; 3]);
+    }
+
+    /// Of a budget beyond the needs for what is asked, frames whose needs pilots know take little, and the others the rest.
+    #[test]
+    fn what_is_left_over_goes_where_pilots_know_least() {
+        let needs = needs_at_2(&[20.0, 20.0, 320.0]);
+        assert_eq!(needs.shares(200, 2.0), [26, 26, 548]);
+        // Beyond what they may be wrong by, all have the same share more.
+        assert_eq!(needs.shares(2 * (26 + 26 + 4160) / 3, 2.0), [52, 52, 8320]);
+        // Less than they need is spent for one visibility.
+        assert_eq!(needs.shares(60, 2.0).iter().sum::<u32>(), 180);
     }
 }

@@ -16,6 +16,7 @@ pub mod budget;
 pub mod eye;
 pub mod gaze;
 pub mod name;
+mod pilots;
 pub mod track;
 pub mod velocity;
 pub mod video;

@@ -89,9 +89,9 @@ impl Track {
         Ok(Self { made_for: made_for(shot, operator), frames })
     }
 
-    /// Gives each frame its share of a budget of so many samples a pixel on average.
-    pub fn spread(&mut self, needs: &Needs, mean_samples: u32) {
-        for (frame, share) in self.frames.iter_mut().zip(needs.shares(mean_samples)) {
+    /// Gives each frame its share of a budget of so many samples a pixel on average, on the way to the visibility `asked`.
+    pub fn spread(&mut self, needs: &Needs, mean_samples: u32, asked: f64) {
+        for (frame, share) in self.frames.iter_mut().zip(needs.shares(mean_samples, asked)) {
             frame.mean_samples = Some(share);
         }
     }
@@ -126,7 +126,7 @@ fn made_for(shot: &ShotSettings, operator: &dyn ToneOperator) -> String {
         // Whether frames may be paused, where they are looked at and what denoises them decides what they need of a budget.
         shot.limits.mean_samples.map(|_| {
             let denoiser = shot.denoiser.as_ref().map(Denoiser::name);
-            (shot.sampling, shot.pausable, shot.limits, gaze_hash(shot), denoiser)
+            ("pilots where light changes", shot.sampling, shot.pausable, shot.limits, gaze_hash(shot), denoiser)
         }),
         shot.viewing,
     )
@@ -223,7 +223,8 @@ fn coarse_goal(scene: Arc<Scene>, shot: &ShotSettings, operator: &dyn ToneOperat
     goal_of(&light, shot, operator)
 }
 
-fn goal_of(light: &SceneLight, shot: &ShotSettings, operator: &dyn ToneOperator) -> Goal {
+/// What eyes that look at a small picture of a frame adapt to.
+pub(super) fn goal_of(light: &SceneLight, shot: &ShotSettings, operator: &dyn ToneOperator) -> Goal {
     let scale = light.luminance_cd_m2().width() as f64 / f64::from(shot.trace.width);
     operator.goal(&light.guide_for(operator), shot.viewing.display.pixel_density().times(scale))
 }

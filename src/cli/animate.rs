@@ -60,10 +60,12 @@ pub(super) struct AnimateArguments {
     /// The same, by name.
     #[arg(long, value_enum, conflicts_with = "visibility", help_heading = "Until")]
     quality: Option<Quality>,
-    /// A budget of this mean number of samples a pixel over the whole shot, spent on the frames that need it most.
+    /// A budget of this mean number of samples a pixel over the whole shot, spent on the frames that need it most; for uniform
+    /// sampling as many in each.
     #[arg(long, value_name = "N", value_parser = whole(1..=u32::MAX), allow_negative_numbers = true, help_heading = "Until")]
     spp: Option<u32>,
-    /// A budget of this many seconds for all frames that are rendered, spent on those that need it most.
+    /// A budget of this many seconds for all frames that are rendered, spent on those that need it most; for uniform sampling as
+    /// many on each.
     #[arg(long, value_name = "S", value_parser = parse_seconds, allow_negative_numbers = true, conflicts_with = "spp", help_heading = "Until")]
     time: Option<Duration>,
     /// Most samples of one pixel, at least 16.
@@ -175,10 +177,14 @@ fn render_shot(arguments: &AnimateArguments) -> Result<()> {
     shot.note_other_frames();
     let started = Instant::now();
     let track = shot.track(arguments.frame_numbers())?;
+    let looked = started.elapsed();
     let clock = match arguments.time {
         Some(budget) => ShotClock::new(&shot, &track, started, budget)?,
         None => None,
     };
+    if let (Some(budget), Some(clock)) = (arguments.time, &clock) {
+        note_late_start(budget, looked, clock.left());
+    }
     let mut progress = Progress::new(arguments.frame_numbers().map(|frame| shot.has_record(frame)));
     for frame in arguments.frame_numbers() {
         let started = Instant::now();
@@ -193,6 +199,21 @@ fn render_shot(arguments: &AnimateArguments) -> Result<()> {
         note_overrun(budget, started.elapsed());
     }
     shot.conclude(&track).map(drop)
+}
+
+/// Says where little of a budget is left for the frames, and what helps. `looked`: what the track took.
+fn note_late_start(budget: Duration, looked: Duration, left: Duration) {
+    let half = budget / 2;
+    if left >= half {
+        return;
+    }
+    let [asked, left, taken] = [budget, left, looked].map(|time| duration_in_words(time.as_secs_f64()));
+    let advice = if looked > half {
+        format!("finding the shot's light took {taken}. It is kept: stop and call again, or give more --time")
+    } else {
+        "what they need took the rest to find. Give more --time".to_owned()
+    };
+    say!("note: {left} of --time's {asked} are left for the frames: {advice}.");
 }
 
 /// Says where a budget could not be kept: the track and each frame's first plans are made whatever they take.

@@ -237,6 +237,19 @@ fn even_sampling_does_not_end_where_no_noise_is_found() {
     assert_eq!(rendered.stop_reason, StopReason::Samples);
 }
 
+/// What has reached its target by the last sample of its budget has reached it.
+#[test]
+fn a_target_reached_by_the_last_sample_is_reached() {
+    let by_pilot = render_cornell(24, 3, Sampling::Adaptive, 50.0, Some(16));
+    assert_eq!(by_pilot.stop_reason, StopReason::Visibility);
+    let free = render_cornell(24, 3, Sampling::Uniform, 4.0, None);
+    let samples = u32::try_from(free.film.total_samples() / (24 * 24)).expect("few");
+    let even = render_cornell(24, 3, Sampling::Uniform, 4.0, Some(samples));
+    assert_eq!((even.film.total_samples(), even.stop_reason), (free.film.total_samples(), StopReason::Visibility));
+    let aimless = render_cornell(24, 3, Sampling::Uniform, None, Some(16));
+    assert_eq!(aimless.stop_reason, StopReason::Samples, "without a target");
+}
+
 #[test]
 fn limits_end_a_render() {
     let by_samples = render_cornell(24, 3, Sampling::Adaptive, 0.25, Some(40));

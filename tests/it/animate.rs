@@ -441,6 +441,84 @@ fn a_sequence_for_the_display_is_compared_with_one_of_light() {
     assert!((fitted[0] / fitted[1]).ln().abs() < 0.7, "{fitted:?} by one operator");
 }
 
+/// A lamp over a floor that is bright in frame 7 of 24 a second alone, which equal steps would miss.
+const FLASH: &str = r#"
+nits_per_unit = 100.0
+[film]
+size = [16, 12]
+[view]
+display = "desktop"
+[camera]
+position = [0, 1.2, 5]
+look_at = [0, 1, 0]
+vertical_fov_deg = 35
+[materials.grey]
+type = "diffuse"
+reflectance = [0.6, 0.6, 0.6]
+[materials.lamp]
+type = "diffuse"
+reflectance = [0, 0, 0]
+emission_color = [1, 0.9, 0.7]
+keyframes = [
+    { time = 0.0, power_lm = 0.5 },
+    { time = 0.27, power_lm = 0.5 },
+    { time = 0.285, power_lm = 1500 },
+    { time = 0.30, power_lm = 1500 },
+    { time = 0.315, power_lm = 0.5 },
+]
+[[objects]]
+rectangle = { corner = [-2, 0, 2], edge_u = [4, 0, 0], edge_v = [0, 0, -4] }
+material = "grey"
+[[objects]]
+rectangle = { corner = [-0.4, 2.5, -0.4], edge_u = [0.8, 0, 0], edge_v = [0, 0, 0.8] }
+material = "lamp"
+[[objects]]
+box = { min = [-0.3, 0, -0.3], max = [0.3, 0.9, 0.3] }
+material = "grey"
+"#;
+
+/// A frame that is lit alone has what it needs of the shot's budget, if that is enough.
+#[test]
+fn a_flash_has_its_share_of_a_budget() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = folder.path();
+    animate_scene(
+        at,
+        FLASH,
+        &["--frames", "6..8", "--shot", "0..11", "--visibility", "1", "--spp", "48", "-o", "f.##.png"],
+    );
+    let json = |name: &str| -> serde_json::Value {
+        serde_json::from_str(&std::fs::read_to_string(at.join(name)).expect("written")).expect("JSON")
+    };
+    let track = json("f.track.json");
+    let shares: Vec<u64> = track["frames"]
+        .as_array()
+        .expect("frames")
+        .iter()
+        .map(|frame| frame["mean_samples"].as_u64().expect("a share"))
+        .collect();
+    assert_eq!(shares.iter().sum::<u64>(), 12 * 48);
+    for frame in [6, 7, 8] {
+        let report = &json(&format!("f.{frame:02}.json"))["report"];
+        assert_eq!(report["stop_reason"], "visibility", "frame {frame} of {shares:?}: {report}");
+    }
+    let dark = shares.iter().enumerate().filter(|&(frame, _)| frame != 7).map(|(_, &share)| share);
+    assert!(shares[7] > 2 * dark.max().expect("frames"), "{shares:?}");
+}
+
+/// Where the first look takes most of a budget of time, that is said, and what helps.
+#[test]
+fn little_time_that_is_left_for_the_frames_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let said = |time: &str| {
+        animate(folder.path(), &["--frames", "0..1", "--visibility", "16", "--time", time, "-o", "a.##.png"])
+    };
+    let little = said("0.001");
+    assert!(little.contains("It is kept: stop and call again, or give more --time."), "{little}");
+    let enough = said("20");
+    assert!(!enough.contains("are left for the frames"), "{enough}");
+}
+
 /// A budget of the shot adds up, whoever renders which of its frames; a whole shot has a contact sheet.
 #[test]
 fn a_budget_is_the_whole_shots() {

@@ -5,6 +5,7 @@
 use super::Shot;
 use super::shot::Made;
 use anyhow::Result;
+use fechner::adaptive::settings::Sampling;
 use fechner::animate::track::Track;
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -25,25 +26,36 @@ struct FrameNeed {
 
 impl ShotClock {
     /// Takes a budget that began with the track, for the frames that are not there yet; `None` where all are. Pilots say what they
-    /// need for the visibility that fits the time.
+    /// need for the visibility that fits the time; uniform sampling needs the same of each.
     pub(super) fn new(shot: &Shot<'_>, track: &Track, started: Instant, budget: Duration) -> Result<Option<Self>> {
         let missing = shot.missing_frames(track)?;
         if missing.is_empty() {
             return Ok(None);
         }
-        let needs = shot.needs(track)?;
-        let pixels = f64::from(shot.settings.trace.width) * f64::from(shot.settings.trace.height);
-        let left = budget.saturating_sub(started.elapsed()).as_secs_f64();
-        let seconds_per_sample = needs.seconds_per_sample * pixels * missing.len() as f64;
-        let mean_samples = left / seconds_per_sample.max(f64::MIN_POSITIVE);
-        let of_shot = needs.samples(needs.visibility_for(mean_samples));
-        let need_of = |frame: u32| FrameNeed { frame, need: of_shot[(frame - shot.settings.first) as usize] };
-        Ok(Some(Self { started, budget, needs: missing.into_iter().map(need_of).collect() }))
+        let needs: Vec<FrameNeed> = match shot.settings.sampling {
+            Sampling::Uniform => missing.into_iter().map(|frame| FrameNeed { frame, need: 1.0 }).collect(),
+            _ => {
+                let needs = shot.needs(track)?;
+                let pixels = f64::from(shot.settings.trace.width) * f64::from(shot.settings.trace.height);
+                let left = budget.saturating_sub(started.elapsed()).as_secs_f64();
+                let seconds_per_sample = needs.seconds_per_sample * pixels * missing.len() as f64;
+                let mean_samples = left / seconds_per_sample.max(f64::MIN_POSITIVE);
+                let of_shot = needs.for_budget(mean_samples, shot.settings.limits.last_rung());
+                let need_of = |frame: u32| FrameNeed { frame, need: of_shot[(frame - shot.settings.first) as usize] };
+                missing.into_iter().map(need_of).collect()
+            }
+        };
+        Ok(Some(Self { started, budget, needs }))
+    }
+
+    /// What is left.
+    pub(super) fn left(&self) -> Duration {
+        self.budget.saturating_sub(self.started.elapsed())
     }
 
     /// The time for a frame: its part of what is left, if all those before it are done; none for a frame that is there.
     pub(super) fn share(&self, frame: u32) -> Duration {
-        self.budget.saturating_sub(self.started.elapsed()).mul_f64(part_of(&self.needs, frame))
+        self.left().mul_f64(part_of(&self.needs, frame))
     }
 }
 

@@ -38,7 +38,7 @@ impl Shot<'_> {
         let looking = Counter::new("looking at frames", frames);
         let mut track = Track::make(&self.source, &self.settings, operator.as_ref(), &|done| looking.count(done))?;
         if let (Some(mean_samples), Sampling::Adaptive) = (self.settings.limits.mean_samples, self.settings.sampling) {
-            track.spread(&self.needs(&track)?, mean_samples);
+            track.spread(&self.needs(&track)?, mean_samples, self.settings.limits.last_rung());
         }
         self.make_folder()?;
         let seconds = started.elapsed().as_secs_f64();
