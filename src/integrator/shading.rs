@@ -235,7 +235,9 @@ impl PathTracer {
         let scene = self.world.scene();
         let material = &scene.materials[self.world.material_of(point.object).0 as usize];
         let normal_under = |relief: Option<&Relief>| {
-            seen_side(relief::shading_normal(&self.world, relief, point, time), point.geometric_normal, wo)
+            let normal =
+                seen_side(relief::shading_normal(&self.world, relief, point, time), point.geometric_normal, wo);
+            if is_diffuse(&material.surface) { normal } else { mirroring_outwards(normal, point.geometric_normal, wo) }
         };
         let normal = normal_under(material.relief.as_ref());
         let frame = stretched_frame(material, &scene.textures, point, normal);
@@ -317,9 +319,52 @@ fn seen_side(normal: Vec3, geometric_normal: Vec3, wo: Vec3) -> Vec3 {
     (normal + facing * wo * (LEAST_COSINE - cosine)).normalize_or(geometric_normal)
 }
 
+/// Whether a surface scatters nothing into directions of its own.
+fn is_diffuse(surface: &Surface) -> bool {
+    match surface {
+        Surface::Diffuse { .. } | Surface::OrenNayar { .. } | Surface::DiffuseTransmission { .. } => true,
+        Surface::Mix { first, second, .. } => is_diffuse(first) && is_diffuse(second),
+        Surface::Mirror { .. }
+        | Surface::Conductor { .. }
+        | Surface::Dielectric { .. }
+        | Surface::ThinDielectric { .. }
+        | Surface::CoatedDiffuse { .. }
+        | Surface::CoatedConductor { .. }
+        | Surface::Phong { .. }
+        | Surface::Ward { .. }
+        | Surface::HeTorrance { .. }
+        | Surface::MetalRoughness(_) => false,
+    }
+}
+
+/// A shading normal, seen from `wo`, about which a mirror reflects the viewer away from the face: one about which it would not is turned
+/// until it just does (Keller and others, "The Iray Light Transport Simulation and Rendering System", 2017), since what goes below the face
+/// is lost.
+#[inline]
+fn mirroring_outwards(normal: Vec3, geometric_normal: Vec3, wo: Vec3) -> Vec3 {
+    let (height_of_viewer, cosine) = (wo.dot(geometric_normal), wo.dot(normal));
+    let height = 2.0 * cosine * normal.dot(geometric_normal) - height_of_viewer;
+    // A flat face keeps its own normal at any angle, whatever rounding says.
+    let least_height = (0.9 * height_of_viewer.abs()).min(0.01).copysign(height_of_viewer);
+    if height * height_of_viewer.signum() >= least_height.abs() {
+        return normal;
+    }
+    let mirrored = 2.0 * cosine * normal - wo;
+    mirroring_at(least_height, mirrored - height * geometric_normal, geometric_normal, wo)
+}
+
+/// The normal about which a mirror reflects `wo` to this height over the face, in the plane of the face's normal and a vector along the face.
+#[cold]
+fn mirroring_at(height: f32, along_face: Vec3, geometric_normal: Vec3, wo: Vec3) -> Vec3 {
+    let Some(along_face) = along_face.try_normalize() else { return geometric_normal };
+    let mirrored = (1.0 - height * height).sqrt() * along_face + height * geometric_normal;
+    height.signum() * (wo + mirrored).normalize_or(height.signum() * geometric_normal)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sampler::{hash_words, unit_of_hash};
     use crate::scene::{Encoding, StretchDirection, Texels, TextureId, TextureLookup, Wrap};
     use std::sync::Arc;
 
@@ -366,6 +411,44 @@ mod tests {
             let frame = stretched_frame(&material, &[texture(direction)], &point, Vec3::Z);
             let tangent = frame.to_world(Vec3::X);
             assert!(tangent.abs_diff_eq(expected, 0.01), "{rotation} {direction:?} {handedness}: {tangent}");
+        }
+    }
+
+    fn random_direction(index: u64, dimension: u64) -> Vec3 {
+        let number = |axis| 2.0 * unit_of_hash(hash_words(index, dimension + axis)) - 1.0;
+        Vec3::new(number(0), number(1), number(2)).normalize_or(Vec3::Z)
+    }
+
+    /// Rounding counts where faces are seen from their edges, so those are left out.
+    #[test]
+    fn turned_normals_mirror_the_viewer_away_from_the_face() {
+        for i in 0..10_000 {
+            let [face, wo, other] = [0, 3, 6].map(|dimension| random_direction(i, dimension));
+            let normal = (other + other.dot(face).signum() * face * 0.2).normalize();
+            let normal = seen_side(normal * normal.dot(face).signum(), face, wo);
+            let turned = mirroring_outwards(normal, face, wo);
+            let facing = wo.dot(face).signum();
+            let height = |normal: Vec3| facing * (2.0 * wo.dot(normal) * normal - wo).dot(face);
+            if facing * wo.dot(face) < 0.01 {
+                continue;
+            }
+            let least = (0.9 * facing * wo.dot(face)).min(0.01);
+            assert!((turned.length() - 1.0).abs() < 1e-5 && facing * turned.dot(wo) > 0.0, "{i}: {turned}");
+            assert!(height(turned) > least - 1e-4, "{i}: {} of {least}", height(turned));
+            assert!(turned == normal || height(normal) < least + 1e-4, "{i}: {normal} became {turned}");
+        }
+    }
+
+    /// Also where the face is nearly seen from its edge.
+    #[test]
+    fn a_faces_own_normal_stays() {
+        for i in 0..10_000 {
+            let face = random_direction(i, 0);
+            let along = face.any_orthonormal_vector();
+            for height in [0.0, 1e-8, 1e-6, 1e-3, 0.5, -1e-7, -0.1] {
+                let wo = (along + height * face).normalize();
+                assert_eq!(mirroring_outwards(face, face, wo), face, "{face} {height}");
+            }
         }
     }
 }

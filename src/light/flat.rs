@@ -30,7 +30,7 @@ pub(super) struct FlatEmitter {
     /// Unit normal of the front.
     pub(super) normal: Vec3,
     pub(super) area: f32,
-    /// How far before it a shadow ray ends.
+    /// How far before it a shadow ray ends: beyond the rounding of places on it.
     offset: f32,
     pub(super) both_sides: bool,
     /// No ray meets it.
@@ -173,7 +173,7 @@ impl FlatEmitter {
 
     /// A direction from a receiver to the emitter.
     pub(super) fn sample(&self, scene: &Scene, receiver: &LightReceiver, u: [f32; 2]) -> Option<LightSample> {
-        if self.area == 0.0 {
+        if self.area == 0.0 || self.is_level_with(receiver) {
             return None;
         }
         let from = receiver.position;
@@ -199,6 +199,9 @@ impl FlatEmitter {
 
     /// Density per steradian of a direction that reaches the emitter at this distance.
     pub(super) fn pdf(&self, receiver: &LightReceiver, direction: Vec3, distance: f32) -> f32 {
+        if self.is_level_with(receiver) {
+            return 0.0;
+        }
         let shares = || self.shares_of(receiver.position + distance * direction);
         self.view(receiver).pdf(self, direction, distance, shares)
     }
@@ -223,6 +226,12 @@ impl FlatEmitter {
             a * (1.0 - s1 - s2) + b * s1 + c * s2
         };
         emitted(material, &scene.textures, uv, cosine) * material.alpha.coverage(&scene.textures, uv)
+    }
+
+    /// Whether a receiver is in the emitter's own plane as far as rounding can tell: what such a one sees of it is up to what rays meet.
+    /// A place on the emitter itself may be a hair before it, and would see 2π sr of it.
+    fn is_level_with(&self, receiver: &LightReceiver) -> bool {
+        (self.corner - receiver.position).dot(self.normal).abs() <= self.offset
     }
 
     fn view(&self, receiver: &LightReceiver) -> View {

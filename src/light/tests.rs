@@ -9,7 +9,7 @@ use crate::scene::{
 };
 use glam::{Affine3A, Mat3, Vec2, Vec3, Vec3A};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
-use std::f32::consts::TAU;
+use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
 
 fn random(index: u64, dimension: u64) -> f32 {
@@ -404,5 +404,110 @@ fn kinds_of_light_are_chosen_by_what_arrives() {
         let bound = 4.0 * (variance(chosen, chosen_squares) + variance(evenly, evenly_squares)).sqrt();
         let (chosen, evenly) = (chosen / count as f64, evenly / count as f64);
         assert!((chosen - evenly).abs() < bound, "at {x}: {chosen} for {evenly} ± {bound}");
+    }
+}
+
+/// Irradiance that a receiver is told to have, from so many samples.
+fn irradiance(world: &World, lights: &Lights, receiver: &LightReceiver, samples: u64) -> f64 {
+    let value = |i| {
+        let sample = lights.sample(world, receiver, 0.0, [random(i, 31), random(i, 32), random(i, 33)])?;
+        Some(f64::from(sample.radiance.x * sample.direction.dot(receiver.normal).max(0.0) / sample.pdf))
+    };
+    (0..samples).map(|i| value(i).unwrap_or(0.0)).sum::<f64>() / samples as f64
+}
+
+/// A fan of triangles around the origin in the plane z = 0, as large as the unit disk.
+fn disk() -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    const CORNERS: u32 = 48;
+    let at = |i: u32| (i as f32 / CORNERS as f32 * TAU).sin_cos();
+    let rim = (0..CORNERS).map(|i| Vec3::new(at(i).1, at(i).0, 0.0));
+    let triangles = (0..CORNERS).map(|i| [0, 1 + i, 1 + (i + 1) % CORNERS]).collect();
+    (std::iter::once(Vec3::ZERO).chain(rim).collect(), triangles)
+}
+
+/// A flat lamp gives nothing to itself, wherever rounding puts a place on it: neither to its back nor, where it emits on both sides, to either.
+#[test]
+fn a_flat_lamp_does_not_light_itself() {
+    let square = vec![
+        Vec3::new(-1.0, -1.0, 0.0),
+        Vec3::new(1.0, -1.0, 0.0),
+        Vec3::new(1.0, 1.0, 0.0),
+        Vec3::new(-1.0, 1.0, 0.0),
+    ];
+    let slanted = vec![
+        Vec3::new(-1.0, -1.0, 0.0),
+        Vec3::new(0.5, -1.0, 0.0),
+        Vec3::new(1.0, 1.0, 0.0),
+        Vec3::new(-0.5, 1.0, 0.0),
+    ];
+    let shapes = [
+        ("rectangle", (square.clone(), vec![[0, 1, 2], [0, 2, 3]])),
+        ("parallelogram", (slanted, vec![[0, 1, 2], [0, 2, 3]])),
+        ("triangle", (square, vec![[0, 1, 3]])),
+        ("disk", disk()),
+    ];
+    for (name, (positions, triangles)) in shapes {
+        for (size, translation) in [
+            (1.0, Vec3::ZERO),
+            (0.01, Vec3::ZERO),
+            (100.0, Vec3::ZERO),
+            (1.0, Vec3::new(30.3, -7.7, 71.9)),
+            (0.1, Vec3::new(-913.7, 3.3, 1e-3)),
+        ] {
+            for angle in [1.0_f32, 37.0, 100.0, 120.0, 145.0, 170.0] {
+                for both_sides in [false, true] {
+                    let mut scene = Scene::default();
+                    let lamp = add_emitter(&mut scene, 1.0, both_sides);
+                    add_mesh(&mut scene, positions.clone(), triangles.clone(), lamp);
+                    let turn = Mat3::from_axis_angle(Vec3::new(1.0, 0.3, 0.1).normalize(), angle.to_radians());
+                    let to_world = Affine3A::from_mat3_translation(turn * size, translation);
+                    scene.instances[0].to_world = to_world;
+                    let world = World::new(Arc::new(scene));
+                    let lights = Lights::new(&world);
+                    let mut most = 0.0_f64;
+                    for i in 0..64 {
+                        let target = Vec3::new(random(i, 21), random(i, 22), 0.0) * 0.8 - Vec3::new(0.4, 0.4, 0.0);
+                        let from =
+                            target + Vec3::new(random(i, 23), random(i, 24), if i % 2 == 0 { 3.0 } else { -3.0 });
+                        let [target, from] = [target, from].map(|place| Vec3A::from(to_world.transform_point3(place)));
+                        let ray = Ray::new(from, (target - from).normalize());
+                        let Some(hit) = world.closest(&ray) else { continue };
+                        let point = world.surface(&ray, &hit);
+                        for normal in [point.geometric_normal, -point.geometric_normal] {
+                            let receiver = LightReceiver { position: point.position, normal };
+                            most = most.max(irradiance(&world, &lights, &receiver, 16));
+                        }
+                    }
+                    assert!(
+                        most < 1e-4,
+                        "{name}, size {size} at {translation}, {angle} degrees, both sides {both_sides}: {most}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// What is before a lamp by more than rounding has all of its light: right before it, π, and beside its rim, half of that.
+#[test]
+fn a_lamp_lights_what_nearly_touches_it() {
+    for (center, size) in [(Vec3::ZERO, 1.0), (Vec3::new(5.0, 2.0, -3.0), 1.0), (Vec3::ZERO, 30.0)] {
+        let mut scene = Scene::default();
+        let lamp = add_emitter(&mut scene, 1.0, false);
+        let (along_x, along_z) = (size * Vec3::X, size * Vec3::Z);
+        add_parallelogram(&mut scene, center - 0.5 * (along_x + along_z), along_x, along_z, lamp);
+        let world = World::new(Arc::new(scene));
+        let lights = Lights::new(&world);
+        for height in [1e-4 * size, 1e-5 * size, 1e-3 * size] {
+            let below = LightReceiver { position: center - height * Vec3::Y, normal: Vec3::Y };
+            let wall = LightReceiver { position: center + Vec3::new(0.5 * size, -height, 0.0), normal: -Vec3::X };
+            for (receiver, expected) in [(below, PI), (wall, 0.5 * PI)] {
+                let found = irradiance(&world, &lights, &receiver, 4096);
+                assert!(
+                    (found / f64::from(expected) - 1.0).abs() < 0.05,
+                    "{center} {size} {height}: {found} of {expected}"
+                );
+            }
+        }
     }
 }

@@ -1,13 +1,14 @@
 //! White furnaces: what a lossless surface returns in a constant environment is the environment.
 
 use crate::support::{
-    add_material, add_rectangle, add_sphere, block_key, constant_environment, diffuse, empty_scene, radiance_along,
-    trace_settings,
+    add_material, add_mesh, add_rectangle, add_sphere, block_key, constant_environment, diffuse, empty_scene,
+    radiance_along, trace_settings,
 };
 use fechner::geometry::Ray;
 use fechner::integrator::{PathTracer, Pruning, TraceSettings};
 use fechner::scene::{
-    ColorInput, MetalRoughness, Roughness, ScalarInput, Scene, Surface, Texels, Texture, TextureId, TextureLookup, Wrap,
+    ColorInput, Mesh, MetalRoughness, Roughness, ScalarInput, Scene, Surface, Texels, Texture, TextureId,
+    TextureLookup, Wrap,
 };
 use glam::{Vec3, Vec3A, vec3a};
 use std::sync::Arc;
@@ -238,5 +239,59 @@ fn layers_lie_over_volumes() {
     for (clearcoat, sheen) in [(1.0, 0.0), (0.0, 1.0), (1.0, 0.5)] {
         let layered = returned(clearcoat, sheen);
         assert!((0.7..0.9995).contains(&layered), "coat {clearcoat}, sheen {sheen}: {layered}");
+    }
+}
+
+/// A torus of 16 by 8 corners around the z axis with the normals of the smooth one.
+fn coarse_torus() -> Mesh {
+    const AROUND: u32 = 16;
+    const ACROSS: u32 = 8;
+    let turn = |number: u32, of: u32| (number as f32 / of as f32 * std::f32::consts::TAU).sin_cos();
+    let mut mesh = Mesh { name: "torus".to_owned(), ..Mesh::default() };
+    for (i, j) in (0..AROUND).flat_map(|i| (0..ACROSS).map(move |j| (i, j))) {
+        let ((sin_a, cos_a), (sin_b, cos_b)) = (turn(i, AROUND), turn(j, ACROSS));
+        let outwards = Vec3::new(cos_a, sin_a, 0.0);
+        let normal = cos_b * outwards + sin_b * Vec3::Z;
+        mesh.positions.push(0.7 * outwards + 0.32 * normal);
+        mesh.normals.push(normal);
+        let corner = |i: u32, j: u32| (i % AROUND) * ACROSS + j % ACROSS;
+        let [a, b, c, d] = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
+        mesh.triangles.extend([[a, b, c], [a, c, d]]);
+    }
+    mesh
+}
+
+/// What reflects as a mirror, in whole or in part, loses little where normals between the corners turn away from flat faces.
+#[test]
+fn silhouettes_of_smooth_meshes_lose_little() {
+    let plastic = Surface::CoatedDiffuse {
+        reflectance: ColorInput::constant(Vec3::ONE),
+        ior: 1.5,
+        roughness: Roughness::constant(0.0),
+        saturates: true,
+    };
+    for (name, surface, least_mean, least) in [
+        ("mirror", Surface::Mirror { reflectance: ColorInput::constant(Vec3::ONE) }, 0.999, 0.97),
+        ("dielectric", Surface::clear_dielectric(1.5), 0.99, 0.65),
+        ("plastic", plastic, 0.99, 0.9),
+    ] {
+        let mut scene = empty_scene();
+        scene.environment = constant_environment(1.0);
+        let material = add_material(&mut scene, surface, Vec3::ZERO);
+        add_mesh(&mut scene, coarse_torus(), material);
+        let tracer = PathTracer::new(Arc::new(scene), trace_settings(16, 16, 0));
+        let camera = vec3a(0.0, -3.0, 2.0);
+        let across = vec3a(0.0, 2.0, 3.0).normalize();
+        let values: Vec<f32> = (0..24 * 24)
+            .map(|i| {
+                let [x, y] = [i % 24, i / 24].map(|k| (k as f32 + 0.5) / 12.0 - 1.0);
+                let target = 1.1 * (x * Vec3A::X + y * across);
+                radiance_along(&tracer, Ray::new(camera, (target - camera).normalize()), 2, 128).0.x
+            })
+            .collect();
+        let mean = values.iter().sum::<f32>() / values.len() as f32;
+        let darkest = values.iter().copied().fold(1.0, f32::min);
+        println!("{name}: {mean:.4}, at darkest {darkest:.3}");
+        assert!(mean > least_mean && mean < 1.005 && darkest > least, "{name}: {mean}, at darkest {darkest}");
     }
 }

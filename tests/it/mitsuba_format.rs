@@ -125,6 +125,23 @@ fn a_checkerboard_of_numbers_begins_with_its_second() {
     }
 }
 
+/// A colour where a number is asked for is the mean of its channels, as in Mitsuba.
+#[test]
+fn colours_for_numbers_are_their_mean() {
+    let alpha_of = |opacity: &str| {
+        let scene = scene(&format!(
+            r#"<shape type="rectangle"><bsdf type="mask">{opacity}<bsdf type="diffuse"/></bsdf></shape>"#
+        ));
+        let Alpha::Blend { value } = scene.materials[0].alpha else { panic!("{:?}", scene.materials[0].alpha) };
+        value.evaluate(&scene.textures, Vec2::splat(0.2))
+    };
+    let plain = alpha_of(r#"<rgb name="opacity" value="0.9, 0.2, 0.1"/>"#);
+    let squares = alpha_of(
+        r#"<texture name="opacity" type="checkerboard"><rgb name="color0" value="0"/><rgb name="color1" value="0.9, 0.2, 0.1"/></texture>"#,
+    );
+    assert!((plain - 0.4).abs() < 1e-6 && (squares - 0.4).abs() < 1e-6, "{plain} {squares}");
+}
+
 #[test]
 fn what_lies_beyond_a_picture_is_told_where_it_is_not_rendered() {
     let of_mode = |mode: &str| {

@@ -59,22 +59,28 @@ pub(crate) fn add_sphere(scene: &mut Scene, center: Vec3, radius: f32, material:
     });
 }
 
+/// Adds a mesh where it is.
+pub(crate) fn add_mesh(scene: &mut Scene, mesh: Mesh, material: MaterialId) {
+    scene.instances.push(Instance {
+        name: mesh.name.clone(),
+        mesh: MeshId(scene.meshes.len() as u32),
+        material,
+        to_world: Affine3A::IDENTITY,
+        motion: None,
+    });
+    scene.meshes.push(mesh);
+}
+
 /// Adds a parallelogram with the normal `edge_u` × `edge_v`.
 pub(crate) fn add_rectangle(scene: &mut Scene, corner: Vec3, edge_u: Vec3, edge_v: Vec3, material: MaterialId) {
-    scene.meshes.push(Mesh {
+    let mesh = Mesh {
         name: "rectangle".to_owned(),
         positions: vec![corner, corner + edge_u, corner + edge_u + edge_v, corner + edge_v],
         uvs: vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y],
         triangles: vec![[0, 1, 2], [0, 2, 3]],
         ..Mesh::default()
-    });
-    scene.instances.push(Instance {
-        name: "rectangle".to_owned(),
-        mesh: MeshId(scene.meshes.len() as u32 - 1),
-        material,
-        to_world: Affine3A::IDENTITY,
-        motion: None,
-    });
+    };
+    add_mesh(scene, mesh, material);
 }
 
 pub(crate) fn trace_settings(width: u32, height: u32, seed: u64) -> TraceSettings {

@@ -1,10 +1,9 @@
 //! `<bsdf>` and its wrappers.
 
 use super::super::error::{LoadError, names_of};
-use super::super::luminance;
 use super::element::Element;
 use super::surfaces::PLAIN;
-use super::textures::Meaning;
+use super::textures::{Meaning, number_of};
 use super::{Reader, blend};
 use crate::scene::{Alpha, ColorInput, HeightMap, HeightUnit, Material, Relief, ScalarInput, Surface};
 use glam::Vec3;
@@ -136,7 +135,7 @@ impl Reader {
         };
         let input = self.texture(&texture, Meaning::Number, 0)?;
         let height =
-            ScalarInput { factor: scale * luminance(input.factor), texture: input.texture.map(|lookup| (lookup, 0)) };
+            ScalarInput { factor: scale * number_of(input.factor), texture: input.texture.map(|lookup| (lookup, 0)) };
         Ok(height.texture.map(|_| Relief::Heights(HeightMap { height, unit: HeightUnit::Scene })))
     }
 

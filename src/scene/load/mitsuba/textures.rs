@@ -1,9 +1,9 @@
 //! Colours, spectra and `<texture>`.
 
 use super::super::error::LoadError;
+use super::super::files;
 use super::super::spectrum::Spectrum;
 use super::super::texture::{Adjust, IfMissing, Number, Picture, Request, has_alpha, is_grey};
-use super::super::{files, luminance};
 use super::Reader;
 use super::element::{Element, canonical};
 use super::transform;
@@ -17,9 +17,14 @@ use std::rc::Rc;
 pub(super) enum Meaning {
     Reflectance,
     Coefficient,
-    /// A single number: colours mean their luminance.
+    /// A single number: colours mean that of [`number_of`], pictures their luminance, as in Mitsuba 3.
     Number,
     Light,
+}
+
+/// What a colour means where a number is asked for: the mean of its channels.
+pub(super) fn number_of(color: Vec3) -> f32 {
+    color.element_sum() / 3.0
 }
 
 /// Deepest chain of textures and colours that use each other.
@@ -155,7 +160,7 @@ impl Reader {
             return Ok(owner.float(name)?.map(ScalarInput::constant));
         }
         let Some(color) = self.color_input(owner, name, Meaning::Number)? else { return Ok(None) };
-        Ok(Some(ScalarInput { factor: luminance(color.factor), texture: color.texture.map(|lookup| (lookup, 0)) }))
+        Ok(Some(ScalarInput { factor: number_of(color.factor), texture: color.texture.map(|lookup| (lookup, 0)) }))
     }
 
     /// The opacity of a mask. A picture with an alpha channel means that channel in files before version 2, whose exporters wrote leaves
@@ -279,7 +284,7 @@ impl Reader {
         let mut color = |name: &str, default: f32| -> Result<[f32; 4], LoadError> {
             let color = self.nested_color(texture, name, Meaning::Reflectance, depth + 1)?;
             let color = color.unwrap_or(Vec3::splat(default));
-            let color = if meaning == Meaning::Number { Vec3::splat(luminance(color)) } else { color };
+            let color = if meaning == Meaning::Number { Vec3::splat(number_of(color)) } else { color };
             Ok(color.extend(1.0).to_array())
         };
         let (mut first, mut second) = (color("color0", 0.4)?, color("color1", 0.2)?);
