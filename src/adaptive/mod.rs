@@ -227,6 +227,7 @@ pub fn decide(
 
 impl<'a> Loop<'a> {
     fn new(tracer: &'a PathTracer, settings: &'a LoopSettings, state: RenderState) -> Self {
+        let resumed_at = Instant::now();
         let is_below = |rung: f64, bound: Option<f64>| bound.is_none_or(|bound| rung < bound);
         let is_left = |&rung: &f64| is_below(rung, state.finished_rung) && is_below(rung, state.left_rung);
         let rungs = settings.rungs().into_iter().filter(is_left).collect();
@@ -240,7 +241,7 @@ impl<'a> Loop<'a> {
             settings,
             rungs,
             state,
-            resumed_at: Instant::now(),
+            resumed_at,
             seconds_before,
             looked: None,
             samples_to_meet_lamps: OnceCell::new(),

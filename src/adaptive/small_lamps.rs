@@ -5,7 +5,7 @@
 
 use super::missed::FoundLight;
 use super::settings::Limits;
-use crate::film::Film;
+use crate::film::{Film, KnownLamps};
 use fechner_perception::Plane;
 use fechner_perception::tone::Pixel;
 
@@ -51,32 +51,40 @@ fn wanted(share: f32, meetings: f64) -> u32 {
 /// the display, over how often chance lets so many samples meet them (Poisson's distribution). Once they are met oftener, their own scatter
 /// tells. `None` where no lamps are known.
 ///
-/// Forty lamps far out of focus cover 300 pixels each by a thousandth or less: few of those showed any noise, so that renders asked for 8 stopped
-/// at 21 to 56 with 8 % of the light missing. `found`: what is found besides. `shown`: what is displayed of a pixel's luminance, both cd/m².
+/// Of forty lamps far out of focus few neighbours had met one, and renders asked for 8 stopped at 51 to 53 with 46 % of the light missing.
+/// `found`: what is found besides. `shown`: what is displayed of a pixel's luminance, both cd/m².
 pub(super) fn unmet_noise(
     film: &Film,
     found: &FoundLight,
     nits_per_unit: f64,
-    shown: impl Fn(Pixel, f32) -> f32,
+    shown: impl Fn(Pixel, f32) -> f32 + Sync,
 ) -> Option<Plane> {
     let lamps = film.known_lamps.as_ref()?;
     let width = film.width() as usize;
-    let mut mean_square = Plane::filled(width, film.height() as usize, 0.0);
-    for (index, mean_square) in mean_square.values_mut().iter_mut().enumerate() {
-        let (share, samples) = (f64::from(lamps.share(index)), f64::from(film.samples(index)));
-        let expected_meetings = share * samples;
-        if expected_meetings > 0.0 && expected_meetings < MEETINGS {
-            let light = nits_per_unit * f64::from(lamps.light(index));
-            let of_one_meeting = light / expected_meetings;
-            let besides = (f64::from(found.mean_cd_m2.values()[index]) - light).max(0.0);
-            let pixel = Pixel { x: index % width, y: index / width };
-            let shown = |light: f64| f64::from(shown(pixel, (besides + light) as f32));
-            let whole = shown(light);
-            let square = |meetings: f64| (shown(meetings * of_one_meeting) - whole).powi(2);
-            *mean_square = mean_of_poisson(expected_meetings, square) as f32;
+    Some(Plane::from_fn(width, film.height() as usize, |x, y| {
+        let index = y * width + x;
+        if !is_unmet(film, index) {
+            return 0.0;
         }
-    }
-    Some(mean_square)
+        let expected_meetings = expected_meetings(film, lamps, index);
+        let light = nits_per_unit * f64::from(lamps.light(index));
+        let of_one_meeting = light / expected_meetings;
+        let besides = (f64::from(found.mean_cd_m2.values()[index]) - light).max(0.0);
+        let shown = |light: f64| f64::from(shown(Pixel { x, y }, (besides + light) as f32));
+        let whole = shown(light);
+        let square = |meetings: f64| (shown(meetings * of_one_meeting) - whole).powi(2);
+        mean_of_poisson(expected_meetings, square) as f32
+    }))
+}
+
+/// Whether a pixel has known lamps that its samples are expected to have met fewer than [`MEETINGS`] times.
+pub(super) fn is_unmet(film: &Film, pixel: usize) -> bool {
+    let expected = film.known_lamps.as_ref().map_or(0.0, |lamps| expected_meetings(film, lamps, pixel));
+    expected > 0.0 && expected < MEETINGS
+}
+
+fn expected_meetings(film: &Film, lamps: &KnownLamps, pixel: usize) -> f64 {
+    f64::from(lamps.share(pixel)) * f64::from(film.samples(pixel))
 }
 
 /// The mean of what depends on a count that is `expected` on average, but for a hundred-thousandth of the cases.
@@ -95,6 +103,10 @@ fn mean_of_poisson(expected: f64, of_count: impl Fn(f64) -> f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::film::BlockSum;
+    use crate::integrator::{BlockWork, FirstHit, PathSample};
+    use crate::sampler::Half;
+    use glam::Vec3;
 
     /// Of a count that is 3 on average the variance is 3, too.
     #[test]
@@ -103,6 +115,32 @@ mod tests {
             let variance = mean_of_poisson(expected, |count| (count - expected).powi(2));
             assert!((variance / expected - 1.0).abs() < 0.01, "{variance} for {expected}");
         }
+    }
+
+    /// A lamp that half a per cent of samples meets brings 1 unit. Of sixteen samples, most meet it not at all: what is missing is all of it, and
+    /// now and then there is too much. Of 2000, ten do, and their own scatter tells.
+    #[test]
+    fn what_few_samples_met_is_noise() {
+        let noise = |samples: u32, shown: fn(f32) -> f32| {
+            let mut film = Film::new(1, 1);
+            let mut sum = BlockSum::default();
+            let first_hit = FirstHit { albedo: Vec3::ONE, normal: Vec3::Z, depth: 1.0, object_id: 1, shines: false };
+            (0..samples).for_each(|_| sum.add(&PathSample { radiance: Vec3::ZERO, first_hit, rays: 1 }));
+            film.merge_block(BlockWork { samples, ..BlockWork::whole(0, Half::A, 0) }, &sum);
+            let found = FoundLight::of_film(&film, 10.0);
+            assert!(unmet_noise(&film, &found, 10.0, |_, light| light).is_none(), "no lamps are known");
+            let mut lamps = KnownLamps::new(1);
+            lamps.add(0, 0.005, 200.0, true);
+            film.known_lamps = Some(lamps);
+            f64::from(unmet_noise(&film, &found, 10.0, |_, light| shown(light)).expect("known").get(0, 0))
+        };
+        // The variance of a count of 0.08 is 0.08, of which each is 125 cd/m².
+        let of_sixteen = noise(16, |light| light);
+        assert!((of_sixteen / (0.08 * 125.0 * 125.0) - 1.0).abs() < 0.01, "{of_sixteen}");
+        // On a display whose white is 20 cd/m², too much shows no more than too little.
+        let clipped = noise(16, |light| light.min(20.0));
+        assert!((clipped / 100.0 - 1.0).abs() < 0.01, "{clipped}");
+        assert_eq!(noise(2000, |light| light), 0.0);
     }
 
     /// Lamps that cover 3 % of a pixel, with more of them fewer meetings, then none.

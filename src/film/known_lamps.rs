@@ -14,7 +14,8 @@ struct KnownLamp {
     share: f32,
     /// What these bring to its mean: luminance in scene units.
     light: f32,
-    /// Whether it has at least half as much of one of them as any pixel.
+    /// Whether it is one of those that have much of one of them: at least half as much as the pixel that has the lamp's middle, or that a lens
+    /// blurs it over.
     is_main: bool,
 }
 
@@ -24,8 +25,8 @@ impl KnownLamps {
         Self { pixels: vec![KnownLamp::default(); pixels] }
     }
 
-    /// Adds a piece of a lamp of this luminance, scene units, that so much of a pixel's samples meets. `is_main`: at least half as much as any
-    /// pixel's.
+    /// Adds a piece of a lamp of this luminance, scene units, that so much of a pixel's samples meets. `is_main`: it is one of those that
+    /// have much of the lamp.
     pub fn add(&mut self, pixel: usize, share: f32, luminance: f32, is_main: bool) {
         let lamp = &mut self.pixels[pixel];
         lamp.share += share;
@@ -43,7 +44,7 @@ impl KnownLamps {
         self.pixels[pixel].share
     }
 
-    /// The same in pixels that have at least half as much of a lamp as any; 0 in others.
+    /// The same in pixels that have much of a lamp; 0 in others.
     pub fn main_shares(&self) -> impl Iterator<Item = f32> {
         self.pixels.iter().map(|lamp| if lamp.is_main { lamp.share } else { 0.0 })
     }

@@ -23,12 +23,16 @@ const LONGEST_SLICE_PX: f64 = 0.5;
 const THICK_PX: f64 = 1.5;
 /// Farther outside the film nothing shines into it, in pixels, but for its blur: strips are no higher, and pixel filters no wider.
 const BORDER_PX: f64 = 3.5;
-/// Rays that look for lamps. The rest of the lamps is left to chance.
+/// Spots that are looked for, and rays that look for them: each from fewer points of the lens where there are many. The rest of the lamps is
+/// left to chance.
 const MOST_RAYS: usize = 1 << 18;
+/// Pixels that spots are spread over, one after the other, some 0.2 s. The rest of the lamps is left to chance.
+const MOST_PIXELS: f64 = (1 << 26) as f64;
 /// What is blurred no wider than this, in pixels, is seen as from the middle of the lens.
 const LEAST_BLUR_PX: f32 = 0.25;
-/// Points of the lens, squared, from which each spot is looked for that is blurred.
+/// Points of the lens, squared, from which each spot is looked for that is blurred, where there are rays enough.
 const LENS_POINTS_A_SIDE: usize = 8;
+const LENS_POINTS: usize = LENS_POINTS_A_SIDE * LENS_POINTS_A_SIDE;
 /// Each of these sees a spot at a place of its own; between these, its light is spread as far as this, over the blur.
 const SPREAD: f32 = 0.25;
 
@@ -52,15 +56,21 @@ impl PathTracer {
             return None;
         }
         let area = self.settings.film_area();
-        let mut spots = Spots { camera: &self.camera, area, rays: 0, found: Vec::new() };
+        let mut spots = Spots { camera: &self.camera, area, found: Vec::new() };
         self.lights.still_parts(&self.world).for_each(|part| spots.add(&part));
+        let points_of_each = (MOST_RAYS / spots.found.len().max(1)).clamp(1, LENS_POINTS);
         let mut shares = Shares {
             area,
             density: self.settings.filter.density(),
             lamps: KnownLamps::new(area.width as usize * area.height as usize),
         };
-        for spot in &spots.found {
-            let lens = lens_points(spot.blur_px);
+        let mut pixels_left = MOST_PIXELS;
+        for (number, spot) in spots.found.iter().enumerate() {
+            let lens = lens_points(spot.blur_px, number * points_of_each, points_of_each);
+            pixels_left -= lens.len() as f64 * shares.pixels_of(SPREAD * spot.blur_px);
+            if pixels_left < 0.0 {
+                break;
+            }
             let area_px2 = spot.area_px2 / lens.len() as f32;
             for place_px in lens.into_iter().filter_map(|lens| self.seen_at(spot, lens)) {
                 shares.add(&Piece { place_px, area_px2, spread_px: SPREAD * spot.blur_px, luminance: spot.luminance });
@@ -80,14 +90,16 @@ impl PathTracer {
     }
 }
 
-/// Points of the lens, by their [`CameraSample::lens`], from which what is blurred so far is looked for.
-fn lens_points(blur_px: Vec2) -> Vec<[f32; 2]> {
+/// So many points of the lens, by their [`CameraSample::lens`], from which what is blurred so far is looked for; others for another `first`.
+fn lens_points(blur_px: Vec2, first: usize, count: usize) -> Vec<[f32; 2]> {
+    /// From one to the next: has no divisor in common with their number, and goes to and fro over the lens.
+    const STRIDE: usize = 27;
     if !is_blurred(blur_px) {
         return vec![[0.5; 2]];
     }
     let at = |index: usize| (index as f32 + 0.5) / LENS_POINTS_A_SIDE as f32;
-    let all = 0..LENS_POINTS_A_SIDE * LENS_POINTS_A_SIDE;
-    all.map(|index| [at(index % LENS_POINTS_A_SIDE), at(index / LENS_POINTS_A_SIDE)]).collect()
+    let of = |index: usize| [at(index % LENS_POINTS_A_SIDE), at(index / LENS_POINTS_A_SIDE)];
+    (first..first + count).map(|index| of(index * STRIDE % LENS_POINTS)).collect()
 }
 
 fn is_blurred(blur_px: Vec2) -> bool {
@@ -103,6 +115,15 @@ struct Piece {
     luminance: f32,
 }
 
+/// Whether what is spread so far is spread over pixels.
+fn is_spread(spread_px: Vec2) -> bool {
+    spread_px.min_element() >= 1.0
+}
+
+fn ellipse_px2(half_axes_px: Vec2) -> f64 {
+    PI * f64::from(half_axes_px.x) * f64::from(half_axes_px.y)
+}
+
 /// Shares of the film's pixels.
 struct Shares {
     area: Crop,
@@ -113,7 +134,13 @@ struct Shares {
 impl Shares {
     /// Adds a piece to each pixel whose samples may meet it.
     fn add(&mut self, piece: &Piece) {
-        if piece.spread_px.min_element() >= 1.0 { self.add_spread(piece) } else { self.add_sharp(piece) }
+        if is_spread(piece.spread_px) { self.add_spread(piece) } else { self.add_sharp(piece) }
+    }
+
+    /// How many pixels a piece is added to, about, that is spread so far.
+    fn pixels_of(&self, spread_px: Vec2) -> f64 {
+        let film = f64::from(self.area.width) * f64::from(self.area.height);
+        if is_spread(spread_px) { ellipse_px2(spread_px).min(film) } else { 9.0 }
     }
 
     fn add_sharp(&mut self, piece: &Piece) {
@@ -130,14 +157,16 @@ impl Shares {
         }
     }
 
-    /// As evenly over all pixels whose middle is in an ellipse.
+    /// Evenly over the pixels of the film whose middle is in an ellipse.
     fn add_spread(&mut self, piece: &Piece) {
         let Piece { place_px, spread_px, .. } = *piece;
-        let low = (place_px - spread_px).floor();
-        let [columns, rows] = (place_px + spread_px - low).ceil().to_array().map(|count| count as u32);
+        let film_from = Vec2::new(self.area.x as f32, self.area.y as f32);
+        let film_to = film_from + Vec2::new(self.area.width as f32, self.area.height as f32);
+        let low = (place_px - spread_px).floor().max(film_from);
+        let [columns, rows] = ((place_px + spread_px).min(film_to) - low).ceil().to_array().map(|count| count as u32);
         let all = (0..rows).flat_map(|y| (0..columns).map(move |x| low + Vec2::new(x as f32, y as f32)));
         let is_in = |pixel: &Vec2| ((*pixel + 0.5 - place_px) / spread_px).length_squared() <= 1.0;
-        let share = piece.area_px2 / all.clone().filter(is_in).count().max(1) as f32;
+        let share = (f64::from(piece.area_px2) / ellipse_px2(spread_px)) as f32;
         all.filter(is_in).for_each(|pixel| self.add_share(pixel, share, piece.luminance, true));
     }
 
@@ -156,13 +185,14 @@ struct Spots<'a> {
     camera: &'a CameraRays,
     /// Outside of which nothing is looked for.
     area: Crop,
-    /// That look for what is found.
-    rays: usize,
     found: Vec<Spot>,
 }
 
 impl Spots<'_> {
     fn add(&mut self, part: &LampPart) {
+        if self.found.len() >= MOST_RAYS {
+            return;
+        }
         let [luminance, ..] = opponent(part.radiance.as_dvec3().to_array()).map(|value| value as f32);
         match part.shape {
             LampShape::Triangle { corners, front } => {
@@ -172,16 +202,8 @@ impl Spots<'_> {
                 }
             }
             LampShape::Sphere { center, radius } => {
-                self.sphere(center, radius, luminance).into_iter().for_each(|spot| self.push(spot));
+                self.found.extend(self.sphere(center, radius, luminance));
             }
-        }
-    }
-
-    fn push(&mut self, spot: Spot) {
-        let rays = self.rays + if is_blurred(spot.blur_px) { LENS_POINTS_A_SIDE * LENS_POINTS_A_SIDE } else { 1 };
-        if rays <= MOST_RAYS {
-            self.rays = rays;
-            self.found.push(spot);
         }
     }
 
@@ -220,14 +242,15 @@ impl Spots<'_> {
         let [a, b, c] = corners.map(|corner| corner.as_dvec3());
         let normal = (b - a).cross(c - a);
         let border_px = BORDER_PX + f64::from(blur_px.max_element());
-        for slice in strip.slices(self.area, LONGEST_SLICE_PX.max(0.5 * blur), border_px) {
+        let most = MOST_RAYS - self.found.len();
+        for slice in strip.slices(self.area, LONGEST_SLICE_PX.max(0.5 * blur), border_px).take(most) {
             let ray = self.camera.ray_through(slice.place_px.as_vec2());
             let (origin, direction) = (Vec3::from(ray.origin).as_dvec3(), Vec3::from(ray.direction).as_dvec3());
             let distance = normal.dot(a - origin) / normal.dot(direction);
             if distance.is_finite() && distance > 0.0 {
                 let position = (origin + distance * direction).as_vec3();
-                let area_px2 = slice.area_px2 as f32;
-                self.push(Spot { position, area_px2, radius: 0.0, blur_px, luminance });
+                let (area_px2, blur_px) = (slice.area_px2 as f32, self.camera.blur_px(position));
+                self.found.push(Spot { position, area_px2, radius: 0.0, blur_px, luminance });
             }
         }
     }

@@ -5,7 +5,7 @@ use fechner::adaptive;
 use fechner::adaptive::Quiet;
 use fechner::adaptive::settings::Sampling;
 use fechner::film::Film;
-use fechner::integrator::{BlockWork, PathTracer, SamplePlan, TraceSettings};
+use fechner::integrator::{BlockWork, Crop, PathTracer, SamplePlan, TraceSettings};
 use fechner::sampler::{Half, PixelFilter};
 use fechner::scene::load::{LoadOptions, load};
 use fechner::scene::{Alpha, ScalarInput, Scene};
@@ -100,6 +100,29 @@ fn shares_of_blurred_lamps_are_what_samples_find() {
             assert!((ratio - 1.0).abs() < 0.1 && elsewhere < 0.35, "{name} over {blur_px}: {ratio}, {elsewhere}");
         }
     }
+}
+
+/// What a lens blurs over the whole picture and far beyond comes to an end, and what a film is a part of has the shares of the whole.
+#[test]
+fn blurred_lamps_are_looked_for_within_the_film() {
+    let scene = |blur_px: f32, depth: f32, radius: f32| {
+        let mut scene = empty_scene();
+        add_material(&mut scene, diffuse(0.0), Vec3::ONE);
+        blur(&mut scene, blur_px);
+        add_sphere(&mut scene, Vec3::new(0.0, 0.0, 5.0 - depth), radius, LAMP);
+        Arc::new(scene)
+    };
+    let near = PathTracer::new(scene(6.0, 5e-3, 5e-4), trace_settings(4096, 4096, 1));
+    assert!(shares_of(&near).is_none_or(|shares| shares.iter().all(|share| share.is_finite())));
+
+    let whole = trace_settings(SIDE, SIDE, 1);
+    let crop = Crop { x: 5, y: 3, width: 7, height: 4 };
+    let shares = |settings| shares_of(&PathTracer::new(scene(6.0, 5.0, 0.05), settings)).expect("a blurred lamp");
+    let (of_whole, of_part) = (shares(whole), shares(TraceSettings { crop: Some(crop), ..whole }));
+    let part_of_whole = (0..crop.height).flat_map(|y| (0..crop.width).map(move |x| [crop.x + x, crop.y + y]));
+    let expected: Vec<f32> = part_of_whole.map(|[x, y]| of_whole[(y * SIDE + x) as usize]).collect();
+    assert_eq!(of_part, expected);
+    assert!(expected.iter().all(|&share| share > 0.0));
 }
 
 /// Forty balls far out of focus, of which a render asked for 8 saw a few and left out 46 ± 3 % of their light.
